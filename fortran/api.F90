@@ -1,0 +1,589 @@
+!> The flat face of the kernel: routines jf_* for Fortran 77, modern Fortran, C and Python alike. No algebra here.
+!>
+!> Every routine is one symbol, `jf_name_`, which FORTRAN 77 programs reach by CALL JF_NAME, C programs by jointfrf.h and
+!> modern Fortran by this module. CHARACTER arguments are single letters without hidden lengths.
+!>
+!> Common to all:
+!> trans       'N': a line's matrix is stored h(out, in, freq), Fortran's habit. 'T': h(in, out, freq), which is the array
+!>             (freq, out, in) of C and numpy seen from Fortran. It holds for all matrices of a call, unless said
+!>             otherwise.
+!> n_freq      number of frequency lines; 0 is allowed and does nothing
+!> line_info   shape (n_freq), status of each line: 0 good, > 0 singular (LAPACK's INFO), -1 NaN or Inf in the line,
+!>             -2 its result overflows. A bad line is filled with NaN; the others are not touched by it.
+!> rcond       shape (n_freq), reciprocal condition number (1-norm) of the worst matrix inverted in the line; 0 in a bad
+!>             line, 1 where nothing is inverted
+!> info        0 good; -i argument i is wrong and nothing was done; > 0 number of bad lines; -1000 no memory
+!> Time convention exp(+i w t). Input and output arrays must not overlap.
+module jointfrf
+  use, intrinsic :: iso_c_binding, only: c_char, c_double, c_double_complex, c_int
+  use jointfrf_arguments, only: as_lines, as_matrix, bad_offsets, is_transposed, lower, names, not_finite, out_of_range, &
+    repeated, spread_text, unknown_equation, unknown_order
+  use jointfrf_compliance, only: compliance_covariance, compliance_factors, joint_compliance
+  use jointfrf_coupling, only: couple
+  use jointfrf_decoupling, only: decouple
+  use jointfrf_dynamic_stiffness, only: receptance_banded, receptance_dense
+  use jointfrf_finite_difference, only: difference_weights, transform_receptance
+  use jointfrf_ismm, only: inverse_substructuring, ismm
+  use jointfrf_linear_algebra, only: invert, solve
+  use jointfrf_modal, only: receptance_modal
+  use jointfrf_modification, only: find_modification, modify
+  use jointfrf_status, only: info_good, info_text, line_text
+  implicit none
+  private
+
+  public :: jf_version, jf_info_text, jf_line_text
+  public :: jf_invert, jf_solve
+  public :: jf_receptance, jf_receptance_banded, jf_receptance_modal
+  public :: jf_couple, jf_modify, jf_find_modification
+  public :: jf_ismm, jf_inverse_substructuring, jf_decouple
+  public :: jf_joint_compliance, jf_compliance_factors, jf_compliance_covariance
+  public :: jf_difference_weights, jf_central_difference, jf_transform
+
+contains
+
+  !> Version of the library.
+  subroutine jf_version(major, minor, patch) bind(C, name='jf_version_')
+    integer(c_int), intent(out) :: major, minor, patch
+
+    major = JF_VERSION_MAJOR
+    minor = JF_VERSION_MINOR
+    patch = JF_VERSION_PATCH
+  end subroutine jf_version
+
+  !> What an `info` means, in words.
+  !> info     as returned by any routine
+  !> n_text   characters of room, 80 suffice
+  !> text     shape (n_text), padded with blanks, no terminating null
+  subroutine jf_info_text(info, n_text, text) bind(C, name='jf_info_text_')
+    integer(c_int), intent(in) :: info, n_text
+    character(kind=c_char), intent(out) :: text(n_text)
+
+    call spread_text(info_text(info), text)
+  end subroutine jf_info_text
+
+  !> What a `line_info` means, in words. Arguments as in jf_info_text.
+  subroutine jf_line_text(line_info, n_text, text) bind(C, name='jf_line_text_')
+    integer(c_int), intent(in) :: line_info, n_text
+    character(kind=c_char), intent(out) :: text(n_text)
+
+    call spread_text(line_text(line_info), text)
+  end subroutine jf_line_text
+
+  !> Inverse of every line.
+  !> n           order of the matrices
+  !> a           shape (n, n, n_freq); the order of storage does not matter
+  !> a_inverse   shape (n, n, n_freq)
+  subroutine jf_invert(n, n_freq, a, a_inverse, line_info, rcond, info) bind(C, name='jf_invert_')
+    integer(c_int), intent(in) :: n, n_freq
+    complex(c_double_complex), target, intent(in) :: a(n, n, n_freq)
+    complex(c_double_complex), target, intent(out) :: a_inverse(n, n, n_freq)
+    integer(c_int), intent(out) :: line_info(n_freq)
+    real(c_double), intent(out) :: rcond(n_freq)
+    integer(c_int), intent(out) :: info
+
+    info = info_good
+    if (n_freq < 0) info = -2
+    if (n < 0) info = -1
+    if (info /= info_good) return
+    call invert(a, a_inverse, line_info, rcond, info)
+  end subroutine jf_invert
+
+  !> Solve A X = B on every line.
+  !> n       order of the matrices
+  !> n_rhs   number of right-hand sides
+  !> a       shape (n, n, n_freq)
+  !> b, x    shape (n, n_rhs, n_freq), or (n_rhs, n, n_freq) with trans 'T'
+  subroutine jf_solve(trans, n, n_rhs, n_freq, a, b, x, line_info, rcond, info) bind(C, name='jf_solve_')
+    character(kind=c_char), intent(in) :: trans
+    integer(c_int), intent(in) :: n, n_rhs, n_freq
+    complex(c_double_complex), target, intent(in) :: a(n, n, n_freq), b(*)
+    complex(c_double_complex), target, intent(inout) :: x(*)
+    integer(c_int), intent(out) :: line_info(n_freq)
+    real(c_double), intent(out) :: rcond(n_freq)
+    integer(c_int), intent(out) :: info
+    complex(c_double_complex), pointer, contiguous :: b_lines(:, :, :), x_lines(:, :, :)
+
+    info = info_good
+    if (n_freq < 0) info = -4
+    if (n_rhs < 0) info = -3
+    if (n < 0) info = -2
+    if (unknown_order(trans)) info = -1
+    if (info /= info_good) return
+    call as_lines(trans, n, n_rhs, n_freq, b, b_lines)
+    call as_lines(trans, n, n_rhs, n_freq, x, x_lines)
+    call solve(is_transposed(trans), a, b_lines, x_lines, line_info, rcond, info)
+  end subroutine jf_solve
+
+  !> Receptance of a model by solving, dense (zgesv). Eqs. (2.28), (2.29): ((1 + i eta) K + i H + i w C - w^2 M)^-1.
+  !> n              number of DOFs of the model
+  !> n_out, n_in    number of responses and of forces
+  !> omega          angular frequencies, shape (n_freq), rad/s
+  !> stiffness      K, shape (n, n), N/m
+  !> mass           M, same shape, kg
+  !> n_damping      n, or 0 for no viscous damping: damping is not read then
+  !> damping        C, shape (n, n_damping), N s/m
+  !> n_structural   n, or 0 for no structural damping matrix: structural is not read then
+  !> structural     H, shape (n, n_structural), N/m
+  !> loss_factor    eta of the whole stiffness, K (1 + i eta)
+  !> outputs        DOFs of the response, shape (n_out), counted from 1
+  !> inputs         DOFs of the force, shape (n_in), counted from 1
+  !> h              receptance, shape (n_out, n_in, n_freq), or (n_in, n_out, n_freq) with trans 'T', m/N
+  subroutine jf_receptance(trans, n, n_freq, n_out, n_in, omega, stiffness, mass, n_damping, damping, &
+                           n_structural, structural, loss_factor, outputs, inputs, h, line_info, rcond, info) &
+    bind(C, name='jf_receptance_')
+    character(kind=c_char), intent(in) :: trans
+    integer(c_int), intent(in) :: n, n_freq, n_out, n_in, n_damping, n_structural
+    real(c_double), target, intent(in) :: omega(n_freq), stiffness(n, n), mass(n, n)
+    real(c_double), target, intent(in) :: damping(n, n_damping), structural(n, n_structural)
+    real(c_double), intent(in) :: loss_factor
+    integer(c_int), target, intent(in) :: outputs(n_out), inputs(n_in)
+    complex(c_double_complex), target, intent(inout) :: h(*)
+    integer(c_int), intent(out) :: line_info(n_freq)
+    real(c_double), intent(out) :: rcond(n_freq)
+    integer(c_int), intent(out) :: info
+    complex(c_double_complex), pointer, contiguous :: h_lines(:, :, :)
+
+    info = info_good
+    if (out_of_range(inputs, n)) info = -15
+    if (out_of_range(outputs, n)) info = -14
+    if (not_finite(loss_factor)) info = -13
+    if (n_structural /= 0 .and. n_structural /= n) info = -11
+    if (n_damping /= 0 .and. n_damping /= n) info = -9
+    if (n_in < 0) info = -5
+    if (n_out < 0) info = -4
+    if (n_freq < 0) info = -3
+    if (n < 0) info = -2
+    if (unknown_order(trans)) info = -1
+    if (info /= info_good) return
+    call as_lines(trans, n_out, n_in, n_freq, h, h_lines)
+    call receptance_dense(is_transposed(trans), omega, stiffness, mass, damping, structural, loss_factor, outputs, &
+                          inputs, h_lines, line_info, rcond, info)
+  end subroutine jf_receptance
+
+  !> The same for band matrices in LAPACK's band storage, entry (i, j) at (ku + 1 + i - j, j); zgbtrf and zgbtrs (zgbsv).
+  !> trans          concerns h only
+  !> n              number of DOFs of the model
+  !> kl, ku         number of diagonals below and above the main one
+  !> n_out, n_in    number of responses and of forces
+  !> omega          angular frequencies, shape (n_freq), rad/s
+  !> stiffness      K, shape (kl + ku + 1, n), N/m
+  !> mass           M, same shape, kg
+  !> n_damping      n, or 0 for no viscous damping: damping is not read then
+  !> damping        C, shape (kl + ku + 1, n_damping), N s/m
+  !> n_structural   n, or 0 for no structural damping matrix: structural is not read then
+  !> structural     H, shape (kl + ku + 1, n_structural), N/m
+  !> loss_factor    eta of the whole stiffness, K (1 + i eta)
+  !> outputs        DOFs of the response, shape (n_out), counted from 1
+  !> inputs         DOFs of the force, shape (n_in), counted from 1
+  !> h              receptance, shape (n_out, n_in, n_freq), or (n_in, n_out, n_freq) with trans 'T', m/N
+  subroutine jf_receptance_banded(trans, n, kl, ku, n_freq, n_out, n_in, omega, stiffness, mass, n_damping, &
+                                  damping, n_structural, structural, loss_factor, outputs, inputs, h, &
+                                  line_info, rcond, info) bind(C, name='jf_receptance_banded_')
+    character(kind=c_char), intent(in) :: trans
+    integer(c_int), intent(in) :: n, kl, ku, n_freq, n_out, n_in, n_damping, n_structural
+    real(c_double), target, intent(in) :: omega(n_freq), stiffness(kl + ku + 1, n), mass(kl + ku + 1, n)
+    real(c_double), target, intent(in) :: damping(kl + ku + 1, n_damping), structural(kl + ku + 1, n_structural)
+    real(c_double), intent(in) :: loss_factor
+    integer(c_int), target, intent(in) :: outputs(n_out), inputs(n_in)
+    complex(c_double_complex), target, intent(inout) :: h(*)
+    integer(c_int), intent(out) :: line_info(n_freq)
+    real(c_double), intent(out) :: rcond(n_freq)
+    integer(c_int), intent(out) :: info
+    complex(c_double_complex), pointer, contiguous :: h_lines(:, :, :)
+
+    info = info_good
+    if (out_of_range(inputs, n)) info = -17
+    if (out_of_range(outputs, n)) info = -16
+    if (not_finite(loss_factor)) info = -15
+    if (n_structural /= 0 .and. n_structural /= n) info = -13
+    if (n_damping /= 0 .and. n_damping /= n) info = -11
+    if (n_in < 0) info = -7
+    if (n_out < 0) info = -6
+    if (n_freq < 0) info = -5
+    if (ku < 0 .or. ku > max(0, n - 1)) info = -4
+    if (kl < 0 .or. kl > max(0, n - 1)) info = -3
+    if (n < 0) info = -2
+    if (unknown_order(trans)) info = -1
+    if (info /= info_good) return
+    call as_lines(trans, n_out, n_in, n_freq, h, h_lines)
+    call receptance_banded(is_transposed(trans), kl, ku, omega, stiffness, mass, damping, structural, loss_factor, &
+                           outputs, inputs, h_lines, line_info, rcond, info)
+  end subroutine jf_receptance_banded
+
+  !> Receptance by superposition of modes: sum of phi_out phi_in / (lambda (1 + i eta) - w^2 + i w c), unit modal masses.
+  !> n_modes       number of modes
+  !> n_out, n_in   number of responses and of forces
+  !> omega         angular frequencies, shape (n_freq), rad/s
+  !> stiffness     lambda = w_r^2, shape (n_modes), (rad/s)^2
+  !> damping       c = 2 zeta w_r, shape (n_modes), rad/s
+  !> loss_factor   eta, shape (n_modes)
+  !> shapes_out    shape (n_out, n_modes), or (n_modes, n_out) with trans 'T', 1/sqrt(kg)
+  !> shapes_in     shape (n_in, n_modes), or (n_modes, n_in) with trans 'T', 1/sqrt(kg)
+  !> h             receptance, shape (n_out, n_in, n_freq), or (n_in, n_out, n_freq) with trans 'T', m/N
+  !> line_info     > 0: the mode without damping that the line hits exactly
+  subroutine jf_receptance_modal(trans, n_modes, n_freq, n_out, n_in, omega, stiffness, damping, loss_factor, &
+                                 shapes_out, shapes_in, h, line_info, rcond, info) bind(C, name='jf_receptance_modal_')
+    character(kind=c_char), intent(in) :: trans
+    integer(c_int), intent(in) :: n_modes, n_freq, n_out, n_in
+    real(c_double), target, intent(in) :: omega(n_freq), stiffness(n_modes), damping(n_modes), loss_factor(n_modes)
+    real(c_double), target, intent(in) :: shapes_out(*), shapes_in(*)
+    complex(c_double_complex), target, intent(inout) :: h(*)
+    integer(c_int), intent(out) :: line_info(n_freq)
+    real(c_double), intent(out) :: rcond(n_freq)
+    integer(c_int), intent(out) :: info
+    real(c_double), pointer, contiguous :: out_matrix(:, :), in_matrix(:, :)
+    complex(c_double_complex), pointer, contiguous :: h_lines(:, :, :)
+
+    info = info_good
+    if (n_in < 0) info = -5
+    if (n_out < 0) info = -4
+    if (n_freq < 0) info = -3
+    if (n_modes < 0) info = -2
+    if (unknown_order(trans)) info = -1
+    if (info /= info_good) return
+    call as_matrix(trans, n_out, n_modes, shapes_out, out_matrix)
+    call as_matrix(trans, n_in, n_modes, shapes_in, in_matrix)
+    call as_lines(trans, n_out, n_in, n_freq, h, h_lines)
+    call receptance_modal(is_transposed(trans), omega, stiffness, damping, loss_factor, out_matrix, in_matrix, h_lines, &
+                          line_info, rcond, info)
+  end subroutine jf_receptance_modal
+
+  !> Receptance of A and B coupled by a flexible joint, all blocks. Eqs. (2.24)-(2.26), (2.42)-(2.45).
+  !> n_a, n_b   number of DOFs of A and of B
+  !> n_j        number of joint DOFs
+  !> h_a        receptance of A, shape (n_a, n_a, n_freq), m/N (rotational rows and columns rad/N, m/(N m), rad/(N m))
+  !> h_b        receptance of B, shape (n_b, n_b, n_freq)
+  !> k_joint    complex joint stiffness K*, shape (n_j, n_j, n_freq), N/m; DOFs without stiffness are allowed
+  !> dofs_a     joint DOFs j among those of A, shape (n_j), counted from 1, none twice
+  !> dofs_b     joint DOFs k among those of B, shape (n_j), in the same order, none twice
+  !> h_c        receptance of the assembly, DOFs of A, then of B, shape (n_a + n_b, n_a + n_b, n_freq)
+  subroutine jf_couple(trans, n_a, n_b, n_j, n_freq, h_a, h_b, k_joint, dofs_a, dofs_b, h_c, line_info, rcond, &
+                       info) bind(C, name='jf_couple_')
+    character(kind=c_char), intent(in) :: trans
+    integer(c_int), intent(in) :: n_a, n_b, n_j, n_freq
+    complex(c_double_complex), target, intent(in) :: h_a(n_a, n_a, n_freq), h_b(n_b, n_b, n_freq)
+    complex(c_double_complex), target, intent(in) :: k_joint(n_j, n_j, n_freq)
+    integer(c_int), target, intent(in) :: dofs_a(n_j), dofs_b(n_j)
+    complex(c_double_complex), target, intent(out) :: h_c(n_a + n_b, n_a + n_b, n_freq)
+    integer(c_int), intent(out) :: line_info(n_freq)
+    real(c_double), intent(out) :: rcond(n_freq)
+    integer(c_int), intent(out) :: info
+
+    info = info_good
+    if (out_of_range(dofs_b, n_b) .or. repeated(dofs_b)) info = -10
+    if (out_of_range(dofs_a, n_a) .or. repeated(dofs_a)) info = -9
+    if (n_freq < 0) info = -5
+    if (n_j < 0 .or. n_j > min(n_a, n_b)) info = -4
+    if (n_b < 0) info = -3
+    if (n_a < 0) info = -2
+    if (unknown_order(trans)) info = -1
+    if (info /= info_good) return
+    call couple(is_transposed(trans), h_a, h_b, k_joint, dofs_a, dofs_b, h_c, line_info, rcond, info)
+  end subroutine jf_couple
+
+  !> Receptance of a locally modified structure. Eqs. (2.34)-(2.36).
+  !> n       number of DOFs
+  !> n_m     number of modified DOFs
+  !> alpha   receptance before, shape (n, n, n_freq), m/N
+  !> d       dynamic stiffness added at the modified DOFs, shape (n_m, n_m, n_freq), N/m
+  !> dofs    the modified DOFs, shape (n_m), counted from 1, none twice
+  !> gamma   receptance after, shape (n, n, n_freq), m/N
+  subroutine jf_modify(trans, n, n_m, n_freq, alpha, d, dofs, gamma, line_info, rcond, info) bind(C, name='jf_modify_')
+    character(kind=c_char), intent(in) :: trans
+    integer(c_int), intent(in) :: n, n_m, n_freq
+    complex(c_double_complex), target, intent(in) :: alpha(n, n, n_freq), d(n_m, n_m, n_freq)
+    integer(c_int), target, intent(in) :: dofs(n_m)
+    complex(c_double_complex), target, intent(out) :: gamma(n, n, n_freq)
+    integer(c_int), intent(out) :: line_info(n_freq)
+    real(c_double), intent(out) :: rcond(n_freq)
+    integer(c_int), intent(out) :: info
+
+    info = info_good
+    if (out_of_range(dofs, n) .or. repeated(dofs)) info = -7
+    if (n_freq < 0) info = -4
+    if (n_m < 0 .or. n_m > n) info = -3
+    if (n < 0) info = -2
+    if (unknown_order(trans)) info = -1
+    if (info /= info_good) return
+    call modify(is_transposed(trans), alpha, d, dofs, gamma, line_info, rcond, info)
+  end subroutine jf_modify
+
+  !> The modification D = alpha^-1 (alpha - gamma) gamma^-1 that turns alpha into gamma. Eqs. (2.40), (2.47).
+  !> n       number of DOFs
+  !> alpha   receptance before, shape (n, n, n_freq), m/N
+  !> gamma   receptance after, shape (n, n, n_freq), m/N
+  !> d       dynamic stiffness added, shape (n, n, n_freq), N/m
+  subroutine jf_find_modification(trans, n, n_freq, alpha, gamma, d, line_info, rcond, info) &
+    bind(C, name='jf_find_modification_')
+    character(kind=c_char), intent(in) :: trans
+    integer(c_int), intent(in) :: n, n_freq
+    complex(c_double_complex), target, intent(in) :: alpha(n, n, n_freq), gamma(n, n, n_freq)
+    complex(c_double_complex), target, intent(out) :: d(n, n, n_freq)
+    integer(c_int), intent(out) :: line_info(n_freq)
+    real(c_double), intent(out) :: rcond(n_freq)
+    integer(c_int), intent(out) :: info
+
+    info = info_good
+    if (n_freq < 0) info = -3
+    if (n < 0) info = -2
+    if (unknown_order(trans)) info = -1
+    if (info /= info_good) return
+    call find_modification(is_transposed(trans), alpha, gamma, d, line_info, rcond, info)
+  end subroutine jf_find_modification
+
+  !> Joint stiffness by inverse structural modification, K* = K0 - D_jk. Eqs. (2.37)-(2.48).
+  !> n           number of joint DOFs
+  !> alpha       calculated receptance of the assembly with K0 at DOFs j, then k, shape (2 n, 2 n, n_freq), m/N
+  !> gamma       measured receptance of the assembly, same DOFs, shape (2 n, 2 n, n_freq), m/N
+  !> k_initial   K0, shape (n, n, n_freq), N/m
+  !> k_joint     K*, shape (n, n, n_freq), N/m
+  subroutine jf_ismm(trans, n, n_freq, alpha, gamma, k_initial, k_joint, line_info, rcond, info) &
+    bind(C, name='jf_ismm_')
+    character(kind=c_char), intent(in) :: trans
+    integer(c_int), intent(in) :: n, n_freq
+    complex(c_double_complex), target, intent(in) :: alpha(2*n, 2*n, n_freq), gamma(2*n, 2*n, n_freq)
+    complex(c_double_complex), target, intent(in) :: k_initial(n, n, n_freq)
+    complex(c_double_complex), target, intent(out) :: k_joint(n, n, n_freq)
+    integer(c_int), intent(out) :: line_info(n_freq)
+    real(c_double), intent(out) :: rcond(n_freq)
+    integer(c_int), intent(out) :: info
+
+    info = info_good
+    if (n_freq < 0) info = -3
+    if (n < 0) info = -2
+    if (unknown_order(trans)) info = -1
+    if (info /= info_good) return
+    call ismm(is_transposed(trans), alpha, gamma, k_initial, k_joint, line_info, rcond, info)
+  end subroutine jf_ismm
+
+  !> Joint stiffness K* = -(gamma^-1)_jk, which ISMM is where alpha was assembled through K0.
+  !> n         number of joint DOFs
+  !> gamma     measured receptance of the assembly at DOFs j, then k, shape (2 n, 2 n, n_freq), m/N
+  !> k_joint   K*, shape (n, n, n_freq), N/m
+  subroutine jf_inverse_substructuring(trans, n, n_freq, gamma, k_joint, line_info, rcond, info) &
+    bind(C, name='jf_inverse_substructuring_')
+    character(kind=c_char), intent(in) :: trans
+    integer(c_int), intent(in) :: n, n_freq
+    complex(c_double_complex), target, intent(in) :: gamma(2*n, 2*n, n_freq)
+    complex(c_double_complex), target, intent(out) :: k_joint(n, n, n_freq)
+    integer(c_int), intent(out) :: line_info(n_freq)
+    real(c_double), intent(out) :: rcond(n_freq)
+    integer(c_int), intent(out) :: info
+
+    info = info_good
+    if (n_freq < 0) info = -3
+    if (n < 0) info = -2
+    if (unknown_order(trans)) info = -1
+    if (info /= info_good) return
+    call inverse_substructuring(is_transposed(trans), gamma, k_joint, line_info, rcond, info)
+  end subroutine jf_inverse_substructuring
+
+  !> Joint stiffness by FRF decoupling, by one of four equations. Eqs. (2.53)-(2.56).
+  !> equation   two letters, responding point and excited point: 'rr' (2.53), 'rs' (2.54), 'sr' (2.55), 'ss' (2.56)
+  !> n_a, n_b   number of DOFs of A and of B
+  !> n          number of joint DOFs, and of internal DOFs at each point used
+  !> h_a        receptance of A, shape (n_a, n_a, n_freq), m/N
+  !> h_b        receptance of B, shape (n_b, n_b, n_freq), m/N
+  !> h_c        measured receptance of the assembly, first point by second point, shape (n, n, n_freq), m/N
+  !> dofs_j     joint DOFs among those of A, shape (n), counted from 1
+  !> dofs_k     joint DOFs among those of B, shape (n), in the same order
+  !> dofs_r     internal DOFs of A, shape (n); must be valid only where the equation names r
+  !> dofs_s     internal DOFs of B, shape (n); must be valid only where the equation names s
+  !> k_joint    K*, shape (n, n, n_freq), N/m
+  subroutine jf_decouple(equation, trans, n_a, n_b, n, n_freq, h_a, h_b, h_c, dofs_j, dofs_k, dofs_r, dofs_s, &
+                         k_joint, line_info, rcond, info) bind(C, name='jf_decouple_')
+    character(kind=c_char), intent(in) :: equation(2)
+    character(kind=c_char), intent(in) :: trans
+    integer(c_int), intent(in) :: n_a, n_b, n, n_freq
+    complex(c_double_complex), target, intent(in) :: h_a(n_a, n_a, n_freq), h_b(n_b, n_b, n_freq), h_c(n, n, n_freq)
+    integer(c_int), target, intent(in) :: dofs_j(n), dofs_k(n), dofs_r(n), dofs_s(n)
+    complex(c_double_complex), target, intent(out) :: k_joint(n, n, n_freq)
+    integer(c_int), intent(out) :: line_info(n_freq)
+    real(c_double), intent(out) :: rcond(n_freq)
+    integer(c_int), intent(out) :: info
+
+    info = info_good
+    if (names(equation, 's') .and. (out_of_range(dofs_s, n_b) .or. repeated(dofs_s))) info = -13
+    if (names(equation, 'r') .and. (out_of_range(dofs_r, n_a) .or. repeated(dofs_r))) info = -12
+    if (out_of_range(dofs_k, n_b) .or. repeated(dofs_k)) info = -11
+    if (out_of_range(dofs_j, n_a) .or. repeated(dofs_j)) info = -10
+    if (n_freq < 0) info = -6
+    if (n < 0 .or. n > min(n_a, n_b)) info = -5
+    if (n_b < 0) info = -4
+    if (n_a < 0) info = -3
+    if (unknown_order(trans)) info = -2
+    if (unknown_equation(equation)) info = -1
+    if (info /= info_good) return
+    call decouple(lower(equation), is_transposed(trans), h_a, h_b, h_c, dofs_j, dofs_k, dofs_r, dofs_s, k_joint, &
+                  line_info, rcond, info)
+  end subroutine jf_decouple
+
+  !> Joint compliance C = gamma_kk gamma_jk^-1 gamma_jj - gamma_kj = K*^-1, without model or first estimate.
+  !> n         number of joint DOFs
+  !> gamma     receptance of the assembly at DOFs j, then k, shape (2 n, 2 n, n_freq), m/N
+  !> c_joint   C, shape (n, n, n_freq), m/N
+  subroutine jf_joint_compliance(trans, n, n_freq, gamma, c_joint, line_info, rcond, info) &
+    bind(C, name='jf_joint_compliance_')
+    character(kind=c_char), intent(in) :: trans
+    integer(c_int), intent(in) :: n, n_freq
+    complex(c_double_complex), target, intent(in) :: gamma(2*n, 2*n, n_freq)
+    complex(c_double_complex), target, intent(out) :: c_joint(n, n, n_freq)
+    integer(c_int), intent(out) :: line_info(n_freq)
+    real(c_double), intent(out) :: rcond(n_freq)
+    integer(c_int), intent(out) :: info
+
+    info = info_good
+    if (n_freq < 0) info = -3
+    if (n < 0) info = -2
+    if (unknown_order(trans)) info = -1
+    if (info /= info_good) return
+    call joint_compliance(is_transposed(trans), gamma, c_joint, line_info, rcond, info)
+  end subroutine jf_joint_compliance
+
+  !> How a small change of the measured FRFs moves the joint compliance, dC = U dh V to first order, gamma = T h T^T.
+  !> n            number of joint DOFs
+  !> m            number of measured points and directions
+  !> gamma        receptance about which is linearised, shape (2 n, 2 n, n_freq), m/N
+  !> transform    T, shape (2 n, m), or (m, 2 n) with trans 'T'; the unit matrix where gamma itself was measured
+  !> factors      U above V^T, shape (2 n, m, n_freq), or (m, 2 n, n_freq) with trans 'T'
+  subroutine jf_compliance_factors(trans, n, m, n_freq, gamma, transform, factors, line_info, rcond, info) &
+    bind(C, name='jf_compliance_factors_')
+    character(kind=c_char), intent(in) :: trans
+    integer(c_int), intent(in) :: n, m, n_freq
+    complex(c_double_complex), target, intent(in) :: gamma(2*n, 2*n, n_freq)
+    real(c_double), target, intent(in) :: transform(*)
+    complex(c_double_complex), target, intent(inout) :: factors(*)
+    integer(c_int), intent(out) :: line_info(n_freq)
+    real(c_double), intent(out) :: rcond(n_freq)
+    integer(c_int), intent(out) :: info
+    real(c_double), pointer, contiguous :: matrix(:, :)
+    complex(c_double_complex), pointer, contiguous :: factor_lines(:, :, :)
+
+    info = info_good
+    if (n_freq < 0) info = -4
+    if (m < 0) info = -3
+    if (n < 0) info = -2
+    if (unknown_order(trans)) info = -1
+    if (info /= info_good) return
+    call as_matrix(trans, 2*n, m, transform, matrix)
+    call as_lines(trans, 2*n, m, n_freq, factors, factor_lines)
+    call compliance_factors(is_transposed(trans), gamma, matrix, factor_lines, line_info, rcond, info)
+  end subroutine jf_compliance_factors
+
+  !> Covariance of the entries of the joint compliance from the noise of the measured FRFs, to first order.
+  !> The noise is circular and independent between the measured entries; gamma = T h T^T.
+  !> reciprocal   0: h used as measured; 1: h made reciprocal, (h + h^T)/2
+  !> n            number of joint DOFs
+  !> m            number of measured points and directions
+  !> gamma        receptance about which is linearised, shape (2 n, 2 n, n_freq), m/N
+  !> transform    T, shape (2 n, m), or (m, 2 n) with trans 'T'; the unit matrix where gamma itself was measured
+  !> variance     E|e|^2 of the measured FRFs, shape (m, m, n_freq), (m/N)^2
+  !> covariance   shape (n^2, n^2, n_freq), (m/N)^2; entry ab of C counts as C lies in memory
+  subroutine jf_compliance_covariance(trans, reciprocal, n, m, n_freq, gamma, transform, variance, covariance, &
+                                      line_info, rcond, info) bind(C, name='jf_compliance_covariance_')
+    character(kind=c_char), intent(in) :: trans
+    integer(c_int), intent(in) :: reciprocal, n, m, n_freq
+    complex(c_double_complex), target, intent(in) :: gamma(2*n, 2*n, n_freq)
+    real(c_double), target, intent(in) :: transform(*), variance(m, m, n_freq)
+    complex(c_double_complex), target, intent(out) :: covariance(n*n, n*n, n_freq)
+    integer(c_int), intent(out) :: line_info(n_freq)
+    real(c_double), intent(out) :: rcond(n_freq)
+    integer(c_int), intent(out) :: info
+    real(c_double), pointer, contiguous :: matrix(:, :)
+
+    info = info_good
+    if (n_freq < 0) info = -5
+    if (m < 0) info = -4
+    if (n < 0) info = -3
+    if (reciprocal /= 0 .and. reciprocal /= 1) info = -2
+    if (unknown_order(trans)) info = -1
+    if (info /= info_good) return
+    call as_matrix(trans, 2*n, m, transform, matrix)
+    call compliance_covariance(is_transposed(trans), gamma, matrix, variance, reciprocal == 1, covariance, &
+                               line_info, rcond, info)
+  end subroutine jf_compliance_covariance
+
+  !> Weights for displacement and slope at a reference from points along a line. Eq. (2.59) for any spacing.
+  !> m         number of points, at least 2
+  !> offset    positions of the points from the reference, shape (m), no two equal, m
+  !> weights   shape (2, m): first row displacement, second row slope, 1/m
+  subroutine jf_difference_weights(m, offset, weights, info) bind(C, name='jf_difference_weights_')
+    integer(c_int), intent(in) :: m
+    real(c_double), intent(in) :: offset(m)
+    real(c_double), intent(out) :: weights(2, m)
+    integer(c_int), intent(out) :: info
+
+    info = info_good
+    if (bad_offsets(offset)) info = -2
+    if (m < 2) info = -1
+    if (info /= info_good) return
+    call difference_weights(offset, weights)
+  end subroutine jf_difference_weights
+
+  !> Displacement and rotation receptances at a reference from translational ones along a line. Eqs. (2.57)-(2.59).
+  !> m        number of points, at least 2
+  !> offset   positions of the points from the reference, shape (m), no two equal, m
+  !> h        measured receptance of the points, shape (m, m, n_freq), m/N
+  !> h_new    shape (2, 2, n_freq): displacement, then slope du/ds
+  subroutine jf_central_difference(trans, m, n_freq, offset, h, h_new, line_info, rcond, info) &
+    bind(C, name='jf_central_difference_')
+    character(kind=c_char), intent(in) :: trans
+    integer(c_int), intent(in) :: m, n_freq
+    real(c_double), intent(in) :: offset(m)
+    complex(c_double_complex), target, intent(in) :: h(m, m, n_freq)
+    complex(c_double_complex), target, intent(out) :: h_new(2, 2, n_freq)
+    integer(c_int), intent(out) :: line_info(n_freq)
+    real(c_double), intent(out) :: rcond(n_freq)
+    integer(c_int), intent(out) :: info
+    real(c_double) :: weights(2, m), weights_transposed(m, 2)
+
+    info = info_good
+    if (bad_offsets(offset)) info = -4
+    if (n_freq < 0) info = -3
+    if (m < 2) info = -2
+    if (unknown_order(trans)) info = -1
+    if (info /= info_good) return
+    call difference_weights(offset, weights)
+    if (is_transposed(trans)) then
+      weights_transposed = transpose(weights)
+      call transform_receptance(.true., h, weights_transposed, weights_transposed, h_new, line_info, rcond, info)
+    else
+      call transform_receptance(.false., h, weights, weights, h_new, line_info, rcond, info)
+    end if
+  end subroutine jf_central_difference
+
+  !> H_new = T_out H T_in^T on every line. Eq. (2.57) for any number of points and DOFs.
+  !> n_out, n_in   size of the result
+  !> m_out, m_in   size of the measured matrix
+  !> h             shape (m_out, m_in, n_freq), or (m_in, m_out, n_freq) with trans 'T'
+  !> t_out         shape (n_out, m_out), or (m_out, n_out) with trans 'T'
+  !> t_in          shape (n_in, m_in), or (m_in, n_in) with trans 'T'
+  !> h_new         shape (n_out, n_in, n_freq), or (n_in, n_out, n_freq) with trans 'T'
+  subroutine jf_transform(trans, n_out, n_in, m_out, m_in, n_freq, h, t_out, t_in, h_new, line_info, rcond, &
+                          info) bind(C, name='jf_transform_')
+    character(kind=c_char), intent(in) :: trans
+    integer(c_int), intent(in) :: n_out, n_in, m_out, m_in, n_freq
+    complex(c_double_complex), target, intent(in) :: h(*)
+    real(c_double), target, intent(in) :: t_out(*), t_in(*)
+    complex(c_double_complex), target, intent(inout) :: h_new(*)
+    integer(c_int), intent(out) :: line_info(n_freq)
+    real(c_double), intent(out) :: rcond(n_freq)
+    integer(c_int), intent(out) :: info
+    complex(c_double_complex), pointer, contiguous :: h_lines(:, :, :), new_lines(:, :, :)
+    real(c_double), pointer, contiguous :: out_matrix(:, :), in_matrix(:, :)
+
+    info = info_good
+    if (n_freq < 0) info = -6
+    if (m_in < 0) info = -5
+    if (m_out < 0) info = -4
+    if (n_in < 0) info = -3
+    if (n_out < 0) info = -2
+    if (unknown_order(trans)) info = -1
+    if (info /= info_good) return
+    call as_lines(trans, m_out, m_in, n_freq, h, h_lines)
+    call as_lines(trans, n_out, n_in, n_freq, h_new, new_lines)
+    call as_matrix(trans, n_out, m_out, t_out, out_matrix)
+    call as_matrix(trans, n_in, m_in, t_in, in_matrix)
+    call transform_receptance(is_transposed(trans), h_lines, out_matrix, in_matrix, new_lines, line_info, rcond, info)
+  end subroutine jf_transform
+end module jointfrf

@@ -1,0 +1,312 @@
+!> Joint compliance K*^-1 straight from receptances of the assembly at the joint, without model, first estimate or band,
+!> and how measurement noise comes through.
+module jointfrf_compliance
+  use jointfrf_kinds, only: dp, ip
+  use jointfrf_line_layout, only: all_finite, load, store, store_nan, take_block
+  use jointfrf_lines_lapack, only: inverse_work, product_line, solve_line
+  use jointfrf_status, only: line_good, line_not_finite, line_overflow
+  use jointfrf_sweep, only: line_operation, line_space, run_sweep
+  implicit none
+  private
+  public :: joint_compliance, compliance_covariance, compliance_factors
+
+  type, extends(line_operation) :: compliance
+    logical :: transposed
+    integer :: n
+    complex(dp), pointer, contiguous :: gamma(:, :, :), c_joint(:, :, :)
+  contains
+    procedure :: line => compliance_one
+    procedure :: void => void_compliance
+  end type compliance
+
+  !> What both linearisations share.
+  type, abstract, extends(line_operation) :: linearisation
+    logical :: transposed
+    integer :: n, m
+    complex(dp), pointer, contiguous :: gamma(:, :, :)
+    real(dp), allocatable :: transform(:, :)    !< (2 n, m)
+  end type linearisation
+
+  type, extends(linearisation) :: factorisation
+    complex(dp), pointer, contiguous :: factors(:, :, :)
+  contains
+    procedure :: line => factor_one
+    procedure :: void => void_factors
+  end type factorisation
+
+  type, extends(linearisation) :: propagation
+    logical :: reciprocal
+    complex(dp), pointer, contiguous :: covariance(:, :, :)
+    real(dp), pointer, contiguous :: variance(:, :, :)
+  contains
+    procedure :: line => propagate_one
+    procedure :: void => void_covariance
+  end type propagation
+
+contains
+
+  !> C = gamma_kk gamma_jk^-1 gamma_jj - gamma_kj = K*^-1.
+  !>
+  !> Exact, because with gamma^-1 = [[Z_A + K*, -K*], [-K*, Z_B + K*]] one has gamma_kk gamma_jk^-1 = K*^-1 (Z_A + K*) and
+  !> (Z_A + K*) gamma_jj - K* gamma_kj = I. Noise enters C almost linearly; it enters K* through an inverse.
+  !> gamma     receptance of the assembly at DOFs j, then k, shape (2 n, 2 n, n_freq), m/N
+  !> c_joint   joint compliance, shape (n, n, n_freq), m/N
+  subroutine joint_compliance(transposed, gamma, c_joint, line_info, rcond, info)
+    logical, intent(in) :: transposed
+    complex(dp), contiguous, target, intent(in) :: gamma(:, :, :)
+    complex(dp), contiguous, target, intent(out) :: c_joint(:, :, :)
+    integer(ip), contiguous, intent(out) :: line_info(:)
+    real(dp), contiguous, intent(out) :: rcond(:)
+    integer(ip), intent(out) :: info
+    type(compliance) :: operation
+    integer :: n
+
+    n = size(c_joint, 1)
+    operation%transposed = transposed
+    operation%n = n
+    operation%gamma => gamma
+    operation%c_joint => c_joint
+    operation%n_complex = 8*n**2 + inverse_work(n)
+    operation%n_real = 2*n
+    operation%n_pivot = n
+    operation%flops = 19.0_dp*real(n, dp)**3
+    call run_sweep(operation, size(gamma, 3, kind=ip), line_info, rcond, info)
+  end subroutine joint_compliance
+
+  subroutine compliance_one(self, i, space, line_info, rcond)
+    class(compliance), intent(in) :: self
+    integer, intent(in) :: i
+    type(line_space), target, intent(inout) :: space
+    integer(ip), intent(out) :: line_info
+    real(dp), intent(out) :: rcond
+    complex(dp), pointer, contiguous :: gamma(:, :), gamma_jk(:, :), gamma_kk(:, :), right(:, :), c(:, :)
+    integer :: n
+
+    line_info = line_not_finite
+    rcond = 0.0_dp
+    if (.not. all_finite(self%gamma(:, :, i))) return
+    n = self%n
+    gamma => space%matrix(2*n, 2*n)
+    gamma_jk => space%matrix(n, n)
+    gamma_kk => space%matrix(n, n)
+    right => space%matrix(n, n)
+    c => space%matrix(n, n)
+    call load(self%transposed, self%gamma(:, :, i), gamma)
+    call take_block(.false., 1.0_dp, gamma, 0, n, gamma_jk)
+    call take_block(.false., 1.0_dp, gamma, n, n, gamma_kk)
+    call take_block(.false., 1.0_dp, gamma, 0, 0, right)
+    call solve_line(gamma_jk, right, space, line_info, rcond)       ! gamma_jk^-1 gamma_jj
+    if (line_info /= line_good) return
+    call take_block(.false., -1.0_dp, gamma, n, 0, c)
+    call product_line('N', 'N', 1.0_dp, gamma_kk, right, c)
+    if (.not. all_finite(c)) line_info = line_overflow
+    call store(self%transposed, c, self%c_joint(:, :, i))
+  end subroutine compliance_one
+
+  subroutine void_compliance(self, i)
+    class(compliance), intent(in) :: self
+    integer, intent(in) :: i
+
+    call store_nan(self%c_joint(:, :, i))
+  end subroutine void_compliance
+
+  !> How a small change of the measured FRFs moves C: dC = U dh V, to first order.
+  !>
+  !> With gamma = T h T^T, L = gamma_kk gamma_jk^-1 and R = gamma_jk^-1 gamma_jj:
+  !>   dC = [L, -I] dgamma [I; -R],   so   U = [L, -I] T,   V = T^T [I; -R]
+  !> gamma        receptance about which is linearised, shape (2 n, 2 n, n_freq), m/N
+  !> transform    T, shape (2 n, m), (m, 2 n) where transposed: from measured points to DOFs j, then k; the unit matrix
+  !>              where gamma itself was measured
+  !> factors      U above V^T, shape (2 n, m, n_freq), (m, 2 n, n_freq) where transposed
+  subroutine compliance_factors(transposed, gamma, transform, factors, line_info, rcond, info)
+    logical, intent(in) :: transposed
+    complex(dp), contiguous, target, intent(in) :: gamma(:, :, :)
+    real(dp), contiguous, intent(in) :: transform(:, :)
+    complex(dp), contiguous, target, intent(out) :: factors(:, :, :)
+    integer(ip), contiguous, intent(out) :: line_info(:)
+    real(dp), contiguous, intent(out) :: rcond(:)
+    integer(ip), intent(out) :: info
+    type(factorisation) :: operation
+    integer :: n, m
+
+    call set_linearisation(operation, transposed, gamma, transform)
+    operation%factors => factors
+    n = operation%n
+    m = operation%m
+    operation%n_complex = operation%n_complex + 2*n*m
+    operation%flops = 43.0_dp*real(n, dp)**3 + 8.0_dp*real(n, dp)**2*m
+    call run_sweep(operation, size(gamma, 3, kind=ip), line_info, rcond, info)
+  end subroutine compliance_factors
+
+  subroutine set_linearisation(operation, transposed, gamma, transform)
+    class(linearisation), intent(inout) :: operation
+    logical, intent(in) :: transposed
+    complex(dp), contiguous, target, intent(in) :: gamma(:, :, :)
+    real(dp), contiguous, intent(in) :: transform(:, :)
+
+    operation%transposed = transposed
+    operation%n = size(gamma, 1)/2
+    operation%gamma => gamma
+    if (transposed) then
+      operation%transform = transpose(transform)
+    else
+      operation%transform = transform
+    end if
+    operation%m = size(operation%transform, 2)
+    operation%n_complex = 7*operation%n**2 + 2*operation%n*operation%m + inverse_work(operation%n)
+    operation%n_real = 2*operation%n
+    operation%n_pivot = operation%n
+  end subroutine set_linearisation
+
+  subroutine factor_one(self, i, space, line_info, rcond)
+    class(factorisation), intent(in) :: self
+    integer, intent(in) :: i
+    type(line_space), target, intent(inout) :: space
+    integer(ip), intent(out) :: line_info
+    real(dp), intent(out) :: rcond
+    complex(dp), pointer, contiguous :: u(:, :), v_transposed(:, :), factors(:, :)
+
+    u => space%matrix(self%n, self%m)
+    v_transposed => space%matrix(self%n, self%m)
+    factors => space%matrix(2*self%n, self%m)
+    call linearise(self, i, space, u, v_transposed, line_info, rcond)
+    if (line_info /= line_good) return
+    call stack(u, v_transposed, factors)
+    if (.not. all_finite(factors)) line_info = line_overflow
+    call store(self%transposed, factors, self%factors(:, :, i))
+  end subroutine factor_one
+
+  pure subroutine stack(above, below, whole)
+    complex(dp), contiguous, intent(in) :: above(:, :), below(:, :)
+    complex(dp), contiguous, intent(out) :: whole(:, :)
+
+    whole(:size(above, 1), :) = above
+    whole(size(above, 1) + 1:, :) = below
+  end subroutine stack
+
+  subroutine void_factors(self, i)
+    class(factorisation), intent(in) :: self
+    integer, intent(in) :: i
+
+    call store_nan(self%factors(:, :, i))
+  end subroutine void_factors
+
+  !> U and V^T of one line. Takes 7 n^2 of the complex workspace, and that of `solve_line`.
+  subroutine linearise(self, i, space, u, v_transposed, line_info, rcond)
+    class(linearisation), intent(in) :: self
+    integer, intent(in) :: i
+    type(line_space), target, intent(inout) :: space
+    complex(dp), contiguous, intent(out) :: u(:, :), v_transposed(:, :)
+    integer(ip), intent(out) :: line_info
+    real(dp), intent(out) :: rcond
+    complex(dp), pointer, contiguous :: gamma(:, :), gamma_jk(:, :), right(:, :), left(:, :)
+    integer :: n, p, a
+
+    line_info = line_not_finite
+    rcond = 0.0_dp
+    if (.not. all_finite(self%gamma(:, :, i))) return
+    n = self%n
+    gamma => space%matrix(2*n, 2*n)
+    gamma_jk => space%matrix(n, n)
+    right => space%matrix(n, n)
+    left => space%matrix(n, n)
+    call load(self%transposed, self%gamma(:, :, i), gamma)
+    call take_block(.false., 1.0_dp, gamma, 0, n, gamma_jk)
+    call take_block(.false., 1.0_dp, gamma, 0, 0, right)
+    call solve_line(gamma_jk, right, space, line_info, rcond)         ! R
+    if (line_info /= line_good) return
+    call take_block(.true., 1.0_dp, gamma, 0, n, gamma_jk)
+    call take_block(.true., 1.0_dp, gamma, n, n, left)
+    call solve_line(gamma_jk, left, space, line_info, rcond)          ! L^T
+    if (line_info /= line_good) return
+    do p = 1, self%m
+      do a = 1, n
+        u(a, p) = sum(left(:, a)*self%transform(:n, p)) - self%transform(n + a, p)
+        v_transposed(a, p) = self%transform(a, p) - sum(right(:, a)*self%transform(n + 1:, p))
+      end do
+    end do
+  end subroutine linearise
+
+  !> Covariance of the entries of C from the noise of the measured FRFs, to first order.
+  !>
+  !> With U and V of `compliance_factors`, noise e_pq of entry pq of h moves C_ab by U_ap V_qb e_pq, or by
+  !> (U_ap V_qb + U_aq V_pb) e_pq/2 where h was made reciprocal, (h + h^T)/2. The noise is taken as circular and
+  !> independent between entries.
+  !> gamma        receptance about which is linearised, shape (2 n, 2 n, n_freq), m/N
+  !> transform    T, shape (2 n, m), (m, 2 n) where transposed: from measured points to DOFs j, then k; the unit matrix
+  !>              where gamma itself was measured
+  !> variance     E|e_pq|^2 of the measured FRFs, shape (m, m, n_freq), (m/N)^2
+  !> reciprocal   whether h was made reciprocal
+  !> covariance   E[dC_ab conj(dC_cd)], shape (n^2, n^2, n_freq); ab runs as C lies in the caller's memory
+  subroutine compliance_covariance(transposed, gamma, transform, variance, reciprocal, covariance, line_info, rcond, info)
+    logical, intent(in) :: transposed, reciprocal
+    complex(dp), contiguous, target, intent(in) :: gamma(:, :, :)
+    real(dp), contiguous, target, intent(in) :: variance(:, :, :)
+    real(dp), contiguous, intent(in) :: transform(:, :)
+    complex(dp), contiguous, target, intent(out) :: covariance(:, :, :)
+    integer(ip), contiguous, intent(out) :: line_info(:)
+    real(dp), contiguous, intent(out) :: rcond(:)
+    integer(ip), intent(out) :: info
+    type(propagation) :: operation
+    integer :: n, m
+
+    call set_linearisation(operation, transposed, gamma, transform)
+    operation%reciprocal = reciprocal
+    operation%variance => variance
+    operation%covariance => covariance
+    n = operation%n
+    m = operation%m
+    operation%n_complex = operation%n_complex + n**2*m**2 + n**4
+    operation%flops = 8.0_dp*real(n, dp)**4*real(m, dp)**2
+    call run_sweep(operation, size(gamma, 3, kind=ip), line_info, rcond, info)
+  end subroutine compliance_covariance
+
+  subroutine propagate_one(self, i, space, line_info, rcond)
+    class(propagation), intent(in) :: self
+    integer, intent(in) :: i
+    type(line_space), target, intent(inout) :: space
+    integer(ip), intent(out) :: line_info
+    real(dp), intent(out) :: rcond
+    complex(dp), pointer, contiguous :: u(:, :), v_transposed(:, :), jacobian(:, :), covariance(:, :)
+    real(dp) :: sigma
+    integer :: n, m, p, q, a, b, ab
+
+    line_info = line_not_finite
+    rcond = 0.0_dp
+    if (.not. all(self%variance(:, :, i) >= 0.0_dp .and. self%variance(:, :, i) <= huge(1.0_dp))) return
+    n = self%n
+    m = self%m
+    u => space%matrix(n, m)
+    v_transposed => space%matrix(n, m)
+    jacobian => space%matrix(n*n, m*m)
+    covariance => space%matrix(n*n, n*n)
+    call linearise(self, i, space, u, v_transposed, line_info, rcond)
+    if (line_info /= line_good) return
+    do q = 1, m
+      do p = 1, m
+        sigma = sqrt(merge(self%variance(q, p, i), self%variance(p, q, i), self%transposed))
+        do b = 1, n
+          do a = 1, n
+            ab = merge(b + (a - 1)*n, a + (b - 1)*n, self%transposed)
+            if (self%reciprocal) then
+              jacobian(ab, p + (q - 1)*m) = 0.5_dp*sigma*(u(a, p)*v_transposed(b, q) + u(a, q)*v_transposed(b, p))
+            else
+              jacobian(ab, p + (q - 1)*m) = sigma*u(a, p)*v_transposed(b, q)
+            end if
+          end do
+        end do
+      end do
+    end do
+    covariance = 0
+    call product_line('N', 'C', 1.0_dp, jacobian, jacobian, covariance)
+    if (.not. all_finite(covariance)) line_info = line_overflow
+    call store(self%transposed, covariance, self%covariance(:, :, i))
+  end subroutine propagate_one
+
+  subroutine void_covariance(self, i)
+    class(propagation), intent(in) :: self
+    integer, intent(in) :: i
+
+    call store_nan(self%covariance(:, :, i))
+  end subroutine void_covariance
+end module jointfrf_compliance

@@ -1,0 +1,113 @@
+!> Rotational receptances from translational ones by finite differences (2.57)-(2.59).
+module jointfrf_finite_difference
+  use jointfrf_kinds, only: dp, ip
+  use jointfrf_line_layout, only: all_finite, load, store, store_nan
+  use jointfrf_lines_lapack, only: product_line
+  use jointfrf_status, only: line_good, line_not_finite, line_overflow
+  use jointfrf_sweep, only: line_operation, line_space, run_sweep
+  implicit none
+  private
+  public :: difference_weights, transform_receptance
+
+  type, extends(line_operation) :: transformation
+    logical :: transposed
+    integer :: n_out, n_in, m_out, m_in
+    complex(dp), pointer, contiguous :: h(:, :, :), h_new(:, :, :)
+    complex(dp), allocatable :: t_out(:, :), t_in(:, :)
+  contains
+    procedure :: line => transform_one
+    procedure :: void => void_new
+  end type transformation
+
+contains
+
+  !> Weights that give displacement and slope at the reference from the displacements of points along a line: value and
+  !> derivative at 0 of the polynomial through the points. Three points at -dx, 0, dx give T_2c of (2.59); unequal
+  !> spacing, two points, and a reference between the points come from the same rule.
+  !> offset    positions of the points from the reference, shape (m), all different, m
+  !> weights   shape (2, m): displacement (no unit), slope (1/m)
+  pure subroutine difference_weights(offset, weights)
+    real(dp), intent(in) :: offset(:)
+    real(dp), intent(out) :: weights(:, :)
+    real(dp) :: value, slope
+    integer :: p, q
+
+    do p = 1, size(offset)
+      value = 1.0_dp                       ! of the Lagrange polynomial of point p, factor by factor
+      slope = 0.0_dp
+      do q = 1, size(offset)
+        if (q == p) cycle
+        slope = (slope*(-offset(q)) + value)/(offset(p) - offset(q))
+        value = value*(-offset(q))/(offset(p) - offset(q))
+      end do
+      weights(1, p) = value
+      weights(2, p) = slope
+    end do
+  end subroutine difference_weights
+
+  !> H_new = T_out H T_in^T on every line. Eq. (2.57).
+  !> h         measured receptance, shape (m_out, m_in, n_freq), m/N
+  !> t_out     shape (n_out, m_out), (m_out, n_out) where transposed
+  !> t_in      shape (n_in, m_in), (m_in, n_in) where transposed
+  !> h_new     shape (n_out, n_in, n_freq)
+  subroutine transform_receptance(transposed, h, t_out, t_in, h_new, line_info, rcond, info)
+    logical, intent(in) :: transposed
+    complex(dp), contiguous, target, intent(in) :: h(:, :, :)
+    real(dp), contiguous, intent(in) :: t_out(:, :), t_in(:, :)
+    complex(dp), contiguous, target, intent(out) :: h_new(:, :, :)
+    integer(ip), contiguous, intent(out) :: line_info(:)
+    real(dp), contiguous, intent(out) :: rcond(:)
+    integer(ip), intent(out) :: info
+    type(transformation) :: operation
+
+    operation%transposed = transposed
+    operation%h => h
+    operation%h_new => h_new
+    if (transposed) then
+      operation%t_out = transpose(t_out)
+      operation%t_in = transpose(t_in)
+    else
+      operation%t_out = t_out
+      operation%t_in = t_in
+    end if
+    operation%n_out = size(operation%t_out, 1)
+    operation%m_out = size(operation%t_out, 2)
+    operation%n_in = size(operation%t_in, 1)
+    operation%m_in = size(operation%t_in, 2)
+    operation%n_complex = operation%m_out*operation%m_in + operation%n_out*(operation%m_in + operation%n_in)
+    operation%flops = 8.0_dp*operation%n_out*operation%m_in*(operation%m_out + operation%n_in)
+    call run_sweep(operation, size(h, 3, kind=ip), line_info, rcond, info)
+  end subroutine transform_receptance
+
+  subroutine transform_one(self, i, space, line_info, rcond)
+    class(transformation), intent(in) :: self
+    integer, intent(in) :: i
+    type(line_space), target, intent(inout) :: space
+    integer(ip), intent(out) :: line_info
+    real(dp), intent(out) :: rcond
+    complex(dp), pointer, contiguous :: h(:, :), half(:, :), h_new(:, :)
+
+    line_info = line_not_finite
+    rcond = 0.0_dp
+    if (.not. all_finite(self%h(:, :, i))) return
+    line_info = line_good
+    rcond = 1.0_dp
+    h => space%matrix(self%m_out, self%m_in)
+    half => space%matrix(self%n_out, self%m_in)
+    h_new => space%matrix(self%n_out, self%n_in)
+    call load(self%transposed, self%h(:, :, i), h)
+    half = 0
+    call product_line('N', 'N', 1.0_dp, self%t_out, h, half)
+    h_new = 0
+    call product_line('N', 'T', 1.0_dp, half, self%t_in, h_new)       ! (2.57)
+    if (.not. all_finite(h_new)) line_info = line_overflow
+    call store(self%transposed, h_new, self%h_new(:, :, i))
+  end subroutine transform_one
+
+  subroutine void_new(self, i)
+    class(transformation), intent(in) :: self
+    integer, intent(in) :: i
+
+    call store_nan(self%h_new(:, :, i))
+  end subroutine void_new
+end module jointfrf_finite_difference

@@ -1,0 +1,110 @@
+!> Receptance of a model by superposition of its modes.
+module jointfrf_modal
+  use jointfrf_kinds, only: dp, ip
+  use jointfrf_line_layout, only: all_finite, store, store_nan
+  use jointfrf_lines_lapack, only: product_line
+  use jointfrf_status, only: line_good, line_not_finite, line_overflow
+  use jointfrf_sweep, only: line_operation, line_space, run_sweep
+  implicit none
+  private
+  public :: receptance_modal
+
+  type, extends(line_operation) :: superposition
+    logical :: transposed
+    integer :: n_modes, n_out, n_in
+    real(dp), pointer, contiguous :: omega(:), stiffness(:), damping(:), loss_factor(:)
+    complex(dp), allocatable :: shapes_out(:, :)      !< (n_out, n_modes)
+    real(dp), allocatable :: shapes_in(:, :)          !< (n_in, n_modes)
+    complex(dp), pointer, contiguous :: h(:, :, :)
+  contains
+    procedure :: line => superpose_one
+    procedure :: void => void_receptance
+  end type superposition
+
+contains
+
+  !> H = sum over modes of phi_out phi_in / (lambda (1 + i eta) - w^2 + i w c), modes normalised to unit modal mass.
+  !> omega         angular frequencies, shape (n_freq), rad/s
+  !> stiffness     lambda = w_r^2 of each mode, shape (n_modes), (rad/s)^2
+  !> damping       viscous modal damping c = 2 zeta w_r, shape (n_modes), rad/s
+  !> loss_factor   eta of each mode, shape (n_modes)
+  !> shapes_out    mode shapes at the responses, shape (n_out, n_modes), (n_modes, n_out) where transposed, 1/sqrt(kg)
+  !> shapes_in     mode shapes at the forces, shape (n_in, n_modes), (n_modes, n_in) where transposed
+  !> h             receptance, shape (n_out, n_in, n_freq), m/N
+  !> rcond         smallest modal denominator over the largest
+  subroutine receptance_modal(transposed, omega, stiffness, damping, loss_factor, shapes_out, shapes_in, h, line_info, &
+                              rcond, info)
+    logical, intent(in) :: transposed
+    real(dp), contiguous, target, intent(in) :: omega(:), stiffness(:), damping(:), loss_factor(:)
+    real(dp), contiguous, intent(in) :: shapes_out(:, :), shapes_in(:, :)
+    complex(dp), contiguous, target, intent(out) :: h(:, :, :)
+    integer(ip), contiguous, intent(out) :: line_info(:)
+    real(dp), contiguous, intent(out) :: rcond(:)
+    integer(ip), intent(out) :: info
+    type(superposition) :: operation
+
+    operation%transposed = transposed
+    operation%omega => omega
+    operation%stiffness => stiffness
+    operation%damping => damping
+    operation%loss_factor => loss_factor
+    operation%h => h
+    if (transposed) then
+      operation%shapes_out = transpose(shapes_out)
+      operation%shapes_in = transpose(shapes_in)
+    else
+      operation%shapes_out = shapes_out
+      operation%shapes_in = shapes_in
+    end if
+    operation%n_modes = size(stiffness)
+    operation%n_out = size(operation%shapes_out, 1)
+    operation%n_in = size(operation%shapes_in, 1)
+    operation%n_complex = operation%n_modes*operation%n_in + operation%n_out*operation%n_in
+    operation%flops = 8.0_dp*operation%n_modes*(operation%n_in + operation%n_out*operation%n_in)
+    call run_sweep(operation, size(omega, kind=ip), line_info, rcond, info)
+  end subroutine receptance_modal
+
+  subroutine superpose_one(self, i, space, line_info, rcond)
+    class(superposition), intent(in) :: self
+    integer, intent(in) :: i
+    type(line_space), target, intent(inout) :: space
+    integer(ip), intent(out) :: line_info
+    real(dp), intent(out) :: rcond
+    complex(dp), pointer, contiguous :: weighted(:, :), h(:, :)
+    complex(dp) :: denominator
+    real(dp) :: smallest, largest, omega
+    integer :: mode
+
+    omega = self%omega(i)
+    weighted => space%matrix(self%n_modes, self%n_in)
+    h => space%matrix(self%n_out, self%n_in)
+    smallest = huge(1.0_dp)
+    largest = 0.0_dp
+    rcond = 0.0_dp
+    do mode = 1, self%n_modes
+      denominator = cmplx(self%stiffness(mode) - omega**2, &
+                          self%loss_factor(mode)*self%stiffness(mode) + omega*self%damping(mode), dp)
+      line_info = line_not_finite
+      if (.not. abs(denominator) <= huge(1.0_dp)) return
+      line_info = int(mode, ip)                                        ! as LAPACK would name a zero pivot
+      if (.not. abs(denominator) > 0.0_dp) return
+      smallest = min(smallest, abs(denominator))
+      largest = max(largest, abs(denominator))
+      weighted(mode, :) = self%shapes_in(:, mode)/denominator
+    end do
+    line_info = line_good
+    rcond = 1.0_dp
+    if (self%n_modes > 0) rcond = smallest/largest
+    h = 0
+    call product_line('N', 'N', 1.0_dp, self%shapes_out, weighted, h)
+    if (.not. all_finite(h)) line_info = line_overflow
+    call store(self%transposed, h, self%h(:, :, i))
+  end subroutine superpose_one
+
+  subroutine void_receptance(self, i)
+    class(superposition), intent(in) :: self
+    integer, intent(in) :: i
+
+    call store_nan(self%h(:, :, i))
+  end subroutine void_receptance
+end module jointfrf_modal

@@ -1,0 +1,206 @@
+!> Receptances of a locally modified structure (2.31)-(2.36), and the modification that turns one set of receptances into
+!> another (2.40), (2.47).
+module jointfrf_modification
+  use jointfrf_kinds, only: dp, ip
+  use jointfrf_line_layout, only: all_finite, load, store, store_nan, subtract
+  use jointfrf_lines_lapack, only: inverse_work, product_line, solve_line
+  use jointfrf_status, only: line_good, line_not_finite, line_overflow
+  use jointfrf_sweep, only: line_operation, line_space, run_sweep
+  implicit none
+  private
+  public :: modify, find_modification, apply_modification, modification_work
+
+  type, extends(line_operation) :: modification
+    logical :: transposed
+    integer :: n, n_m
+    complex(dp), pointer, contiguous :: alpha(:, :, :), d(:, :, :), gamma(:, :, :)
+    integer(ip), pointer, contiguous :: dofs(:)
+  contains
+    procedure :: line => modify_one
+    procedure :: void => void_gamma
+  end type modification
+
+  type, extends(line_operation) :: inverse_modification
+    logical :: transposed
+    integer :: n
+    complex(dp), pointer, contiguous :: alpha(:, :, :), gamma(:, :, :), d(:, :, :)
+  contains
+    procedure :: line => find_one
+    procedure :: void => void_d
+  end type inverse_modification
+
+contains
+
+  !> gamma from alpha and a local modification D. Eqs. (2.34)-(2.36), for any order of the DOFs.
+  !> alpha   receptance before, shape (n, n, n_freq), m/N
+  !> d       dynamic stiffness added at the modified DOFs, shape (n_m, n_m, n_freq), N/m
+  !> dofs    the modified DOFs, shape (n_m), counted from 1
+  !> gamma   receptance after, shape (n, n, n_freq)
+  subroutine modify(transposed, alpha, d, dofs, gamma, line_info, rcond, info)
+    logical, intent(in) :: transposed
+    complex(dp), contiguous, target, intent(in) :: alpha(:, :, :), d(:, :, :)
+    integer(ip), contiguous, target, intent(in) :: dofs(:)
+    complex(dp), contiguous, target, intent(out) :: gamma(:, :, :)
+    integer(ip), contiguous, intent(out) :: line_info(:)
+    real(dp), contiguous, intent(out) :: rcond(:)
+    integer(ip), intent(out) :: info
+    type(modification) :: operation
+    integer :: n, n_m
+
+    n = size(alpha, 1)
+    n_m = size(dofs)
+    operation%transposed = transposed
+    operation%n = n
+    operation%n_m = n_m
+    operation%alpha => alpha
+    operation%d => d
+    operation%dofs => dofs
+    operation%gamma => gamma
+    operation%n_complex = n**2 + 2*n_m**2 + 2*n*n_m + modification_work(n, n_m)
+    operation%n_real = 2*n_m
+    operation%n_pivot = n_m
+    operation%flops = 8.0_dp*n_m*(real(n, dp)**2 + 2.0_dp*real(n_m, dp)*n)
+    call run_sweep(operation, size(alpha, 3, kind=ip), line_info, rcond, info)
+  end subroutine modify
+
+  subroutine modify_one(self, i, space, line_info, rcond)
+    class(modification), intent(in) :: self
+    integer, intent(in) :: i
+    type(line_space), target, intent(inout) :: space
+    integer(ip), intent(out) :: line_info
+    real(dp), intent(out) :: rcond
+    complex(dp), pointer, contiguous :: h(:, :), d(:, :), columns(:, :), rows(:, :), h_mm(:, :)
+
+    line_info = line_not_finite
+    rcond = 0.0_dp
+    if (.not. (all_finite(self%alpha(:, :, i)) .and. all_finite(self%d(:, :, i)))) return
+    h => space%matrix(self%n, self%n)
+    d => space%matrix(self%n_m, self%n_m)
+    columns => space%matrix(self%n, self%n_m)
+    rows => space%matrix(self%n_m, self%n)
+    h_mm => space%matrix(self%n_m, self%n_m)
+    call load(self%transposed, self%alpha(:, :, i), h)
+    call load(self%transposed, self%d(:, :, i), d)
+    call take_modified(h, self%dofs, columns, rows, h_mm)
+    call apply_modification(h, columns, rows, h_mm, d, space, line_info, rcond)
+    call store(self%transposed, h, self%gamma(:, :, i))
+  end subroutine modify_one
+
+  !> Columns, rows and square of the modified DOFs.
+  pure subroutine take_modified(h, dofs, columns, rows, h_mm)
+    complex(dp), contiguous, intent(in) :: h(:, :)
+    integer(ip), contiguous, intent(in) :: dofs(:)
+    complex(dp), contiguous, intent(out) :: columns(:, :), rows(:, :), h_mm(:, :)
+
+    columns = h(:, dofs)
+    rows = h(dofs, :)
+    h_mm = h(dofs, dofs)
+  end subroutine take_modified
+
+  subroutine void_gamma(self, i)
+    class(modification), intent(in) :: self
+    integer, intent(in) :: i
+
+    call store_nan(self%gamma(:, :, i))
+  end subroutine void_gamma
+
+  !> Complex workspace of `apply_modification`.
+  pure function modification_work(n, n_m) result(size_needed)
+    integer, intent(in) :: n, n_m
+    integer :: size_needed
+
+    size_needed = n_m**2 + n_m*n + inverse_work(n_m)
+  end function modification_work
+
+  !> H = H - columns (I + D H_mm)^-1 D rows: what (2.34)-(2.36) say of all DOFs at once. D may be singular.
+  !> h         receptance, changed in place, shape (n, n)
+  !> columns   receptance from forces at the modified coordinates, shape (n, n_m)
+  !> rows      receptance at the modified coordinates, shape (n_m, n)
+  !> h_mm      receptance among the modified coordinates, shape (n_m, n_m)
+  !> d         dynamic stiffness added there, shape (n_m, n_m)
+  subroutine apply_modification(h, columns, rows, h_mm, d, space, line_info, rcond)
+    complex(dp), contiguous, intent(inout) :: h(:, :)
+    complex(dp), contiguous, intent(in) :: columns(:, :), rows(:, :), h_mm(:, :), d(:, :)
+    type(line_space), target, intent(inout) :: space
+    integer(ip), intent(out) :: line_info
+    real(dp), intent(out) :: rcond
+    complex(dp), pointer, contiguous :: system(:, :), forces(:, :)
+    integer :: m
+
+    system => space%matrix(size(d, 1), size(d, 1))
+    forces => space%matrix(size(d, 1), size(h, 2))
+    system = 0
+    do m = 1, size(d, 1)
+      system(m, m) = 1
+    end do
+    call product_line('N', 'N', 1.0_dp, d, h_mm, system)
+    forces = 0
+    call product_line('N', 'N', 1.0_dp, d, rows, forces)
+    call solve_line(system, forces, space, line_info, rcond)
+    if (line_info /= line_good) return
+    call product_line('N', 'N', -1.0_dp, columns, forces, h)
+    if (.not. all_finite(h)) line_info = line_overflow
+  end subroutine apply_modification
+
+  !> The modification D = alpha^-1 (alpha - gamma) gamma^-1 between two structures. Eqs. (2.40), (2.47).
+  !> The product form keeps its accuracy for a weak modification, where gamma^-1 - alpha^-1 cancels.
+  !> alpha, gamma   receptances before and after at the modified DOFs, shape (n, n, n_freq), m/N
+  !> d              dynamic stiffness added, shape (n, n, n_freq), N/m
+  subroutine find_modification(transposed, alpha, gamma, d, line_info, rcond, info)
+    logical, intent(in) :: transposed
+    complex(dp), contiguous, target, intent(in) :: alpha(:, :, :), gamma(:, :, :)
+    complex(dp), contiguous, target, intent(out) :: d(:, :, :)
+    integer(ip), contiguous, intent(out) :: line_info(:)
+    real(dp), contiguous, intent(out) :: rcond(:)
+    integer(ip), intent(out) :: info
+    type(inverse_modification) :: operation
+    integer :: n
+
+    n = size(alpha, 1)
+    operation%transposed = transposed
+    operation%n = n
+    operation%alpha => alpha
+    operation%gamma => gamma
+    operation%d => d
+    operation%n_complex = 4*n**2 + inverse_work(n)
+    operation%n_real = 2*n
+    operation%n_pivot = n
+    operation%flops = 21.0_dp*real(n, dp)**3
+    call run_sweep(operation, size(alpha, 3, kind=ip), line_info, rcond, info)
+  end subroutine find_modification
+
+  subroutine find_one(self, i, space, line_info, rcond)
+    class(inverse_modification), intent(in) :: self
+    integer, intent(in) :: i
+    type(line_space), target, intent(inout) :: space
+    integer(ip), intent(out) :: line_info
+    real(dp), intent(out) :: rcond
+    complex(dp), pointer, contiguous :: alpha(:, :), gamma(:, :), d(:, :), d_transposed(:, :)
+    real(dp) :: rcond_gamma
+
+    line_info = line_not_finite
+    rcond = 0.0_dp
+    if (.not. (all_finite(self%alpha(:, :, i)) .and. all_finite(self%gamma(:, :, i)))) return
+    alpha => space%matrix(self%n, self%n)
+    gamma => space%matrix(self%n, self%n)
+    d => space%matrix(self%n, self%n)
+    call load(self%transposed, self%alpha(:, :, i), alpha)
+    call load(self%transposed, self%gamma(:, :, i), gamma)
+    d_transposed => space%matrix(self%n, self%n)
+    call subtract(alpha, gamma, d)
+    call solve_line(alpha, d, space, line_info, rcond)                  ! alpha^-1 (alpha - gamma)
+    if (line_info /= line_good) return
+    call load(.true., d, d_transposed)
+    call load(.not. self%transposed, self%gamma(:, :, i), gamma)
+    call solve_line(gamma, d_transposed, space, line_info, rcond_gamma) ! its product with gamma^-1, transposed
+    rcond = min(rcond, rcond_gamma)
+    call store(.not. self%transposed, d_transposed, self%d(:, :, i))
+  end subroutine find_one
+
+  subroutine void_d(self, i)
+    class(inverse_modification), intent(in) :: self
+    integer, intent(in) :: i
+
+    call store_nan(self%d(:, :, i))
+  end subroutine void_d
+end module jointfrf_modification

@@ -1,0 +1,220 @@
+#!/bin/sh
+# Sets up a fresh clone: Python, compilers and headers from the system's package manager where they are missing, then
+# .venv with the package installed editable. Does nothing when all is up to date.
+#
+#   sh python/bootstrap.sh run     what the cases need
+#   sh python/bootstrap.sh test    also what the tests need
+#
+# PYTHON names the interpreter for a new .venv, FC and CC the compilers.
+# Exit status: 3 when system packages are missing and may not be installed from here, 1 for any other failure.
+set -eu
+
+case ${1-} in
+  run) extras=all ;;
+  test) extras=all,test ;;
+  *) echo "usage: $0 run|test" >&2; exit 2 ;;
+esac
+root=$(CDPATH='' cd -- "$(dirname -- "$0")/.." && pwd -P)
+cd "$root"
+venv=$root/.venv
+log=$root/build/set-up.log
+lock=$root/build/set-up.lock
+stamp=$venv/set-up
+
+say() { echo "jointfrf: $*" >&2; }
+
+# ---------------------------------------------------------------- what is there
+
+is_new_enough() { "$1" -c 'import sys; sys.exit(sys.version_info < (3, 11))' >/dev/null 2>&1; }
+
+# A folder that was moved keeps scripts that point to its old place.
+venv_works() {
+  is_new_enough "$venv/bin/python" && grep -qF "$venv/bin/python" "$venv/bin/pip" 2>/dev/null &&
+    "$venv/bin/python" -c 'import pip' 2>/dev/null
+}
+
+find_python() {
+  if venv_works; then
+    set -- "$venv/bin/python"
+  elif [ "${PYTHON-}" ]; then
+    set -- "$PYTHON"
+  else
+    set -- python3 python3.14 python3.13 python3.12 python3.11
+  fi
+  for python; do
+    is_new_enough "$python" && return
+  done
+  return 1
+}
+
+has_headers() {
+  "$python" -c 'import pathlib, sys, sysconfig
+sys.exit(not pathlib.Path(sysconfig.get_path("include"), "Python.h").exists())' >/dev/null 2>&1
+}
+
+# A compiler may be there and yet be unable to link, for want of the C library's headers and start-up files.
+# links COMPILER SUFFIX SOURCE
+links() {
+  scratch=$(mktemp -d)
+  echo "$3" >"$scratch/a.$2"
+  status=0
+  # shellcheck disable=SC2086  # "ccache gcc" is two words
+  $1 "$scratch/a.$2" -o "$scratch/a.out" >>"$log" 2>&1 || status=1
+  rm -rf "$scratch"
+  return $status
+}
+
+# -> missing: words out of fortran c python headers venv
+find_missing() {
+  missing=
+  links "${FC:-gfortran}" f90 'end' || missing="$missing fortran"
+  links "${CC:-cc}" c '#include <math.h>
+int main(void) { return 0; }' || missing="$missing c"
+  if find_python; then
+    version=$("$python" -c 'import sys; print("%d.%d" % sys.version_info[:2])')
+    has_headers || missing="$missing headers"
+    "$python" -c 'import ensurepip' 2>/dev/null || venv_works || missing="$missing venv"
+  else
+    version=3
+    missing="$missing python headers venv"
+  fi
+}
+
+# ---------------------------------------------------------------- the system's packages
+
+find_manager() {
+  for manager in apt-get dnf zypper pacman brew; do
+    command -v $manager >/dev/null 2>&1 && return
+  done
+  manager=
+  return 1
+}
+
+# What is missing -> the packages that bring it.
+package() {
+  case $manager/$1 in
+    apt-get/fortran) echo gfortran libc6-dev ;;
+    apt-get/c) echo gcc libc6-dev ;;
+    apt-get/python) echo python3 ;;
+    apt-get/headers) echo "python$version-dev" ;;
+    apt-get/venv) echo "python$version-venv" ;;
+    dnf/fortran | zypper/fortran | pacman/fortran) [ $manager = dnf ] && echo gcc-gfortran || echo gcc-fortran ;;
+    dnf/c | zypper/c | pacman/c | brew/fortran | brew/c) echo gcc ;;
+    dnf/headers) echo "python$version-devel" ;;
+    dnf/python | dnf/venv) echo python3 python3-pip ;;
+    zypper/headers) echo "python$version-devel" | tr -d . ;;
+    zypper/python | zypper/venv) echo python3 python3-pip ;;
+    pacman/python | pacman/headers | pacman/venv) echo python ;;
+    brew/python | brew/headers | brew/venv) echo python ;;
+  esac
+}
+
+install_missing() {
+  if ! find_manager; then
+    say "missing:$missing. Install them with the system's package manager and start again."
+    exit 3
+  fi
+  packages=$(for item in $missing; do package "$item"; done | tr ' ' '\n' | sort -u | tr '\n' ' ')
+  packages=${packages% }
+  case $manager in
+    apt-get)
+      refresh='apt-get update -q'
+      install="env DEBIAN_FRONTEND=noninteractive apt-get install -qy --no-install-recommends $packages"
+      command="sudo apt-get update && sudo apt-get install $packages" ;;
+    dnf)
+      install="dnf install -y $packages"
+      command="sudo dnf install $packages" ;;
+    zypper)
+      install="zypper --non-interactive install $packages"
+      command="sudo zypper install $packages" ;;
+    pacman)
+      install="pacman -Sy --noconfirm --needed $packages"
+      command="sudo pacman -S $packages" ;;
+    brew)
+      install="brew install $packages"
+      command=$install ;;
+  esac
+  sudo=
+  if [ $manager != brew ] && [ "$(id -u)" != 0 ]; then
+    if ! sudo -n true >/dev/null 2>&1; then
+      say "missing:$missing. Type this, then start again:"
+      echo "  $command" >&2
+      exit 3
+    fi
+    sudo='sudo -n'
+  fi
+  say "installing $packages"
+  # shellcheck disable=SC2086  # the commands are lists of words
+  $sudo $install >>"$log" 2>&1 </dev/null ||
+    { [ "${refresh-}" ] && $sudo $refresh >>"$log" 2>&1 </dev/null && $sudo $install >>"$log" 2>&1 </dev/null; } ||
+    fail "could not install the system packages"
+  hash -r
+}
+
+# ---------------------------------------------------------------- one at a time
+
+fail() {
+  tail -n 40 "$log" >&2
+  say "$1; the whole log is $log"
+  exit 1
+}
+
+# The lock is a link to the number of the process that holds it: made in one step, and a dead holder is seen.
+take_lock() {
+  holder=
+  until ln -s $$ "$lock" 2>/dev/null; do
+    [ "$holder" ] || say "another set-up is running, waiting for it"
+    holder=$(readlink "$lock" 2>/dev/null) || continue
+    if kill -0 "$holder" 2>/dev/null; then
+      sleep 1
+    else
+      rm -f "$lock"
+    fi
+  done
+  trap 'rm -f "$lock"' EXIT
+  trap 'exit 1' HUP INT TERM
+}
+
+# ---------------------------------------------------------------- .venv
+
+state() { { echo "$root"; cat pyproject.toml meson.build meson.options fortran/meson.build python/meson.build; } | cksum; }
+
+up_to_date() {
+  [ "$(cat "$stamp.$1" 2>/dev/null)" = "$(state)" ] && is_new_enough "$venv/bin/python" &&
+    ls build/cp*/build.ninja >/dev/null 2>&1
+}
+
+pip_install() { "$venv/bin/python" -m pip --disable-pip-version-check --no-input install "$@" >>"$log" 2>&1; }
+
+make_venv() {
+  if ! venv_works; then
+    # Build folders remember the environment they were made with.
+    rm -rf build/cp*
+    "$python" -m venv --clear "$venv" >>"$log" 2>&1 || fail "could not make .venv"
+  fi
+  rm -f "$stamp".*
+  # The build runs meson and ninja by name.
+  PATH=$venv/bin:$PATH
+  export PATH
+  "$venv/bin/python" -c 'import tomllib
+print(*tomllib.load(open("pyproject.toml", "rb"))["build-system"]["requires"], sep="\n")' >build/requirements.txt
+  pip_install -r build/requirements.txt || fail "could not install what the build needs"
+  pip_install --no-build-isolation -e ".[$extras]" || fail "could not build the package"
+  state >"$stamp.run"
+  if [ "$1" = test ]; then state >"$stamp.test"; fi
+}
+
+up_to_date "$1" && exit
+mkdir -p build
+take_lock
+up_to_date "$1" && exit
+date >"$log"
+say "setting up (log: build/set-up.log)"
+[ -z "${PYTHON-}" ] || is_new_enough "$PYTHON" || fail "PYTHON=$PYTHON is not Python 3.11 or newer"
+find_missing
+if [ "$missing" ]; then
+  install_missing
+  find_missing
+  [ -z "$missing" ] || fail "still missing after installation:$missing"
+fi
+make_venv "$1"

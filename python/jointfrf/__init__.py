@@ -1,0 +1,34 @@
+"""Stiffness and damping of joints from frequency response functions.
+
+Time convention exp(+i w t). Arrays over frequency have shape (n_freq, out, in), complex128, C order. SI units.
+"""
+
+from jointfrf._sweep import RCOND_LIMIT
+from jointfrf.bands import as_bands, band_mean, in_bands, propose_bands, sensitivity
+from jointfrf.beam import beam
+from jointfrf.compliance import compliance_covariance, compliance_factors, joint_compliance
+from jointfrf.coupling import couple
+from jointfrf.decoupling import decouple
+from jointfrf.discrete import chain
+from jointfrf.errors import (
+    ConvergenceWarning,
+    CopyWarning,
+    FileContentError,
+    FileContentWarning,
+    IdentificationWarning,
+    IllConditionedWarning,
+    SingularLineError,
+)
+from jointfrf.identify import identify
+from jointfrf.ismm import inverse_substructuring, ismm
+from jointfrf.joint import Joint
+from jointfrf.joint_fit import JointFit
+from jointfrf.linear_algebra import invert, reciprocal_condition, solve
+from jointfrf.metrics import amplitude_error, frequency_error, peak
+from jointfrf.model import Model, assemble
+from jointfrf.modification import find_modification, modify
+from jointfrf.noise import pollute, realisations
+from jointfrf.receptance import receptance
+from jointfrf.rotations import central_difference, difference_error, difference_weights, transform
+
+__version__ = "0.1.0"

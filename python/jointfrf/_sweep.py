@@ -1,0 +1,252 @@
+"""Between numpy and the kernel: checks, order of axes, and status turned into exceptions.
+
+The only module that imports the compiled kernel. A C-order array (n_freq, out, in) enters as its transposed view, so
+nothing is copied; results come back in C order.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from jointfrf import _kernel
+from jointfrf.errors import CopyWarning, IllConditionedWarning, SingularLineError
+
+__all__ = [
+    "LARGE_COPY",
+    "RCOND_LIMIT",
+    "ComplexArray",
+    "FloatArray",
+    "LineStatus",
+    "OnSingular",
+    "as_dofs",
+    "as_frequency",
+    "as_interface",
+    "as_joint_lines",
+    "as_lines",
+    "as_real",
+    "as_square",
+    "run",
+    "weights",
+]
+
+ComplexArray = NDArray[np.complex128]
+FloatArray = NDArray[np.float64]
+OnSingular = Literal["raise", "nan"]
+
+#: Below this reciprocal condition number (1-norm) a result is called ill-conditioned: fewer than four digits may be left.
+RCOND_LIMIT = 1e-12
+#: A conversion that copies more than this many bytes is announced by a `CopyWarning`.
+LARGE_COPY = 16 * 2**20
+
+_LINE_NOT_FINITE = -1
+_LINE_OVERFLOW = -2
+
+
+class LineStatus(NamedTuple):
+    """How each line of a sweep went.
+
+    Attributes
+    ----------
+    line_info : ndarray of int32, shape (n_freq,)
+        0 good; > 0 singular (LAPACK's INFO); -1 NaN or Inf in the line; -2 its result overflows.
+    rcond : ndarray, shape (n_freq,)
+        Reciprocal condition number (1-norm) of the worst matrix inverted; 0 in a bad line.
+    """
+
+    line_info: NDArray[np.int32]
+    rcond: FloatArray
+
+
+def _converted(name: str, value: ArrayLike, dtype: type) -> NDArray[Any]:
+    array = np.asarray(value)
+    if array.dtype.kind not in ("biufc" if dtype is np.complex128 else "biuf"):
+        wanted = "numbers" if dtype is np.complex128 else "real numbers"
+        raise TypeError(f"{name} must hold {wanted}, not {array.dtype}")
+    result = np.ascontiguousarray(array, dtype=dtype).reshape(array.shape)
+    if result is not array and not np.shares_memory(result, array) and result.nbytes > LARGE_COPY:
+        why = f"of type {array.dtype}" if array.dtype != dtype else "not contiguous in C order"
+        warnings.warn(
+            f"{name} is {why}: a copy of {result.nbytes / 2**20:.0f} MiB was made", CopyWarning, stacklevel=4
+        )
+    return result
+
+
+def as_lines(
+    name: str, value: ArrayLike, rows: int | None = None, columns: int | None = None, n_freq: int | None = None
+) -> ComplexArray:
+    """Return a sweep (n_freq, rows, columns) as contiguous complex128; sizes that are None are free."""
+    array = _converted(name, value, np.complex128)
+    wanted = (n_freq, rows, columns)
+    if array.ndim != 3 or any(w is not None and w != s for w, s in zip(wanted, array.shape, strict=True)):
+        labels = ["n_freq" if n_freq is None else str(n_freq)]
+        labels += ["n" if w is None else str(w) for w in (rows, columns)]
+        raise ValueError(f"{name} must have shape ({', '.join(labels)}), not {array.shape}")
+    return array
+
+
+def as_square(name: str, value: ArrayLike, n_freq: int | None = None) -> ComplexArray:
+    """Return a sweep of square matrices."""
+    array = as_lines(name, value, n_freq=n_freq)
+    if array.shape[1] != array.shape[2]:
+        raise ValueError(f"{name} must hold square matrices, not {array.shape[1]} x {array.shape[2]}")
+    return array
+
+
+def as_joint_lines(name: str, value: ArrayLike, n: int | None, n_freq: int) -> ComplexArray:
+    """Return joint matrices (n_freq, n, n); one matrix (n, n) serves all lines."""
+    array = np.asarray(value)
+    if array.ndim == 2:
+        array = np.broadcast_to(array, (n_freq, *array.shape))
+    lines = as_square(name, array, n_freq)
+    if n is not None and lines.shape[1] != n:
+        raise ValueError(f"{name} must have shape ({n_freq}, {n}, {n}), not {lines.shape}")
+    return lines
+
+
+def as_interface(name: str, value: ArrayLike, n_freq: int | None = None) -> tuple[ComplexArray, int]:
+    """Return a sweep at joint DOFs j, then k, and the number of joint DOFs."""
+    lines = as_square(name, value, n_freq)
+    if lines.shape[1] % 2 or lines.shape[1] == 0:
+        raise ValueError(f"{name} must hold DOFs j and k, an even number of rows, not {lines.shape[1]}")
+    return lines, lines.shape[1] // 2
+
+
+def as_real(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> FloatArray:
+    """Return a finite real array of the given shape; sizes that are None are free."""
+    array = _converted(name, value, np.float64)
+    if array.ndim != len(shape) or any(w is not None and w != s for w, s in zip(shape, array.shape, strict=True)):
+        wanted = ", ".join("n" if w is None else str(w) for w in shape)
+        raise ValueError(f"{name} must have shape ({wanted}), not {array.shape}")
+    if not np.isfinite(array).all():
+        where = np.unravel_index(int(np.argmin(np.isfinite(array))), array.shape)
+        raise ValueError(f"{name} holds NaN or Inf at index {tuple(int(i) for i in where)}")
+    return array
+
+
+def as_frequency(freq_hz: ArrayLike | None, n_freq: int | None = None) -> FloatArray | None:
+    """Return the frequency lines in Hz, finite and not negative."""
+    if freq_hz is None:
+        return None
+    freq = as_real("freq_hz", freq_hz, (n_freq,))
+    if (freq < 0).any():
+        raise ValueError(f"freq_hz must not be negative: line {int(np.argmax(freq < 0))} is {freq.min():g} Hz")
+    return freq
+
+
+def as_dofs(name: str, dofs: ArrayLike, n: int, *, unique: bool = True) -> NDArray[np.int32]:
+    """Return DOF indices, counted from 0 by the caller, as the kernel counts them (from 1)."""
+    array = np.asarray(dofs)
+    if array.ndim != 1 or (array.size and array.dtype.kind not in "iu"):
+        raise TypeError(f"{name} must be a list of DOF numbers")
+    array = array.astype(np.int64)
+    if ((array < 0) | (array >= n)).any():
+        bad = int(array[(array < 0) | (array >= n)][0])
+        raise ValueError(f"{name} names DOF {bad}; there are DOFs 0 to {n - 1}")
+    if unique and np.unique(array).size != array.size:
+        raise ValueError(f"{name} names a DOF twice: {array.tolist()}")
+    return (array + 1).astype(np.int32)
+
+
+def _line_names(lines: NDArray[np.intp], freq_hz: FloatArray | None) -> str:
+    """Return the first few lines in words."""
+    some = [f"line {i}" + (f" ({freq_hz[i]:g} Hz)" if freq_hz is not None else "") for i in lines[:3]]
+    more = f" and {lines.size - 3} more" if lines.size > 3 else ""
+    return ", ".join(some) + more
+
+
+def _check_status(
+    routine: str,
+    status: LineStatus,
+    sweeps: Mapping[str, NDArray[Any]],
+    freq_hz: FloatArray | None,
+    on_singular: OnSingular,
+    rcond_limit: float,
+) -> None:
+    """Turn bad lines into exceptions and poor conditions into a warning."""
+    info = status.line_info
+    if on_singular == "raise":
+        broken = np.flatnonzero(info == _LINE_NOT_FINITE)
+        if broken.size:
+            line = broken[0]
+            names = [name for name, sweep in sweeps.items() if not np.isfinite(sweep[line]).all()]
+            raise ValueError(f"{' and '.join(names) or routine}: NaN or Inf in {_line_names(broken, freq_hz)}")
+        overflow = np.flatnonzero(info == _LINE_OVERFLOW)
+        if overflow.size:
+            raise OverflowError(f"{routine}: the result overflows in {_line_names(overflow, freq_hz)}")
+        singular = np.flatnonzero(info > 0)
+        if singular.size:
+            raise SingularLineError(
+                f"{routine}: singular matrix in {_line_names(singular, freq_hz)}",
+                singular,
+                None if freq_hz is None else freq_hz[singular],
+            )
+    poor = np.flatnonzero((status.rcond < rcond_limit) & (info == 0))
+    if poor.size:
+        worst = poor[np.argmin(status.rcond[poor])]
+        warnings.warn(
+            f"{routine}: {poor.size} of {info.size} lines are ill-conditioned, worst "
+            f"{_line_names(np.array([worst]), freq_hz)} with rcond {status.rcond[worst]:.1e}",
+            IllConditionedWarning,
+            stacklevel=4,
+        )
+
+
+def run(
+    routine: str,
+    args: Sequence[Any],
+    shape: tuple[int, ...],
+    sweeps: Mapping[str, NDArray[Any]],
+    freq_hz: FloatArray | None,
+    on_singular: OnSingular,
+    rcond_limit: float = RCOND_LIMIT,
+) -> tuple[ComplexArray, LineStatus]:
+    """Call a kernel routine.
+
+    Parameters
+    ----------
+    routine : str
+        Name without ``jf_``, used in messages too.
+    args : sequence
+        Arguments of the routine in the order of `_kernel.pyf`, up to the result; arrays in C order.
+    shape : tuple of int
+        Shape of the result in C order, (n_freq, out, in).
+    sweeps : mapping of str to ndarray
+        Arguments that have a line axis, by the name the caller knows, to name a bad one.
+    freq_hz : ndarray or None
+        Frequencies in Hz for messages.
+    on_singular : {"raise", "nan"}
+        What becomes of bad lines (singular, NaN or Inf inside, overflow).
+    rcond_limit : float
+        Below this reciprocal condition number a line is announced by an `IllConditionedWarning`.
+
+    Returns
+    -------
+    result : ndarray, shape `shape`
+    status : LineStatus
+    """
+    if on_singular not in ("raise", "nan"):
+        raise ValueError(f"on_singular must be 'raise' or 'nan', not {on_singular!r}")
+    n_freq = shape[0]
+    result = np.empty(shape, np.complex128)
+    status = LineStatus(np.zeros(n_freq, np.int32), np.ones(n_freq))
+    if result.size:
+        views = [a.T if isinstance(a, np.ndarray) else a for a in args]
+        info = getattr(_kernel, "jf_" + routine)(*views, result.T, status.line_info, status.rcond)
+        if info < 0:
+            raise RuntimeError(f"{routine}: {_kernel.jf_info_text(info).decode().strip()}")
+        _check_status(routine, status, sweeps, freq_hz, on_singular, rcond_limit)
+    return result, status
+
+
+def weights(offset: FloatArray) -> FloatArray:
+    """Return finite-difference weights, shape (2, m): displacement and slope (2.59)."""
+    result = np.empty((offset.size, 2))
+    info = _kernel.jf_difference_weights(offset.size, offset, result.T)
+    if info < 0:
+        raise ValueError(f"offsets must be finite and no two equal: {offset.tolist()}")
+    return result.T

@@ -1,0 +1,57 @@
+"""Exceptions and warnings, one meaning each."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = [
+    "ConvergenceWarning",
+    "CopyWarning",
+    "FileContentError",
+    "FileContentWarning",
+    "IdentificationWarning",
+    "IllConditionedWarning",
+    "SingularLineError",
+]
+
+
+class SingularLineError(np.linalg.LinAlgError):
+    """A matrix that had to be inverted is singular at some frequency lines.
+
+    Attributes
+    ----------
+    lines : ndarray of int
+        The bad lines, counted from 0.
+    freq_hz : ndarray of float or None
+        Their frequencies in Hz, where the caller gave them.
+    """
+
+    def __init__(self, message: str, lines: NDArray[np.intp], freq_hz: NDArray[np.float64] | None = None) -> None:
+        super().__init__(message)
+        self.lines = lines
+        self.freq_hz = freq_hz
+
+
+class FileContentError(ValueError):
+    """A file cannot be read, or lacks something that is needed."""
+
+
+class FileContentWarning(UserWarning):
+    """Something in a file had to be assumed or left out."""
+
+
+class IllConditionedWarning(UserWarning):
+    """A result may have lost most of its digits: rcond is below `jointfrf.RCOND_LIMIT`."""
+
+
+class CopyWarning(UserWarning):
+    """A large array had to be copied because of its type or its order in memory."""
+
+
+class IdentificationWarning(UserWarning):
+    """The data say little about a parameter, or do not fit the model of the joint."""
+
+
+class ConvergenceWarning(UserWarning):
+    """An iteration stopped before it converged."""

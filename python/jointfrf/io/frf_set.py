@@ -1,0 +1,345 @@
+"""A set of measured FRFs whose rows and columns carry names."""
+
+from __future__ import annotations
+
+import re
+import warnings
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointfrf.errors import FileContentError, FileContentWarning
+
+__all__ = ["POWER_OF_I_OMEGA", "Channel", "FrfSet"]
+
+POWER_OF_I_OMEGA = {"receptance": 0, "mobility": 1, "accelerance": 2}
+"""How often a receptance is differentiated in time to give the quantity."""
+
+_PLURALS = {
+    "receptance": "receptances m/N",
+    "mobility": "mobilities (m/s)/N",
+    "accelerance": "accelerances (m/s^2)/N",
+}
+_DIRECTION = re.compile(r"([+-]?)(r?[xyz])")
+_CHANNEL = re.compile(r"(\d+)\s*:?\s*([+-]?r?[xyz])")
+_NAMES_SHOWN = 10
+
+
+@dataclass(frozen=True, order=True)
+class Channel:
+    """A point and a signed direction: where an FRF was measured or excited.
+
+    Parameters
+    ----------
+    node : int
+        Number of the point, 1 or more.
+    direction : str
+        ``+x``, ``-x``, ... ``+z`` for a translation, ``+rx``, ... ``-rz`` for a rotation. A missing sign means plus.
+
+    Examples
+    --------
+    >>> str(Channel(102, "y")), Channel.parse("102:-y").sign, Channel.parse("102:rx").is_rotation
+    ('102:+y', -1, True)
+    """
+
+    node: int
+    direction: str
+
+    def __post_init__(self) -> None:
+        match = _DIRECTION.fullmatch(self.direction.strip().lower())
+        if match is None:
+            raise ValueError(f"direction {self.direction!r} is none of +x -x +y -y +z -z +rx -rx +ry -ry +rz -rz")
+        if self.node < 1:
+            raise ValueError(f"node {self.node} is not a positive number")
+        object.__setattr__(self, "direction", (match[1] or "+") + match[2])
+
+    @classmethod
+    def parse(cls, text: str | Channel) -> Channel:
+        """Channel of a name such as ``102:+y``, ``102:y``, ``102+y``, ``102y`` or ``102:rx``.
+
+        Raises
+        ------
+        ValueError
+            The text is no such name.
+        """
+        if isinstance(text, Channel):
+            return text
+        match = _CHANNEL.fullmatch(text.strip().lower())
+        if match is None:
+            raise ValueError(f"{text!r} is no channel: expected a node and a direction such as 102:+y or 102:rx")
+        return cls(int(match[1]), match[2])
+
+    @property
+    def sign(self) -> int:
+        """+1 along the axis, -1 against it."""
+        return -1 if self.direction[0] == "-" else 1
+
+    @property
+    def axis(self) -> str:
+        """The direction without its sign."""
+        return self.direction[1:]
+
+    @property
+    def is_rotation(self) -> bool:
+        """Whether the channel is a rotation or a moment."""
+        return self.axis.startswith("r")
+
+    def opposite(self) -> Channel:
+        """Return the channel of the same point that points the other way."""
+        return Channel(self.node, ("+" if self.sign < 0 else "-") + self.axis)
+
+    def __str__(self) -> str:
+        return f"{self.node}:{self.direction}"
+
+
+ChannelLike = str | Channel
+
+
+@dataclass(frozen=True, eq=False)
+class FrfSet:
+    """Measured FRFs: any responses by any excitations, not necessarily all of them.
+
+    Parameters
+    ----------
+    freq_hz : ndarray, shape (n_freq,)
+        Frequency lines in Hz, increasing.
+    responses, excitations : tuple of Channel
+        Names of the rows and columns, each at most once.
+    h : ndarray of complex, shape (n_freq, n_responses, n_excitations)
+        The FRFs in SI units, time convention exp(+i w t); NaN where there is none.
+    quantity : {"receptance", "mobility", "accelerance"}
+        Displacement (m), velocity (m/s) or acceleration (m/s^2) per force (N); for rotations rad, rad/s, rad/s^2 per
+        N m.
+    coordinates : mapping of int to ndarray, shape (3,)
+        Global cartesian coordinates of the nodes in m, empty where unknown.
+    source : str
+        Where the set comes from, named in messages.
+
+    Examples
+    --------
+    A point measured along y and its neighbour measured against y, both excited at the first:
+
+    >>> import numpy as np
+    >>> frfs = FrfSet(freq_hz=np.array([10.0, 20.0]),
+    ...               responses=(Channel(1, "+y"), Channel(2, "-y")), excitations=(Channel(1, "+y"),),
+    ...               h=np.array([[[2.0], [1.0]], [[4.0], [3.0]]]), quantity="accelerance")
+    >>> frfs.matrix(["1:y", "2:y"], ["1:y"])[0].real
+    array([[ 2.],
+           [-1.]])
+    >>> frfs.missing(["1:y"], ["1:y", "2:y"])
+    [(Channel(node=1, direction='+y'), Channel(node=2, direction='+y'))]
+    >>> print(frfs)
+    2 accelerances (m/s^2)/N: 2 responses x 1 excitations, none missing
+    2 lines, 10 to 20 Hz, spacing 10 Hz
+    no coordinates
+    responses: 1:+y 2:-y
+    excitations: 1:+y
+    """
+
+    freq_hz: NDArray[np.float64]
+    responses: tuple[Channel, ...]
+    excitations: tuple[Channel, ...]
+    h: NDArray[np.complex128]
+    quantity: str = "receptance"
+    coordinates: Mapping[int, NDArray[np.float64]] = field(default_factory=dict)
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "freq_hz", np.asarray(self.freq_hz, dtype=np.float64))
+        object.__setattr__(self, "h", np.ascontiguousarray(self.h, dtype=np.complex128))
+        shape = (*self.freq_hz.shape, len(self.responses), len(self.excitations))
+        if self.freq_hz.ndim != 1 or self.h.shape != shape:
+            raise ValueError(f"h has shape {self.h.shape}, expected (n_freq, n_responses, n_excitations) = {shape}")
+        if self.quantity not in POWER_OF_I_OMEGA:
+            raise ValueError(f"quantity {self.quantity!r} is none of {', '.join(POWER_OF_I_OMEGA)}")
+        for name in ("responses", "excitations"):
+            if len(set(getattr(self, name))) < len(getattr(self, name)):
+                raise ValueError(f"{name} names a channel twice")
+
+    @property
+    def measured(self) -> NDArray[np.bool_]:
+        """Which FRFs there are, shape (n_responses, n_excitations)."""
+        return np.logical_not(np.isnan(self.h).all(axis=0))
+
+    def receptance(self) -> FrfSet:
+        """Return the same set as displacement per force.
+
+        Returns
+        -------
+        FrfSet
+            With quantity "receptance" in m/N; the set itself if it is one already.
+
+        Warns
+        -----
+        FileContentWarning
+            A line at 0 Hz had to be dropped.
+
+        Notes
+        -----
+        Mobility is divided by i w and accelerance by (i w)^2, which 0 Hz does not allow.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> point = (Channel(1, "+y"),)
+        >>> frfs = FrfSet(np.array([1.0 / (2.0 * np.pi)]), point, point, np.array([[[-3.0]]]), "accelerance")
+        >>> frfs.receptance().h.real
+        array([[[3.]]])
+        """
+        power = POWER_OF_I_OMEGA[self.quantity]
+        if power == 0:
+            return self
+        usable = self.freq_hz != 0.0
+        if not usable.all():
+            message = f"{self._name()}the line at 0 Hz is dropped: {self.quantity} gives no receptance there"
+            warnings.warn(message, FileContentWarning, stacklevel=2)
+        freq_hz = self.freq_hz[usable]
+        i_omega = 2j * np.pi * freq_hz
+        h = self.h[usable] / i_omega[:, None, None] ** power
+        return replace(self, freq_hz=freq_hz, h=h, quantity="receptance")
+
+    def has(self, output: ChannelLike, input: ChannelLike) -> bool:
+        """Whether the FRF is there, possibly measured along the opposite direction."""
+        return not self.missing([output], [input])
+
+    def missing(self, outputs: Iterable[ChannelLike], inputs: Iterable[ChannelLike]) -> list[tuple[Channel, Channel]]:
+        """Entries of a matrix of FRFs that the set does not hold.
+
+        Parameters
+        ----------
+        outputs, inputs : iterable of Channel or str
+            The rows and columns of the matrix.
+
+        Returns
+        -------
+        list of (Channel, Channel)
+            Output and input of every FRF that is not there, row by row; empty if all are.
+        """
+        return self._locate(outputs, inputs)[2]
+
+    def matrix(self, outputs: Sequence[ChannelLike], inputs: Sequence[ChannelLike]) -> NDArray[np.complex128]:
+        """FRFs between named channels, with their signs.
+
+        Parameters
+        ----------
+        outputs, inputs : sequence of Channel or str
+            Rows and columns, for example ``["102:+y", "202:+y"]``. A channel measured the other way serves with the
+            opposite sign.
+
+        Returns
+        -------
+        ndarray of complex, shape (n_freq, n_outputs, n_inputs)
+            In the unit of the set's quantity, C order, a copy.
+
+        Raises
+        ------
+        FileContentError
+            FRFs are missing; the message names them.
+        """
+        places, signs, missing = self._locate(outputs, inputs)
+        if missing:
+            pairs = [f"{output} / {input_}" for output, input_ in missing]
+            more = f" and {len(pairs) - _NAMES_SHOWN} more" if len(pairs) > _NAMES_SHOWN else ""
+            text = f"{', '.join(pairs[:_NAMES_SHOWN])}{more}"
+            raise FileContentError(f"{self._name()}missing FRFs (response / excitation): {text}")
+        h = self.h[:, places[0], places[1]] * signs
+        return np.ascontiguousarray(h)
+
+    def select(self, band: tuple[float, float]) -> FrfSet:
+        """Return the lines in a band.
+
+        Parameters
+        ----------
+        band : (float, float)
+            Lowest and highest frequency in Hz, both included.
+
+        Raises
+        ------
+        ValueError
+            The band is not an increasing pair of numbers.
+        FileContentError
+            No line lies in the band.
+        """
+        low, high = band
+        if not low <= high:
+            raise ValueError(f"band ({low:g}, {high:g}) Hz does not increase")
+        inside = (self.freq_hz >= low) & (self.freq_hz <= high)
+        if not inside.any():
+            held = f"the {self.freq_hz.size} lines are {self._range()}" if self.freq_hz.size else "there are none"
+            raise FileContentError(f"{self._name()}no frequency line in {low:g} to {high:g} Hz: {held}")
+        return replace(self, freq_hz=self.freq_hz[inside], h=self.h[inside])
+
+    def summary(self) -> str:
+        """Say what the set holds."""
+        measured = self.measured
+        n_missing = measured.size - int(measured.sum())
+        nodes = {channel.node for channel in (*self.responses, *self.excitations)}
+        located = len(nodes & set(self.coordinates))
+        lines = [
+            f"{measured.sum()} {_PLURALS[self.quantity]}: {len(self.responses)} responses x "
+            f"{len(self.excitations)} excitations, {n_missing or 'none'} missing",
+            f"{self.freq_hz.size} lines, {self._range()}, {self._spacing()}" if self.freq_hz.size else "no lines",
+            f"coordinates of {located} of {len(nodes)} nodes" if located else "no coordinates",
+            f"responses: {_by_node(self.responses)}",
+            f"excitations: {_by_node(self.excitations)}",
+        ]
+        return "\n".join([self.source, *lines] if self.source else lines)
+
+    def __str__(self) -> str:
+        return self.summary()
+
+    def __repr__(self) -> str:
+        return f"<FrfSet {self.h.shape} {self.quantity}>"
+
+    def _locate(
+        self, outputs: Iterable[ChannelLike], inputs: Iterable[ChannelLike]
+    ) -> tuple[tuple[NDArray[np.intp], NDArray[np.intp]], NDArray[np.float64], list[tuple[Channel, Channel]]]:
+        """Row, column and sign of every entry of a matrix, and the entries that are not there."""
+        rows = [Channel.parse(output) for output in outputs]
+        columns = [Channel.parse(input_) for input_ in inputs]
+        shape = (len(rows), len(columns))
+        i_row, i_column, signs = np.zeros(shape, np.intp), np.zeros(shape, np.intp), np.ones(shape)
+        measured = self.measured
+        row_of = {channel: i for i, channel in enumerate(self.responses)}
+        column_of = {channel: i for i, channel in enumerate(self.excitations)}
+        missing = []
+        for i, row in enumerate(rows):
+            for j, column in enumerate(columns):
+                for output, input_ in _same_frf(row, column):
+                    place = row_of.get(output, -1), column_of.get(input_, -1)
+                    if min(place) >= 0 and measured[place]:
+                        i_row[i, j], i_column[i, j] = place
+                        signs[i, j] = row.sign * output.sign * column.sign * input_.sign
+                        break
+                else:
+                    missing.append((row, column))
+        return (i_row, i_column), signs, missing
+
+    def _name(self) -> str:
+        return f"{self.source}: " if self.source else ""
+
+    def _range(self) -> str:
+        return f"{self.freq_hz[0]:.6g} to {self.freq_hz[-1]:.6g} Hz"
+
+    def _spacing(self) -> str:
+        steps = np.diff(self.freq_hz)
+        if not steps.size:
+            return "one line"
+        if np.allclose(steps, steps[0], rtol=1e-3, atol=1e-5 * self.freq_hz[-1]):
+            return f"spacing {steps.mean():.6g} Hz"
+        return f"uneven spacing {steps.min():.4g} to {steps.max():.4g} Hz"
+
+
+def _same_frf(output: Channel, input_: Channel) -> list[tuple[Channel, Channel]]:
+    """List the four pairs of channels that measure the same FRF up to its sign, the exact one first."""
+    return [(o, i) for o in (output, output.opposite()) for i in (input_, input_.opposite())]
+
+
+def _by_node(channels: Iterable[Channel]) -> str:
+    """Write channels with each node once, as in ``101:+x+y+z 102:+y``."""
+    directions: dict[int, str] = {}
+    for channel in channels:
+        directions[channel.node] = directions.get(channel.node, "") + channel.direction
+    return " ".join(f"{node}:{direction}" for node, direction in directions.items())

@@ -1,0 +1,117 @@
+"""A Universal File as numbered datasets, with what there is to say about it."""
+
+from __future__ import annotations
+
+import re
+import warnings
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from jointfrf.errors import FileContentError, FileContentWarning
+from jointfrf.io.units import UnitSystem
+
+__all__ = ["UniversalFile", "name_some"]
+
+_DELIMITER = re.compile(rb"    -1(?=[\r\n]|\Z| {74})")
+_NUMBERS_SHOWN = 5
+
+
+class UniversalFile:
+    """A file divided into datasets, which are counted from 1 as their users count them.
+
+    Raises
+    ------
+    FileNotFoundError
+        There is no such file.
+    FileContentError
+        It is no Universal File; every method raises it where the file is damaged.
+    """
+
+    def __init__(self, path: Path) -> None:
+        try:
+            import pyuff
+        except ImportError as error:
+            message = "reading Universal Files needs the package pyuff: pip install jointfrf[uff]"
+            raise ImportError(message) from error
+        self.path = path
+        self._notes: dict[str, list[int]] = {}
+        self._systems: dict[int, UnitSystem] | None = None
+        content = self._content()
+        n_delimiters = len(_DELIMITER.findall(content))
+        if n_delimiters == 0:
+            raise self.error("is not a Universal File: no dataset delimiters (-1)")
+        try:
+            self._reader = pyuff.UFF(str(path))
+            self.types = [int(number) for number in self._reader.get_set_types()]
+        except Exception as error:
+            raise self.error("cannot be divided into datasets") from error
+        if not self.types:
+            raise self.error("ends inside its first dataset")
+        for number, kind in enumerate(self.types, start=1):
+            if kind <= 0:
+                raise self.error(f"is damaged: dataset {number} has no type, a delimiter (-1) is missing before it")
+        if n_delimiters % 2:
+            self.note("ends inside a dataset, which is left out", len(self.types) + 1)
+
+    def error(self, sentence: str) -> FileContentError:
+        """Exception whose message is the file's name and a sentence about it."""
+        return FileContentError(f"{self.path} {sentence}")
+
+    def note(self, sentence: str, *datasets: int) -> None:
+        """Keep something for the user to know about some datasets."""
+        self._notes.setdefault(sentence, []).extend(datasets)
+
+    def warn(self, stacklevel: int) -> None:
+        """Say every note once."""
+        for sentence, datasets in self._notes.items():
+            message = f"{self.path}: {sentence} ({name_some('dataset', datasets)})"
+            warnings.warn(message, FileContentWarning, stacklevel=stacklevel)
+
+    def datasets(self, *kinds: int) -> list[int]:
+        """Numbers of the datasets of some types."""
+        return [number for number, kind in enumerate(self.types, start=1) if kind in kinds]
+
+    def read(self, dataset: int, header_only: bool = False) -> dict[str, Any]:
+        """Content of a dataset."""
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                content: dict[str, Any] = self._reader.read_sets(dataset - 1, header_only=header_only)
+        except Exception as error:
+            kind = self.types[dataset - 1]
+            raise self.error(f"is damaged: dataset {dataset} (type {kind}) cannot be read") from error
+        return content
+
+    def unit_system(self, dataset: int) -> UnitSystem | None:
+        """Units of a dataset: the last dataset 164 before it, else the first of the file, else None."""
+        if self._systems is None:
+            self._systems = {number: self._read_unit_system(number) for number in self.datasets(164)}
+        before = [system for number, system in self._systems.items() if number < dataset]
+        return before[-1] if before else next(iter(self._systems.values()), None)
+
+    def _read_unit_system(self, dataset: int) -> UnitSystem:
+        content = self.read(dataset)
+        for name in ("length", "force"):
+            if not 1e-30 < content[name] < 1e30:
+                raise self.error(f"has the {name} factor {content[name]:g} in its units (dataset {dataset})")
+        return UnitSystem(content["length"], content["force"])
+
+    def _content(self) -> bytes:
+        if not self.path.exists():
+            raise FileNotFoundError(f"there is no file {self.path}")
+        if self.path.is_dir():
+            raise self.error("is a folder, not a file")
+        try:
+            content = self.path.read_bytes()
+        except OSError as error:
+            raise self.error(f"cannot be read: {error.strerror}") from error
+        if not content.strip():
+            raise self.error("is empty")
+        return content
+
+
+def name_some(what: str, numbers: Sequence[int]) -> str:
+    """Name the first few of some things, as in ``datasets 3, 4 and 12 more``."""
+    more = f" and {len(numbers) - _NUMBERS_SHOWN} more" if len(numbers) > _NUMBERS_SHOWN else ""
+    return f"{what}{'s' if len(numbers) > 1 else ''} {', '.join(map(str, numbers[:_NUMBERS_SHOWN]))}{more}"

@@ -1,0 +1,153 @@
+"""Units of files: labels as test systems write them (``m/s^2``, ``g``, ``(1/N)*(m/s²)``, ``lbf``), and systems."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+
+__all__ = ["Exponents", "Unit", "UnitSystem", "parse_unit"]
+
+Exponents = tuple[int, int, int]
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit as a factor to SI and exponents of length, force and time (a radian is a pure number)."""
+
+    to_si: float
+    exponents: Exponents = (0, 0, 0)
+
+    def times(self, other: Unit, power: int = 1) -> Unit:
+        """Return the product of this unit and a power of another."""
+        length, force, time = (a + power * b for a, b in zip(self.exponents, other.exponents, strict=True))
+        return Unit(self.to_si * other.to_si**power, (length, force, time))
+
+
+@dataclass(frozen=True)
+class UnitSystem:
+    """What values in a file's units are divided by to give m and N (dataset 164 of Universal Files)."""
+
+    length: float
+    force: float
+
+    def to_si(self, exponents: Exponents) -> float:
+        """Factor to SI of a quantity with these exponents of length, force and time."""
+        return self.length ** -exponents[0] * self.force ** -exponents[1]
+
+
+_LENGTH, _FORCE, _TIME, _MOMENT = (1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 0)
+_POUND, _GRAVITY, _INCH = 4.4482216152605, 9.80665, 0.0254
+_SYMBOLS = {
+    "m": Unit(1.0, _LENGTH),
+    "cm": Unit(1e-2, _LENGTH),
+    "mm": Unit(1e-3, _LENGTH),
+    "um": Unit(1e-6, _LENGTH),
+    "nm": Unit(1e-9, _LENGTH),
+    "mil": Unit(1e-3 * _INCH, _LENGTH),
+    "in": Unit(_INCH, _LENGTH),
+    "inch": Unit(_INCH, _LENGTH),
+    "ft": Unit(12 * _INCH, _LENGTH),
+    "s": Unit(1.0, _TIME),
+    "sec": Unit(1.0, _TIME),
+    "ips": Unit(_INCH, (1, 0, -1)),
+    "g": Unit(_GRAVITY, (1, 0, -2)),
+    "gn": Unit(_GRAVITY, (1, 0, -2)),
+    "N": Unit(1.0, _FORCE),
+    "mN": Unit(1e-3, _FORCE),
+    "kN": Unit(1e3, _FORCE),
+    "MN": Unit(1e6, _FORCE),
+    "dyn": Unit(1e-5, _FORCE),
+    "kgf": Unit(_GRAVITY, _FORCE),
+    "kp": Unit(_GRAVITY, _FORCE),
+    "lbf": Unit(_POUND, _FORCE),
+    "lb": Unit(_POUND, _FORCE),
+    "lbs": Unit(_POUND, _FORCE),
+    "Nm": Unit(1.0, _MOMENT),
+    "kNm": Unit(1e3, _MOMENT),
+    "Nmm": Unit(1e-3, _MOMENT),
+    "kg": Unit(1.0, (-1, 1, 2)),
+    "rad": Unit(1.0),
+    "mrad": Unit(1e-3),
+    "deg": Unit(math.pi / 180.0),
+}
+# U+FFFD is what is left of a superscript 2 in Latin-1.
+_SPELLINGS = {"²": "^2", "\ufffd": "^2", "**": "^", "·": "*", ".": "*", "µ": "u", "μ": "u", "°": "deg"}
+_TOKEN = re.compile(r"\s*([A-Za-z]+|\d+|[-^*/()])")
+
+
+def parse_unit(label: str) -> Unit | None:
+    """Read a unit label.
+
+    Parameters
+    ----------
+    label : str
+        Products, quotients and whole powers of the usual symbols; capitals are forgiven where only one symbol fits.
+
+    Returns
+    -------
+    Unit or None
+        None where the label is empty, NONE or not understood.
+
+    Examples
+    --------
+    >>> parse_unit("mm/s^2")
+    Unit(to_si=0.001, exponents=(1, 0, -2))
+    >>> parse_unit("(1/N)*(m/s2)").exponents
+    (1, -1, -2)
+    >>> parse_unit("Volt") is None
+    True
+    """
+    for spelling, meaning in _SPELLINGS.items():
+        label = label.replace(spelling, meaning)
+    label = label.strip()
+    tokens = _TOKEN.findall(label)
+    if label.upper() in ("", "NONE") or "".join(tokens) != "".join(label.split()):
+        return None
+    try:
+        unit = _product(tokens)
+    except (LookupError, ValueError, OverflowError, ZeroDivisionError, RecursionError):
+        return None
+    return unit if not tokens and 0.0 < unit.to_si < math.inf else None
+
+
+def _product(tokens: list[str]) -> Unit:
+    """Read factors up to the end or a closing bracket; ``a/b/c`` is a/(b c), a space or hyphen multiplies."""
+    unit = _power(tokens)
+    while tokens and tokens[0] != ")":
+        power = -1 if tokens[0] == "/" else 1
+        if tokens[0] in "/*-":
+            tokens.pop(0)
+        unit = unit.times(_power(tokens), power)
+    return unit
+
+
+def _power(tokens: list[str]) -> Unit:
+    """Read a symbol, a number or a bracket, and the exponent after it if there is one."""
+    token = tokens.pop(0)
+    if token == "(":
+        unit = _product(tokens)
+        if tokens.pop(0) != ")":
+            raise ValueError("unbalanced bracket")
+    else:
+        unit = Unit(float(token)) if token.isdigit() else _symbol(token)
+    raised = tokens[:1] == ["^"]
+    if raised:
+        tokens.pop(0)
+    negative = len(tokens) > 1 and tokens[0] == "-" and tokens[1].isdigit()
+    if negative:
+        tokens.pop(0)
+    if tokens and tokens[0].isdigit():
+        return Unit(1.0).times(unit, int(tokens.pop(0)) * (-1 if negative else 1))
+    if raised:
+        raise ValueError("no exponent")
+    return unit
+
+
+def _symbol(name: str) -> Unit:
+    if name in _SYMBOLS:
+        return _SYMBOLS[name]
+    alike = [symbol for symbol in _SYMBOLS if symbol.lower() == name.lower()]
+    if len(alike) != 1:
+        raise LookupError(name)
+    return _SYMBOLS[alike[0]]

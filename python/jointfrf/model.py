@@ -1,0 +1,161 @@
+"""A linear model by its matrices and the names of its DOFs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy import linalg, sparse
+
+from jointfrf._sweep import ComplexArray, FloatArray
+from jointfrf.joint import Joint
+from jointfrf.receptance import Method, receptance
+
+__all__ = ["Model", "assemble"]
+
+
+@dataclass(frozen=True)
+class Model:
+    """Stiffness, mass and damping of a structure.
+
+    Parameters
+    ----------
+    stiffness, mass : scipy sparse array or ndarray, shape (n, n)
+        K in N/m and M in kg.
+    dofs : tuple of str
+        Names of the DOFs, ``"node:direction"`` with nodes counted from 1.
+    damping : sparse array or ndarray, shape (n, n), optional
+        Viscous damping C, N s/m.
+    structural_damping : sparse array or ndarray, shape (n, n), optional
+        Structural damping H, N/m.
+    loss_factor : float
+        Loss factor of the whole stiffness, K (1 + i eta).
+
+    Examples
+    --------
+    >>> import jointfrf as jf
+    >>> model = jf.chain([1.0, 1.0], [2.0, 2.0], ground="start")
+    >>> model.dofs, model.index("2:x")
+    (('1:x', '2:x'), 1)
+    """
+
+    stiffness: sparse.sparray | FloatArray
+    mass: sparse.sparray | FloatArray
+    dofs: tuple[str, ...]
+    damping: sparse.sparray | FloatArray | None = None
+    structural_damping: sparse.sparray | FloatArray | None = None
+    loss_factor: float = 0.0
+
+    def index(self, *names: str) -> int | list[int]:
+        """Return the number of a DOF, or the list of several, counted from 0.
+
+        Raises
+        ------
+        ValueError
+            The model has no such DOF.
+        """
+        for name in names:
+            if name not in self.dofs:
+                raise ValueError(f"the model has no DOF {name!r}; it has {self.dofs[0]!r} to {self.dofs[-1]!r}")
+        found = [self.dofs.index(name) for name in names]
+        return found[0] if len(found) == 1 else found
+
+    def receptance(
+        self,
+        freq_hz: ArrayLike,
+        outputs: Sequence[int] | None = None,
+        inputs: Sequence[int] | None = None,
+        method: Method = "auto",
+    ) -> ComplexArray:
+        """Receptance of the model, see `jointfrf.receptance`; `inputs` are the `outputs` by default."""
+        return receptance(
+            freq_hz,
+            self.stiffness,
+            self.mass,
+            self.damping,
+            self.loss_factor,
+            self.structural_damping,
+            outputs,
+            outputs if inputs is None else inputs,
+            method=method,
+        )
+
+    def natural_frequencies(self, count: int | None = None) -> FloatArray:
+        """Undamped natural frequencies, lowest first.
+
+        Parameters
+        ----------
+        count : int, optional
+            How many; all by default.
+
+        Returns
+        -------
+        ndarray, shape (count,)
+            Hz.
+        """
+        k, m = (a.toarray() if sparse.issparse(a) else a for a in (self.stiffness, self.mass))
+        last = len(self.dofs) if count is None else min(count, len(self.dofs))
+        squared = linalg.eigh(k, m, eigvals_only=True, subset_by_index=(0, last - 1))
+        return np.sqrt(np.maximum(squared, 0)) / (2 * np.pi)
+
+
+def _block_diagonal(
+    a: sparse.sparray | FloatArray | None, b: sparse.sparray | FloatArray | None, n_a: int, n_b: int
+) -> sparse.csr_array:
+    blocks = [sparse.csr_array((n, n)) if x is None else sparse.csr_array(x) for x, n in ((a, n_a), (b, n_b))]
+    return sparse.csr_array(sparse.block_diag(blocks, format="csr"))
+
+
+def assemble(a: Model, b: Model, joint: Joint, dofs_a: Sequence[int], dofs_b: Sequence[int]) -> Model:
+    """Assembly of two models through a joint, by adding the joint to the matrices.
+
+    Parameters
+    ----------
+    a, b : Model
+        The substructures.
+    joint : Joint
+        The joint.
+    dofs_a, dofs_b : sequence of int
+        Joint DOFs j of A and k of B, counted from 0, in the order of the joint.
+
+    Returns
+    -------
+    Model
+        DOFs of A (named ``"A/..."``), then of B (``"B/..."``). A loss factor becomes a structural damping matrix.
+
+    Raises
+    ------
+    ValueError
+        The numbers of DOFs differ.
+
+    Examples
+    --------
+    >>> import jointfrf as jf
+    >>> a = jf.chain([5, 3], [2500, 3500], [3, 4], ground="start")
+    >>> b = jf.chain([4, 2], [2000, 2500], [2, 1], ground="end")
+    >>> jf.assemble(a, b, jf.Joint([2000.0], [3.0]), [1], [0]).natural_frequencies().round(3).tolist()
+    [2.598, 4.682, 7.77, 8.374]
+    """
+    n_a, n_b, n_j = len(a.dofs), len(b.dofs), len(joint.dofs)
+    if not len(dofs_a) == len(dofs_b) == n_j:
+        raise ValueError(f"dofs_a and dofs_b must name {n_j} DOFs each, not {len(dofs_a)} and {len(dofs_b)}")
+    rows = np.tile(np.arange(n_j), 2)
+    columns = np.concatenate([np.asarray(dofs_a), n_a + np.asarray(dofs_b)])
+    relative = sparse.csr_array((np.repeat([1.0, -1.0], n_j), (rows, columns)), shape=(n_j, n_a + n_b))
+
+    def across(matrix: FloatArray) -> sparse.csr_array:
+        return sparse.csr_array(relative.T @ sparse.csr_array(matrix) @ relative)
+
+    joint_loss = joint.stiffness * np.sqrt(np.outer(joint.loss_factor, joint.loss_factor))
+    losses = [
+        (0 if m.structural_damping is None else m.structural_damping) + m.loss_factor * m.stiffness for m in (a, b)
+    ]
+    return Model(
+        stiffness=_block_diagonal(a.stiffness, b.stiffness, n_a, n_b) + across(joint.stiffness),
+        mass=_block_diagonal(a.mass, b.mass, n_a, n_b),
+        damping=_block_diagonal(a.damping, b.damping, n_a, n_b) + across(joint.damping),
+        structural_damping=_block_diagonal(losses[0], losses[1], n_a, n_b) + across(joint_loss),
+        dofs=tuple(f"A/{d}" for d in a.dofs) + tuple(f"B/{d}" for d in b.dofs),
+    )

@@ -1,0 +1,464 @@
+"""Universal Files: what is read, in which units, and what is said of files that hold no FRFs."""
+
+import os
+import random
+import struct
+import sys
+import warnings
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+import pytest
+from jointfrf.errors import FileContentError, FileContentWarning
+from jointfrf.io import read_uff
+from jointfrf.io.units import parse_unit
+
+pytest.importorskip("pyuff")
+
+DATA = Path(os.environ.get("JOINTFRF_TEST_DATA", Path(__file__).resolve().parents[3] / "shared" / "data"))
+LAP_JOINT = DATA / "lap_joint" / "lap_joint.uff"
+FREQ_HZ = np.array([10.0, 12.0, 14.0])
+VALUES = np.array([1.0 + 2.0j, 3.0 - 4.0j, -5.0 + 6.0j])
+
+
+def dataset(kind, *records):
+    """Lines of a dataset with its delimiters."""
+    return "\n".join(["    -1", f"{kind:6d}", *records, "    -1", ""])
+
+
+def function(
+    values=VALUES,
+    freq_hz=FREQ_HZ,
+    *,
+    function_type=4,
+    response=(1, 2),
+    reference=(1, 2),
+    numerator=(12, "m/s^2"),
+    denominator=(13, "N"),
+    abscissa=(18, "Hz"),
+    entities=("NONE", "NONE"),
+    number_type=6,
+    even=True,
+    n_values=None,
+    binary=False,
+):
+    """Dataset 58 or, as bytes, 58b."""
+    axes = [f"{kind:10d}    0    0    0 {'NONE':20} {unit:20}" for kind, unit in (abscissa, numerator, denominator)]
+    step = freq_hz[1] - freq_hz[0] if len(freq_hz) > 1 else 1.0
+    start = f"{freq_hz[0]:13.5e}{step:13.5e}" if even else f"{0:13.5e}{0:13.5e}"
+    records = [
+        *["NONE"] * 5,
+        f"{function_type:5d}{1:10d}{0:5d}{0:10d} {entities[0]:10}{response[0]:10d}{response[1]:4d}"
+        f" {entities[1]:10}{reference[0]:10d}{reference[1]:4d}",
+        f"{number_type:10d}{n_values or len(values):10d}{int(even):10d}{start}{0:13.5e}",
+        *axes,
+        f"{0:10d}    0    0    0 {'NONE':20} {'NONE':20}",
+    ]
+    if binary:
+        head = "\n".join(["    -1", f"    58b{1:6d}{2:6d}{11:12d}{16 * len(values):12d}", *records, ""]).encode()
+        return head + np.asarray(values, dtype="<c16").tobytes() + b"\n    -1\n"
+    return dataset(58, *records, *numbers(values, freq_hz, number_type, even)).encode()
+
+
+def numbers(values, freq_hz, number_type, even):
+    """Records 12 of dataset 58."""
+    values = np.asarray(values)
+    if not even:
+        return [f"{f:13.5e}{v.real:20.11e}{v.imag:20.11e}" for f, v in zip(freq_hz, values, strict=True)]
+    flat = values.view(float) if np.iscomplexobj(values) else values
+    width, a_line = ("20.11e", 4) if number_type in (4, 6) else ("13.5e", 6)
+    return ["".join(f"{v:{width}}" for v in flat[i : i + a_line]) for i in range(0, len(flat), a_line)]
+
+
+def units(length, force):
+    return dataset(164, f"{9:10d}{'own':20}{2:10d}", f"{length:25.16e}{force:25.16e}{1:25.16e}", f"{273.15:25.16e}")
+
+
+def nodes_2411(coordinates, displacement=0):
+    rows = []
+    for node, xyz in coordinates.items():
+        rows += [f"{node:10d}{0:10d}{displacement:10d}{1:10d}", "".join(f"{x:25.16e}" for x in xyz)]
+    return dataset(2411, *rows)
+
+
+def nodes_15(coordinates, definition=0):
+    rows = [f"{n:10d}{definition:10d}{0:10d}{1:10d}" + "".join(f"{x:13.5e}" for x in p) for n, p in coordinates.items()]
+    return dataset(15, *rows)
+
+
+def system_2420(label, matrix):
+    rows = ["".join(f"{x:25.16e}" for x in row) for row in matrix]
+    return dataset(2420, f"{1:10d}", "part", f"{label:10d}{0:10d}{8:10d}", "axes", *rows)
+
+
+@pytest.fixture
+def write(tmp_path):
+    def write(*datasets):
+        path = tmp_path / "test.uff"
+        path.write_bytes(b"".join(each if isinstance(each, bytes) else each.encode() for each in datasets))
+        return path
+
+    return write
+
+
+@pytest.mark.parametrize("form", [{}, {"even": False}, {"number_type": 5}, {"binary": True}])
+def test_an_frf_is_read_in_every_form(write, form):
+    frfs = read_uff(write(function(**form)))
+    np.testing.assert_allclose(frfs.freq_hz, FREQ_HZ)
+    np.testing.assert_allclose(frfs.h[:, 0, 0], VALUES)
+    assert (frfs.quantity, str(frfs.responses[0]), str(frfs.excitations[0])) == ("accelerance", "1:+y", "1:+y")
+
+
+def test_uneven_frequencies_are_kept(write):
+    frfs = read_uff(write(function(freq_hz=[1.0, 2.0, 5.0], even=False)))
+    assert frfs.freq_hz.tolist() == [1.0, 2.0, 5.0]
+
+
+def test_channels_stand_in_the_order_of_the_file_and_gaps_are_nan(write):
+    frfs = read_uff(
+        write(
+            function(response=(3, -1)),
+            function(2 * VALUES, reference=(2, 6), denominator=(13, "N m")),
+            function(3 * VALUES, response=(3, -1), reference=(2, 6), denominator=(13, "N m")),
+        )
+    )
+    assert [str(channel) for channel in frfs.responses] == ["3:-x", "1:+y"]
+    assert [str(channel) for channel in frfs.excitations] == ["1:+y", "2:+rz"]
+    assert np.isnan(frfs.h[:, 1, 0]).all()
+    np.testing.assert_array_equal(frfs.matrix(["3:+x"], ["2:+rz"])[:, 0, 0], -3 * VALUES)
+
+
+@pytest.mark.parametrize(
+    ("numerator", "denominator", "quantity", "factor"),
+    [
+        ((12, "m/s^2"), (13, "N"), "accelerance", 1.0),
+        ((12, "g"), (13, "N"), "accelerance", 9.80665),
+        ((12, "mm/s2"), (13, "kN"), "accelerance", 1e-6),
+        ((12, "g/N"), (13, "NONE"), "accelerance", 9.80665),
+        ((12, "in/s^2"), (13, "lbf"), "accelerance", 0.0254 / 4.4482216152605),
+        ((11, "mm/s"), (13, "N"), "mobility", 1e-3),
+        ((8, "mm"), (9, "N"), "receptance", 1e-3),
+        ((1, "(1/N)*(m/s²)"), (0, "NONE"), "accelerance", 1.0),
+        ((0, "m/s"), (0, "N"), "mobility", 1.0),
+    ],
+)
+def test_units_come_from_the_labels(write, numerator, denominator, quantity, factor):
+    frfs = read_uff(write(function(numerator=numerator, denominator=denominator)))
+    assert frfs.quantity == quantity
+    np.testing.assert_allclose(frfs.h[:, 0, 0], factor * VALUES, rtol=1e-10)
+
+
+@pytest.mark.parametrize(
+    ("response", "reference", "factor"),
+    [(2, 2, 1e-3 / 1e-3), (5, 2, 1.0 / 1e-3), (2, 5, 1e-3 / 1e-6), (5, 5, 1.0 / 1e-6)],
+)
+def test_dataset_164_divides_where_there_is_no_label(write, response, reference, factor):
+    plain = {"numerator": (12, "NONE"), "denominator": (13, "NONE")}
+    frfs = read_uff(write(units(1e3, 1e3), function(response=(1, response), reference=(1, reference), **plain)))
+    np.testing.assert_allclose(frfs.h[:, 0, 0], factor * VALUES, rtol=1e-10)
+
+
+def test_each_frf_has_the_units_that_stand_before_it(write):
+    plain = {"numerator": (12, "NONE"), "denominator": (13, "NONE")}
+    frfs = read_uff(write(units(1e3, 1.0), function(**plain), units(1.0, 1.0), function(response=(2, 2), **plain)))
+    np.testing.assert_allclose(frfs.h[:, 1, 0] / frfs.h[:, 0, 0], 1e3)
+
+
+def test_units_that_are_assumed_are_said(write):
+    path = write(function(numerator=(12, "NONE")), function(numerator=(12, "NONE"), response=(2, 2)))
+    with pytest.warns(FileContentWarning, match=r"response has no unit .*SI units are assumed \(datasets 1, 2\)"):
+        assert read_uff(path).h[0, 0, 0] == VALUES[0]
+    with pytest.warns(FileContentWarning, match="unit 'V' of the response is not used .*SI units are assumed"):
+        read_uff(write(function(numerator=(12, "V"))))
+    with pytest.warns(FileContentWarning, match="unit 'V' of the response is not used: dataset 164 gives"):
+        assert read_uff(write(units(1e3, 1.0), function(numerator=(12, "V")))).h[0, 0, 0] == 1e-3 * VALUES[0]
+    with pytest.warns(FileContentWarning, match="'m/s\\^2' contradicts dataset 164: the unit is used"):
+        assert read_uff(write(units(1e3, 1.0), function())).h[0, 0, 0] == VALUES[0]
+
+
+def test_a_label_of_another_quantity_is_refused_unless_the_caller_names_it(write):
+    path = write(function(numerator=(12, "mm")))
+    with pytest.raises(
+        FileContentError, match=r"dataset 1: the unit 'mm' does not fit the response of accelerance 1:\+y"
+    ):
+        read_uff(path)
+    assert read_uff(path, quantity="receptance").h[0, 0, 0] == pytest.approx(1e-3 * VALUES[0])
+    with pytest.warns(FileContentWarning, match="SI units are assumed"):
+        assert read_uff(path, quantity="accelerance").h[0, 0, 0] == VALUES[0]
+
+
+def test_an_unknown_data_type_needs_the_word_of_the_caller(write):
+    path = write(function(numerator=(0, "NONE"), denominator=(0, "NONE")))
+    with pytest.raises(FileContentError, match=r"data types 0 \(unknown.*give quantity= \(dataset 1\)"):
+        read_uff(path)
+    with pytest.warns(FileContentWarning, match="SI units are assumed"):
+        assert read_uff(path, quantity="mobility").quantity == "mobility"
+    with pytest.raises(ValueError, match="quantity 'inertance'"):
+        read_uff(path, quantity="inertance")
+
+
+def test_mixed_quantities_become_the_one_differentiated_most(write):
+    frfs = read_uff(write(function(numerator=(8, "m")), function(response=(2, 2))))
+    assert frfs.quantity == "accelerance"
+    np.testing.assert_allclose(frfs.receptance().h[:, 0, 0], VALUES, rtol=1e-12)
+    np.testing.assert_allclose(frfs.h[:, 1, 0], VALUES)
+
+
+def test_frequencies_in_rad_per_second_are_converted(write):
+    frfs = read_uff(write(function(abscissa=(18, "rad/s"))))
+    np.testing.assert_allclose(frfs.freq_hz, FREQ_HZ / (2 * np.pi))
+    with pytest.warns(FileContentWarning, match="unit 'furlong' of the frequencies is not known: Hz is assumed"):
+        read_uff(write(function(abscissa=(18, "furlong"))))
+    with pytest.raises(FileContentError, match="over rpm, not frequency"):
+        read_uff(write(function(abscissa=(19, "rpm"))))
+
+
+@pytest.mark.parametrize("nodes", [nodes_2411, nodes_15])
+def test_coordinates_are_in_metres(write, nodes):
+    frfs = read_uff(
+        write(units(1e3, 1.0), nodes({1: (10.0, -20.0, 30.0), 7: (0.0, 0.0, 0.0)}), function(numerator=(12, "mm/s^2")))
+    )
+    assert list(frfs.coordinates) == [1]
+    np.testing.assert_allclose(frfs.coordinates[1], [0.01, -0.02, 0.03])
+
+
+def test_coordinates_that_cannot_be_trusted_are_said(write):
+    turned = [[0, 1, 0], [-1, 0, 0], [0, 0, 1], [0, 0, 0]]
+    with pytest.warns(FileContentWarning, match="m is assumed"):
+        assert read_uff(write(nodes_2411({1: (1, 2, 3)}), function())).coordinates[1].tolist() == [1, 2, 3]
+    local = nodes_15({1: (1, 2, 3)}, definition=5)
+    with pytest.warns(FileContentWarning, match="coordinates of node 1 are local and are left out"):
+        assert not read_uff(write(units(1, 1), system_2420(5, turned), local, function())).coordinates
+    with pytest.warns(FileContentWarning, match="directions at node 1 are those of local axes"):
+        read_uff(write(units(1, 1), system_2420(5, turned), nodes_2411({1: (1, 2, 3)}, displacement=5), function()))
+    with pytest.warns(FileContentWarning, match="cannot be read and are left out"):
+        assert not read_uff(write(units(1, 1), dataset(2411, "one two"), function())).coordinates
+    aligned = dataset(
+        18,
+        f"{5:10d}{0:10d}{0:10d}{1:10d}{1:10d}",
+        "CS",
+        "".join(f"{x:13.5e}" for x in (0, 0, 0, 1, 0, 0)),
+        "".join(f"{x:13.5e}" for x in (0, 0, 1)),
+    )
+    assert 1 in read_uff(write(units(1, 1), aligned, local, function())).coordinates
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"response": (0, 2)}, r"names no response node \(node 0\) \(dataset 1\)"),
+        ({"reference": (1, 0)}, r"names no reference direction \(code 0\) \(dataset 1\)"),
+        ({"numerator": (15, "Pa")}, r"pressure per excitation force, not motion per force \(dataset 1\)"),
+        ({"values": VALUES.real, "number_type": 4}, "real numbers, without phase"),
+        ({"function_type": 1}, r"holds 1 time history \(dataset 58, function type 1\) and no FRF"),
+        ({"function_type": 99}, "holds 1 function of another kind"),
+    ],
+)
+def test_a_function_that_is_no_usable_frf_is_left_out(write, wrong, message):
+    with pytest.raises(FileContentError, match=message):
+        read_uff(write(function(**wrong)))
+    if "function_type" not in wrong:
+        with pytest.warns(FileContentWarning, match="FRF left out: it"):
+            assert read_uff(write(function(**wrong), function())).h.shape == (3, 1, 1)
+    else:
+        assert read_uff(write(function(**wrong), function())).h.shape == (3, 1, 1)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"n_values": 7}, r"dataset 1 \(1:\+y / 1:\+y\) holds 3 of 7 values"),
+        ({"n_values": 1}, "holds 3 of 1 values"),
+        ({"number_type": 8}, "is damaged: ordinate data type 8 in dataset 1"),
+        ({"freq_hz": [5.0, 5.0, 5.0], "even": False}, "do not increase"),
+        ({"freq_hz": [-1.0, 0.0, 1.0]}, "do not increase from 0 Hz"),
+        ({"values": np.array([1.0, np.nan, 1.0 + 0j])}, r"NaN or Inf in dataset 1 \(1:\+y / 1:\+y\), first at 12 Hz"),
+    ],
+)
+def test_damage_is_named(write, wrong, message):
+    with pytest.raises(FileContentError, match=message):
+        read_uff(write(function(**wrong)))
+
+
+def test_numbers_in_a_foreign_binary_form_are_refused(write):
+    with pytest.raises(FileContentError, match="not IEEE 754"):
+        read_uff(write(function(binary=True).replace(b"58b     1     2", b"58b     1     3")))
+
+
+def test_nan_at_0_hz_costs_that_line_only(write):
+    bad = np.array([np.nan, 1.0 + 0j, 2.0])
+    path = write(function(freq_hz=[0.0, 1.0, 2.0]), function(bad, freq_hz=[0.0, 1.0, 2.0], response=(2, 2)))
+    with pytest.warns(FileContentWarning, match=r"0 Hz holds NaN or Inf and is dropped \(dataset 2\)"):
+        frfs = read_uff(path)
+    assert frfs.freq_hz.tolist() == [1.0, 2.0]
+    assert np.isfinite(frfs.h).all()
+
+
+def test_different_frequencies_are_refused(write):
+    path = write(function(), function(freq_hz=[10.0, 11.0, 12.0], response=(2, 2)))
+    with pytest.raises(FileContentError, match=r"3 lines 10 to 14 Hz in dataset 1 .*3 lines 10 to 12 Hz in dataset 2"):
+        read_uff(path)
+
+
+def test_the_first_of_two_equal_frfs_is_kept(write):
+    with pytest.warns(FileContentWarning, match=r"second FRF between the same channels is left out \(dataset 2\)"):
+        assert read_uff(write(function(), function(2 * VALUES))).h[0, 0, 0] == VALUES[0]
+    with pytest.raises(FileContentError, match=r"'A' / 'A' .*'B' / 'B' .*must be unique"):
+        read_uff(write(function(entities=("A", "A")), function(entities=("B", "B"))))
+
+
+def test_a_file_cut_short_loses_its_last_dataset(write):
+    path = write(function(), function(response=(2, 2))[:-60])
+    with pytest.warns(FileContentWarning, match=r"ends inside a dataset, which is left out \(dataset 2\)"):
+        assert len(read_uff(path).responses) == 1
+    with pytest.raises(FileContentError, match="ends inside its first dataset"):
+        read_uff(write(function()[:-60]))
+
+
+def test_a_lost_delimiter_is_noticed(write):
+    datasets = [function(response=(node, 2)).decode() for node in (1, 2, 3)]
+    datasets[1] = datasets[1].removeprefix("    -1\n")
+    with pytest.raises(FileContentError, match="is damaged: dataset 2 has no type"):
+        read_uff(write(*datasets))
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"", "is empty"),
+        (b" \n", "is empty"),
+        (b"(1.0+2.0j)\n", r"is not a Universal File: no dataset delimiters \(-1\)"),
+        (bytes(range(256)), "is not a Universal File"),
+        (b"    -1\n    -1\n", "has no type"),
+        (dataset(15).encode(), r"holds dataset 15 \(nodes\) and no FRF"),
+        (dataset(58).encode(), r"dataset 1 \(type 58\) cannot be read"),
+        (dataset(164, "x").encode() + function(), r"dataset 1 \(type 164\) cannot be read"),
+        (function() + units(0.0, 1.0).encode(), r"test.uff has the length factor 0 in its units \(dataset 2\)"),
+        (units(0.0, 1.0).encode() + function(), r"test.uff has the length factor 0 in its units \(dataset 1\)"),
+    ],
+)
+def test_what_is_no_sound_file_is_refused_in_one_sentence(write, content, message):
+    with pytest.raises(FileContentError, match=message):
+        read_uff(write(content))
+
+
+def test_missing_files_and_folders(tmp_path):
+    with pytest.raises(FileNotFoundError, match=r"there is no file .*none\.uff"):
+        read_uff(tmp_path / "none.uff")
+    with pytest.raises(FileContentError, match="is a folder"):
+        read_uff(tmp_path)
+
+
+def test_without_pyuff_one_sentence_tells_what_to_install(write, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyuff", None)
+    with pytest.raises(ImportError, match=r"pip install jointfrf\[uff\]"):
+        read_uff(write(function()))
+
+
+def test_a_damaged_file_is_read_or_refused_but_nothing_else(write):
+    sound = b"".join(
+        [
+            units(1.0, 1.0).encode(),
+            nodes_2411({1: (1, 2, 3)}).encode(),
+            function(),
+            function(response=(2, 2), binary=True),
+            function(reference=(2, -3), even=False),
+        ]
+    )
+    chance = random.Random(7)
+    for _ in range(150):
+        content = bytearray(sound[: chance.randrange(len(sound))] if chance.random() < 0.3 else sound)
+        for _ in range(chance.randrange(6)):
+            start = chance.randrange(len(content) + 1)
+            content[start : start + chance.randrange(4)] = chance.randbytes(chance.randrange(4))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", FileContentWarning)
+            with suppress(FileContentError):
+                read_uff(write(bytes(content)))
+
+
+@pytest.mark.parametrize(
+    ("label", "to_si", "exponents"),
+    [
+        ("m/s/s", 1.0, (1, 0, -2)),
+        ("M/SEC**2", 1.0, (1, 0, -2)),
+        ("m s-2", 1.0, (1, 0, -2)),
+        ("m·s^-2", 1.0, (1, 0, -2)),
+        ("m/(N s2)", 1.0, (1, -1, -2)),
+        ("1/kg", 1.0, (1, -1, -2)),
+        ("µm", 1e-6, (1, 0, 0)),
+        ("lb-in", 4.4482216152605 * 0.0254, (1, 1, 0)),
+        ("N.m", 1.0, (1, 1, 0)),
+        ("deg/s", np.pi / 180, (0, 0, -1)),
+        ("MN", 1e6, (0, 1, 0)),
+        ("LBF", 4.4482216152605, (0, 1, 0)),
+    ],
+)
+def test_unit_labels(label, to_si, exponents):
+    unit = parse_unit(label)
+    assert unit.to_si == pytest.approx(to_si, rel=1e-12)
+    assert unit.exponents == exponents
+
+
+@pytest.mark.parametrize("label", ["", "NONE", "V", "m/", "m/s^", "(m", "m)", "^2", "m/0", "m=s", "NM", "/N", "()"])
+def test_labels_that_are_not_understood(label):
+    assert parse_unit(label) is None
+
+
+needs_lap_joint = pytest.mark.skipif(not LAP_JOINT.exists(), reason=f"no {LAP_JOINT} (set JOINTFRF_TEST_DATA)")
+vendor_files = sorted((DATA / "uff").glob("*")) or [
+    pytest.param(None, marks=pytest.mark.skip(reason=f"no files in {DATA / 'uff'} (set JOINTFRF_TEST_DATA)"))
+]
+
+
+@needs_lap_joint
+def test_lap_joint():
+    frfs = read_uff(LAP_JOINT)
+    assert frfs.h.shape == (600, 48, 26)
+    assert frfs.measured.all()
+    np.testing.assert_array_equal(frfs.freq_hz, np.arange(1.0, 601.0))
+    np.testing.assert_allclose(frfs.coordinates[101], [0.0, 0.0113, 0.2875], atol=1e-12)
+    assert len(frfs.coordinates) == 24
+    raw = LAP_JOINT.read_bytes()
+    start = raw.index(b"\n", raw.index(b"FRF 101+X / 101+Y")) + 1
+    for _ in range(10):
+        start = raw.index(b"\n", start) + 1
+    first = complex(*struct.unpack("<2d", raw[start : start + 16]))
+    assert frfs.matrix(["101:x"], ["101:y"])[0, 0, 0] == first
+
+
+@needs_lap_joint
+def test_lap_joint_is_reciprocal_within_its_noise():
+    names = ["101:y", "102:y", "104:y", "202:y", "204:y", "301:y", "302:y"]
+    receptance = read_uff(LAP_JOINT).receptance()
+    h = receptance.matrix(names, names)
+    off_diagonal = ~np.eye(len(names), dtype=bool)
+    scatter = (np.abs(h - h.transpose(0, 2, 1)) / np.abs(h))[:, off_diagonal]
+    assert np.sqrt((scatter**2).mean()) == pytest.approx(0.01 * np.sqrt(2.0), rel=0.02)
+    accelerance = read_uff(LAP_JOINT).matrix(names, names)
+    omega = 2.0 * np.pi * receptance.freq_hz[:, None, None]
+    np.testing.assert_allclose(h, -accelerance / omega**2, rtol=1e-12)
+
+
+@needs_lap_joint
+def test_lap_joint_names_what_was_not_excited():
+    with pytest.raises(FileContentError, match=r"101:\+y / 101:\+x, 101:\+y / 301:\+rx"):
+        read_uff(LAP_JOINT).matrix(["101:y"], ["101:x", "301:rx", "301:y"])
+
+
+@needs_lap_joint
+def test_lap_joint_cut_anywhere_is_read_as_far_as_it_goes(tmp_path):
+    content = LAP_JOINT.read_bytes()[:60_000]
+    path = tmp_path / "cut.uff"
+    for end in range(50_000, 60_000, 997):
+        path.write_bytes(content[:end])
+        with pytest.warns(FileContentWarning, match="ends inside a dataset"):
+            assert np.isfinite(read_uff(path).h).all()
+
+
+@pytest.mark.parametrize("path", vendor_files, ids=lambda path: getattr(path, "name", "none"))
+def test_vendor_files_without_frfs_are_refused_in_one_sentence(path):
+    with pytest.raises(FileContentError, match=r"no FRF|not a Universal File") as caught:
+        read_uff(path)
+    assert "\n" not in str(caught.value)
