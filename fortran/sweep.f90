@@ -30,6 +30,9 @@ module jointfrf_sweep
     integer :: n_real = 0          !< real workspace of one line
     integer :: n_pivot = 0         !< integer workspace of one line
     real(dp) :: flops = 0.0_dp     !< estimated work of one line
+    !> Never set. gfortran takes a CLASS argument with INTENT(IN) to leave untouched whatever it can reach, unless the
+    !> declared type has a pointer; without this one it may assume that a sweep writes no results.
+    integer, pointer :: results => null()
   contains
     procedure(line_routine), deferred :: line
     procedure(void_routine), deferred :: void
@@ -121,7 +124,7 @@ contains
     integer :: threads
 
     threads = 1
-    if (flops < serial_flops) return
-    !$ if (.not. omp_in_parallel()) threads = max(1, min(omp_get_max_threads(), int(n_freq)))
+    if (flops < serial_flops .or. n_freq < 2) return
+    !$ if (.not. omp_in_parallel()) threads = min(omp_get_max_threads(), int(n_freq))
   end function threads_for
 end module jointfrf_sweep

@@ -137,6 +137,7 @@ install_missing() {
   sudo=
   if [ $manager != brew ] && [ "$(id -u)" != 0 ]; then
     if ! sudo -n true >/dev/null 2>&1; then
+      command -v sudo >/dev/null 2>&1 || command="su -c '$(echo "$command" | sed 's/sudo //g')'"
       say "missing:$missing. Type this, then start again:"
       echo "  $command" >&2
       exit 3

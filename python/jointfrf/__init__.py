@@ -20,6 +20,7 @@ from jointfrf.errors import (
     SingularLineError,
 )
 from jointfrf.identify import identify
+from jointfrf.interface import Interface, interface
 from jointfrf.ismm import inverse_substructuring, ismm
 from jointfrf.joint import Joint
 from jointfrf.joint_fit import JointFit
@@ -29,6 +30,6 @@ from jointfrf.model import Model, assemble
 from jointfrf.modification import find_modification, modify
 from jointfrf.noise import pollute, realisations
 from jointfrf.receptance import receptance
-from jointfrf.rotations import central_difference, difference_error, difference_weights, transform
+from jointfrf.rotations import DifferenceError, central_difference, difference_error, difference_weights, transform
 
 __version__ = "0.1.0"

@@ -13,7 +13,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from jointfrf import _kernel
+import jointfrf._kernel as _kernel
 from jointfrf.errors import CopyWarning, IllConditionedWarning, SingularLineError
 
 __all__ = [

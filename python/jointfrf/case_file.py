@@ -261,7 +261,9 @@ def _built(table: Table, build):  # type: ignore[no-untyped-def]
 
 def _joint(tables: list[Table]) -> tuple[Joint, Joint, tuple[bool, ...]]:
     dofs, rotational = [], []
-    values: dict[str, list[float]] = {key: [] for key in ("stiffness", "damping", "initial_stiffness", "initial_damping")}
+    values: dict[str, list[float]] = {
+        key: [] for key in ("stiffness", "damping", "initial_stiffness", "initial_damping")
+    }
     for table in tables:
         dofs.append(table.text("dof"))
         rotational.append(table.text("motion", _MOTIONS) == "rotation")
@@ -312,11 +314,15 @@ def _noise(table: Table, n: int) -> Noise:
     return noise
 
 
-def _expected(table: Table, parameters: list[str], band_sets: tuple[BandSet, ...], noises: tuple[Noise, ...]) -> Expected:
+def _expected(
+    table: Table, parameters: list[str], band_sets: tuple[BandSet, ...], noises: tuple[Noise, ...]
+) -> Expected:
     frequencies = []
     for entry in table.tables("frequencies") if "frequencies" in table else []:
         joint = entry.text("joint", ("actual", "initial"))
-        frequencies.append((joint, entry.text("source"), tuple(entry.numbers("values")), entry.number("within_percent", 0)))
+        frequencies.append(
+            (joint, entry.text("source"), tuple(entry.numbers("values")), entry.number("within_percent", 0))
+        )
         entry.close()
     tables = []
     for entry in table.tables("identified") if "identified" in table else []:

@@ -327,18 +327,30 @@ def _start(
 ) -> tuple[FloatArray, FloatArray]:
     """First parameters, and the size at which a joint is as good as rigid: both of shape (r, p).
 
-    The stiffness starts from the weighted mean of the real compliance, everything else from zero. A compliance lost in
-    noise starts from what the noise would let through.
+    Each DOF by itself, from K*(theta) C = 1 by weighted linear least squares, twice, the second time with the weights of
+    the first K*. Noise draws this start towards zero, from where Gauss-Newton steps climb safely; from above they may
+    fall off towards a rigid joint.
     """
-    theta = np.zeros((linear.shape[0], len(basis.names)))
-    rigid = np.empty((linear.shape[0], n))
+    r = linear.shape[0]
+    theta = np.zeros((r, len(basis.names)))
+    rigid = np.empty((r, n))
     for d in range(n):
         at = int(np.flatnonzero(chosen == d * (n + 1))[0])
         own = weight[..., at, at].real
-        mean = (own * linear[..., at].real).sum(axis=1) / own.sum(axis=1)
-        error = 1 / np.sqrt(own.sum(axis=1))
-        theta[:, d] = 1 / np.maximum(mean, 1e-3 * error)
-        rigid[:, d] = 1 / (_RIGID * error)
+        rigid[:, d] = np.sqrt(own.sum(axis=1)) / _RIGID
+        terms = np.flatnonzero(abs(basis.matrices[:, :, d, d]).max(axis=1))
+        slope = linear[..., at, None] * basis.matrices[terms, :, d, d].T
+        scale = np.sqrt((abs(slope) ** 2).sum(axis=1, keepdims=True))
+        slope = slope / np.where(scale > 0, scale, 1)
+        stiffness = np.ones_like(own)
+        for _ in range(2):
+            pull = (own / stiffness**2)[..., None] * slope.conj()
+            normal = (pull.swapaxes(1, 2) @ slope).real
+            found = (np.linalg.pinv(normal, hermitian=True) @ pull.real.sum(axis=1)[..., None])[..., 0]
+            theta[:, terms] = found / np.where(scale > 0, scale, 1)[:, 0]
+            model = abs(theta[:, terms] @ basis.matrices[terms, :, d, d])
+            stiffness = np.maximum(model, 1e-3 * model.max(axis=1, keepdims=True))
+            stiffness = np.where(stiffness > 0, stiffness, 1)
     size = abs(basis.matrices).max(axis=1)  # (p, n, n), one pair of entries each
     limit = np.stack(
         [np.sqrt(rigid[:, a] * rigid[:, b]) / entry[a, b] for entry in size for a, b in [np.argwhere(entry)[0]]], axis=1

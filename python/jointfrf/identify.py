@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Literal, get_args
 
 import numpy as np
@@ -256,7 +257,7 @@ def _by_compliance(
 
     notes: list[str] = []
     if damping == "auto":
-        damping, result = _choose_damping(fit, used, notes)
+        damping, result = _choose_damping(fit, used, level, notes)
     else:
         result = fit(damping)
     basis_names = joint_basis(2 * np.pi * freq[:1], names, damping, cross).names
@@ -276,8 +277,10 @@ def _by_compliance(
         freq_hz=freq,
         k_lines=k_lines,
         bands=tuple(tuple(b) for b in own),
-        notes=tuple(notes),
     )
+    unseen = [name for name, (low, high) in found.confidence_interval(0.95).items() if name[0] in "hc" and low < 0 < high]
+    if unseen:
+        notes.append(f"{', '.join(unseen)}: not told from zero, the 95 % interval holds it")
     told = _lost_lines(measured, t, level, variance) + _doubts(found, result, cross)
     for text in told:
         warnings.warn(text, IdentificationWarning, stacklevel=3)
@@ -286,7 +289,7 @@ def _by_compliance(
             f"the fit did not converge in {result.iterations} iterations", ConvergenceWarning, stacklevel=3
         )
         told.append(f"the fit did not converge in {result.iterations} iterations")
-    return JointFit(**{**found.__dict__, "warnings": tuple(told)})
+    return replace(found, warnings=tuple(told), notes=tuple(notes))
 
 
 def _covariance(result: ComplianceEstimate, level: float, residual: float) -> FloatArray:
@@ -318,7 +321,7 @@ def _noise_of(
 
 
 def _choose_damping(
-    fit: Callable[[Damping], ComplianceEstimate], used: NDArray[np.bool_], notes: list[str]
+    fit: Callable[[Damping], ComplianceEstimate], used: NDArray[np.bool_], level: float, notes: list[str]
 ) -> tuple[Damping, ComplianceEstimate]:
     """Take the damping terms with the lowest Bayesian information criterion, and note how clear the choice is."""
     kinds: tuple[Damping, ...] = ("viscous", "hysteretic", "both")
@@ -331,12 +334,23 @@ def _choose_damping(
         p = result.theta.shape[1]
         misfit = float(result.residual_level[0]) ** 2 * (equations - p) / max(power, np.finfo(float).tiny)
         scores[kind] = misfit + p * np.log(equations)
-    best = min(scores, key=lambda kind: scores[kind])
     ranked = sorted(scores, key=lambda kind: scores[kind])
+    if ranked[0] == "both" and not _both_seen(results["both"], level):
+        ranked.remove("both")
+        notes.append("viscous and hysteretic damping cannot be told apart: only one of them is fitted")
+    best = ranked[0]
     margin = scores[ranked[1]] - scores[best]
     strength = "clearly" if margin > 10 else "weakly" if margin > 2 else "hardly"
     notes.append(f"damping {best}: {strength} preferred to {ranked[1]} (difference of BIC {margin:.1f})")
     return best, results[best]
+
+
+def _both_seen(result: ComplianceEstimate, level: float) -> bool:
+    """Whether, for some DOF, the hysteretic and the viscous term both differ from zero by two standard errors."""
+    residual = float(result.residual_level[0])
+    error = np.sqrt(np.diagonal(_covariance(result, level or residual, residual)))
+    seen = (abs(result.theta[0]) > 2 * error).reshape(3, -1)  # k, h, c by DOF
+    return bool((seen[1] & seen[2]).any())
 
 
 def _lost_lines(measured: ComplexArray, t: FloatArray, level: float, variance: FloatArray | None) -> list[str]:
@@ -347,10 +361,8 @@ def _lost_lines(measured: ComplexArray, t: FloatArray, level: float, variance: F
     n = t.shape[0] // 2
     spread = level**2 * (abs(measured) ** 2 if variance is None else variance)
     inverse = invert(t[:n] @ measured @ t[n:].T, on_singular="nan")
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)
-        relative = np.einsum("fap,aq,fpq->fa", abs(inverse @ t[:n]) ** 2, t[n:] ** 2, spread, optimize=True)
-        lost = int((~(relative.max(axis=1) < _LOST**2)).sum())
+    relative = np.einsum("fap,aq,fpq->fa", abs(inverse @ t[:n]) ** 2, t[n:] ** 2, spread, optimize=True)
+    lost = int((~(relative.max(axis=1) < _LOST**2)).sum())
     if lost <= relative.shape[0] / 2:
         return []
     return [

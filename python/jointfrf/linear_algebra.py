@@ -50,7 +50,7 @@ def invert(a: ArrayLike, *, freq_hz: ArrayLike | None = None, on_singular: OnSin
 
 
 def reciprocal_condition(a: ArrayLike) -> FloatArray:
-    """Reciprocal condition number 1/(|A| |A^-1|) of every line, 1-norm.
+    """Reciprocal condition number 1/(|A| |A^-1|) of every line, infinity norm.
 
     Parameters
     ----------

@@ -160,14 +160,15 @@ class DifferenceError(NamedTuple):
 
     Attributes
     ----------
+    compliance : float
+        What they add to the rotational compliance of the joint, rad/(N m).
     bias : float
-        Estimated relative bias of the rotational compliance from the strain between the points; the identified stiffness
-        is about k / (1 + bias).
+        The same as a share of the joint's compliance: at low frequency k is found as k / (1 + bias).
     noise_gain : float
-        Standard deviation of the rotational receptance over that of a translational one, rad/(N m) per m/N: 1/(2 dx^2)
-        for three points.
+        Variance of a rotational receptance over that of a translational one: sum of squared weights, squared, 1/m^4.
     """
 
+    compliance: float
     bias: float
     noise_gain: float
 
@@ -178,7 +179,7 @@ def difference_error(spacing: float | ArrayLike, bending_stiffness: float, joint
     Parameters
     ----------
     spacing : float or array_like, shape (m,)
-        As in `difference_weights`.
+        As in `difference_weights`; the outermost points count.
     bending_stiffness : float
         E I of the beams, N m^2.
     joint_stiffness : float
@@ -195,20 +196,20 @@ def difference_error(spacing: float | ArrayLike, bending_stiffness: float, joint
 
     Notes
     -----
-    A moment is applied as two forces and the rotation read from two displacements. Between the reference and a point at
-    distance dx the beam bends under the moment: with the outer points at +-dx on each side of the joint, the rotation
-    measured across it contains an extra dx/(E I) or so, which adds to the compliance 1/k.
+    A moment is applied as two opposite forces at +-dx, and the rotation read from the displacements there. Between the
+    points the beam bends under this couple: strain energy theory gives dx/(6 E I) more compliance on each side of the
+    joint, dx/(3 E I) in all, at low frequency and for a joint in the middle of the points.
 
     Examples
     --------
     >>> import jointfrf as jf
     >>> error = jf.difference_error(0.005, bending_stiffness=30.15, joint_stiffness=5000.0)
-    >>> round(error.bias, 2), round(error.noise_gain)
-    (0.83, 20000)
+    >>> round(error.bias, 3), round(error.compliance * 1e5, 2)
+    (0.276, 5.53)
     """
     if not (bending_stiffness > 0 and joint_stiffness > 0):
         raise ValueError("bending_stiffness and joint_stiffness must be positive")
     t = difference_weights(spacing)
-    offset = np.array([-spacing, 0.0, spacing]) if np.ndim(spacing) == 0 else np.asarray(spacing)  # type: ignore[operator]
-    reach = float(offset.max() - offset.min()) / 2
-    return DifferenceError(reach / bending_stiffness * joint_stiffness, float((t[1] ** 2).sum()))
+    reach = float(spacing) if np.ndim(spacing) == 0 else float(np.ptp(np.asarray(spacing))) / 2  # type: ignore[arg-type]
+    compliance = reach / (3 * bending_stiffness)
+    return DifferenceError(compliance, compliance * joint_stiffness, float((t[1] ** 2).sum() ** 2))

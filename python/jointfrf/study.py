@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -22,10 +22,10 @@ from jointfrf.estimator import estimate, joint_basis
 from jointfrf.ismm import inverse_substructuring, ismm
 from jointfrf.noise import realisations
 
-__all__ = ["Exact", "Identified", "exact_frfs", "run_study", "workers"]
+__all__ = ["Exact", "Identified", "exact_frfs", "regenerate", "run_study", "workers"]
 
-#: Realisations treated at once: bounds the memory, a few MB each.
-_CHUNK = 25
+#: Lines treated at once, over realisations: bounds the memory to some tens of MB.
+_CHUNK = 20_000
 #: Realisations whose K*(w) is kept line by line, for figures.
 _KEPT = 200
 _ALL_LINES = "all lines"
@@ -151,7 +151,7 @@ def _fit(task: _Task) -> tuple[FloatArray, ComplexArray]:
     exact = task.exact
     basis = joint_basis(2 * np.pi * exact.freq_hz, exact.dofs, "viscous", "zero")
     gamma = _polluted(task, exact.interface(exact.h_c), task.seed)
-    theta = estimate(gamma, np.eye(2 * exact.n), basis, reciprocal=not task.noise.reciprocal, tolerance=0.5).theta
+    theta = estimate(gamma, np.eye(2 * exact.n), basis, tolerance=0.5).theta
     return theta[None], np.empty((0, exact.freq_hz.size, exact.n), np.complex128)
 
 
@@ -244,7 +244,8 @@ def run_study(
         seed and its own number only: neither on `pool` nor on how many there are.
     """
     groups = [(noise, method) for noise in case.noises for method in noise.methods]
-    chunks = [(first, min(_CHUNK, n_realisations - first)) for first in range(0, n_realisations, _CHUNK)]
+    size = max(1, _CHUNK // case.freq_hz.size)
+    chunks = [(first, min(size, n_realisations - first)) for first in range(0, n_realisations, size)]
     tasks = [
         _Task(exact, noise, method, case.band_sets, case.seed, first, count)
         for noise, method in groups
@@ -292,8 +293,3 @@ def regenerate(exact: Exact, theta: FloatArray, point: str) -> ComplexArray:
     )  # fmt: skip
     at = n if point == "r" else 2 * n
     return couple(h_a, h_b, k_joint, joint, joint)[:, at, at].reshape(r, n_freq)
-
-
-def chunked(total: int, size: int) -> Sequence[slice]:
-    """Slices of at most `size` that cover `total`."""
-    return [slice(first, min(first + size, total)) for first in range(0, total, size)]

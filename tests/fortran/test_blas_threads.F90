@@ -5,9 +5,19 @@ module blas_probe
   use jointfrf_sweep, only: line_operation, line_space
   implicit none
   private
-  public :: probe, openblas_get_num_threads, openblas_set_num_threads
+  public :: probe, skip, openblas_get_num_threads, openblas_get_parallel, openblas_set_num_threads
 
   interface
+    function openblas_get_parallel() bind(C, name=JF_BLAS_PREFIX//"openblas_get_parallel") result(model)
+      import :: ip
+      integer(ip) :: model
+    end function openblas_get_parallel
+
+    subroutine c_exit(code) bind(C, name='exit')
+      import :: ip
+      integer(ip), value :: code
+    end subroutine c_exit
+
     function openblas_get_num_threads() bind(C, name=JF_BLAS_PREFIX//"openblas_get_num_threads") result(threads)
       import :: ip
       integer(ip) :: threads
@@ -28,6 +38,11 @@ module blas_probe
   end type probe
 
 contains
+
+  !> The exit status by which the test driver knows that a test does not apply.
+  subroutine skip()
+    call c_exit(77_ip)
+  end subroutine skip
 
   subroutine look(self, i, space, line_info, rcond)
     class(probe), intent(in) :: self
@@ -51,7 +66,7 @@ contains
 end module blas_probe
 
 program test_blas_threads
-  use blas_probe, only: openblas_get_num_threads, openblas_set_num_threads, probe
+  use blas_probe, only: openblas_get_num_threads, openblas_get_parallel, openblas_set_num_threads, probe, skip
   use testing, only: check, dp, finish, ip, set_threads
   use jointfrf_blas_threads, only: hold_blas_threads, release_blas_threads
   use jointfrf_sweep, only: run_sweep
@@ -60,6 +75,7 @@ program test_blas_threads
   integer(ip) :: before
   logical :: threaded
 
+  if (openblas_get_parallel() /= 1) call skip()
   threaded = .false.
   !$ threaded = .true.
   call openblas_set_num_threads(2_ip)

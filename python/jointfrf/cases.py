@@ -1,0 +1,162 @@
+"""Cases: finding them, running one, and writing what it yields."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from collections.abc import Callable
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from pathlib import Path
+
+from jointfrf.case_file import read_case
+from jointfrf.figures import make_figures
+from jointfrf.plots import as_csv as figure_as_csv
+from jointfrf.plots import draw
+from jointfrf.report import make_report, summary
+from jointfrf.results import CaseResult, compute
+from jointfrf.tables import Table, as_csv, make_tables, to_json
+
+__all__ = ["CaseOutput", "UnknownCaseError", "cases_folder", "find_case", "list_cases", "run_case"]
+
+
+class UnknownCaseError(ValueError):
+    """There is no such case."""
+
+
+@dataclass(frozen=True)
+class CaseOutput:
+    """What running a case gave.
+
+    Attributes
+    ----------
+    result : CaseResult
+    tables : list of Table
+    summary : list of str
+        A few sentences.
+    report : Path
+        The HTML report; CSV, PNG and JSON files stand beside it.
+    """
+
+    result: CaseResult
+    tables: list[Table]
+    summary: list[str]
+    report: Path
+
+
+def cases_folder() -> Path | None:
+    """Return the folder of the cases that come with the package: installed, or in the source tree; None if absent."""
+    here = Path(__file__).resolve().parent
+    for folder in (here / "data" / "cases", *(parent / "cases" for parent in here.parents[:2])):
+        if folder.is_dir() and any(folder.glob("*/case.toml")):
+            return folder
+    return None
+
+
+def list_cases() -> list[Path]:
+    """Return the folders of the cases that come with the package, in the order of their numbers."""
+    folder = cases_folder()
+    found = [] if folder is None else [path.parent for path in folder.glob("*/case.toml")]
+    return sorted(found, key=lambda path: [int(x) for x in path.name.split("-")[0].split(".") if x.isdigit()])
+
+
+def find_case(word: str) -> Path:
+    """Return the folder of a case.
+
+    Parameters
+    ----------
+    word : str
+        A folder that holds a `case.toml`, or the name or the number of a case that comes with the package.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    UnknownCaseError
+        There is none.
+    """
+    if (Path(word) / "case.toml").is_file():
+        return Path(word)
+    known = list_cases()
+    for folder in known:
+        if word in (folder.name, folder.name.split("-")[0]):
+            return folder
+    names = ", ".join(folder.name for folder in known) or "none"
+    if Path(word).is_dir():
+        raise UnknownCaseError(f"the folder {word} holds no case.toml; known cases: {names}")
+    raise UnknownCaseError(f"there is no case {word!r}; known cases: {names}; or name a folder with a case.toml")
+
+
+def _write(path: Path, content: str | bytes) -> None:
+    """Write a file whole or not at all."""
+    data = content.encode("utf-8") if isinstance(content, str) else content
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(data)
+        # As an ordinary new file: mkstemp makes private ones.
+        mask = os.umask(0)
+        os.umask(mask)
+        Path(temporary).chmod(0o666 & ~mask)
+        Path(temporary).replace(path)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
+
+
+def run_case(
+    folder: Path | str,
+    out: Path | str = "results",
+    *,
+    realisations: int | None = None,
+    pool: Executor | None = None,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> CaseOutput:
+    """Run a case and write its report, tables and figures.
+
+    Parameters
+    ----------
+    folder : Path or str
+        Folder with `case.toml`.
+    out : Path or str
+        Results go to a folder with the case's name in there: `report.html`, `results.json`, `tables/*.csv`,
+        `figures/*.png` and `figures/*.csv`.
+    realisations : int, optional
+        Instead of the number that the case names.
+    pool : Executor, optional
+        Processes that share the work, see `jointfrf.study.workers`.
+    progress : callable
+        Called with the numbers of chunks done and in all.
+
+    Returns
+    -------
+    CaseOutput
+
+    Raises
+    ------
+    FileContentError
+        Something in the case is missing or wrong.
+    OSError
+        The results cannot be written.
+    """
+    if realisations is not None and realisations < 1:
+        raise ValueError(f"realisations must be at least 1, not {realisations}")
+    case = read_case(Path(folder))
+    target = Path(out) / case.name
+    for inner in ("tables", "figures"):
+        (target / inner).mkdir(parents=True, exist_ok=True)
+    result = compute(case, realisations, pool, progress)
+    tables, figures = make_tables(result), make_figures(result)
+    drawn = list((map if pool is None else pool.map)(draw, figures))
+    for figure, png in zip(figures, drawn, strict=True):
+        _write(target / "figures" / f"{figure.key}.png", png)
+        _write(target / "figures" / f"{figure.key}.csv", figure_as_csv(figure))
+    for table in tables:
+        _write(target / "tables" / f"{table.key}.csv", as_csv(table))
+    _write(target / "results.json", json.dumps(to_json(result), indent=1) + "\n")
+    report = target / "report.html"
+    _write(report, make_report(result, tables, list(zip(figures, drawn, strict=True))))
+    return CaseOutput(result, tables, summary(result, tables), report)

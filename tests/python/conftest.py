@@ -1,0 +1,87 @@
+"""Structures that several tests share."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+import jointfrf as jf
+
+
+@dataclass(frozen=True)
+class Assembly:
+    """Two substructures, a joint, and their FRFs; DOFs of A: joint, then r; of B: joint, then s."""
+
+    freq: np.ndarray
+    a: jf.Model
+    b: jf.Model
+    joint: jf.Joint
+    first: jf.Joint
+    h_a: np.ndarray
+    h_b: np.ndarray
+
+    @property
+    def n(self) -> int:
+        return len(self.joint.dofs)
+
+    @property
+    def at(self) -> list[int]:
+        """Joint DOFs in either substructure."""
+        return list(range(self.n))
+
+    @property
+    def inner(self) -> list[int]:
+        return list(range(self.n, 2 * self.n))
+
+    def coupled(self, joint: jf.Joint) -> np.ndarray:
+        return jf.couple(self.h_a, self.h_b, joint.dynamic_stiffness(self.freq), self.at, self.at)
+
+    def gamma(self, joint: jf.Joint) -> np.ndarray:
+        dofs = self.at + [2 * self.n + i for i in self.at]
+        return self.coupled(joint)[:, dofs][:, :, dofs]
+
+
+def _assembly(freq, a, b, dofs_a, dofs_b, joint, first):
+    return Assembly(freq, a, b, joint, first, a.receptance(freq, dofs_a), b.receptance(freq, dofs_b))
+
+
+@pytest.fixture(scope="session")
+def chains() -> Assembly:
+    """Table 3-1."""
+    a = jf.chain([5, 3], [2500, 3500], [3, 4], ground="start")
+    b = jf.chain([4, 2], [2000, 2500], [2, 1], ground="end")
+    joint, first = jf.Joint([2000.0], [3.0], ["x"]), jf.Joint([1000.0], [1.5], ["x"])
+    return _assembly(np.linspace(0.5, 10, 191), a, b, [1, 0], [0, 1], joint, first)
+
+
+@pytest.fixture(scope="session")
+def beams() -> Assembly:
+    """Table 3-3 with a coarser mesh, Eqns (3.13), (3.14)."""
+    section = dict(youngs_modulus=67e9, density=2700.0, width=0.025, height=0.006, loss_factor=0.01)
+    a = jf.beam(0.3, 12, ends=("clamped", "free"), **section)
+    b = jf.beam(0.225, 9, **section)
+    joint = jf.Joint([6e5, 5e3], [20, 1.5], ["y", "theta"])
+    first = jf.Joint([1e5, 1e3], [5, 0.5], ["y", "theta"])
+    dofs_a = a.index("13:y", "13:theta", "7:y", "7:theta")
+    dofs_b = b.index("1:y", "1:theta", "10:y", "10:theta")
+    return _assembly(np.arange(15, 800.5, 5.0), a, b, dofs_a, dofs_b, joint, first)
+
+
+@pytest.fixture(params=["chains", "beams"])
+def assembly(request) -> Assembly:
+    return request.getfixturevalue(request.param)
+
+
+@pytest.fixture
+def random_lines():
+    """Well-conditioned, non-symmetric complex matrices."""
+
+    def make(n_freq: int, rows: int, columns: int | None = None, seed: int = 0) -> np.ndarray:
+        rng = np.random.default_rng(seed)
+        shape = (n_freq, rows, rows if columns is None else columns)
+        matrices = rng.standard_normal(shape) + 1j * rng.standard_normal(shape)
+        return matrices + (3 * np.eye(rows) if columns is None else 0)
+
+    return make

@@ -1,0 +1,147 @@
+"""`jointfrf identify` on the simulated hammer test, and what it says when something is missing."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+DATA = Path(os.environ.get("JOINTFRF_TEST_DATA", Path(__file__).resolve().parents[3] / "shared" / "data"))
+LAP = DATA / "lap_joint" / "lap_joint.uff"
+needs_data = pytest.mark.skipif(not LAP.exists(), reason="the measured files are not beside the project (JOINTFRF_TEST_DATA)")
+JOINT = ["--j", "102,104", "--k", "202,204", "--dofs", "y,theta_x"]
+
+
+def run(*words, expect=0):
+    result = subprocess.run(
+        [sys.executable, "-m", "jointfrf.cli", "identify", *map(str, words)], capture_output=True, text=True, timeout=120
+    )
+    assert result.returncode == expect, result.stderr
+    assert "Traceback" not in result.stderr
+    return result
+
+
+@pytest.fixture(scope="module")
+def identified(tmp_path_factory):
+    if not LAP.exists():
+        pytest.skip("the measured files are not beside the project (JOINTFRF_TEST_DATA)")
+    folder = tmp_path_factory.mktemp("out") / "deep" / "lap"
+    words = (LAP, *JOINT, "--band", "200:550", "--method", "compliance,inverse_substructuring", "--out", folder)
+    return run(*words), folder
+
+
+def test_bending_plane_of_the_lap_joint(identified):
+    result, folder = identified
+    content = json.loads((folder / "identification.json").read_text())
+    fit, plain = content["fits"]
+    found = fit["parameters"]["k_theta_x"]
+    assert 5e3 < found["value"] < 9e3
+    low, high = found["confidence_interval_95"]
+    assert low < 7e3 < high
+    assert 3e7 < fit["parameters"]["k_y"]["value"] < 2e8
+    assert fit["noise_level"] == pytest.approx(0.01, rel=0.1)
+    # The plain band mean shrinks both stiffnesses on the same data.
+    assert plain["parameters"]["k_theta_x"]["value"] < 0.6 * found["value"]
+    assert plain["parameters"]["k_y"]["value"] < 0.6 * fit["parameters"]["k_y"]["value"]
+    assert content["source"] == "lap_joint.uff"
+    for word in ("k_theta_x", "95 % interval", "residual", "warning:", "reference points 12 mm apart"):
+        assert word in result.stdout
+
+
+def test_figures_are_written_and_nothing_else(identified):
+    _, folder = identified
+    names = {path.name for path in folder.iterdir()}
+    assert names == {
+        "identification.json",
+        "joint_y.png",
+        "joint_theta_x.png",
+        "joint_y_inverse_substructuring.png",
+        "joint_theta_x_inverse_substructuring.png",
+    }
+    for path in folder.glob("*.png"):
+        assert path.read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
+        assert path.stat().st_size > 20_000
+
+
+@needs_data
+def test_without_a_joint_it_tells_what_the_file_holds():
+    printed = run(LAP).stdout
+    assert "48 responses x 26 excitations" in printed
+    assert "--dofs" in printed
+
+
+@needs_data
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--j", "102,104", "--k", "202,204", "--dofs", "x"], "102:+x / 102:+x"),
+        (["--j", "102,999", "--k", "202,204", "--dofs", "y"], "no FRF at node 999"),
+        (["--j", "102,103", "--k", "202,204", "--dofs", "y"], "do not lie on one line"),
+        (["--j", "102", "--k", "202,204", "--dofs", "y"], "same number of nodes"),
+        ([*JOINT, "--band", "700:900"], "holds no frequency line"),
+        ([*JOINT, "--spacing", "0.01"], "--spacing and --axis go together"),
+        ([*JOINT[:-1], "phi"], "joint DOF 'phi' is not one of"),
+    ],
+)
+def test_what_is_missing_is_said_in_one_sentence(words, message):
+    result = run(LAP, *words, expect=1)
+    assert message in result.stderr
+    assert result.stderr.startswith("jointfrf: error:")
+
+
+@pytest.mark.parametrize(
+    "words", [["--j", "a,b"], ["--band", "200-300"], ["--method", "magic"], ["--damping", "dry"], ["--cross", "some"]]
+)
+def test_wrong_words_are_a_usage_error(words, tmp_path):
+    assert "usage:" in run(tmp_path / "x.uff", *words, expect=2).stderr
+
+
+def test_a_file_that_is_missing_or_no_universal_file(tmp_path):
+    assert "x.uff" in run(tmp_path / "x.uff", expect=1).stderr
+    (tmp_path / "y.uff").write_text("nothing\n")
+    assert "not a Universal File" in run(tmp_path / "y.uff", expect=1).stderr
+
+
+@needs_data
+def test_vendor_files_give_a_sentence():
+    for path in sorted((DATA / "uff").iterdir()):
+        result = run(path, expect=1)
+        errors = [line for line in result.stderr.splitlines() if line.startswith("jointfrf: error:")]
+        assert len(errors) == 1, path
+        assert path.name in errors[0]
+
+
+def write_uff(path, freq, h, nodes):
+    """FRFs (receptance, y) of some nodes as ASCII dataset 58, SI units."""
+    import pyuff
+
+    sets = [
+        {
+            "type": 58, "func_type": 4, "rsp_node": out, "rsp_dir": 2, "ref_node": into, "ref_dir": 2,
+            "data": h[:, i, j], "x": freq, "id1": "id", "rsp_ent_name": "A", "ref_ent_name": "A",
+            "abscissa_spacing": 1, "abscissa_spec_data_type": 18, "ordinate_spec_data_type": 8,
+            "orddenom_spec_data_type": 13, "binary": 0,
+        }
+        for i, out in enumerate(nodes) for j, into in enumerate(nodes)
+    ]  # fmt: skip
+    pyuff.UFF(str(path)).write_sets([pyuff.prepare_58(**one) for one in sets], "add")
+
+
+def test_a_file_without_coordinates_and_a_spacing(tmp_path, beams):
+    """Two points a side on rigid end pieces: the rotations are exact, the joint comes back."""
+    mix = np.kron(np.eye(2), [[1.0, -0.01], [1.0, 0.01]])  # theta_z = du_y/dx
+    h = mix @ beams.gamma(beams.joint) @ mix.T
+    path = tmp_path / "points.uff"
+    write_uff(path, beams.freq, h, [1, 2, 3, 4])
+    words = [path, "--j", "1,2", "--k", "3,4", "--dofs", "y,theta_z", "--damping", "viscous", "--noise", "0.001"]
+    assert "no coordinates of node 1" in run(*words, expect=1).stderr
+    words += ["--spacing", "0.02", "--axis", "x", "--bending-stiffness", "30", "--out", tmp_path / "out"]
+    printed = run(*words).stdout
+    assert "rotations by central differences over +-10 mm" in printed
+    assert "0.000111 rad/(N m)" in printed
+    found = json.loads((tmp_path / "out" / "identification.json").read_text())["fits"][0]["parameters"]
+    for name, truth in (("k_y", 6e5), ("k_theta_z", 5e3), ("c_y", 20), ("c_theta_z", 1.5)):
+        assert found[name]["value"] == pytest.approx(truth, rel=2e-3)

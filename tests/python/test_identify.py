@@ -1,0 +1,201 @@
+"""The one door: every method, its arguments, what it returns and what it warns of."""
+
+import json
+import warnings
+
+import numpy as np
+import pytest
+
+import jointfrf as jf
+
+TRUTH = {"k_y": 6e5, "k_theta": 5e3, "c_y": 20, "c_theta": 1.5}
+BANDS = {"y": (200, 800), "theta": (650, 800)}
+
+
+def noisy(s, level=0.01, seed=3):
+    return jf.pollute(s.gamma(s.joint), level, seed=seed)
+
+
+@pytest.mark.parametrize(
+    "method",
+    ["compliance", "ismm", "inverse_substructuring", "decoupling-rr", "decoupling-rs", "decoupling-sr", "decoupling-ss"],
+)
+def test_every_method_returns_the_joint_without_noise(beams, method):
+    s = beams
+    more = {}
+    measured = s.gamma(s.joint)
+    if method == "ismm":
+        more = dict(alpha=s.gamma(s.first), k_initial=s.first.dynamic_stiffness(s.freq))
+    elif method.startswith("decoupling"):
+        place = {"r": s.inner, "s": [2 * s.n + i for i in s.inner]}
+        measured = s.coupled(s.joint)[:, place[method[-2]]][:, :, place[method[-1]]]
+        more = dict(h_a=s.h_a, h_b=s.h_b, dofs_j=s.at, dofs_k=s.at, dofs_r=s.inner, dofs_s=s.inner)
+    fit = jf.identify(s.freq, measured, ["y", "theta"], method, None if method == "compliance" else BANDS, **more)
+    assert fit.method == method
+    for name, value in TRUTH.items():
+        assert fit.parameters[name] == pytest.approx(value, rel=1e-5)
+    np.testing.assert_allclose(fit.stiffness, [6e5, 5e3], rtol=1e-5)
+    np.testing.assert_allclose(fit.damping, [20, 1.5], rtol=1e-5)
+    exact = s.joint.dynamic_stiffness(s.freq)
+    np.testing.assert_allclose(fit.k_joint(s.freq), exact, rtol=1e-5, atol=1e-5)
+    assert (abs(fit.k_lines - exact) / abs(exact).max(axis=(0, 2), keepdims=True)).max() < 1e-5
+
+
+def test_intervals_hold_the_truth_and_the_noise_is_found(beams):
+    fit = jf.identify(beams.freq, noisy(beams), ["y", "theta"])
+    assert fit.noise_level == pytest.approx(0.01, rel=0.15)
+    assert fit.residual_level == pytest.approx(0.01, rel=0.15)
+    assert not fit.warnings
+    for name, (low, high) in fit.confidence_interval(0.999).items():
+        assert low < TRUTH[name] < high
+        narrow = fit.confidence_interval(0.5)[name]
+        assert low < narrow[0] < narrow[1] < high
+    assert list(fit.std_error) == list(fit.parameters) == ["k_y", "k_theta", "c_y", "c_theta"]
+
+
+def test_a_given_noise_level_and_given_variances_are_used(beams):
+    measured = noisy(beams)
+    free = jf.identify(beams.freq, measured, ["y", "theta"])
+    level = jf.identify(beams.freq, measured, ["y", "theta"], noise=0.02)
+    assert level.noise_level == 0.02
+    assert level.std_error["k_y"] == pytest.approx(2 * free.std_error["k_y"], rel=0.15)
+    variances = (0.01 * abs(beams.gamma(beams.joint))) ** 2
+    given = jf.identify(beams.freq, measured, ["y", "theta"], noise=variances)
+    assert given.residual_level == pytest.approx(1, rel=0.15)
+    assert given.std_error["k_theta"] == pytest.approx(free.std_error["k_theta"], rel=0.15)
+    assert given.parameters["k_theta"] == pytest.approx(free.parameters["k_theta"], rel=0.02)
+
+
+def test_reciprocal_data_take_their_noise_from_the_residual(beams):
+    measured = jf.pollute(beams.gamma(beams.joint), 0.01, seed=3, reciprocal=True)
+    measured = (measured + measured.swapaxes(1, 2)) / 2
+    fit = jf.identify(beams.freq, measured, ["y", "theta"])
+    assert "taken from the residual" in fit.notes[-1]
+    low, high = fit.confidence_interval(0.999)["k_theta"]
+    assert low < 5e3 < high
+
+
+def test_damping_terms_that_the_data_support(beams):
+    hysteretic = jf.Joint([6e5, 5e3], dofs=["y", "theta"], loss_factor=[0.3, 0.4])
+    both = jf.Joint([6e5, 5e3], [40, 3], ["y", "theta"], [0.3, 0.4])
+    for joint, expected in ((beams.joint, "damping viscous"), (hysteretic, "damping hysteretic"), (both, "damping both")):
+        measured = jf.pollute(beams.gamma(joint), 0.005, seed=1)
+        fit = jf.identify(beams.freq, measured, ["y", "theta"], damping="auto")
+        assert any(note.startswith(expected) for note in fit.notes), (expected, fit.notes)
+    np.testing.assert_allclose(fit.loss_factor, [0.3, 0.4], atol=0.06)
+    assert fit.unit("h_theta") == "N m/rad"
+
+
+def test_a_coupled_joint(beams):
+    coupled = jf.Joint([[6e5, 1e4], [1e4, 5e3]], [20, 1.5], ["y", "theta"])
+    measured = jf.pollute(beams.gamma(coupled), 0.005, seed=1)
+    with pytest.warns(jf.IdentificationWarning, match="coupled|residual"):
+        plain = jf.identify(beams.freq, measured, ["y", "theta"])
+    assert any("consider cross=" in text for text in plain.warnings)
+    fit = jf.identify(beams.freq, measured, ["y", "theta"], cross="fit")
+    assert not fit.warnings
+    assert fit.parameters["k_y,theta"] == pytest.approx(1e4, rel=0.05)
+    assert fit.unit("k_y,theta") == "N"
+    np.testing.assert_allclose(fit.k_joint([100.0])[0, 0, 1], fit.k_joint([100.0])[0, 1, 0])
+
+
+def test_a_joint_too_stiff_to_be_seen_is_said_with_its_bound(beams):
+    rigid = jf.Joint([1e12, 5e3], [0, 1.5], ["y", "theta"])
+    measured = jf.pollute(beams.gamma(rigid), 0.01, seed=2)
+    with pytest.warns(jf.IdentificationWarning, match="cannot tell this DOF from a rigid one"):
+        fit = jf.identify(beams.freq, measured, ["y", "theta"])
+    low, high = fit.confidence_interval(0.95)["k_y"]
+    assert high == np.inf
+    assert 1e6 < low < 1e12
+    assert fit.parameters["k_theta"] == pytest.approx(5e3, rel=0.05)
+    json.dumps(fit.to_dict(), allow_nan=False)
+
+
+def test_points_instead_of_dofs(beams):
+    mix = np.array([[1.0, 0.01], [1.0, -0.01]])
+    points = np.kron(np.eye(2), mix)
+    measured = jf.pollute(points @ beams.gamma(beams.joint) @ points.T, 1e-3, seed=4)
+    fit = jf.identify(beams.freq, measured, ["y", "theta"], transform=np.linalg.inv(points))
+    low, high = fit.confidence_interval(0.999)["k_theta"]
+    assert low < 5e3 < high
+    same = jf.identify(beams.freq, measured, ["y", "theta"], "inverse_substructuring", BANDS, transform=np.linalg.inv(points))
+    assert np.isfinite(same.stiffness).all()
+
+
+def test_nearly_singular_interface_is_told(beams):
+    few = jf.pollute(beams.gamma(beams.joint), 0.6, seed=4)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        jf.identify(beams.freq, few, ["y", "theta"])
+    assert any("gamma_jk is nearly singular" in str(w.message) for w in caught)
+
+
+def test_the_table_and_the_dictionary_say_the_same(beams):
+    fit = jf.identify(beams.freq, noisy(beams), ["y", "theta"])
+    text = str(fit)
+    content = json.loads(json.dumps(fit.to_dict(), allow_nan=False))
+    for name, entry in content["parameters"].items():
+        assert name in text
+        assert f"{entry['value']:.5g}" in text
+        assert entry["unit"] in text
+    assert content["frequency_hz"] == [15.0, 800.0]
+    assert "95 % interval" in text
+
+
+def test_only_lines_in_the_bands_are_used(beams):
+    broken = noisy(beams)
+    outside = (beams.freq < 200) | (beams.freq > 600)
+    broken[outside] *= 3
+    fit = jf.identify(beams.freq, broken, ["y", "theta"], bands=(200, 600))
+    assert fit.freq_hz.min() == 200
+    assert not fit.warnings
+    own = jf.identify(beams.freq, noisy(beams), ["y", "theta"], bands={"y": (200, 800), "theta": (15, 400)})
+    assert own.bands == (((200.0, 800.0),), ((15.0, 400.0),))
+    assert own.parameters["k_y"] == pytest.approx(6e5, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (dict(method="ISMM"), "method must be one of"),
+        (dict(method="ismm"), "'ismm' needs alpha and k_initial"),
+        (dict(method="decoupling-ss"), "needs h_a, h_b, dofs_j and dofs_k"),
+        (dict(dofs=["y"]), "dofs must name 2 different joint DOFs"),
+        (dict(dofs=["y", "y"]), "dofs must name 2 different joint DOFs"),
+        (dict(bands=(2000, 3000)), "holds no frequency line"),
+        (dict(damping="friction"), "damping must be one of"),
+        (dict(cross="all"), "cross must be one of"),
+        (dict(noise=-1.0), "noise must be positive"),
+        (dict(noise=np.zeros((158, 4, 4))), "noise must hold positive variances"),
+        (dict(transform=np.eye(3)), r"transform must have shape \(n, 4\)"),
+        (dict(transform=np.ones((3, 4))), "even number of rows"),
+        (dict(freq_hz=np.arange(5.0)), r"freq_hz must have shape \(158\)"),
+    ],
+)
+def test_bad_arguments_get_one_sentence(beams, change, message):
+    arguments = dict(freq_hz=beams.freq, gamma=noisy(beams), dofs=["y", "theta"]) | change
+    with pytest.raises(ValueError, match=message):
+        jf.identify(**arguments)
+
+
+def test_bad_measurements_get_one_sentence(beams):
+    measured = noisy(beams)
+    measured[7, 0, 1] = np.nan
+    with pytest.raises(ValueError, match=r"gamma: NaN or Inf in line 7 \(50 Hz\)"):
+        jf.identify(beams.freq, measured, ["y", "theta"])
+    with pytest.raises(ValueError, match="gamma has no frequency lines"):
+        jf.identify([], np.zeros((0, 4, 4)))
+    with pytest.raises(ValueError, match="even number of rows"):
+        jf.identify(beams.freq, noisy(beams)[:, :3, :3])
+
+
+def test_probability_of_an_interval(beams):
+    fit = jf.identify(beams.freq, noisy(beams), ["y", "theta"])
+    with pytest.raises(ValueError, match="probability must lie between 0 and 1"):
+        fit.confidence_interval(95)
+
+
+def test_one_line_is_enough_for_one_complex_stiffness(chains):
+    fit = jf.identify(chains.freq[50:51], chains.gamma(chains.joint)[50:51], ["x"])
+    assert fit.parameters["k_x"] == pytest.approx(2000, rel=1e-6)
+    assert fit.parameters["c_x"] == pytest.approx(3, rel=1e-6)

@@ -1,0 +1,99 @@
+"""Noise of every kind has the distribution it says, and comes back with its seed."""
+
+from itertools import product
+
+import numpy as np
+import pytest
+
+import jointfrf as jf
+
+H = np.exp(1j * np.linspace(0, 3, 3000))[:, None, None] * np.array([[1.0, 10.0], [10.0, 0.1]])
+
+
+def relative(polluted, h=H):
+    return (polluted - h) / h
+
+
+@pytest.mark.parametrize(
+    ("kind", "total", "is_real"),
+    [
+        ("complex", 0.05, False),
+        ("complex-per-part", 0.05 * np.sqrt(2), False),
+        ("real-normal", 0.05, True),
+        ("real-uniform", 0.05 / np.sqrt(3), True),
+        ("real-uniform-std", 0.05, True),
+    ],
+)
+def test_level_relative_to_each_entry(kind, total, is_real):
+    e = relative(jf.pollute(H, 0.05, kind, seed=4))
+    spread = np.sqrt((abs(e) ** 2).mean(axis=0))
+    np.testing.assert_allclose(spread, total, rtol=0.05)
+    assert abs(e.mean()) < 4 * total / np.sqrt(e.size)
+    if is_real:
+        assert abs(e.imag).max() < 1e-12
+    else:
+        assert abs((e**2).mean()) < 0.05 * total**2  # circular
+    if kind == "real-uniform":
+        assert abs(e.real).max() <= 0.05 * (1 + 1e-9)
+        assert abs(e.real).max() > 0.049
+
+
+@pytest.mark.parametrize("relative_to", ["line", "spectrum"])
+def test_level_relative_to_a_maximum(relative_to):
+    h = H * np.linspace(1, 3, 3000)[:, None, None]
+    e = jf.pollute(h, 0.02, "real-normal", seed=1, relative_to=relative_to) - h
+    size = abs(h).max(axis=(1, 2), keepdims=True) if relative_to == "line" else abs(h).max()
+    np.testing.assert_allclose((e / size).std(axis=0), 0.02, rtol=0.06)
+    assert not e.imag.any()
+
+
+def test_same_seed_same_noise_other_seed_other_noise():
+    one = jf.pollute(H, 0.05, seed=7)
+    np.testing.assert_array_equal(one, jf.pollute(H, 0.05, seed=7))
+    assert (one != jf.pollute(H, 0.05, seed=8)).all()
+    assert (one != jf.pollute(H, 0.05, seed=7, realisation=1)).all()
+
+
+def test_realisations_do_not_depend_on_how_they_are_grouped():
+    whole = jf.realisations(H[:50], 0.05, seed=3, count=7)
+    parts = np.concatenate([jf.realisations(H[:50], 0.05, seed=3, first=f, count=c) for f, c in ((0, 3), (3, 4))])
+    np.testing.assert_array_equal(whole, parts)
+    for i, j in product(range(7), range(7)):
+        if i < j:
+            e, f = relative(whole[i], H[:50]).ravel(), relative(whole[j], H[:50]).ravel()
+            assert abs((e * f.conj()).mean()) < 5 * 0.05**2 / np.sqrt(e.size)
+
+
+def test_reciprocal_noise_is_the_same_on_both_sides():
+    e = relative(jf.pollute(H, 0.05, seed=2, reciprocal=True))
+    np.testing.assert_allclose(e, e.swapaxes(1, 2), atol=1e-14)
+    free = relative(jf.pollute(H, 0.05, seed=2))
+    assert abs(free[:, 0, 1] - free[:, 1, 0]).max() > 0.05
+
+
+def test_a_block_shares_its_noise():
+    h = np.ones((10, 4, 4), complex)
+    e = relative(jf.pollute(h, 0.05, seed=2, block=2), h)
+    blocks = e.reshape(10, 2, 2, 2, 2)
+    np.testing.assert_allclose(blocks, np.broadcast_to(blocks[:, :, :1, :, :1], blocks.shape), atol=1e-15)
+    assert np.unique(e[0].round(12)).size == 4
+
+
+def test_no_level_no_noise():
+    np.testing.assert_array_equal(jf.pollute(H, 0.0), H)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (dict(kind="white"), "kind must be one of"),
+        (dict(relative_to="peak"), "relative_to must be one of"),
+        (dict(level=-0.1), "level must be 0 or positive"),
+        (dict(level=np.nan), "level must be 0 or positive"),
+        (dict(block=3), "block 3 does not divide"),
+        (dict(h=H[:, :1], reciprocal=True), "reciprocal noise needs square matrices"),
+    ],
+)
+def test_bad_arguments_get_one_sentence(change, message):
+    with pytest.raises(ValueError, match=message):
+        jf.pollute(**(dict(h=H, level=0.05) | change))
