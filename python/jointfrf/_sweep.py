@@ -38,7 +38,8 @@ ComplexArray = NDArray[np.complex128]
 FloatArray = NDArray[np.float64]
 OnSingular = Literal["raise", "nan"]
 
-#: Below this reciprocal condition number (1-norm) a result is called ill-conditioned: fewer than four digits may be left.
+#: Below this reciprocal condition number (1-norm) a result is called ill-conditioned: fewer than four digits may be
+#: left.
 RCOND_LIMIT = 1e-12
 #: A conversion that copies more than this many bytes is announced by a `CopyWarning`.
 LARGE_COPY = 16 * 2**20
@@ -67,12 +68,10 @@ def _converted(name: str, value: ArrayLike, dtype: type) -> NDArray[Any]:
     if array.dtype.kind not in ("biufc" if dtype is np.complex128 else "biuf"):
         wanted = "numbers" if dtype is np.complex128 else "real numbers"
         raise TypeError(f"{name} must hold {wanted}, not {array.dtype}")
-    result = np.ascontiguousarray(array, dtype=dtype).reshape(array.shape)
+    result: NDArray[Any] = np.ascontiguousarray(array, dtype=dtype).reshape(array.shape)
     if result is not array and not np.shares_memory(result, array) and result.nbytes > LARGE_COPY:
         why = f"of type {array.dtype}" if array.dtype != dtype else "not contiguous in C order"
-        warnings.warn(
-            f"{name} is {why}: a copy of {result.nbytes / 2**20:.0f} MiB was made", CopyWarning, stacklevel=4
-        )
+        warnings.warn(f"{name} is {why}: a copy of {result.nbytes / 2**20:.0f} MiB was made", CopyWarning, stacklevel=4)
     return result
 
 

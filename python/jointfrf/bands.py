@@ -56,7 +56,7 @@ def in_bands(freq_hz: ArrayLike, bands: Sequence[Band]) -> NDArray[np.bool_]:
 
 
 def as_bands(
-    bands: None | Band | Sequence[Band] | Mapping[str, Band | Sequence[Band]], dofs: Sequence[str], freq_hz: FloatArray
+    bands: Band | Sequence[Band] | Mapping[str, Band | Sequence[Band]] | None, dofs: Sequence[str], freq_hz: FloatArray
 ) -> list[list[Band]]:
     """Bands of each DOF from what a user writes: nothing (all lines), one band, several, or one of these for each DOF.
 
@@ -86,12 +86,12 @@ def as_bands(
     [[(1.0, 2.0)], [(1.0, 2.0), (3.0, 4.0)]]
     """
 
-    def several(entry: None | Band | Sequence[Band]) -> list[Band]:
+    def several(entry: Band | Sequence[Band] | None) -> list[Band]:
         if entry is None:
             return [(float(freq_hz.min(initial=np.inf)), float(freq_hz.max(initial=0)))]
         pairs = [entry] if np.ndim(entry) == 1 and len(entry) == 2 else list(entry)
         in_bands(freq_hz, pairs)  # type: ignore[arg-type]
-        return [(float(low), float(high)) for low, high in pairs]  # type: ignore[misc]
+        return [(float(pair[0]), float(pair[1])) for pair in pairs]  # type: ignore[index]
 
     if not isinstance(bands, Mapping):
         return [several(bands)] * len(dofs)
@@ -119,7 +119,7 @@ class BandMean(NamedTuple):
 def band_mean(
     freq_hz: ArrayLike,
     k_joint: ArrayLike,
-    bands: None | Band | Sequence[Band] | Mapping[str, Band | Sequence[Band]] = None,
+    bands: Band | Sequence[Band] | Mapping[str, Band | Sequence[Band]] | None = None,
     dofs: Sequence[str] | None = None,
 ) -> BandMean:
     """Mean of Re K* and Im K*/w of each DOF over its sensitive band, as the source does.

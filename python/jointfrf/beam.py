@@ -65,8 +65,8 @@ def beam(
     Returns
     -------
     Model
-        Banded matrices. DOFs ``"node:y"``, ``"node:theta"`` (and ``"node:x"`` first), nodes counted from 1 at x = 0, the
-        clamped ones included.
+        Banded matrices. DOFs ``"node:y"``, ``"node:theta"`` (and ``"node:x"`` first), nodes counted from 1 at x = 0,
+        the clamped ones included.
 
     Raises
     ------

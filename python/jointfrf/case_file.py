@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import get_args
+from typing import TypeVar, cast, get_args
 
 import numpy as np
 
@@ -31,6 +32,7 @@ METHODS = (
 )
 _MOTIONS = ("translation", "rotation")
 _MOST_LINES = 1_000_000
+_T = TypeVar("_T")
 
 
 @dataclass(frozen=True)
@@ -161,7 +163,7 @@ class Case:
 
 
 def unit_of(letter: str, rotational: bool) -> str:
-    """Unit of a stiffness ("k") or a damping ("c")."""
+    """Return the unit of a stiffness ("k") or a damping ("c")."""
     return {"k": ("N/m", "N m/rad"), "c": ("N s/m", "N m s/rad")}[letter][rotational]
 
 
@@ -232,26 +234,31 @@ def _substructure(table: Table) -> Substructure:
         numbers = [table.numbers(key) for key in ("masses", "stiffness", "damping")]
         ground = table.text("ground", get_args(Ground))
         table.close()
-        return _built(table, lambda: Substructure(chain(*numbers, ground=ground, loss_factor=loss_factor), None))
-    sizes = {key: table.number(key) for key in ("length", "youngs_modulus", "density", "width", "height")}
+        return _built(
+            table, lambda: Substructure(chain(*numbers, ground=cast(Ground, ground), loss_factor=loss_factor), None)
+        )
+    length, youngs_modulus, density, width, height = (
+        table.number(key) for key in ("length", "youngs_modulus", "density", "width", "height")
+    )
     elements = table.whole("elements", 1)
     ends = table.texts("ends", get_args(End))
-    element = table.text("element", get_args(BeamElement))
-    poisson = {"poisson": table.number("poisson", -1)} if element == "shear-flexible" else {}
+    element = cast(BeamElement, table.text("element", get_args(BeamElement)))
+    # Without shear there is no Poisson's ratio.
+    poisson = table.number("poisson", -0.99) if element == "shear-flexible" else 0.0
     axial = table.truth("axial")
     table.close()
-    length = sizes.pop("length")
 
     def build() -> Substructure:
         model = beam(
-            length, elements, ends=ends, element=element, axial=axial, loss_factor=loss_factor, **sizes, **poisson
+            length, elements, youngs_modulus=youngs_modulus, density=density, width=width, height=height,
+            ends=cast(tuple[End, End], ends), element=element, axial=axial, poisson=poisson, loss_factor=loss_factor,
         )  # fmt: skip
         return Substructure(model, np.linspace(0, length, elements + 1))
 
     return _built(table, build)
 
 
-def _built(table: Table, build):  # type: ignore[no-untyped-def]
+def _built(table: Table, build: Callable[[], _T]) -> _T:
     """Call a builder; its complaints name the table."""
     try:
         return build()
@@ -283,7 +290,7 @@ def _points(table: Table, point: str, model: Model, n: int) -> list[int]:
     def found() -> list[int]:
         return [int(model.index(name)) for name in names]  # type: ignore[arg-type]
 
-    return _built(table, found)  # type: ignore[no-any-return]
+    return _built(table, found)
 
 
 def _band_set(table: Table, parameters: list[str], freq: FloatArray) -> BandSet:

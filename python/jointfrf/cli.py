@@ -65,7 +65,7 @@ def _complain(message: object, status: int) -> int:
     return status
 
 
-def _show_warning(message: Warning | str, *_: Any) -> None:
+def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
     print(f"jointfrf: warning: {message}", file=sys.stderr)
 
 

@@ -52,8 +52,8 @@ def _methods(text: str) -> list[str]:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the arguments of the command."""
     parser.description = (
-        "Identify a joint from the FRFs of an assembly in a Universal File (dataset 58). Accelerances and mobilities become "
-        "receptances; rotations come from points along a line by central differences."
+        "Identify a joint from the FRFs of an assembly in a Universal File (dataset 58). Accelerances and mobilities "
+        "become receptances; rotations come from points along a line by central differences."
     )
     parser.add_argument("file", type=Path, help="Universal File with the FRF matrix of the points around the joint")
     parser.add_argument("--j", type=_nodes, metavar="NODES", help="nodes on side j, along a line: 102,104")
@@ -61,22 +61,52 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--dofs", type=_words, metavar="DOFS", help="joint DOFs out of x,y,z,theta_x,theta_y,theta_z, like y,theta_x"
     )
-    parser.add_argument("--band", type=_band, action="append", metavar="LOW:HIGH", help="frequency band in Hz; may be repeated")
-    parser.add_argument("--method", type=_methods, default=["compliance"], metavar="METHODS",
-                        help=f"one or several of {','.join(_METHODS)} (default: compliance)")
-    parser.add_argument("--damping", choices=(*get_args(Damping), "auto"), default="auto",
-                        help="damping terms of K* = k (1 + i eta) + i w c (default: auto, what the data support)")
-    parser.add_argument("--cross", choices=get_args(Cross), default="zero",
-                        help="terms between the joint DOFs: none (default), not looked at, fitted")
-    parser.add_argument("--noise", type=float, metavar="LEVEL",
-                        help="relative noise of the FRFs, 0.01 for 1 %% (default: from their reciprocity)")
-    parser.add_argument("--spacing", type=float, metavar="METRES",
-                        help="distance between neighbouring nodes, where the file has no coordinates; needs --axis")
+    parser.add_argument(
+        "--band", type=_band, action="append", metavar="LOW:HIGH", help="frequency band in Hz; may be repeated"
+    )
+    parser.add_argument(
+        "--method",
+        type=_methods,
+        default=["compliance"],
+        metavar="METHODS",
+        help=f"one or several of {','.join(_METHODS)} (default: compliance)",
+    )
+    parser.add_argument(
+        "--damping",
+        choices=(*get_args(Damping), "auto"),
+        default="auto",
+        help="damping terms of K* = k (1 + i eta) + i w c (default: auto, what the data support)",
+    )
+    parser.add_argument(
+        "--cross",
+        choices=get_args(Cross),
+        default="zero",
+        help="terms between the joint DOFs: none (default), not looked at, fitted",
+    )
+    parser.add_argument(
+        "--noise",
+        type=float,
+        metavar="LEVEL",
+        help="relative noise of the FRFs, 0.01 for 1 %% (default: from their reciprocity)",
+    )
+    parser.add_argument(
+        "--spacing",
+        type=float,
+        metavar="METRES",
+        help="distance between neighbouring nodes, where the file has no coordinates; needs --axis",
+    )
     parser.add_argument("--axis", choices=("x", "y", "z"), help="direction of the line of nodes, with --spacing")
-    parser.add_argument("--bending-stiffness", type=float, metavar="EI",
-                        help="E I of the thinner part in N m^2: tells how much compliance the differences add")
-    parser.add_argument("--quantity", choices=("receptance", "mobility", "accelerance"),
-                        help="what the FRFs are, where the file does not say")
+    parser.add_argument(
+        "--bending-stiffness",
+        type=float,
+        metavar="EI",
+        help="E I of the thinner part in N m^2: tells how much compliance the differences add",
+    )
+    parser.add_argument(
+        "--quantity",
+        choices=("receptance", "mobility", "accelerance"),
+        help="what the FRFs are, where the file does not say",
+    )
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder for identification.json and figures")
 
 
@@ -95,11 +125,16 @@ def run(args: argparse.Namespace) -> int:
     measured = frfs.matrix(sides.channels, sides.channels)
     fits = [_fit(args, method, frfs.freq_hz, measured, sides) for method in args.method]
     points = " and ".join(", ".join(map(str, nodes)) for nodes in (args.j, args.k))
-    print(f"{args.file.name}: {frfs.h.shape[1]} responses x {frfs.h.shape[2]} excitations; joint between points {points}")
+    print(
+        f"{args.file.name}: {frfs.h.shape[1]} responses x {frfs.h.shape[2]} excitations; joint between points {points}"
+    )
     apart = sides.references[1] - sides.references[0]
     if np.linalg.norm(apart) > 0:
-        print(f"reference points {1e3 * np.linalg.norm(apart):.3g} mm apart: x, y, z = "
-              + ", ".join(f"{1e3 * value:.3g}" for value in apart) + " mm")
+        print(
+            f"reference points {1e3 * np.linalg.norm(apart):.3g} mm apart: x, y, z = "
+            + ", ".join(f"{1e3 * value:.3g}" for value in apart)
+            + " mm"
+        )
     _tell_differences(args, sides)
     for fit in fits:
         print(f"\n{fit}")
@@ -121,8 +156,10 @@ def _tell_differences(args: argparse.Namespace, sides: Interface) -> None:
     print(f"rotations by central differences over +-{1e3 * reach:.3g} mm")
     if args.bending_stiffness is not None:
         error = difference_error(reach, args.bending_stiffness, 1.0)
-        print(f"they add about dx/(3 E I) = {error.compliance:.3g} rad/(N m) to the compliance of a rotational DOF: "
-              f"a joint much stiffer than {1 / error.compliance:.3g} N m/rad is not told from a rigid one")
+        print(
+            f"they add about dx/(3 E I) = {error.compliance:.3g} rad/(N m) to the compliance of a rotational DOF: "
+            f"a joint much stiffer than {1 / error.compliance:.3g} N m/rad is not told from a rigid one"
+        )
 
 
 def _sides(args: argparse.Namespace, frfs: FrfSet) -> Interface:
@@ -141,13 +178,17 @@ def _sides(args: argparse.Namespace, frfs: FrfSet) -> Interface:
     known = {channel.node for channel in (*frfs.responses, *frfs.excitations)}
     for node in (*args.j, *args.k):
         if node not in known:
-            raise FileContentError(f"{args.file} has no FRF at node {node}; it has nodes {', '.join(map(str, sorted(known)))}")
+            raise FileContentError(
+                f"{args.file} has no FRF at node {node}; it has nodes {', '.join(map(str, sorted(known)))}"
+            )
         if node not in places and (len(args.j) > 1 or any("theta" in dof for dof in args.dofs)):
             raise FileContentError(f"{args.file} has no coordinates of node {node}: say --spacing and --axis")
     return interface(args.j, args.k, args.dofs, {node: places.get(node, np.zeros(3)) for node in (*args.j, *args.k)})
 
 
-def _fit(args: argparse.Namespace, method: str, freq_hz: np.ndarray, measured: np.ndarray, sides: Interface) -> JointFit:
+def _fit(
+    args: argparse.Namespace, method: str, freq_hz: np.ndarray, measured: np.ndarray, sides: Interface
+) -> JointFit:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", IdentificationWarning)  # they stand in the table
         warnings.simplefilter("ignore", ConvergenceWarning)

@@ -1,10 +1,10 @@
 """Joint parameters from noisy interface FRFs by maximum likelihood in the compliance domain.
 
-The unknowns are the parameters of the joint and, on every line, the true FRFs. The joint is what ties the FRFs of a line
-together: C(h) = K*(w)^-1, n^2 complex equations. Linearised about an estimate of the true FRFs this is a generalised
-least-squares problem with the full covariance of C; its residual corrects the FRFs, and so on until nothing moves. Without
-noise the fixed point is exact; with noise it reaches the Cramer-Rao bound of an unknown structure around the joint
-(tests/python/test_estimator.py).
+The unknowns are the parameters of the joint and, on every line, the true FRFs. The joint is what ties the FRFs of a
+line together: C(h) = K*(w)^-1, n^2 complex equations. Linearised about an estimate of the true FRFs this is a
+generalised least-squares problem with the full covariance of C; its residual corrects the FRFs, and so on until
+nothing moves. Without noise the fixed point is exact; with noise it reaches the Cramer-Rao bound of an unknown
+structure around the joint (tests/python/test_estimator.py).
 
 Everything has a leading axis over realisations, so that a Monte Carlo study is one call.
 """
@@ -67,7 +67,7 @@ class Basis(NamedTuple):
 def joint_basis(omega: FloatArray, dofs: Sequence[str], damping: Damping, cross: Cross) -> Basis:
     """Matrices of K*(w) = k + i h + i w c for the terms asked for; symmetric cross terms where `cross` is "fit"."""
     n = len(dofs)
-    factors: dict[str, ComplexArray] = {"k": np.ones(omega.size, np.complex128)}
+    factors: dict[str, NDArray[np.complexfloating]] = {"k": np.ones(omega.size, np.complex128)}
     if damping in ("hysteretic", "both"):
         factors["h"] = np.full(omega.size, 1j)
     if damping in ("viscous", "both"):
@@ -124,8 +124,8 @@ class ComplianceEstimate(NamedTuple):
 def reciprocity_noise(h: ComplexArray) -> FloatArray:
     """Relative noise level from the differences h_pq - h_qp, robustly: shape (r,), 0 where h is reciprocal.
 
-    For circular noise of level s, |h_pq - h_qp|^2 / (|h_pq|^2 + |h_qp|^2) is s^2 times an exponential variable, whose median
-    is log 2. A median does not see a few bad FRFs.
+    For circular noise of level s, |h_pq - h_qp|^2 / (|h_pq|^2 + |h_qp|^2) is s^2 times an exponential variable, whose
+    median is log 2. A median does not see a few bad FRFs.
     """
     m = h.shape[-1]
     p, q = np.triu_indices(m, 1)
@@ -133,7 +133,8 @@ def reciprocity_noise(h: ComplexArray) -> FloatArray:
     size = abs(above) ** 2 + abs(below) ** 2
     with np.errstate(invalid="ignore"):
         ratio = abs(above - below) ** 2 / size
-    return np.sqrt(np.nanmedian(ratio.reshape(h.shape[0], -1), axis=1) / np.log(2))
+    level: FloatArray = np.sqrt(np.nanmedian(ratio.reshape(h.shape[0], -1), axis=1) / np.log(2))
+    return level
 
 
 def estimate(
@@ -175,7 +176,7 @@ def estimate(
     -------
     ComplianceEstimate
     """
-    r, n_freq, m, _ = h.shape
+    r, n_freq = h.shape[:2]
     n = transform.shape[0] // 2
     measured = (h + h.swapaxes(-1, -2)) / 2 if reciprocal else h
     chosen = np.arange(n) * (n + 1) if cross == "ignore" else np.arange(n * n)
@@ -248,8 +249,8 @@ def estimate(
 def jackknife_covariance(found: ComplianceEstimate, blocks: int = 10) -> FloatArray:
     """Covariance of the parameters from leaving out one block of neighbouring lines after the other.
 
-    It needs no noise level and also sees what the model of the joint cannot follow over frequency. To first order, by one
-    Gauss-Newton step without the block.
+    It needs no noise level and also sees what the model of the joint cannot follow over frequency. To first order, by
+    one Gauss-Newton step without the block.
 
     Returns
     -------
@@ -265,7 +266,8 @@ def jackknife_covariance(found: ComplianceEstimate, blocks: int = 10) -> FloatAr
         pull = total - found.line_gradient[:, lines].sum(axis=1)
         moved[b] = (_inverse(rest) @ pull[..., None])[..., 0]
     moved -= moved.mean(axis=0)
-    return (blocks - 1) / blocks * np.einsum("bra,brc->rac", moved, moved)
+    covariance: FloatArray = (blocks - 1) / blocks * np.einsum("bra,brc->rac", moved, moved)
+    return covariance
 
 
 def _blocked(used: NDArray[np.bool_] | None, n_freq: int, n: int) -> NDArray[np.bool_]:
@@ -303,23 +305,24 @@ def _weights(covariance: ComplexArray, blocked: NDArray[np.bool_]) -> ComplexArr
     size = np.where(size > 0, size, 1)
     scaled = masked / (size[..., :, None] * size[..., None, :])
     inverse = invert(scaled.reshape(-1, q, q)).reshape(covariance.shape)
-    return inverse / (size[..., :, None] * size[..., None, :]) * (keep[:, :, None] * keep[:, None, :])
+    weight: ComplexArray = inverse / (size[..., :, None] * size[..., None, :]) * (keep[:, :, None] * keep[:, None, :])
+    return weight
 
 
 def _inverse(information: FloatArray) -> FloatArray:
     """Inverse of information matrices of parameters of very different size; a pseudo-inverse where one is not seen."""
     size = np.sqrt(np.maximum(np.einsum("raa->ra", information), np.finfo(float).tiny))
     outer = size[:, :, None] * size[:, None, :]
-    return np.linalg.pinv(information / outer, hermitian=True) / outer
+    inverse: FloatArray = np.linalg.pinv(information / outer, hermitian=True) / outer
+    return inverse
 
 
-def _power(
-    residual: ComplexArray, weight: ComplexArray, blocked: NDArray[np.bool_], basis: Basis | None
-) -> FloatArray:
+def _power(residual: ComplexArray, weight: ComplexArray, blocked: NDArray[np.bool_], basis: Basis | None) -> FloatArray:
     """Mean squared weighted residual for each complex equation left over, shape (r,)."""
     total = (residual.conj() * (weight @ residual[..., None])[..., 0]).real.sum(axis=(1, 2))
     equations = np.count_nonzero(~blocked) - (0 if basis is None else len(basis.names) / 2)
-    return np.maximum(total, 0) / max(equations, 1)
+    power: FloatArray = np.maximum(total, 0) / max(equations, 1)
+    return power
 
 
 def _start(
@@ -327,9 +330,9 @@ def _start(
 ) -> tuple[FloatArray, FloatArray]:
     """First parameters, and the size at which a joint is as good as rigid: both of shape (r, p).
 
-    Each DOF by itself, from K*(theta) C = 1 by weighted linear least squares, twice, the second time with the weights of
-    the first K*. Noise draws this start towards zero, from where Gauss-Newton steps climb safely; from above they may
-    fall off towards a rigid joint.
+    Each DOF by itself, from K*(theta) C = 1 by weighted linear least squares, twice, the second time with the weights
+    of the first K*. Noise draws this start towards zero, from where Gauss-Newton steps climb safely; from above they
+    may fall off towards a rigid joint.
     """
     r = linear.shape[0]
     theta = np.zeros((r, len(basis.names)))
@@ -373,14 +376,16 @@ class _JointModel:
         """Return K*^-1: shape (r, n_freq, n) where diagonal, else (r, n_freq, n, n)."""
         if self.diagonals is not None:
             with np.errstate(divide="ignore", invalid="ignore"):
-                return 1 / np.einsum("rp,pfa->rfa", theta, self.diagonals)
+                diagonal: ComplexArray = 1 / np.einsum("rp,pfa->rfa", theta, self.diagonals)
+            return diagonal
         k = np.einsum("rp,pfab->rfab", theta, self.basis.matrices, optimize=True)
         return invert(k.reshape(-1, self.n, self.n), on_singular="nan").reshape(k.shape)
 
     def entries(self, compliance: ComplexArray) -> ComplexArray:
         """Return the chosen entries, shape (r, n_freq, q)."""
         whole = compliance if self.diagonals is None else compliance[..., None] * np.eye(self.n)
-        return whole.reshape(*whole.shape[:2], -1)[..., self.chosen]
+        entries: ComplexArray = whole.reshape(*whole.shape[:2], -1)[..., self.chosen]
+        return entries
 
     def slope(self, compliance: ComplexArray) -> ComplexArray:
         """Return the derivatives -C B C of the chosen entries, shape (r, n_freq, q, p)."""

@@ -92,8 +92,8 @@ def _receptances(result: CaseResult) -> Iterator[Figure]:
     for point in "rs":
         at = exact.where(point).start
         curves = (
-            Curve("first estimate", exact.freq_hz, abs(exact.h_initial[:, at, at]), "initial"),
-            Curve("actual joint", exact.freq_hz, abs(exact.h_c[:, at, at]), "actual"),
+            Curve("first estimate", exact.freq_hz, np.abs(exact.h_initial[:, at, at]), "initial"),
+            Curve("actual joint", exact.freq_hz, np.abs(exact.h_c[:, at, at]), "actual"),
         )
         panel = Panel("", _FREQUENCY, _modulus(result, point * 2), curves, log_y=True)
         caption = f"Receptance of the assembly at point {point} with the first estimate and with the actual joint"
@@ -116,8 +116,8 @@ def _polluted(result: CaseResult) -> Iterator[Figure]:
         for lines in (np.ones(inside.size, bool), inside):
             freq = exact.freq_hz[lines]
             curves = (
-                Curve("exact", freq, abs(gamma[lines, 0, 0]), "actual"),
-                Curve("polluted", freq, abs(h[lines, 0, 0]), "measured"),
+                Curve("exact", freq, np.abs(gamma[lines, 0, 0]), "actual"),
+                Curve("polluted", freq, np.abs(h[lines, 0, 0]), "measured"),
             )
             panels.append(Panel(f"noise: {noise.name}", _FREQUENCY, _modulus(result, "jj"), curves, log_y=True))
     caption = "Receptance of the assembly at the joint, exact and polluted (one realisation); right: close up"
@@ -131,11 +131,11 @@ def _sensitivities(result: CaseResult) -> Iterator[Figure]:
         at = exact.where(point).start
         for d, dof in enumerate(case.joint.dofs):
             name = symbol(f"k_{dof}")
-            curves = [Curve(f"actual {name}", exact.freq_hz, abs(exact.h_c[:, at, at]), "actual")]
+            curves = [Curve(f"actual {name}", exact.freq_hz, np.abs(exact.h_c[:, at, at]), "actual")]
             for factor, style in _VARIED:
                 varied = case.actual.copy()
                 varied[d] *= factor
-                h = abs(regenerate(exact, varied[None], point)[0])
+                h = np.abs(regenerate(exact, varied[None], point)[0])
                 curves.append(Curve(f"{factor:g} {name}", exact.freq_hz, h, style))
             shades = _shades(result, f"k_{dof}")
             proposed = tuple(result.proposals[point, f"k_{dof}"])
@@ -192,7 +192,7 @@ def _limits(actual: float, values: FloatArray) -> tuple[float, float]:
 
 
 def _line_panel(result: CaseResult, found: Identified, p: int, within: tuple[Band, ...] | None) -> Panel:
-    """Identified parameter over frequency: everywhere, or inside bands with its mean."""
+    """Draw an identified parameter over frequency: everywhere, or inside bands with its mean."""
     freq, parameter = result.exact.freq_hz, result.case.parameters[p]
     lines = _parameter_lines(result, found, p)
     actual, median = float(result.case.actual[p]), float(np.median(found.theta[:, p]))
@@ -289,14 +289,14 @@ def _regenerated(result: CaseResult) -> Iterator[Figure]:
     names = (result.case.band_sets[0].name, "all lines")
     for point in "rs":
         at = exact.where(point).start
-        actual = Curve("actual", exact.freq_hz, abs(exact.h_c[:, at, at]), "actual")
+        actual = Curve("actual", exact.freq_hz, np.abs(exact.h_c[:, at, at]), "actual")
         panels = []
         for r in result.regenerated:
             found = r.identified
             if r.point != point or found.noise != first_noise or found.bands not in names:
                 continue
             low, _, high = r.percentiles
-            curve = Curve("regenerated, one realisation", exact.freq_hz, abs(r.first), "high")
+            curve = Curve("regenerated, one realisation", exact.freq_hz, np.abs(r.first), "high")
             ribbon = Ribbon("2.5-97.5 %", exact.freq_hz, low, high, "ismm")
             title = f"{_METHOD_NAMES[found.method]} ({found.bands})"
             panels.append(

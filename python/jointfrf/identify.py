@@ -81,17 +81,20 @@ def identify(
         Measured receptances, m/N: at joint DOFs j, then k; or at the points that `transform` takes there; or, for
         decoupling, between the internal points that the equation names.
     dofs : sequence of str, optional
-        Names of the n joint DOFs; names beginning with theta, rx, ry, rz are rotations. ``"0"``, ``"1"``, ... by default.
+        Names of the n joint DOFs; names beginning with theta, rx, ry, rz are rotations. ``"0"``, ``"1"``, ... by
+        default.
     method : str
-        "compliance": maximum likelihood in the compliance domain, with error bars; needs no model of the substructures.
-        "ismm": inverse structural modification (2.47), needs `alpha` and `k_initial`. "inverse_substructuring":
-        -(gamma^-1)_jk, which ISMM reduces to. "decoupling-rr", "-rs", "-sr", "-ss": (2.53)-(2.56), need `h_a`, `h_b` and
-        the DOF lists. All but the first take the mean over bands, as the source does.
+        "compliance": maximum likelihood in the compliance domain, with error bars; needs no model of the
+        substructures. "ismm": inverse structural modification (2.47), needs `alpha` and `k_initial`.
+        "inverse_substructuring": -(gamma^-1)_jk, which ISMM reduces to. "decoupling-rr", "-rs", "-sr", "-ss":
+        (2.53)-(2.56), need `h_a`, `h_b` and the DOF lists. All but the first take the mean over bands, as the source
+        does.
     bands : None, (low, high), sequence of these, or mapping of DOF name to these, optional
-        Sensitive bands in Hz; all lines by default. The compliance fit weighs each line by what it knows and needs none.
+        Sensitive bands in Hz; all lines by default. The compliance fit weighs each line by what it knows and needs
+        none.
     transform : array_like, shape (2 n, m), optional
-        From measured points to joint DOFs j, then k: rotations by finite differences. Noise is then taken as independent
-        between the measured FRFs, not between the transformed ones.
+        From measured points to joint DOFs j, then k: rotations by finite differences. Noise is then taken as
+        independent between the measured FRFs, not between the transformed ones.
     damping : {"viscous", "hysteretic", "both", "none", "auto"}
         Terms of K* = k (1 + i eta) + i w c to fit. "auto" takes what the data support (Bayesian information criterion).
         Compliance fit only.
@@ -130,10 +133,10 @@ def identify(
 
     Notes
     -----
-    Standard errors of the compliance fit: first-order propagation of the noise, at the larger of the noise level and the
-    level the residual shows; where the residual exceeds the noise by 30 %, not below those of a jackknife over ten parts
-    of the band, which sees what the model of the joint cannot follow. Standard errors of a band mean: scatter of its lines over the root of their number; they
-    say nothing of its bias.
+    Standard errors of the compliance fit: first-order propagation of the noise, at the larger of the noise
+    level and the level the residual shows; where the residual exceeds the noise by 30 %, not below those of a
+    jackknife over ten parts of the band, which sees what the model of the joint cannot follow. Standard errors of a
+    band mean: scatter of its lines over the root of their number; they say nothing of its bias.
 
     Examples
     --------
@@ -245,15 +248,13 @@ def _by_compliance(
         raise ValueError(f"cross must be one of {', '.join(get_args(Cross))}, not {cross!r}")
     own = as_bands(bands, names, freq)
     used = np.stack([in_bands(freq, b) for b in own], axis=1)
-    keep = used.any(axis=1)
+    keep = np.asarray(used.any(axis=1))
     freq, measured, used = freq[keep], measured[keep], used[keep]
     level, variance = _noise_of(noise, measured, keep)
 
     def fit(kind: Damping) -> ComplianceEstimate:
         basis = joint_basis(2 * np.pi * freq, names, kind, cross)
-        return estimate(
-            measured[None], t, basis, variance=variance, reciprocal=reciprocal, cross=cross, used=used
-        )
+        return estimate(measured[None], t, basis, variance=variance, reciprocal=reciprocal, cross=cross, used=used)
 
     notes: list[str] = []
     if damping == "auto":
@@ -278,16 +279,16 @@ def _by_compliance(
         k_lines=k_lines,
         bands=tuple(tuple(b) for b in own),
     )
-    unseen = [name for name, (low, high) in found.confidence_interval(0.95).items() if name[0] in "hc" and low < 0 < high]
+    unseen = [
+        name for name, (low, high) in found.confidence_interval(0.95).items() if name[0] in "hc" and low < 0 < high
+    ]
     if unseen:
         notes.append(f"{', '.join(unseen)}: not told from zero, the 95 % interval holds it")
     told = _lost_lines(measured, t, level, variance) + _doubts(found, result, cross)
     for text in told:
         warnings.warn(text, IdentificationWarning, stacklevel=3)
     if not result.converged[0]:
-        warnings.warn(
-            f"the fit did not converge in {result.iterations} iterations", ConvergenceWarning, stacklevel=3
-        )
+        warnings.warn(f"the fit did not converge in {result.iterations} iterations", ConvergenceWarning, stacklevel=3)
         told.append(f"the fit did not converge in {result.iterations} iterations")
     return replace(found, warnings=tuple(told), notes=tuple(notes))
 
@@ -356,7 +357,8 @@ def _both_seen(result: ComplianceEstimate, level: float) -> bool:
 def _lost_lines(measured: ComplexArray, t: FloatArray, level: float, variance: FloatArray | None) -> list[str]:
     """Tell when gamma_jk, which has to be inverted, is lost in noise on most lines.
 
-    The measure is the standard deviation of the diagonal of gamma_jk^-1 dgamma_jk: to be small against 1, whatever the units.
+    The measure is the standard deviation of the diagonal of gamma_jk^-1 dgamma_jk: to be small against 1, whatever the
+    units.
     """
     n = t.shape[0] // 2
     spread = level**2 * (abs(measured) ** 2 if variance is None else variance)
@@ -366,8 +368,9 @@ def _lost_lines(measured: ComplexArray, t: FloatArray, level: float, variance: F
     if lost <= relative.shape[0] / 2:
         return []
     return [
-        f"on {lost} of {relative.shape[0]} lines the noise is as large as the difference between the motions of the joint "
-        "DOFs (gamma_jk is nearly singular): expect bias beyond the intervals; other bands or points may see the joint"
+        f"on {lost} of {relative.shape[0]} lines the noise is as large as the difference between the motions of the "
+        "joint DOFs (gamma_jk is nearly singular): expect bias beyond the intervals; other bands or points may see "
+        "the joint"
     ]
 
 

@@ -62,13 +62,11 @@ def interface(
     Raises
     ------
     ValueError
-        An unknown DOF, a node without coordinates, points that are not on a line along an axis, a rotation about the line
-        of its points.
+        An unknown DOF, a node without coordinates, points that are not on a line along an axis, a rotation about the
+        line of its points.
 
-    Notes
-    -----
-    A rotation about axis a of points along axis e is seen in the displacements along d, a x e = +-d: theta_x = -du_y/dz,
-    theta_z = +du_y/dx, theta_y = -du_z/dx (2.57).
+    Notes ----- A rotation about axis a of points along axis e is seen in the displacements along d, a x e = +-d:
+    theta_x = -du_y/dz, theta_z = +du_y/dx, theta_y = -du_z/dx (2.57).
 
     Examples
     --------

@@ -35,8 +35,8 @@ class JointFit:
     dofs : tuple of str
         Names of the joint DOFs.
     parameters : dict of str to float
-        ``"k_<dof>"`` stiffness, ``"h_<dof>"`` hysteretic stiffness eta k, ``"c_<dof>"`` viscous damping, in the order of
-        the covariance; ``"k_<dof>,<dof>"`` cross terms. N/m, N s/m; rotational N m/rad, N m s/rad.
+        ``"k_<dof>"`` stiffness, ``"h_<dof>"`` hysteretic stiffness eta k, ``"c_<dof>"`` viscous damping, in the order
+        of the covariance; ``"k_<dof>,<dof>"`` cross terms. N/m, N s/m; rotational N m/rad, N m s/rad.
     covariance : ndarray, shape (p, p)
         Covariance of the parameters.
     noise_level : float
@@ -100,8 +100,8 @@ class JointFit:
         Returns
         -------
         dict of str to (low, high)
-            A stiffness gets its interval from that of the compliance 1/k, in which the noise is nearly normal: it is not
-            symmetric, and open above, up to inf, where the data cannot tell the joint from a rigid one.
+            A stiffness gets its interval from that of the compliance 1/k, in which the noise is nearly normal: it is
+            not symmetric, and open above, up to inf, where the data cannot tell the joint from a rigid one.
 
         Raises
         ------

@@ -95,10 +95,11 @@ class Model:
         ndarray, shape (count,)
             Hz.
         """
-        k, m = (a.toarray() if sparse.issparse(a) else a for a in (self.stiffness, self.mass))
+        k, m = (sparse.csr_array(a).toarray() for a in (self.stiffness, self.mass))
         last = len(self.dofs) if count is None else min(count, len(self.dofs))
         squared = linalg.eigh(k, m, eigvals_only=True, subset_by_index=(0, last - 1))
-        return np.sqrt(np.maximum(squared, 0)) / (2 * np.pi)
+        frequencies: FloatArray = np.sqrt(np.maximum(squared, 0)) / (2 * np.pi)
+        return frequencies
 
 
 def _block_diagonal(

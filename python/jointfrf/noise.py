@@ -73,9 +73,10 @@ def pollute(
     >>> round(float(np.sqrt((abs(polluted - h) ** 2).mean())), 3)
     0.05
     """
-    return realisations(
+    polluted: ComplexArray = realisations(
         h, level, kind, seed, relative_to=relative_to, reciprocal=reciprocal, block=block, first=realisation, count=1
     )[0]
+    return polluted
 
 
 def realisations(

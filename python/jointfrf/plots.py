@@ -216,7 +216,7 @@ def _draw_intervals(ax: Any, panel: Panel) -> None:
 
 
 def as_csv(figure: Figure) -> str:
-    """Write the data of a figure as CSV, one line for each point: panel, curve, x, y and, for an area, its upper limit."""
+    """Write the data of a figure as CSV, a line for each point: panel, curve, x, y and the upper limit of an area."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(["panel", "curve", "x", "y", "y_high"])

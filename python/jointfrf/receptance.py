@@ -53,9 +53,9 @@ def receptance(
     outputs, inputs : array_like of int, optional
         DOFs of responses and of forces, counted from 0; all by default.
     method : {"auto", "dense", "banded", "modal"}
-        "dense": zgesv on every line. "banded": band LU on every line (zgbsv). Both take any damping. "modal": all modes
-        once, then their sum; exact, for symmetric K and M and damping that the undamped modes diagonalise. "auto" solves
-        banded where K and M have a narrow band, else dense.
+        "dense": zgesv on every line. "banded": band LU on every line (zgbsv). Both take any damping. "modal": all
+        modes once, then their sum; exact, for symmetric K and M and damping that the undamped modes diagonalise.
+        "auto" solves banded where K and M have a narrow band, else dense.
     on_singular : {"raise", "nan"}
         Whether a bad line raises or becomes NaN.
 
@@ -225,6 +225,6 @@ def _modal(
     stiffness = np.maximum(squared, 0)
     structural = modal("structural_damping")
     losses = loss_factor + np.divide(structural, stiffness, out=np.zeros(n), where=stiffness > 0)
-    args = (n, freq.size, out.size, into.size, omega, stiffness, modal("damping"), losses)
-    args += (np.ascontiguousarray(shapes[out - 1]), np.ascontiguousarray(shapes[into - 1]))
+    at_out, at_in = np.ascontiguousarray(shapes[out - 1]), np.ascontiguousarray(shapes[into - 1])
+    args = (n, freq.size, out.size, into.size, omega, stiffness, modal("damping"), losses, at_out, at_in)
     return run("receptance_modal", args, (freq.size, out.size, into.size), {}, freq, on_singular, _SINGULAR)[0]

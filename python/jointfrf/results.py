@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy import linalg, sparse
@@ -14,7 +13,7 @@ from scipy.sparse import linalg as sparse_linalg
 from jointfrf._sweep import ComplexArray, FloatArray
 from jointfrf.bands import Band, Sensitivity, propose_bands, sensitivity
 from jointfrf.case_file import Case
-from jointfrf.decoupling import decouple
+from jointfrf.decoupling import Equation, decouple
 from jointfrf.ismm import inverse_substructuring, ismm
 from jointfrf.joint import Joint
 from jointfrf.metrics import amplitude_error, frequency_error
@@ -123,7 +122,7 @@ def noise_free_errors(exact: Exact, k_actual: ComplexArray) -> dict[str, float]:
         "ismm": ismm(exact.interface(exact.h_initial), gamma, exact.k_initial),
         "inverse_substructuring": inverse_substructuring(gamma),
     }
-    equations: tuple[Any, ...] = ("rr", "rs", "sr", "ss")
+    equations: tuple[Equation, ...] = ("rr", "rs", "sr", "ss")
     for equation in equations:
         h_c = np.ascontiguousarray(exact.h_c[:, exact.where(equation[0]), exact.where(equation[1])])
         found[f"decoupling-{equation}"] = decouple(equation, exact.h_a, exact.h_b, h_c, joint, joint, inner, inner)

@@ -16,7 +16,7 @@ from jointfrf._sweep import ComplexArray, FloatArray
 from jointfrf.bands import band_mean
 from jointfrf.case_file import BandSet, Case, Noise
 from jointfrf.coupling import couple
-from jointfrf.decoupling import decouple
+from jointfrf.decoupling import Equation, decouple
 from jointfrf.errors import IllConditionedWarning
 from jointfrf.estimator import estimate, joint_basis
 from jointfrf.ismm import inverse_substructuring, ismm
@@ -29,7 +29,10 @@ _CHUNK = 20_000
 #: Realisations whose K*(w) is kept line by line, for figures.
 _KEPT = 200
 _ALL_LINES = "all lines"
+#: Standard errors by which a fitted parameter may still move: far less than realisations differ.
+_TOLERANCE = 0.5
 _POINTS = "jrks"
+_EQUATIONS: tuple[Equation, ...] = ("rr", "rs", "sr", "ss")
 
 
 @dataclass(frozen=True)
@@ -151,8 +154,9 @@ def _fit(task: _Task) -> tuple[FloatArray, ComplexArray]:
     exact = task.exact
     basis = joint_basis(2 * np.pi * exact.freq_hz, exact.dofs, "viscous", "zero")
     gamma = _polluted(task, exact.interface(exact.h_c), task.seed)
-    theta = estimate(gamma, np.eye(2 * exact.n), basis, tolerance=0.5).theta
-    return theta[None], np.empty((0, exact.freq_hz.size, exact.n), np.complex128)
+    # One realisation at a time: a slow one does not hold up others, and all stays in the processor's cache.
+    fits = [estimate(one[None], np.eye(2 * exact.n), basis, tolerance=_TOLERANCE).theta for one in gamma]
+    return np.concatenate(fits)[None], np.empty((0, exact.freq_hz.size, exact.n), np.complex128)
 
 
 def _joint_lines(task: _Task) -> ComplexArray:
@@ -166,15 +170,15 @@ def _joint_lines(task: _Task) -> ComplexArray:
         return np.tile(h, (task.count, 1, 1))
 
     if task.method.startswith("decoupling"):
-        responding, excited = equation = task.method.removeprefix("decoupling-")
-        h_c = np.ascontiguousarray(exact.h_c[:, exact.where(responding), exact.where(excited)])
+        equation = next(e for e in _EQUATIONS if task.method == f"decoupling-{e}")
+        h_c = np.ascontiguousarray(exact.h_c[:, exact.where(equation[0]), exact.where(equation[1])])
         # Noise of its own: another block of the assembly's FRFs.
-        seed = task.seed + 1 + ("rr", "rs", "sr", "ss").index(equation)
+        seed = task.seed + 1 + _EQUATIONS.index(equation)
         joint, inner = list(range(n)), list(range(n, 2 * n))
         found = decouple(
             equation, repeated(exact.h_a), repeated(exact.h_b), flat(_polluted(task, h_c, seed)), joint, joint,
             inner, inner, on_singular="nan",
-        )  # type: ignore[arg-type]  # fmt: skip
+        )  # fmt: skip
     else:
         gamma = flat(_polluted(task, exact.interface(exact.h_c), task.seed))
         if task.method == "ismm":
@@ -286,7 +290,7 @@ def regenerate(exact: Exact, theta: FloatArray, point: str) -> ComplexArray:
     diagonal = np.repeat(theta[:, :n], n_freq, axis=0) + 1j * omega[:, None] * np.repeat(theta[:, n:], n_freq, axis=0)
     k_joint = diagonal[:, :, None] * np.eye(n)
     joint = list(range(n))
-    of_a, of_b = (joint + [n], joint) if point == "r" else (joint, joint + [n])
+    of_a, of_b = ([*joint, n], joint) if point == "r" else (joint, [*joint, n])
     h_a, h_b = (
         np.tile(h[:, np.array(dofs)[:, None], dofs], (r, 1, 1))
         for h, dofs in ((exact.h_a, of_a), (exact.h_b, of_b))

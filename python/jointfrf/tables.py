@@ -76,7 +76,8 @@ def identified_rows(result: CaseResult) -> list[Row]:
             error = float(np.sqrt(((values - actual) ** 2).mean()) / abs(actual) * 100) if actual else float("nan")
             common = (found.noise, found.method, found.bands, parameter, case.units[p], actual)
             beside = [(t.source, t.values[parameter]) for t in published if parameter in t.values]
-            for source, value in beside or [(None, None)]:
+            nothing: list[tuple[str | None, float | None]] = [(None, None)]
+            for source, value in beside or nothing:
                 share = None if value is None else float((values < value).mean() * 100)
                 fits = None if share is None else abs(share - 50) <= _CENTRAL / 2
                 rows.append(Row(*common, source, value, median, low, high, error, share, fits))
@@ -104,8 +105,8 @@ def _published(source: str, rows: list[Row]) -> Table:
     )  # fmt: skip
     failing = tuple(i for i, row in enumerate(rows) if not row.fits)
     note = (
-        "The thesis' value comes from one realisation of the noise; ours are a distribution. The percentile is the share "
-        "of realisations below the thesis' value; it fits inside the central 98 %."
+        "The thesis' value comes from one realisation of the noise; ours are a distribution. The percentile is the "
+        "share of realisations below the thesis' value; it fits inside the central 98 %."
     )
     return Table(re.sub(r"[^a-z0-9]+", "-", source.lower()).strip("-"), source[0].upper() + source[1:], columns, cells,
                  failing, note)  # fmt: skip
@@ -177,7 +178,7 @@ def _bands(result: CaseResult) -> Table:
 
 
 def _regenerated(result: CaseResult) -> Table:
-    cells = []
+    cells: list[tuple[Cell, ...]] = []
     for r in result.regenerated:
         spread = [float(x) for e in (r.amplitude, r.frequency) for x in np.percentile(e, [50, 2.5, 97.5])]
         cells.append((r.identified.noise, r.identified.method, r.identified.bands, f"H_{r.point}{r.point}", *spread))
@@ -217,7 +218,8 @@ def number(value: Cell, digits: int = 5) -> str:
         places = digits if value == 0 else max(0, digits - 1 - int(np.floor(np.log10(abs(value)))))
         text = f"{value:.{places}f}"
         return text.rstrip("0").rstrip(".") if "." in text else text
-    return f"{value:.{digits - 1}e}".replace("e+0", "e").replace("e-0", "e-")
+    mantissa, _, exponent = f"{value:.{digits - 1}e}".partition("e")
+    return f"{mantissa.rstrip('0').rstrip('.') if '.' in mantissa else mantissa}e{int(exponent)}"
 
 
 def as_text(table: Table) -> str:

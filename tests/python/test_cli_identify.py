@@ -9,15 +9,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from uff_writer import function
+
 DATA = Path(os.environ.get("JOINTFRF_TEST_DATA", Path(__file__).resolve().parents[3] / "shared" / "data"))
 LAP = DATA / "lap_joint" / "lap_joint.uff"
-needs_data = pytest.mark.skipif(not LAP.exists(), reason="the measured files are not beside the project (JOINTFRF_TEST_DATA)")
+needs_data = pytest.mark.skipif(
+    not LAP.exists(), reason="the measured files are not beside the project (JOINTFRF_TEST_DATA)"
+)
 JOINT = ["--j", "102,104", "--k", "202,204", "--dofs", "y,theta_x"]
 
 
 def run(*words, expect=0):
     result = subprocess.run(
-        [sys.executable, "-m", "jointfrf.cli", "identify", *map(str, words)], capture_output=True, text=True, timeout=120
+        [sys.executable, "-m", "jointfrf", "identify", *map(str, words)], capture_output=True, text=True, timeout=120
     )
     assert result.returncode == expect, result.stderr
     assert "Traceback" not in result.stderr
@@ -115,19 +119,14 @@ def test_vendor_files_give_a_sentence():
 
 
 def write_uff(path, freq, h, nodes):
-    """FRFs (receptance, y) of some nodes as ASCII dataset 58, SI units."""
-    import pyuff
-
-    sets = [
-        {
-            "type": 58, "func_type": 4, "rsp_node": out, "rsp_dir": 2, "ref_node": into, "ref_dir": 2,
-            "data": h[:, i, j], "x": freq, "id1": "id", "rsp_ent_name": "A", "ref_ent_name": "A",
-            "abscissa_spacing": 1, "abscissa_spec_data_type": 18, "ordinate_spec_data_type": 8,
-            "orddenom_spec_data_type": 13, "binary": 0,
-        }
-        for i, out in enumerate(nodes) for j, into in enumerate(nodes)
-    ]  # fmt: skip
-    pyuff.UFF(str(path)).write_sets([pyuff.prepare_58(**one) for one in sets], "add")
+    """Receptances along y of some nodes, SI units, no coordinates."""
+    path.write_bytes(
+        b"".join(
+            function(h[:, i, j], freq, response=(out, 2), reference=(into, 2), numerator=(8, "m"))
+            for i, out in enumerate(nodes)
+            for j, into in enumerate(nodes)
+        )
+    )
 
 
 def test_a_file_without_coordinates_and_a_spacing(tmp_path, beams):

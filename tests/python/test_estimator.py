@@ -18,7 +18,8 @@ def symmetric(values, n):
 def cramer_rao(s, damping="viscous"):
     """Bound for unit relative noise when nothing is known of the structure around the joint.
 
-    Unknown on every line: the symmetric dynamic stiffnesses Z_A + and Z_B of both sides; measured: all entries of gamma.
+    Unknown on every line: the symmetric dynamic stiffnesses Z_A + and Z_B of both sides; measured: all entries of
+    gamma.
     """
     n, f = s.n, s.freq
     basis = joint_basis(2 * np.pi * f, s.joint.dofs, damping, "zero")
@@ -30,6 +31,7 @@ def cramer_rao(s, damping="viscous"):
     p, q = len(basis.names), n * (n + 1)
     information = np.zeros((p, p))
     for i in range(f.size):
+
         def model(joint, sides):
             a, b = symmetric(sides[: q // 2], n), symmetric(sides[q // 2 :], n)
             return np.linalg.inv(np.block([[a + joint, -joint], [-joint, b + joint]])).ravel()

@@ -18,7 +18,15 @@ def noisy(s, level=0.01, seed=3):
 
 @pytest.mark.parametrize(
     "method",
-    ["compliance", "ismm", "inverse_substructuring", "decoupling-rr", "decoupling-rs", "decoupling-sr", "decoupling-ss"],
+    [
+        "compliance",
+        "ismm",
+        "inverse_substructuring",
+        "decoupling-rr",
+        "decoupling-rs",
+        "decoupling-sr",
+        "decoupling-ss",
+    ],
 )
 def test_every_method_returns_the_joint_without_noise(beams, method):
     s = beams
@@ -78,7 +86,11 @@ def test_reciprocal_data_take_their_noise_from_the_residual(beams):
 def test_damping_terms_that_the_data_support(beams):
     hysteretic = jf.Joint([6e5, 5e3], dofs=["y", "theta"], loss_factor=[0.3, 0.4])
     both = jf.Joint([6e5, 5e3], [40, 3], ["y", "theta"], [0.3, 0.4])
-    for joint, expected in ((beams.joint, "damping viscous"), (hysteretic, "damping hysteretic"), (both, "damping both")):
+    for joint, expected in (
+        (beams.joint, "damping viscous"),
+        (hysteretic, "damping hysteretic"),
+        (both, "damping both"),
+    ):
         measured = jf.pollute(beams.gamma(joint), 0.005, seed=1)
         fit = jf.identify(beams.freq, measured, ["y", "theta"], damping="auto")
         assert any(note.startswith(expected) for note in fit.notes), (expected, fit.notes)
@@ -118,7 +130,9 @@ def test_points_instead_of_dofs(beams):
     fit = jf.identify(beams.freq, measured, ["y", "theta"], transform=np.linalg.inv(points))
     low, high = fit.confidence_interval(0.999)["k_theta"]
     assert low < 5e3 < high
-    same = jf.identify(beams.freq, measured, ["y", "theta"], "inverse_substructuring", BANDS, transform=np.linalg.inv(points))
+    same = jf.identify(
+        beams.freq, measured, ["y", "theta"], "inverse_substructuring", BANDS, transform=np.linalg.inv(points)
+    )
     assert np.isfinite(same.stiffness).all()
 
 

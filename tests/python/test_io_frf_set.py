@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from jointfrf.errors import FileContentError, FileContentWarning
 from jointfrf.io import Channel, FrfSet
 

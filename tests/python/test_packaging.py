@@ -8,8 +8,9 @@ import shutil
 import subprocess
 import sys
 
-import jointfrf
 import pytest
+
+import jointfrf
 from jointfrf import _kernel
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]

@@ -41,12 +41,16 @@ def from_program(path: Path) -> dict[tuple[str, int, int, int], complex]:
             name, frequency, real, imaginary = line.split()
             match = NAME.fullmatch(name)
             assert match, line
-            values[match[1].lower(), int(frequency), int(match[2]), int(match[3])] = complex(float(real), float(imaginary))
+            values[match[1].lower(), int(frequency), int(match[2]), int(match[3])] = complex(
+                float(real), float(imaginary)
+            )
     return values
 
 
 def programs() -> Path:
-    folder = Path(os.environ.get("JOINTFRF_TEST_PROGRAMS", Path(__file__).resolve().parents[2] / "build" / "tests" / "tests"))
+    folder = Path(
+        os.environ.get("JOINTFRF_TEST_PROGRAMS", Path(__file__).resolve().parents[2] / "build" / "tests" / "tests")
+    )
     if not (folder / "case_c").exists():
         pytest.skip("the test programs are not built: ./tests/run builds them, or set JOINTFRF_TEST_PROGRAMS")
     return folder

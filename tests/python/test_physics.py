@@ -36,14 +36,14 @@ def test_ismm_with_another_alpha_is_not_the_short_form(chains):
     alpha = stiffer.copy()
     alpha[:, 0, 1] *= 1.1
     result = jf.ismm(alpha, s.gamma(s.joint), s.first.dynamic_stiffness(s.freq))
-    general = s.first.dynamic_stiffness(s.freq) - (
-        np.linalg.inv(s.gamma(s.joint)) - np.linalg.inv(alpha)
-    )[:, :1, 1:]
+    general = s.first.dynamic_stiffness(s.freq) - (np.linalg.inv(s.gamma(s.joint)) - np.linalg.inv(alpha))[:, :1, 1:]
     assert relative(result, general) < 1e-9
     assert relative(result, jf.inverse_substructuring(s.gamma(s.joint))) > 1e-3
 
 
-@pytest.mark.parametrize(("equation", "output", "force"), [("rr", "r", "r"), ("rs", "r", "s"), ("sr", "s", "r"), ("ss", "s", "s")])
+@pytest.mark.parametrize(
+    ("equation", "output", "force"), [("rr", "r", "r"), ("rs", "r", "s"), ("sr", "s", "r"), ("ss", "s", "s")]
+)
 def test_each_decoupling_equation_returns_the_joint(assembly, equation, output, force):
     s = assembly
     place = {"r": s.inner, "s": [2 * s.n + i for i in s.inner]}
@@ -71,7 +71,9 @@ def test_non_symmetric_frfs_catch_a_transpose(random_lines):
         select = np.zeros((2, 7))
         select[[0, 1], j] = 1
         select[[0, 1], [3 + d for d in other]] = -1
-        np.testing.assert_allclose(coupled[i], np.linalg.inv(stiffness + select.T @ k[i] @ select), rtol=1e-9, atol=1e-12)
+        np.testing.assert_allclose(
+            coupled[i], np.linalg.inv(stiffness + select.T @ k[i] @ select), rtol=1e-9, atol=1e-12
+        )
     gamma = coupled[:, [*j, *(3 + d for d in other)]][:, :, [*j, *(3 + d for d in other)]]
     np.testing.assert_allclose(jf.inverse_substructuring(gamma), k, rtol=1e-8)
     np.testing.assert_allclose(jf.invert(jf.joint_compliance(gamma)), k, rtol=1e-8)
@@ -141,7 +143,10 @@ def test_natural_frequencies_of_the_beams(element, expected):
 def test_free_free_and_clamped_beams_against_the_analytic_result():
     section = dict(youngs_modulus=70e9, density=2700.0, width=0.02, height=0.004)
     ei_over_m = 70e9 * 0.004**2 / 12 / 2700
-    for ends, roots, rigid in ((("free", "free"), [4.73004074, 7.85320462], 2), (("clamped", "free"), [1.87510407, 4.69409113], 0)):
+    for ends, roots, rigid in (
+        (("free", "free"), [4.73004074, 7.85320462], 2),
+        (("clamped", "free"), [1.87510407, 4.69409113], 0),
+    ):
         exact = np.square(roots) / (2 * np.pi) * np.sqrt(ei_over_m) / 0.5**2
         model = jf.beam(0.5, 40, ends=ends, **section)
         np.testing.assert_allclose(model.natural_frequencies(rigid + 2)[rigid:], exact, rtol=1e-5)
@@ -169,7 +174,16 @@ def test_central_difference_of_a_bending_shape():
 
 def test_rotational_receptance_of_a_beam_by_differences(beams):
     """Close points come close to the rotational receptances of the model."""
-    model = jf.beam(0.3, 300, ends=("clamped", "free"), youngs_modulus=67e9, density=2700.0, width=0.025, height=0.006, loss_factor=0.01)
+    model = jf.beam(
+        0.3,
+        300,
+        ends=("clamped", "free"),
+        youngs_modulus=67e9,
+        density=2700.0,
+        width=0.025,
+        height=0.006,
+        loss_factor=0.01,
+    )
     freq = [20.0, 150.0, 400.0]
     points = model.index("275:y", "276:y", "277:y")
     exact = model.receptance(freq, model.index("276:y", "276:theta"))

@@ -9,7 +9,11 @@ import jointfrf as jf
 
 def model(n=12, seed=0):
     rng = np.random.default_rng(seed)
-    k = np.diag(rng.uniform(1e3, 2e3, n)) - np.diag(rng.uniform(100, 400, n - 1), 1) - np.diag(rng.uniform(100, 400, n - 1), -1)
+    k = (
+        np.diag(rng.uniform(1e3, 2e3, n))
+        - np.diag(rng.uniform(100, 400, n - 1), 1)
+        - np.diag(rng.uniform(100, 400, n - 1), -1)
+    )
     m = np.diag(rng.uniform(1, 2, n)) + np.diag(rng.uniform(0, 0.2, n - 2), 2)
     c = np.diag(rng.uniform(0, 2, n)) + np.diag(rng.uniform(0, 1, n - 1), -1)
     h = np.diag(rng.uniform(0, 20, n))
@@ -32,7 +36,9 @@ def test_sparse_and_dense_matrices_are_the_same():
     k, m, c, h = model()
     given = [sparse.csr_array(x) for x in (k, m, c, h)]
     np.testing.assert_allclose(
-        jf.receptance(FREQ, given[0], given[1], given[2], 0.03, given[3]), jf.receptance(FREQ, k, m, c, 0.03, h), rtol=1e-10
+        jf.receptance(FREQ, given[0], given[1], given[2], 0.03, given[3]),
+        jf.receptance(FREQ, k, m, c, 0.03, h),
+        rtol=1e-10,
     )
 
 
@@ -97,7 +103,9 @@ def test_bad_arguments_get_one_sentence(change, message):
 
 
 def test_auto_solves_a_narrow_band_as_one():
-    beam = jf.beam(0.3, 40, youngs_modulus=1e9, density=1e3, width=0.01, height=0.01, ends=("clamped", "free"), loss_factor=0.1)
+    beam = jf.beam(
+        0.3, 40, youngs_modulus=1e9, density=1e3, width=0.01, height=0.01, ends=("clamped", "free"), loss_factor=0.1
+    )
     freq = [10.0, 50.0]
     np.testing.assert_allclose(
         beam.receptance(freq, [5, 60]), beam.receptance(freq, [5, 60], method="dense"), rtol=1e-6

@@ -118,14 +118,16 @@ def test_nan_and_inf_are_named_by_argument_line_and_frequency(random_lines, bad)
     kept = jf.invert(a, on_singular="nan")
     assert np.isnan(kept[2]).all()
     np.testing.assert_allclose(kept[[0, 1, 3]], np.linalg.inv(a[[0, 1, 3]]), rtol=1e-10)
-    with pytest.raises(ValueError, match="^b: NaN or Inf in line 2"):
+    with pytest.raises(ValueError, match=r"^b: NaN or Inf in line 2"):
         jf.solve(random_lines(4, 2), a)
 
 
 def test_singular_lines_are_listed(random_lines):
     a = random_lines(6, 2)
     a[[1, 4]] = [[1, 2], [2, 4]]
-    with pytest.raises(jf.SingularLineError, match=r"invert: singular matrix in line 1 \(20 Hz\), line 4 \(50 Hz\)") as caught:
+    with pytest.raises(
+        jf.SingularLineError, match=r"invert: singular matrix in line 1 \(20 Hz\), line 4 \(50 Hz\)"
+    ) as caught:
         jf.invert(a, freq_hz=np.arange(10.0, 70, 10))
     assert isinstance(caught.value, np.linalg.LinAlgError)
     assert caught.value.lines.tolist() == [1, 4]

@@ -1,0 +1,7 @@
+"""`python -m jointfrf`."""
+
+import sys
+
+from jointfrf.cli import main
+
+sys.exit(main())
