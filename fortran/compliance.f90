@@ -2,7 +2,7 @@
 !> and how measurement noise comes through.
 module jointfrf_compliance
   use jointfrf_kinds, only: dp, ip
-  use jointfrf_line_layout, only: all_finite, load, store, store_nan, take_block
+  use jointfrf_line_layout, only: all_finite, load, store, take_block
   use jointfrf_lines_lapack, only: inverse_work, product_line, solve_line
   use jointfrf_status, only: line_good, line_not_finite, line_overflow
   use jointfrf_sweep, only: line_operation, line_space, run_sweep
@@ -13,10 +13,9 @@ module jointfrf_compliance
   type, extends(line_operation) :: compliance
     logical :: transposed
     integer :: n
-    complex(dp), pointer, contiguous :: gamma(:, :, :), c_joint(:, :, :)
+    complex(dp), pointer, contiguous :: gamma(:, :, :)
   contains
     procedure :: line => compliance_one
-    procedure :: void => void_compliance
   end type compliance
 
   !> What both linearisations share.
@@ -28,19 +27,15 @@ module jointfrf_compliance
   end type linearisation
 
   type, extends(linearisation) :: factorisation
-    complex(dp), pointer, contiguous :: factors(:, :, :)
   contains
     procedure :: line => factor_one
-    procedure :: void => void_factors
   end type factorisation
 
   type, extends(linearisation) :: propagation
     logical :: reciprocal
-    complex(dp), pointer, contiguous :: covariance(:, :, :)
     real(dp), pointer, contiguous :: variance(:, :, :)
   contains
     procedure :: line => propagate_one
-    procedure :: void => void_covariance
   end type propagation
 
 contains
@@ -65,7 +60,7 @@ contains
     operation%transposed = transposed
     operation%n = n
     operation%gamma => gamma
-    operation%c_joint => c_joint
+    operation%result => c_joint
     operation%n_complex = 8*n**2 + inverse_work(n)
     operation%n_real = 2*n
     operation%n_pivot = n
@@ -100,15 +95,8 @@ contains
     call take_block(.false., -1.0_dp, gamma, n, 0, c)
     call product_line('N', 'N', 1.0_dp, gamma_kk, right, c)
     if (.not. all_finite(c)) line_info = line_overflow
-    call store(self%transposed, c, self%c_joint(:, :, i))
+    call store(self%transposed, c, self%result(:, :, i))
   end subroutine compliance_one
-
-  subroutine void_compliance(self, i)
-    class(compliance), intent(in) :: self
-    integer, intent(in) :: i
-
-    call store_nan(self%c_joint(:, :, i))
-  end subroutine void_compliance
 
   !> How a small change of the measured FRFs moves C: dC = U dh V, to first order.
   !>
@@ -130,7 +118,7 @@ contains
     integer :: n, m
 
     call set_linearisation(operation, transposed, gamma, transform)
-    operation%factors => factors
+    operation%result => factors
     n = operation%n
     m = operation%m
     operation%n_complex = operation%n_complex + 2*n*m
@@ -173,7 +161,7 @@ contains
     if (line_info /= line_good) return
     call stack(u, v_transposed, factors)
     if (.not. all_finite(factors)) line_info = line_overflow
-    call store(self%transposed, factors, self%factors(:, :, i))
+    call store(self%transposed, factors, self%result(:, :, i))
   end subroutine factor_one
 
   pure subroutine stack(above, below, whole)
@@ -183,13 +171,6 @@ contains
     whole(:size(above, 1), :) = above
     whole(size(above, 1) + 1:, :) = below
   end subroutine stack
-
-  subroutine void_factors(self, i)
-    class(factorisation), intent(in) :: self
-    integer, intent(in) :: i
-
-    call store_nan(self%factors(:, :, i))
-  end subroutine void_factors
 
   !> U and V^T of one line. Takes 7 n^2 of the complex workspace, and that of `solve_line`.
   subroutine linearise(self, i, space, u, v_transposed, line_info, rcond)
@@ -253,7 +234,7 @@ contains
     call set_linearisation(operation, transposed, gamma, transform)
     operation%reciprocal = reciprocal
     operation%variance => variance
-    operation%covariance => covariance
+    operation%result => covariance
     n = operation%n
     m = operation%m
     operation%n_complex = operation%n_complex + n**2*m**2 + n**4
@@ -300,13 +281,7 @@ contains
     covariance = 0
     call product_line('N', 'C', 1.0_dp, jacobian, jacobian, covariance)
     if (.not. all_finite(covariance)) line_info = line_overflow
-    call store(self%transposed, covariance, self%covariance(:, :, i))
+    call store(self%transposed, covariance, self%result(:, :, i))
   end subroutine propagate_one
 
-  subroutine void_covariance(self, i)
-    class(propagation), intent(in) :: self
-    integer, intent(in) :: i
-
-    call store_nan(self%covariance(:, :, i))
-  end subroutine void_covariance
 end module jointfrf_compliance

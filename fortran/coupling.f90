@@ -1,7 +1,7 @@
 !> Receptances of two substructures joined by a complex joint stiffness (2.24)-(2.26), (2.42)-(2.45).
 module jointfrf_coupling
   use jointfrf_kinds, only: dp, ip
-  use jointfrf_line_layout, only: all_finite, load, store, store_nan
+  use jointfrf_line_layout, only: all_finite, load, store
   use jointfrf_modification, only: apply_modification, modification_work
   use jointfrf_status, only: line_not_finite
   use jointfrf_sweep, only: line_operation, line_space, run_sweep
@@ -12,11 +12,10 @@ module jointfrf_coupling
   type, extends(line_operation) :: coupling
     logical :: transposed
     integer :: n_a, n_b, n_j
-    complex(dp), pointer, contiguous :: h_a(:, :, :), h_b(:, :, :), k_joint(:, :, :), h_c(:, :, :)
+    complex(dp), pointer, contiguous :: h_a(:, :, :), h_b(:, :, :), k_joint(:, :, :)
     integer(ip), pointer, contiguous :: dofs_a(:), dofs_b(:)
   contains
     procedure :: line => couple_one
-    procedure :: void => void_assembly
   end type coupling
 
 contains
@@ -56,7 +55,7 @@ contains
     operation%k_joint => k_joint
     operation%dofs_a => dofs_a
     operation%dofs_b => dofs_b
-    operation%h_c => h_c
+    operation%result => h_c
     operation%n_complex = n_a**2 + n_b**2 + n**2 + 2*n_j**2 + 2*n*n_j + modification_work(n, n_j)
     operation%n_real = 2*n_j
     operation%n_pivot = n_j
@@ -93,7 +92,7 @@ contains
 
     call take_relative(h_a, h_b, self%dofs_a, self%dofs_b, h, columns, rows, h_relative)
     call apply_modification(h, columns, rows, h_relative, k_joint, space, line_info, rcond) ! (2.26)
-    call store(self%transposed, h, self%h_c(:, :, i))
+    call store(self%transposed, h, self%result(:, :, i))
   end subroutine couple_one
 
   !> Receptance of the unjoined substructures, and its columns, rows and square in the coordinates x_j - x_k.
@@ -114,10 +113,4 @@ contains
     h_relative = h_a(dofs_a, dofs_a) + h_b(dofs_b, dofs_b)
   end subroutine take_relative
 
-  subroutine void_assembly(self, i)
-    class(coupling), intent(in) :: self
-    integer, intent(in) :: i
-
-    call store_nan(self%h_c(:, :, i))
-  end subroutine void_assembly
 end module jointfrf_coupling

@@ -2,7 +2,7 @@
 !> (2.49)-(2.56).
 module jointfrf_decoupling
   use jointfrf_kinds, only: dp, ip
-  use jointfrf_line_layout, only: all_finite, load, store, store_nan
+  use jointfrf_line_layout, only: all_finite, load, store
   use jointfrf_lines_lapack, only: inverse_work, invert_line, product_line, solve_line
   use jointfrf_status, only: line_good, line_not_finite
   use jointfrf_sweep, only: line_operation, line_space, run_sweep
@@ -14,11 +14,10 @@ module jointfrf_decoupling
     character(len=2) :: equation
     logical :: transposed
     integer :: n_a, n_b, n
-    complex(dp), pointer, contiguous :: h_a(:, :, :), h_b(:, :, :), h_c(:, :, :), k_joint(:, :, :)
+    complex(dp), pointer, contiguous :: h_a(:, :, :), h_b(:, :, :), h_c(:, :, :)
     integer(ip), pointer, contiguous :: dofs_j(:), dofs_k(:), dofs_r(:), dofs_s(:)
   contains
     procedure :: line => decouple_one
-    procedure :: void => void_joint
   end type decoupling
 
 contains
@@ -69,7 +68,7 @@ contains
     operation%dofs_k => dofs_k
     operation%dofs_r => dofs_r
     operation%dofs_s => dofs_s
-    operation%k_joint => k_joint
+    operation%result => k_joint
     operation%n_complex = operation%n_a**2 + operation%n_b**2 + 4*n**2 + inverse_work(n)
     operation%n_real = 2*n
     operation%n_pivot = n
@@ -109,7 +108,7 @@ contains
     call product_line('N', 'N', 1.0_dp, to_joint, from_joint, z)
     call invert_line(z, space, line_info, rcond_z)             ! (2.53)-(2.56)
     rcond = min(rcond, rcond_z)
-    call store(self%transposed, z, self%k_joint(:, :, i))
+    call store(self%transposed, z, self%result(:, :, i))
   end subroutine decouple_one
 
   !> M, P and Q of the equation, and -H_jj - H_kk. The first letter names the responding point: it gives Q. The second
@@ -136,10 +135,4 @@ contains
     z = -h_a(dofs_j, dofs_j) - h_b(dofs_k, dofs_k)
   end subroutine take_terms
 
-  subroutine void_joint(self, i)
-    class(decoupling), intent(in) :: self
-    integer, intent(in) :: i
-
-    call store_nan(self%k_joint(:, :, i))
-  end subroutine void_joint
 end module jointfrf_decoupling

@@ -3,7 +3,7 @@ module jointfrf_dynamic_stiffness
   use, intrinsic :: iso_c_binding, only: c_size_t
   use jointfrf_kinds, only: dp, ip
   use jointfrf_lapack, only: zgbcon, zgbtrf, zgbtrs
-  use jointfrf_line_layout, only: all_finite, store, store_nan
+  use jointfrf_line_layout, only: all_finite, store
   use jointfrf_lines_lapack, only: inverse_work, one_norm, solve_line
   use jointfrf_status, only: line_good, line_not_finite, line_overflow
   use jointfrf_sweep, only: line_operation, line_space, run_sweep
@@ -22,9 +22,7 @@ module jointfrf_dynamic_stiffness
     real(dp), pointer, contiguous :: omega(:)
     real(dp), pointer, contiguous :: stiffness(:, :), mass(:, :), damping(:, :), structural(:, :)
     integer(ip), pointer, contiguous :: outputs(:), inputs(:)
-    complex(dp), pointer, contiguous :: h(:, :, :)
   contains
-    procedure :: void => void_receptance
   end type dynamic_stiffness
 
   type, extends(dynamic_stiffness) :: dense_stiffness
@@ -125,7 +123,7 @@ contains
     operation%loss_factor = loss_factor
     operation%outputs => outputs
     operation%inputs => inputs
-    operation%h => h
+    operation%result => h
   end subroutine set_model
 
   !> One stored entry of Z = (1 + i eta) K + i H + i w C - w^2 M. Eq. (2.29), with viscous damping.
@@ -178,7 +176,7 @@ contains
     call unit_forces(self%inputs, x)
     call solve_line(z, x, space, line_info, rcond)                     ! (2.28)
     call take_rows(x, self%outputs, h)
-    call store(self%transposed, h, self%h(:, :, i))
+    call store(self%transposed, h, self%result(:, :, i))
   end subroutine dense_one
 
   subroutine banded_one(self, i, space, line_info, rcond)
@@ -217,7 +215,7 @@ contains
     call zgbcon('1', n, kl, ku, band, ld, space%pivot, norm, rcond, work, space%r, ignored, one_char)
     if (.not. all_finite(x)) line_info = line_overflow
     call take_rows(x, self%outputs, h)
-    call store(self%transposed, h, self%h(:, :, i))
+    call store(self%transposed, h, self%result(:, :, i))
   end subroutine banded_one
 
   !> Z in band storage, below the kl rows that the factorisation fills.
@@ -256,10 +254,4 @@ contains
     end do
   end subroutine unit_forces
 
-  subroutine void_receptance(self, i)
-    class(dynamic_stiffness), intent(in) :: self
-    integer, intent(in) :: i
-
-    call store_nan(self%h(:, :, i))
-  end subroutine void_receptance
 end module jointfrf_dynamic_stiffness

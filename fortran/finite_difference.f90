@@ -1,7 +1,7 @@
 !> Rotational receptances from translational ones by finite differences (2.57)-(2.59).
 module jointfrf_finite_difference
   use jointfrf_kinds, only: dp, ip
-  use jointfrf_line_layout, only: all_finite, load, store, store_nan
+  use jointfrf_line_layout, only: all_finite, load, store
   use jointfrf_lines_lapack, only: product_line
   use jointfrf_status, only: line_good, line_not_finite, line_overflow
   use jointfrf_sweep, only: line_operation, line_space, run_sweep
@@ -12,11 +12,10 @@ module jointfrf_finite_difference
   type, extends(line_operation) :: transformation
     logical :: transposed
     integer :: n_out, n_in, m_out, m_in
-    complex(dp), pointer, contiguous :: h(:, :, :), h_new(:, :, :)
+    complex(dp), pointer, contiguous :: h(:, :, :)
     complex(dp), allocatable :: t_out(:, :), t_in(:, :)
   contains
     procedure :: line => transform_one
-    procedure :: void => void_new
   end type transformation
 
 contains
@@ -62,7 +61,7 @@ contains
 
     operation%transposed = transposed
     operation%h => h
-    operation%h_new => h_new
+    operation%result => h_new
     if (transposed) then
       operation%t_out = transpose(t_out)
       operation%t_in = transpose(t_in)
@@ -101,13 +100,7 @@ contains
     h_new = 0
     call product_line('N', 'T', 1.0_dp, half, self%t_in, h_new)       ! (2.57)
     if (.not. all_finite(h_new)) line_info = line_overflow
-    call store(self%transposed, h_new, self%h_new(:, :, i))
+    call store(self%transposed, h_new, self%result(:, :, i))
   end subroutine transform_one
 
-  subroutine void_new(self, i)
-    class(transformation), intent(in) :: self
-    integer, intent(in) :: i
-
-    call store_nan(self%h_new(:, :, i))
-  end subroutine void_new
 end module jointfrf_finite_difference

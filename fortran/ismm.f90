@@ -1,7 +1,7 @@
 !> Inverse structural modification: the joint stiffness from receptances of the assembly (2.37)-(2.48).
 module jointfrf_ismm
   use jointfrf_kinds, only: dp, ip
-  use jointfrf_line_layout, only: all_finite, load, store, store_nan, subtract, take_block
+  use jointfrf_line_layout, only: all_finite, load, store, subtract, take_block
   use jointfrf_lines_lapack, only: inverse_work, product_line, solve_line
   use jointfrf_status, only: line_good, line_not_finite, line_overflow
   use jointfrf_sweep, only: line_operation, line_space, run_sweep
@@ -12,19 +12,17 @@ module jointfrf_ismm
   type, extends(line_operation) :: identification
     logical :: transposed
     integer :: n
-    complex(dp), pointer, contiguous :: alpha(:, :, :), gamma(:, :, :), k_initial(:, :, :), k_joint(:, :, :)
+    complex(dp), pointer, contiguous :: alpha(:, :, :), gamma(:, :, :), k_initial(:, :, :)
   contains
     procedure :: line => identify_one
-    procedure :: void => void_joint
   end type identification
 
   type, extends(line_operation) :: short_identification
     logical :: transposed
     integer :: n
-    complex(dp), pointer, contiguous :: gamma(:, :, :), k_joint(:, :, :)
+    complex(dp), pointer, contiguous :: gamma(:, :, :)
   contains
     procedure :: line => invert_one
-    procedure :: void => void_short
   end type short_identification
 
 contains
@@ -54,7 +52,7 @@ contains
     operation%alpha => alpha
     operation%gamma => gamma
     operation%k_initial => k_initial
-    operation%k_joint => k_joint
+    operation%result => k_joint
     operation%n_complex = 3*m**2 + 3*m*n + n**2 + inverse_work(m)
     operation%n_real = 2*m
     operation%n_pivot = m
@@ -102,15 +100,8 @@ contains
     call product_line('N', 'N', 1.0_dp, difference, columns_k, product)
     call product_line('T', 'N', -1.0_dp, rows_j, product, k_joint)      ! (2.47), (2.48): K* = K0 - D_jk
     if (.not. all_finite(k_joint)) line_info = line_overflow
-    call store(self%transposed, k_joint, self%k_joint(:, :, i))
+    call store(self%transposed, k_joint, self%result(:, :, i))
   end subroutine identify_one
-
-  subroutine void_joint(self, i)
-    class(identification), intent(in) :: self
-    integer, intent(in) :: i
-
-    call store_nan(self%k_joint(:, :, i))
-  end subroutine void_joint
 
   !> K* = -(gamma^-1)_jk: what ISMM reduces to where alpha was assembled through K0.
   !>
@@ -132,7 +123,7 @@ contains
     operation%transposed = transposed
     operation%n = n
     operation%gamma => gamma
-    operation%k_joint => k_joint
+    operation%result => k_joint
     operation%n_complex = m**2 + m*n + n**2 + inverse_work(m)
     operation%n_real = 2*m
     operation%n_pivot = m
@@ -160,15 +151,8 @@ contains
     call unit_columns(n, columns_k)
     call solve_line(gamma, columns_k, space, line_info, rcond)
     call take_block(.false., -1.0_dp, columns_k, 0, 0, k_joint)
-    call store(self%transposed, k_joint, self%k_joint(:, :, i))
+    call store(self%transposed, k_joint, self%result(:, :, i))
   end subroutine invert_one
-
-  subroutine void_short(self, i)
-    class(short_identification), intent(in) :: self
-    integer, intent(in) :: i
-
-    call store_nan(self%k_joint(:, :, i))
-  end subroutine void_short
 
   !> The unit vectors first + 1, first + 2, ... as columns.
   pure subroutine unit_columns(first, columns)

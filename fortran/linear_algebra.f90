@@ -1,7 +1,7 @@
 !> Inverse and solution of a sweep of matrices.
 module jointfrf_linear_algebra
   use jointfrf_kinds, only: dp, ip
-  use jointfrf_line_layout, only: all_finite, load, store, store_nan
+  use jointfrf_line_layout, only: all_finite, load, store
   use jointfrf_lines_lapack, only: inverse_work, invert_line, solve_line
   use jointfrf_status, only: line_not_finite
   use jointfrf_sweep, only: line_operation, line_space, run_sweep
@@ -11,19 +11,17 @@ module jointfrf_linear_algebra
 
   type, extends(line_operation) :: inversion
     integer :: n
-    complex(dp), pointer, contiguous :: a(:, :, :), a_inverse(:, :, :)
+    complex(dp), pointer, contiguous :: a(:, :, :)
   contains
     procedure :: line => invert_one
-    procedure :: void => void_inverse
   end type inversion
 
   type, extends(line_operation) :: solution
     logical :: transposed
     integer :: n, n_rhs
-    complex(dp), pointer, contiguous :: a(:, :, :), b(:, :, :), x(:, :, :)
+    complex(dp), pointer, contiguous :: a(:, :, :), b(:, :, :)
   contains
     procedure :: line => solve_one
-    procedure :: void => void_solution
   end type solution
 
 contains
@@ -41,7 +39,7 @@ contains
 
     operation%n = size(a, 1)
     operation%a => a
-    operation%a_inverse => a_inverse
+    operation%result => a_inverse
     operation%n_complex = inverse_work(operation%n)
     operation%n_pivot = operation%n
     operation%flops = 8.0_dp*real(operation%n, dp)**3
@@ -58,16 +56,9 @@ contains
     line_info = line_not_finite
     rcond = 0.0_dp
     if (.not. all_finite(self%a(:, :, i))) return
-    self%a_inverse(:, :, i) = self%a(:, :, i)
-    call invert_line(self%a_inverse(:, :, i), space, line_info, rcond)
+    self%result(:, :, i) = self%a(:, :, i)
+    call invert_line(self%result(:, :, i), space, line_info, rcond)
   end subroutine invert_one
-
-  subroutine void_inverse(self, i)
-    class(inversion), intent(in) :: self
-    integer, intent(in) :: i
-
-    call store_nan(self%a_inverse(:, :, i))
-  end subroutine void_inverse
 
   !> A X = B on every line.
   !> transposed  whether each matrix is stored as (in, out)
@@ -87,7 +78,7 @@ contains
     operation%n_rhs = size(b, merge(1, 2, transposed))
     operation%a => a
     operation%b => b
-    operation%x => x
+    operation%result => x
     operation%n_complex = operation%n**2 + operation%n*operation%n_rhs + inverse_work(operation%n)
     operation%n_real = 2*operation%n
     operation%n_pivot = operation%n
@@ -111,13 +102,7 @@ contains
     call load(self%transposed, self%a(:, :, i), a)
     call load(self%transposed, self%b(:, :, i), b)
     call solve_line(a, b, space, line_info, rcond)
-    call store(self%transposed, b, self%x(:, :, i))
+    call store(self%transposed, b, self%result(:, :, i))
   end subroutine solve_one
 
-  subroutine void_solution(self, i)
-    class(solution), intent(in) :: self
-    integer, intent(in) :: i
-
-    call store_nan(self%x(:, :, i))
-  end subroutine void_solution
 end module jointfrf_linear_algebra

@@ -1,7 +1,7 @@
 !> Receptance of a model by superposition of its modes.
 module jointfrf_modal
   use jointfrf_kinds, only: dp, ip
-  use jointfrf_line_layout, only: all_finite, store, store_nan
+  use jointfrf_line_layout, only: all_finite, store
   use jointfrf_lines_lapack, only: product_line
   use jointfrf_status, only: line_good, line_not_finite, line_overflow
   use jointfrf_sweep, only: line_operation, line_space, run_sweep
@@ -15,10 +15,8 @@ module jointfrf_modal
     real(dp), pointer, contiguous :: omega(:), stiffness(:), damping(:), loss_factor(:)
     complex(dp), allocatable :: shapes_out(:, :)      !< (n_out, n_modes)
     real(dp), allocatable :: shapes_in(:, :)          !< (n_in, n_modes)
-    complex(dp), pointer, contiguous :: h(:, :, :)
   contains
     procedure :: line => superpose_one
-    procedure :: void => void_receptance
   end type superposition
 
 contains
@@ -48,7 +46,7 @@ contains
     operation%stiffness => stiffness
     operation%damping => damping
     operation%loss_factor => loss_factor
-    operation%h => h
+    operation%result => h
     if (transposed) then
       operation%shapes_out = transpose(shapes_out)
       operation%shapes_in = transpose(shapes_in)
@@ -98,13 +96,7 @@ contains
     h = 0
     call product_line('N', 'N', 1.0_dp, self%shapes_out, weighted, h)
     if (.not. all_finite(h)) line_info = line_overflow
-    call store(self%transposed, h, self%h(:, :, i))
+    call store(self%transposed, h, self%result(:, :, i))
   end subroutine superpose_one
 
-  subroutine void_receptance(self, i)
-    class(superposition), intent(in) :: self
-    integer, intent(in) :: i
-
-    call store_nan(self%h(:, :, i))
-  end subroutine void_receptance
 end module jointfrf_modal

@@ -2,7 +2,7 @@
 !> another (2.40), (2.47).
 module jointfrf_modification
   use jointfrf_kinds, only: dp, ip
-  use jointfrf_line_layout, only: all_finite, load, store, store_nan, subtract
+  use jointfrf_line_layout, only: all_finite, load, store, subtract
   use jointfrf_lines_lapack, only: inverse_work, product_line, solve_line
   use jointfrf_status, only: line_good, line_not_finite, line_overflow
   use jointfrf_sweep, only: line_operation, line_space, run_sweep
@@ -13,20 +13,18 @@ module jointfrf_modification
   type, extends(line_operation) :: modification
     logical :: transposed
     integer :: n, n_m
-    complex(dp), pointer, contiguous :: alpha(:, :, :), d(:, :, :), gamma(:, :, :)
+    complex(dp), pointer, contiguous :: alpha(:, :, :), d(:, :, :)
     integer(ip), pointer, contiguous :: dofs(:)
   contains
     procedure :: line => modify_one
-    procedure :: void => void_gamma
   end type modification
 
   type, extends(line_operation) :: inverse_modification
     logical :: transposed
     integer :: n
-    complex(dp), pointer, contiguous :: alpha(:, :, :), gamma(:, :, :), d(:, :, :)
+    complex(dp), pointer, contiguous :: alpha(:, :, :), gamma(:, :, :)
   contains
     procedure :: line => find_one
-    procedure :: void => void_d
   end type inverse_modification
 
 contains
@@ -55,7 +53,7 @@ contains
     operation%alpha => alpha
     operation%d => d
     operation%dofs => dofs
-    operation%gamma => gamma
+    operation%result => gamma
     operation%n_complex = n**2 + 2*n_m**2 + 2*n*n_m + modification_work(n, n_m)
     operation%n_real = 2*n_m
     operation%n_pivot = n_m
@@ -83,7 +81,7 @@ contains
     call load(self%transposed, self%d(:, :, i), d)
     call take_modified(h, self%dofs, columns, rows, h_mm)
     call apply_modification(h, columns, rows, h_mm, d, space, line_info, rcond)
-    call store(self%transposed, h, self%gamma(:, :, i))
+    call store(self%transposed, h, self%result(:, :, i))
   end subroutine modify_one
 
   !> Columns, rows and square of the modified DOFs.
@@ -96,13 +94,6 @@ contains
     rows = h(dofs, :)
     h_mm = h(dofs, dofs)
   end subroutine take_modified
-
-  subroutine void_gamma(self, i)
-    class(modification), intent(in) :: self
-    integer, intent(in) :: i
-
-    call store_nan(self%gamma(:, :, i))
-  end subroutine void_gamma
 
   !> Complex workspace of `apply_modification`.
   pure function modification_work(n, n_m) result(size_needed)
@@ -161,7 +152,7 @@ contains
     operation%n = n
     operation%alpha => alpha
     operation%gamma => gamma
-    operation%d => d
+    operation%result => d
     operation%n_complex = 4*n**2 + inverse_work(n)
     operation%n_real = 2*n
     operation%n_pivot = n
@@ -194,13 +185,7 @@ contains
     call load(.not. self%transposed, self%gamma(:, :, i), gamma)
     call solve_line(gamma, d_transposed, space, line_info, rcond_gamma) ! its product with gamma^-1, transposed
     rcond = min(rcond, rcond_gamma)
-    call store(.not. self%transposed, d_transposed, self%d(:, :, i))
+    call store(.not. self%transposed, d_transposed, self%result(:, :, i))
   end subroutine find_one
 
-  subroutine void_d(self, i)
-    class(inverse_modification), intent(in) :: self
-    integer, intent(in) :: i
-
-    call store_nan(self%d(:, :, i))
-  end subroutine void_d
 end module jointfrf_modification

@@ -1,11 +1,13 @@
 !> A sweep: independent frequency lines, shared among threads, each with its own status and condition number.
 !>
-!> A physics module says what one line is (`line_operation`); everything that is the same for all of them is here, once:
-!> workspace (allocated before the loop, one piece a thread), threads, NaN in bad lines, the count of bad lines.
+!> A physics module says what one line is (`line_operation`) and where its result goes; everything that is the same for
+!> all of them is here, once: workspace (allocated before the loop, one piece a thread), threads, NaN in bad lines, the
+!> count of bad lines.
 module jointfrf_sweep
   !$ use omp_lib, only: omp_get_max_threads, omp_get_thread_num, omp_in_parallel
   use jointfrf_blas_threads, only: hold_blas_threads, release_blas_threads
   use jointfrf_kinds, only: dp, ip
+  use jointfrf_line_layout, only: store_nan
   use jointfrf_status, only: info_no_memory, line_good
   implicit none
   private
@@ -24,18 +26,16 @@ module jointfrf_sweep
     procedure :: matrix
   end type line_space
 
-  !> What is done with one line. An extension holds pointers to the caller's arrays and sets the sizes below.
+  !> What is done with one line. An extension holds pointers to the caller's arrays.
   type, abstract :: line_operation
     integer :: n_complex = 0       !< complex workspace of one line
     integer :: n_real = 0          !< real workspace of one line
     integer :: n_pivot = 0         !< integer workspace of one line
     real(dp) :: flops = 0.0_dp     !< estimated work of one line
-    !> Never set. gfortran takes a CLASS argument with INTENT(IN) to leave untouched whatever it can reach, unless the
-    !> declared type has a pointer; without this one it may assume that a sweep writes no results.
-    integer, pointer :: results => null()
+    !> The caller's array for the results, one matrix a line.
+    complex(dp), pointer, contiguous :: result(:, :, :) => null()
   contains
     procedure(line_routine), deferred :: line
-    procedure(void_routine), deferred :: void
   end type line_operation
 
   abstract interface
@@ -48,13 +48,6 @@ module jointfrf_sweep
       integer(ip), intent(out) :: line_info
       real(dp), intent(out) :: rcond
     end subroutine line_routine
-
-    !> Fill the result of line i with NaN.
-    subroutine void_routine(self, i)
-      import :: line_operation
-      class(line_operation), intent(in) :: self
-      integer, intent(in) :: i
-    end subroutine void_routine
   end interface
 
 contains
@@ -109,7 +102,7 @@ contains
       call operation%line(i, space(t), line_info(i), rcond(i))
       if (line_info(i) /= line_good) then
         rcond(i) = 0.0_dp
-        call operation%void(i)
+        call store_nan(operation%result(:, :, i))
       end if
     end do
     !$omp end parallel do

@@ -203,6 +203,8 @@ def estimate(
         weight = _weights(covariance.reshape(r, n_freq, chosen.size, chosen.size), blocked)
         if theta is None:
             theta, limit = _start(linear, weight, basis, chosen, n)
+            starts = [theta, _mean_start(linear, weight, theta.shape, chosen, n)]
+            theta = _best_of(starts, limit, linear, weight, model)
         before = theta
         theta, information, residual = _gauss_newton(theta, limit, linear, weight, model)
         scatter = _inverse(2 * information)
@@ -359,6 +361,31 @@ def _start(
         [np.sqrt(rigid[:, a] * rigid[:, b]) / entry[a, b] for entry in size for a, b in [np.argwhere(entry)[0]]], axis=1
     )
     return theta, limit
+
+
+def _mean_start(
+    linear: ComplexArray, weight: ComplexArray, shape: tuple[int, ...], chosen: NDArray[np.intp], n: int
+) -> FloatArray:
+    """Return stiffnesses from the weighted mean of the real compliance of each DOF, everything else zero."""
+    theta = np.zeros(shape)
+    for d in range(n):
+        at = int(np.flatnonzero(chosen == d * (n + 1))[0])
+        own = weight[..., at, at].real
+        mean = (own * linear[..., at].real).sum(axis=1) / own.sum(axis=1)
+        # A compliance lost in noise starts from what the noise would let through.
+        theta[:, d] = 1 / np.maximum(mean, 1e-3 / np.sqrt(own.sum(axis=1)))
+    return theta
+
+
+def _best_of(
+    starts: Sequence[FloatArray], limit: FloatArray, linear: ComplexArray, weight: ComplexArray, model: _JointModel
+) -> FloatArray:
+    """Minimise from several starts; of each realisation keep the lowest minimum."""
+    found = [_gauss_newton(start, limit, linear, weight, model) for start in starts]
+    costs = [(left.conj() * (weight @ left[..., None])[..., 0]).real.sum(axis=(1, 2)) for _, _, left in found]
+    best = np.argmin(np.where(np.isfinite(costs), costs, np.inf), axis=0)
+    theta: FloatArray = np.stack([theta for theta, _, _ in found])[best, np.arange(best.size)]
+    return theta
 
 
 class _JointModel:

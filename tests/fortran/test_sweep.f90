@@ -1,4 +1,4 @@
-!> A sweep visits every line once, on one thread or several, voids the bad ones and counts them.
+!> A sweep visits every line once, on one thread or several, turns the bad ones into NaN and counts them.
 module probes
   use jointfrf_kinds, only: dp, ip
   use jointfrf_sweep, only: line_operation, line_space
@@ -10,10 +10,9 @@ module probes
   !> Records what is done to it; the lines in `codes` that are not 0 are bad.
   type, extends(line_operation) :: probe
     integer(ip), pointer :: codes(:) => null()
-    integer, pointer :: visits(:) => null(), voids(:) => null(), thread(:) => null(), spoilt(:) => null()
+    integer, pointer :: visits(:) => null(), thread(:) => null(), spoilt(:) => null()
   contains
     procedure :: line => visit
-    procedure :: void => note_void
   end type probe
 
 contains
@@ -37,20 +36,15 @@ contains
     if (any(shape(a) /= [2, 3]) .or. any(shape(b) /= [3, 2]) .or. space%used /= 12) self%spoilt(i) = 3
     if (size(space%r) /= self%n_real .or. size(space%pivot) /= self%n_pivot) self%spoilt(i) = 4
     self%visits(i) = self%visits(i) + 1
+    self%result(:, :, i) = i
     !$ self%thread(i) = omp_get_thread_num()
     line_info = self%codes(i)
     rcond = 1.0_dp/i
   end subroutine visit
-
-  subroutine note_void(self, i)
-    class(probe), intent(in) :: self
-    integer, intent(in) :: i
-
-    self%voids(i) = self%voids(i) + 1
-  end subroutine note_void
 end module probes
 
 program test_sweep
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
   use probes, only: probe
   use testing, only: check, check_same, dp, finish, ip, set_threads
   use jointfrf_sweep, only: run_sweep
@@ -59,7 +53,8 @@ program test_sweep
   integer, parameter :: n = 101
   logical :: threaded
   integer(ip), target :: codes(n)
-  integer, target :: visits(n), voids(n), thread(n), spoilt(n)
+  integer, target :: visits(n), thread(n), spoilt(n)
+  complex(dp), target :: results(2, 1, n)
   integer(ip) :: line_info(n), info
   real(dp) :: rcond(n), expected(n)
   integer :: i
@@ -73,7 +68,7 @@ program test_sweep
   call sweep(1.0_dp, n)
   call check(info == 0 .and. all(line_info == 0), 'good lines')
   call check_same(rcond, expected, 'rcond of each line')
-  call check(all(visits == 1) .and. all(voids == 0), 'each line once')
+  call check(all(visits == 1) .and. all(kept()), 'each line once')
   call check(all(spoilt == 0), 'workspace')
   call check(all(thread == 0), 'little work stays on one thread')
 
@@ -85,7 +80,7 @@ program test_sweep
   call check(info == 3, 'number of bad lines')
   call check(all(line_info == codes), 'code of each line')
   call check_same(rcond, expected, 'rcond with bad lines')
-  call check(all(visits == 1) .and. all((voids == 1) .eqv. (codes /= 0)), 'bad lines, and only they, are voided once')
+  call check(all(visits == 1) .and. all(kept() .eqv. (codes == 0)), 'bad lines, and only they, become NaN')
   call check(all(spoilt == 0), 'workspace with threads')
   if (threaded) call check(any(thread == 0) .and. any(thread == 1), 'much work goes to two threads')
 
@@ -109,6 +104,17 @@ program test_sweep
 
 contains
 
+  !> Whether the result of each line is what the line wrote; where it is not, it must be NaN throughout.
+  function kept() result(same)
+    logical :: same(n)
+    integer :: j
+
+    do j = 1, n
+      same(j) = all(abs(results(:, :, j) - j) <= 0.0_dp)
+      if (.not. same(j)) call check(all(ieee_is_nan(real(results(:, :, j)))), 'a bad line is NaN throughout')
+    end do
+  end function kept
+
   subroutine sweep(flops, lines)
     real(dp), intent(in) :: flops
     integer, intent(in) :: lines
@@ -116,7 +122,7 @@ contains
 
     operation%codes => codes
     operation%visits => visits
-    operation%voids => voids
+    operation%result => results(:, :, :lines)
     operation%thread => thread
     operation%spoilt => spoilt
     operation%n_complex = 12
@@ -124,7 +130,7 @@ contains
     operation%n_pivot = 7
     operation%flops = flops
     visits = 0
-    voids = 0
+    results = -1
     thread = 0
     spoilt = 0
     call run_sweep(operation, int(lines, ip), line_info(:lines), rcond(:lines), info)
