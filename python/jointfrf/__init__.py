@@ -3,7 +3,7 @@
 Time convention exp(+i w t). Arrays over frequency have shape (n_freq, out, in), complex128, C order. SI units.
 """
 
-from jointfrf._sweep import RCOND_LIMIT
+from jointfrf._sweep import RCOND_LIMIT, VERSION
 from jointfrf.bands import as_bands, band_mean, in_bands, propose_bands, sensitivity
 from jointfrf.beam import beam
 from jointfrf.compliance import compliance_covariance, compliance_factors, joint_compliance
@@ -32,4 +32,4 @@ from jointfrf.noise import pollute, realisations
 from jointfrf.receptance import receptance
 from jointfrf.rotations import DifferenceError, central_difference, difference_error, difference_weights, transform
 
-__version__ = "0.1.0"
+__version__ = VERSION

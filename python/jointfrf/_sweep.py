@@ -19,6 +19,7 @@ from jointfrf.errors import CopyWarning, IllConditionedWarning, SingularLineErro
 __all__ = [
     "LARGE_COPY",
     "RCOND_LIMIT",
+    "VERSION",
     "ComplexArray",
     "FloatArray",
     "LineStatus",
@@ -33,6 +34,9 @@ __all__ = [
     "run",
     "weights",
 ]
+
+#: Version of the kernel, and so of the package.
+VERSION = ".".join(str(int(number)) for number in _kernel.jf_version())
 
 ComplexArray = NDArray[np.complex128]
 FloatArray = NDArray[np.float64]

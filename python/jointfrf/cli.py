@@ -165,3 +165,7 @@ def _progress(name: str) -> Callable[[int, int], None]:
         print(f"\r{name}: {100 * done // total} %{end}", end="", file=sys.stderr, flush=True)
 
     return show
+
+
+if __name__ == "__main__":
+    sys.exit(main())

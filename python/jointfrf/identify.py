@@ -214,6 +214,7 @@ def _by_band_mean(
             errors.append(values.std(ddof=1) / np.sqrt(values.size) if values.size > 1 else np.nan)
     parameters = {f"k_{d}": float(v) for d, v in zip(names, mean.stiffness, strict=True)}
     parameters |= {f"c_{d}": float(v) for d, v in zip(names, mean.damping, strict=True)}
+    keep = np.any([in_bands(freq, b) for b in own], axis=0)
     note = "the standard error of a band mean is the scatter of its lines; its bias by noise is not in it"
     return JointFit(
         method=method,
@@ -222,8 +223,8 @@ def _by_band_mean(
         covariance=np.diag(np.square(errors)),
         noise_level=np.nan,
         residual_level=np.nan,
-        freq_hz=freq,
-        k_lines=k_lines,
+        freq_hz=freq[keep],
+        k_lines=k_lines[keep],
         bands=tuple(tuple(b) for b in own),
         notes=(note,),
     )
@@ -392,5 +393,5 @@ def _doubts(found: JointFit, result: ComplianceEstimate, cross: Cross) -> list[s
             "rotations by coarse differences); standard errors come from the scatter between parts of the band"
         )
         if cross == "zero" and result.off_diagonal[0] > _MISFIT * found.noise_level:
-            told.append("the DOFs of the joint are coupled: consider cross='ignore' or cross='fit'")
+            told.append("the DOFs of the joint are coupled: consider to ignore or to fit the cross terms (cross)")
     return told

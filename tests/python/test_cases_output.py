@@ -1,0 +1,209 @@
+"""Figures, reports, tables in print, and the command line."""
+
+import csv
+import io
+import re
+import subprocess
+import sys
+
+import jointfrf.cli
+import numpy as np
+import pytest
+from jointfrf.cases import find_case, run_case
+from jointfrf.figures import make_figures
+from jointfrf.plots import Curve, Figure, Interval, Panel, as_csv, draw, symbol
+from jointfrf.tables import Table, as_text, number
+from PIL import Image
+
+COMMAND = [sys.executable, "-m", "jointfrf.cli"]
+
+
+@pytest.fixture(scope="module")
+def outputs(tmp_path_factory):
+    """Two cases: one parameter a kind, and several methods on beams."""
+    folder = tmp_path_factory.mktemp("results")
+    beams = tmp_path_factory.mktemp("cases") / "beams"
+    beams.mkdir()
+    for name in ("case.toml", "expected.toml", "README.md"):
+        text = (find_case("3.3.1") / name).read_text()
+        text = text.replace("elements = 300", "elements = 30").replace("elements = 225", "elements = 20")
+        text = text.replace("301:", "31:").replace("151:", "16:").replace("226:", "21:").replace("step = 1.0", "step = 5.0")
+        (beams / name).write_text(text)
+    return {"chain": run_case(find_case("3.1"), folder, realisations=4), "beams": run_case(beams, folder, realisations=4)}
+
+
+FIGURES = {
+    "chain": ["3-2", "3-3", "3-4", "3-5", "3-6", "3-7"],
+    "beams": ["3-30", "3-31", "3-32", "3-33", "3-34"],
+}
+
+
+@pytest.mark.parametrize("which", FIGURES)
+def test_figures_of_the_source_are_drawn(outputs, which):
+    figures = {figure.number: figure for figure in make_figures(outputs[which].result)}
+    assert set(FIGURES[which]) == set(figures) - {""}
+    folder = outputs[which].report.parent / "figures"
+    for figure in figures.values():
+        path = folder / f"{figure.key}.png"
+        with Image.open(path) as image:
+            assert image.format == "PNG"
+            assert image.width == 910
+            # More than an empty frame: many shades, and mostly paper.
+            shades = np.asarray(image.convert("L"))
+        assert 0.5 < (shades > 200).mean() < 0.999
+        assert len(np.unique(shades)) > 30
+        rows = list(csv.DictReader((folder / f"{figure.key}.csv").open(newline="")))
+        points = sum(curve.x.size for panel in figure.panels for curve in panel.curves)
+        assert len(rows) >= points
+        assert len(rows) > 10
+
+
+@pytest.mark.parametrize(
+    ("number", "which"), [("3-16", "modes"), ("3-27", "noise")] + [(f"3-{i}", None) for i in range(17, 27)]
+)  # fmt: skip
+def test_case_3_3_names_all_its_figures(number, which):
+    from jointfrf.case_file import read_case
+
+    numbers = {n: key for key, n in read_case(find_case("3.3")).expected.figures}
+    assert numbers[number] == (which or numbers[number])
+
+
+def test_report_holds_every_table_and_figure_and_no_link(outputs):
+    for output in outputs.values():
+        text = output.report.read_text(encoding="utf-8")
+        for table in output.tables:
+            assert f'id="{table.key}"' in text
+            body = text.split(f'id="{table.key}"')[1].split("</table>")[0]
+            assert body.count("<tr") == len(table.rows) + 1
+            assert body.count('class="failing"') == len(table.failing)
+        figures = make_figures(output.result)
+        assert text.count('src="data:image/png;base64,') == len(figures)
+        assert not re.search(r'(?:src|href)="(?!data:|#)', text)
+        assert "realisations = 1000" in text  # the case itself
+        assert all(number in text for number in (f.number for f in figures))
+
+
+def test_report_escapes_what_a_user_writes(tmp_path):
+    own = tmp_path / "own"
+    own.mkdir()
+    text = (find_case("3.1") / "case.toml").read_text()
+    (own / "case.toml").write_text(text.replace("Two masses and", "<script>alert(1)</script> &"))
+    report = run_case(own, tmp_path, realisations=2).report.read_text(encoding="utf-8")
+    assert "<script>" not in report
+    assert "&lt;script&gt;" in report
+
+
+def test_a_figure_is_reproducible_and_leaves_no_global_state():
+    import matplotlib
+
+    before = dict(matplotlib.rcParams)
+    x = np.arange(1.0, 5.0)
+    figure = Figure("f", "caption", "", (Panel("t", "x", "y", (Curve("a", x, x**2, "actual"),), log_y=True),))
+    assert draw(figure) == draw(figure)
+    assert dict(matplotlib.rcParams) == before
+
+
+def test_data_of_a_figure():
+    x = np.array([1.0, 2.0])
+    curve, interval = Curve("a, b", x, 2 * x, "actual"), Interval("one\ntwo", 1.0, 2.0, 3.0, 2.5)
+    figure = Figure("f", "", "", (Panel("p", "x", "y", (curve,)), Panel("q", "x", "", intervals=(interval,))))
+    rows = list(csv.reader(io.StringIO(as_csv(figure))))
+    assert rows[1:3] == [["p", "a, b", "1.0", "2.0", ""], ["p", "a, b", "2.0", "4.0", ""]]
+    assert ["q", "one, two: 2.5 to 97.5 %", "", "1.0", "3.0"] in rows
+    assert ["q", "one, two: thesis", "", "2.5", ""] in rows
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (2010.9, "2010.9"), (2000.0, "2000"), (6.069e5, "606900"), (6.23e6, "6.23e6"), (0.0, "0"), (-0.25, "-0.25"),
+        (4.9491e-4, "4.9491e-4"), (float("nan"), "nan"), (None, ""), ("word", "word"), (123456.0, "123456"),
+    ],
+)  # fmt: skip
+def test_numbers_for_a_reader(value, text):
+    assert number(value) == text
+
+
+def test_text_table_is_aligned():
+    table = Table("k", "Title", ("name", "value"), (("a", 1.5), ("longer", 20.0)))
+    assert as_text(table).splitlines() == ["Title", "name    value", "------  -----", "a         1.5", "longer     20"]
+
+
+def test_symbols_of_parameters():
+    assert symbol("k_Mtheta") == r"$k_{M\theta}$"
+    assert symbol("c_x") == "$c_{x}$"
+
+
+def call(*words, cwd=None):
+    return subprocess.run([*COMMAND, *words], capture_output=True, text=True, cwd=cwd)
+
+
+def test_command_runs_a_case_in_processes(tmp_path):
+    done = call("run", "3.1", "--realisations", "30", "--jobs", "2", "--out", str(tmp_path / "out"))
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    assert "2010.9" in done.stdout
+    assert "Natural frequencies of the assembly" in done.stdout
+    assert str(tmp_path / "out" / "3.1-discrete" / "report.html") in done.stdout
+    alone = run_case(find_case("3.1"), tmp_path / "alone", realisations=30)
+    table = "tables/identified.csv"
+    parallel = (tmp_path / "out" / "3.1-discrete" / table).read_text()
+    assert parallel == (alone.report.parent / table).read_text()
+
+
+def test_command_lists_cases(capsys):
+    assert jointfrf.cli.main(["cases"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines] == ["3.1-discrete", "3.2-fe-beams", "3.3-beams-1mm", "3.3.1-decoupling"]
+    assert all(len(line.split()) > 3 for line in lines)
+
+
+def test_command_without_or_with_wrong_words():
+    for words in ([], ["walk"], ["run", "--realisations", "0"], ["run", "--realisations", "x"], ["run", "--jobs", "-1"]):
+        with pytest.raises(SystemExit) as stop:
+            jointfrf.cli.main(words)
+        assert stop.value.code == 2
+
+
+def test_version(capsys):
+    with pytest.raises(SystemExit) as stop:
+        jointfrf.cli.main(["--version"])
+    assert stop.value.code == 0
+    assert capsys.readouterr().out == f"jointfrf {jointfrf.__version__}\n"
+
+
+def test_unknown_case_is_one_sentence_and_status_2(capsys):
+    assert jointfrf.cli.main(["run", "9.9"]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("jointfrf: error: there is no case '9.9'; known cases: 3.1-discrete")
+    assert error.count("\n") == 1
+
+
+def test_wrong_case_file_is_one_sentence_and_status_1(tmp_path, capsys):
+    (tmp_path / "case.toml").write_text("title = 1\n")
+    assert jointfrf.cli.main(["run", str(tmp_path), "--jobs", "1"]) == 1
+    assert capsys.readouterr().err == f"jointfrf: error: {tmp_path / 'case.toml'}: title must be a text, not 1\n"
+
+
+def test_results_that_cannot_be_written_are_one_sentence(tmp_path, capsys):
+    (tmp_path / "file").touch()
+    out = tmp_path / "file" / "out"
+    assert jointfrf.cli.main(["run", "3.1", "--realisations", "2", "--jobs", "1", "--out", str(out)]) == 1
+    error = capsys.readouterr().err
+    assert error.startswith("jointfrf: error: ")
+    assert error.endswith(": Not a directory\n")
+    assert str(out) in error
+
+
+def test_two_cases_of_one_name_are_refused(tmp_path, capsys):
+    own = tmp_path / "3.1-discrete"
+    own.mkdir()
+    (own / "case.toml").write_text((find_case("3.1") / "case.toml").read_text())
+    assert jointfrf.cli.main(["run", "3.1", str(own)]) == 2
+    assert "overwrite" in capsys.readouterr().err
+
+
+def test_command_survives_a_closed_pipe():
+    script = f"{sys.executable} -m jointfrf.cli cases | head -c 1"
+    done = subprocess.run(["sh", "-c", script], capture_output=True, text=True)
+    assert done.stderr == ""
