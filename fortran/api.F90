@@ -1,11 +1,11 @@
 !> The flat face of the kernel: routines jf_* for Fortran 77, modern Fortran, C and Python alike. No algebra here.
 !>
-!> Every routine is one symbol, `jf_name_`, which FORTRAN 77 programs reach by CALL JF_NAME, C programs by jointfrf.h and
-!> modern Fortran by this module. CHARACTER arguments are single letters without hidden lengths.
+!> Every routine is one symbol, `jf_name_`, which FORTRAN 77 programs reach by CALL JF_NAME, C programs by jointfrf.h
+!> and modern Fortran by this module. CHARACTER arguments are single letters without hidden lengths.
 !>
 !> Common to all:
-!> trans       'N': a line's matrix is stored h(out, in, freq), Fortran's habit. 'T': h(in, out, freq), which is the array
-!>             (freq, out, in) of C and numpy seen from Fortran. It holds for all matrices of a call, unless said
+!> trans       'N': a line's matrix is stored h(out, in, freq), Fortran's habit. 'T': h(in, out, freq), which is the
+!>             array (freq, out, in) of C and numpy seen from Fortran. It holds for all matrices of a call, unless said
 !>             otherwise.
 !> n_freq      number of frequency lines; 0 is allowed and does nothing
 !> line_info   shape (n_freq), status of each line: 0 good, > 0 singular (LAPACK's INFO), -1 NaN or Inf in the line,
@@ -16,8 +16,8 @@
 !> Time convention exp(+i w t). Input and output arrays must not overlap.
 module jointfrf
   use, intrinsic :: iso_c_binding, only: c_char, c_double, c_double_complex, c_int
-  use jointfrf_arguments, only: as_lines, as_matrix, bad_offsets, is_transposed, lower, names, not_finite, out_of_range, &
-    repeated, spread_text, unknown_equation, unknown_order
+  use jointfrf_arguments, only: as_lines, as_matrix, bad_offsets, is_transposed, lower, names, not_finite, &
+    out_of_range, repeated, spread_text, unknown_equation, unknown_order
   use jointfrf_compliance, only: compliance_covariance, compliance_factors, joint_compliance
   use jointfrf_coupling, only: couple
   use jointfrf_decoupling, only: decouple
@@ -160,7 +160,7 @@ contains
                           inputs, h_lines, line_info, rcond, info)
   end subroutine jf_receptance
 
-  !> The same for band matrices in LAPACK's band storage, entry (i, j) at (ku + 1 + i - j, j); zgbtrf and zgbtrs (zgbsv).
+  !> The same for band matrices in LAPACK's band storage, entry (i, j) at (ku + 1 + i - j, j), with zgbtrf and zgbtrs.
   !> trans          concerns h only
   !> n              number of DOFs of the model
   !> kl, ku         number of diagonals below and above the main one
@@ -210,8 +210,8 @@ contains
                            outputs, inputs, h_lines, line_info, rcond, info)
   end subroutine jf_receptance_banded
 
-  !> Receptance by superposition of modes: sum of phi_out phi_in / (lambda (1 + i eta) - w^2 + i w c), unit modal masses.
-  !> n_modes       number of modes
+  !> Receptance by superposition of modes: sum of phi_out phi_in / (lambda (1 + i eta) - w^2 + i w c).
+  !> n_modes       number of modes, normalised to unit modal mass
   !> n_out, n_in   number of responses and of forces
   !> omega         angular frequencies, shape (n_freq), rad/s
   !> stiffness     lambda = w_r^2, shape (n_modes), (rad/s)^2
@@ -244,8 +244,8 @@ contains
     call as_matrix(trans, n_out, n_modes, shapes_out, out_matrix)
     call as_matrix(trans, n_in, n_modes, shapes_in, in_matrix)
     call as_lines(trans, n_out, n_in, n_freq, h, h_lines)
-    call receptance_modal(is_transposed(trans), omega, stiffness, damping, loss_factor, out_matrix, in_matrix, h_lines, &
-                          line_info, rcond, info)
+    call receptance_modal(is_transposed(trans), omega, stiffness, damping, loss_factor, out_matrix, in_matrix, &
+                          h_lines, line_info, rcond, info)
   end subroutine jf_receptance_modal
 
   !> Receptance of A and B coupled by a flexible joint, all blocks. Eqs. (2.24)-(2.26), (2.42)-(2.45).

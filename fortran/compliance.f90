@@ -42,8 +42,8 @@ contains
 
   !> C = gamma_kk gamma_jk^-1 gamma_jj - gamma_kj = K*^-1.
   !>
-  !> Exact, because with gamma^-1 = [[Z_A + K*, -K*], [-K*, Z_B + K*]] one has gamma_kk gamma_jk^-1 = K*^-1 (Z_A + K*) and
-  !> (Z_A + K*) gamma_jj - K* gamma_kj = I. Noise enters C almost linearly; it enters K* through an inverse.
+  !> Exact, because with gamma^-1 = [[Z_A + K*, -K*], [-K*, Z_B + K*]] one has gamma_kk gamma_jk^-1 = K*^-1 (Z_A + K*)
+  !> and (Z_A + K*) gamma_jj - K* gamma_kj = I. Noise enters C almost linearly; it enters K* through an inverse.
   !> gamma     receptance of the assembly at DOFs j, then k, shape (2 n, 2 n, n_freq), m/N
   !> c_joint   joint compliance, shape (n, n, n_freq), m/N
   subroutine joint_compliance(transposed, gamma, c_joint, line_info, rcond, info)
@@ -219,7 +219,8 @@ contains
   !> variance     E|e_pq|^2 of the measured FRFs, shape (m, m, n_freq), (m/N)^2
   !> reciprocal   whether h was made reciprocal
   !> covariance   E[dC_ab conj(dC_cd)], shape (n^2, n^2, n_freq); ab runs as C lies in the caller's memory
-  subroutine compliance_covariance(transposed, gamma, transform, variance, reciprocal, covariance, line_info, rcond, info)
+  subroutine compliance_covariance(transposed, gamma, transform, variance, reciprocal, covariance, line_info, rcond, &
+                                   info)
     logical, intent(in) :: transposed, reciprocal
     complex(dp), contiguous, target, intent(in) :: gamma(:, :, :)
     real(dp), contiguous, target, intent(in) :: variance(:, :, :)

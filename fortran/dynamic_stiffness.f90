@@ -48,8 +48,8 @@ contains
   !> outputs       DOFs of the response, shape (n_out), counted from 1
   !> inputs        DOFs of the force, shape (n_in), counted from 1
   !> h             receptance, shape (n_out, n_in, n_freq), m/N
-  subroutine receptance_dense(transposed, omega, stiffness, mass, damping, structural, loss_factor, outputs, inputs, h, &
-                              line_info, rcond, info)
+  subroutine receptance_dense(transposed, omega, stiffness, mass, damping, structural, loss_factor, outputs, inputs, &
+                              h, line_info, rcond, info)
     logical, intent(in) :: transposed
     real(dp), contiguous, target, intent(in) :: omega(:), stiffness(:, :), mass(:, :), damping(:, :), structural(:, :)
     real(dp), intent(in) :: loss_factor
@@ -63,7 +63,8 @@ contains
 
     n = size(stiffness, 1)
     n_in = size(inputs)
-    call set_model(operation, transposed, n, omega, stiffness, mass, damping, structural, loss_factor, outputs, inputs, h)
+    call set_model(operation, transposed, n, omega, stiffness, mass, damping, structural, loss_factor, outputs, inputs, &
+                   h)
     operation%n_complex = n*n + n*n_in + size(outputs)*n_in + inverse_work(n)
     operation%n_real = 2*n
     operation%n_pivot = n
@@ -91,7 +92,8 @@ contains
 
     n = size(stiffness, 2)
     n_in = size(inputs)
-    call set_model(operation, transposed, n, omega, stiffness, mass, damping, structural, loss_factor, outputs, inputs, h)
+    call set_model(operation, transposed, n, omega, stiffness, mass, damping, structural, loss_factor, outputs, inputs, &
+                   h)
     operation%kl = kl
     operation%ku = ku
     operation%n_complex = (2*kl + ku + 1)*n + n*n_in + size(outputs)*n_in + 2*n

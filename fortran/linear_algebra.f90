@@ -26,7 +26,7 @@ module jointfrf_linear_algebra
 
 contains
 
-  !> Inverse of every line. The order of storage does not matter: the inverse of the transpose is the transposed inverse.
+  !> Inverse of every line. The order of storage does not matter: transposing and inverting commute.
   !> a           matrices, shape (n, n, n_freq)
   !> a_inverse   their inverses, same shape
   subroutine invert(a, a_inverse, line_info, rcond, info)

@@ -1,5 +1,5 @@
-!> Receptances of a locally modified structure (2.31)-(2.36), and the modification that turns one set of receptances into
-!> another (2.40), (2.47).
+!> Receptances of a locally modified structure (2.31)-(2.36), and the modification that turns one set of receptances
+!> into another (2.40), (2.47).
 module jointfrf_modification
   use jointfrf_kinds, only: dp, ip
   use jointfrf_line_layout, only: all_finite, load, store, subtract

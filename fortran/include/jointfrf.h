@@ -1,10 +1,11 @@
 /* jointfrf: the flat face of the kernel for C and C++. The same symbols serve FORTRAN 77, modern Fortran and Python.
  *
- * Every argument is passed by address, also of what is not read: no NULL. Arrays are as C writes them with trans = "T": h[freq][out][in]. DOFs count from 1.
+ * Every argument is passed by address, also of what is not read: no NULL. Arrays are as C writes them with trans = "T":
+ * h[freq][out][in]. DOFs count from 1.
  * What each argument means, its shape and unit stands in fortran/api.F90 at the routine of the same name.
  *
- * jf_complex is two doubles, real part first: double complex in C99, std::complex<double> in C++. Define JF_COMPLEX before
- * including this header to use a type of your own of that layout.
+ * jf_complex is two doubles, real part first: double complex in C99, std::complex<double> in C++. Define JF_COMPLEX
+ * before including this header to use a type of your own of that layout.
  */
 #ifndef JOINTFRF_H
 #define JOINTFRF_H
