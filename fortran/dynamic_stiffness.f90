@@ -63,8 +63,8 @@ contains
 
     n = size(stiffness, 1)
     n_in = size(inputs)
-    call set_model(operation, transposed, n, omega, stiffness, mass, damping, structural, loss_factor, outputs, inputs, &
-                   h)
+    call set_model(operation, transposed, n, omega, stiffness, mass, damping, structural, loss_factor, outputs, &
+                   inputs, h)
     operation%n_complex = n*n + n*n_in + size(outputs)*n_in + inverse_work(n)
     operation%n_real = 2*n
     operation%n_pivot = n
@@ -92,8 +92,8 @@ contains
 
     n = size(stiffness, 2)
     n_in = size(inputs)
-    call set_model(operation, transposed, n, omega, stiffness, mass, damping, structural, loss_factor, outputs, inputs, &
-                   h)
+    call set_model(operation, transposed, n, omega, stiffness, mass, damping, structural, loss_factor, outputs, &
+                   inputs, h)
     operation%kl = kl
     operation%ku = ku
     operation%n_complex = (2*kl + ku + 1)*n + n*n_in + size(outputs)*n_in + 2*n
