@@ -38,6 +38,8 @@ Cross = Literal["zero", "ignore", "fit"]
 #: The first linearisation uses the mean of this many lines on either side, without the line itself: weights must not
 #: follow the noise they weigh.
 _NEIGHBOURS = 2
+#: Beyond this share of the size of a rigid joint, or below zero, a parameter may have run off.
+_RAN_OFF = 1e-8
 _OUTER, _INNER = 40, 60
 _SMALL_STEP = 1e-3
 #: A stiffness stops growing when its compliance is this share of the error that 100 % noise would leave.
@@ -203,8 +205,8 @@ def estimate(
         weight = _weights(covariance.reshape(r, n_freq, chosen.size, chosen.size), blocked)
         if theta is None:
             theta, limit = _start(linear, weight, basis, chosen, n)
-            starts = [theta, _mean_start(linear, weight, theta.shape, chosen, n)]
-            theta = _best_of(starts, limit, linear, weight, model)
+            starts = [_mean_start(linear, weight, theta.shape, chosen, n), theta]
+            theta = _from_starts(starts, limit, linear, weight, model)
         before = theta
         theta, information, residual = _gauss_newton(theta, limit, linear, weight, model)
         scatter = _inverse(2 * information)
@@ -377,14 +379,26 @@ def _mean_start(
     return theta
 
 
-def _best_of(
+def _from_starts(
     starts: Sequence[FloatArray], limit: FloatArray, linear: ComplexArray, weight: ComplexArray, model: _JointModel
 ) -> FloatArray:
-    """Minimise from several starts; of each realisation keep the lowest minimum."""
-    found = [_gauss_newton(start, limit, linear, weight, model) for start in starts]
-    costs = [(left.conj() * (weight @ left[..., None])[..., 0]).real.sum(axis=(1, 2)) for _, _, left in found]
-    best = np.argmin(np.where(np.isfinite(costs), costs, np.inf), axis=0)
-    theta: FloatArray = np.stack([theta for theta, _, _ in found])[best, np.arange(best.size)]
+    """Minimise from the first start; where a parameter runs off towards a rigid joint also from the others.
+
+    Of each realisation the lowest minimum is kept.
+    """
+
+    def minimum(start: FloatArray, which: NDArray[np.intp]) -> tuple[FloatArray, FloatArray]:
+        theta, _, left = _gauss_newton(start[which], limit[which], linear[which], weight[which], model)
+        cost = (left.conj() * (weight[which] @ left[..., None])[..., 0]).real.sum(axis=(1, 2))
+        return theta, np.where(np.isfinite(cost), cost, np.inf)
+
+    theta, cost = minimum(starts[0], np.arange(len(linear)))
+    ran_off = np.flatnonzero(~((theta >= 0) & (theta < _RAN_OFF * limit)).all(axis=1))
+    for start in starts[1:] if ran_off.size else ():
+        other, other_cost = minimum(start, ran_off)
+        lower = other_cost < cost[ran_off]
+        theta[ran_off[lower]] = other[lower]
+        cost[ran_off[lower]] = other_cost[lower]
     return theta
 
 

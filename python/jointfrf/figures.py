@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 import numpy as np
+from scipy.interpolate import CubicHermiteSpline
 
 from jointfrf._sweep import FloatArray
 from jointfrf.bands import Band
@@ -28,6 +29,8 @@ _METHOD_NAMES = {
 }
 #: Stiffness of the curves beside the actual one in a sensitivity figure.
 _VARIED = ((0.5, "low"), (2.0, "high"))
+#: Points of a mode shape on each beam; elements bend cubically between their nodes.
+_SHAPE_POINTS = 100
 #: Noise levels side by side.
 _MOST_LEVELS = 3
 #: How much room curves get around the values that matter.
@@ -81,8 +84,13 @@ def _modes(result: CaseResult) -> Iterator[Figure]:
         curves = []
         for side, x in positions.items():
             # A node without DOFs is clamped.
-            y = np.array([shape.get(f"{side}/{node + 1}:y", 0.0) for node in range(x.size)]) / largest
-            curves.append(Curve(f"beam {side}", x, y, "actual" if side == "A" else "high"))
+            y, theta = (
+                np.array([shape.get(f"{side}/{node + 1}:{direction}", 0.0) for node in range(x.size)]) / largest
+                for direction in ("y", "theta")
+            )
+            fine = np.linspace(x[0], x[-1], max(_SHAPE_POINTS, x.size))
+            deflection = CubicHermiteSpline(x, y, theta)(fine)
+            curves.append(Curve(f"beam {side}", fine, deflection, "actual" if side == "A" else "high"))
         panels.append(Panel(f"mode {mode + 1}: {freq:.1f} Hz", "x, m", "deflection, relative", tuple(curves)))
     yield _figure(result, "modes", "Mode shapes of the assembly", panels, 2)
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from scipy import linalg, sparse
@@ -185,6 +186,8 @@ def compute(
         for parameter, change in zip(found.parameters, found.change, strict=True)
     }
     identified = run_study(case, exact, count, pool, progress)
-    regenerated = [_regenerated(exact, found, point) for found in identified for point in "rs"]
+    # Without the lines, which are large and not needed there.
+    slim = [replace(found, k_lines=found.k_lines[:0]) for found in identified for _ in "rs"]
+    regenerated = list((map if pool is None else pool.map)(partial(_regenerated, exact), slim, "rs" * len(identified)))
     errors = noise_free_errors(exact, case.joint.dynamic_stiffness(case.freq_hz))
     return CaseResult(case, exact, count, modes, sensitivities, proposals, identified, regenerated, errors)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import warnings
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
@@ -211,8 +212,13 @@ def workers(jobs: int) -> Iterator[Executor | None]:
     before = {name: os.environ.get(name) for name in single}
     os.environ.update(single)
     try:
-        with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
+        # An interrupt goes to the process that waits for the others.
+        ignore = (signal.SIGINT, signal.SIG_IGN)
+        pool = ProcessPoolExecutor(jobs, get_context("spawn"), initializer=signal.signal, initargs=ignore)
+        try:
             yield pool
+        finally:
+            pool.shutdown(cancel_futures=True)
     finally:
         for name, value in before.items():
             if value is None:
@@ -296,4 +302,8 @@ def regenerate(exact: Exact, theta: FloatArray, point: str) -> ComplexArray:
         for h, dofs in ((exact.h_a, of_a), (exact.h_b, of_b))
     )  # fmt: skip
     at = n if point == "r" else 2 * n
-    return couple(h_a, h_b, k_joint, joint, joint)[:, at, at].reshape(r, n_freq)
+    with warnings.catch_warnings():
+        # Identified parameters may be absurd.
+        warnings.simplefilter("ignore", IllConditionedWarning)
+        h_c = couple(h_a, h_b, k_joint, joint, joint)
+    return h_c[:, at, at].reshape(r, n_freq)

@@ -6,6 +6,7 @@ import json
 
 import numpy as np
 import pytest
+
 from jointfrf.case_file import read_case
 from jointfrf.cases import UnknownCaseError, find_case, list_cases, run_case
 from jointfrf.results import compute
@@ -32,9 +33,7 @@ def rmse(result, noise, method, bands=None):
     """Percent, by parameter."""
     rows = identified_rows(result)
     return {
-        r.parameter: r.rmse_percent
-        for r in rows
-        if (r.noise, r.method) == (noise, method) and bands in (None, r.bands)
+        r.parameter: r.rmse_percent for r in rows if (r.noise, r.method) == (noise, method) and bands in (None, r.bands)
     }
 
 
@@ -129,7 +128,10 @@ def test_table_3_4(results):
     assert fits["5 %", "point s", "c_Fy"]
     assert fits["5 %", "point r", "k_Mtheta"]
     assert fits["10 %", "point s", "k_Mtheta"]
-    assert not any(ok for (_, _, parameter), ok in fits.items() if parameter == "c_Mtheta")
+    # The source's damping of the rotation is never reached: its band mean is not biased downwards.
+    damping = [row for row in rows if row.parameter == "c_Mtheta"]
+    assert len(damping) == 4
+    assert all(row.published < row.low < 1.5 < row.median + 0.05 for row in damping)
 
 
 def test_compliance_fit_beats_the_band_means(results):
@@ -141,7 +143,21 @@ def test_compliance_fit_beats_the_band_means(results):
         assert fit[parameter] < 1.25 * np.sqrt(3) * limit
         assert fit[parameter] < means[parameter]
     assert 8 < means["k_Fy"] < 25
-    assert 40 < means["c_Fy"]
+    assert means["c_Fy"] > 40
+
+
+@pytest.mark.parametrize(("name", "noise", "number"), [("3.3", "5 % complex", 237), ("3.2", "5 %", 148)])
+def test_compliance_fit_of_a_realisation_that_once_ran_away(name, noise, number):
+    import jointfrf as jf
+    from jointfrf.estimator import estimate, joint_basis
+
+    case = read_case(find_case(name))
+    exact = exact_frfs(case)
+    kind = next(n for n in case.noises if n.name == noise)
+    h = jf.realisations(exact.interface(exact.h_c), kind.level, kind.kind, case.seed, first=number)
+    basis = joint_basis(2 * np.pi * case.freq_hz, case.joint.dofs, "viscous", "zero")
+    theta = estimate(h, np.eye(4), basis, tolerance=0.5).theta[0]
+    np.testing.assert_allclose(theta[[0, 1, 3]], case.actual[[0, 1, 3]], rtol=0.15)
 
 
 def test_ismm_against_decoupling(results):

@@ -1,6 +1,7 @@
 """What is wrong in a case file is told in one sentence with file and key."""
 
 import pytest
+
 from jointfrf.case_file import read_case
 from jointfrf.cases import find_case
 from jointfrf.errors import FileContentError
@@ -20,7 +21,11 @@ CHANGES = [
     ('["ismm", "compliance"]', '["ismn"]', r"methods must be a list of ismm, .*, not \['ismn'\]"),
     ('["ismm", "compliance"]', "[]", r"methods must be a list"),
     ("reciprocal = false", 'reciprocal = "no"', r"reciprocal must be true or false, not 'no'"),
-    ("k_x = [[3.0, 9.0]]", "k_x = [[11.0, 12.0]]", r"\[\[bands\]\] number 1: k_x: .*11 to 12 Hz holds no frequency line"),
+    (
+        "k_x = [[3.0, 9.0]]",
+        "k_x = [[11.0, 12.0]]",
+        r"\[\[bands\]\] number 1: k_x: .*11 to 12 Hz holds no frequency line",
+    ),
     ("k_x = [[3.0, 9.0]]", "k_x = [3.0, 9.0]", r"k_x must be a list of bands \[low, high\] in Hz"),
     ("k_x = [[3.0, 9.0]]", "k_x = [[9.0, 3.0]]", r"k_x must be a list of bands"),
     ("k_x = [[3.0, 9.0]]", "", r"the key 'k_x' is missing"),
@@ -34,7 +39,11 @@ CHANGES = [
     ("masses = [5.0, 3.0]", "masses = [5.0, -3.0]", r"\[substructure_a\]: masses must name .* positive"),
     ("stiffness = [2500.0, 3500.0]", "stiffness = [2500.0]", r"\[substructure_a\]: stiffness must have shape"),
     ('ground = "start"', 'ground = "left"', r"\[substructure_a\]: ground must be one of"),
-    ('motion = "translation"', 'motion = "sideways"', r"\[\[joint\]\] number 1: motion must be one of translation, rotation"),
+    (
+        'motion = "translation"',
+        'motion = "sideways"',
+        r"\[\[joint\]\] number 1: motion must be one of translation, rotation",
+    ),
     ("damping = 3.0", "damping = -3.0", r"damping must be a number, at least 0, not -3.0"),
     ('model = "chain"', 'model = "plate"', r"model must be one of beam, chain, not 'plate'"),
     ("[study]", "[study", r"not a TOML file"),

@@ -1,19 +1,23 @@
 """Figures, reports, tables in print, and the command line."""
 
 import csv
+import dataclasses
 import io
 import re
 import subprocess
 import sys
 
-import jointfrf.cli
 import numpy as np
 import pytest
+from PIL import Image
+
+import jointfrf.cli
+from jointfrf.case_file import read_case
 from jointfrf.cases import find_case, run_case
 from jointfrf.figures import make_figures
 from jointfrf.plots import Curve, Figure, Interval, Panel, as_csv, draw, symbol
+from jointfrf.results import compute
 from jointfrf.tables import Table, as_text, number
-from PIL import Image
 
 COMMAND = [sys.executable, "-m", "jointfrf.cli"]
 
@@ -27,9 +31,17 @@ def outputs(tmp_path_factory):
     for name in ("case.toml", "expected.toml", "README.md"):
         text = (find_case("3.3.1") / name).read_text()
         text = text.replace("elements = 300", "elements = 30").replace("elements = 225", "elements = 20")
-        text = text.replace("301:", "31:").replace("151:", "16:").replace("226:", "21:").replace("step = 1.0", "step = 5.0")
+        text = (
+            text.replace("301:", "31:")
+            .replace("151:", "16:")
+            .replace("226:", "21:")
+            .replace("step = 1.0", "step = 5.0")
+        )
         (beams / name).write_text(text)
-    return {"chain": run_case(find_case("3.1"), folder, realisations=4), "beams": run_case(beams, folder, realisations=4)}
+    return {
+        "chain": run_case(find_case("3.1"), folder, realisations=4),
+        "beams": run_case(beams, folder, realisations=4),
+    }
 
 
 FIGURES = {
@@ -52,20 +64,17 @@ def test_figures_of_the_source_are_drawn(outputs, which):
             shades = np.asarray(image.convert("L"))
         assert 0.5 < (shades > 200).mean() < 0.999
         assert len(np.unique(shades)) > 30
-        rows = list(csv.DictReader((folder / f"{figure.key}.csv").open(newline="")))
+        rows = list(csv.DictReader(io.StringIO((folder / f"{figure.key}.csv").read_text())))
         points = sum(curve.x.size for panel in figure.panels for curve in panel.curves)
         assert len(rows) >= points
         assert len(rows) > 10
 
 
-@pytest.mark.parametrize(
-    ("number", "which"), [("3-16", "modes"), ("3-27", "noise")] + [(f"3-{i}", None) for i in range(17, 27)]
-)  # fmt: skip
-def test_case_3_3_names_all_its_figures(number, which):
-    from jointfrf.case_file import read_case
-
-    numbers = {n: key for key, n in read_case(find_case("3.3")).expected.figures}
-    assert numbers[number] == (which or numbers[number])
+def test_case_3_3_has_all_figures_of_the_source():
+    case = read_case(find_case("3.3"))
+    case = dataclasses.replace(case, freq_hz=case.freq_hz[::25])
+    numbers = {figure.number for figure in make_figures(compute(case, 2))} - {""}
+    assert numbers == {f"3-{i}" for i in range(16, 28)}
 
 
 def test_report_holds_every_table_and_figure_and_no_link(outputs):
@@ -159,7 +168,13 @@ def test_command_lists_cases(capsys):
 
 
 def test_command_without_or_with_wrong_words():
-    for words in ([], ["walk"], ["run", "--realisations", "0"], ["run", "--realisations", "x"], ["run", "--jobs", "-1"]):
+    for words in (
+        [],
+        ["walk"],
+        ["run", "--realisations", "0"],
+        ["run", "--realisations", "x"],
+        ["run", "--jobs", "-1"],
+    ):
         with pytest.raises(SystemExit) as stop:
             jointfrf.cli.main(words)
         assert stop.value.code == 2
