@@ -204,7 +204,7 @@ def estimate(
         linear = (at_true + u @ sweep(measured - true) @ v).reshape(r, n_freq, n * n)[..., chosen]
         weight = _weights(covariance.reshape(r, n_freq, chosen.size, chosen.size), blocked)
         if theta is None:
-            theta, limit = _start(linear, weight, basis, chosen, n)
+            theta, limit = _linear_start(linear, weight, basis, chosen, n)
             starts = [_mean_start(linear, weight, theta.shape, chosen, n), theta]
             theta = _from_starts(starts, limit, linear, weight, model)
         before = theta
@@ -329,14 +329,13 @@ def _power(residual: ComplexArray, weight: ComplexArray, blocked: NDArray[np.boo
     return power
 
 
-def _start(
+def _linear_start(
     linear: ComplexArray, weight: ComplexArray, basis: Basis, chosen: NDArray[np.intp], n: int
 ) -> tuple[FloatArray, FloatArray]:
     """First parameters, and the size at which a joint is as good as rigid: both of shape (r, p).
 
     Each DOF by itself, from K*(theta) C = 1 by weighted linear least squares, twice, the second time with the weights
-    of the first K*. Noise draws this start towards zero, from where Gauss-Newton steps climb safely; from above they
-    may fall off towards a rigid joint.
+    of the first K*. It finds damping at once, but noise draws it towards zero.
     """
     r = linear.shape[0]
     theta = np.zeros((r, len(basis.names)))
@@ -368,7 +367,10 @@ def _start(
 def _mean_start(
     linear: ComplexArray, weight: ComplexArray, shape: tuple[int, ...], chosen: NDArray[np.intp], n: int
 ) -> FloatArray:
-    """Return stiffnesses from the weighted mean of the real compliance of each DOF, everything else zero."""
+    """Return stiffnesses from the weighted mean of the real compliance of each DOF, everything else zero.
+
+    Noise does not bias it; much damping does.
+    """
     theta = np.zeros(shape)
     for d in range(n):
         at = int(np.flatnonzero(chosen == d * (n + 1))[0])
