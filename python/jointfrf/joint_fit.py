@@ -192,7 +192,8 @@ class JointFit:
         for name, value in self.parameters.items():
             low, high = intervals[name]
             between = f"{low:.4g} .. {high:.4g}"
-            rows.append((name, f"{value:.5g}", f"{errors[name]:.2g}", between, self.unit(name)))
+            is_open = name.startswith("k_") and not np.isfinite(high)
+            rows.append((name, "open" if is_open else f"{value:.5g}", f"{errors[name]:.2g}", between, self.unit(name)))
         widths = [max(len(row[i]) for row in rows) for i in range(5)]
         lines = ["  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in rows]
         lines.insert(1, "-" * len(lines[0]))

@@ -120,6 +120,7 @@ def test_a_joint_too_stiff_to_be_seen_is_said_with_its_bound(beams):
     low, high = fit.confidence_interval(0.95)["k_y"]
     assert high == np.inf
     assert 1e6 < low < 1e12
+    assert "k_y        open" in str(fit)
     assert fit.parameters["k_theta"] == pytest.approx(5e3, rel=0.05)
     json.dumps(fit.to_dict(), allow_nan=False)
 
