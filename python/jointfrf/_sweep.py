@@ -6,9 +6,10 @@ nothing is copied; results come back in C order.
 
 from __future__ import annotations
 
+import reprlib
 import warnings
 from collections.abc import Mapping, Sequence
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -29,8 +30,12 @@ __all__ = [
     "as_interface",
     "as_joint_lines",
     "as_lines",
+    "as_number",
     "as_real",
     "as_square",
+    "as_values",
+    "check_choice",
+    "optional_frequency",
     "run",
     "weights",
 ]
@@ -131,14 +136,41 @@ def as_real(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> Float
     return array
 
 
-def as_frequency(freq_hz: ArrayLike | None, n_freq: int | None = None) -> FloatArray | None:
+def as_frequency(freq_hz: ArrayLike, n_freq: int | None = None) -> FloatArray:
     """Return the frequency lines in Hz, finite and not negative."""
-    if freq_hz is None:
-        return None
     freq = as_real("freq_hz", freq_hz, (n_freq,))
     if (freq < 0).any():
         raise ValueError(f"freq_hz must not be negative: line {int(np.argmax(freq < 0))} is {freq.min():g} Hz")
     return freq
+
+
+def optional_frequency(freq_hz: ArrayLike | None, n_freq: int) -> FloatArray | None:
+    """Return the frequency lines where the caller gave them to name a bad line."""
+    return None if freq_hz is None else as_frequency(freq_hz, n_freq)
+
+
+def check_choice(name: str, value: object, known: Sequence[str]) -> None:
+    """Raise unless the value is one of the words that are known."""
+    if not isinstance(value, str) or value not in known:
+        raise ValueError(f"{name} must be one of {', '.join(known)}, not {reprlib.repr(value)}")
+
+
+def as_number(name: str, value: object) -> float:
+    """Return one finite real number."""
+    if isinstance(value, str | bytes) or np.ndim(value) or np.asarray(value).dtype.kind not in "biuf":  # type: ignore[arg-type]
+        raise TypeError(f"{name} must be one real number, not {reprlib.repr(value)}")
+    number = float(value)  # type: ignore[arg-type]
+    if not np.isfinite(number):
+        raise ValueError(f"{name} must be finite, not {number}")
+    return number
+
+
+def as_values(name: str, value: ArrayLike, n: int) -> ComplexArray:
+    """Return n complex numbers."""
+    array: ComplexArray = _converted(name, value, np.complex128)
+    if array.shape != (n,):
+        raise ValueError(f"{name} must have one value for each of the {n} lines, not shape {array.shape}")
+    return array
 
 
 def as_dofs(name: str, dofs: ArrayLike, n: int, *, unique: bool = True) -> NDArray[np.int32]:
@@ -232,8 +264,7 @@ def run(
     result : ndarray, shape `shape`
     status : LineStatus
     """
-    if on_singular not in ("raise", "nan"):
-        raise ValueError(f"on_singular must be 'raise' or 'nan', not {on_singular!r}")
+    check_choice("on_singular", on_singular, get_args(OnSingular))
     n_freq = shape[0]
     result = np.empty(shape, np.complex128)
     status = LineStatus(np.zeros(n_freq, np.int32), np.ones(n_freq))

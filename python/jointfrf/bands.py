@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import reprlib
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from jointfrf._sweep import ComplexArray, FloatArray, as_dofs, as_frequency, as_square
+from jointfrf._sweep import ComplexArray, FloatArray, as_dofs, as_frequency, as_square, as_values
 from jointfrf.joint import Joint
 
 __all__ = ["Band", "BandMean", "Sensitivity", "as_bands", "band_mean", "in_bands", "propose_bands", "sensitivity"]
@@ -42,17 +43,25 @@ def in_bands(freq_hz: ArrayLike, bands: Sequence[Band]) -> NDArray[np.bool_]:
     [False, True, True, False]
     """
     freq = as_frequency(freq_hz)
-    assert freq is not None
     inside = np.zeros(freq.size, bool)
-    for band in bands:
-        if np.shape(band) != (2,) or not (0 <= band[0] <= band[1] < np.inf):
-            raise ValueError(f"a band must be (low, high) in Hz with 0 <= low <= high, not {band!r}")
-        here = (freq >= band[0]) & (freq <= band[1])
+    for low, high in _pairs(bands):
+        here = (freq >= low) & (freq <= high)
         if not here.any():
             extent = f"they run from {freq.min():g} to {freq.max():g} Hz" if freq.size else "there are none"
-            raise ValueError(f"the band {band[0]:g} to {band[1]:g} Hz holds no frequency line; {extent}")
+            raise ValueError(f"the band {low:g} to {high:g} Hz holds no frequency line; {extent}")
         inside |= here
     return inside
+
+
+def _pairs(bands: object) -> list[Band]:
+    """Return bands as pairs of numbers."""
+    try:
+        pairs = [(float(low), float(high)) for low, high in bands]  # type: ignore[attr-defined]
+    except (TypeError, ValueError):
+        pairs = [(np.nan, np.nan)]
+    if not all(0 <= low <= high < np.inf for low, high in pairs):
+        raise ValueError(f"a band must be (low, high) in Hz with 0 <= low <= high, not {reprlib.repr(bands)}")
+    return pairs
 
 
 def as_bands(
@@ -89,9 +98,10 @@ def as_bands(
     def several(entry: Band | Sequence[Band] | None) -> list[Band]:
         if entry is None:
             return [(float(freq_hz.min(initial=np.inf)), float(freq_hz.max(initial=0)))]
-        pairs = [entry] if np.ndim(entry) == 1 and len(entry) == 2 else list(entry)
-        in_bands(freq_hz, pairs)  # type: ignore[arg-type]
-        return [(float(pair[0]), float(pair[1])) for pair in pairs]  # type: ignore[index]
+        single = isinstance(entry, Sequence | np.ndarray) and len(entry) == 2 and all(np.ndim(x) == 0 for x in entry)
+        pairs = _pairs([entry] if single else entry)
+        in_bands(freq_hz, pairs)
+        return pairs
 
     if not isinstance(bands, Mapping):
         return [several(bands)] * len(dofs)
@@ -157,7 +167,6 @@ def band_mean(
     lines = as_square("k_joint", k_joint)
     n_freq, n, _ = lines.shape
     freq = as_frequency(freq_hz, n_freq)
-    assert freq is not None
     names = [str(i) for i in range(n)] if dofs is None else list(dofs)
     if len(names) != n:
         raise ValueError(f"dofs must name {n} DOFs, not {len(names)}")
@@ -243,7 +252,8 @@ def sensitivity(
     lines = as_square("h_c", h_c)
     n_freq, n, _ = lines.shape
     freq = as_frequency(freq_hz, n_freq)
-    assert freq is not None
+    if not isinstance(joint, Joint):
+        raise TypeError(f"joint must be a Joint, not {type(joint).__name__}")
     n_j = len(joint.dofs)
     j, k = (as_dofs(name, d, n) - 1 for name, d in (("dofs_j", dofs_j), ("dofs_k", dofs_k)))
     if not j.size == k.size == n_j:
@@ -293,10 +303,9 @@ def propose_bands(
     [(30.0, 60.0)]
     """
     freq = as_frequency(freq_hz)
-    assert freq is not None
-    level = abs(np.asarray(change))
-    if level.shape != freq.shape or freq.size < 2 or (np.diff(freq) <= 0).any():
-        raise ValueError("freq_hz must increase and change must have one value for each line")
+    level = abs(as_values("change", change, freq.size))
+    if freq.size < 2 or (np.diff(freq) <= 0).any():
+        raise ValueError("freq_hz must hold at least two lines and increase")
     extent = freq[-1] - freq[0]
     power = level**2
     first = np.searchsorted(freq, freq - smooth * extent / 2)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import reprlib
 from typing import Literal, get_args
 
 import numpy as np
 from scipy import sparse
 
-from jointfrf._sweep import FloatArray
+from jointfrf._sweep import FloatArray, check_choice
 from jointfrf.model import Model
 
 __all__ = ["BeamElement", "End", "beam"]
@@ -83,10 +84,11 @@ def beam(
     >>> round(float(model.natural_frequencies(1)[0]), 2)
     53.65
     """
-    if element not in get_args(BeamElement):
-        raise ValueError(f"element must be one of {', '.join(get_args(BeamElement))}, not {element!r}")
-    if len(ends) != 2 or any(end not in get_args(End) for end in ends):
-        raise ValueError(f"ends must be two of {', '.join(get_args(End))}, not {ends!r}")
+    check_choice("element", element, get_args(BeamElement))
+    if not isinstance(ends, tuple | list) or len(ends) != 2:
+        raise ValueError(f"ends must be two of {', '.join(get_args(End))}, not {reprlib.repr(ends)}")
+    for end in ends:
+        check_choice("ends", end, get_args(End))
     sizes = {"length": length, "youngs_modulus": youngs_modulus, "density": density, "width": width, "height": height}
     for name, value in sizes.items():
         if not (np.isfinite(value) and value > 0):

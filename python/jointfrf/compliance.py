@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from jointfrf._sweep import ComplexArray, OnSingular, as_frequency, as_interface, as_real, run
+from jointfrf._sweep import ComplexArray, OnSingular, as_interface, as_real, optional_frequency, run
 
 __all__ = ["compliance_covariance", "compliance_factors", "joint_compliance"]
 
@@ -46,7 +46,7 @@ def joint_compliance(
     """
     measured, n = as_interface("gamma", gamma)
     n_freq = measured.shape[0]
-    freq = as_frequency(freq_hz, n_freq)
+    freq = optional_frequency(freq_hz, n_freq)
     return run("joint_compliance", (n, n_freq, measured), (n_freq, n, n), {"gamma": measured}, freq, on_singular)[0]
 
 
@@ -96,7 +96,7 @@ def compliance_factors(
     n_freq = mean.shape[0]
     t = as_real("transform", np.eye(2 * n) if transform is None else transform, (2 * n, None))
     m = t.shape[1]
-    freq = as_frequency(freq_hz, n_freq)
+    freq = optional_frequency(freq_hz, n_freq)
     args = (n, m, n_freq, mean, t)
     factors = run("compliance_factors", args, (n_freq, 2 * n, m), {"gamma": mean}, freq, on_singular)[0]
     return factors[:, :n], factors[:, n:].swapaxes(1, 2)
@@ -154,6 +154,6 @@ def compliance_covariance(
     spread = as_real("variance", variance, (n_freq, m, m))
     if (spread < 0).any():
         raise ValueError("variance must not be negative")
-    freq = as_frequency(freq_hz, n_freq)
+    freq = optional_frequency(freq_hz, n_freq)
     args = (int(reciprocal), n, m, n_freq, mean, t, spread)
     return run("compliance_covariance", args, (n_freq, n * n, n * n), {"gamma": mean}, freq, on_singular)[0]

@@ -8,9 +8,9 @@ from jointfrf._sweep import (
     ComplexArray,
     OnSingular,
     as_dofs,
-    as_frequency,
     as_joint_lines,
     as_square,
+    optional_frequency,
     run,
 )
 
@@ -78,7 +78,7 @@ def couple(
     if j.size != k.size or j.size == 0:
         raise ValueError(f"dofs_a and dofs_b must name the same number of DOFs, at least one: {j.size} and {k.size}")
     joint = as_joint_lines("k_joint", k_joint, j.size, n_freq)
-    freq = as_frequency(freq_hz, n_freq)
+    freq = optional_frequency(freq_hz, n_freq)
     args = (n_a, n_b, j.size, n_freq, a, b, joint, j, k)
     shape = (n_freq, n_a + n_b, n_a + n_b)
     return run("couple", args, shape, {"h_a": a, "h_b": b, "k_joint": joint}, freq, on_singular)[0]

@@ -7,7 +7,16 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from jointfrf._sweep import ComplexArray, OnSingular, as_dofs, as_frequency, as_lines, as_square, run
+from jointfrf._sweep import (
+    ComplexArray,
+    OnSingular,
+    as_dofs,
+    as_lines,
+    as_square,
+    check_choice,
+    optional_frequency,
+    run,
+)
 
 __all__ = ["Equation", "decouple"]
 
@@ -70,8 +79,7 @@ def decouple(
     >>> jf.decouple("rr", a, b, c[:, :1, :1], [1], [0], dofs_r=[0]).real.round(10).tolist()
     [[[3.0]]]
     """
-    if equation not in get_args(Equation):
-        raise ValueError(f"equation must be one of {', '.join(get_args(Equation))}, not {equation!r}")
+    check_choice("equation", equation, get_args(Equation))
     a = as_square("h_a", h_a)
     n_freq, n_a, _ = a.shape
     b = as_square("h_b", h_b, n_freq)
@@ -93,6 +101,6 @@ def decouple(
             raise ValueError(f"dofs_{point} must name {n} DOFs, as many as the joint has, not {where.size}")
         internal.append(where)
     c = as_lines("h_c", h_c, n, n, n_freq)
-    freq = as_frequency(freq_hz, n_freq)
+    freq = optional_frequency(freq_hz, n_freq)
     args = (equation, n_a, n_b, n, n_freq, a, b, c, j, k, *internal)
     return run("decouple", args, (n_freq, n, n), {"h_a": a, "h_b": b, "h_c": c}, freq, on_singular)[0]

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
-from jointfrf._sweep import FloatArray, as_real
+from jointfrf._sweep import FloatArray, as_real, check_choice
 from jointfrf.model import Model
 
 __all__ = ["Ground", "chain"]
@@ -55,8 +55,7 @@ def chain(
     >>> jf.chain([5, 3], [2500, 3500], ground="start").stiffness.toarray().tolist()
     [[6000.0, -3500.0], [-3500.0, 3500.0]]
     """
-    if ground not in get_args(Ground):
-        raise ValueError(f"ground must be one of {', '.join(get_args(Ground))}, not {ground!r}")
+    check_choice("ground", ground, get_args(Ground))
     m = as_real("masses", masses, (None,))
     if m.size == 0 or (m <= 0).any():
         raise ValueError("masses must name at least one mass, all positive")

@@ -10,7 +10,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from jointfrf._sweep import ComplexArray, FloatArray, as_frequency, as_real, as_square
+from jointfrf._sweep import ComplexArray, FloatArray, as_frequency, as_real, as_square, check_choice
 from jointfrf.bands import Band, as_bands, band_mean, in_bands
 from jointfrf.decoupling import Equation, decouple
 from jointfrf.errors import ConvergenceWarning, IdentificationWarning
@@ -151,11 +151,9 @@ def identify(
     >>> bool(low < 2000 < high), bool(abs(fit.stiffness[0] / 2000 - 1) < 0.01)
     (True, True)
     """
-    if method not in get_args(Method):
-        raise ValueError(f"method must be one of {', '.join(get_args(Method))}, not {method!r}")
+    check_choice("method", method, get_args(Method))
     measured = as_square("gamma", gamma)
     freq = as_frequency(freq_hz, measured.shape[0])
-    assert freq is not None
     if freq.size == 0:
         raise ValueError("gamma has no frequency lines")
     broken = np.flatnonzero(~np.isfinite(measured).all(axis=(1, 2)))
@@ -243,10 +241,8 @@ def _by_compliance(
 ) -> JointFit:
     t = _as_transform(transform, measured)
     names = _as_names(dofs, t.shape[0] // 2)
-    if damping not in (*get_args(Damping), "auto"):
-        raise ValueError(f"damping must be one of {', '.join(get_args(Damping))}, auto, not {damping!r}")
-    if cross not in get_args(Cross):
-        raise ValueError(f"cross must be one of {', '.join(get_args(Cross))}, not {cross!r}")
+    check_choice("damping", damping, (*get_args(Damping), "auto"))
+    check_choice("cross", cross, get_args(Cross))
     own = as_bands(bands, names, freq)
     used = np.stack([in_bands(freq, b) for b in own], axis=1)
     keep = np.asarray(used.any(axis=1))

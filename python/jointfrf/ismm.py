@@ -7,9 +7,9 @@ from numpy.typing import ArrayLike
 from jointfrf._sweep import (
     ComplexArray,
     OnSingular,
-    as_frequency,
     as_interface,
     as_joint_lines,
+    optional_frequency,
     run,
 )
 
@@ -65,7 +65,7 @@ def ismm(
     if m != n:
         raise ValueError(f"gamma must have the shape of alpha, {calculated.shape}, not {measured.shape}")
     first = as_joint_lines("k_initial", k_initial, n, n_freq)
-    freq = as_frequency(freq_hz, n_freq)
+    freq = optional_frequency(freq_hz, n_freq)
     sweeps = {"alpha": calculated, "gamma": measured, "k_initial": first}
     return run("ismm", (n, n_freq, calculated, measured, first), first.shape, sweeps, freq, on_singular)[0]
 
@@ -105,6 +105,6 @@ def inverse_substructuring(
     """
     measured, n = as_interface("gamma", gamma)
     n_freq = measured.shape[0]
-    freq = as_frequency(freq_hz, n_freq)
+    freq = optional_frequency(freq_hz, n_freq)
     shape = (n_freq, n, n)
     return run("inverse_substructuring", (n, n_freq, measured), shape, {"gamma": measured}, freq, on_singular)[0]

@@ -85,7 +85,6 @@ class Joint:
             N/m, rotational N m/rad.
         """
         freq = as_frequency(freq_hz)
-        assert freq is not None
         omega = 2 * np.pi * freq[:, None, None]
         static = self.stiffness * (1 + 1j * np.sqrt(np.outer(self.loss_factor, self.loss_factor)))
         return static + 1j * omega * self.damping

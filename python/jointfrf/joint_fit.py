@@ -135,7 +135,6 @@ class JointFit:
             N/m, rotational N m/rad.
         """
         freq = as_frequency(freq_hz)
-        assert freq is not None
         factors = {"k": np.ones(freq.size), "h": np.full(freq.size, 1j), "c": 2j * np.pi * freq}
         result = np.zeros((freq.size, len(self.dofs), len(self.dofs)), np.complex128)
         for name, value in self.parameters.items():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from numpy.typing import ArrayLike
 
-from jointfrf._sweep import ComplexArray, FloatArray, OnSingular, as_frequency, as_lines, as_square, run
+from jointfrf._sweep import ComplexArray, FloatArray, OnSingular, as_lines, as_square, optional_frequency, run
 
 __all__ = ["invert", "reciprocal_condition", "solve"]
 
@@ -45,7 +45,7 @@ def invert(a: ArrayLike, *, freq_hz: ArrayLike | None = None, on_singular: OnSin
     """
     lines = as_square("a", a)
     n_freq, n, _ = lines.shape
-    freq = as_frequency(freq_hz, n_freq)
+    freq = optional_frequency(freq_hz, n_freq)
     return run("invert", (n, n_freq, lines), lines.shape, {"a": lines}, freq, on_singular)[0]
 
 
@@ -105,6 +105,6 @@ def solve(
     lines = as_square("a", a)
     n_freq, n, _ = lines.shape
     right = as_lines("b", b, n, None, n_freq)
-    freq = as_frequency(freq_hz, n_freq)
+    freq = optional_frequency(freq_hz, n_freq)
     args = (n, right.shape[2], n_freq, lines, right)
     return run("solve", args, right.shape, {"a": lines, "b": right}, freq, on_singular)[0]

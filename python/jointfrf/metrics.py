@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from jointfrf._sweep import FloatArray, as_frequency
+from jointfrf._sweep import FloatArray, as_frequency, as_values
 from jointfrf.bands import Band, in_bands
 
 __all__ = ["amplitude_error", "frequency_error", "peak"]
@@ -42,10 +42,7 @@ def peak(h: ArrayLike, freq_hz: ArrayLike, band: Band | None = None, *, refine: 
     (4.0, 11.0)
     """
     freq = as_frequency(freq_hz)
-    assert freq is not None
-    amplitude: FloatArray = abs(np.asarray(h))
-    if amplitude.shape != freq.shape:
-        raise ValueError(f"h must have one value for each of the {freq.size} lines, not shape {amplitude.shape}")
+    amplitude: FloatArray = np.abs(as_values("h", h, freq.size))
     if not np.isfinite(amplitude).all():
         raise ValueError(f"h holds NaN or Inf in line {int(np.argmin(np.isfinite(amplitude)))}")
     inside = np.arange(freq.size) if band is None else np.flatnonzero(in_bands(freq, [band]))

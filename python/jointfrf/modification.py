@@ -8,9 +8,9 @@ from jointfrf._sweep import (
     ComplexArray,
     OnSingular,
     as_dofs,
-    as_frequency,
     as_joint_lines,
     as_square,
+    optional_frequency,
     run,
 )
 
@@ -66,7 +66,7 @@ def modify(
     if where.size == 0:
         raise ValueError("dofs must name at least one DOF")
     added = as_joint_lines("d", d, where.size, n_freq)
-    freq = as_frequency(freq_hz, n_freq)
+    freq = optional_frequency(freq_hz, n_freq)
     args = (n, where.size, n_freq, before, added, where)
     return run("modify", args, before.shape, {"alpha": before, "d": added}, freq, on_singular)[0]
 
@@ -108,6 +108,6 @@ def find_modification(
     after = as_square("gamma", gamma, n_freq)
     if after.shape != before.shape:
         raise ValueError(f"gamma must have the shape of alpha, {before.shape}, not {after.shape}")
-    freq = as_frequency(freq_hz, n_freq)
+    freq = optional_frequency(freq_hz, n_freq)
     sweeps = {"alpha": before, "gamma": after}
     return run("find_modification", (n, n_freq, before, after), before.shape, sweeps, freq, on_singular)[0]

@@ -7,7 +7,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from jointfrf._sweep import ComplexArray, FloatArray, as_lines
+from jointfrf._sweep import ComplexArray, FloatArray, as_lines, as_number, check_choice
 
 __all__ = ["NoiseKind", "NoiseReference", "pollute", "realisations"]
 
@@ -119,11 +119,9 @@ def realisations(
     """
     lines = as_lines("h", h)
     n_freq, n_out, n_in = lines.shape
-    if kind not in get_args(NoiseKind):
-        raise ValueError(f"kind must be one of {', '.join(get_args(NoiseKind))}, not {kind!r}")
-    if relative_to not in get_args(NoiseReference):
-        raise ValueError(f"relative_to must be one of {', '.join(get_args(NoiseReference))}, not {relative_to!r}")
-    if not (np.isfinite(level) and level >= 0):
+    check_choice("kind", kind, get_args(NoiseKind))
+    check_choice("relative_to", relative_to, get_args(NoiseReference))
+    if as_number("level", level) < 0:
         raise ValueError(f"level must be 0 or positive, not {level}")
     if reciprocal and n_out != n_in:
         raise ValueError(f"reciprocal noise needs square matrices, not {n_out} x {n_in}")

@@ -8,7 +8,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import linalg, sparse
 
-from jointfrf._sweep import ComplexArray, FloatArray, OnSingular, as_dofs, as_frequency, as_real, run
+from jointfrf._sweep import (
+    ComplexArray,
+    FloatArray,
+    OnSingular,
+    as_dofs,
+    as_frequency,
+    as_number,
+    as_real,
+    check_choice,
+    run,
+)
 
 __all__ = ["Method", "receptance"]
 
@@ -82,10 +92,8 @@ def receptance(
     >>> jf.receptance([0.0], [[2.0]], [[1.0]], loss_factor=1.0).tolist()
     [[[(0.25-0.25j)]]]
     """
-    if method not in get_args(Method):
-        raise ValueError(f"method must be one of {', '.join(get_args(Method))}, not {method!r}")
+    check_choice("method", method, get_args(Method))
     freq = as_frequency(freq_hz)
-    assert freq is not None
     omega = 2 * np.pi * freq
     matrices = {
         "stiffness": stiffness,
@@ -93,15 +101,14 @@ def receptance(
         "damping": damping,
         "structural_damping": structural_damping,
     }
-    if np.ndim(loss_factor) or not np.isfinite(loss_factor):
-        raise ValueError(f"loss_factor must be one finite number, not {loss_factor}")
+    eta = as_number("loss_factor", loss_factor)
     n = _check_square(matrices)
     out = as_dofs("outputs", np.arange(n) if outputs is None else outputs, n, unique=False)
     into = as_dofs("inputs", np.arange(n) if inputs is None else inputs, n, unique=False)
     if method == "auto":
         method = "banded" if _has_band(matrices, n) else "dense"
     chosen = {"dense": _dense, "banded": _banded, "modal": _modal}[method]
-    return chosen(freq, omega, matrices, float(loss_factor), out, into, on_singular)
+    return chosen(freq, omega, matrices, eta, out, into, on_singular)
 
 
 def _check_square(matrices: dict[str, Matrix]) -> int:

@@ -11,9 +11,10 @@ from jointfrf._sweep import (
     ComplexArray,
     FloatArray,
     OnSingular,
-    as_frequency,
     as_lines,
+    as_number,
     as_real,
+    optional_frequency,
     run,
     weights,
 )
@@ -49,9 +50,9 @@ def difference_weights(spacing: float | ArrayLike) -> FloatArray:
     [[0.5, 0.5], [-50.0, 50.0]]
     """
     if np.ndim(spacing) == 0:
-        step = float(spacing)  # type: ignore[arg-type]
-        if not (np.isfinite(step) and step > 0):
-            raise ValueError(f"spacing must be positive and finite, not {step:g} m")
+        step = as_number("spacing", spacing)
+        if step <= 0:
+            raise ValueError(f"spacing must be positive, not {step:g} m")
         spacing = np.array([-step, 0.0, step])
     offset = as_real("spacing", spacing, (None,))
     if offset.size < 2:
@@ -149,7 +150,7 @@ def transform(
     n_freq, m_out, m_in = lines.shape
     left = as_real("t_out", t_out, (None, m_out))
     right = as_real("t_in", t_in, (None, m_in))
-    freq = as_frequency(freq_hz, n_freq)
+    freq = optional_frequency(freq_hz, n_freq)
     n_out, n_in = left.shape[0], right.shape[0]
     args = (n_out, n_in, m_out, m_in, n_freq, lines, left, right)
     return run("transform", args, (n_freq, n_out, n_in), {"h": lines}, freq, on_singular)[0]

@@ -89,7 +89,7 @@ def test_no_level_no_noise():
         (dict(kind="white"), "kind must be one of"),
         (dict(relative_to="peak"), "relative_to must be one of"),
         (dict(level=-0.1), "level must be 0 or positive"),
-        (dict(level=np.nan), "level must be 0 or positive"),
+        (dict(level=np.nan), "level must be finite"),
         (dict(block=3), "block 3 does not divide"),
         (dict(h=H[:, :1], reciprocal=True), "reciprocal noise needs square matrices"),
     ],
