@@ -8,12 +8,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import linalg, sparse
+from scipy.sparse import linalg as sparse_linalg
 
 from jointfrf._sweep import ComplexArray, FloatArray
 from jointfrf.joint import Joint
 from jointfrf.receptance import Method, receptance
 
 __all__ = ["Model", "assemble"]
+
+#: Up to this size all modes are computed, beyond it only those asked for.
+_DENSE_LIMIT = 50
+#: -(2 pi 1 Hz)^2
+_SHIFT = -((2 * np.pi) ** 2)
 
 
 @dataclass(frozen=True)
@@ -95,11 +101,33 @@ class Model:
         ndarray, shape (count,)
             Hz.
         """
-        k, m = (sparse.csr_array(a).toarray() for a in (self.stiffness, self.mass))
-        last = len(self.dofs) if count is None else min(count, len(self.dofs))
-        squared = linalg.eigh(k, m, eigvals_only=True, subset_by_index=(0, last - 1))
-        frequencies: FloatArray = np.sqrt(np.maximum(squared, 0)) / (2 * np.pi)
-        return frequencies
+        return self.modes(count)[0]
+
+    def modes(self, count: int | None = None) -> tuple[FloatArray, FloatArray]:
+        """Undamped natural frequencies, lowest first, and their shapes.
+
+        Parameters
+        ----------
+        count : int, optional
+            How many; all by default.
+
+        Returns
+        -------
+        freq_hz : ndarray, shape (count,)
+            Hz; about 0 for a rigid-body motion.
+        shapes : ndarray, shape (n, count)
+            Unit modal masses, 1/sqrt(kg).
+        """
+        n = len(self.dofs)
+        k, m = sparse.csc_array(self.stiffness), sparse.csc_array(self.mass)
+        if count is None or count > n - 2 or n <= _DENSE_LIMIT:
+            squared, shapes = linalg.eigh(k.toarray(), m.toarray())
+        else:
+            # Shifted below zero, where K - shift M is regular even for a free structure; a fixed start, to repeat it.
+            squared, shapes = sparse_linalg.eigsh(k, count, m, sigma=_SHIFT, v0=np.ones(n))
+        order = np.argsort(squared)[:count]
+        freq: FloatArray = np.sqrt(np.maximum(squared[order], 0)) / (2 * np.pi)
+        return freq, shapes[:, order]
 
 
 def _block_diagonal(
