@@ -40,6 +40,9 @@ Cross = Literal["zero", "ignore", "fit"]
 _NEIGHBOURS = 2
 #: Beyond this share of the size of a rigid joint, or below zero, a parameter may have run off.
 _RAN_OFF = 1e-8
+#: A line is left out where the relative noise of gamma_jk, which has to be inverted, exceeds this: first order ends
+#: there.
+_LOST = 0.35
 _OUTER, _INNER = 40, 60
 _SMALL_STEP = 1e-3
 #: A stiffness stops growing when its compliance is this share of the error that 100 % noise would leave.
@@ -102,6 +105,8 @@ class ComplianceEstimate(NamedTuple):
         Noise level that the entries of C beside the diagonal show, or NaN where they are not used.
     compliance : ndarray, shape (r, n_freq, n, n)
         Joint compliance of each line as measured, no model of the joint.
+    lost : ndarray of bool, shape (n_freq,)
+        Lines on which gamma_jk, which has to be inverted, is lost in noise. They are left out, unless too few remain.
     iterations : int
         Linearisations done.
     converged : ndarray of bool, shape (r,)
@@ -117,6 +122,7 @@ class ComplianceEstimate(NamedTuple):
     residual_level: FloatArray
     off_diagonal: FloatArray
     compliance: ComplexArray
+    lost: NDArray[np.bool_]
     iterations: int
     converged: NDArray[np.bool_]
     line_gradient: FloatArray
@@ -170,7 +176,7 @@ def estimate(
     used : ndarray of bool, shape (n_freq, n), optional
         Lines used for each DOF; all by default.
     level : ndarray, shape (r,), optional
-        Noise level, to judge convergence.
+        Noise level, to judge convergence and lost lines; by default from the residual and from reciprocity.
     tolerance : float
         Share of its standard error by which a parameter may still move when the iteration stops.
 
@@ -188,7 +194,9 @@ def estimate(
         return array.reshape(lines + array.shape[2:])
 
     raw = joint_compliance(transform @ sweep(measured) @ transform.T, on_singular="nan").reshape(r, n_freq, n, n)
-    blocked = _blocked(used, n_freq, n)[:, chosen]
+    lost = _lost_lines(measured, transform, _level_of(h, level, variance), variance)
+    enough = np.count_nonzero(~lost) >= max(2, len(basis.names))
+    blocked = _blocked(used, lost if enough else np.zeros_like(lost), n)[:, chosen]
     model = _JointModel(basis, chosen)
     true = _neighbour_mean(measured)
     theta: FloatArray | None = None
@@ -243,6 +251,7 @@ def estimate(
         residual_level=np.sqrt(_power(residual, weight, blocked, basis)),
         off_diagonal=off,
         compliance=raw,
+        lost=lost,
         iterations=step,
         converged=converged,
         line_gradient=2 * (weighted @ residual[..., None]).real[..., 0],
@@ -274,11 +283,37 @@ def jackknife_covariance(found: ComplianceEstimate, blocks: int = 10) -> FloatAr
     return covariance
 
 
-def _blocked(used: NDArray[np.bool_] | None, n_freq: int, n: int) -> NDArray[np.bool_]:
-    """Return which entries of C are left out, shape (n_freq, n * n): those of a DOF outside its bands."""
-    if used is None:
-        return np.zeros((n_freq, n * n), bool)
-    return ~(used[:, :, None] & used[:, None, :]).reshape(n_freq, n * n)
+def _level_of(h: ComplexArray, level: FloatArray | None, variance: FloatArray | None) -> FloatArray:
+    """Noise level, shape (r,): as given, 1 for given variances, else what reciprocity shows."""
+    if level is not None:
+        return level
+    return reciprocity_noise(h) if variance is None else np.ones(len(h))
+
+
+def _lost_lines(
+    h: ComplexArray, transform: FloatArray, level: FloatArray, variance: FloatArray | None
+) -> NDArray[np.bool_]:
+    """Lines on which gamma_jk is lost in noise, shape (n_freq,), by the median over realisations.
+
+    The measure is the standard deviation of the diagonal of gamma_jk^-1 dgamma_jk: to be small against 1, whatever the
+    units.
+    """
+    n = transform.shape[0] // 2
+    spread = level[:, None, None, None] ** 2 * (abs(h) ** 2 if variance is None else variance)
+    gamma_jk = transform[:n] @ h @ transform[n:].T
+    inverse = invert(gamma_jk.reshape(-1, n, n), on_singular="nan").reshape(gamma_jk.shape)
+    weights = abs(inverse @ transform[:n]) ** 2
+    relative = np.einsum("rfap,aq,rfpq->rfa", weights, transform[n:] ** 2, spread, optimize=True)
+    lost: NDArray[np.bool_] = ~(np.median(relative.max(axis=2), axis=0) <= _LOST**2)
+    return lost
+
+
+def _blocked(used: NDArray[np.bool_] | None, lost: NDArray[np.bool_], n: int) -> NDArray[np.bool_]:
+    """Return which entries of C are left out, shape (n_freq, n * n): lost lines, DOFs outside their bands."""
+    kept = np.repeat(~lost[:, None], n, axis=1)
+    if used is not None:
+        kept &= used
+    return ~(kept[:, :, None] & kept[:, None, :]).reshape(len(lost), n * n)
 
 
 def _neighbour_mean(h: ComplexArray) -> ComplexArray:

@@ -25,7 +25,6 @@ from jointfrf.estimator import (
 )
 from jointfrf.ismm import inverse_substructuring, ismm
 from jointfrf.joint_fit import JointFit
-from jointfrf.linear_algebra import invert
 
 __all__ = ["Method", "identify"]
 
@@ -44,8 +43,6 @@ Bands = None | Band | Sequence[Band] | Mapping[str, Band | Sequence[Band]]
 _MISFIT = 1.3
 #: A parameter is called uncertain when its standard error exceeds this share of it.
 _UNCERTAIN = 0.5
-#: gamma_jk is lost where its relative noise exceeds this.
-_LOST = 0.5
 #: FRFs that differ less than this from their transpose were made reciprocal: they do not show their noise.
 _RECIPROCAL = 1e-9
 
@@ -251,7 +248,10 @@ def _by_compliance(
 
     def fit(kind: Damping) -> ComplianceEstimate:
         basis = joint_basis(2 * np.pi * freq, names, kind, cross)
-        return estimate(measured[None], t, basis, variance=variance, reciprocal=reciprocal, cross=cross, used=used)
+        return estimate(
+            measured[None], t, basis, variance=variance, reciprocal=reciprocal, cross=cross, used=used,
+            level=np.array([level]) if level > 0 else None,
+        )  # fmt: skip
 
     notes: list[str] = []
     if damping == "auto":
@@ -276,12 +276,14 @@ def _by_compliance(
         k_lines=k_lines,
         bands=tuple(tuple(b) for b in own),
     )
+    if 0 < result.lost.sum() <= result.lost.size / 2:
+        notes.append(f"{result.lost.sum()} of {result.lost.size} lines are left out: their noise hides the joint")
     unseen = [
         name for name, (low, high) in found.confidence_interval(0.95).items() if name[0] in "hc" and low < 0 < high
     ]
     if unseen:
         notes.append(f"{', '.join(unseen)}: not told from zero, the 95 % interval holds it")
-    told = _lost_lines(measured, t, level, variance) + _doubts(found, result, cross)
+    told = _lost_lines(result) + _doubts(found, result, cross)
     for text in told:
         warnings.warn(text, IdentificationWarning, stacklevel=3)
     if not result.converged[0]:
@@ -344,30 +346,28 @@ def _choose_damping(
 
 
 def _both_seen(result: ComplianceEstimate, level: float) -> bool:
-    """Whether, for some DOF, the hysteretic and the viscous term both differ from zero by two standard errors."""
+    """Whether, for some DOF, the hysteretic and the viscous term both exceed zero by two standard errors.
+
+    A joint feeds no energy: two terms of opposite sign that nearly cancel are noise.
+    """
     residual = float(result.residual_level[0])
     error = np.sqrt(np.diagonal(_covariance(result, level or residual, residual)))
-    seen = (abs(result.theta[0]) > 2 * error).reshape(3, -1)  # k, h, c by DOF
+    seen = (result.theta[0] > 2 * error).reshape(3, -1)  # k, h, c by DOF
     return bool((seen[1] & seen[2]).any())
 
 
-def _lost_lines(measured: ComplexArray, t: FloatArray, level: float, variance: FloatArray | None) -> list[str]:
-    """Tell when gamma_jk, which has to be inverted, is lost in noise on most lines.
-
-    The measure is the standard deviation of the diagonal of gamma_jk^-1 dgamma_jk: to be small against 1, whatever the
-    units.
-    """
-    n = t.shape[0] // 2
-    spread = level**2 * (abs(measured) ** 2 if variance is None else variance)
-    inverse = invert(t[:n] @ measured @ t[n:].T, on_singular="nan")
-    relative = np.einsum("fap,aq,fpq->fa", abs(inverse @ t[:n]) ** 2, t[n:] ** 2, spread, optimize=True)
-    lost = int((~(relative.max(axis=1) < _LOST**2)).sum())
-    if lost <= relative.shape[0] / 2:
+def _lost_lines(result: ComplianceEstimate) -> list[str]:
+    """Tell of many lines on which the noise hides the joint."""
+    total, lost = result.lost.size, int(result.lost.sum())
+    if lost <= total / 2:
         return []
+    kept = total - lost
+    what = "expect bias beyond the intervals"
+    if kept >= max(2, result.theta.shape[1]):
+        what = f"only the other {kept} are used"
     return [
-        f"on {lost} of {relative.shape[0]} lines the noise is as large as the difference between the motions of the "
-        "joint DOFs (gamma_jk is nearly singular): expect bias beyond the intervals; other bands or points may see "
-        "the joint"
+        f"on {lost} of {total} lines the noise is as large as the difference between the motions of the joint DOFs "
+        f"(gamma_jk is nearly singular): {what}; other bands or points may see the joint better"
     ]
 
 
@@ -380,7 +380,7 @@ def _doubts(found: JointFit, result: ComplianceEstimate, cross: Cross) -> list[s
         if name.startswith("k_") and "," not in name and (not np.isfinite(high) or not np.isfinite(low)):
             bound = f"at least {low:.3g} {found.unit(name)}" if np.isfinite(low) else "nothing"
             told.append(f"{name}: the data cannot tell this DOF from a rigid one; they say {bound} (95 %)")
-        elif name.startswith("k_") and found.std_error[name] > _UNCERTAIN * abs(value):
+        elif name.startswith("k_") and "," not in name and found.std_error[name] > _UNCERTAIN * abs(value):
             told.append(f"{name}: the data barely see it, 95 % interval {low:.3g} .. {high:.3g} {found.unit(name)}")
     ratio = found.residual_level / found.noise_level if found.noise_level > 0 else 1.0
     if ratio > _MISFIT:

@@ -139,7 +139,7 @@ def test_points_instead_of_dofs(beams):
 
 
 def test_nearly_singular_interface_is_told(beams):
-    few = jf.pollute(beams.gamma(beams.joint), 0.6, seed=4)
+    few = jf.pollute(beams.gamma(beams.joint), 0.9, seed=4)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         jf.identify(beams.freq, few, ["y", "theta"])
@@ -215,3 +215,33 @@ def test_one_line_is_enough_for_one_complex_stiffness(chains):
     fit = jf.identify(chains.freq[50:51], chains.gamma(chains.joint)[50:51], ["x"])
     assert fit.parameters["k_x"] == pytest.approx(2000, rel=1e-6)
     assert fit.parameters["c_x"] == pytest.approx(3, rel=1e-6)
+
+
+def test_six_dofs_of_a_structure_with_many_modes():
+    """Lines on which the noise hides the joint are left out, and the rest suffice: the fit stays on its feet."""
+    freq = np.arange(20.0, 620.0)
+    stiffness = np.array([1e6, 2e6, 5e5, 1e6, 3e6, 8e5])
+    damping = np.array([50.0, 20.0, 30.0, 10.0, 40.0, 20.0])
+    sides = []
+    for seed in (1, 2):
+        shapes, _ = np.linalg.qr(np.random.default_rng(seed).standard_normal((30, 30)))
+        squared = (2 * np.pi * np.linspace(20, 900, 30)) ** 2
+        matrices = (shapes * squared) @ shapes.T, np.eye(30)
+        sides.append(jf.receptance(freq, *matrices, loss_factor=0.01, outputs=range(6), inputs=range(6)))
+    joint = jf.Joint(stiffness, damping)
+    exact = jf.couple(*sides, joint.dynamic_stiffness(freq), range(6), range(6), freq_hz=freq)
+    measured = jf.pollute(exact, 0.02, seed=1)
+    for cross in ("zero", "ignore", "fit"):
+        with pytest.warns(jf.IdentificationWarning, match="only the other .* are used"):
+            fit = jf.identify(freq, measured, cross=cross)
+        assert fit.residual_level == pytest.approx(0.02, rel=0.1)
+        errors = np.array([fit.std_error[f"k_{i}"] for i in range(6)])
+        assert (abs(fit.stiffness - stiffness) < 4 * errors).all()
+        assert (errors < 0.02 * stiffness).all()
+
+
+def test_a_few_lost_lines_are_noted(beams):
+    fit = jf.identify(beams.freq, jf.pollute(beams.gamma(beams.joint), 0.05, seed=3), ["y", "theta"])
+    assert any("lines are left out" in note for note in fit.notes)
+    for name, (low, high) in fit.confidence_interval(0.999).items():
+        assert low < TRUTH[name] < high
