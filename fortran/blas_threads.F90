@@ -1,5 +1,5 @@
 !> Keeps a threaded BLAS to one thread while a sweep runs over several lines: threads inside threads run 10-25 times
-!> slower from n = 96 on, and the rounding of the BLAS depends on its threads. JF_OPENBLAS_PTHREADS is set by the build
+!> slower from n = 96 on, and the rounding of the BLAS depends on its threads. JF_OPENBLAS is set by the build
 !> where the BLAS is an OpenBLAS; where it is not, or starts no threads of its own, both routines do nothing.
 !>
 !> The thread count of OpenBLAS is one number for the whole process, so the hold is counted: the first of several
@@ -13,7 +13,7 @@ module jointfrf_blas_threads
   private
   public :: hold_blas_threads, release_blas_threads
 
-#ifdef JF_OPENBLAS_PTHREADS
+#ifdef JF_OPENBLAS
   integer(ip) :: holders = 0
   integer(ip) :: threads_before = 1
 
@@ -42,7 +42,7 @@ contains
 
   !> From here to the matching release the BLAS uses one thread.
   subroutine hold_blas_threads()
-#ifdef JF_OPENBLAS_PTHREADS
+#ifdef JF_OPENBLAS
     !$omp critical (jointfrf_blas_threads_hold)
     if (holders == 0) then
       threads_before = 1
@@ -56,7 +56,7 @@ contains
 
   !> The last holder gives the BLAS its threads back.
   subroutine release_blas_threads()
-#ifdef JF_OPENBLAS_PTHREADS
+#ifdef JF_OPENBLAS
     !$omp critical (jointfrf_blas_threads_hold)
     holders = holders - 1
     if (holders == 0 .and. threads_before /= 1) call openblas_set_num_threads(threads_before)

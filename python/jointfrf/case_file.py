@@ -14,6 +14,7 @@ from jointfrf.bands import Band, in_bands
 from jointfrf.beam import BeamElement, End, beam
 from jointfrf.discrete import Ground, chain
 from jointfrf.errors import FileContentError
+from jointfrf.identify import Method
 from jointfrf.joint import Joint
 from jointfrf.model import Model
 from jointfrf.noise import NoiseKind, NoiseReference
@@ -21,15 +22,7 @@ from jointfrf.toml_table import Table, read_toml
 
 __all__ = ["METHODS", "BandSet", "Case", "Expected", "ExpectedTable", "Noise", "Substructure", "read_case", "unit_of"]
 
-METHODS = (
-    "ismm",
-    "inverse_substructuring",
-    "decoupling-rr",
-    "decoupling-rs",
-    "decoupling-sr",
-    "decoupling-ss",
-    "compliance",
-)
+METHODS: tuple[str, ...] = get_args(Method)
 _MOTIONS = ("translation", "rotation")
 _MOST_LINES = 1_000_000
 _T = TypeVar("_T")

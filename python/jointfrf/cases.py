@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import tempfile
 from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass
@@ -12,6 +10,7 @@ from pathlib import Path
 
 from jointfrf.case_file import read_case
 from jointfrf.figures import make_figures
+from jointfrf.files import write_file
 from jointfrf.plots import as_csv as figure_as_csv
 from jointfrf.plots import draw
 from jointfrf.report import make_report, summary
@@ -90,23 +89,6 @@ def find_case(word: str) -> Path:
     raise UnknownCaseError(f"there is no case {word!r}; known cases: {names}; or name a folder with a case.toml")
 
 
-def _write(path: Path, content: str | bytes) -> None:
-    """Write a file whole or not at all."""
-    data = content.encode("utf-8") if isinstance(content, str) else content
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(data)
-        # As an ordinary new file: mkstemp makes private ones.
-        mask = os.umask(0)
-        os.umask(mask)
-        Path(temporary).chmod(0o666 & ~mask)
-        Path(temporary).replace(path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
-
-
 def run_case(
     folder: Path | str,
     out: Path | str = "results",
@@ -152,11 +134,11 @@ def run_case(
     tables, figures = make_tables(result), make_figures(result)
     drawn = list((map if pool is None else pool.map)(draw, figures))
     for figure, png in zip(figures, drawn, strict=True):
-        _write(target / "figures" / f"{figure.key}.png", png)
-        _write(target / "figures" / f"{figure.key}.csv", figure_as_csv(figure))
+        write_file(target / "figures" / f"{figure.key}.png", png)
+        write_file(target / "figures" / f"{figure.key}.csv", figure_as_csv(figure))
     for table in tables:
-        _write(target / "tables" / f"{table.key}.csv", as_csv(table))
-    _write(target / "results.json", json.dumps(to_json(result), indent=1) + "\n")
+        write_file(target / "tables" / f"{table.key}.csv", as_csv(table))
+    write_file(target / "results.json", json.dumps(to_json(result), indent=1) + "\n")
     report = target / "report.html"
-    _write(report, make_report(result, tables, list(zip(figures, drawn, strict=True))))
+    write_file(report, make_report(result, tables, list(zip(figures, drawn, strict=True))))
     return CaseOutput(result, tables, summary(result, tables), report)

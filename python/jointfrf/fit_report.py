@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+import io
 import json
-import os
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from jointfrf.files import write_file
 from jointfrf.joint_fit import JointFit
 from jointfrf.linear_algebra import invert
 
@@ -98,21 +98,14 @@ def write_fit(fits: Sequence[JointFit], folder: Path, source: str) -> list[Path]
     list of Path
         What was written.
     """
-    folder.mkdir(parents=True, exist_ok=True)
     text = json.dumps({"source": source, "fits": [fit.to_dict() for fit in fits]}, indent=2)
-    written = [_write(folder / "identification.json", (text + "\n").encode())]
+    contents: dict[str, str | bytes] = {"identification.json": text + "\n"}
     for i, fit in enumerate(fits):
         for name, figure in fit_figures(fit).items():
-            path = folder / (f"{name}.png" if i == 0 else f"{name}_{fit.method}.png")
-            with tempfile.NamedTemporaryFile(dir=folder, suffix=".png", delete=False) as temporary:
-                figure.savefig(temporary, dpi=150)
-            os.replace(temporary.name, path)
-            written.append(path)
-    return written
-
-
-def _write(path: Path, content: bytes) -> Path:
-    with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as temporary:
-        temporary.write(content)
-    os.replace(temporary.name, path)
-    return path
+            drawn = io.BytesIO()
+            figure.savefig(drawn, dpi=150)
+            contents[f"{name}.png" if i == 0 else f"{name}_{fit.method}.png"] = drawn.getvalue()
+    folder.mkdir(parents=True, exist_ok=True)
+    for file, content in contents.items():
+        write_file(folder / file, content)
+    return [folder / file for file in contents]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -51,6 +51,8 @@ class JointFit:
         For each DOF the bands used, (low, high) in Hz.
     warnings : tuple of str
         What a reader must know before using the numbers.
+    notes : tuple of str
+        How the numbers came about.
     """
 
     method: str
@@ -63,7 +65,7 @@ class JointFit:
     k_lines: ComplexArray
     bands: tuple[tuple[tuple[float, float], ...], ...]
     warnings: tuple[str, ...] = ()
-    notes: tuple[str, ...] = field(default=())
+    notes: tuple[str, ...] = ()
 
     def _of_each_dof(self, letter: str) -> FloatArray:
         return np.array([self.parameters.get(f"{letter}_{dof}", 0.0) for dof in self.dofs])

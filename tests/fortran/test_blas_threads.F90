@@ -1,5 +1,5 @@
 !> The hold on the threads of the BLAS is counted and given back. Skipped where the BLAS starts no threads of its own.
-#ifdef JF_OPENBLAS_PTHREADS
+#ifdef JF_OPENBLAS
 module blas_probe
   use jointfrf_kinds, only: dp, ip
   use jointfrf_sweep, only: line_operation, line_space

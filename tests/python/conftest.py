@@ -19,8 +19,12 @@ class Assembly:
     b: jf.Model
     joint: jf.Joint
     first: jf.Joint
-    h_a: np.ndarray
-    h_b: np.ndarray
+    dofs_a: list[int]
+    dofs_b: list[int]
+
+    def __post_init__(self):
+        object.__setattr__(self, "h_a", self.a.receptance(self.freq, self.dofs_a))
+        object.__setattr__(self, "h_b", self.b.receptance(self.freq, self.dofs_b))
 
     @property
     def n(self) -> int:
@@ -43,17 +47,13 @@ class Assembly:
         return self.coupled(joint)[:, dofs][:, :, dofs]
 
 
-def _assembly(freq, a, b, dofs_a, dofs_b, joint, first):
-    return Assembly(freq, a, b, joint, first, a.receptance(freq, dofs_a), b.receptance(freq, dofs_b))
-
-
 @pytest.fixture(scope="session")
 def chains() -> Assembly:
     """Table 3-1."""
     a = jf.chain([5, 3], [2500, 3500], [3, 4], ground="start")
     b = jf.chain([4, 2], [2000, 2500], [2, 1], ground="end")
     joint, first = jf.Joint([2000.0], [3.0], ["x"]), jf.Joint([1000.0], [1.5], ["x"])
-    return _assembly(np.linspace(0.5, 10, 191), a, b, [1, 0], [0, 1], joint, first)
+    return Assembly(np.linspace(0.5, 10, 191), a, b, joint, first, [1, 0], [0, 1])
 
 
 @pytest.fixture(scope="session")
@@ -66,7 +66,7 @@ def beams() -> Assembly:
     first = jf.Joint([1e5, 1e3], [5, 0.5], ["y", "theta"])
     dofs_a = a.index("13:y", "13:theta", "7:y", "7:theta")
     dofs_b = b.index("1:y", "1:theta", "10:y", "10:theta")
-    return _assembly(np.arange(15, 800.5, 5.0), a, b, dofs_a, dofs_b, joint, first)
+    return Assembly(np.arange(15, 800.5, 5.0), a, b, joint, first, dofs_a, dofs_b)
 
 
 @pytest.fixture(params=["chains", "beams"])

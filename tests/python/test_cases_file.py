@@ -18,7 +18,7 @@ CHANGES = [
     ("level = 0.05", "", r"the key 'level' is missing"),
     ('kind = "complex"', 'kind = "white"', r"kind must be one of complex, .*, not 'white'"),
     ("block = 1", "block = 2", r"block must be a divisor of 1"),
-    ('["ismm", "compliance"]', '["ismn"]', r"methods must be a list of ismm, .*, not \['ismn'\]"),
+    ('["ismm", "compliance"]', '["ismn"]', r"methods must be a list of compliance, ismm, .*, not \['ismn'\]"),
     ('["ismm", "compliance"]', "[]", r"methods must be a list"),
     ("reciprocal = false", 'reciprocal = "no"', r"reciprocal must be true or false, not 'no'"),
     (

@@ -201,7 +201,7 @@ def test_dofs_must_be_whole_numbers(random_lines):
         jf.couple(g, g, np.eye(1), [0.0], [0])
 
 
-def test_threads_do_not_change_a_bit(random_lines, monkeypatch):
+def test_threads_do_not_change_a_bit(random_lines):
     """The same lines in a short sweep (one thread) and in a long one (all threads)."""
     a = random_lines(4000, 6)
     whole = jf.invert(a)
