@@ -29,6 +29,7 @@ __all__ = [
     "estimate",
     "jackknife_covariance",
     "joint_basis",
+    "neighbour_mean",
     "reciprocity_noise",
 ]
 
@@ -103,26 +104,29 @@ class ComplianceEstimate(NamedTuple):
         Noise level that the residual shows.
     off_diagonal : ndarray, shape (r,)
         Noise level that the entries of C beside the diagonal show, or NaN where they are not used.
-    compliance : ndarray, shape (r, n_freq, n, n)
-        Joint compliance of each line as measured, no model of the joint.
+    equations : int
+        Complex equations used: entries of C on lines that are not left out.
     lost : ndarray of bool, shape (n_freq,)
-        Lines on which gamma_jk, which has to be inverted, is lost in noise. They are left out, unless too few remain.
+        Lines on which gamma_jk, which has to be inverted, is lost in noise.
+    left_out : bool
+        Whether these lines are left out; they are not where too few would remain.
     iterations : int
         Linearisations done.
     converged : ndarray of bool, shape (r,)
         Whether the parameters stopped moving.
-    line_gradient : ndarray, shape (r, n_freq, p)
-        What each line pulls at the parameters, at unit noise level; sums to zero.
-    line_information : ndarray, shape (r, n_freq, p, p)
-        What each line knows of them.
+    line_gradient : ndarray, shape (r, n_used, p)
+        What each line that is not left out pulls at the parameters, at unit noise level; sums to zero.
+    line_information : ndarray, shape (r, n_used, p, p)
+        What each of them knows of the parameters.
     """
 
     theta: FloatArray
     covariance: FloatArray
     residual_level: FloatArray
     off_diagonal: FloatArray
-    compliance: ComplexArray
+    equations: int
     lost: NDArray[np.bool_]
+    left_out: bool
     iterations: int
     converged: NDArray[np.bool_]
     line_gradient: FloatArray
@@ -154,6 +158,7 @@ def estimate(
     reciprocal: bool = True,
     cross: Cross = "zero",
     used: NDArray[np.bool_] | None = None,
+    near: ComplexArray | None = None,
     level: FloatArray | None = None,
     tolerance: float = 0.05,
 ) -> ComplianceEstimate:
@@ -175,6 +180,9 @@ def estimate(
         What the entries of C beside its diagonal say: they are zero; nothing; they belong to the terms of the basis.
     used : ndarray of bool, shape (n_freq, n), optional
         Lines used for each DOF; all by default.
+    near : ndarray, shape (r, n_freq, m, m), optional
+        FRFs about which is linearised first; by default the mean of the neighbouring lines of `h`, which must then be
+        neighbours in frequency.
     level : ndarray, shape (r,), optional
         Noise level, to judge convergence and lost lines; by default from the residual and from reciprocity.
     tolerance : float
@@ -184,21 +192,26 @@ def estimate(
     -------
     ComplianceEstimate
     """
-    r, n_freq = h.shape[:2]
     n = transform.shape[0] // 2
-    measured = (h + h.swapaxes(-1, -2)) / 2 if reciprocal else h
+    measured, true = h, neighbour_mean(h) if near is None else near
+    if reciprocal:
+        measured, true = ((x + x.swapaxes(-1, -2)) / 2 for x in (measured, true))
+    lost = _lost_lines(measured, transform, _level_of(h, level, variance), variance)
+    left_out = bool(lost.any() and np.count_nonzero(~lost) >= max(2, len(basis.names)))
+    if left_out:
+        kept = np.flatnonzero(~lost)
+        measured, true, basis = measured[:, kept], true[:, kept], Basis(basis.names, basis.matrices[:, kept])
+        variance = None if variance is None else variance[kept]
+        used = None if used is None else used[kept]
+    r, n_freq = measured.shape[:2]
     chosen = np.arange(n) * (n + 1) if cross == "ignore" else np.arange(n * n)
     lines = (r * n_freq,)
 
     def sweep(array: ComplexArray) -> ComplexArray:
         return array.reshape(lines + array.shape[2:])
 
-    raw = joint_compliance(transform @ sweep(measured) @ transform.T, on_singular="nan").reshape(r, n_freq, n, n)
-    lost = _lost_lines(measured, transform, _level_of(h, level, variance), variance)
-    enough = np.count_nonzero(~lost) >= max(2, len(basis.names))
-    blocked = _blocked(used, lost if enough else np.zeros_like(lost), n)[:, chosen]
+    blocked = _blocked(used, n_freq, n)[:, chosen]
     model = _JointModel(basis, chosen)
-    true = _neighbour_mean(measured)
     theta: FloatArray | None = None
     converged = np.zeros(r, bool)
     step = 0
@@ -250,8 +263,9 @@ def estimate(
         covariance=scatter,
         residual_level=np.sqrt(_power(residual, weight, blocked, basis)),
         off_diagonal=off,
-        compliance=raw,
+        equations=int(np.count_nonzero(~blocked)),
         lost=lost,
+        left_out=left_out,
         iterations=step,
         converged=converged,
         line_gradient=2 * (weighted @ residual[..., None]).real[..., 0],
@@ -308,16 +322,15 @@ def _lost_lines(
     return lost
 
 
-def _blocked(used: NDArray[np.bool_] | None, lost: NDArray[np.bool_], n: int) -> NDArray[np.bool_]:
-    """Return which entries of C are left out, shape (n_freq, n * n): lost lines, DOFs outside their bands."""
-    kept = np.repeat(~lost[:, None], n, axis=1)
-    if used is not None:
-        kept &= used
-    return ~(kept[:, :, None] & kept[:, None, :]).reshape(len(lost), n * n)
+def _blocked(used: NDArray[np.bool_] | None, n_freq: int, n: int) -> NDArray[np.bool_]:
+    """Return which entries of C are left out, shape (n_freq, n * n): those of a DOF outside its bands."""
+    if used is None:
+        return np.zeros((n_freq, n * n), bool)
+    return ~(used[:, :, None] & used[:, None, :]).reshape(n_freq, n * n)
 
 
-def _neighbour_mean(h: ComplexArray) -> ComplexArray:
-    """Mean of the lines around each line, without itself."""
+def neighbour_mean(h: ComplexArray) -> ComplexArray:
+    """Mean of the lines around each line, without itself, shape (r, n_freq, m, m)."""
     n_freq = h.shape[1]
     if n_freq < 2:
         return h

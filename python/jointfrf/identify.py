@@ -10,10 +10,10 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from jointfrf._sweep import ComplexArray, FloatArray, as_frequency, as_real, as_square, check_choice
+from jointfrf._sweep import ComplexArray, FloatArray, as_frequency, as_number, as_real, as_square, check_choice
 from jointfrf.bands import Band, as_bands, band_mean, in_bands
 from jointfrf.decoupling import Equation, decouple
-from jointfrf.errors import ConvergenceWarning, IdentificationWarning
+from jointfrf.errors import ConvergenceWarning, IdentificationWarning, IllConditionedWarning
 from jointfrf.estimator import (
     ComplianceEstimate,
     Cross,
@@ -21,6 +21,7 @@ from jointfrf.estimator import (
     estimate,
     jackknife_covariance,
     joint_basis,
+    neighbour_mean,
     reciprocity_noise,
 )
 from jointfrf.ismm import inverse_substructuring, ismm
@@ -119,7 +120,7 @@ def identify(
     ValueError
         Wrong shapes, names, bands; NaN or Inf in a line; an argument that the method needs is missing.
     SingularLineError
-        A line of a band mean cannot be inverted.
+        A line cannot be inverted.
 
     Warns
     -----
@@ -243,19 +244,24 @@ def _by_compliance(
     own = as_bands(bands, names, freq)
     used = np.stack([in_bands(freq, b) for b in own], axis=1)
     keep = np.asarray(used.any(axis=1))
+    # Taken before lines are left out: what is next to a line in a band may lie outside.
+    near = neighbour_mean(measured[None])[:, keep]
     freq, measured, used = freq[keep], measured[keep], used[keep]
     level, variance = _noise_of(noise, measured, keep)
 
     def fit(kind: Damping) -> ComplianceEstimate:
         basis = joint_basis(2 * np.pi * freq, names, kind, cross)
-        return estimate(
-            measured[None], t, basis, variance=variance, reciprocal=reciprocal, cross=cross, used=used,
-            level=np.array([level]) if level > 0 else None,
-        )  # fmt: skip
+        with warnings.catch_warnings():
+            # Lines on which noise hides the joint are ill-conditioned; they are left out, and this is told.
+            warnings.simplefilter("ignore", IllConditionedWarning)
+            return estimate(
+                measured[None], t, basis, variance=variance, reciprocal=reciprocal, cross=cross, used=used, near=near,
+                level=np.array([level]) if level > 0 else None,
+            )  # fmt: skip
 
     notes: list[str] = []
     if damping == "auto":
-        damping, result = _choose_damping(fit, used, level, notes)
+        damping, result = _choose_damping(fit, level, notes)
     else:
         result = fit(damping)
     basis_names = joint_basis(2 * np.pi * freq[:1], names, damping, cross).names
@@ -264,7 +270,9 @@ def _by_compliance(
         level = residual
         notes.append("the noise level is taken from the residual: the FRFs do not show it by their reciprocity")
     parameters = dict(zip(basis_names, result.theta[0].tolist(), strict=True))
-    k_lines = inverse_substructuring(t @ measured @ t.T, freq_hz=freq, on_singular="nan")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", IllConditionedWarning)
+        k_lines = inverse_substructuring(t @ measured @ t.T, on_singular="nan")
     found = JointFit(
         method="compliance",
         dofs=names,
@@ -276,7 +284,7 @@ def _by_compliance(
         k_lines=k_lines,
         bands=tuple(tuple(b) for b in own),
     )
-    if 0 < result.lost.sum() <= result.lost.size / 2:
+    if result.left_out and result.lost.sum() <= result.lost.size / 2:
         notes.append(f"{result.lost.sum()} of {result.lost.size} lines are left out: their noise hides the joint")
     unseen = [
         name for name, (low, high) in found.confidence_interval(0.95).items() if name[0] in "hc" and low < 0 < high
@@ -310,9 +318,9 @@ def _noise_of(
         level = float(reciprocity_noise(measured[None])[0]) if measured.shape[1] > 1 else 0.0
         return (level if level > _RECIPROCAL else 0.0), None
     if np.ndim(noise) == 0:
-        level = float(noise)  # type: ignore[arg-type]
-        if not (np.isfinite(level) and level > 0):
-            raise ValueError(f"noise must be positive, not {level}")
+        level = as_number("noise", noise)
+        if level <= 0:
+            raise ValueError(f"noise must be positive, not {level:g}")
         return level, None
     variance = as_real("noise", noise, (keep.size, *measured.shape[1:]))[keep]
     if (variance <= 0).any():
@@ -321,17 +329,16 @@ def _noise_of(
 
 
 def _choose_damping(
-    fit: Callable[[Damping], ComplianceEstimate], used: NDArray[np.bool_], level: float, notes: list[str]
+    fit: Callable[[Damping], ComplianceEstimate], level: float, notes: list[str]
 ) -> tuple[Damping, ComplianceEstimate]:
     """Take the damping terms with the lowest Bayesian information criterion, and note how clear the choice is."""
     kinds: tuple[Damping, ...] = ("viscous", "hysteretic", "both")
     results = {kind: fit(kind) for kind in kinds}
     # All are judged at the noise that the richest model leaves.
     power = float(results["both"].residual_level[0]) ** 2
-    equations = 2 * np.count_nonzero(used[:, :, None] & used[:, None, :])
     scores = {}
     for kind, result in results.items():
-        p = result.theta.shape[1]
+        equations, p = 2 * result.equations, result.theta.shape[1]
         misfit = float(result.residual_level[0]) ** 2 * (equations - p) / max(power, np.finfo(float).tiny)
         scores[kind] = misfit + p * np.log(equations)
     ranked = sorted(scores, key=lambda kind: scores[kind])
@@ -361,10 +368,7 @@ def _lost_lines(result: ComplianceEstimate) -> list[str]:
     total, lost = result.lost.size, int(result.lost.sum())
     if lost <= total / 2:
         return []
-    kept = total - lost
-    what = "expect bias beyond the intervals"
-    if kept >= max(2, result.theta.shape[1]):
-        what = f"only the other {kept} are used"
+    what = f"only the other {total - lost} are used" if result.left_out else "expect bias beyond the intervals"
     return [
         f"on {lost} of {total} lines the noise is as large as the difference between the motions of the joint DOFs "
         f"(gamma_jk is nearly singular): {what}; other bands or points may see the joint better"

@@ -245,3 +245,29 @@ def test_a_few_lost_lines_are_noted(beams):
     assert any("lines are left out" in note for note in fit.notes)
     for name, (low, high) in fit.confidence_interval(0.999).items():
         assert low < TRUTH[name] < high
+
+
+def test_two_bands_are_not_taken_for_neighbours(beams):
+    """Lines at the edge of a gap are linearised about what lies next to them in frequency."""
+    gamma = beams.gamma(beams.joint)
+    bands = [(15.0, 120.0), (400.0, 420.0), (700.0, 800.0)]
+    pulls = []
+    for seed in range(20):
+        fit = jf.identify(beams.freq, jf.pollute(gamma, 0.01, seed=seed), ["y", "theta"], bands=bands)
+        pulls.append([(fit.parameters[name] - value) / fit.std_error[name] for name, value in TRUTH.items()])
+    spread = np.sqrt(np.square(pulls).mean(axis=0))
+    assert (spread < 1.6).all(), spread
+    assert (spread > 0.5).all(), spread
+    exact = jf.identify(beams.freq, gamma, ["y", "theta"], bands=bands, noise=1e-6)
+    for name, value in TRUTH.items():
+        assert exact.parameters[name] == pytest.approx(value, rel=1e-6)
+
+
+def test_ill_conditioned_lines_are_told_in_the_words_of_the_fit(beams):
+    measured = jf.pollute(beams.gamma(beams.joint), 1e-3, seed=1)
+    measured[40] = 1e-6 * np.ones((4, 4))  # a line of rank one
+    measured[40] += 1e-20 * np.diag([1, 2, 3, 4])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", jf.IllConditionedWarning)
+        fit = jf.identify(beams.freq, measured, ["y", "theta"])
+    assert fit.parameters["k_theta"] == pytest.approx(5e3, rel=0.01)

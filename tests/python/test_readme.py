@@ -37,7 +37,7 @@ def words(text: str) -> list[float | str]:
         if set(word) == {"-"}:
             continue
         try:
-            found.append(float(word.rstrip(",:")))
+            found.append(float(word.rstrip(",:)")))
         except ValueError:
             found.append(word)
     return found
