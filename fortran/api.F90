@@ -10,10 +10,16 @@
 !> n_freq      number of frequency lines; 0 is allowed and does nothing
 !> line_info   shape (n_freq), status of each line: 0 good, > 0 singular (LAPACK's INFO), -1 NaN or Inf in the line,
 !>             -2 its result overflows. A bad line is filled with NaN; the others are not touched by it.
-!> rcond       shape (n_freq), reciprocal condition number (1-norm) of the worst matrix inverted in the line; 0 in a bad
-!>             line, 1 where nothing is inverted
-!> info        0 good; -i argument i is wrong and nothing was done; > 0 number of bad lines; -1000 no memory
+!> rcond       shape (n_freq), reciprocal condition number of the worst matrix inverted in the line; 0 in a bad line, 1
+!>             where nothing is inverted. In the 1-norm with |re| + |im| for the modulus, within a factor 2 of the true
+!>             one; an estimate where the fast engines solve, and for large or banded matrices
+!> info        0 good; -i argument i is wrong and nothing was done; > 0 number of bad lines; -1000 no memory; -1001 the
+!>             environment variable JOINTFRF_ENGINE names an engine that is not there, and nothing was done
 !> Time convention exp(+i w t). Input and output arrays must not overlap.
+!>
+!> Engines: the same sweeps by LAPACK line by line (the reference), or several lines side by side in the vector registers
+!> of the processor. jf_set_engine chooses for the whole process; without it JOINTFRF_ENGINE does, by one of the words
+!> auto, lapack, plain, x86-64-v2, x86-64-v3, x86-64-v4. Results agree within the rounding that the condition allows.
 module jointfrf
   use, intrinsic :: iso_c_binding, only: c_char, c_double, c_double_complex, c_int
   use jointfrf_arguments, only: as_lines, as_matrix, bad_offsets, is_transposed, lower, names, not_finite, &
@@ -22,6 +28,8 @@ module jointfrf
   use jointfrf_coupling, only: couple
   use jointfrf_decoupling, only: decouple
   use jointfrf_dynamic_stiffness, only: receptance_banded, receptance_dense
+  use jointfrf_engine, only: engine_automatic, engine_lapack, engine_plain, engine_v2, engine_v3, engine_v4, &
+    get_engine, set_engine
   use jointfrf_finite_difference, only: difference_weights, transform_receptance
   use jointfrf_ismm, only: inverse_substructuring, ismm
   use jointfrf_linear_algebra, only: invert, solve
@@ -32,12 +40,21 @@ module jointfrf
   private
 
   public :: jf_version, jf_info_text, jf_line_text
+  public :: jf_set_engine, jf_get_engine
   public :: jf_invert, jf_solve
   public :: jf_receptance, jf_receptance_banded, jf_receptance_modal
   public :: jf_couple, jf_modify, jf_find_modification
   public :: jf_ismm, jf_inverse_substructuring, jf_decouple
   public :: jf_joint_compliance, jf_compliance_factors, jf_compliance_covariance
   public :: jf_difference_weights, jf_central_difference, jf_transform
+
+  !> What jf_set_engine takes and jf_get_engine gives.
+  integer(c_int), parameter, public :: jf_engine_automatic = engine_automatic
+  integer(c_int), parameter, public :: jf_engine_lapack = engine_lapack
+  integer(c_int), parameter, public :: jf_engine_plain = engine_plain
+  integer(c_int), parameter, public :: jf_engine_x86_64_v2 = engine_v2
+  integer(c_int), parameter, public :: jf_engine_x86_64_v3 = engine_v3
+  integer(c_int), parameter, public :: jf_engine_x86_64_v4 = engine_v4
 
 contains
 
@@ -68,6 +85,27 @@ contains
 
     call spread_text(line_text(line_info), text)
   end subroutine jf_line_text
+
+  !> Choose the engine of all sweeps that begin after this call, in every thread.
+  !> engine   0 automatic, the widest registers there are; 1 LAPACK line by line; side by side with 2 the instructions
+  !>          of any processor, 3 x86-64-v2, 4 x86-64-v3 (AVX2), 5 x86-64-v4 (AVX-512)
+  !> info     0 good; -1 this machine or this build does not have it, and the choice stays
+  subroutine jf_set_engine(engine, info) bind(C, name='jf_set_engine_')
+    integer(c_int), intent(in) :: engine
+    integer(c_int), intent(out) :: info
+
+    call set_engine(engine, info)
+  end subroutine jf_set_engine
+
+  !> The engine in use: never 0, but what automatic comes to.
+  !> engine   as in jf_set_engine; -1 with info -1001
+  !> info     0 good; -1001 the environment variable JOINTFRF_ENGINE names an engine that is not there
+  subroutine jf_get_engine(engine, info) bind(C, name='jf_get_engine_')
+    integer(c_int), intent(out) :: engine, info
+
+    call get_engine(engine, info)
+    if (info /= info_good) engine = -1
+  end subroutine jf_get_engine
 
   !> Inverse of every line.
   !> n           order of the matrices

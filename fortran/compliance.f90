@@ -2,20 +2,31 @@
 !> and how measurement noise comes through.
 module jointfrf_compliance
   use jointfrf_kinds, only: dp, ip
+  use jointfrf_lanes, only: in_memory, lane_kernels, lanes, largest_in_lanes, natural, padded, real_lines, row_starts, system, &
+    system_size
   use jointfrf_line_layout, only: all_finite, load, store, take_block
   use jointfrf_lines_lapack, only: inverse_work, product_line, solve_line
   use jointfrf_status, only: line_good, line_not_finite, line_overflow
-  use jointfrf_sweep, only: line_operation, line_space, run_sweep
+  use jointfrf_sweep, only: judge, line_operation, line_space, run_sweep
   implicit none
   private
   public :: joint_compliance, compliance_covariance, compliance_factors
+
+  !> Where the blocks of gamma and C lie in lanes.
+  type :: compliance_in_lanes
+    real(dp), pointer, contiguous :: gamma(:, :, :), c_joint(:, :, :)
+    integer, allocatable :: gamma_place(:), c(:)          !< in the caller's order
+    integer, allocatable :: kk_row(:), c_row(:)           !< the element before each row
+  end type compliance_in_lanes
 
   type, extends(line_operation) :: compliance
     logical :: transposed
     integer :: n
     complex(dp), pointer, contiguous :: gamma(:, :, :)
+    type(compliance_in_lanes) :: plan
   contains
     procedure :: line => compliance_one
+    procedure :: line_block => compliance_block
   end type compliance
 
   !> What both linearisations share.
@@ -65,8 +76,54 @@ contains
     operation%n_real = 2*n
     operation%n_pivot = n
     operation%flops = 19.0_dp*real(n, dp)**3
+    if (n >= 1 .and. n <= largest_in_lanes) call plan_compliance(operation)
     call run_sweep(operation, size(gamma, 3, kind=ip), line_info, rcond, info)
   end subroutine joint_compliance
+
+  subroutine plan_compliance(operation)
+    type(compliance), intent(inout) :: operation
+    integer :: gamma(2*operation%n, 2*operation%n), solved(operation%n, 2*operation%n), n, taken
+
+    n = operation%n
+    solved = system(0, n, n)
+    taken = system_size(n, n)
+    gamma(:n, n + 1:) = solved(:, :n)               ! jk, to be inverted
+    gamma(:n, :n) = solved(:, n + 1:)               ! jj, the right-hand sides
+    gamma(n + 1:, n + 1:) = natural(taken, n, n)    ! kk
+    gamma(n + 1:, :n) = natural(taken + n*n, n, n)  ! kj, where C will be
+    operation%n_element = taken + 2*n*n
+    operation%n_hint = padded(n)
+    associate (plan => operation%plan)
+      plan%gamma => real_lines(operation%gamma)
+      plan%c_joint => real_lines(operation%result)
+      plan%gamma_place = in_memory(operation%transposed, gamma)
+      plan%c = in_memory(operation%transposed, gamma(n + 1:, :n))
+      plan%kk_row = row_starts(gamma(n + 1:, n + 1:))
+      plan%c_row = row_starts(gamma(n + 1:, :n))
+    end associate
+  end subroutine plan_compliance
+
+  subroutine compliance_block(self, kernels, first, n_lines, space, line_info, rcond)
+    class(compliance), intent(in) :: self
+    type(lane_kernels), intent(in) :: kernels
+    integer, intent(in) :: first, n_lines
+    type(line_space), target, intent(inout) :: space
+    integer(ip), intent(out) :: line_info(n_lines)
+    real(dp), intent(out) :: rcond(n_lines)
+    real(dp) :: rcond_lanes(lanes), total(lanes)
+    integer :: row(self%n), n
+
+    n = self%n
+    associate (plan => self%plan, x => space%x)
+      call kernels%load(4*n*n, plan%gamma_place, first, n_lines, plan%gamma, x)
+      call kernels%solve(n, n, n, 0, x, space%hint, row, rcond_lanes)                     ! gamma_jk^-1 gamma_jj
+      call kernels%copy(n*n, -1.0_dp, plan%c, plan%c, x)
+      call kernels%product(n, n, n, 1.0_dp, plan%kk_row, row, plan%c_row, x)
+      call kernels%store(n*n, plan%c, first, n_lines, x, self%plan%c_joint)
+      call kernels%total(n*n, plan%c, x, total)
+      call judge(total, rcond_lanes, line_info, rcond)
+    end associate
+  end subroutine compliance_block
 
   subroutine compliance_one(self, i, space, line_info, rcond)
     class(compliance), intent(in) :: self

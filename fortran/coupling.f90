@@ -1,10 +1,12 @@
 !> Receptances of two substructures joined by a complex joint stiffness (2.24)-(2.26), (2.42)-(2.45).
 module jointfrf_coupling
   use jointfrf_kinds, only: dp, ip
+  use jointfrf_lanes, only: flat, in_memory, lane_kernels, lanes, largest_in_lanes, padded, real_lines
   use jointfrf_line_layout, only: all_finite, load, store
-  use jointfrf_modification, only: apply_modification, modification_work
+  use jointfrf_modification, only: apply_in_lanes, apply_modification, modification_elements, modification_in_lanes, &
+    modification_work, plan_modification
   use jointfrf_status, only: line_not_finite
-  use jointfrf_sweep, only: line_operation, line_space, run_sweep
+  use jointfrf_sweep, only: judge, line_operation, line_space, run_sweep
   implicit none
   private
   public :: couple
@@ -14,8 +16,16 @@ module jointfrf_coupling
     integer :: n_a, n_b, n_j
     complex(dp), pointer, contiguous :: h_a(:, :, :), h_b(:, :, :), k_joint(:, :, :)
     integer(ip), pointer, contiguous :: dofs_a(:), dofs_b(:)
+    type(modification_in_lanes) :: plan
+    real(dp), pointer, contiguous :: a_pairs(:, :, :), b_pairs(:, :, :), k_pairs(:, :, :), result_pairs(:, :, :)
+    integer, allocatable :: a_place(:), b_place(:), k_place(:), h_place(:)
+    integer, allocatable :: apart(:)                       !< blocks of H between the unjoined substructures
+    complex(dp), allocatable :: apart_value(:)
+    integer, allocatable :: of_a(:), from_a(:), of_b(:), from_b(:)     !< rows and columns in the coordinates x_j - x_k
+    integer, allocatable :: relative(:), relative_a(:), relative_b(:)  !< their square
   contains
     procedure :: line => couple_one
+    procedure :: line_block => couple_block
   end type coupling
 
 contains
@@ -60,8 +70,63 @@ contains
     operation%n_real = 2*n_j
     operation%n_pivot = n_j
     operation%flops = 8.0_dp*n_j*(real(n, dp)**2 + 2.0_dp*real(n_j, dp)*n)
+    if (n_j >= 1 .and. n <= largest_in_lanes) call plan_coupling(operation)
     call run_sweep(operation, size(h_a, 3, kind=ip), line_info, rcond, info)
   end subroutine couple
+
+  subroutine plan_coupling(operation)
+    type(coupling), intent(inout) :: operation
+    integer :: n_a, n
+
+    n_a = operation%n_a
+    n = n_a + operation%n_b
+    call plan_modification(n, operation%n_j, operation%plan)
+    operation%n_element = modification_elements(n, operation%n_j)
+    operation%n_hint = padded(operation%n_j)
+    operation%a_pairs => real_lines(operation%h_a)
+    operation%b_pairs => real_lines(operation%h_b)
+    operation%k_pairs => real_lines(operation%k_joint)
+    operation%result_pairs => real_lines(operation%result)
+    associate (plan => operation%plan, j => operation%dofs_a, k => n_a + operation%dofs_b)
+      operation%a_place = in_memory(operation%transposed, plan%h(:n_a, :n_a))
+      operation%b_place = in_memory(operation%transposed, plan%h(n_a + 1:, n_a + 1:))
+      operation%k_place = in_memory(operation%transposed, plan%d)
+      operation%h_place = in_memory(operation%transposed, plan%h)
+      operation%apart = [flat(plan%h(:n_a, n_a + 1:)), flat(plan%h(n_a + 1:, :n_a))]
+      operation%of_a = [flat(plan%columns(:n_a, :)), flat(plan%rows(:, :n_a))]
+      operation%from_a = [flat(plan%h(:n_a, j)), flat(plan%h(j, :n_a))]
+      operation%of_b = [flat(plan%columns(n_a + 1:, :)), flat(plan%rows(:, n_a + 1:))]
+      operation%from_b = [flat(plan%h(n_a + 1:, k)), flat(plan%h(k, n_a + 1:))]
+      operation%relative = flat(plan%h_mm)
+      operation%relative_a = flat(plan%h(j, j))
+      operation%relative_b = flat(plan%h(k, k))
+    end associate
+    allocate (operation%apart_value(size(operation%apart)), source=(0.0_dp, 0.0_dp))
+  end subroutine plan_coupling
+
+  subroutine couple_block(self, kernels, first, n_lines, space, line_info, rcond)
+    class(coupling), intent(in) :: self
+    type(lane_kernels), intent(in) :: kernels
+    integer, intent(in) :: first, n_lines
+    type(line_space), target, intent(inout) :: space
+    integer(ip), intent(out) :: line_info(n_lines)
+    real(dp), intent(out) :: rcond(n_lines)
+    real(dp) :: rcond_lanes(lanes), total(lanes)
+
+    associate (x => space%x)
+      call kernels%load(size(self%a_place), self%a_place, first, n_lines, self%a_pairs, x)
+      call kernels%load(size(self%b_place), self%b_place, first, n_lines, self%b_pairs, x)
+      call kernels%load(size(self%k_place), self%k_place, first, n_lines, self%k_pairs, x)
+      call kernels%fill(size(self%apart), self%apart_value, self%apart, x)
+      call kernels%copy(size(self%of_a), 1.0_dp, self%from_a, self%of_a, x)
+      call kernels%copy(size(self%of_b), -1.0_dp, self%from_b, self%of_b, x)
+      call kernels%combine(size(self%relative), 1.0_dp, self%relative_a, 1.0_dp, self%relative_b, self%relative, x)
+      call apply_in_lanes(self%plan, kernels, x, space%hint, rcond_lanes)              ! (2.26)
+      call kernels%store(size(self%h_place), self%h_place, first, n_lines, x, self%result_pairs)
+      call kernels%total(size(self%h_place), self%h_place, x, total)
+      call judge(total, rcond_lanes, line_info, rcond)
+    end associate
+  end subroutine couple_block
 
   subroutine couple_one(self, i, space, line_info, rcond)
     class(coupling), intent(in) :: self

@@ -2,13 +2,26 @@
 !> (2.49)-(2.56).
 module jointfrf_decoupling
   use jointfrf_kinds, only: dp, ip
+  use jointfrf_lanes, only: flat, in_memory, lane_kernels, lanes, largest_in_lanes, natural, padded, real_lines, row_starts, &
+    system, system_size
   use jointfrf_line_layout, only: all_finite, load, store
   use jointfrf_lines_lapack, only: inverse_work, invert_line, product_line, solve_line
   use jointfrf_status, only: line_good, line_not_finite
-  use jointfrf_sweep, only: line_operation, line_space, run_sweep
+  use jointfrf_sweep, only: judge, line_operation, line_space, run_sweep
   implicit none
   private
   public :: decouple, is_equation
+
+  !> Where the terms of the equation lie in lanes: the system [M, Q], P, and -H_jj - H_kk, which is to be inverted.
+  type :: decoupling_in_lanes
+    real(dp), pointer, contiguous :: a(:, :, :), b(:, :, :), c(:, :, :), k_joint(:, :, :)
+    integer, allocatable :: a_place(:), b_place(:), c_place(:)         !< in the caller's order
+    integer, allocatable :: measured(:), m(:), model(:)                !< H^C, M, and H_rr or H_ss where M is a difference
+    integer, allocatable :: q(:), q_from(:), p(:), p_from(:), z(:), z_from_j(:), z_from_k(:)
+    integer, allocatable :: p_row(:), z_row(:), z_system(:)
+    integer, allocatable :: given(:)                                   !< all that is loaded
+    integer :: m_before, z_before                                      !< the element before each system
+  end type decoupling_in_lanes
 
   type, extends(line_operation) :: decoupling
     character(len=2) :: equation
@@ -16,8 +29,10 @@ module jointfrf_decoupling
     integer :: n_a, n_b, n
     complex(dp), pointer, contiguous :: h_a(:, :, :), h_b(:, :, :), h_c(:, :, :)
     integer(ip), pointer, contiguous :: dofs_j(:), dofs_k(:), dofs_r(:), dofs_s(:)
+    type(decoupling_in_lanes) :: plan
   contains
     procedure :: line => decouple_one
+    procedure :: line_block => decouple_block
   end type decoupling
 
 contains
@@ -73,8 +88,103 @@ contains
     operation%n_real = 2*n
     operation%n_pivot = n
     operation%flops = 27.0_dp*real(n, dp)**3
+    if (n >= 1 .and. max(operation%n_a, operation%n_b) <= largest_in_lanes) call plan_decoupling(operation)
     call run_sweep(operation, size(h_a, 3, kind=ip), line_info, rcond, info)
   end subroutine decouple
+
+  subroutine plan_decoupling(operation)
+    type(decoupling), intent(inout) :: operation
+    integer :: a(operation%n_a, operation%n_a), b(operation%n_b, operation%n_b)
+    integer :: measured(operation%n, operation%n), to_joint(operation%n, operation%n), z(operation%n, operation%n)
+    integer :: whole(operation%n, 2*operation%n), n, taken
+
+    n = operation%n
+    a = natural(0, operation%n_a, operation%n_a)
+    taken = operation%n_a**2
+    b = natural(taken, operation%n_b, operation%n_b)
+    taken = taken + operation%n_b**2
+    measured = natural(taken, n, n)
+    taken = taken + n*n
+    to_joint = natural(taken, n, n)
+    taken = taken + n*n
+    z = natural(taken, n, n)
+    taken = taken + n*n
+    whole = system(taken, n, n)
+    taken = taken + system_size(n, n)
+    associate (plan => operation%plan, j => operation%dofs_j, k => operation%dofs_k, r => operation%dofs_r, &
+               s => operation%dofs_s, equation => operation%equation)
+      plan%z_before = taken
+      plan%z_system = flat(system(taken, n, 0))
+      operation%n_element = taken + system_size(n, 0)
+      operation%n_hint = 2*padded(n)
+      plan%a => real_lines(operation%h_a)
+      plan%b => real_lines(operation%h_b)
+      plan%c => real_lines(operation%h_c)
+      plan%k_joint => real_lines(operation%result)
+      plan%a_place = in_memory(operation%transposed, a)
+      plan%b_place = in_memory(operation%transposed, b)
+      plan%c_place = in_memory(operation%transposed, measured)
+      plan%given = [plan%a_place, plan%b_place, plan%c_place]
+      plan%measured = flat(measured)
+      plan%m = flat(whole(:, :n))
+      plan%m_before = minval(whole) - 1
+      plan%q = flat(whole(:, n + 1:))
+      plan%p = flat(to_joint)
+      plan%z = flat(z)
+      plan%z_from_j = flat(a(j, j))
+      plan%z_from_k = flat(b(k, k))
+      if (equation(1:1) == 'r') then
+        plan%q_from = flat(a(r, j))
+      else
+        plan%q_from = flat(b(s, k))
+      end if
+      if (equation(2:2) == 'r') then
+        plan%p_from = flat(a(j, r))
+      else
+        plan%p_from = flat(b(k, s))
+      end if
+      plan%model = [integer ::]
+      if (equation == 'rr') plan%model = flat(a(r, r))
+      if (equation == 'ss') plan%model = flat(b(s, s))
+      plan%p_row = row_starts(to_joint)
+      plan%z_row = row_starts(z)
+    end associate
+  end subroutine plan_decoupling
+
+  subroutine decouple_block(self, kernels, first, n_lines, space, line_info, rcond)
+    class(decoupling), intent(in) :: self
+    type(lane_kernels), intent(in) :: kernels
+    integer, intent(in) :: first, n_lines
+    type(line_space), target, intent(inout) :: space
+    integer(ip), intent(out) :: line_info(n_lines)
+    real(dp), intent(out) :: rcond(n_lines)
+    real(dp) :: rcond_m(lanes), rcond_z(lanes), total(lanes)
+    integer :: row(self%n), inverse(self%n**2), place(self%n**2), n
+
+    n = self%n
+    associate (plan => self%plan, x => space%x)
+      call kernels%load(size(plan%a_place), plan%a_place, first, n_lines, plan%a, x)
+      call kernels%load(size(plan%b_place), plan%b_place, first, n_lines, plan%b, x)
+      call kernels%load(n*n, plan%c_place, first, n_lines, plan%c, x)
+      call kernels%total(size(plan%given), plan%given, x, total)                ! not all of it enters the result
+      if (size(plan%model) > 0) then
+        call kernels%combine(n*n, 1.0_dp, plan%model, -1.0_dp, plan%measured, plan%m, x)
+      else
+        call kernels%copy(n*n, 1.0_dp, plan%measured, plan%m, x)
+      end if
+      call kernels%copy(n*n, 1.0_dp, plan%q_from, plan%q, x)
+      call kernels%copy(n*n, 1.0_dp, plan%p_from, plan%p, x)
+      call kernels%combine(n*n, -1.0_dp, plan%z_from_j, -1.0_dp, plan%z_from_k, plan%z, x)
+      call kernels%solve(n, n, n, plan%m_before, x, space%hint(:padded(n)), row, rcond_m)
+      call kernels%product(n, n, n, 1.0_dp, plan%p_row, row, plan%z_row, x)
+      call kernels%copy(n*n, 1.0_dp, plan%z, plan%z_system, x)
+      call kernels%invert(n, plan%z_before, x, space%hint(padded(n) + 1:), inverse, rcond_z)  ! (2.53)-(2.56)
+      place = inverse
+      if (.not. self%transposed) place = reshape(transpose(reshape(inverse, [n, n])), [n*n])
+      call kernels%store(n*n, place, first, n_lines, x, self%plan%k_joint)
+      call judge(total, min(rcond_m, rcond_z), line_info, rcond)
+    end associate
+  end subroutine decouple_block
 
   subroutine decouple_one(self, i, space, line_info, rcond)
     class(decoupling), intent(in) :: self

@@ -1,21 +1,33 @@
 !> Rotational receptances from translational ones by finite differences (2.57)-(2.59).
 module jointfrf_finite_difference
   use jointfrf_kinds, only: dp, ip
+  use jointfrf_lanes, only: in_memory, lane_kernels, lanes, largest_in_lanes, natural, real_lines, row_starts
   use jointfrf_line_layout, only: all_finite, load, store
   use jointfrf_lines_lapack, only: product_line
   use jointfrf_status, only: line_good, line_not_finite, line_overflow
-  use jointfrf_sweep, only: line_operation, line_space, run_sweep
+  use jointfrf_sweep, only: judge, line_operation, line_space, run_sweep
   implicit none
   private
   public :: difference_weights, transform_receptance
+
+  !> Where the matrices lie in lanes.
+  type :: transformation_in_lanes
+    real(dp), pointer, contiguous :: h(:, :, :), h_new(:, :, :)
+    integer, allocatable :: h_place(:), new_place(:)             !< in the caller's order
+    integer, allocatable :: weight(:), sums(:)                   !< T_out and T_in^T; what products are added to
+    complex(dp), allocatable :: weight_value(:), nothing(:)
+    integer, allocatable :: out_row(:), in_row(:), h_row(:), half_row(:), new_row(:)   !< the element before each row
+  end type transformation_in_lanes
 
   type, extends(line_operation) :: transformation
     logical :: transposed
     integer :: n_out, n_in, m_out, m_in
     complex(dp), pointer, contiguous :: h(:, :, :)
     complex(dp), allocatable :: t_out(:, :), t_in(:, :)
+    type(transformation_in_lanes) :: plan
   contains
     procedure :: line => transform_one
+    procedure :: line_block => transform_block
   end type transformation
 
 contains
@@ -75,8 +87,67 @@ contains
     operation%m_in = size(operation%t_in, 2)
     operation%n_complex = operation%m_out*operation%m_in + operation%n_out*(operation%m_in + operation%n_in)
     operation%flops = 8.0_dp*operation%n_out*operation%m_in*(operation%m_out + operation%n_in)
+    if (min(operation%n_out, operation%n_in, operation%m_out, operation%m_in) >= 1 &
+        .and. max(operation%n_out, operation%n_in, operation%m_out, operation%m_in) <= largest_in_lanes) &
+      call plan_transformation(operation)
     call run_sweep(operation, size(h, 3, kind=ip), line_info, rcond, info)
   end subroutine transform_receptance
+
+  subroutine plan_transformation(operation)
+    type(transformation), intent(inout) :: operation
+    integer :: t_out(operation%n_out, operation%m_out), t_in(operation%m_in, operation%n_in)
+    integer :: h(operation%m_out, operation%m_in), half(operation%n_out, operation%m_in)
+    integer :: h_new(operation%n_out, operation%n_in), taken
+
+    associate (n_out => operation%n_out, n_in => operation%n_in, m_out => operation%m_out, m_in => operation%m_in, &
+               plan => operation%plan)
+      t_out = natural(0, n_out, m_out)
+      taken = n_out*m_out
+      t_in = natural(taken, m_in, n_in)
+      taken = taken + m_in*n_in
+      h = natural(taken, m_out, m_in)
+      taken = taken + m_out*m_in
+      half = natural(taken, n_out, m_in)
+      taken = taken + n_out*m_in
+      h_new = natural(taken, n_out, n_in)
+      operation%n_element = taken + n_out*n_in
+      plan%h => real_lines(operation%h)
+      plan%h_new => real_lines(operation%result)
+      plan%h_place = in_memory(operation%transposed, h)
+      plan%new_place = in_memory(operation%transposed, h_new)
+      plan%weight = [in_memory(.true., t_out), in_memory(.true., t_in)]
+      plan%weight_value = [reshape(transpose(operation%t_out), [n_out*m_out]), reshape(operation%t_in, [m_in*n_in])]
+      plan%sums = [in_memory(.true., half), in_memory(.true., h_new)]
+      allocate (plan%nothing(size(plan%sums)), source=(0.0_dp, 0.0_dp))
+      plan%out_row = row_starts(t_out)
+      plan%in_row = row_starts(t_in)
+      plan%h_row = row_starts(h)
+      plan%half_row = row_starts(half)
+      plan%new_row = row_starts(h_new)
+    end associate
+  end subroutine plan_transformation
+
+  subroutine transform_block(self, kernels, first, n_lines, space, line_info, rcond)
+    class(transformation), intent(in) :: self
+    type(lane_kernels), intent(in) :: kernels
+    integer, intent(in) :: first, n_lines
+    type(line_space), target, intent(inout) :: space
+    integer(ip), intent(out) :: line_info(n_lines)
+    real(dp), intent(out) :: rcond(n_lines)
+    real(dp) :: total(lanes), well(lanes)
+
+    well = 1.0_dp
+    associate (plan => self%plan, x => space%x)
+      call kernels%fill(size(plan%weight), plan%weight_value, plan%weight, x)
+      call kernels%fill(size(plan%sums), plan%nothing, plan%sums, x)
+      call kernels%load(size(plan%h_place), plan%h_place, first, n_lines, plan%h, x)
+      call kernels%product(self%n_out, self%m_in, self%m_out, 1.0_dp, plan%out_row, plan%h_row, plan%half_row, x)
+      call kernels%product(self%n_out, self%n_in, self%m_in, 1.0_dp, plan%half_row, plan%in_row, plan%new_row, x) ! (2.57)
+      call kernels%store(size(plan%new_place), plan%new_place, first, n_lines, x, self%plan%h_new)
+      call kernels%total(size(plan%new_place), plan%new_place, x, total)
+      call judge(total, well, line_info, rcond)
+    end associate
+  end subroutine transform_block
 
   subroutine transform_one(self, i, space, line_info, rcond)
     class(transformation), intent(in) :: self

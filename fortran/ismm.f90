@@ -1,28 +1,54 @@
 !> Inverse structural modification: the joint stiffness from receptances of the assembly (2.37)-(2.48).
 module jointfrf_ismm
   use jointfrf_kinds, only: dp, ip
+  use jointfrf_lanes, only: in_memory, lane_kernels, lanes, largest_in_lanes, natural, padded, real_lines, row_starts, &
+    rows_in_memory, system, system_size
   use jointfrf_line_layout, only: all_finite, load, store, subtract, take_block
   use jointfrf_lines_lapack, only: inverse_work, product_line, solve_line
   use jointfrf_status, only: line_good, line_not_finite, line_overflow
-  use jointfrf_sweep, only: line_operation, line_space, run_sweep
+  use jointfrf_sweep, only: judge, line_operation, line_space, run_sweep
   implicit none
   private
   public :: ismm, inverse_substructuring
+
+  !> Where the matrices of ISMM lie in lanes. Elements are listed in the caller's order, unless said otherwise.
+  type :: identification_in_lanes
+    real(dp), pointer, contiguous :: alpha(:, :, :), gamma(:, :, :), k_initial(:, :, :), k_joint(:, :, :)
+    integer, allocatable :: alpha_place(:)         !< in the system alpha Y = W, columns k, then j
+    integer, allocatable :: gamma_place(:)         !< in the system gamma X = E_k
+    integer, allocatable :: difference(:)          !< alpha - gamma
+    integer, allocatable :: joint(:)               !< K0, then K*
+    integer, allocatable :: unit(:)                !< right-hand sides E_k, row by row
+    complex(dp), allocatable :: unit_value(:)
+    integer, allocatable :: difference_row(:), w_row(:)   !< the element before each row
+    integer, allocatable :: w(:)                   !< W, row by row
+  end type identification_in_lanes
+
+  !> The same for the short form.
+  type :: short_identification_in_lanes
+    real(dp), pointer, contiguous :: gamma(:, :, :), k_joint(:, :, :)
+    integer, allocatable :: gamma_place(:), unit(:)
+    complex(dp), allocatable :: unit_value(:)
+  end type short_identification_in_lanes
 
   type, extends(line_operation) :: identification
     logical :: transposed
     integer :: n
     complex(dp), pointer, contiguous :: alpha(:, :, :), gamma(:, :, :), k_initial(:, :, :)
+    type(identification_in_lanes) :: plan
   contains
     procedure :: line => identify_one
+    procedure :: line_block => identify_block
   end type identification
 
   type, extends(line_operation) :: short_identification
     logical :: transposed
     integer :: n
     complex(dp), pointer, contiguous :: gamma(:, :, :)
+    type(short_identification_in_lanes) :: plan
   contains
     procedure :: line => invert_one
+    procedure :: line_block => invert_block
   end type short_identification
 
 contains
@@ -57,8 +83,92 @@ contains
     operation%n_real = 2*m
     operation%n_pivot = m
     operation%flops = 8.0_dp*real(m, dp)**3*(5.0_dp/3.0_dp)
+    if (n >= 1 .and. m <= largest_in_lanes) call plan_identification(operation)
     call run_sweep(operation, size(alpha, 3, kind=ip), line_info, rcond, info)
   end subroutine ismm
+
+  subroutine plan_identification(operation)
+    type(identification), intent(inout) :: operation
+    integer :: of_alpha(2*operation%n, 3*operation%n), of_gamma(2*operation%n, 3*operation%n)
+    integer :: difference(2*operation%n, 2*operation%n), joint(operation%n, operation%n), n, m, taken
+
+    n = operation%n
+    m = 2*n
+    of_gamma = system(0, m, n)
+    taken = system_size(m, n)
+    of_alpha = system(taken, m, n)
+    taken = taken + system_size(m, n)
+    difference = natural(taken, m, m)
+    taken = taken + m*m
+    joint = natural(taken, n, n)
+    operation%n_element = taken + n*n
+    operation%n_hint = 2*padded(m)
+    associate (plan => operation%plan)
+      plan%alpha => real_lines(operation%alpha)
+      plan%gamma => real_lines(operation%gamma)
+      plan%k_initial => real_lines(operation%k_initial)
+      plan%k_joint => real_lines(operation%result)
+      plan%gamma_place = in_memory(operation%transposed, of_gamma(:, :m))
+      plan%alpha_place = in_memory(operation%transposed, of_alpha(:, cshift(row_numbers(m), n)))
+      plan%difference = in_memory(operation%transposed, difference)
+      plan%joint = in_memory(operation%transposed, joint)
+      plan%unit = in_memory(.true., of_gamma(:, m + 1:))
+      plan%unit_value = unit_block(m, n)
+      plan%w = in_memory(.true., of_alpha(:, m + 1:))
+      plan%difference_row = row_starts(difference)
+      plan%w_row = row_starts(of_alpha(:, m + 1:))
+    end associate
+  end subroutine plan_identification
+
+  !> X = gamma^-1 E_k, W = (alpha - gamma) X, and of Y = alpha^-1 W the rows j, which are eliminated last: D_jk.
+  subroutine identify_block(self, kernels, first, n_lines, space, line_info, rcond)
+    class(identification), intent(in) :: self
+    type(lane_kernels), intent(in) :: kernels
+    integer, intent(in) :: first, n_lines
+    type(line_space), target, intent(inout) :: space
+    integer(ip), intent(out) :: line_info(n_lines)
+    real(dp), intent(out) :: rcond(n_lines)
+    real(dp) :: rcond_alpha(lanes), rcond_gamma(lanes), total(lanes)
+    integer :: x_row(2*self%n), y_row(2*self%n), y(self%n**2), n, m
+
+    n = self%n
+    m = 2*n
+    associate (plan => self%plan, x => space%x)
+      call kernels%load(m*m, plan%gamma_place, first, n_lines, plan%gamma, x)
+      call kernels%load(m*m, plan%alpha_place, first, n_lines, plan%alpha, x)
+      call kernels%load(n*n, plan%joint, first, n_lines, plan%k_initial, x)
+      call kernels%combine(m*m, 1.0_dp, plan%alpha_place, -1.0_dp, plan%gamma_place, plan%difference, x)
+      call kernels%fill(m*n, plan%unit_value, plan%unit, x)
+      call kernels%solve(m, n, m, 0, x, space%hint(:padded(m)), x_row, rcond_gamma)
+      call kernels%fill(m*n, 0*plan%unit_value, plan%w, x)
+      call kernels%product(m, n, m, 1.0_dp, plan%difference_row, x_row, plan%w_row, x)
+      call kernels%solve(m, n, n, system_size(m, n), x, space%hint(padded(m) + 1:), y_row, rcond_alpha)
+      call rows_in_memory(self%transposed, y_row(n + 1:), n, y)
+      call kernels%combine(n*n, 1.0_dp, plan%joint, -1.0_dp, y, plan%joint, x)      ! (2.47), (2.48): K* = K0 - D_jk
+      call kernels%store(n*n, plan%joint, first, n_lines, x, self%plan%k_joint)
+      call kernels%total(n*n, plan%joint, x, total)
+      call judge(total, min(rcond_alpha, rcond_gamma), line_info, rcond)
+    end associate
+  end subroutine identify_block
+
+  !> E_k row by row: zeros above the unit matrix.
+  pure function unit_block(m, n) result(values)
+    integer, intent(in) :: m, n
+    complex(dp) :: values(m*n)
+    integer :: i
+
+    values = 0
+    do i = 1, n
+      values((m - n + i - 1)*n + i) = 1
+    end do
+  end function unit_block
+
+  pure function row_numbers(n) result(numbers)
+    integer, intent(in) :: n
+    integer :: numbers(n), i
+
+    numbers = [(i, i=1, n)]
+  end function row_numbers
 
   subroutine identify_one(self, i, space, line_info, rcond)
     class(identification), intent(in) :: self
@@ -128,8 +238,51 @@ contains
     operation%n_real = 2*m
     operation%n_pivot = m
     operation%flops = 8.0_dp*real(m, dp)**3*(5.0_dp/6.0_dp)
+    if (n >= 1 .and. m <= largest_in_lanes) call plan_short_identification(operation)
     call run_sweep(operation, size(gamma, 3, kind=ip), line_info, rcond, info)
   end subroutine inverse_substructuring
+
+  subroutine plan_short_identification(operation)
+    type(short_identification), intent(inout) :: operation
+    integer :: element(2*operation%n, 3*operation%n), n, m
+
+    n = operation%n
+    m = 2*n
+    element = system(0, m, n)
+    operation%n_element = system_size(m, n)
+    operation%n_hint = padded(m)
+    associate (plan => operation%plan)
+      plan%gamma => real_lines(operation%gamma)
+      plan%k_joint => real_lines(operation%result)
+      plan%gamma_place = in_memory(operation%transposed, element(:, cshift(row_numbers(m), n)))
+      plan%unit = in_memory(.true., element(:, m + 1:))
+      plan%unit_value = -unit_block(m, n)
+    end associate
+  end subroutine plan_short_identification
+
+  !> gamma X = -E_k with the columns k before j, so that the wanted rows j of X are found first.
+  subroutine invert_block(self, kernels, first, n_lines, space, line_info, rcond)
+    class(short_identification), intent(in) :: self
+    type(lane_kernels), intent(in) :: kernels
+    integer, intent(in) :: first, n_lines
+    type(line_space), target, intent(inout) :: space
+    integer(ip), intent(out) :: line_info(n_lines)
+    real(dp), intent(out) :: rcond(n_lines)
+    real(dp) :: rcond_lanes(lanes), total(lanes)
+    integer :: row(2*self%n), joint(self%n**2), n, m
+
+    n = self%n
+    m = 2*n
+    associate (plan => self%plan, x => space%x)
+      call kernels%load(m*m, plan%gamma_place, first, n_lines, plan%gamma, x)
+      call kernels%fill(m*n, plan%unit_value, plan%unit, x)
+      call kernels%solve(m, n, n, 0, x, space%hint, row, rcond_lanes)
+      call rows_in_memory(self%transposed, row(n + 1:), n, joint)
+      call kernels%store(n*n, joint, first, n_lines, x, self%plan%k_joint)
+      call kernels%total(n*n, joint, x, total)
+      call judge(total, rcond_lanes, line_info, rcond)
+    end associate
+  end subroutine invert_block
 
   subroutine invert_one(self, i, space, line_info, rcond)
     class(short_identification), intent(in) :: self

@@ -1,10 +1,12 @@
 !> Inverse and solution of a sweep of matrices.
 module jointfrf_linear_algebra
   use jointfrf_kinds, only: dp, ip
+  use jointfrf_lanes, only: in_memory, lane_kernels, lanes, largest_in_lanes, padded, real_lines, rows_in_memory, system, &
+    system_size
   use jointfrf_line_layout, only: all_finite, load, store
   use jointfrf_lines_lapack, only: inverse_work, invert_line, solve_line
   use jointfrf_status, only: line_not_finite
-  use jointfrf_sweep, only: line_operation, line_space, run_sweep
+  use jointfrf_sweep, only: judge, line_operation, line_space, run_sweep
   implicit none
   private
   public :: invert, solve
@@ -12,16 +14,22 @@ module jointfrf_linear_algebra
   type, extends(line_operation) :: inversion
     integer :: n
     complex(dp), pointer, contiguous :: a(:, :, :)
+    real(dp), pointer, contiguous :: a_pairs(:, :, :), result_pairs(:, :, :)
+    integer, allocatable :: place(:)
   contains
     procedure :: line => invert_one
+    procedure :: line_block => invert_block
   end type inversion
 
   type, extends(line_operation) :: solution
     logical :: transposed
     integer :: n, n_rhs
     complex(dp), pointer, contiguous :: a(:, :, :), b(:, :, :)
+    real(dp), pointer, contiguous :: a_pairs(:, :, :), b_pairs(:, :, :), result_pairs(:, :, :)
+    integer, allocatable :: a_place(:), b_place(:)
   contains
     procedure :: line => solve_one
+    procedure :: line_block => solve_block
   end type solution
 
 contains
@@ -43,8 +51,32 @@ contains
     operation%n_complex = inverse_work(operation%n)
     operation%n_pivot = operation%n
     operation%flops = 8.0_dp*real(operation%n, dp)**3
+    if (operation%n >= 1 .and. operation%n <= largest_in_lanes) then
+      operation%n_element = system_size(operation%n, 0)
+      operation%n_hint = padded(operation%n)
+      operation%a_pairs => real_lines(a)
+      operation%result_pairs => real_lines(a_inverse)
+      operation%place = in_memory(.true., system(0, operation%n, 0))
+    end if
     call run_sweep(operation, size(a, 3, kind=ip), line_info, rcond, info)
   end subroutine invert
+
+  !> The rows in lanes are the columns in memory, so that the largest row sum is the 1-norm.
+  subroutine invert_block(self, kernels, first, n_lines, space, line_info, rcond)
+    class(inversion), intent(in) :: self
+    type(lane_kernels), intent(in) :: kernels
+    integer, intent(in) :: first, n_lines
+    type(line_space), target, intent(inout) :: space
+    integer(ip), intent(out) :: line_info(n_lines)
+    real(dp), intent(out) :: rcond(n_lines)
+    real(dp) :: rcond_lanes(lanes)
+    integer :: place(self%n**2)
+
+    call kernels%load(self%n**2, self%place, first, n_lines, self%a_pairs, space%x)
+    call kernels%invert(self%n, 0, space%x, space%hint, place, rcond_lanes)
+    call kernels%store(self%n**2, place, first, n_lines, space%x, self%result_pairs)
+    call judge(rcond_lanes, rcond_lanes, line_info, rcond)
+  end subroutine invert_block
 
   subroutine invert_one(self, i, space, line_info, rcond)
     class(inversion), intent(in) :: self
@@ -83,8 +115,45 @@ contains
     operation%n_real = 2*operation%n
     operation%n_pivot = operation%n
     operation%flops = 8.0_dp*real(operation%n, dp)**2*(operation%n/3.0_dp + operation%n_rhs)
+    if (min(operation%n, operation%n_rhs) >= 1 .and. operation%n <= largest_in_lanes) call plan_solution(operation)
     call run_sweep(operation, size(a, 3, kind=ip), line_info, rcond, info)
   end subroutine solve
+
+  subroutine plan_solution(operation)
+    type(solution), intent(inout) :: operation
+    integer :: element(operation%n, operation%n + operation%n_rhs)
+
+    associate (n => operation%n, n_rhs => operation%n_rhs)
+      element = system(0, n, n_rhs)
+      operation%n_element = system_size(n, n_rhs)
+      operation%n_hint = padded(n)
+      operation%a_place = in_memory(operation%transposed, element(:, :n))
+      operation%b_place = in_memory(operation%transposed, element(:, n + 1:))
+      operation%a_pairs => real_lines(operation%a)
+      operation%b_pairs => real_lines(operation%b)
+      operation%result_pairs => real_lines(operation%result)
+    end associate
+  end subroutine plan_solution
+
+  subroutine solve_block(self, kernels, first, n_lines, space, line_info, rcond)
+    class(solution), intent(in) :: self
+    type(lane_kernels), intent(in) :: kernels
+    integer, intent(in) :: first, n_lines
+    type(line_space), target, intent(inout) :: space
+    integer(ip), intent(out) :: line_info(n_lines)
+    real(dp), intent(out) :: rcond(n_lines)
+    real(dp) :: rcond_lanes(lanes), total(lanes)
+    integer :: row(self%n), place(self%n*self%n_rhs), n_x
+
+    n_x = self%n*self%n_rhs
+    call kernels%load(self%n**2, self%a_place, first, n_lines, self%a_pairs, space%x)
+    call kernels%load(n_x, self%b_place, first, n_lines, self%b_pairs, space%x)
+    call kernels%solve(self%n, self%n_rhs, self%n, 0, space%x, space%hint, row, rcond_lanes)
+    call rows_in_memory(self%transposed, row, self%n_rhs, place)
+    call kernels%store(n_x, place, first, n_lines, space%x, self%result_pairs)
+    call kernels%total(n_x, place, space%x, total)
+    call judge(total, rcond_lanes, line_info, rcond)
+  end subroutine solve_block
 
   subroutine solve_one(self, i, space, line_info, rcond)
     class(solution), intent(in) :: self

@@ -2,21 +2,38 @@
 !> into another (2.40), (2.47).
 module jointfrf_modification
   use jointfrf_kinds, only: dp, ip
+  use jointfrf_lanes, only: flat, in_memory, lane_kernels, lanes, largest_in_lanes, natural, padded, real_lines, row_starts, &
+    system, system_size
   use jointfrf_line_layout, only: all_finite, load, store, subtract
   use jointfrf_lines_lapack, only: inverse_work, product_line, solve_line
   use jointfrf_status, only: line_good, line_not_finite, line_overflow
-  use jointfrf_sweep, only: line_operation, line_space, run_sweep
+  use jointfrf_sweep, only: judge, line_operation, line_space, run_sweep
   implicit none
   private
   public :: modify, find_modification, apply_modification, modification_work
+  public :: modification_in_lanes, plan_modification, apply_in_lanes, modification_elements
+
+  !> Where the matrices of a modification lie in lanes: H, D, [H_mm, rows], columns, and the system
+  !> [I + D H_mm, D rows], which is solved for the forces.
+  type :: modification_in_lanes
+    integer :: n, n_m
+    integer, allocatable :: h(:, :), d(:, :), h_mm(:, :), rows(:, :), columns(:, :)
+    complex(dp), allocatable :: unit_value(:)      !< [I, 0], row by row
+    integer, allocatable :: d_row(:), right_row(:), product_row(:), product(:), in_system(:), columns_row(:), h_row(:)
+    integer :: system_before                       !< the element before the system
+  end type modification_in_lanes
 
   type, extends(line_operation) :: modification
     logical :: transposed
     integer :: n, n_m
     complex(dp), pointer, contiguous :: alpha(:, :, :), d(:, :, :)
     integer(ip), pointer, contiguous :: dofs(:)
+    type(modification_in_lanes) :: plan
+    real(dp), pointer, contiguous :: alpha_pairs(:, :, :), d_pairs(:, :, :), result_pairs(:, :, :)
+    integer, allocatable :: h_place(:), d_place(:), taken(:), taken_from(:)
   contains
     procedure :: line => modify_one
+    procedure :: line_block => modify_block
   end type modification
 
   type, extends(line_operation) :: inverse_modification
@@ -58,8 +75,106 @@ contains
     operation%n_real = 2*n_m
     operation%n_pivot = n_m
     operation%flops = 8.0_dp*n_m*(real(n, dp)**2 + 2.0_dp*real(n_m, dp)*n)
+    if (n_m >= 1 .and. max(n, n_m) <= largest_in_lanes) call plan_block(operation)
     call run_sweep(operation, size(alpha, 3, kind=ip), line_info, rcond, info)
   end subroutine modify
+
+  subroutine plan_block(operation)
+    type(modification), intent(inout) :: operation
+
+    call plan_modification(operation%n, operation%n_m, operation%plan)
+    operation%n_element = modification_elements(operation%n, operation%n_m)
+    operation%n_hint = padded(operation%n_m)
+    operation%alpha_pairs => real_lines(operation%alpha)
+    operation%d_pairs => real_lines(operation%d)
+    operation%result_pairs => real_lines(operation%result)
+    associate (plan => operation%plan, dofs => operation%dofs)
+      operation%h_place = in_memory(operation%transposed, plan%h)
+      operation%d_place = in_memory(operation%transposed, plan%d)
+      operation%taken = [flat(plan%columns), flat(plan%rows), flat(plan%h_mm)]
+      operation%taken_from = [flat(plan%h(:, dofs)), flat(plan%h(dofs, :)), flat(plan%h(dofs, dofs))]
+    end associate
+  end subroutine plan_block
+
+  subroutine modify_block(self, kernels, first, n_lines, space, line_info, rcond)
+    class(modification), intent(in) :: self
+    type(lane_kernels), intent(in) :: kernels
+    integer, intent(in) :: first, n_lines
+    type(line_space), target, intent(inout) :: space
+    integer(ip), intent(out) :: line_info(n_lines)
+    real(dp), intent(out) :: rcond(n_lines)
+    real(dp) :: rcond_lanes(lanes), total(lanes)
+
+    associate (x => space%x)
+      call kernels%load(size(self%h_place), self%h_place, first, n_lines, self%alpha_pairs, x)
+      call kernels%load(size(self%d_place), self%d_place, first, n_lines, self%d_pairs, x)
+      call kernels%copy(size(self%taken), 1.0_dp, self%taken_from, self%taken, x)
+      call apply_in_lanes(self%plan, kernels, x, space%hint, rcond_lanes)
+      call kernels%store(size(self%h_place), self%h_place, first, n_lines, x, self%result_pairs)
+      call kernels%total(size(self%h_place), self%h_place, x, total)
+      call judge(total, rcond_lanes, line_info, rcond)
+    end associate
+  end subroutine modify_block
+
+  !> Elements that a modification of n DOFs at n_m coordinates takes.
+  pure function modification_elements(n, n_m) result(elements)
+    integer, intent(in) :: n, n_m
+    integer :: elements
+
+    elements = n*n + n_m*n_m + 2*n_m*(n_m + n) + n*n_m + system_size(n_m, n)
+  end function modification_elements
+
+  pure subroutine plan_modification(n, n_m, plan)
+    integer, intent(in) :: n, n_m
+    type(modification_in_lanes), intent(out) :: plan
+    integer :: right(n_m, n_m + n), product(n_m, n_m + n), whole(n_m, n_m + n), taken, i
+
+    plan%n = n
+    plan%n_m = n_m
+    plan%h = natural(0, n, n)
+    taken = n*n
+    plan%d = natural(taken, n_m, n_m)
+    taken = taken + n_m*n_m
+    right = natural(taken, n_m, n_m + n)
+    plan%h_mm = right(:, :n_m)
+    plan%rows = right(:, n_m + 1:)
+    taken = taken + n_m*(n_m + n)
+    product = natural(taken, n_m, n_m + n)
+    taken = taken + n_m*(n_m + n)
+    plan%columns = natural(taken, n, n_m)
+    taken = taken + n*n_m
+    whole = system(taken, n_m, n)
+    plan%system_before = taken
+    plan%product = in_memory(.true., product)
+    plan%in_system = in_memory(.true., whole)
+    allocate (plan%unit_value(size(product)), source=(0.0_dp, 0.0_dp))
+    do i = 1, n_m
+      plan%unit_value((i - 1)*(n_m + n) + i) = 1
+    end do
+    plan%d_row = row_starts(plan%d)
+    plan%right_row = row_starts(right)
+    plan%product_row = row_starts(product)
+    plan%columns_row = row_starts(plan%columns)
+    plan%h_row = row_starts(plan%h)
+  end subroutine plan_modification
+
+  !> `apply_modification` in lanes, once H, D, H_mm, rows and columns are there.
+  subroutine apply_in_lanes(plan, kernels, x, hint, rcond)
+    type(modification_in_lanes), intent(in) :: plan
+    type(lane_kernels), intent(in) :: kernels
+    real(dp), contiguous, intent(inout) :: x(:, :, :)
+    integer, contiguous, intent(inout) :: hint(:)
+    real(dp), intent(out) :: rcond(lanes)
+    integer :: force_row(plan%n_m), n, n_m
+
+    n = plan%n
+    n_m = plan%n_m
+    call kernels%fill(size(plan%product), plan%unit_value, plan%product, x)
+    call kernels%product(n_m, n_m + n, n_m, 1.0_dp, plan%d_row, plan%right_row, plan%product_row, x)
+    call kernels%copy(size(plan%product), 1.0_dp, plan%product, plan%in_system, x)
+    call kernels%solve(n_m, n, n_m, plan%system_before, x, hint, force_row, rcond)
+    call kernels%product(n, n, n_m, -1.0_dp, plan%columns_row, force_row, plan%h_row, x)
+  end subroutine apply_in_lanes
 
   subroutine modify_one(self, i, space, line_info, rcond)
     class(modification), intent(in) :: self

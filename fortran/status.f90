@@ -1,7 +1,8 @@
 !> Every status code of the kernel and its text, once.
 !>
 !> `info` (one a call):      0 good; -i argument i is wrong; > 0 that many lines are bad, see `line_info`;
-!>                           `info_no_memory` the workspace could not be allocated.
+!>                           `info_no_memory` the workspace could not be allocated; `info_no_engine` the environment
+!>                           variable JOINTFRF_ENGINE names an engine that this machine does not have.
 !> `line_info` (one a line): 0 good; i > 0 LAPACK found pivot i to be exactly zero; `line_not_finite` the line holds NaN
 !>                           or Inf; `line_overflow` the line is finite but its result is not. A bad line is filled with
 !>                           NaN and the sweep goes on.
@@ -13,6 +14,7 @@ module jointfrf_status
 
   integer(ip), parameter, public :: info_good = 0
   integer(ip), parameter, public :: info_no_memory = -1000
+  integer(ip), parameter, public :: info_no_engine = -1001
   integer(ip), parameter, public :: line_good = 0
   integer(ip), parameter, public :: line_not_finite = -1
   integer(ip), parameter, public :: line_overflow = -2
@@ -33,6 +35,8 @@ contains
       text = 'good'
     else if (info == info_no_memory) then
       text = 'the workspace could not be allocated'
+    else if (info == info_no_engine) then
+      text = 'JOINTFRF_ENGINE names an engine that this machine does not have'
     else if (info < 0) then
       text = 'argument '//trim(digits)//' is wrong'
     else

@@ -23,10 +23,18 @@ typedef double _Complex jf_complex;
 /* info: 0 good; -i argument i is wrong, counted from 1; > 0 number of bad lines */
 #define JF_INFO_GOOD 0
 #define JF_INFO_NO_MEMORY (-1000)
+#define JF_INFO_NO_ENGINE (-1001)
 /* line_info: 0 good; > 0 singular */
 #define JF_LINE_GOOD 0
 #define JF_LINE_NOT_FINITE (-1)
 #define JF_LINE_OVERFLOW (-2)
+/* engines; JF_ENGINE_AUTOMATIC is the widest there is */
+#define JF_ENGINE_AUTOMATIC 0
+#define JF_ENGINE_LAPACK 1
+#define JF_ENGINE_PLAIN 2
+#define JF_ENGINE_X86_64_V2 3
+#define JF_ENGINE_X86_64_V3 4
+#define JF_ENGINE_X86_64_V4 5
 
 #ifdef __cplusplus
 extern "C" {
@@ -35,6 +43,8 @@ extern "C" {
 void jf_version_(int *major, int *minor, int *patch);
 void jf_info_text_(const int *info, const int *n_text, char *text);
 void jf_line_text_(const int *line_info, const int *n_text, char *text);
+void jf_set_engine_(const int *engine, int *info);
+void jf_get_engine_(int *engine, int *info);
 void jf_invert_(const int *n, const int *n_freq, const jf_complex *a, jf_complex *a_inverse, int *line_info, double
     *rcond, int *info);
 void jf_solve_(const char *trans, const int *n, const int *n_rhs, const int *n_freq, const jf_complex *a, const
@@ -82,6 +92,8 @@ void jf_transform_(const char *trans, const int *n_out, const int *n_in, const i
 #define jf_version jf_version_
 #define jf_info_text jf_info_text_
 #define jf_line_text jf_line_text_
+#define jf_set_engine jf_set_engine_
+#define jf_get_engine jf_get_engine_
 #define jf_invert jf_invert_
 #define jf_solve jf_solve_
 #define jf_receptance jf_receptance_

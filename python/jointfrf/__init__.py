@@ -10,6 +10,7 @@ from jointfrf.compliance import compliance_covariance, compliance_factors, joint
 from jointfrf.coupling import couple
 from jointfrf.decoupling import decouple
 from jointfrf.discrete import chain
+from jointfrf.engine import get_engine, set_engine, use_engine
 from jointfrf.errors import (
     ConvergenceWarning,
     CopyWarning,

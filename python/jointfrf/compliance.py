@@ -5,13 +5,17 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from jointfrf._sweep import ComplexArray, OnSingular, as_interface, as_real, optional_frequency, run
+from jointfrf._sweep import N_FREQ, ComplexArray, OnSingular, as_interface, as_real, optional_frequency, run
 
 __all__ = ["compliance_covariance", "compliance_factors", "joint_compliance"]
 
 
 def joint_compliance(
-    gamma: ArrayLike, *, freq_hz: ArrayLike | None = None, on_singular: OnSingular = "raise"
+    gamma: ArrayLike,
+    *,
+    freq_hz: ArrayLike | None = None,
+    on_singular: OnSingular = "raise",
+    out: ComplexArray | None = None,
 ) -> ComplexArray:
     """Joint compliance C = K*^-1 without model, first estimate or band.
 
@@ -19,7 +23,7 @@ def joint_compliance(
     ----------
     gamma : array_like, shape (n_freq, 2 n, 2 n)
         Receptance of the assembly at joint DOFs j, then k, m/N.
-    freq_hz, on_singular
+    freq_hz, on_singular, out
         As in `couple`.
 
     Returns
@@ -47,7 +51,8 @@ def joint_compliance(
     measured, n = as_interface("gamma", gamma)
     n_freq = measured.shape[0]
     freq = optional_frequency(freq_hz, n_freq)
-    return run("joint_compliance", (n, n_freq, measured), (n_freq, n, n), {"gamma": measured}, freq, on_singular)[0]
+    shape, sweeps = (n_freq, n, n), {"gamma": measured}
+    return run("joint_compliance", (n, N_FREQ, measured), shape, sweeps, freq, on_singular, out=out)[0]
 
 
 def compliance_factors(
@@ -97,7 +102,7 @@ def compliance_factors(
     t = as_real("transform", np.eye(2 * n) if transform is None else transform, (2 * n, None))
     m = t.shape[1]
     freq = optional_frequency(freq_hz, n_freq)
-    args = (n, m, n_freq, mean, t)
+    args = (n, m, N_FREQ, mean, t)
     factors = run("compliance_factors", args, (n_freq, 2 * n, m), {"gamma": mean}, freq, on_singular)[0]
     return factors[:, :n], factors[:, n:].swapaxes(1, 2)
 
@@ -155,5 +160,6 @@ def compliance_covariance(
     if (spread < 0).any():
         raise ValueError("variance must not be negative")
     freq = optional_frequency(freq_hz, n_freq)
-    args = (int(reciprocal), n, m, n_freq, mean, t, spread)
-    return run("compliance_covariance", args, (n_freq, n * n, n * n), {"gamma": mean}, freq, on_singular)[0]
+    args = (int(reciprocal), n, m, N_FREQ, mean, t, spread)
+    sweeps = {"gamma": mean, "variance": spread}
+    return run("compliance_covariance", args, (n_freq, n * n, n * n), sweeps, freq, on_singular)[0]

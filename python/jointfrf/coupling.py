@@ -5,6 +5,7 @@ from __future__ import annotations
 from numpy.typing import ArrayLike
 
 from jointfrf._sweep import (
+    N_FREQ,
     ComplexArray,
     OnSingular,
     as_dofs,
@@ -26,6 +27,7 @@ def couple(
     *,
     freq_hz: ArrayLike | None = None,
     on_singular: OnSingular = "raise",
+    out: ComplexArray | None = None,
 ) -> ComplexArray:
     """Receptance of the assembly of A and B through a flexible joint, all blocks.
 
@@ -43,6 +45,8 @@ def couple(
         Frequencies in Hz, to name a bad line.
     on_singular : {"raise", "nan"}
         Whether a bad line raises or becomes NaN.
+    out : ndarray of complex128, optional
+        Where the result goes, as in `invert`.
 
     Returns
     -------
@@ -69,9 +73,9 @@ def couple(
     >>> jf.couple(h, h, [[3.0]], [0], [0]).real.round(4).tolist()
     [[[0.3125, 0.1875], [0.1875, 0.3125]]]
     """
-    a = as_square("h_a", h_a)
+    a = as_square("h_a", h_a, later=True)
     n_freq, n_a, _ = a.shape
-    b = as_square("h_b", h_b, n_freq)
+    b = as_square("h_b", h_b, n_freq, later=True)
     n_b = b.shape[1]
     j = as_dofs("dofs_a", dofs_a, n_a)
     k = as_dofs("dofs_b", dofs_b, n_b)
@@ -79,6 +83,6 @@ def couple(
         raise ValueError(f"dofs_a and dofs_b must name the same number of DOFs, at least one: {j.size} and {k.size}")
     joint = as_joint_lines("k_joint", k_joint, j.size, n_freq)
     freq = optional_frequency(freq_hz, n_freq)
-    args = (n_a, n_b, j.size, n_freq, a, b, joint, j, k)
+    args = (n_a, n_b, j.size, N_FREQ, a, b, joint, j, k)
     shape = (n_freq, n_a + n_b, n_a + n_b)
-    return run("couple", args, shape, {"h_a": a, "h_b": b, "k_joint": joint}, freq, on_singular)[0]
+    return run("couple", args, shape, {"h_a": a, "h_b": b, "k_joint": joint}, freq, on_singular, out=out)[0]

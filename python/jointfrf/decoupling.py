@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from jointfrf._sweep import (
+    N_FREQ,
     ComplexArray,
     OnSingular,
     as_dofs,
@@ -35,6 +36,7 @@ def decouple(
     *,
     freq_hz: ArrayLike | None = None,
     on_singular: OnSingular = "raise",
+    out: ComplexArray | None = None,
 ) -> ComplexArray:
     """Joint stiffness from FRFs of the assembly away from the joint and of both substructures.
 
@@ -52,7 +54,7 @@ def decouple(
         Joint DOFs of A and of B, counted from 0, in the same order.
     dofs_r, dofs_s : array_like of int, shape (n,), optional
         Internal DOFs r of A and s of B; needed where `equation` names the point.
-    freq_hz, on_singular
+    freq_hz, on_singular, out
         As in `couple`.
 
     Returns
@@ -80,9 +82,9 @@ def decouple(
     [[[3.0]]]
     """
     check_choice("equation", equation, get_args(Equation))
-    a = as_square("h_a", h_a)
+    a = as_square("h_a", h_a, later=True)
     n_freq, n_a, _ = a.shape
-    b = as_square("h_b", h_b, n_freq)
+    b = as_square("h_b", h_b, n_freq, later=True)
     n_b = b.shape[1]
     j = as_dofs("dofs_j", dofs_j, n_a)
     k = as_dofs("dofs_k", dofs_k, n_b)
@@ -100,7 +102,8 @@ def decouple(
         if where.size != n:
             raise ValueError(f"dofs_{point} must name {n} DOFs, as many as the joint has, not {where.size}")
         internal.append(where)
-    c = as_lines("h_c", h_c, n, n, n_freq)
+    c = as_lines("h_c", h_c, n, n, n_freq, later=True)
     freq = optional_frequency(freq_hz, n_freq)
-    args = (equation, n_a, n_b, n, n_freq, a, b, c, j, k, *internal)
-    return run("decouple", args, (n_freq, n, n), {"h_a": a, "h_b": b, "h_c": c}, freq, on_singular)[0]
+    args = (equation, n_a, n_b, n, N_FREQ, a, b, c, j, k, *internal)
+    sweeps = {"h_a": a, "h_b": b, "h_c": c}
+    return run("decouple", args, (n_freq, n, n), sweeps, freq, on_singular, out=out)[0]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from numpy.typing import ArrayLike
 
 from jointfrf._sweep import (
+    N_FREQ,
     ComplexArray,
     OnSingular,
     as_interface,
@@ -23,6 +24,7 @@ def ismm(
     *,
     freq_hz: ArrayLike | None = None,
     on_singular: OnSingular = "raise",
+    out: ComplexArray | None = None,
 ) -> ComplexArray:
     """Joint stiffness K* = K0 + Delta by the inverse structural modification method.
 
@@ -34,7 +36,7 @@ def ismm(
         Measured receptance of the assembly at the same DOFs.
     k_initial : array_like, shape (n_freq, n, n) or (n, n)
         First estimate K0, N/m.
-    freq_hz, on_singular
+    freq_hz, on_singular, out
         As in `couple`.
 
     Returns
@@ -67,11 +69,16 @@ def ismm(
     first = as_joint_lines("k_initial", k_initial, n, n_freq)
     freq = optional_frequency(freq_hz, n_freq)
     sweeps = {"alpha": calculated, "gamma": measured, "k_initial": first}
-    return run("ismm", (n, n_freq, calculated, measured, first), first.shape, sweeps, freq, on_singular)[0]
+    args = (n, N_FREQ, calculated, measured, first)
+    return run("ismm", args, first.shape, sweeps, freq, on_singular, out=out)[0]
 
 
 def inverse_substructuring(
-    gamma: ArrayLike, *, freq_hz: ArrayLike | None = None, on_singular: OnSingular = "raise"
+    gamma: ArrayLike,
+    *,
+    freq_hz: ArrayLike | None = None,
+    on_singular: OnSingular = "raise",
+    out: ComplexArray | None = None,
 ) -> ComplexArray:
     """Joint stiffness K* = -(gamma^-1)_jk: what ISMM reduces to, without model and first estimate.
 
@@ -79,7 +86,7 @@ def inverse_substructuring(
     ----------
     gamma : array_like, shape (n_freq, 2 n, 2 n)
         Measured receptance of the assembly at joint DOFs j, then k, m/N.
-    freq_hz, on_singular
+    freq_hz, on_singular, out
         As in `couple`.
 
     Returns
@@ -106,5 +113,5 @@ def inverse_substructuring(
     measured, n = as_interface("gamma", gamma)
     n_freq = measured.shape[0]
     freq = optional_frequency(freq_hz, n_freq)
-    shape = (n_freq, n, n)
-    return run("inverse_substructuring", (n, n_freq, measured), shape, {"gamma": measured}, freq, on_singular)[0]
+    shape, sweeps = (n_freq, n, n), {"gamma": measured}
+    return run("inverse_substructuring", (n, N_FREQ, measured), shape, sweeps, freq, on_singular, out=out)[0]

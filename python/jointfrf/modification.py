@@ -5,6 +5,7 @@ from __future__ import annotations
 from numpy.typing import ArrayLike
 
 from jointfrf._sweep import (
+    N_FREQ,
     ComplexArray,
     OnSingular,
     as_dofs,
@@ -24,6 +25,7 @@ def modify(
     *,
     freq_hz: ArrayLike | None = None,
     on_singular: OnSingular = "raise",
+    out: ComplexArray | None = None,
 ) -> ComplexArray:
     """Receptance after a local modification.
 
@@ -35,7 +37,7 @@ def modify(
         Dynamic stiffness added at the modified DOFs, Delta K - w^2 Delta M + i Delta H (2.32), N/m.
     dofs : array_like of int, shape (n_m,)
         The modified DOFs, counted from 0.
-    freq_hz, on_singular
+    freq_hz, on_singular, out
         As in `couple`.
 
     Returns
@@ -60,19 +62,24 @@ def modify(
     >>> jf.modify([[[0.5]]], [[2.0]], [0]).real.tolist()
     [[[0.25]]]
     """
-    before = as_square("alpha", alpha)
+    before = as_square("alpha", alpha, later=True)
     n_freq, n, _ = before.shape
     where = as_dofs("dofs", dofs, n)
     if where.size == 0:
         raise ValueError("dofs must name at least one DOF")
     added = as_joint_lines("d", d, where.size, n_freq)
     freq = optional_frequency(freq_hz, n_freq)
-    args = (n, where.size, n_freq, before, added, where)
-    return run("modify", args, before.shape, {"alpha": before, "d": added}, freq, on_singular)[0]
+    args = (n, where.size, N_FREQ, before, added, where)
+    return run("modify", args, before.shape, {"alpha": before, "d": added}, freq, on_singular, out=out)[0]
 
 
 def find_modification(
-    alpha: ArrayLike, gamma: ArrayLike, *, freq_hz: ArrayLike | None = None, on_singular: OnSingular = "raise"
+    alpha: ArrayLike,
+    gamma: ArrayLike,
+    *,
+    freq_hz: ArrayLike | None = None,
+    on_singular: OnSingular = "raise",
+    out: ComplexArray | None = None,
 ) -> ComplexArray:
     """Return the modification D = alpha^-1 (alpha - gamma) gamma^-1 that turns alpha into gamma (2.40), (2.47).
 
@@ -80,7 +87,7 @@ def find_modification(
     ----------
     alpha, gamma : array_like, shape (n_freq, n, n)
         Receptances before and after at the modified DOFs, m/N.
-    freq_hz, on_singular
+    freq_hz, on_singular, out
         As in `couple`.
 
     Returns
@@ -103,11 +110,11 @@ def find_modification(
     >>> jf.find_modification([[[0.5]]], [[[0.25]]]).real.tolist()
     [[[2.0]]]
     """
-    before = as_square("alpha", alpha)
+    before = as_square("alpha", alpha, later=True)
     n_freq, n, _ = before.shape
-    after = as_square("gamma", gamma, n_freq)
+    after = as_square("gamma", gamma, n_freq, later=True)
     if after.shape != before.shape:
         raise ValueError(f"gamma must have the shape of alpha, {before.shape}, not {after.shape}")
     freq = optional_frequency(freq_hz, n_freq)
     sweeps = {"alpha": before, "gamma": after}
-    return run("find_modification", (n, n_freq, before, after), before.shape, sweeps, freq, on_singular)[0]
+    return run("find_modification", (n, N_FREQ, before, after), before.shape, sweeps, freq, on_singular, out=out)[0]

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import linalg, sparse
 
 from jointfrf._sweep import (
+    N_FREQ,
     ComplexArray,
     FloatArray,
     OnSingular,
@@ -45,6 +46,7 @@ def receptance(
     method: Method = "auto",
     *,
     on_singular: OnSingular = "raise",
+    out: ComplexArray | None = None,
 ) -> ComplexArray:
     """Receptance ((1 + i eta) K + i H + i w C - w^2 M)^-1 at chosen DOFs.
 
@@ -68,6 +70,8 @@ def receptance(
         "auto" solves banded where K and M have a narrow band, else dense.
     on_singular : {"raise", "nan"}
         Whether a bad line raises or becomes NaN.
+    out : ndarray of complex128, shape (n_freq, n_out, n_in), optional
+        Where the result goes, as in `invert`.
 
     Returns
     -------
@@ -103,12 +107,12 @@ def receptance(
     }
     eta = as_number("loss_factor", loss_factor)
     n = _check_square(matrices)
-    out = as_dofs("outputs", np.arange(n) if outputs is None else outputs, n, unique=False)
+    to = as_dofs("outputs", np.arange(n) if outputs is None else outputs, n, unique=False)
     into = as_dofs("inputs", np.arange(n) if inputs is None else inputs, n, unique=False)
     if method == "auto":
         method = "banded" if _has_band(matrices, n) else "dense"
     chosen = {"dense": _dense, "banded": _banded, "modal": _modal}[method]
-    return chosen(freq, omega, matrices, eta, out, into, on_singular)
+    return chosen(freq, omega, matrices, eta, to, into, on_singular, out)
 
 
 def _check_square(matrices: dict[str, Matrix]) -> int:
@@ -153,18 +157,20 @@ def _dense(
     omega: FloatArray,
     matrices: dict[str, Matrix],
     loss_factor: float,
-    out: NDArray[np.int32],
+    to: NDArray[np.int32],
     into: NDArray[np.int32],
     on_singular: OnSingular,
+    out: ComplexArray | None,
 ) -> ComplexArray:
     n = _check_square(matrices)
     given = {name: None if m is None else _as_dense(name, m, n) for name, m in matrices.items()}
-    args: list[Any] = [n, freq.size, out.size, into.size, omega, given["stiffness"], given["mass"]]
+    args: list[Any] = [n, N_FREQ, to.size, into.size, omega, given["stiffness"], given["mass"]]
     for name in ("damping", "structural_damping"):
         matrix = given[name]
         args += [0, np.zeros((1, n))] if matrix is None else [n, matrix]
-    args += [loss_factor, out, into]
-    return run("receptance", args, (freq.size, out.size, into.size), {}, freq, on_singular, _SINGULAR)[0]
+    args += [loss_factor, to, into]
+    shape = (freq.size, to.size, into.size)
+    return run("receptance", args, shape, {"omega": omega}, freq, on_singular, _SINGULAR, out)[0]
 
 
 def _banded(
@@ -172,9 +178,10 @@ def _banded(
     omega: FloatArray,
     matrices: dict[str, Matrix],
     loss_factor: float,
-    out: NDArray[np.int32],
+    to: NDArray[np.int32],
     into: NDArray[np.int32],
     on_singular: OnSingular,
+    out: ComplexArray | None,
 ) -> ComplexArray:
     n = _check_square(matrices)
     kl, ku = _widths(matrices)
@@ -189,12 +196,13 @@ def _banded(
         np.add.at(band, (entries.col, ku + entries.row - entries.col), values)
         return band
 
-    args: list[Any] = [n, kl, ku, freq.size, out.size, into.size, omega, stored("stiffness"), stored("mass")]
+    args: list[Any] = [n, kl, ku, N_FREQ, to.size, into.size, omega, stored("stiffness"), stored("mass")]
     for name in ("damping", "structural_damping"):
         band = stored(name)
         args += [0, np.zeros((1, kl + ku + 1))] if band is None else [n, band]
-    args += [loss_factor, out, into]
-    return run("receptance_banded", args, (freq.size, out.size, into.size), {}, freq, on_singular, _SINGULAR)[0]
+    args += [loss_factor, to, into]
+    shape = (freq.size, to.size, into.size)
+    return run("receptance_banded", args, shape, {"omega": omega}, freq, on_singular, _SINGULAR, out)[0]
 
 
 def _modal(
@@ -202,9 +210,10 @@ def _modal(
     omega: FloatArray,
     matrices: dict[str, Matrix],
     loss_factor: float,
-    out: NDArray[np.int32],
+    to: NDArray[np.int32],
     into: NDArray[np.int32],
     on_singular: OnSingular,
+    out: ComplexArray | None,
 ) -> ComplexArray:
     n = _check_square(matrices)
     given = {name: None if m is None else _as_dense(name, m, n) for name, m in matrices.items()}
@@ -232,6 +241,7 @@ def _modal(
     stiffness = np.maximum(squared, 0)
     structural = modal("structural_damping")
     losses = loss_factor + np.divide(structural, stiffness, out=np.zeros(n), where=stiffness > 0)
-    at_out, at_in = np.ascontiguousarray(shapes[out - 1]), np.ascontiguousarray(shapes[into - 1])
-    args = (n, freq.size, out.size, into.size, omega, stiffness, modal("damping"), losses, at_out, at_in)
-    return run("receptance_modal", args, (freq.size, out.size, into.size), {}, freq, on_singular, _SINGULAR)[0]
+    at_out, at_in = np.ascontiguousarray(shapes[to - 1]), np.ascontiguousarray(shapes[into - 1])
+    args = (n, N_FREQ, to.size, into.size, omega, stiffness, modal("damping"), losses, at_out, at_in)
+    shape = (freq.size, to.size, into.size)
+    return run("receptance_modal", args, shape, {"omega": omega}, freq, on_singular, _SINGULAR, out)[0]

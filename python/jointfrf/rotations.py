@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from jointfrf._sweep import (
+    N_FREQ,
     ComplexArray,
     FloatArray,
     OnSingular,
@@ -67,6 +68,7 @@ def central_difference(
     sign: float = 1.0,
     freq_hz: ArrayLike | None = None,
     on_singular: OnSingular = "raise",
+    out: ComplexArray | None = None,
 ) -> ComplexArray:
     """Displacement and rotation receptances at a reference from translational ones along a line.
 
@@ -78,7 +80,7 @@ def central_difference(
         As in `difference_weights`.
     sign : {1, -1}
         Rotation as slope or as minus the slope: theta_z = +du_y/dx, theta_y = -du_z/dx, theta_x = -du_y/dz.
-    freq_hz, on_singular
+    freq_hz, on_singular, out
         As in `couple`.
 
     Returns
@@ -108,8 +110,8 @@ def central_difference(
     if sign not in (1, -1):
         raise ValueError(f"sign must be 1 or -1, not {sign}")
     t = difference_weights(spacing) * np.array([[1.0], [sign]])
-    lines = as_lines("h", h, t.shape[1], t.shape[1])
-    return transform(lines, t, t, freq_hz=freq_hz, on_singular=on_singular)
+    lines = as_lines("h", h, t.shape[1], t.shape[1], later=True)
+    return transform(lines, t, t, freq_hz=freq_hz, on_singular=on_singular, out=out)
 
 
 def transform(
@@ -119,6 +121,7 @@ def transform(
     *,
     freq_hz: ArrayLike | None = None,
     on_singular: OnSingular = "raise",
+    out: ComplexArray | None = None,
 ) -> ComplexArray:
     """Receptance in other coordinates, T_out H T_in^T on every line: (2.57) for any points and DOFs.
 
@@ -128,7 +131,7 @@ def transform(
         Measured receptance.
     t_out, t_in : array_like, shapes (n_out, m_out) and (n_in, m_in)
         Real transformations of responses and of forces.
-    freq_hz, on_singular
+    freq_hz, on_singular, out
         As in `couple`.
 
     Returns
@@ -146,14 +149,14 @@ def transform(
     >>> jf.transform([[[1.0, 2.0], [3.0, 4.0]]], [[1.0, 1.0]], [[1.0, -1.0]]).real.tolist()
     [[[-2.0]]]
     """
-    lines = as_lines("h", h)
+    lines = as_lines("h", h, later=True)
     n_freq, m_out, m_in = lines.shape
     left = as_real("t_out", t_out, (None, m_out))
     right = as_real("t_in", t_in, (None, m_in))
     freq = optional_frequency(freq_hz, n_freq)
     n_out, n_in = left.shape[0], right.shape[0]
-    args = (n_out, n_in, m_out, m_in, n_freq, lines, left, right)
-    return run("transform", args, (n_freq, n_out, n_in), {"h": lines}, freq, on_singular)[0]
+    args = (n_out, n_in, m_out, m_in, N_FREQ, lines, left, right)
+    return run("transform", args, (n_freq, n_out, n_in), {"h": lines}, freq, on_singular, out=out)[0]
 
 
 class DifferenceError(NamedTuple):

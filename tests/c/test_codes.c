@@ -46,6 +46,32 @@ static void check_line(double value, int expected, const char *what)
     check((expected == JF_LINE_GOOD) == (rcond[1] > 0.0), "rcond of a bad line");
 }
 
+/* The choice is kept, and an engine that no machine has leaves it as it is. */
+static void check_engines(void)
+{
+    const int engines[] = {JF_ENGINE_LAPACK, JF_ENGINE_PLAIN, JF_ENGINE_X86_64_V2, JF_ENGINE_X86_64_V3,
+                           JF_ENGINE_X86_64_V4}, automatic = JF_ENGINE_AUTOMATIC, lapack = JF_ENGINE_LAPACK, none = 6;
+    int engine, info, widest = 0, before;
+
+    for (int i = 0; i < 5; i++) {
+        jf_get_engine(&before, &info);
+        jf_set_engine(&engines[i], &info);
+        check(info == 0 || (info == -1 && i >= 2), "an engine is there or it is not");
+        if (info == 0 && i >= 1)
+            widest = engines[i];
+        jf_get_engine(&engine, &info);
+        check(info == JF_INFO_GOOD && (engine == engines[i] || engine == before), "the engine in use");
+    }
+    jf_set_engine(&lapack, &info);
+    jf_set_engine(&none, &info);
+    check(info == -1, "an engine that does not exist");
+    jf_get_engine(&engine, &info);
+    check(engine == JF_ENGINE_LAPACK, "JF_ENGINE_LAPACK");
+    jf_set_engine(&automatic, &info);
+    jf_get_engine(&engine, &info);
+    check(info == JF_INFO_GOOD && engine == widest, "JF_ENGINE_AUTOMATIC is the widest");
+}
+
 /* Two million forces on a thousand DOFs: 32 GB of workspace where 8 GB are allowed. */
 static void check_no_memory(void)
 {
@@ -78,6 +104,7 @@ int main(void)
 
     check_text(jf_info_text, JF_INFO_GOOD, "good");
     check_text(jf_info_text, JF_INFO_NO_MEMORY, "the workspace could not be allocated");
+    check_text(jf_info_text, JF_INFO_NO_ENGINE, "JOINTFRF_ENGINE names an engine that this machine does not have");
     check_text(jf_info_text, -2, "argument 2 is wrong");
     check_text(jf_line_text, JF_LINE_GOOD, "good");
     check_text(jf_line_text, JF_LINE_NOT_FINITE, "the line holds NaN or Inf");
@@ -91,6 +118,7 @@ int main(void)
 
     jf_invert(&n, &n_freq, NULL, NULL, NULL, NULL, &info);
     check(info == -1, "a wrong argument");
+    check_engines();
     check_no_memory();
     return failures > 0;
 }

@@ -294,7 +294,7 @@ contains
     bad(2, 4, 1) = 1.0e-6_dp
     call joint_compliance(.false., bad, c, line_info, rcond, info)
     call check(info == 0, 'nearly singular is good')
-    call check_close(rcond(1), 1.0e-6_dp, 1.0e-10_dp, 'rcond of a nearly singular line')
+    call check(abs(log(rcond(1)/1.0e-6_dp)) < log(3.0_dp), 'rcond of a nearly singular line')      ! an estimate
   end subroutine bad_lines
 
   subroutine bad_covariance_lines()

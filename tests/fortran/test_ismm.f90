@@ -192,11 +192,11 @@ contains
     bad(2, 2, 1) = 1.0e-8_dp
     call ismm(.false., alpha, bad, first, k, line_info, rcond, info)
     call check(info == 0, 'nearly singular gamma is good')
-    call check_close(rcond(1), 1.0e-8_dp, 1.0e-10_dp, 'rcond of nearly singular gamma')
+    call check(abs(log(rcond(1)/1.0e-8_dp)) < log(3.0_dp), 'rcond of nearly singular gamma')      ! an estimate
     call ismm(.false., bad, gamma, first, k, line_info, rcond, info)
-    call check_close(rcond(1), 1.0e-8_dp, 1.0e-10_dp, 'rcond of nearly singular alpha')
+    call check(abs(log(rcond(1)/1.0e-8_dp)) < log(3.0_dp), 'rcond of nearly singular alpha')      ! an estimate
     call inverse_substructuring(.false., bad, k, line_info, rcond, info)
-    call check_close(rcond(1), 1.0e-8_dp, 1.0e-10_dp, 'short form: rcond of nearly singular gamma')
+    call check(abs(log(rcond(1)/1.0e-8_dp)) < log(3.0_dp), 'short form: rcond of nearly singular gamma')      ! an estimate
 
     first(1, 1, 1) = cmplx(0.0_dp, not_a_number(), dp)
     call ismm(.false., alpha, gamma, first, k, line_info, rcond, info)

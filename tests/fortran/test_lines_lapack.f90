@@ -1,6 +1,6 @@
 !> The linear algebra of one line against quadruple precision.
 program test_lines_lapack
-  use testing, only: check, check_close, dp, finish, infinity, inverse, ip, random_lines, random_regular, seed
+  use testing, only: check, check_close, dp, finish, infinity, inverse, ip, norm_1, random_lines, random_regular, seed
   use jointfrf_lines_lapack, only: inverse_work, invert_line, one_norm, product_line, solve_line
   use jointfrf_sweep, only: line_space
   implicit none
@@ -31,14 +31,14 @@ contains
   subroutine solution_and_inverse(n)
     integer, intent(in) :: n
     complex(dp) :: a(n, n, 1), expected(n, n, 1), lu(n, n, 1), b(n, 2, 1), x(n, 2, 1)
-    real(dp) :: rcond, exact
+    real(dp) :: rcond, exact, norm, true_norm
     integer(ip) :: info
 
     call make_space(n)
     a = random_regular(n, 1)
     b = random_lines(n, 2, 1)
     expected = inverse(a)
-    exact = 1.0_dp/(largest_column(a(:, :, 1))*largest_column(expected(:, :, 1)))
+    exact = 1.0_dp/(norm_1(a(:, :, 1))*norm_1(expected(:, :, 1)))
 
     lu = a
     x = b
@@ -46,22 +46,18 @@ contains
     b(:, :, 1) = matmul(expected(:, :, 1), b(:, :, 1))
     call check(info == 0 .and. space%used == 3, 'solve: good, workspace given back')
     call check_close(x, b, tolerance, 'solve')
-    call check(rcond >= 0.999_dp*exact .and. rcond <= 3.0_dp*exact, 'solve: rcond')
+    call check(rcond >= 0.999_dp*exact .and. rcond <= 4.0_dp*exact, 'solve: rcond')
 
     lu = a
     call invert_line(lu(:, :, 1), space, info, rcond)
     call check(info == 0 .and. space%used == 3, 'inverse: good, workspace given back')
     call check_close(lu, expected, tolerance, 'inverse')
     call check_close(rcond, exact, 1.0e-10_dp, 'inverse: rcond')
-    call check_close(one_norm(a(:, :, 1)), largest_column(a(:, :, 1)), tolerance, 'one_norm')
+    norm = one_norm(a(:, :, 1))
+    true_norm = maxval(sum(abs(a(:, :, 1)), dim=1))
+    call check_close(norm, norm_1(a(:, :, 1)), tolerance, 'one_norm')
+    call check(norm >= true_norm .and. norm <= sqrt(2.0_dp)*true_norm, 'one_norm: near the 1-norm')
   end subroutine solution_and_inverse
-
-  pure function largest_column(a) result(norm)
-    complex(dp), intent(in) :: a(:, :)
-    real(dp) :: norm
-
-    norm = maxval(sum(abs(a), dim=1))
-  end function largest_column
 
   subroutine nothing_to_do()
     complex(dp) :: a(0, 0), b(0, 2), c(2, 2, 1), none(2, 0)

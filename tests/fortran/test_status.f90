@@ -1,16 +1,18 @@
 !> Every code has its value and its text.
 program test_status
   use testing, only: check, finish, ip
-  use jointfrf_status, only: info_good, info_no_memory, info_text, line_good, line_not_finite, line_overflow, &
+  use jointfrf_status, only: info_good, info_no_engine, info_no_memory, info_text, line_good, line_not_finite, line_overflow, &
     line_text, text_length
   implicit none
   integer(ip) :: code
 
   call check(info_good == 0 .and. line_good == 0, 'good is 0')
-  call check(all([info_no_memory, line_not_finite, line_overflow] == [-1000, -1, -2]), 'values as documented')
+  call check(all([info_no_memory, info_no_engine, line_not_finite, line_overflow] == [-1000, -1001, -1, -2]), &
+             'values as documented')
 
   call check(info_text(0_ip) == 'good', 'info 0')
   call check(info_text(-1000_ip) == 'the workspace could not be allocated', 'info -1000')
+  call check(info_text(-1001_ip) == 'JOINTFRF_ENGINE names an engine that this machine does not have', 'info -1001')
   call check(info_text(-7_ip) == 'argument 7 is wrong', 'info -7')
   call check(info_text(12_ip) == 'number of bad lines: 12; see line_info', 'info 12')
   call check(line_text(0_ip) == 'good', 'line 0')

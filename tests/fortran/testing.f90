@@ -13,7 +13,7 @@ module testing
   public :: check, check_close, check_same, check_bad_line, check_untouched, finish
   public :: not_a_number, infinity, untouched, set_threads
   public :: seed, uniform, normal, random_real, random_lines, random_regular
-  public :: inverse, quad_inverse, transposed, assembled, add_spring, thesis_chain
+  public :: inverse, quad_inverse, norm_1, transposed, assembled, add_spring, thesis_chain
 
   !> What outputs hold before a call that must not touch them.
   real(dp), parameter :: untouched = 4711.0_dp
@@ -300,6 +300,14 @@ contains
     end do
     x = work(:, n + 1:)
   end function quad_inverse
+
+  !> Largest column sum of |re| + |im|, which the kernel takes for the 1-norm.
+  pure function norm_1(a) result(norm)
+    complex(dp), intent(in) :: a(:, :)
+    real(dp) :: norm
+
+    norm = maxval(sum(abs(real(a)) + abs(aimag(a)), dim=1))
+  end function norm_1
 
   !> Receptance of A and B joined by K*, DOFs of A, then of B: the assembled dynamic stiffness, inverted.
   function assembled(h_a, h_b, k_joint, dofs_j, dofs_k) result(h_c)

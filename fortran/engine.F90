@@ -1,0 +1,144 @@
+!> Which engine a sweep uses: LAPACK line by line (the reference), or lanes with one of the instruction sets.
+!>
+!> The choice is one number for the whole process: that of the environment variable JOINTFRF_ENGINE when the kernel is
+!> first used, until `set_engine` is called. JF_X86 is set by the build where the lane kernels of x86-64 exist.
+module jointfrf_engine
+  use, intrinsic :: iso_c_binding, only: c_int
+  use jointfrf_kinds, only: ip
+  use jointfrf_lanes, only: lane_kernels
+  use jointfrf_lanes_plain, only: set_plain => set_kernels
+#ifdef JF_X86
+  use jointfrf_lanes_v2, only: set_v2 => set_kernels
+  use jointfrf_lanes_v3, only: set_v3 => set_kernels
+  use jointfrf_lanes_v4, only: set_v4 => set_kernels
+#endif
+  use jointfrf_noise_plain, only: set_noise_plain => set_noise_kernels
+#ifdef JF_X86
+  use jointfrf_noise_v2, only: set_noise_v2 => set_noise_kernels
+  use jointfrf_noise_v3, only: set_noise_v3 => set_noise_kernels
+  use jointfrf_noise_v4, only: set_noise_v4 => set_noise_kernels
+#endif
+  use jointfrf_status, only: info_good, info_no_engine
+  implicit none
+  private
+  public :: set_engine, get_engine, find_kernels
+
+  integer(ip), parameter, public :: engine_automatic = 0, engine_lapack = 1, engine_plain = 2
+  integer(ip), parameter, public :: engine_v2 = 3, engine_v3 = 4, engine_v4 = 5
+  character(len=9), parameter :: names(0:5) = [character(len=9) :: 'auto', 'lapack', 'plain', 'x86-64-v2', &
+                                               'x86-64-v3', 'x86-64-v4']
+
+  integer(ip), parameter :: not_asked = -1, unknown = -2
+  integer(ip) :: choice = not_asked
+
+  interface
+    function cpu_level() bind(C, name='jointfrf_cpu_level') result(level)
+      import :: c_int
+      integer(c_int) :: level
+    end function cpu_level
+  end interface
+
+contains
+
+  !> Use this engine from now on; info is -1 where this machine does not have it.
+  subroutine set_engine(engine, info)
+    integer(ip), intent(in) :: engine
+    integer(ip), intent(out) :: info
+
+    info = -1
+    if (.not. available(engine)) return
+    info = info_good
+    !$omp atomic write
+    choice = engine
+  end subroutine set_engine
+
+  !> The engine in use; where the choice is automatic, the one that it comes to.
+  subroutine get_engine(engine, info)
+    integer(ip), intent(out) :: engine, info
+
+    !$omp atomic read
+    engine = choice
+    if (engine == not_asked) then
+      engine = from_environment()
+      !$omp atomic write
+      choice = engine
+    end if
+    info = info_good
+    if (engine == unknown) info = info_no_engine
+    if (engine == engine_automatic) engine = best()
+  end subroutine get_engine
+
+  !> The kernels of the engine in use; `found` is false for the reference engine, which has those for noise only: they
+  !> give the same bits with every instruction set.
+  subroutine find_kernels(kernels, found, info)
+    type(lane_kernels), intent(out) :: kernels
+    logical, intent(out) :: found
+    integer(ip), intent(out) :: info
+    integer(ip) :: engine
+
+    found = .false.
+    call get_engine(engine, info)
+    if (info /= info_good) return
+    found = engine /= engine_lapack
+    select case (engine)
+    case (engine_plain)
+      call set_plain(kernels)
+#ifdef JF_X86
+    case (engine_v2)
+      call set_v2(kernels)
+    case (engine_v3)
+      call set_v3(kernels)
+    case (engine_v4)
+      call set_v4(kernels)
+#endif
+    end select
+    if (engine == engine_lapack) engine = best()
+    select case (engine)
+    case (engine_plain)
+      call set_noise_plain(kernels)
+#ifdef JF_X86
+    case (engine_v2)
+      call set_noise_v2(kernels)
+    case (engine_v3)
+      call set_noise_v3(kernels)
+    case (engine_v4)
+      call set_noise_v4(kernels)
+#endif
+    end select
+  end subroutine find_kernels
+
+  !> The widest instruction set there is.
+  function best() result(engine)
+    integer(ip) :: engine
+
+    do engine = engine_v4, engine_v2, -1
+      if (available(engine)) return
+    end do
+    engine = engine_plain
+  end function best
+
+  !> Whether this build and this processor have an engine.
+  function available(engine) result(yes)
+    integer(ip), intent(in) :: engine
+    logical :: yes
+
+    yes = engine >= engine_automatic .and. engine <= engine_plain
+#ifdef JF_X86
+    if (engine >= engine_v2 .and. engine <= engine_v4) yes = engine - engine_v2 + 2 <= cpu_level()
+#endif
+  end function available
+
+  function from_environment() result(engine)
+    integer(ip) :: engine
+    character(len=16) :: word
+    integer :: stat
+
+    call get_environment_variable('JOINTFRF_ENGINE', word, status=stat)
+    engine = engine_automatic
+    if (stat == 1 .or. (stat == 0 .and. word == '')) return        ! not there, or empty
+    engine = unknown
+    if (stat /= 0) return
+    engine = findloc(names, word, dim=1, kind=ip) - 1_ip
+    if (.not. available(engine)) engine = unknown
+  end function from_environment
+end module jointfrf_engine

@@ -1,0 +1,320 @@
+!> Lanes: several frequency lines worked on at once, one a lane of the processor's vector registers.
+!>
+!> A workspace x(lanes, 2, *) holds numbers of `lanes` lines side by side, real and imaginary parts apart. One complex
+!> number of every lane is an `element`; a matrix is a run of elements, rows one after the other unless a list says
+!> where each element lies. What is done with elements is a set of kernels, compiled from one source for several
+!> instruction sets (folder `lanes/`); `engine.F90` chooses among them.
+!>
+!> Kernels do not judge a line: they return the sums in which NaN, Inf and overflow show, and estimates of the condition.
+!> A line in doubt is done again by the reference engine, so that both engines give the same codes.
+module jointfrf_lanes
+  use, intrinsic :: iso_c_binding, only: c_f_pointer, c_loc
+  use, intrinsic :: iso_fortran_env, only: int64
+  use jointfrf_kinds, only: dp
+  implicit none
+  private
+  public :: lane_kernels, system_position, system_size, padded, real_lines, natural, system, flat, in_memory, &
+    row_starts, rows_in_memory
+
+  !> Lines side by side. One register of AVX-512, two of AVX2, four of SSE2.
+  integer, parameter, public :: lanes = 8
+
+  !> Above this order LAPACK is as fast.
+  integer, parameter, public :: largest_in_lanes = 64
+
+  abstract interface
+    !> Lines of the caller into lanes.
+    !> n        numbers a line
+    !> place    the element that each number goes to, shape (n)
+    !> first    the first line
+    !> n_lines  lines there are, 1..lanes; the last one fills the lanes that are left
+    subroutine load_routine(n, place, first, n_lines, lines, x)
+      import :: dp, lanes
+      integer, intent(in) :: n, place(n), first, n_lines
+      real(dp), intent(in) :: lines(2, n, *)
+      real(dp), intent(inout) :: x(lanes, 2, *)
+    end subroutine load_routine
+
+    !> Lanes into the caller's lines. Arguments as in load.
+    subroutine store_routine(n, place, first, n_lines, x, lines)
+      import :: dp, lanes
+      integer, intent(in) :: n, place(n), first, n_lines
+      real(dp), intent(in) :: x(lanes, 2, *)
+      real(dp), intent(inout) :: lines(2, n, *)
+    end subroutine store_routine
+
+    !> Sum of |re| + |im| over elements, shape (lanes): not finite where one of them is not.
+    subroutine total_routine(n, from, x, total)
+      import :: dp, lanes
+      integer, intent(in) :: n, from(n)
+      real(dp), intent(in) :: x(lanes, 2, *)
+      real(dp), intent(out) :: total(lanes)
+    end subroutine total_routine
+
+    !> x(to) = factor x(from), element by element.
+    subroutine copy_routine(n, factor, from, to, x)
+      import :: dp, lanes
+      integer, intent(in) :: n, from(n), to(n)
+      real(dp), intent(in) :: factor
+      real(dp), intent(inout) :: x(lanes, 2, *)
+    end subroutine copy_routine
+
+    !> x(to) = value, the same in all lanes.
+    subroutine fill_routine(n, value, to, x)
+      import :: dp, lanes
+      integer, intent(in) :: n, to(n)
+      complex(dp), intent(in) :: value(n)
+      real(dp), intent(inout) :: x(lanes, 2, *)
+    end subroutine fill_routine
+
+    !> x(to) = fa x(a) + fb x(b), element by element.
+    subroutine combine_routine(n, fa, a, fb, b, to, x)
+      import :: dp, lanes
+      integer, intent(in) :: n, a(n), b(n), to(n)
+      real(dp), intent(in) :: fa, fb
+      real(dp), intent(inout) :: x(lanes, 2, *)
+    end subroutine combine_routine
+
+    !> C = C + factor A B.
+    !> m, n, k   A is m by k, B is k by n
+    !> a, b, c   the element before the first one of each row, shapes (m), (k), (m)
+    subroutine product_routine(m, n, k, factor, a, b, c, x)
+      import :: dp, lanes
+      integer, intent(in) :: m, n, k, a(m), b(k), c(m)
+      real(dp), intent(in) :: factor
+      real(dp), intent(inout) :: x(lanes, 2, *)
+    end subroutine product_routine
+
+    !> Inverse of a matrix that lies as a system without right-hand sides, see `system_position`. The inverse comes back
+    !> at other places.
+    !> n       order
+    !> before  the element before the system
+    !> hint    pivot rows to try first, 0 where none is known, shape (padded(n)); as found on return
+    !> place   where the inverse lies, row by row, shape (n*n)
+    !> rcond   reciprocal condition number; not finite where something overflowed
+    subroutine invert_routine(n, before, x, hint, place, rcond)
+      import :: dp, lanes
+      integer, intent(in) :: n, before
+      real(dp), intent(inout) :: x(lanes, 2, *)
+      integer, intent(inout) :: hint(*)
+      integer, intent(out) :: place(n*n)
+      real(dp), intent(out) :: rcond(lanes)
+    end subroutine invert_routine
+
+    !> Solution of A X = B by elimination with partial pivoting (threshold 1/2) and back substitution.
+    !> n        order
+    !> n_rhs    right-hand sides
+    !> n_last   how many of the last unknowns are wanted
+    !> before   the element before the system, see `system_position`
+    !> hint     pivot rows to try first, 0 where none is known, shape (padded(n)); as found on return
+    !> row      the element before the first one of each row of X, shape (n); the last n_last are valid
+    !> rcond    estimate of the reciprocal condition number; not finite where something overflowed
+    subroutine solve_routine(n, n_rhs, n_last, before, x, hint, row, rcond)
+      import :: dp, lanes
+      integer, intent(in) :: n, n_rhs, n_last, before
+      real(dp), intent(inout) :: x(lanes, 2, *)
+      integer, intent(inout) :: hint(*)
+      integer, intent(out) :: row(n)
+      real(dp), intent(out) :: rcond(lanes)
+    end subroutine solve_routine
+
+    !> Two words of random bits for every counter, see `lanes_noise/random.inc`.
+    !> n      counters a lane
+    !> key    shape (2)
+    !> low    first word of the counters, shape (lanes, n)
+    !> high   second word, the same for all n counters of a lane
+    subroutine words_routine(n, key, low, high, words)
+      import :: int64, lanes
+      integer, intent(in) :: n
+      integer(int64), intent(in) :: key(2), low(lanes, n), high(lanes)
+      integer(int64), intent(out) :: words(lanes, 2, n)
+    end subroutine words_routine
+
+    !> Random numbers as real and imaginary parts; `size` is the variance of a part, or half the width. Counters as in
+    !> words_routine.
+    subroutine draw_routine(n, size, key, low, high, x)
+      import :: dp, int64, lanes
+      integer, intent(in) :: n
+      real(dp), intent(in) :: size
+      integer(int64), intent(in) :: key(2), low(lanes, n), high(lanes)
+      real(dp), intent(out) :: x(lanes, 2, n)
+    end subroutine draw_routine
+
+    !> polluted = h + s e for numbers in a row; number i has its noise e in lane mod(i - 1, lanes) + 1.
+    subroutine pollute_flat_routine(n, h, s, e, polluted)
+      import :: dp, lanes
+      integer, intent(in) :: n
+      real(dp), intent(in) :: h(2, n), s(2, n), e(lanes, 2, *)
+      real(dp), intent(out) :: polluted(2, n)
+    end subroutine pollute_flat_routine
+
+    !> x(place) = h + s e, with other noise in every lane.
+    subroutine pollute_lanes_routine(n, h, s, e, place, x)
+      import :: dp, lanes
+      integer, intent(in) :: n, place(n)
+      real(dp), intent(in) :: h(2, n), s(2, n), e(lanes, 2, n)
+      real(dp), intent(inout) :: x(lanes, 2, *)
+    end subroutine pollute_lanes_routine
+
+    !> The largest modulus among numbers that are finite, 0 where there is none.
+    pure function largest_routine(n, h) result(modulus)
+      import :: dp
+      integer, intent(in) :: n
+      real(dp), intent(in) :: h(2, n)
+      real(dp) :: modulus
+    end function largest_routine
+
+    !> One more value in every lane: means, and sums of squares about them.
+    !> n        elements
+    !> from     where they lie, shape (n)
+    !> taken    1 in lanes whose values count, else 0
+    !> number   values counted so far, those of this call included
+    !> mean     shape (lanes, 2, n)
+    !> square   sums of re*re, im*im and re*im about the mean, shape (lanes, 3, n)
+    subroutine moments_routine(n, from, x, taken, number, mean, square)
+      import :: dp, lanes
+      integer, intent(in) :: n, from(n)
+      real(dp), intent(in) :: x(lanes, 2, *), taken(lanes), number(lanes)
+      real(dp), intent(inout) :: mean(lanes, 2, n), square(lanes, 3, n)
+    end subroutine moments_routine
+  end interface
+
+  !> The kernels of one instruction set.
+  type :: lane_kernels
+    procedure(load_routine), pointer, nopass :: load => null()
+    procedure(store_routine), pointer, nopass :: store => null()
+    procedure(total_routine), pointer, nopass :: total => null()
+    procedure(copy_routine), pointer, nopass :: copy => null()
+    procedure(fill_routine), pointer, nopass :: fill => null()
+    procedure(combine_routine), pointer, nopass :: combine => null()
+    procedure(product_routine), pointer, nopass :: product => null()
+    procedure(invert_routine), pointer, nopass :: invert => null()
+    procedure(solve_routine), pointer, nopass :: solve => null()
+    procedure(words_routine), pointer, nopass :: random_words => null()
+    procedure(draw_routine), pointer, nopass :: normals => null()
+    procedure(draw_routine), pointer, nopass :: uniforms => null()
+    procedure(pollute_flat_routine), pointer, nopass :: pollute_flat => null()
+    procedure(pollute_lanes_routine), pointer, nopass :: pollute_lanes => null()
+    procedure(largest_routine), pointer, nopass :: largest => null()
+    procedure(moments_routine), pointer, nopass :: moments => null()
+  end type lane_kernels
+
+contains
+
+  !> Elimination takes two columns at a time: order of a matrix made even by a one on the diagonal.
+  pure function padded(n) result(even)
+    integer, intent(in) :: n
+    integer :: even
+
+    even = n + mod(n, 2)
+  end function padded
+
+  !> Elements that a system of order n with right-hand sides takes: one more right-hand side estimates the condition,
+  !> and two rows more are room for the pivot rows of a panel.
+  pure function system_size(n, n_rhs) result(elements)
+    integer, intent(in) :: n, n_rhs
+    integer :: elements
+
+    elements = (padded(n) + 2)*(padded(n) + merge(n_rhs + 1, 0, n_rhs > 0))
+  end function system_size
+
+  !> The element of a system that holds entry (i, j) of A, or of B where j > n.
+  !>
+  !> The first two columns, which are eliminated next, lie apart from the others: both parts have rows of a fixed length
+  !> then, which is what lets the compiler run all lanes at once. A matrix of order 1 to 4 that is to be inverted lies
+  !> row by row.
+  pure function system_position(n, n_rhs, i, j) result(element)
+    integer, intent(in) :: n, n_rhs, i, j
+    integer :: element, even, column, width
+
+    even = padded(n)
+    width = even - 2 + merge(n_rhs + 1, 0, n_rhs > 0)
+    column = merge(j, even + j - n, j <= n)
+    if (n <= 4 .and. n_rhs == 0) then
+      element = even*(i - 1) + j
+    else if (column <= 2) then
+      element = 2*(i - 1) + column
+    else
+      element = 2*even + width*(i - 1) + column - 2
+    end if
+  end function system_position
+
+  !> The elements of a matrix that lies row by row, after element `before`.
+  pure function natural(before, n_rows, n_columns) result(element)
+    integer, intent(in) :: before, n_rows, n_columns
+    integer :: element(n_rows, n_columns), i, j
+
+    do j = 1, n_columns
+      do i = 1, n_rows
+        element(i, j) = before + (i - 1)*n_columns + j
+      end do
+    end do
+  end function natural
+
+  !> The elements of a system [A, B] that lies after element `before`.
+  pure function system(before, n, n_rhs) result(element)
+    integer, intent(in) :: before, n, n_rhs
+    integer :: element(n, n + n_rhs), i, j
+
+    do j = 1, n + n_rhs
+      do i = 1, n
+        element(i, j) = before + system_position(n, n_rhs, i, j)
+      end do
+    end do
+  end function system
+
+  !> The elements of a matrix column by column.
+  pure function flat(element) result(list)
+    integer, intent(in) :: element(:, :)
+    integer :: list(size(element))
+
+    list = reshape(element, [size(element)])
+  end function flat
+
+  !> The elements of a matrix in the order in which the caller stores it.
+  pure function in_memory(transposed, element) result(list)
+    logical, intent(in) :: transposed
+    integer, intent(in) :: element(:, :)
+    integer :: list(size(element))
+
+    if (transposed) then
+      list = reshape(transpose(element), [size(element)])
+    else
+      list = flat(element)
+    end if
+  end function in_memory
+
+  !> The elements of a matrix with n_columns columns in the caller's order, from the element before each of its rows.
+  pure subroutine rows_in_memory(transposed, before, n_columns, list)
+    logical, intent(in) :: transposed
+    integer, intent(in) :: before(:), n_columns
+    integer, intent(out) :: list(:)
+    integer :: i, j
+
+    do i = 1, size(before)
+      do j = 1, n_columns
+        if (transposed) then
+          list((i - 1)*n_columns + j) = before(i) + j
+        else
+          list((j - 1)*size(before) + i) = before(i) + j
+        end if
+      end do
+    end do
+  end subroutine rows_in_memory
+
+  !> The element before each row of a matrix whose rows lie in one piece.
+  pure function row_starts(element) result(before)
+    integer, intent(in) :: element(:, :)
+    integer :: before(size(element, 1))
+
+    before = element(:, 1) - 1
+  end function row_starts
+
+  !> The caller's lines as pairs of real numbers.
+  function real_lines(lines) result(pairs)
+    complex(dp), contiguous, target, intent(in) :: lines(:, :, :)
+    real(dp), pointer, contiguous :: pairs(:, :, :)
+
+    call c_f_pointer(c_loc(lines), pairs, [2, size(lines, 1)*size(lines, 2), size(lines, 3)])
+  end function real_lines
+end module jointfrf_lanes
