@@ -35,6 +35,8 @@ module jointfrf
   use jointfrf_linear_algebra, only: invert, solve
   use jointfrf_modal, only: receptance_modal
   use jointfrf_modification, only: find_modification, modify
+  use jointfrf_monte_carlo, only: is_method, monte_carlo
+  use jointfrf_noise, only: is_kind, is_reference, make_noise, pollute
   use jointfrf_status, only: info_good, info_text, line_text
   implicit none
   private
@@ -47,6 +49,7 @@ module jointfrf
   public :: jf_ismm, jf_inverse_substructuring, jf_decouple
   public :: jf_joint_compliance, jf_compliance_factors, jf_compliance_covariance
   public :: jf_difference_weights, jf_central_difference, jf_transform
+  public :: jf_pollute, jf_monte_carlo
 
   !> What jf_set_engine takes and jf_get_engine gives.
   integer(c_int), parameter, public :: jf_engine_automatic = engine_automatic
@@ -624,4 +627,108 @@ contains
     call as_matrix(trans, n_in, m_in, t_in, in_matrix)
     call transform_receptance(is_transposed(trans), h_lines, out_matrix, in_matrix, new_lines, line_info, rcond, info)
   end subroutine jf_transform
+
+  !> Realisations of polluted FRFs, H + S e with noise numbers e. Realisation r of a seed is always the same: on any
+  !> number of threads, with any engine, by either order of storage.
+  !> kind         'C' circular complex normal, E|e|^2 = 1; 'P' the same with variance 1 of each part; 'N' real normal;
+  !>              'U' real, uniform between -1 and 1; 'S' real, uniform with variance 1
+  !> reference    S is level times 'E' the entry itself, 'L' the largest modulus of the line, 'S' that of the spectrum
+  !> reciprocal   1: entries (p, q) and (q, p) get the same number, which takes n_out = n_in; 0: they do not
+  !> block        size of square blocks whose entries share one number; 1 for none
+  !> level        0.05 for 5 percent
+  !> seed         shape (2), its lower and its upper 32 bits
+  !> first        number of the first realisation, counted from 0
+  !> count        number of realisations
+  !> h            exact FRFs, shape (n_out, n_in, n_freq), or (n_in, n_out, n_freq) with trans 'T'
+  !> polluted     shape (n_out, n_in, n_freq, count), or (n_in, n_out, n_freq, count) with trans 'T'
+  !> info         as above; lines that hold NaN or Inf are polluted like any other and not counted
+  subroutine jf_pollute(trans, kind, reference, reciprocal, block, level, seed, n_out, n_in, n_freq, first, count, h, &
+                        polluted, info) bind(C, name='jf_pollute_')
+    character(kind=c_char), intent(in) :: trans, kind, reference
+    integer(c_int), intent(in) :: reciprocal, block, seed(2), n_out, n_in, n_freq, first, count
+    real(c_double), intent(in) :: level
+    complex(c_double_complex), target, intent(in) :: h(*)
+    complex(c_double_complex), target, intent(inout) :: polluted(*)
+    integer(c_int), intent(out) :: info
+    complex(c_double_complex), pointer, contiguous :: exact(:, :, :), lines(:, :, :)
+
+    info = info_good
+    if (count < 0) info = -12
+    if (count > 0) then
+      if (n_freq > huge(count)/count .or. first > huge(count) - count) info = -12
+    end if
+    if (first < 0) info = -11
+    if (n_freq < 0) info = -10
+    if (n_in < 0) info = -9
+    if (n_out < 0) info = -8
+    if (not_finite(level) .or. level < 0.0_c_double) info = -6
+    if (block < 1) then
+      info = -5
+    else if (mod(n_out, block) /= 0 .or. mod(n_in, block) /= 0) then
+      info = -5
+    end if
+    if (reciprocal /= 0 .and. .not. (reciprocal == 1 .and. n_out == n_in)) info = -4
+    if (.not. is_reference(reference)) info = -3
+    if (.not. is_kind(kind)) info = -2
+    if (unknown_order(trans)) info = -1
+    if (info /= info_good) return
+    call as_lines(trans, n_out, n_in, n_freq, h, exact)
+    call as_lines(trans, n_out, n_in, n_freq*count, polluted, lines)
+    call pollute(is_transposed(trans), make_noise(kind, reference, reciprocal == 1, block, level, seed), first, count, &
+                 exact, lines, info)
+  end subroutine jf_pollute
+
+  !> Mean and covariance of the joint identified from polluted FRFs, over realisations that are never stored: those that
+  !> jf_pollute gives of gamma.
+  !> method      'I' ISMM, K* = K0 - D_jk; 'S' inverse substructuring, K* = -(gamma^-1)_jk; 'C' joint compliance
+  !> kind, reference, reciprocal, block, level, seed, first, count    as in jf_pollute
+  !> n           number of joint DOFs
+  !> alpha       calculated receptance of the assembly with K0 at DOFs j, then k, shape (2 n, 2 n, n_freq), m/N; free of
+  !>             noise; read by method 'I' only
+  !> gamma       exact receptance of the assembly, same DOFs, shape (2 n, 2 n, n_freq), m/N
+  !> k_initial   K0, shape (n, n, n_freq), N/m; read by method 'I' only
+  !> good        number of realisations of each line that could be identified, shape (n_freq); the others are left out
+  !> mean        shape (n, n, n_freq), N/m, or m/N for method 'C'
+  !> covariance  Var Re, Var Im and Cov(Re, Im) of each entry, shape (3, n, n, n_freq), entries stored as in `mean`; NaN where fewer than two realisations are good
+  !> line_info   as above; a line is bad where no realisation is good, and says what was wrong with the first
+  !> rcond       the smallest over the good realisations
+  subroutine jf_monte_carlo(trans, method, kind, reference, reciprocal, block, level, seed, n, n_freq, first, count, &
+                            alpha, gamma, k_initial, good, mean, covariance, line_info, rcond, info) &
+    bind(C, name='jf_monte_carlo_')
+    character(kind=c_char), intent(in) :: trans, method, kind, reference
+    integer(c_int), intent(in) :: reciprocal, block, seed(2), n, n_freq, first, count
+    real(c_double), intent(in) :: level
+    complex(c_double_complex), target, intent(in) :: alpha(2*n, 2*n, n_freq), gamma(2*n, 2*n, n_freq)
+    complex(c_double_complex), target, intent(in) :: k_initial(n, n, n_freq)
+    integer(c_int), intent(out) :: good(n_freq)
+    complex(c_double_complex), target, intent(inout) :: mean(n, n, n_freq)
+    real(c_double), intent(out) :: covariance(3, n, n, n_freq)
+    integer(c_int), intent(out) :: line_info(n_freq)
+    real(c_double), intent(out) :: rcond(n_freq)
+    integer(c_int), intent(out) :: info
+
+    info = info_good
+    if (count < 1) then
+      info = -12
+    else if (first > huge(count) - count) then
+      info = -12
+    end if
+    if (first < 0) info = -11
+    if (n_freq < 0) info = -10
+    if (n < 1) info = -9
+    if (not_finite(level) .or. level < 0.0_c_double) info = -7
+    if (block < 1) then
+      info = -6
+    else if (mod(2*n, block) /= 0) then
+      info = -6
+    end if
+    if (reciprocal /= 0 .and. reciprocal /= 1) info = -5
+    if (.not. is_reference(reference)) info = -4
+    if (.not. is_kind(kind)) info = -3
+    if (.not. is_method(method)) info = -2
+    if (unknown_order(trans)) info = -1
+    if (info /= info_good) return
+    call monte_carlo(is_transposed(trans), method, make_noise(kind, reference, reciprocal == 1, block, level, seed), &
+                     first, count, alpha, gamma, k_initial, good, mean, covariance, line_info, rcond, info)
+  end subroutine jf_monte_carlo
 end module jointfrf

@@ -2,12 +2,12 @@
 !> and how measurement noise comes through.
 module jointfrf_compliance
   use jointfrf_kinds, only: dp, ip
-  use jointfrf_lanes, only: in_memory, lane_kernels, lanes, largest_in_lanes, natural, padded, real_lines, row_starts, system, &
-    system_size
+  use jointfrf_lanes, only: in_memory, lane_kernels, lanes, largest_in_lanes, natural, padded, real_lines, &
+    row_starts, system, system_size
   use jointfrf_line_layout, only: all_finite, load, store, take_block
   use jointfrf_lines_lapack, only: inverse_work, product_line, solve_line
   use jointfrf_status, only: line_good, line_not_finite, line_overflow
-  use jointfrf_sweep, only: judge, line_operation, line_space, run_sweep
+  use jointfrf_sweep, only: line_operation, line_space, run_sweep
   implicit none
   private
   public :: joint_compliance, compliance_covariance, compliance_factors
@@ -93,8 +93,9 @@ contains
     gamma(n + 1:, :n) = natural(taken + n*n, n, n)  ! kj, where C will be
     operation%n_element = taken + 2*n*n
     operation%n_hint = padded(n)
+    operation%plan%gamma => real_lines(operation%gamma)
+    call operation%reads(operation%plan%gamma)
     associate (plan => operation%plan)
-      plan%gamma => real_lines(operation%gamma)
       plan%c_joint => real_lines(operation%result)
       plan%gamma_place = in_memory(operation%transposed, gamma)
       plan%c = in_memory(operation%transposed, gamma(n + 1:, :n))
@@ -116,12 +117,13 @@ contains
     n = self%n
     associate (plan => self%plan, x => space%x)
       call kernels%load(4*n*n, plan%gamma_place, first, n_lines, plan%gamma, x)
-      call kernels%solve(n, n, n, 0, x, space%hint, row, rcond_lanes)                     ! gamma_jk^-1 gamma_jj
+      call kernels%solve(n, n, n, 0, x, space%hint, row, rcond_lanes, space%ahead)        ! gamma_jk^-1 gamma_jj
       call kernels%copy(n*n, -1.0_dp, plan%c, plan%c, x)
       call kernels%product(n, n, n, 1.0_dp, plan%kk_row, row, plan%c_row, x)
       call kernels%store(n*n, plan%c, first, n_lines, x, self%plan%c_joint)
       call kernels%total(n*n, plan%c, x, total)
-      call judge(total, rcond_lanes, line_info, rcond)
+      rcond = rcond_lanes(:n_lines)
+      call kernels%judge(n_lines, total, line_info, rcond)
     end associate
   end subroutine compliance_block
 

@@ -1,12 +1,13 @@
 !> Receptances of two substructures joined by a complex joint stiffness (2.24)-(2.26), (2.42)-(2.45).
 module jointfrf_coupling
   use jointfrf_kinds, only: dp, ip
-  use jointfrf_lanes, only: flat, in_memory, lane_kernels, lanes, largest_in_lanes, padded, real_lines
+  use jointfrf_lanes, only: flat, in_memory, lane_kernels, lanes, largest_in_lanes, largest_product, padded, &
+    real_lines
   use jointfrf_line_layout, only: all_finite, load, store
   use jointfrf_modification, only: apply_in_lanes, apply_modification, modification_elements, modification_in_lanes, &
     modification_work, plan_modification
   use jointfrf_status, only: line_not_finite
-  use jointfrf_sweep, only: judge, line_operation, line_space, run_sweep
+  use jointfrf_sweep, only: line_operation, line_space, run_sweep
   implicit none
   private
   public :: couple
@@ -70,7 +71,7 @@ contains
     operation%n_real = 2*n_j
     operation%n_pivot = n_j
     operation%flops = 8.0_dp*n_j*(real(n, dp)**2 + 2.0_dp*real(n_j, dp)*n)
-    if (n_j >= 1 .and. n <= largest_in_lanes) call plan_coupling(operation)
+    if (n_j >= 1 .and. n_j <= largest_in_lanes .and. n <= largest_product) call plan_coupling(operation)
     call run_sweep(operation, size(h_a, 3, kind=ip), line_info, rcond, info)
   end subroutine couple
 
@@ -87,6 +88,9 @@ contains
     operation%b_pairs => real_lines(operation%h_b)
     operation%k_pairs => real_lines(operation%k_joint)
     operation%result_pairs => real_lines(operation%result)
+    call operation%reads(operation%a_pairs)
+    call operation%reads(operation%b_pairs)
+    call operation%reads(operation%k_pairs)
     associate (plan => operation%plan, j => operation%dofs_a, k => n_a + operation%dofs_b)
       operation%a_place = in_memory(operation%transposed, plan%h(:n_a, :n_a))
       operation%b_place = in_memory(operation%transposed, plan%h(n_a + 1:, n_a + 1:))
@@ -121,10 +125,11 @@ contains
       call kernels%copy(size(self%of_a), 1.0_dp, self%from_a, self%of_a, x)
       call kernels%copy(size(self%of_b), -1.0_dp, self%from_b, self%of_b, x)
       call kernels%combine(size(self%relative), 1.0_dp, self%relative_a, 1.0_dp, self%relative_b, self%relative, x)
-      call apply_in_lanes(self%plan, kernels, x, space%hint, rcond_lanes)              ! (2.26)
+      call apply_in_lanes(self%plan, kernels, x, space%hint, rcond_lanes, space%ahead)              ! (2.26)
       call kernels%store(size(self%h_place), self%h_place, first, n_lines, x, self%result_pairs)
       call kernels%total(size(self%h_place), self%h_place, x, total)
-      call judge(total, rcond_lanes, line_info, rcond)
+      rcond = rcond_lanes(:n_lines)
+      call kernels%judge(n_lines, total, line_info, rcond)
     end associate
   end subroutine couple_block
 

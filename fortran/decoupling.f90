@@ -2,12 +2,12 @@
 !> (2.49)-(2.56).
 module jointfrf_decoupling
   use jointfrf_kinds, only: dp, ip
-  use jointfrf_lanes, only: flat, in_memory, lane_kernels, lanes, largest_in_lanes, natural, padded, real_lines, row_starts, &
-    system, system_size
+  use jointfrf_lanes, only: flat, in_memory, lane_kernels, lanes, largest_in_lanes, natural, padded, real_lines, &
+    row_starts, system, system_size, worse_of
   use jointfrf_line_layout, only: all_finite, load, store
   use jointfrf_lines_lapack, only: inverse_work, invert_line, product_line, solve_line
   use jointfrf_status, only: line_good, line_not_finite
-  use jointfrf_sweep, only: judge, line_operation, line_space, run_sweep
+  use jointfrf_sweep, only: line_operation, line_space, run_sweep
   implicit none
   private
   public :: decouple, is_equation
@@ -16,7 +16,8 @@ module jointfrf_decoupling
   type :: decoupling_in_lanes
     real(dp), pointer, contiguous :: a(:, :, :), b(:, :, :), c(:, :, :), k_joint(:, :, :)
     integer, allocatable :: a_place(:), b_place(:), c_place(:)         !< in the caller's order
-    integer, allocatable :: measured(:), m(:), model(:)                !< H^C, M, and H_rr or H_ss where M is a difference
+    integer, allocatable :: measured(:), m(:)                          !< H^C, M
+    integer, allocatable :: model(:)                                   !< H_rr or H_ss where M is a difference
     integer, allocatable :: q(:), q_from(:), p(:), p_from(:), z(:), z_from_j(:), z_from_k(:)
     integer, allocatable :: p_row(:), z_row(:), z_system(:)
     integer, allocatable :: given(:)                                   !< all that is loaded
@@ -121,6 +122,9 @@ contains
       plan%b => real_lines(operation%h_b)
       plan%c => real_lines(operation%h_c)
       plan%k_joint => real_lines(operation%result)
+      call operation%reads(plan%a)
+      call operation%reads(plan%b)
+      call operation%reads(plan%c)
       plan%a_place = in_memory(operation%transposed, a)
       plan%b_place = in_memory(operation%transposed, b)
       plan%c_place = in_memory(operation%transposed, measured)
@@ -175,14 +179,15 @@ contains
       call kernels%copy(n*n, 1.0_dp, plan%q_from, plan%q, x)
       call kernels%copy(n*n, 1.0_dp, plan%p_from, plan%p, x)
       call kernels%combine(n*n, -1.0_dp, plan%z_from_j, -1.0_dp, plan%z_from_k, plan%z, x)
-      call kernels%solve(n, n, n, plan%m_before, x, space%hint(:padded(n)), row, rcond_m)
+      call kernels%solve(n, n, n, plan%m_before, x, space%hint(:padded(n)), row, rcond_m, space%ahead)
       call kernels%product(n, n, n, 1.0_dp, plan%p_row, row, plan%z_row, x)
       call kernels%copy(n*n, 1.0_dp, plan%z, plan%z_system, x)
       call kernels%invert(n, plan%z_before, x, space%hint(padded(n) + 1:), inverse, rcond_z)  ! (2.53)-(2.56)
       place = inverse
       if (.not. self%transposed) place = reshape(transpose(reshape(inverse, [n, n])), [n*n])
       call kernels%store(n*n, place, first, n_lines, x, self%plan%k_joint)
-      call judge(total, min(rcond_m, rcond_z), line_info, rcond)
+      rcond = worse_of(rcond_m(:n_lines), rcond_z(:n_lines))
+      call kernels%judge(n_lines, total, line_info, rcond)
     end associate
   end subroutine decouple_block
 

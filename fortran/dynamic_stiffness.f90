@@ -1,7 +1,14 @@
 !> Receptance of a model from its matrices (2.28)-(2.29): by solving, dense or banded.
+!>
+!> Side by side, a line is condensed: DOFs that are not wanted are eliminated with their own pivots, in an order found
+!> once for all lines, and the small system that is left is solved with pivoting. The matrices are scaled by powers of
+!> two first, so that displacements and rotations have pivots of one size; where one is small, the line is in doubt.
 module jointfrf_dynamic_stiffness
   use, intrinsic :: iso_c_binding, only: c_size_t
+  use jointfrf_elimination_plan, only: elimination_plan, make_plan
   use jointfrf_kinds, only: dp, ip
+  use jointfrf_lanes, only: lane_kernels, lanes, largest_in_lanes, padded, real_lines, rows_in_memory, &
+    system_position, system_size
   use jointfrf_lapack, only: zgbcon, zgbtrf, zgbtrs
   use jointfrf_line_layout, only: all_finite, store
   use jointfrf_lines_lapack, only: inverse_work, one_norm, solve_line
@@ -12,6 +19,14 @@ module jointfrf_dynamic_stiffness
   public :: receptance_dense, receptance_banded
 
   integer(c_size_t), parameter :: one_char = 1_c_size_t
+  !> Fewer lines than these are not worth a plan.
+  integer, parameter :: fewest_lines = 3
+  !> Lanes do about this many multiplications in the time that LAPACK takes for one.
+  real(dp), parameter :: gain_of_lanes = 8.0_dp
+  !> A pivot smaller than this, where those of the scaled matrices are about one, puts the line in doubt.
+  real(dp), parameter :: smallest_pivot = 1.0e-4_dp
+  !> So does a smaller reciprocal condition number of the scaled matrix that is left.
+  real(dp), parameter :: doubtful = 1.0e-14_dp
 
   !> What both ways share: Z = (1 + i eta) K + i H + i w C - w^2 M at chosen DOFs.
   !> `damping` and `structural` may be empty.
@@ -22,18 +37,42 @@ module jointfrf_dynamic_stiffness
     real(dp), pointer, contiguous :: omega(:)
     real(dp), pointer, contiguous :: stiffness(:, :), mass(:, :), damping(:, :), structural(:, :)
     integer(ip), pointer, contiguous :: outputs(:), inputs(:)
+    type(elimination_plan) :: plan
+    real(dp), allocatable :: scale(:)              !< of each DOF, a power of two
+    real(dp) :: norms(4)                           !< of K, M, C and eta K + H
+    real(dp), pointer, contiguous :: result_pairs(:, :, :)
+    integer, allocatable :: from(:), to(:)         !< where the condensed matrix lies, and where the system wants it
+    integer :: n_wanted                            !< outputs that differ
+    integer, allocatable :: row_of(:)              !< slot of each retained DOF, shape (n)
+    integer, allocatable :: rhs(:)                 !< where the right-hand sides lie
+    complex(dp), allocatable :: forces(:)          !< what they hold
+    real(dp), allocatable :: result_scale(:, :)    !< of each entry of the result, shape (n_out, n_in) or transposed
   contains
+    procedure(coefficient_function), deferred :: coefficients
+    procedure :: line_block => stiffness_block
   end type dynamic_stiffness
+
+  abstract interface
+    !> Entry (i, j) of K, M, C and eta K + H; zero outside the band.
+    pure function coefficient_function(self, i, j) result(value)
+      import :: dynamic_stiffness, dp
+      class(dynamic_stiffness), intent(in) :: self
+      integer, intent(in) :: i, j
+      real(dp) :: value(4)
+    end function coefficient_function
+  end interface
 
   type, extends(dynamic_stiffness) :: dense_stiffness
   contains
     procedure :: line => dense_one
+    procedure :: coefficients => dense_coefficients
   end type dense_stiffness
 
   type, extends(dynamic_stiffness) :: banded_stiffness
     integer :: kl, ku
   contains
     procedure :: line => banded_one
+    procedure :: coefficients => banded_coefficients
   end type banded_stiffness
 
 contains
@@ -69,6 +108,7 @@ contains
     operation%n_real = 2*n
     operation%n_pivot = n
     operation%flops = 8.0_dp*real(n, dp)**2*(n/3.0_dp + n_in)
+    if (n <= largest_in_lanes) call prepare_block(operation, n - 1, n - 1, .true.)
     call run_sweep(operation, size(omega, kind=ip), line_info, rcond, info)
   end subroutine receptance_dense
 
@@ -100,6 +140,7 @@ contains
     operation%n_real = n
     operation%n_pivot = n
     operation%flops = 8.0_dp*real(n, dp)*(real(kl, dp)*(kl + ku + 1) + real(n_in, dp)*(2*kl + ku + 1))
+    call prepare_block(operation, kl, ku, .false.)
     call run_sweep(operation, size(omega, kind=ip), line_info, rcond, info)
   end subroutine receptance_banded
 
@@ -127,6 +168,244 @@ contains
     operation%inputs => inputs
     operation%result => h
   end subroutine set_model
+
+  !> The plan of lines side by side, where they are worth it.
+  !> retain_all   eliminate nothing in the plan's order, solve with pivoting
+  subroutine prepare_block(operation, kl, ku, retain_all)
+    class(dynamic_stiffness), intent(inout) :: operation
+    integer, intent(in) :: kl, ku
+    logical, intent(in) :: retain_all
+    logical :: coupled(max(kl, ku), operation%n), is_output(operation%n), retained(operation%n), symmetric
+    integer :: reach
+    real(dp) :: reference
+
+    reach = max(kl, ku)
+    if (size(operation%result) == 0 .or. size(operation%omega) < fewest_lines .or. reach >= largest_in_lanes) return
+    call mark(operation%outputs, is_output)
+    call mark(operation%inputs, retained)
+    retained = retained .or. is_output .or. retain_all
+    if (count(retained) > largest_in_lanes) return
+    call look_at_matrices(operation, reach, coupled, symmetric)
+    call make_plan(operation%n, coupled, retained, dofs_of(is_output), symmetric, operation%plan)
+    associate (n_left => operation%plan%n_retained, n_in => size(operation%inputs))
+      reference = real(operation%n, dp)*(real(kl, dp)*(kl + ku + 1) + real(n_in, dp)*(2*kl + ku + 1)) + n_left**2
+      if (n_left > largest_in_lanes .or. operation%plan%products > gain_of_lanes*reference) return
+      operation%n_wanted = count(is_output)
+      operation%n_element = operation%plan%n_slots**2 + system_size(n_left, n_in)
+      operation%n_hint = padded(n_left)
+    end associate
+    call set_coefficients(operation)
+    call set_places(operation)
+    call set_result(operation)
+  end subroutine prepare_block
+
+  !> The numbers of the plan's entries, scaled.
+  subroutine set_coefficients(operation)
+    class(dynamic_stiffness), intent(inout) :: operation
+    integer :: e, i, j
+
+    do e = 1, size(operation%plan%coefficient, 2)
+      i = operation%plan%row(e)
+      j = operation%plan%column(e)
+      operation%plan%coefficient(:, e) = operation%coefficients(i, j)*operation%scale(i)*operation%scale(j)
+    end do
+  end subroutine set_coefficients
+
+  !> From the plan's square to the system that is solved, and its right-hand sides: a unit force at each input.
+  subroutine set_places(operation)
+    class(dynamic_stiffness), intent(inout) :: operation
+    integer :: n_left, n_in, i, j, base
+
+    n_left = operation%plan%n_retained
+    n_in = size(operation%inputs)
+    base = operation%plan%n_slots**2
+    allocate (operation%from(n_left**2), operation%to(n_left**2), operation%rhs(n_left*n_in))
+    allocate (operation%row_of(operation%n), source=0)
+    allocate (operation%forces(n_left*n_in), source=(0.0_dp, 0.0_dp))
+    do i = 1, n_left
+      do j = 1, n_left
+        operation%from((i - 1)*n_left + j) = element(operation%plan, i, j)
+        operation%to((i - 1)*n_left + j) = base + system_position(n_left, n_in, i, j)
+      end do
+      do j = 1, n_in
+        operation%rhs((i - 1)*n_in + j) = base + system_position(n_left, n_in, i, n_left + j)
+        if (operation%plan%unknown(i) == operation%inputs(j)) operation%forces((i - 1)*n_in + j) = 1
+      end do
+      operation%row_of(operation%plan%unknown(i)) = i
+    end do
+  end subroutine set_places
+
+  !> The caller's result as numbers to be stored, and the scale of each entry.
+  subroutine set_result(operation)
+    class(dynamic_stiffness), intent(inout) :: operation
+    integer :: i, j
+
+    allocate (operation%result_scale(size(operation%result, 1), size(operation%result, 2)))
+    do j = 1, size(operation%result, 2)
+      do i = 1, size(operation%result, 1)
+        if (operation%transposed) then
+          operation%result_scale(i, j) = operation%scale(operation%inputs(i))*operation%scale(operation%outputs(j))
+        else
+          operation%result_scale(i, j) = operation%scale(operation%outputs(i))*operation%scale(operation%inputs(j))
+        end if
+      end do
+    end do
+    operation%result_pairs => real_lines(operation%result)
+  end subroutine set_result
+
+  !> Where the plan keeps entry (i, j) of the condensed matrix.
+  pure function element(plan, i, j) result(at)
+    type(elimination_plan), intent(in) :: plan
+    integer, intent(in) :: i, j
+    integer :: at
+
+    at = (i - 1)*plan%n_slots + j
+    if (plan%symmetric) at = (min(i, j) - 1)*plan%n_slots + max(i, j)
+  end function element
+
+  !> Which DOFs are named.
+  pure subroutine mark(dofs, named)
+    integer(ip), intent(in) :: dofs(:)
+    logical, intent(out) :: named(:)
+    integer :: j
+
+    named = .false.
+    do j = 1, size(dofs)
+      named(dofs(j)) = .true.
+    end do
+  end subroutine mark
+
+  !> The DOFs that are marked, ascending.
+  pure function dofs_of(named) result(dofs)
+    logical, intent(in) :: named(:)
+    integer :: dofs(count(named))
+    integer :: i, j
+
+    i = 0
+    do j = 1, size(named)
+      if (.not. named(j)) cycle
+      i = i + 1
+      dofs(i) = j
+    end do
+  end function dofs_of
+
+  !> Which DOFs are coupled, whether the matrices are symmetric, their norms, and the scale of each DOF.
+  subroutine look_at_matrices(operation, reach, coupled, symmetric)
+    class(dynamic_stiffness), intent(inout) :: operation
+    integer, intent(in) :: reach
+    logical, intent(out) :: coupled(reach, operation%n)
+    logical, intent(out) :: symmetric
+    real(dp) :: above(4), below(4), sums(4, operation%n), omega, size_of_z
+    integer :: i, j, d
+
+    coupled = .false.
+    allocate (operation%scale(operation%n), source=1.0_dp)
+    symmetric = .true.
+    omega = maxval(operation%omega, mask=abs(operation%omega) <= huge(1.0_dp))
+    sums = 0
+    do j = 1, operation%n
+      above = operation%coefficients(j, j)
+      sums(:, j) = sums(:, j) + abs(above)
+      size_of_z = abs(above(1)) + omega*(omega*abs(above(2)) + abs(above(3))) + abs(above(4))
+      if (size_of_z > 0.0_dp .and. size_of_z <= huge(1.0_dp)) &
+        operation%scale(j) = 2.0_dp**(-((exponent(size_of_z))/2))
+      do d = 1, min(reach, operation%n - j)
+        i = j + d
+        below = operation%coefficients(i, j)
+        above = operation%coefficients(j, i)
+        sums(:, j) = sums(:, j) + abs(below)
+        sums(:, i) = sums(:, i) + abs(above)
+        coupled(d, j) = .not. all(abs(below) <= 0.0_dp .and. abs(above) <= 0.0_dp)
+        symmetric = symmetric .and. all(abs(below - above) <= 0.0_dp)
+      end do
+    end do
+    operation%norms = maxval(sums, dim=2)
+  end subroutine look_at_matrices
+
+  pure function dense_coefficients(self, i, j) result(value)
+    class(dense_stiffness), intent(in) :: self
+    integer, intent(in) :: i, j
+    real(dp) :: value(4)
+
+    if (self%transposed) then
+      value = stored_coefficients(self, j, i)
+    else
+      value = stored_coefficients(self, i, j)
+    end if
+  end function dense_coefficients
+
+  pure function banded_coefficients(self, i, j) result(value)
+    class(banded_stiffness), intent(in) :: self
+    integer, intent(in) :: i, j
+    real(dp) :: value(4)
+
+    value = 0
+    if (i - j <= self%kl .and. j - i <= self%ku) value = stored_coefficients(self, self%ku + 1 + i - j, j)
+  end function banded_coefficients
+
+  pure function stored_coefficients(self, i, j) result(value)
+    class(dynamic_stiffness), intent(in) :: self
+    integer, intent(in) :: i, j
+    real(dp) :: value(4)
+
+    value = 0
+    value(1) = self%stiffness(i, j)
+    value(2) = self%mass(i, j)
+    if (self%has_damping) value(3) = self%damping(i, j)
+    value(4) = self%loss_factor*self%stiffness(i, j)
+    if (self%has_structural) value(4) = value(4) + self%structural(i, j)
+  end function stored_coefficients
+
+  !> Lines side by side: condensed to the DOFs that are wanted, then solved. Eq. (2.28).
+  !> rcond   one over the norm of Z times that of its inverse at inputs and outputs: an estimate from above
+  subroutine stiffness_block(self, kernels, first, n_lines, space, line_info, rcond)
+    class(dynamic_stiffness), intent(in) :: self
+    type(lane_kernels), intent(in) :: kernels
+    integer, intent(in) :: first, n_lines
+    type(line_space), target, intent(inout) :: space
+    integer(ip), intent(out) :: line_info(n_lines)
+    real(dp), intent(out) :: rcond(n_lines)
+    real(dp) :: omega(lanes), smallest(lanes), rcond_lanes(lanes), total(lanes), norm, largest
+    integer :: n_left, n_in, last, l, base
+    integer :: row(self%plan%n_retained), place(size(self%result_scale))
+
+    n_left = self%plan%n_retained
+    n_in = size(self%inputs)
+    base = self%plan%n_slots**2
+    last = first + n_lines - 1
+    do l = 1, lanes
+      omega(l) = self%omega(min(first + l - 1, last))
+    end do
+    call kernels%eliminate(self%plan, omega, space%x, smallest)
+    call kernels%copy(n_left**2, 1.0_dp, self%from, self%to, space%x)
+    call kernels%fill(n_left*n_in, self%forces, self%rhs, space%x)
+    call kernels%solve(n_left, n_in, self%n_wanted, base, space%x, space%hint, row, rcond_lanes)             ! (2.28)
+    call rows_in_memory(self%transposed, row(self%row_of(self%outputs)), n_in, place)
+    call kernels%total(size(place), place, space%x, total)
+    call kernels%store(size(place), place, first, n_lines, space%x, self%result_pairs)
+    do l = 1, n_lines
+      self%result(:, :, first + l - 1) = self%result(:, :, first + l - 1)*self%result_scale
+      largest = largest_sum(self%transposed, self%result(:, :, first + l - 1))
+      norm = self%norms(1) + omega(l)*(omega(l)*self%norms(2) + self%norms(3)) + self%norms(4)
+      rcond(l) = min(1.0_dp, (1/norm)/largest)
+      line_info(l) = line_overflow                                                                           ! in doubt
+      if (smallest(l) >= smallest_pivot**2 .and. rcond_lanes(l) >= doubtful .and. total(l) <= huge(1.0_dp) &
+          .and. largest <= huge(1.0_dp)) line_info(l) = line_good
+    end do
+  end subroutine stiffness_block
+
+  !> The largest sum of |re| + |im| over the outputs.
+  pure function largest_sum(transposed, h) result(largest)
+    logical, intent(in) :: transposed
+    complex(dp), contiguous, intent(in) :: h(:, :)
+    real(dp) :: largest
+
+    if (transposed) then
+      largest = maxval(sum(abs(real(h)) + abs(aimag(h)), dim=2))
+    else
+      largest = maxval(sum(abs(real(h)) + abs(aimag(h)), dim=1))
+    end if
+  end function largest_sum
 
   !> One stored entry of Z = (1 + i eta) K + i H + i w C - w^2 M. Eq. (2.29), with viscous damping.
   pure function entry(self, omega, i, j) result(z)

@@ -5,7 +5,7 @@ module jointfrf_finite_difference
   use jointfrf_line_layout, only: all_finite, load, store
   use jointfrf_lines_lapack, only: product_line
   use jointfrf_status, only: line_good, line_not_finite, line_overflow
-  use jointfrf_sweep, only: judge, line_operation, line_space, run_sweep
+  use jointfrf_sweep, only: line_operation, line_space, run_sweep
   implicit none
   private
   public :: difference_weights, transform_receptance
@@ -142,10 +142,12 @@ contains
       call kernels%fill(size(plan%sums), plan%nothing, plan%sums, x)
       call kernels%load(size(plan%h_place), plan%h_place, first, n_lines, plan%h, x)
       call kernels%product(self%n_out, self%m_in, self%m_out, 1.0_dp, plan%out_row, plan%h_row, plan%half_row, x)
-      call kernels%product(self%n_out, self%n_in, self%m_in, 1.0_dp, plan%half_row, plan%in_row, plan%new_row, x) ! (2.57)
+      call kernels%product(self%n_out, self%n_in, self%m_in, 1.0_dp, plan%half_row, plan%in_row, plan%new_row, &
+                           x)                                                             ! (2.57)
       call kernels%store(size(plan%new_place), plan%new_place, first, n_lines, x, self%plan%h_new)
       call kernels%total(size(plan%new_place), plan%new_place, x, total)
-      call judge(total, well, line_info, rcond)
+      rcond = well(:n_lines)
+      call kernels%judge(n_lines, total, line_info, rcond)
     end associate
   end subroutine transform_block
 

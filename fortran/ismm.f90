@@ -1,12 +1,12 @@
 !> Inverse structural modification: the joint stiffness from receptances of the assembly (2.37)-(2.48).
 module jointfrf_ismm
   use jointfrf_kinds, only: dp, ip
-  use jointfrf_lanes, only: in_memory, lane_kernels, lanes, largest_in_lanes, natural, padded, real_lines, row_starts, &
-    rows_in_memory, system, system_size
+  use jointfrf_lanes, only: in_memory, lane_kernels, lanes, largest_in_lanes, natural, padded, real_lines, &
+    row_starts, rows_in_memory, system, system_size, worse_of
   use jointfrf_line_layout, only: all_finite, load, store, subtract, take_block
   use jointfrf_lines_lapack, only: inverse_work, product_line, solve_line
   use jointfrf_status, only: line_good, line_not_finite, line_overflow
-  use jointfrf_sweep, only: judge, line_operation, line_space, run_sweep
+  use jointfrf_sweep, only: line_operation, line_space, long_block, run_sweep
   implicit none
   private
   public :: ismm, inverse_substructuring
@@ -19,8 +19,9 @@ module jointfrf_ismm
     integer, allocatable :: difference(:)          !< alpha - gamma
     integer, allocatable :: joint(:)               !< K0, then K*
     integer, allocatable :: unit(:)                !< right-hand sides E_k, row by row
-    complex(dp), allocatable :: unit_value(:)
+    complex(dp), allocatable :: unit_value(:)      !< E_k, or zeros
     integer, allocatable :: difference_row(:), w_row(:)   !< the element before each row
+    integer, allocatable :: alpha_row(:), gamma_row(:), joint_row(:)   !< where alpha and gamma are inverted as a whole
     integer, allocatable :: w(:)                   !< W, row by row
   end type identification_in_lanes
 
@@ -94,6 +95,21 @@ contains
 
     n = operation%n
     m = 2*n
+    operation%plan%alpha => real_lines(operation%alpha)
+    operation%plan%gamma => real_lines(operation%gamma)
+    operation%plan%k_initial => real_lines(operation%k_initial)
+    operation%plan%k_joint => real_lines(operation%result)
+    call operation%reads(operation%plan%alpha)
+    call operation%reads(operation%plan%gamma)
+    call operation%reads(operation%plan%k_initial)
+    if (n == 1) then
+      operation%block_lines = long_block
+      operation%n_element = 1
+      return
+    else if (n == 2) then
+      call plan_inversions(operation)
+      return
+    end if
     of_gamma = system(0, m, n)
     taken = system_size(m, n)
     of_alpha = system(taken, m, n)
@@ -104,10 +120,6 @@ contains
     operation%n_element = taken + n*n
     operation%n_hint = 2*padded(m)
     associate (plan => operation%plan)
-      plan%alpha => real_lines(operation%alpha)
-      plan%gamma => real_lines(operation%gamma)
-      plan%k_initial => real_lines(operation%k_initial)
-      plan%k_joint => real_lines(operation%result)
       plan%gamma_place = in_memory(operation%transposed, of_gamma(:, :m))
       plan%alpha_place = in_memory(operation%transposed, of_alpha(:, cshift(row_numbers(m), n)))
       plan%difference = in_memory(operation%transposed, difference)
@@ -120,6 +132,62 @@ contains
     end associate
   end subroutine plan_identification
 
+  !> Matrices of order 4 are inverted as a whole, which costs no more than to solve for two columns.
+  subroutine plan_inversions(operation)
+    type(identification), intent(inout) :: operation
+    integer, parameter :: n = 2, m = 4
+    integer :: gamma(m, m), alpha(m, m), difference(m, m), w(m, n), joint(n, n)
+
+    gamma = system(0, m, 0)
+    alpha = system(system_size(m, 0), m, 0)
+    difference = natural(2*system_size(m, 0), m, m)
+    w = natural(2*system_size(m, 0) + m*m, m, n)
+    joint = natural(2*system_size(m, 0) + m*m + m*n, n, n)
+    operation%n_element = 2*system_size(m, 0) + m*m + m*n + n*n
+    associate (plan => operation%plan)
+      plan%gamma_place = in_memory(operation%transposed, gamma)
+      plan%alpha_place = in_memory(operation%transposed, alpha)
+      plan%difference = in_memory(operation%transposed, difference)
+      plan%joint = in_memory(operation%transposed, joint)
+      plan%w = in_memory(.true., w)
+      allocate (plan%unit_value(m*n), source=(0.0_dp, 0.0_dp))
+      plan%gamma_row = row_starts(gamma(:, n + 1:))
+      plan%alpha_row = row_starts(alpha(:n, :))
+      plan%difference_row = row_starts(difference)
+      plan%w_row = row_starts(w)
+      plan%joint_row = row_starts(joint)
+    end associate
+  end subroutine plan_inversions
+
+  !> `identify_block` for two joint DOFs.
+  subroutine identify_by_inverses(self, kernels, first, n_lines, space, line_info, rcond)
+    class(identification), intent(in) :: self
+    type(lane_kernels), intent(in) :: kernels
+    integer, intent(in) :: first, n_lines
+    type(line_space), target, intent(inout) :: space
+    integer(ip), intent(out) :: line_info(n_lines)
+    real(dp), intent(out) :: rcond(n_lines)
+    real(dp) :: rcond_alpha(lanes), rcond_gamma(lanes), total(lanes)
+    integer, parameter :: n = 2, m = 4
+    integer :: unmoved(m*m)
+
+    associate (plan => self%plan, x => space%x)
+      call kernels%load(m*m, plan%gamma_place, first, n_lines, plan%gamma, x)
+      call kernels%load(m*m, plan%alpha_place, first, n_lines, plan%alpha, x)
+      call kernels%load(n*n, plan%joint, first, n_lines, plan%k_initial, x)
+      call kernels%combine(m*m, 1.0_dp, plan%alpha_place, -1.0_dp, plan%gamma_place, plan%difference, x)
+      call kernels%invert(m, 0, x, space%hint, unmoved, rcond_gamma, space%ahead)
+      call kernels%invert(m, system_size(m, 0), x, space%hint, unmoved, rcond_alpha)
+      call kernels%fill(m*n, plan%unit_value, plan%w, x)
+      call kernels%product(m, n, m, 1.0_dp, plan%difference_row, plan%gamma_row, plan%w_row, x)
+      call kernels%product(n, n, m, -1.0_dp, plan%alpha_row, plan%w_row, plan%joint_row, x)   ! (2.47), (2.48)
+      call kernels%store(n*n, plan%joint, first, n_lines, x, self%plan%k_joint)
+      call kernels%total(n*n, plan%joint, x, total)
+      rcond = worse_of(rcond_alpha(:n_lines), rcond_gamma(:n_lines))
+      call kernels%judge(n_lines, total, line_info, rcond)
+    end associate
+  end subroutine identify_by_inverses
+
   !> X = gamma^-1 E_k, W = (alpha - gamma) X, and of Y = alpha^-1 W the rows j, which are eliminated last: D_jk.
   subroutine identify_block(self, kernels, first, n_lines, space, line_info, rcond)
     class(identification), intent(in) :: self
@@ -131,6 +199,15 @@ contains
     real(dp) :: rcond_alpha(lanes), rcond_gamma(lanes), total(lanes)
     integer :: x_row(2*self%n), y_row(2*self%n), y(self%n**2), n, m
 
+    if (self%n == 1) then
+      call kernels%identify_lines(self%transposed, first, n_lines, self%plan%alpha, self%plan%gamma, &
+                                  self%plan%k_initial, self%plan%k_joint, rcond)
+      call kernels%judge(n_lines, 0*rcond, line_info, rcond)
+      return
+    else if (self%n == 2) then
+      call identify_by_inverses(self, kernels, first, n_lines, space, line_info, rcond)
+      return
+    end if
     n = self%n
     m = 2*n
     associate (plan => self%plan, x => space%x)
@@ -139,7 +216,7 @@ contains
       call kernels%load(n*n, plan%joint, first, n_lines, plan%k_initial, x)
       call kernels%combine(m*m, 1.0_dp, plan%alpha_place, -1.0_dp, plan%gamma_place, plan%difference, x)
       call kernels%fill(m*n, plan%unit_value, plan%unit, x)
-      call kernels%solve(m, n, m, 0, x, space%hint(:padded(m)), x_row, rcond_gamma)
+      call kernels%solve(m, n, m, 0, x, space%hint(:padded(m)), x_row, rcond_gamma, space%ahead)
       call kernels%fill(m*n, 0*plan%unit_value, plan%w, x)
       call kernels%product(m, n, m, 1.0_dp, plan%difference_row, x_row, plan%w_row, x)
       call kernels%solve(m, n, n, system_size(m, n), x, space%hint(padded(m) + 1:), y_row, rcond_alpha)
@@ -147,7 +224,8 @@ contains
       call kernels%combine(n*n, 1.0_dp, plan%joint, -1.0_dp, y, plan%joint, x)      ! (2.47), (2.48): K* = K0 - D_jk
       call kernels%store(n*n, plan%joint, first, n_lines, x, self%plan%k_joint)
       call kernels%total(n*n, plan%joint, x, total)
-      call judge(total, min(rcond_alpha, rcond_gamma), line_info, rcond)
+      rcond = worse_of(rcond_alpha(:n_lines), rcond_gamma(:n_lines))
+      call kernels%judge(n_lines, total, line_info, rcond)
     end associate
   end subroutine identify_block
 
@@ -254,6 +332,7 @@ contains
     associate (plan => operation%plan)
       plan%gamma => real_lines(operation%gamma)
       plan%k_joint => real_lines(operation%result)
+      call operation%reads(plan%gamma)
       plan%gamma_place = in_memory(operation%transposed, element(:, cshift(row_numbers(m), n)))
       plan%unit = in_memory(.true., element(:, m + 1:))
       plan%unit_value = -unit_block(m, n)
@@ -276,11 +355,12 @@ contains
     associate (plan => self%plan, x => space%x)
       call kernels%load(m*m, plan%gamma_place, first, n_lines, plan%gamma, x)
       call kernels%fill(m*n, plan%unit_value, plan%unit, x)
-      call kernels%solve(m, n, n, 0, x, space%hint, row, rcond_lanes)
+      call kernels%solve(m, n, n, 0, x, space%hint, row, rcond_lanes, space%ahead)
       call rows_in_memory(self%transposed, row(n + 1:), n, joint)
       call kernels%store(n*n, joint, first, n_lines, x, self%plan%k_joint)
       call kernels%total(n*n, joint, x, total)
-      call judge(total, rcond_lanes, line_info, rcond)
+      rcond = rcond_lanes(:n_lines)
+      call kernels%judge(n_lines, total, line_info, rcond)
     end associate
   end subroutine invert_block
 

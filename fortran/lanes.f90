@@ -5,24 +5,45 @@
 !> where each element lies. What is done with elements is a set of kernels, compiled from one source for several
 !> instruction sets (folder `lanes/`); `engine.F90` chooses among them.
 !>
-!> Kernels do not judge a line: they return the sums in which NaN, Inf and overflow show, and estimates of the condition.
-!> A line in doubt is done again by the reference engine, so that both engines give the same codes.
+!> Kernels return sums in which NaN, Inf and overflow show, and estimates of the condition. A line in doubt is done again
+!> by the reference engine, so that both engines give the same codes.
 module jointfrf_lanes
   use, intrinsic :: iso_c_binding, only: c_f_pointer, c_loc
   use, intrinsic :: iso_fortran_env, only: int64
-  use jointfrf_kinds, only: dp
+  use jointfrf_elimination_plan, only: elimination_plan
+  use jointfrf_kinds, only: dp, ip
+  use jointfrf_lookahead, only: lookahead
   implicit none
   private
   public :: lane_kernels, system_position, system_size, padded, real_lines, natural, system, flat, in_memory, &
-    row_starts, rows_in_memory
+    row_starts, rows_in_memory, worse_of
 
   !> Lines side by side. One register of AVX-512, two of AVX2, four of SSE2.
   integer, parameter, public :: lanes = 8
 
-  !> Above this order LAPACK is as fast.
+  !> Above this order of a matrix to be inverted LAPACK is as fast.
   integer, parameter, public :: largest_in_lanes = 64
+  !> Above this order of a matrix that only enters products a block leaves the caches.
+  integer, parameter, public :: largest_product = 128
+
+  !> What a block says of a line that it leaves to the reference engine; no line keeps it.
+  integer(ip), parameter, public :: in_doubt = huge(1_ip)
+  !> Below this reciprocal condition number a line of a block is in doubt: LAPACK may find it exactly singular.
+  real(dp), parameter, public :: doubtful = 1.0e-14_dp
 
   abstract interface
+    !> Which lines of a block are in doubt.
+    !> total        sums in which NaN, Inf and overflow of the results show
+    !> line_info    0, or `in_doubt`
+    !> rcond        reciprocal condition numbers, cut off at 1
+    subroutine judge_routine(n_lines, total, line_info, rcond)
+      import :: dp, ip
+      integer, intent(in) :: n_lines
+      real(dp), intent(in) :: total(n_lines)
+      integer(ip), intent(out) :: line_info(n_lines)
+      real(dp), intent(inout) :: rcond(n_lines)
+    end subroutine judge_routine
+
     !> Lines of the caller into lanes.
     !> n        numbers a line
     !> place    the element that each number goes to, shape (n)
@@ -92,13 +113,15 @@ module jointfrf_lanes
     !> hint    pivot rows to try first, 0 where none is known, shape (padded(n)); as found on return
     !> place   where the inverse lies, row by row, shape (n*n)
     !> rcond   reciprocal condition number; not finite where something overflowed
-    subroutine invert_routine(n, before, x, hint, place, rcond)
-      import :: dp, lanes
+    !> ahead   memory to ask for on the way
+    subroutine invert_routine(n, before, x, hint, place, rcond, ahead)
+      import :: dp, lanes, lookahead
       integer, intent(in) :: n, before
       real(dp), intent(inout) :: x(lanes, 2, *)
       integer, intent(inout) :: hint(*)
       integer, intent(out) :: place(n*n)
       real(dp), intent(out) :: rcond(lanes)
+      type(lookahead), intent(inout), optional :: ahead
     end subroutine invert_routine
 
     !> Solution of A X = B by elimination with partial pivoting (threshold 1/2) and back substitution.
@@ -109,14 +132,46 @@ module jointfrf_lanes
     !> hint     pivot rows to try first, 0 where none is known, shape (padded(n)); as found on return
     !> row      the element before the first one of each row of X, shape (n); the last n_last are valid
     !> rcond    estimate of the reciprocal condition number; not finite where something overflowed
-    subroutine solve_routine(n, n_rhs, n_last, before, x, hint, row, rcond)
-      import :: dp, lanes
+    !> ahead    memory to ask for on the way
+    subroutine solve_routine(n, n_rhs, n_last, before, x, hint, row, rcond, ahead)
+      import :: dp, lanes, lookahead
       integer, intent(in) :: n, n_rhs, n_last, before
       real(dp), intent(inout) :: x(lanes, 2, *)
       integer, intent(inout) :: hint(*)
       integer, intent(out) :: row(n)
       real(dp), intent(out) :: rcond(lanes)
+      type(lookahead), intent(inout), optional :: ahead
     end subroutine solve_routine
+
+    !> Elimination of Z = K - w^2 M + i (H + w C) by a plan, with pivots in the plan's order.
+    !> omega      angular frequencies, shape (lanes)
+    !> x          the square of the plan; holds what is left of Z for the retained unknowns on return
+    !> smallest   smallest |pivot|^2, shape (lanes); NaN where a pivot is not finite
+    subroutine eliminate_routine(plan, omega, x, smallest)
+      import :: dp, elimination_plan, lanes
+      type(elimination_plan), intent(in) :: plan
+      real(dp), intent(in) :: omega(lanes)
+      real(dp), intent(inout) :: x(lanes, 2, *)
+      real(dp), intent(out) :: smallest(lanes)
+    end subroutine eliminate_routine
+
+    !> Superposition of modes with residues R: sums of R/(lambda - w^2 + i (loss + w c)).
+    !> n_modes    number of modes, at least 1
+    !> n_four     number of entries over four
+    !> stiffness  lambda, shape (n_modes), (rad/s)^2; loss (lambda eta) and damping (c, rad/s) alike
+    !> residue    shape (4, n_modes, n_four)
+    !> omega      angular frequencies, shape (lanes)
+    !> x          first n_modes elements of workspace, then 4 n_four of result
+    !> smallest   smallest squared modulus of a denominator, shape (lanes); NaN where one is zero or not finite
+    !> largest    largest, shape (lanes)
+    subroutine superpose_routine(n_modes, n_four, stiffness, loss, damping, residue, omega, x, smallest, largest)
+      import :: dp, lanes
+      integer, intent(in) :: n_modes, n_four
+      real(dp), intent(in) :: stiffness(n_modes), loss(n_modes), damping(n_modes), residue(4, n_modes, n_four)
+      real(dp), intent(in) :: omega(lanes)
+      real(dp), intent(inout) :: x(lanes, 2, *)
+      real(dp), intent(out) :: smallest(lanes), largest(lanes)
+    end subroutine superpose_routine
 
     !> Two words of random bits for every counter, see `lanes_noise/random.inc`.
     !> n      counters a lane
@@ -177,10 +232,32 @@ module jointfrf_lanes
       real(dp), intent(in) :: x(lanes, 2, *), taken(lanes), number(lanes)
       real(dp), intent(inout) :: mean(lanes, 2, n), square(lanes, 3, n)
     end subroutine moments_routine
+
+    !> Inverse of lines of order n, 1 or 2, without workspace.
+    !> a, a_inverse   the caller's lines, of which n_lines from `first` on are done; any number of them
+    !> rcond          not finite where something overflowed
+    subroutine invert_lines_routine(n, first, n_lines, a, a_inverse, rcond)
+      import :: dp
+      integer, intent(in) :: n, first, n_lines
+      real(dp), intent(in) :: a(2, n*n, *)
+      real(dp), intent(inout) :: a_inverse(2, n*n, *)
+      real(dp), intent(out) :: rcond(n_lines)
+    end subroutine invert_lines_routine
+
+    !> ISMM for one joint DOF, without workspace. Arguments as in `ismm`, as pairs of real numbers.
+    subroutine identify_lines_routine(transposed, first, n_lines, alpha, gamma, k_initial, k_joint, rcond)
+      import :: dp
+      logical, intent(in) :: transposed
+      integer, intent(in) :: first, n_lines
+      real(dp), intent(in) :: alpha(8, *), gamma(8, *), k_initial(2, *)
+      real(dp), intent(inout) :: k_joint(2, *)
+      real(dp), intent(out) :: rcond(n_lines)
+    end subroutine identify_lines_routine
   end interface
 
   !> The kernels of one instruction set.
   type :: lane_kernels
+    procedure(judge_routine), pointer, nopass :: judge => null()
     procedure(load_routine), pointer, nopass :: load => null()
     procedure(store_routine), pointer, nopass :: store => null()
     procedure(total_routine), pointer, nopass :: total => null()
@@ -190,6 +267,10 @@ module jointfrf_lanes
     procedure(product_routine), pointer, nopass :: product => null()
     procedure(invert_routine), pointer, nopass :: invert => null()
     procedure(solve_routine), pointer, nopass :: solve => null()
+    procedure(invert_lines_routine), pointer, nopass :: invert_lines => null()
+    procedure(identify_lines_routine), pointer, nopass :: identify_lines => null()
+    procedure(eliminate_routine), pointer, nopass :: eliminate => null()
+    procedure(superpose_routine), pointer, nopass :: superpose => null()
     procedure(words_routine), pointer, nopass :: random_words => null()
     procedure(draw_routine), pointer, nopass :: normals => null()
     procedure(draw_routine), pointer, nopass :: uniforms => null()
@@ -201,7 +282,7 @@ module jointfrf_lanes
 
 contains
 
-  !> Elimination takes two columns at a time: order of a matrix made even by a one on the diagonal.
+  !> Elimination takes two columns at a time: order of a matrix made even by one more number on the diagonal.
   pure function padded(n) result(even)
     integer, intent(in) :: n
     integer :: even
@@ -309,6 +390,14 @@ contains
 
     before = element(:, 1) - 1
   end function row_starts
+
+  !> The smaller of two reciprocal condition numbers; not finite where one of them is not, which MIN may forget.
+  elemental function worse_of(a, b) result(rcond)
+    real(dp), intent(in) :: a, b
+    real(dp) :: rcond
+
+    rcond = min(a, b) + 0*(a + b)
+  end function worse_of
 
   !> The caller's lines as pairs of real numbers.
   function real_lines(lines) result(pairs)

@@ -1,12 +1,12 @@
 !> Inverse and solution of a sweep of matrices.
 module jointfrf_linear_algebra
   use jointfrf_kinds, only: dp, ip
-  use jointfrf_lanes, only: in_memory, lane_kernels, lanes, largest_in_lanes, padded, real_lines, rows_in_memory, system, &
-    system_size
+  use jointfrf_lanes, only: in_memory, lane_kernels, lanes, largest_in_lanes, padded, real_lines, rows_in_memory, &
+    system, system_size
   use jointfrf_line_layout, only: all_finite, load, store
   use jointfrf_lines_lapack, only: inverse_work, invert_line, solve_line
   use jointfrf_status, only: line_not_finite
-  use jointfrf_sweep, only: judge, line_operation, line_space, run_sweep
+  use jointfrf_sweep, only: line_operation, line_space, long_block, run_sweep
   implicit none
   private
   public :: invert, solve
@@ -54,9 +54,11 @@ contains
     if (operation%n >= 1 .and. operation%n <= largest_in_lanes) then
       operation%n_element = system_size(operation%n, 0)
       operation%n_hint = padded(operation%n)
+      if (operation%n <= 2) operation%block_lines = long_block
       operation%a_pairs => real_lines(a)
       operation%result_pairs => real_lines(a_inverse)
       operation%place = in_memory(.true., system(0, operation%n, 0))
+      call operation%reads(operation%a_pairs)
     end if
     call run_sweep(operation, size(a, 3, kind=ip), line_info, rcond, info)
   end subroutine invert
@@ -72,10 +74,16 @@ contains
     real(dp) :: rcond_lanes(lanes)
     integer :: place(self%n**2)
 
+    if (self%n <= 2) then
+      call kernels%invert_lines(self%n, first, n_lines, self%a_pairs, self%result_pairs, rcond)
+      call kernels%judge(n_lines, 0*rcond, line_info, rcond)
+      return
+    end if
     call kernels%load(self%n**2, self%place, first, n_lines, self%a_pairs, space%x)
-    call kernels%invert(self%n, 0, space%x, space%hint, place, rcond_lanes)
+    call kernels%invert(self%n, 0, space%x, space%hint, place, rcond_lanes, space%ahead)
     call kernels%store(self%n**2, place, first, n_lines, space%x, self%result_pairs)
-    call judge(rcond_lanes, rcond_lanes, line_info, rcond)
+    rcond = rcond_lanes(:n_lines)
+    call kernels%judge(n_lines, rcond_lanes, line_info, rcond)
   end subroutine invert_block
 
   subroutine invert_one(self, i, space, line_info, rcond)
@@ -132,6 +140,8 @@ contains
       operation%a_pairs => real_lines(operation%a)
       operation%b_pairs => real_lines(operation%b)
       operation%result_pairs => real_lines(operation%result)
+      call operation%reads(operation%a_pairs)
+      call operation%reads(operation%b_pairs)
     end associate
   end subroutine plan_solution
 
@@ -148,11 +158,12 @@ contains
     n_x = self%n*self%n_rhs
     call kernels%load(self%n**2, self%a_place, first, n_lines, self%a_pairs, space%x)
     call kernels%load(n_x, self%b_place, first, n_lines, self%b_pairs, space%x)
-    call kernels%solve(self%n, self%n_rhs, self%n, 0, space%x, space%hint, row, rcond_lanes)
+    call kernels%solve(self%n, self%n_rhs, self%n, 0, space%x, space%hint, row, rcond_lanes, space%ahead)
     call rows_in_memory(self%transposed, row, self%n_rhs, place)
     call kernels%store(n_x, place, first, n_lines, space%x, self%result_pairs)
     call kernels%total(n_x, place, space%x, total)
-    call judge(total, rcond_lanes, line_info, rcond)
+    rcond = rcond_lanes(:n_lines)
+    call kernels%judge(n_lines, total, line_info, rcond)
   end subroutine solve_block
 
   subroutine solve_one(self, i, space, line_info, rcond)

@@ -1,6 +1,7 @@
 !> Receptance of a model by superposition of its modes.
 module jointfrf_modal
   use jointfrf_kinds, only: dp, ip
+  use jointfrf_lanes, only: lane_kernels, lanes, real_lines
   use jointfrf_line_layout, only: all_finite, store
   use jointfrf_lines_lapack, only: product_line
   use jointfrf_status, only: line_good, line_not_finite, line_overflow
@@ -15,7 +16,12 @@ module jointfrf_modal
     real(dp), pointer, contiguous :: omega(:), stiffness(:), damping(:), loss_factor(:)
     complex(dp), allocatable :: shapes_out(:, :)      !< (n_out, n_modes)
     real(dp), allocatable :: shapes_in(:, :)          !< (n_in, n_modes)
+    real(dp), allocatable :: loss(:)                  !< lambda eta of each mode
+    real(dp), allocatable :: residue(:, :, :)         !< of entries that differ, by fours, shape (4, n_modes, n_four)
+    integer, allocatable :: place(:)                  !< the element of each entry, in the caller's order
+    real(dp), pointer, contiguous :: result_pairs(:, :, :)
   contains
+    procedure :: line_block => superpose_block
     procedure :: line => superpose_one
   end type superposition
 
@@ -59,8 +65,70 @@ contains
     operation%n_in = size(operation%shapes_in, 1)
     operation%n_complex = operation%n_modes*operation%n_in + operation%n_out*operation%n_in
     operation%flops = 8.0_dp*operation%n_modes*(operation%n_in + operation%n_out*operation%n_in)
+    if (operation%n_modes > 0 .and. size(h) > 0) call prepare_block(operation)
     call run_sweep(operation, size(omega, kind=ip), line_info, rcond, info)
   end subroutine receptance_modal
+
+  !> Residues phi_out phi_in of the entries. Where responses and forces are at the same places, entries (i, j) and
+  !> (j, i) are one.
+  subroutine prepare_block(operation)
+    class(superposition), intent(inout) :: operation
+    logical :: symmetric
+    integer :: o, i, e, entries
+
+    symmetric = operation%n_out == operation%n_in
+    if (symmetric) symmetric = all(abs(operation%shapes_out - operation%shapes_in) <= 0.0_dp)
+    entries = operation%n_out*operation%n_in
+    if (symmetric) entries = (operation%n_out*(operation%n_out + 1))/2
+    allocate (operation%residue(4, operation%n_modes, (entries + 3)/4), source=0.0_dp)
+    allocate (operation%place(operation%n_out*operation%n_in))
+    e = 0
+    do i = 1, operation%n_in
+      do o = merge(i, 1, symmetric), operation%n_out
+        e = e + 1
+        operation%residue(mod(e - 1, 4) + 1, :, (e + 3)/4) = &
+          real(operation%shapes_out(o, :), dp)*operation%shapes_in(i, :)
+        operation%place(in_memory(o, i)) = operation%n_modes + e
+        if (symmetric) operation%place(in_memory(i, o)) = operation%n_modes + e
+      end do
+    end do
+    operation%loss = operation%loss_factor*operation%stiffness
+    operation%result_pairs => real_lines(operation%result)
+    operation%n_element = operation%n_modes + 4*size(operation%residue, 3)
+
+  contains
+
+    pure function in_memory(o, i) result(at)
+      integer, intent(in) :: o, i
+      integer :: at
+
+      at = merge((o - 1)*operation%n_in + i, (i - 1)*operation%n_out + o, operation%transposed)
+    end function in_memory
+  end subroutine prepare_block
+
+  subroutine superpose_block(self, kernels, first, n_lines, space, line_info, rcond)
+    class(superposition), intent(in) :: self
+    type(lane_kernels), intent(in) :: kernels
+    integer, intent(in) :: first, n_lines
+    type(line_space), target, intent(inout) :: space
+    integer(ip), intent(out) :: line_info(n_lines)
+    real(dp), intent(out) :: rcond(n_lines)
+    real(dp) :: omega(lanes), smallest(lanes), largest(lanes), total(lanes)
+    integer :: l
+
+    do l = 1, lanes
+      omega(l) = self%omega(first + min(l, n_lines) - 1)
+    end do
+    call kernels%superpose(self%n_modes, size(self%residue, 3), self%stiffness, self%loss, self%damping, self%residue, &
+                           omega, space%x, smallest, largest)
+    call kernels%total(size(self%place), self%place, space%x, total)
+    call kernels%store(size(self%place), self%place, first, n_lines, space%x, self%result_pairs)
+    do l = 1, n_lines
+      rcond(l) = sqrt(smallest(l)/largest(l))
+      line_info(l) = line_overflow                                     ! in doubt
+      if (total(l) <= huge(1.0_dp) .and. smallest(l) <= huge(1.0_dp)) line_info(l) = line_good
+    end do
+  end subroutine superpose_block
 
   subroutine superpose_one(self, i, space, line_info, rcond)
     class(superposition), intent(in) :: self

@@ -2,12 +2,13 @@
 !> into another (2.40), (2.47).
 module jointfrf_modification
   use jointfrf_kinds, only: dp, ip
-  use jointfrf_lanes, only: flat, in_memory, lane_kernels, lanes, largest_in_lanes, natural, padded, real_lines, row_starts, &
-    system, system_size
+  use jointfrf_lanes, only: flat, in_memory, lane_kernels, lanes, largest_in_lanes, largest_product, natural, &
+    padded, real_lines, row_starts, system, system_size
   use jointfrf_line_layout, only: all_finite, load, store, subtract
   use jointfrf_lines_lapack, only: inverse_work, product_line, solve_line
+  use jointfrf_lookahead, only: lookahead
   use jointfrf_status, only: line_good, line_not_finite, line_overflow
-  use jointfrf_sweep, only: judge, line_operation, line_space, run_sweep
+  use jointfrf_sweep, only: line_operation, line_space, run_sweep
   implicit none
   private
   public :: modify, find_modification, apply_modification, modification_work
@@ -75,7 +76,7 @@ contains
     operation%n_real = 2*n_m
     operation%n_pivot = n_m
     operation%flops = 8.0_dp*n_m*(real(n, dp)**2 + 2.0_dp*real(n_m, dp)*n)
-    if (n_m >= 1 .and. max(n, n_m) <= largest_in_lanes) call plan_block(operation)
+    if (n_m >= 1 .and. n_m <= largest_in_lanes .and. n <= largest_product) call plan_block(operation)
     call run_sweep(operation, size(alpha, 3, kind=ip), line_info, rcond, info)
   end subroutine modify
 
@@ -88,6 +89,8 @@ contains
     operation%alpha_pairs => real_lines(operation%alpha)
     operation%d_pairs => real_lines(operation%d)
     operation%result_pairs => real_lines(operation%result)
+    call operation%reads(operation%alpha_pairs)
+    call operation%reads(operation%d_pairs)
     associate (plan => operation%plan, dofs => operation%dofs)
       operation%h_place = in_memory(operation%transposed, plan%h)
       operation%d_place = in_memory(operation%transposed, plan%d)
@@ -109,10 +112,11 @@ contains
       call kernels%load(size(self%h_place), self%h_place, first, n_lines, self%alpha_pairs, x)
       call kernels%load(size(self%d_place), self%d_place, first, n_lines, self%d_pairs, x)
       call kernels%copy(size(self%taken), 1.0_dp, self%taken_from, self%taken, x)
-      call apply_in_lanes(self%plan, kernels, x, space%hint, rcond_lanes)
+      call apply_in_lanes(self%plan, kernels, x, space%hint, rcond_lanes, space%ahead)
       call kernels%store(size(self%h_place), self%h_place, first, n_lines, x, self%result_pairs)
       call kernels%total(size(self%h_place), self%h_place, x, total)
-      call judge(total, rcond_lanes, line_info, rcond)
+      rcond = rcond_lanes(:n_lines)
+      call kernels%judge(n_lines, total, line_info, rcond)
     end associate
   end subroutine modify_block
 
@@ -136,8 +140,8 @@ contains
     plan%d = natural(taken, n_m, n_m)
     taken = taken + n_m*n_m
     right = natural(taken, n_m, n_m + n)
-    plan%h_mm = right(:, :n_m)
-    plan%rows = right(:, n_m + 1:)
+    allocate (plan%h_mm, source=right(:, :n_m))
+    allocate (plan%rows, source=right(:, n_m + 1:))
     taken = taken + n_m*(n_m + n)
     product = natural(taken, n_m, n_m + n)
     taken = taken + n_m*(n_m + n)
@@ -159,12 +163,13 @@ contains
   end subroutine plan_modification
 
   !> `apply_modification` in lanes, once H, D, H_mm, rows and columns are there.
-  subroutine apply_in_lanes(plan, kernels, x, hint, rcond)
+  subroutine apply_in_lanes(plan, kernels, x, hint, rcond, ahead)
     type(modification_in_lanes), intent(in) :: plan
     type(lane_kernels), intent(in) :: kernels
     real(dp), contiguous, intent(inout) :: x(:, :, :)
     integer, contiguous, intent(inout) :: hint(:)
     real(dp), intent(out) :: rcond(lanes)
+    type(lookahead), intent(inout) :: ahead
     integer :: force_row(plan%n_m), n, n_m
 
     n = plan%n
@@ -172,7 +177,7 @@ contains
     call kernels%fill(size(plan%product), plan%unit_value, plan%product, x)
     call kernels%product(n_m, n_m + n, n_m, 1.0_dp, plan%d_row, plan%right_row, plan%product_row, x)
     call kernels%copy(size(plan%product), 1.0_dp, plan%product, plan%in_system, x)
-    call kernels%solve(n_m, n, n_m, plan%system_before, x, hint, force_row, rcond)
+    call kernels%solve(n_m, n, n_m, plan%system_before, x, hint, force_row, rcond, ahead)
     call kernels%product(n, n, n_m, -1.0_dp, plan%columns_row, force_row, plan%h_row, x)
   end subroutine apply_in_lanes
 

@@ -2,20 +2,21 @@
 !>
 !> A physics module says what one line is (`line_operation`) and where its result goes; everything that is the same for
 !> all of them is here, once: workspace (allocated before the loop, one piece a thread), threads, NaN in bad lines, the
-!> count of bad lines. It may also say how a block of lines is done side by side (`line_block`); lines of a block that are
-!> in doubt are done again one by one, so that both ways give the same codes.
+!> count of bad lines. It may also say how a block of lines is done side by side (`line_block`); lines of a block that
+!> are in doubt are done again one by one, so that both ways give the same codes.
 module jointfrf_sweep
   use, intrinsic :: iso_c_binding, only: c_intptr_t, c_loc
   !$ use omp_lib, only: omp_get_max_threads, omp_get_thread_num, omp_in_parallel
   use jointfrf_blas_threads, only: hold_blas_threads, release_blas_threads
   use jointfrf_engine, only: find_kernels
   use jointfrf_kinds, only: dp, ip
-  use jointfrf_lanes, only: lane_kernels, lanes
+  use jointfrf_lanes, only: in_doubt, lane_kernels, lanes
   use jointfrf_line_layout, only: store_nan
+  use jointfrf_lookahead, only: add_range, lookahead, most_ranges
   use jointfrf_status, only: info_good, info_no_memory, line_good
   implicit none
   private
-  public :: line_operation, line_space, run_sweep, judge
+  public :: line_operation, line_space, run_sweep
 
   !> Below this many floating-point operations a sweep costs less than waking the threads (about 100 microseconds).
   real(dp), parameter :: serial_flops = 2.0e5_dp
@@ -24,14 +25,12 @@ module jointfrf_sweep
   !> Lines that a thread takes at a time; pivot rows are remembered within them only, so that results do not depend on
   !> the number of threads.
   integer, parameter :: chunk = 8*lanes
+  !> A sweep that reads no more than this stays in the caches.
+  integer(c_intptr_t), parameter :: near_bytes = 2**20
+  !> Lines of a block that needs no workspace.
+  integer, parameter, public :: long_block = 64*lanes
   !> Fewer lines than these are not worth a block.
   integer, parameter :: fewest_lines = 3
-  !> Below this reciprocal condition number a line of a block is in doubt: LAPACK may find it exactly singular.
-  real(dp), parameter :: doubtful = 1.0e-14_dp
-
-  !> What a block says of a line that it leaves to the reference engine; no line keeps it.
-  integer(ip), parameter :: in_doubt = huge(1_ip)
-
   !> The workspace of one thread, handed out line by line.
   type :: line_space
     complex(dp), allocatable :: z(:)
@@ -41,9 +40,15 @@ module jointfrf_sweep
     real(dp), pointer, contiguous :: x(:, :, :) => null()   !< elements of a block, shape (lanes, 2, n_element)
     real(dp), allocatable :: room(:)         !< where x lies
     integer, allocatable :: hint(:)          !< pivot rows of the block before
+    type(lookahead) :: ahead                 !< memory of the next block
   contains
     procedure :: matrix
   end type line_space
+
+  !> An array of lines in the caller's memory.
+  type :: stream
+    integer(c_intptr_t) :: address, line_bytes
+  end type stream
 
   !> What is done with one line. An extension holds pointers to the caller's arrays.
   type, abstract :: line_operation
@@ -53,11 +58,15 @@ module jointfrf_sweep
     real(dp) :: flops = 0.0_dp     !< estimated work of one line
     integer :: n_element = 0       !< elements that a block takes, see jointfrf_lanes; 0: no block form
     integer :: n_hint = 0          !< pivot rows that a block remembers
+    integer :: block_lines = lanes !< lines of a block
+    integer :: n_stream = 0        !< the caller's large arrays that a block reads
+    type(stream) :: streams(most_ranges - 1)
     !> The caller's array for the results, one matrix a line.
     complex(dp), pointer, contiguous :: result(:, :, :) => null()
   contains
     procedure(line_routine), deferred :: line
     procedure :: line_block => no_block
+    procedure :: reads
   end type line_operation
 
   abstract interface
@@ -74,10 +83,41 @@ module jointfrf_sweep
 
 contains
 
+  !> A block reads these lines, given as pairs of real numbers.
+  subroutine reads(self, lines)
+    class(line_operation), intent(inout) :: self
+    real(dp), contiguous, target, intent(in) :: lines(:, :, :)
+
+    if (self%n_stream == size(self%streams) .or. size(lines) == 0) return
+    self%n_stream = self%n_stream + 1
+    self%streams(self%n_stream)%address = transfer(c_loc(lines), 0_c_intptr_t)
+    self%streams(self%n_stream)%line_bytes = 16_c_intptr_t*size(lines, 2)
+  end subroutine reads
+
+  !> What to bring near while the block of lines from first to last is computed: what the next block reads, and where
+  !> this one writes.
+  subroutine look_ahead(operation, first, last, final, ahead)
+    class(line_operation), intent(in) :: operation
+    integer, intent(in) :: first, last, final
+    type(lookahead), intent(out) :: ahead
+    integer(c_intptr_t) :: address, bytes
+    integer :: i, next
+
+    next = min(last + operation%block_lines, final)
+    do i = 1, operation%n_stream
+      associate (s => operation%streams(i))
+        call add_range(ahead, s%address + s%line_bytes*last, s%address + s%line_bytes*next, .false.)
+      end associate
+    end do
+    bytes = 16_c_intptr_t*size(operation%result, 1)*size(operation%result, 2)
+    address = transfer(c_loc(operation%result), address)
+    call add_range(ahead, address + bytes*(first - 1), address + bytes*last, .true.)
+  end subroutine look_ahead
+
   !> What an operation without block form has.
   !> kernels     what lanes can do
   !> first       the first line of the block
-  !> n_lines     its number of lines, 1..lanes
+  !> n_lines     its number of lines, 1..block_lines
   !> line_info   shape (n_lines): 0 good; anything else: in doubt, to be done again
   !> rcond       shape (n_lines)
   subroutine no_block(self, kernels, first, n_lines, space, line_info, rcond)
@@ -93,23 +133,6 @@ contains
     associate (unused => self%flops, also => kernels, and => first, with => space)
     end associate
   end subroutine no_block
-
-  !> Which lines of a block are in doubt.
-  !> total         sums in which NaN, Inf and overflow of the results show
-  !> rcond_lanes   reciprocal condition numbers
-  pure subroutine judge(total, rcond_lanes, line_info, rcond)
-    real(dp), intent(in) :: total(lanes), rcond_lanes(lanes)
-    integer(ip), intent(out) :: line_info(:)
-    real(dp), intent(out) :: rcond(:)
-    integer :: l
-
-    do l = 1, size(line_info)
-      rcond(l) = min(1.0_dp, rcond_lanes(l))
-      line_info(l) = in_doubt
-      if (total(l) <= huge(1.0_dp) .and. rcond_lanes(l) > doubtful .and. rcond_lanes(l) <= huge(1.0_dp)) &
-        line_info(l) = line_good
-    end do
-  end subroutine judge
 
   !> The next n by m matrix of the workspace, valid until the line ends.
   function matrix(self, n, m) result(piece)
@@ -134,15 +157,17 @@ contains
     integer(ip), intent(out) :: info
     type(line_space), allocatable, target :: space(:)
     type(lane_kernels) :: kernels
-    integer :: t, threads, n_chunks, c, stat
-    logical :: hold, blocks
+    integer :: t, threads, share, n_chunks, c, stat
+    logical :: hold, blocks, far
 
     call find_kernels(kernels, blocks, info)
     if (info /= info_good) return
     blocks = blocks .and. operation%n_element > 0 .and. n_freq >= fewest_lines
-    n_chunks = (n_freq + chunk - 1)/chunk
+    share = max(chunk, operation%block_lines)
+    n_chunks = (n_freq - 1)/share + 1
     threads = threads_for(operation%flops*n_freq, merge(n_chunks, int(n_freq), blocks), &
                           merge(serial_flops_lanes, serial_flops, blocks))
+    far = sum(operation%streams(:operation%n_stream)%line_bytes)*n_freq > near_bytes
     call prepare(operation, blocks, threads, space, stat)
     if (stat /= 0) then
       info = info_no_memory
@@ -157,10 +182,11 @@ contains
     t = 1
     if (blocks) then
       !$omp parallel do num_threads(threads) if(threads > 1) schedule(static) default(none) &
-      !$omp shared(operation, kernels, n_freq, n_chunks, space, line_info, rcond) firstprivate(t)
+      !$omp shared(operation, kernels, n_freq, n_chunks, share, far, space, line_info, rcond) firstprivate(t)
       do c = 1, n_chunks
         !$ t = omp_get_thread_num() + 1
-        call run_blocks(operation, kernels, (c - 1)*chunk + 1, min(c*chunk, int(n_freq)), space(t), line_info, rcond)
+        call run_blocks(operation, kernels, (c - 1)*share + 1, min(c*share, int(n_freq)), far, space(t), line_info, &
+                        rcond)
       end do
       !$omp end parallel do
     else
@@ -210,19 +236,23 @@ contains
   end subroutine place_elements
 
   !> The lines from first to last, in blocks.
-  subroutine run_blocks(operation, kernels, first, last, space, line_info, rcond)
+  !> far   whether the sweep is too large for the caches
+  subroutine run_blocks(operation, kernels, first, last, far, space, line_info, rcond)
     class(line_operation), intent(in) :: operation
     type(lane_kernels), intent(in) :: kernels
     integer, intent(in) :: first, last
+    logical, intent(in) :: far
     type(line_space), intent(inout) :: space
     integer(ip), intent(inout) :: line_info(:)
     real(dp), intent(inout) :: rcond(:)
     integer :: i, k, n_lines
 
     space%hint = 0
-    do i = first, last, lanes
-      n_lines = min(lanes, last - i + 1)
+    do i = first, last, operation%block_lines
+      n_lines = min(operation%block_lines, last - i + 1)
+      if (far) call look_ahead(operation, i, i + n_lines - 1, last, space%ahead)
       call operation%line_block(kernels, i, n_lines, space, line_info(i:i + n_lines - 1), rcond(i:i + n_lines - 1))
+      if (count(line_info(i:i + n_lines - 1) /= line_good) == 0) cycle
       do k = i, i + n_lines - 1
         if (line_info(k) /= line_good) call run_line(operation, k, space, line_info(k), rcond(k))
       end do

@@ -87,6 +87,13 @@ void jf_central_difference_(const char *trans, const int *m, const int *n_freq, 
 void jf_transform_(const char *trans, const int *n_out, const int *n_in, const int *m_out, const int *m_in, const
     int *n_freq, const jf_complex *h, const double *t_out, const double *t_in, jf_complex *h_new, int *line_info,
     double *rcond, int *info);
+void jf_pollute_(const char *trans, const char *kind, const char *reference, const int *reciprocal, const int *block,
+    const double *level, const int *seed, const int *n_out, const int *n_in, const int *n_freq, const int *first, const
+    int *count, const jf_complex *h, jf_complex *polluted, int *info);
+void jf_monte_carlo_(const char *trans, const char *method, const char *kind, const char *reference, const int
+    *reciprocal, const int *block, const double *level, const int *seed, const int *n, const int *n_freq, const int
+    *first, const int *count, const jf_complex *alpha, const jf_complex *gamma, const jf_complex *k_initial, int *good,
+    jf_complex *mean, double *covariance, int *line_info, double *rcond, int *info);
 
 /* the names without the trailing underscore */
 #define jf_version jf_version_
@@ -111,6 +118,8 @@ void jf_transform_(const char *trans, const int *n_out, const int *n_in, const i
 #define jf_difference_weights jf_difference_weights_
 #define jf_central_difference jf_central_difference_
 #define jf_transform jf_transform_
+#define jf_pollute jf_pollute_
+#define jf_monte_carlo jf_monte_carlo_
 
 #ifdef __cplusplus
 }

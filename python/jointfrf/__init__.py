@@ -29,8 +29,9 @@ from jointfrf.linear_algebra import invert, reciprocal_condition, solve
 from jointfrf.metrics import amplitude_error, frequency_error, peak
 from jointfrf.model import Model, assemble
 from jointfrf.modification import find_modification, modify
+from jointfrf.monte_carlo import BandStatistics, MonteCarlo, monte_carlo
 from jointfrf.noise import pollute, realisations
-from jointfrf.receptance import receptance
+from jointfrf.receptance import ReceptanceInfo, receptance
 from jointfrf.rotations import DifferenceError, central_difference, difference_error, difference_weights, transform
 
 __version__ = VERSION

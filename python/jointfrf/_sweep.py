@@ -14,6 +14,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
+from numpy.lib.array_utils import byte_bounds
 from numpy.typing import ArrayLike, NDArray
 
 import jointfrf._kernel as _kernel
@@ -38,7 +39,9 @@ __all__ = [
     "as_real",
     "as_square",
     "as_values",
+    "call",
     "check_choice",
+    "check_lines",
     "kernel_engine",
     "optional_frequency",
     "run",
@@ -60,8 +63,9 @@ RCOND_LIMIT = 1e-12
 LARGE_COPY = 16 * 2**20
 #: Arrays in files are worked on in pieces of lines; inputs and result of one piece take about this many bytes.
 PIECE = 64 * 2**20
-#: Lines that the kernel takes as one share; pieces are multiples of it, so that they change no bit of a result.
-_SHARE = 64
+#: Lines that the kernel takes as one share, of large matrices and of small ones; pieces are multiples of it, so that
+#: they change no bit of a result.
+_SHARE, _LONG_SHARE = 64, 512
 
 _LINE_NOT_FINITE = -1
 _LINE_OVERFLOW = -2
@@ -381,7 +385,8 @@ def _pieces(result: ComplexArray, sweeps: Mapping[str, NDArray[Any]]) -> Iterato
     step = n_freq = result.shape[0]
     size = result.nbytes + sum(16 * sweep.size for sweep in sweeps.values())
     if size > PIECE and any(a.strides[0] == 0 or _mapped(a) for a in (result, *sweeps.values())):
-        step = _SHARE * max(1, PIECE * n_freq // (_SHARE * size))
+        step = PIECE * n_freq // size
+        step = max(_SHARE, step - step % (_LONG_SHARE if step >= _LONG_SHARE else _SHARE))
     # fewer lines than a share are left to the piece before
     firsts = range(0, max(1, n_freq - _SHARE + 1), step)
     for first in firsts:
@@ -404,15 +409,33 @@ def _let_go(lines: NDArray[Any]) -> None:
     while isinstance(base.base, np.ndarray):
         base = base.base
     # In mode "c" what was written would be lost; otherwise mapped memory is no more than a view of the file.
-    if not (isinstance(base, np.memmap) and base.mode != "c" and lines.flags.c_contiguous):
+    pages = base.base
+    if not (isinstance(base, np.memmap) and base.mode != "c" and isinstance(pages, mmap.mmap)):
         return
-    if not (isinstance(base.base, mmap.mmap) and hasattr(mmap, "MADV_DONTNEED")):
-        return
-    first = base.__array_interface__["data"][0] - base.offset % mmap.ALLOCATIONGRANULARITY
-    start = (lines.__array_interface__["data"][0] - first) // mmap.PAGESIZE * mmap.PAGESIZE
-    stop = (lines.__array_interface__["data"][0] - first + lines.nbytes) // mmap.PAGESIZE * mmap.PAGESIZE
-    if stop > start:
-        base.base.madvise(mmap.MADV_DONTNEED, start, stop - start)
+    if hasattr(mmap, "MADV_DONTNEED"):
+        first = base.ctypes.data - base.offset % mmap.ALLOCATIONGRANULARITY
+        start, stop = ((end - first) // mmap.PAGESIZE * mmap.PAGESIZE for end in byte_bounds(lines))
+        if stop > start:
+            pages.madvise(mmap.MADV_DONTNEED, start, stop - start)
+
+
+def call(routine: str, args: Sequence[Any]) -> None:
+    """Call a kernel routine whose results are among its arguments; arrays in C order, none of size zero."""
+    views = [a.T if isinstance(a, np.ndarray) else a for a in args]
+    _check_info(routine, getattr(_kernel, "jf_" + routine)(*views))
+
+
+def check_lines(
+    routine: str,
+    status: LineStatus,
+    sweeps: Mapping[str, NDArray[Any]],
+    freq_hz: FloatArray | None,
+    on_singular: OnSingular,
+) -> None:
+    """Turn bad lines into exceptions."""
+    check_choice("on_singular", on_singular, get_args(OnSingular))
+    if status.line_info.any():
+        _check_status(routine, status, int((status.line_info != 0).sum()), sweeps, freq_hz, on_singular, 0.0)
 
 
 def weights(offset: FloatArray) -> FloatArray:

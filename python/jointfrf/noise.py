@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
-from typing import Literal, get_args
+from operator import index
+from typing import Final, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from jointfrf._sweep import ComplexArray, FloatArray, as_lines, as_number, check_choice
+from jointfrf._sweep import ComplexArray, as_lines, as_number, call, check_choice
 
-__all__ = ["NoiseKind", "NoiseReference", "pollute", "realisations"]
+__all__ = ["NoiseKind", "NoiseReference", "noise_arguments", "pollute", "realisations"]
 
 NoiseKind = Literal["complex", "complex-per-part", "real-normal", "real-uniform", "real-uniform-std"]
 NoiseReference = Literal["entry", "line", "spectrum"]
+
+#: The letters of the kernel.
+_KINDS: Final[dict[str, str]] = {
+    "complex": "C", "complex-per-part": "P", "real-normal": "N", "real-uniform": "U", "real-uniform-std": "S",
+}  # fmt: skip
+#: Realisations are counted in 31 bits.
+_MOST: Final = 2**31 - 1
 
 
 def pollute(
@@ -44,7 +52,7 @@ def pollute(
         - "real-uniform-std": real, uniform with standard deviation `level`.
 
     seed : int
-        Seed; the same seed gives the same noise on any machine and any number of threads.
+        Seed, 0 to 2**64 - 1; the same seed gives the same noise on any machine and any number of threads.
     relative_to : {"entry", "line", "spectrum"}
         What the level refers to: the entry itself, H (1 + e) (a real kind then leaves all phases exact: the wording of
         section 3.2); the largest modulus at that line, H + e max|H| (the wording of section 3.1); or the largest over
@@ -63,7 +71,17 @@ def pollute(
     Raises
     ------
     ValueError
-        An unknown word, a negative level, blocks that do not fit, reciprocal noise on a matrix that is not square.
+        An unknown word, a negative level, blocks that do not fit, reciprocal noise on a matrix that is not square, a
+        seed or a realisation out of range.
+
+    Notes
+    -----
+    Numbers come from a counter-based generator (Threefry-2x64-20): the counter is made of entry, line and realisation,
+    the key of the seed. So the number of an entry depends on nothing else. Normal numbers are those of Box and Muller.
+
+    References
+    ----------
+    J. K. Salmon, M. A. Moraes, R. O. Dror, D. E. Shaw, Parallel random numbers: as easy as 1, 2, 3. SC11, 2011.
 
     Examples
     --------
@@ -118,40 +136,40 @@ def realisations(
     True
     """
     lines = as_lines("h", h)
-    n_freq, n_out, n_in = lines.shape
-    check_choice("kind", kind, get_args(NoiseKind))
-    check_choice("relative_to", relative_to, get_args(NoiseReference))
-    if as_number("level", level) < 0:
-        raise ValueError(f"level must be 0 or positive, not {level}")
-    if reciprocal and n_out != n_in:
-        raise ValueError(f"reciprocal noise needs square matrices, not {n_out} x {n_in}")
-    size = 1 if block is None else block
-    if size < 1 or n_out % size or n_in % size:
-        raise ValueError(f"block {block} does not divide matrices of {n_out} x {n_in}")
-
-    scale: FloatArray | ComplexArray = lines
-    if relative_to != "entry":
-        scale = abs(lines).max(axis=(1, 2) if relative_to == "line" else None, keepdims=True)
+    noise = noise_arguments(level, kind, seed, relative_to, reciprocal, block, first, count, lines.shape[1:])
     polluted = np.empty((count, *lines.shape), np.complex128)
-    for i in range(count):
-        # A counter-based generator: the repetition is part of the counter, so no repetition depends on another.
-        generator = np.random.Generator(np.random.Philox(key=seed, counter=[0, 0, 0, first + i]))
-        noise = _noise(generator, kind, (n_freq, n_out // size, n_in // size))
-        if reciprocal:
-            upper = np.triu(np.ones(noise.shape[1:], bool))
-            noise = np.where(upper, noise, noise.swapaxes(1, 2))
-        if size > 1:
-            noise = noise.repeat(size, axis=1).repeat(size, axis=2)
-        polluted[i] = lines + scale * (level * noise)
+    if polluted.size:
+        n_freq, n_out, n_in = lines.shape
+        call("pollute", (*noise, n_out, n_in, n_freq, first, count, lines, polluted))
     return polluted
 
 
-def _noise(generator: np.random.Generator, kind: NoiseKind, shape: tuple[int, ...]) -> NDArray[np.complexfloating]:
-    """Return noise numbers for level 1."""
-    if kind in ("complex", "complex-per-part"):
-        numbers = generator.standard_normal((*shape, 2)).view(np.complex128)[..., 0]
-        return numbers / np.sqrt(2) if kind == "complex" else numbers
-    if kind == "real-normal":
-        return generator.standard_normal(shape).astype(np.complex128)
-    width = np.sqrt(3) if kind == "real-uniform-std" else 1.0
-    return generator.uniform(-width, width, shape).astype(np.complex128)
+def noise_arguments(
+    level: float,
+    kind: NoiseKind,
+    seed: int,
+    relative_to: NoiseReference,
+    reciprocal: bool,
+    block: int | None,
+    first: int,
+    count: int,
+    shape: tuple[int, ...],
+) -> tuple[str, str, int, int, float, NDArray[np.int32]]:
+    """Return the arguments that say the noise as the kernel takes them, checked; matrices of `shape`."""
+    check_choice("kind", kind, get_args(NoiseKind))
+    check_choice("relative_to", relative_to, get_args(NoiseReference))
+    number = as_number("level", level)
+    if number < 0:
+        raise ValueError(f"level must be 0 or positive, not {level}")
+    n_out, n_in = shape
+    if reciprocal and n_out != n_in:
+        raise ValueError(f"reciprocal noise needs square matrices, not {n_out} x {n_in}")
+    size = 1 if block is None else index(block)
+    if size < 1 or n_out % size or n_in % size:
+        raise ValueError(f"block {block} does not divide matrices of {n_out} x {n_in}")
+    if index(first) < 0 or index(count) < 0 or first + count > _MOST:
+        raise ValueError(f"realisations are counted from 0 to {_MOST - 1}: not {count} from {first} on")
+    if not 0 <= index(seed) < 2**64:
+        raise ValueError(f"seed must lie between 0 and 2**64 - 1, not {seed}")
+    words = np.array([seed & 0xFFFFFFFF, seed >> 32], np.uint32).view(np.int32)
+    return _KINDS[kind], relative_to[0].upper(), int(reciprocal), size, number, words

@@ -2,36 +2,119 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal, get_args
+import warnings
+from dataclasses import dataclass
+from typing import Literal, get_args, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import linalg, sparse
 
 from jointfrf._sweep import (
-    N_FREQ,
     ComplexArray,
     FloatArray,
     OnSingular,
     as_dofs,
     as_frequency,
     as_number,
-    as_real,
     check_choice,
-    run,
 )
+from jointfrf.direct_solution import solve_banded, solve_dense
+from jointfrf.errors import ConvergenceWarning
+from jointfrf.model_matrices import Matrix, ModelMatrices
+from jointfrf.reduction import reduce_model, spot_error
+from jointfrf.superposition import Modes, all_modes
 
-__all__ = ["Method", "receptance"]
+__all__ = ["Method", "ReceptanceInfo", "receptance"]
 
-Method = Literal["auto", "dense", "banded", "modal"]
-Matrix = Any  # array_like or scipy sparse array
+Method = Literal["auto", "dense", "banded", "modal", "krylov"]
 
-#: A fine mesh in mixed units has rcond 1e-13 and still gives nine digits: only singular to working precision is told.
-_SINGULAR = float(np.finfo(np.float64).eps)
 #: A matrix with a wider band than this share of its size is solved as a dense one.
 _BAND_LIMIT = 0.25
-#: A modal damping matrix is diagonal if nothing beside its diagonal exceeds this share of it.
-_PROPORTIONAL = 1e-8
+#: Up to this band, or this size, a direct solution of many lines side by side is as fast as any reduction.
+_NARROW, _SMALL = 64, 64
+#: Beyond this size all modes cost more than a reduced model.
+_ALL_MODES = 600
+#: A reduction pays for itself from this number of lines on, and up to this number of DOFs that are asked for.
+_MANY_LINES, _FEW_DOFS = 32, 64
+#: Lines at which a sum of all modes is compared with a direct solution.
+_SPOTS = 3
+
+
+@dataclass(frozen=True)
+class ReceptanceInfo:
+    """How receptances were calculated.
+
+    Parameters
+    ----------
+    method : {"dense", "banded", "modal", "krylov"}
+        What was done in the end.
+    reason : str
+        Why, in a sentence.
+    error_estimate : float or None
+        Of "modal" and "krylov": largest difference to a direct solution at a few lines, relative to the largest entry
+        of the line. None for a direct solution.
+    tolerance : float or None
+        What the estimate had to meet.
+    n_vectors : int or None
+        Modes, or vectors of the reduced model.
+    """
+
+    method: Literal["dense", "banded", "modal", "krylov"]
+    reason: str
+    error_estimate: float | None = None
+    tolerance: float | None = None
+    n_vectors: int | None = None
+
+
+@dataclass(frozen=True)
+class _Task:
+    """What was asked for."""
+
+    freq_hz: FloatArray
+    matrices: ModelMatrices
+    outputs: NDArray[np.int32]
+    inputs: NDArray[np.int32]
+    on_singular: OnSingular
+    tolerance: float
+    out: ComplexArray | None
+
+
+@overload
+def receptance(
+    freq_hz: ArrayLike,
+    stiffness: Matrix,
+    mass: Matrix,
+    damping: Matrix | None = ...,
+    loss_factor: float = ...,
+    structural_damping: Matrix | None = ...,
+    outputs: ArrayLike | None = ...,
+    inputs: ArrayLike | None = ...,
+    method: Method = ...,
+    *,
+    on_singular: OnSingular = ...,
+    out: ComplexArray | None = ...,
+    tolerance: float = ...,
+    full_output: Literal[False] = ...,
+) -> ComplexArray: ...
+
+
+@overload
+def receptance(
+    freq_hz: ArrayLike,
+    stiffness: Matrix,
+    mass: Matrix,
+    damping: Matrix | None = ...,
+    loss_factor: float = ...,
+    structural_damping: Matrix | None = ...,
+    outputs: ArrayLike | None = ...,
+    inputs: ArrayLike | None = ...,
+    method: Method = ...,
+    *,
+    on_singular: OnSingular = ...,
+    out: ComplexArray | None = ...,
+    tolerance: float = ...,
+    full_output: Literal[True],
+) -> tuple[ComplexArray, ReceptanceInfo]: ...
 
 
 def receptance(
@@ -47,7 +130,9 @@ def receptance(
     *,
     on_singular: OnSingular = "raise",
     out: ComplexArray | None = None,
-) -> ComplexArray:
+    tolerance: float = 1e-8,
+    full_output: bool = False,
+) -> ComplexArray | tuple[ComplexArray, ReceptanceInfo]:
     """Receptance ((1 + i eta) K + i H + i w C - w^2 M)^-1 at chosen DOFs.
 
     Parameters
@@ -64,184 +149,152 @@ def receptance(
         Structural damping H, N/m.
     outputs, inputs : array_like of int, optional
         DOFs of responses and of forces, counted from 0; all by default.
-    method : {"auto", "dense", "banded", "modal"}
-        "dense": zgesv on every line. "banded": band LU on every line (zgbsv). Both take any damping. "modal": all
-        modes once, then their sum; exact, for symmetric K and M and damping that the undamped modes diagonalise.
-        "auto" solves banded where K and M have a narrow band, else dense.
+    method : {"auto", "dense", "banded", "modal", "krylov"}
+        "dense": full matrices solved on every line. "banded": the same in band storage. Both take any damping.
+        "modal": all modes once, then their sum; for symmetric K and M and damping that the undamped modes diagonalise.
+        "krylov": the model is reduced to solutions at a few frequencies; for symmetric K and M, damping a M + b K and
+        one loss factor. Where `tolerance` is not met, the model is solved and a warning says so. "auto" chooses, see
+        Notes.
     on_singular : {"raise", "nan"}
         Whether a bad line raises or becomes NaN.
     out : ndarray of complex128, shape (n_freq, n_out, n_in), optional
         Where the result goes, as in `invert`.
+    tolerance : float
+        What the error estimate of "krylov", and of "modal" where "auto" chose it, must meet: the largest error of a
+        line relative to its largest entry.
+    full_output : bool
+        Whether a `ReceptanceInfo` is returned too: what was done, why, and the error estimate.
 
     Returns
     -------
-    ndarray, shape (n_freq, n_out, n_in)
+    h : ndarray, shape (n_freq, n_out, n_in)
         m/N (rotational rows rad/N, rotational columns m/(N m)).
+    info : ReceptanceInfo
+        Only with `full_output`.
 
     Raises
     ------
     SingularLineError
         A line hits an undamped natural frequency, or 0 Hz of a free structure.
     ValueError
-        Wrong shapes or DOFs, NaN or Inf; "modal" with damping that couples the modes.
+        Wrong shapes or DOFs, NaN or Inf; "modal" or "krylov" with damping that couples the modes.
+
+    Warns
+    -----
+    ConvergenceWarning
+        "krylov" did not meet the tolerance; the model was solved instead.
 
     Notes
     -----
     Eqs. (2.28), (2.29), with i w C for viscous damping. Cost a line: n^3 (dense), n b^2 (band of b diagonals),
-    n n_out n_in (modal).
+    n_vectors n_out n_in (modal, krylov).
+
+    "auto" solves in band storage where the band is narrow, and full matrices where the model is small. Many lines of a
+    larger symmetric model with damping a M + b K and one loss factor are a sum of modes, all of them or those of a
+    reduced model. That sum is compared with direct solutions at a few lines: at both ends, and of a reduced model where
+    its residual is largest. Where the tolerance is not met, the model is solved. The error between these lines is
+    estimated, not bounded. Any other damping is solved.
 
     Examples
     --------
     >>> import jointfrf as jf
     >>> jf.receptance([0.0], [[2.0]], [[1.0]], loss_factor=1.0).tolist()
     [[[(0.25-0.25j)]]]
+    >>> beam = jf.beam(0.3, 40, youngs_modulus=67e9, density=2700.0, width=0.025, height=0.006)
+    >>> h, info = jf.receptance([50.0], beam.stiffness, beam.mass, outputs=[0], inputs=[0], full_output=True)
+    >>> info.method, info.reason
+    ('banded', 'narrow band: 3 diagonals below and 3 above the main one')
     """
     check_choice("method", method, get_args(Method))
     freq = as_frequency(freq_hz)
-    omega = 2 * np.pi * freq
-    matrices = {
-        "stiffness": stiffness,
-        "mass": mass,
-        "damping": damping,
-        "structural_damping": structural_damping,
-    }
-    eta = as_number("loss_factor", loss_factor)
-    n = _check_square(matrices)
+    matrices = ModelMatrices(stiffness, mass, damping, structural_damping, as_number("loss_factor", loss_factor))
+    n = matrices.n
     to = as_dofs("outputs", np.arange(n) if outputs is None else outputs, n, unique=False)
     into = as_dofs("inputs", np.arange(n) if inputs is None else inputs, n, unique=False)
-    if method == "auto":
-        method = "banded" if _has_band(matrices, n) else "dense"
-    chosen = {"dense": _dense, "banded": _banded, "modal": _modal}[method]
-    return chosen(freq, omega, matrices, eta, to, into, on_singular, out)
+    wanted = as_number("tolerance", tolerance)
+    if not wanted > 0:
+        raise ValueError(f"tolerance must be positive, not {wanted}")
+    task = _Task(freq, matrices, to, into, on_singular, wanted, out)
+    if method in ("dense", "banded"):
+        result, info = _solved(task, method == "banded", "as asked for")
+    elif method == "modal":
+        modes = all_modes(matrices, to, into)
+        result = modes.receptance(freq, on_singular, out)
+        info = ReceptanceInfo("modal", "as asked for", n_vectors=modes.stiffness.size)
+    elif method == "krylov":
+        result, info = _reduced(task, "as asked for")
+        if info.method != "krylov" and freq.size:
+            warnings.warn(f"receptance: {info.reason}", ConvergenceWarning, stacklevel=2)
+    else:
+        result, info = _automatic(task)
+    return (result, info) if full_output else result
 
 
-def _check_square(matrices: dict[str, Matrix]) -> int:
-    """Check the shapes; return n."""
-    n: int | None = None
-    for name, matrix in matrices.items():
-        if matrix is None:
-            if name in ("stiffness", "mass"):
-                raise ValueError(f"{name} is missing")
-            continue
-        shape = matrix.shape if sparse.issparse(matrix) else np.shape(matrix)
-        if len(shape) != 2 or shape[0] != shape[1] or (n is not None and shape[0] != n):
-            wanted = "(n, n)" if n is None else f"({n}, {n})"
-            raise ValueError(f"{name} must have shape {wanted}, not {tuple(shape)}")
-        n = shape[0]
-    assert n is not None
-    return n
+def _automatic(task: _Task) -> tuple[ComplexArray, ReceptanceInfo]:
+    """Choose by size, band, damping and number of lines."""
+    matrices, n = task.matrices, task.matrices.n
+    kl, ku = matrices.widths
+    banded = n > 8 and kl + ku < _BAND_LIMIT * n
+    n_dofs = np.unique(np.concatenate([task.outputs, task.inputs])).size
+    if banded and max(kl, ku) < _NARROW:
+        return _solved(task, True, f"narrow band: {kl} diagonals below and {ku} above the main one")
+    if n <= _SMALL:
+        return _solved(task, False, f"small model: {n} DOFs")
+    if task.freq_hz.size < _MANY_LINES:
+        return _solved(task, banded, f"few lines: {task.freq_hz.size}")
+    if matrices.proportional is None:
+        return _solved(task, banded, "damping couples the modes")
+    if not (matrices.is_symmetric("stiffness") and matrices.is_symmetric("mass")):
+        return _solved(task, banded, "stiffness or mass is not symmetric")
+    if n <= _ALL_MODES:
+        return _summed(task, f"{task.freq_hz.size} lines of {n} DOFs whose modes the damping does not couple")
+    if n_dofs > _FEW_DOFS:
+        return _solved(task, banded, f"many DOFs are asked for: {n_dofs}")
+    return _reduced(task, f"{task.freq_hz.size} lines of {n} DOFs whose modes the damping does not couple")
 
 
-def _as_dense(name: str, matrix: Matrix, n: int) -> FloatArray:
-    return as_real(name, matrix.toarray() if sparse.issparse(matrix) else matrix, (n, n))
+def _solved(task: _Task, banded: bool, reason: str) -> tuple[ComplexArray, ReceptanceInfo]:
+    """Direct solution."""
+    solve = solve_banded if banded else solve_dense
+    result = solve(task.freq_hz, task.matrices, task.outputs, task.inputs, task.on_singular, task.out)
+    return result, ReceptanceInfo("banded" if banded else "dense", reason)
 
 
-def _widths(matrices: dict[str, Matrix]) -> tuple[int, int]:
-    """Return the number of diagonals below and above the main one, over all matrices."""
-    below = above = 0
-    for matrix in matrices.values():
-        if matrix is not None:
-            entries = sparse.coo_array(matrix)
-            distance = entries.col.astype(np.int64) - entries.row
-            below = max(below, -int(distance.min(initial=0)))
-            above = max(above, int(distance.max(initial=0)))
-    return below, above
+def _fallen_back(task: _Task, error: float, n_vectors: int, what: str) -> tuple[ComplexArray, ReceptanceInfo]:
+    """Direct solution after a sum of modes that was not good enough."""
+    banded = task.matrices.n > 8 and sum(task.matrices.widths) < _BAND_LIMIT * task.matrices.n
+    reason = (
+        f"{what} of {n_vectors} vectors has the error estimate {error:.1e}, above the tolerance {task.tolerance:.1e}"
+    )
+    return _solved(task, banded, reason)
 
 
-def _has_band(matrices: dict[str, Matrix], n: int) -> bool:
-    return n > 8 and sum(_widths(matrices)) < _BAND_LIMIT * n
-
-
-def _dense(
-    freq: FloatArray,
-    omega: FloatArray,
-    matrices: dict[str, Matrix],
-    loss_factor: float,
-    to: NDArray[np.int32],
-    into: NDArray[np.int32],
-    on_singular: OnSingular,
-    out: ComplexArray | None,
-) -> ComplexArray:
-    n = _check_square(matrices)
-    given = {name: None if m is None else _as_dense(name, m, n) for name, m in matrices.items()}
-    args: list[Any] = [n, N_FREQ, to.size, into.size, omega, given["stiffness"], given["mass"]]
-    for name in ("damping", "structural_damping"):
-        matrix = given[name]
-        args += [0, np.zeros((1, n))] if matrix is None else [n, matrix]
-    args += [loss_factor, to, into]
-    shape = (freq.size, to.size, into.size)
-    return run("receptance", args, shape, {"omega": omega}, freq, on_singular, _SINGULAR, out)[0]
-
-
-def _banded(
-    freq: FloatArray,
-    omega: FloatArray,
-    matrices: dict[str, Matrix],
-    loss_factor: float,
-    to: NDArray[np.int32],
-    into: NDArray[np.int32],
-    on_singular: OnSingular,
-    out: ComplexArray | None,
-) -> ComplexArray:
-    n = _check_square(matrices)
-    kl, ku = _widths(matrices)
-
-    def stored(name: str) -> FloatArray | None:
-        """Return LAPACK's band storage, transposed: row j holds column j."""
-        if matrices[name] is None:
-            return None
-        entries = sparse.coo_array(matrices[name])
-        values = as_real(name, entries.data, (None,))
-        band = np.zeros((n, kl + ku + 1))
-        np.add.at(band, (entries.col, ku + entries.row - entries.col), values)
-        return band
-
-    args: list[Any] = [n, kl, ku, N_FREQ, to.size, into.size, omega, stored("stiffness"), stored("mass")]
-    for name in ("damping", "structural_damping"):
-        band = stored(name)
-        args += [0, np.zeros((1, kl + ku + 1))] if band is None else [n, band]
-    args += [loss_factor, to, into]
-    shape = (freq.size, to.size, into.size)
-    return run("receptance_banded", args, shape, {"omega": omega}, freq, on_singular, _SINGULAR, out)[0]
-
-
-def _modal(
-    freq: FloatArray,
-    omega: FloatArray,
-    matrices: dict[str, Matrix],
-    loss_factor: float,
-    to: NDArray[np.int32],
-    into: NDArray[np.int32],
-    on_singular: OnSingular,
-    out: ComplexArray | None,
-) -> ComplexArray:
-    n = _check_square(matrices)
-    given = {name: None if m is None else _as_dense(name, m, n) for name, m in matrices.items()}
-    for name in ("stiffness", "mass"):
-        matrix = given[name]
-        assert matrix is not None
-        if abs(matrix - matrix.T).max(initial=0) > 1e-10 * abs(matrix).max(initial=0):
-            raise ValueError(f"{name} is not symmetric: method 'modal' cannot be used, 'dense' or 'banded' can")
+def _summed(task: _Task, reason: str) -> tuple[ComplexArray, ReceptanceInfo]:
+    """All modes, where they meet the tolerance."""
     try:
-        squared, shapes = linalg.eigh(given["stiffness"], given["mass"])
-    except np.linalg.LinAlgError as error:
-        raise ValueError("mass is not positive definite: method 'modal' cannot be used") from error
+        modes = all_modes(task.matrices, task.outputs, task.inputs)
+    except ValueError as refusal:
+        return _solved(task, False, str(refusal).split(":")[0])
+    order = np.argsort(task.freq_hz)
+    lines = order[np.linspace(0, order.size - 1, _SPOTS).astype(int)]
+    error = float(spot_error(task.freq_hz[lines], task.matrices, modes, task.outputs, task.inputs).max())
+    return _finished(task, modes, error, "modal", reason)
 
-    def modal(name: str) -> FloatArray:
-        matrix = given[name]
-        if matrix is None:
-            return np.zeros(n)
-        projected = shapes.T @ matrix @ shapes
-        diagonal = np.diagonal(projected).copy()
-        rest = abs(projected - np.diag(diagonal)).max(initial=0)
-        if rest > _PROPORTIONAL * abs(diagonal).max(initial=0):
-            raise ValueError(f"{name} couples the modes: method 'modal' cannot be used, 'dense' or 'banded' can")
-        return diagonal
 
-    stiffness = np.maximum(squared, 0)
-    structural = modal("structural_damping")
-    losses = loss_factor + np.divide(structural, stiffness, out=np.zeros(n), where=stiffness > 0)
-    at_out, at_in = np.ascontiguousarray(shapes[to - 1]), np.ascontiguousarray(shapes[into - 1])
-    args = (n, N_FREQ, to.size, into.size, omega, stiffness, modal("damping"), losses, at_out, at_in)
-    shape = (freq.size, to.size, into.size)
-    return run("receptance_modal", args, shape, {"omega": omega}, freq, on_singular, _SINGULAR, out)[0]
+def _reduced(task: _Task, reason: str) -> tuple[ComplexArray, ReceptanceInfo]:
+    """Reduced model, where it meets the tolerance."""
+    if task.freq_hz.size == 0:
+        return _solved(task, True, "no lines")
+    found = reduce_model(task.freq_hz, task.matrices, task.outputs, task.inputs, task.tolerance)
+    return _finished(task, found.modes, found.error_estimate, "krylov", reason)
+
+
+def _finished(
+    task: _Task, modes: Modes, error: float, method: Literal["modal", "krylov"], reason: str
+) -> tuple[ComplexArray, ReceptanceInfo]:
+    """Sum of modes, or a direct solution where its error is too large."""
+    n_vectors = modes.stiffness.size
+    if not error <= task.tolerance:
+        return _fallen_back(task, error, n_vectors, "a sum of modes" if method == "modal" else "a reduced model")
+    result = modes.receptance(task.freq_hz, task.on_singular, task.out)
+    return result, ReceptanceInfo(method, reason, error, task.tolerance, n_vectors)

@@ -4,9 +4,11 @@ program test_api
   use testing, only: check, check_close, check_same, dp, finish, inverse, ip, random_lines, random_real, &
     random_regular, seed, transposed
   use jointfrf, only: jf_central_difference, jf_compliance_covariance, jf_compliance_factors, jf_couple, jf_decouple, &
-    jf_difference_weights, jf_find_modification, jf_info_text, jf_inverse_substructuring, jf_invert, jf_ismm, &
-    jf_joint_compliance, jf_line_text, jf_modify, jf_receptance, jf_receptance_banded, jf_receptance_modal, jf_solve, &
-    jf_transform, jf_version
+    jf_difference_weights, jf_engine_automatic, jf_engine_lapack, jf_engine_plain, jf_engine_x86_64_v2, &
+    jf_engine_x86_64_v3, jf_engine_x86_64_v4, jf_find_modification, jf_get_engine, jf_info_text, &
+    jf_inverse_substructuring, jf_invert, jf_ismm, &
+    jf_joint_compliance, jf_line_text, jf_modify, jf_receptance, jf_receptance_banded, jf_receptance_modal, jf_set_engine, &
+    jf_solve, jf_transform, jf_version
   use jointfrf_compliance, only: compliance_covariance, compliance_factors, joint_compliance
   use jointfrf_coupling, only: couple
   use jointfrf_decoupling, only: decouple
@@ -25,6 +27,7 @@ program test_api
   call seed(13)
   omega = [0.0_dp, 0.7_dp, 1.9_dp]
   call version_and_texts()
+  call engines()
   call algebra()
   call models()
   call assemblies()
@@ -63,6 +66,22 @@ contains
     call jf_info_text(0_ip, 0_ip, short)
     call check(joined(short) == 'goo', 'no room, nothing written')
   end subroutine version_and_texts
+
+  subroutine engines()
+    integer(ip) :: engine, before
+
+    call check(all([jf_engine_automatic, jf_engine_lapack, jf_engine_plain, jf_engine_x86_64_v2, jf_engine_x86_64_v3, &
+                    jf_engine_x86_64_v4] == [0, 1, 2, 3, 4, 5]), 'engines as documented')
+    call jf_get_engine(before, info)
+    call check(info == 0 .and. before > 0, 'engine in use')
+    call jf_set_engine(jf_engine_lapack, info)
+    call check(info == 0, 'engine chosen')
+    call jf_set_engine(9_ip, info)
+    call check(info == -1, 'engine that does not exist')
+    call jf_get_engine(engine, info)
+    call check(info == 0 .and. engine == jf_engine_lapack, 'engine kept')
+    call jf_set_engine(before, info)
+  end subroutine engines
 
   function joined(text) result(line)
     character(kind=c_char), intent(in) :: text(:)

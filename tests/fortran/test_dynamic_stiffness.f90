@@ -4,6 +4,7 @@ program test_dynamic_stiffness
   use testing, only: check, check_bad_line, check_close, check_same, dp, finish, infinity, ip, not_a_number, qp, &
     quad_inverse, random_real, seed, set_threads, transposed, two_pi, thesis_chain
   use jointfrf_dynamic_stiffness, only: receptance_banded, receptance_dense
+  use jointfrf_engine, only: engine_automatic, engine_lapack, set_engine
   implicit none
   real(dp), parameter :: tolerance = 1.0e-12_dp
   real(dp), parameter :: none(0, 0) = reshape([real(dp) ::], [0, 0])
@@ -17,6 +18,10 @@ program test_dynamic_stiffness
   call banded_against_reference(3, 0)
   call banded_against_reference(0, 0)
   call banded_against_reference(6, 6)
+  call long_chain(.true.)
+  call long_chain(.false.)
+  call zero_pivot()
+  call part_that_is_not_wanted()
   call nothing()
   call bad_lines()
   call scales()
@@ -50,9 +55,18 @@ contains
     expected(1, 1, :) = 1/cmplx(k - omega**2*m, eta*k + s + omega*c, dp)
     call check_close(h, expected, tolerance, 'all dampings, banded')
     call check(info == 0 .and. all(line_info == 0), 'one DOF: good')
+    call set_engine(engine_lapack, info)
+    call receptance_banded(.true., 0, 0, omega, matrix(k), matrix(m), matrix(c), matrix(s), eta, dof, dof, h, &
+                           line_info, rcond, info)
     ! |re| + |im| of Z, as everywhere; LAPACK's estimate of the inverse takes the modulus
     call check_close(sum(rcond), sum(1/(abs(expected)*(abs(real(1/expected)) + abs(aimag(1/expected))))), tolerance, &
-                     'one DOF: rcond')
+                     'one DOF: rcond of LAPACK')
+    call set_engine(engine_automatic, info)
+    call receptance_banded(.true., 0, 0, omega, matrix(k), matrix(m), matrix(c), matrix(s), eta, dof, dof, h, &
+                           line_info, rcond, info)
+    ! side by side the norm of Z is that of its terms
+    call check_close(h, expected, tolerance, 'one DOF: side by side')
+    call check(all(rcond <= 1.0_dp .and. rcond > 1.0e-2_dp), 'one DOF: rcond side by side')
   end subroutine one_dof
 
   pure function matrix(x) result(a)
@@ -181,6 +195,99 @@ contains
     call check_close(h, reference(omega, k, m, 0*c, 0*s, 0.2_dp, outputs, inputs), 1.0e-11_dp, &
                      'banded, loss factor alone')
   end subroutine banded_against_reference
+
+  !> Nodes of three DOFs, every matrix general: many lines, so that blocks are full and one is not. DOFs are wanted at
+  !> the first node, at two in the middle, and not at the last; the DOFs of a node have different units.
+  subroutine long_chain(symmetric)
+    logical, intent(in) :: symmetric
+    integer, parameter :: n = 36, band = 5, lines = 11
+    integer(ip), parameter :: outputs(4) = [20_ip, 1_ip, 21_ip, 14_ip], inputs(3) = [14_ip, 1_ip, 19_ip]
+    real(dp) :: k(n, n), m(n, n), c(n, n), s(n, n), unit(n), omega(lines), rcond(lines)
+    complex(dp) :: h(4, 3, lines), h_t(3, 4, lines), h_lapack(4, 3, lines)
+    integer(ip) :: line_info(lines), info
+    integer :: i, j
+
+    k = random_real(n, n)
+    m = 0.1_dp*random_real(n, n)
+    c = 0.1_dp*random_real(n, n)
+    s = 0.1_dp*random_real(n, n)
+    if (symmetric) then
+      k = k + transpose(k)
+      m = m + transpose(m)
+      c = c + transpose(c)
+      s = s + transpose(s)
+    end if
+    unit = [(10.0_dp**mod(i, 3), i=1, n)]
+    do j = 1, n
+      k(j, j) = k(j, j) + 6
+      m(j, j) = m(j, j) + 2
+      do i = 1, n
+        if ((i - 1)/3 - (j - 1)/3 > 1 .or. (j - 1)/3 - (i - 1)/3 > 1) then
+          k(i, j) = 0
+          m(i, j) = 0
+          c(i, j) = 0
+          s(i, j) = 0
+        end if
+        k(i, j) = k(i, j)*unit(i)*unit(j)
+        m(i, j) = m(i, j)*unit(i)*unit(j)
+        c(i, j) = c(i, j)*unit(i)*unit(j)
+        s(i, j) = s(i, j)*unit(i)*unit(j)
+      end do
+    end do
+    omega = [(0.21_dp*i, i=1, lines)]
+    call receptance_banded(.false., band, band, omega, to_band(k, band, band), to_band(m, band, band), &
+                           to_band(c, band, band), to_band(s, band, band), 0.05_dp, outputs, inputs, h, line_info, &
+                           rcond, info)
+    call check(info == 0 .and. all(line_info == 0), 'long chain: good')
+    call check_close(h, reference(omega, k, m, c, s, 0.05_dp, outputs, inputs), 1.0e-12_dp, 'long chain')
+    call receptance_banded(.true., band, band, omega, to_band(k, band, band), to_band(m, band, band), &
+                           to_band(c, band, band), to_band(s, band, band), 0.05_dp, outputs, inputs, h_t, line_info, &
+                           rcond, info)
+    call check_same(transposed(h_t), h, 'long chain, transposed')
+    call set_engine(engine_lapack, info)
+    call receptance_banded(.false., band, band, omega, to_band(k, band, band), to_band(m, band, band), &
+                           to_band(c, band, band), to_band(s, band, band), 0.05_dp, outputs, inputs, h_lapack, &
+                           line_info, rcond, info)
+    call check_close(h_lapack, h, 1.0e-12_dp, 'long chain: LAPACK')
+    call set_engine(engine_automatic, info)
+  end subroutine long_chain
+
+  !> The mass in the middle is at rest in the sense of its own pivot: k + k - w^2 m = 0 at w = 2, and no damping. The
+  !> assembly is regular there.
+  subroutine zero_pivot()
+    real(dp), parameter :: k(3, 3) = reshape([3, -1, 0, -1, 4, -3, 0, -3, 9], [3, 3])
+    real(dp), parameter :: m(3, 3) = reshape([1, 0, 0, 0, 1, 0, 0, 0, 1], [3, 3])
+    integer(ip), parameter :: ends(2) = [1_ip, 3_ip]
+    real(dp) :: omega(4), rcond(4)
+    complex(dp) :: h(2, 2, 4)
+    integer(ip) :: line_info(4), info
+
+    omega = [1.0_dp, 2.0_dp, 2.0_dp + 1.0e-9_dp, 2.5_dp]
+    call receptance_banded(.false., 1, 1, omega, to_band(k, 1, 1), to_band(m, 1, 1), none, none, 0.0_dp, ends, ends, &
+                           h, line_info, rcond, info)
+    call check(info == 0 .and. all(line_info == 0), 'zero pivot: good')
+    call check_close(h, reference(omega, k, m, 0*k, 0*k, 0.0_dp, ends, ends), 1.0e-13_dp, 'zero pivot')
+  end subroutine zero_pivot
+
+  !> Two parts; the one where nothing is wanted is in undamped resonance.
+  subroutine part_that_is_not_wanted()
+    real(dp), parameter :: k(3, 3) = reshape([3, 0, -1, 0, 4, 0, -1, 0, 9], [3, 3])
+    real(dp), parameter :: m(3, 3) = reshape([1, 0, 0, 0, 1, 0, 0, 0, 1], [3, 3])
+    integer(ip), parameter :: tip(1) = [3_ip]
+    real(dp) :: omega(4), bad_omega(4), rcond(4)
+    complex(dp) :: good(1, 1, 4), h(1, 1, 4)
+    integer(ip) :: line_info(4), info
+
+    omega = [1.0_dp, 1.4_dp, 1.9_dp, 2.5_dp]
+    call receptance_banded(.false., 2, 2, omega, to_band(k, 2, 2), to_band(m, 2, 2), none, none, 0.0_dp, tip, tip, &
+                           good, line_info, rcond, info)
+    call check_close(good, reference(omega, k, m, 0*k, 0*k, 0.0_dp, tip, tip), 1.0e-13_dp, 'other part')
+    bad_omega = omega
+    bad_omega(3) = 2.0_dp
+    call receptance_banded(.false., 2, 2, bad_omega, to_band(k, 2, 2), to_band(m, 2, 2), none, none, 0.0_dp, tip, tip, &
+                           h, line_info, rcond, info)
+    call check_bad_line(h, good, 3, 2_ip, line_info, rcond, info, 'other part in resonance')
+  end subroutine part_that_is_not_wanted
 
   subroutine nothing()
     real(dp), parameter :: k(2, 2) = reshape([2, 1, 0, 3], [2, 2]), no_band(1, 0) = reshape([real(dp) ::], [1, 0])

@@ -72,7 +72,7 @@ contains
     call check(info == 0 .and. all(line_info == 0) .and. all(rcond > 0.0_dp .and. rcond < 1.001_dp), 'good')
     call check_close(k, exact, tolerance, 'K* returns')
     call inverse_substructuring(.false., gamma, short, line_info, rcond_short, info)
-    call check(info == 0 .and. all(line_info == 0) .and. all(rcond_short >= rcond), 'short form: good')
+    call check(info == 0 .and. all(line_info == 0) .and. all(rcond_short > 0.0_dp), 'short form: good')
     call check_close(short, exact, tolerance, 'K* returns, short form')
     call check_close(short, k, tolerance, 'both forms agree')
     call ismm(.true., transposed(alpha), transposed(gamma), transposed(first), k_t, line_info, rcond, info)

@@ -9,6 +9,7 @@ program test_modal
   call seed(5)
   call two_masses()
   call against_sum()
+  call reciprocal()
   call nothing()
   call bad_lines()
   call scales()
@@ -78,6 +79,39 @@ contains
                           rcond, info)
     call check_same(transposed(h_t), h, 'sum, transposed')
   end subroutine against_sum
+
+  !> Responses and forces at the same places, against a sum in quadruple precision; lines for a full block and a part.
+  subroutine reciprocal()
+    integer, parameter :: modes = 13, lines = 19, n = 5
+    real(dp) :: lambda(modes), c(modes), eta(modes), phi(n, modes), omega(lines), rcond(lines)
+    complex(dp) :: h(n, n, lines), h_t(n, n, lines), expected(n, n, lines)
+    complex(qp) :: total(n, n), denominator
+    real(qp) :: w
+    integer(ip) :: line_info(lines), info
+    integer :: i, j, r
+
+    lambda = [(real(r, dp)**4, r=1, modes)]
+    c = [(0.01_dp*r, r=1, modes)]
+    eta = [(0.02_dp/r, r=1, modes)]
+    phi = random_real(n, modes)
+    omega = [(8.0_dp*i, i=1, lines)]
+    do i = 1, lines
+      w = omega(i)
+      total = 0
+      do r = 1, modes
+        denominator = cmplx(lambda(r) - w**2, lambda(r)*real(eta(r), qp) + w*c(r), qp)
+        do j = 1, n
+          total(:, j) = total(:, j) + real(phi(:, r), qp)*phi(j, r)/denominator
+        end do
+      end do
+      expected(:, :, i) = cmplx(total, kind=dp)
+    end do
+    call receptance_modal(.false., omega, lambda, c, eta, phi, phi, h, line_info, rcond, info)
+    call check(info == 0, 'reciprocal: good')
+    call check_close(h, expected, 1.0e-14_dp, 'reciprocal')
+    call receptance_modal(.true., omega, lambda, c, eta, transpose(phi), transpose(phi), h_t, line_info, rcond, info)
+    call check_same(transposed(h_t), h, 'reciprocal, transposed')
+  end subroutine reciprocal
 
   subroutine nothing()
     real(dp), parameter :: no_modes(0) = [real(dp) ::], no_shapes(2, 0) = reshape([real(dp) ::], [2, 0])

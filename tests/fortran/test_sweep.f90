@@ -1,11 +1,12 @@
 !> A sweep visits every line once, on one thread or several, turns the bad ones into NaN and counts them.
 module probes
   use jointfrf_kinds, only: dp, ip
+  use jointfrf_lanes, only: lane_kernels, lanes
   use jointfrf_sweep, only: line_operation, line_space
   !$ use omp_lib, only: omp_get_thread_num
   implicit none
   private
-  public :: probe
+  public :: block_probe, probe
 
   !> Records what is done to it; the lines in `codes` that are not 0 are bad.
   type, extends(line_operation) :: probe
@@ -15,7 +16,40 @@ module probes
     procedure :: line => visit
   end type probe
 
+  !> The same in blocks: lines of `doubts` that are not 0 are left to the line by line way.
+  type, extends(probe) :: block_probe
+    integer, pointer :: doubts(:) => null(), block_of(:) => null(), before(:) => null()
+  contains
+    procedure :: line_block => visit_block
+  end type block_probe
+
 contains
+
+  !> A block leaves its first line in `hint`, so that the next one can tell what it finds there.
+  subroutine visit_block(self, kernels, first, n_lines, space, line_info, rcond)
+    class(block_probe), intent(in) :: self
+    type(lane_kernels), intent(in) :: kernels
+    integer, intent(in) :: first, n_lines
+    type(line_space), target, intent(inout) :: space
+    integer(ip), intent(out) :: line_info(n_lines)
+    real(dp), intent(out) :: rcond(n_lines)
+    integer :: i
+
+    if (any(shape(space%x) /= [lanes, 2, self%n_element]) .or. size(space%hint) /= self%n_hint) self%spoilt(first) = 5
+    if (.not. associated(kernels%invert)) self%spoilt(first) = 6
+    space%x = first
+    do i = first, first + n_lines - 1
+      self%block_of(i) = first
+      self%before(i) = space%hint(1)
+      self%result(:, :, i) = -i                 ! lines in doubt write it once more
+      if (self%doubts(i) == 0) self%result(:, :, i) = i
+      if (self%doubts(i) == 0) self%visits(i) = self%visits(i) + 1
+      !$ self%thread(i) = omp_get_thread_num()
+    end do
+    line_info = int(self%doubts(first:first + n_lines - 1), ip)
+    rcond = 0.5_dp
+    space%hint = first
+  end subroutine visit_block
 
   subroutine visit(self, i, space, line_info, rcond)
     class(probe), intent(in) :: self
@@ -45,15 +79,16 @@ end module probes
 
 program test_sweep
   use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
-  use probes, only: probe
+  use probes, only: block_probe, probe
   use testing, only: check, check_same, dp, finish, ip, set_threads
+  use jointfrf_engine, only: engine_automatic, engine_lapack, engine_plain, set_engine
   use jointfrf_sweep, only: run_sweep
   !$ use omp_lib, only: omp_set_max_active_levels
   implicit none
   integer, parameter :: n = 101
   logical :: threaded, as_written(n)
   integer(ip), target :: codes(n)
-  integer, target :: visits(n), thread(n), spoilt(n)
+  integer, target :: visits(n), thread(n), spoilt(n), doubts(n), block_of(n), before(n)
   complex(dp), target :: results(2, 1, n)
   integer(ip) :: line_info(n), info
   real(dp) :: rcond(n), expected(n)
@@ -102,9 +137,74 @@ program test_sweep
     call check(info == 3 .and. all(visits == 1), 'every line inside a parallel region')
     call check(all(thread == thread(1)), 'no threads inside a parallel region')
   end if
+  call blocks()
   call finish('sweep')
 
 contains
+
+  !> Blocks of eight lines; what was in doubt is done line by line, and only that.
+  subroutine blocks()
+    integer(ip) :: ignored
+    integer :: i
+
+    codes = 0
+    codes([4, 71]) = [2_ip, -1_ip]
+    doubts = 0
+    doubts([1, 4, 16, 17, 71, n]) = 1
+    expected = 0.5_dp
+    expected([1, 16, 17, n]) = 1.0_dp/[1, 16, 17, n]
+    expected([4, 71]) = 0.0_dp
+    call set_engine(engine_plain, ignored)
+    do i = 1, 2
+      call sweep_blocks(merge(1.0_dp, 1.0e9_dp, i == 1), n)
+      call check(info == 2 .and. all(line_info == codes), 'blocks: codes')
+      call check_same(rcond, expected, 'blocks: rcond of the block, or of the line that was in doubt')
+      as_written = kept()
+      call check(all(visits == 1) .and. all(as_written .eqv. (codes == 0)), 'blocks: each line once')
+      call check(all(spoilt == 0), 'blocks: workspace')
+      call check(all(block_of == expected_block()), 'blocks: first lines')
+      call check(all(before == expected_hint()), 'blocks: what the block before left, anew in every share of 64 lines')
+      if (i == 1) call check(all(thread == 0), 'blocks: little work stays on one thread')
+      if (i == 2 .and. threaded) call check(any(thread == 0) .and. any(thread == 1), 'blocks: much work')
+    end do
+
+    call sweep_blocks(1.0e9_dp, 2)
+    call check(all(block_of(:2) == 0) .and. info == 0 .and. all(visits(:2) == 1), 'two lines are not worth a block')
+    call sweep_blocks(1.0e9_dp, 3)
+    call check(all(block_of(:3) == 1) .and. sum(visits) == 3, 'three lines are')
+    call set_engine(engine_lapack, ignored)
+    call sweep_blocks(1.0e9_dp, n)
+    call check(all(block_of == 0) .and. all(visits == 1) .and. info == 2, 'the reference engine has no blocks')
+    call set_engine(engine_automatic, ignored)
+  end subroutine blocks
+
+  function expected_block() result(first)
+    integer :: first(n), j
+
+    first = [(j - mod(j - 1, 8), j=1, n)]
+  end function expected_block
+
+  function expected_hint() result(hint)
+    integer :: hint(n)
+
+    hint = expected_block() - 8
+    where (mod(expected_block(), 64) == 1) hint = 0
+  end function expected_hint
+
+  subroutine sweep_blocks(flops, lines)
+    real(dp), intent(in) :: flops
+    integer, intent(in) :: lines
+    type(block_probe) :: operation
+
+    operation%doubts => doubts
+    operation%block_of => block_of
+    operation%before => before
+    operation%n_element = 5
+    operation%n_hint = 2
+    block_of = 0
+    before = -1
+    call start(operation, flops, lines)
+  end subroutine sweep_blocks
 
   !> Whether the result of each line is what the line wrote; where it is not, it must be NaN throughout.
   function kept() result(same)
@@ -122,6 +222,14 @@ contains
     integer, intent(in) :: lines
     type(probe) :: operation
 
+    call start(operation, flops, lines)
+  end subroutine sweep
+
+  subroutine start(operation, flops, lines)
+    class(probe), intent(inout) :: operation
+    real(dp), intent(in) :: flops
+    integer, intent(in) :: lines
+
     operation%codes => codes
     operation%visits => visits
     operation%result => results(:, :, :lines)
@@ -136,5 +244,5 @@ contains
     thread = 0
     spoilt = 0
     call run_sweep(operation, int(lines, ip), line_info(:lines), rcond(:lines), info)
-  end subroutine sweep
+  end subroutine start
 end program test_sweep

@@ -4,6 +4,7 @@ from itertools import product
 
 import numpy as np
 import pytest
+from scipy.special import ndtr
 
 import jointfrf as jf
 
@@ -79,6 +80,57 @@ def test_a_block_shares_its_noise():
     assert np.unique(e[0].round(12)).size == 4
 
 
+def numbers(kind, n_freq=50000, **options):
+    h = np.ones((n_freq, 2, 2), complex)
+    return jf.pollute(h, 1.0, kind, **options) - h
+
+
+def distance(x, cumulative):
+    """Kolmogorov's distance times the root of the number of values: above 2 with probability 0.0007."""
+    x = np.sort(x)
+    steps = np.arange(x.size + 1) / x.size
+    return max(abs(cumulative(x) - steps[1:]).max(), abs(cumulative(x) - steps[:-1]).max()) * np.sqrt(x.size)
+
+
+@pytest.mark.parametrize(
+    ("kind", "spread"), [("complex", np.sqrt(0.5)), ("complex-per-part", 1.0), ("real-normal", 1.0)]
+)
+def test_normal_numbers_are_normal(kind, spread):
+    e = numbers(kind, seed=11) / spread
+    parts = [e.real, e.imag] if kind != "real-normal" else [e.real]
+    for part in parts:
+        assert distance(part.ravel(), ndtr) < 2
+    if kind != "real-normal":
+        assert distance(((np.angle(e) / np.pi + 1) / 2).ravel(), lambda t: t) < 2
+        assert distance(abs(e).ravel(), lambda r: 1 - np.exp(-(r**2) / 2)) < 2
+
+
+@pytest.mark.parametrize(("kind", "width"), [("real-uniform", 1.0), ("real-uniform-std", np.sqrt(3))])
+def test_uniform_numbers_are_uniform(kind, width):
+    e = numbers(kind, seed=12).real
+    assert distance(e.ravel(), lambda x: (x / width + 1) / 2) < 2
+
+
+def test_tails_have_their_share():
+    """Of 8 million pairs, as many lie beyond r as exp(-r^2/2) says, out to where a few are left."""
+    h = np.ones((1000000, 1, 8), complex)
+    r = abs(jf.pollute(h, 1.0, "complex-per-part", seed=5) - h)
+    for limit in (3.0, 4.0, 5.0):
+        expected = r.size * np.exp(-(limit**2) / 2)
+        assert abs((r > limit).sum() - expected) < 5 * np.sqrt(expected)
+
+
+def test_entries_lines_and_realisations_are_independent():
+    e = np.stack([numbers("complex", seed=s, realisation=r) for s in (0, 1) for r in (0, 1)])
+    limit = 5 / np.sqrt(e[0, :, 0, 0].size)
+    flat = e.reshape(4, -1, 4).transpose(0, 2, 1).reshape(16, -1)
+    flat = np.concatenate([flat[:, 1:], flat[:, :-1]])  # and the line before
+    correlation = abs(flat @ flat.conj().T) / flat.shape[1] - np.eye(32)
+    assert abs(correlation).max() < limit
+    power = abs(flat) ** 2 - 1
+    assert abs(power @ power.T / flat.shape[1] - np.eye(32)).max() < 2 * limit
+
+
 def test_no_level_no_noise():
     np.testing.assert_array_equal(jf.pollute(H, 0.0), H)
 
@@ -91,6 +143,9 @@ def test_no_level_no_noise():
         (dict(level=-0.1), "level must be 0 or positive"),
         (dict(level=np.nan), "level must be finite"),
         (dict(block=3), "block 3 does not divide"),
+        (dict(seed=2**64), "seed must lie between"),
+        (dict(realisation=-1), "realisations are counted from 0"),
+        (dict(realisation=2**31 - 1), "realisations are counted from 0"),
         (dict(h=H[:, :1], reciprocal=True), "reciprocal noise needs square matrices"),
     ],
 )

@@ -1,4 +1,5 @@
-/* Which of the instruction sets that the lane kernels are compiled for this processor has. */
+/* What Fortran has no word for: which instruction sets the processor has, and asking for memory before it is needed. */
+#include <stdint.h>
 
 /* 2, 3 or 4 for x86-64-v2, -v3 or -v4; 0 for less and for other processors. The operating system's support of the wide
    registers is part of the answer. */
@@ -17,5 +18,23 @@ int jointfrf_cpu_level(void)
   return 4;
 #else
   return 0;
+#endif
+}
+
+/* Begin to bring the bytes from `from` to before `to` near, to be read or, with `write`, to be overwritten. A hint: no
+   address is wrong. */
+void jointfrf_prefetch(intptr_t from, intptr_t to, int write)
+{
+#if defined(__GNUC__) || defined(__clang__)
+  if (write)
+    for (; from < to; from += 64)
+      __builtin_prefetch((const void *)from, 1, 2);
+  else
+    for (; from < to; from += 64)
+      __builtin_prefetch((const void *)from, 0, 2);
+#else
+  (void)from;
+  (void)to;
+  (void)write;
 #endif
 }

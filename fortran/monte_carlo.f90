@@ -1,0 +1,496 @@
+!> Monte Carlo study of an identification: pollute, identify and accumulate, without keeping any realisation.
+!>
+!> Lanes are realisations of one frequency line: inputs are the same in all of them, only noise differs. The
+!> realisations of a line are cut into slices whose number depends on the arguments alone; slices are put together in a
+!> fixed order. So results do not depend on the number of threads.
+module jointfrf_monte_carlo
+  use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
+  use, intrinsic :: iso_c_binding, only: c_intptr_t, c_loc, c_ptr
+  use, intrinsic :: iso_fortran_env, only: int64
+  !$ use omp_lib, only: omp_get_max_threads, omp_get_thread_num, omp_in_parallel
+  use jointfrf_blas_threads, only: hold_blas_threads, release_blas_threads
+  use jointfrf_engine, only: find_kernels
+  use jointfrf_ismm, only: inverse_substructuring
+  use jointfrf_kinds, only: dp, ip
+  use jointfrf_lanes, only: in_memory, lane_kernels, lanes, largest_in_lanes, natural, padded, real_lines, &
+    row_starts, rows_in_memory, system, system_size
+  use jointfrf_line_layout, only: all_finite, load, store, take_block
+  use jointfrf_lines_lapack, only: inverse_work, product_line, solve_line
+  use jointfrf_noise, only: draw, entry_counters, find_scale, line_counter, noise_model, spectrum_peak, &
+    upper
+  use jointfrf_status, only: info_good, info_no_memory, line_good, line_not_finite, line_overflow
+  use jointfrf_sweep, only: line_space
+  implicit none
+  private
+  public :: monte_carlo, is_method
+
+  !> ISMM, inverse substructuring, joint compliance.
+  character(len=*), parameter :: methods = 'ISC'
+  !> Slices in all where there are few lines, and realisations that a slice has at least.
+  integer, parameter :: most_slices = 64, fewest_realisations = 512
+
+  !> What is the same for all lines: places of the elements in lanes.
+  type :: study_plan
+    logical :: transposed, compliance
+    integer :: n, m, n_element
+    integer, allocatable :: gamma(:)             !< gamma in lanes, in the caller's order
+    integer, allocatable :: again(:)             !< gamma once more, for lanes that are in doubt
+    integer, allocatable :: unit(:)              !< right-hand sides -E_k
+    complex(dp), allocatable :: unit_value(:)
+    integer, allocatable :: kk_row(:), c_row(:)  !< rows of gamma_kk and of C
+    integer, allocatable :: result(:)            !< where results lie that come line by line
+    integer(int64), allocatable :: counters(:)
+  end type study_plan
+
+  !> Moments of values: how many, mean, and sums of re*re, im*im and re*im about the mean.
+  type :: moments
+    real(dp) :: number = 0.0_dp
+    real(dp), allocatable :: mean(:, :), square(:, :)
+    real(dp) :: rcond = huge(1.0_dp)             !< the smallest
+    integer(ip) :: code = line_good              !< of the first bad realisation
+  end type moments
+
+  !> The workspace of one thread.
+  type :: study_space
+    type(line_space) :: lapack
+    real(dp), allocatable :: room(:)             !< where x, e, mean and square lie
+    integer(int64), allocatable :: low_room(:)
+    real(dp), pointer, contiguous :: x(:, :, :) => null(), e(:, :, :) => null()
+    real(dp), pointer, contiguous :: mean(:, :, :) => null(), square(:, :, :) => null()
+    integer(int64), pointer, contiguous :: low(:, :) => null()
+    real(dp), allocatable :: scale(:, :)
+    integer, allocatable :: hint(:)
+    complex(dp), allocatable :: gamma(:, :), found(:, :)
+  end type study_space
+
+contains
+
+  pure function is_method(letter) result(known)
+    character, intent(in) :: letter
+    logical :: known
+
+    known = index(methods, upper(letter)) > 0
+  end function is_method
+
+  !> Mean and covariance of what a method identifies from polluted FRFs.
+  !>
+  !> 'I' ISMM, K* = K0 - D_jk. Noise is on gamma only, so that by D = gamma^-1 - alpha^-1 (2.40) what belongs to alpha
+  !> is done once a line: K* = K0 + (alpha^-1)_jk - (gamma^-1)_jk. 'S' inverse substructuring, K* = -(gamma^-1)_jk.
+  !> 'C' compliance, C = gamma_kk gamma_jk^-1 gamma_jj - gamma_kj.
+  !> first, count  realisations first .. first + count - 1, those that `pollute` gives of gamma
+  !> alpha         receptance of the assembly with K0, shape (2 n, 2 n, n_freq), m/N; read by 'I' only
+  !> gamma         exact receptance of the assembly, shape (2 n, 2 n, n_freq), m/N
+  !> k_initial     K0, shape (n, n, n_freq), N/m; read by 'I' only
+  !> good          realisations of every line that could be identified, shape (n_freq)
+  !> mean          over the good ones, shape (n, n, n_freq), N/m or m/N
+  !> covariance    of real and imaginary part of each entry, shape (3, n, n, n_freq): Var Re, Var Im, Cov(Re, Im)
+  !> line_info     shape (n_freq): where no realisation is good, what was wrong with the first
+  !> rcond         shape (n_freq): the smallest over the realisations
+  subroutine monte_carlo(transposed, method, noise, first, count, alpha, gamma, k_initial, good, mean, covariance, &
+                         line_info, rcond, info)
+    logical, intent(in) :: transposed
+    character, intent(in) :: method
+    type(noise_model), intent(in) :: noise
+    integer(ip), intent(in) :: first, count
+    complex(dp), contiguous, target, intent(in) :: alpha(:, :, :), gamma(:, :, :), k_initial(:, :, :)
+    integer(ip), contiguous, intent(out) :: good(:)
+    complex(dp), contiguous, target, intent(inout) :: mean(:, :, :)
+    real(dp), contiguous, intent(out) :: covariance(:, :, :, :), rcond(:)
+    integer(ip), contiguous, intent(out) :: line_info(:)
+    integer(ip), intent(out) :: info
+    type(lane_kernels) :: kernels
+    type(study_plan) :: plan
+    type(study_space), allocatable, target :: space(:)
+    type(moments), allocatable :: part(:)
+    real(dp), pointer, contiguous :: gamma_pairs(:, :, :)
+    real(dp) :: peak
+    integer :: n, n_freq, slices, share, item, i, s, t, threads, stat
+    logical :: blocks
+
+    n = size(mean, 1)
+    n_freq = size(mean, 3)
+    call find_kernels(kernels, blocks, info)
+    if (info /= info_good .or. n_freq == 0) return
+    if (upper(method) == 'I') then
+      call inverse_substructuring(transposed, alpha, mean, line_info, rcond, info)
+      if (info < 0) return
+      mean = k_initial - mean                                     ! K0 + (alpha^-1)_jk
+      do i = 1, n_freq
+        if (line_info(i) == line_good .and. .not. all_finite(mean(:, :, i))) line_info(i) = line_not_finite
+      end do
+    else
+      mean = 0.0_dp
+      line_info = line_good
+      rcond = 1.0_dp
+    end if
+
+    plan = make_plan(transposed, upper(method) == 'C', n, noise)
+    blocks = blocks .and. plan%m <= largest_in_lanes
+    slices = max(1, min((most_slices + n_freq - 1)/n_freq, count/fewest_realisations))
+    share = ((count + slices - 1)/slices + lanes - 1)/lanes*lanes
+    threads = 1
+    !$ if (8.0_dp*real(plan%m, dp)**3*count*n_freq > 1.0e6_dp .and. .not. omp_in_parallel()) &
+    !$   threads = min(omp_get_max_threads(), slices*n_freq)
+    allocate (part(slices*n_freq), space(threads), stat=stat)
+    do t = 1, threads
+      if (stat == 0) call prepare(plan, space(t), stat)
+    end do
+    do item = 1, slices*n_freq
+      if (stat == 0) allocate (part(item)%mean(2, n*n), part(item)%square(3, n*n), stat=stat)
+    end do
+    if (stat /= 0) then
+      info = info_no_memory
+      return
+    end if
+    gamma_pairs => real_lines(gamma)
+    peak = spectrum_peak(noise, kernels, gamma_pairs)
+
+    call hold_blas_threads()
+    t = 1
+    !$omp parallel do num_threads(threads) if(threads > 1) schedule(dynamic) default(none) private(i, s) &
+    !$omp shared(plan, noise, kernels, blocks, n_freq, slices, share, first, count, gamma, gamma_pairs, peak) &
+    !$omp shared(line_info, space, part) firstprivate(t)
+    do item = 1, slices*n_freq
+      !$ t = omp_get_thread_num() + 1
+      i = (item - 1)/slices + 1
+      s = mod(item - 1, slices)*share
+      if (line_info(i) == line_good .and. all_finite(gamma(:, :, i))) then
+        call run_slice(plan, noise, kernels, blocks, i, int(first, int64) + s, min(share, count - s), &
+                       gamma_pairs(:, :, i), peak, space(t), part(item))
+      else
+        call clear(part(item))
+        part(item)%code = line_info(i)
+        if (part(item)%code == line_good) part(item)%code = line_not_finite
+      end if
+    end do
+    !$omp end parallel do
+    call release_blas_threads()
+
+    do i = 1, n_freq
+      s = (i - 1)*slices + 1
+      do item = s + 1, s + slices - 1
+        call add(part(item)%number, part(item)%mean, part(item)%square, part(s))
+        part(s)%rcond = min(part(s)%rcond, part(item)%rcond)
+        if (part(s)%code == line_good) part(s)%code = part(item)%code
+      end do
+      good(i) = nint(part(s)%number, ip)
+      line_info(i) = line_good
+      if (good(i) == 0) line_info(i) = part(s)%code
+      rcond(i) = merge(min(rcond(i), part(s)%rcond), 0.0_dp, good(i) > 0)
+      call deliver(part(s), mean(:, :, i), covariance(:, :, :, i))
+    end do
+    info = int(sum(merge(1, 0, line_info /= line_good)), ip)
+  end subroutine monte_carlo
+
+  !> Where everything lies in lanes. For K*: the columns of gamma in the order k, j, so that only the last unknowns,
+  !> rows j of the solution, must be found.
+  function make_plan(transposed, compliance, n, noise) result(plan)
+    logical, intent(in) :: transposed, compliance
+    integer, intent(in) :: n
+    type(noise_model), intent(in) :: noise
+    type(study_plan) :: plan
+    integer :: gamma(2*n, 2*n), whole(2*n, 3*n), part(n, 2*n), taken, i, j
+
+    plan%transposed = transposed
+    plan%compliance = compliance
+    plan%n = n
+    plan%m = 2*n
+    if (compliance) then
+      part = system(0, n, n)
+      taken = system_size(n, n)
+      gamma(:n, n + 1:) = part(:, :n)                      ! jk, the matrix
+      gamma(:n, :n) = part(:, n + 1:)                      ! jj, the right-hand sides
+      gamma(n + 1:, n + 1:) = natural(taken, n, n)         ! kk
+      gamma(n + 1:, :n) = natural(taken + n*n, n, n)       ! kj, where C will be
+      taken = taken + 2*n*n
+      plan%kk_row = row_starts(gamma(n + 1:, n + 1:))
+      plan%c_row = row_starts(gamma(n + 1:, :n))
+      plan%result = in_memory(transposed, gamma(n + 1:, :n))
+    else
+      whole = system(0, 2*n, n)
+      taken = system_size(2*n, n)
+      gamma(:, n + 1:) = whole(:, :n)
+      gamma(:, :n) = whole(:, n + 1:2*n)
+      plan%unit = in_memory(.true., whole(:, 2*n + 1:))
+      allocate (plan%unit_value(2*n*n))
+      do i = 1, 2*n
+        do j = 1, n
+          plan%unit_value((i - 1)*n + j) = merge(-1, 0, i == n + j)
+        end do
+      end do
+      plan%result = in_memory(transposed, natural(0, n, n))
+    end if
+    plan%gamma = in_memory(transposed, gamma)
+    plan%again = [(taken + i, i=1, 4*n*n)]
+    plan%n_element = taken + 4*n*n
+    plan%counters = entry_counters(noise, transposed, 2*n, 2*n)
+  end function make_plan
+
+  subroutine prepare(plan, space, stat)
+    type(study_plan), intent(in) :: plan
+    type(study_space), target, intent(inout) :: space
+    integer, intent(out) :: stat
+    integer :: n, m, at
+
+    n = plan%n
+    m = plan%m
+    allocate (space%room(lanes*(2*plan%n_element + 2*m + 5*n*n + 1)), space%low_room(lanes*(m*m + 1)), &
+              space%scale(2, m*m), space%hint(padded(m)), space%gamma(m, m), space%found(n, n), &
+              space%lapack%z(3*m*m + inverse_work(m)), space%lapack%r(2*m), space%lapack%pivot(m), stat=stat)
+    if (stat /= 0) return
+    at = to_register(c_loc(space%room))
+    call place(2, plan%n_element, space%x)
+    call place(2, m, space%e)
+    call place(2, n*n, space%mean)
+    call place(3, n*n, space%square)
+    at = to_register(c_loc(space%low_room))
+    space%low(1:lanes, 1:m*m) => space%low_room(at + 1:at + lanes*m*m)
+
+  contains
+
+    subroutine place(n_parts, n_elements, array)
+      integer, intent(in) :: n_parts, n_elements
+      real(dp), pointer, contiguous, intent(out) :: array(:, :, :)
+
+      array(1:lanes, 1:n_parts, 1:n_elements) => space%room(at + 1:at + lanes*n_parts*n_elements)
+      at = at + lanes*n_parts*n_elements
+    end subroutine place
+
+    !> Numbers from an address to where a register begins.
+    function to_register(address) result(skip)
+      type(c_ptr), intent(in) :: address
+      integer :: skip
+
+      skip = int(modulo(-transfer(address, 1_c_intptr_t)/8, int(lanes, c_intptr_t)))
+    end function to_register
+  end subroutine prepare
+
+  !> The realisations first .. first + count - 1 of one line.
+  subroutine run_slice(plan, noise, kernels, blocks, line, first, count, gamma, peak, space, part)
+    type(study_plan), intent(in) :: plan
+    type(noise_model), intent(in) :: noise
+    type(lane_kernels), intent(in) :: kernels
+    logical, intent(in) :: blocks
+    integer, intent(in) :: line, count
+    integer(int64), intent(in) :: first
+    real(dp), contiguous, intent(in) :: gamma(:, :)
+    real(dp), intent(in) :: peak
+    type(study_space), target, intent(inout) :: space
+    type(moments), intent(inout) :: part
+    integer(int64) :: high(lanes)
+    real(dp) :: taken(lanes), number(lanes), rcond(lanes)
+    integer(ip) :: code(lanes)
+    integer :: from(plan%n**2), done, here, l
+
+    call clear(part)
+    call find_scale(noise, kernels, plan%m**2, gamma, peak, space%scale)
+    do l = 1, lanes
+      space%low(l, :) = plan%counters + line_counter(line)
+    end do
+    space%mean = 0.0_dp
+    space%square = 0.0_dp
+    space%hint = 0
+    number = 0.0_dp
+    do done = 0, count - 1, lanes
+      here = min(lanes, count - done)
+      high = [(first + done + l, l=0, lanes - 1)]
+      code = not(line_good)
+      from = plan%result
+      if (blocks) call identify_lanes(plan, noise, kernels, high, gamma, space, from, code, rcond)
+      if (any(code(:here) /= line_good)) &
+        call repeat_lanes(plan, noise, kernels, high, here, gamma, space, from, code, rcond)
+      taken = 0.0_dp
+      do l = 1, here
+        if (code(l) == line_good) then
+          taken(l) = 1.0_dp
+          part%rcond = min(part%rcond, rcond(l))
+        else if (part%code == line_good) then
+          part%code = code(l)
+        end if
+      end do
+      number = number + taken
+      call kernels%moments(plan%n**2, from, space%x, taken, number, space%mean, space%square)
+    end do
+    do l = 1, lanes
+      call add(number(l), space%mean(l, :, :), space%square(l, :, :), part)
+    end do
+  end subroutine run_slice
+
+  !> One realisation a lane. A lane whose code is not good is in doubt.
+  !> from    where the results lie
+  subroutine identify_lanes(plan, noise, kernels, high, gamma, space, from, code, rcond)
+    type(study_plan), intent(in) :: plan
+    type(noise_model), intent(in) :: noise
+    type(lane_kernels), intent(in) :: kernels
+    integer(int64), intent(in) :: high(lanes)
+    real(dp), contiguous, intent(in) :: gamma(:, :)
+    type(study_space), target, intent(inout) :: space
+    integer, intent(inout) :: from(:)
+    integer(ip), intent(out) :: code(lanes)
+    real(dp), intent(out) :: rcond(lanes)
+    integer :: row(plan%m), n, m
+    real(dp) :: total(lanes)
+
+    n = plan%n
+    m = plan%m
+    call pollute_in_lanes(plan, noise, kernels, high, gamma, plan%gamma, space)
+    if (plan%compliance) then
+      call kernels%solve(n, n, n, 0, space%x, space%hint, row, rcond)         ! gamma_jk^-1 gamma_jj
+      call kernels%copy(n*n, -1.0_dp, from, from, space%x)
+      call kernels%product(n, n, n, 1.0_dp, plan%kk_row, row, plan%c_row, space%x)
+    else
+      call kernels%fill(m*n, plan%unit_value, plan%unit, space%x)
+      call kernels%solve(m, n, n, 0, space%x, space%hint, row, rcond)         ! rows j of -gamma^-1 E_k
+      call rows_in_memory(plan%transposed, row(n + 1:), n, from)
+    end if
+    call kernels%total(n*n, from, space%x, total)
+    call kernels%judge(lanes, total, code, rcond)
+  end subroutine identify_lanes
+
+  !> The polluted gamma of every lane to its places, row by row of what the caller stores.
+  subroutine pollute_in_lanes(plan, noise, kernels, high, gamma, place, space)
+    type(study_plan), intent(in) :: plan
+    type(noise_model), intent(in) :: noise
+    type(lane_kernels), intent(in) :: kernels
+    integer(int64), intent(in) :: high(lanes)
+    real(dp), contiguous, intent(in) :: gamma(:, :)
+    integer, intent(in) :: place(:)
+    type(study_space), target, intent(inout) :: space
+    integer :: i, m
+
+    m = plan%m
+    do i = 1, m*m, m
+      call draw(noise, kernels, m, space%low(:, i:i + m - 1), high, space%e)
+      call kernels%pollute_lanes(m, gamma(:, i:i + m - 1), space%scale(:, i:i + m - 1), space%e, place(i:i + m - 1), &
+                                 space%x)
+    end do
+  end subroutine pollute_in_lanes
+
+  !> Lanes in doubt once more by the reference engine.
+  subroutine repeat_lanes(plan, noise, kernels, high, here, gamma, space, from, code, rcond)
+    type(study_plan), intent(in) :: plan
+    type(noise_model), intent(in) :: noise
+    type(lane_kernels), intent(in) :: kernels
+    integer(int64), intent(in) :: high(lanes)
+    integer, intent(in) :: here, from(:)
+    real(dp), contiguous, intent(in) :: gamma(:, :)
+    type(study_space), target, intent(inout) :: space
+    integer(ip), intent(inout) :: code(lanes)
+    real(dp), intent(inout) :: rcond(lanes)
+    integer :: l, i, j, p
+
+    call pollute_in_lanes(plan, noise, kernels, high, gamma, plan%again, space)
+    do l = 1, here
+      if (code(l) == line_good) cycle
+      do j = 1, plan%m
+        do i = 1, plan%m
+          p = plan%again((j - 1)*plan%m + i)
+          space%gamma(i, j) = cmplx(space%x(l, 1, p), space%x(l, 2, p), dp)
+        end do
+      end do
+      call identify_one(plan, space%gamma, space%lapack, space%found, code(l), rcond(l))
+      do j = 1, plan%n
+        do i = 1, plan%n
+          p = from((j - 1)*plan%n + i)
+          space%x(l, 1, p) = real(space%found(i, j), dp)
+          space%x(l, 2, p) = aimag(space%found(i, j))
+        end do
+      end do
+    end do
+  end subroutine repeat_lanes
+
+  !> One realisation with LAPACK: -(gamma^-1)_jk or C, stored as gamma is.
+  subroutine identify_one(plan, stored, space, found, code, rcond)
+    type(study_plan), intent(in) :: plan
+    complex(dp), contiguous, intent(in) :: stored(:, :)
+    type(line_space), target, intent(inout) :: space
+    complex(dp), contiguous, intent(out) :: found(:, :)
+    integer(ip), intent(out) :: code
+    real(dp), intent(out) :: rcond
+    complex(dp), pointer, contiguous :: gamma(:, :), matrix(:, :), right(:, :), last(:, :), answer(:, :)
+    integer :: n, i
+
+    found = 0.0_dp
+    rcond = 0.0_dp
+    code = line_overflow
+    if (.not. all_finite(stored)) return
+    n = plan%n
+    space%used = 0
+    gamma => space%matrix(2*n, 2*n)
+    answer => space%matrix(n, n)
+    call load(plan%transposed, stored, gamma)
+    if (plan%compliance) then
+      matrix => space%matrix(n, n)
+      last => space%matrix(n, n)
+      right => space%matrix(n, n)
+      call take_block(.false., 1.0_dp, gamma, 0, n, matrix)
+      call take_block(.false., 1.0_dp, gamma, 0, 0, right)
+      call take_block(.false., 1.0_dp, gamma, n, n, last)
+      call solve_line(matrix, right, space, code, rcond)                  ! gamma_jk^-1 gamma_jj
+      if (code /= line_good) return
+      call take_block(.false., -1.0_dp, gamma, n, 0, answer)
+      call product_line('N', 'N', 1.0_dp, last, right, answer)
+    else
+      right => space%matrix(2*n, n)
+      right = 0.0_dp
+      do i = 1, n
+        right(n + i, i) = -1.0_dp
+      end do
+      call solve_line(gamma, right, space, code, rcond)
+      if (code /= line_good) return
+      call take_block(.false., 1.0_dp, right, 0, 0, answer)
+    end if
+    if (.not. all_finite(answer)) code = line_overflow
+    call store(plan%transposed, answer, found)
+  end subroutine identify_one
+
+  subroutine clear(part)
+    type(moments), intent(inout) :: part
+
+    part%number = 0.0_dp
+    part%mean = 0.0_dp
+    part%square = 0.0_dp
+  end subroutine clear
+
+  !> Moments of further values, put together with those of `part` (Chan, Golub, LeVeque).
+  pure subroutine add(number, mean, square, part)
+    real(dp), intent(in) :: number, mean(:, :), square(:, :)
+    type(moments), intent(inout) :: part
+    real(dp) :: share, re, im, weight
+    integer :: i
+
+    if (.not. number > 0.0_dp) return
+    share = number/(part%number + number)
+    weight = part%number*share
+    do i = 1, size(mean, 2)
+      re = mean(1, i) - part%mean(1, i)
+      im = mean(2, i) - part%mean(2, i)
+      part%mean(1, i) = part%mean(1, i) + share*re
+      part%mean(2, i) = part%mean(2, i) + share*im
+      part%square(1, i) = part%square(1, i) + (square(1, i) + weight*re*re)
+      part%square(2, i) = part%square(2, i) + (square(2, i) + weight*im*im)
+      part%square(3, i) = part%square(3, i) + (square(3, i) + weight*re*im)
+    end do
+    part%number = part%number + number
+  end subroutine add
+
+  !> Mean, onto what the line has without noise, and covariance; NaN where there are too few values.
+  pure subroutine deliver(part, mean, covariance)
+    type(moments), intent(in) :: part
+    complex(dp), contiguous, intent(inout) :: mean(:, :)
+    real(dp), contiguous, intent(out) :: covariance(:, :, :)
+    real(dp) :: nan
+    integer :: i, j, p
+
+    nan = ieee_value(nan, ieee_quiet_nan)
+    do j = 1, size(mean, 2)
+      do i = 1, size(mean, 1)
+        p = (j - 1)*size(mean, 1) + i
+        mean(i, j) = mean(i, j) + cmplx(part%mean(1, p), part%mean(2, p), dp)
+        if (part%number < 0.5_dp) mean(i, j) = cmplx(nan, nan, dp)
+        covariance(:, i, j) = nan
+        if (part%number > 1.5_dp) covariance(:, i, j) = part%square(:, p)/(part%number - 1.0_dp)
+      end do
+    end do
+  end subroutine deliver
+end module jointfrf_monte_carlo

@@ -1,0 +1,7 @@
+"""How fast the operations are: against the limits of the machine, numpy, and a loop over LAPACK."""
+
+import os
+
+# Before numpy loads its BLAS. At these orders threads within a line do harm, to numpy most of all.
+for _name in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ[_name] = "1"

@@ -1,0 +1,260 @@
+"""The benchmark command: `tests/benchmarks/run --help`."""
+
+from __future__ import annotations
+
+import argparse
+import ctypes
+import sys
+import time
+import warnings
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from datetime import datetime
+from pathlib import Path
+
+import numpy as np
+
+import jointfrf as jf
+
+from . import report
+from .data import Data
+from .machine import QUICK_SIZES, ROOT, SIZES, Limits, as_dict, best_of, build_library, describe, measure_limits
+from .measure import Candidate, time_interleaved
+from .operations import OPERATIONS, Operation, Reference
+from .results import LOOP, NUMPY, OURS, OUT, REFERENCE, Run, load, record, save, with_limits
+
+_ORDERS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64)
+_QUICK_ORDERS = (2, 6, 12, 24)
+#: FRFs and random matrices again and again on the same lines; FRFs that no cache holds.
+_DATA = ("frf", "random", "streaming")
+#: Memory that a case may take, bytes; operations of one call on one candidate.
+_MEMORY, _WORK, _QUICK_WORK = 2e9, 2e9, 4e8
+_FEWEST_LINES = 200
+#: A case streams where its data are this many times those of the repeated one.
+_STREAMING_FACTOR = 4
+
+
+def _numbers(text: str) -> tuple[int, ...]:
+    numbers = tuple(int(word) for word in text.split(","))
+    if min(numbers) < 1:
+        raise argparse.ArgumentTypeError("numbers from 1 on")
+    return numbers
+
+
+def _names(text: str) -> tuple[str, ...]:
+    names = tuple(text.split(","))
+    for name in names:
+        if name not in OPERATIONS:
+            raise argparse.ArgumentTypeError(f"{name!r} is none of {', '.join(OPERATIONS)}")
+    return names
+
+
+def _data(text: str) -> tuple[str, ...]:
+    kinds = tuple(text.split(","))
+    for kind in kinds:
+        if kind not in _DATA:
+            raise argparse.ArgumentTypeError(f"{kind!r} is none of {', '.join(_DATA)}")
+    return kinds
+
+
+def _parse(arguments: list[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        prog="tests/benchmarks/run",
+        description="Times the operations of jointfrf against the limits of this machine, numpy and LAPACK line by "
+        "line. Prints a table; writes speed.json and speed.png.",
+    )
+    parser.add_argument("--output", type=Path, default=ROOT / "results" / "benchmarks", metavar="FOLDER")
+    parser.add_argument("--operations", type=_names, default=tuple(OPERATIONS), metavar="NAME,...",
+                        help=f"out of {', '.join(OPERATIONS)}")  # fmt: skip
+    parser.add_argument("--orders", type=_numbers, metavar="N,...", help="n; default 1 to 64")
+    parser.add_argument("--lines", type=int, help="frequency lines; default 2000")
+    parser.add_argument("--data", type=_data, metavar="KIND,...", help=f"out of {', '.join(_DATA)}; default all")
+    parser.add_argument("--threads", type=_numbers, default=(1, 2), metavar="N,...", help="default 1,2; 1 comes first")
+    parser.add_argument("--engine", default="auto", help="the engine that is timed as jointfrf")
+    parser.add_argument(
+        "--budget", type=float, help="seconds a case may take, once it was repeated five times; default 0.6"
+    )
+    parser.add_argument("--quick", action="store_true", help="four orders, 500 lines, FRFs only, no streaming")
+    parser.add_argument(
+        "--compare", type=Path, metavar="OLD.json", help="print what became slower; status 1 if anything did"
+    )
+    parser.add_argument("--readme", action="store_true", help="put the table into README.md")
+    parser.add_argument(
+        "--from", type=Path, dest="source", metavar="FILE.json", help="use these results, measure nothing"
+    )
+    options = parser.parse_args(arguments)
+    options.orders = options.orders or (_QUICK_ORDERS if options.quick else _ORDERS)
+    options.data = options.data or (_DATA[:1] if options.quick else _DATA)
+    options.lines = options.lines or (500 if options.quick else 2000)
+    options.budget = options.budget if options.budget is not None else (0.1 if options.quick else 0.6)
+    options.threads = tuple(sorted({1, *options.threads}))
+    return options
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the command; return its exit status."""
+    options = _parse(arguments)
+    warnings.simplefilter("ignore", jf.IllConditionedWarning)
+    # Another method would be timed.
+    warnings.simplefilter("error", jf.ConvergenceWarning)
+    # Read first: it may be the file that is written.
+    old = load(options.compare) if options.compare else None
+    options.output.mkdir(parents=True, exist_ok=True)
+    if options.source:
+        run = load(options.source)
+    else:
+        run = _measure(options)
+        save(run, options.output / "speed.json")
+        print(f"\nwrote {options.output / 'speed.json'}")
+    from .plot import draw
+
+    draw(run, options.output / "speed.png")
+    print(f"wrote {options.output / 'speed.png'}")
+    if options.readme:
+        report.write_readme(run, ROOT / "README.md")
+        print("wrote README.md")
+    if old is None:
+        return 0
+    text, worse = report.comparison(old, run)
+    print(text)
+    return int(worse)
+
+
+def _measure(options: argparse.Namespace) -> Run:
+    jf.set_engine(options.engine)
+    library = build_library()
+    threads = tuple(count for count in options.threads if library.machine_set_threads(count) == count)
+    machine = {**describe(), "engine": jf.get_engine()}
+
+    def measured() -> dict[int, Limits]:
+        return {count: measure_limits(library, count, QUICK_SIZES if options.quick else SIZES) for count in threads}
+
+    limits = measured()
+    run = Run(datetime.now().astimezone().isoformat(timespec="seconds"), machine, [], [])
+    run.limits.extend(as_dict(limit) for limit in limits.values())
+    print(report.machine_text(machine, run.limits), flush=True)
+    start = time.perf_counter()
+    for name in options.operations:
+        operation = OPERATIONS[name]
+        for kind in options.data:
+            if kind == "streaming" and operation.streams:
+                _time_operation(operation, "frf", True, options, library, limits, run)
+            elif kind in operation.kinds:
+                _time_operation(operation, kind, False, options, library, limits, run)
+        # What an interrupted run has measured is not lost.
+        save(run, options.output / "speed.json")
+    # Once more, since something may have disturbed it at the beginning.
+    limits = {count: best_of(limits[count], limit) for count, limit in measured().items()}
+    final = replace(
+        run,
+        limits=[as_dict(limit) for limit in limits.values()],
+        records=[with_limits(one, limits) for one in run.records],
+    )
+    print(f"\n{len(run.records)} numbers in {time.perf_counter() - start:.0f} s")
+    print(*report.limits_text(final.limits), sep="\n")
+    return final
+
+
+def _time_operation(
+    operation: Operation,
+    kind: str,
+    streaming: bool,
+    options: argparse.Namespace,
+    library: ctypes.CDLL,
+    limits: dict[int, Limits],
+    run: Run,
+) -> None:
+    """Time all orders with one kind of data."""
+    threads = tuple(limits)
+    titled = False
+    for n in options.orders:
+        times, lines = _sizes(operation, kind, n, options, streaming)
+        if times == 0:
+            continue
+        if not titled:
+            print(report.heading(operation.name, kind, streaming, threads, operation.takes_out))
+            titled = True
+        case = (operation.name, kind, streaming, n)
+        try:
+            _time_case(operation, case, (lines, times), options, library, limits, run)
+        except jf.ConvergenceWarning as warning:
+            print(f"{n:4d}  left out: {warning}")
+            continue
+        print(report.row(run, case, threads, operation.takes_out), flush=True)
+
+
+def _sizes(operation: Operation, kind: str, n: int, options: argparse.Namespace, streaming: bool) -> tuple[int, int]:
+    """Return how often the lines are repeated, 0 where that is not worth while, and the number of lines."""
+    if n < operation.smallest:
+        return 0, 0
+    few = operation.make(kind, 2, n)
+    room = sum(array.nbytes for array in few.sweeps.values()) / 2 * operation.per_call
+    room += operation.numpy(few).nbytes / 2
+    work = max(operation.flops(n) * operation.per_call, 1)
+    fits = int(_MEMORY / (operation.copies * room))
+    enough = max(_FEWEST_LINES, int((_QUICK_WORK if options.quick else _WORK) / work))
+    lines = max(2, min(max(2, options.lines // operation.per_call), fits, enough))
+    if not streaming:
+        return 1, lines
+    times = min(100_000, fits, enough) // lines
+    return (times if times >= _STREAMING_FACTOR else 0), lines
+
+
+def _time_case(
+    operation: Operation,
+    case: tuple[str, str, bool, int],
+    sizes: tuple[int, int],
+    options: argparse.Namespace,
+    library: ctypes.CDLL,
+    limits: dict[int, Limits],
+    run: Run,
+) -> None:
+    """Check all candidates, then time them in turn."""
+    _, kind, _, n = case
+    lines, times = sizes
+    base = operation.make(kind, lines, n)
+    reference = Reference(operation, base)
+    data = base.repeated(times) if times > 1 else base
+    candidates = list(_candidates(operation, data, options.engine, library, tuple(limits)))
+    first = []
+    for candidate in candidates:
+        candidate.prepare()
+        start = time.perf_counter()
+        result = candidate.call()
+        first.append(time.perf_counter() - start)
+        fault = reference.fault(result)
+        del result
+        if fault:
+            raise SystemExit(f"{operation.name}, n = {n}, {kind}: {candidate.name} is wrong: {fault}")
+    timings = time_interleaved(candidates, first, options.budget, fewest=3 if options.quick else 5)
+    done = data.lines * operation.per_call
+    for candidate, timing in zip(candidates, timings, strict=True):
+        own = limits[candidate.threads]
+        run.records.append(record(case, done, candidate.name, own, timing, operation.flops(n), operation.moved(n)))
+    jf.set_engine(options.engine)
+
+
+def _candidates(
+    operation: Operation, data: Data, engine: jf.engine.Engine, library: ctypes.CDLL, threads: tuple[int, ...]
+) -> Iterator[Candidate]:
+    def prepare(chosen: jf.engine.Engine, count: int) -> Callable[[], None]:
+        def set_up() -> None:
+            jf.set_engine(chosen)
+            library.machine_set_threads(count)
+
+        return set_up
+
+    ours, loop = operation.ours, operation.loop
+    for count in threads:
+        yield Candidate(OURS, count, prepare(engine, count), lambda: ours(data))
+        if operation.takes_out:
+            out = np.empty_like(ours(data))
+            yield Candidate(OUT, count, prepare(engine, count), lambda out=out: ours(data, out=out))  # type: ignore[misc]
+        yield Candidate(REFERENCE, count, prepare("lapack", count), lambda: ours(data))
+    yield Candidate(NUMPY, 1, prepare(engine, 1), lambda: operation.numpy(data))
+    if loop is not None:
+        yield Candidate(LOOP, 1, prepare(engine, 1), lambda: loop(library, data))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

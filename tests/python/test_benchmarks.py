@@ -1,0 +1,132 @@
+"""The benchmark command: it runs, finds wrong results, compares, and fills the README."""
+
+import json
+import math
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+TESTS = Path(__file__).resolve().parents[1]
+
+
+def command(*arguments: str) -> subprocess.CompletedProcess[str]:
+    path = os.pathsep.join([str(TESTS), *filter(None, [os.environ.get("PYTHONPATH")])])
+    return subprocess.run(
+        [sys.executable, "-m", "benchmarks", *arguments],
+        capture_output=True,
+        text=True,
+        env={**os.environ, "PYTHONPATH": path},
+        timeout=300,
+    )
+
+
+@pytest.fixture(scope="module")
+def result(tmp_path_factory):
+    """One short run: (folder, what it printed, what it wrote)."""
+    folder = tmp_path_factory.mktemp("speed")
+    names = ("--operations", "invert,ismm,noise", "--orders", "2,3", "--lines", "64")
+    done = command("--quick", *names, "--budget", "0", "--output", str(folder))
+    assert done.returncode == 0, done.stdout + done.stderr
+    return folder, done.stdout, json.loads((folder / "speed.json").read_text())
+
+
+@pytest.fixture
+def benchmarks(monkeypatch):
+    """Import the package of the command; it sets variables of the environment."""
+    monkeypatch.syspath_prepend(str(TESTS))
+    for name in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        monkeypatch.setenv(name, "1")
+    import benchmarks.__main__
+
+    return benchmarks
+
+
+def test_every_candidate_is_timed(result):
+    _, printed, run = result
+    one = {r["candidate"] for r in run["records"] if r["operation"] == "invert" and r["threads"] == 1}
+    assert one >= {"jointfrf", "engine lapack", "numpy", "LAPACK loop"}
+    assert {(r["operation"], r["n"]) for r in run["records"]} == {
+        (name, n) for name in ("invert", "ismm", "noise") for n in (2, 3)
+    }
+    for r in run["records"]:
+        assert 0 < r["least"] <= r["median"] < math.inf
+        assert len(r["samples"]) == 3
+        assert 0 < r["limit"] < math.inf
+    for name in ("invert", "ismm", "noise"):
+        assert f"\n{name}: ns a line (FRFs" in printed
+
+
+def test_limits_are_those_of_a_machine(result):
+    one, *more = result[2]["limits"]
+    assert 1e8 < one["best_peak"] < 1e13
+    assert all(1e8 < rate < 1e13 for _, rate in one["bandwidth"])
+    for limit in more:
+        # Where other programs hold the second core, threads wait for each other.
+        assert limit["best_peak"] > 0
+        assert all(rate > 0 for _, rate in limit["bandwidth"])
+
+
+def test_figure_is_a_png(result):
+    assert (result[0] / "speed.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_what_became_slower_is_told(result, benchmarks, tmp_path):
+    folder, _, run = result
+    same = benchmarks.results.load(folder / "speed.json")
+    assert benchmarks.report.comparison(same, same)[1] is False
+    for r in run["records"]:
+        if r["operation"] == "invert" and r["candidate"] == "jointfrf" and r["n"] == 3:
+            r["median"] /= 100
+    old = tmp_path / "old.json"
+    old.write_text(json.dumps(run))
+    worse = command("--from", str(folder / "speed.json"), "--compare", str(old), "--output", str(tmp_path))
+    assert worse.returncode == 1
+    assert "invert, n = 3, FRFs" in worse.stdout
+    assert "ismm, n" not in worse.stdout
+    assert (tmp_path / "speed.png").exists()
+
+
+def test_readme_is_rewritten_between_the_markers_only(result, benchmarks, tmp_path):
+    readme = tmp_path / "README.md"
+    readme.write_text("before\n<!-- speed: begin -->\nold\n<!-- speed: end -->\nafter\n")
+    run = benchmarks.results.load(result[0] / "speed.json")
+    benchmarks.report.write_readme(run, readme)
+    text = readme.read_text()
+    assert text.startswith("before\n<!-- speed: begin -->\n")
+    assert text.endswith("\n<!-- speed: end -->\nafter\n")
+    assert "| `invert` | " in text
+    assert "old" not in text
+    readme.write_text("no markers")
+    with pytest.raises(ValueError, match="markers"):
+        benchmarks.report.write_readme(run, readme)
+
+
+def test_wrong_results_are_found(benchmarks):
+    operations = benchmarks.operations
+    for name, operation in operations.OPERATIONS.items():
+        n = max(2, operation.smallest)
+        for kind in operation.kinds:
+            data = operation.make(kind, 100, n)
+            reference = operations.Reference(operation, data)
+            # The reference and the operation go different ways to the same result.
+            good = operation.ours(data)
+            assert reference.fault(good) == "", name
+            bad = np.array(good)
+            bad[37] *= 1 + (10.0 if name == "noise" else 1e-3)
+            assert reference.fault(bad) != "", name
+
+
+def test_limit_is_that_of_the_cache_which_holds_the_data(benchmarks):
+    limits = benchmarks.machine.Limits(1, {"256": 1e9}, [(1024, 4e9), (4096, 1e9)])
+    assert limits.seconds(10, 0, 1024) == pytest.approx(1e-8)
+    assert limits.seconds(0, 4, 512) == pytest.approx(1e-9)
+    assert limits.seconds(0, 4, 2048) == pytest.approx(2e-9)
+    assert limits.seconds(0, 4, 1e9) == pytest.approx(4e-9)
+
+
+def test_command_can_be_started():
+    assert os.access(TESTS / "benchmarks" / "run", os.X_OK)
