@@ -22,11 +22,12 @@ module jointfrf_sweep
   real(dp), parameter :: serial_flops = 2.0e5_dp
   !> Lanes do about ten times as many in that time.
   real(dp), parameter :: serial_flops_lanes = 2.0e6_dp
-  !> Lines that a thread takes at a time; pivot rows are remembered within them only, so that results do not depend on
-  !> the number of threads.
-  integer, parameter :: chunk = 8*lanes
-  !> A sweep that reads no more than this stays in the caches.
-  integer(c_intptr_t), parameter :: near_bytes = 2**20
+  !> Most blocks that a thread takes at a time, and work enough to take fewer. Pivot rows are remembered within them only,
+  !> so that results do not depend on the number of threads.
+  integer, parameter :: most_blocks = 8
+  real(dp), parameter :: chunk_flops = 2.0e6_dp
+  !> A sweep that reads no more bytes than this stays in the caches, and looking ahead would only cost time.
+  integer(c_intptr_t), parameter :: near_bytes = 2**23
   !> Lines of a block that needs no workspace.
   integer, parameter, public :: long_block = 64*lanes
   !> Fewer lines than these are not worth a block.
@@ -163,7 +164,8 @@ contains
     call find_kernels(kernels, blocks, info)
     if (info /= info_good) return
     blocks = blocks .and. operation%n_element > 0 .and. n_freq >= fewest_lines
-    share = max(chunk, operation%block_lines)
+    share = operation%block_lines*max(1, min(most_blocks*lanes/operation%block_lines, &
+                                             ceiling(chunk_flops/max(operation%flops*operation%block_lines, 1.0_dp))))
     n_chunks = (n_freq - 1)/share + 1
     threads = threads_for(operation%flops*n_freq, merge(n_chunks, int(n_freq), blocks), &
                           merge(serial_flops_lanes, serial_flops, blocks))
