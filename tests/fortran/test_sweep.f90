@@ -163,7 +163,8 @@ contains
       call check(all(visits == 1) .and. all(as_written .eqv. (codes == 0)), 'blocks: each line once')
       call check(all(spoilt == 0), 'blocks: workspace')
       call check(all(block_of == expected_block()), 'blocks: first lines')
-      call check(all(before == expected_hint()), 'blocks: what the block before left, anew in every share of 64 lines')
+      call check(all(before == expected_hint(merge(64, 8, i == 1))), &
+                 'blocks: what the block before left, anew in every share: of 64 lines, or of a block of much work')
       if (i == 1) call check(all(thread == 0), 'blocks: little work stays on one thread')
       if (i == 2 .and. threaded) call check(any(thread == 0) .and. any(thread == 1), 'blocks: much work')
     end do
@@ -184,11 +185,12 @@ contains
     first = [(j - mod(j - 1, 8), j=1, n)]
   end function expected_block
 
-  function expected_hint() result(hint)
+  function expected_hint(share) result(hint)
+    integer, intent(in) :: share
     integer :: hint(n)
 
     hint = expected_block() - 8
-    where (mod(expected_block(), 64) == 1) hint = 0
+    where (mod(expected_block(), share) == 1) hint = 0
   end function expected_hint
 
   subroutine sweep_blocks(flops, lines)
