@@ -7,7 +7,7 @@ module jointfrf_monte_carlo
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use, intrinsic :: iso_c_binding, only: c_intptr_t, c_loc, c_ptr
   use, intrinsic :: iso_fortran_env, only: int64
-  !$ use omp_lib, only: omp_get_max_threads, omp_get_thread_num, omp_in_parallel
+  !$ use omp_lib, only: omp_get_thread_num
   use jointfrf_blas_threads, only: hold_blas_threads, release_blas_threads
   use jointfrf_engine, only: find_kernels
   use jointfrf_ismm, only: inverse_substructuring
@@ -19,7 +19,7 @@ module jointfrf_monte_carlo
   use jointfrf_noise, only: draw, entry_counters, find_scale, line_counter, noise_model, spectrum_peak, &
     upper
   use jointfrf_status, only: info_good, info_no_memory, line_good, line_not_finite, line_overflow
-  use jointfrf_sweep, only: line_space
+  use jointfrf_sweep, only: line_space, serial_flops_lanes, threads_for
   implicit none
   private
   public :: monte_carlo, is_method
@@ -128,9 +128,7 @@ contains
     blocks = blocks .and. plan%m <= largest_in_lanes
     slices = max(1, min((most_slices + n_freq - 1)/n_freq, count/fewest_realisations))
     share = ((count + slices - 1)/slices + lanes - 1)/lanes*lanes
-    threads = 1
-    !$ if (8.0_dp*real(plan%m, dp)**3*count*n_freq > 1.0e6_dp .and. .not. omp_in_parallel()) &
-    !$   threads = min(omp_get_max_threads(), slices*n_freq)
+    threads = threads_for(16.0_dp*real(plan%m, dp)**3*count*n_freq, slices*n_freq, serial_flops_lanes)
     allocate (part(slices*n_freq), space(threads), stat=stat)
     do t = 1, threads
       if (stat == 0) call prepare(plan, space(t), stat)

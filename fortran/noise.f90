@@ -4,11 +4,12 @@
 !> depends neither on threads nor on the instruction set nor on how the caller stores a line.
 module jointfrf_noise
   use, intrinsic :: iso_fortran_env, only: int64
-  !$ use omp_lib, only: omp_get_max_threads, omp_get_thread_num, omp_in_parallel
+  !$ use omp_lib, only: omp_get_thread_num
   use jointfrf_engine, only: find_kernels
   use jointfrf_kinds, only: dp, ip
   use jointfrf_lanes, only: lane_kernels, lanes, real_lines
   use jointfrf_status, only: info_good, info_no_memory
+  use jointfrf_sweep, only: serial_flops_lanes, threads_for
   implicit none
   private
   public :: noise_model, make_noise, is_kind, is_reference, upper, pollute
@@ -18,8 +19,8 @@ module jointfrf_noise
   character(len=*), parameter :: kinds = 'CPNUS'
   !> Letters of what the level refers to: the entry, the largest of the line, the largest of the spectrum.
   character(len=*), parameter :: references = 'ELS'
-  !> Fewer numbers than these cost less than waking the threads.
-  integer(int64), parameter :: serial_numbers = 20000_int64
+  !> Work of one number, as the sweeps count it.
+  real(dp), parameter :: number_flops = 100.0_dp
 
   type :: noise_model
     character :: kind = 'C', reference = 'E'
@@ -105,9 +106,7 @@ contains
     if (info /= info_good) return
     n_chunks = (n_freq + lanes - 1)/lanes
     n_items = int(n_chunks, int64)*count
-    threads = 1
-    !$ if (int(n, int64)*n_freq*count > serial_numbers .and. .not. omp_in_parallel()) &
-    !$   threads = int(min(int(omp_get_max_threads(), int64), n_items))
+    threads = threads_for(number_flops*n*n_freq*count, int(min(n_items, int(huge(1), int64))), serial_flops_lanes)
     allocate (counters(lanes, n), space(threads), stat=stat)
     do t = 1, threads
       if (stat == 0) allocate (space(t)%low(lanes, n), space(t)%e(lanes, 2, n), space(t)%scale(2, n*lanes), stat=stat)

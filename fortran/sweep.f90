@@ -16,12 +16,12 @@ module jointfrf_sweep
   use jointfrf_status, only: info_good, info_no_memory, line_good
   implicit none
   private
-  public :: line_operation, line_space, run_sweep
+  public :: line_operation, line_space, run_sweep, threads_for
 
   !> Below this many floating-point operations a sweep costs less than waking the threads (about 100 microseconds).
   real(dp), parameter :: serial_flops = 2.0e5_dp
   !> Lanes do about ten times as many in that time.
-  real(dp), parameter :: serial_flops_lanes = 2.0e6_dp
+  real(dp), parameter, public :: serial_flops_lanes = 2.0e6_dp
   !> Most blocks that a thread takes at a time, and work enough to take fewer. Pivot rows are remembered within them only,
   !> so that results do not depend on the number of threads.
   integer, parameter :: most_blocks = 8
