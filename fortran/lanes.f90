@@ -23,7 +23,7 @@ module jointfrf_lanes
 
   !> Above this order of a matrix to be inverted LAPACK is as fast.
   integer, parameter, public :: largest_in_lanes = 64
-  !> Above this order of a matrix that only enters products a block leaves the caches.
+  !> Above this size of what only enters products, or is solved for, a block leaves the caches.
   integer, parameter, public :: largest_product = 128
 
   !> What a block says of a line that it leaves to the reference engine; no line keeps it.

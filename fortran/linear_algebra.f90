@@ -1,7 +1,7 @@
 !> Inverse and solution of a sweep of matrices.
 module jointfrf_linear_algebra
   use jointfrf_kinds, only: dp, ip
-  use jointfrf_lanes, only: in_memory, lane_kernels, lanes, largest_in_lanes, padded, real_lines, rows_in_memory, &
+  use jointfrf_lanes, only: in_memory, lane_kernels, lanes, largest_in_lanes, largest_product, padded, real_lines, rows_in_memory, &
     system, system_size
   use jointfrf_line_layout, only: all_finite, load, store
   use jointfrf_lines_lapack, only: inverse_work, invert_line, solve_line
@@ -123,7 +123,9 @@ contains
     operation%n_real = 2*operation%n
     operation%n_pivot = operation%n
     operation%flops = 8.0_dp*real(operation%n, dp)**2*(operation%n/3.0_dp + operation%n_rhs)
-    if (min(operation%n, operation%n_rhs) >= 1 .and. operation%n <= largest_in_lanes) call plan_solution(operation)
+    ! More right-hand sides than these leave the caches, eight lines at a time.
+    if (min(operation%n, operation%n_rhs) >= 1 .and. operation%n <= largest_in_lanes &
+        .and. operation%n_rhs <= largest_product) call plan_solution(operation)
     call run_sweep(operation, size(a, 3, kind=ip), line_info, rcond, info)
   end subroutine solve
 

@@ -32,6 +32,7 @@ module jointfrf_sweep
   integer, parameter, public :: long_block = 64*lanes
   !> Fewer lines than these are not worth a block.
   integer, parameter :: fewest_lines = 3
+
   !> The workspace of one thread, handed out line by line.
   type :: line_space
     complex(dp), allocatable :: z(:)
