@@ -1,8 +1,8 @@
 !> Inverse and solution of a sweep of matrices.
 module jointfrf_linear_algebra
   use jointfrf_kinds, only: dp, ip
-  use jointfrf_lanes, only: in_memory, lane_kernels, lanes, largest_in_lanes, largest_product, padded, real_lines, rows_in_memory, &
-    system, system_size
+  use jointfrf_lanes, only: in_memory, lane_kernels, lanes, largest_in_lanes, largest_product, padded, real_lines, &
+    rows_in_memory, system, system_size
   use jointfrf_line_layout, only: all_finite, load, store
   use jointfrf_lines_lapack, only: inverse_work, invert_line, solve_line
   use jointfrf_status, only: line_not_finite
