@@ -2,6 +2,7 @@
 program test_ismm
   use testing, only: assembled, check, check_bad_line, check_close, check_same, dp, finish, infinity, inverse, ip, &
     not_a_number, random_lines, random_regular, seed, set_threads, thesis_chain, transposed, two_pi
+  use jointfrf_engine, only: engine_automatic, engine_lapack, set_engine
   use jointfrf_ismm, only: inverse_substructuring, ismm
   implicit none
   real(dp), parameter :: tolerance = 1.0e-10_dp
@@ -197,6 +198,15 @@ contains
     call check(abs(log(rcond(1)/1.0e-8_dp)) < log(3.0_dp), 'rcond of nearly singular alpha')      ! an estimate
     call inverse_substructuring(.false., bad, k, line_info, rcond, info)
     call check(abs(log(rcond(1)/1.0e-8_dp)) < log(3.0_dp), 'short form: rcond of nearly singular gamma')      ! an estimate
+
+    call set_engine(engine_lapack, info)                       ! the reference engine knows it exactly
+    call ismm(.false., alpha, bad, first, k, line_info, rcond, info)
+    call check_close(rcond(1), 1.0e-8_dp, 1.0e-10_dp, 'reference: rcond of nearly singular gamma')
+    call ismm(.false., bad, gamma, first, k, line_info, rcond, info)
+    call check_close(rcond(1), 1.0e-8_dp, 1.0e-10_dp, 'reference: rcond of nearly singular alpha')
+    call inverse_substructuring(.false., bad, k, line_info, rcond, info)
+    call check_close(rcond(1), 1.0e-8_dp, 1.0e-10_dp, 'reference: short form: rcond of nearly singular gamma')
+    call set_engine(engine_automatic, info)
 
     first(1, 1, 1) = cmplx(0.0_dp, not_a_number(), dp)
     call ismm(.false., alpha, gamma, first, k, line_info, rcond, info)
