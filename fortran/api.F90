@@ -24,6 +24,7 @@ module jointfrf
   use, intrinsic :: iso_c_binding, only: c_char, c_double, c_double_complex, c_int
   use jointfrf_arguments, only: as_lines, as_matrix, bad_offsets, is_transposed, lower, names, not_finite, &
     out_of_range, repeated, spread_text, unknown_equation, unknown_order
+  use jointfrf_brick, only: brick_matrices, brick_quality, is_formulation
   use jointfrf_compliance, only: compliance_covariance, compliance_factors, joint_compliance
   use jointfrf_coupling, only: couple
   use jointfrf_decoupling, only: decouple
@@ -50,6 +51,7 @@ module jointfrf
   public :: jf_joint_compliance, jf_compliance_factors, jf_compliance_covariance
   public :: jf_difference_weights, jf_central_difference, jf_transform
   public :: jf_pollute, jf_monte_carlo
+  public :: jf_brick_matrices, jf_brick_quality
 
   !> What jf_set_engine takes and jf_get_engine gives.
   integer(c_int), parameter, public :: jf_engine_automatic = engine_automatic
@@ -731,4 +733,62 @@ contains
     call monte_carlo(is_transposed(trans), method, make_noise(kind, reference, reciprocal == 1, block, level, seed), &
                      first, count, alpha, gamma, k_initial, good, mean, covariance, line_info, rcond, info)
   end subroutine jf_monte_carlo
+
+  !> Stiffness and mass of eight-node bricks. Nodes 1 to 4 go round one face, counter-clockwise as seen from the
+  !> opposite face; 5 to 8 lie there, 5 over 1. DOFs are x, y, z of node 1, then of node 2, ...
+  !> formulation      'R' one strain and stiffness against hourglass patterns; 'I' incompatible modes; 'F' 2 x 2 x 2
+  !>                  integration points, too stiff in bending
+  !> n_elements       number of elements; 0 is allowed and does nothing
+  !> coordinates      shape (3, 8, n_elements), m
+  !> youngs_modulus   shape (n_elements), positive, N/m^2
+  !> poisson          shape (n_elements), between -1 and 0.5
+  !> density          shape (n_elements), positive, kg/m^3
+  !> hourglass        stiffness of hourglass patterns as a share of the shear modulus, not negative; for 'R'
+  !> lumped           1: the rows of the mass are summed into its diagonal; 0: the consistent mass
+  !> stiffness        shape (24, 24, n_elements), symmetric, N/m
+  !> mass             shape (24, 24, n_elements), symmetric, kg
+  !> element_info     shape (n_elements): 0 good; -1 NaN or Inf in the coordinates; -2 the result overflows; > 0 the
+  !>                  element is turned inside out or flat, first seen at the integration point nearest to that node, 1
+  !>                  to 8. A bad element is filled with NaN.
+  !> info             0 good; -i argument i is wrong and nothing was done; > 0 number of bad elements
+  subroutine jf_brick_matrices(formulation, n_elements, coordinates, youngs_modulus, poisson, density, hourglass, &
+                               lumped, stiffness, mass, element_info, info) bind(C, name='jf_brick_matrices_')
+    character(kind=c_char), intent(in) :: formulation
+    integer(c_int), intent(in) :: n_elements, lumped
+    real(c_double), intent(in) :: coordinates(3, 8, n_elements)
+    real(c_double), intent(in) :: youngs_modulus(n_elements), poisson(n_elements), density(n_elements), hourglass
+    real(c_double), intent(out) :: stiffness(24, 24, n_elements), mass(24, 24, n_elements)
+    integer(c_int), intent(out) :: element_info(n_elements)
+    integer(c_int), intent(out) :: info
+
+    info = info_good
+    if (lumped /= 0 .and. lumped /= 1) info = -8
+    if (not_finite(hourglass) .or. hourglass < 0.0_c_double) info = -7
+    if (.not. all(density > 0.0_c_double .and. density <= huge(density))) info = -6
+    if (.not. all(poisson > -1.0_c_double .and. poisson < 0.5_c_double)) info = -5
+    if (.not. all(youngs_modulus > 0.0_c_double .and. youngs_modulus <= huge(youngs_modulus))) info = -4
+    if (n_elements < 0) info = -2
+    if (.not. is_formulation(formulation)) info = -1
+    if (info /= info_good) return
+    call brick_matrices(formulation, coordinates, youngs_modulus, poisson, density, hourglass, lumped == 1, stiffness, &
+                        mass, element_info, info)
+  end subroutine jf_brick_matrices
+
+  !> How far eight-node bricks are from rectangular ones. Node order as in jf_brick_matrices.
+  !> n_elements        number of elements; 0 is allowed and does nothing
+  !> coordinates       shape (3, 8, n_elements), m
+  !> scaled_jacobian   shape (n_elements): volume that the three edges of a corner span over the product of their
+  !>                   lengths, the smallest of the eight; 1 where all angles are right, not positive in a bad element
+  !> aspect_ratio      shape (n_elements): longest edge over shortest, Inf where an edge has no length
+  !> info              0 good; -1 argument 1 is wrong; > 0 number of elements with NaN or Inf, whose results are NaN
+  subroutine jf_brick_quality(n_elements, coordinates, scaled_jacobian, aspect_ratio, info) &
+    bind(C, name='jf_brick_quality_')
+    integer(c_int), intent(in) :: n_elements
+    real(c_double), intent(in) :: coordinates(3, 8, n_elements)
+    real(c_double), intent(out) :: scaled_jacobian(n_elements), aspect_ratio(n_elements)
+    integer(c_int), intent(out) :: info
+
+    info = -1
+    if (n_elements >= 0) call brick_quality(coordinates, scaled_jacobian, aspect_ratio, info)
+  end subroutine jf_brick_quality
 end module jointfrf

@@ -94,6 +94,11 @@ void jf_monte_carlo_(const char *trans, const char *method, const char *kind, co
     *reciprocal, const int *block, const double *level, const int *seed, const int *n, const int *n_freq, const int
     *first, const int *count, const jf_complex *alpha, const jf_complex *gamma, const jf_complex *k_initial, int *good,
     jf_complex *mean, double *covariance, int *line_info, double *rcond, int *info);
+void jf_brick_matrices_(const char *formulation, const int *n_elements, const double *coordinates, const double
+    *youngs_modulus, const double *poisson, const double *density, const double *hourglass, const int *lumped, double
+    *stiffness, double *mass, int *element_info, int *info);
+void jf_brick_quality_(const int *n_elements, const double *coordinates, double *scaled_jacobian, double
+    *aspect_ratio, int *info);
 
 /* the names without the trailing underscore */
 #define jf_version jf_version_
@@ -120,6 +125,8 @@ void jf_monte_carlo_(const char *trans, const char *method, const char *kind, co
 #define jf_transform jf_transform_
 #define jf_pollute jf_pollute_
 #define jf_monte_carlo jf_monte_carlo_
+#define jf_brick_matrices jf_brick_matrices_
+#define jf_brick_quality jf_brick_quality_
 
 #ifdef __cplusplus
 }

@@ -340,7 +340,7 @@ def run(
     """
     check_choice("on_singular", on_singular, get_args(OnSingular))
     n_freq = shape[0]
-    result = np.empty(shape, np.complex128) if out is None else _checked_out(out, shape, args, sweeps)
+    result = np.empty(shape, np.complex128) if out is None else checked_out(out, shape, args, sweeps)
     status = LineStatus(np.empty(n_freq, np.int32), np.empty(n_freq))
     if not result.size:
         status.line_info[:], status.rcond[:] = 0, 1
@@ -359,10 +359,10 @@ def run(
     return result, status
 
 
-def _checked_out(
+def checked_out(
     out: ComplexArray, shape: tuple[int, ...], args: Sequence[Any], sweeps: Mapping[str, NDArray[Any]]
 ) -> ComplexArray:
-    """Return `out` if results can be written into it."""
+    """Return `out` if results can be written into it; no array of `args` may share its memory."""
     if not isinstance(out, np.ndarray):
         raise TypeError(f"out must be a numpy array, not {type(out).__name__}")
     if out.shape != shape:
@@ -431,11 +431,13 @@ def check_lines(
     sweeps: Mapping[str, NDArray[Any]],
     freq_hz: FloatArray | None,
     on_singular: OnSingular,
+    rcond_limit: float = 0.0,
 ) -> None:
-    """Turn bad lines into exceptions."""
+    """Turn bad lines into exceptions and, below a limit, poor conditions into a warning."""
     check_choice("on_singular", on_singular, get_args(OnSingular))
-    if status.line_info.any():
-        _check_status(routine, status, int((status.line_info != 0).sum()), sweeps, freq_hz, on_singular, 0.0)
+    if status.line_info.size:
+        n_bad = int((status.line_info != 0).sum())
+        _check_status(routine, status, n_bad, sweeps, freq_hz, on_singular, rcond_limit)
 
 
 def weights(offset: FloatArray) -> FloatArray:

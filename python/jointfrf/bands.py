@@ -261,7 +261,7 @@ def sensitivity(
     o, i = as_dofs("output and input", [output, input], n, unique=False) - 1
     through = -(lines[:, o, j] - lines[:, o, k]) * (lines[:, j, i] - lines[:, k, i])  # (n_freq, n_j)
     relative = through.T / lines[:, o, i] / 100
-    k_parts = np.diagonal(joint.stiffness) * (1 + 1j * joint.loss_factor)
+    k_parts = np.diagonal(joint.stiffness) + 1j * np.diagonal(joint.hysteretic_stiffness)
     c_parts = 2j * np.pi * freq * np.diagonal(joint.damping)[:, None]
     names = [f"k_{d}" for d in joint.dofs] + [f"c_{d}" for d in joint.dofs]
     return Sensitivity(tuple(names), np.concatenate([relative * k_parts[:, None], relative * c_parts]))

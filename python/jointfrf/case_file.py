@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar, cast, get_args
 
 import numpy as np
+from scipy import sparse
 
 from jointfrf._sweep import FloatArray
 from jointfrf.bands import Band, in_bands
 from jointfrf.beam import BeamElement, End, beam
+from jointfrf.brick import Material
+from jointfrf.brick_beam import Face, Hole, Preset, brick_beam
 from jointfrf.discrete import Ground, chain
 from jointfrf.errors import FileContentError
 from jointfrf.identify import Method
@@ -20,7 +23,24 @@ from jointfrf.model import Model
 from jointfrf.noise import NoiseKind, NoiseReference
 from jointfrf.toml_table import Table, read_toml
 
-__all__ = ["METHODS", "BandSet", "Case", "Expected", "ExpectedTable", "Noise", "Substructure", "read_case", "unit_of"]
+__all__ = [
+    "METHODS",
+    "BandSet",
+    "Case",
+    "Expected",
+    "ExpectedErrors",
+    "ExpectedTable",
+    "Noise",
+    "Observed",
+    "Substructure",
+    "built",
+    "read_bands",
+    "read_case",
+    "read_frequency",
+    "read_joint",
+    "read_noise",
+    "unit_of",
+]
 
 METHODS: tuple[str, ...] = get_args(Method)
 _MOTIONS = ("translation", "rotation")
@@ -41,6 +61,28 @@ class Substructure:
 
     model: Model
     x: FloatArray | None
+
+
+@dataclass(frozen=True)
+class Observed:
+    """An FRF of the assembly that is looked at: response and force at one DOF of an internal point.
+
+    Attributes
+    ----------
+    key : str
+        "r" or "s", and the direction where a case names some: "s-Fx".
+    point : str
+        "r" or "s".
+    dof : int
+        DOF of the point, in the order of the joint's.
+    bands : tuple of (low, high)
+        Where errors of regenerated FRFs are counted, Hz; all lines if empty.
+    """
+
+    key: str
+    point: str
+    dof: int
+    bands: tuple[Band, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -66,7 +108,10 @@ class Noise:
 
 @dataclass(frozen=True)
 class ExpectedTable:
-    """Published numbers of one identification: parameter to value, and the largest errors allowed, percent."""
+    """Published numbers of one identification: parameter to value, and the largest errors allowed, percent.
+
+    A value fits inside the `central` percent of the realisations.
+    """
 
     source: str
     noise: str
@@ -74,6 +119,20 @@ class ExpectedTable:
     bands: str
     values: dict[str, float]
     rmse_below: dict[str, float]
+    central: float = 98.0
+
+
+@dataclass(frozen=True)
+class ExpectedErrors:
+    """Published errors (4.11), (4.12) of a regenerated FRF in a band, percent; None where the source has none."""
+
+    source: str
+    noise: str
+    method: str
+    observed: str
+    band: Band
+    amplitude: float | None
+    frequency: float | None
 
 
 @dataclass(frozen=True)
@@ -82,6 +141,7 @@ class Expected:
 
     frequencies: tuple[tuple[str, str, tuple[float, ...], float], ...] = ()
     tables: tuple[ExpectedTable, ...] = ()
+    errors: tuple[ExpectedErrors, ...] = ()
     figures: tuple[tuple[str, str], ...] = ()
 
     def figure(self, key: str) -> str:
@@ -102,12 +162,16 @@ class Case:
     freq_hz : ndarray, shape (n_freq,)
         Hz.
     a, b : Substructure
-    dofs_j, dofs_k, dofs_r, dofs_s : list of int
-        Joint DOFs and internal DOFs, in A (j, r) and B (k, s), counted from 0.
+    dofs_j, dofs_k : list of int
+        Joint DOFs in A and B, counted from 0.
+    ports_a, ports_b : list of int, or sparse array of weights
+        Joint DOFs, then internal ones, in A (j, r) and B (k, s), as `jointfrf.receptance` takes them.
     joint, initial : Joint
         The actual joint and its first estimate.
     rotational : tuple of bool
         Which joint DOFs are rotations.
+    observed : tuple of Observed
+        FRFs of the assembly that are looked at.
     band_sets : tuple of BandSet
         The first is that of the tables.
     noises : tuple of Noise
@@ -123,11 +187,12 @@ class Case:
     b: Substructure
     dofs_j: list[int]
     dofs_k: list[int]
-    dofs_r: list[int]
-    dofs_s: list[int]
+    ports_a: list[int] | sparse.csr_array
+    ports_b: list[int] | sparse.csr_array
     joint: Joint
     initial: Joint
     rotational: tuple[bool, ...]
+    observed: tuple[Observed, ...]
     band_sets: tuple[BandSet, ...]
     noises: tuple[Noise, ...]
     realisations: int
@@ -179,16 +244,16 @@ def read_case(folder: Path) -> Case:
     path = folder / "case.toml"
     table = read_toml(path)
     title, section = table.text("title"), table.text("section")
-    freq = _frequency(table.table("frequency"))
+    freq = read_frequency(table.table("frequency"))
     a, b = (_substructure(table.table(f"substructure_{side}")) for side in "ab")
-    joint, initial, rotational = _joint(table.tables("joint"))
+    joint, initial, rotational = read_joint(table.tables("joint"))
     points = table.table("points")
-    j, r = (_points(points, point, a.model, len(rotational)) for point in "jr")
-    k, s = (_points(points, point, b.model, len(rotational)) for point in "ks")
+    j, r, k, s = (_points(points, point, len(rotational)) for point in "jrks")
     points.close()
+    observed = _observed(table, joint.dofs, freq)
     parameters = [f"{letter}_{dof}" for letter in "kc" for dof in joint.dofs]
-    band_sets = tuple(_band_set(entry, parameters, freq) for entry in table.tables("bands"))
-    noises = tuple(_noise(entry, len(rotational)) for entry in table.tables("noise"))
+    band_sets = tuple(read_bands(entry, parameters, freq) for entry in table.tables("bands"))
+    noises = tuple(read_noise(entry, len(rotational)) for entry in table.tables("noise"))
     study = table.table("study")
     number, seed = study.whole("realisations", 1), study.whole("seed")
     study.close()
@@ -198,14 +263,16 @@ def read_case(folder: Path) -> Case:
             raise FileContentError(f"{path}: two tables [[{what}]] have the same name")
     expected = Expected()
     if (folder / "expected.toml").is_file():
-        expected = _expected(read_toml(folder / "expected.toml"), parameters, band_sets, noises)
+        expected = _expected(read_toml(folder / "expected.toml"), parameters, band_sets, noises, observed)
     return Case(
-        folder.resolve(), title, section, freq, a, b, j, k, r, s, joint, initial, rotational, band_sets, noises,
-        number, seed, expected,
+        folder.resolve(), title, section, freq, a, b, _dofs(points, a.model, j), _dofs(points, b.model, k),
+        _ports(points, a.model, j + r), _ports(points, b.model, k + s), joint, initial, rotational, observed,
+        band_sets, noises, number, seed, expected,
     )  # fmt: skip
 
 
-def _frequency(table: Table) -> FloatArray:
+def read_frequency(table: Table) -> FloatArray:
+    """Read the frequency lines, Hz."""
     first, last, step = table.number("first", 0), table.number("last", 0), table.number("step", 0)
     table.close()
     if step <= 0:
@@ -221,13 +288,15 @@ def _frequency(table: Table) -> FloatArray:
 
 
 def _substructure(table: Table) -> Substructure:
-    kind = table.text("model", ("beam", "chain"))
+    kind = table.text("model", ("beam", "brick-beam", "chain"))
+    if kind == "brick-beam":
+        return _brick_beam(table)
     loss_factor = table.number("loss_factor", 0)
     if kind == "chain":
         numbers = [table.numbers(key) for key in ("masses", "stiffness", "damping")]
         ground = table.text("ground", get_args(Ground))
         table.close()
-        return _built(
+        return built(
             table, lambda: Substructure(chain(*numbers, ground=cast(Ground, ground), loss_factor=loss_factor), None)
         )
     length, youngs_modulus, density, width, height = (
@@ -248,10 +317,41 @@ def _substructure(table: Table) -> Substructure:
         )  # fmt: skip
         return Substructure(model, np.linspace(0, length, elements + 1))
 
-    return _built(table, build)
+    return built(table, build)
 
 
-def _built(table: Table, build: Callable[[], _T]) -> _T:
+def _brick_beam(table: Table) -> Substructure:
+    numbers = ("youngs_modulus", "poisson", "density", "loss_factor")
+    properties = [table.number(key, -0.99 if key == "poisson" else 0) for key in numbers]
+    length, width, height = (table.number(key) for key in ("length", "width", "height"))
+    ends = table.texts("ends", get_args(End))
+    preset = cast(Preset, table.text("preset", get_args(Preset)))
+    origin = table.numbers("origin")
+    if len(origin) != 3:
+        raise table.error("origin", "x, y, z in m")
+    hole = None
+    if "hole" in table:
+        inner = table.table("hole")
+        position, radius, patch_radius = (inner.number(key, 0) for key in ("position", "radius", "patch_radius"))
+        hole = Hole(position, radius, patch_radius, cast(Face, inner.text("face", get_args(Face))))
+        inner.close()
+    observed = {}
+    if "observed" in table:
+        inner = table.table("observed")
+        observed = {name: inner.number(name, 0) for name in inner.keys()}  # noqa: SIM118
+    table.close()
+
+    def build() -> Substructure:
+        model = brick_beam(
+            length, width, height, Material(*properties), ends=cast(tuple[End, End], ends), hole=hole,
+            observed=observed, preset=preset, origin=cast(tuple[float, float, float], tuple(origin)),
+        )  # fmt: skip
+        return Substructure(model, None)
+
+    return built(table, build)
+
+
+def built(table: Table, build: Callable[[], _T]) -> _T:
     """Call a builder; its complaints name the table."""
     try:
         return build()
@@ -259,7 +359,8 @@ def _built(table: Table, build: Callable[[], _T]) -> _T:
         raise FileContentError(f"{table.where}: {error}") from error
 
 
-def _joint(tables: list[Table]) -> tuple[Joint, Joint, tuple[bool, ...]]:
+def read_joint(tables: list[Table]) -> tuple[Joint, Joint, tuple[bool, ...]]:
+    """Read the joint and its first estimate, and which DOFs are rotations."""
     dofs, rotational = [], []
     values: dict[str, list[float]] = {
         key: [] for key in ("stiffness", "damping", "initial_stiffness", "initial_damping")
@@ -270,35 +371,64 @@ def _joint(tables: list[Table]) -> tuple[Joint, Joint, tuple[bool, ...]]:
         for key, column in values.items():
             column.append(table.number(key, 0))
         table.close()
-    actual = _built(tables[-1], lambda: Joint(values["stiffness"], values["damping"], dofs))
+    actual = built(tables[-1], lambda: Joint(values["stiffness"], values["damping"], dofs))
     initial = Joint(values["initial_stiffness"], values["initial_damping"], dofs)
     return actual, initial, tuple(rotational)
 
 
-def _points(table: Table, point: str, model: Model, n: int) -> list[int]:
+def _points(table: Table, point: str, n: int) -> tuple[str, ...]:
     names = table.texts(point)
     if len(names) != n:
         raise table.error(point, f"a list of {n} DOFs, as many as the joint has")
-
-    def found() -> list[int]:
-        return [int(model.index(name)) for name in names]  # type: ignore[arg-type]
-
-    return _built(table, found)
+    return names
 
 
-def _band_set(table: Table, parameters: list[str], freq: FloatArray) -> BandSet:
+def _ports(table: Table, model: Model, names: tuple[str, ...]) -> list[int] | sparse.csr_array:
+    """Return what `jointfrf.receptance` takes for these names."""
+    return built(table, lambda: model.ports(*names))
+
+
+def _dofs(table: Table, model: Model, names: tuple[str, ...]) -> list[int]:
+    """Return DOFs, counted from 0: a joint cannot act on a mean."""
+    return built(table, lambda: [int(model.index(name)) for name in names])  # type: ignore[arg-type]
+
+
+def _observed(table: Table, dofs: tuple[str, ...], freq: FloatArray) -> tuple[Observed, ...]:
+    if "observed" not in table:
+        return (Observed("r", "r", 0), Observed("s", "s", 0))
+    found = []
+    for entry in table.tables("observed"):
+        point, dof = entry.text("point", ("r", "s")), entry.text("dof", dofs)
+        bands = tuple(entry.bands("bands")) if "bands" in entry else ()
+        entry.close()
+        _check_lines(entry, "bands", bands, freq)
+        found.append(Observed(f"{point}-{dof}", point, dofs.index(dof), bands))
+    if len({one.key for one in found}) < len(found):
+        raise FileContentError(f"{table.where}: two tables [[observed]] name the same FRF")
+    return tuple(found)
+
+
+def _check_lines(table: Table, key: str, bands: Sequence[Band], freq: FloatArray) -> None:
+    """Complain of bands without frequency lines."""
+    try:
+        if bands:
+            in_bands(freq, bands)
+    except ValueError as error:
+        raise FileContentError(f"{table.where}: {key}: {error}") from error
+
+
+def read_bands(table: Table, parameters: list[str], freq: FloatArray) -> BandSet:
+    """Read the bands of all parameters."""
     name = table.text("name")
     bands = {parameter: table.bands(parameter) for parameter in parameters}
     table.close()
     for parameter, own in bands.items():
-        try:
-            in_bands(freq, own)
-        except ValueError as error:
-            raise FileContentError(f"{table.where}: {parameter}: {error}") from error
+        _check_lines(table, parameter, own, freq)
     return BandSet(name, bands)
 
 
-def _noise(table: Table, n: int) -> Noise:
+def read_noise(table: Table, n: int) -> Noise:
+    """Read a noise level for n joint DOFs."""
     noise = Noise(
         table.text("name"),
         table.number("level", 0),
@@ -315,7 +445,11 @@ def _noise(table: Table, n: int) -> Noise:
 
 
 def _expected(
-    table: Table, parameters: list[str], band_sets: tuple[BandSet, ...], noises: tuple[Noise, ...]
+    table: Table,
+    parameters: list[str],
+    band_sets: tuple[BandSet, ...],
+    noises: tuple[Noise, ...],
+    observed: tuple[Observed, ...],
 ) -> Expected:
     frequencies = []
     for entry in table.tables("frequencies") if "frequencies" in table else []:
@@ -326,12 +460,9 @@ def _expected(
         entry.close()
     tables = []
     for entry in table.tables("identified") if "identified" in table else []:
-        source, noise = entry.text("source"), entry.text("noise", [x.name for x in noises])
-        method = entry.text("method", METHODS)
-        if method not in next(x for x in noises if x.name == noise).methods:
-            raise entry.error("method", f"one of the methods that case.toml applies to {noise!r}")
+        source, noise, method = _applied(entry, noises)
         bands = "" if method == "compliance" else entry.text("bands", [x.name for x in band_sets])
-        columns = []
+        columns: list[dict[str, float]] = []
         for key in ("values", "rmse_below"):
             column = {}
             if key in entry:
@@ -339,11 +470,36 @@ def _expected(
                 column = {parameter: inner.number(parameter) for parameter in parameters if parameter in inner}
                 inner.close()
             columns.append(column)
-        tables.append(ExpectedTable(source, noise, method, bands, *columns))
+        central = entry.number("central_percent", 0) if "central_percent" in entry else 98.0
+        tables.append(ExpectedTable(source, noise, method, bands, columns[0], columns[1], central))
         entry.close()
+    errors = []
+    for entry in table.tables("regenerated") if "regenerated" in table else []:
+        errors.append(_expected_errors(entry, noises, observed))
     figures: tuple[tuple[str, str], ...] = ()
     if "figures" in table:
         inner = table.table("figures")
         figures = tuple((key, inner.text(key)) for key in inner.keys())  # noqa: SIM118
     table.close()
-    return Expected(tuple(frequencies), tuple(tables), figures)
+    return Expected(tuple(frequencies), tuple(tables), tuple(errors), figures)
+
+
+def _applied(entry: Table, noises: tuple[Noise, ...]) -> tuple[str, str, str]:
+    """Return source, noise and method of an expected table."""
+    source, noise = entry.text("source"), entry.text("noise", [x.name for x in noises])
+    method = entry.text("method", METHODS)
+    if method not in next(x for x in noises if x.name == noise).methods:
+        raise entry.error("method", f"one of the methods that case.toml applies to {noise!r}")
+    return source, noise, method
+
+
+def _expected_errors(entry: Table, noises: tuple[Noise, ...], observed: tuple[Observed, ...]) -> ExpectedErrors:
+    source, noise, method = _applied(entry, noises)
+    key = entry.text("observed", [one.key for one in observed])
+    bands = entry.bands("band")
+    own = next(one.bands for one in observed if one.key == key)
+    if len(bands) != 1 or bands[0] not in own:
+        raise entry.error("band", f"one of the bands that case.toml names for {key}")
+    amplitude, frequency = (entry.number(what) if what in entry else None for what in ("amplitude", "frequency"))
+    entry.close()
+    return ExpectedErrors(source, noise, method, key, bands[0], amplitude, frequency)

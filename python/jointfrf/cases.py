@@ -7,17 +7,31 @@ from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from jointfrf.case_file import read_case
+from jointfrf.bolted.case_file import KIND, BoltedCase, read_bolted_case
+from jointfrf.bolted.figures import bolted_figures
+from jointfrf.bolted.study import BoltedResult, compute_bolted
+from jointfrf.bolted.tables import bolted_json, bolted_summary, bolted_tables
+from jointfrf.case_file import Case, read_case
 from jointfrf.figures import make_figures
 from jointfrf.files import write_file
+from jointfrf.plots import Figure, draw
 from jointfrf.plots import as_csv as figure_as_csv
-from jointfrf.plots import draw
 from jointfrf.report import make_report, summary
 from jointfrf.results import CaseResult, compute
 from jointfrf.tables import Table, as_csv, make_tables, to_json
+from jointfrf.toml_table import read_toml
 
-__all__ = ["CaseOutput", "UnknownCaseError", "cases_folder", "find_case", "list_cases", "run_case"]
+__all__ = [
+    "CaseOutput",
+    "UnknownCaseError",
+    "cases_folder",
+    "find_case",
+    "list_cases",
+    "read_any_case",
+    "run_case",
+]
 
 
 class UnknownCaseError(ValueError):
@@ -30,7 +44,7 @@ class CaseOutput:
 
     Attributes
     ----------
-    result : CaseResult
+    result : CaseResult or BoltedResult
     tables : list of Table
     summary : list of str
         A few sentences.
@@ -38,7 +52,7 @@ class CaseOutput:
         The HTML report; CSV, PNG and JSON files stand beside it.
     """
 
-    result: CaseResult
+    result: CaseResult | BoltedResult
     tables: list[Table]
     summary: list[str]
     report: Path
@@ -126,19 +140,49 @@ def run_case(
     """
     if realisations is not None and realisations < 1:
         raise ValueError(f"realisations must be at least 1, not {realisations}")
-    case = read_case(Path(folder))
+    case = read_any_case(Path(folder))
     target = Path(out) / case.name
     for inner in ("tables", "figures"):
         (target / inner).mkdir(parents=True, exist_ok=True)
-    result = compute(case, realisations, pool, progress)
-    tables, figures = make_tables(result), make_figures(result)
+    result, tables, figures, sentences, content = _computed(case, realisations, pool, progress)
     drawn = list((map if pool is None else pool.map)(draw, figures))
     for figure, png in zip(figures, drawn, strict=True):
         write_file(target / "figures" / f"{figure.key}.png", png)
         write_file(target / "figures" / f"{figure.key}.csv", figure_as_csv(figure))
     for table in tables:
         write_file(target / "tables" / f"{table.key}.csv", as_csv(table))
-    write_file(target / "results.json", json.dumps(to_json(result), indent=1) + "\n")
+    write_file(target / "results.json", json.dumps(content, indent=1) + "\n")
     report = target / "report.html"
-    write_file(report, make_report(result, tables, list(zip(figures, drawn, strict=True))))
-    return CaseOutput(result, tables, summary(result, tables), report)
+    drawings = list(zip(figures, drawn, strict=True))
+    write_file(report, make_report(case, result.n_realisations, sentences, tables, drawings))
+    return CaseOutput(result, tables, sentences, report)
+
+
+def read_any_case(folder: Path) -> Case | BoltedCase:
+    """Read a case of whatever kind its `case.toml` names: a joint of known parameters by default.
+
+    Raises
+    ------
+    FileContentError
+        One sentence that names the file and the key.
+    """
+    table = read_toml(folder / "case.toml")
+    if "kind" in table and table.text("kind", (KIND,)) == KIND:
+        return read_bolted_case(folder)
+    return read_case(folder)
+
+
+def _computed(
+    case: Case | BoltedCase,
+    realisations: int | None,
+    pool: Executor | None,
+    progress: Callable[[int, int], None],
+) -> tuple[CaseResult | BoltedResult, list[Table], list[Figure], list[str], dict[str, Any]]:
+    """Return the result of a case, its tables, figures, summary, and numbers for JSON."""
+    if isinstance(case, BoltedCase):
+        bolted = compute_bolted(case, realisations, pool, progress)
+        tables = bolted_tables(bolted)
+        return bolted, tables, bolted_figures(bolted), bolted_summary(bolted), bolted_json(bolted, tables)
+    result = compute(case, realisations, pool, progress)
+    tables = make_tables(result)
+    return result, tables, make_figures(result), summary(result, tables), to_json(result)

@@ -107,10 +107,9 @@ def _cores() -> int:
 
 
 def _cases(options: argparse.Namespace) -> int:
-    from jointfrf.case_file import read_case
-    from jointfrf.cases import list_cases
+    from jointfrf.cases import list_cases, read_any_case
 
-    found = [read_case(folder) for folder in list_cases()]
+    found = [read_any_case(folder) for folder in list_cases()]
     width = max((len(case.name) for case in found), default=0)
     for case in found:
         print(f"{case.name.ljust(width)}  {case.title}")

@@ -9,9 +9,12 @@ from scipy.interpolate import CubicHermiteSpline
 
 from jointfrf._sweep import FloatArray
 from jointfrf.bands import Band
+from jointfrf.case_file import Observed
 from jointfrf.noise import pollute
 from jointfrf.plots import Curve, Figure, Interval, Level, Panel, Ribbon, symbol
 from jointfrf.results import CaseResult
+from jointfrf.solid import SolidModel
+from jointfrf.solid_figures import solid_modes
 from jointfrf.study import Identified, regenerate
 from jointfrf.tables import identified_rows
 
@@ -31,8 +34,12 @@ _METHOD_NAMES = {
 _VARIED = ((0.5, "low"), (2.0, "high"))
 #: Points of a mode shape on each beam; elements bend cubically between their nodes.
 _SHAPE_POINTS = 100
+#: Panels that still fit below each other.
+_ONE_COLUMN = 4
 #: Noise levels side by side.
 _MOST_LEVELS = 3
+#: A parameter whose sensitivity stays below this share of the largest one does not move an FRF.
+_UNMOVED = 1e-4
 #: How much room curves get around the values that matter.
 _ROOM = 0.15
 #: How far an axis reaches from the actual value, in actual values.
@@ -60,12 +67,20 @@ def _figure(result: CaseResult, key: str, caption: str, panels: list[Panel], col
     return Figure(key, caption, result.case.expected.figure(key), tuple(panels), columns)
 
 
-def _frf_unit(result: CaseResult) -> str:
-    return "rad/(N m)" if result.case.rotational[0] else "m/N"
+def _modulus(result: CaseResult, point: str, dof: int = 0) -> str:
+    unit = "rad/(N m)" if result.case.rotational[dof] else "m/N"
+    return f"$|H_{{{point}}}|$, {unit}"
 
 
-def _modulus(result: CaseResult, point: str) -> str:
-    return f"$|H_{{{point}}}|$, {_frf_unit(result)}"
+def _label(result: CaseResult, observed: Observed) -> str:
+    """Label of an axis."""
+    return _modulus(result, observed.point * 2, observed.dof)
+
+
+def _place(result: CaseResult, observed: Observed) -> str:
+    """Where an observed FRF is taken, in words."""
+    named = "" if observed.key == observed.point else f", {result.case.joint.dofs[observed.dof]}"
+    return f"point {observed.point}{named}"
 
 
 def _unit(result: CaseResult, parameter: str) -> str:
@@ -74,6 +89,10 @@ def _unit(result: CaseResult, parameter: str) -> str:
 
 def _modes(result: CaseResult) -> Iterator[Figure]:
     case, modes = result.case, result.modes["actual"]
+    if isinstance(case.a.model, SolidModel) and isinstance(case.b.model, SolidModel):
+        panels = solid_modes(modes, case.a.model, case.b.model)
+        yield _figure(result, "modes", "Mode shapes of the assembly; shade: displacement", panels, 2)
+        return
     if case.a.x is None or case.b.x is None:
         return
     positions = {"A": case.a.x, "B": case.a.x[-1] + case.b.x}
@@ -97,15 +116,16 @@ def _modes(result: CaseResult) -> Iterator[Figure]:
 
 def _receptances(result: CaseResult) -> Iterator[Figure]:
     exact = result.exact
-    for point in "rs":
-        at = exact.where(point).start
+    for one in result.case.observed:
+        at = exact.where(one.point).start + one.dof
         curves = (
             Curve("first estimate", exact.freq_hz, np.abs(exact.h_initial[:, at, at]), "initial"),
             Curve("actual joint", exact.freq_hz, np.abs(exact.h_c[:, at, at]), "actual"),
         )
-        panel = Panel("", _FREQUENCY, _modulus(result, point * 2), curves, log_y=True)
-        caption = f"Receptance of the assembly at point {point} with the first estimate and with the actual joint"
-        yield _figure(result, f"receptance-{point}", caption, [panel])
+        panel = Panel("", _FREQUENCY, _label(result, one), curves, log_y=True)
+        place = _place(result, one)
+        caption = f"Receptance of the assembly at {place}, with the first estimate and with the actual joint"
+        yield _figure(result, f"receptance-{one.key}", caption, [panel])
 
 
 def _polluted(result: CaseResult) -> Iterator[Figure]:
@@ -134,25 +154,28 @@ def _polluted(result: CaseResult) -> Iterator[Figure]:
 
 def _sensitivities(result: CaseResult) -> Iterator[Figure]:
     case, exact = result.case, result.exact
-    for point in "rs":
-        found = result.sensitivities[point]
-        at = exact.where(point).start
+    for one in case.observed:
+        found = result.sensitivities[one.key]
+        at = exact.where(one.point).start + one.dof
+        reach = abs(found.change).max(axis=1)
         for d, dof in enumerate(case.joint.dofs):
+            if reach[d] < _UNMOVED * reach.max():
+                continue
             name = symbol(f"k_{dof}")
             curves = [Curve(f"actual {name}", exact.freq_hz, np.abs(exact.h_c[:, at, at]), "actual")]
             for factor, style in _VARIED:
                 varied = case.actual.copy()
                 varied[d] *= factor
-                h = np.abs(regenerate(exact, varied[None], point)[0])
+                h = np.abs(regenerate(exact, varied[None], one.point, one.dof)[0])
                 curves.append(Curve(f"{factor:g} {name}", exact.freq_hz, h, style))
             shades = _shades(result, f"k_{dof}")
-            proposed = tuple(result.proposals[point, f"k_{dof}"])
+            proposed = tuple(result.proposals[one.key, f"k_{dof}"])
             panels = [
-                Panel("", _FREQUENCY, _modulus(result, point * 2), tuple(curves), shades=shades, log_y=True),
-                _sensitivity_panel(result, point, dof, found.in_db, shades, proposed),
+                Panel("", _FREQUENCY, _label(result, one), tuple(curves), shades=shades, log_y=True),
+                _sensitivity_panel(result, one.point, dof, found.in_db, shades, proposed),
             ]
-            caption = f"Sensitivity of the receptance at point {point} to k_{dof} and c_{dof}"
-            yield _figure(result, f"sensitivity-{point}-{dof}", caption, panels)
+            caption = f"Sensitivity of the receptance at {_place(result, one)}, to k_{dof} and c_{dof}"
+            yield _figure(result, f"sensitivity-{one.key}-{dof}", caption, panels)
 
 
 def _sensitivity_panel(
@@ -260,7 +283,7 @@ def _noise(result: CaseResult) -> Iterator[Figure]:
         label = f"{symbol(parameter)}, {result.case.units[p]}"
         panels.append(Panel("", label, "", levels=(Level("actual", actual, "actual"),), intervals=intervals))
     caption = "Identified parameters at all noise levels: median and percentiles over realisations"
-    yield _figure(result, "noise", caption, panels, 1)
+    yield _figure(result, "noise", caption, panels, 1 if len(panels) <= _ONE_COLUMN else 2)
 
 
 def _methods(result: CaseResult) -> Iterator[Figure]:
@@ -295,20 +318,23 @@ def _methods(result: CaseResult) -> Iterator[Figure]:
 def _regenerated(result: CaseResult) -> Iterator[Figure]:
     exact, first_noise = result.exact, result.case.noises[0].name
     names = (result.case.band_sets[0].name, "all lines")
-    for point in "rs":
-        at = exact.where(point).start
+    for one in result.case.observed:
+        at = exact.where(one.point).start + one.dof
         actual = Curve("actual", exact.freq_hz, np.abs(exact.h_c[:, at, at]), "actual")
         panels = []
         for r in result.regenerated:
             found = r.identified
-            if r.point != point or found.noise != first_noise or found.bands not in names:
+            if r.observed != one or found.noise != first_noise or found.bands not in names:
                 continue
             low, _, high = r.percentiles
             curve = Curve("regenerated, one realisation", exact.freq_hz, np.abs(r.first), "high")
             ribbon = Ribbon("2.5-97.5 %", exact.freq_hz, low, high, "ismm")
             title = f"{_METHOD_NAMES[found.method]} ({found.bands})"
             panels.append(
-                Panel(title, _FREQUENCY, _modulus(result, point * 2), (actual, curve), (ribbon,), log_y=True)
+                Panel(
+                    title, _FREQUENCY, _label(result, one), (actual, curve), (ribbon,),
+                    shades=(("errors counted in", one.bands),) if one.bands else (), log_y=True,
+                )
             )  # fmt: skip
-        caption = f"Receptance of the assembly at point {point} regenerated from the identified parameters"
-        yield _figure(result, f"regenerated-{point}", caption, panels, 1 if len(panels) < 3 else 2)
+        caption = f"Receptance of the assembly at {_place(result, one)}, regenerated from the identified parameters"
+        yield _figure(result, f"regenerated-{one.key}", caption, panels, 1 if len(panels) < 3 else 2)

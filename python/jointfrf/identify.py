@@ -24,6 +24,7 @@ from jointfrf.estimator import (
     neighbour_mean,
     reciprocity_noise,
 )
+from jointfrf.fit_notes import MISFIT, doubts, group_notes, left_out_notes, lost_warnings
 from jointfrf.ismm import inverse_substructuring, ismm
 from jointfrf.joint_fit import JointFit
 
@@ -40,10 +41,6 @@ Method = Literal[
 ]
 Bands = None | Band | Sequence[Band] | Mapping[str, Band | Sequence[Band]]
 
-#: The residual may exceed the noise by this factor before the model of the joint is doubted.
-_MISFIT = 1.3
-#: A parameter is called uncertain when its standard error exceeds this share of it.
-_UNCERTAIN = 0.5
 #: FRFs that differ less than this from their transpose were made reciprocal: they do not show their noise.
 _RECIPROCAL = 1e-9
 
@@ -265,11 +262,12 @@ def _by_compliance(
     else:
         result = fit(damping)
     basis_names = joint_basis(2 * np.pi * freq[:1], names, damping, cross).names
+    result, seen = result.of_seen(), np.flatnonzero(result.seen)
     residual = float(result.residual_level[0])
     if not level > 0:
         level = residual
         notes.append("the noise level is taken from the residual: the FRFs do not show it by their reciprocity")
-    parameters = dict(zip(basis_names, result.theta[0].tolist(), strict=True))
+    parameters = dict(zip([basis_names[i] for i in seen], result.theta[0].tolist(), strict=True))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", IllConditionedWarning)
         k_lines = inverse_substructuring(t @ measured @ t.T, on_singular="nan")
@@ -284,26 +282,28 @@ def _by_compliance(
         k_lines=k_lines,
         bands=tuple(tuple(b) for b in own),
     )
-    if result.left_out and result.lost.sum() <= result.lost.size / 2:
-        notes.append(f"{result.lost.sum()} of {result.lost.size} lines are left out: their noise hides the joint")
+    notes += left_out_notes(result, names)
     unseen = [
         name for name, (low, high) in found.confidence_interval(0.95).items() if name[0] in "hc" and low < 0 < high
     ]
     if unseen:
         notes.append(f"{', '.join(unseen)}: not told from zero, the 95 % interval holds it")
-    told = _lost_lines(result) + _doubts(found, result, cross)
+    notes += group_notes(result, names, cross)
+    told = lost_warnings(result, names) + doubts(found, result, cross)
     for text in told:
         warnings.warn(text, IdentificationWarning, stacklevel=3)
     if not result.converged[0]:
-        warnings.warn(f"the fit did not converge in {result.iterations} iterations", ConvergenceWarning, stacklevel=3)
-        told.append(f"the fit did not converge in {result.iterations} iterations")
+        warnings.warn(
+            f"the fit did not converge in {result.iterations[0]} iterations", ConvergenceWarning, stacklevel=3
+        )
+        told.append(f"the fit did not converge in {result.iterations[0]} iterations")
     return replace(found, warnings=tuple(told), notes=tuple(notes))
 
 
 def _covariance(result: ComplianceEstimate, level: float, residual: float) -> FloatArray:
     """Covariance from the noise; where the residual exceeds it, not below what blocks of lines say of each other."""
     covariance: FloatArray = result.covariance[0] * max(level, residual) ** 2
-    if residual > _MISFIT * level:
+    if residual > MISFIT * level:
         by_blocks = jackknife_covariance(result)[0]
         grown = np.sqrt(np.maximum(np.diagonal(by_blocks) / np.diagonal(covariance), 1))
         covariance = covariance * np.outer(grown, grown)
@@ -338,7 +338,7 @@ def _choose_damping(
     power = float(results["both"].residual_level[0]) ** 2
     scores = {}
     for kind, result in results.items():
-        equations, p = 2 * result.equations, result.theta.shape[1]
+        equations, p = 2 * float(result.equations[0]), int(np.count_nonzero(result.seen))
         misfit = float(result.residual_level[0]) ** 2 * (equations - p) / max(power, np.finfo(float).tiny)
         scores[kind] = misfit + p * np.log(equations)
     ranked = sorted(scores, key=lambda kind: scores[kind])
@@ -358,40 +358,7 @@ def _both_seen(result: ComplianceEstimate, level: float) -> bool:
     A joint feeds no energy: two terms of opposite sign that nearly cancel are noise.
     """
     residual = float(result.residual_level[0])
+    result = result.of_seen()
     error = np.sqrt(np.diagonal(_covariance(result, level or residual, residual)))
     seen = (result.theta[0] > 2 * error).reshape(3, -1)  # k, h, c by DOF
     return bool((seen[1] & seen[2]).any())
-
-
-def _lost_lines(result: ComplianceEstimate) -> list[str]:
-    """Tell of many lines on which the noise hides the joint."""
-    total, lost = result.lost.size, int(result.lost.sum())
-    if lost <= total / 2:
-        return []
-    what = f"only the other {total - lost} are used" if result.left_out else "expect bias beyond the intervals"
-    return [
-        f"on {lost} of {total} lines the noise is as large as the difference between the motions of the joint DOFs "
-        f"(gamma_jk is nearly singular): {what}; other bands or points may see the joint better"
-    ]
-
-
-def _doubts(found: JointFit, result: ComplianceEstimate, cross: Cross) -> list[str]:
-    """Return what a reader must know before using the numbers."""
-    told = []
-    intervals = found.confidence_interval(0.95)
-    for name, value in found.parameters.items():
-        low, high = intervals[name]
-        if name.startswith("k_") and "," not in name and (not np.isfinite(high) or not np.isfinite(low)):
-            bound = f"at least {low:.3g} {found.unit(name)}" if np.isfinite(low) else "nothing"
-            told.append(f"{name}: the data cannot tell this DOF from a rigid one; they say {bound} (95 %)")
-        elif name.startswith("k_") and "," not in name and found.std_error[name] > _UNCERTAIN * abs(value):
-            told.append(f"{name}: the data barely see it, 95 % interval {low:.3g} .. {high:.3g} {found.unit(name)}")
-    ratio = found.residual_level / found.noise_level if found.noise_level > 0 else 1.0
-    if ratio > _MISFIT:
-        told.append(
-            f"the residual is {ratio:.1f} times the noise: the joint is not what is fitted (cross terms, other DOFs, "
-            "rotations by coarse differences); standard errors come from the scatter between parts of the band"
-        )
-        if cross == "zero" and result.off_diagonal[0] > _MISFIT * found.noise_level:
-            told.append("the DOFs of the joint are coupled: consider to ignore or to fit the cross terms (cross)")
-    return told

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from jointfrf._sweep import ComplexArray, FloatArray, as_frequency, as_real
+from jointfrf.rigid_offset import rigid_offset
 
 __all__ = ["Joint"]
 
@@ -22,7 +23,7 @@ def _as_matrix(name: str, value: ArrayLike, n: int | None) -> FloatArray:
 
 @dataclass(frozen=True)
 class Joint:
-    """Massless joint, K*(w) = K (1 + i eta) + i w C (2.11).
+    """Massless joint, K*(w) = K (1 + i eta) + i H + i w C (2.11).
 
     Parameters
     ----------
@@ -31,14 +32,16 @@ class Joint:
     damping : array_like, shape (n,) or (n, n), optional
         Viscous damping, N s/m, rotational N m s/rad.
     dofs : sequence of str, optional
-        Names of the DOFs.
+        Names of the DOFs, in any order.
     loss_factor : float or array_like, shape (n,)
-        Hysteretic loss factor eta of each DOF.
+        Hysteretic loss factor eta of each DOF; eta_ab = sqrt(eta_a eta_b) for a full matrix.
+    structural_damping : array_like, shape (n,) or (n, n), optional
+        Hysteretic damping H where loss factors cannot say it; N/m, rotational N m/rad.
 
     Raises
     ------
     ValueError
-        Shapes that do not agree, NaN or Inf.
+        Shapes that do not agree, NaN or Inf, a negative loss factor.
 
     Examples
     --------
@@ -46,12 +49,15 @@ class Joint:
     >>> joint = jf.Joint([6e5, 5e3], [20, 1.5], dofs=["y", "theta"])
     >>> joint.dynamic_stiffness([0.0])[0].real.tolist()
     [[600000.0, 0.0], [0.0, 5000.0]]
+    >>> joint.reordered(["theta", "y"]).damping.tolist()
+    [[1.5, 0.0], [0.0, 20.0]]
     """
 
     stiffness: FloatArray
     damping: FloatArray = field(default_factory=lambda: np.zeros(0))
     dofs: tuple[str, ...] = ()
     loss_factor: FloatArray = field(default_factory=lambda: np.zeros(1))
+    structural_damping: FloatArray = field(default_factory=lambda: np.zeros(0))
 
     def __init__(
         self,
@@ -59,6 +65,7 @@ class Joint:
         damping: ArrayLike | None = None,
         dofs: Sequence[str] | None = None,
         loss_factor: ArrayLike = 0.0,
+        structural_damping: ArrayLike | None = None,
     ) -> None:
         k = _as_matrix("stiffness", stiffness, None)
         n = len(k)
@@ -66,10 +73,23 @@ class Joint:
         if len(names) != n or len(set(names)) != n:
             raise ValueError(f"dofs must name {n} different DOFs, not {names}")
         eta = as_real("loss_factor", np.broadcast_to(np.asarray(loss_factor, dtype=np.float64), (n,)), (n,))
+        if (eta < 0).any():
+            raise ValueError(f"loss_factor must not be negative, not {eta.min():g}")
+        c, h = (
+            np.zeros((n, n)) if value is None else _as_matrix(name, value, n)
+            for name, value in (("damping", damping), ("structural_damping", structural_damping))
+        )
         object.__setattr__(self, "stiffness", k)
-        object.__setattr__(self, "damping", np.zeros((n, n)) if damping is None else _as_matrix("damping", damping, n))
+        object.__setattr__(self, "damping", c)
         object.__setattr__(self, "dofs", names)
         object.__setattr__(self, "loss_factor", eta)
+        object.__setattr__(self, "structural_damping", h)
+
+    @property
+    def hysteretic_stiffness(self) -> FloatArray:
+        """All hysteretic damping, sqrt(eta_a eta_b) K_ab + H_ab, shape (n, n), N/m or N m/rad."""
+        whole: FloatArray = self.stiffness * np.sqrt(np.outer(self.loss_factor, self.loss_factor))
+        return whole + self.structural_damping
 
     def dynamic_stiffness(self, freq_hz: ArrayLike) -> ComplexArray:
         """Complex joint stiffness K*(w).
@@ -86,5 +106,58 @@ class Joint:
         """
         freq = as_frequency(freq_hz)
         omega = 2 * np.pi * freq[:, None, None]
-        static = self.stiffness * (1 + 1j * np.sqrt(np.outer(self.loss_factor, self.loss_factor)))
-        return static + 1j * omega * self.damping
+        k_joint: ComplexArray = self.stiffness + 1j * self.hysteretic_stiffness + 1j * omega * self.damping
+        return k_joint
+
+    def reordered(self, dofs: Sequence[str]) -> Joint:
+        """Return the same joint with its DOFs in another order.
+
+        Parameters
+        ----------
+        dofs : sequence of str
+            All of its DOFs.
+
+        Raises
+        ------
+        ValueError
+            Other names than those of its DOFs.
+        """
+        if len(dofs) != len(self.dofs) or set(dofs) != set(self.dofs):
+            raise ValueError(f"dofs must name {', '.join(self.dofs)} in some order, not {', '.join(map(str, dofs))}")
+        order = [self.dofs.index(dof) for dof in dofs]
+        k, c, h = (matrix[np.ix_(order, order)] for matrix in (self.stiffness, self.damping, self.structural_damping))
+        return Joint(k, c, tuple(dofs), self.loss_factor[order], h)
+
+    def moved(self, offset: ArrayLike) -> Joint:
+        """Return the same joint between other reference points, rigidly connected to the present ones.
+
+        Parameters
+        ----------
+        offset : array_like, shape (3,)
+            From the present to the new reference points along x, y, z, m, the same on both sides.
+
+        Returns
+        -------
+        Joint
+            T^-T K T^-1, and the same of all damping, with T of `rigid_offset`: in general full matrices.
+
+        Raises
+        ------
+        ValueError
+            DOFs whose direction is not told by their name, a wrong shape, NaN or Inf.
+
+        Notes
+        -----
+        A joint resists the difference of the motions of its two reference points. Moved by different offsets, these
+        would differ when both sides turn together, and the force would not depend on their difference alone.
+
+        Examples
+        --------
+        >>> import jointfrf as jf
+        >>> joint = jf.Joint([1e6, 1e3], dofs=["z", "theta_x"])
+        >>> joint.moved([0, 0.1, 0]).stiffness.round(6).tolist()
+        [[1000000.0, -100000.0], [-100000.0, 11000.0]]
+        """
+        back = rigid_offset(self.dofs, -as_real("offset", offset, (3,)))
+        k, c, h = (back.T @ matrix @ back for matrix in (self.stiffness, self.damping, self.hysteretic_stiffness))
+        return Joint(k, c, self.dofs, structural_damping=h)

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import stats
 
-from jointfrf._sweep import ComplexArray, FloatArray, as_frequency
+from jointfrf._sweep import ComplexArray, FloatArray
+from jointfrf.joint import Joint
 
 __all__ = ["JointFit"]
 
@@ -66,6 +67,30 @@ class JointFit:
     bands: tuple[tuple[tuple[float, float], ...], ...]
     warnings: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+
+    def _matrix(self, letter: str) -> FloatArray:
+        matrix = np.zeros((len(self.dofs), len(self.dofs)))
+        for name, value in self.parameters.items():
+            if name[0] == letter:
+                pair = name[2:].split(",")
+                a, b = self.dofs.index(pair[0]), self.dofs.index(pair[-1])
+                matrix[a, b] = matrix[b, a] = value
+        return matrix
+
+    @property
+    def stiffness_matrix(self) -> FloatArray:
+        """Stiffness with its cross terms, shape (n, n), N/m, N, N m/rad."""
+        return self._matrix("k")
+
+    @property
+    def damping_matrix(self) -> FloatArray:
+        """Viscous damping with its cross terms, shape (n, n), N s/m, N s, N m s/rad."""
+        return self._matrix("c")
+
+    @property
+    def joint(self) -> Joint:
+        """The joint found, to be coupled, moved or reordered; DOFs in the order of `dofs`."""
+        return Joint(self.stiffness_matrix, self.damping_matrix, self.dofs, structural_damping=self._matrix("h"))
 
     def _of_each_dof(self, letter: str) -> FloatArray:
         return np.array([self.parameters.get(f"{letter}_{dof}", 0.0) for dof in self.dofs])
@@ -136,16 +161,7 @@ class JointFit:
         ndarray, shape (n_freq, n, n)
             N/m, rotational N m/rad.
         """
-        freq = as_frequency(freq_hz)
-        factors = {"k": np.ones(freq.size), "h": np.full(freq.size, 1j), "c": 2j * np.pi * freq}
-        result = np.zeros((freq.size, len(self.dofs), len(self.dofs)), np.complex128)
-        for name, value in self.parameters.items():
-            pair = name[2:].split(",")
-            a, b = self.dofs.index(pair[0]), self.dofs.index(pair[-1])
-            result[:, a, b] += value * factors[name[0]]
-            if a != b:
-                result[:, b, a] += value * factors[name[0]]
-        return result
+        return self.joint.dynamic_stiffness(freq_hz)
 
     def unit(self, parameter: str) -> str:
         """Return the unit of a parameter, told from the name of its DOF (theta..., rx, ry, rz are rotations)."""

@@ -12,6 +12,7 @@ from scipy.sparse import linalg as sparse_linalg
 
 from jointfrf._sweep import ComplexArray, FloatArray
 from jointfrf.joint import Joint
+from jointfrf.model_matrices import Matrix
 from jointfrf.receptance import Method, receptance
 
 __all__ = ["Model", "assemble"]
@@ -68,11 +69,22 @@ class Model:
         found = [self.dofs.index(name) for name in names]
         return found[0] if len(found) == 1 else found
 
+    def ports(self, *names: str) -> list[int] | sparse.csr_array:
+        """Return what `jointfrf.receptance` takes as outputs or inputs for these names: here DOFs, counted from 0.
+
+        Raises
+        ------
+        ValueError
+            The model has no such DOF.
+        """
+        found = self.index(*names)
+        return [found] if isinstance(found, int) else found
+
     def receptance(
         self,
         freq_hz: ArrayLike,
-        outputs: Sequence[int] | None = None,
-        inputs: Sequence[int] | None = None,
+        outputs: ArrayLike | Matrix | None = None,
+        inputs: ArrayLike | Matrix | None = None,
         method: Method = "auto",
     ) -> ComplexArray:
         """Receptance of the model, see `jointfrf.receptance`; `inputs` are the `outputs` by default."""
@@ -177,7 +189,6 @@ def assemble(a: Model, b: Model, joint: Joint, dofs_a: Sequence[int], dofs_b: Se
     def across(matrix: FloatArray) -> sparse.csr_array:
         return sparse.csr_array(relative.T @ sparse.csr_array(matrix) @ relative)
 
-    joint_loss = joint.stiffness * np.sqrt(np.outer(joint.loss_factor, joint.loss_factor))
     losses = [
         (0 if m.structural_damping is None else m.structural_damping) + m.loss_factor * m.stiffness for m in (a, b)
     ]
@@ -185,6 +196,6 @@ def assemble(a: Model, b: Model, joint: Joint, dofs_a: Sequence[int], dofs_b: Se
         stiffness=_block_diagonal(a.stiffness, b.stiffness, n_a, n_b) + across(joint.stiffness),
         mass=_block_diagonal(a.mass, b.mass, n_a, n_b),
         damping=_block_diagonal(a.damping, b.damping, n_a, n_b) + across(joint.damping),
-        structural_damping=_block_diagonal(losses[0], losses[1], n_a, n_b) + across(joint_loss),
+        structural_damping=_block_diagonal(losses[0], losses[1], n_a, n_b) + across(joint.hysteretic_stiffness),
         dofs=tuple(f"A/{d}" for d in a.dofs) + tuple(f"B/{d}" for d in b.dofs),
     )

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from scipy import sparse
+from scipy.sparse import csc_matrix
 
 from jointfrf._sweep import FloatArray, as_real
 
@@ -88,6 +89,12 @@ class ModelMatrices:
         found.sum_duplicates()
         found.data = as_real(name, found.data, (None,))
         return found
+
+    def dynamic_stiffness(self, omega: float) -> csc_matrix:
+        """Return Z = (1 + i eta) K + i H + i w C - w^2 M by its entries, N/m."""
+        k, m, c, h = (self.sparse(name) for name in self.named)
+        z = (1 + 1j * self.loss_factor) * k + 1j * h + 1j * omega * c - omega**2 * m
+        return csc_matrix(z)
 
     @cached_property
     def widths(self) -> tuple[int, int]:

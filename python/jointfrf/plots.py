@@ -12,7 +12,7 @@ import numpy as np
 from jointfrf._sweep import FloatArray
 from jointfrf.bands import Band
 
-__all__ = ["Curve", "Figure", "Interval", "Level", "Panel", "Ribbon", "as_csv", "draw", "symbol"]
+__all__ = ["Curve", "Figure", "Interval", "Level", "Panel", "Ribbon", "Surface", "as_csv", "draw", "symbol"]
 
 #: (colour, line style, width): told apart by lightness and dashes when printed grey.
 STYLES: dict[str, tuple[str, str, float]] = {
@@ -33,7 +33,9 @@ STYLES: dict[str, tuple[str, str, float]] = {
 _SHADES = ("#ececec", "#d2d2d2", "#bdbdbd")
 _RESOLUTION = 130
 #: Size of a figure, inches: fits the text width of A4.
-_WIDTH, _PANEL_HEIGHT = 7.0, 2.75
+_WIDTH, _PANEL_HEIGHT, _SPACE_HEIGHT = 7.0, 2.75, 1.5
+#: Directions on the page of a drawing in space, to the right and up, and towards the reader: z lies along, y up.
+_VIEW = np.array([[-0.419, 0.0, 0.908], [0.410, 0.893, 0.189], [-0.810, 0.451, -0.374]])
 _FONTS = {"font.size": 8.5, "axes.titlesize": 9, "legend.fontsize": 7.5, "axes.grid": True, "grid.alpha": 0.3,
           "grid.linewidth": 0.5, "axes.axisbelow": True, "lines.solid_capstyle": "round"}  # fmt: skip
 
@@ -81,6 +83,19 @@ class Interval:
 
 
 @dataclass(frozen=True)
+class Surface:
+    """Quadrilaterals shaded by a value: in space, shape (n, 4, 3), seen from one side; or in a plane, (n, 4, 2).
+
+    `edges` are other quadrilaterals of which only the outline is drawn.
+    """
+
+    faces: FloatArray
+    values: FloatArray
+    label: str = ""
+    edges: FloatArray | None = None
+
+
+@dataclass(frozen=True)
 class Panel:
     """Axes of a figure.
 
@@ -99,6 +114,7 @@ class Panel:
     log_y: bool = False
     x_limits: tuple[float, float] | None = None
     y_limits: tuple[float, float] | None = None
+    surface: Surface | None = None
 
 
 @dataclass(frozen=True)
@@ -138,20 +154,29 @@ def draw(figure: Figure) -> bytes:
     height = max(_PANEL_HEIGHT, *(0.9 + 0.34 * len(panel.intervals) for panel in figure.panels))
     if len(figure.panels) == 1:
         height *= 1.25
+    if all(_in_space(panel) for panel in figure.panels):
+        height = _SPACE_HEIGHT
     # The settings hold inside this block only.
     with matplotlib.rc_context(_FONTS):  # type: ignore[arg-type]
         canvas = Canvas(figsize=(_WIDTH, rows * height + 0.4), layout="constrained")
         FigureCanvasAgg(canvas)
-        axes = list(canvas.subplots(rows, figure.columns, squeeze=False).flat)
-        for ax, panel in zip(axes, figure.panels, strict=False):
-            (_draw_intervals if panel.intervals else _draw_curves)(ax, panel)
-        for ax in axes[len(figure.panels) :]:
-            ax.set_axis_off()
+        axes = []
+        for i, panel in enumerate(figure.panels):
+            ax = canvas.add_subplot(rows, figure.columns, i + 1)
+            axes.append(ax)
+            if panel.surface is not None:
+                _draw_surface(ax, panel.surface, panel.title, (panel.x_label, panel.y_label))
+            else:
+                (_draw_intervals if panel.intervals else _draw_curves)(ax, panel)
         _add_legend(canvas, axes)
         png = io.BytesIO()
         # No version inside: the same data give the same file.
         canvas.savefig(png, format="png", dpi=_RESOLUTION, metadata={"Software": None})
     return png.getvalue()
+
+
+def _in_space(panel: Panel) -> bool:
+    return panel.surface is not None and panel.surface.faces.shape[2] == 3
 
 
 def _add_legend(canvas: Any, axes: list[Any]) -> None:
@@ -196,6 +221,32 @@ def _draw_curves(ax: Any, panel: Panel) -> None:
     ax.set(title=panel.title or None, xlabel=panel.x_label, ylabel=panel.y_label)
 
 
+def _draw_surface(ax: Any, surface: Surface, title: str, labels: tuple[str, str]) -> None:
+    """Draw shaded quadrilaterals in space or in a plane, light where the value is small."""
+    from matplotlib.collections import PolyCollection
+
+    faces, values, edges = surface.faces, surface.values, surface.edges
+    if faces.shape[2] == 3:
+        order = np.argsort((faces @ _VIEW[2]).mean(axis=1))  # what is near is drawn last
+        faces, values = (faces @ _VIEW[:2].T)[order], values[order]
+        edges = None if edges is None else edges @ _VIEW[:2].T
+    if edges is not None:
+        ax.add_collection(PolyCollection(list(edges), facecolors="none", edgecolors="#c8c8c8", linewidths=0.3))
+    patches = PolyCollection(list(faces), cmap="YlGnBu", edgecolors="#404040", linewidths=0.12)
+    patches.set_array(values)
+    patches.set_clim(0.0, max(float(values.max(initial=0)), np.finfo(float).tiny))
+    ax.add_collection(patches)
+    ax.autoscale_view()
+    ax.set_aspect("equal")
+    ax.set_title(title)
+    if surface.faces.shape[2] == 3:
+        ax.set_axis_off()
+    else:
+        ax.set(xlabel=labels[0], ylabel=labels[1])
+    if surface.label:
+        ax.figure.colorbar(patches, ax=ax, label=surface.label, shrink=0.8, pad=0.02)
+
+
 def _draw_intervals(ax: Any, panel: Panel) -> None:
     places = np.arange(len(panel.intervals))[::-1]
     middle = np.array([i.median for i in panel.intervals])
@@ -236,6 +287,10 @@ def as_csv(figure: Figure) -> str:
             writer.writerow((name, f"{label}: 2.5 to 97.5 %", "", interval.low, interval.high))
             if interval.published is not None:
                 writer.writerow((name, f"{label}: thesis", "", interval.published, ""))
+        if panel.surface is not None:
+            middles = panel.surface.faces.mean(axis=1)
+            for middle, value in zip(middles.tolist(), panel.surface.values.tolist(), strict=True):
+                writer.writerow((name, panel.surface.label, " ".join(f"{x:.9g}" for x in middle), value, ""))
         for label, bands in (*panel.shades, *panel.strips):
             writer.writerows((name, label, f"{low:g}-{high:g}", "", "") for low, high in bands)
     return text.getvalue()

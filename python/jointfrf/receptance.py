@@ -4,29 +4,31 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass
-from typing import Literal, get_args, overload
+from typing import Literal, cast, get_args, overload
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from jointfrf._sweep import (
     ComplexArray,
     FloatArray,
     OnSingular,
-    as_dofs,
     as_frequency,
     as_number,
     check_choice,
 )
-from jointfrf.direct_solution import solve_banded, solve_dense
+from jointfrf.direct_solution import solve_banded, solve_dense, solve_sparse
 from jointfrf.errors import ConvergenceWarning
 from jointfrf.model_matrices import Matrix, ModelMatrices
+from jointfrf.ports import Ports, as_ports, directions
 from jointfrf.reduction import reduce_model, spot_error
+from jointfrf.rotations import transform
 from jointfrf.superposition import Modes, all_modes
 
 __all__ = ["Method", "ReceptanceInfo", "receptance"]
 
-Method = Literal["auto", "dense", "banded", "modal", "krylov"]
+Direct = Literal["dense", "banded", "sparse"]
+Method = Literal["auto", "dense", "banded", "sparse", "modal", "krylov"]
 
 #: A matrix with a wider band than this share of its size is solved as a dense one.
 _BAND_LIMIT = 0.25
@@ -36,6 +38,8 @@ _NARROW, _SMALL = 64, 64
 _ALL_MODES = 600
 #: A reduction pays for itself from this number of lines on, and up to this number of DOFs that are asked for.
 _MANY_LINES, _FEW_DOFS = 32, 64
+#: Larger models with fewer entries than this share of a full matrix are factored by their entries.
+_SPARSE = 0.1
 #: Lines at which a sum of all modes is compared with a direct solution.
 _SPOTS = 3
 
@@ -46,7 +50,7 @@ class ReceptanceInfo:
 
     Parameters
     ----------
-    method : {"dense", "banded", "modal", "krylov"}
+    method : {"dense", "banded", "sparse", "modal", "krylov"}
         What was done in the end.
     reason : str
         Why, in a sentence.
@@ -54,12 +58,12 @@ class ReceptanceInfo:
         Of "modal" and "krylov": largest difference to a direct solution at a few lines, relative to the largest entry
         of the line. None for a direct solution.
     tolerance : float or None
-        What the estimate had to meet.
+        What the estimate had to meet, unless rounding keeps a direct solution from it, too.
     n_vectors : int or None
         Modes, or vectors of the reduced model.
     """
 
-    method: Literal["dense", "banded", "modal", "krylov"]
+    method: Literal["dense", "banded", "sparse", "modal", "krylov"]
     reason: str
     error_estimate: float | None = None
     tolerance: float | None = None
@@ -72,11 +76,16 @@ class _Task:
 
     freq_hz: FloatArray
     matrices: ModelMatrices
-    outputs: NDArray[np.int32]
-    inputs: NDArray[np.int32]
+    outputs: Ports
+    inputs: Ports
     on_singular: OnSingular
     tolerance: float
     out: ComplexArray | None
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether there are no lines, or no DOF has a weight."""
+        return not (self.freq_hz.size and (self.outputs.weights.nnz or self.inputs.weights.nnz))
 
 
 @overload
@@ -87,8 +96,8 @@ def receptance(
     damping: Matrix | None = ...,
     loss_factor: float = ...,
     structural_damping: Matrix | None = ...,
-    outputs: ArrayLike | None = ...,
-    inputs: ArrayLike | None = ...,
+    outputs: ArrayLike | Matrix | None = ...,
+    inputs: ArrayLike | Matrix | None = ...,
     method: Method = ...,
     *,
     on_singular: OnSingular = ...,
@@ -106,8 +115,8 @@ def receptance(
     damping: Matrix | None = ...,
     loss_factor: float = ...,
     structural_damping: Matrix | None = ...,
-    outputs: ArrayLike | None = ...,
-    inputs: ArrayLike | None = ...,
+    outputs: ArrayLike | Matrix | None = ...,
+    inputs: ArrayLike | Matrix | None = ...,
     method: Method = ...,
     *,
     on_singular: OnSingular = ...,
@@ -124,8 +133,8 @@ def receptance(
     damping: Matrix | None = None,
     loss_factor: float = 0.0,
     structural_damping: Matrix | None = None,
-    outputs: ArrayLike | None = None,
-    inputs: ArrayLike | None = None,
+    outputs: ArrayLike | Matrix | None = None,
+    inputs: ArrayLike | Matrix | None = None,
     method: Method = "auto",
     *,
     on_singular: OnSingular = "raise",
@@ -147,10 +156,12 @@ def receptance(
         eta of the whole stiffness.
     structural_damping : array_like or sparse array, shape (n, n), optional
         Structural damping H, N/m.
-    outputs, inputs : array_like of int, optional
-        DOFs of responses and of forces, counted from 0; all by default.
-    method : {"auto", "dense", "banded", "modal", "krylov"}
-        "dense": full matrices solved on every line. "banded": the same in band storage. Both take any damping.
+    outputs, inputs : array_like of int, or of shape (m, n), optional
+        DOFs of responses and of forces, counted from 0; all by default. Or weights of all DOFs for each response or
+        force, an array or sparse array: a mean, a difference, a point between nodes.
+    method : {"auto", "dense", "banded", "sparse", "modal", "krylov"}
+        "dense": full matrices solved on every line. "banded": the same in band storage. "sparse": a sparse
+        factorisation of every line (SuperLU). All three take any damping.
         "modal": all modes once, then their sum; for symmetric K and M and damping that the undamped modes diagonalise.
         "krylov": the model is reduced to solutions at a few frequencies; for symmetric K and M, damping a M + b K and
         one loss factor. Where `tolerance` is not met, the model is solved and a warning says so. "auto" chooses, see
@@ -161,7 +172,8 @@ def receptance(
         Where the result goes, as in `invert`.
     tolerance : float
         What the error estimate of "krylov", and of "modal" where "auto" chose it, must meet: the largest error of a
-        line relative to its largest entry.
+        line relative to its largest entry. Where rounding limits a direct solution, too, 30 times its rounding
+        will do.
     full_output : bool
         Whether a `ReceptanceInfo` is returned too: what was done, why, and the error estimate.
 
@@ -187,13 +199,15 @@ def receptance(
     Notes
     -----
     Eqs. (2.28), (2.29), with i w C for viscous damping. Cost a line: n^3 (dense), n b^2 (band of b diagonals),
-    n_vectors n_out n_in (modal, krylov).
+    n_vectors n_out n_in (modal, krylov); about n^1.5 for a sparse solution of a solid.
 
     "auto" solves in band storage where the band is narrow, and full matrices where the model is small. Many lines of a
     larger symmetric model with damping a M + b K and one loss factor are a sum of modes, all of them or those of a
     reduced model. That sum is compared with direct solutions at a few lines: at both ends, and of a reduced model where
-    its residual is largest. Where the tolerance is not met, the model is solved. The error between these lines is
-    estimated, not bounded. Any other damping is solved.
+    its residual is largest. Motions as a rigid body are treated apart before, by their mass alone: near 0 Hz rounding
+    hides them from any solution of a structure that is not held. Where the tolerance is not met, the model is solved.
+    The error between these lines is estimated, not bounded. Any other damping is solved, and so is a model of many DOFs
+    and few entries, by a sparse factorisation.
 
     Examples
     --------
@@ -209,64 +223,82 @@ def receptance(
     freq = as_frequency(freq_hz)
     matrices = ModelMatrices(stiffness, mass, damping, structural_damping, as_number("loss_factor", loss_factor))
     n = matrices.n
-    to = as_dofs("outputs", np.arange(n) if outputs is None else outputs, n, unique=False)
-    into = as_dofs("inputs", np.arange(n) if inputs is None else inputs, n, unique=False)
+    to, into = as_ports("outputs", outputs, n), as_ports("inputs", inputs, n)
     wanted = as_number("tolerance", tolerance)
     if not wanted > 0:
         raise ValueError(f"tolerance must be positive, not {wanted}")
     task = _Task(freq, matrices, to, into, on_singular, wanted, out)
-    if method in ("dense", "banded"):
-        result, info = _solved(task, method == "banded", "as asked for")
+    if method in ("dense", "banded", "sparse"):
+        result, info = _solved(task, cast(Direct, method), "as asked for")
     elif method == "modal":
         modes = all_modes(matrices, to, into)
         result = modes.receptance(freq, on_singular, out)
         info = ReceptanceInfo("modal", "as asked for", n_vectors=modes.stiffness.size)
     elif method == "krylov":
         result, info = _reduced(task, "as asked for")
-        if info.method != "krylov" and freq.size:
+        if info.method != "krylov" and not task.is_empty:
             warnings.warn(f"receptance: {info.reason}", ConvergenceWarning, stacklevel=2)
     else:
         result, info = _automatic(task)
     return (result, info) if full_output else result
 
 
+def _direct(matrices: ModelMatrices) -> Direct:
+    """How a model is solved best on every line."""
+    n, widths = matrices.n, matrices.widths
+    if n > 8 and max(widths) < _NARROW and sum(widths) < _BAND_LIMIT * n:
+        return "banded"
+    if n > _ALL_MODES and sum(matrices.sparse(name).nnz for name in ("stiffness", "mass")) < _SPARSE * n**2:
+        return "sparse"
+    return "banded" if n > 8 and sum(widths) < _BAND_LIMIT * n else "dense"
+
+
 def _automatic(task: _Task) -> tuple[ComplexArray, ReceptanceInfo]:
     """Choose by size, band, damping and number of lines."""
     matrices, n = task.matrices, task.matrices.n
     kl, ku = matrices.widths
-    banded = n > 8 and kl + ku < _BAND_LIMIT * n
-    n_dofs = np.unique(np.concatenate([task.outputs, task.inputs])).size
-    if banded and max(kl, ku) < _NARROW:
-        return _solved(task, True, f"narrow band: {kl} diagonals below and {ku} above the main one")
+    direct = _direct(matrices)
+    n_ports = directions(task.outputs, task.inputs).shape[1]
+    if direct == "banded" and max(kl, ku) < _NARROW:
+        return _solved(task, direct, f"narrow band: {kl} diagonals below and {ku} above the main one")
     if n <= _SMALL:
-        return _solved(task, False, f"small model: {n} DOFs")
+        return _solved(task, "dense", f"small model: {n} DOFs")
     if task.freq_hz.size < _MANY_LINES:
-        return _solved(task, banded, f"few lines: {task.freq_hz.size}")
+        return _solved(task, direct, f"few lines: {task.freq_hz.size}")
     if matrices.proportional is None:
-        return _solved(task, banded, "damping couples the modes")
+        return _solved(task, direct, "damping couples the modes")
     if not (matrices.is_symmetric("stiffness") and matrices.is_symmetric("mass")):
-        return _solved(task, banded, "stiffness or mass is not symmetric")
+        return _solved(task, direct, "stiffness or mass is not symmetric")
     if n <= _ALL_MODES:
         return _summed(task, f"{task.freq_hz.size} lines of {n} DOFs whose modes the damping does not couple")
-    if n_dofs > _FEW_DOFS:
-        return _solved(task, banded, f"many DOFs are asked for: {n_dofs}")
+    if n_ports > _FEW_DOFS:
+        return _solved(task, direct, f"many DOFs are asked for: {n_ports}")
     return _reduced(task, f"{task.freq_hz.size} lines of {n} DOFs whose modes the damping does not couple")
 
 
-def _solved(task: _Task, banded: bool, reason: str) -> tuple[ComplexArray, ReceptanceInfo]:
+def _solved(task: _Task, how: Direct, reason: str) -> tuple[ComplexArray, ReceptanceInfo]:
     """Direct solution."""
-    solve = solve_banded if banded else solve_dense
-    result = solve(task.freq_hz, task.matrices, task.outputs, task.inputs, task.on_singular, task.out)
-    return result, ReceptanceInfo("banded" if banded else "dense", reason)
+    freq, matrices, on_singular = task.freq_hz, task.matrices, task.on_singular
+    to, into = task.outputs, task.inputs
+    if how == "sparse":
+        result = solve_sparse(freq, matrices, to, into, on_singular, task.out)
+        return result, ReceptanceInfo(how, reason)
+    solve = solve_banded if how == "banded" else solve_dense
+    if to.picked is not None and into.picked is not None:
+        result = solve(freq, matrices, to.picked, into.picked, on_singular, task.out)
+    else:
+        h = solve(freq, matrices, to.needed, into.needed, on_singular)
+        t_out, t_in = (ports.weights[:, ports.needed - 1].toarray() for ports in (to, into))
+        result = transform(h, t_out, t_in, freq_hz=freq, on_singular=on_singular, out=task.out)
+    return result, ReceptanceInfo(how, reason)
 
 
 def _fallen_back(task: _Task, error: float, n_vectors: int, what: str) -> tuple[ComplexArray, ReceptanceInfo]:
     """Direct solution after a sum of modes that was not good enough."""
-    banded = task.matrices.n > 8 and sum(task.matrices.widths) < _BAND_LIMIT * task.matrices.n
     reason = (
         f"{what} of {n_vectors} vectors has the error estimate {error:.1e}, above the tolerance {task.tolerance:.1e}"
     )
-    return _solved(task, banded, reason)
+    return _solved(task, _direct(task.matrices), reason)
 
 
 def _summed(task: _Task, reason: str) -> tuple[ComplexArray, ReceptanceInfo]:
@@ -274,27 +306,27 @@ def _summed(task: _Task, reason: str) -> tuple[ComplexArray, ReceptanceInfo]:
     try:
         modes = all_modes(task.matrices, task.outputs, task.inputs)
     except ValueError as refusal:
-        return _solved(task, False, str(refusal).split(":")[0])
+        return _solved(task, _direct(task.matrices), str(refusal).split(":")[0])
     order = np.argsort(task.freq_hz)
     lines = order[np.linspace(0, order.size - 1, _SPOTS).astype(int)]
-    error = float(spot_error(task.freq_hz[lines], task.matrices, modes, task.outputs, task.inputs).max())
-    return _finished(task, modes, error, "modal", reason)
+    error, attainable = spot_error(task.freq_hz[lines], task.matrices, modes, task.outputs, task.inputs)
+    return _finished(task, modes, error, attainable, "modal", reason)
 
 
 def _reduced(task: _Task, reason: str) -> tuple[ComplexArray, ReceptanceInfo]:
     """Reduced model, where it meets the tolerance."""
-    if task.freq_hz.size == 0:
-        return _solved(task, True, "no lines")
+    if task.is_empty:
+        return _solved(task, _direct(task.matrices), "no lines, or no DOFs with a weight")
     found = reduce_model(task.freq_hz, task.matrices, task.outputs, task.inputs, task.tolerance)
-    return _finished(task, found.modes, found.error_estimate, "krylov", reason)
+    return _finished(task, found.modes, found.error_estimate, found.attainable, "krylov", reason)
 
 
 def _finished(
-    task: _Task, modes: Modes, error: float, method: Literal["modal", "krylov"], reason: str
+    task: _Task, modes: Modes, error: float, attainable: float, method: Literal["modal", "krylov"], reason: str
 ) -> tuple[ComplexArray, ReceptanceInfo]:
     """Sum of modes, or a direct solution where its error is too large."""
     n_vectors = modes.stiffness.size
-    if not error <= task.tolerance:
+    if not error <= max(task.tolerance, attainable):
         return _fallen_back(task, error, n_vectors, "a sum of modes" if method == "modal" else "a reduced model")
     result = modes.receptance(task.freq_hz, task.on_singular, task.out)
     return result, ReceptanceInfo(method, reason, error, task.tolerance, n_vectors)

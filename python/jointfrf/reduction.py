@@ -9,14 +9,17 @@ from numpy.typing import NDArray
 from scipy import linalg, sparse
 from scipy.sparse import linalg as sparse_linalg
 
-from jointfrf._sweep import ComplexArray, FloatArray
+from jointfrf._sweep import FloatArray
+from jointfrf.direct_solution import SYMMETRIC
 from jointfrf.model_matrices import ModelMatrices
+from jointfrf.ports import Ports, directions
+from jointfrf.rigid_body import RigidMotions, find_rigid_motions, held
 from jointfrf.superposition import Modes
 
 __all__ = ["Reduction", "reduce_model", "spot_error"]
 
-#: Shifts to begin with, and solutions at each.
-_FIRST_SHIFTS, _MOMENTS = 3, 3
+#: Shifts to begin with; solutions at each for every force, and in all: few forces need more of them.
+_FIRST_SHIFTS, _MOMENTS, _VECTORS = 1, 4, 40
 #: Shifts are added up to this number, and vectors up to this share of the DOFs.
 _MOST_SHIFTS, _MOST_VECTORS = 40, 0.5
 #: Below this error a refinement that gains less than a factor of three has reached the round-off of the model.
@@ -25,6 +28,10 @@ _NEAR = 1e-4
 _NEW_DIRECTION = 1e-12
 #: Lines whose residual is looked at, and those of them that are solved directly.
 _CANDIDATES, _SPOTS = 40, 4
+#: In a model of this many DOFs a direct solution costs more than all the rest: it is compared at the worst line only.
+_LARGE, _FEW_SPOTS = 10_000, 1
+#: Rounding may move the modes of a reduced model by this many times what it moves a direct solution by.
+_LOSS = 30
 
 
 @dataclass(frozen=True)
@@ -39,19 +46,18 @@ class Reduction:
         Largest difference to a direct solution, relative to the largest entry of its line.
     n_vectors : int
         Size of the reduced model.
+    attainable : float
+        What rounding leaves of a direct solution, times what a sum of modes may lose more.
     """
 
     modes: Modes
     error_estimate: float
     n_vectors: int
+    attainable: float
 
 
 def reduce_model(
-    freq_hz: FloatArray,
-    matrices: ModelMatrices,
-    outputs: NDArray[np.int32],
-    inputs: NDArray[np.int32],
-    tolerance: float,
+    freq_hz: FloatArray, matrices: ModelMatrices, outputs: Ports, inputs: Ports, tolerance: float
 ) -> Reduction:
     """Project a model on solutions at a few frequencies, more of them until the tolerance is met or no longer nearer.
 
@@ -61,8 +67,7 @@ def reduce_model(
         Frequencies that will be asked for, Hz.
     matrices : ModelMatrices
         Symmetric K and M, damping a M + b K and one loss factor.
-    outputs, inputs : ndarray of int
-        DOFs, counted from 1.
+    outputs, inputs : Ports
     tolerance : float
         Wanted relative error of a line.
 
@@ -81,35 +86,36 @@ def reduce_model(
     The space is spanned by (K - s M)^-1 B, (K - s M)^-1 M (K - s M)^-1 B, ... at real shifts s = w^2, with unit forces
     B at inputs and outputs. With damping a M + b K and a loss factor the undamped space serves all dampings; because it
     serves outputs too, errors of the projection enter the receptance squared. The residual says at which lines the
-    reduced model is worst; there, and at both ends, it is compared with a direct solution. The error between these
-    lines is not bounded.
+    reduced model is worst; there and at both ends, of a large model at the worst line only, it is compared with a
+    direct solution. The error between these lines is not bounded.
+
+    A structure that is not held moves as a rigid body, too. Rounding gives these motions a stiffness; near 0 Hz it
+    would spoil any solution, reduced or direct. They are found and taken out, and enter as what they are, r r^T / -w^2.
     """
     for name in ("stiffness", "mass"):
         if not matrices.is_symmetric(name):
-            raise ValueError(f"{name} is not symmetric: method 'krylov' cannot be used, 'dense' or 'banded' can")
+            raise ValueError(f"{name} is not symmetric: method 'krylov' cannot be used, 'sparse' or 'dense' can")
     if matrices.proportional is None:
-        raise ValueError("damping couples the modes: method 'krylov' cannot be used, 'dense' or 'banded' can")
-    k, m = matrices.sparse("stiffness"), matrices.sparse("mass")
-    dofs = np.unique(np.concatenate([outputs, inputs])) - 1
-    forces = np.zeros((matrices.n, dofs.size))
-    forces[dofs, np.arange(dofs.size)] = 1
+        raise ValueError("damping couples the modes: method 'krylov' cannot be used, 'sparse' or 'dense' can")
+    task = _Reducer(freq_hz, matrices, outputs, inputs)
     low, high = float(freq_hz.min()), float(freq_hz.max())
     place = (1 - np.cos(np.pi * (np.arange(_FIRST_SHIFTS) + 0.5) / _FIRST_SHIFTS)) / 2
     shifts = [(2 * np.pi * f) ** 2 for f in low + place * (high - low)]
-    basis = np.zeros((matrices.n, 0))
     best: Reduction | None = None
     vain = 0
     new = shifts
     while True:
         for shift in new:
-            basis = _extended(basis, k, m, forces, shift)
-        found, worst = _project(freq_hz, matrices, k, m, basis, outputs, inputs)
+            task.extend(shift)
+        if best is None:
+            task.take_out_rigid_motions()
+        found, worst = task.project()
         gained = best is None or found.error_estimate < best.error_estimate / 3
         if best is None or found.error_estimate < best.error_estimate:
             best = found
         vain = 0 if gained or found.error_estimate > _NEAR else vain + 1
-        enough = len(shifts) >= _MOST_SHIFTS or basis.shape[1] > _MOST_VECTORS * matrices.n
-        if best.error_estimate <= tolerance or vain >= 2 or enough:
+        enough = len(shifts) >= _MOST_SHIFTS or task.basis.shape[1] > _MOST_VECTORS * matrices.n
+        if best.error_estimate <= max(tolerance, best.attainable) or vain >= 2 or enough:
             return best
         new = [shift for shift in (2 * np.pi * worst) ** 2 if shift not in shifts][: 1 + len(shifts) // 2]
         if not new:
@@ -117,117 +123,144 @@ def reduce_model(
         shifts = shifts + new
 
 
-def _extended(
-    basis: FloatArray, k: sparse.csc_array, m: sparse.csc_array, forces: FloatArray, shift: float
-) -> FloatArray:
-    """Return the basis with the solutions at one more shift, orthonormal."""
-    try:
-        factors = sparse_linalg.splu(sparse.csc_matrix(k - shift * m))
-        vectors = [factors.solve(forces)]
-        for _ in range(_MOMENTS - 1):
-            last = vectors[-1] / np.linalg.norm(vectors[-1], axis=0)
-            vectors.append(factors.solve(m @ last))
-    except RuntimeError:  # exactly singular: the next shift will do
-        return basis
-    block = np.hstack(vectors)
-    if not np.isfinite(block).all():
-        return basis
-    block = block / np.linalg.norm(block, axis=0)
-    for _ in range(2):  # twice is enough
-        block = block - basis @ (basis.T @ block)
-    q, r, _ = linalg.qr(block, mode="economic", pivoting=True)
-    q = q[:, abs(np.diagonal(r)) > _NEW_DIRECTION]
-    q = q - basis @ (basis.T @ q)
-    return np.hstack([basis, linalg.qr(q, mode="economic")[0]])
+class _Reducer:
+    """A model, what is asked of it, and the space found so far: orthonormal, without rigid motions."""
 
+    def __init__(self, freq_hz: FloatArray, matrices: ModelMatrices, outputs: Ports, inputs: Ports) -> None:
+        assert matrices.proportional is not None
+        self.freq_hz, self.matrices, self.outputs, self.inputs = freq_hz, matrices, outputs, inputs
+        self.k, self.m = matrices.sparse("stiffness"), matrices.sparse("mass")
+        self.a, self.b, self.eta = matrices.proportional
+        self.forces = directions(outputs, inputs)
+        self.rigid = held(matrices.n)
+        self.basis = np.zeros((matrices.n, 0))
 
-def _project(
-    freq_hz: FloatArray,
-    matrices: ModelMatrices,
-    k: sparse.csc_array,
-    m: sparse.csc_array,
-    basis: FloatArray,
-    outputs: NDArray[np.int32],
-    inputs: NDArray[np.int32],
-) -> tuple[Reduction, FloatArray]:
-    """Return the reduced model and the frequencies where it is worst, Hz, worst first."""
-    assert matrices.proportional is not None
-    a, b, eta = matrices.proportional
-    kv, mv = k @ basis, m @ basis
-    reduced_k, reduced_m = basis.T @ kv, basis.T @ mv
-    size = basis.shape[1]
-    try:
-        squared, shapes = linalg.eigh((reduced_k + reduced_k.T) / 2, (reduced_m + reduced_m.T) / 2)
-    except (np.linalg.LinAlgError, ValueError):
-        empty = np.zeros(0)
-        none = Modes(empty, empty, empty, np.zeros((outputs.size, 0)), np.zeros((inputs.size, 0)))
-        return Reduction(none, np.inf, size), freq_hz[[freq_hz.size // 2]]
-    squared = np.maximum(squared, 0)
-    whole = basis @ shapes
-    modes = Modes(squared, a + b * squared, np.full(size, eta), whole[outputs - 1], whole[inputs - 1])
-    worst = _worst_lines(freq_hz, modes, matrices, kv @ shapes, mv @ shapes, inputs)
-    lines = np.unique([freq_hz.argmin(), freq_hz.argmax(), *worst[:_SPOTS]])
-    error = float(spot_error(freq_hz[lines], matrices, modes, outputs, inputs).max())
-    return Reduction(modes, error, size), freq_hz[worst]
+    def extend(self, shift: float) -> None:
+        """Add the solutions at one more shift."""
+        try:
+            factors = sparse_linalg.splu(sparse.csc_matrix(self.k - shift * self.m), **SYMMETRIC)
+            vectors = [factors.solve(self.rigid.straining_forces(self.forces))]
+            for _ in range(max(_MOMENTS, -(-_VECTORS // self.forces.shape[1])) - 1):
+                last = self.rigid.strains(vectors[-1] / np.linalg.norm(vectors[-1], axis=0))
+                vectors.append(factors.solve(self.m @ last))
+        except RuntimeError:  # exactly singular: the next shift will do
+            return
+        block = self.rigid.strains(np.hstack(vectors))
+        if not np.isfinite(block).all():
+            return
+        block = block / np.linalg.norm(block, axis=0)
+        for _ in range(2):  # twice is enough
+            block = block - self.basis @ (self.basis.T @ block)
+        q, r, _ = linalg.qr(block, mode="economic", pivoting=True)
+        q = q[:, abs(np.diagonal(r)) > _NEW_DIRECTION]
+        q = q - self.basis @ (self.basis.T @ q)
+        self.basis = np.hstack([self.basis, linalg.qr(q, mode="economic")[0]])
 
+    def modes(self) -> tuple[FloatArray, FloatArray]:
+        """Modes of the space, w^2 and shapes (n, k), without the rigid motions."""
+        stiffness, mass = self.basis.T @ (self.k @ self.basis), self.basis.T @ (self.m @ self.basis)
+        squared, shapes = linalg.eigh((stiffness + stiffness.T) / 2, (mass + mass.T) / 2)
+        return np.maximum(squared, 0), self.basis @ shapes
 
-def _worst_lines(
-    freq_hz: FloatArray,
-    modes: Modes,
-    matrices: ModelMatrices,
-    k_shapes: FloatArray,
-    m_shapes: FloatArray,
-    inputs: NDArray[np.int32],
-) -> NDArray[np.intp]:
-    """Lines among candidates in the order of their residual Z x - b, largest first."""
-    assert matrices.proportional is not None
-    a, b, eta = matrices.proportional
-    ascending = np.argsort(freq_hz)
-    spread = ascending[np.linspace(0, freq_hz.size - 1, min(_CANDIDATES, freq_hz.size)).astype(int)]
-    residual = np.empty(spread.size)
-    for i, omega in enumerate(2 * np.pi * freq_hz[spread]):
-        denominator = modes.stiffness * (1 + 1j * eta) - omega**2 + 1j * omega * modes.damping
-        x = (
-            np.divide(1, denominator, out=np.zeros_like(denominator), where=denominator != 0)[:, None]
-            * modes.shapes_in.T
-        )
-        stiff = 1 + 1j * eta + 1j * omega * b
-        left = (stiff * k_shapes) @ x + ((1j * omega * a - omega**2) * m_shapes) @ x
-        left[inputs - 1, np.arange(inputs.size)] -= 1
-        residual[i] = np.linalg.norm(left) / max(np.linalg.norm(stiff * (k_shapes @ x)), np.finfo(float).tiny)
-    order = np.argsort(residual)[::-1]
-    return np.take(spread, order)
+    def take_out_rigid_motions(self) -> None:
+        """Find them in the space, and keep what is left of it."""
+        try:
+            self.rigid = find_rigid_motions(self.k, self.m, *self.modes())
+        except (np.linalg.LinAlgError, ValueError):
+            return
+        if self.rigid.shapes.size:
+            left, r, _ = linalg.qr(self.rigid.strains(self.basis), mode="economic", pivoting=True)
+            kept = left[:, abs(np.diagonal(r)) > _NEW_DIRECTION**0.5]
+            self.basis = linalg.qr(self.rigid.strains(kept), mode="economic")[0]
+
+    def project(self) -> tuple[Reduction, FloatArray]:
+        """Return the reduced model and the frequencies where it is worst, Hz, worst first."""
+        freq, count = self.freq_hz, self.rigid.shapes.shape[1]
+        size = self.basis.shape[1] + count
+        try:
+            squared, shapes = self.modes()
+        except (np.linalg.LinAlgError, ValueError):
+            empty = np.zeros(0)
+            none = Modes(empty, empty, empty, np.zeros((len(self.outputs), 0)), np.zeros((len(self.inputs), 0)))
+            return Reduction(none, np.inf, size, 0.0), freq[[freq.size // 2]]
+        squared = np.concatenate([np.zeros(count), squared])
+        shapes = np.hstack([self.rigid.shapes, shapes])
+        damping, loss = self.a + self.b * squared, np.full(size, self.eta)
+        modes = Modes(squared, damping, loss, self.outputs.of(shapes), self.inputs.of(shapes))
+        worst = self._worst_lines(modes, shapes)
+        spots = [worst[0], freq.argmin(), freq.argmax(), *worst[1:]]
+        lines = np.unique(spots[: _SPOTS if self.matrices.n < _LARGE else _FEW_SPOTS])
+        error, attainable = spot_error(freq[lines], self.matrices, modes, self.outputs, self.inputs, self.rigid)
+        return Reduction(modes, error, size, attainable), freq[worst]
+
+    def _worst_lines(self, modes: Modes, shapes: FloatArray) -> NDArray[np.intp]:
+        """Lines among candidates in the order of their residual Z x - b, largest first."""
+        freq, size = self.freq_hz, shapes.shape[1]
+        # Lengths of sums of these columns are those of sums of the columns of a small triangle.
+        columns = np.hstack([self.k @ shapes, self.m @ shapes, self.inputs.forces()])
+        triangle = linalg.qr(columns, mode="r")[0][: columns.shape[1]]
+        by_k, by_m, forces = triangle[:, :size], triangle[:, size : 2 * size], triangle[:, 2 * size :]
+        ascending = np.argsort(freq)
+        spread = ascending[np.linspace(0, freq.size - 1, min(_CANDIDATES, freq.size)).astype(int)]
+        residual = np.empty(spread.size)
+        for i, omega in enumerate(2 * np.pi * freq[spread]):
+            denominator = modes.stiffness * (1 + 1j * self.eta) - omega**2 + 1j * omega * modes.damping
+            inverse = np.divide(1, denominator, out=np.zeros_like(denominator), where=denominator != 0)
+            x = inverse[:, None] * modes.shapes_in.T
+            elastic = (1 + 1j * self.eta + 1j * omega * self.b) * (by_k @ x)
+            left = elastic + (1j * omega * self.a - omega**2) * (by_m @ x) - forces
+            residual[i] = np.linalg.norm(left) / max(np.linalg.norm(elastic), np.finfo(float).tiny)
+        return np.take(spread, np.argsort(residual)[::-1])
 
 
 def spot_error(
     freq_hz: FloatArray,
     matrices: ModelMatrices,
     modes: Modes,
-    outputs: NDArray[np.int32],
-    inputs: NDArray[np.int32],
-) -> FloatArray:
-    """Difference to direct solutions, relative to the largest entry of each line; inf where there is none.
+    outputs: Ports,
+    inputs: Ports,
+    rigid: RigidMotions | None = None,
+) -> tuple[float, float]:
+    """Largest difference to direct solutions at a few lines, and how small rounding lets it become.
 
     Parameters
     ----------
     freq_hz : ndarray, shape (n_lines,)
         A few frequencies, Hz.
+    rigid : RigidMotions, optional
+        What is solved by its mass alone.
 
     Returns
     -------
-    ndarray, shape (n_lines,)
+    error : float
+        Relative to the largest entry of the line; inf where there is no direct solution.
+    attainable : float
+        Some times the last step of a refinement of the direct solutions, which is all rounding.
     """
-    k, m, c, h = (matrices.sparse(name) for name in matrices.named)
     found = modes.receptance(freq_hz, "nan")
-    forces = np.zeros((matrices.n, inputs.size), np.complex128)
-    forces[inputs - 1, np.arange(inputs.size)] = 1
-    errors = np.full(freq_hz.size, np.inf)
+    parts = held(matrices.n) if rigid is None else rigid
+    a = matrices.proportional[0] if matrices.proportional else 0.0
+    forces = inputs.forces()
+    straining = parts.straining_forces(forces).astype(np.complex128)
+    thrust = outputs.of(parts.shapes) @ (parts.shapes.T @ forces)
+    errors, rounding = np.full(freq_hz.size, np.inf), 0.0
     for i, omega in enumerate(2 * np.pi * freq_hz):
-        z = (1 + 1j * matrices.loss_factor) * k + 1j * h + 1j * omega * c - omega**2 * m
+        inertia = 1j * omega * a - omega**2
+        if parts.shapes.size and inertia == 0:  # nothing holds the body: superposition names the line as singular
+            errors[i] = 0
+            continue
+        z = matrices.dynamic_stiffness(omega)
         try:
-            exact: ComplexArray = sparse_linalg.splu(sparse.csc_matrix(z)).solve(forces)[outputs - 1]
+            factors = sparse_linalg.splu(z, **SYMMETRIC)
         except RuntimeError:  # singular
             continue
-        error = abs(found[i] - exact).max(initial=0) / max(abs(exact).max(initial=0), np.finfo(float).tiny)
+        x = factors.solve(straining)
+        step = outputs.of(parts.strains(factors.solve(straining - z @ x)))
+        exact = outputs.of(parts.strains(x)) + step
+        if parts.shapes.size:
+            exact = exact + thrust / inertia
+        size = max(abs(exact).max(initial=0), np.finfo(float).tiny)
+        error = abs(found[i] - exact).max(initial=0) / size
         errors[i] = error if np.isfinite(error) else np.inf
-    return errors
+        rounding = max(rounding, float(abs(step).max(initial=0) / size))
+    return float(errors.max(initial=0)), _LOSS * rounding

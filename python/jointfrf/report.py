@@ -6,13 +6,14 @@ import base64
 import re
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
+from jointfrf._sweep import FloatArray
 from jointfrf.plots import Figure
 from jointfrf.results import CaseResult
 from jointfrf.tables import Row, Table, identified_rows, number, written
 
-__all__ = ["make_report", "summary"]
+__all__ = ["Reported", "make_report", "summary"]
 
 _TEMPLATE = Path(__file__).with_name("report.html.jinja")
 _PARAMETER = re.compile(r"^([kc])_(\w+)$")
@@ -53,7 +54,8 @@ def _published(rows: list[Row]) -> list[str]:
             for r in own if not r.fits
         ]  # fmt: skip
         text = f"{str(source)[:1].upper()}{str(source)[1:]}, noise {noise}, bands {bands}: "
-        text += f"{len(own) - len(outside)} of {len(own)} values of the thesis lie inside the central 98 % of ours"
+        text += f"{len(own) - len(outside)} of {len(own)} values of the thesis lie inside the central "
+        text += f"{own[0].central:g} % of ours"
         sentences.append(text + (f"; {_joined(outside)} do not fit." if outside else "."))
     return sentences
 
@@ -79,7 +81,10 @@ def _marked(text: str) -> str:
     from markupsafe import Markup
 
     found = _PARAMETER.match(text)
-    return Markup("<i>{}</i><sub>{}</sub>").format(found[1], found[2].replace("theta", "θ")) if found else text
+    if not found:
+        return text
+    index = found[2].replace("theta_", "θ").replace("theta", "θ")
+    return Markup("<i>{}</i><sub>{}</sub>").format(found[1], index)
 
 
 def _for_template(table: Table) -> dict[str, Any]:
@@ -94,12 +99,42 @@ def _for_template(table: Table) -> dict[str, Any]:
     }
 
 
-def make_report(result: CaseResult, tables: list[Table], figures: list[tuple[Figure, bytes]]) -> str:
+class Reported(Protocol):
+    """What a report says of any kind of case."""
+
+    @property
+    def folder(self) -> Path:
+        """Where the case stands."""
+
+    @property
+    def title(self) -> str:
+        """What it is."""
+
+    @property
+    def section(self) -> str:
+        """Where the source treats it."""
+
+    @property
+    def freq_hz(self) -> FloatArray:
+        """Frequency lines, Hz."""
+
+    @property
+    def seed(self) -> int:
+        """Seed of the noise."""
+
+
+def make_report(
+    case: Reported, count: int, sentences: list[str], tables: list[Table], figures: list[tuple[Figure, bytes]]
+) -> str:
     """Write the report of a case.
 
     Parameters
     ----------
-    result : CaseResult
+    case : Reported
+    count : int
+        Realisations of the noise.
+    sentences : list of str
+        Summary.
     tables : list of Table
     figures : list of (Figure, bytes)
         Figures and their PNG files, which become part of the report.
@@ -111,17 +146,16 @@ def make_report(result: CaseResult, tables: list[Table], figures: list[tuple[Fig
     """
     import jinja2
 
-    case = result.case
     environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, keep_trailing_newline=True)
     about = case.folder / "README.md"
     return environment.from_string(_TEMPLATE.read_text(encoding="utf-8")).render(
         case=case,
-        count=result.n_realisations,
+        count=count,
         lines=case.freq_hz.size,
         first=f"{case.freq_hz[0]:g}",
         last=f"{case.freq_hz[-1]:g}",
         version=version("jointfrf"),
-        summary=summary(result, tables),
+        summary=sentences,
         tables=[_for_template(table) for table in tables],
         figures=[
             {

@@ -2,61 +2,82 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
 from jointfrf._sweep import ComplexArray, FloatArray
 from jointfrf.bands import Band, Sensitivity, propose_bands, sensitivity
-from jointfrf.case_file import Case
+from jointfrf.case_file import Case, Observed
 from jointfrf.decoupling import Equation, decouple
+from jointfrf.errors import IllConditionedWarning
 from jointfrf.ismm import inverse_substructuring, ismm
 from jointfrf.joint import Joint
 from jointfrf.metrics import amplitude_error, frequency_error
 from jointfrf.model import Model, assemble
+from jointfrf.solid import SolidModel
 from jointfrf.study import Exact, Identified, exact_frfs, regenerate, run_study
 
-__all__ = ["CaseResult", "Modes", "Regenerated", "compute", "find_modes", "noise_free_errors"]
+__all__ = ["CaseResult", "Modes", "NoiseFree", "Regenerated", "compute", "find_modes", "noise_free_errors"]
 
 #: Realisations whose FRFs are regenerated.
 _REGENERATED = 200
+#: Modes shown, unless more are expected.
+_MODES = 5
 #: Modes below this share of the highest one sought are rigid-body motions: round-off of a fine mesh gives them some.
 _RIGID = 1e-3
 
 
 @dataclass(frozen=True)
 class Modes:
-    """Undamped modes without rigid-body motions: frequencies (n,) in Hz, shapes (n_dofs, n), names of the DOFs."""
+    """Undamped modes without rigid-body motions.
+
+    Attributes
+    ----------
+    freq_hz : ndarray, shape (n,)
+        Hz.
+    shapes : ndarray, shape (n_dofs, n)
+    dofs : tuple of str
+        Names of the DOFs.
+    directions : tuple of str
+        Where a solid moves most in each mode, "x", "y" or "z"; empty for other models.
+    """
 
     freq_hz: FloatArray
     shapes: FloatArray
     dofs: tuple[str, ...]
+    directions: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
 class Regenerated:
-    """FRFs of the assembly with identified parameters, at a point.
+    """An FRF of the assembly with identified parameters.
 
     Attributes
     ----------
     identified : Identified
-    point : str
-        "r" or "s".
+    observed : Observed
+        Which FRF.
     percentiles : ndarray, shape (3, n_freq)
         2.5, 50 and 97.5 percentile of the modulus, m/N.
     first : ndarray, shape (n_freq,)
         That of the first realisation.
-    amplitude, frequency : ndarray, shape (n_realisations,)
+    bands : tuple of (low, high) or None
+        Where errors are counted, Hz; None for all lines.
+    amplitude, frequency : ndarray, shape (n_bands, n_realisations)
         Errors (4.11) and (4.12), percent.
     """
 
     identified: Identified
-    point: str
+    observed: Observed
     percentiles: FloatArray
     first: ComplexArray
+    bands: tuple[Band | None, ...]
     amplitude: FloatArray
     frequency: FloatArray
 
@@ -73,13 +94,13 @@ class CaseResult:
     modes : dict
         ``"actual"`` and ``"initial"`` joint to Modes.
     sensitivities : dict
-        Point "r" or "s" to Sensitivity.
+        Key of an observed FRF to Sensitivity.
     proposals : dict
-        (point, parameter) to bands, Hz.
+        (key, parameter) to bands, Hz.
     identified : list of Identified
     regenerated : list of Regenerated
     noise_free : dict
-        Method to largest relative error without noise.
+        Method to NoiseFree.
     """
 
     case: Case
@@ -90,7 +111,7 @@ class CaseResult:
     proposals: dict[tuple[str, str], list[Band]]
     identified: list[Identified]
     regenerated: list[Regenerated]
-    noise_free: dict[str, float]
+    noise_free: dict[str, NoiseFree]
 
 
 def find_modes(model: Model, count: int) -> Modes:
@@ -100,11 +121,56 @@ def find_modes(model: Model, count: int) -> Modes:
     return Modes(freq[kept], shapes[:, kept], model.dofs)
 
 
-def noise_free_errors(exact: Exact, k_actual: ComplexArray) -> dict[str, float]:
-    """Largest relative error of K* of every method without noise.
+def _with_directions(modes: Modes, a: Model, b: Model) -> Modes:
+    """Name the direction in which the reference points of solids move most: in torsion it is not that of the edges."""
+    if not (isinstance(a, SolidModel) and isinstance(b, SolidModel)):
+        return modes
+    names = {*a.references, *b.references}
+    at = [[i for i, dof in enumerate(modes.dofs) if dof[2:] in {f"{name}:{axis}" for name in names}] for axis in "xyz"]
+    squares = [(modes.shapes[rows] ** 2).sum(axis=0) for rows in at]
+    return replace(modes, directions=tuple("xyz"[i] for i in np.argmax(squares, axis=0)))
+
+
+class NoiseFree(NamedTuple):
+    """Largest relative error of K* without noise, and how much K* moves when the last bits of the FRFs do."""
+
+    error: float
+    rounding: float
+
+
+def noise_free_errors(exact: Exact, k_actual: ComplexArray) -> dict[str, NoiseFree]:
+    """Find the largest relative error of K* of every method without noise.
 
     "short form" is the difference between (2.47) and -(gamma^-1)_jk; the others are errors against the actual K*.
     """
+    with warnings.catch_warnings():
+        # What a poor condition does is what is shown.
+        warnings.simplefilter("ignore", IllConditionedWarning)
+        found, moved = _noise_free_lines(exact), _noise_free_lines(_rounded(exact))
+    size = np.sqrt(abs(np.diagonal(k_actual, axis1=1, axis2=2)))
+    scale = size[:, :, None] * size[:, None, :]
+
+    def difference(a: ComplexArray, b: ComplexArray) -> float:
+        return float((abs(a - b) / scale).max())
+
+    rounding = {method: difference(k, moved[method]) for method, k in found.items()}
+    errors = {method: NoiseFree(difference(k, k_actual), rounding[method]) for method, k in found.items()}
+    short = NoiseFree(difference(found["ismm"], found["inverse_substructuring"]), rounding["ismm"])
+    return {"short form": short, **errors}
+
+
+def _rounded(exact: Exact) -> Exact:
+    """Move every FRF by a rounding, up or down, always the same."""
+    rng = np.random.default_rng(1)
+    h_a, h_b, h_initial, h_c = (
+        h * (1 + np.finfo(float).eps * rng.choice((-1.0, 1.0), h.shape))
+        for h in (exact.h_a, exact.h_b, exact.h_initial, exact.h_c)
+    )
+    return replace(exact, h_a=h_a, h_b=h_b, h_initial=h_initial, h_c=h_c)
+
+
+def _noise_free_lines(exact: Exact) -> dict[str, ComplexArray]:
+    """K* on every line by every method."""
     n = exact.n
     joint, inner = list(range(n)), list(range(n, 2 * n))
     gamma = exact.interface(exact.h_c)
@@ -114,32 +180,28 @@ def noise_free_errors(exact: Exact, k_actual: ComplexArray) -> dict[str, float]:
     }
     equations: tuple[Equation, ...] = ("rr", "rs", "sr", "ss")
     for equation in equations:
-        h_c = np.ascontiguousarray(exact.h_c[:, exact.where(equation[0]), exact.where(equation[1])])
-        found[f"decoupling-{equation}"] = decouple(equation, exact.h_a, exact.h_b, h_c, joint, joint, inner, inner)
-    size = np.sqrt(abs(np.diagonal(k_actual, axis1=1, axis2=2)))
-    scale = size[:, :, None] * size[:, None, :]
-
-    def difference(a: ComplexArray, b: ComplexArray) -> float:
-        return float((abs(a - b) / scale).max())
-
-    errors = {method: difference(k, k_actual) for method, k in found.items()}
-    return {"short form": difference(found["ismm"], found["inverse_substructuring"]), **errors}
+        between = np.ascontiguousarray(exact.h_c[:, exact.where(equation[0]), exact.where(equation[1])])
+        found[f"decoupling-{equation}"] = decouple(equation, exact.h_a, exact.h_b, between, joint, joint, inner, inner)
+    return found
 
 
-def _sensitivity(case: Case, exact: Exact, joint: Joint, point: str) -> Sensitivity:
-    at = exact.where(point).start
+def _sensitivity(case: Case, exact: Exact, joint: Joint, observed: Observed) -> Sensitivity:
+    at = exact.where(observed.point).start + observed.dof
     j, k = (list(range(exact.where(p).start, exact.where(p).stop)) for p in "jk")
     return sensitivity(case.freq_hz, exact.h_c, joint, j, k, at, at)
 
 
-def _regenerated(exact: Exact, identified: Identified, point: str) -> Regenerated:
-    at = exact.where(point).start
-    h = regenerate(exact, identified.theta[:_REGENERATED], point)
+def _regenerated(exact: Exact, identified: Identified, observed: Observed) -> Regenerated:
+    at = exact.where(observed.point).start + observed.dof
+    h = regenerate(exact, identified.theta[:_REGENERATED], observed.point, observed.dof)
     h_exact = exact.h_c[:, at, at]
+    bands = observed.bands or (None,)
     amplitude, frequency = (
-        np.array([error(h_exact, one, exact.freq_hz) for one in h]) for error in (amplitude_error, frequency_error)
+        np.array([[error(h_exact, one, exact.freq_hz, band) for one in h] for band in bands], np.float64)
+        for error in (amplitude_error, frequency_error)
     )
-    return Regenerated(identified, point, np.percentile(abs(h), [2.5, 50, 97.5], axis=0), h[0], amplitude, frequency)
+    percentiles: FloatArray = np.asarray(np.percentile(abs(h), [2.5, 50, 97.5], axis=0), np.float64)
+    return Regenerated(identified, observed, percentiles, h[0], bands, amplitude, frequency)
 
 
 def compute(
@@ -167,16 +229,18 @@ def compute(
     modes = {}
     for which, joint in (("initial", case.initial), ("actual", case.joint)):
         model = assemble(case.a.model, case.b.model, joint, case.dofs_j, case.dofs_k)
-        modes[which] = find_modes(model, 5)
-    sensitivities = {point: _sensitivity(case, exact, case.joint, point) for point in "rs"}
+        wanted = max([_MODES, *(len(values) for _, _, values, _ in case.expected.frequencies)])
+        modes[which] = _with_directions(find_modes(model, wanted), case.a.model, case.b.model)
+    sensitivities = {one.key: _sensitivity(case, exact, case.joint, one) for one in case.observed}
     proposals = {
-        (point, parameter): propose_bands(case.freq_hz, change)
-        for point, found in sensitivities.items()
+        (key, parameter): propose_bands(case.freq_hz, change)
+        for key, found in sensitivities.items()
         for parameter, change in zip(found.parameters, found.change, strict=True)
     }
     identified = run_study(case, exact, count, pool, progress)
     # Without the lines, which are large and not needed there.
-    slim = [replace(found, k_lines=found.k_lines[:0]) for found in identified for _ in "rs"]
-    regenerated = list((map if pool is None else pool.map)(partial(_regenerated, exact), slim, "rs" * len(identified)))
+    slim = [replace(found, k_lines=found.k_lines[:0]) for found in identified for _ in case.observed]
+    watched = case.observed * len(identified)
+    regenerated = list((map if pool is None else pool.map)(partial(_regenerated, exact), slim, watched))
     errors = noise_free_errors(exact, case.joint.dynamic_stiffness(case.freq_hz))
     return CaseResult(case, exact, count, modes, sensitivities, proposals, identified, regenerated, errors)

@@ -25,8 +25,8 @@ from jointfrf.noise import realisations
 
 __all__ = ["Exact", "Identified", "exact_frfs", "regenerate", "run_study", "workers"]
 
-#: Lines treated at once, over realisations: bounds the memory to some tens of MB.
-_CHUNK = 20_000
+#: Lines, and entries of their FRF matrices, treated at once, over realisations: bound the memory to some tens of MB.
+_CHUNK, _CHUNK_ENTRIES = 20_000, 1_500_000
 #: Realisations whose K*(w) is kept line by line, for figures.
 _KEPT = 200
 _ALL_LINES = "all lines"
@@ -102,8 +102,8 @@ class Identified:
 def exact_frfs(case: Case) -> Exact:
     """Receptances of the substructures (2.28)-(2.29) and of the assembly (2.26)."""
     freq, n = case.freq_hz, len(case.joint.dofs)
-    h_a = case.a.model.receptance(freq, case.dofs_j + case.dofs_r)
-    h_b = case.b.model.receptance(freq, case.dofs_k + case.dofs_s)
+    h_a = case.a.model.receptance(freq, case.ports_a)
+    h_b = case.b.model.receptance(freq, case.ports_b)
     first = list(range(n))
     initial = case.initial.dynamic_stiffness(freq)
     h_initial = couple(h_a, h_b, initial, first, first, freq_hz=freq)
@@ -254,7 +254,7 @@ def run_study(
         seed and its own number only: neither on `pool` nor on how many there are.
     """
     groups = [(noise, method) for noise in case.noises for method in noise.methods]
-    size = max(1, _CHUNK // case.freq_hz.size)
+    size = max(1, min(_CHUNK, _CHUNK_ENTRIES // (2 * exact.n) ** 2) // case.freq_hz.size)
     chunks = [(first, min(size, n_realisations - first)) for first in range(0, n_realisations, size)]
     tasks = [
         _Task(exact, noise, method, case.band_sets, case.seed, first, count)
@@ -275,7 +275,7 @@ def run_study(
     return found
 
 
-def regenerate(exact: Exact, theta: FloatArray, point: str) -> ComplexArray:
+def regenerate(exact: Exact, theta: FloatArray, point: str, dof: int = 0) -> ComplexArray:
     """Receptance of the assembly at a point, regenerated from identified parameters.
 
     Parameters
@@ -284,7 +284,8 @@ def regenerate(exact: Exact, theta: FloatArray, point: str) -> ComplexArray:
     theta : ndarray, shape (r, 2 n)
         Stiffness of all DOFs, then damping.
     point : {"r", "s"}
-        Response and force at the first DOF of this point.
+    dof : int
+        Response and force at this DOF of the point.
 
     Returns
     -------
@@ -296,7 +297,7 @@ def regenerate(exact: Exact, theta: FloatArray, point: str) -> ComplexArray:
     diagonal = np.repeat(theta[:, :n], n_freq, axis=0) + 1j * omega[:, None] * np.repeat(theta[:, n:], n_freq, axis=0)
     k_joint = diagonal[:, :, None] * np.eye(n)
     joint = list(range(n))
-    of_a, of_b = ([*joint, n], joint) if point == "r" else (joint, [*joint, n])
+    of_a, of_b = ([*joint, n + dof], joint) if point == "r" else (joint, [*joint, n + dof])
     h_a, h_b = (
         np.tile(h[:, np.array(dofs)[:, None], dofs], (r, 1, 1))
         for h, dofs in ((exact.h_a, of_a), (exact.h_b, of_b))

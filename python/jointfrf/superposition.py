@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import linalg
 
 from jointfrf._sweep import N_FREQ, ComplexArray, FloatArray, OnSingular, run
 from jointfrf.direct_solution import SINGULAR
 from jointfrf.model_matrices import ModelMatrices
+from jointfrf.ports import Ports
 
 __all__ = ["Modes", "all_modes"]
 
@@ -64,8 +64,8 @@ class Modes:
         return run("receptance_modal", args, shape, {"omega": omega}, freq_hz, on_singular, SINGULAR, out)[0]
 
 
-def all_modes(matrices: ModelMatrices, outputs: NDArray[np.int32], inputs: NDArray[np.int32]) -> Modes:
-    """All modes of a model whose damping does not couple them; DOFs counted from 1.
+def all_modes(matrices: ModelMatrices, outputs: Ports, inputs: Ports) -> Modes:
+    """All modes of a model whose damping does not couple them.
 
     Raises
     ------
@@ -74,7 +74,7 @@ def all_modes(matrices: ModelMatrices, outputs: NDArray[np.int32], inputs: NDArr
     """
     for name in ("stiffness", "mass"):
         if not matrices.is_symmetric(name):
-            raise ValueError(f"{name} is not symmetric: method 'modal' cannot be used, 'dense' or 'banded' can")
+            raise ValueError(f"{name} is not symmetric: method 'modal' cannot be used, 'dense' or 'sparse' can")
     try:
         squared, shapes = linalg.eigh(matrices.dense("stiffness"), matrices.dense("mass"))
     except np.linalg.LinAlgError as error:
@@ -88,10 +88,10 @@ def all_modes(matrices: ModelMatrices, outputs: NDArray[np.int32], inputs: NDArr
         diagonal = np.diagonal(projected).copy()
         rest = abs(projected - np.diag(diagonal)).max(initial=0)
         if rest > _DIAGONAL * abs(diagonal).max(initial=0):
-            raise ValueError(f"{name} couples the modes: method 'modal' cannot be used, 'dense' or 'banded' can")
+            raise ValueError(f"{name} couples the modes: method 'modal' cannot be used, 'dense' or 'sparse' can")
         return diagonal
 
     stiffness = np.maximum(squared, 0)
     structural = modal("structural_damping")
     losses = matrices.loss_factor + np.divide(structural, stiffness, out=np.zeros(matrices.n), where=stiffness > 0)
-    return Modes(stiffness, modal("damping"), losses, shapes[outputs - 1], shapes[inputs - 1])
+    return Modes(stiffness, modal("damping"), losses, outputs.of(shapes), inputs.of(shapes))

@@ -11,15 +11,27 @@ from typing import Any
 import numpy as np
 
 from jointfrf.bands import Band
+from jointfrf.case_file import Observed
 from jointfrf.results import CaseResult
 
-__all__ = ["Row", "Table", "as_csv", "as_text", "identified_rows", "make_tables", "number", "to_json", "written"]
+__all__ = [
+    "Row",
+    "Table",
+    "as_csv",
+    "as_text",
+    "frf_name",
+    "identified_rows",
+    "make_tables",
+    "number",
+    "to_json",
+    "written",
+]
 
 Cell = str | float | None
 
-#: A published value fits where it lies inside this share of the realisations.
-_CENTRAL = 98.0
 _NOISE_FREE_LIMIT = 1e-6
+#: An equation is exact up to this many roundings of the FRFs it takes.
+_ROUNDINGS = 100
 _PERCENTAGES = ("difference %", "RMSE %", "limit %", "percentile")
 
 
@@ -28,7 +40,7 @@ class Row:
     """One parameter identified by one method at one noise level.
 
     `published`, `source`, `percentile` and `fits` are None where the source has no number. `percentile` is the share of
-    realisations below the published value, percent; it fits inside the central 98 %.
+    realisations below the published value, percent; it fits inside the `central` percent.
     """
 
     noise: str
@@ -45,6 +57,7 @@ class Row:
     rmse_percent: float
     percentile: float | None
     fits: bool | None
+    central: float | None = None
 
 
 @dataclass(frozen=True)
@@ -75,12 +88,12 @@ def identified_rows(result: CaseResult) -> list[Row]:
             low, median, high = (float(x) for x in np.percentile(values, [2.5, 50, 97.5]))
             error = float(np.sqrt(((values - actual) ** 2).mean()) / abs(actual) * 100) if actual else float("nan")
             common = (found.noise, found.method, found.bands, parameter, case.units[p], actual)
-            beside = [(t.source, t.values[parameter]) for t in published if parameter in t.values]
-            nothing: list[tuple[str | None, float | None]] = [(None, None)]
-            for source, value in beside or nothing:
+            beside = [(t.source, t.values[parameter], t.central) for t in published if parameter in t.values]
+            nothing: list[tuple[str | None, float | None, float | None]] = [(None, None, None)]
+            for source, value, central in beside or nothing:
                 share = None if value is None else float((values < value).mean() * 100)
-                fits = None if share is None else abs(share - 50) <= _CENTRAL / 2
-                rows.append(Row(*common, source, value, median, low, high, error, share, fits))
+                fits = None if share is None or central is None else abs(share - 50) <= central / 2
+                rows.append(Row(*common, source, value, median, low, high, error, share, fits, central))
     return rows
 
 
@@ -89,6 +102,7 @@ def make_tables(result: CaseResult) -> list[Table]:
     rows = identified_rows(result)
     sources = list(dict.fromkeys(row.source for row in rows if row.source is not None))
     tables = [_published(source, [row for row in rows if row.source == source]) for source in sources]
+    tables += _published_errors(result)
     tables += [_frequencies(result), _identified(rows, result.n_realisations), *_limits(result, rows)]
     tables += [_bands(result), _regenerated(result), _noise_free(result)]
     return tables
@@ -106,15 +120,16 @@ def _published(source: str, rows: list[Row]) -> Table:
     failing = tuple(i for i, row in enumerate(rows) if not row.fits)
     note = (
         "The thesis' value comes from one realisation of the noise; ours are a distribution. The percentile is the "
-        "share of realisations below the thesis' value; it fits inside the central 98 %."
+        f"share of realisations below the thesis' value; it fits inside the central {rows[0].central:g} %."
     )
-    return Table(re.sub(r"[^a-z0-9]+", "-", source.lower()).strip("-"), source[0].upper() + source[1:], columns, cells,
+    return Table(_key(source), source[0].upper() + source[1:], columns, cells,
                  failing, note)  # fmt: skip
 
 
 def _frequencies(result: CaseResult) -> Table:
     cells: list[tuple[Cell, ...]] = []
     failing = []
+    directed = any(modes.directions for modes in result.modes.values())
     expected = {joint: (values, within) for joint, _, values, within in result.case.expected.frequencies}
     for joint, modes in result.modes.items():
         values, within = expected.get(joint, ((), 0.0))
@@ -124,8 +139,9 @@ def _frequencies(result: CaseResult) -> Table:
             if difference is not None and abs(difference) > within:
                 failing.append(len(cells))
             verdict = "" if difference is None else "fits" if abs(difference) <= within else "does not fit"
-            cells.append((joint, str(i + 1), float(freq), known, difference, verdict))
-    columns = ("joint", "mode", "Hz", "expected Hz", "difference %", "")
+            most = (modes.directions[i],) if directed else ()
+            cells.append((joint, str(i + 1), *most, float(freq), known, difference, verdict))
+    columns = ("joint", "mode", *(("mostly in",) if directed else ()), "Hz", "expected Hz", "difference %", "")
     note = "; ".join(f"{joint} joint: {source}" for joint, source, _, _ in result.case.expected.frequencies)
     return Table(
         "natural-frequencies", "Natural frequencies of the assembly", columns, tuple(cells), tuple(failing), note
@@ -168,11 +184,12 @@ def _bands(result: CaseResult) -> Table:
         (
             parameter,
             "; ".join(dict.fromkeys(_in_words(s.bands[parameter]) for s in sets)),
-            *(_in_words(result.proposals[point, parameter]) for point in "rs"),
+            *(_in_words(result.proposals[one.key, parameter]) for one in result.case.observed),
         )
         for parameter in result.case.parameters
     )
-    columns = ("parameter", "bands of the case, Hz", "proposed from H_rr, Hz", "proposed from H_ss, Hz")
+    proposed = tuple(f"proposed from {frf_name(result, one)}, Hz" for one in result.case.observed)
+    columns = ("parameter", "bands of the case, Hz", *proposed)
     note = "Proposed: where the smoothed sensitivity of the FRF stays within 20 dB of its largest value."
     return Table("bands", "Sensitive bands", columns, cells, (), note)
 
@@ -180,24 +197,65 @@ def _bands(result: CaseResult) -> Table:
 def _regenerated(result: CaseResult) -> Table:
     cells: list[tuple[Cell, ...]] = []
     for r in result.regenerated:
-        spread = [float(x) for e in (r.amplitude, r.frequency) for x in np.percentile(e, [50, 2.5, 97.5])]
-        cells.append((r.identified.noise, r.identified.method, r.identified.bands, f"H_{r.point}{r.point}", *spread))
-    columns = ("noise", "method", "bands", "FRF", "amplitude %", "2.5 %", "97.5 %", "frequency %", "2.5 %", "97.5 %")
+        for b, band in enumerate(r.bands):
+            spread = [float(x) for e in (r.amplitude[b], r.frequency[b]) for x in np.percentile(e, [50, 2.5, 97.5])]
+            where = "all lines" if band is None else _in_words([band])
+            named = (r.identified.noise, r.identified.method, r.identified.bands, frf_name(result, r.observed), where)
+            cells.append((*named, *spread))
+    columns = ("noise", "method", "bands", "FRF", "errors in, Hz",
+               "amplitude %", "2.5 %", "97.5 %", "frequency %", "2.5 %", "97.5 %")  # fmt: skip
     title = "Errors of the regenerated FRFs: amplitude (4.11) and frequency (4.12)"
     return Table("regenerated", title, columns, tuple(cells), (), "Median and percentiles over realisations.")
+
+
+def frf_name(result: CaseResult, observed: Observed) -> str:
+    """Name an observed FRF: "H_ss", with its direction where the case names one."""
+    name = f"H_{observed.point * 2}"
+    return name if observed.key == observed.point else f"{name} {result.case.joint.dofs[observed.dof]}"
+
+
+def _published_errors(result: CaseResult) -> list[Table]:
+    """Tables of the source with errors of regenerated FRFs, beside the distributions; with the first set of bands."""
+    columns = ("FRF", "band, Hz", "method", "error", "thesis", "median", "2.5 %", "97.5 %", "percentile")
+    rows: dict[str, list[tuple[Cell, ...]]] = {}
+    for known in result.case.expected.errors:
+        found = next(
+            r for r in result.regenerated if r.observed.key == known.observed
+            and (r.identified.noise, r.identified.method) == (known.noise, known.method)
+        )  # fmt: skip
+        band = found.bands.index(known.band)
+        for what, published, values in (
+            ("amplitude (4.11)", known.amplitude, found.amplitude[band]),
+            ("frequency (4.12)", known.frequency, found.frequency[band]),
+        ):
+            low, median, high = (float(x) for x in np.percentile(values, [2.5, 50, 97.5]))
+            share = None if published is None else float((values < published).mean() * 100)
+            named = (frf_name(result, found.observed), _in_words([known.band]), known.method, what)
+            rows.setdefault(known.source, []).append((*named, published, median, low, high, share))
+    note = "Errors in percent of one realisation in the thesis; ours are a distribution."
+    return [
+        Table(_key(source), f"{source[0].upper()}{source[1:]}: errors of the regenerated FRFs, percent", columns,
+              tuple(own), (), note)
+        for source, own in rows.items()
+    ]  # fmt: skip
+
+
+def _key(source: str) -> str:
+    return re.sub(r"[^a-z0-9]+", "-", source.lower()).strip("-")
 
 
 def _noise_free(result: CaseResult) -> Table:
     limit = {"short form": 1e-10}
     cells, failing = [], []
-    for i, (method, error) in enumerate(result.noise_free.items()):
-        fits = error <= limit.get(method, _NOISE_FREE_LIMIT)
+    for i, (method, (error, rounding)) in enumerate(result.noise_free.items()):
+        fits = error <= max(limit.get(method, _NOISE_FREE_LIMIT), _ROUNDINGS * rounding)
         what = "ismm against -(gamma^-1)_jk" if method == "short form" else f"{method} against K*"
-        cells.append((what, f"{error:.1e}", "exact" if fits else "does not fit"))
+        cells.append((what, f"{error:.1e}", f"{rounding:.1e}", "exact" if fits else "does not fit"))
         if not fits:
             failing.append(i)
-    columns = ("without noise", "largest relative error", "")
-    return Table("noise-free", "The equations without noise", columns, tuple(cells), tuple(failing))
+    columns = ("without noise", "largest relative error", "of one rounding", "")
+    note = "The third column is what K* moves by when the last bits of the FRFs that the equation takes do."
+    return Table("noise-free", "The equations without noise", columns, tuple(cells), tuple(failing), note)
 
 
 def written(table: Table) -> list[list[str]]:
@@ -256,8 +314,11 @@ def to_json(result: CaseResult) -> dict[str, Any]:
         "frequency_hz": {"first": case.freq_hz[0], "last": case.freq_hz[-1], "lines": case.freq_hz.size},
         "natural_frequencies_hz": {joint: modes.freq_hz.tolist() for joint, modes in result.modes.items()},
         "identified": [asdict(row) for row in identified_rows(result)],
-        "noise_free_relative_error": result.noise_free,
-        "proposed_bands_hz": {f"H_{p}{p} {name}": bands for (p, name), bands in result.proposals.items()},
+        "noise_free_relative_error": {method: found.error for method, found in result.noise_free.items()},
+        "proposed_bands_hz": {
+            f"{frf_name(result, one)} {name}": result.proposals[one.key, name]
+            for one in case.observed for name in case.parameters
+        },
         "tables": {
             table.key: {"title": table.title, "columns": table.columns, "rows": table.rows}
             for table in make_tables(result)

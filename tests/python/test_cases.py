@@ -3,17 +3,23 @@
 import csv
 import dataclasses
 import json
+import re
 
 import numpy as np
 import pytest
 
+import jointfrf as jf
 from jointfrf.case_file import read_case
 from jointfrf.cases import UnknownCaseError, find_case, list_cases, run_case
-from jointfrf.results import compute
+from jointfrf.figures import make_figures
+from jointfrf.report import make_report, summary
+from jointfrf.results import compute, noise_free_errors
 from jointfrf.study import exact_frfs, run_study
-from jointfrf.tables import identified_rows, make_tables
+from jointfrf.tables import identified_rows, make_tables, to_json
 
-NAMES = ["3.1-discrete", "3.2-fe-beams", "3.3-beams-1mm", "3.3.1-decoupling"]
+PLANE = ["3.1-discrete", "3.2-fe-beams", "3.3-beams-1mm", "3.3.1-decoupling"]
+SOLID = ["4.3.1-six-dof", "4.3.2-six-dof-decoupling"]
+NAMES = [*PLANE, *SOLID, "4.3.3-bolt"]
 #: Every so many lines are left, to save time.
 THINNED = {"3.1-discrete": 1, "3.2-fe-beams": 1, "3.3-beams-1mm": 3, "3.3.1-decoupling": 3}
 COUNT = 60
@@ -24,11 +30,30 @@ MANY = 300
 @pytest.fixture(scope="module")
 def results():
     found = {}
-    for name in NAMES:
+    for name in PLANE:
         case = read_case(find_case(name))
         case = dataclasses.replace(case, freq_hz=case.freq_hz[:: THINNED[name]])
         found[name] = compute(case, MANY if name == "3.2-fe-beams" else COUNT)
     return found
+
+
+@pytest.fixture(scope="module")
+def solids():
+    """The cases of bricks with every fourth line."""
+    found = {}
+    for name, count in zip(SOLID, (8, 4), strict=True):
+        case = read_case(find_case(name))
+        found[name] = compute(dataclasses.replace(case, freq_hz=case.freq_hz[::4]), count)
+    return found
+
+
+@pytest.fixture(scope="module")
+def six_dofs():
+    """Case 4.3.1 on all its lines, by ISMM only: case, exact FRFs, and what was identified."""
+    case = read_case(find_case("4.3.1"))
+    case = dataclasses.replace(case, noises=tuple(dataclasses.replace(n, methods=("ismm",)) for n in case.noises))
+    exact = exact_frfs(case)
+    return case, exact, run_study(case, exact, MANY)
 
 
 def rmse(result, noise, method, bands=None):
@@ -39,7 +64,7 @@ def rmse(result, noise, method, bands=None):
     }
 
 
-def test_the_four_cases_come_with_the_package():
+def test_the_cases_come_with_the_package():
     assert [folder.name for folder in list_cases()] == NAMES
 
 
@@ -56,9 +81,9 @@ def test_a_folder_comes_before_a_name(tmp_path, monkeypatch):
     assert find_case("3.1").resolve() == tmp_path / "3.1"
 
 
-@pytest.mark.parametrize("word", ["3", "3.", "discrete", "", "no/such/folder"])
+@pytest.mark.parametrize("word", ["3", "3.", "4.3", "discrete", "", "no/such/folder"])
 def test_an_unknown_case_lists_the_known_ones(word):
-    with pytest.raises(UnknownCaseError, match=r"3\.1-discrete, 3\.2-fe-beams, 3\.3-beams-1mm, 3\.3\.1-decoupling"):
+    with pytest.raises(UnknownCaseError, match=re.escape(", ".join(NAMES))):
         find_case(word)
 
 
@@ -77,19 +102,17 @@ def test_natural_frequencies(results, name, joint, frequencies, within):
     np.testing.assert_allclose(found, frequencies, atol=within)
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", PLANE)
 def test_the_equations_are_exact_without_noise(results, name):
-    errors = results[name].noise_free
+    errors = {method: found.error for method, found in results[name].noise_free.items()}
     assert errors["short form"] < 1e-10
     assert errors["ismm"] < 1e-10
     assert {f"decoupling-{e}" for e in ("rr", "rs", "sr", "ss")} < set(errors)
     assert max(errors.values()) < 1e-6
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", PLANE)
 def test_band_means_are_those_of_the_public_functions(results, name):
-    import jointfrf as jf
-
     result = results[name]
     case, noise = result.case, result.case.noises[0]
     found = next(f for f in result.identified if (f.noise, f.method) == (noise.name, "ismm"))
@@ -150,7 +173,6 @@ def test_compliance_fit_beats_the_band_means(results):
 
 @pytest.mark.parametrize(("name", "noise", "number"), [("3.3", "5 % complex", 237), ("3.2", "5 %", 148)])
 def test_compliance_fit_of_a_realisation_that_once_ran_away(name, noise, number):
-    import jointfrf as jf
     from jointfrf.estimator import estimate, joint_basis
 
     case = read_case(find_case(name))
@@ -177,10 +199,151 @@ def test_ismm_against_decoupling(results):
 
 def test_regenerated_frfs_are_near_the_exact_ones(results):
     found = [r for r in results["3.3-beams-1mm"].regenerated if r.identified.method == "compliance"]
-    assert {r.point for r in found} == {"r", "s"}
+    assert {r.observed.key for r in found} == {"r", "s"}
     for r in found:
+        assert r.amplitude.shape == r.frequency.shape == (1, COUNT)
         assert 0 < np.median(r.amplitude) < 1
         assert r.frequency.max() == 0
+
+
+def test_natural_frequencies_of_bricks(solids):
+    modes = solids["4.3.1-six-dof"].modes["actual"]
+    np.testing.assert_allclose(modes.freq_hz, [12.8, 58.8, 76.1, 226.5, 325.8, 417.5, 491.2], rtol=0.003)
+    assert "".join(modes.directions) == "yxyyxyx"
+
+
+@pytest.mark.parametrize("name", SOLID)
+def test_the_equations_are_exact_up_to_roundings_in_six_dofs(solids, name):
+    result = solids[name]
+    errors = result.noise_free
+    assert errors["short form"].error < 1e-9
+    assert errors["ismm"].error < 1e-8
+    assert errors["decoupling-sr"].error < 1e-6
+    # The other equations take differences of nearly equal matrices: what is lost there, a rounding loses too.
+    for equation in ("rr", "ss"):
+        error, rounding = errors[f"decoupling-{equation}"]
+        assert error < 100 * rounding
+        assert rounding > 1e-7
+    table = next(table for table in make_tables(result) if table.key == "noise-free")
+    assert table.failing == ()
+    assert {row[-1] for row in table.rows} == {"exact"}
+
+
+def test_an_error_beyond_the_roundings_is_told(solids):
+    result = solids["4.3.1-six-dof"]
+    exact = dataclasses.replace(result.exact, h_c=result.exact.h_c * (1 + 1e-5j))
+    wrong = noise_free_errors(exact, result.case.joint.dynamic_stiffness(exact.freq_hz))
+    assert wrong["ismm"].error > 1e-6
+    table = next(t for t in make_tables(dataclasses.replace(result, noise_free=wrong)) if t.key == "noise-free")
+    assert "ismm against K*" in {table.rows[i][0] for i in table.failing}
+
+
+def test_tables_4_3_and_4_4(six_dofs):
+    case, _, found = six_dofs
+    inside = []
+    for one, table in zip(found, case.expected.tables, strict=True):
+        assert (one.method, one.bands, table.central) == (table.method, table.bands, 95)
+        for parameter, value in table.values.items():
+            low, high = np.percentile(one.theta[:, case.parameters.index(parameter)], [2.5, 97.5])
+            inside.append(low < value < high)
+    assert len(inside) == 16
+    assert sum(inside) >= 15
+
+
+def test_the_rotation_about_the_beams_is_lost_by_ismm_and_kept_by_the_fit(solids, six_dofs):
+    case, _, found = six_dofs
+    p = case.parameters.index("k_Mtheta_z")
+    assert case.actual[p] == 1000
+    assert abs(np.median(found[0].theta[:, p])) < 0.3 * 1000
+    fit = next(f for f in solids["4.3.1-six-dof"].identified if f.method == "compliance")
+    assert np.median(fit.theta[:, p]) == pytest.approx(1000, rel=0.3)
+
+
+def test_regenerated_frfs_of_an_observed_direction(solids):
+    result = solids["4.3.2-six-dof-decoupling"]
+    case, exact = result.case, result.exact
+    assert {r.observed.key for r in result.regenerated} == {"s-Fx", "s-Fy", "s-Fz", "r-Fy"}
+    for key, at in (("s-Fx", 6), ("s-Fy", 8)):
+        r = next(r for r in result.regenerated if (r.identified.method, r.observed.key) == ("decoupling-ss", key))
+        assert r.amplitude.shape == r.frequency.shape == (2, 4)
+        theta = r.identified.theta[2]
+        k_joint = jf.Joint(theta[:6], theta[6:]).dynamic_stiffness(case.freq_hz)
+        h_c = jf.couple(exact.h_a, exact.h_b, k_joint, range(6), range(6))  # DOFs j, r, k, s
+        h, actual = (x[:, 12 + at, 12 + at] for x in (h_c, exact.h_c))
+        for b, band in enumerate(r.observed.bands):
+            assert r.amplitude[b, 2] == pytest.approx(jf.amplitude_error(actual, h, case.freq_hz, band), abs=1e-4)
+            assert r.frequency[b, 2] == pytest.approx(jf.frequency_error(actual, h, case.freq_hz, band), abs=1e-9)
+    whole = [r for r in result.regenerated if r.observed.key in ("s-Fz", "r-Fy")]
+    assert {r.bands for r in whole} == {(None,)}
+    assert {r.amplitude.shape for r in whole} == {(1, 4)}
+
+
+def test_published_errors_of_regenerated_frfs(solids):
+    tables = {table.key: table for table in make_tables(solids["4.3.2-six-dof-decoupling"])}
+    rows = {key: [row[:5] for row in tables[key].rows] for key in ("table-4-7", "table-4-8")}
+    assert [row[4] for row in rows["table-4-7"]] == [6.66, 0.25, 29.7, 1.24, None, None, 34.16, 0.62]
+    assert [row[4] for row in rows["table-4-8"]] == [1.89, 0.0, 14.76, 0.0, 1.97, 0.06, 6.65, 0.32]
+    assert rows["table-4-7"][2] == ("H_ss Fx", "30-90", "decoupling-ss", "amplitude (4.11)", 29.7)
+    assert {row[0] for row in rows["table-4-8"]} == {"H_ss Fy"}
+    for key in rows:
+        for row, full in zip(rows[key], tables[key].rows, strict=True):
+            median, low, high, share = full[5:]
+            assert 0 <= low <= median <= high
+            assert (share is None) == (row[4] is None)
+
+
+def test_sensitivities_are_drawn_where_a_parameter_moves_the_frf(solids):
+    result = solids["4.3.1-six-dof"]
+    moved = {"s-Fx": ["Fx", "Mtheta_y", "Mtheta_z"], "s-Fy": ["Fy", "Mtheta_x", "Fz"]}
+    moved |= {"s-Fz": ["Fy", "Mtheta_x", "Fz"], "r-Fy": ["Fy", "Mtheta_x", "Fz"]}
+    expected = [f"sensitivity-{key}-{dof}" for key, dofs in moved.items() for dof in dofs]
+    assert [f.key for f in make_figures(result) if f.key.startswith("sens")] == expected
+    # A change counts by its modulus, whatever its sign.
+    turned = {key: found._replace(change=-abs(found.change) + 0j) for key, found in result.sensitivities.items()}
+    again = make_figures(dataclasses.replace(result, sensitivities=turned))
+    assert [f.key for f in again if f.key.startswith("sens")] == expected
+
+
+def test_mode_shapes_of_bricks_are_drawn_true_to_scale(solids):
+    result = solids["4.3.1-six-dof"]
+    figure = next(f for f in make_figures(result) if f.key == "modes")
+    assert [panel.title.split(", ")[1] for panel in figure.panels] == [f"mostly {x}" for x in "yxyyxyx"]
+    for panel in figure.panels:
+        surface = panel.surface
+        assert surface.faces.shape == surface.edges.shape
+        moved = np.linalg.norm(surface.faces - surface.edges, axis=2)
+        assert moved.max() == pytest.approx(0.12 * 0.575, rel=1e-6)  # of the length of both beams
+        np.testing.assert_allclose(surface.values, moved.mean(axis=1) / moved.max(), atol=1e-9)
+        assert moved[surface.edges[:, :, 2].max(axis=1) == 0].max() == 0  # the clamped end
+
+
+@pytest.mark.parametrize("name", [*PLANE, *SOLID])
+def test_numbers_of_the_source_stand_at_figures_that_exist(results, solids, name):
+    result = (results | solids)[name]
+    keys = [figure.key for figure in make_figures(result)]
+    assert len(set(keys)) == len(keys)
+    assert {key for key, _ in result.case.expected.figures} <= set(keys)
+    assert result.case.expected.figures
+
+
+def test_figures_4_17_to_4_38_are_there(solids):
+    numbers = {figure.number for result in solids.values() for figure in make_figures(result)}
+    found = {number for text in numbers for number in text.split(" and ")}
+    assert {f"4-{i}" for i in range(17, 39)} <= found
+
+
+def test_numbers_and_report_of_six_dofs(solids):
+    for result in solids.values():
+        tables = make_tables(result)
+        content = json.loads(json.dumps(to_json(result)))
+        assert list(content["tables"]) == [table.key for table in tables]
+        assert len(content["natural_frequencies_hz"]["initial"]) >= 5
+        assert "H_ss Fx k_Fx" in content["proposed_bands_hz"]
+        sentences = summary(result, tables)
+        assert any("inside the central 95 % of ours" in sentence for sentence in sentences)
+        report = make_report(result.case, result.n_realisations, sentences, tables, [])
+        assert all(f'id="{table.key}"' in report for table in tables)
+        assert "<i>k</i><sub>Mθz</sub>" in report
 
 
 def test_a_realisation_depends_on_its_number_only():

@@ -1,9 +1,11 @@
 """What is wrong in a case file is told in one sentence with file and key."""
 
+import re
+
 import pytest
 
 from jointfrf.case_file import read_case
-from jointfrf.cases import find_case
+from jointfrf.cases import find_case, read_any_case
 from jointfrf.errors import FileContentError
 
 CHANGES = [
@@ -45,21 +47,126 @@ CHANGES = [
         r"\[\[joint\]\] number 1: motion must be one of translation, rotation",
     ),
     ("damping = 3.0", "damping = -3.0", r"damping must be a number, at least 0, not -3.0"),
-    ('model = "chain"', 'model = "plate"', r"model must be one of beam, chain, not 'plate'"),
+    ('model = "chain"', 'model = "plate"', r"model must be one of beam, brick-beam, chain, not 'plate'"),
     ("[study]", "[study", r"not a TOML file"),
 ]
 
 
+#: Of bricks, with six DOFs and observed FRFs.
+SOLID_CHANGES = [
+    ('preset = "seed"', 'preset = "fine"', r"\[substructure_a\]: preset must be one of seed, accurate, not 'fine'"),
+    ("origin = [0.0, 0.0, 0.0]", "origin = [0.0, 0.0]", r"\[substructure_a\]: origin must be x, y, z in m"),
+    ("poisson = 0.33", "poisson = 0.5", r"\[substructure_a\]: poisson must"),
+    ("position = 0.2875", "position = 0.3", r"\[substructure_a\]: the hole at 300 mm.* does not lie within the beam"),
+    ("position = 0.2875, ", "", r"\[substructure_a\]: \[hole\]: the key 'position' is missing"),
+    ('face = "top"', 'face = "left"', r"\[hole\]: face must be one of top, bottom.*, not 'left'"),
+    ("observed = { r = 0.15 }", "observed = { r = 0.5 }", r"\[substructure_a\]: .*r.* 500 mm"),
+    ('"r:theta_z"]', '"r:phi"]', r"\[points\]: the model has no DOF 'r:phi'"),
+    ('j = ["hole:x", ', 'j = ["r:x", ', r"\[points\]: the model has no DOF 'r:x'"),
+    ('point = "s"\ndof = "Fx"', 'point = "j"\ndof = "Fx"', r"\[\[observed\]\] number 1: point must be one of r, s"),
+    (
+        'point = "s"\ndof = "Fx"',
+        'point = "s"\ndof = "x"',
+        r"\[\[observed\]\] number 1: dof must be one of Fx, Mtheta_y,",
+    ),
+    ('point = "s"\ndof = "Fz"', 'point = "s"\ndof = "Fy"', r"two tables \[\[observed\]\] name the same FRF"),
+    ("[[30.0, 90.0], ", "[[601.0, 700.0], ", r"\[\[observed\]\] number 1: bands: .*holds no frequency line"),
+]
+
+
+#: Of a bolted lap joint.
+BOLTED_CHANGES = [
+    ("spacing_x = 0.010", "spacing_x = -0.010", r"\[measurement\]: spacing_x must be a number, at least 0, not -0.01"),
+    ("spacing_z = 0.010", "spacing_z = 0", r"\[measurement\]: spacing_z must be positive, in m, not 0"),
+    ("spacing_z = 0.010", "", r"\[measurement\]: the key 'spacing_z' is missing"),
+    ("spacing_z = 0.010", "spacing_z = 0.010\nspacing_y = 1", r"\[measurement\]: unknown key 'spacing_y'"),
+    ("[measurement]", "[measurements]", r"case\.toml: the key 'measurement' is missing"),
+    ("[contact]\nfriction = 0.3", "", r"case\.toml: the key 'contact' is missing"),
+    ("friction = 0.3", "friction = -0.3", r"\[contact\]: friction must be a number, at least 0"),
+    ('size = "M8"', 'size = "M7"', r"\[bolt\]: size must be one of M5, M6, M8, M10, M12, not 'M7'"),
+    ('"10.9"', '"11.9"', r"\[bolt\]: strength_class must be one of .*10\.9, 12\.9, not '11\.9'"),
+    ("preload_share = 0.75", "preload_share = 0", r"\[bolt\]: share must be positive, not 0"),
+    ("preload_share = 0.75", "preload_share = 75", r"\[bolt\]: share must not exceed 1"),
+    ("head_radius = 0.0065", "head_radius = 0.004", r"\[bolt\]: head_radius \(4 mm\) must exceed shank_radius"),
+    ("poisson = 0.33", "poisson = 0.5", r"\[beams\]: poisson must"),
+    ('preset = "seed"', 'preset = "fine"', r"\[beams\]: preset must be one of seed, accurate, not 'fine'"),
+    ("overlap = 0.025\n", "", r"\[beams\]: the key 'overlap' is missing"),
+    ('dof = "x"', 'dof = "y"', r"\[\[joint\]\] number 6: dofs must name 6 different DOFs"),
+    ('dof = "z"', 'dof = "Fz"', r"\[\[joint\]\] number 5: dof must be 'z', in the order x, theta_y, y, .*, not 'Fz'"),
+    ('motion = "rotation"', 'motion = "translation"', r"number 2: motion must be 'rotation', not 'translation'"),
+    ("k_theta_y = [[200.0, 500.0]]", "", r"\[bands\]: the key 'k_theta_y' is missing"),
+    (
+        "k_theta_y = [[200.0, 500.0]]",
+        "k_theta_y = [[601.0, 700.0]]",
+        r"\[bands\]: k_theta_y: .*holds no frequency line",
+    ),
+    ("block = 1", "block = 4", r"\[\[noise\]\] number 1: block must be a divisor of 6"),
+    ("[study]", "[study]\nrealization = 1", r"\[study\]: unknown key 'realization'; it takes realisations, seed"),
+    ('kind = "bolted-lap"', 'kind = "glued"', r"case\.toml: kind must be one of bolted-lap, not 'glued'"),
+]
+
+
+def check(folder, case, old, new, message):
+    text = (find_case(case) / "case.toml").read_text()
+    assert old in text
+    (folder / "case.toml").write_text(text.replace(old, new, 1))
+    with pytest.raises(FileContentError, match=message) as error:
+        read_any_case(folder)
+    sentence = str(error.value)
+    assert sentence.startswith(str(folder / "case.toml"))
+    assert "\n" not in sentence
+
+
 @pytest.mark.parametrize(("old", "new", "message"), CHANGES)
 def test_one_sentence_names_file_and_key(tmp_path, old, new, message):
-    text = (find_case("3.1") / "case.toml").read_text()
-    assert old in text
-    (tmp_path / "case.toml").write_text(text.replace(old, new, 1))
+    check(tmp_path, "3.1", old, new, message)
+
+
+@pytest.mark.parametrize(("old", "new", "message"), SOLID_CHANGES)
+def test_one_sentence_for_bricks(tmp_path, old, new, message):
+    check(tmp_path, "4.3.2", old, new, message)
+
+
+@pytest.mark.parametrize(("old", "new", "message"), BOLTED_CHANGES)
+def test_one_sentence_for_a_bolted_joint(tmp_path, old, new, message):
+    check(tmp_path, "4.3.3", old, new, message)
+
+
+def test_dofs_of_a_bolted_joint_in_another_order(tmp_path):
+    """Both are translations: only their names tell that they were exchanged."""
+    text = (find_case("4.3.3") / "case.toml").read_text()
+    text = text.replace('dof = "x"', 'dof = "?"').replace('dof = "y"', 'dof = "x"').replace('dof = "?"', 'dof = "y"')
+    (tmp_path / "case.toml").write_text(text)
+    with pytest.raises(FileContentError, match=r"number 1: dof must be 'x', in the order x, theta_y, y, .*, not 'y'"):
+        read_any_case(tmp_path)
+    (tmp_path / "case.toml").write_text(re.sub(r'\[\[joint\]\]\ndof = "theta_z"(.*\n){6}', "", text))
+    with pytest.raises(FileContentError, match=r"number 1: dof must be the first of six"):
+        read_any_case(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("band = [[30.0, 90.0]]", "band = [[30.0, 91.0]]", r"number 1: band must be one of the bands .* for s-Fx"),
+        ('observed = "s-Fx"', 'observed = "s"', r"number 1: observed must be one of s-Fx, s-Fy, s-Fz, r-Fy, not 's'"),
+        (
+            'method = "decoupling-ss"',
+            'method = "inverse_substructuring"',
+            r"number 2: method must be one of",
+        ),
+        ("central_percent = 95", "central_percent = -5", r"number 1: central_percent must be a number, at least 0"),
+        ('modes = "4-32', 'modes = 4 # "', r"\[figures\]: modes must be a text, not 4"),
+    ],
+)
+def test_expected_numbers_of_regenerated_frfs(tmp_path, old, new, message):
+    for name in ("case.toml", "expected.toml"):
+        (tmp_path / name).write_text((find_case("4.3.2") / name).read_text())
+    path = tmp_path / "expected.toml"
+    assert old in path.read_text()
+    path.write_text(path.read_text().replace(old, new, 1))
     with pytest.raises(FileContentError, match=message) as error:
         read_case(tmp_path)
-    sentence = str(error.value)
-    assert sentence.startswith(str(tmp_path / "case.toml"))
-    assert "\n" not in sentence
+    assert str(error.value).startswith(str(path))
 
 
 def test_expected_numbers_must_belong_to_the_case(tmp_path):

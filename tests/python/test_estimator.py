@@ -4,57 +4,14 @@ import numpy as np
 import pytest
 
 import jointfrf as jf
+from cramer_rao import cramer_rao
 from jointfrf.estimator import estimate, jackknife_covariance, joint_basis, reciprocity_noise
+from jointfrf.frf_noise import gamma_noise
 
 
-def symmetric(values, n):
-    """Symmetric matrices from their upper triangles."""
-    matrix = np.zeros((*values.shape[:-1], n, n), complex)
-    for position, (a, b) in enumerate(zip(*np.triu_indices(n), strict=True)):
-        matrix[..., a, b] = matrix[..., b, a] = values[..., position]
-    return matrix
-
-
-def cramer_rao(s, damping="viscous"):
-    """Bound for unit relative noise when nothing is known of the structure around the joint.
-
-    Unknown on every line: the symmetric dynamic stiffnesses Z_A + and Z_B of both sides; measured: all entries of
-    gamma.
-    """
-    n, f = s.n, s.freq
-    basis = joint_basis(2 * np.pi * f, s.joint.dofs, damping, "zero")
-    k = s.joint.dynamic_stiffness(f)
-    inverse = np.linalg.inv(s.gamma(s.joint))
-    z_a, z_b = inverse[:, :n, :n] - k, inverse[:, n:, n:] - k
-    upper = np.triu_indices(n)
-    gamma = s.gamma(s.joint)
-    p, q = len(basis.names), n * (n + 1)
-    information = np.zeros((p, p))
-    for i in range(f.size):
-
-        def model(joint, sides):
-            a, b = symmetric(sides[: q // 2], n), symmetric(sides[q // 2 :], n)
-            return np.linalg.inv(np.block([[a + joint, -joint], [-joint, b + joint]])).ravel()
-
-        sides = np.concatenate([z_a[i][upper], z_b[i][upper]])
-        columns = []
-        for matrix in basis.matrices[:, i]:
-            step = 1e-6 * abs(k[i]).max() / max(abs(matrix).max(), 1e-300)
-            columns.append((model(k[i] + step * matrix, sides) - model(k[i] - step * matrix, sides)) / (2 * step))
-        slopes = np.array(columns).T
-        nuisance = []
-        for unknown in range(q):
-            step = np.zeros(q, complex)
-            step[unknown] = 1e-5 * abs(sides[unknown])
-            nuisance.append((model(k[i], sides + step) - model(k[i], sides - step)) / (2 * step[unknown]))
-        free = np.array(nuisance).T
-        weight = 1 / abs(gamma[i].ravel())
-        slopes, free = slopes * weight[:, None], free * weight[:, None]
-        free = free / np.linalg.norm(free, axis=0)
-        # gamma is analytic in the unknowns of a line: they take a complex subspace out of the data.
-        rest = slopes - free @ np.linalg.lstsq(free, slopes, rcond=None)[0]
-        information += 2 * (rest.conj().T @ rest).real
-    return np.linalg.inv(information)
+def bound_of(s, damping="viscous"):
+    basis = joint_basis(2 * np.pi * s.freq, s.joint.dofs, damping, "zero")
+    return cramer_rao(s.gamma(s.joint), s.joint.dynamic_stiffness(s.freq), basis)
 
 
 @pytest.mark.parametrize("name", ["chains", "beams"])
@@ -62,7 +19,7 @@ def test_covariance_is_the_cramer_rao_bound(name, request):
     s = request.getfixturevalue(name)
     basis = joint_basis(2 * np.pi * s.freq, s.joint.dofs, "viscous", "zero")
     found = estimate(s.gamma(s.joint)[None], np.eye(2 * s.n), basis)
-    bound = np.sqrt(np.diag(cramer_rao(s)))
+    bound = np.sqrt(np.diag(bound_of(s)))
     np.testing.assert_allclose(np.sqrt(np.diag(found.covariance[0])), bound, rtol=1e-3)
 
 
@@ -96,7 +53,7 @@ def test_reaches_the_bound_and_covers_the_truth(beams):
     h = jf.realisations(beams.gamma(beams.joint), 0.02, seed=5, count=200)
     level = reciprocity_noise(h)
     found = estimate(h, np.eye(4), basis, level=level, tolerance=0.3)
-    bound = 0.02 * np.sqrt(np.diag(cramer_rao(beams))) / truth
+    bound = 0.02 * np.sqrt(np.diag(bound_of(beams))) / truth
     assert (spread(found, truth) / bound < 1.15).all()
     error = np.sqrt(np.einsum("raa->ra", found.covariance)) * np.maximum(level, found.residual_level)[:, None]
     inside = (abs(found.theta - truth) < 1.96 * error).mean(axis=0)
@@ -124,7 +81,7 @@ def test_ignoring_cross_terms_costs_accuracy_but_no_bias(beams):
     h = jf.realisations(beams.gamma(beams.joint), 0.02, seed=6, count=100)
     found = estimate(h, np.eye(4), basis, cross="ignore", tolerance=0.3)
     own = 0.02 * np.sqrt(np.einsum("raa->ra", found.covariance)).mean(axis=0)
-    assert (own / truth >= 0.02 * np.sqrt(np.diag(cramer_rao(beams))) / truth * 0.99).all()
+    assert (own / truth >= 0.02 * np.sqrt(np.diag(bound_of(beams))) / truth * 0.99).all()
     assert (abs(found.theta.mean(axis=0) - truth) < 0.5 * own).all()
     assert np.isnan(found.off_diagonal).all()
 
@@ -161,3 +118,27 @@ def test_noise_from_reciprocity_is_robust():
     noisy[0, :100, 0, 1] *= 50  # a few FRFs gone wrong
     assert reciprocity_noise(noisy)[0] == pytest.approx(0.03, rel=0.1)
     assert reciprocity_noise(h)[0] == 0
+
+
+def test_noise_from_reciprocity_does_not_count_zeros():
+    h = jf.realisations(np.ones((500, 6, 6), complex), 0.03, seed=1)
+    inside = np.kron(np.eye(3), np.ones((2, 2))) > 0
+    h = np.where(inside, h, 1e-14 * np.random.default_rng(1).standard_normal(h.shape))
+    assert reciprocity_noise(h)[0] == pytest.approx(0.03, rel=0.1)
+    assert reciprocity_noise(h * np.eye(6))[0] == 0
+
+
+def test_noise_of_gamma_jk_by_sampling(beams):
+    """The largest eigenvalue of the mean squares of gamma_jk^-1 dgamma_jk, and its independence of units."""
+    gamma = beams.gamma(beams.joint)[::20]
+    e = jf.realisations(gamma, 0.01, seed=3, count=4000) - gamma
+    ratio = np.linalg.solve(gamma[:, :2, 2:], e[:, :, :2, 2:])
+    sampled = np.sqrt(abs(np.linalg.eigvals((abs(ratio) ** 2).mean(axis=0))).max(axis=1))
+    found = gamma_noise(gamma[None], np.eye(4), np.array([0.01]), None)[0]
+    np.testing.assert_allclose(found, sampled, rtol=0.05)
+    units = np.diag([1, 1e3, 1, 1e3])
+    scaled = gamma_noise((units @ gamma @ units)[None], np.eye(4), np.array([0.01]), None)[0]
+    np.testing.assert_allclose(scaled, found, rtol=1e-9)
+    whole = np.sqrt((abs(ratio) ** 2).mean(axis=0)[:, [0, 1], [0, 1]].max(axis=1))
+    diagonal = gamma_noise(gamma[None], np.eye(4), np.array([0.01]), None, whole=False)[0]
+    np.testing.assert_allclose(diagonal, whole, rtol=0.05)

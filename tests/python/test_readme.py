@@ -21,13 +21,23 @@ def blocks(language: str) -> list[str]:
 
 
 def test_python_example(capsys):
-    (example,) = blocks("python")
+    example, _ = blocks("python")
     names: dict[str, object] = {}
     exec(example, names)
     fit = names["fit"]
     assert fit.stiffness[0] == pytest.approx(2000, rel=0.01)
     assert fit.damping[0] == pytest.approx(3, rel=0.15)
     assert capsys.readouterr().out.rstrip().endswith("%")
+
+
+def test_python_example_of_solid_bodies(capsys):
+    _, example = blocks("python")
+    exec(example, {})
+    printed = capsys.readouterr().out
+    found = {line.split()[0]: float(line.split()[1]) for line in printed.splitlines() if line[:2] in ("k_", "c_")}
+    assert found["k_x"] == pytest.approx(1e6, rel=0.02)
+    assert found["k_theta_x"] == pytest.approx(1e3, rel=0.05)
+    assert len(found) == 12
 
 
 def words(text: str) -> list[float | str]:

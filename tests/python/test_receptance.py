@@ -1,10 +1,13 @@
-"""Receptances of models: dense, banded and modal against each other and against closed forms."""
+"""Receptances of models: all methods against each other, plain inverses, closed forms, and without rigid motions."""
 
 import numpy as np
 import pytest
-from scipy import sparse
+from scipy import linalg, sparse
+from scipy.sparse import linalg as sparse_linalg
 
 import jointfrf as jf
+from jointfrf import reduction
+from jointfrf.direct_solution import SYMMETRIC, _reciprocal_condition
 
 
 def model(n=12, seed=0):
@@ -23,7 +26,7 @@ def model(n=12, seed=0):
 FREQ = np.array([0.0, 1.3, 4.0, 9.7])
 
 
-@pytest.mark.parametrize("method", ["dense", "banded"])
+@pytest.mark.parametrize("method", ["dense", "banded", "sparse"])
 def test_against_a_plain_inverse_of_a_non_symmetric_model(method):
     k, m, c, h = model()
     found = jf.receptance(FREQ, k, m, c, 0.03, h, [3, 0], [1, 5, 11], method=method)
@@ -64,12 +67,12 @@ def test_modal_refuses_what_it_cannot_do():
 def test_single_degree_of_freedom():
     freq = np.array([0.0, 1.0, 2.0])
     omega = 2 * np.pi * freq
-    for method in ("dense", "banded", "modal"):
+    for method in ("dense", "banded", "sparse", "modal"):
         found = jf.receptance(freq, [[50.0]], [[0.3]], [[0.7]], 0.01, method=method)[:, 0, 0]
         np.testing.assert_allclose(found, 1 / (50 * (1 + 0.01j) - 0.3 * omega**2 + 0.7j * omega), rtol=1e-12)
 
 
-@pytest.mark.parametrize("method", ["dense", "banded", "modal"])
+@pytest.mark.parametrize("method", ["dense", "banded", "sparse", "modal"])
 def test_a_line_on_an_undamped_resonance_is_singular(method):
     freq = np.array([1.0, np.sqrt(2.0) / (2 * np.pi), 0.0])
     k, m = np.diag([4.0, 0.0]), np.diag([1.0, 1.0])
@@ -172,7 +175,8 @@ def test_krylov_refuses_damping_that_couples_the_modes():
         jf.receptance(LINES, k + sparse.triu(k, 1), m, method="krylov")
 
 
-def test_a_tolerance_that_cannot_be_met_leads_to_a_direct_solution_and_is_told():
+def test_a_tolerance_that_cannot_be_met_leads_to_a_direct_solution_and_is_told(monkeypatch):
+    monkeypatch.setattr(reduction, "_LOSS", 0)  # rounding is no excuse
     k, m = plate(9)
     arguments = dict(loss_factor=0.02, outputs=[0], inputs=[0], tolerance=1e-18, full_output=True)
     with pytest.warns(jf.ConvergenceWarning, match=r"above the tolerance 1\.0e-18"):
@@ -182,6 +186,16 @@ def test_a_tolerance_that_cannot_be_met_leads_to_a_direct_solution_and_is_told()
     assert relative_error(h, solved_by_numpy(LINES, k, m, None, 0.02, [0])) < 1e-11
     h, info = jf.receptance(LINES, k.toarray(), m.toarray(), **arguments)
     assert info.method == "banded"
+
+
+def test_a_reduced_model_need_not_be_better_than_rounding():
+    k, m = plate(9)
+    h, info = jf.receptance(
+        LINES, k, m, None, 0.02, outputs=[0], inputs=[0], method="krylov", tolerance=1e-18, full_output=True
+    )
+    assert info.method == "krylov"
+    assert info.tolerance < info.error_estimate < 1e-12
+    assert relative_error(h, solved_by_numpy(LINES, k, m, None, 0.02, [0])) < 1e-11
 
 
 @pytest.mark.parametrize(
@@ -233,14 +247,14 @@ def test_auto_reduces_a_large_model_with_a_wide_band():
     assert relative_error(h[::20], exact) < 1e-8
 
 
-def solved_in_long_double(freq, k, m, eta, dofs):
+def solved_in_long_double(freq, k, m, eta, dofs, band=6):
     """Elimination without exchanging rows in 80 bits, for symmetric matrices with a positive loss factor."""
     result = []
     for omega in 2 * np.pi * freq.astype(np.longdouble):
         z = k.astype(np.longdouble) * np.clongdouble(1 + 1j * eta) - omega**2 * m.astype(np.longdouble)
         x = np.eye(len(k), dtype=np.clongdouble)[:, dofs]
         for p in range(len(k)):
-            below = slice(p + 1, min(p + 7, len(k)))
+            below = slice(p + 1, min(p + 1 + band, len(k)))
             factor = z[below, p] / z[p, p]
             z[below] -= factor[:, None] * z[p]
             x[below] -= factor[:, None] * x[p]
@@ -263,3 +277,235 @@ def test_a_chain_side_by_side_is_as_accurate_as_zgbsv():
         errors[engine] = abs(h - exact).max(axis=(1, 2)) / abs(exact).max(axis=(1, 2))
     assert errors["auto"].max() < 2 * errors["lapack"].max()
     assert errors["auto"].max() < 1e-6
+
+
+ALUMINIUM = jf.Material(70e9, 0.33, 2700.0, loss_factor=0.01)
+ENDS = [f"{end}:{d}" for end in "ab" for d in ("x", "y", "z", "theta_x", "theta_y", "theta_z")]
+
+
+def bricks(ends, size=(0.3, 0.025, 0.006), divisions=(2, 2, 20)):
+    """Beam of bricks with a reference point at every end that is free."""
+    sections = {"a": 0.0, "b": size[0]} if ends[0] == "free" else {"b": size[0]}
+    return jf.brick_beam(*size, ALUMINIUM, ends=ends, sections=sections, divisions=divisions)
+
+
+@pytest.fixture(scope="module")
+def free_beam():
+    return bricks(("free", "free"))
+
+
+WIDE = np.linspace(1.0, 1200.0, 300)
+
+
+def test_krylov_and_sparse_agree_on_a_beam_that_is_held():
+    beam = bricks(("clamped", "free"), (0.08, 0.025, 0.02), (3, 3, 8))
+    at = beam.index("b:x", "b:y", "b:theta_x", "51:z")
+    freq = np.linspace(1.0, 17e3, 300)  # over the first six modes
+    given = dict(stiffness=beam.stiffness, mass=beam.mass, loss_factor=0.01, outputs=at, inputs=at)
+    h, info = jf.receptance(freq, method="krylov", tolerance=1e-9, full_output=True, **given)
+    assert info.method == "krylov"
+    spots = [0, 14, 62, 87, 200, 299]
+    exact, direct = jf.receptance(freq[spots], method="sparse", full_output=True, **given)
+    assert (direct.method, direct.reason, direct.error_estimate) == ("sparse", "as asked for", None)
+    assert relative_error(h[spots], exact) < 1e-9
+
+
+def test_on_a_slender_beam_krylov_loses_no_more_than_a_direct_solution():
+    beam = bricks(("clamped", "free"), divisions=(1, 1, 20))
+    at = beam.index("b:x", "b:y", "b:theta_x", "20:z")
+    given = dict(stiffness=beam.stiffness, mass=beam.mass, loss_factor=0.01, outputs=at, inputs=at)
+    h, info = jf.receptance(WIDE, method="krylov", tolerance=1e-12, full_output=True, **given)
+    assert info.method == "krylov"
+    spots = [0, 2, 40, 150]
+    k, m = beam.stiffness.toarray(), beam.mass.toarray()
+    exact = solved_in_long_double(WIDE[spots], k, m, 0.01, at, band=len(k))
+    sparse_error = relative_error(jf.receptance(WIDE[spots], method="sparse", **given), exact)
+    assert sparse_error > 1e-12  # rounding stands in the way of the tolerance
+    assert relative_error(h[spots], exact) < 3 * sparse_error
+
+
+def without_rigid_motions(beam, freq, forces):
+    """Elastic and rigid motion of a free body, by lines: the one regularised by M r r^T M, the other by its mass."""
+    k, m = beam.stiffness.toarray(), beam.mass.toarray()
+    rigid = np.zeros((len(beam.dofs), 6))
+    for row, dof in enumerate(beam.dofs):
+        name, direction = dof.split(":")
+        place = beam.references[name] if name in beam.references else beam.mesh.nodes[int(name) - 1]
+        axis = ("x", "y", "z", "theta_x", "theta_y", "theta_z").index(direction)
+        for column, unit in enumerate(np.eye(6)):
+            rigid[row, column] = np.append(unit[:3] + np.cross(unit[3:], place), unit[3:])[axis]
+    rigid = linalg.solve_triangular(linalg.cholesky(rigid.T @ m @ rigid), rigid.T, trans="T").T
+    momenta = m @ rigid
+    left = forces - momenta @ (rigid.T @ forces)
+    stiff = (abs(k).max() / abs(m).max()) * 1e-4
+    for omega in 2 * np.pi * freq:
+        elastic = np.linalg.solve((1 + 0.01j) * k - omega**2 * m + stiff * momenta @ momenta.T, left)
+        yield elastic - rigid @ (momenta.T @ elastic), -rigid @ (rigid.T @ forces) / omega**2
+
+
+def test_krylov_on_a_free_beam_near_0_hz(free_beam):
+    """Where a direct solution has lost most of its digits."""
+    at = free_beam.index(*ENDS)
+    freq = np.array([1.0, 5.0, 40.0, *WIDE[50:]])
+    k, m = free_beam.stiffness, free_beam.mass
+    h, info = jf.receptance(freq, k, m, None, 0.01, outputs=at, inputs=at, method="krylov", full_output=True)
+    assert info.method == "krylov"
+    forces = np.eye(len(free_beam.dofs))[:, at]
+    parts = without_rigid_motions(free_beam, freq[:3], forces)
+    exact = np.array([(elastic + rigid)[at] for elastic, rigid in parts])
+    size = np.sqrt(abs(np.einsum("fii->fi", exact)))
+    # each entry against its own kind: metres and radians
+    assert (abs(h[:3] - exact) / (size[:, :, None] * size[:, None, :])).max() < 1e-9
+    direct = jf.receptance(freq[:1], k, m, None, 0.01, outputs=at, inputs=at, method="sparse")
+    assert relative_error(direct, exact[:1]) > 1e-8
+
+
+def test_what_strains_a_free_beam_is_as_exact_as_if_it_were_held(free_beam):
+    """Equal and opposite forces: no motion as a rigid body is left to hide errors."""
+    stretch = np.zeros((2, len(free_beam.dofs)))
+    stretch[0, free_beam.index("b:z", "a:z")] = 1, -1
+    stretch[1, free_beam.index("b:theta_x", "a:theta_x")] = 1, -1
+    freq = np.array([1.0, 5.0, *WIDE[50:]])
+    given = dict(loss_factor=0.01, outputs=stretch, inputs=stretch, method="krylov", full_output=True)
+    h, info = jf.receptance(freq, free_beam.stiffness, free_beam.mass, **given)
+    assert info.method == "krylov"
+    exact = [stretch @ elastic for elastic, _ in without_rigid_motions(free_beam, freq[:2], stretch.T)]
+    np.testing.assert_allclose(h[:2, [0, 1], [0, 1]], np.diagonal(exact, axis1=1, axis2=2), rtol=1e-9)
+    # a bar that stretches, far below its first natural frequency
+    assert h[0, 0, 0].real == pytest.approx(0.3 / (70e9 * 0.025 * 0.006), rel=0.02)
+
+
+@pytest.mark.parametrize("method", ["krylov", "auto"])
+def test_a_free_beam_is_singular_at_0_hz_only(free_beam, method):
+    at = free_beam.index("a:y", "b:y")
+    given = dict(stiffness=free_beam.stiffness, mass=free_beam.mass, loss_factor=0.01, outputs=at, inputs=at)
+    freq = np.linspace(0.0, 400.0, 41)
+    if method == "krylov":
+        with pytest.raises(jf.SingularLineError, match=r"line 0 \(0 Hz\)"):
+            jf.receptance(freq, method=method, **given)
+        h = jf.receptance(freq, method=method, on_singular="nan", **given)
+        assert np.isnan(h[0]).all()
+    else:
+        h = np.concatenate([np.full((1, 2, 2), np.nan), jf.receptance(freq[1:], method=method, **given)])
+    exact = jf.receptance(freq[[2, 20, 40]], method="sparse", **given)
+    assert relative_error(h[[2, 20, 40]], exact) < 1e-6
+
+
+def test_a_direct_solution_of_a_free_beam_at_0_hz_warns(free_beam):
+    at = free_beam.index("a:y", "b:y")
+    for method in ("dense", "sparse"):
+        with pytest.warns(jf.IllConditionedWarning, match=r"1 of 2 lines are ill-conditioned, worst line 0 \(0 Hz\)"):
+            jf.receptance([0.0, 300.0], free_beam.stiffness, free_beam.mass, outputs=at, inputs=at, method=method)
+
+
+@pytest.mark.parametrize("n", [1, 4, 12, 80])
+def test_the_condition_of_a_sparse_line(n):
+    rng = np.random.default_rng(n)
+    z = sparse.csc_matrix(np.diag(10.0 ** rng.uniform(-4, 2, n)) + 0.1 * rng.standard_normal((n, n)) / n + 0.01j)
+    found = _reciprocal_condition(z, sparse_linalg.splu(z, **SYMMETRIC))
+    exact = 1 / np.linalg.cond(z.toarray(), 1)
+    assert exact * (1 - 1e-10) < found < 3 * exact
+
+
+def coupled_plate(n_side):
+    """A wide band without order, and damping that couples the modes."""
+    k, m = plate(n_side)
+    rng = np.random.default_rng(4)
+    order = rng.permutation(n_side**2)
+    k, m = k[order][:, order], m[order][:, order]
+    c = sparse.diags_array(rng.uniform(0, 5, n_side**2))
+    h = sparse.diags_array(rng.uniform(0, 50, n_side**2))
+    return k, m, sparse.csr_array(c), sparse.csr_array(h)
+
+
+def test_auto_factors_a_large_model_of_few_entries_whose_damping_couples_the_modes():
+    k, m, c, h = coupled_plate(26)
+    found, info = jf.receptance(LINES, k, m, c, 0.02, h, outputs=[0, 9], inputs=[9], full_output=True)
+    assert (info.method, info.reason) == ("sparse", "damping couples the modes")
+    assert (info.error_estimate, info.tolerance, info.n_vectors) == (None, None, None)
+    for i in (0, 31, 59):
+        z = (1 + 0.02j) * k + 1j * h + 2j * np.pi * LINES[i] * c - (2 * np.pi * LINES[i]) ** 2 * m
+        exact = np.linalg.solve(z.toarray(), np.eye(26**2)[:, [9]])[[0, 9]]
+        np.testing.assert_allclose(found[i], exact, rtol=1e-9)
+    assert jf.receptance(LINES[:3], k, m, c, full_output=True, outputs=[0], inputs=[0])[1].method == "sparse"
+
+
+METHODS = ["auto", "dense", "banded", "sparse", "modal", "krylov"]
+
+
+@pytest.mark.parametrize("kind", [np.asarray, sparse.csr_array, sparse.coo_array, np.ndarray.tolist])
+@pytest.mark.parametrize("method", METHODS)
+def test_weights_are_products_with_the_whole_matrix(method, kind):
+    k, m = plate(9)
+    rng = np.random.default_rng(5)
+    to, into = np.zeros((4, 81)), np.zeros((2, 81))
+    to[0, [3, 4, 5]] = 1 / 3  # a mean
+    to[1, [70, 10]] = 1, -1  # a difference
+    to[2, rng.integers(0, 81, 20)] = rng.standard_normal(20)
+    into[0, 70] = -2.5
+    into[1, [8, 3]] = 0.5
+    whole = solved_by_numpy(LINES, k, m, None, 0.02, range(81))
+    given = dict(loss_factor=0.02, method=method)
+    found = jf.receptance(LINES, k, m, outputs=kind(to), inputs=kind(into), **given)
+    np.testing.assert_array_equal(found[:, 3], 0)  # a row without weights
+    assert relative_error(found, to @ whole @ into.T) < 1e-8
+    dofs = jf.receptance(LINES, k, m, outputs=[5, 70, 5], inputs=kind(into), **given)
+    assert relative_error(dofs, whole[:, [5, 70, 5]] @ into.T) < 1e-8
+    np.testing.assert_allclose(dofs[:, 0], dofs[:, 2], rtol=1e-12)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_weights_that_are_all_zero_see_nothing(method):
+    k, m = plate(9)
+    given = dict(loss_factor=0.02, method=method)
+    assert not jf.receptance(LINES, k, m, outputs=np.zeros((2, 81)), inputs=[4], **given).any()
+    assert not jf.receptance(LINES, k, m, outputs=np.zeros((2, 81)), inputs=np.zeros((1, 81)), **given).any()
+    assert jf.receptance(LINES, k, m, outputs=np.zeros((0, 81)), inputs=[4], **given).shape == (60, 0, 1)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_results_go_where_the_caller_wants_them(method):
+    k, m = plate(9)
+    for at in ([4, 8], np.eye(81)[[4, 8]]):
+        out = np.full((60, 2, 2), np.nan + 0j)
+        arguments = dict(loss_factor=0.02, outputs=at, inputs=at, method=method)
+        assert jf.receptance(LINES, k, m, out=out, **arguments) is out
+        np.testing.assert_allclose(out, jf.receptance(LINES, k, m, **arguments), rtol=1e-12)
+        with pytest.raises(ValueError, match=r"out must have shape \(60, 2, 2\), not \(60, 2, 3\)"):
+            jf.receptance(LINES, k, m, out=np.zeros((60, 2, 3), complex), **arguments)
+
+
+def test_a_bad_line_of_a_sparse_sweep_leaves_the_others():
+    k, m = sparse.diags_array([4.0, 9.0, 1.0]), sparse.eye_array(3)
+    freq = np.array([0.1, 3 / (2 * np.pi), 0.7])
+    k = sparse.csr_array(k) * (1 / 9)
+    m = sparse.csr_array(m) * (1 / ((2 * np.pi * freq[1]) ** 2))
+    out = np.zeros((3, 3, 3), complex)
+    with pytest.raises(jf.SingularLineError, match=r"line 1 \(0.477465 Hz\)") as caught:
+        jf.receptance(freq, k, m, method="sparse", out=out)
+    assert caught.value.lines.tolist() == [1]
+    kept = jf.receptance(freq, k, m, method="sparse", on_singular="nan")
+    np.testing.assert_array_equal(kept, out)
+    assert np.isnan(kept[1]).all()
+    omega = 2 * np.pi * freq[[0, 2], None]
+    exact = 1 / (np.array([4, 9, 1]) / 9 - omega**2 / (2 * np.pi * freq[1]) ** 2)
+    np.testing.assert_allclose(np.diagonal(kept[[0, 2]], axis1=1, axis2=2), exact, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("outputs", "error", "message"),
+    [
+        (np.ones((2, 11)), ValueError, r"outputs must be DOFs, or weights of shape \(m, 12\), not \(2, 11\)"),
+        (sparse.csr_array((2, 11)), ValueError, r"outputs must be DOFs, or weights of shape \(m, 12\), not \(2, 11\)"),
+        (np.full((1, 12), np.nan), ValueError, "outputs holds NaN or Inf"),
+        (sparse.csr_array(np.full((1, 12), np.inf)), ValueError, "outputs holds NaN or Inf"),
+        (1j * np.ones((1, 12)), TypeError, "outputs must hold real numbers, not complex128"),
+        (sparse.csr_array(1j * np.ones((1, 12))), TypeError, "outputs must hold real numbers, not complex128"),
+        (np.ones((1, 12, 1)), TypeError, "outputs must be a list of DOF numbers"),
+        ([0.5], TypeError, "outputs must be a list of DOF numbers"),
+    ],
+)
+def test_bad_weights_get_one_sentence(outputs, error, message):
+    k, m, _, _ = model()
+    with pytest.raises(error, match=message):
+        jf.receptance(FREQ, k, m, outputs=outputs)

@@ -1,0 +1,261 @@
+"""Structured meshes of eight-node bricks: plane quadrilaterals, with holes and discs, drawn out over the thickness."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial import cKDTree
+
+from jointfrf._sweep import FloatArray, as_number, as_real
+
+__all__ = ["Mesh", "Plan", "as_count", "disc", "extrude", "holed_rectangle", "join_plans", "rectangle"]
+
+#: Points nearer than this share of the extent of a mesh are one node.
+_SAME = 1e-7
+#: Half the side of the square in the middle of a disc, as a share of the radius.
+_CORE = 0.55
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Quadrilaterals in the plane of z and x, counter-clockwise there.
+
+    Attributes
+    ----------
+    points : ndarray, shape (n_points, 2)
+        z and x, m.
+    quads : ndarray of int, shape (n_quads, 4)
+        Points of each, counted from 0.
+    """
+
+    points: FloatArray
+    quads: NDArray[np.int32]
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """Nodes and eight-node bricks.
+
+    Attributes
+    ----------
+    nodes : ndarray, shape (n_nodes, 3)
+        x, y, z, m.
+    elements : ndarray of int, shape (n_elements, 8)
+        Nodes of each, counted from 0: lower face counter-clockwise seen from above, then the upper face.
+    """
+
+    nodes: FloatArray
+    elements: NDArray[np.int32]
+
+    def near(self, point: ArrayLike) -> int:
+        """Return the node at a point.
+
+        Raises
+        ------
+        ValueError
+            There is none.
+        """
+        place = as_real("point", point, (3,))
+        distance, found = cKDTree(self.nodes).query(place)
+        if distance > 10 * _SAME * _extent(self.nodes):
+            at = ", ".join(f"{1e3 * x:g}" for x in place)
+            raise ValueError(f"no node lies at x, y, z = {at} mm; the nearest is {1e3 * distance:.3g} mm away")
+        return int(found)
+
+    def faces(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+        """Return the outer faces, shape (n_faces, 4), seen counter-clockwise from outside, and their elements."""
+        every = self.elements[:, _FACES].reshape(-1, 4)
+        _, first, count = np.unique(np.sort(every, axis=1), axis=0, return_index=True, return_counts=True)
+        outer = np.sort(first[count == 1])
+        return every[outer], (outer // len(_FACES)).astype(np.int32)
+
+
+#: Faces of a brick, counter-clockwise from outside.
+_FACES = np.array([[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]])
+
+
+def as_count(name: str, value: object) -> int:
+    """Return a whole number of at least 1."""
+    number = as_number(name, value)
+    if number < 1 or number != int(number):
+        raise ValueError(f"{name} must be a whole number, at least 1, not {value}")
+    return int(number)
+
+
+def rectangle(z: ArrayLike, x: ArrayLike) -> Plan:
+    """Rectangle with grid lines at given places.
+
+    Parameters
+    ----------
+    z, x : array_like, shape (n_z,), (n_x,)
+        Ascending, m.
+
+    Returns
+    -------
+    Plan
+    """
+    lines = [as_real(name, value, (None,)) for name, value in (("z", z), ("x", x))]
+    for name, line in zip("zx", lines, strict=True):
+        if line.size < 2 or (np.diff(line) <= 0).any():
+            raise ValueError(f"{name} must hold at least two grid lines in ascending order")
+    grid = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1)
+    number = np.arange(grid[..., 0].size).reshape(grid.shape[:2])
+    quads = np.stack([number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]], axis=-1)
+    return Plan(grid.reshape(-1, 2), quads.reshape(-1, 4).astype(np.int32))
+
+
+def holed_rectangle(
+    centre: ArrayLike, reach: tuple[float, float, float], radii: Sequence[float], divisions: int, layers: int = 1
+) -> Plan:
+    """Rectangle around a round hole: rings at given radii, then layers that pass from the circle to the edges.
+
+    Parameters
+    ----------
+    centre : array_like, shape (2,)
+        z and x of the middle of the hole, m.
+    reach : tuple of float
+        How far the rectangle reaches from there: to lower z, to higher z, and along x to either side, m.
+    radii : sequence of float
+        Radius of the hole, then of the rings around it, m.
+    divisions : int
+        Quadrilaterals along an edge.
+    layers : int
+        Quadrilaterals from the last circle to the edges.
+
+    Returns
+    -------
+    Plan
+
+    Raises
+    ------
+    ValueError
+        The circles do not grow, or leave the rectangle; numbers of quadrilaterals below 1.
+    """
+    as_count("layers", layers)
+    if not radii or not _grow([*radii, min(reach)]):
+        raise ValueError(
+            f"radii {', '.join(f'{1e3 * r:g}' for r in radii)} mm must grow from the hole outwards and stay within "
+            f"the nearest edge, {1e3 * min(reach):g} mm from its middle"
+        )
+    circle, square = _around(divisions)
+    edge = square * np.where(square[:, :1] < 0, [reach[0], reach[2]], [reach[1], reach[2]])
+    rows = [r * circle for r in radii]
+    rows += [rows[-1] + (edge - rows[-1]) * (i / layers) for i in range(1, layers + 1)]
+    return _rings(np.asarray(centre, float), rows)
+
+
+def disc(centre: ArrayLike, radii: Sequence[float], divisions: int, layers: int = 1) -> Plan:
+    """Disc: a square core, layers from it to the first circle, then rings.
+
+    Parameters
+    ----------
+    centre : array_like, shape (2,)
+        z and x of the middle, m.
+    radii : sequence of float
+        Ascending, m.
+    divisions : int
+        Quadrilaterals along a side of the core.
+    layers : int
+        Quadrilaterals from the core to the first circle.
+
+    Returns
+    -------
+    Plan
+
+    Raises
+    ------
+    ValueError
+        The circles do not grow; numbers of quadrilaterals below 1.
+    """
+    as_count("layers", layers)
+    if not radii or not _grow(radii):
+        raise ValueError(f"radii {', '.join(f'{1e3 * r:g}' for r in radii)} mm must grow from the middle outwards")
+    circle, square = _around(divisions)
+    core = _CORE * radii[0]
+    rows = [core * square + (radii[0] * circle - core * square) * (i / layers) for i in range(layers + 1)]
+    rows += [r * circle for r in radii[1:]]
+    place = np.asarray(centre, float)
+    lines = np.linspace(-core, core, divisions + 1)
+    return join_plans(rectangle(place[0] + lines, place[1] + lines), _rings(place, rows))
+
+
+def _grow(radii: Sequence[float]) -> bool:
+    return all(b > a for a, b in pairwise([0.0, *radii]))
+
+
+def _around(divisions: int) -> tuple[FloatArray, FloatArray]:
+    """Points once around, counter-clockwise: on the unit circle, and on the square of half side 1."""
+    as_count("divisions", divisions)
+    along = np.linspace(-1, 1, divisions + 1)[:-1]
+    side = np.stack([np.ones(divisions), along], axis=1)
+    arc = np.stack([np.cos(np.pi / 4 * along), np.sin(np.pi / 4 * along)], axis=1)
+    turn = np.array([[0.0, 1.0], [-1.0, 0.0]])
+    quarters = [np.linalg.matrix_power(turn, i) for i in range(4)]
+    return np.concatenate([arc @ q for q in quarters]), np.concatenate([side @ q for q in quarters])
+
+
+def _rings(centre: FloatArray, rows: Sequence[FloatArray]) -> Plan:
+    """Quadrilaterals between closed rows of points, the innermost first."""
+    number = np.arange(len(rows) * len(rows[0])).reshape(len(rows), -1)
+    after = np.roll(number, -1, axis=1)
+    quads = np.stack([number[:-1], number[1:], after[1:], after[:-1]], axis=-1)
+    return Plan(centre + np.concatenate(rows), quads.reshape(-1, 4).astype(np.int32))
+
+
+def join_plans(*plans: Plan) -> Plan:
+    """One plan of several; points at the same place become one."""
+    points = np.concatenate([p.points for p in plans])
+    starts = np.cumsum([0, *(len(p.points) for p in plans[:-1])])
+    quads = np.concatenate([p.quads + start for p, start in zip(plans, starts, strict=True)])
+    number, kept = _merged(points)
+    return Plan(points[kept], number[quads])
+
+
+def extrude(*parts: tuple[Plan, ArrayLike]) -> Mesh:
+    """Bricks over the quadrilaterals of plans, between heights y; nodes at the same place become one.
+
+    Parameters
+    ----------
+    *parts : (Plan, array_like of shape (n_layers + 1,))
+        Plan and ascending heights, m, of each part of one body.
+
+    Returns
+    -------
+    Mesh
+        Layers of a part from the lowest up.
+    """
+    nodes, elements, start = [], [], 0
+    for plan, heights in parts:
+        y = as_real("heights", heights, (None,))
+        if y.size < 2 or (np.diff(y) <= 0).any():
+            raise ValueError("heights must hold at least two values in ascending order")
+        count = len(plan.points)
+        layer = np.empty((y.size, count, 3))
+        layer[:, :, 0], layer[:, :, 1], layer[:, :, 2] = plan.points[:, 1], y[:, None], plan.points[:, 0]
+        nodes.append(layer.reshape(-1, 3))
+        base = start + count * np.arange(y.size - 1)[:, None, None] + plan.quads
+        elements.append(np.concatenate([base, base + count], axis=2).reshape(-1, 8))
+        start += layer.size // 3
+    every = np.concatenate(nodes)
+    number, kept = _merged(every)
+    return Mesh(every[kept], number[np.concatenate(elements)])
+
+
+def _extent(points: FloatArray) -> float:
+    return float(np.ptp(points, axis=0).max())
+
+
+def _merged(points: FloatArray) -> tuple[NDArray[np.int32], NDArray[np.intp]]:
+    """Return the new number of every point, and which points are kept, in their order."""
+    pairs = cKDTree(points).query_pairs(_SAME * _extent(points), output_type="ndarray")
+    first = np.arange(len(points))
+    # The lower number of a pair stays; pairs of one place all name its lowest point, since all are near each other.
+    np.minimum.at(first, pairs[:, 1], pairs[:, 0])
+    kept = np.flatnonzero(first == np.arange(len(points)))
+    number = np.full(len(points), -1, np.int32)
+    number[kept] = np.arange(kept.size)
+    return number[first], kept

@@ -1,0 +1,52 @@
+"""The Cramer-Rao bound of a joint between unknown structures, by differences: nothing shared with the fit."""
+
+import numpy as np
+
+
+def symmetric(values, n):
+    """Symmetric matrices from their upper triangles."""
+    matrix = np.zeros((*values.shape[:-1], n, n), complex)
+    for position, (a, b) in enumerate(zip(*np.triu_indices(n), strict=True)):
+        matrix[..., a, b] = matrix[..., b, a] = values[..., position]
+    return matrix
+
+
+def cramer_rao(gamma, k_joint, basis):
+    """Covariance for unit relative noise of independent entries of gamma, when nothing is known around the joint.
+
+    Unknown on every line: the symmetric dynamic stiffnesses Z_A and Z_B of both sides; measured: all entries of gamma.
+    """
+    n = k_joint.shape[-1]
+    inverse = np.linalg.inv(gamma)
+    z_a, z_b = inverse[:, :n, :n] - k_joint, inverse[:, n:, n:] - k_joint
+    upper = np.triu_indices(n)
+    p, q = len(basis.names), n * (n + 1)
+    information = np.zeros((p, p))
+    for i, k in enumerate(k_joint):
+
+        def model(joint, sides):
+            a, b = symmetric(sides[..., : q // 2], n), symmetric(sides[..., q // 2 :], n)
+            joint, a, b = np.broadcast_arrays(joint, a, b)
+            whole = np.concatenate(
+                [np.concatenate([a + joint, -joint], axis=-1), np.concatenate([-joint, b + joint], axis=-1)], axis=-2
+            )
+            return np.linalg.inv(whole).reshape(*whole.shape[:-2], -1)
+
+        sides = np.concatenate([z_a[i][upper], z_b[i][upper]])
+        size = np.sqrt(np.outer(abs(np.diagonal(k)), abs(np.diagonal(k))))
+        matrices = basis.matrices[:, i]
+        steps = np.array([1e-6 * (size / np.where(m != 0, abs(m), np.inf)).max() for m in matrices])
+        moved = steps[:, None, None] * matrices
+        slopes = ((model(k + moved, sides) - model(k - moved, sides)) / (2 * steps[:, None])).T
+        roots = [np.sqrt(abs(np.diagonal(z[i]))) for z in (z_a, z_b)]
+        steps = 1e-5 * np.concatenate([np.outer(root, root)[upper] for root in roots])
+        moved = np.diag(steps).astype(complex)
+        free = ((model(k, sides + moved) - model(k, sides - moved)) / (2 * steps[:, None])).T
+        weight = 1 / abs(gamma[i].ravel())[:, None]
+        slopes, free = slopes * weight, free * weight
+        free = free / np.linalg.norm(free, axis=0)
+        # gamma is analytic in the unknowns of a line: they take a complex subspace out of the data.
+        rest = slopes - free @ np.linalg.lstsq(free, slopes, rcond=None)[0]
+        information += 2 * (rest.conj().T @ rest).real
+    size = np.sqrt(np.diag(information))
+    return np.linalg.inv(information / np.outer(size, size)) / np.outer(size, size)
