@@ -6,10 +6,6 @@ Time convention exp(+i w t). Arrays over frequency have shape (n_freq, out, in),
 from jointfrf._sweep import RCOND_LIMIT, VERSION
 from jointfrf.bands import as_bands, band_mean, in_bands, propose_bands, sensitivity
 from jointfrf.beam import beam
-from jointfrf.bolt import PROOF_STRENGTH, STRESS_AREA, Bolt, preload_force
-from jointfrf.bolted_lap import BoltedLap, LapDivisions, bolted_lap
-from jointfrf.brick import Material, assemble_bricks, brick_quality, element_matrices
-from jointfrf.brick_beam import Hole, brick_beam
 from jointfrf.compliance import compliance_covariance, compliance_factors, joint_compliance
 from jointfrf.consistency import (
     Consistency,
@@ -18,7 +14,6 @@ from jointfrf.consistency import (
     impact_consistency,
     sensor_consistency,
 )
-from jointfrf.contact_pairs import ContactLaw
 from jointfrf.coupling import couple
 from jointfrf.decoupling import decouple
 from jointfrf.discrete import chain
@@ -34,23 +29,28 @@ from jointfrf.errors import (
 )
 from jointfrf.identify import identify
 from jointfrf.interface import Interface, interface
-from jointfrf.interpolation import interpolation
 from jointfrf.ismm import inverse_substructuring, ismm
 from jointfrf.joint import Joint
 from jointfrf.joint_fit import JointFit
 from jointfrf.linear_algebra import invert, reciprocal_condition, solve
-from jointfrf.mesh import Mesh
 from jointfrf.metrics import amplitude_error, frequency_error, peak
 from jointfrf.model import Model, assemble
 from jointfrf.modification import find_modification, modify
 from jointfrf.monte_carlo import BandStatistics, MonteCarlo, monte_carlo
 from jointfrf.multi_point import MultiPointJoint, multi_point_compliance, multi_point_stiffness
 from jointfrf.noise import pollute, realisations
-from jointfrf.preload import PreloadedLap, preload
 from jointfrf.receptance import ReceptanceInfo, receptance
 from jointfrf.rigid_offset import rigid_offset
 from jointfrf.rotations import DifferenceError, central_difference, difference_error, difference_weights, transform
-from jointfrf.solid import Patch, SolidModel, solid_model
+from jointfrf.solids.bolt import PROOF_STRENGTH, STRESS_AREA, Bolt, preload_force
+from jointfrf.solids.bolted_lap import BoltedLap, LapDivisions, bolted_lap
+from jointfrf.solids.brick import Material, assemble_bricks, brick_quality, element_matrices
+from jointfrf.solids.brick_beam import Hole, brick_beam
+from jointfrf.solids.contact_pairs import ContactLaw
+from jointfrf.solids.interpolation import interpolation
+from jointfrf.solids.mesh import Mesh
+from jointfrf.solids.preload import PreloadedLap, preload
+from jointfrf.solids.solid import Patch, SolidModel, solid_model
 from jointfrf.virtual_point import (
     VirtualPoint,
     append_virtual_point,

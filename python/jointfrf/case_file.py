@@ -13,14 +13,14 @@ from scipy import sparse
 from jointfrf._sweep import FloatArray
 from jointfrf.bands import Band, in_bands
 from jointfrf.beam import BeamElement, End, beam
-from jointfrf.brick import Material
-from jointfrf.brick_beam import Face, Hole, Preset, brick_beam
 from jointfrf.discrete import Ground, chain
 from jointfrf.errors import FileContentError
 from jointfrf.identify import Method
 from jointfrf.joint import Joint
 from jointfrf.model import Model
 from jointfrf.noise import NoiseKind, NoiseReference
+from jointfrf.solids.brick import Material
+from jointfrf.solids.brick_beam import Face, Hole, Preset, brick_beam
 from jointfrf.toml_table import Table, read_toml
 
 __all__ = [

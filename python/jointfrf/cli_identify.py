@@ -11,7 +11,7 @@ from typing import get_args
 import numpy as np
 
 from jointfrf.errors import ConvergenceWarning, FileContentError, IdentificationWarning
-from jointfrf.estimator import Cross, Damping
+from jointfrf.fitting.estimator import Cross, Damping
 from jointfrf.identify import identify
 from jointfrf.interface import Interface, interface
 from jointfrf.io import FrfSet, read_uff

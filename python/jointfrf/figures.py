@@ -13,8 +13,8 @@ from jointfrf.case_file import Observed
 from jointfrf.noise import pollute
 from jointfrf.plots import Curve, Figure, Interval, Level, Panel, Ribbon, symbol
 from jointfrf.results import CaseResult
-from jointfrf.solid import SolidModel
 from jointfrf.solid_figures import solid_modes
+from jointfrf.solids.solid import SolidModel
 from jointfrf.study import Identified, regenerate
 from jointfrf.tables import identified_rows
 

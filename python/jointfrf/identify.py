@@ -14,7 +14,7 @@ from jointfrf._sweep import ComplexArray, FloatArray, as_frequency, as_number, a
 from jointfrf.bands import Band, as_bands, band_mean, in_bands
 from jointfrf.decoupling import Equation, decouple
 from jointfrf.errors import ConvergenceWarning, IdentificationWarning, IllConditionedWarning
-from jointfrf.estimator import (
+from jointfrf.fitting.estimator import (
     ComplianceEstimate,
     Cross,
     Damping,
@@ -24,7 +24,7 @@ from jointfrf.estimator import (
     neighbour_mean,
     reciprocity_noise,
 )
-from jointfrf.fit_notes import MISFIT, doubts, group_notes, left_out_notes, lost_warnings
+from jointfrf.fitting.fit_notes import MISFIT, doubts, group_notes, left_out_notes, lost_warnings
 from jointfrf.ismm import inverse_substructuring, ismm
 from jointfrf.joint_fit import JointFit
 

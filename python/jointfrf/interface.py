@@ -65,7 +65,9 @@ def interface(
         An unknown DOF, a node without coordinates, points that are not on a line along an axis, a rotation about the
         line of its points.
 
-    Notes ----- A rotation about axis a of points along axis e is seen in the displacements along d, a x e = +-d:
+    Notes
+    -----
+    A rotation about axis a of points along axis e is seen in the displacements along d, a x e = +-d:
     theta_x = -du_y/dz, theta_z = +du_y/dx, theta_y = -du_z/dx (2.57).
 
     Examples

@@ -49,8 +49,10 @@ def ismm(
     SingularLineError, ValueError
         As in `couple`.
 
-    Notes ----- Eqs. (2.47), (2.48): D = alpha^-1 (alpha - gamma) gamma^-1 holds -Delta off its diagonal, so K* = K0 -
-    D_jk. Only that block is formed. Where alpha was assembled through K0, substructures and first estimate cancel and
+    Notes
+    -----
+    Eqs. (2.47), (2.48): D = alpha^-1 (alpha - gamma) gamma^-1 holds -Delta off its diagonal, so K* = K0 - D_jk. Only
+    that block is formed. Where alpha was assembled through K0, substructures and first estimate cancel and
     the result is that of `inverse_substructuring`; with any other alpha (a truncated modal model, say) it is not.
 
     Examples

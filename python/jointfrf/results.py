@@ -20,7 +20,7 @@ from jointfrf.ismm import inverse_substructuring, ismm
 from jointfrf.joint import Joint
 from jointfrf.metrics import amplitude_error, frequency_error
 from jointfrf.model import Model, assemble
-from jointfrf.solid import SolidModel
+from jointfrf.solids.solid import SolidModel
 from jointfrf.study import Exact, Identified, exact_frfs, regenerate, run_study
 
 __all__ = ["CaseResult", "Modes", "NoiseFree", "Regenerated", "compute", "find_modes", "noise_free_errors"]

@@ -6,7 +6,7 @@ import numpy as np
 
 from jointfrf.plots import Panel, Surface
 from jointfrf.results import Modes
-from jointfrf.solid import SolidModel
+from jointfrf.solids.solid import SolidModel
 
 __all__ = ["solid_modes"]
 

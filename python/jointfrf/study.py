@@ -19,7 +19,7 @@ from jointfrf.case_file import BandSet, Case, Noise
 from jointfrf.coupling import couple
 from jointfrf.decoupling import Equation, decouple
 from jointfrf.errors import IllConditionedWarning
-from jointfrf.estimator import estimate, joint_basis
+from jointfrf.fitting.estimator import estimate, joint_basis
 from jointfrf.ismm import inverse_substructuring, ismm
 from jointfrf.noise import realisations
 

@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from jointfrf.bolt import PROOF_STRENGTH, STRESS_AREA, Bolt, preload_force
-from jointfrf.bolted_lap import ALUMINIUM, LapDivisions, bolted_lap
-from jointfrf.contact import ContactLaw
-from jointfrf.preload import preload
+from jointfrf.solids.bolt import PROOF_STRENGTH, STRESS_AREA, Bolt, preload_force
+from jointfrf.solids.bolted_lap import ALUMINIUM, LapDivisions, bolted_lap
+from jointfrf.solids.contact import ContactLaw
+from jointfrf.solids.preload import preload
 
 FORCE = 22784.0
 COARSE = LapDivisions(across=4, rings=1, circles=0, head=1, nut=1)

@@ -8,11 +8,11 @@ from scipy.sparse import csc_array
 from scipy.sparse.linalg import splu
 
 from calculix_deck import deck, displacements, frequency_step, natural_frequencies, static_step
-from jointfrf.bolted_lap import BODIES, LapDivisions, bolted_lap
-from jointfrf.brick import Material
-from jointfrf.brick_beam import brick_beam
-from jointfrf.contact import ContactLaw
-from jointfrf.preload import preload
+from jointfrf.solids.bolted_lap import BODIES, LapDivisions, bolted_lap
+from jointfrf.solids.brick import Material
+from jointfrf.solids.brick_beam import brick_beam
+from jointfrf.solids.contact import ContactLaw
+from jointfrf.solids.preload import preload
 
 CCX = shutil.which("ccx")
 pytestmark = pytest.mark.skipif(CCX is None, reason="CalculiX (ccx) is not on PATH")

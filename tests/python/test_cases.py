@@ -173,7 +173,7 @@ def test_compliance_fit_beats_the_band_means(results):
 
 @pytest.mark.parametrize(("name", "noise", "number"), [("3.3", "5 % complex", 237), ("3.2", "5 %", 148)])
 def test_compliance_fit_of_a_realisation_that_once_ran_away(name, noise, number):
-    from jointfrf.estimator import estimate, joint_basis
+    from jointfrf.fitting.estimator import estimate, joint_basis
 
     case = read_case(find_case(name))
     exact = exact_frfs(case)

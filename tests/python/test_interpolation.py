@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from jointfrf.bolted_lap import LapDivisions, bolted_lap
-from jointfrf.interpolation import interpolation
-from jointfrf.mesh import Mesh, extrude, holed_rectangle
+from jointfrf.solids.bolted_lap import LapDivisions, bolted_lap
+from jointfrf.solids.interpolation import interpolation
+from jointfrf.solids.mesh import Mesh, extrude, holed_rectangle
 
 SIGNS = np.array([[x, y, z] for z in (-1, 1) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))])
 

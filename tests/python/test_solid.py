@@ -6,7 +6,7 @@ from scipy.sparse import linalg as sparse_linalg
 from scipy.spatial.transform import Rotation
 
 import jointfrf as jf
-from jointfrf.solid import DIRECTIONS, rigid_motion
+from jointfrf.solids.solid import DIRECTIONS, mean_motion, rigid_motion
 from rigid_bodies import Body, six
 
 ALUMINIUM = jf.Material(70e9, 0.33, 2700.0)
@@ -299,17 +299,17 @@ def test_a_mean_motion_does_not_stiffen_and_shows_rigid_motions():
     assert abs(shown.stiffness - plain.stiffness).max() == 0
     about = shown.references["end"]
     np.testing.assert_allclose(about, [0, HEIGHT / 2, LENGTH], atol=1e-15)
-    motion = jf.solid.rigid_motion(shown.mesh.nodes, about).reshape(-1, 6)
+    motion = rigid_motion(shown.mesh.nodes, about).reshape(-1, 6)
     end = jf.Patch(about, np.flatnonzero(abs(shown.mesh.nodes[:, 2] - LENGTH) < 1e-9))
-    np.testing.assert_allclose((jf.solid.mean_motion(shown.mesh, end) @ motion), np.eye(6), atol=1e-12)
+    np.testing.assert_allclose((mean_motion(shown.mesh, end) @ motion), np.eye(6), atol=1e-12)
 
 
 def test_forces_on_a_mean_motion_have_its_resultant_and_strain_the_body_as_a_beam():
     model = observed_block()
-    names = [f"end:{d}" for d in jf.solid.DIRECTIONS]
+    names = [f"end:{d}" for d in DIRECTIONS]
     weights = model.ports(*names)
     # the resultant of what is spread over the nodes: R^T (T^T f) = f
-    motion = jf.solid.rigid_motion(model.mesh.nodes, model.references["end"]).reshape(-1, 6)
+    motion = rigid_motion(model.mesh.nodes, model.references["end"]).reshape(-1, 6)
     on_nodes = model.expansion @ weights.T.toarray()
     np.testing.assert_allclose(motion.T @ on_nodes, np.eye(6), atol=1e-10)
     stretch = jf.receptance([0.0], model.stiffness, model.mass, outputs=weights, inputs=weights)[0].real

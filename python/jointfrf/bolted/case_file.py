@@ -8,17 +8,20 @@ from typing import cast, get_args
 
 from jointfrf._sweep import FloatArray
 from jointfrf.bands import Band
-from jointfrf.bolt import PROOF_STRENGTH, STRESS_AREA, Bolt, preload_force
 from jointfrf.bolted.measurement import DOFS
-from jointfrf.brick import Material
-from jointfrf.brick_beam import Preset
 from jointfrf.case_file import BandSet, Noise, built, read_bands, read_frequency, read_joint, read_noise
+from jointfrf.errors import FileContentError
 from jointfrf.joint import Joint
+from jointfrf.solids.bolt import PROOF_STRENGTH, STRESS_AREA, Bolt, preload_force
+from jointfrf.solids.brick import Material
+from jointfrf.solids.brick_beam import Preset
 from jointfrf.toml_table import Table, read_toml
 
 __all__ = ["KIND", "BoltedCase", "ExpectedFrequencies", "read_bolted_case"]
 
 KIND = "bolted-lap"
+#: Band means, and the fit.
+_METHODS = ("ismm", "compliance")
 
 
 @dataclass(frozen=True)
@@ -123,7 +126,9 @@ def read_bolted_case(folder: Path) -> BoltedCase:
     joint, initial = _joint(table.tables("joint"))
     parameters = [f"{letter}_{dof}" for letter in "kc" for dof in joint.dofs]
     bands = read_bands(table.table("bands"), parameters, freq)
-    noises = tuple(read_noise(entry, len(joint.dofs)) for entry in table.tables("noise"))
+    noises = tuple(_noise(entry, len(joint.dofs)) for entry in table.tables("noise"))
+    if len({noise.name for noise in noises}) < len(noises):
+        raise FileContentError(f"{table.where}: two tables [[noise]] have the same name")
     study = table.table("study")
     realisations, seed = study.whole("realisations", 1), study.whole("seed")
     study.close()
@@ -156,6 +161,14 @@ def _joint(tables: list[Table]) -> tuple[Joint, Joint]:
         if turns != dof.startswith("theta"):
             raise table.error("motion", "'translation'" if turns else "'rotation'")
     return joint, initial
+
+
+def _noise(table: Table, n: int) -> Noise:
+    noise = read_noise(table, n)
+    unknown = [method for method in noise.methods if method not in _METHODS]
+    if unknown:
+        raise table.error("methods", f"a list of {', '.join(_METHODS)}")
+    return noise
 
 
 def _material(table: Table) -> Material:

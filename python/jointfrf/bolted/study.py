@@ -17,21 +17,21 @@ from jointfrf._sweep import ComplexArray, FloatArray
 from jointfrf.bands import Band, band_mean
 from jointfrf.bolted.case_file import BoltedCase
 from jointfrf.bolted.measurement import DOFS, Cross, both_sides, measured_entries
-from jointfrf.bolted_lap import bolted_lap
-from jointfrf.brick_beam import Hole, brick_beam
 from jointfrf.case_file import Noise
-from jointfrf.contact_pairs import ContactLaw
 from jointfrf.coupling import couple
 from jointfrf.errors import ConvergenceWarning, IdentificationWarning, IllConditionedWarning
 from jointfrf.identify import identify
-from jointfrf.interpolation import interpolation
 from jointfrf.ismm import inverse_substructuring
 from jointfrf.linear_algebra import invert
 from jointfrf.metrics import amplitude_error, frequency_error
 from jointfrf.multi_point import multi_point_compliance
 from jointfrf.noise import pollute
-from jointfrf.preload import PreloadedLap, preload
-from jointfrf.solid import SolidModel
+from jointfrf.solids.bolted_lap import bolted_lap
+from jointfrf.solids.brick_beam import Hole, brick_beam
+from jointfrf.solids.contact_pairs import ContactLaw
+from jointfrf.solids.interpolation import interpolation
+from jointfrf.solids.preload import PreloadedLap, preload
+from jointfrf.solids.solid import SolidModel
 from jointfrf.virtual_point import virtual_point
 
 __all__ = ["BoltedResult", "Found", "NoiseStudy", "Regenerated", "Unmeasured", "compute_bolted"]
@@ -444,5 +444,9 @@ def _identified(task: _Realisation) -> list[Found]:
     gammas = _routes(task.crosses, h)
     k_lines = {route: _joint_lines(gamma) for route, gamma in gammas.items()}
     k_lines["multi-point"] = _multi_point(task.crosses, h)
-    found = [Found(route, "band mean", _band_means(task.case, k)) for route, k in k_lines.items()]
-    return found + _fits(task.case, task.crosses, h)
+    found = []
+    if "ismm" in noise.methods:
+        found += [Found(route, "band mean", _band_means(task.case, k)) for route, k in k_lines.items()]
+    if "compliance" in noise.methods:
+        found += _fits(task.case, task.crosses, h)
+    return found

@@ -46,7 +46,7 @@ class Material:
 
     Examples
     --------
-    >>> from jointfrf.brick import Material
+    >>> from jointfrf.solids.brick import Material
     >>> Material(youngs_modulus=70e9, poisson=0.33, density=2700.0, loss_factor=0.01).density
     2700.0
     """
@@ -140,7 +140,7 @@ def element_matrices(
     Pulled along z by a force F, a bar of length l stretches by F l/(E A):
 
     >>> import numpy as np
-    >>> from jointfrf.brick import Material, element_matrices
+    >>> from jointfrf.solids.brick import Material, element_matrices
     >>> bar = np.array([[x, y, z] for z in (0, 0.2) for x, y in ((0, 0), (0.01, 0), (0.01, 0.01), (0, 0.01))])
     >>> k, m = element_matrices([bar], Material(70e9, 0.0, 2700.0))
     >>> stretch = np.where(bar[:, 2] > 0, 1.0, 0.0)
@@ -190,7 +190,7 @@ def assemble_bricks(
 
     Examples
     --------
-    >>> from jointfrf.brick import Material, assemble_bricks
+    >>> from jointfrf.solids.brick import Material, assemble_bricks
     >>> nodes = [[x, y, z] for z in (0, 1, 2) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))]
     >>> k, m = assemble_bricks(nodes, [[0, 1, 2, 3, 4, 5, 6, 7], [4, 5, 6, 7, 8, 9, 10, 11]], Material(1.0, 0.3, 1.0))
     >>> k.shape, float(m.sum()).__round__(12)
@@ -229,7 +229,7 @@ def brick_quality(nodes: ArrayLike, elements: ArrayLike) -> tuple[FloatArray, Fl
 
     Examples
     --------
-    >>> from jointfrf.brick import brick_quality
+    >>> from jointfrf.solids.brick import brick_quality
     >>> nodes = [[x, y, z] for z in (0, 2) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))]
     >>> brick_quality(nodes, [range(8)])
     (array([1.]), array([2.]))

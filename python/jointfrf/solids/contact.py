@@ -12,8 +12,8 @@ from scipy import sparse
 from scipy.sparse import linalg as sparse_linalg
 
 from jointfrf._sweep import FloatArray, as_real
-from jointfrf.contact_pairs import NORMAL, TANGENTIAL, BoolArray, ContactLaw, Interface, Pairs, tie
 from jointfrf.direct_solution import SYMMETRIC
+from jointfrf.solids.contact_pairs import NORMAL, TANGENTIAL, BoolArray, ContactLaw, Interface, Pairs, tie
 
 __all__ = ["ContactLaw", "ContactSolution", "Interface", "InterfaceState", "Iteration", "solve_contact"]
 
@@ -152,8 +152,8 @@ def solve_contact(
     Two cubes of 10 mm, one on the other, pressed together:
 
     >>> import numpy as np
-    >>> from jointfrf.brick import Material, assemble_bricks
-    >>> from jointfrf.contact import Interface, solve_contact
+    >>> from jointfrf.solids.brick import Material, assemble_bricks
+    >>> from jointfrf.solids.contact import Interface, solve_contact
     >>> corners = np.array([[0, 0], [0, 1], [1, 1], [1, 0]])
     >>> nodes = [[0.01 * x, y, 0.01 * z] for y in (0.0, 0.01, 0.01, 0.02) for x, z in corners]
     >>> k, _ = assemble_bricks(nodes, [range(8), range(8, 16)], Material(70e9, 0.0, 2700.0))

@@ -10,13 +10,13 @@ import numpy as np
 from scipy import sparse
 
 from jointfrf._sweep import FloatArray, as_number
-from jointfrf.bolted_lap import BoltedLap
-from jointfrf.brick import Formulation, assemble_bricks
-from jointfrf.brick_beam import PRESETS
-from jointfrf.contact import ContactLaw, InterfaceState, Iteration, solve_contact
-from jointfrf.contact_pairs import Pairs, tie
-from jointfrf.pressure_map import PressureMap, pressure_maps
-from jointfrf.solid import DIRECTIONS, SolidModel, solid_model
+from jointfrf.solids.bolted_lap import BoltedLap
+from jointfrf.solids.brick import Formulation, assemble_bricks
+from jointfrf.solids.brick_beam import PRESETS
+from jointfrf.solids.contact import ContactLaw, InterfaceState, Iteration, solve_contact
+from jointfrf.solids.contact_pairs import Pairs, tie
+from jointfrf.solids.pressure_map import PressureMap, pressure_maps
+from jointfrf.solids.solid import DIRECTIONS, SolidModel, solid_model
 
 __all__ = ["PreloadedLap", "preload"]
 
@@ -146,8 +146,8 @@ def preload(lap: BoltedLap, force: float, law: ContactLaw | None = None, *, max_
 
     Examples
     --------
-    >>> from jointfrf.bolted_lap import LapDivisions, bolted_lap
-    >>> from jointfrf.preload import preload
+    >>> from jointfrf.solids.bolted_lap import LapDivisions, bolted_lap
+    >>> from jointfrf.solids.preload import preload
     >>> coarse = LapDivisions(across=4, rings=1, circles=0, head=1, nut=1)
     >>> tight = preload(bolted_lap((0.1, 0.1), divisions=coarse), 20e3)
     >>> {name: round(state.normal_force, 6) for name, state in tight.interfaces.items()}

@@ -41,7 +41,7 @@ class ContactLaw:
 
     Examples
     --------
-    >>> from jointfrf.contact import ContactLaw
+    >>> from jointfrf.solids.contact import ContactLaw
     >>> ContactLaw(friction=0.2)
     ContactLaw(friction=0.2, normal_stiffness=100000000000000.0, tangential_stiffness=10000000000000.0)
     """

@@ -11,7 +11,7 @@ from scipy import sparse
 from scipy.spatial import cKDTree
 
 from jointfrf._sweep import FloatArray, as_number, as_real
-from jointfrf.mesh import Mesh
+from jointfrf.solids.mesh import Mesh
 
 __all__ = ["interpolation"]
 
@@ -66,8 +66,8 @@ def interpolation(
     --------
     The middle of the upper face of a brick of 1 x 1 x 2 m follows its four nodes:
 
-    >>> from jointfrf.interpolation import interpolation
-    >>> from jointfrf.mesh import extrude, rectangle
+    >>> from jointfrf.solids.interpolation import interpolation
+    >>> from jointfrf.solids.mesh import extrude, rectangle
     >>> brick = extrude((rectangle([0, 2], [0, 1]), [0, 1]))
     >>> weights = interpolation(brick, [[0.5, 1.0, 1.0]], "y")
     >>> weights.shape, weights.data.tolist()

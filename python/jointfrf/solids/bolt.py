@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from jointfrf._sweep import as_number
-from jointfrf.brick import Material
+from jointfrf.solids.brick import Material
 
 __all__ = ["PROOF_STRENGTH", "STEEL", "STRESS_AREA", "Bolt", "preload_force"]
 
@@ -49,7 +49,7 @@ class Bolt:
     --------
     The default is an M8 bolt:
 
-    >>> from jointfrf.bolt import Bolt
+    >>> from jointfrf.solids.bolt import Bolt
     >>> Bolt().shank_radius, Bolt().head_height
     (0.004, 0.0053)
     """
@@ -97,7 +97,7 @@ def preload_force(tensile_area: float, proof_strength: float, share: float = 0.7
     --------
     An M8 bolt of class 10.9:
 
-    >>> from jointfrf.bolt import PROOF_STRENGTH, STRESS_AREA, preload_force
+    >>> from jointfrf.solids.bolt import PROOF_STRENGTH, STRESS_AREA, preload_force
     >>> round(preload_force(STRESS_AREA["M8"], PROOF_STRENGTH["10.9"]), 1)
     22783.5
     """

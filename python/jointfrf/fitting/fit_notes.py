@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from jointfrf.estimator import ComplianceEstimate, Cross
+from jointfrf.fitting.estimator import ComplianceEstimate, Cross
 from jointfrf.joint_fit import JointFit
 
 __all__ = ["MISFIT", "doubts", "group_notes", "left_out_notes", "lost_warnings"]

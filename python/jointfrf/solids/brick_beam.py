@@ -11,9 +11,9 @@ import numpy as np
 
 from jointfrf._sweep import FloatArray, as_number, as_real, check_choice
 from jointfrf.beam import End
-from jointfrf.brick import Formulation, Material
-from jointfrf.mesh import Mesh, Plan, as_count, extrude, holed_rectangle, join_plans, rectangle
-from jointfrf.solid import Patch, SolidModel, solid_model
+from jointfrf.solids.brick import Formulation, Material
+from jointfrf.solids.mesh import Mesh, Plan, as_count, extrude, holed_rectangle, join_plans, rectangle
+from jointfrf.solids.solid import Patch, SolidModel, solid_model
 
 __all__ = ["PRESETS", "Face", "Hole", "Preset", "brick_beam", "holed_plan"]
 

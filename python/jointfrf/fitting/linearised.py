@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from jointfrf._sweep import ComplexArray, FloatArray
 from jointfrf.compliance import compliance_covariance, compliance_factors, joint_compliance
-from jointfrf.frf_noise import ZERO, own_size
-from jointfrf.joint_terms import Basis, Cross, JointModel
-from jointfrf.least_squares import Task
+from jointfrf.fitting.frf_noise import ZERO, own_size
+from jointfrf.fitting.joint_terms import Basis, Cross, JointModel
+from jointfrf.fitting.least_squares import Task
 from jointfrf.linear_algebra import invert, solve
 
 __all__ = ["Data", "Group", "Linearised", "squares_of_lines"]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf._sweep import ComplexArray, FloatArray
-from jointfrf.joint_terms import JointModel
+from jointfrf.fitting.joint_terms import JointModel
 
 __all__ = [
     "SHARE_OF_VALUE",
@@ -140,7 +140,7 @@ def gauss_newton(theta: FloatArray, limit: FloatArray, task: Task, tolerance: fl
         step = (inverse @ (gradient / size)[..., None])[..., 0] / size
         step = np.clip(theta + step, -limit, limit) - theta
         # One standard error is about this in units of 1/size.
-        noise = np.maximum(cost, 0) / (2 * task.equations)
+        noise = np.maximum(cost, 0) / np.maximum(2 * task.equations, 1)
         error = np.sqrt(np.maximum(np.einsum("raa->ra", inverse), 0) * noise[:, None])
         settled = (abs(step) * size <= tolerance * error + SHARE_OF_VALUE * abs(theta) * size).all(axis=1)
         compliance_new, weighted_new, cost_new = _at(theta + step, task)

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf._sweep import FloatArray
-from jointfrf.bolted_lap import INTERFACES, BoltedLap
-from jointfrf.contact import InterfaceState
+from jointfrf.solids.bolted_lap import INTERFACES, BoltedLap
+from jointfrf.solids.contact import InterfaceState
 
 __all__ = ["PressureMap", "pressure_maps"]
 

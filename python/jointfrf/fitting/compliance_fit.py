@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf._sweep import ComplexArray, FloatArray
-from jointfrf.frf_noise import LOST, gamma_noise
-from jointfrf.least_squares import (
+from jointfrf.fitting.frf_noise import LOST, gamma_noise
+from jointfrf.fitting.least_squares import (
     SHARE_OF_VALUE,
     Fitted,
     Task,
@@ -19,7 +19,7 @@ from jointfrf.least_squares import (
     line_information,
     ran_off,
 )
-from jointfrf.linearised import Data, Group, squares_of_lines
+from jointfrf.fitting.linearised import Data, Group, squares_of_lines
 
 __all__ = ["GroupEstimate", "fit_group"]
 

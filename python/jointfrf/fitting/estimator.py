@@ -18,11 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf._sweep import ComplexArray, FloatArray
-from jointfrf.compliance_fit import GroupEstimate, fit_group
-from jointfrf.frf_noise import LOST, gamma_noise, neighbour_mean, reciprocity_noise, uncoupled_groups
-from jointfrf.joint_terms import Basis, Cross, Damping, joint_basis
-from jointfrf.least_squares import inverse_information
-from jointfrf.linearised import Data
+from jointfrf.fitting.compliance_fit import GroupEstimate, fit_group
+from jointfrf.fitting.frf_noise import LOST, gamma_noise, neighbour_mean, reciprocity_noise, uncoupled_groups
+from jointfrf.fitting.joint_terms import Basis, Cross, Damping, joint_basis
+from jointfrf.fitting.least_squares import inverse_information
+from jointfrf.fitting.linearised import Data
 
 __all__ = [
     "Basis",

@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 from jointfrf._sweep import FloatArray, as_real
-from jointfrf.brick import Formulation, Mass, Material, assemble_bricks
-from jointfrf.mesh import Mesh
 from jointfrf.model import Model
+from jointfrf.solids.brick import Formulation, Mass, Material, assemble_bricks
+from jointfrf.solids.mesh import Mesh
 
 __all__ = ["DIRECTIONS", "Patch", "SolidModel", "mean_motion", "rigid_motion", "solid_model"]
 

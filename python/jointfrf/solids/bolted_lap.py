@@ -11,11 +11,11 @@ from scipy.spatial import cKDTree
 
 from jointfrf._sweep import FloatArray, as_number, check_choice
 from jointfrf.beam import End
-from jointfrf.bolt import Bolt
-from jointfrf.brick import Material, brick_quality
-from jointfrf.brick_beam import Preset, holed_plan
-from jointfrf.contact_pairs import Interface
-from jointfrf.mesh import Mesh, Plan, disc, extrude, join_plans, rectangle
+from jointfrf.solids.bolt import Bolt
+from jointfrf.solids.brick import Material, brick_quality
+from jointfrf.solids.brick_beam import Preset, holed_plan
+from jointfrf.solids.contact_pairs import Interface
+from jointfrf.solids.mesh import Mesh, Plan, disc, extrude, join_plans, rectangle
 
 __all__ = ["ALUMINIUM", "BODIES", "INTERFACES", "BoltedLap", "LapDivisions", "bolted_lap"]
 
@@ -172,7 +172,7 @@ def bolted_lap(
 
     Examples
     --------
-    >>> from jointfrf.bolted_lap import bolted_lap
+    >>> from jointfrf.solids.bolted_lap import bolted_lap
     >>> lap = bolted_lap()
     >>> len(lap.mesh.elements), {name: len(pairs.area) for name, pairs in lap.interfaces.items()}
     (3840, {'head': 96, 'lap': 288, 'nut': 96})
