@@ -364,16 +364,16 @@ def _as_lines(theta: FloatArray, freq: FloatArray) -> ComplexArray:
 
 
 def _peaks(freq: FloatArray, tip: ComplexArray) -> list[Peak]:
-    """Resonances of the FRFs of the tip."""
+    """Resonances of the FRFs of the tip, sought between the valleys on either side."""
     found = []
     for d, direction in enumerate(DIRECTIONS):
         size = np.log(abs(tip[:, d]))
-        places = freq[find_peaks(size, prominence=np.log(_PROMINENCE))[0]]
-        between = (places[1:] + places[:-1]) / 2  # a neighbour's resonance is not sought
-        limits = np.concatenate([freq[:1], between, freq[-1:]])
-        for i, at in enumerate(places):
-            low, high = max(limits[i], at * (1 - _REACH)), min(limits[i + 1], at * (1 + _REACH))
-            found.append(Peak(direction, float(at), (float(low), float(high))))
+        tops = find_peaks(size, prominence=np.log(_PROMINENCE))[0]
+        parts = np.split(np.arange(freq.size), tops)
+        valleys = [part[np.argmin(size[part])] for part in parts]
+        for at, left, right in zip(tops, valleys, valleys[1:], strict=False):
+            low, high = max(freq[left], freq[at] * (1 - _REACH)), min(freq[right], freq[at] * (1 + _REACH))
+            found.append(Peak(direction, float(freq[at]), (float(low), float(high))))
     return found
 
 
