@@ -13,9 +13,9 @@ from scipy import sparse
 from jointfrf._sweep import FloatArray
 from jointfrf.bands import Band, in_bands
 from jointfrf.beam import BeamElement, End, beam
+from jointfrf.case_expected import METHODS, Expected, Known, read_expected
 from jointfrf.discrete import Ground, chain
 from jointfrf.errors import FileContentError
-from jointfrf.identify import Method
 from jointfrf.joint import Joint
 from jointfrf.model import Model
 from jointfrf.noise import NoiseKind, NoiseReference
@@ -27,9 +27,6 @@ __all__ = [
     "METHODS",
     "BandSet",
     "Case",
-    "Expected",
-    "ExpectedErrors",
-    "ExpectedTable",
     "Noise",
     "Observed",
     "Substructure",
@@ -42,7 +39,6 @@ __all__ = [
     "unit_of",
 ]
 
-METHODS: tuple[str, ...] = get_args(Method)
 _MOTIONS = ("translation", "rotation")
 _MOST_LINES = 1_000_000
 _T = TypeVar("_T")
@@ -104,49 +100,6 @@ class Noise:
     reciprocal: bool
     block: int
     methods: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class ExpectedTable:
-    """Published numbers of one identification: parameter to value, and the largest errors allowed, percent.
-
-    A value fits inside the `central` percent of the realisations.
-    """
-
-    source: str
-    noise: str
-    method: str
-    bands: str
-    values: dict[str, float]
-    rmse_below: dict[str, float]
-    central: float = 98.0
-
-
-@dataclass(frozen=True)
-class ExpectedErrors:
-    """Published errors (4.11), (4.12) of a regenerated FRF in a band, percent; None where the source has none."""
-
-    source: str
-    noise: str
-    method: str
-    observed: str
-    band: Band
-    amplitude: float | None
-    frequency: float | None
-
-
-@dataclass(frozen=True)
-class Expected:
-    """What is known about a case: natural frequencies in Hz, tables, and the numbers of the source's figures."""
-
-    frequencies: tuple[tuple[str, str, tuple[float, ...], float], ...] = ()
-    tables: tuple[ExpectedTable, ...] = ()
-    errors: tuple[ExpectedErrors, ...] = ()
-    figures: tuple[tuple[str, str], ...] = ()
-
-    def figure(self, key: str) -> str:
-        """Return the number of a figure in the source, or an empty text."""
-        return dict(self.figures).get(key, "")
 
 
 @dataclass(frozen=True)
@@ -263,7 +216,13 @@ def read_case(folder: Path) -> Case:
             raise FileContentError(f"{path}: two tables [[{what}]] have the same name")
     expected = Expected()
     if (folder / "expected.toml").is_file():
-        expected = _expected(read_toml(folder / "expected.toml"), parameters, band_sets, noises, observed)
+        known = Known(
+            tuple(parameters),
+            tuple(band_set.name for band_set in band_sets),
+            {noise.name: noise.methods for noise in noises},
+            {one.key: one.bands for one in observed},
+        )
+        expected = read_expected(folder / "expected.toml", known)
     return Case(
         folder.resolve(), title, section, freq, a, b, _dofs(points, a.model, j), _dofs(points, b.model, k),
         _ports(points, a.model, j + r), _ports(points, b.model, k + s), joint, initial, rotational, observed,
@@ -442,64 +401,3 @@ def read_noise(table: Table, n: int) -> Noise:
     if n % noise.block:
         raise table.error("block", f"a divisor of {n}, the number of joint DOFs")
     return noise
-
-
-def _expected(
-    table: Table,
-    parameters: list[str],
-    band_sets: tuple[BandSet, ...],
-    noises: tuple[Noise, ...],
-    observed: tuple[Observed, ...],
-) -> Expected:
-    frequencies = []
-    for entry in table.tables("frequencies") if "frequencies" in table else []:
-        joint = entry.text("joint", ("actual", "initial"))
-        frequencies.append(
-            (joint, entry.text("source"), tuple(entry.numbers("values")), entry.number("within_percent", 0))
-        )
-        entry.close()
-    tables = []
-    for entry in table.tables("identified") if "identified" in table else []:
-        source, noise, method = _applied(entry, noises)
-        bands = "" if method == "compliance" else entry.text("bands", [x.name for x in band_sets])
-        columns: list[dict[str, float]] = []
-        for key in ("values", "rmse_below"):
-            column = {}
-            if key in entry:
-                inner = entry.table(key)
-                column = {parameter: inner.number(parameter) for parameter in parameters if parameter in inner}
-                inner.close()
-            columns.append(column)
-        central = entry.number("central_percent", 0) if "central_percent" in entry else 98.0
-        tables.append(ExpectedTable(source, noise, method, bands, columns[0], columns[1], central))
-        entry.close()
-    errors = []
-    for entry in table.tables("regenerated") if "regenerated" in table else []:
-        errors.append(_expected_errors(entry, noises, observed))
-    figures: tuple[tuple[str, str], ...] = ()
-    if "figures" in table:
-        inner = table.table("figures")
-        figures = tuple((key, inner.text(key)) for key in inner.keys())  # noqa: SIM118
-    table.close()
-    return Expected(tuple(frequencies), tuple(tables), tuple(errors), figures)
-
-
-def _applied(entry: Table, noises: tuple[Noise, ...]) -> tuple[str, str, str]:
-    """Return source, noise and method of an expected table."""
-    source, noise = entry.text("source"), entry.text("noise", [x.name for x in noises])
-    method = entry.text("method", METHODS)
-    if method not in next(x for x in noises if x.name == noise).methods:
-        raise entry.error("method", f"one of the methods that case.toml applies to {noise!r}")
-    return source, noise, method
-
-
-def _expected_errors(entry: Table, noises: tuple[Noise, ...], observed: tuple[Observed, ...]) -> ExpectedErrors:
-    source, noise, method = _applied(entry, noises)
-    key = entry.text("observed", [one.key for one in observed])
-    bands = entry.bands("band")
-    own = next(one.bands for one in observed if one.key == key)
-    if len(bands) != 1 or bands[0] not in own:
-        raise entry.error("band", f"one of the bands that case.toml names for {key}")
-    amplitude, frequency = (entry.number(what) if what in entry else None for what in ("amplitude", "frequency"))
-    entry.close()
-    return ExpectedErrors(source, noise, method, key, bands[0], amplitude, frequency)
