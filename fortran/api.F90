@@ -38,7 +38,8 @@ module jointfrf
   use jointfrf_modification, only: find_modification, modify
   use jointfrf_monte_carlo, only: is_method, monte_carlo
   use jointfrf_noise, only: is_kind, is_reference, make_noise, pollute
-  use jointfrf_status, only: info_good, info_text, line_text
+  use jointfrf_status, only: info_good, info_no_engine, info_no_memory, info_text, line_good, line_not_finite, &
+    line_overflow, line_text
   implicit none
   private
 
@@ -61,9 +62,18 @@ module jointfrf
   integer(c_int), parameter, public :: jf_engine_x86_64_v3 = engine_v3
   integer(c_int), parameter, public :: jf_engine_x86_64_v4 = engine_v4
 
+  !> What `info` and `line_info` may be, besides numbers of arguments, lines and pivots.
+  integer(c_int), parameter, public :: jf_info_good = info_good
+  integer(c_int), parameter, public :: jf_info_no_memory = info_no_memory
+  integer(c_int), parameter, public :: jf_info_no_engine = info_no_engine
+  integer(c_int), parameter, public :: jf_line_good = line_good
+  integer(c_int), parameter, public :: jf_line_not_finite = line_not_finite
+  integer(c_int), parameter, public :: jf_line_overflow = line_overflow
+
 contains
 
   !> Version of the library.
+  !> major, minor, patch   the three numbers of the version
   subroutine jf_version(major, minor, patch) bind(C, name='jf_version_')
     integer(c_int), intent(out) :: major, minor, patch
 
@@ -83,7 +93,10 @@ contains
     call spread_text(info_text(info), text)
   end subroutine jf_info_text
 
-  !> What a `line_info` means, in words. Arguments as in jf_info_text.
+  !> What a `line_info` means, in words.
+  !> line_info   that of one line
+  !> n_text      as in jf_info_text
+  !> text        as in jf_info_text
   subroutine jf_line_text(line_info, n_text, text) bind(C, name='jf_line_text_')
     integer(c_int), intent(in) :: line_info, n_text
     character(kind=c_char), intent(out) :: text(n_text)
@@ -203,8 +216,9 @@ contains
                           inputs, h_lines, line_info, rcond, info)
   end subroutine jf_receptance
 
-  !> The same for band matrices in LAPACK's band storage, entry (i, j) at (ku + 1 + i - j, j), with zgbtrf and zgbtrs.
-  !> trans          concerns h only
+  !> Receptance as by jf_receptance of a model with band matrices, with zgbtrf and zgbtrs. LAPACK's band storage: entry
+  !> (i, j) at (ku + 1 + i - j, j).
+  !> trans          as above; concerns h only
   !> n              number of DOFs of the model
   !> kl, ku         number of diagonals below and above the main one
   !> n_out, n_in    number of responses and of forces
@@ -263,7 +277,7 @@ contains
   !> shapes_out    shape (n_out, n_modes), or (n_modes, n_out) with trans 'T', 1/sqrt(kg)
   !> shapes_in     shape (n_in, n_modes), or (n_modes, n_in) with trans 'T', 1/sqrt(kg)
   !> h             receptance, shape (n_out, n_in, n_freq), or (n_in, n_out, n_freq) with trans 'T', m/N
-  !> line_info     > 0: the mode without damping that the line hits exactly
+  !> line_info     as above; > 0 is the mode without damping that the line hits exactly
   subroutine jf_receptance_modal(trans, n_modes, n_freq, n_out, n_in, omega, stiffness, damping, loss_factor, &
                                  shapes_out, shapes_in, h, line_info, rcond, info) bind(C, name='jf_receptance_modal_')
     character(kind=c_char), intent(in) :: trans
@@ -639,6 +653,7 @@ contains
   !> block        size of square blocks whose entries share one number; 1 for none
   !> level        0.05 for 5 percent
   !> seed         shape (2), its lower and its upper 32 bits
+  !> n_out, n_in  number of responses and of forces
   !> first        number of the first realisation, counted from 0
   !> count        number of realisations
   !> h            exact FRFs, shape (n_out, n_in, n_freq), or (n_in, n_out, n_freq) with trans 'T'

@@ -1,7 +1,7 @@
 #!/bin/sh
-# install_module.sh FOLDER: puts the compiled module of the flat face under the installation prefix. Module files hold for
-# one compiler and version, so the folder names both.
+# install_module.sh BUILT FOLDER: puts the compiled module of the flat face, found under BUILT, below the installation
+# prefix. Module files hold for one compiler and version, so the folder names both.
 set -eu
-module=$(find "$MESON_BUILD_ROOT/fortran" -name jointfrf.mod | head -n 1)
-mkdir -p "$MESON_INSTALL_DESTDIR_PREFIX/$1"
-cp "$module" "$MESON_INSTALL_DESTDIR_PREFIX/$1/"
+module=$(find "$1" -name jointfrf.mod | head -n 1)
+mkdir -p "$MESON_INSTALL_DESTDIR_PREFIX/$2"
+cp "$module" "$MESON_INSTALL_DESTDIR_PREFIX/$2/"
