@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import jointfrf as jf
+from installed_library import installed_library  # noqa: F401
 
 
 @dataclass(frozen=True)

@@ -1,72 +1,81 @@
-"""The same small case from FORTRAN 77, C and Python through the same symbols."""
+"""The same small case from FORTRAN 77, modern Fortran, C and Python, on the installed library: the same text."""
 
-import os
 import re
-import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import case
 import jointfrf as jf
+from installed_library import InstalledLibrary, run
 
-FREQ = np.array([1.0, 2.0, 4.0, 6.0, 8.0])
-NAME = re.compile(r"(\w+)\((\d+),(\d+)\)")
-
-
-def from_python() -> dict[str, np.ndarray]:
-    a = jf.chain([5, 3], [2500, 3500], [3, 4], ground="start")
-    b = jf.chain([4, 2], [2000, 2500], [2, 1], ground="end")
-    h_a, h_b = a.receptance(FREQ), b.receptance(FREQ)
-    k, k0 = (jf.Joint([s], [c]).dynamic_stiffness(FREQ) for s, c in ((2000.0, 3.0), (1000.0, 1.5)))
-    h_c, h_c0 = (jf.couple(h_a, h_b, joint, [1], [0]) for joint in (k, k0))
-    at = np.ix_(range(FREQ.size), [1, 2], [1, 2])
-    return {
-        "h_a": h_a,
-        "h_b": h_b,
-        "h_c": h_c,
-        "h_c0": h_c0,
-        "k_ismm": jf.ismm(h_c0[at], h_c[at], k0),
-        "k_short": jf.inverse_substructuring(h_c[at]),
-        "k_rr": jf.decouple("rr", h_a, h_b, h_c[:, :1, :1], [1], [0], dofs_r=[0]),
-        "c_joint": jf.joint_compliance(h_c[at]),
-    }
+TESTS = Path(__file__).resolve().parents[1]
+SOURCES = {"FORTRAN 77": "f77/case.f", "Fortran": "fortran/case.f90", "C": "c/case.c"}
+ENTRY = re.compile(r"(\w+)\((\d),(\d)\) *(\d+) +(\S+) +(\S+)")
 
 
-def from_program(path: Path) -> dict[tuple[str, int, int, int], complex]:
-    printed = subprocess.run([path], capture_output=True, text=True, check=True, timeout=60).stdout
-    values = {}
-    for line in printed.split("\n"):
-        if line.strip():
-            name, frequency, real, imaginary = line.split()
-            match = NAME.fullmatch(name)
-            assert match, line
-            values[match[1].lower(), int(frequency), int(match[2]), int(match[3])] = complex(
-                float(real), float(imaginary)
-            )
-    return values
+@pytest.fixture(scope="module")
+def programs(installed_library: InstalledLibrary, tmp_path_factory) -> dict[str, list[str | Path]]:
+    folder = tmp_path_factory.mktemp("case")
+    commands: dict[str, list[str | Path]] = {"Python": [sys.executable, TESTS / "python" / "case.py"]}
+    for language, source in SOURCES.items():
+        commands[language] = [installed_library.compile(TESTS / source, folder / Path(source).name.replace(".", "_"))]
+    return commands
 
 
-def programs() -> Path:
-    folder = Path(
-        os.environ.get("JOINTFRF_TEST_PROGRAMS", Path(__file__).resolve().parents[2] / "build" / "tests" / "tests")
-    )
-    if not (folder / "case_c").exists():
-        pytest.skip("the test programs are not built: ./tests/run builds them, or set JOINTFRF_TEST_PROGRAMS")
-    return folder
+def printed(command: list[str | Path], engine: str, threads: int = 1) -> str:
+    return run(command, env={"JOINTFRF_ENGINE": engine, "OMP_NUM_THREADS": str(threads)})
 
 
-@pytest.mark.parametrize("program", ["case_f77", "case_c"])
-def test_python_gives_what_the_program_gives(program):
-    values = from_program(programs() / program)
-    expected = from_python()
-    assert {key[0] for key in values} == set(expected)
-    assert len(values) == sum(array.size for array in expected.values())
-    for (name, frequency, row, column), value in values.items():
-        exact = expected[name][frequency - 1, row - 1, column - 1]
-        assert abs(value - exact) <= 1e-12 * abs(expected[name][frequency - 1]).max(), (name, frequency, row, column)
+@pytest.fixture(scope="module")
+def values(programs) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    """What the FORTRAN 77 program prints: matrices by name, and the means as they follow each other."""
+    text = printed(programs["FORTRAN 77"], "auto").splitlines()
+    shapes = {"gamma": 4, "k_ismm": 2, "k_short": 2}
+    matrices = {name: np.full((case.N_FREQ, n, n), np.nan, complex) for name, n in shapes.items()}
+    for line in text[:-8]:
+        match = ENTRY.fullmatch(line)
+        assert match, line
+        at = int(match[4]) - 1, int(match[2]) - 1, int(match[3]) - 1
+        matrices[match[1]][at] = complex(float(match[5]), float(match[6]))
+    return matrices, np.array([float(line.split()[1]) for line in text[-8:]])
 
 
-def test_fortran_77_and_c_agree_to_the_last_bit():
-    folder = programs()
-    assert from_program(folder / "case_f77") == from_program(folder / "case_c")
+@pytest.mark.parametrize("engine", ["lapack", "auto"])
+def test_four_languages_print_the_same_text(programs, engine):
+    texts = {language: printed(command, engine) for language, command in programs.items()}
+    assert len(texts["Python"].splitlines()) == case.N_FREQ * (16 + 4 + 4) + 8
+    for language in SOURCES:
+        assert texts[language] == texts["Python"], language
+
+
+def test_text_does_not_depend_on_threads(programs):
+    assert printed(programs["C"], "auto", 1) == printed(programs["Fortran"], "auto", 2)
+
+
+def test_assembly_is_that_of_one_model(values):
+    """Joint and beams in one pair of matrices, by jf.beam."""
+    section = dict(youngs_modulus=67e9, density=2700.0, width=0.025, height=0.006, loss_factor=0.01)
+    a = jf.beam(0.3, 2, ends=("clamped", "free"), **section)
+    b = jf.beam(0.225, 1, **section)
+    joint = jf.Joint([6e6, 5e3], [50, 15], ["y", "theta"])
+    whole = jf.assemble(a, b, joint, case.DOFS_A, case.DOFS_B).receptance(case.FREQ_HZ, case.DOFS_C)
+    np.testing.assert_allclose(values[0]["gamma"], whole, rtol=1e-9, atol=1e-12 * abs(whole).max())
+
+
+def test_joint_is_found(values):
+    matrices, means = values
+    k_joint = jf.Joint([6e6, 5e3], [50, 15]).dynamic_stiffness(case.FREQ_HZ)
+    for name in ("k_ismm", "k_short"):
+        assert abs(matrices[name] - k_joint).max() < 1e-9 * abs(k_joint).max()
+    np.testing.assert_allclose(means, 2 * [6e6, 5e3, 50, 15], rtol=1e-9)
+
+
+def test_means_are_those_of_the_package(values):
+    matrices, means = values
+    bands = {"Fy": (200.0, 900.0), "Mtheta": (15.0, 200.0)}
+    for name, own in zip(("k_ismm", "k_short"), means.reshape(2, 4), strict=True):
+        mean = jf.band_mean(case.FREQ_HZ, matrices[name], bands, list(bands))
+        np.testing.assert_allclose(own, [*mean.stiffness, *mean.damping], rtol=1e-13)

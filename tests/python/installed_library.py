@@ -1,0 +1,75 @@
+"""The library as `meson install` leaves it, and programs linked to it by pkg-config."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+#: The optimised build takes half a minute; it is kept, and brought up to date by each run.
+BUILD = ROOT / "build" / "installed"
+#: Where meson and ninja lie, too, if the environment of this Python is not activated.
+PATH = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+#: Nothing may be contracted: the last bit is compared.
+COMPILERS = {
+    ".f": ["gfortran", "-std=legacy"],
+    ".f90": ["gfortran", "-std=f2018"],
+    ".c": ["gcc", "-std=c11"],
+}
+FLAGS = ["-Wall", "-Wextra", "-Werror", "-O2", "-ffp-contract=off"]
+
+
+def run(command: list[str | Path], **options: Any) -> str:
+    """Run a command; where it fails, the test shows all that it printed."""
+    environment = os.environ | {"PATH": PATH} | options.pop("env", {})
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, env=environment, **options)
+    assert done.returncode == 0, f"{command}\n{done.stdout}\n{done.stderr}"
+    return done.stdout
+
+
+@dataclass(frozen=True)
+class InstalledLibrary:
+    """An installation prefix."""
+
+    prefix: Path
+
+    def pkg_config(self, *arguments: str) -> list[str]:
+        (file,) = self.prefix.rglob("jointfrf.pc")
+        return run(["pkg-config", *arguments, "jointfrf"], env={"PKG_CONFIG_PATH": str(file.parent)}).split()
+
+    def compile(self, source: Path, program: Path) -> Path:
+        """Compile one source file as a user would, against nothing but what is installed."""
+        (module_dir,) = self.pkg_config("--variable=moduledir")
+        (lib_dir,) = self.pkg_config("--variable=libdir")
+        modules = [f"-I{module_dir}"] if source.suffix == ".f90" else []
+        libraries = [*self.pkg_config("--cflags", "--libs"), "-lm", f"-Wl,-rpath,{lib_dir}"]
+        run([*COMPILERS[source.suffix], *FLAGS, *modules, "-o", program, source, *libraries])
+        return program
+
+
+@pytest.fixture(scope="session")
+def installed_library(tmp_path_factory: pytest.TempPathFactory) -> InstalledLibrary:
+    """Build as the Python extension is built, and install to a folder of this run."""
+    tools = ("meson", "pkg-config", "gfortran", "gcc")
+    missing = [name for name in tools if shutil.which(name, path=PATH) is None]
+    if missing:
+        pytest.skip(f"{', '.join(missing)} not found")
+    if not (BUILD / "build.ninja").exists():
+        options = [
+            "-Dtests=false",
+            "-Dlapack=scipy-openblas32",
+            f"-Dlapack_python={sys.executable}",
+            "-Dprefix=/prefix",
+        ]
+        run(["meson", "setup", BUILD, ROOT, *options])
+    destination = tmp_path_factory.mktemp("installed")
+    run(["meson", "compile", "-C", BUILD])
+    run(["meson", "install", "-C", BUILD, "--no-rebuild", "--destdir", destination])
+    return InstalledLibrary(destination / "prefix")
