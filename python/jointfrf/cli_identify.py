@@ -6,7 +6,7 @@ import argparse
 import sys
 import warnings
 from pathlib import Path
-from typing import get_args
+from typing import cast, get_args
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from jointfrf.fitting.estimator import Cross, Damping
 from jointfrf.identify import identify
 from jointfrf.interface import Interface, interface
 from jointfrf.io import FrfSet, read_uff
+from jointfrf.io.cards import CardFormat
 from jointfrf.joint_fit import JointFit
 from jointfrf.rotations import difference_error
 
@@ -47,6 +48,18 @@ def _methods(text: str) -> list[str]:
         if word not in _METHODS:
             raise argparse.ArgumentTypeError(f"{word!r} is not one of {', '.join(_METHODS)}")
     return _words(text)
+
+
+def _export(text: str) -> tuple[CardFormat, list[int]]:
+    program, _, numbers = text.partition(":")
+    nodes = _nodes(numbers)
+    wanted = 4 if program == "calculix" else 2
+    if program not in get_args(CardFormat) or len(nodes) not in (2, wanted):
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not a program ({', '.join(get_args(CardFormat))}) and nodes j and k like abaqus:9001,9002; "
+            "calculix takes two ROT NODEs after them"
+        )
+    return cast(CardFormat, program), nodes
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -107,6 +120,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         choices=("receptance", "mobility", "accelerance"),
         help="what the FRFs are, where the file does not say",
     )
+    parser.add_argument(
+        "--export",
+        type=_export,
+        metavar="PROGRAM:J,K",
+        help="also print the joint (by the first method) as input of abaqus, calculix (stiffness only), nastran or "
+        "ansys, between its nodes J and K: abaqus:9001,9002; rotations of calculix need two ROT NODEs after them",
+    )
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder for identification.json and figures")
 
 
@@ -138,6 +158,11 @@ def run(args: argparse.Namespace) -> int:
     _tell_differences(args, sides)
     for fit in fits:
         print(f"\n{fit}")
+    if args.export is not None:
+        program, nodes = args.export
+        damping = program != "calculix"  # it has none between DOFs, and says so in the text
+        print()
+        print(fits[0].export(program, nodes[:2], rotation_nodes=nodes[2:] or None, damping=damping), end="")
     if args.out is not None:
         from jointfrf.fit_report import write_fit
 

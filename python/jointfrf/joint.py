@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from jointfrf._sweep import ComplexArray, FloatArray, as_frequency, as_real
+from jointfrf.io.cards import CardFormat, cards
 from jointfrf.rigid_offset import rigid_offset
 
 __all__ = ["Joint"]
@@ -161,3 +162,79 @@ class Joint:
         back = rigid_offset(self.dofs, -as_real("offset", offset, (3,)))
         k, c, h = (back.T @ matrix @ back for matrix in (self.stiffness, self.damping, self.hysteretic_stiffness))
         return Joint(k, c, self.dofs, structural_damping=h)
+
+    def export(
+        self,
+        program: CardFormat,
+        nodes: Sequence[int],
+        *,
+        element: int = 1,
+        number: int = 1,
+        rotation_nodes: Sequence[int] | None = None,
+        damping: bool = True,
+        full_matrix: bool = False,
+    ) -> str:
+        """Write the joint as input of a finite-element program, in the units it has (SI).
+
+        Parameters
+        ----------
+        program : {"abaqus", "calculix", "nastran", "ansys"}
+            Whose input. Abaqus: SPRING2 (complex with hysteretic damping) and DASHPOT2, or MATRIX INPUT where DOFs are
+            coupled. CalculiX: SPRING2. Nastran: CBUSH and PBUSH, or DMIG where DOFs are coupled. Ansys: MATRIX27.
+        nodes : sequence of two int
+            Nodes j on A and k on B. Directions are the global ones (Ansys: those of the nodal coordinate systems).
+        element, number : int
+            First number of the new elements; first number of property, type and real constants, and part of names.
+        rotation_nodes : sequence of two int, optional
+            CalculiX only, and needed there for rotations: the ROT NODEs of rigid bodies whose REF NODEs are `nodes`.
+        damping : bool
+            Whether damping is written.
+        full_matrix : bool
+            Whether matrices are written where springs would do: Abaqus, and Nastran where the nodes do not coincide.
+
+        Returns
+        -------
+        str
+            Lines of input, 12 to 14 digits.
+
+        Raises
+        ------
+        ValueError
+            DOFs whose direction is not told by their name; matrices that are not symmetric; numbers out of range; what
+            the program has no word for: damping in CalculiX, hysteretic damping in Ansys, rotations of CalculiX without
+            `rotation_nodes`.
+
+        Notes
+        -----
+        Forces are K* (u_j - u_k), DOF by DOF, with no arm between nodes that are apart. CBUSH has such an arm, and is
+        the same joint only between coincident grids. Coupled springs of CalculiX: K_ab q_a q_b with q = u_j - u_k is
+        the sum of four springs, two of them negative.
+
+        Examples
+        --------
+        >>> import jointfrf as jf
+        >>> print(jf.Joint([6e5], [20.0], dofs=["y"]).export("abaqus", (102, 202)))
+        ** DOFs y; SI units, written by jointfrf
+        *ELEMENT, TYPE=SPRING2, ELSET=JOINT1_K2
+        1, 102, 202
+        *SPRING, ELSET=JOINT1_K2
+        2, 2
+        6.0000000000000E+05
+        *ELEMENT, TYPE=DASHPOT2, ELSET=JOINT1_C2
+        2, 102, 202
+        *DASHPOT, ELSET=JOINT1_C2
+        2, 2
+        2.0000000000000E+01
+        <BLANKLINE>
+        """
+        return cards(
+            program,
+            self.dofs,
+            (self.stiffness, self.damping, self.hysteretic_stiffness),
+            nodes,
+            element=element,
+            number=number,
+            rotation_nodes=rotation_nodes,
+            damping=damping,
+            full_matrix=full_matrix,
+        )

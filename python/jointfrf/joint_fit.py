@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import stats
 
 from jointfrf._sweep import ComplexArray, FloatArray
+from jointfrf.io.cards import CardFormat, CardOptions
 from jointfrf.joint import Joint
 
 __all__ = ["JointFit"]
@@ -162,6 +164,10 @@ class JointFit:
             N/m, rotational N m/rad.
         """
         return self.joint.dynamic_stiffness(freq_hz)
+
+    def export(self, program: CardFormat, nodes: Sequence[int], **options: Unpack[CardOptions]) -> str:
+        """Write the joint found as input of a finite-element program; all as in `Joint.export`."""
+        return self.joint.export(program, nodes, **options)
 
     def unit(self, parameter: str) -> str:
         """Return the unit of a parameter, told from the name of its DOF (theta..., rx, ry, rz are rotations)."""

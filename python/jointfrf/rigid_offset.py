@@ -6,17 +6,35 @@ import reprlib
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from jointfrf._sweep import FloatArray, as_real
 
-__all__ = ["rigid_offset"]
+__all__ = ["direction_places", "rigid_offset"]
 
 _AXES = "xyz"
 #: Position among x, y, z, theta_x, theta_y, theta_z by name.
 _PLACES = {prefix + axis: i for prefix in ("", "u", "u_") for i, axis in enumerate(_AXES)} | {
     prefix + axis: 3 + i for prefix in ("theta_", "theta", "r", "rot_", "rot") for i, axis in enumerate(_AXES)
 }
+
+
+def direction_places(dofs: Sequence[str]) -> NDArray[np.intp]:
+    """Return where each DOF stands among x, y, z, theta_x, theta_y, theta_z, counted from 0, shape (n,).
+
+    Raises
+    ------
+    ValueError
+        A name that is not known or comes twice.
+    """
+    names = [str(dof).lower() for dof in dofs]
+    unknown = [dof for dof, name in zip(dofs, names, strict=True) if name not in _PLACES]
+    if unknown:
+        raise ValueError(f"dofs must be among x, y, z, theta_x, theta_y, theta_z, not {reprlib.repr(unknown[0])}")
+    places = np.array([_PLACES[name] for name in names], np.intp)
+    if np.unique(places).size != places.size:
+        raise ValueError(f"dofs must name each direction once, not {', '.join(dofs)}")
+    return places
 
 
 def rigid_offset(dofs: Sequence[str], offset: ArrayLike) -> FloatArray:
@@ -53,13 +71,7 @@ def rigid_offset(dofs: Sequence[str], offset: ArrayLike) -> FloatArray:
     >>> jf.rigid_offset(["y", "z", "theta_x"], [0, 0.006, 0]).tolist()
     [[1.0, 0.0, 0.0], [0.0, 1.0, 0.006], [0.0, 0.0, 1.0]]
     """
-    names = [str(dof).lower() for dof in dofs]
-    unknown = [dof for dof, name in zip(dofs, names, strict=True) if name not in _PLACES]
-    if unknown:
-        raise ValueError(f"dofs must be among x, y, z, theta_x, theta_y, theta_z, not {reprlib.repr(unknown[0])}")
-    places = np.array([_PLACES[name] for name in names], np.intp)
-    if np.unique(places).size != places.size:
-        raise ValueError(f"dofs must name each direction once, not {', '.join(dofs)}")
+    places = direction_places(dofs)
     a, b, c = as_real("offset", offset, (3,))
     whole = np.eye(6)
     whole[:3, 3:] += [[0, c, -b], [-c, 0, a], [b, -a, 0]]  # theta x offset

@@ -24,11 +24,21 @@ QUICK_SIZES = tuple(2**k for k in range(14, 27, 4))
 SIZES = tuple(2**k for k in range(14, 29))
 
 
-def build_library() -> ctypes.CDLL:
-    """Build the library with meson where it is not up to date, and load it."""
+def build_kernel() -> Path:
+    """Build the kernel as a shared library where it is not up to date; return the folder it lies in."""
+    _build("jointfrf:shared_library")
+    return _BUILD / "fortran"
+
+
+def _build(target: str) -> None:
     if not (_BUILD / "build.ninja").exists():
         _meson("setup", str(_BUILD), str(ROOT), "-Dlapack=scipy-openblas32")
-    _meson("compile", "-C", str(_BUILD), _TARGET)
+    _meson("compile", "-C", str(_BUILD), target)
+
+
+def build_library() -> ctypes.CDLL:
+    """Build the library with meson where it is not up to date, and load it."""
+    _build(_TARGET)
     found = [path for path in _BUILD.rglob(f"*{_TARGET}*") if path.suffix in (".so", ".dylib")]
     if len(found) != 1:
         raise RuntimeError(f"{_BUILD}: the library {_TARGET} is not there")

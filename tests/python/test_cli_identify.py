@@ -98,7 +98,9 @@ def test_what_is_missing_is_said_in_one_sentence(words, message):
 
 
 @pytest.mark.parametrize(
-    "words", [["--j", "a,b"], ["--band", "200-300"], ["--method", "magic"], ["--damping", "dry"], ["--cross", "some"]]
+    "words",
+    [["--j", "a,b"], ["--band", "200-300"], ["--method", "magic"], ["--damping", "dry"], ["--cross", "some"]]
+    + [["--export", text] for text in ("abaqus", "marc:1,2", "abaqus:1,2,3,4", "nastran:1")],
 )
 def test_wrong_words_are_a_usage_error(words, tmp_path):
     assert "usage:" in run(tmp_path / "x.uff", *words, expect=2).stderr
@@ -146,3 +148,11 @@ def test_a_file_without_coordinates_and_a_spacing(tmp_path, beams):
     found = json.loads((tmp_path / "out" / "identification.json").read_text())["fits"][0]["parameters"]
     for name, truth in (("k_y", 6e5), ("k_theta_z", 5e3), ("c_y", 20), ("c_theta_z", 1.5)):
         assert found[name]["value"] == pytest.approx(truth, rel=2e-3)
+    words = words[:-2]  # without --out
+    cards = run(*words, "--export", "nastran:9001,9002").stdout
+    assert f"CBUSH   {1:8d}{1:8d}{9001:8d}{9002:8d}" in cards
+    cards = run(*words, "--export", "calculix:9001,9002,9003,9004").stdout
+    assert cards.count("TYPE=SPRING2") == 2
+    assert "1, 9001, 9002\n" in cards
+    assert "2, 9003, 9004\n" in cards
+    assert "damping left out" in cards

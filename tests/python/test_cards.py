@@ -1,0 +1,345 @@
+"""Joints as text for finite-element programs, read back by small readers of their own, and run by CalculiX."""
+
+import re
+import shutil
+
+import numpy as np
+import pytest
+
+import jointfrf as jf
+from calculix_deck import frequency_step, natural_frequencies
+
+CCX = shutil.which("ccx")
+DOFS = ("x", "y", "z", "theta_x", "theta_y", "theta_z")
+NODES = (102, 202)
+PLACE = {(node, i + 1): 6 * side + i for side, node in enumerate(NODES) for i in range(6)}
+
+
+def random_matrix(seed, n, scale):
+    """Positive definite, of very different sizes of entries."""
+    rng = np.random.default_rng(seed)
+    root = rng.standard_normal((n, n)) * scale
+    return root @ root.T
+
+
+SIZES = np.array([1e3, 2e2, 1e4, 30.0, 7.0, 90.0])[:, None]
+COUPLED = jf.Joint(
+    random_matrix(1, 6, SIZES),
+    random_matrix(2, 6, SIZES / 100),
+    ("theta_y", "x", "z", "y", "theta_z", "theta_x"),
+    structural_damping=random_matrix(3, 6, SIZES / 10),
+)
+DIAGONAL = jf.Joint(
+    [6.0123456789012e5, -7.123456789012345e3, 4 / 3 * 1e8],
+    [20.0 / 3, 0, 1e-3 / 7],
+    ("UY", "rx", "theta_z"),
+    loss_factor=[0.01, 0, 0.3],
+)
+
+
+def expected(joint):
+    """[[K, -K], [-K, K]] of stiffness, damping and hysteretic damping at x ... theta_z of nodes j and k, (12, 12)."""
+    names = [{"UY": "y", "rx": "theta_x"}.get(dof, dof) for dof in joint.dofs]
+    whole = np.zeros((3, 12, 12))
+    relative = np.zeros((len(names), 12))
+    for row, name in zip(relative, names, strict=True):
+        row[[DOFS.index(name), 6 + DOFS.index(name)]] = 1, -1
+    for matrix, own in zip(whole, (joint.stiffness, joint.damping, joint.hysteretic_stiffness), strict=True):
+        matrix += relative.T @ own @ relative
+    return whole
+
+
+def spring(matrix, a, b, value):
+    """Energy value (u_a - u_b)^2 / 2."""
+    for row, column, sign in ((a, a, 1), (b, b, 1), (a, b, -1), (b, a, -1)):
+        matrix[row, column] += sign * value
+
+
+def keywords(text):
+    """(keyword, parameters, rows) of an input of Abaqus or CalculiX."""
+    found = []
+    for line in text.splitlines():
+        assert len(line) < 256
+        if line.startswith("**"):
+            continue
+        words = [word.strip() for word in line.split(",")]
+        if line.startswith("*"):
+            pairs = (word.partition("=")[::2] for word in words[1:])
+            found.append((words[0], {name.strip(): value.strip() for name, value in pairs}, []))
+        else:
+            assert all(len(word) <= 20 for word in words)
+            found[-1][2].append(words)
+    return found
+
+
+def read_springs(text, place=PLACE):
+    """Matrices (3, 12, 12) from SPRING2 and DASHPOT2."""
+    whole = np.zeros((3, 12, 12))
+    ends, seen = {}, set()
+    for word, parameters, rows in keywords(text):
+        name = parameters["ELSET"]
+        if word == "*ELEMENT":
+            ((number, a, b),) = rows
+            assert number not in seen
+            seen.add(number)
+            ends[name] = (parameters["TYPE"], int(a), int(b))
+            continue
+        kind, a, b = ends.pop(name)
+        assert kind == {"*SPRING": "SPRING2", "*DASHPOT": "DASHPOT2"}[word]
+        (dof_a, dof_b), values = rows
+        at = place[a, int(dof_a)], place[b, int(dof_b)]
+        assert len(values) == (2 if "COMPLEX STIFFNESS" in parameters else 1)
+        for target, value in zip((0, 2) if word == "*SPRING" else (1,), values, strict=False):
+            spring(whole[target], *at, float(value))
+    assert not ends
+    return whole
+
+
+def read_abaqus_matrices(text):
+    *inputs, (last, used, _) = keywords(text)
+    assert last == "*MATRIX ASSEMBLE"
+    order = {"STIFFNESS": 0, "VISCOUS DAMPING": 1, "STRUCTURAL DAMPING": 2}
+    target = {name: order[kind] for kind, name in used.items()}
+    whole = np.zeros((3, 12, 12))
+    for word, parameters, rows in inputs:
+        assert (word, parameters["TYPE"]) == ("*MATRIX INPUT", "SYMMETRIC")
+        for a, i, b, j, value in rows:
+            row, column = PLACE[int(a), int(i)], PLACE[int(b), int(j)]
+            assert whole[target[parameters["NAME"]], row, column] == 0
+            whole[target[parameters["NAME"]], row, column] = float(value)
+            whole[target[parameters["NAME"]], column, row] = float(value)
+    return whole
+
+
+def nastran_fields(text):
+    """Cards as lists of fields without the first and the tenth of every line of eight."""
+    found = []
+    for line in text.splitlines():
+        if line.startswith("$"):
+            continue
+        assert len(line) <= 72
+        first = line[:8].strip()
+        width, count = (16, 4) if first.endswith("*") else (8, 8)
+        fields = [line[8 + width * i : 8 + width * (i + 1)].strip() for i in range(count)]
+        if first == "*":
+            found[-1] += fields
+        else:
+            found.append([first.rstrip("*"), *fields])
+    return found
+
+
+def nastran_real(field):
+    """A real number: with a point, the exponent with or without its letter; empty is zero."""
+    match = re.fullmatch(r"([+-]?\d+\.\d*)(?:E?([+-]\d+))?", field)
+    assert match or field == "", field
+    return float(f"{match[1]}E{match[2] or 0}") if match else 0.0
+
+
+def read_bush(text):
+    bush, pbush = nastran_fields(text)
+    assert bush[0] == "CBUSH"
+    assert bush[8] == "0"  # directions of the basic system
+    assert bush[2] == pbush[1]
+    a, b = int(bush[3]), int(bush[4])
+    assert pbush[0] == "PBUSH"
+    groups = {"K": np.zeros(6), "B": np.zeros(6), "GE": np.zeros(6)}
+    rows = [pbush[2 + 8 * i : 9 + 8 * i] for i in range((len(pbush) - 2 + 7) // 8)]
+    for word, *values in rows:
+        groups[word] = np.array([nastran_real(value) for value in values])
+    whole = np.zeros((3, 12, 12))
+    for i in range(6):
+        at = PLACE[a, i + 1], PLACE[b, i + 1]
+        for target, value in enumerate((groups["K"][i], groups["B"][i], groups["GE"][i] * groups["K"][i])):
+            spring(whole[target], *at, value)
+    return whole
+
+
+def read_dmig(text):
+    control = re.search(r"case control: (.*)", text)[1]
+    order = {"K2GG": 0, "B2GG": 1, "K42GG": 2}
+    target = {name: order[word] for word, name in (pair.split(" = ") for pair in control.split(", "))}
+    whole = np.zeros((3, 12, 12))
+    for word, name, *rest in nastran_fields(text):
+        assert word == "DMIG"
+        if rest[0] == "0":
+            assert rest[1:4] == ["6", "2", "0"]  # symmetric, double precision
+            continue
+        column = PLACE[int(rest[0]), int(rest[1])]
+        for node, dof, value, empty in zip(*(rest[i::4] for i in (3, 4, 5, 6)), strict=False):
+            assert empty == ""
+            row = PLACE[int(node), int(dof)]
+            assert whole[target[name], row, column] == 0
+            whole[target[name], row, column] = whole[target[name], column, row] = nastran_real(value)
+    return whole
+
+
+def read_matrix27(text):
+    """Execute the few commands of APDL."""
+    whole = np.zeros((3, 12, 12))
+    kinds, reals, active = {}, {}, {}
+    for line in text.splitlines():
+        assert len(line) <= 128
+        command, *words = line.split(",")
+        if command == "ET":
+            assert words[1:4] == ["MATRIX27", "", "0"]
+            kinds[words[0]] = {"4": 0, "5": 1}[words[4]]
+        elif command == "R":
+            active["set"] = words[0]
+            reals[words[0]] = words[1:]
+        elif command == "RMORE":
+            assert len(words) <= 6
+            reals[active["set"]] += words
+        elif command in ("TYPE", "REAL"):
+            active[command] = words[0]
+        elif command == "EN":
+            nodes = [int(word) for word in words[1:]]
+            constants = iter(map(float, reals[active["REAL"]]))
+            for i in range(12):
+                for j in range(i, 12):
+                    at = [PLACE[nodes[p // 6], p % 6 + 1] for p in (i, j)]
+                    whole[kinds[active["TYPE"]], at[0], at[1]] = next(constants)
+                    whole[kinds[active["TYPE"]], at[1], at[0]] = whole[kinds[active["TYPE"]], at[0], at[1]]
+            assert next(constants, None) is None
+        else:
+            assert command.startswith("!")
+    return whole
+
+
+WITHOUT_LOSS = jf.Joint(COUPLED.stiffness, COUPLED.damping, COUPLED.dofs)
+
+
+@pytest.mark.parametrize(
+    ("joint", "program", "options", "reader", "digits"),
+    [
+        (DIAGONAL, "abaqus", {}, read_springs, 13),
+        (DIAGONAL, "abaqus", {"full_matrix": True}, read_abaqus_matrices, 13),
+        (COUPLED, "abaqus", {}, read_abaqus_matrices, 13),
+        (DIAGONAL, "nastran", {}, read_bush, 11),
+        (DIAGONAL, "nastran", {"full_matrix": True}, read_dmig, 11),
+        (COUPLED, "nastran", {}, read_dmig, 11),
+        (WITHOUT_LOSS, "ansys", {}, read_matrix27, 12),
+    ],
+)
+def test_text_holds_the_joint(joint, program, options, reader, digits):
+    found = reader(joint.export(program, NODES, element=9001, number=77, **options))
+    for ours, exact in zip(found, expected(joint), strict=True):
+        np.testing.assert_allclose(ours, exact, rtol=10.0**-digits * 2, atol=1e-13 * abs(exact).max())
+
+
+def test_calculix_springs_add_up_to_the_matrix():
+    place = {
+        (node, i + 1): 6 * side + 3 * turn + i
+        for side, pair in enumerate(((1, 2), (3, 4)))
+        for turn, node in enumerate(pair)
+        for i in range(3)
+    }
+    text = COUPLED.export("calculix", (1, 3), rotation_nodes=(2, 4), damping=False)
+    assert "damping left out" in text
+    stiffness, *none = read_springs(text, place)
+    exact = expected(COUPLED)[0]
+    # The springs cancel on the diagonal.
+    np.testing.assert_allclose(stiffness, exact, rtol=1e-12, atol=1e-12 * abs(exact).max())
+    assert not np.any(none)
+
+
+def test_hysteretic_damping_without_stiffness_is_written_as_a_matrix():
+    joint = jf.Joint([0.0], dofs=["z"], structural_damping=[5.0])
+    np.testing.assert_allclose(read_dmig(joint.export("nastran", NODES)), expected(joint))
+    np.testing.assert_allclose(read_springs(joint.export("abaqus", NODES)), expected(joint))
+
+
+def test_a_fit_is_exported_as_its_joint():
+    freq = np.linspace(0.5, 10, 100)
+    a = jf.chain([5, 3], [2500, 3500], [3, 4], ground="start").receptance(freq)
+    b = jf.chain([4, 2], [2000, 2500], [2, 1], ground="end").receptance(freq)
+    h = jf.couple(a, b, jf.Joint([2000.0], [3.0]).dynamic_stiffness(freq), [1], [0])[:, 1:3, 1:3]
+    fit = jf.identify(freq, jf.pollute(h, 0.01, seed=3), ["x"], damping="viscous")
+    found = read_springs(fit.export("abaqus", NODES, element=5))
+    assert found[0, 0, 6] == pytest.approx(-fit.stiffness[0], rel=1e-12)
+    assert found[1, 0, 0] == pytest.approx(fit.damping[0], rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("joint", "arguments", "options", "message"),
+    [
+        (DIAGONAL, ("marc", NODES), {}, "program must be one of"),
+        (DIAGONAL, ("abaqus", (1, 1)), {}, "nodes must be two different nodes"),
+        (DIAGONAL, ("abaqus", (1, 2, 3)), {}, "nodes must be two different nodes"),
+        (DIAGONAL, ("nastran", (1, 123456789)), {}, "nodes must be an integer from 1 to 99999999"),
+        (DIAGONAL, ("nastran", NODES), {"element": 0}, "element must be an integer"),
+        (DIAGONAL, ("nastran", NODES), {"number": 1.5}, "number must be an integer"),
+        (COUPLED, ("nastran", NODES), {"number": 1234567}, "at most six digits"),
+        (DIAGONAL, ("calculix", NODES), {}, "damping=False"),
+        (DIAGONAL, ("calculix", NODES), {"damping": False}, "rotation_nodes must name the ROT NODEs"),
+        (DIAGONAL, ("calculix", NODES), {"full_matrix": True}, "full_matrix is not for calculix"),
+        (DIAGONAL, ("abaqus", NODES), {"rotation_nodes": (5, 6)}, "rotation_nodes are for calculix"),
+        (DIAGONAL, ("ansys", NODES), {}, "no hysteretic damping"),
+        (jf.Joint([1.0]), ("abaqus", NODES), {}, "dofs must be among x, y, z"),
+        (jf.Joint([[1.0, 2.0], [3.0, 9.0]], dofs=["x", "y"]), ("abaqus", NODES), {}, "must be symmetric"),
+    ],
+)
+def test_what_cannot_be_written_is_said(joint, arguments, options, message):
+    with pytest.raises(ValueError, match=re.escape(message)):
+        joint.export(*arguments, **options)
+
+
+# Two rigid bricks between which only the joint acts: size, m; density, kg/m^3; reference point from the centre, m.
+BRICKS = (((0.10, 0.06, 0.04), 7800.0, (0.05, 0.01, 0.0)), ((0.08, 0.05, 0.07), 2700.0, (-0.04, 0.0, 0.02)))
+
+
+def rigid_model(size, density, reference):
+    """Mass matrix at the reference point by the theorem of Huygens and Steiner."""
+    mass = density * np.prod(size)
+    squares = np.square(size)
+    inertia = mass / 12 * np.diag(squares.sum() - squares)
+    to_centre = -np.array(reference)
+    cross = np.cross(np.eye(3), to_centre)  # rows e_i x r: u_centre = u + theta x r
+    shift = np.hstack([np.eye(3), cross.T])
+    m = mass * shift.T @ shift
+    m[3:, 3:] += inertia
+    return jf.Model(np.zeros((6, 6)), m, DOFS)
+
+
+def rigid_bricks(joint_cards):
+    corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]]) - 0.5
+    lines = ["*NODE, NSET=ALL"]
+    for body, (size, _, reference) in enumerate(BRICKS):
+        at = -np.array(reference) + body * np.array([0.001, 0, 0])
+        points = [*(at + corners * size), at + reference, at + reference]
+        lines += [f"{10 * body + i}, " + ", ".join(f"{x:.12g}" for x in p) for i, p in enumerate(points, 1)]
+    for body, (_, density, _) in enumerate(BRICKS):
+        first = 10 * body
+        lines += [f"*ELEMENT, TYPE=C3D8, ELSET=E{body}"]
+        lines += [f"{body + 1}, " + ", ".join(str(first + i) for i in range(1, 9))]
+        lines += [f"*MATERIAL, NAME=M{body}", "*ELASTIC", "210e9, 0.3", "*DENSITY", f"{density}"]
+        lines += [f"*SOLID SECTION, ELSET=E{body}, MATERIAL=M{body}"]
+        lines += [f"*NSET, NSET=N{body}", ", ".join(str(first + i) for i in range(1, 9))]
+        lines += [f"*RIGID BODY, NSET=N{body}, REF NODE={first + 9}, ROT NODE={first + 10}"]
+    # Clamped bricks beside them, of far higher frequencies: the eigensolver wants four times as many DOFs as modes.
+    for i in range(5):
+        numbers = range(100 + 10 * i, 108 + 10 * i)
+        points = 0.01 * corners + np.array([1.0 + i, 1.0, 1.0])
+        lines += [
+            "*NODE",
+            *(f"{k}, {x:.12g}, {y:.12g}, {z:.12g}" for k, (x, y, z) in zip(numbers, points, strict=True)),
+        ]
+        lines += ["*ELEMENT, TYPE=C3D8, ELSET=E2", f"{3 + i}, " + ", ".join(map(str, numbers))]
+        lines += ["*BOUNDARY", *(f"{k}, 1, 3" for k in numbers[:4])]
+    lines += ["*SOLID SECTION, ELSET=E2, MATERIAL=M0"]
+    return "\n".join([*lines, joint_cards + "*STEP", *frequency_step(12), "*END STEP", ""])
+
+
+@pytest.mark.skipif(CCX is None, reason="CalculiX (ccx) is not on PATH")
+@pytest.mark.parametrize("kind", ["diagonal", "coupled"])
+def test_natural_frequencies_of_calculix(kind, tmp_path):
+    stiffness = np.diag([1e6, 3e6, 2e6, 1e3, 4e3, 2e3])
+    if kind == "coupled":
+        sizes = np.sqrt(stiffness.diagonal())
+        angle = np.random.default_rng(5).standard_normal((6, 6))
+        stiffness = sizes[:, None] * (np.eye(6) + 0.1 * (angle + angle.T)) * sizes
+    joint = jf.Joint(stiffness, dofs=DOFS)
+    a, b = (rigid_model(*brick) for brick in BRICKS)
+    ours = jf.assemble(a, b, joint, range(6), range(6)).natural_frequencies()[6:]
+    text = rigid_bricks(joint.export("calculix", (9, 19), rotation_nodes=(10, 20), element=100))
+    theirs = natural_frequencies(CCX, text, tmp_path)
+    np.testing.assert_allclose(theirs[6:], ours, rtol=1e-6)
