@@ -1,0 +1,187 @@
+/* A host program survives calls with nonsense: the library prints nothing, stops nothing, writes nothing where an
+   argument is wrong, and leaves rounding, masks and modes of the floating-point unit as they were. */
+#define _GNU_SOURCE
+#include <fenv.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#if defined(__x86_64__)
+#include <xmmintrin.h>
+#endif
+
+#include "jointfrf.h"
+
+#define CALLS 100000
+#define MOST 6          /* largest order and number of DOFs */
+#define LINES 4         /* most lines */
+#define ROOM 10400      /* numbers in a result: as many as the largest call writes */
+#define GIVEN 1200      /* numbers in an argument, likewise */
+
+static unsigned long long state = 88172645463325252ULL;
+
+static unsigned next(unsigned below)
+{
+    state ^= state << 13;
+    state ^= state >> 7;
+    state ^= state << 17;
+    return (unsigned)((state >> 20) % below);
+}
+
+/* Mostly a size that is possible. */
+static int any_size(int most)
+{
+    static const int strange[] = {-1, -30000, 0, -7};
+
+    return next(5) ? 1 + (int)next((unsigned)most) : strange[next(4)];
+}
+
+static double any_number(void)
+{
+    static const double strange[] = {0.0, -0.0, INFINITY, -INFINITY, NAN, 1e308, -1e308, 5e-324, 1e-308};
+
+    return next(12) ? (next(2001) - 1000.0) / 500.0 : strange[next(9)];
+}
+
+static char any_letter(void)
+{
+    static const char letters[] = "NnTtRrIiFfSsCcPpUuEeLlXx?\0 ";
+
+    return next(4) ? letters[next(4)] : letters[next(sizeof letters)];
+}
+
+static double in[6][GIVEN];
+static double out[2][ROOM], before[2][ROOM];
+static int dofs[4][8 * MOST], line_info[256], line_info_before[256];
+
+/* New arguments: one array of numbers a call, all indices. */
+static void fill(int number)
+{
+    int i, k;
+
+    for (i = 0; i < GIVEN; i++)
+        in[number % 6][i] = any_number();
+    for (k = 0; k < 4; k++)
+        for (i = 0; i < 8 * MOST; i++)
+            dofs[k][i] = next(8) ? 1 + (i + (int)next(2)) % MOST : (int)next(12) - 4;
+    memset(out, 0x5a, sizeof out);
+    memcpy(before, out, sizeof before);
+    memset(line_info, 0x5a, sizeof line_info);
+    memcpy(line_info_before, line_info, sizeof line_info_before);
+}
+
+static const jf_complex *frf(int k)
+{
+    return (const jf_complex *)in[k];
+}
+
+/* One call of one routine with arguments as they come; returns its info. */
+static int call(void)
+{
+    const char t = any_letter(), kind = any_letter(), reference = any_letter();
+    const char equation[2] = {any_letter(), any_letter()};
+    const int n = any_size(MOST), m = any_size(MOST), p = any_size(MOST), q = any_size(MOST);
+    const int n_freq = any_size(LINES), flag = (int)next(4) - 1;
+    const double number = any_number();
+    jf_complex *h = (jf_complex *)out[0];
+    double *rcond = out[1];
+    int info = 12345;
+
+    switch (next(20)) {
+    case 0: jf_invert(&n, &n_freq, frf(0), h, line_info, rcond, &info); break;
+    case 1: jf_solve(&t, &n, &m, &n_freq, frf(0), frf(1), h, line_info, rcond, &info); break;
+    case 2:
+        jf_receptance(&t, &n, &n_freq, &m, &p, in[2], in[0], in[1], &flag, in[3], &q, in[4], &number, dofs[0], dofs[1], h,
+                      line_info, rcond, &info);
+        break;
+    case 3:
+        jf_receptance_banded(&t, &n, &flag, &q, &n_freq, &m, &p, in[2], in[0], in[1], &flag, in[3], &q, in[4], &number,
+                             dofs[0], dofs[1], h, line_info, rcond, &info);
+        break;
+    case 4:
+        jf_receptance_modal(&t, &n, &n_freq, &m, &p, in[0], in[1], in[2], in[3], in[4], in[5], h, line_info, rcond, &info);
+        break;
+    case 5:
+        jf_couple(&t, &n, &m, &p, &n_freq, frf(0), frf(1), frf(2), dofs[0], dofs[1], h, line_info, rcond, &info);
+        break;
+    case 6: jf_modify(&t, &n, &m, &n_freq, frf(0), frf(1), dofs[0], h, line_info, rcond, &info); break;
+    case 7: jf_find_modification(&t, &n, &n_freq, frf(0), frf(1), h, line_info, rcond, &info); break;
+    case 8: jf_ismm(&t, &n, &n_freq, frf(0), frf(1), frf(2), h, line_info, rcond, &info); break;
+    case 9: jf_inverse_substructuring(&t, &n, &n_freq, frf(0), h, line_info, rcond, &info); break;
+    case 10:
+        jf_decouple(equation, &t, &n, &m, &p, &n_freq, frf(0), frf(1), frf(2), dofs[0], dofs[1], dofs[2], dofs[3], h,
+                    line_info, rcond, &info);
+        break;
+    case 11: jf_joint_compliance(&t, &n, &n_freq, frf(0), h, line_info, rcond, &info); break;
+    case 12: jf_compliance_factors(&t, &n, &m, &n_freq, frf(0), in[1], h, line_info, rcond, &info); break;
+    case 13:
+        jf_compliance_covariance(&t, &flag, &n, &m, &n_freq, frf(0), in[1], in[2], h, line_info, rcond, &info);
+        break;
+    case 14: jf_difference_weights(&n, in[0], out[0], &info); break;
+    case 15: jf_central_difference(&t, &n, &n_freq, in[0], frf(1), h, line_info, rcond, &info); break;
+    case 16: jf_transform(&t, &n, &m, &p, &q, &n_freq, frf(0), in[1], in[2], h, line_info, rcond, &info); break;
+    case 17:
+        jf_pollute(&t, &kind, &reference, &flag, &m, &number, dofs[3], &n, &p, &n_freq, &flag, &q, frf(0), h, &info);
+        break;
+    case 18:
+        jf_brick_matrices(&t, &n_freq, in[0], in[1], in[2], in[3], &number, &flag, out[0], out[1], line_info, &info);
+        break;
+    default: jf_brick_quality(&n_freq, in[0], out[0], out[1], &info);
+    }
+    return info;
+}
+
+static unsigned modes(void)
+{
+    unsigned found = (unsigned)fegetround();
+#if defined(__GLIBC__)
+    found = 1000 * found + (unsigned)fegetexcept();
+#endif
+#if defined(__x86_64__)
+    found ^= _mm_getcsr() & 0xffc0u; /* masks, rounding, flush to zero, denormals are zero */
+#endif
+    return found;
+}
+
+int main(void)
+{
+    const int screen = dup(STDERR_FILENO);
+    FILE *said = tmpfile();
+    const unsigned modes_before = modes();
+    int i, refused = 0, answered = 0, failures = 0;
+    long printed;
+
+    if (screen < 0 || said == NULL || dup2(fileno(said), STDOUT_FILENO) < 0 || dup2(fileno(said), STDERR_FILENO) < 0)
+        return 2;
+    for (i = 0; i < 6; i++)
+        fill(i);
+    for (i = 0; i < CALLS; i++) {
+        int info;
+
+        fill(i);
+        info = call();
+        if (info == 12345)
+            failures++;
+        if (info >= 0) {
+            answered++;
+            continue;
+        }
+        refused++;
+        if (memcmp(out, before, sizeof out) != 0 || memcmp(line_info, line_info_before, sizeof line_info) != 0)
+            failures++;
+    }
+    fflush(stdout);
+    fflush(stderr);
+    printed = lseek(fileno(said), 0, SEEK_END);
+    dup2(screen, STDERR_FILENO);
+    if (printed != 0)
+        fprintf(stderr, "FAILED: the library printed %ld bytes\n", printed);
+    if (failures != 0)
+        fprintf(stderr, "FAILED: %d refused calls wrote something, or left info as it was\n", failures);
+    if (modes() != modes_before)
+        fprintf(stderr, "FAILED: the floating-point modes have changed\n");
+    if (refused < CALLS / 10 || answered < CALLS / 10)
+        fprintf(stderr, "FAILED: %d refused and %d answered calls: the arguments are no test\n", refused, answered);
+    return printed != 0 || failures != 0 || modes() != modes_before || refused < CALLS / 10 || answered < CALLS / 10;
+}
