@@ -185,4 +185,4 @@ def _computed(
         return bolted, tables, bolted_figures(bolted), bolted_summary(bolted), bolted_json(bolted, tables)
     result = compute(case, realisations, pool, progress)
     tables = make_tables(result)
-    return result, tables, make_figures(result), summary(result, tables), to_json(result)
+    return result, tables, make_figures(result), summary(result, tables), to_json(result, tables)

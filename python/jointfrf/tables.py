@@ -19,6 +19,7 @@ __all__ = [
     "Table",
     "as_csv",
     "as_text",
+    "case_json",
     "frf_name",
     "identified_rows",
     "make_tables",
@@ -302,25 +303,29 @@ def as_csv(table: Table) -> str:
     return text.getvalue()
 
 
-def to_json(result: CaseResult) -> dict[str, Any]:
-    """Return all numbers of a case as a structure for JSON."""
-    case = result.case
+def case_json(case: Any, count: int, tables: list[Table]) -> dict[str, Any]:
+    """Return what the JSON of every kind of case begins with, and its tables."""
     return {
         "case": case.name,
         "title": case.title,
         "section": case.section,
-        "realisations": result.n_realisations,
+        "realisations": count,
         "seed": case.seed,
         "frequency_hz": {"first": case.freq_hz[0], "last": case.freq_hz[-1], "lines": case.freq_hz.size},
+        "tables": {table.key: {"title": table.title, "columns": table.columns, "rows": table.rows} for table in tables},
+    }
+
+
+def to_json(result: CaseResult, tables: list[Table]) -> dict[str, Any]:
+    """Return all numbers of a case as a structure for JSON."""
+    case = result.case
+    return {
+        **case_json(case, result.n_realisations, tables),
         "natural_frequencies_hz": {joint: modes.freq_hz.tolist() for joint, modes in result.modes.items()},
         "identified": [asdict(row) for row in identified_rows(result)],
         "noise_free_relative_error": {method: found.error for method, found in result.noise_free.items()},
         "proposed_bands_hz": {
             f"{frf_name(result, one)} {name}": result.proposals[one.key, name]
             for one in case.observed for name in case.parameters
-        },
-        "tables": {
-            table.key: {"title": table.title, "columns": table.columns, "rows": table.rows}
-            for table in make_tables(result)
         },
     }  # fmt: skip

@@ -335,7 +335,7 @@ def test_figures_4_17_to_4_38_are_there(solids):
 def test_numbers_and_report_of_six_dofs(solids):
     for result in solids.values():
         tables = make_tables(result)
-        content = json.loads(json.dumps(to_json(result)))
+        content = json.loads(json.dumps(to_json(result, make_tables(result))))
         assert list(content["tables"]) == [table.key for table in tables]
         assert len(content["natural_frequencies_hz"]["initial"]) >= 5
         assert "H_ss Fx k_Fx" in content["proposed_bands_hz"]

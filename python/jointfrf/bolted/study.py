@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 from scipy.signal import find_peaks
 
 from jointfrf._sweep import ComplexArray, FloatArray
@@ -30,9 +31,10 @@ from jointfrf.solids.bolted_lap import bolted_lap
 from jointfrf.solids.brick_beam import Hole, brick_beam
 from jointfrf.solids.contact_pairs import ContactLaw
 from jointfrf.solids.interpolation import interpolation
+from jointfrf.solids.mesh import Mesh
 from jointfrf.solids.preload import PreloadedLap, preload
-from jointfrf.solids.solid import SolidModel
-from jointfrf.virtual_point import virtual_point
+from jointfrf.solids.solid import DIRECTIONS as SIX
+from jointfrf.solids.solid import Patch, SolidModel, mean_motion
 
 __all__ = ["BoltedResult", "Found", "NoiseStudy", "Regenerated", "Unmeasured", "compute_bolted"]
 
@@ -265,18 +267,13 @@ def _solid(case: BoltedCase, length_b: float, measured: bool) -> _Solid:
     nodes = model.mesh.nodes
     on_j, on_k = (lap.axis + np.array([0, y, 0]) for y in (case.height, -case.height))
     crosses = (Cross(on_j, case.spacing), Cross(on_k, case.spacing))
-    end = np.flatnonzero(nodes[:, 2] > nodes[:, 2].max() - 1e-9)
-    tip = np.zeros((2, nodes.size))
-    for row, axis in enumerate((0, 1)):
-        tip[row, 3 * end + axis] = 1 / end.size
-    weights = [tip]
+    end = np.flatnonzero(nodes[:, 2] > nodes[:, 2].max() - 1e-9).astype(np.int32)
+    weights = [_mean(model.mesh, end, nodes[end].mean(axis=0), DIRECTIONS)]
     if measured:
-        weights += [interpolation(model.mesh, *cross.channels).toarray() for cross in crosses]
-        weights += [
-            _under(nodes, lap.interfaces[face].lower if face == "head" else lap.interfaces[face].upper, at)
-            for face, at in (("head", on_j), ("nut", on_k))
-        ]
-    ports = np.concatenate(weights) @ model.expansion
+        weights += [interpolation(model.mesh, *cross.channels) for cross in crosses]
+        rings = (lap.interfaces["head"].lower, lap.interfaces["nut"].upper)
+        weights += [_mean(model.mesh, ring, at, DOFS) for ring, at in zip(rings, (on_j, on_k), strict=True)]
+    ports = sparse.vstack(weights) @ model.expansion
     h = model.receptance(case.freq_hz, ports)
     return _Solid(
         state, model, crosses, np.ascontiguousarray(h[:, 2:32, 2:32]), np.ascontiguousarray(h[:, 32:, 32:]),
@@ -284,12 +281,9 @@ def _solid(case: BoltedCase, length_b: float, measured: bool) -> _Solid:
     )  # fmt: skip
 
 
-def _under(nodes: FloatArray, ring: NDArray[np.int32], point: FloatArray) -> FloatArray:
-    """Mean rigid motion of the nodes under the head or the nut about a point, weights of shape (6, 3 n_nodes)."""
-    mean = virtual_point(np.repeat(nodes[ring], 3, axis=0), np.tile(np.eye(3), (ring.size, 1)), point, DOFS)
-    weights = np.zeros((6, nodes.size))
-    weights[:, (3 * ring[:, None] + np.arange(3)).ravel()] = mean.transform
-    return weights
+def _mean(mesh: Mesh, nodes: NDArray[np.int32], point: FloatArray, dofs: tuple[str, ...]) -> sparse.csr_array:
+    """Weights of all nodes for the mean rigid motion of some about a point, DOFs in the order asked for."""
+    return mean_motion(mesh, Patch(point, nodes))[[SIX.index(dof) for dof in dofs]]
 
 
 def _beams(case: BoltedCase, length_b: float) -> _Beams:

@@ -8,7 +8,7 @@ import numpy as np
 
 from jointfrf.bolted.study import BoltedResult, Found, peak_errors
 from jointfrf.case_file import unit_of
-from jointfrf.tables import Cell, Table, number
+from jointfrf.tables import Cell, Table, case_json, number
 
 __all__ = ["bolted_json", "bolted_summary", "bolted_tables", "parameters"]
 
@@ -178,17 +178,10 @@ def bolted_summary(result: BoltedResult) -> list[str]:
 
 def bolted_json(result: BoltedResult, tables: list[Table]) -> dict[str, Any]:
     """Return all numbers of a case as a structure for JSON."""
-    case = result.case
     return {
-        "case": case.name,
-        "title": case.title,
-        "section": case.section,
-        "realisations": result.n_realisations,
-        "seed": case.seed,
-        "frequency_hz": {"first": case.freq_hz[0], "last": case.freq_hz[-1], "lines": case.freq_hz.size},
+        **case_json(result.case, result.n_realisations, tables),
         "n_dofs": result.n_dofs,
         "preload_newton": result.state.force,
         "elongation_m": result.state.elongation,
         "natural_frequencies_hz": result.natural_frequencies.tolist(),
-        "tables": {table.key: {"title": table.title, "columns": table.columns, "rows": table.rows} for table in tables},
     }
