@@ -15,16 +15,47 @@
 !>             one; an estimate where the fast engines solve, and for large or banded matrices
 !> info        0 good; -i argument i is wrong and nothing was done; > 0 number of bad lines; -1000 no memory; -1001 the
 !>             environment variable JOINTFRF_ENGINE names an engine that is not there, and nothing was done
+!> work        of jf_NAME_work: workspace, shape (max(1, lwork)); after a query, work(1) is the least lwork that will do
+!> lwork       length of work; -1 here or in liwork is a query: the arguments are checked, both least lengths are given
+!>             back, and nothing else is done
+!> iwork       of jf_NAME_work: workspace, shape (max(1, liwork)); after a query, iwork(1) is the least liwork
+!> liwork      length of iwork
+!> Integers are default ones of four bytes, jf_int in C. The library jointfrf64 has the same routines with integers of
+!> eight bytes, also in arrays, for programs compiled so (-fdefault-integer-8, -i8); sizes end at 2147483647 in both.
+!> Where a program is built for the other library, the compiler refuses the module or the include file, and the linker a
+!> C program. A FORTRAN 77 program without the include file is refused by nothing: single numbers may come through by
+!> chance, arrays and info do not.
+!>
 !> Time convention exp(+i w t). Input and output arrays must not overlap.
 !>
-!> Engines: the same sweeps by LAPACK line by line (the reference), or several lines side by side in the vector registers
-!> of the processor. jf_set_engine chooses for the whole process; without it JOINTFRF_ENGINE does, by one of the words
-!> auto, lapack, plain, x86-64-v2, x86-64-v3, x86-64-v4. Results agree within the rounding that the condition allows.
+!> Engines: the same sweeps by LAPACK line by line (the reference), or several lines side by side in the vector
+!> registers of the processor. jf_set_engine chooses for the whole process; without it JOINTFRF_ENGINE does, by one of
+!> the words auto, lapack, plain, x86-64-v2, x86-64-v3, x86-64-v4. Results agree within the rounding that the condition
+!> allows.
+!>
+!> One line at a time: jf_NAME with n_freq = 1 does a single line. jf_NAME_work does one line or many in memory of the
+!> caller: nothing is allocated, no thread is started, and LAPACK does every line, whatever engine is chosen, so that
+!> results have the same bits for one line and for many, and are those of a sweep by jf_NAME with the engine lapack; a
+!> single large line by jf_NAME may take threads of the BLAS, and round otherwise. Lengths do not depend on n_freq, so
+!> one query serves a whole loop.
+!>
+!> Floating-point traps of the program are held off during a call, so that a bad line gets its code instead of a signal;
+!> afterwards traps, flags and rounding are what they were.
 module jointfrf
-  use, intrinsic :: iso_c_binding, only: c_char, c_double, c_double_complex, c_int
-  use jointfrf_arguments, only: as_lines, as_matrix, bad_offsets, is_transposed, lower, names, not_finite, &
-    out_of_range, repeated, spread_text, unknown_equation, unknown_order
-  use jointfrf_brick, only: brick_matrices, brick_quality, is_formulation
+  use, intrinsic :: iso_c_binding, only: c_char, c_double, c_double_complex
+  use jointfrf_api_work, only: jf_compliance_covariance_work, jf_compliance_factors_work, jf_couple_work, &
+    jf_decouple_work, jf_find_modification_work, jf_inverse_substructuring_work, &
+    jf_invert_work, jf_ismm_work, jf_joint_compliance_work, jf_modify_work, &
+    jf_receptance_banded_work, jf_receptance_modal_work, jf_receptance_work, &
+    jf_solve_work, jf_transform_work
+  use jointfrf_arguments, only: as_lines, as_matrix, is_transposed, lower, spread_text
+  use jointfrf_brick, only: brick_matrices, brick_quality
+  use jointfrf_checks, only: check_brick_matrices, check_brick_quality, check_central_difference, &
+    check_compliance_covariance, check_compliance_factors, check_couple, check_decouple, check_difference_weights, &
+    check_find_modification, check_inverse_substructuring, check_invert, check_ismm, &
+    check_joint_compliance, check_modify, check_monte_carlo, check_pollute, &
+    check_receptance, check_receptance_banded, check_receptance_modal, check_solve, &
+    check_transform
   use jointfrf_compliance, only: compliance_covariance, compliance_factors, joint_compliance
   use jointfrf_coupling, only: couple
   use jointfrf_decoupling, only: decouple
@@ -33,13 +64,15 @@ module jointfrf
     get_engine, set_engine
   use jointfrf_finite_difference, only: difference_weights, transform_receptance
   use jointfrf_ismm, only: inverse_substructuring, ismm
+  use jointfrf_kinds, only: ip, long
   use jointfrf_linear_algebra, only: invert, solve
   use jointfrf_modal, only: receptance_modal
   use jointfrf_modification, only: find_modification, modify
-  use jointfrf_monte_carlo, only: is_method, monte_carlo
-  use jointfrf_noise, only: is_kind, is_reference, make_noise, pollute
+  use jointfrf_monte_carlo, only: monte_carlo
+  use jointfrf_noise, only: make_noise, pollute
   use jointfrf_status, only: info_good, info_no_engine, info_no_memory, info_text, line_good, line_not_finite, &
     line_overflow, line_text
+  use jointfrf_traps, only: hold_traps, host_state, release_traps
   implicit none
   private
 
@@ -53,29 +86,35 @@ module jointfrf
   public :: jf_difference_weights, jf_central_difference, jf_transform
   public :: jf_pollute, jf_monte_carlo
   public :: jf_brick_matrices, jf_brick_quality
+  public :: jf_invert_work, jf_solve_work, jf_receptance_work, jf_receptance_banded_work, jf_receptance_modal_work
+  public :: jf_couple_work, jf_modify_work, jf_find_modification_work, jf_ismm_work, jf_inverse_substructuring_work
+  public :: jf_decouple_work, jf_joint_compliance_work, jf_compliance_factors_work, jf_compliance_covariance_work
+  public :: jf_transform_work
 
   !> What jf_set_engine takes and jf_get_engine gives.
-  integer(c_int), parameter, public :: jf_engine_automatic = engine_automatic
-  integer(c_int), parameter, public :: jf_engine_lapack = engine_lapack
-  integer(c_int), parameter, public :: jf_engine_plain = engine_plain
-  integer(c_int), parameter, public :: jf_engine_x86_64_v2 = engine_v2
-  integer(c_int), parameter, public :: jf_engine_x86_64_v3 = engine_v3
-  integer(c_int), parameter, public :: jf_engine_x86_64_v4 = engine_v4
+  integer(ip), parameter, public :: jf_engine_automatic = engine_automatic
+  integer(ip), parameter, public :: jf_engine_lapack = engine_lapack
+  integer(ip), parameter, public :: jf_engine_plain = engine_plain
+  integer(ip), parameter, public :: jf_engine_x86_64_v2 = engine_v2
+  integer(ip), parameter, public :: jf_engine_x86_64_v3 = engine_v3
+  integer(ip), parameter, public :: jf_engine_x86_64_v4 = engine_v4
 
   !> What `info` and `line_info` may be, besides numbers of arguments, lines and pivots.
-  integer(c_int), parameter, public :: jf_info_good = info_good
-  integer(c_int), parameter, public :: jf_info_no_memory = info_no_memory
-  integer(c_int), parameter, public :: jf_info_no_engine = info_no_engine
-  integer(c_int), parameter, public :: jf_line_good = line_good
-  integer(c_int), parameter, public :: jf_line_not_finite = line_not_finite
-  integer(c_int), parameter, public :: jf_line_overflow = line_overflow
+  integer(ip), parameter, public :: jf_info_good = info_good
+  integer(ip), parameter, public :: jf_info_no_memory = info_no_memory
+  integer(ip), parameter, public :: jf_info_no_engine = info_no_engine
+  integer(ip), parameter, public :: jf_line_good = line_good
+  integer(ip), parameter, public :: jf_line_not_finite = line_not_finite
+  integer(ip), parameter, public :: jf_line_overflow = line_overflow
 
 contains
+
+  ! Bounds are computed before sizes are checked: MIN and MAX in them keep those that will be refused from overflowing.
 
   !> Version of the library.
   !> major, minor, patch   the three numbers of the version
   subroutine jf_version(major, minor, patch) bind(C, name='jf_version_')
-    integer(c_int), intent(out) :: major, minor, patch
+    integer(ip), intent(out) :: major, minor, patch
 
     major = JF_VERSION_MAJOR
     minor = JF_VERSION_MINOR
@@ -87,7 +126,7 @@ contains
   !> n_text   characters of room, 80 suffice
   !> text     shape (n_text), padded with blanks, no terminating null
   subroutine jf_info_text(info, n_text, text) bind(C, name='jf_info_text_')
-    integer(c_int), intent(in) :: info, n_text
+    integer(ip), intent(in) :: info, n_text
     character(kind=c_char), intent(out) :: text(n_text)
 
     call spread_text(info_text(info), text)
@@ -98,7 +137,7 @@ contains
   !> n_text      as in jf_info_text
   !> text        as in jf_info_text
   subroutine jf_line_text(line_info, n_text, text) bind(C, name='jf_line_text_')
-    integer(c_int), intent(in) :: line_info, n_text
+    integer(ip), intent(in) :: line_info, n_text
     character(kind=c_char), intent(out) :: text(n_text)
 
     call spread_text(line_text(line_info), text)
@@ -109,8 +148,8 @@ contains
   !>          of any processor, 3 x86-64-v2, 4 x86-64-v3 (AVX2), 5 x86-64-v4 (AVX-512)
   !> info     0 good; -1 this machine or this build does not have it, and the choice stays
   subroutine jf_set_engine(engine, info) bind(C, name='jf_set_engine_')
-    integer(c_int), intent(in) :: engine
-    integer(c_int), intent(out) :: info
+    integer(ip), intent(in) :: engine
+    integer(ip), intent(out) :: info
 
     call set_engine(engine, info)
   end subroutine jf_set_engine
@@ -119,7 +158,7 @@ contains
   !> engine   as in jf_set_engine; -1 with info -1001
   !> info     0 good; -1001 the environment variable JOINTFRF_ENGINE names an engine that is not there
   subroutine jf_get_engine(engine, info) bind(C, name='jf_get_engine_')
-    integer(c_int), intent(out) :: engine, info
+    integer(ip), intent(out) :: engine, info
 
     call get_engine(engine, info)
     if (info /= info_good) engine = -1
@@ -130,18 +169,20 @@ contains
   !> a           shape (n, n, n_freq); the order of storage does not matter
   !> a_inverse   shape (n, n, n_freq)
   subroutine jf_invert(n, n_freq, a, a_inverse, line_info, rcond, info) bind(C, name='jf_invert_')
-    integer(c_int), intent(in) :: n, n_freq
+    integer(ip), intent(in) :: n, n_freq
     complex(c_double_complex), target, intent(in) :: a(n, n, n_freq)
     complex(c_double_complex), target, intent(out) :: a_inverse(n, n, n_freq)
-    integer(c_int), intent(out) :: line_info(n_freq)
+    integer(ip), intent(out) :: line_info(n_freq)
     real(c_double), intent(out) :: rcond(n_freq)
-    integer(c_int), intent(out) :: info
+    integer(ip), intent(out) :: info
+    type(host_state) :: host
 
-    info = info_good
-    if (n_freq < 0) info = -2
-    if (n < 0) info = -1
-    if (info /= info_good) return
-    call invert(a, a_inverse, line_info, rcond, info)
+    call hold_traps(host)
+    info = check_invert(n, n_freq)
+    if (info == info_good) then
+      call invert(a, a_inverse, line_info, rcond, info)
+    end if
+    call release_traps(host)
   end subroutine jf_invert
 
   !> Solve A X = B on every line.
@@ -151,23 +192,23 @@ contains
   !> b, x    shape (n, n_rhs, n_freq), or (n_rhs, n, n_freq) with trans 'T'
   subroutine jf_solve(trans, n, n_rhs, n_freq, a, b, x, line_info, rcond, info) bind(C, name='jf_solve_')
     character(kind=c_char), intent(in) :: trans
-    integer(c_int), intent(in) :: n, n_rhs, n_freq
+    integer(ip), intent(in) :: n, n_rhs, n_freq
     complex(c_double_complex), target, intent(in) :: a(n, n, n_freq), b(*)
     complex(c_double_complex), target, intent(inout) :: x(*)
-    integer(c_int), intent(out) :: line_info(n_freq)
+    integer(ip), intent(out) :: line_info(n_freq)
     real(c_double), intent(out) :: rcond(n_freq)
-    integer(c_int), intent(out) :: info
+    integer(ip), intent(out) :: info
     complex(c_double_complex), pointer, contiguous :: b_lines(:, :, :), x_lines(:, :, :)
+    type(host_state) :: host
 
-    info = info_good
-    if (n_freq < 0) info = -4
-    if (n_rhs < 0) info = -3
-    if (n < 0) info = -2
-    if (unknown_order(trans)) info = -1
-    if (info /= info_good) return
-    call as_lines(trans, n, n_rhs, n_freq, b, b_lines)
-    call as_lines(trans, n, n_rhs, n_freq, x, x_lines)
-    call solve(is_transposed(trans), a, b_lines, x_lines, line_info, rcond, info)
+    call hold_traps(host)
+    info = check_solve(trans, n, n_rhs, n_freq)
+    if (info == info_good) then
+      call as_lines(trans, n, n_rhs, n_freq, b, b_lines)
+      call as_lines(trans, n, n_rhs, n_freq, x, x_lines)
+      call solve(is_transposed(trans), a, b_lines, x_lines, line_info, rcond, info)
+    end if
+    call release_traps(host)
   end subroutine jf_solve
 
   !> Receptance of a model by solving, dense (zgesv). Eqs. (2.28), (2.29): ((1 + i eta) K + i H + i w C - w^2 M)^-1.
@@ -188,32 +229,26 @@ contains
                            n_structural, structural, loss_factor, outputs, inputs, h, line_info, rcond, info) &
     bind(C, name='jf_receptance_')
     character(kind=c_char), intent(in) :: trans
-    integer(c_int), intent(in) :: n, n_freq, n_out, n_in, n_damping, n_structural
+    integer(ip), intent(in) :: n, n_freq, n_out, n_in, n_damping, n_structural
     real(c_double), target, intent(in) :: omega(n_freq), stiffness(n, n), mass(n, n)
     real(c_double), target, intent(in) :: damping(n, n_damping), structural(n, n_structural)
     real(c_double), intent(in) :: loss_factor
-    integer(c_int), target, intent(in) :: outputs(n_out), inputs(n_in)
+    integer(ip), target, intent(in) :: outputs(n_out), inputs(n_in)
     complex(c_double_complex), target, intent(inout) :: h(*)
-    integer(c_int), intent(out) :: line_info(n_freq)
+    integer(ip), intent(out) :: line_info(n_freq)
     real(c_double), intent(out) :: rcond(n_freq)
-    integer(c_int), intent(out) :: info
+    integer(ip), intent(out) :: info
     complex(c_double_complex), pointer, contiguous :: h_lines(:, :, :)
+    type(host_state) :: host
 
-    info = info_good
-    if (out_of_range(inputs, n)) info = -15
-    if (out_of_range(outputs, n)) info = -14
-    if (not_finite(loss_factor)) info = -13
-    if (n_structural /= 0 .and. n_structural /= n) info = -11
-    if (n_damping /= 0 .and. n_damping /= n) info = -9
-    if (n_in < 0) info = -5
-    if (n_out < 0) info = -4
-    if (n_freq < 0) info = -3
-    if (n < 0) info = -2
-    if (unknown_order(trans)) info = -1
-    if (info /= info_good) return
-    call as_lines(trans, n_out, n_in, n_freq, h, h_lines)
-    call receptance_dense(is_transposed(trans), omega, stiffness, mass, damping, structural, loss_factor, outputs, &
-                          inputs, h_lines, line_info, rcond, info)
+    call hold_traps(host)
+    info = check_receptance(trans, n, n_freq, n_out, n_in, n_damping, n_structural, loss_factor, outputs, inputs)
+    if (info == info_good) then
+      call as_lines(trans, n_out, n_in, n_freq, h, h_lines)
+      call receptance_dense(is_transposed(trans), omega, stiffness, mass, damping, structural, loss_factor, outputs, &
+                            inputs, h_lines, line_info, rcond, info)
+    end if
+    call release_traps(host)
   end subroutine jf_receptance
 
   !> Receptance as by jf_receptance of a model with band matrices, with zgbtrf and zgbtrs. LAPACK's band storage: entry
@@ -237,34 +272,28 @@ contains
                                   damping, n_structural, structural, loss_factor, outputs, inputs, h, &
                                   line_info, rcond, info) bind(C, name='jf_receptance_banded_')
     character(kind=c_char), intent(in) :: trans
-    integer(c_int), intent(in) :: n, kl, ku, n_freq, n_out, n_in, n_damping, n_structural
-    real(c_double), target, intent(in) :: omega(n_freq), stiffness(kl + ku + 1, n), mass(kl + ku + 1, n)
-    real(c_double), target, intent(in) :: damping(kl + ku + 1, n_damping), structural(kl + ku + 1, n_structural)
+    integer(ip), intent(in) :: n, kl, ku, n_freq, n_out, n_in, n_damping, n_structural
+    real(c_double), target, intent(in) :: omega(n_freq), stiffness(1_long + kl + ku, n), mass(1_long + kl + ku, n)
+    real(c_double), target, intent(in) :: damping(1_long + kl + ku, n_damping)
+    real(c_double), target, intent(in) :: structural(1_long + kl + ku, n_structural)
     real(c_double), intent(in) :: loss_factor
-    integer(c_int), target, intent(in) :: outputs(n_out), inputs(n_in)
+    integer(ip), target, intent(in) :: outputs(n_out), inputs(n_in)
     complex(c_double_complex), target, intent(inout) :: h(*)
-    integer(c_int), intent(out) :: line_info(n_freq)
+    integer(ip), intent(out) :: line_info(n_freq)
     real(c_double), intent(out) :: rcond(n_freq)
-    integer(c_int), intent(out) :: info
+    integer(ip), intent(out) :: info
     complex(c_double_complex), pointer, contiguous :: h_lines(:, :, :)
+    type(host_state) :: host
 
-    info = info_good
-    if (out_of_range(inputs, n)) info = -17
-    if (out_of_range(outputs, n)) info = -16
-    if (not_finite(loss_factor)) info = -15
-    if (n_structural /= 0 .and. n_structural /= n) info = -13
-    if (n_damping /= 0 .and. n_damping /= n) info = -11
-    if (n_in < 0) info = -7
-    if (n_out < 0) info = -6
-    if (n_freq < 0) info = -5
-    if (ku < 0 .or. ku > max(0, n - 1)) info = -4
-    if (kl < 0 .or. kl > max(0, n - 1)) info = -3
-    if (n < 0) info = -2
-    if (unknown_order(trans)) info = -1
-    if (info /= info_good) return
-    call as_lines(trans, n_out, n_in, n_freq, h, h_lines)
-    call receptance_banded(is_transposed(trans), kl, ku, omega, stiffness, mass, damping, structural, loss_factor, &
-                           outputs, inputs, h_lines, line_info, rcond, info)
+    call hold_traps(host)
+    info = check_receptance_banded(trans, n, kl, ku, n_freq, n_out, n_in, n_damping, n_structural, loss_factor, &
+                                   outputs, inputs)
+    if (info == info_good) then
+      call as_lines(trans, n_out, n_in, n_freq, h, h_lines)
+      call receptance_banded(is_transposed(trans), int(kl), int(ku), omega, stiffness, mass, damping, structural, &
+                             loss_factor, outputs, inputs, h_lines, line_info, rcond, info)
+    end if
+    call release_traps(host)
   end subroutine jf_receptance_banded
 
   !> Receptance by superposition of modes: sum of phi_out phi_in / (lambda (1 + i eta) - w^2 + i w c).
@@ -281,28 +310,27 @@ contains
   subroutine jf_receptance_modal(trans, n_modes, n_freq, n_out, n_in, omega, stiffness, damping, loss_factor, &
                                  shapes_out, shapes_in, h, line_info, rcond, info) bind(C, name='jf_receptance_modal_')
     character(kind=c_char), intent(in) :: trans
-    integer(c_int), intent(in) :: n_modes, n_freq, n_out, n_in
+    integer(ip), intent(in) :: n_modes, n_freq, n_out, n_in
     real(c_double), target, intent(in) :: omega(n_freq), stiffness(n_modes), damping(n_modes), loss_factor(n_modes)
     real(c_double), target, intent(in) :: shapes_out(*), shapes_in(*)
     complex(c_double_complex), target, intent(inout) :: h(*)
-    integer(c_int), intent(out) :: line_info(n_freq)
+    integer(ip), intent(out) :: line_info(n_freq)
     real(c_double), intent(out) :: rcond(n_freq)
-    integer(c_int), intent(out) :: info
+    integer(ip), intent(out) :: info
     real(c_double), pointer, contiguous :: out_matrix(:, :), in_matrix(:, :)
     complex(c_double_complex), pointer, contiguous :: h_lines(:, :, :)
+    type(host_state) :: host
 
-    info = info_good
-    if (n_in < 0) info = -5
-    if (n_out < 0) info = -4
-    if (n_freq < 0) info = -3
-    if (n_modes < 0) info = -2
-    if (unknown_order(trans)) info = -1
-    if (info /= info_good) return
-    call as_matrix(trans, n_out, n_modes, shapes_out, out_matrix)
-    call as_matrix(trans, n_in, n_modes, shapes_in, in_matrix)
-    call as_lines(trans, n_out, n_in, n_freq, h, h_lines)
-    call receptance_modal(is_transposed(trans), omega, stiffness, damping, loss_factor, out_matrix, in_matrix, &
-                          h_lines, line_info, rcond, info)
+    call hold_traps(host)
+    info = check_receptance_modal(trans, n_modes, n_freq, n_out, n_in)
+    if (info == info_good) then
+      call as_matrix(trans, n_out, n_modes, shapes_out, out_matrix)
+      call as_matrix(trans, n_in, n_modes, shapes_in, in_matrix)
+      call as_lines(trans, n_out, n_in, n_freq, h, h_lines)
+      call receptance_modal(is_transposed(trans), omega, stiffness, damping, loss_factor, out_matrix, in_matrix, &
+                            h_lines, line_info, rcond, info)
+    end if
+    call release_traps(host)
   end subroutine jf_receptance_modal
 
   !> Receptance of A and B coupled by a flexible joint, all blocks. Eqs. (2.24)-(2.26), (2.42)-(2.45).
@@ -317,25 +345,22 @@ contains
   subroutine jf_couple(trans, n_a, n_b, n_j, n_freq, h_a, h_b, k_joint, dofs_a, dofs_b, h_c, line_info, rcond, &
                        info) bind(C, name='jf_couple_')
     character(kind=c_char), intent(in) :: trans
-    integer(c_int), intent(in) :: n_a, n_b, n_j, n_freq
+    integer(ip), intent(in) :: n_a, n_b, n_j, n_freq
     complex(c_double_complex), target, intent(in) :: h_a(n_a, n_a, n_freq), h_b(n_b, n_b, n_freq)
-    complex(c_double_complex), target, intent(in) :: k_joint(n_j, n_j, n_freq)
-    integer(c_int), target, intent(in) :: dofs_a(n_j), dofs_b(n_j)
-    complex(c_double_complex), target, intent(out) :: h_c(n_a + n_b, n_a + n_b, n_freq)
-    integer(c_int), intent(out) :: line_info(n_freq)
+    complex(c_double_complex), target, intent(in) :: k_joint(min(n_j, n_a), min(n_j, n_a), n_freq)
+    integer(ip), target, intent(in) :: dofs_a(n_j), dofs_b(n_j)
+    complex(c_double_complex), target, intent(out) :: h_c(0_long + n_a + n_b, 0_long + n_a + n_b, n_freq)
+    integer(ip), intent(out) :: line_info(n_freq)
     real(c_double), intent(out) :: rcond(n_freq)
-    integer(c_int), intent(out) :: info
+    integer(ip), intent(out) :: info
+    type(host_state) :: host
 
-    info = info_good
-    if (out_of_range(dofs_b, n_b) .or. repeated(dofs_b)) info = -10
-    if (out_of_range(dofs_a, n_a) .or. repeated(dofs_a)) info = -9
-    if (n_freq < 0) info = -5
-    if (n_j < 0 .or. n_j > min(n_a, n_b)) info = -4
-    if (n_b < 0) info = -3
-    if (n_a < 0) info = -2
-    if (unknown_order(trans)) info = -1
-    if (info /= info_good) return
-    call couple(is_transposed(trans), h_a, h_b, k_joint, dofs_a, dofs_b, h_c, line_info, rcond, info)
+    call hold_traps(host)
+    info = check_couple(trans, n_a, n_b, n_j, n_freq, dofs_a, dofs_b)
+    if (info == info_good) then
+      call couple(is_transposed(trans), h_a, h_b, k_joint, dofs_a, dofs_b, h_c, line_info, rcond, info)
+    end if
+    call release_traps(host)
   end subroutine jf_couple
 
   !> Receptance of a locally modified structure. Eqs. (2.34)-(2.36).
@@ -347,22 +372,21 @@ contains
   !> gamma   receptance after, shape (n, n, n_freq), m/N
   subroutine jf_modify(trans, n, n_m, n_freq, alpha, d, dofs, gamma, line_info, rcond, info) bind(C, name='jf_modify_')
     character(kind=c_char), intent(in) :: trans
-    integer(c_int), intent(in) :: n, n_m, n_freq
-    complex(c_double_complex), target, intent(in) :: alpha(n, n, n_freq), d(n_m, n_m, n_freq)
-    integer(c_int), target, intent(in) :: dofs(n_m)
+    integer(ip), intent(in) :: n, n_m, n_freq
+    complex(c_double_complex), target, intent(in) :: alpha(n, n, n_freq), d(min(n_m, n), min(n_m, n), n_freq)
+    integer(ip), target, intent(in) :: dofs(n_m)
     complex(c_double_complex), target, intent(out) :: gamma(n, n, n_freq)
-    integer(c_int), intent(out) :: line_info(n_freq)
+    integer(ip), intent(out) :: line_info(n_freq)
     real(c_double), intent(out) :: rcond(n_freq)
-    integer(c_int), intent(out) :: info
+    integer(ip), intent(out) :: info
+    type(host_state) :: host
 
-    info = info_good
-    if (out_of_range(dofs, n) .or. repeated(dofs)) info = -7
-    if (n_freq < 0) info = -4
-    if (n_m < 0 .or. n_m > n) info = -3
-    if (n < 0) info = -2
-    if (unknown_order(trans)) info = -1
-    if (info /= info_good) return
-    call modify(is_transposed(trans), alpha, d, dofs, gamma, line_info, rcond, info)
+    call hold_traps(host)
+    info = check_modify(trans, n, n_m, n_freq, dofs)
+    if (info == info_good) then
+      call modify(is_transposed(trans), alpha, d, dofs, gamma, line_info, rcond, info)
+    end if
+    call release_traps(host)
   end subroutine jf_modify
 
   !> The modification D = alpha^-1 (alpha - gamma) gamma^-1 that turns alpha into gamma. Eqs. (2.40), (2.47).
@@ -373,19 +397,20 @@ contains
   subroutine jf_find_modification(trans, n, n_freq, alpha, gamma, d, line_info, rcond, info) &
     bind(C, name='jf_find_modification_')
     character(kind=c_char), intent(in) :: trans
-    integer(c_int), intent(in) :: n, n_freq
+    integer(ip), intent(in) :: n, n_freq
     complex(c_double_complex), target, intent(in) :: alpha(n, n, n_freq), gamma(n, n, n_freq)
     complex(c_double_complex), target, intent(out) :: d(n, n, n_freq)
-    integer(c_int), intent(out) :: line_info(n_freq)
+    integer(ip), intent(out) :: line_info(n_freq)
     real(c_double), intent(out) :: rcond(n_freq)
-    integer(c_int), intent(out) :: info
+    integer(ip), intent(out) :: info
+    type(host_state) :: host
 
-    info = info_good
-    if (n_freq < 0) info = -3
-    if (n < 0) info = -2
-    if (unknown_order(trans)) info = -1
-    if (info /= info_good) return
-    call find_modification(is_transposed(trans), alpha, gamma, d, line_info, rcond, info)
+    call hold_traps(host)
+    info = check_find_modification(trans, n, n_freq)
+    if (info == info_good) then
+      call find_modification(is_transposed(trans), alpha, gamma, d, line_info, rcond, info)
+    end if
+    call release_traps(host)
   end subroutine jf_find_modification
 
   !> Joint stiffness by inverse structural modification, K* = K0 - D_jk. Eqs. (2.37)-(2.48).
@@ -397,20 +422,22 @@ contains
   subroutine jf_ismm(trans, n, n_freq, alpha, gamma, k_initial, k_joint, line_info, rcond, info) &
     bind(C, name='jf_ismm_')
     character(kind=c_char), intent(in) :: trans
-    integer(c_int), intent(in) :: n, n_freq
-    complex(c_double_complex), target, intent(in) :: alpha(2*n, 2*n, n_freq), gamma(2*n, 2*n, n_freq)
+    integer(ip), intent(in) :: n, n_freq
+    complex(c_double_complex), target, intent(in) :: alpha(2_long*n, 2_long*n, n_freq)
+    complex(c_double_complex), target, intent(in) :: gamma(2_long*n, 2_long*n, n_freq)
     complex(c_double_complex), target, intent(in) :: k_initial(n, n, n_freq)
     complex(c_double_complex), target, intent(out) :: k_joint(n, n, n_freq)
-    integer(c_int), intent(out) :: line_info(n_freq)
+    integer(ip), intent(out) :: line_info(n_freq)
     real(c_double), intent(out) :: rcond(n_freq)
-    integer(c_int), intent(out) :: info
+    integer(ip), intent(out) :: info
+    type(host_state) :: host
 
-    info = info_good
-    if (n_freq < 0) info = -3
-    if (n < 0) info = -2
-    if (unknown_order(trans)) info = -1
-    if (info /= info_good) return
-    call ismm(is_transposed(trans), alpha, gamma, k_initial, k_joint, line_info, rcond, info)
+    call hold_traps(host)
+    info = check_ismm(trans, n, n_freq)
+    if (info == info_good) then
+      call ismm(is_transposed(trans), alpha, gamma, k_initial, k_joint, line_info, rcond, info)
+    end if
+    call release_traps(host)
   end subroutine jf_ismm
 
   !> Joint stiffness K* = -(gamma^-1)_jk, which ISMM is where alpha was assembled through K0.
@@ -420,19 +447,20 @@ contains
   subroutine jf_inverse_substructuring(trans, n, n_freq, gamma, k_joint, line_info, rcond, info) &
     bind(C, name='jf_inverse_substructuring_')
     character(kind=c_char), intent(in) :: trans
-    integer(c_int), intent(in) :: n, n_freq
-    complex(c_double_complex), target, intent(in) :: gamma(2*n, 2*n, n_freq)
+    integer(ip), intent(in) :: n, n_freq
+    complex(c_double_complex), target, intent(in) :: gamma(2_long*n, 2_long*n, n_freq)
     complex(c_double_complex), target, intent(out) :: k_joint(n, n, n_freq)
-    integer(c_int), intent(out) :: line_info(n_freq)
+    integer(ip), intent(out) :: line_info(n_freq)
     real(c_double), intent(out) :: rcond(n_freq)
-    integer(c_int), intent(out) :: info
+    integer(ip), intent(out) :: info
+    type(host_state) :: host
 
-    info = info_good
-    if (n_freq < 0) info = -3
-    if (n < 0) info = -2
-    if (unknown_order(trans)) info = -1
-    if (info /= info_good) return
-    call inverse_substructuring(is_transposed(trans), gamma, k_joint, line_info, rcond, info)
+    call hold_traps(host)
+    info = check_inverse_substructuring(trans, n, n_freq)
+    if (info == info_good) then
+      call inverse_substructuring(is_transposed(trans), gamma, k_joint, line_info, rcond, info)
+    end if
+    call release_traps(host)
   end subroutine jf_inverse_substructuring
 
   !> Joint stiffness by FRF decoupling, by one of four equations. Eqs. (2.53)-(2.56).
@@ -451,28 +479,23 @@ contains
                          k_joint, line_info, rcond, info) bind(C, name='jf_decouple_')
     character(kind=c_char), intent(in) :: equation(2)
     character(kind=c_char), intent(in) :: trans
-    integer(c_int), intent(in) :: n_a, n_b, n, n_freq
-    complex(c_double_complex), target, intent(in) :: h_a(n_a, n_a, n_freq), h_b(n_b, n_b, n_freq), h_c(n, n, n_freq)
-    integer(c_int), target, intent(in) :: dofs_j(n), dofs_k(n), dofs_r(n), dofs_s(n)
-    complex(c_double_complex), target, intent(out) :: k_joint(n, n, n_freq)
-    integer(c_int), intent(out) :: line_info(n_freq)
+    integer(ip), intent(in) :: n_a, n_b, n, n_freq
+    complex(c_double_complex), target, intent(in) :: h_a(n_a, n_a, n_freq), h_b(n_b, n_b, n_freq)
+    complex(c_double_complex), target, intent(in) :: h_c(min(n, n_a), min(n, n_a), n_freq)
+    integer(ip), target, intent(in) :: dofs_j(n), dofs_k(n), dofs_r(n), dofs_s(n)
+    complex(c_double_complex), target, intent(out) :: k_joint(min(n, n_a), min(n, n_a), n_freq)
+    integer(ip), intent(out) :: line_info(n_freq)
     real(c_double), intent(out) :: rcond(n_freq)
-    integer(c_int), intent(out) :: info
+    integer(ip), intent(out) :: info
+    type(host_state) :: host
 
-    info = info_good
-    if (names(equation, 's') .and. (out_of_range(dofs_s, n_b) .or. repeated(dofs_s))) info = -13
-    if (names(equation, 'r') .and. (out_of_range(dofs_r, n_a) .or. repeated(dofs_r))) info = -12
-    if (out_of_range(dofs_k, n_b) .or. repeated(dofs_k)) info = -11
-    if (out_of_range(dofs_j, n_a) .or. repeated(dofs_j)) info = -10
-    if (n_freq < 0) info = -6
-    if (n < 0 .or. n > min(n_a, n_b)) info = -5
-    if (n_b < 0) info = -4
-    if (n_a < 0) info = -3
-    if (unknown_order(trans)) info = -2
-    if (unknown_equation(equation)) info = -1
-    if (info /= info_good) return
-    call decouple(lower(equation), is_transposed(trans), h_a, h_b, h_c, dofs_j, dofs_k, dofs_r, dofs_s, k_joint, &
-                  line_info, rcond, info)
+    call hold_traps(host)
+    info = check_decouple(equation, trans, n_a, n_b, n, n_freq, dofs_j, dofs_k, dofs_r, dofs_s)
+    if (info == info_good) then
+      call decouple(lower(equation), is_transposed(trans), h_a, h_b, h_c, dofs_j, dofs_k, dofs_r, dofs_s, k_joint, &
+                    line_info, rcond, info)
+    end if
+    call release_traps(host)
   end subroutine jf_decouple
 
   !> Joint compliance C = gamma_kk gamma_jk^-1 gamma_jj - gamma_kj = K*^-1, without model or first estimate.
@@ -482,19 +505,20 @@ contains
   subroutine jf_joint_compliance(trans, n, n_freq, gamma, c_joint, line_info, rcond, info) &
     bind(C, name='jf_joint_compliance_')
     character(kind=c_char), intent(in) :: trans
-    integer(c_int), intent(in) :: n, n_freq
-    complex(c_double_complex), target, intent(in) :: gamma(2*n, 2*n, n_freq)
+    integer(ip), intent(in) :: n, n_freq
+    complex(c_double_complex), target, intent(in) :: gamma(2_long*n, 2_long*n, n_freq)
     complex(c_double_complex), target, intent(out) :: c_joint(n, n, n_freq)
-    integer(c_int), intent(out) :: line_info(n_freq)
+    integer(ip), intent(out) :: line_info(n_freq)
     real(c_double), intent(out) :: rcond(n_freq)
-    integer(c_int), intent(out) :: info
+    integer(ip), intent(out) :: info
+    type(host_state) :: host
 
-    info = info_good
-    if (n_freq < 0) info = -3
-    if (n < 0) info = -2
-    if (unknown_order(trans)) info = -1
-    if (info /= info_good) return
-    call joint_compliance(is_transposed(trans), gamma, c_joint, line_info, rcond, info)
+    call hold_traps(host)
+    info = check_joint_compliance(trans, n, n_freq)
+    if (info == info_good) then
+      call joint_compliance(is_transposed(trans), gamma, c_joint, line_info, rcond, info)
+    end if
+    call release_traps(host)
   end subroutine jf_joint_compliance
 
   !> How a small change of the measured FRFs moves the joint compliance, dC = U dh V to first order, gamma = T h T^T.
@@ -506,25 +530,25 @@ contains
   subroutine jf_compliance_factors(trans, n, m, n_freq, gamma, transform, factors, line_info, rcond, info) &
     bind(C, name='jf_compliance_factors_')
     character(kind=c_char), intent(in) :: trans
-    integer(c_int), intent(in) :: n, m, n_freq
-    complex(c_double_complex), target, intent(in) :: gamma(2*n, 2*n, n_freq)
+    integer(ip), intent(in) :: n, m, n_freq
+    complex(c_double_complex), target, intent(in) :: gamma(2_long*n, 2_long*n, n_freq)
     real(c_double), target, intent(in) :: transform(*)
     complex(c_double_complex), target, intent(inout) :: factors(*)
-    integer(c_int), intent(out) :: line_info(n_freq)
+    integer(ip), intent(out) :: line_info(n_freq)
     real(c_double), intent(out) :: rcond(n_freq)
-    integer(c_int), intent(out) :: info
+    integer(ip), intent(out) :: info
     real(c_double), pointer, contiguous :: matrix(:, :)
     complex(c_double_complex), pointer, contiguous :: factor_lines(:, :, :)
+    type(host_state) :: host
 
-    info = info_good
-    if (n_freq < 0) info = -4
-    if (m < 0) info = -3
-    if (n < 0) info = -2
-    if (unknown_order(trans)) info = -1
-    if (info /= info_good) return
-    call as_matrix(trans, 2*n, m, transform, matrix)
-    call as_lines(trans, 2*n, m, n_freq, factors, factor_lines)
-    call compliance_factors(is_transposed(trans), gamma, matrix, factor_lines, line_info, rcond, info)
+    call hold_traps(host)
+    info = check_compliance_factors(trans, n, m, n_freq)
+    if (info == info_good) then
+      call as_matrix(trans, 2*n, m, transform, matrix)
+      call as_lines(trans, 2*n, m, n_freq, factors, factor_lines)
+      call compliance_factors(is_transposed(trans), gamma, matrix, factor_lines, line_info, rcond, info)
+    end if
+    call release_traps(host)
   end subroutine jf_compliance_factors
 
   !> Covariance of the entries of the joint compliance from the noise of the measured FRFs, to first order.
@@ -539,25 +563,24 @@ contains
   subroutine jf_compliance_covariance(trans, reciprocal, n, m, n_freq, gamma, transform, variance, covariance, &
                                       line_info, rcond, info) bind(C, name='jf_compliance_covariance_')
     character(kind=c_char), intent(in) :: trans
-    integer(c_int), intent(in) :: reciprocal, n, m, n_freq
-    complex(c_double_complex), target, intent(in) :: gamma(2*n, 2*n, n_freq)
+    integer(ip), intent(in) :: reciprocal, n, m, n_freq
+    complex(c_double_complex), target, intent(in) :: gamma(2_long*n, 2_long*n, n_freq)
     real(c_double), target, intent(in) :: transform(*), variance(m, m, n_freq)
-    complex(c_double_complex), target, intent(out) :: covariance(n*n, n*n, n_freq)
-    integer(c_int), intent(out) :: line_info(n_freq)
+    complex(c_double_complex), target, intent(out) :: covariance(1_long*n*max(0_ip, n), 1_long*n*max(0_ip, n), n_freq)
+    integer(ip), intent(out) :: line_info(n_freq)
     real(c_double), intent(out) :: rcond(n_freq)
-    integer(c_int), intent(out) :: info
+    integer(ip), intent(out) :: info
     real(c_double), pointer, contiguous :: matrix(:, :)
+    type(host_state) :: host
 
-    info = info_good
-    if (n_freq < 0) info = -5
-    if (m < 0) info = -4
-    if (n < 0) info = -3
-    if (reciprocal /= 0 .and. reciprocal /= 1) info = -2
-    if (unknown_order(trans)) info = -1
-    if (info /= info_good) return
-    call as_matrix(trans, 2*n, m, transform, matrix)
-    call compliance_covariance(is_transposed(trans), gamma, matrix, variance, reciprocal == 1, covariance, &
-                               line_info, rcond, info)
+    call hold_traps(host)
+    info = check_compliance_covariance(trans, reciprocal, n, m, n_freq)
+    if (info == info_good) then
+      call as_matrix(trans, 2*n, m, transform, matrix)
+      call compliance_covariance(is_transposed(trans), gamma, matrix, variance, reciprocal == 1, covariance, &
+                                 line_info, rcond, info)
+    end if
+    call release_traps(host)
   end subroutine jf_compliance_covariance
 
   !> Weights for displacement and slope at a reference from points along a line. Eq. (2.59) for any spacing.
@@ -565,16 +588,18 @@ contains
   !> offset    positions of the points from the reference, shape (m), no two equal, m
   !> weights   shape (2, m): first row displacement, second row slope, 1/m
   subroutine jf_difference_weights(m, offset, weights, info) bind(C, name='jf_difference_weights_')
-    integer(c_int), intent(in) :: m
+    integer(ip), intent(in) :: m
     real(c_double), intent(in) :: offset(m)
     real(c_double), intent(out) :: weights(2, m)
-    integer(c_int), intent(out) :: info
+    integer(ip), intent(out) :: info
+    type(host_state) :: host
 
-    info = info_good
-    if (bad_offsets(offset)) info = -2
-    if (m < 2) info = -1
-    if (info /= info_good) return
-    call difference_weights(offset, weights)
+    call hold_traps(host)
+    info = check_difference_weights(m, offset)
+    if (info == info_good) then
+      call difference_weights(offset, weights)
+    end if
+    call release_traps(host)
   end subroutine jf_difference_weights
 
   !> Displacement and rotation receptances at a reference from translational ones along a line. Eqs. (2.57)-(2.59).
@@ -585,28 +610,31 @@ contains
   subroutine jf_central_difference(trans, m, n_freq, offset, h, h_new, line_info, rcond, info) &
     bind(C, name='jf_central_difference_')
     character(kind=c_char), intent(in) :: trans
-    integer(c_int), intent(in) :: m, n_freq
+    integer(ip), intent(in) :: m, n_freq
     real(c_double), intent(in) :: offset(m)
     complex(c_double_complex), target, intent(in) :: h(m, m, n_freq)
     complex(c_double_complex), target, intent(out) :: h_new(2, 2, n_freq)
-    integer(c_int), intent(out) :: line_info(n_freq)
+    integer(ip), intent(out) :: line_info(n_freq)
     real(c_double), intent(out) :: rcond(n_freq)
-    integer(c_int), intent(out) :: info
-    real(c_double) :: weights(2, m), weights_transposed(m, 2)
+    integer(ip), intent(out) :: info
+    type(host_state) :: host
 
-    info = info_good
-    if (bad_offsets(offset)) info = -4
-    if (n_freq < 0) info = -3
-    if (m < 2) info = -2
-    if (unknown_order(trans)) info = -1
-    if (info /= info_good) return
-    call difference_weights(offset, weights)
-    if (is_transposed(trans)) then
-      weights_transposed = transpose(weights)
-      call transform_receptance(.true., h, weights_transposed, weights_transposed, h_new, line_info, rcond, info)
-    else
-      call transform_receptance(.false., h, weights, weights, h_new, line_info, rcond, info)
+    call hold_traps(host)
+    info = check_central_difference(trans, m, n_freq, offset)
+    if (info == info_good) then
+      block
+        real(c_double) :: weights(2, m), weights_transposed(m, 2)
+
+        call difference_weights(offset, weights)
+        if (is_transposed(trans)) then
+          weights_transposed = transpose(weights)
+          call transform_receptance(.true., h, weights_transposed, weights_transposed, h_new, line_info, rcond, info)
+        else
+          call transform_receptance(.false., h, weights, weights, h_new, line_info, rcond, info)
+        end if
+      end block
     end if
+    call release_traps(host)
   end subroutine jf_central_difference
 
   !> H_new = T_out H T_in^T on every line. Eq. (2.57) for any number of points and DOFs.
@@ -619,29 +647,27 @@ contains
   subroutine jf_transform(trans, n_out, n_in, m_out, m_in, n_freq, h, t_out, t_in, h_new, line_info, rcond, &
                           info) bind(C, name='jf_transform_')
     character(kind=c_char), intent(in) :: trans
-    integer(c_int), intent(in) :: n_out, n_in, m_out, m_in, n_freq
+    integer(ip), intent(in) :: n_out, n_in, m_out, m_in, n_freq
     complex(c_double_complex), target, intent(in) :: h(*)
     real(c_double), target, intent(in) :: t_out(*), t_in(*)
     complex(c_double_complex), target, intent(inout) :: h_new(*)
-    integer(c_int), intent(out) :: line_info(n_freq)
+    integer(ip), intent(out) :: line_info(n_freq)
     real(c_double), intent(out) :: rcond(n_freq)
-    integer(c_int), intent(out) :: info
+    integer(ip), intent(out) :: info
     complex(c_double_complex), pointer, contiguous :: h_lines(:, :, :), new_lines(:, :, :)
     real(c_double), pointer, contiguous :: out_matrix(:, :), in_matrix(:, :)
+    type(host_state) :: host
 
-    info = info_good
-    if (n_freq < 0) info = -6
-    if (m_in < 0) info = -5
-    if (m_out < 0) info = -4
-    if (n_in < 0) info = -3
-    if (n_out < 0) info = -2
-    if (unknown_order(trans)) info = -1
-    if (info /= info_good) return
-    call as_lines(trans, m_out, m_in, n_freq, h, h_lines)
-    call as_lines(trans, n_out, n_in, n_freq, h_new, new_lines)
-    call as_matrix(trans, n_out, m_out, t_out, out_matrix)
-    call as_matrix(trans, n_in, m_in, t_in, in_matrix)
-    call transform_receptance(is_transposed(trans), h_lines, out_matrix, in_matrix, new_lines, line_info, rcond, info)
+    call hold_traps(host)
+    info = check_transform(trans, n_out, n_in, m_out, m_in, n_freq)
+    if (info == info_good) then
+      call as_lines(trans, m_out, m_in, n_freq, h, h_lines)
+      call as_lines(trans, n_out, n_in, n_freq, h_new, new_lines)
+      call as_matrix(trans, n_out, m_out, t_out, out_matrix)
+      call as_matrix(trans, n_in, m_in, t_in, in_matrix)
+      call transform_receptance(is_transposed(trans), h_lines, out_matrix, in_matrix, new_lines, line_info, rcond, info)
+    end if
+    call release_traps(host)
   end subroutine jf_transform
 
   !> Realisations of polluted FRFs, H + S e with noise numbers e. Realisation r of a seed is always the same: on any
@@ -662,37 +688,23 @@ contains
   subroutine jf_pollute(trans, kind, reference, reciprocal, block, level, seed, n_out, n_in, n_freq, first, count, h, &
                         polluted, info) bind(C, name='jf_pollute_')
     character(kind=c_char), intent(in) :: trans, kind, reference
-    integer(c_int), intent(in) :: reciprocal, block, seed(2), n_out, n_in, n_freq, first, count
+    integer(ip), intent(in) :: reciprocal, block, seed(2), n_out, n_in, n_freq, first, count
     real(c_double), intent(in) :: level
     complex(c_double_complex), target, intent(in) :: h(*)
     complex(c_double_complex), target, intent(inout) :: polluted(*)
-    integer(c_int), intent(out) :: info
+    integer(ip), intent(out) :: info
     complex(c_double_complex), pointer, contiguous :: exact(:, :, :), lines(:, :, :)
+    type(host_state) :: host
 
-    info = info_good
-    if (count < 0) info = -12
-    if (count > 0) then
-      if (n_freq > huge(count)/count .or. first > huge(count) - count) info = -12
+    call hold_traps(host)
+    info = check_pollute(trans, kind, reference, reciprocal, block, level, n_out, n_in, n_freq, first, count)
+    if (info == info_good) then
+      call as_lines(trans, n_out, n_in, n_freq, h, exact)
+      call as_lines(trans, n_out, n_in, n_freq*count, polluted, lines)
+      call pollute(is_transposed(trans), make_noise(kind, reference, reciprocal == 1, int(block), level, seed), &
+                   first, count, exact, lines, info)
     end if
-    if (first < 0) info = -11
-    if (n_freq < 0) info = -10
-    if (n_in < 0) info = -9
-    if (n_out < 0) info = -8
-    if (not_finite(level) .or. level < 0.0_c_double) info = -6
-    if (block < 1) then
-      info = -5
-    else if (mod(n_out, block) /= 0 .or. mod(n_in, block) /= 0) then
-      info = -5
-    end if
-    if (reciprocal /= 0 .and. .not. (reciprocal == 1 .and. n_out == n_in)) info = -4
-    if (.not. is_reference(reference)) info = -3
-    if (.not. is_kind(kind)) info = -2
-    if (unknown_order(trans)) info = -1
-    if (info /= info_good) return
-    call as_lines(trans, n_out, n_in, n_freq, h, exact)
-    call as_lines(trans, n_out, n_in, n_freq*count, polluted, lines)
-    call pollute(is_transposed(trans), make_noise(kind, reference, reciprocal == 1, block, level, seed), first, count, &
-                 exact, lines, info)
+    call release_traps(host)
   end subroutine jf_pollute
 
   !> Mean and covariance of the joint identified from polluted FRFs, over realisations that are never stored: those that
@@ -706,47 +718,35 @@ contains
   !> k_initial   K0, shape (n, n, n_freq), N/m; read by method 'I' only
   !> good        number of realisations of each line that could be identified, shape (n_freq); the others are left out
   !> mean        shape (n, n, n_freq), N/m, or m/N for method 'C'
-  !> covariance  Var Re, Var Im and Cov(Re, Im) of each entry, shape (3, n, n, n_freq), entries stored as in `mean`; NaN where fewer than two realisations are good
+  !> covariance  Var Re, Var Im and Cov(Re, Im) of each entry, shape (3, n, n, n_freq), entries stored as in
+  !>             `mean`; NaN where fewer than two realisations are good
   !> line_info   as above; a line is bad where no realisation is good, and says what was wrong with the first
   !> rcond       the smallest over the good realisations
   subroutine jf_monte_carlo(trans, method, kind, reference, reciprocal, block, level, seed, n, n_freq, first, count, &
                             alpha, gamma, k_initial, good, mean, covariance, line_info, rcond, info) &
     bind(C, name='jf_monte_carlo_')
     character(kind=c_char), intent(in) :: trans, method, kind, reference
-    integer(c_int), intent(in) :: reciprocal, block, seed(2), n, n_freq, first, count
+    integer(ip), intent(in) :: reciprocal, block, seed(2), n, n_freq, first, count
     real(c_double), intent(in) :: level
-    complex(c_double_complex), target, intent(in) :: alpha(2*n, 2*n, n_freq), gamma(2*n, 2*n, n_freq)
+    complex(c_double_complex), target, intent(in) :: alpha(2_long*n, 2_long*n, n_freq)
+    complex(c_double_complex), target, intent(in) :: gamma(2_long*n, 2_long*n, n_freq)
     complex(c_double_complex), target, intent(in) :: k_initial(n, n, n_freq)
-    integer(c_int), intent(out) :: good(n_freq)
+    integer(ip), intent(out) :: good(n_freq)
     complex(c_double_complex), target, intent(inout) :: mean(n, n, n_freq)
     real(c_double), intent(out) :: covariance(3, n, n, n_freq)
-    integer(c_int), intent(out) :: line_info(n_freq)
+    integer(ip), intent(out) :: line_info(n_freq)
     real(c_double), intent(out) :: rcond(n_freq)
-    integer(c_int), intent(out) :: info
+    integer(ip), intent(out) :: info
+    type(host_state) :: host
 
-    info = info_good
-    if (count < 1) then
-      info = -12
-    else if (first > huge(count) - count) then
-      info = -12
+    call hold_traps(host)
+    info = check_monte_carlo(trans, method, kind, reference, reciprocal, block, level, n, n_freq, first, count)
+    if (info == info_good) then
+      call monte_carlo(is_transposed(trans), method, &
+                       make_noise(kind, reference, reciprocal == 1, int(block), level, seed), &
+                       first, count, alpha, gamma, k_initial, good, mean, covariance, line_info, rcond, info)
     end if
-    if (first < 0) info = -11
-    if (n_freq < 0) info = -10
-    if (n < 1) info = -9
-    if (not_finite(level) .or. level < 0.0_c_double) info = -7
-    if (block < 1) then
-      info = -6
-    else if (mod(2*n, block) /= 0) then
-      info = -6
-    end if
-    if (reciprocal /= 0 .and. reciprocal /= 1) info = -5
-    if (.not. is_reference(reference)) info = -4
-    if (.not. is_kind(kind)) info = -3
-    if (.not. is_method(method)) info = -2
-    if (unknown_order(trans)) info = -1
-    if (info /= info_good) return
-    call monte_carlo(is_transposed(trans), method, make_noise(kind, reference, reciprocal == 1, block, level, seed), &
-                     first, count, alpha, gamma, k_initial, good, mean, covariance, line_info, rcond, info)
+    call release_traps(host)
   end subroutine jf_monte_carlo
 
   !> Stiffness and mass of eight-node bricks. Nodes 1 to 4 go round one face, counter-clockwise as seen from the
@@ -769,24 +769,21 @@ contains
   subroutine jf_brick_matrices(formulation, n_elements, coordinates, youngs_modulus, poisson, density, hourglass, &
                                lumped, stiffness, mass, element_info, info) bind(C, name='jf_brick_matrices_')
     character(kind=c_char), intent(in) :: formulation
-    integer(c_int), intent(in) :: n_elements, lumped
+    integer(ip), intent(in) :: n_elements, lumped
     real(c_double), intent(in) :: coordinates(3, 8, n_elements)
     real(c_double), intent(in) :: youngs_modulus(n_elements), poisson(n_elements), density(n_elements), hourglass
     real(c_double), intent(out) :: stiffness(24, 24, n_elements), mass(24, 24, n_elements)
-    integer(c_int), intent(out) :: element_info(n_elements)
-    integer(c_int), intent(out) :: info
+    integer(ip), intent(out) :: element_info(n_elements)
+    integer(ip), intent(out) :: info
+    type(host_state) :: host
 
-    info = info_good
-    if (lumped /= 0 .and. lumped /= 1) info = -8
-    if (not_finite(hourglass) .or. hourglass < 0.0_c_double) info = -7
-    if (.not. all(density > 0.0_c_double .and. density <= huge(density))) info = -6
-    if (.not. all(poisson > -1.0_c_double .and. poisson < 0.5_c_double)) info = -5
-    if (.not. all(youngs_modulus > 0.0_c_double .and. youngs_modulus <= huge(youngs_modulus))) info = -4
-    if (n_elements < 0) info = -2
-    if (.not. is_formulation(formulation)) info = -1
-    if (info /= info_good) return
-    call brick_matrices(formulation, coordinates, youngs_modulus, poisson, density, hourglass, lumped == 1, stiffness, &
-                        mass, element_info, info)
+    call hold_traps(host)
+    info = check_brick_matrices(formulation, n_elements, youngs_modulus, poisson, density, hourglass, lumped)
+    if (info == info_good) then
+      call brick_matrices(formulation, coordinates, youngs_modulus, poisson, density, hourglass, lumped == 1, &
+                          stiffness, mass, element_info, info)
+    end if
+    call release_traps(host)
   end subroutine jf_brick_matrices
 
   !> How far eight-node bricks are from rectangular ones. Node order as in jf_brick_matrices.
@@ -798,12 +795,17 @@ contains
   !> info              0 good; -1 argument 1 is wrong; > 0 number of elements with NaN or Inf, whose results are NaN
   subroutine jf_brick_quality(n_elements, coordinates, scaled_jacobian, aspect_ratio, info) &
     bind(C, name='jf_brick_quality_')
-    integer(c_int), intent(in) :: n_elements
+    integer(ip), intent(in) :: n_elements
     real(c_double), intent(in) :: coordinates(3, 8, n_elements)
     real(c_double), intent(out) :: scaled_jacobian(n_elements), aspect_ratio(n_elements)
-    integer(c_int), intent(out) :: info
+    integer(ip), intent(out) :: info
+    type(host_state) :: host
 
-    info = -1
-    if (n_elements >= 0) call brick_quality(coordinates, scaled_jacobian, aspect_ratio, info)
+    call hold_traps(host)
+    info = check_brick_quality(n_elements)
+    if (info == info_good) then
+      call brick_quality(coordinates, scaled_jacobian, aspect_ratio, info)
+    end if
+    call release_traps(host)
   end subroutine jf_brick_quality
 end module jointfrf

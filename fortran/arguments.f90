@@ -1,11 +1,12 @@
 !> What the flat face checks before anything is done, and how it sees the caller's memory.
 module jointfrf_arguments
-  use, intrinsic :: iso_c_binding, only: c_char, c_double, c_double_complex, c_int, c_int64_t
+  use, intrinsic :: iso_c_binding, only: c_char, c_double, c_double_complex
   use jointfrf_decoupling, only: is_equation
+  use jointfrf_kinds, only: ip, long
   use jointfrf_status, only: text_length
   implicit none
   private
-  public :: unknown_order, is_transposed, out_of_range, repeated, not_finite, bad_offsets
+  public :: unknown_order, is_transposed, bad_size, out_of_range, repeated, not_finite, bad_offsets
   public :: lower, unknown_equation, names, as_lines, as_matrix, spread_text
 
 contains
@@ -26,9 +27,17 @@ contains
     transposed = trans == 'T' .or. trans == 't'
   end function is_transposed
 
+  !> Whether a size is negative, or no default integer although the caller's integers are longer.
+  pure function bad_size(n) result(bad)
+    integer(ip), intent(in) :: n
+    logical :: bad
+
+    bad = n < 0 .or. n > huge(0)
+  end function bad_size
+
   !> Whether a DOF lies outside 1..n.
   pure function out_of_range(dofs, n) result(bad)
-    integer(c_int), intent(in) :: dofs(:), n
+    integer(ip), intent(in) :: dofs(:), n
     logical :: bad
 
     bad = any(dofs < 1 .or. dofs > n)
@@ -36,7 +45,7 @@ contains
 
   !> Whether a DOF is named twice.
   pure function repeated(dofs) result(bad)
-    integer(c_int), intent(in) :: dofs(:)
+    integer(ip), intent(in) :: dofs(:)
     logical :: bad
     integer :: i
 
@@ -99,12 +108,12 @@ contains
   !> The caller's memory as lines of (n, m), or (m, n) where transposed.
   subroutine as_lines(trans, n, m, n_freq, memory, lines)
     character(kind=c_char), intent(in) :: trans
-    integer(c_int), intent(in) :: n, m, n_freq
+    integer(ip), intent(in) :: n, m, n_freq
     complex(c_double_complex), target, intent(in) :: memory(*)
     complex(c_double_complex), pointer, contiguous, intent(out) :: lines(:, :, :)
-    integer(c_int64_t) :: total
+    integer(long) :: total
 
-    total = int(n, c_int64_t)*m*n_freq
+    total = int(n, long)*m*n_freq
     if (is_transposed(trans)) then
       lines(1:m, 1:n, 1:n_freq) => memory(1:total)
     else
@@ -115,12 +124,12 @@ contains
   !> The caller's memory as a real matrix (n, m), or (m, n) where transposed.
   subroutine as_matrix(trans, n, m, memory, matrix)
     character(kind=c_char), intent(in) :: trans
-    integer(c_int), intent(in) :: n, m
+    integer(ip), intent(in) :: n, m
     real(c_double), target, intent(in) :: memory(*)
     real(c_double), pointer, contiguous, intent(out) :: matrix(:, :)
-    integer(c_int64_t) :: total
+    integer(long) :: total
 
-    total = int(n, c_int64_t)*m
+    total = int(n, long)*m
     if (is_transposed(trans)) then
       matrix(1:m, 1:n) => memory(1:total)
     else

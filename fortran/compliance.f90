@@ -1,13 +1,14 @@
 !> Joint compliance K*^-1 straight from receptances of the assembly at the joint, without model, first estimate or band,
 !> and how measurement noise comes through.
 module jointfrf_compliance
+  use jointfrf_caller_memory, only: caller_memory
   use jointfrf_kinds, only: dp, ip
   use jointfrf_lanes, only: in_memory, lane_kernels, lanes, largest_in_lanes, natural, padded, real_lines, &
     row_starts, system, system_size
-  use jointfrf_line_layout, only: all_finite, load, store, take_block
+  use jointfrf_line_layout, only: all_finite, load, load_real, store, take_block
   use jointfrf_lines_lapack, only: inverse_work, product_line, solve_line
   use jointfrf_status, only: line_good, line_not_finite, line_overflow
-  use jointfrf_sweep, only: line_operation, line_space, run_sweep
+  use jointfrf_sweep, only: area, line_operation, line_space, run_sweep, worth_a_plan
   implicit none
   private
   public :: joint_compliance, compliance_covariance, compliance_factors
@@ -34,7 +35,7 @@ module jointfrf_compliance
     logical :: transposed
     integer :: n, m
     complex(dp), pointer, contiguous :: gamma(:, :, :)
-    real(dp), allocatable :: transform(:, :)    !< (2 n, m)
+    real(dp), pointer, contiguous :: transform(:, :)
   end type linearisation
 
   type, extends(linearisation) :: factorisation
@@ -57,13 +58,14 @@ contains
   !> and (Z_A + K*) gamma_jj - K* gamma_kj = I. Noise enters C almost linearly; it enters K* through an inverse.
   !> gamma     receptance of the assembly at DOFs j, then k, shape (2 n, 2 n, n_freq), m/N
   !> c_joint   joint compliance, shape (n, n, n_freq), m/N
-  subroutine joint_compliance(transposed, gamma, c_joint, line_info, rcond, info)
+  subroutine joint_compliance(transposed, gamma, c_joint, line_info, rcond, info, memory)
     logical, intent(in) :: transposed
     complex(dp), contiguous, target, intent(in) :: gamma(:, :, :)
     complex(dp), contiguous, target, intent(out) :: c_joint(:, :, :)
     integer(ip), contiguous, intent(out) :: line_info(:)
     real(dp), contiguous, intent(out) :: rcond(:)
     integer(ip), intent(out) :: info
+    type(caller_memory), intent(in), optional :: memory
     type(compliance) :: operation
     integer :: n
 
@@ -72,12 +74,12 @@ contains
     operation%n = n
     operation%gamma => gamma
     operation%result => c_joint
-    operation%n_complex = 8*n**2 + inverse_work(n)
-    operation%n_real = 2*n
+    operation%n_complex = 8*area(n, n) + inverse_work(n)
+    operation%n_real = area(2, n)
     operation%n_pivot = n
     operation%flops = 19.0_dp*real(n, dp)**3
-    if (n >= 1 .and. n <= largest_in_lanes) call plan_compliance(operation)
-    call run_sweep(operation, size(gamma, 3, kind=ip), line_info, rcond, info)
+    if (worth_a_plan(size(gamma, 3), memory) .and. n >= 1 .and. n <= largest_in_lanes) call plan_compliance(operation)
+    call run_sweep(operation, size(gamma, 3, kind=ip), line_info, rcond, info, memory)
   end subroutine joint_compliance
 
   subroutine plan_compliance(operation)
@@ -165,14 +167,15 @@ contains
   !> transform    T, shape (2 n, m), (m, 2 n) where transposed: from measured points to DOFs j, then k; the unit matrix
   !>              where gamma itself was measured
   !> factors      U above V^T, shape (2 n, m, n_freq), (m, 2 n, n_freq) where transposed
-  subroutine compliance_factors(transposed, gamma, transform, factors, line_info, rcond, info)
+  subroutine compliance_factors(transposed, gamma, transform, factors, line_info, rcond, info, memory)
     logical, intent(in) :: transposed
     complex(dp), contiguous, target, intent(in) :: gamma(:, :, :)
-    real(dp), contiguous, intent(in) :: transform(:, :)
+    real(dp), contiguous, target, intent(in) :: transform(:, :)
     complex(dp), contiguous, target, intent(out) :: factors(:, :, :)
     integer(ip), contiguous, intent(out) :: line_info(:)
     real(dp), contiguous, intent(out) :: rcond(:)
     integer(ip), intent(out) :: info
+    type(caller_memory), intent(in), optional :: memory
     type(factorisation) :: operation
     integer :: n, m
 
@@ -180,28 +183,25 @@ contains
     operation%result => factors
     n = operation%n
     m = operation%m
-    operation%n_complex = operation%n_complex + 2*n*m
+    operation%n_complex = operation%n_complex + 2*area(n, m)
     operation%flops = 43.0_dp*real(n, dp)**3 + 8.0_dp*real(n, dp)**2*m
-    call run_sweep(operation, size(gamma, 3, kind=ip), line_info, rcond, info)
+    call run_sweep(operation, size(gamma, 3, kind=ip), line_info, rcond, info, memory)
   end subroutine compliance_factors
 
   subroutine set_linearisation(operation, transposed, gamma, transform)
     class(linearisation), intent(inout) :: operation
     logical, intent(in) :: transposed
     complex(dp), contiguous, target, intent(in) :: gamma(:, :, :)
-    real(dp), contiguous, intent(in) :: transform(:, :)
+    real(dp), contiguous, target, intent(in) :: transform(:, :)
 
     operation%transposed = transposed
     operation%n = size(gamma, 1)/2
     operation%gamma => gamma
-    if (transposed) then
-      operation%transform = transpose(transform)
-    else
-      operation%transform = transform
-    end if
-    operation%m = size(operation%transform, 2)
-    operation%n_complex = 7*operation%n**2 + 2*operation%n*operation%m + inverse_work(operation%n)
-    operation%n_real = 2*operation%n
+    operation%transform => transform
+    operation%m = size(transform, merge(1, 2, transposed))
+    operation%n_complex = 7*area(operation%n, operation%n) + 2*area(operation%n, operation%m) &
+                          + inverse_work(operation%n)
+    operation%n_real = area(2, operation%n)
     operation%n_pivot = operation%n
   end subroutine set_linearisation
 
@@ -240,7 +240,7 @@ contains
     integer(ip), intent(out) :: line_info
     real(dp), intent(out) :: rcond
     complex(dp), pointer, contiguous :: gamma(:, :), gamma_jk(:, :), right(:, :), left(:, :)
-    integer :: n, p, a
+    integer :: n, p, a, b
 
     line_info = line_not_finite
     rcond = 0.0_dp
@@ -261,10 +261,30 @@ contains
     if (line_info /= line_good) return
     do p = 1, self%m
       do a = 1, n
-        u(a, p) = sum(left(:, a)*self%transform(:n, p)) - self%transform(n + a, p)
-        v_transposed(a, p) = self%transform(a, p) - sum(right(:, a)*self%transform(n + 1:, p))
+        u(a, p) = 0.0_dp
+        v_transposed(a, p) = 0.0_dp
+        do b = 1, n
+          u(a, p) = u(a, p) + left(b, a)*weight(b, p)
+          v_transposed(a, p) = v_transposed(a, p) - right(b, a)*weight(n + b, p)
+        end do
+        u(a, p) = u(a, p) - weight(n + a, p)
+        v_transposed(a, p) = v_transposed(a, p) + weight(a, p)
       end do
     end do
+
+  contains
+
+    !> T at a DOF of j or k and a measured point.
+    pure function weight(dof, point)
+      integer, intent(in) :: dof, point
+      real(dp) :: weight
+
+      if (self%transposed) then
+        weight = self%transform(point, dof)
+      else
+        weight = self%transform(dof, point)
+      end if
+    end function weight
   end subroutine linearise
 
   !> Covariance of the entries of C from the noise of the measured FRFs, to first order.
@@ -279,15 +299,16 @@ contains
   !> reciprocal   whether h was made reciprocal
   !> covariance   E[dC_ab conj(dC_cd)], shape (n^2, n^2, n_freq); ab runs as C lies in the caller's memory
   subroutine compliance_covariance(transposed, gamma, transform, variance, reciprocal, covariance, line_info, rcond, &
-                                   info)
+                                   info, memory)
     logical, intent(in) :: transposed, reciprocal
     complex(dp), contiguous, target, intent(in) :: gamma(:, :, :)
     real(dp), contiguous, target, intent(in) :: variance(:, :, :)
-    real(dp), contiguous, intent(in) :: transform(:, :)
+    real(dp), contiguous, target, intent(in) :: transform(:, :)
     complex(dp), contiguous, target, intent(out) :: covariance(:, :, :)
     integer(ip), contiguous, intent(out) :: line_info(:)
     real(dp), contiguous, intent(out) :: rcond(:)
     integer(ip), intent(out) :: info
+    type(caller_memory), intent(in), optional :: memory
     type(propagation) :: operation
     integer :: n, m
 
@@ -297,9 +318,9 @@ contains
     operation%result => covariance
     n = operation%n
     m = operation%m
-    operation%n_complex = operation%n_complex + 3*n**2*m + m**2 + 3*n**4
+    operation%n_complex = operation%n_complex + 3*area(n, n)*m + area(m, m) + 3*area(n, n)**2
     operation%flops = 16.0_dp*real(n, dp)**2*m*(real(n, dp)**2 + m)
-    call run_sweep(operation, size(gamma, 3, kind=ip), line_info, rcond, info)
+    call run_sweep(operation, size(gamma, 3, kind=ip), line_info, rcond, info, memory)
   end subroutine compliance_covariance
 
   subroutine propagate_one(self, i, space, line_info, rcond)
@@ -328,12 +349,8 @@ contains
     covariance => space%matrix(n*n, n*n)
     call linearise(self, i, space, u, v_transposed, line_info, rcond)
     if (line_info /= line_good) return
-    if (self%transposed) then
-      spread = transpose(self%variance(:, :, i))
-    else
-      spread = self%variance(:, :, i)
-    end if
-    if (self%reciprocal) spread = 0.5_dp*(spread + transpose(spread))
+    call load_real(self%transposed, self%variance(:, :, i), spread)
+    if (self%reciprocal) call make_symmetric(spread)
 
     ! sum over p, q of U_ap conj(U_cp) s_pq V_qb conj(V_qd), at row ac, column bd
     call outer_rows(u, u, uu)
@@ -367,6 +384,19 @@ contains
     if (.not. all_finite(covariance)) line_info = line_overflow
     call store(self%transposed, covariance, self%result(:, :, i))
   end subroutine propagate_one
+
+  !> a = (a + a^T)/2
+  pure subroutine make_symmetric(a)
+    complex(dp), contiguous, intent(inout) :: a(:, :)
+    integer :: i, j
+
+    do j = 1, size(a, 2)
+      do i = 1, j
+        a(i, j) = 0.5_dp*(a(i, j) + a(j, i))
+        a(j, i) = a(i, j)
+      end do
+    end do
+  end subroutine make_symmetric
 
   !> Products x_ap conj(y_cp), at row ac.
   pure subroutine outer_rows(x, y, outer)

@@ -1,5 +1,6 @@
 !> Receptances of two substructures joined by a complex joint stiffness (2.24)-(2.26), (2.42)-(2.45).
 module jointfrf_coupling
+  use jointfrf_caller_memory, only: caller_memory
   use jointfrf_kinds, only: dp, ip
   use jointfrf_lanes, only: flat, in_memory, lane_kernels, lanes, largest_in_lanes, largest_product, padded, &
     real_lines
@@ -7,7 +8,7 @@ module jointfrf_coupling
   use jointfrf_modification, only: apply_in_lanes, apply_modification, modification_elements, modification_in_lanes, &
     modification_work, plan_modification
   use jointfrf_status, only: line_not_finite
-  use jointfrf_sweep, only: line_operation, line_space, run_sweep
+  use jointfrf_sweep, only: area, line_operation, line_space, run_sweep, worth_a_plan
   implicit none
   private
   public :: couple
@@ -42,7 +43,7 @@ contains
   !> dofs_a    joint DOFs j among those of A, shape (n_j), counted from 1
   !> dofs_b    joint DOFs k among those of B, shape (n_j), in the same order
   !> h_c       receptance of the assembly, shape (n_a + n_b, n_a + n_b, n_freq)
-  subroutine couple(transposed, h_a, h_b, k_joint, dofs_a, dofs_b, h_c, line_info, rcond, info)
+  subroutine couple(transposed, h_a, h_b, k_joint, dofs_a, dofs_b, h_c, line_info, rcond, info, memory)
     logical, intent(in) :: transposed
     complex(dp), contiguous, target, intent(in) :: h_a(:, :, :), h_b(:, :, :), k_joint(:, :, :)
     integer(ip), contiguous, target, intent(in) :: dofs_a(:), dofs_b(:)
@@ -50,6 +51,7 @@ contains
     integer(ip), contiguous, intent(out) :: line_info(:)
     real(dp), contiguous, intent(out) :: rcond(:)
     integer(ip), intent(out) :: info
+    type(caller_memory), intent(in), optional :: memory
     type(coupling) :: operation
     integer :: n_a, n_b, n, n_j
 
@@ -67,12 +69,14 @@ contains
     operation%dofs_a => dofs_a
     operation%dofs_b => dofs_b
     operation%result => h_c
-    operation%n_complex = n_a**2 + n_b**2 + n**2 + 2*n_j**2 + 2*n*n_j + modification_work(n, n_j)
-    operation%n_real = 2*n_j
+    operation%n_complex = area(n_a, n_a) + area(n_b, n_b) + area(n, n) + 2*area(n_j, n_j) &
+                          + 2*area(n, n_j) + modification_work(n, n_j)
+    operation%n_real = area(2, n_j)
     operation%n_pivot = n_j
     operation%flops = 8.0_dp*n_j*(real(n, dp)**2 + 2.0_dp*real(n_j, dp)*n)
-    if (n_j >= 1 .and. n_j <= largest_in_lanes .and. n <= largest_product) call plan_coupling(operation)
-    call run_sweep(operation, size(h_a, 3, kind=ip), line_info, rcond, info)
+    if (worth_a_plan(size(h_a, 3), memory) .and. n_j >= 1 .and. n_j <= largest_in_lanes .and. n <= largest_product) &
+      call plan_coupling(operation)
+    call run_sweep(operation, size(h_a, 3, kind=ip), line_info, rcond, info, memory)
   end subroutine couple
 
   subroutine plan_coupling(operation)

@@ -1,13 +1,14 @@
 !> FRF decoupling: the joint stiffness from receptances of the assembly away from the joint and of both substructures
 !> (2.49)-(2.56).
 module jointfrf_decoupling
+  use jointfrf_caller_memory, only: caller_memory
   use jointfrf_kinds, only: dp, ip
   use jointfrf_lanes, only: flat, in_memory, lane_kernels, lanes, largest_in_lanes, natural, padded, real_lines, &
     row_starts, system, system_size, worse_of
   use jointfrf_line_layout, only: all_finite, load, store
   use jointfrf_lines_lapack, only: inverse_work, invert_line, product_line, solve_line
   use jointfrf_status, only: line_good, line_not_finite
-  use jointfrf_sweep, only: line_operation, line_space, run_sweep
+  use jointfrf_sweep, only: area, line_operation, line_space, run_sweep, worth_a_plan
   implicit none
   private
   public :: decouple, is_equation
@@ -59,7 +60,7 @@ contains
   !> dofs_s    internal DOFs of B, shape (n); read where the equation names s
   !> k_joint   K*, shape (n, n, n_freq), N/m
   subroutine decouple(equation, transposed, h_a, h_b, h_c, dofs_j, dofs_k, dofs_r, dofs_s, k_joint, &
-                      line_info, rcond, info)
+                      line_info, rcond, info, memory)
     character(len=2), intent(in) :: equation
     logical, intent(in) :: transposed
     complex(dp), contiguous, target, intent(in) :: h_a(:, :, :), h_b(:, :, :), h_c(:, :, :)
@@ -68,6 +69,7 @@ contains
     integer(ip), contiguous, intent(out) :: line_info(:)
     real(dp), contiguous, intent(out) :: rcond(:)
     integer(ip), intent(out) :: info
+    type(caller_memory), intent(in), optional :: memory
     type(decoupling) :: operation
     integer :: n
 
@@ -85,12 +87,14 @@ contains
     operation%dofs_r => dofs_r
     operation%dofs_s => dofs_s
     operation%result => k_joint
-    operation%n_complex = operation%n_a**2 + operation%n_b**2 + 4*n**2 + inverse_work(n)
-    operation%n_real = 2*n
+    operation%n_complex = area(operation%n_a, operation%n_a) + area(operation%n_b, operation%n_b) + 4*area(n, n) &
+                          + inverse_work(n)
+    operation%n_real = area(2, n)
     operation%n_pivot = n
     operation%flops = 27.0_dp*real(n, dp)**3
-    if (n >= 1 .and. max(operation%n_a, operation%n_b) <= largest_in_lanes) call plan_decoupling(operation)
-    call run_sweep(operation, size(h_a, 3, kind=ip), line_info, rcond, info)
+    if (worth_a_plan(size(h_a, 3), memory) .and. n >= 1 .and. max(operation%n_a, operation%n_b) <= largest_in_lanes) &
+      call plan_decoupling(operation)
+    call run_sweep(operation, size(h_a, 3, kind=ip), line_info, rcond, info, memory)
   end subroutine decouple
 
   subroutine plan_decoupling(operation)

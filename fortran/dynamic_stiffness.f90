@@ -5,22 +5,21 @@
 !> two first, so that displacements and rotations have pivots of one size; where one is small, the line is in doubt.
 module jointfrf_dynamic_stiffness
   use, intrinsic :: iso_c_binding, only: c_size_t
+  use jointfrf_caller_memory, only: caller_memory
   use jointfrf_elimination_plan, only: elimination_plan, make_plan
-  use jointfrf_kinds, only: dp, ip
+  use jointfrf_kinds, only: blas_ip, dp, ip
   use jointfrf_lanes, only: lane_kernels, lanes, largest_in_lanes, padded, real_lines, rows_in_memory, &
     system_position, system_size
   use jointfrf_lapack, only: zgbcon, zgbtrf, zgbtrs
   use jointfrf_line_layout, only: all_finite, store
   use jointfrf_lines_lapack, only: inverse_work, one_norm, solve_line
   use jointfrf_status, only: line_good, line_not_finite, line_overflow
-  use jointfrf_sweep, only: line_operation, line_space, run_sweep
+  use jointfrf_sweep, only: area, line_operation, line_space, run_sweep, worth_a_plan
   implicit none
   private
   public :: receptance_dense, receptance_banded
 
   integer(c_size_t), parameter :: one_char = 1_c_size_t
-  !> Fewer lines than these are not worth a plan.
-  integer, parameter :: fewest_lines = 3
   !> Lanes do about this many multiplications in the time that LAPACK takes for one.
   real(dp), parameter :: gain_of_lanes = 8.0_dp
   !> A pivot smaller than this, where those of the scaled matrices are about one, puts the line in doubt. A segment of m
@@ -89,7 +88,7 @@ contains
   !> inputs        DOFs of the force, shape (n_in), counted from 1
   !> h             receptance, shape (n_out, n_in, n_freq), m/N
   subroutine receptance_dense(transposed, omega, stiffness, mass, damping, structural, loss_factor, outputs, inputs, &
-                              h, line_info, rcond, info)
+                              h, line_info, rcond, info, memory)
     logical, intent(in) :: transposed
     real(dp), contiguous, target, intent(in) :: omega(:), stiffness(:, :), mass(:, :), damping(:, :), structural(:, :)
     real(dp), intent(in) :: loss_factor
@@ -98,6 +97,7 @@ contains
     integer(ip), contiguous, intent(out) :: line_info(:)
     real(dp), contiguous, intent(out) :: rcond(:)
     integer(ip), intent(out) :: info
+    type(caller_memory), intent(in), optional :: memory
     type(dense_stiffness) :: operation
     integer :: n, n_in
 
@@ -105,12 +105,13 @@ contains
     n_in = size(inputs)
     call set_model(operation, transposed, n, omega, stiffness, mass, damping, structural, loss_factor, outputs, &
                    inputs, h)
-    operation%n_complex = n*n + n*n_in + size(outputs)*n_in + inverse_work(n)
-    operation%n_real = 2*n
+    operation%n_complex = area(n, n + n_in) + area(size(outputs), n_in) + inverse_work(n)
+    operation%n_real = area(2, n)
     operation%n_pivot = n
     operation%flops = 8.0_dp*real(n, dp)**2*(n/3.0_dp + n_in)
-    if (n <= largest_in_lanes) call prepare_block(operation, n - 1, n - 1, .true.)
-    call run_sweep(operation, size(omega, kind=ip), line_info, rcond, info)
+    if (worth_a_plan(size(omega), memory) .and. n <= largest_in_lanes) &
+      call prepare_block(operation, n - 1, n - 1, .true.)
+    call run_sweep(operation, size(omega, kind=ip), line_info, rcond, info, memory)
   end subroutine receptance_dense
 
   !> The same for matrices in LAPACK band storage, entry (i, j) at (ku + 1 + i - j, j), with zgbtrf and zgbtrs (zgbsv).
@@ -118,7 +119,7 @@ contains
   !> stiffness     K, shape (kl + ku + 1, n); mass alike; damping and structural alike or (0, 0)
   !> the rest      as in `receptance_dense`; TRANS concerns h only
   subroutine receptance_banded(transposed, kl, ku, omega, stiffness, mass, damping, structural, loss_factor, outputs, &
-                               inputs, h, line_info, rcond, info)
+                               inputs, h, line_info, rcond, info, memory)
     logical, intent(in) :: transposed
     integer, intent(in) :: kl, ku
     real(dp), contiguous, target, intent(in) :: omega(:), stiffness(:, :), mass(:, :), damping(:, :), structural(:, :)
@@ -128,6 +129,7 @@ contains
     integer(ip), contiguous, intent(out) :: line_info(:)
     real(dp), contiguous, intent(out) :: rcond(:)
     integer(ip), intent(out) :: info
+    type(caller_memory), intent(in), optional :: memory
     type(banded_stiffness) :: operation
     integer :: n, n_in
 
@@ -137,12 +139,12 @@ contains
                    inputs, h)
     operation%kl = kl
     operation%ku = ku
-    operation%n_complex = (2*kl + ku + 1)*n + n*n_in + size(outputs)*n_in + 2*n
+    operation%n_complex = area(2*kl + ku + 1, n) + area(n, n_in) + area(size(outputs), n_in) + area(2, n)
     operation%n_real = n
     operation%n_pivot = n
     operation%flops = 8.0_dp*real(n, dp)*(real(kl, dp)*(kl + ku + 1) + real(n_in, dp)*(2*kl + ku + 1))
-    call prepare_block(operation, kl, ku, .false.)
-    call run_sweep(operation, size(omega, kind=ip), line_info, rcond, info)
+    if (worth_a_plan(size(omega), memory)) call prepare_block(operation, kl, ku, .false.)
+    call run_sweep(operation, size(omega, kind=ip), line_info, rcond, info, memory)
   end subroutine receptance_banded
 
   subroutine set_model(operation, transposed, n, omega, stiffness, mass, damping, structural, loss_factor, outputs, &
@@ -181,7 +183,7 @@ contains
     real(dp) :: reference
 
     reach = max(kl, ku)
-    if (size(operation%result) == 0 .or. size(operation%omega) < fewest_lines .or. reach >= largest_in_lanes) return
+    if (size(operation%result) == 0 .or. reach >= largest_in_lanes) return
     call mark(operation%outputs, is_output)
     call mark(operation%inputs, retained)
     retained = retained .or. is_output .or. retain_all
@@ -469,11 +471,11 @@ contains
     real(dp), intent(out) :: rcond
     complex(dp), pointer, contiguous :: band(:, :), x(:, :), h(:, :), work(:, :)
     real(dp) :: norm
-    integer(ip) :: n, kl, ku, ld, ignored
+    integer(blas_ip) :: n, kl, ku, ld, code, ignored
 
-    n = int(self%n, ip)
-    kl = int(self%kl, ip)
-    ku = int(self%ku, ip)
+    n = int(self%n, blas_ip)
+    kl = int(self%kl, blas_ip)
+    ku = int(self%ku, blas_ip)
     ld = 2*kl + ku + 1
     band => space%matrix(int(ld), self%n)
     x => space%matrix(self%n, size(self%inputs))
@@ -490,10 +492,11 @@ contains
     line_info = line_good
     rcond = 1.0_dp
     if (size(self%inputs) == 0) return
-    call zgbtrf(n, n, kl, ku, band, ld, space%pivot, line_info)
+    call zgbtrf(n, n, kl, ku, band, ld, space%pivot, code)
+    line_info = int(code, ip)
     if (line_info /= line_good) return
     call unit_forces(self%inputs, x)
-    call zgbtrs('N', n, kl, ku, size(self%inputs, kind=ip), band, ld, space%pivot, x, n, ignored, one_char)
+    call zgbtrs('N', n, kl, ku, size(self%inputs, kind=blas_ip), band, ld, space%pivot, x, n, ignored, one_char)
     call zgbcon('1', n, kl, ku, band, ld, space%pivot, norm, rcond, work, space%r, ignored, one_char)
     if (.not. all_finite(x)) line_info = line_overflow
     call take_rows(x, self%outputs, h)

@@ -1,11 +1,12 @@
 !> Rotational receptances from translational ones by finite differences (2.57)-(2.59).
 module jointfrf_finite_difference
+  use jointfrf_caller_memory, only: caller_memory
   use jointfrf_kinds, only: dp, ip
   use jointfrf_lanes, only: in_memory, lane_kernels, lanes, largest_in_lanes, natural, real_lines, row_starts
-  use jointfrf_line_layout, only: all_finite, load, store
+  use jointfrf_line_layout, only: all_finite, load, load_real, store
   use jointfrf_lines_lapack, only: product_line
   use jointfrf_status, only: line_good, line_not_finite, line_overflow
-  use jointfrf_sweep, only: line_operation, line_space, run_sweep
+  use jointfrf_sweep, only: area, line_operation, line_space, run_sweep, worth_a_plan
   implicit none
   private
   public :: difference_weights, transform_receptance
@@ -23,7 +24,7 @@ module jointfrf_finite_difference
     logical :: transposed
     integer :: n_out, n_in, m_out, m_in
     complex(dp), pointer, contiguous :: h(:, :, :)
-    complex(dp), allocatable :: t_out(:, :), t_in(:, :)
+    real(dp), pointer, contiguous :: t_out(:, :), t_in(:, :)
     type(transformation_in_lanes) :: plan
   contains
     procedure :: line => transform_one
@@ -61,36 +62,35 @@ contains
   !> t_out     shape (n_out, m_out), (m_out, n_out) where transposed
   !> t_in      shape (n_in, m_in), (m_in, n_in) where transposed
   !> h_new     shape (n_out, n_in, n_freq)
-  subroutine transform_receptance(transposed, h, t_out, t_in, h_new, line_info, rcond, info)
+  subroutine transform_receptance(transposed, h, t_out, t_in, h_new, line_info, rcond, info, memory)
     logical, intent(in) :: transposed
     complex(dp), contiguous, target, intent(in) :: h(:, :, :)
-    real(dp), contiguous, intent(in) :: t_out(:, :), t_in(:, :)
+    real(dp), contiguous, target, intent(in) :: t_out(:, :), t_in(:, :)
     complex(dp), contiguous, target, intent(out) :: h_new(:, :, :)
     integer(ip), contiguous, intent(out) :: line_info(:)
     real(dp), contiguous, intent(out) :: rcond(:)
     integer(ip), intent(out) :: info
+    type(caller_memory), intent(in), optional :: memory
     type(transformation) :: operation
 
     operation%transposed = transposed
     operation%h => h
     operation%result => h_new
-    if (transposed) then
-      operation%t_out = transpose(t_out)
-      operation%t_in = transpose(t_in)
-    else
-      operation%t_out = t_out
-      operation%t_in = t_in
-    end if
-    operation%n_out = size(operation%t_out, 1)
-    operation%m_out = size(operation%t_out, 2)
-    operation%n_in = size(operation%t_in, 1)
-    operation%m_in = size(operation%t_in, 2)
-    operation%n_complex = operation%m_out*operation%m_in + operation%n_out*(operation%m_in + operation%n_in)
+    operation%t_out => t_out
+    operation%t_in => t_in
+    operation%n_out = size(t_out, merge(2, 1, transposed))
+    operation%m_out = size(t_out, merge(1, 2, transposed))
+    operation%n_in = size(t_in, merge(2, 1, transposed))
+    operation%m_in = size(t_in, merge(1, 2, transposed))
+    operation%n_complex = area(operation%m_out, operation%m_in) + area(operation%n_out, operation%m_in) &
+                          + area(operation%n_out, operation%n_in) + area(operation%n_out, operation%m_out) &
+                          + area(operation%n_in, operation%m_in)
     operation%flops = 8.0_dp*operation%n_out*operation%m_in*(operation%m_out + operation%n_in)
-    if (min(operation%n_out, operation%n_in, operation%m_out, operation%m_in) >= 1 &
+    if (worth_a_plan(size(h, 3), memory) &
+        .and. min(operation%n_out, operation%n_in, operation%m_out, operation%m_in) >= 1 &
         .and. max(operation%n_out, operation%n_in, operation%m_out, operation%m_in) <= largest_in_lanes) &
       call plan_transformation(operation)
-    call run_sweep(operation, size(h, 3, kind=ip), line_info, rcond, info)
+    call run_sweep(operation, size(h, 3, kind=ip), line_info, rcond, info, memory)
   end subroutine transform_receptance
 
   subroutine plan_transformation(operation)
@@ -116,7 +116,11 @@ contains
       plan%h_place = in_memory(operation%transposed, h)
       plan%new_place = in_memory(operation%transposed, h_new)
       plan%weight = [in_memory(.true., t_out), in_memory(.true., t_in)]
-      plan%weight_value = [reshape(transpose(operation%t_out), [n_out*m_out]), reshape(operation%t_in, [m_in*n_in])]
+      if (operation%transposed) then
+        plan%weight_value = [reshape(operation%t_out, [n_out*m_out]), reshape(transpose(operation%t_in), [m_in*n_in])]
+      else
+        plan%weight_value = [reshape(transpose(operation%t_out), [n_out*m_out]), reshape(operation%t_in, [m_in*n_in])]
+      end if
       plan%sums = [in_memory(.true., half), in_memory(.true., h_new)]
       allocate (plan%nothing(size(plan%sums)), source=(0.0_dp, 0.0_dp))
       plan%out_row = row_starts(t_out)
@@ -157,21 +161,25 @@ contains
     type(line_space), target, intent(inout) :: space
     integer(ip), intent(out) :: line_info
     real(dp), intent(out) :: rcond
-    complex(dp), pointer, contiguous :: h(:, :), half(:, :), h_new(:, :)
+    complex(dp), pointer, contiguous :: t_out(:, :), t_in(:, :), h(:, :), half(:, :), h_new(:, :)
 
     line_info = line_not_finite
     rcond = 0.0_dp
     if (.not. all_finite(self%h(:, :, i))) return
     line_info = line_good
     rcond = 1.0_dp
+    t_out => space%matrix(self%n_out, self%m_out)
+    t_in => space%matrix(self%n_in, self%m_in)
     h => space%matrix(self%m_out, self%m_in)
     half => space%matrix(self%n_out, self%m_in)
     h_new => space%matrix(self%n_out, self%n_in)
+    call load_real(self%transposed, self%t_out, t_out)
+    call load_real(self%transposed, self%t_in, t_in)
     call load(self%transposed, self%h(:, :, i), h)
     half = 0
-    call product_line('N', 'N', 1.0_dp, self%t_out, h, half)
+    call product_line('N', 'N', 1.0_dp, t_out, h, half)
     h_new = 0
-    call product_line('N', 'T', 1.0_dp, half, self%t_in, h_new)       ! (2.57)
+    call product_line('N', 'T', 1.0_dp, half, t_in, h_new)            ! (2.57)
     if (.not. all_finite(h_new)) line_info = line_overflow
     call store(self%transposed, h_new, self%result(:, :, i))
   end subroutine transform_one

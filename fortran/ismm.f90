@@ -1,12 +1,13 @@
 !> Inverse structural modification: the joint stiffness from receptances of the assembly (2.37)-(2.48).
 module jointfrf_ismm
+  use jointfrf_caller_memory, only: caller_memory
   use jointfrf_kinds, only: dp, ip
   use jointfrf_lanes, only: in_memory, lane_kernels, lanes, largest_in_lanes, natural, padded, real_lines, &
     row_starts, rows_in_memory, system, system_size, worse_of
   use jointfrf_line_layout, only: all_finite, load, store, subtract, take_block
   use jointfrf_lines_lapack, only: inverse_work, product_line, solve_line
   use jointfrf_status, only: line_good, line_not_finite, line_overflow
-  use jointfrf_sweep, only: line_operation, line_space, long_block, run_sweep
+  use jointfrf_sweep, only: area, line_operation, line_space, long_block, run_sweep, worth_a_plan
   implicit none
   private
   public :: ismm, inverse_substructuring
@@ -62,13 +63,14 @@ contains
   !> gamma       measured receptance of the assembly, same DOFs and shape
   !> k_initial   K0, shape (n, n, n_freq), N/m
   !> k_joint     K*, shape (n, n, n_freq), N/m
-  subroutine ismm(transposed, alpha, gamma, k_initial, k_joint, line_info, rcond, info)
+  subroutine ismm(transposed, alpha, gamma, k_initial, k_joint, line_info, rcond, info, memory)
     logical, intent(in) :: transposed
     complex(dp), contiguous, target, intent(in) :: alpha(:, :, :), gamma(:, :, :), k_initial(:, :, :)
     complex(dp), contiguous, target, intent(out) :: k_joint(:, :, :)
     integer(ip), contiguous, intent(out) :: line_info(:)
     real(dp), contiguous, intent(out) :: rcond(:)
     integer(ip), intent(out) :: info
+    type(caller_memory), intent(in), optional :: memory
     type(identification) :: operation
     integer :: n, m
 
@@ -80,12 +82,13 @@ contains
     operation%gamma => gamma
     operation%k_initial => k_initial
     operation%result => k_joint
-    operation%n_complex = 3*m**2 + 3*m*n + n**2 + inverse_work(m)
-    operation%n_real = 2*m
+    operation%n_complex = 3*area(m, m) + 3*area(m, n) + area(n, n) + inverse_work(m)
+    operation%n_real = area(2, m)
     operation%n_pivot = m
     operation%flops = 8.0_dp*real(m, dp)**3*(5.0_dp/3.0_dp)
-    if (n >= 1 .and. m <= largest_in_lanes) call plan_identification(operation)
-    call run_sweep(operation, size(alpha, 3, kind=ip), line_info, rcond, info)
+    if (worth_a_plan(size(alpha, 3), memory) .and. n >= 1 .and. m <= largest_in_lanes) &
+      call plan_identification(operation)
+    call run_sweep(operation, size(alpha, 3, kind=ip), line_info, rcond, info, memory)
   end subroutine ismm
 
   subroutine plan_identification(operation)
@@ -296,13 +299,14 @@ contains
   !> gamma^-1 = [[Z_A + K*, -K*], [-K*, Z_B + K*]], so the joint stands alone off the diagonal; no model is needed.
   !> gamma     measured receptance of the assembly at DOFs j, then k, shape (2 n, 2 n, n_freq), m/N
   !> k_joint   K*, shape (n, n, n_freq), N/m
-  subroutine inverse_substructuring(transposed, gamma, k_joint, line_info, rcond, info)
+  subroutine inverse_substructuring(transposed, gamma, k_joint, line_info, rcond, info, memory)
     logical, intent(in) :: transposed
     complex(dp), contiguous, target, intent(in) :: gamma(:, :, :)
     complex(dp), contiguous, target, intent(out) :: k_joint(:, :, :)
     integer(ip), contiguous, intent(out) :: line_info(:)
     real(dp), contiguous, intent(out) :: rcond(:)
     integer(ip), intent(out) :: info
+    type(caller_memory), intent(in), optional :: memory
     type(short_identification) :: operation
     integer :: n, m
 
@@ -312,12 +316,13 @@ contains
     operation%n = n
     operation%gamma => gamma
     operation%result => k_joint
-    operation%n_complex = m**2 + m*n + n**2 + inverse_work(m)
-    operation%n_real = 2*m
+    operation%n_complex = area(m, m) + area(m, n) + area(n, n) + inverse_work(m)
+    operation%n_real = area(2, m)
     operation%n_pivot = m
     operation%flops = 8.0_dp*real(m, dp)**3*(5.0_dp/6.0_dp)
-    if (n >= 1 .and. m <= largest_in_lanes) call plan_short_identification(operation)
-    call run_sweep(operation, size(gamma, 3, kind=ip), line_info, rcond, info)
+    if (worth_a_plan(size(gamma, 3), memory) .and. n >= 1 .and. m <= largest_in_lanes) &
+      call plan_short_identification(operation)
+    call run_sweep(operation, size(gamma, 3, kind=ip), line_info, rcond, info, memory)
   end subroutine inverse_substructuring
 
   subroutine plan_short_identification(operation)

@@ -7,7 +7,7 @@
 #endif
 module jointfrf_lapack
   use, intrinsic :: iso_c_binding, only: c_char, c_size_t
-  use jointfrf_kinds, only: dp, ip
+  use jointfrf_kinds, only: blas_ip, dp
   implicit none
   private
   public :: zgesv, zgetrf, zgetri, zgecon, zgbtrf, zgbtrs, zgbcon, zgemm
@@ -15,83 +15,83 @@ module jointfrf_lapack
   interface
     !> Solve A X = B by LU with partial pivoting; A leaves as its factors.
     subroutine zgesv(n, nrhs, a, lda, ipiv, b, ldb, info) bind(C, name=JF_BLAS_PREFIX//"zgesv_")
-      import :: dp, ip
-      integer(ip), intent(in) :: n, nrhs, lda, ldb
+      import :: dp, blas_ip
+      integer(blas_ip), intent(in) :: n, nrhs, lda, ldb
       complex(dp), intent(inout) :: a(lda, *), b(ldb, *)
-      integer(ip), intent(out) :: ipiv(*), info
+      integer(blas_ip), intent(out) :: ipiv(*), info
     end subroutine zgesv
 
     !> LU factors of a general matrix.
     subroutine zgetrf(m, n, a, lda, ipiv, info) bind(C, name=JF_BLAS_PREFIX//"zgetrf_")
-      import :: dp, ip
-      integer(ip), intent(in) :: m, n, lda
+      import :: dp, blas_ip
+      integer(blas_ip), intent(in) :: m, n, lda
       complex(dp), intent(inout) :: a(lda, *)
-      integer(ip), intent(out) :: ipiv(*), info
+      integer(blas_ip), intent(out) :: ipiv(*), info
     end subroutine zgetrf
 
     !> Inverse from LU factors.
     subroutine zgetri(n, a, lda, ipiv, work, lwork, info) bind(C, name=JF_BLAS_PREFIX//"zgetri_")
-      import :: dp, ip
-      integer(ip), intent(in) :: n, lda, ipiv(*), lwork
+      import :: dp, blas_ip
+      integer(blas_ip), intent(in) :: n, lda, ipiv(*), lwork
       complex(dp), intent(inout) :: a(lda, *)
       complex(dp), intent(out) :: work(*)
-      integer(ip), intent(out) :: info
+      integer(blas_ip), intent(out) :: info
     end subroutine zgetri
 
     !> Reciprocal condition number from LU factors.
     subroutine zgecon(norm, n, a, lda, anorm, rcond, work, rwork, info, norm_len) &
       bind(C, name=JF_BLAS_PREFIX//"zgecon_")
-      import :: dp, ip, c_char, c_size_t
+      import :: dp, blas_ip, c_char, c_size_t
       character(kind=c_char), intent(in) :: norm
-      integer(ip), intent(in) :: n, lda
+      integer(blas_ip), intent(in) :: n, lda
       complex(dp), intent(in) :: a(lda, *)
       real(dp), intent(in) :: anorm
       real(dp), intent(out) :: rcond, rwork(*)
       complex(dp), intent(out) :: work(*)
-      integer(ip), intent(out) :: info
+      integer(blas_ip), intent(out) :: info
       integer(c_size_t), value :: norm_len
     end subroutine zgecon
 
     !> LU factors of a band matrix.
     subroutine zgbtrf(m, n, kl, ku, ab, ldab, ipiv, info) bind(C, name=JF_BLAS_PREFIX//"zgbtrf_")
-      import :: dp, ip
-      integer(ip), intent(in) :: m, n, kl, ku, ldab
+      import :: dp, blas_ip
+      integer(blas_ip), intent(in) :: m, n, kl, ku, ldab
       complex(dp), intent(inout) :: ab(ldab, *)
-      integer(ip), intent(out) :: ipiv(*), info
+      integer(blas_ip), intent(out) :: ipiv(*), info
     end subroutine zgbtrf
 
     !> Solve with the LU factors of a band matrix.
     subroutine zgbtrs(trans, n, kl, ku, nrhs, ab, ldab, ipiv, b, ldb, info, trans_len) &
       bind(C, name=JF_BLAS_PREFIX//"zgbtrs_")
-      import :: dp, ip, c_char, c_size_t
+      import :: dp, blas_ip, c_char, c_size_t
       character(kind=c_char), intent(in) :: trans
-      integer(ip), intent(in) :: n, kl, ku, nrhs, ldab, ipiv(*), ldb
+      integer(blas_ip), intent(in) :: n, kl, ku, nrhs, ldab, ipiv(*), ldb
       complex(dp), intent(in) :: ab(ldab, *)
       complex(dp), intent(inout) :: b(ldb, *)
-      integer(ip), intent(out) :: info
+      integer(blas_ip), intent(out) :: info
       integer(c_size_t), value :: trans_len
     end subroutine zgbtrs
 
     !> Reciprocal condition number from the LU factors of a band matrix.
     subroutine zgbcon(norm, n, kl, ku, ab, ldab, ipiv, anorm, rcond, work, rwork, info, norm_len) &
       bind(C, name=JF_BLAS_PREFIX//"zgbcon_")
-      import :: dp, ip, c_char, c_size_t
+      import :: dp, blas_ip, c_char, c_size_t
       character(kind=c_char), intent(in) :: norm
-      integer(ip), intent(in) :: n, kl, ku, ldab, ipiv(*)
+      integer(blas_ip), intent(in) :: n, kl, ku, ldab, ipiv(*)
       complex(dp), intent(in) :: ab(ldab, *)
       real(dp), intent(in) :: anorm
       real(dp), intent(out) :: rcond, rwork(*)
       complex(dp), intent(out) :: work(*)
-      integer(ip), intent(out) :: info
+      integer(blas_ip), intent(out) :: info
       integer(c_size_t), value :: norm_len
     end subroutine zgbcon
 
     !> C = alpha op(A) op(B) + beta C.
     subroutine zgemm(transa, transb, m, n, k, alpha, a, lda, b, ldb, beta, c, ldc, transa_len, transb_len) &
       bind(C, name=JF_BLAS_PREFIX//"zgemm_")
-      import :: dp, ip, c_char, c_size_t
+      import :: dp, blas_ip, c_char, c_size_t
       character(kind=c_char), intent(in) :: transa, transb
-      integer(ip), intent(in) :: m, n, k, lda, ldb, ldc
+      integer(blas_ip), intent(in) :: m, n, k, lda, ldb, ldc
       complex(dp), intent(in) :: alpha, beta, a(lda, *), b(ldb, *)
       complex(dp), intent(inout) :: c(ldc, *)
       integer(c_size_t), value :: transa_len, transb_len

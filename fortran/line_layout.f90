@@ -8,7 +8,7 @@ module jointfrf_line_layout
   use jointfrf_kinds, only: dp
   implicit none
   private
-  public :: load, store, store_nan, subtract, take_block, all_finite
+  public :: load, load_real, store, store_nan, subtract, take_block, all_finite
 
 contains
 
@@ -24,6 +24,19 @@ contains
       m = a
     end if
   end subroutine load
+
+  !> The same from real numbers.
+  pure subroutine load_real(transposed, a, m)
+    logical, intent(in) :: transposed
+    real(dp), contiguous, intent(in) :: a(:, :)
+    complex(dp), contiguous, intent(out) :: m(:, :)
+
+    if (transposed) then
+      m = transpose(a)
+    else
+      m = a
+    end if
+  end subroutine load_real
 
   !> a = m, or its transpose where the caller stores (in, out).
   pure subroutine store(transposed, m, a)

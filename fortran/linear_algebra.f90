@@ -1,12 +1,13 @@
 !> Inverse and solution of a sweep of matrices.
 module jointfrf_linear_algebra
+  use jointfrf_caller_memory, only: caller_memory
   use jointfrf_kinds, only: dp, ip
   use jointfrf_lanes, only: in_memory, lane_kernels, lanes, largest_in_lanes, largest_product, padded, real_lines, &
     rows_in_memory, system, system_size
   use jointfrf_line_layout, only: all_finite, load, store
   use jointfrf_lines_lapack, only: inverse_work, invert_line, solve_line
   use jointfrf_status, only: line_not_finite
-  use jointfrf_sweep, only: line_operation, line_space, long_block, run_sweep
+  use jointfrf_sweep, only: area, line_operation, line_space, long_block, run_sweep, worth_a_plan
   implicit none
   private
   public :: invert, solve
@@ -37,12 +38,13 @@ contains
   !> Inverse of every line. The order of storage does not matter: transposing and inverting commute.
   !> a           matrices, shape (n, n, n_freq)
   !> a_inverse   their inverses, same shape
-  subroutine invert(a, a_inverse, line_info, rcond, info)
+  subroutine invert(a, a_inverse, line_info, rcond, info, memory)
     complex(dp), contiguous, target, intent(in) :: a(:, :, :)
     complex(dp), contiguous, target, intent(out) :: a_inverse(:, :, :)
     integer(ip), contiguous, intent(out) :: line_info(:)
     real(dp), contiguous, intent(out) :: rcond(:)
     integer(ip), intent(out) :: info
+    type(caller_memory), intent(in), optional :: memory
     type(inversion) :: operation
 
     operation%n = size(a, 1)
@@ -51,7 +53,7 @@ contains
     operation%n_complex = inverse_work(operation%n)
     operation%n_pivot = operation%n
     operation%flops = 8.0_dp*real(operation%n, dp)**3
-    if (operation%n >= 1 .and. operation%n <= largest_in_lanes) then
+    if (worth_a_plan(size(a, 3), memory) .and. operation%n >= 1 .and. operation%n <= largest_in_lanes) then
       operation%n_element = system_size(operation%n, 0)
       operation%n_hint = padded(operation%n)
       if (operation%n <= 2) operation%block_lines = long_block
@@ -60,7 +62,7 @@ contains
       operation%place = in_memory(.true., system(0, operation%n, 0))
       call operation%reads(operation%a_pairs)
     end if
-    call run_sweep(operation, size(a, 3, kind=ip), line_info, rcond, info)
+    call run_sweep(operation, size(a, 3, kind=ip), line_info, rcond, info, memory)
   end subroutine invert
 
   !> The rows in lanes are the columns in memory, so that the largest row sum is the 1-norm.
@@ -104,13 +106,14 @@ contains
   !> transposed  whether each matrix is stored as (in, out)
   !> a           shape (n, n, n_freq)
   !> b, x        shape (n, n_rhs, n_freq), or (n_rhs, n, n_freq) where transposed
-  subroutine solve(transposed, a, b, x, line_info, rcond, info)
+  subroutine solve(transposed, a, b, x, line_info, rcond, info, memory)
     logical, intent(in) :: transposed
     complex(dp), contiguous, target, intent(in) :: a(:, :, :), b(:, :, :)
     complex(dp), contiguous, target, intent(out) :: x(:, :, :)
     integer(ip), contiguous, intent(out) :: line_info(:)
     real(dp), contiguous, intent(out) :: rcond(:)
     integer(ip), intent(out) :: info
+    type(caller_memory), intent(in), optional :: memory
     type(solution) :: operation
 
     operation%transposed = transposed
@@ -119,14 +122,15 @@ contains
     operation%a => a
     operation%b => b
     operation%result => x
-    operation%n_complex = operation%n**2 + operation%n*operation%n_rhs + inverse_work(operation%n)
-    operation%n_real = 2*operation%n
+    operation%n_complex = area(operation%n, operation%n + operation%n_rhs) + inverse_work(operation%n)
+    operation%n_real = area(2, operation%n)
     operation%n_pivot = operation%n
     operation%flops = 8.0_dp*real(operation%n, dp)**2*(operation%n/3.0_dp + operation%n_rhs)
     ! More right-hand sides than these leave the caches, eight lines at a time.
-    if (min(operation%n, operation%n_rhs) >= 1 .and. operation%n <= largest_in_lanes &
-        .and. operation%n_rhs <= largest_product) call plan_solution(operation)
-    call run_sweep(operation, size(a, 3, kind=ip), line_info, rcond, info)
+    if (worth_a_plan(size(a, 3), memory) .and. min(operation%n, operation%n_rhs) >= 1 &
+        .and. operation%n <= largest_in_lanes .and. operation%n_rhs <= largest_product) &
+      call plan_solution(operation)
+    call run_sweep(operation, size(a, 3, kind=ip), line_info, rcond, info, memory)
   end subroutine solve
 
   subroutine plan_solution(operation)

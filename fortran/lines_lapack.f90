@@ -1,11 +1,11 @@
 !> The linear algebra of one line with LAPACK (zgesv, zgetrf and zgetri): the reference engine, any n.
 module jointfrf_lines_lapack
   use, intrinsic :: iso_c_binding, only: c_size_t
-  use jointfrf_kinds, only: dp, ip
+  use jointfrf_kinds, only: blas_ip, dp, ip, long
   use jointfrf_lapack, only: zgecon, zgemm, zgesv, zgetrf, zgetri
   use jointfrf_line_layout, only: all_finite
   use jointfrf_status, only: line_good, line_overflow
-  use jointfrf_sweep, only: line_space
+  use jointfrf_sweep, only: area, line_space
   implicit none
   private
   public :: solve_line, invert_line, product_line, one_norm, inverse_work
@@ -22,10 +22,10 @@ contains
   !> Complex workspace that `solve_line` and `invert_line` take for matrices up to n by n.
   pure function inverse_work(n) result(size_needed)
     integer, intent(in) :: n
-    integer :: size_needed
+    integer(long) :: size_needed
 
-    size_needed = max(2*n, min(n, inverse_block)*n)
-    if (n <= exact_condition) size_needed = size_needed + n*n
+    size_needed = max(area(2, n), area(min(n, inverse_block), n))
+    if (n <= exact_condition) size_needed = size_needed + area(n, n)
   end function inverse_work
 
   !> A X = B with zgesv. A leaves as its LU factors, B as X. Needs space%pivot(n), space%r(2 n).
@@ -35,15 +35,16 @@ contains
     integer(ip), intent(out) :: info
     real(dp), intent(out) :: rcond
     real(dp) :: norm
-    integer(ip) :: n
+    integer(blas_ip) :: n, code
 
-    n = size(a, 1, kind=ip)
+    n = size(a, 1, kind=blas_ip)
     rcond = 1.0_dp
     info = line_good
     if (n == 0 .or. size(b, 2) == 0) return        ! OpenBLAS does not factor A without right-hand sides
     norm = one_norm(a)
-    call zgesv(n, size(b, 2, kind=ip), a, n, space%pivot, b, n, info)
-    if (info /= 0) return
+    call zgesv(n, size(b, 2, kind=blas_ip), a, n, space%pivot, b, n, code)
+    info = int(code, ip)
+    if (info /= line_good) return
     call condition(norm, a, space, rcond)
     if (.not. all_finite(b)) info = line_overflow
   end subroutine solve_line
@@ -55,16 +56,16 @@ contains
     type(line_space), target, intent(inout) :: space
     real(dp), intent(out) :: rcond
     complex(dp), pointer, contiguous :: inverse(:, :), work(:, :)
-    integer(ip) :: n, ignored
-    integer :: before
+    integer(blas_ip) :: n, ignored
+    integer(long) :: before
 
-    n = size(factors, 1, kind=ip)
+    n = size(factors, 1, kind=blas_ip)
     before = space%used
     if (n <= exact_condition) then
       inverse => space%matrix(int(n), int(n))
       work => space%matrix(min(int(n), inverse_block), int(n))
       inverse = factors
-      call zgetri(n, inverse, n, space%pivot, work, size(work, kind=ip), ignored)
+      call zgetri(n, inverse, n, space%pivot, work, size(work, kind=blas_ip), ignored)
       rcond = 0.0_dp
       if (all_finite(inverse)) rcond = min(1.0_dp, (1.0_dp/norm)/one_norm(inverse))
     else
@@ -82,21 +83,23 @@ contains
     real(dp), intent(out) :: rcond
     complex(dp), pointer, contiguous :: work(:, :)
     real(dp) :: norm
-    integer(ip) :: n
-    integer :: before
+    integer(blas_ip) :: n, code
+    integer(long) :: before
 
-    n = size(a, 1, kind=ip)
+    n = size(a, 1, kind=blas_ip)
     rcond = 1.0_dp
     info = line_good
     if (n == 0) return
     norm = one_norm(a)
-    call zgetrf(n, n, a, n, space%pivot, info)
-    if (info /= 0) return
+    call zgetrf(n, n, a, n, space%pivot, code)
+    info = int(code, ip)
+    if (info /= line_good) return
     before = space%used
-    work => space%matrix(inverse_work(int(n)), 1)
-    call zgetri(n, a, n, space%pivot, work, size(work, kind=ip), info)
+    work => space%matrix(int(inverse_work(int(n))), 1)
+    call zgetri(n, a, n, space%pivot, work, size(work, kind=blas_ip), code)
     space%used = before
-    if (info /= 0) return
+    info = int(code, ip)
+    if (info /= line_good) return
     if (.not. all_finite(a)) then
       info = line_overflow
     else
@@ -110,13 +113,13 @@ contains
     real(dp), intent(in) :: factor
     complex(dp), contiguous, intent(in) :: a(:, :), b(:, :)
     complex(dp), contiguous, intent(inout) :: c(:, :)
-    integer(ip) :: m, n, k
+    integer(blas_ip) :: m, n, k
 
-    m = size(c, 1, kind=ip)
-    n = size(c, 2, kind=ip)
-    k = size(a, merge(2, 1, trans_a == 'N'), kind=ip)
+    m = size(c, 1, kind=blas_ip)
+    n = size(c, 2, kind=blas_ip)
+    k = size(a, merge(2, 1, trans_a == 'N'), kind=blas_ip)
     if (min(m, n, k) == 0) return
-    call zgemm(trans_a, trans_b, m, n, k, factor*one, a, size(a, 1, kind=ip), b, size(b, 1, kind=ip), &
+    call zgemm(trans_a, trans_b, m, n, k, factor*one, a, size(a, 1, kind=blas_ip), b, size(b, 1, kind=blas_ip), &
                one, c, m, one_char, one_char)
   end subroutine product_line
 

@@ -1,11 +1,12 @@
 !> Receptance of a model by superposition of its modes.
 module jointfrf_modal
+  use jointfrf_caller_memory, only: caller_memory
   use jointfrf_kinds, only: dp, ip
   use jointfrf_lanes, only: lane_kernels, lanes, real_lines
-  use jointfrf_line_layout, only: all_finite, store
+  use jointfrf_line_layout, only: all_finite, load_real, store
   use jointfrf_lines_lapack, only: product_line
   use jointfrf_status, only: line_good, line_not_finite, line_overflow
-  use jointfrf_sweep, only: line_operation, line_space, run_sweep
+  use jointfrf_sweep, only: area, line_operation, line_space, run_sweep, worth_a_plan
   implicit none
   private
   public :: receptance_modal
@@ -14,8 +15,7 @@ module jointfrf_modal
     logical :: transposed
     integer :: n_modes, n_out, n_in
     real(dp), pointer, contiguous :: omega(:), stiffness(:), damping(:), loss_factor(:)
-    complex(dp), allocatable :: shapes_out(:, :)      !< (n_out, n_modes)
-    real(dp), allocatable :: shapes_in(:, :)          !< (n_in, n_modes)
+    real(dp), pointer, contiguous :: shapes_out(:, :), shapes_in(:, :)
     real(dp), allocatable :: loss(:)                  !< lambda eta of each mode
     real(dp), allocatable :: residue(:, :, :)         !< of entries that differ, by fours, shape (4, n_modes, n_four)
     integer, allocatable :: place(:)                  !< the element of each entry, in the caller's order
@@ -37,14 +37,15 @@ contains
   !> h             receptance, shape (n_out, n_in, n_freq), m/N
   !> rcond         smallest modal denominator over the largest
   subroutine receptance_modal(transposed, omega, stiffness, damping, loss_factor, shapes_out, shapes_in, h, line_info, &
-                              rcond, info)
+                              rcond, info, memory)
     logical, intent(in) :: transposed
     real(dp), contiguous, target, intent(in) :: omega(:), stiffness(:), damping(:), loss_factor(:)
-    real(dp), contiguous, intent(in) :: shapes_out(:, :), shapes_in(:, :)
+    real(dp), contiguous, target, intent(in) :: shapes_out(:, :), shapes_in(:, :)
     complex(dp), contiguous, target, intent(out) :: h(:, :, :)
     integer(ip), contiguous, intent(out) :: line_info(:)
     real(dp), contiguous, intent(out) :: rcond(:)
     integer(ip), intent(out) :: info
+    type(caller_memory), intent(in), optional :: memory
     type(superposition) :: operation
 
     operation%transposed = transposed
@@ -53,20 +54,16 @@ contains
     operation%damping => damping
     operation%loss_factor => loss_factor
     operation%result => h
-    if (transposed) then
-      operation%shapes_out = transpose(shapes_out)
-      operation%shapes_in = transpose(shapes_in)
-    else
-      operation%shapes_out = shapes_out
-      operation%shapes_in = shapes_in
-    end if
+    operation%shapes_out => shapes_out
+    operation%shapes_in => shapes_in
     operation%n_modes = size(stiffness)
-    operation%n_out = size(operation%shapes_out, 1)
-    operation%n_in = size(operation%shapes_in, 1)
-    operation%n_complex = operation%n_modes*operation%n_in + operation%n_out*operation%n_in
+    operation%n_out = size(h, merge(2, 1, transposed))
+    operation%n_in = size(h, merge(1, 2, transposed))
+    operation%n_complex = area(operation%n_modes, operation%n_out + operation%n_in) &
+                          + area(operation%n_out, operation%n_in)
     operation%flops = 8.0_dp*operation%n_modes*(operation%n_in + operation%n_out*operation%n_in)
-    if (operation%n_modes > 0 .and. size(h) > 0) call prepare_block(operation)
-    call run_sweep(operation, size(omega, kind=ip), line_info, rcond, info)
+    if (worth_a_plan(size(omega), memory) .and. operation%n_modes > 0 .and. size(h) > 0) call prepare_block(operation)
+    call run_sweep(operation, size(omega, kind=ip), line_info, rcond, info, memory)
   end subroutine receptance_modal
 
   !> Residues phi_out phi_in of the entries. Where responses and forces are at the same places, entries (i, j) and
@@ -74,7 +71,7 @@ contains
   subroutine prepare_block(operation)
     class(superposition), intent(inout) :: operation
     logical :: symmetric
-    integer :: o, i, e, entries
+    integer :: o, i, e, entries, mode
 
     symmetric = operation%n_out == operation%n_in
     if (symmetric) symmetric = all(abs(operation%shapes_out - operation%shapes_in) <= 0.0_dp)
@@ -86,8 +83,11 @@ contains
     do i = 1, operation%n_in
       do o = merge(i, 1, symmetric), operation%n_out
         e = e + 1
-        operation%residue(mod(e - 1, 4) + 1, :, (e + 3)/4) = &
-          real(operation%shapes_out(o, :), dp)*operation%shapes_in(i, :)
+        do mode = 1, operation%n_modes
+          operation%residue(mod(e - 1, 4) + 1, mode, (e + 3)/4) = &
+            shape_at(operation%transposed, operation%shapes_out, o, mode) &
+            *shape_at(operation%transposed, operation%shapes_in, i, mode)
+        end do
         operation%place(in_memory(o, i)) = operation%n_modes + e
         if (symmetric) operation%place(in_memory(i, o)) = operation%n_modes + e
       end do
@@ -105,6 +105,20 @@ contains
       at = merge((o - 1)*operation%n_in + i, (i - 1)*operation%n_out + o, operation%transposed)
     end function in_memory
   end subroutine prepare_block
+
+  !> A mode shape at one place.
+  pure function shape_at(transposed, shapes, place, mode) result(value)
+    logical, intent(in) :: transposed
+    real(dp), contiguous, intent(in) :: shapes(:, :)
+    integer, intent(in) :: place, mode
+    real(dp) :: value
+
+    if (transposed) then
+      value = shapes(mode, place)
+    else
+      value = shapes(place, mode)
+    end if
+  end function shape_at
 
   subroutine superpose_block(self, kernels, first, n_lines, space, line_info, rcond)
     class(superposition), intent(in) :: self
@@ -136,12 +150,13 @@ contains
     type(line_space), target, intent(inout) :: space
     integer(ip), intent(out) :: line_info
     real(dp), intent(out) :: rcond
-    complex(dp), pointer, contiguous :: weighted(:, :), h(:, :)
+    complex(dp), pointer, contiguous :: shapes(:, :), weighted(:, :), h(:, :)
     complex(dp) :: denominator
     real(dp) :: smallest, largest, omega
-    integer :: mode
+    integer :: mode, place
 
     omega = self%omega(i)
+    shapes => space%matrix(self%n_out, self%n_modes)
     weighted => space%matrix(self%n_modes, self%n_in)
     h => space%matrix(self%n_out, self%n_in)
     smallest = huge(1.0_dp)
@@ -156,13 +171,16 @@ contains
       if (.not. abs(denominator) > 0.0_dp) return
       smallest = min(smallest, abs(denominator))
       largest = max(largest, abs(denominator))
-      weighted(mode, :) = self%shapes_in(:, mode)/denominator
+      do place = 1, self%n_in
+        weighted(mode, place) = shape_at(self%transposed, self%shapes_in, place, mode)/denominator
+      end do
     end do
     line_info = line_good
     rcond = 1.0_dp
     if (self%n_modes > 0) rcond = smallest/largest
+    call load_real(self%transposed, self%shapes_out, shapes)
     h = 0
-    call product_line('N', 'N', 1.0_dp, self%shapes_out, weighted, h)
+    call product_line('N', 'N', 1.0_dp, shapes, weighted, h)
     if (.not. all_finite(h)) line_info = line_overflow
     call store(self%transposed, h, self%result(:, :, i))
   end subroutine superpose_one

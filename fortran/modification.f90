@@ -1,14 +1,15 @@
 !> Receptances of a locally modified structure (2.31)-(2.36), and the modification that turns one set of receptances
 !> into another (2.40), (2.47).
 module jointfrf_modification
-  use jointfrf_kinds, only: dp, ip
+  use jointfrf_caller_memory, only: caller_memory
+  use jointfrf_kinds, only: dp, ip, long
   use jointfrf_lanes, only: flat, in_memory, lane_kernels, lanes, largest_in_lanes, largest_product, natural, &
     padded, real_lines, row_starts, system, system_size
   use jointfrf_line_layout, only: all_finite, load, store, subtract
   use jointfrf_lines_lapack, only: inverse_work, product_line, solve_line
   use jointfrf_lookahead, only: lookahead
   use jointfrf_status, only: line_good, line_not_finite, line_overflow
-  use jointfrf_sweep, only: line_operation, line_space, run_sweep
+  use jointfrf_sweep, only: area, line_operation, line_space, run_sweep, worth_a_plan
   implicit none
   private
   public :: modify, find_modification, apply_modification, modification_work
@@ -52,7 +53,7 @@ contains
   !> d       dynamic stiffness added at the modified DOFs, shape (n_m, n_m, n_freq), N/m
   !> dofs    the modified DOFs, shape (n_m), counted from 1
   !> gamma   receptance after, shape (n, n, n_freq)
-  subroutine modify(transposed, alpha, d, dofs, gamma, line_info, rcond, info)
+  subroutine modify(transposed, alpha, d, dofs, gamma, line_info, rcond, info, memory)
     logical, intent(in) :: transposed
     complex(dp), contiguous, target, intent(in) :: alpha(:, :, :), d(:, :, :)
     integer(ip), contiguous, target, intent(in) :: dofs(:)
@@ -60,6 +61,7 @@ contains
     integer(ip), contiguous, intent(out) :: line_info(:)
     real(dp), contiguous, intent(out) :: rcond(:)
     integer(ip), intent(out) :: info
+    type(caller_memory), intent(in), optional :: memory
     type(modification) :: operation
     integer :: n, n_m
 
@@ -72,12 +74,13 @@ contains
     operation%d => d
     operation%dofs => dofs
     operation%result => gamma
-    operation%n_complex = n**2 + 2*n_m**2 + 2*n*n_m + modification_work(n, n_m)
-    operation%n_real = 2*n_m
+    operation%n_complex = area(n, n) + 2*area(n_m, n_m) + 2*area(n, n_m) + modification_work(n, n_m)
+    operation%n_real = area(2, n_m)
     operation%n_pivot = n_m
     operation%flops = 8.0_dp*n_m*(real(n, dp)**2 + 2.0_dp*real(n_m, dp)*n)
-    if (n_m >= 1 .and. n_m <= largest_in_lanes .and. n <= largest_product) call plan_block(operation)
-    call run_sweep(operation, size(alpha, 3, kind=ip), line_info, rcond, info)
+    if (worth_a_plan(size(alpha, 3), memory) .and. n_m >= 1 .and. n_m <= largest_in_lanes .and. n <= largest_product) &
+      call plan_block(operation)
+    call run_sweep(operation, size(alpha, 3, kind=ip), line_info, rcond, info, memory)
   end subroutine modify
 
   subroutine plan_block(operation)
@@ -218,9 +221,9 @@ contains
   !> Complex workspace of `apply_modification`.
   pure function modification_work(n, n_m) result(size_needed)
     integer, intent(in) :: n, n_m
-    integer :: size_needed
+    integer(long) :: size_needed
 
-    size_needed = n_m**2 + n_m*n + inverse_work(n_m)
+    size_needed = area(n_m, n_m) + area(n_m, n) + inverse_work(n_m)
   end function modification_work
 
   !> H = H - columns (I + D H_mm)^-1 D rows: what (2.34)-(2.36) say of all DOFs at once. D may be singular.
@@ -257,13 +260,14 @@ contains
   !> The product form keeps its accuracy for a weak modification, where gamma^-1 - alpha^-1 cancels.
   !> alpha, gamma   receptances before and after at the modified DOFs, shape (n, n, n_freq), m/N
   !> d              dynamic stiffness added, shape (n, n, n_freq), N/m
-  subroutine find_modification(transposed, alpha, gamma, d, line_info, rcond, info)
+  subroutine find_modification(transposed, alpha, gamma, d, line_info, rcond, info, memory)
     logical, intent(in) :: transposed
     complex(dp), contiguous, target, intent(in) :: alpha(:, :, :), gamma(:, :, :)
     complex(dp), contiguous, target, intent(out) :: d(:, :, :)
     integer(ip), contiguous, intent(out) :: line_info(:)
     real(dp), contiguous, intent(out) :: rcond(:)
     integer(ip), intent(out) :: info
+    type(caller_memory), intent(in), optional :: memory
     type(inverse_modification) :: operation
     integer :: n
 
@@ -273,11 +277,11 @@ contains
     operation%alpha => alpha
     operation%gamma => gamma
     operation%result => d
-    operation%n_complex = 4*n**2 + inverse_work(n)
-    operation%n_real = 2*n
+    operation%n_complex = 4*area(n, n) + inverse_work(n)
+    operation%n_real = area(2, n)
     operation%n_pivot = n
     operation%flops = 21.0_dp*real(n, dp)**3
-    call run_sweep(operation, size(alpha, 3, kind=ip), line_info, rcond, info)
+    call run_sweep(operation, size(alpha, 3, kind=ip), line_info, rcond, info, memory)
   end subroutine find_modification
 
   subroutine find_one(self, i, space, line_info, rcond)

@@ -19,7 +19,8 @@ module jointfrf_monte_carlo
   use jointfrf_noise, only: draw, entry_counters, find_scale, line_counter, noise_model, spectrum_peak, &
     upper
   use jointfrf_status, only: info_good, info_no_memory, line_good, line_not_finite, line_overflow
-  use jointfrf_sweep, only: line_space, serial_flops_lanes, threads_for
+  use jointfrf_sweep, only: area, line_space, serial_flops_lanes, threads_for
+  use jointfrf_traps, only: hold_traps, host_state, release_traps
   implicit none
   private
   public :: monte_carlo, is_method
@@ -99,12 +100,13 @@ contains
     integer(ip), contiguous, intent(out) :: line_info(:)
     integer(ip), intent(out) :: info
     type(lane_kernels) :: kernels
+    type(host_state) :: host
     type(study_plan) :: plan
     type(study_space), allocatable, target :: space(:)
     type(moments), allocatable :: part(:)
     real(dp), pointer, contiguous :: gamma_pairs(:, :, :)
     real(dp) :: peak
-    integer :: n, n_freq, slices, share, item, i, s, t, threads, stat
+    integer :: n, n_freq, realisations, slices, share, item, i, s, t, threads, stat
     logical :: blocks
 
     n = size(mean, 1)
@@ -126,9 +128,10 @@ contains
 
     plan = make_plan(transposed, upper(method) == 'C', n, noise)
     blocks = blocks .and. plan%m <= largest_in_lanes
-    slices = max(1, min((most_slices + n_freq - 1)/n_freq, count/fewest_realisations))
-    share = ((count + slices - 1)/slices + lanes - 1)/lanes*lanes
-    threads = threads_for(16.0_dp*real(plan%m, dp)**3*count*n_freq, slices*n_freq, serial_flops_lanes)
+    realisations = int(count)
+    slices = max(1, min((most_slices + n_freq - 1)/n_freq, realisations/fewest_realisations))
+    share = ((realisations - 1)/slices + lanes)/lanes*lanes
+    threads = threads_for(16.0_dp*real(plan%m, dp)**3*realisations*n_freq, slices*n_freq, serial_flops_lanes)
     allocate (part(slices*n_freq), space(threads), stat=stat)
     do t = 1, threads
       if (stat == 0) call prepare(plan, space(t), stat)
@@ -145,15 +148,17 @@ contains
 
     call hold_blas_threads()
     t = 1
-    !$omp parallel do num_threads(threads) if(threads > 1) schedule(dynamic) default(none) private(i, s) &
-    !$omp shared(plan, noise, kernels, blocks, n_freq, slices, share, first, count, gamma, gamma_pairs, peak) &
-    !$omp shared(line_info, space, part) firstprivate(t)
+    !$omp parallel num_threads(threads) if(threads > 1) default(none) private(i, s, host) firstprivate(t) &
+    !$omp shared(plan, noise, kernels, blocks, n_freq, slices, share, first, realisations, gamma, gamma_pairs) &
+    !$omp shared(peak, line_info, space, part)
+    !$ t = omp_get_thread_num() + 1
+    call hold_traps(host)
+    !$omp do schedule(dynamic)
     do item = 1, slices*n_freq
-      !$ t = omp_get_thread_num() + 1
       i = (item - 1)/slices + 1
       s = mod(item - 1, slices)*share
       if (line_info(i) == line_good .and. all_finite(gamma(:, :, i))) then
-        call run_slice(plan, noise, kernels, blocks, i, int(first, int64) + s, min(share, count - s), &
+        call run_slice(plan, noise, kernels, blocks, i, int(first, int64) + s, min(share, realisations - s), &
                        gamma_pairs(:, :, i), peak, space(t), part(item))
       else
         call clear(part(item))
@@ -161,7 +166,9 @@ contains
         if (part(item)%code == line_good) part(item)%code = line_not_finite
       end if
     end do
-    !$omp end parallel do
+    !$omp end do
+    call release_traps(host)
+    !$omp end parallel
     call release_blas_threads()
 
     do i = 1, n_freq
@@ -233,8 +240,8 @@ contains
     n = plan%n
     m = plan%m
     allocate (space%room(lanes*(2*plan%n_element + 2*m + 5*n*n + 1)), space%low_room(lanes*(m*m + 1)), &
-              space%scale(2, m*m), space%hint(padded(m)), space%gamma(m, m), space%found(n, n), &
-              space%lapack%z(3*m*m + inverse_work(m)), space%lapack%r(2*m), space%lapack%pivot(m), stat=stat)
+              space%scale(2, m*m), space%hint(padded(m)), space%gamma(m, m), space%found(n, n), stat=stat)
+    if (stat == 0) call space%lapack%set_up(3*area(m, m) + inverse_work(m), area(2, m), area(m, 1), stat)
     if (stat /= 0) return
     at = to_register(c_loc(space%room))
     call place(2, plan%n_element, space%x)

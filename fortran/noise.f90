@@ -10,6 +10,7 @@ module jointfrf_noise
   use jointfrf_lanes, only: lane_kernels, lanes, real_lines
   use jointfrf_status, only: info_good, info_no_memory
   use jointfrf_sweep, only: serial_flops_lanes, threads_for
+  use jointfrf_traps, only: hold_traps, host_state, release_traps
   implicit none
   private
   public :: noise_model, make_noise, is_kind, is_reference, upper, pollute
@@ -90,6 +91,7 @@ contains
     complex(dp), contiguous, target, intent(inout) :: polluted(:, :, :)
     integer(ip), intent(out) :: info
     type(lane_kernels) :: kernels
+    type(host_state) :: host
     type(noise_space), allocatable :: space(:)
     real(dp), pointer, contiguous :: from(:, :, :), to(:, :, :)
     integer(int64), allocatable :: counters(:, :)
@@ -121,17 +123,21 @@ contains
     to => real_lines(polluted)
     peak = spectrum_peak(noise, kernels, from)
     t = 1
-    !$omp parallel do num_threads(threads) if(threads > 1) schedule(static) default(none) private(c, r, n_lines) &
-    !$omp shared(noise, kernels, n, n_freq, n_chunks, n_items, first, counters, space, from, to, peak) firstprivate(t)
+    !$omp parallel num_threads(threads) if(threads > 1) default(none) private(c, r, n_lines, host) firstprivate(t) &
+    !$omp shared(noise, kernels, n, n_freq, n_chunks, n_items, first, counters, space, from, to, peak)
+    !$ t = omp_get_thread_num() + 1
+    call hold_traps(host)
+    !$omp do schedule(static)
     do item = 0, n_items - 1
-      !$ t = omp_get_thread_num() + 1
       r = int(item/n_chunks)
       c = int(mod(item, int(n_chunks, int64)))*lanes + 1
       n_lines = min(lanes, n_freq - c + 1)
       call pollute_lines(noise, kernels, n, n_lines, c, int(first, int64) + r, counters, peak, &
                          from(:, :, c:c + n_lines - 1), space(t), to(:, :, r*n_freq + c:r*n_freq + c + n_lines - 1))
     end do
-    !$omp end parallel do
+    !$omp end do
+    call release_traps(host)
+    !$omp end parallel
   end subroutine pollute
 
   !> The lines of one block in one realisation. Numbers lie in lanes one after the other, over lines.

@@ -1,7 +1,7 @@
-"""Man pages and one Markdown file from the comments of api.F90, whose form the pages depend on.
+"""Man pages and one Markdown file from the comments of api.F90 and api_work.f90, whose form the pages depend on.
 
-`reference.py API VERSION FOLDER` writes FOLDER/jointfrf.3 (overview), one FOLDER/jf_NAME.3 for every public routine and
-FOLDER/jointfrf.md. An argument that no comment explains is an error.
+`reference.py API WORK VERSION FOLDER` writes FOLDER/jointfrf.3 (overview), one FOLDER/jf_NAME.3 for every public
+routine and FOLDER/jointfrf.md. An argument that no comment explains is an error.
 """
 
 from __future__ import annotations
@@ -12,11 +12,13 @@ import sys
 from dataclasses import dataclass
 
 TYPES = {  # as declared: what FORTRAN 77 calls it, and C
-    "integer(c_int)": ("INTEGER", "int"),
+    "integer(ip)": ("INTEGER", "jf_int"),
     "real(c_double)": ("DOUBLE PRECISION", "double"),
     "complex(c_double_complex)": ("COMPLEX*16", "jf_complex"),
     "character(kind=c_char)": ("CHARACTER", "char"),
 }
+#: What only keeps a shape's arithmetic from overflowing.
+WIDE = re.compile(r"0_long \+ |1_long\*|\b(\d)_long|min\((\w+), \w+\)|max\(0_ip, (\w+)\)")
 ARGUMENT_TEXT = re.compile(r"([a-z]\w*(?:, [a-z]\w*)*) {2,}(\S.*)")
 
 
@@ -98,13 +100,16 @@ def read_declarations(lines: list[str]) -> dict[str, Argument]:
         match = re.fullmatch(r"\s*([a-z]+\([\w=]+\)).*?intent\((\w+)\) :: (.*)", line)
         if match:
             for name, shape in re.findall(r"(\w+)(\([^()]*(?:\([^()]*\)[^()]*)*\))?(?:, |$)", match[3].strip()):
-                found[name] = Argument(name, *TYPES[match[1]], match[2], shape)
+                found[name] = Argument(name, *TYPES[match[1]], match[2], WIDE.sub(r"\1\2\3", shape))
     return found
 
 
 def resolve(routine: Routine, name: str, texts: dict[str, dict[str, str]], common: dict[str, str]) -> str:
-    """Find the text of one argument, with `as above` and `as in jf_NAME` replaced by what they refer to."""
-    text = texts[routine.name].get(name, "as above")
+    """Find the text of one argument, with `as above` and `as in jf_NAME` replaced by what they refer to.
+
+    What jf_NAME_work does not explain, jf_NAME does.
+    """
+    text = texts[routine.name].get(name) or texts[routine.name.removesuffix("_work")].get(name, "as above")
     other = re.match(r"as in (jf_\w+)", text)
     if text.startswith("as above") and name in common:
         rest = text.removeprefix("as above")
@@ -141,7 +146,8 @@ def read_api(source: str) -> Api:
     for routine in routines.values():
         for argument in routine.arguments:
             argument.text = resolve(routine, argument.name, texts, common)
-    return Api([text for text in prose if not text.endswith(":")], common, [routines[name] for name in public])
+    prose = [text for text in prose if not text.endswith(":")]
+    return Api(prose, common, [routines[name] for name in dict.fromkeys(public)])
 
 
 def roff(text: str) -> str:
@@ -197,9 +203,11 @@ def markdown(api: Api, version: str) -> str:
     return "\n\n".join(text) + "\n"
 
 
-def main(source: str, version: str, folder: str) -> None:
+def main(*arguments: str) -> None:
     """Write every page."""
-    api, target = read_api(pathlib.Path(source).read_text(encoding="utf-8")), pathlib.Path(folder)
+    *sources, version, folder = arguments
+    api = read_api("".join(pathlib.Path(source).read_text(encoding="utf-8") for source in sources))
+    target = pathlib.Path(folder)
     pages = {f"{routine.name}.3": routine_page(routine, version) for routine in api.routines}
     pages |= {"jointfrf.3": overview_page(api, version), "jointfrf.md": markdown(api, version)}
     for name, text in pages.items():

@@ -7,7 +7,6 @@
 !>                           or Inf; `line_overflow` the line is finite but its result is not. A bad line is filled with
 !>                           NaN and the sweep goes on.
 module jointfrf_status
-  use, intrinsic :: iso_c_binding, only: c_int64_t
   use jointfrf_kinds, only: ip
   implicit none
   private
@@ -28,9 +27,10 @@ contains
   pure function info_text(info) result(text)
     integer(ip), intent(in) :: info
     character(len=text_length) :: text
-    character(len=12) :: digits
+    character(len=20) :: digits
 
-    write (digits, '(i0)') abs(int(info, c_int64_t))
+    write (digits, '(i0)') info
+    if (info < 0) digits = digits(2:)
     if (info == info_good) then
       text = 'good'
     else if (info == info_no_memory) then
@@ -48,9 +48,10 @@ contains
   pure function line_text(info) result(text)
     integer(ip), intent(in) :: info
     character(len=text_length) :: text
-    character(len=12) :: digits
+    character(len=20) :: digits
 
-    write (digits, '(i0)') abs(int(info, c_int64_t))
+    write (digits, '(i0)') info
+    if (info < 0) digits = digits(2:)
     if (info == line_good) then
       text = 'good'
     else if (info == line_not_finite) then

@@ -55,15 +55,15 @@ static void joint(const double stiffness[N_J], const double damping[N_J], jf_com
 }
 
 /* Stop where a call did not go well, and say in words what it was. */
-static void test(int info)
+static void test(jf_int info)
 {
     char text[80];
-    int n_text = sizeof text;
+    jf_int n_text = sizeof text;
 
     if (info == JF_INFO_GOOD)
         return;
     jf_info_text(&info, &n_text, text);
-    printf("%.*s\n", n_text, text);
+    printf("%.*s\n", (int)n_text, text);
     exit(1);
 }
 
@@ -102,17 +102,17 @@ static void print_means(jf_complex k[N_FREQ][N_J][N_J])
 
 int main(void)
 {
-    const int n = N, n_j = N_J, n_freq = N_FREQ, none = 0;
+    const jf_int n = N, n_j = N_J, n_freq = N_FREQ, none = 0;
     const double loss = 0.01, pi = acos(-1.0);
     /* all DOFs of a beam; the joint's on A, on B, in the assembly; all count from 1 */
-    const int all_dofs[N] = {1, 2, 3, 4}, dofs_a[N_J] = {3, 4}, dofs_b[N_J] = {1, 2}, dofs_c[2 * N_J] = {3, 4, 5, 6};
+    const jf_int all_dofs[N] = {1, 2, 3, 4}, dofs_a[N_J] = {3, 4}, dofs_b[N_J] = {1, 2}, dofs_c[2 * N_J] = {3, 4, 5, 6};
     static double k_a[N][N], m_a[N][N], k_b[N][N], m_b[N][N], rcond[N_FREQ];
     static jf_complex h_a[N_FREQ][N][N], h_b[N_FREQ][N][N], h_c[N_FREQ][2 * N][2 * N], h_c0[N_FREQ][2 * N][2 * N];
     static jf_complex k_joint[N_FREQ][N_J][N_J], k_initial[N_FREQ][N_J][N_J];
     static jf_complex gamma[N_FREQ][2 * N_J][2 * N_J], alpha[N_FREQ][2 * N_J][2 * N_J];
     static jf_complex k_ismm[N_FREQ][N_J][N_J], k_short[N_FREQ][N_J][N_J];
-    static int line_info[N_FREQ];
-    int info;
+    static jf_int line_info[N_FREQ];
+    jf_int info;
 
     for (int l = 0; l < N_FREQ; l++) {
         freq_hz[l] = 15 + 5.0 * l;

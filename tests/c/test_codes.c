@@ -19,10 +19,10 @@ static void check(int good, const char *what)
     fprintf(stderr, "FAILED: %s\n", what);
 }
 
-static void check_text(void (*routine)(const int *, const int *, char *), int code, const char *expected)
+static void check_text(void (*routine)(const jf_int *, const jf_int *, char *), jf_int code, const char *expected)
 {
     char text[81];
-    int n_text = 80;
+    jf_int n_text = 80;
 
     text[80] = '\0';
     routine(&code, &n_text, text);
@@ -31,11 +31,11 @@ static void check_text(void (*routine)(const int *, const int *, char *), int co
 }
 
 /* Two lines of order 1, the second as given. */
-static void check_line(double value, int expected, const char *what)
+static void check_line(double value, jf_int expected, const char *what)
 {
-    const int n = 1, n_freq = 2;
+    const jf_int n = 1, n_freq = 2;
     jf_complex a[2] = {2.0, value}, a_inverse[2];
-    int line_info[2], info;
+    jf_int line_info[2], info;
     double rcond[2];
 
     jf_invert(&n, &n_freq, a, a_inverse, line_info, rcond, &info);
@@ -49,9 +49,10 @@ static void check_line(double value, int expected, const char *what)
 /* The choice is kept, and an engine that no machine has leaves it as it is. */
 static void check_engines(void)
 {
-    const int engines[] = {JF_ENGINE_LAPACK, JF_ENGINE_PLAIN, JF_ENGINE_X86_64_V2, JF_ENGINE_X86_64_V3,
-                           JF_ENGINE_X86_64_V4}, automatic = JF_ENGINE_AUTOMATIC, lapack = JF_ENGINE_LAPACK, none = 6;
-    int engine, info, widest = 0, before;
+    const jf_int engines[] = {JF_ENGINE_LAPACK, JF_ENGINE_PLAIN, JF_ENGINE_X86_64_V2, JF_ENGINE_X86_64_V3,
+                              JF_ENGINE_X86_64_V4};
+    const jf_int automatic = JF_ENGINE_AUTOMATIC, lapack = JF_ENGINE_LAPACK, none = 6;
+    jf_int engine, info, widest = 0, before;
 
     for (int i = 0; i < 5; i++) {
         jf_get_engine(&before, &info);
@@ -76,18 +77,18 @@ static void check_engines(void)
 static void check_no_memory(void)
 {
 #if defined(__linux__) && !defined(__SANITIZE_ADDRESS__)
-    const int n = 1000, n_freq = 1, n_out = 0, n_in = 2000000, zero = 0;
+    const jf_int n = 1000, n_freq = 1, n_out = 0, n_in = 2000000, zero = 0;
     const double omega = 1.0, loss_factor = 0.0;
     const struct rlimit limit = {8000000000u, 8000000000u};
     double *matrix = calloc((size_t)n * n, sizeof *matrix), rcond = 0.5;
     jf_complex h;
-    int *inputs = malloc((size_t)n_in * sizeof *inputs), line_info = 7, info = 0;
+    jf_int *inputs = malloc((size_t)n_in * sizeof *inputs), line_info = 7, info = 0;
 
     if (!matrix || !inputs || setrlimit(RLIMIT_AS, &limit) != 0) {
         check(0, "cannot set up the test of missing memory");
         return;
     }
-    for (int i = 0; i < n_in; i++)
+    for (jf_int i = 0; i < n_in; i++)
         inputs[i] = 1;
     jf_receptance("N", &n, &n_freq, &n_out, &n_in, &omega, matrix, matrix, &zero, matrix, &zero, matrix, &loss_factor,
                   inputs, inputs, &h, &line_info, &rcond, &info);
@@ -99,8 +100,8 @@ static void check_no_memory(void)
 
 int main(void)
 {
-    const int n = -1, n_freq = 1;
-    int info = 7;
+    const jf_int n = -1, n_freq = 1;
+    jf_int info = 7;
 
     check_text(jf_info_text, JF_INFO_GOOD, "good");
     check_text(jf_info_text, JF_INFO_NO_MEMORY, "the workspace could not be allocated");

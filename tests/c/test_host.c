@@ -1,7 +1,9 @@
 /* A host program survives calls with nonsense: the library prints nothing, stops nothing, writes nothing where an
-   argument is wrong, and leaves rounding, masks and modes of the floating-point unit as they were. */
+   argument is wrong and no further than the workspace it is given, and leaves rounding, masks and modes of the
+   floating-point unit as they were. */
 #define _GNU_SOURCE
 #include <fenv.h>
+#include <limits.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -18,6 +20,7 @@
 #define LINES 4         /* most lines */
 #define ROOM 10400      /* numbers in a result: as many as the largest call writes */
 #define GIVEN 1200      /* numbers in an argument, likewise */
+#define WORK 6000       /* numbers in a workspace, more than any call takes */
 
 static unsigned long long state = 88172645463325252ULL;
 
@@ -30,11 +33,22 @@ static unsigned next(unsigned below)
 }
 
 /* Mostly a size that is possible. */
-static int any_size(int most)
+static jf_int any_size(int most)
 {
-    static const int strange[] = {-1, -30000, 0, -7};
+    static const int strange[] = {-1, -30000, 0, -7, INT_MIN};
 
-    return next(5) ? 1 + (int)next((unsigned)most) : strange[next(4)];
+    return next(5) ? 1 + (int)next((unsigned)most) : strange[next(5)];
+}
+
+/* A size that may be no larger than others are. */
+static jf_int any_part(int most)
+{
+    return next(40) ? any_size(most) : INT_MAX;
+}
+
+static jf_int any_length(void)
+{
+    return next(4) ? WORK / 6 : next(2) ? (int)next(WORK / 6) : next(2) ? WORK : any_size(2);
 }
 
 static double any_number(void)
@@ -53,7 +67,10 @@ static char any_letter(void)
 
 static double in[6][GIVEN];
 static double out[2][ROOM], before[2][ROOM];
-static int dofs[4][8 * MOST], line_info[256], line_info_before[256];
+static jf_int dofs[4][8 * MOST], line_info[256], line_info_before[256];
+static double work[2 * WORK], work_before[2 * WORK];
+static jf_int iwork[WORK], iwork_before[WORK], lwork, liwork;
+static int in_work;     /* whether the last call was one in memory of the caller */
 
 /* New arguments: one array of numbers a call, all indices. */
 static void fill(int number)
@@ -64,7 +81,8 @@ static void fill(int number)
         in[number % 6][i] = any_number();
     for (k = 0; k < 4; k++)
         for (i = 0; i < 8 * MOST; i++)
-            dofs[k][i] = next(8) ? 1 + (i + (int)next(2)) % MOST : (int)next(12) - 4;
+            dofs[k][i] = next(8) ? 1 + (i + (int)next(2)) % MOST
+                                 : next(9) ? (int)next(12) - 4 : next(2) ? INT_MIN : INT_MAX;
     memset(out, 0x5a, sizeof out);
     memcpy(before, out, sizeof before);
     memset(line_info, 0x5a, sizeof line_info);
@@ -76,51 +94,60 @@ static const jf_complex *frf(int k)
     return (const jf_complex *)in[k];
 }
 
+/* With or without workspace. */
+#define CALL(name, ...)                                                                                              \
+    do {                                                                                                             \
+        if (in_work)                                                                                                 \
+            jf_##name##_work(__VA_ARGS__, line_info, rcond, (jf_complex *)work, &lwork, iwork, &liwork, &info);      \
+        else                                                                                                         \
+            jf_##name(__VA_ARGS__, line_info, rcond, &info);                                                         \
+    } while (0)
+
 /* One call of one routine with arguments as they come; returns its info. */
-static int call(void)
+static jf_int call(void)
 {
     const char t = any_letter(), kind = any_letter(), reference = any_letter();
     const char equation[2] = {any_letter(), any_letter()};
-    const int n = any_size(MOST), m = any_size(MOST), p = any_size(MOST), q = any_size(MOST);
-    const int n_freq = any_size(LINES), flag = (int)next(4) - 1;
+    const jf_int n = any_size(MOST), m = any_size(MOST), p = any_size(MOST), q = any_size(MOST);
+    const jf_int n_freq = any_size(LINES), flag = (int)next(4) - 1;
     const double number = any_number();
     jf_complex *h = (jf_complex *)out[0];
     double *rcond = out[1];
-    int info = 12345;
+    const jf_int part = any_part(MOST), n_damping = next(3) ? (int)next(2) * n : any_part(MOST);
+    const jf_int n_structural = next(3) ? (int)next(2) * n : any_part(MOST), kl = next(40) ? flag : INT_MAX;
+    const int routine = (int)next(20);
+    jf_int info = 12345;
 
-    switch (next(20)) {
-    case 0: jf_invert(&n, &n_freq, frf(0), h, line_info, rcond, &info); break;
-    case 1: jf_solve(&t, &n, &m, &n_freq, frf(0), frf(1), h, line_info, rcond, &info); break;
+    lwork = any_length();
+    liwork = any_length();
+    in_work = (routine < 14 || routine == 16) && next(2);
+    switch (routine) {
+    case 0: CALL(invert, &n, &n_freq, frf(0), h); break;
+    case 1: CALL(solve, &t, &n, &m, &n_freq, frf(0), frf(1), h); break;
     case 2:
-        jf_receptance(&t, &n, &n_freq, &m, &p, in[2], in[0], in[1], &flag, in[3], &q, in[4], &number, dofs[0], dofs[1], h,
-                      line_info, rcond, &info);
+        CALL(receptance, &t, &n, &n_freq, &m, &p, in[2], in[0], in[1], &n_damping, in[3], &n_structural, in[4], &number,
+             dofs[0], dofs[1], h);
         break;
     case 3:
-        jf_receptance_banded(&t, &n, &flag, &q, &n_freq, &m, &p, in[2], in[0], in[1], &flag, in[3], &q, in[4], &number,
-                             dofs[0], dofs[1], h, line_info, rcond, &info);
+        CALL(receptance_banded, &t, &n, &kl, &q, &n_freq, &m, &p, in[2], in[0], in[1], &n_damping, in[3], &n_structural,
+             in[4], &number, dofs[0], dofs[1], h);
         break;
-    case 4:
-        jf_receptance_modal(&t, &n, &n_freq, &m, &p, in[0], in[1], in[2], in[3], in[4], in[5], h, line_info, rcond, &info);
-        break;
-    case 5:
-        jf_couple(&t, &n, &m, &p, &n_freq, frf(0), frf(1), frf(2), dofs[0], dofs[1], h, line_info, rcond, &info);
-        break;
-    case 6: jf_modify(&t, &n, &m, &n_freq, frf(0), frf(1), dofs[0], h, line_info, rcond, &info); break;
-    case 7: jf_find_modification(&t, &n, &n_freq, frf(0), frf(1), h, line_info, rcond, &info); break;
-    case 8: jf_ismm(&t, &n, &n_freq, frf(0), frf(1), frf(2), h, line_info, rcond, &info); break;
-    case 9: jf_inverse_substructuring(&t, &n, &n_freq, frf(0), h, line_info, rcond, &info); break;
+    case 4: CALL(receptance_modal, &t, &n, &n_freq, &m, &p, in[0], in[1], in[2], in[3], in[4], in[5], h); break;
+    case 5: CALL(couple, &t, &n, &m, &part, &n_freq, frf(0), frf(1), frf(2), dofs[0], dofs[1], h); break;
+    case 6: CALL(modify, &t, &n, &part, &n_freq, frf(0), frf(1), dofs[0], h); break;
+    case 7: CALL(find_modification, &t, &n, &n_freq, frf(0), frf(1), h); break;
+    case 8: CALL(ismm, &t, &n, &n_freq, frf(0), frf(1), frf(2), h); break;
+    case 9: CALL(inverse_substructuring, &t, &n, &n_freq, frf(0), h); break;
     case 10:
-        jf_decouple(equation, &t, &n, &m, &p, &n_freq, frf(0), frf(1), frf(2), dofs[0], dofs[1], dofs[2], dofs[3], h,
-                    line_info, rcond, &info);
+        CALL(decouple, equation, &t, &n, &m, &part, &n_freq, frf(0), frf(1), frf(2), dofs[0], dofs[1], dofs[2],
+             dofs[3], h);
         break;
-    case 11: jf_joint_compliance(&t, &n, &n_freq, frf(0), h, line_info, rcond, &info); break;
-    case 12: jf_compliance_factors(&t, &n, &m, &n_freq, frf(0), in[1], h, line_info, rcond, &info); break;
-    case 13:
-        jf_compliance_covariance(&t, &flag, &n, &m, &n_freq, frf(0), in[1], in[2], h, line_info, rcond, &info);
-        break;
+    case 11: CALL(joint_compliance, &t, &n, &n_freq, frf(0), h); break;
+    case 12: CALL(compliance_factors, &t, &n, &m, &n_freq, frf(0), in[1], h); break;
+    case 13: CALL(compliance_covariance, &t, &flag, &n, &m, &n_freq, frf(0), in[1], in[2], h); break;
     case 14: jf_difference_weights(&n, in[0], out[0], &info); break;
     case 15: jf_central_difference(&t, &n, &n_freq, in[0], frf(1), h, line_info, rcond, &info); break;
-    case 16: jf_transform(&t, &n, &m, &p, &q, &n_freq, frf(0), in[1], in[2], h, line_info, rcond, &info); break;
+    case 16: CALL(transform, &t, &n, &m, &p, &q, &n_freq, frf(0), in[1], in[2], h); break;
     case 17:
         jf_pollute(&t, &kind, &reference, &flag, &m, &number, dofs[3], &n, &p, &n_freq, &flag, &q, frf(0), h, &info);
         break;
@@ -130,6 +157,18 @@ static int call(void)
     default: jf_brick_quality(&n_freq, in[0], out[0], out[1], &info);
     }
     return info;
+}
+
+/* Whether nothing was written behind so many numbers and integers; then these are as before. */
+static int workspace_kept(jf_int numbers, jf_int integers)
+{
+    const size_t used = 2 * (size_t)numbers, i_used = (size_t)integers;
+    const int kept = memcmp(work + used, work_before + used, sizeof work - used * sizeof *work) == 0
+                     && memcmp(iwork + i_used, iwork_before + i_used, sizeof iwork - i_used * sizeof *iwork) == 0;
+
+    memcpy(work, work_before, used * sizeof *work);
+    memcpy(iwork, iwork_before, i_used * sizeof *iwork);
+    return kept;
 }
 
 static unsigned modes(void)
@@ -154,16 +193,26 @@ int main(void)
 
     if (screen < 0 || said == NULL || dup2(fileno(said), STDOUT_FILENO) < 0 || dup2(fileno(said), STDERR_FILENO) < 0)
         return 2;
+    memset(work, 0x6b, sizeof work);
+    memcpy(work_before, work, sizeof work);
+    memset(iwork, 0x6b, sizeof iwork);
+    memcpy(iwork_before, iwork, sizeof iwork);
     for (i = 0; i < 6; i++)
         fill(i);
     for (i = 0; i < CALLS; i++) {
-        int info;
+        jf_int info;
+        int query;
 
         fill(i);
         info = call();
+        query = in_work && (lwork == -1 || liwork == -1);
         if (info == 12345)
             failures++;
-        if (info >= 0) {
+        if (!in_work || info < 0)
+            failures += !workspace_kept(0, 0);
+        else
+            failures += query ? !workspace_kept(1, 1) : !workspace_kept(lwork, liwork);
+        if (info >= 0 && !query) {
             answered++;
             continue;
         }
@@ -175,10 +224,15 @@ int main(void)
     fflush(stderr);
     printed = lseek(fileno(said), 0, SEEK_END);
     dup2(screen, STDERR_FILENO);
-    if (printed != 0)
-        fprintf(stderr, "FAILED: the library printed %ld bytes\n", printed);
+    if (printed != 0) {
+        char text[2000];
+
+        rewind(said);
+        fprintf(stderr, "FAILED: the library printed %ld bytes:\n", printed);
+        fwrite(text, 1, fread(text, 1, sizeof text, said), stderr);
+    }
     if (failures != 0)
-        fprintf(stderr, "FAILED: %d refused calls wrote something, or left info as it was\n", failures);
+        fprintf(stderr, "FAILED: %d calls wrote what they must not, or left info as it was\n", failures);
     if (modes() != modes_before)
         fprintf(stderr, "FAILED: the floating-point modes have changed\n");
     if (refused < CALLS / 10 || answered < CALLS / 10)

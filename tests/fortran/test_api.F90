@@ -35,6 +35,7 @@ program test_api
   call compliances()
   call differences()
   call no_lines()
+  call lists_too_long()
   call finish('api')
 
 contains
@@ -391,6 +392,24 @@ contains
     call jf_transform('T', 0_ip, 0_ip, 0_ip, 0_ip, n_freq, a, s, r, x, line_info, rcond, info)
     call good('transform, n = 0')
   end subroutine no_lines
+
+  !> A list whose length is wrong is not read: here it would lead far beyond the memory of the program.
+  subroutine lists_too_long()
+    complex(dp) :: a(0), x(0)
+    real(dp) :: s(0)
+    integer(ip) :: i(0)
+    integer(ip) :: n
+
+    n = huge(0)
+    call jf_couple('N', 4_ip, 4_ip, n, n_freq, a, a, a, i, i, x, line_info, rcond, info)
+    call check(info == -4, 'couple, more joint DOFs than there are')
+    call jf_modify('N', 4_ip, n, n_freq, a, a, i, x, line_info, rcond, info)
+    call check(info == -3, 'modify, more DOFs than there are')
+    call jf_decouple(['r', 's'], 'N', 4_ip, 4_ip, n, n_freq, a, a, a, i, i, i, i, x, line_info, rcond, info)
+    call check(info == -5, 'decouple, more DOFs than there are')
+    call jf_receptance('N', -1_ip, n_freq, n, n, omega, s, s, 0_ip, s, 0_ip, s, 0.0_dp, i, i, x, line_info, rcond, info)
+    call check(info == -2, 'receptance, no size')
+  end subroutine lists_too_long
 
   subroutine empty(what)
     character(len=*), intent(in) :: what

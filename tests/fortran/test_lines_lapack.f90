@@ -2,7 +2,7 @@
 program test_lines_lapack
   use testing, only: check, check_close, dp, finish, infinity, inverse, ip, norm_1, random_lines, random_regular, seed
   use jointfrf_lines_lapack, only: inverse_work, invert_line, one_norm, product_line, solve_line
-  use jointfrf_sweep, only: line_space
+  use jointfrf_sweep, only: area, line_space
   implicit none
   real(dp), parameter :: tolerance = 1.0e-13_dp
   integer, parameter :: sizes(6) = [1, 2, 3, 7, 33, 70]
@@ -22,9 +22,11 @@ contains
 
   subroutine make_space(n)
     integer, intent(in) :: n
+    integer :: stat
 
-    if (allocated(space%z)) deallocate (space%z, space%r, space%pivot)
-    allocate (space%z(3 + inverse_work(n)), space%r(2*n), space%pivot(n))
+    if (allocated(space%own%z)) deallocate (space%own%z, space%own%r, space%own%pivot)
+    call space%set_up(3 + inverse_work(n), area(2, n), area(n, 1), stat)
+    call check(stat == 0, 'workspace')
     space%used = 3
   end subroutine make_space
 

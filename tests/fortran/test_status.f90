@@ -4,6 +4,9 @@ program test_status
   use jointfrf_status, only: info_good, info_no_engine, info_no_memory, info_text, line_good, line_not_finite, line_overflow, &
     line_text, text_length
   implicit none
+  !> The modulus of the most negative number.
+  character(len=*), parameter :: most = &
+    trim(merge('9223372036854775808', '2147483648         ', storage_size(1_ip) == 64))
   integer(ip) :: code
 
   call check(info_good == 0 .and. line_good == 0, 'good is 0')
@@ -25,7 +28,7 @@ program test_status
     call check(len_trim(info_text(code)) < text_length .and. len_trim(line_text(code)) < text_length, 'a text is cut')
   end do
   call check(len_trim(info_text(huge(1_ip))) < text_length, 'the longest number')
-  call check(info_text(-huge(1_ip) - 1_ip) == 'argument 2147483648 is wrong', 'the most negative number')
-  call check(line_text(-huge(1_ip) - 1_ip) == 'unknown line code -2147483648', 'the most negative line code')
+  call check(info_text(-huge(1_ip) - 1_ip) == 'argument '//most//' is wrong', 'the most negative number')
+  call check(line_text(-huge(1_ip) - 1_ip) == 'unknown line code -'//most, 'the most negative line code')
   call finish('status')
 end program test_status

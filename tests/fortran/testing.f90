@@ -1,11 +1,12 @@
 !> What the test programs share: checks that count, seeded random matrices, and references in quadruple precision.
 !>
-!> A reference never uses the kernel: inverses are Gauss-Jordan in real(16), assemblies are built from dynamic
+!> A reference never uses the kernel, but for the kind of its integers: inverses are Gauss-Jordan in real(16), assemblies are built from dynamic
 !> stiffnesses spring by spring. Arrays of lines have the shape (out, in, n_freq).
 module testing
   use, intrinsic :: ieee_arithmetic, only: ieee_is_nan, ieee_positive_inf, ieee_quiet_nan, ieee_value
-  use, intrinsic :: iso_c_binding, only: dp => c_double, ip => c_int
+  use, intrinsic :: iso_c_binding, only: dp => c_double
   use, intrinsic :: iso_fortran_env, only: error_unit, int64, output_unit, qp => real128
+  use jointfrf_kinds, only: ip
   !$ use omp_lib, only: omp_set_num_threads
   implicit none
   private
@@ -315,7 +316,8 @@ contains
     integer(ip), intent(in) :: dofs_j(:), dofs_k(:)
     complex(dp) :: h_c(size(h_a, 1) + size(h_b, 1), size(h_a, 1) + size(h_b, 1), size(h_a, 3))
     complex(qp) :: z(size(h_c, 1), size(h_c, 1)), k(size(dofs_j), size(dofs_j))
-    integer :: on_b(size(dofs_k)), n_a, i
+    integer(ip) :: on_b(size(dofs_k))
+    integer :: n_a, i
 
     n_a = size(h_a, 1)
     on_b = n_a + dofs_k

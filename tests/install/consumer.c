@@ -3,10 +3,10 @@
 
 int main(void)
 {
-    const int n = 1, n_freq = 2, engine = JF_ENGINE_LAPACK;
+    const jf_int n = 1, n_freq = 2, engine = JF_ENGINE_LAPACK;
     jf_complex a[2] = {2.0, 0.0}, a_inverse[2];
     double rcond[2];
-    int line_info[2], info, major, minor, patch;
+    jf_int line_info[2], info, major, minor, patch;
 
     jf_version(&major, &minor, &patch);
     jf_set_engine(&engine, &info);

@@ -13,8 +13,8 @@ from typing import Any
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-#: The optimised build takes half a minute; it is kept, and brought up to date by each run.
-BUILD = ROOT / "build" / "installed"
+#: Optimised builds take half a minute; they are kept, and brought up to date by each run.
+BUILDS = {"jointfrf": ROOT / "build" / "installed", "jointfrf64": ROOT / "build" / "ilp64"}
 #: Where meson and ninja lie, too, if the environment of this Python is not activated.
 PATH = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
 #: Nothing may be contracted: the last bit is compared.
@@ -36,40 +36,47 @@ def run(command: list[str | Path], **options: Any) -> str:
 
 @dataclass(frozen=True)
 class InstalledLibrary:
-    """An installation prefix."""
+    """An installation prefix, and which of the libraries below it."""
 
     prefix: Path
+    name: str = "jointfrf"
 
     def pkg_config(self, *arguments: str) -> list[str]:
-        (file,) = self.prefix.rglob("jointfrf.pc")
-        return run(["pkg-config", *arguments, "jointfrf"], env={"PKG_CONFIG_PATH": str(file.parent)}).split()
+        (file,) = self.prefix.rglob(f"{self.name}.pc")
+        return run(["pkg-config", *arguments, self.name], env={"PKG_CONFIG_PATH": str(file.parent)}).split()
 
-    def compile(self, source: Path, program: Path) -> Path:
+    def compile(self, source: Path, program: Path, *flags: str) -> Path:
         """Compile one source file as a user would, against nothing but what is installed."""
         (module_dir,) = self.pkg_config("--variable=moduledir")
         (lib_dir,) = self.pkg_config("--variable=libdir")
         modules = [f"-I{module_dir}"] if source.suffix == ".f90" else []
         libraries = [*self.pkg_config("--cflags", "--libs"), "-lm", f"-Wl,-rpath,{lib_dir}"]
-        run([*COMPILERS[source.suffix], *FLAGS, *modules, "-o", program, source, *libraries])
+        run([*COMPILERS[source.suffix], *FLAGS, *flags, *modules, "-o", program, source, *libraries])
         return program
 
 
-@pytest.fixture(scope="session")
-def installed_library(tmp_path_factory: pytest.TempPathFactory) -> InstalledLibrary:
-    """Build as the Python extension is built, and install to a folder of this run."""
-    tools = ("meson", "pkg-config", "gfortran", "gcc")
-    missing = [name for name in tools if shutil.which(name, path=PATH) is None]
-    if missing:
-        pytest.skip(f"{', '.join(missing)} not found")
-    if not (BUILD / "build.ninja").exists():
+def install(name: str, destination: Path) -> InstalledLibrary:
+    """Build as the Python extension is built, and install below a folder."""
+    build = BUILDS[name]
+    if not (build / "build.ninja").exists():
         options = [
             "-Dtests=false",
             "-Dlapack=scipy-openblas32",
             f"-Dlapack_python={sys.executable}",
             "-Dprefix=/prefix",
+            f"-Dilp64={str(name == 'jointfrf64').lower()}",
         ]
-        run(["meson", "setup", BUILD, ROOT, *options])
-    destination = tmp_path_factory.mktemp("installed")
-    run(["meson", "compile", "-C", BUILD])
-    run(["meson", "install", "-C", BUILD, "--no-rebuild", "--destdir", destination])
-    return InstalledLibrary(destination / "prefix")
+        run(["meson", "setup", build, ROOT, *options])
+    run(["meson", "compile", "-C", build])
+    run(["meson", "install", "-C", build, "--no-rebuild", "--destdir", destination])
+    return InstalledLibrary(destination / "prefix", name)
+
+
+@pytest.fixture(scope="session")
+def installed_library(tmp_path_factory: pytest.TempPathFactory) -> InstalledLibrary:
+    """Install to a folder of this run."""
+    tools = ("meson", "pkg-config", "gfortran", "gcc")
+    missing = [name for name in tools if shutil.which(name, path=PATH) is None]
+    if missing:
+        pytest.skip(f"{', '.join(missing)} not found")
+    return install("jointfrf", tmp_path_factory.mktemp("installed"))

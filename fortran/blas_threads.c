@@ -1,0 +1,71 @@
+/* The threads of the BLAS, whichever it is when a program is linked or loaded. The names that control them are weak:
+   null where the BLAS has none. The linker takes nothing out of a static libopenblas.a for their sake: a program that
+   links one and wants its threads held adds -Wl,-u,openblas_get_parallel. Only ELF has such names; elsewhere nothing is
+   held. */
+#include <stdint.h>
+
+#ifdef __ELF__
+#define OPTIONAL(symbol) __asm__(symbol) __attribute__((weak))
+int openblas_get_parallel(void) OPTIONAL(JF_BLAS_PREFIX "openblas_get_parallel");
+int openblas_get_num_threads(void) OPTIONAL(JF_BLAS_PREFIX "openblas_get_num_threads");
+void openblas_set_num_threads(int threads) OPTIONAL(JF_BLAS_PREFIX "openblas_set_num_threads");
+int mkl_set_local(int threads) OPTIONAL("MKL_Set_Num_Threads_Local");
+int64_t blis_get(void) OPTIONAL("bli_thread_get_num_threads");
+void blis_set(int64_t threads) OPTIONAL("bli_thread_set_num_threads");
+
+/* How an OpenBLAS was built. The count of one built on OpenMP is OpenMP's own and is left alone; it starts no threads in
+   threads. One built without threads must not be called by two at once. */
+enum { NO_THREADS = 0, OWN_THREADS = 1 };
+
+/* Whether several threads may call the BLAS at once. */
+int jointfrf_blas_takes_threads(void)
+{
+  return !openblas_get_parallel || openblas_get_parallel() != NO_THREADS;
+}
+
+/* How many threads the BLAS takes, if that is one number for the whole process; 1 where there is nothing to hold. */
+int jointfrf_get_blas_threads(void)
+{
+  if (!openblas_get_parallel || !openblas_get_num_threads || !openblas_set_num_threads)
+    return 1;
+  return openblas_get_parallel() == OWN_THREADS ? openblas_get_num_threads() : 1;
+}
+
+/* Only after the number above was not 1. */
+void jointfrf_set_blas_threads(int threads)
+{
+  openblas_set_num_threads(threads);
+}
+
+/* MKL has a number for each thread that calls it, where 0 stands for that of the process; threads of a parallel region
+   get 1 from MKL itself. In BLIS the number belongs to the calling thread or to the process, as its version will; in the
+   latter case another sweep that ends first lets go for all. Each thread puts back what it has changed itself. */
+static _Thread_local int holds, mkl_before, blis_before;
+
+void jointfrf_hold_own_blas_threads(void)
+{
+  if (holds++ > 0)
+    return;
+  if (mkl_set_local)
+    mkl_before = mkl_set_local(1);
+  blis_before = blis_get && blis_set ? (int)blis_get() : 1;
+  if (blis_before > 1)
+    blis_set(1);
+}
+
+void jointfrf_release_own_blas_threads(void)
+{
+  if (--holds > 0)
+    return;
+  if (mkl_set_local)
+    mkl_set_local(mkl_before);
+  if (blis_before > 1)
+    blis_set(blis_before);
+}
+#else
+int jointfrf_blas_takes_threads(void) { return 1; }
+int jointfrf_get_blas_threads(void) { return 1; }
+void jointfrf_set_blas_threads(int threads) { (void)threads; }
+void jointfrf_hold_own_blas_threads(void) {}
+void jointfrf_release_own_blas_threads(void) {}
+#endif

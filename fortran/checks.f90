@@ -1,0 +1,340 @@
+!> Which argument of a routine is wrong, before anything is done: info = -i for the first one, 0 where all can be. The
+!> forms with and without memory of the caller share them. Sizes come before the arrays whose lengths they are: an array
+!> is read only where they are good.
+module jointfrf_checks
+  use, intrinsic :: iso_c_binding, only: c_char, c_double
+  use jointfrf_arguments, only: bad_offsets, bad_size, names, not_finite, out_of_range, repeated, unknown_equation, &
+    unknown_order
+  use jointfrf_brick, only: is_formulation
+  use jointfrf_kinds, only: ip, long
+  use jointfrf_monte_carlo, only: is_method
+  use jointfrf_noise, only: is_kind, is_reference
+  use jointfrf_status, only: info_good
+  implicit none
+  private
+  public :: check_invert, check_solve, check_receptance, check_receptance_banded, check_receptance_modal
+  public :: check_couple, check_modify, check_find_modification, check_ismm, check_inverse_substructuring
+  public :: check_decouple, check_joint_compliance, check_compliance_factors, check_compliance_covariance
+  public :: check_difference_weights, check_central_difference, check_transform, check_pollute, check_monte_carlo
+  public :: check_brick_matrices, check_brick_quality
+
+contains
+
+  pure function check_invert(n, n_freq) result(info)
+    integer(ip), intent(in) :: n, n_freq
+    integer(ip) :: info
+
+    info = info_good
+    if (bad_size(n_freq)) info = -2
+    if (bad_size(n)) info = -1
+  end function check_invert
+
+  pure function check_solve(trans, n, n_rhs, n_freq) result(info)
+    character(kind=c_char), intent(in) :: trans
+    integer(ip), intent(in) :: n, n_rhs, n_freq
+    integer(ip) :: info
+
+    info = info_good
+    if (bad_size(n_freq)) info = -4
+    if (bad_size(n_rhs)) info = -3
+    if (bad_size(n)) info = -2
+    if (unknown_order(trans)) info = -1
+  end function check_solve
+
+  pure function check_receptance(trans, n, n_freq, n_out, n_in, n_damping, n_structural, loss_factor, outputs, &
+                                 inputs) result(info)
+    character(kind=c_char), intent(in) :: trans
+    integer(ip), intent(in) :: n, n_freq, n_out, n_in, n_damping, n_structural, outputs(:), inputs(:)
+    real(c_double), intent(in) :: loss_factor
+    integer(ip) :: info
+
+    info = info_good
+    if (not_finite(loss_factor)) info = -13
+    if (n_structural /= 0 .and. n_structural /= n) info = -11
+    if (n_damping /= 0 .and. n_damping /= n) info = -9
+    if (bad_size(n_in)) info = -5
+    if (bad_size(n_out)) info = -4
+    if (bad_size(n_freq)) info = -3
+    if (bad_size(n)) info = -2
+    if (unknown_order(trans)) info = -1
+    if (info /= info_good) return
+    if (out_of_range(inputs, n)) info = -15
+    if (out_of_range(outputs, n)) info = -14
+  end function check_receptance
+
+  pure function check_receptance_banded(trans, n, kl, ku, n_freq, n_out, n_in, n_damping, n_structural, &
+                                        loss_factor, outputs, inputs) result(info)
+    character(kind=c_char), intent(in) :: trans
+    integer(ip), intent(in) :: n, kl, ku, n_freq, n_out, n_in, n_damping, n_structural, outputs(:), inputs(:)
+    real(c_double), intent(in) :: loss_factor
+    integer(ip) :: info
+
+    info = info_good
+    if (not_finite(loss_factor)) info = -15
+    if (n_structural /= 0 .and. n_structural /= n) info = -13
+    if (n_damping /= 0 .and. n_damping /= n) info = -11
+    if (bad_size(n_in)) info = -7
+    if (bad_size(n_out)) info = -6
+    if (bad_size(n_freq)) info = -5
+    if (ku < 0 .or. (ku > 0 .and. ku >= n)) info = -4
+    if (kl < 0 .or. (kl > 0 .and. kl >= n)) info = -3
+    if (bad_size(n)) info = -2
+    if (unknown_order(trans)) info = -1
+    if (info /= info_good) return
+    if (out_of_range(inputs, n)) info = -17
+    if (out_of_range(outputs, n)) info = -16
+  end function check_receptance_banded
+
+  pure function check_receptance_modal(trans, n_modes, n_freq, n_out, n_in) result(info)
+    character(kind=c_char), intent(in) :: trans
+    integer(ip), intent(in) :: n_modes, n_freq, n_out, n_in
+    integer(ip) :: info
+
+    info = info_good
+    if (bad_size(n_in)) info = -5
+    if (bad_size(n_out)) info = -4
+    if (bad_size(n_freq)) info = -3
+    if (bad_size(n_modes)) info = -2
+    if (unknown_order(trans)) info = -1
+  end function check_receptance_modal
+
+  pure function check_couple(trans, n_a, n_b, n_j, n_freq, dofs_a, dofs_b) result(info)
+    character(kind=c_char), intent(in) :: trans
+    integer(ip), intent(in) :: n_a, n_b, n_j, n_freq, dofs_a(:), dofs_b(:)
+    integer(ip) :: info
+
+    info = info_good
+    if (bad_size(n_freq)) info = -5
+    if (bad_size(n_j) .or. n_j > min(n_a, n_b)) info = -4
+    if (bad_size(n_b)) info = -3
+    if (bad_size(n_a)) info = -2
+    if (unknown_order(trans)) info = -1
+    if (info /= info_good) return
+    if (out_of_range(dofs_b, n_b) .or. repeated(dofs_b)) info = -10
+    if (out_of_range(dofs_a, n_a) .or. repeated(dofs_a)) info = -9
+  end function check_couple
+
+  pure function check_modify(trans, n, n_m, n_freq, dofs) result(info)
+    character(kind=c_char), intent(in) :: trans
+    integer(ip), intent(in) :: n, n_m, n_freq, dofs(:)
+    integer(ip) :: info
+
+    info = info_good
+    if (bad_size(n_freq)) info = -4
+    if (bad_size(n_m) .or. n_m > n) info = -3
+    if (bad_size(n)) info = -2
+    if (unknown_order(trans)) info = -1
+    if (info /= info_good) return
+    if (out_of_range(dofs, n) .or. repeated(dofs)) info = -7
+  end function check_modify
+
+  pure function check_find_modification(trans, n, n_freq) result(info)
+    character(kind=c_char), intent(in) :: trans
+    integer(ip), intent(in) :: n, n_freq
+    integer(ip) :: info
+
+    info = info_good
+    if (bad_size(n_freq)) info = -3
+    if (bad_size(n)) info = -2
+    if (unknown_order(trans)) info = -1
+  end function check_find_modification
+
+  pure function check_ismm(trans, n, n_freq) result(info)
+    character(kind=c_char), intent(in) :: trans
+    integer(ip), intent(in) :: n, n_freq
+    integer(ip) :: info
+
+    info = info_good
+    if (bad_size(n_freq)) info = -3
+    if (bad_size(n)) info = -2
+    if (unknown_order(trans)) info = -1
+  end function check_ismm
+
+  pure function check_inverse_substructuring(trans, n, n_freq) result(info)
+    character(kind=c_char), intent(in) :: trans
+    integer(ip), intent(in) :: n, n_freq
+    integer(ip) :: info
+
+    info = info_good
+    if (bad_size(n_freq)) info = -3
+    if (bad_size(n)) info = -2
+    if (unknown_order(trans)) info = -1
+  end function check_inverse_substructuring
+
+  pure function check_decouple(equation, trans, n_a, n_b, n, n_freq, dofs_j, dofs_k, dofs_r, dofs_s) result(info)
+    character(kind=c_char), intent(in) :: equation(2), trans
+    integer(ip), intent(in) :: n_a, n_b, n, n_freq, dofs_j(:), dofs_k(:), dofs_r(:), dofs_s(:)
+    integer(ip) :: info
+
+    info = info_good
+    if (bad_size(n_freq)) info = -6
+    if (bad_size(n) .or. n > min(n_a, n_b)) info = -5
+    if (bad_size(n_b)) info = -4
+    if (bad_size(n_a)) info = -3
+    if (unknown_order(trans)) info = -2
+    if (unknown_equation(equation)) info = -1
+    if (info /= info_good) return
+    if (names(equation, 's') .and. (out_of_range(dofs_s, n_b) .or. repeated(dofs_s))) info = -13
+    if (names(equation, 'r') .and. (out_of_range(dofs_r, n_a) .or. repeated(dofs_r))) info = -12
+    if (out_of_range(dofs_k, n_b) .or. repeated(dofs_k)) info = -11
+    if (out_of_range(dofs_j, n_a) .or. repeated(dofs_j)) info = -10
+  end function check_decouple
+
+  pure function check_joint_compliance(trans, n, n_freq) result(info)
+    character(kind=c_char), intent(in) :: trans
+    integer(ip), intent(in) :: n, n_freq
+    integer(ip) :: info
+
+    info = info_good
+    if (bad_size(n_freq)) info = -3
+    if (bad_size(n)) info = -2
+    if (unknown_order(trans)) info = -1
+  end function check_joint_compliance
+
+  pure function check_compliance_factors(trans, n, m, n_freq) result(info)
+    character(kind=c_char), intent(in) :: trans
+    integer(ip), intent(in) :: n, m, n_freq
+    integer(ip) :: info
+
+    info = info_good
+    if (bad_size(n_freq)) info = -4
+    if (bad_size(m)) info = -3
+    if (bad_size(n)) info = -2
+    if (unknown_order(trans)) info = -1
+  end function check_compliance_factors
+
+  pure function check_compliance_covariance(trans, reciprocal, n, m, n_freq) result(info)
+    character(kind=c_char), intent(in) :: trans
+    integer(ip), intent(in) :: reciprocal, n, m, n_freq
+    integer(ip) :: info
+
+    info = info_good
+    if (bad_size(n_freq)) info = -5
+    if (bad_size(m)) info = -4
+    if (bad_size(n)) info = -3
+    if (reciprocal /= 0 .and. reciprocal /= 1) info = -2
+    if (unknown_order(trans)) info = -1
+  end function check_compliance_covariance
+
+  pure function check_difference_weights(m, offset) result(info)
+    integer(ip), intent(in) :: m
+    real(c_double), intent(in) :: offset(:)
+    integer(ip) :: info
+
+    info = info_good
+    if (m < 2 .or. bad_size(m)) info = -1
+    if (info /= info_good) return
+    if (bad_offsets(offset)) info = -2
+  end function check_difference_weights
+
+  pure function check_central_difference(trans, m, n_freq, offset) result(info)
+    character(kind=c_char), intent(in) :: trans
+    integer(ip), intent(in) :: m, n_freq
+    real(c_double), intent(in) :: offset(:)
+    integer(ip) :: info
+
+    info = info_good
+    if (bad_size(n_freq)) info = -3
+    if (m < 2 .or. bad_size(m)) info = -2
+    if (unknown_order(trans)) info = -1
+    if (info /= info_good) return
+    if (bad_offsets(offset)) info = -4
+  end function check_central_difference
+
+  pure function check_transform(trans, n_out, n_in, m_out, m_in, n_freq) result(info)
+    character(kind=c_char), intent(in) :: trans
+    integer(ip), intent(in) :: n_out, n_in, m_out, m_in, n_freq
+    integer(ip) :: info
+
+    info = info_good
+    if (bad_size(n_freq)) info = -6
+    if (bad_size(m_in)) info = -5
+    if (bad_size(m_out)) info = -4
+    if (bad_size(n_in)) info = -3
+    if (bad_size(n_out)) info = -2
+    if (unknown_order(trans)) info = -1
+  end function check_transform
+
+  pure function check_pollute(trans, kind, reference, reciprocal, block, level, n_out, n_in, n_freq, first, &
+                              count) result(info)
+    character(kind=c_char), intent(in) :: trans, kind, reference
+    integer(ip), intent(in) :: reciprocal, block, n_out, n_in, n_freq, first, count
+    real(c_double), intent(in) :: level
+    integer(ip) :: info
+
+    info = info_good
+    if (bad_size(count)) info = -12
+    if (count > 0) then
+      if (n_freq > huge(0)/count .or. first > huge(0) - count) info = -12
+    end if
+    if (bad_size(first)) info = -11
+    if (bad_size(n_freq)) info = -10
+    if (bad_size(n_in)) info = -9
+    if (bad_size(n_out)) info = -8
+    if (not_finite(level) .or. level < 0.0_c_double) info = -6
+    if (block < 1 .or. bad_size(block)) then
+      info = -5
+    else if (mod(n_out, block) /= 0 .or. mod(n_in, block) /= 0) then
+      info = -5
+    end if
+    if (reciprocal /= 0 .and. .not. (reciprocal == 1 .and. n_out == n_in)) info = -4
+    if (.not. is_reference(reference)) info = -3
+    if (.not. is_kind(kind)) info = -2
+    if (unknown_order(trans)) info = -1
+  end function check_pollute
+
+  pure function check_monte_carlo(trans, method, kind, reference, reciprocal, block, level, n, n_freq, first, &
+                                  count) result(info)
+    character(kind=c_char), intent(in) :: trans, method, kind, reference
+    integer(ip), intent(in) :: reciprocal, block, n, n_freq, first, count
+    real(c_double), intent(in) :: level
+    integer(ip) :: info
+
+    info = info_good
+    if (count < 1 .or. bad_size(count)) then
+      info = -12
+    else if (first > huge(0) - count) then
+      info = -12
+    end if
+    if (bad_size(first)) info = -11
+    if (bad_size(n_freq)) info = -10
+    if (n < 1 .or. bad_size(n)) info = -9
+    if (not_finite(level) .or. level < 0.0_c_double) info = -7
+    if (block < 1 .or. bad_size(block)) then
+      info = -6
+    else if (mod(2_long*n, int(block, long)) /= 0) then
+      info = -6
+    end if
+    if (reciprocal /= 0 .and. reciprocal /= 1) info = -5
+    if (.not. is_reference(reference)) info = -4
+    if (.not. is_kind(kind)) info = -3
+    if (.not. is_method(method)) info = -2
+    if (unknown_order(trans)) info = -1
+  end function check_monte_carlo
+
+  pure function check_brick_matrices(formulation, n_elements, youngs_modulus, poisson, density, hourglass, &
+                                     lumped) result(info)
+    character(kind=c_char), intent(in) :: formulation
+    integer(ip), intent(in) :: n_elements, lumped
+    real(c_double), intent(in) :: youngs_modulus(:), poisson(:), density(:), hourglass
+    integer(ip) :: info
+
+    info = info_good
+    if (bad_size(n_elements)) info = -2
+    if (.not. is_formulation(formulation)) info = -1
+    if (info /= info_good) return
+    if (lumped /= 0 .and. lumped /= 1) info = -8
+    if (not_finite(hourglass) .or. hourglass < 0.0_c_double) info = -7
+    if (.not. all(density > 0.0_c_double .and. density <= huge(density))) info = -6
+    if (.not. all(poisson > -1.0_c_double .and. poisson < 0.5_c_double)) info = -5
+    if (.not. all(youngs_modulus > 0.0_c_double .and. youngs_modulus <= huge(youngs_modulus))) info = -4
+  end function check_brick_matrices
+
+  pure function check_brick_quality(n_elements) result(info)
+    integer(ip), intent(in) :: n_elements
+    integer(ip) :: info
+
+    info = info_good
+    if (bad_size(n_elements)) info = -1
+  end function check_brick_quality
+end module jointfrf_checks

@@ -1,0 +1,27 @@
+!> The floating-point state of the program that calls: its traps are held off while the kernel computes, because a bad
+!> line gets its code from NaN and Inf; afterwards traps, flags and rounding are as they were.
+module jointfrf_traps
+  use, intrinsic :: iso_c_binding, only: c_int64_t
+  implicit none
+  private
+  public :: host_state, hold_traps, release_traps
+
+  type, bind(C) :: host_state
+    private
+    integer(c_int64_t) :: room(8)
+  end type host_state
+
+  interface
+    !> From here to the release no exception stops this thread. Rounding stays.
+    subroutine hold_traps(host) bind(C, name='jointfrf_hold_traps')
+      import :: host_state
+      type(host_state), intent(out) :: host
+    end subroutine hold_traps
+
+    !> The state of this thread is that of `host` again.
+    subroutine release_traps(host) bind(C, name='jointfrf_release_traps')
+      import :: host_state
+      type(host_state), intent(in) :: host
+    end subroutine release_traps
+  end interface
+end module jointfrf_traps

@@ -1,0 +1,68 @@
+"""What one line costs in a program's own frequency loop: `tests/benchmarks/run-line-calls --help`."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import scipy_openblas32
+
+from .machine import ROOT, build_kernel
+
+_SOURCE = ROOT / "tests" / "benchmarks" / "line_calls.F90"
+_WAYS = {"work": "jf_NAME_work", "line": "jf_NAME", "sweep": "all lines"}
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(prog="run-line-calls", description=__doc__)
+    parser.add_argument("--orders", default="1,2,3,6,12", metavar="N,...", help="joint DOFs (default: %(default)s)")
+    parser.add_argument("--output", type=Path, metavar="FILE", help="the results as JSON")
+    options = parser.parse_args()
+    if shutil.which("gfortran") is None:
+        parser.error("gfortran is not there")
+    orders = [int(word) for word in options.orders.split(",")]
+    with tempfile.TemporaryDirectory() as folder:
+        program = _compile(Path(folder) / "line_calls")
+        records = [_run(program, order) for order in orders]
+    print(f"nanoseconds a line, one thread   {'  '.join(f'{way:>12}' for way in _WAYS.values())}         zgesv")
+    for name in ("couple", "compliance", "solve"):
+        for record in records:
+            times = "  ".join(f"{record[f'{name}_{way}']:12.0f}" for way in _WAYS)
+            zgesv = f"{record['solve_zgesv']:12.0f}" if name == "solve" else ""
+            print(f"{name:12} joint of {record['order']:2.0f} DOFs        {times}  {zgesv}")
+    if options.output is not None:
+        options.output.write_text(json.dumps(records, indent=1) + "\n")
+    return 0
+
+
+def _compile(program: Path) -> Path:
+    """Compile the program against the shared library, its Fortran module and the same LAPACK."""
+    kernel, lapack = build_kernel(), scipy_openblas32.get_lib_dir()
+    modules = sorted({str(path.parent) for path in kernel.rglob("jointfrf.mod")})
+    command = ["gfortran", "-O2", '-DJF_BLAS_PREFIX="scipy_"', *(f"-I{folder}" for folder in modules), str(_SOURCE)]
+    command += ["-o", str(program), f"-L{kernel}", "-ljointfrf", f"-L{lapack}", "-lscipy_openblas"]
+    command += [f"-Wl,-rpath,{kernel.resolve()}", f"-Wl,-rpath,{lapack}"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    if done.returncode:
+        raise RuntimeError(f"gfortran failed:\n{done.stderr[-2000:]}")
+    return program
+
+
+def _run(program: Path, order: int) -> dict[str, float]:
+    """Run the program on one thread; return what it prints as names and numbers."""
+    environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    done = subprocess.run([str(program), str(order)], capture_output=True, text=True, env=environment)
+    if done.returncode:
+        raise RuntimeError(f"line_calls failed:\n{done.stdout[-1000:]}{done.stderr[-2000:]}")
+    words = done.stdout.split()
+    return {name: float(value) for name, value in zip(words[::2], words[1::2], strict=True)}
+
+
+if __name__ == "__main__":
+    sys.exit(main())

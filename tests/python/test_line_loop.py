@@ -1,0 +1,40 @@
+"""A FORTRAN 77 program with its own frequency loop and arena, on the installed library."""
+
+from pathlib import Path
+
+import numpy as np
+
+import jointfrf as jf
+from installed_library import InstalledLibrary, run
+
+SOURCE = Path(__file__).resolve().parents[1] / "f77" / "loop.f"
+
+
+def test_one_line_at_a_time(installed_library: InstalledLibrary, tmp_path):
+    program = installed_library.compile(SOURCE, tmp_path / "loop")
+    rows = np.array([line.split() for line in run([program]).splitlines()], float)
+    freq_hz, found = rows[:, 0], rows[:, 3:]
+    np.testing.assert_allclose(freq_hz, 0.2 * np.arange(1, 51))
+    np.testing.assert_allclose(found, np.tile([500.0, 3.0], (50, 1)), rtol=1e-9)
+
+    # both chains and the joint in one dynamic stiffness matrix
+    k = 1000.0 * (1 + 0.01j) * np.array([[2, -1, 0, 0], [-1, 1, 0, 0], [0, 0, 2, -1], [0, 0, -1, 1]])
+    between = np.array([0.0, 1.0, 0.0, -1.0])
+    omega = 2 * np.pi * freq_hz[:, None, None]
+    whole = k + (500 + 3j * omega) * np.outer(between, between) - omega**2 * 2.0 * np.eye(4)
+    expected = np.linalg.inv(whole)[:, 1, 1]
+    np.testing.assert_allclose(rows[:, 1] + 1j * rows[:, 2], expected, rtol=1e-12)
+
+
+def test_the_loop_and_a_sweep_have_the_same_bits(installed_library: InstalledLibrary, tmp_path):
+    """Of the reference engine, also where another is chosen."""
+    program = installed_library.compile(SOURCE, tmp_path / "loop")
+    text = run([program], env={"JOINTFRF_ENGINE": "lapack"})
+    assert text == run([program], env={"JOINTFRF_ENGINE": "plain"})
+    rows = np.array([line.split() for line in text.splitlines()], float)
+    k, m = np.array([[2000.0, -1000.0], [-1000.0, 1000.0]]), 2.0 * np.eye(2)
+    joint = jf.Joint([500.0], [3.0])
+    with jf.use_engine("lapack"):
+        h = jf.Model(k, m, ("1:x", "2:x"), loss_factor=0.01).receptance(rows[:, 0], method="dense")
+        gamma = jf.couple(h, h, joint.dynamic_stiffness(rows[:, 0]), [1], [1])
+    np.testing.assert_array_equal(gamma[:, 1, 1], rows[:, 1] + 1j * rows[:, 2])
