@@ -300,18 +300,25 @@ int main(void)
 {
     struct sigaction action = {.sa_handler = stopped};
     jf_int engine, info;
+    int threads = 1;
 
     if (feenableexcept(ALL) < 0 || fegetexcept() != ALL)
         return 77;      /* this processor does not trap */
     fedisableexcept(ALL);
     sigaction(SIGFPE, &action, NULL);
+#ifdef _OPENMP
+    threads = omp_get_max_threads();
+#endif
     for (engine = JF_ENGINE_LAPACK; engine <= JF_ENGINE_X86_64_V4; engine++) {
         jf_set_engine(&engine, &info);
         if (info != 0)
             continue;
-        every_routine(engine);
-        other_states(engine);
-        workers(engine);
+        if (threads > 1) {
+            workers(engine);
+        } else {
+            every_routine(engine);
+            other_states(engine);
+        }
     }
     printf("traps: %d checks, %d failed\n", checks, failures);
     return failures != 0;

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from filelock import FileLock
 
 ROOT = Path(__file__).resolve().parents[2]
 #: Optimised builds take half a minute; they are kept, and brought up to date by each run.
@@ -56,8 +57,14 @@ class InstalledLibrary:
 
 
 def install(name: str, destination: Path) -> InstalledLibrary:
-    """Build as the Python extension is built, and install below a folder."""
+    """Build as the Python extension is built, and install below a folder. Tests that run at once take turns."""
     build = BUILDS[name]
+    build.parent.mkdir(exist_ok=True)
+    with FileLock(build.with_suffix(".lock")):
+        return _install(name, build, destination)
+
+
+def _install(name: str, build: Path, destination: Path) -> InstalledLibrary:
     if not (build / "build.ninja").exists():
         options = [
             "-Dtests=false",

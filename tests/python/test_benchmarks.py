@@ -13,10 +13,10 @@ import pytest
 TESTS = Path(__file__).resolve().parents[1]
 
 
-def command(*arguments: str) -> subprocess.CompletedProcess[str]:
+def command(*arguments: str, module: str = "benchmarks") -> subprocess.CompletedProcess[str]:
     path = os.pathsep.join([str(TESTS), *filter(None, [os.environ.get("PYTHONPATH")])])
     return subprocess.run(
-        [sys.executable, "-m", "benchmarks", *arguments],
+        [sys.executable, "-m", module, *arguments],
         capture_output=True,
         text=True,
         env={**os.environ, "PYTHONPATH": path},
@@ -130,3 +130,16 @@ def test_limit_is_that_of_the_cache_which_holds_the_data(benchmarks):
 
 def test_command_can_be_started():
     assert os.access(TESTS / "benchmarks" / "run", os.X_OK)
+
+
+def test_one_line_is_timed_three_ways(tmp_path):
+    results = tmp_path / "lines.json"
+    done = command("--orders", "1,3", "--output", str(results), module="benchmarks.line_calls")
+    assert done.returncode == 0, done.stdout + done.stderr
+    records = json.loads(results.read_text())
+    assert [record["order"] for record in records] == [1, 3]
+    assert all(0 < value < math.inf for record in records for value in record.values())
+    assert [row.split()[0] for row in done.stdout.splitlines()[1:]] == ["couple"] * 2 + ["compliance"] * 2 + [
+        "solve"
+    ] * 2
+    assert os.access(TESTS / "benchmarks" / "run-line-calls", os.X_OK)
