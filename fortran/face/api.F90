@@ -603,6 +603,7 @@ contains
   end subroutine jf_difference_weights
 
   !> Displacement and rotation receptances at a reference from translational ones along a line. Eqs. (2.57)-(2.59).
+  !> In memory of the caller: the weights by jf_difference_weights once, then jf_transform_work with them for T.
   !> m        number of points, at least 2
   !> offset   positions of the points from the reference, shape (m), no two equal, m
   !> h        measured receptance of the points, shape (m, m, n_freq), m/N

@@ -64,7 +64,7 @@ contains
     if (size(memory%work, kind=long) < n_work) info = -memory%argument
     if (info /= info_good) return
     z => memory%work(:n_complex)
-    call c_f_pointer(c_loc(memory%work(n_work - (n_real + 1)/2 + merge(1, 0, n_real > 0))), r, [n_real])
+    call c_f_pointer(c_loc(memory%work(min(n_complex + 1, n_work))), r, [n_real])
     call c_f_pointer(c_loc(memory%iwork(1)), pivot, [n_pivot])
     ready = .true.
   end subroutine take_memory

@@ -40,7 +40,7 @@ from jointfrf.monte_carlo import BandStatistics, MonteCarlo, monte_carlo
 from jointfrf.multi_point import MultiPointJoint, multi_point_compliance, multi_point_stiffness
 from jointfrf.noise import pollute, realisations
 from jointfrf.receptance import ReceptanceInfo, receptance
-from jointfrf.rigid_offset import rigid_offset
+from jointfrf.rigid_motion import rigid_offset
 from jointfrf.rotations import DifferenceError, central_difference, difference_error, difference_weights, transform
 from jointfrf.solids.bolt import PROOF_STRENGTH, STRESS_AREA, Bolt, preload_force
 from jointfrf.solids.bolted_lap import BoltedLap, LapDivisions, bolted_lap

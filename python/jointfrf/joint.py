@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from jointfrf._sweep import ComplexArray, FloatArray, as_frequency, as_real
 from jointfrf.io.cards import CardFormat, cards
-from jointfrf.rigid_offset import rigid_offset
+from jointfrf.rigid_motion import rigid_offset
 
 __all__ = ["Joint"]
 

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from jointfrf._sweep import ComplexArray, FloatArray, as_dofs, as_real, as_square
 from jointfrf.io.frf_set import Channel
+from jointfrf.rigid_motion import rigid_motion
 from jointfrf.rotations import transform
 
 __all__ = ["VirtualPoint", "append_virtual_point", "channel_geometry", "virtual_point", "virtual_points"]
@@ -139,9 +140,10 @@ def virtual_point(
     if used < len(names):
         raise ValueError(f"positions hold {used} channels with weight: too few for {len(names)} DOFs")
 
-    arm = place - as_real("point", point, (3,))
-    modes = np.hstack([direction, np.cross(arm, direction)])[:, [_DOFS.index(name) for name in names]]
-    reach = float(np.sqrt(np.average((arm**2).sum(axis=1), weights=weight))) or 1.0
+    reference = as_real("point", point, (3,))
+    motion = np.einsum("mi,mij->mj", direction, rigid_motion(place, reference))
+    modes = motion[:, [_DOFS.index(name) for name in names]]
+    reach = float(np.sqrt(np.average(((place - reference) ** 2).sum(axis=1), weights=weight))) or 1.0
     scale = np.array([reach if name.startswith("theta") else 1.0 for name in names])
     root = np.sqrt(weight / weight.max())
     left, size, right = np.linalg.svd(root[:, None] * modes / scale, full_matrices=False)

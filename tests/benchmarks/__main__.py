@@ -21,6 +21,7 @@ from .data import Data
 from .machine import QUICK_SIZES, ROOT, SIZES, Limits, as_dict, best_of, build_library, describe, measure_limits
 from .measure import Candidate, time_interleaved
 from .operations import OPERATIONS, Operation, Reference
+from .options import numbers
 from .results import LOOP, NUMPY, OURS, OUT, REFERENCE, Run, load, record, save, with_limits
 
 _ORDERS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64)
@@ -32,13 +33,6 @@ _MEMORY, _WORK, _QUICK_WORK = 2e9, 2e9, 4e8
 _FEWEST_LINES = 200
 #: A case streams where its data are this many times those of the repeated one.
 _STREAMING_FACTOR = 4
-
-
-def _numbers(text: str) -> tuple[int, ...]:
-    numbers = tuple(int(word) for word in text.split(","))
-    if min(numbers) < 1:
-        raise argparse.ArgumentTypeError("numbers from 1 on")
-    return numbers
 
 
 def _names(text: str) -> tuple[str, ...]:
@@ -66,10 +60,10 @@ def _parse(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--output", type=Path, default=ROOT / "results" / "benchmarks", metavar="FOLDER")
     parser.add_argument("--operations", type=_names, default=tuple(OPERATIONS), metavar="NAME,...",
                         help=f"out of {', '.join(OPERATIONS)}")  # fmt: skip
-    parser.add_argument("--orders", type=_numbers, metavar="N,...", help="n; default 1 to 64")
+    parser.add_argument("--orders", type=numbers, metavar="N,...", help="n; default 1 to 64")
     parser.add_argument("--lines", type=int, help="frequency lines; default 2000")
     parser.add_argument("--data", type=_data, metavar="KIND,...", help=f"out of {', '.join(_DATA)}; default all")
-    parser.add_argument("--threads", type=_numbers, default=(1, 2), metavar="N,...", help="default 1,2; 1 comes first")
+    parser.add_argument("--threads", type=numbers, default=(1, 2), metavar="N,...", help="default 1,2; 1 comes first")
     parser.add_argument("--engine", default="auto", help="the engine that is timed as jointfrf")
     parser.add_argument(
         "--budget", type=float, help="seconds a case may take, once it was repeated five times; default 0.6"

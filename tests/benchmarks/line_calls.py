@@ -14,6 +14,7 @@ from pathlib import Path
 import scipy_openblas32
 
 from .machine import ROOT, build_kernel
+from .options import numbers
 
 _SOURCE = ROOT / "tests" / "benchmarks" / "line_calls.F90"
 _WAYS = {"work": "jf_NAME_work", "line": "jf_NAME", "sweep": "all lines"}
@@ -21,15 +22,14 @@ _WAYS = {"work": "jf_NAME_work", "line": "jf_NAME", "sweep": "all lines"}
 
 def main() -> int:
     parser = argparse.ArgumentParser(prog="run-line-calls", description=__doc__)
-    parser.add_argument("--orders", default="1,2,3,6,12", metavar="N,...", help="joint DOFs (default: %(default)s)")
+    parser.add_argument("--orders", type=numbers, default=(1, 2, 3, 6, 12), metavar="N,...", help="joint DOFs")
     parser.add_argument("--output", type=Path, metavar="FILE", help="the results as JSON")
     options = parser.parse_args()
     if shutil.which("gfortran") is None:
         parser.error("gfortran is not there")
-    orders = [int(word) for word in options.orders.split(",")]
     with tempfile.TemporaryDirectory() as folder:
         program = _compile(Path(folder) / "line_calls")
-        records = [_run(program, order) for order in orders]
+        records = [_run(program, order) for order in options.orders]
     print(f"nanoseconds a line, one thread   {'  '.join(f'{way:>12}' for way in _WAYS.values())}         zgesv")
     for name in ("couple", "compliance", "solve"):
         for record in records:

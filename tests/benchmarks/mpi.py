@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from .machine import ROOT, build_kernel
+from .options import numbers
 
 _SOURCE = ROOT / "tests" / "mpi" / "sweep.f90"
 #: Memory that the FRFs of a case may take, bytes: all processes hold them together about twice.
@@ -22,8 +23,8 @@ _TIMEOUT = 300
 
 def main() -> int:
     parser = argparse.ArgumentParser(prog="run-mpi", description=__doc__)
-    parser.add_argument("--processes", type=_numbers, default=(1, 2), metavar="N,...", help="default: 1,2")
-    parser.add_argument("--orders", type=_numbers, default=(2, 6, 12, 24), metavar="N,...", help="joint DOFs")
+    parser.add_argument("--processes", type=numbers, default=(1, 2), metavar="N,...", help="default: 1,2")
+    parser.add_argument("--orders", type=numbers, default=(2, 6, 12, 24), metavar="N,...", help="joint DOFs")
     parser.add_argument("--lines", type=int, help="frequency lines (default: what 200 MB hold, 65536 at most)")
     parser.add_argument("--repeats", type=int, default=7, help="the least time counts (default: 7)")
     parser.add_argument("--kernel", type=Path, metavar="FOLDER", help="folder with a library that is built already")
@@ -45,13 +46,6 @@ def main() -> int:
     if options.output is not None:
         options.output.write_text(json.dumps({"cores": os.cpu_count(), "records": records}, indent=1) + "\n")
     return 0
-
-
-def _numbers(text: str) -> tuple[int, ...]:
-    numbers = tuple(int(word) for word in text.split(","))
-    if min(numbers) < 1:
-        raise argparse.ArgumentTypeError("numbers from 1 on")
-    return numbers
 
 
 def _compile(kernel: Path, program: Path) -> Path:

@@ -21,10 +21,11 @@ from jointfrf.bolted.figures import bolted_figures
 from jointfrf.bolted.measurement import DOFS, Cross, both_sides, measured_entries
 from jointfrf.bolted.tables import bolted_summary, bolted_tables
 from jointfrf.cases import find_case, read_any_case, run_case
+from jointfrf.rigid_motion import rigid_motion
 from jointfrf.solids.bolted_lap import LapDivisions, bolted_lap
 from jointfrf.solids.contact import ContactLaw
 from jointfrf.solids.preload import preload
-from jointfrf.solids.solid import DIRECTIONS, rigid_motion
+from jointfrf.solids.solid import DIRECTIONS
 
 FOLDER = find_case("4.3.3")
 COARSE = LapDivisions(across=6, rings=1, circles=0, head=1, nut=1)

@@ -6,7 +6,8 @@ from scipy.sparse import linalg as sparse_linalg
 from scipy.spatial.transform import Rotation
 
 import jointfrf as jf
-from jointfrf.solids.solid import DIRECTIONS, mean_motion, rigid_motion
+from jointfrf.rigid_motion import rigid_motion
+from jointfrf.solids.solid import DIRECTIONS, mean_motion
 from rigid_bodies import Body, six
 
 ALUMINIUM = jf.Material(70e9, 0.33, 2700.0)

@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple, TypedDict, get_args
 import numpy as np
 
 from jointfrf._sweep import FloatArray, check_choice
-from jointfrf.rigid_offset import direction_places
+from jointfrf.rigid_motion import direction_places
 
 __all__ = ["CardFormat", "CardOptions", "cards"]
 

@@ -11,10 +11,11 @@ from scipy import sparse
 
 from jointfrf._sweep import FloatArray, as_real
 from jointfrf.model import Model
+from jointfrf.rigid_motion import rigid_motion
 from jointfrf.solids.brick import Formulation, Mass, Material, assemble_bricks
 from jointfrf.solids.mesh import Mesh
 
-__all__ = ["DIRECTIONS", "Patch", "SolidModel", "mean_motion", "rigid_motion", "solid_model"]
+__all__ = ["DIRECTIONS", "Patch", "SolidModel", "mean_motion", "solid_model"]
 
 #: DOFs of a reference point; a node has the first three.
 DIRECTIONS = ("x", "y", "z", "theta_x", "theta_y", "theta_z")
@@ -77,29 +78,6 @@ class SolidModel(Model):
         """Return the displacements of all nodes in a motion of the DOFs, shape (n_nodes, 3)."""
         found: FloatArray = (self.expansion @ np.asarray(shape)).reshape(-1, 3)
         return found
-
-
-def rigid_motion(points: FloatArray, about: FloatArray) -> FloatArray:
-    """Displacements of points that follow a reference point, u = u_R + theta x r.
-
-    Parameters
-    ----------
-    points : ndarray, shape (n, 3)
-        m.
-    about : ndarray, shape (3,)
-        Reference point, m.
-
-    Returns
-    -------
-    ndarray, shape (n, 3, 6)
-        For unit motions x, y, z, theta_x, theta_y, theta_z.
-    """
-    r = points - about
-    motion = np.zeros((len(points), 3, 6))
-    motion[:, [0, 1, 2], [0, 1, 2]] = 1
-    for axis in range(3):
-        motion[:, :, 3 + axis] = np.cross(np.eye(3)[axis], r)
-    return motion
 
 
 def solid_model(

@@ -1,4 +1,4 @@
-"""Motion of a point that is rigidly connected to another one."""
+"""Motion of points that are rigidly connected to another one."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from jointfrf._sweep import FloatArray, as_real
 
-__all__ = ["direction_places", "rigid_offset"]
+__all__ = ["direction_places", "rigid_motion", "rigid_offset"]
 
 _AXES = "xyz"
 #: Position among x, y, z, theta_x, theta_y, theta_z by name.
@@ -35,6 +35,29 @@ def direction_places(dofs: Sequence[str]) -> NDArray[np.intp]:
     if np.unique(places).size != places.size:
         raise ValueError(f"dofs must name each direction once, not {', '.join(dofs)}")
     return places
+
+
+def rigid_motion(points: FloatArray, about: FloatArray) -> FloatArray:
+    """Displacements of points that follow a reference point, u = u_R + theta x r.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 3)
+        m.
+    about : ndarray, shape (3,)
+        Reference point, m.
+
+    Returns
+    -------
+    ndarray, shape (n, 3, 6)
+        For unit motions x, y, z, theta_x, theta_y, theta_z.
+    """
+    r = points - about
+    motion = np.zeros((len(points), 3, 6))
+    motion[:, [0, 1, 2], [0, 1, 2]] = 1
+    for axis in range(3):
+        motion[:, :, 3 + axis] = np.cross(np.eye(3)[axis], r)
+    return motion
 
 
 def rigid_offset(dofs: Sequence[str], offset: ArrayLike) -> FloatArray:
@@ -72,8 +95,8 @@ def rigid_offset(dofs: Sequence[str], offset: ArrayLike) -> FloatArray:
     [[1.0, 0.0, 0.0], [0.0, 1.0, 0.006], [0.0, 0.0, 1.0]]
     """
     places = direction_places(dofs)
-    a, b, c = as_real("offset", offset, (3,))
+    point = as_real("offset", offset, (3,))
     whole = np.eye(6)
-    whole[:3, 3:] += [[0, c, -b], [-c, 0, a], [b, -a, 0]]  # theta x offset
+    whole[:3] = rigid_motion(point[None], np.zeros(3))[0]
     matrix: FloatArray = whole[np.ix_(places, places)]
     return matrix
