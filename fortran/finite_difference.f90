@@ -9,7 +9,7 @@ module jointfrf_finite_difference
   use jointfrf_sweep, only: area, line_operation, line_space, run_sweep, worth_a_plan
   implicit none
   private
-  public :: difference_weights, transform_receptance
+  public :: difference_weights, central_difference, transform_receptance
 
   !> Where the matrices lie in lanes.
   type :: transformation_in_lanes
@@ -56,6 +56,29 @@ contains
       weights(2, p) = slope
     end do
   end subroutine difference_weights
+
+  !> Displacement and slope at the reference from points along a line: the transformation by their weights.
+  !> offset    positions of the points from the reference, shape (m), all different, m
+  !> h         measured receptance of the points, shape (m, m, n_freq), m/N
+  !> h_new     shape (2, 2, n_freq)
+  subroutine central_difference(transposed, offset, h, h_new, line_info, rcond, info)
+    logical, intent(in) :: transposed
+    real(dp), intent(in) :: offset(:)
+    complex(dp), contiguous, target, intent(in) :: h(:, :, :)
+    complex(dp), contiguous, target, intent(out) :: h_new(:, :, :)
+    integer(ip), contiguous, intent(out) :: line_info(:)
+    real(dp), contiguous, intent(out) :: rcond(:)
+    integer(ip), intent(out) :: info
+    real(dp), target :: weights(2, size(offset)), weights_transposed(size(offset), 2)
+
+    call difference_weights(offset, weights)
+    if (transposed) then
+      weights_transposed = transpose(weights)
+      call transform_receptance(.true., h, weights_transposed, weights_transposed, h_new, line_info, rcond, info)
+    else
+      call transform_receptance(.false., h, weights, weights, h_new, line_info, rcond, info)
+    end if
+  end subroutine central_difference
 
   !> H_new = T_out H T_in^T on every line. Eq. (2.57).
   !> h         measured receptance, shape (m_out, m_in, n_freq), m/N

@@ -51,18 +51,17 @@ module jointfrf
   use jointfrf_arguments, only: as_lines, as_matrix, is_transposed, lower, spread_text
   use jointfrf_brick, only: brick_matrices, brick_quality
   use jointfrf_checks, only: check_brick_matrices, check_brick_quality, check_central_difference, &
-    check_compliance_covariance, check_compliance_factors, check_couple, check_decouple, check_difference_weights, &
-    check_find_modification, check_inverse_substructuring, check_invert, check_ismm, &
-    check_joint_compliance, check_modify, check_monte_carlo, check_pollute, &
-    check_receptance, check_receptance_banded, check_receptance_modal, check_solve, &
-    check_transform
+    check_compliance_covariance, check_compliance_factors, check_couple, check_decouple, &
+    check_difference_weights, check_invert, check_matrices, check_modify, check_monte_carlo, &
+    check_pollute, check_receptance, check_receptance_banded, check_receptance_modal, &
+    check_solve, check_transform
   use jointfrf_compliance, only: compliance_covariance, compliance_factors, joint_compliance
   use jointfrf_coupling, only: couple
   use jointfrf_decoupling, only: decouple
   use jointfrf_dynamic_stiffness, only: receptance_banded, receptance_dense
   use jointfrf_engine, only: engine_automatic, engine_lapack, engine_plain, engine_v2, engine_v3, engine_v4, &
     get_engine, set_engine
-  use jointfrf_finite_difference, only: difference_weights, transform_receptance
+  use jointfrf_finite_difference, only: central_difference, difference_weights, transform_receptance
   use jointfrf_ismm, only: inverse_substructuring, ismm
   use jointfrf_kinds, only: ip, long
   use jointfrf_linear_algebra, only: invert, solve
@@ -406,7 +405,7 @@ contains
     type(host_state) :: host
 
     call hold_traps(host)
-    info = check_find_modification(trans, n, n_freq)
+    info = check_matrices(trans, n, n_freq)
     if (info == info_good) then
       call find_modification(is_transposed(trans), alpha, gamma, d, line_info, rcond, info)
     end if
@@ -433,7 +432,7 @@ contains
     type(host_state) :: host
 
     call hold_traps(host)
-    info = check_ismm(trans, n, n_freq)
+    info = check_matrices(trans, n, n_freq)
     if (info == info_good) then
       call ismm(is_transposed(trans), alpha, gamma, k_initial, k_joint, line_info, rcond, info)
     end if
@@ -456,7 +455,7 @@ contains
     type(host_state) :: host
 
     call hold_traps(host)
-    info = check_inverse_substructuring(trans, n, n_freq)
+    info = check_matrices(trans, n, n_freq)
     if (info == info_good) then
       call inverse_substructuring(is_transposed(trans), gamma, k_joint, line_info, rcond, info)
     end if
@@ -514,7 +513,7 @@ contains
     type(host_state) :: host
 
     call hold_traps(host)
-    info = check_joint_compliance(trans, n, n_freq)
+    info = check_matrices(trans, n, n_freq)
     if (info == info_good) then
       call joint_compliance(is_transposed(trans), gamma, c_joint, line_info, rcond, info)
     end if
@@ -623,17 +622,7 @@ contains
     call hold_traps(host)
     info = check_central_difference(trans, m, n_freq, offset)
     if (info == info_good) then
-      block
-        real(c_double) :: weights(2, m), weights_transposed(m, 2)
-
-        call difference_weights(offset, weights)
-        if (is_transposed(trans)) then
-          weights_transposed = transpose(weights)
-          call transform_receptance(.true., h, weights_transposed, weights_transposed, h_new, line_info, rcond, info)
-        else
-          call transform_receptance(.false., h, weights, weights, h_new, line_info, rcond, info)
-        end if
-      end block
+      call central_difference(is_transposed(trans), offset, h, h_new, line_info, rcond, info)
     end if
     call release_traps(host)
   end subroutine jf_central_difference

@@ -6,8 +6,7 @@ module jointfrf_api_work
   use jointfrf_arguments, only: as_lines, as_matrix, is_transposed, lower
   use jointfrf_caller_memory, only: as_memory
   use jointfrf_checks, only: check_compliance_covariance, check_compliance_factors, check_couple, check_decouple, &
-    check_find_modification, check_inverse_substructuring, check_invert, check_ismm, &
-    check_joint_compliance, check_modify, check_receptance, check_receptance_banded, &
+    check_invert, check_matrices, check_modify, check_receptance, check_receptance_banded, &
     check_receptance_modal, check_solve, check_transform
   use jointfrf_compliance, only: compliance_covariance, compliance_factors, joint_compliance
   use jointfrf_coupling, only: couple
@@ -243,7 +242,7 @@ contains
     type(host_state) :: host
 
     call hold_traps(host)
-    info = check_find_modification(trans, n, n_freq)
+    info = check_matrices(trans, n, n_freq)
     if (info == info_good) then
       call find_modification(is_transposed(trans), alpha, gamma, d, line_info, rcond, info, &
                              as_memory(10_ip, work, lwork, iwork, liwork))
@@ -269,7 +268,7 @@ contains
     type(host_state) :: host
 
     call hold_traps(host)
-    info = check_ismm(trans, n, n_freq)
+    info = check_matrices(trans, n, n_freq)
     if (info == info_good) then
       call ismm(is_transposed(trans), alpha, gamma, k_initial, k_joint, line_info, rcond, info, &
                 as_memory(11_ip, work, lwork, iwork, liwork))
@@ -293,7 +292,7 @@ contains
     type(host_state) :: host
 
     call hold_traps(host)
-    info = check_inverse_substructuring(trans, n, n_freq)
+    info = check_matrices(trans, n, n_freq)
     if (info == info_good) then
       call inverse_substructuring(is_transposed(trans), gamma, k_joint, line_info, rcond, info, &
                                   as_memory(9_ip, work, lwork, iwork, liwork))
@@ -345,7 +344,7 @@ contains
     type(host_state) :: host
 
     call hold_traps(host)
-    info = check_joint_compliance(trans, n, n_freq)
+    info = check_matrices(trans, n, n_freq)
     if (info == info_good) then
       call joint_compliance(is_transposed(trans), gamma, c_joint, line_info, rcond, info, &
                             as_memory(9_ip, work, lwork, iwork, liwork))

@@ -13,8 +13,8 @@ module jointfrf_checks
   implicit none
   private
   public :: check_invert, check_solve, check_receptance, check_receptance_banded, check_receptance_modal
-  public :: check_couple, check_modify, check_find_modification, check_ismm, check_inverse_substructuring
-  public :: check_decouple, check_joint_compliance, check_compliance_factors, check_compliance_covariance
+  public :: check_couple, check_modify, check_matrices, check_decouple, check_compliance_factors
+  public :: check_compliance_covariance
   public :: check_difference_weights, check_central_difference, check_transform, check_pollute, check_monte_carlo
   public :: check_brick_matrices, check_brick_quality
 
@@ -128,7 +128,8 @@ contains
     if (out_of_range(dofs, n) .or. repeated(dofs)) info = -7
   end function check_modify
 
-  pure function check_find_modification(trans, n, n_freq) result(info)
+  !> Of the routines that take nothing but lines of matrices whose order is n or 2 n.
+  pure function check_matrices(trans, n, n_freq) result(info)
     character(kind=c_char), intent(in) :: trans
     integer(ip), intent(in) :: n, n_freq
     integer(ip) :: info
@@ -137,29 +138,7 @@ contains
     if (bad_size(n_freq)) info = -3
     if (bad_size(n)) info = -2
     if (unknown_order(trans)) info = -1
-  end function check_find_modification
-
-  pure function check_ismm(trans, n, n_freq) result(info)
-    character(kind=c_char), intent(in) :: trans
-    integer(ip), intent(in) :: n, n_freq
-    integer(ip) :: info
-
-    info = info_good
-    if (bad_size(n_freq)) info = -3
-    if (bad_size(n)) info = -2
-    if (unknown_order(trans)) info = -1
-  end function check_ismm
-
-  pure function check_inverse_substructuring(trans, n, n_freq) result(info)
-    character(kind=c_char), intent(in) :: trans
-    integer(ip), intent(in) :: n, n_freq
-    integer(ip) :: info
-
-    info = info_good
-    if (bad_size(n_freq)) info = -3
-    if (bad_size(n)) info = -2
-    if (unknown_order(trans)) info = -1
-  end function check_inverse_substructuring
+  end function check_matrices
 
   pure function check_decouple(equation, trans, n_a, n_b, n, n_freq, dofs_j, dofs_k, dofs_r, dofs_s) result(info)
     character(kind=c_char), intent(in) :: equation(2), trans
@@ -179,17 +158,6 @@ contains
     if (out_of_range(dofs_k, n_b) .or. repeated(dofs_k)) info = -11
     if (out_of_range(dofs_j, n_a) .or. repeated(dofs_j)) info = -10
   end function check_decouple
-
-  pure function check_joint_compliance(trans, n, n_freq) result(info)
-    character(kind=c_char), intent(in) :: trans
-    integer(ip), intent(in) :: n, n_freq
-    integer(ip) :: info
-
-    info = info_good
-    if (bad_size(n_freq)) info = -3
-    if (bad_size(n)) info = -2
-    if (unknown_order(trans)) info = -1
-  end function check_joint_compliance
 
   pure function check_compliance_factors(trans, n, m, n_freq) result(info)
     character(kind=c_char), intent(in) :: trans

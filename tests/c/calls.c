@@ -1,5 +1,6 @@
 #include "calls.h"
 
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -14,6 +15,18 @@ const char *const routine_name[ROUTINES] = {
 };
 /* The number of LWORK among the arguments; that of LIWORK is two more. */
 const int lwork_argument[WORK_ROUTINES] = {8, 11, 20, 22, 16, 15, 12, 10, 11, 9, 18, 9, 11, 13, 14};
+
+int checks, failures;
+char what[100];
+
+void check(int condition, const char *claim)
+{
+    checks++;
+    if (condition)
+        return;
+    failures++;
+    fprintf(stderr, "FAILED: %s: %s\n", what, claim);
+}
 
 outcome new_outcome(const problem *p)
 {

@@ -63,6 +63,11 @@ typedef struct {
     jf_int *line_info, info;
 } outcome;
 
+/* Checks that count; `what` names the case. */
+extern int checks, failures;
+extern char what[100];
+void check(int condition, const char *claim);
+
 extern const char *const routine_name[ROUTINES];
 extern const int lwork_argument[WORK_ROUTINES];
 

@@ -10,18 +10,6 @@
 #define LINES 12
 #define GUARDS 16       /* bytes before and after the workspace: complex numbers stay aligned */
 
-static int checks, failures;
-static char what[100];
-
-static void check(int condition, const char *claim)
-{
-    checks++;
-    if (condition)
-        return;
-    failures++;
-    fprintf(stderr, "FAILED: %s: %s\n", what, claim);
-}
-
 static void choose(jf_int engine)
 {
     jf_int info;

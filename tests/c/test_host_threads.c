@@ -25,11 +25,11 @@ typedef struct {
 static task tasks[MOST];
 static int n_tasks;
 static jf_int engine_chosen;
-static _Atomic int failures, calls;
+static _Atomic int failed, calls;
 
 static void fail(const char *claim, const problem *p)
 {
-    failures++;
+    failed++;
     fprintf(stderr, "FAILED: %s: %s, order %d, engine %d\n", claim, routine_name[p->routine], (int)p->size[0],
             (int)engine_chosen);
 }
@@ -167,6 +167,6 @@ int main(void)
         threads_of_posix();
         free_tasks();
     }
-    printf("host_threads: %d calls, %d failed\n", calls, failures);
-    return failures != 0 || calls == 0;
+    printf("host_threads: %d calls, %d failed\n", calls, failed);
+    return failed != 0 || calls == 0;
 }

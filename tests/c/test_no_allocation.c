@@ -71,8 +71,6 @@ int pthread_create(pthread_t *thread, const pthread_attr_t *attributes, void *(*
     return real(thread, attributes, start, argument);
 }
 
-static int failures;
-
 static void expect_none(long before, const problem *p, const char *when)
 {
     if (count == before)

@@ -22,18 +22,6 @@
 #define MANY_LINES 500  /* worth two threads */
 #define ALL (FE_INVALID | FE_DIVBYZERO | FE_OVERFLOW | FE_UNDERFLOW | FE_INEXACT)
 
-static int checks, failures;
-static char what[100];
-
-static void check(int condition, const char *claim)
-{
-    checks++;
-    if (condition)
-        return;
-    failures++;
-    fprintf(stderr, "FAILED: %s: %s\n", what, claim);
-}
-
 static void stopped(int number)
 {
     static const char claim[] = "FAILED: stopped by an exception: ";

@@ -1,7 +1,7 @@
 !> What the test programs share: checks that count, seeded random matrices, and references in quadruple precision.
 !>
-!> A reference never uses the kernel, but for the kind of its integers: inverses are Gauss-Jordan in real(16), assemblies are built from dynamic
-!> stiffnesses spring by spring. Arrays of lines have the shape (out, in, n_freq).
+!> A reference never uses the kernel, but for the kind of its integers: inverses are Gauss-Jordan in real(16),
+!> assemblies are built from dynamic stiffnesses spring by spring. Arrays of lines have the shape (out, in, n_freq).
 module testing
   use, intrinsic :: ieee_arithmetic, only: ieee_is_nan, ieee_positive_inf, ieee_quiet_nan, ieee_value
   use, intrinsic :: iso_c_binding, only: dp => c_double
