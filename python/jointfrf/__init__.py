@@ -3,21 +3,29 @@
 Time convention exp(+i w t). Arrays over frequency have shape (n_freq, out, in), complex128, C order. SI units.
 """
 
-from jointfrf._sweep import RCOND_LIMIT, VERSION
-from jointfrf.bands import as_bands, band_mean, in_bands, propose_bands, sensitivity
-from jointfrf.beam import beam
-from jointfrf.compliance import compliance_covariance, compliance_factors, joint_compliance
-from jointfrf.consistency import (
+from jointfrf.channels.consistency import (
     Consistency,
     DrivingPointCheck,
     driving_point_check,
     impact_consistency,
     sensor_consistency,
 )
-from jointfrf.coupling import couple
-from jointfrf.decoupling import decouple
-from jointfrf.discrete import chain
-from jointfrf.engine import get_engine, set_engine, use_engine
+from jointfrf.channels.finite_differences import (
+    DifferenceError,
+    central_difference,
+    difference_error,
+    difference_weights,
+    transform,
+)
+from jointfrf.channels.point_lines import Interface, interface
+from jointfrf.channels.virtual_point import (
+    VirtualPoint,
+    append_virtual_point,
+    channel_geometry,
+    virtual_point,
+    virtual_points,
+)
+from jointfrf.dofs import rigid_offset
 from jointfrf.errors import (
     ConvergenceWarning,
     CopyWarning,
@@ -27,21 +35,22 @@ from jointfrf.errors import (
     IllConditionedWarning,
     SingularLineError,
 )
-from jointfrf.identify import identify
-from jointfrf.interface import Interface, interface
-from jointfrf.ismm import inverse_substructuring, ismm
+from jointfrf.frf.bands import as_bands, band_mean, in_bands
+from jointfrf.frf.metrics import amplitude_error, frequency_error, peak
+from jointfrf.frf.noise import pollute, realisations
+from jointfrf.identification.identify import identify
+from jointfrf.identification.joint_fit import JointFit
+from jointfrf.identification.monte_carlo import BandStatistics, MonteCarlo, monte_carlo
+from jointfrf.identification.sensitivity import propose_bands, sensitivity
 from jointfrf.joint import Joint
-from jointfrf.joint_fit import JointFit
-from jointfrf.linear_algebra import invert, reciprocal_condition, solve
-from jointfrf.metrics import amplitude_error, frequency_error, peak
-from jointfrf.model import Model, assemble
-from jointfrf.modification import find_modification, modify
-from jointfrf.monte_carlo import BandStatistics, MonteCarlo, monte_carlo
-from jointfrf.multi_point import MultiPointJoint, multi_point_compliance, multi_point_stiffness
-from jointfrf.noise import pollute, realisations
-from jointfrf.receptance import ReceptanceInfo, receptance
-from jointfrf.rigid_motion import rigid_offset
-from jointfrf.rotations import DifferenceError, central_difference, difference_error, difference_weights, transform
+from jointfrf.kernel.call import VERSION
+from jointfrf.kernel.engine import get_engine, set_engine, use_engine
+from jointfrf.kernel.linear_algebra import invert, reciprocal_condition, solve
+from jointfrf.kernel.status import RCOND_LIMIT
+from jointfrf.models.beam import beam
+from jointfrf.models.chain import chain
+from jointfrf.models.model import Model, assemble
+from jointfrf.models.receptance.receptance import ReceptanceInfo, receptance
 from jointfrf.solids.bolt import PROOF_STRENGTH, STRESS_AREA, Bolt, preload_force
 from jointfrf.solids.bolted_lap import BoltedLap, LapDivisions, bolted_lap
 from jointfrf.solids.brick import Material, assemble_bricks, brick_quality, element_matrices
@@ -51,12 +60,11 @@ from jointfrf.solids.interpolation import interpolation
 from jointfrf.solids.mesh import Mesh
 from jointfrf.solids.preload import PreloadedLap, preload
 from jointfrf.solids.solid import Patch, SolidModel, solid_model
-from jointfrf.virtual_point import (
-    VirtualPoint,
-    append_virtual_point,
-    channel_geometry,
-    virtual_point,
-    virtual_points,
-)
+from jointfrf.substructuring.compliance import compliance_covariance, compliance_factors, joint_compliance
+from jointfrf.substructuring.coupling import couple
+from jointfrf.substructuring.decoupling import decouple
+from jointfrf.substructuring.ismm import inverse_substructuring, ismm
+from jointfrf.substructuring.modification import find_modification, modify
+from jointfrf.substructuring.multi_point import MultiPointJoint, multi_point_compliance, multi_point_stiffness
 
 __version__ = VERSION

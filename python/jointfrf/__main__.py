@@ -2,6 +2,6 @@
 
 import sys
 
-from jointfrf.cli import main
+from jointfrf.cli.main import main
 
 sys.exit(main())

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from jointfrf._sweep import ComplexArray, FloatArray, as_frequency, as_real
+from jointfrf.dofs import rigid_offset
 from jointfrf.io.cards import CardFormat, cards
-from jointfrf.rigid_motion import rigid_offset
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_frequency, as_real
 
 __all__ = ["Joint"]
 

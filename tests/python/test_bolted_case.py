@@ -13,15 +13,15 @@ import numpy as np
 import pytest
 
 import jointfrf as jf
-import jointfrf.cli
-from jointfrf import cases
+import jointfrf.cli.main
 from jointfrf.bolted import study
-from jointfrf.bolted.case_file import read_bolted_case
-from jointfrf.bolted.figures import bolted_figures
-from jointfrf.bolted.measurement import DOFS, Cross, both_sides, measured_entries
-from jointfrf.bolted.tables import bolted_summary, bolted_tables
-from jointfrf.cases import find_case, read_any_case, run_case
-from jointfrf.rigid_motion import rigid_motion
+from jointfrf.cases import catalogue as cases
+from jointfrf.cases.bolted_lap.figures import bolted_figures
+from jointfrf.cases.bolted_lap.measurement import DOFS, Cross, both_sides, measured_entries
+from jointfrf.cases.bolted_lap.read import read_bolted_case
+from jointfrf.cases.bolted_lap.tables import bolted_summary, bolted_tables
+from jointfrf.cases.catalogue import find_case, read_any_case, run_case
+from jointfrf.dofs import rigid_motion
 from jointfrf.solids.bolted_lap import LapDivisions, bolted_lap
 from jointfrf.solids.contact import ContactLaw
 from jointfrf.solids.preload import preload

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 import jointfrf as jf
-from jointfrf.case_file import read_case
-from jointfrf.cases import UnknownCaseError, find_case, list_cases, run_case
-from jointfrf.figures import make_figures
-from jointfrf.report import make_report, summary
-from jointfrf.results import compute, noise_free_errors
-from jointfrf.study import exact_frfs, run_study
-from jointfrf.tables import identified_rows, make_tables, to_json
+from jointfrf.cases.catalogue import UnknownCaseError, find_case, list_cases, run_case
+from jointfrf.cases.known_joint.compute import compute, noise_free_errors
+from jointfrf.cases.known_joint.figures import make_figures
+from jointfrf.cases.known_joint.read import read_case
+from jointfrf.cases.known_joint.study import exact_frfs, run_study
+from jointfrf.cases.known_joint.tables import identified_rows, make_tables, to_json
+from jointfrf.report.page import make_report, summary
 
 PLANE = ["3.1-discrete", "3.2-fe-beams", "3.3-beams-1mm", "3.3.1-decoupling"]
 SOLID = ["4.3.1-six-dof", "4.3.2-six-dof-decoupling"]
@@ -173,7 +173,7 @@ def test_compliance_fit_beats_the_band_means(results):
 
 @pytest.mark.parametrize(("name", "noise", "number"), [("3.3", "5 % complex", 237), ("3.2", "5 %", 148)])
 def test_compliance_fit_of_a_realisation_that_once_ran_away(name, noise, number):
-    from jointfrf.fitting.estimator import estimate, joint_basis
+    from jointfrf.identification.compliance_fit.estimator import estimate, joint_basis
 
     case = read_case(find_case(name))
     exact = exact_frfs(case)

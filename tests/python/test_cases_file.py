@@ -4,8 +4,8 @@ import re
 
 import pytest
 
-from jointfrf.case_file import read_case
-from jointfrf.cases import find_case, read_any_case
+from jointfrf.cases.catalogue import find_case, read_any_case
+from jointfrf.cases.known_joint.read import read_case
 from jointfrf.errors import FileContentError
 
 CHANGES = [

@@ -11,15 +11,16 @@ import numpy as np
 import pytest
 from PIL import Image
 
-import jointfrf.cli
-from jointfrf.case_file import read_case
-from jointfrf.cases import find_case, list_cases, run_case
-from jointfrf.figures import make_figures
-from jointfrf.plots import Curve, Figure, Interval, Panel, as_csv, draw, symbol
-from jointfrf.results import compute
-from jointfrf.tables import Table, as_text, number
+import jointfrf as jf
+from jointfrf.cases.catalogue import find_case, list_cases, run_case
+from jointfrf.cases.known_joint.compute import compute
+from jointfrf.cases.known_joint.figures import make_figures
+from jointfrf.cases.known_joint.read import read_case
+from jointfrf.cases.known_joint.tables import Table, as_text, number
+from jointfrf.cli.main import main
+from jointfrf.report.plots import Curve, Figure, Interval, Panel, as_csv, draw, symbol
 
-COMMAND = [sys.executable, "-m", "jointfrf.cli"]
+COMMAND = [sys.executable, "-m", "jointfrf"]
 
 
 @pytest.fixture(scope="module")
@@ -161,7 +162,7 @@ def test_command_runs_a_case_in_processes(tmp_path):
 
 
 def test_command_lists_cases(capsys):
-    assert jointfrf.cli.main(["cases"]) == 0
+    assert main(["cases"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert [line.split()[0] for line in lines] == [folder.name for folder in list_cases()]
     assert all(len(line.split()) > 3 for line in lines)
@@ -176,19 +177,19 @@ def test_command_without_or_with_wrong_words():
         ["run", "--jobs", "-1"],
     ):
         with pytest.raises(SystemExit) as stop:
-            jointfrf.cli.main(words)
+            main(words)
         assert stop.value.code == 2
 
 
 def test_version(capsys):
     with pytest.raises(SystemExit) as stop:
-        jointfrf.cli.main(["--version"])
+        main(["--version"])
     assert stop.value.code == 0
-    assert capsys.readouterr().out == f"jointfrf {jointfrf.__version__}\n"
+    assert capsys.readouterr().out == f"jointfrf {jf.__version__}\n"
 
 
 def test_unknown_case_is_one_sentence_and_status_2(capsys):
-    assert jointfrf.cli.main(["run", "9.9"]) == 2
+    assert main(["run", "9.9"]) == 2
     error = capsys.readouterr().err
     assert error.startswith("jointfrf: error: there is no case '9.9'; known cases: 3.1-discrete")
     assert error.count("\n") == 1
@@ -196,14 +197,14 @@ def test_unknown_case_is_one_sentence_and_status_2(capsys):
 
 def test_wrong_case_file_is_one_sentence_and_status_1(tmp_path, capsys):
     (tmp_path / "case.toml").write_text("title = 1\n")
-    assert jointfrf.cli.main(["run", str(tmp_path), "--jobs", "1"]) == 1
+    assert main(["run", str(tmp_path), "--jobs", "1"]) == 1
     assert capsys.readouterr().err == f"jointfrf: error: {tmp_path / 'case.toml'}: title must be a text, not 1\n"
 
 
 def test_results_that_cannot_be_written_are_one_sentence(tmp_path, capsys):
     (tmp_path / "file").touch()
     out = tmp_path / "file" / "out"
-    assert jointfrf.cli.main(["run", "3.1", "--realisations", "2", "--jobs", "1", "--out", str(out)]) == 1
+    assert main(["run", "3.1", "--realisations", "2", "--jobs", "1", "--out", str(out)]) == 1
     error = capsys.readouterr().err
     assert error.startswith("jointfrf: error: ")
     assert error.endswith(": Not a directory\n")
@@ -214,11 +215,11 @@ def test_two_cases_of_one_name_are_refused(tmp_path, capsys):
     own = tmp_path / "3.1-discrete"
     own.mkdir()
     (own / "case.toml").write_text((find_case("3.1") / "case.toml").read_text())
-    assert jointfrf.cli.main(["run", "3.1", str(own)]) == 2
+    assert main(["run", "3.1", str(own)]) == 2
     assert "overwrite" in capsys.readouterr().err
 
 
 def test_command_survives_a_closed_pipe():
-    script = f"{sys.executable} -m jointfrf.cli cases | head -c 1"
+    script = f"{sys.executable} -m jointfrf cases | head -c 1"
     done = subprocess.run(["sh", "-c", script], capture_output=True, text=True)
     assert done.stderr == ""

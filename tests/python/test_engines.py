@@ -19,8 +19,8 @@ import numpy as np
 import pytest
 
 import jointfrf as jf
-from jointfrf import _sweep
-from jointfrf.engine import Engine
+from jointfrf.kernel import call
+from jointfrf.kernel.engine import Engine
 
 EPS = np.finfo(float).eps
 #: As many times the change by the last bit of the inputs may two engines be apart.
@@ -41,7 +41,7 @@ class Call:
     def run(self, on_singular: str = "nan"):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", jf.IllConditionedWarning)
-            result, status = _sweep.run(self.routine, self.args, self.shape, self.sweeps, None, on_singular)
+            result, status = call.run(self.routine, self.args, self.shape, self.sweeps, None, on_singular)
         return result, status.line_info, status.rcond
 
     def failure(self) -> tuple[type, str] | None:
@@ -474,7 +474,7 @@ def test_the_choice_is_kept_and_returned_to():
 
 
 def test_an_engine_of_another_machine_is_refused(monkeypatch):
-    monkeypatch.setattr(_sweep._kernel, "jf_set_engine", lambda code: -1)
+    monkeypatch.setattr(call._kernel, "jf_set_engine", lambda code: -1)
     with pytest.raises(ValueError, match="engine 'x86-64-v4' is not there on this machine"):
         jf.set_engine("x86-64-v4")
 
@@ -503,7 +503,7 @@ def test_a_wrong_word_in_the_environment_is_told_in_one_sentence():
 
 
 def test_a_wrong_word_in_the_environment_on_the_command_line(tmp_path):
-    code = "import sys; from jointfrf.cli import main; sys.exit(main({!r}))"
+    code = "import sys; from jointfrf.cli.main import main; sys.exit(main({!r}))"
     run = ["run", "3.1-discrete", "--jobs", "1", "--realisations", "1", "--out", str(tmp_path)]
     assert python(code.format(["--help"]), "quick").returncode == 0
     assert python(code.format(["cases"]), "quick").returncode == 0

@@ -5,8 +5,13 @@ import pytest
 
 import jointfrf as jf
 from cramer_rao import cramer_rao
-from jointfrf.fitting.estimator import estimate, jackknife_covariance, joint_basis, reciprocity_noise
-from jointfrf.fitting.frf_noise import gamma_noise
+from jointfrf.identification.compliance_fit.estimator import (
+    estimate,
+    jackknife_covariance,
+    joint_basis,
+    reciprocity_noise,
+)
+from jointfrf.identification.compliance_fit.frf_noise import gamma_noise
 
 
 def bound_of(s, damping="viscous"):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from jointfrf.plots import Figure, Panel, Surface, as_csv, draw
+from jointfrf.report.plots import Figure, Panel, Surface, as_csv, draw
 
 PNG = b"\x89PNG\r\n\x1a\n"
 

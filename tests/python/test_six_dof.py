@@ -7,8 +7,8 @@ import pytest
 
 import jointfrf as jf
 from cramer_rao import cramer_rao
-from jointfrf.fitting.estimator import estimate, joint_basis, reciprocity_noise
-from jointfrf.fitting.frf_noise import uncoupled_groups
+from jointfrf.identification.compliance_fit.estimator import estimate, joint_basis, reciprocity_noise
+from jointfrf.identification.compliance_fit.frf_noise import uncoupled_groups
 from six_dof_beams import DOFS, FREQ, GROUPS, JOINT, assembly, side, sides
 
 TRUTH = np.concatenate([JOINT.stiffness.diagonal(), JOINT.damping.diagonal()])

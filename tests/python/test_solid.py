@@ -6,7 +6,7 @@ from scipy.sparse import linalg as sparse_linalg
 from scipy.spatial.transform import Rotation
 
 import jointfrf as jf
-from jointfrf.rigid_motion import rigid_motion
+from jointfrf.dofs import rigid_motion
 from jointfrf.solids.solid import DIRECTIONS, mean_motion
 from rigid_bodies import Body, six
 

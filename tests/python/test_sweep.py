@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import jointfrf as jf
-from jointfrf import _sweep
+from jointfrf.kernel import arguments, call
 
 
 def test_invert_and_solve_against_numpy(random_lines):
@@ -39,13 +39,13 @@ def test_sizes_without_content(n_freq, n):
 def test_c_order_goes_through_untouched(monkeypatch, random_lines):
     """The kernel reads the caller's own memory and writes into the array that is returned."""
     seen = {}
-    kernel = _sweep._kernel.jf_invert
+    kernel = call._kernel.jf_invert
 
     def spy(n, n_freq, a, result, *rest):
         seen.update(a=a, result=result)
         return kernel(n, n_freq, a, result, *rest)
 
-    monkeypatch.setattr(_sweep._kernel, "jf_invert", spy)
+    monkeypatch.setattr(call._kernel, "jf_invert", spy)
     a = random_lines(4, 3)
     a.setflags(write=False)
     kept = a.copy()
@@ -63,12 +63,12 @@ def test_f2py_makes_no_copy_of_the_view_either(random_lines):
     """Results written into a view appear in the array behind it."""
     a = random_lines(4, 3)
     result, info, rcond = np.zeros_like(a), np.ones(4, np.int32), np.zeros(4)
-    assert _sweep._kernel.jf_invert(3, 4, a.T, result.T, info, rcond) == 0
+    assert call._kernel.jf_invert(3, 4, a.T, result.T, info, rcond) == 0
     np.testing.assert_allclose(result, np.linalg.inv(a), rtol=1e-10)
     assert not info.any()
     for wrong in (result.T.astype(np.complex64), result.T[:, ::-1], np.zeros((4, 3, 3), complex)):
         with pytest.raises(Exception, match=r"intent\(inout\)|failed in converting|shape|dimension|expected"):
-            _sweep._kernel.jf_invert(3, 4, a.T, wrong, info, rcond)
+            call._kernel.jf_invert(3, 4, a.T, wrong, info, rcond)
 
 
 @pytest.mark.parametrize(
@@ -102,7 +102,7 @@ def test_what_is_no_number_is_a_type_error(wrong):
 
 
 def test_a_large_copy_is_announced(monkeypatch):
-    monkeypatch.setattr(_sweep, "LARGE_COPY", 1000)
+    monkeypatch.setattr(arguments, "LARGE_COPY", 1000)
     a = np.broadcast_to(np.eye(4), (20, 4, 4))
     with pytest.warns(jf.CopyWarning, match=r"a is of type float64: a copy of 0 MiB"):
         jf.invert(a)

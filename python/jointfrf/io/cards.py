@@ -8,8 +8,8 @@ from typing import Literal, NamedTuple, TypedDict, get_args
 
 import numpy as np
 
-from jointfrf._sweep import FloatArray, check_choice
-from jointfrf.rigid_motion import direction_places
+from jointfrf.dofs import direction_places
+from jointfrf.kernel.arguments import FloatArray, check_choice
 
 __all__ = ["CardFormat", "CardOptions", "cards"]
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from jointfrf.io.frf_set import POWER_OF_I_OMEGA, Channel, FrfSet
+from jointfrf.frf.frf_set import POWER_OF_I_OMEGA, Channel, FrfSet
 from jointfrf.io.uff_file import UniversalFile, name_some
 from jointfrf.io.uff_nodes import node_coordinates
 from jointfrf.io.uff_ordinate import DATA_TYPES, Axis, kind_of_frf, ordinate_factor, ordinate_quantity

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from jointfrf.io.frf_set import POWER_OF_I_OMEGA, Channel
+from jointfrf.frf.frf_set import POWER_OF_I_OMEGA, Channel
 from jointfrf.io.units import Exponents, Unit, UnitSystem, parse_unit
 
 __all__ = ["DATA_TYPES", "Axis", "kind_of_frf", "ordinate_factor", "ordinate_quantity"]

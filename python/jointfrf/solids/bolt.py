@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
-from jointfrf._sweep import as_number
+from jointfrf.kernel.arguments import as_number
 from jointfrf.solids.brick import Material
 
 __all__ = ["PROOF_STRENGTH", "STEEL", "STRESS_AREA", "Bolt", "preload_force"]

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from jointfrf._sweep import FloatArray, as_number, check_choice
-from jointfrf.beam import End
+from jointfrf.kernel.arguments import FloatArray, as_number, check_choice
+from jointfrf.models.beam import End
 from jointfrf.solids.bolt import Bolt
 from jointfrf.solids.brick import Material, brick_quality
 from jointfrf.solids.brick_beam import Preset, holed_plan

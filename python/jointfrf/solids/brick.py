@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
-from jointfrf._sweep import FloatArray, as_number, as_real, call, check_choice
+from jointfrf.kernel.arguments import FloatArray, as_number, as_real, check_choice
+from jointfrf.kernel.call import call
 
 __all__ = ["Formulation", "Mass", "Material", "assemble_bricks", "brick_quality", "element_matrices"]
 

@@ -9,8 +9,8 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from jointfrf._sweep import FloatArray, as_number, as_real, check_choice
-from jointfrf.beam import End
+from jointfrf.kernel.arguments import FloatArray, as_number, as_real, check_choice
+from jointfrf.models.beam import End
 from jointfrf.solids.brick import Formulation, Material
 from jointfrf.solids.mesh import Mesh, Plan, as_count, extrude, holed_rectangle, join_plans, rectangle
 from jointfrf.solids.solid import Patch, SolidModel, solid_model

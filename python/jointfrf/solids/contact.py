@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 from scipy.sparse import linalg as sparse_linalg
 
-from jointfrf._sweep import FloatArray, as_real
-from jointfrf.direct_solution import SYMMETRIC
+from jointfrf.kernel.arguments import FloatArray, as_real
+from jointfrf.models.receptance.direct import SYMMETRIC
 from jointfrf.solids.contact_pairs import NORMAL, TANGENTIAL, BoolArray, ContactLaw, Interface, Pairs, tie
 
 __all__ = ["ContactLaw", "ContactSolution", "Interface", "InterfaceState", "Iteration", "solve_contact"]

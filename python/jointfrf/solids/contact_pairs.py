@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
-from jointfrf._sweep import FloatArray, as_number
+from jointfrf.kernel.arguments import FloatArray, as_number
 
 __all__ = ["NORMAL", "TANGENTIAL", "BoolArray", "ContactLaw", "Interface", "Pairs", "tie"]
 

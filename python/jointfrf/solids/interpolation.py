@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 from scipy.spatial import cKDTree
 
-from jointfrf._sweep import FloatArray, as_number, as_real
+from jointfrf.kernel.arguments import FloatArray, as_number, as_real
 from jointfrf.solids.mesh import Mesh
 
 __all__ = ["interpolation"]

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
-from jointfrf._sweep import FloatArray, as_number, as_real
+from jointfrf.kernel.arguments import FloatArray, as_number, as_real
 
 __all__ = ["Mesh", "Plan", "as_count", "disc", "extrude", "holed_rectangle", "join_plans", "rectangle"]
 

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from scipy import sparse
 
-from jointfrf._sweep import FloatArray, as_number
+from jointfrf.kernel.arguments import FloatArray, as_number
 from jointfrf.solids.bolted_lap import BoltedLap
 from jointfrf.solids.brick import Formulation, assemble_bricks
 from jointfrf.solids.brick_beam import PRESETS

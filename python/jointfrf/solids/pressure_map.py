@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from jointfrf._sweep import FloatArray
+from jointfrf.kernel.arguments import FloatArray
 from jointfrf.solids.bolted_lap import INTERFACES, BoltedLap
 from jointfrf.solids.contact import InterfaceState
 

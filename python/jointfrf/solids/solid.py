@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
-from jointfrf._sweep import FloatArray, as_real
-from jointfrf.model import Model
-from jointfrf.rigid_motion import rigid_motion
+from jointfrf.dofs import rigid_motion
+from jointfrf.kernel.arguments import FloatArray, as_real
+from jointfrf.models.model import Model
 from jointfrf.solids.brick import Formulation, Mass, Material, assemble_bricks
 from jointfrf.solids.mesh import Mesh
 

@@ -1,0 +1,1 @@
+"""From measured channels to the DOFs of the joint: points along a line, differences, virtual points, consistency."""

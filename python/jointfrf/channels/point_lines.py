@@ -1,0 +1,145 @@
+"""Joint DOFs from measured points: displacements by interpolation, rotations by finite differences."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointfrf.channels.finite_differences import difference_weights
+from jointfrf.frf.frf_set import Channel
+from jointfrf.kernel.arguments import FloatArray
+
+__all__ = ["Interface", "interface"]
+
+_AXES = ("x", "y", "z")
+#: Points count as lying on a line along an axis when they stray from it by less than this share of its length.
+_STRAY = 1e-3
+
+
+class Interface(NamedTuple):
+    """How joint DOFs follow from measured channels.
+
+    Attributes
+    ----------
+    channels : tuple of Channel
+        Measured points and directions, side j, then side k: both the responses and the forces that are needed.
+    transform : ndarray, shape (2 n, m)
+        From the channels to the joint DOFs j, then k.
+    references : tuple of ndarray, shape (3,)
+        Reference points of the two sides, m: the middle of the points of each.
+    """
+
+    channels: tuple[Channel, ...]
+    transform: FloatArray
+    references: tuple[FloatArray, FloatArray]
+
+
+def interface(
+    points_j: Sequence[int],
+    points_k: Sequence[int],
+    dofs: Sequence[str],
+    coordinates: Mapping[int, NDArray[np.float64]],
+) -> Interface:
+    """Build the joint DOFs of both sides from points along lines.
+
+    Parameters
+    ----------
+    points_j, points_k : sequence of int
+        Nodes of side j (on A) and of side k (on B), each along one line parallel to an axis; one node suffices where no
+        rotation is wanted.
+    dofs : sequence of str
+        Joint DOFs: ``"x"``, ``"y"``, ``"z"``, ``"theta_x"``, ``"theta_y"``, ``"theta_z"``.
+    coordinates : mapping of int to array_like, shape (3,)
+        Positions of the nodes, m.
+
+    Returns
+    -------
+    Interface
+
+    Raises
+    ------
+    ValueError
+        An unknown DOF, a node without coordinates, points that are not on a line along an axis, a rotation about the
+        line of its points.
+
+    Notes
+    -----
+    A rotation about axis a of points along axis e is seen in the displacements along d, a x e = +-d:
+    theta_x = -du_y/dz, theta_z = +du_y/dx, theta_y = -du_z/dx (2.57).
+
+    Examples
+    --------
+    >>> import jointfrf as jf
+    >>> places = {1: (0, 0, 0.00), 2: (0, 0, 0.02), 3: (0, 0, 0.00), 4: (0, 0, 0.02)}
+    >>> sides = jf.interface([1, 2], [3, 4], ["y", "theta_x"], places)
+    >>> [str(channel) for channel in sides.channels]
+    ['1:+y', '2:+y', '3:+y', '4:+y']
+    >>> sides.transform[:2, :2].tolist()
+    [[0.5, 0.5], [50.0, -50.0]]
+    """
+    known = (*_AXES, *(f"theta_{axis}" for axis in _AXES))
+    for dof in dofs:
+        if dof not in known:
+            raise ValueError(f"joint DOF {dof!r} is not one of {', '.join(known)}")
+    if len(set(dofs)) != len(dofs) or not dofs:
+        raise ValueError(f"dofs must name different joint DOFs, at least one, not {', '.join(dofs) or 'none'}")
+    shared = set(points_j) & set(points_k)
+    if shared:
+        raise ValueError(f"node {min(shared)} is named on both sides of the joint")
+    sides = [_one_side(points, dofs, coordinates) for points in (points_j, points_k)]
+    n = len(dofs)
+    (channels_j, rows_j, at_j), (channels_k, rows_k, at_k) = sides
+    transform = np.zeros((2 * n, len(channels_j) + len(channels_k)))
+    transform[:n, : len(channels_j)] = rows_j
+    transform[n:, len(channels_j) :] = rows_k
+    return Interface((*channels_j, *channels_k), transform, (at_j, at_k))
+
+
+def _one_side(
+    points: Sequence[int], dofs: Sequence[str], coordinates: Mapping[int, NDArray[np.float64]]
+) -> tuple[list[Channel], FloatArray, FloatArray]:
+    if not points or len(set(points)) != len(points):
+        raise ValueError(f"a side of the joint needs different nodes, not {', '.join(map(str, points)) or 'none'}")
+    missing = [node for node in points if node not in coordinates]
+    if missing:
+        raise ValueError(f"node {missing[0]} has no coordinates")
+    places = np.array([np.asarray(coordinates[node], dtype=float) for node in points])
+    middle = (places.min(axis=0) + places.max(axis=0)) / 2
+    extent = np.ptp(places, axis=0)
+    along = int(np.argmax(extent))
+    if len(points) > 1 and np.delete(extent, along).max() > _STRAY * extent[along]:
+        names = ", ".join(map(str, points))
+        raise ValueError(f"nodes {names} do not lie on one line parallel to an axis: name the points of one line")
+
+    weights = np.vstack([np.ones(1), np.zeros(1)])
+    if len(points) > 1:
+        weights = difference_weights(places[:, along] - middle[along])
+    needed: list[tuple[str, FloatArray]] = []
+    for dof in dofs:
+        if dof in _AXES:
+            needed.append((dof, weights[0]))
+        else:
+            needed.append(_rotation(dof, points, along, weights[1]))
+    directions = [axis for axis in _AXES if any(axis == direction for direction, _ in needed)]
+    channels = [Channel(node, f"+{direction}") for direction in directions for node in points]
+    rows = np.zeros((len(dofs), len(channels)))
+    for row, (direction, values) in zip(rows, needed, strict=True):
+        first = directions.index(direction) * len(points)
+        row[first : first + len(points)] = values
+    return channels, rows, middle
+
+
+def _rotation(dof: str, points: Sequence[int], along: int, slope: FloatArray) -> tuple[str, FloatArray]:
+    """Return the direction in which a rotation is seen, and the weights of the points."""
+    names = ", ".join(map(str, points))
+    if len(points) < 2:
+        raise ValueError(f"{dof} needs at least two nodes on each side, not {names}")
+    about = _AXES.index(dof[-1])
+    if about == along:
+        raise ValueError(f"{dof} cannot be seen from nodes {names}: they lie along its axis {_AXES[along]}")
+    normal = np.cross(np.eye(3)[about], np.eye(3)[along])
+    seen = int(np.argmax(abs(normal)))
+    return _AXES[seen], normal[seen] * slope

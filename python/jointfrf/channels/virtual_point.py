@@ -1,0 +1,314 @@
+"""Virtual point transformation: the motion of a rigid interface from many translational channels."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from jointfrf.channels.finite_differences import transform
+from jointfrf.dofs import rigid_motion
+from jointfrf.frf.frf_set import Channel
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_dofs, as_real, as_square
+
+__all__ = ["VirtualPoint", "append_virtual_point", "channel_geometry", "virtual_point", "virtual_points"]
+
+_DOFS = ("x", "y", "z", "theta_x", "theta_y", "theta_z")
+#: A motion that the channels show this many times more weakly than the best one is not seen.
+_UNSEEN = 1e-6
+#: Directions may be rounded: their length may differ from one by this.
+_UNIT = 1e-2
+
+
+class VirtualPoint(NamedTuple):
+    """Rigid motion of a group of channels about a point.
+
+    Attributes
+    ----------
+    dofs : tuple of str
+        Names of the n DOFs of the point.
+    modes : ndarray, shape (m, n)
+        Rigid interface modes R of u = R q: displacement of each channel for a unit of each DOF, 1 or m/rad.
+    transform : ndarray, shape (n, m)
+        T = (R^T W R)^-1 R^T W of q = T u, and of f = T^T m for forces: 1 or rad/m.
+    weights : ndarray, shape (m,)
+        Diagonal of W.
+    condition : float
+        Condition number of W^(1/2) R with rotations times the reach of the channels (root mean square distance to the
+        point), so that it does not depend on units. 1 is best; above some hundreds the point lies far from the
+        channels, or they hardly show some DOF.
+    """
+
+    dofs: tuple[str, ...]
+    modes: FloatArray
+    transform: FloatArray
+    weights: FloatArray
+    condition: float
+
+    @property
+    def noise_gain(self) -> FloatArray:
+        """Standard deviation of each DOF for independent noise of standard deviation 1 in all channels, shape (n,).
+
+        The root of the diagonal of T T^T, which is (R^T R)^-1 for equal weights: 1, or rad/m for rotations.
+        """
+        gain: FloatArray = np.sqrt((self.transform**2).sum(axis=1))
+        return gain
+
+    @property
+    def redundancy(self) -> FloatArray:
+        """Share of an error in a channel that stays in its residual, 1 - (R T)_ii, shape (m,).
+
+        0: the other channels cannot check this one, its error goes into q unseen. The sum over all channels with
+        weight is their number less n.
+        """
+        left: FloatArray = 1 - np.einsum("mn,nm->m", self.modes, self.transform)
+        return left
+
+
+def virtual_point(
+    positions: ArrayLike,
+    directions: ArrayLike,
+    point: ArrayLike,
+    dofs: Sequence[str] = _DOFS,
+    weights: ArrayLike | None = None,
+) -> VirtualPoint:
+    """Virtual point transformation of a group of translational channels on a part that moves as a rigid body.
+
+    Parameters
+    ----------
+    positions : array_like, shape (m, 3)
+        Where the channels are, m. A triaxial accelerometer is three channels at one place.
+    directions : array_like, shape (m, 3)
+        Unit vector of each channel: of the measured motion, or of the force of an impact. They may be rounded to two
+        digits and are brought to length one.
+    point : array_like, shape (3,)
+        The virtual point, m. Both sides of a joint need their points where the joint is to be described.
+    dofs : sequence of str
+        DOFs of the point, in the order wanted: ``"x"``, ``"y"``, ``"z"``, ``"theta_x"``, ``"theta_y"``,
+        ``"theta_z"``, all or some. Those left out are taken as zero.
+    weights : array_like, shape (m,), optional
+        Weight of each channel, 0 to leave it out; equal by default. One over the variance of their noise gives q the
+        least variance.
+
+    Returns
+    -------
+    VirtualPoint
+
+    Raises
+    ------
+    ValueError
+        Wrong shapes, names, directions or weights; fewer channels than DOFs; DOFs that the channels do not show, or
+        cannot tell apart: they are named.
+
+    Notes
+    -----
+    A channel at r from the point with direction e shows e . (t + theta x r), so that its row of R is [e, r x e]. Its
+    transpose takes forces at the channels to force and moment at the point, R^T f = m, and T^T distributes them back
+    with least squares. The receptance of the point is T_u H T_f^T (`jointfrf.transform`); T_u and T_f may come from
+    different channels. What is not rigid motion is averaged out: `sensor_consistency` tells how much that is.
+
+    References
+    ----------
+    M. V. van der Seijs, D. D. van den Bosch, D. J. Rixen, D. de Klerk, An improved methodology for the virtual point
+    transformation of measured frequency response functions in dynamic substructuring, COMPDYN 2013.
+
+    Examples
+    --------
+    Three channels on a line, 10 mm apart: the slope is that of central differences.
+
+    >>> import numpy as np
+    >>> from jointfrf import virtual_point
+    >>> places = [[-0.01, 0, 0], [0, 0, 0], [0.01, 0, 0]]
+    >>> vp = virtual_point(places, [[0, 1, 0]] * 3, [0, 0, 0], dofs=["y", "theta_z"])
+    >>> (vp.transform.round(4) + 0.0).tolist()
+    [[0.3333, 0.3333, 0.3333], [-50.0, 0.0, 50.0]]
+    >>> virtual_point(places, [[0, 1, 0]] * 3, [0, 0, 0], dofs=["y", "theta_x"])
+    Traceback (most recent call last):
+        ...
+    ValueError: dofs: the channels do not show theta_x
+    """
+    place = as_real("positions", positions, (None, 3))
+    m = place.shape[0]
+    direction = _as_directions(directions, m)
+    names = _as_names(dofs)
+    weight = np.ones(m) if weights is None else as_real("weights", weights, (m,))
+    if (weight < 0).any():
+        raise ValueError(f"weights must not be negative: channel {int(np.argmax(weight < 0))} has {weight.min():g}")
+    used = int(np.count_nonzero(weight))
+    if used < len(names):
+        raise ValueError(f"positions hold {used} channels with weight: too few for {len(names)} DOFs")
+
+    reference = as_real("point", point, (3,))
+    motion = np.einsum("mi,mij->mj", direction, rigid_motion(place, reference))
+    modes = motion[:, [_DOFS.index(name) for name in names]]
+    reach = float(np.sqrt(np.average(((place - reference) ** 2).sum(axis=1), weights=weight))) or 1.0
+    scale = np.array([reach if name.startswith("theta") else 1.0 for name in names])
+    root = np.sqrt(weight / weight.max())
+    left, size, right = np.linalg.svd(root[:, None] * modes / scale, full_matrices=False)
+    _check_seen(names, size, right)
+    # (R^T W R)^-1 R^T W by the singular values of W^(1/2) R
+    inverse = (right.T / size) @ left.T * root / scale[:, None]
+    return VirtualPoint(names, modes, inverse, weight, float(size[0] / size[-1]))
+
+
+def virtual_points(side_j: VirtualPoint, side_k: VirtualPoint) -> FloatArray:
+    """Put the transformations of both sides of a joint into one, for `identify`.
+
+    Parameters
+    ----------
+    side_j, side_k : VirtualPoint
+        Side j (on A) and side k (on B), of m_j and m_k channels, with the same n DOFs in the same order.
+
+    Returns
+    -------
+    ndarray, shape (2 n, m_j + m_k)
+        [[T_j, 0], [0, T_k]].
+
+    Raises
+    ------
+    ValueError
+        The sides have different DOFs.
+
+    Notes
+    -----
+    ``identify(freq_hz, h, vp.dofs, transform=...)`` wants impacts at the places and in the directions of the channels.
+    Where they are elsewhere, apply ``transform(h, t_out, t_in)`` with a transformation of each and hand over the
+    result; its noise is then no longer independent between entries, and intervals are approximate.
+
+    Examples
+    --------
+    >>> from jointfrf import virtual_point, virtual_points
+    >>> side = virtual_point([[-0.01, 0, 0], [0.01, 0, 0]], [[0, 1, 0]] * 2, [0, 0, 0], ["y", "theta_z"])
+    >>> virtual_points(side, side).round(6).tolist()[1]
+    [-50.0, 50.0, 0.0, 0.0]
+    """
+    if side_j.dofs != side_k.dofs:
+        both = f"{', '.join(side_j.dofs)} and {', '.join(side_k.dofs)}"
+        raise ValueError(f"side_j and side_k must have the same DOFs in the same order, not {both}")
+    (n, m_j), m_k = side_j.transform.shape, side_k.transform.shape[1]
+    both_sides = np.zeros((2 * n, m_j + m_k))
+    both_sides[:n, :m_j] = side_j.transform
+    both_sides[n:, m_j:] = side_k.transform
+    return both_sides
+
+
+def append_virtual_point(h: ArrayLike, channels: ArrayLike, point: VirtualPoint) -> ComplexArray:
+    """Receptance of a structure with the DOFs of a virtual point behind its own.
+
+    Parameters
+    ----------
+    h : array_like, shape (n_freq, n_all, n_all)
+        Receptance, m/N.
+    channels : array_like of int, shape (m,)
+        Which DOFs of `h` are the channels of the point, counted from 0, in their order.
+    point : VirtualPoint
+
+    Returns
+    -------
+    ndarray, shape (n_freq, n_all + n, n_all + n)
+        At its own DOFs, then at the point.
+
+    Raises
+    ------
+    ValueError
+        Wrong shapes or DOFs; NaN or Inf in a line.
+
+    Notes
+    -----
+    With such receptances of A and B, `couple` joins the points by a joint of n DOFs and returns the assembly at all
+    measured DOFs. The channels of both sides need not lie opposite one another. A joint force g acts as T^T g on the
+    channels (weakened compatibility: only the rigid motion of the patches is coupled).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from jointfrf import append_virtual_point, virtual_point
+    >>> vp = virtual_point([[-0.1, 0, 0], [0.1, 0, 0]], [[0, 1, 0]] * 2, [0, 0, 0], ["y"])
+    >>> append_virtual_point(np.eye(3)[None], [1, 2], vp)[0, -1].real.round(12).tolist()
+    [0.0, 0.5, 0.5, 0.5]
+    """
+    lines = as_square("h", h, later=True)
+    n_all = lines.shape[1]
+    at = as_dofs("channels", channels, n_all) - 1
+    n, m = point.transform.shape
+    if at.size != m:
+        raise ValueError(f"channels must name the {m} channels of the point, not {at.size}")
+    rows = np.zeros((n, n_all))
+    rows[:, at] = point.transform
+    whole = np.vstack([np.eye(n_all), rows])
+    return transform(lines, whole, whole)
+
+
+def channel_geometry(
+    channels: Iterable[Channel | str], coordinates: Mapping[int, ArrayLike]
+) -> tuple[FloatArray, FloatArray]:
+    """Positions and directions of named channels, as `virtual_point` takes them.
+
+    Parameters
+    ----------
+    channels : iterable of Channel or str
+        Translational channels, such as ``"102:+y"``.
+    coordinates : mapping of int to array_like, shape (3,)
+        Positions of the nodes, m.
+
+    Returns
+    -------
+    positions, directions : ndarray, shape (m, 3)
+
+    Raises
+    ------
+    ValueError
+        A node without coordinates, or a channel that is a rotation.
+
+    Examples
+    --------
+    >>> from jointfrf import channel_geometry
+    >>> positions, directions = channel_geometry(["1:+x", "2:-y"], {1: (0, 0, 0), 2: (0.02, 0, 0)})
+    >>> positions.tolist(), directions.tolist()
+    ([[0.0, 0.0, 0.0], [0.02, 0.0, 0.0]], [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
+    """
+    named = [Channel.parse(channel) for channel in channels]
+    for channel in named:
+        if channel.is_rotation:
+            raise ValueError(f"channels: {channel} is a rotation, a virtual point needs translations")
+        if channel.node not in coordinates:
+            raise ValueError(f"coordinates: node {channel.node} has none")
+    places = [as_real(f"coordinates of node {c.node}", coordinates[c.node], (3,)) for c in named]
+    axes = [c.sign * np.eye(3)["xyz".index(c.axis)] for c in named]
+    # adding zero turns -0 to 0
+    return np.array(places).reshape(-1, 3), np.array(axes).reshape(-1, 3) + 0.0
+
+
+def _as_directions(directions: ArrayLike, m: int) -> FloatArray:
+    direction = as_real("directions", directions, (m, 3))
+    length = np.linalg.norm(direction, axis=1)
+    wrong = np.flatnonzero(abs(length - 1) > _UNIT)
+    if wrong.size:
+        raise ValueError(f"directions must be unit vectors: that of channel {wrong[0]} has length {length[wrong[0]]:g}")
+    unit: FloatArray = direction / length[:, None]
+    return unit
+
+
+def _as_names(dofs: Sequence[str]) -> tuple[str, ...]:
+    names = (dofs,) if isinstance(dofs, str) else tuple(dofs)
+    unknown = [name for name in names if name not in _DOFS]
+    if unknown:
+        raise ValueError(f"dofs: {unknown[0]!r} is not one of {', '.join(_DOFS)}")
+    if not names or len(set(names)) != len(names):
+        raise ValueError(f"dofs must name different DOFs, at least one, not {', '.join(names) or 'none'}")
+    return names
+
+
+def _check_seen(names: tuple[str, ...], size: FloatArray, right: FloatArray) -> None:
+    """Raise where the channels do not show a motion, and name the DOFs it consists of."""
+    blind = right[size <= _UNSEEN * size[0]]
+    if not len(blind):
+        return
+    share = np.sqrt((blind**2).sum(axis=0))
+    unseen = [name for name, part in zip(names, share, strict=True) if part > 1 - _UNSEEN]
+    mixed = [name for name, part in zip(names, share, strict=True) if _UNSEEN < part <= 1 - _UNSEEN]
+    faults = [f"do not show {', '.join(unseen)}"] if unseen else []
+    faults += [f"cannot tell {', '.join(mixed)} apart"] if mixed else []
+    raise ValueError(f"dofs: the channels {' and '.join(faults)}")

@@ -1,0 +1,230 @@
+"""`jointfrf identify`: from a Universal File to the parameters of a joint."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import warnings
+from pathlib import Path
+from typing import cast, get_args
+
+import numpy as np
+
+from jointfrf.channels.finite_differences import difference_error
+from jointfrf.channels.point_lines import Interface, interface
+from jointfrf.errors import ConvergenceWarning, FileContentError, IdentificationWarning
+from jointfrf.identification.compliance_fit.estimator import Cross, Damping
+from jointfrf.identification.identify import identify
+from jointfrf.identification.joint_fit import JointFit
+from jointfrf.io import FrfSet, read_uff
+from jointfrf.io.cards import CardFormat
+
+__all__ = ["add_arguments", "run"]
+
+_METHODS = ("compliance", "inverse_substructuring")
+
+
+def _words(text: str) -> list[str]:
+    return [word.strip() for word in text.split(",") if word.strip()]
+
+
+def _nodes(text: str) -> list[int]:
+    try:
+        return [int(word) for word in _words(text)]
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a list of node numbers like 102,104") from None
+
+
+def _band(text: str) -> tuple[float, float]:
+    try:
+        low, high = (float(part) for part in text.split(":"))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a band like 200:550 (Hz)") from None
+    return low, high
+
+
+def _methods(text: str) -> list[str]:
+    for word in _words(text):
+        if word not in _METHODS:
+            raise argparse.ArgumentTypeError(f"{word!r} is not one of {', '.join(_METHODS)}")
+    return _words(text)
+
+
+def _export(text: str) -> tuple[CardFormat, list[int]]:
+    program, _, numbers = text.partition(":")
+    nodes = _nodes(numbers)
+    wanted = 4 if program == "calculix" else 2
+    if program not in get_args(CardFormat) or len(nodes) not in (2, wanted):
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not a program ({', '.join(get_args(CardFormat))}) and nodes j and k like abaqus:9001,9002; "
+            "calculix takes two ROT NODEs after them"
+        )
+    return cast(CardFormat, program), nodes
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Describe the arguments of the command."""
+    parser.description = (
+        "Identify a joint from the FRFs of an assembly in a Universal File (dataset 58). Accelerances and mobilities "
+        "become receptances; rotations come from points along a line by central differences."
+    )
+    parser.add_argument("file", type=Path, help="Universal File with the FRF matrix of the points around the joint")
+    parser.add_argument("--j", type=_nodes, metavar="NODES", help="nodes on side j, along a line: 102,104")
+    parser.add_argument("--k", type=_nodes, metavar="NODES", help="nodes on side k, in the same order: 202,204")
+    parser.add_argument(
+        "--dofs", type=_words, metavar="DOFS", help="joint DOFs out of x,y,z,theta_x,theta_y,theta_z, like y,theta_x"
+    )
+    parser.add_argument(
+        "--band", type=_band, action="append", metavar="LOW:HIGH", help="frequency band in Hz; may be repeated"
+    )
+    parser.add_argument(
+        "--method",
+        type=_methods,
+        default=["compliance"],
+        metavar="METHODS",
+        help=f"one or several of {','.join(_METHODS)} (default: compliance)",
+    )
+    parser.add_argument(
+        "--damping",
+        choices=(*get_args(Damping), "auto"),
+        default="auto",
+        help="damping terms of K* = k (1 + i eta) + i w c (default: auto, what the data support)",
+    )
+    parser.add_argument(
+        "--cross",
+        choices=get_args(Cross),
+        default="zero",
+        help="terms between the joint DOFs: none (default), not looked at, fitted",
+    )
+    parser.add_argument(
+        "--noise",
+        type=float,
+        metavar="LEVEL",
+        help="relative noise of the FRFs, 0.01 for 1 %% (default: from their reciprocity)",
+    )
+    parser.add_argument(
+        "--spacing",
+        type=float,
+        metavar="METRES",
+        help="distance between neighbouring nodes, where the file has no coordinates; needs --axis",
+    )
+    parser.add_argument("--axis", choices=("x", "y", "z"), help="direction of the line of nodes, with --spacing")
+    parser.add_argument(
+        "--bending-stiffness",
+        type=float,
+        metavar="EI",
+        help="E I of the thinner part in N m^2: tells how much compliance the differences add",
+    )
+    parser.add_argument(
+        "--quantity",
+        choices=("receptance", "mobility", "accelerance"),
+        help="what the FRFs are, where the file does not say",
+    )
+    parser.add_argument(
+        "--export",
+        type=_export,
+        metavar="PROGRAM:J,K",
+        help="also print the joint (by the first method) as input of abaqus, calculix (stiffness only), nastran or "
+        "ansys, between its nodes J and K: abaqus:9001,9002; rotations of calculix need two ROT NODEs after them",
+    )
+    parser.add_argument("--out", type=Path, metavar="DIR", help="folder for identification.json and figures")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Carry out the command; the caller turns exceptions into messages."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        frfs = read_uff(args.file, quantity=args.quantity).receptance()
+    for message in caught:
+        print(f"jointfrf: warning: {message.message}", file=sys.stderr)
+    if not (args.j and args.k and args.dofs):
+        print(frfs.summary())
+        print("\nname the points and DOFs of the joint to identify it: --j NODES --k NODES --dofs DOFS")
+        return 0
+    sides = _sides(args, frfs)
+    measured = frfs.matrix(sides.channels, sides.channels)
+    fits = [_fit(args, method, frfs.freq_hz, measured, sides) for method in args.method]
+    points = " and ".join(", ".join(map(str, nodes)) for nodes in (args.j, args.k))
+    print(
+        f"{args.file.name}: {frfs.h.shape[1]} responses x {frfs.h.shape[2]} excitations; joint between points {points}"
+    )
+    apart = sides.references[1] - sides.references[0]
+    if np.linalg.norm(apart) > 0:
+        print(
+            f"reference points {1e3 * np.linalg.norm(apart):.3g} mm apart: x, y, z = "
+            + ", ".join(f"{1e3 * value:.3g}" for value in apart)
+            + " mm"
+        )
+    _tell_differences(args, sides)
+    for fit in fits:
+        print(f"\n{fit}")
+    if args.export is not None:
+        program, nodes = args.export
+        damping = program != "calculix"  # it has none between DOFs, and says so in the text
+        print()
+        print(fits[0].export(program, nodes[:2], rotation_nodes=nodes[2:] or None, damping=damping), end="")
+    if args.out is not None:
+        from jointfrf.identification.fit_report import write_fit
+
+        print()
+        for path in write_fit(fits, args.out, args.file.name):
+            print(f"wrote {path}")
+    return 0
+
+
+def _tell_differences(args: argparse.Namespace, sides: Interface) -> None:
+    """Say what the central differences do to a rotational joint stiffness, before the result is read."""
+    rotations = [i for i, dof in enumerate(args.dofs) if dof.startswith("theta")]
+    if not rotations:
+        return
+    reach = 1 / abs(sides.transform[rotations[0]]).max() / 2
+    print(f"rotations by central differences over +-{1e3 * reach:.3g} mm")
+    if args.bending_stiffness is not None:
+        error = difference_error(reach, args.bending_stiffness, 1.0)
+        print(
+            f"they add about dx/(3 E I) = {error.compliance:.3g} rad/(N m) to the compliance of a rotational DOF: "
+            f"a joint much stiffer than {1 / error.compliance:.3g} N m/rad is not told from a rigid one"
+        )
+
+
+def _sides(args: argparse.Namespace, frfs: FrfSet) -> Interface:
+    places = dict(frfs.coordinates)
+    if (args.spacing is None) != (args.axis is None):
+        raise ValueError("--spacing and --axis go together")
+    if args.spacing is not None:
+        if not args.spacing > 0:
+            raise ValueError(f"--spacing must be positive, not {args.spacing:g}")
+        for nodes in (args.j, args.k):
+            for i, node in enumerate(nodes):
+                places[node] = np.zeros(3)
+                places[node]["xyz".index(args.axis)] = args.spacing * i
+    if len(args.j) != len(args.k):
+        raise ValueError(f"--j and --k must name the same number of nodes, not {len(args.j)} and {len(args.k)}")
+    known = {channel.node for channel in (*frfs.responses, *frfs.excitations)}
+    for node in (*args.j, *args.k):
+        if node not in known:
+            raise FileContentError(
+                f"{args.file} has no FRF at node {node}; it has nodes {', '.join(map(str, sorted(known)))}"
+            )
+        if node not in places and (len(args.j) > 1 or any("theta" in dof for dof in args.dofs)):
+            raise FileContentError(f"{args.file} has no coordinates of node {node}: say --spacing and --axis")
+    return interface(args.j, args.k, args.dofs, {node: places.get(node, np.zeros(3)) for node in (*args.j, *args.k)})
+
+
+def _fit(
+    args: argparse.Namespace, method: str, freq_hz: np.ndarray, measured: np.ndarray, sides: Interface
+) -> JointFit:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", IdentificationWarning)  # they stand in the table
+        warnings.simplefilter("ignore", ConvergenceWarning)
+        return identify(
+            freq_hz,
+            measured,
+            args.dofs,
+            method,  # type: ignore[arg-type]
+            args.band,
+            transform=sides.transform,
+            damping=args.damping,
+            cross=args.cross,
+            noise=args.noise,
+        )

@@ -1,0 +1,1 @@
+"""FRFs as data: sets of them, their channels, bands, noise and error measures."""

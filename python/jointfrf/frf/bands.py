@@ -1,0 +1,180 @@
+"""Frequency bands, and means over them."""
+
+from __future__ import annotations
+
+import reprlib
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from jointfrf.kernel.arguments import FloatArray, as_frequency, as_square
+
+__all__ = ["Band", "BandMean", "as_bands", "band_mean", "in_bands"]
+
+Band = tuple[float, float]
+
+
+def in_bands(freq_hz: ArrayLike, bands: Sequence[Band]) -> NDArray[np.bool_]:
+    """Which lines lie in any of the bands, limits included.
+
+    Parameters
+    ----------
+    freq_hz : array_like, shape (n_freq,)
+        Hz.
+    bands : sequence of (low, high)
+        Hz.
+
+    Returns
+    -------
+    ndarray of bool, shape (n_freq,)
+
+    Raises
+    ------
+    ValueError
+        A band is not (low, high), or holds no line.
+
+    Examples
+    --------
+    >>> import jointfrf as jf
+    >>> jf.in_bands([1, 2, 3, 4], [(2, 3)]).tolist()
+    [False, True, True, False]
+    """
+    freq = as_frequency(freq_hz)
+    inside = np.zeros(freq.size, bool)
+    for low, high in _pairs(bands):
+        here = (freq >= low) & (freq <= high)
+        if not here.any():
+            extent = f"they run from {freq.min():g} to {freq.max():g} Hz" if freq.size else "there are none"
+            raise ValueError(f"the band {low:g} to {high:g} Hz holds no frequency line; {extent}")
+        inside |= here
+    return inside
+
+
+def _pairs(bands: object) -> list[Band]:
+    """Return bands as pairs of numbers."""
+    try:
+        pairs = [(float(low), float(high)) for low, high in bands]  # type: ignore[attr-defined]
+    except (TypeError, ValueError):
+        pairs = [(np.nan, np.nan)]
+    if not all(0 <= low <= high < np.inf for low, high in pairs):
+        raise ValueError(f"a band must be (low, high) in Hz with 0 <= low <= high, not {reprlib.repr(bands)}")
+    return pairs
+
+
+def as_bands(
+    bands: Band | Sequence[Band] | Mapping[str, Band | Sequence[Band]] | None, dofs: Sequence[str], freq_hz: FloatArray
+) -> list[list[Band]]:
+    """Bands of each DOF from what a user writes: nothing (all lines), one band, several, or one of these for each DOF.
+
+    Parameters
+    ----------
+    bands : None, (low, high), sequence of (low, high), or mapping of DOF name to these
+        Hz. A sequence holds bands that serve all DOFs together.
+    dofs : sequence of str
+        Names of the DOFs.
+    freq_hz : ndarray, shape (n_freq,)
+        Hz.
+
+    Returns
+    -------
+    list of list of (low, high)
+        One list for each DOF.
+
+    Raises
+    ------
+    ValueError
+        A name that is not a DOF, a DOF without a band, a band without lines.
+
+    Examples
+    --------
+    >>> import numpy as np, jointfrf as jf
+    >>> jf.as_bands({"y": (1, 2), "theta": [(1, 2), (3, 4)]}, ["y", "theta"], np.arange(5.0))
+    [[(1.0, 2.0)], [(1.0, 2.0), (3.0, 4.0)]]
+    """
+
+    def several(entry: Band | Sequence[Band] | None) -> list[Band]:
+        if entry is None:
+            return [(float(freq_hz.min(initial=np.inf)), float(freq_hz.max(initial=0)))]
+        single = isinstance(entry, Sequence | np.ndarray) and len(entry) == 2 and all(np.ndim(x) == 0 for x in entry)
+        pairs = _pairs([entry] if single else entry)
+        in_bands(freq_hz, pairs)
+        return pairs
+
+    if not isinstance(bands, Mapping):
+        return [several(bands)] * len(dofs)
+    unknown = [name for name in bands if name not in dofs]
+    missing = [name for name in dofs if name not in bands]
+    if unknown or missing:
+        what = f"names {unknown[0]!r}, which is no DOF" if unknown else f"has no band for DOF {missing[0]!r}"
+        raise ValueError(f"bands {what}; the DOFs are {', '.join(dofs)}")
+    return [several(bands[name]) for name in dofs]
+
+
+class BandMean(NamedTuple):
+    """Means over a band.
+
+    Attributes
+    ----------
+    stiffness, damping : ndarray, shape (n,)
+        Mean of Re K* and of Im K*/w of each DOF: N/m and N s/m, rotational N m/rad and N m s/rad.
+    """
+
+    stiffness: FloatArray
+    damping: FloatArray
+
+
+def band_mean(
+    freq_hz: ArrayLike,
+    k_joint: ArrayLike,
+    bands: Band | Sequence[Band] | Mapping[str, Band | Sequence[Band]] | None = None,
+    dofs: Sequence[str] | None = None,
+) -> BandMean:
+    """Mean of Re K* and Im K*/w of each DOF over its sensitive band, as the source does.
+
+    Parameters
+    ----------
+    freq_hz : array_like, shape (n_freq,)
+        Hz; a line at 0 Hz cannot give a damping.
+    k_joint : array_like, shape (n_freq, n, n)
+        Identified K*.
+    bands, dofs
+        As in `as_bands`; names ``"0"``, ``"1"``, ... by default.
+
+    Returns
+    -------
+    BandMean
+
+    Raises
+    ------
+    ValueError
+        Wrong shapes, bands without lines, 0 Hz inside a band.
+
+    Notes
+    -----
+    The mean of an inverse of noise: where the noise exceeds the joint's compliance, k and c shrink to zero.
+
+    Examples
+    --------
+    >>> import jointfrf as jf
+    >>> joint = jf.Joint([2000.0], [3.0])
+    >>> mean = jf.band_mean([3.0, 6.0, 9.0], joint.dynamic_stiffness([3.0, 6.0, 9.0]), (3, 9))
+    >>> mean.stiffness.tolist(), mean.damping.round(12).tolist()
+    ([2000.0], [3.0])
+    """
+    lines = as_square("k_joint", k_joint)
+    n_freq, n, _ = lines.shape
+    freq = as_frequency(freq_hz, n_freq)
+    names = [str(i) for i in range(n)] if dofs is None else list(dofs)
+    if len(names) != n:
+        raise ValueError(f"dofs must name {n} DOFs, not {len(names)}")
+    stiffness, damping = np.empty(n), np.empty(n)
+    for d, own in enumerate(as_bands(bands, names, freq)):
+        inside = in_bands(freq, own)
+        if (freq[inside] == 0).any():
+            raise ValueError(f"the band of {names[d]} holds 0 Hz, where Im K*/w is not defined")
+        k = lines[inside, d, d]
+        stiffness[d] = k.real.mean()
+        damping[d] = (k.imag / (2 * np.pi * freq[inside])).mean()
+    return BandMean(stiffness, damping)

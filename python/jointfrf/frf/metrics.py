@@ -1,0 +1,120 @@
+"""How far a regenerated FRF is from the exact one: amplitude error (4.11) and frequency error (4.12)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from jointfrf.frf.bands import Band, in_bands
+from jointfrf.kernel.arguments import FloatArray, as_frequency, as_values
+
+__all__ = ["amplitude_error", "frequency_error", "peak"]
+
+
+def peak(h: ArrayLike, freq_hz: ArrayLike, band: Band | None = None, *, refine: bool = False) -> tuple[float, float]:
+    """Largest modulus of an FRF in a band and its frequency.
+
+    Parameters
+    ----------
+    h : array_like, shape (n_freq,)
+        One FRF.
+    freq_hz : array_like, shape (n_freq,)
+        Hz.
+    band : (low, high), optional
+        Hz; all lines by default.
+    refine : bool
+        Whether the peak is sought between the lines, by a parabola through the logarithms of the three highest.
+
+    Returns
+    -------
+    amplitude, frequency : float
+        In the unit of `h`, and Hz.
+
+    Raises
+    ------
+    ValueError
+        Shapes that do not agree, a band without lines, NaN.
+
+    Examples
+    --------
+    >>> import jointfrf as jf
+    >>> jf.peak([1.0, 4.0, 2.0], [10.0, 11.0, 12.0])
+    (4.0, 11.0)
+    """
+    freq = as_frequency(freq_hz)
+    amplitude: FloatArray = np.abs(as_values("h", h, freq.size))
+    if not np.isfinite(amplitude).all():
+        raise ValueError(f"h holds NaN or Inf in line {int(np.argmin(np.isfinite(amplitude)))}")
+    inside = np.arange(freq.size) if band is None else np.flatnonzero(in_bands(freq, [band]))
+    if inside.size == 0:
+        raise ValueError("h has no lines")
+    at = inside[np.argmax(amplitude[inside])]
+    if not refine or at in (inside[0], inside[-1]) or amplitude[at - 1 : at + 2].min() <= 0:
+        return float(amplitude[at]), float(freq[at])
+    parabola = np.polyfit(freq[at - 1 : at + 2] - freq[at], np.log(amplitude[at - 1 : at + 2]), 2)
+    offset = -parabola[1] / (2 * parabola[0])
+    return float(np.exp(np.polyval(parabola, offset))), float(freq[at] + offset)
+
+
+def amplitude_error(
+    h_exact: ArrayLike, h: ArrayLike, freq_hz: ArrayLike, band: Band | None = None, *, refine: bool = False
+) -> float:
+    """Relative difference of the largest amplitudes in a band, percent (4.11).
+
+    Parameters
+    ----------
+    h_exact, h : array_like, shape (n_freq,)
+        Exact and regenerated FRF.
+    freq_hz, band, refine
+        As in `peak`.
+
+    Returns
+    -------
+    float
+        Percent.
+
+    Raises
+    ------
+    ValueError
+        As in `peak`.
+
+    Examples
+    --------
+    >>> import jointfrf as jf
+    >>> jf.amplitude_error([1.0, 4.0, 2.0], [1.0, 3.0, 2.0], [10.0, 11.0, 12.0])
+    25.0
+    """
+    exact, obtained = (peak(x, freq_hz, band, refine=refine)[0] for x in (h_exact, h))
+    return abs((exact - obtained) / exact) * 100
+
+
+def frequency_error(
+    h_exact: ArrayLike, h: ArrayLike, freq_hz: ArrayLike, band: Band | None = None, *, refine: bool = False
+) -> float:
+    """Relative difference of the frequencies of the largest amplitudes in a band, percent (4.12).
+
+    Parameters
+    ----------
+    h_exact, h : array_like, shape (n_freq,)
+        Exact and regenerated FRF.
+    freq_hz, band, refine
+        As in `peak`. Without `refine` the error is a multiple of the spacing of the lines.
+
+    Returns
+    -------
+    float
+        Percent.
+
+    Raises
+    ------
+    ValueError
+        As in `peak`.
+
+    Examples
+    --------
+    >>> import jointfrf as jf
+    >>> jf.frequency_error([1.0, 4.0, 2.0], [1.0, 2.0, 4.0], [10.0, 11.0, 12.0])
+    9.090909090909092
+    """
+    exact, obtained = (peak(x, freq_hz, band, refine=refine)[1] for x in (h_exact, h))
+    return abs((exact - obtained) / exact) * 100

@@ -1,0 +1,1 @@
+"""From FRFs of the assembly to the parameters of the joint."""

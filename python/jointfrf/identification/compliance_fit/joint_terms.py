@@ -1,0 +1,132 @@
+"""K*(w) of a joint as a sum of terms, its compliance, and how this moves with the terms."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.kernel.linear_algebra import invert
+
+__all__ = ["Basis", "Cross", "Damping", "JointModel", "joint_basis"]
+
+Damping = Literal["none", "viscous", "hysteretic", "both"]
+Cross = Literal["zero", "ignore", "fit"]
+
+
+class Basis(NamedTuple):
+    """K*(w) as a sum of parameters times terms: a function of frequency times a pair of DOFs.
+
+    Attributes
+    ----------
+    names : tuple of str
+        ``"k_<dof>"`` stiffness, ``"h_<dof>"`` hysteretic stiffness eta k, ``"c_<dof>"`` viscous damping;
+        ``"k_<dof>,<dof>"`` for cross terms. All pairs of the first letter, then of the next.
+    factors : ndarray, shape (n_letters, n_freq)
+        Function of frequency of each letter: 1, i, i w.
+    pairs : ndarray of int, shape (n_pairs, 2)
+        Row and column of each entry of K* that is sought; the first n are the diagonal.
+    """
+
+    names: tuple[str, ...]
+    factors: ComplexArray
+    pairs: NDArray[np.intp]
+
+    @property
+    def n(self) -> int:
+        """Number of joint DOFs."""
+        return int(self.pairs.max()) + 1
+
+    @property
+    def matrices(self) -> ComplexArray:
+        """Matrix of each parameter on each line, shape (n_parameters, n_freq, n, n)."""
+        units = np.zeros((len(self.pairs), self.n, self.n))
+        for unit, (a, b) in zip(units, self.pairs, strict=True):
+            unit[a, b] = unit[b, a] = 1
+        whole = self.factors[:, None, :, None, None] * units[:, None]
+        matrices: ComplexArray = whole.reshape(len(self.names), -1, self.n, self.n)
+        return matrices
+
+    def on_lines(self, lines: NDArray[np.intp]) -> Basis:
+        """Return the same terms on some of the lines."""
+        return self._replace(factors=self.factors[:, lines])
+
+    def of_dofs(self, dofs: NDArray[np.intp], *, cross: bool = True) -> tuple[Basis, NDArray[np.intp]]:
+        """Return the terms between some of the DOFs, or without those across, and which of the parameters these are."""
+        inside = np.flatnonzero(
+            np.isin(self.pairs, dofs).all(axis=1) & (cross | (self.pairs[:, 0] == self.pairs[:, 1]))
+        )
+        which = (np.arange(len(self.factors))[:, None] * len(self.pairs) + inside).ravel()
+        pairs = np.searchsorted(dofs, self.pairs[inside])
+        return Basis(tuple(self.names[i] for i in which), self.factors, pairs), which
+
+
+def joint_basis(omega: FloatArray, dofs: Sequence[str], damping: Damping, cross: Cross) -> Basis:
+    """Return the terms of K*(w) = k + i h + i w c asked for; symmetric cross terms where `cross` is "fit"."""
+    n = len(dofs)
+    factors: dict[str, NDArray[np.complexfloating]] = {"k": np.ones(omega.size, np.complex128)}
+    if damping in ("hysteretic", "both"):
+        factors["h"] = np.full(omega.size, 1j)
+    if damping in ("viscous", "both"):
+        factors["c"] = 1j * omega
+    pairs = [(a, a) for a in range(n)]
+    if cross == "fit":
+        pairs += [(a, b) for a in range(n) for b in range(a + 1, n)]
+    labels = [dofs[a] if a == b else f"{dofs[a]},{dofs[b]}" for a, b in pairs]
+    names = tuple(f"{letter}_{label}" for letter in factors for label in labels)
+    return Basis(names, np.array(list(factors.values())), np.array(pairs, np.intp))
+
+
+class JointModel:
+    """C = K*(theta)^-1 and its derivatives, by elements where K* is diagonal.
+
+    C is symmetric, so that the model has one value for C_ab and C_ba.
+
+    Attributes
+    ----------
+    n : int
+        Number of joint DOFs.
+    is_diagonal : bool
+        Whether C is diagonal.
+    rows, columns : ndarray of int, shape (q,)
+        Entries of C that the model moves: those of the diagonal, or of the upper triangle.
+    """
+
+    def __init__(self, basis: Basis) -> None:
+        self.basis, self.n = basis, basis.n
+        self.is_diagonal = len(basis.pairs) == self.n
+        self.rows, self.columns = np.diag_indices(self.n) if self.is_diagonal else np.triu_indices(self.n)
+
+    def compliance(self, theta: FloatArray) -> ComplexArray:
+        """Return C of parameters of shape (r, p): its diagonal, shape (r, n_freq, n), or (r, n_freq, n, n)."""
+        factors, pairs = self.basis.factors, self.basis.pairs
+        values = factors.T @ theta.reshape(len(theta), len(factors), len(pairs))
+        if self.is_diagonal:
+            with np.errstate(divide="ignore", invalid="ignore"):
+                diagonal: ComplexArray = 1 / values
+            return diagonal
+        k = np.empty((*values.shape[:2], self.n, self.n), np.complex128)
+        k[..., pairs[:, 0], pairs[:, 1]] = k[..., pairs[:, 1], pairs[:, 0]] = values
+        return invert(k.reshape(-1, self.n, self.n), on_singular="nan").reshape(k.shape)
+
+    def moved(self, compliance: ComplexArray) -> ComplexArray:
+        """Return the entries of C that the model moves, shape (r, n_freq, q)."""
+        return compliance if self.is_diagonal else compliance[..., self.rows, self.columns]
+
+    def slope(self, compliance: ComplexArray) -> ComplexArray:
+        """Return their derivatives -C B C by each pair of DOFs, shape (r, n_freq, q, n_pairs).
+
+        That by a parameter is this times the function of frequency of its letter.
+        """
+        if self.is_diagonal:
+            return -(compliance**2)[..., None] * np.eye(self.n)
+        a, b = self.basis.pairs.T
+        left, right = compliance[..., a], -compliance[..., b]  # (..., n, n_pairs); C is symmetric
+        slope: ComplexArray = left[..., self.rows, :] * right[..., self.columns, :]
+        other = left[..., self.columns, :] * right[..., self.rows, :]
+        other[..., a == b] = 0
+        slope += other
+        return slope

@@ -1,0 +1,215 @@
+"""Monte Carlo study of an identification in the kernel: no realisation is ever stored."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from operator import index
+from typing import Literal, NamedTuple, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from jointfrf.frf.bands import Band, in_bands
+from jointfrf.frf.noise import NoiseKind, NoiseReference, noise_arguments
+from jointfrf.kernel.arguments import (
+    ComplexArray,
+    FloatArray,
+    as_frequency,
+    as_interface,
+    as_joint_lines,
+    check_choice,
+    optional_frequency,
+)
+from jointfrf.kernel.call import call
+from jointfrf.kernel.status import LineStatus, OnSingular, check_lines
+
+__all__ = ["BandStatistics", "MonteCarlo", "MonteCarloMethod", "monte_carlo"]
+
+MonteCarloMethod = Literal["ismm", "inverse-substructuring", "compliance"]
+
+_LETTERS = {"ismm": "I", "inverse-substructuring": "S", "compliance": "C"}
+
+
+class BandStatistics(NamedTuple):
+    """What single realisations give as means over a band: their mean and standard deviation, shape (n, n) each.
+
+    Attributes
+    ----------
+    stiffness, stiffness_std : ndarray
+        Mean of Re K* over the lines of the band, N/m.
+    damping, damping_std : ndarray
+        Mean of Im K*/w, N s/m.
+    """
+
+    stiffness: FloatArray
+    stiffness_std: FloatArray
+    damping: FloatArray
+    damping_std: FloatArray
+
+
+@dataclass(frozen=True)
+class MonteCarlo:
+    """Result of `monte_carlo`.
+
+    Attributes
+    ----------
+    count : int
+        Realisations of every line.
+    good : ndarray of int32, shape (n_freq,)
+        How many of them could be identified; the others are left out.
+    mean : ndarray, shape (n_freq, n, n)
+        Mean over the good ones, N/m (m/N for "compliance"); NaN where there is none.
+    covariance : ndarray, shape (n_freq, n, n, 3)
+        Var Re, Var Im and Cov(Re, Im) of each entry; NaN where fewer than two are good.
+    line_info : ndarray of int32, shape (n_freq,)
+        0, or where no realisation is good what was wrong with the first, see `LineStatus`.
+    rcond : ndarray, shape (n_freq,)
+        Smallest reciprocal condition number over the good ones.
+    """
+
+    count: int
+    good: NDArray[np.int32]
+    mean: ComplexArray
+    covariance: FloatArray
+    line_info: NDArray[np.int32]
+    rcond: FloatArray
+
+    @property
+    def variance(self) -> FloatArray:
+        """E|x - mean|^2 of each entry, shape (n_freq, n, n)."""
+        total: FloatArray = self.covariance[..., 0] + self.covariance[..., 1]
+        return total
+
+    @property
+    def std_error(self) -> FloatArray:
+        """Standard error of the mean, sqrt(variance/good), shape (n_freq, n, n)."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            error: FloatArray = np.sqrt(self.variance / self.good[:, None, None])
+        return error
+
+    def band(self, freq_hz: ArrayLike, bands: Sequence[Band]) -> BandStatistics:
+        """Statistics of the means over a band that single realisations give.
+
+        Parameters
+        ----------
+        freq_hz : array_like, shape (n_freq,)
+            Frequency lines, Hz.
+        bands : sequence of (low, high)
+            Hz; all of them together are the band.
+
+        Returns
+        -------
+        BandStatistics
+
+        Raises
+        ------
+        ValueError
+            No line in the band, or one at 0 Hz.
+
+        Notes
+        -----
+        The noise of different lines is independent, so the variance of a mean over N lines is the sum of their
+        variances over N^2. No line may have lost realisations for that to hold exactly.
+        """
+        freq = as_frequency(freq_hz, self.good.size)
+        inside = in_bands(freq, bands)
+        if not inside.any() or not freq[inside].all():
+            raise ValueError(f"the band must hold lines, and none at 0 Hz: {bands}")
+        number = int(inside.sum())
+        omega = 2 * np.pi * freq[inside, None, None]
+        mean, covariance = self.mean[inside], self.covariance[inside]
+        return BandStatistics(
+            mean.real.mean(axis=0),
+            np.sqrt(covariance[..., 0].sum(axis=0)) / number,
+            (mean.imag / omega).mean(axis=0),
+            np.sqrt((covariance[..., 1] / omega**2).sum(axis=0)) / number,
+        )
+
+
+def monte_carlo(
+    gamma: ArrayLike,
+    level: float,
+    kind: NoiseKind = "complex",
+    seed: int = 0,
+    *,
+    count: int = 1000,
+    first: int = 0,
+    method: MonteCarloMethod = "inverse-substructuring",
+    alpha: ArrayLike | None = None,
+    k_initial: ArrayLike | None = None,
+    relative_to: NoiseReference = "entry",
+    reciprocal: bool = False,
+    block: int | None = None,
+    freq_hz: ArrayLike | None = None,
+    on_singular: OnSingular = "raise",
+) -> MonteCarlo:
+    """Mean and covariance of the joint identified from polluted FRFs.
+
+    Parameters
+    ----------
+    gamma : array_like, shape (n_freq, 2 n, 2 n)
+        Exact receptance of the assembly at joint DOFs j, then k, m/N; it is polluted.
+    level, kind, seed, relative_to, reciprocal, block
+        The noise, as in `pollute`.
+    count, first : int
+        Realisations `first` to `first + count - 1`, the very ones that `realisations` gives.
+    method : {"ismm", "inverse-substructuring", "compliance"}
+        As `ismm`, `inverse_substructuring` or `joint_compliance`, line by line.
+    alpha : array_like, shape (n_freq, 2 n, 2 n), optional
+        For "ismm": calculated receptance of the assembly with K0, free of noise, m/N.
+    k_initial : array_like, shape (n_freq, n, n) or (n, n), optional
+        For "ismm": first estimate K0, N/m.
+    freq_hz, on_singular
+        As in `couple`; a line is bad where no realisation can be identified.
+
+    Returns
+    -------
+    MonteCarlo
+
+    Raises
+    ------
+    SingularLineError, ValueError
+        As in `couple` and `pollute`; alpha or k_initial missing for "ismm", or given for another method.
+
+    Notes
+    -----
+    Memory does not depend on `count`. Results do not depend on the number of threads; other engines differ by rounding.
+    Noise is on gamma only, so that by D = gamma^-1 - alpha^-1, eq. (2.40), ISMM is K0 + (alpha^-1)_jk - (gamma^-1)_jk,
+    of which all but the last term is done once a line. Where noise lets gamma come near a singular matrix, K* has heavy
+    tails; mean and variance then converge slowly or not at all, and quantiles from `realisations` say more.
+
+    Examples
+    --------
+    >>> import numpy as np, jointfrf as jf
+    >>> h = np.full((1, 1, 1), 0.5)
+    >>> gamma = jf.couple(h, h, [[3.0]], [0], [0])
+    >>> study = jf.monte_carlo(gamma, 0.01, seed=1, count=4000)
+    >>> study.mean.real.round(1).tolist(), study.good.tolist()
+    ([[[3.0]]], [4000])
+    """
+    exact, n = as_interface("gamma", gamma)
+    n_freq = exact.shape[0]
+    check_choice("method", method, get_args(MonteCarloMethod))
+    noise = noise_arguments(level, kind, seed, relative_to, reciprocal, block, first, count, exact.shape[1:])
+    if index(count) < 1:
+        raise ValueError(f"count must be positive, not {count}")
+    if (method == "ismm") != (alpha is not None) or (method == "ismm") != (k_initial is not None):
+        raise ValueError('method "ismm", and no other, needs alpha and k_initial')
+    sweeps = {"gamma": exact}
+    calculated, initial = exact, np.zeros((n_freq, n, n), np.complex128)
+    if alpha is not None and k_initial is not None:
+        calculated, m = as_interface("alpha", alpha, n_freq)
+        if m != n:
+            raise ValueError(f"alpha must have the shape of gamma, {exact.shape}, not {calculated.shape}")
+        initial = np.ascontiguousarray(as_joint_lines("k_initial", k_initial, n, n_freq))
+        sweeps |= {"alpha": calculated, "k_initial": initial}
+    freq = optional_frequency(freq_hz, n_freq)
+    good, mean = np.zeros(n_freq, np.int32), np.empty((n_freq, n, n), np.complex128)
+    covariance = np.empty((n_freq, n, n, 3))
+    status = LineStatus(np.zeros(n_freq, np.int32), np.ones(n_freq))
+    if n_freq:
+        results = (good, mean, covariance, *status)
+        call("monte_carlo", (_LETTERS[method], *noise, n, n_freq, first, count, calculated, exact, initial, *results))
+    check_lines("monte_carlo", status, sweeps, freq, on_singular)
+    return MonteCarlo(count, good, mean, covariance, *status)

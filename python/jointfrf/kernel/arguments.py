@@ -1,0 +1,189 @@
+"""What the kernel takes: arrays, DOFs, frequencies and words of a caller, checked once and brought into its form."""
+
+from __future__ import annotations
+
+import reprlib
+import warnings
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from jointfrf.errors import CopyWarning
+from jointfrf.kernel.memory_maps import is_mapped
+
+__all__ = [
+    "LARGE_COPY",
+    "ComplexArray",
+    "FloatArray",
+    "as_dofs",
+    "as_frequency",
+    "as_interface",
+    "as_joint_lines",
+    "as_lines",
+    "as_number",
+    "as_real",
+    "as_square",
+    "as_values",
+    "check_choice",
+    "checked_out",
+    "optional_frequency",
+]
+
+ComplexArray = NDArray[np.complex128]
+FloatArray = NDArray[np.float64]
+
+#: A conversion that copies more than this many bytes is announced by a `CopyWarning`.
+LARGE_COPY = 16 * 2**20
+
+
+def _converted(name: str, value: ArrayLike, dtype: type, *, later: bool = False) -> NDArray[Any]:
+    """Return contiguous numbers of the type; with `later`, an array in a file is left for `run` to convert."""
+    if type(value) is np.ndarray and value.dtype == dtype and value.flags.c_contiguous:
+        return value
+    array = np.asarray(value)
+    if array.dtype.kind not in ("biufc" if dtype is np.complex128 else "biuf"):
+        wanted = "numbers" if dtype is np.complex128 else "real numbers"
+        raise TypeError(f"{name} must hold {wanted}, not {array.dtype}")
+    if later and is_mapped(array):
+        return array
+    result: NDArray[Any] = np.ascontiguousarray(array, dtype=dtype).reshape(array.shape)
+    if result is not array and not np.shares_memory(result, array) and result.nbytes > LARGE_COPY:
+        why = f"of type {array.dtype}" if array.dtype != dtype else "not contiguous in C order"
+        warnings.warn(f"{name} is {why}: a copy of {result.nbytes / 2**20:.0f} MiB was made", CopyWarning, stacklevel=4)
+    return result
+
+
+def as_lines(
+    name: str,
+    value: ArrayLike,
+    rows: int | None = None,
+    columns: int | None = None,
+    n_freq: int | None = None,
+    *,
+    later: bool = False,
+) -> ComplexArray:
+    """Return a sweep (n_freq, rows, columns) as contiguous complex128; sizes that are None are free.
+
+    With `later`, an array in a file is returned as it is: `run` converts it chunk by chunk.
+    """
+    array = _converted(name, value, np.complex128, later=later)
+    if array.ndim != 3 or any(w not in (None, s) for w, s in zip((n_freq, rows, columns), array.shape, strict=True)):
+        labels = ["n_freq" if n_freq is None else str(n_freq)]
+        labels += ["n" if w is None else str(w) for w in (rows, columns)]
+        raise ValueError(f"{name} must have shape ({', '.join(labels)}), not {array.shape}")
+    return array
+
+
+def as_square(name: str, value: ArrayLike, n_freq: int | None = None, *, later: bool = False) -> ComplexArray:
+    """Return a sweep of square matrices, as `as_lines` does."""
+    array = as_lines(name, value, n_freq=n_freq, later=later)
+    if array.shape[1] != array.shape[2]:
+        raise ValueError(f"{name} must hold square matrices, not {array.shape[1]} x {array.shape[2]}")
+    return array
+
+
+def as_joint_lines(name: str, value: ArrayLike, n: int | None, n_freq: int) -> ComplexArray:
+    """Return joint matrices (n_freq, n, n) for `run`; one matrix (n, n) serves all lines."""
+    array = np.asarray(value)
+    if array.ndim == 2:
+        one = as_square(name, array[None])
+        lines: ComplexArray = np.broadcast_to(one, (n_freq, *array.shape))
+    else:
+        lines = as_square(name, array, n_freq, later=True)
+    if n is not None and lines.shape[1] != n:
+        raise ValueError(f"{name} must have shape ({n_freq}, {n}, {n}), not {lines.shape}")
+    return lines
+
+
+def as_interface(name: str, value: ArrayLike, n_freq: int | None = None) -> tuple[ComplexArray, int]:
+    """Return a sweep at joint DOFs j, then k, for `run`, and the number of joint DOFs."""
+    lines = as_square(name, value, n_freq, later=True)
+    if lines.shape[1] % 2 or lines.shape[1] == 0:
+        raise ValueError(f"{name} must hold DOFs j and k, an even number of rows, not {lines.shape[1]}")
+    return lines, lines.shape[1] // 2
+
+
+def as_real(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> FloatArray:
+    """Return a finite real array of the given shape; sizes that are None are free."""
+    array = _converted(name, value, np.float64)
+    if array.ndim != len(shape) or any(w is not None and w != s for w, s in zip(shape, array.shape, strict=True)):
+        wanted = ", ".join("n" if w is None else str(w) for w in shape)
+        raise ValueError(f"{name} must have shape ({wanted}), not {array.shape}")
+    if not np.isfinite(array).all():
+        where = np.unravel_index(int(np.argmin(np.isfinite(array))), array.shape)
+        raise ValueError(f"{name} holds NaN or Inf at index {tuple(int(i) for i in where)}")
+    return array
+
+
+def as_frequency(freq_hz: ArrayLike, n_freq: int | None = None) -> FloatArray:
+    """Return the frequency lines in Hz, finite and not negative."""
+    freq = as_real("freq_hz", freq_hz, (n_freq,))
+    if (freq < 0).any():
+        raise ValueError(f"freq_hz must not be negative: line {int(np.argmax(freq < 0))} is {freq.min():g} Hz")
+    return freq
+
+
+def optional_frequency(freq_hz: ArrayLike | None, n_freq: int) -> FloatArray | None:
+    """Return the frequency lines where the caller gave them to name a bad line."""
+    return None if freq_hz is None else as_frequency(freq_hz, n_freq)
+
+
+def check_choice(name: str, value: object, known: Sequence[str]) -> None:
+    """Raise unless the value is one of the words that are known."""
+    if not isinstance(value, str) or value not in known:
+        raise ValueError(f"{name} must be one of {', '.join(known)}, not {reprlib.repr(value)}")
+
+
+def as_number(name: str, value: object) -> float:
+    """Return one finite real number."""
+    if isinstance(value, str | bytes) or np.ndim(value) or np.asarray(value).dtype.kind not in "biuf":  # type: ignore[arg-type]
+        raise TypeError(f"{name} must be one real number, not {reprlib.repr(value)}")
+    number = float(value)  # type: ignore[arg-type]
+    if not np.isfinite(number):
+        raise ValueError(f"{name} must be finite, not {number}")
+    return number
+
+
+def as_values(name: str, value: ArrayLike, n: int) -> ComplexArray:
+    """Return n complex numbers."""
+    array: ComplexArray = _converted(name, value, np.complex128)
+    if array.shape != (n,):
+        raise ValueError(f"{name} must have one value for each of the {n} lines, not shape {array.shape}")
+    return array
+
+
+def as_dofs(name: str, dofs: ArrayLike, n: int, *, unique: bool = True) -> NDArray[np.int32]:
+    """Return DOF indices, counted from 0 by the caller, as the kernel counts them (from 1)."""
+    array = np.asarray(dofs)
+    if array.ndim != 1 or (array.size and array.dtype.kind not in "iu"):
+        raise TypeError(f"{name} must be a list of DOF numbers")
+    array = array.astype(np.int64)
+    if ((array < 0) | (array >= n)).any():
+        bad = int(array[(array < 0) | (array >= n)][0])
+        raise ValueError(f"{name} names DOF {bad}; there are DOFs 0 to {n - 1}")
+    if unique and np.unique(array).size != array.size:
+        raise ValueError(f"{name} names a DOF twice: {array.tolist()}")
+    return (array + 1).astype(np.int32)
+
+
+def checked_out(
+    out: ComplexArray, shape: tuple[int, ...], args: Sequence[Any], sweeps: Mapping[str, NDArray[Any]]
+) -> ComplexArray:
+    """Return `out` if results can be written into it; no array of `args` may share its memory."""
+    if not isinstance(out, np.ndarray):
+        raise TypeError(f"out must be a numpy array, not {type(out).__name__}")
+    if out.shape != shape:
+        raise ValueError(f"out must have shape {shape}, not {out.shape}")
+    if out.dtype != np.complex128:
+        raise ValueError(f"out must hold complex128, not {out.dtype}")
+    if not (out.flags.c_contiguous and out.flags.aligned):
+        raise ValueError("out must be contiguous in C order and aligned")
+    if not out.flags.writeable:
+        raise ValueError("out must be writeable")
+    for array in args:
+        if isinstance(array, np.ndarray) and np.may_share_memory(out, array):
+            names = [name for name, sweep in sweeps.items() if sweep is array]
+            raise ValueError(f"out must not share memory with {names[0] if names else 'an argument'}")
+    return out

@@ -1,0 +1,134 @@
+"""Calling a routine of the kernel.
+
+A C-order array (n_freq, out, in) enters as its transposed view, so nothing is copied; results come back in C order.
+"""
+
+from __future__ import annotations
+
+import os
+import reprlib
+from collections.abc import Mapping, Sequence
+from typing import Any, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+import jointfrf._kernel as _kernel
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, check_choice, checked_out
+from jointfrf.kernel.memory_maps import chunks, release
+from jointfrf.kernel.status import RCOND_LIMIT, LineStatus, OnSingular, check_status
+
+__all__ = ["N_FREQ", "VERSION", "call", "info_of", "kernel_engine", "run", "set_kernel_engine"]
+
+#: Version of the kernel, and so of the package.
+VERSION = ".".join(str(int(number)) for number in _kernel.jf_version())
+
+_NO_ENGINE = -1001
+
+#: Stands for the number of lines among the arguments of a kernel routine.
+N_FREQ = object()
+
+
+def set_kernel_engine(code: int) -> bool:
+    """Choose an engine by its number in the kernel; return whether this machine has it."""
+    return bool(_kernel.jf_set_engine(code) == 0)
+
+
+def kernel_engine() -> int:
+    """Return the number of the engine in use."""
+    code, info = _kernel.jf_get_engine()
+    _check_info("engine", info)
+    return int(code)
+
+
+def _check_info(routine: str, info: int) -> None:
+    """Raise what a negative `info` means."""
+    if info == _NO_ENGINE:
+        word = reprlib.repr(os.environ.get("JOINTFRF_ENGINE"))
+        raise ValueError(
+            f"the environment variable JOINTFRF_ENGINE is {word}: it must be one of auto, lapack, plain, x86-64-v2, "
+            "x86-64-v3, x86-64-v4 that this machine has"
+        )
+    if info < 0:
+        raise RuntimeError(f"{routine}: {_kernel.jf_info_text(info).decode().strip()}")
+
+
+def run(
+    routine: str,
+    args: Sequence[Any],
+    shape: tuple[int, ...],
+    sweeps: Mapping[str, NDArray[Any]],
+    freq_hz: FloatArray | None,
+    on_singular: OnSingular,
+    rcond_limit: float = RCOND_LIMIT,
+    out: ComplexArray | None = None,
+) -> tuple[ComplexArray, LineStatus]:
+    """Call a kernel routine.
+
+    Parameters
+    ----------
+    routine : str
+        Name without ``jf_``, used in messages too.
+    args : sequence
+        Arguments of the routine in the order of `_kernel.pyf`, up to the result; arrays in C order, `N_FREQ` for the
+        number of lines.
+    shape : tuple of int
+        Shape of the result in C order, (n_freq, out, in).
+    sweeps : mapping of str to ndarray
+        Arguments that have a line axis, by the name the caller knows, to name a bad one. They may lie in a file or be
+        one matrix broadcast to all lines; they are then converted chunk by chunk.
+    freq_hz : ndarray or None
+        Frequencies in Hz for messages.
+    on_singular : {"raise", "nan"}
+        What becomes of bad lines (singular, NaN or Inf inside, overflow).
+    rcond_limit : float
+        Below this reciprocal condition number a line is announced by an `IllConditionedWarning`.
+    out : ndarray or None
+        Where the result goes. All lines are done before a bad one raises: `out` then holds the good lines, and NaN in
+        the bad ones.
+
+    Returns
+    -------
+    result : ndarray, shape `shape`
+    status : LineStatus
+    """
+    check_choice("on_singular", on_singular, get_args(OnSingular))
+    n_freq = shape[0]
+    result = np.empty(shape, np.complex128) if out is None else checked_out(out, shape, args, sweeps)
+    status = LineStatus(np.empty(n_freq, np.int32), np.empty(n_freq))
+    if not result.size:
+        status.line_info[:], status.rcond[:] = 0, 1
+    else:
+        kernel = getattr(_kernel, "jf_" + routine)
+        n_bad = 0
+        for lines in chunks(result, sweeps):
+            chunk = [_argument(a, lines, sweeps) for a in args]
+            info = kernel(*chunk, result[lines].T, status.line_info[lines], status.rcond[lines])
+            _check_info(routine, info)
+            n_bad += info
+            if lines.stop < n_freq:
+                for array in (result, *sweeps.values()):
+                    release(array[lines])
+        check_status(routine, status, n_bad, sweeps, freq_hz, on_singular, rcond_limit)
+    return result, status
+
+
+def _argument(value: Any, lines: slice, sweeps: Mapping[str, NDArray[Any]]) -> Any:
+    """Return an argument as the kernel takes it for these lines."""
+    if value is N_FREQ:
+        return lines.stop - lines.start
+    if not isinstance(value, np.ndarray):
+        return value
+    # f2py copies what has another type or order: the chunk, not the whole.
+    return (value[lines] if any(value is sweep for sweep in sweeps.values()) else value).T
+
+
+def call(routine: str, args: Sequence[Any]) -> None:
+    """Call a kernel routine whose results are among its arguments; arrays in C order, none of size zero."""
+    _check_info(routine, info_of(routine, args))
+
+
+def info_of(routine: str, args: Sequence[Any]) -> int:
+    """Call a kernel routine as `call` does and return its `info` for the caller to judge."""
+    views = [a.T if isinstance(a, np.ndarray) else a for a in args]
+    return int(getattr(_kernel, "jf_" + routine)(*views))

@@ -1,0 +1,143 @@
+"""The matrices of a model as given: their sizes, bands, symmetry, and what kind of damping they hold."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse import csc_matrix
+
+from jointfrf.kernel.arguments import FloatArray, as_real
+
+__all__ = ["Matrix", "ModelMatrices"]
+
+Matrix = Any  # array_like or scipy sparse array
+
+#: Two entries differ by no more than this share of the largest where a matrix is called symmetric.
+_SYMMETRIC = 1e-10
+#: Damping is a M + b K where no entry differs by more than this share of the largest.
+_PROPORTIONAL = 1e-13
+
+
+@dataclass(frozen=True)
+class ModelMatrices:
+    """K, M, C, H and the loss factor of a model, checked.
+
+    Parameters
+    ----------
+    stiffness, mass : array_like or scipy sparse array, shape (n, n)
+        K in N/m, M in kg.
+    damping : array_like or sparse array, shape (n, n), optional
+        Viscous damping C, N s/m.
+    structural_damping : array_like or sparse array, shape (n, n), optional
+        Structural damping H, N/m.
+    loss_factor : float
+        eta of the whole stiffness.
+    """
+
+    stiffness: Matrix
+    mass: Matrix
+    damping: Matrix | None
+    structural_damping: Matrix | None
+    loss_factor: float
+
+    def __post_init__(self) -> None:
+        n: int | None = None
+        for name, matrix in self.named.items():
+            if matrix is None:
+                if name in ("stiffness", "mass"):
+                    raise ValueError(f"{name} is missing")
+                continue
+            shape = matrix.shape if sparse.issparse(matrix) else np.shape(matrix)
+            if len(shape) != 2 or shape[0] != shape[1] or (n is not None and shape[0] != n):
+                wanted = "(n, n)" if n is None else f"({n}, {n})"
+                raise ValueError(f"{name} must have shape {wanted}, not {tuple(shape)}")
+            n = shape[0]
+
+    @property
+    def named(self) -> dict[str, Matrix | None]:
+        """The matrices by the names that the caller knows."""
+        return {
+            "stiffness": self.stiffness,
+            "mass": self.mass,
+            "damping": self.damping,
+            "structural_damping": self.structural_damping,
+        }
+
+    @cached_property
+    def n(self) -> int:
+        """Number of DOFs."""
+        shape = self.stiffness.shape if sparse.issparse(self.stiffness) else np.shape(self.stiffness)
+        return int(shape[0])
+
+    def dense(self, name: str) -> FloatArray | None:
+        """Return a matrix as an array, shape (n, n); None where the model has none."""
+        matrix = self.named[name]
+        if matrix is None:
+            return None
+        return as_real(name, matrix.toarray() if sparse.issparse(matrix) else matrix, (self.n, self.n))
+
+    def sparse(self, name: str) -> sparse.csc_array:
+        """Return a matrix by its entries, shape (n, n); empty where the model has none."""
+        matrix = self.named[name]
+        if matrix is None:
+            return sparse.csc_array((self.n, self.n))
+        found = sparse.csc_array(matrix)
+        found.sum_duplicates()
+        found.data = as_real(name, found.data, (None,))
+        return found
+
+    def dynamic_stiffness(self, omega: float) -> csc_matrix:
+        """Return Z = (1 + i eta) K + i H + i w C - w^2 M by its entries, N/m."""
+        k, m, c, h = (self.sparse(name) for name in self.named)
+        z = (1 + 1j * self.loss_factor) * k + 1j * h + 1j * omega * c - omega**2 * m
+        return csc_matrix(z)
+
+    @cached_property
+    def widths(self) -> tuple[int, int]:
+        """Number of diagonals below and above the main one, over all matrices."""
+        below = above = 0
+        for matrix in self.named.values():
+            if matrix is not None:
+                entries = sparse.coo_array(matrix)
+                distance = entries.col.astype(np.int64) - entries.row
+                below = max(below, -int(distance.min(initial=0)))
+                above = max(above, int(distance.max(initial=0)))
+        return below, above
+
+    def is_symmetric(self, name: str) -> bool:
+        """Whether K or M is symmetric."""
+        matrix = self.sparse(name)
+        return bool(_largest(matrix - matrix.T) <= _SYMMETRIC * _largest(matrix))
+
+    @cached_property
+    def proportional(self) -> tuple[float, float, float] | None:
+        """(a, b, eta) where C = a M + b K and all structural damping is eta K, else None; 1/s, s, 1."""
+        k, m = self.sparse("stiffness"), self.sparse("mass")
+        viscous = _combination(self.sparse("damping"), m, k)
+        structural = _combination(self.sparse("structural_damping"), 0 * m, k)
+        if viscous is None or structural is None:
+            return None
+        return viscous[0], viscous[1], self.loss_factor + structural[1]
+
+
+def _largest(matrix: sparse.csc_array) -> float:
+    return float(np.abs(matrix.data).max(initial=0.0))
+
+
+def _combination(c: sparse.csc_array, m: sparse.csc_array, k: sparse.csc_array) -> tuple[float, float] | None:
+    """Return a, b of C = a M + b K; the simplest that holds."""
+    if _largest(c) == 0:
+        return 0.0, 0.0
+    kk, mm, km = (k * k).sum(), (m * m).sum(), (k * m).sum()
+    ck, cm = (c * k).sum(), (c * m).sum()
+    choices = [(0.0, ck / kk if kk else 0.0), (cm / mm if mm else 0.0, 0.0)]
+    if kk * mm - km**2 > 1e-8 * kk * mm:
+        choices.append(tuple(np.array([cm * kk - ck * km, ck * mm - cm * km]) / (kk * mm - km**2)))
+    for a, b in choices:
+        if _largest(sparse.csc_array(c - a * m - b * k)) <= _PROPORTIONAL * _largest(c):
+            return float(a), float(b)
+    return None

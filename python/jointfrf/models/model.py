@@ -1,0 +1,201 @@
+"""A linear model by its matrices and the names of its DOFs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy import linalg, sparse
+from scipy.sparse import linalg as sparse_linalg
+
+from jointfrf.joint import Joint
+from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.models.matrices import Matrix
+from jointfrf.models.receptance.receptance import Method, receptance
+
+__all__ = ["Model", "assemble"]
+
+#: Up to this size all modes are computed, beyond it only those asked for.
+_DENSE_LIMIT = 50
+#: -(2 pi 1 Hz)^2
+_SHIFT = -((2 * np.pi) ** 2)
+
+
+@dataclass(frozen=True)
+class Model:
+    """Stiffness, mass and damping of a structure.
+
+    Parameters
+    ----------
+    stiffness, mass : scipy sparse array or ndarray, shape (n, n)
+        K in N/m and M in kg.
+    dofs : tuple of str
+        Names of the DOFs, ``"node:direction"`` with nodes counted from 1.
+    damping : sparse array or ndarray, shape (n, n), optional
+        Viscous damping C, N s/m.
+    structural_damping : sparse array or ndarray, shape (n, n), optional
+        Structural damping H, N/m.
+    loss_factor : float
+        Loss factor of the whole stiffness, K (1 + i eta).
+
+    Examples
+    --------
+    >>> import jointfrf as jf
+    >>> model = jf.chain([1.0, 1.0], [2.0, 2.0], ground="start")
+    >>> model.dofs, model.index("2:x")
+    (('1:x', '2:x'), 1)
+    """
+
+    stiffness: sparse.sparray | FloatArray
+    mass: sparse.sparray | FloatArray
+    dofs: tuple[str, ...]
+    damping: sparse.sparray | FloatArray | None = None
+    structural_damping: sparse.sparray | FloatArray | None = None
+    loss_factor: float = 0.0
+
+    def index(self, *names: str) -> int | list[int]:
+        """Return the number of a DOF, or the list of several, counted from 0.
+
+        Raises
+        ------
+        ValueError
+            The model has no such DOF.
+        """
+        for name in names:
+            if name not in self.dofs:
+                raise ValueError(f"the model has no DOF {name!r}; it has {self.dofs[0]!r} to {self.dofs[-1]!r}")
+        found = [self.dofs.index(name) for name in names]
+        return found[0] if len(found) == 1 else found
+
+    def ports(self, *names: str) -> list[int] | sparse.csr_array:
+        """Return what `jointfrf.receptance` takes as outputs or inputs for these names: here DOFs, counted from 0.
+
+        Raises
+        ------
+        ValueError
+            The model has no such DOF.
+        """
+        found = self.index(*names)
+        return [found] if isinstance(found, int) else found
+
+    def receptance(
+        self,
+        freq_hz: ArrayLike,
+        outputs: ArrayLike | Matrix | None = None,
+        inputs: ArrayLike | Matrix | None = None,
+        method: Method = "auto",
+    ) -> ComplexArray:
+        """Receptance of the model, see `jointfrf.receptance`; `inputs` are the `outputs` by default."""
+        return receptance(
+            freq_hz,
+            self.stiffness,
+            self.mass,
+            self.damping,
+            self.loss_factor,
+            self.structural_damping,
+            outputs,
+            outputs if inputs is None else inputs,
+            method=method,
+        )
+
+    def natural_frequencies(self, count: int | None = None) -> FloatArray:
+        """Undamped natural frequencies, lowest first.
+
+        Parameters
+        ----------
+        count : int, optional
+            How many; all by default.
+
+        Returns
+        -------
+        ndarray, shape (count,)
+            Hz.
+        """
+        return self.modes(count)[0]
+
+    def modes(self, count: int | None = None) -> tuple[FloatArray, FloatArray]:
+        """Undamped natural frequencies, lowest first, and their shapes.
+
+        Parameters
+        ----------
+        count : int, optional
+            How many; all by default.
+
+        Returns
+        -------
+        freq_hz : ndarray, shape (count,)
+            Hz; about 0 for a rigid-body motion.
+        shapes : ndarray, shape (n, count)
+            Unit modal masses, 1/sqrt(kg).
+        """
+        n = len(self.dofs)
+        k, m = sparse.csc_array(self.stiffness), sparse.csc_array(self.mass)
+        if count is None or count > n - 2 or n <= _DENSE_LIMIT:
+            squared, shapes = linalg.eigh(k.toarray(), m.toarray())
+        else:
+            # Shifted below zero, where K - shift M is regular even for a free structure; a fixed start, to repeat it.
+            squared, shapes = sparse_linalg.eigsh(k, count, m, sigma=_SHIFT, v0=np.ones(n))
+        order = np.argsort(squared)[:count]
+        freq: FloatArray = np.sqrt(np.maximum(squared[order], 0)) / (2 * np.pi)
+        return freq, shapes[:, order]
+
+
+def _block_diagonal(
+    a: sparse.sparray | FloatArray | None, b: sparse.sparray | FloatArray | None, n_a: int, n_b: int
+) -> sparse.csr_array:
+    blocks = [sparse.csr_array((n, n)) if x is None else sparse.csr_array(x) for x, n in ((a, n_a), (b, n_b))]
+    return sparse.csr_array(sparse.block_diag(blocks, format="csr"))
+
+
+def assemble(a: Model, b: Model, joint: Joint, dofs_a: Sequence[int], dofs_b: Sequence[int]) -> Model:
+    """Assembly of two models through a joint, by adding the joint to the matrices.
+
+    Parameters
+    ----------
+    a, b : Model
+        The substructures.
+    joint : Joint
+        The joint.
+    dofs_a, dofs_b : sequence of int
+        Joint DOFs j of A and k of B, counted from 0, in the order of the joint.
+
+    Returns
+    -------
+    Model
+        DOFs of A (named ``"A/..."``), then of B (``"B/..."``). A loss factor becomes a structural damping matrix.
+
+    Raises
+    ------
+    ValueError
+        The numbers of DOFs differ.
+
+    Examples
+    --------
+    >>> import jointfrf as jf
+    >>> a = jf.chain([5, 3], [2500, 3500], [3, 4], ground="start")
+    >>> b = jf.chain([4, 2], [2000, 2500], [2, 1], ground="end")
+    >>> jf.assemble(a, b, jf.Joint([2000.0], [3.0]), [1], [0]).natural_frequencies().round(3).tolist()
+    [2.598, 4.682, 7.77, 8.374]
+    """
+    n_a, n_b, n_j = len(a.dofs), len(b.dofs), len(joint.dofs)
+    if not len(dofs_a) == len(dofs_b) == n_j:
+        raise ValueError(f"dofs_a and dofs_b must name {n_j} DOFs each, not {len(dofs_a)} and {len(dofs_b)}")
+    rows = np.tile(np.arange(n_j), 2)
+    columns = np.concatenate([np.asarray(dofs_a), n_a + np.asarray(dofs_b)])
+    relative = sparse.csr_array((np.repeat([1.0, -1.0], n_j), (rows, columns)), shape=(n_j, n_a + n_b))
+
+    def across(matrix: FloatArray) -> sparse.csr_array:
+        return sparse.csr_array(relative.T @ sparse.csr_array(matrix) @ relative)
+
+    losses = [
+        (0 if m.structural_damping is None else m.structural_damping) + m.loss_factor * m.stiffness for m in (a, b)
+    ]
+    return Model(
+        stiffness=_block_diagonal(a.stiffness, b.stiffness, n_a, n_b) + across(joint.stiffness),
+        mass=_block_diagonal(a.mass, b.mass, n_a, n_b),
+        damping=_block_diagonal(a.damping, b.damping, n_a, n_b) + across(joint.damping),
+        structural_damping=_block_diagonal(losses[0], losses[1], n_a, n_b) + across(joint.hysteretic_stiffness),
+        dofs=tuple(f"A/{d}" for d in a.dofs) + tuple(f"B/{d}" for d in b.dofs),
+    )

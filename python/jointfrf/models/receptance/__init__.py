@@ -1,0 +1,1 @@
+"""Receptance of a model: direct solution, superposition of modes, reduction by rational Krylov vectors."""

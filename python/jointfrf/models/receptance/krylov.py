@@ -1,0 +1,266 @@
+"""Rational Krylov reduction of a model with one loss factor or proportional damping, and how its error is estimated."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg, sparse
+from scipy.sparse import linalg as sparse_linalg
+
+from jointfrf.kernel.arguments import FloatArray
+from jointfrf.models.matrices import ModelMatrices
+from jointfrf.models.ports import Ports, directions
+from jointfrf.models.receptance.direct import SYMMETRIC
+from jointfrf.models.receptance.modal import Modes
+from jointfrf.models.receptance.rigid_modes import RigidMotions, find_rigid_motions, held
+
+__all__ = ["Reduction", "reduce_model", "spot_error"]
+
+#: Shifts to begin with; solutions at each for every force, and in all: few forces need more of them.
+_FIRST_SHIFTS, _MOMENTS, _VECTORS = 1, 4, 40
+#: Shifts are added up to this number, and vectors up to this share of the DOFs.
+_MOST_SHIFTS, _MOST_VECTORS = 40, 0.5
+#: Below this error a refinement that gains less than a factor of three has reached the round-off of the model.
+_NEAR = 1e-4
+#: Directions smaller than this share of their vector are not new.
+_NEW_DIRECTION = 1e-12
+#: Lines whose residual is looked at, and those of them that are solved directly.
+_CANDIDATES, _SPOTS = 40, 4
+#: In a model of this many DOFs a direct solution costs more than all the rest: it is compared at the worst line only.
+_LARGE, _FEW_SPOTS = 10_000, 1
+#: Rounding may move the modes of a reduced model by this many times what it moves a direct solution by.
+_LOSS = 30
+
+
+@dataclass(frozen=True)
+class Reduction:
+    """A reduced model that is ready for superposition.
+
+    Parameters
+    ----------
+    modes : Modes
+        Modes of the reduced model.
+    error_estimate : float
+        Largest difference to a direct solution, relative to the largest entry of its line.
+    n_vectors : int
+        Size of the reduced model.
+    attainable : float
+        What rounding leaves of a direct solution, times what a sum of modes may lose more.
+    """
+
+    modes: Modes
+    error_estimate: float
+    n_vectors: int
+    attainable: float
+
+
+def reduce_model(
+    freq_hz: FloatArray, matrices: ModelMatrices, outputs: Ports, inputs: Ports, tolerance: float
+) -> Reduction:
+    """Project a model on solutions at a few frequencies, more of them until the tolerance is met or no longer nearer.
+
+    Parameters
+    ----------
+    freq_hz : ndarray, shape (n_freq,)
+        Frequencies that will be asked for, Hz.
+    matrices : ModelMatrices
+        Symmetric K and M, damping a M + b K and one loss factor.
+    outputs, inputs : Ports
+    tolerance : float
+        Wanted relative error of a line.
+
+    Returns
+    -------
+    Reduction
+        Its error estimate may exceed the tolerance.
+
+    Raises
+    ------
+    ValueError
+        K or M is not symmetric, or the damping couples the modes.
+
+    Notes
+    -----
+    The space is spanned by (K - s M)^-1 B, (K - s M)^-1 M (K - s M)^-1 B, ... at real shifts s = w^2, with unit forces
+    B at inputs and outputs. With damping a M + b K and a loss factor the undamped space serves all dampings; because it
+    serves outputs too, errors of the projection enter the receptance squared. The residual says at which lines the
+    reduced model is worst; there and at both ends, of a large model at the worst line only, it is compared with a
+    direct solution. The error between these lines is not bounded.
+
+    A structure that is not held moves as a rigid body, too. Rounding gives these motions a stiffness; near 0 Hz it
+    would spoil any solution, reduced or direct. They are found and taken out, and enter as what they are, r r^T / -w^2.
+    """
+    for name in ("stiffness", "mass"):
+        if not matrices.is_symmetric(name):
+            raise ValueError(f"{name} is not symmetric: method 'krylov' cannot be used, 'sparse' or 'dense' can")
+    if matrices.proportional is None:
+        raise ValueError("damping couples the modes: method 'krylov' cannot be used, 'sparse' or 'dense' can")
+    task = _Reducer(freq_hz, matrices, outputs, inputs)
+    low, high = float(freq_hz.min()), float(freq_hz.max())
+    place = (1 - np.cos(np.pi * (np.arange(_FIRST_SHIFTS) + 0.5) / _FIRST_SHIFTS)) / 2
+    shifts = [(2 * np.pi * f) ** 2 for f in low + place * (high - low)]
+    best: Reduction | None = None
+    vain = 0
+    new = shifts
+    while True:
+        for shift in new:
+            task.extend(shift)
+        if best is None:
+            task.take_out_rigid_motions()
+        found, worst = task.project()
+        gained = best is None or found.error_estimate < best.error_estimate / 3
+        if best is None or found.error_estimate < best.error_estimate:
+            best = found
+        vain = 0 if gained or found.error_estimate > _NEAR else vain + 1
+        enough = len(shifts) >= _MOST_SHIFTS or task.basis.shape[1] > _MOST_VECTORS * matrices.n
+        if best.error_estimate <= max(tolerance, best.attainable) or vain >= 2 or enough:
+            return best
+        new = [shift for shift in (2 * np.pi * worst) ** 2 if shift not in shifts][: 1 + len(shifts) // 2]
+        if not new:
+            return best
+        shifts = shifts + new
+
+
+class _Reducer:
+    """A model, what is asked of it, and the space found so far: orthonormal, without rigid motions."""
+
+    def __init__(self, freq_hz: FloatArray, matrices: ModelMatrices, outputs: Ports, inputs: Ports) -> None:
+        assert matrices.proportional is not None
+        self.freq_hz, self.matrices, self.outputs, self.inputs = freq_hz, matrices, outputs, inputs
+        self.k, self.m = matrices.sparse("stiffness"), matrices.sparse("mass")
+        self.a, self.b, self.eta = matrices.proportional
+        self.forces = directions(outputs, inputs)
+        self.rigid = held(matrices.n)
+        self.basis = np.zeros((matrices.n, 0))
+
+    def extend(self, shift: float) -> None:
+        """Add the solutions at one more shift."""
+        try:
+            factors = sparse_linalg.splu(sparse.csc_matrix(self.k - shift * self.m), **SYMMETRIC)
+            vectors = [factors.solve(self.rigid.straining_forces(self.forces))]
+            for _ in range(max(_MOMENTS, -(-_VECTORS // self.forces.shape[1])) - 1):
+                last = self.rigid.strains(vectors[-1] / np.linalg.norm(vectors[-1], axis=0))
+                vectors.append(factors.solve(self.m @ last))
+        except RuntimeError:  # exactly singular: the next shift will do
+            return
+        block = self.rigid.strains(np.hstack(vectors))
+        if not np.isfinite(block).all():
+            return
+        block = block / np.linalg.norm(block, axis=0)
+        for _ in range(2):  # twice is enough
+            block = block - self.basis @ (self.basis.T @ block)
+        q, r, _ = linalg.qr(block, mode="economic", pivoting=True)
+        q = q[:, abs(np.diagonal(r)) > _NEW_DIRECTION]
+        q = q - self.basis @ (self.basis.T @ q)
+        self.basis = np.hstack([self.basis, linalg.qr(q, mode="economic")[0]])
+
+    def modes(self) -> tuple[FloatArray, FloatArray]:
+        """Modes of the space, w^2 and shapes (n, k), without the rigid motions."""
+        stiffness, mass = self.basis.T @ (self.k @ self.basis), self.basis.T @ (self.m @ self.basis)
+        squared, shapes = linalg.eigh((stiffness + stiffness.T) / 2, (mass + mass.T) / 2)
+        return np.maximum(squared, 0), self.basis @ shapes
+
+    def take_out_rigid_motions(self) -> None:
+        """Find them in the space, and keep what is left of it."""
+        try:
+            self.rigid = find_rigid_motions(self.k, self.m, *self.modes())
+        except (np.linalg.LinAlgError, ValueError):
+            return
+        if self.rigid.shapes.size:
+            left, r, _ = linalg.qr(self.rigid.strains(self.basis), mode="economic", pivoting=True)
+            kept = left[:, abs(np.diagonal(r)) > _NEW_DIRECTION**0.5]
+            self.basis = linalg.qr(self.rigid.strains(kept), mode="economic")[0]
+
+    def project(self) -> tuple[Reduction, FloatArray]:
+        """Return the reduced model and the frequencies where it is worst, Hz, worst first."""
+        freq, count = self.freq_hz, self.rigid.shapes.shape[1]
+        size = self.basis.shape[1] + count
+        try:
+            squared, shapes = self.modes()
+        except (np.linalg.LinAlgError, ValueError):
+            empty = np.zeros(0)
+            none = Modes(empty, empty, empty, np.zeros((len(self.outputs), 0)), np.zeros((len(self.inputs), 0)))
+            return Reduction(none, np.inf, size, 0.0), freq[[freq.size // 2]]
+        squared = np.concatenate([np.zeros(count), squared])
+        shapes = np.hstack([self.rigid.shapes, shapes])
+        damping, loss = self.a + self.b * squared, np.full(size, self.eta)
+        modes = Modes(squared, damping, loss, self.outputs.of(shapes), self.inputs.of(shapes))
+        worst = self._worst_lines(modes, shapes)
+        spots = [worst[0], freq.argmin(), freq.argmax(), *worst[1:]]
+        lines = np.unique(spots[: _SPOTS if self.matrices.n < _LARGE else _FEW_SPOTS])
+        error, attainable = spot_error(freq[lines], self.matrices, modes, self.outputs, self.inputs, self.rigid)
+        return Reduction(modes, error, size, attainable), freq[worst]
+
+    def _worst_lines(self, modes: Modes, shapes: FloatArray) -> NDArray[np.intp]:
+        """Lines among candidates in the order of their residual Z x - b, largest first."""
+        freq, size = self.freq_hz, shapes.shape[1]
+        # Lengths of sums of these columns are those of sums of the columns of a small triangle.
+        columns = np.hstack([self.k @ shapes, self.m @ shapes, self.inputs.forces()])
+        triangle = linalg.qr(columns, mode="r")[0][: columns.shape[1]]
+        by_k, by_m, forces = triangle[:, :size], triangle[:, size : 2 * size], triangle[:, 2 * size :]
+        ascending = np.argsort(freq)
+        spread = ascending[np.linspace(0, freq.size - 1, min(_CANDIDATES, freq.size)).astype(int)]
+        residual = np.empty(spread.size)
+        for i, omega in enumerate(2 * np.pi * freq[spread]):
+            denominator = modes.stiffness * (1 + 1j * self.eta) - omega**2 + 1j * omega * modes.damping
+            inverse = np.divide(1, denominator, out=np.zeros_like(denominator), where=denominator != 0)
+            x = inverse[:, None] * modes.shapes_in.T
+            elastic = (1 + 1j * self.eta + 1j * omega * self.b) * (by_k @ x)
+            left = elastic + (1j * omega * self.a - omega**2) * (by_m @ x) - forces
+            residual[i] = np.linalg.norm(left) / max(np.linalg.norm(elastic), np.finfo(float).tiny)
+        return np.take(spread, np.argsort(residual)[::-1])
+
+
+def spot_error(
+    freq_hz: FloatArray,
+    matrices: ModelMatrices,
+    modes: Modes,
+    outputs: Ports,
+    inputs: Ports,
+    rigid: RigidMotions | None = None,
+) -> tuple[float, float]:
+    """Largest difference to direct solutions at a few lines, and how small rounding lets it become.
+
+    Parameters
+    ----------
+    freq_hz : ndarray, shape (n_lines,)
+        A few frequencies, Hz.
+    rigid : RigidMotions, optional
+        What is solved by its mass alone.
+
+    Returns
+    -------
+    error : float
+        Relative to the largest entry of the line; inf where there is no direct solution.
+    attainable : float
+        Some times the last step of a refinement of the direct solutions, which is all rounding.
+    """
+    found = modes.receptance(freq_hz, "nan")
+    parts = held(matrices.n) if rigid is None else rigid
+    a = matrices.proportional[0] if matrices.proportional else 0.0
+    forces = inputs.forces()
+    straining = parts.straining_forces(forces).astype(np.complex128)
+    thrust = outputs.of(parts.shapes) @ (parts.shapes.T @ forces)
+    errors, rounding = np.full(freq_hz.size, np.inf), 0.0
+    for i, omega in enumerate(2 * np.pi * freq_hz):
+        inertia = 1j * omega * a - omega**2
+        if parts.shapes.size and inertia == 0:  # nothing holds the body: superposition names the line as singular
+            errors[i] = 0
+            continue
+        z = matrices.dynamic_stiffness(omega)
+        try:
+            factors = sparse_linalg.splu(z, **SYMMETRIC)
+        except RuntimeError:  # singular
+            continue
+        x = factors.solve(straining)
+        step = outputs.of(parts.strains(factors.solve(straining - z @ x)))
+        exact = outputs.of(parts.strains(x)) + step
+        if parts.shapes.size:
+            exact = exact + thrust / inertia
+        size = max(abs(exact).max(initial=0), np.finfo(float).tiny)
+        error = abs(found[i] - exact).max(initial=0) / size
+        errors[i] = error if np.isfinite(error) else np.inf
+        rounding = max(rounding, float(abs(step).max(initial=0) / size))
+    return float(errors.max(initial=0)), _LOSS * rounding

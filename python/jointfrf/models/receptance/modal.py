@@ -1,0 +1,99 @@
+"""Receptance of a model as a sum over modes, all of them or those of a reduced model."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import linalg
+
+from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.kernel.call import N_FREQ, run
+from jointfrf.kernel.status import OnSingular
+from jointfrf.models.matrices import ModelMatrices
+from jointfrf.models.ports import Ports
+from jointfrf.models.receptance.direct import SINGULAR
+
+__all__ = ["Modes", "all_modes"]
+
+#: A modal damping matrix is diagonal if nothing beside its diagonal exceeds this share of it.
+_DIAGONAL = 1e-8
+
+
+@dataclass(frozen=True)
+class Modes:
+    """Modes with unit modal masses.
+
+    Parameters
+    ----------
+    stiffness : ndarray, shape (n_modes,)
+        w_r^2, (rad/s)^2.
+    damping : ndarray, shape (n_modes,)
+        Viscous, 2 zeta w_r, rad/s.
+    loss_factor : ndarray, shape (n_modes,)
+        eta of each mode.
+    shapes_out, shapes_in : ndarray, shape (n_out, n_modes), (n_in, n_modes)
+        Shapes at responses and forces, 1/sqrt(kg).
+    """
+
+    stiffness: FloatArray
+    damping: FloatArray
+    loss_factor: FloatArray
+    shapes_out: FloatArray
+    shapes_in: FloatArray
+
+    def receptance(self, freq_hz: FloatArray, on_singular: OnSingular, out: ComplexArray | None = None) -> ComplexArray:
+        """Sum of phi phi^T / (w_r^2 (1 + i eta) - w^2 + i w c) over the modes.
+
+        Returns
+        -------
+        ndarray, shape (n_freq, n_out, n_in)
+            m/N.
+        """
+        shape = (freq_hz.size, self.shapes_out.shape[0], self.shapes_in.shape[0])
+        omega = 2 * np.pi * freq_hz
+        args = (
+            self.stiffness.size,
+            N_FREQ,
+            *shape[1:],
+            omega,
+            self.stiffness,
+            self.damping,
+            self.loss_factor,
+            np.ascontiguousarray(self.shapes_out),
+            np.ascontiguousarray(self.shapes_in),
+        )
+        return run("receptance_modal", args, shape, {"omega": omega}, freq_hz, on_singular, SINGULAR, out)[0]
+
+
+def all_modes(matrices: ModelMatrices, outputs: Ports, inputs: Ports) -> Modes:
+    """All modes of a model whose damping does not couple them.
+
+    Raises
+    ------
+    ValueError
+        K or M is not symmetric, M is not positive definite, or damping couples the modes.
+    """
+    for name in ("stiffness", "mass"):
+        if not matrices.is_symmetric(name):
+            raise ValueError(f"{name} is not symmetric: method 'modal' cannot be used, 'dense' or 'sparse' can")
+    try:
+        squared, shapes = linalg.eigh(matrices.dense("stiffness"), matrices.dense("mass"))
+    except np.linalg.LinAlgError as error:
+        raise ValueError("mass is not positive definite: method 'modal' cannot be used") from error
+
+    def modal(name: str) -> FloatArray:
+        matrix = matrices.dense(name)
+        if matrix is None:
+            return np.zeros(matrices.n)
+        projected = shapes.T @ matrix @ shapes
+        diagonal = np.diagonal(projected).copy()
+        rest = abs(projected - np.diag(diagonal)).max(initial=0)
+        if rest > _DIAGONAL * abs(diagonal).max(initial=0):
+            raise ValueError(f"{name} couples the modes: method 'modal' cannot be used, 'dense' or 'sparse' can")
+        return diagonal
+
+    stiffness = np.maximum(squared, 0)
+    structural = modal("structural_damping")
+    losses = matrices.loss_factor + np.divide(structural, stiffness, out=np.zeros(matrices.n), where=stiffness > 0)
+    return Modes(stiffness, modal("damping"), losses, outputs.of(shapes), inputs.of(shapes))

@@ -1,0 +1,326 @@
+"""Receptance of a model from its matrices (2.28)-(2.29)."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from typing import Literal, cast, get_args, overload
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from jointfrf.channels.finite_differences import transform
+from jointfrf.errors import ConvergenceWarning
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_frequency, as_number, check_choice
+from jointfrf.kernel.status import OnSingular
+from jointfrf.models.matrices import Matrix, ModelMatrices
+from jointfrf.models.ports import Ports, as_ports, directions
+from jointfrf.models.receptance.direct import solve_banded, solve_dense, solve_sparse
+from jointfrf.models.receptance.krylov import reduce_model, spot_error
+from jointfrf.models.receptance.modal import Modes, all_modes
+
+__all__ = ["Method", "ReceptanceInfo", "receptance"]
+
+Direct = Literal["dense", "banded", "sparse"]
+Method = Literal["auto", "dense", "banded", "sparse", "modal", "krylov"]
+
+#: A matrix with a wider band than this share of its size is solved as a dense one.
+_BAND_LIMIT = 0.25
+#: Up to this band, or this size, a direct solution of many lines side by side is as fast as any reduction.
+_NARROW, _SMALL = 64, 64
+#: Beyond this size all modes cost more than a reduced model.
+_ALL_MODES = 600
+#: A reduction pays for itself from this number of lines on, and up to this number of DOFs that are asked for.
+_MANY_LINES, _FEW_DOFS = 32, 64
+#: Larger models with fewer entries than this share of a full matrix are factored by their entries.
+_SPARSE = 0.1
+#: Lines at which a sum of all modes is compared with a direct solution.
+_SPOTS = 3
+
+
+@dataclass(frozen=True)
+class ReceptanceInfo:
+    """How receptances were calculated.
+
+    Parameters
+    ----------
+    method : {"dense", "banded", "sparse", "modal", "krylov"}
+        What was done in the end.
+    reason : str
+        Why, in a sentence.
+    error_estimate : float or None
+        Of "modal" and "krylov": largest difference to a direct solution at a few lines, relative to the largest entry
+        of the line. None for a direct solution.
+    tolerance : float or None
+        What the estimate had to meet, unless rounding keeps a direct solution from it, too.
+    n_vectors : int or None
+        Modes, or vectors of the reduced model.
+    """
+
+    method: Literal["dense", "banded", "sparse", "modal", "krylov"]
+    reason: str
+    error_estimate: float | None = None
+    tolerance: float | None = None
+    n_vectors: int | None = None
+
+
+@dataclass(frozen=True)
+class _Task:
+    """What was asked for."""
+
+    freq_hz: FloatArray
+    matrices: ModelMatrices
+    outputs: Ports
+    inputs: Ports
+    on_singular: OnSingular
+    tolerance: float
+    out: ComplexArray | None
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether there are no lines, or no DOF has a weight."""
+        return not (self.freq_hz.size and (self.outputs.weights.nnz or self.inputs.weights.nnz))
+
+
+@overload
+def receptance(
+    freq_hz: ArrayLike,
+    stiffness: Matrix,
+    mass: Matrix,
+    damping: Matrix | None = ...,
+    loss_factor: float = ...,
+    structural_damping: Matrix | None = ...,
+    outputs: ArrayLike | Matrix | None = ...,
+    inputs: ArrayLike | Matrix | None = ...,
+    method: Method = ...,
+    *,
+    on_singular: OnSingular = ...,
+    out: ComplexArray | None = ...,
+    tolerance: float = ...,
+    full_output: Literal[False] = ...,
+) -> ComplexArray: ...
+
+
+@overload
+def receptance(
+    freq_hz: ArrayLike,
+    stiffness: Matrix,
+    mass: Matrix,
+    damping: Matrix | None = ...,
+    loss_factor: float = ...,
+    structural_damping: Matrix | None = ...,
+    outputs: ArrayLike | Matrix | None = ...,
+    inputs: ArrayLike | Matrix | None = ...,
+    method: Method = ...,
+    *,
+    on_singular: OnSingular = ...,
+    out: ComplexArray | None = ...,
+    tolerance: float = ...,
+    full_output: Literal[True],
+) -> tuple[ComplexArray, ReceptanceInfo]: ...
+
+
+def receptance(
+    freq_hz: ArrayLike,
+    stiffness: Matrix,
+    mass: Matrix,
+    damping: Matrix | None = None,
+    loss_factor: float = 0.0,
+    structural_damping: Matrix | None = None,
+    outputs: ArrayLike | Matrix | None = None,
+    inputs: ArrayLike | Matrix | None = None,
+    method: Method = "auto",
+    *,
+    on_singular: OnSingular = "raise",
+    out: ComplexArray | None = None,
+    tolerance: float = 1e-8,
+    full_output: bool = False,
+) -> ComplexArray | tuple[ComplexArray, ReceptanceInfo]:
+    """Receptance ((1 + i eta) K + i H + i w C - w^2 M)^-1 at chosen DOFs.
+
+    Parameters
+    ----------
+    freq_hz : array_like, shape (n_freq,)
+        Frequencies in Hz.
+    stiffness, mass : array_like or scipy sparse array, shape (n, n)
+        K in N/m, M in kg.
+    damping : array_like or sparse array, shape (n, n), optional
+        Viscous damping C, N s/m.
+    loss_factor : float
+        eta of the whole stiffness.
+    structural_damping : array_like or sparse array, shape (n, n), optional
+        Structural damping H, N/m.
+    outputs, inputs : array_like of int, or of shape (m, n), optional
+        DOFs of responses and of forces, counted from 0; all by default. Or weights of all DOFs for each response or
+        force, an array or sparse array: a mean, a difference, a point between nodes.
+    method : {"auto", "dense", "banded", "sparse", "modal", "krylov"}
+        "dense": full matrices solved on every line. "banded": the same in band storage. "sparse": a sparse
+        factorisation of every line (SuperLU). All three take any damping.
+        "modal": all modes once, then their sum; for symmetric K and M and damping that the undamped modes diagonalise.
+        "krylov": the model is reduced to solutions at a few frequencies; for symmetric K and M, damping a M + b K and
+        one loss factor. Where `tolerance` is not met, the model is solved and a warning says so. "auto" chooses, see
+        Notes.
+    on_singular : {"raise", "nan"}
+        Whether a bad line raises or becomes NaN.
+    out : ndarray of complex128, shape (n_freq, n_out, n_in), optional
+        Where the result goes, as in `invert`.
+    tolerance : float
+        What the error estimate of "krylov", and of "modal" where "auto" chose it, must meet: the largest error of a
+        line relative to its largest entry. Where rounding limits a direct solution, too, 30 times its rounding
+        will do.
+    full_output : bool
+        Whether a `ReceptanceInfo` is returned too: what was done, why, and the error estimate.
+
+    Returns
+    -------
+    h : ndarray, shape (n_freq, n_out, n_in)
+        m/N (rotational rows rad/N, rotational columns m/(N m)).
+    info : ReceptanceInfo
+        Only with `full_output`.
+
+    Raises
+    ------
+    SingularLineError
+        A line hits an undamped natural frequency, or 0 Hz of a free structure.
+    ValueError
+        Wrong shapes or DOFs, NaN or Inf; "modal" or "krylov" with damping that couples the modes.
+
+    Warns
+    -----
+    ConvergenceWarning
+        "krylov" did not meet the tolerance; the model was solved instead.
+
+    Notes
+    -----
+    Eqs. (2.28), (2.29), with i w C for viscous damping. Cost a line: n^3 (dense), n b^2 (band of b diagonals),
+    n_vectors n_out n_in (modal, krylov); about n^1.5 for a sparse solution of a solid.
+
+    "auto" solves in band storage where the band is narrow, and full matrices where the model is small. Many lines of a
+    larger symmetric model with damping a M + b K and one loss factor are a sum of modes, all of them or those of a
+    reduced model. That sum is compared with direct solutions at a few lines: at both ends, and of a reduced model where
+    its residual is largest. Motions as a rigid body are treated apart before, by their mass alone: near 0 Hz rounding
+    hides them from any solution of a structure that is not held. Where the tolerance is not met, the model is solved.
+    The error between these lines is estimated, not bounded. Any other damping is solved, and so is a model of many DOFs
+    and few entries, by a sparse factorisation.
+
+    Examples
+    --------
+    >>> import jointfrf as jf
+    >>> jf.receptance([0.0], [[2.0]], [[1.0]], loss_factor=1.0).tolist()
+    [[[(0.25-0.25j)]]]
+    >>> beam = jf.beam(0.3, 40, youngs_modulus=67e9, density=2700.0, width=0.025, height=0.006)
+    >>> h, info = jf.receptance([50.0], beam.stiffness, beam.mass, outputs=[0], inputs=[0], full_output=True)
+    >>> info.method, info.reason
+    ('banded', 'narrow band: 3 diagonals below and 3 above the main one')
+    """
+    check_choice("method", method, get_args(Method))
+    freq = as_frequency(freq_hz)
+    matrices = ModelMatrices(stiffness, mass, damping, structural_damping, as_number("loss_factor", loss_factor))
+    n = matrices.n
+    to, into = as_ports("outputs", outputs, n), as_ports("inputs", inputs, n)
+    wanted = as_number("tolerance", tolerance)
+    if not wanted > 0:
+        raise ValueError(f"tolerance must be positive, not {wanted}")
+    task = _Task(freq, matrices, to, into, on_singular, wanted, out)
+    if method in ("dense", "banded", "sparse"):
+        result, info = _solved(task, cast(Direct, method), "as asked for")
+    elif method == "modal":
+        modes = all_modes(matrices, to, into)
+        result = modes.receptance(freq, on_singular, out)
+        info = ReceptanceInfo("modal", "as asked for", n_vectors=modes.stiffness.size)
+    elif method == "krylov":
+        result, info = _reduced(task, "as asked for")
+        if info.method != "krylov" and not task.is_empty:
+            warnings.warn(f"receptance: {info.reason}", ConvergenceWarning, stacklevel=2)
+    else:
+        result, info = _automatic(task)
+    return (result, info) if full_output else result
+
+
+def _direct(matrices: ModelMatrices) -> Direct:
+    """How a model is solved best on every line."""
+    n, widths = matrices.n, matrices.widths
+    if n > 8 and max(widths) < _NARROW and sum(widths) < _BAND_LIMIT * n:
+        return "banded"
+    if n > _ALL_MODES and sum(matrices.sparse(name).nnz for name in ("stiffness", "mass")) < _SPARSE * n**2:
+        return "sparse"
+    return "banded" if n > 8 and sum(widths) < _BAND_LIMIT * n else "dense"
+
+
+def _automatic(task: _Task) -> tuple[ComplexArray, ReceptanceInfo]:
+    """Choose by size, band, damping and number of lines."""
+    matrices, n = task.matrices, task.matrices.n
+    kl, ku = matrices.widths
+    direct = _direct(matrices)
+    n_ports = directions(task.outputs, task.inputs).shape[1]
+    if direct == "banded" and max(kl, ku) < _NARROW:
+        return _solved(task, direct, f"narrow band: {kl} diagonals below and {ku} above the main one")
+    if n <= _SMALL:
+        return _solved(task, "dense", f"small model: {n} DOFs")
+    if task.freq_hz.size < _MANY_LINES:
+        return _solved(task, direct, f"few lines: {task.freq_hz.size}")
+    if matrices.proportional is None:
+        return _solved(task, direct, "damping couples the modes")
+    if not (matrices.is_symmetric("stiffness") and matrices.is_symmetric("mass")):
+        return _solved(task, direct, "stiffness or mass is not symmetric")
+    if n <= _ALL_MODES:
+        return _summed(task, f"{task.freq_hz.size} lines of {n} DOFs whose modes the damping does not couple")
+    if n_ports > _FEW_DOFS:
+        return _solved(task, direct, f"many DOFs are asked for: {n_ports}")
+    return _reduced(task, f"{task.freq_hz.size} lines of {n} DOFs whose modes the damping does not couple")
+
+
+def _solved(task: _Task, how: Direct, reason: str) -> tuple[ComplexArray, ReceptanceInfo]:
+    """Direct solution."""
+    freq, matrices, on_singular = task.freq_hz, task.matrices, task.on_singular
+    to, into = task.outputs, task.inputs
+    if how == "sparse":
+        result = solve_sparse(freq, matrices, to, into, on_singular, task.out)
+        return result, ReceptanceInfo(how, reason)
+    solve = solve_banded if how == "banded" else solve_dense
+    if to.picked is not None and into.picked is not None:
+        result = solve(freq, matrices, to.picked, into.picked, on_singular, task.out)
+    else:
+        h = solve(freq, matrices, to.needed, into.needed, on_singular)
+        t_out, t_in = (ports.weights[:, ports.needed - 1].toarray() for ports in (to, into))
+        result = transform(h, t_out, t_in, freq_hz=freq, on_singular=on_singular, out=task.out)
+    return result, ReceptanceInfo(how, reason)
+
+
+def _fallen_back(task: _Task, error: float, n_vectors: int, what: str) -> tuple[ComplexArray, ReceptanceInfo]:
+    """Direct solution after a sum of modes that was not good enough."""
+    reason = (
+        f"{what} of {n_vectors} vectors has the error estimate {error:.1e}, above the tolerance {task.tolerance:.1e}"
+    )
+    return _solved(task, _direct(task.matrices), reason)
+
+
+def _summed(task: _Task, reason: str) -> tuple[ComplexArray, ReceptanceInfo]:
+    """All modes, where they meet the tolerance."""
+    try:
+        modes = all_modes(task.matrices, task.outputs, task.inputs)
+    except ValueError as refusal:
+        return _solved(task, _direct(task.matrices), str(refusal).split(":")[0])
+    order = np.argsort(task.freq_hz)
+    lines = order[np.linspace(0, order.size - 1, _SPOTS).astype(int)]
+    error, attainable = spot_error(task.freq_hz[lines], task.matrices, modes, task.outputs, task.inputs)
+    return _finished(task, modes, error, attainable, "modal", reason)
+
+
+def _reduced(task: _Task, reason: str) -> tuple[ComplexArray, ReceptanceInfo]:
+    """Reduced model, where it meets the tolerance."""
+    if task.is_empty:
+        return _solved(task, _direct(task.matrices), "no lines, or no DOFs with a weight")
+    found = reduce_model(task.freq_hz, task.matrices, task.outputs, task.inputs, task.tolerance)
+    return _finished(task, found.modes, found.error_estimate, found.attainable, "krylov", reason)
+
+
+def _finished(
+    task: _Task, modes: Modes, error: float, attainable: float, method: Literal["modal", "krylov"], reason: str
+) -> tuple[ComplexArray, ReceptanceInfo]:
+    """Sum of modes, or a direct solution where its error is too large."""
+    n_vectors = modes.stiffness.size
+    if not error <= max(task.tolerance, attainable):
+        return _fallen_back(task, error, n_vectors, "a sum of modes" if method == "modal" else "a reduced model")
+    result = modes.receptance(task.freq_hz, task.on_singular, task.out)
+    return result, ReceptanceInfo(method, reason, error, task.tolerance, n_vectors)

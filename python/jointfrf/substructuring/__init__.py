@@ -1,0 +1,1 @@
+"""Coupling of substructures and the ways back to the joint, one equation of the thesis each."""

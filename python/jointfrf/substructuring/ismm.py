@@ -1,0 +1,113 @@
+"""Joint stiffness by inverse structural modification (2.37)-(2.48), and what it reduces to."""
+
+from __future__ import annotations
+
+from numpy.typing import ArrayLike
+
+from jointfrf.kernel.arguments import ComplexArray, as_interface, as_joint_lines, optional_frequency
+from jointfrf.kernel.call import N_FREQ, run
+from jointfrf.kernel.status import OnSingular
+
+__all__ = ["inverse_substructuring", "ismm"]
+
+
+def ismm(
+    alpha: ArrayLike,
+    gamma: ArrayLike,
+    k_initial: ArrayLike,
+    *,
+    freq_hz: ArrayLike | None = None,
+    on_singular: OnSingular = "raise",
+    out: ComplexArray | None = None,
+) -> ComplexArray:
+    """Joint stiffness K* = K0 + Delta by the inverse structural modification method.
+
+    Parameters
+    ----------
+    alpha : array_like, shape (n_freq, 2 n, 2 n)
+        Calculated receptance of the assembly with K0 at joint DOFs j, then k, m/N.
+    gamma : array_like, shape (n_freq, 2 n, 2 n)
+        Measured receptance of the assembly at the same DOFs.
+    k_initial : array_like, shape (n_freq, n, n) or (n, n)
+        First estimate K0, N/m.
+    freq_hz, on_singular, out
+        As in `couple`.
+
+    Returns
+    -------
+    ndarray, shape (n_freq, n, n)
+        K*, N/m.
+
+    Raises
+    ------
+    SingularLineError, ValueError
+        As in `couple`.
+
+    Notes
+    -----
+    Eqs. (2.47), (2.48): D = alpha^-1 (alpha - gamma) gamma^-1 holds -Delta off its diagonal, so K* = K0 - D_jk. Only
+    that block is formed. Where alpha was assembled through K0, substructures and first estimate cancel and
+    the result is that of `inverse_substructuring`; with any other alpha (a truncated modal model, say) it is not.
+
+    Examples
+    --------
+    >>> import numpy as np, jointfrf as jf
+    >>> h = np.full((1, 1, 1), 0.5)
+    >>> alpha, gamma = (jf.couple(h, h, [[k]], [0], [0]) for k in (1.0, 3.0))
+    >>> jf.ismm(alpha, gamma, [[1.0]]).real.round(12).tolist()
+    [[[3.0]]]
+    """
+    calculated, n = as_interface("alpha", alpha)
+    n_freq = calculated.shape[0]
+    measured, m = as_interface("gamma", gamma, n_freq)
+    if m != n:
+        raise ValueError(f"gamma must have the shape of alpha, {calculated.shape}, not {measured.shape}")
+    first = as_joint_lines("k_initial", k_initial, n, n_freq)
+    freq = optional_frequency(freq_hz, n_freq)
+    sweeps = {"alpha": calculated, "gamma": measured, "k_initial": first}
+    args = (n, N_FREQ, calculated, measured, first)
+    return run("ismm", args, first.shape, sweeps, freq, on_singular, out=out)[0]
+
+
+def inverse_substructuring(
+    gamma: ArrayLike,
+    *,
+    freq_hz: ArrayLike | None = None,
+    on_singular: OnSingular = "raise",
+    out: ComplexArray | None = None,
+) -> ComplexArray:
+    """Joint stiffness K* = -(gamma^-1)_jk: what ISMM reduces to, without model and first estimate.
+
+    Parameters
+    ----------
+    gamma : array_like, shape (n_freq, 2 n, 2 n)
+        Measured receptance of the assembly at joint DOFs j, then k, m/N.
+    freq_hz, on_singular, out
+        As in `couple`.
+
+    Returns
+    -------
+    ndarray, shape (n_freq, n, n)
+        K*, N/m.
+
+    Raises
+    ------
+    SingularLineError, ValueError
+        As in `couple`.
+
+    Notes
+    -----
+    gamma^-1 = [[Z_A + K*, -K*], [-K*, Z_B + K*]]: the joint stands alone off the diagonal.
+
+    Examples
+    --------
+    >>> import numpy as np, jointfrf as jf
+    >>> h = np.full((1, 1, 1), 0.5)
+    >>> jf.inverse_substructuring(jf.couple(h, h, [[3.0]], [0], [0])).real.round(12).tolist()
+    [[[3.0]]]
+    """
+    measured, n = as_interface("gamma", gamma)
+    n_freq = measured.shape[0]
+    freq = optional_frequency(freq_hz, n_freq)
+    shape, sweeps = (n_freq, n, n), {"gamma": measured}
+    return run("inverse_substructuring", (n, N_FREQ, measured), shape, sweeps, freq, on_singular, out=out)[0]
