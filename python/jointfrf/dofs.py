@@ -1,26 +1,158 @@
-"""Motion of points that are rigidly connected to another one."""
+"""Degrees of freedom by name: which are rotations, their units, the parameters of a joint, rigid motion."""
 
 from __future__ import annotations
 
+import re
 import reprlib
 from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal, cast, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from jointfrf.kernel.arguments import FloatArray, as_real
 
-__all__ = ["direction_places", "rigid_motion", "rigid_offset"]
+__all__ = [
+    "DIRECTIONS",
+    "Parameter",
+    "ParameterKind",
+    "compliance_unit",
+    "direction_names",
+    "direction_places",
+    "is_rotation",
+    "joint_parameters",
+    "rigid_motion",
+    "rigid_offset",
+]
+
+#: The six directions of a point: displacements, then rotations, right-handed.
+DIRECTIONS = ("x", "y", "z", "theta_x", "theta_y", "theta_z")
 
 _AXES = "xyz"
-#: Position among x, y, z, theta_x, theta_y, theta_z by name.
-_PLACES = {prefix + axis: i for prefix in ("", "u", "u_") for i, axis in enumerate(_AXES)} | {
-    prefix + axis: 3 + i for prefix in ("theta_", "theta", "r", "rot_", "rot") for i, axis in enumerate(_AXES)
+_TRANSLATIONS = ("", "u", "u_", "f")
+_ROTATIONS = ("theta_", "theta", "r", "rot_", "rot", "m", "mtheta_", "mtheta")
+#: Position among `DIRECTIONS` by name, small letters.
+_PLACES = {prefix + axis: i for prefix in _TRANSLATIONS for i, axis in enumerate(_AXES)} | {
+    prefix + axis: 3 + i for prefix in _ROTATIONS for i, axis in enumerate(_AXES)
 }
+#: A rotation whose axis the name need not tell, as in a plane: theta, Mtheta, rot1.
+_ROTATION = re.compile(r"m?(theta|phi|rot|r[xyz])", re.IGNORECASE)
+
+#: Stiffness k, hysteretic stiffness h = eta k, viscous damping c of K*(w) = k + i h + i w c.
+ParameterKind = Literal["k", "h", "c"]
+
+
+def is_rotation(dof: str) -> bool:
+    """Whether a DOF is a rotation: by its name, as `direction_places` reads it, or a name like theta, Mtheta, phi, rot.
+
+    Examples
+    --------
+    >>> from jointfrf.dofs import is_rotation
+    >>> [is_rotation(dof) for dof in ("y", "Fx", "theta", "Mtheta_z", "rx", "Mx", "0")]
+    [False, False, True, True, True, True, False]
+    """
+    place = _PLACES.get(dof.lower())
+    return _ROTATION.match(dof) is not None if place is None else place >= 3
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One number of a joint: a kind of stiffness or damping between two DOFs, or of one DOF where both are the same.
+
+    Attributes
+    ----------
+    kind : {"k", "h", "c"}
+        Stiffness, hysteretic stiffness eta k, viscous damping.
+    row, column : str
+        Names of the DOFs.
+
+    Examples
+    --------
+    >>> from jointfrf.dofs import Parameter
+    >>> str(Parameter("k", "theta", "theta")), Parameter("c", "y", "theta").unit
+    ('k_theta', 'N s')
+    >>> Parameter.parse("k_y,theta").is_cross
+    True
+    """
+
+    kind: ParameterKind
+    row: str
+    column: str
+
+    @classmethod
+    def of_dof(cls, kind: ParameterKind, dof: str) -> Parameter:
+        """Return the parameter of one DOF."""
+        return cls(kind, dof, dof)
+
+    @classmethod
+    def parse(cls, name: str) -> Parameter:
+        """Read a name like ``"k_y"`` or ``"c_y,theta"``.
+
+        Raises
+        ------
+        ValueError
+            No such name.
+        """
+        kind, underscore, dofs = name.partition("_")
+        row, _, column = dofs.partition(",")
+        if kind not in get_args(ParameterKind) or not underscore or not row or dofs.endswith(","):
+            raise ValueError(f"a parameter must be named k_<dof>, h_<dof> or c_<dof>, not {reprlib.repr(name)}")
+        return cls(cast(ParameterKind, kind), row, column or row)
+
+    def __str__(self) -> str:
+        return self.name
+
+    @property
+    def name(self) -> str:
+        """``"k_<dof>"``, or ``"k_<dof>,<dof>"`` of a cross term."""
+        return f"{self.kind}_{self.row}" + (f",{self.column}" if self.is_cross else "")
+
+    @property
+    def is_cross(self) -> bool:
+        """Whether it couples two DOFs."""
+        return self.row != self.column
+
+    @property
+    def unit(self) -> str:
+        """Unit: N/m, between a displacement and a rotation N, N m/rad; the same times seconds for damping."""
+        rotations = is_rotation(self.row) + is_rotation(self.column)
+        return (("N/m", "N", "N m/rad"), ("N s/m", "N s", "N m s/rad"))[self.kind == "c"][rotations]
+
+
+def joint_parameters(
+    dofs: Sequence[str], kinds: Sequence[ParameterKind] = ("k", "c"), *, cross: bool = False
+) -> tuple[Parameter, ...]:
+    """Return the parameters of a joint: of each kind those of all DOFs, then, with `cross`, those of all pairs.
+
+    Examples
+    --------
+    >>> from jointfrf.dofs import joint_parameters
+    >>> [str(parameter) for parameter in joint_parameters(["y", "theta"])]
+    ['k_y', 'k_theta', 'c_y', 'c_theta']
+    """
+    pairs = [(dof, dof) for dof in dofs]
+    if cross:
+        pairs += [(a, b) for i, a in enumerate(dofs) for b in dofs[i + 1 :]]
+    return tuple(Parameter(kind, *pair) for kind in kinds for pair in pairs)
+
+
+def compliance_unit(response: str, force: str) -> str:
+    """Return the unit of a receptance or compliance between two DOFs: m/N, m/(N m), rad/N or rad/(N m)."""
+    motion = "rad" if is_rotation(response) else "m"
+    return motion + ("/(N m)" if is_rotation(force) else "/N")
+
+
+def direction_names(dofs: Sequence[str]) -> tuple[str, ...]:
+    """Return the names among `DIRECTIONS` of DOFs written in any way that `direction_places` knows."""
+    return tuple(DIRECTIONS[place] for place in direction_places(dofs))
 
 
 def direction_places(dofs: Sequence[str]) -> NDArray[np.intp]:
-    """Return where each DOF stands among x, y, z, theta_x, theta_y, theta_z, counted from 0, shape (n,).
+    """Return where each DOF stands among `DIRECTIONS`, counted from 0, shape (n,).
+
+    Small or capital letters; x, ux, u_x and the thesis' Fx are displacements; theta_x, thetax, rx, rot_x, Mx and the
+    thesis' Mtheta_x rotations.
 
     Raises
     ------
@@ -30,7 +162,7 @@ def direction_places(dofs: Sequence[str]) -> NDArray[np.intp]:
     names = [str(dof).lower() for dof in dofs]
     unknown = [dof for dof, name in zip(dofs, names, strict=True) if name not in _PLACES]
     if unknown:
-        raise ValueError(f"dofs must be among x, y, z, theta_x, theta_y, theta_z, not {reprlib.repr(unknown[0])}")
+        raise ValueError(f"dofs must be among {', '.join(DIRECTIONS)}, not {reprlib.repr(unknown[0])}")
     places = np.array([_PLACES[name] for name in names], np.intp)
     if np.unique(places).size != places.size:
         raise ValueError(f"dofs must name each direction once, not {', '.join(dofs)}")
