@@ -88,7 +88,7 @@ def test_without_a_joint_it_tells_what_the_file_holds():
         (["--j", "102", "--k", "202,204", "--dofs", "y"], "same number of nodes"),
         ([*JOINT, "--band", "700:900"], "holds no frequency line"),
         ([*JOINT, "--spacing", "0.01"], "--spacing and --axis go together"),
-        ([*JOINT[:-1], "phi"], "joint DOF 'phi' is not one of"),
+        ([*JOINT[:-1], "phi"], "dofs must be among x, y, z, theta_x, theta_y, theta_z, not 'phi'"),
     ],
 )
 def test_what_is_missing_is_said_in_one_sentence(words, message):

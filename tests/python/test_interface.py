@@ -51,9 +51,9 @@ LINE = {1: (0, 0, 0), 2: (0, 0, 0.02), 3: (0, 0, 0), 4: (0, 0, 0.02), 5: (0.01, 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (([1, 2], [3, 4], ["y", "phi"], LINE), "joint DOF 'phi' is not one of"),
-        (([1, 2], [3, 4], ["y", "y"], LINE), "dofs must name different joint DOFs"),
-        (([1, 2], [3, 4], [], LINE), "at least one, not none"),
+        (([1, 2], [3, 4], ["y", "phi"], LINE), "dofs must be among x, y, z, theta_x, theta_y, theta_z, not 'phi'"),
+        (([1, 2], [3, 4], ["y", "y"], LINE), "dofs must name each direction once, not y, y"),
+        (([1, 2], [3, 4], [], LINE), "dofs must name at least one joint DOF"),
         (([1, 2], [2, 4], ["y"], LINE), "node 2 is named on both sides"),
         (([1, 1], [3, 4], ["y"], LINE), "different nodes, not 1, 1"),
         (([1, 9], [3, 4], ["y"], LINE), "node 9 has no coordinates"),
@@ -65,3 +65,9 @@ LINE = {1: (0, 0, 0), 2: (0, 0, 0.02), 3: (0, 0, 0), 4: (0, 0, 0.02), 5: (0.01, 
 def test_what_cannot_be_built_is_said(arguments, message):
     with pytest.raises(ValueError, match=message):
         jf.interface(*arguments)
+
+
+def test_directions_may_be_spelt_in_any_way():
+    plain, other = (jf.interface([1, 2], [3, 4], dofs, LINE) for dofs in (["y", "theta_x"], ["Fy", "rx"]))
+    assert plain.channels == other.channels
+    assert np.array_equal(plain.transform, other.transform)

@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf.channels.finite_differences import difference_weights
+from jointfrf.dofs import DIRECTIONS, direction_places
 from jointfrf.frf.frf_set import Channel
 from jointfrf.kernel.arguments import FloatArray
 
 __all__ = ["Interface", "interface"]
 
-_AXES = ("x", "y", "z")
+_AXES = DIRECTIONS[:3]
 #: Points count as lying on a line along an axis when they stray from it by less than this share of its length.
 _STRAY = 1e-3
 
@@ -80,16 +81,13 @@ def interface(
     >>> sides.transform[:2, :2].tolist()
     [[0.5, 0.5], [50.0, -50.0]]
     """
-    known = (*_AXES, *(f"theta_{axis}" for axis in _AXES))
-    for dof in dofs:
-        if dof not in known:
-            raise ValueError(f"joint DOF {dof!r} is not one of {', '.join(known)}")
-    if len(set(dofs)) != len(dofs) or not dofs:
-        raise ValueError(f"dofs must name different joint DOFs, at least one, not {', '.join(dofs) or 'none'}")
+    if not dofs:
+        raise ValueError("dofs must name at least one joint DOF")
+    places = direction_places(dofs).tolist()
     shared = set(points_j) & set(points_k)
     if shared:
         raise ValueError(f"node {min(shared)} is named on both sides of the joint")
-    sides = [_one_side(points, dofs, coordinates) for points in (points_j, points_k)]
+    sides = [_one_side(points, places, coordinates) for points in (points_j, points_k)]
     n = len(dofs)
     (channels_j, rows_j, at_j), (channels_k, rows_k, at_k) = sides
     transform = np.zeros((2 * n, len(channels_j) + len(channels_k)))
@@ -99,16 +97,16 @@ def interface(
 
 
 def _one_side(
-    points: Sequence[int], dofs: Sequence[str], coordinates: Mapping[int, NDArray[np.float64]]
+    points: Sequence[int], places: Sequence[int], coordinates: Mapping[int, NDArray[np.float64]]
 ) -> tuple[list[Channel], FloatArray, FloatArray]:
     if not points or len(set(points)) != len(points):
         raise ValueError(f"a side of the joint needs different nodes, not {', '.join(map(str, points)) or 'none'}")
     missing = [node for node in points if node not in coordinates]
     if missing:
         raise ValueError(f"node {missing[0]} has no coordinates")
-    places = np.array([np.asarray(coordinates[node], dtype=float) for node in points])
-    middle = (places.min(axis=0) + places.max(axis=0)) / 2
-    extent = np.ptp(places, axis=0)
+    at = np.array([np.asarray(coordinates[node], dtype=float) for node in points])
+    middle = (at.min(axis=0) + at.max(axis=0)) / 2
+    extent = np.ptp(at, axis=0)
     along = int(np.argmax(extent))
     if len(points) > 1 and np.delete(extent, along).max() > _STRAY * extent[along]:
         names = ", ".join(map(str, points))
@@ -116,30 +114,28 @@ def _one_side(
 
     weights = np.vstack([np.ones(1), np.zeros(1)])
     if len(points) > 1:
-        weights = difference_weights(places[:, along] - middle[along])
-    needed: list[tuple[str, FloatArray]] = []
-    for dof in dofs:
-        if dof in _AXES:
-            needed.append((dof, weights[0]))
-        else:
-            needed.append(_rotation(dof, points, along, weights[1]))
-    directions = [axis for axis in _AXES if any(axis == direction for direction, _ in needed)]
-    channels = [Channel(node, f"+{direction}") for direction in directions for node in points]
-    rows = np.zeros((len(dofs), len(channels)))
-    for row, (direction, values) in zip(rows, needed, strict=True):
-        first = directions.index(direction) * len(points)
+        weights = difference_weights(at[:, along] - middle[along])
+    needed = [
+        (place, weights[0]) if place < len(_AXES) else _rotation(place - len(_AXES), points, along, weights[1])
+        for place in places
+    ]
+    seen = sorted({axis for axis, _ in needed})
+    channels = [Channel(node, f"+{_AXES[axis]}") for axis in seen for node in points]
+    rows = np.zeros((len(places), len(channels)))
+    for row, (axis, values) in zip(rows, needed, strict=True):
+        first = seen.index(axis) * len(points)
         row[first : first + len(points)] = values
     return channels, rows, middle
 
 
-def _rotation(dof: str, points: Sequence[int], along: int, slope: FloatArray) -> tuple[str, FloatArray]:
-    """Return the direction in which a rotation is seen, and the weights of the points."""
+def _rotation(about: int, points: Sequence[int], along: int, slope: FloatArray) -> tuple[int, FloatArray]:
+    """Return the axis along which a rotation about another one is seen, and the weights of the points."""
+    dof = f"theta_{_AXES[about]}"
     names = ", ".join(map(str, points))
     if len(points) < 2:
         raise ValueError(f"{dof} needs at least two nodes on each side, not {names}")
-    about = _AXES.index(dof[-1])
     if about == along:
         raise ValueError(f"{dof} cannot be seen from nodes {names}: they lie along its axis {_AXES[along]}")
     normal = np.cross(np.eye(3)[about], np.eye(3)[along])
     seen = int(np.argmax(abs(normal)))
-    return _AXES[seen], normal[seen] * slope
+    return seen, normal[seen] * slope

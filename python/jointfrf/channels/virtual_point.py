@@ -9,13 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from jointfrf.channels.finite_differences import transform
-from jointfrf.dofs import rigid_motion
+from jointfrf.dofs import DIRECTIONS, direction_places, is_rotation, rigid_motion
 from jointfrf.frf.frf_set import Channel
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_dofs, as_real, as_square
 
 __all__ = ["VirtualPoint", "append_virtual_point", "channel_geometry", "virtual_point", "virtual_points"]
 
-_DOFS = ("x", "y", "z", "theta_x", "theta_y", "theta_z")
 #: A motion that the channels show this many times more weakly than the best one is not seen.
 _UNSEEN = 1e-6
 #: Directions may be rounded: their length may differ from one by this.
@@ -71,7 +70,7 @@ def virtual_point(
     positions: ArrayLike,
     directions: ArrayLike,
     point: ArrayLike,
-    dofs: Sequence[str] = _DOFS,
+    dofs: Sequence[str] = DIRECTIONS,
     weights: ArrayLike | None = None,
 ) -> VirtualPoint:
     """Virtual point transformation of a group of translational channels on a part that moves as a rigid body.
@@ -142,9 +141,9 @@ def virtual_point(
 
     reference = as_real("point", point, (3,))
     motion = np.einsum("mi,mij->mj", direction, rigid_motion(place, reference))
-    modes = motion[:, [_DOFS.index(name) for name in names]]
+    modes = motion[:, direction_places(names)]
     reach = float(np.sqrt(np.average(((place - reference) ** 2).sum(axis=1), weights=weight))) or 1.0
-    scale = np.array([reach if name.startswith("theta") else 1.0 for name in names])
+    scale = np.array([reach if is_rotation(name) else 1.0 for name in names])
     root = np.sqrt(weight / weight.max())
     left, size, right = np.linalg.svd(root[:, None] * modes / scale, full_matrices=False)
     _check_seen(names, size, right)
@@ -293,11 +292,9 @@ def _as_directions(directions: ArrayLike, m: int) -> FloatArray:
 
 def _as_names(dofs: Sequence[str]) -> tuple[str, ...]:
     names = (dofs,) if isinstance(dofs, str) else tuple(dofs)
-    unknown = [name for name in names if name not in _DOFS]
-    if unknown:
-        raise ValueError(f"dofs: {unknown[0]!r} is not one of {', '.join(_DOFS)}")
-    if not names or len(set(names)) != len(names):
-        raise ValueError(f"dofs must name different DOFs, at least one, not {', '.join(names) or 'none'}")
+    if not names:
+        raise ValueError("dofs must name at least one DOF")
+    direction_places(names)
     return names
 
 

@@ -8,14 +8,13 @@ from typing import Literal, NamedTuple, TypedDict, get_args
 
 import numpy as np
 
-from jointfrf.dofs import direction_places
+from jointfrf.dofs import DIRECTIONS, direction_places
 from jointfrf.kernel.arguments import FloatArray, check_choice
 
 __all__ = ["CardFormat", "CardOptions", "cards"]
 
 CardFormat = Literal["abaqus", "calculix", "nastran", "ansys"]
 
-_DIRECTIONS = ("x", "y", "z", "theta_x", "theta_y", "theta_z")
 #: Largest number of a node, an element or a property: eight columns.
 _LARGEST = 99_999_999
 #: How far from symmetric, relative to the largest entry, round-off may leave a matrix.
@@ -87,7 +86,7 @@ def cards(
         whole = np.zeros((6, 6))
         whole[np.ix_(places, places)] = (matrix + matrix.T) / 2
         wide.append(whole)
-    note = f"DOFs {', '.join(_DIRECTIONS[place] for place in sorted(places))}; SI units, written by jointfrf"
+    note = f"DOFs {', '.join(DIRECTIONS[place] for place in sorted(places))}; SI units, written by jointfrf"
     if not damping:
         note += ", damping left out"
         wide[1:] = [np.zeros((6, 6)), np.zeros((6, 6))]
