@@ -1,0 +1,79 @@
+"""The rooms of the package: which may import which, and one way into the compiled kernel."""
+
+import ast
+from pathlib import Path
+
+import jointfrf
+
+PACKAGE = Path(jointfrf.__file__).parent
+
+#: From the ground up; rooms of one floor do not know each other, a room imports what stands below its floor.
+FLOORS = (
+    {"errors", "files"},
+    {"kernel"},
+    {"dofs"},
+    {"frf"},
+    {"channels", "io"},
+    {"joint"},
+    {"substructuring", "models"},
+    {"identification"},
+    {"solids"},
+    {"report"},
+    {"cases"},
+    {"cli"},
+    {"__main__"},
+)
+FLOOR = {room: floor for floor, rooms in enumerate(FLOORS) for room in rooms}
+
+
+def room_of(module: str) -> str:
+    return module.split(".")[1]
+
+
+def imported_modules(file: Path) -> set[str]:
+    """Modules of the package that a file imports, anywhere in it."""
+    found: set[str] = set()
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{file}: a relative import"
+            if node.module == "jointfrf":
+                found |= {f"jointfrf.{alias.name}" for alias in node.names}
+            elif node.module and node.module.startswith("jointfrf."):
+                found.add(node.module)
+        elif isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names if alias.name.startswith("jointfrf.")}
+    return found
+
+
+def files() -> dict[Path, str]:
+    """Every file of the package below its front door, and its room."""
+    found = {}
+    for file in PACKAGE.rglob("*.py"):
+        place = file.relative_to(PACKAGE)
+        if place != Path("__init__.py"):
+            found[file] = place.parts[0].removesuffix(".py")
+    return found
+
+
+def test_every_room_has_its_floor():
+    assert set(files().values()) == set(FLOOR)
+
+
+def test_a_room_imports_only_rooms_below_it():
+    wrong = [
+        f"{file.relative_to(PACKAGE)} imports {module}"
+        for file, room in files().items()
+        for module in imported_modules(file)
+        if module != "jointfrf._kernel" and room_of(module) != room and FLOOR[room_of(module)] >= FLOOR[room]
+    ]
+    assert not wrong
+
+
+def test_only_the_room_kernel_imports_the_compiled_kernel():
+    importers = {room for file, room in files().items() if "jointfrf._kernel" in imported_modules(file)}
+    assert importers == {"kernel"}
+
+
+def test_no_public_function_hides_a_module():
+    modules = {file.relative_to(PACKAGE).parts[0].removesuffix(".py") for file in PACKAGE.rglob("*.py")}
+    assert not modules & set(jointfrf.__all__)
