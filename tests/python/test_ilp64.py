@@ -15,7 +15,7 @@ import jointfrf as jf
 from installed_library import COMPILERS, ROOT, InstalledLibrary, install, run
 
 TESTS = ROOT / "tests"
-HEADER = (ROOT / "fortran" / "face" / "include" / "jointfrf.h").read_text()
+HEADER = (ROOT / "fortran" / "api" / "include" / "jointfrf.h").read_text()
 CASES = ["f77/case.f", "fortran/case.f90", "c/case.c"]
 CONSUMERS = {language: TESTS / "install" / f"consumer.{language}" for language in ("f", "f90", "c")}
 #: Its lower half is 1.

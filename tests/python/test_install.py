@@ -14,7 +14,7 @@ import scipy_openblas32
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 INSTALL = ROOT / "tests" / "install"
 ABI = ROOT / "tests" / "abi" / "libjointfrf.so.0.txt"
-HEADER = (ROOT / "fortran" / "face" / "include" / "jointfrf.h").read_text()
+HEADER = (ROOT / "fortran" / "api" / "include" / "jointfrf.h").read_text()
 COMPILERS = {"c": ["gcc"], "f": ["gfortran", "-std=legacy"], "f90": ["gfortran", "-std=f2018"]}
 LISTED = re.findall(r"^(?:void|const char) (jf_\w+)", ABI.read_text(), re.MULTILINE)
 
@@ -39,7 +39,7 @@ def prototypes(text):
 
 
 def load_reference():
-    spec = importlib.util.spec_from_file_location("jointfrf_reference", ROOT / "fortran" / "face" / "reference.py")
+    spec = importlib.util.spec_from_file_location("jointfrf_reference", ROOT / "fortran" / "api" / "reference.py")
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module
     spec.loader.exec_module(module)
@@ -208,7 +208,7 @@ def test_reference_refuses_an_argument_without_comment():
 
 
 def test_constants_agree():
-    include = (ROOT / "fortran" / "face" / "include" / "jointfrf.inc.in").read_text()
+    include = (ROOT / "fortran" / "api" / "include" / "jointfrf.inc.in").read_text()
     constants = dict(re.findall(r"^#define (JF_\w+) \(?(-?\d+)\)?$", HEADER, re.MULTILINE))
     assert dict(re.findall(r"^ {6}PARAMETER \((\w+) = (-?\d+)\)$", include, re.MULTILINE)) == constants
     assert re.findall(r"^ {6}INTEGER (\w+)$", include, re.MULTILINE) == list(constants)

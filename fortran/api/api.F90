@@ -1,4 +1,4 @@
-!> The flat face of the kernel: routines jf_* for Fortran 77, modern Fortran, C and Python alike. No algebra here.
+!> The flat API of the kernel: routines jf_* for Fortran 77, modern Fortran, C and Python alike. No algebra here.
 !>
 !> Every routine is one symbol, `jf_name_`, which FORTRAN 77 programs reach by CALL JF_NAME, C programs by jointfrf.h
 !> and modern Fortran by this module. CHARACTER arguments are single letters without hidden lengths.

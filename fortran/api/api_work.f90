@@ -1,4 +1,4 @@
-!> The flat face in memory of the caller: jf_NAME_work takes the arguments of jf_NAME and, before INFO, workspace by
+!> The flat API in memory of the caller: jf_NAME_work takes the arguments of jf_NAME and, before INFO, workspace by
 !> LAPACK's habit. Nothing is allocated and no thread is started; LAPACK does every line, as the reference engine does,
 !> whatever engine is chosen. A program calls them line by line in its own loop, or for many lines at once.
 module jointfrf_api_work

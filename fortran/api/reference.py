@@ -61,7 +61,7 @@ class Routine:
 
 @dataclass
 class Api:
-    """The whole face: the prose of the module's head, the arguments common to all, the public routines."""
+    """The whole API: the prose of the module's head, the arguments common to all, the public routines."""
 
     prose: list[str]
     common: dict[str, str]
@@ -122,7 +122,7 @@ def resolve(routine: Routine, name: str, texts: dict[str, dict[str, str]], commo
 
 
 def read_api(source: str) -> Api:
-    """Read the face as api.F90 declares and explains it."""
+    """Read the API as api.F90 declares and explains it."""
     lines = source.splitlines()
     head = lines[: next(i for i, line in enumerate(lines) if line.startswith("module"))]
     prose, common = split_comment(head)

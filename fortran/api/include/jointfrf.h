@@ -1,8 +1,8 @@
-/* jointfrf: the flat face of the kernel for C and C++. The same symbols serve FORTRAN 77, modern Fortran and Python.
+/* jointfrf: the flat API of the kernel for C and C++. The same symbols serve FORTRAN 77, modern Fortran and Python.
  *
  * Every argument is passed by address, also of what is not read: no NULL. Arrays are as C writes them with trans = "T":
  * h[freq][out][in]. DOFs count from 1.
- * What each argument means, its shape and unit stands in the man page of the routine, and in fortran/face/api.F90.
+ * What each argument means, its shape and unit stands in the man page of the routine, and in fortran/api/api.F90.
  *
  * jf_complex is two doubles, real part first: double complex in C99, std::complex<double> in C++. Define JF_COMPLEX
  * before including this header to use a type of your own of that layout.
