@@ -15,7 +15,7 @@ import jointfrf as jf
 from installed_library import COMPILERS, ROOT, InstalledLibrary, install, run
 
 TESTS = ROOT / "tests"
-HEADER = (ROOT / "fortran" / "api" / "include" / "jointfrf.h").read_text()
+ABI = (TESTS / "abi" / "libjointfrf.so.0.txt").read_text()
 CASES = ["f77/case.f", "fortran/case.f90", "c/case.c"]
 CONSUMERS = {language: TESTS / "install" / f"consumer.{language}" for language in ("f", "f90", "c")}
 #: Its lower half is 1.
@@ -165,9 +165,7 @@ def test_plug_ins_of_one_process_may_use_both(libraries, tmp_path):
 
 
 def test_exported_symbols(libraries):
-    listed = re.findall(
-        r"^(?:void|const char) (jf_\w+)", (TESTS / "abi" / "libjointfrf.so.0.txt").read_text(), re.MULTILINE
-    )
+    listed = re.findall(r"^(?:void|const char) (jf_\w+)", ABI, re.MULTILINE)
     for n_bytes, library in libraries.items():
         (lib_dir,) = library.pkg_config("--variable=libdir")
         exported = run(["nm", "-D", "--defined-only", f"{lib_dir}/lib{library.name}.so"]).splitlines()
@@ -201,7 +199,7 @@ INTEGERS = {"m": 2, "reciprocal": 0, "kl": 0, "ku": 0, "first": 0, "lwork": 500,
 FREE = {"seed", "lwork", "liwork", "n_text"}
 ROUTINES = {
     name: [argument.split() for argument in arguments.split(",")]
-    for name, arguments in re.findall(r"^void (jf_\w+_)\(([^)]*)\);", HEADER, re.MULTILINE)
+    for name, arguments in re.findall(r"^void (jf_\w+_)\(([^)]*)\);", ABI, re.MULTILINE)
     if name not in ("jf_version_", "jf_info_text_", "jf_line_text_", "jf_get_engine_")
 }
 
