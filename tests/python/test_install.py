@@ -10,11 +10,11 @@ import sys
 import pytest
 import scipy_openblas32
 
+from abi import LISTED, prototypes
+
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 INSTALL = ROOT / "tests" / "install"
-ABI = ROOT / "tests" / "abi" / "libjointfrf.so.0.txt"
 COMPILERS = {"c": ["gcc"], "f": ["gfortran", "-std=legacy"], "f90": ["gfortran", "-std=f2018"]}
-LISTED = re.findall(r"^(?:void|const char) (jf_\w+)", ABI.read_text(), re.MULTILINE)
 
 needs_tools = pytest.mark.skipif(
     not sys.platform.startswith("linux") or not all(map(shutil.which, ("gcc", "gfortran", "nm", "readelf"))),
@@ -28,12 +28,6 @@ def run(*command, **options):
     done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False, **options)
     assert done.returncode == 0, f"{command}\n{done.stdout}"
     return done.stdout
-
-
-def prototypes(text):
-    """The arguments of each symbol that a text declares in C."""
-    found = re.findall(r"^void (jf_\w+_)\(([^)]*)\);", text, re.MULTILINE)
-    return {name: [" ".join(argument.split()) for argument in arguments.split(",")] for name, arguments in found}
 
 
 @pytest.fixture(scope="session")
@@ -109,7 +103,7 @@ def test_installed_header_declares_the_listed_abi(project):
     """A line of the list that changes or goes breaks linked programs: that takes a new major version."""
     header = (project / "prefix" / "include" / "jointfrf.h").read_text()
     assert sorted(LISTED) == LISTED
-    assert prototypes(header) == prototypes(ABI.read_text())
+    assert prototypes(header) == prototypes()
     assert "\nextern const char jf_integers_have_4_bytes_;\n" in header
 
 
@@ -136,7 +130,7 @@ def test_static_library_keeps_to_its_names(project):
 @needs_tools
 def test_every_routine_has_a_page(project):
     pages = project / "prefix" / "share" / "man" / "man3"
-    declared = prototypes(ABI.read_text())
+    declared = prototypes()
     assert {path.name for path in pages.iterdir()} == {f"{name[:-1]}.3" for name in declared} | {"jointfrf.3"}
     markdown = (project / "prefix" / "share" / "doc" / "jointfrf" / "jointfrf.md").read_text()
     overview = (pages / "jointfrf.3").read_text()
