@@ -178,7 +178,7 @@ take_lock() {
 
 # ---------------------------------------------------------------- .venv
 
-state() { { echo "$root"; cat pyproject.toml meson.build meson.options fortran/meson.build fortran/face/meson.build python/meson.build; } | cksum; }
+state() { { echo "$root"; cat pyproject.toml meson.build meson.options fortran/meson.build fortran/api/meson.build fortran/api/*/meson.build python/meson.build; } | cksum; }
 
 up_to_date() {
   [ "$(cat "$stamp.$1" 2>/dev/null)" = "$(state)" ] && is_new_enough "$venv/bin/python" &&

@@ -1,4 +1,4 @@
-!> The flat face gives what the modules behind it give, in both storage orders, and for sweeps of nothing.
+!> The flat API gives what the modules behind it give, in both storage orders, and for sweeps of nothing.
 program test_api
   use, intrinsic :: iso_c_binding, only: c_char
   use testing, only: check, check_close, check_same, dp, finish, inverse, ip, random_lines, random_real, &

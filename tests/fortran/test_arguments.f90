@@ -1,4 +1,4 @@
-!> What the flat face checks: each wrong argument is named by its place, and nothing is done.
+!> What the flat API checks: each wrong argument is named by its place, and nothing is done.
 module trials
   use, intrinsic :: iso_c_binding, only: c_char
   use testing, only: check, check_untouched, dp, infinity, ip, not_a_number, random_regular, untouched

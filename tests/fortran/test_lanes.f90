@@ -1,4 +1,4 @@
-!> Every engine against LAPACK and quadruple precision, by the flat face: all operations in both storage orders, any
+!> Every engine against LAPACK and quadruple precision, by the flat API: all operations in both storage orders, any
 !> number of lines, memory beside the results, bad lines, threads, both residuals of inverse and solution.
 module lane_calls
   use testing, only: dp, infinity, ip, not_a_number, random_lines, random_real, random_regular, transposed, uniform, &

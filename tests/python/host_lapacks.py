@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-#: What a static OpenBLAS must be asked for, so that its threads are held (fortran/host/blas_threads.c).
+#: What a static OpenBLAS must be asked for, so that its threads are held (fortran/runtime/blas_threads.c).
 THREAD_CONTROL = "-Wl,-u,openblas_get_parallel"
 #: Words that tell other libraries from the reference one, which may have the same name.
 OTHERS = (b"openblas", b"flexiblas", b"bli_init", b"mkl_")

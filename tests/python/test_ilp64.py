@@ -12,10 +12,10 @@ from pathlib import Path
 import pytest
 
 import jointfrf as jf
+from abi import LISTED, prototypes
 from installed_library import COMPILERS, ROOT, InstalledLibrary, install, run
 
 TESTS = ROOT / "tests"
-HEADER = (ROOT / "fortran" / "face" / "include" / "jointfrf.h").read_text()
 CASES = ["f77/case.f", "fortran/case.f90", "c/case.c"]
 CONSUMERS = {language: TESTS / "install" / f"consumer.{language}" for language in ("f", "f90", "c")}
 #: Its lower half is 1.
@@ -165,13 +165,10 @@ def test_plug_ins_of_one_process_may_use_both(libraries, tmp_path):
 
 
 def test_exported_symbols(libraries):
-    listed = re.findall(
-        r"^(?:void|const char) (jf_\w+)", (TESTS / "abi" / "libjointfrf.so.0.txt").read_text(), re.MULTILINE
-    )
     for n_bytes, library in libraries.items():
         (lib_dir,) = library.pkg_config("--variable=libdir")
         exported = run(["nm", "-D", "--defined-only", f"{lib_dir}/lib{library.name}.so"]).splitlines()
-        expected = [f"{name}@@{library.name}_0".replace("have_4", f"have_{n_bytes}") for name in listed]
+        expected = [f"{name}@@{library.name}_0".replace("have_4", f"have_{n_bytes}") for name in LISTED]
         assert [line.split()[-1] for line in exported if " A " not in line] == sorted(expected)
 
 
@@ -200,8 +197,8 @@ INTEGERS = {"m": 2, "reciprocal": 0, "kl": 0, "ku": 0, "first": 0, "lwork": 500,
 #: Those that may have any value: of a seed the lower 32 bits count, and memory may be as long as it likes.
 FREE = {"seed", "lwork", "liwork", "n_text"}
 ROUTINES = {
-    name: [argument.split() for argument in arguments.split(",")]
-    for name, arguments in re.findall(r"^void (jf_\w+_)\(([^)]*)\);", HEADER, re.MULTILINE)
+    name: [argument.split() for argument in arguments]
+    for name, arguments in prototypes().items()
     if name not in ("jf_version_", "jf_info_text_", "jf_line_text_", "jf_get_engine_")
 }
 

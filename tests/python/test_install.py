@@ -1,6 +1,5 @@
 """The plain library as installed: programs in C, FORTRAN 77 and Fortran find it, and nothing else leaves it."""
 
-import importlib.util
 import os
 import pathlib
 import re
@@ -11,12 +10,11 @@ import sys
 import pytest
 import scipy_openblas32
 
+from abi import LISTED, prototypes
+
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 INSTALL = ROOT / "tests" / "install"
-ABI = ROOT / "tests" / "abi" / "libjointfrf.so.0.txt"
-HEADER = (ROOT / "fortran" / "face" / "include" / "jointfrf.h").read_text()
 COMPILERS = {"c": ["gcc"], "f": ["gfortran", "-std=legacy"], "f90": ["gfortran", "-std=f2018"]}
-LISTED = re.findall(r"^(?:void|const char) (jf_\w+)", ABI.read_text(), re.MULTILINE)
 
 needs_tools = pytest.mark.skipif(
     not sys.platform.startswith("linux") or not all(map(shutil.which, ("gcc", "gfortran", "nm", "readelf"))),
@@ -30,20 +28,6 @@ def run(*command, **options):
     done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False, **options)
     assert done.returncode == 0, f"{command}\n{done.stdout}"
     return done.stdout
-
-
-def prototypes(text):
-    """The arguments of each symbol that a text declares in C."""
-    found = re.findall(r"^void (jf_\w+_)\(([^)]*)\);", text, re.MULTILINE)
-    return {name: [" ".join(argument.split()) for argument in arguments.split(",")] for name, arguments in found}
-
-
-def load_reference():
-    spec = importlib.util.spec_from_file_location("jointfrf_reference", ROOT / "fortran" / "face" / "reference.py")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
 
 
 @pytest.fixture(scope="session")
@@ -114,11 +98,13 @@ def test_cmake(project, tmp_path):
     assert "libjointfrf" not in needed["c_static"]
 
 
-def test_header_declares_the_listed_abi():
+@needs_tools
+def test_installed_header_declares_the_listed_abi(project):
     """A line of the list that changes or goes breaks linked programs: that takes a new major version."""
+    header = (project / "prefix" / "include" / "jointfrf.h").read_text()
     assert sorted(LISTED) == LISTED
-    assert prototypes(HEADER) == prototypes(ABI.read_text())
-    assert "\nextern const char jf_integers_have_4_bytes_;\n" in HEADER
+    assert prototypes(header) == prototypes()
+    assert "\nextern const char jf_integers_have_4_bytes_;\n" in header
 
 
 @needs_tools
@@ -144,7 +130,7 @@ def test_static_library_keeps_to_its_names(project):
 @needs_tools
 def test_every_routine_has_a_page(project):
     pages = project / "prefix" / "share" / "man" / "man3"
-    declared = prototypes(HEADER)
+    declared = prototypes()
     assert {path.name for path in pages.iterdir()} == {f"{name[:-1]}.3" for name in declared} | {"jointfrf.3"}
     markdown = (project / "prefix" / "share" / "doc" / "jointfrf" / "jointfrf.md").read_text()
     overview = (pages / "jointfrf.3").read_text()
@@ -164,56 +150,3 @@ def test_every_routine_has_a_page(project):
 def test_pages_are_sound_roff(project):
     pages = sorted((project / "prefix" / "share" / "man" / "man3").iterdir())
     assert run("groff", "-man", "-Tascii", "-ww", "-z", "-rLL=120n", *pages) == ""
-
-
-API = """!> Head.
-!> n_freq   number of lines.
-!> Tail.
-module jointfrf
-  public :: jf_one, jf_two
-
-  !> Does one thing. And more.
-  !> a, b    two numbers, shape (n_freq),
-  !>         m
-  !> n_freq  as above; not 0
-  subroutine jf_one(n_freq, a, b) &
-    bind(C, name='jf_one_')
-    integer(ip), intent(in) :: n_freq
-    real(c_double), target, intent(in) :: a(max(1, n_freq), 2), b(n_freq)
-
-  !> Does another.
-  !> b   as in jf_one
-  subroutine jf_two(b) bind(C, name='jf_two_')
-    complex(c_double_complex), intent(out) :: b(2)
-
-"""
-
-
-def test_reference_reads_comments():
-    api = load_reference().read_api(API)
-    one, two = api.routines
-    assert (one.summary, one.prose, api.prose) == ("Does one thing", "Does one thing. And more.", ["Head.", "Tail."])
-    assert [(a.name, a.shape, a.text) for a in one.arguments] == [
-        ("n_freq", "", "number of lines; not 0"),
-        ("a", "(max(1, n_freq), 2)", "two numbers, shape (n_freq), m"),
-        ("b", "(n_freq)", "two numbers, shape (n_freq), m"),
-    ]
-    assert two.prototype == "void jf_two_(jf_complex *b);"
-    assert two.arguments[0].text == one.arguments[2].text
-
-
-def test_reference_refuses_an_argument_without_comment():
-    with pytest.raises(SystemExit, match="no comment explains argument b of jf_two"):
-        load_reference().read_api(API.replace("  !> b   as in jf_one\n", ""))
-
-
-def test_constants_agree():
-    include = (ROOT / "fortran" / "face" / "include" / "jointfrf.inc.in").read_text()
-    constants = dict(re.findall(r"^#define (JF_\w+) \(?(-?\d+)\)?$", HEADER, re.MULTILINE))
-    assert dict(re.findall(r"^ {6}PARAMETER \((\w+) = (-?\d+)\)$", include, re.MULTILINE)) == constants
-    assert re.findall(r"^ {6}INTEGER (\w+)$", include, re.MULTILINE) == list(constants)
-    assert max(map(len, include.splitlines())) <= 72
-    sources = "".join((ROOT / "fortran" / name).read_text() for name in ("status.f90", "engine.F90"))
-    declared = " ".join(re.findall(r"parameter, public :: (.*)$", sources, re.MULTILINE))
-    kernel = dict(re.findall(r"\b((?:info|line|engine)_\w+) = (-?\d+)", declared))
-    assert {f"jf_{name}".replace("engine_v", "engine_x86_64_v").upper(): kernel[name] for name in kernel} == constants

@@ -70,7 +70,7 @@ def run(
     routine : str
         Name without ``jf_``, used in messages too.
     args : sequence
-        Arguments of the routine in the order of `_kernel.pyf`, up to the result; arrays in C order, `N_FREQ` for the
+        Arguments of the routine in the order of `fortran/api/api.F90`, up to the result; arrays in C order, `N_FREQ` for the
         number of lines.
     shape : tuple of int
         Shape of the result in C order, (n_freq, out, in).

@@ -1,4 +1,4 @@
-!> The flat face of the kernel: routines jf_* for Fortran 77, modern Fortran, C and Python alike. No algebra here.
+!> The flat API of the kernel: routines jf_* for Fortran 77, modern Fortran, C and Python alike. No algebra here.
 !>
 !> Every routine is one symbol, `jf_name_`, which FORTRAN 77 programs reach by CALL JF_NAME, C programs by jointfrf.h
 !> and modern Fortran by this module. CHARACTER arguments are single letters without hidden lengths.
@@ -43,11 +43,7 @@
 !> afterwards traps, flags and rounding are what they were.
 module jointfrf
   use, intrinsic :: iso_c_binding, only: c_char, c_double, c_double_complex
-  use jointfrf_api_work, only: jf_compliance_covariance_work, jf_compliance_factors_work, jf_couple_work, &
-    jf_decouple_work, jf_find_modification_work, jf_inverse_substructuring_work, &
-    jf_invert_work, jf_ismm_work, jf_joint_compliance_work, jf_modify_work, &
-    jf_receptance_banded_work, jf_receptance_modal_work, jf_receptance_work, &
-    jf_solve_work, jf_transform_work
+  use jointfrf_api_work       ! generated from this file; what is public of it is named below
   use jointfrf_arguments, only: as_lines, as_matrix, is_transposed, lower, spread_text
   use jointfrf_brick, only: brick_matrices, brick_quality
   use jointfrf_checks, only: check_brick_matrices, check_brick_quality, check_central_difference, &
@@ -90,21 +86,23 @@ module jointfrf
   public :: jf_decouple_work, jf_joint_compliance_work, jf_compliance_factors_work, jf_compliance_covariance_work
   public :: jf_transform_work
 
-  !> What jf_set_engine takes and jf_get_engine gives.
+  !> info: 0 good; -i argument i is wrong, counted from 1; > 0 number of bad lines
+  integer(ip), parameter, public :: jf_info_good = info_good
+  integer(ip), parameter, public :: jf_info_no_memory = info_no_memory
+  integer(ip), parameter, public :: jf_info_no_engine = info_no_engine
+
+  !> line_info: 0 good; > 0 singular
+  integer(ip), parameter, public :: jf_line_good = line_good
+  integer(ip), parameter, public :: jf_line_not_finite = line_not_finite
+  integer(ip), parameter, public :: jf_line_overflow = line_overflow
+
+  !> engines; JF_ENGINE_AUTOMATIC is the widest there is
   integer(ip), parameter, public :: jf_engine_automatic = engine_automatic
   integer(ip), parameter, public :: jf_engine_lapack = engine_lapack
   integer(ip), parameter, public :: jf_engine_plain = engine_plain
   integer(ip), parameter, public :: jf_engine_x86_64_v2 = engine_v2
   integer(ip), parameter, public :: jf_engine_x86_64_v3 = engine_v3
   integer(ip), parameter, public :: jf_engine_x86_64_v4 = engine_v4
-
-  !> What `info` and `line_info` may be, besides numbers of arguments, lines and pivots.
-  integer(ip), parameter, public :: jf_info_good = info_good
-  integer(ip), parameter, public :: jf_info_no_memory = info_no_memory
-  integer(ip), parameter, public :: jf_info_no_engine = info_no_engine
-  integer(ip), parameter, public :: jf_line_good = line_good
-  integer(ip), parameter, public :: jf_line_not_finite = line_not_finite
-  integer(ip), parameter, public :: jf_line_overflow = line_overflow
 
 contains
 
@@ -463,7 +461,8 @@ contains
   end subroutine jf_inverse_substructuring
 
   !> Joint stiffness by FRF decoupling, by one of four equations. Eqs. (2.53)-(2.56).
-  !> equation   two letters, responding point and excited point: 'rr' (2.53), 'rs' (2.54), 'sr' (2.55), 'ss' (2.56)
+  !> equation   shape (2), letters of the responding and of the excited point: 'rr' (2.53), 'rs' (2.54), 'sr' (2.55),
+  !>            'ss' (2.56)
   !> n_a, n_b   number of DOFs of A and of B
   !> n          number of joint DOFs, and of internal DOFs at each point used
   !> h_a        receptance of A, shape (n_a, n_a, n_freq), m/N
@@ -711,7 +710,7 @@ contains
   !> covariance  Var Re, Var Im and Cov(Re, Im) of each entry, shape (3, n, n, n_freq), entries stored as in
   !>             `mean`; NaN where fewer than two realisations are good
   !> line_info   as above; a line is bad where no realisation is good, and says what was wrong with the first
-  !> rcond       the smallest over the good realisations
+  !> rcond       shape (n_freq), the smallest over the good realisations
   subroutine jf_monte_carlo(trans, method, kind, reference, reciprocal, block, level, seed, n, n_freq, first, count, &
                             alpha, gamma, k_initial, good, mean, covariance, line_info, rcond, info) &
     bind(C, name='jf_monte_carlo_')

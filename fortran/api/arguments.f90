@@ -1,4 +1,4 @@
-!> What the flat face checks before anything is done, and how it sees the caller's memory.
+!> What the flat API checks before anything is done, and how it sees the caller's memory.
 module jointfrf_arguments
   use, intrinsic :: iso_c_binding, only: c_char, c_double, c_double_complex
   use jointfrf_decoupling, only: is_equation
