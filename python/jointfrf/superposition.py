@@ -7,10 +7,20 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import linalg
 
-from jointfrf._sweep import N_FREQ, ComplexArray, FloatArray, OnSingular, run
+from jointfrf._sweep import (
+    N_FREQ,
+    RCOND_LIMIT,
+    ComplexArray,
+    FloatArray,
+    LineStatus,
+    OnSingular,
+    check_lines,
+    run,
+)
 from jointfrf.direct_solution import SINGULAR
 from jointfrf.model_matrices import ModelMatrices
 from jointfrf.ports import Ports
+from jointfrf.rigid_body import find_rigid_modes
 
 __all__ = ["Modes", "all_modes"]
 
@@ -32,6 +42,8 @@ class Modes:
         eta of each mode.
     shapes_out, shapes_in : ndarray, shape (n_out, n_modes), (n_in, n_modes)
         Shapes at responses and forces, 1/sqrt(kg).
+    uncertainty : ndarray, shape (n_modes,)
+        What rounding of K leaves open of w_r^2, (rad/s)^2, of modes that it may hide, see `RigidModes`; 0 of the others.
     """
 
     stiffness: FloatArray
@@ -39,6 +51,7 @@ class Modes:
     loss_factor: FloatArray
     shapes_out: FloatArray
     shapes_in: FloatArray
+    uncertainty: FloatArray
 
     def receptance(self, freq_hz: FloatArray, on_singular: OnSingular, out: ComplexArray | None = None) -> ComplexArray:
         """Sum of phi phi^T / (w_r^2 (1 + i eta) - w^2 + i w c) over the modes.
@@ -47,6 +60,18 @@ class Modes:
         -------
         ndarray, shape (n_freq, n_out, n_in)
             m/N.
+        """
+        result, status = self.lines(freq_hz, on_singular, out)
+        check_lines("receptance", status, {}, freq_hz, "nan", RCOND_LIMIT)
+        return result
+
+    def lines(
+        self, freq_hz: FloatArray, on_singular: OnSingular, out: ComplexArray | None = None
+    ) -> tuple[ComplexArray, LineStatus]:
+        """Return the sum and how each line went, without a word on lines that are ill-conditioned.
+
+        Their reciprocal condition is that of all modes where it is below the machine's precision, and otherwise such
+        that eps / rcond is the relative change of a mode by its uncertainty.
         """
         shape = (freq_hz.size, self.shapes_out.shape[0], self.shapes_in.shape[0])
         omega = 2 * np.pi * freq_hz
@@ -61,7 +86,13 @@ class Modes:
             np.ascontiguousarray(self.shapes_out),
             np.ascontiguousarray(self.shapes_in),
         )
-        return run("receptance_modal", args, shape, {"omega": omega}, freq_hz, on_singular, SINGULAR, out)[0]
+        result, status = run("receptance_modal", args, shape, {"omega": omega}, freq_hz, on_singular, 0.0, out)
+        rcond = np.where(status.rcond < SINGULAR, status.rcond, 1.0)
+        for r in np.flatnonzero(self.uncertainty):
+            elastic = self.stiffness[r] * (1 + 1j * self.loss_factor[r])
+            left = abs(elastic - omega**2 + 1j * omega * self.damping[r])
+            rcond = np.minimum(rcond, SINGULAR * left / self.uncertainty[r])
+        return result, LineStatus(status.line_info, rcond)
 
 
 def all_modes(matrices: ModelMatrices, outputs: Ports, inputs: Ports) -> Modes:
@@ -71,6 +102,11 @@ def all_modes(matrices: ModelMatrices, outputs: Ports, inputs: Ports) -> Modes:
     ------
     ValueError
         K or M is not symmetric, M is not positive definite, or damping couples the modes.
+
+    Notes
+    -----
+    An eigenvalue solver knows every w^2 within rounding of the largest one; rigid-body modes, and those of a soft
+    suspension, are found apart, see `find_rigid_modes`.
     """
     for name in ("stiffness", "mass"):
         if not matrices.is_symmetric(name):
@@ -79,6 +115,10 @@ def all_modes(matrices: ModelMatrices, outputs: Ports, inputs: Ports) -> Modes:
         squared, shapes = linalg.eigh(matrices.dense("stiffness"), matrices.dense("mass"))
     except np.linalg.LinAlgError as error:
         raise ValueError("mass is not positive definite: method 'modal' cannot be used") from error
+    rigid = find_rigid_modes(matrices.sparse("stiffness"), matrices.sparse("mass"))
+    shapes = np.hstack([rigid.shapes, rigid.strains(shapes[:, len(rigid) :])])
+    stiffness = np.concatenate([rigid.stiffness, np.maximum(squared[len(rigid) :], 0)])
+    uncertainty = np.concatenate([rigid.uncertainty, np.zeros(matrices.n - len(rigid))])
 
     def modal(name: str) -> FloatArray:
         matrix = matrices.dense(name)
@@ -91,7 +131,6 @@ def all_modes(matrices: ModelMatrices, outputs: Ports, inputs: Ports) -> Modes:
             raise ValueError(f"{name} couples the modes: method 'modal' cannot be used, 'dense' or 'sparse' can")
         return diagonal
 
-    stiffness = np.maximum(squared, 0)
     structural = modal("structural_damping")
     losses = matrices.loss_factor + np.divide(structural, stiffness, out=np.zeros(matrices.n), where=stiffness > 0)
-    return Modes(stiffness, modal("damping"), losses, outputs.of(shapes), inputs.of(shapes))
+    return Modes(stiffness, modal("damping"), losses, outputs.of(shapes), inputs.of(shapes), uncertainty)
