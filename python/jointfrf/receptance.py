@@ -10,18 +10,22 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from jointfrf._sweep import (
+    RCOND_LIMIT,
     ComplexArray,
     FloatArray,
+    LineStatus,
     OnSingular,
     as_frequency,
     as_number,
     check_choice,
+    check_lines,
 )
-from jointfrf.direct_solution import solve_banded, solve_dense, solve_sparse
+from jointfrf.direct_solution import SINGULAR, solve_banded, solve_dense, solve_sparse
 from jointfrf.errors import ConvergenceWarning
 from jointfrf.model_matrices import Matrix, ModelMatrices
 from jointfrf.ports import Ports, as_ports, directions
 from jointfrf.reduction import reduce_model, spot_error
+from jointfrf.rigid_body import find_rigid_modes, mode_condition
 from jointfrf.rotations import transform
 from jointfrf.superposition import Modes, all_modes
 
@@ -281,16 +285,32 @@ def _solved(task: _Task, how: Direct, reason: str) -> tuple[ComplexArray, Recept
     freq, matrices, on_singular = task.freq_hz, task.matrices, task.on_singular
     to, into = task.outputs, task.inputs
     if how == "sparse":
-        result = solve_sparse(freq, matrices, to, into, on_singular, task.out)
-        return result, ReceptanceInfo(how, reason)
-    solve = solve_banded if how == "banded" else solve_dense
-    if to.picked is not None and into.picked is not None:
-        result = solve(freq, matrices, to.picked, into.picked, on_singular, task.out)
+        result, status = solve_sparse(freq, matrices, to, into, on_singular, task.out)
     else:
-        h = solve(freq, matrices, to.needed, into.needed, on_singular)
-        t_out, t_in = (ports.weights[:, ports.needed - 1].toarray() for ports in (to, into))
-        result = transform(h, t_out, t_in, freq_hz=freq, on_singular=on_singular, out=task.out)
+        solve = solve_banded if how == "banded" else solve_dense
+        if to.picked is not None and into.picked is not None:
+            result, status = solve(freq, matrices, to.picked, into.picked, on_singular, task.out)
+        else:
+            h, status = solve(freq, matrices, to.needed, into.needed, on_singular)
+            t_out, t_in = (ports.weights[:, ports.needed - 1].toarray() for ports in (to, into))
+            result = transform(h, t_out, t_in, freq_hz=freq, on_singular=on_singular, out=task.out)
+    check_lines("receptance", _in_doubt(matrices, freq, status), {}, freq, "nan", RCOND_LIMIT)
     return result, ReceptanceInfo(how, reason)
+
+
+def _in_doubt(matrices: ModelMatrices, freq: FloatArray, status: LineStatus) -> LineStatus:
+    """Return how lines went, with a small reciprocal condition only where a direct solution is in doubt.
+
+    A fine mesh in mixed units has rcond 1e-13 and still gives nine digits: such a line is in doubt if it is singular to
+    working precision, or if rounding of K hides what holds the structure as a whole.
+    """
+    rcond = np.where(status.rcond < SINGULAR, status.rcond, 1.0)
+    poor = (status.rcond < RCOND_LIMIT) & (status.rcond >= SINGULAR)
+    if poor.any() and matrices.is_symmetric("stiffness") and matrices.is_symmetric("mass"):
+        rigid = find_rigid_modes(matrices.sparse("stiffness"), matrices.sparse("mass"))
+        left = rigid.dynamic_stiffness(matrices, 2 * np.pi * freq[poor])
+        rcond[poor] = mode_condition(left, rigid.uncertainty)
+    return LineStatus(status.line_info, rcond)
 
 
 def _fallen_back(task: _Task, error: float, n_vectors: int, what: str) -> tuple[ComplexArray, ReceptanceInfo]:

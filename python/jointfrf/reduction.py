@@ -247,14 +247,13 @@ def spot_error(
     """
     found = modes.lines(freq_hz, "nan")[0]
     parts = held(matrices.n) if rigid is None else rigid
-    a, b, eta = matrices.proportional or (0.0, 0.0, 0.0)
+    own = parts.dynamic_stiffness(matrices, 2 * np.pi * freq_hz)
     forces = inputs.forces()
     straining = parts.straining_forces(forces).astype(np.complex128)
     seen, driven = outputs.of(parts.shapes), parts.shapes.T @ forces
     errors, rounding = np.full(freq_hz.size, np.inf), 0.0
     for i, omega in enumerate(2 * np.pi * freq_hz):
-        alone = parts.stiffness * (1 + 1j * eta + 1j * omega * b) + 1j * omega * a - omega**2
-        if not alone.all():  # nothing holds the body: superposition names the line as singular
+        if not own[i].all():  # nothing holds the body: superposition names the line as singular
             errors[i] = 0
             continue
         z = matrices.dynamic_stiffness(omega)
@@ -264,7 +263,7 @@ def spot_error(
             continue
         x = factors.solve(straining)
         step = outputs.of(parts.strains(factors.solve(straining - z @ x)))
-        exact = outputs.of(parts.strains(x)) + step + seen @ (driven / alone[:, None])
+        exact = outputs.of(parts.strains(x)) + step + seen @ (driven / own[i][:, None])
         size = max(abs(exact).max(initial=0), np.finfo(float).tiny)
         error = abs(found[i] - exact).max(initial=0) / size
         errors[i] = error if np.isfinite(error) else np.inf

@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 from scipy import linalg, sparse
 from scipy.sparse import linalg as sparse_linalg
 
-from jointfrf._sweep import FloatArray
+from jointfrf._sweep import ComplexArray, FloatArray
 from jointfrf.direct_solution import SYMMETRIC
+from jointfrf.model_matrices import ModelMatrices
 
-__all__ = ["RigidModes", "find_rigid_modes", "held"]
+__all__ = ["RigidModes", "find_rigid_modes", "held", "mode_condition", "resistance"]
 
 _EPS = float(np.finfo(np.float64).eps)
 #: r^T K r counts as zero within this many roundings of its terms: an entry of K is a sum of some tens of rounded terms.
@@ -49,6 +50,13 @@ class RigidModes:
         """Return the number of modes."""
         return self.stiffness.size
 
+    def dynamic_stiffness(self, matrices: ModelMatrices, omega: FloatArray) -> ComplexArray:
+        """Return r^T Z r = w_r^2 (1 + i eta) + i r^T H r + i w r^T C r - w^2, shape (n_freq, k), (rad/s)^2."""
+        structural, viscous = (resistance(matrices.sparse(x), self.shapes) for x in ("structural_damping", "damping"))
+        w = omega[:, None]
+        elastic = (1 + 1j * matrices.loss_factor) * self.stiffness
+        return np.asarray(elastic + 1j * (structural + w * viscous) - w**2, np.complex128)
+
     def straining_forces(self, forces: FloatArray) -> FloatArray:
         """Return forces that do not accelerate these modes, b - M r r^T b."""
         left: FloatArray = forces - self.momenta @ (self.shapes.T @ forces)
@@ -63,6 +71,23 @@ class RigidModes:
 def held(n: int) -> RigidModes:
     """No rigid-body modes: a structure of n DOFs that is held."""
     return RigidModes(np.zeros((n, 0)), np.zeros((n, 0)), np.zeros(0), np.zeros(0))
+
+
+def resistance(matrix: sparse.csc_array, shapes: FloatArray) -> FloatArray:
+    """Return r^T A r of each shape, shape (k,); 0 where it may be rounding of A."""
+    found = np.einsum("ij,ij->j", shapes, matrix @ shapes)
+    return np.where(abs(found) <= _ROUNDINGS * _EPS * _terms(matrix, shapes), 0, found)
+
+
+def mode_condition(dynamic_stiffness: ComplexArray, uncertainty: FloatArray) -> FloatArray:
+    """Return the reciprocal condition of lines, shape (n_freq,), from r^T Z r of modes that rounding may hide.
+
+    eps / rcond is the relative change of a mode by the uncertainty of its w_r^2; 0 where nothing holds the mode.
+    """
+    left = abs(dynamic_stiffness)
+    rcond = np.divide(_EPS * left, uncertainty, out=np.ones_like(left), where=uncertainty > 0)
+    found: FloatArray = np.where(left > 0, rcond, 0).min(axis=1, initial=1.0)
+    return found
 
 
 def find_rigid_modes(k: sparse.csc_array, m: sparse.csc_array) -> RigidModes:
@@ -154,4 +179,10 @@ def _ritz(k: sparse.csc_array, m: sparse.csc_array, basis: FloatArray) -> tuple[
     """Return Ritz values of a space, Ritz vectors with unit modal masses, and the terms of the values."""
     squared, mixed = linalg.eigh(basis.T @ (k @ basis), basis.T @ (m @ basis))
     shapes = basis @ mixed
-    return squared, shapes, np.einsum("ij,ij->j", abs(shapes), abs(k) @ abs(shapes))
+    return squared, shapes, _terms(k, shapes)
+
+
+def _terms(matrix: sparse.csc_array, shapes: FloatArray) -> FloatArray:
+    """Return |r|^T |A| |r| of each shape, shape (k,)."""
+    found: FloatArray = np.einsum("ij,ij->j", abs(shapes), abs(matrix) @ abs(shapes))
+    return found

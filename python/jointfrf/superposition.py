@@ -20,7 +20,7 @@ from jointfrf._sweep import (
 from jointfrf.direct_solution import SINGULAR
 from jointfrf.model_matrices import ModelMatrices
 from jointfrf.ports import Ports
-from jointfrf.rigid_body import find_rigid_modes
+from jointfrf.rigid_body import find_rigid_modes, mode_condition, resistance
 
 __all__ = ["Modes", "all_modes"]
 
@@ -43,7 +43,7 @@ class Modes:
     shapes_out, shapes_in : ndarray, shape (n_out, n_modes), (n_in, n_modes)
         Shapes at responses and forces, 1/sqrt(kg).
     uncertainty : ndarray, shape (n_modes,)
-        What rounding of K leaves open of w_r^2, (rad/s)^2, of modes that it may hide, see `RigidModes`; 0 of the others.
+        What rounding of K leaves open of w_r^2, (rad/s)^2, of modes that it may hide, see `RigidModes`; else 0.
     """
 
     stiffness: FloatArray
@@ -88,10 +88,10 @@ class Modes:
         )
         result, status = run("receptance_modal", args, shape, {"omega": omega}, freq_hz, on_singular, 0.0, out)
         rcond = np.where(status.rcond < SINGULAR, status.rcond, 1.0)
-        for r in np.flatnonzero(self.uncertainty):
-            elastic = self.stiffness[r] * (1 + 1j * self.loss_factor[r])
-            left = abs(elastic - omega**2 + 1j * omega * self.damping[r])
-            rcond = np.minimum(rcond, SINGULAR * left / self.uncertainty[r])
+        known = self.uncertainty > 0
+        complex_stiffness = self.stiffness[known] * (1 + 1j * self.loss_factor[known])
+        left = complex_stiffness + omega[:, None] * (1j * self.damping[known] - omega[:, None])
+        rcond = np.minimum(rcond, mode_condition(left, self.uncertainty[known]))
         return result, LineStatus(status.line_info, rcond)
 
 
@@ -132,5 +132,8 @@ def all_modes(matrices: ModelMatrices, outputs: Ports, inputs: Ports) -> Modes:
         return diagonal
 
     structural = modal("structural_damping")
+    alone = resistance(matrices.sparse("structural_damping"), rigid.shapes)
+    structural[: len(rigid)] = alone
+    stiffness[: len(rigid)] = np.where(rigid.stiffness > 0, rigid.stiffness, SINGULAR * alone)  # held by H alone
     losses = matrices.loss_factor + np.divide(structural, stiffness, out=np.zeros(matrices.n), where=stiffness > 0)
     return Modes(stiffness, modal("damping"), losses, outputs.of(shapes), inputs.of(shapes), uncertainty)
