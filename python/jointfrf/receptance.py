@@ -177,7 +177,7 @@ def receptance(
     tolerance : float
         What the error estimate of "krylov", and of "modal" where "auto" chose it, must meet: the largest error of a
         line relative to its largest entry. Where rounding limits a direct solution, too, 30 times its rounding
-        will do.
+        will do, up to 2.2e-4: what rounding leaves at the reciprocal condition `jointfrf.RCOND_LIMIT`.
     full_output : bool
         Whether a `ReceptanceInfo` is returned too: what was done, why, and the error estimate.
 
@@ -199,6 +199,9 @@ def receptance(
     -----
     ConvergenceWarning
         "krylov" did not meet the tolerance; the model was solved instead.
+    IllConditionedWarning
+        A line is singular to working precision; or rounding of the entries of K changes the motion of a structure that
+        is softly held, as a rigid body, by more than 2.2e-4 of it.
 
     Notes
     -----
@@ -209,7 +212,8 @@ def receptance(
     larger symmetric model with damping a M + b K and one loss factor are a sum of modes, all of them or those of a
     reduced model. That sum is compared with direct solutions at a few lines: at both ends, and of a reduced model where
     its residual is largest. Motions as a rigid body are treated apart before, by their mass alone: near 0 Hz rounding
-    hides them from any solution of a structure that is not held. Where the tolerance is not met, the model is solved.
+    hides them from any solution of a structure that is not held. A motion counts as free if what K holds it with is
+    within 32 roundings of the terms it is the difference of. Where the tolerance is not met, the model is solved.
     The error between these lines is estimated, not bounded. Any other damping is solved, and so is a model of many DOFs
     and few entries, by a sparse factorisation.
 
@@ -235,7 +239,7 @@ def receptance(
     if method in ("dense", "banded", "sparse"):
         result, info = _solved(task, cast(Direct, method), "as asked for")
     elif method == "modal":
-        modes = all_modes(matrices, to, into)
+        modes, _ = all_modes(matrices, to, into)
         result = modes.receptance(freq, on_singular, out)
         info = ReceptanceInfo("modal", "as asked for", n_vectors=modes.stiffness.size)
     elif method == "krylov":
@@ -324,12 +328,12 @@ def _fallen_back(task: _Task, error: float, n_vectors: int, what: str) -> tuple[
 def _summed(task: _Task, reason: str) -> tuple[ComplexArray, ReceptanceInfo]:
     """All modes, where they meet the tolerance."""
     try:
-        modes = all_modes(task.matrices, task.outputs, task.inputs)
+        modes, rigid = all_modes(task.matrices, task.outputs, task.inputs)
     except ValueError as refusal:
         return _solved(task, _direct(task.matrices), str(refusal).split(":")[0])
     order = np.argsort(task.freq_hz)
     lines = order[np.linspace(0, order.size - 1, _SPOTS).astype(int)]
-    error, attainable = spot_error(task.freq_hz[lines], task.matrices, modes, task.outputs, task.inputs)
+    error, attainable = spot_error(task.freq_hz[lines], task.matrices, modes, task.outputs, task.inputs, rigid)
     return _finished(task, modes, error, attainable, "modal", reason)
 
 

@@ -20,7 +20,7 @@ from jointfrf._sweep import (
 from jointfrf.direct_solution import SINGULAR
 from jointfrf.model_matrices import ModelMatrices
 from jointfrf.ports import Ports
-from jointfrf.rigid_body import find_rigid_modes, mode_condition, resistance
+from jointfrf.rigid_body import RigidModes, find_rigid_modes, mode_condition, resistance
 
 __all__ = ["Modes", "all_modes"]
 
@@ -95,8 +95,8 @@ class Modes:
         return result, LineStatus(status.line_info, rcond)
 
 
-def all_modes(matrices: ModelMatrices, outputs: Ports, inputs: Ports) -> Modes:
-    """All modes of a model whose damping does not couple them.
+def all_modes(matrices: ModelMatrices, outputs: Ports, inputs: Ports) -> tuple[Modes, RigidModes]:
+    """Return all modes of a model whose damping does not couple them, and those as a rigid body among them.
 
     Raises
     ------
@@ -136,4 +136,5 @@ def all_modes(matrices: ModelMatrices, outputs: Ports, inputs: Ports) -> Modes:
     structural[: len(rigid)] = alone
     stiffness[: len(rigid)] = np.where(rigid.stiffness > 0, rigid.stiffness, SINGULAR * alone)  # held by H alone
     losses = matrices.loss_factor + np.divide(structural, stiffness, out=np.zeros(matrices.n), where=stiffness > 0)
-    return Modes(stiffness, modal("damping"), losses, outputs.of(shapes), inputs.of(shapes), uncertainty)
+    modes = Modes(stiffness, modal("damping"), losses, outputs.of(shapes), inputs.of(shapes), uncertainty)
+    return modes, rigid
