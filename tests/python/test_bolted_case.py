@@ -11,10 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from jointfrf.bolted import study
 
 import jointfrf as jf
 import jointfrf.cli.main
-from jointfrf.bolted import study
 from jointfrf.cases import catalogue as cases
 from jointfrf.cases.bolted_lap.figures import bolted_figures
 from jointfrf.cases.bolted_lap.measurement import DOFS, Cross, both_sides, measured_entries

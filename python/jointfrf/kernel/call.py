@@ -70,8 +70,8 @@ def run(
     routine : str
         Name without ``jf_``, used in messages too.
     args : sequence
-        Arguments of the routine in the order of `fortran/api/api.F90`, up to the result; arrays in C order, `N_FREQ` for the
-        number of lines.
+        Arguments of the routine in the order of `fortran/api/api.F90`, up to the result; arrays in C order, `N_FREQ`
+        for the number of lines.
     shape : tuple of int
         Shape of the result in C order, (n_freq, out, in).
     sweeps : mapping of str to ndarray

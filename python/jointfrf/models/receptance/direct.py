@@ -35,13 +35,15 @@ def solve_dense(
     inputs: NDArray[np.int32],
     on_singular: OnSingular,
     out: ComplexArray | None = None,
-) -> ComplexArray:
+) -> tuple[ComplexArray, LineStatus]:
     """Solve with full matrices, zgesv; DOFs counted from 1.
 
     Returns
     -------
-    ndarray, shape (n_freq, n_out, n_in)
+    h : ndarray, shape (n_freq, n_out, n_in)
         m/N.
+    status : LineStatus
+        With the reciprocal condition of each line; no line is announced as ill-conditioned yet.
     """
     n, shape, omega = matrices.n, (freq_hz.size, outputs.size, inputs.size), 2 * np.pi * freq_hz
     args: list[Any] = [n, N_FREQ, *shape[1:], omega, matrices.dense("stiffness"), matrices.dense("mass")]
@@ -49,7 +51,7 @@ def solve_dense(
         matrix = matrices.dense(name)
         args += [0, np.zeros((1, n))] if matrix is None else [n, matrix]
     args += [matrices.loss_factor, outputs, inputs]
-    return run("receptance", args, shape, {"omega": omega}, freq_hz, on_singular, SINGULAR, out)[0]
+    return run("receptance", args, shape, {"omega": omega}, freq_hz, on_singular, 0.0, out)
 
 
 def solve_banded(
@@ -59,13 +61,15 @@ def solve_banded(
     inputs: NDArray[np.int32],
     on_singular: OnSingular,
     out: ComplexArray | None = None,
-) -> ComplexArray:
+) -> tuple[ComplexArray, LineStatus]:
     """Solve in band storage, zgbsv or an elimination of many lines side by side; DOFs counted from 1.
 
     Returns
     -------
-    ndarray, shape (n_freq, n_out, n_in)
+    h : ndarray, shape (n_freq, n_out, n_in)
         m/N.
+    status : LineStatus
+        With the reciprocal condition of each line; no line is announced as ill-conditioned yet.
     """
     n, shape, omega = matrices.n, (freq_hz.size, outputs.size, inputs.size), 2 * np.pi * freq_hz
     kl, ku = matrices.widths
@@ -85,7 +89,7 @@ def solve_banded(
         band = stored(name)
         args += [0, np.zeros((1, kl + ku + 1))] if band is None else [n, band]
     args += [matrices.loss_factor, outputs, inputs]
-    return run("receptance_banded", args, shape, {"omega": omega}, freq_hz, on_singular, SINGULAR, out)[0]
+    return run("receptance_banded", args, shape, {"omega": omega}, freq_hz, on_singular, 0.0, out)
 
 
 def solve_sparse(
@@ -95,13 +99,15 @@ def solve_sparse(
     inputs: Ports,
     on_singular: OnSingular,
     out: ComplexArray | None = None,
-) -> ComplexArray:
+) -> tuple[ComplexArray, LineStatus]:
     """Solve by a sparse factorisation of every line, SuperLU.
 
     Returns
     -------
-    ndarray, shape (n_freq, n_out, n_in)
+    h : ndarray, shape (n_freq, n_out, n_in)
         m/N.
+    status : LineStatus
+        With the reciprocal condition of each line; no line is announced as ill-conditioned yet.
     """
     shape = (freq_hz.size, len(outputs), len(inputs))
     result = np.empty(shape, np.complex128) if out is None else checked_out(out, shape, (), {})
@@ -118,8 +124,8 @@ def solve_sparse(
         status.rcond[i] = _reciprocal_condition(z, factors)
         if not np.isfinite(result[i]).all():
             result[i], status.line_info[i], status.rcond[i] = np.nan, -2, 0
-    check_lines("receptance", status, {}, freq_hz, on_singular, SINGULAR)
-    return result
+    check_lines("receptance", status, {}, freq_hz, on_singular)
+    return result, status
 
 
 def _reciprocal_condition(z: sparse.csc_matrix, factors: sparse_linalg.SuperLU) -> float:

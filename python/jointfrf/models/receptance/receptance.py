@@ -12,12 +12,13 @@ from numpy.typing import ArrayLike
 from jointfrf.channels.finite_differences import transform
 from jointfrf.errors import ConvergenceWarning
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_frequency, as_number, check_choice
-from jointfrf.kernel.status import OnSingular
+from jointfrf.kernel.status import RCOND_LIMIT, LineStatus, OnSingular, check_lines
 from jointfrf.models.matrices import Matrix, ModelMatrices
 from jointfrf.models.ports import Ports, as_ports, directions
-from jointfrf.models.receptance.direct import solve_banded, solve_dense, solve_sparse
+from jointfrf.models.receptance.direct import SINGULAR, solve_banded, solve_dense, solve_sparse
 from jointfrf.models.receptance.krylov import reduce_model, spot_error
 from jointfrf.models.receptance.modal import Modes, all_modes
+from jointfrf.models.receptance.rigid_modes import find_rigid_modes, mode_condition
 
 __all__ = ["Method", "ReceptanceInfo", "receptance"]
 
@@ -167,7 +168,7 @@ def receptance(
     tolerance : float
         What the error estimate of "krylov", and of "modal" where "auto" chose it, must meet: the largest error of a
         line relative to its largest entry. Where rounding limits a direct solution, too, 30 times its rounding
-        will do.
+        will do, up to 2.2e-4: what rounding leaves at the reciprocal condition `jointfrf.RCOND_LIMIT`.
     full_output : bool
         Whether a `ReceptanceInfo` is returned too: what was done, why, and the error estimate.
 
@@ -189,6 +190,9 @@ def receptance(
     -----
     ConvergenceWarning
         "krylov" did not meet the tolerance; the model was solved instead.
+    IllConditionedWarning
+        A line is singular to working precision; or rounding of the entries of K changes the motion of a structure that
+        is softly held, as a rigid body, by more than 2.2e-4 of it.
 
     Notes
     -----
@@ -199,7 +203,8 @@ def receptance(
     larger symmetric model with damping a M + b K and one loss factor are a sum of modes, all of them or those of a
     reduced model. That sum is compared with direct solutions at a few lines: at both ends, and of a reduced model where
     its residual is largest. Motions as a rigid body are treated apart before, by their mass alone: near 0 Hz rounding
-    hides them from any solution of a structure that is not held. Where the tolerance is not met, the model is solved.
+    hides them from any solution of a structure that is not held. A motion counts as free if what K holds it with is
+    within 32 roundings of the terms it is the difference of. Where the tolerance is not met, the model is solved.
     The error between these lines is estimated, not bounded. Any other damping is solved, and so is a model of many DOFs
     and few entries, by a sparse factorisation.
 
@@ -225,7 +230,7 @@ def receptance(
     if method in ("dense", "banded", "sparse"):
         result, info = _solved(task, cast(Direct, method), "as asked for")
     elif method == "modal":
-        modes = all_modes(matrices, to, into)
+        modes, _ = all_modes(matrices, to, into)
         result = modes.receptance(freq, on_singular, out)
         info = ReceptanceInfo("modal", "as asked for", n_vectors=modes.stiffness.size)
     elif method == "krylov":
@@ -275,16 +280,32 @@ def _solved(task: _Task, how: Direct, reason: str) -> tuple[ComplexArray, Recept
     freq, matrices, on_singular = task.freq_hz, task.matrices, task.on_singular
     to, into = task.outputs, task.inputs
     if how == "sparse":
-        result = solve_sparse(freq, matrices, to, into, on_singular, task.out)
-        return result, ReceptanceInfo(how, reason)
-    solve = solve_banded if how == "banded" else solve_dense
-    if to.picked is not None and into.picked is not None:
-        result = solve(freq, matrices, to.picked, into.picked, on_singular, task.out)
+        result, status = solve_sparse(freq, matrices, to, into, on_singular, task.out)
     else:
-        h = solve(freq, matrices, to.needed, into.needed, on_singular)
-        t_out, t_in = (ports.weights[:, ports.needed - 1].toarray() for ports in (to, into))
-        result = transform(h, t_out, t_in, freq_hz=freq, on_singular=on_singular, out=task.out)
+        solve = solve_banded if how == "banded" else solve_dense
+        if to.picked is not None and into.picked is not None:
+            result, status = solve(freq, matrices, to.picked, into.picked, on_singular, task.out)
+        else:
+            h, status = solve(freq, matrices, to.needed, into.needed, on_singular)
+            t_out, t_in = (ports.weights[:, ports.needed - 1].toarray() for ports in (to, into))
+            result = transform(h, t_out, t_in, freq_hz=freq, on_singular=on_singular, out=task.out)
+    check_lines("receptance", _in_doubt(matrices, freq, status), {}, freq, "nan", RCOND_LIMIT)
     return result, ReceptanceInfo(how, reason)
+
+
+def _in_doubt(matrices: ModelMatrices, freq: FloatArray, status: LineStatus) -> LineStatus:
+    """Return how lines went, with a small reciprocal condition only where a direct solution is in doubt.
+
+    A fine mesh in mixed units has rcond 1e-13 and still gives nine digits: such a line is in doubt if it is singular to
+    working precision, or if rounding of K hides what holds the structure as a whole.
+    """
+    rcond = np.where(status.rcond < SINGULAR, status.rcond, 1.0)
+    poor = (status.rcond < RCOND_LIMIT) & (status.rcond >= SINGULAR)
+    if poor.any() and matrices.is_symmetric("stiffness") and matrices.is_symmetric("mass"):
+        rigid = find_rigid_modes(matrices.sparse("stiffness"), matrices.sparse("mass"))
+        left = rigid.dynamic_stiffness(matrices, 2 * np.pi * freq[poor])
+        rcond[poor] = mode_condition(left, rigid.uncertainty)
+    return LineStatus(status.line_info, rcond)
 
 
 def _fallen_back(task: _Task, error: float, n_vectors: int, what: str) -> tuple[ComplexArray, ReceptanceInfo]:
@@ -298,12 +319,12 @@ def _fallen_back(task: _Task, error: float, n_vectors: int, what: str) -> tuple[
 def _summed(task: _Task, reason: str) -> tuple[ComplexArray, ReceptanceInfo]:
     """All modes, where they meet the tolerance."""
     try:
-        modes = all_modes(task.matrices, task.outputs, task.inputs)
+        modes, rigid = all_modes(task.matrices, task.outputs, task.inputs)
     except ValueError as refusal:
         return _solved(task, _direct(task.matrices), str(refusal).split(":")[0])
     order = np.argsort(task.freq_hz)
     lines = order[np.linspace(0, order.size - 1, _SPOTS).astype(int)]
-    error, attainable = spot_error(task.freq_hz[lines], task.matrices, modes, task.outputs, task.inputs)
+    error, attainable = spot_error(task.freq_hz[lines], task.matrices, modes, task.outputs, task.inputs, rigid)
     return _finished(task, modes, error, attainable, "modal", reason)
 
 
