@@ -14,6 +14,8 @@ import pytest
 import jointfrf as jf
 from installed_library import COMPILERS, ROOT, InstalledLibrary, install, run
 
+pytestmark = pytest.mark.builds
+
 TESTS = ROOT / "tests"
 HEADER = (ROOT / "fortran" / "face" / "include" / "jointfrf.h").read_text()
 CASES = ["f77/case.f", "fortran/case.f90", "c/case.c"]

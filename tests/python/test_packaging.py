@@ -58,6 +58,7 @@ assert all(pathlib.Path(m).is_relative_to(sys.prefix) for m in fortran), fortran
 """
 
 
+@pytest.mark.builds
 @pytest.mark.wheel
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="the wheel script is for Linux")
 def test_wheel_brings_its_own_fortran_library(tmp_path):
