@@ -178,14 +178,17 @@ take_lock() {
 
 # ---------------------------------------------------------------- .venv
 
-state() { { echo "$root"; cat pyproject.toml meson.build meson.options fortran/meson.build fortran/api/meson.build fortran/api/*/meson.build python/meson.build; } | cksum; }
+state() { { echo "$root"; cat pyproject.toml python/constraints.txt meson.build meson.options fortran/meson.build fortran/api/meson.build fortran/api/*/meson.build python/meson.build; } | cksum; }
 
 up_to_date() {
   [ "$(cat "$stamp.$1" 2>/dev/null)" = "$(state)" ] && is_new_enough "$venv/bin/python" &&
     ls build/cp*/build.ninja >/dev/null 2>&1
 }
 
-pip_install() { "$venv/bin/python" -m pip --disable-pip-version-check --no-input install "$@" >>"$log" 2>&1; }
+# The versions of the checked-in list, so that a new release of a dependency breaks no fresh clone.
+pip_install() {
+  "$venv/bin/python" -m pip --disable-pip-version-check --no-input install -c python/constraints.txt "$@" >>"$log" 2>&1
+}
 
 make_venv() {
   if ! venv_works; then

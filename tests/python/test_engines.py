@@ -4,7 +4,6 @@ How far two results may be apart is measured, not assumed: the reference is run 
 bit.
 """
 
-import ctypes
 import os
 import re
 import subprocess
@@ -12,7 +11,6 @@ import sys
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, get_args
 
 import numpy as np
@@ -254,18 +252,8 @@ def operation(request) -> str:
 
 
 @pytest.fixture(autouse=True)
-def threads():
-    """One thread, and how to set another number; the number before comes back at the end."""
-    maps = Path("/proc/self/maps")
-    openmp = re.search(r"\S*libgomp\S*", maps.read_text()) if maps.exists() else None
-    if openmp is None:
-        yield None
-        return
-    library = ctypes.CDLL(openmp[0])
-    before = library.omp_get_max_threads()
-    library.omp_set_num_threads(1)
-    yield library.omp_set_num_threads
-    library.omp_set_num_threads(before)
+def one_thread(threads):
+    """Lines are compared among the same neighbours."""
 
 
 def on(engine: str, call: Call):

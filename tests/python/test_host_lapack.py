@@ -22,7 +22,10 @@ CASES = ("f77/case.f", "fortran/case.f90", "c/case.c")
 LAPACKS = find_lapacks()
 ENTRY = re.compile(r"(\w+)\((\d),(\d)\) *(\d+) +(\S+) +(\S+)")
 
-pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="shared libraries of Linux")
+pytestmark = [
+    pytest.mark.builds,
+    pytest.mark.skipif(not sys.platform.startswith("linux"), reason="shared libraries of Linux"),
+]
 each_lapack = pytest.mark.parametrize("lapack", parameters(LAPACKS))
 
 

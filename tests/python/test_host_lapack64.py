@@ -13,7 +13,10 @@ import jointfrf as jf
 from host_lapacks import find_lapacks
 from host_library import TESTS, HostLibrary, parameters
 
-pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="shared libraries of Linux")
+pytestmark = [
+    pytest.mark.builds,
+    pytest.mark.skipif(not sys.platform.startswith("linux"), reason="shared libraries of Linux"),
+]
 each_lapack = pytest.mark.parametrize("lapack", parameters(find_lapacks(ilp64=True)))
 
 

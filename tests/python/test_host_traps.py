@@ -10,6 +10,8 @@ import pytest
 
 from installed_library import InstalledLibrary, run
 
+pytestmark = pytest.mark.builds
+
 FOLDER = Path(__file__).resolve().parents[1] / "f77"
 TRAPS = "-ffpe-trap=invalid,zero,overflow"
 CODES = [0, 0, 2, -2, -1, 2, 0, -2, 2, -1, 0, 2]

@@ -15,6 +15,8 @@ import jointfrf as jf
 from abi import LISTED, prototypes
 from installed_library import COMPILERS, ROOT, InstalledLibrary, install, run
 
+pytestmark = pytest.mark.builds
+
 TESTS = ROOT / "tests"
 CASES = ["f77/case.f", "fortran/case.f90", "c/case.c"]
 CONSUMERS = {language: TESTS / "install" / f"consumer.{language}" for language in ("f", "f90", "c")}

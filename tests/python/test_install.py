@@ -54,6 +54,7 @@ def static_prefix(project):
     return moved
 
 
+@pytest.mark.builds
 @needs_tools
 @pytest.mark.parametrize("language", COMPILERS)
 @pytest.mark.parametrize("kind", ["shared", "static"])
@@ -63,6 +64,7 @@ def test_subproject(project, kind, language):
     assert ("libjointfrf.so.0" in run("readelf", "-d", program)) == (kind == "shared")
 
 
+@pytest.mark.builds
 @needs_tools
 @needs_pkg_config
 @pytest.mark.parametrize("language", COMPILERS)
@@ -83,6 +85,7 @@ def test_pkg_config(request, tmp_path, kind, language):
     run(program, env=os.environ | {"LD_LIBRARY_PATH": str(path)})
 
 
+@pytest.mark.builds
 @needs_tools
 @needs_pkg_config
 @pytest.mark.skipif(shutil.which("cmake") is None or shutil.which("ctest") is None, reason="needs CMake")
@@ -107,6 +110,7 @@ def test_installed_header_declares_the_listed_abi(project):
     assert "\nextern const char jf_integers_have_4_bytes_;\n" in header
 
 
+@pytest.mark.builds
 @needs_tools
 def test_shared_library_exports_the_listed_abi(project):
     library = project / "prefix" / "lib" / "libjointfrf.so"
@@ -117,6 +121,7 @@ def test_shared_library_exports_the_listed_abi(project):
     assert "Library soname: [libjointfrf.so.0]" in run("readelf", "-d", library)
 
 
+@pytest.mark.builds
 @needs_tools
 def test_static_library_keeps_to_its_names(project):
     """Internal names cannot be hidden in an archive, but they cannot clash: all carry the name of the library."""
@@ -127,6 +132,7 @@ def test_static_library_keeps_to_its_names(project):
     assert [name for name in symbols if not name.startswith(own)] == []
 
 
+@pytest.mark.builds
 @needs_tools
 def test_every_routine_has_a_page(project):
     pages = project / "prefix" / "share" / "man" / "man3"
@@ -145,6 +151,7 @@ def test_every_routine_has_a_page(project):
         assert f".BR {name} (3)" in overview, name
 
 
+@pytest.mark.builds
 @needs_tools
 @pytest.mark.skipif(shutil.which("groff") is None, reason="needs groff")
 def test_pages_are_sound_roff(project):

@@ -286,6 +286,37 @@ def test_without_pyuff_one_sentence_tells_what_to_install(write, monkeypatch):
         read_uff(write(function()))
 
 
+def test_a_fault_of_a_program_is_not_called_a_damaged_file(write, monkeypatch):
+    """pyuff hides whatever it runs into below a bare `Exception`."""
+    path = write(function())
+
+    def older(self, setn=None):
+        raise AssertionError("not reached")
+
+    def hides(self, setn=None, header_only=False):
+        try:
+            float(None)
+        except TypeError:
+            raise Exception("Error reading data-set #58b")  # noqa: B904
+
+    for read_sets in (older, hides):
+        monkeypatch.setattr("pyuff.UFF.read_sets", read_sets)
+        with pytest.raises(Exception, match=r"header_only|data-set") as caught:
+            read_uff(path)
+        assert not isinstance(caught.value, FileContentError)
+
+
+def test_a_damaged_file_is_one_whatever_the_caller_is_handling(write):
+    path = write(function().replace(b"1.00000000000e+00", b"1.00000x00000e+00"))
+    with pytest.raises(FileContentError, match=r"dataset 1 .* cannot be read"):
+        read_uff(path)
+    try:
+        float(None)
+    except TypeError:
+        with pytest.raises(FileContentError, match=r"dataset 1 .* cannot be read"):
+            read_uff(path)
+
+
 def test_a_damaged_file_is_read_or_refused_but_nothing_else(write):
     sound = b"".join(
         [

@@ -11,6 +11,8 @@ import pytest
 import jointfrf as jf
 from installed_library import InstalledLibrary, run
 
+pytestmark = pytest.mark.builds
+
 F77 = Path(__file__).resolve().parents[1] / "f77"
 PATCH = F77 / "frame-joint.patch"
 JOINT_NODES = (5, 6)

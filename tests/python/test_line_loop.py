@@ -3,9 +3,12 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 import jointfrf as jf
 from installed_library import InstalledLibrary, run
+
+pytestmark = pytest.mark.builds
 
 SOURCE = Path(__file__).resolve().parents[1] / "f77" / "loop.f"
 

@@ -13,6 +13,7 @@ TESTS = Path(__file__).resolve().parents[1]
 BUILT = Path(os.environ.get("JOINTFRF_TEST_PROGRAMS", TESTS.parent / "build" / "tests" / "tests")).parent / "fortran"
 
 pytestmark = [
+    pytest.mark.builds,
     pytest.mark.skipif(
         shutil.which("mpif90") is None or shutil.which("mpirun") is None,
         reason="MPI (mpif90, mpirun) is not on PATH",

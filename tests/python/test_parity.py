@@ -11,6 +11,8 @@ import case
 import jointfrf as jf
 from installed_library import InstalledLibrary, run
 
+pytestmark = pytest.mark.builds
+
 TESTS = Path(__file__).resolve().parents[1]
 SOURCES = {"FORTRAN 77": "f77/case.f", "Fortran": "fortran/case.f90", "C": "c/case.c"}
 ENTRY = re.compile(r"(\w+)\((\d),(\d)\) *(\d+) +(\S+) +(\S+)")

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import re
+import struct
+import sys
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from jointfrf.errors import FileContentError, FileContentWarning
 from jointfrf.io.units import UnitSystem
@@ -15,6 +17,9 @@ __all__ = ["UniversalFile", "name_some"]
 
 _DELIMITER = re.compile(rb"    -1(?=[\r\n]|\Z| {74})")
 _NUMBERS_SHOWN = 5
+#: What pyuff runs into where a file is damaged; it raises a bare `Exception` instead, for these and for any other.
+_DAMAGE = (ValueError, LookupError, ArithmeticError, struct.error)
+_Answer = TypeVar("_Answer")
 
 
 class UniversalFile:
@@ -41,11 +46,9 @@ class UniversalFile:
         n_delimiters = len(_DELIMITER.findall(content))
         if n_delimiters == 0:
             raise self.error("is not a Universal File: no dataset delimiters (-1)")
-        try:
-            self._reader = pyuff.UFF(str(path))
-            self.types = [int(number) for number in self._reader.get_set_types()]
-        except Exception as error:
-            raise self.error("cannot be divided into datasets") from error
+        cut = "cannot be divided into datasets"
+        self._reader = self._ask(cut, lambda: pyuff.UFF(str(path)))
+        self.types = [int(number) for number in self._ask(cut, self._reader.get_set_types)]
         if not self.types:
             raise self.error("ends inside its first dataset")
         for number, kind in enumerate(self.types, start=1):
@@ -74,13 +77,10 @@ class UniversalFile:
 
     def read(self, dataset: int, header_only: bool = False) -> dict[str, Any]:
         """Content of a dataset."""
-        try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")
-                content: dict[str, Any] = self._reader.read_sets(dataset - 1, header_only=header_only)
-        except Exception as error:
-            kind = self.types[dataset - 1]
-            raise self.error(f"is damaged: dataset {dataset} (type {kind}) cannot be read") from error
+        sentence = f"is damaged: dataset {dataset} (type {self.types[dataset - 1]}) cannot be read"
+        content: dict[str, Any] = self._ask(
+            sentence, lambda: self._reader.read_sets(dataset - 1, header_only=header_only)
+        )
         return content
 
     def unit_system(self, dataset: int) -> UnitSystem | None:
@@ -97,6 +97,18 @@ class UniversalFile:
                 raise self.error(f"has the {name} factor {content[name]:g} in its units (dataset {dataset})")
         return UnitSystem(content["length"], content["force"])
 
+    def _ask(self, sentence: str, question: Callable[[], _Answer]) -> _Answer:
+        """Ask pyuff; where the file is why it has no answer, the error is a sentence about the file."""
+        outside = sys.exc_info()[1]
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                return question()
+        except Exception as error:
+            if not _is_damage(error, outside):
+                raise
+            raise self.error(sentence) from error
+
     def _content(self) -> bytes:
         if not self.path.exists():
             raise FileNotFoundError(f"there is no file {self.path}")
@@ -109,6 +121,15 @@ class UniversalFile:
         if not content.strip():
             raise self.error("is empty")
         return content
+
+
+def _is_damage(error: BaseException, outside: BaseException | None) -> bool:
+    """Whether pyuff stopped because of the file. `outside` is what its caller was handling already."""
+    if type(error) is not Exception:
+        return False
+    while error.__context__ is not None and error.__context__ is not outside:
+        error = error.__context__
+    return type(error) is Exception or isinstance(error, _DAMAGE)
 
 
 def name_some(what: str, numbers: Sequence[int]) -> str:

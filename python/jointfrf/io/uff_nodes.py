@@ -51,7 +51,7 @@ def node_coordinates(file: UniversalFile, nodes: Collection[int]) -> dict[int, N
     for number in file.datasets(15, 2411):
         try:
             rows = _node_rows(file.read(number))
-        except (FileContentError, ValueError, TypeError):
+        except (FileContentError, ValueError):
             file.note("the coordinates of nodes cannot be read and are left out", number)
             continue
         rows = rows[np.isin(rows[:, 0], list(nodes))]
@@ -88,7 +88,7 @@ def _coordinate_systems(file: UniversalFile) -> dict[int, _Axes]:
         try:
             content = file.read(number)
             systems |= _axes_by_points(content) if content["type"] == 18 else _axes_by_matrix(content)
-        except (FileContentError, ValueError, TypeError, LookupError):
+        except (FileContentError, ValueError, LookupError):
             file.note("the coordinate systems cannot be read and are taken as global", number)
     return systems
 

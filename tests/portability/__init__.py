@@ -1,0 +1,1 @@
+"""The numerical tests on other kinds of processor, engines, versions and Pythons."""
