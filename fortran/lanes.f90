@@ -173,7 +173,7 @@ module jointfrf_lanes
       real(dp), intent(out) :: smallest(lanes), largest(lanes)
     end subroutine superpose_routine
 
-    !> Two words of random bits for every counter, see `lanes_noise/random.inc`.
+    !> Two words of random bits for every counter, see `lanes/random_numbers.inc`.
     !> n      counters a lane
     !> key    shape (2)
     !> low    first word of the counters, shape (lanes, n)
