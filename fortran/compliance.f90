@@ -3,12 +3,12 @@
 module jointfrf_compliance
   use jointfrf_caller_memory, only: caller_memory
   use jointfrf_kinds, only: dp, ip
-  use jointfrf_lanes, only: in_memory, lane_kernels, lanes, largest_in_lanes, natural, padded, real_lines, &
-    row_starts, system, system_size
+  use jointfrf_lanes, only: element_space, in_memory, lane_kernels, lanes, largest_in_lanes, padded, real_lines, &
+    row_starts
   use jointfrf_line_layout, only: all_finite, load, load_real, store, take_block
-  use jointfrf_lines_lapack, only: inverse_work, product_line, solve_line
+  use jointfrf_lines_lapack, only: product_line, room_to_solve, solve_line
   use jointfrf_status, only: line_good, line_not_finite, line_overflow
-  use jointfrf_sweep, only: area, line_operation, line_space, run_sweep, worth_a_plan
+  use jointfrf_sweep, only: line_operation, line_space, run_sweep, worth_a_plan
   implicit none
   private
   public :: joint_compliance, compliance_covariance, compliance_factors
@@ -18,6 +18,7 @@ module jointfrf_compliance
     real(dp), pointer, contiguous :: gamma(:, :, :), c_joint(:, :, :)
     integer, allocatable :: gamma_place(:), c(:)          !< in the caller's order
     integer, allocatable :: kk_row(:), c_row(:)           !< the element before each row
+    integer :: jk_before                                  !< the element before the system gamma_jk X = gamma_jj
   end type compliance_in_lanes
 
   type, extends(line_operation) :: compliance
@@ -37,6 +38,13 @@ module jointfrf_compliance
     complex(dp), pointer, contiguous :: gamma(:, :, :)
     real(dp), pointer, contiguous :: transform(:, :)
   end type linearisation
+
+  !> The matrices of one line of it.
+  type :: linear_terms
+    complex(dp), pointer, contiguous :: u(:, :), v_transposed(:, :)          !< U and V^T
+    complex(dp), pointer, contiguous :: right(:, :), left(:, :)              !< R and L^T
+    complex(dp), pointer, contiguous :: gamma(:, :), gamma_jk(:, :)
+  end type linear_terms
 
   type, extends(linearisation) :: factorisation
   contains
@@ -74,9 +82,6 @@ contains
     operation%n = n
     operation%gamma => gamma
     operation%result => c_joint
-    operation%n_complex = 8*area(n, n) + inverse_work(n)
-    operation%n_real = area(2, n)
-    operation%n_pivot = n
     operation%flops = 19.0_dp*real(n, dp)**3
     if (worth_a_plan(size(gamma, 3), memory) .and. n >= 1 .and. n <= largest_in_lanes) call plan_compliance(operation)
     call run_sweep(operation, size(gamma, 3, kind=ip), line_info, rcond, info, memory)
@@ -84,16 +89,16 @@ contains
 
   subroutine plan_compliance(operation)
     type(compliance), intent(inout) :: operation
-    integer :: gamma(2*operation%n, 2*operation%n), solved(operation%n, 2*operation%n), n, taken
+    integer :: gamma(2*operation%n, 2*operation%n), solved(operation%n, 2*operation%n), n
+    type(element_space) :: room
 
     n = operation%n
-    solved = system(0, n, n)
-    taken = system_size(n, n)
+    solved = room%system(n, n, operation%plan%jk_before)
     gamma(:n, n + 1:) = solved(:, :n)               ! jk, to be inverted
     gamma(:n, :n) = solved(:, n + 1:)               ! jj, the right-hand sides
-    gamma(n + 1:, n + 1:) = natural(taken, n, n)    ! kk
-    gamma(n + 1:, :n) = natural(taken + n*n, n, n)  ! kj, where C will be
-    operation%n_element = taken + 2*n*n
+    gamma(n + 1:, n + 1:) = room%matrix(n, n)       ! kk
+    gamma(n + 1:, :n) = room%matrix(n, n)           ! kj, where C will be
+    operation%n_element = room%taken
     operation%n_hint = padded(n)
     operation%plan%gamma => real_lines(operation%gamma)
     call operation%reads(operation%plan%gamma)
@@ -119,7 +124,7 @@ contains
     n = self%n
     associate (plan => self%plan, x => space%x)
       call kernels%load(4*n*n, plan%gamma_place, first, n_lines, plan%gamma, x)
-      call kernels%solve(n, n, n, 0, x, space%hint, row, rcond_lanes, space%ahead)        ! gamma_jk^-1 gamma_jj
+      call kernels%solve(n, n, n, plan%jk_before, x, space%hint, row, rcond_lanes, space%ahead)  ! gamma_jk^-1 gamma_jj
       call kernels%copy(n*n, -1.0_dp, plan%c, plan%c, x)
       call kernels%product(n, n, n, 1.0_dp, plan%kk_row, row, plan%c_row, x)
       call kernels%store(n*n, plan%c, first, n_lines, x, self%plan%c_joint)
@@ -138,15 +143,17 @@ contains
     complex(dp), pointer, contiguous :: gamma(:, :), gamma_jk(:, :), gamma_kk(:, :), right(:, :), c(:, :)
     integer :: n
 
-    line_info = line_not_finite
-    rcond = 0.0_dp
-    if (.not. all_finite(self%gamma(:, :, i))) return
     n = self%n
     gamma => space%matrix(2*n, 2*n)
     gamma_jk => space%matrix(n, n)
     gamma_kk => space%matrix(n, n)
     right => space%matrix(n, n)
     c => space%matrix(n, n)
+    call room_to_solve(n, space)
+    line_info = line_not_finite
+    rcond = 0.0_dp
+    if (space%only_counts) return
+    if (.not. all_finite(self%gamma(:, :, i))) return
     call load(self%transposed, self%gamma(:, :, i), gamma)
     call take_block(.false., 1.0_dp, gamma, 0, n, gamma_jk)
     call take_block(.false., 1.0_dp, gamma, n, n, gamma_kk)
@@ -183,7 +190,6 @@ contains
     operation%result => factors
     n = operation%n
     m = operation%m
-    operation%n_complex = operation%n_complex + 2*area(n, m)
     operation%flops = 43.0_dp*real(n, dp)**3 + 8.0_dp*real(n, dp)**2*m
     call run_sweep(operation, size(gamma, 3, kind=ip), line_info, rcond, info, memory)
   end subroutine compliance_factors
@@ -199,10 +205,6 @@ contains
     operation%gamma => gamma
     operation%transform => transform
     operation%m = size(transform, merge(1, 2, transposed))
-    operation%n_complex = 7*area(operation%n, operation%n) + 2*area(operation%n, operation%m) &
-                          + inverse_work(operation%n)
-    operation%n_real = area(2, operation%n)
-    operation%n_pivot = operation%n
   end subroutine set_linearisation
 
   subroutine factor_one(self, i, space, line_info, rcond)
@@ -211,14 +213,17 @@ contains
     type(line_space), target, intent(inout) :: space
     integer(ip), intent(out) :: line_info
     real(dp), intent(out) :: rcond
-    complex(dp), pointer, contiguous :: u(:, :), v_transposed(:, :), factors(:, :)
+    complex(dp), pointer, contiguous :: factors(:, :)
+    type(linear_terms) :: terms
 
-    u => space%matrix(self%n, self%m)
-    v_transposed => space%matrix(self%n, self%m)
     factors => space%matrix(2*self%n, self%m)
-    call linearise(self, i, space, u, v_transposed, line_info, rcond)
+    call take_terms(self, space, terms)
+    line_info = line_not_finite
+    rcond = 0.0_dp
+    if (space%only_counts) return
+    call linearise(self, i, terms, space, line_info, rcond)
     if (line_info /= line_good) return
-    call stack(u, v_transposed, factors)
+    call stack(terms%u, terms%v_transposed, factors)
     if (.not. all_finite(factors)) line_info = line_overflow
     call store(self%transposed, factors, self%result(:, :, i))
   end subroutine factor_one
@@ -231,34 +236,57 @@ contains
     whole(size(above, 1) + 1:, :) = below
   end subroutine stack
 
-  !> U and V^T of one line. Takes 7 n^2 of the complex workspace, and that of `solve_line`.
-  subroutine linearise(self, i, space, u, v_transposed, line_info, rcond)
+  !> The matrices of one line, and room for `linearise`.
+  subroutine take_terms(self, space, terms)
+    class(linearisation), intent(in) :: self
+    type(line_space), target, intent(inout) :: space
+    type(linear_terms), intent(out) :: terms
+    integer :: n
+
+    n = self%n
+    terms%u => space%matrix(n, self%m)
+    terms%v_transposed => space%matrix(n, self%m)
+    terms%right => space%matrix(n, n)
+    terms%left => space%matrix(n, n)
+    terms%gamma => space%matrix(2*n, 2*n)
+    terms%gamma_jk => space%matrix(n, n)
+    call room_to_solve(n, space)
+  end subroutine take_terms
+
+  !> U and V^T of one line.
+  subroutine linearise(self, i, terms, space, line_info, rcond)
     class(linearisation), intent(in) :: self
     integer, intent(in) :: i
+    type(linear_terms), intent(in) :: terms
     type(line_space), target, intent(inout) :: space
-    complex(dp), contiguous, intent(out) :: u(:, :), v_transposed(:, :)
     integer(ip), intent(out) :: line_info
     real(dp), intent(out) :: rcond
-    complex(dp), pointer, contiguous :: gamma(:, :), gamma_jk(:, :), right(:, :), left(:, :)
-    integer :: n, p, a, b
+    integer :: n
 
     line_info = line_not_finite
     rcond = 0.0_dp
     if (.not. all_finite(self%gamma(:, :, i))) return
     n = self%n
-    gamma => space%matrix(2*n, 2*n)
-    gamma_jk => space%matrix(n, n)
-    right => space%matrix(n, n)
-    left => space%matrix(n, n)
-    call load(self%transposed, self%gamma(:, :, i), gamma)
-    call take_block(.false., 1.0_dp, gamma, 0, n, gamma_jk)
-    call take_block(.false., 1.0_dp, gamma, 0, 0, right)
-    call solve_line(gamma_jk, right, space, line_info, rcond)         ! R
+    call load(self%transposed, self%gamma(:, :, i), terms%gamma)
+    call take_block(.false., 1.0_dp, terms%gamma, 0, n, terms%gamma_jk)
+    call take_block(.false., 1.0_dp, terms%gamma, 0, 0, terms%right)
+    call solve_line(terms%gamma_jk, terms%right, space, line_info, rcond)       ! R
     if (line_info /= line_good) return
-    call take_block(.true., 1.0_dp, gamma, 0, n, gamma_jk)
-    call take_block(.true., 1.0_dp, gamma, n, n, left)
-    call solve_line(gamma_jk, left, space, line_info, rcond)          ! L^T
+    call take_block(.true., 1.0_dp, terms%gamma, 0, n, terms%gamma_jk)
+    call take_block(.true., 1.0_dp, terms%gamma, n, n, terms%left)
+    call solve_line(terms%gamma_jk, terms%left, space, line_info, rcond)        ! L^T
     if (line_info /= line_good) return
+    call weigh(self, terms%left, terms%right, terms%u, terms%v_transposed)
+  end subroutine linearise
+
+  !> U = [L, -I] T and V = T^T [I; -R].
+  subroutine weigh(self, left, right, u, v_transposed)
+    class(linearisation), intent(in) :: self
+    complex(dp), contiguous, intent(in) :: left(:, :), right(:, :)
+    complex(dp), contiguous, intent(out) :: u(:, :), v_transposed(:, :)
+    integer :: n, p, a, b
+
+    n = self%n
     do p = 1, self%m
       do a = 1, n
         u(a, p) = 0.0_dp
@@ -285,7 +313,7 @@ contains
         weight = self%transform(dof, point)
       end if
     end function weight
-  end subroutine linearise
+  end subroutine weigh
 
   !> Covariance of the entries of C from the noise of the measured FRFs, to first order.
   !>
@@ -318,7 +346,6 @@ contains
     operation%result => covariance
     n = operation%n
     m = operation%m
-    operation%n_complex = operation%n_complex + 3*area(n, n)*m + area(m, m) + 3*area(n, n)**2
     operation%flops = 16.0_dp*real(n, dp)**2*m*(real(n, dp)**2 + m)
     call run_sweep(operation, size(gamma, 3, kind=ip), line_info, rcond, info, memory)
   end subroutine compliance_covariance
@@ -329,17 +356,13 @@ contains
     type(line_space), target, intent(inout) :: space
     integer(ip), intent(out) :: line_info
     real(dp), intent(out) :: rcond
-    complex(dp), pointer, contiguous :: u(:, :), v_transposed(:, :), spread(:, :), uu(:, :), vv(:, :), uv(:, :)
+    complex(dp), pointer, contiguous :: spread(:, :), uu(:, :), vv(:, :), uv(:, :)
+    type(linear_terms) :: terms
     complex(dp), pointer, contiguous :: straight(:, :), crossed(:, :), covariance(:, :)
     integer :: n, m, a, b, c, d, ab, cd
 
-    line_info = line_not_finite
-    rcond = 0.0_dp
-    if (.not. all(self%variance(:, :, i) >= 0.0_dp .and. self%variance(:, :, i) <= huge(1.0_dp))) return
     n = self%n
     m = self%m
-    u => space%matrix(n, m)
-    v_transposed => space%matrix(n, m)
     spread => space%matrix(m, m)
     uu => space%matrix(n*n, m)
     vv => space%matrix(n*n, m)
@@ -347,14 +370,19 @@ contains
     straight => space%matrix(n*n, n*n)
     crossed => space%matrix(n*n, n*n)
     covariance => space%matrix(n*n, n*n)
-    call linearise(self, i, space, u, v_transposed, line_info, rcond)
+    call take_terms(self, space, terms)
+    line_info = line_not_finite
+    rcond = 0.0_dp
+    if (space%only_counts) return
+    if (.not. all(self%variance(:, :, i) >= 0.0_dp .and. self%variance(:, :, i) <= huge(1.0_dp))) return
+    call linearise(self, i, terms, space, line_info, rcond)
     if (line_info /= line_good) return
     call load_real(self%transposed, self%variance(:, :, i), spread)
     if (self%reciprocal) call make_symmetric(spread)
 
     ! sum over p, q of U_ap conj(U_cp) s_pq V_qb conj(V_qd), at row ac, column bd
-    call outer_rows(u, u, uu)
-    call outer_rows(v_transposed, v_transposed, vv)
+    call outer_rows(terms%u, terms%u, uu)
+    call outer_rows(terms%v_transposed, terms%v_transposed, vv)
     uv = 0
     call product_line('N', 'N', 1.0_dp, uu, spread, uv)
     straight = 0
@@ -362,7 +390,7 @@ contains
     crossed = 0
     if (self%reciprocal) then
       ! sum over p, q of U_ap conj(V_pd) s_pq V_qb conj(U_cq), at row ad, column cb
-      call outer_rows(u, v_transposed, uv)
+      call outer_rows(terms%u, terms%v_transposed, uv)
       uu = 0
       call product_line('N', 'N', 1.0_dp, uv, spread, uu)
       call product_line('N', 'C', 1.0_dp, uu, uv, crossed)

@@ -5,10 +5,10 @@ module jointfrf_coupling
   use jointfrf_lanes, only: flat, in_memory, lane_kernels, lanes, largest_in_lanes, largest_product, padded, &
     real_lines
   use jointfrf_line_layout, only: all_finite, load, store
-  use jointfrf_modification, only: apply_in_lanes, apply_modification, modification_elements, modification_in_lanes, &
-    modification_work, plan_modification
+  use jointfrf_modification, only: apply_in_lanes, apply_modification, modification_in_lanes, modification_matrices, &
+    plan_modification, take_matrices
   use jointfrf_status, only: line_not_finite
-  use jointfrf_sweep, only: area, line_operation, line_space, run_sweep, worth_a_plan
+  use jointfrf_sweep, only: line_operation, line_space, run_sweep, worth_a_plan
   implicit none
   private
   public :: couple
@@ -69,10 +69,6 @@ contains
     operation%dofs_a => dofs_a
     operation%dofs_b => dofs_b
     operation%result => h_c
-    operation%n_complex = area(n_a, n_a) + area(n_b, n_b) + area(n, n) + 2*area(n_j, n_j) &
-                          + 2*area(n, n_j) + modification_work(n, n_j)
-    operation%n_real = area(2, n_j)
-    operation%n_pivot = n_j
     operation%flops = 8.0_dp*n_j*(real(n, dp)**2 + 2.0_dp*real(n_j, dp)*n)
     if (worth_a_plan(size(h_a, 3), memory) .and. n_j >= 1 .and. n_j <= largest_in_lanes .and. n <= largest_product) &
       call plan_coupling(operation)
@@ -86,7 +82,7 @@ contains
     n_a = operation%n_a
     n = n_a + operation%n_b
     call plan_modification(n, operation%n_j, operation%plan)
-    operation%n_element = modification_elements(n, operation%n_j)
+    operation%n_element = operation%plan%n_element
     operation%n_hint = padded(operation%n_j)
     operation%a_pairs => real_lines(operation%h_a)
     operation%b_pairs => real_lines(operation%h_b)
@@ -143,30 +139,23 @@ contains
     type(line_space), target, intent(inout) :: space
     integer(ip), intent(out) :: line_info
     real(dp), intent(out) :: rcond
-    complex(dp), pointer, contiguous :: h_a(:, :), h_b(:, :), h(:, :), k_joint(:, :)
-    complex(dp), pointer, contiguous :: columns(:, :), rows(:, :), h_relative(:, :)
-    integer :: n_a, n
+    complex(dp), pointer, contiguous :: h_a(:, :), h_b(:, :)
+    type(modification_matrices) :: m
 
+    h_a => space%matrix(self%n_a, self%n_a)
+    h_b => space%matrix(self%n_b, self%n_b)
+    call take_matrices(self%n_a + self%n_b, self%n_j, space, m)
     line_info = line_not_finite
     rcond = 0.0_dp
+    if (space%only_counts) return
     if (.not. (all_finite(self%h_a(:, :, i)) .and. all_finite(self%h_b(:, :, i)) &
                .and. all_finite(self%k_joint(:, :, i)))) return
-    n_a = self%n_a
-    n = n_a + self%n_b
-    h_a => space%matrix(n_a, n_a)
-    h_b => space%matrix(self%n_b, self%n_b)
-    h => space%matrix(n, n)
-    k_joint => space%matrix(self%n_j, self%n_j)
-    columns => space%matrix(n, self%n_j)
-    rows => space%matrix(self%n_j, n)
-    h_relative => space%matrix(self%n_j, self%n_j)
     call load(self%transposed, self%h_a(:, :, i), h_a)
     call load(self%transposed, self%h_b(:, :, i), h_b)
-    call load(self%transposed, self%k_joint(:, :, i), k_joint)
-
-    call take_relative(h_a, h_b, self%dofs_a, self%dofs_b, h, columns, rows, h_relative)
-    call apply_modification(h, columns, rows, h_relative, k_joint, space, line_info, rcond) ! (2.26)
-    call store(self%transposed, h, self%result(:, :, i))
+    call load(self%transposed, self%k_joint(:, :, i), m%d)
+    call take_relative(h_a, h_b, self%dofs_a, self%dofs_b, m%h, m%columns, m%rows, m%h_mm)
+    call apply_modification(m, space, line_info, rcond)                 ! (2.26)
+    call store(self%transposed, m%h, self%result(:, :, i))
   end subroutine couple_one
 
   !> Receptance of the unjoined substructures, and its columns, rows and square in the coordinates x_j - x_k.

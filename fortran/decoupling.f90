@@ -3,12 +3,12 @@
 module jointfrf_decoupling
   use jointfrf_caller_memory, only: caller_memory
   use jointfrf_kinds, only: dp, ip
-  use jointfrf_lanes, only: flat, in_memory, lane_kernels, lanes, largest_in_lanes, natural, padded, real_lines, &
-    row_starts, system, system_size, worse_of
+  use jointfrf_lanes, only: element_space, flat, in_memory, lane_kernels, lanes, largest_in_lanes, padded, real_lines, &
+    row_starts, worse_of
   use jointfrf_line_layout, only: all_finite, load, store
-  use jointfrf_lines_lapack, only: inverse_work, invert_line, product_line, solve_line
+  use jointfrf_lines_lapack, only: invert_line, product_line, room_to_invert, room_to_solve, solve_line
   use jointfrf_status, only: line_good, line_not_finite
-  use jointfrf_sweep, only: area, line_operation, line_space, run_sweep, worth_a_plan
+  use jointfrf_sweep, only: line_operation, line_space, run_sweep, worth_a_plan
   implicit none
   private
   public :: decouple, is_equation
@@ -87,10 +87,6 @@ contains
     operation%dofs_r => dofs_r
     operation%dofs_s => dofs_s
     operation%result => k_joint
-    operation%n_complex = area(operation%n_a, operation%n_a) + area(operation%n_b, operation%n_b) + 4*area(n, n) &
-                          + inverse_work(n)
-    operation%n_real = area(2, n)
-    operation%n_pivot = n
     operation%flops = 27.0_dp*real(n, dp)**3
     if (worth_a_plan(size(h_a, 3), memory) .and. n >= 1 .and. max(operation%n_a, operation%n_b) <= largest_in_lanes) &
       call plan_decoupling(operation)
@@ -101,27 +97,22 @@ contains
     type(decoupling), intent(inout) :: operation
     integer :: a(operation%n_a, operation%n_a), b(operation%n_b, operation%n_b)
     integer :: measured(operation%n, operation%n), to_joint(operation%n, operation%n), z(operation%n, operation%n)
-    integer :: whole(operation%n, 2*operation%n), n, taken
+    integer :: whole(operation%n, 2*operation%n), inverse(operation%n, operation%n), n
+    type(element_space) :: room
 
     n = operation%n
-    a = natural(0, operation%n_a, operation%n_a)
-    taken = operation%n_a**2
-    b = natural(taken, operation%n_b, operation%n_b)
-    taken = taken + operation%n_b**2
-    measured = natural(taken, n, n)
-    taken = taken + n*n
-    to_joint = natural(taken, n, n)
-    taken = taken + n*n
-    z = natural(taken, n, n)
-    taken = taken + n*n
-    whole = system(taken, n, n)
-    taken = taken + system_size(n, n)
+    a = room%matrix(operation%n_a, operation%n_a)
+    b = room%matrix(operation%n_b, operation%n_b)
+    measured = room%matrix(n, n)
+    to_joint = room%matrix(n, n)
+    z = room%matrix(n, n)
+    whole = room%system(n, n, operation%plan%m_before)
+    inverse = room%system(n, 0, operation%plan%z_before)
+    operation%n_element = room%taken
+    operation%n_hint = 2*padded(n)
     associate (plan => operation%plan, j => operation%dofs_j, k => operation%dofs_k, r => operation%dofs_r, &
                s => operation%dofs_s, equation => operation%equation)
-      plan%z_before = taken
-      plan%z_system = flat(system(taken, n, 0))
-      operation%n_element = taken + system_size(n, 0)
-      operation%n_hint = 2*padded(n)
+      plan%z_system = flat(inverse)
       plan%a => real_lines(operation%h_a)
       plan%b => real_lines(operation%h_b)
       plan%c => real_lines(operation%h_c)
@@ -135,7 +126,6 @@ contains
       plan%given = [plan%a_place, plan%b_place, plan%c_place]
       plan%measured = flat(measured)
       plan%m = flat(whole(:, :n))
-      plan%m_before = minval(whole) - 1
       plan%q = flat(whole(:, n + 1:))
       plan%p = flat(to_joint)
       plan%z = flat(z)
@@ -205,10 +195,6 @@ contains
     real(dp) :: rcond_z
     integer :: n
 
-    line_info = line_not_finite
-    rcond = 0.0_dp
-    if (.not. (all_finite(self%h_a(:, :, i)) .and. all_finite(self%h_b(:, :, i)) &
-               .and. all_finite(self%h_c(:, :, i)))) return
     n = self%n
     h_a => space%matrix(self%n_a, self%n_a)
     h_b => space%matrix(self%n_b, self%n_b)
@@ -216,6 +202,13 @@ contains
     to_joint => space%matrix(n, n)
     from_joint => space%matrix(n, n)
     z => space%matrix(n, n)
+    call room_to_solve(n, space)
+    call room_to_invert(n, space)
+    line_info = line_not_finite
+    rcond = 0.0_dp
+    if (space%only_counts) return
+    if (.not. (all_finite(self%h_a(:, :, i)) .and. all_finite(self%h_b(:, :, i)) &
+               .and. all_finite(self%h_c(:, :, i)))) return
     call load(self%transposed, self%h_a(:, :, i), h_a)
     call load(self%transposed, self%h_b(:, :, i), h_b)
     call load(self%transposed, self%h_c(:, :, i), measured)

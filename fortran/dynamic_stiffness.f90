@@ -8,13 +8,13 @@ module jointfrf_dynamic_stiffness
   use jointfrf_caller_memory, only: caller_memory
   use jointfrf_elimination_plan, only: elimination_plan, make_plan
   use jointfrf_kinds, only: blas_ip, dp, ip
-  use jointfrf_lanes, only: lane_kernels, lanes, largest_in_lanes, padded, real_lines, rows_in_memory, &
-    system_position, system_size
+  use jointfrf_lanes, only: element_space, in_memory, lane_kernels, lanes, largest_in_lanes, padded, real_lines, &
+    rows_in_memory
   use jointfrf_lapack, only: zgbcon, zgbtrf, zgbtrs
   use jointfrf_line_layout, only: all_finite, store
-  use jointfrf_lines_lapack, only: inverse_work, one_norm, solve_line
+  use jointfrf_lines_lapack, only: one_norm, room_to_solve, solve_line
   use jointfrf_status, only: line_good, line_not_finite, line_overflow
-  use jointfrf_sweep, only: area, line_operation, line_space, run_sweep, worth_a_plan
+  use jointfrf_sweep, only: line_operation, line_space, run_sweep, worth_a_plan
   implicit none
   private
   public :: receptance_dense, receptance_banded
@@ -41,6 +41,7 @@ module jointfrf_dynamic_stiffness
     real(dp), allocatable :: scale(:)              !< of each DOF, a power of two
     real(dp) :: norms(4)                           !< of K, M, C and eta K + H
     real(dp), pointer, contiguous :: result_pairs(:, :, :)
+    integer :: system_before                       !< the element before the system that is solved
     integer, allocatable :: from(:), to(:)         !< where the condensed matrix lies, and where the system wants it
     integer :: n_wanted                            !< outputs that differ
     integer, allocatable :: row_of(:)              !< slot of each retained DOF, shape (n)
@@ -99,16 +100,12 @@ contains
     integer(ip), intent(out) :: info
     type(caller_memory), intent(in), optional :: memory
     type(dense_stiffness) :: operation
-    integer :: n, n_in
+    integer :: n
 
     n = size(stiffness, 1)
-    n_in = size(inputs)
     call set_model(operation, transposed, n, omega, stiffness, mass, damping, structural, loss_factor, outputs, &
                    inputs, h)
-    operation%n_complex = area(n, n + n_in) + area(size(outputs), n_in) + inverse_work(n)
-    operation%n_real = area(2, n)
-    operation%n_pivot = n
-    operation%flops = 8.0_dp*real(n, dp)**2*(n/3.0_dp + n_in)
+    operation%flops = 8.0_dp*real(n, dp)**2*(n/3.0_dp + size(inputs))
     if (worth_a_plan(size(omega), memory) .and. n <= largest_in_lanes) &
       call prepare_block(operation, n - 1, n - 1, .true.)
     call run_sweep(operation, size(omega, kind=ip), line_info, rcond, info, memory)
@@ -139,9 +136,6 @@ contains
                    inputs, h)
     operation%kl = kl
     operation%ku = ku
-    operation%n_complex = area(2*kl + ku + 1, n) + area(n, n_in) + area(size(outputs), n_in) + area(2, n)
-    operation%n_real = n
-    operation%n_pivot = n
     operation%flops = 8.0_dp*real(n, dp)*(real(kl, dp)*(kl + ku + 1) + real(n_in, dp)*(2*kl + ku + 1))
     if (worth_a_plan(size(omega), memory)) call prepare_block(operation, kl, ku, .false.)
     call run_sweep(operation, size(omega, kind=ip), line_info, rcond, info, memory)
@@ -194,7 +188,6 @@ contains
       reference = real(operation%n, dp)*(real(kl, dp)*(kl + ku + 1) + real(n_in, dp)*(2*kl + ku + 1)) + n_left**2
       if (n_left > largest_in_lanes .or. operation%plan%products > gain_of_lanes*reference) return
       operation%n_wanted = count(is_output)
-      operation%n_element = operation%plan%n_slots**2 + system_size(n_left, n_in)
       operation%n_hint = padded(n_left)
     end associate
     call set_coefficients(operation)
@@ -217,21 +210,25 @@ contains
   !> From the plan's square to the system that is solved, and its right-hand sides: a unit force at each input.
   subroutine set_places(operation)
     class(dynamic_stiffness), intent(inout) :: operation
-    integer :: n_left, n_in, i, j, base
+    integer :: whole(operation%plan%n_retained, operation%plan%n_retained + size(operation%inputs))
+    integer :: n_left, n_in, i, j, square
+    type(element_space) :: room
 
     n_left = operation%plan%n_retained
     n_in = size(operation%inputs)
-    base = operation%plan%n_slots**2
-    allocate (operation%from(n_left**2), operation%to(n_left**2), operation%rhs(n_left*n_in))
+    square = room%run(operation%plan%n_slots**2)
+    whole = room%system(n_left, n_in, operation%system_before)
+    operation%n_element = room%taken
+    operation%to = in_memory(.true., whole(:, :n_left))
+    operation%rhs = in_memory(.true., whole(:, n_left + 1:))
+    allocate (operation%from(n_left**2))
     allocate (operation%row_of(operation%n), source=0)
     allocate (operation%forces(n_left*n_in), source=(0.0_dp, 0.0_dp))
     do i = 1, n_left
       do j = 1, n_left
-        operation%from((i - 1)*n_left + j) = element(operation%plan, i, j)
-        operation%to((i - 1)*n_left + j) = base + system_position(n_left, n_in, i, j)
+        operation%from((i - 1)*n_left + j) = square + element(operation%plan, i, j)
       end do
       do j = 1, n_in
-        operation%rhs((i - 1)*n_in + j) = base + system_position(n_left, n_in, i, n_left + j)
         if (operation%plan%unknown(i) == operation%inputs(j)) operation%forces((i - 1)*n_in + j) = 1
       end do
       operation%row_of(operation%plan%unknown(i)) = i
@@ -369,12 +366,11 @@ contains
     integer(ip), intent(out) :: line_info(n_lines)
     real(dp), intent(out) :: rcond(n_lines)
     real(dp) :: omega(lanes), smallest(lanes), rcond_lanes(lanes), total(lanes), norm, largest
-    integer :: n_left, n_in, last, l, base
+    integer :: n_left, n_in, last, l
     integer :: row(self%plan%n_retained), place(size(self%result_scale))
 
     n_left = self%plan%n_retained
     n_in = size(self%inputs)
-    base = self%plan%n_slots**2
     last = first + n_lines - 1
     do l = 1, lanes
       omega(l) = self%omega(min(first + l - 1, last))
@@ -382,7 +378,7 @@ contains
     call kernels%eliminate(self%plan, omega, space%x, smallest)
     call kernels%copy(n_left**2, 1.0_dp, self%from, self%to, space%x)
     call kernels%fill(n_left*n_in, self%forces, self%rhs, space%x)
-    call kernels%solve(n_left, n_in, self%n_wanted, base, space%x, space%hint, row, rcond_lanes)             ! (2.28)
+    call kernels%solve(n_left, n_in, self%n_wanted, self%system_before, space%x, space%hint, row, rcond_lanes)  ! (2.28)
     call rows_in_memory(self%transposed, row(self%row_of(self%outputs)), n_in, place)
     call kernels%total(size(place), place, space%x, total)
     call kernels%store(size(place), place, first, n_lines, space%x, self%result_pairs)
@@ -453,9 +449,11 @@ contains
     z => space%matrix(self%n, self%n)
     x => space%matrix(self%n, size(self%inputs))
     h => space%matrix(size(self%outputs), size(self%inputs))
-    call fill(self, self%omega(i), z)
+    call room_to_solve(self%n, space)
     line_info = line_not_finite
     rcond = 0.0_dp
+    if (space%only_counts) return
+    call fill(self, self%omega(i), z)
     if (.not. all_finite(z)) return
     call unit_forces(self%inputs, x)
     call solve_line(z, x, space, line_info, rcond)                     ! (2.28)
@@ -470,6 +468,8 @@ contains
     integer(ip), intent(out) :: line_info
     real(dp), intent(out) :: rcond
     complex(dp), pointer, contiguous :: band(:, :), x(:, :), h(:, :), work(:, :)
+    real(dp), pointer, contiguous :: real_work(:)
+    integer(blas_ip), pointer, contiguous :: pivot(:)
     real(dp) :: norm
     integer(blas_ip) :: n, kl, ku, ld, code, ignored
 
@@ -481,9 +481,11 @@ contains
     x => space%matrix(self%n, size(self%inputs))
     h => space%matrix(size(self%outputs), size(self%inputs))
     work => space%matrix(2*self%n, 1)
+    real_work => space%reals(self%n)
+    pivot => space%pivots(self%n)
     line_info = line_good
     rcond = 1.0_dp
-    if (n == 0) return
+    if (space%only_counts .or. n == 0) return
     call fill_band(self, self%omega(i), band)
     norm = one_norm(band)
     line_info = line_not_finite
@@ -492,12 +494,12 @@ contains
     line_info = line_good
     rcond = 1.0_dp
     if (size(self%inputs) == 0) return
-    call zgbtrf(n, n, kl, ku, band, ld, space%pivot, code)
+    call zgbtrf(n, n, kl, ku, band, ld, pivot, code)
     line_info = int(code, ip)
     if (line_info /= line_good) return
     call unit_forces(self%inputs, x)
-    call zgbtrs('N', n, kl, ku, size(self%inputs, kind=blas_ip), band, ld, space%pivot, x, n, ignored, one_char)
-    call zgbcon('1', n, kl, ku, band, ld, space%pivot, norm, rcond, work, space%r, ignored, one_char)
+    call zgbtrs('N', n, kl, ku, size(self%inputs, kind=blas_ip), band, ld, pivot, x, n, ignored, one_char)
+    call zgbcon('1', n, kl, ku, band, ld, pivot, norm, rcond, work, real_work, ignored, one_char)
     if (.not. all_finite(x)) line_info = line_overflow
     call take_rows(x, self%outputs, h)
     call store(self%transposed, h, self%result(:, :, i))

@@ -1,8 +1,20 @@
 !> The order in which a sparse system is eliminated down to the unknowns that are wanted, found once for all lines.
 !>
 !> A static condensation: unknown after unknown is eliminated with its own pivot until only the retained ones are left.
-!> What is being worked on lies in a small square of `slots`; a slot is free again once its unknown is eliminated. A
-!> plan holds no numbers, only where they come from and go to.
+!> A plan holds no numbers, only where they come from and go to. It is made in four steps:
+!>
+!> 1. Retained unknowns and those that separate them (one-way dissection) split the structure, and `find_order` orders
+!>    what lies between as the band does: from the outside towards the retained unknowns. No minimum degree is looked
+!>    for, because models come with a numbering of small bandwidth.
+!> 2. `find_structure` finds which unknowns are coupled with each pivot when its turn comes: symbolic elimination along
+!>    the elimination tree (A. George, J. W. Liu, Computer Solution of Large Sparse Positive Definite Systems, 1981,
+!>    section 5.4; J. W. H. Liu, SIAM J. Matrix Anal. Appl. 11 (1990) 134-172).
+!> 3. `assign_slots` gives places in a small square to what is being worked on. A slot is free again once its unknown is
+!>    eliminated, as in a frontal solver (B. M. Irons, Int. J. Numer. Meth. Eng. 2 (1970) 5-32).
+!> 4. `list_elements` says which elements of the square begin as zero or as an entry of the matrix, and when.
+!>
+!> With n unknowns, a reach b of the band and m unknowns coupled with a pivot (m <= 2 b + retained ones), the second and
+!> third step cost O(n (b + m)), the fourth O(n m^2): in all in proportion to the multiplications of one line. Memory: the lists, one item a number that is touched, and the square.
 module jointfrf_elimination_plan
   use jointfrf_kinds, only: dp
   implicit none
@@ -27,6 +39,12 @@ module jointfrf_elimination_plan
     real(dp), allocatable :: coefficient(:, :)  !< their numbers, shape (4, entries); set by the user of the plan
   end type elimination_plan
 
+  !> Unknowns coupled with the pivot of each step: unknown(last(s) + 1:last(s + 1)), eliminated later or retained.
+  type :: elimination_structure
+    integer, allocatable :: last(:)           !< shape (n_steps + 1)
+    integer, allocatable :: unknown(:)
+  end type elimination_structure
+
 contains
 
   !> Plan for a matrix of order n.
@@ -40,75 +58,110 @@ contains
     logical, intent(inout) :: retained(n)
     logical, intent(in) :: symmetric
     type(elimination_plan), intent(out) :: plan
-    integer, allocatable :: order(:), slot_of(:), in_slot(:), near(:)
-    logical, allocatable :: known(:, :)
-    integer :: n_bound, reach, s, p, i, j, m
+    type(elimination_structure) :: structure
+    integer, allocatable :: order(:), slot_of(:)
 
-    reach = size(coupled, 1)
-    plan%symmetric = symmetric
-    allocate (slot_of(n), source=0)
     allocate (order(n))
+    allocate (slot_of(n), source=0)
+    plan%symmetric = symmetric
     call add_separators(n, coupled, retained)
     call set_slots(wanted, retained, slot_of, plan)
     call find_order(n, coupled, retained, order, plan%n_steps)
-    n_bound = plan%n_retained + 2*reach + 2
-    allocate (known(n_bound, n_bound), source=.false.)     ! pairs of slots that hold a number
-    allocate (in_slot(n_bound), source=0)
-    in_slot(:plan%n_retained) = plan%unknown
-    plan%n_slots = plan%n_retained
-    allocate (plan%pivot(plan%n_steps), plan%last_near(plan%n_steps + 1), plan%last_zero(plan%n_steps + 2), &
-              plan%last_entry(plan%n_steps + 2))
-    plan%last_near = 0
-    plan%last_zero = 0
-    plan%last_entry = 0
-    allocate (near(n_bound))
-    call allocate_lists(plan, n*(reach + 1))
-    do s = 1, plan%n_steps
+    call find_structure(n, coupled, order(:plan%n_steps), structure)
+    call assign_slots(order(:plan%n_steps), structure, slot_of, plan)
+    call list_elements(coupled, order(:plan%n_steps), structure, slot_of, plan)
+    allocate (plan%coefficient(4, plan%last_entry(plan%n_steps + 2)), source=0.0_dp)
+  end subroutine make_plan
+
+  !> Symbolic elimination. A pivot is coupled with what the matrix couples it with, and with what those unknowns were
+  !> coupled with that found it as their first neighbour to be eliminated: its children in the elimination tree.
+  !> order   the unknowns to be eliminated, shape (n_steps)
+  subroutine find_structure(n, coupled, order, structure)
+    integer, intent(in) :: n, order(:)
+    logical, contiguous, intent(in) :: coupled(:, :)
+    type(elimination_structure), intent(out) :: structure
+    integer :: step_of(n), seen_by(n), first_child(n), next_child(size(order))
+    integer :: s, p, j, e, child, parent
+
+    allocate (structure%last(size(order) + 1), source=0)
+    allocate (structure%unknown(size(coupled)))
+    step_of = huge(1)                                     ! retained unknowns come after all others
+    do s = 1, size(order)
+      step_of(order(s)) = s
+    end do
+    seen_by = 0
+    first_child = 0
+    do s = 1, size(order)
+      structure%last(s + 1) = structure%last(s)
       p = order(s)
-      call take_slot(p)
-      do j = max(1, p - reach), min(n, p + reach)
-        if (j == p) cycle
-        if (slot_of(j) < 0) cycle                          ! eliminated
-        if (coupled(abs(j - p), min(j, p))) call take_slot(j)
+      do j = max(1, p - size(coupled, 1)), min(n, p + size(coupled, 1))
+        if (are_coupled(coupled, p, j)) call add(j)
       end do
-      plan%pivot(s) = slot_of(p)
-      m = 0
-      do i = 1, plan%n_slots
-        if (in_slot(i) == 0 .or. in_slot(i) == p) cycle
-        if (.not. (known(i, slot_of(p)) .or. is_coupled(in_slot(i), p))) cycle
-        m = m + 1
-        near(m) = i
-      end do
-      call begin_with(slot_of(p), slot_of(p))
-      do i = 1, m
-        call begin_with(near(i), slot_of(p))
-        do j = 1, i
-          call begin_with(near(j), near(i))
+      child = first_child(p)
+      do while (child > 0)
+        do e = structure%last(child) + 1, structure%last(child + 1)
+          call add(structure%unknown(e))
         end do
+        child = next_child(child)
       end do
-      do i = 1, m
-        call append(plan%near, plan%last_near(s + 1), near(i))
-      end do
-      plan%products = plan%products + merge((m*(m + 1))/2, m*m, symmetric)
-      known(:, slot_of(p)) = .false.
-      known(slot_of(p), :) = .false.
-      in_slot(slot_of(p)) = 0
-      slot_of(p) = -1
-      if (s < plan%n_steps) plan%last_near(s + 2) = plan%last_near(s + 1)
-      plan%last_zero(s + 2) = plan%last_zero(s + 1)
-      plan%last_entry(s + 2) = plan%last_entry(s + 1)
+      associate (near => structure%unknown(structure%last(s) + 1:structure%last(s + 1)))
+        if (size(near) == 0) cycle
+        parent = near(minloc(step_of(near), dim=1))
+      end associate
+      next_child(s) = first_child(parent)
+      first_child(parent) = s
     end do
-    s = plan%n_steps + 1
-    do i = 1, plan%n_retained
-      do j = 1, i
-        call begin_with(j, i)
-      end do
-    end do
-    call close_lists(plan, n_bound)
 
   contains
 
-    !> A free slot for an unknown that has none.
+    !> One unknown more that is coupled with p, unless it is known or was eliminated.
+    subroutine add(unknown)
+      integer, intent(in) :: unknown
+
+      if (seen_by(unknown) == s .or. step_of(unknown) <= s) return
+      seen_by(unknown) = s
+      call append(structure%unknown, structure%last(s + 1), unknown)
+    end subroutine add
+  end subroutine find_structure
+
+  !> Slots of the unknowns while they are worked on: the first that is free when an unknown is first needed. The unknowns
+  !> of each step of the structure are put into the order of their slots.
+  !> slot_of   the slot of each unknown, 0 where it has none yet
+  subroutine assign_slots(order, structure, slot_of, plan)
+    integer, intent(in) :: order(:)
+    type(elimination_structure), intent(inout) :: structure
+    integer, intent(inout) :: slot_of(:)
+    type(elimination_plan), intent(inout) :: plan
+    integer :: in_slot(size(slot_of)), needed_in(size(slot_of))    ! its unknown, 0 for a free slot; the last step
+    integer :: s, e, m, slot
+
+    in_slot = 0
+    in_slot(:plan%n_retained) = plan%unknown
+    needed_in = 0
+    plan%n_slots = plan%n_retained
+    allocate (plan%pivot(plan%n_steps))
+    do s = 1, plan%n_steps
+      call take_slot(order(s))
+      do e = structure%last(s) + 1, structure%last(s + 1)
+        call take_slot(structure%unknown(e))
+        needed_in(slot_of(structure%unknown(e))) = s
+      end do
+      e = structure%last(s)
+      do slot = 1, plan%n_slots
+        if (needed_in(slot) /= s) cycle
+        e = e + 1
+        structure%unknown(e) = in_slot(slot)
+      end do
+      plan%pivot(s) = slot_of(order(s))
+      in_slot(plan%pivot(s)) = 0
+      m = structure%last(s + 1) - structure%last(s)
+      plan%products = plan%products + merge((m*(m + 1))/2, m*m, plan%symmetric)
+    end do
+    plan%last_near = structure%last
+    plan%near = slot_of(structure%unknown(:structure%last(plan%n_steps + 1)))
+
+  contains
+
     subroutine take_slot(unknown)
       integer, intent(in) :: unknown
 
@@ -117,45 +170,86 @@ contains
       in_slot(slot_of(unknown)) = unknown
       plan%n_slots = max(plan%n_slots, slot_of(unknown))
     end subroutine take_slot
+  end subroutine assign_slots
 
-    function is_coupled(a, b) result(yes)
-      integer, intent(in) :: a, b
-      logical :: yes
+  !> What elements of the square begin with, in the step that needs them first; after the last step come those of retained
+  !> unknowns that no step has touched.
+  subroutine list_elements(coupled, order, structure, slot_of, plan)
+    logical, contiguous, intent(in) :: coupled(:, :)
+    integer, intent(in) :: order(:), slot_of(:)
+    type(elimination_structure), intent(in) :: structure
+    type(elimination_plan), intent(inout) :: plan
+    logical :: begun(plan%n_slots, plan%n_slots)          ! pairs of slots that hold a number
+    integer :: s, i, j
 
-      yes = a == b
-      if (a == b .or. abs(a - b) > reach) return
-      yes = coupled(abs(a - b), min(a, b))
-    end function is_coupled
+    begun = .false.
+    allocate (plan%last_zero(plan%n_steps + 2), plan%last_entry(plan%n_steps + 2), source=0)
+    allocate (plan%zero(size(coupled)), plan%entry(size(coupled)), plan%row(size(coupled)), plan%column(size(coupled)))
+    do s = 1, plan%n_steps + 1
+      plan%last_zero(s + 1) = plan%last_zero(s)
+      plan%last_entry(s + 1) = plan%last_entry(s)
+      if (s > plan%n_steps) exit
+      call begin_with(order(s), order(s))
+      associate (near => structure%unknown(structure%last(s) + 1:structure%last(s + 1)), &
+                 slot => plan%near(structure%last(s) + 1:structure%last(s + 1)))
+        do i = 1, size(near)
+          call begin_with(near(i), order(s))
+          do j = 1, i
+            if (.not. begun(slot(j), slot(i))) call begin_with(near(j), near(i))
+          end do
+        end do
+      end associate
+      begun(:, plan%pivot(s)) = .false.
+      begun(plan%pivot(s), :) = .false.
+    end do
+    do i = 1, plan%n_retained
+      do j = 1, i
+        call begin_with(plan%unknown(j), plan%unknown(i))
+      end do
+    end do
 
-    !> What a pair of slots holds before step s.
+  contains
+
+    !> A pair of unknowns is needed.
     subroutine begin_with(a, b)
       integer, intent(in) :: a, b
-      integer :: low, high
+      integer :: first, second
 
-      low = min(a, b)
-      high = max(a, b)
-      if (known(low, high)) return
-      known(low, high) = .true.
-      known(high, low) = .true.
-      call begin_one(low, high)
-      if (low /= high .and. .not. symmetric) call begin_one(high, low)
+      first = merge(a, b, slot_of(a) <= slot_of(b))
+      second = merge(b, a, slot_of(a) <= slot_of(b))
+      if (begun(slot_of(first), slot_of(second))) return
+      begun(slot_of(first), slot_of(second)) = .true.
+      begun(slot_of(second), slot_of(first)) = .true.
+      call begin_one(first, second)
+      if (first /= second .and. .not. plan%symmetric) call begin_one(second, first)
     end subroutine begin_with
 
-    subroutine begin_one(a, b)
-      integer, intent(in) :: a, b
-      integer :: e
+    subroutine begin_one(row, column)
+      integer, intent(in) :: row, column
+      integer :: element, used
 
-      if (is_coupled(in_slot(a), in_slot(b))) then
-        e = plan%last_entry(s + 1)
-        call append(plan%row, e, in_slot(a))
-        e = plan%last_entry(s + 1)
-        call append(plan%column, e, in_slot(b))
-        call append(plan%entry, plan%last_entry(s + 1), (a - 1)*n_bound + b)
+      element = (slot_of(row) - 1)*plan%n_slots + slot_of(column)
+      if (row == column .or. are_coupled(coupled, row, column)) then
+        used = plan%last_entry(s + 1)
+        call append(plan%row, used, row)
+        used = plan%last_entry(s + 1)
+        call append(plan%column, used, column)
+        call append(plan%entry, plan%last_entry(s + 1), element)
       else
-        call append(plan%zero, plan%last_zero(s + 1), (a - 1)*n_bound + b)
+        call append(plan%zero, plan%last_zero(s + 1), element)
       end if
     end subroutine begin_one
-  end subroutine make_plan
+  end subroutine list_elements
+
+  !> Whether the matrix couples two unknowns that differ.
+  pure function are_coupled(coupled, a, b) result(yes)
+    logical, contiguous, intent(in) :: coupled(:, :)
+    integer, intent(in) :: a, b
+    logical :: yes
+
+    yes = .false.
+    if (a /= b .and. abs(a - b) <= size(coupled, 1)) yes = coupled(abs(a - b), min(a, b))
+  end function are_coupled
 
   !> Slots of the retained unknowns: the wanted ones last.
   subroutine set_slots(wanted, retained, slot_of, plan)
@@ -181,38 +275,6 @@ contains
       plan%unknown(slot_of(j)) = j
     end do
   end subroutine set_slots
-
-  !> Room for the lists.
-  subroutine allocate_lists(plan, room)
-    type(elimination_plan), intent(inout) :: plan
-    integer, intent(in) :: room
-
-    allocate (plan%near(room), plan%zero(room), plan%entry(room), plan%row(room), plan%column(room))
-  end subroutine allocate_lists
-
-  !> Count elements in the square as it turned out.
-  subroutine close_lists(plan, n_bound)
-    type(elimination_plan), intent(inout) :: plan
-    integer, intent(in) :: n_bound
-    integer :: e
-
-    do e = 1, plan%last_entry(plan%n_steps + 2)
-      plan%entry(e) = moved(plan%entry(e))
-    end do
-    do e = 1, plan%last_zero(plan%n_steps + 2)
-      plan%zero(e) = moved(plan%zero(e))
-    end do
-    allocate (plan%coefficient(4, plan%last_entry(plan%n_steps + 2)), source=0.0_dp)
-
-  contains
-
-    function moved(element) result(new)
-      integer, intent(in) :: element
-      integer :: new
-
-      new = ((element - 1)/n_bound)*plan%n_slots + mod(element - 1, n_bound) + 1
-    end function moved
-  end subroutine close_lists
 
   !> Append to a list of which `used` items are used; it grows.
   subroutine append(list, used, item)

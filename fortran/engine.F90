@@ -6,17 +6,17 @@ module jointfrf_engine
   use, intrinsic :: iso_c_binding, only: c_int
   use jointfrf_kinds, only: ip
   use jointfrf_lanes, only: lane_kernels
-  use jointfrf_lanes_plain, only: set_plain => set_kernels
+  use jointfrf_lane_kernels_plain, only: set_plain => set_kernels
 #ifdef JF_X86
-  use jointfrf_lanes_v2, only: set_v2 => set_kernels
-  use jointfrf_lanes_v3, only: set_v3 => set_kernels
-  use jointfrf_lanes_v4, only: set_v4 => set_kernels
+  use jointfrf_lane_kernels_v2, only: set_v2 => set_kernels
+  use jointfrf_lane_kernels_v3, only: set_v3 => set_kernels
+  use jointfrf_lane_kernels_v4, only: set_v4 => set_kernels
 #endif
-  use jointfrf_noise_plain, only: set_noise_plain => set_noise_kernels
+  use jointfrf_noise_kernels_plain, only: set_noise_plain => set_noise_kernels
 #ifdef JF_X86
-  use jointfrf_noise_v2, only: set_noise_v2 => set_noise_kernels
-  use jointfrf_noise_v3, only: set_noise_v3 => set_noise_kernels
-  use jointfrf_noise_v4, only: set_noise_v4 => set_noise_kernels
+  use jointfrf_noise_kernels_v2, only: set_noise_v2 => set_noise_kernels
+  use jointfrf_noise_kernels_v3, only: set_noise_v3 => set_noise_kernels
+  use jointfrf_noise_kernels_v4, only: set_noise_v4 => set_noise_kernels
 #endif
   use jointfrf_status, only: info_good, info_no_engine
   implicit none

@@ -2,11 +2,11 @@
 module jointfrf_finite_difference
   use jointfrf_caller_memory, only: caller_memory
   use jointfrf_kinds, only: dp, ip
-  use jointfrf_lanes, only: in_memory, lane_kernels, lanes, largest_in_lanes, natural, real_lines, row_starts
+  use jointfrf_lanes, only: element_space, in_memory, lane_kernels, lanes, largest_in_lanes, real_lines, row_starts
   use jointfrf_line_layout, only: all_finite, load, load_real, store
   use jointfrf_lines_lapack, only: product_line
   use jointfrf_status, only: line_good, line_not_finite, line_overflow
-  use jointfrf_sweep, only: area, line_operation, line_space, run_sweep, worth_a_plan
+  use jointfrf_sweep, only: line_operation, line_space, run_sweep, worth_a_plan
   implicit none
   private
   public :: difference_weights, central_difference, transform_receptance
@@ -105,9 +105,6 @@ contains
     operation%m_out = size(t_out, merge(1, 2, transposed))
     operation%n_in = size(t_in, merge(2, 1, transposed))
     operation%m_in = size(t_in, merge(1, 2, transposed))
-    operation%n_complex = area(operation%m_out, operation%m_in) + area(operation%n_out, operation%m_in) &
-                          + area(operation%n_out, operation%n_in) + area(operation%n_out, operation%m_out) &
-                          + area(operation%n_in, operation%m_in)
     operation%flops = 8.0_dp*operation%n_out*operation%m_in*(operation%m_out + operation%n_in)
     if (worth_a_plan(size(h, 3), memory) &
         .and. min(operation%n_out, operation%n_in, operation%m_out, operation%m_in) >= 1 &
@@ -120,20 +117,17 @@ contains
     type(transformation), intent(inout) :: operation
     integer :: t_out(operation%n_out, operation%m_out), t_in(operation%m_in, operation%n_in)
     integer :: h(operation%m_out, operation%m_in), half(operation%n_out, operation%m_in)
-    integer :: h_new(operation%n_out, operation%n_in), taken
+    integer :: h_new(operation%n_out, operation%n_in)
+    type(element_space) :: room
 
     associate (n_out => operation%n_out, n_in => operation%n_in, m_out => operation%m_out, m_in => operation%m_in, &
                plan => operation%plan)
-      t_out = natural(0, n_out, m_out)
-      taken = n_out*m_out
-      t_in = natural(taken, m_in, n_in)
-      taken = taken + m_in*n_in
-      h = natural(taken, m_out, m_in)
-      taken = taken + m_out*m_in
-      half = natural(taken, n_out, m_in)
-      taken = taken + n_out*m_in
-      h_new = natural(taken, n_out, n_in)
-      operation%n_element = taken + n_out*n_in
+      t_out = room%matrix(n_out, m_out)
+      t_in = room%matrix(m_in, n_in)
+      h = room%matrix(m_out, m_in)
+      half = room%matrix(n_out, m_in)
+      h_new = room%matrix(n_out, n_in)
+      operation%n_element = room%taken
       plan%h => real_lines(operation%h)
       plan%h_new => real_lines(operation%result)
       plan%h_place = in_memory(operation%transposed, h)
@@ -186,16 +180,17 @@ contains
     real(dp), intent(out) :: rcond
     complex(dp), pointer, contiguous :: t_out(:, :), t_in(:, :), h(:, :), half(:, :), h_new(:, :)
 
-    line_info = line_not_finite
-    rcond = 0.0_dp
-    if (.not. all_finite(self%h(:, :, i))) return
-    line_info = line_good
-    rcond = 1.0_dp
     t_out => space%matrix(self%n_out, self%m_out)
     t_in => space%matrix(self%n_in, self%m_in)
     h => space%matrix(self%m_out, self%m_in)
     half => space%matrix(self%n_out, self%m_in)
     h_new => space%matrix(self%n_out, self%n_in)
+    line_info = line_not_finite
+    rcond = 0.0_dp
+    if (space%only_counts) return
+    if (.not. all_finite(self%h(:, :, i))) return
+    line_info = line_good
+    rcond = 1.0_dp
     call load_real(self%transposed, self%t_out, t_out)
     call load_real(self%transposed, self%t_in, t_in)
     call load(self%transposed, self%h(:, :, i), h)

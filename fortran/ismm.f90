@@ -2,12 +2,12 @@
 module jointfrf_ismm
   use jointfrf_caller_memory, only: caller_memory
   use jointfrf_kinds, only: dp, ip
-  use jointfrf_lanes, only: in_memory, lane_kernels, lanes, largest_in_lanes, natural, padded, real_lines, &
-    row_starts, rows_in_memory, system, system_size, worse_of
+  use jointfrf_lanes, only: element_space, in_memory, lane_kernels, lanes, largest_in_lanes, padded, real_lines, &
+    row_starts, rows_in_memory, worse_of
   use jointfrf_line_layout, only: all_finite, load, store, subtract, take_block
-  use jointfrf_lines_lapack, only: inverse_work, product_line, solve_line
+  use jointfrf_lines_lapack, only: product_line, room_to_solve, solve_line
   use jointfrf_status, only: line_good, line_not_finite, line_overflow
-  use jointfrf_sweep, only: area, line_operation, line_space, long_block, run_sweep, worth_a_plan
+  use jointfrf_sweep, only: line_operation, line_space, long_block, run_sweep, worth_a_plan
   implicit none
   private
   public :: ismm, inverse_substructuring
@@ -24,6 +24,7 @@ module jointfrf_ismm
     integer, allocatable :: difference_row(:), w_row(:)   !< the element before each row
     integer, allocatable :: alpha_row(:), gamma_row(:), joint_row(:)   !< where alpha and gamma are inverted as a whole
     integer, allocatable :: w(:)                   !< W, row by row
+    integer :: alpha_before, gamma_before          !< the element before each system
   end type identification_in_lanes
 
   !> The same for the short form.
@@ -31,6 +32,7 @@ module jointfrf_ismm
     real(dp), pointer, contiguous :: gamma(:, :, :), k_joint(:, :, :)
     integer, allocatable :: gamma_place(:), unit(:)
     complex(dp), allocatable :: unit_value(:)
+    integer :: gamma_before
   end type short_identification_in_lanes
 
   type, extends(line_operation) :: identification
@@ -82,9 +84,6 @@ contains
     operation%gamma => gamma
     operation%k_initial => k_initial
     operation%result => k_joint
-    operation%n_complex = 3*area(m, m) + 3*area(m, n) + area(n, n) + inverse_work(m)
-    operation%n_real = area(2, m)
-    operation%n_pivot = m
     operation%flops = 8.0_dp*real(m, dp)**3*(5.0_dp/3.0_dp)
     if (worth_a_plan(size(alpha, 3), memory) .and. n >= 1 .and. m <= largest_in_lanes) &
       call plan_identification(operation)
@@ -94,7 +93,8 @@ contains
   subroutine plan_identification(operation)
     type(identification), intent(inout) :: operation
     integer :: of_alpha(2*operation%n, 3*operation%n), of_gamma(2*operation%n, 3*operation%n)
-    integer :: difference(2*operation%n, 2*operation%n), joint(operation%n, operation%n), n, m, taken
+    integer :: difference(2*operation%n, 2*operation%n), joint(operation%n, operation%n), n, m
+    type(element_space) :: room
 
     n = operation%n
     m = 2*n
@@ -113,14 +113,11 @@ contains
       call plan_inversions(operation)
       return
     end if
-    of_gamma = system(0, m, n)
-    taken = system_size(m, n)
-    of_alpha = system(taken, m, n)
-    taken = taken + system_size(m, n)
-    difference = natural(taken, m, m)
-    taken = taken + m*m
-    joint = natural(taken, n, n)
-    operation%n_element = taken + n*n
+    of_gamma = room%system(m, n, operation%plan%gamma_before)
+    of_alpha = room%system(m, n, operation%plan%alpha_before)
+    difference = room%matrix(m, m)
+    joint = room%matrix(n, n)
+    operation%n_element = room%taken
     operation%n_hint = 2*padded(m)
     associate (plan => operation%plan)
       plan%gamma_place = in_memory(operation%transposed, of_gamma(:, :m))
@@ -140,13 +137,14 @@ contains
     type(identification), intent(inout) :: operation
     integer, parameter :: n = 2, m = 4
     integer :: gamma(m, m), alpha(m, m), difference(m, m), w(m, n), joint(n, n)
+    type(element_space) :: room
 
-    gamma = system(0, m, 0)
-    alpha = system(system_size(m, 0), m, 0)
-    difference = natural(2*system_size(m, 0), m, m)
-    w = natural(2*system_size(m, 0) + m*m, m, n)
-    joint = natural(2*system_size(m, 0) + m*m + m*n, n, n)
-    operation%n_element = 2*system_size(m, 0) + m*m + m*n + n*n
+    gamma = room%system(m, 0, operation%plan%gamma_before)
+    alpha = room%system(m, 0, operation%plan%alpha_before)
+    difference = room%matrix(m, m)
+    w = room%matrix(m, n)
+    joint = room%matrix(n, n)
+    operation%n_element = room%taken
     associate (plan => operation%plan)
       plan%gamma_place = in_memory(operation%transposed, gamma)
       plan%alpha_place = in_memory(operation%transposed, alpha)
@@ -179,8 +177,8 @@ contains
       call kernels%load(m*m, plan%alpha_place, first, n_lines, plan%alpha, x)
       call kernels%load(n*n, plan%joint, first, n_lines, plan%k_initial, x)
       call kernels%combine(m*m, 1.0_dp, plan%alpha_place, -1.0_dp, plan%gamma_place, plan%difference, x)
-      call kernels%invert(m, 0, x, space%hint, unmoved, rcond_gamma, space%ahead)
-      call kernels%invert(m, system_size(m, 0), x, space%hint, unmoved, rcond_alpha)
+      call kernels%invert(m, plan%gamma_before, x, space%hint, unmoved, rcond_gamma, space%ahead)
+      call kernels%invert(m, plan%alpha_before, x, space%hint, unmoved, rcond_alpha)
       call kernels%fill(m*n, plan%unit_value, plan%w, x)
       call kernels%product(m, n, m, 1.0_dp, plan%difference_row, plan%gamma_row, plan%w_row, x)
       call kernels%product(n, n, m, -1.0_dp, plan%alpha_row, plan%w_row, plan%joint_row, x)   ! (2.47), (2.48)
@@ -219,10 +217,10 @@ contains
       call kernels%load(n*n, plan%joint, first, n_lines, plan%k_initial, x)
       call kernels%combine(m*m, 1.0_dp, plan%alpha_place, -1.0_dp, plan%gamma_place, plan%difference, x)
       call kernels%fill(m*n, plan%unit_value, plan%unit, x)
-      call kernels%solve(m, n, m, 0, x, space%hint(:padded(m)), x_row, rcond_gamma, space%ahead)
+      call kernels%solve(m, n, m, plan%gamma_before, x, space%hint(:padded(m)), x_row, rcond_gamma, space%ahead)
       call kernels%fill(m*n, 0*plan%unit_value, plan%w, x)
       call kernels%product(m, n, m, 1.0_dp, plan%difference_row, x_row, plan%w_row, x)
-      call kernels%solve(m, n, n, system_size(m, n), x, space%hint(padded(m) + 1:), y_row, rcond_alpha)
+      call kernels%solve(m, n, n, plan%alpha_before, x, space%hint(padded(m) + 1:), y_row, rcond_alpha)
       call rows_in_memory(self%transposed, y_row(n + 1:), n, y)
       call kernels%combine(n*n, 1.0_dp, plan%joint, -1.0_dp, y, plan%joint, x)      ! (2.47), (2.48): K* = K0 - D_jk
       call kernels%store(n*n, plan%joint, first, n_lines, x, self%plan%k_joint)
@@ -262,10 +260,6 @@ contains
     real(dp) :: rcond_gamma
     integer :: n, m
 
-    line_info = line_not_finite
-    rcond = 0.0_dp
-    if (.not. (all_finite(self%alpha(:, :, i)) .and. all_finite(self%gamma(:, :, i)) &
-               .and. all_finite(self%k_initial(:, :, i)))) return
     n = self%n
     m = 2*n
     alpha => space%matrix(m, m)
@@ -275,6 +269,12 @@ contains
     columns_k => space%matrix(m, n)
     product => space%matrix(m, n)
     k_joint => space%matrix(n, n)
+    call room_to_solve(m, space)
+    line_info = line_not_finite
+    rcond = 0.0_dp
+    if (space%only_counts) return
+    if (.not. (all_finite(self%alpha(:, :, i)) .and. all_finite(self%gamma(:, :, i)) &
+               .and. all_finite(self%k_initial(:, :, i)))) return
     call load(self%transposed, self%alpha(:, :, i), alpha)
     call load(self%transposed, self%gamma(:, :, i), gamma)
     call load(self%transposed, self%k_initial(:, :, i), k_joint)
@@ -316,9 +316,6 @@ contains
     operation%n = n
     operation%gamma => gamma
     operation%result => k_joint
-    operation%n_complex = area(m, m) + area(m, n) + area(n, n) + inverse_work(m)
-    operation%n_real = area(2, m)
-    operation%n_pivot = m
     operation%flops = 8.0_dp*real(m, dp)**3*(5.0_dp/6.0_dp)
     if (worth_a_plan(size(gamma, 3), memory) .and. n >= 1 .and. m <= largest_in_lanes) &
       call plan_short_identification(operation)
@@ -328,11 +325,12 @@ contains
   subroutine plan_short_identification(operation)
     type(short_identification), intent(inout) :: operation
     integer :: element(2*operation%n, 3*operation%n), n, m
+    type(element_space) :: room
 
     n = operation%n
     m = 2*n
-    element = system(0, m, n)
-    operation%n_element = system_size(m, n)
+    element = room%system(m, n, operation%plan%gamma_before)
+    operation%n_element = room%taken
     operation%n_hint = padded(m)
     associate (plan => operation%plan)
       plan%gamma => real_lines(operation%gamma)
@@ -360,7 +358,7 @@ contains
     associate (plan => self%plan, x => space%x)
       call kernels%load(m*m, plan%gamma_place, first, n_lines, plan%gamma, x)
       call kernels%fill(m*n, plan%unit_value, plan%unit, x)
-      call kernels%solve(m, n, n, 0, x, space%hint, row, rcond_lanes, space%ahead)
+      call kernels%solve(m, n, n, plan%gamma_before, x, space%hint, row, rcond_lanes, space%ahead)
       call rows_in_memory(self%transposed, row(n + 1:), n, joint)
       call kernels%store(n*n, joint, first, n_lines, x, self%plan%k_joint)
       call kernels%total(n*n, joint, x, total)
@@ -378,13 +376,15 @@ contains
     complex(dp), pointer, contiguous :: gamma(:, :), columns_k(:, :), k_joint(:, :)
     integer :: n
 
-    line_info = line_not_finite
-    rcond = 0.0_dp
-    if (.not. all_finite(self%gamma(:, :, i))) return
     n = self%n
     gamma => space%matrix(2*n, 2*n)
     columns_k => space%matrix(2*n, n)
     k_joint => space%matrix(n, n)
+    call room_to_solve(2*n, space)
+    line_info = line_not_finite
+    rcond = 0.0_dp
+    if (space%only_counts) return
+    if (.not. all_finite(self%gamma(:, :, i))) return
     call load(self%transposed, self%gamma(:, :, i), gamma)
     call unit_columns(n, columns_k)
     call solve_line(gamma, columns_k, space, line_info, rcond)

@@ -8,15 +8,15 @@
 !> Kernels return sums in which NaN, Inf and overflow show, and estimates of the condition. A line in doubt is done again
 !> by the reference engine, so that both engines give the same codes.
 module jointfrf_lanes
-  use, intrinsic :: iso_c_binding, only: c_f_pointer, c_loc
+  use, intrinsic :: iso_c_binding, only: c_f_pointer, c_intptr_t, c_loc, c_ptr
   use, intrinsic :: iso_fortran_env, only: int64
   use jointfrf_elimination_plan, only: elimination_plan
   use jointfrf_kinds, only: dp, ip
   use jointfrf_lookahead, only: lookahead
   implicit none
   private
-  public :: lane_kernels, system_position, system_size, padded, real_lines, natural, system, flat, in_memory, &
-    row_starts, rows_in_memory, worse_of
+  public :: lane_kernels, element_space, padded, to_register, real_lines, flat, in_memory, row_starts, &
+    rows_in_memory, worse_of
 
   !> Lines side by side. One register of AVX-512, two of AVX2, four of SSE2.
   integer, parameter, public :: lanes = 8
@@ -173,7 +173,7 @@ module jointfrf_lanes
       real(dp), intent(out) :: smallest(lanes), largest(lanes)
     end subroutine superpose_routine
 
-    !> Two words of random bits for every counter, see `lanes_noise/random.inc`.
+    !> Two words of random bits for every counter, see `lanes/random_numbers.inc`.
     !> n      counters a lane
     !> key    shape (2)
     !> low    first word of the counters, shape (lanes, n)
@@ -280,6 +280,15 @@ module jointfrf_lanes
     procedure(moments_routine), pointer, nopass :: moments => null()
   end type lane_kernels
 
+  !> The elements of a block, given out one after the other. What was taken in the end is what the block needs.
+  type :: element_space
+    integer :: taken = 0
+  contains
+    procedure :: matrix
+    procedure :: system
+    procedure :: run
+  end type element_space
+
 contains
 
   !> Elimination takes two columns at a time: order of a matrix made even by one more number on the diagonal.
@@ -299,7 +308,7 @@ contains
     elements = (padded(n) + 2)*(padded(n) + merge(n_rhs + 1, 0, n_rhs > 0))
   end function system_size
 
-  !> The element of a system that holds entry (i, j) of A, or of B where j > n.
+  !> The element of a system [A, B] that holds entry (i, j) of A, or of B where j > n.
   !>
   !> The first two columns, which are eliminated next, lie apart from the others: both parts have rows of a fixed length
   !> then, which is what lets the compiler run all lanes at once. A matrix of order 1 to 4 that is to be inverted lies
@@ -320,28 +329,45 @@ contains
     end if
   end function system_position
 
-  !> The elements of a matrix that lies row by row, after element `before`.
-  pure function natural(before, n_rows, n_columns) result(element)
-    integer, intent(in) :: before, n_rows, n_columns
-    integer :: element(n_rows, n_columns), i, j
+  !> n elements in a row: the element before them.
+  function run(self, n) result(before)
+    class(element_space), intent(inout) :: self
+    integer, intent(in) :: n
+    integer :: before
 
+    before = self%taken
+    self%taken = self%taken + n
+  end function run
+
+  !> The elements of a matrix that lies row by row.
+  function matrix(self, n_rows, n_columns) result(element)
+    class(element_space), intent(inout) :: self
+    integer, intent(in) :: n_rows, n_columns
+    integer :: element(n_rows, n_columns), before, i, j
+
+    before = self%run(n_rows*n_columns)
     do j = 1, n_columns
       do i = 1, n_rows
         element(i, j) = before + (i - 1)*n_columns + j
       end do
     end do
-  end function natural
+  end function matrix
 
-  !> The elements of a system [A, B] that lies after element `before`.
-  pure function system(before, n, n_rhs) result(element)
-    integer, intent(in) :: before, n, n_rhs
-    integer :: element(n, n + n_rhs), i, j
+  !> The elements of a system [A, B], n_rhs = 0 for a matrix that is to be inverted.
+  !> before   the element before the system
+  function system(self, n, n_rhs, before) result(element)
+    class(element_space), intent(inout) :: self
+    integer, intent(in) :: n, n_rhs
+    integer, intent(out), optional :: before
+    integer :: element(n, n + n_rhs), start, i, j
 
+    start = self%run(system_size(n, n_rhs))
     do j = 1, n + n_rhs
       do i = 1, n
-        element(i, j) = before + system_position(n, n_rhs, i, j)
+        element(i, j) = start + system_position(n, n_rhs, i, j)
       end do
     end do
+    if (present(before)) before = start
   end function system
 
   !> The elements of a matrix column by column.
@@ -398,6 +424,14 @@ contains
 
     rcond = min(a, b) + 0*(a + b)
   end function worse_of
+
+  !> Numbers from an address to where a register begins, so that none is read across two cache lines.
+  function to_register(address) result(skip)
+    type(c_ptr), intent(in) :: address
+    integer :: skip
+
+    skip = int(modulo(-transfer(address, 1_c_intptr_t)/8, int(lanes, c_intptr_t)))
+  end function to_register
 
   !> The caller's lines as pairs of real numbers.
   function real_lines(lines) result(pairs)

@@ -2,12 +2,12 @@
 module jointfrf_linear_algebra
   use jointfrf_caller_memory, only: caller_memory
   use jointfrf_kinds, only: dp, ip
-  use jointfrf_lanes, only: in_memory, lane_kernels, lanes, largest_in_lanes, largest_product, padded, real_lines, &
-    rows_in_memory, system, system_size
+  use jointfrf_lanes, only: element_space, in_memory, lane_kernels, lanes, largest_in_lanes, largest_product, padded, &
+    real_lines, rows_in_memory
   use jointfrf_line_layout, only: all_finite, load, store
-  use jointfrf_lines_lapack, only: inverse_work, invert_line, solve_line
+  use jointfrf_lines_lapack, only: invert_line, room_to_invert, room_to_solve, solve_line
   use jointfrf_status, only: line_not_finite
-  use jointfrf_sweep, only: area, line_operation, line_space, long_block, run_sweep, worth_a_plan
+  use jointfrf_sweep, only: line_operation, line_space, long_block, run_sweep, worth_a_plan
   implicit none
   private
   public :: invert, solve
@@ -50,20 +50,24 @@ contains
     operation%n = size(a, 1)
     operation%a => a
     operation%result => a_inverse
-    operation%n_complex = inverse_work(operation%n)
-    operation%n_pivot = operation%n
     operation%flops = 8.0_dp*real(operation%n, dp)**3
-    if (worth_a_plan(size(a, 3), memory) .and. operation%n >= 1 .and. operation%n <= largest_in_lanes) then
-      operation%n_element = system_size(operation%n, 0)
-      operation%n_hint = padded(operation%n)
-      if (operation%n <= 2) operation%block_lines = long_block
-      operation%a_pairs => real_lines(a)
-      operation%result_pairs => real_lines(a_inverse)
-      operation%place = in_memory(.true., system(0, operation%n, 0))
-      call operation%reads(operation%a_pairs)
-    end if
+    if (worth_a_plan(size(a, 3), memory) .and. operation%n >= 1 .and. operation%n <= largest_in_lanes) &
+      call plan_inversion(operation)
     call run_sweep(operation, size(a, 3, kind=ip), line_info, rcond, info, memory)
   end subroutine invert
+
+  subroutine plan_inversion(operation)
+    type(inversion), intent(inout) :: operation
+    type(element_space) :: room
+
+    operation%place = in_memory(.true., room%system(operation%n, 0))
+    operation%n_element = room%taken
+    operation%n_hint = padded(operation%n)
+    if (operation%n <= 2) operation%block_lines = long_block
+    operation%a_pairs => real_lines(operation%a)
+    operation%result_pairs => real_lines(operation%result)
+    call operation%reads(operation%a_pairs)
+  end subroutine plan_inversion
 
   !> The rows in lanes are the columns in memory, so that the largest row sum is the 1-norm.
   subroutine invert_block(self, kernels, first, n_lines, space, line_info, rcond)
@@ -95,8 +99,10 @@ contains
     integer(ip), intent(out) :: line_info
     real(dp), intent(out) :: rcond
 
+    call room_to_invert(self%n, space)
     line_info = line_not_finite
     rcond = 0.0_dp
+    if (space%only_counts) return
     if (.not. all_finite(self%a(:, :, i))) return
     self%result(:, :, i) = self%a(:, :, i)
     call invert_line(self%result(:, :, i), space, line_info, rcond)
@@ -122,9 +128,6 @@ contains
     operation%a => a
     operation%b => b
     operation%result => x
-    operation%n_complex = area(operation%n, operation%n + operation%n_rhs) + inverse_work(operation%n)
-    operation%n_real = area(2, operation%n)
-    operation%n_pivot = operation%n
     operation%flops = 8.0_dp*real(operation%n, dp)**2*(operation%n/3.0_dp + operation%n_rhs)
     ! More right-hand sides than these leave the caches, eight lines at a time.
     if (worth_a_plan(size(a, 3), memory) .and. min(operation%n, operation%n_rhs) >= 1 &
@@ -135,11 +138,12 @@ contains
 
   subroutine plan_solution(operation)
     type(solution), intent(inout) :: operation
+    type(element_space) :: room
     integer :: element(operation%n, operation%n + operation%n_rhs)
 
     associate (n => operation%n, n_rhs => operation%n_rhs)
-      element = system(0, n, n_rhs)
-      operation%n_element = system_size(n, n_rhs)
+      element = room%system(n, n_rhs)
+      operation%n_element = room%taken
       operation%n_hint = padded(n)
       operation%a_place = in_memory(operation%transposed, element(:, :n))
       operation%b_place = in_memory(operation%transposed, element(:, n + 1:))
@@ -180,11 +184,13 @@ contains
     real(dp), intent(out) :: rcond
     complex(dp), pointer, contiguous :: a(:, :), b(:, :)
 
-    line_info = line_not_finite
-    rcond = 0.0_dp
-    if (.not. (all_finite(self%a(:, :, i)) .and. all_finite(self%b(:, :, i)))) return
     a => space%matrix(self%n, self%n)
     b => space%matrix(self%n, self%n_rhs)
+    call room_to_solve(self%n, space)
+    line_info = line_not_finite
+    rcond = 0.0_dp
+    if (space%only_counts) return
+    if (.not. (all_finite(self%a(:, :, i)) .and. all_finite(self%b(:, :, i)))) return
     call load(self%transposed, self%a(:, :, i), a)
     call load(self%transposed, self%b(:, :, i), b)
     call solve_line(a, b, space, line_info, rcond)

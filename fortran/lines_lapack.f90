@@ -5,10 +5,10 @@ module jointfrf_lines_lapack
   use jointfrf_lapack, only: zgecon, zgemm, zgesv, zgetrf, zgetri
   use jointfrf_line_layout, only: all_finite
   use jointfrf_status, only: line_good, line_overflow
-  use jointfrf_sweep, only: area, line_space
+  use jointfrf_sweep, only: line_space
   implicit none
   private
-  public :: solve_line, invert_line, product_line, one_norm, inverse_work
+  public :: solve_line, invert_line, product_line, one_norm, room_to_solve, room_to_invert
 
   complex(dp), parameter :: one = (1.0_dp, 0.0_dp), zero = (0.0_dp, 0.0_dp)
   integer(c_size_t), parameter :: one_char = 1_c_size_t
@@ -19,21 +19,44 @@ module jointfrf_lines_lapack
 
 contains
 
-  !> Complex workspace that `solve_line` and `invert_line` take for matrices up to n by n.
-  pure function inverse_work(n) result(size_needed)
+  !> Take and give back what `solve_line` takes and gives back for matrices of order n, where the space only counts.
+  subroutine room_to_solve(n, space)
     integer, intent(in) :: n
-    integer(long) :: size_needed
+    type(line_space), target, intent(inout) :: space
+    complex(dp), pointer, contiguous :: copy(:, :), work(:, :)
+    real(dp), pointer, contiguous :: real_work(:)
+    integer(blas_ip), pointer, contiguous :: pivot(:)
+    integer(long) :: before
 
-    size_needed = max(area(2, n), area(min(n, inverse_block), n))
-    if (n <= exact_condition) size_needed = size_needed + area(n, n)
-  end function inverse_work
+    if (.not. space%only_counts) return
+    before = space%used
+    pivot => space%pivots(n)
+    call take_for_condition(n, space, copy, work, real_work)
+    space%used = before
+  end subroutine room_to_solve
 
-  !> A X = B with zgesv. A leaves as its LU factors, B as X. Needs space%pivot(n), space%r(2 n).
+  !> The same for `invert_line`.
+  subroutine room_to_invert(n, space)
+    integer, intent(in) :: n
+    type(line_space), target, intent(inout) :: space
+    complex(dp), pointer, contiguous :: work(:, :)
+    integer(blas_ip), pointer, contiguous :: pivot(:)
+    integer(long) :: before
+
+    if (.not. space%only_counts) return
+    before = space%used
+    pivot => space%pivots(n)
+    work => space%matrix(n, min(n, inverse_block))
+    space%used = before
+  end subroutine room_to_invert
+
+  !> A X = B with zgesv. A leaves as its LU factors, B as X.
   subroutine solve_line(a, b, space, info, rcond)
     complex(dp), contiguous, intent(inout) :: a(:, :), b(:, :)
     type(line_space), target, intent(inout) :: space
     integer(ip), intent(out) :: info
     real(dp), intent(out) :: rcond
+    integer(blas_ip), pointer, contiguous :: pivot(:)
     real(dp) :: norm
     integer(blas_ip) :: n, code
 
@@ -41,47 +64,66 @@ contains
     rcond = 1.0_dp
     info = line_good
     if (n == 0 .or. size(b, 2) == 0) return        ! OpenBLAS does not factor A without right-hand sides
+    pivot => space%pivots(int(n))
     norm = one_norm(a)
-    call zgesv(n, size(b, 2, kind=blas_ip), a, n, space%pivot, b, n, code)
+    call zgesv(n, size(b, 2, kind=blas_ip), a, n, pivot, b, n, code)
     info = int(code, ip)
     if (info /= line_good) return
-    call condition(norm, a, space, rcond)
+    call condition(norm, a, pivot, space, rcond)
     if (.not. all_finite(b)) info = line_overflow
   end subroutine solve_line
 
   !> Reciprocal condition number from LU factors: of the inverse while that is cheap, else LAPACK's estimate.
-  subroutine condition(norm, factors, space, rcond)
+  subroutine condition(norm, factors, pivot, space, rcond)
     real(dp), intent(in) :: norm
     complex(dp), contiguous, intent(in) :: factors(:, :)
+    integer(blas_ip), contiguous, intent(in) :: pivot(:)
     type(line_space), target, intent(inout) :: space
     real(dp), intent(out) :: rcond
     complex(dp), pointer, contiguous :: inverse(:, :), work(:, :)
+    real(dp), pointer, contiguous :: real_work(:)
     integer(blas_ip) :: n, ignored
     integer(long) :: before
 
     n = size(factors, 1, kind=blas_ip)
     before = space%used
+    call take_for_condition(int(n), space, inverse, work, real_work)
     if (n <= exact_condition) then
-      inverse => space%matrix(int(n), int(n))
-      work => space%matrix(min(int(n), inverse_block), int(n))
       inverse = factors
-      call zgetri(n, inverse, n, space%pivot, work, size(work, kind=blas_ip), ignored)
+      call zgetri(n, inverse, n, pivot, work, size(work, kind=blas_ip), ignored)
       rcond = 0.0_dp
       if (all_finite(inverse)) rcond = min(1.0_dp, (1.0_dp/norm)/one_norm(inverse))
     else
-      work => space%matrix(2, int(n))
-      call zgecon('1', n, factors, n, norm, rcond, work, space%r, ignored, one_char)
+      call zgecon('1', n, factors, n, norm, rcond, work, real_work, ignored, one_char)
     end if
     space%used = before
   end subroutine condition
 
-  !> A becomes its inverse, with zgetrf and zgetri. Needs space%pivot(n).
+  !> What `condition` works in for a matrix of order n; null where it does not need it.
+  subroutine take_for_condition(n, space, inverse, work, real_work)
+    integer, intent(in) :: n
+    type(line_space), target, intent(inout) :: space
+    complex(dp), pointer, contiguous, intent(out) :: inverse(:, :), work(:, :)
+    real(dp), pointer, contiguous, intent(out) :: real_work(:)
+
+    nullify (inverse, real_work)
+    if (n <= exact_condition) then
+      inverse => space%matrix(n, n)
+      work => space%matrix(n, min(n, inverse_block))
+    else
+      work => space%matrix(n, 2)
+      real_work => space%reals(2*n)
+    end if
+  end subroutine take_for_condition
+
+  !> A becomes its inverse, with zgetrf and zgetri.
   subroutine invert_line(a, space, info, rcond)
     complex(dp), contiguous, intent(inout) :: a(:, :)
     type(line_space), target, intent(inout) :: space
     integer(ip), intent(out) :: info
     real(dp), intent(out) :: rcond
     complex(dp), pointer, contiguous :: work(:, :)
+    integer(blas_ip), pointer, contiguous :: pivot(:)
     real(dp) :: norm
     integer(blas_ip) :: n, code
     integer(long) :: before
@@ -90,13 +132,14 @@ contains
     rcond = 1.0_dp
     info = line_good
     if (n == 0) return
+    pivot => space%pivots(int(n))
     norm = one_norm(a)
-    call zgetrf(n, n, a, n, space%pivot, code)
+    call zgetrf(n, n, a, n, pivot, code)
     info = int(code, ip)
     if (info /= line_good) return
     before = space%used
-    work => space%matrix(int(inverse_work(int(n))), 1)
-    call zgetri(n, a, n, space%pivot, work, size(work, kind=blas_ip), code)
+    work => space%matrix(int(n), min(int(n), inverse_block))
+    call zgetri(n, a, n, pivot, work, size(work, kind=blas_ip), code)
     space%used = before
     info = int(code, ip)
     if (info /= line_good) return

@@ -2,11 +2,11 @@
 module jointfrf_modal
   use jointfrf_caller_memory, only: caller_memory
   use jointfrf_kinds, only: dp, ip
-  use jointfrf_lanes, only: lane_kernels, lanes, real_lines
+  use jointfrf_lanes, only: element_space, lane_kernels, lanes, real_lines
   use jointfrf_line_layout, only: all_finite, load_real, store
   use jointfrf_lines_lapack, only: product_line
   use jointfrf_status, only: line_good, line_not_finite, line_overflow
-  use jointfrf_sweep, only: area, line_operation, line_space, run_sweep, worth_a_plan
+  use jointfrf_sweep, only: line_operation, line_space, run_sweep, worth_a_plan
   implicit none
   private
   public :: receptance_modal
@@ -59,8 +59,6 @@ contains
     operation%n_modes = size(stiffness)
     operation%n_out = size(h, merge(2, 1, transposed))
     operation%n_in = size(h, merge(1, 2, transposed))
-    operation%n_complex = area(operation%n_modes, operation%n_out + operation%n_in) &
-                          + area(operation%n_out, operation%n_in)
     operation%flops = 8.0_dp*operation%n_modes*(operation%n_in + operation%n_out*operation%n_in)
     if (worth_a_plan(size(omega), memory) .and. operation%n_modes > 0 .and. size(h) > 0) call prepare_block(operation)
     call run_sweep(operation, size(omega, kind=ip), line_info, rcond, info, memory)
@@ -70,8 +68,9 @@ contains
   !> (j, i) are one.
   subroutine prepare_block(operation)
     class(superposition), intent(inout) :: operation
+    type(element_space) :: room
     logical :: symmetric
-    integer :: o, i, e, entries, mode
+    integer :: o, i, e, entries, mode, before
 
     symmetric = operation%n_out == operation%n_in
     if (symmetric) symmetric = all(abs(operation%shapes_out - operation%shapes_in) <= 0.0_dp)
@@ -79,6 +78,9 @@ contains
     if (symmetric) entries = (operation%n_out*(operation%n_out + 1))/2
     allocate (operation%residue(4, operation%n_modes, (entries + 3)/4), source=0.0_dp)
     allocate (operation%place(operation%n_out*operation%n_in))
+    before = room%run(operation%n_modes)                              ! what the kernel works in
+    before = room%run(4*size(operation%residue, 3))
+    operation%n_element = room%taken
     e = 0
     do i = 1, operation%n_in
       do o = merge(i, 1, symmetric), operation%n_out
@@ -88,13 +90,12 @@ contains
             shape_at(operation%transposed, operation%shapes_out, o, mode) &
             *shape_at(operation%transposed, operation%shapes_in, i, mode)
         end do
-        operation%place(in_memory(o, i)) = operation%n_modes + e
-        if (symmetric) operation%place(in_memory(i, o)) = operation%n_modes + e
+        operation%place(in_memory(o, i)) = before + e
+        if (symmetric) operation%place(in_memory(i, o)) = before + e
       end do
     end do
     operation%loss = operation%loss_factor*operation%stiffness
     operation%result_pairs => real_lines(operation%result)
-    operation%n_element = operation%n_modes + 4*size(operation%residue, 3)
 
   contains
 
@@ -155,13 +156,15 @@ contains
     real(dp) :: smallest, largest, omega
     integer :: mode, place
 
-    omega = self%omega(i)
     shapes => space%matrix(self%n_out, self%n_modes)
     weighted => space%matrix(self%n_modes, self%n_in)
     h => space%matrix(self%n_out, self%n_in)
+    line_info = line_good
+    rcond = 0.0_dp
+    if (space%only_counts) return
+    omega = self%omega(i)
     smallest = huge(1.0_dp)
     largest = 0.0_dp
-    rcond = 0.0_dp
     do mode = 1, self%n_modes
       denominator = cmplx(self%stiffness(mode) - omega**2, &
                           self%loss_factor(mode)*self%stiffness(mode) + omega*self%damping(mode), dp)

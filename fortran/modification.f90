@@ -2,23 +2,35 @@
 !> into another (2.40), (2.47).
 module jointfrf_modification
   use jointfrf_caller_memory, only: caller_memory
-  use jointfrf_kinds, only: dp, ip, long
-  use jointfrf_lanes, only: flat, in_memory, lane_kernels, lanes, largest_in_lanes, largest_product, natural, &
-    padded, real_lines, row_starts, system, system_size
+  use jointfrf_kinds, only: dp, ip
+  use jointfrf_lanes, only: element_space, flat, in_memory, lane_kernels, lanes, largest_in_lanes, largest_product, &
+    padded, real_lines, row_starts
   use jointfrf_line_layout, only: all_finite, load, store, subtract
-  use jointfrf_lines_lapack, only: inverse_work, product_line, solve_line
+  use jointfrf_lines_lapack, only: product_line, room_to_solve, solve_line
   use jointfrf_lookahead, only: lookahead
   use jointfrf_status, only: line_good, line_not_finite, line_overflow
-  use jointfrf_sweep, only: area, line_operation, line_space, run_sweep, worth_a_plan
+  use jointfrf_sweep, only: line_operation, line_space, run_sweep, worth_a_plan
   implicit none
   private
-  public :: modify, find_modification, apply_modification, modification_work
-  public :: modification_in_lanes, plan_modification, apply_in_lanes, modification_elements
+  public :: modify, find_modification
+  public :: modification_matrices, take_matrices, apply_modification
+  public :: modification_in_lanes, plan_modification, apply_in_lanes
+
+  !> The matrices of one line of n DOFs that is modified at n_m coordinates.
+  type :: modification_matrices
+    complex(dp), pointer, contiguous :: h(:, :)          !< receptance, shape (n, n), changed in place
+    complex(dp), pointer, contiguous :: d(:, :)          !< dynamic stiffness added, shape (n_m, n_m)
+    complex(dp), pointer, contiguous :: columns(:, :)    !< receptance from forces at these coordinates, shape (n, n_m)
+    complex(dp), pointer, contiguous :: rows(:, :)       !< receptance at these coordinates, shape (n_m, n)
+    complex(dp), pointer, contiguous :: h_mm(:, :)       !< receptance among them, shape (n_m, n_m)
+    complex(dp), pointer, contiguous :: system(:, :)     !< I + D H_mm
+    complex(dp), pointer, contiguous :: forces(:, :)     !< (I + D H_mm)^-1 D rows
+  end type modification_matrices
 
   !> Where the matrices of a modification lie in lanes: H, D, [H_mm, rows], columns, and the system
   !> [I + D H_mm, D rows], which is solved for the forces.
   type :: modification_in_lanes
-    integer :: n, n_m
+    integer :: n, n_m, n_element
     integer, allocatable :: h(:, :), d(:, :), h_mm(:, :), rows(:, :), columns(:, :)
     complex(dp), allocatable :: unit_value(:)      !< [I, 0], row by row
     integer, allocatable :: d_row(:), right_row(:), product_row(:), product(:), in_system(:), columns_row(:), h_row(:)
@@ -74,9 +86,6 @@ contains
     operation%d => d
     operation%dofs => dofs
     operation%result => gamma
-    operation%n_complex = area(n, n) + 2*area(n_m, n_m) + 2*area(n, n_m) + modification_work(n, n_m)
-    operation%n_real = area(2, n_m)
-    operation%n_pivot = n_m
     operation%flops = 8.0_dp*n_m*(real(n, dp)**2 + 2.0_dp*real(n_m, dp)*n)
     if (worth_a_plan(size(alpha, 3), memory) .and. n_m >= 1 .and. n_m <= largest_in_lanes .and. n <= largest_product) &
       call plan_block(operation)
@@ -87,7 +96,7 @@ contains
     type(modification), intent(inout) :: operation
 
     call plan_modification(operation%n, operation%n_m, operation%plan)
-    operation%n_element = modification_elements(operation%n, operation%n_m)
+    operation%n_element = operation%plan%n_element
     operation%n_hint = padded(operation%n_m)
     operation%alpha_pairs => real_lines(operation%alpha)
     operation%d_pairs => real_lines(operation%d)
@@ -123,35 +132,23 @@ contains
     end associate
   end subroutine modify_block
 
-  !> Elements that a modification of n DOFs at n_m coordinates takes.
-  pure function modification_elements(n, n_m) result(elements)
-    integer, intent(in) :: n, n_m
-    integer :: elements
-
-    elements = n*n + n_m*n_m + 2*n_m*(n_m + n) + n*n_m + system_size(n_m, n)
-  end function modification_elements
-
-  pure subroutine plan_modification(n, n_m, plan)
+  subroutine plan_modification(n, n_m, plan)
     integer, intent(in) :: n, n_m
     type(modification_in_lanes), intent(out) :: plan
-    integer :: right(n_m, n_m + n), product(n_m, n_m + n), whole(n_m, n_m + n), taken, i
+    integer :: right(n_m, n_m + n), product(n_m, n_m + n), whole(n_m, n_m + n), i
+    type(element_space) :: room
 
     plan%n = n
     plan%n_m = n_m
-    plan%h = natural(0, n, n)
-    taken = n*n
-    plan%d = natural(taken, n_m, n_m)
-    taken = taken + n_m*n_m
-    right = natural(taken, n_m, n_m + n)
+    plan%h = room%matrix(n, n)
+    plan%d = room%matrix(n_m, n_m)
+    right = room%matrix(n_m, n_m + n)
     allocate (plan%h_mm, source=right(:, :n_m))
     allocate (plan%rows, source=right(:, n_m + 1:))
-    taken = taken + n_m*(n_m + n)
-    product = natural(taken, n_m, n_m + n)
-    taken = taken + n_m*(n_m + n)
-    plan%columns = natural(taken, n, n_m)
-    taken = taken + n*n_m
-    whole = system(taken, n_m, n)
-    plan%system_before = taken
+    product = room%matrix(n_m, n_m + n)
+    plan%columns = room%matrix(n, n_m)
+    whole = room%system(n_m, n, plan%system_before)
+    plan%n_element = room%taken
     plan%product = in_memory(.true., product)
     plan%in_system = in_memory(.true., whole)
     allocate (plan%unit_value(size(product)), source=(0.0_dp, 0.0_dp))
@@ -190,21 +187,18 @@ contains
     type(line_space), target, intent(inout) :: space
     integer(ip), intent(out) :: line_info
     real(dp), intent(out) :: rcond
-    complex(dp), pointer, contiguous :: h(:, :), d(:, :), columns(:, :), rows(:, :), h_mm(:, :)
+    type(modification_matrices) :: m
 
+    call take_matrices(self%n, self%n_m, space, m)
     line_info = line_not_finite
     rcond = 0.0_dp
+    if (space%only_counts) return
     if (.not. (all_finite(self%alpha(:, :, i)) .and. all_finite(self%d(:, :, i)))) return
-    h => space%matrix(self%n, self%n)
-    d => space%matrix(self%n_m, self%n_m)
-    columns => space%matrix(self%n, self%n_m)
-    rows => space%matrix(self%n_m, self%n)
-    h_mm => space%matrix(self%n_m, self%n_m)
-    call load(self%transposed, self%alpha(:, :, i), h)
-    call load(self%transposed, self%d(:, :, i), d)
-    call take_modified(h, self%dofs, columns, rows, h_mm)
-    call apply_modification(h, columns, rows, h_mm, d, space, line_info, rcond)
-    call store(self%transposed, h, self%result(:, :, i))
+    call load(self%transposed, self%alpha(:, :, i), m%h)
+    call load(self%transposed, self%d(:, :, i), m%d)
+    call take_modified(m%h, self%dofs, m%columns, m%rows, m%h_mm)
+    call apply_modification(m, space, line_info, rcond)
+    call store(self%transposed, m%h, self%result(:, :, i))
   end subroutine modify_one
 
   !> Columns, rows and square of the modified DOFs.
@@ -218,42 +212,41 @@ contains
     h_mm = h(dofs, dofs)
   end subroutine take_modified
 
-  !> Complex workspace of `apply_modification`.
-  pure function modification_work(n, n_m) result(size_needed)
+  !> The matrices of one line, and room for `apply_modification`.
+  subroutine take_matrices(n, n_m, space, m)
     integer, intent(in) :: n, n_m
-    integer(long) :: size_needed
+    type(line_space), target, intent(inout) :: space
+    type(modification_matrices), intent(out) :: m
 
-    size_needed = area(n_m, n_m) + area(n_m, n) + inverse_work(n_m)
-  end function modification_work
+    m%h => space%matrix(n, n)
+    m%d => space%matrix(n_m, n_m)
+    m%columns => space%matrix(n, n_m)
+    m%rows => space%matrix(n_m, n)
+    m%h_mm => space%matrix(n_m, n_m)
+    m%system => space%matrix(n_m, n_m)
+    m%forces => space%matrix(n_m, n)
+    call room_to_solve(n_m, space)
+  end subroutine take_matrices
 
   !> H = H - columns (I + D H_mm)^-1 D rows: what (2.34)-(2.36) say of all DOFs at once. D may be singular.
-  !> h         receptance, changed in place, shape (n, n)
-  !> columns   receptance from forces at the modified coordinates, shape (n, n_m)
-  !> rows      receptance at the modified coordinates, shape (n_m, n)
-  !> h_mm      receptance among the modified coordinates, shape (n_m, n_m)
-  !> d         dynamic stiffness added there, shape (n_m, n_m)
-  subroutine apply_modification(h, columns, rows, h_mm, d, space, line_info, rcond)
-    complex(dp), contiguous, intent(inout) :: h(:, :)
-    complex(dp), contiguous, intent(in) :: columns(:, :), rows(:, :), h_mm(:, :), d(:, :)
+  subroutine apply_modification(m, space, line_info, rcond)
+    type(modification_matrices), intent(in) :: m
     type(line_space), target, intent(inout) :: space
     integer(ip), intent(out) :: line_info
     real(dp), intent(out) :: rcond
-    complex(dp), pointer, contiguous :: system(:, :), forces(:, :)
-    integer :: m
+    integer :: k
 
-    system => space%matrix(size(d, 1), size(d, 1))
-    forces => space%matrix(size(d, 1), size(h, 2))
-    system = 0
-    do m = 1, size(d, 1)
-      system(m, m) = 1
+    m%system = 0
+    do k = 1, size(m%d, 1)
+      m%system(k, k) = 1
     end do
-    call product_line('N', 'N', 1.0_dp, d, h_mm, system)
-    forces = 0
-    call product_line('N', 'N', 1.0_dp, d, rows, forces)
-    call solve_line(system, forces, space, line_info, rcond)
+    call product_line('N', 'N', 1.0_dp, m%d, m%h_mm, m%system)
+    m%forces = 0
+    call product_line('N', 'N', 1.0_dp, m%d, m%rows, m%forces)
+    call solve_line(m%system, m%forces, space, line_info, rcond)
     if (line_info /= line_good) return
-    call product_line('N', 'N', -1.0_dp, columns, forces, h)
-    if (.not. all_finite(h)) line_info = line_overflow
+    call product_line('N', 'N', -1.0_dp, m%columns, m%forces, m%h)
+    if (.not. all_finite(m%h)) line_info = line_overflow
   end subroutine apply_modification
 
   !> The modification D = alpha^-1 (alpha - gamma) gamma^-1 between two structures. Eqs. (2.40), (2.47).
@@ -277,9 +270,6 @@ contains
     operation%alpha => alpha
     operation%gamma => gamma
     operation%result => d
-    operation%n_complex = 4*area(n, n) + inverse_work(n)
-    operation%n_real = area(2, n)
-    operation%n_pivot = n
     operation%flops = 21.0_dp*real(n, dp)**3
     call run_sweep(operation, size(alpha, 3, kind=ip), line_info, rcond, info, memory)
   end subroutine find_modification
@@ -293,15 +283,17 @@ contains
     complex(dp), pointer, contiguous :: alpha(:, :), gamma(:, :), d(:, :), d_transposed(:, :)
     real(dp) :: rcond_gamma
 
-    line_info = line_not_finite
-    rcond = 0.0_dp
-    if (.not. (all_finite(self%alpha(:, :, i)) .and. all_finite(self%gamma(:, :, i)))) return
     alpha => space%matrix(self%n, self%n)
     gamma => space%matrix(self%n, self%n)
     d => space%matrix(self%n, self%n)
+    d_transposed => space%matrix(self%n, self%n)
+    call room_to_solve(self%n, space)
+    line_info = line_not_finite
+    rcond = 0.0_dp
+    if (space%only_counts) return
+    if (.not. (all_finite(self%alpha(:, :, i)) .and. all_finite(self%gamma(:, :, i)))) return
     call load(self%transposed, self%alpha(:, :, i), alpha)
     call load(self%transposed, self%gamma(:, :, i), gamma)
-    d_transposed => space%matrix(self%n, self%n)
     call subtract(alpha, gamma, d)
     call solve_line(alpha, d, space, line_info, rcond)                  ! alpha^-1 (alpha - gamma)
     if (line_info /= line_good) return

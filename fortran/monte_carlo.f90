@@ -1,26 +1,25 @@
 !> Monte Carlo study of an identification: pollute, identify and accumulate, without keeping any realisation.
 !>
 !> Lanes are realisations of one frequency line: inputs are the same in all of them, only noise differs. The
-!> realisations of a line are cut into slices whose number depends on the arguments alone; slices are put together in a
-!> fixed order. So results do not depend on the number of threads.
+!> realisations of a line are cut into slices whose number depends on the arguments alone; slices are shared among threads
+!> and put together in a fixed order. So results do not depend on the number of threads.
 module jointfrf_monte_carlo
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
-  use, intrinsic :: iso_c_binding, only: c_intptr_t, c_loc, c_ptr
+  use, intrinsic :: iso_c_binding, only: c_loc
   use, intrinsic :: iso_fortran_env, only: int64
-  !$ use omp_lib, only: omp_get_thread_num
   use jointfrf_blas_threads, only: hold_blas_threads, release_blas_threads
   use jointfrf_engine, only: find_kernels
   use jointfrf_ismm, only: inverse_substructuring
-  use jointfrf_kinds, only: dp, ip
-  use jointfrf_lanes, only: in_memory, lane_kernels, lanes, largest_in_lanes, natural, padded, real_lines, &
-    row_starts, rows_in_memory, system, system_size
+  use jointfrf_kinds, only: dp, ip, long
+  use jointfrf_lanes, only: element_space, in_memory, lane_kernels, lanes, largest_in_lanes, padded, real_lines, &
+    row_starts, rows_in_memory, to_register
   use jointfrf_line_layout, only: all_finite, load, store, take_block
-  use jointfrf_lines_lapack, only: inverse_work, product_line, solve_line
+  use jointfrf_lines_lapack, only: product_line, room_to_solve, solve_line
   use jointfrf_noise, only: draw, entry_counters, find_scale, line_counter, noise_model, spectrum_peak, &
     upper
+  use jointfrf_sharing, only: serial_flops_lanes, share, shared_work, threads_for
   use jointfrf_status, only: info_good, info_no_memory, line_good, line_not_finite, line_overflow
-  use jointfrf_sweep, only: area, line_space, serial_flops_lanes, threads_for
-  use jointfrf_traps, only: hold_traps, host_state, release_traps
+  use jointfrf_sweep, only: line_space
   implicit none
   private
   public :: monte_carlo, is_method
@@ -36,6 +35,7 @@ module jointfrf_monte_carlo
     integer :: n, m, n_element
     integer, allocatable :: gamma(:)             !< gamma in lanes, in the caller's order
     integer, allocatable :: again(:)             !< gamma once more, for lanes that are in doubt
+    integer :: system_before                     !< the element before the system that is solved
     integer, allocatable :: unit(:)              !< right-hand sides -E_k
     complex(dp), allocatable :: unit_value(:)
     integer, allocatable :: kk_row(:), c_row(:)  !< rows of gamma_kk and of C
@@ -63,6 +63,24 @@ module jointfrf_monte_carlo
     integer, allocatable :: hint(:)
     complex(dp), allocatable :: gamma(:, :), found(:, :)
   end type study_space
+
+  !> A study as work to be shared: an item is a slice of the realisations of one line, slices of a line side by side.
+  type, extends(shared_work) :: study
+    type(study_plan) :: plan
+    type(noise_model) :: noise
+    type(lane_kernels) :: kernels
+    logical :: blocks = .false.                  !< whether realisations are done side by side
+    integer :: first = 0, count = 0              !< realisations
+    integer :: slices = 0, slice = 0             !< slices of a line, realisations of a slice
+    complex(dp), pointer, contiguous :: gamma(:, :, :) => null()
+    real(dp), pointer, contiguous :: gamma_pairs(:, :, :) => null()
+    real(dp) :: peak = 0.0_dp                    !< see `spectrum_peak`
+    integer(ip), pointer, contiguous :: line_info(:) => null()     !< what was wrong with a line from the start
+    type(study_space), pointer, contiguous :: space(:) => null()   !< one a thread
+    type(moments), pointer, contiguous :: part(:) => null()        !< one an item
+  contains
+    procedure :: do_items => do_slices
+  end type study
 
 contains
 
@@ -97,21 +115,15 @@ contains
     integer(ip), contiguous, intent(out) :: good(:)
     complex(dp), contiguous, target, intent(inout) :: mean(:, :, :)
     real(dp), contiguous, intent(out) :: covariance(:, :, :, :), rcond(:)
-    integer(ip), contiguous, intent(out) :: line_info(:)
+    integer(ip), contiguous, target, intent(out) :: line_info(:)
     integer(ip), intent(out) :: info
-    type(lane_kernels) :: kernels
-    type(host_state) :: host
-    type(study_plan) :: plan
+    type(study) :: work
     type(study_space), allocatable, target :: space(:)
-    type(moments), allocatable :: part(:)
-    real(dp), pointer, contiguous :: gamma_pairs(:, :, :)
-    real(dp) :: peak
-    integer :: n, n_freq, realisations, slices, share, item, i, s, t, threads, stat
-    logical :: blocks
+    type(moments), allocatable, target :: part(:)
+    integer :: n_freq, i, s, threads, stat
 
-    n = size(mean, 1)
     n_freq = size(mean, 3)
-    call find_kernels(kernels, blocks, info)
+    call find_kernels(work%kernels, work%blocks, info)
     if (info /= info_good .or. n_freq == 0) return
     if (upper(method) == 'I') then
       call inverse_substructuring(transposed, alpha, mean, line_info, rcond, info)
@@ -126,58 +138,33 @@ contains
       rcond = 1.0_dp
     end if
 
-    plan = make_plan(transposed, upper(method) == 'C', n, noise)
-    blocks = blocks .and. plan%m <= largest_in_lanes
-    realisations = int(count)
-    slices = max(1, min((most_slices + n_freq - 1)/n_freq, realisations/fewest_realisations))
-    share = ((realisations - 1)/slices + lanes)/lanes*lanes
-    threads = threads_for(16.0_dp*real(plan%m, dp)**3*realisations*n_freq, slices*n_freq, serial_flops_lanes)
-    allocate (part(slices*n_freq), space(threads), stat=stat)
-    do t = 1, threads
-      if (stat == 0) call prepare(plan, space(t), stat)
-    end do
-    do item = 1, slices*n_freq
-      if (stat == 0) allocate (part(item)%mean(2, n*n), part(item)%square(3, n*n), stat=stat)
-    end do
+    work%plan = make_plan(transposed, upper(method) == 'C', size(mean, 1), noise)
+    work%noise = noise
+    work%blocks = work%blocks .and. work%plan%m <= largest_in_lanes
+    work%first = int(first)
+    work%count = int(count)
+    work%slices = max(1, min((most_slices + n_freq - 1)/n_freq, work%count/fewest_realisations))
+    work%slice = ((work%count - 1)/work%slices + lanes)/lanes*lanes
+    work%gamma => gamma
+    work%gamma_pairs => real_lines(gamma)
+    work%peak = spectrum_peak(noise, work%kernels, work%gamma_pairs)
+    threads = threads_for(16.0_dp*real(work%plan%m, dp)**3*work%count*n_freq, int(work%slices, long)*n_freq, &
+                          serial_flops_lanes)
+    call allocate_study(work%plan, threads, work%slices*n_freq, space, part, stat)
     if (stat /= 0) then
       info = info_no_memory
       return
     end if
-    gamma_pairs => real_lines(gamma)
-    peak = spectrum_peak(noise, kernels, gamma_pairs)
+    work%space => space
+    work%part => part
+    work%line_info => line_info
 
     call hold_blas_threads()
-    t = 1
-    !$omp parallel num_threads(threads) if(threads > 1) default(none) private(i, s, host) firstprivate(t) &
-    !$omp shared(plan, noise, kernels, blocks, n_freq, slices, share, first, realisations, gamma, gamma_pairs) &
-    !$omp shared(peak, line_info, space, part)
-    !$ t = omp_get_thread_num() + 1
-    call hold_traps(host)
-    !$omp do schedule(dynamic)
-    do item = 1, slices*n_freq
-      i = (item - 1)/slices + 1
-      s = mod(item - 1, slices)*share
-      if (line_info(i) == line_good .and. all_finite(gamma(:, :, i))) then
-        call run_slice(plan, noise, kernels, blocks, i, int(first, int64) + s, min(share, realisations - s), &
-                       gamma_pairs(:, :, i), peak, space(t), part(item))
-      else
-        call clear(part(item))
-        part(item)%code = line_info(i)
-        if (part(item)%code == line_good) part(item)%code = line_not_finite
-      end if
-    end do
-    !$omp end do
-    call release_traps(host)
-    !$omp end parallel
+    call share(work, size(part, kind=long), threads, even=.false.)
     call release_blas_threads()
-
     do i = 1, n_freq
-      s = (i - 1)*slices + 1
-      do item = s + 1, s + slices - 1
-        call add(part(item)%number, part(item)%mean, part(item)%square, part(s))
-        part(s)%rcond = min(part(s)%rcond, part(item)%rcond)
-        if (part(s)%code == line_good) part(s)%code = part(item)%code
-      end do
+      s = (i - 1)*work%slices + 1
+      call put_together(part(s:s + work%slices - 1))
       good(i) = nint(part(s)%number, ip)
       line_info(i) = line_good
       if (good(i) == 0) line_info(i) = part(s)%code
@@ -187,6 +174,58 @@ contains
     info = int(sum(merge(1, 0, line_info /= line_good)), ip)
   end subroutine monte_carlo
 
+  !> Workspace of every thread, and room for what comes of every item.
+  subroutine allocate_study(plan, threads, n_items, space, part, stat)
+    type(study_plan), intent(in) :: plan
+    integer, intent(in) :: threads, n_items
+    type(study_space), allocatable, target, intent(out) :: space(:)
+    type(moments), allocatable, intent(out) :: part(:)
+    integer, intent(out) :: stat
+    integer :: t, item
+
+    allocate (part(n_items), space(threads), stat=stat)
+    do t = 1, threads
+      if (stat == 0) call prepare(plan, space(t), stat)
+    end do
+    do item = 1, n_items
+      if (stat == 0) allocate (part(item)%mean(2, plan%n**2), part(item)%square(3, plan%n**2), stat=stat)
+    end do
+  end subroutine allocate_study
+
+  !> The slices from first to last.
+  subroutine do_slices(self, first, last, thread)
+    class(study), intent(in) :: self
+    integer(long), intent(in) :: first, last
+    integer, intent(in) :: thread
+    integer :: item, line, done
+
+    do item = int(first), int(last)
+      line = (item - 1)/self%slices + 1
+      done = mod(item - 1, self%slices)*self%slice
+      if (self%line_info(line) == line_good .and. all_finite(self%gamma(:, :, line))) then
+        call run_slice(self%plan, self%noise, self%kernels, self%blocks, line, int(self%first, int64) + done, &
+                       min(self%slice, self%count - done), self%gamma_pairs(:, :, line), self%peak, &
+                       self%space(thread), self%part(item))
+      else
+        call clear(self%part(item))
+        self%part(item)%code = self%line_info(line)
+        if (self%part(item)%code == line_good) self%part(item)%code = line_not_finite
+      end if
+    end do
+  end subroutine do_slices
+
+  !> The slices of one line, in their order, into the first.
+  subroutine put_together(part)
+    type(moments), intent(inout) :: part(:)
+    integer :: item
+
+    do item = 2, size(part)
+      call add(part(item)%number, part(item)%mean, part(item)%square, part(1))
+      part(1)%rcond = min(part(1)%rcond, part(item)%rcond)
+      if (part(1)%code == line_good) part(1)%code = part(item)%code
+    end do
+  end subroutine put_together
+
   !> Where everything lies in lanes. For K*: the columns of gamma in the order k, j, so that only the last unknowns,
   !> rows j of the solution, must be found.
   function make_plan(transposed, compliance, n, noise) result(plan)
@@ -194,26 +233,24 @@ contains
     integer, intent(in) :: n
     type(noise_model), intent(in) :: noise
     type(study_plan) :: plan
-    integer :: gamma(2*n, 2*n), whole(2*n, 3*n), part(n, 2*n), taken, i, j
+    integer :: gamma(2*n, 2*n), whole(2*n, 3*n), part(n, 2*n), i, j
+    type(element_space) :: room
 
     plan%transposed = transposed
     plan%compliance = compliance
     plan%n = n
     plan%m = 2*n
     if (compliance) then
-      part = system(0, n, n)
-      taken = system_size(n, n)
+      part = room%system(n, n, plan%system_before)
       gamma(:n, n + 1:) = part(:, :n)                      ! jk, the matrix
       gamma(:n, :n) = part(:, n + 1:)                      ! jj, the right-hand sides
-      gamma(n + 1:, n + 1:) = natural(taken, n, n)         ! kk
-      gamma(n + 1:, :n) = natural(taken + n*n, n, n)       ! kj, where C will be
-      taken = taken + 2*n*n
+      gamma(n + 1:, n + 1:) = room%matrix(n, n)            ! kk
+      gamma(n + 1:, :n) = room%matrix(n, n)                ! kj, where C will be
       plan%kk_row = row_starts(gamma(n + 1:, n + 1:))
       plan%c_row = row_starts(gamma(n + 1:, :n))
       plan%result = in_memory(transposed, gamma(n + 1:, :n))
     else
-      whole = system(0, 2*n, n)
-      taken = system_size(2*n, n)
+      whole = room%system(2*n, n, plan%system_before)
       gamma(:, n + 1:) = whole(:, :n)
       gamma(:, :n) = whole(:, n + 1:2*n)
       plan%unit = in_memory(.true., whole(:, 2*n + 1:))
@@ -223,11 +260,11 @@ contains
           plan%unit_value((i - 1)*n + j) = merge(-1, 0, i == n + j)
         end do
       end do
-      plan%result = in_memory(transposed, natural(0, n, n))
+      plan%result = in_memory(transposed, gamma(:n, :n))
     end if
     plan%gamma = in_memory(transposed, gamma)
-    plan%again = [(taken + i, i=1, 4*n*n)]
-    plan%n_element = taken + 4*n*n
+    plan%again = in_memory(.true., room%matrix(2*n, 2*n))
+    plan%n_element = room%taken
     plan%counters = entry_counters(noise, transposed, 2*n, 2*n)
   end function make_plan
 
@@ -235,13 +272,17 @@ contains
     type(study_plan), intent(in) :: plan
     type(study_space), target, intent(inout) :: space
     integer, intent(out) :: stat
+    integer(ip) :: no_code
+    real(dp) :: no_rcond
     integer :: n, m, at
 
     n = plan%n
     m = plan%m
     allocate (space%room(lanes*(2*plan%n_element + 2*m + 5*n*n + 1)), space%low_room(lanes*(m*m + 1)), &
               space%scale(2, m*m), space%hint(padded(m)), space%gamma(m, m), space%found(n, n), stat=stat)
-    if (stat == 0) call space%lapack%set_up(3*area(m, m) + inverse_work(m), area(2, m), area(m, 1), stat)
+    if (stat /= 0) return
+    call identify_one(plan, space%gamma, space%lapack, space%found, no_code, no_rcond)     ! counts what it takes
+    call space%lapack%set_up(stat)
     if (stat /= 0) return
     at = to_register(c_loc(space%room))
     call place(2, plan%n_element, space%x)
@@ -260,14 +301,6 @@ contains
       array(1:lanes, 1:n_parts, 1:n_elements) => space%room(at + 1:at + lanes*n_parts*n_elements)
       at = at + lanes*n_parts*n_elements
     end subroutine place
-
-    !> Numbers from an address to where a register begins.
-    function to_register(address) result(skip)
-      type(c_ptr), intent(in) :: address
-      integer :: skip
-
-      skip = int(modulo(-transfer(address, 1_c_intptr_t)/8, int(lanes, c_intptr_t)))
-    end function to_register
   end subroutine prepare
 
   !> The realisations first .. first + count - 1 of one line.
@@ -340,12 +373,12 @@ contains
     m = plan%m
     call pollute_in_lanes(plan, noise, kernels, high, gamma, plan%gamma, space)
     if (plan%compliance) then
-      call kernels%solve(n, n, n, 0, space%x, space%hint, row, rcond)         ! gamma_jk^-1 gamma_jj
+      call kernels%solve(n, n, n, plan%system_before, space%x, space%hint, row, rcond)   ! gamma_jk^-1 gamma_jj
       call kernels%copy(n*n, -1.0_dp, from, from, space%x)
       call kernels%product(n, n, n, 1.0_dp, plan%kk_row, row, plan%c_row, space%x)
     else
       call kernels%fill(m*n, plan%unit_value, plan%unit, space%x)
-      call kernels%solve(m, n, n, 0, space%x, space%hint, row, rcond)         ! rows j of -gamma^-1 E_k
+      call kernels%solve(m, n, n, plan%system_before, space%x, space%hint, row, rcond)   ! rows j of -gamma^-1 E_k
       call rows_in_memory(plan%transposed, row(n + 1:), n, from)
     end if
     call kernels%total(n*n, from, space%x, total)
@@ -415,19 +448,26 @@ contains
     complex(dp), pointer, contiguous :: gamma(:, :), matrix(:, :), right(:, :), last(:, :), answer(:, :)
     integer :: n, i
 
-    found = 0.0_dp
-    rcond = 0.0_dp
-    code = line_overflow
-    if (.not. all_finite(stored)) return
     n = plan%n
     space%used = 0
     gamma => space%matrix(2*n, 2*n)
     answer => space%matrix(n, n)
-    call load(plan%transposed, stored, gamma)
     if (plan%compliance) then
       matrix => space%matrix(n, n)
       last => space%matrix(n, n)
       right => space%matrix(n, n)
+      call room_to_solve(n, space)
+    else
+      right => space%matrix(2*n, n)
+      call room_to_solve(2*n, space)
+    end if
+    found = 0.0_dp
+    rcond = 0.0_dp
+    code = line_overflow
+    if (space%only_counts) return
+    if (.not. all_finite(stored)) return
+    call load(plan%transposed, stored, gamma)
+    if (plan%compliance) then
       call take_block(.false., 1.0_dp, gamma, 0, n, matrix)
       call take_block(.false., 1.0_dp, gamma, 0, 0, right)
       call take_block(.false., 1.0_dp, gamma, n, n, last)
@@ -436,7 +476,6 @@ contains
       call take_block(.false., -1.0_dp, gamma, n, 0, answer)
       call product_line('N', 'N', 1.0_dp, last, right, answer)
     else
-      right => space%matrix(2*n, n)
       right = 0.0_dp
       do i = 1, n
         right(n + i, i) = -1.0_dp

@@ -4,13 +4,11 @@
 !> depends neither on threads nor on the instruction set nor on how the caller stores a line.
 module jointfrf_noise
   use, intrinsic :: iso_fortran_env, only: int64
-  !$ use omp_lib, only: omp_get_thread_num
   use jointfrf_engine, only: find_kernels
-  use jointfrf_kinds, only: dp, ip
+  use jointfrf_kinds, only: dp, ip, long
   use jointfrf_lanes, only: lane_kernels, lanes, real_lines
+  use jointfrf_sharing, only: serial_flops_lanes, share, shared_work, threads_for
   use jointfrf_status, only: info_good, info_no_memory
-  use jointfrf_sweep, only: serial_flops_lanes, threads_for
-  use jointfrf_traps, only: hold_traps, host_state, release_traps
   implicit none
   private
   public :: noise_model, make_noise, is_kind, is_reference, upper, pollute
@@ -36,6 +34,20 @@ module jointfrf_noise
     integer(int64), allocatable :: low(:, :)
     real(dp), allocatable :: e(:, :, :), scale(:, :)
   end type noise_space
+
+  !> Polluted FRFs as work to be shared: an item is `lanes` lines of one realisation.
+  type, extends(shared_work) :: pollution
+    type(noise_model) :: noise
+    type(lane_kernels) :: kernels
+    integer :: n = 0, n_chunks = 0                         !< numbers of a line, items of a realisation
+    integer(int64) :: first = 0                            !< realisation
+    real(dp) :: peak = 0.0_dp                              !< see `spectrum_peak`
+    integer(int64), allocatable :: counters(:, :)          !< of the entries of lines 1 .. lanes, in this order
+    real(dp), pointer, contiguous :: from(:, :, :) => null(), to(:, :, :) => null()
+    type(noise_space), pointer, contiguous :: space(:) => null()
+  contains
+    procedure :: do_items => pollute_items
+  end type pollution
 
 contains
 
@@ -90,26 +102,25 @@ contains
     complex(dp), contiguous, target, intent(in) :: h(:, :, :)
     complex(dp), contiguous, target, intent(inout) :: polluted(:, :, :)
     integer(ip), intent(out) :: info
-    type(lane_kernels) :: kernels
-    type(host_state) :: host
-    type(noise_space), allocatable :: space(:)
-    real(dp), pointer, contiguous :: from(:, :, :), to(:, :, :)
-    integer(int64), allocatable :: counters(:, :)
-    real(dp) :: peak
-    integer(int64) :: item, n_items
-    integer :: n, n_freq, n_chunks, threads, t, c, r, n_lines, stat
+    type(pollution) :: work
+    type(noise_space), allocatable, target :: space(:)
+    integer(long) :: n_items
+    integer :: n, n_freq, threads, t, stat
     logical :: found
 
     info = info_good
     n = size(h, 1)*size(h, 2)
     n_freq = size(h, 3)
     if (n == 0 .or. n_freq == 0 .or. count == 0) return
-    call find_kernels(kernels, found, info)
+    call find_kernels(work%kernels, found, info)
     if (info /= info_good) return
-    n_chunks = (n_freq + lanes - 1)/lanes
-    n_items = int(n_chunks, int64)*count
-    threads = threads_for(number_flops*n*n_freq*count, int(min(n_items, int(huge(1), int64))), serial_flops_lanes)
-    allocate (counters(lanes, n), space(threads), stat=stat)
+    work%noise = noise
+    work%n = n
+    work%n_chunks = (n_freq + lanes - 1)/lanes
+    work%first = first
+    n_items = int(work%n_chunks, long)*count
+    threads = threads_for(number_flops*n*n_freq*count, n_items, serial_flops_lanes)
+    allocate (work%counters(lanes, n), space(threads), stat=stat)
     do t = 1, threads
       if (stat == 0) allocate (space(t)%low(lanes, n), space(t)%e(lanes, 2, n), space(t)%scale(2, n*lanes), stat=stat)
     end do
@@ -117,28 +128,33 @@ contains
       info = info_no_memory
       return
     end if
-    counters = reshape(spread(entry_counters(noise, transposed, size(h, 1), size(h, 2)), 2, lanes) &
-                       + spread([(line_counter(t), t=1, lanes)], 1, n), [lanes, n])
-    from => real_lines(h)
-    to => real_lines(polluted)
-    peak = spectrum_peak(noise, kernels, from)
-    t = 1
-    !$omp parallel num_threads(threads) if(threads > 1) default(none) private(c, r, n_lines, host) firstprivate(t) &
-    !$omp shared(noise, kernels, n, n_freq, n_chunks, n_items, first, counters, space, from, to, peak)
-    !$ t = omp_get_thread_num() + 1
-    call hold_traps(host)
-    !$omp do schedule(static)
-    do item = 0, n_items - 1
-      r = int(item/n_chunks)
-      c = int(mod(item, int(n_chunks, int64)))*lanes + 1
-      n_lines = min(lanes, n_freq - c + 1)
-      call pollute_lines(noise, kernels, n, n_lines, c, int(first, int64) + r, counters, peak, &
-                         from(:, :, c:c + n_lines - 1), space(t), to(:, :, r*n_freq + c:r*n_freq + c + n_lines - 1))
-    end do
-    !$omp end do
-    call release_traps(host)
-    !$omp end parallel
+    work%space => space
+    work%counters = reshape(spread(entry_counters(noise, transposed, size(h, 1), size(h, 2)), 2, lanes) &
+                            + spread([(line_counter(t), t=1, lanes)], 1, n), [lanes, n])
+    work%from => real_lines(h)
+    work%to => real_lines(polluted)
+    work%peak = spectrum_peak(noise, work%kernels, work%from)
+    call share(work, n_items, threads, even=.true.)
   end subroutine pollute
+
+  !> Items from first to last.
+  subroutine pollute_items(self, first, last, thread)
+    class(pollution), intent(in) :: self
+    integer(long), intent(in) :: first, last
+    integer, intent(in) :: thread
+    integer(long) :: item
+    integer :: n_freq, r, line, n_lines
+
+    n_freq = size(self%from, 3)
+    do item = first - 1, last - 1
+      r = int(item/self%n_chunks)
+      line = int(mod(item, int(self%n_chunks, long)))*lanes + 1
+      n_lines = min(lanes, n_freq - line + 1)
+      call pollute_lines(self%noise, self%kernels, self%n, n_lines, line, self%first + r, self%counters, self%peak, &
+                         self%from(:, :, line:line + n_lines - 1), self%space(thread), &
+                         self%to(:, :, r*n_freq + line:r*n_freq + line + n_lines - 1))
+    end do
+  end subroutine pollute_items
 
   !> The lines of one block in one realisation. Numbers lie in lanes one after the other, over lines.
   !> counters   those of lines 1 .. lanes, in this order

@@ -1,31 +1,30 @@
 !> A sweep: independent frequency lines, shared among threads, each with its own status and condition number.
 !>
 !> A physics module says what one line is (`line_operation`) and where its result goes; everything that is the same for
-!> all of them is here, once: workspace (allocated before the loop, one piece a thread), threads, NaN in bad lines, the
-!> count of bad lines. It may also say how a block of lines is done side by side (`line_block`); lines of a block that
-!> are in doubt are done again one by one, so that both ways give the same codes.
+!> all of them is here, once: workspace (allocated before the loop, one piece a thread), NaN in bad lines, the count of
+!> bad lines. It may also say how a block of lines is done side by side (`line_block`); lines of a block that are in doubt
+!> are done again one by one, so that both ways give the same codes.
+!>
+!> A line declares its workspace by taking it: `line` is called once for no line in a `line_space` that only counts, and
+!> the workspace is as large as what was taken.
 !>
 !> In memory of the caller nothing is allocated and no thread is started: lines are done one by one.
 module jointfrf_sweep
   use, intrinsic :: iso_c_binding, only: c_intptr_t, c_loc
-  !$ use omp_lib, only: omp_get_max_threads, omp_in_parallel
-  use jointfrf_blas_threads, only: blas_takes_threads, hold_blas_threads, release_blas_threads
+  !$ use omp_lib, only: omp_in_parallel
+  use jointfrf_blas_threads, only: hold_blas_threads, release_blas_threads
   use jointfrf_caller_memory, only: caller_memory, take_memory
   use jointfrf_engine, only: find_kernels
   use jointfrf_kinds, only: blas_ip, dp, ip, long
-  use jointfrf_lanes, only: in_doubt, lane_kernels, lanes
+  use jointfrf_lanes, only: in_doubt, lane_kernels, lanes, to_register
   use jointfrf_line_layout, only: store_nan
   use jointfrf_lookahead, only: add_range, lookahead, most_ranges
+  use jointfrf_sharing, only: serial_flops, serial_flops_lanes, share, shared_work, threads_for
   use jointfrf_status, only: info_good, info_no_memory, line_good
-  use jointfrf_traps, only: hold_traps, host_state, release_traps
   implicit none
   private
-  public :: line_operation, line_space, run_sweep, threads_for, worth_a_plan, area
+  public :: line_operation, line_space, run_sweep, worth_a_plan
 
-  !> Below this many floating-point operations a sweep costs less than waking the threads (about 100 microseconds).
-  real(dp), parameter :: serial_flops = 2.0e5_dp
-  !> Lanes do about ten times as many in that time.
-  real(dp), parameter, public :: serial_flops_lanes = 2.0e6_dp
   !> Most blocks that a thread takes at a time, and work enough to take fewer. Pivot rows are remembered within them only,
   !> so that results do not depend on the number of threads.
   integer, parameter :: most_blocks = 8
@@ -44,19 +43,29 @@ module jointfrf_sweep
     integer(blas_ip), allocatable :: pivot(:)
   end type own_memory
 
-  !> The workspace of one thread, handed out line by line.
+  !> Numbers of a workspace: complex, real, integers.
+  type :: extent
+    integer(long) :: z = 0, r = 0, pivot = 0
+  end type extent
+
+  !> The workspace of one thread, handed out line by line. A new one has no memory: it counts what is taken, so that
+  !> `set_up` can provide it.
   type :: line_space
+    logical :: only_counts = .true.          !< what is taken is null
+    type(extent) :: most                     !< the most that was taken at a time
+    integer(long) :: used = 0                !< complex numbers taken
     complex(dp), pointer, contiguous :: z(:) => null()
     real(dp), pointer, contiguous :: r(:) => null()
     integer(blas_ip), pointer, contiguous :: pivot(:) => null()
-    integer(long) :: used = 0
     real(dp), pointer, contiguous :: x(:, :, :) => null()   !< elements of a block, shape (lanes, 2, n_element)
     integer, allocatable :: hint(:)          !< pivot rows of the block before
     type(lookahead) :: ahead                 !< memory of the next block
     type(own_memory) :: own                  !< where the others lie, unless in the caller's memory
   contains
-    procedure :: set_up
     procedure :: matrix
+    procedure :: reals
+    procedure :: pivots
+    procedure :: set_up
   end type line_space
 
   !> An array of lines in the caller's memory.
@@ -66,9 +75,6 @@ module jointfrf_sweep
 
   !> What is done with one line. An extension holds pointers to the caller's arrays.
   type, abstract :: line_operation
-    integer(long) :: n_complex = 0 !< complex workspace of one line
-    integer(long) :: n_real = 0    !< real workspace of one line
-    integer(long) :: n_pivot = 0   !< integer workspace of one line
     real(dp) :: flops = 0.0_dp     !< estimated work of one line
     integer :: n_element = 0       !< elements that a block takes, see jointfrf_lanes; 0: no block form
     integer :: n_hint = 0          !< pivot rows that a block remembers
@@ -83,8 +89,25 @@ module jointfrf_sweep
     procedure :: reads
   end type line_operation
 
+  !> The lines of an operation as work to be shared: an item is a share of lines.
+  type, extends(shared_work) :: sweep_work
+    class(line_operation), pointer :: operation => null()
+    type(lane_kernels) :: kernels
+    logical :: blocks = .false.              !< whether lines are done side by side
+    logical :: far = .false.                 !< whether the sweep is too large for the caches
+    integer :: lines = 1                     !< of a share
+    type(line_space), pointer, contiguous :: space(:) => null()
+    integer(ip), pointer, contiguous :: line_info(:) => null()
+    real(dp), pointer, contiguous :: rcond(:) => null()
+  contains
+    procedure :: do_items => do_shares
+  end type sweep_work
+
   abstract interface
     !> Compute line i. `rcond` is the smallest reciprocal condition number (1-norm) of the matrices inverted.
+    !>
+    !> First of all the line takes from the space whatever it may need, then it returns if the space only counts: there
+    !> is no line i then, and all it has taken is null.
     subroutine line_routine(self, i, space, line_info, rcond)
       import :: line_operation, line_space, dp, ip
       class(line_operation), intent(in) :: self
@@ -148,36 +171,63 @@ contains
     end associate
   end subroutine no_block
 
-  !> Numbers in an n by m matrix.
-  pure function area(n, m) result(numbers)
-    integer, intent(in) :: n, m
-    integer(long) :: numbers
-
-    numbers = int(n, long)*m
-  end function area
-
-  !> Memory of its own, of these sizes.
-  subroutine set_up(self, n_complex, n_real, n_pivot, stat)
-    class(line_space), target, intent(inout) :: self
-    integer(long), intent(in) :: n_complex, n_real, n_pivot
-    integer, intent(out) :: stat
-
-    allocate (self%own%z(n_complex), self%own%r(n_real), self%own%pivot(n_pivot), stat=stat)
-    if (stat /= 0) return
-    self%z => self%own%z
-    self%r => self%own%r
-    self%pivot => self%own%pivot
-  end subroutine set_up
-
   !> The next n by m matrix of the workspace, valid until the line ends.
   function matrix(self, n, m) result(piece)
     class(line_space), target, intent(inout) :: self
     integer, intent(in) :: n, m
     complex(dp), pointer, contiguous :: piece(:, :)
+    integer(long) :: before
 
-    piece(1:n, 1:m) => self%z(self%used + 1:self%used + area(n, m))
-    self%used = self%used + area(n, m)
+    before = self%used
+    self%used = before + int(n, long)*m
+    self%most%z = max(self%most%z, self%used)
+    if (self%only_counts) then
+      piece => null()
+    else
+      piece(1:n, 1:m) => self%z(before + 1:self%used)
+    end if
   end function matrix
+
+  !> n real numbers of the workspace, always the same.
+  function reals(self, n) result(piece)
+    class(line_space), target, intent(inout) :: self
+    integer, intent(in) :: n
+    real(dp), pointer, contiguous :: piece(:)
+
+    self%most%r = max(self%most%r, int(n, long))
+    if (self%only_counts) then
+      piece => null()
+    else
+      piece => self%r(:n)
+    end if
+  end function reals
+
+  !> n pivot rows of the workspace, always the same.
+  function pivots(self, n) result(piece)
+    class(line_space), target, intent(inout) :: self
+    integer, intent(in) :: n
+    integer(blas_ip), pointer, contiguous :: piece(:)
+
+    self%most%pivot = max(self%most%pivot, int(n, long))
+    if (self%only_counts) then
+      piece => null()
+    else
+      piece => self%pivot(:n)
+    end if
+  end function pivots
+
+  !> Memory of its own for the most that was taken.
+  subroutine set_up(self, stat)
+    class(line_space), target, intent(inout) :: self
+    integer, intent(out) :: stat
+
+    allocate (self%own%z(self%most%z), self%own%r(self%most%r), self%own%pivot(self%most%pivot), stat=stat)
+    if (stat /= 0) return
+    self%z => self%own%z
+    self%r => self%own%r
+    self%pivot => self%own%pivot
+    self%only_counts = .false.
+  end subroutine set_up
 
   !> Whether there are enough lines to plan how they are computed side by side, in memory that is allocated.
   pure function worth_a_plan(n_freq, memory) result(worth)
@@ -210,6 +260,17 @@ contains
     end if
   end subroutine run_sweep
 
+  !> What a line of an operation takes, counted by a space without memory.
+  subroutine count_workspace(operation, space)
+    class(line_operation), intent(in) :: operation
+    type(line_space), target, intent(inout) :: space
+    integer(ip) :: no_info
+    real(dp) :: no_rcond
+
+    call operation%line(0, space, no_info, no_rcond)
+  end subroutine count_workspace
+
+  !> Lines one by one in memory of the caller. As LAPACK does, the lengths that were needed are left at the beginning.
   subroutine run_in_memory(operation, memory, line_info, rcond, info)
     class(line_operation), intent(in) :: operation
     type(caller_memory), intent(in) :: memory
@@ -217,74 +278,64 @@ contains
     real(dp), intent(inout) :: rcond(:)
     integer(ip), intent(out) :: info
     type(line_space), target :: space
+    type(caller_memory) :: lengths
     logical :: ready
     integer :: i
 
-    call take_memory(memory, operation%n_complex, operation%n_real, operation%n_pivot, space%z, space%r, space%pivot, &
-                     ready, info)
+    call count_workspace(operation, space)
+    call take_memory(memory, space%most%z, space%most%r, space%most%pivot, space%z, space%r, space%pivot, ready, info)
     if (.not. ready) return
+    space%only_counts = .false.
+    if (size(line_info) > 0) space%most = extent()
     call hold_blas_threads()       ! threads of the BLAS allocate, and their rounding differs
     do i = 1, size(line_info)
       call run_line(operation, i, space, line_info(i), rcond(i))
     end do
     call release_blas_threads()
+    lengths = memory
+    lengths%query = .true.
+    call take_memory(lengths, space%most%z, space%most%r, space%most%pivot, space%z, space%r, space%pivot, ready, info)
     info = count(line_info /= line_good, kind=ip)
   end subroutine run_in_memory
 
   !> Lines in blocks where the engine can, shared among threads.
   subroutine run_shared(operation, n_freq, line_info, rcond, info)
-    class(line_operation), intent(in) :: operation
+    class(line_operation), target, intent(in) :: operation
     integer(ip), intent(in) :: n_freq
-    integer(ip), intent(out) :: line_info(n_freq)
-    real(dp), intent(out) :: rcond(n_freq)
+    integer(ip), target, intent(out) :: line_info(n_freq)
+    real(dp), target, intent(out) :: rcond(n_freq)
     integer(ip), intent(out) :: info
     type(line_space), allocatable, target :: space(:)
-    type(lane_kernels) :: kernels
-    integer :: threads, share, n_shares, t, stat
-    logical :: hold, blocks, far
+    type(sweep_work) :: work
+    integer(long) :: n_shares
+    integer :: threads, stat
+    logical :: hold
 
-    call find_kernels(kernels, blocks, info)
+    call find_kernels(work%kernels, work%blocks, info)
     if (info /= info_good) return
-    blocks = blocks .and. operation%n_element > 0 .and. n_freq >= fewest_lines
-    share = 1
-    if (blocks) share = lines_of_share(operation)
-    n_shares = (int(n_freq) + share - 1)/share
-    threads = threads_for(operation%flops*n_freq, n_shares, merge(serial_flops_lanes, serial_flops, blocks))
-    far = sum(operation%streams(:operation%n_stream)%line_bytes)*n_freq > near_bytes
-    call prepare(operation, blocks, threads, space, stat)
+    work%operation => operation
+    work%blocks = work%blocks .and. operation%n_element > 0 .and. n_freq >= fewest_lines
+    if (work%blocks) work%lines = lines_of_share(operation)
+    n_shares = (n_freq - 1)/work%lines + 1
+    threads = threads_for(operation%flops*n_freq, n_shares, merge(serial_flops_lanes, serial_flops, work%blocks))
+    work%far = sum(operation%streams(:operation%n_stream)%line_bytes)*n_freq > near_bytes
+    call prepare(operation, work%blocks, threads, space, stat)
     if (stat /= 0) then
       info = info_no_memory
       return
     end if
+    work%space => space
+    work%line_info => line_info
+    work%rcond => rcond
 
     ! Threads of the BLAS serve a single line only. Over several they would get in the way, and their rounding differs.
     hold = .false.
     !$ hold = omp_in_parallel()
     !$ if (n_freq > 1) hold = .true.
     if (hold) call hold_blas_threads()
-    if (threads == 1) then
-      call run_shares(operation, kernels, blocks, far, share, 1, n_shares, space(1), line_info, rcond)
-    else
-      !$omp parallel do num_threads(threads) schedule(static) default(none) &
-      !$omp shared(operation, kernels, blocks, far, share, n_shares, threads, space, line_info, rcond)
-      do t = 1, threads
-        call run_shares(operation, kernels, blocks, far, share, first_of(t), first_of(t + 1) - 1, space(t), line_info, &
-                        rcond)
-      end do
-      !$omp end parallel do
-    end if
+    call share(work, n_shares, threads, even=.true.)
     if (hold) call release_blas_threads()
     info = count(line_info /= line_good, kind=ip)
-
-  contains
-
-    !> The first share of a thread.
-    pure function first_of(thread) result(first)
-      integer, intent(in) :: thread
-      integer :: first
-
-      first = int((int(thread - 1, long)*n_shares)/threads) + 1
-    end function first_of
   end subroutine run_shared
 
   !> Lines that a thread takes at a time, in blocks.
@@ -297,34 +348,27 @@ contains
     lines = operation%block_lines*max(1, min(most_blocks*lanes/operation%block_lines, ceiling(chunk_flops/flops)))
   end function lines_of_share
 
-  !> The shares of one thread, from first to last.
-  !> blocks   whether lines are done side by side
-  !> far      whether the sweep is too large for the caches
-  !> share    lines of a share
-  subroutine run_shares(operation, kernels, blocks, far, share, first, last, space, line_info, rcond)
-    class(line_operation), intent(in) :: operation
-    type(lane_kernels), intent(in) :: kernels
-    logical, intent(in) :: blocks, far
-    integer, intent(in) :: share, first, last
-    type(line_space), target, intent(inout) :: space
-    integer(ip), intent(inout) :: line_info(:)
-    real(dp), intent(inout) :: rcond(:)
-    type(host_state) :: host
-    integer :: s, i
+  !> The shares of lines from first to last.
+  subroutine do_shares(self, first, last, thread)
+    class(sweep_work), intent(in) :: self
+    integer(long), intent(in) :: first, last
+    integer, intent(in) :: thread
+    integer(long) :: s
+    integer :: i, first_line, last_line
 
-    call hold_traps(host)
     do s = first, last
-      if (blocks) then
-        call run_blocks(operation, kernels, (s - 1)*share + 1, min(s*share, size(line_info)), far, space, line_info, &
-                        rcond)
+      first_line = int((s - 1)*self%lines) + 1
+      last_line = int(min(s*self%lines, size(self%line_info, kind=long)))
+      if (self%blocks) then
+        call run_blocks(self%operation, self%kernels, first_line, last_line, self%far, self%space(thread), &
+                        self%line_info, self%rcond)
       else
-        do i = (s - 1)*share + 1, min(s*share, size(line_info))
-          call run_line(operation, i, space, line_info(i), rcond(i))
+        do i = first_line, last_line
+          call run_line(self%operation, i, self%space(thread), self%line_info(i), self%rcond(i))
         end do
       end if
     end do
-    call release_traps(host)
-  end subroutine run_shares
+  end subroutine do_shares
 
   !> Workspace, one piece a thread.
   subroutine prepare(operation, blocks, threads, space, stat)
@@ -336,25 +380,26 @@ contains
     integer :: t
 
     allocate (space(threads), stat=stat)
+    if (stat /= 0) return
+    call count_workspace(operation, space(1))
     do t = 1, threads
-      if (stat == 0) call space(t)%set_up(operation%n_complex, operation%n_real, operation%n_pivot, stat)
+      space(t)%most = space(1)%most
+      if (stat == 0) call space(t)%set_up(stat)
       if (stat == 0 .and. blocks) call place_elements(operation, space(t), stat)
     end do
   end subroutine prepare
 
-  !> Elements begin at a multiple of their own length, so that no register is read across two cache lines.
+  !> Elements begin where a register does.
   subroutine place_elements(operation, space, stat)
     class(line_operation), intent(in) :: operation
     type(line_space), target, intent(inout) :: space
     integer, intent(out) :: stat
-    integer(c_intptr_t) :: address
     integer :: skip, n
 
     n = lanes*2*operation%n_element
     allocate (space%own%x(n + lanes), space%hint(operation%n_hint), stat=stat)
     if (stat /= 0) return
-    address = transfer(c_loc(space%own%x), address)/8
-    skip = int(modulo(-address, int(lanes, c_intptr_t)))
+    skip = to_register(c_loc(space%own%x))
     space%x(1:lanes, 1:2, 1:operation%n_element) => space%own%x(skip + 1:skip + n)
   end subroutine place_elements
 
@@ -396,16 +441,4 @@ contains
       call store_nan(operation%result(:, :, i))
     end if
   end subroutine run_line
-
-  !> One thread for little work, inside somebody else's parallel region, or where the BLAS takes one only; else what
-  !> OpenMP would take.
-  function threads_for(flops, n_shares, serial) result(threads)
-    real(dp), intent(in) :: flops, serial
-    integer, intent(in) :: n_shares
-    integer :: threads
-
-    threads = 1
-    if (flops < serial .or. n_shares < 2) return
-    !$ if (.not. omp_in_parallel() .and. blas_takes_threads()) threads = min(omp_get_max_threads(), n_shares)
-  end function threads_for
 end module jointfrf_sweep

@@ -113,8 +113,9 @@ static void too_small(const problem *p, outcome *o, jf_int lwork, jf_int liwork)
     }
 }
 
-/* In memory of exactly these lengths: all lines at once with every engine chosen, and one by one. */
-static void compare(const problem *p, const outcome *expected, outcome *o, jf_int lwork, jf_int liwork)
+/* In memory of exactly these lengths: all lines at once with every engine chosen, and one by one. What the lines took is
+   left in the first numbers: these lengths, where every line is computed. */
+static void compare(const problem *p, const outcome *expected, outcome *o, jf_int lwork, jf_int liwork, int computed)
 {
     guarded g = new_memory(lwork, liwork, (size_t)lwork, (size_t)liwork);
     jf_int engine, info, bad = 0, line_info;
@@ -127,6 +128,8 @@ static void compare(const problem *p, const outcome *expected, outcome *o, jf_in
         clear(o);
         call_into(p, &g.space, o);
         check(same(o, expected), "all lines at once: the bits of LAPACK");
+        if (computed)
+            check(g.space.work[0] == (double)lwork && g.space.iwork[0] == liwork, "the lines take what was declared");
     }
     clear(o);
     for (line = 0; line < p->n_freq; line++) {
@@ -191,7 +194,7 @@ static void one_problem(int routine, char trans, int n, int variant, const char 
     }
     check(good && expected.info >= 0 && guards_stay(&expected), "the lines that are not spoiled are good");
     query(&p, &o, &lwork, &liwork);
-    compare(&p, &expected, &o, lwork, liwork);
+    compare(&p, &expected, &o, lwork, liwork, n > 0);
     too_small(&p, &o, lwork, liwork);
     if (n == 3)
         wrong_arguments(&p, &expected, &o, lwork, liwork);

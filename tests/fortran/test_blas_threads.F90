@@ -133,11 +133,13 @@ contains
     integer(blas_ip), parameter :: n = 1
     complex(dp) :: one(1, 1), square(1, 1)
 
+    line_info = 0
+    rcond = 0.0_dp
+    if (space%only_counts) return
     one = 1.0_dp
     square = 0.0_dp
     call zgemm('N', 'N', n, n, n, one(1, 1), one, n, one, n, square(1, 1), square, n, 1_c_size_t, 1_c_size_t)
     self%threads(i) = get_threads()
-    line_info = 0
     rcond = real(square(1, 1), dp)
     if (space%used /= 0) line_info = 1
   end subroutine look

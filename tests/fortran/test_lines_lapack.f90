@@ -1,12 +1,14 @@
 !> The linear algebra of one line against quadruple precision.
 program test_lines_lapack
   use testing, only: check, check_close, dp, finish, infinity, inverse, ip, norm_1, random_lines, random_regular, seed
-  use jointfrf_lines_lapack, only: inverse_work, invert_line, one_norm, product_line, solve_line
-  use jointfrf_sweep, only: area, line_space
+  use jointfrf_lines_lapack, only: invert_line, one_norm, product_line, room_to_invert, room_to_solve, solve_line
+  use jointfrf_kinds, only: long
+  use jointfrf_sweep, only: line_space
   implicit none
   real(dp), parameter :: tolerance = 1.0e-13_dp
   integer, parameter :: sizes(6) = [1, 2, 3, 7, 33, 70]
-  type(line_space), target :: space
+  type(line_space), allocatable, target :: space
+  integer(long) :: declared(3)
   integer :: i
 
   call seed(2)
@@ -20,15 +22,30 @@ program test_lines_lapack
 
 contains
 
+  !> Workspace for one matrix of 3 numbers, and for solution and inverse of order n.
   subroutine make_space(n)
     integer, intent(in) :: n
+    complex(dp), pointer, contiguous :: three(:, :)
     integer :: stat
 
-    if (allocated(space%own%z)) deallocate (space%own%z, space%own%r, space%own%pivot)
-    call space%set_up(3 + inverse_work(n), area(2, n), area(n, 1), stat)
+    if (allocated(space)) deallocate (space)
+    allocate (space)
+    three => space%matrix(3, 1)
+    call room_to_solve(n, space)
+    call room_to_invert(n, space)
+    call check(space%used == 3 .and. .not. associated(three), 'counted, and given back')
+    call space%set_up(stat)
     call check(stat == 0, 'workspace')
-    space%used = 3
+    declared = [space%most%z, space%most%r, space%most%pivot]
+    space%most%z = 0
+    space%most%r = 0
+    space%most%pivot = 0
   end subroutine make_space
+
+  !> Solution and inverse have taken what was declared for them.
+  subroutine check_taken()
+    call check(all(declared == [space%most%z, space%most%r, space%most%pivot]), 'what was declared, no more, no less')
+  end subroutine check_taken
 
   subroutine solution_and_inverse(n)
     integer, intent(in) :: n
@@ -55,6 +72,7 @@ contains
     call check(info == 0 .and. space%used == 3, 'inverse: good, workspace given back')
     call check_close(lu, expected, tolerance, 'inverse')
     call check_close(rcond, exact, 1.0e-10_dp, 'inverse: rcond')
+    call check_taken()
     norm = one_norm(a(:, :, 1))
     true_norm = maxval(sum(abs(a(:, :, 1)), dim=1))
     call check_close(norm, norm_1(a(:, :, 1)), tolerance, 'one_norm')

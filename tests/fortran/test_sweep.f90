@@ -1,6 +1,6 @@
 !> A sweep visits every line once, on one thread or several, turns the bad ones into NaN and counts them.
 module probes
-  use jointfrf_kinds, only: dp, ip
+  use jointfrf_kinds, only: blas_ip, dp, ip
   use jointfrf_lanes, only: lane_kernels, lanes
   use jointfrf_sweep, only: line_operation, line_space
   !$ use omp_lib, only: omp_get_thread_num
@@ -58,17 +58,30 @@ contains
     integer(ip), intent(out) :: line_info
     real(dp), intent(out) :: rcond
     complex(dp), pointer, contiguous :: a(:, :), b(:, :)
+    real(dp), pointer, contiguous :: r(:)
+    integer(blas_ip), pointer, contiguous :: pivot(:)
+    logical :: fresh
 
-    if (space%used /= 0) self%spoilt(i) = 1
+    fresh = space%used == 0
     a => space%matrix(2, 3)
     b => space%matrix(3, 2)
+    r => space%reals(5)
+    pivot => space%pivots(7)
+    line_info = 1
+    rcond = 0.0_dp
+    if (space%only_counts) then
+      if (i /= 0 .or. associated(a) .or. associated(r) .or. associated(pivot)) error stop 'there is no memory yet'
+      return
+    end if
+    if (.not. fresh) self%spoilt(i) = 1
     a = i
     b = -i
-    space%r = i
-    space%pivot = i
+    r = i
+    pivot = i
     if (any(nint(real(a)) /= i) .or. any(nint(real(b)) /= -i)) self%spoilt(i) = 2
     if (any(shape(a) /= [2, 3]) .or. any(shape(b) /= [3, 2]) .or. space%used /= 12) self%spoilt(i) = 3
-    if (size(space%r) /= self%n_real .or. size(space%pivot) /= self%n_pivot) self%spoilt(i) = 4
+    if (size(r) /= 5 .or. size(pivot) /= 7) self%spoilt(i) = 4
+    if (size(space%z) /= 12 .or. size(space%r) /= 5 .or. size(space%pivot) /= 7) self%spoilt(i) = 4
     self%visits(i) = self%visits(i) + 1
     self%result(:, :, i) = i
     !$ self%thread(i) = omp_get_thread_num()
@@ -237,9 +250,6 @@ contains
     operation%result => results(:, :, :lines)
     operation%thread => thread
     operation%spoilt => spoilt
-    operation%n_complex = 12
-    operation%n_real = 5
-    operation%n_pivot = 7
     operation%flops = flops
     visits = 0
     results = -1

@@ -1,6 +1,14 @@
-! What every instruction set compiles: one module body. Loops over lanes (index l) are outermost or alone and have no
-! branches; inner loops step by a fixed number of elements and test at the bottom. The compiler then turns each
-! statement into one instruction for all lanes.
+!> The lane kernels: linear algebra, condensation and superposition of modes, for eight lines side by side.
+!>
+!> One source for all instruction sets: the build sets JF_MODULE, the name of the module, and the instructions that the
+!> compiler may use. Loops over lanes (index l) are outermost or alone and have no branches; inner loops step by a fixed
+!> number of elements and test at the bottom. The compiler then turns each statement into one instruction for all lanes.
+module JF_MODULE
+  use, intrinsic :: iso_fortran_env, only: int64
+  use jointfrf_elimination_plan, only: elimination_plan
+  use jointfrf_kinds, only: dp, ip
+  use jointfrf_lanes, only: doubtful, in_doubt, lane_kernels, lanes, largest_in_lanes, padded
+  use jointfrf_lookahead, only: advance, lookahead, spread_over
   implicit none
   private
   public :: set_kernels
@@ -50,10 +58,11 @@ contains
 
 #include "layout.inc"
 #include "product.inc"
-#include "elimination.inc"
+#include "panel_elimination.inc"
 #include "inverse.inc"
 #include "small_inverse.inc"
 #include "solution.inc"
-#include "lines_of_two.inc"
-#include "chain.inc"
-#include "superposition.inc"
+#include "closed_forms.inc"
+#include "condensation.inc"
+#include "modal_superposition.inc"
+end module JF_MODULE
