@@ -72,7 +72,7 @@ def _parse(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument(
         "--compare", type=Path, metavar="OLD.json", help="print what became slower; status 1 if anything did"
     )
-    parser.add_argument("--readme", action="store_true", help="put the table into README.md")
+    parser.add_argument("--document", action="store_true", help="put the table into docs/performance.md")
     parser.add_argument(
         "--from", type=Path, dest="source", metavar="FILE.json", help="use these results, measure nothing"
     )
@@ -104,9 +104,9 @@ def main(arguments: list[str] | None = None) -> int:
 
     draw(run, options.output / "speed.png")
     print(f"wrote {options.output / 'speed.png'}")
-    if options.readme:
-        report.write_readme(run, ROOT / "README.md")
-        print("wrote README.md")
+    if options.document:
+        report.write_document(run, ROOT / "docs" / "performance.md")
+        print("wrote docs/performance.md")
     if old is None:
         return 0
     text, worse = report.comparison(old, run)

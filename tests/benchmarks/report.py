@@ -1,4 +1,4 @@
-"""What is printed, and the table of the README."""
+"""What is printed, and the table of docs/performance.md."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .operations import OPERATIONS
 from .results import LOOP, NUMPY, OURS, OUT, REFERENCE, Record, Run, faster, slower
 
 _BEGIN, _END = "<!-- speed: begin -->", "<!-- speed: end -->"
-_README_ORDERS = (1, 2, 6, 12, 24, 48)
+_DOCUMENT_ORDERS = (1, 2, 6, 12, 24, 48)
 _KINDS = {"frf": "FRFs", "random": "random matrices"}
 
 
@@ -122,12 +122,12 @@ def _change(old: Record, new: Record) -> str:
             f"{_ns(old.median)} -> {_ns(new.median)} ns ({100 * (new.median / old.median - 1):+.0f} %)")  # fmt: skip
 
 
-def readme_table(run: Run) -> str:
-    """Return the table of the README."""
+def document_table(run: Run) -> str:
+    """Return the table of docs/performance.md."""
     machine, one = run.machine, run.limits[0]
     compiler = f"{machine['fortran'].partition(' (')[0]} {machine['fortran'].split()[-1]}"
     found = {r.n for r in run.records if not r.streaming and r.data == "frf" and r.candidate == OURS}
-    orders = [n for n in _README_ORDERS if n in found]
+    orders = [n for n in _DOCUMENT_ORDERS if n in found]
     text = [
         f"{machine['processor']}, one thread, {compiler}, engine {machine['engine']}; {one['best_peak'] / 1e9:.0f} "
         f"GFlop/s peak, memory {one['bandwidth'][-1][1] / 1e9:.0f} GB/s.",
@@ -156,10 +156,10 @@ def readme_table(run: Run) -> str:
     return "\n".join(text)
 
 
-def write_readme(run: Run, path: Path) -> None:
-    """Put the table between the two markers of the README."""
+def write_document(run: Run, path: Path) -> None:
+    """Put the table between the two markers of a document."""
     before, begin, rest = path.read_text().partition(_BEGIN)
     _, end, after = rest.partition(_END)
     if not (begin and end):
         raise ValueError(f"{path} has no markers {_BEGIN} and {_END}")
-    path.write_text(f"{before}{_BEGIN}\n{readme_table(run)}\n{_END}{after}")
+    path.write_text(f"{before}{_BEGIN}\n{document_table(run)}\n{_END}{after}")

@@ -1,4 +1,4 @@
-"""The benchmark command: it runs, finds wrong results, compares, and fills the README."""
+"""The benchmark command: it runs, finds wrong results, compares, and fills the document."""
 
 import json
 import math
@@ -101,19 +101,19 @@ def test_what_became_slower_is_told(result, benchmarks, tmp_path):
 
 
 @pytest.mark.builds
-def test_readme_is_rewritten_between_the_markers_only(result, benchmarks, tmp_path):
-    readme = tmp_path / "README.md"
-    readme.write_text("before\n<!-- speed: begin -->\nold\n<!-- speed: end -->\nafter\n")
+def test_document_is_rewritten_between_the_markers_only(result, benchmarks, tmp_path):
+    document = tmp_path / "README.md"
+    document.write_text("before\n<!-- speed: begin -->\nold\n<!-- speed: end -->\nafter\n")
     run = benchmarks.results.load(result[0] / "speed.json")
-    benchmarks.report.write_readme(run, readme)
-    text = readme.read_text()
+    benchmarks.report.write_document(run, document)
+    text = document.read_text()
     assert text.startswith("before\n<!-- speed: begin -->\n")
     assert text.endswith("\n<!-- speed: end -->\nafter\n")
     assert "| `invert` | " in text
     assert "old" not in text
-    readme.write_text("no markers")
+    document.write_text("no markers")
     with pytest.raises(ValueError, match="markers"):
-        benchmarks.report.write_readme(run, readme)
+        benchmarks.report.write_document(run, document)
 
 
 def test_wrong_results_are_found(benchmarks):

@@ -1,0 +1,96 @@
+"""README and docs are true: their Python runs, their commands give the output shown, and links lead somewhere."""
+
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+DOCUMENTS = {
+    str(path.relative_to(ROOT)): path.read_text(encoding="utf-8")
+    for path in sorted(
+        [*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("cases/*/README.md"), ROOT / "fortran/README.md"]
+    )
+}
+README = DOCUMENTS["README.md"]
+
+
+def blocks(language: str, text: str = README) -> list[str]:
+    return re.findall(rf"```{language}\n(.*?)```", text, re.DOTALL)
+
+
+def test_python_of_the_readme_prints_what_it_shows(capsys):
+    (example,) = blocks("python")
+    expected, _ = blocks("text")
+    exec(example, {})
+    agree(capsys.readouterr().out, expected)
+
+
+def test_python_example_of_solid_bodies(capsys):
+    (example,) = blocks("python", DOCUMENTS["docs/python.md"])
+    exec(example, {})
+    printed = capsys.readouterr().out
+    found = {line.split()[0]: float(line.split()[1]) for line in printed.splitlines() if line[:2] in ("k_", "c_")}
+    assert found["k_x"] == pytest.approx(1e6, rel=0.02)
+    assert found["k_theta_x"] == pytest.approx(1e3, rel=0.05)
+    assert len(found) == 12
+
+
+def words(text: str) -> list[float | str]:
+    """Words of a text, numbers as numbers; rules of dashes left out."""
+    found: list[float | str] = []
+    for word in text.split():
+        if set(word) == {"-"}:
+            continue
+        try:
+            found.append(float(word.rstrip(",:)")))
+        except ValueError:
+            found.append(word)
+    return found
+
+
+def agree(printed: str, expected: str) -> None:
+    """The same words, and numbers as far as the fit settles on any processor."""
+    assert len(words(printed)) == len(words(expected))
+    for found, said in zip(words(printed), words(expected), strict=True):
+        assert found == (pytest.approx(said, rel=0.05) if isinstance(said, float) else said)
+
+
+def test_measured_file_gives_the_output_shown(tmp_path):
+    (shown,) = (block for block in blocks("text") if "jointfrf identify" in block)
+    command, expected = re.match(r"\$ (.*?[^\\])\n(.*)", shown, re.DOTALL).groups()
+    program, subcommand, file, *options = shlex.split(command.replace("\\\n", " "))
+    assert (program, subcommand) == ("jointfrf", "identify")
+    (tmp_path / file).parent.mkdir(parents=True)
+    shutil.copy(ROOT / file, tmp_path / file)
+    arguments = [subcommand, file, *options]
+    printed = subprocess.run(
+        [sys.executable, "-m", "jointfrf", *arguments], cwd=tmp_path, capture_output=True, text=True, check=True
+    ).stdout
+    agree(printed, expected)
+
+
+def test_the_readme_fits_a_reader():
+    assert len(README.splitlines()) <= 130
+
+
+@pytest.mark.parametrize("name", DOCUMENTS)
+def test_files_that_are_named_exist(name):
+    named = set(re.findall(r"`((?:tests|cases|python|fortran|docs)/[\w./-]+)`", DOCUMENTS[name]))
+    missing = [file for file in sorted(named) if not (ROOT / file).exists()]
+    assert not missing
+
+
+@pytest.mark.parametrize("name", DOCUMENTS)
+def test_links_lead_to_files_and_headings(name):
+    for link in re.findall(r"\]\((?!https?:)([^)\s]+)\)", DOCUMENTS[name]):
+        file, _, heading = link.partition("#")
+        target = (ROOT / name).parent / file
+        assert target.exists(), link
+        if heading:
+            titles = re.findall(r"^#+ (.*)$", target.read_text(encoding="utf-8"), re.MULTILINE)
+            assert heading in [re.sub(r"[^\w -]", "", title).lower().replace(" ", "-") for title in titles], link
