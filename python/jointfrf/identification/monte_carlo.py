@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from operator import index
 from typing import Literal, NamedTuple, get_args
@@ -23,12 +23,14 @@ from jointfrf.kernel.arguments import (
 )
 from jointfrf.kernel.call import call
 from jointfrf.kernel.status import LineStatus, OnSingular, check_lines
+from jointfrf.substructuring.methods import STIFFNESS_METHODS
 
 __all__ = ["BandStatistics", "MonteCarlo", "MonteCarloMethod", "monte_carlo"]
 
 MonteCarloMethod = Literal["ismm", "inverse-substructuring", "compliance"]
 
-_LETTERS = {"ismm": "I", "inverse-substructuring": "S", "compliance": "C"}
+#: The letters of the kernel.
+_LETTERS: Mapping[MonteCarloMethod, str] = {"ismm": "I", "inverse-substructuring": "S", "compliance": "C"}
 
 
 class BandStatistics(NamedTuple):
@@ -57,7 +59,7 @@ class MonteCarlo:
     count : int
         Realisations of every line.
     good : ndarray of int32, shape (n_freq,)
-        How many of them could be identified; the others are left out.
+        How many of them could be identified; the others are excluded.
     mean : ndarray, shape (n_freq, n, n)
         Mean over the good ones, N/m (m/N for "compliance"); NaN where there is none.
     covariance : ndarray, shape (n_freq, n, n, 3)
@@ -194,7 +196,8 @@ def monte_carlo(
     noise = noise_arguments(level, kind, seed, relative_to, reciprocal, block, first, count, exact.shape[1:])
     if index(count) < 1:
         raise ValueError(f"count must be positive, not {count}")
-    if (method == "ismm") != (alpha is not None) or (method == "ismm") != (k_initial is not None):
+    needed = () if method == "compliance" else STIFFNESS_METHODS[method].model
+    if any((name in needed) != (value is not None) for name, value in (("alpha", alpha), ("k_initial", k_initial))):
         raise ValueError('method "ismm", and no other, needs alpha and k_initial')
     sweeps = {"gamma": exact}
     calculated, initial = exact, np.zeros((n_freq, n, n), np.complex128)
