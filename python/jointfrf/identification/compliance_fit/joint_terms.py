@@ -42,16 +42,6 @@ class Basis(NamedTuple):
         """Number of joint DOFs."""
         return int(self.pairs.max()) + 1
 
-    @property
-    def matrices(self) -> ComplexArray:
-        """Matrix of each parameter on each line, shape (n_parameters, n_freq, n, n)."""
-        units = np.zeros((len(self.pairs), self.n, self.n))
-        for unit, (a, b) in zip(units, self.pairs, strict=True):
-            unit[a, b] = unit[b, a] = 1
-        whole = self.factors[:, None, :, None, None] * units[:, None]
-        matrices: ComplexArray = whole.reshape(len(self.parameters), -1, self.n, self.n)
-        return matrices
-
     def on_lines(self, lines: NDArray[np.intp]) -> Basis:
         """Return the same terms on some of the lines."""
         return self._replace(factors=self.factors[:, lines])
