@@ -21,7 +21,7 @@ __all__ = ["JointFit"]
 
 @dataclass(frozen=True)
 class JointFit:
-    """Parameters of a joint, K*(w) = k + i h + i w c, and what the data say of their accuracy.
+    """Parameters of a joint, K*(w) = k + i h + i w c, and their uncertainty.
 
     Attributes
     ----------
@@ -115,7 +115,7 @@ class JointFit:
         return dict(zip(self.parameters, errors.tolist(), strict=True))
 
     def confidence_interval(self, probability: float = 0.95) -> dict[str, tuple[float, float]]:
-        """Interval that holds the true parameter with the given probability.
+        """Interval that contains the true parameter with the given probability.
 
         Parameters
         ----------

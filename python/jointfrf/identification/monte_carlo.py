@@ -34,7 +34,7 @@ _LETTERS: Mapping[MonteCarloMethod, str] = {"ismm": "I", "inverse-substructuring
 
 
 class BandStatistics(NamedTuple):
-    """What single realisations give as means over a band: their mean and standard deviation, shape (n, n) each.
+    """Mean and standard deviation of the band means of single realisations, shape (n, n) each.
 
     Attributes
     ----------
@@ -112,12 +112,12 @@ class MonteCarlo:
         Notes
         -----
         The noise of different lines is independent, so the variance of a mean over N lines is the sum of their
-        variances over N^2. No line may have lost realisations for that to hold exactly.
+        variances over N^2. It is exact where no line has lost realisations.
         """
         freq = as_frequency(freq_hz, self.good.size)
         inside = in_bands(freq, bands)
         if not inside.any() or not freq[inside].all():
-            raise ValueError(f"the band must hold lines, and none at 0 Hz: {bands}")
+            raise ValueError(f"the band must contain lines, and none at 0 Hz: {bands}")
         number = int(inside.sum())
         omega = 2 * np.pi * freq[inside, None, None]
         mean, covariance = self.mean[inside], self.covariance[inside]
@@ -178,7 +178,7 @@ def monte_carlo(
     -----
     Memory does not depend on `count`. Results do not depend on the number of threads; other engines differ by rounding.
     Noise is on gamma only, so that by D = gamma^-1 - alpha^-1, eq. (2.40), ISMM is K0 + (alpha^-1)_jk - (gamma^-1)_jk,
-    of which all but the last term is done once a line. Where noise lets gamma come near a singular matrix, K* has heavy
+    of which all but the last term is done once a line. Where noise makes gamma nearly singular, K* has heavy
     tails; mean and variance then converge slowly or not at all, and quantiles from `realisations` say more.
 
     Examples

@@ -20,6 +20,7 @@ from jointfrf.kernel.arguments import (
     as_real,
     as_square,
     check_choice,
+    check_finite_lines,
 )
 from jointfrf.substructuring.methods import STIFFNESS_METHODS, JointFrfs, StiffnessMethod, joint_stiffness
 
@@ -149,9 +150,7 @@ def as_measured(freq_hz: ArrayLike, gamma: ArrayLike) -> MeasuredFrfs:
     freq = as_frequency(freq_hz, h.shape[0])
     if freq.size == 0:
         raise ValueError("gamma has no frequency lines")
-    broken = np.flatnonzero(~np.isfinite(h).all(axis=(1, 2)))
-    if broken.size:
-        raise ValueError(f"gamma: NaN or Inf in line {broken[0]} ({freq[broken[0]]:g} Hz)")
+    check_finite_lines("gamma", h, freq)
     return MeasuredFrfs(freq, h)
 
 
