@@ -11,6 +11,16 @@ def symmetric(values, n):
     return matrix
 
 
+def term_matrices(basis):
+    """Matrix of each parameter on each line, shape (n_parameters, n_freq, n, n)."""
+    units = np.zeros((len(basis.pairs), basis.n, basis.n))
+    for unit, (a, b) in zip(units, basis.pairs, strict=True):
+        unit[a, b] = unit[b, a] = 1
+    return (basis.factors[:, None, :, None, None] * units[:, None]).reshape(
+        -1, basis.factors.shape[1], *units.shape[1:]
+    )
+
+
 def cramer_rao(gamma, k_joint, basis):
     """Covariance for unit relative noise of independent entries of gamma, when nothing is known around the joint.
 
@@ -20,7 +30,7 @@ def cramer_rao(gamma, k_joint, basis):
     inverse = np.linalg.inv(gamma)
     z_a, z_b = inverse[:, :n, :n] - k_joint, inverse[:, n:, n:] - k_joint
     upper = np.triu_indices(n)
-    p, q = len(basis.names), n * (n + 1)
+    p, q = len(basis.parameters), n * (n + 1)
     information = np.zeros((p, p))
     for i, k in enumerate(k_joint):
 
@@ -34,7 +44,7 @@ def cramer_rao(gamma, k_joint, basis):
 
         sides = np.concatenate([z_a[i][upper], z_b[i][upper]])
         size = np.sqrt(np.outer(abs(np.diagonal(k)), abs(np.diagonal(k))))
-        matrices = basis.matrices[:, i]
+        matrices = term_matrices(basis)[:, i]
         steps = np.array([1e-6 * (size / np.where(m != 0, abs(m), np.inf)).max() for m in matrices])
         moved = steps[:, None, None] * matrices
         slopes = ((model(k + moved, sides) - model(k - moved, sides)) / (2 * steps[:, None])).T

@@ -152,7 +152,7 @@ def test_dofs_of_a_bolted_joint_in_another_order(tmp_path):
         ('observed = "s-Fx"', 'observed = "s"', r"number 1: observed must be one of s-Fx, s-Fy, s-Fz, r-Fy, not 's'"),
         (
             'method = "decoupling-ss"',
-            'method = "inverse_substructuring"',
+            'method = "inverse-substructuring"',
             r"number 2: method must be one of",
         ),
         ("central_percent = 95", "central_percent = -5", r"number 1: central_percent must be a number, at least 0"),

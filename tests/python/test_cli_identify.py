@@ -36,7 +36,7 @@ def identified(tmp_path_factory):
     if not LAP.exists():
         pytest.skip("the measured files are not beside the project (JOINTFRF_TEST_DATA)")
     folder = tmp_path_factory.mktemp("out") / "deep" / "lap"
-    words = (LAP, *JOINT, "--band", "200:550", "--method", "compliance,inverse_substructuring", "--out", folder)
+    words = (LAP, *JOINT, "--band", "200:550", "--method", "compliance,inverse-substructuring", "--out", folder)
     return run(*words), folder
 
 
@@ -65,8 +65,8 @@ def test_figures_are_written_and_nothing_else(identified):
         "identification.json",
         "joint_y.png",
         "joint_theta_x.png",
-        "joint_y_inverse_substructuring.png",
-        "joint_theta_x_inverse_substructuring.png",
+        "joint_y_inverse-substructuring.png",
+        "joint_theta_x_inverse-substructuring.png",
     }
     for path in folder.glob("*.png"):
         assert path.read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"

@@ -21,7 +21,7 @@ def noisy(s, level=0.01, seed=3):
     [
         "compliance",
         "ismm",
-        "inverse_substructuring",
+        "inverse-substructuring",
         "decoupling-rr",
         "decoupling-rs",
         "decoupling-sr",
@@ -115,7 +115,7 @@ def test_a_coupled_joint(beams):
 def test_a_joint_too_stiff_to_be_seen_is_said_with_its_bound(beams):
     rigid = jf.Joint([1e12, 5e3], [0, 1.5], ["y", "theta"])
     measured = jf.pollute(beams.gamma(rigid), 0.01, seed=2)
-    with pytest.warns(jf.IdentificationWarning, match="cannot tell this DOF from a rigid one"):
+    with pytest.warns(jf.IdentificationWarning, match="cannot be distinguished from a rigid one; at least"):
         fit = jf.identify(beams.freq, measured, ["y", "theta"])
     low, high = fit.confidence_interval(0.95)["k_y"]
     assert high == np.inf
@@ -133,7 +133,7 @@ def test_points_instead_of_dofs(beams):
     low, high = fit.confidence_interval(0.999)["k_theta"]
     assert low < 5e3 < high
     same = jf.identify(
-        beams.freq, measured, ["y", "theta"], "inverse_substructuring", BANDS, transform=np.linalg.inv(points)
+        beams.freq, measured, ["y", "theta"], "inverse-substructuring", BANDS, transform=np.linalg.inv(points)
     )
     assert np.isfinite(same.stiffness).all()
 
@@ -174,10 +174,13 @@ def test_only_lines_in_the_bands_are_used(beams):
     ("change", "message"),
     [
         (dict(method="ISMM"), "method must be one of"),
+        (dict(method="inverse_substructuring"), "method must be one of .* inverse-substructuring, .* not 'inverse_sub"),
         (dict(method="ismm"), "'ismm' needs alpha and k_initial"),
-        (dict(method="decoupling-ss"), "needs h_a, h_b, dofs_j and dofs_k"),
+        (dict(method="decoupling-ss"), "needs h_a, h_b, dofs_j, dofs_k and dofs_s"),
         (dict(dofs=["y"]), "dofs must name 2 different joint DOFs"),
         (dict(dofs=["y", "y"]), "dofs must name 2 different joint DOFs"),
+        (dict(dofs=["y", ""]), "dofs must name 2 different joint DOFs"),
+        (dict(dofs=["y", "x,z"]), "without commas"),
         (dict(bands=(2000, 3000)), "holds no frequency line"),
         (dict(damping="friction"), "damping must be one of"),
         (dict(cross="all"), "cross must be one of"),

@@ -7,8 +7,9 @@ import pytest
 
 import jointfrf as jf
 from cramer_rao import cramer_rao
-from jointfrf.identification.compliance_fit.estimator import estimate, joint_basis, reciprocity_noise
-from jointfrf.identification.compliance_fit.frf_noise import uncoupled_groups
+from jointfrf.frf.noise_estimate import reciprocity_noise
+from jointfrf.identification.compliance_fit.estimator import estimate, joint_basis
+from jointfrf.identification.compliance_fit.groups import uncoupled_groups
 from six_dof_beams import DOFS, FREQ, GROUPS, JOINT, assembly, side, sides
 
 TRUTH = np.concatenate([JOINT.stiffness.diagonal(), JOINT.damping.diagonal()])
@@ -163,7 +164,7 @@ def test_any_order_by_name():
 
 def test_units_know_every_way_to_write_a_rotation():
     fit = jf.identify(
-        SHORT, assembly(freq=SHORT), ["ux", "ry", "uy", "rx", "uz", "rot_z"], "inverse_substructuring", (10, 600)
+        SHORT, assembly(freq=SHORT), ["ux", "ry", "uy", "rx", "uz", "rot_z"], "inverse-substructuring", (10, 600)
     )
     assert [fit.unit(f"c_{d}") for d in fit.dofs] == ["N s/m", "N m s/rad"] * 3
     assert fit.unit("k_ux,ry") == "N"
@@ -243,8 +244,8 @@ def test_cross_terms_between_groups_are_not_seen_and_this_is_said(gamma):
     assert len(fit.parameters) == 2 * (6 + 3 + 3)
     assert "k_x,y" not in fit.parameters
     assert "k_x,theta_y" in fit.parameters
-    told = "the FRFs between (x, theta_y, theta_z) and (y, theta_x, z) are zero: each is fitted by itself"
-    assert any(note == told + ", and cross terms between them are not seen" for note in fit.notes)
+    told = "the FRFs between (x, theta_y, theta_z) and (y, theta_x, z) are zero: each group is fitted separately"
+    assert any(note == told + ", and cross terms between them cannot be identified" for note in fit.notes)
     assert told in plain.notes
     assert fit.stiffness_matrix[0, 2] == 0
     assert np.isfinite(list(fit.std_error.values())).all()

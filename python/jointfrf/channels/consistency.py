@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from jointfrf.channels.virtual_point import VirtualPoint
-from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_lines, as_square
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_lines, as_square, check_finite_lines
 
 __all__ = ["Consistency", "DrivingPointCheck", "driving_point_check", "impact_consistency", "sensor_consistency"]
 
@@ -91,7 +91,7 @@ def sensor_consistency(h: ArrayLike, point: VirtualPoint) -> Consistency:
     Three channels less two DOFs leave one residual: it cannot say which of them is wrong.
     """
     measured = as_lines("h", h, point.modes.shape[0])
-    _check_finite("h", measured)
+    check_finite_lines("h", measured)
     weight = point.weights[:, None]
     filtered = point.modes @ (point.transform @ measured)
     residual = measured - filtered
@@ -207,7 +207,7 @@ def driving_point_check(h: ArrayLike) -> DrivingPointCheck:
     True
     """
     lines = as_square("h", h)
-    _check_finite("h", lines)
+    check_finite_lines("h", lines)
     diagonal = np.einsum("faa->fa", lines)
     across = lines.swapaxes(1, 2)
     with np.errstate(invalid="ignore"):
@@ -229,9 +229,3 @@ def _square(values: ComplexArray) -> FloatArray:
 def _power(squares: FloatArray, axis: int | tuple[int, ...]) -> FloatArray:
     power: FloatArray = squares.sum(axis=axis)
     return power
-
-
-def _check_finite(name: str, lines: ComplexArray) -> None:
-    broken = np.flatnonzero(~np.isfinite(lines).all(axis=(1, 2)))
-    if broken.size:
-        raise ValueError(f"{name}: NaN or Inf in line {broken[0]}")

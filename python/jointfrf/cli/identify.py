@@ -13,7 +13,7 @@ import numpy as np
 from jointfrf.channels.finite_differences import difference_error
 from jointfrf.channels.point_lines import Interface, interface
 from jointfrf.errors import ConvergenceWarning, FileContentError, IdentificationWarning
-from jointfrf.identification.compliance_fit.estimator import Cross, Damping
+from jointfrf.identification.compliance_fit.joint_terms import CrossTerms, DampingTerms
 from jointfrf.identification.identify import identify
 from jointfrf.identification.joint_fit import JointFit
 from jointfrf.io import FrfSet, read_uff
@@ -21,7 +21,7 @@ from jointfrf.io.cards import CardFormat
 
 __all__ = ["add_arguments", "run"]
 
-_METHODS = ("compliance", "inverse_substructuring")
+_METHODS = ("compliance", "inverse-substructuring")
 
 
 def _words(text: str) -> list[str]:
@@ -86,13 +86,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--damping",
-        choices=(*get_args(Damping), "auto"),
+        choices=(*get_args(DampingTerms), "auto"),
         default="auto",
         help="damping terms of K* = k (1 + i eta) + i w c (default: auto, what the data support)",
     )
     parser.add_argument(
         "--cross",
-        choices=get_args(Cross),
+        choices=get_args(CrossTerms),
         default="zero",
         help="terms between the joint DOFs: none (default), not looked at, fitted",
     )

@@ -4,32 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import stats
 
+from jointfrf.dofs import Parameter, ParameterKind
 from jointfrf.io.cards import CardFormat, CardOptions
 from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
 __all__ = ["JointFit"]
 
-_UNITS = {
-    "k": ("N/m", "N m/rad"),
-    "h": ("N/m", "N m/rad"),
-    "c": ("N s/m", "N m s/rad"),
-}
-
-
-def _is_rotation(dof: str) -> bool:
-    return dof.lower().startswith(("theta", "rx", "ry", "rz", "rot"))
-
 
 @dataclass(frozen=True)
 class JointFit:
-    """Parameters of a joint, K*(w) = k + i h + i w c, and what the data say of their accuracy.
+    """Parameters of a joint, K*(w) = k + i h + i w c, and their uncertainty.
 
     Attributes
     ----------
@@ -70,12 +62,16 @@ class JointFit:
     warnings: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
 
-    def _matrix(self, letter: str) -> FloatArray:
+    @cached_property
+    def terms(self) -> tuple[Parameter, ...]:
+        """The parameters as objects, in the order of `parameters`: kind, DOFs, unit."""
+        return tuple(Parameter.parse(name) for name in self.parameters)
+
+    def _matrix(self, kind: ParameterKind) -> FloatArray:
         matrix = np.zeros((len(self.dofs), len(self.dofs)))
-        for name, value in self.parameters.items():
-            if name[0] == letter:
-                pair = name[2:].split(",")
-                a, b = self.dofs.index(pair[0]), self.dofs.index(pair[-1])
+        for term, value in zip(self.terms, self.parameters.values(), strict=True):
+            if term.kind == kind:
+                a, b = self.dofs.index(term.row), self.dofs.index(term.column)
                 matrix[a, b] = matrix[b, a] = value
         return matrix
 
@@ -94,8 +90,8 @@ class JointFit:
         """The joint found, to be coupled, moved or reordered; DOFs in the order of `dofs`."""
         return Joint(self.stiffness_matrix, self.damping_matrix, self.dofs, structural_damping=self._matrix("h"))
 
-    def _of_each_dof(self, letter: str) -> FloatArray:
-        return np.array([self.parameters.get(f"{letter}_{dof}", 0.0) for dof in self.dofs])
+    def _of_each_dof(self, kind: ParameterKind) -> FloatArray:
+        return np.array([self.parameters.get(Parameter.of_dof(kind, dof).name, 0.0) for dof in self.dofs])
 
     @property
     def stiffness(self) -> FloatArray:
@@ -119,7 +115,7 @@ class JointFit:
         return dict(zip(self.parameters, errors.tolist(), strict=True))
 
     def confidence_interval(self, probability: float = 0.95) -> dict[str, tuple[float, float]]:
-        """Interval that holds the true parameter with the given probability.
+        """Interval that contains the true parameter with the given probability.
 
         Parameters
         ----------
@@ -130,7 +126,7 @@ class JointFit:
         -------
         dict of str to (low, high)
             A stiffness gets its interval from that of the compliance 1/k, in which the noise is nearly normal: it is
-            not symmetric, and open above, up to inf, where the data cannot tell the joint from a rigid one.
+            not symmetric, and open above, up to inf, where the joint cannot be distinguished from a rigid one.
 
         Raises
         ------
@@ -141,13 +137,14 @@ class JointFit:
             raise ValueError(f"probability must lie between 0 and 1, not {probability}")
         reach = float(stats.norm.ppf((1 + probability) / 2))
         intervals = {}
-        for (name, value), error in zip(self.parameters.items(), self.std_error.values(), strict=True):
-            if name.startswith("k_") and "," not in name and self.method == "compliance" and value != 0:
+        values = zip(self.terms, self.parameters.values(), self.std_error.values(), strict=True)
+        for term, value, error in values:
+            if term.kind == "k" and not term.is_cross and self.method == "compliance" and value != 0:
                 soft, own = 1 / value, error / value**2
                 low, high = soft - reach * own, soft + reach * own
-                intervals[name] = (1 / high if high > 0 else -np.inf, 1 / low if low > 0 else np.inf)
+                intervals[term.name] = (1 / high if high > 0 else -np.inf, 1 / low if low > 0 else np.inf)
             else:
-                intervals[name] = (value - reach * error, value + reach * error)
+                intervals[term.name] = (value - reach * error, value + reach * error)
         return intervals
 
     def k_joint(self, freq_hz: ArrayLike) -> ComplexArray:
@@ -170,12 +167,8 @@ class JointFit:
         return self.joint.export(program, nodes, **options)
 
     def unit(self, parameter: str) -> str:
-        """Return the unit of a parameter, told from the name of its DOF (theta..., rx, ry, rz are rotations)."""
-        pair = parameter[2:].split(",")
-        rotations = [_is_rotation(dof) for dof in pair]
-        if rotations[0] != rotations[-1]:
-            return "N" if parameter[0] != "c" else "N s"
-        return _UNITS[parameter[0]][rotations[0]]
+        """Return the unit of a parameter, by the names of its DOFs as `Parameter.unit` reads them."""
+        return Parameter.parse(parameter).unit
 
     def to_dict(self) -> dict[str, Any]:
         """Everything but the lines, as plain numbers and text, ready for JSON (an open interval ends at None)."""
@@ -189,13 +182,13 @@ class JointFit:
             "method": self.method,
             "dofs": list(self.dofs),
             "parameters": {
-                name: {
-                    "value": float(value),
-                    "unit": self.unit(name),
-                    "std_error": plain(errors[name]),
-                    "confidence_interval_95": [plain(limit) for limit in intervals[name]],
+                term.name: {
+                    "value": float(self.parameters[term.name]),
+                    "unit": term.unit,
+                    "std_error": plain(errors[term.name]),
+                    "confidence_interval_95": [plain(limit) for limit in intervals[term.name]],
                 }
-                for name, value in self.parameters.items()
+                for term in self.terms
             },
             "loss_factor": {dof: plain(eta) for dof, eta in zip(self.dofs, self.loss_factor, strict=True)},
             "noise_level": plain(self.noise_level),
@@ -212,11 +205,11 @@ class JointFit:
         intervals = self.confidence_interval(0.95)
         errors = self.std_error
         rows = [("parameter", "value", "std error", "95 % interval", "unit")]
-        for name, value in self.parameters.items():
-            low, high = intervals[name]
-            between = f"{low:.4g} .. {high:.4g}"
-            is_open = name.startswith("k_") and not np.isfinite(high)
-            rows.append((name, "open" if is_open else f"{value:.5g}", f"{errors[name]:.2g}", between, self.unit(name)))
+        for term, value in zip(self.terms, self.parameters.values(), strict=True):
+            low, high = intervals[term.name]
+            is_open = term.kind == "k" and not np.isfinite(high)
+            shown = "open" if is_open else f"{value:.5g}"
+            rows.append((term.name, shown, f"{errors[term.name]:.2g}", f"{low:.4g} .. {high:.4g}", term.unit))
         widths = [max(len(row[i]) for row in rows) for i in range(5)]
         lines = ["  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in rows]
         lines.insert(1, "-" * len(lines[0]))

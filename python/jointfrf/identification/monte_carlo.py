@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from operator import index
 from typing import Literal, NamedTuple, get_args
@@ -23,16 +23,18 @@ from jointfrf.kernel.arguments import (
 )
 from jointfrf.kernel.call import call
 from jointfrf.kernel.status import LineStatus, OnSingular, check_lines
+from jointfrf.substructuring.methods import STIFFNESS_METHODS
 
 __all__ = ["BandStatistics", "MonteCarlo", "MonteCarloMethod", "monte_carlo"]
 
 MonteCarloMethod = Literal["ismm", "inverse-substructuring", "compliance"]
 
-_LETTERS = {"ismm": "I", "inverse-substructuring": "S", "compliance": "C"}
+#: The letters of the kernel.
+_LETTERS: Mapping[MonteCarloMethod, str] = {"ismm": "I", "inverse-substructuring": "S", "compliance": "C"}
 
 
 class BandStatistics(NamedTuple):
-    """What single realisations give as means over a band: their mean and standard deviation, shape (n, n) each.
+    """Mean and standard deviation of the band means of single realisations, shape (n, n) each.
 
     Attributes
     ----------
@@ -57,7 +59,7 @@ class MonteCarlo:
     count : int
         Realisations of every line.
     good : ndarray of int32, shape (n_freq,)
-        How many of them could be identified; the others are left out.
+        How many of them could be identified; the others are excluded.
     mean : ndarray, shape (n_freq, n, n)
         Mean over the good ones, N/m (m/N for "compliance"); NaN where there is none.
     covariance : ndarray, shape (n_freq, n, n, 3)
@@ -110,12 +112,12 @@ class MonteCarlo:
         Notes
         -----
         The noise of different lines is independent, so the variance of a mean over N lines is the sum of their
-        variances over N^2. No line may have lost realisations for that to hold exactly.
+        variances over N^2. It is exact where no line has lost realisations.
         """
         freq = as_frequency(freq_hz, self.good.size)
         inside = in_bands(freq, bands)
         if not inside.any() or not freq[inside].all():
-            raise ValueError(f"the band must hold lines, and none at 0 Hz: {bands}")
+            raise ValueError(f"the band must contain lines, and none at 0 Hz: {bands}")
         number = int(inside.sum())
         omega = 2 * np.pi * freq[inside, None, None]
         mean, covariance = self.mean[inside], self.covariance[inside]
@@ -176,7 +178,7 @@ def monte_carlo(
     -----
     Memory does not depend on `count`. Results do not depend on the number of threads; other engines differ by rounding.
     Noise is on gamma only, so that by D = gamma^-1 - alpha^-1, eq. (2.40), ISMM is K0 + (alpha^-1)_jk - (gamma^-1)_jk,
-    of which all but the last term is done once a line. Where noise lets gamma come near a singular matrix, K* has heavy
+    of which all but the last term is done once a line. Where noise makes gamma nearly singular, K* has heavy
     tails; mean and variance then converge slowly or not at all, and quantiles from `realisations` say more.
 
     Examples
@@ -194,7 +196,8 @@ def monte_carlo(
     noise = noise_arguments(level, kind, seed, relative_to, reciprocal, block, first, count, exact.shape[1:])
     if index(count) < 1:
         raise ValueError(f"count must be positive, not {count}")
-    if (method == "ismm") != (alpha is not None) or (method == "ismm") != (k_initial is not None):
+    needed = () if method == "compliance" else STIFFNESS_METHODS[method].model
+    if any((name in needed) != (value is not None) for name, value in (("alpha", alpha), ("k_initial", k_initial))):
         raise ValueError('method "ismm", and no other, needs alpha and k_initial')
     sweeps = {"gamma": exact}
     calculated, initial = exact, np.zeros((n_freq, n, n), np.complex128)

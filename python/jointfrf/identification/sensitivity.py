@@ -1,4 +1,4 @@
-"""How much an FRF of the assembly moves with the joint, and the sensitive bands that follow."""
+"""Sensitivity of an FRF of the assembly to the joint, and the sensitive bands that follow."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from jointfrf.dofs import joint_parameters
 from jointfrf.frf.bands import Band
 from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_dofs, as_frequency, as_square, as_values
@@ -15,7 +16,7 @@ __all__ = ["Sensitivity", "propose_bands", "sensitivity"]
 
 
 class Sensitivity(NamedTuple):
-    """How much an FRF of the assembly moves with the parameters of the joint.
+    """Sensitivity of an FRF of the assembly to the parameters of the joint.
 
     Attributes
     ----------
@@ -96,8 +97,8 @@ def sensitivity(
     relative = through.T / lines[:, o, i] / 100
     k_parts = np.diagonal(joint.stiffness) + 1j * np.diagonal(joint.hysteretic_stiffness)
     c_parts = 2j * np.pi * freq * np.diagonal(joint.damping)[:, None]
-    names = [f"k_{d}" for d in joint.dofs] + [f"c_{d}" for d in joint.dofs]
-    return Sensitivity(tuple(names), np.concatenate([relative * k_parts[:, None], relative * c_parts]))
+    names = tuple(one.name for one in joint_parameters(joint.dofs))
+    return Sensitivity(names, np.concatenate([relative * k_parts[:, None], relative * c_parts]))
 
 
 def propose_bands(

@@ -27,6 +27,7 @@ __all__ = [
     "as_square",
     "as_values",
     "check_choice",
+    "check_finite_lines",
     "checked_out",
     "optional_frequency",
 ]
@@ -134,6 +135,14 @@ def check_choice(name: str, value: object, known: Sequence[str]) -> None:
     """Raise unless the value is one of the words that are known."""
     if not isinstance(value, str) or value not in known:
         raise ValueError(f"{name} must be one of {', '.join(known)}, not {reprlib.repr(value)}")
+
+
+def check_finite_lines(name: str, lines: ComplexArray, freq_hz: FloatArray | None = None) -> None:
+    """Raise if a line holds NaN or Inf, and name the first one and its frequency."""
+    broken = np.flatnonzero(~np.isfinite(lines).all(axis=(1, 2)))
+    if broken.size:
+        where = "" if freq_hz is None else f" ({freq_hz[broken[0]]:g} Hz)"
+        raise ValueError(f"{name}: NaN or Inf in line {broken[0]}{where}")
 
 
 def as_number(name: str, value: object) -> float:

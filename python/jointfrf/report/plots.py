@@ -20,7 +20,7 @@ STYLES: dict[str, tuple[str, str, float]] = {
     "initial": ("#8c8c8c", "--", 1.2),
     "measured": ("#e07b00", "-", 0.7),
     "ismm": ("#1b4f9c", "-", 1.1),
-    "inverse_substructuring": ("#1b4f9c", "--", 1.1),
+    "inverse-substructuring": ("#1b4f9c", "--", 1.1),
     "compliance": ("#e07b00", "-.", 1.5),
     "decoupling-rr": ("#c0392b", "--", 1.1),
     "decoupling-rs": ("#5aa469", ":", 1.5),

@@ -1,4 +1,4 @@
-"""Joint compliance K*^-1 from interface FRFs, and how measurement noise enters it."""
+"""Joint compliance K*^-1 from interface FRFs, and its derivative and covariance for noisy FRFs."""
 
 from __future__ import annotations
 
@@ -41,7 +41,8 @@ def joint_compliance(
     Notes
     -----
     C = gamma_kk gamma_jk^-1 gamma_jj - gamma_kj, exactly. Noise enters C almost linearly, while it enters K* through an
-    inverse: the mean of K* over a band shrinks to zero where the noise exceeds the compliance, the mean of C does not.
+    inverse: averaging K*, an inverse of noisy data, over a band is biased towards zero where the noise exceeds the
+    compliance, averaging C is not.
 
     Examples
     --------
@@ -64,7 +65,7 @@ def compliance_factors(
     freq_hz: ArrayLike | None = None,
     on_singular: OnSingular = "raise",
 ) -> tuple[ComplexArray, ComplexArray]:
-    """How a small change of the measured FRFs moves the joint compliance: dC = U dh V, to first order.
+    """Return the derivative of the joint compliance by the measured FRFs: dC = U dh V, to first order.
 
     Parameters
     ----------
@@ -123,7 +124,7 @@ def compliance_covariance(
     Parameters
     ----------
     gamma : array_like, shape (n_freq, 2 n, 2 n)
-        Receptance about which is linearised, m/N: a smoothed one, lest the weights follow the noise.
+        Receptance about which is linearised, m/N: a smoothed one, so that the weights do not follow the noise.
     variance : array_like, shape (n_freq, m, m)
         E|e|^2 of the measured FRFs h, (m/N)^2; circular noise, independent between entries.
     transform : array_like, shape (2 n, m), optional

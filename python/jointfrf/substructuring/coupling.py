@@ -55,7 +55,7 @@ def couple(
 
     Notes
     -----
-    Eq. (2.26) with Z^-1 = (I + K* (H_jj + H_kk))^-1 K*. In the source the entry jj lacks its first term H_jj.
+    Eq. (2.26) with Z^-1 = (I + K* (H_jj + H_kk))^-1 K*. In the thesis the entry jj lacks its first term H_jj.
 
     Examples
     --------

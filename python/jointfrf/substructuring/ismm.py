@@ -1,4 +1,4 @@
-"""Joint stiffness by inverse structural modification (2.37)-(2.48), and what it reduces to."""
+"""Joint stiffness by inverse structural modification (2.37)-(2.48), and its short form."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def ismm(
 
     Notes
     -----
-    Eqs. (2.47), (2.48): D = alpha^-1 (alpha - gamma) gamma^-1 holds -Delta off its diagonal, so K* = K0 - D_jk. Only
+    Eqs. (2.47), (2.48): D = alpha^-1 (alpha - gamma) gamma^-1 contains -Delta off its diagonal, so K* = K0 - D_jk. Only
     that block is formed. Where alpha was assembled through K0, substructures and first estimate cancel and
     the result is that of `inverse_substructuring`; with any other alpha (a truncated modal model, say) it is not.
 
@@ -97,7 +97,7 @@ def inverse_substructuring(
 
     Notes
     -----
-    gamma^-1 = [[Z_A + K*, -K*], [-K*, Z_B + K*]]: the joint stands alone off the diagonal.
+    gamma^-1 = [[Z_A + K*, -K*], [-K*, Z_B + K*]]: the off-diagonal blocks contain the joint only.
 
     Examples
     --------

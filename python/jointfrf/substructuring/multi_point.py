@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from jointfrf.channels.virtual_point import VirtualPoint
 from jointfrf.errors import IdentificationWarning, SingularLineError
-from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_number, as_real, as_square
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_number, as_real, as_square, check_finite_lines
 
 __all__ = ["MultiPointJoint", "multi_point_compliance", "multi_point_stiffness"]
 
@@ -80,7 +80,7 @@ def multi_point_stiffness(
     Warns
     -----
     IdentificationWarning
-        On some lines less than 2 n singular values are used, so that a part of the equivalent joint is lost.
+        On some lines fewer than 2 n singular values are used, so that a part of the equivalent joint is missing.
 
     Notes
     -----
@@ -92,12 +92,12 @@ def multi_point_stiffness(
     - The joint acts through the channels only, springs between them for instance, and gamma is regular: patches that
       deform. A virtual point transformation would count the deformation as part of the joint here.
     - The patches are rigid. Then gamma has rank 2 n: ``rank=2 * n`` gives the joint of the virtual points, with
-      K_m = T_j^T K T_k, of minimum norm: how the forces are shared among the channels of a rigid patch is not seen.
+      K_m = T_j^T K T_k, of minimum norm: how the channels of a rigid patch share the forces cannot be identified.
 
     In between, nearly rigid patches with noise, the small singular values are the deformation of the patches and the
-    inverse blows up their noise; leaving them out is what `rank` and `noise` do, and `rank` of the result says how many
-    were used. Truncation is a bias: the stiffer a joint, the smaller its relative motion, which falls out first. For
-    stiff joints `multi_point_compliance`, or `identify` with `virtual_points`, is the better way.
+    inverse amplifies their noise; `rank` and `noise` leave them out, and `rank` of the result says how many were used.
+    Truncation is a bias: the stiffer a joint, the smaller its relative motion, which is truncated first. For stiff
+    joints use `multi_point_compliance`, or `identify` with `virtual_points`.
 
     Threshold of noise: the largest root of a row sum of the variances plus that of a column sum, the expected largest
     singular value of independent noise (exactly so for equal variances and large matrices).
@@ -129,10 +129,11 @@ def multi_point_stiffness(
     [[[4.0, 2.0], [2.0, 4.0]]]
     """
     lines, m_j = _as_sides(gamma, side_j, side_k)
-    inverse, used, size, threshold = _truncated_inverse(lines, rank, _variance(noise, lines), "gamma")
-    _tell_lost(used, 2 * len(side_j.dofs))
-    stiffness = -inverse[:, :m_j, m_j:]
-    return MultiPointJoint(stiffness, side_j.modes.T @ stiffness @ side_k.modes, used, size, threshold)
+    by = _truncated_inverse(lines, rank, _variance(noise, lines), "gamma")
+    _warn_if_truncated(by.used, 2 * len(side_j.dofs))
+    stiffness = -by.inverse[:, :m_j, m_j:]
+    equivalent = side_j.modes.T @ stiffness @ side_k.modes
+    return MultiPointJoint(stiffness, equivalent, by.used, by.singular_values, by.threshold)
 
 
 def multi_point_compliance(
@@ -143,7 +144,7 @@ def multi_point_compliance(
     rank: int | None = None,
     noise: float | ArrayLike | None = None,
 ) -> MultiPointJoint:
-    """Compliance of a joint seen by all channels of both sides, and of the joint between their virtual points.
+    """Compliance of a joint between all channels of both sides, and of the joint between their virtual points.
 
     Parameters
     ----------
@@ -169,19 +170,19 @@ def multi_point_compliance(
     Warns
     -----
     IdentificationWarning
-        On some lines less than n singular values are used, so that a part of the equivalent joint is lost.
+        On some lines fewer than n singular values are used, so that a part of the equivalent joint is missing.
 
     Notes
     -----
     Noise enters almost linearly, and only gamma_jk is inverted, which has one singular value above the noise for each
     force that the joint passes; their number shows what kind of joint it is. A soft joint above its resonances passes
-    hardly any force, and gamma_jk is lost in noise: `multi_point_stiffness` sees it better there.
+    hardly any force, and gamma_jk is lost in noise: `multi_point_stiffness` is more accurate there.
 
     For a joint between virtual points, which acts on the patches as T^T g, the equivalent with ``rank=n`` is K*^-1
     whether the patches deform or not; so is `joint_compliance` of the transformed receptances. For a joint of
     independent springs between opposite channels C_m is the inverse of their stiffness when all singular values are
     used. The equivalents of `multi_point_stiffness` and of this function are inverses of one another where the patches
-    are rigid; where they are not, their difference tells how much the patches deform.
+    are rigid; where they are not, their difference shows how much the patches deform.
 
     Examples
     --------
@@ -198,10 +199,11 @@ def multi_point_compliance(
     lines, m_j = _as_sides(gamma, side_j, side_k)
     variance = _variance(noise, lines)
     across = None if variance is None else variance[:, :m_j, m_j:]
-    inverse, used, size, threshold = _truncated_inverse(lines[:, :m_j, m_j:], rank, across, "gamma_jk")
-    _tell_lost(used, len(side_j.dofs))
-    compliance = lines[:, m_j:, m_j:] @ inverse @ lines[:, :m_j, :m_j] - lines[:, m_j:, :m_j]
-    return MultiPointJoint(compliance, side_k.transform @ compliance @ side_j.transform.T, used, size, threshold)
+    by = _truncated_inverse(lines[:, :m_j, m_j:], rank, across, "gamma_jk")
+    _warn_if_truncated(by.used, len(side_j.dofs))
+    compliance = lines[:, m_j:, m_j:] @ by.inverse @ lines[:, :m_j, :m_j] - lines[:, m_j:, :m_j]
+    equivalent = side_k.transform @ compliance @ side_j.transform.T
+    return MultiPointJoint(compliance, equivalent, by.used, by.singular_values, by.threshold)
 
 
 def _as_sides(gamma: ArrayLike, side_j: VirtualPoint, side_k: VirtualPoint) -> tuple[ComplexArray, int]:
@@ -215,9 +217,7 @@ def _as_sides(gamma: ArrayLike, side_j: VirtualPoint, side_k: VirtualPoint) -> t
         raise ValueError(
             f"gamma must hold the {m_j} channels of side_j, then the {m_k} of side_k, not {lines.shape[1]}"
         )
-    broken = np.flatnonzero(~np.isfinite(lines).all(axis=(1, 2)))
-    if broken.size:
-        raise ValueError(f"gamma: NaN or Inf in line {broken[0]}")
+    check_finite_lines("gamma", lines)
     return lines, m_j
 
 
@@ -235,43 +235,61 @@ def _variance(noise: float | ArrayLike | None, lines: ComplexArray) -> FloatArra
     return variance
 
 
+class _TruncatedInverse(NamedTuple):
+    """Pseudo-inverse of every line, the singular values, how many of them it uses, and the threshold of noise."""
+
+    inverse: ComplexArray
+    used: NDArray[np.intp]
+    singular_values: FloatArray
+    threshold: FloatArray
+
+
 def _truncated_inverse(
     lines: ComplexArray, rank: int | None, variance: FloatArray | None, name: str
-) -> tuple[ComplexArray, NDArray[np.intp], FloatArray, FloatArray]:
-    """Pseudo-inverse by the singular values asked for: inverse, how many, all of them, and the threshold of noise."""
+) -> _TruncatedInverse:
+    """Invert by the singular values asked for: `rank` of them, those above the noise, or all."""
     n_freq, most = lines.shape[0], min(lines.shape[1:])
     if rank is not None and variance is not None:
         raise ValueError("rank and noise exclude one another: give one of them")
     if rank is not None and not 1 <= index(rank) <= most:
         raise ValueError(f"rank must lie between 1 and {most}, the singular values of {name}, not {rank}")
     left, size, right = np.linalg.svd(lines, full_matrices=False)
-    threshold = np.zeros(n_freq)
+    threshold, used = np.zeros(n_freq), np.full(n_freq, most if rank is None else index(rank))
     if variance is not None:
-        by_rows, by_columns = variance.sum(axis=2), variance.sum(axis=1)
-        threshold = np.sqrt(by_rows.max(axis=1)) + np.sqrt(by_columns.max(axis=1))
-    used = np.full(n_freq, most if rank is None else index(rank))
-    if variance is not None:
+        threshold = _noise_threshold(variance)
         used = np.count_nonzero(size > threshold[:, None], axis=1)
     elif rank is None:
-        singular = np.flatnonzero(~(size[:, -1] > _SINGULAR * size[:, 0]))
-        if singular.size:
-            raise SingularLineError(
-                f"{name} is singular in line {singular[0]}: rigid patches have no more singular values than rigid "
-                "motions; give rank or noise",
-                singular,
-            )
+        _check_regular(size, name)
     keep = np.arange(most) < used[:, None]
     reciprocal = np.divide(1, size, out=np.zeros_like(size), where=keep & (size > 0))
     inverse = (right.conj().swapaxes(1, 2) * reciprocal[:, None, :]) @ left.conj().swapaxes(1, 2)
-    return inverse, used, size, threshold
+    return _TruncatedInverse(inverse, used, size, threshold)
 
 
-def _tell_lost(used: NDArray[np.intp], needed: int) -> None:
+def _noise_threshold(variance: FloatArray) -> FloatArray:
+    """Return the expected largest singular value of independent noise, shape (n_freq,)."""
+    by_rows, by_columns = variance.sum(axis=2), variance.sum(axis=1)
+    threshold: FloatArray = np.sqrt(by_rows.max(axis=1)) + np.sqrt(by_columns.max(axis=1))
+    return threshold
+
+
+def _check_regular(size: FloatArray, name: str) -> None:
+    """Raise if the smallest singular value of a line is zero to working precision."""
+    singular = np.flatnonzero(~(size[:, -1] > _SINGULAR * size[:, 0]))
+    if singular.size:
+        raise SingularLineError(
+            f"{name} is singular in line {singular[0]}: rigid patches have no more singular values than rigid "
+            "motions; give rank or noise",
+            singular,
+        )
+
+
+def _warn_if_truncated(used: NDArray[np.intp], needed: int) -> None:
     lost = np.flatnonzero(used < needed)
     if lost.size:
         warnings.warn(
-            f"on {lost.size} of {used.size} lines less than the {needed} singular values of the equivalent joint are "
-            f"used, {used[lost].min()} at least: a part of it is lost there",
+            f"on {lost.size} of {used.size} lines fewer than the {needed} singular values of the equivalent joint "
+            f"are used, down to {used[lost].min()}: a part of it is missing there",
             IdentificationWarning,
             stacklevel=3,
         )

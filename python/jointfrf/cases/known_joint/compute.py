@@ -156,7 +156,7 @@ def noise_free_errors(exact: Exact, k_actual: ComplexArray) -> dict[str, NoiseFr
 
     rounding = {method: difference(k, moved[method]) for method, k in found.items()}
     errors = {method: NoiseFree(difference(k, k_actual), rounding[method]) for method, k in found.items()}
-    short = NoiseFree(difference(found["ismm"], found["inverse_substructuring"]), rounding["ismm"])
+    short = NoiseFree(difference(found["ismm"], found["inverse-substructuring"]), rounding["ismm"])
     return {"short form": short, **errors}
 
 
@@ -177,7 +177,7 @@ def _noise_free_lines(exact: Exact) -> dict[str, ComplexArray]:
     gamma = exact.interface(exact.h_c)
     found = {
         "ismm": ismm(exact.interface(exact.h_initial), gamma, exact.k_initial),
-        "inverse_substructuring": inverse_substructuring(gamma),
+        "inverse-substructuring": inverse_substructuring(gamma),
     }
     equations: tuple[Equation, ...] = ("rr", "rs", "sr", "ss")
     for equation in equations:

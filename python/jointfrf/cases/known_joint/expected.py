@@ -9,11 +9,11 @@ from typing import get_args
 
 from jointfrf.cases.toml_table import Table, read_toml
 from jointfrf.frf.bands import Band
-from jointfrf.identification.identify import Method
+from jointfrf.identification.identify import IdentificationMethod
 
 __all__ = ["METHODS", "Expected", "ExpectedErrors", "ExpectedTable", "Known", "read_expected"]
 
-METHODS: tuple[str, ...] = get_args(Method)
+METHODS: tuple[str, ...] = get_args(IdentificationMethod)
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ __all__ = ["make_figures"]
 _FREQUENCY = "frequency, Hz"
 _METHOD_NAMES = {
     "ismm": "ISMM",
-    "inverse_substructuring": "inverse substructuring",
+    "inverse-substructuring": "inverse substructuring",
     "compliance": "compliance fit",
     "decoupling-rr": "decoupling (2.53)",
     "decoupling-rs": "decoupling (2.54)",

@@ -1,4 +1,4 @@
-"""The compliance fit of one group of joint DOFs: linearise, fit, correct the FRFs, and again until nothing moves."""
+"""The compliance fit of one group of joint DOFs: linearise, minimise, correct the FRFs, until nothing changes."""
 
 from __future__ import annotations
 
@@ -7,38 +7,27 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from jointfrf.identification.compliance_fit.frf_noise import LOST, gamma_noise
+from jointfrf.identification.compliance_fit.initial_parameters import diverged, initial_parameters
 from jointfrf.identification.compliance_fit.least_squares import (
     SHARE_OF_VALUE,
-    Fitted,
-    Task,
-    first_parameters,
-    gauss_newton,
+    LeastSquares,
+    Minimum,
     inverse_information,
     line_information,
-    ran_off,
+    minimise,
 )
-from jointfrf.identification.compliance_fit.linearised import Data, Group, squares_of_lines
+from jointfrf.identification.compliance_fit.line_selection import EveryLine, LineSelection, Progress, ReliableLines
+from jointfrf.identification.compliance_fit.linearised import DofGroup, GroupData, squares_of_lines
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
 __all__ = ["GroupEstimate", "fit_group"]
 
-#: Linearisations at most, first without and then with care.
-_PLAIN, _CAREFUL = 40, 40
+#: Linearisations at most.
+_MOST = 40
 #: The parameters of one linearisation are found to this share of the tolerance.
 _INNER = 0.02
-#: From this linearisation on, FRFs move half way: lines with little more signal than noise would swing for long.
-_FULL_STEPS = 4
-#: A fit that then still moves by more standard errors than this, and by more than this share of the move before, is
-#: begun anew, carefully.
-_SWINGS, _SHRINKS = 5.0, 0.25
-#: So is one with a stiffness that is negative by so many standard errors.
+#: A stiffness that is negative by so many standard errors is doubted.
 _BELOW = 3.0
-#: A careful fit trusts lines little where the relative noise of gamma_jk exceeds this, for so many linearisations ...
-_TRUSTED = 0.1
-_SOFT_STEPS = 4
-#: ... and leaves out those whose FRFs then still move by more than this share of their noise.
-_UNSETTLED = 0.2
 
 
 class GroupEstimate(NamedTuple):
@@ -48,174 +37,139 @@ class GroupEstimate(NamedTuple):
     ----------
     squares : ndarray, shape (r,)
         Weighted squares of the residual.
-    squares_beside : ndarray, shape (r,)
-        Those of the entries of C that the model does not move, by themselves.
-    equations, equations_beside : ndarray, shape (r,)
-        Complex equations, and those of the entries that the model does not move.
-    trust : ndarray, shape (r, n_freq)
+    off_diagonal_squares : ndarray, shape (r,)
+        Those of the entries of C off the diagonal of a diagonal joint, by themselves.
+    equations, off_diagonal_equations : ndarray, shape (r,)
+        Complex equations, and those of the entries off the diagonal.
+    line_weight : ndarray, shape (r, n_freq)
         1 on lines used, 0 on lines left out.
     """
 
     theta: FloatArray
     covariance: FloatArray
     squares: FloatArray
-    squares_beside: FloatArray
+    off_diagonal_squares: FloatArray
     equations: FloatArray
-    equations_beside: FloatArray
-    trust: FloatArray
+    off_diagonal_equations: FloatArray
+    line_weight: FloatArray
     iterations: NDArray[np.intp]
     converged: NDArray[np.bool_]
     line_gradient: FloatArray
     line_information: FloatArray
 
 
-def fit_group(data: Data, noise: FloatArray, level: FloatArray | None, tolerance: float) -> GroupEstimate:
-    """Fit one group of DOFs.
+def fit_group(data: GroupData, noise: FloatArray, level: FloatArray | None, tolerance: float) -> GroupEstimate:
+    """Fit one group of DOFs: on every line, and where that fails on reliable lines.
 
     Parameters
     ----------
-    data : Data
-        Lines that are used, made reciprocal if the structure is.
+    data : GroupData
+        Lines that are used, symmetrised if the structure is reciprocal.
     noise : ndarray, shape (r,)
-        Noise level, for what can be trusted.
+        Noise level, to judge which lines are reliable.
     level : ndarray, shape (r,), optional
         Noise level to judge convergence; by default from the residual.
     tolerance : float
         As in `estimate`.
     """
-    found, swings = _iterate(Group(data), level, tolerance)
-    if swings.any():
-        which = np.flatnonzero(swings)
-        group = Group(data.of(which).near_enough(noise[which]))
-        again = _iterate_carefully(group, noise[which], None if level is None else level[which], tolerance)
+    group = DofGroup(data)
+    every = EveryLine(group)
+    found = _iterate(group, every, level, tolerance)
+    failed = every.oscillating | ~found.converged | _has_negative_stiffness(group, found)
+    if failed.any():
+        which = np.flatnonzero(failed)
+        group = DofGroup(data.of(which).without_outliers(noise[which]))
+        own_level = None if level is None else level[which]
+        again = _iterate(group, ReliableLines(group, noise[which]), own_level, tolerance)
         for whole, part in zip(found, again, strict=True):
             whole[which] = part
     return found
 
 
-def _iterate(group: Group, level: FloatArray | None, tolerance: float) -> tuple[GroupEstimate, NDArray[np.bool_]]:
-    """Iterate until nothing moves; also return the realisations that are to be done carefully."""
-    true = group.data.near
-    swings = np.zeros(group.r, bool)
-    last = np.full(group.r, np.inf)
-    for step in range(1, _PLAIN + 1):
+def _iterate(group: DofGroup, lines: LineSelection, level: FloatArray | None, tolerance: float) -> GroupEstimate:
+    """Linearise, minimise and correct the FRFs until the parameters converge."""
+    true = group.data.initial
+    theta = limit = np.empty(0)
+    for step in range(1, _MOST + 1):
+        weight = lines.weight(step)
         at = group.linearised(true)
-        task = group.task(at)
+        problem = group.least_squares(at, weight)
         if step == 1:
-            theta, limit = first_parameters(task, _INNER * tolerance)
-        before = theta
-        found = gauss_newton(theta, limit, task, _INNER * tolerance)
-        theta = found.theta
-        residual = group.less(at.linear, group.model.moved(found.compliance))
-        corrected = group.corrected(at, residual)
-        true = corrected if step < _FULL_STEPS else (corrected + true) / 2
-        squares = squares_of_lines(residual, at.weight).sum(axis=1)
-        moved, far, converged, scatter = _moved(found, before, squares, task.equations, level, tolerance)
-        if step == _FULL_STEPS:
-            swings = (moved > _SWINGS) & (far > _SHRINKS * last) & ~converged
-        last = far
-        if step > 1 and (converged | swings).all():
+            theta, limit = initial_parameters(problem, _INNER * tolerance)
+        elif lines.may_restart(step) and diverged(theta, limit).any():
+            theta = initial_parameters(problem, _INNER * tolerance)[0]
+        minimum = minimise(theta, limit, problem, _INNER * tolerance)
+        residual = group.residual(at.linear, group.model.entries(minimum.compliance))
+        of_lines = squares_of_lines(residual, at.weight)
+        squares = (of_lines if weight is None else of_lines * weight).sum(axis=1)
+        covariance = inverse_information(2 * minimum.information)
+        change = _change(minimum.theta, theta, covariance)
+        in_errors = _in_errors(change, squares, problem, level)
+        progress = Progress(
+            step, true, group.corrected(at, residual), at.spread, squares, problem.equations, change, in_errors,
+            in_errors <= tolerance,
+        )  # fmt: skip
+        theta, true = minimum.theta, lines.next_frfs(progress)
+        if lines.is_finished(progress):
             break
-    trust = np.ones((group.r, group.n_freq))
-    # A stiffness clearly below zero: FRFs and parameters may have settled on each other's errors.
-    error = np.sqrt(np.maximum(np.einsum("raa->ra", scatter), 0) * (squares / task.equations)[:, None])
-    below = (theta < -_BELOW * error)[:, : group.model.n].any(axis=1)
-    return _result(group, task, found, scatter, squares, trust, step, converged), swings | ~converged | below
+    line_weight = np.ones((group.r, group.n_freq)) if weight is None else weight
+    return _result(group, problem, minimum, covariance, line_weight, progress)
 
 
-def _iterate_carefully(group: Group, noise: FloatArray, level: FloatArray | None, tolerance: float) -> GroupEstimate:
-    """Iterate with little trust in noisy lines until the parameters are known, then without those that do not settle.
-
-    A line on which noise hides the joint tells much that is wrong with little doubt, as long as it is linearised about
-    FRFs that do not fit the joint.
-    """
-    true, p = group.data.near, len(group.model.basis.names)
-    ratio = gamma_noise(group.data.measured, group.data.transform, noise, group.data.variance)
-    soft = 1 / (1 + (ratio / _TRUSTED) ** 8)
-    settled = ratio <= LOST
-    for step in range(1, _CAREFUL + 1):
-        trust = soft if step <= _SOFT_STEPS else settled.astype(float)
-        at = group.linearised(true)
-        task = group.task(at, trust)
-        if step == 1:
-            theta, limit = first_parameters(task, _INNER * tolerance)
-        elif step <= _SOFT_STEPS and ran_off(theta, limit).any():
-            theta = first_parameters(task, _INNER * tolerance)[0]
-        before = theta
-        found = gauss_newton(theta, limit, task, _INNER * tolerance)
-        theta = found.theta
-        residual = group.less(at.linear, group.model.moved(found.compliance))
-        squares = (squares_of_lines(residual, at.weight) * trust).sum(axis=1)
-        *_, converged, scatter = _moved(found, before, squares, task.equations, level, tolerance)
-        corrected = group.corrected(at, residual)
-        if step >= _SOFT_STEPS:
-            own = np.maximum(noise, np.sqrt(squares / np.maximum(task.equations - p / 2, 1)))
-            shift = np.sqrt((abs(corrected - true) ** 2 / at.spread).mean(axis=(2, 3)))
-            rest = settled & (shift <= _UNSETTLED * own[:, None])
-            enough = np.count_nonzero(rest, axis=1) >= max(2, p)
-            settled = np.where(enough[:, None], rest, settled)
-        true = corrected
-        if step > _SOFT_STEPS + 1 and converged.all():
-            break
-    return _result(group, task, found, scatter, squares, trust, step, converged)
+def _change(theta: FloatArray, before: FloatArray, covariance: FloatArray) -> FloatArray:
+    """Return the largest change of a parameter in standard errors of the covariance, shape (r,)."""
+    error = np.sqrt(np.maximum(np.einsum("raa->ra", covariance), np.finfo(float).tiny))
+    change = np.maximum(abs(theta - before) - SHARE_OF_VALUE * abs(theta), 0) / error
+    largest: FloatArray = change.max(axis=1)
+    return largest
 
 
-def _moved(
-    found: Fitted,
-    before: FloatArray,
-    squares: FloatArray,
-    equations: FloatArray,
-    level: FloatArray | None,
-    tolerance: float,
-) -> tuple[FloatArray, FloatArray, NDArray[np.bool_], FloatArray]:
-    """Return by how many standard errors a parameter moved at most, and whether that is little; and the covariance.
+def _in_errors(change: FloatArray, squares: FloatArray, problem: LeastSquares, level: FloatArray | None) -> FloatArray:
+    """Return a change for unit level in standard errors at the level given, or at that of the residual."""
+    if level is None:
+        p = len(problem.model.basis.parameters)
+        level = np.sqrt(squares / np.maximum(problem.equations - p / 2, 1))
+    return np.divide(change, level, out=np.where(change > 0, np.inf, 0.0), where=level > 0)
 
-    First at the level given, or that of the residual, then for unit level, as is the covariance.
-    """
-    scatter = inverse_information(2 * found.information)
-    own = np.sqrt(squares / np.maximum(equations - before.shape[1] / 2, 1)) if level is None else level
-    error = np.sqrt(np.maximum(np.einsum("raa->ra", scatter), np.finfo(float).tiny))
-    shift = np.maximum(abs(found.theta - before) - SHARE_OF_VALUE * abs(found.theta), 0)
-    far: FloatArray = (shift / error).max(axis=1)
-    moved = np.divide(far, own, out=np.where(far > 0, np.inf, 0.0), where=own > 0)
-    return moved, far, moved <= tolerance, scatter
+
+def _has_negative_stiffness(group: DofGroup, found: GroupEstimate) -> NDArray[np.bool_]:
+    """Whether a stiffness is clearly below zero: FRFs and parameters may have adapted to each other's errors."""
+    variance = np.maximum(np.einsum("raa->ra", found.covariance), 0)
+    error = np.sqrt(variance * (found.squares / found.equations)[:, None])
+    return np.asarray((found.theta < -_BELOW * error)[:, : group.model.n].any(axis=1))
 
 
 def _result(
-    group: Group,
-    task: Task,
-    found: Fitted,
-    scatter: FloatArray,
-    squares: FloatArray,
-    trust: FloatArray,
-    step: int,
-    converged: NDArray[np.bool_],
+    group: DofGroup,
+    problem: LeastSquares,
+    minimum: Minimum,
+    covariance: FloatArray,
+    line_weight: FloatArray,
+    progress: Progress,
 ) -> GroupEstimate:
     """Put together what was found."""
-    gradient, information = _of_lines(task, found.compliance)
+    gradient, information = _of_lines(problem, minimum.compliance)
     return GroupEstimate(
-        theta=found.theta,
-        covariance=scatter,
-        squares=squares,
-        squares_beside=group.squares_beside(task),
-        equations=task.equations,
-        equations_beside=group.equations(trust) - trust @ np.count_nonzero(~group.blocked[:, group.moved], axis=1)
-        if group.model.is_diagonal
-        else np.zeros(group.r),
-        trust=trust,
-        iterations=np.full(group.r, step),
-        converged=converged,
+        theta=minimum.theta,
+        covariance=covariance,
+        squares=progress.squares,
+        off_diagonal_squares=group.off_diagonal_squares(problem),
+        equations=problem.equations,
+        off_diagonal_equations=group.off_diagonal_equations(line_weight),
+        line_weight=line_weight,
+        iterations=np.full(group.r, progress.step),
+        converged=progress.converged,
         line_gradient=gradient,
         line_information=information,
     )
 
 
-def _of_lines(task: Task, compliance: ComplexArray) -> tuple[FloatArray, FloatArray]:
-    """Tell what each line pulls at the parameters, shape (r, n_freq, p), and knows of them, (r, n_freq, p, p)."""
-    factors = task.model.basis.factors
-    per_line, adjoint = line_information(task, compliance)
-    left = task.value - task.model.moved(compliance)
-    weighted = task.weight @ left[..., None] + task.pull[..., None]
+def _of_lines(problem: LeastSquares, compliance: ComplexArray) -> tuple[FloatArray, FloatArray]:
+    """Gradient and information of each line, shapes (r, n_freq, p) and (r, n_freq, p, p)."""
+    factors = problem.model.basis.factors
+    per_line, adjoint = line_information(problem, compliance)
+    residual = problem.value - problem.model.entries(compliance)
+    weighted = problem.weight @ residual[..., None] + problem.other_gradient[..., None]
     gradient = factors.conj().T[:, :, None] * (adjoint @ weighted)[:, :, None, :, 0]
     products = factors.conj()[:, None] * factors
     whole = products.transpose(2, 0, 1)[:, :, None, :, None] * per_line[:, :, None, :, None, :]

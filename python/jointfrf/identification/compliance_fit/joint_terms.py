@@ -1,4 +1,4 @@
-"""K*(w) of a joint as a sum of terms, its compliance, and how this moves with the terms."""
+"""K*(w) of a joint as a sum of terms, its compliance, and the derivatives of this by the parameters."""
 
 from __future__ import annotations
 
@@ -8,13 +8,16 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from jointfrf.dofs import Parameter, ParameterKind, joint_parameters
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.kernel.linear_algebra import invert
 
-__all__ = ["Basis", "Cross", "Damping", "JointModel", "joint_basis"]
+__all__ = ["Basis", "CrossTerms", "DampingTerms", "JointModel", "joint_basis"]
 
-Damping = Literal["none", "viscous", "hysteretic", "both"]
-Cross = Literal["zero", "ignore", "fit"]
+#: Terms of K* beside its stiffness.
+DampingTerms = Literal["none", "viscous", "hysteretic", "both"]
+#: Terms that couple the DOFs of a joint: none, and this is used; perhaps, but not sought; fitted.
+CrossTerms = Literal["zero", "ignore", "fit"]
 
 
 class Basis(NamedTuple):
@@ -22,16 +25,15 @@ class Basis(NamedTuple):
 
     Attributes
     ----------
-    names : tuple of str
-        ``"k_<dof>"`` stiffness, ``"h_<dof>"`` hysteretic stiffness eta k, ``"c_<dof>"`` viscous damping;
-        ``"k_<dof>,<dof>"`` for cross terms. All pairs of the first letter, then of the next.
-    factors : ndarray, shape (n_letters, n_freq)
-        Function of frequency of each letter: 1, i, i w.
+    parameters : tuple of Parameter
+        All pairs of the first kind, then of the next.
+    factors : ndarray, shape (n_kinds, n_freq)
+        Function of frequency of each kind: 1, i, i w.
     pairs : ndarray of int, shape (n_pairs, 2)
         Row and column of each entry of K* that is sought; the first n are the diagonal.
     """
 
-    names: tuple[str, ...]
+    parameters: tuple[Parameter, ...]
     factors: ComplexArray
     pairs: NDArray[np.intp]
 
@@ -40,44 +42,29 @@ class Basis(NamedTuple):
         """Number of joint DOFs."""
         return int(self.pairs.max()) + 1
 
-    @property
-    def matrices(self) -> ComplexArray:
-        """Matrix of each parameter on each line, shape (n_parameters, n_freq, n, n)."""
-        units = np.zeros((len(self.pairs), self.n, self.n))
-        for unit, (a, b) in zip(units, self.pairs, strict=True):
-            unit[a, b] = unit[b, a] = 1
-        whole = self.factors[:, None, :, None, None] * units[:, None]
-        matrices: ComplexArray = whole.reshape(len(self.names), -1, self.n, self.n)
-        return matrices
-
     def on_lines(self, lines: NDArray[np.intp]) -> Basis:
         """Return the same terms on some of the lines."""
         return self._replace(factors=self.factors[:, lines])
 
-    def of_dofs(self, dofs: NDArray[np.intp], *, cross: bool = True) -> tuple[Basis, NDArray[np.intp]]:
-        """Return the terms between some of the DOFs, or without those across, and which of the parameters these are."""
-        inside = np.flatnonzero(
-            np.isin(self.pairs, dofs).all(axis=1) & (cross | (self.pairs[:, 0] == self.pairs[:, 1]))
-        )
+    def of_dofs(self, dofs: NDArray[np.intp]) -> tuple[Basis, NDArray[np.intp]]:
+        """Return the terms between some of the DOFs, and which of the parameters these are."""
+        inside = np.flatnonzero(np.isin(self.pairs, dofs).all(axis=1))
         which = (np.arange(len(self.factors))[:, None] * len(self.pairs) + inside).ravel()
         pairs = np.searchsorted(dofs, self.pairs[inside])
-        return Basis(tuple(self.names[i] for i in which), self.factors, pairs), which
+        return Basis(tuple(self.parameters[i] for i in which), self.factors, pairs), which
 
 
-def joint_basis(omega: FloatArray, dofs: Sequence[str], damping: Damping, cross: Cross) -> Basis:
+def joint_basis(omega: FloatArray, dofs: Sequence[str], damping: DampingTerms, cross: CrossTerms) -> Basis:
     """Return the terms of K*(w) = k + i h + i w c asked for; symmetric cross terms where `cross` is "fit"."""
-    n = len(dofs)
-    factors: dict[str, NDArray[np.complexfloating]] = {"k": np.ones(omega.size, np.complex128)}
+    factors: dict[ParameterKind, NDArray[np.complexfloating]] = {"k": np.ones(omega.size, np.complex128)}
     if damping in ("hysteretic", "both"):
         factors["h"] = np.full(omega.size, 1j)
     if damping in ("viscous", "both"):
         factors["c"] = 1j * omega
-    pairs = [(a, a) for a in range(n)]
-    if cross == "fit":
-        pairs += [(a, b) for a in range(n) for b in range(a + 1, n)]
-    labels = [dofs[a] if a == b else f"{dofs[a]},{dofs[b]}" for a, b in pairs]
-    names = tuple(f"{letter}_{label}" for letter in factors for label in labels)
-    return Basis(names, np.array(list(factors.values())), np.array(pairs, np.intp))
+    parameters = joint_parameters(dofs, tuple(factors), cross=cross == "fit")
+    place = {dof: i for i, dof in enumerate(dofs)}
+    pairs = [(place[one.row], place[one.column]) for one in parameters[: len(parameters) // len(factors)]]
+    return Basis(parameters, np.array(list(factors.values())), np.array(pairs, np.intp))
 
 
 class JointModel:
@@ -92,7 +79,7 @@ class JointModel:
     is_diagonal : bool
         Whether C is diagonal.
     rows, columns : ndarray of int, shape (q,)
-        Entries of C that the model moves: those of the diagonal, or of the upper triangle.
+        Entries of C that the parameters change: those of the diagonal, or of the upper triangle.
     """
 
     def __init__(self, basis: Basis) -> None:
@@ -112,14 +99,14 @@ class JointModel:
         k[..., pairs[:, 0], pairs[:, 1]] = k[..., pairs[:, 1], pairs[:, 0]] = values
         return invert(k.reshape(-1, self.n, self.n), on_singular="nan").reshape(k.shape)
 
-    def moved(self, compliance: ComplexArray) -> ComplexArray:
-        """Return the entries of C that the model moves, shape (r, n_freq, q)."""
+    def entries(self, compliance: ComplexArray) -> ComplexArray:
+        """Return the entries of C that the parameters change, shape (r, n_freq, q)."""
         return compliance if self.is_diagonal else compliance[..., self.rows, self.columns]
 
     def slope(self, compliance: ComplexArray) -> ComplexArray:
         """Return their derivatives -C B C by each pair of DOFs, shape (r, n_freq, q, n_pairs).
 
-        That by a parameter is this times the function of frequency of its letter.
+        That by a parameter is this times the function of frequency of its kind.
         """
         if self.is_diagonal:
             return -(compliance**2)[..., None] * np.eye(self.n)

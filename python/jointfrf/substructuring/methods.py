@@ -1,0 +1,132 @@
+"""The methods that give K*(w) line by line: their names, what each needs, and the function that computes it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import Literal, NamedTuple
+
+from numpy.typing import ArrayLike
+
+from jointfrf.kernel.arguments import ComplexArray, check_choice
+from jointfrf.kernel.status import OnSingular
+from jointfrf.substructuring.decoupling import decouple
+from jointfrf.substructuring.ismm import inverse_substructuring, ismm
+
+__all__ = ["STIFFNESS_METHODS", "JointFrfs", "LineMethod", "StiffnessMethod", "joint_stiffness"]
+
+StiffnessMethod = Literal[
+    "ismm", "inverse-substructuring", "decoupling-rr", "decoupling-rs", "decoupling-sr", "decoupling-ss"
+]
+
+
+@dataclass(frozen=True, kw_only=True)
+class JointFrfs:
+    """What is known of a joint and its substructures; each method needs some of it.
+
+    Attributes
+    ----------
+    gamma : array_like, shape (n_freq, 2 n, 2 n)
+        Measured receptance of the assembly at joint DOFs j, then k, m/N.
+    alpha : array_like, shape (n_freq, 2 n, 2 n)
+        Calculated receptance of the assembly with the first estimate at the same DOFs.
+    k_initial : array_like, shape (n_freq, n, n) or (n, n)
+        First estimate K0, N/m.
+    h_a, h_b : array_like, shapes (n_freq, n_a, n_a), (n_freq, n_b, n_b)
+        Receptances of the substructures.
+    h_c : array_like, shape (n_freq, n, n)
+        Measured receptance of the assembly between the internal points that a decoupling equation names.
+    dofs_j, dofs_k : array_like of int, shape (n,)
+        Joint DOFs in `h_a` and in `h_b`, counted from 0.
+    dofs_r, dofs_s : array_like of int, shape (n,)
+        Internal DOFs in `h_a` and in `h_b`.
+    """
+
+    gamma: ArrayLike | None = None
+    alpha: ArrayLike | None = None
+    k_initial: ArrayLike | None = None
+    h_a: ArrayLike | None = None
+    h_b: ArrayLike | None = None
+    h_c: ArrayLike | None = None
+    dofs_j: ArrayLike | None = None
+    dofs_k: ArrayLike | None = None
+    dofs_r: ArrayLike | None = None
+    dofs_s: ArrayLike | None = None
+
+
+class LineMethod(NamedTuple):
+    """How a method computes K*(w).
+
+    Attributes
+    ----------
+    lines : callable
+        Takes what the method needs by keyword, then `freq_hz` and `on_singular`.
+    measured : {"gamma", "h_c"}
+        Field of `JointFrfs` that is measured.
+    model : tuple of str
+        Fields that come from models.
+    """
+
+    lines: Callable[..., ComplexArray]
+    measured: Literal["gamma", "h_c"]
+    model: tuple[str, ...] = ()
+
+
+_SUBSTRUCTURES = ("h_a", "h_b", "dofs_j", "dofs_k")
+
+STIFFNESS_METHODS: Mapping[StiffnessMethod, LineMethod] = {
+    "ismm": LineMethod(ismm, "gamma", ("alpha", "k_initial")),
+    "inverse-substructuring": LineMethod(inverse_substructuring, "gamma"),
+    "decoupling-rr": LineMethod(partial(decouple, "rr"), "h_c", (*_SUBSTRUCTURES, "dofs_r")),
+    "decoupling-rs": LineMethod(partial(decouple, "rs"), "h_c", (*_SUBSTRUCTURES, "dofs_r", "dofs_s")),
+    "decoupling-sr": LineMethod(partial(decouple, "sr"), "h_c", (*_SUBSTRUCTURES, "dofs_r", "dofs_s")),
+    "decoupling-ss": LineMethod(partial(decouple, "ss"), "h_c", (*_SUBSTRUCTURES, "dofs_s")),
+}
+
+
+def joint_stiffness(
+    method: StiffnessMethod,
+    frfs: JointFrfs,
+    *,
+    freq_hz: ArrayLike | None = None,
+    on_singular: OnSingular = "raise",
+) -> ComplexArray:
+    """Joint stiffness by one of the methods.
+
+    Parameters
+    ----------
+    method : str
+        A key of `STIFFNESS_METHODS`: (2.47), its short form -(gamma^-1)_jk, or (2.53)-(2.56).
+    frfs : JointFrfs
+        At least what the method needs; the rest is not used.
+    freq_hz, on_singular
+        As in `couple`.
+
+    Returns
+    -------
+    ndarray, shape (n_freq, n, n)
+        K*, N/m.
+
+    Raises
+    ------
+    SingularLineError, ValueError
+        As in `couple`; a field that the method needs is missing.
+
+    Examples
+    --------
+    >>> import numpy as np, jointfrf as jf
+    >>> from jointfrf.substructuring.methods import JointFrfs, joint_stiffness
+    >>> h = np.full((1, 1, 1), 0.5)
+    >>> frfs = JointFrfs(gamma=jf.couple(h, h, [[3.0]], [0], [0]))
+    >>> joint_stiffness("inverse-substructuring", frfs).real.round(12).tolist()
+    [[[3.0]]]
+    """
+    check_choice("method", method, tuple(STIFFNESS_METHODS))
+    own = STIFFNESS_METHODS[method]
+    given = {name: getattr(frfs, name) for name in (own.measured, *own.model)}
+    if any(value is None for value in given.values()):
+        # The measured FRFs are named only where they are missing themselves.
+        needed = [name for name in given if name in own.model or given[name] is None]
+        raise ValueError(f"method {method!r} needs {' and '.join(filter(None, (', '.join(needed[:-1]), needed[-1])))}")
+    return own.lines(**given, freq_hz=freq_hz, on_singular=on_singular)
