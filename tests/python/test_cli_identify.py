@@ -109,10 +109,11 @@ def test_without_a_joint_it_tells_what_the_file_holds():
         ([*JOINT_OF_BARS[:-1], "phi"], "dofs must be among x, y, z, theta_x, theta_y, theta_z, not 'phi'"),
     ],
 )
-def test_what_is_missing_is_said_in_one_sentence(words, message):
-    result = run(BARS, *words, expect=1)
-    assert message in result.stderr
-    assert result.stderr.startswith("jointfrf: error:")
+def test_what_is_missing_is_said_in_one_sentence(words, message, capsys):
+    assert main(["identify", str(BARS), *words]) == 1
+    printed = capsys.readouterr().err
+    assert message in printed
+    assert printed.startswith("jointfrf: error:")
 
 
 @needs_data
@@ -126,8 +127,11 @@ def test_points_that_lie_on_no_line():
     [["--j", "a,b"], ["--band", "200-300"], ["--method", "magic"], ["--damping", "dry"], ["--cross", "some"]]
     + [["--export", text] for text in ("abaqus", "marc:1,2", "abaqus:1,2,3,4", "nastran:1")],
 )
-def test_wrong_words_are_a_usage_error(words, tmp_path):
-    assert "usage:" in run(tmp_path / "x.uff", *words, expect=2).stderr
+def test_wrong_words_are_a_usage_error(words, tmp_path, capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(["identify", str(tmp_path / "x.uff"), *words])
+    assert stop.value.code == 2
+    assert "usage:" in capsys.readouterr().err
 
 
 def test_a_file_that_is_missing_or_no_universal_file(tmp_path):
