@@ -164,7 +164,7 @@ def run(args: argparse.Namespace) -> int:
         print()
         print(fits[0].export(program, nodes[:2], rotation_nodes=nodes[2:] or None, damping=damping), end="")
     if args.out is not None:
-        from jointfrf.identification.fit_report import write_fit
+        from jointfrf.report.fit import write_fit
 
         print()
         for path in write_fit(fits, args.out, args.file.name):

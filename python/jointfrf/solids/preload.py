@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 from scipy import sparse
 
+from jointfrf.dofs import DIRECTIONS
 from jointfrf.kernel.arguments import FloatArray, as_number
 from jointfrf.solids.bolted_lap import BoltedLap
 from jointfrf.solids.brick import Formulation, assemble_bricks
@@ -16,7 +17,7 @@ from jointfrf.solids.brick_beam import PRESETS
 from jointfrf.solids.contact import ContactLaw, InterfaceState, Iteration, solve_contact
 from jointfrf.solids.contact_pairs import Pairs, tie
 from jointfrf.solids.pressure_map import PressureMap, pressure_maps
-from jointfrf.solids.solid import DIRECTIONS, SolidModel, solid_model
+from jointfrf.solids.solid import SolidModel, solid_model
 
 __all__ = ["PreloadedLap", "preload"]
 

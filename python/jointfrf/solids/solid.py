@@ -9,16 +9,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
-from jointfrf.dofs import rigid_motion
+from jointfrf.dofs import DIRECTIONS, rigid_motion
 from jointfrf.kernel.arguments import FloatArray, as_real
 from jointfrf.models.model import Model
 from jointfrf.solids.brick import Formulation, Mass, Material, assemble_bricks
 from jointfrf.solids.mesh import Mesh
 
-__all__ = ["DIRECTIONS", "Patch", "SolidModel", "mean_motion", "solid_model"]
+__all__ = ["Patch", "SolidModel", "mean_motion", "solid_model"]
 
-#: DOFs of a reference point; a node has the first three.
-DIRECTIONS = ("x", "y", "z", "theta_x", "theta_y", "theta_z")
 #: A rotation is not held by a patch whose points stray less than this share of its extent from a line.
 _HELD = 1e-6
 
