@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import nnls
 
 from jointfrf.solids.brick import Material, assemble_bricks
-from jointfrf.solids.contact import ContactLaw, Interface, solve_contact
+from jointfrf.solids.contact import ContactInterface, ContactLaw, solve_contact
 from jointfrf.solids.mesh import Mesh, extrude, rectangle
 
 RIGID = ContactLaw(0.3, None, None)
@@ -58,7 +58,7 @@ def test_a_pressed_stack_has_uniform_pressure(friction, stiffness):
     # The bottom slides on a plane, held against motions of a rigid body.
     fixed = np.concatenate([3 * bottom + 1, [3 * bottom[0], 3 * bottom[0] + 2, 3 * bottom[-1]]])
     law = ContactLaw(friction, stiffness, stiffness)
-    found = solve_contact(k, f, {"faces": Interface(below, above, area)}, law, fixed=fixed)
+    found = solve_contact(k, f, {"faces": ContactInterface(below, above, area)}, law, fixed=fixed)
     state = found.interfaces["faces"]
     assert state.pressure == pytest.approx(np.full(20, 5e6), rel=1e-7)
     assert state.closed.all()
@@ -78,7 +78,7 @@ def test_bars_that_close_a_gap(stiffness):
     area, gap, force = node_areas(Z, X), 2e-6, 8e3
     f = np.zeros(k.shape[0])
     f[3 * above + 1] = -force * area / area.sum()
-    pairs = {"gap": Interface(below, above, area, np.full(20, gap))}
+    pairs = {"gap": ContactInterface(below, above, area, np.full(20, gap))}
     held = dofs(np.concatenate([bottom, top]), 0, 1, 2)
     state = solve_contact(k, f, pairs, ContactLaw(0.3, stiffness, stiffness), fixed=held).interfaces["gap"]
 
@@ -104,7 +104,7 @@ def plate_on_block():
     f[3 * far + 1] = 30.0
     f[3 * middle + 1] = -400.0
     f[3 * far] = 60.0
-    return k, f, Interface(below, above, node_areas(Z, X)), dofs(np.concatenate([bottom, at_end]), 0, 1, 2)
+    return k, f, ContactInterface(below, above, node_areas(Z, X)), dofs(np.concatenate([bottom, at_end]), 0, 1, 2)
 
 
 def condensed(k, f, pairs, held):
@@ -189,11 +189,11 @@ def test_refusals():
     with pytest.raises(ValueError, match="a node belongs to two pairs"):
         solve_contact(k, f, {"p": pairs, "q": pairs}, fixed=held)
     with pytest.raises(ValueError, match="'p' must have pairs, with an area"):
-        solve_contact(k, f, {"p": Interface(pairs.lower, pairs.upper[1:], pairs.area)}, fixed=held)
+        solve_contact(k, f, {"p": ContactInterface(pairs.lower, pairs.upper[1:], pairs.area)}, fixed=held)
     with pytest.raises(ValueError, match="positive areas"):
-        solve_contact(k, f, {"p": Interface(pairs.lower, pairs.upper, -pairs.area)}, fixed=held)
+        solve_contact(k, f, {"p": ContactInterface(pairs.lower, pairs.upper, -pairs.area)}, fixed=held)
     with pytest.raises(ValueError, match="a node is none of the"):
-        solve_contact(k, f, {"p": Interface(pairs.lower, pairs.upper + 10_000, pairs.area)}, fixed=held)
+        solve_contact(k, f, {"p": ContactInterface(pairs.lower, pairs.upper + 10_000, pairs.area)}, fixed=held)
     with pytest.raises(ValueError, match="at least one interface"):
         solve_contact(k, f, {}, fixed=held)
     with pytest.raises(ValueError, match="friction must not be negative"):

@@ -22,7 +22,7 @@ __all__ = [
     "Noise",
     "Observed",
     "actual_values",
-    "check_lines",
+    "check_bands",
     "read_bands",
     "read_frequency",
     "read_joint",
@@ -147,7 +147,7 @@ def _read_dof(table: TomlTable) -> str:
     return dof
 
 
-def check_lines(table: TomlTable, key: str, bands: Sequence[Band], freq_hz: FloatArray) -> None:
+def check_bands(table: TomlTable, key: str, bands: Sequence[Band], freq_hz: FloatArray) -> None:
     """Raise an error if a band holds no frequency line."""
     if bands:
         table.build(lambda: in_bands(freq_hz, bands), key)
@@ -159,7 +159,7 @@ def read_bands(table: TomlTable, dofs: Sequence[str], freq_hz: FloatArray) -> Ba
     bands = {parameter: table.bands(parameter.name) for parameter in joint_parameters(dofs)}
     table.close()
     for parameter, own in bands.items():
-        check_lines(table, parameter.name, own, freq_hz)
+        check_bands(table, parameter.name, own, freq_hz)
     return BandSet(name, bands)
 
 

@@ -14,7 +14,7 @@ from jointfrf.models.beam import End
 from jointfrf.solids.bolt import Bolt
 from jointfrf.solids.brick import Material, brick_quality
 from jointfrf.solids.brick_beam import Preset, holed_plan
-from jointfrf.solids.contact_pairs import Interface
+from jointfrf.solids.contact_pairs import ContactInterface
 from jointfrf.solids.mesh import Mesh, Plan, disc, extrude, join_plans, rectangle
 
 __all__ = ["ALUMINIUM", "BODIES", "INTERFACES", "BoltedLap", "LapDivisions", "bolted_lap"]
@@ -93,7 +93,7 @@ class BoltedLap:
         "A", "B" or "bolt".
     materials : tuple of Material
         Of A, B and the bolt.
-    interfaces : dict of str to Interface
+    interfaces : dict of str to ContactInterface
         "head" (bolt upon A), "lap" (A upon B), "nut" (B upon the bolt): pairs of nodes at the same place.
     clamped : ndarray of int
         Nodes held in all directions.
@@ -105,7 +105,7 @@ class BoltedLap:
     mesh: Mesh
     body: NDArray[np.str_]
     materials: tuple[Material, Material, Material]
-    interfaces: dict[str, Interface]
+    interfaces: dict[str, ContactInterface]
     clamped: NDArray[np.int32]
     axis: FloatArray
     preset: Preset
@@ -303,12 +303,12 @@ def _joined(solids: dict[str, Mesh]) -> tuple[Mesh, NDArray[np.str_]]:
     return Mesh(nodes, np.concatenate(elements).astype(np.int32)), body
 
 
-def _interfaces(mesh: Mesh, body: NDArray[np.str_], heights: tuple[float, float]) -> dict[str, Interface]:
+def _interfaces(mesh: Mesh, body: NDArray[np.str_], heights: tuple[float, float]) -> dict[str, ContactInterface]:
     """Return the faces that touch, found by their planes."""
     faces, elements = mesh.faces()
     near = _NEAR * min(heights)
     planes: dict[str, float] = {"head": heights[0], "lap": 0.0, "nut": -heights[1]}
-    found: dict[str, Interface] = {}
+    found: dict[str, ContactInterface] = {}
     for name, (lower, upper) in INTERFACES.items():
         flat = (abs(mesh.nodes[faces, 1] - planes[name]) < near).all(axis=1)
         below, above = (faces[flat & (body[elements] == side)] for side in (lower, upper))
@@ -318,7 +318,7 @@ def _interfaces(mesh: Mesh, body: NDArray[np.str_], heights: tuple[float, float]
         quads = above[np.isin(above, partner[touching]).all(axis=1)]
         # A corner of a quad that is no neighbour of a touching one belongs to no pair.
         kept = touching & np.isin(partner, quads)
-        found[name] = Interface(
+        found[name] = ContactInterface(
             lower=nodes[nearest[kept]],
             upper=partner[kept],
             area=_node_areas(mesh.nodes, quads, partner[kept]),

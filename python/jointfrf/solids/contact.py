@@ -13,9 +13,9 @@ from scipy.sparse import linalg as sparse_linalg
 
 from jointfrf.kernel.arguments import FloatArray, as_real
 from jointfrf.models.receptance.direct import SYMMETRIC
-from jointfrf.solids.contact_pairs import NORMAL, TANGENTIAL, BoolArray, ContactLaw, Interface, Pairs, tie
+from jointfrf.solids.contact_pairs import NORMAL, TANGENTIAL, BoolArray, ContactInterface, ContactLaw, Pairs, tie
 
-__all__ = ["ContactLaw", "ContactSolution", "Interface", "InterfaceState", "Iteration", "solve_contact"]
+__all__ = ["ContactInterface", "ContactLaw", "ContactSolution", "InterfaceState", "Iteration", "solve_contact"]
 
 #: A tension or penetration is none below this share of the largest normal force or relative displacement.
 _ROUNDING: Final = 1e-9
@@ -104,7 +104,7 @@ class ContactSolution:
 def solve_contact(
     stiffness: sparse.sparray,
     load: ArrayLike,
-    interfaces: Mapping[str, Interface],
+    interfaces: Mapping[str, ContactInterface],
     law: ContactLaw | None = None,
     *,
     fixed: ArrayLike = (),
@@ -118,7 +118,7 @@ def solve_contact(
         Symmetric, N/m: x, y, z of node 0, then of node 1, ...; other DOFs may follow.
     load : array_like, shape (n,)
         N. It is applied in one step from the unloaded state.
-    interfaces : mapping of str to Interface
+    interfaces : mapping of str to ContactInterface
         No node may belong to two pairs.
     law : ContactLaw, optional
         ``ContactLaw()`` by default.
@@ -153,13 +153,13 @@ def solve_contact(
 
     >>> import numpy as np
     >>> from jointfrf.solids.brick import Material, assemble_bricks
-    >>> from jointfrf.solids.contact import Interface, solve_contact
+    >>> from jointfrf.solids.contact import ContactInterface, solve_contact
     >>> corners = np.array([[0, 0], [0, 1], [1, 1], [1, 0]])
     >>> nodes = [[0.01 * x, y, 0.01 * z] for y in (0.0, 0.01, 0.01, 0.02) for x, z in corners]
     >>> k, _ = assemble_bricks(nodes, [range(8), range(8, 16)], Material(70e9, 0.0, 2700.0))
     >>> load = np.zeros(48)
     >>> load[37::3] = -100.0
-    >>> faces = Interface(np.arange(4, 8), np.arange(8, 12), np.full(4, 25e-6))
+    >>> faces = ContactInterface(np.arange(4, 8), np.arange(8, 12), np.full(4, 25e-6))
     >>> found = solve_contact(k, load, {"faces": faces}, fixed=range(12)).interfaces["faces"]
     >>> (found.pressure / 1e6).round(9).tolist()
     [4.0, 4.0, 4.0, 4.0]

@@ -12,7 +12,7 @@ from scipy import sparse
 
 from jointfrf.kernel.arguments import FloatArray, as_number
 
-__all__ = ["NORMAL", "TANGENTIAL", "BoolArray", "ContactLaw", "Interface", "Pairs", "tie"]
+__all__ = ["NORMAL", "TANGENTIAL", "BoolArray", "ContactInterface", "ContactLaw", "Pairs", "tie"]
 
 BoolArray = NDArray[np.bool_]
 
@@ -60,7 +60,7 @@ class ContactLaw:
 
 
 @dataclass(frozen=True)
-class Interface:
+class ContactInterface:
     """Two faces that may touch, given by pairs of nodes.
 
     Attributes
@@ -88,13 +88,13 @@ class Pairs:
 
     Parameters
     ----------
-    interfaces : mapping of str to Interface
+    interfaces : mapping of str to ContactInterface
         No node may belong to two pairs.
     n : int
         Number of DOFs: x, y, z of node 0, then of node 1, ...; others may follow.
     """
 
-    def __init__(self, interfaces: Mapping[str, Interface], n: int) -> None:
+    def __init__(self, interfaces: Mapping[str, ContactInterface], n: int) -> None:
         if not interfaces:
             raise ValueError("interfaces must name at least one interface")
         for name, one in interfaces.items():

@@ -20,10 +20,10 @@ from jointfrf.substructuring.multi_point import multi_point_compliance
 
 __all__ = [
     "Found",
-    "as_lines",
     "band_means",
     "by_band_means",
     "by_compliance_fit",
+    "joint_of_constants",
     "joint_stiffness_lines",
     "route_lines",
 ]
@@ -112,7 +112,7 @@ def by_compliance_fit(case: BoltedLapCase, points: tuple[FivePoints, FivePoints]
     return found
 
 
-def as_lines(theta: FloatArray, freq_hz: FloatArray) -> ComplexArray:
+def joint_of_constants(theta: FloatArray, freq_hz: FloatArray) -> ComplexArray:
     """K*(w) of twelve constants, shape (n_freq, 6, 6)."""
     diagonal: ComplexArray = theta[:6] + 2j * np.pi * freq_hz[:, None] * theta[6:]
     return diagonal[:, :, None] * np.eye(6)

@@ -11,7 +11,7 @@ from jointfrf.cases.definitions import (
     Noise,
     Observed,
     actual_values,
-    check_lines,
+    check_bands,
     read_bands,
     read_joint,
     read_noises,
@@ -137,7 +137,7 @@ def _observed(table: TomlTable, dofs: tuple[str, ...], freq_hz: FloatArray) -> t
         point, dof = entry.text("point", ("r", "s")), entry.text("dof", dofs)
         bands = tuple(entry.bands("bands")) if "bands" in entry else ()
         entry.close()
-        check_lines(entry, "bands", bands, freq_hz)
+        check_bands(entry, "bands", bands, freq_hz)
         found.append(Observed(f"{point}-{dof}", point, dofs.index(dof), bands))
     table.check_different("observed", [one.key for one in found], "name the same FRF")
     return tuple(found)
