@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import importlib
-import importlib.util
 import os
 import sys
 import time
@@ -14,6 +13,8 @@ from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from jointfrf.cli.extras import check_installed
 
 if TYPE_CHECKING:
     from jointfrf.cases.catalogue import CaseOutput
@@ -119,9 +120,7 @@ def _cases(options: argparse.Namespace) -> int:
 
 
 def _run(options: argparse.Namespace) -> int:
-    missing = [name for name in ("matplotlib", "jinja2") if importlib.util.find_spec(name) is None]
-    if missing:
-        raise RuntimeError(f"{' and '.join(missing)} missing: reports need pip install 'jointfrf[report]'")
+    check_installed("matplotlib", "jinja2")
     from jointfrf.cases.catalogue import UnknownCaseError, find_case, list_cases, run_case
     from jointfrf.cases.workers import started_workers
 

@@ -17,11 +17,14 @@ __all__ = [
     "modulus_label",
     "parameter_label",
     "parameter_lines",
+    "percentile_lines",
     "percentiles",
     "symbol",
 ]
 
 FREQUENCY = "frequency, Hz"
+#: What is shown of a distribution.
+_SPREAD = (2.5, 50, 97.5)
 #: Percentiles between which most values lie.
 _BULK = (5, 95)
 #: Margin around what is shown, as a share of its extent, and at least as a share of the largest value.
@@ -79,9 +82,14 @@ def parameter_lines(k_lines: ComplexArray, freq_hz: FloatArray, parameter: Param
 
 
 def percentiles(values: FloatArray) -> tuple[float, float, float]:
-    """2.5, 50 and 97.5 percentile: what is shown of a distribution."""
-    low, median, high = (float(x) for x in np.percentile(values, [2.5, 50, 97.5]))
+    """2.5, 50 and 97.5 percentile of values."""
+    low, median, high = (float(x) for x in np.percentile(values, _SPREAD))
     return low, median, high
+
+
+def percentile_lines(lines: FloatArray) -> FloatArray:
+    """2.5, 50 and 97.5 percentile at each frequency, shape (3, n_freq), of lines of shape (r, n_freq)."""
+    return np.asarray(np.percentile(lines, _SPREAD, axis=0), np.float64)
 
 
 def bulk_limits(

@@ -22,6 +22,7 @@ from jointfrf.report.axes import (
     modulus_label,
     parameter_label,
     parameter_lines,
+    percentile_lines,
     symbol,
 )
 from jointfrf.report.figure import Curve, Figure, Interval, Level, NamedBands, Panel, Ribbon
@@ -187,7 +188,7 @@ def _line_panel(result: KnownJointResult, found: Identified, p: int, within: tup
         inside = (freq >= limits[0]) & (freq <= limits[1])
         title = f"band {bands_in_words(within)} Hz"
         levels += (Level("median of the band means", median, "high", within),)
-    low, middle, high = np.percentile(lines[:, inside], [2.5, 50, 97.5], axis=0)
+    low, middle, high = percentile_lines(lines[:, inside])
     x = freq[inside]
     shown = tuple(
         Curve("" if i else "single realisations", x, line[inside], "faint") for i, line in enumerate(lines[:2])

@@ -15,6 +15,7 @@ from jointfrf.errors import IllConditionedWarning
 from jointfrf.frf.bands import Band
 from jointfrf.frf.metrics import amplitude_error, frequency_error
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.report.axes import percentile_lines
 from jointfrf.substructuring.coupling import couple
 
 __all__ = ["RegeneratedFrf", "regenerate", "regenerate_all"]
@@ -104,8 +105,7 @@ def _with_errors(exact: Exact, identified: Identified, observed: Observed) -> Re
         np.array([[error(h_exact, one, exact.freq_hz, band) for one in h] for band in bands], np.float64)
         for error in (amplitude_error, frequency_error)
     )
-    spread: FloatArray = np.asarray(np.percentile(abs(h), [2.5, 50, 97.5], axis=0), np.float64)
-    return RegeneratedFrf(identified, observed, spread, h[0].copy(), bands, amplitude, frequency)
+    return RegeneratedFrf(identified, observed, percentile_lines(np.abs(h)), h[0].copy(), bands, amplitude, frequency)
 
 
 def regenerate_all(
