@@ -64,7 +64,7 @@ def frequency_table(
                 known = expected.values[i]
                 difference = (freq / known - 1) * 100
                 good = abs(difference) <= expected.within
-            if good is False:
+            if good is not None and not good:
                 failing.append(len(cells))
             cells.append((*name, freq, known, difference, verdict(good)))
     all_columns = (*columns, "Hz", "expected Hz", "difference %", "")
