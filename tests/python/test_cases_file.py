@@ -4,8 +4,7 @@ import re
 
 import pytest
 
-from jointfrf.cases.catalogue import find_case, read_any_case
-from jointfrf.cases.known_joint.read import read_case
+from jointfrf.cases.catalogue import find_case, read_case
 from jointfrf.errors import FileContentError
 
 CHANGES = [
@@ -45,6 +44,12 @@ CHANGES = [
         'motion = "translation"',
         'motion = "sideways"',
         r"\[\[joint\]\] number 1: motion must be one of translation, rotation",
+    ),
+    (
+        'motion = "translation"',
+        'motion = "rotation"',
+        r"\[\[joint\]\] number 1: motion must be 'translation', which is what the name 'x' of the DOF says \(name a "
+        r"rotation like theta, .*\), not 'rotation'",
     ),
     ("damping = 3.0", "damping = -3.0", r"damping must be a number, at least 0, not -3.0"),
     ('model = "chain"', 'model = "plate"', r"model must be one of beam, brick-beam, chain, not 'plate'"),
@@ -93,7 +98,11 @@ BOLTED_CHANGES = [
     ("overlap = 0.025\n", "", r"\[beams\]: the key 'overlap' is missing"),
     ('dof = "x"', 'dof = "y"', r"\[\[joint\]\] number 6: dofs must name 6 different DOFs"),
     ('dof = "z"', 'dof = "Fz"', r"\[\[joint\]\] number 5: dof must be 'z', in the order x, theta_y, y, .*, not 'Fz'"),
-    ('motion = "rotation"', 'motion = "translation"', r"number 2: motion must be 'rotation', not 'translation'"),
+    (
+        'motion = "rotation"',
+        'motion = "translation"',
+        r"number 2: motion must be 'rotation', .*'theta_y'.*, not 'translation'",
+    ),
     ("k_theta_y = [[200.0, 500.0]]", "", r"\[bands\]: the key 'k_theta_y' is missing"),
     (
         "k_theta_y = [[200.0, 500.0]]",
@@ -103,7 +112,7 @@ BOLTED_CHANGES = [
     ("block = 1", "block = 4", r"\[\[noise\]\] number 1: block must be a divisor of 6"),
     ('"compliance"]', '"decoupling-ss"]', r"\[\[noise\]\] number 1: methods must be a list of ismm, compliance"),
     ("[study]", "[study]\nrealization = 1", r"\[study\]: unknown key 'realization'; it takes realisations, seed"),
-    ('kind = "bolted-lap"', 'kind = "glued"', r"case\.toml: kind must be one of bolted-lap, not 'glued'"),
+    ('kind = "bolted-lap"', 'kind = "glued"', r"case\.toml: kind must be one of known-joint, bolted-lap, not 'glued'"),
 ]
 
 
@@ -112,7 +121,7 @@ def check(folder, case, old, new, message):
     assert old in text
     (folder / "case.toml").write_text(text.replace(old, new, 1))
     with pytest.raises(FileContentError, match=message) as error:
-        read_any_case(folder)
+        read_case(folder)
     sentence = str(error.value)
     assert sentence.startswith(str(folder / "case.toml"))
     assert "\n" not in sentence
@@ -139,10 +148,10 @@ def test_dofs_of_a_bolted_joint_in_another_order(tmp_path):
     text = text.replace('dof = "x"', 'dof = "?"').replace('dof = "y"', 'dof = "x"').replace('dof = "?"', 'dof = "y"')
     (tmp_path / "case.toml").write_text(text)
     with pytest.raises(FileContentError, match=r"number 1: dof must be 'x', in the order x, theta_y, y, .*, not 'y'"):
-        read_any_case(tmp_path)
+        read_case(tmp_path)
     (tmp_path / "case.toml").write_text(re.sub(r'\[\[joint\]\]\ndof = "theta_z"(.*\n){6}', "", text))
     with pytest.raises(FileContentError, match=r"number 1: dof must be the first of six"):
-        read_any_case(tmp_path)
+        read_case(tmp_path)
 
 
 @pytest.mark.parametrize(

@@ -76,7 +76,7 @@ def test_figures_are_written_and_nothing_else(identified):
 def test_hammer_test_that_comes_with_the_project(tmp_path):
     """Rotations by differences over +-10 mm add 1.4e-6 to the compliance 2e-4 of the rotational DOF, 0.7 %."""
     out = tmp_path / "bars"
-    result = run(BARS, *JOINT_OF_BARS, "--method", "compliance,inverse_substructuring", "--out", out)
+    result = run(BARS, *JOINT_OF_BARS, "--method", "compliance,inverse-substructuring", "--out", out)
     content = json.loads((out / "identification.json").read_text())
     fit, plain = (each["parameters"] for each in content["fits"])
     assert content["fits"][0]["noise_level"] == pytest.approx(0.01, rel=0.1)

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from jointfrf.report.plots import Figure, Panel, Surface, as_csv, draw
+from jointfrf.report.draw import draw
+from jointfrf.report.figure import Figure, Panel, Surface, figure_csv
 
 PNG = b"\x89PNG\r\n\x1a\n"
 
@@ -34,7 +35,7 @@ VIEWS = {"plane": plan_view, "space": space_view}
 
 
 def figure(surface):
-    return Figure("f", "", "", (Panel("head", "z, mm", "x, mm", surface=surface),), 1)
+    return Figure("f", "", (Panel("head", "z, mm", "x, mm", surface=surface),), 1)
 
 
 def shades(png):
@@ -56,7 +57,7 @@ def test_a_surface_is_drawn_and_drawn_alike(view):
 @pytest.mark.parametrize("view", VIEWS)
 def test_data_of_a_surface(view):
     surface = VIEWS[view]()
-    rows = list(csv.reader(io.StringIO(as_csv(figure(surface)))))[1:]
+    rows = list(csv.reader(io.StringIO(figure_csv(figure(surface)))))[1:]
     assert len(rows) == len(surface.faces)
     assert {(row[0], row[1], row[4]) for row in rows} == {("head", surface.label, "")}
     places = np.array([[float(x) for x in row[2].split()] for row in rows])

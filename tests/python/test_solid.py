@@ -6,8 +6,8 @@ from scipy.sparse import linalg as sparse_linalg
 from scipy.spatial.transform import Rotation
 
 import jointfrf as jf
-from jointfrf.dofs import rigid_motion
-from jointfrf.solids.solid import DIRECTIONS, mean_motion
+from jointfrf.dofs import DIRECTIONS, rigid_motion
+from jointfrf.solids.solid import mean_motion
 from rigid_bodies import Body, six
 
 ALUMINIUM = jf.Material(70e9, 0.33, 2700.0)

@@ -1,27 +1,23 @@
-"""Cases: finding them, running one, and writing what it yields."""
+"""Finding cases, reading one, running one and writing what it yields."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
-from concurrent.futures import Executor
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from jointfrf.cases.bolted_lap.compute import BoltedResult, compute_bolted
-from jointfrf.cases.bolted_lap.figures import bolted_figures
-from jointfrf.cases.bolted_lap.read import KIND, BoltedCase, read_bolted_case
-from jointfrf.cases.bolted_lap.tables import bolted_json, bolted_summary, bolted_tables
-from jointfrf.cases.known_joint.compute import CaseResult, compute
-from jointfrf.cases.known_joint.figures import make_figures
-from jointfrf.cases.known_joint.read import Case, read_case
-from jointfrf.cases.known_joint.tables import Table, as_csv, make_tables, to_json
-from jointfrf.cases.toml_table import read_toml
+from jointfrf.cases.definitions import read_frequency
+from jointfrf.cases.kind import Case, CaseKind
+from jointfrf.cases.kinds import KINDS
+from jointfrf.cases.toml_table import TomlTable, read_toml
+from jointfrf.cases.workers import Workers
 from jointfrf.files import write_file
-from jointfrf.report.page import make_report, summary
-from jointfrf.report.plots import Figure, draw
-from jointfrf.report.plots import as_csv as figure_as_csv
+from jointfrf.report.draw import draw
+from jointfrf.report.figure import Figure, figure_csv
+from jointfrf.report.page import Page, make_page
+from jointfrf.report.table import Table, plain_rows, table_csv
 
 __all__ = [
     "CaseOutput",
@@ -29,7 +25,9 @@ __all__ = [
     "cases_folder",
     "find_case",
     "list_cases",
-    "read_any_case",
+    "numbered",
+    "read_case",
+    "read_case_and_kind",
     "run_case",
 ]
 
@@ -44,18 +42,26 @@ class CaseOutput:
 
     Attributes
     ----------
-    result : CaseResult or BoltedResult
+    case : Case
+    result : object
+        What the `compute` of its kind returned.
     tables : list of Table
+    figures : list of Figure
     summary : list of str
         A few sentences.
     report : Path
         The HTML report; CSV, PNG and JSON files stand beside it.
+    printed : list of Table
+        The tables that are worth printing.
     """
 
-    result: CaseResult | BoltedResult
+    case: Case
+    result: Any
     tables: list[Table]
+    figures: list[Figure]
     summary: list[str]
     report: Path
+    printed: list[Table]
 
 
 def cases_folder() -> Path | None:
@@ -103,13 +109,73 @@ def find_case(word: str) -> Path:
     raise UnknownCaseError(f"there is no case {word!r}; known cases: {names}; or name a folder with a case.toml")
 
 
+def read_case(folder: Path, kinds: Mapping[str, CaseKind[Any, Any]] = KINDS) -> Case:
+    """Read a case of whatever kind its `case.toml` names.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder with `case.toml` and, where something is known about the case, `expected.toml`.
+    kinds : mapping of str to CaseKind
+        Kinds that may be named; the first is that of a file that names none.
+
+    Returns
+    -------
+    Case
+        What the `read` of its kind returned.
+
+    Raises
+    ------
+    FileContentError
+        One sentence that names the file and the key.
+    """
+    return read_case_and_kind(folder, kinds)[0]
+
+
+def read_case_and_kind(
+    folder: Path, kinds: Mapping[str, CaseKind[Any, Any]] = KINDS
+) -> tuple[Case, CaseKind[Any, Any]]:
+    """Read a case as `read_case` does, and return its kind, too."""
+    table = read_toml(folder / "case.toml")
+    path = folder / "expected.toml"
+    expected = read_toml(path) if path.is_file() else TomlTable({}, str(path))
+    kind = kinds[table.text("kind", tuple(kinds))] if "kind" in table else next(iter(kinds.values()))
+    case: Case = kind.read(_common(folder, table, expected), table, expected)
+    table.close()
+    expected.close()
+    return case, kind
+
+
+def _common(folder: Path, table: TomlTable, expected: TomlTable) -> Case:
+    """Read what every case says."""
+    title, section = table.text("title"), table.text("section")
+    freq_hz = read_frequency(table.table("frequency"))
+    study = table.table("study")
+    realisations, seed = study.whole("realisations", 1), study.whole("seed")
+    study.close()
+    return Case(
+        folder=folder.resolve(),
+        title=title,
+        section=section,
+        freq_hz=freq_hz,
+        realisations=realisations,
+        seed=seed,
+        figure_numbers=expected.table("figures").words() if "figures" in expected else {},
+    )
+
+
+def numbered(case: Case, figures: Sequence[Figure]) -> list[Figure]:
+    """Give figures their numbers in the source, where they have one."""
+    return [replace(figure, number=case.figure_numbers.get(figure.key, "")) for figure in figures]
+
+
 def run_case(
     folder: Path | str,
     out: Path | str = "results",
     *,
     realisations: int | None = None,
-    pool: Executor | None = None,
-    progress: Callable[[int, int], None] = lambda done, total: None,
+    workers: Workers | None = None,
+    kinds: Mapping[str, CaseKind[Any, Any]] = KINDS,
 ) -> CaseOutput:
     """Run a case and write its report, tables and figures.
 
@@ -122,10 +188,10 @@ def run_case(
         `figures/*.png` and `figures/*.csv`.
     realisations : int, optional
         Instead of the number that the case names.
-    pool : Executor, optional
-        Processes that share the work, see `jointfrf.cases.known_joint.study.workers`.
-    progress : callable
-        Called with the numbers of chunks done and in all.
+    workers : Workers, optional
+        Processes that share the work, see `jointfrf.cases.workers.started_workers`; this process by default.
+    kinds : mapping of str to CaseKind
+        As in `read_case`.
 
     Returns
     -------
@@ -140,49 +206,64 @@ def run_case(
     """
     if realisations is not None and realisations < 1:
         raise ValueError(f"realisations must be at least 1, not {realisations}")
-    case = read_any_case(Path(folder))
+    at_work = workers or Workers()
+    case, kind = read_case_and_kind(Path(folder), kinds)
     target = Path(out) / case.name
     for inner in ("tables", "figures"):
         (target / inner).mkdir(parents=True, exist_ok=True)
-    result, tables, figures, sentences, content = _computed(case, realisations, pool, progress)
-    drawn = list((map if pool is None else pool.map)(draw, figures))
-    for figure, png in zip(figures, drawn, strict=True):
-        write_file(target / "figures" / f"{figure.key}.png", png)
-        write_file(target / "figures" / f"{figure.key}.csv", figure_as_csv(figure))
-    for table in tables:
-        write_file(target / "tables" / f"{table.key}.csv", as_csv(table))
-    write_file(target / "results.json", json.dumps(content, indent=1) + "\n")
-    report = target / "report.html"
-    drawings = list(zip(figures, drawn, strict=True))
-    write_file(report, make_report(case, result.n_realisations, sentences, tables, drawings))
-    return CaseOutput(result, tables, sentences, report)
+    count = case.realisations if realisations is None else realisations
+    result = kind.compute(case, count, at_work)
+    tables, figures = kind.tables(result), numbered(case, kind.figures(result))
+    sentences = kind.summary(result, tables)
+    content = _common_numbers(case, count, tables) | kind.numbers(result)
+    page = Page(
+        title=case.title,
+        about=_about(case, count),
+        summary=sentences,
+        tables=tables,
+        figures=list(zip(figures, at_work.map(draw, figures), strict=True)),
+        subject="The case",
+        text=_text(case.folder / "README.md"),
+        sources=[("case.toml", _text(case.folder / "case.toml"))],
+    )
+    _write(target, page, content)
+    printed = [table for table in tables if table.key not in kind.not_printed]
+    return CaseOutput(case, result, tables, figures, sentences, target / "report.html", printed)
 
 
-def read_any_case(folder: Path) -> Case | BoltedCase:
-    """Read a case of whatever kind its `case.toml` names: a joint of known parameters by default.
-
-    Raises
-    ------
-    FileContentError
-        One sentence that names the file and the key.
-    """
-    table = read_toml(folder / "case.toml")
-    if "kind" in table and table.text("kind", (KIND,)) == KIND:
-        return read_bolted_case(folder)
-    return read_case(folder)
+def _write(folder: Path, page: Page, content: dict[str, Any]) -> None:
+    """Write a report and, beside it, its tables, figures and numbers."""
+    for figure, png in page.figures:
+        write_file(folder / "figures" / f"{figure.key}.png", png)
+        write_file(folder / "figures" / f"{figure.key}.csv", figure_csv(figure))
+    for table in page.tables:
+        write_file(folder / "tables" / f"{table.key}.csv", table_csv(table))
+    write_file(folder / "results.json", json.dumps(content, indent=1) + "\n")
+    write_file(folder / "report.html", make_page(page))
 
 
-def _computed(
-    case: Case | BoltedCase,
-    realisations: int | None,
-    pool: Executor | None,
-    progress: Callable[[int, int], None],
-) -> tuple[CaseResult | BoltedResult, list[Table], list[Figure], list[str], dict[str, Any]]:
-    """Return the result of a case, its tables, figures, summary, and numbers for JSON."""
-    if isinstance(case, BoltedCase):
-        bolted = compute_bolted(case, realisations, pool, progress)
-        tables = bolted_tables(bolted)
-        return bolted, tables, bolted_figures(bolted), bolted_summary(bolted), bolted_json(bolted, tables)
-    result = compute(case, realisations, pool, progress)
-    tables = make_tables(result)
-    return result, tables, make_figures(result), summary(result, tables), to_json(result, tables)
+def _about(case: Case, count: int) -> str:
+    freq = case.freq_hz
+    return (
+        f"Section {case.section}. {count} realisations of each noise level, seed {case.seed}; "
+        f"{freq.size} frequency lines from {freq[0]:g} to {freq[-1]:g} Hz."
+    )
+
+
+def _text(path: Path) -> str:
+    return path.read_text(encoding="utf-8") if path.is_file() else ""
+
+
+def _common_numbers(case: Case, count: int, tables: list[Table]) -> dict[str, Any]:
+    """Return what the JSON of every kind of case begins with, and its tables."""
+    return {
+        "case": case.name,
+        "title": case.title,
+        "section": case.section,
+        "realisations": count,
+        "seed": case.seed,
+        "frequency_hz": {"first": case.freq_hz[0], "last": case.freq_hz[-1], "lines": case.freq_hz.size},
+        "tables": {
+            table.key: {"title": table.title, "columns": table.columns, "rows": plain_rows(table)} for table in tables
+        },
+    }

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from jointfrf.errors import FileContentError
 
-__all__ = ["Table", "read_toml"]
+__all__ = ["TomlTable", "read_toml"]
+
+_T = TypeVar("_T")
 
 
-def read_toml(path: Path) -> Table:
+def read_toml(path: Path) -> TomlTable:
     """Read a TOML file.
 
     Raises
@@ -23,14 +25,14 @@ def read_toml(path: Path) -> Table:
         The file is missing, cannot be read, or is not TOML.
     """
     try:
-        return Table(tomllib.loads(path.read_text(encoding="utf-8")), str(path))
+        return TomlTable(tomllib.loads(path.read_text(encoding="utf-8")), str(path))
     except OSError as error:
         raise FileContentError(f"{path}: cannot be read: {error.strerror}") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise FileContentError(f"{path}: not a TOML file: {error}") from error
 
 
-class Table:
+class TomlTable:
     """One table of a TOML file.
 
     Parameters
@@ -57,8 +59,27 @@ class Table:
         """Return the exception that says what the value of a key must be."""
         return FileContentError(f"{self.where}: {key} must be {must}, not {self._content.get(key)!r}")
 
+    def build(self, builder: Callable[[], _T], key: str = "") -> _T:
+        """Call a builder; if it complains, the message names the table and, if given, the key.
+
+        Raises
+        ------
+        FileContentError
+            The builder raised a ValueError or a TypeError.
+        """
+        try:
+            return builder()
+        except (ValueError, TypeError) as error:
+            where = f"{self.where}: {key}" if key else self.where
+            raise FileContentError(f"{where}: {error}") from error
+
+    def check_different(self, key: str, names: Sequence[str], what: str = "have the same name") -> None:
+        """Raise an error where two tables of an array say the same."""
+        if len(set(names)) < len(names):
+            raise FileContentError(f"{self.where}: two tables [[{key}]] {what}")
+
     def close(self) -> None:
-        """Complain about keys that nobody asked for."""
+        """Raise an error if there is a key that nobody asked for."""
         unknown = [key for key in self._content if key not in self._asked]
         if unknown:
             raise FileContentError(f"{self.where}: unknown key {unknown[0]!r}; it takes {', '.join(self._asked)}")
@@ -120,19 +141,23 @@ class Table:
             raise self.error(key, "a list of bands [low, high] in Hz")
         return [(float(low), float(high)) for low, high in value]
 
-    def table(self, key: str) -> Table:
+    def words(self) -> dict[str, str]:
+        """Return all keys with their texts."""
+        return {key: self.text(key) for key in self._content}
+
+    def table(self, key: str) -> TomlTable:
         """Return a table inside this one."""
         value = self._value(key)
         if not isinstance(value, dict):
             raise self.error(key, "a table")
-        return Table(value, f"{self.where}: [{key}]")
+        return TomlTable(value, f"{self.where}: [{key}]")
 
-    def tables(self, key: str) -> list[Table]:
+    def tables(self, key: str) -> list[TomlTable]:
         """Return an array of at least one table."""
         value = self._value(key)
         if not isinstance(value, list) or not value or not all(isinstance(v, dict) for v in value):
             raise self.error(key, f"at least one table [[{key}]]")
-        return [Table(v, f"{self.where}: [[{key}]] number {i + 1}") for i, v in enumerate(value)]
+        return [TomlTable(v, f"{self.where}: [[{key}]] number {i + 1}") for i, v in enumerate(value)]
 
 
 def _is_number(value: Any) -> bool:

@@ -12,6 +12,8 @@ import numpy as np
 
 from jointfrf.channels.finite_differences import difference_error
 from jointfrf.channels.point_lines import Interface, interface
+from jointfrf.cli.extras import check_installed
+from jointfrf.dofs import is_rotation
 from jointfrf.errors import ConvergenceWarning, FileContentError, IdentificationWarning
 from jointfrf.identification.compliance_fit.joint_terms import CrossTerms, DampingTerms
 from jointfrf.identification.identify import identify
@@ -132,6 +134,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry out the command; the caller turns exceptions into messages."""
+    if args.out is not None:
+        check_installed("matplotlib")
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         frfs = read_uff(args.file, quantity=args.quantity).receptance()
@@ -164,7 +168,7 @@ def run(args: argparse.Namespace) -> int:
         print()
         print(fits[0].export(program, nodes[:2], rotation_nodes=nodes[2:] or None, damping=damping), end="")
     if args.out is not None:
-        from jointfrf.identification.fit_report import write_fit
+        from jointfrf.report.fit import write_fit
 
         print()
         for path in write_fit(fits, args.out, args.file.name):
@@ -174,7 +178,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _tell_differences(args: argparse.Namespace, sides: Interface) -> None:
     """Say what the central differences do to a rotational joint stiffness, before the result is read."""
-    rotations = [i for i, dof in enumerate(args.dofs) if dof.startswith("theta")]
+    rotations = [i for i, dof in enumerate(args.dofs) if is_rotation(dof)]
     if not rotations:
         return
     reach = 1 / abs(sides.transform[rotations[0]]).max() / 2
@@ -183,7 +187,7 @@ def _tell_differences(args: argparse.Namespace, sides: Interface) -> None:
         error = difference_error(reach, args.bending_stiffness, 1.0)
         print(
             f"they add about dx/(3 E I) = {error.compliance:.3g} rad/(N m) to the compliance of a rotational DOF: "
-            f"a joint much stiffer than {1 / error.compliance:.3g} N m/rad is not told from a rigid one"
+            f"a joint much stiffer than {1 / error.compliance:.3g} N m/rad cannot be distinguished from a rigid one"
         )
 
 
@@ -206,7 +210,7 @@ def _sides(args: argparse.Namespace, frfs: FrfSet) -> Interface:
             raise FileContentError(
                 f"{args.file} has no FRF at node {node}; it has nodes {', '.join(map(str, sorted(known)))}"
             )
-        if node not in places and (len(args.j) > 1 or any("theta" in dof for dof in args.dofs)):
+        if node not in places and (len(args.j) > 1 or any(is_rotation(dof) for dof in args.dofs)):
             raise FileContentError(f"{args.file} has no coordinates of node {node}: say --spacing and --axis")
     return interface(args.j, args.k, args.dofs, {node: places.get(node, np.zeros(3)) for node in (*args.j, *args.k)})
 

@@ -4,21 +4,24 @@ from __future__ import annotations
 
 import argparse
 import importlib
-import importlib.util
 import os
 import sys
 import time
 import warnings
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+from jointfrf.cli.extras import check_installed
+
+if TYPE_CHECKING:
+    from jointfrf.cases.catalogue import CaseOutput
 
 __all__ = ["main"]
 
 _USAGE_ERROR, _FAILURE, _INTERRUPTED = 2, 1, 130
-#: Tables that are printed; the others stand in the report.
-_NOT_PRINTED = ("bands", "regenerated")
 
 
 class _UsageError(Exception):
@@ -107,9 +110,9 @@ def _cores() -> int:
 
 
 def _cases(options: argparse.Namespace) -> int:
-    from jointfrf.cases.catalogue import list_cases, read_any_case
+    from jointfrf.cases.catalogue import list_cases, read_case
 
-    found = [read_any_case(folder) for folder in list_cases()]
+    found = [read_case(folder) for folder in list_cases()]
     width = max((len(case.name) for case in found), default=0)
     for case in found:
         print(f"{case.name.ljust(width)}  {case.title}")
@@ -117,12 +120,9 @@ def _cases(options: argparse.Namespace) -> int:
 
 
 def _run(options: argparse.Namespace) -> int:
-    missing = [name for name in ("matplotlib", "jinja2") if importlib.util.find_spec(name) is None]
-    if missing:
-        raise RuntimeError(f"{' and '.join(missing)} missing: reports need pip install 'jointfrf[report]'")
+    check_installed("matplotlib", "jinja2")
     from jointfrf.cases.catalogue import UnknownCaseError, find_case, list_cases, run_case
-    from jointfrf.cases.known_joint.study import workers
-    from jointfrf.cases.known_joint.tables import as_text
+    from jointfrf.cases.workers import started_workers
 
     try:
         folders = [find_case(word).resolve() for word in options.cases] or list_cases()
@@ -135,23 +135,29 @@ def _run(options: argparse.Namespace) -> int:
     if twice:
         raise _UsageError(f"two cases are called {min(twice)}: their results would overwrite each other")
     reports = []
-    with workers(options.jobs) as pool:
+    with started_workers(options.jobs) as workers:
         for folder in folders:
             start = time.perf_counter()
-            show = _progress(folder.name)
-            output = run_case(folder, options.out, realisations=options.realisations, pool=pool, progress=show)
-            case = output.result.case
-            heading = f"{case.name}: {case.title}"
-            print(f"{heading}\n{'=' * len(heading)}\n")
-            print(*(f"- {sentence}" for sentence in output.summary), "", sep="\n")
-            for table in output.tables:
-                if table.key not in _NOT_PRINTED:
-                    print(as_text(table), end="\n\n")
+            at_work = replace(workers, progress=_progress(folder.name))
+            output = run_case(folder, options.out, realisations=options.realisations, workers=at_work)
+            _show_output(output)
             print(f"{time.perf_counter() - start:.1f} s, report: {output.report}\n", flush=True)
             reports.append(output.report)
+            del output  # before the next case needs the memory
     if len(reports) > 1:
         print("Reports:", *(f"  {report}" for report in reports), sep="\n")
     return 0
+
+
+def _show_output(output: CaseOutput) -> None:
+    """Print the summary and the tables of a case."""
+    from jointfrf.report.table import as_text
+
+    heading = f"{output.case.name}: {output.case.title}"
+    print(f"{heading}\n{'=' * len(heading)}\n")
+    print(*(f"- {sentence}" for sentence in output.summary), "", sep="\n")
+    for table in output.printed:
+        print(as_text(table), end="\n\n")
 
 
 def _progress(name: str) -> Callable[[int, int], None]:

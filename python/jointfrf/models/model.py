@@ -13,7 +13,7 @@ from scipy.sparse import linalg as sparse_linalg
 from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.models.matrices import Matrix
-from jointfrf.models.receptance.receptance import Method, receptance
+from jointfrf.models.receptance.receptance import ReceptanceMethod, receptance
 
 __all__ = ["Model", "assemble"]
 
@@ -85,7 +85,7 @@ class Model:
         freq_hz: ArrayLike,
         outputs: ArrayLike | Matrix | None = None,
         inputs: ArrayLike | Matrix | None = None,
-        method: Method = "auto",
+        method: ReceptanceMethod = "auto",
     ) -> ComplexArray:
         """Receptance of the model, see `jointfrf.receptance`; `inputs` are the `outputs` by default."""
         return receptance(

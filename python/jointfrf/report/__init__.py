@@ -1,1 +1,10 @@
-"""What people look at: figures, tables, pages."""
+"""What people look at: tables, figures, pages. Of cases it knows nothing; cases and `jointfrf identify` both use it.
+
+table        a table as data; as aligned text, as CSV, and its cells as a reader wants them
+figure       a figure as data: curves, areas, levels, intervals, shaded surfaces on panels; as CSV
+axes         what several figures share: labels with units, limits of axes, percentiles
+draw         a figure drawn to a PNG file
+solid_modes  mode shapes of solids as shaded surfaces
+page         one self-contained HTML page from sentences, tables, figures and texts
+fit          the files of one identification: parameters as JSON, figures of the joint over frequency
+"""

@@ -1,51 +1,57 @@
-"""Drawings of solid models, as data."""
+"""Mode shapes of solids as shaded surfaces."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 import numpy as np
+from numpy.typing import NDArray
 
-from jointfrf.cases.known_joint.compute import Modes
-from jointfrf.report.plots import Panel, Surface
-from jointfrf.solids.solid import SolidModel
+from jointfrf.kernel.arguments import FloatArray
+from jointfrf.report.figure import Surface
 
-__all__ = ["solid_modes"]
+__all__ = ["MovingBody", "deformed_surface"]
 
 #: Largest displacement drawn, as a share of the length of the structure.
 _DEFLECTION = 0.12
 
 
-def solid_modes(modes: Modes, a: SolidModel, b: SolidModel) -> list[Panel]:
-    """Draw the mode shapes of an assembly of two solids: deformed surfaces, darker where they move more.
+@dataclass(frozen=True)
+class MovingBody:
+    """The outside of a body and how its nodes move.
+
+    Attributes
+    ----------
+    nodes : ndarray, shape (n_nodes, 3)
+        Positions, m.
+    faces : ndarray of int, shape (n_faces, 4)
+        Nodes of the quadrilaterals on the outside, counted from 0.
+    motion : ndarray, shape (n_nodes, 3)
+        Displacements, of any size.
+    """
+
+    nodes: FloatArray
+    faces: NDArray[np.integer]
+    motion: FloatArray
+
+
+def deformed_surface(bodies: Sequence[MovingBody]) -> Surface:
+    """Draw bodies in a common motion: deformed true to scale, darker where they move more, outlines at rest.
 
     Parameters
     ----------
-    modes : Modes
-        DOFs of A, then of B.
-    a, b : SolidModel
+    bodies : sequence of MovingBody
 
     Returns
     -------
-    list of Panel
-        One a mode.
+    Surface
+        Values are displacements, as shares of the largest.
     """
-    everything = np.concatenate([a.mesh.nodes, b.mesh.nodes])
-    reach = _DEFLECTION * np.ptp(everything, axis=0).max()
-    panels = []
-    for mode, freq in enumerate(modes.freq_hz):
-        shape = modes.shapes[:, mode]
-        faces, moved = [], []
-        for model, own in ((a, shape[: len(a.dofs)]), (b, shape[len(a.dofs) :])):
-            outer, _ = model.mesh.faces()
-            motion = model.displacements(own)
-            faces.append((model.mesh.nodes, motion, outer))
-            moved.append(np.linalg.norm(motion, axis=1))
-        largest = max(float(m.max()) for m in moved)
-        drawn = np.concatenate([(nodes + reach / largest * motion)[outer] for nodes, motion, outer in faces])
-        values = np.concatenate(
-            [(m / largest)[outer].mean(axis=1) for m, (_, _, outer) in zip(moved, faces, strict=True)]
-        )
-        most = f", mostly {modes.directions[mode]}" if modes.directions else ""
-        rest = np.concatenate([nodes[outer] for nodes, _, outer in faces])
-        surface = Surface(drawn, values, edges=rest)
-        panels.append(Panel(f"mode {mode + 1}: {freq:.1f} Hz{most}", "", "", surface=surface))
-    return panels
+    reach = _DEFLECTION * np.ptp(np.concatenate([body.nodes for body in bodies]), axis=0).max()
+    sizes = [np.linalg.norm(body.motion, axis=1) for body in bodies]
+    largest = max(float(size.max()) for size in sizes)
+    drawn = [(body.nodes + reach / largest * body.motion)[body.faces] for body in bodies]
+    values = [(size / largest)[body.faces].mean(axis=1) for body, size in zip(bodies, sizes, strict=True)]
+    at_rest = [body.nodes[body.faces] for body in bodies]
+    return Surface(np.concatenate(drawn), np.concatenate(values), edges=np.concatenate(at_rest))

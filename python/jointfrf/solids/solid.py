@@ -17,7 +17,6 @@ from jointfrf.solids.mesh import Mesh
 
 __all__ = ["Patch", "SolidModel", "mean_motion", "solid_model"]
 
-#: DOFs of a reference point; a node has the first three.
 #: A rotation is not held by a patch whose points stray less than this share of its extent from a line.
 _HELD = 1e-6
 

@@ -1,5 +1,13 @@
-"""A bolted lap joint from its solid model to the identified joint: case study 2 of chapter 4.
+"""A lap joint with a preloaded bolt of solid elements: measured, identified, and used again with another beam.
 
-`case_file` reads the case, `measurement` turns measured translations into the six DOFs of both sides, `study`
-calculates, `tables` and `figures` show.
+read         the case as data
+measurement  the measured points, and how the six DOFs of both sides follow
+frfs         FRFs: of the preloaded solid model, of the beams by themselves
+routes       from measured FRFs to K*(w) by several routes, and to constants by two estimators
+resonances   resonances of the tip, and errors of regenerated ones
+compute      all of these, without noise and with it
+tables       the tables
+summary      a few sentences
+figures      the figures
+kind         the six parts of the kind, for the registry
 """

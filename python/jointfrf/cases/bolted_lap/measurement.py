@@ -12,7 +12,7 @@ from jointfrf.channels.finite_differences import difference_weights
 from jointfrf.channels.virtual_point import VirtualPoint, virtual_point, virtual_points
 from jointfrf.kernel.arguments import FloatArray
 
-__all__ = ["DOFS", "Cross", "both_sides", "measured_entries"]
+__all__ = ["DOFS", "FivePoints", "both_sides", "measured_entries"]
 
 #: Order of the joint DOFs in (4.5) and (4.8).
 DOFS = ("x", "theta_y", "y", "theta_x", "z", "theta_z")
@@ -20,7 +20,7 @@ _AXES = np.eye(3)
 
 
 @dataclass(frozen=True)
-class Cross:
+class FivePoints:
     """Five triaxial points on one side of the joint: rp in the middle, 1 and 3 along z, 2 and 4 along x (figure 4-40).
 
     Attributes
@@ -82,7 +82,7 @@ def measured_entries() -> NDArray[np.bool_]:
     return known
 
 
-def both_sides(j: Cross, k: Cross) -> tuple[FloatArray, FloatArray]:
+def both_sides(j: FivePoints, k: FivePoints) -> tuple[FloatArray, FloatArray]:
     """Return the transformations (12, 30) of both sides: by central differences, and by virtual points."""
     by_differences = np.zeros((12, 30))
     by_differences[:6, :15], by_differences[6:, 15:] = j.differences, k.differences

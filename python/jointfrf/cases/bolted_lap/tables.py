@@ -6,33 +6,31 @@ from typing import Any
 
 import numpy as np
 
-from jointfrf.cases.bolted_lap.compute import BoltedResult, Found, peak_errors
-from jointfrf.cases.known_joint.read import unit_of
-from jointfrf.cases.known_joint.tables import Cell, Table, case_json, number
+from jointfrf.cases.bolted_lap.compute import BoltedLapResult
+from jointfrf.cases.bolted_lap.resonances import resonance_errors
+from jointfrf.cases.comparison import frequency_table
+from jointfrf.report.axes import percentiles
+from jointfrf.report.table import Cell, Table
 
-__all__ = ["bolted_json", "bolted_summary", "bolted_tables", "parameters"]
-
-
-def parameters(result: BoltedResult) -> list[tuple[str, str]]:
-    """Names and units of the twelve parameters."""
-    return [(f"{letter}_{dof}", unit_of(letter, "theta" in dof)) for letter in "kc" for dof in result.case.joint.dofs]
+__all__ = ["bolted_lap_numbers", "bolted_lap_tables"]
 
 
-def bolted_tables(result: BoltedResult) -> list[Table]:
+def bolted_lap_tables(result: BoltedLapResult) -> list[Table]:
     """Build all tables."""
+    transfer = f"Transfer to a beam B of {result.case.beams.lengths[2]:g} m"
     return [
         _contact(result),
         _convergence(result),
         _frequencies(result),
         _identified(result),
         _resonances(result, "resonances", "Resonances of the tip, regenerated with the identified joint"),
-        _resonances(result, "transfer", f"Transfer to a beam B of {result.case.lengths[2]:g} m", transferred=True),
+        _resonances(result, "transfer", transfer, transferred=True),
         _noise(result),
         _unmeasured(result),
     ]
 
 
-def _contact(result: BoltedResult) -> Table:
+def _contact(result: BoltedLapResult) -> Table:
     state = result.state
     cells: list[tuple[Cell, ...]] = []
     for name, one in state.interfaces.items():
@@ -53,7 +51,7 @@ def _contact(result: BoltedResult) -> Table:
     return Table("contact", "Preloaded contact", columns, tuple(cells), (), note)
 
 
-def _convergence(result: BoltedResult) -> Table:
+def _convergence(result: BoltedLapResult) -> Table:
     cells = tuple(
         (str(i + 1), str(one.closed), str(one.slipping), str(one.changed), float(one.residual))
         for i, one in enumerate(result.state.history)
@@ -63,123 +61,74 @@ def _convergence(result: BoltedResult) -> Table:
     return Table("convergence", "Convergence of the contact", columns, cells, (), note)
 
 
-def _frequencies(result: BoltedResult) -> Table:
-    expected = result.case.expected
-    cells: list[tuple[Cell, ...]] = []
-    failing = []
-    for i, freq in enumerate(result.natural_frequencies.tolist()):
-        known = expected.values[i] if expected and i < len(expected.values) else None
-        difference = None if known is None else (freq / known - 1) * 100
-        fits = difference is None or expected is None or abs(difference) <= expected.within
-        if not fits:
-            failing.append(i)
-        cells.append((str(i + 1), freq, known, difference, "" if known is None else "fits" if fits else "does not fit"))
-    columns = ("mode", "Hz", "expected Hz", "difference %", "")
-    note = expected.source if expected else ""
+def _frequencies(result: BoltedLapResult) -> Table:
+    expected, found = result.case.expected, result.natural_frequencies.tolist()
+    names = [(str(i + 1),) for i in range(len(found))]
     title = "Natural frequencies of the preloaded assembly"
-    return Table("natural-frequencies", title, columns, tuple(cells), tuple(failing), note)
+    return frequency_table(title, ("mode",), [(names, found, expected)], expected.source if expected else "")
 
 
-def _named(found: Found) -> tuple[str, str]:
-    return found.route, found.estimator
-
-
-def _identified(result: BoltedResult) -> Table:
+def _identified(result: BoltedLapResult) -> Table:
     shown = [one.found for one in result.regenerated if np.isfinite(one.found.theta).all()]
     cells: list[tuple[Cell, ...]] = []
-    for p, (name, unit) in enumerate(parameters(result)):
-        cells.append((name, unit, *(float(found.theta[p]) for found in shown)))
+    for p, parameter in enumerate(result.case.parameters):
+        cells.append((parameter, parameter.unit, *(float(found.theta[p]) for found in shown)))
     columns = ("parameter", "unit", *(f"{found.route}, {found.estimator}" for found in shown))
     note = (
         "Without noise. Band means are those of -(gamma^-1)_jk, which ISMM reduces to, over the bands of table 4-2; "
-        "the multi-point connection is condensed to six DOFs. No true values exist: the reference points take the mean "
-        "rigid motion of the faces under head and nut, with all their entries."
+        "the multi-point connection is condensed to six DOFs. There are no true values: the reference points take the "
+        "mean rigid motion of the faces under head and nut, with all their entries."
     )
     return Table("identified", "Identified joint parameters", columns, tuple(cells), (), note)
 
 
-def _resonances(result: BoltedResult, key: str, title: str, *, transferred: bool = False) -> Table:
+def _resonances(result: BoltedLapResult, key: str, title: str, *, transferred: bool = False) -> Table:
     peaks = result.transferred_peaks if transferred else result.peaks
     actual = result.transferred if transferred else result.actual
     cells: list[tuple[Cell, ...]] = []
     for one in result.regenerated:
         h = one.transferred if transferred else one.h
-        amplitude, frequency = peak_errors(result.case.freq_hz, peaks, actual, h)
-        cells.append((*_named(one.found), *(float(x) for pair in zip(frequency, amplitude, strict=True) for x in pair)))
+        amplitude, frequency = resonance_errors(result.case.freq_hz, peaks, actual, h)
+        cells.append((*one.found[:2], *(float(x) for pair in zip(frequency, amplitude, strict=True) for x in pair)))
     columns = ["joint DOFs by", "estimator"]
     for peak in peaks:
         columns += [f"{peak.direction} {peak.freq_hz:g} Hz: frequency %", "amplitude %"]
     note = (
-        "Errors (4.12) and (4.11) in percent, sought within 15 % of the actual resonance, between the lines. The last "
-        "row couples the beams by the full 6 x 6 K*(w) of the reference points. What remains is no matter of noise or "
-        "of rotations: a joint between two points has no mass, and leaves out that the beams press on each other, too."
+        "Errors (4.12) and (4.11) in percent; a resonance is sought within 15 % of the actual one, between the lines. "
+        "The last row couples the beams by the full 6 x 6 K*(w) of the reference points. What remains there comes "
+        "neither from noise nor from rotations: a joint between two points has no mass, and the beams also press on "
+        "each other, which it leaves out."
     )
     return Table(key, title, tuple(columns), tuple(cells), (), note)
 
 
-def _noise(result: BoltedResult) -> Table:
+def _noise(result: BoltedLapResult) -> Table:
     cells: list[tuple[Cell, ...]] = []
-    free = {_named(one.found): one.found.theta for one in result.regenerated}
+    free = {one.found[:2]: one.found.theta for one in result.regenerated}
     for study in result.noisy:
         reference = free[study.route, study.estimator]
-        for p, (name, unit) in enumerate(parameters(result)):
-            low, middle, high = (float(x) for x in np.percentile(study.theta[:, p], [2.5, 50, 97.5]))
-            named = (study.noise, study.route, study.estimator, name, unit)
-            cells.append((*named, float(reference[p]), middle, low, high))
+        for p, parameter in enumerate(result.case.parameters):
+            low, median, high = percentiles(study.theta[:, p])
+            named = (study.noise, study.route, study.estimator, parameter, parameter.unit)
+            cells.append((*named, float(reference[p]), median, low, high))
     columns = ("noise", "joint DOFs by", "estimator", "parameter", "unit", "without noise", "median", "2.5 %", "97.5 %")
     title = f"Identified joint parameters with noise, {result.n_realisations} realisations"
     return Table("noise", title, columns, tuple(cells))
 
 
-def _unmeasured(result: BoltedResult) -> Table:
-    joint = result.case.joint
-    actual = np.concatenate([np.diagonal(joint.stiffness), np.diagonal(joint.damping)])
+def _unmeasured(result: BoltedLapResult) -> Table:
     cells: list[tuple[Cell, ...]] = []
-    for p, (name, unit) in enumerate(parameters(result)):
-        ratios = (float(one.theta[p] / actual[p]) for one in result.unmeasured)
-        cells.append((name, unit, float(actual[p]), *ratios))
+    for p, (parameter, actual) in enumerate(zip(result.case.parameters, result.case.actual, strict=True)):
+        ratios = (float(one.theta[p] / actual) for one in result.unmeasured)
+        cells.append((parameter, parameter.unit, float(actual), *ratios))
     columns = ("parameter", "unit", "actual", *(f"{one.name}: found / actual" for one in result.unmeasured))
     note = "Exact FRFs of the beams with the joint of table 4-1; the entries named are set to zero."
     return Table("unmeasured", "Effect of entries that cannot be measured (4.3.3.1)", columns, tuple(cells), (), note)
 
 
-def _worst(result: BoltedResult, route: str, estimator: str, direction: str, *, transferred: bool = False) -> float:
-    peaks = result.transferred_peaks if transferred else result.peaks
-    actual = result.transferred if transferred else result.actual
-    one = next(r for r in result.regenerated if (r.found.route, r.found.estimator) == (route, estimator))
-    _, errors = peak_errors(result.case.freq_hz, peaks, actual, one.transferred if transferred else one.h)
-    own = [float(e) for e, peak in zip(errors, peaks, strict=True) if peak.direction == direction]
-    return max(own, default=0.0)
-
-
-def bolted_summary(result: BoltedResult) -> list[str]:
-    """Say in a few sentences what came out."""
-    state = result.state
-    slipping = sum(int(np.count_nonzero(one.slipping)) for one in state.interfaces.values())
-    sentences = [
-        f"A preload of {number(state.force)} N stretches the bolt by {1e6 * state.elongation:.1f} um; the contact "
-        f"converged in {len(state.history)} iterations, {slipping} pairs slip, the lap is closed up to "
-        f"{1e3 * state.contact_radius:.1f} mm from the axis.",
-    ]
-    frequencies = _frequencies(result)
-    known = sum(row[2] is not None for row in frequencies.rows)
-    if known:
-        sentences.append(f"{known - len(frequencies.failing)} of {known} natural frequencies agree with the expected.")
-    routes = dict.fromkeys((one.found.route, one.found.estimator) for one in result.regenerated)
-    for transferred, what in ((False, "Regenerated"), (True, "Transferred to the other beam B")):
-        each = "; ".join(
-            f"{route} ({estimator}) "
-            + " / ".join(number(_worst(result, route, estimator, d, transferred=transferred), 2) for d in "yx")
-            for route, estimator in routes
-        )
-        sentences.append(f"{what}: largest error of a resonance in y / x, percent: {each}.")
-    return sentences
-
-
-def bolted_json(result: BoltedResult, tables: list[Table]) -> dict[str, Any]:
-    """Return all numbers of a case as a structure for JSON."""
+def bolted_lap_numbers(result: BoltedLapResult) -> dict[str, Any]:
+    """Return the numbers of a case for JSON, beside its tables."""
     return {
-        **case_json(result.case, result.n_realisations, tables),
         "n_dofs": result.n_dofs,
         "preload_newton": result.state.force,
         "elongation_m": result.state.elongation,

@@ -1,1 +1,17 @@
-"""A kind of case: two substructures and a joint of known parameters, identified from polluted FRFs."""
+"""Two simulated substructures and a joint of known parameters: identified from noisy FRFs, many times over.
+
+read           the case as data
+substructures  the two structures: chain, beam, beam of bricks
+expected       what the source says about the case: tables, errors of regenerated FRFs
+exact          FRFs without noise
+methods        K*(w) line by line, by each method
+study          many realisations of the noise: identified parameters
+regenerate     FRFs of the assembly from identified parameters, and their errors
+noise_free     how exact the equations are without noise
+modes          mode shapes of the assembly, and drawings of them
+compute        all of these, one after the other
+tables         numbers beside those of the source
+summary        a few sentences
+figures        the figures
+kind           the six parts of the kind, for the registry
+"""

@@ -1,19 +1,20 @@
-"""What is known about a case: reading and checking its `expected.toml`."""
+"""What the source says about a case of a known joint: its `expected.toml`."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
-from typing import get_args
 
-from jointfrf.cases.toml_table import Table, read_toml
+from jointfrf.cases.comparison import ExpectedFrequencies, read_expected_frequencies
+from jointfrf.cases.fitting import METHODS
+from jointfrf.cases.toml_table import TomlTable
+from jointfrf.dofs import Parameter
 from jointfrf.frf.bands import Band
-from jointfrf.identification.identify import IdentificationMethod
 
-__all__ = ["METHODS", "Expected", "ExpectedErrors", "ExpectedTable", "Known", "read_expected"]
+__all__ = ["Expected", "ExpectedErrors", "ExpectedParameters", "Known", "read_expected"]
 
-METHODS: tuple[str, ...] = get_args(IdentificationMethod)
+#: Share of the realisations that a published value fits inside, percent, unless the file says otherwise.
+_CENTRAL = 98.0
 
 
 @dataclass(frozen=True)
@@ -22,22 +23,23 @@ class Known:
 
     Attributes
     ----------
-    parameters, band_sets : tuple of str
+    parameters : tuple of Parameter
+    band_sets : tuple of str
     methods : mapping of str to tuple of str
         Noise to the methods that are applied to it.
     observed : mapping of str to tuple of (low, high)
         FRF to the bands where errors of regenerated ones are counted, Hz.
     """
 
-    parameters: tuple[str, ...]
+    parameters: tuple[Parameter, ...]
     band_sets: tuple[str, ...]
     methods: Mapping[str, tuple[str, ...]]
     observed: Mapping[str, tuple[Band, ...]]
 
 
 @dataclass(frozen=True)
-class ExpectedTable:
-    """Published numbers of one identification: parameter to value, and the largest errors allowed, percent.
+class ExpectedParameters:
+    """Published parameters of one identification, and the largest errors allowed, percent.
 
     A value fits inside the `central` percent of the realisations.
     """
@@ -46,9 +48,9 @@ class ExpectedTable:
     noise: str
     method: str
     bands: str
-    values: dict[str, float]
-    rmse_below: dict[str, float]
-    central: float = 98.0
+    values: dict[Parameter, float]
+    rmse_below: dict[Parameter, float]
+    central: float = _CENTRAL
 
 
 @dataclass(frozen=True)
@@ -66,60 +68,43 @@ class ExpectedErrors:
 
 @dataclass(frozen=True)
 class Expected:
-    """What is known about a case: natural frequencies in Hz, tables, and the numbers of the source's figures."""
+    """What is known about a case.
 
-    frequencies: tuple[tuple[str, str, tuple[float, ...], float], ...] = ()
-    tables: tuple[ExpectedTable, ...] = ()
-    errors: tuple[ExpectedErrors, ...] = ()
-    figures: tuple[tuple[str, str], ...] = ()
+    Attributes
+    ----------
+    frequencies : dict of str to ExpectedFrequencies
+        Natural frequencies of the assembly with the ``"actual"`` or the ``"initial"`` joint.
+    tables : tuple of ExpectedParameters
+    errors : tuple of ExpectedErrors
+    """
 
-    def figure(self, key: str) -> str:
-        """Return the number of a figure in the source, or an empty text."""
-        return dict(self.figures).get(key, "")
+    frequencies: dict[str, ExpectedFrequencies]
+    tables: tuple[ExpectedParameters, ...]
+    errors: tuple[ExpectedErrors, ...]
 
 
-def read_expected(path: Path, known: Known) -> Expected:
-    """Read an `expected.toml`.
+def read_expected(table: TomlTable, known: Known) -> Expected:
+    """Read the keys of this kind from `expected.toml`.
 
     Raises
     ------
     FileContentError
         One sentence that names the file and the key.
     """
-    table = read_toml(path)
-    frequencies = []
-    for entry in table.tables("frequencies") if "frequencies" in table else []:
-        joint = entry.text("joint", ("actual", "initial"))
-        frequencies.append(
-            (joint, entry.text("source"), tuple(entry.numbers("values")), entry.number("within_percent", 0))
-        )
-        entry.close()
-    tables = []
-    for entry in table.tables("identified") if "identified" in table else []:
-        source, noise, method = _applied(entry, known)
-        bands = "" if method == "compliance" else entry.text("bands", known.band_sets)
-        columns: list[dict[str, float]] = []
-        for key in ("values", "rmse_below"):
-            column = {}
-            if key in entry:
-                inner = entry.table(key)
-                column = {parameter: inner.number(parameter) for parameter in known.parameters if parameter in inner}
-                inner.close()
-            columns.append(column)
-        central = entry.number("central_percent", 0) if "central_percent" in entry else 98.0
-        tables.append(ExpectedTable(source, noise, method, bands, columns[0], columns[1], central))
-        entry.close()
-    regenerated = table.tables("regenerated") if "regenerated" in table else []
-    errors = [_expected_errors(entry, known) for entry in regenerated]
-    figures: tuple[tuple[str, str], ...] = ()
-    if "figures" in table:
-        inner = table.table("figures")
-        figures = tuple((key, inner.text(key)) for key in inner.keys())  # noqa: SIM118
-    table.close()
-    return Expected(tuple(frequencies), tuple(tables), tuple(errors), figures)
+
+    def entries(key: str) -> list[TomlTable]:
+        return table.tables(key) if key in table else []
+
+    joints = [(entry.text("joint", ("actual", "initial")), entry) for entry in entries("frequencies")]
+    table.check_different("frequencies", [joint for joint, _ in joints], "name the same joint")
+    return Expected(
+        {joint: read_expected_frequencies(entry) for joint, entry in joints},
+        tuple(_expected_parameters(entry, known) for entry in entries("identified")),
+        tuple(_expected_errors(entry, known) for entry in entries("regenerated")),
+    )
 
 
-def _applied(entry: Table, known: Known) -> tuple[str, str, str]:
+def _applied(entry: TomlTable, known: Known) -> tuple[str, str, str]:
     """Return source, noise and method of an expected table."""
     source, noise = entry.text("source"), entry.text("noise", tuple(known.methods))
     method = entry.text("method", METHODS)
@@ -128,7 +113,25 @@ def _applied(entry: Table, known: Known) -> tuple[str, str, str]:
     return source, noise, method
 
 
-def _expected_errors(entry: Table, known: Known) -> ExpectedErrors:
+def _expected_parameters(entry: TomlTable, known: Known) -> ExpectedParameters:
+    source, noise, method = _applied(entry, known)
+    bands = "" if method == "compliance" else entry.text("bands", known.band_sets)
+    values, rmse_below = (_by_parameter(entry, key, known) for key in ("values", "rmse_below"))
+    central = entry.number("central_percent", 0) if "central_percent" in entry else _CENTRAL
+    entry.close()
+    return ExpectedParameters(source, noise, method, bands, values, rmse_below, central)
+
+
+def _by_parameter(entry: TomlTable, key: str, known: Known) -> dict[Parameter, float]:
+    if key not in entry:
+        return {}
+    inner = entry.table(key)
+    found = {parameter: inner.number(parameter.name) for parameter in known.parameters if parameter.name in inner}
+    inner.close()
+    return found
+
+
+def _expected_errors(entry: TomlTable, known: Known) -> ExpectedErrors:
     source, noise, method = _applied(entry, known)
     key = entry.text("observed", tuple(known.observed))
     bands = entry.bands("band")

@@ -20,10 +20,10 @@ from jointfrf.models.receptance.krylov import reduce_model, spot_error
 from jointfrf.models.receptance.modal import Modes, all_modes
 from jointfrf.models.receptance.rigid_modes import find_rigid_modes, mode_condition
 
-__all__ = ["Method", "ReceptanceInfo", "receptance"]
+__all__ = ["ReceptanceInfo", "ReceptanceMethod", "receptance"]
 
 Direct = Literal["dense", "banded", "sparse"]
-Method = Literal["auto", "dense", "banded", "sparse", "modal", "krylov"]
+ReceptanceMethod = Literal["auto", "dense", "banded", "sparse", "modal", "krylov"]
 
 #: A matrix with a wider band than this share of its size is solved as a dense one.
 _BAND_LIMIT = 0.25
@@ -93,7 +93,7 @@ def receptance(
     structural_damping: Matrix | None = ...,
     outputs: ArrayLike | Matrix | None = ...,
     inputs: ArrayLike | Matrix | None = ...,
-    method: Method = ...,
+    method: ReceptanceMethod = ...,
     *,
     on_singular: OnSingular = ...,
     out: ComplexArray | None = ...,
@@ -112,7 +112,7 @@ def receptance(
     structural_damping: Matrix | None = ...,
     outputs: ArrayLike | Matrix | None = ...,
     inputs: ArrayLike | Matrix | None = ...,
-    method: Method = ...,
+    method: ReceptanceMethod = ...,
     *,
     on_singular: OnSingular = ...,
     out: ComplexArray | None = ...,
@@ -130,7 +130,7 @@ def receptance(
     structural_damping: Matrix | None = None,
     outputs: ArrayLike | Matrix | None = None,
     inputs: ArrayLike | Matrix | None = None,
-    method: Method = "auto",
+    method: ReceptanceMethod = "auto",
     *,
     on_singular: OnSingular = "raise",
     out: ComplexArray | None = None,
@@ -218,7 +218,7 @@ def receptance(
     >>> info.method, info.reason
     ('banded', 'narrow band: 3 diagonals below and 3 above the main one')
     """
-    check_choice("method", method, get_args(Method))
+    check_choice("method", method, get_args(ReceptanceMethod))
     freq = as_frequency(freq_hz)
     matrices = ModelMatrices(stiffness, mass, damping, structural_damping, as_number("loss_factor", loss_factor))
     n = matrices.n

@@ -1,137 +1,52 @@
-"""Figures for an engineering report: what a figure shows as data, drawn by matplotlib without global state."""
+"""Figures drawn by matplotlib, without global state."""
 
 from __future__ import annotations
 
-import csv
 import io
-from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from jointfrf.frf.bands import Band
-from jointfrf.kernel.arguments import FloatArray
+from jointfrf.report.figure import Figure, Panel, Surface
 
-__all__ = ["Curve", "Figure", "Interval", "Level", "Panel", "Ribbon", "Surface", "as_csv", "draw", "symbol"]
+__all__ = ["STYLES", "Style", "draw"]
 
-#: (colour, line style, width): told apart by lightness and dashes when printed grey.
-STYLES: dict[str, tuple[str, str, float]] = {
-    "actual": ("#000000", "-", 1.5),
-    "initial": ("#8c8c8c", "--", 1.2),
-    "measured": ("#e07b00", "-", 0.7),
-    "ismm": ("#1b4f9c", "-", 1.1),
-    "inverse-substructuring": ("#1b4f9c", "--", 1.1),
-    "compliance": ("#e07b00", "-.", 1.5),
-    "decoupling-rr": ("#c0392b", "--", 1.1),
-    "decoupling-rs": ("#5aa469", ":", 1.5),
-    "decoupling-sr": ("#9b72b0", (0, (3, 1, 1, 1)), 1.1),  # type: ignore[dict-item]
-    "decoupling-ss": ("#d96a9a", (0, (6, 2)), 1.3),  # type: ignore[dict-item]
-    "low": ("#2f7fbf", ":", 1.4),
-    "high": ("#e07b00", "--", 1.2),
-    "faint": ("#6b6b6b", "-", 0.4),
+
+class Style(NamedTuple):
+    """How a curve is drawn; dashes as matplotlib takes them."""
+
+    colour: str
+    dashes: Any
+    width: float
+    marker: str = ""
+
+
+#: Told apart by lightness and dashes when printed grey.
+STYLES = {
+    "actual": Style("#000000", "-", 1.5),
+    "initial": Style("#8c8c8c", "--", 1.2),
+    "measured": Style("#e07b00", "-", 0.7),
+    "ismm": Style("#1b4f9c", "-", 1.1),
+    "inverse-substructuring": Style("#1b4f9c", "--", 1.1),
+    "compliance": Style("#e07b00", "-.", 1.5),
+    "decoupling-rr": Style("#c0392b", "--", 1.1),
+    "decoupling-rs": Style("#5aa469", ":", 1.5),
+    "decoupling-sr": Style("#9b72b0", (0, (3, 1, 1, 1)), 1.1),
+    "decoupling-ss": Style("#d96a9a", (0, (6, 2)), 1.3),
+    "low": Style("#2f7fbf", ":", 1.4),
+    "high": Style("#e07b00", "--", 1.2),
+    "faint": Style("#6b6b6b", "-", 0.4),
+    "dots": Style("#8c8c8c", "", 1.0, "."),
 }
 _SHADES = ("#ececec", "#d2d2d2", "#bdbdbd")
-_RESOLUTION = 130
+_RESOLUTION, _MARKER = 130, 2.5
+_HEADING = 10
 #: Size of a figure, inches: fits the text width of A4.
 _WIDTH, _PANEL_HEIGHT, _SPACE_HEIGHT = 7.0, 2.75, 1.5
 #: Directions on the page of a drawing in space, to the right and up, and towards the reader: z lies along, y up.
 _VIEW = np.array([[-0.419, 0.0, 0.908], [0.410, 0.893, 0.189], [-0.810, 0.451, -0.374]])
 _FONTS = {"font.size": 8.5, "axes.titlesize": 9, "legend.fontsize": 7.5, "axes.grid": True, "grid.alpha": 0.3,
           "grid.linewidth": 0.5, "axes.axisbelow": True, "lines.solid_capstyle": "round"}  # fmt: skip
-
-
-@dataclass(frozen=True)
-class Curve:
-    """A line: y over x, drawn in one of the styles."""
-
-    label: str
-    x: FloatArray
-    y: FloatArray
-    style: str
-
-
-@dataclass(frozen=True)
-class Ribbon:
-    """The area between two curves."""
-
-    label: str
-    x: FloatArray
-    low: FloatArray
-    high: FloatArray
-    style: str
-
-
-@dataclass(frozen=True)
-class Level:
-    """A value: a horizontal line, over `bands` only if they are given."""
-
-    label: str
-    value: float
-    style: str
-    bands: tuple[Band, ...] = ()
-
-
-@dataclass(frozen=True)
-class Interval:
-    """A median with its 2.5 and 97.5 percentiles, and a published value beside it."""
-
-    label: str
-    low: float
-    median: float
-    high: float
-    published: float | None = None
-
-
-@dataclass(frozen=True)
-class Surface:
-    """Quadrilaterals shaded by a value: in space, shape (n, 4, 3), seen from one side; or in a plane, (n, 4, 2).
-
-    `edges` are other quadrilaterals of which only the outline is drawn.
-    """
-
-    faces: FloatArray
-    values: FloatArray
-    label: str = ""
-    edges: FloatArray | None = None
-
-
-@dataclass(frozen=True)
-class Panel:
-    """Axes of a figure.
-
-    `shades` are (label, bands) in Hz; `strips` are bands drawn as bars at the bottom.
-    """
-
-    title: str
-    x_label: str
-    y_label: str
-    curves: tuple[Curve, ...] = ()
-    ribbons: tuple[Ribbon, ...] = ()
-    levels: tuple[Level, ...] = ()
-    intervals: tuple[Interval, ...] = ()
-    shades: tuple[tuple[str, tuple[Band, ...]], ...] = ()
-    strips: tuple[tuple[str, tuple[Band, ...]], ...] = ()
-    log_y: bool = False
-    x_limits: tuple[float, float] | None = None
-    y_limits: tuple[float, float] | None = None
-    surface: Surface | None = None
-
-
-@dataclass(frozen=True)
-class Figure:
-    """A figure: file name, caption, number in the source (or empty), and panels in rows of `columns`."""
-
-    key: str
-    caption: str
-    number: str
-    panels: tuple[Panel, ...] = field(default=())
-    columns: int = 1
-
-
-def symbol(parameter: str) -> str:
-    """Write a parameter or DOF name as a formula, "k_Mtheta" as k with index M theta."""
-    letter, _, index = parameter.partition("_")
-    return f"${letter}_{{{index.replace('theta', chr(92) + 'theta ').strip()}}}$"
 
 
 def draw(figure: Figure) -> bytes:
@@ -169,6 +84,8 @@ def draw(figure: Figure) -> bytes:
             else:
                 (_draw_intervals if panel.intervals else _draw_curves)(ax, panel)
         _add_legend(canvas, axes)
+        if figure.heading:
+            canvas.suptitle(figure.heading, fontsize=_HEADING)
         png = io.BytesIO()
         # No version inside: the same data give the same file.
         canvas.savefig(png, format="png", dpi=_RESOLUTION, metadata={"Software": None})
@@ -195,13 +112,14 @@ def _draw_curves(ax: Any, panel: Panel) -> None:
         for b, (low, high) in enumerate(bands):
             ax.axvspan(low, high, color=_SHADES[i % len(_SHADES)], lw=0, zorder=0, label=None if b else label)
     for ribbon in panel.ribbons:
-        colour = STYLES[ribbon.style][0]
+        colour = STYLES[ribbon.style].colour
         ax.fill_between(ribbon.x, ribbon.low, ribbon.high, color=colour, alpha=0.3, lw=0, label=ribbon.label)
     for curve in panel.curves:
-        colour, dashes, width = STYLES[curve.style]
-        ax.plot(curve.x, curve.y, color=colour, ls=dashes, lw=width, label=curve.label or None)
+        colour, dashes, width, marker = STYLES[curve.style]
+        look = {"color": colour, "ls": dashes, "lw": width, "marker": marker, "ms": _MARKER}
+        ax.plot(curve.x, curve.y, label=curve.label or None, **look)
     for level in panel.levels:
-        colour, dashes, width = STYLES[level.style]
+        colour, dashes, width, _ = STYLES[level.style]
         if not level.bands:
             ax.axhline(level.value, color=colour, ls=dashes, lw=width, label=level.label)
         for b, (low, high) in enumerate(level.bands):
@@ -251,46 +169,16 @@ def _draw_intervals(ax: Any, panel: Panel) -> None:
     places = np.arange(len(panel.intervals))[::-1]
     middle = np.array([i.median for i in panel.intervals])
     spread = np.array([[i.median - i.low for i in panel.intervals], [i.high - i.median for i in panel.intervals]])
-    colour = STYLES["ismm"][0]
+    colour = STYLES["ismm"].colour
     ax.errorbar(middle, places, xerr=spread, fmt="o", color=colour, ms=4, capsize=3, lw=1.3, label="median, 2.5-97.5 %")
     known = [(i.published, place) for i, place in zip(panel.intervals, places, strict=True) if i.published is not None]
     if known:
         ax.plot(*zip(*known, strict=True), "D", color="#e07b00", mec="black", mew=0.6, ms=5, label="thesis")
     for level in panel.levels:
-        shade, dashes, width = STYLES[level.style]
+        shade, dashes, width, _ = STYLES[level.style]
         ax.axvline(level.value, color=shade, ls=dashes, lw=width, label=level.label, zorder=1)
     ax.set_yticks(places, [i.label for i in panel.intervals])
     ax.set_ylim(-0.7, len(places) - 0.3)
     if panel.x_limits:
         ax.set_xlim(*panel.x_limits)
     ax.set(title=panel.title or None, xlabel=panel.x_label, ylabel=panel.y_label or None)
-
-
-def as_csv(figure: Figure) -> str:
-    """Write the data of a figure as CSV, a line for each point: panel, curve, x, y and the upper limit of an area."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["panel", "curve", "x", "y", "y_high"])
-    for number, panel in enumerate(figure.panels, 1):
-        name = panel.title or str(number)
-        for curve in panel.curves:
-            writer.writerows(
-                (name, curve.label, x, y, "") for x, y in zip(curve.x.tolist(), curve.y.tolist(), strict=True)
-            )
-        for area in panel.ribbons:
-            columns = (area.x.tolist(), area.low.tolist(), area.high.tolist())
-            writer.writerows((name, area.label, *point) for point in zip(*columns, strict=True))
-        writer.writerows((name, level.label, "", level.value, "") for level in panel.levels)
-        for interval in panel.intervals:
-            label = interval.label.replace("\n", ", ")
-            writer.writerow((name, f"{label}: median", "", interval.median, ""))
-            writer.writerow((name, f"{label}: 2.5 to 97.5 %", "", interval.low, interval.high))
-            if interval.published is not None:
-                writer.writerow((name, f"{label}: thesis", "", interval.published, ""))
-        if panel.surface is not None:
-            middles = panel.surface.faces.mean(axis=1)
-            for middle, value in zip(middles.tolist(), panel.surface.values.tolist(), strict=True):
-                writer.writerow((name, panel.surface.label, " ".join(f"{x:.9g}" for x in middle), value, ""))
-        for label, bands in (*panel.shades, *panel.strips):
-            writer.writerows((name, label, f"{low:g}-{high:g}", "", "") for low, high in bands)
-    return text.getvalue()

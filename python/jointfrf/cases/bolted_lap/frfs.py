@@ -1,0 +1,131 @@
+"""FRFs of a bolted lap joint: of the preloaded solid model, and of the beams by themselves."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from jointfrf.cases.bolted_lap.measurement import DOFS, FivePoints
+from jointfrf.cases.bolted_lap.read import BoltedLapCase
+from jointfrf.dofs import DIRECTIONS
+from jointfrf.errors import IllConditionedWarning
+from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.solids.bolted_lap import BoltedLap, bolted_lap
+from jointfrf.solids.brick_beam import Hole, brick_beam
+from jointfrf.solids.contact_pairs import ContactLaw
+from jointfrf.solids.interpolation import interpolation
+from jointfrf.solids.mesh import Mesh
+from jointfrf.solids.preload import PreloadedLap, preload
+from jointfrf.solids.solid import Patch, SolidModel, mean_motion
+from jointfrf.substructuring.coupling import couple
+
+__all__ = ["JOINT_DOFS", "TIP_DIRECTIONS", "BeamFrfs", "SolidFrfs", "beam_frfs", "solid_frfs"]
+
+#: Directions in which FRFs of the tip are compared.
+TIP_DIRECTIONS = ("x", "y")
+#: The joint DOFs among those of either beam.
+JOINT_DOFS = list(range(6))
+
+
+@dataclass(frozen=True)
+class SolidFrfs:
+    """The preloaded solid model and its FRFs.
+
+    Attributes
+    ----------
+    state : PreloadedLap
+    model : SolidModel
+    points : tuple of FivePoints
+        Measured points on sides j and k.
+    channels : ndarray, shape (n_freq, 30, 30)
+        Between the measured channels, m/N; empty where only the tip was asked for.
+    reference : ndarray, shape (n_freq, 12, 12)
+        Between reference points with six DOFs on both sides; empty as above.
+    tip : ndarray, shape (n_freq, 2)
+        Of the tip in `TIP_DIRECTIONS`.
+    """
+
+    state: PreloadedLap
+    model: SolidModel
+    points: tuple[FivePoints, FivePoints]
+    channels: ComplexArray
+    reference: ComplexArray
+    tip: ComplexArray
+
+
+@dataclass(frozen=True)
+class BeamFrfs:
+    """FRFs of the substructures: A at the joint; B at the joint, and at its tip in `TIP_DIRECTIONS`."""
+
+    h_a: ComplexArray
+    h_b: ComplexArray
+
+    def coupled(self, k_joint: ComplexArray) -> ComplexArray:
+        """Receptance of the assembly through a joint: DOFs of A, then of B (2.26)."""
+        return couple(self.h_a, self.h_b, k_joint, JOINT_DOFS, JOINT_DOFS)
+
+    def tip(self, k_joint: ComplexArray) -> ComplexArray:
+        """FRFs of the tip of the assembly through an identified joint, shape (n_freq, 2)."""
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", IllConditionedWarning)  # identified joints may be absurd
+            h_c = self.coupled(k_joint)
+        return np.stack([h_c[:, at, at] for at in (12, 13)], axis=1)
+
+
+def solid_frfs(case: BoltedLapCase, length_b: float, measured: bool) -> SolidFrfs:
+    """Preload, linearise, and take the FRFs: all, or at the tip only."""
+    lap = _lap(case, length_b)
+    state = preload(lap, case.preload, ContactLaw(friction=case.friction))
+    model = state.model()
+    height = case.beams.height
+    on_j, on_k = (lap.axis + np.array([0, y, 0]) for y in (height, -height))
+    points = (FivePoints(on_j, case.spacing), FivePoints(on_k, case.spacing))
+    weights = [_tip(model.mesh)]
+    if measured:
+        weights += [interpolation(model.mesh, *side.channels) for side in points]
+        rings = (lap.interfaces["head"].lower, lap.interfaces["nut"].upper)
+        weights += [_mean(model.mesh, ring, at, DOFS) for ring, at in zip(rings, (on_j, on_k), strict=True)]
+    h = model.receptance(case.freq_hz, sparse.vstack(weights) @ model.expansion)
+    return SolidFrfs(
+        state, model, points, h[:, 2:32, 2:32].copy(), h[:, 32:, 32:].copy(),
+        np.stack([h[:, 0, 0], h[:, 1, 1]], axis=1),
+    )  # fmt: skip
+
+
+def _lap(case: BoltedLapCase, length_b: float) -> BoltedLap:
+    beams = case.beams
+    return bolted_lap(
+        (beams.lengths[0], length_b), (beams.height, beams.height), beams.width, beams.overlap, beams.hole_radius,
+        case.bolt, materials=(beams.material, beams.material), preset=beams.preset,
+    )  # fmt: skip
+
+
+def _tip(mesh: Mesh) -> sparse.csr_array:
+    """Weights of all nodes for the mean motion of the end of B."""
+    nodes = mesh.nodes
+    end = np.flatnonzero(nodes[:, 2] > nodes[:, 2].max() - 1e-9).astype(np.int32)
+    return _mean(mesh, end, nodes[end].mean(axis=0), TIP_DIRECTIONS)
+
+
+def _mean(mesh: Mesh, nodes: NDArray[np.int32], point: FloatArray, dofs: tuple[str, ...]) -> sparse.csr_array:
+    """Weights of all nodes for the mean rigid motion of some about a point, DOFs in the order asked for."""
+    return mean_motion(mesh, Patch(point, nodes))[[DIRECTIONS.index(dof) for dof in dofs]]
+
+
+def beam_frfs(case: BoltedLapCase, length_b: float) -> BeamFrfs:
+    """FRFs of the beams by themselves, with reference points where the bolt presses."""
+    beams = case.beams
+    size = (beams.width, beams.height, beams.material)
+    start = beams.overlap / 2
+    hole_a = Hole(beams.lengths[0] - start, beams.hole_radius, case.bolt.head_radius, "top", "joint")
+    hole_b = Hole(start, beams.hole_radius, case.bolt.nut_radius, "bottom", "joint")
+    a = brick_beam(beams.lengths[0], *size, ends=("clamped", "free"), hole=hole_a, preset=beams.preset)
+    b = brick_beam(length_b, *size, hole=hole_b, observed={"tip": length_b}, preset=beams.preset)
+    joint = [f"joint:{dof}" for dof in DOFS]
+    tip = [f"tip:{axis}" for axis in TIP_DIRECTIONS]
+    h_a, h_b = (model.receptance(case.freq_hz, model.ports(*names)) for model, names in ((a, joint), (b, joint + tip)))
+    return BeamFrfs(h_a, h_b)

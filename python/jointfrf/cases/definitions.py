@@ -1,0 +1,186 @@
+"""What several kinds of cases say: frequency lines, a joint, bands, noise, observed FRFs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import cast, get_args
+
+import numpy as np
+
+from jointfrf.cases.fitting import METHODS
+from jointfrf.cases.toml_table import TomlTable
+from jointfrf.dofs import Parameter, is_rotation, joint_parameters
+from jointfrf.frf.bands import Band, in_bands
+from jointfrf.frf.noise import NoiseKind, NoiseReference, pollute, realisations
+from jointfrf.joint import Joint
+from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.solids.brick import Material
+
+__all__ = [
+    "BandSet",
+    "Noise",
+    "Observed",
+    "actual_values",
+    "check_bands",
+    "read_bands",
+    "read_frequency",
+    "read_joint",
+    "read_material",
+    "read_noises",
+]
+
+_MOTIONS = ("translation", "rotation")
+_MOST_LINES = 1_000_000
+
+
+@dataclass(frozen=True)
+class Observed:
+    """An FRF of the assembly that is looked at: response and force at one DOF of an internal point.
+
+    Attributes
+    ----------
+    key : str
+        "r" or "s", and the direction where a case names some: "s-Fx".
+    point : str
+        "r" or "s".
+    dof : int
+        DOF of the point, in the order of the joint's.
+    bands : tuple of (low, high)
+        Where errors of regenerated FRFs are counted, Hz; all lines if empty.
+    """
+
+    key: str
+    point: str
+    dof: int
+    bands: tuple[Band, ...] = ()
+
+
+@dataclass(frozen=True)
+class BandSet:
+    """Sensitive bands of every parameter, (low, high) in Hz."""
+
+    name: str
+    bands: dict[Parameter, list[Band]]
+
+
+@dataclass(frozen=True)
+class Noise:
+    """A level of noise, as `jointfrf.pollute` takes it, and the methods applied to the noisy FRFs."""
+
+    name: str
+    level: float
+    kind: NoiseKind
+    relative_to: NoiseReference
+    reciprocal: bool
+    block: int
+    methods: tuple[str, ...]
+
+    def pollute(self, h: ComplexArray, seed: int, realisation: int = 0) -> ComplexArray:
+        """Add one realisation of the noise to FRFs, shape (n_freq, n, n)."""
+        return pollute(
+            h, self.level, self.kind, seed, relative_to=self.relative_to, reciprocal=self.reciprocal,
+            block=self.block, realisation=realisation,
+        )  # fmt: skip
+
+    def realisations(self, h: ComplexArray, seed: int, first: int, count: int) -> ComplexArray:
+        """Add several realisations of the noise to FRFs, shape (count, n_freq, n, n)."""
+        return realisations(
+            h, self.level, self.kind, seed, relative_to=self.relative_to, reciprocal=self.reciprocal,
+            block=self.block, first=first, count=count,
+        )  # fmt: skip
+
+
+def actual_values(joint: Joint) -> FloatArray:
+    """Values of the parameters of a joint without cross terms, in the order of `jointfrf.dofs.joint_parameters`."""
+    return np.concatenate([np.diagonal(joint.stiffness), np.diagonal(joint.damping)])
+
+
+def read_frequency(table: TomlTable) -> FloatArray:
+    """Read the frequency lines, Hz."""
+    first, last, step = table.number("first", 0), table.number("last", 0), table.number("step", 0)
+    table.close()
+    if step <= 0:
+        raise table.error("step", "positive, in Hz")
+    if first <= 0:
+        raise table.error("first", "above 0 Hz, where Im K*/w is defined")
+    if last < first:
+        raise table.error("last", f"at least {first:g} Hz")
+    if (last - first) / step > _MOST_LINES:
+        raise table.error("step", f"larger: there would be more than {_MOST_LINES} lines")
+    count = int((last - first) / step + 1 + 1e-9)
+    return np.round(first + step * np.arange(count), 9)
+
+
+def read_material(table: TomlTable) -> Material:
+    """Read the keys of a material among others of a table."""
+    numbers = ("youngs_modulus", "poisson", "density", "loss_factor")
+    values = [table.number(key, -0.99 if key == "poisson" else 0) for key in numbers]
+    return table.build(lambda: Material(*values))
+
+
+def read_joint(tables: list[TomlTable]) -> tuple[Joint, Joint]:
+    """Read a joint and its first estimate, one table a DOF."""
+    dofs = []
+    values: dict[str, list[float]] = {
+        key: [] for key in ("stiffness", "damping", "initial_stiffness", "initial_damping")
+    }
+    for table in tables:
+        dofs.append(_read_dof(table))
+        for key, column in values.items():
+            column.append(table.number(key, 0))
+        table.close()
+    actual = tables[-1].build(lambda: Joint(values["stiffness"], values["damping"], dofs))
+    return actual, Joint(values["initial_stiffness"], values["initial_damping"], dofs)
+
+
+def _read_dof(table: TomlTable) -> str:
+    """Read the name of a joint DOF; what it says of translation and rotation must agree with `motion`."""
+    dof, motion = table.text("dof"), table.text("motion", _MOTIONS)
+    named = _MOTIONS[is_rotation(dof)]
+    if motion != named:
+        raise table.error(
+            "motion",
+            f"{named!r}, which is what the name {dof!r} of the DOF says (name a rotation like theta, theta_x, rx or "
+            "Mtheta_x, a translation like x, ux or Fx)",
+        )
+    return dof
+
+
+def check_bands(table: TomlTable, key: str, bands: Sequence[Band], freq_hz: FloatArray) -> None:
+    """Raise an error if a band holds no frequency line."""
+    if bands:
+        table.build(lambda: in_bands(freq_hz, bands), key)
+
+
+def read_bands(table: TomlTable, dofs: Sequence[str], freq_hz: FloatArray) -> BandSet:
+    """Read the bands of all parameters of a joint."""
+    name = table.text("name")
+    bands = {parameter: table.bands(parameter.name) for parameter in joint_parameters(dofs)}
+    table.close()
+    for parameter, own in bands.items():
+        check_bands(table, parameter.name, own, freq_hz)
+    return BandSet(name, bands)
+
+
+def read_noises(table: TomlTable, n: int, methods: Sequence[str] = METHODS) -> tuple[Noise, ...]:
+    """Read all tables [[noise]] of a case with n joint DOFs and the methods that its kind knows."""
+    noises = tuple(_read_noise(entry, n, methods) for entry in table.tables("noise"))
+    table.check_different("noise", [noise.name for noise in noises])
+    return noises
+
+
+def _read_noise(table: TomlTable, n: int, methods: Sequence[str]) -> Noise:
+    noise = Noise(
+        table.text("name"),
+        table.number("level", 0),
+        cast(NoiseKind, table.text("kind", get_args(NoiseKind))),
+        cast(NoiseReference, table.text("relative_to", get_args(NoiseReference))),
+        table.truth("reciprocal"),
+        table.whole("block", 1),
+        table.texts("methods", methods),
+    )
+    table.close()
+    if n % noise.block:
+        raise table.error("block", f"a divisor of {n}, the number of joint DOFs")
+    return noise

@@ -1,0 +1,69 @@
+"""Methods of identification as cases call them: their names, and the fit in the compliance domain."""
+
+from __future__ import annotations
+
+import warnings
+from typing import get_args
+
+import numpy as np
+
+from jointfrf.errors import ConvergenceWarning, IdentificationWarning, IllConditionedWarning
+from jointfrf.identification.compliance_fit.estimator import estimate, joint_basis
+from jointfrf.identification.identify import IdentificationMethod, identify
+from jointfrf.identification.joint_fit import JointFit
+from jointfrf.kernel.arguments import ComplexArray, FloatArray
+
+__all__ = ["METHODS", "fit_measured", "fit_viscous"]
+
+METHODS: tuple[str, ...] = get_args(IdentificationMethod)
+#: Standard errors by which a fitted parameter may still move: far less than realisations differ.
+_TOLERANCE = 0.5
+#: Relative noise for the weights of a fit to data whose noise is not asked for.
+_ASSUMED = 0.01
+
+
+def fit_viscous(freq_hz: FloatArray, dofs: tuple[str, ...], gammas: ComplexArray) -> FloatArray:
+    """Fit stiffness and viscous damping without cross terms to each of several sets of FRFs.
+
+    Parameters
+    ----------
+    freq_hz : ndarray, shape (n_freq,)
+        Hz.
+    dofs : tuple of str
+        Names of the n joint DOFs.
+    gammas : ndarray, shape (r, n_freq, 2 n, 2 n)
+        Receptances of the assembly at joint DOFs j, then k, m/N.
+
+    Returns
+    -------
+    ndarray, shape (r, 2 n)
+        Stiffness of all DOFs, then damping.
+    """
+    basis = joint_basis(2 * np.pi * freq_hz, dofs, "viscous", "zero")
+    # One realisation at a time: a slow one does not hold up others, and all stays in the processor's cache.
+    fits = [estimate(one[None], np.eye(2 * len(dofs)), basis, tolerance=_TOLERANCE).theta for one in gammas]
+    return np.concatenate(fits)
+
+
+def fit_measured(freq_hz: FloatArray, dofs: tuple[str, ...], h: ComplexArray, transform: FloatArray) -> JointFit:
+    """Fit a joint to FRFs between measured channels; its warnings stand in the result.
+
+    Parameters
+    ----------
+    freq_hz : ndarray, shape (n_freq,)
+        Hz.
+    dofs : tuple of str
+        Names of the n joint DOFs.
+    h : ndarray, shape (n_freq, m, m)
+        Receptances between the channels, m/N.
+    transform : ndarray, shape (2 n, m)
+        From the channels to joint DOFs j, then k.
+
+    Returns
+    -------
+    JointFit
+    """
+    with warnings.catch_warnings():
+        for category in (IdentificationWarning, IllConditionedWarning, ConvergenceWarning):
+            warnings.simplefilter("ignore", category)
+        return identify(freq_hz, h, dofs, transform=transform, cross="ignore", noise=_ASSUMED)

@@ -1,0 +1,119 @@
+"""FRFs of the assembly regenerated from identified parameters, and how far they are from the exact ones."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from jointfrf.cases.definitions import Observed
+from jointfrf.cases.known_joint.exact import Exact
+from jointfrf.cases.known_joint.study import Identified, chunk_size
+from jointfrf.cases.workers import Workers
+from jointfrf.errors import IllConditionedWarning
+from jointfrf.frf.bands import Band
+from jointfrf.frf.metrics import amplitude_error, frequency_error
+from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.report.axes import percentile_lines
+from jointfrf.substructuring.coupling import couple
+
+__all__ = ["RegeneratedFrf", "regenerate", "regenerate_all"]
+
+#: Realisations whose FRFs are regenerated.
+_REGENERATED = 200
+
+
+@dataclass(frozen=True)
+class RegeneratedFrf:
+    """An FRF of the assembly with identified parameters.
+
+    Attributes
+    ----------
+    identified : Identified
+        Without its lines.
+    observed : Observed
+        Which FRF.
+    percentiles : ndarray, shape (3, n_freq)
+        2.5, 50 and 97.5 percentile of the modulus, m/N.
+    first : ndarray, shape (n_freq,)
+        That of the first realisation.
+    bands : tuple of (low, high) or None
+        Where errors are counted, Hz; None for all lines.
+    amplitude, frequency : ndarray, shape (n_bands, n_realisations)
+        Errors (4.11) and (4.12), percent.
+    """
+
+    identified: Identified
+    observed: Observed
+    percentiles: FloatArray
+    first: ComplexArray
+    bands: tuple[Band | None, ...]
+    amplitude: FloatArray
+    frequency: FloatArray
+
+
+def regenerate(exact: Exact, theta: FloatArray, point: str, dof: int = 0) -> ComplexArray:
+    """Receptance of the assembly at a point, regenerated from identified parameters.
+
+    Parameters
+    ----------
+    exact : Exact
+    theta : ndarray, shape (r, 2 n)
+        Stiffness of all DOFs, then damping.
+    point : {"r", "s"}
+    dof : int
+        Response and force at this DOF of the point.
+
+    Returns
+    -------
+    ndarray, shape (r, n_freq)
+        m/N.
+    """
+    n, n_freq = exact.n, exact.freq_hz.size
+    size = chunk_size(n_freq, (2 * n + 1) ** 2)
+    found = np.empty((len(theta), n_freq), np.complex128)
+    for first in range(0, len(theta), size):
+        # Copied out of the coupled FRFs, which are large.
+        found[first : first + size] = _regenerated_chunk(exact, theta[first : first + size], point, dof)
+    return found
+
+
+def _regenerated_chunk(exact: Exact, theta: FloatArray, point: str, dof: int) -> ComplexArray:
+    """Couple the substructures once for each set of parameters, all at once; a view of the coupled FRFs."""
+    n, count, n_freq = exact.n, len(theta), exact.freq_hz.size
+    k_joint = (theta[:, None, :n] + 2j * np.pi * exact.freq_hz[:, None] * theta[:, None, n:])[..., None] * np.eye(n)
+    joint = list(range(n))
+    of_a, of_b = ([*joint, n + dof], joint) if point == "r" else (joint, [*joint, n + dof])
+    h_a, h_b = (
+        np.tile(h[:, np.array(dofs)[:, None], dofs], (count, 1, 1))
+        for h, dofs in ((exact.h_a, of_a), (exact.h_b, of_b))
+    )
+    at = n if point == "r" else 2 * n
+    with warnings.catch_warnings():
+        # Identified parameters may be absurd.
+        warnings.simplefilter("ignore", IllConditionedWarning)
+        h_c = couple(h_a, h_b, k_joint.reshape(-1, n, n), joint, joint)
+    return h_c[:, at, at].reshape(count, n_freq)
+
+
+def _with_errors(exact: Exact, identified: Identified, observed: Observed) -> RegeneratedFrf:
+    h = regenerate(exact, identified.theta[:_REGENERATED], observed.point, observed.dof)
+    h_exact = exact.h_c[:, exact.at(observed), exact.at(observed)]
+    bands = observed.bands or (None,)
+    amplitude, frequency = (
+        np.array([[error(h_exact, one, exact.freq_hz, band) for one in h] for band in bands], np.float64)
+        for error in (amplitude_error, frequency_error)
+    )
+    return RegeneratedFrf(identified, observed, percentile_lines(np.abs(h)), h[0].copy(), bands, amplitude, frequency)
+
+
+def regenerate_all(
+    exact: Exact, identified: list[Identified], observed: tuple[Observed, ...], workers: Workers
+) -> list[RegeneratedFrf]:
+    """Regenerate each observed FRF from everything that was identified."""
+    # Without the lines, which are large and not needed there.
+    without_lines = [replace(found, k_lines=np.empty((0, *found.k_lines.shape[1:]), complex)) for found in identified]
+    pairs = [(found, one) for found in without_lines for one in observed]
+    each = [exact] * len(pairs)
+    return list(workers.map(_with_errors, each, *zip(*pairs, strict=True)))

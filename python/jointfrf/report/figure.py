@@ -1,0 +1,151 @@
+"""Figures as data: what each shows, before anything draws it."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from jointfrf.frf.bands import Band
+from jointfrf.kernel.arguments import FloatArray
+
+__all__ = ["Curve", "Figure", "Interval", "Level", "NamedBands", "Panel", "Ribbon", "Surface", "figure_csv"]
+
+#: Names of bands and their limits, Hz.
+NamedBands = tuple[tuple[str, tuple[Band, ...]], ...]
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A line: y over x, drawn in one of `jointfrf.report.draw.STYLES`."""
+
+    label: str
+    x: FloatArray
+    y: FloatArray
+    style: str
+
+
+@dataclass(frozen=True)
+class Ribbon:
+    """The area between two curves."""
+
+    label: str
+    x: FloatArray
+    low: FloatArray
+    high: FloatArray
+    style: str
+
+
+@dataclass(frozen=True)
+class Level:
+    """A value: a horizontal line, over `bands` only if they are given."""
+
+    label: str
+    value: float
+    style: str
+    bands: tuple[Band, ...] = ()
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A median with its 2.5 and 97.5 percentiles, and a published value beside it."""
+
+    label: str
+    low: float
+    median: float
+    high: float
+    published: float | None = None
+
+
+@dataclass(frozen=True)
+class Surface:
+    """Quadrilaterals shaded by a value: in space, shape (n, 4, 3), seen from one side; or in a plane, (n, 4, 2).
+
+    `edges` are other quadrilaterals of which only the outline is drawn.
+    """
+
+    faces: FloatArray
+    values: FloatArray
+    label: str = ""
+    edges: FloatArray | None = None
+
+
+@dataclass(frozen=True)
+class Panel:
+    """Axes of a figure.
+
+    `shades` are (label, bands) in Hz; `strips` are bands drawn as bars at the bottom.
+    """
+
+    title: str
+    x_label: str
+    y_label: str
+    curves: tuple[Curve, ...] = ()
+    ribbons: tuple[Ribbon, ...] = ()
+    levels: tuple[Level, ...] = ()
+    intervals: tuple[Interval, ...] = ()
+    shades: NamedBands = ()
+    strips: NamedBands = ()
+    log_y: bool = False
+    x_limits: tuple[float, float] | None = None
+    y_limits: tuple[float, float] | None = None
+    surface: Surface | None = None
+
+
+@dataclass(frozen=True)
+class Figure:
+    """Panels in rows of `columns`.
+
+    Attributes
+    ----------
+    key : str
+        Name of its files.
+    caption : str
+        What stands below it on a page.
+    panels : tuple of Panel
+    columns : int
+    number : str
+        Its number in the source, or empty.
+    heading : str
+        What stands above the panels, where the figure stands alone.
+    """
+
+    key: str
+    caption: str
+    panels: tuple[Panel, ...] = ()
+    columns: int = 1
+    number: str = ""
+    heading: str = ""
+
+
+def figure_csv(figure: Figure) -> str:
+    """Write the data of a figure as CSV, a line for each point: panel, curve, x, y and the upper limit of an area."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["panel", "curve", "x", "y", "y_high"])
+    for number, panel in enumerate(figure.panels, 1):
+        writer.writerows((panel.title or str(number), *row) for row in _panel_rows(panel))
+    return text.getvalue()
+
+
+def _panel_rows(panel: Panel) -> Iterator[tuple[object, ...]]:
+    """Rows of a panel: curve, x, y and the upper limit of an area."""
+    for curve in panel.curves:
+        yield from ((curve.label, x, y, "") for x, y in zip(curve.x.tolist(), curve.y.tolist(), strict=True))
+    for area in panel.ribbons:
+        columns = (area.x.tolist(), area.low.tolist(), area.high.tolist())
+        yield from ((area.label, *point) for point in zip(*columns, strict=True))
+    yield from ((level.label, "", level.value, "") for level in panel.levels)
+    for interval in panel.intervals:
+        label = interval.label.replace("\n", ", ")
+        yield f"{label}: median", "", interval.median, ""
+        yield f"{label}: 2.5 to 97.5 %", "", interval.low, interval.high
+        if interval.published is not None:
+            yield f"{label}: thesis", "", interval.published, ""
+    if panel.surface is not None:
+        middles = panel.surface.faces.mean(axis=1)
+        for middle, value in zip(middles.tolist(), panel.surface.values.tolist(), strict=True):
+            yield panel.surface.label, " ".join(f"{x:.9g}" for x in middle), value, ""
+    for label, bands in (*panel.shades, *panel.strips):
+        yield from ((label, f"{low:g}-{high:g}", "", "") for low, high in bands)

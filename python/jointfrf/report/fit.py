@@ -1,0 +1,109 @@
+"""Files of one identification: parameters as JSON, figures of the joint over frequency."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from jointfrf.dofs import Parameter, compliance_unit
+from jointfrf.files import write_file
+from jointfrf.identification.joint_fit import JointFit
+from jointfrf.kernel.arguments import ComplexArray
+from jointfrf.kernel.linear_algebra import invert
+from jointfrf.report.axes import FREQUENCY, bulk_limits
+from jointfrf.report.draw import draw
+from jointfrf.report.figure import Curve, Figure, Panel, Ribbon
+
+__all__ = ["fit_figures", "write_fit"]
+
+
+def fit_figures(fit: JointFit) -> list[Figure]:
+    """Figures of the identified joint: K* and compliance of each DOF, line by line and as fitted.
+
+    Parameters
+    ----------
+    fit : JointFit
+        What `identify` found.
+
+    Returns
+    -------
+    list of Figure
+        ``"joint_<dof>"`` for each DOF.
+    """
+    fitted = fit.k_joint(fit.freq_hz)
+    lines = fit.k_lines
+    compliance = invert(fitted, on_singular="nan")
+    each_compliance = invert(np.where(np.isfinite(lines), lines, 0), on_singular="nan")
+    figures = []
+    for d, dof in enumerate(fit.dofs):
+        stiffness = Parameter.of_dof("k", dof)
+        panels = [
+            *_panels(fit, f"K*, {stiffness.unit}", lines[:, d, d], fitted[:, d, d], _interval(fit, stiffness)),
+            *_panels(fit, f"C, {compliance_unit(dof, dof)}", each_compliance[:, d, d], compliance[:, d, d], ()),
+        ]
+        words = f"Joint DOF {dof}: complex stiffness K* and compliance C"
+        figures.append(Figure(f"joint_{dof}", words, tuple(panels), 2, heading=words))
+    return figures
+
+
+def _interval(fit: JointFit, stiffness: Parameter) -> tuple[Ribbon, ...]:
+    """Confidence interval of a stiffness, where it is not open."""
+    low, high = fit.confidence_interval(0.95)[stiffness.name]
+    if not (np.isfinite(low) and np.isfinite(high)):
+        return ()
+    ends = fit.freq_hz[[0, -1]]
+    return (Ribbon("95 % interval of k", ends, np.full(2, low), np.full(2, high), "low"),)
+
+
+def _panels(
+    fit: JointFit, label: str, each: ComplexArray, fitted: ComplexArray, interval: tuple[Ribbon, ...]
+) -> list[Panel]:
+    """Real and imaginary part of one entry; the interval belongs to the real part."""
+    panels = []
+    for part, values, curve in (("Re", each.real, fitted.real), ("Im", each.imag, fitted.imag)):
+        curves = (
+            Curve("each line", fit.freq_hz, values, "dots"),
+            Curve(f"fit ({fit.method})", fit.freq_hz, curve, "actual"),
+        )
+        ribbons = interval if part == "Re" else ()
+        shown = [float(curve.min()), float(curve.max())] if np.isfinite(curve).all() else []
+        panels.append(Panel("", FREQUENCY, f"{part} {label}", curves, ribbons, y_limits=bulk_limits([values], shown)))
+    return panels
+
+
+def write_fit(fits: Sequence[JointFit], folder: Path, source: str) -> list[Path]:
+    """Write ``identification.json`` and one PNG a DOF for each fit; nothing is left half-written.
+
+    Parameters
+    ----------
+    fits : sequence of JointFit
+        Results on the same data; the figures of the second and later ones carry their method in the name.
+    folder : Path
+        Made if it is missing.
+    source : str
+        Name of the file that was measured, written into the JSON.
+
+    Returns
+    -------
+    list of Path
+        What was written.
+
+    Raises
+    ------
+    ImportError
+        matplotlib is missing.
+    OSError
+        The files cannot be written.
+    """
+    text = json.dumps({"source": source, "fits": [fit.to_dict() for fit in fits]}, indent=2)
+    contents: dict[str, str | bytes] = {"identification.json": text + "\n"}
+    for i, fit in enumerate(fits):
+        for figure in fit_figures(fit):
+            contents[f"{figure.key}.png" if i == 0 else f"{figure.key}_{fit.method}.png"] = draw(figure)
+    folder.mkdir(parents=True, exist_ok=True)
+    for file, content in contents.items():
+        write_file(folder / file, content)
+    return [folder / file for file in contents]

@@ -1,0 +1,97 @@
+"""Tables as data, and written: as aligned text, as CSV, and cell by cell for a reader."""
+
+from __future__ import annotations
+
+import csv
+import io
+from dataclasses import dataclass
+
+import numpy as np
+
+from jointfrf.dofs import Parameter
+
+__all__ = ["Cell", "Table", "as_text", "number", "plain_rows", "table_csv", "written"]
+
+Cell = str | float | Parameter | None
+
+_DIGITS, _DIGITS_OF_PERCENT = 5, 3
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table: cells are texts, numbers or parameters.
+
+    Attributes
+    ----------
+    key : str
+        Name of its file, and of its place on a page.
+    title : str
+    columns : tuple of str
+    rows : tuple of tuple
+    failing : tuple of int
+        Rows whose last cell says that something does not fit.
+    note : str
+    percentages : tuple of str
+        Columns that are written with three digits instead of five.
+    """
+
+    key: str
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[Cell, ...], ...]
+    failing: tuple[int, ...] = ()
+    note: str = ""
+    percentages: tuple[str, ...] = ()
+
+    @property
+    def is_number(self) -> list[bool]:
+        """Which columns hold numbers."""
+        return [any(isinstance(row[c], float) for row in self.rows) for c in range(len(self.columns))]
+
+
+def number(value: Cell, digits: int = _DIGITS) -> str:
+    """Write a cell for a reader: `digits` significant digits, without an exponent where that is short."""
+    if value is None:
+        return ""
+    if isinstance(value, str | Parameter):
+        return str(value)
+    if not np.isfinite(value):
+        return str(value)
+    if value == 0 or 1e-3 <= abs(value) < 10**6:
+        places = digits if value == 0 else max(0, digits - 1 - int(np.floor(np.log10(abs(value)))))
+        text = f"{value:.{places}f}"
+        return text.rstrip("0").rstrip(".") if "." in text else text
+    mantissa, _, exponent = f"{value:.{digits - 1}e}".partition("e")
+    return f"{mantissa.rstrip('0').rstrip('.') if '.' in mantissa else mantissa}e{int(exponent)}"
+
+
+def written(table: Table) -> list[list[str]]:
+    """Write the cells of a table for a reader: values with five digits, percentages with three."""
+    digits = [_DIGITS_OF_PERCENT if column in table.percentages else _DIGITS for column in table.columns]
+    return [[number(cell, d) for cell, d in zip(row, digits, strict=True)] for row in table.rows]
+
+
+def as_text(table: Table) -> str:
+    """Write a table in aligned columns, numbers to the right."""
+    cells = written(table)
+    widths = [max(len(row[c]) for row in [list(table.columns), *cells]) for c in range(len(table.columns))]
+
+    def line(row: list[str] | tuple[str, ...]) -> str:
+        padded = (x.rjust(w) if right else x.ljust(w) for x, w, right in zip(row, widths, table.is_number, strict=True))
+        return "  ".join(padded).rstrip()
+
+    return "\n".join([table.title, line(table.columns), "  ".join("-" * w for w in widths), *map(line, cells)])
+
+
+def plain_rows(table: Table) -> list[list[str | float | None]]:
+    """Return the rows with parameters by their names, for JSON and CSV."""
+    return [[cell.name if isinstance(cell, Parameter) else cell for cell in row] for row in table.rows]
+
+
+def table_csv(table: Table) -> str:
+    """Write a table as CSV, numbers in full."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow([column or "verdict" for column in table.columns])
+    writer.writerows([["" if cell is None else cell for cell in row] for row in plain_rows(table)])
+    return text.getvalue()

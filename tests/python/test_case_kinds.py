@@ -1,0 +1,192 @@
+"""What a kind of case is: the registry, a kind of one's own, and what a run keeps in memory."""
+
+import json
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+import jointfrf as jf
+from jointfrf.cases.catalogue import find_case, list_cases, read_case, read_case_and_kind, run_case
+from jointfrf.cases.kind import Case, CaseKind
+from jointfrf.cases.kinds import KINDS
+from jointfrf.cases.known_joint.exact import exact_frfs
+from jointfrf.cases.known_joint.regenerate import regenerate, regenerate_all
+from jointfrf.cases.known_joint.study import run_study
+from jointfrf.cases.workers import Workers
+from jointfrf.dofs import Parameter
+from jointfrf.errors import FileContentError
+from jointfrf.report.figure import Curve, Figure, Panel
+from jointfrf.report.table import Table
+
+
+def test_every_case_names_a_kind_of_the_registry_or_none():
+    assert list(KINDS) == ["known-joint", "bolted-lap"]
+    kinds = {folder.name: read_case_and_kind(folder)[1].name for folder in list_cases()}
+    assert kinds.pop("4.3.3-bolt") == "bolted-lap"
+    assert set(kinds.values()) == {"known-joint"}
+
+
+def test_a_kind_may_be_named_where_it_is_the_first(tmp_path):
+    text = (find_case("3.1") / "case.toml").read_text()
+    (tmp_path / "case.toml").write_text('kind = "known-joint"\n' + text)
+    assert read_case(tmp_path).joint.dofs == ("x",)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Oscillator(Case):
+    """A mass on a spring, whose stiffness is to be found from its noisy receptance."""
+
+    mass: float
+    stiffness: float
+    expected: float | None
+
+
+@dataclass(frozen=True)
+class Weighed:
+    """Stiffness by every realisation, and one FRF."""
+
+    case: Oscillator
+    stiffness: np.ndarray
+    h: np.ndarray
+
+
+def read(common, table, expected):
+    return Oscillator(
+        **vars(common),
+        mass=table.number("mass", 0),
+        stiffness=table.number("stiffness", 0),
+        expected=expected.number("stiffness") if "stiffness" in expected else None,
+    )
+
+
+def compute(case, n_realisations, workers):
+    omega = 2 * np.pi * case.freq_hz
+    h = 1 / (case.stiffness - omega**2 * case.mass + 0j)
+    noisy = [jf.pollute(h[:, None, None], 0.01, "complex", case.seed, realisation=i) for i in range(n_realisations)]
+    found = workers.map(lambda one: float(np.mean(1 / one[:, 0, 0] + omega**2 * case.mass).real), noisy)
+    return Weighed(case, np.array(list(workers.counted(found, n_realisations))), h)
+
+
+def tables(result):
+    parameter = Parameter.of_dof("k", "x")
+    row = (parameter, parameter.unit, result.case.stiffness, float(np.median(result.stiffness)))
+    return [Table("found", "Stiffness", ("parameter", "unit", "actual", "median"), (row,))]
+
+
+def figures(result):
+    curve = Curve("exact", result.case.freq_hz, abs(result.h), "actual")
+    return [Figure("frf", "Receptance", (Panel("", "frequency, Hz", "m/N", (curve,), log_y=True),))]
+
+
+OSCILLATOR = CaseKind(
+    name="oscillator",
+    read=read,
+    compute=compute,
+    tables=tables,
+    figures=figures,
+    summary=lambda result, tables: [f"{len(tables)} table, {result.stiffness.size} realisations."],
+    numbers=lambda result: {"stiffness": result.stiffness.tolist()},
+)
+TEXT = """
+kind = "oscillator"
+title = "One mass"
+section = "none"
+mass = 2.0
+stiffness = 500.0
+[frequency]
+first = 0.1
+last = 2.0
+step = 0.1
+[study]
+realisations = 40
+seed = 5
+"""
+
+
+@pytest.fixture
+def folder(tmp_path):
+    own = tmp_path / "one-mass"
+    own.mkdir()
+    (own / "case.toml").write_text(TEXT)
+    (own / "expected.toml").write_text('stiffness = 490.0\n[figures]\nfrf = "7-1"\n')
+    return own
+
+
+def test_a_kind_of_ones_own_goes_through_the_same_door(folder, tmp_path):
+    told = []
+    workers = Workers(progress=lambda done, total: told.append((done, total)))
+    output = run_case(folder, tmp_path / "out", workers=workers, kinds={**KINDS, "oscillator": OSCILLATOR})
+    assert (output.case.mass, output.case.expected, output.case.realisations) == (2.0, 490.0, 40)
+    assert output.result.stiffness == pytest.approx(500, rel=0.01)
+    assert told == [(i + 1, 40) for i in range(40)]
+    written = tmp_path / "out" / "one-mass"
+    content = json.loads((written / "results.json").read_text())
+    assert (content["case"], content["seed"], content["frequency_hz"]["lines"]) == ("one-mass", 5, 20)
+    assert content["stiffness"] == output.result.stiffness.tolist()
+    assert content["tables"]["found"]["rows"][0][:3] == ["k_x", "N/m", 500.0]
+    assert (written / "tables" / "found.csv").read_text().startswith("parameter,unit,actual,median\nk_x,N/m,500.0,")
+    assert (written / "figures" / "frf.png").read_bytes().startswith(b"\x89PNG")
+    report = output.report.read_text()
+    for words in ("1 table, 40 realisations.", "<b>Figure 7-1.</b>", "<i>k</i><sub>x</sub>", "mass = 2.0"):
+        assert words in report
+    assert [table.key for table in output.printed] == ["found"]
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "message"),
+    [
+        ("case.toml", "mass = 2.0", "mass = 2.0\nm = 1", r"case\.toml: unknown key 'm'; it takes kind, title"),
+        ("case.toml", "mass = 2.0", "", r"case\.toml: the key 'mass' is missing"),
+        ("case.toml", "step = 0.1", "step = 0", r"\[frequency\]: step must be positive"),
+        ("expected.toml", "[figures]", "mass = 1\n[figures]", r"expected\.toml: unknown key 'mass'; it takes"),
+    ],
+)
+def test_a_kind_of_ones_own_gets_the_same_sentences(folder, file, old, new, message):
+    path = folder / file
+    path.write_text(path.read_text().replace(old, new, 1))
+    with pytest.raises(FileContentError, match=message):
+        read_case(folder, {"oscillator": OSCILLATOR})
+
+
+def test_a_kind_that_is_not_registered_is_told(folder):
+    with pytest.raises(FileContentError, match=r"kind must be one of known-joint, bolted-lap, not 'oscillator'"):
+        read_case(folder)
+
+
+@pytest.fixture(scope="module")
+def identified():
+    """A few realisations of two beams, on some lines."""
+    case = read_case(find_case("3.2"))
+    case = replace(case, freq_hz=case.freq_hz[::4], noises=case.noises[1:])
+    exact = exact_frfs(case)
+    return case, exact, run_study(case, exact, 5)
+
+
+def owner(array):
+    """The array that holds the memory of another one."""
+    return array if array.base is None else owner(array.base)
+
+
+def test_regenerated_frfs_own_their_memory(identified, monkeypatch):
+    """A view would keep the FRFs of all DOFs and realisations alive."""
+    case, exact, found = identified
+    h = regenerate(exact, found[0].theta, "s", 1)
+    assert h.base is None
+    assert h.shape == (5, case.freq_hz.size)
+    for one in regenerate_all(exact, found, case.observed, Workers()):
+        arrays = (one.percentiles, one.first, one.amplitude, one.frequency, one.identified.k_lines)
+        assert sum(owner(array).nbytes for array in arrays) < 200 * case.freq_hz.size
+
+
+def test_lines_that_are_kept_own_their_memory(identified):
+    case, _, found = identified
+    for one in found:
+        assert owner(one.k_lines).nbytes == one.k_lines.nbytes == 5 * case.freq_hz.size * 2 * 16
+
+
+def test_realisations_in_chunks_are_those_at_once(identified, monkeypatch):
+    _, exact, found = identified
+    whole = regenerate(exact, found[0].theta, "r")
+    monkeypatch.setattr("jointfrf.cases.known_joint.regenerate.chunk_size", lambda n_freq, entries: 2)
+    np.testing.assert_allclose(regenerate(exact, found[0].theta, "r"), whole, rtol=1e-13)
