@@ -168,6 +168,12 @@ def test_units_know_every_way_to_write_a_rotation():
     )
     assert [fit.unit(f"c_{d}") for d in fit.dofs] == ["N s/m", "N m s/rad"] * 3
     assert fit.unit("k_ux,ry") == "N"
+    assert fit.unit("k_Mtheta_x") == "N m/rad"
+    assert fit.unit("h_Fx,Mtheta_x") == "N"
+    assert [term.name for term in fit.terms] == list(fit.parameters)
+    assert [term.unit for term in fit.terms] == [entry["unit"] for entry in fit.to_dict()["parameters"].values()]
+    with pytest.raises(ValueError, match="a parameter must be named k_<dof>, h_<dof> or c_<dof>, not 'stiffness'"):
+        fit.unit("stiffness")
 
 
 @pytest.mark.parametrize("joint", [JOINT, MOVED, FULL], ids=["diagonal", "moved", "full"])
