@@ -145,7 +145,7 @@ class Joint:
         Raises
         ------
         ValueError
-            DOFs whose direction is not told by their name, a wrong shape, NaN or Inf.
+            DOFs whose names do not tell a direction, a wrong shape, NaN or Inf.
 
         Notes
         -----
@@ -200,7 +200,7 @@ class Joint:
         Raises
         ------
         ValueError
-            DOFs whose direction is not told by their name; matrices that are not symmetric; numbers out of range; what
+            DOFs whose names do not tell a direction; matrices that are not symmetric; numbers out of range; what
             the program has no word for: damping in CalculiX, hysteretic damping in Ansys, rotations of CalculiX without
             `rotation_nodes`.
 

@@ -131,7 +131,7 @@ def band_mean(
     bands: Band | Sequence[Band] | Mapping[str, Band | Sequence[Band]] | None = None,
     dofs: Sequence[str] | None = None,
 ) -> BandMean:
-    """Mean of Re K* and Im K*/w of each DOF over its sensitive band, as the source does.
+    """Mean of Re K* and Im K*/w of each DOF over its sensitive band, as the thesis does.
 
     Parameters
     ----------

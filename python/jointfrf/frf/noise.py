@@ -1,4 +1,4 @@
-"""Pollution of FRFs: every kind of noise the source uses, and a physical default."""
+"""Pollution of FRFs: every kind of noise the thesis uses, and a physical default."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ _TEMPLATE = Path(__file__).with_name("page.html.jinja")
 
 @dataclass(frozen=True)
 class Page:
-    """What stands on a page.
+    """What a page holds.
 
     Attributes
     ----------

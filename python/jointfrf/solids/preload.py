@@ -134,7 +134,7 @@ def preload(lap: BoltedLap, force: float, law: ContactLaw | None = None, *, max_
     which the preload acts as force; afterwards this length is locked, and bodies and contacts are linear about this
     state: `PreloadedLap.model`. The bolt needs no artificial support, since all contacts begin closed and sticking.
 
-    What the case study comes to (3840 bricks, "accurate", 22784 N), with faces of finite stiffness and with rigid ones:
+    Results of the case study (3840 bricks, "accurate", 22784 N), with faces of finite stiffness and with rigid ones:
 
     ================================  ==========  =====  =====  =====  =====  =====  =====  =====
     law                               elongation  natural frequencies, Hz

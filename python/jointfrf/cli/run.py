@@ -1,0 +1,81 @@
+"""`jointfrf run`: cases, with their tables, figures and reports."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+from jointfrf.cases.catalogue import CaseOutput, UnknownCaseError, find_case, list_cases, run_case
+from jointfrf.cases.workers import started_workers
+from jointfrf.cli.extras import check_installed
+from jointfrf.cli.usage import UsageError, positive
+from jointfrf.report.table import as_text
+
+__all__ = ["add_arguments", "run"]
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Describe the arguments of the command."""
+    parser.description = "Run cases by name, number or folder; without any, all that come with jointfrf."
+    parser.add_argument("cases", nargs="*", metavar="CASE", help="name, number, or folder with a case.toml")
+    parser.add_argument("--out", type=Path, default=Path("results"), metavar="DIR", help="where results go (results)")
+    parser.add_argument("--realisations", type=positive, metavar="N", help="instead of the number the case names")
+    parser.add_argument("--jobs", type=positive, metavar="N", default=_cores(), help="processes (all cores)")
+
+
+def _cores() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def run(options: argparse.Namespace) -> int:
+    """Carry out the command."""
+    check_installed("matplotlib", "jinja2")
+    try:
+        folders = [find_case(word).resolve() for word in options.cases] or list_cases()
+    except UnknownCaseError as error:
+        raise UsageError(error) from error
+    folders = list(dict.fromkeys(folders))
+    if not folders:
+        raise UsageError("no cases come with this installation: name a folder with a case.toml")
+    twice = {folder.name for folder in folders if [f.name for f in folders].count(folder.name) > 1}
+    if twice:
+        raise UsageError(f"two cases are called {min(twice)}: their results would overwrite each other")
+    reports = []
+    with started_workers(options.jobs) as workers:
+        for folder in folders:
+            start = time.perf_counter()
+            at_work = replace(workers, progress=_progress(folder.name))
+            output = run_case(folder, options.out, realisations=options.realisations, workers=at_work)
+            _show_output(output)
+            print(f"{time.perf_counter() - start:.1f} s, report: {output.report}\n", flush=True)
+            reports.append(output.report)
+            del output  # before the next case needs the memory
+    if len(reports) > 1:
+        print("Reports:", *(f"  {report}" for report in reports), sep="\n")
+    return 0
+
+
+def _show_output(output: CaseOutput) -> None:
+    """Print the summary and the tables of a case."""
+    heading = f"{output.case.name}: {output.case.title}"
+    print(f"{heading}\n{'=' * len(heading)}\n")
+    print(*(f"- {sentence}" for sentence in output.summary), "", sep="\n")
+    for table in output.printed:
+        print(as_text(table), end="\n\n")
+
+
+def _progress(name: str) -> Callable[[int, int], None]:
+    """Return a counter in one line of a terminal; silent elsewhere."""
+    if not sys.stderr.isatty():
+        return lambda done, total: None
+
+    def show(done: int, total: int) -> None:
+        end = "\r\x1b[K" if done == total else ""
+        print(f"\r{name}: {100 * done // total} %{end}", end="", file=sys.stderr, flush=True)
+
+    return show
