@@ -30,7 +30,7 @@ contains
 
     if (allocated(space)) deallocate (space)
     allocate (space)
-    three => space%matrix(3, 1)
+    call space%take(3, 1, three)
     call room_to_solve(n, space)
     call room_to_invert(n, space)
     call check(space%used == 3 .and. .not. associated(three), 'counted, and given back')
