@@ -18,6 +18,7 @@ program test_lines_lapack
   call nothing_to_do()
   call special_matrices()
   call products()
+  deallocate (space)
   call finish('lines_lapack')
 
 contains
