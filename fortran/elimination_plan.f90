@@ -158,8 +158,9 @@ contains
       m = structure%last(s + 1) - structure%last(s)
       plan%products = plan%products + merge((m*(m + 1))/2, m*m, plan%symmetric)
     end do
-    allocate (plan%last_near, source=structure%last)
-    allocate (plan%near, source=slot_of(structure%unknown(:structure%last(plan%n_steps + 1))))
+    allocate (plan%last_near(plan%n_steps + 1), plan%near(structure%last(plan%n_steps + 1)))
+    plan%last_near(:) = structure%last
+    plan%near(:) = slot_of(structure%unknown(:size(plan%near)))
 
   contains
 
