@@ -144,11 +144,11 @@ contains
     integer :: n
 
     n = self%n
-    gamma => space%matrix(2*n, 2*n)
-    gamma_jk => space%matrix(n, n)
-    gamma_kk => space%matrix(n, n)
-    right => space%matrix(n, n)
-    c => space%matrix(n, n)
+    call space%take(2*n, 2*n, gamma)
+    call space%take(n, n, gamma_jk)
+    call space%take(n, n, gamma_kk)
+    call space%take(n, n, right)
+    call space%take(n, n, c)
     call room_to_solve(n, space)
     line_info = line_not_finite
     rcond = 0.0_dp
@@ -216,7 +216,7 @@ contains
     complex(dp), pointer, contiguous :: factors(:, :)
     type(linear_terms) :: terms
 
-    factors => space%matrix(2*self%n, self%m)
+    call space%take(2*self%n, self%m, factors)
     call take_terms(self, space, terms)
     line_info = line_not_finite
     rcond = 0.0_dp
@@ -244,12 +244,12 @@ contains
     integer :: n
 
     n = self%n
-    terms%u => space%matrix(n, self%m)
-    terms%v_transposed => space%matrix(n, self%m)
-    terms%right => space%matrix(n, n)
-    terms%left => space%matrix(n, n)
-    terms%gamma => space%matrix(2*n, 2*n)
-    terms%gamma_jk => space%matrix(n, n)
+    call space%take(n, self%m, terms%u)
+    call space%take(n, self%m, terms%v_transposed)
+    call space%take(n, n, terms%right)
+    call space%take(n, n, terms%left)
+    call space%take(2*n, 2*n, terms%gamma)
+    call space%take(n, n, terms%gamma_jk)
     call room_to_solve(n, space)
   end subroutine take_terms
 
@@ -363,13 +363,13 @@ contains
 
     n = self%n
     m = self%m
-    spread => space%matrix(m, m)
-    uu => space%matrix(n*n, m)
-    vv => space%matrix(n*n, m)
-    uv => space%matrix(n*n, m)
-    straight => space%matrix(n*n, n*n)
-    crossed => space%matrix(n*n, n*n)
-    covariance => space%matrix(n*n, n*n)
+    call space%take(m, m, spread)
+    call space%take(n*n, m, uu)
+    call space%take(n*n, m, vv)
+    call space%take(n*n, m, uv)
+    call space%take(n*n, n*n, straight)
+    call space%take(n*n, n*n, crossed)
+    call space%take(n*n, n*n, covariance)
     call take_terms(self, space, terms)
     line_info = line_not_finite
     rcond = 0.0_dp

@@ -142,8 +142,8 @@ contains
     complex(dp), pointer, contiguous :: h_a(:, :), h_b(:, :)
     type(modification_matrices) :: m
 
-    h_a => space%matrix(self%n_a, self%n_a)
-    h_b => space%matrix(self%n_b, self%n_b)
+    call space%take(self%n_a, self%n_a, h_a)
+    call space%take(self%n_b, self%n_b, h_b)
     call take_matrices(self%n_a + self%n_b, self%n_j, space, m)
     line_info = line_not_finite
     rcond = 0.0_dp

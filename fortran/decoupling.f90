@@ -196,12 +196,12 @@ contains
     integer :: n
 
     n = self%n
-    h_a => space%matrix(self%n_a, self%n_a)
-    h_b => space%matrix(self%n_b, self%n_b)
-    measured => space%matrix(n, n)
-    to_joint => space%matrix(n, n)
-    from_joint => space%matrix(n, n)
-    z => space%matrix(n, n)
+    call space%take(self%n_a, self%n_a, h_a)
+    call space%take(self%n_b, self%n_b, h_b)
+    call space%take(n, n, measured)
+    call space%take(n, n, to_joint)
+    call space%take(n, n, from_joint)
+    call space%take(n, n, z)
     call room_to_solve(n, space)
     call room_to_invert(n, space)
     line_info = line_not_finite

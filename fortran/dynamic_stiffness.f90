@@ -446,9 +446,9 @@ contains
     real(dp), intent(out) :: rcond
     complex(dp), pointer, contiguous :: z(:, :), x(:, :), h(:, :)
 
-    z => space%matrix(self%n, self%n)
-    x => space%matrix(self%n, size(self%inputs))
-    h => space%matrix(size(self%outputs), size(self%inputs))
+    call space%take(self%n, self%n, z)
+    call space%take(self%n, size(self%inputs), x)
+    call space%take(size(self%outputs), size(self%inputs), h)
     call room_to_solve(self%n, space)
     line_info = line_not_finite
     rcond = 0.0_dp
@@ -477,12 +477,12 @@ contains
     kl = int(self%kl, blas_ip)
     ku = int(self%ku, blas_ip)
     ld = 2*kl + ku + 1
-    band => space%matrix(int(ld), self%n)
-    x => space%matrix(self%n, size(self%inputs))
-    h => space%matrix(size(self%outputs), size(self%inputs))
-    work => space%matrix(2*self%n, 1)
-    real_work => space%reals(self%n)
-    pivot => space%pivots(self%n)
+    call space%take(int(ld), self%n, band)
+    call space%take(self%n, size(self%inputs), x)
+    call space%take(size(self%outputs), size(self%inputs), h)
+    call space%take(2*self%n, 1, work)
+    call space%take_reals(self%n, real_work)
+    call space%take_pivots(self%n, pivot)
     line_info = line_good
     rcond = 1.0_dp
     if (space%only_counts .or. n == 0) return

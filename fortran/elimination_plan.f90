@@ -8,13 +8,14 @@
 !>    for, because models come with a numbering of small bandwidth.
 !> 2. `find_structure` finds which unknowns are coupled with each pivot when its turn comes: symbolic elimination along
 !>    the elimination tree (A. George, J. W. Liu, Computer Solution of Large Sparse Positive Definite Systems, 1981,
-!>    section 5.4; J. W. H. Liu, SIAM J. Matrix Anal. Appl. 11 (1990) 134-172).
+!>    chapter 5; J. W. H. Liu, SIAM J. Matrix Anal. Appl. 11 (1990) 134-172).
 !> 3. `assign_slots` gives places in a small square to what is being worked on. A slot is free again once its unknown is
 !>    eliminated, as in a frontal solver (B. M. Irons, Int. J. Numer. Meth. Eng. 2 (1970) 5-32).
 !> 4. `list_elements` says which elements of the square begin as zero or as an entry of the matrix, and when.
 !>
 !> With n unknowns, a reach b of the band and m unknowns coupled with a pivot (m <= 2 b + retained ones), the second and
-!> third step cost O(n (b + m)), the fourth O(n m^2): in all in proportion to the multiplications of one line. Memory: the lists, one item a number that is touched, and the square.
+!> third step cost O(n (b + m)), the fourth O(n m^2): in all in proportion to the multiplications of one line. Memory:
+!> the lists, one item a number that is touched, and the square.
 module jointfrf_elimination_plan
   use jointfrf_kinds, only: dp
   implicit none
@@ -124,8 +125,8 @@ contains
     end subroutine add
   end subroutine find_structure
 
-  !> Slots of the unknowns while they are worked on: the first that is free when an unknown is first needed. The unknowns
-  !> of each step of the structure are put into the order of their slots.
+  !> Slots of the unknowns while they are worked on: the first that is free when an unknown is first needed. The
+  !> unknowns of each step of the structure are put into the order of their slots.
   !> slot_of   the slot of each unknown, 0 where it has none yet
   subroutine assign_slots(order, structure, slot_of, plan)
     integer, intent(in) :: order(:)
@@ -157,8 +158,9 @@ contains
       m = structure%last(s + 1) - structure%last(s)
       plan%products = plan%products + merge((m*(m + 1))/2, m*m, plan%symmetric)
     end do
-    plan%last_near = structure%last
-    plan%near = slot_of(structure%unknown(:structure%last(plan%n_steps + 1)))
+    allocate (plan%last_near(plan%n_steps + 1), plan%near(structure%last(plan%n_steps + 1)))
+    plan%last_near(:) = structure%last
+    plan%near(:) = slot_of(structure%unknown(:size(plan%near)))
 
   contains
 
@@ -172,8 +174,8 @@ contains
     end subroutine take_slot
   end subroutine assign_slots
 
-  !> What elements of the square begin with, in the step that needs them first; after the last step come those of retained
-  !> unknowns that no step has touched.
+  !> What elements of the square begin with, in the step that needs them first; after the last step come those of
+  !> retained unknowns that no step has touched.
   subroutine list_elements(coupled, order, structure, slot_of, plan)
     logical, contiguous, intent(in) :: coupled(:, :)
     integer, intent(in) :: order(:), slot_of(:)

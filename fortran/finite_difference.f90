@@ -180,11 +180,11 @@ contains
     real(dp), intent(out) :: rcond
     complex(dp), pointer, contiguous :: t_out(:, :), t_in(:, :), h(:, :), half(:, :), h_new(:, :)
 
-    t_out => space%matrix(self%n_out, self%m_out)
-    t_in => space%matrix(self%n_in, self%m_in)
-    h => space%matrix(self%m_out, self%m_in)
-    half => space%matrix(self%n_out, self%m_in)
-    h_new => space%matrix(self%n_out, self%n_in)
+    call space%take(self%n_out, self%m_out, t_out)
+    call space%take(self%n_in, self%m_in, t_in)
+    call space%take(self%m_out, self%m_in, h)
+    call space%take(self%n_out, self%m_in, half)
+    call space%take(self%n_out, self%n_in, h_new)
     line_info = line_not_finite
     rcond = 0.0_dp
     if (space%only_counts) return

@@ -262,13 +262,13 @@ contains
 
     n = self%n
     m = 2*n
-    alpha => space%matrix(m, m)
-    gamma => space%matrix(m, m)
-    difference => space%matrix(m, m)
-    rows_j => space%matrix(m, n)
-    columns_k => space%matrix(m, n)
-    product => space%matrix(m, n)
-    k_joint => space%matrix(n, n)
+    call space%take(m, m, alpha)
+    call space%take(m, m, gamma)
+    call space%take(m, m, difference)
+    call space%take(m, n, rows_j)
+    call space%take(m, n, columns_k)
+    call space%take(m, n, product)
+    call space%take(n, n, k_joint)
     call room_to_solve(m, space)
     line_info = line_not_finite
     rcond = 0.0_dp
@@ -377,9 +377,9 @@ contains
     integer :: n
 
     n = self%n
-    gamma => space%matrix(2*n, 2*n)
-    columns_k => space%matrix(2*n, n)
-    k_joint => space%matrix(n, n)
+    call space%take(2*n, 2*n, gamma)
+    call space%take(2*n, n, columns_k)
+    call space%take(n, n, k_joint)
     call room_to_solve(2*n, space)
     line_info = line_not_finite
     rcond = 0.0_dp

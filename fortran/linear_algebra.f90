@@ -184,8 +184,8 @@ contains
     real(dp), intent(out) :: rcond
     complex(dp), pointer, contiguous :: a(:, :), b(:, :)
 
-    a => space%matrix(self%n, self%n)
-    b => space%matrix(self%n, self%n_rhs)
+    call space%take(self%n, self%n, a)
+    call space%take(self%n, self%n_rhs, b)
     call room_to_solve(self%n, space)
     line_info = line_not_finite
     rcond = 0.0_dp

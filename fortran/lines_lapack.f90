@@ -30,7 +30,7 @@ contains
 
     if (.not. space%only_counts) return
     before = space%used
-    pivot => space%pivots(n)
+    call space%take_pivots(n, pivot)
     call take_for_condition(n, space, copy, work, real_work)
     space%used = before
   end subroutine room_to_solve
@@ -45,8 +45,8 @@ contains
 
     if (.not. space%only_counts) return
     before = space%used
-    pivot => space%pivots(n)
-    work => space%matrix(n, min(n, inverse_block))
+    call space%take_pivots(n, pivot)
+    call space%take(n, min(n, inverse_block), work)
     space%used = before
   end subroutine room_to_invert
 
@@ -64,7 +64,7 @@ contains
     rcond = 1.0_dp
     info = line_good
     if (n == 0 .or. size(b, 2) == 0) return        ! OpenBLAS does not factor A without right-hand sides
-    pivot => space%pivots(int(n))
+    call space%take_pivots(int(n), pivot)
     norm = one_norm(a)
     call zgesv(n, size(b, 2, kind=blas_ip), a, n, pivot, b, n, code)
     info = int(code, ip)
@@ -108,11 +108,11 @@ contains
 
     nullify (inverse, real_work)
     if (n <= exact_condition) then
-      inverse => space%matrix(n, n)
-      work => space%matrix(n, min(n, inverse_block))
+      call space%take(n, n, inverse)
+      call space%take(n, min(n, inverse_block), work)
     else
-      work => space%matrix(n, 2)
-      real_work => space%reals(2*n)
+      call space%take(n, 2, work)
+      call space%take_reals(2*n, real_work)
     end if
   end subroutine take_for_condition
 
@@ -132,13 +132,13 @@ contains
     rcond = 1.0_dp
     info = line_good
     if (n == 0) return
-    pivot => space%pivots(int(n))
+    call space%take_pivots(int(n), pivot)
     norm = one_norm(a)
     call zgetrf(n, n, a, n, pivot, code)
     info = int(code, ip)
     if (info /= line_good) return
     before = space%used
-    work => space%matrix(int(n), min(int(n), inverse_block))
+    call space%take(int(n), min(int(n), inverse_block), work)
     call zgetri(n, a, n, pivot, work, size(work, kind=blas_ip), code)
     space%used = before
     info = int(code, ip)

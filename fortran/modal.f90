@@ -156,9 +156,9 @@ contains
     real(dp) :: smallest, largest, omega
     integer :: mode, place
 
-    shapes => space%matrix(self%n_out, self%n_modes)
-    weighted => space%matrix(self%n_modes, self%n_in)
-    h => space%matrix(self%n_out, self%n_in)
+    call space%take(self%n_out, self%n_modes, shapes)
+    call space%take(self%n_modes, self%n_in, weighted)
+    call space%take(self%n_out, self%n_in, h)
     line_info = line_good
     rcond = 0.0_dp
     if (space%only_counts) return

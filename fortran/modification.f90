@@ -218,13 +218,13 @@ contains
     type(line_space), target, intent(inout) :: space
     type(modification_matrices), intent(out) :: m
 
-    m%h => space%matrix(n, n)
-    m%d => space%matrix(n_m, n_m)
-    m%columns => space%matrix(n, n_m)
-    m%rows => space%matrix(n_m, n)
-    m%h_mm => space%matrix(n_m, n_m)
-    m%system => space%matrix(n_m, n_m)
-    m%forces => space%matrix(n_m, n)
+    call space%take(n, n, m%h)
+    call space%take(n_m, n_m, m%d)
+    call space%take(n, n_m, m%columns)
+    call space%take(n_m, n, m%rows)
+    call space%take(n_m, n_m, m%h_mm)
+    call space%take(n_m, n_m, m%system)
+    call space%take(n_m, n, m%forces)
     call room_to_solve(n_m, space)
   end subroutine take_matrices
 
@@ -283,10 +283,10 @@ contains
     complex(dp), pointer, contiguous :: alpha(:, :), gamma(:, :), d(:, :), d_transposed(:, :)
     real(dp) :: rcond_gamma
 
-    alpha => space%matrix(self%n, self%n)
-    gamma => space%matrix(self%n, self%n)
-    d => space%matrix(self%n, self%n)
-    d_transposed => space%matrix(self%n, self%n)
+    call space%take(self%n, self%n, alpha)
+    call space%take(self%n, self%n, gamma)
+    call space%take(self%n, self%n, d)
+    call space%take(self%n, self%n, d_transposed)
     call room_to_solve(self%n, space)
     line_info = line_not_finite
     rcond = 0.0_dp

@@ -1,8 +1,8 @@
 !> Monte Carlo study of an identification: pollute, identify and accumulate, without keeping any realisation.
 !>
 !> Lanes are realisations of one frequency line: inputs are the same in all of them, only noise differs. The
-!> realisations of a line are cut into slices whose number depends on the arguments alone; slices are shared among threads
-!> and put together in a fixed order. So results do not depend on the number of threads.
+!> realisations of a line are cut into slices whose number depends on the arguments alone; slices are shared among
+!> threads and put together in a fixed order. So results do not depend on the number of threads.
 module jointfrf_monte_carlo
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use, intrinsic :: iso_c_binding, only: c_loc
@@ -450,15 +450,15 @@ contains
 
     n = plan%n
     space%used = 0
-    gamma => space%matrix(2*n, 2*n)
-    answer => space%matrix(n, n)
+    call space%take(2*n, 2*n, gamma)
+    call space%take(n, n, answer)
     if (plan%compliance) then
-      matrix => space%matrix(n, n)
-      last => space%matrix(n, n)
-      right => space%matrix(n, n)
+      call space%take(n, n, matrix)
+      call space%take(n, n, last)
+      call space%take(n, n, right)
       call room_to_solve(n, space)
     else
-      right => space%matrix(2*n, n)
+      call space%take(2*n, n, right)
       call room_to_solve(2*n, space)
     end if
     found = 0.0_dp

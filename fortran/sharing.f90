@@ -36,8 +36,8 @@ contains
 
   !> Do the items 1..n_items of the work.
   !> threads   from `threads_for`
-  !> even      whether items take equally long: each thread then does one run of neighbours, the same in every call, which
-  !>           keeps data in its cache; otherwise whoever is free takes the next item
+  !> even      whether items take equally long: each thread then does one run of neighbours, the same in every call,
+  !>           which keeps data in its cache; otherwise whoever is free takes the next item
   subroutine share(work, n_items, threads, even)
     class(shared_work), intent(in) :: work
     integer(long), intent(in) :: n_items

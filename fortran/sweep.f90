@@ -62,9 +62,9 @@ module jointfrf_sweep
     type(lookahead) :: ahead                 !< memory of the next block
     type(own_memory) :: own                  !< where the others lie, unless in the caller's memory
   contains
-    procedure :: matrix
-    procedure :: reals
-    procedure :: pivots
+    procedure :: take
+    procedure :: take_reals
+    procedure :: take_pivots
     procedure :: set_up
   end type line_space
 
@@ -172,49 +172,49 @@ contains
   end subroutine no_block
 
   !> The next n by m matrix of the workspace, valid until the line ends.
-  function matrix(self, n, m) result(piece)
+  subroutine take(self, n, m, matrix)
     class(line_space), target, intent(inout) :: self
     integer, intent(in) :: n, m
-    complex(dp), pointer, contiguous :: piece(:, :)
+    complex(dp), pointer, contiguous, intent(out) :: matrix(:, :)
     integer(long) :: before
 
     before = self%used
     self%used = before + int(n, long)*m
     self%most%z = max(self%most%z, self%used)
     if (self%only_counts) then
-      piece => null()
+      nullify (matrix)
     else
-      piece(1:n, 1:m) => self%z(before + 1:self%used)
+      matrix(1:n, 1:m) => self%z(before + 1:self%used)
     end if
-  end function matrix
+  end subroutine take
 
   !> n real numbers of the workspace, always the same.
-  function reals(self, n) result(piece)
+  subroutine take_reals(self, n, numbers)
     class(line_space), target, intent(inout) :: self
     integer, intent(in) :: n
-    real(dp), pointer, contiguous :: piece(:)
+    real(dp), pointer, contiguous, intent(out) :: numbers(:)
 
     self%most%r = max(self%most%r, int(n, long))
     if (self%only_counts) then
-      piece => null()
+      nullify (numbers)
     else
-      piece => self%r(:n)
+      numbers => self%r(:n)
     end if
-  end function reals
+  end subroutine take_reals
 
   !> n pivot rows of the workspace, always the same.
-  function pivots(self, n) result(piece)
+  subroutine take_pivots(self, n, pivot)
     class(line_space), target, intent(inout) :: self
     integer, intent(in) :: n
-    integer(blas_ip), pointer, contiguous :: piece(:)
+    integer(blas_ip), pointer, contiguous, intent(out) :: pivot(:)
 
     self%most%pivot = max(self%most%pivot, int(n, long))
     if (self%only_counts) then
-      piece => null()
+      nullify (pivot)
     else
-      piece => self%pivot(:n)
+      pivot => self%pivot(:n)
     end if
-  end function pivots
+  end subroutine take_pivots
 
   !> Memory of its own for the most that was taken.
   subroutine set_up(self, stat)

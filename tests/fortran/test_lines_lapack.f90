@@ -18,6 +18,7 @@ program test_lines_lapack
   call nothing_to_do()
   call special_matrices()
   call products()
+  deallocate (space)
   call finish('lines_lapack')
 
 contains
@@ -30,7 +31,7 @@ contains
 
     if (allocated(space)) deallocate (space)
     allocate (space)
-    three => space%matrix(3, 1)
+    call space%take(3, 1, three)
     call room_to_solve(n, space)
     call room_to_invert(n, space)
     call check(space%used == 3 .and. .not. associated(three), 'counted, and given back')

@@ -63,10 +63,10 @@ contains
     logical :: fresh
 
     fresh = space%used == 0
-    a => space%matrix(2, 3)
-    b => space%matrix(3, 2)
-    r => space%reals(5)
-    pivot => space%pivots(7)
+    call space%take(2, 3, a)
+    call space%take(3, 2, b)
+    call space%take_reals(5, r)
+    call space%take_pivots(7, pivot)
     line_info = 1
     rcond = 0.0_dp
     if (space%only_counts) then
