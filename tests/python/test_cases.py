@@ -346,6 +346,9 @@ def test_numbers_and_report_of_six_dofs(solids):
         assert "H_ss Fx k_Fx" in content["proposed_bands_hz"]
         sentences = known_joint_summary(result, tables)
         assert any("inside the central 95 % of ours" in sentence for sentence in sentences)
+        known = sum(len(one.values) for one in result.case.expected.frequencies.values())
+        agreeing = [sentence for sentence in sentences if "natural frequencies" in sentence]
+        assert [re.search(r"of (\d+)", sentence)[1] for sentence in agreeing] == ([str(known)] if known else [])
         report = make_page(Page(result.case.title, "", sentences, tables, []))
         assert all(f'id="{table.key}"' in report for table in tables)
         assert "<i>k</i><sub>Mθz</sub>" in report
