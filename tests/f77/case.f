@@ -1,6 +1,6 @@
 C     Two beams and a joint (thesis case 3.2), from FORTRAN 77. The same
 C     case, alike line by line: tests/fortran/case.f90, tests/c/case.c,
-C     tests/python/case.py.
+C     tests/python/support/case.py.
 C
 C     A is clamped, two Euler-Bernoulli elements; B is free, one element.
 C     They are joined in deflection and rotation. The assembly through

@@ -1,5 +1,5 @@
 ! Two beams and a joint (thesis case 3.2), from modern Fortran. The same case, alike line by line: tests/f77/case.f,
-! tests/c/case.c, tests/python/case.py.
+! tests/c/case.c, tests/python/support/case.py.
 !
 ! A is clamped, two Euler-Bernoulli elements; B is free, one element. They are joined in deflection and rotation. The
 ! assembly through the actual joint K* stands for a measurement, the one through a first estimate K0 for a model. The

@@ -27,7 +27,7 @@ from rigid_bodies import (
 )
 
 FREQ = np.array([20.0, 45.0, 110.0])
-DATA = Path(os.environ.get("JOINTFRF_TEST_DATA", Path(__file__).resolve().parents[3] / "shared" / "data"))
+DATA = Path(os.environ.get("JOINTFRF_TEST_DATA", Path(__file__).resolve().parents[4] / "shared" / "data"))
 LAP = DATA / "lap_joint" / "lap_joint.uff"
 SOURCE_ORDER = ("x", "theta_y", "y", "theta_x", "z", "theta_z")
 

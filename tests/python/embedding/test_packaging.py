@@ -13,7 +13,7 @@ import pytest
 import jointfrf
 from jointfrf import _kernel
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
+ROOT = pathlib.Path(__file__).resolve().parents[3]
 CASES = sorted(path.parent.name for path in (ROOT / "cases").glob("*/case.toml"))
 
 

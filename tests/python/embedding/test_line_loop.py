@@ -10,7 +10,7 @@ from installed_library import InstalledLibrary, run
 
 pytestmark = pytest.mark.builds
 
-SOURCE = Path(__file__).resolve().parents[1] / "f77" / "loop.f"
+SOURCE = Path(__file__).resolve().parents[2] / "f77" / "loop.f"
 
 
 def test_one_line_at_a_time(installed_library: InstalledLibrary, tmp_path):

@@ -5,7 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 AGE = ["DeprecationWarning", "PendingDeprecationWarning"]
 OURS = ["jointfrf", "jointfrf.io.uff", "tests.python.test_frf", "test_frf", "benchmarks.machine"]
 OTHERS = ["matplotlib.text", "numpy", "pyuff.datasets.dataset_58"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-ABI = (Path(__file__).resolve().parents[1] / "abi" / "libjointfrf.so.0.txt").read_text()
+ABI = (Path(__file__).resolve().parents[2] / "abi" / "libjointfrf.so.0.txt").read_text()
 #: Symbols in the order of the list.
 LISTED = re.findall(r"^(?:void|const char) (jf_\w+)", ABI, re.MULTILINE)
 

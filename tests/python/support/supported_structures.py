@@ -1,6 +1,6 @@
 """Structures that are free, hinged, held and softly held; their receptances in 80 bits; and a run over many of them.
 
-`python tests/python/supported_structures.py [BEAMS]` looks for free brick beams that are not recognised at 0 Hz, with
+`python tests/python/support/supported_structures.py [BEAMS]` looks for free brick beams that are not recognised at 0 Hz, with
 every kernel of OpenBLAS.
 """
 

@@ -12,7 +12,7 @@ from installed_library import InstalledLibrary, run
 
 pytestmark = pytest.mark.builds
 
-FOLDER = Path(__file__).resolve().parents[1] / "f77"
+FOLDER = Path(__file__).resolve().parents[2] / "f77"
 TRAPS = "-ffpe-trap=invalid,zero,overflow"
 CODES = [0, 0, 2, -2, -1, 2, 0, -2, 2, -1, 0, 2]
 #: Of 24 lines: those whose number is a multiple of 3, 4 or 5.

@@ -13,7 +13,7 @@ from installed_library import InstalledLibrary, run
 
 pytestmark = pytest.mark.builds
 
-TESTS = Path(__file__).resolve().parents[1]
+TESTS = Path(__file__).resolve().parents[2]
 SOURCES = {"FORTRAN 77": "f77/case.f", "Fortran": "fortran/case.f90", "C": "c/case.c"}
 ENTRY = re.compile(r"(\w+)\((\d),(\d)\) *(\d+) +(\S+) +(\S+)")
 

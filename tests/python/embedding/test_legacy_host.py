@@ -13,7 +13,7 @@ from installed_library import InstalledLibrary, run
 
 pytestmark = pytest.mark.builds
 
-F77 = Path(__file__).resolve().parents[1] / "f77"
+F77 = Path(__file__).resolve().parents[2] / "f77"
 PATCH = F77 / "frame-joint.patch"
 JOINT_NODES = (5, 6)
 JOINT = jf.Joint([4e6, 2e6, 3e3], [30.0, 20.0, 1.5], ["x", "y", "theta"])

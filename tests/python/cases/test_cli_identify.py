@@ -12,13 +12,13 @@ import pytest
 from jointfrf.cli.main import main
 from uff_writer import function
 
-DATA = Path(os.environ.get("JOINTFRF_TEST_DATA", Path(__file__).resolve().parents[3] / "shared" / "data"))
+DATA = Path(os.environ.get("JOINTFRF_TEST_DATA", Path(__file__).resolve().parents[4] / "shared" / "data"))
 LAP = DATA / "lap_joint" / "lap_joint.uff"
 needs_data = pytest.mark.skipif(
     not LAP.exists(), reason="the measured files are not beside the project (JOINTFRF_TEST_DATA)"
 )
 JOINT = ["--j", "102,104", "--k", "202,204", "--dofs", "y,theta_x"]
-BARS = Path(__file__).resolve().parents[2] / "cases" / "hammer-test" / "two_bars.uff"
+BARS = Path(__file__).resolve().parents[3] / "cases" / "hammer-test" / "two_bars.uff"
 JOINT_OF_BARS = ["--j", "101,102", "--k", "201,202", "--dofs", "y,theta_z"]
 
 

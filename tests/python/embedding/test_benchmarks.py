@@ -12,7 +12,7 @@ import pytest
 
 from installed_library import run
 
-TESTS = Path(__file__).resolve().parents[1]
+TESTS = Path(__file__).resolve().parents[2]
 BUILD = TESTS.parent / "build" / "benchmarks_plain"
 
 

@@ -18,7 +18,7 @@ from uff_writer import FREQ_HZ, VALUES, dataset, function, nodes_15, nodes_2411,
 
 pytest.importorskip("pyuff")
 
-DATA = Path(os.environ.get("JOINTFRF_TEST_DATA", Path(__file__).resolve().parents[3] / "shared" / "data"))
+DATA = Path(os.environ.get("JOINTFRF_TEST_DATA", Path(__file__).resolve().parents[4] / "shared" / "data"))
 LAP_JOINT = DATA / "lap_joint" / "lap_joint.uff"
 
 

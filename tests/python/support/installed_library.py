@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 from filelock import FileLock
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 #: Optimised builds take half a minute; they are kept, and brought up to date by each run.
 BUILDS = {"jointfrf": ROOT / "build" / "installed", "jointfrf64": ROOT / "build" / "ilp64"}
 #: Where meson and ninja lie, too, if the environment of this Python is not activated.

@@ -12,7 +12,7 @@ from jointfrf.io import Channel, FrfSet, read_uff, write_uff
 
 pyuff = pytest.importorskip("pyuff")
 
-HAMMER_TEST = Path(__file__).resolve().parents[2] / "cases" / "hammer-test"
+HAMMER_TEST = Path(__file__).resolve().parents[3] / "cases" / "hammer-test"
 
 
 def frfs(quantity="accelerance"):

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-TESTS = Path(__file__).resolve().parents[1]
+TESTS = Path(__file__).resolve().parents[2]
 BUILT = Path(os.environ.get("JOINTFRF_TEST_PROGRAMS", TESTS.parent / "build" / "tests" / "tests")).parent / "fortran"
 
 pytestmark = [

@@ -12,7 +12,7 @@ import scipy_openblas32
 
 from abi import LISTED, prototypes
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
+ROOT = pathlib.Path(__file__).resolve().parents[3]
 INSTALL = ROOT / "tests" / "install"
 COMPILERS = {"c": ["gcc"], "f": ["gfortran", "-std=legacy"], "f90": ["gfortran", "-std=f2018"]}
 

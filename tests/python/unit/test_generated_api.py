@@ -15,7 +15,7 @@ from generate.__main__ import main
 from generate.reader import read_api
 from generate.source import Source
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 API = ROOT / "fortran" / "api"
 VALUES = [ROOT / "fortran" / name for name in ("status.f90", "engine.F90")]
 TEXT = (API / "api.F90").read_text()
