@@ -101,7 +101,8 @@ contains
       child = first_child(p)
       do while (child > 0)
         do e = structure%last(child) + 1, structure%last(child + 1)
-          call add(structure%unknown(e))
+          j = structure%unknown(e)                        ! the list may move while it grows
+          call add(j)
         end do
         child = next_child(child)
       end do
