@@ -4,8 +4,8 @@ The unknowns are the parameters of the joint and, on every line, the true FRFs. 
 C(h) = K*(w)^-1, n^2 complex equations. Linearised about an estimate of the true FRFs this is a generalised
 least-squares problem with the full covariance of C; its residual corrects the FRFs, and this is repeated until the
 parameters converge. Without noise the fixed point is exact; with noise it reaches the Cramer-Rao bound of an unknown
-structure around the joint (tests/python/physics/test_estimator.py). Groups of DOFs between which all FRFs are zero are fitted
-separately.
+structure around the joint (tests/python/physics/test_estimator.py). Groups of DOFs between which all FRFs are zero are
+fitted separately.
 
 Everything has a leading axis over realisations, so that a Monte Carlo study is one call.
 """
