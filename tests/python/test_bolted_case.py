@@ -6,6 +6,7 @@ import dataclasses
 import io
 import json
 import shutil
+import warnings
 from functools import partial
 from typing import NamedTuple
 
@@ -191,7 +192,12 @@ def ran(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(study, "bolted_lap", partial(bolted_lap, divisions=COARSE))
         patch.setattr(cases, "run_case", kept)
-        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(complained):
+        with (
+            contextlib.redirect_stdout(said),
+            contextlib.redirect_stderr(complained),
+            warnings.catch_warnings(),
+        ):
+            warnings.simplefilter("ignore", DeprecationWarning)  # as Python does where a command is started
             status = jointfrf.cli.main(words)
     return Run(status, said.getvalue(), complained.getvalue(), outputs[0])
 
