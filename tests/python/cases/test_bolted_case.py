@@ -6,6 +6,7 @@ import dataclasses
 import io
 import json
 import shutil
+import warnings
 from functools import partial
 from typing import NamedTuple
 
@@ -13,12 +14,12 @@ import numpy as np
 import pytest
 
 import jointfrf as jf
-from jointfrf.cases import catalogue as cases
 from jointfrf.cases.bolted_lap import frfs
 from jointfrf.cases.bolted_lap.measurement import DOFS, FivePoints, both_sides, measured_entries
 from jointfrf.cases.bolted_lap.summary import bolted_lap_summary
 from jointfrf.cases.bolted_lap.tables import bolted_lap_tables
-from jointfrf.cases.catalogue import find_case, read_case, run_case
+from jointfrf.cases.catalogue import CaseOutput, find_case, read_case, run_case
+from jointfrf.cli import run
 from jointfrf.cli.main import main
 from jointfrf.dofs import DIRECTIONS, rigid_motion
 from jointfrf.solids.bolted_lap import LapDivisions, bolted_lap
@@ -169,7 +170,7 @@ class Run(NamedTuple):
     status: int
     said: str
     complained: str
-    output: cases.CaseOutput
+    output: CaseOutput
 
     @property
     def result(self):
@@ -189,8 +190,13 @@ def ran(tmp_path_factory):
     said, complained = io.StringIO(), io.StringIO()
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(frfs, "bolted_lap", partial(bolted_lap, divisions=COARSE))
-        patch.setattr(cases, "run_case", kept)
-        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(complained):
+        patch.setattr(run, "run_case", kept)
+        with (
+            contextlib.redirect_stdout(said),
+            contextlib.redirect_stderr(complained),
+            warnings.catch_warnings(),
+        ):
+            warnings.simplefilter("ignore", DeprecationWarning)  # as Python does where a command is started
             status = main(words)
     return Run(status, said.getvalue(), complained.getvalue(), outputs[0])
 

@@ -332,9 +332,9 @@ def test_assembly_of_many_elements_is_fast():
     assert len(elements) == 5000
     times = []
     for _ in range(5):
-        start = time.perf_counter()
+        start = time.process_time()
         assemble_bricks(nodes, elements, ALUMINIUM)
-        times.append(time.perf_counter() - start)
+        times.append(time.process_time() - start)
     assert min(times) < 1.0
 
 
