@@ -187,7 +187,7 @@ def _tell_differences(args: argparse.Namespace, sides: Interface) -> None:
         error = difference_error(reach, args.bending_stiffness, 1.0)
         print(
             f"they add about dx/(3 E I) = {error.compliance:.3g} rad/(N m) to the compliance of a rotational DOF: "
-            f"a joint much stiffer than {1 / error.compliance:.3g} N m/rad is not told from a rigid one"
+            f"a joint much stiffer than {1 / error.compliance:.3g} N m/rad cannot be distinguished from a rigid one"
         )
 
 

@@ -1,7 +1,7 @@
 """Structures that are free, hinged, held and softly held; their receptances in 80 bits; and a run over many of them.
 
-`python tests/python/support/supported_structures.py [BEAMS]` looks for free brick beams that are not recognised at 0 Hz,
-with every kernel of OpenBLAS.
+`python tests/python/support/supported_structures.py [BEAMS]` looks for free brick beams that are not recognised at
+0 Hz, with every kernel of OpenBLAS.
 """
 
 from __future__ import annotations
