@@ -94,7 +94,7 @@ contains
 
     threads = 1
     if (flops < serial .or. n_items < 2) return
-    !$ if (.not. omp_in_parallel() .and. blas_takes_threads()) &
-    !$   threads = int(min(int(omp_get_max_threads(), long), n_items))
+    !$ if (omp_in_parallel()) return
+    !$ if (blas_takes_threads()) threads = int(min(int(omp_get_max_threads(), long), n_items))
   end function threads_for
 end module jointfrf_sharing

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import ctypes
 import os
-import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -22,15 +22,22 @@ def pytest_configure(config: pytest.Config) -> None:
         os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 
+@cache
+def openmp_library() -> ctypes.CDLL | None:
+    """The OpenMP library of this process; None without one, or without /proc."""
+    maps = Path("/proc/self/maps")
+    lines = maps.read_text().splitlines() if maps.exists() else []
+    paths = [line.split()[-1] for line in lines if "libgomp" in line]
+    return ctypes.CDLL(paths[0]) if paths else None
+
+
 @pytest.fixture
 def threads() -> Iterator[Callable[[int], None] | None]:
-    """One thread, and how to set another number; the number before comes back. None without OpenMP or /proc."""
-    maps = Path("/proc/self/maps")
-    openmp = re.search(r"\S*libgomp\S*", maps.read_text()) if maps.exists() else None
-    if openmp is None:
+    """One thread, and how to set another number; the number before comes back. None where OpenMP is not found."""
+    library = openmp_library()
+    if library is None:
         yield None
         return
-    library = ctypes.CDLL(openmp[0])
     before = library.omp_get_max_threads()
     library.omp_set_num_threads(1)
     yield library.omp_set_num_threads

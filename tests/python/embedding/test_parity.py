@@ -21,7 +21,7 @@ ENTRY = re.compile(r"(\w+)\((\d),(\d)\) *(\d+) +(\S+) +(\S+)")
 @pytest.fixture(scope="module")
 def programs(installed_library: InstalledLibrary, tmp_path_factory) -> dict[str, list[str | Path]]:
     folder = tmp_path_factory.mktemp("case")
-    commands: dict[str, list[str | Path]] = {"Python": [sys.executable, TESTS / "python" / "case.py"]}
+    commands: dict[str, list[str | Path]] = {"Python": [sys.executable, TESTS / "python" / "support" / "case.py"]}
     for language, source in SOURCES.items():
         commands[language] = [installed_library.compile(TESTS / source, folder / Path(source).name.replace(".", "_"))]
     return commands
