@@ -319,7 +319,8 @@ contains
   !>
   !> With U and V of `compliance_factors`, noise e_pq of entry pq of h moves C_ab by U_ap V_qb e_pq, or by
   !> (U_ap V_qb + U_aq V_pb) e_pq/2 where h was made reciprocal, (h + h^T)/2. The noise is taken as circular and
-  !> independent between entries. The sums over p and q are taken one after the other: n^4 m instead of n^4 m^2 products.
+  !> independent between entries. The sums over p and q are taken one after the other: n^4 m instead of n^4 m^2
+  !> products.
   !> gamma        receptance about which is linearised, shape (2 n, 2 n, n_freq), m/N
   !> transform    T, shape (2 n, m), (m, 2 n) where transposed: from measured points to DOFs j, then k; the unit matrix
   !>              where gamma itself was measured

@@ -57,6 +57,7 @@ module jointfrf_dynamic_stiffness
     !> Entry (i, j) of K, M, C and eta K + H; zero outside the band.
     pure function coefficient_function(self, i, j) result(value)
       import :: dynamic_stiffness, dp
+      implicit none
       class(dynamic_stiffness), intent(in) :: self
       integer, intent(in) :: i, j
       real(dp) :: value(4)

@@ -34,6 +34,7 @@ module jointfrf_engine
   interface
     function cpu_level() bind(C, name='jointfrf_cpu_level') result(level)
       import :: c_int
+      implicit none
       integer(c_int) :: level
     end function cpu_level
   end interface

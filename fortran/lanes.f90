@@ -5,8 +5,8 @@
 !> where each element lies. What is done with elements is a set of kernels, compiled from one source for several
 !> instruction sets (folder `lanes/`); `engine.F90` chooses among them.
 !>
-!> Kernels return sums in which NaN, Inf and overflow show, and estimates of the condition. A line in doubt is done again
-!> by the reference engine, so that both engines give the same codes.
+!> Kernels return sums in which NaN, Inf and overflow show, and estimates of the condition. A line in doubt is done
+!> again by the reference engine, so that both engines give the same codes.
 module jointfrf_lanes
   use, intrinsic :: iso_c_binding, only: c_f_pointer, c_intptr_t, c_loc, c_ptr
   use, intrinsic :: iso_fortran_env, only: int64
@@ -38,6 +38,7 @@ module jointfrf_lanes
     !> rcond        reciprocal condition numbers, cut off at 1
     subroutine judge_routine(n_lines, total, line_info, rcond)
       import :: dp, ip
+      implicit none
       integer, intent(in) :: n_lines
       real(dp), intent(in) :: total(n_lines)
       integer(ip), intent(out) :: line_info(n_lines)
@@ -51,6 +52,7 @@ module jointfrf_lanes
     !> n_lines  lines there are, 1..lanes; the last one fills the lanes that are left
     subroutine load_routine(n, place, first, n_lines, lines, x)
       import :: dp, lanes
+      implicit none
       integer, intent(in) :: n, place(n), first, n_lines
       real(dp), intent(in) :: lines(2, n, *)
       real(dp), intent(inout) :: x(lanes, 2, *)
@@ -59,6 +61,7 @@ module jointfrf_lanes
     !> Lanes into the caller's lines. Arguments as in load.
     subroutine store_routine(n, place, first, n_lines, x, lines)
       import :: dp, lanes
+      implicit none
       integer, intent(in) :: n, place(n), first, n_lines
       real(dp), intent(in) :: x(lanes, 2, *)
       real(dp), intent(inout) :: lines(2, n, *)
@@ -67,6 +70,7 @@ module jointfrf_lanes
     !> Sum of |re| + |im| over elements, shape (lanes): not finite where one of them is not.
     subroutine total_routine(n, from, x, total)
       import :: dp, lanes
+      implicit none
       integer, intent(in) :: n, from(n)
       real(dp), intent(in) :: x(lanes, 2, *)
       real(dp), intent(out) :: total(lanes)
@@ -75,6 +79,7 @@ module jointfrf_lanes
     !> x(to) = factor x(from), element by element.
     subroutine copy_routine(n, factor, from, to, x)
       import :: dp, lanes
+      implicit none
       integer, intent(in) :: n, from(n), to(n)
       real(dp), intent(in) :: factor
       real(dp), intent(inout) :: x(lanes, 2, *)
@@ -83,6 +88,7 @@ module jointfrf_lanes
     !> x(to) = value, the same in all lanes.
     subroutine fill_routine(n, value, to, x)
       import :: dp, lanes
+      implicit none
       integer, intent(in) :: n, to(n)
       complex(dp), intent(in) :: value(n)
       real(dp), intent(inout) :: x(lanes, 2, *)
@@ -91,6 +97,7 @@ module jointfrf_lanes
     !> x(to) = fa x(a) + fb x(b), element by element.
     subroutine combine_routine(n, fa, a, fb, b, to, x)
       import :: dp, lanes
+      implicit none
       integer, intent(in) :: n, a(n), b(n), to(n)
       real(dp), intent(in) :: fa, fb
       real(dp), intent(inout) :: x(lanes, 2, *)
@@ -101,6 +108,7 @@ module jointfrf_lanes
     !> a, b, c   the element before the first one of each row, shapes (m), (k), (m)
     subroutine product_routine(m, n, k, factor, a, b, c, x)
       import :: dp, lanes
+      implicit none
       integer, intent(in) :: m, n, k, a(m), b(k), c(m)
       real(dp), intent(in) :: factor
       real(dp), intent(inout) :: x(lanes, 2, *)
@@ -116,6 +124,7 @@ module jointfrf_lanes
     !> ahead   memory to ask for on the way
     subroutine invert_routine(n, before, x, hint, place, rcond, ahead)
       import :: dp, lanes, lookahead
+      implicit none
       integer, intent(in) :: n, before
       real(dp), intent(inout) :: x(lanes, 2, *)
       integer, intent(inout) :: hint(*)
@@ -135,6 +144,7 @@ module jointfrf_lanes
     !> ahead    memory to ask for on the way
     subroutine solve_routine(n, n_rhs, n_last, before, x, hint, row, rcond, ahead)
       import :: dp, lanes, lookahead
+      implicit none
       integer, intent(in) :: n, n_rhs, n_last, before
       real(dp), intent(inout) :: x(lanes, 2, *)
       integer, intent(inout) :: hint(*)
@@ -149,6 +159,7 @@ module jointfrf_lanes
     !> smallest   smallest |pivot|^2, shape (lanes); NaN where a pivot is not finite
     subroutine eliminate_routine(plan, omega, x, smallest)
       import :: dp, elimination_plan, lanes
+      implicit none
       type(elimination_plan), intent(in) :: plan
       real(dp), intent(in) :: omega(lanes)
       real(dp), intent(inout) :: x(lanes, 2, *)
@@ -166,6 +177,7 @@ module jointfrf_lanes
     !> largest    largest, shape (lanes)
     subroutine superpose_routine(n_modes, n_four, stiffness, loss, damping, residue, omega, x, smallest, largest)
       import :: dp, lanes
+      implicit none
       integer, intent(in) :: n_modes, n_four
       real(dp), intent(in) :: stiffness(n_modes), loss(n_modes), damping(n_modes), residue(4, n_modes, n_four)
       real(dp), intent(in) :: omega(lanes)
@@ -180,6 +192,7 @@ module jointfrf_lanes
     !> high   second word, the same for all n counters of a lane
     subroutine words_routine(n, key, low, high, words)
       import :: int64, lanes
+      implicit none
       integer, intent(in) :: n
       integer(int64), intent(in) :: key(2), low(lanes, n), high(lanes)
       integer(int64), intent(out) :: words(lanes, 2, n)
@@ -189,6 +202,7 @@ module jointfrf_lanes
     !> words_routine.
     subroutine draw_routine(n, size, key, low, high, x)
       import :: dp, int64, lanes
+      implicit none
       integer, intent(in) :: n
       real(dp), intent(in) :: size
       integer(int64), intent(in) :: key(2), low(lanes, n), high(lanes)
@@ -198,6 +212,7 @@ module jointfrf_lanes
     !> polluted = h + s e for numbers in a row; number i has its noise e in lane mod(i - 1, lanes) + 1.
     subroutine pollute_flat_routine(n, h, s, e, polluted)
       import :: dp, lanes
+      implicit none
       integer, intent(in) :: n
       real(dp), intent(in) :: h(2, n), s(2, n), e(lanes, 2, *)
       real(dp), intent(out) :: polluted(2, n)
@@ -206,6 +221,7 @@ module jointfrf_lanes
     !> x(place) = h + s e, with other noise in every lane.
     subroutine pollute_lanes_routine(n, h, s, e, place, x)
       import :: dp, lanes
+      implicit none
       integer, intent(in) :: n, place(n)
       real(dp), intent(in) :: h(2, n), s(2, n), e(lanes, 2, n)
       real(dp), intent(inout) :: x(lanes, 2, *)
@@ -214,6 +230,7 @@ module jointfrf_lanes
     !> The largest modulus among numbers that are finite, 0 where there is none.
     pure function largest_routine(n, h) result(modulus)
       import :: dp
+      implicit none
       integer, intent(in) :: n
       real(dp), intent(in) :: h(2, n)
       real(dp) :: modulus
@@ -228,6 +245,7 @@ module jointfrf_lanes
     !> square   sums of re*re, im*im and re*im about the mean, shape (lanes, 3, n)
     subroutine moments_routine(n, from, x, taken, number, mean, square)
       import :: dp, lanes
+      implicit none
       integer, intent(in) :: n, from(n)
       real(dp), intent(in) :: x(lanes, 2, *), taken(lanes), number(lanes)
       real(dp), intent(inout) :: mean(lanes, 2, n), square(lanes, 3, n)
@@ -238,6 +256,7 @@ module jointfrf_lanes
     !> rcond          not finite where something overflowed
     subroutine invert_lines_routine(n, first, n_lines, a, a_inverse, rcond)
       import :: dp
+      implicit none
       integer, intent(in) :: n, first, n_lines
       real(dp), intent(in) :: a(2, n*n, *)
       real(dp), intent(inout) :: a_inverse(2, n*n, *)
@@ -247,6 +266,7 @@ module jointfrf_lanes
     !> ISMM for one joint DOF, without workspace. Arguments as in `ismm`, as pairs of real numbers.
     subroutine identify_lines_routine(transposed, first, n_lines, alpha, gamma, k_initial, k_joint, rcond)
       import :: dp
+      implicit none
       logical, intent(in) :: transposed
       integer, intent(in) :: first, n_lines
       real(dp), intent(in) :: alpha(8, *), gamma(8, *), k_initial(2, *)

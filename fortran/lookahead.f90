@@ -21,6 +21,7 @@ module jointfrf_lookahead
   interface
     subroutine prefetch(from, to, write) bind(C, name='jointfrf_prefetch')
       import :: c_int, c_intptr_t
+      implicit none
       integer(c_intptr_t), value :: from, to
       integer(c_int), value :: write
     end subroutine prefetch

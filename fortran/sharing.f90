@@ -26,6 +26,7 @@ module jointfrf_sharing
     !> thread   1..threads: which workspace to use; several threads call this at the same time
     subroutine items_routine(self, first, last, thread)
       import :: long, shared_work
+      implicit none
       class(shared_work), intent(in) :: self
       integer(long), intent(in) :: first, last
       integer, intent(in) :: thread

@@ -2,8 +2,8 @@
 !>
 !> A physics module says what one line is (`line_operation`) and where its result goes; everything that is the same for
 !> all of them is here, once: workspace (allocated before the loop, one piece a thread), NaN in bad lines, the count of
-!> bad lines. It may also say how a block of lines is done side by side (`line_block`); lines of a block that are in doubt
-!> are done again one by one, so that both ways give the same codes.
+!> bad lines. It may also say how a block of lines is done side by side (`line_block`); lines of a block that are in
+!> doubt are done again one by one, so that both ways give the same codes.
 !>
 !> A line declares its workspace by taking it: `line` is called once for no line in a `line_space` that only counts, and
 !> the workspace is as large as what was taken.
@@ -25,8 +25,8 @@ module jointfrf_sweep
   private
   public :: line_operation, line_space, run_sweep, worth_a_plan
 
-  !> Most blocks that a thread takes at a time, and work enough to take fewer. Pivot rows are remembered within them only,
-  !> so that results do not depend on the number of threads.
+  !> Most blocks that a thread takes at a time, and work enough to take fewer. Pivot rows are remembered within them
+  !> only, so that results do not depend on the number of threads.
   integer, parameter :: most_blocks = 8
   real(dp), parameter :: chunk_flops = 2.0e6_dp
   !> A sweep that reads no more bytes than this stays in the caches, and looking ahead would only cost time.
@@ -110,6 +110,7 @@ module jointfrf_sweep
     !> is no line i then, and all it has taken is null.
     subroutine line_routine(self, i, space, line_info, rcond)
       import :: line_operation, line_space, dp, ip
+      implicit none
       class(line_operation), intent(in) :: self
       integer, intent(in) :: i
       type(line_space), target, intent(inout) :: space

@@ -1,8 +1,8 @@
 !> The noise kernels: random numbers, noise on FRFs, and moments of what comes of it.
 !>
 !> One source for all instruction sets, as `lane_kernels.F90` is, loops written alike. Every bit is the same with every
-!> instruction set: only operations that IEEE 754 rounds correctly, in a fixed order, and none contracted (the build says
-!> so). Integers wrap around (the build says that too).
+!> instruction set: only operations that IEEE 754 rounds correctly, in a fixed order, and none contracted (the build
+!> says so). Integers wrap around (the build says that too).
 module JF_MODULE
   use, intrinsic :: iso_fortran_env, only: int64
   use jointfrf_kinds, only: dp

@@ -17,23 +17,28 @@ module jointfrf_blas_threads
   interface
     function takes_threads() bind(C, name='jointfrf_blas_takes_threads') result(yes)
       import :: c_int
+      implicit none
       integer(c_int) :: yes
     end function takes_threads
 
     function get_blas_threads() bind(C, name='jointfrf_get_blas_threads') result(threads)
       import :: c_int
+      implicit none
       integer(c_int) :: threads
     end function get_blas_threads
 
     subroutine set_blas_threads(threads) bind(C, name='jointfrf_set_blas_threads')
       import :: c_int
+      implicit none
       integer(c_int), value :: threads
     end subroutine set_blas_threads
 
     subroutine hold_own_blas_threads() bind(C, name='jointfrf_hold_own_blas_threads')
+      implicit none
     end subroutine hold_own_blas_threads
 
     subroutine release_own_blas_threads() bind(C, name='jointfrf_release_own_blas_threads')
+      implicit none
     end subroutine release_own_blas_threads
   end interface
 

@@ -16,6 +16,7 @@ module jointfrf_lapack
     !> Solve A X = B by LU with partial pivoting; A leaves as its factors.
     subroutine zgesv(n, nrhs, a, lda, ipiv, b, ldb, info) bind(C, name=JF_BLAS_PREFIX//"zgesv_")
       import :: dp, blas_ip
+      implicit none
       integer(blas_ip), intent(in) :: n, nrhs, lda, ldb
       complex(dp), intent(inout) :: a(lda, *), b(ldb, *)
       integer(blas_ip), intent(out) :: ipiv(*), info
@@ -24,6 +25,7 @@ module jointfrf_lapack
     !> LU factors of a general matrix.
     subroutine zgetrf(m, n, a, lda, ipiv, info) bind(C, name=JF_BLAS_PREFIX//"zgetrf_")
       import :: dp, blas_ip
+      implicit none
       integer(blas_ip), intent(in) :: m, n, lda
       complex(dp), intent(inout) :: a(lda, *)
       integer(blas_ip), intent(out) :: ipiv(*), info
@@ -32,6 +34,7 @@ module jointfrf_lapack
     !> Inverse from LU factors.
     subroutine zgetri(n, a, lda, ipiv, work, lwork, info) bind(C, name=JF_BLAS_PREFIX//"zgetri_")
       import :: dp, blas_ip
+      implicit none
       integer(blas_ip), intent(in) :: n, lda, ipiv(*), lwork
       complex(dp), intent(inout) :: a(lda, *)
       complex(dp), intent(out) :: work(*)
@@ -42,6 +45,7 @@ module jointfrf_lapack
     subroutine zgecon(norm, n, a, lda, anorm, rcond, work, rwork, info, norm_len) &
       bind(C, name=JF_BLAS_PREFIX//"zgecon_")
       import :: dp, blas_ip, c_char, c_size_t
+      implicit none
       character(kind=c_char), intent(in) :: norm
       integer(blas_ip), intent(in) :: n, lda
       complex(dp), intent(in) :: a(lda, *)
@@ -55,6 +59,7 @@ module jointfrf_lapack
     !> LU factors of a band matrix.
     subroutine zgbtrf(m, n, kl, ku, ab, ldab, ipiv, info) bind(C, name=JF_BLAS_PREFIX//"zgbtrf_")
       import :: dp, blas_ip
+      implicit none
       integer(blas_ip), intent(in) :: m, n, kl, ku, ldab
       complex(dp), intent(inout) :: ab(ldab, *)
       integer(blas_ip), intent(out) :: ipiv(*), info
@@ -64,6 +69,7 @@ module jointfrf_lapack
     subroutine zgbtrs(trans, n, kl, ku, nrhs, ab, ldab, ipiv, b, ldb, info, trans_len) &
       bind(C, name=JF_BLAS_PREFIX//"zgbtrs_")
       import :: dp, blas_ip, c_char, c_size_t
+      implicit none
       character(kind=c_char), intent(in) :: trans
       integer(blas_ip), intent(in) :: n, kl, ku, nrhs, ldab, ipiv(*), ldb
       complex(dp), intent(in) :: ab(ldab, *)
@@ -76,6 +82,7 @@ module jointfrf_lapack
     subroutine zgbcon(norm, n, kl, ku, ab, ldab, ipiv, anorm, rcond, work, rwork, info, norm_len) &
       bind(C, name=JF_BLAS_PREFIX//"zgbcon_")
       import :: dp, blas_ip, c_char, c_size_t
+      implicit none
       character(kind=c_char), intent(in) :: norm
       integer(blas_ip), intent(in) :: n, kl, ku, ldab, ipiv(*)
       complex(dp), intent(in) :: ab(ldab, *)
@@ -90,6 +97,7 @@ module jointfrf_lapack
     subroutine zgemm(transa, transb, m, n, k, alpha, a, lda, b, ldb, beta, c, ldc, transa_len, transb_len) &
       bind(C, name=JF_BLAS_PREFIX//"zgemm_")
       import :: dp, blas_ip, c_char, c_size_t
+      implicit none
       character(kind=c_char), intent(in) :: transa, transb
       integer(blas_ip), intent(in) :: m, n, k, lda, ldb, ldc
       complex(dp), intent(in) :: alpha, beta, a(lda, *), b(ldb, *)

@@ -15,12 +15,14 @@ module jointfrf_traps
     !> From here to the release no exception stops this thread. Rounding stays.
     subroutine hold_traps(host) bind(C, name='jointfrf_hold_traps')
       import :: host_state
+      implicit none
       type(host_state), intent(out) :: host
     end subroutine hold_traps
 
     !> The state of this thread is that of `host` again.
     subroutine release_traps(host) bind(C, name='jointfrf_release_traps')
       import :: host_state
+      implicit none
       type(host_state), intent(in) :: host
     end subroutine release_traps
   end interface

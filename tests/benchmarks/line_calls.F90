@@ -10,6 +10,7 @@ program line_calls
   interface
     subroutine zgesv(n, n_rhs, a, lda, pivot, b, ldb, info) bind(C, name=JF_BLAS_PREFIX//"zgesv_")
       import :: c_int, dp
+      implicit none
       integer(c_int), intent(in) :: n, n_rhs, lda, ldb
       complex(dp), intent(inout) :: a(lda, *), b(ldb, *)
       integer(c_int), intent(out) :: pivot(*), info
@@ -68,7 +69,8 @@ contains
     complex(dp) :: length(3, 1)
     integer(c_int) :: i_length(3, 1)
 
-    call jf_couple_work('N', m, m, n, 1, h_a, h_b, k, dofs, dofs, h_c, codes, rcond, length(1, :), -1, i_length(1, :), -1, &
+    call jf_couple_work('N', m, m, n, 1, h_a, h_b, k, dofs, dofs, h_c, codes, rcond, length(1, :), -1, i_length(1, &
+      :), -1, &
                         info)
     call jf_joint_compliance_work('N', n, 1, gamma, c, codes, rcond, length(2, :), -1, i_length(2, :), -1, info)
     call jf_solve_work('N', m, m, 1, h_a, h_b, gamma, codes, rcond, length(3, :), -1, i_length(3, :), -1, info)

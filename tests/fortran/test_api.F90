@@ -7,7 +7,8 @@ program test_api
     jf_difference_weights, jf_engine_automatic, jf_engine_lapack, jf_engine_plain, jf_engine_x86_64_v2, &
     jf_engine_x86_64_v3, jf_engine_x86_64_v4, jf_find_modification, jf_get_engine, jf_info_text, &
     jf_inverse_substructuring, jf_invert, jf_ismm, &
-    jf_joint_compliance, jf_line_text, jf_modify, jf_receptance, jf_receptance_banded, jf_receptance_modal, jf_set_engine, &
+    jf_joint_compliance, jf_line_text, jf_modify, jf_receptance, jf_receptance_banded, jf_receptance_modal, &
+      jf_set_engine, &
     jf_solve, jf_transform, jf_version
   use jointfrf_compliance, only: compliance_covariance, compliance_factors, joint_compliance
   use jointfrf_coupling, only: couple

@@ -1,7 +1,8 @@
-!> The hold on the threads of the BLAS is counted and given back, seen through the BLAS's own functions, which are looked
-!> up by name. Skipped where the BLAS starts no threads of its own, or is of a kind that is not held.
+!> The hold on the threads of the BLAS is counted and given back, seen through the BLAS's own functions, which are
+!> looked up by name. Skipped where the BLAS starts no threads of its own, or is of a kind that is not held.
 module blas_probe
-  use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_f_procpointer, c_funptr, c_int, c_int64_t, c_null_char, &
+  use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_f_procpointer, c_funptr, c_int, c_int64_t, &
+    c_null_char, &
     c_null_ptr, c_ptr, c_size_t
   use jointfrf_kinds, only: blas_ip, dp, ip
   use jointfrf_lapack, only: zgemm
@@ -13,21 +14,25 @@ module blas_probe
   abstract interface
     function getter() bind(C) result(number)
       import :: c_int
+      implicit none
       integer(c_int) :: number
     end function getter
 
     subroutine setter(number) bind(C)
       import :: c_int
+      implicit none
       integer(c_int), value :: number
     end subroutine setter
 
     function long_getter() bind(C) result(number)
       import :: c_int64_t
+      implicit none
       integer(c_int64_t) :: number
     end function long_getter
 
     subroutine long_setter(number) bind(C)
       import :: c_int64_t
+      implicit none
       integer(c_int64_t), value :: number
     end subroutine long_setter
   end interface
@@ -35,11 +40,13 @@ module blas_probe
   interface
     subroutine c_exit(code) bind(C, name='exit')
       import :: c_int
+      implicit none
       integer(c_int), value :: code
     end subroutine c_exit
 
     function dlsym(handle, name) bind(C, name='dlsym') result(symbol)
       import :: c_char, c_funptr, c_ptr
+      implicit none
       type(c_ptr), value :: handle
       character(kind=c_char), intent(in) :: name(*)
       type(c_funptr) :: symbol

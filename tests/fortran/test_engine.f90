@@ -3,7 +3,8 @@
 !> The environment is read once, so the program runs once for each word of JOINTFRF_ENGINE that is to be tried.
 program test_engine
   use testing, only: check, check_close, dp, finish, inverse, ip, random_regular, seed
-  use jointfrf_engine, only: engine_automatic, engine_lapack, engine_plain, engine_v2, engine_v3, engine_v4, find_kernels, &
+  use jointfrf_engine, only: engine_automatic, engine_lapack, engine_plain, engine_v2, engine_v3, engine_v4, &
+    find_kernels, &
     get_engine, set_engine
   use jointfrf_lanes, only: lane_kernels
   use jointfrf_linear_algebra, only: invert
@@ -16,7 +17,8 @@ program test_engine
 
   call seed(23)
   call get_environment_variable('JOINTFRF_ENGINE', word)
-  call check(all([engine_automatic, engine_lapack, engine_plain, engine_v2, engine_v3, engine_v4] == [0, 1, 2, 3, 4, 5]), &
+  call check(all([engine_automatic, engine_lapack, engine_plain, engine_v2, engine_v3, engine_v4] == [0, 1, 2, 3, 4, &
+    5]), &
              'codes as documented')
   wrong = word /= '' .and. all(word /= [character(len=40) :: 'auto', 'lapack', 'plain'])
   if (wrong) call refused()

@@ -197,7 +197,8 @@ contains
     call ismm(.false., bad, gamma, first, k, line_info, rcond, info)
     call check(abs(log(rcond(1)/1.0e-8_dp)) < log(3.0_dp), 'rcond of nearly singular alpha')      ! an estimate
     call inverse_substructuring(.false., bad, k, line_info, rcond, info)
-    call check(abs(log(rcond(1)/1.0e-8_dp)) < log(3.0_dp), 'short form: rcond of nearly singular gamma')      ! an estimate
+    call check(abs(log(rcond(1)/1.0e-8_dp)) < log(3.0_dp), &
+      'short form: rcond of nearly singular gamma')      ! an estimate
 
     call get_engine(engine, info)
     call set_engine(engine_lapack, info)                       ! the reference engine knows it exactly

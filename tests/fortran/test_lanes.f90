@@ -4,7 +4,8 @@ module lane_calls
   use testing, only: dp, infinity, ip, not_a_number, random_lines, random_real, random_regular, transposed, uniform, &
     untouched
   use jointfrf, only: jf_central_difference, jf_compliance_covariance, jf_compliance_factors, jf_couple, jf_decouple, &
-    jf_find_modification, jf_inverse_substructuring, jf_invert, jf_ismm, jf_joint_compliance, jf_modify, jf_receptance, &
+    jf_find_modification, jf_inverse_substructuring, jf_invert, jf_ismm, jf_joint_compliance, jf_modify, &
+      jf_receptance, &
     jf_receptance_banded, jf_receptance_modal, jf_solve, jf_transform
   implicit none
   private
@@ -304,8 +305,8 @@ contains
     end do
   end subroutine threads
 
-  !> |A X - I| and |X A - I| over eps |A| |X|, and |A X - B| over eps (|A| |X|), in quadruple precision: no more than a few
-  !> times those of LAPACK.
+  !> |A X - I| and |X A - I| over eps |A| |X|, and |A X - B| over eps (|A| |X|), in quadruple precision: no more than a
+  !> few times those of LAPACK.
   subroutine residuals()
     integer, parameter :: sizes(6) = [2, 3, 5, 8, 13, 24]
     character(len=*), parameter :: families(5) = [character(len=8) :: 'random', 'rows', 'columns', 'rank', 'growth']

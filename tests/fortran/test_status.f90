@@ -1,7 +1,8 @@
 !> Every code has its value and its text.
 program test_status
   use testing, only: check, finish, ip
-  use jointfrf_status, only: info_good, info_no_engine, info_no_memory, info_text, line_good, line_not_finite, line_overflow, &
+  use jointfrf_status, only: info_good, info_no_engine, info_no_memory, info_text, line_good, line_not_finite, &
+    line_overflow, &
     line_text, text_length
   implicit none
   !> The modulus of the most negative number.
