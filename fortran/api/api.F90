@@ -15,10 +15,11 @@
 !>             one; an estimate where the fast engines solve, and for large or banded matrices
 !> info        0 good; -i argument i is wrong and nothing was done; > 0 number of bad lines; -1000 no memory; -1001 the
 !>             environment variable JOINTFRF_ENGINE names an engine that is not there, and nothing was done
-!> work        of jf_NAME_work: workspace, shape (max(1, lwork)); after a query, work(1) is the least lwork that will do
+!> work        of jf_NAME_work: workspace, shape (max(1, lwork)); after a query work(1) is the least lwork that will do,
+!>             otherwise what the lines took of it
 !> lwork       length of work; -1 here or in liwork is a query: the arguments are checked, both least lengths are given
 !>             back, and nothing else is done
-!> iwork       of jf_NAME_work: workspace, shape (max(1, liwork)); after a query, iwork(1) is the least liwork
+!> iwork       of jf_NAME_work: workspace, shape (max(1, liwork)); iwork(1) likewise
 !> liwork      length of iwork
 !> Integers are default ones of four bytes, jf_int in C. The library jointfrf64 has the same routines with integers of
 !> eight bytes, also in arrays, for programs compiled so (-fdefault-integer-8, -i8); sizes end at 2147483647 in both.

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from command import run_command
 from jointfrf.cli.main import main
 from uff_writer import function
 
@@ -23,12 +24,18 @@ JOINT_OF_BARS = ["--j", "101,102", "--k", "201,202", "--dofs", "y,theta_z"]
 
 
 def run(*words, expect=0):
-    result = subprocess.run(
-        [sys.executable, "-m", "jointfrf", "identify", *map(str, words)], capture_output=True, text=True, timeout=120
-    )
+    result = run_command("identify", *words)
     assert result.returncode == expect, result.stderr
     assert "Traceback" not in result.stderr
     return result
+
+
+def test_the_program_prints_what_the_command_gives():
+    words = ["identify", BARS, *JOINT_OF_BARS]
+    started = subprocess.run(
+        [sys.executable, "-m", "jointfrf", *map(str, words)], capture_output=True, text=True, timeout=120
+    )
+    assert (started.returncode, started.stdout, started.stderr) == run_command(*words)
 
 
 @pytest.fixture(scope="module")
