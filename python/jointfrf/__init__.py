@@ -36,7 +36,7 @@ from jointfrf.errors import (
     SingularLineError,
 )
 from jointfrf.frf.bands import as_bands, band_mean, in_bands
-from jointfrf.frf.metrics import amplitude_error, frequency_error, peak
+from jointfrf.frf.metrics import amplitude_error, frequency_error, has_peak, peak
 from jointfrf.frf.noise import pollute, realisations
 from jointfrf.identification.identify import identify
 from jointfrf.identification.joint_fit import JointFit
@@ -124,6 +124,7 @@ __all__ = [
     "find_modification",
     "frequency_error",
     "get_engine",
+    "has_peak",
     "identify",
     "impact_consistency",
     "in_bands",

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from jointfrf.frf.bands import Band, in_bands
 from jointfrf.kernel.arguments import FloatArray, as_frequency, as_values
 
-__all__ = ["amplitude_error", "frequency_error", "peak"]
+__all__ = ["amplitude_error", "frequency_error", "has_peak", "peak"]
 
 
 def peak(h: ArrayLike, freq_hz: ArrayLike, band: Band | None = None, *, refine: bool = False) -> tuple[float, float]:
@@ -42,18 +42,55 @@ def peak(h: ArrayLike, freq_hz: ArrayLike, band: Band | None = None, *, refine: 
     (4.0, 11.0)
     """
     freq = as_frequency(freq_hz)
+    amplitude, inside, at = _largest(h, freq, band)
+    if not refine or at in (inside[0], inside[-1]) or amplitude[at - 1 : at + 2].min() <= 0:
+        return float(amplitude[at]), float(freq[at])
+    parabola = np.polyfit(freq[at - 1 : at + 2] - freq[at], np.log(amplitude[at - 1 : at + 2]), 2)
+    offset = -parabola[1] / (2 * parabola[0])
+    return float(np.exp(np.polyval(parabola, offset))), float(freq[at] + offset)
+
+
+def has_peak(h: ArrayLike, freq_hz: ArrayLike, band: Band) -> bool:
+    """Whether an FRF has a peak in a band: its largest modulus there does not lie on the first or the last line.
+
+    Parameters
+    ----------
+    h : array_like, shape (n_freq,)
+        One FRF.
+    freq_hz : array_like, shape (n_freq,)
+        Hz.
+    band : (low, high)
+        Hz.
+
+    Returns
+    -------
+    bool
+
+    Raises
+    ------
+    ValueError
+        As in `peak`.
+
+    Examples
+    --------
+    >>> import jointfrf as jf
+    >>> h, freq = [1.0, 4.0, 2.0, 1.0], [10.0, 11.0, 12.0, 13.0]
+    >>> jf.has_peak(h, freq, (10, 13)), jf.has_peak(h, freq, (11, 13))
+    (True, False)
+    """
+    _, inside, at = _largest(h, as_frequency(freq_hz), band)
+    return at not in (inside[0], inside[-1])
+
+
+def _largest(h: ArrayLike, freq: FloatArray, band: Band | None) -> tuple[FloatArray, NDArray[np.intp], np.intp]:
+    """Return the modulus of an FRF, the lines inside the band, and the one where it is largest there."""
     amplitude: FloatArray = np.abs(as_values("h", h, freq.size))
     if not np.isfinite(amplitude).all():
         raise ValueError(f"h holds NaN or Inf in line {int(np.argmin(np.isfinite(amplitude)))}")
     inside = np.arange(freq.size) if band is None else np.flatnonzero(in_bands(freq, [band]))
     if inside.size == 0:
         raise ValueError("h has no lines")
-    at = inside[np.argmax(amplitude[inside])]
-    if not refine or at in (inside[0], inside[-1]) or amplitude[at - 1 : at + 2].min() <= 0:
-        return float(amplitude[at]), float(freq[at])
-    parabola = np.polyfit(freq[at - 1 : at + 2] - freq[at], np.log(amplitude[at - 1 : at + 2]), 2)
-    offset = -parabola[1] / (2 * parabola[0])
-    return float(np.exp(np.polyval(parabola, offset))), float(freq[at] + offset)
+    return amplitude, inside, inside[np.argmax(amplitude[inside])]
 
 
 def amplitude_error(

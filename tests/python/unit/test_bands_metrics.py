@@ -86,6 +86,16 @@ def test_amplitude_and_frequency_error():
     assert jf.frequency_error(exact, found, freq, (50, 101.5)) == pytest.approx(1.5)
 
 
+@pytest.mark.parametrize(
+    ("band", "expected"), [((20.0, 40.0), True), ((10.0, 30.0), False), ((30.0, 50.0), False), ((31.0, 50.0), False)]
+)
+def test_a_peak_lies_inside_its_band(band, expected):
+    """One mode at 30 Hz: where it lies at the edge of the band or outside, the largest value is no peak."""
+    freq = np.arange(10.0, 51.0)
+    h = 1 / (30.0**2 - freq**2 + 0.1j * 30.0**2)
+    assert jf.has_peak(h, freq, band) == expected
+
+
 def test_refined_peak_lies_between_the_lines():
     freq = np.arange(50.0, 150.0, 1.0)
     h = resonance(freq, 100.37, eta=0.05)

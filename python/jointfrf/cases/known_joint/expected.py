@@ -13,9 +13,6 @@ from jointfrf.frf.bands import Band
 
 __all__ = ["Expected", "ExpectedErrors", "ExpectedParameters", "Known", "read_expected"]
 
-#: Share of the realisations that a published value fits inside, percent, unless the file says otherwise.
-_CENTRAL = 98.0
-
 
 @dataclass(frozen=True)
 class Known:
@@ -39,10 +36,7 @@ class Known:
 
 @dataclass(frozen=True)
 class ExpectedParameters:
-    """Published parameters of one identification, and the largest errors allowed, percent.
-
-    A value fits inside the `central` percent of the realisations.
-    """
+    """Published parameters of one identification, and the largest errors allowed, percent."""
 
     source: str
     noise: str
@@ -50,7 +44,6 @@ class ExpectedParameters:
     bands: str
     values: dict[Parameter, float]
     rmse_below: dict[Parameter, float]
-    central: float = _CENTRAL
 
 
 @dataclass(frozen=True)
@@ -117,9 +110,8 @@ def _expected_parameters(entry: TomlTable, known: Known) -> ExpectedParameters:
     source, noise, method = _applied(entry, known)
     bands = "" if method == "compliance" else entry.text("bands", known.band_sets)
     values, rmse_below = (_by_parameter(entry, key, known) for key in ("values", "rmse_below"))
-    central = entry.number("central_percent", 0) if "central_percent" in entry else _CENTRAL
     entry.close()
-    return ExpectedParameters(source, noise, method, bands, values, rmse_below, central)
+    return ExpectedParameters(source, noise, method, bands, values, rmse_below)
 
 
 def _by_parameter(entry: TomlTable, key: str, known: Known) -> dict[Parameter, float]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,7 +14,7 @@ from jointfrf.cases.known_joint.study import Identified, chunk_size
 from jointfrf.cases.workers import Workers
 from jointfrf.errors import IllConditionedWarning
 from jointfrf.frf.bands import Band
-from jointfrf.frf.metrics import amplitude_error, frequency_error
+from jointfrf.frf.metrics import amplitude_error, frequency_error, has_peak
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.report.axes import percentile_lines
 from jointfrf.substructuring.coupling import couple
@@ -41,7 +42,7 @@ class RegeneratedFrf:
     bands : tuple of (low, high) or None
         Where errors are counted, Hz; None for all lines.
     amplitude, frequency : ndarray, shape (n_bands, n_realisations)
-        Errors (4.11) and (4.12), percent.
+        Errors (4.11) and (4.12), percent; NaN where the exact or the regenerated FRF has no peak in the band.
     """
 
     identified: Identified
@@ -102,10 +103,19 @@ def _with_errors(exact: Exact, identified: Identified, observed: Observed) -> Re
     h_exact = exact.h_c[:, exact.at(observed), exact.at(observed)]
     bands = observed.bands or (None,)
     amplitude, frequency = (
-        np.array([[error(h_exact, one, exact.freq_hz, band) for one in h] for band in bands], np.float64)
+        np.array([[_error(error, h_exact, one, exact.freq_hz, band) for one in h] for band in bands], np.float64)
         for error in (amplitude_error, frequency_error)
     )
     return RegeneratedFrf(identified, observed, percentile_lines(np.abs(h)), h[0].copy(), bands, amplitude, frequency)
+
+
+def _error(
+    error: Callable[..., float], h_exact: ComplexArray, h: ComplexArray, freq_hz: FloatArray, band: Band | None
+) -> float:
+    """Error of a peak; NaN where there is none: what is largest at the edge of a band belongs to a peak elsewhere."""
+    if band is not None and not (has_peak(h_exact, freq_hz, band) and has_peak(h, freq_hz, band)):
+        return float("nan")
+    return error(h_exact, h, freq_hz, band)
 
 
 def regenerate_all(

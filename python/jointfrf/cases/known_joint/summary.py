@@ -37,7 +37,7 @@ def _published(rows: list[Row]) -> list[str]:
         ]  # fmt: skip
         text = (
             f"{source[:1].upper()}{source[1:]}, noise {noise}, bands {bands}: {len(own) - len(outside)} of {len(own)} "
-            f"values of the thesis lie inside the central {own[0].central:g} % of ours"
+            "values of the thesis lie between the 2.5 and 97.5 percentile of ours"
         )
         sentences.append(text + (f"; {_joined(outside)} do not fit." if outside else "."))
     return sentences
