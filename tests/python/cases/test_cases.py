@@ -17,6 +17,7 @@ from jointfrf.cases.known_joint.noise_free import noise_free_errors
 from jointfrf.cases.known_joint.study import run_study
 from jointfrf.cases.known_joint.summary import known_joint_summary
 from jointfrf.cases.known_joint.tables import identified_rows, known_joint_numbers, known_joint_tables
+from jointfrf.cases.workers import Workers
 from jointfrf.dofs import Parameter
 from jointfrf.report.page import Page, make_page
 
@@ -292,7 +293,7 @@ def test_published_errors_of_regenerated_frfs(solids):
     rows = {key: [row[:5] for row in tables[key].rows] for key in ("table-4-7", "table-4-8")}
     assert [row[4] for row in rows["table-4-7"]] == [6.66, 0.25, 29.7, 1.24, None, None, 34.16, 0.62]
     assert [row[4] for row in rows["table-4-8"]] == [1.89, 0.0, 14.76, 0.0, 1.97, 0.06, 6.65, 0.32]
-    assert rows["table-4-7"][2] == ("H_ss Fx", "30-90", "decoupling-ss", "amplitude (4.11)", 29.7)
+    assert rows["table-4-7"][2] == ("H_ss Fx", "30-90", "decoupling-rs", "amplitude (4.11)", 29.7)
     assert {row[0] for row in rows["table-4-8"]} == {"H_ss Fy"}
     for key in rows:
         for row, full in zip(rows[key], tables[key].rows, strict=True):
@@ -306,6 +307,24 @@ def test_published_errors_of_regenerated_frfs(solids):
             assert row[4] is None or (verdict == "fits") == (low <= row[4] <= high)
     failing = {key: [i for i, row in enumerate(tables[key].rows) if row[-1] == "does not fit"] for key in rows}
     assert failing == {key: list(tables[key].failing) for key in rows}
+
+
+def test_tables_4_5_and_4_6_hold_with_one_factor_a_line():
+    """Equation (2.54) and a factor that all FRFs of a line share explain the decoupling columns, (2.56) does not."""
+    case = read_case(find_case("4.3.2"))
+    common = next(noise for noise in case.noises if noise.block == 6)
+    case = dataclasses.replace(case, freq_hz=case.freq_hz[1::2], noises=(common,))
+    found = {one.method: one for one in run_study(case, exact_frfs(case), 150, Workers())}
+    inside = {}
+    for table in case.expected.tables:
+        if table.noise == common.name or table.method == "decoupling-ss":
+            theta = found[table.method].theta
+            low, high = np.percentile(theta[:, [case.parameters.index(p) for p in table.values]], [2.5, 97.5], axis=0)
+            values = np.array(list(table.values.values()))
+            inside[table.method] = int(np.count_nonzero((low < values) & (values < high)))
+    assert inside["decoupling-rs"] >= 11
+    assert inside["ismm"] >= 10
+    assert inside["decoupling-ss"] <= 5
 
 
 def test_what_is_largest_at_the_edge_of_a_band_is_no_peak(solids):
