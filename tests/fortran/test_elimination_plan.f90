@@ -7,6 +7,8 @@ program test_elimination_plan
   call seed(9)
   call chain(.true.)
   call chain(.false.)
+  call both_ends(.true.)
+  call both_ends(.false.)
   call everything_retained()
   call finish('elimination_plan')
 
@@ -41,6 +43,33 @@ contains
     call check(plan%products < merge(16, 30, symmetric)*n, 'chain: few products')
     call check_inverse(plan, a, 'chain')
   end subroutine chain
+
+  !> Nodes of one DOF, of which both ends are wanted: every pivot is coupled with the next one and with the first, twice
+  !> as many unknowns as the matrix has entries below its diagonal, so that lists of that length have to grow.
+  subroutine both_ends(symmetric)
+    logical, intent(in) :: symmetric
+    integer, parameter :: n = 60, wanted(2) = [1, n]
+    real(dp) :: a(n, n)
+    logical :: coupled(1, n), retained(n)
+    type(elimination_plan) :: plan
+    integer :: i, j
+
+    a = random_real(n, n)
+    if (symmetric) a = a + transpose(a)
+    do j = 1, n
+      do i = 1, n
+        if (abs(i - j) > 1) a(i, j) = 0
+      end do
+      a(j, j) = a(j, j) + 8
+    end do
+    coupled = .true.
+    retained = .false.
+    retained(wanted) = .true.
+    call make_plan(n, coupled, retained, wanted, symmetric, plan)
+    call check(plan%n_retained == 2 .and. plan%n_steps == n - 2, 'both ends: all others are eliminated')
+    call check(plan%last_near(plan%n_steps + 1) > n, 'both ends: more neighbours than couplings')
+    call check_inverse(plan, a, 'both ends')
+  end subroutine both_ends
 
   subroutine everything_retained()
     integer, parameter :: n = 3
