@@ -165,6 +165,8 @@ def test_dofs_of_a_bolted_joint_in_another_order(tmp_path):
             r"number 2: method must be one of",
         ),
         ('bands = "region 1"', 'bands = "region 1"\ncentral_percent = 95', r"number 1: unknown key 'central_percent'"),
+        ("printed_step = 0.15", "printed_step = 0", r"printed_step must be positive, in Hz, not 0"),
+        ("offset = [0.0, -0.003, 0.0]", "offset = [0.0, -0.003]", r"number 3: offset must be x, y, z in m"),
         ('modes = "4-32', 'modes = 4 # "', r"\[figures\]: modes must be a text, not 4"),
     ],
 )

@@ -7,6 +7,7 @@ exact          FRFs without noise
 methods        K*(w) line by line, by each method
 study          many realisations of the noise: identified parameters
 regenerate     FRFs of the assembly from identified parameters, and their errors
+printed        FRFs from published parameters as they are printed, and their errors
 noise_free     how exact the equations are without noise
 modes          mode shapes of the assembly, and drawings of them
 compute        all of these, one after the other

@@ -8,6 +8,7 @@ from jointfrf.cases.definitions import Observed
 from jointfrf.cases.known_joint.exact import Exact, exact_frfs
 from jointfrf.cases.known_joint.modes import ModeShapes, modes_of_case
 from jointfrf.cases.known_joint.noise_free import NoiseFree, noise_free_errors
+from jointfrf.cases.known_joint.printed import PrintedErrors, printed_errors
 from jointfrf.cases.known_joint.read import KnownJointCase
 from jointfrf.cases.known_joint.regenerate import RegeneratedFrf, regenerate_all
 from jointfrf.cases.known_joint.study import Identified, run_study
@@ -36,6 +37,8 @@ class KnownJointResult:
         Key of an observed FRF, and Parameter, to bands, Hz.
     identified : list of Identified
     regenerated : list of RegeneratedFrf
+    printed : list of PrintedErrors
+        FRFs regenerated from published parameters.
     noise_free : dict
         Method to NoiseFree.
     """
@@ -48,6 +51,7 @@ class KnownJointResult:
     proposals: dict[tuple[str, Parameter], list[Band]]
     identified: list[Identified]
     regenerated: list[RegeneratedFrf]
+    printed: list[PrintedErrors]
     noise_free: dict[str, NoiseFree]
 
 
@@ -88,5 +92,6 @@ def compute(case: KnownJointCase, n_realisations: int, workers: Workers | None =
         },
         identified=identified,
         regenerated=regenerate_all(exact, identified, case.observed, at_work),
+        printed=printed_errors(case),
         noise_free=noise_free_errors(exact, case.joint.dynamic_stiffness(case.freq_hz)),
     )

@@ -48,7 +48,10 @@ class ExpectedParameters:
 
 @dataclass(frozen=True)
 class ExpectedErrors:
-    """Published errors (4.11), (4.12) of a regenerated FRF in a band, percent; None where the source has none."""
+    """Published errors (4.11), (4.12) of a regenerated FRF in a band, percent; None where the source has none.
+
+    `offset` says how far from its reference point the FRF is seen, x, y, z in m; empty for the point itself.
+    """
 
     source: str
     noise: str
@@ -57,6 +60,7 @@ class ExpectedErrors:
     band: Band
     amplitude: float | None
     frequency: float | None
+    offset: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -69,11 +73,14 @@ class Expected:
         Natural frequencies of the assembly with the ``"actual"`` or the ``"initial"`` joint.
     tables : tuple of ExpectedParameters
     errors : tuple of ExpectedErrors
+    printed_step : float or None
+        Spacing of the lines, Hz, on which FRFs regenerated from printed parameters are compared; None: they are not.
     """
 
     frequencies: dict[str, ExpectedFrequencies]
     tables: tuple[ExpectedParameters, ...]
     errors: tuple[ExpectedErrors, ...]
+    printed_step: float | None = None
 
 
 def read_expected(table: TomlTable, known: Known) -> Expected:
@@ -88,12 +95,16 @@ def read_expected(table: TomlTable, known: Known) -> Expected:
     def entries(key: str) -> list[TomlTable]:
         return table.tables(key) if key in table else []
 
+    step = table.number("printed_step", 0) if "printed_step" in table else None
+    if step == 0:
+        raise table.error("printed_step", "positive, in Hz")
     joints = [(entry.text("joint", ("actual", "initial")), entry) for entry in entries("frequencies")]
     table.check_different("frequencies", [joint for joint, _ in joints], "name the same joint")
     return Expected(
         {joint: read_expected_frequencies(entry) for joint, entry in joints},
         tuple(_expected_parameters(entry, known) for entry in entries("identified")),
         tuple(_expected_errors(entry, known) for entry in entries("regenerated")),
+        step,
     )
 
 
@@ -130,5 +141,8 @@ def _expected_errors(entry: TomlTable, known: Known) -> ExpectedErrors:
     if len(bands) != 1 or bands[0] not in known.observed[key]:
         raise entry.error("band", f"one of the bands that case.toml names for {key}")
     amplitude, frequency = (entry.number(what) if what in entry else None for what in ("amplitude", "frequency"))
+    offset = tuple(entry.numbers("offset")) if "offset" in entry else ()
+    if offset and len(offset) != 3:
+        raise entry.error("offset", "x, y, z in m")
     entry.close()
-    return ExpectedErrors(source, noise, method, key, bands[0], amplitude, frequency)
+    return ExpectedErrors(source, noise, method, key, bands[0], amplitude, frequency, offset)

@@ -91,6 +91,7 @@ def known_joint_tables(result: KnownJointResult) -> list[Table]:
     return [
         *(_published(source, [row for row in rows if row.source == source]) for source in sources),
         *_published_errors(result),
+        *_printed(result),
         _frequencies(result),
         _identified(rows, result.n_realisations),
         *_limits(result, rows),
@@ -242,6 +243,30 @@ def _error_rows(frf: str, known: ExpectedErrors, found: RegeneratedFrf) -> list[
         named = (frf, bands_in_words([known.band]), known.method, what)
         rows.append((*named, published, median, low, high, share, verdict(good)))
     return rows
+
+
+def _printed(result: KnownJointResult) -> list[Table]:
+    """Table of the FRFs regenerated from printed parameters; none where there are none."""
+    cells: list[tuple[Cell, ...]] = []
+    for one in result.printed:
+        known = one.known
+        observed = next(o for o in result.case.observed if o.key == known.observed)
+        seen = f", {1e3 * float(np.linalg.norm(known.offset)):.3g} mm away" if known.offset else ""
+        named = (known.source, frf_name(result, observed) + seen, bands_in_words([known.band]), known.method)
+        for what, published, found in (
+            ("amplitude (4.11)", known.amplitude, one.amplitude),
+            ("frequency (4.12)", known.frequency, one.frequency),
+        ):
+            cells.append((*named, what, published, _NO_PEAK if found is None else found))
+    if not cells:
+        return []
+    columns = ("source", "FRF", "band, Hz", "method", "error", "thesis", "from the printed parameters")
+    note = (
+        f"Percent, on lines {result.case.expected.printed_step:g} Hz apart, without noise: what differs is the model,"
+        " the lines or the printed digits."
+    )
+    title = "Errors of FRFs regenerated from the printed parameters"
+    return [Table("printed-parameters", title, columns, tuple(cells), note=note, percentages=columns[-2:])]
 
 
 def _key(source: str) -> str:
