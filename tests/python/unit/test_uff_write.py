@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import jointfrf as jf
 from jointfrf.io import Channel, FrfSet, read_uff, write_uff
 
 pyuff = pytest.importorskip("pyuff")
@@ -107,6 +108,15 @@ def test_an_frf_with_a_bad_line_is_refused_and_the_older_file_stays(tmp_path, va
         write_uff(tmp_path / "test.uff", bad)
 
 
+def rounding(make, length):
+    """Rounding times the condition of the dynamic stiffness of a bar at the lowest frequency, rows of one size."""
+    bar = jf.beam(length, round(length / make.ELEMENT), **make.SECTION)
+    stiffness, mass = (x.toarray() if hasattr(x, "toarray") else np.asarray(x) for x in (bar.stiffness, bar.mass))
+    size = 1 / np.sqrt(np.diag(stiffness))
+    dynamic = (1 + 1j * bar.loss_factor) * stiffness - (2 * np.pi * make.FREQ_HZ[0]) ** 2 * mass
+    return np.finfo(float).eps * np.linalg.cond(dynamic * size[:, None] * size, 1)
+
+
 def test_hammer_test_is_what_its_script_writes(tmp_path):
     spec = importlib.util.spec_from_file_location("hammer_test", HAMMER_TEST / "make.py")
     make = importlib.util.module_from_spec(spec)
@@ -117,6 +127,10 @@ def test_hammer_test_is_what_its_script_writes(tmp_path):
     np.testing.assert_array_equal(kept.freq_hz, given.freq_hz)
     for node, place in given.coordinates.items():
         np.testing.assert_allclose(kept.coordinates[node], place, rtol=1e-15)
-    # Half a unit of the last place, 2^-24, of either part; twice that where rounding before it went the other way.
-    assert (abs(kept.h - given.h) <= 2.0**-23 * abs(given.h)).all()
+    # Half a unit of the last place, 2^-24, of either part, twice that where rounding before it went the other way; and
+    # what engines may differ by: a rounding times the condition of either bar on the first line, where a free one is
+    # worst.
+    allowed = 2.0**-23 + sum(rounding(make, length) for length in (0.5, 0.4))
+    assert allowed < 1e-5
+    assert (abs(kept.h - given.h) <= allowed * abs(given.h)).all()
     assert (HAMMER_TEST / "two_bars.uff").stat().st_size < 300 * 1024
