@@ -21,6 +21,8 @@ from jointfrf.cases.workers import Workers
 from jointfrf.dofs import Parameter
 from jointfrf.report.page import Page, make_page
 
+pytestmark = pytest.mark.long
+
 PLANE = ["3.1-discrete", "3.2-fe-beams", "3.3-beams-1mm", "3.3.1-decoupling"]
 SOLID = ["4.3.1-six-dof", "4.3.2-six-dof-decoupling"]
 NAMES = [*PLANE, *SOLID, "4.3.3-bolt"]

@@ -22,6 +22,8 @@ from jointfrf.report.draw import draw
 from jointfrf.report.figure import Curve, Figure, Interval, Panel, figure_csv
 from jointfrf.report.table import Table, as_text, number
 
+pytestmark = pytest.mark.long
+
 COMMAND = [sys.executable, "-m", "jointfrf"]
 
 

@@ -11,6 +11,8 @@ from jointfrf.solids.bolted_lap import ALUMINIUM, LapDivisions, bolted_lap
 from jointfrf.solids.contact import ContactLaw
 from jointfrf.solids.preload import preload
 
+pytestmark = pytest.mark.long
+
 FORCE = 22784.0
 COARSE = LapDivisions(across=4, rings=1, circles=0, head=1, nut=1)
 RIGID = ContactLaw(0.3, None, None)

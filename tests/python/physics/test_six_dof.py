@@ -12,6 +12,8 @@ from jointfrf.identification.compliance_fit.estimator import estimate, joint_bas
 from jointfrf.identification.compliance_fit.groups import uncoupled_groups
 from six_dof_beams import DOFS, FREQ, GROUPS, JOINT, assembly, side, sides
 
+pytestmark = pytest.mark.long
+
 TRUTH = np.concatenate([JOINT.stiffness.diagonal(), JOINT.damping.diagonal()])
 BASIS = joint_basis(2 * np.pi * FREQ, DOFS, "viscous", "zero")
 

@@ -19,6 +19,8 @@ from jointfrf.models.receptance import krylov
 from jointfrf.models.receptance.rigid_modes import find_rigid_modes, held
 from supported_structures import EPS, FREE, HELD, calculated, exact, relative_error
 
+pytestmark = pytest.mark.long
+
 METHODS = ["auto", "dense", "banded", "sparse", "modal", "krylov"]
 LOSS_FACTOR = 0.01
 #: A stiffness within this many roundings counts as none: what sums of modes may leave out.
