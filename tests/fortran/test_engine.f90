@@ -4,8 +4,7 @@
 program test_engine
   use testing, only: check, check_close, dp, finish, inverse, ip, random_regular, seed
   use jointfrf_engine, only: engine_automatic, engine_lapack, engine_plain, engine_v2, engine_v3, engine_v4, &
-    find_kernels, &
-    get_engine, set_engine
+    find_kernels, get_engine, set_engine
   use jointfrf_lanes, only: lane_kernels
   use jointfrf_linear_algebra, only: invert
   use jointfrf_status, only: info_good, info_no_engine
@@ -17,10 +16,10 @@ program test_engine
 
   call seed(23)
   call get_environment_variable('JOINTFRF_ENGINE', word)
-  call check(all([engine_automatic, engine_lapack, engine_plain, engine_v2, engine_v3, engine_v4] == [0, 1, 2, 3, 4, &
-    5]), &
-             'codes as documented')
-  wrong = word /= '' .and. all(word /= [character(len=40) :: 'auto', 'lapack', 'plain'])
+  call check(all([engine_automatic, engine_lapack, engine_plain, engine_v2, engine_v3, engine_v4] == &
+                 [0, 1, 2, 3, 4, 5]), 'codes as documented')
+  wrong = word /= '' .and. all(word /= [character(len=40) :: 'auto', 'lapack', 'plain', &
+    'x86-64-v2', 'x86-64-v3', 'x86-64-v4'])
   if (wrong) call refused()
   call get_engine(engine, info)
   call check(info == merge(info_no_engine, info_good, wrong), 'whether the word is known: '//trim(word))
