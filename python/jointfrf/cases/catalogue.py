@@ -140,6 +140,9 @@ def read_case_and_kind(
     path = folder / "expected.toml"
     expected = read_toml(path) if path.is_file() else TomlTable({}, str(path))
     kind = kinds[table.text("kind", tuple(kinds))] if "kind" in table else next(iter(kinds.values()))
+    for one, known in ((table, kind.keys), (expected, kind.expected_keys)):
+        if known is not None:
+            one.expect(known)
     case: Case = kind.read(_common(folder, table, expected), table, expected)
     table.close()
     expected.close()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import cast, get_args
@@ -11,8 +12,11 @@ import numpy as np
 from jointfrf.cases.fitting import METHODS
 from jointfrf.cases.toml_table import TomlTable
 from jointfrf.dofs import Parameter, is_rotation, joint_parameters
+from jointfrf.errors import FileContentWarning
 from jointfrf.frf.bands import Band, in_bands
+from jointfrf.frf.frf_set import FrfSet
 from jointfrf.frf.noise import NoiseKind, NoiseReference, pollute, realisations
+from jointfrf.io.uff import read_uff
 from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.solids.brick import Material
@@ -25,6 +29,7 @@ __all__ = [
     "check_bands",
     "read_bands",
     "read_frequency",
+    "read_frf_file",
     "read_joint",
     "read_material",
     "read_noises",
@@ -32,6 +37,8 @@ __all__ = [
 
 _MOTIONS = ("translation", "rotation")
 _MOST_LINES = 1_000_000
+#: A higher level of noise is more often 5 % written as 5 than meant.
+_HIGH_LEVEL = 0.5
 
 
 @dataclass(frozen=True)
@@ -97,7 +104,9 @@ def actual_values(joint: Joint) -> FloatArray:
 
 
 def read_frequency(table: TomlTable) -> FloatArray:
-    """Read the frequency lines, Hz."""
+    """Read the frequency lines, Hz: evenly spaced, or those of a file of FRFs."""
+    if "from_file" in table:
+        return _lines_of_file(table)
     first, last, step = table.number("first", 0), table.number("last", 0), table.number("step", 0)
     table.close()
     if step <= 0:
@@ -110,6 +119,30 @@ def read_frequency(table: TomlTable) -> FloatArray:
         raise table.error("step", f"larger: there would be more than {_MOST_LINES} lines")
     count = int((last - first) / step + 1 + 1e-9)
     return np.round(first + step * np.arange(count), 9)
+
+
+def _lines_of_file(table: TomlTable) -> FloatArray:
+    """Return the lines of a file of FRFs between `first` and `last`, where they are given."""
+    held = read_frf_file(table, "from_file").freq_hz
+    low = table.number("first", 0) if "first" in table else 0.0
+    high = table.number("last", 0) if "last" in table else np.inf
+    table.close()
+    lines = held[(held >= low) & (held <= high)]
+    if not lines.size:
+        raise table.wrong("from_file", f"no line of the file lies in {low:g} to {high:g} Hz")
+    if lines[0] == 0:
+        raise table.wrong("from_file", "the file has a line at 0 Hz, where Im K*/w is not defined: name the first line")
+    return lines
+
+
+def read_frf_file(table: TomlTable, key: str, quantity: str | None = None) -> FrfSet:
+    """Read the receptances of a file that a key names; a line at 0 Hz that they do not have is left out."""
+    path = table.file(key)
+    frfs = table.build(lambda: read_uff(path, quantity), key)
+    with warnings.catch_warnings():
+        # No case has a line at 0 Hz.
+        warnings.simplefilter("ignore", FileContentWarning)
+        return frfs.receptance()
 
 
 def read_material(table: TomlTable) -> Material:
@@ -180,7 +213,11 @@ def _read_noise(table: TomlTable, n: int, methods: Sequence[str]) -> Noise:
         table.whole("block", 1),
         table.texts("methods", methods),
     )
+    confirmed = "confirm_level" in table and table.truth("confirm_level")
     table.close()
+    if noise.level > _HIGH_LEVEL and not confirmed:
+        percent = f"{noise.level:g} is noise of {100 * noise.level:g} % (5 % is 0.05)"
+        raise table.wrong("level", f"{percent}; if that is meant, say confirm_level = true")
     if n % noise.block:
         raise table.error("block", f"a divisor of {n}, the number of joint DOFs")
     return noise

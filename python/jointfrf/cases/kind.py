@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
+from jointfrf.cases.keys import KeyTable
 from jointfrf.cases.toml_table import TomlTable
 from jointfrf.cases.workers import Workers
 from jointfrf.kernel.arguments import FloatArray
@@ -76,6 +77,9 @@ class CaseKind(Generic[CaseT, ResultT]):
         ``numbers(result)`` returns what `results.json` holds beside the common part and the tables.
     not_printed : tuple of str
         Keys of tables that stand in the report but are not printed.
+    keys, expected_keys : KeyTable, optional
+        What `case.toml` and `expected.toml` may hold; then a misspelt key is found before anything else is wrong, and
+        the reference of all keys has a part about the kind.
 
     Examples
     --------
@@ -92,3 +96,5 @@ class CaseKind(Generic[CaseT, ResultT]):
     summary: Callable[[ResultT, list[Table]], list[str]]
     numbers: Callable[[ResultT], dict[str, Any]]
     not_printed: tuple[str, ...] = ()
+    keys: KeyTable | None = None
+    expected_keys: KeyTable | None = None

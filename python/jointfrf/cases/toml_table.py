@@ -9,15 +9,17 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from jointfrf.cases.keys import KeyTable, look_alike
 from jointfrf.errors import FileContentError
 
 __all__ = ["TomlTable", "read_toml"]
 
 _T = TypeVar("_T")
+_HERE = Path()
 
 
 def read_toml(path: Path) -> TomlTable:
-    """Read a TOML file.
+    """Read a TOML file; files that it names stand beside it.
 
     Raises
     ------
@@ -25,10 +27,10 @@ def read_toml(path: Path) -> TomlTable:
         The file is missing, cannot be read, or is not TOML.
     """
     try:
-        return TomlTable(tomllib.loads(path.read_text(encoding="utf-8")), str(path))
+        return TomlTable(tomllib.loads(path.read_text(encoding="utf-8")), str(path), path.parent)
     except OSError as error:
         raise FileContentError(f"{path}: cannot be read: {error.strerror}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
         raise FileContentError(f"{path}: not a TOML file: {error}") from error
 
 
@@ -41,15 +43,57 @@ class TomlTable:
         Keys and values.
     where : str
         File and table, for messages.
+    folder : Path
+        Where files stand that the table names.
+    known : KeyTable, optional
+        The keys that the table takes.
+
+    Raises
+    ------
+    FileContentError
+        There is a key that is not known.
     """
 
-    def __init__(self, content: dict[str, Any], where: str) -> None:
+    def __init__(
+        self, content: dict[str, Any], where: str, folder: Path = _HERE, known: KeyTable | None = None
+    ) -> None:
         self._content = content
         self._asked: list[str] = []
         self.where = where
+        self.folder = folder
+        self.known: KeyTable | None = None
+        if known is not None:
+            self.expect(known)
+
+    def expect(self, known: KeyTable) -> None:
+        """Say which keys the table takes.
+
+        Raises
+        ------
+        FileContentError
+            There is another key.
+        """
+        self.known = known.variant(self._content)
+        if self.known is not None:
+            names = [key.name for key in self.known.keys]
+            for key in self._content:
+                if key not in self.known:
+                    raise self._unknown(key, names)
 
     def __contains__(self, key: str) -> bool:
+        self._ask(key)
         return key in self._content
+
+    def _ask(self, key: str) -> None:
+        if self.known is not None and key not in self.known:
+            raise KeyError(f"{key!r} is not among the keys of {self.known.header}")  # a mistake of the reader
+        if key not in self._asked:
+            self._asked.append(key)
+
+    def _unknown(self, key: str, names: Sequence[str]) -> FileContentError:
+        similar = look_alike(key, names)
+        hint = f"; did you mean {similar!r}?" if similar else ""
+        return FileContentError(f"{self.where}: unknown key {key!r}; it takes {', '.join(names)}{hint}")
 
     def keys(self) -> list[str]:
         """Return all keys."""
@@ -59,17 +103,21 @@ class TomlTable:
         """Return the exception that says what the value of a key must be."""
         return FileContentError(f"{self.where}: {key} must be {must}, not {self._content.get(key)!r}")
 
+    def wrong(self, key: str, why: str) -> FileContentError:
+        """Return the exception that says what is wrong with what a key names."""
+        return FileContentError(f"{self.where}: {key}: {why}")
+
     def build(self, builder: Callable[[], _T], key: str = "") -> _T:
         """Call a builder; if it complains, the message names the table and, if given, the key.
 
         Raises
         ------
         FileContentError
-            The builder raised a ValueError or a TypeError.
+            The builder raised a ValueError, a TypeError or an OSError.
         """
         try:
             return builder()
-        except (ValueError, TypeError) as error:
+        except (ValueError, TypeError, OSError) as error:
             where = f"{self.where}: {key}" if key else self.where
             raise FileContentError(f"{where}: {error}") from error
 
@@ -82,13 +130,18 @@ class TomlTable:
         """Raise an error if there is a key that nobody asked for."""
         unknown = [key for key in self._content if key not in self._asked]
         if unknown:
-            raise FileContentError(f"{self.where}: unknown key {unknown[0]!r}; it takes {', '.join(self._asked)}")
+            raise self._unknown(unknown[0], self._asked)
 
     def _value(self, key: str) -> Any:
-        self._asked.append(key)
+        self._ask(key)
         if key not in self._content:
-            raise FileContentError(f"{self.where}: the key {key!r} is missing")
+            similar = look_alike(key, [other for other in self._content if other not in self._asked])
+            hint = f"; is {similar!r} meant to be it?" if similar and self.known is None else ""
+            raise FileContentError(f"{self.where}: the key {key!r} is missing{hint}")
         return self._content[key]
+
+    def _inner(self, key: str) -> KeyTable | None:
+        return None if self.known is None else self.known.inner(key)
 
     def text(self, key: str, choice: Sequence[str] = ()) -> str:
         """Return a string, one of `choice` if given."""
@@ -104,6 +157,22 @@ class TomlTable:
         if not is_list or (choice and any(v not in choice for v in value)):
             raise self.error(key, f"a list of {', '.join(choice) if choice else 'texts'}")
         return tuple(value)
+
+    def file(self, key: str) -> Path:
+        """Return the path of a file, which is named relative to the case file."""
+        name = self.text(key)
+        try:
+            path = self.folder / name
+            if path.is_file():
+                return path
+        except ValueError:  # a zero byte
+            raise self.error(key, "the name of a file") from None
+        why = "is a folder" if path.is_dir() else "does not exist"
+        raise FileContentError(f"{self.where}: {key} must name a file: {path} {why}")
+
+    def texts_or_file(self, key: str) -> tuple[str, ...] | Path:
+        """Return a list of at least one string, or the path of a file."""
+        return self.file(key) if isinstance(self._content.get(key), str) else self.texts(key)
 
     def number(self, key: str, lowest: float = -np.inf) -> float:
         """Return a finite number, not below `lowest`."""
@@ -150,14 +219,17 @@ class TomlTable:
         value = self._value(key)
         if not isinstance(value, dict):
             raise self.error(key, "a table")
-        return TomlTable(value, f"{self.where}: [{key}]")
+        return TomlTable(value, f"{self.where}: [{key}]", self.folder, self._inner(key))
 
     def tables(self, key: str) -> list[TomlTable]:
         """Return an array of at least one table."""
         value = self._value(key)
         if not isinstance(value, list) or not value or not all(isinstance(v, dict) for v in value):
             raise self.error(key, f"at least one table [[{key}]]")
-        return [TomlTable(v, f"{self.where}: [[{key}]] number {i + 1}") for i, v in enumerate(value)]
+        return [
+            TomlTable(v, f"{self.where}: [[{key}]] number {i + 1}", self.folder, self._inner(key))
+            for i, v in enumerate(value)
+        ]
 
 
 def _is_number(value: Any) -> bool:

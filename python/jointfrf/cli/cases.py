@@ -5,17 +5,24 @@ from __future__ import annotations
 import argparse
 
 from jointfrf.cases.catalogue import list_cases, read_case
+from jointfrf.cases.key_page import key_page
 
 __all__ = ["add_arguments", "run"]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Describe the arguments of the command: there are none."""
+    """Describe the arguments of the command."""
     parser.description = "List the cases that come with jointfrf."
+    parser.add_argument(
+        "--keys", action="store_true", help="instead: print all keys of case.toml and expected.toml (Markdown)"
+    )
 
 
 def run(options: argparse.Namespace) -> int:
     """Carry out the command."""
+    if options.keys:
+        print(key_page(), end="")
+        return 0
     found = [read_case(folder) for folder in list_cases()]
     width = max((len(case.name) for case in found), default=0)
     for case in found:

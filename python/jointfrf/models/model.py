@@ -126,20 +126,43 @@ class Model:
         Returns
         -------
         freq_hz : ndarray, shape (count,)
-            Hz; about 0 for a rigid-body motion.
+            Hz; about 0 for a rigid-body motion. Fewer than asked for where DOFs have no mass.
         shapes : ndarray, shape (n, count)
             Unit modal masses, 1/sqrt(kg).
+
+        Raises
+        ------
+        ValueError
+            There are no modes: mass or stiffness is negative, or a motion has neither.
         """
         n = len(self.dofs)
         k, m = sparse.csc_array(self.stiffness), sparse.csc_array(self.mass)
-        if count is None or count > n - 2 or n <= _DENSE_LIMIT:
-            squared, shapes = linalg.eigh(k.toarray(), m.toarray())
-        else:
-            # Shifted below zero, where K - shift M is regular even for a free structure; a fixed start, to repeat it.
-            squared, shapes = sparse_linalg.eigsh(k, count, m, sigma=_SHIFT, v0=np.ones(n))
+        try:
+            if count is None or count > n - 2 or n <= _DENSE_LIMIT:
+                squared, shapes = _all_modes(k.toarray(), m.toarray())
+            else:
+                # Shifted below zero, where K - shift M is regular even for a free structure; a fixed start, to repeat.
+                squared, shapes = sparse_linalg.eigsh(k, count, m, sigma=_SHIFT, v0=np.ones(n))
+        except (linalg.LinAlgError, RuntimeError) as error:
+            raise ValueError(
+                "the model has no modes: a motion has neither stiffness nor mass, or one of them is negative"
+            ) from error
         order = np.argsort(squared)[:count]
         freq: FloatArray = np.sqrt(np.maximum(squared[order], 0)) / (2 * np.pi)
         return freq, shapes[:, order]
+
+
+def _all_modes(k: FloatArray, m: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Squared natural circular frequencies and shapes; those of DOFs without mass are infinite and left out."""
+    try:
+        squared, shapes = linalg.eigh(k, m)
+    except linalg.LinAlgError:
+        # M v = mu (K - shift M) v, where 1/mu = w^2 - shift is infinite for a motion without mass.
+        mu, shapes = linalg.eigh(m, k - _SHIFT * m)
+        finite = mu > len(mu) * np.finfo(float).eps * mu.max()
+        shapes = shapes[:, finite] / np.sqrt(mu[finite])
+        squared = 1 / mu[finite] + _SHIFT
+    return squared, shapes
 
 
 def _block_diagonal(

@@ -8,14 +8,37 @@ from jointfrf.cases.catalogue import find_case, read_case
 from jointfrf.errors import FileContentError
 
 CHANGES = [
-    ('title = "Two masses', 'titel = "Two masses', r"the key 'title' is missing"),
-    ("seed = 31", "seed = 31\nsede = 1", r"\[study\]: unknown key 'sede'; it takes realisations, seed"),
+    (
+        'title = "Two masses',
+        'titel = "Two masses',
+        r"unknown key 'titel'; it takes kind, title, .*, noise; did you mean 'title'\?",
+    ),
+    (
+        "seed = 31",
+        "seed = 31\nsede = 1",
+        r"\[study\]: unknown key 'sede'; it takes realisations, seed; did you mean 'seed'\?$",
+    ),
     ("seed = 31", "", r"\[study\]: the key 'seed' is missing"),
     ("seed = 31", 'seed = "x"', r"\[study\]: seed must be a whole number, at least 0, not 'x'"),
     ("seed = 31", "seed = true", r"seed must be a whole number"),
     ("realisations = 1000", "realisations = 0", r"realisations must be a whole number, at least 1, not 0"),
     ("level = 0.05", 'level = "5 %"', r"\[\[noise\]\] number 1: level must be a number, at least 0, not '5 %'"),
     ("level = 0.05", "level = nan", r"level must be a number"),
+    (
+        "level = 0.05",
+        "level = 5",
+        r"\[\[noise\]\] number 1: level: 5 is noise of 500 % .*; if that is meant, say confirm_level = true$",
+    ),
+    ("level = 0.05", "level = 0.51\nconfirm_level = false", r"level: 0\.51 is noise of 51 %"),
+    ("level = 0.05", "level = 0.51\nconfirm_level = 1", r"confirm_level must be true or false, not 1"),
+    ("level = 0.05", "Level = 0.05", r"unknown key 'Level'; it takes name, level, .*; did you mean 'level'\?"),
+    ("masses = [5.0", "mass = [5.0", r"\[substructure_a\]: unknown key 'mass'; it takes model, masses, .*'masses'\?"),
+    (
+        'ground = "start"',
+        'ground = "start"\nelements = 2',
+        r"\[substructure_a\]: unknown key 'elements'; it takes model",
+    ),
+    ("[[noise]]", "[[noises]]", r"case\.toml: unknown key 'noises'; .*did you mean 'noise'\?"),
     ("level = 0.05", "", r"the key 'level' is missing"),
     ('kind = "complex"', 'kind = "white"', r"kind must be one of complex, .*, not 'white'"),
     ("block = 1", "block = 2", r"block must be a divisor of 1"),
@@ -52,7 +75,7 @@ CHANGES = [
         r"rotation like theta, .*\), not 'rotation'",
     ),
     ("damping = 3.0", "damping = -3.0", r"damping must be a number, at least 0, not -3.0"),
-    ('model = "chain"', 'model = "plate"', r"model must be one of beam, brick-beam, chain, not 'plate'"),
+    ('model = "chain"', 'model = "plate"', r"model must be one of chain, beam, brick-beam, .*, not 'plate'"),
     ("[study]", "[study", r"not a TOML file"),
 ]
 
@@ -63,6 +86,7 @@ SOLID_CHANGES = [
     ("origin = [0.0, 0.0, 0.0]", "origin = [0.0, 0.0]", r"\[substructure_a\]: origin must be x, y, z in m"),
     ("poisson = 0.33", "poisson = 0.5", r"\[substructure_a\]: poisson must"),
     ("position = 0.2875", "position = 0.3", r"\[substructure_a\]: the hole at 300 mm.* does not lie within the beam"),
+    ("patch_radius", "patchradius", r"\[hole\]: unknown key 'patchradius'; it takes .*did you mean 'patch_radius'\?"),
     ("position = 0.2875, ", "", r"\[substructure_a\]: \[hole\]: the key 'position' is missing"),
     ('face = "top"', 'face = "left"', r"\[hole\]: face must be one of top, bottom.*, not 'left'"),
     ("observed = { r = 0.15 }", "observed = { r = 0.5 }", r"\[substructure_a\]: .*r.* 500 mm"),
@@ -85,7 +109,7 @@ BOLTED_CHANGES = [
     ("spacing_z = 0.010", "spacing_z = 0", r"\[measurement\]: spacing_z must be positive, in m, not 0"),
     ("spacing_z = 0.010", "", r"\[measurement\]: the key 'spacing_z' is missing"),
     ("spacing_z = 0.010", "spacing_z = 0.010\nspacing_y = 1", r"\[measurement\]: unknown key 'spacing_y'"),
-    ("[measurement]", "[measurements]", r"case\.toml: the key 'measurement' is missing"),
+    ("[measurement]", "[measurements]", r"unknown key 'measurements'; .*did you mean 'measurement'\?"),
     ("[contact]\nfriction = 0.3", "", r"case\.toml: the key 'contact' is missing"),
     ("friction = 0.3", "friction = -0.3", r"\[contact\]: friction must be a number, at least 0"),
     ('size = "M8"', 'size = "M7"', r"\[bolt\]: size must be one of M5, M6, M8, M10, M12, not 'M7'"),

@@ -1,5 +1,6 @@
 """A lap joint with a preloaded bolt of solid elements: measured, identified, and used again with another beam.
 
+keys         what the keys of its files mean
 read         the case as data
 measurement  the measured points, and how the six DOFs of both sides follow
 frfs         FRFs: of the preloaded solid model, of the beams by themselves

@@ -1,7 +1,10 @@
 """Two simulated substructures and a joint of known parameters: identified from noisy FRFs, many times over.
 
 read           the case as data
+keys           what the keys of its files mean
+structure      a structure as the case needs it: by a model, or by its FRFs
 substructures  the two structures: chain, beam, beam of bricks
+from_files     the two structures: matrices and receptances in files
 expected       what the source says about the case: tables, errors of regenerated FRFs
 exact          FRFs without noise
 methods        K*(w) line by line, by each method

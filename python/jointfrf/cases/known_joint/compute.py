@@ -30,7 +30,7 @@ class KnownJointResult:
     exact : Exact
     n_realisations : int
     modes : dict
-        ``"actual"`` and ``"initial"`` joint to ModeShapes.
+        ``"actual"`` and ``"initial"`` joint to ModeShapes; empty without models.
     sensitivities : dict
         Key of an observed FRF to Sensitivity.
     proposals : dict
@@ -83,7 +83,7 @@ def compute(case: KnownJointCase, n_realisations: int, workers: Workers | None =
         case=case,
         exact=exact,
         n_realisations=n_realisations,
-        modes={"initial": modes_of_case(case, case.initial), "actual": modes_of_case(case, case.joint)},
+        modes=modes_of_case(case),
         sensitivities=sensitivities,
         proposals={
             (key, parameter): propose_bands(case.freq_hz, change)

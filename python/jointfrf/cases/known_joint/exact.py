@@ -68,8 +68,8 @@ class Exact:
 def exact_frfs(case: KnownJointCase) -> Exact:
     """Receptances of the substructures (2.28)-(2.29) and of the assembly (2.26)."""
     freq, n = case.freq_hz, len(case.joint.dofs)
-    h_a = case.a.model.receptance(freq, case.ports_a)
-    h_b = case.b.model.receptance(freq, case.ports_b)
+    h_a = case.a.receptance(freq, case.points["j"] + case.points["r"])
+    h_b = case.b.receptance(freq, case.points["k"] + case.points["s"])
     first = list(range(n))
     initial = case.initial.dynamic_stiffness(freq)
     h_initial = couple(h_a, h_b, initial, first, first, freq_hz=freq)

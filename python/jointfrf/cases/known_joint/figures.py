@@ -85,6 +85,8 @@ def _modulus(result: KnownJointResult, h: ComplexArray, observed: Observed) -> F
 
 
 def _modes(result: KnownJointResult) -> Iterator[Figure]:
+    if not result.modes:
+        return
     caption, panels = mode_panels(result.case, result.modes["actual"])
     if panels:
         yield Figure("modes", caption, tuple(panels), 2)

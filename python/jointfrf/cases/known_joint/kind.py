@@ -5,6 +5,7 @@ from __future__ import annotations
 from jointfrf.cases.kind import CaseKind
 from jointfrf.cases.known_joint.compute import KnownJointResult, compute
 from jointfrf.cases.known_joint.figures import known_joint_figures
+from jointfrf.cases.known_joint.keys import EXPECTED_KEYS, KNOWN_JOINT_KEYS
 from jointfrf.cases.known_joint.read import KnownJointCase, read_known_joint
 from jointfrf.cases.known_joint.summary import known_joint_summary
 from jointfrf.cases.known_joint.tables import known_joint_numbers, known_joint_tables
@@ -20,4 +21,6 @@ KNOWN_JOINT: CaseKind[KnownJointCase, KnownJointResult] = CaseKind(
     summary=known_joint_summary,
     numbers=known_joint_numbers,
     not_printed=("bands", "regenerated"),
+    keys=KNOWN_JOINT_KEYS,
+    expected_keys=EXPECTED_KEYS,
 )

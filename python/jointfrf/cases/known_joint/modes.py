@@ -8,7 +8,6 @@ import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
 from jointfrf.cases.known_joint.read import KnownJointCase
-from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import FloatArray
 from jointfrf.models.model import Model, assemble
 from jointfrf.report.figure import Curve, Panel
@@ -46,12 +45,22 @@ class ModeShapes:
     directions: tuple[str, ...] = ()
 
 
-def modes_of_case(case: KnownJointCase, joint: Joint) -> ModeShapes:
-    """Modes of the assembly through a joint: as many as are expected, and some at least."""
+def modes_of_case(case: KnownJointCase) -> dict[str, ModeShapes]:
+    """Modes of the assembly through the first estimate ("initial") and the "actual" joint, some at least.
+
+    As many as are expected; none where a substructure is known by its receptances only.
+    """
+    if case.models is None:
+        return {}
+    a, b = case.models
+    at = a.dofs(case.points["j"]), b.dofs(case.points["k"])
     wanted = max([_SHOWN, *(len(known.values) for known in case.expected.frequencies.values())])
-    modes = find_modes(assemble(case.a.model, case.b.model, joint, case.dofs_j, case.dofs_k), wanted)
+    found = {
+        name: find_modes(assemble(a.model, b.model, joint, *at), wanted)
+        for name, joint in (("initial", case.initial), ("actual", case.joint))
+    }
     solids = _solids(case)
-    return modes if solids is None else _with_directions(modes, *solids)
+    return found if solids is None else {name: _with_directions(modes, *solids) for name, modes in found.items()}
 
 
 def find_modes(model: Model, count: int) -> ModeShapes:
@@ -62,7 +71,9 @@ def find_modes(model: Model, count: int) -> ModeShapes:
 
 
 def _solids(case: KnownJointCase) -> tuple[SolidModel, SolidModel] | None:
-    a, b = case.a.model, case.b.model
+    if case.models is None:
+        return None
+    a, b = (one.model for one in case.models)
     return (a, b) if isinstance(a, SolidModel) and isinstance(b, SolidModel) else None
 
 
@@ -86,9 +97,10 @@ def mode_panels(case: KnownJointCase, modes: ModeShapes) -> tuple[str, list[Pane
     solids = _solids(case)
     if solids is not None:
         return "Mode shapes of the assembly; shade: displacement", _solid_panels(modes, *solids)
-    if case.a.x is None or case.b.x is None:
+    x_a, x_b = (one.x for one in case.models) if case.models else (None, None)
+    if x_a is None or x_b is None:
         return "", []
-    return "Mode shapes of the assembly", _beam_panels(modes, case.a.x, case.b.x)
+    return "Mode shapes of the assembly", _beam_panels(modes, x_a, x_b)
 
 
 def _solid_panels(modes: ModeShapes, a: SolidModel, b: SolidModel) -> list[Panel]:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-
-from scipy import sparse
+from functools import partial
 
 from jointfrf.cases.definitions import (
     BandSet,
@@ -18,12 +18,13 @@ from jointfrf.cases.definitions import (
 )
 from jointfrf.cases.kind import Case
 from jointfrf.cases.known_joint.expected import Expected, Known, read_expected
-from jointfrf.cases.known_joint.substructures import Substructure, read_substructure
+from jointfrf.cases.known_joint.structure import ModelStructure, Structure
+from jointfrf.cases.known_joint.substructures import read_substructure
 from jointfrf.cases.toml_table import TomlTable
 from jointfrf.dofs import Parameter, joint_parameters
+from jointfrf.errors import FileContentError
 from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import FloatArray
-from jointfrf.models.model import Model
 
 __all__ = ["KnownJointCase", "read_known_joint"]
 
@@ -34,11 +35,9 @@ class KnownJointCase(Case):
 
     Attributes
     ----------
-    a, b : Substructure
-    dofs_j, dofs_k : list of int
-        Joint DOFs in A and B, counted from 0.
-    ports_a, ports_b : list of int, or sparse array of weights
-        Joint DOFs, then internal ones, in A (j, r) and B (k, s), as `jointfrf.receptance` takes them.
+    a, b : Structure
+    points : mapping of str to tuple of str
+        Names of the joint DOFs, "j" in A and "k" in B, and of internal ones, "r" in A and "s" in B.
     joint, initial : Joint
         The actual joint and its first estimate.
     observed : tuple of Observed
@@ -49,18 +48,21 @@ class KnownJointCase(Case):
     expected : Expected
     """
 
-    a: Substructure
-    b: Substructure
-    dofs_j: list[int]
-    dofs_k: list[int]
-    ports_a: list[int] | sparse.csr_array
-    ports_b: list[int] | sparse.csr_array
+    a: Structure
+    b: Structure
+    points: Mapping[str, tuple[str, ...]]
     joint: Joint
     initial: Joint
     observed: tuple[Observed, ...]
     band_sets: tuple[BandSet, ...]
     noises: tuple[Noise, ...]
     expected: Expected
+
+    @property
+    def models(self) -> tuple[ModelStructure, ModelStructure] | None:
+        """Both substructures where both are known by their models, else None."""
+        a, b = self.a, self.b
+        return (a, b) if isinstance(a, ModelStructure) and isinstance(b, ModelStructure) else None
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -81,11 +83,9 @@ def read_known_joint(common: Case, table: TomlTable, expected: TomlTable) -> Kno
     FileContentError
         One sentence that names the file and the key.
     """
-    a, b = (read_substructure(table.table(f"substructure_{side}")) for side in "ab")
+    a, b = (read_substructure(table.table(f"substructure_{side}"), common.freq_hz) for side in "ab")
     joint, initial = read_joint(table.tables("joint"))
-    points = table.table("points")
-    j, r, k, s = (_points(points, point, len(joint.dofs)) for point in "jrks")
-    points.close()
+    points = _points(table.table("points"), a, b, len(joint.dofs))
     observed = _observed(table, joint.dofs, common.freq_hz)
     band_sets = tuple(read_bands(entry, joint.dofs, common.freq_hz) for entry in table.tables("bands"))
     table.check_different("bands", [band_set.name for band_set in band_sets])
@@ -96,14 +96,11 @@ def read_known_joint(common: Case, table: TomlTable, expected: TomlTable) -> Kno
         {noise.name: noise.methods for noise in noises},
         {one.key: one.bands for one in observed},
     )
-    return KnownJointCase(
+    case = KnownJointCase(
         **vars(common),
         a=a,
         b=b,
-        dofs_j=_dofs(points, a.model, j),
-        dofs_k=_dofs(points, b.model, k),
-        ports_a=_ports(points, a.model, j + r),
-        ports_b=_ports(points, b.model, k + s),
+        points=points,
         joint=joint,
         initial=initial,
         observed=observed,
@@ -111,23 +108,21 @@ def read_known_joint(common: Case, table: TomlTable, expected: TomlTable) -> Kno
         noises=noises,
         expected=read_expected(expected, known),
     )
+    for key in ("frequencies", "printed_step"):
+        if case.models is None and key in expected:
+            raise FileContentError(f"{expected.where}: {key} needs models, not receptances, of both substructures")
+    return case
 
 
-def _points(table: TomlTable, point: str, n: int) -> tuple[str, ...]:
-    names = table.texts(point)
-    if len(names) != n:
-        raise table.error(point, f"a list of {n} DOFs, as many as the joint has")
-    return names
-
-
-def _ports(table: TomlTable, model: Model, names: tuple[str, ...]) -> list[int] | sparse.csr_array:
-    """Return what `jointfrf.receptance` takes for these names."""
-    return table.build(lambda: model.ports(*names))
-
-
-def _dofs(table: TomlTable, model: Model, names: tuple[str, ...]) -> list[int]:
-    """Return DOFs, counted from 0: a joint cannot act on a mean."""
-    return table.build(lambda: [int(model.index(name)) for name in names])  # type: ignore[arg-type]
+def _points(table: TomlTable, a: Structure, b: Structure, n: int) -> dict[str, tuple[str, ...]]:
+    points = {point: table.texts(point) for point in "jrks"}
+    table.close()
+    for point, names in points.items():
+        if len(names) != n:
+            raise table.error(point, f"a list of {n} DOFs, as many as the joint has")
+    for structure, joint, internal in ((a, "j", "r"), (b, "k", "s")):
+        table.build(partial(structure.check_points, points[joint], points[internal]))
+    return points
 
 
 def _observed(table: TomlTable, dofs: tuple[str, ...], freq_hz: FloatArray) -> tuple[Observed, ...]:

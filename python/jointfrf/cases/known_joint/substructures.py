@@ -1,53 +1,45 @@
-"""The two structures that a joint connects, read from `case.toml`: chains, beams, beams of bricks."""
+"""The two structures that a joint connects, read from `case.toml`: chains, beams, bricks, matrices, receptances."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
 from typing import cast, get_args
 
 import numpy as np
 
 from jointfrf.cases.definitions import read_material
+from jointfrf.cases.known_joint.from_files import read_matrices, read_receptances
+from jointfrf.cases.known_joint.structure import ModelStructure, Structure
 from jointfrf.cases.toml_table import TomlTable
 from jointfrf.kernel.arguments import FloatArray
 from jointfrf.models.beam import BeamElement, End, beam
 from jointfrf.models.chain import Ground, chain
-from jointfrf.models.model import Model
 from jointfrf.solids.brick_beam import Face, Hole, Preset, brick_beam
 
-__all__ = ["Substructure", "read_substructure"]
+__all__ = ["read_substructure"]
 
 
-@dataclass(frozen=True)
-class Substructure:
-    """One of the two structures that the joint connects.
-
-    Attributes
-    ----------
-    model : Model
-    x : ndarray, shape (n_nodes,), or None
-        Positions of the nodes along a beam, m.
-    """
-
-    model: Model
-    x: FloatArray | None = None
-
-
-def read_substructure(table: TomlTable) -> Substructure:
-    """Read a substructure: `model` says which."""
-    readers = {"beam": _beam, "brick-beam": _brick_beam, "chain": _chain}
+def read_substructure(table: TomlTable, freq_hz: FloatArray) -> Structure:
+    """Read a substructure: `model` says which; receptances must be there on all lines, Hz."""
+    readers: dict[str, Callable[[TomlTable], Structure]] = {
+        "chain": _chain,
+        "beam": _beam,
+        "brick-beam": _brick_beam,
+        "matrices": read_matrices,
+        "receptances": lambda own: read_receptances(own, freq_hz),
+    }
     return readers[table.text("model", tuple(readers))](table)
 
 
-def _chain(table: TomlTable) -> Substructure:
+def _chain(table: TomlTable) -> Structure:
     loss_factor = table.number("loss_factor", 0)
     numbers = [table.numbers(key) for key in ("masses", "stiffness", "damping")]
     ground = cast(Ground, table.text("ground", get_args(Ground)))
     table.close()
-    return table.build(lambda: Substructure(chain(*numbers, ground=ground, loss_factor=loss_factor)))
+    return table.build(lambda: ModelStructure(chain(*numbers, ground=ground, loss_factor=loss_factor)))
 
 
-def _beam(table: TomlTable) -> Substructure:
+def _beam(table: TomlTable) -> Structure:
     loss_factor = table.number("loss_factor", 0)
     length, youngs_modulus, density, width, height = (
         table.number(key) for key in ("length", "youngs_modulus", "density", "width", "height")
@@ -60,17 +52,17 @@ def _beam(table: TomlTable) -> Substructure:
     axial = table.truth("axial")
     table.close()
 
-    def build() -> Substructure:
+    def build() -> Structure:
         model = beam(
             length, elements, youngs_modulus=youngs_modulus, density=density, width=width, height=height,
             ends=ends, element=element, axial=axial, poisson=poisson, loss_factor=loss_factor,
         )  # fmt: skip
-        return Substructure(model, np.linspace(0, length, elements + 1))
+        return ModelStructure(model, np.linspace(0, length, elements + 1))
 
     return table.build(build)
 
 
-def _brick_beam(table: TomlTable) -> Substructure:
+def _brick_beam(table: TomlTable) -> Structure:
     material = read_material(table)
     length, width, height = (table.number(key) for key in ("length", "width", "height"))
     ends = cast(tuple[End, End], table.texts("ends", get_args(End)))
@@ -85,12 +77,12 @@ def _brick_beam(table: TomlTable) -> Substructure:
         observed = {name: inner.number(name, 0) for name in inner.keys()}  # noqa: SIM118
     table.close()
 
-    def build() -> Substructure:
+    def build() -> Structure:
         model = brick_beam(
             length, width, height, material, ends=ends, hole=hole, observed=observed, preset=preset,
             origin=cast(tuple[float, float, float], tuple(origin)),
         )  # fmt: skip
-        return Substructure(model)
+        return ModelStructure(model)
 
     return table.build(build)
 

@@ -14,7 +14,9 @@ def known_joint_summary(result: KnownJointResult, tables: list[Table]) -> list[s
     """Say in a few sentences what came out."""
     rows = identified_rows(result)
     by_key = {table.key: table for table in tables}
-    sentences = _published(rows) + agreement(by_key["natural-frequencies"])
+    sentences = _published(rows)
+    if "natural-frequencies" in by_key:
+        sentences += agreement(by_key["natural-frequencies"])
     if "limits" in by_key:
         limits = by_key["limits"]
         kept = len(limits.rows) - len(limits.failing)

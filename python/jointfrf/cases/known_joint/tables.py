@@ -92,7 +92,7 @@ def known_joint_tables(result: KnownJointResult) -> list[Table]:
         *(_published(source, [row for row in rows if row.source == source]) for source in sources),
         *_published_errors(result),
         *_printed(result),
-        _frequencies(result),
+        *_frequencies(result),
         _identified(rows, result.n_realisations),
         *_limits(result, rows),
         _bands(result),
@@ -118,7 +118,10 @@ def _published(source: str, rows: list[Row]) -> Table:
     return Table(_key(source), _title(source), columns, cells, failing, note, percentages=("percentile",))
 
 
-def _frequencies(result: KnownJointResult) -> Table:
+def _frequencies(result: KnownJointResult) -> list[Table]:
+    """Table of the natural frequencies; none without models."""
+    if not result.modes:
+        return []
     directed = any(modes.directions for modes in result.modes.values())
     expected = result.case.expected.frequencies
     groups = []
@@ -127,7 +130,7 @@ def _frequencies(result: KnownJointResult) -> Table:
         groups.append((names, modes.freq_hz.tolist(), expected.get(joint)))
     columns = ("joint", "mode", *(("mostly in",) if directed else ()))
     note = "; ".join(f"{joint} joint: {known.source}" for joint, known in expected.items())
-    return frequency_table("Natural frequencies of the assembly", columns, groups, note)
+    return [frequency_table("Natural frequencies of the assembly", columns, groups, note)]
 
 
 def _identified(rows: list[Row], count: int) -> Table:

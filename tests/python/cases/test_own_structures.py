@@ -1,0 +1,191 @@
+"""A case of structures of one's own: by matrices and by FRFs in files, against the same case by its beams."""
+
+import json
+import re
+import shlex
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.io
+from scipy import sparse
+
+import jointfrf as jf
+from jointfrf.cases.catalogue import find_case, read_case
+from jointfrf.cases.known_joint.compute import compute
+from jointfrf.cases.known_joint.exact import exact_frfs
+from jointfrf.cases.known_joint.figures import known_joint_figures
+from jointfrf.cases.known_joint.tables import identified_rows, known_joint_numbers, known_joint_tables
+from jointfrf.io import Channel, FrfSet, write_uff
+from own_case import replace_tables, write_case
+
+ROOT = Path(__file__).resolve().parents[3]
+BEAMS = read_case(find_case("3.2"))
+MATRICES = """
+[substructure_a]
+model = "matrices"
+stiffness = "a_k.mtx"
+mass = "a_m.npz"
+loss_factor = 0.01
+dofs = "a_dofs.txt"
+[substructure_b]
+model = "matrices"
+stiffness = "b.npz"
+mass = "b.npz"
+structural_damping = "b_h.mtx"
+damping = "b_c.npz"
+dofs = ["1:y", "1:theta", "2:y", "2:theta"]
+"""
+RECEPTANCES = """
+[substructure_a]
+model = "receptances"
+file = "a.uff"
+[substructure_b]
+model = "receptances"
+file = "b.uff"
+[points]
+j = ["3:y", "3:rz"]
+k = ["1:y", "1:rz"]
+r = ["2:-y", "2:rz"]
+s = ["2:y", "2:rz"]
+"""
+
+
+def as_channels(names):
+    return tuple(Channel.parse(name.replace("theta", "rz")) for name in names)
+
+
+@pytest.fixture
+def by_matrices(tmp_path):
+    """Case 3.2 with matrices in every format: Matrix Market, sparse NPZ, NPZ of one and of several dense arrays."""
+    folder = write_case(tmp_path / "matrices", MATRICES)
+    a, b = BEAMS.a.model, BEAMS.b.model
+    scipy.io.mmwrite(folder / "a_k.mtx", sparse.coo_array(a.stiffness))
+    sparse.save_npz(folder / "a_m.npz", sparse.csc_array(a.mass))
+    (folder / "a_dofs.txt").write_text("# node, DOF\n2 y\n2 theta\n\n3:y  # tip\n3:theta\n")
+    dense = [sparse.csr_array(matrix).toarray() for matrix in (b.stiffness, b.mass)]
+    np.savez(folder / "b.npz", stiffness=dense[0], mass=dense[1])
+    scipy.io.mmwrite(folder / "b_h.mtx", 0.01 * dense[0])
+    np.savez(folder / "b_c.npz", np.zeros((4, 4)))
+    return folder
+
+
+@pytest.fixture
+def by_receptances(tmp_path):
+    """The same with FRFs: A as accelerances on lines that begin at 0 Hz, B measured against y at its tip."""
+    folder = write_case(tmp_path / "receptances", RECEPTANCES)
+    freq = np.arange(0.0, 901.0, 5.0)
+    h = np.concatenate([np.zeros((1, 4, 4)), BEAMS.a.model.receptance(freq[1:])])
+    acceleration = (2j * np.pi * freq[:, None, None]) ** 2 * h
+    channels = as_channels(BEAMS.a.model.dofs)
+    write_uff(folder / "a.uff", FrfSet(freq, channels, channels, acceleration, "accelerance"))
+    channels = as_channels(("1:y", "1:theta", "2:-y", "2:theta"))
+    signs = np.array([1, 1, -1, 1])
+    turned = BEAMS.b.model.receptance(freq[1:]) * signs[:, None] * signs
+    write_uff(folder / "b.uff", FrfSet(freq[1:], channels, channels, turned))
+    return folder
+
+
+def same_frfs(found, wanted, signs=1.0):
+    scale = abs(wanted).max(axis=(1, 2), keepdims=True)
+    assert (abs(found - wanted * signs) / scale).max() < 1e-12
+
+
+def test_matrices_give_the_case_of_the_beams(by_matrices):
+    case = read_case(by_matrices)
+    for mine, theirs in ((case.a.model, BEAMS.a.model), (case.b.model, BEAMS.b.model)):
+        assert mine.dofs == theirs.dofs
+        assert (sparse.csr_array(mine.stiffness) != sparse.csr_array(theirs.stiffness)).nnz == 0
+    same_frfs(exact_frfs(case).h_c, exact_frfs(BEAMS).h_c)
+    result, wanted = (compute(replace(one, noises=one.noises[:1]), 20) for one in (case, BEAMS))
+    for joint in ("actual", "initial"):
+        np.testing.assert_allclose(result.modes[joint].freq_hz, wanted.modes[joint].freq_hz, rtol=1e-9)
+    for mine, theirs in zip(result.identified, wanted.identified, strict=True):
+        np.testing.assert_allclose(mine.theta, theirs.theta, rtol=1e-6)
+
+
+def test_receptances_give_the_case_of_the_beams(by_receptances):
+    case = read_case(by_receptances)
+    assert case.models is None
+    turned = np.ones(8)
+    turned[2] = -1  # r is named against y
+    same_frfs(exact_frfs(case).h_c, exact_frfs(BEAMS).h_c, turned[:, None] * turned)
+    result, wanted = (compute(replace(one, noises=one.noises[:1]), 20) for one in (case, BEAMS))
+    assert result.modes == {}
+    for mine, theirs in zip(result.identified, wanted.identified, strict=True):
+        np.testing.assert_allclose(mine.theta, theirs.theta, rtol=1e-6)
+    for key, sensitivity in wanted.sensitivities.items():
+        size = abs(sensitivity.change).max()
+        assert abs(abs(result.sensitivities[key].change) - abs(sensitivity.change)).max() < 1e-9 * size
+
+
+def test_receptances_leave_out_modes_and_nothing_else(by_receptances):
+    without, with_modes = (compute(one, 3) for one in (read_case(by_receptances), BEAMS))
+    tables, all_tables = ([table.key for table in known_joint_tables(one)] for one in (without, with_modes))
+    assert set(all_tables) - set(tables) == {"natural-frequencies", "table-3-2"}  # expected.toml has been left behind
+    figures, all_figures = ({figure.key for figure in known_joint_figures(one)} for one in (without, with_modes))
+    assert all_figures - figures == {"modes"}
+    assert known_joint_numbers(without)["natural_frequencies_hz"] == {}
+
+
+@pytest.mark.long
+def test_the_documented_case_runs(tmp_path, monkeypatch):
+    text = (ROOT / "docs/cases.md").read_text(encoding="utf-8")
+    (copy,), (python,), (tables,) = (
+        re.findall(rf"```{language}\n(.*?)```", text.partition("## Structures of your own")[2], re.DOTALL)
+        for language in ("sh", "python", "toml")
+    )
+    (tmp_path / "cases").symlink_to(ROOT / "cases")
+    monkeypatch.chdir(tmp_path)
+    subprocess.run(["sh", "-ec", copy], check=True)
+    exec(python, {})
+    path = tmp_path / "my-case" / "case.toml"
+    path.write_text(replace_tables(path.read_text(), tables))
+    command = [sys.executable, "-m", "jointfrf", *shlex.split("run my-case --realisations 5 --jobs 1")]
+    subprocess.run(command, check=True, capture_output=True)
+    found = json.loads((tmp_path / "results/my-case/results.json").read_text())["identified"]
+    wanted = identified_rows(compute(BEAMS, 5))
+    beside = {(row.noise, row.method, row.parameter.name): row.median for row in wanted}
+    assert {(row["noise"], row["method"], row["parameter"]) for row in found} == set(beside)
+    for row in found:
+        assert row["median"] == pytest.approx(beside[row["noise"], row["method"], row["parameter"]], rel=1e-6)
+
+
+def test_lines_of_a_file_may_be_limited(by_receptances):
+    folder = write_case(by_receptances, RECEPTANCES + '[frequency]\nfrom_file = "b.uff"\nfirst = 15.0\nlast = 900.0\n')
+    np.testing.assert_allclose(read_case(folder).freq_hz, BEAMS.freq_hz, rtol=1e-12)
+
+
+def test_large_matrices_are_reduced_or_factored_by_their_entries(by_matrices):
+    """A membrane of 6400 DOFs: one full matrix would take 660 MB."""
+    rows = columns = 80
+    second = [sparse.diags_array([-1.0, 2.0, -1.0], offsets=(-1, 0, 1), shape=(n, n)) for n in (rows, columns)]
+    k = 1e6 * sparse.kronsum(*second, format="csr")
+    n = k.shape[0]
+    scipy.io.mmwrite(by_matrices / "a_k.mtx", k, symmetry="symmetric")
+    sparse.save_npz(by_matrices / "a_m.npz", 0.01 * sparse.eye_array(n, format="csr"))
+    (by_matrices / "a_dofs.txt").write_text("\n".join(f"{i + 1}:z" for i in range(n)))
+    text = (by_matrices / "case.toml").read_text()
+    points = '[points]\nj = ["3:z", "99:z"]\nk = ["1:y", "1:theta"]\nr = ["6400:z", "5:z"]\ns = ["2:y", "2:theta"]\n'
+    (by_matrices / "case.toml").write_text(replace_tables(text, points))
+    case = read_case(by_matrices)
+    model = case.a.model
+    ports = model.ports("3:z", "99:z", "6400:z", "5:z")
+    arguments = (BEAMS.freq_hz[:40], model.stiffness, model.mass, None, 0.01, None, ports, ports)
+    h, info = jf.receptance(*arguments, full_output=True)
+    assert info.method == "krylov"
+    same_frfs(case.a.receptance(BEAMS.freq_hz[:40], ["3:z", "99:z", "6400:z", "5:z"]), h)
+
+
+def test_dofs_without_mass_have_no_modes():
+    """Two springs in a row with nothing between them: one mode, of half the stiffness."""
+    k = np.array([[2.0, -1.0], [-1.0, 1.0]])
+    model = jf.Model(k, np.diag([0.0, 1.0]), ("1:x", "2:x"))
+    freq, shapes = model.modes()
+    np.testing.assert_allclose(2 * np.pi * freq, [np.sqrt(0.5)], rtol=1e-6)
+    np.testing.assert_allclose(abs(shapes[:, 0]), [0.5, 1.0], rtol=1e-6)
+    with pytest.raises(ValueError, match="has no modes: a motion has neither stiffness nor mass"):
+        jf.Model(np.diag([0.0, 1.0]), np.diag([0.0, 1.0]), ("1:x", "2:x")).modes()
