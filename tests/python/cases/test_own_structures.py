@@ -14,79 +14,24 @@ import scipy.io
 from scipy import sparse
 
 import jointfrf as jf
-from jointfrf.cases.catalogue import find_case, read_case
+from jointfrf.cases.catalogue import read_case
 from jointfrf.cases.known_joint.compute import compute
 from jointfrf.cases.known_joint.exact import exact_frfs
 from jointfrf.cases.known_joint.figures import known_joint_figures
 from jointfrf.cases.known_joint.tables import identified_rows, known_joint_numbers, known_joint_tables
-from jointfrf.io import Channel, FrfSet, write_uff
-from own_case import replace_tables, write_case
+from own_case import BEAMS, RECEPTANCES, replace_tables, write_by_matrices, write_by_receptances, write_case
 
 ROOT = Path(__file__).resolve().parents[3]
-BEAMS = read_case(find_case("3.2"))
-MATRICES = """
-[substructure_a]
-model = "matrices"
-stiffness = "a_k.mtx"
-mass = "a_m.npz"
-loss_factor = 0.01
-dofs = "a_dofs.txt"
-[substructure_b]
-model = "matrices"
-stiffness = "b.npz"
-mass = "b.npz"
-structural_damping = "b_h.mtx"
-damping = "b_c.npz"
-dofs = ["1:y", "1:theta", "2:y", "2:theta"]
-"""
-RECEPTANCES = """
-[substructure_a]
-model = "receptances"
-file = "a.uff"
-[substructure_b]
-model = "receptances"
-file = "b.uff"
-[points]
-j = ["3:y", "3:rz"]
-k = ["1:y", "1:rz"]
-r = ["2:-y", "2:rz"]
-s = ["2:y", "2:rz"]
-"""
-
-
-def as_channels(names):
-    return tuple(Channel.parse(name.replace("theta", "rz")) for name in names)
 
 
 @pytest.fixture
 def by_matrices(tmp_path):
-    """Case 3.2 with matrices in every format: Matrix Market, sparse NPZ, NPZ of one and of several dense arrays."""
-    folder = write_case(tmp_path / "matrices", MATRICES)
-    a, b = BEAMS.a.model, BEAMS.b.model
-    scipy.io.mmwrite(folder / "a_k.mtx", sparse.coo_array(a.stiffness))
-    sparse.save_npz(folder / "a_m.npz", sparse.csc_array(a.mass))
-    (folder / "a_dofs.txt").write_text("# node, DOF\n2 y\n2 theta\n\n3:y  # tip\n3:theta\n")
-    dense = [sparse.csr_array(matrix).toarray() for matrix in (b.stiffness, b.mass)]
-    np.savez(folder / "b.npz", stiffness=dense[0], mass=dense[1])
-    scipy.io.mmwrite(folder / "b_h.mtx", 0.01 * dense[0])
-    np.savez(folder / "b_c.npz", np.zeros((4, 4)))
-    return folder
+    return write_by_matrices(tmp_path / "matrices")
 
 
 @pytest.fixture
 def by_receptances(tmp_path):
-    """The same with FRFs: A as accelerances on lines that begin at 0 Hz, B measured against y at its tip."""
-    folder = write_case(tmp_path / "receptances", RECEPTANCES)
-    freq = np.arange(0.0, 901.0, 5.0)
-    h = np.concatenate([np.zeros((1, 4, 4)), BEAMS.a.model.receptance(freq[1:])])
-    acceleration = (2j * np.pi * freq[:, None, None]) ** 2 * h
-    channels = as_channels(BEAMS.a.model.dofs)
-    write_uff(folder / "a.uff", FrfSet(freq, channels, channels, acceleration, "accelerance"))
-    channels = as_channels(("1:y", "1:theta", "2:-y", "2:theta"))
-    signs = np.array([1, 1, -1, 1])
-    turned = BEAMS.b.model.receptance(freq[1:]) * signs[:, None] * signs
-    write_uff(folder / "b.uff", FrfSet(freq[1:], channels, channels, turned))
-    return folder
+    return write_by_receptances(tmp_path / "receptances")
 
 
 def same_frfs(found, wanted, signs=1.0):

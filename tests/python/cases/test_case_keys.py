@@ -1,0 +1,128 @@
+"""The declared keys are those that the readers ask for; the reference of all keys is printed from them."""
+
+import tomllib
+from collections import defaultdict
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from jointfrf.cases import catalogue
+from jointfrf.cases.catalogue import find_case, list_cases, read_case
+from jointfrf.cases.key_page import key_page
+from jointfrf.cases.keys import look_alike
+from jointfrf.cases.kinds import KINDS
+from jointfrf.cases.toml_table import TomlTable, read_toml
+from jointfrf.cli.main import main
+from jointfrf.errors import FileContentError
+from own_case import write_by_matrices, write_by_receptances
+
+ROOT = Path(__file__).resolve().parents[3]
+DECLARED = [table for kind in KINDS.values() for top in (kind.keys, kind.expected_keys) for table in top.all_tables()]
+
+
+@pytest.fixture
+def asked(monkeypatch):
+    """Keys that readers ask for, by the identity of the declared table."""
+    found = defaultdict(set)
+    ask = TomlTable._ask
+
+    def recorded(self, key):
+        ask(self, key)
+        if self.known is not None:
+            found[id(self.known)] |= {one.name for one in self.known.keys if one.matches(key)}
+
+    monkeypatch.setattr(TomlTable, "_ask", recorded)
+    return found
+
+
+@pytest.fixture
+def own(tmp_path):
+    return write_by_matrices(tmp_path / "matrices"), write_by_receptances(tmp_path / "receptances")
+
+
+def test_readers_ask_for_every_key_that_is_declared(asked, own, tmp_path):
+    for folder in (*list_cases(), *own):
+        read_case(folder)
+    shear = tmp_path / "shear"
+    shear.mkdir()
+    text = (list_cases()[1] / "case.toml").read_text()
+    assert 'element = "euler-bernoulli"' in text
+    (shear / "case.toml").write_text(text.replace('"euler-bernoulli"', '"shear-flexible"\npoisson = 0.3'))
+    read_case(shear)
+    # `kind` and what every case says are read before the kind is known.
+    common = {"kind", "title", "section", "frequency", "study"}
+    for table in DECLARED:
+        names = [key.name for key in table.keys]
+        assert len(names) == len(set(names)), table.header
+        early = {"case.toml": common, "expected.toml": {"figures"}}.get(table.header.split()[0], set())
+        assert set(names) - asked[id(table)] <= early, table.header
+
+
+def places(content, known, where=()):
+    """Go through all keys of a file and of the tables inside: path to the table, and the declared key."""
+    table = known.variant(content)
+    for word, value in content.items():
+        key = next(key for key in table.keys if key.matches(word))
+        yield (*where, word), key
+        inner = [value] if isinstance(value, dict) else value if isinstance(value, list) else []
+        for number, each in enumerate(inner):
+            if isinstance(each, dict) and key.inner is not None:
+                step = (word,) if each is value else (word, number)
+                yield from places(each, key.inner, (*where, *step))
+
+
+def read_changed(changed, path):
+    """Read a file of a case, but for `case.toml` return another table."""
+    return changed if path.name == "case.toml" else read_toml(path)
+
+
+def test_a_key_may_be_absent_where_the_reference_says_so(own, monkeypatch):
+    folders = [find_case(number) for number in ("3.1", "3.2", "4.3.3")] + list(own)
+    count = 0
+    for folder in folders:
+        text = (folder / "case.toml").read_text()
+        kind = KINDS[tomllib.loads(text).get("kind", "known-joint")]
+        for (*where, word), key in list(places(tomllib.loads(text), kind.keys)):
+            if word == "kind":
+                continue  # another kind takes other keys
+            content = tomllib.loads(text)
+            table = content
+            for step in where:
+                table = table[step]
+            del table[word]
+            changed = TomlTable(content, "here", folder)
+            monkeypatch.setattr(catalogue, "read_toml", partial(read_changed, changed))
+            count += 1
+            if key.default is None or key.default.startswith("required"):
+                with pytest.raises(FileContentError, match=f"the key '{word}' is missing"):
+                    read_case(folder)
+            else:
+                read_case(folder)
+    assert count > 200
+
+
+def test_the_reference_is_printed_from_the_declared_keys(capsys):
+    assert main(["cases", "--keys"]) == 0
+    page = capsys.readouterr().out
+    assert page == (ROOT / "docs/case-keys.md").read_text(encoding="utf-8") == key_page()
+    for table in DECLARED:
+        assert page.count(f" {table.header}\n") == 1
+        for key in table.keys:
+            assert f"| `{key.name}` | {key.takes} |" in page
+    assert all(row.count("|") == 6 for row in page.splitlines() if row.startswith("|"))
+
+
+def test_kinds_of_the_reference_are_those_of_the_registry():
+    for kind in KINDS.values():
+        (key,) = (key for key in kind.keys.keys if key.name == "kind")
+        assert key.takes == "one of " + ", ".join(f"`{name}`" for name in KINDS)
+        assert key.default == f"`{next(iter(KINDS))}`"
+
+
+@pytest.mark.parametrize(
+    ("word", "similar"),
+    [("sead", "seed"), ("Seed", "seed"), ("realizations", "realisations"), ("xyz", ""), ("", "")],
+)
+def test_a_misspelt_word_looks_like_a_known_one(word, similar):
+    assert look_alike(word, ["realisations", "seed"]) == similar
