@@ -32,6 +32,10 @@ __all__ = [
 ]
 
 
+#: Methods that take FRFs at other points add to the seed, which has 64 bits.
+_HIGHEST_SEED = 2**63 - 1
+
+
 class UnknownCaseError(ValueError):
     """There is no such case."""
 
@@ -154,7 +158,7 @@ def _common(folder: Path, table: TomlTable, expected: TomlTable) -> Case:
     title, section = table.text("title"), table.text("section")
     freq_hz = read_frequency(table.table("frequency"))
     study = table.table("study")
-    realisations, seed = study.whole("realisations", 1), study.whole("seed")
+    realisations, seed = study.whole("realisations", 1), study.whole("seed", highest=_HIGHEST_SEED)
     study.close()
     return Case(
         folder=folder.resolve(),

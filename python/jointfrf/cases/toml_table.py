@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import reprlib
+import sys
 import tomllib
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -16,6 +18,8 @@ __all__ = ["TomlTable", "read_toml"]
 
 _T = TypeVar("_T")
 _HERE = Path()
+#: A longer name is not repeated in a message.
+_LONG = 1000
 
 
 def read_toml(path: Path) -> TomlTable:
@@ -30,7 +34,7 @@ def read_toml(path: Path) -> TomlTable:
         return TomlTable(tomllib.loads(path.read_text(encoding="utf-8")), str(path), path.parent)
     except OSError as error:
         raise FileContentError(f"{path}: cannot be read: {error.strerror}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:
         raise FileContentError(f"{path}: not a TOML file: {error}") from error
 
 
@@ -101,7 +105,7 @@ class TomlTable:
 
     def error(self, key: str, must: str) -> FileContentError:
         """Return the exception that says what the value of a key must be."""
-        return FileContentError(f"{self.where}: {key} must be {must}, not {self._content.get(key)!r}")
+        return FileContentError(f"{self.where}: {key} must be {must}, not {reprlib.repr(self._content.get(key))}")
 
     def wrong(self, key: str, why: str) -> FileContentError:
         """Return the exception that says what is wrong with what a key names."""
@@ -113,13 +117,14 @@ class TomlTable:
         Raises
         ------
         FileContentError
-            The builder raised a ValueError, a TypeError or an OSError.
+            The builder raised a ValueError, a TypeError, an OSError or an ArithmeticError.
         """
         try:
             return builder()
-        except (ValueError, TypeError, OSError) as error:
+        except (ValueError, TypeError, OSError, ArithmeticError) as error:
             where = f"{self.where}: {key}" if key else self.where
-            raise FileContentError(f"{where}: {error}") from error
+            why = "a number is too large or too small" if isinstance(error, ArithmeticError) else error
+            raise FileContentError(f"{where}: {why}") from error
 
     def check_different(self, key: str, names: Sequence[str], what: str = "have the same name") -> None:
         """Raise an error where two tables of an array say the same."""
@@ -161,13 +166,15 @@ class TomlTable:
     def file(self, key: str) -> Path:
         """Return the path of a file, which is named relative to the case file."""
         name = self.text(key)
+        if not name.isprintable() or len(name) > _LONG:
+            raise self.error(key, "the name of a file")
+        path = self.folder / name
         try:
-            path = self.folder / name
             if path.is_file():
                 return path
-        except ValueError:  # a zero byte
-            raise self.error(key, "the name of a file") from None
-        why = "is a folder" if path.is_dir() else "does not exist"
+            why = "is a folder" if path.is_dir() else "does not exist"
+        except OSError as error:
+            why = f"cannot be found: {error.strerror}"
         raise FileContentError(f"{self.where}: {key} must name a file: {path} {why}")
 
     def texts_or_file(self, key: str) -> tuple[str, ...] | Path:
@@ -188,11 +195,13 @@ class TomlTable:
             raise self.error(key, "a list of numbers")
         return [float(v) for v in value]
 
-    def whole(self, key: str, lowest: int = 0) -> int:
-        """Return a whole number, not below `lowest`."""
+    def whole(self, key: str, lowest: int = 0, highest: int = 2**31 - 1) -> int:
+        """Return a whole number from `lowest` to `highest`."""
         value = self._value(key)
         if not isinstance(value, int) or isinstance(value, bool) or value < lowest:
             raise self.error(key, f"a whole number, at least {lowest}")
+        if value > highest:
+            raise self.error(key, f"a whole number, at most {highest}")
         return value
 
     def truth(self, key: str) -> bool:
@@ -233,4 +242,5 @@ class TomlTable:
 
 
 def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and bool(np.isfinite(value))
+    # A whole number in TOML may have any number of digits.
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= sys.float_info.max

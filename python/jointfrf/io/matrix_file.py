@@ -63,7 +63,7 @@ def _read_market(path: Path) -> Any:
 
 
 def _read_npz(path: Path, name: str) -> Any:
-    with np.load(path, allow_pickle=False) as archive:
+    with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
         if "format" in archive.files:
             return sparse.load_npz(path)
         chosen = name if name in archive.files else archive.files[0] if len(archive.files) == 1 else ""
