@@ -104,6 +104,21 @@ def test_lines_of_a_file_may_be_limited(by_receptances):
     np.testing.assert_allclose(read_case(folder).freq_hz, BEAMS.freq_hz, rtol=1e-12)
 
 
+@pytest.mark.filterwarnings("ignore::jointfrf.FileContentWarning")
+def test_a_quantity_may_be_said(by_receptances):
+    """The file says accelerance; the key goes before it."""
+    path = by_receptances / "case.toml"
+    text, power = path.read_text(), {"accelerance": 2, "mobility": 1, "receptance": 0}
+    h = {}
+    for quantity in power:
+        path.write_text(text.replace('file = "a.uff"', f'file = "a.uff"\nquantity = "{quantity}"'))
+        h[quantity] = read_case(by_receptances).a.receptance(BEAMS.freq_hz, ["3:y", "3:rz"])
+    i_omega = 2j * np.pi * BEAMS.freq_hz[:, None, None]
+    for quantity, n in power.items():
+        same_frfs(h["receptance"] / i_omega**n, h[quantity])
+    same_frfs(h["accelerance"], BEAMS.a.receptance(BEAMS.freq_hz, ["3:y", "3:theta"]))
+
+
 def test_large_matrices_are_reduced_or_factored_by_their_entries(by_matrices):
     """A membrane of 6400 DOFs: one full matrix would take 660 MB."""
     rows = columns = 80

@@ -215,6 +215,14 @@ def test_frfs_that_are_missing_or_no_numbers(by_receptances):
     check(by_receptances, r"\[points\]: \S+b\.uff: missing FRFs \(response / excitation\): 2:\+rz / 1:\+y$")
 
 
+def test_a_sensor_that_shows_nothing(by_receptances):
+    frfs = read_uff(by_receptances / "b.uff")
+    h = frfs.h.copy()
+    h[:, 1] = 0
+    write_uff(by_receptances / "b.uff", FrfSet(frfs.freq_hz, frfs.responses, frfs.excitations, h))
+    check(by_receptances, r"\[points\]: \S+b\.uff: the FRF 1:\+rz / 1:\+rz is zero on all lines$")
+
+
 def test_what_needs_a_model_is_told(by_receptances):
     expected = by_receptances / "expected.toml"
     expected.write_text("printed_step = 0.1\n")

@@ -85,10 +85,13 @@ class MeasuredStructure(Structure):
     frfs: FrfSet
 
     def check_points(self, joint: Sequence[str], internal: Sequence[str]) -> None:
-        """Raise an error if an FRF is missing."""
+        """Raise an error if an FRF is missing, or a point does not move where it is driven."""
         channels = [Channel.parse(name) for name in (*joint, *internal)]
         _check_once([f"{channel.node}:{channel.axis}" for channel in channels[: len(joint)]])
-        self.frfs.matrix(channels, channels)
+        h = self.frfs.matrix(channels, channels)
+        for i, channel in enumerate(channels):
+            if not h[:, i, i].any():
+                raise ValueError(f"{self.frfs.source}: the FRF {channel} / {channel} is zero on all lines")
 
     def receptance(self, freq_hz: FloatArray, points: Sequence[str]) -> ComplexArray:
         """Return the receptances on lines that the set holds."""
