@@ -17,6 +17,8 @@ from jointfrf.cli.main import main
 from jointfrf.errors import FileContentError
 from own_case import write_by_matrices, write_by_receptances
 
+#: Cases that are read without a mesh.
+QUICK = tuple(find_case(number) for number in ("3.1", "3.2", "4.3.3"))
 ROOT = Path(__file__).resolve().parents[3]
 DECLARED = [table for kind in KINDS.values() for top in (kind.keys, kind.expected_keys) for table in top.all_tables()]
 
@@ -77,29 +79,89 @@ def read_changed(changed, path):
     return changed if path.name == "case.toml" else read_toml(path)
 
 
-def test_a_key_may_be_absent_where_the_reference_says_so(own, monkeypatch):
-    folders = [find_case(number) for number in ("3.1", "3.2", "4.3.3")] + list(own)
-    count = 0
+def variations(folders, values):
+    """Go through the cases with one key at a time set to each of some values, or deleted where the value is None.
+
+    A declared key is treated once, where it stands first.
+    """
+    seen = set()
     for folder in folders:
         text = (folder / "case.toml").read_text()
         kind = KINDS[tomllib.loads(text).get("kind", "known-joint")]
         for (*where, word), key in list(places(tomllib.loads(text), kind.keys)):
-            if word == "kind":
-                continue  # another kind takes other keys
-            content = tomllib.loads(text)
-            table = content
-            for step in where:
-                table = table[step]
-            del table[word]
-            changed = TomlTable(content, "here", folder)
-            monkeypatch.setattr(catalogue, "read_toml", partial(read_changed, changed))
-            count += 1
-            if key.default is None or key.default.startswith("required"):
-                with pytest.raises(FileContentError, match=f"the key '{word}' is missing"):
-                    read_case(folder)
-            else:
-                read_case(folder)
-    assert count > 200
+            if id(key) in seen:
+                continue
+            seen.add(id(key))
+            for value in values(key):
+                content = tomllib.loads(text)
+                table = content
+                for step in where:
+                    table = table[step]
+                table[word] = value
+                if value is None:
+                    del table[word]
+                yield folder, content, key, word, value
+
+
+@pytest.fixture
+def read_instead(monkeypatch):
+    """Return a function that reads a case with another content of its `case.toml`."""
+
+    def read(folder, content):
+        monkeypatch.setattr(catalogue, "read_toml", partial(read_changed, TomlTable(content, "here", folder)))
+        return read_case(folder)
+
+    return read
+
+
+def test_a_key_may_be_absent_where_the_reference_says_so(own, read_instead):
+    count = 0
+    for folder, content, key, word, _ in variations(QUICK + own, lambda key: [None]):
+        count += 1
+        if word == "kind":
+            continue  # another kind takes other keys
+        if key.default is None or key.default.startswith("required"):
+            with pytest.raises(FileContentError, match=f"the key '{word}' is missing"):
+                read_instead(folder, content)
+        else:
+            read_instead(folder, content)
+    assert count > 80
+
+
+#: How a value begins in the reference, to values that are something else.
+WRONG = {
+    "number": ["1", True, [1.0], float("nan"), 10**400],
+    "number, above 0": [0, -1],
+    "number, at least 0": [-1],
+    "whole number": [1.5, "1", True, -1, 10**400],
+    "whole number, at least 1": [0],
+    "text": [1, ["x"]],
+    "name of a": [1, "no such file"],
+    "one of": ["no such word", 1, ["x"]],
+    "true or false": [1, "true"],
+    "list of": [1, [], {}],
+    "list of numbers": [["1"]],
+    "list of texts": [[1]],
+    "list of `[low, high]`": [[[2.0, 1.0]], [[1.0]], [1.0, 2.0]],
+    "table": [1, []],
+    "tables": [1, [], [1]],
+}
+
+
+def test_a_value_is_what_the_reference_says(own, read_instead):
+    def wrong(key):
+        return [value for start, values in WRONG.items() if key.takes.startswith(start) for value in values]
+
+    accepted, count = [], 0
+    for folder, content, _, word, value in variations(QUICK + own, wrong):
+        count += 1
+        try:
+            read_instead(folder, content)
+            accepted.append((folder.name, word, value))
+        except FileContentError:
+            pass
+    assert accepted == []
+    assert count > 250
 
 
 def test_the_reference_is_printed_from_the_declared_keys(capsys):

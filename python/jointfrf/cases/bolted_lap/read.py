@@ -133,20 +133,24 @@ def read_bolted_lap(common: Case, table: TomlTable, expected: TomlTable) -> Bolt
 
 
 def _beams(table: TomlTable) -> LapGeometry:
-    lengths = tuple(table.number(key, 0) for key in ("length_a", "length_b", "transfer_length_b"))
-    width, height, overlap, hole_radius = (table.number(x, 0) for x in ("width", "height", "overlap", "hole_radius"))
+    lengths = tuple(_length(table, key) for key in ("length_a", "length_b", "transfer_length_b"))
+    width, height, overlap, hole_radius = (_length(table, key) for key in ("width", "height", "overlap", "hole_radius"))
     preset = cast(Preset, table.text("preset", get_args(Preset)))
     material = read_material(table)
     table.close()
     return LapGeometry(cast(tuple[float, float, float], lengths), width, height, overlap, hole_radius, material, preset)
 
 
+def _length(table: TomlTable, key: str) -> float:
+    value = table.number(key, 0)
+    if value == 0:
+        raise table.error(key, "positive, in m")
+    return value
+
+
 def _spacing(table: TomlTable) -> tuple[float, float]:
-    found = (table.number("spacing_x", 0), table.number("spacing_z", 0))
+    found = _length(table, "spacing_x"), _length(table, "spacing_z")
     table.close()
-    for key, value in zip(("spacing_x", "spacing_z"), found, strict=True):
-        if value == 0:
-            raise table.error(key, "positive, in m")
     return found
 
 
