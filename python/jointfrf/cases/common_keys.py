@@ -97,7 +97,9 @@ MATERIAL_KEYS = (
     Key("density", "number, above 0", "Density.", "kg/m^3"),
     Key("loss_factor", "number, at least 0", "Loss factor eta of the stiffness, K (1 + i eta)."),
 )
-PRESET = Key("preset", one_of(Preset), "Mesh: `seed` is that of the thesis, `accurate` a converged one.")
+PRESET = Key(
+    "preset", one_of(Preset), "Elements: `seed` as in the thesis (C3D8R), `accurate` with incompatible modes (C3D8I)."
+)
 EXPECTED_FREQUENCIES = (
     Key("source", "text", "Where the numbers come from."),
     Key("values", "list of numbers", "Natural frequencies of the assembly, lowest first.", "Hz"),

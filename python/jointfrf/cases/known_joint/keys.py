@@ -53,11 +53,11 @@ _BEAM = _of(
     Key("density", "number, above 0", "Density.", "kg/m^3"),
     Key("width", "number, above 0", "Width of the section.", "m"),
     Key("height", "number, above 0", "Height of the section, in the plane of bending.", "m"),
-    Key("poisson", "number", "Poisson's ratio; only of `shear-flexible` elements.", "", "required there"),
+    Key("poisson", "number", "Poisson's ratio; only of `shear-flexible` elements.", "", "required for these"),
     _LOSS_FACTOR,
 )
 _HOLE = KeyTable(
-    "hole",
+    "hole, in a brick-beam",
     "A bolt hole whose ring follows a reference point with six DOFs, `hole:x` to `hole:theta_z`.",
     (
         Key("position", "number, at least 0", "Distance from the first end.", "m"),
@@ -75,7 +75,7 @@ _BRICK_BEAM = _of(
     *MATERIAL_KEYS,
     _ENDS,
     PRESET,
-    Key("origin", "list of 3 numbers", "Where the first end lies.", "m"),
+    Key("origin", "list of 3 numbers", "Middle of the lower edge of the first end; the beam lies above it.", "m"),
     Key("hole", "table", "A bolt hole.", "", "none", _HOLE),
     Key("observed", "table of numbers", "Sections whose mean motion is observed: name, and distance from the first "
         "end; `r` gives `\"r:x\"` to `\"r:theta_z\"`.", "m", "none"),
@@ -163,9 +163,9 @@ _IDENTIFIED = KeyTable(
         *_APPLIED,
         Key("bands", "text", "Name of a set of bands of the case.", "", "required but for `compliance`"),
         Key("values", "table", "Published values.", "as the parameters", "none",
-            KeyTable("values", "Of an `[[identified]]`.", _BY_PARAMETER)),
+            KeyTable("values, in [[identified]]", "Published values of the parameters.", _BY_PARAMETER)),
         Key("rmse_below", "table", "Largest root-mean-square error allowed.", "%", "none",
-            KeyTable("rmse_below", "Of an `[[identified]]`.", _BY_PARAMETER)),
+            KeyTable("rmse_below, in [[identified]]", "Largest errors of the parameters, %.", _BY_PARAMETER)),
     ),
 )  # fmt: skip
 _REGENERATED = KeyTable(
