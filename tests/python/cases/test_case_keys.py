@@ -169,7 +169,7 @@ def test_the_reference_is_printed_from_the_declared_keys(capsys):
     page = capsys.readouterr().out
     assert page == (ROOT / "docs/case-keys.md").read_text(encoding="utf-8") == key_page()
     for table in DECLARED:
-        assert page.count(f" {table.header}\n") == 1
+        assert page.count(f"# {table.header}\n") == 1
         for key in table.keys:
             assert f"| `{key.name}` | {key.takes} |" in page
     assert all(row.count("|") == 6 for row in page.splitlines() if row.startswith("|"))
