@@ -18,7 +18,7 @@ from jointfrf.errors import IllConditionedWarning
 from jointfrf.frf.bands import band_mean
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
-__all__ = ["ALL_LINES", "Identified", "chunk_size", "run_study"]
+__all__ = ["ALL_LINES", "Identified", "band_means", "chunk_size", "run_study"]
 
 #: Lines, and entries of their FRF matrices, treated at once, over realisations: bound the memory to some tens of MB.
 _CHUNK, _CHUNK_ENTRIES = 20_000, 1_500_000
@@ -79,12 +79,12 @@ def _identify(chunk: _Chunk) -> tuple[FloatArray, ComplexArray]:
             theta = fit_viscous(exact.freq_hz, exact.dofs, h)
             return theta[None], np.empty((0, exact.freq_hz.size, exact.n), np.complex128)
         k_joint = joint_lines(exact, method, h, "nan")
-    means = np.array([[_band_means(exact, k, band_set) for k in k_joint] for band_set in chunk.band_sets])
+    means = np.array([[band_means(exact, k, band_set) for k in k_joint] for band_set in chunk.band_sets])
     kept = max(0, min(chunk.count, _KEPT - chunk.first))
     return means, np.diagonal(k_joint[:kept], axis1=2, axis2=3).copy()
 
 
-def _band_means(exact: Exact, k_joint: ComplexArray, band_set: BandSet) -> FloatArray:
+def band_means(exact: Exact, k_joint: ComplexArray, band_set: BandSet) -> FloatArray:
     """Mean of Re K* and Im K*/w, each parameter over its own bands."""
     of_k, of_c = ({dof: band_set.bands[Parameter.of_dof(kind, dof)] for dof in exact.dofs} for kind in ("k", "c"))
     stiffness = band_mean(exact.freq_hz, k_joint, of_k, exact.dofs).stiffness
