@@ -19,7 +19,7 @@ from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.report.axes import percentile_lines
 from jointfrf.substructuring.coupling import couple
 
-__all__ = ["RegeneratedFrf", "peak_error", "regenerate", "regenerate_all"]
+__all__ = ["RegeneratedFrf", "regenerate", "regenerate_all"]
 
 #: Realisations whose FRFs are regenerated.
 _REGENERATED = 200
@@ -103,13 +103,13 @@ def _with_errors(exact: Exact, identified: Identified, observed: Observed) -> Re
     h_exact = exact.h_c[:, exact.at(observed), exact.at(observed)]
     bands = observed.bands or (None,)
     amplitude, frequency = (
-        np.array([[peak_error(error, h_exact, one, exact.freq_hz, band) for one in h] for band in bands], np.float64)
+        np.array([[_error(error, h_exact, one, exact.freq_hz, band) for one in h] for band in bands], np.float64)
         for error in (amplitude_error, frequency_error)
     )
     return RegeneratedFrf(identified, observed, percentile_lines(np.abs(h)), h[0].copy(), bands, amplitude, frequency)
 
 
-def peak_error(
+def _error(
     error: Callable[..., float], h_exact: ComplexArray, h: ComplexArray, freq_hz: FloatArray, band: Band | None
 ) -> float:
     """Error of a peak; NaN where there is none: what is largest at the edge of a band belongs to a peak elsewhere."""
