@@ -10,7 +10,13 @@ from pathlib import Path
 from jointfrf.cases.catalogue import UnknownCaseError, find_case, list_cases, read_case
 from jointfrf.cases.known_joint.read import KnownJointCase
 from jointfrf.cases.known_joint.readings.ranking import totals
-from jointfrf.cases.known_joint.readings.study import Explained, SameStructure, group_cases, study_readings
+from jointfrf.cases.known_joint.readings.study import (
+    Explained,
+    ReadingsPlan,
+    SameStructure,
+    group_cases,
+    study_readings,
+)
 from jointfrf.cases.known_joint.readings.tables import altogether_table, choices_table, source_tables, values_table
 from jointfrf.cases.workers import started_workers
 from jointfrf.cli.usage import UsageError, available_cores, positive, progress
@@ -57,13 +63,12 @@ def _numbers(words: str) -> tuple[float, ...]:
 def run(options: argparse.Namespace) -> int:
     """Carry out the command."""
     groups = _groups(options.cases)
+    plan = ReadingsPlan(options.spacing, options.level, options.realisations, options.seed)
     explained: list[Explained] = []
     with started_workers(options.jobs) as workers:
         for group in groups:
             at_work = replace(workers, progress=progress(group.cases[0].name))
-            explained += study_readings(
-                group, options.spacing, options.level, options.realisations, options.seed, at_work
-            )
+            explained += study_readings(group, plan, at_work)
     every = totals(explained, options.spacing)
     print(f"{options.realisations} realisations of each reading, seed {options.seed}\n")
     for table in (*source_tables(explained, options.top), choices_table(every), altogether_table(every, options.top)):

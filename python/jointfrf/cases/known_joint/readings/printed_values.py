@@ -75,7 +75,7 @@ class PrintedTable:
     way : str
         Method and bands.
     level : float
-        Printed level of the noise.
+        Printed level of the noise: that of the first noise of the case that the table stands beside.
     values : tuple of PrintedValue
     """
 

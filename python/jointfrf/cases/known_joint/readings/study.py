@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import product
 
 import numpy as np
@@ -26,7 +26,7 @@ from jointfrf.cases.known_joint.readings.realise import (
 from jointfrf.cases.known_joint.readings.score import Score, score
 from jointfrf.cases.workers import Workers
 
-__all__ = ["Explained", "SameStructure", "group_cases", "study_readings"]
+__all__ = ["Explained", "ReadingsPlan", "SameStructure", "group_cases", "study_readings"]
 
 #: A range of fewer lines asks for a spacing of its own.
 _FEWEST_LINES = 100
@@ -67,6 +67,29 @@ class SameStructure:
         first, last = (float(self.cases[0].freq_hz[i]) for i in (0, -1))
         lines = np.round(first + spacing * np.arange(int((last - first) / spacing + 1 + 1e-9)), 9)
         return exact_frfs(replace(self.cases[0], freq_hz=lines))
+
+
+@dataclass(frozen=True)
+class ReadingsPlan:
+    """What is compared.
+
+    Attributes
+    ----------
+    spacings : tuple of float
+        Of the frequency lines, Hz.
+    shares : tuple of float
+        Levels of the noise as shares of the printed one: 1 for what is printed.
+    count, seed : int
+        Realisations of each reading, and the seed they come from.
+    readings : tuple of Reading
+        All by default.
+    """
+
+    spacings: tuple[float, ...]
+    shares: tuple[float, ...] = (1.0,)
+    count: int = 300
+    seed: int = 1
+    readings: tuple[Reading, ...] = field(default_factory=lambda: tuple(every_reading()))
 
 
 @dataclass(frozen=True)
@@ -135,26 +158,13 @@ def _are_same(a: Exact, b: Exact) -> bool:
     )
 
 
-def study_readings(
-    group: SameStructure,
-    spacings: Sequence[float],
-    shares: Sequence[float],
-    count: int,
-    seed: int,
-    workers: Workers | None = None,
-) -> list[Explained]:
+def study_readings(group: SameStructure, plan: ReadingsPlan, workers: Workers | None = None) -> list[Explained]:
     """Compare the printed values of cases with realisations of every reading.
 
     Parameters
     ----------
     group : SameStructure
-    spacings : sequence of float
-        Of the frequency lines, Hz.
-    shares : sequence of float
-        Levels as shares of the printed one: 1 for what is printed.
-    count : int
-        Realisations.
-    seed : int
+    plan : ReadingsPlan
     workers : Workers, optional
         This process by default.
 
@@ -164,8 +174,8 @@ def study_readings(
         One for each spacing, share, reading and table. A realisation depends on the seed and its own number only.
     """
     at_work = workers or Workers()
-    own = group.spacings(spacings)
-    tasks = {spacing: _tasks(group, group.exact(spacing), shares, count, seed) for spacing in own}
+    own = group.spacings(plan.spacings)
+    tasks = {spacing: _tasks(group, group.exact(spacing), plan) for spacing in own}
     flat = [task for of_spacing in tasks.values() for task in of_spacing.values()]
     results = iter(list(at_work.counted(at_work.map(realise, flat), len(flat))))
     found: list[Explained] = []
@@ -175,30 +185,30 @@ def study_readings(
             for key, task in of_spacing.items()
             for scale, one in zip(task.scales, next(results), strict=True)
         }
-        wanted = product(shares, every_reading(), group.tables)
-        found += [_explained(Explained(table, reading, spacing, own != list(spacings), share, ()), realised, group.n)
-                  for share, reading, table in wanted]  # fmt: skip
+        alone = own != list(plan.spacings)
+        found += [
+            _explained(Explained(table, reading, spacing, alone, share, ()), realised, group.n)
+            for share, reading, table in product(plan.shares, plan.readings, group.tables)
+        ]
     return found
 
 
-def _tasks(
-    group: SameStructure, exact: Exact, shares: Sequence[float], count: int, seed: int
-) -> dict[tuple[str, Draw], DrawTask]:
+def _tasks(group: SameStructure, exact: Exact, plan: ReadingsPlan) -> dict[tuple[str, Draw], DrawTask]:
     """Return the work for one spacing of the lines: readings that draw the same numbers share a task."""
     tasks: dict[tuple[str, Draw], DrawTask] = {}
     for method in dict.fromkeys(value.quantity.method for table in group.tables for value in table.values):
         own = [(table, v.quantity) for table in group.tables for v in table.values if v.quantity.method == method]
-        levels = dict.fromkeys(table.level * share for share in shares for table, _ in own)
+        levels = dict.fromkeys(table.level * share for share in plan.shares for table, _ in own)
         band_sets = {quantity.bands.name: quantity.bands for _, quantity in own}
         errors = dict.fromkeys(quantity.known for _, quantity in own if isinstance(quantity, ErrorQuantity))
         scales: dict[Draw, dict[NoiseScale, None]] = {}
-        for reading in every_reading():
+        for reading in plan.readings:
             drawn = scales.setdefault(_draw(reading, method, group.n), {})
             drawn.update(dict.fromkeys(reading.scale(level) for level in levels))
         common = DrawTask(
             needed_frfs(exact, method), SHORT_FORM.get(method, method), measured(exact, method), next(iter(scales)), (),
             tuple(band_sets.values()), tuple(find_window(exact, one, group.observed(one)) for one in errors),
-            seed + noise_stream(method), count,
+            plan.seed + noise_stream(method), plan.count,
         )  # fmt: skip
         tasks |= {(method, draw): replace(common, draw=draw, scales=tuple(of)) for draw, of in scales.items()}
     return tasks
