@@ -18,7 +18,7 @@ from jointfrf.errors import IllConditionedWarning
 from jointfrf.frf.bands import in_bands
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
-__all__ = ["ALL_LINES", "Identified", "band_means", "chunk_size", "run_study"]
+__all__ = ["ALL_LINES", "Identified", "chunk_size", "means_over_bands", "run_study"]
 
 #: Lines, and entries of their FRF matrices, treated at once, over realisations: bound the memory to some tens of MB.
 _CHUNK, _CHUNK_ENTRIES = 20_000, 1_500_000
@@ -79,12 +79,12 @@ def _identify(chunk: _Chunk) -> tuple[FloatArray, ComplexArray]:
             theta = fit_viscous(exact.freq_hz, exact.dofs, h)
             return theta[None], np.empty((0, exact.freq_hz.size, exact.n), np.complex128)
         k_joint = joint_lines(exact, method, h, "nan")
-    means = np.array([band_means(exact, k_joint, band_set) for band_set in chunk.band_sets])
+    means = np.array([means_over_bands(exact, k_joint, band_set) for band_set in chunk.band_sets])
     kept = max(0, min(chunk.count, _KEPT - chunk.first))
     return means, np.diagonal(k_joint[:kept], axis1=2, axis2=3).copy()
 
 
-def band_means(exact: Exact, k_joint: ComplexArray, band_set: BandSet) -> FloatArray:
+def means_over_bands(exact: Exact, k_joint: ComplexArray, band_set: BandSet) -> FloatArray:
     """Mean of Re K* and Im K*/w of several realisations, each parameter over its own bands.
 
     Parameters

@@ -13,7 +13,7 @@ from jointfrf.cases.known_joint.expected import ExpectedErrors
 from jointfrf.cases.known_joint.methods import joint_lines
 from jointfrf.cases.known_joint.readings.reading import Draw, NoiseScale, noise_numbers, reference_moduli
 from jointfrf.cases.known_joint.regenerate import regenerate
-from jointfrf.cases.known_joint.study import band_means, chunk_size
+from jointfrf.cases.known_joint.study import chunk_size, means_over_bands
 from jointfrf.dofs import rigid_offset
 from jointfrf.errors import IllConditionedWarning
 from jointfrf.frf.bands import in_bands
@@ -127,7 +127,7 @@ def realise(task: DrawTask) -> list[Realised]:
                     task.exact, task.method, scale.pollute(task.h, moduli[scale.reference], numbers), "nan"
                 )
             for b, band_set in enumerate(task.band_sets):
-                theta[s, b, several] = band_means(task.exact, k_joint, band_set)
+                theta[s, b, several] = means_over_bands(task.exact, k_joint, band_set)
     return [_realised(task, own) for own in theta]
 
 
