@@ -82,12 +82,13 @@ def by_table(explained: Sequence[Explained]) -> dict[str, list[Explained]]:
     Returns
     -------
     dict of str to list of Explained
-        Source, with the level of the noise.
+        Source, with the level of the noise and the number of values.
     """
     found: dict[str, dict[tuple[object, ...], Explained]] = {}
     for one in explained:
         same = (one.table.way, one.spacing, one.share, one.scores)
-        found.setdefault(f"{one.table.source}, {100 * one.table.level:g} %", {}).setdefault(same, one)
+        name = f"{one.table.source}, {100 * one.table.level:g} %, {len(one.scores)} values"
+        found.setdefault(name, {}).setdefault(same, one)
     return {name: sorted(own.values(), key=lambda one: -one.log_density) for name, own in found.items()}
 
 
