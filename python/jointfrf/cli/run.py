@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import argparse
-import os
-import sys
 import time
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 from jointfrf.cases.catalogue import CaseOutput, UnknownCaseError, find_case, list_cases, run_case
 from jointfrf.cases.workers import started_workers
 from jointfrf.cli.extras import check_installed
-from jointfrf.cli.usage import UsageError, positive
+from jointfrf.cli.usage import UsageError, available_cores, positive, progress
 from jointfrf.report.table import as_text
 
 __all__ = ["add_arguments", "run"]
@@ -25,11 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("cases", nargs="*", metavar="CASE", help="name, number, or folder with a case.toml")
     parser.add_argument("--out", type=Path, default=Path("results"), metavar="DIR", help="where results go (results)")
     parser.add_argument("--realisations", type=positive, metavar="N", help="instead of the number the case names")
-    parser.add_argument("--jobs", type=positive, metavar="N", default=_cores(), help="processes (all cores)")
-
-
-def _cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    parser.add_argument("--jobs", type=positive, metavar="N", default=available_cores(), help="processes (all cores)")
 
 
 def run(options: argparse.Namespace) -> int:
@@ -49,7 +42,7 @@ def run(options: argparse.Namespace) -> int:
     with started_workers(options.jobs) as workers:
         for folder in folders:
             start = time.perf_counter()
-            at_work = replace(workers, progress=_progress(folder.name))
+            at_work = replace(workers, progress=progress(folder.name))
             output = run_case(folder, options.out, realisations=options.realisations, workers=at_work)
             _show_output(output)
             print(f"{time.perf_counter() - start:.1f} s, report: {output.report}\n", flush=True)
@@ -67,15 +60,3 @@ def _show_output(output: CaseOutput) -> None:
     print(*(f"- {sentence}" for sentence in output.summary), "", sep="\n")
     for table in output.printed:
         print(as_text(table), end="\n\n")
-
-
-def _progress(name: str) -> Callable[[int, int], None]:
-    """Return a counter in one line of a terminal; silent elsewhere."""
-    if not sys.stderr.isatty():
-        return lambda done, total: None
-
-    def show(done: int, total: int) -> None:
-        end = "\r\x1b[K" if done == total else ""
-        print(f"\r{name}: {100 * done // total} %{end}", end="", file=sys.stderr, flush=True)
-
-    return show

@@ -13,12 +13,12 @@ from jointfrf.cases.known_joint.exact import Exact
 from jointfrf.cases.known_joint.methods import joint_lines, measured, noise_stream
 from jointfrf.cases.known_joint.read import KnownJointCase
 from jointfrf.cases.workers import Workers
-from jointfrf.dofs import Parameter
+from jointfrf.dofs import joint_parameters
 from jointfrf.errors import IllConditionedWarning
-from jointfrf.frf.bands import band_mean
+from jointfrf.frf.bands import in_bands
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
-__all__ = ["ALL_LINES", "Identified", "chunk_size", "run_study"]
+__all__ = ["ALL_LINES", "Identified", "chunk_size", "means_over_bands", "run_study"]
 
 #: Lines, and entries of their FRF matrices, treated at once, over realisations: bound the memory to some tens of MB.
 _CHUNK, _CHUNK_ENTRIES = 20_000, 1_500_000
@@ -79,16 +79,34 @@ def _identify(chunk: _Chunk) -> tuple[FloatArray, ComplexArray]:
             theta = fit_viscous(exact.freq_hz, exact.dofs, h)
             return theta[None], np.empty((0, exact.freq_hz.size, exact.n), np.complex128)
         k_joint = joint_lines(exact, method, h, "nan")
-    means = np.array([[_band_means(exact, k, band_set) for k in k_joint] for band_set in chunk.band_sets])
+    means = np.array([means_over_bands(exact, k_joint, band_set) for band_set in chunk.band_sets])
     kept = max(0, min(chunk.count, _KEPT - chunk.first))
     return means, np.diagonal(k_joint[:kept], axis1=2, axis2=3).copy()
 
 
-def _band_means(exact: Exact, k_joint: ComplexArray, band_set: BandSet) -> FloatArray:
-    """Mean of Re K* and Im K*/w, each parameter over its own bands."""
-    of_k, of_c = ({dof: band_set.bands[Parameter.of_dof(kind, dof)] for dof in exact.dofs} for kind in ("k", "c"))
-    stiffness = band_mean(exact.freq_hz, k_joint, of_k, exact.dofs).stiffness
-    return np.concatenate([stiffness, band_mean(exact.freq_hz, k_joint, of_c, exact.dofs).damping])
+def means_over_bands(exact: Exact, k_joint: ComplexArray, band_set: BandSet) -> FloatArray:
+    """Mean of Re K* and Im K*/w of several realisations, each parameter over its own bands.
+
+    Parameters
+    ----------
+    exact : Exact
+        Names the lines and the n DOFs.
+    k_joint : ndarray, shape (r, n_freq, n, n)
+        N/m.
+    band_set : BandSet
+
+    Returns
+    -------
+    ndarray, shape (r, 2 n)
+        Stiffness of all DOFs, then damping.
+    """
+    found = np.empty((len(k_joint), 2 * exact.n))
+    for p, parameter in enumerate(joint_parameters(exact.dofs)):
+        inside, d = in_bands(exact.freq_hz, band_set.bands[parameter]), p % exact.n
+        lines = k_joint[:, inside, d, d]
+        values = lines.real if p < exact.n else lines.imag / (2 * np.pi * exact.freq_hz[inside])
+        found[:, p] = values.mean(axis=1)
+    return found
 
 
 def run_study(

@@ -1,0 +1,236 @@
+"""Realisations of every reading of the noise: the numbers and the exact FRFs are computed once for all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import product
+
+import numpy as np
+
+from jointfrf.cases.definitions import Observed
+from jointfrf.cases.known_joint.exact import Exact, exact_frfs
+from jointfrf.cases.known_joint.expected import ExpectedErrors
+from jointfrf.cases.known_joint.methods import measured, noise_stream
+from jointfrf.cases.known_joint.read import KnownJointCase
+from jointfrf.cases.known_joint.readings.printed_values import ErrorQuantity, PrintedTable, printed_tables
+from jointfrf.cases.known_joint.readings.reading import Draw, NoiseScale, Reading, every_reading
+from jointfrf.cases.known_joint.readings.realise import (
+    SHORT_FORM,
+    DrawTask,
+    Realised,
+    find_window,
+    needed_frfs,
+    realise,
+)
+from jointfrf.cases.known_joint.readings.score import Score, score
+from jointfrf.cases.workers import Workers
+
+__all__ = ["Explained", "ReadingsPlan", "SameStructure", "group_cases", "study_readings"]
+
+#: A range of fewer lines asks for a spacing of its own.
+_FEWEST_LINES = 100
+#: Lines on which two cases are compared.
+_COMPARED = 3
+
+
+@dataclass(frozen=True)
+class SameStructure:
+    """Cases of the same structures and joint: what is computed for one serves all.
+
+    Attributes
+    ----------
+    cases : tuple of KnownJointCase
+    tables : tuple of PrintedTable
+    """
+
+    cases: tuple[KnownJointCase, ...]
+    tables: tuple[PrintedTable, ...]
+
+    def spacings(self, asked: Sequence[float]) -> list[float]:
+        """Spacings of lines, Hz: the asked ones, or its own where the finest of them would leave a few lines only."""
+        freq = self.cases[0].freq_hz
+        few = float(freq[-1] - freq[0]) < _FEWEST_LINES * min(asked)
+        return [float(freq[1] - freq[0])] if few and freq.size > 1 else list(asked)
+
+    @property
+    def n(self) -> int:
+        """Number of joint DOFs."""
+        return len(self.cases[0].joint.dofs)
+
+    def observed(self, known: ExpectedErrors) -> Observed:
+        """Return the FRF that published errors belong to."""
+        return next(one for case in self.cases for one in case.observed if one.key == known.observed)
+
+    def exact(self, spacing: float) -> Exact:
+        """Exact FRFs on lines between the limits of the first case."""
+        first, last = (float(self.cases[0].freq_hz[i]) for i in (0, -1))
+        lines = np.round(first + spacing * np.arange(int((last - first) / spacing + 1 + 1e-9)), 9)
+        return exact_frfs(replace(self.cases[0], freq_hz=lines))
+
+
+@dataclass(frozen=True)
+class ReadingsPlan:
+    """What is compared.
+
+    Attributes
+    ----------
+    spacings : tuple of float
+        Of the frequency lines, Hz.
+    shares : tuple of float
+        Levels of the noise as shares of the printed one: 1 for what is printed.
+    count, seed : int
+        Realisations of each reading, and the seed they come from.
+    readings : tuple of Reading
+        All by default.
+    """
+
+    spacings: tuple[float, ...]
+    shares: tuple[float, ...] = (1.0,)
+    count: int = 300
+    seed: int = 1
+    readings: tuple[Reading, ...] = field(default_factory=lambda: tuple(every_reading()))
+
+
+@dataclass(frozen=True)
+class Explained:
+    """How well a reading explains a printed table.
+
+    Attributes
+    ----------
+    table : PrintedTable
+    reading : Reading
+    spacing : float
+        Of the lines, Hz.
+    own_spacing : bool
+        Whether it is the only one, whatever others have.
+    share : float
+        Level of the noise as a share of the printed one.
+    scores : tuple of Score
+        One for each printed value.
+    """
+
+    table: PrintedTable
+    reading: Reading
+    spacing: float
+    own_spacing: bool
+    share: float
+    scores: tuple[Score, ...]
+
+    @property
+    def inside(self) -> int:
+        """Printed values inside the central 95 %."""
+        return sum(one.inside for one in self.scores)
+
+    @property
+    def log_density(self) -> float:
+        """Sum over the printed values."""
+        return float(sum(one.log_density for one in self.scores))
+
+
+def group_cases(cases: Sequence[KnownJointCase]) -> list[SameStructure]:
+    """Put cases together whose exact FRFs are the same, and leave out those without printed values.
+
+    Parameters
+    ----------
+    cases : sequence of KnownJointCase
+
+    Returns
+    -------
+    list of SameStructure
+    """
+    groups: list[tuple[Exact, list[KnownJointCase]]] = []
+    for case in cases:
+        if not printed_tables([case]):
+            continue
+        few = exact_frfs(replace(case, freq_hz=case.freq_hz[:: max(1, case.freq_hz.size // _COMPARED)]))
+        same = next((own for exact, own in groups if _are_same(exact, few)), None)
+        if same is None:
+            groups.append((few, [case]))
+        else:
+            same.append(case)
+    return [SameStructure(tuple(own), tuple(printed_tables(own))) for _, own in groups]
+
+
+def _are_same(a: Exact, b: Exact) -> bool:
+    return a.dofs == b.dofs and all(
+        np.array_equal(getattr(a, x), getattr(b, x)) for x in ("freq_hz", "h_a", "h_b", "h_c")
+    )
+
+
+def study_readings(group: SameStructure, plan: ReadingsPlan, workers: Workers | None = None) -> list[Explained]:
+    """Compare the printed values of cases with realisations of every reading.
+
+    Parameters
+    ----------
+    group : SameStructure
+    plan : ReadingsPlan
+    workers : Workers, optional
+        This process by default.
+
+    Returns
+    -------
+    list of Explained
+        One for each spacing, share, reading and table. A realisation depends on the seed and its own number only.
+    """
+    at_work = workers or Workers()
+    own = group.spacings(plan.spacings)
+    tasks = {spacing: _tasks(group, group.exact(spacing), plan) for spacing in own}
+    flat = [task for of_spacing in tasks.values() for task in of_spacing.values()]
+    results = iter(list(at_work.counted(at_work.map(realise, flat), len(flat))))
+    found: list[Explained] = []
+    for spacing, of_spacing in tasks.items():
+        realised = {
+            (*key, scale): one
+            for key, task in of_spacing.items()
+            for scale, one in zip(task.scales, next(results), strict=True)
+        }
+        alone = own != list(plan.spacings)
+        found += [
+            _explained(Explained(table, reading, spacing, alone, share, ()), realised, group.n)
+            for share, reading, table in product(plan.shares, plan.readings, group.tables)
+        ]
+    return found
+
+
+def _tasks(group: SameStructure, exact: Exact, plan: ReadingsPlan) -> dict[tuple[str, Draw], DrawTask]:
+    """Return the work for one spacing of the lines: readings that draw the same numbers share a task."""
+    tasks: dict[tuple[str, Draw], DrawTask] = {}
+    for method in dict.fromkeys(value.quantity.method for table in group.tables for value in table.values):
+        own = [(table, v.quantity) for table in group.tables for v in table.values if v.quantity.method == method]
+        levels = dict.fromkeys(table.level * share for share in plan.shares for table, _ in own)
+        band_sets = {quantity.bands.name: quantity.bands for _, quantity in own}
+        errors = dict.fromkeys(quantity.known for _, quantity in own if isinstance(quantity, ErrorQuantity))
+        scales: dict[Draw, dict[NoiseScale, None]] = {}
+        for reading in plan.readings:
+            drawn = scales.setdefault(_draw(reading, method, group.n), {})
+            drawn.update(dict.fromkeys(reading.scale(level) for level in levels))
+        common = DrawTask(
+            needed_frfs(exact, method), SHORT_FORM.get(method, method), measured(exact, method), next(iter(scales)), (),
+            tuple(band_sets.values()), tuple(find_window(exact, one, group.observed(one)) for one in errors),
+            plan.seed + noise_stream(method), plan.count,
+        )  # fmt: skip
+        tasks |= {(method, draw): replace(common, draw=draw, scales=tuple(of)) for draw, of in scales.items()}
+    return tasks
+
+
+def _draw(reading: Reading, method: str, n: int) -> Draw:
+    """Return the numbers that a reading takes for a method."""
+    between = {"decoupling-rs": False, "decoupling-sr": False}
+    return reading.draw(n, n if method.startswith("decoupling") else 2 * n, between.get(method, True))
+
+
+def _explained(empty: Explained, realised: Mapping[tuple[str, Draw, NoiseScale], Realised], n: int) -> Explained:
+    """Compare each value of a table with the realisations of a reading."""
+    table, reading = empty.table, empty.reading
+    scale = reading.scale(table.level * empty.share)
+    scores = []
+    for value in table.values:
+        quantity = value.quantity
+        found = realised[quantity.method, _draw(reading, quantity.method, n), scale]
+        if isinstance(quantity, ErrorQuantity):
+            values = found.errors[quantity.known][quantity.index]
+        else:
+            values = found.theta[quantity.bands.name][:, quantity.index]
+        scores.append(score(values, value.value, value.unit, value.resolution(empty.spacing)))
+    return replace(empty, scores=tuple(scores))
