@@ -16,11 +16,10 @@ from jointfrf.cases.bolted_lap.routes import (
     band_means,
     by_band_means,
     by_compliance_fit,
-    joint_of_constants,
     joint_stiffness_lines,
     route_lines,
 )
-from jointfrf.cases.definitions import Noise
+from jointfrf.cases.definitions import Noise, constant_joint
 from jointfrf.cases.workers import Workers
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.solids.preload import PreloadedLap
@@ -172,7 +171,7 @@ def _regenerated(
 ) -> list[RegeneratedTip]:
     """FRFs of the tip with every identified joint, with both beams B."""
     found = by_band_means(case, k_lines) + by_compliance_fit(case, solid.points, solid.channels)
-    joints = [(one, joint_of_constants(one.theta, case.freq_hz)) for one in found]
+    joints = [(one, constant_joint(one.theta, case.freq_hz)) for one in found]
     # Last, all entries of K* of the reference points, line by line.
     joints.append((Found("reference points", LINES, np.full(12, np.nan)), k_lines["reference points"]))
     return [RegeneratedTip(one, *(part.tip(k_joint) for part in beams)) for one, k_joint in joints]
@@ -233,7 +232,7 @@ def _noise_studies(
     """Put the realisations of every route and estimator together, with the resonances they regenerate."""
     studies = []
     for same in zip(*parts, strict=True):
-        lines = [joint_of_constants(found.theta, case.freq_hz) for found in same]
+        lines = [constant_joint(found.theta, case.freq_hz) for found in same]
         shift = [resonance_errors(case.freq_hz, peaks, solid.tip, beams.tip(k))[1] for k in lines]
         theta = np.array([found.theta for found in same])
         studies.append(NoiseStudy(noise.name, same[0].route, same[0].estimator, theta, np.array(shift)))

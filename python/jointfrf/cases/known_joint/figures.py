@@ -31,6 +31,7 @@ __all__ = ["known_joint_figures"]
 
 _METHOD_NAMES = {
     "ismm": "ISMM",
+    "ismm-kj": "ISMM, D_kj",
     "inverse-substructuring": "inverse substructuring",
     "compliance": "compliance fit",
     "decoupling-rr": "decoupling (2.53)",

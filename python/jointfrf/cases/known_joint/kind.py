@@ -19,5 +19,5 @@ KNOWN_JOINT: CaseKind[KnownJointCase, KnownJointResult] = CaseKind(
     figures=known_joint_figures,
     summary=known_joint_summary,
     numbers=known_joint_numbers,
-    not_printed=("bands", "regenerated"),
+    not_printed=("bands", "blocks", "regenerated"),
 )

@@ -95,6 +95,7 @@ def read_known_joint(common: Case, table: TomlTable, expected: TomlTable) -> Kno
         tuple(band_set.name for band_set in band_sets),
         {noise.name: noise.methods for noise in noises},
         {one.key: one.bands for one in observed},
+        common.freq_hz,
     )
     return KnownJointCase(
         **vars(common),
