@@ -66,9 +66,10 @@ def ismm(
 
     Notes
     -----
-    Eqs. (2.47), (2.48): D = alpha^-1 (alpha - gamma) gamma^-1 contains -Delta twice off its diagonal, so K* = K0 - D_jk,
-    and K* = K0 - D_kj. Only the block asked for is formed. Where alpha was assembled through K0, substructures and first estimate cancel and
-    the result is that of `inverse_substructuring`; with any other alpha (a truncated modal model, say) it is not.
+    Eqs. (2.47), (2.48): D = alpha^-1 (alpha - gamma) gamma^-1 contains -Delta twice off its diagonal, so that
+    K* = K0 - D_jk, and K* = K0 - D_kj. Only the block asked for is formed. Where alpha was assembled through K0,
+    substructures and first estimate cancel and the result is that of `inverse_substructuring`; with any other alpha (a
+    truncated modal model, say) it is not.
 
     Examples
     --------

@@ -73,7 +73,7 @@ def test_a_method_takes_only_what_it_needs(chains, method):
     [
         ("ismm", "method 'ismm' needs alpha and k_initial$"),
         ("decoupling-rs", "method 'decoupling-rs' needs h_a, h_b, dofs_j, dofs_k, dofs_r and dofs_s$"),
-        ("inverse_substructuring", "method must be one of ismm, inverse-substructuring, decoupling-rr, "),
+        ("inverse_substructuring", "method must be one of ismm, ismm-kj, inverse-substructuring, decoupling-rr, "),
         ("compliance", "method must be one of ismm"),
     ],
 )

@@ -78,20 +78,20 @@ def regenerate(
     """
     h_a, h_b = _at_joint_and_point(exact, point, _weights(exact, dof, offset))
     n, n_freq = exact.n, exact.freq_hz.size
-    size = chunk_size(n_freq, (2 * n + 1) ** 2)
+    size, at = chunk_size(n_freq, (2 * n + 1) ** 2), n if point == "r" else 2 * n
     found = np.empty((len(theta), n_freq), np.complex128)
     for first in range(0, len(theta), size):
         some = theta[first : first + size]
         # Copied out of the coupled FRFs, which are large.
-        found[first : first + size] = _coupled(
-            h_a, h_b, constant_joint(some, exact.freq_hz), 2 * n if point == "s" else n
-        )
+        found[first : first + size] = _coupled(h_a, h_b, constant_joint(some, exact.freq_hz), at)
     return found
 
 
 def _weights(exact: Exact, dof: int, offset: tuple[float, ...]) -> FloatArray:
     """Weights of the DOFs of a point for the motion in the direction of one of them, there or beside it."""
-    return rigid_offset(exact.dofs, offset)[dof] if offset else np.eye(exact.n)[dof]
+    motion = rigid_offset(exact.dofs, offset) if offset else np.eye(exact.n)
+    weights: FloatArray = motion[dof]
+    return weights
 
 
 def _at_joint_and_point(exact: Exact, point: str, weights: FloatArray) -> tuple[ComplexArray, ComplexArray]:
@@ -107,11 +107,11 @@ def _coupled(h_a: ComplexArray, h_b: ComplexArray, k_joint: ComplexArray, at: in
     """Couple once for each set of parameters, all at once, and take one DOF: a view of the coupled FRFs."""
     count, n_freq, n, _ = k_joint.shape
     joint = list(range(n))
-    tiled = (np.tile(h, (count, 1, 1)) for h in (h_a, h_b))
+    many_a, many_b = (np.tile(h, (count, 1, 1)) for h in (h_a, h_b))
     with warnings.catch_warnings():
         # Identified parameters may be absurd.
         warnings.simplefilter("ignore", IllConditionedWarning)
-        h_c = couple(*tiled, k_joint.reshape(-1, n, n), joint, joint)
+        h_c = couple(many_a, many_b, k_joint.reshape(-1, n, n), joint, joint)
     return h_c[:, at, at].reshape(count, n_freq)
 
 

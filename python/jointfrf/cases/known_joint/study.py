@@ -71,7 +71,7 @@ def chunk_size(n_freq: int, entries: int) -> int:
     return max(1, min(_CHUNK, _CHUNK_ENTRIES // entries) // n_freq)
 
 
-class _Part(NamedTuple):
+class _ChunkResult(NamedTuple):
     """What comes out of a chunk: arrays as in `Identified`, the parameters for each set of bands."""
 
     theta: FloatArray
@@ -79,7 +79,7 @@ class _Part(NamedTuple):
     theta_kj: FloatArray
 
 
-def _identify(chunk: _Chunk) -> _Part:
+def _identify(chunk: _Chunk) -> _ChunkResult:
     exact, method = chunk.exact, chunk.method
     seed = chunk.seed + noise_stream(method)
     h = chunk.noise.realisations(measured(exact, method), seed, chunk.first, chunk.count)
@@ -89,12 +89,12 @@ def _identify(chunk: _Chunk) -> _Part:
         if method == "compliance":
             theta = fit_viscous(exact.freq_hz, exact.dofs, h)
             no_lines = np.empty((0, exact.freq_hz.size, exact.n), np.complex128)
-            return _Part(theta[None], no_lines, np.empty((1, 0, theta.shape[1])))
+            return _ChunkResult(theta[None], no_lines, np.empty((1, 0, theta.shape[1])))
         k_joint = joint_lines(exact, method, h, "nan")
         of_kj = joint_lines(exact, "ismm-kj", h, "nan") if method == "ismm" else k_joint[:0]
     kept = max(0, min(chunk.count, _KEPT - chunk.first))
     k_lines = np.diagonal(k_joint[:kept], axis1=2, axis2=3).copy()
-    return _Part(_all_band_means(chunk, k_joint), k_lines, _all_band_means(chunk, of_kj))
+    return _ChunkResult(_all_band_means(chunk, k_joint), k_lines, _all_band_means(chunk, of_kj))
 
 
 def _all_band_means(chunk: _Chunk, k_joint: ComplexArray) -> FloatArray:

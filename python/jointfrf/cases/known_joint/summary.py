@@ -29,7 +29,8 @@ def known_joint_summary(result: KnownJointResult, tables: list[Table]) -> list[s
 def _verdicts(result: KnownJointResult, by_key: dict[str, Table]) -> list[str]:
     """How much fits of the regenerated FRFs and of the sensitive regions that the thesis prints."""
     expected = result.case.expected
-    keys = [*(key_of(known.source) for known in (*expected.errors, *expected.regions)), "printed-parameters"]
+    sources = [*(known.source for known in expected.errors), *(known.source for known in expected.regions)]
+    keys = [*map(key_of, sources), "printed-parameters"]
     sentences = []
     for key in dict.fromkeys(keys):
         if key in by_key:
