@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import interp1d
 
-from jointfrf.cases.bolted_lap.frfs import BeamFrfs, SolidFrfs, beam_frfs, solid_frfs
+from jointfrf.cases.bolted_lap.frfs import TIP_DIRECTIONS, BeamFrfs, SolidFrfs, beam_frfs, solid_frfs
 from jointfrf.cases.bolted_lap.measurement import DOFS, FivePoints, measured_entries
 from jointfrf.cases.bolted_lap.read import BoltedLapCase
 from jointfrf.cases.bolted_lap.resonances import Resonance, ResonanceErrors, resonance_errors, resonances
@@ -59,11 +59,14 @@ class Unmeasured(NamedTuple):
     name : str
     k_lines : ndarray, shape (n_freq, 6, 6)
     theta : ndarray, shape (12,)
+    shift : ndarray, shape (2,)
+        Largest error (4.12) of a resonance of the tip in x and in y, regenerated with theta, percent.
     """
 
     name: str
     k_lines: ComplexArray
     theta: FloatArray
+    shift: FloatArray
 
 
 class NoiseStudy(NamedTuple):
@@ -175,7 +178,7 @@ def compute_bolted_lap(case: BoltedLapCase, n_realisations: int, workers: Worker
         transferred=_on_case(case, other),
         peaks=peaks,
         transferred_peaks=other_peaks,
-        unmeasured=_unmeasured(case, beams[0].on(case.freq_hz)),
+        unmeasured=_unmeasured(case, beams[0]),
         noisy=noisy,
     )
 
@@ -210,7 +213,7 @@ def _regenerated(
 
 def _unmeasured(case: BoltedLapCase, beams: BeamFrfs) -> list[Unmeasured]:
     """Set entries to zero that cannot be measured, in exact FRFs of beams with a known joint (section 4.3.3.1)."""
-    h_c = beams.coupled(case.joint.dynamic_stiffness(case.freq_hz))
+    h_c = beams.on(case.freq_hz).coupled(case.joint.dynamic_stiffness(case.freq_hz))
     gamma = np.ascontiguousarray(h_c[:, :12, :12])
     no_x, no_z = (np.ones((6, 6), bool) for _ in "xz")
     for mask, a, b in ((no_x, "x", "theta_z"), (no_z, "z", "theta_x")):
@@ -223,7 +226,17 @@ def _unmeasured(case: BoltedLapCase, beams: BeamFrfs) -> list[Unmeasured]:
         "Measurements 1-4 (4.28)": measured_entries(),
     }
     lines = {name: joint_stiffness_lines(gamma * np.tile(mask, (2, 2))) for name, mask in patterns.items()}
-    return [Unmeasured(name, k, band_means(case, k)) for name, k in lines.items()]
+    found = {name: (k, band_means(case, k)) for name, k in lines.items()}
+    return [Unmeasured(name, k, theta, _shift(case, beams, theta)) for name, (k, theta) in found.items()]
+
+
+def _shift(case: BoltedLapCase, beams: BeamFrfs, theta: FloatArray) -> FloatArray:
+    """Largest errors of the resonances in x and in y where constants stand for the known joint."""
+    exact, tip = (beams.tip(constant_joint(one, beams.freq_hz)) for one in (case.actual, theta))
+    peaks = resonances(beams.freq_hz, exact)
+    errors = resonance_errors(beams.freq_hz, peaks, tip).frequency
+    own = [[error for error, one in zip(errors, peaks, strict=True) if one.direction == d] for d in TIP_DIRECTIONS]
+    return np.array([max(one, default=0.0) for one in own])
 
 
 class _Realisation(NamedTuple):

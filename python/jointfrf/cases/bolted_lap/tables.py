@@ -145,7 +145,11 @@ def _unmeasured(result: BoltedLapResult) -> Table:
         ratios = (float(one.theta[p] / actual) for one in result.unmeasured)
         cells.append((parameter, parameter.unit, float(actual), *ratios))
     columns = ("parameter", "unit", "actual", *(f"{one.name}: found / actual" for one in result.unmeasured))
-    note = "Exact FRFs of the beams with the joint of table 4-1; the entries named are set to zero."
+    shifts = "; ".join(f"{one.name} {' / '.join(number(float(x), 2) for x in one.shift)}" for one in result.unmeasured)
+    note = (
+        "Exact FRFs of the beams with the joint of table 4-1; the entries named are set to zero. Largest error of a "
+        f"resonance of the tip in x / y with the joint that is found, percent: {shifts}."
+    )
     return Table("unmeasured", "Effect of entries that cannot be measured (4.3.3.1)", columns, tuple(cells), (), note)
 
 
