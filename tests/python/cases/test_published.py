@@ -11,7 +11,6 @@ from scipy.sparse.linalg import eigsh
 import jointfrf as jf
 from jointfrf.cases.catalogue import find_case, read_case
 from jointfrf.cases.known_joint.compute import compute
-from jointfrf.cases.known_joint.summary import known_joint_summary
 from jointfrf.cases.known_joint.tables import known_joint_tables
 from jointfrf.dofs import Parameter
 
@@ -102,7 +101,8 @@ def coupled_frequencies(case, joint, count):
 def test_natural_frequencies_fit_where_they_are_as_near_as_the_file_says(results, name):
     case = results[name].case
     table = by_key(results[name])["natural-frequencies"]
-    rows = [row[table.columns.index("Hz") :] for row in table.rows if row[-1]]
+    at = next(i for i, column in enumerate(table.columns) if column.endswith("Hz"))
+    rows = [row[at:] for row in table.rows if row[-1]]
     printed = sorted(expected_of(name).get("frequencies", []), key=lambda one: one["joint"] != "initial")
     values = [(value, one["within_percent"]) for one in printed for value in one["values"]]
     assert len(rows) == len(values)
@@ -159,8 +159,6 @@ def test_regions_fit_where_an_frf_is_twice_as_sensitive_inside(results, name):
             )
             assert row[""] == ("fits" if max(levels) > 6.02 else "does not fit")
     assert (at, at - len(table.failing)) == REGIONS[name]
-    words = " ".join(known_joint_summary(result, list(by_key(result).values())))
-    assert f"sensitive regions: {at - len(table.failing)} of {at} fit." in words
 
 
 def test_bands_of_the_first_estimate_are_nearer_to_the_regions_of_section_3_3(results):

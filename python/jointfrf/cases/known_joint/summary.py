@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from jointfrf.cases.comparison import agreement, verdict
+from jointfrf.cases.comparison import agreement
 from jointfrf.cases.known_joint.compute import KnownJointResult
-from jointfrf.cases.known_joint.published_tables import key_of
 from jointfrf.cases.known_joint.tables import Row, identified_rows
 from jointfrf.report.table import Table, number
 
@@ -15,7 +14,7 @@ def known_joint_summary(result: KnownJointResult, tables: list[Table]) -> list[s
     """Say in a few sentences what came out."""
     rows = identified_rows(result)
     by_key = {table.key: table for table in tables}
-    sentences = _published(rows) + _verdicts(result, by_key) + agreement(by_key["natural-frequencies"])
+    sentences = _published(rows) + agreement(by_key["natural-frequencies"])
     if "limits" in by_key:
         limits = by_key["limits"]
         kept = len(limits.rows) - len(limits.failing)
@@ -24,20 +23,6 @@ def known_joint_summary(result: KnownJointResult, tables: list[Table]) -> list[s
     good = len(exact.rows) - len(exact.failing)
     sentences.append(f"Without noise {good} of {len(exact.rows)} checks of the equations are exact.")
     return sentences + _methods(rows)
-
-
-def _verdicts(result: KnownJointResult, by_key: dict[str, Table]) -> list[str]:
-    """How much fits of the regenerated FRFs and of the sensitive regions that the thesis prints."""
-    expected = result.case.expected
-    sources = [*(known.source for known in expected.errors), *(known.source for known in expected.regions)]
-    keys = [*map(key_of, sources), "printed-parameters"]
-    sentences = []
-    for key in dict.fromkeys(keys):
-        if key in by_key:
-            known = sum(row[-1] != verdict(None) for row in by_key[key].rows)
-            good = known - len(by_key[key].failing)
-            sentences.append(f"{by_key[key].title}: {good} of {known} fit.")
-    return sentences
 
 
 def _published(rows: list[Row]) -> list[str]:
