@@ -20,6 +20,7 @@ from jointfrf.cases.known_joint.tables import identified_rows, known_joint_numbe
 from jointfrf.cases.workers import Workers
 from jointfrf.dofs import Parameter
 from jointfrf.report.page import Page, make_page
+from jointfrf.substructuring.methods import STIFFNESS_METHODS
 
 pytestmark = pytest.mark.long
 
@@ -444,6 +445,19 @@ def test_numbers_and_report_of_six_dofs(solids):
         report = make_page(Page(result.case.title, "", sentences, tables, []))
         assert all(f'id="{table.key}"' in report for table in tables)
         assert "<i>k</i><sub>Mθz</sub>" in report
+
+
+def test_every_method_of_the_table_has_a_name_and_a_style_in_figures(tmp_path):
+    own = tmp_path / "mine"
+    own.mkdir()
+    text = (find_case("3.1") / "case.toml").read_text()
+    methods = json.dumps(list(STIFFNESS_METHODS))
+    (own / "case.toml").write_text(text.replace('methods = ["ismm", "compliance"]', f"methods = {methods}"))
+    output = run_case(own, tmp_path / "out", realisations=2)
+    theta = {f.method: f for f in output.result.identified}
+    assert list(theta) == list(STIFFNESS_METHODS)
+    np.testing.assert_array_equal(theta["ismm-kj"].theta, theta["ismm"].theta_kj)
+    assert "ISMM, D_kj" in (output.report.parent / "figures" / "methods-k_x.csv").read_text()
 
 
 def test_a_realisation_depends_on_its_number_only():
