@@ -301,6 +301,19 @@ def test_amplitude_errors_do_not_depend_on_the_lines(ran):
     assert one.errors.frequency[low] == pytest.approx(abs(freq[h.argmax()] / freq[actual.argmax()] - 1) * 100, abs=0.05)
 
 
+def test_lines_are_close_where_peaks_are(ran):
+    case = ran.result.case
+    every = frfs._close_lines(case)
+    assert np.isin(case.freq_hz, every).all()
+    assert (np.diff(every) / every[:-1]).max() <= 0.01 / 8 * (1 + 1e-9)
+    assert (np.diff(every) / every[:-1]).min() > 1e-6
+    around = frfs._with_lines_around(case, np.array([12.8, 300.0]))
+    assert np.isin(case.freq_hz, around).all()
+    for place in (12.8, 300.0):
+        near = around[abs(around - place) < 0.02 * place]
+        assert np.diff(near).max() <= 0.01 / 8 * place * (1 + 1e-9)
+
+
 def one_mode(freq, place, loss=0.01):
     return 1 / (place**2 * (1 + 1j * loss) - freq**2)
 

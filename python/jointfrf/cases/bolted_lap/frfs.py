@@ -29,6 +29,8 @@ __all__ = ["JOINT_DOFS", "TIP_DIRECTIONS", "BeamFrfs", "SolidFrfs", "beam_frfs",
 _MODES = 12
 #: Lines where peaks are sought lie this share of a half-power bandwidth apart, out to so many bandwidths.
 _SPACING, _EXTENT = 1 / 8, 3
+#: Lines nearer than this share of their frequency are one.
+_COINCIDENT = 1e-6
 #: Loss factor that lines are laid out for where the beams have less.
 _LEAST_LOSS = 0.005
 #: Directions in which FRFs of the tip are compared.
@@ -133,14 +135,23 @@ def _with_lines_around(case: BoltedLapCase, natural: FloatArray) -> FloatArray:
     steps = np.arange(-_EXTENT, _EXTENT + _SPACING, _SPACING)
     close = (natural[:, None] * (1 + _loss(case) * steps)).ravel()
     first, last = case.freq_hz[[0, -1]]
-    return np.unique(np.concatenate([case.freq_hz, close[(close > first) & (close < last)]]))
+    return _joined(case.freq_hz, close[(close > first) & (close < last)])
 
 
 def _close_lines(case: BoltedLapCase) -> FloatArray:
     """Lines of the case, and lines throughout their range as close as the loss factor asks for."""
     first, last = case.freq_hz[[0, -1]]
     count = int(np.log(last / first) / np.log1p(_SPACING * _loss(case))) + 2
-    return np.unique(np.concatenate([case.freq_hz, np.geomspace(first, last, count)[1:-1]]))
+    return _joined(case.freq_hz, np.geomspace(first, last, count)[1:-1])
+
+
+def _joined(lines: FloatArray, close: FloatArray) -> FloatArray:
+    """All of the first lines and those of the second that do not nearly coincide with any other."""
+    every = np.unique(np.concatenate([lines, close]))
+    gaps = np.concatenate([[np.inf], np.diff(every), [np.inf]])
+    apart = np.minimum(gaps[:-1], gaps[1:]) > _COINCIDENT * every
+    joined: FloatArray = every[apart | np.isin(every, lines)]
+    return joined
 
 
 def _lap(case: BoltedLapCase, length_b: float) -> BoltedLap:
