@@ -14,12 +14,12 @@ from jointfrf.cases.known_joint.exact import Exact
 from jointfrf.cases.known_joint.methods import joint_lines, measured, noise_stream
 from jointfrf.cases.known_joint.read import KnownJointCase
 from jointfrf.cases.workers import Workers
-from jointfrf.dofs import Parameter
+from jointfrf.dofs import joint_parameters
 from jointfrf.errors import IllConditionedWarning
-from jointfrf.frf.bands import band_mean
+from jointfrf.frf.bands import in_bands
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
-__all__ = ["ALL_LINES", "Identified", "chunk_size", "run_study"]
+__all__ = ["ALL_LINES", "Identified", "chunk_size", "means_over_bands", "run_study"]
 
 #: Lines, and entries of their FRF matrices, treated at once, over realisations: bound the memory to some tens of MB.
 _CHUNK, _CHUNK_ENTRIES = 20_000, 1_500_000
@@ -94,20 +94,35 @@ def _identify(chunk: _Chunk) -> _ChunkResult:
         of_kj = joint_lines(exact, "ismm-kj", h, "nan") if method == "ismm" else k_joint[:0]
     kept = max(0, min(chunk.count, _KEPT - chunk.first))
     k_lines = np.diagonal(k_joint[:kept], axis1=2, axis2=3).copy()
-    return _ChunkResult(_all_band_means(chunk, k_joint), k_lines, _all_band_means(chunk, of_kj))
+    theta, theta_kj = (
+        np.array([means_over_bands(exact, k, band_set) for band_set in chunk.band_sets]) for k in (k_joint, of_kj)
+    )
+    return _ChunkResult(theta, k_lines, theta_kj)
 
 
-def _all_band_means(chunk: _Chunk, k_joint: ComplexArray) -> FloatArray:
-    """Parameters by each set of bands from each realisation, shape (n_band_sets, count, p)."""
-    means = [[_band_means(chunk.exact, k, band_set) for k in k_joint] for band_set in chunk.band_sets]
-    return np.array(means, np.float64).reshape(len(chunk.band_sets), len(k_joint), 2 * chunk.exact.n)
+def means_over_bands(exact: Exact, k_joint: ComplexArray, band_set: BandSet) -> FloatArray:
+    """Mean of Re K* and Im K*/w of several realisations, each parameter over its own bands.
 
+    Parameters
+    ----------
+    exact : Exact
+        Names the lines and the n DOFs.
+    k_joint : ndarray, shape (r, n_freq, n, n)
+        N/m.
+    band_set : BandSet
 
-def _band_means(exact: Exact, k_joint: ComplexArray, band_set: BandSet) -> FloatArray:
-    """Mean of Re K* and Im K*/w, each parameter over its own bands."""
-    of_k, of_c = ({dof: band_set.bands[Parameter.of_dof(kind, dof)] for dof in exact.dofs} for kind in ("k", "c"))
-    stiffness = band_mean(exact.freq_hz, k_joint, of_k, exact.dofs).stiffness
-    return np.concatenate([stiffness, band_mean(exact.freq_hz, k_joint, of_c, exact.dofs).damping])
+    Returns
+    -------
+    ndarray, shape (r, 2 n)
+        Stiffness of all DOFs, then damping.
+    """
+    found = np.empty((len(k_joint), 2 * exact.n))
+    for p, parameter in enumerate(joint_parameters(exact.dofs)):
+        inside, d = in_bands(exact.freq_hz, band_set.bands[parameter]), p % exact.n
+        lines = k_joint[:, inside, d, d]
+        values = lines.real if p < exact.n else lines.imag / (2 * np.pi * exact.freq_hz[inside])
+        found[:, p] = values.mean(axis=1)
+    return found
 
 
 def run_study(
