@@ -27,6 +27,7 @@ __all__ = [
     "Observed",
     "actual_values",
     "check_bands",
+    "constant_joint",
     "read_bands",
     "read_frequency",
     "read_frf_file",
@@ -101,6 +102,26 @@ class Noise:
 def actual_values(joint: Joint) -> FloatArray:
     """Values of the parameters of a joint without cross terms, in the order of `jointfrf.dofs.joint_parameters`."""
     return np.concatenate([np.diagonal(joint.stiffness), np.diagonal(joint.damping)])
+
+
+def constant_joint(theta: FloatArray, freq_hz: FloatArray) -> ComplexArray:
+    """K*(w) = k + i w c of uncoupled joint DOFs, for any number of sets of constants.
+
+    Parameters
+    ----------
+    theta : ndarray, shape (..., 2 n)
+        Stiffness of all DOFs, then damping.
+    freq_hz : ndarray, shape (n_freq,)
+        Hz.
+
+    Returns
+    -------
+    ndarray, shape (..., n_freq, n, n)
+        N/m, rotational N m/rad.
+    """
+    n = theta.shape[-1] // 2
+    diagonal: ComplexArray = theta[..., None, :n] + 2j * np.pi * freq_hz[:, None] * theta[..., None, n:]
+    return diagonal[..., None] * np.eye(n)
 
 
 def read_frequency(table: TomlTable) -> FloatArray:

@@ -63,10 +63,10 @@ def identify(
         default.
     method : str
         "compliance": maximum likelihood in the compliance domain, with error bars; needs no model of the
-        substructures. "ismm": inverse structural modification (2.47), needs `alpha` and `k_initial`.
-        "inverse-substructuring": -(gamma^-1)_jk, which ISMM reduces to. "decoupling-rr", "-rs", "-sr", "-ss":
-        (2.53)-(2.56), need `h_a`, `h_b` and the DOF lists. All but the first take the mean over bands, as the thesis
-        does.
+        substructures. "ismm", "ismm-kj": inverse structural modification (2.47) with D_jk or D_kj, need `alpha` and
+        `k_initial`. "inverse-substructuring": -(gamma^-1)_jk, which ISMM reduces to. "decoupling-rr", "-rs", "-sr",
+        "-ss": (2.53)-(2.56), need `h_a`, `h_b` and the DOF lists. All but the first take the mean over bands, as the
+        thesis does.
     bands : None, (low, high), sequence of these, or mapping of DOF name to these, optional
         Sensitive bands in Hz; all lines by default. The compliance fit weights each line by its information and needs
         none.
@@ -85,9 +85,9 @@ def identify(
     reciprocal : bool
         Whether the structure is reciprocal, so that gamma_pq and gamma_qp may be averaged. Compliance fit only.
     alpha : array_like, shape (n_freq, 2 n, 2 n), optional
-        Calculated receptance of the assembly with the first estimate, for "ismm".
+        Calculated receptance of the assembly with the first estimate, for ISMM.
     k_initial : array_like, shape (n_freq, n, n) or (n, n), optional
-        First estimate K0, for "ismm".
+        First estimate K0, for ISMM.
     h_a, h_b, dofs_j, dofs_k, dofs_r, dofs_s : optional
         As in `decouple`.
 

@@ -27,6 +27,7 @@ STYLES = {
     "initial": Style("#8c8c8c", "--", 1.2),
     "measured": Style("#e07b00", "-", 0.7),
     "ismm": Style("#1b4f9c", "-", 1.1),
+    "ismm-kj": Style("#1b4f9c", (0, (5, 1)), 1.1),
     "inverse-substructuring": Style("#1b4f9c", "--", 1.1),
     "compliance": Style("#e07b00", "-.", 1.5),
     "decoupling-rr": Style("#c0392b", "--", 1.1),

@@ -2,13 +2,29 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
+import numpy as np
 from numpy.typing import ArrayLike
 
-from jointfrf.kernel.arguments import ComplexArray, as_interface, as_joint_lines, optional_frequency
+from jointfrf.kernel.arguments import ComplexArray, as_interface, as_joint_lines, check_choice, optional_frequency
 from jointfrf.kernel.call import N_FREQ, run
 from jointfrf.kernel.status import OnSingular
 
-__all__ = ["inverse_substructuring", "ismm"]
+__all__ = ["Block", "inverse_substructuring", "ismm"]
+
+#: Off-diagonal block of (2.48) that K* is taken from: rows of side j, or of side k.
+Block = Literal["jk", "kj"]
+_BLOCKS: tuple[Block, ...] = ("jk", "kj")
+
+
+def _with_block_first(lines: ComplexArray, n: int, block: Block) -> ComplexArray:
+    """Return FRFs in the order of sides that a block names: as they are, or a copy with sides j and k exchanged."""
+    check_choice("block", block, _BLOCKS)
+    if block == "jk":
+        return lines
+    order = np.roll(np.arange(2 * n), n)
+    return np.ascontiguousarray(lines[:, order[:, None], order])
 
 
 def ismm(
@@ -16,6 +32,7 @@ def ismm(
     gamma: ArrayLike,
     k_initial: ArrayLike,
     *,
+    block: Block = "jk",
     freq_hz: ArrayLike | None = None,
     on_singular: OnSingular = "raise",
     out: ComplexArray | None = None,
@@ -30,6 +47,10 @@ def ismm(
         Measured receptance of the assembly at the same DOFs.
     k_initial : array_like, shape (n_freq, n, n) or (n, n)
         First estimate K0, N/m.
+    block : {"jk", "kj"}
+        Off-diagonal block that K* is taken from. Both hold the same joint; with measured FRFs, where gamma_jk and
+        gamma_kj have noise of their own, they are two estimates. They agree where gamma is symmetric. "kj" copies the
+        FRFs, sides exchanged.
     freq_hz, on_singular, out
         As in `couple`.
 
@@ -45,9 +66,10 @@ def ismm(
 
     Notes
     -----
-    Eqs. (2.47), (2.48): D = alpha^-1 (alpha - gamma) gamma^-1 contains -Delta off its diagonal, so K* = K0 - D_jk. Only
-    that block is formed. Where alpha was assembled through K0, substructures and first estimate cancel and
-    the result is that of `inverse_substructuring`; with any other alpha (a truncated modal model, say) it is not.
+    Eqs. (2.47), (2.48): D = alpha^-1 (alpha - gamma) gamma^-1 contains -Delta twice off its diagonal, so that
+    K* = K0 - D_jk, and K* = K0 - D_kj. Only the block asked for is formed. Where alpha was assembled through K0,
+    substructures and first estimate cancel and the result is that of `inverse_substructuring`; with any other alpha (a
+    truncated modal model, say) it is not.
 
     Examples
     --------
@@ -63,6 +85,7 @@ def ismm(
     if m != n:
         raise ValueError(f"gamma must have the shape of alpha, {calculated.shape}, not {measured.shape}")
     first = as_joint_lines("k_initial", k_initial, n, n_freq)
+    calculated, measured = (_with_block_first(lines, n, block) for lines in (calculated, measured))
     freq = optional_frequency(freq_hz, n_freq)
     sweeps = {"alpha": calculated, "gamma": measured, "k_initial": first}
     args = (n, N_FREQ, calculated, measured, first)
@@ -72,6 +95,7 @@ def ismm(
 def inverse_substructuring(
     gamma: ArrayLike,
     *,
+    block: Block = "jk",
     freq_hz: ArrayLike | None = None,
     on_singular: OnSingular = "raise",
     out: ComplexArray | None = None,
@@ -82,6 +106,8 @@ def inverse_substructuring(
     ----------
     gamma : array_like, shape (n_freq, 2 n, 2 n)
         Measured receptance of the assembly at joint DOFs j, then k, m/N.
+    block
+        As in `ismm`.
     freq_hz, on_singular, out
         As in `couple`.
 
@@ -108,6 +134,7 @@ def inverse_substructuring(
     """
     measured, n = as_interface("gamma", gamma)
     n_freq = measured.shape[0]
+    measured = _with_block_first(measured, n, block)
     freq = optional_frequency(freq_hz, n_freq)
     shape, sweeps = (n_freq, n, n), {"gamma": measured}
     return run("inverse_substructuring", (n, N_FREQ, measured), shape, sweeps, freq, on_singular, out=out)[0]

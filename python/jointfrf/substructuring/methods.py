@@ -17,7 +17,7 @@ from jointfrf.substructuring.ismm import inverse_substructuring, ismm
 __all__ = ["STIFFNESS_METHODS", "JointFrfs", "LineMethod", "StiffnessMethod", "joint_stiffness"]
 
 StiffnessMethod = Literal[
-    "ismm", "inverse-substructuring", "decoupling-rr", "decoupling-rs", "decoupling-sr", "decoupling-ss"
+    "ismm", "ismm-kj", "inverse-substructuring", "decoupling-rr", "decoupling-rs", "decoupling-sr", "decoupling-ss"
 ]
 
 
@@ -77,6 +77,7 @@ _SUBSTRUCTURES = ("h_a", "h_b", "dofs_j", "dofs_k")
 
 STIFFNESS_METHODS: Mapping[StiffnessMethod, LineMethod] = {
     "ismm": LineMethod(ismm, "gamma", ("alpha", "k_initial")),
+    "ismm-kj": LineMethod(partial(ismm, block="kj"), "gamma", ("alpha", "k_initial")),
     "inverse-substructuring": LineMethod(inverse_substructuring, "gamma"),
     "decoupling-rr": LineMethod(partial(decouple, "rr"), "h_c", (*_SUBSTRUCTURES, "dofs_r")),
     "decoupling-rs": LineMethod(partial(decouple, "rs"), "h_c", (*_SUBSTRUCTURES, "dofs_r", "dofs_s")),
@@ -97,7 +98,7 @@ def joint_stiffness(
     Parameters
     ----------
     method : str
-        A key of `STIFFNESS_METHODS`: (2.47), its short form -(gamma^-1)_jk, or (2.53)-(2.56).
+        A key of `STIFFNESS_METHODS`: (2.47) with D_jk or D_kj, its short form -(gamma^-1)_jk, or (2.53)-(2.56).
     frfs : JointFrfs
         At least what the method needs; the rest is not used.
     freq_hz, on_singular

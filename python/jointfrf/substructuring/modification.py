@@ -45,7 +45,8 @@ def modify(
 
     Notes
     -----
-    Eqs. (2.34)-(2.36) for all DOFs at once: gamma = alpha - alpha_:m (I + D alpha_mm)^-1 D alpha_m:.
+    Eqs. (2.34)-(2.36) for all DOFs at once: gamma = alpha - alpha_:m (I + D alpha_mm)^-1 D alpha_m:. Misprint in
+    (2.36): the second line must read gamma_um = alpha_um (I - D_mm gamma_mm); it has alpha_mu.
 
     Examples
     --------

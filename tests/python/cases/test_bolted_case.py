@@ -16,6 +16,7 @@ import pytest
 import jointfrf as jf
 from jointfrf.cases.bolted_lap import frfs
 from jointfrf.cases.bolted_lap.measurement import DOFS, FivePoints, both_sides, measured_entries
+from jointfrf.cases.bolted_lap.resonances import resonance_errors, resonances
 from jointfrf.cases.bolted_lap.summary import bolted_lap_summary
 from jointfrf.cases.bolted_lap.tables import bolted_lap_tables
 from jointfrf.cases.catalogue import CaseOutput, find_case, read_case, run_case
@@ -272,6 +273,71 @@ def test_what_unmeasured_entries_do(ran):
     assert abs(no_z["cz"] - 1) > 0.5
 
 
+def test_unmeasured_entries_are_not_why_the_lateral_plane_fails(ran):
+    """From exact FRFs the entries of (4.28) give the resonances; central differences fail with all entries, too."""
+    for one in ran.result.unmeasured:
+        assert (one.shift < 0.1).all()
+    lateral = [i for i, peak in enumerate(ran.result.peaks) if peak.direction == "x"]
+    for route in ("Measurements 1-4", "central differences"):
+        errors = next(r.errors for r in ran.result.regenerated if r.found[:2] == (route, "band mean"))
+        assert errors.frequency[lateral].max() > 10
+
+
+def test_amplitude_errors_do_not_depend_on_the_lines(ran):
+    """The low bending mode, 0.13 Hz wide, on lines ten times closer than those of the case."""
+    result, case = ran.result, ran.result.case
+    low = next(i for i, peak in enumerate(result.peaks) if peak.direction == "y")
+    place = result.peaks[low]
+    assert place.freq_hz == pytest.approx(12.8, abs=0.3)
+    one = next(r for r in result.regenerated if r.found[:2] == ("central differences", "compliance fit"))
+    freq = place.freq_hz * np.linspace(0.97, 1.03, 501)
+    fine = frfs.beam_frfs(dataclasses.replace(case, freq_hz=freq), case.beams.lengths[1]).on(freq)
+    h = abs(fine.tip(jf.Joint(one.found.theta[:6], one.found.theta[6:]).dynamic_stiffness(freq))[:, 1])
+    weights = frfs._tip(result.state.model().mesh) @ result.state.model().expansion
+    actual = abs(result.state.model().receptance(freq, weights)[:, 1, 1])
+    for found, exact in ((place.amplitude, actual.max()), (place.freq_hz, freq[actual.argmax()])):
+        assert found == pytest.approx(exact, rel=1e-3)
+    assert one.errors.amplitude[low] == pytest.approx(abs(h.max() / actual.max() - 1) * 100, abs=0.1)
+    assert one.errors.frequency[low] == pytest.approx(abs(freq[h.argmax()] / freq[actual.argmax()] - 1) * 100, abs=0.05)
+
+
+def test_lines_are_close_where_peaks_are(ran):
+    case = ran.result.case
+    every = frfs._close_lines(case)
+    assert np.isin(case.freq_hz, every).all()
+    assert (np.diff(every) / every[:-1]).max() <= 0.01 / 8 * (1 + 1e-9)
+    assert (np.diff(every) / every[:-1]).min() > 1e-6
+    around = frfs._with_lines_around(case, np.array([12.8, 300.0]))
+    assert np.isin(case.freq_hz, around).all()
+    for place in (12.8, 300.0):
+        near = around[abs(around - place) < 0.02 * place]
+        assert np.diff(near).max() <= 0.01 / 8 * place * (1 + 1e-9)
+
+
+def one_mode(freq, place, loss=0.01):
+    return 1 / (place**2 * (1 + 1j * loss) - freq**2)
+
+
+def test_no_peak_up_to_the_limit_of_the_search_is_said(ran):
+    freq = np.geomspace(50, 150, 2000)
+    actual = np.stack([one_mode(freq, 100.0)] * 2, axis=1)
+    peaks = resonances(freq, actual)
+    assert [(p.direction, round(p.freq_hz, 2)) for p in peaks] == [("x", 100), ("y", 100)]
+    near, far = 1.5 * one_mode(freq, 103.0), one_mode(freq, 130.0)
+    errors = resonance_errors(freq, peaks, np.stack([near, far], axis=1))
+    assert errors.found.tolist() == [True, False]
+    assert errors.frequency == pytest.approx([3, 15], abs=0.1)
+    assert errors.amplitude[0] == pytest.approx((1.5 / 1.03**2 - 1) * 100, abs=0.1)
+    assert np.isnan(errors.amplitude[1])
+    tables = {table.key: table for table in ran.output.tables}
+    for key, which in (("resonances", "errors"), ("transfer", "transferred_errors")):
+        for row, one in zip(tables[key].rows, ran.result.regenerated, strict=True):
+            found = getattr(one, which).found
+            assert [isinstance(cell, str) and cell.startswith("above ") for cell in row[2::2]] == (~found).tolist()
+            assert [cell is None for cell in row[3::2]] == (~found).tolist()
+    assert any("above" in str(cell) for row in tables["resonances"].rows for cell in row)
+
+
 def test_routes_without_noise(ran):
     """Every route ends in lines and in their means over the bands; two of them also in fits."""
     k = ran.result.k_lines
@@ -295,7 +361,7 @@ def test_noise(ran):
     quiet = {r.found[:2]: r.found.theta for r in result.regenerated}
     for key, one in studies.items():
         assert one.theta.shape == (2, 12)
-        assert one.shift.shape == (2, len(result.peaks))
+        assert one.shift.shape == one.found.shape == (2, len(result.peaks))
         assert (one.theta[0] != one.theta[1]).all(), key
     # Noise of 1 % leaves the translations of the fit, and takes the rotations from the means over bands.
     fit, mean = ("virtual points", "compliance fit"), ("Measurements 1-4", "band mean")
@@ -307,7 +373,8 @@ def test_noise(ran):
     assert (abs(studies[mean].theta[:, rotation]) < 0.3 * quiet[mean][rotation]).all()
 
 
-KEYS = ["contact", "convergence", "natural-frequencies", "identified", "resonances", "transfer", "noise", "unmeasured"]
+KEYS = ["contact", "convergence", "natural-frequencies", "identified", "resonances", "transfer", "noise",
+        "noise-resonances", "unmeasured"]  # fmt: skip
 
 
 def test_tables(ran):

@@ -45,6 +45,8 @@ def test_every_method_is_the_function_it_names(beams, method):
     assert (abs(found - exact) / abs(exact).max(axis=(0, 2), keepdims=True)).max() < 1e-5
     if method == "ismm":
         direct = jf.ismm(frfs.alpha, frfs.gamma, frfs.k_initial)
+    elif method == "ismm-kj":
+        direct = jf.ismm(frfs.alpha, frfs.gamma, frfs.k_initial, block="kj")
     elif method == "inverse-substructuring":
         direct = jf.inverse_substructuring(frfs.gamma)
     else:
@@ -71,7 +73,7 @@ def test_a_method_takes_only_what_it_needs(chains, method):
     [
         ("ismm", "method 'ismm' needs alpha and k_initial$"),
         ("decoupling-rs", "method 'decoupling-rs' needs h_a, h_b, dofs_j, dofs_k, dofs_r and dofs_s$"),
-        ("inverse_substructuring", "method must be one of ismm, inverse-substructuring, decoupling-rr, "),
+        ("inverse_substructuring", "method must be one of ismm, ismm-kj, inverse-substructuring, decoupling-rr, "),
         ("compliance", "method must be one of ismm"),
     ],
 )
@@ -93,3 +95,32 @@ def test_singular_lines_are_named_or_become_nan(chains):
         joint_stiffness("inverse-substructuring", JointFrfs(gamma=gamma), freq_hz=chains.freq)
     found = joint_stiffness("inverse-substructuring", JointFrfs(gamma=gamma), on_singular="nan")
     assert np.flatnonzero(np.isnan(found).any(axis=(1, 2))).tolist() == [3]
+
+
+def test_either_block_of_the_modification(random_lines):
+    """(2.48) written out: K0 - D_jk and K0 - D_kj from the whole of D, for FRFs that are not symmetric."""
+    n, alpha, gamma, first = 3, random_lines(5, 6), random_lines(5, 6), random_lines(5, 3)
+    d = np.linalg.inv(gamma) - np.linalg.inv(alpha)
+    for block, part in (("jk", d[:, :n, n:]), ("kj", d[:, n:, :n])):
+        np.testing.assert_allclose(jf.ismm(alpha, gamma, first, block=block), first - part, rtol=1e-9)
+        short = jf.inverse_substructuring(gamma, block=block)
+        rows, columns = (slice(0, n), slice(n, 2 * n)) if block == "jk" else (slice(n, 2 * n), slice(0, n))
+        np.testing.assert_allclose(short, -np.linalg.inv(gamma)[:, rows, columns], rtol=1e-9)
+    with pytest.raises(ValueError, match="block must be one of jk, kj, not 'kk'"):
+        jf.ismm(alpha, gamma, first, block="kk")
+
+
+def test_both_blocks_agree_where_gamma_is_symmetric_and_not_where_noise_is_not(chains):
+    frfs = known(chains)
+    noisy = jf.pollute(frfs.gamma, 0.01, seed=1)
+    symmetric = (noisy + np.swapaxes(noisy, 1, 2)) / 2
+    for gamma, same in ((symmetric, True), (noisy, False)):
+        jk, kj = (jf.ismm(frfs.alpha, gamma, frfs.k_initial, block=block) for block in ("jk", "kj"))
+        assert np.allclose(jk, np.swapaxes(kj, 1, 2), rtol=1e-9, atol=0) == same
+
+
+def test_singular_lines_of_either_block_are_the_same(chains):
+    gamma = chains.gamma(chains.joint)
+    gamma[3] = 0
+    with pytest.raises(jf.SingularLineError, match=f"{chains.freq[3]:g} Hz"):
+        jf.inverse_substructuring(gamma, block="kj", freq_hz=chains.freq)

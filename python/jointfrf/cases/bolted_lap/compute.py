@@ -6,21 +6,22 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import interp1d
 
-from jointfrf.cases.bolted_lap.frfs import BeamFrfs, SolidFrfs, beam_frfs, solid_frfs
+from jointfrf.cases.bolted_lap.frfs import TIP_DIRECTIONS, BeamFrfs, SolidFrfs, beam_frfs, solid_frfs
 from jointfrf.cases.bolted_lap.measurement import DOFS, FivePoints, measured_entries
 from jointfrf.cases.bolted_lap.read import BoltedLapCase
-from jointfrf.cases.bolted_lap.resonances import Resonance, resonance_errors, resonances
+from jointfrf.cases.bolted_lap.resonances import Resonance, ResonanceErrors, resonance_errors, resonances
 from jointfrf.cases.bolted_lap.routes import (
     Found,
     band_means,
     by_band_means,
     by_compliance_fit,
-    joint_of_constants,
     joint_stiffness_lines,
     route_lines,
 )
-from jointfrf.cases.definitions import Noise
+from jointfrf.cases.definitions import Noise, constant_joint
 from jointfrf.cases.workers import Workers
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.solids.preload import PreloadedLap
@@ -29,15 +30,25 @@ __all__ = ["LINES", "BoltedLapResult", "NoiseStudy", "RegeneratedTip", "Unmeasur
 
 #: K* of the reference points as it is, without constants for the joint.
 LINES = "K* line by line, cross terms"
-_MODES = 7
 
 
 class RegeneratedTip(NamedTuple):
-    """FRFs of the tip with an identified joint, shape (n_freq, 2), directions x and y, m/N."""
+    """FRFs of the tip with an identified joint, with B and with the other B.
+
+    Attributes
+    ----------
+    found : Found
+    h, transferred : ndarray, shape (n_freq, 2)
+        Directions x and y, m/N.
+    errors, transferred_errors : ResonanceErrors
+        On lines as close as the loss factor asks for.
+    """
 
     found: Found
     h: ComplexArray
     transferred: ComplexArray
+    errors: ResonanceErrors
+    transferred_errors: ResonanceErrors
 
 
 class Unmeasured(NamedTuple):
@@ -48,11 +59,14 @@ class Unmeasured(NamedTuple):
     name : str
     k_lines : ndarray, shape (n_freq, 6, 6)
     theta : ndarray, shape (12,)
+    shift : ndarray, shape (2,)
+        Largest error (4.12) of a resonance of the tip in x and in y, regenerated with theta, percent.
     """
 
     name: str
     k_lines: ComplexArray
     theta: FloatArray
+    shift: FloatArray
 
 
 class NoiseStudy(NamedTuple):
@@ -65,6 +79,8 @@ class NoiseStudy(NamedTuple):
     theta : ndarray, shape (r, 12)
     shift : ndarray, shape (r, n_peaks)
         Error (4.12) of every resonance, x then y.
+    found : ndarray of bool, shape (r, n_peaks)
+        Where False, the shift is the limit of the search.
     """
 
     noise: str
@@ -72,6 +88,7 @@ class NoiseStudy(NamedTuple):
     estimator: str
     theta: FloatArray
     shift: FloatArray
+    found: NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -85,8 +102,8 @@ class BoltedLapResult:
     state : PreloadedLap
     n_dofs : int
         Of the solid model.
-    natural_frequencies : ndarray, shape (7,)
-        Hz.
+    natural_frequencies : ndarray, shape (n_modes,)
+        Up to the last line, Hz.
     k_lines : dict
         Route to K* line by line, shape (n_freq, 6, 6).
     regenerated : list of RegeneratedTip
@@ -137,50 +154,66 @@ def compute_bolted_lap(case: BoltedLapCase, n_realisations: int, workers: Worker
     uncoupled = at_work.map(beam_frfs, [case] * 2, both)
     solid, other = solids
     beams = list(uncoupled)
+    peaks, other_peaks = (resonances(one.tip_hz, one.tip) for one in (solid, other))
     # Processes repeat it with noise while the rest is done here.
     repeated = [
         (noise, at_work.map(_identify_noisy, _realisations(case, noise, solid, n_realisations)))
         for noise in case.noises
     ]
     k_lines = route_lines(solid.points, solid.channels, solid.reference)
-    regenerated = _regenerated(case, solid, beams, k_lines)
-    peaks = resonances(case.freq_hz, solid.tip)
-    natural_frequencies = solid.model.natural_frequencies(_MODES)
+    regenerated = _regenerated(case, solid, beams, k_lines, (peaks, other_peaks))
     noisy: list[NoiseStudy] = []
     for noise, parts in repeated:
         done = list(at_work.counted(parts, n_realisations))
-        noisy += _noise_studies(case, noise, solid, beams[0], peaks, done)
+        noisy += _noise_studies(noise, beams[0], peaks, done)
     return BoltedLapResult(
         case=case,
         n_realisations=n_realisations,
         state=solid.state,
         n_dofs=len(solid.model.dofs),
-        natural_frequencies=natural_frequencies,
+        natural_frequencies=solid.natural_frequencies[solid.natural_frequencies <= case.freq_hz[-1]],
         k_lines=k_lines,
         regenerated=regenerated,
-        actual=solid.tip,
-        transferred=other.tip,
+        actual=_on_case(case, solid),
+        transferred=_on_case(case, other),
         peaks=peaks,
-        transferred_peaks=resonances(case.freq_hz, other.tip),
+        transferred_peaks=other_peaks,
         unmeasured=_unmeasured(case, beams[0]),
         noisy=noisy,
     )
 
 
+def _on_case(case: BoltedLapCase, solid: SolidFrfs) -> ComplexArray:
+    """FRFs of the tip of a solid model on the lines of the case."""
+    return solid.tip[np.searchsorted(solid.tip_hz, case.freq_hz)]
+
+
 def _regenerated(
-    case: BoltedLapCase, solid: SolidFrfs, beams: list[BeamFrfs], k_lines: dict[str, ComplexArray]
+    case: BoltedLapCase,
+    solid: SolidFrfs,
+    beams: list[BeamFrfs],
+    k_lines: dict[str, ComplexArray],
+    peaks: tuple[list[Resonance], list[Resonance]],
 ) -> list[RegeneratedTip]:
     """FRFs of the tip with every identified joint, with both beams B."""
     found = by_band_means(case, k_lines) + by_compliance_fit(case, solid.points, solid.channels)
-    joints = [(one, joint_of_constants(one.theta, case.freq_hz)) for one in found]
-    # Last, all entries of K* of the reference points, line by line.
-    joints.append((Found("reference points", LINES, np.full(12, np.nan)), k_lines["reference points"]))
-    return [RegeneratedTip(one, *(part.tip(k_joint) for part in beams)) for one, k_joint in joints]
+    freq = beams[0].freq_hz
+    joints = [(one, constant_joint(one.theta, freq)) for one in found]
+    # Last, all entries of K* of the reference points, line by line and linear between the lines.
+    all_entries = interp1d(case.freq_hz, k_lines["reference points"], axis=0)(freq)
+    joints.append((Found("reference points", LINES, np.full(12, np.nan)), all_entries))
+    at = np.searchsorted(freq, case.freq_hz)
+    regenerated = []
+    for one, k_joint in joints:
+        tips = [part.tip(k_joint) for part in beams]
+        errors, other = (resonance_errors(freq, own, tip) for own, tip in zip(peaks, tips, strict=True))
+        regenerated.append(RegeneratedTip(one, tips[0][at], tips[1][at], errors, other))
+    return regenerated
 
 
 def _unmeasured(case: BoltedLapCase, beams: BeamFrfs) -> list[Unmeasured]:
     """Set entries to zero that cannot be measured, in exact FRFs of beams with a known joint (section 4.3.3.1)."""
-    h_c = beams.coupled(case.joint.dynamic_stiffness(case.freq_hz))
+    h_c = beams.on(case.freq_hz).coupled(case.joint.dynamic_stiffness(case.freq_hz))
     gamma = np.ascontiguousarray(h_c[:, :12, :12])
     no_x, no_z = (np.ones((6, 6), bool) for _ in "xz")
     for mask, a, b in ((no_x, "x", "theta_z"), (no_z, "z", "theta_x")):
@@ -193,7 +226,17 @@ def _unmeasured(case: BoltedLapCase, beams: BeamFrfs) -> list[Unmeasured]:
         "Measurements 1-4 (4.28)": measured_entries(),
     }
     lines = {name: joint_stiffness_lines(gamma * np.tile(mask, (2, 2))) for name, mask in patterns.items()}
-    return [Unmeasured(name, k, band_means(case, k)) for name, k in lines.items()]
+    found = {name: (k, band_means(case, k)) for name, k in lines.items()}
+    return [Unmeasured(name, k, theta, _shift(case, beams, theta)) for name, (k, theta) in found.items()]
+
+
+def _shift(case: BoltedLapCase, beams: BeamFrfs, theta: FloatArray) -> FloatArray:
+    """Largest errors of the resonances in x and in y where constants stand for the known joint."""
+    exact, tip = (beams.tip(constant_joint(one, beams.freq_hz)) for one in (case.actual, theta))
+    peaks = resonances(beams.freq_hz, exact)
+    errors = resonance_errors(beams.freq_hz, peaks, tip).frequency
+    own = [[error for error, one in zip(errors, peaks, strict=True) if one.direction == d] for d in TIP_DIRECTIONS]
+    return np.array([max(one, default=0.0) for one in own])
 
 
 class _Realisation(NamedTuple):
@@ -222,19 +265,13 @@ def _identify_noisy(task: _Realisation) -> list[Found]:
     return found
 
 
-def _noise_studies(
-    case: BoltedLapCase,
-    noise: Noise,
-    solid: SolidFrfs,
-    beams: BeamFrfs,
-    peaks: list[Resonance],
-    parts: list[list[Found]],
-) -> list[NoiseStudy]:
+def _noise_studies(noise: Noise, beams: BeamFrfs, peaks: list[Resonance], parts: list[list[Found]]) -> list[NoiseStudy]:
     """Put the realisations of every route and estimator together, with the resonances they regenerate."""
     studies = []
     for same in zip(*parts, strict=True):
-        lines = [joint_of_constants(found.theta, case.freq_hz) for found in same]
-        shift = [resonance_errors(case.freq_hz, peaks, solid.tip, beams.tip(k))[1] for k in lines]
         theta = np.array([found.theta for found in same])
-        studies.append(NoiseStudy(noise.name, same[0].route, same[0].estimator, theta, np.array(shift)))
+        tips = (beams.tip(constant_joint(one, beams.freq_hz)) for one in theta)
+        errors = [resonance_errors(beams.freq_hz, peaks, tip) for tip in tips]
+        shift, inside = (np.array([getattr(one, what) for one in errors]) for what in ("frequency", "found"))
+        studies.append(NoiseStudy(noise.name, same[0].route, same[0].estimator, theta, shift, inside))
     return studies

@@ -125,8 +125,10 @@ def _noise(result: BoltedLapResult) -> Iterator[Figure]:
         intervals = []
         for study in result.noisy:
             intervals.append(Interval(f"{study.route},\n{study.estimator}", *percentiles(study.shift[:, p])))
-        title = f"{peak.direction}, {peak.freq_hz:g} Hz"
+        title = f"{peak.direction}, {peak.freq_hz:.3g} Hz"
         panels.append(Panel(title, "frequency error (4.12), %", "", intervals=tuple(intervals)))
     if panels and result.noisy:
-        caption = "Errors of the regenerated resonances with noise: median and percentiles"
+        caption = (
+            "Errors of the regenerated resonances with noise: median and percentiles; 15 % is the limit of the search"
+        )
         yield Figure("noise", caption, tuple(panels), 2)

@@ -25,6 +25,14 @@ from jointfrf.substructuring.coupling import couple
 
 __all__ = ["JOINT_DOFS", "TIP_DIRECTIONS", "BeamFrfs", "SolidFrfs", "beam_frfs", "solid_frfs"]
 
+#: Natural frequencies of the solid model that are sought.
+_MODES = 12
+#: Lines where peaks are sought lie this share of a half-power bandwidth apart, out to so many bandwidths.
+_SPACING, _EXTENT = 1 / 8, 3
+#: Lines nearer than this share of their frequency are one.
+_COINCIDENT = 1e-6
+#: Loss factor that lines are laid out for where the beams have less.
+_LEAST_LOSS = 0.005
 #: Directions in which FRFs of the tip are compared.
 TIP_DIRECTIONS = ("x", "y")
 #: The joint DOFs among those of either beam.
@@ -45,7 +53,11 @@ class SolidFrfs:
         Between the measured channels, m/N; empty where only the tip was asked for.
     reference : ndarray, shape (n_freq, 12, 12)
         Between reference points with six DOFs on both sides; empty as above.
-    tip : ndarray, shape (n_freq, 2)
+    natural_frequencies : ndarray, shape (12,)
+        Hz.
+    tip_hz : ndarray, shape (n_tip,)
+        Lines of the tip, Hz: those of the case, and close ones around the natural frequencies.
+    tip : ndarray, shape (n_tip, 2)
         Of the tip in `TIP_DIRECTIONS`.
     """
 
@@ -54,15 +66,31 @@ class SolidFrfs:
     points: tuple[FivePoints, FivePoints]
     channels: ComplexArray
     reference: ComplexArray
+    natural_frequencies: FloatArray
+    tip_hz: FloatArray
     tip: ComplexArray
 
 
 @dataclass(frozen=True)
 class BeamFrfs:
-    """FRFs of the substructures: A at the joint; B at the joint, and at its tip in `TIP_DIRECTIONS`."""
+    """FRFs of the substructures: A at the joint; B at the joint, and at its tip in `TIP_DIRECTIONS`.
 
+    Attributes
+    ----------
+    freq_hz : ndarray, shape (n_freq,)
+        Lines of the case, and others between them, close enough for the peaks of the assembly, Hz.
+    h_a, h_b : ndarray, shapes (n_freq, 6, 6), (n_freq, 8, 8)
+        m/N.
+    """
+
+    freq_hz: FloatArray
     h_a: ComplexArray
     h_b: ComplexArray
+
+    def on(self, freq_hz: FloatArray) -> BeamFrfs:
+        """Return the FRFs on some of the lines."""
+        at = np.searchsorted(self.freq_hz, freq_hz)
+        return BeamFrfs(freq_hz, self.h_a[at], self.h_b[at])
 
     def coupled(self, k_joint: ComplexArray) -> ComplexArray:
         """Receptance of the assembly through a joint: DOFs of A, then of B (2.26)."""
@@ -89,11 +117,41 @@ def solid_frfs(case: BoltedLapCase, length_b: float, measured: bool) -> SolidFrf
         weights += [interpolation(model.mesh, *side.channels) for side in points]
         rings = (lap.interfaces["head"].lower, lap.interfaces["nut"].upper)
         weights += [_mean(model.mesh, ring, at, DOFS) for ring, at in zip(rings, (on_j, on_k), strict=True)]
-    h = model.receptance(case.freq_hz, sparse.vstack(weights) @ model.expansion)
-    return SolidFrfs(
-        state, model, points, h[:, 2:32, 2:32].copy(), h[:, 32:, 32:].copy(),
-        np.stack([h[:, 0, 0], h[:, 1, 1]], axis=1),
-    )  # fmt: skip
+    natural = model.natural_frequencies(_MODES)
+    freq = _with_lines_around(case, natural)
+    h = model.receptance(freq, sparse.vstack(weights) @ model.expansion)
+    tip = np.stack([h[:, 0, 0], h[:, 1, 1]], axis=1)
+    of_case = h[np.searchsorted(freq, case.freq_hz)]
+    channels, reference = of_case[:, 2:32, 2:32].copy(), of_case[:, 32:, 32:].copy()
+    return SolidFrfs(state, model, points, channels, reference, natural, freq, tip)
+
+
+def _loss(case: BoltedLapCase) -> float:
+    return max(case.beams.material.loss_factor, _LEAST_LOSS)
+
+
+def _with_lines_around(case: BoltedLapCase, natural: FloatArray) -> FloatArray:
+    """Lines of the case, and lines around natural frequencies as close as the loss factor asks for."""
+    steps = np.arange(-_EXTENT, _EXTENT + _SPACING, _SPACING)
+    close = (natural[:, None] * (1 + _loss(case) * steps)).ravel()
+    first, last = case.freq_hz[[0, -1]]
+    return _joined(case.freq_hz, close[(close > first) & (close < last)])
+
+
+def _close_lines(case: BoltedLapCase) -> FloatArray:
+    """Lines of the case, and lines throughout their range as close as the loss factor asks for."""
+    first, last = case.freq_hz[[0, -1]]
+    count = int(np.log(last / first) / np.log1p(_SPACING * _loss(case))) + 2
+    return _joined(case.freq_hz, np.geomspace(first, last, count)[1:-1])
+
+
+def _joined(lines: FloatArray, close: FloatArray) -> FloatArray:
+    """All of the first lines and those of the second that do not nearly coincide with any other."""
+    every = np.unique(np.concatenate([lines, close]))
+    gaps = np.concatenate([[np.inf], np.diff(every), [np.inf]])
+    apart = np.minimum(gaps[:-1], gaps[1:]) > _COINCIDENT * every
+    joined: FloatArray = every[apart | np.isin(every, lines)]
+    return joined
 
 
 def _lap(case: BoltedLapCase, length_b: float) -> BoltedLap:
@@ -125,7 +183,8 @@ def beam_frfs(case: BoltedLapCase, length_b: float) -> BeamFrfs:
     hole_b = Hole(start, beams.hole_radius, case.bolt.nut_radius, "bottom", "joint")
     a = brick_beam(beams.lengths[0], *size, ends=("clamped", "free"), hole=hole_a, preset=beams.preset)
     b = brick_beam(length_b, *size, hole=hole_b, observed={"tip": length_b}, preset=beams.preset)
+    freq = _close_lines(case)
     joint = [f"joint:{dof}" for dof in DOFS]
     tip = [f"tip:{axis}" for axis in TIP_DIRECTIONS]
-    h_a, h_b = (model.receptance(case.freq_hz, model.ports(*names)) for model, names in ((a, joint), (b, joint + tip)))
-    return BeamFrfs(h_a, h_b)
+    h_a, h_b = (model.receptance(freq, model.ports(*names)) for model, names in ((a, joint), (b, joint + tip)))
+    return BeamFrfs(freq, h_a, h_b)

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.signal import find_peaks
 
 from jointfrf.cases.bolted_lap.frfs import TIP_DIRECTIONS
 from jointfrf.frf.bands import Band
-from jointfrf.frf.metrics import amplitude_error, frequency_error
+from jointfrf.frf.metrics import has_peak, peak
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
-__all__ = ["Resonance", "resonance_errors", "resonances"]
+__all__ = ["Resonance", "ResonanceErrors", "resonance_errors", "resonances"]
 
 #: A regenerated resonance is sought within this share of the actual one.
 _REACH = 0.15
@@ -22,11 +24,29 @@ _PROMINENCE = 1.5
 
 @dataclass(frozen=True)
 class Resonance:
-    """A resonance of the actual FRF: direction, frequency in Hz, and the band in which it is sought again."""
+    """A resonance of the actual FRF: direction, Hz, m/N, and the band in which it is sought again."""
 
     direction: str
     freq_hz: float
+    amplitude: float
     band: Band
+
+
+class ResonanceErrors(NamedTuple):
+    """Errors of a regenerated FRF at every resonance.
+
+    Attributes
+    ----------
+    amplitude, frequency : ndarray, shape (n_peaks,)
+        (4.11) and (4.12), percent.
+    found : ndarray of bool, shape (n_peaks,)
+        Whether the regenerated FRF has a peak in the band. Where it has none, its largest value lies at an end of the
+        band: the frequency error is the limit of the search, not a result, and the amplitude error is NaN.
+    """
+
+    amplitude: FloatArray
+    frequency: FloatArray
+    found: NDArray[np.bool_]
 
 
 def resonances(freq_hz: FloatArray, tip: ComplexArray) -> list[Resonance]:
@@ -40,17 +60,20 @@ def resonances(freq_hz: FloatArray, tip: ComplexArray) -> list[Resonance]:
         for at, left, right in zip(tops, valleys, valleys[1:], strict=False):
             low = max(freq_hz[left], freq_hz[at] * (1 - _REACH))
             high = min(freq_hz[right], freq_hz[at] * (1 + _REACH))
-            found.append(Resonance(direction, float(freq_hz[at]), (float(low), float(high))))
+            band = (float(low), float(high))
+            amplitude, freq = peak(tip[:, d], freq_hz, band, refine=True)
+            found.append(Resonance(direction, freq, amplitude, band))
     return found
 
 
-def resonance_errors(
-    freq_hz: FloatArray, peaks: list[Resonance], actual: ComplexArray, h: ComplexArray
-) -> tuple[FloatArray, FloatArray]:
-    """Errors (4.11) and (4.12) at every resonance, percent, shape (n_peaks,) each."""
-    pairs = [(actual[:, d], h[:, d]) for p in peaks for d in [TIP_DIRECTIONS.index(p.direction)]]
-    amplitude, frequency = (
-        np.array([error(*pair, freq_hz, p.band, refine=True) for p, pair in zip(peaks, pairs, strict=True)])
-        for error in (amplitude_error, frequency_error)
-    )
-    return amplitude, frequency
+def resonance_errors(freq_hz: FloatArray, peaks: list[Resonance], h: ComplexArray) -> ResonanceErrors:
+    """Errors of the regenerated FRFs of the tip, shape (n_freq, 2), at every resonance; peaks between the lines."""
+    errors = []
+    for one in peaks:
+        own = h[:, TIP_DIRECTIONS.index(one.direction)]
+        amplitude, freq = peak(own, freq_hz, one.band, refine=True)
+        found = has_peak(own, freq_hz, one.band)
+        in_amplitude = abs(amplitude / one.amplitude - 1) * 100 if found else np.nan  # (4.11)
+        errors.append((in_amplitude, abs(freq / one.freq_hz - 1) * 100, found))  # (4.12)
+    amplitudes, frequencies, which = np.array(errors, np.float64).reshape(-1, 3).T
+    return ResonanceErrors(amplitudes, frequencies, which.astype(bool))

@@ -23,7 +23,6 @@ __all__ = [
     "band_means",
     "by_band_means",
     "by_compliance_fit",
-    "joint_of_constants",
     "joint_stiffness_lines",
     "route_lines",
 ]
@@ -110,9 +109,3 @@ def by_compliance_fit(case: BoltedLapCase, points: tuple[FivePoints, FivePoints]
         errors = np.array([fit.std_error[parameter.name] for parameter in case.parameters])
         found.append(Found(route, "compliance fit", np.concatenate([fit.stiffness, fit.damping]), errors))
     return found
-
-
-def joint_of_constants(theta: FloatArray, freq_hz: FloatArray) -> ComplexArray:
-    """K*(w) of twelve constants, shape (n_freq, 6, 6)."""
-    diagonal: ComplexArray = theta[:6] + 2j * np.pi * freq_hz[:, None] * theta[6:]
-    return diagonal[:, :, None] * np.eye(6)

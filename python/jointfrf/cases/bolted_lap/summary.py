@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from jointfrf.cases.bolted_lap.compute import BoltedLapResult
-from jointfrf.cases.bolted_lap.resonances import resonance_errors
+from jointfrf.cases.bolted_lap.tables import above_limit
 from jointfrf.cases.comparison import agreement
 from jointfrf.report.table import Table, number
 
@@ -19,8 +19,7 @@ def bolted_lap_summary(result: BoltedLapResult, tables: list[Table]) -> list[str
     routes = dict.fromkeys(one.found[:2] for one in result.regenerated)
     for transferred, what in ((False, "Regenerated"), (True, "Transferred to the other beam B")):
         each = "; ".join(
-            f"{route} ({estimator}) "
-            + " / ".join(number(_worst(result, (route, estimator), d, transferred), 2) for d in "yx")
+            f"{route} ({estimator}) " + " / ".join(_worst(result, (route, estimator), d, transferred) for d in "yx")
             for route, estimator in routes
         )
         sentences.append(f"{what}: largest error of a resonance in y / x, percent: {each}.")
@@ -37,11 +36,11 @@ def _preload(result: BoltedLapResult) -> str:
     )
 
 
-def _worst(result: BoltedLapResult, named: tuple[str, str], direction: str, transferred: bool) -> float:
-    """Largest error (4.12) of a resonance in a direction, percent."""
+def _worst(result: BoltedLapResult, named: tuple[str, str], direction: str, transferred: bool) -> str:
+    """Write the largest error (4.12) of a resonance in a direction, percent."""
     peaks = result.transferred_peaks if transferred else result.peaks
-    actual = result.transferred if transferred else result.actual
     one = next(r for r in result.regenerated if r.found[:2] == named)
-    _, errors = resonance_errors(result.case.freq_hz, peaks, actual, one.transferred if transferred else one.h)
-    own = [float(e) for e, peak in zip(errors, peaks, strict=True) if peak.direction == direction]
-    return max(own, default=0.0)
+    errors = one.transferred_errors if transferred else one.errors
+    own = [i for i, peak in enumerate(peaks) if peak.direction == direction]
+    worst = max((float(errors.frequency[i]) for i in own), default=0.0)
+    return number(worst, 2) if errors.found[own].all() else above_limit(worst)

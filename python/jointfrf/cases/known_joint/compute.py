@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from jointfrf.cases.definitions import Observed
 from jointfrf.cases.known_joint.exact import Exact, exact_frfs
 from jointfrf.cases.known_joint.modes import ModeShapes, modes_of_case
 from jointfrf.cases.known_joint.noise_free import NoiseFree, noise_free_errors
 from jointfrf.cases.known_joint.printed import PrintedErrors, printed_errors
 from jointfrf.cases.known_joint.read import KnownJointCase
 from jointfrf.cases.known_joint.regenerate import RegeneratedFrf, regenerate_all
+from jointfrf.cases.known_joint.sensitive import SensitiveBands, sensitive_bands
 from jointfrf.cases.known_joint.study import Identified, run_study
 from jointfrf.cases.workers import Workers
 from jointfrf.dofs import Parameter
 from jointfrf.frf.bands import Band
-from jointfrf.identification.sensitivity import Sensitivity, propose_bands, sensitivity
+from jointfrf.identification.sensitivity import Sensitivity
 
 __all__ = ["KnownJointResult", "compute"]
 
@@ -35,6 +35,8 @@ class KnownJointResult:
         Key of an observed FRF to Sensitivity.
     proposals : dict
         Key of an observed FRF, and Parameter, to bands, Hz.
+    from_initial : SensitiveBands
+        Both with the first estimate in the place of the actual joint.
     identified : list of Identified
     regenerated : list of RegeneratedFrf
     printed : list of PrintedErrors
@@ -49,16 +51,11 @@ class KnownJointResult:
     modes: dict[str, ModeShapes]
     sensitivities: dict[str, Sensitivity]
     proposals: dict[tuple[str, Parameter], list[Band]]
+    from_initial: SensitiveBands
     identified: list[Identified]
     regenerated: list[RegeneratedFrf]
     printed: list[PrintedErrors]
     noise_free: dict[str, NoiseFree]
-
-
-def _sensitivity(case: KnownJointCase, exact: Exact, observed: Observed) -> Sensitivity:
-    at = exact.at(observed)
-    j, k = (list(range(exact.where(p).start, exact.where(p).stop)) for p in "jk")
-    return sensitivity(case.freq_hz, exact.h_c, case.joint, j, k, at, at)
 
 
 def compute(case: KnownJointCase, n_realisations: int, workers: Workers | None = None) -> KnownJointResult:
@@ -77,19 +74,16 @@ def compute(case: KnownJointCase, n_realisations: int, workers: Workers | None =
     """
     at_work = workers or Workers()
     exact = exact_frfs(case)
-    sensitivities = {one.key: _sensitivity(case, exact, one) for one in case.observed}
+    actual = sensitive_bands(case, exact, case.joint, exact.h_c)
     identified = run_study(case, exact, n_realisations, at_work)
     return KnownJointResult(
         case=case,
         exact=exact,
         n_realisations=n_realisations,
         modes=modes_of_case(case),
-        sensitivities=sensitivities,
-        proposals={
-            (key, parameter): propose_bands(case.freq_hz, change)
-            for key, found in sensitivities.items()
-            for parameter, change in zip(case.parameters, found.change, strict=True)
-        },
+        sensitivities=actual.sensitivities,
+        proposals=actual.proposals,
+        from_initial=sensitive_bands(case, exact, case.initial, exact.h_initial),
         identified=identified,
         regenerated=regenerate_all(exact, identified, case.observed, at_work),
         printed=printed_errors(case),

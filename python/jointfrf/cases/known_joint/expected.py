@@ -6,12 +6,22 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from jointfrf.cases.comparison import ExpectedFrequencies, read_expected_frequencies
+from jointfrf.cases.definitions import check_bands
 from jointfrf.cases.fitting import METHODS
 from jointfrf.cases.toml_table import TomlTable
 from jointfrf.dofs import Parameter
 from jointfrf.frf.bands import Band
+from jointfrf.kernel.arguments import FloatArray
 
-__all__ = ["Expected", "ExpectedErrors", "ExpectedParameters", "Known", "read_expected"]
+__all__ = [
+    "Expected",
+    "ExpectedErrors",
+    "ExpectedParameters",
+    "ExpectedRegions",
+    "Known",
+    "PrintedLines",
+    "read_expected",
+]
 
 
 @dataclass(frozen=True)
@@ -26,12 +36,15 @@ class Known:
         Noise to the methods that are applied to it.
     observed : mapping of str to tuple of (low, high)
         FRF to the bands where errors of regenerated ones are counted, Hz.
+    freq_hz : ndarray, shape (n_freq,)
+        Lines, Hz.
     """
 
     parameters: tuple[Parameter, ...]
     band_sets: tuple[str, ...]
     methods: Mapping[str, tuple[str, ...]]
     observed: Mapping[str, tuple[Band, ...]]
+    freq_hz: FloatArray
 
 
 @dataclass(frozen=True)
@@ -64,6 +77,35 @@ class ExpectedErrors:
 
 
 @dataclass(frozen=True)
+class ExpectedRegions:
+    """Where a source finds an FRF sensitive to a parameter, (low, high) in Hz."""
+
+    source: str
+    parameter: Parameter
+    observed: str
+    bands: tuple[Band, ...]
+
+
+@dataclass(frozen=True)
+class PrintedLines:
+    """How FRFs regenerated from printed parameters are compared with the errors that the same source prints.
+
+    Attributes
+    ----------
+    step : float
+        Spacing of the lines, Hz.
+    amplitude_within : float
+        How far the error (4.11) may lie from the printed one, percent of it.
+    lines_within : float
+        How many lines the error (4.12) may lie from the printed one.
+    """
+
+    step: float
+    amplitude_within: float
+    lines_within: float
+
+
+@dataclass(frozen=True)
 class Expected:
     """What is known about a case.
 
@@ -73,14 +115,16 @@ class Expected:
         Natural frequencies of the assembly with the ``"actual"`` or the ``"initial"`` joint.
     tables : tuple of ExpectedParameters
     errors : tuple of ExpectedErrors
-    printed_step : float or None
-        Spacing of the lines, Hz, on which FRFs regenerated from printed parameters are compared; None: they are not.
+    regions : tuple of ExpectedRegions
+    printed : PrintedLines or None
+        None: nothing is regenerated from printed parameters.
     """
 
     frequencies: dict[str, ExpectedFrequencies]
     tables: tuple[ExpectedParameters, ...]
     errors: tuple[ExpectedErrors, ...]
-    printed_step: float | None = None
+    regions: tuple[ExpectedRegions, ...] = ()
+    printed: PrintedLines | None = None
 
 
 def read_expected(table: TomlTable, known: Known) -> Expected:
@@ -95,16 +139,14 @@ def read_expected(table: TomlTable, known: Known) -> Expected:
     def entries(key: str) -> list[TomlTable]:
         return table.tables(key) if key in table else []
 
-    step = table.number("printed_step", 0) if "printed_step" in table else None
-    if step == 0:
-        raise table.error("printed_step", "positive, in Hz")
     joints = [(entry.text("joint", ("actual", "initial")), entry) for entry in entries("frequencies")]
     table.check_different("frequencies", [joint for joint, _ in joints], "name the same joint")
     return Expected(
         {joint: read_expected_frequencies(entry) for joint, entry in joints},
         tuple(_expected_parameters(entry, known) for entry in entries("identified")),
         tuple(_expected_errors(entry, known) for entry in entries("regenerated")),
-        step,
+        tuple(_expected_regions(entry, known) for entry in entries("regions")),
+        _printed_lines(table.table("printed")) if "printed" in table else None,
     )
 
 
@@ -146,3 +188,20 @@ def _expected_errors(entry: TomlTable, known: Known) -> ExpectedErrors:
         raise entry.error("offset", "x, y, z in m")
     entry.close()
     return ExpectedErrors(source, noise, method, key, bands[0], amplitude, frequency, offset)
+
+
+def _expected_regions(entry: TomlTable, known: Known) -> ExpectedRegions:
+    names = tuple(parameter.name for parameter in known.parameters)
+    source, parameter = entry.text("source"), known.parameters[names.index(entry.text("parameter", names))]
+    key, bands = entry.text("observed", tuple(known.observed)), tuple(entry.bands("bands"))
+    entry.close()
+    check_bands(entry, "bands", bands, known.freq_hz)
+    return ExpectedRegions(source, parameter, key, bands)
+
+
+def _printed_lines(table: TomlTable) -> PrintedLines:
+    found = PrintedLines(*(table.number(key, 0) for key in ("step", "amplitude_within_percent", "lines_within")))
+    table.close()
+    if found.step == 0:
+        raise table.error("step", "positive, in Hz")
+    return found

@@ -31,6 +31,7 @@ __all__ = ["known_joint_figures"]
 
 _METHOD_NAMES = {
     "ismm": "ISMM",
+    "ismm-kj": "ISMM, D_kj",
     "inverse-substructuring": "inverse substructuring",
     "compliance": "compliance fit",
     "decoupling-rr": "decoupling (2.53)",
@@ -155,13 +156,19 @@ def _varied_panel(result: KnownJointResult, one: Observed, d: int) -> Panel:
 
 def _sensitivity_panel(result: KnownJointResult, one: Observed, stiffness: Parameter, damping: Parameter) -> Panel:
     """Draw the sensitivity of an FRF to stiffness and damping of a DOF, and the bands that follow."""
-    in_db, parameters = result.sensitivities[one.key].in_db, result.case.parameters
+    actual, initial = (found[one.key].in_db for found in (result.sensitivities, result.from_initial.sensitivities))
+    drawn = ((stiffness, actual, "", "actual"), (stiffness, initial, ", first estimate", "initial"),
+             (damping, actual, "", "high"))  # fmt: skip
     curves = tuple(
-        Curve(f"to {symbol(parameter)}", result.exact.freq_hz, in_db[parameters.index(parameter)], style)
-        for parameter, style in ((stiffness, "actual"), (damping, "high"))
+        Curve(
+            f"to {symbol(parameter)}{of}", result.exact.freq_hz, in_db[result.case.parameters.index(parameter)], style
+        )
+        for parameter, in_db, of, style in drawn
     )
     label = f"change of $H_{{{one.point * 2}}}$ per 1 %, dB"
-    strips = ((f"proposed for {symbol(stiffness)}", tuple(result.proposals[one.key, stiffness])),)
+    key = (one.key, stiffness)
+    strips = ((f"proposed for {symbol(stiffness)}", tuple(result.proposals[key])),
+              ("proposed from the first estimate", tuple(result.from_initial.proposals[key])))  # fmt: skip
     return Panel("", FREQUENCY, label, curves, shades=_shades(result, stiffness), strips=strips)
 
 

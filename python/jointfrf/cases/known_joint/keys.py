@@ -180,6 +180,25 @@ _REGENERATED = KeyTable(
         Key("offset", "list of 3 numbers", "Where the FRF is seen, from its reference point.", "m", "at the point"),
     ),
 )
+_REGIONS = KeyTable(
+    "[[regions]]",
+    "Where the source finds an FRF sensitive to a parameter.",
+    (
+        Key("source", "text", "Where the regions come from: title of the table."),
+        Key("parameter", "`k_DOF` or `c_DOF`", "Parameter of the joint."),
+        Key("observed", "text", "An FRF that the case looks at: `s`, `s-Fx`."),
+        Key("bands", "list of `[low, high]`", "The regions.", "Hz"),
+    ),
+)
+_PRINTED = KeyTable(
+    "[printed]",
+    "How errors of FRFs regenerated from published parameters are compared with the published errors.",
+    (
+        Key("step", "number, above 0", "Spacing of the lines.", "Hz"),
+        Key("amplitude_within_percent", "number, at least 0", "How far error (4.11) may be off, of itself.", "%"),
+        Key("lines_within", "number, at least 0", "How many lines error (4.12) may be off."),
+    ),
+)
 _FREQUENCIES = KeyTable(
     "[[frequencies]]",
     "Natural frequencies of the assembly; both substructures must be models.",
@@ -192,8 +211,9 @@ EXPECTED_KEYS = KeyTable(
         Key("frequencies", "tables", "Natural frequencies.", "", "none", _FREQUENCIES),
         Key("identified", "tables", "Published parameters.", "", "none", _IDENTIFIED),
         Key("regenerated", "tables", "Published errors of regenerated FRFs.", "", "none", _REGENERATED),
-        Key("printed_step", "number, above 0", "Spacing of the lines on which FRFs regenerated from published "
-            "parameters are compared; both substructures must be models.", "Hz", "not compared"),
+        Key("regions", "tables", "Published sensitive regions.", "", "none", _REGIONS),
+        Key("printed", "table", "FRFs regenerated from published parameters; both substructures must be models.", "",
+            "not compared", _PRINTED),
         FIGURES,
     ),
 )  # fmt: skip

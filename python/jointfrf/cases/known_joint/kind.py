@@ -20,7 +20,7 @@ KNOWN_JOINT: CaseKind[KnownJointCase, KnownJointResult] = CaseKind(
     figures=known_joint_figures,
     summary=known_joint_summary,
     numbers=known_joint_numbers,
-    not_printed=("bands", "regenerated"),
+    not_printed=("bands", "blocks", "regenerated"),
     keys=KNOWN_JOINT_KEYS,
     expected_keys=EXPECTED_KEYS,
 )

@@ -95,6 +95,7 @@ def read_known_joint(common: Case, table: TomlTable, expected: TomlTable) -> Kno
         tuple(band_set.name for band_set in band_sets),
         {noise.name: noise.methods for noise in noises},
         {one.key: one.bands for one in observed},
+        common.freq_hz,
     )
     case = KnownJointCase(
         **vars(common),
@@ -108,7 +109,7 @@ def read_known_joint(common: Case, table: TomlTable, expected: TomlTable) -> Kno
         noises=noises,
         expected=read_expected(expected, known),
     )
-    for key in ("frequencies", "printed_step"):
+    for key in ("frequencies", "printed"):
         if case.models is None and key in expected:
             raise FileContentError(f"{expected.where}: {key} needs models, not receptances, of both substructures")
     return case

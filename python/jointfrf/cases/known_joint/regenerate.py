@@ -8,10 +8,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from jointfrf.cases.definitions import Observed
+from jointfrf.cases.definitions import Observed, constant_joint
 from jointfrf.cases.known_joint.exact import Exact
 from jointfrf.cases.known_joint.study import Identified, chunk_size
 from jointfrf.cases.workers import Workers
+from jointfrf.dofs import rigid_offset
 from jointfrf.errors import IllConditionedWarning
 from jointfrf.frf.bands import Band
 from jointfrf.frf.metrics import amplitude_error, frequency_error, has_peak
@@ -54,8 +55,10 @@ class RegeneratedFrf:
     frequency: FloatArray
 
 
-def regenerate(exact: Exact, theta: FloatArray, point: str, dof: int = 0) -> ComplexArray:
-    """Receptance of the assembly at a point, regenerated from identified parameters.
+def regenerate(
+    exact: Exact, theta: FloatArray, point: str, dof: int = 0, offset: tuple[float, ...] = ()
+) -> ComplexArray:
+    """Receptance of the assembly (2.26) at a point, regenerated from parameters of the joint.
 
     Parameters
     ----------
@@ -65,36 +68,50 @@ def regenerate(exact: Exact, theta: FloatArray, point: str, dof: int = 0) -> Com
     point : {"r", "s"}
     dof : int
         Response and force at this DOF of the point.
+    offset : tuple of float, optional
+        Where response and force are, from the point, x, y, z in m; at the point itself by default.
 
     Returns
     -------
     ndarray, shape (r, n_freq)
         m/N.
     """
+    h_a, h_b = _at_joint_and_point(exact, point, _weights(exact, dof, offset))
     n, n_freq = exact.n, exact.freq_hz.size
-    size = chunk_size(n_freq, (2 * n + 1) ** 2)
+    size, at = chunk_size(n_freq, (2 * n + 1) ** 2), n if point == "r" else 2 * n
     found = np.empty((len(theta), n_freq), np.complex128)
     for first in range(0, len(theta), size):
+        some = theta[first : first + size]
         # Copied out of the coupled FRFs, which are large.
-        found[first : first + size] = _regenerated_chunk(exact, theta[first : first + size], point, dof)
+        found[first : first + size] = _coupled(h_a, h_b, constant_joint(some, exact.freq_hz), at)
     return found
 
 
-def _regenerated_chunk(exact: Exact, theta: FloatArray, point: str, dof: int) -> ComplexArray:
-    """Couple the substructures once for each set of parameters, all at once; a view of the coupled FRFs."""
-    n, count, n_freq = exact.n, len(theta), exact.freq_hz.size
-    k_joint = (theta[:, None, :n] + 2j * np.pi * exact.freq_hz[:, None] * theta[:, None, n:])[..., None] * np.eye(n)
+def _weights(exact: Exact, dof: int, offset: tuple[float, ...]) -> FloatArray:
+    """Weights of the DOFs of a point for the motion in the direction of one of them, there or beside it."""
+    motion = rigid_offset(exact.dofs, offset) if offset else np.eye(exact.n)
+    weights: FloatArray = motion[dof]
+    return weights
+
+
+def _at_joint_and_point(exact: Exact, point: str, weights: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+    """Receptances of A and B at the joint DOFs; that of the substructure with the point also there, as the last DOF."""
+    n = exact.n
+    at_joint = np.eye(n, 2 * n)
+    at_both = np.vstack([at_joint, np.concatenate([np.zeros(n), weights])])
+    of_a, of_b = (at_both, at_joint) if point == "r" else (at_joint, at_both)
+    return of_a @ exact.h_a @ of_a.T, of_b @ exact.h_b @ of_b.T
+
+
+def _coupled(h_a: ComplexArray, h_b: ComplexArray, k_joint: ComplexArray, at: int) -> ComplexArray:
+    """Couple once for each set of parameters, all at once, and take one DOF: a view of the coupled FRFs."""
+    count, n_freq, n, _ = k_joint.shape
     joint = list(range(n))
-    of_a, of_b = ([*joint, n + dof], joint) if point == "r" else (joint, [*joint, n + dof])
-    h_a, h_b = (
-        np.tile(h[:, np.array(dofs)[:, None], dofs], (count, 1, 1))
-        for h, dofs in ((exact.h_a, of_a), (exact.h_b, of_b))
-    )
-    at = n if point == "r" else 2 * n
+    many_a, many_b = (np.tile(h, (count, 1, 1)) for h in (h_a, h_b))
     with warnings.catch_warnings():
         # Identified parameters may be absurd.
         warnings.simplefilter("ignore", IllConditionedWarning)
-        h_c = couple(h_a, h_b, k_joint.reshape(-1, n, n), joint, joint)
+        h_c = couple(many_a, many_b, k_joint.reshape(-1, n, n), joint, joint)
     return h_c[:, at, at].reshape(count, n_freq)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -40,6 +41,8 @@ class Identified:
         Parameters: stiffness of all DOFs, then damping.
     k_lines : ndarray, shape (n_kept, n_freq, n)
         Diagonal of K* line by line for the first realisations; empty for a fit over all lines.
+    theta_kj : ndarray, shape (n_realisations, n_parameters) or (0, n_parameters)
+        For "ismm", which takes K* from D_jk: the parameters from D_kj of the same FRFs.
     """
 
     noise: str
@@ -47,6 +50,7 @@ class Identified:
     bands: str
     theta: FloatArray
     k_lines: ComplexArray
+    theta_kj: FloatArray
 
 
 @dataclass(frozen=True)
@@ -67,8 +71,15 @@ def chunk_size(n_freq: int, entries: int) -> int:
     return max(1, min(_CHUNK, _CHUNK_ENTRIES // entries) // n_freq)
 
 
-def _identify(chunk: _Chunk) -> tuple[FloatArray, ComplexArray]:
-    """Return the parameters, shape (n_band_sets, count, p), and the lines kept, shape (n_kept, n_freq, n)."""
+class _ChunkResult(NamedTuple):
+    """What comes out of a chunk: arrays as in `Identified`, the parameters for each set of bands."""
+
+    theta: FloatArray
+    k_lines: ComplexArray
+    theta_kj: FloatArray
+
+
+def _identify(chunk: _Chunk) -> _ChunkResult:
     exact, method = chunk.exact, chunk.method
     seed = chunk.seed + noise_stream(method)
     h = chunk.noise.realisations(measured(exact, method), seed, chunk.first, chunk.count)
@@ -77,11 +88,16 @@ def _identify(chunk: _Chunk) -> tuple[FloatArray, ComplexArray]:
         warnings.simplefilter("ignore", IllConditionedWarning)
         if method == "compliance":
             theta = fit_viscous(exact.freq_hz, exact.dofs, h)
-            return theta[None], np.empty((0, exact.freq_hz.size, exact.n), np.complex128)
+            no_lines = np.empty((0, exact.freq_hz.size, exact.n), np.complex128)
+            return _ChunkResult(theta[None], no_lines, np.empty((1, 0, theta.shape[1])))
         k_joint = joint_lines(exact, method, h, "nan")
-    means = np.array([means_over_bands(exact, k_joint, band_set) for band_set in chunk.band_sets])
+        of_kj = joint_lines(exact, "ismm-kj", h, "nan") if method == "ismm" else k_joint[:0]
     kept = max(0, min(chunk.count, _KEPT - chunk.first))
-    return means, np.diagonal(k_joint[:kept], axis1=2, axis2=3).copy()
+    k_lines = np.diagonal(k_joint[:kept], axis1=2, axis2=3).copy()
+    theta, theta_kj = (
+        np.array([means_over_bands(exact, k, band_set) for band_set in chunk.band_sets]) for k in (k_joint, of_kj)
+    )
+    return _ChunkResult(theta, k_lines, theta_kj)
 
 
 def means_over_bands(exact: Exact, k_joint: ComplexArray, band_set: BandSet) -> FloatArray:
@@ -142,8 +158,8 @@ def run_study(
     found = []
     for i, (noise, method) in enumerate(groups):
         own = parts[i * len(spans) : (i + 1) * len(spans)]
-        theta = np.concatenate([part[0] for part in own], axis=1)
-        k_lines = np.concatenate([part[1] for part in own])
+        theta, theta_kj = (np.concatenate([getattr(p, x) for p in own], axis=1) for x in ("theta", "theta_kj"))
+        k_lines = np.concatenate([part.k_lines for part in own])
         names = [ALL_LINES] if method == "compliance" else [band_set.name for band_set in case.band_sets]
-        found += [Identified(noise.name, method, name, theta[b], k_lines) for b, name in enumerate(names)]
+        found += [Identified(noise.name, method, name, theta[b], k_lines, theta_kj[b]) for b, name in enumerate(names)]
     return found

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from jointfrf.cases.comparison import frequency_table, verdict
-from jointfrf.cases.definitions import Observed
 from jointfrf.cases.known_joint.compute import KnownJointResult
 from jointfrf.cases.known_joint.expected import ExpectedErrors, ExpectedParameters
+from jointfrf.cases.known_joint.published_tables import (
+    NO_PEAK,
+    band_table,
+    frf_name,
+    key_of,
+    printed_tables,
+    region_tables,
+    title_of,
+)
 from jointfrf.cases.known_joint.regenerate import RegeneratedFrf
 from jointfrf.cases.known_joint.study import Identified
 from jointfrf.dofs import Parameter
@@ -19,12 +26,11 @@ from jointfrf.kernel.arguments import FloatArray
 from jointfrf.report.axes import bands_in_words, percentiles
 from jointfrf.report.table import Cell, Table
 
-__all__ = ["Row", "frf_name", "identified_rows", "known_joint_numbers", "known_joint_tables"]
+__all__ = ["Row", "identified_rows", "known_joint_numbers", "known_joint_tables"]
 
 _NOISE_FREE_LIMIT, _SHORT_FORM_LIMIT = 1e-6, 1e-10
 #: An equation is exact up to this many roundings of the FRFs it takes.
 _ROUNDINGS = 100
-_NO_PEAK = "no peak in the band"
 
 
 @dataclass(frozen=True)
@@ -91,11 +97,13 @@ def known_joint_tables(result: KnownJointResult) -> list[Table]:
     return [
         *(_published(source, [row for row in rows if row.source == source]) for source in sources),
         *_published_errors(result),
-        *_printed(result),
+        *printed_tables(result),
+        *region_tables(result),
         *_frequencies(result),
         _identified(rows, result.n_realisations),
+        *_blocks(result),
         *_limits(result, rows),
-        _bands(result),
+        band_table(result),
         _regenerated(result),
         _noise_free(result),
     ]
@@ -115,7 +123,7 @@ def _published(source: str, rows: list[Row]) -> Table:
         "The value of the thesis comes from one realisation of the noise; ours are a distribution. The percentile is "
         "the share of realisations below the value of the thesis; it fits between the 2.5 and 97.5 percentile shown."
     )
-    return Table(_key(source), _title(source), columns, cells, failing, note, percentages=("percentile",))
+    return Table(key_of(source), title_of(source), columns, cells, failing, note, percentages=("percentile",))
 
 
 def _frequencies(result: KnownJointResult) -> list[Table]:
@@ -144,6 +152,28 @@ def _identified(rows: list[Row], count: int) -> Table:
     return Table("identified", title, columns, tuple(seen), percentages=("RMSE %",))
 
 
+def _blocks(result: KnownJointResult) -> list[Table]:
+    """Table of ISMM from both off-diagonal blocks of (2.48); none where ISMM is not applied."""
+    published = {(r.noise, r.bands, r.parameter): r.published for r in identified_rows(result) if r.method == "ismm"}
+    cells: list[tuple[Cell, ...]] = []
+    for found in result.identified:
+        for p, parameter in enumerate(result.case.parameters if len(found.theta_kj) else ()):
+            named = (found.noise, found.bands, parameter, parameter.unit, float(result.case.actual[p]))
+            low_jk, median_jk, high_jk = percentiles(found.theta[:, p])
+            low_kj, median_kj, high_kj = percentiles(found.theta_kj[:, p])
+            known = published[found.noise, found.bands, parameter]
+            cells.append((*named, known, median_jk, low_jk, high_jk, median_kj, low_kj, high_kj))
+    if not cells:
+        return []
+    columns = ("noise", "bands", "parameter", "unit", "actual", "thesis",
+               "D_jk: median", "2.5 %", "97.5 %", "D_kj: median", "2.5 %", "97.5 %")  # fmt: skip
+    note = (
+        "D (2.48) holds -Delta twice. Without noise both blocks give the same joint; the noise of the FRFs is not "
+        "symmetric, so that with it they are two estimates. All other tables take D_jk."
+    )
+    return [Table("blocks", "ISMM from either block of the modification", columns, tuple(cells), note=note)]
+
+
 def _limits(result: KnownJointResult, rows: list[Row]) -> list[Table]:
     cells: list[tuple[Cell, ...]] = []
     for table in result.case.expected.tables:
@@ -162,22 +192,6 @@ def _limits(result: KnownJointResult, rows: list[Row]) -> list[Table]:
     return [Table("limits", title, columns, tuple(cells), failing, percentages=("RMSE %", "limit %"))]
 
 
-def _bands(result: KnownJointResult) -> Table:
-    sets, observed = result.case.band_sets, result.case.observed
-    cells: tuple[tuple[Cell, ...], ...] = tuple(
-        (
-            parameter,
-            "; ".join(dict.fromkeys(bands_in_words(s.bands[parameter]) for s in sets)),
-            *(bands_in_words(result.proposals[one.key, parameter]) or "none" for one in observed),
-        )
-        for parameter in result.case.parameters
-    )
-    proposed = tuple(f"proposed from {frf_name(result, one)}, Hz" for one in observed)
-    columns = ("parameter", "bands of the case, Hz", *proposed)
-    note = "Proposed: where the smoothed sensitivity of the FRF stays within 20 dB of its largest value."
-    return Table("bands", "Sensitive bands", columns, cells, note=note)
-
-
 def _regenerated(result: KnownJointResult) -> Table:
     cells: list[tuple[Cell, ...]] = []
     for r in result.regenerated:
@@ -189,7 +203,7 @@ def _regenerated(result: KnownJointResult) -> Table:
     columns = ("noise", "method", "bands", "FRF", "errors in, Hz",
                "amplitude %", "2.5 %", "97.5 %", "frequency %", "2.5 %", "97.5 %")  # fmt: skip
     title = "Errors of the regenerated FRFs: amplitude (4.11) and frequency (4.12)"
-    note = f"Median and percentiles over realisations with a peak in the band. {_NO_PEAK}: not even half have one."
+    note = f"Median and percentiles over realisations with a peak in the band. {NO_PEAK}: not even half have one."
     return Table("regenerated", title, columns, tuple(cells), note=note, percentages=columns)
 
 
@@ -197,15 +211,9 @@ def _spread(errors: FloatArray) -> tuple[Cell, Cell, Cell]:
     """Median, 2.5 and 97.5 percentile over realisations with a peak in the band, where at least half have one."""
     with_peak = errors[np.isfinite(errors)]
     if with_peak.size < errors.size / 2:
-        return _NO_PEAK, None, None
+        return NO_PEAK, None, None
     low, median, high = percentiles(with_peak)
     return median, low, high
-
-
-def frf_name(result: KnownJointResult, observed: Observed) -> str:
-    """Name an observed FRF: "H_ss", with its direction where the case names one."""
-    name = f"H_{observed.point * 2}"
-    return name if observed.key == observed.point else f"{name} {result.case.joint.dofs[observed.dof]}"
 
 
 def _published_errors(result: KnownJointResult) -> list[Table]:
@@ -220,11 +228,11 @@ def _published_errors(result: KnownJointResult) -> list[Table]:
         rows.setdefault(known.source, []).extend(_error_rows(frf_name(result, found.observed), known, found))
     note = (
         "Errors in percent of one realisation in the thesis; ours are a distribution over realisations with a peak in "
-        f"the band. {_NO_PEAK}: not even half have one, because the largest value lies at an edge of the band."
+        f"the band. {NO_PEAK}: not even half have one, because the largest value lies at an edge of the band."
     )
     return [
         Table(
-            _key(source), f"{_title(source)}: errors of the regenerated FRFs, percent", columns, tuple(own),
+            key_of(source), f"{title_of(source)}: errors of the regenerated FRFs, percent", columns, tuple(own),
             tuple(i for i, row in enumerate(own) if row[-1] == verdict(False)), note, percentages=("percentile",),
         )
         for source, own in rows.items()
@@ -246,38 +254,6 @@ def _error_rows(frf: str, known: ExpectedErrors, found: RegeneratedFrf) -> list[
         named = (frf, bands_in_words([known.band]), known.method, what)
         rows.append((*named, published, median, low, high, share, verdict(good)))
     return rows
-
-
-def _printed(result: KnownJointResult) -> list[Table]:
-    """Table of the FRFs regenerated from printed parameters; none where there are none."""
-    cells: list[tuple[Cell, ...]] = []
-    for one in result.printed:
-        known = one.known
-        observed = next(o for o in result.case.observed if o.key == known.observed)
-        seen = f", {1e3 * float(np.linalg.norm(known.offset)):.3g} mm away" if known.offset else ""
-        named = (known.source, frf_name(result, observed) + seen, bands_in_words([known.band]), known.method)
-        for what, published, found in (
-            ("amplitude (4.11)", known.amplitude, one.amplitude),
-            ("frequency (4.12)", known.frequency, one.frequency),
-        ):
-            cells.append((*named, what, published, _NO_PEAK if found is None else found))
-    if not cells:
-        return []
-    columns = ("source", "FRF", "band, Hz", "method", "error", "thesis", "from the printed parameters")
-    note = (
-        f"Percent, on lines {result.case.expected.printed_step:g} Hz apart, without noise: what differs is the model,"
-        " the lines or the printed digits."
-    )
-    title = "Errors of FRFs regenerated from the printed parameters"
-    return [Table("printed-parameters", title, columns, tuple(cells), note=note, percentages=columns[-2:])]
-
-
-def _key(source: str) -> str:
-    return re.sub(r"[^a-z0-9]+", "-", source.lower()).strip("-")
-
-
-def _title(source: str) -> str:
-    return source[:1].upper() + source[1:]
 
 
 def _noise_free(result: KnownJointResult) -> Table:
@@ -303,6 +279,10 @@ def known_joint_numbers(result: KnownJointResult) -> dict[str, Any]:
         "noise_free_relative_error": {method: found.error for method, found in result.noise_free.items()},
         "proposed_bands_hz": {
             f"{frf_name(result, one)} {parameter.name}": result.proposals[one.key, parameter]
+            for one in case.observed for parameter in case.parameters
+        },
+        "proposed_bands_of_first_estimate_hz": {
+            f"{frf_name(result, one)} {parameter.name}": result.from_initial.proposals[one.key, parameter]
             for one in case.observed for parameter in case.parameters
         },
     }  # fmt: skip
