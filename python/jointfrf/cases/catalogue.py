@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -50,7 +51,7 @@ class CaseOutput:
     summary : list of str
         A few sentences.
     report : Path
-        The HTML report; CSV, PNG and JSON files stand beside it.
+        The HTML report; CSV, PNG, SVG and JSON files stand beside it.
     printed : list of Table
         The tables that are worth printing.
     """
@@ -165,8 +166,14 @@ def _common(folder: Path, table: TomlTable, expected: TomlTable) -> Case:
 
 
 def numbered(case: Case, figures: Sequence[Figure]) -> list[Figure]:
-    """Give figures their numbers in the source, where they have one."""
-    return [replace(figure, number=case.figure_numbers.get(figure.key, "")) for figure in figures]
+    """Give figures their numbers in the source and its order; those that have none follow as they are."""
+    named = [replace(figure, number=case.figure_numbers.get(figure.key, "")) for figure in figures]
+    return sorted(named, key=lambda figure: (not figure.number, _number_key(figure.number)))
+
+
+def _number_key(number: str) -> list[tuple[int, str]]:
+    """Order "3-9a", "3-9b", "3-10", "4-32 and 4-33" as they stand in the source."""
+    return [(int(digits), letter) for digits, letter in re.findall(r"(\d+)([a-z]?)", number)]
 
 
 def run_case(
@@ -185,7 +192,7 @@ def run_case(
         Folder with `case.toml`.
     out : Path or str
         Results go to a folder with the case's name in there: `report.html`, `results.json`, `tables/*.csv`,
-        `figures/*.png` and `figures/*.csv`.
+        `figures/*.png`, `figures/*.svg` and `figures/*.csv`.
     realisations : int, optional
         Instead of the number that the case names.
     workers : Workers, optional
@@ -233,8 +240,9 @@ def run_case(
 
 def _write(folder: Path, page: Page, content: dict[str, Any]) -> None:
     """Write a report and, beside it, its tables, figures and numbers."""
-    for figure, png in page.figures:
-        write_file(folder / "figures" / f"{figure.key}.png", png)
+    for figure, drawing in page.figures:
+        write_file(folder / "figures" / f"{figure.key}.png", drawing.png)
+        write_file(folder / "figures" / f"{figure.key}.svg", drawing.svg)
         write_file(folder / "figures" / f"{figure.key}.csv", figure_csv(figure))
     for table in page.tables:
         write_file(folder / "tables" / f"{table.key}.csv", table_csv(table))
