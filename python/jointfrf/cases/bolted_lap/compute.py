@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -21,7 +22,9 @@ from jointfrf.cases.bolted_lap.routes import (
     route_lines,
 )
 from jointfrf.cases.definitions import Noise
+from jointfrf.cases.fitting import fit_viscous
 from jointfrf.cases.workers import Workers
+from jointfrf.errors import IllConditionedWarning
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.solids.preload import PreloadedLap
 
@@ -47,12 +50,14 @@ class Unmeasured(NamedTuple):
     ----------
     name : str
     k_lines : ndarray, shape (n_freq, 6, 6)
-    theta : ndarray, shape (12,)
+    theta, fitted : ndarray, shape (12,)
+        Means over bands, and the compliance fit.
     """
 
     name: str
     k_lines: ComplexArray
     theta: FloatArray
+    fitted: FloatArray
 
 
 class NoiseStudy(NamedTuple):
@@ -192,8 +197,13 @@ def _unmeasured(case: BoltedLapCase, beams: BeamFrfs) -> list[Unmeasured]:
         "without z-theta_x (4.30)": no_z,
         "Measurements 1-4 (4.28)": measured_entries(),
     }
-    lines = {name: joint_stiffness_lines(gamma * np.tile(mask, (2, 2))) for name, mask in patterns.items()}
-    return [Unmeasured(name, k, band_means(case, k)) for name, k in lines.items()]
+    masked = {name: gamma * np.tile(mask, (2, 2)) for name, mask in patterns.items()}
+    lines = {name: joint_stiffness_lines(h) for name, h in masked.items()}
+    with warnings.catch_warnings():
+        # Without some of its entries a matrix may be singular.
+        warnings.simplefilter("ignore", IllConditionedWarning)
+        fits = {name: fit_viscous(case.freq_hz, DOFS, h[None])[0] for name, h in masked.items()}
+    return [Unmeasured(name, k, band_means(case, k), fits[name]) for name, k in lines.items()]
 
 
 class _Realisation(NamedTuple):

@@ -45,6 +45,8 @@ _METHOD_NAMES = {
 _SINGLE = ("ismm", "decoupling-ss")
 #: Stiffness of the curves beside the actual one in a sensitivity figure.
 _VARIED = ((0.5, "low"), (2.0, "high"))
+#: Panels that still fit on a page.
+_ONE_FIGURE = 6
 #: Noise levels side by side.
 _MOST_LEVELS = 3
 #: A parameter whose sensitivity stays below this share of the largest one does not change an FRF visibly.
@@ -237,9 +239,9 @@ def _identified(result: KnownJointResult) -> Iterator[Figure]:
 
 
 def _noise(result: KnownJointResult) -> Iterator[Figure]:
-    rows = identified_rows(result)
+    rows, parameters = identified_rows(result), result.case.parameters
     panels = []
-    for p, parameter in enumerate(result.case.parameters):
+    for p, parameter in enumerate(parameters):
         intervals = tuple(
             Interval(f"{_METHOD_NAMES[r.method]}, {r.noise}\n{r.bands}", r.low, r.median, r.high, r.published)
             for r in rows if r.parameter == parameter
@@ -247,7 +249,12 @@ def _noise(result: KnownJointResult) -> Iterator[Figure]:
         levels = (Level("actual", float(result.case.actual[p]), "actual"),)
         panels.append(Panel("", parameter_label(parameter), "", levels=levels, intervals=intervals))
     caption = "Identified parameters at all noise levels: median and percentiles over realisations"
-    yield Figure("noise", caption, tuple(panels), 2)
+    if len(panels) <= _ONE_FIGURE:
+        yield Figure("noise", caption, tuple(panels), 2)
+        return
+    for kind, what in (("k", "stiffness"), ("c", "damping")):
+        own = tuple(panel for parameter, panel in zip(parameters, panels, strict=True) if parameter.kind == kind)
+        yield Figure(f"noise-{kind}", f"{caption}: {what}", own, 2)
 
 
 def _methods(result: KnownJointResult) -> Iterator[Figure]:
