@@ -18,7 +18,7 @@ from jointfrf.files import write_file
 from jointfrf.report.draw import draw
 from jointfrf.report.figure import Figure, figure_csv
 from jointfrf.report.page import Page, make_page
-from jointfrf.report.table import Table, plain_rows, table_csv
+from jointfrf.report.table import Table, plain_rows, shown, table_csv
 
 __all__ = [
     "CaseOutput",
@@ -48,8 +48,8 @@ class CaseOutput:
         What the `compute` of its kind returned.
     tables : list of Table
     figures : list of Figure
-    summary : list of str
-        A few sentences.
+    summary : list of Table
+        What came out, in short.
     report : Path
         The HTML report; CSV, PNG, SVG and JSON files stand beside it.
     printed : list of Table
@@ -60,7 +60,7 @@ class CaseOutput:
     result: Any
     tables: list[Table]
     figures: list[Figure]
-    summary: list[str]
+    summary: list[Table]
     report: Path
     printed: list[Table]
 
@@ -221,12 +221,12 @@ def run_case(
     count = case.realisations if realisations is None else realisations
     result = kind.compute(case, count, at_work)
     tables, figures = kind.tables(result), numbered(case, kind.figures(result))
-    sentences = kind.summary(result, tables)
+    summary = kind.summary(result, tables)
     content = _common_numbers(case, count, tables) | kind.numbers(result)
     page = Page(
         title=case.title,
         about=_about(case, count),
-        summary=sentences,
+        summary=summary,
         tables=tables,
         figures=list(zip(figures, at_work.map(draw, figures), strict=True)),
         subject="The case",
@@ -235,7 +235,7 @@ def run_case(
     )
     _write(target, page, content)
     printed = [table for table in tables if table.key not in kind.not_printed]
-    return CaseOutput(case, result, tables, figures, sentences, target / "report.html", printed)
+    return CaseOutput(case, result, tables, figures, summary, target / "report.html", printed)
 
 
 def _write(folder: Path, page: Page, content: dict[str, Any]) -> None:
@@ -272,6 +272,7 @@ def _common_numbers(case: Case, count: int, tables: list[Table]) -> dict[str, An
         "seed": case.seed,
         "frequency_hz": {"first": case.freq_hz[0], "last": case.freq_hz[-1], "lines": case.freq_hz.size},
         "tables": {
-            table.key: {"title": table.title, "columns": table.columns, "rows": plain_rows(table)} for table in tables
+            table.key: {"title": table.title, "columns": table.columns, "rows": plain_rows(table)}
+            for table in map(shown, tables)
         },
     }

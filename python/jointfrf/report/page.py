@@ -1,4 +1,4 @@
-"""One self-contained HTML page: sentences, tables, figures and texts."""
+"""One self-contained HTML page: a summary, tables, figures and texts; for screens of any width and for paper."""
 
 from __future__ import annotations
 
@@ -12,10 +12,12 @@ from urllib.parse import quote
 from jointfrf.dofs import Parameter
 from jointfrf.report.draw import Drawing
 from jointfrf.report.figure import Figure
-from jointfrf.report.table import Table, written
+from jointfrf.report.table import VERDICT, Table, shown, written
 
 __all__ = ["Page", "make_page"]
 
+#: Up to so many columns fit on any screen; more than so many are written smaller.
+_NARROW, _WIDE = 4, 9
 _TEMPLATE = Path(__file__).with_name("page.html.jinja")
 
 
@@ -28,8 +30,8 @@ class Page:
     title : str
     about : str
         A sentence or two below it: what was computed from what.
-    summary : sequence of str
-        Sentences.
+    summary : sequence of Table
+        Short tables.
     tables : sequence of Table
     figures : sequence of (Figure, Drawing)
         Figures as they are drawn: the SVG files become part of the page.
@@ -43,7 +45,7 @@ class Page:
 
     title: str
     about: str
-    summary: Sequence[str]
+    summary: Sequence[Table]
     tables: Sequence[Table]
     figures: Sequence[tuple[Figure, Drawing]]
     subject: str = ""
@@ -74,6 +76,8 @@ def make_page(page: Page) -> str:
     return environment.from_string(_TEMPLATE.read_text(encoding="utf-8")).render(
         page=page,
         version=version("jointfrf"),
+        verdict=VERDICT,
+        summary=[_for_template(table) for table in page.summary],
         tables=[_for_template(table) for table in page.tables],
         figures=[(figure, _as_address(drawing.svg)) for figure, drawing in page.figures],
     )
@@ -85,11 +89,18 @@ def _as_address(svg: bytes) -> str:
 
 
 def _for_template(table: Table) -> dict[str, Any]:
+    table = shown(table)
     cells = [
         [_marked(cell) if isinstance(cell, Parameter) else text for cell, text in zip(row, texts, strict=True)]
         for row, texts in zip(table.rows, written(table), strict=True)
     ]
-    return {"table": table, "numeric": table.is_number, "rows": cells}
+    return {"table": table, "numeric": table.is_number, "rows": cells, "shape": _shape(table)}
+
+
+def _shape(table: Table) -> str:
+    """Return the class of style of a table."""
+    count = len(table.columns)
+    return "narrow" if count <= _NARROW else "usual" if count <= _WIDE else "wide"
 
 
 def _marked(parameter: Parameter) -> str:

@@ -44,7 +44,7 @@ def _contact(result: BoltedLapResult) -> Table:
         )  # fmt: skip
     columns = ("interface", "force, N", "preload, N", "largest pressure, MPa", "closed", "slipping", "slip ratio")
     note = (
-        f"Elongation of the bolt {1e6 * state.elongation:.1f} um; the lap is closed up to "
+        f"Elongation of the bolt {1e6 * state.elongation:.1f} µm; the lap is closed up to "
         f"{1e3 * state.contact_radius:.1f} mm from the axis. "
         "The slip ratio is tangential force over friction times normal force, at most 1."
     )
@@ -92,7 +92,7 @@ def _resonances(result: BoltedLapResult, key: str, title: str, *, transferred: b
         cells.append((*one.found[:2], *(float(x) for pair in zip(frequency, amplitude, strict=True) for x in pair)))
     columns = ["joint DOFs by", "estimator"]
     for peak in peaks:
-        columns += [f"{peak.direction} {peak.freq_hz:g} Hz: frequency %", "amplitude %"]
+        columns += [f"{peak.direction} {peak.freq_hz:g} Hz: frequency, %", "amplitude, %"]
     note = (
         "Errors (4.12) and (4.11) in percent; a resonance is sought within 15 % of the actual one, between the lines. "
         "The last row couples the beams by the full 6 x 6 K*(w) of the reference points. What remains there comes "
