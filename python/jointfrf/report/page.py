@@ -12,12 +12,12 @@ from urllib.parse import quote
 from jointfrf.dofs import Parameter
 from jointfrf.report.draw import Drawing
 from jointfrf.report.figure import Figure
-from jointfrf.report.table import VERDICT, Table, shown, written
+from jointfrf.report.table import VERDICT, Table, shown, turned, written
 
 __all__ = ["Page", "make_page"]
 
-#: Up to so many columns fit on any screen; more than so many are written smaller.
-_NARROW, _WIDE = 4, 9
+#: Up to so many columns fit on any screen; more than so many are written smaller; more than so many become rows.
+_NARROW, _WIDE, _WIDEST = 4, 9, 12
 _TEMPLATE = Path(__file__).with_name("page.html.jinja")
 
 
@@ -90,6 +90,8 @@ def _as_address(svg: bytes) -> str:
 
 def _for_template(table: Table) -> dict[str, Any]:
     table = shown(table)
+    if len(table.columns) > _WIDEST and len(table.rows) < _WIDEST:
+        table = turned(table)
     cells = [
         [_marked(cell) if isinstance(cell, Parameter) else text for cell, text in zip(row, texts, strict=True)]
         for row, texts in zip(table.rows, written(table), strict=True)

@@ -10,7 +10,7 @@ import numpy as np
 
 from jointfrf.dofs import Parameter
 
-__all__ = ["VERDICT", "Cell", "Table", "as_text", "number", "plain_rows", "shown", "table_csv", "written"]
+__all__ = ["VERDICT", "Cell", "Table", "as_text", "number", "plain_rows", "shown", "table_csv", "turned", "written"]
 
 Cell = str | float | Parameter | None
 
@@ -71,6 +71,24 @@ def shown(table: Table) -> Table:
 
     columns = (VERDICT, *table.columns[:at], *table.columns[at + 1 :])
     return replace(table, columns=columns, rows=tuple(first(row) for row in table.rows))
+
+
+def turned(table: Table) -> Table:
+    """Return a table of many columns with a row for each of its numbers, and a column for each row.
+
+    Examples
+    --------
+    >>> from jointfrf.report.table import Table, turned
+    >>> table = turned(Table("f", "Errors", ("by", "x, %", "y, %"), (("A", 1.0, 2.0), ("B", 3.0, 4.0))))
+    >>> table.columns, table.rows
+    (('by', 'A', 'B'), (('x, %', 1.0, 3.0), ('y, %', 2.0, 4.0)))
+    """
+    names = table.is_number.index(True) if any(table.is_number) else 1
+    heads = tuple(", ".join(map(number, row[:names])) for row in table.rows)
+    rows = tuple((column, *(row[c] for row in table.rows)) for c, column in enumerate(table.columns[names:], names))
+    percentages = heads if set(table.columns[names:]) <= set(table.percentages) else ()
+    columns = (", ".join(table.columns[:names]), *heads)
+    return replace(table, columns=columns, rows=rows, failing=(), percentages=percentages)
 
 
 def number(value: Cell, digits: int = _DIGITS) -> str:

@@ -119,7 +119,7 @@ def _unmeasured(result: BoltedLapResult) -> Iterator[Figure]:
             panels = []
             for parameter, actual in parameters:
                 values, fitted = _values(result, one.k_lines, parameter), fits[parameter]
-                curve = Curve("line by line", freq, values, "high")
+                curve = Curve("line by line", freq, values, "ismm")
                 levels = (Level("actual", actual, "actual"), Level("compliance fit", fitted, "compliance"))
                 limits = bulk_limits([values], [actual])
                 title, label = f"compliance fit: {fitted / actual:.3g} of the actual", parameter_label(parameter)

@@ -33,11 +33,12 @@ def _preload(result: BoltedLapResult) -> Table:
 
 def _worst_errors(result: BoltedLapResult) -> Table:
     cells = tuple(
-        (*named, *(number(_worst(result, named, d, transferred), 2) for transferred in (False, True) for d in "yx"))
+        (*named, *(_worst(result, named, d, transferred) for transferred in (False, True) for d in "yx"))
         for named in dict.fromkeys(one.found[:2] for one in result.regenerated)
     )
-    columns = ("joint DOFs by", "estimator", "same beams: y", "x", "other beam B: y", "x")
-    return Table("worst", "Largest error (4.12) of a resonance of the tip, percent", columns, cells)
+    columns = ("joint DOFs by", "estimator", "same beams: y", "same beams: x", "other beam B: y", "other beam B: x")
+    title = "Largest error (4.12) of a resonance of the tip, percent"
+    return Table("worst", title, columns, cells, percentages=columns)
 
 
 def _worst(result: BoltedLapResult, named: tuple[str, str], direction: str, transferred: bool) -> float:

@@ -95,11 +95,11 @@ def _resonances(result: BoltedLapResult, key: str, title: str, *, transferred: b
         columns += [f"{peak.direction} {peak.freq_hz:g} Hz: frequency, %", "amplitude, %"]
     note = (
         "Errors (4.12) and (4.11) in percent; a resonance is sought within 15 % of the actual one, between the lines. "
-        "The last row couples the beams by the full 6 x 6 K*(w) of the reference points. What remains there comes "
+        "K* line by line couples the beams by the full 6 x 6 K*(w) of the reference points. What remains there comes "
         "neither from noise nor from rotations: a joint between two points has no mass, and the beams also press on "
         "each other, which it leaves out."
     )
-    return Table(key, title, tuple(columns), tuple(cells), (), note)
+    return Table(key, title, tuple(columns), tuple(cells), (), note, percentages=tuple(columns))
 
 
 def _noise(result: BoltedLapResult) -> Table:
