@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import io
-import re
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from jointfrf.report.figure import Figure, Panel, Surface
+from jointfrf.report.svg import shortened
 from jointfrf.report.ticks import format_axis
 
 __all__ = ["STYLES", "Drawing", "Style", "draw"]
@@ -52,6 +52,8 @@ STYLES = {
 }
 _SHADES = ("#ececec", "#d2d2d2", "#bdbdbd")
 _RESOLUTION, _MARKER = 130, 2.5
+#: Width of thin curves, as a share of that of others.
+_THIN = 0.55
 #: Styles of curves with more detail than lines are good for: an image in a drawing of lines.
 _DENSE = ("faint", "dots")
 #: The middle of a distribution is seen through what lies around it.
@@ -100,6 +102,7 @@ def draw(figure: Figure) -> Drawing:
                 _draw_panel(axes[-1], panel, figure.columns)
                 if column and panel.intervals and _names(panel) == _names(figure.panels[i - 1]):
                     axes[-1].tick_params(labelleft=False)
+        _draw_axes_of_space([ax for ax in axes if not ax.axison])
         _add_legend(canvas, axes)
         canvas.align_ylabels(axes)
         if figure.heading:
@@ -109,18 +112,7 @@ def draw(figure: Figure) -> Drawing:
         canvas.savefig(png, format="png", dpi=_RESOLUTION, metadata={"Software": None})
         canvas.set_layout_engine("none")  # it is found, and takes half the time
         canvas.savefig(svg, format="svg", dpi=_RESOLUTION, metadata={"Date": None, "Creator": None})
-    return Drawing(png.getvalue(), _shortened(svg.getvalue().decode()).encode())
-
-
-def _shortened(svg: str) -> str:
-    """Write each line as steps from point to point, in hundredths of a typographic point: a third of the file."""
-
-    def path(match: re.Match[str]) -> str:
-        points = np.round(np.array(match[1].replace("L", " ").split(), np.float64).reshape(-1, 2), 2)
-        steps = np.diff(points, axis=0, prepend=0)
-        return ' d="m' + " ".join(f"{value:.2f}".rstrip("0").rstrip(".") for value in steps.ravel()) + (match[2] + '"')
-
-    return re.sub(r' d="M ([\d.\sL-]+?)\s*(z?)\s*"', path, svg)
+    return Drawing(png.getvalue(), shortened(svg.getvalue().decode()).encode())
 
 
 def _names(panel: Panel) -> list[str]:
@@ -178,6 +170,7 @@ def _draw_curves(ax: Any, panel: Panel) -> None:
         ax.fill_between(ribbon.x, ribbon.low, ribbon.high, color=colour, alpha=0.25, lw=0, label=ribbon.label)
     for curve in panel.curves:
         colour, dashes, width, marker = STYLES[curve.style]
+        width *= _THIN if curve.thin else 1
         look = {"color": colour, "ls": dashes, "lw": width, "marker": marker, "ms": _MARKER}
         dense = curve.style in _DENSE
         (line,) = ax.plot(
@@ -225,7 +218,6 @@ def _draw_surface(ax: Any, surface: Surface, labels: tuple[str, str], beside: in
     ax.set_aspect("equal")
     if surface.faces.shape[2] == 3:
         ax.set_axis_off()
-        _draw_axes_of_space(ax)
     else:
         format_axis(ax.xaxis, labels[0], beside=beside)
         format_axis(ax.yaxis, labels[1])
@@ -234,17 +226,19 @@ def _draw_surface(ax: Any, surface: Surface, labels: tuple[str, str], beside: in
         format_axis(bar.ax.yaxis, surface.label)
 
 
-def _draw_axes_of_space(ax: Any) -> None:
-    """Draw arrows along x, y and z in the corner that a structure along z leaves free."""
-    (_, right), (low, high) = ax.get_xlim(), ax.get_ylim()
-    length = _ARROW * (high - low)
-    origin = np.array([right - 1.2 * length, low + 0.6 * length])
-    for letter, direction in zip("xyz", _VIEW[:2].T, strict=True):
-        ax.annotate("", origin + length * direction, origin, annotation_clip=False,
-                    arrowprops={"arrowstyle": "-|>", "lw": 0.8, "color": "#303030", "shrinkA": 0, "shrinkB": 0,
-                                "mutation_scale": 6})  # fmt: skip
-        place = origin + _LETTER * length * direction
-        ax.text(*place, letter, ha="center", va="center", style="italic", fontsize=7.5, color="#303030")
+def _draw_axes_of_space(axes: list[Any]) -> None:
+    """Give drawings in space one scale, and arrows along the axes in the corner that one along z leaves free."""
+    for ax in axes:
+        ax.set_xlim(min(one.get_xlim()[0] for one in axes), max(one.get_xlim()[1] for one in axes))
+        ax.set_ylim(min(one.get_ylim()[0] for one in axes), max(one.get_ylim()[1] for one in axes))
+        length = _ARROW * np.ptp(ax.get_ylim())
+        origin = np.array([ax.get_xlim()[0] + 0.8 * length, ax.get_ylim()[1] - 1.2 * length])
+        for letter, direction in zip("xyz", _VIEW[:2].T, strict=True):
+            ax.annotate("", origin + length * direction, origin, annotation_clip=False,
+                        arrowprops={"arrowstyle": "-|>", "lw": 0.8, "color": "#303030", "shrinkA": 0, "shrinkB": 0,
+                                    "mutation_scale": 6})  # fmt: skip
+            place = origin + _LETTER * length * direction
+            ax.text(*place, letter, ha="center", va="center", style="italic", fontsize=7.5, color="#303030")
 
 
 def _draw_intervals(ax: Any, panel: Panel) -> None:

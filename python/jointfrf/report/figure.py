@@ -18,12 +18,13 @@ NamedBands = tuple[tuple[str, tuple[Band, ...]], ...]
 
 @dataclass(frozen=True)
 class Curve:
-    """A line: y over x, drawn in one of `jointfrf.report.draw.STYLES`."""
+    """A line: y over x, drawn in one of `jointfrf.report.draw.STYLES`; `thin` where it is not to hide others."""
 
     label: str
     x: FloatArray
     y: FloatArray
     style: str
+    thin: bool = False
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
@@ -85,7 +86,8 @@ def make_page(page: Page) -> str:
 
 def _as_address(svg: bytes) -> str:
     """Return a drawing as the address of an image, in a quarter less than base64 takes."""
-    return "data:image/svg+xml," + quote(b" ".join(svg.split()), safe=" !$&'()*+,-./:;=?@_~|")
+    text = re.sub("<[^>]*>", lambda tag: tag[0].replace("'", "").replace('"', "'"), svg.decode())
+    return "data:image/svg+xml," + quote(" ".join(text.split()), safe=" !$&'()*+,-./:;=?@_~|")
 
 
 def _for_template(table: Table) -> dict[str, Any]:

@@ -56,8 +56,8 @@ def tick_texts(values: Sequence[float]) -> list[str]:
     >>> from jointfrf.report.ticks import tick_texts
     >>> tick_texts([-0.5, 0.0, 0.5, 1.0])
     ['−0.5', '0.0', '0.5', '1.0']
-    >>> tick_texts([1e-7, 1.0])
-    ['1e−07', '1']
+    >>> tick_texts([0.0, 1e-7])
+    ['0', '1e−07']
     """
     for decimals in range(5):
         if all(abs(value - round(value, decimals)) <= 1e-6 * max(map(abs, values)) for value in values):

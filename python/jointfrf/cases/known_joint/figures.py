@@ -281,7 +281,7 @@ def _method_panels(
         lines = _lines(result, f, p)[:, inside]
         medians.append(Curve(_METHOD_NAMES[f.method], freq[inside], np.median(lines, axis=0), f.method))
         if f in shown:
-            single.append(Curve(_METHOD_NAMES[f.method], freq[inside], lines[0], f.method))
+            single.append(Curve(_METHOD_NAMES[f.method], freq[inside], lines[0], f.method, thin=True))
     limits = bulk_limits([curve.y for curve in single + medians], around=actual)
     label, (levels, fitted) = parameter_label(result.case.parameters[p]), _known_and_fitted(result, found[0].noise, p)
     both = (("one realisation", single), ("median of the realisations", medians))
