@@ -90,7 +90,8 @@ def draw(figure: Figure) -> Drawing:
 
     heights = _row_heights(figure)
     # The settings hold inside this block only.
-    with matplotlib.rc_context({**_FONTS, **_SETTINGS, "svg.hashsalt": figure.key}):  # type: ignore[arg-type]
+    settings: dict[str, Any] = {**_FONTS, **_SETTINGS, "svg.hashsalt": figure.key}
+    with matplotlib.rc_context(settings):  # type: ignore[arg-type]
         canvas = Canvas(figsize=(_WIDTH, sum(heights) + 0.4), layout="constrained")
         FigureCanvasAgg(canvas)
         grid = canvas.add_gridspec(len(heights), figure.columns, height_ratios=heights)

@@ -77,7 +77,7 @@ def test_a_page_of_neutral_parts():
     figure = Figure("f", "A <caption>", (Panel("", "x", "y", (Curve("a", x, x, "actual"),)),), number="9-9")
     page = Page("A & B", "About.", [SUMMARY], [TABLE], [(figure, draw(figure))], "The data", "text", [("file", "<x>")])
     text = make_page(page)
-    for part in ("A &amp; B", '<h3 id="short">What fits</h3>', "<i>k</i><sub>θx</sub>", 
+    for part in ("A &amp; B", '<h3 id="short">What fits</h3>', "<i>k</i><sub>θx</sub>",
                  "<b>Figure 9-9.</b> A &lt;caption&gt;.",
                  '<h2 id="subject">The data</h2>', "<summary>file</summary><pre>&lt;x&gt;</pre>", "note"):  # fmt: skip
         assert part in text

@@ -32,7 +32,7 @@ def _preload(result: BoltedLapResult) -> Table:
 
 
 def _worst_errors(result: BoltedLapResult) -> Table:
-    cells = tuple(
+    cells: tuple[tuple[Cell, ...], ...] = tuple(
         (*named, *(_worst(result, named, d, transferred) for transferred in (False, True) for d in "yx"))
         for named in dict.fromkeys(one.found[:2] for one in result.regenerated)
     )
