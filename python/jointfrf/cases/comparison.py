@@ -89,8 +89,8 @@ def agreement(tables: Sequence[Table]) -> Table:
         for i, row in enumerate(table.rows):
             named = dict(zip(table.columns, row, strict=True))
             if named.get("", verdict(None)) != verdict(None):
-                group = groups.setdefault((named.get("noise"), named.get("bands")), [])
-                group.append((named.get("parameter"), i not in table.failing))
+                own = groups.setdefault((named.get("noise"), named.get("bands")), [])
+                own.append((named.get("parameter"), i not in table.failing))
         for group, judged in groups.items():
             good = sum(fits for _, fits in judged)
             others = ", ".join(str(name) for name, fits in judged if name is not None and not fits)
