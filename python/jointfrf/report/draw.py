@@ -51,7 +51,8 @@ STYLES = {
     "dots": Style("#8c8c8c", "", 1.0, "."),
 }
 _SHADES = ("#ececec", "#d2d2d2", "#bdbdbd")
-_RESOLUTION, _MARKER = 130, 2.5
+#: Dots an inch of a PNG file, and of images inside an SVG file.
+_RESOLUTION, _RESOLUTION_INSIDE, _MARKER = 130, 96, 2.5
 #: Width of thin curves, as a share of that of others.
 _THIN = 0.55
 #: Styles of curves with more detail than lines are good for: an image in a drawing of lines.
@@ -112,7 +113,7 @@ def draw(figure: Figure) -> Drawing:
         # No version and no date inside.
         canvas.savefig(png, format="png", dpi=_RESOLUTION, metadata={"Software": None})
         canvas.set_layout_engine("none")  # it is found, and takes half the time
-        canvas.savefig(svg, format="svg", dpi=_RESOLUTION, metadata={"Date": None, "Creator": None})
+        canvas.savefig(svg, format="svg", dpi=_RESOLUTION_INSIDE, metadata={"Date": None, "Creator": None})
     return Drawing(png.getvalue(), shortened(svg.getvalue().decode()).encode())
 
 
