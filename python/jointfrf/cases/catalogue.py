@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,7 +18,7 @@ from jointfrf.files import write_file
 from jointfrf.report.draw import draw
 from jointfrf.report.figure import Figure, figure_csv
 from jointfrf.report.page import Page, make_page
-from jointfrf.report.table import Table, plain_rows, table_csv
+from jointfrf.report.table import Table, plain_rows, shown, table_csv
 
 __all__ = [
     "CaseOutput",
@@ -51,10 +52,10 @@ class CaseOutput:
         What the `compute` of its kind returned.
     tables : list of Table
     figures : list of Figure
-    summary : list of str
-        A few sentences.
+    summary : list of Table
+        What came out, in short.
     report : Path
-        The HTML report; CSV, PNG and JSON files stand beside it.
+        The HTML report; CSV, PNG, SVG and JSON files stand beside it.
     printed : list of Table
         The tables that are worth printing.
     """
@@ -63,7 +64,7 @@ class CaseOutput:
     result: Any
     tables: list[Table]
     figures: list[Figure]
-    summary: list[str]
+    summary: list[Table]
     report: Path
     printed: list[Table]
 
@@ -172,8 +173,14 @@ def _common(folder: Path, table: TomlTable, expected: TomlTable) -> Case:
 
 
 def numbered(case: Case, figures: Sequence[Figure]) -> list[Figure]:
-    """Give figures their numbers in the source, where they have one."""
-    return [replace(figure, number=case.figure_numbers.get(figure.key, "")) for figure in figures]
+    """Give figures their numbers in the source and its order; those that have none follow as they are."""
+    named = [replace(figure, number=case.figure_numbers.get(figure.key, "")) for figure in figures]
+    return sorted(named, key=lambda figure: (not figure.number, _number_key(figure.number)))
+
+
+def _number_key(number: str) -> list[tuple[int, str]]:
+    """Order "3-9a", "3-9b", "3-10", "4-32 and 4-33" as they stand in the source."""
+    return [(int(digits), letter) for digits, letter in re.findall(r"(\d+)([a-z]?)", number)]
 
 
 def run_case(
@@ -192,7 +199,7 @@ def run_case(
         Folder with `case.toml`.
     out : Path or str
         Results go to a folder with the case's name in there: `report.html`, `results.json`, `tables/*.csv`,
-        `figures/*.png` and `figures/*.csv`.
+        `figures/*.png`, `figures/*.svg` and `figures/*.csv`.
     realisations : int, optional
         Instead of the number that the case names.
     workers : Workers, optional
@@ -221,12 +228,12 @@ def run_case(
     count = case.realisations if realisations is None else realisations
     result = kind.compute(case, count, at_work)
     tables, figures = kind.tables(result), numbered(case, kind.figures(result))
-    sentences = kind.summary(result, tables)
+    summary = kind.summary(result, tables)
     content = _common_numbers(case, count, tables) | kind.numbers(result)
     page = Page(
         title=case.title,
         about=_about(case, count),
-        summary=sentences,
+        summary=summary,
         tables=tables,
         figures=list(zip(figures, at_work.map(draw, figures), strict=True)),
         subject="The case",
@@ -235,13 +242,14 @@ def run_case(
     )
     _write(target, page, content)
     printed = [table for table in tables if table.key not in kind.not_printed]
-    return CaseOutput(case, result, tables, figures, sentences, target / "report.html", printed)
+    return CaseOutput(case, result, tables, figures, summary, target / "report.html", printed)
 
 
 def _write(folder: Path, page: Page, content: dict[str, Any]) -> None:
     """Write a report and, beside it, its tables, figures and numbers."""
-    for figure, png in page.figures:
-        write_file(folder / "figures" / f"{figure.key}.png", png)
+    for figure, drawing in page.figures:
+        write_file(folder / "figures" / f"{figure.key}.png", drawing.png)
+        write_file(folder / "figures" / f"{figure.key}.svg", drawing.svg)
         write_file(folder / "figures" / f"{figure.key}.csv", figure_csv(figure))
     for table in page.tables:
         write_file(folder / "tables" / f"{table.key}.csv", table_csv(table))
@@ -271,6 +279,7 @@ def _common_numbers(case: Case, count: int, tables: list[Table]) -> dict[str, An
         "seed": case.seed,
         "frequency_hz": {"first": case.freq_hz[0], "last": case.freq_hz[-1], "lines": case.freq_hz.size},
         "tables": {
-            table.key: {"title": table.title, "columns": table.columns, "rows": plain_rows(table)} for table in tables
+            table.key: {"title": table.title, "columns": table.columns, "rows": plain_rows(table)}
+            for table in map(shown, tables)
         },
     }

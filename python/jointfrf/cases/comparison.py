@@ -1,4 +1,4 @@
-"""Expected natural frequencies of an assembly, and the table that compares them with the computed ones."""
+"""Verdicts: on natural frequencies beside the expected ones, and how many of all tables fit."""
 
 from __future__ import annotations
 
@@ -65,16 +65,35 @@ def frequency_table(
             if good is not None and not good:
                 failing.append(len(cells))
             cells.append((*name, freq, known, difference, verdict(good)))
-    all_columns = (*columns, "Hz", "expected Hz", "difference %", "")
+    all_columns = (*columns, "found, Hz", "expected, Hz", "difference, %", "")
     return Table(
-        "natural-frequencies", title, all_columns, tuple(cells), tuple(failing), note, percentages=("difference %",)
+        "natural-frequencies", title, all_columns, tuple(cells), tuple(failing), note, percentages=("difference, %",)
     )
 
 
-def agreement(table: Table) -> list[str]:
-    """Say how many natural frequencies agree; nothing where none is known."""
-    known = sum(row[table.columns.index("expected Hz")] is not None for row in table.rows)
-    if not known:
-        return []
-    good = known - len(table.failing)
-    return [f"{good} of {known} natural frequencies of the assembly agree with the expected values."]
+def agreement(tables: Sequence[Table]) -> Table:
+    """Build the table that counts the verdicts of others, for each noise and each set of bands by itself.
+
+    Parameters
+    ----------
+    tables : sequence of Table
+
+    Returns
+    -------
+    Table
+        How many rows fit, and which parameters do not.
+    """
+    cells: list[tuple[Cell, ...]] = []
+    for table in tables:
+        groups: dict[tuple[Cell, ...], list[tuple[Cell, bool]]] = {}
+        for i, row in enumerate(table.rows):
+            named = dict(zip(table.columns, row, strict=True))
+            if named.get("", verdict(None)) != verdict(None):
+                own = groups.setdefault((named.get("noise"), named.get("bands")), [])
+                own.append((named.get("parameter"), i not in table.failing))
+        for group, judged in groups.items():
+            good = sum(fits for _, fits in judged)
+            others = ", ".join(str(name) for name, fits in judged if name is not None and not fits)
+            cells.append((table.title, *group, f"{good} of {len(judged)}", others, verdict(good == len(judged))))
+    failing = tuple(i for i, row in enumerate(cells) if row[-1] == verdict(False))
+    return Table("agreement", "What fits", ("table", "noise", "bands", "fit", "do not", ""), tuple(cells), failing)

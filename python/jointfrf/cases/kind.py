@@ -72,7 +72,7 @@ class CaseKind(Generic[CaseT, ResultT]):
     figures : callable
         ``figures(result)``; their numbers in the source are added afterwards.
     summary : callable
-        ``summary(result, tables)`` says in a few sentences what came out.
+        ``summary(result, tables)`` returns short tables that say what came out.
     numbers : callable
         ``numbers(result)`` returns what `results.json` holds beside the common part and the tables.
     not_printed : tuple of str
@@ -93,7 +93,7 @@ class CaseKind(Generic[CaseT, ResultT]):
     compute: Callable[[CaseT, int, Workers], ResultT]
     tables: Callable[[ResultT], list[Table]]
     figures: Callable[[ResultT], list[Figure]]
-    summary: Callable[[ResultT, list[Table]], list[str]]
+    summary: Callable[[ResultT, list[Table]], list[Table]]
     numbers: Callable[[ResultT], dict[str, Any]]
     not_printed: tuple[str, ...] = ()
     keys: KeyTable | None = None

@@ -57,6 +57,5 @@ def _show_output(output: CaseOutput) -> None:
     """Print the summary and the tables of a case."""
     heading = f"{output.case.name}: {output.case.title}"
     print(f"{heading}\n{'=' * len(heading)}\n")
-    print(*(f"- {sentence}" for sentence in output.summary), "", sep="\n")
-    for table in output.printed:
+    for table in (*output.summary, *output.printed):
         print(as_text(table), end="\n\n")

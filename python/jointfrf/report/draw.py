@@ -8,8 +8,17 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jointfrf.report.figure import Figure, Panel, Surface
+from jointfrf.report.svg import shortened
+from jointfrf.report.ticks import format_axis
 
-__all__ = ["STYLES", "Style", "draw"]
+__all__ = ["STYLES", "Drawing", "Style", "draw"]
+
+
+class Drawing(NamedTuple):
+    """A figure drawn twice: a PNG file for documents, and an SVG file, sharp at every size."""
+
+    png: bytes
+    svg: bytes
 
 
 class Style(NamedTuple):
@@ -26,6 +35,9 @@ STYLES = {
     "actual": Style("#000000", "-", 1.5),
     "initial": Style("#8c8c8c", "--", 1.2),
     "measured": Style("#e07b00", "-", 0.7),
+    "mean": Style("#c0392b", (0, (5, 1.5)), 2.2),
+    "stiffness": Style("#8e7cc3", "-", 2.4),
+    "damping": Style("#2e7d4f", (0, (4, 1.5, 1, 1.5, 1, 1.5)), 1.3),
     "ismm": Style("#1b4f9c", "-", 1.1),
     "ismm-kj": Style("#1b4f9c", (0, (5, 1)), 1.1),
     "inverse-substructuring": Style("#1b4f9c", "--", 1.1),
@@ -36,21 +48,33 @@ STYLES = {
     "decoupling-ss": Style("#d96a9a", (0, (6, 2)), 1.3),
     "low": Style("#2f7fbf", ":", 1.4),
     "high": Style("#e07b00", "--", 1.2),
-    "faint": Style("#6b6b6b", "-", 0.4),
+    "faint": Style("#a8a8a8", "-", 0.3),
     "dots": Style("#8c8c8c", "", 1.0, "."),
 }
 _SHADES = ("#ececec", "#d2d2d2", "#bdbdbd")
-_RESOLUTION, _MARKER = 130, 2.5
+#: Dots an inch of a PNG file, and of images inside an SVG file.
+_RESOLUTION, _RESOLUTION_INSIDE, _MARKER = 130, 96, 2.5
+#: Width of thin curves, as a share of that of others.
+_THIN = 0.55
+#: Styles of curves with more detail than lines are good for: an image in a drawing of lines.
+_DENSE = ("faint", "dots")
+#: The middle of a distribution is seen through what lies around it.
+_ON_TOP, _HALO = ("ismm", "compliance"), 1.2
 _HEADING = 10
 #: Size of a figure, inches: fits the text width of A4.
 _WIDTH, _PANEL_HEIGHT, _SPACE_HEIGHT = 7.0, 2.75, 1.5
+#: Height of a panel of intervals: its frame, and each.
+_INTERVALS = (0.7, 0.36)
 #: Directions on the page of a drawing in space, to the right and up, and towards the reader: z lies along, y up.
 _VIEW = np.array([[-0.419, 0.0, 0.908], [0.410, 0.893, 0.189], [-0.810, 0.451, -0.374]])
+#: Arrows that show the axes of space: their length as a share of the height of what is drawn, and place of the letters.
+_ARROW, _LETTER = 0.28, 1.45
+_SETTINGS = {"svg.fonttype": "none", "path.simplify_threshold": 0.2}
 _FONTS = {"font.size": 8.5, "axes.titlesize": 9, "legend.fontsize": 7.5, "axes.grid": True, "grid.alpha": 0.3,
           "grid.linewidth": 0.5, "axes.axisbelow": True, "lines.solid_capstyle": "round"}  # fmt: skip
 
 
-def draw(figure: Figure) -> bytes:
+def draw(figure: Figure) -> Drawing:
     """Draw a figure.
 
     Parameters
@@ -59,38 +83,68 @@ def draw(figure: Figure) -> bytes:
 
     Returns
     -------
-    bytes
-        A PNG file.
+    Drawing
+        A PNG and an SVG file; the same data give the same files.
     """
     import matplotlib
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure as Canvas
 
-    rows = -(-len(figure.panels) // figure.columns)
-    height = max(_PANEL_HEIGHT, *(0.9 + 0.34 * len(panel.intervals) for panel in figure.panels))
-    if len(figure.panels) == 1:
-        height *= 1.25
-    if all(_in_space(panel) for panel in figure.panels):
-        height = _SPACE_HEIGHT
+    heights = _row_heights(figure)
     # The settings hold inside this block only.
-    with matplotlib.rc_context(_FONTS):  # type: ignore[arg-type]
-        canvas = Canvas(figsize=(_WIDTH, rows * height + 0.4), layout="constrained")
+    settings: dict[str, Any] = {**_FONTS, **_SETTINGS, "svg.hashsalt": figure.key}
+    with matplotlib.rc_context(settings):  # type: ignore[arg-type]
+        canvas = Canvas(figsize=(_WIDTH, sum(heights) + 0.4), layout="constrained")
         FigureCanvasAgg(canvas)
+        grid = canvas.add_gridspec(len(heights), figure.columns, height_ratios=heights)
         axes = []
         for i, panel in enumerate(figure.panels):
-            ax = canvas.add_subplot(rows, figure.columns, i + 1)
-            axes.append(ax)
-            if panel.surface is not None:
-                _draw_surface(ax, panel.surface, panel.title, (panel.x_label, panel.y_label))
-            else:
-                (_draw_intervals if panel.intervals else _draw_curves)(ax, panel)
+            row, column = divmod(i, figure.columns)
+            if not panel.is_blank:
+                axes.append(canvas.add_subplot(grid[row, column]))
+                _draw_panel(axes[-1], panel, figure.columns)
+                if column and panel.intervals and _names(panel) == _names(figure.panels[i - 1]):
+                    axes[-1].tick_params(labelleft=False)
+        _draw_axes_of_space([ax for ax in axes if not ax.axison])
         _add_legend(canvas, axes)
+        canvas.align_ylabels(axes)
         if figure.heading:
             canvas.suptitle(figure.heading, fontsize=_HEADING)
-        png = io.BytesIO()
-        # No version inside: the same data give the same file.
+        png, svg = io.BytesIO(), io.BytesIO()
+        # No version and no date inside.
         canvas.savefig(png, format="png", dpi=_RESOLUTION, metadata={"Software": None})
-    return png.getvalue()
+        canvas.set_layout_engine("none")  # it is found, and takes half the time
+        canvas.savefig(svg, format="svg", dpi=_RESOLUTION_INSIDE, metadata={"Date": None, "Creator": None})
+    return Drawing(png.getvalue(), shortened(svg.getvalue().decode()).encode())
+
+
+def _names(panel: Panel) -> list[str]:
+    return [interval.label for interval in panel.intervals]
+
+
+def _row_heights(figure: Figure) -> list[float]:
+    """Heights of the rows of panels, inches."""
+    rows = [figure.panels[i : i + figure.columns] for i in range(0, len(figure.panels), figure.columns)]
+    heights = []
+    for row in rows:
+        intervals = _INTERVALS[0] + _INTERVALS[1] * max(len(panel.intervals) for panel in row)
+        usual = _SPACE_HEIGHT if all(panel.is_blank or _in_space(panel) for panel in row) else _PANEL_HEIGHT
+        heights.append(max(usual * max(panel.height for panel in row), intervals if intervals > _PANEL_HEIGHT else 0))
+    return [1.25 * height for height in heights] if len(figure.panels) == 1 else heights
+
+
+def _draw_panel(ax: Any, panel: Panel, beside: int) -> None:
+    if panel.surface is not None:
+        _draw_surface(ax, panel.surface, (panel.x_label, panel.y_label), beside)
+    elif panel.intervals:
+        _draw_intervals(ax, panel)
+        format_axis(ax.xaxis, panel.x_label, beside=beside)
+    else:
+        _draw_curves(ax, panel)
+        format_axis(ax.xaxis, panel.x_label, beside=beside)
+        format_axis(ax.yaxis, panel.y_label, log=panel.log_y, step=panel.y_step)
+        ax.tick_params(labelbottom=bool(panel.x_label))
+    ax.set_title(panel.title)
 
 
 def _in_space(panel: Panel) -> bool:
@@ -109,22 +163,30 @@ def _add_legend(canvas: Any, axes: list[Any]) -> None:
 
 
 def _draw_curves(ax: Any, panel: Panel) -> None:
+    from matplotlib.patheffects import Normal, Stroke
+
     for i, (label, bands) in enumerate(panel.shades):
         for b, (low, high) in enumerate(bands):
             ax.axvspan(low, high, color=_SHADES[i % len(_SHADES)], lw=0, zorder=0, label=None if b else label)
     for ribbon in panel.ribbons:
         colour = STYLES[ribbon.style].colour
-        ax.fill_between(ribbon.x, ribbon.low, ribbon.high, color=colour, alpha=0.3, lw=0, label=ribbon.label)
+        ax.fill_between(ribbon.x, ribbon.low, ribbon.high, color=colour, alpha=0.25, lw=0, label=ribbon.label)
     for curve in panel.curves:
         colour, dashes, width, marker = STYLES[curve.style]
+        width *= _THIN if curve.thin else 1
         look = {"color": colour, "ls": dashes, "lw": width, "marker": marker, "ms": _MARKER}
-        ax.plot(curve.x, curve.y, label=curve.label or None, **look)
+        dense = curve.style in _DENSE
+        (line,) = ax.plot(
+            curve.x, curve.y, label=curve.label or None, rasterized=dense, zorder=1.5 if dense else 2, **look
+        )
+        if panel.ribbons and curve.style in _ON_TOP:
+            line.set_path_effects([Stroke(linewidth=width + _HALO, foreground="#ffffff"), Normal()])
     for level in panel.levels:
         colour, dashes, width, _ = STYLES[level.style]
         if not level.bands:
-            ax.axhline(level.value, color=colour, ls=dashes, lw=width, label=level.label)
+            ax.axhline(level.value, color=colour, ls=dashes, lw=width, label=level.label, zorder=1.9)
         for b, (low, high) in enumerate(level.bands):
-            ax.plot([low, high], [level.value] * 2, color=colour, ls=dashes, lw=2.2, label=None if b else level.label)
+            ax.plot([low, high], [level.value] * 2, color=colour, ls=dashes, lw=width, label=None if b else level.label)
     for i, (label, bands) in enumerate(panel.strips):
         for b, (low, high) in enumerate(bands):
             ax.axvspan(low, high, 0.01 + 0.03 * i, 0.03 + 0.03 * i, color=("#000000", "#7f7f7f")[i % 2], lw=0,
@@ -137,10 +199,9 @@ def _draw_curves(ax: Any, panel: Panel) -> None:
         ax.set_xlim(min(c.x[0] for c in panel.curves), max(c.x[-1] for c in panel.curves))
     if panel.y_limits:
         ax.set_ylim(*panel.y_limits)
-    ax.set(title=panel.title or None, xlabel=panel.x_label, ylabel=panel.y_label)
 
 
-def _draw_surface(ax: Any, surface: Surface, title: str, labels: tuple[str, str]) -> None:
+def _draw_surface(ax: Any, surface: Surface, labels: tuple[str, str], beside: int) -> None:
     """Draw shaded quadrilaterals in space or in a plane, light where the value is small."""
     from matplotlib.collections import PolyCollection
 
@@ -150,20 +211,37 @@ def _draw_surface(ax: Any, surface: Surface, title: str, labels: tuple[str, str]
         faces, values = (faces @ _VIEW[:2].T)[order], values[order]
         edges = None if edges is None else edges @ _VIEW[:2].T
     if edges is not None:
-        ax.add_collection(PolyCollection(list(edges), facecolors="none", edgecolors="#c8c8c8", linewidths=0.3))
-    patches = PolyCollection(list(faces), cmap="YlGnBu", edgecolors="#404040", linewidths=0.12)
+        ax.add_collection(PolyCollection(list(edges), facecolors="none", edgecolors="#c8c8c8", linewidths=0.3,
+                                         rasterized=True))  # fmt: skip
+    patches = PolyCollection(list(faces), cmap="YlGnBu", edgecolors="#404040", linewidths=0.12, rasterized=True)
     patches.set_array(values)
     patches.set_clim(0.0, max(float(values.max(initial=0)), np.finfo(float).tiny))
     ax.add_collection(patches)
     ax.autoscale_view()
     ax.set_aspect("equal")
-    ax.set_title(title)
     if surface.faces.shape[2] == 3:
         ax.set_axis_off()
     else:
-        ax.set(xlabel=labels[0], ylabel=labels[1])
+        format_axis(ax.xaxis, labels[0], beside=beside)
+        format_axis(ax.yaxis, labels[1])
     if surface.label:
-        ax.figure.colorbar(patches, ax=ax, label=surface.label, shrink=0.8, pad=0.02)
+        bar = ax.figure.colorbar(patches, ax=ax, shrink=0.8, pad=0.02)
+        format_axis(bar.ax.yaxis, surface.label)
+
+
+def _draw_axes_of_space(axes: list[Any]) -> None:
+    """Give drawings in space one scale, and arrows along the axes in the corner that one along z leaves free."""
+    for ax in axes:
+        ax.set_xlim(min(one.get_xlim()[0] for one in axes), max(one.get_xlim()[1] for one in axes))
+        ax.set_ylim(min(one.get_ylim()[0] for one in axes), max(one.get_ylim()[1] for one in axes))
+        length = _ARROW * np.ptp(ax.get_ylim())
+        origin = np.array([ax.get_xlim()[0] + 0.8 * length, ax.get_ylim()[1] - 1.2 * length])
+        for letter, direction in zip("xyz", _VIEW[:2].T, strict=True):
+            ax.annotate("", origin + length * direction, origin, annotation_clip=False,
+                        arrowprops={"arrowstyle": "-|>", "lw": 0.8, "color": "#303030", "shrinkA": 0, "shrinkB": 0,
+                                    "mutation_scale": 6})  # fmt: skip
+            place = origin + _LETTER * length * direction
+            ax.text(*place, letter, ha="center", va="center", style="italic", fontsize=7.5, color="#303030")
 
 
 def _draw_intervals(ax: Any, panel: Panel) -> None:
@@ -182,4 +260,4 @@ def _draw_intervals(ax: Any, panel: Panel) -> None:
     ax.set_ylim(-0.7, len(places) - 0.3)
     if panel.x_limits:
         ax.set_xlim(*panel.x_limits)
-    ax.set(title=panel.title or None, xlabel=panel.x_label, ylabel=panel.y_label or None)
+    ax.set_ylabel(panel.y_label)

@@ -18,12 +18,13 @@ NamedBands = tuple[tuple[str, tuple[Band, ...]], ...]
 
 @dataclass(frozen=True)
 class Curve:
-    """A line: y over x, drawn in one of `jointfrf.report.draw.STYLES`."""
+    """A line: y over x, drawn in one of `jointfrf.report.draw.STYLES`; `thin` where it is not to hide others."""
 
     label: str
     x: FloatArray
     y: FloatArray
     style: str
+    thin: bool = False
 
 
 @dataclass(frozen=True)
@@ -75,7 +76,10 @@ class Surface:
 class Panel:
     """Axes of a figure.
 
-    `shades` are (label, bands) in Hz; `strips` are bands drawn as bars at the bottom.
+    Labels are "quantity, unit". An empty `x_label` leaves out the numbers, too: the panel below shares them.
+    `shades` are (label, bands) in Hz; `strips` are bands drawn as bars at the bottom. `y_step` is the distance of the
+    numbers along y, where it is not to be chosen; `height` is relative to that of other panels. A panel that holds
+    nothing is left blank.
     """
 
     title: str
@@ -91,6 +95,13 @@ class Panel:
     x_limits: tuple[float, float] | None = None
     y_limits: tuple[float, float] | None = None
     surface: Surface | None = None
+    y_step: float | None = None
+    height: float = 1.0
+
+    @property
+    def is_blank(self) -> bool:
+        """Whether it holds nothing."""
+        return not (self.curves or self.ribbons or self.levels or self.intervals or self.surface)
 
 
 @dataclass(frozen=True)

@@ -75,7 +75,7 @@ def _panels(
 
 
 def write_fit(fits: Sequence[JointFit], folder: Path, source: str) -> list[Path]:
-    """Write ``identification.json`` and one PNG a DOF for each fit; nothing is left half-written.
+    """Write ``identification.json`` and a PNG and an SVG file a DOF for each fit; nothing is left half-written.
 
     Parameters
     ----------
@@ -102,7 +102,8 @@ def write_fit(fits: Sequence[JointFit], folder: Path, source: str) -> list[Path]
     contents: dict[str, str | bytes] = {"identification.json": text + "\n"}
     for i, fit in enumerate(fits):
         for figure in fit_figures(fit):
-            contents[f"{figure.key}.png" if i == 0 else f"{figure.key}_{fit.method}.png"] = draw(figure)
+            stem = figure.key if i == 0 else f"{figure.key}_{fit.method}"
+            contents[f"{stem}.png"], contents[f"{stem}.svg"] = draw(figure)
     folder.mkdir(parents=True, exist_ok=True)
     for file, content in contents.items():
         write_file(folder / file, content)

@@ -1,19 +1,21 @@
-"""Tables as data, and written: as aligned text, as CSV, and cell by cell for a reader."""
+"""Tables as data, and written: as aligned text, as CSV, and cell by cell for a reader; the verdict always first."""
 
 from __future__ import annotations
 
 import csv
 import io
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from jointfrf.dofs import Parameter
 
-__all__ = ["Cell", "Table", "as_text", "number", "plain_rows", "table_csv", "written"]
+__all__ = ["VERDICT", "Cell", "Table", "as_text", "number", "plain_rows", "shown", "table_csv", "turned", "written"]
 
 Cell = str | float | Parameter | None
 
+#: Heading of verdicts.
+VERDICT = "verdict"
 _DIGITS, _DIGITS_OF_PERCENT = 5, 3
 
 
@@ -27,9 +29,10 @@ class Table:
         Name of its file, and of its place on a page.
     title : str
     columns : tuple of str
+        "quantity, unit". One without a name holds verdicts: whatever shows the table begins with it, see `shown`.
     rows : tuple of tuple
     failing : tuple of int
-        Rows whose last cell says that something does not fit.
+        Rows whose verdict is that something does not fit.
     note : str
     percentages : tuple of str
         Columns that are written with three digits instead of five.
@@ -47,6 +50,45 @@ class Table:
     def is_number(self) -> list[bool]:
         """Which columns hold numbers."""
         return [any(isinstance(row[c], float) for row in self.rows) for c in range(len(self.columns))]
+
+
+def shown(table: Table) -> Table:
+    """Return a table as it is shown: its verdicts, if it holds any, in the first column, which is named.
+
+    Examples
+    --------
+    >>> from jointfrf.report.table import Table, shown
+    >>> table = shown(Table("k", "Stiffness", ("k, N/m", ""), ((2.0, "fits"),)))
+    >>> table.columns, table.rows
+    (('verdict', 'k, N/m'), (('fits', 2.0),))
+    """
+    if "" not in table.columns:
+        return table
+    at = table.columns.index("")
+
+    def first(row: tuple[Cell, ...]) -> tuple[Cell, ...]:
+        return (row[at], *row[:at], *row[at + 1 :])
+
+    columns = (VERDICT, *table.columns[:at], *table.columns[at + 1 :])
+    return replace(table, columns=columns, rows=tuple(first(row) for row in table.rows))
+
+
+def turned(table: Table) -> Table:
+    """Return a table of many columns with a row for each of its numbers, and a column for each row.
+
+    Examples
+    --------
+    >>> from jointfrf.report.table import Table, turned
+    >>> table = turned(Table("f", "Errors", ("by", "x, %", "y, %"), (("A", 1.0, 2.0), ("B", 3.0, 4.0))))
+    >>> table.columns, table.rows
+    (('by', 'A', 'B'), (('x, %', 1.0, 3.0), ('y, %', 2.0, 4.0)))
+    """
+    names = table.is_number.index(True) if any(table.is_number) else 1
+    heads = tuple(", ".join(map(number, row[:names])) for row in table.rows)
+    rows = tuple((column, *(row[c] for row in table.rows)) for c, column in enumerate(table.columns[names:], names))
+    percentages = heads if set(table.columns[names:]) <= set(table.percentages) else ()
+    columns = (", ".join(table.columns[:names]), *heads)
+    return replace(table, columns=columns, rows=rows, failing=(), percentages=percentages)
 
 
 def number(value: Cell, digits: int = _DIGITS) -> str:
@@ -73,6 +115,7 @@ def written(table: Table) -> list[list[str]]:
 
 def as_text(table: Table) -> str:
     """Write a table in aligned columns, numbers to the right."""
+    table = shown(table)
     cells = written(table)
     widths = [max(len(row[c]) for row in [list(table.columns), *cells]) for c in range(len(table.columns))]
 
@@ -90,8 +133,9 @@ def plain_rows(table: Table) -> list[list[str | float | None]]:
 
 def table_csv(table: Table) -> str:
     """Write a table as CSV, numbers in full."""
+    table = shown(table)
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([column or "verdict" for column in table.columns])
+    writer.writerow(table.columns)
     writer.writerows([["" if cell is None else cell for cell in row] for row in plain_rows(table)])
     return text.getvalue()

@@ -85,7 +85,9 @@ OSCILLATOR = CaseKind(
     compute=compute,
     tables=tables,
     figures=figures,
-    summary=lambda result, tables: [f"{len(tables)} table, {result.stiffness.size} realisations."],
+    summary=lambda result, tables: [
+        Table("short", "In short", ("tables", "realisations"), ((str(len(tables)), str(result.stiffness.size)),))
+    ],
     numbers=lambda result: {"stiffness": result.stiffness.tolist()},
 )
 TEXT = """
@@ -128,7 +130,7 @@ def test_a_kind_of_ones_own_goes_through_the_same_door(folder, tmp_path):
     assert (written / "tables" / "found.csv").read_text().startswith("parameter,unit,actual,median\nk_x,N/m,500.0,")
     assert (written / "figures" / "frf.png").read_bytes().startswith(b"\x89PNG")
     report = output.report.read_text()
-    for words in ("1 table, 40 realisations.", "<b>Figure 7-1.</b>", "<i>k</i><sub>x</sub>", "mass = 2.0"):
+    for words in ("In short</h3>", "<span>40</span>", "<b>Figure 7-1.</b>", "<i>k</i><sub>x</sub>", "mass = 2.0"):
         assert words in report
     assert [table.key for table in output.printed] == ["found"]
 

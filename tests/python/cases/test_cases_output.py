@@ -91,7 +91,7 @@ def test_report_holds_every_table_and_figure_and_no_link(outputs):
             assert body.count("<tr") == len(table.rows) + 1
             assert body.count('class="failing"') == len(table.failing)
         figures = output.figures
-        assert text.count('src="data:image/png;base64,') == len(figures)
+        assert text.count('src="data:image/svg+xml,') == len(figures)
         assert not re.search(r'(?:src|href)="(?!data:|#)', text)
         assert "realisations = 1000" in text  # the case itself
         assert all(number in text for number in (f.number for f in figures))

@@ -74,7 +74,7 @@ def test_figures_are_written_and_nothing_else(identified):
         "joint_theta_x.png",
         "joint_y_inverse-substructuring.png",
         "joint_theta_x_inverse-substructuring.png",
-    }
+    } | {path.with_suffix(".svg").name for path in folder.glob("*.png")}
     for path in folder.glob("*.png"):
         assert path.read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
         assert path.stat().st_size > 20_000
@@ -92,7 +92,7 @@ def test_hammer_test_that_comes_with_the_project(tmp_path):
         low, high = fit[name]["confidence_interval_95"]
         assert low - bent < truth < high + bent
         assert abs(fit[name]["value"] - truth) < abs(plain[name]["value"] - truth) + bent
-    assert {path.suffix for path in out.iterdir()} == {".json", ".png"}
+    assert {path.suffix for path in out.iterdir()} == {".json", ".png", ".svg"}
     for word in ("6 responses x 6 excitations", "95 % interval", "residual", "warning:"):
         assert word in result.stdout
 

@@ -54,27 +54,34 @@ def test_lines_of_parameters():
 
 
 TABLE = Table(
-    "k", "Found", ("parameter", "value", "RMSE %", ""),
+    "k", "Found", ("parameter", "value", "RMSE, %", ""),
     ((Parameter.parse("k_theta_x"), 1234.5678, 1.23456, "fits"), (Parameter.parse("c_y"), 2.0, 5.0, "does not fit")),
-    failing=(1,), note="a note", percentages=("RMSE %",),
+    failing=(1,), note="a note", percentages=("RMSE, %",),
 )  # fmt: skip
 
 
 def test_a_parameter_in_a_table_is_its_name():
-    assert as_text(TABLE).splitlines()[3].split() == ["k_theta_x", "1234.6", "1.23", "fits"]
+    assert as_text(TABLE).splitlines()[3].split() == ["fits", "k_theta_x", "1234.6", "1.23"]
     assert plain_rows(TABLE)[1] == ["c_y", 2.0, 5.0, "does not fit"]
-    assert table_csv(TABLE).splitlines()[:2] == ["parameter,value,RMSE %,verdict", "k_theta_x,1234.5678,1.23456,fits"]
+    assert table_csv(TABLE).splitlines()[:2] == [
+        'verdict,parameter,value,"RMSE, %"',
+        "fits,k_theta_x,1234.5678,1.23456",
+    ]
+
+
+SUMMARY = Table("short", "What fits", ("table", "fit", ""), (("Found", "1 of 2", "does not fit"),), failing=(0,))
 
 
 def test_a_page_of_neutral_parts():
     x = np.arange(1.0, 5.0)
     figure = Figure("f", "A <caption>", (Panel("", "x", "y", (Curve("a", x, x, "actual"),)),), number="9-9")
-    page = Page("A & B", "About.", ["One."], [TABLE], [(figure, draw(figure))], "The data", "text", [("file", "<x>")])
+    page = Page("A & B", "About.", [SUMMARY], [TABLE], [(figure, draw(figure))], "The data", "text", [("file", "<x>")])
     text = make_page(page)
-    for part in ("A &amp; B", "<li>One.</li>", "<i>k</i><sub>θx</sub>", "<b>Figure 9-9.</b> A &lt;caption&gt;.",
+    for part in ("A &amp; B", '<h3 id="short">What fits</h3>', "<i>k</i><sub>θx</sub>",
+                 "<b>Figure 9-9.</b> A &lt;caption&gt;.",
                  '<h2 id="subject">The data</h2>', "<summary>file</summary><pre>&lt;x&gt;</pre>", "note"):  # fmt: skip
         assert part in text
-    assert text.count('class="failing"') == 1
+    assert text.count('class="failing"') == 2
     assert "subject" not in make_page(Page("t", "", [], [], []))
     assert not re.search(r'(?:src|href)="(?!data:|#)', text)
 
@@ -104,5 +111,6 @@ def test_figures_of_a_fit_hold_lines_fit_and_interval(fit):
         low, high = panel.y_limits
         assert low < panel.curves[1].y.min() <= panel.curves[1].y.max() < high
     drawn = draw(figures["joint_theta"])
-    assert drawn.startswith(b"\x89PNG")
+    assert drawn.png.startswith(b"\x89PNG")
+    assert drawn.svg.startswith(b"<svg")
     assert drawn == draw(figures["joint_theta"])

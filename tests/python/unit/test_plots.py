@@ -38,16 +38,16 @@ def figure(surface):
     return Figure("f", "", (Panel("head", "z, mm", "x, mm", surface=surface),), 1)
 
 
-def shades(png):
-    with Image.open(io.BytesIO(png)) as image:
+def shades(drawing):
+    with Image.open(io.BytesIO(getattr(drawing, "png", drawing))) as image:
         return np.asarray(image.convert("RGB")).astype(int)
 
 
 @pytest.mark.parametrize("view", VIEWS)
 def test_a_surface_is_drawn_and_drawn_alike(view):
-    png = draw(figure(VIEWS[view]()))
+    png = draw(figure(VIEWS[view]())).png
     assert png.startswith(PNG)
-    assert png == draw(figure(VIEWS[view]()))
+    assert png == draw(figure(VIEWS[view]())).png
     pixels = shades(png)
     assert pixels.shape[1] == 910
     assert 0.4 < (pixels.min(axis=2) > 200).mean() < 0.999  # mostly paper
@@ -67,8 +67,8 @@ def test_data_of_a_surface(view):
 
 def test_what_is_near_covers_what_is_far_in_any_order():
     surface = space_view()
-    png = draw(figure(surface))
-    assert png == draw(figure(replace(surface, faces=surface.faces[::-1], values=surface.values[::-1])))
+    png = draw(figure(surface)).png
+    assert png == draw(figure(replace(surface, faces=surface.faces[::-1], values=surface.values[::-1]))).png
     # Two faces, one straight behind the other along the line of sight: only the colour of the near one is seen.
     towards_reader = np.array([-0.810, 0.451, -0.374])
     near, values = surface.faces[0], np.array([1.0, 0.4])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -22,7 +23,9 @@ from jointfrf.cases.bolted_lap.routes import (
     route_lines,
 )
 from jointfrf.cases.definitions import Noise, constant_joint
+from jointfrf.cases.fitting import fit_viscous
 from jointfrf.cases.workers import Workers
+from jointfrf.errors import IllConditionedWarning
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.solids.preload import PreloadedLap
 
@@ -58,7 +61,8 @@ class Unmeasured(NamedTuple):
     ----------
     name : str
     k_lines : ndarray, shape (n_freq, 6, 6)
-    theta : ndarray, shape (12,)
+    theta, fitted : ndarray, shape (12,)
+        Means over bands, and the compliance fit.
     shift : ndarray, shape (2,)
         Largest error (4.12) of a resonance of the tip in x and in y, regenerated with theta, percent.
     """
@@ -66,6 +70,7 @@ class Unmeasured(NamedTuple):
     name: str
     k_lines: ComplexArray
     theta: FloatArray
+    fitted: FloatArray
     shift: FloatArray
 
 
@@ -225,9 +230,17 @@ def _unmeasured(case: BoltedLapCase, beams: BeamFrfs) -> list[Unmeasured]:
         "without z-theta_x (4.30)": no_z,
         "Measurements 1-4 (4.28)": measured_entries(),
     }
-    lines = {name: joint_stiffness_lines(gamma * np.tile(mask, (2, 2))) for name, mask in patterns.items()}
-    found = {name: (k, band_means(case, k)) for name, k in lines.items()}
-    return [Unmeasured(name, k, theta, _shift(case, beams, theta)) for name, (k, theta) in found.items()]
+    masked = {name: gamma * np.tile(mask, (2, 2)) for name, mask in patterns.items()}
+    found = []
+    for name, h in masked.items():
+        lines = joint_stiffness_lines(h)
+        theta = band_means(case, lines)
+        with warnings.catch_warnings():
+            # Without some of its entries a matrix may be singular.
+            warnings.simplefilter("ignore", IllConditionedWarning)
+            fitted = fit_viscous(case.freq_hz, DOFS, h[None])[0]
+        found.append(Unmeasured(name, lines, theta, fitted, _shift(case, beams, theta)))
+    return found
 
 
 def _shift(case: BoltedLapCase, beams: BeamFrfs, theta: FloatArray) -> FloatArray:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-
-import numpy as np
+from dataclasses import replace
 
 from jointfrf.cases.bolted_lap.compute import LINES, BoltedLapResult, RegeneratedTip
 from jointfrf.cases.bolted_lap.frfs import TIP_DIRECTIONS
@@ -12,6 +11,7 @@ from jointfrf.dofs import Parameter
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.report.axes import FREQUENCY, bulk_limits, parameter_label, parameter_lines, percentiles
 from jointfrf.report.figure import Curve, Figure, Interval, Level, Panel, Surface
+from jointfrf.report.receptance import ReceptanceCurve, receptance_panels
 
 __all__ = ["bolted_lap_figures"]
 
@@ -24,7 +24,7 @@ _DRAWN = (
 _LINE_STYLES = {
     "Measurements 1-4": "ismm",
     "central differences": "decoupling-rs",
-    "virtual points": "compliance",
+    "virtual points": "decoupling-sr",
     "multi-point": "decoupling-rr",
     "reference points": "low",
 }
@@ -59,22 +59,22 @@ def _regenerated(result: BoltedLapResult) -> Iterator[Figure]:
     for key, what in (("regenerated", "regenerated"), ("transferred", other)):
         for d, direction in reversed(list(enumerate(TIP_DIRECTIONS))):
             curves = _tip_curves(result, d, transferred=key == "transferred")
-            panel = Panel("", FREQUENCY, f"$|H_{{ss}}|$ in {direction}, m/N", curves, log_y=True)
+            panels = receptance_panels("", f"$|H_{{ss}}|$ in {direction}, m/N", curves)
             caption = f"Receptance of the tip in {direction}, {what}, from the identified joint"
-            yield Figure(f"{key}-{direction}", caption, (panel,))
+            yield Figure(f"{key}-{direction}", caption, panels)
 
 
-def _tip_curves(result: BoltedLapResult, d: int, *, transferred: bool) -> tuple[Curve, ...]:
+def _tip_curves(result: BoltedLapResult, d: int, *, transferred: bool) -> tuple[ReceptanceCurve, ...]:
     """Draw the FRF of the tip in a direction, of the solid model and as regenerated."""
 
     def regenerated(one: RegeneratedTip) -> ComplexArray:
         return one.transferred if transferred else one.h
 
     freq, actual = result.case.freq_hz, result.transferred if transferred else result.actual
-    curves = [Curve("solid model", freq, np.abs(actual[:, d]), "actual")]
+    curves = [ReceptanceCurve("solid model", freq, actual[:, d], "actual")]
     for named, style in _DRAWN:
         one = next(r for r in result.regenerated if r.found[:2] == named)
-        curves.append(Curve(", ".join(named), freq, np.abs(regenerated(one)[:, d]), style))
+        curves.append(ReceptanceCurve(", ".join(named), freq, regenerated(one)[:, d], style))
     return tuple(curves)
 
 
@@ -93,14 +93,20 @@ def _by_kind(result: BoltedLapResult) -> Iterator[tuple[str, str, list[tuple[Par
 
 def _lines(result: BoltedLapResult) -> Iterator[Figure]:
     freq = result.case.freq_hz
+    # Over all lines: a constant.
+    fit = next(one.found for one in result.regenerated if one.found[:2] == ("virtual points", "compliance fit"))
+    fitted = dict(zip(result.case.parameters, fit.theta.tolist(), strict=True))
     for kind, what, parameters in _by_kind(result):
         panels = []
         for parameter, _ in parameters:
             lines = {route: _values(result, k, parameter) for route, k in result.k_lines.items()}
             curves = tuple(Curve(route, freq, values, _LINE_STYLES[route]) for route, values in lines.items())
             shades = (("band", tuple(result.case.bands_of(parameter.row))),)
-            limits = bulk_limits(list(lines.values()))
-            panels.append(Panel("", FREQUENCY, parameter_label(parameter), curves, shades=shades, y_limits=limits))
+            levels = (Level("compliance fit, virtual points", fitted[parameter], "compliance"),)
+            limits = bulk_limits(list(lines.values()), [fitted[parameter]])
+            panels.append(
+                Panel("", FREQUENCY, parameter_label(parameter), curves, (), levels, shades=shades, y_limits=limits)
+            )
         caption = f"Joint {what} line by line, by different routes to the FRFs of the joint DOFs, without noise"
         yield Figure(f"lines-{kind}", caption, tuple(panels), 2)
 
@@ -108,13 +114,16 @@ def _lines(result: BoltedLapResult) -> Iterator[Figure]:
 def _unmeasured(result: BoltedLapResult) -> Iterator[Figure]:
     freq = result.case.freq_hz
     for key, one in zip(("unmeasured-x", "unmeasured-z", "unmeasured-all"), result.unmeasured[1:], strict=True):
+        fits = dict(zip(result.case.parameters, one.fitted.tolist(), strict=True))
         for kind, what, parameters in _by_kind(result):
             panels = []
             for parameter, actual in parameters:
-                values = _values(result, one.k_lines, parameter)
-                curve, level = Curve("found", freq, values, "high"), Level("actual", actual, "actual")
-                label, limits = parameter_label(parameter), bulk_limits([values], [actual])
-                panels.append(Panel("", FREQUENCY, label, (curve,), levels=(level,), y_limits=limits))
+                values, fitted = _values(result, one.k_lines, parameter), fits[parameter]
+                curve = Curve("line by line", freq, values, "ismm")
+                levels = (Level("actual", actual, "actual"), Level("compliance fit", fitted, "compliance"))
+                limits = bulk_limits([values], [actual])
+                title, label = f"compliance fit: {fitted / actual:.3g} of the actual", parameter_label(parameter)
+                panels.append(Panel(title, FREQUENCY, label, (curve,), levels=levels, y_limits=limits))
             caption = f"Effect of unmeasured FRFs on {what}, exact data: {one.name}"
             yield Figure(f"{key}-{kind}", caption, tuple(panels), 2)
 
@@ -127,6 +136,9 @@ def _noise(result: BoltedLapResult) -> Iterator[Figure]:
             intervals.append(Interval(f"{study.route},\n{study.estimator}", *percentiles(study.shift[:, p])))
         title = f"{peak.direction}, {peak.freq_hz:.3g} Hz"
         panels.append(Panel(title, "frequency error (4.12), %", "", intervals=tuple(intervals)))
+    # One range for all: a resonance that is off by a tenth is to look different from one that is off by a thousandth.
+    every = [interval.high for panel in panels for interval in panel.intervals]
+    panels = [replace(panel, x_limits=(0.0, 1.05 * max(every))) for panel in panels]
     if panels and result.noisy:
         caption = (
             "Errors of the regenerated resonances with noise: median and percentiles; 15 % is the limit of the search"

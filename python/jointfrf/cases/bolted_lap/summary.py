@@ -1,4 +1,4 @@
-"""What came out of a case of a bolted lap joint, in a few sentences."""
+"""What came out of a case of a bolted lap joint, in short tables."""
 
 from __future__ import annotations
 
@@ -7,33 +7,38 @@ import numpy as np
 from jointfrf.cases.bolted_lap.compute import BoltedLapResult
 from jointfrf.cases.bolted_lap.tables import above_limit
 from jointfrf.cases.comparison import agreement
-from jointfrf.report.table import Table, number
+from jointfrf.report.table import Cell, Table, number
 
 __all__ = ["bolted_lap_summary"]
 
 
-def bolted_lap_summary(result: BoltedLapResult, tables: list[Table]) -> list[str]:
-    """Say in a few sentences what came out."""
-    by_key = {table.key: table for table in tables}
-    sentences = [_preload(result), *agreement(by_key["natural-frequencies"])]
-    routes = dict.fromkeys(one.found[:2] for one in result.regenerated)
-    for transferred, what in ((False, "Regenerated"), (True, "Transferred to the other beam B")):
-        each = "; ".join(
-            f"{route} ({estimator}) " + " / ".join(_worst(result, (route, estimator), d, transferred) for d in "yx")
-            for route, estimator in routes
-        )
-        sentences.append(f"{what}: largest error of a resonance in y / x, percent: {each}.")
-    return sentences
+def bolted_lap_summary(result: BoltedLapResult, tables: list[Table]) -> list[Table]:
+    """Return short tables: how much fits, the preload, and the largest errors of the resonances."""
+    fits = agreement(tables)
+    return [*([fits] if fits.rows else []), _preload(result), _worst_errors(result)]
 
 
-def _preload(result: BoltedLapResult) -> str:
+def _preload(result: BoltedLapResult) -> Table:
     state = result.state
     slipping = sum(int(np.count_nonzero(one.slipping)) for one in state.interfaces.values())
-    return (
-        f"A preload of {number(state.force)} N stretches the bolt by {1e6 * state.elongation:.1f} um; the contact "
-        f"converged in {len(state.history)} iterations, {slipping} pairs slip, the lap is closed up to "
-        f"{1e3 * state.contact_radius:.1f} mm from the axis."
+    cells: tuple[tuple[Cell, ...], ...] = (
+        ("preload", number(state.force), "N"),
+        ("elongation of the bolt", f"{1e6 * state.elongation:.1f}", "µm"),
+        ("iterations of the contact", str(len(state.history)), ""),
+        ("slipping pairs", str(slipping), ""),
+        ("lap closed up to this distance from the axis", f"{1e3 * state.contact_radius:.1f}", "mm"),
     )
+    return Table("preload", "Preload", ("quantity", "value", "unit"), cells)
+
+
+def _worst_errors(result: BoltedLapResult) -> Table:
+    cells: tuple[tuple[Cell, ...], ...] = tuple(
+        (*named, *(_worst(result, named, d, transferred) for transferred in (False, True) for d in "yx"))
+        for named in dict.fromkeys(one.found[:2] for one in result.regenerated)
+    )
+    columns = ("joint DOFs by", "estimator", "same beams: y", "same beams: x", "other beam B: y", "other beam B: x")
+    title = "Largest error (4.12) of a resonance of the tip, percent"
+    return Table("worst", title, columns, cells, percentages=columns)
 
 
 def _worst(result: BoltedLapResult, named: tuple[str, str], direction: str, transferred: bool) -> str:

@@ -44,7 +44,7 @@ def _contact(result: BoltedLapResult) -> Table:
         )  # fmt: skip
     columns = ("interface", "force, N", "preload, N", "largest pressure, MPa", "closed", "slipping", "slip ratio")
     note = (
-        f"Elongation of the bolt {1e6 * state.elongation:.1f} um; the lap is closed up to "
+        f"Elongation of the bolt {1e6 * state.elongation:.1f} µm; the lap is closed up to "
         f"{1e3 * state.contact_radius:.1f} mm from the axis. "
         "The slip ratio is tangential force over friction times normal force, at most 1."
     )
@@ -93,7 +93,7 @@ def _resonances(result: BoltedLapResult, key: str, title: str, *, transferred: b
         cells.append((*one.found[:2], *row))
     columns = ["joint DOFs by", "estimator"]
     for peak in peaks:
-        columns += [f"{peak.direction} {peak.freq_hz:.3g} Hz: frequency %", "amplitude %"]
+        columns += [f"{peak.direction} {peak.freq_hz:.3g} Hz: frequency, %", "amplitude, %"]
     note = (
         "Errors (4.12) and (4.11) in percent, on lines as close as the loss factor asks for. A resonance is sought "
         "within 15 % of the actual one, and not beyond the valleys beside it: 'above' stands where there is no peak "
@@ -102,7 +102,7 @@ def _resonances(result: BoltedLapResult, key: str, title: str, *, transferred: b
         "neither from noise nor from rotations: a joint between two points has no mass, and the beams also press on "
         "each other, which it leaves out."
     )
-    return Table(key, title, tuple(columns), tuple(cells), (), note)
+    return Table(key, title, tuple(columns), tuple(cells), (), note, percentages=tuple(columns))
 
 
 def _noise(result: BoltedLapResult) -> Table:
@@ -132,7 +132,7 @@ def _noise_resonances(result: BoltedLapResult) -> Table:
         row = [float(x) if found else above_limit(x) for x, found in zip(medians, most_found, strict=True)]
         lost = np.count_nonzero(~study.found)
         cells.append((study.noise, study.route, study.estimator, *row, f"{lost} of {study.found.size}"))
-    of_peaks = (f"{peak.direction} {peak.freq_hz:.3g} Hz: frequency %" for peak in result.peaks)
+    of_peaks = (f"{peak.direction} {peak.freq_hz:.3g} Hz: frequency, %" for peak in result.peaks)
     columns = ("noise", "joint DOFs by", "estimator", *of_peaks, "not found")
     note = "Median errors (4.12). 'above': most realisations have no peak up to the limit of the search."
     title = f"Resonances of the tip with noise, {result.n_realisations} realisations"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -23,9 +24,11 @@ from jointfrf.report.axes import (
     parameter_label,
     parameter_lines,
     percentile_lines,
+    percentiles,
     symbol,
 )
 from jointfrf.report.figure import Curve, Figure, Interval, Level, NamedBands, Panel, Ribbon
+from jointfrf.report.receptance import ReceptanceCurve, receptance_panels, side_by_side
 
 __all__ = ["known_joint_figures"]
 
@@ -43,8 +46,8 @@ _METHOD_NAMES = {
 _SINGLE = ("ismm", "decoupling-ss")
 #: Stiffness of the curves beside the actual one in a sensitivity figure.
 _VARIED = ((0.5, "low"), (2.0, "high"))
-#: Panels that still fit below each other.
-_ONE_COLUMN = 4
+#: Panels that still fit on a page.
+_ONE_FIGURE = 6
 #: Noise levels side by side.
 _MOST_LEVELS = 3
 #: A parameter whose sensitivity stays below this share of the largest one does not change an FRF visibly.
@@ -79,10 +82,10 @@ def _place(result: KnownJointResult, observed: Observed) -> str:
     return f"point {observed.point}{named}"
 
 
-def _modulus(result: KnownJointResult, h: ComplexArray, observed: Observed) -> FloatArray:
-    """Modulus of an observed FRF among those of the assembly."""
+def _curve(result: KnownJointResult, label: str, h: ComplexArray, observed: Observed, style: str) -> ReceptanceCurve:
+    """Draw an observed FRF among those of the assembly."""
     at = result.exact.at(observed)
-    return np.abs(h[:, at, at])
+    return ReceptanceCurve(label, result.exact.freq_hz, h[:, at, at], style)
 
 
 def _modes(result: KnownJointResult) -> Iterator[Figure]:
@@ -97,13 +100,12 @@ def _receptances(result: KnownJointResult) -> Iterator[Figure]:
     exact = result.exact
     for one in result.case.observed:
         curves = (
-            Curve("first estimate", exact.freq_hz, _modulus(result, exact.h_initial, one), "initial"),
-            Curve("actual joint", exact.freq_hz, _modulus(result, exact.h_c, one), "actual"),
+            _curve(result, "first estimate", exact.h_initial, one, "initial"),
+            _curve(result, "actual joint", exact.h_c, one, "actual"),
         )
-        panel = Panel("", FREQUENCY, _label(result, one), curves, log_y=True)
         place = _place(result, one)
         caption = f"Receptance of the assembly at {place}, with the first estimate and with the actual joint"
-        yield Figure(f"receptance-{one.key}", caption, (panel,))
+        yield Figure(f"receptance-{one.key}", caption, receptance_panels("", _label(result, one), curves))
 
 
 def _polluted(result: KnownJointResult) -> Iterator[Figure]:
@@ -114,18 +116,18 @@ def _polluted(result: KnownJointResult) -> Iterator[Figure]:
     close = (exact.freq_hz[0] + 0.45 * extent, exact.freq_hz[0] + 0.55 * extent)
     inside = (exact.freq_hz >= close[0]) & (exact.freq_hz <= close[1])
     label = modulus_label("jj", exact.dofs[0])
-    panels = []
+    pairs = []
     for noise in result.case.noises[:_MOST_LEVELS]:
         h = noise.pollute(gamma, result.case.seed)
         for lines in (np.ones(inside.size, bool), inside):
             freq = exact.freq_hz[lines]
             curves = (
-                Curve("exact", freq, np.abs(gamma[lines, 0, 0]), "actual"),
-                Curve("polluted", freq, np.abs(h[lines, 0, 0]), "measured"),
+                ReceptanceCurve("exact", freq, gamma[lines, 0, 0], "actual"),
+                ReceptanceCurve("polluted", freq, h[lines, 0, 0], "measured"),
             )
-            panels.append(Panel(f"noise: {noise.name}", FREQUENCY, label, curves, log_y=True))
+            pairs.append(receptance_panels(f"noise: {noise.name}", label, curves))
     caption = "Receptance of the assembly at the joint, exact and polluted (one realisation); right: close up"
-    yield Figure("polluted", caption, tuple(panels), 2)
+    yield Figure("polluted", caption, side_by_side(pairs, 2), 2)
 
 
 def _sensitivities(result: KnownJointResult) -> Iterator[Figure]:
@@ -135,33 +137,36 @@ def _sensitivities(result: KnownJointResult) -> Iterator[Figure]:
             if reach[d] < _UNMOVED * reach.max():
                 continue
             stiffness, damping = Parameter.of_dof("k", dof), Parameter.of_dof("c", dof)
-            panels = (_varied_panel(result, one, d), _sensitivity_panel(result, one, stiffness, damping))
+            panels = (*_varied_panels(result, one, d), _sensitivity_panel(result, one, stiffness, damping))
             caption = f"Sensitivity of the receptance at {_place(result, one)}, to {stiffness} and {damping}"
             yield Figure(f"sensitivity-{one.key}-{dof}", caption, panels)
 
 
-def _varied_panel(result: KnownJointResult, one: Observed, d: int) -> Panel:
+def _varied_panels(result: KnownJointResult, one: Observed, d: int) -> tuple[Panel, Panel]:
     """Draw an FRF with the actual stiffness of a DOF, with less and with more."""
     exact, parameter = result.exact, result.case.parameters[d]
     name = symbol(parameter)
-    curves = [Curve(f"actual {name}", exact.freq_hz, _modulus(result, exact.h_c, one), "actual")]
+    curves = [_curve(result, f"actual {name}", exact.h_c, one, "actual")]
     for factor, style in _VARIED:
         varied = result.case.actual.copy()
         varied[d] *= factor
-        h = np.abs(regenerate(exact, varied[None], one.point, one.dof)[0])
-        curves.append(Curve(f"{factor:g} {name}", exact.freq_hz, h, style))
-    shades = _shades(result, parameter)
-    return Panel("", FREQUENCY, _label(result, one), tuple(curves), shades=shades, log_y=True)
+        h = regenerate(exact, varied[None], one.point, one.dof)[0]
+        curves.append(ReceptanceCurve(f"{factor:g} {name}", exact.freq_hz, h, style))
+    modulus, phase = receptance_panels("", _label(result, one), curves, shades=_shades(result, parameter))
+    return modulus, replace(phase, x_label="")
 
 
 def _sensitivity_panel(result: KnownJointResult, one: Observed, stiffness: Parameter, damping: Parameter) -> Panel:
     """Draw the sensitivity of an FRF to stiffness and damping of a DOF, and the bands that follow."""
     actual, initial = (found[one.key].in_db for found in (result.sensitivities, result.from_initial.sensitivities))
-    drawn = ((stiffness, actual, "", "actual"), (stiffness, initial, ", first estimate", "initial"),
-             (damping, actual, "", "high"))  # fmt: skip
+    drawn = ((stiffness, actual, "", "stiffness"), (stiffness, initial, ", first estimate", "initial"),
+             (damping, actual, "", "damping"))  # fmt: skip
     curves = tuple(
         Curve(
-            f"to {symbol(parameter)}{of}", result.exact.freq_hz, in_db[result.case.parameters.index(parameter)], style
+            f"sensitivity to {symbol(parameter)}{of}",
+            result.exact.freq_hz,
+            in_db[result.case.parameters.index(parameter)],
+            style,
         )
         for parameter, in_db, of, style in drawn
     )
@@ -190,13 +195,13 @@ def _line_panel(result: KnownJointResult, found: Identified, p: int, within: tup
     freq, parameter, lines = result.exact.freq_hz, result.case.parameters[p], _lines(result, found, p)
     actual, median = float(result.case.actual[p]), float(np.median(found.theta[:, p]))
     inside = np.ones(freq.size, bool)
-    levels: tuple[Level, ...] = (Level("actual", actual, "actual"),)
+    levels, fitted = _known_and_fitted(result, found.noise, p)
     title, limits = ALL_LINES, None
     if within is not None:
         limits = (within[0][0], within[-1][1])
         inside = (freq >= limits[0]) & (freq <= limits[1])
         title = f"band {bands_in_words(within)} Hz"
-        levels += (Level("median of the band means", median, "high", within),)
+        levels += (Level("median of the band means", median, "mean", within),)
     low, middle, high = percentile_lines(lines[:, inside])
     x = freq[inside]
     shown = tuple(
@@ -205,12 +210,25 @@ def _line_panel(result: KnownJointResult, found: Identified, p: int, within: tup
     return Panel(
         title, FREQUENCY, parameter_label(parameter),
         (*shown, Curve("median", x, middle, "ismm")),
-        (Ribbon("2.5-97.5 %", x, low, high, "ismm"),),
+        (Ribbon("2.5-97.5 %", x, low, high, "ismm"), *fitted),
         levels,
         shades=_shades(result, parameter) if within is None else (),
         x_limits=limits,
         y_limits=bulk_limits([low, high], around=actual),
     )  # fmt: skip
+
+
+def _known_and_fitted(result: KnownJointResult, noise: str, p: int) -> tuple[tuple[Level, ...], tuple[Ribbon, ...]]:
+    """Draw the actual value of a parameter, and what the compliance fit finds over realisations of a noise."""
+    levels = [Level("actual", float(result.case.actual[p]), "actual")]
+    fits = [f for f in result.identified if (f.noise, f.method) == (noise, "compliance")]
+    ribbons = []
+    for fit in fits:
+        low, median, high = percentiles(fit.theta[:, p])
+        ends = result.exact.freq_hz[[0, -1]]
+        levels.append(Level("compliance fit, median", median, "compliance"))
+        ribbons.append(Ribbon("compliance fit, 2.5-97.5 %", ends, np.full(2, low), np.full(2, high), "compliance"))
+    return tuple(levels), tuple(ribbons)
 
 
 def _identified(result: KnownJointResult) -> Iterator[Figure]:
@@ -233,9 +251,9 @@ def _identified(result: KnownJointResult) -> Iterator[Figure]:
 
 
 def _noise(result: KnownJointResult) -> Iterator[Figure]:
-    rows = identified_rows(result)
+    rows, parameters = identified_rows(result), result.case.parameters
     panels = []
-    for p, parameter in enumerate(result.case.parameters):
+    for p, parameter in enumerate(parameters):
         intervals = tuple(
             Interval(f"{_METHOD_NAMES[r.method]}, {r.noise}\n{r.bands}", r.low, r.median, r.high, r.published)
             for r in rows if r.parameter == parameter
@@ -243,7 +261,12 @@ def _noise(result: KnownJointResult) -> Iterator[Figure]:
         levels = (Level("actual", float(result.case.actual[p]), "actual"),)
         panels.append(Panel("", parameter_label(parameter), "", levels=levels, intervals=intervals))
     caption = "Identified parameters at all noise levels: median and percentiles over realisations"
-    yield Figure("noise", caption, tuple(panels), 1 if len(panels) <= _ONE_COLUMN else 2)
+    if len(panels) <= _ONE_FIGURE:
+        yield Figure("noise", caption, tuple(panels), 2)
+        return
+    for kind, what in (("k", "stiffness"), ("c", "damping")):
+        own = tuple(panel for parameter, panel in zip(parameters, panels, strict=True) if parameter.kind == kind)
+        yield Figure(f"noise-{kind}", f"{caption}: {what}", own, 2)
 
 
 def _methods(result: KnownJointResult) -> Iterator[Figure]:
@@ -259,46 +282,49 @@ def _methods(result: KnownJointResult) -> Iterator[Figure]:
 
 def _method_panels(
     result: KnownJointResult, found: list[Identified], p: int, bands: tuple[Band, ...]
-) -> tuple[Panel, Panel]:
+) -> tuple[Panel, ...]:
     """One realisation of two methods, and the medians of all."""
     freq, actual = result.exact.freq_hz, float(result.case.actual[p])
-    inside = (freq >= bands[0][0]) & (freq <= bands[-1][1])
+    low, high = bands[0][0], bands[-1][1]
+    inside = (freq >= low) & (freq <= high)
     shown = [f for f in found if f.method in _SINGLE] or found[:2]
     single, medians = [], []
     for f in found:
         lines = _lines(result, f, p)[:, inside]
         medians.append(Curve(_METHOD_NAMES[f.method], freq[inside], np.median(lines, axis=0), f.method))
         if f in shown:
-            single.append(Curve(_METHOD_NAMES[f.method], freq[inside], lines[0], f.method))
+            single.append(Curve(_METHOD_NAMES[f.method], freq[inside], lines[0], f.method, thin=True))
     limits = bulk_limits([curve.y for curve in single + medians], around=actual)
-    label, levels = parameter_label(result.case.parameters[p]), (Level("actual", actual, "actual"),)
-    return (
-        Panel("one realisation", FREQUENCY, label, tuple(single), levels=levels, y_limits=limits),
-        Panel("median of the realisations", FREQUENCY, label, tuple(medians), levels=levels, y_limits=limits),
+    label, (levels, fitted) = parameter_label(result.case.parameters[p]), _known_and_fitted(result, found[0].noise, p)
+    both = (("one realisation", single), ("median of the realisations", medians))
+    return tuple(
+        Panel(title, FREQUENCY, label, tuple(curves), fitted, levels, x_limits=(low, high), y_limits=limits)
+        for title, curves in both
     )
 
 
 def _regenerated(result: KnownJointResult) -> Iterator[Figure]:
     first_noise, names = result.case.noises[0].name, (result.case.band_sets[0].name, ALL_LINES)
     for one in result.case.observed:
-        panels = tuple(
-            _regenerated_panel(result, r)
+        pairs = [
+            _regenerated_panels(result, r)
             for r in result.regenerated
             if r.observed == one and r.identified.noise == first_noise and r.identified.bands in names
-        )
+        ]
         caption = f"Receptance of the assembly at {_place(result, one)}, regenerated from the identified parameters"
-        yield Figure(f"regenerated-{one.key}", caption, panels, 1 if len(panels) < 3 else 2)
+        columns = 1 if len(pairs) < 3 else 2
+        yield Figure(f"regenerated-{one.key}", caption, side_by_side(pairs, columns), columns)
 
 
-def _regenerated_panel(result: KnownJointResult, regenerated: RegeneratedFrf) -> Panel:
+def _regenerated_panels(result: KnownJointResult, regenerated: RegeneratedFrf) -> tuple[Panel, Panel]:
     exact, one, found = result.exact, regenerated.observed, regenerated.identified
     low, _, high = regenerated.percentiles
     curves = (
-        Curve("actual", exact.freq_hz, _modulus(result, exact.h_c, one), "actual"),
-        Curve("regenerated, one realisation", exact.freq_hz, np.abs(regenerated.first), "high"),
+        _curve(result, "actual", exact.h_c, one, "actual"),
+        ReceptanceCurve("regenerated, one realisation", exact.freq_hz, regenerated.first, "high"),
     )
-    return Panel(
-        f"{_METHOD_NAMES[found.method]} ({found.bands})", FREQUENCY, _label(result, one), curves,
+    return receptance_panels(
+        f"{_METHOD_NAMES[found.method]} ({found.bands})", _label(result, one), curves,
         (Ribbon("2.5-97.5 %", exact.freq_hz, low, high, "ismm"),),
-        shades=(("errors counted in", one.bands),) if one.bands else (), log_y=True,
+        (("errors counted in", one.bands),) if one.bands else (),
     )  # fmt: skip

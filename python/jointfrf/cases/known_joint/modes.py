@@ -22,6 +22,8 @@ _SHOWN = 5
 _RIGID = 1e-3
 #: Points of a mode shape on each beam; elements bend cubically between their nodes.
 _SHAPE_POINTS = 100
+#: Limits of deflections, whose largest is 1.
+_DEFLECTIONS = (-1.15, 1.15)
 
 
 @dataclass(frozen=True)
@@ -132,5 +134,6 @@ def _beam_panels(modes: ModeShapes, x_a: FloatArray, x_b: FloatArray) -> list[Pa
             )
             fine = np.linspace(x[0], x[-1], max(_SHAPE_POINTS, x.size))
             curves.append(Curve(f"beam {side}", fine, CubicHermiteSpline(x, y, theta)(fine), style))
-        panels.append(Panel(f"mode {mode + 1}: {freq:.1f} Hz", "x, m", "deflection, relative", tuple(curves)))
+        title = f"mode {mode + 1}: {freq:.1f} Hz"
+        panels.append(Panel(title, "x, m", "deflection, relative", tuple(curves), y_limits=_DEFLECTIONS))
     return panels

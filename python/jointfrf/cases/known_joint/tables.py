@@ -142,14 +142,14 @@ def _frequencies(result: KnownJointResult) -> list[Table]:
 
 
 def _identified(rows: list[Row], count: int) -> Table:
-    columns = ("noise", "method", "bands", "parameter", "unit", "actual", "median", "2.5 %", "97.5 %", "RMSE %")
+    columns = ("noise", "method", "bands", "parameter", "unit", "actual", "median", "2.5 %", "97.5 %", "RMSE, %")
     # Once, even where the source has it twice.
     seen = dict.fromkeys(
         (r.noise, r.method, r.bands, r.parameter, r.parameter.unit, r.actual, r.median, r.low, r.high, r.rmse_percent)
         for r in rows
     )
     title = f"Identified joint parameters, {count} realisations"
-    return Table("identified", title, columns, tuple(seen), percentages=("RMSE %",))
+    return Table("identified", title, columns, tuple(seen), percentages=("RMSE, %",))
 
 
 def _blocks(result: KnownJointResult) -> list[Table]:
@@ -187,9 +187,9 @@ def _limits(result: KnownJointResult, rows: list[Row]) -> list[Table]:
     if not cells:
         return []
     failing = tuple(i for i, cell in enumerate(cells) if cell[-1] != "fits")
-    columns = ("noise", "method", "bands", "parameter", "RMSE %", "limit %", "")
+    columns = ("noise", "method", "bands", "parameter", "RMSE, %", "limit, %", "")
     title = "Root-mean-square errors and their limits"
-    return [Table("limits", title, columns, tuple(cells), failing, percentages=("RMSE %", "limit %"))]
+    return [Table("limits", title, columns, tuple(cells), failing, percentages=("RMSE, %", "limit, %"))]
 
 
 def _regenerated(result: KnownJointResult) -> Table:
@@ -201,7 +201,7 @@ def _regenerated(result: KnownJointResult) -> Table:
             named = (found.noise, found.method, found.bands, frf_name(result, r.observed), where)
             cells.append((*named, *_spread(r.amplitude[b]), *_spread(r.frequency[b])))
     columns = ("noise", "method", "bands", "FRF", "errors in, Hz",
-               "amplitude %", "2.5 %", "97.5 %", "frequency %", "2.5 %", "97.5 %")  # fmt: skip
+               "amplitude, %", "2.5 %", "97.5 %", "frequency, %", "2.5 %", "97.5 %")  # fmt: skip
     title = "Errors of the regenerated FRFs: amplitude (4.11) and frequency (4.12)"
     note = f"Median and percentiles over realisations with a peak in the band. {NO_PEAK}: not even half have one."
     return Table("regenerated", title, columns, tuple(cells), note=note, percentages=columns)

@@ -1,0 +1,120 @@
+"""Numbers along axes: SI prefixes instead of powers of ten beside an axis, and few enough not to collide."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+__all__ = ["format_axis", "prefixed_unit", "tick_texts"]
+
+_PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"}
+#: Units that a prefix may precede, by how they begin; hertz, percent, decibel and lengths are shown as they are.
+_TAKE_PREFIX = ("N", "m/N", "rad/")
+#: Values that are short without a prefix.
+_SHORT = (0.1, 1e4)
+#: Decades of a logarithmic axis: below the first, numbers at equal distances; below the second at 1, 2, 5; else at 1.
+_NARROW, _WIDE = 0.7, 2.0
+_MOST_TICKS, _MOST_BESIDE = 10, 5
+
+
+def prefixed_unit(unit: str, largest: float) -> tuple[str, float]:
+    """Choose the SI prefix with which values of a unit are short.
+
+    Parameters
+    ----------
+    unit : str
+    largest : float
+        Largest absolute value.
+
+    Returns
+    -------
+    unit : str
+        With its prefix; as it is where none is needed or usual.
+    size : float
+        What it stands for: values are divided by it.
+
+    Examples
+    --------
+    >>> from jointfrf.report.ticks import prefixed_unit
+    >>> prefixed_unit("N/m", 6.2e6), prefixed_unit("rad/(N m)", 2e-4), prefixed_unit("%", 1e6)
+    (('MN/m', 1000000.0), ('µrad/(N m)', 1e-06), ('%', 1.0))
+    """
+    usual = unit.startswith(_TAKE_PREFIX)
+    if not usual or not np.isfinite(largest) or largest == 0 or _SHORT[0] <= largest < _SHORT[1]:
+        return unit, 1.0
+    power = int(np.clip(3 * np.floor(np.log10(largest) / 3), min(_PREFIXES), max(_PREFIXES)))
+    return _PREFIXES[power] + unit, 10.0**power
+
+
+def tick_texts(values: Sequence[float]) -> list[str]:
+    """Write the numbers along an axis, all with as many decimals as the finest needs.
+
+    Examples
+    --------
+    >>> from jointfrf.report.ticks import tick_texts
+    >>> tick_texts([-0.5, 0.0, 0.5, 1.0])
+    ['−0.5', '0.0', '0.5', '1.0']
+    >>> tick_texts([0.0, 1e-7])
+    ['0', '1e−07']
+    """
+    for decimals in range(5):
+        if all(abs(value - round(value, decimals)) <= 1e-6 * max(map(abs, values)) for value in values):
+            texts = [f"{value:.{decimals}f}" for value in values]
+            break
+    else:
+        texts = [f"{value:g}" for value in values]
+    # A zero has no sign, and a minus is as long as a plus.
+    return [(text[1:] if text.startswith("-") and float(text) == 0 else text).replace("-", "−") for text in texts]
+
+
+def format_axis(axis: Any, label: str, *, log: bool = False, step: float | None = None, beside: int = 1) -> None:
+    """Set label and numbers of an axis of matplotlib.
+
+    Parameters
+    ----------
+    axis : matplotlib.axis.Axis
+        Its limits are final.
+    label : str
+        "quantity, unit".
+    log : bool
+    step : float, optional
+        Distance of the numbers.
+    beside : int
+        Panels beside each other.
+    """
+    from matplotlib.ticker import LogLocator, MaxNLocator, MultipleLocator, NullFormatter
+
+    low, high = sorted(axis.get_view_interval())
+    decades = np.log10(high / low) if log and low > 0 else np.inf
+    if log and decades >= _WIDE:
+        axis.set_minor_formatter(NullFormatter())
+        axis.set_label_text(label)
+        return
+    quantity, comma, unit = label.rpartition(", ")
+    unit, size = prefixed_unit(unit, max(abs(low), abs(high)))
+    most = _MOST_TICKS if beside == 1 else _MOST_BESIDE
+    if step is not None:
+        axis.set_major_locator(MultipleLocator(step))
+    elif log and decades >= _NARROW:
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    else:
+        axis.set_major_locator(MaxNLocator(most if axis.axis_name == "x" else _MOST_BESIDE, steps=[1, 2, 2.5, 5, 10]))
+    axis.set_major_formatter(_formatter(size))
+    axis.set_minor_formatter(NullFormatter())
+    axis.set_label_text(f"{quantity}{comma}{unit}")
+
+
+def _formatter(size: float) -> Any:
+    """Write numbers in multiples of `size`."""
+    from matplotlib.ticker import Formatter
+
+    class InUnits(Formatter):
+        def __call__(self, x: float, pos: int | None = None) -> str:
+            return tick_texts([x / size])[0]
+
+        def format_ticks(self, values: Sequence[float]) -> list[str]:
+            return tick_texts([float(value) / size for value in values])
+
+    return InUnits()
