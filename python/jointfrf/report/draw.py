@@ -37,6 +37,7 @@ STYLES = {
     "measured": Style("#e07b00", "-", 0.7),
     "mean": Style("#c0392b", (0, (5, 1.5)), 2.2),
     "stiffness": Style("#8e7cc3", "-", 2.4),
+    "stiffness-initial": Style("#4b3d80", (0, (7, 2)), 1.2),
     "damping": Style("#2e7d4f", (0, (4, 1.5, 1, 1.5, 1, 1.5)), 1.3),
     "ismm": Style("#1b4f9c", "-", 1.1),
     "ismm-kj": Style("#1b4f9c", (0, (5, 1)), 1.1),

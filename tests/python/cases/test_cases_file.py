@@ -190,7 +190,12 @@ def test_dofs_of_a_bolted_joint_in_another_order(tmp_path):
         ),
         ('bands = "region 1"', 'bands = "region 1"\ncentral_percent = 95', r"number 1: unknown key 'central_percent'"),
         ("step = 0.15", "step = 0", r"\[printed\]: step must be positive, in Hz, not 0"),
-        ("lines_within = 1", "lines = 1", r"\[printed\]: the key 'lines_within' is missing"),
+        ("lines_within = 1", "", r"\[printed\]: the key 'lines_within' is missing"),
+        (
+            "lines_within = 1",
+            "lines = 1",
+            r"\[printed\]: unknown key 'lines'; it takes step, amplitude_within_percent, lines_within",
+        ),
         ("offset = [0.0, -0.003, 0.0]", "offset = [0.0, -0.003]", r"number 3: offset must be x, y, z in m"),
         ('modes = "4-32', 'modes = 4 # "', r"\[figures\]: modes must be a text, not 4"),
     ],
@@ -211,7 +216,10 @@ def test_expected_numbers_must_belong_to_the_case(tmp_path):
         (tmp_path / name).write_text((find_case("3.1") / name).read_text())
     path = tmp_path / "expected.toml"
     path.write_text(path.read_text().replace('noise = "5 %"', 'noise = "6 %"'))
-    with pytest.raises(FileContentError, match=r"expected\.toml.*noise must be one of 5 %, not '6 %'"):
+    with pytest.raises(
+        FileContentError,
+        match=r"expected\.toml.*noise must be one of 5 %, 5 % of the largest FRF at that line, not '6 %'",
+    ):
         read_case(tmp_path)
 
 

@@ -155,7 +155,8 @@ def test_the_verdict_is_the_first_column_wherever_a_table_is_shown(result):
     summary = known_joint_summary(result, tables)
     text = make_page(Page("", "", summary, tables, []))
     judged = [table for table in (*summary, *tables) if "" in table.columns]
-    assert [table.key for table in judged] == ["agreement", "table-3-2", "natural-frequencies", "noise-free"]
+    regions = "section-3-2-figures-3-11-and-3-12"
+    assert [table.key for table in judged] == ["agreement", "table-3-2", regions, "natural-frequencies", "noise-free"]
     for table in judged:
         head = text.split(f'id="{table.key}"')[1].split("</tr>")[0]
         assert re.findall(r"<th[^>]*>([^<]*)</th>", head)[:2] == ["verdict", table.columns[0]]

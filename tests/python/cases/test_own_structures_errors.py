@@ -225,8 +225,8 @@ def test_a_sensor_that_shows_nothing(by_receptances):
 
 def test_what_needs_a_model_is_told(by_receptances):
     expected = by_receptances / "expected.toml"
-    expected.write_text("printed_step = 0.1\n")
-    check(by_receptances, r"expected\.toml: printed_step needs models, not receptances, of both substructures$")
+    expected.write_text("[printed]\nstep = 0.1\namplitude_within_percent = 5\nlines_within = 1\n")
+    check(by_receptances, r"expected\.toml: printed needs models, not receptances, of both substructures$")
     expected.write_text('[[frequencies]]\njoint = "actual"\nsource = "x"\nvalues = [1.0]\nwithin_percent = 1\n')
     check(by_receptances, r"expected\.toml: frequencies needs models, not receptances, of both substructures$")
 

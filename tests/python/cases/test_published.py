@@ -83,8 +83,8 @@ def coupled_frequencies(case, joint, count):
         sparse.block_diag([sparse.csc_array(getattr(side.model, what)) for side in (case.a, case.b)], format="lil")
         for what in ("stiffness", "mass")
     )
-    at_k = [len(case.a.model.dofs) + dof for dof in case.dofs_k]
-    for i, j, spring in zip(case.dofs_j, at_k, np.diagonal(joint.stiffness), strict=True):
+    at_j, at_k = case.a.dofs(case.points["j"]), [len(case.a.model.dofs) + k for k in case.b.dofs(case.points["k"])]
+    for i, j, spring in zip(at_j, at_k, np.diagonal(joint.stiffness), strict=True):
         k[i, i] += spring
         k[j, j] += spring
         k[i, j] -= spring

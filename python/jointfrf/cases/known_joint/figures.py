@@ -159,7 +159,7 @@ def _varied_panels(result: KnownJointResult, one: Observed, d: int) -> tuple[Pan
 def _sensitivity_panel(result: KnownJointResult, one: Observed, stiffness: Parameter, damping: Parameter) -> Panel:
     """Draw the sensitivity of an FRF to stiffness and damping of a DOF, and the bands that follow."""
     actual, initial = (found[one.key].in_db for found in (result.sensitivities, result.from_initial.sensitivities))
-    drawn = ((stiffness, actual, "", "stiffness"), (stiffness, initial, ", first estimate", "initial"),
+    drawn = ((stiffness, actual, "", "stiffness"), (stiffness, initial, ", first estimate", "stiffness-initial"),
              (damping, actual, "", "damping"))  # fmt: skip
     curves = tuple(
         Curve(

@@ -16,7 +16,7 @@ from jointfrf.frf.bands import Band
 from jointfrf.report.axes import bands_in_words
 from jointfrf.report.table import Cell, Table
 
-__all__ = ["NO_PEAK", "band_table", "frf_name", "key_of", "printed_tables", "region_tables", "title_of"]
+__all__ = ["NO_PEAK", "band_table", "frf_name", "key_of", "printed_parameter_tables", "region_tables", "title_of"]
 
 NO_PEAK = "no peak in the band"
 _JOINTS = ("first estimate", "actual")
@@ -42,7 +42,7 @@ def frf_name(result: KnownJointResult, observed: Observed) -> str:
     return name if observed.key == observed.point else f"{name} {result.case.joint.dofs[observed.dof]}"
 
 
-def printed_tables(result: KnownJointResult) -> list[Table]:
+def printed_parameter_tables(result: KnownJointResult) -> list[Table]:
     """Table of the FRFs regenerated from printed parameters; none where there are none."""
     lines = result.case.expected.printed
     if lines is None or not result.printed:

@@ -15,7 +15,7 @@ from jointfrf.cases.known_joint.published_tables import (
     band_table,
     frf_name,
     key_of,
-    printed_tables,
+    printed_parameter_tables,
     region_tables,
     title_of,
 )
@@ -97,7 +97,7 @@ def known_joint_tables(result: KnownJointResult) -> list[Table]:
     return [
         *(_published(source, [row for row in rows if row.source == source]) for source in sources),
         *_published_errors(result),
-        *printed_tables(result),
+        *printed_parameter_tables(result),
         *region_tables(result),
         *_frequencies(result),
         _identified(rows, result.n_realisations),
