@@ -383,6 +383,7 @@ def test_tables(ran):
     for table in tables.values():
         assert table.rows
         assert {len(row) for row in table.rows} == {len(table.columns)}
+        assert len(set(table.columns)) == len(table.columns)
         with (ran.output.report.parent / "tables" / f"{table.key}.csv").open(newline="") as file:
             assert len(list(csv.reader(file))) == len(table.rows) + 1
     assert [row[0] for row in tables["contact"].rows] == ["head", "lap", "nut"]

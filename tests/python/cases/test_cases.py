@@ -458,6 +458,18 @@ def test_numbers_and_report_of_six_dofs(solids):
         assert "<i>k</i><sub>Mθz</sub>" in report
 
 
+@pytest.mark.parametrize("name", [*PLANE, *SOLID])
+def test_headings_stand_once_and_say_the_unit(results, solids, name):
+    """A column is found by its name, in CSV too; percent stands in the heading of a column, not over all of them."""
+    result = (results | solids)[name]
+    tables = known_joint_tables(result)
+    for table in (*known_joint_summary(result, tables), *tables):
+        assert len(set(table.columns)) == len(table.columns), table.key
+        assert "percent" not in table.title
+        if {"error", "thesis, %"} <= set(table.columns):
+            assert all(column.endswith((" %", "percentile", "")) for column in table.columns[5:])
+
+
 def test_every_method_of_the_table_has_a_name_and_a_style_in_figures(tmp_path):
     own = tmp_path / "mine"
     own.mkdir()

@@ -36,8 +36,9 @@ def _worst_errors(result: BoltedLapResult) -> Table:
         (*named, *(_worst(result, named, d, transferred) for transferred in (False, True) for d in "yx"))
         for named in dict.fromkeys(one.found[:2] for one in result.regenerated)
     )
-    columns = ("joint DOFs by", "estimator", "same beams: y", "same beams: x", "other beam B: y", "other beam B: x")
-    title = "Largest error (4.12) of a resonance of the tip, percent"
+    beams = (f"{beams}: {direction}, %" for beams in ("same beams", "other beam B") for direction in "yx")
+    columns = ("joint DOFs by", "estimator", *beams)
+    title = "Largest error (4.12) of a resonance of the tip"
     return Table("worst", title, columns, cells, percentages=columns)
 
 

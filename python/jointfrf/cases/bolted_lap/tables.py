@@ -93,9 +93,9 @@ def _resonances(result: BoltedLapResult, key: str, title: str, *, transferred: b
         cells.append((*one.found[:2], *row))
     columns = ["joint DOFs by", "estimator"]
     for peak in peaks:
-        columns += [f"{peak.direction} {peak.freq_hz:.3g} Hz: frequency, %", "amplitude, %"]
+        columns += [f"{peak.direction} {peak.freq_hz:.3g} Hz: {error}, %" for error in ("frequency", "amplitude")]
     note = (
-        "Errors (4.12) and (4.11) in percent, on lines as close as the loss factor asks for. A resonance is sought "
+        "Errors (4.12) and (4.11), on lines as close as the loss factor asks for. A resonance is sought "
         "within 15 % of the actual one, and not beyond the valleys beside it: 'above' stands where there is no peak "
         "up to that limit of the search. "
         "The last row couples the beams by the full 6 x 6 K*(w) of the reference points. What remains there comes "

@@ -58,14 +58,14 @@ def printed_parameter_tables(result: KnownJointResult) -> list[Table]:
             ("frequency (4.12)", known.frequency, one.frequency, one.frequency_fits),
         ):
             cells.append((*named, what, published, NO_PEAK if found is None else found, verdict(good)))
-    columns = ("source", "FRF", "band, Hz", "method", "error", "thesis", "from the printed parameters", "")
+    columns = ("source", "FRF", "band, Hz", "method", "error", "thesis, %", "from the printed parameters, %", "")
     note = (
-        f"Percent, on lines {lines.step:g} Hz apart, without noise: what differs is the model, the lines or the printed"
+        f"On lines {lines.step:g} Hz apart, without noise: what differs is the model, the lines or the printed"
         f" digits. It fits within {lines.amplitude_within:g} % of the printed amplitude error, and within "
         f"{lines.lines_within:g} lines of the printed frequency error; an empty cell fits where there is no peak."
     )
     title = "Errors of FRFs regenerated from the printed parameters"
-    return [Table("printed-parameters", title, columns, tuple(cells), _failing(cells), note, columns[5:7])]
+    return [Table("printed-parameters", title, columns, tuple(cells), _failing(cells), note, columns[6:7])]
 
 
 def region_tables(result: KnownJointResult) -> list[Table]:

@@ -27,7 +27,7 @@ def _methods(rows: list[Row]) -> list[Table]:
         if len(errors) > 1:
             parameters = next(iter(errors.values()))
             cells = tuple((parameter, *(own[parameter] for own in errors.values())) for parameter in parameters)
-            title = f"Root-mean-square errors by method, percent, noise {noise}"
-            columns = ("parameter", *errors)
+            title = f"Root-mean-square errors by method, noise {noise}"
+            columns = ("parameter", *(f"{name}, %" for name in errors))
             tables.append(Table(f"methods-{count}", title, columns, cells, percentages=columns))
     return tables

@@ -31,6 +31,9 @@ __all__ = ["Row", "identified_rows", "known_joint_numbers", "known_joint_tables"
 _NOISE_FREE_LIMIT, _SHORT_FORM_LIMIT = 1e-6, 1e-10
 #: An equation is exact up to this many roundings of the FRFs it takes.
 _ROUNDINGS = 100
+#: Headings of distributions: of values, and of errors, which have three digits.
+_SPREAD = ("median", "2.5 %", "97.5 %")
+_SPREAD_OF_ERRORS = ("median, %", *_SPREAD[1:])
 
 
 @dataclass(frozen=True)
@@ -110,7 +113,7 @@ def known_joint_tables(result: KnownJointResult) -> list[Table]:
 
 
 def _published(source: str, rows: list[Row]) -> Table:
-    columns = ("noise", "bands", "parameter", "unit", "actual", "thesis", "median", "2.5 %", "97.5 %", "percentile", "")
+    columns = ("noise", "bands", "parameter", "unit", "actual", "thesis", *_SPREAD, "percentile", "")
     cells = tuple(
         (
             row.noise, row.bands, row.parameter, row.parameter.unit, row.actual, row.published, row.median, row.low,
@@ -142,7 +145,7 @@ def _frequencies(result: KnownJointResult) -> list[Table]:
 
 
 def _identified(rows: list[Row], count: int) -> Table:
-    columns = ("noise", "method", "bands", "parameter", "unit", "actual", "median", "2.5 %", "97.5 %", "RMSE, %")
+    columns = ("noise", "method", "bands", "parameter", "unit", "actual", *_SPREAD, "RMSE, %")
     # Once, even where the source has it twice.
     seen = dict.fromkeys(
         (r.noise, r.method, r.bands, r.parameter, r.parameter.unit, r.actual, r.median, r.low, r.high, r.rmse_percent)
@@ -166,7 +169,7 @@ def _blocks(result: KnownJointResult) -> list[Table]:
     if not cells:
         return []
     columns = ("noise", "bands", "parameter", "unit", "actual", "thesis",
-               "D_jk: median", "2.5 %", "97.5 %", "D_kj: median", "2.5 %", "97.5 %")  # fmt: skip
+               *(f"{block}: {what}" for block in ("D_jk", "D_kj") for what in _SPREAD))  # fmt: skip
     note = (
         "D (2.48) holds -Delta twice. Without noise both blocks give the same joint; the noise of the FRFs is not "
         "symmetric, so that with it they are two estimates. All other tables take D_jk."
@@ -200,8 +203,8 @@ def _regenerated(result: KnownJointResult) -> Table:
             where = "all lines" if band is None else bands_in_words([band])
             named = (found.noise, found.method, found.bands, frf_name(result, r.observed), where)
             cells.append((*named, *_spread(r.amplitude[b]), *_spread(r.frequency[b])))
-    columns = ("noise", "method", "bands", "FRF", "errors in, Hz",
-               "amplitude, %", "2.5 %", "97.5 %", "frequency, %", "2.5 %", "97.5 %")  # fmt: skip
+    errors = (f"{error}: {what}" for error in ("amplitude", "frequency") for what in _SPREAD_OF_ERRORS)
+    columns = ("noise", "method", "bands", "FRF", "band, Hz", *errors)
     title = "Errors of the regenerated FRFs: amplitude (4.11) and frequency (4.12)"
     note = f"Median and percentiles over realisations with a peak in the band. {NO_PEAK}: not even half have one."
     return Table("regenerated", title, columns, tuple(cells), note=note, percentages=columns)
@@ -218,7 +221,7 @@ def _spread(errors: FloatArray) -> tuple[Cell, Cell, Cell]:
 
 def _published_errors(result: KnownJointResult) -> list[Table]:
     """Tables of the source with errors of regenerated FRFs, beside the distributions; with the first set of bands."""
-    columns = ("FRF", "band, Hz", "method", "error", "thesis", "median", "2.5 %", "97.5 %", "percentile", "")
+    columns = ("FRF", "band, Hz", "method", "error", "thesis, %", *_SPREAD_OF_ERRORS, "percentile", "")
     rows: dict[str, list[tuple[Cell, ...]]] = {}
     for known in result.case.expected.errors:
         found = next(
@@ -227,13 +230,14 @@ def _published_errors(result: KnownJointResult) -> list[Table]:
         )  # fmt: skip
         rows.setdefault(known.source, []).extend(_error_rows(frf_name(result, found.observed), known, found))
     note = (
-        "Errors in percent of one realisation in the thesis; ours are a distribution over realisations with a peak in "
+        "Errors of one realisation in the thesis; ours are a distribution over realisations with a peak in "
         f"the band. {NO_PEAK}: not even half have one, because the largest value lies at an edge of the band."
     )
     return [
         Table(
-            key_of(source), f"{title_of(source)}: errors of the regenerated FRFs, percent", columns, tuple(own),
-            tuple(i for i, row in enumerate(own) if row[-1] == verdict(False)), note, percentages=("percentile",),
+            key_of(source), f"{title_of(source)}: errors of the regenerated FRFs", columns, tuple(own),
+            tuple(i for i, row in enumerate(own) if row[-1] == verdict(False)), note,
+            percentages=(*_SPREAD_OF_ERRORS, "percentile"),
         )
         for source, own in rows.items()
     ]  # fmt: skip
