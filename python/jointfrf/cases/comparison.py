@@ -96,4 +96,5 @@ def agreement(tables: Sequence[Table]) -> Table:
             others = ", ".join(str(name) for name, fits in judged if name is not None and not fits)
             cells.append((table.title, *group, f"{good} of {len(judged)}", others, verdict(good == len(judged))))
     failing = tuple(i for i, row in enumerate(cells) if row[-1] == verdict(False))
-    return Table("agreement", "What fits", ("table", "noise", "bands", "fit", "do not", ""), tuple(cells), failing)
+    columns = ("table", "noise", "bands", "rows that fit", "parameters that do not", "")
+    return Table("agreement", "What fits", columns, tuple(cells), failing)

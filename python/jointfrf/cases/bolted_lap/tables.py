@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from jointfrf.cases.bolted_lap.compute import BoltedLapResult
+from jointfrf.cases.bolted_lap.compute import LINES, BoltedLapResult
 from jointfrf.cases.comparison import frequency_table
 from jointfrf.report.axes import percentiles
 from jointfrf.report.table import Cell, Table, number
@@ -98,7 +98,7 @@ def _resonances(result: BoltedLapResult, key: str, title: str, *, transferred: b
         "Errors (4.12) and (4.11), on lines as close as the loss factor asks for. A resonance is sought "
         "within 15 % of the actual one, and not beyond the valleys beside it: 'above' stands where there is no peak "
         "up to that limit of the search. "
-        "The last row couples the beams by the full 6 x 6 K*(w) of the reference points. What remains there comes "
+        f"'reference points, {LINES}' couples the beams by the full 6 x 6 K*(w). What remains there comes "
         "neither from noise nor from rotations: a joint between two points has no mass, and the beams also press on "
         "each other, which it leaves out."
     )

@@ -16,11 +16,21 @@ from jointfrf.frf.bands import Band
 from jointfrf.report.axes import bands_in_words
 from jointfrf.report.table import Cell, Table
 
-__all__ = ["NO_PEAK", "band_table", "frf_name", "key_of", "printed_parameter_tables", "region_tables", "title_of"]
+__all__ = [
+    "JOINT_NAMES",
+    "NO_PEAK",
+    "band_table",
+    "frf_name",
+    "key_of",
+    "printed_parameter_tables",
+    "region_tables",
+    "title_of",
+]
 
 NO_PEAK = "no peak in the band"
-_JOINTS = ("first estimate", "actual")
-#: What the table of regions says for either joint.
+#: Joints by their names in tables.
+JOINT_NAMES = {"initial": "first estimate", "actual": "actual"}
+#: What the table of regions says of either.
 _OF_JOINT = ("proposed, Hz", "inside, dB")
 #: Twice as sensitive, dB.
 _TWICE = 20 * np.log10(2)
@@ -73,7 +83,8 @@ def region_tables(result: KnownJointResult) -> list[Table]:
     rows: dict[str, list[tuple[Cell, ...]]] = {}
     for known in result.case.expected.regions:
         rows.setdefault(known.source, []).extend(_region_rows(result, known))
-    columns = ("parameter", "FRF", "region, Hz", *(f"{joint}: {what}" for joint in _JOINTS for what in _OF_JOINT), "")
+    of_joints = (f"{joint}: {what}" for joint in JOINT_NAMES.values() for what in _OF_JOINT)
+    columns = ("parameter", "FRF", "region, Hz", *of_joints, "")
     note = (
         "Inside: median sensitivity of the FRF on the lines of the region relative to that on the lines outside all "
         "regions of the parameter. A region fits where the FRF is at least twice as sensitive inside (6 dB), with the "
@@ -125,7 +136,7 @@ def band_table(result: KnownJointResult) -> Table:
             *(_proposed(sensitive, one, parameter) for one in observed),
         )
         for parameter in result.case.parameters
-        for joint, sensitive in zip(_JOINTS, _both(result), strict=True)
+        for joint, sensitive in zip(JOINT_NAMES.values(), _both(result), strict=True)
     )
     proposed = tuple(f"proposed from {frf_name(result, one)}, Hz" for one in observed)
     columns = ("parameter", "bands of the case, Hz", "joint", *proposed)

@@ -11,6 +11,7 @@ from jointfrf.cases.comparison import frequency_table, verdict
 from jointfrf.cases.known_joint.compute import KnownJointResult
 from jointfrf.cases.known_joint.expected import ExpectedErrors, ExpectedParameters
 from jointfrf.cases.known_joint.published_tables import (
+    JOINT_NAMES,
     NO_PEAK,
     band_table,
     frf_name,
@@ -137,10 +138,11 @@ def _frequencies(result: KnownJointResult) -> list[Table]:
     expected = result.case.expected.frequencies
     groups = []
     for joint, modes in result.modes.items():
-        names = [(joint, str(i + 1), *((modes.directions[i],) if directed else ())) for i in range(modes.freq_hz.size)]
+        named = JOINT_NAMES[joint]
+        names = [(named, str(i + 1), *((modes.directions[i],) if directed else ())) for i in range(modes.freq_hz.size)]
         groups.append((names, modes.freq_hz.tolist(), expected.get(joint)))
     columns = ("joint", "mode", *(("mostly in",) if directed else ()))
-    note = "; ".join(f"{joint} joint: {known.source}" for joint, known in expected.items())
+    note = "; ".join(f"{JOINT_NAMES[joint]}: {known.source}" for joint, known in expected.items())
     return [frequency_table("Natural frequencies of the assembly", columns, groups, note)]
 
 
@@ -269,8 +271,8 @@ def _noise_free(result: KnownJointResult) -> Table:
         cells.append((what, f"{error:.1e}", f"{rounding:.1e}", "exact" if exact else "does not fit"))
         if not exact:
             failing.append(i)
-    columns = ("without noise", "largest relative error", "of one rounding", "")
-    note = "The third column is the change of K* when the last bits of the FRFs that the equation takes change."
+    columns = ("equation", "largest relative error", "change by one rounding", "")
+    note = "By one rounding: the change of K* when the last bits of the FRFs that the equation takes change."
     return Table("noise-free", "The equations without noise", columns, tuple(cells), tuple(failing), note)
 
 
