@@ -1,0 +1,156 @@
+"""From measured minus smooth FRFs: relative and floor part, correlation between lines, outlying lines."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special
+
+from jointfrf.kernel.arguments import ComplexArray, FloatArray
+
+__all__ = ["line_correlation", "noise_parts", "outlying_factors"]
+
+#: Entries are binned by |h|^2 into so many bins: within one the variance is nearly the same.
+_BINS = 32
+#: Iterations of the likelihood of the parts.
+_ITERATIONS = 60
+#: A start of a part that is to grow from nearly nothing.
+_HARDLY = 1e-3
+#: Probability of calling one line of a sweep without outliers outlying.
+_FALSE_ALARM = 1e-2
+#: Lines over which the usual residual of a line is taken: so many, and so many times the lines that go together.
+_USUAL = 41
+_USUAL_CORRELATED = 5
+#: An autocorrelation below so many standard deviations of that of independent lines ends the sum.
+_SIGNIFICANT = 2.5
+#: Residuals beyond so many medians are cut to that, for correlations.
+_CUT = 3.0
+
+
+def noise_parts(squares: FloatArray, terms: FloatArray) -> FloatArray:
+    """Non-negative parts of the variance, by maximum likelihood for exponentially distributed squares.
+
+    Parameters
+    ----------
+    squares : ndarray, shape (n_entries, n_freq)
+        |e|^2, corrected for what smoothing has taken up.
+    terms : ndarray, shape (n_terms, n_entries, n_freq)
+        E|e|^2 = sum over the terms of part times term. The first is |h|^2, which lines are binned by.
+
+    Returns
+    -------
+    ndarray, shape (n_terms, n_entries)
+
+    Notes
+    -----
+    Multiplicative updates part *= sqrt(sum term y/v^2 / sum term/v), which never lower the likelihood
+    -sum(log v + y/v), from one start a term with that term alone, and one with all alike. The estimate holds for
+    any distribution of e with this variance; it is efficient for circular normal e.
+    """
+    y, a, count = _binned(squares, terms)
+    size = np.maximum((a * count).sum(axis=2, keepdims=True), np.finfo(float).tiny)
+    a = a / size
+    level = (y * count).sum(axis=1)
+    n_terms = len(a)
+    starts = np.concatenate([np.eye(n_terms) + _HARDLY, np.ones((1, n_terms)) / n_terms])
+    parts = starts[:, :, None] * level
+    for _ in range(_ITERATIONS):
+        v = np.maximum(np.einsum("ste,teb->seb", parts, a), np.finfo(float).tiny)
+        up = np.einsum("teb,seb->ste", a, count * y / v**2)
+        down = np.einsum("teb,seb->ste", a, count / v)
+        parts *= np.sqrt(up / np.maximum(down, np.finfo(float).tiny))
+    v = np.maximum(np.einsum("ste,teb->seb", parts, a), np.finfo(float).tiny)
+    best = (count * (np.log(v) + y / v)).sum(axis=2).argmin(axis=0)
+    chosen: FloatArray = parts[best, :, np.arange(parts.shape[2])].T / size[:, :, 0]
+    return chosen
+
+
+def _binned(squares: FloatArray, terms: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Means over bins of lines of similar |h|^2, and how many lines each bin holds; single lines with more terms."""
+    n_freq = squares.shape[1]
+    if n_freq <= _BINS or len(terms) > 2:
+        return squares, terms, np.ones(n_freq)
+    order = np.argsort(terms[0], axis=1)
+    edges = np.linspace(0, n_freq, _BINS + 1).astype(int)
+    count = np.diff(edges).astype(float)
+
+    def means(values: FloatArray) -> FloatArray:
+        found: FloatArray = np.add.reduceat(np.take_along_axis(values, order, axis=1), edges[:-1], axis=1) / count
+        return found
+
+    return means(squares), np.stack([means(term) for term in terms]), count
+
+
+def outlying_factors(ratio: FloatArray, inflation: float = 1.0) -> FloatArray:
+    """By how much the noise power of outlying lines exceeds what is usual among the lines around.
+
+    Parameters
+    ----------
+    ratio : ndarray, shape (n_entries, n_freq)
+        |e|^2 over its variance.
+    inflation : float
+        Lines that carry the noise of one independent line.
+
+    Returns
+    -------
+    ndarray, shape (n_freq,)
+        1 for a line that is not outlying.
+
+    Notes
+    -----
+    The mean over the entries is compared with its running median. Its distribution without outliers is taken to be a
+    gamma distribution whose shape follows from the quartiles of its logarithm, so entries that share their noise and
+    noise that is not circular are allowed for.
+    """
+    line = ratio.mean(axis=0)
+    n_freq = len(line)
+    reach = int(min(max(_USUAL, _USUAL_CORRELATED * inflation), n_freq)) // 2
+    padded = np.pad(line, reach, mode="reflect")
+    usual = np.median(np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1), axis=1)
+    tiny = np.finfo(float).tiny
+    factor: FloatArray = line / np.maximum(usual, tiny)
+    quarter, three_quarters = np.quantile(np.log(np.maximum(factor, tiny)), [0.25, 0.75])
+    shape = (1.349 / max(three_quarters - quarter, 1e-3)) ** 2
+    limit = special.gammainccinv(shape, _FALSE_ALARM / n_freq) / special.gammaincinv(shape, 0.5)
+    return np.where(factor > limit, factor, 1.0)
+
+
+def line_correlation(noise: ComplexArray, share: float = 0.0) -> float:
+    """How many neighbouring lines carry the noise of one independent line.
+
+    Parameters
+    ----------
+    noise : ndarray, shape (n_entries, n_freq)
+        Noise of unit variance; NaN where it is not to count.
+    share : float
+        Part of the noise power that smoothing has taken up, 0 for noise that no smooth FRF was subtracted from.
+
+    Returns
+    -------
+    float
+        1 + 2 sum of the autocorrelations up to the first that is not significant; at least 1.
+    """
+    n_freq = noise.shape[1]
+    size = abs(noise)
+    known: NDArray[np.bool_] = np.isfinite(size)
+    size = np.where(known, size, 0)
+    if n_freq < 16 or not size.any():
+        return 1.0
+    limit = _CUT * np.nanmedian(np.where(known, size, np.nan), axis=1, keepdims=True)
+    cut = np.where(known, noise, 0) * np.minimum(1, limit / np.maximum(size, np.finfo(float).tiny))
+    n_lags = n_freq // 4
+    pairs = np.maximum(_autocorrelation(known.astype(float), n_lags), 1)
+    rho = _autocorrelation(cut, n_lags) / pairs
+    rho = (rho / rho[0] * (1 - share) + share)[1:]
+    small = rho < _SIGNIFICANT / np.sqrt(pairs[0])
+    last = int(small.argmax()) if small.any() else len(rho)
+    lags = np.arange(1, last + 1)
+    return float(max(1.0, 1 + 2 * (rho[:last] * (1 - lags / n_freq)).sum()))
+
+
+def _autocorrelation(x: ComplexArray | FloatArray, n_lags: int) -> FloatArray:
+    """Return sums over entries and lines of Re x_l conj(x_(l+lag)), lag 0 to n_lags - 1."""
+    length = 1 << int(np.ceil(np.log2(x.shape[1] + n_lags)))
+    power = (abs(np.fft.fft(x, length, axis=1)) ** 2).sum(axis=0)
+    sums: FloatArray = np.fft.ifft(power).real[:n_lags]
+    return sums

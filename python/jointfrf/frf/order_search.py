@@ -1,0 +1,202 @@
+"""How many common poles FRFs need, and where they are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from jointfrf.frf.noise_parts import line_correlation
+from jointfrf.frf.rational_fit import Entries, RationalFit, rational_fit, relocated
+from jointfrf.kernel.arguments import ComplexArray, FloatArray
+
+__all__ = ["OrderSearch", "search_order"]
+
+#: Relocations after new poles, and at the end; fewer where the sum of squares no longer changes.
+_RELOCATIONS = 3
+_LAST_RELOCATIONS = 8
+#: Relocation ends when it gains less than this share of what a pole must gain.
+_STILL = 0.1
+#: A fit that leaves this share of the data is exact but for rounding.
+_EXACT = 3e-5
+#: Peaks are the largest lines within this share of all lines on either side, twice what lies between them.
+_PEAK_WINDOW = 0.02
+_PEAK_RISE = 2.0
+#: Poles with less damping than this part of the distance of lines may follow one line only: it is left out to see.
+_NARROW = 0.5
+_LEFT_OUT = 1e-4
+#: Damping of new poles relative to their frequency.
+_DAMPING = 0.01
+
+
+@dataclass(frozen=True)
+class OrderSearch:
+    """What a search is told.
+
+    Attributes
+    ----------
+    inflation : float, optional
+        Lines that carry the noise of one independent line; found from the residual if it is None.
+    max_poles : int
+    patience : int
+        Orders in a row that may gain nothing before the search ends.
+    """
+
+    inflation: float | None = 1.0
+    max_poles: int = 60
+    patience: int = 2
+
+    def most_poles(self, n_freq: int) -> int:
+        """Most poles that this number of lines bears."""
+        return max(1, min(self.max_poles, int(n_freq / (self.inflation or 1) / 3) - 1))
+
+    def found_inflation(self, entries: Entries, fit: RationalFit) -> float:
+        """Return the inflation that was told, or that of the residual."""
+        if self.inflation is not None:
+            return self.inflation
+        share = entries.n_parameters(len(fit.poles)) / entries.n_data
+        return line_correlation(entries.weight * (entries.h - fit.smooth), share)
+
+
+def _price(entries: Entries, inflation: float) -> float:
+    """Return what a pole must take off the sum of squares of noise of variance 1 to be worth its parameters.
+
+    Twice its parameters, as in generalised cross-validation, and the logarithm of the number of lines among which its
+    place was chosen.
+    """
+    return inflation * float(2 * (len(entries.h) + 1) + np.log(len(entries.s)))
+
+
+def _score(entries: Entries, inflation: float, fit: RationalFit) -> float:
+    """Generalised cross-validation: the least is the best."""
+    used = inflation * len(entries.h) + _price(entries, inflation) * len(fit.poles) / 2
+    free = 1 - used / entries.n_data
+    return fit.squares / free**2 if free > 0 else np.inf
+
+
+def search_order(entries: Entries, search: OrderSearch, start: ComplexArray | None = None) -> RationalFit:
+    """Fit with the number of poles that describes the data best.
+
+    Parameters
+    ----------
+    entries : Entries
+        Lines in rising order.
+    search : OrderSearch
+    start : ndarray, optional
+        Poles to begin with; default the peaks of the entries.
+
+    Returns
+    -------
+    RationalFit
+    """
+    most = search.most_poles(len(entries.s))
+    poles: ComplexArray = first_poles(entries) if start is None else start
+    poles = poles[:most]
+    total = float((abs(entries.weight * entries.h) ** 2).sum())
+    best: RationalFit | None = None
+    failures = 0
+    while True:
+        fit = rational_fit(entries, converged(entries, poles, _RELOCATIONS))
+        inflation = search.found_inflation(entries, fit)
+        if best is None or _score(entries, inflation, fit) < _score(entries, inflation, best):
+            best, failures = fit, 0
+        else:
+            failures += 1
+        if failures == search.patience or len(fit.poles) >= most or fit.squares < _EXACT**2 * total:
+            break
+        count = min(max(1, len(fit.poles) // 5), most - len(fit.poles))
+        poles = np.concatenate([fit.poles, _poles_for_residual(entries, fit, count)])
+    inflation = search.found_inflation(entries, best)
+    return _pruned(entries, inflation, _without_single_lines(entries, inflation, best))
+
+
+def converged(entries: Entries, poles: ComplexArray, most: int) -> ComplexArray:
+    """Relocate poles until the sum of squares stays; return those of the least sum."""
+    best, least, before = poles, np.inf, np.inf
+    for _ in range(most + 1):
+        squares, better = relocated(entries, poles)
+        if squares < least:
+            best, least = poles, squares
+        still = _STILL * _price(entries, 1.0) * squares / entries.n_data
+        if abs(before - squares) < still:
+            break
+        before, poles = squares, better
+    return best
+
+
+def _without_single_lines(entries: Entries, inflation: float, fit: RationalFit) -> RationalFit:
+    """Fit without poles that follow one outlying line: without that line they would not be worth their parameters."""
+    f = entries.s.imag
+    narrow = -fit.poles.real < _NARROW * (f[-1] - f[0]) / len(f)
+    narrow &= (fit.poles.imag > f[0]) & (fit.poles.imag < f[-1])
+    if not narrow.any():
+        return fit
+    nearest = abs(f[:, None] - fit.poles.imag[narrow]).argmin(axis=0)
+    weight = entries.weight.copy()
+    weight[:, nearest] *= _LEFT_OUT
+    others = replace(entries, weight=weight)
+    again = rational_fit(others, fit.poles)
+    variance = again.squares / max(entries.n_data - entries.n_parameters(len(fit.poles)), 1)
+    keep = ~narrow | (again.loss > _price(entries, inflation) * variance)
+    return rational_fit(entries, fit.poles[keep]) if keep.any() else fit
+
+
+def _pruned(entries: Entries, inflation: float, fit: RationalFit) -> RationalFit:
+    """Fit without the poles that are not worth their parameters."""
+    least = np.inf
+    best = fit
+    while True:
+        fit = rational_fit(entries, converged(entries, fit.poles, _LAST_RELOCATIONS))
+        score = _score(entries, inflation, fit)
+        if score > least:
+            return best
+        best, least = fit, score
+        variance = fit.squares / max(entries.n_data - entries.n_parameters(len(fit.poles)), 1)
+        keep = fit.loss > _price(entries, inflation) * variance
+        if keep.all() or len(keep) == 1:
+            return best
+        keep[:] = True
+        keep[np.argmin(fit.loss)] = False
+        fit = RationalFit(fit.poles[keep], fit.smooth, fit.squares, fit.loss[keep])
+
+
+def first_poles(entries: Entries) -> ComplexArray:
+    """Poles at the peaks of the entries, and one below and two above the lines for all other modes."""
+    f = entries.s.imag
+    size = abs(entries.h) ** 2
+    indicator = _median_of_three((size / size.mean(axis=1, keepdims=True)).sum(axis=0))
+    places = np.concatenate([[0.5 * f[0]], f[_peaks(indicator)], [1.2, 1.5]])
+    return _at(places)
+
+
+def _at(places: FloatArray) -> ComplexArray:
+    return np.asarray((1j - _DAMPING) * places, np.complex128)
+
+
+def _median_of_three(values: FloatArray) -> FloatArray:
+    """Median of each line and its neighbours: a single outlying line is not a mode."""
+    padded = np.pad(values, 1, mode="edge")
+    return np.asarray(np.median(np.stack([padded[:-2], padded[1:-1], padded[2:]]), axis=0), float)
+
+
+def _peaks(values: FloatArray) -> np.ndarray:
+    """Lines that stand out from those on both sides."""
+    n = len(values)
+    reach = max(2, round(_PEAK_WINDOW * n))
+    windows = np.lib.stride_tricks.sliding_window_view(np.pad(values, reach, mode="edge"), 2 * reach + 1)
+    low = np.maximum(windows[:, :reach].min(axis=1), windows[:, reach + 1 :].min(axis=1))
+    peaks = (values == windows.max(axis=1)) & (values > _PEAK_RISE * low)
+    return np.flatnonzero(peaks)
+
+
+def _poles_for_residual(entries: Entries, fit: RationalFit, count: int) -> ComplexArray:
+    """Poles where the residual is largest, not next to each other."""
+    power = (abs(entries.weight * (entries.h - fit.smooth)) ** 2).sum(axis=0)
+    power = _median_of_three(power)
+    reach = len(power) // 40 + 1
+    lines = []
+    for _ in range(count):
+        line = int(power.argmax())
+        lines.append(line)
+        power[max(0, line - reach) : line + reach + 1] = 0
+    return _at(entries.s.imag[lines] * (1 + 1e-4))
