@@ -28,20 +28,23 @@ class EntryGroup:
         Of entries that count; of a pair that is reciprocal the one above the diagonal.
     paired : ndarray of bool, shape (n_entries,)
         Whether the entry is one of a reciprocal pair.
+    repeated : ndarray of bool, shape (n_entries,)
+        Whether the pair holds two measurements; False where it was made reciprocal before.
     """
 
     rows: NDArray[np.intp]
     columns: NDArray[np.intp]
     paired: NDArray[np.bool_]
+    repeated: NDArray[np.bool_]
 
     def means(self, h: ComplexArray, variance: FloatArray) -> tuple[ComplexArray, FloatArray]:
-        """Return the entries and their variance, one a row; a pair gives its weighted mean."""
+        """Return the entries and their variance, one a row; two measurements give their weighted mean."""
         mean, spread = h[:, self.rows, self.columns].T, variance[:, self.rows, self.columns].T
-        rows, columns, paired = self.rows[self.paired], self.columns[self.paired], self.paired
+        rows, columns, twice = self.rows[self.repeated], self.columns[self.repeated], self.repeated
         other, other_variance = h[:, columns, rows].T, variance[:, columns, rows].T
-        share = other_variance / (spread[paired] + other_variance)
-        mean[paired] = share * mean[paired] + (1 - share) * other
-        spread[paired] *= share
+        share = other_variance / (spread[twice] + other_variance)
+        mean[twice] = share * mean[twice] + (1 - share) * other
+        spread[twice] *= share
         return mean, spread
 
     def put(self, values: ComplexArray | FloatArray, into: ComplexArray | FloatArray) -> None:
@@ -81,7 +84,10 @@ def entry_groups(h: ComplexArray, *, reciprocal: bool) -> list[EntryGroup]:
     for one in np.unique(label[rows]):
         own = label[rows] == one
         p, q = rows[own], columns[own]
-        groups.append(EntryGroup(p, q, (p != q) & reciprocal))
+        paired = (p != q) & reciprocal
+        repeated = paired.copy()
+        repeated[paired] = (h[:, p[paired], q[paired]] != h[:, q[paired], p[paired]]).any(axis=0)
+        groups.append(EntryGroup(p, q, paired, repeated))
     return groups
 
 

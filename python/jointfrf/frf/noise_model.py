@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from jointfrf.frf.entry_groups import entry_groups
 from jointfrf.frf.noise_estimate import reciprocity_noise
-from jointfrf.frf.noise_parts import line_correlation, noise_parts, outlying_factors
+from jointfrf.frf.noise_parts import line_correlation, line_levels, noise_parts
 from jointfrf.frf.order_search import OrderSearch
 from jointfrf.frf.reciprocity_differences import ReciprocityDifferences, reciprocity_differences
 from jointfrf.frf.smoothing import SmoothFrfs, checked_frfs, first_variance, smoothed
@@ -32,7 +32,10 @@ _SETTLED_SHARE = 0.99
 
 @dataclass(frozen=True)
 class NoiseModel:
-    """Noise of measured FRFs, E|e|^2 = line_factor (relative^2 |h|^2 + floor^2 + coherence_factor^2 v), v of coherence.
+    """Noise of measured FRFs.
+
+    E|e|^2 = line_level line_factor (relative^2 |h|^2 + floor^2 + coherence_factor^2 v), v the variance that coherence
+    tells.
 
     Attributes
     ----------
@@ -49,6 +52,9 @@ class NoiseModel:
     inflation_source : {"reciprocity", "residual", "none"}
         Differences h_pq - h_qp, in which no model enters; or measured minus smooth, corrected for the parameters, where
         FRFs are not square or were made reciprocal before; or nothing, too few lines.
+    line_level : ndarray, shape (n_freq,)
+        Variation of the noise power over frequency, common to all entries, that the parts do not describe; 1 where it
+        is not significant.
     line_factor : ndarray, shape (n_freq,)
         By how much the noise power of an outlying line (mains hum) exceeds the model, 1 for other lines.
     source : {"residual", "reciprocity", "none"}
@@ -63,6 +69,7 @@ class NoiseModel:
     variance: FloatArray
     inflation: float
     inflation_source: NoiseSource
+    line_level: FloatArray
     line_factor: FloatArray
     source: NoiseSource
     smooth: SmoothFrfs
@@ -142,6 +149,7 @@ def estimate_noise(
     return replace(
         model,
         variance=model.variance[back],
+        line_level=model.line_level[back],
         line_factor=model.line_factor[back],
         smooth=model.smooth.in_order(back),
     )
@@ -155,9 +163,9 @@ def _estimated(
     variance = first_variance(lines)
     inflation = None
     if differences is not None:
-        factor = differences.outlying_factors(variance)
-        inflation = differences.inflation(variance, factor)
-        variance *= factor[:, None, None]
+        inflation = differences.inflation(variance, differences.line_levels(variance).factor)
+        levels = differences.line_levels(variance, inflation)
+        variance *= (levels.usual * levels.factor)[:, None, None]
     smooth = smoothed(freq, lines, variance, OrderSearch(inflation, max_poles, 1), reciprocal=reciprocal)
     if not smooth.is_smooth:
         return _without_smoothing(lines, smooth, reciprocal=reciprocal)
@@ -168,7 +176,7 @@ def _estimated(
         before, variance = variance, np.maximum(model.variance, np.finfo(float).tiny)
         if turn > 0 and _alike(before, variance):
             break
-        start = _away_from(model.outlying, freq, smooth.poles)
+        start = smooth.poles
         smooth = smoothed(freq, lines, variance, OrderSearch(inflation, max_poles), reciprocal=reciprocal, start=start)
     return model
 
@@ -176,19 +184,6 @@ def _estimated(
 def _alike(before: FloatArray, variance: FloatArray) -> bool:
     """Whether weights have settled."""
     return bool((abs(np.log(variance / before)) < np.log(_SETTLED)).mean() > _SETTLED_SHARE)
-
-
-def _away_from(lines: NDArray[np.intp], freq: FloatArray, groups: tuple[ComplexArray, ...]) -> tuple[ComplexArray, ...]:
-    """Poles without those that follow a single outlying line."""
-    spacing = np.median(np.diff(freq))
-
-    def wide(poles: ComplexArray) -> ComplexArray:
-        hz = poles / (2 * np.pi)
-        near = (abs(hz.imag[:, None] - freq[lines]) < spacing).any(axis=1)
-        keep = ~near | (abs(hz.real) > spacing)
-        return poles[keep] if keep.any() else poles
-
-    return tuple(wide(poles) for poles in groups)
 
 
 def _coherence_variance(h: ComplexArray, coherence: ArrayLike | None, averages: float | None) -> FloatArray | None:
@@ -241,23 +236,27 @@ def _model(
     terms = [abs(smooth.h[:, shown]).T ** 2, np.ones(squares.shape)]
     if given is not None:
         terms.append(given[:, shown].T)
-    factor = np.ones(n_freq)
-    for _ in range(2):
+    stacked = np.stack(terms)
+    usual, factor = np.ones(n_freq), np.ones(n_freq)
+    for turn in range(3):  # outlying lines; with these left out, slow variation; with both, the parts
         good = factor == 1
-        parts = noise_parts(squares[:, good], np.stack(terms)[:, :, good])
-        usual = np.einsum("te,tel->el", parts, np.stack(terms))
-        factor = np.ones(n_freq)
-        if not first or differences is None:
-            factor = outlying_factors(squares / np.maximum(usual, np.finfo(float).tiny), inflation)
+        parts = noise_parts((squares / usual)[:, good], stacked[:, :, good], robust=first or turn == 0)
+        described = np.maximum(np.einsum("te,tel->el", parts, stacked) * usual, np.finfo(float).tiny)
         variance = np.zeros(h.shape)
-        variance[:, shown] = usual.T
+        variance[:, shown] = described.T
+        levels = []
         if differences is not None:
-            factor = np.maximum(factor, differences.outlying_factors(variance, inflation))
+            levels.append(differences.line_levels(variance, inflation))
+        if not first or differences is None:
+            levels.append(line_levels(squares / described, inflation))
+        factor = np.max([found.factor for found in levels], axis=0)
+        if turn == 1:
+            usual = levels[-1].usual
     variance *= factor[:, None, None]
     by_entry = np.zeros((3, n_out, n_in))
     by_entry[: len(parts), shown] = np.sqrt(parts)
     relative, floor, of_coherence = by_entry
-    return NoiseModel(relative, floor, of_coherence, variance, inflation, "none", factor, "residual", smooth)
+    return NoiseModel(relative, floor, of_coherence, variance, inflation, "none", usual, factor, "residual", smooth)
 
 
 def _without_smoothing(h: ComplexArray, smooth: SmoothFrfs, *, reciprocal: bool) -> NoiseModel:
@@ -278,6 +277,7 @@ def _without_smoothing(h: ComplexArray, smooth: SmoothFrfs, *, reciprocal: bool)
         variance=relative**2 * abs(h) ** 2,
         inflation=1.0,
         inflation_source="none",
+        line_level=np.ones(n_freq),
         line_factor=np.ones(n_freq),
         source=cast(NoiseSource, source),
         smooth=smooth,

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
-__all__ = ["line_correlation", "noise_parts", "outlying_factors"]
+__all__ = ["LineLevels", "line_correlation", "line_levels", "noise_parts"]
 
 #: Entries are binned by |h|^2 into so many bins: within one the variance is nearly the same.
 _BINS = 32
@@ -21,13 +23,15 @@ _FALSE_ALARM = 1e-2
 #: Lines over which the usual residual of a line is taken: so many, and so many times the lines that go together.
 _USUAL = 41
 _USUAL_CORRELATED = 5
+#: A spread of running medians so many times that of independent lines is a variation over frequency.
+_VARIES = 2.5
 #: An autocorrelation below so many standard deviations of that of independent lines ends the sum.
 _SIGNIFICANT = 2.5
 #: Residuals beyond so many medians are cut to that, for correlations.
 _CUT = 3.0
 
 
-def noise_parts(squares: FloatArray, terms: FloatArray) -> FloatArray:
+def noise_parts(squares: FloatArray, terms: FloatArray, *, robust: bool = False) -> FloatArray:
     """Non-negative parts of the variance, by maximum likelihood for exponentially distributed squares.
 
     Parameters
@@ -36,6 +40,9 @@ def noise_parts(squares: FloatArray, terms: FloatArray) -> FloatArray:
         |e|^2, corrected for what smoothing has taken up.
     terms : ndarray, shape (n_terms, n_entries, n_freq)
         E|e|^2 = sum over the terms of part times term. The first is |h|^2, which lines are binned by.
+    robust : bool
+        Whether medians of the bins count, which some lines with another error than noise do not change; as exact as
+        the squares are exponentially distributed.
 
     Returns
     -------
@@ -47,7 +54,10 @@ def noise_parts(squares: FloatArray, terms: FloatArray) -> FloatArray:
     -sum(log v + y/v), from one start a term with that term alone, and one with all alike. The estimate holds for
     any distribution of e with this variance; it is efficient for circular normal e.
     """
-    y, a, count = _binned(squares, terms)
+    # The variance is nearly the same within a bin, unless a further term follows neither |h|^2 nor a constant.
+    y, a, count = (
+        _binned(squares, terms, robust=robust) if len(terms) == 2 else (squares, terms, np.ones(squares.shape[1]))
+    )
     size = np.maximum((a * count).sum(axis=2, keepdims=True), np.finfo(float).tiny)
     a = a / size
     level = (y * count).sum(axis=1)
@@ -65,24 +75,45 @@ def noise_parts(squares: FloatArray, terms: FloatArray) -> FloatArray:
     return chosen
 
 
-def _binned(squares: FloatArray, terms: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Means over bins of lines of similar |h|^2, and how many lines each bin holds; single lines with more terms."""
+def _binned(squares: FloatArray, terms: FloatArray, *, robust: bool) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Means over bins of lines of similar |h|^2, and how many lines each bin holds."""
     n_freq = squares.shape[1]
-    if n_freq <= _BINS or len(terms) > 2:
+    if n_freq <= _BINS:
         return squares, terms, np.ones(n_freq)
     order = np.argsort(terms[0], axis=1)
     edges = np.linspace(0, n_freq, _BINS + 1).astype(int)
     count = np.diff(edges).astype(float)
 
     def means(values: FloatArray) -> FloatArray:
-        found: FloatArray = np.add.reduceat(np.take_along_axis(values, order, axis=1), edges[:-1], axis=1) / count
-        return found
+        return np.asarray(np.add.reduceat(values, edges[:-1], axis=1) / count)
 
-    return means(squares), np.stack([means(term) for term in terms]), count
+    ordered = np.take_along_axis(squares, order, axis=1)
+    if robust:
+        bins = np.split(ordered, edges[1:-1], axis=1)
+        y = np.stack([np.median(one, axis=1) for one in bins], axis=1) / np.log(2)
+    else:
+        y = means(ordered)
+    return y, np.stack([means(np.take_along_axis(term, order, axis=1)) for term in terms]), count
 
 
-def outlying_factors(ratio: FloatArray, inflation: float = 1.0) -> FloatArray:
-    """By how much the noise power of outlying lines exceeds what is usual among the lines around.
+@dataclass(frozen=True)
+class LineLevels:
+    """Noise power of lines, all entries together, relative to their variance.
+
+    Attributes
+    ----------
+    usual : ndarray, shape (n_freq,)
+        Slow variation over frequency; 1 where there is none that is significant.
+    factor : ndarray, shape (n_freq,)
+        By how much an outlying line exceeds the lines around; 1 for other lines.
+    """
+
+    usual: FloatArray
+    factor: FloatArray
+
+
+def line_levels(ratio: FloatArray, inflation: float = 1.0) -> LineLevels:
+    """Find slow variation of the noise over frequency, and outlying lines.
 
     Parameters
     ----------
@@ -93,26 +124,30 @@ def outlying_factors(ratio: FloatArray, inflation: float = 1.0) -> FloatArray:
 
     Returns
     -------
-    ndarray, shape (n_freq,)
-        1 for a line that is not outlying.
+    LineLevels
 
     Notes
     -----
     The mean over the entries is compared with its running median. Its distribution without outliers is taken to be a
     gamma distribution whose shape follows from the quartiles of its logarithm, so entries that share their noise and
-    noise that is not circular are allowed for.
+    noise that is not circular are allowed for. The running median, relative to its own median, is the slow variation
+    if its spread is well above that of medians of so many independent lines.
     """
     line = ratio.mean(axis=0)
     n_freq = len(line)
     reach = int(min(max(_USUAL, _USUAL_CORRELATED * inflation), n_freq)) // 2
     padded = np.pad(line, reach, mode="reflect")
-    usual = np.median(np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1), axis=1)
     tiny = np.finfo(float).tiny
-    factor: FloatArray = line / np.maximum(usual, tiny)
+    usual = np.maximum(np.median(np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1), axis=1), tiny)
+    factor: FloatArray = line / usual
     quarter, three_quarters = np.quantile(np.log(np.maximum(factor, tiny)), [0.25, 0.75])
     shape = (1.349 / max(three_quarters - quarter, 1e-3)) ** 2
     limit = special.gammainccinv(shape, _FALSE_ALARM / n_freq) / special.gammaincinv(shape, 0.5)
-    return np.where(factor > limit, factor, 1.0)
+    by_chance = np.sqrt(inflation / (shape * (2 * reach + 1)))
+    low, high = np.quantile(np.log(usual), [0.1, 0.9])
+    varies = (high - low) / 2.56 > _VARIES * by_chance
+    slow = usual / np.median(usual) if varies else np.ones(n_freq)
+    return LineLevels(slow, np.where(factor > limit, factor, 1.0))
 
 
 def line_correlation(noise: ComplexArray, share: float = 0.0) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from jointfrf.frf.noise_parts import line_correlation
 from jointfrf.frf.rational_fit import Entries, RationalFit, rational_fit, relocated
@@ -25,6 +26,8 @@ _PEAK_RISE = 2.0
 #: Poles with less damping than this part of the distance of lines may follow one line only: it is left out to see.
 _NARROW = 0.5
 _LEFT_OUT = 1e-4
+#: Rounds of finding such lines.
+_ROUNDS = 3
 #: Damping of new poles relative to their frequency.
 _DAMPING = 0.01
 
@@ -89,10 +92,23 @@ def search_order(entries: Entries, search: OrderSearch, start: ComplexArray | No
     -------
     RationalFit
     """
+    poles = first_poles(entries) if start is None else start
+    for _ in range(_ROUNDS):
+        fit = _grown(entries, search, poles)
+        inflation = search.found_inflation(entries, fit)
+        alone, followed = _single_lines(entries, inflation, fit)
+        if not followed.size:
+            break
+        entries = _left_out(entries, followed)
+        poles = fit.poles[~alone] if not alone.all() else first_poles(entries)
+    return _pruned(entries, inflation, fit)
+
+
+def _grown(entries: Entries, search: OrderSearch, poles: ComplexArray) -> RationalFit:
+    """Fit with poles added where the residual is largest, as long as they are worth their parameters."""
     most = search.most_poles(len(entries.s))
-    poles: ComplexArray = first_poles(entries) if start is None else start
-    poles = poles[:most]
     total = float((abs(entries.weight * entries.h) ** 2).sum())
+    poles = poles[:most]
     best: RationalFit | None = None
     failures = 0
     while True:
@@ -103,11 +119,9 @@ def search_order(entries: Entries, search: OrderSearch, start: ComplexArray | No
         else:
             failures += 1
         if failures == search.patience or len(fit.poles) >= most or fit.squares < _EXACT**2 * total:
-            break
+            return best
         count = min(max(1, len(fit.poles) // 5), most - len(fit.poles))
         poles = np.concatenate([fit.poles, _poles_for_residual(entries, fit, count)])
-    inflation = search.found_inflation(entries, best)
-    return _pruned(entries, inflation, _without_single_lines(entries, inflation, best))
 
 
 def converged(entries: Entries, poles: ComplexArray, most: int) -> ComplexArray:
@@ -124,21 +138,24 @@ def converged(entries: Entries, poles: ComplexArray, most: int) -> ComplexArray:
     return best
 
 
-def _without_single_lines(entries: Entries, inflation: float, fit: RationalFit) -> RationalFit:
-    """Fit without poles that follow one outlying line: without that line they would not be worth their parameters."""
+def _single_lines(entries: Entries, inflation: float, fit: RationalFit) -> tuple[NDArray[np.bool_], NDArray[np.intp]]:
+    """Whether a pole follows one outlying line, and these lines: without that line it is not worth its parameters."""
     f = entries.s.imag
     narrow = -fit.poles.real < _NARROW * (f[-1] - f[0]) / len(f)
     narrow &= (fit.poles.imag > f[0]) & (fit.poles.imag < f[-1])
     if not narrow.any():
-        return fit
-    nearest = abs(f[:, None] - fit.poles.imag[narrow]).argmin(axis=0)
-    weight = entries.weight.copy()
-    weight[:, nearest] *= _LEFT_OUT
-    others = replace(entries, weight=weight)
-    again = rational_fit(others, fit.poles)
+        return narrow, np.zeros(0, np.intp)
+    nearest = abs(f[:, None] - fit.poles.imag).argmin(axis=0)
+    again = rational_fit(_left_out(entries, nearest[narrow]), fit.poles)
     variance = again.squares / max(entries.n_data - entries.n_parameters(len(fit.poles)), 1)
-    keep = ~narrow | (again.loss > _price(entries, inflation) * variance)
-    return rational_fit(entries, fit.poles[keep]) if keep.any() else fit
+    alone = narrow & (again.loss < _price(entries, inflation) * variance)
+    return alone, nearest[alone]
+
+
+def _left_out(entries: Entries, lines: NDArray[np.intp]) -> Entries:
+    weight = entries.weight.copy()
+    weight[:, lines] *= _LEFT_OUT
+    return replace(entries, weight=weight)
 
 
 def _pruned(entries: Entries, inflation: float, fit: RationalFit) -> RationalFit:
@@ -161,16 +178,18 @@ def _pruned(entries: Entries, inflation: float, fit: RationalFit) -> RationalFit
 
 
 def first_poles(entries: Entries) -> ComplexArray:
-    """Poles at the peaks of the entries, and one below and two above the lines for all other modes."""
+    """Poles at the peaks of the entries, at the mirror image of the lowest, and two above the lines."""
     f = entries.s.imag
     size = abs(entries.h) ** 2
     indicator = _median_of_three((size / size.mean(axis=1, keepdims=True)).sum(axis=0))
-    places = np.concatenate([[0.5 * f[0]], f[_peaks(indicator)], [1.2, 1.5]])
+    peaks = f[_peaks(indicator)]
+    lowest = peaks[0] if peaks.size else f[0]
+    places = np.concatenate([[-lowest], peaks, [1.2, 1.5]])
     return _at(places)
 
 
 def _at(places: FloatArray) -> ComplexArray:
-    return np.asarray((1j - _DAMPING) * places, np.complex128)
+    return np.asarray(1j * places - _DAMPING * abs(places), np.complex128)
 
 
 def _median_of_three(values: FloatArray) -> FloatArray:

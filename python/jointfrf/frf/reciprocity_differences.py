@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from jointfrf.frf.noise_parts import line_correlation, outlying_factors
+from jointfrf.frf.noise_parts import LineLevels, line_correlation, line_levels
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
 __all__ = ["ReciprocityDifferences", "reciprocity_differences"]
@@ -33,9 +33,9 @@ class ReciprocityDifferences:
         total: FloatArray = (variance[:, self.rows, self.columns] + variance[:, self.columns, self.rows]).T
         return np.maximum(total, np.finfo(float).tiny)
 
-    def outlying_factors(self, variance: FloatArray, inflation: float = 1.0) -> FloatArray:
-        """Return factors of outlying lines, shape (n_freq,), for FRFs of this variance (n_freq, m, m)."""
-        return outlying_factors(abs(self.values) ** 2 / self._variance(variance), inflation)
+    def line_levels(self, variance: FloatArray, inflation: float = 1.0) -> LineLevels:
+        """Return slow variation and outlying lines of the noise of FRFs of this variance (n_freq, m, m)."""
+        return line_levels(abs(self.values) ** 2 / self._variance(variance), inflation)
 
     def inflation(self, variance: FloatArray, line_factor: FloatArray) -> float:
         """Return how many lines carry the noise of one independent line; outlying lines do not count."""

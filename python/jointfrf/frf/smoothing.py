@@ -157,7 +157,7 @@ def smoothed(
     reciprocal: bool,
     start: tuple[ComplexArray, ...] = (),
 ) -> SmoothFrfs:
-    """Smooth checked FRFs, lines in rising order, as `smooth_frfs` does; from poles `start` in rad/s if there are any."""
+    """Smooth checked FRFs, lines in rising order, as `smooth_frfs` does; poles `start` are in rad/s."""
     n_freq, n_out, n_in = h.shape
     measured = SmoothFrfs(freq, h, False, (), 1.0, np.zeros((n_out, n_in)))
     if n_freq < _FEWEST_LINES or not h.any():
@@ -172,7 +172,7 @@ def smoothed(
         squares, freedom = squares + fit.squares, freedom + entries.n_data - parameters
         exactness = max(exactness, _relative(entries, fit))
         group.put(fit.smooth, values)
-        group.put((parameters / entries.n_data / np.where(group.paired, 2, 1))[:, None], share)
+        group.put((parameters / entries.n_data / np.where(group.repeated, 2, 1))[:, None], share)
         fits.append(fit.poles * unit)
     level = float(np.sqrt(squares / max(freedom, 1)))
     if exactness < _EXACT:
@@ -201,7 +201,7 @@ def _smooth_group(
         return entries, search_order(entries, search, start)
     mean, spread = group.means(h, first_variance(h))
     fit = search_order(Entries(s, mean, 1 / np.sqrt(spread)), search, start)
-    count = np.where(group.paired, 2, 1)[:, None]
+    count = np.where(group.repeated, 2, 1)[:, None]
     weight = np.sqrt(count / ((3 * abs(fit.smooth) ** 2 + count * spread) / 4))
     entries = Entries(s, mean, weight)
     return entries, search_order(entries, search, fit.poles)
