@@ -13,7 +13,7 @@ from jointfrf.frf.noise_estimate import reciprocity_noise
 from jointfrf.frf.noise_parts import line_correlation, line_levels, noise_parts
 from jointfrf.frf.order_search import OrderSearch
 from jointfrf.frf.reciprocity_differences import ReciprocityDifferences, reciprocity_differences
-from jointfrf.frf.smoothing import SmoothFrfs, checked_frfs, first_variance, smoothed
+from jointfrf.frf.smoothing import SmoothFrfs, checked_frfs, first_variance, near_squares, smoothed
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_number, as_real
 
 __all__ = ["NoiseModel", "NoiseSource", "estimate_noise"]
@@ -160,9 +160,11 @@ def _estimated(
 ) -> NoiseModel:
     """Noise model of checked FRFs, lines in rising order."""
     differences = reciprocity_differences(lines) if reciprocal else None
-    variance = first_variance(lines)
     inflation = None
-    if differences is not None:
+    if differences is None:
+        variance = first_variance(lines)
+    else:
+        variance = np.maximum(differences.variance_of_parts(near_squares(lines)), np.finfo(float).tiny)
         inflation = differences.inflation(variance, differences.line_levels(variance).factor)
         levels = differences.line_levels(variance, inflation)
         variance *= (levels.usual * levels.factor)[:, None, None]
@@ -170,11 +172,11 @@ def _estimated(
     if not smooth.is_smooth:
         return _without_smoothing(lines, smooth, reciprocal=reciprocal)
     for turn in range(_MOST_TURNS):
-        model = _model(lines, smooth, given, inflation or 1.0, differences, first=turn == 0)
+        model = _model(lines, smooth, given, inflation or 1.0, differences, first=turn == 0 and differences is None)
         inflation, source = _found_inflation(lines, differences, model)
         model = replace(model, inflation=inflation, inflation_source=source)
         before, variance = variance, np.maximum(model.variance, np.finfo(float).tiny)
-        if turn > 0 and _alike(before, variance):
+        if (turn > 0 or differences is not None) and _alike(before, variance):
             break
         start = smooth.poles
         smooth = smoothed(freq, lines, variance, OrderSearch(inflation, max_poles), reciprocal=reciprocal, start=start)

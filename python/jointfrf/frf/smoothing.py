@@ -20,7 +20,7 @@ from jointfrf.kernel.arguments import (
     check_finite_lines,
 )
 
-__all__ = ["SmoothFrfs", "checked_frfs", "first_variance", "smooth_frfs", "smoothed"]
+__all__ = ["SmoothFrfs", "checked_frfs", "first_variance", "near_squares", "smooth_frfs", "smoothed"]
 
 #: Fewer lines are returned as they were measured.
 _FEWEST_LINES = 16
@@ -209,8 +209,14 @@ def _smooth_group(
 
 def first_variance(h: ComplexArray) -> FloatArray:
     """Variance before anything is known of the noise: |h|^2 over neighbouring lines, not below a part of its median."""
-    squares = abs(h) ** 2
-    padded = np.pad(squares, ((1, 1), (0, 0), (0, 0)), mode="edge")
-    near = (padded[:-2] + padded[1:-1] + padded[2:]) / 3
-    variance: FloatArray = np.maximum(near + _FIRST_FLOOR * np.median(squares, axis=0), np.finfo(float).tiny)
+    near = near_squares(h)
+    variance: FloatArray = np.maximum(near + _FIRST_FLOOR * np.median(near, axis=0), np.finfo(float).tiny)
     return variance
+
+
+def near_squares(h: ComplexArray) -> FloatArray:
+    """Mean of |h|^2 over each line and its neighbours."""
+    squares = h.real**2 + h.imag**2
+    padded = np.pad(squares, ((1, 1), (0, 0), (0, 0)), mode="edge")
+    near: FloatArray = (padded[:-2] + padded[1:-1] + padded[2:]) / 3
+    return near
