@@ -16,7 +16,7 @@ module jointfrf_checks
   public :: check_couple, check_modify, check_matrices, check_decouple, check_compliance_factors
   public :: check_compliance_covariance
   public :: check_difference_weights, check_central_difference, check_transform, check_pollute, check_monte_carlo
-  public :: check_brick_matrices, check_brick_quality
+  public :: check_brick_matrices, check_brick_quality, check_rational_fit, check_relocate_poles
 
 contains
 
@@ -305,4 +305,25 @@ contains
     info = info_good
     if (bad_size(n_elements)) info = -1
   end function check_brick_quality
+
+  pure function check_relocate_poles(n_poles, n_entries, n_freq, iterations, still) result(info)
+    integer(ip), intent(in) :: n_poles, n_entries, n_freq, iterations
+    real(c_double), intent(in) :: still
+    integer(ip) :: info
+
+    info = check_rational_fit(n_poles, n_entries, n_freq)
+    if (info /= info_good) return
+    if (not_finite(still) .or. still < 0.0_c_double) info = -5
+    if (bad_size(iterations)) info = -4
+  end function check_relocate_poles
+
+  pure function check_rational_fit(n_poles, n_entries, n_freq) result(info)
+    integer(ip), intent(in) :: n_poles, n_entries, n_freq
+    integer(ip) :: info
+
+    info = info_good
+    if (bad_size(n_freq)) info = -3
+    if (bad_size(n_entries)) info = -2
+    if (bad_size(n_poles)) info = -1
+  end function check_rational_fit
 end module jointfrf_checks

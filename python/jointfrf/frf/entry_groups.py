@@ -39,7 +39,8 @@ class EntryGroup:
 
     def means(self, h: ComplexArray, variance: FloatArray) -> tuple[ComplexArray, FloatArray]:
         """Return the entries and their variance, one a row; two measurements give their weighted mean."""
-        mean, spread = h[:, self.rows, self.columns].T, variance[:, self.rows, self.columns].T
+        mean = np.ascontiguousarray(h[:, self.rows, self.columns].T)
+        spread = np.ascontiguousarray(variance[:, self.rows, self.columns].T)
         rows, columns, twice = self.rows[self.repeated], self.columns[self.repeated], self.repeated
         other, other_variance = h[:, columns, rows].T, variance[:, columns, rows].T
         share = other_variance / (spread[twice] + other_variance)

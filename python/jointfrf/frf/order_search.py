@@ -112,7 +112,7 @@ def _grown(entries: Entries, search: OrderSearch, poles: ComplexArray) -> Ration
     best: RationalFit | None = None
     failures = 0
     while True:
-        fit = rational_fit(entries, converged(entries, poles, _RELOCATIONS))
+        fit = _converged(entries, poles, _RELOCATIONS)
         inflation = search.found_inflation(entries, fit)
         if best is None or _score(entries, inflation, fit) < _score(entries, inflation, best):
             best, failures = fit, 0
@@ -124,18 +124,10 @@ def _grown(entries: Entries, search: OrderSearch, poles: ComplexArray) -> Ration
         poles = np.concatenate([fit.poles, _poles_for_residual(entries, fit, count)])
 
 
-def converged(entries: Entries, poles: ComplexArray, most: int) -> ComplexArray:
-    """Relocate poles until the sum of squares stays; return those of the least sum."""
-    best, least, before = poles, np.inf, np.inf
-    for _ in range(most + 1):
-        squares, better = relocated(entries, poles)
-        if squares < least:
-            best, least = poles, squares
-        still = _STILL * _price(entries, 1.0) * squares / entries.n_data
-        if abs(before - squares) < still:
-            break
-        before, poles = squares, better
-    return best
+def _converged(entries: Entries, poles: ComplexArray, most: int) -> RationalFit:
+    """Fit with poles relocated until the sum of squares stays."""
+    still = _STILL * _price(entries, 1.0) / entries.n_data
+    return rational_fit(entries, relocated(entries, poles, most, still)[1])
 
 
 def _single_lines(entries: Entries, inflation: float, fit: RationalFit) -> tuple[NDArray[np.bool_], NDArray[np.intp]]:
@@ -163,7 +155,7 @@ def _pruned(entries: Entries, inflation: float, fit: RationalFit) -> RationalFit
     least = np.inf
     best = fit
     while True:
-        fit = rational_fit(entries, converged(entries, fit.poles, _LAST_RELOCATIONS))
+        fit = _converged(entries, fit.poles, _LAST_RELOCATIONS)
         score = _score(entries, inflation, fit)
         if score > least:
             return best

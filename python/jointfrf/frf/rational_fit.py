@@ -7,15 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.kernel.call import call_for_number
 
 __all__ = ["Entries", "RationalFit", "rational_fit", "relocated"]
-
-#: Line-wise products are formed for so many lines at a time: they stay in the cache.
-_LINES = 4096
-#: Poles closer to the frequency axis than this share of the distance of lines are moved away from it.
-_NEAREST = 1e-3
-#: Added to the diagonal of normal equations, relative to their trace.
-_ROUNDING = 1e-15
 
 
 @dataclass(frozen=True)
@@ -27,8 +21,9 @@ class Entries:
     s : ndarray, shape (n_freq,)
         i f / max f.
     h : ndarray, shape (n_entries, n_freq)
+        In C order.
     weight : ndarray, shape (n_entries, n_freq)
-        1 / sqrt(E|e|^2) up to one factor.
+        1 / sqrt(E|e|^2) up to one factor, in C order.
     """
 
     s: ComplexArray
@@ -65,59 +60,24 @@ class RationalFit:
     loss: FloatArray
 
 
-@dataclass(frozen=True)
-class _Basis:
-    """1 and 1/(s - p) of each pole, made orthonormal under the mean weight of the entries.
-
-    Attributes
-    ----------
-    functions : ndarray, shape (n_freq, n_poles + 1)
-        psi of [1, 1/(s - p)] = psi `triangle`.
-    triangle : ndarray, shape (n_poles + 1, n_poles + 1)
-    """
-
-    functions: ComplexArray
-    triangle: ComplexArray
-
-
-def _basis(entries: Entries, poles: ComplexArray) -> _Basis:
-    fractions = np.empty((len(entries.s), len(poles) + 1), np.complex128)
-    fractions[:, 0] = 1
-    np.divide(1, entries.s[:, None] - poles, out=fractions[:, 1:])
-    common = np.sqrt((entries.weight**2).mean(axis=0))[:, None]
-    orthonormal, triangle = np.linalg.qr(common * fractions)
-    return _Basis(orthonormal / common, triangle)
-
-
-def _gram(functions: ComplexArray, weights: ComplexArray) -> ComplexArray:
-    """Return sum over the lines of w_e conj(psi_i) psi_j, shape (n_weights, n, n)."""
-    n = functions.shape[1]
-    i, j = np.triu_indices(n)
-    upper = np.zeros((len(weights), 2, i.size), np.complex128)
-    for first in range(0, len(functions), _LINES):
-        some = functions[first : first + _LINES]
-        product = some[:, i].conj() * some[:, j]
-        w = weights[:, first : first + _LINES]
-        upper[:, 0] += w @ product
-        upper[:, 1] += w @ product.conj()
-    gram = np.empty((len(weights), n, n), np.complex128)
-    gram[:, i, j] = upper[:, 0]
-    gram[:, j, i] = upper[:, 1]
-    return gram
-
-
-def relocated(entries: Entries, poles: ComplexArray) -> tuple[float, ComplexArray]:
-    """Sum of squares of the fit with these poles, and better poles.
+def relocated(entries: Entries, poles: ComplexArray, iterations: int, still: float) -> tuple[float, ComplexArray]:
+    """Relocate poles until the sum of squares of the fit stays.
 
     Parameters
     ----------
     entries : Entries
     poles : ndarray, shape (n_poles,)
+    iterations : int
+        Most relocations.
+    still : float
+        Relative change of the sum of squares at which they end.
 
     Returns
     -------
     squares : float
+        The least sum of squares.
     better : ndarray, shape (n_poles,)
+        Its poles, all stable.
 
     Notes
     -----
@@ -133,34 +93,11 @@ def relocated(entries: Entries, poles: ComplexArray) -> tuple[float, ComplexArra
     B. Gustavsen, A. Semlyen, Rational approximation of frequency domain responses by vector fitting. IEEE Trans.
     Power Delivery 14 (1999); B. Gustavsen, Improving the pole relocating properties of vector fitting. 21 (2006).
     """
-    basis = _basis(entries, poles)
-    form = _form_of_sigma(entries, basis.functions)
-    n = len(form)
-    one = basis.triangle[:, 0]  # psi one = 1
-    squares = max(float((one.conj() @ form @ one).real), 0.0)
-    form[np.diag_indices(n)] += _ROUNDING * np.trace(form).real / n
-    sigma = np.linalg.solve(basis.triangle, np.linalg.solve(form, basis.functions.conj().sum(axis=0)))
-    lead = sigma[0] if sigma[0] != 0 else np.finfo(float).tiny
-    zeros: ComplexArray = np.linalg.eigvals(np.diag(poles) - sigma[1:] / lead).astype(np.complex128)
-    return squares, _stable(zeros, entries.s)
-
-
-def _form_of_sigma(entries: Entries, functions: ComplexArray) -> ComplexArray:
-    """Sum of squares as a quadratic form of the coefficients of sigma, the numerators eliminated."""
-    n = functions.shape[1]
-    squared = entries.weight**2
-    weights = np.concatenate([squared, squared * entries.h, squared * abs(entries.h) ** 2])
-    own, mixed, right = _gram(functions, weights).reshape(3, -1, n, n)
-    own[:, np.arange(n), np.arange(n)] *= 1 + _ROUNDING
-    form: ComplexArray = (right - mixed.conj().swapaxes(1, 2) @ np.linalg.solve(own, mixed)).sum(axis=0)
-    return (form + form.conj().T) / 2
-
-
-def _stable(poles: ComplexArray, s: ComplexArray) -> ComplexArray:
-    """Poles turned to the stable side, none nearer to the axis than a small part of the distance of lines."""
-    nearest = _NEAREST * (s.imag.max() - s.imag.min()) / len(s)
-    stable: ComplexArray = -np.maximum(abs(poles.real), nearest) + 1j * poles.imag
-    return stable
+    better = np.array(poles, np.complex128)
+    sizes = (len(poles), *entries.h.shape)
+    fitted = (entries.s, entries.h, entries.weight)
+    squares, _ = call_for_number("relocate_poles", (*sizes, iterations, still, *fitted, better))
+    return squares, better
 
 
 def rational_fit(entries: Entries, poles: ComplexArray) -> RationalFit:
@@ -179,18 +116,8 @@ def rational_fit(entries: Entries, poles: ComplexArray) -> RationalFit:
     -----
     Normal equations in a basis that is orthonormal under the mean weight, corrected once by their residual.
     """
-    basis = _basis(entries, poles)
-    psi, squared = basis.functions, entries.weight**2
-    gram = _gram(psi, squared.astype(np.complex128))
-    smooth = np.zeros_like(entries.h)
-    coefficients = np.zeros((len(entries.h), psi.shape[1], 1), np.complex128)
-    for _ in range(2):
-        pull = (squared * (entries.h - smooth)) @ psi.conj()
-        coefficients += np.linalg.solve(gram, pull[:, :, None])
-        smooth = coefficients[:, :, 0] @ psi.T
-    squares = float((squared * abs(entries.h - smooth) ** 2).sum())
-    back = np.linalg.solve(basis.triangle, np.eye(psi.shape[1]))
-    residues = coefficients[:, :, 0] @ back.T
-    spread = np.einsum("kj,eji,ki->ek", back, np.linalg.inv(gram), back.conj(), optimize=True).real
-    loss = (abs(residues) ** 2 / spread).sum(axis=0)[1:]
+    smooth, loss = np.empty_like(entries.h), np.empty(len(poles))
+    sizes = (len(poles), *entries.h.shape)
+    fitted = (entries.s, entries.h, entries.weight)
+    squares, _ = call_for_number("rational_fit", (*sizes, *fitted, poles, smooth, loss))
     return RationalFit(poles, smooth, squares, loss)
