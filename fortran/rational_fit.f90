@@ -17,6 +17,8 @@ module jointfrf_rational_fit
   private
   public :: rational_fit, relocate_poles
 
+  !> Their pairs are counted by default integers, with room to spare.
+  integer, parameter, public :: most_poles = 10000
   !> Lines, and pairs of functions, of one piece of the sums.
   integer, parameter :: piece_lines = 256, piece_pairs = 16
   !> Below this many floating-point operations, a millisecond or two of matrix products, one thread does the work.
@@ -84,6 +86,8 @@ contains
     integer :: n, k, stat
 
     squares = 0.0_dp
+    info = info_good
+    if (size(h) == 0) return
     n = size(poles) + 1
     call prepare_sums(4*size(h, 2), n, size(s), gram, info)
     if (info == info_good) then
@@ -140,6 +144,8 @@ contains
     smooth = 0.0_dp
     squares = 0.0_dp
     loss = 0.0_dp
+    info = info_good
+    if (size(h) == 0) return
     n = size(poles) + 1
     call prepare_sums(size(h, 2), n, size(s), gram, info)
     if (info == info_good) then

@@ -803,7 +803,7 @@ contains
 
   !> Rational functions c_0 + sum c_k/(s - p_k) with given common poles through several FRFs, each fitted by weighted
   !> least squares; residues are complex.
-  !> n_poles     number of poles
+  !> n_poles     number of poles, at most 10000
   !> n_entries   number of FRFs
   !> n_freq      as above
   !> s           i times the frequency of each line, in any unit, shape (n_freq)
@@ -832,7 +832,7 @@ contains
 
   !> Better common poles of rational functions c_0 + sum c_k/(s - p_k) through several FRFs, by relaxed vector fitting,
   !> until the sum of squares of their fit stays.
-  !> n_poles     number of poles
+  !> n_poles     number of poles, at most 10000
   !> n_entries   number of FRFs
   !> n_freq      as above
   !> iterations  most relocations; 0 gives the sum of squares of the poles as they are

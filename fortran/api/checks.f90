@@ -9,6 +9,7 @@ module jointfrf_checks
   use jointfrf_kinds, only: ip, long
   use jointfrf_monte_carlo, only: is_method
   use jointfrf_noise, only: is_kind, is_reference
+  use jointfrf_rational_fit, only: most_poles
   use jointfrf_status, only: info_good
   implicit none
   private
@@ -323,7 +324,7 @@ contains
 
     info = info_good
     if (bad_size(n_freq)) info = -3
-    if (bad_size(n_entries)) info = -2
-    if (bad_size(n_poles)) info = -1
+    if (bad_size(n_entries) .or. n_entries > huge(0)/4) info = -2
+    if (bad_size(n_poles) .or. n_poles > most_poles) info = -1
   end function check_rational_fit
 end module jointfrf_checks

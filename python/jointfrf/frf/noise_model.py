@@ -26,8 +26,9 @@ _MOST_TAKEN = 0.8
 #: Smooth FRFs and noise model are found in turn so often at most, until variances change by less than a factor on
 #: nearly all lines.
 _MOST_TURNS = 4
-_SETTLED = 1.3
-_SETTLED_SHARE = 0.99
+_SETTLED = 1.5
+_SETTLED_SHARE = 0.97
+_TINY = float(np.finfo(float).tiny)
 
 
 @dataclass(frozen=True)
@@ -86,7 +87,7 @@ class NoiseModel:
         counts = (self.relative > 0) | (self.floor > 0) | (self.coherence_factor > 0)
         if not counts.any():
             return 0.0
-        return float(np.median(np.sqrt(self.variance[:, counts]) / np.maximum(size[:, counts], np.finfo(float).tiny)))
+        return float(np.median(np.sqrt(self.variance[:, counts]) / np.maximum(size[:, counts], _TINY)))
 
 
 def estimate_noise(
@@ -164,7 +165,7 @@ def _estimated(
     if differences is None:
         variance = first_variance(lines)
     else:
-        variance = np.maximum(differences.variance_of_parts(near_squares(lines)), np.finfo(float).tiny)
+        variance = np.maximum(differences.variance_of_parts(near_squares(lines)), _TINY)
         inflation = differences.inflation(variance, differences.line_levels(variance).factor)
         levels = differences.line_levels(variance, inflation)
         variance *= (levels.usual * levels.factor)[:, None, None]
@@ -175,11 +176,13 @@ def _estimated(
         model = _model(lines, smooth, given, inflation or 1.0, differences, first=turn == 0 and differences is None)
         inflation, source = _found_inflation(lines, differences, model)
         model = replace(model, inflation=inflation, inflation_source=source)
-        before, variance = variance, np.maximum(model.variance, np.finfo(float).tiny)
+        before, variance = variance, np.maximum(model.variance, _TINY)
         if (turn > 0 or differences is not None) and _alike(before, variance):
             break
         start = smooth.poles
-        smooth = smoothed(freq, lines, variance, OrderSearch(inflation, max_poles), reciprocal=reciprocal, start=start)
+        smooth = smoothed(
+            freq, lines, variance, OrderSearch(inflation, max_poles, 1), reciprocal=reciprocal, start=start
+        )
     return model
 
 
@@ -240,10 +243,11 @@ def _model(
         terms.append(given[:, shown].T)
     stacked = np.stack(terms)
     usual, factor = np.ones(n_freq), np.ones(n_freq)
-    for turn in range(3):  # outlying lines; with these left out, slow variation; with both, the parts
+    # Outlying lines; with these left out, slow variation; where there is some, parts and outlying lines once more.
+    for turn in range(3):
         good = factor == 1
         parts = noise_parts((squares / usual)[:, good], stacked[:, :, good], robust=first or turn == 0)
-        described = np.maximum(np.einsum("te,tel->el", parts, stacked) * usual, np.finfo(float).tiny)
+        described = np.maximum(_described(parts, stacked) * usual, _TINY)
         variance = np.zeros(h.shape)
         variance[:, shown] = described.T
         levels = []
@@ -253,12 +257,19 @@ def _model(
             levels.append(line_levels(squares / described, inflation))
         factor = np.max([found.factor for found in levels], axis=0)
         if turn == 1:
+            if (levels[-1].usual == 1).all():
+                break
             usual = levels[-1].usual
     variance *= factor[:, None, None]
     by_entry = np.zeros((3, n_out, n_in))
     by_entry[: len(parts), shown] = np.sqrt(parts)
     relative, floor, of_coherence = by_entry
     return NoiseModel(relative, floor, of_coherence, variance, inflation, "none", usual, factor, "residual", smooth)
+
+
+def _described(parts: FloatArray, terms: FloatArray) -> FloatArray:
+    """Sum of parts times terms, shape (n_entries, n_freq)."""
+    return np.asarray((parts[:, :, None] * terms).sum(axis=0))
 
 
 def _without_smoothing(h: ComplexArray, smooth: SmoothFrfs, *, reciprocal: bool) -> NoiseModel:

@@ -14,6 +14,11 @@ __all__ = ["LineLevels", "line_correlation", "line_levels", "noise_parts"]
 
 #: Entries are binned by |h|^2 into so many bins: within one the variance is nearly the same.
 _BINS = 32
+#: Grid of the logarithm of the odds of two parts, and how far it reaches.
+_GRID = 33
+_WIDEST = 16.0
+#: A running median is taken at so many lines within its reach.
+_STEPS = 5
 #: Iterations of the likelihood of the parts.
 _ITERATIONS = 60
 #: A start of a part that is to grow from nearly nothing.
@@ -50,20 +55,42 @@ def noise_parts(squares: FloatArray, terms: FloatArray, *, robust: bool = False)
 
     Notes
     -----
-    Multiplicative updates part *= sqrt(sum term y/v^2 / sum term/v), which never lower the likelihood
-    -sum(log v + y/v), from one start a term with that term alone, and one with all alike. The estimate holds for
-    any distribution of e with this variance; it is efficient for circular normal e.
+    The likelihood is -sum(log v + y/v). For two terms its maximum is found on a grid of the share of the second,
+    refined twice, the size of both following from the share; for more terms by multiplicative updates
+    part *= sqrt(sum term y/v^2 / sum term/v), which never lower the likelihood, from one start a term with that term
+    nearly alone, and one with all alike. The estimate holds for any distribution of e with this variance; it is
+    efficient for circular normal e.
     """
-    # The variance is nearly the same within a bin, unless a further term follows neither |h|^2 nor a constant.
-    y, a, count = (
-        _binned(squares, terms, robust=robust) if len(terms) == 2 else (squares, terms, np.ones(squares.shape[1]))
-    )
-    size = np.maximum((a * count).sum(axis=2, keepdims=True), np.finfo(float).tiny)
-    a = a / size
-    level = (y * count).sum(axis=1)
+    if len(terms) == 2:
+        y, a, count = _binned(squares, terms, robust=robust)
+    else:  # the variance is not the same within a bin
+        y, a, count = squares, terms, np.ones(squares.shape[1])
+    size = np.maximum((a * count).sum(axis=2), np.finfo(float).tiny) / count.sum()
+    a = a / size[:, :, None]
+    parts = _two_parts(y, a, count) if len(terms) == 2 else _several_parts(y, a, count)
+    return np.asarray(parts / size)
+
+
+def _two_parts(y: FloatArray, a: FloatArray, count: FloatArray) -> FloatArray:
+    """Parts of two terms of mean 1, shape (2, n_entries)."""
+    centre, reach = np.zeros(len(y[:, 0])), _WIDEST
+    for _ in range(3):
+        odds = np.exp(centre + reach * np.linspace(-1, 1, _GRID)[:, None])
+        share = np.stack([1 / (1 + odds), odds / (1 + odds)])  # (2, grid, n_entries)
+        v = np.maximum(share[0][:, :, None] * a[0] + share[1][:, :, None] * a[1], np.finfo(float).tiny)
+        level = (count * y / v).sum(axis=2) / count.sum()
+        loss = (count * np.log(v)).sum(axis=2) + count.sum() * np.log(np.maximum(level, np.finfo(float).tiny))
+        best = loss.argmin(axis=0)
+        entries = np.arange(len(y))
+        centre, reach = np.log(odds[best, entries]), 2 * reach / (_GRID - 1)
+    return np.asarray(share[:, best, entries] * level[best, entries])
+
+
+def _several_parts(y: FloatArray, a: FloatArray, count: FloatArray) -> FloatArray:
+    """Parts of any number of terms of mean 1, shape (n_terms, n_entries)."""
     n_terms = len(a)
     starts = np.concatenate([np.eye(n_terms) + _HARDLY, np.ones((1, n_terms)) / n_terms])
-    parts = starts[:, :, None] * level
+    parts = starts[:, :, None] * ((y * count).sum(axis=1) / count.sum())
     for _ in range(_ITERATIONS):
         v = np.maximum(np.einsum("ste,teb->seb", parts, a), np.finfo(float).tiny)
         up = np.einsum("teb,seb->ste", a, count * y / v**2)
@@ -71,8 +98,7 @@ def noise_parts(squares: FloatArray, terms: FloatArray, *, robust: bool = False)
         parts *= np.sqrt(up / np.maximum(down, np.finfo(float).tiny))
     v = np.maximum(np.einsum("ste,teb->seb", parts, a), np.finfo(float).tiny)
     best = (count * (np.log(v) + y / v)).sum(axis=2).argmin(axis=0)
-    chosen: FloatArray = parts[best, :, np.arange(parts.shape[2])].T / size[:, :, 0]
-    return chosen
+    return np.asarray(parts[best, :, np.arange(parts.shape[2])].T)
 
 
 def _binned(squares: FloatArray, terms: FloatArray, *, robust: bool) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -136,9 +162,8 @@ def line_levels(ratio: FloatArray, inflation: float = 1.0) -> LineLevels:
     line = ratio.mean(axis=0)
     n_freq = len(line)
     reach = int(min(max(_USUAL, _USUAL_CORRELATED * inflation), n_freq)) // 2
-    padded = np.pad(line, reach, mode="reflect")
     tiny = np.finfo(float).tiny
-    usual = np.maximum(np.median(np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1), axis=1), tiny)
+    usual = np.maximum(_running_median(line, reach), tiny)
     factor: FloatArray = line / usual
     quarter, three_quarters = np.quantile(np.log(np.maximum(factor, tiny)), [0.25, 0.75])
     shape = (1.349 / max(three_quarters - quarter, 1e-3)) ** 2
@@ -148,6 +173,15 @@ def line_levels(ratio: FloatArray, inflation: float = 1.0) -> LineLevels:
     varies = (high - low) / 2.56 > _VARIES * by_chance
     slow = usual / np.median(usual) if varies else np.ones(n_freq)
     return LineLevels(slow, np.where(factor > limit, factor, 1.0))
+
+
+def _running_median(values: FloatArray, reach: int) -> FloatArray:
+    """Median over so many lines on either side, interpolated between every few lines."""
+    padded = np.pad(values, reach, mode="reflect")
+    step = max(1, reach // _STEPS)
+    at = np.append(np.arange(0, len(values) - 1, step), len(values) - 1)
+    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1)[at]
+    return np.asarray(np.interp(np.arange(len(values)), at, np.median(windows, axis=1)))
 
 
 def line_correlation(noise: ComplexArray, share: float = 0.0) -> float:
@@ -172,7 +206,7 @@ def line_correlation(noise: ComplexArray, share: float = 0.0) -> float:
     if n_freq < 16 or not size.any():
         return 1.0
     limit = _CUT * np.nanmedian(np.where(known, size, np.nan), axis=1, keepdims=True)
-    cut = np.where(known, noise, 0) * np.minimum(1, limit / np.maximum(size, np.finfo(float).tiny))
+    cut = np.where(known, noise, 0) * np.where(size > limit, limit / np.where(size > limit, size, 1), 1)
     n_lags = n_freq // 4
     pairs = np.maximum(_autocorrelation(known.astype(float), n_lags), 1)
     rho = _autocorrelation(cut, n_lags) / pairs

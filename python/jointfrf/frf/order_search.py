@@ -161,12 +161,12 @@ def _pruned(entries: Entries, inflation: float, fit: RationalFit) -> RationalFit
             return best
         best, least = fit, score
         variance = fit.squares / max(entries.n_data - entries.n_parameters(len(fit.poles)), 1)
-        keep = fit.loss > _price(entries, inflation) * variance
-        if keep.all() or len(keep) == 1:
+        worthless = np.flatnonzero(fit.loss < _price(entries, inflation) * variance)
+        if not worthless.size or len(fit.poles) == 1:
             return best
-        keep[:] = True
-        keep[np.argmin(fit.loss)] = False
-        fit = RationalFit(fit.poles[keep], fit.smooth, fit.squares, fit.loss[keep])
+        # Half of them at a time: what one describes another may describe as well.
+        drop = worthless[fit.loss[worthless].argsort()][: (worthless.size + 1) // 2]
+        fit = replace(fit, poles=np.delete(fit.poles, drop[: len(fit.poles) - 1]))
 
 
 def first_poles(entries: Entries) -> ComplexArray:

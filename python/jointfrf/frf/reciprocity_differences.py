@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from jointfrf.frf.entry_groups import entry_groups
 from jointfrf.frf.noise_parts import LineLevels, line_correlation, line_levels, noise_parts
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
@@ -82,11 +83,13 @@ def reciprocity_differences(h: ComplexArray) -> ReciprocityDifferences | None:
     Returns
     -------
     ReciprocityDifferences or None
-        None where h is not square or was made reciprocal before.
+        None where h is not square or was made reciprocal before. Entries that are zero to rounding do not count.
     """
     if h.shape[1] != h.shape[2]:
         return None
-    rows, columns = np.triu_indices(h.shape[1], 1)
+    groups = entry_groups(h, reciprocal=True)
+    rows = np.concatenate([group.rows[group.repeated] for group in groups] or [np.zeros(0, np.intp)])
+    columns = np.concatenate([group.columns[group.repeated] for group in groups] or [np.zeros(0, np.intp)])
     one, two = h[:, rows, columns], h[:, columns, rows]
     shown = (abs(one - two) > _RECIPROCAL * (abs(one) + abs(two))).mean(axis=0) > 0.5
     if not shown.any():
