@@ -59,9 +59,9 @@ contains
 
   !> Better poles: relaxed vector fitting, until the sum of squares of the fit stays.
   !>
-  !> sigma and numerators q_e of the form c_0 + sum c_k/(s - p_k) minimise sum_e |w_e (q_e - sigma h_e)|^2 with the mean of
-  !> sigma held; the zeros of sigma are the new poles. Noise adds its own Gram matrix to this form, so holding the mean
-  !> leaves the poles where they are once they are right. B. Gustavsen, IEEE Trans. Power Delivery 14 (1999), 21 (2006).
+  !> sigma and numerators q_e of the form c_0 + sum c_k/(s - p_k) minimise sum_e |w_e (q_e - sigma h_e)|^2 with the mean
+  !> of sigma held; the zeros of sigma are the new poles. Noise adds its own Gram matrix to this form, so holding the
+  !> mean leaves the poles where they are once they are right. B. Gustavsen, IEEE Trans. Power Del. 14, 21.
   !> iterations  most relocations
   !> still       relative change of the sum of squares at which they end
   !> s           i times the frequency of each line, in any unit, shape (n_freq)
@@ -136,7 +136,7 @@ contains
     integer(ip), intent(out) :: info
     type(pair_sums), target :: gram
     type(orthonormal_basis) :: basis
-    complex(dp), allocatable :: back(:, :), pulled(:), coefficients(:), normal(:, :), right(:, :)
+    complex(dp), allocatable :: back(:, :), pulled(:), normal(:, :)
     real(dp) :: gain(size(poles))
     integer :: n, e, stat
     logical :: good
@@ -149,8 +149,7 @@ contains
     n = size(poles) + 1
     call prepare_sums(size(h, 2), n, size(s), gram, info)
     if (info == info_good) then
-      allocate (basis%psi(size(s), n), basis%triangle(n, n), back(n, n), pulled(size(s)), coefficients(n), normal(n, n), &
-                right(n, n + 1), stat=stat)
+      allocate (basis%psi(size(s), n), basis%triangle(n, n), back(n, n), pulled(size(s)), normal(n, n), stat=stat)
       if (stat /= 0) info = info_no_memory
     end if
     if (info /= info_good) return
@@ -161,7 +160,7 @@ contains
     call sum_all(basis, gram)
     do e = 1, size(h, 2)
       call own_gram(gram, e, normal)
-      call fit_entry(basis%psi, back, normal, h(:, e), weight(:, e), right, pulled, coefficients, smooth(:, e), gain, good)
+      call fit_entry(basis%psi, back, normal, h(:, e), weight(:, e), pulled, smooth(:, e), gain, good)
       if (good) then
         loss = loss + gain
       else
@@ -176,14 +175,16 @@ contains
 
   !> Fit of one entry.
   !> normal      Gram matrix of the entry; lost
+  !> pulled      workspace, shape (n_freq)
   !> gain        what each pole takes off the sum of squares
-  subroutine fit_entry(psi, back, normal, h, weight, right, pulled, coefficients, smooth, gain, good)
+  subroutine fit_entry(psi, back, normal, h, weight, pulled, smooth, gain, good)
     complex(dp), contiguous, intent(in) :: psi(:, :), back(:, :), h(:)
-    complex(dp), contiguous, intent(inout) :: normal(:, :), right(:, :), pulled(:), coefficients(:), smooth(:)
+    complex(dp), contiguous, intent(inout) :: normal(:, :), pulled(:), smooth(:)
     real(dp), intent(in) :: weight(:)
     real(dp), intent(out) :: gain(:)
     logical, intent(out) :: good
-    complex(dp) :: residue, inverse(size(psi, 2), size(psi, 2))
+    complex(dp) :: residue, coefficients(size(psi, 2)), pull(size(psi, 2))
+    complex(dp) :: inverse(size(psi, 2), size(psi, 2)), right(size(psi, 2), size(psi, 2))
     integer(blas_ip) :: pivot(size(psi, 2)), stat
     integer :: n, j, turn
 
@@ -199,11 +200,11 @@ contains
     smooth = 0.0_dp
     do turn = 1, 2
       pulled = weight**2*(h - smooth)
-      call product('C', psi, pulled, right(:, 1))
-      coefficients = coefficients + matmul(inverse, right(:, 1))
-      call product('N', psi, coefficients, smooth)
+      call multiply('C', psi, pulled, pull)
+      coefficients = coefficients + matmul(inverse, pull)
+      call multiply('N', psi, coefficients, smooth)
     end do
-    right(:, :n) = matmul(inverse, transpose(conjg(back)))
+    right = matmul(inverse, transpose(conjg(back)))
     do j = 2, n
       residue = sum(back(j, :)*coefficients)
       gain(j - 1) = abs(residue)**2/real(sum(back(j, :)*right(:, j)), dp)
@@ -211,7 +212,7 @@ contains
   end subroutine fit_entry
 
   !> y = A x or A^H x.
-  subroutine product(operation, a, x, y)
+  subroutine multiply(operation, a, x, y)
     character, intent(in) :: operation
     complex(dp), contiguous, intent(in) :: a(:, :), x(:)
     complex(dp), contiguous, intent(out) :: y(:)
@@ -220,7 +221,7 @@ contains
     rows = size(a, 1, kind=blas_ip)
     call zgemm(operation, 'N', size(y, kind=blas_ip), 1_blas_ip, size(x, kind=blas_ip), (1.0_dp, 0.0_dp), a, rows, x, &
                size(x, kind=blas_ip), (0.0_dp, 0.0_dp), y, size(y, kind=blas_ip), 1_c_size_t, 1_c_size_t)
-  end subroutine product
+  end subroutine multiply
 
   subroutine prepare_sums(n_sums, n, n_freq, gram, info)
     integer, intent(in) :: n_sums, n, n_freq
@@ -269,19 +270,19 @@ contains
     real(dp), contiguous, intent(in) :: weight(:, :)
     type(orthonormal_basis), intent(inout) :: basis
     complex(dp) :: part(size(poles) + 1)
-    real(dp) :: common(size(s)), length
+    real(dp) :: mean_weight(size(s)), length
     integer :: j, turn
 
-    common = sqrt(sum(weight**2, dim=2)/size(weight, 2))
+    mean_weight = sqrt(sum(weight**2, dim=2)/size(weight, 2))
     associate (psi => basis%psi, triangle => basis%triangle)
       triangle = 0.0_dp
-      psi(:, 1) = common
+      psi(:, 1) = mean_weight
       do j = 1, size(poles)
-        psi(:, j + 1) = common/(s - poles(j))
+        psi(:, j + 1) = mean_weight/(s - poles(j))
       end do
       do j = 1, size(psi, 2)
         do turn = 1, merge(0, 2, j == 1)
-          call product('C', psi(:, :j - 1), psi(:, j), part(:j - 1))
+          call multiply('C', psi(:, :j - 1), psi(:, j), part(:j - 1))
           call take_off(psi(:, :j - 1), part(:j - 1), psi(:, j))
           triangle(:j - 1, j) = triangle(:j - 1, j) + part(:j - 1)
         end do
@@ -290,7 +291,7 @@ contains
         if (length > 0.0_dp) psi(:, j) = psi(:, j)/length
       end do
       do j = 1, size(psi, 2)
-        psi(:, j) = psi(:, j)/common
+        psi(:, j) = psi(:, j)/mean_weight
       end do
     end associate
   end subroutine make_basis
@@ -301,8 +302,8 @@ contains
     complex(dp), contiguous, intent(inout) :: y(:)
 
     call zgemm('N', 'N', size(y, kind=blas_ip), 1_blas_ip, size(x, kind=blas_ip), (-1.0_dp, 0.0_dp), a, &
-               size(y, kind=blas_ip), x, size(x, kind=blas_ip), (1.0_dp, 0.0_dp), y, size(y, kind=blas_ip), 1_c_size_t, &
-               1_c_size_t)
+               size(y, kind=blas_ip), x, size(x, kind=blas_ip), (1.0_dp, 0.0_dp), y, size(y, kind=blas_ip), &
+               1_c_size_t, 1_c_size_t)
   end subroutine take_off
 
   !> Inverse of an upper triangle; a zero on the diagonal gives a row of zeros.
@@ -382,9 +383,9 @@ contains
     type(orthonormal_basis), intent(in) :: basis
     type(pair_sums), intent(inout) :: gram
     type(elimination), intent(in) :: entries
-    complex(dp), intent(out) :: form(:, :)
+    complex(dp), contiguous, intent(out) :: form(:, :)
     integer(ip), intent(out) :: info
-    integer :: threads
+    integer :: threads, i, j
 
     call sum_all(basis, gram)
     threads = threads_for(24.0_dp*entries%n_entries*real(entries%n, dp)**3, int(entries%n_entries, long), &
@@ -392,7 +393,12 @@ contains
     call share(entries, int(entries%n_entries, long), threads, even=.true.)
     info = count(entries%failed /= 0, kind=ip)
     form = sum(entries%forms, dim=3)
-    form = (form + transpose(conjg(form)))/2
+    do j = 1, size(form, 2)                                   ! Hermitian but for rounding
+      do i = 1, j
+        form(i, j) = (form(i, j) + conjg(form(j, i)))/2
+        form(j, i) = conjg(form(i, j))
+      end do
+    end do
     if (.not. all_finite(form)) info = max(info, 1_ip)
   end subroutine form_of_sigma
 
@@ -404,24 +410,27 @@ contains
     integer(blas_ip) :: pivot(self%n), n, stat
     integer :: e, k, m
 
-    n = int(self%n + 0*thread, blas_ip)
+    if (thread < 1) return                 ! workspace lies on the stack of the thread
+    n = int(self%n, blas_ip)
     m = self%n_entries
     do e = int(first), int(last)
       call own_gram(self%gram, e, own)
       associate (form => self%forms(:, :, e), sums => self%gram%sums)
         do k = 1, self%gram%n_pairs
-          associate (i => self%gram%first(k), j => self%gram%second(k))
-            form(i, j) = cmplx(sums(m + e, 1, k), sums(m + e, 2, k), dp)
+          associate (i => self%gram%first(k), j => self%gram%second(k), right => sums(m + e, :, k), &
+                     re => sums(2*m + e, :, k), im => sums(3*m + e, :, k))          ! w^2 |h|^2, w^2 Re h, w^2 Im h
+            form(i, j) = cmplx(right(1), right(2), dp)
             form(j, i) = conjg(form(i, j))
-            mixed(i, j) = cmplx(sums(2*m + e, 1, k) - sums(3*m + e, 2, k), sums(2*m + e, 2, k) + sums(3*m + e, 1, k), dp)
-            mixed(j, i) = cmplx(sums(2*m + e, 1, k) + sums(3*m + e, 2, k), sums(3*m + e, 1, k) - sums(2*m + e, 2, k), dp)
+            mixed(i, j) = cmplx(re(1) - im(2), re(2) + im(1), dp)
+            mixed(j, i) = cmplx(re(1) + im(2), im(1) - re(2), dp)
           end associate
         end do
         solved = mixed
         call zgesv(n, n, own, n, pivot, solved, n, stat)
         self%failed(e) = int(stat)
-        if (stat == 0) call zgemm('C', 'N', n, n, n, (-1.0_dp, 0.0_dp), mixed, n, solved, n, (1.0_dp, 0.0_dp), form, n, &
-                                  1_c_size_t, 1_c_size_t)
+        if (stat /= 0) cycle
+        call zgemm('C', 'N', n, n, n, (-1.0_dp, 0.0_dp), mixed, n, solved, n, (1.0_dp, 0.0_dp), form, n, 1_c_size_t, &
+                   1_c_size_t)
       end associate
     end do
   end subroutine eliminate_numerators

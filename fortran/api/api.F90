@@ -840,7 +840,8 @@ contains
   !> s           i times the frequency of each line, in any unit, shape (n_freq)
   !> h           FRFs, shape (n_freq, n_entries), any unit
   !> weight      1/sqrt(E|e|^2) up to one factor, > 0, shape (n_freq, n_entries)
-  !> poles       in: poles to begin with, in the unit of s, all different; out: those with the least sum, shape (n_poles)
+  !> poles       in: poles to begin with, in the unit of s, all different; out: those with the least sum, shape
+  !>             (n_poles)
   !> squares     that weighted sum of squares of h minus the fit
   !> info        0, -i, -1000 as above; > 0 so many FRFs had singular equations: poles are the last that had not
   subroutine jf_relocate_poles(n_poles, n_entries, n_freq, iterations, still, s, h, weight, poles, squares, info) &

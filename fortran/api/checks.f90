@@ -324,7 +324,7 @@ contains
 
     info = info_good
     if (bad_size(n_freq)) info = -3
-    if (bad_size(n_entries) .or. n_entries > huge(0)/4) info = -2
+    if (bad_size(n_entries) .or. 4*int(n_entries, long) > huge(0)) info = -2
     if (bad_size(n_poles) .or. n_poles > most_poles) info = -1
   end function check_rational_fit
 end module jointfrf_checks
