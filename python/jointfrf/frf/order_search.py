@@ -121,7 +121,10 @@ def _grown(entries: Entries, search: OrderSearch, poles: ComplexArray) -> Ration
         if failures == search.patience or len(fit.poles) >= most or fit.squares < _EXACT**2 * total:
             return best
         count = min(max(1, len(fit.poles) // 5), most - len(fit.poles))
-        poles = np.concatenate([fit.poles, _poles_for_residual(entries, fit, count)])
+        more = _poles_for_residual(entries, fit, inflation, count)
+        if not more.size:
+            return best
+        poles = np.concatenate([fit.poles, more])
 
 
 def _converged(entries: Entries, poles: ComplexArray, most: int) -> RationalFit:
@@ -200,14 +203,32 @@ def _peaks(values: FloatArray) -> np.ndarray:
     return np.flatnonzero(peaks)
 
 
-def _poles_for_residual(entries: Entries, fit: RationalFit, count: int) -> ComplexArray:
-    """Poles where the residual is largest, not next to each other."""
-    power = (abs(entries.weight * (entries.h - fit.smooth)) ** 2).sum(axis=0)
-    power = _median_of_three(power)
-    reach = len(power) // 40 + 1
-    lines = []
-    for _ in range(count):
-        line = int(power.argmax())
-        lines.append(line)
-        power[max(0, line - reach) : line + reach + 1] = 0
-    return _at(entries.s.imag[lines] * (1 + 1e-4))
+def _poles_for_residual(entries: Entries, fit: RationalFit, inflation: float, count: int) -> ComplexArray:
+    """Poles where the residual does not vanish in the mean over neighbouring lines, at most `count`.
+
+    For windows of some widths the sum over the entries of |sum of residuals|^2 / width is what a pole there can take off
+    the sum of squares, about; a window counts if that is the price of a pole. The pole takes its middle for frequency
+    and its half-width for damping. Lines far above their neighbours are cut down to these: they are no modes.
+    """
+    f = entries.s.imag
+    residual = entries.weight * (entries.h - fit.smooth)
+    power = (residual.real**2 + residual.imag**2).sum(axis=0)
+    usual = _median_of_three(power)
+    residual = residual * np.sqrt(np.where(power > usual, usual / np.where(power > usual, power, 1), 1))
+    sums = np.pad(np.cumsum(residual, axis=1), ((0, 0), (1, 0)))
+    widths = [w for w in 3 ** np.arange(1, 12) if w <= len(f)]
+    gains = [(abs(sums[:, w:] - sums[:, :-w]) ** 2).sum(axis=0) / w for w in widths]
+    variance = fit.squares / max(entries.n_data - entries.n_parameters(len(fit.poles)), 1)
+    poles: list[complex] = []
+    while len(poles) < count:
+        at = [int(gain.argmax()) for gain in gains]
+        best = int(np.argmax([gain[k] for gain, k in zip(gains, at, strict=True)]))
+        first, width = at[best], widths[best]
+        if gains[best][first] < _price(entries, inflation) * variance:
+            break
+        last = first + width - 1
+        middle, half = (f[first] + f[last]) / 2, (f[last] - f[first]) / 2
+        poles.append(complex(-half, middle))
+        for w, gain in zip(widths, gains, strict=True):
+            gain[max(0, first - w + 1) : last + 1] = 0
+    return np.array(poles, np.complex128)
