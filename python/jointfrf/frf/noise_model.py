@@ -169,21 +169,22 @@ def _estimated(
         inflation = differences.inflation(variance, differences.line_levels(variance).factor)
         levels = differences.line_levels(variance, inflation)
         variance *= (levels.usual * levels.factor)[:, None, None]
-    smooth = smoothed(freq, lines, variance, OrderSearch(inflation, max_poles, 1), reciprocal=reciprocal)
+    patience = 2 if differences is None else 1  # a worse start
+    smooth = smoothed(freq, lines, variance, OrderSearch(inflation, max_poles, patience), reciprocal=reciprocal)
     if not smooth.is_smooth:
         return _without_smoothing(lines, smooth, reciprocal=reciprocal)
-    for turn in range(_MOST_TURNS):
-        model = _model(lines, smooth, given, inflation or 1.0, differences, first=turn == 0 and differences is None)
-        inflation, source = _found_inflation(lines, differences, model)
-        model = replace(model, inflation=inflation, inflation_source=source)
+    for _ in range(_MOST_TURNS):
+        model = _model(lines, smooth, given, inflation or 1.0, differences, robust=True)
+        inflation, _ = _found_inflation(lines, differences, model)
         before, variance = variance, np.maximum(model.variance, _TINY)
-        if (turn > 0 or differences is not None) and _alike(before, variance):
+        settled = _alike(before, variance)
+        search = OrderSearch(inflation, max_poles, 0 if settled else patience)
+        smooth = smoothed(freq, lines, variance, search, reciprocal=reciprocal, start=smooth.poles)
+        if settled:
             break
-        start = smooth.poles
-        smooth = smoothed(
-            freq, lines, variance, OrderSearch(inflation, max_poles, 1), reciprocal=reciprocal, start=start
-        )
-    return model
+    model = _model(lines, smooth, given, inflation or 1.0, differences, robust=False)
+    inflation, source = _found_inflation(lines, differences, model)
+    return replace(model, inflation=inflation, inflation_source=source)
 
 
 def _alike(before: FloatArray, variance: FloatArray) -> bool:
@@ -227,11 +228,12 @@ def _model(
     inflation: float,
     differences: ReciprocityDifferences | None,
     *,
-    first: bool,
+    robust: bool,
 ) -> NoiseModel:
     """Noise model from measured minus smooth.
 
-    The error of the first smooth FRFs at a peak would be taken for an outlying line where there is another way.
+    The robust one is for weights: the error of smooth FRFs that are not the last, at peaks and antiresonances, must not
+    be taken for noise, nor for outlying lines where differences tell these.
     """
     n_freq, n_out, n_in = h.shape
     shown = (smooth.h != 0).any(axis=0)
@@ -246,14 +248,14 @@ def _model(
     # Outlying lines; with these left out, slow variation; where there is some, parts and outlying lines once more.
     for turn in range(3):
         good = factor == 1
-        parts = noise_parts((squares / usual)[:, good], stacked[:, :, good], robust=first or turn == 0)
+        parts = noise_parts((squares / usual)[:, good], stacked[:, :, good], robust=robust or turn == 0)
         described = np.maximum(_described(parts, stacked) * usual, _TINY)
         variance = np.zeros(h.shape)
         variance[:, shown] = described.T
         levels = []
         if differences is not None:
             levels.append(differences.line_levels(variance, inflation))
-        if not first or differences is None:
+        if not robust or differences is None:
             levels.append(line_levels(squares / described, inflation))
         factor = np.max([found.factor for found in levels], axis=0)
         if turn == 1:

@@ -25,11 +25,15 @@ _ITERATIONS = 60
 _HARDLY = 1e-3
 #: Probability of calling one line of a sweep without outliers outlying.
 _FALSE_ALARM = 1e-2
+#: Most lines in a row that are called outlying.
+_LONGEST_RUN = 3
 #: Lines over which the usual residual of a line is taken: so many, and so many times the lines that go together.
 _USUAL = 41
 _USUAL_CORRELATED = 5
-#: A spread of running medians so many times that of independent lines is a variation over frequency.
+#: A standard deviation of the logarithm of running medians so many times that of independent lines, and of at least
+#: this, is a variation over frequency.
 _VARIES = 2.5
+_VARIES_LEAST = 0.15
 #: An autocorrelation below so many standard deviations of that of independent lines ends the sum.
 _SIGNIFICANT = 2.5
 #: Residuals beyond so many medians are cut to that, for correlations.
@@ -157,7 +161,8 @@ def line_levels(ratio: FloatArray, inflation: float = 1.0) -> LineLevels:
     The mean over the entries is compared with its running median. Its distribution without outliers is taken to be a
     gamma distribution whose shape follows from the quartiles of its logarithm, so entries that share their noise and
     noise that is not circular are allowed for. The running median, relative to its own median, is the slow variation
-    if its spread is well above that of medians of so many independent lines.
+    if its spread is well above that of medians of so many independent lines. More than a few lines in a row are not
+    outlying: there smooth FRFs do not fit, or the noise is another.
     """
     line = ratio.mean(axis=0)
     n_freq = len(line)
@@ -170,9 +175,18 @@ def line_levels(ratio: FloatArray, inflation: float = 1.0) -> LineLevels:
     limit = special.gammainccinv(shape, _FALSE_ALARM / n_freq) / special.gammaincinv(shape, 0.5)
     by_chance = np.sqrt(inflation / (shape * (2 * reach + 1)))
     low, high = np.quantile(np.log(usual), [0.1, 0.9])
-    varies = (high - low) / 2.56 > _VARIES * by_chance
+    varies = (high - low) / 2.56 > max(_VARIES * by_chance, _VARIES_LEAST)
     slow = usual / np.median(usual) if varies else np.ones(n_freq)
-    return LineLevels(slow, np.where(factor > limit, factor, 1.0))
+    return LineLevels(slow, np.where(_in_short_runs(factor > limit), factor, 1.0))
+
+
+def _in_short_runs(chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Which of the chosen lines have few chosen neighbours in a row."""
+    steps = np.diff(np.pad(chosen.astype(int), 1))
+    short = chosen.copy()
+    for first, end in zip(np.flatnonzero(steps > 0), np.flatnonzero(steps < 0), strict=True):
+        short[first:end] = end - first <= _LONGEST_RUN
+    return short
 
 
 def _running_median(values: FloatArray, reach: int) -> FloatArray:

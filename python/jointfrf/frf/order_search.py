@@ -42,7 +42,7 @@ class OrderSearch:
         Lines that carry the noise of one independent line; found from the residual if it is None.
     max_poles : int
     patience : int
-        Orders in a row that may gain nothing before the search ends.
+        Orders in a row that may gain nothing before the search ends; 0 for no further poles.
     """
 
     inflation: float | None = 1.0
@@ -118,7 +118,7 @@ def _grown(entries: Entries, search: OrderSearch, poles: ComplexArray) -> Ration
             best, failures = fit, 0
         else:
             failures += 1
-        if failures == search.patience or len(fit.poles) >= most or fit.squares < _EXACT**2 * total:
+        if failures >= search.patience or len(fit.poles) >= most or fit.squares < _EXACT**2 * total:
             return best
         count = min(max(1, len(fit.poles) // 5), most - len(fit.poles))
         more = _poles_for_residual(entries, fit, inflation, count)
@@ -206,8 +206,8 @@ def _peaks(values: FloatArray) -> np.ndarray:
 def _poles_for_residual(entries: Entries, fit: RationalFit, inflation: float, count: int) -> ComplexArray:
     """Poles where the residual does not vanish in the mean over neighbouring lines, at most `count`.
 
-    For windows of some widths the sum over the entries of |sum of residuals|^2 / width is what a pole there can take off
-    the sum of squares, about; a window counts if that is the price of a pole. The pole takes its middle for frequency
+    For windows of some widths the sum over the entries of |sum of residuals|^2 / width is about what a pole there can
+    take off the sum of squares; a window counts if that is the price of a pole. The pole takes its middle for frequency
     and its half-width for damping. Lines far above their neighbours are cut down to these: they are no modes.
     """
     f = entries.s.imag
