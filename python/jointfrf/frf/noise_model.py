@@ -178,7 +178,7 @@ def _estimated(
         inflation, _ = _found_inflation(lines, differences, model)
         before, variance = variance, np.maximum(model.variance, _TINY)
         settled = _alike(before, variance)
-        search = OrderSearch(inflation, max_poles, 0 if settled else patience)
+        search = OrderSearch(None if differences is None else inflation, max_poles, 0 if settled else patience)
         smooth = smoothed(freq, lines, variance, search, reciprocal=reciprocal, start=smooth.poles)
         if settled:
             break

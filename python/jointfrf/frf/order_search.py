@@ -27,7 +27,9 @@ _PEAK_RISE = 2.0
 _NARROW = 0.5
 _LEFT_OUT = 1e-4
 #: Rounds of finding such lines.
-_ROUNDS = 3
+_ROUNDS = 6
+#: An inflation found from a residual counts up to this while poles may be missing.
+_MOST_INFLATION = 4.0
 #: Damping of new poles relative to their frequency.
 _DAMPING = 0.01
 
@@ -54,11 +56,11 @@ class OrderSearch:
         return max(1, min(self.max_poles, int(n_freq / (self.inflation or 1) / 3) - 1))
 
     def found_inflation(self, entries: Entries, fit: RationalFit) -> float:
-        """Return the inflation that was told, or that of the residual."""
+        """Return the inflation that was told, or that of the residual, in which poles that are missing show as well."""
         if self.inflation is not None:
             return self.inflation
         share = entries.n_parameters(len(fit.poles)) / entries.n_data
-        return line_correlation(entries.weight * (entries.h - fit.smooth), share)
+        return min(line_correlation(entries.weight * (entries.h - fit.smooth), share), _MOST_INFLATION)
 
 
 def _price(entries: Entries, inflation: float) -> float:
@@ -96,12 +98,13 @@ def search_order(entries: Entries, search: OrderSearch, start: ComplexArray | No
     for _ in range(_ROUNDS):
         fit = _grown(entries, search, poles)
         inflation = search.found_inflation(entries, fit)
+        fit = _pruned(entries, inflation, fit)
         alone, followed = _single_lines(entries, inflation, fit)
         if not followed.size:
             break
         entries = _left_out(entries, followed)
         poles = fit.poles[~alone] if not alone.all() else first_poles(entries)
-    return _pruned(entries, inflation, fit)
+    return fit
 
 
 def _grown(entries: Entries, search: OrderSearch, poles: ComplexArray) -> RationalFit:
