@@ -14,6 +14,8 @@ __all__ = ["EntryGroup", "entry_groups"]
 
 #: An FRF below this share of what is usual in its row and column is zero to rounding.
 _ZERO = 1e-8
+#: A pair that differs less than this, relatively, was made reciprocal: it holds one measurement.
+_RECIPROCAL = 1e-9
 #: Rows and columns are scaled in turn so many times, until each has a largest entry near 1.
 _SCALINGS = 4
 
@@ -87,7 +89,8 @@ def entry_groups(h: ComplexArray, *, reciprocal: bool) -> list[EntryGroup]:
         p, q = rows[own], columns[own]
         paired = (p != q) & reciprocal
         repeated = paired.copy()
-        repeated[paired] = (h[:, p[paired], q[paired]] != h[:, q[paired], p[paired]]).any(axis=0)
+        one, two = h[:, p[paired], q[paired]], h[:, q[paired], p[paired]]
+        repeated[paired] = (abs(one - two) > _RECIPROCAL * (abs(one) + abs(two))).mean(axis=0) > 0.5
         groups.append(EntryGroup(p, q, paired, repeated))
     return groups
 

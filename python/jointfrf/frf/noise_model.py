@@ -214,7 +214,7 @@ def _found_inflation(
     if differences is not None:
         return differences.inflation(model.variance, model.line_factor), "reciprocity"
     shown = (model.variance > 0).all(axis=0)
-    if h.shape[1] == h.shape[2] and np.array_equal(h, h.swapaxes(1, 2)):
+    if h.shape[1] == h.shape[2] and np.allclose(h, h.swapaxes(1, 2), rtol=1e-8, atol=0):
         shown = np.triu(shown)
     noise = ((h - model.smooth.h)[:, shown] / np.sqrt(model.variance[:, shown])).T
     noise = np.where(model.line_factor > 1, np.nan, noise)

@@ -12,9 +12,6 @@ from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
 __all__ = ["ReciprocityDifferences", "reciprocity_differences"]
 
-#: FRFs that differ less than this from their transpose were made reciprocal: the difference does not show their noise.
-_RECIPROCAL = 1e-9
-
 
 @dataclass(frozen=True)
 class ReciprocityDifferences:
@@ -90,9 +87,7 @@ def reciprocity_differences(h: ComplexArray) -> ReciprocityDifferences | None:
     groups = entry_groups(h, reciprocal=True)
     rows = np.concatenate([group.rows[group.repeated] for group in groups] or [np.zeros(0, np.intp)])
     columns = np.concatenate([group.columns[group.repeated] for group in groups] or [np.zeros(0, np.intp)])
-    one, two = h[:, rows, columns], h[:, columns, rows]
-    shown = (abs(one - two) > _RECIPROCAL * (abs(one) + abs(two))).mean(axis=0) > 0.5
-    if not shown.any():
+    if not rows.size:
         return None
-    values = np.ascontiguousarray((one - two)[:, shown].T)
-    return ReciprocityDifferences(rows[shown], columns[shown], values)
+    values = np.ascontiguousarray((h[:, rows, columns] - h[:, columns, rows]).T)
+    return ReciprocityDifferences(rows, columns, values)
