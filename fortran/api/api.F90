@@ -50,8 +50,8 @@ module jointfrf
   use jointfrf_checks, only: check_brick_matrices, check_brick_quality, check_central_difference, &
     check_compliance_covariance, check_compliance_factors, check_couple, check_decouple, &
     check_difference_weights, check_invert, check_matrices, check_modify, check_monte_carlo, &
-    check_pollute, check_receptance, check_receptance_banded, check_receptance_modal, &
-    check_solve, check_transform
+    check_pollute, check_rational_fit, check_receptance, check_receptance_banded, check_receptance_modal, &
+    check_relocate_poles, check_solve, check_transform
   use jointfrf_compliance, only: compliance_covariance, compliance_factors, joint_compliance
   use jointfrf_coupling, only: couple
   use jointfrf_decoupling, only: decouple
@@ -66,6 +66,7 @@ module jointfrf
   use jointfrf_modification, only: find_modification, modify
   use jointfrf_monte_carlo, only: monte_carlo
   use jointfrf_noise, only: make_noise, pollute
+  use jointfrf_rational_fit, only: rational_fit, relocate_poles
   use jointfrf_status, only: info_good, info_no_engine, info_no_memory, info_text, line_good, line_not_finite, &
     line_overflow, line_text
   use jointfrf_traps, only: hold_traps, host_state, release_traps
@@ -82,6 +83,7 @@ module jointfrf
   public :: jf_difference_weights, jf_central_difference, jf_transform
   public :: jf_pollute, jf_monte_carlo
   public :: jf_brick_matrices, jf_brick_quality
+  public :: jf_rational_fit, jf_relocate_poles
   public :: jf_invert_work, jf_solve_work, jf_receptance_work, jf_receptance_banded_work, jf_receptance_modal_work
   public :: jf_couple_work, jf_modify_work, jf_find_modification_work, jf_ismm_work, jf_inverse_substructuring_work
   public :: jf_decouple_work, jf_joint_compliance_work, jf_compliance_factors_work, jf_compliance_covariance_work
@@ -798,4 +800,64 @@ contains
     end if
     call release_traps(host)
   end subroutine jf_brick_quality
+
+  !> Rational functions c_0 + sum c_k/(s - p_k) with given common poles through several FRFs, each fitted by weighted
+  !> least squares; residues are complex.
+  !> n_poles     number of poles, at most 10000
+  !> n_entries   number of FRFs
+  !> n_freq      as above
+  !> s           i times the frequency of each line, in any unit, shape (n_freq)
+  !> h           FRFs, shape (n_freq, n_entries), any unit
+  !> weight      1/sqrt(E|e|^2) up to one factor, > 0, shape (n_freq, n_entries)
+  !> poles       p_k in the unit of s, all different, shape (n_poles)
+  !> smooth      the fit, shape (n_freq, n_entries)
+  !> squares     weighted sum of squares of h - smooth
+  !> loss        by how much that sum would grow without a pole, the others staying where they are, shape (n_poles)
+  !> info        0, -i, -1000 as above; > 0 so many FRFs have singular equations, and smooth is 0 there
+  subroutine jf_rational_fit(n_poles, n_entries, n_freq, s, h, weight, poles, smooth, squares, loss, info) &
+    bind(C, name='jf_rational_fit_')
+    integer(ip), intent(in) :: n_poles, n_entries, n_freq
+    complex(c_double_complex), intent(in) :: s(n_freq), h(n_freq, n_entries), poles(n_poles)
+    real(c_double), intent(in) :: weight(n_freq, n_entries)
+    complex(c_double_complex), intent(out) :: smooth(n_freq, n_entries)
+    real(c_double), intent(out) :: squares, loss(n_poles)
+    integer(ip), intent(out) :: info
+    type(host_state) :: host
+
+    call hold_traps(host)
+    info = check_rational_fit(n_poles, n_entries, n_freq)
+    if (info == info_good) call rational_fit(s, h, weight, poles, smooth, squares, loss, info)
+    call release_traps(host)
+  end subroutine jf_rational_fit
+
+  !> Better common poles of rational functions c_0 + sum c_k/(s - p_k) through several FRFs, by relaxed vector fitting,
+  !> until the sum of squares of their fit stays.
+  !> n_poles     number of poles, at most 10000
+  !> n_entries   number of FRFs
+  !> n_freq      as above
+  !> iterations  most relocations; 0 gives the sum of squares of the poles as they are
+  !> still       relative change of the sum of squares at which relocation ends, >= 0
+  !> s           i times the frequency of each line, in any unit, shape (n_freq)
+  !> h           FRFs, shape (n_freq, n_entries), any unit
+  !> weight      1/sqrt(E|e|^2) up to one factor, > 0, shape (n_freq, n_entries)
+  !> poles       in: poles to begin with, in the unit of s, all different; out: those with the least sum, shape
+  !>             (n_poles)
+  !> squares     that weighted sum of squares of h minus the fit
+  !> info        0, -i, -1000 as above; > 0 so many FRFs had singular equations: poles are the last that had not
+  subroutine jf_relocate_poles(n_poles, n_entries, n_freq, iterations, still, s, h, weight, poles, squares, info) &
+    bind(C, name='jf_relocate_poles_')
+    integer(ip), intent(in) :: n_poles, n_entries, n_freq, iterations
+    real(c_double), intent(in) :: still
+    complex(c_double_complex), intent(in) :: s(n_freq), h(n_freq, n_entries)
+    real(c_double), intent(in) :: weight(n_freq, n_entries)
+    complex(c_double_complex), intent(inout) :: poles(n_poles)
+    real(c_double), intent(out) :: squares
+    integer(ip), intent(out) :: info
+    type(host_state) :: host
+
+    call hold_traps(host)
+    info = check_relocate_poles(n_poles, n_entries, n_freq, iterations, still)
+    if (info == info_good) call relocate_poles(int(iterations), still, s, h, weight, poles, squares, info)
+    call release_traps(host)
+  end subroutine jf_relocate_poles
 end module jointfrf

@@ -9,6 +9,7 @@ module jointfrf_checks
   use jointfrf_kinds, only: ip, long
   use jointfrf_monte_carlo, only: is_method
   use jointfrf_noise, only: is_kind, is_reference
+  use jointfrf_rational_fit, only: most_poles
   use jointfrf_status, only: info_good
   implicit none
   private
@@ -16,7 +17,7 @@ module jointfrf_checks
   public :: check_couple, check_modify, check_matrices, check_decouple, check_compliance_factors
   public :: check_compliance_covariance
   public :: check_difference_weights, check_central_difference, check_transform, check_pollute, check_monte_carlo
-  public :: check_brick_matrices, check_brick_quality
+  public :: check_brick_matrices, check_brick_quality, check_rational_fit, check_relocate_poles
 
 contains
 
@@ -305,4 +306,25 @@ contains
     info = info_good
     if (bad_size(n_elements)) info = -1
   end function check_brick_quality
+
+  pure function check_relocate_poles(n_poles, n_entries, n_freq, iterations, still) result(info)
+    integer(ip), intent(in) :: n_poles, n_entries, n_freq, iterations
+    real(c_double), intent(in) :: still
+    integer(ip) :: info
+
+    info = check_rational_fit(n_poles, n_entries, n_freq)
+    if (info /= info_good) return
+    if (not_finite(still) .or. still < 0.0_c_double) info = -5
+    if (bad_size(iterations)) info = -4
+  end function check_relocate_poles
+
+  pure function check_rational_fit(n_poles, n_entries, n_freq) result(info)
+    integer(ip), intent(in) :: n_poles, n_entries, n_freq
+    integer(ip) :: info
+
+    info = info_good
+    if (bad_size(n_freq)) info = -3
+    if (bad_size(n_entries) .or. 4*int(n_entries, long) > huge(0)) info = -2
+    if (bad_size(n_poles) .or. n_poles > most_poles) info = -1
+  end function check_rational_fit
 end module jointfrf_checks

@@ -10,7 +10,7 @@ module jointfrf_lapack
   use jointfrf_kinds, only: blas_ip, dp
   implicit none
   private
-  public :: zgesv, zgetrf, zgetri, zgecon, zgbtrf, zgbtrs, zgbcon, zgemm
+  public :: dgemm, zgeev, zgesv, zgetrf, zgetri, zgecon, zgbtrf, zgbtrs, zgbcon, zgemm
 
   interface
     !> Solve A X = B by LU with partial pivoting; A leaves as its factors.
@@ -92,6 +92,32 @@ module jointfrf_lapack
       integer(blas_ip), intent(out) :: info
       integer(c_size_t), value :: norm_len
     end subroutine zgbcon
+
+    !> C = alpha op(A) op(B) + beta C, real.
+    subroutine dgemm(transa, transb, m, n, k, alpha, a, lda, b, ldb, beta, c, ldc, transa_len, transb_len) &
+      bind(C, name=JF_BLAS_PREFIX//"dgemm_")
+      import :: dp, blas_ip, c_char, c_size_t
+      implicit none
+      character(kind=c_char), intent(in) :: transa, transb
+      integer(blas_ip), intent(in) :: m, n, k, lda, ldb, ldc
+      real(dp), intent(in) :: alpha, beta, a(lda, *), b(ldb, *)
+      real(dp), intent(inout) :: c(ldc, *)
+      integer(c_size_t), value :: transa_len, transb_len
+    end subroutine dgemm
+
+    !> Eigenvalues w of a general matrix, and eigenvectors where asked for.
+    subroutine zgeev(jobvl, jobvr, n, a, lda, w, vl, ldvl, vr, ldvr, work, lwork, rwork, info, jobvl_len, jobvr_len) &
+      bind(C, name=JF_BLAS_PREFIX//"zgeev_")
+      import :: dp, blas_ip, c_char, c_size_t
+      implicit none
+      character(kind=c_char), intent(in) :: jobvl, jobvr
+      integer(blas_ip), intent(in) :: n, lda, ldvl, ldvr, lwork
+      complex(dp), intent(inout) :: a(lda, *)
+      complex(dp), intent(out) :: w(*), vl(ldvl, *), vr(ldvr, *), work(*)
+      real(dp), intent(out) :: rwork(*)
+      integer(blas_ip), intent(out) :: info
+      integer(c_size_t), value :: jobvl_len, jobvr_len
+    end subroutine zgeev
 
     !> C = alpha op(A) op(B) + beta C.
     subroutine zgemm(transa, transb, m, n, k, alpha, a, lda, b, ldb, beta, c, ldc, transa_len, transb_len) &

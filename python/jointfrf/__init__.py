@@ -38,6 +38,8 @@ from jointfrf.errors import (
 from jointfrf.frf.bands import as_bands, band_mean, in_bands
 from jointfrf.frf.metrics import amplitude_error, frequency_error, has_peak, peak
 from jointfrf.frf.noise import pollute, realisations
+from jointfrf.frf.noise_model import NoiseModel, estimate_noise
+from jointfrf.frf.smoothing import SmoothFrfs, smooth_frfs
 from jointfrf.identification.identify import identify
 from jointfrf.identification.joint_fit import JointFit
 from jointfrf.identification.monte_carlo import BandStatistics, MonteCarlo, monte_carlo
@@ -94,10 +96,12 @@ __all__ = [
     "Model",
     "MonteCarlo",
     "MultiPointJoint",
+    "NoiseModel",
     "Patch",
     "PreloadedLap",
     "ReceptanceInfo",
     "SingularLineError",
+    "SmoothFrfs",
     "SolidModel",
     "VirtualPoint",
     "amplitude_error",
@@ -121,6 +125,7 @@ __all__ = [
     "difference_weights",
     "driving_point_check",
     "element_matrices",
+    "estimate_noise",
     "find_modification",
     "frequency_error",
     "get_engine",
@@ -150,6 +155,7 @@ __all__ = [
     "sensitivity",
     "sensor_consistency",
     "set_engine",
+    "smooth_frfs",
     "solid_model",
     "solve",
     "transform",

@@ -115,7 +115,7 @@ static jf_int call(void)
     double *rcond = out[1];
     const jf_int part = any_part(MOST), n_damping = next(3) ? (int)next(2) * n : any_part(MOST);
     const jf_int n_structural = next(3) ? (int)next(2) * n : any_part(MOST), kl = next(40) ? flag : INT_MAX;
-    const int routine = (int)next(20);
+    const int routine = (int)next(22);
     jf_int info = 12345;
 
     lwork = any_length();
@@ -154,6 +154,10 @@ static jf_int call(void)
     case 18:
         jf_brick_matrices(&t, &n_freq, in[0], in[1], in[2], in[3], &number, &flag, out[0], out[1], line_info, &info);
         break;
+    case 19:
+        jf_relocate_poles(&n, &m, &n_freq, &p, &number, frf(0), frf(1), in[2], h, out[1], &info);
+        break;
+    case 20: jf_rational_fit(&n, &m, &n_freq, frf(0), frf(1), in[2], frf(3), h, out[1], out[1] + 1, &info); break;
     default: jf_brick_quality(&n_freq, in[0], out[0], out[1], &info);
     }
     return info;

@@ -18,7 +18,7 @@ from jointfrf.kernel.arguments import ComplexArray, FloatArray, check_choice, ch
 from jointfrf.kernel.memory_maps import chunks, release
 from jointfrf.kernel.status import RCOND_LIMIT, LineStatus, OnSingular, check_status
 
-__all__ = ["N_FREQ", "VERSION", "call", "info_of", "kernel_engine", "run", "set_kernel_engine"]
+__all__ = ["N_FREQ", "VERSION", "call", "call_for_number", "info_of", "kernel_engine", "run", "set_kernel_engine"]
 
 #: Version of the kernel, and so of the package.
 VERSION = ".".join(str(int(number)) for number in _kernel.jf_version())
@@ -126,6 +126,14 @@ def _argument(value: Any, lines: slice, sweeps: Mapping[str, NDArray[Any]]) -> A
 def call(routine: str, args: Sequence[Any]) -> None:
     """Call a kernel routine whose results are among its arguments; arrays in C order, none of size zero."""
     _check_info(routine, info_of(routine, args))
+
+
+def call_for_number(routine: str, args: Sequence[Any]) -> tuple[float, int]:
+    """Call as `call` does a routine that returns a number before its `info`; return both, an `info` > 0 included."""
+    views = [a.T if isinstance(a, np.ndarray) else a for a in args]
+    number, info = getattr(_kernel, "jf_" + routine)(*views)
+    _check_info(routine, info)
+    return float(number), int(info)
 
 
 def info_of(routine: str, args: Sequence[Any]) -> int:

@@ -37,6 +37,7 @@ FUNCTIONS = {
     jf.compliance_covariance: 3, jf.central_difference: 2, jf.difference_weights: 1, jf.transform: 3, jf.pollute: 2,
     jf.receptance: 8, jf.band_mean: 3, jf.in_bands: 2, jf.sensitivity: 7, jf.propose_bands: 2, jf.peak: 3,
     jf.identify: 3, jf.chain: 3, jf.Joint: 2, jf.Material: 4, jf.element_matrices: 3, jf.assemble_bricks: 4,
+    jf.smooth_frfs: 3, jf.estimate_noise: 2,
     jf.brick_quality: 2, jf.Hole: 4, jf.brick_beam: 4, jf.solid_model: 2, jf.virtual_point: 5,
     **dict.fromkeys(ONE_BAD, 1),
 }  # fmt: skip

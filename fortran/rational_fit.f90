@@ -1,0 +1,481 @@
+!> Rational functions with common poles through several FRFs: one weighted least-squares fit, and better poles.
+!>
+!> c_0 + sum c_k/(s - p_k) with complex residues. Only poles of positive frequencies are meant; their mirror images, far
+!> from the lines, are left to poles of their own, so structural damping, which has none, is met exactly, too.
+!> All is done in functions psi that are orthonormal under the mean weight of the entries: [1, 1/(s - p_k)] = psi R.
+!> What costs time is the sums over the lines of w conj(psi_i) psi_j, for all entries and pairs at once: one product of
+!> real matrices, in pieces that stay in the cache.
+module jointfrf_rational_fit
+  use, intrinsic :: iso_c_binding, only: c_size_t
+  use jointfrf_blas_threads, only: hold_blas_threads, release_blas_threads
+  use jointfrf_kinds, only: blas_ip, dp, ip, long
+  use jointfrf_lapack, only: dgemm, zgeev, zgemm, zgesv
+  use jointfrf_line_layout, only: all_finite
+  use jointfrf_sharing, only: share, shared_work, threads_for
+  use jointfrf_status, only: info_good, info_no_memory
+  implicit none
+  private
+  public :: rational_fit, relocate_poles
+
+  !> Their pairs are counted by default integers, with room to spare.
+  integer, parameter, public :: most_poles = 10000
+  !> Lines, and pairs of functions, of one piece of the sums.
+  integer, parameter :: piece_lines = 256, piece_pairs = 16
+  !> Below this many floating-point operations, a millisecond or two of matrix products, one thread does the work.
+  real(dp), parameter :: serial_flops_products = 2.0e7_dp
+  !> Added to the diagonal of normal equations, relative to it.
+  real(dp), parameter :: rounding = 1.0e-15_dp
+  !> Poles nearer to the frequency axis than this part of the distance of lines are moved away from it.
+  real(dp), parameter :: nearest = 1.0e-3_dp
+
+  !> Sums over the lines of weights times products of functions; an item is a piece of the pairs of functions.
+  type, extends(shared_work) :: pair_sums
+    integer :: n, n_pairs
+    integer, allocatable :: first(:), second(:)                !< functions of a pair, first <= second
+    real(dp), allocatable :: weights(:, :)                     !< (n_freq, number of sums)
+    real(dp), allocatable :: re(:, :), im(:, :)                !< psi, (n_freq, n)
+    real(dp), pointer, contiguous :: products(:, :, :) => null()   !< (piece_lines, 2 piece_pairs, threads)
+    real(dp), pointer, contiguous :: sums(:, :, :) => null()   !< (number of sums, 2, n_pairs): of Re, of Im
+  contains
+    procedure :: do_items => sum_pairs
+  end type pair_sums
+
+  !> The quadratic form of sigma of each entry, its numerator eliminated; an item is an entry.
+  type, extends(shared_work) :: elimination
+    integer :: n, n_entries
+    type(pair_sums), pointer :: gram => null()
+    complex(dp), pointer, contiguous :: forms(:, :, :) => null()   !< (n, n, n_entries)
+    integer, pointer, contiguous :: failed(:) => null()        !< (n_entries), 0 good
+  contains
+    procedure :: do_items => eliminate_numerators
+  end type elimination
+
+  !> psi and R.
+  type :: orthonormal_basis
+    complex(dp), allocatable :: psi(:, :), triangle(:, :)
+  end type orthonormal_basis
+
+contains
+
+  !> Better poles: relaxed vector fitting, until the sum of squares of the fit stays.
+  !>
+  !> sigma and numerators q_e of the form c_0 + sum c_k/(s - p_k) minimise sum_e |w_e (q_e - sigma h_e)|^2 with the mean
+  !> of sigma held; the zeros of sigma are the new poles. Noise adds its own Gram matrix to this form, so holding the
+  !> mean leaves the poles where they are once they are right. B. Gustavsen, IEEE Trans. Power Del. 14, 21.
+  !> iterations  most relocations
+  !> still       relative change of the sum of squares at which they end
+  !> s           i times the frequency of each line, in any unit, shape (n_freq)
+  !> h           FRFs, shape (n_freq, n_entries)
+  !> weight      1/sqrt(E|e|^2) up to one factor, shape (n_freq, n_entries)
+  !> poles       in: first poles; out: those of the least sum of squares, stable, shape (n_poles)
+  !> squares     that sum
+  !> info        > 0 so many entries have singular equations; poles are then the last that had not
+  subroutine relocate_poles(iterations, still, s, h, weight, poles, squares, info)
+    integer, intent(in) :: iterations
+    real(dp), intent(in) :: still
+    complex(dp), contiguous, intent(in) :: s(:), h(:, :)
+    real(dp), contiguous, intent(in) :: weight(:, :)
+    complex(dp), contiguous, intent(inout) :: poles(:)
+    real(dp), intent(out) :: squares
+    integer(ip), intent(out) :: info
+    type(pair_sums), target :: gram
+    type(elimination) :: entries
+    type(orthonormal_basis) :: basis
+    complex(dp), allocatable :: moved(:), form(:, :)
+    real(dp) :: before, now
+    integer :: n, k, stat
+
+    squares = 0.0_dp
+    info = info_good
+    if (size(h) == 0) return
+    n = size(poles) + 1
+    call prepare_sums(4*size(h, 2), n, size(s), gram, info)
+    if (info == info_good) then
+      allocate (moved(n - 1), form(n, n), basis%psi(size(s), n), basis%triangle(n, n), &
+                entries%forms(n, n, size(h, 2)), entries%failed(size(h, 2)), stat=stat)
+      if (stat /= 0) info = info_no_memory
+    end if
+    if (info /= info_good) return
+    call set_weights(h, weight, gram%weights)
+    entries%n = n
+    entries%n_entries = size(h, 2)
+    entries%gram => gram
+    squares = huge(squares)
+    before = huge(before)
+    moved = poles
+    call hold_blas_threads()
+    do k = 0, iterations
+      call make_basis(s, weight, moved, basis)
+      call form_of_sigma(basis, gram, entries, form, info)
+      if (info /= info_good) exit
+      now = max(real(dot_product(basis%triangle(:, 1), matmul(form, basis%triangle(:, 1))), dp), 0.0_dp)
+      if (now < squares) then
+        squares = now
+        poles = moved
+      end if
+      if (abs(before - now) <= still*now .or. k == iterations) exit
+      before = now
+      call zeros_of_sigma(basis, form, s, moved, info)
+      if (info /= info_good) exit
+    end do
+    call release_blas_threads()
+    deallocate (gram%products, gram%sums, entries%forms, entries%failed)
+  end subroutine relocate_poles
+
+  !> Least-squares fit with given poles: normal equations in psi, corrected once by their residual.
+  !> s, h, weight, poles   as in relocate_poles
+  !> smooth      the fit, shape (n_freq, n_entries)
+  !> squares     weighted sum of squares of h - smooth
+  !> loss        by how much it would grow without a pole, the others staying where they are, shape (n_poles)
+  !> info        > 0 so many entries have singular equations, and smooth is 0 there
+  subroutine rational_fit(s, h, weight, poles, smooth, squares, loss, info)
+    complex(dp), contiguous, intent(in) :: s(:), h(:, :), poles(:)
+    real(dp), contiguous, intent(in) :: weight(:, :)
+    complex(dp), contiguous, intent(out) :: smooth(:, :)
+    real(dp), intent(out) :: squares, loss(:)
+    integer(ip), intent(out) :: info
+    type(pair_sums), target :: gram
+    type(orthonormal_basis) :: basis
+    complex(dp), allocatable :: back(:, :), pulled(:), normal(:, :)
+    real(dp) :: gain(size(poles))
+    integer :: n, e, stat
+    logical :: good
+
+    smooth = 0.0_dp
+    squares = 0.0_dp
+    loss = 0.0_dp
+    info = info_good
+    if (size(h) == 0) return
+    n = size(poles) + 1
+    call prepare_sums(size(h, 2), n, size(s), gram, info)
+    if (info == info_good) then
+      allocate (basis%psi(size(s), n), basis%triangle(n, n), back(n, n), pulled(size(s)), normal(n, n), stat=stat)
+      if (stat /= 0) info = info_no_memory
+    end if
+    if (info /= info_good) return
+    gram%weights = weight**2
+    call hold_blas_threads()
+    call make_basis(s, weight, poles, basis)
+    call invert_triangle(basis%triangle, back)
+    call sum_all(basis, gram)
+    do e = 1, size(h, 2)
+      call own_gram(gram, e, normal)
+      call fit_entry(basis%psi, back, normal, h(:, e), weight(:, e), pulled, smooth(:, e), gain, good)
+      if (good) then
+        loss = loss + gain
+      else
+        smooth(:, e) = 0.0_dp
+        info = info + 1
+      end if
+      squares = squares + sum((weight(:, e)*abs(h(:, e) - smooth(:, e)))**2)
+    end do
+    call release_blas_threads()
+    deallocate (gram%products, gram%sums)
+  end subroutine rational_fit
+
+  !> Fit of one entry.
+  !> normal      Gram matrix of the entry; lost
+  !> pulled      workspace, shape (n_freq)
+  !> gain        what each pole takes off the sum of squares
+  subroutine fit_entry(psi, back, normal, h, weight, pulled, smooth, gain, good)
+    complex(dp), contiguous, intent(in) :: psi(:, :), back(:, :), h(:)
+    complex(dp), contiguous, intent(inout) :: normal(:, :), pulled(:), smooth(:)
+    real(dp), intent(in) :: weight(:)
+    real(dp), intent(out) :: gain(:)
+    logical, intent(out) :: good
+    complex(dp) :: residue, coefficients(size(psi, 2)), pull(size(psi, 2))
+    complex(dp) :: inverse(size(psi, 2), size(psi, 2)), right(size(psi, 2), size(psi, 2))
+    integer(blas_ip) :: pivot(size(psi, 2)), stat
+    integer :: n, j, turn
+
+    n = size(psi, 2)
+    inverse = 0.0_dp
+    do j = 1, n
+      inverse(j, j) = 1.0_dp
+    end do
+    call zgesv(int(n, blas_ip), int(n, blas_ip), normal, int(n, blas_ip), pivot, inverse, int(n, blas_ip), stat)
+    good = stat == 0
+    if (.not. good) return
+    coefficients = 0.0_dp
+    smooth = 0.0_dp
+    do turn = 1, 2
+      pulled = weight**2*(h - smooth)
+      call multiply('C', psi, pulled, pull)
+      coefficients = coefficients + matmul(inverse, pull)
+      call multiply('N', psi, coefficients, smooth)
+    end do
+    right = matmul(inverse, transpose(conjg(back)))
+    do j = 2, n
+      residue = sum(back(j, :)*coefficients)
+      gain(j - 1) = abs(residue)**2/real(sum(back(j, :)*right(:, j)), dp)
+    end do
+  end subroutine fit_entry
+
+  !> y = A x or A^H x.
+  subroutine multiply(operation, a, x, y)
+    character, intent(in) :: operation
+    complex(dp), contiguous, intent(in) :: a(:, :), x(:)
+    complex(dp), contiguous, intent(out) :: y(:)
+    integer(blas_ip) :: rows
+
+    rows = size(a, 1, kind=blas_ip)
+    call zgemm(operation, 'N', size(y, kind=blas_ip), 1_blas_ip, size(x, kind=blas_ip), (1.0_dp, 0.0_dp), a, rows, x, &
+               size(x, kind=blas_ip), (0.0_dp, 0.0_dp), y, size(y, kind=blas_ip), 1_c_size_t, 1_c_size_t)
+  end subroutine multiply
+
+  subroutine prepare_sums(n_sums, n, n_freq, gram, info)
+    integer, intent(in) :: n_sums, n, n_freq
+    type(pair_sums), intent(out) :: gram
+    integer(ip), intent(out) :: info
+    integer :: i, j, stat
+
+    info = info_good
+    gram%n = n
+    gram%n_pairs = n*(n + 1)/2
+    allocate (gram%first(gram%n_pairs), gram%second(gram%n_pairs), gram%weights(n_freq, n_sums), gram%re(n_freq, n), &
+              gram%im(n_freq, n), gram%sums(n_sums, 2, gram%n_pairs), &
+              gram%products(piece_lines, 2*piece_pairs, threads_of(n_sums, gram%n_pairs, n_freq)), stat=stat)
+    if (stat /= 0) then
+      info = info_no_memory
+      return
+    end if
+    gram%first = [((i, i=1, j), j=1, n)]
+    gram%second = [((j, i=1, j), j=1, n)]
+  end subroutine prepare_sums
+
+  function threads_of(n_sums, n_pairs, n_freq) result(threads)
+    integer, intent(in) :: n_sums, n_pairs, n_freq
+    integer :: threads
+
+    threads = threads_for(4.0_dp*n_sums*n_pairs*n_freq, int((n_pairs - 1)/piece_pairs + 1, long), serial_flops_products)
+  end function threads_of
+
+  !> w^2, w^2 |h|^2, w^2 Re h, w^2 Im h of each entry.
+  pure subroutine set_weights(h, weight, weights)
+    complex(dp), intent(in) :: h(:, :)
+    real(dp), intent(in) :: weight(:, :)
+    real(dp), intent(out) :: weights(:, :)
+    integer :: m
+
+    m = size(h, 2)
+    weights(:, :m) = weight**2
+    weights(:, m + 1:2*m) = weights(:, :m)*(real(h)**2 + aimag(h)**2)
+    weights(:, 2*m + 1:3*m) = weights(:, :m)*real(h)
+    weights(:, 3*m + 1:) = weights(:, :m)*aimag(h)
+  end subroutine set_weights
+
+  !> [1, 1/(s - p)] made orthonormal under the mean weight, by Gram and Schmidt, twice.
+  subroutine make_basis(s, weight, poles, basis)
+    complex(dp), contiguous, intent(in) :: s(:), poles(:)
+    real(dp), contiguous, intent(in) :: weight(:, :)
+    type(orthonormal_basis), intent(inout) :: basis
+    complex(dp) :: part(size(poles) + 1)
+    real(dp) :: mean_weight(size(s)), length
+    integer :: j, turn
+
+    mean_weight = sqrt(sum(weight**2, dim=2)/size(weight, 2))
+    associate (psi => basis%psi, triangle => basis%triangle)
+      triangle = 0.0_dp
+      psi(:, 1) = mean_weight
+      do j = 1, size(poles)
+        psi(:, j + 1) = mean_weight/(s - poles(j))
+      end do
+      do j = 1, size(psi, 2)
+        do turn = 1, merge(0, 2, j == 1)
+          call multiply('C', psi(:, :j - 1), psi(:, j), part(:j - 1))
+          call take_off(psi(:, :j - 1), part(:j - 1), psi(:, j))
+          triangle(:j - 1, j) = triangle(:j - 1, j) + part(:j - 1)
+        end do
+        length = sqrt(sum(real(psi(:, j))**2 + aimag(psi(:, j))**2))
+        triangle(j, j) = length
+        if (length > 0.0_dp) psi(:, j) = psi(:, j)/length
+      end do
+      do j = 1, size(psi, 2)
+        psi(:, j) = psi(:, j)/mean_weight
+      end do
+    end associate
+  end subroutine make_basis
+
+  !> y = y - A x.
+  subroutine take_off(a, x, y)
+    complex(dp), contiguous, intent(in) :: a(:, :), x(:)
+    complex(dp), contiguous, intent(inout) :: y(:)
+
+    call zgemm('N', 'N', size(y, kind=blas_ip), 1_blas_ip, size(x, kind=blas_ip), (-1.0_dp, 0.0_dp), a, &
+               size(y, kind=blas_ip), x, size(x, kind=blas_ip), (1.0_dp, 0.0_dp), y, size(y, kind=blas_ip), &
+               1_c_size_t, 1_c_size_t)
+  end subroutine take_off
+
+  !> Inverse of an upper triangle; a zero on the diagonal gives a row of zeros.
+  pure subroutine invert_triangle(triangle, inverse)
+    complex(dp), intent(in) :: triangle(:, :)
+    complex(dp), intent(out) :: inverse(:, :)
+    integer :: i, j
+
+    inverse = 0.0_dp
+    do j = 1, size(triangle, 1)
+      if (abs(triangle(j, j)) > 0.0_dp) inverse(j, j) = 1.0_dp/triangle(j, j)
+      do i = j - 1, 1, -1
+        if (abs(triangle(i, i)) > 0.0_dp) &
+          inverse(i, j) = -sum(triangle(i, i + 1:j)*inverse(i + 1:j, j))/triangle(i, i)
+      end do
+    end do
+  end subroutine invert_triangle
+
+  subroutine sum_all(basis, gram)
+    type(orthonormal_basis), intent(in) :: basis
+    type(pair_sums), intent(inout) :: gram
+
+    gram%re = real(basis%psi)
+    gram%im = aimag(basis%psi)
+    call share(gram, int((gram%n_pairs - 1)/piece_pairs + 1, long), size(gram%products, 3), even=.true.)
+  end subroutine sum_all
+
+  subroutine sum_pairs(self, first, last, thread)
+    class(pair_sums), intent(in) :: self
+    integer(long), intent(in) :: first, last
+    integer, intent(in) :: thread
+    integer(long) :: item
+    integer :: line, lines, pair, pairs, k, i, j
+    real(dp) :: beta
+
+    do item = first, last
+      pair = int(item - 1)*piece_pairs
+      pairs = min(piece_pairs, self%n_pairs - pair)
+      do line = 1, size(self%re, 1), piece_lines
+        lines = min(piece_lines, size(self%re, 1) - line + 1)
+        do k = 1, pairs
+          i = self%first(pair + k)
+          j = self%second(pair + k)
+          associate (ar => self%re(line:line + lines - 1, i), ai => self%im(line:line + lines - 1, i), &
+                     br => self%re(line:line + lines - 1, j), bi => self%im(line:line + lines - 1, j))
+            self%products(:lines, 2*k - 1, thread) = ar*br + ai*bi
+            self%products(:lines, 2*k, thread) = ar*bi - ai*br
+          end associate
+        end do
+        beta = merge(0.0_dp, 1.0_dp, line == 1)
+        call dgemm('T', 'N', size(self%weights, 2, kind=blas_ip), int(2*pairs, blas_ip), int(lines, blas_ip), 1.0_dp, &
+                   self%weights(line, 1), size(self%weights, 1, kind=blas_ip), self%products(:, :, thread), &
+                   int(piece_lines, blas_ip), beta, self%sums(:, :, pair + 1:), size(self%sums, 1, kind=blas_ip), &
+                   1_c_size_t, 1_c_size_t)
+      end do
+    end do
+  end subroutine sum_pairs
+
+  !> Sum over the lines of w^2 conj(psi_i) psi_j of an entry.
+  pure subroutine own_gram(gram, entry, matrix)
+    type(pair_sums), intent(in) :: gram
+    integer, intent(in) :: entry
+    complex(dp), intent(out) :: matrix(:, :)
+    integer :: k
+
+    do k = 1, gram%n_pairs
+      associate (i => gram%first(k), j => gram%second(k))
+        matrix(i, j) = cmplx(gram%sums(entry, 1, k), gram%sums(entry, 2, k), dp)
+        matrix(j, i) = conjg(matrix(i, j))
+        if (i == j) matrix(i, i) = real(matrix(i, i), dp)*(1.0_dp + rounding)
+      end associate
+    end do
+  end subroutine own_gram
+
+  !> Sum of squares as a quadratic form of the coefficients of sigma, the numerators eliminated.
+  subroutine form_of_sigma(basis, gram, entries, form, info)
+    type(orthonormal_basis), intent(in) :: basis
+    type(pair_sums), intent(inout) :: gram
+    type(elimination), intent(in) :: entries
+    complex(dp), contiguous, intent(out) :: form(:, :)
+    integer(ip), intent(out) :: info
+    integer :: threads, i, j
+
+    call sum_all(basis, gram)
+    threads = threads_for(24.0_dp*entries%n_entries*real(entries%n, dp)**3, int(entries%n_entries, long), &
+                          serial_flops_products)
+    call share(entries, int(entries%n_entries, long), threads, even=.true.)
+    info = count(entries%failed /= 0, kind=ip)
+    form = sum(entries%forms, dim=3)
+    do j = 1, size(form, 2)                                   ! Hermitian but for rounding
+      do i = 1, j
+        form(i, j) = (form(i, j) + conjg(form(j, i)))/2
+        form(j, i) = conjg(form(i, j))
+      end do
+    end do
+    if (.not. all_finite(form)) info = max(info, 1_ip)
+  end subroutine form_of_sigma
+
+  subroutine eliminate_numerators(self, first, last, thread)
+    class(elimination), intent(in) :: self
+    integer(long), intent(in) :: first, last
+    integer, intent(in) :: thread
+    complex(dp) :: own(self%n, self%n), mixed(self%n, self%n), solved(self%n, self%n)
+    integer(blas_ip) :: pivot(self%n), n, stat
+    integer :: e, k, m
+
+    if (thread < 1) return                 ! workspace lies on the stack of the thread
+    n = int(self%n, blas_ip)
+    m = self%n_entries
+    do e = int(first), int(last)
+      call own_gram(self%gram, e, own)
+      associate (form => self%forms(:, :, e), sums => self%gram%sums)
+        do k = 1, self%gram%n_pairs
+          associate (i => self%gram%first(k), j => self%gram%second(k), right => sums(m + e, :, k), &
+                     re => sums(2*m + e, :, k), im => sums(3*m + e, :, k))          ! w^2 |h|^2, w^2 Re h, w^2 Im h
+            form(i, j) = cmplx(right(1), right(2), dp)
+            form(j, i) = conjg(form(i, j))
+            mixed(i, j) = cmplx(re(1) - im(2), re(2) + im(1), dp)
+            mixed(j, i) = cmplx(re(1) + im(2), im(1) - re(2), dp)
+          end associate
+        end do
+        solved = mixed
+        call zgesv(n, n, own, n, pivot, solved, n, stat)
+        self%failed(e) = int(stat)
+        if (stat /= 0) cycle
+        call zgemm('C', 'N', n, n, n, (-1.0_dp, 0.0_dp), mixed, n, solved, n, (1.0_dp, 0.0_dp), form, n, 1_c_size_t, &
+                   1_c_size_t)
+      end associate
+    end do
+  end subroutine eliminate_numerators
+
+  !> Zeros of the sigma that minimises its form, its mean held.
+  subroutine zeros_of_sigma(basis, form, s, poles, info)
+    type(orthonormal_basis), intent(in) :: basis
+    complex(dp), contiguous, intent(inout) :: form(:, :)
+    complex(dp), contiguous, intent(in) :: s(:)
+    complex(dp), contiguous, intent(inout) :: poles(:)
+    integer(ip), intent(out) :: info
+    complex(dp) :: sigma(size(form, 1)), back(size(form, 1), size(form, 1)), no_left(1), no_right(1)
+    complex(dp) :: matrix(size(poles), size(poles)), moved(size(poles)), work(4*size(poles) + 1)
+    real(dp) :: trace, real_work(2*size(poles) + 1), least
+    integer(blas_ip) :: pivot(size(form, 1)), n, m, stat
+    integer :: k
+
+    info = info_good
+    n = size(form, 1, kind=blas_ip)
+    m = n - 1_blas_ip
+    trace = sum([(real(form(k, k), dp), k=1, size(form, 1))])
+    do k = 1, size(form, 1)
+      form(k, k) = form(k, k) + rounding*trace/size(form, 1)
+      sigma(k) = sum(conjg(basis%psi(:, k)))
+    end do
+    call zgesv(n, 1_blas_ip, form, n, pivot, sigma, n, stat)
+    call invert_triangle(basis%triangle, back)
+    sigma = matmul(back, sigma)
+    if (stat /= 0 .or. .not. abs(sigma(1)) > 0.0_dp) info = 1
+    if (info /= info_good .or. m == 0) return
+    do k = 1, size(poles)
+      matrix(:, k) = -sigma(k + 1)/sigma(1)
+      matrix(k, k) = matrix(k, k) + poles(k)
+    end do
+    if (.not. all_finite(matrix)) then
+      info = 1
+      return
+    end if
+    call zgeev('N', 'N', m, matrix, m, moved, no_left, 1_blas_ip, no_right, 1_blas_ip, work, &
+               size(work, kind=blas_ip), real_work, stat, 1_c_size_t, 1_c_size_t)
+    if (stat /= 0) then
+      info = 1
+      return
+    end if
+    least = nearest*(maxval(aimag(s)) - minval(aimag(s)))/size(s)
+    poles = cmplx(-max(abs(real(moved)), least), aimag(moved), dp)
+  end subroutine zeros_of_sigma
+end module jointfrf_rational_fit

@@ -1,0 +1,106 @@
+"""Which entries of a matrix of FRFs are measured twice, which are zero, and which have their poles in common."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from jointfrf.kernel.arguments import ComplexArray, FloatArray
+
+__all__ = ["EntryGroup", "entry_groups"]
+
+#: An FRF below this share of what is usual in its row and column is zero to rounding.
+_ZERO = 1e-8
+#: A pair that differs less than this, relatively, was made reciprocal: it holds one measurement.
+_RECIPROCAL = 1e-9
+#: Rows and columns are scaled in turn so many times, until each has a largest entry near 1.
+_SCALINGS = 4
+
+
+@dataclass(frozen=True)
+class EntryGroup:
+    """Entries that are coupled with each other and with no entry of another group.
+
+    Attributes
+    ----------
+    rows, columns : ndarray of int, shape (n_entries,)
+        Of entries that count; of a pair that is reciprocal the one above the diagonal.
+    paired : ndarray of bool, shape (n_entries,)
+        Whether the entry is one of a reciprocal pair.
+    repeated : ndarray of bool, shape (n_entries,)
+        Whether the pair holds two measurements; False where it was made reciprocal before.
+    """
+
+    rows: NDArray[np.intp]
+    columns: NDArray[np.intp]
+    paired: NDArray[np.bool_]
+    repeated: NDArray[np.bool_]
+
+    def means(self, h: ComplexArray, variance: FloatArray) -> tuple[ComplexArray, FloatArray]:
+        """Return the entries and their variance, one a row; two measurements give their weighted mean."""
+        mean = np.ascontiguousarray(h[:, self.rows, self.columns].T)
+        spread = np.ascontiguousarray(variance[:, self.rows, self.columns].T)
+        rows, columns, twice = self.rows[self.repeated], self.columns[self.repeated], self.repeated
+        other, other_variance = h[:, columns, rows].T, variance[:, columns, rows].T
+        share = other_variance / (spread[twice] + other_variance)
+        mean[twice] = share * mean[twice] + (1 - share) * other
+        spread[twice] *= share
+        return mean, spread
+
+    def put(self, values: ComplexArray | FloatArray, into: ComplexArray | FloatArray) -> None:
+        """Write values, one entry a row, to both places of a pair."""
+        into[:, self.rows, self.columns] = values.T
+        rows, columns = self.rows[self.paired], self.columns[self.paired]
+        into[:, columns, rows] = values[self.paired].T
+
+
+def entry_groups(h: ComplexArray, *, reciprocal: bool) -> list[EntryGroup]:
+    """Find the groups; entries that are zero to rounding belong to none.
+
+    Parameters
+    ----------
+    h : ndarray, shape (n_freq, n_out, n_in)
+    reciprocal : bool
+        Whether entries (p, q) and (q, p) of square matrices are the same FRF.
+
+    Returns
+    -------
+    list of EntryGroup
+    """
+    counts = _counting(h)
+    n_out, n_in = counts.shape
+    reciprocal = reciprocal and n_out == n_in
+    if reciprocal:
+        counts |= counts.T
+    links = np.zeros((n_out + n_in, n_out + n_in), np.bool_)
+    links[:n_out, n_out:] = counts
+    if reciprocal:
+        links[:n_out, n_out:] |= np.diag(counts.any(axis=0))
+    _, label = sparse.csgraph.connected_components(sparse.csr_array(links), directed=False)
+    if reciprocal:
+        counts = np.triu(counts)
+    rows, columns = np.nonzero(counts)
+    groups = []
+    for one in np.unique(label[rows]):
+        own = label[rows] == one
+        p, q = rows[own], columns[own]
+        paired = (p != q) & reciprocal
+        repeated = paired.copy()
+        one, two = h[:, p[paired], q[paired]], h[:, q[paired], p[paired]]
+        repeated[paired] = (abs(one - two) > _RECIPROCAL * (abs(one) + abs(two))).mean(axis=0) > 0.5
+        groups.append(EntryGroup(p, q, paired, repeated))
+    return groups
+
+
+def _counting(h: ComplexArray) -> NDArray[np.bool_]:
+    """Whether an entry is not zero, whatever the units of its row and column."""
+    size = np.sqrt((h.real**2 + h.imag**2).mean(axis=0))
+    for _ in range(_SCALINGS):
+        for axis in (0, 1):
+            largest = size.max(axis=axis, keepdims=True)
+            size = size / np.where(largest > 0, largest, 1)
+    counts: NDArray[np.bool_] = size > _ZERO
+    return counts

@@ -1,0 +1,299 @@
+"""Noise of measured FRFs from the FRFs themselves: variance by entry and frequency, correlation, outlying lines."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal, cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from jointfrf.frf.entry_groups import entry_groups
+from jointfrf.frf.noise_estimate import reciprocity_noise
+from jointfrf.frf.noise_parts import line_correlation, line_levels, noise_parts
+from jointfrf.frf.order_search import OrderSearch
+from jointfrf.frf.reciprocity_differences import ReciprocityDifferences, reciprocity_differences
+from jointfrf.frf.smoothing import SmoothFrfs, checked_frfs, first_variance, near_squares, smoothed
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_number, as_real
+
+__all__ = ["NoiseModel", "NoiseSource", "estimate_noise"]
+
+#: What the variance was found from.
+NoiseSource = Literal["residual", "reciprocity", "none"]
+
+#: Smoothing never takes up more of the noise power than this, as far as residuals are corrected for it.
+_MOST_TAKEN = 0.8
+#: Smooth FRFs and noise model are found in turn so often at most, until variances change by less than a factor on
+#: nearly all lines.
+_MOST_TURNS = 4
+_SETTLED = 1.5
+_SETTLED_SHARE = 0.97
+_TINY = float(np.finfo(float).tiny)
+
+
+@dataclass(frozen=True)
+class NoiseModel:
+    """Noise of measured FRFs.
+
+    E|e|^2 = line_level line_factor (relative^2 |h|^2 + floor^2 + coherence_factor^2 v), v the variance that coherence
+    tells.
+
+    Attributes
+    ----------
+    relative : ndarray, shape (n_out, n_in)
+        Relative part, 0.05 for 5 %.
+    floor : ndarray, shape (n_out, n_in)
+        Part that is the same at all lines, in the unit of the FRF.
+    coherence_factor : ndarray, shape (n_out, n_in)
+        Noise over what the coherence says; 0 without coherence. Near 1 where it explains the noise alone.
+    variance : ndarray, shape (n_freq, n_out, n_in)
+        E|e|^2.
+    inflation : float
+        How many neighbouring lines carry the noise of one independent line: covariances of estimates take this factor.
+    inflation_source : {"reciprocity", "residual", "none"}
+        Differences h_pq - h_qp, in which no model enters; or measured minus smooth, corrected for the parameters, where
+        FRFs are not square or were made reciprocal before; or nothing, too few lines.
+    line_level : ndarray, shape (n_freq,)
+        Variation of the noise power over frequency, common to all entries, that the parts do not describe; 1 where it
+        is not significant.
+    line_factor : ndarray, shape (n_freq,)
+        By how much the noise power of an outlying line (mains hum) exceeds the model, 1 for other lines.
+    source : {"residual", "reciprocity", "none"}
+        What the variance comes from: measured minus smooth FRFs; the differences h_pq - h_qp, with too few lines or
+        too little noise for smoothing; none, where neither shows noise: the variance is then 0.
+    smooth : SmoothFrfs
+    """
+
+    relative: FloatArray
+    floor: FloatArray
+    coherence_factor: FloatArray
+    variance: FloatArray
+    inflation: float
+    inflation_source: NoiseSource
+    line_level: FloatArray
+    line_factor: FloatArray
+    source: NoiseSource
+    smooth: SmoothFrfs
+
+    @property
+    def outlying(self) -> NDArray[np.intp]:
+        """Numbers of the outlying lines."""
+        return np.flatnonzero(self.line_factor > 1)
+
+    @property
+    def level(self) -> float:
+        """Median of the noise relative to the FRFs, over entries that are not zero and lines."""
+        size = abs(self.smooth.h)
+        counts = (self.relative > 0) | (self.floor > 0) | (self.coherence_factor > 0)
+        if not counts.any():
+            return 0.0
+        return float(np.median(np.sqrt(self.variance[:, counts]) / np.maximum(size[:, counts], _TINY)))
+
+
+def estimate_noise(
+    freq_hz: ArrayLike,
+    h: ArrayLike,
+    *,
+    reciprocal: bool = True,
+    coherence: ArrayLike | None = None,
+    averages: float | None = None,
+    max_poles: int = 60,
+) -> NoiseModel:
+    """Estimate the noise of measured FRFs, and smooth them.
+
+    Parameters
+    ----------
+    freq_hz : array_like, shape (n_freq,)
+        Lines in Hz, all different, in any spacing.
+    h : array_like, shape (n_freq, n_out, n_in)
+        Measured FRFs.
+    reciprocal : bool
+        Whether h_pq and h_qp of square matrices are the same FRF.
+    coherence : array_like, shape (n_freq, n_out, n_in), optional
+        Ordinary coherence of each FRF, above 0, at most 1.
+    averages : float, optional
+        Number of averages behind the coherence; 1 if it is not given, `coherence_factor` then holds 1/sqrt(averages).
+    max_poles : int
+        As in `smooth_frfs`.
+
+    Returns
+    -------
+    NoiseModel
+
+    Raises
+    ------
+    ValueError
+        As `smooth_frfs`; coherence out of range; averages without coherence, or below 1.
+
+    Notes
+    -----
+    Smooth FRFs and noise model are found in turn until the variances settle. Squares of measured minus smooth, divided
+    by the part of the noise that the smooth FRFs have not taken up, give the parts of the variance by entry. From
+    coherence g^2 of n averages, v = (1 - g^2)/(n g^2) |h|^2 is E|e|^2; |h| alone has half of it as its variance. v
+    enters as one more part with a factor of its own, so the residual, which sees all noise, decides how far the
+    coherence is believed.
+
+    Examples
+    --------
+    >>> import numpy as np, jointfrf as jf
+    >>> freq = np.linspace(0.5, 10, 400)
+    >>> h = jf.chain([5, 3], [2500, 3500], [3, 4], ground="start").receptance(freq)
+    >>> noise = jf.estimate_noise(freq, jf.pollute(h, 0.05, seed=1))
+    >>> bool(abs(noise.level / 0.05 - 1) < 0.1)
+    True
+    """
+    freq, lines = checked_frfs(freq_hz, h)
+    given = _coherence_variance(lines, coherence, averages)
+    up = np.argsort(freq)
+    model = _estimated(freq[up], lines[up], None if given is None else given[up], max_poles, reciprocal=reciprocal)
+    back = np.argsort(up)
+    return replace(
+        model,
+        variance=model.variance[back],
+        line_level=model.line_level[back],
+        line_factor=model.line_factor[back],
+        smooth=model.smooth.in_order(back),
+    )
+
+
+def _estimated(
+    freq: FloatArray, lines: ComplexArray, given: FloatArray | None, max_poles: int, *, reciprocal: bool
+) -> NoiseModel:
+    """Noise model of checked FRFs, lines in rising order."""
+    differences = reciprocity_differences(lines) if reciprocal else None
+    inflation = None
+    if differences is None:
+        variance = first_variance(lines)
+    else:
+        variance = np.maximum(differences.variance_of_parts(near_squares(lines)), _TINY)
+        inflation = differences.inflation(variance, differences.line_levels(variance).factor)
+        levels = differences.line_levels(variance, inflation)
+        variance *= (levels.usual * levels.factor)[:, None, None]
+    patience = 2 if differences is None else 1  # a worse start
+    smooth = smoothed(freq, lines, variance, OrderSearch(inflation, max_poles, patience), reciprocal=reciprocal)
+    if not smooth.is_smooth:
+        return _without_smoothing(lines, smooth, reciprocal=reciprocal)
+    for _ in range(_MOST_TURNS):
+        model = _model(lines, smooth, given, inflation or 1.0, differences, robust=True)
+        inflation, _ = _found_inflation(lines, differences, model)
+        before, variance = variance, np.maximum(model.variance, _TINY)
+        settled = _alike(before, variance)
+        search = OrderSearch(None if differences is None else inflation, max_poles, 0 if settled else patience)
+        smooth = smoothed(freq, lines, variance, search, reciprocal=reciprocal, start=smooth.poles)
+        if settled:
+            break
+    model = _model(lines, smooth, given, inflation or 1.0, differences, robust=False)
+    inflation, source = _found_inflation(lines, differences, model)
+    return replace(model, inflation=inflation, inflation_source=source)
+
+
+def _alike(before: FloatArray, variance: FloatArray) -> bool:
+    """Whether weights have settled."""
+    return bool((abs(np.log(variance / before)) < np.log(_SETTLED)).mean() > _SETTLED_SHARE)
+
+
+def _coherence_variance(h: ComplexArray, coherence: ArrayLike | None, averages: float | None) -> FloatArray | None:
+    """E|e|^2 that the coherence says."""
+    if coherence is None:
+        if averages is not None:
+            raise ValueError("averages are used with coherence only: give coherence, too")
+        return None
+    squared = as_real("coherence", coherence, h.shape)
+    if ((squared <= 0) | (squared > 1)).any():
+        raise ValueError("coherence must be above 0 and at most 1")
+    count = 1.0 if averages is None else as_number("averages", averages)
+    if count < 1:
+        raise ValueError(f"averages must be 1 or more, not {averages}")
+    variance: FloatArray = (1 - squared) / (count * squared) * abs(h) ** 2
+    return variance
+
+
+def _found_inflation(
+    h: ComplexArray, differences: ReciprocityDifferences | None, model: NoiseModel
+) -> tuple[float, NoiseSource]:
+    if differences is not None:
+        return differences.inflation(model.variance, model.line_factor), "reciprocity"
+    shown = (model.variance > 0).all(axis=0)
+    if h.shape[1] == h.shape[2] and np.allclose(h, h.swapaxes(1, 2), rtol=1e-8, atol=0):
+        shown = np.triu(shown)
+    noise = ((h - model.smooth.h)[:, shown] / np.sqrt(model.variance[:, shown])).T
+    noise = np.where(model.line_factor > 1, np.nan, noise)
+    return line_correlation(noise, float(model.smooth.share[shown].mean())), "residual"
+
+
+def _model(
+    h: ComplexArray,
+    smooth: SmoothFrfs,
+    given: FloatArray | None,
+    inflation: float,
+    differences: ReciprocityDifferences | None,
+    *,
+    robust: bool,
+) -> NoiseModel:
+    """Noise model from measured minus smooth.
+
+    The robust one is for weights: the error of smooth FRFs that are not the last, at peaks and antiresonances, must not
+    be taken for noise, nor for outlying lines where differences tell these.
+    """
+    n_freq, n_out, n_in = h.shape
+    shown = (smooth.h != 0).any(axis=0)
+    squares = (abs(h - smooth.h)[:, shown] ** 2).T
+    taken = np.minimum(inflation * smooth.share[shown], _MOST_TAKEN)
+    squares = squares / (1 - taken)[:, None]
+    terms = [abs(smooth.h[:, shown]).T ** 2, np.ones(squares.shape)]
+    if given is not None:
+        terms.append(given[:, shown].T)
+    stacked = np.stack(terms)
+    usual, factor = np.ones(n_freq), np.ones(n_freq)
+    # Outlying lines; with these left out, slow variation; where there is some, parts and outlying lines once more.
+    for turn in range(3):
+        good = factor == 1
+        parts = noise_parts((squares / usual)[:, good], stacked[:, :, good], robust=robust or turn == 0)
+        described = np.maximum(_described(parts, stacked) * usual, _TINY)
+        variance = np.zeros(h.shape)
+        variance[:, shown] = described.T
+        levels = []
+        if differences is not None:
+            levels.append(differences.line_levels(variance, inflation))
+        if not robust or differences is None:
+            levels.append(line_levels(squares / described, inflation))
+        factor = np.max([found.factor for found in levels], axis=0)
+        if turn == 1:
+            if (levels[-1].usual == 1).all():
+                break
+            usual = levels[-1].usual
+    variance *= factor[:, None, None]
+    by_entry = np.zeros((3, n_out, n_in))
+    by_entry[: len(parts), shown] = np.sqrt(parts)
+    relative, floor, of_coherence = by_entry
+    return NoiseModel(relative, floor, of_coherence, variance, inflation, "none", usual, factor, "residual", smooth)
+
+
+def _described(parts: FloatArray, terms: FloatArray) -> FloatArray:
+    """Sum of parts times terms, shape (n_entries, n_freq)."""
+    return np.asarray((parts[:, :, None] * terms).sum(axis=0))
+
+
+def _without_smoothing(h: ComplexArray, smooth: SmoothFrfs, *, reciprocal: bool) -> NoiseModel:
+    """Relative noise alike for all entries, for few lines and for nearly exact FRFs."""
+    n_freq, n_out, n_in = h.shape
+    level, source = 0.0, "none"
+    if reciprocal and n_out == n_in:
+        level, source = float(reciprocity_noise(h[None])[0]), "reciprocity"
+    if level == 0:
+        level, source = (smooth.level, "residual") if smooth.poles else (0.0, "none")
+    relative = np.zeros((1, n_out, n_in))
+    for group in entry_groups(h, reciprocal=reciprocal):
+        group.put(np.full((len(group.rows), 1), level), relative)
+    return NoiseModel(
+        relative=relative[0],
+        floor=np.zeros((n_out, n_in)),
+        coherence_factor=np.zeros((n_out, n_in)),
+        variance=relative**2 * abs(h) ** 2,
+        inflation=1.0,
+        inflation_source="none",
+        line_level=np.ones(n_freq),
+        line_factor=np.ones(n_freq),
+        source=cast(NoiseSource, source),
+        smooth=smooth,
+    )

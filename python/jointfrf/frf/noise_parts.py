@@ -1,0 +1,239 @@
+"""From measured minus smooth FRFs: relative and floor part, correlation between lines, outlying lines."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special
+
+from jointfrf.kernel.arguments import ComplexArray, FloatArray
+
+__all__ = ["LineLevels", "line_correlation", "line_levels", "noise_parts"]
+
+#: Entries are binned by |h|^2 into so many bins: within one the variance is nearly the same.
+_BINS = 32
+#: Grid of the logarithm of the odds of two parts, and how far it reaches.
+_GRID = 33
+_WIDEST = 16.0
+#: A running median is taken at so many lines within its reach.
+_STEPS = 5
+#: Iterations of the likelihood of the parts.
+_ITERATIONS = 60
+#: A start of a part that is to grow from nearly nothing.
+_HARDLY = 1e-3
+#: Probability of calling one line of a sweep without outliers outlying.
+_FALSE_ALARM = 1e-2
+#: Most lines in a row that are called outlying.
+_LONGEST_RUN = 3
+#: Lines over which the usual residual of a line is taken: so many, and so many times the lines that go together.
+_USUAL = 41
+_USUAL_CORRELATED = 5
+#: A standard deviation of the logarithm of running medians so many times that of independent lines, and of at least
+#: this, is a variation over frequency.
+_VARIES = 2.5
+_VARIES_LEAST = 0.15
+#: An autocorrelation below so many standard deviations of that of independent lines ends the sum.
+_SIGNIFICANT = 2.5
+#: Residuals beyond so many medians are cut to that, for correlations.
+_CUT = 3.0
+
+
+def noise_parts(squares: FloatArray, terms: FloatArray, *, robust: bool = False) -> FloatArray:
+    """Non-negative parts of the variance, by maximum likelihood for exponentially distributed squares.
+
+    Parameters
+    ----------
+    squares : ndarray, shape (n_entries, n_freq)
+        |e|^2, corrected for what smoothing has taken up.
+    terms : ndarray, shape (n_terms, n_entries, n_freq)
+        E|e|^2 = sum over the terms of part times term. The first is |h|^2, which lines are binned by.
+    robust : bool
+        Whether medians of the bins count, which some lines with another error than noise do not change; as exact as
+        the squares are exponentially distributed.
+
+    Returns
+    -------
+    ndarray, shape (n_terms, n_entries)
+
+    Notes
+    -----
+    The likelihood is -sum(log v + y/v). For two terms its maximum is found on a grid of the share of the second,
+    refined twice, the size of both following from the share; for more terms by multiplicative updates
+    part *= sqrt(sum term y/v^2 / sum term/v), which never lower the likelihood, from one start a term with that term
+    nearly alone, and one with all alike. The estimate holds for any distribution of e with this variance; it is
+    efficient for circular normal e.
+    """
+    if len(terms) == 2:
+        y, a, count = _binned(squares, terms, robust=robust)
+    else:  # the variance is not the same within a bin
+        y, a, count = squares, terms, np.ones(squares.shape[1])
+    size = np.maximum((a * count).sum(axis=2), np.finfo(float).tiny) / count.sum()
+    a = a / size[:, :, None]
+    parts = _two_parts(y, a, count) if len(terms) == 2 else _several_parts(y, a, count)
+    return np.asarray(parts / size)
+
+
+def _two_parts(y: FloatArray, a: FloatArray, count: FloatArray) -> FloatArray:
+    """Parts of two terms of mean 1, shape (2, n_entries)."""
+    centre, reach = np.zeros(len(y[:, 0])), _WIDEST
+    for _ in range(3):
+        odds = np.exp(centre + reach * np.linspace(-1, 1, _GRID)[:, None])
+        share = np.stack([1 / (1 + odds), odds / (1 + odds)])  # (2, grid, n_entries)
+        v = np.maximum(share[0][:, :, None] * a[0] + share[1][:, :, None] * a[1], np.finfo(float).tiny)
+        level = (count * y / v).sum(axis=2) / count.sum()
+        loss = (count * np.log(v)).sum(axis=2) + count.sum() * np.log(np.maximum(level, np.finfo(float).tiny))
+        best = loss.argmin(axis=0)
+        entries = np.arange(len(y))
+        centre, reach = np.log(odds[best, entries]), 2 * reach / (_GRID - 1)
+    return np.asarray(share[:, best, entries] * level[best, entries])
+
+
+def _several_parts(y: FloatArray, a: FloatArray, count: FloatArray) -> FloatArray:
+    """Parts of any number of terms of mean 1, shape (n_terms, n_entries)."""
+    n_terms = len(a)
+    starts = np.concatenate([np.eye(n_terms) + _HARDLY, np.ones((1, n_terms)) / n_terms])
+    parts = starts[:, :, None] * ((y * count).sum(axis=1) / count.sum())
+    for _ in range(_ITERATIONS):
+        v = np.maximum(np.einsum("ste,teb->seb", parts, a), np.finfo(float).tiny)
+        up = np.einsum("teb,seb->ste", a, count * y / v**2)
+        down = np.einsum("teb,seb->ste", a, count / v)
+        parts *= np.sqrt(up / np.maximum(down, np.finfo(float).tiny))
+    v = np.maximum(np.einsum("ste,teb->seb", parts, a), np.finfo(float).tiny)
+    best = (count * (np.log(v) + y / v)).sum(axis=2).argmin(axis=0)
+    return np.asarray(parts[best, :, np.arange(parts.shape[2])].T)
+
+
+def _binned(squares: FloatArray, terms: FloatArray, *, robust: bool) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Means over bins of lines of similar |h|^2, and how many lines each bin holds."""
+    n_freq = squares.shape[1]
+    if n_freq <= _BINS:
+        return squares, terms, np.ones(n_freq)
+    order = np.argsort(terms[0], axis=1)
+    edges = np.linspace(0, n_freq, _BINS + 1).astype(int)
+    count = np.diff(edges).astype(float)
+
+    def means(values: FloatArray) -> FloatArray:
+        return np.asarray(np.add.reduceat(values, edges[:-1], axis=1) / count)
+
+    ordered = np.take_along_axis(squares, order, axis=1)
+    if robust:
+        bins = np.split(ordered, edges[1:-1], axis=1)
+        y = np.stack([np.median(one, axis=1) for one in bins], axis=1) / np.log(2)
+    else:
+        y = means(ordered)
+    return y, np.stack([means(np.take_along_axis(term, order, axis=1)) for term in terms]), count
+
+
+@dataclass(frozen=True)
+class LineLevels:
+    """Noise power of lines, all entries together, relative to their variance.
+
+    Attributes
+    ----------
+    usual : ndarray, shape (n_freq,)
+        Slow variation over frequency; 1 where there is none that is significant.
+    factor : ndarray, shape (n_freq,)
+        By how much an outlying line exceeds the lines around; 1 for other lines.
+    """
+
+    usual: FloatArray
+    factor: FloatArray
+
+
+def line_levels(ratio: FloatArray, inflation: float = 1.0) -> LineLevels:
+    """Find slow variation of the noise over frequency, and outlying lines.
+
+    Parameters
+    ----------
+    ratio : ndarray, shape (n_entries, n_freq)
+        |e|^2 over its variance.
+    inflation : float
+        Lines that carry the noise of one independent line.
+
+    Returns
+    -------
+    LineLevels
+
+    Notes
+    -----
+    The mean over the entries is compared with its running median. Its distribution without outliers is taken to be a
+    gamma distribution whose shape follows from the quartiles of its logarithm, so entries that share their noise and
+    noise that is not circular are allowed for. The running median, relative to its own median, is the slow variation
+    if its spread is well above that of medians of so many independent lines. More than a few lines in a row are not
+    outlying: there smooth FRFs do not fit, or the noise is another.
+    """
+    line = ratio.mean(axis=0)
+    n_freq = len(line)
+    reach = int(min(max(_USUAL, _USUAL_CORRELATED * inflation), n_freq)) // 2
+    tiny = np.finfo(float).tiny
+    usual = np.maximum(_running_median(line, reach), tiny)
+    factor: FloatArray = line / usual
+    quarter, three_quarters = np.quantile(np.log(np.maximum(factor, tiny)), [0.25, 0.75])
+    shape = (1.349 / max(three_quarters - quarter, 1e-3)) ** 2
+    limit = special.gammainccinv(shape, _FALSE_ALARM / n_freq) / special.gammaincinv(shape, 0.5)
+    by_chance = np.sqrt(inflation / (shape * (2 * reach + 1)))
+    low, high = np.quantile(np.log(usual), [0.1, 0.9])
+    varies = (high - low) / 2.56 > max(_VARIES * by_chance, _VARIES_LEAST)
+    slow = usual / np.median(usual) if varies else np.ones(n_freq)
+    return LineLevels(slow, np.where(_in_short_runs(factor > limit), factor, 1.0))
+
+
+def _in_short_runs(chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Which of the chosen lines have few chosen neighbours in a row."""
+    steps = np.diff(np.pad(chosen.astype(int), 1))
+    short = chosen.copy()
+    for first, end in zip(np.flatnonzero(steps > 0), np.flatnonzero(steps < 0), strict=True):
+        short[first:end] = end - first <= _LONGEST_RUN
+    return short
+
+
+def _running_median(values: FloatArray, reach: int) -> FloatArray:
+    """Median over so many lines on either side, interpolated between every few lines."""
+    padded = np.pad(values, reach, mode="reflect")
+    step = max(1, reach // _STEPS)
+    at = np.append(np.arange(0, len(values) - 1, step), len(values) - 1)
+    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1)[at]
+    return np.asarray(np.interp(np.arange(len(values)), at, np.median(windows, axis=1)))
+
+
+def line_correlation(noise: ComplexArray, share: float = 0.0) -> float:
+    """How many neighbouring lines carry the noise of one independent line.
+
+    Parameters
+    ----------
+    noise : ndarray, shape (n_entries, n_freq)
+        Noise of unit variance; NaN where it is not to count.
+    share : float
+        Part of the noise power that smoothing has taken up, 0 for noise that no smooth FRF was subtracted from.
+
+    Returns
+    -------
+    float
+        1 + 2 sum of the autocorrelations up to the first that is not significant; at least 1.
+    """
+    n_freq = noise.shape[1]
+    size = abs(noise)
+    known: NDArray[np.bool_] = np.isfinite(size)
+    size = np.where(known, size, 0)
+    if n_freq < 16 or not size.any():
+        return 1.0
+    limit = _CUT * np.nanmedian(np.where(known, size, np.nan), axis=1, keepdims=True)
+    cut = np.where(known, noise, 0) * np.where(size > limit, limit / np.where(size > limit, size, 1), 1)
+    n_lags = n_freq // 4
+    pairs = np.maximum(_autocorrelation(known.astype(float), n_lags), 1)
+    rho = _autocorrelation(cut, n_lags) / pairs
+    rho = (rho / rho[0] * (1 - share) + share)[1:]
+    small = rho < _SIGNIFICANT / np.sqrt(pairs[0])
+    last = int(small.argmax()) if small.any() else len(rho)
+    lags = np.arange(1, last + 1)
+    return float(max(1.0, 1 + 2 * (rho[:last] * (1 - lags / n_freq)).sum()))
+
+
+def _autocorrelation(x: ComplexArray | FloatArray, n_lags: int) -> FloatArray:
+    """Return sums over entries and lines of Re x_l conj(x_(l+lag)), lag 0 to n_lags - 1."""
+    length = 1 << int(np.ceil(np.log2(x.shape[1] + n_lags)))
+    power = (abs(np.fft.fft(x, length, axis=1)) ** 2).sum(axis=0)
+    sums: FloatArray = np.fft.ifft(power).real[:n_lags]
+    return sums

@@ -1,0 +1,222 @@
+"""Smooth FRFs: rational functions with common poles through measured ones."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from jointfrf.frf.entry_groups import EntryGroup, entry_groups
+from jointfrf.frf.order_search import OrderSearch, search_order
+from jointfrf.frf.rational_fit import Entries, RationalFit
+from jointfrf.kernel.arguments import (
+    ComplexArray,
+    FloatArray,
+    as_frequency,
+    as_lines,
+    as_number,
+    as_real,
+    check_finite_lines,
+)
+
+__all__ = ["SmoothFrfs", "checked_frfs", "first_variance", "near_squares", "smooth_frfs", "smoothed"]
+
+#: Fewer lines are returned as they were measured.
+_FEWEST_LINES = 16
+#: A residual below this share of the FRFs is not noise that smoothing could remove.
+_EXACT = 1e-4
+#: Share of the median of |h|^2 that first weights add to |h|^2 itself.
+_FIRST_FLOOR = 0.09
+
+
+@dataclass(frozen=True)
+class SmoothFrfs:
+    """FRFs without most of their noise.
+
+    Attributes
+    ----------
+    freq_hz : ndarray, shape (n_freq,)
+        Hz.
+    h : ndarray, shape (n_freq, n_out, n_in)
+        Smooth FRFs in the unit of the measured ones; reciprocal where that was said.
+    is_smooth : bool
+        False where there are too few lines, or no noise that could be removed: `h` is then what was measured.
+    poles : tuple of ndarray
+        Poles of positive frequencies, rad/s, of each group of coupled entries.
+    level : float
+        Root mean square of measured minus smooth relative to sqrt(variance), corrected for the parameters.
+    share : ndarray, shape (n_out, n_in)
+        Parameters over data: the part of the noise power of an entry that its smooth FRF has taken up, if the noise of
+        neighbouring lines is independent.
+    """
+
+    freq_hz: FloatArray
+    h: ComplexArray
+    is_smooth: bool
+    poles: tuple[ComplexArray, ...]
+    level: float
+    share: FloatArray
+
+    @property
+    def order(self) -> int:
+        """Number of poles of the group that has most."""
+        return max((len(poles) for poles in self.poles), default=0)
+
+    def in_order(self, lines: NDArray[np.intp]) -> SmoothFrfs:
+        """Return the same with lines in this order."""
+        return replace(self, freq_hz=self.freq_hz[lines], h=self.h[lines])
+
+
+def smooth_frfs(
+    freq_hz: ArrayLike,
+    h: ArrayLike,
+    variance: ArrayLike | None = None,
+    *,
+    inflation: float = 1.0,
+    reciprocal: bool = True,
+    max_poles: int = 60,
+) -> SmoothFrfs:
+    """Smooth measured FRFs by rational functions of frequency with common poles.
+
+    Parameters
+    ----------
+    freq_hz : array_like, shape (n_freq,)
+        Lines in Hz, all different, in any spacing.
+    h : array_like, shape (n_freq, n_out, n_in)
+        Measured FRFs.
+    variance : array_like, shape (n_freq, n_out, n_in), optional
+        E|e|^2 of each FRF up to one factor, > 0; default |h|^2 (noise of the same relative level everywhere).
+    inflation : float
+        How many neighbouring lines carry the noise of one independent line, >= 1.
+    reciprocal : bool
+        Whether h_pq and h_qp of square matrices are the same FRF.
+    max_poles : int
+        Most poles of a group of coupled entries.
+
+    Returns
+    -------
+    SmoothFrfs
+
+    Raises
+    ------
+    ValueError
+        Wrong shapes, NaN or Inf in a line, two lines of the same frequency, a variance that is not positive, an
+        inflation below 1.
+
+    Notes
+    -----
+    Poles by relaxed vector fitting with weights 1/variance; their number by generalised cross-validation, from the
+    peaks of the FRFs upwards, new poles where the residual is largest. Only poles of positive frequencies are taken,
+    with complex residues: receptance with structural damping is met exactly by as many poles as there are modes near
+    the lines and a few more for all others. Entries that are zero (by symmetry) stay out, and groups of entries that
+    are not coupled have poles of their own. Work is proportional to n_freq n_entries n_poles^2.
+
+    Examples
+    --------
+    >>> import numpy as np, jointfrf as jf
+    >>> freq = np.linspace(0.5, 10, 400)
+    >>> h = jf.chain([5, 3], [2500, 3500], [3, 4], ground="start").receptance(freq)
+    >>> smooth = jf.smooth_frfs(freq, jf.pollute(h, 0.05, seed=1))
+    >>> bool(np.median(abs(smooth.h - h) / abs(h)) < 0.01)
+    True
+    """
+    freq, lines = checked_frfs(freq_hz, h)
+    spread = None if variance is None else as_real("variance", variance, lines.shape)
+    if spread is not None and not (spread > 0).all():
+        raise ValueError("variance must be positive")
+    if as_number("inflation", inflation) < 1:
+        raise ValueError(f"inflation must be 1 or more, not {inflation}")
+    if max_poles < 1:
+        raise ValueError(f"max_poles must be 1 or more, not {max_poles}")
+    up = np.argsort(freq)
+    search = OrderSearch(inflation=inflation, max_poles=max_poles)
+    smooth = smoothed(freq[up], lines[up], None if spread is None else spread[up], search, reciprocal=reciprocal)
+    return smooth.in_order(np.argsort(up))
+
+
+def checked_frfs(freq_hz: ArrayLike, h: ArrayLike) -> tuple[FloatArray, ComplexArray]:
+    """Return lines, all different, and finite FRFs."""
+    lines = as_lines("h", h)
+    freq = as_frequency(freq_hz, len(lines))
+    check_finite_lines("h", lines, freq)
+    order = np.argsort(freq)
+    same = np.flatnonzero(np.diff(freq[order]) == 0)
+    if same.size:
+        one, two = sorted(order[same[0] : same[0] + 2])
+        raise ValueError(f"freq_hz: lines {one} and {two} are both {freq[one]:g} Hz")
+    return freq, lines
+
+
+def smoothed(
+    freq: FloatArray,
+    h: ComplexArray,
+    variance: FloatArray | None,
+    search: OrderSearch,
+    *,
+    reciprocal: bool,
+    start: tuple[ComplexArray, ...] = (),
+) -> SmoothFrfs:
+    """Smooth checked FRFs, lines in rising order, as `smooth_frfs` does; poles `start` are in rad/s."""
+    n_freq, n_out, n_in = h.shape
+    measured = SmoothFrfs(freq, h, False, (), 1.0, np.zeros((n_out, n_in)))
+    if n_freq < _FEWEST_LINES or not h.any():
+        return measured
+    unit = 2 * np.pi * freq.max()
+    values, share, fits = np.zeros_like(h), np.zeros((1, n_out, n_in)), []
+    squares = freedom = exactness = 0.0
+    for number, group in enumerate(entry_groups(h, reciprocal=reciprocal)):
+        before = start[number] / unit if start else None
+        entries, fit = _smooth_group(freq, h, variance, group, search, before)
+        parameters = entries.n_parameters(len(fit.poles))
+        squares, freedom = squares + fit.squares, freedom + entries.n_data - parameters
+        exactness = max(exactness, _relative(entries, fit))
+        group.put(fit.smooth, values)
+        group.put((parameters / entries.n_data / np.where(group.repeated, 2, 1))[:, None], share)
+        fits.append(fit.poles * unit)
+    level = float(np.sqrt(squares / max(freedom, 1)))
+    if exactness < _EXACT:
+        return replace(measured, poles=tuple(fits), level=level)
+    return SmoothFrfs(freq, values, True, tuple(fits), level, share[0])
+
+
+def _relative(entries: Entries, fit: RationalFit) -> float:
+    """Median of |h - smooth| / |smooth|."""
+    return float(np.median(abs(entries.h - fit.smooth) / np.maximum(abs(fit.smooth), np.finfo(float).tiny)))
+
+
+def _smooth_group(
+    freq: FloatArray,
+    h: ComplexArray,
+    variance: FloatArray | None,
+    group: EntryGroup,
+    search: OrderSearch,
+    start: ComplexArray | None,
+) -> tuple[Entries, RationalFit]:
+    """Fit of one group."""
+    s = 1j * freq / freq.max()
+    if variance is not None:
+        mean, spread = group.means(h, variance)
+        entries = Entries(s, mean, 1 / np.sqrt(spread))
+        return entries, search_order(entries, search, start)
+    mean, spread = group.means(h, first_variance(h))
+    fit = search_order(Entries(s, mean, 1 / np.sqrt(spread)), search, start)
+    count = np.where(group.repeated, 2, 1)[:, None]
+    weight = np.sqrt(count / ((3 * abs(fit.smooth) ** 2 + count * spread) / 4))
+    entries = Entries(s, mean, weight)
+    return entries, search_order(entries, search, fit.poles)
+
+
+def first_variance(h: ComplexArray) -> FloatArray:
+    """Variance before anything is known of the noise: |h|^2 over neighbouring lines, not below a part of its median."""
+    near = near_squares(h)
+    variance: FloatArray = np.maximum(near + _FIRST_FLOOR * np.median(near, axis=0), np.finfo(float).tiny)
+    return variance
+
+
+def near_squares(h: ComplexArray) -> FloatArray:
+    """Mean of |h|^2 over each line and its neighbours."""
+    squares = h.real**2 + h.imag**2
+    padded = np.pad(squares, ((1, 1), (0, 0), (0, 0)), mode="edge")
+    near: FloatArray = (padded[:-2] + padded[1:-1] + padded[2:]) / 3
+    return near

@@ -1,0 +1,199 @@
+"""Noise of measured FRFs from the FRFs themselves."""
+
+import numpy as np
+import pytest
+
+import jointfrf as jf
+from jointfrf.frf.noise_parts import line_correlation, line_levels, noise_parts
+
+FREQ = np.arange(15.0, 601.0)
+
+
+@pytest.fixture(scope="module")
+def h():
+    """Assembly of two beams at the joint, structural damping and dashpots."""
+    a, b = (
+        jf.beam(length, 20, youngs_modulus=67e9, density=2700.0, width=0.025, height=0.006, ends=ends, loss_factor=0.01)
+        for length, ends in ((0.3, ("clamped", "free")), (0.225, ("free", "free")))
+    )
+    h_a = a.receptance(FREQ, a.index("21:y", "21:theta"))
+    h_b = b.receptance(FREQ, b.index("1:y", "1:theta"))
+    joint = jf.Joint([6e5, 5e3], [20.0, 1.5], ["y", "theta"])
+    return jf.couple(h_a, h_b, joint.dynamic_stiffness(FREQ), [0, 1], [0, 1])
+
+
+def circular(shape, seed):
+    rng = np.random.default_rng(seed)
+    return (rng.standard_normal(shape) + 1j * rng.standard_normal(shape)) / np.sqrt(2)
+
+
+def correlated(shape, n, seed):
+    """Moving average over n lines."""
+    e = circular((shape[0] + n - 1, *shape[1:]), seed)
+    total = np.cumsum(np.concatenate([np.zeros((1, *shape[1:])), e]), axis=0)
+    return (total[n:] - total[:-n]) / np.sqrt(n)
+
+
+def size(h):
+    return np.median(abs(h), axis=0)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize(
+    ("kind", "level", "root"),
+    [
+        ("complex", 0.001, 0.001),
+        ("complex", 0.05, 0.05),
+        ("complex", 0.2, 0.2),
+        ("real-normal", 0.05, 0.05),
+        ("real-uniform", 0.05, 0.05 / np.sqrt(3)),
+    ],
+)
+def test_relative_noise(h, kind, level, root, seed):
+    noise = jf.estimate_noise(FREQ, jf.pollute(h, level, kind, seed=seed))
+    np.testing.assert_allclose(noise.relative, root, rtol=0.15)
+    assert noise.level == pytest.approx(root, rel=0.05)
+    assert (noise.floor < 0.35 * root * size(h)).all()
+    assert noise.inflation < 1.3
+    assert noise.inflation_source == "reciprocity"
+    assert noise.source == "residual"
+    assert noise.outlying.size <= 1
+    assert np.median(abs(noise.smooth.h - h) / (root * abs(h))) < 0.15
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_floor(h, seed):
+    x = h + 0.05 * size(h) * circular(h.shape, seed)
+    noise = jf.estimate_noise(FREQ, x)
+    np.testing.assert_allclose(noise.floor, 0.05 * size(h), rtol=0.15)
+    assert (noise.relative < 0.005).all()
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_mixed_noise_different_by_entry(h, seed):
+    relative = np.geomspace(0.005, 0.1, 16).reshape(4, 4)
+    floor = np.geomspace(0.1, 0.005, 16).reshape(4, 4) * size(h)
+    e1, e2 = circular(h.shape, seed), circular(h.shape, seed + 10)
+    noise = jf.estimate_noise(FREQ, h + relative * abs(h) * e1 + floor * e2)
+    variance = (relative * abs(h)) ** 2 + floor**2
+    ratio = np.sqrt(noise.variance / variance)
+    assert np.median(ratio) == pytest.approx(1, abs=0.03)
+    assert np.quantile(ratio, 0.02) > 0.75
+    assert np.quantile(ratio, 0.98) < 1.35
+
+
+@pytest.mark.parametrize(("n", "lowest", "highest"), [(5, 4, 6), (25, 17, 30)])
+def test_correlation_between_lines(h, n, lowest, highest):
+    x = h + 0.02 * abs(h) * correlated(h.shape, n, 3)
+    noise = jf.estimate_noise(FREQ, x)
+    assert lowest < noise.inflation < highest
+    assert noise.inflation_source == "reciprocity"
+    np.testing.assert_allclose(np.median(noise.relative), 0.02, rtol=0.1)
+    reciprocal = jf.estimate_noise(FREQ, (x + x.swapaxes(1, 2)) / 2)
+    assert 0.8 * lowest < reciprocal.inflation < 1.2 * highest
+    assert reciprocal.inflation_source == "residual"
+    rectangular = jf.estimate_noise(FREQ, x[:, :, :3])
+    assert 0.8 * lowest < rectangular.inflation < 1.2 * highest
+    assert rectangular.inflation_source == "residual"
+
+
+@pytest.mark.parametrize("reciprocal", [False, True])
+def test_hum_is_found_and_does_not_bend_the_smooth_frfs(h, reciprocal):
+    x = jf.pollute(h, 0.01, seed=4, reciprocal=reciprocal)
+    hum = np.flatnonzero(FREQ % 50 == 0)
+    e = size(h) * circular(h.shape, 5)
+    x[hum] += ((e + e.swapaxes(1, 2)) / 2 if reciprocal else e)[hum]
+    noise = jf.estimate_noise(FREQ, x)
+    assert set(hum) <= set(noise.outlying)
+    assert noise.outlying.size <= hum.size + 2
+    np.testing.assert_allclose(np.median(noise.relative), 0.01, rtol=0.1)
+    assert np.median(abs(noise.smooth.h - h)[hum] / (0.01 * abs(h[hum]))) < 0.3
+    assert (noise.variance[hum] > 10 * (0.01 * abs(h[hum])) ** 2).mean() > 0.9
+
+
+def test_missing_lines(h):
+    keep = np.random.default_rng(3).random(len(FREQ)) > 0.4
+    noise = jf.estimate_noise(FREQ[keep], jf.pollute(h, 0.02, seed=6)[keep])
+    np.testing.assert_allclose(noise.relative, 0.02, rtol=0.15)
+
+
+def swell():
+    """Relative noise by line that rises and falls over frequency, which neither part describes."""
+    return 0.01 + 0.2 * np.exp(-(((FREQ - 300) / 60) ** 2))
+
+
+def test_noise_that_varies_over_frequency(h):
+    relative = swell()[:, None, None]
+    for x in (
+        h + relative * abs(h) * circular(h.shape, 7),
+        h[:, :, :2] + relative * abs(h[:, :, :2]) * circular(h[:, :, :2].shape, 8),
+    ):
+        noise = jf.estimate_noise(FREQ, x)
+        ratio = np.sqrt(noise.variance) / (relative * abs(h[:, :, : x.shape[2]]))
+        assert np.quantile(abs(np.log(ratio)), 0.9) < 0.35
+        assert noise.line_level.max() > 30 * noise.line_level.min()
+        assert noise.outlying.size < 5
+
+
+def test_coherence_tells_where_the_noise_is(h):
+    """As `swell`, but between lines as well: what coherence sees and nothing else."""
+    averages = 20
+    relative = swell() * np.where(np.arange(len(FREQ)) % 3, 1, 3)
+    squared = 1 / (1 + averages * relative**2)  # (1 - g^2)/(n g^2) = relative^2
+    coherence = np.broadcast_to(squared[:, None, None], h.shape)
+    x = h + relative[:, None, None] * abs(h) * circular(h.shape, 7)
+    noise = jf.estimate_noise(FREQ, x, coherence=coherence, averages=averages)
+    np.testing.assert_allclose(noise.coherence_factor, 1, atol=0.15)
+    ratio = np.sqrt(noise.variance) / (relative[:, None, None] * abs(h))
+    assert np.quantile(abs(ratio - 1), 0.9) < 0.2
+    blind = jf.estimate_noise(FREQ, x)
+    assert not blind.coherence_factor.any()
+    missed = np.sqrt(blind.variance) / (relative[:, None, None] * abs(h))
+    assert np.quantile(abs(missed - 1), 0.9) > 0.4
+
+
+def test_few_lines_and_exact_frfs(h):
+    few = jf.estimate_noise(FREQ[::60], jf.pollute(h, 0.05, seed=1)[::60])
+    assert few.source == "reciprocity"
+    np.testing.assert_allclose(few.relative, 0.05, rtol=0.35)
+    assert few.inflation == 1
+    assert few.inflation_source == "none"
+    lone = jf.estimate_noise(FREQ[:3], h[:3, :1, :1])
+    assert lone.source == "none"
+    assert not lone.variance.any()
+    exact = jf.estimate_noise(FREQ, h)
+    np.testing.assert_array_equal(exact.smooth.h, h)
+    assert exact.level < 1e-4
+
+
+def test_parts_by_maximum_likelihood_against_a_search():
+    """The optimum of the likelihood over a grid of both parts is no better."""
+    rng = np.random.default_rng(1)
+    a = rng.lognormal(0, 2, (1, 20))
+    y = (0.3 * a + 0.5) * rng.exponential(size=(1, 20))
+    parts = noise_parts(y, np.stack([a, np.ones_like(a)]))
+
+    def loss(one, two):
+        v = one * a + two
+        return (np.log(v) + y / v).sum()
+
+    grid = np.geomspace(1e-3, 10, 200)
+    assert loss(*parts) < min(loss(one, two) for one in grid for two in grid) + 1e-3
+
+
+def test_independent_lines_are_not_outlying_and_not_correlated():
+    ratio = np.random.default_rng(1).exponential(size=(50, 3, 1000))
+    found = [np.count_nonzero(line_levels(one).factor > 1) for one in ratio]
+    assert np.mean(found) < 0.3
+    assert np.median([line_correlation(circular((3, 1000), seed)) for seed in range(50)]) < 1.05
+
+
+def test_bad_arguments(h):
+    with pytest.raises(ValueError, match="averages are used with coherence only"):
+        jf.estimate_noise(FREQ, h, averages=3)
+    with pytest.raises(ValueError, match="coherence must be above 0 and at most 1"):
+        jf.estimate_noise(FREQ, h, coherence=np.full(h.shape, 1.1))
+    with pytest.raises(ValueError, match="averages must be 1 or more"):
+        jf.estimate_noise(FREQ, h, coherence=np.full(h.shape, 0.9), averages=0)
+    with pytest.raises(ValueError, match="NaN or Inf in line 0"):
+        jf.estimate_noise(FREQ, np.full(h.shape, np.nan))
