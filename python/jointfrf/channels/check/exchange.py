@@ -1,0 +1,120 @@
+"""FRFs that are not reciprocal at all: exchanged channels, the same channel twice, or one that measures something else."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointfrf.channels.check.pair_ratios import BROKEN, are_signals, scatter_of
+from jointfrf.channels.check.signals import smoothness
+from jointfrf.kernel.arguments import ComplexArray, FloatArray
+
+__all__ = ["Cause", "cause_of_broken_pairs"]
+
+#: A search takes no more lines than these, evenly spread.
+_MOST_LINES = 200
+#: A cause explains if it leaves at most this share of the broken pairs.
+_LEFT = 0.25
+
+
+@dataclass(frozen=True)
+class Cause:
+    """What explains broken pairs.
+
+    Attributes
+    ----------
+    kind : {"exchanged", "doubled response", "doubled force", "channel", "pairs"}
+        "doubled": the second channel shows what the first one does. "channel": all broken pairs hold this one.
+    channels : tuple of int
+        Places among the DOFs that responses and forces share; none for "pairs".
+    before, after : float
+        Mean scatter of the pairs that were broken, and with the cause removed.
+    alternatives : tuple of (int, int)
+        Other exchanges that explain as much.
+    """
+
+    kind: Literal["exchanged", "doubled response", "doubled force", "channel", "pairs"]
+    channels: tuple[int, ...]
+    before: float
+    after: float
+    alternatives: tuple[tuple[int, int], ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class _Evidence:
+    """FRFs on some lines, their sizes and smoothness on all, and the pairs that are broken."""
+
+    h: ComplexArray
+    size: FloatArray
+    smooth: FloatArray
+    n_freq: int
+    broken: NDArray[np.bool_]
+
+
+def cause_of_broken_pairs(h: ComplexArray, broken: NDArray[np.bool_]) -> Cause:
+    """Find what explains that pairs of FRFs are not reciprocal.
+
+    Parameters
+    ----------
+    h : ndarray, shape (n_freq, n, n)
+    broken : ndarray of bool, shape (n, n)
+        Symmetric.
+    """
+    some = h[:: -(-h.shape[0] // _MOST_LINES)]
+    evidence = _Evidence(some, np.median(abs(h), axis=0), smoothness(h), h.shape[0], broken)
+    before = float(_scatter(some)[broken].mean())
+    for cause in (_doubled(evidence, before), _exchanged(evidence, before)):
+        if cause is not None:
+            return cause
+    always = np.flatnonzero((broken.sum(axis=1) == np.triu(broken).sum()) & (broken.sum(axis=1) > 1))
+    if always.size == 1:
+        return Cause("channel", (int(always[0]),), before, before)
+    return Cause("pairs", (), before, before)
+
+
+def _scatter(h: ComplexArray) -> FloatArray:
+    return scatter_of(h, np.ascontiguousarray(h.swapaxes(1, 2)))
+
+
+def _exchanged(evidence: _Evidence, before: float) -> Cause | None:
+    """The exchange of two responses (or, which is the same for reciprocity, of two forces) that leaves least broken."""
+    n = evidence.size.shape[0]
+    left: dict[tuple[int, int], tuple[int, float]] = {}
+    for i, j in combinations(range(n), 2):
+        order = np.arange(n)
+        order[[i, j]] = j, i
+        scatter = _scatter(evidence.h[:, order])
+        signals = are_signals(evidence.size[order], evidence.smooth[order], evidence.n_freq)
+        np.fill_diagonal(signals, False)
+        after = float(scatter[signals].mean()) if signals.any() else np.inf
+        left[i, j] = int((signals & (scatter >= BROKEN)).sum()), after
+    fewest = min(number for number, _ in left.values())
+    if fewest > _LEFT * evidence.broken.sum():
+        return None
+    best = sorted((after, pair) for pair, (number, after) in left.items() if number == fewest)
+    alike = tuple(pair for after, pair in best[1:] if after < 2 * best[0][0])
+    return Cause("exchanged", best[0][1], before, best[0][0], alike)
+
+
+def _doubled(evidence: _Evidence, before: float) -> Cause | None:
+    """A channel that holds all broken pairs and shows the same as another one."""
+    n = evidence.size.shape[0]
+    holds = np.flatnonzero(evidence.broken.sum(axis=1) == np.triu(evidence.broken).sum())
+    across = np.ascontiguousarray(evidence.h.swapaxes(1, 2))
+    found: list[Cause] = []
+    for copy in holds:
+        for h, size, kind in (
+            (evidence.h, evidence.size, "doubled response"), (across, evidence.size.T, "doubled force")
+        ):  # fmt: skip
+            scatter = np.stack([scatter_of(h[:, copy], h[:, other]) for other in range(n)])
+            shown = size[copy] > 0
+            worst = np.array([scatter[other, shown].max(initial=0) for other in range(n)])
+            worst[copy] = np.inf
+            other = int(np.argmin(worst))
+            if worst[other] < BROKEN / 2:
+                found.append(Cause(kind, (other, int(copy)), before, float(worst[other])))  # type: ignore[arg-type]
+    return min(found, key=lambda cause: cause.after, default=None)

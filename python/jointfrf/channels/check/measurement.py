@@ -1,0 +1,94 @@
+"""FRFs with the names of their channels, and which responses and forces share a DOF."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointfrf.dofs import is_rotation
+from jointfrf.frf.frf_set import Channel
+from jointfrf.kernel.arguments import ComplexArray, FloatArray
+
+__all__ = ["Measurement", "as_measurement"]
+
+
+@dataclass(frozen=True, eq=False)
+class Measurement:
+    """FRFs on the lines that can be judged.
+
+    Attributes
+    ----------
+    freq_hz : ndarray, shape (n_freq,)
+        Positive, increasing.
+    h : ndarray, shape (n_freq, n_responses, n_forces)
+        Finite.
+    responses, forces : tuple of str
+    rows, columns : ndarray of int, shape (n,)
+        Responses and forces that share a DOF.
+    signs : ndarray, shape (n,)
+        -1 where they point in opposite directions.
+    """
+
+    freq_hz: FloatArray
+    h: ComplexArray
+    responses: tuple[str, ...]
+    forces: tuple[str, ...]
+    rows: NDArray[np.intp]
+    columns: NDArray[np.intp]
+    signs: FloatArray
+
+    @property
+    def omega(self) -> FloatArray:
+        """Angular frequencies, rad/s."""
+        return 2 * np.pi * self.freq_hz
+
+    @property
+    def square(self) -> ComplexArray:
+        """FRFs between the DOFs that responses and forces share, shape (n_freq, n, n)."""
+        at: ComplexArray = self.h[:, self.rows[:, None], self.columns] * self.signs
+        return at
+
+    @property
+    def dofs(self) -> tuple[str, ...]:
+        """Names of the DOFs that responses and forces share."""
+        return tuple(self.responses[row] for row in self.rows)
+
+    @property
+    def rotations(self) -> NDArray[np.bool_]:
+        """Which of these are rotations."""
+        return np.array([is_rotation(name.rpartition(":")[2].lstrip("+-")) for name in self.dofs], bool)
+
+    def without(self, rows: Sequence[int], columns: Sequence[int]) -> Measurement:
+        """Return the same with these responses and forces paired with nothing."""
+        kept = ~(np.isin(self.rows, rows) | np.isin(self.columns, columns))
+        return replace(self, rows=self.rows[kept], columns=self.columns[kept], signs=self.signs[kept])
+
+
+def as_measurement(
+    freq_hz: FloatArray, h: ComplexArray, responses: Sequence[str | Channel], forces: Sequence[str | Channel]
+) -> Measurement:
+    """Pair responses with forces by name; a name like 102:-y is the opposite of 102:+y."""
+    names = tuple(tuple(_unified(name) for name in some) for some in (responses, forces))
+    place = {name: (i, 1) for i, name in enumerate(names[1])}
+    for i, name in enumerate(names[1]):
+        place.setdefault(_opposite(name), (i, -1))
+    pairs = [(row, *place[name]) for row, name in enumerate(names[0]) if name in place]
+    rows, columns, signs = (np.array(some) for some in zip(*pairs, strict=True)) if pairs else (np.array([], int),) * 3
+    return Measurement(freq_hz, h, *names, rows, columns, signs.astype(float))
+
+
+def _unified(name: str | Channel) -> str:
+    try:
+        return str(Channel.parse(name))
+    except ValueError:
+        return str(name)
+
+
+def _opposite(name: str) -> str:
+    try:
+        return str(Channel.parse(name).opposite())
+    except ValueError:
+        return name
