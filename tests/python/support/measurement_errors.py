@@ -81,3 +81,132 @@ def measured(s: Structure, kind: str, level: float, seed: int) -> tuple[np.ndarr
         h = s.gamma[kept]
         return s.freq[kept], h + NOISE["complex"](rng, s.freq[kept], h, level)
     return s.freq, s.gamma + NOISE[kind](rng, s.freq, s.gamma, level)
+
+
+class ChannelError(NamedTuple):
+    """What is done to measured FRFs, and what a check must say: kind and channel (by place; None: any or all)."""
+
+    change: Callable[[np.random.Generator, np.ndarray, np.ndarray, int], None]
+    kind: str
+    names_channel: bool = True
+    least: int = 1  # joint DOFs that it takes
+    rotation: bool = False  # whether the channel must be a rotation
+
+
+def scaled(factor: float, *, force: bool = False) -> Callable[..., None]:
+    """One response, or force, times a factor."""
+
+    def change(rng: np.random.Generator, f: np.ndarray, h: np.ndarray, at: int) -> None:
+        h.swapaxes(1, 2)[:, at] *= factor
+        if not force:
+            h.swapaxes(1, 2)[:, at] /= factor
+            h[:, at] *= factor
+
+    return change
+
+
+def late(seconds: float, *, force: bool = False) -> Callable[..., None]:
+    """One response late, or one force early."""
+
+    def change(rng: np.random.Generator, f: np.ndarray, h: np.ndarray, at: int) -> None:
+        (h.swapaxes(1, 2) if force else h)[:, at] *= np.exp(-2j * np.pi * f * seconds)[:, None]
+
+    return change
+
+
+def all_times(power: int, *, conjugate: bool = False, sign: float = 1.0) -> Callable[..., None]:
+    """All FRFs times (i w)^power, conjugated."""
+
+    def change(rng: np.random.Generator, f: np.ndarray, h: np.ndarray, at: int) -> None:
+        h *= sign * ((2j * np.pi * f) ** power)[:, None, None]
+        if conjugate:
+            np.conj(h, out=h)
+
+    return change
+
+
+def one_side(power: int) -> Callable[..., None]:
+    """The responses of side k times (i w)^power."""
+
+    def change(rng: np.random.Generator, f: np.ndarray, h: np.ndarray, at: int) -> None:
+        h[:, h.shape[1] // 2 :] *= ((2j * np.pi * f) ** power)[:, None, None]
+
+    return change
+
+
+def put(what: str) -> Callable[..., None]:
+    """One response, or force, replaced by zeros or noise."""
+
+    def change(rng: np.random.Generator, f: np.ndarray, h: np.ndarray, at: int) -> None:
+        own = h.swapaxes(1, 2) if "force" in what else h
+        shape = own[:, at].shape
+        own[:, at] = 0 if "zero" in what else np.median(abs(own[:, at])) * circular(rng, shape)
+
+    return change
+
+
+def copied(*, force: bool = False, anew: bool = False) -> Callable[..., None]:
+    """The channel shows what the next one shows; measured anew, with noise of its own."""
+
+    def change(rng: np.random.Generator, f: np.ndarray, h: np.ndarray, at: int) -> None:
+        own = h.swapaxes(1, 2) if force else h
+        own[:, at] = own[:, (at + 1) % own.shape[1]]
+        if anew:
+            own[:, at] *= 1 + 0.02 * circular(rng, own[:, at].shape)
+
+    return change
+
+
+def exchanged(*, force: bool = False) -> Callable[..., None]:
+    """The channel and the next one exchanged."""
+
+    def change(rng: np.random.Generator, f: np.ndarray, h: np.ndarray, at: int) -> None:
+        own = h.swapaxes(1, 2) if force else h
+        other = (at + 1) % own.shape[1]
+        own[:, [at, other]] = own[:, [other, at]]
+
+    return change
+
+
+def nan_lines(rng: np.random.Generator, f: np.ndarray, h: np.ndarray, at: int) -> None:
+    """Two lines of one channel are NaN."""
+    h[5:7, at] = np.nan
+
+
+def zero_line(rng: np.random.Generator, f: np.ndarray, h: np.ndarray, at: int) -> None:
+    """The first line is at 0 Hz."""
+    f[0] = 0.0
+
+
+#: Errors by their names.
+ERRORS: dict[str, ChannelError] = {
+    "gain of a sensor +10 %": ChannelError(scaled(1.1), "gain"),
+    "gain of a hammer +10 %": ChannelError(scaled(1.1, force=True), "gain"),
+    "gain of a sensor +3 %": ChannelError(scaled(1.03), "gain"),
+    "delay of a sensor, 20 us": ChannelError(late(20e-6), "delay"),
+    "delay of a force, 20 us": ChannelError(late(20e-6, force=True), "delay"),
+    "sign of a sensor": ChannelError(scaled(-1.0), "sign"),
+    "sign of a force": ChannelError(scaled(-1.0, force=True), "sign"),
+    "sign of all forces": ChannelError(all_times(0, sign=-1.0), "sign", False),
+    "conjugated, exp(-i w t)": ChannelError(all_times(0, conjugate=True), "time-convention", False),
+    "accelerances": ChannelError(all_times(2), "quantity", False),
+    "mobilities": ChannelError(all_times(1), "quantity", False),
+    "accelerances, conjugated": ChannelError(all_times(2, conjugate=True), "time-convention", False),
+    "one side in accelerance": ChannelError(one_side(2), "quantity", False),
+    "one side in mobility": ChannelError(one_side(1), "quantity", False),
+    "degrees": ChannelError(scaled(180 / np.pi), "units", rotation=True),
+    "mm instead of m": ChannelError(scaled(1e3), "units"),
+    "g instead of m/s^2": ChannelError(scaled(1 / 9.80665), "units"),
+    "response zero": ChannelError(put("zero"), "dead"),
+    "response noise": ChannelError(put("noise"), "dead"),
+    "force zero": ChannelError(put("zero force"), "dead"),
+    "force noise": ChannelError(put("noise force"), "dead"),
+    "response copied": ChannelError(copied(), "doubled"),
+    "force copied": ChannelError(copied(force=True), "doubled"),
+    "response doubled": ChannelError(copied(anew=True), "doubled"),
+    "force doubled": ChannelError(copied(force=True, anew=True), "doubled"),
+    "responses exchanged": ChannelError(exchanged(), "exchanged"),
+    "forces exchanged": ChannelError(exchanged(force=True), "exchanged"),
+    "NaN lines": ChannelError(nan_lines, "lines"),
+    "0 Hz": ChannelError(zero_line, "zero-frequency", False),
+}

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from jointfrf.channels.check.pair_ratios import PairRatios
 from jointfrf.kernel.arguments import FloatArray
 
-__all__ = ["ChannelRatios", "Offsets", "channel_ratios", "groups_of"]
+__all__ = ["ChannelRatios", "Offsets", "channel_ratios"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,45 +53,63 @@ class ChannelRatios:
     delay: Offsets
 
 
-def groups_of(n: int, p: NDArray[np.intp], q: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return the number of the group of each of n channels, connected by pairs."""
-    group = np.arange(n)
-    for a, b in zip(p, q, strict=True):
-        group[group == group[b]] = group[a]
-    return group
+@dataclass(frozen=True, eq=False)
+class _Trees:
+    """A path of pairs from the first channel of each group to every other one.
+
+    Attributes
+    ----------
+    group : ndarray of int, shape (n,)
+    steps : list of (int, int, int, int)
+        Channel, the one before it, the pair between them, and 1 where the channel is the first of the pair, else -1.
+    """
+
+    group: NDArray[np.intp]
+    steps: list[tuple[int, int, int, int]]
+
+    def summed(self, difference: FloatArray) -> FloatArray:
+        """Values of channels from the differences of pairs along the paths, zero at the first of each group."""
+        value = np.zeros(self.group.size)
+        for channel, before, pair, turn in self.steps:
+            value[channel] = value[before] + turn * difference[pair]
+        return value
+
+
+def _trees(n: int, p: NDArray[np.intp], q: NDArray[np.intp]) -> _Trees:
+    group = np.full(n, -1)
+    steps: list[tuple[int, int, int, int]] = []
+    for first in range(n):
+        if group[first] >= 0:
+            continue
+        group[first] = first
+        front = [first]
+        while front:
+            at = front.pop(0)
+            for ends, others, turn in ((p, q, -1), (q, p, 1)):
+                for pair in np.flatnonzero(ends == at):
+                    other = int(others[pair])
+                    if group[other] < 0:
+                        group[other] = first
+                        steps.append((other, at, int(pair), turn))
+                        front.append(other)
+    return _Trees(group, steps)
 
 
 def channel_ratios(pairs: PairRatios, n: int, *, least_gain: float, least_delay: float) -> ChannelRatios:
     """Assign the ratios of pairs to channels; differences below `least_gain`, `least_delay` count as none."""
     use = pairs.usable
     p, q = pairs.p[use], pairs.q[use]
-    group = groups_of(n, p, q)
-    weight = pairs.gain_error[use] ** -2
-    gain = _solved(n, p, q, pairs.log_gain[use], weight)
+    trees = _trees(n, p, q)
+    group = trees.group
+    gain = _solved(n, p, q, pairs.log_gain[use], pairs.gain_error[use] ** -2)
     delay = _solved(n, p, q, pairs.delay[use], pairs.delay_error[use] ** -2)
-    power = np.zeros(n, np.intp)
+    power = np.rint(trees.summed(pairs.power[use])).astype(np.intp)
     for number in np.unique(group):
-        some = group == number
-        first = np.flatnonzero(some)[0]
-        relative = _relative(p, q, pairs.power[use].astype(float), first, n)
-        power[some] = np.rint(relative[some] - np.nanmin(relative[some]))
-    sign = _signs(pairs, use, group, power, n)
-    return ChannelRatios(
-        group, power, sign, _offsets(group, *gain, least_gain), _offsets(group, *delay, least_delay)
-    )
-
-
-def _relative(p: NDArray[np.intp], q: NDArray[np.intp], difference: FloatArray, first: np.intp, n: int) -> FloatArray:
-    """Values of channels from differences of pairs, one path each, zero at the first; NaN outside its group."""
-    value = np.full(n, np.nan)
-    value[first] = 0
-    for _ in range(n):
-        for a, b, d in zip(p, q, difference, strict=True):
-            if np.isnan(value[a]) and not np.isnan(value[b]):
-                value[a] = value[b] + d
-            elif np.isnan(value[b]) and not np.isnan(value[a]):
-                value[b] = value[a] - d
-    return value
+        power[group == number] -= power[group == number].min()
+    phase = pairs.phase[use] - np.pi / 2 * (power[p] - power[q])
+    turned = np.rint(trees.summed((np.cos(phase) < 0).astype(float))).astype(np.intp)
+    sign = np.where(turned % 2 == 1, -1, 1)
+    return ChannelRatios(group, power, sign, _offsets(group, *gain, least_gain), _offsets(group, *delay, least_delay))
 
 
 def _solved(
@@ -109,21 +127,6 @@ def _solved(
     scale = weight.max(initial=0.0) or 1.0
     covariance = np.linalg.pinv(laplacian / scale, hermitian=True) / scale
     return covariance @ right, covariance
-
-
-def _signs(
-    pairs: PairRatios, use: NDArray[np.bool_], group: NDArray[np.intp], power: NDArray[np.intp], n: int
-) -> NDArray[np.intp]:
-    """Signs relative to the first channel of each group, from the phases less those of i^power."""
-    p, q = pairs.p[use], pairs.q[use]
-    phase = pairs.phase[use] - np.pi / 2 * (power[p] - power[q])
-    turned = (np.cos(phase) < 0).astype(float)
-    sign = np.ones(n, np.intp)
-    for number in np.unique(group):
-        some = group == number
-        relative = _relative(p, q, turned, np.flatnonzero(some)[0], n)
-        sign[some] = np.where(np.rint(relative[some]) % 2 == 1, -1, 1)
-    return sign
 
 
 def _offsets(group: NDArray[np.intp], value: FloatArray, covariance: FloatArray, least: float) -> Offsets:

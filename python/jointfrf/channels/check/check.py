@@ -140,8 +140,7 @@ class _Look:
     def corrected(self) -> Measurement:
         """The measurement with all corrections found so far."""
         one = self.measurement
-        h = corrected(one.omega, one.h, self.corrections)
-        return Measurement(one.freq_hz, h, one.responses, one.forces, one.rows, one.columns, one.signs)
+        return one.with_frfs(corrected(one.omega, one.h, self.corrections)) if self.corrections else one
 
 
 def _as_names(
@@ -172,8 +171,9 @@ def _look_at_channels(look: _Look) -> None:
     signals = check_signals(look.measurement)
     look.findings.extend(signals.findings)
     m = look.measurement = look.measurement.without(signals.rows, signals.columns)
-    live = np.delete(np.delete(m.h, signals.rows, axis=1), signals.columns, axis=2)
-    around = circles(m.omega, live)
+    smooth = m.smoothness.copy()
+    smooth[signals.rows], smooth[:, signals.columns] = 0, 0
+    around = circles(m.omega, m.h, smooth)
     if around.seen and around.value > 0 and around.share >= _BACKWARDS:
         driving = sectors(_driving(m.square))
         look.findings.append(convention_finding(around, driving))
@@ -181,9 +181,9 @@ def _look_at_channels(look: _Look) -> None:
     if not m.rows.size:
         return
     m = look.corrected()
-    pairs = pair_ratios(m.omega, m.square)
+    pairs = pair_ratios(m.omega, m.square, m.square_smoothness)
     if pairs.broken.any():
-        cause = cause_of_broken_pairs(m.square, _matrix(pairs.broken, pairs, m.rows.size))
+        cause = cause_of_broken_pairs(m.square, m.square_smoothness, _matrix(pairs.broken, pairs, m.rows.size))
         look.add(broken_findings(m, pairs, cause, look.side))
         if cause.kind == "exchanged":
             m = look.corrected()
@@ -193,7 +193,7 @@ def _look_at_channels(look: _Look) -> None:
             m = look.corrected()
         if not m.rows.size:
             return
-        pairs = pair_ratios(m.omega, m.square)
+        pairs = pair_ratios(m.omega, m.square, m.square_smoothness)
     _look_at_ratios(look, m, pairs)
 
 

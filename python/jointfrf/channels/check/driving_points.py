@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from jointfrf.channels.check.signals import smoothness
+from jointfrf.channels.check.measurement import modulus
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
 __all__ = ["Circles", "Sectors", "circles", "mean_exponent", "sectors"]
@@ -58,16 +58,16 @@ class Sectors:
     balance: FloatArray
 
 
-def circles(omega: FloatArray, h: ComplexArray) -> Circles:
+def circles(omega: FloatArray, h: ComplexArray, smooth: FloatArray) -> Circles:
     """Tell the direction of all FRFs, shape (n_freq, rows, columns), as the mean arrival time of their energy."""
-    smooth = smoothness(h)
     use = smooth > max(_CIRCLES_SEEN, 6 / np.sqrt(h.shape[0]))
     if not use.any():
         return Circles(0.0, 0.0, 0)
     # Flattened, so that a rigid-body line at the lowest frequencies does not outweigh the resonances.
-    own = h[:, use] * omega[:, None] ** -mean_exponent(omega, h[:, use])
-    size = (abs(own) ** 2).sum(axis=0)
-    turned = (own[:-1].conj() * own[1:]).imag.sum(axis=0) / size
+    own = h[:, use]
+    own = own * omega[:, None] ** -mean_exponent(omega, own)
+    size = (own.real**2 + own.imag**2).sum(axis=0)
+    turned = (own.real[:-1] * own.imag[1:] - own.imag[:-1] * own.real[1:]).sum(axis=0) / size
     return Circles(float(np.median(turned)), float((turned > 0).mean()), int(use.sum()))
 
 
@@ -75,15 +75,14 @@ def mean_exponent(omega: FloatArray, h: ComplexArray) -> float:
     """Median over FRFs, shape (n_freq, m), of the exponent of w in |h|, by least squares."""
     x = np.log(omega)
     x = x - x.mean()
-    with np.errstate(divide="ignore"):
-        y = np.log(np.maximum(abs(h), np.finfo(float).tiny))
+    y = np.log(np.maximum(modulus(h), np.finfo(float).tiny))
     spread = (x**2).sum()
     return float(np.median(x @ y) / spread) if spread > 0 else 0.0
 
 
 def sectors(driving: ComplexArray) -> Sectors:
     """Tell the half plane of driving-point FRFs, shape (n_freq, n)."""
-    size = abs(driving)
+    size = modulus(driving)
     u = np.where(size > 0, driving / np.where(size > 0, size, 1), 0)
     imaginary = u.imag.sum(axis=0) / np.maximum(abs(u.imag).sum(axis=0), np.finfo(float).tiny)
     real = u.real.sum(axis=0) / np.maximum(abs(u.real).sum(axis=0), np.finfo(float).tiny)

@@ -9,8 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from jointfrf.channels.check.pair_ratios import BROKEN, are_signals, scatter_of
-from jointfrf.channels.check.signals import smoothness
+from jointfrf.channels.check.pair_ratios import BROKEN, are_one_sided, are_signals, scatter_of
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
 __all__ = ["Cause", "cause_of_broken_pairs"]
@@ -55,17 +54,19 @@ class _Evidence:
     broken: NDArray[np.bool_]
 
 
-def cause_of_broken_pairs(h: ComplexArray, broken: NDArray[np.bool_]) -> Cause:
+def cause_of_broken_pairs(h: ComplexArray, smooth: FloatArray, broken: NDArray[np.bool_]) -> Cause:
     """Find what explains that pairs of FRFs are not reciprocal.
 
     Parameters
     ----------
     h : ndarray, shape (n_freq, n, n)
+    smooth : ndarray, shape (n, n)
+        `smoothness` of h.
     broken : ndarray of bool, shape (n, n)
         Symmetric.
     """
     some = h[:: -(-h.shape[0] // _MOST_LINES)]
-    evidence = _Evidence(some, np.median(abs(h), axis=0), smoothness(h), h.shape[0], broken)
+    evidence = _Evidence(some, np.median(abs(h), axis=0), smooth, h.shape[0], broken)
     before = float(_scatter(some)[broken].mean())
     for cause in (_doubled(evidence, before), _exchanged(evidence, before)):
         if cause is not None:
@@ -88,7 +89,8 @@ def _exchanged(evidence: _Evidence, before: float) -> Cause | None:
         order = np.arange(n)
         order[[i, j]] = j, i
         scatter = _scatter(evidence.h[:, order])
-        signals = are_signals(evidence.size[order], evidence.smooth[order], evidence.n_freq)
+        size, smooth = evidence.size[order], evidence.smooth[order]
+        signals = are_signals(size, smooth, evidence.n_freq) | are_one_sided(size, smooth)
         np.fill_diagonal(signals, False)
         after = float(scatter[signals].mean()) if signals.any() else np.inf
         left[i, j] = int((signals & (scatter >= BROKEN)).sum()), after
@@ -111,8 +113,7 @@ def _doubled(evidence: _Evidence, before: float) -> Cause | None:
             (evidence.h, evidence.size, "doubled response"), (across, evidence.size.T, "doubled force")
         ):  # fmt: skip
             scatter = np.stack([scatter_of(h[:, copy], h[:, other]) for other in range(n)])
-            shown = size[copy] > 0
-            worst = np.array([scatter[other, shown].max(initial=0) for other in range(n)])
+            worst = scatter[:, size[copy] > 0].max(axis=1, initial=0)
             worst[copy] = np.inf
             other = int(np.argmin(worst))
             if worst[other] < BROKEN / 2:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,10 @@ from jointfrf.dofs import is_rotation
 from jointfrf.frf.frf_set import Channel
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
-__all__ = ["Measurement", "as_measurement"]
+__all__ = ["LEAST_SMOOTHNESS", "Measurement", "as_measurement", "modulus", "smoothness"]
+
+#: Below this agreement of the phase from line to line an FRF is noise.
+LEAST_SMOOTHNESS = 0.3
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,10 +49,21 @@ class Measurement:
         """Angular frequencies, rad/s."""
         return 2 * np.pi * self.freq_hz
 
-    @property
+    @cached_property
+    def smoothness(self) -> FloatArray:
+        """As `smoothness` of `h`, shape (n_responses, n_forces)."""
+        return smoothness(self.h)
+
+    @cached_property
     def square(self) -> ComplexArray:
         """FRFs between the DOFs that responses and forces share, shape (n_freq, n, n)."""
         at: ComplexArray = self.h[:, self.rows[:, None], self.columns] * self.signs
+        return at
+
+    @property
+    def square_smoothness(self) -> FloatArray:
+        """Smoothness of `square`, shape (n, n)."""
+        at: FloatArray = self.smoothness[self.rows[:, None], self.columns]
         return at
 
     @property
@@ -61,10 +76,30 @@ class Measurement:
         """Which of these are rotations."""
         return np.array([is_rotation(name.rpartition(":")[2].lstrip("+-")) for name in self.dofs], bool)
 
+    def with_frfs(self, h: ComplexArray) -> Measurement:
+        """Return the same channels with other FRFs."""
+        return replace(self, h=h)
+
     def without(self, rows: Sequence[int], columns: Sequence[int]) -> Measurement:
         """Return the same with these responses and forces paired with nothing."""
+        if not rows and not columns:
+            return self
         kept = ~(np.isin(self.rows, rows) | np.isin(self.columns, columns))
         return replace(self, rows=self.rows[kept], columns=self.columns[kept], signs=self.signs[kept])
+
+
+def modulus(h: ComplexArray) -> FloatArray:
+    """Return |h| of numbers whose squares do not overflow, faster than abs."""
+    size: FloatArray = np.sqrt(h.real**2 + h.imag**2)
+    return size
+
+
+def smoothness(h: ComplexArray) -> FloatArray:
+    """Agreement of the phase of each FRF from line to line: 1 for a smooth one, 1/sqrt(n_freq) for noise, 0 for 0."""
+    turned = h[:-1].conj() * h[1:]
+    size = modulus(turned)
+    together: FloatArray = abs((turned / np.where(size > 0, size, 1)).mean(axis=0))
+    return together
 
 
 def as_measurement(

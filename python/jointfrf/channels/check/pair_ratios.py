@@ -7,15 +7,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from jointfrf.channels.check.signals import SMOOTH, smoothness
+from jointfrf.channels.check.measurement import LEAST_SMOOTHNESS, modulus
+from jointfrf.frf.noise_estimate import ZERO
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
-__all__ = ["BROKEN", "PairRatios", "are_signals", "block_medians", "pair_ratios", "scatter_of"]
+__all__ = ["BROKEN", "ONE_SIDED", "PairRatios", "are_one_sided", "are_signals", "block_medians", "pair_ratios", "scatter_of"]
 
 #: An FRF below this share of sqrt|h_pp h_qq| is zero by symmetry, or as good as that: its reciprocity tells nothing.
 _SMALL = 1e-2
 #: Scatter of log(h_pq / h_qp) above which h_pq and h_qp are not the same FRF; noise of 10 % gives 0.14.
 BROKEN = 0.5
+#: Scatter of a pair of which one is zero.
+ONE_SIDED = 3.0
 #: Lines whose scatter is taken together.
 _BLOCK = 15
 #: Values beyond this number of standard deviations are clipped.
@@ -65,8 +68,16 @@ class PairRatios:
     inflation: float
 
 
-def pair_ratios(omega: FloatArray, h: ComplexArray) -> PairRatios:
-    """Look at the reciprocity of FRFs between n DOFs; `h` has shape (n_freq, n, n)."""
+def pair_ratios(omega: FloatArray, h: ComplexArray, smooth: FloatArray) -> PairRatios:
+    """Look at the reciprocity of FRFs between n DOFs.
+
+    Parameters
+    ----------
+    omega : ndarray, shape (n_freq,)
+    h : ndarray, shape (n_freq, n, n)
+    smooth : ndarray, shape (n, n)
+        `smoothness` of h.
+    """
     n = h.shape[1]
     p, q = np.triu_indices(n, 1)
     above, below = h[:, p, q], h[:, q, p]
@@ -79,9 +90,13 @@ def pair_ratios(omega: FloatArray, h: ComplexArray) -> PairRatios:
     amplitude = amplitude - power * np.log(omega)[:, None]
     middle = np.median(amplitude, axis=0)
     rest = amplitude - middle + 1j * np.angle(turned * direction.conj())
-    scatter = np.median(abs(rest), axis=0)
-    judged = are_signals(np.median(abs(h), axis=0), smoothness(h), h.shape[0])[p, q]
+    scatter = np.median(modulus(rest), axis=0)
+    typical = np.median(modulus(h), axis=0)
+    judged = are_signals(typical, smooth, h.shape[0])[p, q]
     usable, broken = judged & (scatter < BROKEN), judged & (scatter >= BROKEN)
+    alone = are_one_sided(typical, smooth)[p, q]
+    broken |= alone
+    scatter[alone] = ONE_SIDED
 
     deviation = _block_deviation(rest)
     weight = deviation**-2
@@ -117,8 +132,14 @@ def are_signals(size: FloatArray, smooth: FloatArray, n_freq: int) -> NDArray[np
     across = size * size.T
     own = size.diagonal()
     large = (across > _SMALL**2 * np.outer(own, own)) & (across > 0)
-    signals: NDArray[np.bool_] = large & (np.minimum(smooth, smooth.T) > max(SMOOTH, 4 / np.sqrt(n_freq)))
+    signals: NDArray[np.bool_] = large & (np.minimum(smooth, smooth.T) > max(LEAST_SMOOTHNESS, 4 / np.sqrt(n_freq)))
     return signals
+
+
+def are_one_sided(size: FloatArray, smooth: FloatArray) -> NDArray[np.bool_]:
+    """Pairs, shape (n, n), of which one FRF is a signal and the other one is zero to rounding."""
+    alone = (size > 0) & (size.T <= ZERO * size) & (smooth > LEAST_SMOOTHNESS)
+    return alone | alone.T
 
 
 def scatter_of(above: ComplexArray, below: ComplexArray) -> FloatArray:
@@ -127,14 +148,15 @@ def scatter_of(above: ComplexArray, below: ComplexArray) -> FloatArray:
     rest = amplitude - np.median(amplitude, axis=0)
     turn = np.angle(phasor * _unit(phasor.sum(axis=0)).conj())
     scatter: FloatArray = np.median(np.hypot(rest, turn), axis=0)
-    return scatter
+    one_is_zero = ((above == 0) != (below == 0)).mean(axis=0) > 0.5
+    return np.where(one_is_zero, ONE_SIDED, scatter)
 
 
 def _parts(above: ComplexArray, below: ComplexArray) -> tuple[FloatArray, ComplexArray]:
     """Logarithm of the size, and the phase factor, of above / below; 0 and 1 where one of them is zero."""
     known = (above != 0) & (below != 0)
     ratio = np.where(known, above, 1) / np.where(known, below, 1)
-    size = abs(ratio)
+    size = modulus(ratio)
     return np.log(size), ratio / size
 
 
@@ -182,7 +204,7 @@ def _powers(omega: FloatArray, amplitude: FloatArray) -> NDArray[np.intp]:
 
 def _block_deviation(rest: ComplexArray) -> FloatArray:
     """Standard deviation of each line, from the median in its block, and not far below that of all."""
-    squares = block_medians(abs(rest) ** 2) / np.log(2)
+    squares = block_medians(rest.real**2 + rest.imag**2) / np.log(2)
     squares = np.maximum(squares, 0.01 * np.median(squares, axis=0) + _LEAST_ERROR**2)
     length = max(rest.shape[0] // squares.shape[0], 1)
     length = _BLOCK if rest.shape[0] >= _BLOCK else length

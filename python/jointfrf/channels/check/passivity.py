@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from jointfrf.channels.check.finding import FrfFinding
-from jointfrf.channels.check.measurement import Measurement
+from jointfrf.channels.check.measurement import Measurement, modulus
 from jointfrf.channels.check.pair_ratios import block_medians
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
@@ -25,7 +25,7 @@ def passivity_findings(
     `noise` is the standard deviation of Im h / |h| on a line, shape (n,); NaN where it is not known.
     """
     length = min(_BLOCK, driving.shape[0])
-    size = abs(driving)
+    size = modulus(driving)
     part = np.where(size > 0, driving.imag / np.where(size > 0, size, 1), 0)
     real = np.where(size > 0, driving.real / np.where(size > 0, size, 1), 0)
     middle = block_medians(part, length)
