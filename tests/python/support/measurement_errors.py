@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-import jointfrf as jf
 import six_dof_beams
 from jointfrf.cases.catalogue import find_case, read_case
 from jointfrf.cases.known_joint.exact import exact_frfs

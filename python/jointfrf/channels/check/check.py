@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from jointfrf.channels.check.channel_ratios import ChannelRatios, channel_ratios
 from jointfrf.channels.check.correction import Correction, corrected
 from jointfrf.channels.check.driving_points import circles, mean_exponent, sectors
-from jointfrf.channels.check.exchange import cause_of_broken_pairs
+from jointfrf.channels.check.exchange import Cause, cause_of_broken_pairs, cause_of_gains
 from jointfrf.channels.check.exchange_findings import broken_findings
 from jointfrf.channels.check.finding import FindingLevel, FrfCheck, FrfFinding
 from jointfrf.channels.check.lines import check_lines
@@ -22,7 +22,13 @@ from jointfrf.channels.check.pair_ratios import PairRatios, pair_ratios
 from jointfrf.channels.check.passivity import passivity_findings
 from jointfrf.channels.check.quantities import quantities
 from jointfrf.channels.check.quantity_findings import convention_finding, quantity_findings, sign_findings
-from jointfrf.channels.check.ratio_findings import LEAST_GAIN, LEAST_PHASE, delay_findings, gain_findings
+from jointfrf.channels.check.ratio_findings import (
+    LEAST_GAIN,
+    LEAST_PHASE,
+    delay_findings,
+    gain_findings,
+    is_significant,
+)
 from jointfrf.channels.check.signals import check_signals
 from jointfrf.errors import FrfCheckWarning
 from jointfrf.frf.frf_set import Channel
@@ -184,23 +190,34 @@ def _look_at_channels(look: _Look) -> None:
     pairs = pair_ratios(m.omega, m.square, m.square_smoothness)
     if pairs.broken.any():
         cause = cause_of_broken_pairs(m.square, m.square_smoothness, _matrix(pairs.broken, pairs, m.rows.size))
-        look.add(broken_findings(m, pairs, cause, look.side))
-        if cause.kind == "exchanged":
-            m = look.corrected()
-        elif cause.channels:
-            at = list(cause.channels[-1:])
-            look.measurement = look.measurement.without(m.rows[at].tolist(), m.columns[at].tolist())
-            m = look.corrected()
+        m, pairs = _told(look, m, pairs, cause)
         if not m.rows.size:
             return
-        pairs = pair_ratios(m.omega, m.square, m.square_smoothness)
     _look_at_ratios(look, m, pairs)
 
 
+def _told(look: _Look, m: Measurement, pairs: PairRatios, cause: Cause) -> tuple[Measurement, PairRatios]:
+    """Add what explains FRFs that are not reciprocal; return the measurement without it."""
+    look.add(broken_findings(m, pairs, cause, look.side))
+    if cause.kind != "exchanged" and cause.channels:
+        at = list(cause.channels[-1:])
+        look.measurement = look.measurement.without(m.rows[at].tolist(), m.columns[at].tolist())
+    m = look.corrected()
+    return m, pair_ratios(m.omega, m.square, m.square_smoothness)
+
+
+def _ratios(m: Measurement, pairs: PairRatios) -> ChannelRatios:
+    return channel_ratios(pairs, m.rows.size, least_gain=LEAST_GAIN, least_delay=LEAST_PHASE / m.omega[-1])
+
+
 def _look_at_ratios(look: _Look, m: Measurement, pairs: PairRatios) -> None:
-    ratios = channel_ratios(
-        pairs, m.rows.size, least_gain=LEAST_GAIN, least_delay=LEAST_PHASE / m.omega[-1]
-    )
+    ratios = _ratios(m, pairs)
+    cause = cause_of_gains(m.square, np.where(is_significant(ratios.gain, LEAST_GAIN), ratios.gain.value, 0.0))
+    if cause is not None:
+        m, pairs = _told(look, m, pairs, cause)
+        if not m.rows.size:
+            return
+        ratios = _ratios(m, pairs)
     driving = _driving(m.square)
     sector = sectors(driving)
     exponent = mean_exponent(m.omega, driving * m.omega[:, None] ** -ratios.power.astype(float))
@@ -213,7 +230,10 @@ def _look_at_ratios(look: _Look, m: Measurement, pairs: PairRatios) -> None:
     if not any(finding.kind == "passivity" for finding in look.findings):
         left = look.corrected()
         noise = _noise(pairs, m.rows.size)
-        look.findings.extend(passivity_findings(left, _driving(left.square), noise, pairs.inflation))
+        delayed = {name for finding in look.findings if finding.kind == "delay" for name in finding.channels}
+        active = passivity_findings(left, _driving(left.square), noise, pairs.inflation)
+        # A delay of a force turns its driving point the other way than one of the response that was taken out.
+        look.findings.extend(finding for finding in active if not delayed.issuperset(finding.channels))
 
 
 def _driving(h: ComplexArray) -> ComplexArray:

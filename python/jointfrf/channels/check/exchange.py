@@ -9,13 +9,15 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from jointfrf.channels.check.pair_ratios import BROKEN, are_one_sided, are_signals, scatter_of
+from jointfrf.channels.check.pair_ratios import BROKEN, ONE_SIDED, are_one_sided, are_signals, scatter_of
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
-__all__ = ["Cause", "cause_of_broken_pairs"]
+__all__ = ["Cause", "cause_of_broken_pairs", "cause_of_gains"]
 
 #: A search takes no more lines than these, evenly spread.
 _MOST_LINES = 200
+#: Gains above this factor may come from exchanged channels; logarithms of two that agree so well are one.
+_MUCH, _ALIKE = 2.0, 0.1
 #: A cause explains if it leaves at most this share of the broken pairs.
 _LEFT = 0.25
 
@@ -75,6 +77,48 @@ def cause_of_broken_pairs(h: ComplexArray, smooth: FloatArray, broken: NDArray[n
     if always.size == 1:
         return Cause("channel", (int(always[0]),), before, before)
     return Cause("pairs", (), before, before)
+
+
+def cause_of_gains(h: ComplexArray, log_gain: FloatArray) -> Cause | None:
+    """Find whether gains of channels come from an exchange, or from a channel that shows what another one does.
+
+    Channels that a body moves together, one by a constant factor more than the other, stay reciprocal up to a gain
+    when they are exchanged.
+
+    Parameters
+    ----------
+    h : ndarray, shape (n_freq, n, n)
+    log_gain : ndarray, shape (n,)
+        Natural logarithm of the gains found; 0 where there is none.
+    """
+    some = h[:: -(-h.shape[0] // _MOST_LINES)]
+    places = np.flatnonzero(abs(log_gain) > np.log(_MUCH))
+    before = float(abs(log_gain).max(initial=0))
+    if places.size == 2 and abs(log_gain[places].sum()) < _ALIKE:
+        order = np.arange(log_gain.size)
+        order[places] = places[::-1]
+        after = float(np.median(_from_one(some[:, order][:, places[0]], some[:, :, places[0]])))
+        if after < BROKEN / 2:
+            return Cause("exchanged", (int(places[0]), int(places[1])), before, after)
+    across = np.ascontiguousarray(some.swapaxes(1, 2))
+    for copy in places:
+        for own, kind in ((some, "doubled response"), (across, "doubled force")):
+            differ = np.array([_from_one(own[:, copy], own[:, other]).max() for other in range(log_gain.size)])
+            differ[copy] = np.inf
+            other = int(np.argmin(differ))
+            if differ[other] < BROKEN / 2:
+                return Cause(kind, (other, int(copy)), before, float(differ[other]))  # type: ignore[arg-type]
+    return None
+
+
+def _from_one(first: ComplexArray, second: ComplexArray) -> FloatArray:
+    """Median over lines of |log(first / second)|: small only for equal numbers; 0 where both are zero."""
+    known = (first != 0) & (second != 0)
+    with np.errstate(invalid="ignore"):
+        distance = abs(np.log(np.where(known, first, 1) / np.where(known, second, 1)))
+    distance = np.where((first != 0) != (second != 0), ONE_SIDED, distance)
+    median: FloatArray = np.median(distance, axis=0)
+    return median
 
 
 def _scatter(h: ComplexArray) -> FloatArray:

@@ -21,6 +21,8 @@ def broken_findings(
     """Say what explains that FRFs are not reciprocal, and how to correct it where that is possible."""
     names = measurement.dofs
     number = f"{pairs.broken.sum()} of {pairs.p.size} pairs h_pq, h_qp are not the same FRF (scatter of their ratio "
+    if not pairs.broken.any():
+        number = "h_pq and h_qp differ by large factors (logarithm "
     if cause.kind == "exchanged":
         a, b = (names[i] for i in cause.channels)
         others = "".join(f", or {names[i]} and {names[j]}" for i, j in cause.alternatives)

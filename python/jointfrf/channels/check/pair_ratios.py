@@ -11,7 +11,16 @@ from jointfrf.channels.check.measurement import LEAST_SMOOTHNESS, modulus
 from jointfrf.frf.noise_estimate import ZERO
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
-__all__ = ["BROKEN", "ONE_SIDED", "PairRatios", "are_one_sided", "are_signals", "block_medians", "pair_ratios", "scatter_of"]
+__all__ = [
+    "BROKEN",
+    "ONE_SIDED",
+    "PairRatios",
+    "are_one_sided",
+    "are_signals",
+    "block_medians",
+    "pair_ratios",
+    "scatter_of",
+]
 
 #: An FRF below this share of sqrt|h_pp h_qq| is zero by symmetry, or as good as that: its reciprocity tells nothing.
 _SMALL = 1e-2
@@ -138,7 +147,7 @@ def are_signals(size: FloatArray, smooth: FloatArray, n_freq: int) -> NDArray[np
 
 def are_one_sided(size: FloatArray, smooth: FloatArray) -> NDArray[np.bool_]:
     """Pairs, shape (n, n), of which one FRF is a signal and the other one is zero to rounding."""
-    alone = (size > 0) & (size.T <= ZERO * size) & (smooth > LEAST_SMOOTHNESS)
+    alone = (size > 0) & (ZERO * size >= size.T) & (smooth > LEAST_SMOOTHNESS)
     return alone | alone.T
 
 

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf.channels.check.driving_points import Sectors
-from jointfrf.kernel.arguments import FloatArray
 
 __all__ = ["Quantities", "quantities"]
 

@@ -44,7 +44,8 @@ def quantity_findings(
         rows = tuple(range(len(measurement.responses))) if every else tuple(map(int, measurement.rows[places]))
         what = "the FRFs are" if every else f"the FRFs of the responses {', '.join(names)} are"
         negative = 100 * float(np.median(driving.negative[places]))
-        seen = f"driving points have Im < 0 on {negative:.0f} % of lines"
+        negative = 100 - negative if power == 2 else negative
+        seen = f"driving points have Im {'>' if power == 2 else '<'} 0 on {negative:.0f} % of lines"
         if every:
             seen += f", |h| goes with w^{found.exponent + power:.1f}"
         else:
@@ -63,9 +64,7 @@ def quantity_findings(
 
 
 def _doubt(found: Quantities) -> str:
-    return (
-        f" (or receptances of the wrong sign: |h| goes with w^{found.exponent + 2:.1f} on this band, which does not tell)"
-    )
+    return f" (or receptances of the wrong sign: |h| goes with w^{found.exponent + 2:.1f} on this band, which does not tell)"
 
 
 def sign_findings(

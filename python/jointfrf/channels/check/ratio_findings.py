@@ -13,7 +13,7 @@ from jointfrf.channels.check.finding import FrfFinding
 from jointfrf.channels.check.measurement import Measurement
 from jointfrf.channels.check.units import unit_of_factor
 
-__all__ = ["LEAST_GAIN", "LEAST_PHASE", "Side", "gain_findings", "delay_findings", "is_significant"]
+__all__ = ["LEAST_GAIN", "LEAST_PHASE", "Side", "delay_findings", "gain_findings", "is_significant"]
 
 #: Differences that every set of sensors has are not reported: of gain, and of phase at the highest frequency (rad).
 LEAST_GAIN, LEAST_PHASE = 0.01, 0.01
@@ -86,7 +86,8 @@ def _gain_finding(
         return FrfFinding(
             "units", "error", names, factor, 1 + _UNIT_TOLERANCE, f"{shown}: {unit}{doubt}", remedy
         ), places, factor  # fmt: skip
-    which = f"responses of {', '.join(names)} are {_times(factor, error)} too large, or forces there too small"
+    size, opposite = ("large", "small") if factor > 1 else ("small", "large")
+    which = f"the response of {', '.join(names)} is too {size}, or the force there too {opposite}"
     level = "warning" if 1 / _GAIN_LIMIT < factor < _GAIN_LIMIT else "error"
     remedy = (
         "calibrate sensor and hammer of this DOF; reciprocity cannot tell which of the two it is, and the driving point"
@@ -146,5 +147,6 @@ def _plural(words: str, names: tuple[str, ...]) -> str:
 
 
 def _of(measurement: Measurement, places: list[int], side: Side) -> str:
-    names = ", ".join((measurement.responses[measurement.rows[i]] if side == 1 else measurement.forces[measurement.columns[i]]) for i in places)
-    return ("response " if side == 1 else "force ") + names
+    labels = measurement.responses if side == 1 else measurement.forces
+    at = (measurement.rows if side == 1 else measurement.columns)[places]
+    return ("response " if side == 1 else "force ") + ", ".join(labels[i] for i in at)

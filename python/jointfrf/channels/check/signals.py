@@ -55,7 +55,13 @@ def _dead_finding(word: str, name: str, value: float) -> FrfFinding:
     what = "is zero" if value == 0 else f"is noise: its phase agrees by {value:.2f} from line to line"
     remedy = "connect or replace the sensor" if word == "response" else "repeat the impacts"
     return FrfFinding(
-        "dead", "error", (f"{word} {name}",), float(value), LEAST_SMOOTHNESS, f"{word} {name} {what}", f"{remedy}, or leave it out"
+        "dead",
+        "error",
+        (f"{word} {name}",),
+        float(value),
+        LEAST_SMOOTHNESS,
+        f"{word} {name} {what}",
+        f"{remedy}, or leave it out",
     )
 
 
