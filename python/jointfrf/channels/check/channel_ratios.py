@@ -103,7 +103,7 @@ def channel_ratios(pairs: PairRatios, n: int, *, least_gain: float, least_delay:
     group = trees.group
     gain = _solved(n, p, q, pairs.log_gain[use], pairs.gain_error[use] ** -2)
     delay = _solved(n, p, q, pairs.delay[use], pairs.delay_error[use] ** -2)
-    power = np.rint(trees.summed(pairs.power[use])).astype(np.intp)
+    power = np.rint(trees.summed(pairs.power[use].astype(float))).astype(np.intp)
     for number in np.unique(group):
         power[group == number] -= power[group == number].min()
     phase = pairs.phase[use] - np.pi / 2 * (power[p] - power[q])

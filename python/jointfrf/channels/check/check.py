@@ -27,7 +27,7 @@ from jointfrf.channels.check.ratio_findings import (
     LEAST_PHASE,
     delay_findings,
     gain_findings,
-    is_significant,
+    unexplained_gains,
 )
 from jointfrf.channels.check.signals import check_signals
 from jointfrf.errors import FrfCheckWarning
@@ -144,7 +144,7 @@ class _Look:
         self.corrections.extend(found[1])
 
     def corrected(self) -> Measurement:
-        """The measurement with all corrections found so far."""
+        """Return the measurement with all corrections found so far."""
         one = self.measurement
         return one.with_frfs(corrected(one.omega, one.h, self.corrections)) if self.corrections else one
 
@@ -212,7 +212,7 @@ def _ratios(m: Measurement, pairs: PairRatios) -> ChannelRatios:
 
 def _look_at_ratios(look: _Look, m: Measurement, pairs: PairRatios) -> None:
     ratios = _ratios(m, pairs)
-    cause = cause_of_gains(m.square, np.where(is_significant(ratios.gain, LEAST_GAIN), ratios.gain.value, 0.0))
+    cause = cause_of_gains(m.square, unexplained_gains(m, ratios), [name.rpartition(":")[2] for name in m.dofs])
     if cause is not None:
         m, pairs = _told(look, m, pairs, cause)
         if not m.rows.size:
@@ -248,11 +248,11 @@ def _matrix(values: np.ndarray, pairs: PairRatios, n: int) -> np.ndarray:
 
 
 def _noise(pairs: PairRatios, n: int) -> FloatArray:
-    """Standard deviation of the phase of an FRF of each channel on a line, from the scatter of its ratios; 0 unknown."""
+    """Return the deviation of the phase of an FRF of each channel, from the scatter of its ratios; 0 if unknown."""
     scatter = _matrix(np.where(pairs.usable, pairs.scatter, 0.0), pairs, n)
     count = (scatter > 0).sum(axis=1)
-    mean: FloatArray = scatter.sum(axis=1) / np.maximum(count, 1)
-    return mean / 1.1774 / np.sqrt(2)
+    deviation: FloatArray = scatter.sum(axis=1) / np.maximum(count, 1) / np.sqrt(4 * np.log(2))
+    return deviation
 
 
 def _result(look: _Look, freq: FloatArray, h: ComplexArray, good: np.ndarray, fix: Sequence[FrfFix]) -> FrfCheck:

@@ -1,7 +1,8 @@
-"""FRFs that are not reciprocal at all: exchanged channels, the same channel twice, or one that measures something else."""
+"""FRFs that are not reciprocal: exchanged channels, one channel twice, or one that measures something else."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Literal
@@ -79,7 +80,7 @@ def cause_of_broken_pairs(h: ComplexArray, smooth: FloatArray, broken: NDArray[n
     return Cause("pairs", (), before, before)
 
 
-def cause_of_gains(h: ComplexArray, log_gain: FloatArray) -> Cause | None:
+def cause_of_gains(h: ComplexArray, log_gain: FloatArray, directions: Sequence[str]) -> Cause | None:
     """Find whether gains of channels come from an exchange, or from a channel that shows what another one does.
 
     Channels that a body moves together, one by a constant factor more than the other, stay reciprocal up to a gain
@@ -90,6 +91,8 @@ def cause_of_gains(h: ComplexArray, log_gain: FloatArray) -> Cause | None:
     h : ndarray, shape (n_freq, n, n)
     log_gain : ndarray, shape (n,)
         Natural logarithm of the gains found; 0 where there is none.
+    directions : sequence of str
+        Of the DOFs. Those of one direction on both sides of a stiff joint move alike, which is no sign of a copy.
     """
     some = h[:: -(-h.shape[0] // _MOST_LINES)]
     places = np.flatnonzero(abs(log_gain) > np.log(_MUCH))
@@ -104,7 +107,7 @@ def cause_of_gains(h: ComplexArray, log_gain: FloatArray) -> Cause | None:
     for copy in places:
         for own, kind in ((some, "doubled response"), (across, "doubled force")):
             differ = np.array([_from_one(own[:, copy], own[:, other]).max() for other in range(log_gain.size)])
-            differ[copy] = np.inf
+            differ[[direction == directions[copy] for direction in directions]] = np.inf
             other = int(np.argmin(differ))
             if differ[other] < BROKEN / 2:
                 return Cause(kind, (other, int(copy)), before, float(differ[other]))  # type: ignore[arg-type]
@@ -126,7 +129,7 @@ def _scatter(h: ComplexArray) -> FloatArray:
 
 
 def _exchanged(evidence: _Evidence, before: float) -> Cause | None:
-    """The exchange of two responses (or, which is the same for reciprocity, of two forces) that leaves least broken."""
+    """Return the exchange of two responses (for reciprocity the same as of two forces) that leaves least broken."""
     n = evidence.size.shape[0]
     left: dict[tuple[int, int], tuple[int, float]] = {}
     for i, j in combinations(range(n), 2):
@@ -147,7 +150,7 @@ def _exchanged(evidence: _Evidence, before: float) -> Cause | None:
 
 
 def _doubled(evidence: _Evidence, before: float) -> Cause | None:
-    """A channel that holds all broken pairs and shows the same as another one."""
+    """Return a channel that holds all broken pairs and shows the same as another one."""
     n = evidence.size.shape[0]
     holds = np.flatnonzero(evidence.broken.sum(axis=1) == np.triu(evidence.broken).sum())
     across = np.ascontiguousarray(evidence.h.swapaxes(1, 2))

@@ -50,7 +50,7 @@ def broken_findings(
         name = names[cause.channels[0]]
         finding = FrfFinding(
             "reciprocity", "error", (name,), cause.before, BROKEN,
-            f"{number}{cause.before:.2g}), all with {name}: its response or its force was measured elsewhere, or is noise",
+            f"{number}{cause.before:.2g}), all with {name}: its response or force was measured elsewhere, or is noise",
             "look at place, direction and name of sensor and impacts of this DOF, or leave it out",
         )  # fmt: skip
         return [finding], []

@@ -17,7 +17,7 @@ def check_lines(
     """Return what is wrong with lines, and which lines are good."""
     findings = []
     finite = np.isfinite(h)
-    good = finite.all(axis=(1, 2))
+    good = np.asarray(finite.all(axis=(1, 2)))
     if not good.all():
         findings.append(_not_finite(freq_hz, finite, good, responses, forces))
     zero = freq_hz == 0
@@ -53,7 +53,7 @@ def _not_finite(
 ) -> FrfFinding:
     """Name the channels that hold NaN, or the lines where all do."""
     bad = ~finite
-    rows, columns = bad.any(axis=(0, 2)), bad.any(axis=(0, 1))
+    rows, columns = np.asarray(bad.any(axis=(0, 2))), np.asarray(bad.any(axis=(0, 1)))
     some: tuple[str, ...] = ()
     if not rows.all() and rows.sum() <= columns.sum():
         some = tuple(f"response {name}" for name, is_bad in zip(responses, rows, strict=True) if is_bad)

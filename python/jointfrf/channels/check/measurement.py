@@ -106,13 +106,13 @@ def as_measurement(
     freq_hz: FloatArray, h: ComplexArray, responses: Sequence[str | Channel], forces: Sequence[str | Channel]
 ) -> Measurement:
     """Pair responses with forces by name; a name like 102:-y is the opposite of 102:+y."""
-    names = tuple(tuple(_unified(name) for name in some) for some in (responses, forces))
-    place = {name: (i, 1) for i, name in enumerate(names[1])}
-    for i, name in enumerate(names[1]):
+    of_responses, of_forces = (tuple(_unified(name) for name in some) for some in (responses, forces))
+    place = {name: (i, 1) for i, name in enumerate(of_forces)}
+    for i, name in enumerate(of_forces):
         place.setdefault(_opposite(name), (i, -1))
-    pairs = [(row, *place[name]) for row, name in enumerate(names[0]) if name in place]
-    rows, columns, signs = (np.array(some) for some in zip(*pairs, strict=True)) if pairs else (np.array([], int),) * 3
-    return Measurement(freq_hz, h, *names, rows, columns, signs.astype(float))
+    pairs = np.array([(row, *place[name]) for row, name in enumerate(of_responses) if name in place], np.intp)
+    rows, columns, signs = pairs.reshape(-1, 3).T
+    return Measurement(freq_hz, h, of_responses, of_forces, rows, columns, signs.astype(float))
 
 
 def _unified(name: str | Channel) -> str:

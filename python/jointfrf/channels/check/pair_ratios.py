@@ -164,9 +164,10 @@ def scatter_of(above: ComplexArray, below: ComplexArray) -> FloatArray:
 def _parts(above: ComplexArray, below: ComplexArray) -> tuple[FloatArray, ComplexArray]:
     """Logarithm of the size, and the phase factor, of above / below; 0 and 1 where one of them is zero."""
     known = (above != 0) & (below != 0)
-    ratio = np.where(known, above, 1) / np.where(known, below, 1)
+    ratio: ComplexArray = np.where(known, above, 1) / np.where(known, below, 1)
     size = modulus(ratio)
-    return np.log(size), ratio / size
+    phasor: ComplexArray = ratio / size
+    return np.log(size), phasor
 
 
 def block_medians(values: FloatArray, length: int = _BLOCK) -> FloatArray:
@@ -212,7 +213,7 @@ def _powers(omega: FloatArray, amplitude: FloatArray) -> NDArray[np.intp]:
 
 
 def _block_deviation(rest: ComplexArray) -> FloatArray:
-    """Standard deviation of each line, from the median in its block, and not far below that of all."""
+    """Return the standard deviation of each line, from the median in its block, and not far below that of all."""
     squares = block_medians(rest.real**2 + rest.imag**2) / np.log(2)
     squares = np.maximum(squares, 0.01 * np.median(squares, axis=0) + _LEAST_ERROR**2)
     length = max(rest.shape[0] // squares.shape[0], 1)

@@ -30,15 +30,8 @@ def passivity_findings(
     real = np.where(size > 0, driving.real / np.where(size > 0, size, 1), 0)
     middle = block_medians(part, length)
     # Scatter within a block: of noise, or of the resonances that it holds.
-    spread = (
-        block_medians(
-            abs(part - np.repeat(middle, length, axis=0)[: part.shape[0]])
-            if _fits(part, length)
-            else abs(part - np.median(part, axis=0)),
-            length,
-        )
-        * 1.4826
-    )
+    own = middle[np.minimum(np.arange(part.shape[0]) // length, middle.shape[0] - 1)]
+    spread = 1.4826 * block_medians(abs(part - own), length)
     spread = np.fmax(spread, noise)
     error = 1.2533 * spread * np.sqrt(min(inflation, length) / length)
     active = middle > np.maximum(_LEAST, _SIGNIFICANT * error)
@@ -64,7 +57,3 @@ def passivity_findings(
             )
         )  # fmt: skip
     return findings
-
-
-def _fits(values: FloatArray, length: int) -> bool:
-    return values.shape[0] % length == 0

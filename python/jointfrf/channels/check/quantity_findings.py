@@ -64,7 +64,7 @@ def quantity_findings(
 
 
 def _doubt(found: Quantities) -> str:
-    return f" (or receptances of the wrong sign: |h| goes with w^{found.exponent + 2:.1f} on this band, which does not tell)"
+    return f" (or receptances of the wrong sign: |h| goes with w^{found.exponent + 2:.1f} on this band)"
 
 
 def sign_findings(

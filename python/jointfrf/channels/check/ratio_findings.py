@@ -9,11 +9,20 @@ from numpy.typing import NDArray
 
 from jointfrf.channels.check.channel_ratios import ChannelRatios, Offsets
 from jointfrf.channels.check.correction import Correction
-from jointfrf.channels.check.finding import FrfFinding
+from jointfrf.channels.check.finding import FindingLevel, FrfFinding
 from jointfrf.channels.check.measurement import Measurement
 from jointfrf.channels.check.units import unit_of_factor
+from jointfrf.kernel.arguments import FloatArray
 
-__all__ = ["LEAST_GAIN", "LEAST_PHASE", "Side", "delay_findings", "gain_findings", "is_significant"]
+__all__ = [
+    "LEAST_GAIN",
+    "LEAST_PHASE",
+    "Side",
+    "delay_findings",
+    "gain_findings",
+    "is_significant",
+    "unexplained_gains",
+]
 
 #: Differences that every set of sensors has are not reported: of gain, and of phase at the highest frequency (rad).
 LEAST_GAIN, LEAST_PHASE = 0.01, 0.01
@@ -33,6 +42,17 @@ def is_significant(offsets: Offsets, least: float) -> NDArray[np.bool_]:
     with np.errstate(invalid="ignore"):
         found: NDArray[np.bool_] = abs(offsets.value) > np.maximum(least, _SIGNIFICANT * offsets.error)
     return found
+
+
+def unexplained_gains(measurement: Measurement, ratios: ChannelRatios) -> FloatArray:
+    """Return the logarithms of the gains that are significant and that no unit explains; 0 for others, shape (n,)."""
+    offsets = ratios.gain
+    gain = np.where(is_significant(offsets, LEAST_GAIN), offsets.value, 0.0)
+    for i in np.flatnonzero(gain):
+        tolerance = max(_UNIT_TOLERANCE, 4 * float(offsets.error[i]))
+        if unit_of_factor(math.exp(gain[i]), bool(measurement.rotations[i]), tolerance) is not None:
+            gain[i] = 0
+    return gain
 
 
 def gain_findings(
@@ -88,7 +108,7 @@ def _gain_finding(
         ), places, factor  # fmt: skip
     size, opposite = ("large", "small") if factor > 1 else ("small", "large")
     which = f"the response of {', '.join(names)} is too {size}, or the force there too {opposite}"
-    level = "warning" if 1 / _GAIN_LIMIT < factor < _GAIN_LIMIT else "error"
+    level: FindingLevel = "warning" if 1 / _GAIN_LIMIT < factor < _GAIN_LIMIT else "error"
     remedy = (
         "calibrate sensor and hammer of this DOF; reciprocity cannot tell which of the two it is, and the driving point"
         " carries the error either way"
