@@ -101,8 +101,8 @@ def channel_ratios(pairs: PairRatios, n: int, *, least_gain: float, least_delay:
     p, q = pairs.p[use], pairs.q[use]
     trees = _trees(n, p, q)
     group = trees.group
-    gain = _solved(n, p, q, pairs.log_gain[use], pairs.gain_error[use] ** -2)
-    delay = _solved(n, p, q, pairs.delay[use], pairs.delay_error[use] ** -2)
+    gain = _solved(group, p, q, pairs.log_gain[use], pairs.gain_error[use] ** -2)
+    delay = _solved(group, p, q, pairs.delay[use], pairs.delay_error[use] ** -2)
     power = np.rint(trees.summed(pairs.power[use].astype(float))).astype(np.intp)
     for number in np.unique(group):
         power[group == number] -= power[group == number].min()
@@ -113,9 +113,10 @@ def channel_ratios(pairs: PairRatios, n: int, *, least_gain: float, least_delay:
 
 
 def _solved(
-    n: int, p: NDArray[np.intp], q: NDArray[np.intp], difference: FloatArray, weight: FloatArray
+    group: NDArray[np.intp], p: NDArray[np.intp], q: NDArray[np.intp], difference: FloatArray, weight: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Values of channels by least squares from differences of pairs, mean zero in each group, and their covariance."""
+    n = group.size
     laplacian = np.zeros((n, n))
     np.add.at(laplacian, (p, p), weight)
     np.add.at(laplacian, (q, q), weight)
@@ -125,7 +126,10 @@ def _solved(
     np.add.at(right, p, weight * difference)
     np.add.at(right, q, -weight * difference)
     scale = weight.max(initial=0.0) or 1.0
-    covariance = np.linalg.pinv(laplacian / scale, hermitian=True) / scale
+    # The constant of each group is not determined: projected out.
+    same = group[:, None] == group
+    constants = same / same.sum(axis=1)
+    covariance = (np.linalg.inv(laplacian / scale + constants) - constants) / scale
     return covariance @ right, covariance
 
 

@@ -104,7 +104,7 @@ def cause_of_gains(h: ComplexArray, log_gain: FloatArray, directions: Sequence[s
         if after < BROKEN / 2:
             return Cause("exchanged", (int(places[0]), int(places[1])), before, after)
     across = np.ascontiguousarray(some.swapaxes(1, 2))
-    for copy in places:
+    for copy in places.tolist():
         for own, kind in ((some, "doubled response"), (across, "doubled force")):
             differ = np.array([_from_one(own[:, copy], own[:, other]).max() for other in range(log_gain.size)])
             differ[[direction == directions[copy] for direction in directions]] = np.inf

@@ -37,7 +37,7 @@ _GAIN_LIMIT = 2.0
 Side = int
 
 
-def is_significant(offsets: Offsets, least: float) -> NDArray[np.bool_]:
+def _is_significant(offsets: Offsets, least: float) -> NDArray[np.bool_]:
     """Channels that differ from the others by more than noise and more than a least value."""
     with np.errstate(invalid="ignore"):
         found: NDArray[np.bool_] = abs(offsets.value) > np.maximum(least, _SIGNIFICANT * offsets.error)
@@ -47,7 +47,7 @@ def is_significant(offsets: Offsets, least: float) -> NDArray[np.bool_]:
 def unexplained_gains(measurement: Measurement, ratios: ChannelRatios) -> FloatArray:
     """Return the logarithms of the gains that are significant and that no unit explains; 0 for others, shape (n,)."""
     offsets = ratios.gain
-    gain = np.where(is_significant(offsets, LEAST_GAIN), offsets.value, 0.0)
+    gain = np.where(_is_significant(offsets, LEAST_GAIN), offsets.value, 0.0)
     for i in np.flatnonzero(gain):
         tolerance = max(_UNIT_TOLERANCE, 4 * float(offsets.error[i]))
         if unit_of_factor(math.exp(gain[i]), bool(measurement.rotations[i]), tolerance) is not None:
@@ -61,7 +61,7 @@ def gain_findings(
     """Say which channels have another gain than the others, or other units."""
     findings, corrections = [], []
     offsets = ratios.gain
-    left = is_significant(offsets, LEAST_GAIN)
+    left = _is_significant(offsets, LEAST_GAIN)
     while left.any():
         first = int(np.flatnonzero(left)[np.nanargmax(abs(offsets.value[left]))])
         with np.errstate(invalid="ignore"):
@@ -124,7 +124,7 @@ def delay_findings(
     findings, corrections = [], []
     offsets = ratios.delay
     least = LEAST_PHASE / measurement.omega[-1]
-    for i in np.flatnonzero(is_significant(offsets, least)).tolist():
+    for i in np.flatnonzero(_is_significant(offsets, least)).tolist():
         delay, error = float(offsets.value[i]), float(offsets.error[i])
         name = measurement.dofs[i]
         degrees = math.degrees(delay * measurement.omega[-1])
