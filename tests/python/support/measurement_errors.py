@@ -11,6 +11,7 @@ import numpy as np
 import six_dof_beams
 from jointfrf.cases.catalogue import find_case, read_case
 from jointfrf.cases.known_joint.exact import exact_frfs
+from jointfrf.dofs import is_rotation
 
 
 class Structure(NamedTuple):
@@ -72,6 +73,10 @@ NOISE: dict[str, Noise] = {
 }
 
 
+#: All kinds of noise of `measured`.
+KINDS_OF_NOISE = (*NOISE, "missing")
+
+
 def measured(s: Structure, kind: str, level: float, seed: int) -> tuple[np.ndarray, np.ndarray]:
     """Frequencies and noisy FRFs; "missing": complex noise, and a fifth of the lines is not there."""
     rng = np.random.default_rng([seed, sum(map(ord, kind))])
@@ -88,8 +93,44 @@ class ChannelError(NamedTuple):
     change: Callable[[np.random.Generator, np.ndarray, np.ndarray, int], None]
     kind: str
     names_channel: bool = True
-    least: int = 1  # joint DOFs that it takes
-    rotation: bool = False  # whether the channel must be a rotation
+    rotation: bool | None = None  # whether the channel must be a rotation, or a displacement
+    also: tuple[str, ...] = ()  # findings that must come with it
+    least: int = 2  # channels that it takes
+
+
+class Told(NamedTuple):
+    """Whether a check found the error with its channel, and nothing else."""
+
+    found: bool
+    alone: bool
+    check: jf.FrfCheck
+
+
+def names(s: Structure) -> list[str]:
+    """Names of the channels."""
+    return [f"{side}:{dof}" for side in "jk" for dof in s.dofs]
+
+
+def check_with_error(s: Structure, error: ChannelError, kind: str, level: float, seed: int) -> Told | None:
+    """Check noisy FRFs with an error; None where the structure has no channel for it. The seed chooses the channel."""
+    freq, h = (values.copy() for values in measured(s, kind, level, seed))
+    labels = names(s)
+    able = [i for i, dof in enumerate(s.dofs * 2) if error.rotation in (None, is_rotation(dof))]
+    if not able or h.shape[1] < error.least:
+        return None
+    at = able[seed % len(able)]
+    error.change(np.random.default_rng(seed), freq, h, at)
+    check = jf.check_frfs(freq, h, labels)
+    serious = [finding for finding in check.findings if finding.level != "note"]
+    own = [
+        finding
+        for finding in serious
+        if finding.kind == error.kind
+        and (not error.names_channel or any(labels[at] in name for name in finding.channels + (finding.message,)))
+    ]
+    others = [finding for finding in serious if finding not in own and finding.kind not in error.also]
+    kinds = {finding.kind for finding in serious}
+    return Told(bool(own) and kinds.issuperset(error.also), not others, check)
 
 
 def scaled(factor: float, *, force: bool = False) -> Callable[..., None]:
@@ -190,12 +231,14 @@ ERRORS: dict[str, ChannelError] = {
     "conjugated, exp(-i w t)": ChannelError(all_times(0, conjugate=True), "time-convention", False),
     "accelerances": ChannelError(all_times(2), "quantity", False),
     "mobilities": ChannelError(all_times(1), "quantity", False),
-    "accelerances, conjugated": ChannelError(all_times(2, conjugate=True), "time-convention", False),
+    "accelerances, conjugated": ChannelError(
+        all_times(2, conjugate=True), "time-convention", False, also=("quantity",)
+    ),
     "one side in accelerance": ChannelError(one_side(2), "quantity", False),
     "one side in mobility": ChannelError(one_side(1), "quantity", False),
-    "degrees": ChannelError(scaled(180 / np.pi), "units", rotation=True),
-    "mm instead of m": ChannelError(scaled(1e3), "units"),
-    "g instead of m/s^2": ChannelError(scaled(1 / 9.80665), "units"),
+    "degrees instead of radians": ChannelError(scaled(180 / np.pi), "units", rotation=True),
+    "mm instead of m": ChannelError(scaled(1e3), "units", rotation=False),
+    "g instead of m/s^2": ChannelError(scaled(1 / 9.80665), "units", rotation=False),
     "response zero": ChannelError(put("zero"), "dead"),
     "response noise": ChannelError(put("noise"), "dead"),
     "force zero": ChannelError(put("zero force"), "dead"),

@@ -98,7 +98,7 @@ def pair_ratios(omega: FloatArray, h: ComplexArray, smooth: FloatArray) -> PairR
     power = _powers(omega, amplitude)
     amplitude = amplitude - power * np.log(omega)[:, None]
     middle = np.median(amplitude, axis=0)
-    rest = amplitude - middle + 1j * np.angle(turned * direction.conj())
+    rest: ComplexArray = (amplitude - middle) + 1j * np.angle(turned * direction.conj())
     scatter = np.median(modulus(rest), axis=0)
     typical = np.median(modulus(h), axis=0)
     judged = are_signals(typical, smooth, h.shape[0])[p, q]
@@ -164,7 +164,7 @@ def scatter_of(above: ComplexArray, below: ComplexArray) -> FloatArray:
 def _parts(above: ComplexArray, below: ComplexArray) -> tuple[FloatArray, ComplexArray]:
     """Logarithm of the size, and the phase factor, of above / below; 0 and 1 where one of them is zero."""
     known = (above != 0) & (below != 0)
-    ratio: ComplexArray = np.where(known, above, 1) / np.where(known, below, 1)
+    ratio = np.where(known, above, 1) / np.where(known, below, 1)
     size = modulus(ratio)
     phasor: ComplexArray = ratio / size
     return np.log(size), phasor

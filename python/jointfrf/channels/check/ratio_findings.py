@@ -20,7 +20,6 @@ __all__ = [
     "Side",
     "delay_findings",
     "gain_findings",
-    "is_significant",
     "unexplained_gains",
 ]
 
