@@ -28,7 +28,7 @@ NOISES = (
     ("complex", 0.1),
     ("floor", 0.05),
     ("hum", 0.02),
-    ("correlated 25", 0.02),
+    ("correlated 25", 0.05),
 )
 
 

@@ -6,6 +6,7 @@ import argparse
 
 from jointfrf.channels.check.check import check_frfs
 from jointfrf.cli.measured_file import add_file_arguments, in_some_band, interface_of, read_frfs
+from jointfrf.errors import FileContentError
 
 __all__ = ["add_arguments", "run"]
 
@@ -27,6 +28,12 @@ def run(args: argparse.Namespace) -> int:
         channels = interface_of(args, frfs).channels
         responses, forces, h = channels, channels, frfs.matrix(channels, channels)
     else:
+        missing = int((~frfs.measured).sum())
+        if missing:
+            raise FileContentError(
+                f"{args.file}: {missing} FRFs are missing between its channels: name those of the joint, "
+                "--j NODES --k NODES --dofs DOFS"
+            )
         responses, forces, h = frfs.responses, frfs.excitations, frfs.h
     check = check_frfs(*in_some_band(frfs.freq_hz, h, args.band), responses=responses, forces=forces)
     print(f"{args.file.name}: {check}")

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+import jointfrf as jf
 import six_dof_beams
 from jointfrf.cases.catalogue import find_case, read_case
 from jointfrf.cases.known_joint.exact import exact_frfs
@@ -126,7 +127,7 @@ def check_with_error(s: Structure, error: ChannelError, kind: str, level: float,
         finding
         for finding in serious
         if finding.kind == error.kind
-        and (not error.names_channel or any(labels[at] in name for name in finding.channels + (finding.message,)))
+        and (not error.names_channel or any(labels[at] in name for name in (*finding.channels, finding.message)))
     ]
     others = [finding for finding in serious if finding not in own and finding.kind not in error.also]
     kinds = {finding.kind for finding in serious}

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from jointfrf.channels.check.channel_ratios import ChannelRatios, channel_ratios
 from jointfrf.channels.check.correction import Correction, corrected
 from jointfrf.channels.check.driving_points import circles, mean_exponent, sectors
-from jointfrf.channels.check.exchange import Cause, cause_of_broken_pairs, cause_of_gains
+from jointfrf.channels.check.exchange import Cause, cause_of_broken_pairs, cause_of_gains, hidden_exchange
 from jointfrf.channels.check.exchange_findings import broken_findings
 from jointfrf.channels.check.finding import FindingLevel, FrfCheck, FrfFinding
 from jointfrf.channels.check.lines import check_lines
@@ -92,7 +92,7 @@ def check_frfs(
     clockwise through the complex plane.
 
     Standard errors come from the scatter of the ratios over frequency with their correlation from line to line; a
-    difference counts from 6 standard errors and 1 %. One cause that explains many symptoms is reported once.
+    difference counts from 5 standard errors and 1 %. One cause that explains many symptoms is reported once.
 
     Examples
     --------
@@ -212,7 +212,8 @@ def _ratios(m: Measurement, pairs: PairRatios) -> ChannelRatios:
 
 def _look_at_ratios(look: _Look, m: Measurement, pairs: PairRatios) -> None:
     ratios = _ratios(m, pairs)
-    cause = cause_of_gains(m.square, unexplained_gains(m, ratios), [name.rpartition(":")[2] for name in m.dofs])
+    directions = [name.rpartition(":")[2] for name in m.dofs]
+    cause = hidden_exchange(m.square, directions) or cause_of_gains(m.square, unexplained_gains(m, ratios), directions)
     if cause is not None:
         m, pairs = _told(look, m, pairs, cause)
         if not m.rows.size:

@@ -13,12 +13,14 @@ from numpy.typing import NDArray
 from jointfrf.channels.check.pair_ratios import BROKEN, ONE_SIDED, are_one_sided, are_signals, scatter_of
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
-__all__ = ["Cause", "cause_of_broken_pairs", "cause_of_gains"]
+__all__ = ["Cause", "cause_of_broken_pairs", "cause_of_gains", "hidden_exchange"]
 
 #: A search takes no more lines than these, evenly spread.
 _MOST_LINES = 200
 #: Gains above this factor may come from exchanged channels; logarithms of two that agree so well are one.
 _MUCH, _ALIKE = 2.0, 0.1
+#: Two channels of one direction are exchanged if this divides the scatter of their ratios by so much.
+_LESS, _ROUND_OFF = 1.4, 1e-6
 #: A cause explains if it leaves at most this share of the broken pairs.
 _LEFT = 0.25
 
@@ -112,6 +114,39 @@ def cause_of_gains(h: ComplexArray, log_gain: FloatArray, directions: Sequence[s
             if differ[other] < BROKEN / 2:
                 return Cause(kind, (other, int(copy)), before, float(differ[other]))  # type: ignore[arg-type]
     return None
+
+
+def hidden_exchange(h: ComplexArray, directions: Sequence[str]) -> Cause | None:
+    """Find an exchange of two channels of one direction, which a stiff joint nearly hides.
+
+    Both sides of a stiff joint move alike: exchanged, they remain reciprocal to within some percent.
+
+    Parameters
+    ----------
+    h : ndarray, shape (n_freq, n, n)
+    directions : sequence of str
+        Of the DOFs.
+    """
+    across = np.ascontiguousarray(h.swapaxes(1, 2))
+    best: Cause | None = None
+    for i, j in combinations(range(len(directions)), 2):
+        if directions[i] != directions[j]:
+            continue
+        # Rows of the two responses beside the columns of their forces, as they are and exchanged.
+        both = [_off(scatter_of(h[:, rows], across[:, [i, j]]), (i, j)) for rows in ([i, j], [j, i])]
+        # h_ij against h_ji, or, exchanged, h_jj against h_ii, stands in neither.
+        before, after = (float(np.mean(scatter)) if scatter.size else 0.0 for scatter in both)
+        own = [float(scatter_of(h[:, a, b], h[:, c, d])) for a, b, c, d in ((i, j, j, i), (j, j, i, i))]
+        before, after = (before * both[0].size + 2 * own[0], after * both[0].size + 2 * own[1])
+        if before > _LESS * after + _ROUND_OFF and (best is None or after / before < best.after / best.before):
+            best = Cause("exchanged", (i, j), before / (both[0].size + 2), after / (both[0].size + 2))
+    return best
+
+
+def _off(scatter: FloatArray, places: tuple[int, int]) -> FloatArray:
+    """Leave the two columns out."""
+    kept = np.delete(scatter, places, axis=1)
+    return kept[kept > 0]
 
 
 def _from_one(first: ComplexArray, second: ComplexArray) -> FloatArray:

@@ -164,10 +164,9 @@ def scatter_of(above: ComplexArray, below: ComplexArray) -> FloatArray:
 def _parts(above: ComplexArray, below: ComplexArray) -> tuple[FloatArray, ComplexArray]:
     """Logarithm of the size, and the phase factor, of above / below; 0 and 1 where one of them is zero."""
     known = (above != 0) & (below != 0)
-    ratio = np.where(known, above, 1) / np.where(known, below, 1)
+    ratio = np.asarray(np.where(known, above, 1) / np.where(known, below, 1), np.complex128)
     size = modulus(ratio)
-    phasor: ComplexArray = ratio / size
-    return np.log(size), phasor
+    return np.log(size), ratio / size
 
 
 def block_medians(values: FloatArray, length: int = _BLOCK) -> FloatArray:

@@ -26,7 +26,7 @@ __all__ = [
 #: Differences that every set of sensors has are not reported: of gain, and of phase at the highest frequency (rad).
 LEAST_GAIN, LEAST_PHASE = 0.01, 0.01
 #: Standard errors that a difference must exceed.
-_SIGNIFICANT = 6.0
+_SIGNIFICANT = 5.0
 #: A factor within this share of that of a unit is taken for it.
 _UNIT_TOLERANCE = 0.03
 #: Factors below this are gains, not units, unless a unit brings them.
