@@ -16,7 +16,7 @@ from jointfrf.channels.check.driving_points import circles, mean_exponent, secto
 from jointfrf.channels.check.exchange import Cause, cause_of_broken_pairs, cause_of_gains, hidden_exchange
 from jointfrf.channels.check.exchange_findings import broken_findings
 from jointfrf.channels.check.finding import FindingLevel, FrfCheck, FrfFinding
-from jointfrf.channels.check.lines import check_lines
+from jointfrf.channels.check.lines import find_bad_lines
 from jointfrf.channels.check.measurement import Measurement, as_measurement
 from jointfrf.channels.check.pair_ratios import PairRatios, pair_ratios
 from jointfrf.channels.check.passivity import passivity_findings
@@ -114,7 +114,7 @@ def check_frfs(
     for word in fix:
         check_choice("fix", word, get_args(FrfFix))
     check_choice("blame", blame, ("responses", "forces"))
-    found, good = check_lines(freq, lines, tuple(map(str, rows)), tuple(map(str, columns)))
+    found, good = find_bad_lines(freq, lines, tuple(map(str, rows)), tuple(map(str, columns)))
     measurement = as_measurement(freq[good], lines[good], rows, columns)
     look = _Look(measurement, 1 if blame == "responses" else 2)
     look.findings.extend(found)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from jointfrf.channels.check.correction import Correction
@@ -22,7 +24,11 @@ def broken_findings(
     names = measurement.dofs
     number = f"{pairs.broken.sum()} of {pairs.p.size} pairs h_pq, h_qp are not the same FRF (scatter of their ratio "
     if not pairs.broken.any():
-        number = "h_pq and h_qp differ by large factors (logarithm "
+        number = (
+            "h_pq and h_qp differ by large factors (logarithm "
+            if cause.before > math.log(2)
+            else "with these two h_pq / h_qp varies over frequency by more than noise does (scatter "
+        )
     if cause.kind == "exchanged":
         a, b = (names[i] for i in cause.channels)
         others = "".join(f", or {names[i]} and {names[j]}" for i, j in cause.alternatives)

@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 from jointfrf.channels.check.finding import FrfFinding
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
-__all__ = ["check_lines"]
+__all__ = ["find_bad_lines"]
 
 
-def check_lines(
+def find_bad_lines(
     freq_hz: FloatArray, h: ComplexArray, responses: tuple[str, ...], forces: tuple[str, ...]
 ) -> tuple[list[FrfFinding], NDArray[np.bool_]]:
     """Return what is wrong with lines, and which lines are good."""
