@@ -135,6 +135,25 @@ def test_responses_and_forces_of_different_sets():
     ] == ["time-convention"]
 
 
+def test_virtual_points_from_different_sensors_and_impacts():
+    """No driving point among the channels: the joint DOFs show a wrong sign, and units."""
+    rng = np.random.default_rng(4)
+    sensors, impacts = (
+        np.kron(np.eye(2), np.array([[1.0, a], [1.0, b], [1.0, c]])) for a, b, c in rng.uniform(-0.03, 0.03, (2, 3))
+    )
+    h = jf.pollute(sensors @ S.gamma @ impacts.T, 0.01, seed=2)
+    channels = dict(responses=[f"{i}:y" for i in range(1, 7)], forces=[f"{i}:y" for i in range(11, 17)])
+    transform = np.linalg.pinv(sensors), np.linalg.pinv(impacts)
+    assert jf.check_frfs(S.freq, h, **channels, transform=transform, dofs=["y", "theta"]).ok
+    wrong = jf.check_frfs(S.freq, -h, **channels, transform=transform, dofs=["y", "theta"])
+    assert [finding.kind for finding in wrong.findings] == ["sign"]
+    degrees = np.diag([1, 180 / np.pi, 1, 1]) @ transform[0]
+    (finding,) = jf.check_frfs(S.freq, h, **channels, transform=(degrees, transform[1]), dofs=["y", "theta"]).findings
+    assert (finding.kind, finding.channels) == ("units", ("j:theta",))
+    with pytest.raises(ValueError, match="dofs must name 2 joint DOFs"):
+        jf.check_frfs(S.freq, h, **channels, transform=transform, dofs=["y"])
+
+
 def test_two_sides_that_cannot_be_told_apart_are_both_named():
     s = structure("3.1")
     freq, h = measured(s, "complex", 0.02, 1)
@@ -161,6 +180,18 @@ def test_data_made_reciprocal_and_stiff_joints_are_no_finding(beams):
         joint = jf.Joint([6e5 * factor, 5e3 * factor], [20, 1.5], ["y", "theta"])
         for level in (0.005, 0.05):
             assert jf.check_frfs(beams.freq, jf.pollute(beams.gamma(joint), level, seed=1)).ok
+
+
+def test_one_driving_point_alone():
+    h = noisy()[:, :1, :1]
+    assert jf.check_frfs(S.freq, h, ["y"]).ok
+    assert [finding.kind for finding in jf.check_frfs(S.freq, -h, ["y"]).findings] == ["sign"]
+    assert [finding.kind for finding in jf.check_frfs(S.freq, h.conj(), ["y"]).findings] == ["time-convention"]
+    assert [finding.kind for finding in jf.check_frfs(S.freq, 0 * h, ["y"]).findings] == ["dead", "dead"]
+
+
+def test_all_channels_dead():
+    assert {finding.kind for finding in jf.check_frfs(S.freq, 0 * noisy(), NAMES).findings} == {"dead"}
 
 
 def test_few_lines_are_not_judged():

@@ -32,7 +32,7 @@ from jointfrf.channels.check.ratio_findings import (
 from jointfrf.channels.check.signals import check_signals
 from jointfrf.errors import FrfCheckWarning
 from jointfrf.frf.frf_set import Channel
-from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_frequency, as_lines, check_choice
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_frequency, as_lines, as_real, check_choice
 
 __all__ = ["FrfFix", "check_frfs", "warn_of_frfs"]
 
@@ -50,6 +50,8 @@ def check_frfs(
     *,
     responses: Sequence[str | Channel] | None = None,
     forces: Sequence[str | Channel] | None = None,
+    transform: tuple[ArrayLike, ArrayLike] | None = None,
+    dofs: Sequence[str] | None = None,
     fix: Sequence[FrfFix] = (),
     blame: Literal["responses", "forces"] = "responses",
 ) -> FrfCheck:
@@ -67,6 +69,11 @@ def check_frfs(
     responses, forces : sequence of str or Channel, optional
         Names of rows and columns where they differ. A response and a force of one name are a driving point;
         ``102:-y`` is the opposite of ``102:+y``.
+    transform : (array_like, array_like), shapes (2 n, n_responses), (2 n, n_forces), optional
+        From responses and from forces to joint DOFs j, then k. Where the channels share fewer than two DOFs, the FRFs
+        of the joint DOFs are looked at instead; nothing is corrected there.
+    dofs : sequence of str, optional
+        Names of the n joint DOFs, with `transform`.
     fix : sequence of str
         What to correct: "lines" (leave bad ones out), "time-convention", "exchanged", "quantity", "sign", "units",
         "gain", "delay". Nothing by default.
@@ -120,6 +127,8 @@ def check_frfs(
     look.findings.extend(found)
     if measurement.freq_hz.size >= _LEAST_LINES and measurement.h.size:
         _look_at_channels(look)
+        if transform is not None and look.measurement.rows.size < 2:
+            look.findings.extend(_findings_at_joint(look, transform, dofs))
     return _result(look, freq, lines, good, fix)
 
 
@@ -170,6 +179,25 @@ def _as_names(
             raise ValueError(f"{word if names is None else 'names'} must name {n} different channels")
         found.append(labels)
     return found[0], found[1]
+
+
+def _findings_at_joint(
+    look: _Look, transform: tuple[ArrayLike, ArrayLike], dofs: Sequence[str] | None
+) -> list[FrfFinding]:
+    """Return what the FRFs of the joint DOFs show, besides what the channels have shown already."""
+    m = look.corrected()
+    t_out = as_real("transform[0]", transform[0], (None, m.h.shape[1]))
+    t_in = as_real("transform[1]", transform[1], (t_out.shape[0], m.h.shape[2]))
+    names = [str(i) for i in range(t_out.shape[0] // 2)] if dofs is None else list(dofs)
+    if 2 * len(names) != t_out.shape[0]:
+        raise ValueError(
+            f"dofs must name {t_out.shape[0] / 2:g} joint DOFs, half the rows of transform, not {len(names)}"
+        )
+    labels = [f"{side}:{name}" for side in "jk" for name in names]
+    joint = _Look(as_measurement(m.freq_hz, t_out @ m.h @ t_in.T, labels, labels), look.side)
+    _look_at_channels(joint)
+    known = {finding.kind for finding in look.findings}
+    return [finding for finding in joint.findings if finding.kind not in known]
 
 
 def _look_at_channels(look: _Look) -> None:

@@ -173,7 +173,7 @@ def block_medians(values: FloatArray, length: int = _BLOCK) -> FloatArray:
     """Return the median over blocks of lines, shape (n_blocks, ...); the last block takes what is left."""
     n = max(values.shape[0] // length, 1)
     whole = min(n * length, values.shape[0])
-    medians = np.median(values[:whole].reshape(n, -1, *values.shape[1:]), axis=1)
+    medians = np.median(values[:whole].reshape(n, whole // n, *values.shape[1:]), axis=1)
     if values.shape[0] > whole:
         medians[-1] = np.median(values[whole - whole // n :], axis=0)
     return medians
