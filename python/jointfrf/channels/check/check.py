@@ -17,7 +17,7 @@ from jointfrf.channels.check.exchange import Cause, cause_of_broken_pairs, cause
 from jointfrf.channels.check.exchange_findings import broken_findings
 from jointfrf.channels.check.finding import FindingLevel, FrfCheck, FrfFinding
 from jointfrf.channels.check.lines import find_bad_lines
-from jointfrf.channels.check.measurement import Measurement, as_measurement
+from jointfrf.channels.check.measurement import Measurement, as_channel_names, as_measurement
 from jointfrf.channels.check.pair_ratios import PairRatios, pair_ratios
 from jointfrf.channels.check.passivity import passivity_findings
 from jointfrf.channels.check.quantities import quantities
@@ -117,7 +117,7 @@ def check_frfs(
     """
     lines = as_lines("h", h)
     freq = as_frequency(freq_hz, lines.shape[0])
-    rows, columns = _as_names(lines.shape[1:], names, responses, forces)
+    rows, columns = as_channel_names(lines.shape[1:], names, responses, forces)
     for word in fix:
         check_choice("fix", word, get_args(FrfFix))
     check_choice("blame", blame, ("responses", "forces"))
@@ -156,29 +156,6 @@ class _Look:
         """Return the measurement with all corrections found so far."""
         one = self.measurement
         return one.with_frfs(corrected(one.omega, one.h, self.corrections)) if self.corrections else one
-
-
-def _as_names(
-    shape: tuple[int, ...],
-    names: Sequence[str | Channel] | None,
-    responses: Sequence[str | Channel] | None,
-    forces: Sequence[str | Channel] | None,
-) -> tuple[Sequence[str | Channel], Sequence[str | Channel]]:
-    if names is not None and (responses is not None or forces is not None):
-        raise ValueError("names goes without responses and forces")
-    if names is None and responses is None and forces is None and shape[0] != shape[1]:
-        raise ValueError(f"h holds {shape[0]} responses and {shape[1]} forces: name them by responses and forces")
-    found = []
-    for word, own, n in (("responses", responses, shape[0]), ("forces", forces, shape[1])):
-        if own is None:
-            own = names if names is not None else None
-        if own is None and (responses is not None or forces is not None):
-            raise ValueError("responses and forces go together")
-        labels = [str(i) for i in range(n)] if own is None else list(own)
-        if len(labels) != n or len(set(map(str, labels))) != n:
-            raise ValueError(f"{word if names is None else 'names'} must name {n} different channels")
-        found.append(labels)
-    return found[0], found[1]
 
 
 def _findings_at_joint(

@@ -13,7 +13,7 @@ from jointfrf.dofs import is_rotation
 from jointfrf.frf.frf_set import Channel
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
-__all__ = ["LEAST_SMOOTHNESS", "Measurement", "as_measurement", "modulus", "smoothness"]
+__all__ = ["LEAST_SMOOTHNESS", "Measurement", "as_channel_names", "as_measurement", "modulus", "smoothness"]
 
 #: Below this agreement of the phase from line to line an FRF is noise.
 LEAST_SMOOTHNESS = 0.3
@@ -113,6 +113,30 @@ def as_measurement(
     pairs = np.array([(row, *place[name]) for row, name in enumerate(of_responses) if name in place], np.intp)
     rows, columns, signs = pairs.reshape(-1, 3).T
     return Measurement(freq_hz, h, of_responses, of_forces, rows, columns, signs.astype(float))
+
+
+def as_channel_names(
+    shape: tuple[int, ...],
+    names: Sequence[str | Channel] | None,
+    responses: Sequence[str | Channel] | None,
+    forces: Sequence[str | Channel] | None,
+) -> tuple[Sequence[str | Channel], Sequence[str | Channel]]:
+    """Return the names of responses and forces, each different, by default their numbers."""
+    if names is not None and (responses is not None or forces is not None):
+        raise ValueError("names goes without responses and forces")
+    if names is None and responses is None and forces is None and shape[0] != shape[1]:
+        raise ValueError(f"h holds {shape[0]} responses and {shape[1]} forces: name them by responses and forces")
+    found = []
+    for word, own, n in (("responses", responses, shape[0]), ("forces", forces, shape[1])):
+        if own is None:
+            own = names if names is not None else None
+        if own is None and (responses is not None or forces is not None):
+            raise ValueError("responses and forces go together")
+        labels = [str(i) for i in range(n)] if own is None else list(own)
+        if len(labels) != n or len(set(map(str, labels))) != n:
+            raise ValueError(f"{word if names is None else 'names'} must name {n} different channels")
+        found.append(labels)
+    return found[0], found[1]
 
 
 def _unified(name: str | Channel) -> str:

@@ -127,9 +127,9 @@ def delay_findings(
         delay, error = float(offsets.value[i]), float(offsets.error[i])
         name = measurement.dofs[i]
         degrees = math.degrees(delay * measurement.omega[-1])
-        word, opposite = ("late", "early") if delay > 0 else ("early", "late")
+        word, opposite, way = ("late", "early", "falls") if delay > 0 else ("early", "late", "rises")
         shown = (
-            f"the phase of h_pq / h_qp falls with frequency for p = {name}: a delay of {1e6 * delay:.3g} +- "
+            f"the phase of h_pq / h_qp {way} with frequency for p = {name}: a delay of {1e6 * delay:.3g} +- "
             f"{1e6 * error:.2g} us, {degrees:.3g} degrees at {measurement.freq_hz[-1]:g} Hz: the response of {name} is "
             f"{word}, or the force there {opposite}{_doubt(measurement, ratios, offsets, [i])}"
         )
@@ -147,9 +147,7 @@ def delay_findings(
 
 
 def _times(factor: float, error: float) -> str:
-    if 0.5 < factor < 2:
-        return f"{100 * (factor - 1):+.3g} % (+- {100 * factor * error:.2g})"
-    return f"{factor:.4g} times (+- {100 * error:.2g} %)"
+    return f"{factor:.4g} +- {factor * error:.1g}"
 
 
 def _doubt(measurement: Measurement, ratios: ChannelRatios, offsets: Offsets, places: list[int]) -> str:
