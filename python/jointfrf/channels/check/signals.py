@@ -14,6 +14,8 @@ __all__ = ["BadSignals", "check_signals"]
 
 #: FRFs that agree to this share are copies: two measurements differ by their noise.
 _SAME = 1e-6
+#: FRFs that are reciprocal to this share hold no noise, or were made so.
+_EXACT = 1e-9
 #: Rows that are less alike than this on some lines are not compared on all; how many lines.
 _ALIKE, _SOME = 0.999, 60
 
@@ -39,10 +41,16 @@ def check_signals(measurement: Measurement) -> BadSignals:
     ):
         dead = _dead(own, h.shape[0])
         findings += [_dead_finding(word, names[i], float(own[i].max())) for i in dead]
-        copies = _copies(h, dead)
+        copies = [] if _is_exact(measurement) else _copies(h, dead)
         findings += [_copy_finding(word, names[i], names[j], value) for i, j, value in copies]
         bad.append([*dead, *(place for i, j, _ in copies for place in (i, j))])
     return BadSignals(findings, *bad)
+
+
+def _is_exact(measurement: Measurement) -> bool:
+    """Whether FRFs are reciprocal to rounding: calculated, or made so; equal channels are then no copies of noise."""
+    square = measurement.square
+    return bool(square.size and abs(square - square.swapaxes(1, 2)).max() <= _EXACT * abs(square).max())
 
 
 def _dead(smooth: FloatArray, n_freq: int) -> list[int]:
