@@ -110,7 +110,6 @@ def pair_ratios(omega: FloatArray, h: ComplexArray, smooth: FloatArray) -> PairR
     deviation = _block_deviation(rest)
     weight = deviation**-2
     clipped = _clipped(rest, deviation)
-    inflation = _inflation((clipped / deviation)[:, usable])
     total = weight.sum(axis=0)
     mean = (weight * clipped).sum(axis=0) / total
     at = (weight * omega[:, None]).sum(axis=0) / total
@@ -118,6 +117,8 @@ def pair_ratios(omega: FloatArray, h: ComplexArray, smooth: FloatArray) -> PairR
     inertia = (weight * lever**2).sum(axis=0)
     slope = (weight * lever * clipped.imag).sum(axis=0) / inertia
     left = clipped - mean - 1j * lever * slope
+    # What a delay leaves in the phase is not noise: taken out before.
+    inflation = _inflation((left / deviation)[:, usable])
     real, imaginary = ((weight * part**2).mean(axis=0) * inflation for part in (left.real, left.imag))
     span = omega[-1]
     return PairRatios(
