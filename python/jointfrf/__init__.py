@@ -3,6 +3,8 @@
 Time convention exp(+i w t). Arrays over frequency have shape (n_freq, out, in), complex128, C order. SI units.
 """
 
+from jointfrf.channels.check.check import check_frfs
+from jointfrf.channels.check.finding import FrfCheck, FrfFinding
 from jointfrf.channels.consistency import (
     Consistency,
     DrivingPointCheck,
@@ -31,6 +33,7 @@ from jointfrf.errors import (
     CopyWarning,
     FileContentError,
     FileContentWarning,
+    FrfCheckWarning,
     IdentificationWarning,
     IllConditionedWarning,
     SingularLineError,
@@ -84,6 +87,9 @@ __all__ = [
     "DrivingPointCheck",
     "FileContentError",
     "FileContentWarning",
+    "FrfCheck",
+    "FrfCheckWarning",
+    "FrfFinding",
     "Hole",
     "IdentificationWarning",
     "IllConditionedWarning",
@@ -117,6 +123,7 @@ __all__ = [
     "central_difference",
     "chain",
     "channel_geometry",
+    "check_frfs",
     "compliance_covariance",
     "compliance_factors",
     "couple",

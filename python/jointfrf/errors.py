@@ -10,6 +10,7 @@ __all__ = [
     "CopyWarning",
     "FileContentError",
     "FileContentWarning",
+    "FrfCheckWarning",
     "IdentificationWarning",
     "IllConditionedWarning",
     "SingularLineError",
@@ -39,6 +40,10 @@ class FileContentError(ValueError):
 
 class FileContentWarning(UserWarning):
     """Something in a file had to be assumed or left out."""
+
+
+class FrfCheckWarning(UserWarning):
+    """Measured FRFs look wrong: a channel, the quantity, the sign; see `jointfrf.check_frfs`."""
 
 
 class IllConditionedWarning(UserWarning):

@@ -7,7 +7,7 @@ from typing import get_args
 
 import numpy as np
 
-from jointfrf.errors import ConvergenceWarning, IdentificationWarning, IllConditionedWarning
+from jointfrf.errors import ConvergenceWarning, FrfCheckWarning, IdentificationWarning, IllConditionedWarning
 from jointfrf.identification.compliance_fit.estimator import estimate, joint_basis
 from jointfrf.identification.identify import IdentificationMethod, identify
 from jointfrf.identification.joint_fit import JointFit
@@ -64,6 +64,6 @@ def fit_measured(freq_hz: FloatArray, dofs: tuple[str, ...], h: ComplexArray, tr
     JointFit
     """
     with warnings.catch_warnings():
-        for category in (IdentificationWarning, IllConditionedWarning, ConvergenceWarning):
+        for category in (IdentificationWarning, IllConditionedWarning, ConvergenceWarning, FrfCheckWarning):
             warnings.simplefilter("ignore", category)
         return identify(freq_hz, h, dofs, transform=transform, cross="ignore", noise=_ASSUMED)

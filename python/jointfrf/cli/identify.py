@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 import argparse
-import sys
 import warnings
 from pathlib import Path
 from typing import cast, get_args
 
 import numpy as np
 
+from jointfrf.channels.check.check import check_frfs, warn_of_frfs
 from jointfrf.channels.finite_differences import difference_error
-from jointfrf.channels.point_lines import Interface, interface
+from jointfrf.channels.point_lines import Interface
 from jointfrf.cli.extras import check_installed
+from jointfrf.cli.measured_file import add_file_arguments, in_some_band, interface_of, nodes, read_frfs, words
 from jointfrf.dofs import is_rotation
-from jointfrf.errors import ConvergenceWarning, FileContentError, IdentificationWarning
+from jointfrf.errors import ConvergenceWarning, FrfCheckWarning, IdentificationWarning
 from jointfrf.identification.compliance_fit.joint_terms import CrossTerms, DampingTerms
 from jointfrf.identification.identify import identify
 from jointfrf.identification.joint_fit import JointFit
-from jointfrf.io import FrfSet, read_uff
 from jointfrf.io.cards import CardFormat
 
 __all__ = ["add_arguments", "run"]
@@ -26,42 +26,23 @@ __all__ = ["add_arguments", "run"]
 _METHODS = ("compliance", "inverse-substructuring")
 
 
-def _words(text: str) -> list[str]:
-    return [word.strip() for word in text.split(",") if word.strip()]
-
-
-def _nodes(text: str) -> list[int]:
-    try:
-        return [int(word) for word in _words(text)]
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a list of node numbers like 102,104") from None
-
-
-def _band(text: str) -> tuple[float, float]:
-    try:
-        low, high = (float(part) for part in text.split(":"))
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a band like 200:550 (Hz)") from None
-    return low, high
-
-
 def _methods(text: str) -> list[str]:
-    for word in _words(text):
+    for word in words(text):
         if word not in _METHODS:
             raise argparse.ArgumentTypeError(f"{word!r} is not one of {', '.join(_METHODS)}")
-    return _words(text)
+    return words(text)
 
 
 def _export(text: str) -> tuple[CardFormat, list[int]]:
     program, _, numbers = text.partition(":")
-    nodes = _nodes(numbers)
+    ends = nodes(numbers)
     wanted = 4 if program == "calculix" else 2
-    if program not in get_args(CardFormat) or len(nodes) not in (2, wanted):
+    if program not in get_args(CardFormat) or len(ends) not in (2, wanted):
         raise argparse.ArgumentTypeError(
             f"{text!r} is not a program ({', '.join(get_args(CardFormat))}) and nodes j and k like abaqus:9001,9002; "
             "calculix takes two ROT NODEs after them"
         )
-    return cast(CardFormat, program), nodes
+    return cast(CardFormat, program), ends
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -70,15 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "Identify a joint from the FRFs of an assembly in a Universal File (dataset 58). Accelerances and mobilities "
         "become receptances; rotations come from points along a line by central differences."
     )
-    parser.add_argument("file", type=Path, help="Universal File with the FRF matrix of the points around the joint")
-    parser.add_argument("--j", type=_nodes, metavar="NODES", help="nodes on side j, along a line: 102,104")
-    parser.add_argument("--k", type=_nodes, metavar="NODES", help="nodes on side k, in the same order: 202,204")
-    parser.add_argument(
-        "--dofs", type=_words, metavar="DOFS", help="joint DOFs out of x,y,z,theta_x,theta_y,theta_z, like y,theta_x"
-    )
-    parser.add_argument(
-        "--band", type=_band, action="append", metavar="LOW:HIGH", help="frequency band in Hz; may be repeated"
-    )
+    add_file_arguments(parser)
     parser.add_argument(
         "--method",
         type=_methods,
@@ -105,22 +78,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="relative noise of the FRFs, 0.01 for 1 %% (default: from their reciprocity)",
     )
     parser.add_argument(
-        "--spacing",
-        type=float,
-        metavar="METRES",
-        help="distance between neighbouring nodes, where the file has no coordinates; needs --axis",
-    )
-    parser.add_argument("--axis", choices=("x", "y", "z"), help="direction of the line of nodes, with --spacing")
-    parser.add_argument(
         "--bending-stiffness",
         type=float,
         metavar="EI",
         help="E I of the thinner part in N m^2: tells how much compliance the differences add",
-    )
-    parser.add_argument(
-        "--quantity",
-        choices=("receptance", "mobility", "accelerance"),
-        help="what the FRFs are, where the file does not say",
     )
     parser.add_argument(
         "--export",
@@ -136,19 +97,16 @@ def run(args: argparse.Namespace) -> int:
     """Carry out the command; the caller turns exceptions into messages."""
     if args.out is not None:
         check_installed("matplotlib")
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        frfs = read_uff(args.file, quantity=args.quantity).receptance()
-    for message in caught:
-        print(f"jointfrf: warning: {message.message}", file=sys.stderr)
+    frfs = read_frfs(args)
     if not (args.j and args.k and args.dofs):
         print(frfs.summary())
         print("\nname the points and DOFs of the joint to identify it: --j NODES --k NODES --dofs DOFS")
         return 0
-    sides = _sides(args, frfs)
+    sides = interface_of(args, frfs)
     measured = frfs.matrix(sides.channels, sides.channels)
+    warn_of_frfs(check_frfs(*in_some_band(frfs.freq_hz, measured, args.band), sides.channels))
     fits = [_fit(args, method, frfs.freq_hz, measured, sides) for method in args.method]
-    points = " and ".join(", ".join(map(str, nodes)) for nodes in (args.j, args.k))
+    points = " and ".join(", ".join(map(str, side)) for side in (args.j, args.k))
     print(
         f"{args.file.name}: {frfs.h.shape[1]} responses x {frfs.h.shape[2]} excitations; joint between points {points}"
     )
@@ -163,10 +121,10 @@ def run(args: argparse.Namespace) -> int:
     for fit in fits:
         print(f"\n{fit}")
     if args.export is not None:
-        program, nodes = args.export
+        program, ends = args.export
         damping = program != "calculix"  # it has none between DOFs, and says so in the text
         print()
-        print(fits[0].export(program, nodes[:2], rotation_nodes=nodes[2:] or None, damping=damping), end="")
+        print(fits[0].export(program, ends[:2], rotation_nodes=ends[2:] or None, damping=damping), end="")
     if args.out is not None:
         from jointfrf.report.fit import write_fit
 
@@ -191,36 +149,13 @@ def _tell_differences(args: argparse.Namespace, sides: Interface) -> None:
         )
 
 
-def _sides(args: argparse.Namespace, frfs: FrfSet) -> Interface:
-    places = dict(frfs.coordinates)
-    if (args.spacing is None) != (args.axis is None):
-        raise ValueError("--spacing and --axis go together")
-    if args.spacing is not None:
-        if not args.spacing > 0:
-            raise ValueError(f"--spacing must be positive, not {args.spacing:g}")
-        for nodes in (args.j, args.k):
-            for i, node in enumerate(nodes):
-                places[node] = np.zeros(3)
-                places[node]["xyz".index(args.axis)] = args.spacing * i
-    if len(args.j) != len(args.k):
-        raise ValueError(f"--j and --k must name the same number of nodes, not {len(args.j)} and {len(args.k)}")
-    known = {channel.node for channel in (*frfs.responses, *frfs.excitations)}
-    for node in (*args.j, *args.k):
-        if node not in known:
-            raise FileContentError(
-                f"{args.file} has no FRF at node {node}; it has nodes {', '.join(map(str, sorted(known)))}"
-            )
-        if node not in places and (len(args.j) > 1 or any(is_rotation(dof) for dof in args.dofs)):
-            raise FileContentError(f"{args.file} has no coordinates of node {node}: say --spacing and --axis")
-    return interface(args.j, args.k, args.dofs, {node: places.get(node, np.zeros(3)) for node in (*args.j, *args.k)})
-
-
 def _fit(
     args: argparse.Namespace, method: str, freq_hz: np.ndarray, measured: np.ndarray, sides: Interface
 ) -> JointFit:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", IdentificationWarning)  # they stand in the table
         warnings.simplefilter("ignore", ConvergenceWarning)
+        warnings.simplefilter("ignore", FrfCheckWarning)  # told with the names of the channels
         return identify(
             freq_hz,
             measured,

@@ -20,6 +20,7 @@ _USAGE_ERROR, _FAILURE, _INTERRUPTED = 2, 1, 130
 _COMMANDS = {
     "run": "run cases: tables, figures and a report each",
     "cases": "list the cases that come with jointfrf",
+    "check": "look at measured FRFs: what is wrong, in which channel, what to do",
     "readings": "compare printed values with every reading of the noise",
     "identify": "identify a joint from a file of measured FRFs",
 }

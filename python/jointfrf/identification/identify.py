@@ -8,6 +8,7 @@ from typing import Literal, get_args
 
 from numpy.typing import ArrayLike
 
+from jointfrf.channels.check.check import check_frfs, warn_of_frfs
 from jointfrf.identification.compliance_fit.joint_terms import CrossTerms, DampingTerms
 from jointfrf.identification.describe import describe_band_mean, describe_compliance
 from jointfrf.identification.fit import fit_band_mean, fit_compliance
@@ -108,6 +109,8 @@ def identify(
         The data determine a parameter poorly, or the residual exceeds the noise: also in `JointFit.warnings`.
     ConvergenceWarning
         The fit did not converge.
+    FrfCheckWarning
+        The FRFs look wrong (`check_frfs`): sign, quantity, gain, delay, a dead or doubled channel. Compliance fit only.
 
     Notes
     -----
@@ -134,6 +137,8 @@ def identify(
     if method == "compliance":
         options = ComplianceOptions(damping, cross, reciprocal)
         problem = prepare_compliance(measured, dofs, bands, transform, noise, options)
+        names = None if transform is not None else [f"{side}:{dof}" for side in "jk" for dof in problem.dofs]
+        warn_of_frfs(check_frfs(problem.freq_hz, problem.measured, names))
         described = describe_compliance(fit_compliance(problem), cross)
     else:
         known = JointFrfs(

@@ -1,0 +1,285 @@
+"""The look at measured FRFs before a fit."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from jointfrf.channels.check.channel_ratios import ChannelRatios, channel_ratios
+from jointfrf.channels.check.correction import Correction, corrected
+from jointfrf.channels.check.driving_points import circles, mean_exponent, sectors
+from jointfrf.channels.check.exchange import Cause, cause_of_broken_pairs, cause_of_gains, hidden_exchange
+from jointfrf.channels.check.exchange_findings import broken_findings
+from jointfrf.channels.check.finding import FindingLevel, FrfCheck, FrfFinding
+from jointfrf.channels.check.lines import find_bad_lines
+from jointfrf.channels.check.measurement import Measurement, as_channel_names, as_measurement
+from jointfrf.channels.check.pair_ratios import PairRatios, pair_ratios
+from jointfrf.channels.check.passivity import passivity_findings
+from jointfrf.channels.check.quantities import quantities
+from jointfrf.channels.check.quantity_findings import convention_finding, quantity_findings, sign_findings
+from jointfrf.channels.check.ratio_findings import (
+    LEAST_GAIN,
+    LEAST_PHASE,
+    delay_findings,
+    gain_findings,
+    unexplained_gains,
+)
+from jointfrf.channels.check.signals import check_signals
+from jointfrf.errors import FrfCheckWarning
+from jointfrf.frf.frf_set import Channel
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_frequency, as_lines, as_real, check_choice
+
+__all__ = ["FrfFix", "check_frfs", "warn_of_frfs"]
+
+FrfFix = Literal["lines", "time-convention", "exchanged", "quantity", "sign", "units", "gain", "delay"]
+#: Fewer lines say nothing of noise.
+_LEAST_LINES = 20
+#: Share of FRFs that run backwards from which all are conjugated.
+_BACKWARDS = 0.8
+
+
+def check_frfs(
+    freq_hz: ArrayLike,
+    h: ArrayLike,
+    names: Sequence[str | Channel] | None = None,
+    *,
+    responses: Sequence[str | Channel] | None = None,
+    forces: Sequence[str | Channel] | None = None,
+    transform: tuple[ArrayLike, ArrayLike] | None = None,
+    dofs: Sequence[str] | None = None,
+    fix: Sequence[FrfFix] = (),
+    blame: Literal["responses", "forces"] = "responses",
+) -> FrfCheck:
+    """Look at measured FRFs before a joint is identified from them: what is wrong, in which channel, and what to do.
+
+    Parameters
+    ----------
+    freq_hz : array_like, shape (n_freq,)
+        Hz.
+    h : array_like, shape (n_freq, n_responses, n_forces)
+        Measured receptances, m/N, as `identify` takes them; or at measured points, before any transformation.
+    names : sequence of str or Channel, optional
+        Names of the channels where responses and forces are the same DOFs, in one order; by default their numbers,
+        where `h` is square. Rotations are known by their names, such as ``"j:theta_x"`` or ``"102:rx"``.
+    responses, forces : sequence of str or Channel, optional
+        Names of rows and columns where they differ. A response and a force of one name are a driving point;
+        ``102:-y`` is the opposite of ``102:+y``.
+    transform : (array_like, array_like), shapes (2 n, n_responses), (2 n, n_forces), optional
+        From responses and from forces to joint DOFs j, then k. Where the channels share fewer than two DOFs, the FRFs
+        of the joint DOFs are looked at instead; nothing is corrected there.
+    dofs : sequence of str, optional
+        Names of the n joint DOFs, with `transform`.
+    fix : sequence of str
+        What to correct: "lines" (leave bad ones out), "time-convention", "exchanged", "quantity", "sign", "units",
+        "gain", "delay". Nothing by default.
+    blame : {"responses", "forces"}
+        Which of the two is corrected where they cannot be told apart: sign, units, gain, delay, exchange.
+
+    Returns
+    -------
+    FrfCheck
+        Findings, and the FRFs with the corrections asked for.
+
+    Raises
+    ------
+    ValueError
+        Wrong shapes, names that do not fit, an unknown word.
+
+    Notes
+    -----
+    With r_p the response over the force of a DOF as measured, each relative to its true value, h_pq / h_qp = r_p / r_q
+    for a reciprocal structure. Over frequency this ratio shows gain (size), sign, delay (phase falling with frequency)
+    and quantity (power of i w) of each channel relative to most others, whatever the structure is. Driving points
+    have Im h < 0 (receptance), Re h > 0 (mobility) or Im h > 0 (accelerance), and all FRFs of a causal system run
+    clockwise through the complex plane.
+
+    Standard errors come from the scatter of the ratios over frequency with their correlation from line to line; a
+    difference counts from 5 standard errors and 1 %. One cause that explains many symptoms is reported once.
+
+    Examples
+    --------
+    >>> import numpy as np, jointfrf as jf
+    >>> freq = np.linspace(0.5, 10, 400)
+    >>> h = jf.pollute(jf.chain([4, 2, 3], [2000, 2500, 900], [3, 2, 2], ground="start").receptance(freq), 0.02)
+    >>> jf.check_frfs(freq, h).ok
+    True
+    >>> h[:, 1] *= 1.1
+    >>> check = jf.check_frfs(freq, h, ["a:x", "b:x", "c:x"], fix=["gain"])
+    >>> [(finding.kind, finding.channels, round(finding.value, 2)) for finding in check.findings]
+    [('gain', ('b:x',), 1.1)]
+    >>> check.changes[0][:22]
+    'response b:x divided b'
+    """
+    lines = as_lines("h", h)
+    freq = as_frequency(freq_hz, lines.shape[0])
+    rows, columns = as_channel_names(lines.shape[1:], names, responses, forces)
+    for word in fix:
+        check_choice("fix", word, get_args(FrfFix))
+    check_choice("blame", blame, ("responses", "forces"))
+    found, good = find_bad_lines(freq, lines, tuple(map(str, rows)), tuple(map(str, columns)))
+    measurement = as_measurement(freq[good], lines[good], rows, columns)
+    look = _Look(measurement, 1 if blame == "responses" else 2)
+    look.findings.extend(found)
+    if measurement.freq_hz.size >= _LEAST_LINES and measurement.h.size:
+        _look_at_channels(look)
+        if transform is not None and look.measurement.rows.size < 2:
+            look.findings.extend(_findings_at_joint(look, transform, dofs))
+    return _result(look, freq, lines, good, fix)
+
+
+def warn_of_frfs(check: FrfCheck, stacklevel: int = 2) -> None:
+    """Issue a `FrfCheckWarning` for each error and warning of a check."""
+    for finding in check.findings:
+        if finding.level != "note":
+            warnings.warn(str(finding), FrfCheckWarning, stacklevel=stacklevel + 1)
+
+
+@dataclass
+class _Look:
+    """What is collected on the way."""
+
+    measurement: Measurement
+    side: int
+    findings: list[FrfFinding] = field(default_factory=list)
+    corrections: list[Correction] = field(default_factory=list)
+
+    def add(self, found: tuple[list[FrfFinding], list[Correction]]) -> None:
+        self.findings.extend(found[0])
+        self.corrections.extend(found[1])
+
+    def corrected(self) -> Measurement:
+        """Return the measurement with all corrections found so far."""
+        one = self.measurement
+        return one.with_frfs(corrected(one.omega, one.h, self.corrections)) if self.corrections else one
+
+
+def _findings_at_joint(
+    look: _Look, transform: tuple[ArrayLike, ArrayLike], dofs: Sequence[str] | None
+) -> list[FrfFinding]:
+    """Return what the FRFs of the joint DOFs show, besides what the channels have shown already."""
+    m = look.corrected()
+    t_out = as_real("transform[0]", transform[0], (None, m.h.shape[1]))
+    t_in = as_real("transform[1]", transform[1], (t_out.shape[0], m.h.shape[2]))
+    names = [str(i) for i in range(t_out.shape[0] // 2)] if dofs is None else list(dofs)
+    if 2 * len(names) != t_out.shape[0]:
+        raise ValueError(
+            f"dofs must name {t_out.shape[0] / 2:g} joint DOFs, half the rows of transform, not {len(names)}"
+        )
+    labels = [f"{side}:{name}" for side in "jk" for name in names]
+    joint = _Look(as_measurement(m.freq_hz, t_out @ m.h @ t_in.T, labels, labels), look.side)
+    _look_at_channels(joint)
+    known = {finding.kind for finding in look.findings}
+    return [finding for finding in joint.findings if finding.kind not in known]
+
+
+def _look_at_channels(look: _Look) -> None:
+    """Judge signals, time convention, reciprocity, driving points, in this order: the first cause is told once."""
+    signals = check_signals(look.measurement)
+    look.findings.extend(signals.findings)
+    m = look.measurement = look.measurement.without(signals.rows, signals.columns)
+    smooth = m.smoothness.copy()
+    smooth[signals.rows], smooth[:, signals.columns] = 0, 0
+    around = circles(m.omega, m.h, smooth)
+    if around.seen and around.value > 0 and around.share >= _BACKWARDS:
+        driving = sectors(_driving(m.square))
+        look.findings.append(convention_finding(around, driving))
+        look.corrections.append(Correction("time-convention", "all FRFs conjugated", conjugate=True))
+    if not m.rows.size:
+        return
+    m = look.corrected()
+    pairs = pair_ratios(m.omega, m.square, m.square_smoothness)
+    if pairs.broken.any():
+        cause = cause_of_broken_pairs(m.square, m.square_smoothness, _matrix(pairs.broken, pairs, m.rows.size))
+        m, pairs = _told(look, m, pairs, cause)
+        if not m.rows.size:
+            return
+    _look_at_ratios(look, m, pairs)
+
+
+def _told(look: _Look, m: Measurement, pairs: PairRatios, cause: Cause) -> tuple[Measurement, PairRatios]:
+    """Add what explains FRFs that are not reciprocal; return the measurement without it."""
+    look.add(broken_findings(m, pairs, cause, look.side))
+    if cause.kind != "exchanged" and cause.channels:
+        at = list(cause.channels[-1:])
+        look.measurement = look.measurement.without(m.rows[at].tolist(), m.columns[at].tolist())
+    m = look.corrected()
+    return m, pair_ratios(m.omega, m.square, m.square_smoothness)
+
+
+def _ratios(m: Measurement, pairs: PairRatios) -> ChannelRatios:
+    return channel_ratios(pairs, m.rows.size, least_gain=LEAST_GAIN, least_delay=LEAST_PHASE / m.omega[-1])
+
+
+def _look_at_ratios(look: _Look, m: Measurement, pairs: PairRatios) -> None:
+    ratios = _ratios(m, pairs)
+    directions = [name.rpartition(":")[2] for name in m.dofs]
+    cause = hidden_exchange(m.square, directions) or cause_of_gains(m.square, unexplained_gains(m, ratios), directions)
+    if cause is not None:
+        m, pairs = _told(look, m, pairs, cause)
+        if not m.rows.size:
+            return
+        ratios = _ratios(m, pairs)
+    driving = _driving(m.square)
+    sector = sectors(driving)
+    exponent = mean_exponent(m.omega, driving * m.omega[:, None] ** -ratios.power.astype(float))
+    span = float(m.freq_hz[-1] / m.freq_hz[0])
+    found = quantities(ratios.group, ratios.power, ratios.sign, sector, exponent, span)
+    look.add(quantity_findings(m, found, sector))
+    look.add(sign_findings(m, found, sector, look.side))
+    look.add(gain_findings(m, ratios, look.side))
+    look.add(delay_findings(m, ratios, look.side))
+    if not any(finding.kind == "passivity" for finding in look.findings):
+        left = look.corrected()
+        noise = _noise(pairs, m.rows.size)
+        delayed = {name for finding in look.findings if finding.kind == "delay" for name in finding.channels}
+        active = passivity_findings(left, _driving(left.square), noise, pairs.inflation)
+        # A delay of a force turns its driving point the other way than one of the response that was taken out.
+        look.findings.extend(finding for finding in active if not delayed.issuperset(finding.channels))
+
+
+def _driving(h: ComplexArray) -> ComplexArray:
+    diagonal: ComplexArray = np.einsum("faa->fa", h)
+    return diagonal
+
+
+def _matrix(values: np.ndarray, pairs: PairRatios, n: int) -> np.ndarray:
+    matrix = np.zeros((n, n), values.dtype)
+    matrix[pairs.p, pairs.q] = matrix[pairs.q, pairs.p] = values
+    return matrix
+
+
+def _noise(pairs: PairRatios, n: int) -> FloatArray:
+    """Return the deviation of the phase of an FRF of each channel, from the scatter of its ratios; 0 if unknown."""
+    scatter = _matrix(np.where(pairs.usable, pairs.scatter, 0.0), pairs, n)
+    count = (scatter > 0).sum(axis=1)
+    deviation: FloatArray = scatter.sum(axis=1) / np.maximum(count, 1) / np.sqrt(4 * np.log(2))
+    return deviation
+
+
+def _result(look: _Look, freq: FloatArray, h: ComplexArray, good: np.ndarray, fix: Sequence[FrfFix]) -> FrfCheck:
+    changes = []
+    if "lines" in fix and not good.all():
+        freq, h = freq[good], np.ascontiguousarray(h[good])
+        changes.append(f"{(~good).sum()} lines left out")
+    for correction in look.corrections:
+        if correction.kind in fix:
+            h = correction.apply(2 * np.pi * freq, h)
+            changes.append(correction.text)
+    levels: tuple[FindingLevel, ...] = get_args(FindingLevel)
+    findings = sorted(look.findings, key=lambda finding: levels.index(finding.level))
+    return FrfCheck(tuple(findings), freq, h, tuple(changes), _unseen(look.measurement))
+
+
+def _unseen(measurement: Measurement) -> str:
+    common = "a gain that all channels share: stiffness and damping carry it one to one"
+    if measurement.rows.size < 2:
+        return (
+            f"{common}; fewer than two DOFs have both a response and a force, so gain, units and delay of channels are "
+            "not compared"
+        )
+    return f"{common}; a delay that all share, unless it turns the phase of a driving point"

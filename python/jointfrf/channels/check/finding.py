@@ -1,0 +1,112 @@
+"""What a check of FRFs found, in words and numbers."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from jointfrf.kernel.arguments import ComplexArray, FloatArray
+
+__all__ = ["FindingKind", "FindingLevel", "FrfCheck", "FrfFinding"]
+
+FindingLevel = Literal["error", "warning", "note"]
+FindingKind = Literal[
+    "lines",
+    "zero-frequency",
+    "dead",
+    "doubled",
+    "time-convention",
+    "exchanged",
+    "quantity",
+    "sign",
+    "units",
+    "gain",
+    "delay",
+    "reciprocity",
+    "passivity",
+]
+
+
+@dataclass(frozen=True)
+class FrfFinding:
+    """One thing that is wrong with measured FRFs.
+
+    Attributes
+    ----------
+    kind : str
+        One of "lines", "zero-frequency", "dead", "doubled", "time-convention", "exchanged", "quantity", "sign",
+        "units", "gain", "delay", "reciprocity", "passivity".
+    level : {"error", "warning", "note"}
+        A fit is meaningless; it is wrong by about what is found; worth to know.
+    channels : tuple of str
+        Names of the channels; empty where it concerns all.
+    value, threshold : float
+        The number that shows it, and the limit it exceeds (or falls below).
+    message, remedy : str
+        What it means; what to do.
+    """
+
+    kind: FindingKind
+    level: FindingLevel
+    channels: tuple[str, ...]
+    value: float
+    threshold: float
+    message: str
+    remedy: str
+
+    def __str__(self) -> str:
+        return f"{self.level}: {self.kind}: {self.message}; {self.remedy}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it for JSON; a number that is not finite becomes None."""
+        numbers = {
+            name: number if math.isfinite(number) else None
+            for name, number in (("value", self.value), ("threshold", self.threshold))
+        }
+        texts = dict(kind=self.kind, level=self.level, channels=list(self.channels))
+        return {**texts, **numbers, "message": self.message, "remedy": self.remedy}
+
+
+@dataclass(frozen=True, eq=False)
+class FrfCheck:
+    """Result of `check_frfs`.
+
+    Attributes
+    ----------
+    findings : tuple of FrfFinding
+        Errors first, then warnings, then notes.
+    freq_hz : ndarray, shape (n_freq,)
+    h : ndarray, shape (n_freq, n_responses, n_forces)
+        The FRFs as given, with the corrections that `fix` asked for.
+    changes : tuple of str
+        What was corrected.
+    unseen : str
+        What no check of these FRFs can see.
+    """
+
+    findings: tuple[FrfFinding, ...]
+    freq_hz: FloatArray
+    h: ComplexArray
+    changes: tuple[str, ...]
+    unseen: str
+
+    @property
+    def ok(self) -> bool:
+        """Whether there is neither an error nor a warning."""
+        return all(finding.level == "note" for finding in self.findings)
+
+    def __str__(self) -> str:
+        head = f"{self.h.shape[0]} lines, {self.h.shape[1]} responses x {self.h.shape[2]} forces"
+        found = [str(finding) for finding in self.findings] or ["nothing found"]
+        changed = [f"changed: {change}" for change in self.changes]
+        return "\n".join([head, *found, *changed, f"not visible: {self.unseen}"])
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return all but the FRFs, for JSON."""
+        return {
+            "ok": self.ok,
+            "findings": [finding.to_dict() for finding in self.findings],
+            "changes": list(self.changes),
+            "not_visible": self.unseen,
+        }

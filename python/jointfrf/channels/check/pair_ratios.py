@@ -1,0 +1,244 @@
+"""Ratios h_pq / h_qp over frequency: their gain, power of i w, delay and phase, with standard errors."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointfrf.channels.check.measurement import LEAST_SMOOTHNESS, modulus
+from jointfrf.frf.noise_estimate import ZERO
+from jointfrf.kernel.arguments import ComplexArray, FloatArray
+
+__all__ = [
+    "BROKEN",
+    "ONE_SIDED",
+    "PairRatios",
+    "are_one_sided",
+    "are_signals",
+    "block_medians",
+    "pair_ratios",
+    "scatter_of",
+]
+
+#: An FRF below this share of sqrt|h_pp h_qq| is zero by symmetry, or as good as that: its reciprocity tells nothing.
+_SMALL = 1e-2
+#: Scatter of log(h_pq / h_qp) above which h_pq and h_qp are not the same FRF; noise of 10 % gives 0.14.
+BROKEN = 0.5
+#: Scatter of a pair of which one is zero.
+ONE_SIDED = 3.0
+#: Lines whose scatter is taken together.
+_BLOCK = 15
+#: Values beyond this number of standard deviations are clipped.
+_CLIP = 2.5
+#: Delays that are tried first: this many steps of half a period of the whole band, either way.
+_STEPS = 16
+#: Standard errors are never taken smaller: round-off, and small errors that every sensor has.
+_LEAST_ERROR = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class PairRatios:
+    """What is known of h_pq / h_qp = gain (i w)^power exp(i phase - i w delay), for pairs p < q.
+
+    Attributes
+    ----------
+    p, q : ndarray of int, shape (n_pairs,)
+    usable : ndarray of bool
+        Pairs whose ratio is constant but for power, delay and noise.
+    broken : ndarray of bool
+        Pairs of two signals that are not the same FRF.
+    power : ndarray of int
+    log_gain, gain_error : ndarray
+        Natural logarithm, and its standard error.
+    delay, delay_error : ndarray
+        s.
+    phase, phase_error : ndarray
+        rad, at 0 Hz with the delay, and at the middle of the band without.
+    scatter : ndarray
+        Median of |log(ratio / model)| over lines.
+    inflation : float
+        Variance of a mean over that of independent lines.
+    """
+
+    p: NDArray[np.intp]
+    q: NDArray[np.intp]
+    usable: NDArray[np.bool_]
+    broken: NDArray[np.bool_]
+    power: NDArray[np.intp]
+    log_gain: FloatArray
+    gain_error: FloatArray
+    delay: FloatArray
+    delay_error: FloatArray
+    phase: FloatArray
+    phase_error: FloatArray
+    scatter: FloatArray
+    inflation: float
+
+
+def pair_ratios(omega: FloatArray, h: ComplexArray, smooth: FloatArray) -> PairRatios:
+    """Look at the reciprocity of FRFs between n DOFs.
+
+    Parameters
+    ----------
+    omega : ndarray, shape (n_freq,)
+    h : ndarray, shape (n_freq, n, n)
+    smooth : ndarray, shape (n, n)
+        `smoothness` of h.
+    """
+    n = h.shape[1]
+    p, q = np.triu_indices(n, 1)
+    above, below = h[:, p, q], h[:, q, p]
+    amplitude, phasor = _parts(above, below)
+    steps, tried = _delays(omega)
+    delay = steps[np.argmax(abs(tried @ phasor), axis=0)]
+    turned = phasor * np.exp(1j * omega[:, None] * delay)
+    direction = _unit(turned.sum(axis=0))
+    power = _powers(omega, amplitude)
+    amplitude = amplitude - power * np.log(omega)[:, None]
+    middle = np.median(amplitude, axis=0)
+    rest: ComplexArray = (amplitude - middle) + 1j * np.angle(turned * direction.conj())
+    scatter = np.median(modulus(rest), axis=0)
+    typical = np.median(modulus(h), axis=0)
+    judged = are_signals(typical, smooth, h.shape[0])[p, q]
+    usable, broken = judged & (scatter < BROKEN), judged & (scatter >= BROKEN)
+    alone = are_one_sided(typical, smooth)[p, q]
+    broken |= alone
+    scatter[alone] = ONE_SIDED
+
+    deviation = _block_deviation(rest)
+    weight = deviation**-2
+    clipped = _clipped(rest, deviation)
+    total = weight.sum(axis=0)
+    mean = (weight * clipped).sum(axis=0) / total
+    at = (weight * omega[:, None]).sum(axis=0) / total
+    lever = omega[:, None] - at
+    inertia = (weight * lever**2).sum(axis=0)
+    slope = (weight * lever * clipped.imag).sum(axis=0) / inertia
+    left = clipped - mean - 1j * lever * slope
+    # What a delay leaves in the phase is not noise: taken out before.
+    inflation = _inflation((left / deviation)[:, usable])
+    real, imaginary = ((weight * part**2).mean(axis=0) * inflation for part in (left.real, left.imag))
+    span = omega[-1]
+    return PairRatios(
+        p, q, usable, broken, power,
+        log_gain=middle + mean.real,
+        gain_error=np.hypot(np.sqrt(real / total), _LEAST_ERROR),
+        delay=delay - slope,
+        delay_error=np.hypot(np.sqrt(imaginary / inertia), _LEAST_ERROR / span),
+        phase=np.angle(direction) + mean.imag - at * slope,
+        phase_error=np.hypot(np.sqrt(imaginary / total), _LEAST_ERROR),
+        scatter=scatter,
+        inflation=inflation,
+    )  # fmt: skip
+
+
+def are_signals(size: FloatArray, smooth: FloatArray, n_freq: int) -> NDArray[np.bool_]:
+    """Pairs, shape (n, n), whose two FRFs are signals and not zero by symmetry.
+
+    From the medians of |h| and the `smoothness` of h, both of shape (n, n).
+    """
+    across = size * size.T
+    own = size.diagonal()
+    large = (across > _SMALL**2 * np.outer(own, own)) & (across > 0)
+    signals: NDArray[np.bool_] = large & (np.minimum(smooth, smooth.T) > max(LEAST_SMOOTHNESS, 4 / np.sqrt(n_freq)))
+    return signals
+
+
+def are_one_sided(size: FloatArray, smooth: FloatArray) -> NDArray[np.bool_]:
+    """Pairs, shape (n, n), of which one FRF is a signal and the other one is zero to rounding."""
+    alone = (size > 0) & (ZERO * size >= size.T) & (smooth > LEAST_SMOOTHNESS)
+    return alone | alone.T
+
+
+def scatter_of(above: ComplexArray, below: ComplexArray) -> FloatArray:
+    """Median over lines of |log(above / below) - constant|: below `BROKEN` where they are one FRF up to a factor."""
+    amplitude, phasor = _parts(above, below)
+    rest = amplitude - np.median(amplitude, axis=0)
+    turn = np.angle(phasor * _unit(phasor.sum(axis=0)).conj())
+    scatter: FloatArray = np.median(np.hypot(rest, turn), axis=0)
+    one_is_zero = ((above == 0) != (below == 0)).mean(axis=0) > 0.5
+    return np.where(one_is_zero, ONE_SIDED, scatter)
+
+
+def _parts(above: ComplexArray, below: ComplexArray) -> tuple[FloatArray, ComplexArray]:
+    """Logarithm of the size, and the phase factor, of above / below; 0 and 1 where one of them is zero."""
+    known = (above != 0) & (below != 0)
+    ratio = np.asarray(np.where(known, above, 1) / np.where(known, below, 1), np.complex128)
+    size = modulus(ratio)
+    return np.log(size), ratio / size
+
+
+def block_medians(values: FloatArray, length: int = _BLOCK) -> FloatArray:
+    """Return the median over blocks of lines, shape (n_blocks, ...); the last block takes what is left."""
+    n = max(values.shape[0] // length, 1)
+    whole = min(n * length, values.shape[0])
+    medians = np.median(values[:whole].reshape(n, whole // n, *values.shape[1:]), axis=1)
+    if values.shape[0] > whole:
+        medians[-1] = np.median(values[whole - whole // n :], axis=0)
+    return medians
+
+
+def _unit(values: ComplexArray) -> ComplexArray:
+    size = abs(values)
+    unit: ComplexArray = np.where(size > 0, values / np.where(size > 0, size, 1), 1)
+    return unit
+
+
+def _delays(omega: FloatArray) -> tuple[FloatArray, ComplexArray]:
+    """Delays to try, s, and exp(i w delay), shape (n_delays, n_freq)."""
+    step = np.pi / (omega[-1] - omega[0])
+    steps = step * np.arange(-_STEPS, _STEPS + 1)
+    once = np.exp(1j * omega * step)
+    turns = np.empty((steps.size, omega.size), complex)
+    turns[0] = once ** (-_STEPS)
+    for i in range(1, steps.size):
+        turns[i] = turns[i - 1] * once
+    return steps, turns
+
+
+def _powers(omega: FloatArray, amplitude: FloatArray) -> NDArray[np.intp]:
+    """Exponent of w in each ratio, from -2 to 2, where this explains it better than a constant."""
+    x, y = block_medians(np.log(omega)[:, None]), block_medians(amplitude)
+    x, y = x - x.mean(), y - y.mean(axis=0)
+    spread = (x**2).sum()
+    if spread == 0:
+        return np.zeros(y.shape[1], np.intp)
+    slope = (x * y).sum(axis=0) / spread
+    power = np.clip(np.rint(slope), -2, 2)
+    left = ((y - slope * x) ** 2).sum(axis=0)
+    explained = (abs(slope - power) < 0.3) & (left < 0.1 * (y**2).sum(axis=0))
+    return np.where(explained, power, 0).astype(np.intp)
+
+
+def _block_deviation(rest: ComplexArray) -> FloatArray:
+    """Return the standard deviation of each line, from the median in its block, and not far below that of all."""
+    squares = block_medians(rest.real**2 + rest.imag**2) / np.log(2)
+    squares = np.maximum(squares, 0.01 * np.median(squares, axis=0) + _LEAST_ERROR**2)
+    length = max(rest.shape[0] // squares.shape[0], 1)
+    length = _BLOCK if rest.shape[0] >= _BLOCK else length
+    place = np.minimum(np.arange(rest.shape[0]) // length, squares.shape[0] - 1)
+    deviation: FloatArray = np.sqrt(squares)[place]
+    return deviation
+
+
+def _clipped(rest: ComplexArray, deviation: FloatArray) -> ComplexArray:
+    limit = _CLIP * deviation
+    return np.clip(rest.real, -limit, limit) + 1j * np.clip(rest.imag, -limit, limit)
+
+
+def _inflation(standard: ComplexArray) -> float:
+    """Sum of the autocorrelation over lags, to the first that is not significant, of all pairs together."""
+    n_freq, n_pairs = standard.shape
+    if n_pairs == 0:
+        return 1.0
+    standard = standard - standard.mean(axis=0)
+    spectrum = (abs(np.fft.fft(standard, 2 * n_freq, axis=0)) ** 2).sum(axis=1)
+    covariance = np.fft.ifft(spectrum).real[: n_freq // 4 + 1]
+    if covariance[0] <= 0:
+        return 1.0
+    correlation = covariance[1:] / covariance[0]
+    small = np.flatnonzero(correlation < 2 / np.sqrt(n_freq * n_pairs))
+    last = small[0] if small.size else correlation.size
+    return float(1 + 2 * correlation[:last].sum())

@@ -1,0 +1,107 @@
+"""Channels without a signal, and channels that hold the same signal twice."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from jointfrf.channels.check.finding import FrfFinding
+from jointfrf.channels.check.measurement import LEAST_SMOOTHNESS, Measurement
+from jointfrf.kernel.arguments import ComplexArray, FloatArray
+
+__all__ = ["BadSignals", "check_signals"]
+
+#: FRFs that agree to this share are copies: two measurements differ by their noise.
+_SAME = 1e-6
+#: FRFs that are reciprocal to this share hold no noise, or were made so.
+_EXACT = 1e-9
+#: Rows that are less alike than this on some lines are not compared on all; how many lines.
+_ALIKE, _SOME = 0.999, 60
+
+
+@dataclass(frozen=True)
+class BadSignals:
+    """Findings, and responses and forces that nothing else can be said of."""
+
+    findings: list[FrfFinding]
+    rows: list[int]
+    columns: list[int]
+
+
+def check_signals(measurement: Measurement) -> BadSignals:
+    """Find responses and forces that are dead or doubled."""
+    findings: list[FrfFinding] = []
+    bad: list[list[int]] = []
+    across = measurement.h.swapaxes(1, 2)
+    smooth = measurement.smoothness
+    for word, names, h, own in (
+        ("response", measurement.responses, measurement.h, smooth),
+        ("force", measurement.forces, across, smooth.T),
+    ):
+        dead = _dead(own, h.shape[0])
+        findings += [_dead_finding(word, names[i], float(own[i].max())) for i in dead]
+        copies = [] if _is_exact(measurement) else _copies(h, dead)
+        findings += [_copy_finding(word, names[i], names[j], value) for i, j, value in copies]
+        bad.append([*dead, *(place for i, j, _ in copies for place in (i, j))])
+    return BadSignals(findings, *bad)
+
+
+def _is_exact(measurement: Measurement) -> bool:
+    """Whether FRFs are reciprocal to rounding: calculated, or made so; equal channels are then no copies of noise."""
+    square = measurement.square
+    return bool(square.size and abs(square - square.swapaxes(1, 2)).max() <= _EXACT * abs(square).max())
+
+
+def _dead(smooth: FloatArray, n_freq: int) -> list[int]:
+    """Rows that are zero or noise in all columns."""
+    dead: list[int] = np.flatnonzero(smooth.max(axis=1) < max(LEAST_SMOOTHNESS, 4 / np.sqrt(n_freq))).tolist()
+    return dead
+
+
+def _dead_finding(word: str, name: str, value: float) -> FrfFinding:
+    what = "is zero" if value == 0 else f"is noise: its phase agrees by {value:.2f} from line to line"
+    remedy = "connect or replace the sensor" if word == "response" else "repeat the impacts"
+    return FrfFinding(
+        "dead",
+        "error",
+        (f"{word} {name}",),
+        float(value),
+        LEAST_SMOOTHNESS,
+        f"{word} {name} {what}",
+        f"{remedy}, or leave it out",
+    )
+
+
+def _copies(h: ComplexArray, dead: list[int]) -> list[tuple[int, int, float]]:
+    """Pairs of rows that are equal to rounding up to a real factor, and by how much they differ."""
+    product = _products(h[:: -(-h.shape[0] // _SOME)])
+    found: list[tuple[int, int, float]] = []
+    for i, j in zip(*np.nonzero(np.triu(abs(product) > _ALIKE, 1)), strict=True):
+        if i in dead or j in dead or any(j == other for _, other, _ in found):
+            continue
+        size = np.maximum(np.sqrt((abs(h[:, [i, j]]) ** 2).mean(axis=(0, 1))), np.finfo(float).tiny)
+        first, second = (h[:, k] / size for k in (i, j))
+        factor = np.vdot(first, second).real / np.vdot(first, first).real
+        differs = float(np.linalg.norm(second - factor * first) / np.linalg.norm(second))
+        if differs < _SAME:
+            found.append((int(i), int(j), differs))
+    return found
+
+
+def _products(h: ComplexArray) -> FloatArray:
+    """Normalised products of rows over lines and columns, every column with the same weight."""
+    size = np.sqrt((abs(h) ** 2).mean(axis=(0, 1), keepdims=True))
+    flat = (h / np.where(size > 0, size, 1)).swapaxes(0, 1).reshape(h.shape[1], -1)
+    flat = flat / np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), np.finfo(float).tiny)
+    products: FloatArray = (flat.conj() @ flat.T).real
+    return products
+
+
+def _copy_finding(word: str, first: str, second: str, value: float) -> FrfFinding:
+    names = (f"{word} {first}", f"{word} {second}")
+    return FrfFinding(
+        "doubled", "error", names, value, _SAME,
+        f"{word}s {first} and {second} hold the same numbers, noise included (difference {value:.1e})",
+        "measure one of them again: two DOFs need two measurements",
+    )  # fmt: skip

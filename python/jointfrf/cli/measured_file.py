@@ -1,0 +1,108 @@
+"""A Universal File on the command line: which one, the points and DOFs of the joint in it."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import warnings
+from pathlib import Path
+
+import numpy as np
+
+from jointfrf.channels.point_lines import Interface, interface
+from jointfrf.dofs import is_rotation
+from jointfrf.errors import FileContentError
+from jointfrf.frf.bands import in_bands
+from jointfrf.io import FrfSet, read_uff
+from jointfrf.kernel.arguments import ComplexArray, FloatArray
+
+__all__ = ["add_file_arguments", "in_some_band", "interface_of", "nodes", "read_frfs", "words"]
+
+
+def words(text: str) -> list[str]:
+    """Return the words between commas."""
+    return [word.strip() for word in text.split(",") if word.strip()]
+
+
+def nodes(text: str) -> list[int]:
+    """Return node numbers between commas."""
+    try:
+        return [int(word) for word in words(text)]
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a list of node numbers like 102,104") from None
+
+
+def _band(text: str) -> tuple[float, float]:
+    try:
+        low, high = (float(part) for part in text.split(":"))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a band like 200:550 (Hz)") from None
+    return low, high
+
+
+def add_file_arguments(parser: argparse.ArgumentParser) -> None:
+    """Describe the file, the points on both sides, the DOFs, the bands."""
+    parser.add_argument("file", type=Path, help="Universal File with the FRF matrix of the points around the joint")
+    parser.add_argument("--j", type=nodes, metavar="NODES", help="nodes on side j, along a line: 102,104")
+    parser.add_argument("--k", type=nodes, metavar="NODES", help="nodes on side k, in the same order: 202,204")
+    parser.add_argument(
+        "--dofs", type=words, metavar="DOFS", help="joint DOFs out of x,y,z,theta_x,theta_y,theta_z, like y,theta_x"
+    )
+    parser.add_argument(
+        "--band", type=_band, action="append", metavar="LOW:HIGH", help="frequency band in Hz; may be repeated"
+    )
+    parser.add_argument(
+        "--spacing",
+        type=float,
+        metavar="METRES",
+        help="distance between neighbouring nodes, where the file has no coordinates; needs --axis",
+    )
+    parser.add_argument("--axis", choices=("x", "y", "z"), help="direction of the line of nodes, with --spacing")
+    parser.add_argument(
+        "--quantity",
+        choices=("receptance", "mobility", "accelerance"),
+        help="what the FRFs are, where the file does not say",
+    )
+
+
+def read_frfs(args: argparse.Namespace) -> FrfSet:
+    """Read the file as receptances; what had to be assumed is told as a warning."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        frfs = read_uff(args.file, quantity=args.quantity).receptance()
+    for message in caught:
+        print(f"jointfrf: warning: {message.message}", file=sys.stderr)
+    return frfs
+
+
+def in_some_band(
+    freq_hz: FloatArray, h: ComplexArray, bands: list[tuple[float, float]] | None
+) -> tuple[FloatArray, ComplexArray]:
+    """Return the lines in the bands; all where there are none."""
+    kept = in_bands(freq_hz, bands) if bands else np.ones(freq_hz.size, bool)
+    return freq_hz[kept], np.ascontiguousarray(h[kept])
+
+
+def interface_of(args: argparse.Namespace, frfs: FrfSet) -> Interface:
+    """Return the joint DOFs of both sides."""
+    places = dict(frfs.coordinates)
+    if (args.spacing is None) != (args.axis is None):
+        raise ValueError("--spacing and --axis go together")
+    if args.spacing is not None:
+        if not args.spacing > 0:
+            raise ValueError(f"--spacing must be positive, not {args.spacing:g}")
+        for nodes in (args.j, args.k):
+            for i, node in enumerate(nodes):
+                places[node] = np.zeros(3)
+                places[node]["xyz".index(args.axis)] = args.spacing * i
+    if len(args.j) != len(args.k):
+        raise ValueError(f"--j and --k must name the same number of nodes, not {len(args.j)} and {len(args.k)}")
+    known = {channel.node for channel in (*frfs.responses, *frfs.excitations)}
+    for node in (*args.j, *args.k):
+        if node not in known:
+            raise FileContentError(
+                f"{args.file} has no FRF at node {node}; it has nodes {', '.join(map(str, sorted(known)))}"
+            )
+        if node not in places and (len(args.j) > 1 or any(is_rotation(dof) for dof in args.dofs)):
+            raise FileContentError(f"{args.file} has no coordinates of node {node}: say --spacing and --axis")
+    return interface(args.j, args.k, args.dofs, {node: places.get(node, np.zeros(3)) for node in (*args.j, *args.k)})

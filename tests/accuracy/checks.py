@@ -1,0 +1,83 @@
+"""How often `jf.check_frfs` finds errors of channels, and how often it finds some where there are none.
+
+.venv/bin/python tests/accuracy/checks.py [--seeds N] [--false-seeds N] [--jobs N]
+
+Prints two tables in Markdown, those of docs/checks.md. Seeds 0 to N - 1 of numpy's generator, together with the kind of
+noise.
+"""
+
+import argparse
+import sys
+from concurrent.futures import ProcessPoolExecutor
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "python" / "support"))
+
+import jointfrf as jf
+from measurement_errors import ERRORS, KINDS_OF_NOISE, check_with_error, measured, names, structure
+
+STRUCTURES = ("3.1", "3.2", "3.3", "six")
+LEVELS = (0.005, 0.02, 0.05, 0.1)
+#: Noise of the table of detection.
+NOISES = (
+    ("complex", 0.005),
+    ("complex", 0.05),
+    ("complex", 0.1),
+    ("floor", 0.05),
+    ("hum", 0.02),
+    ("correlated 25", 0.05),
+)
+
+
+def false_alarms(task: tuple[str, str, float, int]) -> int:
+    """Number of data sets without an error in which something is found."""
+    name, kind, level, seeds = task
+    s = structure(name)
+    found = 0
+    for seed in range(seeds):
+        freq, h = measured(s, kind, level, seed)
+        found += not jf.check_frfs(freq, h, names(s)).ok
+    return found
+
+
+def detections(task: tuple[str, str, str, float, int]) -> tuple[int, int, int]:
+    """Numbers of data sets, of those where the error is found with its channel, and where nothing else is."""
+    error, name, kind, level, seeds = task
+    results = [check_with_error(structure(name), ERRORS[error], kind, level, seed) for seed in range(seeds)]
+    told = [result for result in results if result is not None]
+    return len(told), sum(result.found for result in told), sum(result.found and result.alone for result in told)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--seeds", type=int, default=10, help="of each cell of the table of detection")
+    parser.add_argument("--false-seeds", type=int, default=20, help="of each kind of noise, level and structure")
+    parser.add_argument("--jobs", type=int, default=2)
+    options = parser.parse_args()
+    with ProcessPoolExecutor(options.jobs) as pool:
+        tasks = [(*task, options.false_seeds) for task in product(STRUCTURES, KINDS_OF_NOISE, LEVELS)]
+        found = dict(zip([task[:3] for task in tasks], pool.map(false_alarms, tasks), strict=True))
+        print("| noise |", " | ".join(STRUCTURES), "| data sets |\n|" + "---|" * (len(STRUCTURES) + 2))
+        for kind in KINDS_OF_NOISE:
+            row = [sum(found[name, kind, level] for level in LEVELS) for name in STRUCTURES]
+            print(f"| {kind} |", " | ".join(map(str, row)), f"| {len(row) * len(LEVELS) * options.false_seeds} |")
+        total = sum(found.values())
+        print(f"\n{total} false alarms in {len(tasks) * options.false_seeds} data sets\n", flush=True)
+
+        rows = [(error, some) for error in ERRORS for some in NOISES]
+        cells = [(error, name, *some, options.seeds) for error, some in rows for name in STRUCTURES]
+        numbers = dict(zip([cell[:4] for cell in cells], pool.map(detections, cells), strict=True))
+        heads = [f"{kind} {100 * level:g} %" for kind, level in NOISES]
+        print("| error |", " | ".join(heads), "| nothing else |\n|" + "---|" * (len(NOISES) + 2))
+        for error in ERRORS:
+            parts = [[numbers[error, name, *some] for name in STRUCTURES] for some in NOISES]
+            sums = np.array([np.sum(part, axis=0) for part in parts])
+            shares = [f"{100 * found / n:.0f}" for n, found, _ in sums]
+            print(f"| {error} |", " | ".join(shares), f"| {100 * sums[:, 2].sum() / max(sums[:, 1].sum(), 1):.0f} |")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,240 @@
+"""What a look at measured FRFs finds, how it says so, and what it corrects."""
+
+import json
+import warnings
+
+import numpy as np
+import pytest
+
+import jointfrf as jf
+from jointfrf.channels.check.check import warn_of_frfs
+from measurement_errors import ERRORS, KINDS_OF_NOISE, check_with_error, measured, names, structure
+
+S = structure("3.3")
+NAMES = names(S)
+
+
+def noisy(seed=1, level=0.02):
+    return measured(S, "complex", level, seed)[1]
+
+
+@pytest.mark.parametrize("kind", KINDS_OF_NOISE)
+@pytest.mark.parametrize("name", ["3.1", "3.2", "3.3", "six"])
+def test_noise_alone_is_no_finding(name, kind):
+    s = structure(name)
+    for level in (0.005, 0.1):
+        freq, h = measured(s, kind, level, 5)
+        assert jf.check_frfs(freq, h, names(s)).findings == ()
+
+
+@pytest.mark.parametrize("error", ERRORS)
+@pytest.mark.parametrize("name", ["3.3", "six"])
+def test_errors_are_found_with_their_channel_and_nothing_else(name, error):
+    for seed in (0, 3):
+        told = check_with_error(structure(name), ERRORS[error], "complex", 0.02, seed)
+        assert told.found, told.check
+        assert told.alone, told.check
+
+
+def test_without_noise_nothing_is_found():
+    for name in ("3.1", "3.2", "3.3", "six"):
+        s = structure(name)
+        assert jf.check_frfs(s.freq, s.gamma, names(s)).findings == ()
+
+
+def test_numbers_of_gain_and_delay_have_true_errors():
+    gains, delays = [], []
+    for seed in range(10):
+        h = noisy(seed)
+        h[:, 2] *= 1.07 * np.exp(-2j * np.pi * S.freq * 30e-6)[:, None]
+        found = {finding.kind: finding for finding in jf.check_frfs(S.freq, h, NAMES).findings}
+        assert found["gain"].channels == found["delay"].channels == ("k:Fy",)
+        gains.append(found["gain"].value)
+        delays.append(found["delay"].value)
+    # 2 % noise: 0.02 of the logarithm of a ratio on each line, on 786 lines, against the mean of three channels.
+    expected = 0.02 / np.sqrt(786) * np.sqrt(2 / 3)
+    assert np.mean(gains) == pytest.approx(1.07, abs=4 * expected / np.sqrt(10))
+    assert 0.4 * expected < np.std(np.log(gains)) < 2 * expected
+    assert np.mean(delays) == pytest.approx(30e-6, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("kind", "change"),
+    [
+        ("gain", lambda h: h[:, 1].__imul__(1.1)),
+        ("sign", lambda h: h[:, 1].__imul__(-1)),
+        ("units", lambda h: h[:, 1].__imul__(180 / np.pi)),
+        ("delay", lambda h: h[:, 1].__imul__(np.exp(-2j * np.pi * S.freq * 50e-6)[:, None])),
+        ("quantity", lambda h: h.__imul__((2j * np.pi * S.freq)[:, None, None] ** 2)),
+        ("time-convention", lambda h: np.conj(h, out=h)),
+        ("exchanged", lambda h: h.__setitem__((slice(None), [1, 3]), h[:, [3, 1]])),
+    ],
+)
+def test_a_correction_gives_the_data_back(kind, change):
+    exact = noisy()
+    wrong = exact.copy()
+    change(wrong)
+    kept = wrong.copy()
+    check = jf.check_frfs(S.freq, wrong, NAMES, fix=[kind])
+    assert [finding.kind for finding in check.findings] == [kind]
+    assert len(check.changes) == 1
+    np.testing.assert_array_equal(wrong, kept)
+    assert (abs(check.h - exact) / abs(exact)).max() < 0.02
+    assert jf.check_frfs(S.freq, check.h, NAMES).ok
+    untouched = jf.check_frfs(S.freq, wrong, NAMES)
+    assert untouched.changes == ()
+    np.testing.assert_array_equal(untouched.h, wrong)
+
+
+def test_a_force_may_be_blamed_instead():
+    exact = noisy()
+    wrong = exact.copy()
+    wrong[:, :, 1] *= 0.8
+    check = jf.check_frfs(S.freq, wrong, NAMES, fix=["gain"], blame="forces")
+    np.testing.assert_allclose(check.h, exact, rtol=0.01)
+    (finding,) = check.findings
+    assert finding.value == pytest.approx(1 / 0.8, rel=0.01)
+    assert "cannot tell" in finding.remedy
+
+
+def test_bad_lines_can_be_left_out():
+    h = noisy()
+    h[7, 2, 1] = np.nan
+    h[9, 2, 3] = np.inf
+    freq = S.freq.copy()
+    freq[0] = 0
+    check = jf.check_frfs(freq, h, NAMES, fix=["lines"])
+    assert [finding.kind for finding in check.findings] == ["lines", "zero-frequency"]
+    assert check.findings[0].channels == ("response k:Fy",)
+    assert "2 of 786 lines, the first is line 7 (22 Hz)" in check.findings[0].message
+    assert check.h.shape[0] == check.freq_hz.size == 783
+    assert np.isfinite(check.h).all()
+
+
+def test_frequencies_that_do_not_increase():
+    freq = S.freq.copy()
+    freq[100] = freq[99]
+    (finding,) = jf.check_frfs(freq, noisy(), NAMES).findings
+    assert finding.kind == "lines"
+    assert "line 100" in finding.message
+
+
+def test_responses_and_forces_of_different_sets():
+    """Driving points are known by their names, and by the direction in which they point."""
+    h = noisy()[:, :, [2, 0, 1]]
+    h[:, :, 1] *= -1
+    labels = ["1:+y", "1:+rz", "2:+y", "2:+rz"]
+    assert jf.check_frfs(S.freq, h, responses=labels, forces=["2:y", "1:-y", "1:rz"]).ok
+    (finding,) = jf.check_frfs(S.freq, h, responses=labels, forces=["2:y", "1:y", "1:rz"]).findings
+    assert (finding.kind, finding.channels) == ("sign", ("1:+y",))
+    apart = jf.check_frfs(S.freq, h, responses=labels, forces=["7:y", "8:y", "9:y"])
+    assert apart.ok
+    assert "fewer than two DOFs" in apart.unseen
+    assert [
+        f.kind for f in jf.check_frfs(S.freq, h.conj(), responses=labels, forces=["7:y", "8:y", "9:y"]).findings
+    ] == ["time-convention"]
+
+
+def test_virtual_points_from_different_sensors_and_impacts():
+    """No driving point among the channels: the joint DOFs show a wrong sign, and units."""
+    rng = np.random.default_rng(4)
+    sensors, impacts = (
+        np.kron(np.eye(2), np.array([[1.0, a], [1.0, b], [1.0, c]])) for a, b, c in rng.uniform(-0.03, 0.03, (2, 3))
+    )
+    h = jf.pollute(sensors @ S.gamma @ impacts.T, 0.01, seed=2)
+    channels = dict(responses=[f"{i}:y" for i in range(1, 7)], forces=[f"{i}:y" for i in range(11, 17)])
+    transform = np.linalg.pinv(sensors), np.linalg.pinv(impacts)
+    assert jf.check_frfs(S.freq, h, **channels, transform=transform, dofs=["y", "theta"]).ok
+    wrong = jf.check_frfs(S.freq, -h, **channels, transform=transform, dofs=["y", "theta"])
+    assert [finding.kind for finding in wrong.findings] == ["sign"]
+    degrees = np.diag([1, 180 / np.pi, 1, 1]) @ transform[0]
+    (finding,) = jf.check_frfs(S.freq, h, **channels, transform=(degrees, transform[1]), dofs=["y", "theta"]).findings
+    assert (finding.kind, finding.channels) == ("units", ("j:theta",))
+    with pytest.raises(ValueError, match="dofs must name 2 joint DOFs"):
+        jf.check_frfs(S.freq, h, **channels, transform=transform, dofs=["y"])
+
+
+def test_two_sides_that_cannot_be_told_apart_are_both_named():
+    s = structure("3.1")
+    freq, h = measured(s, "complex", 0.02, 1)
+    h[:, 0] *= 1.1
+    (finding,) = jf.check_frfs(freq, h, ["j:x", "k:x"]).findings
+    assert finding.kind == "gain"
+    assert "j:x" in finding.message
+    assert "k:x" in finding.message
+
+
+def test_a_structure_that_gives_out_energy():
+    a = jf.chain([4, 2, 3], [2000, 2500, 900], [6, 4, 4], ground="start")
+    freq = np.linspace(0.5, 8, 600)
+    h = a.receptance(freq)
+    near = abs(freq - freq[np.argmax(abs(h[:, 0, 0]))]) < 1
+    h[near] = h[near].conj()
+    assert "passivity" in {finding.kind for finding in jf.check_frfs(freq, jf.pollute(h, 0.02)).findings}
+
+
+def test_data_made_reciprocal_and_stiff_joints_are_no_finding(beams):
+    h = noisy()
+    assert jf.check_frfs(S.freq, (h + h.swapaxes(1, 2)) / 2, NAMES).ok
+    for factor in (1, 30, 1000):
+        joint = jf.Joint([6e5 * factor, 5e3 * factor], [20, 1.5], ["y", "theta"])
+        for level in (0.005, 0.05):
+            assert jf.check_frfs(beams.freq, jf.pollute(beams.gamma(joint), level, seed=1)).ok
+
+
+def test_one_driving_point_alone():
+    h = noisy()[:, :1, :1]
+    assert jf.check_frfs(S.freq, h, ["y"]).ok
+    assert [finding.kind for finding in jf.check_frfs(S.freq, -h, ["y"]).findings] == ["sign"]
+    assert [finding.kind for finding in jf.check_frfs(S.freq, h.conj(), ["y"]).findings] == ["time-convention"]
+    assert [finding.kind for finding in jf.check_frfs(S.freq, 0 * h, ["y"]).findings] == ["dead", "dead"]
+
+
+def test_all_channels_dead():
+    assert {finding.kind for finding in jf.check_frfs(S.freq, 0 * noisy(), NAMES).findings} == {"dead"}
+
+
+def test_few_lines_are_not_judged():
+    assert jf.check_frfs(S.freq[:5], -noisy()[:5]).ok
+
+
+def test_warnings_text_and_dictionary_say_the_same():
+    h = noisy()
+    h[:, 0] *= -1
+    check = jf.check_frfs(S.freq, h, NAMES)
+    (finding,) = check.findings
+    with pytest.warns(jf.FrfCheckWarning, match="sign: the response of j:Fy points against the force"):
+        warn_of_frfs(check)
+    assert not check.ok
+    assert str(finding) in str(check)
+    content = json.loads(json.dumps(check.to_dict(), allow_nan=False))
+    assert content["findings"][0]["message"] == finding.message
+    assert content["findings"][0]["channels"] == ["j:Fy"]
+
+
+def test_identify_looks_first(beams):
+    h = jf.pollute(beams.gamma(beams.joint), 0.01, seed=3)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        jf.identify(beams.freq, h.conj(), ["y", "theta"])
+    said = [str(w.message) for w in caught if w.category is jf.FrfCheckWarning]
+    assert len(said) == 1
+    assert "exp(-i w t)" in said[0]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (dict(names=["a", "b"]), "names must name 4 different channels"),
+        (dict(names=["a", "a", "b", "c"]), "names must name 4 different channels"),
+        (dict(responses=["a", "b", "c", "d"]), "responses and forces go together"),
+        (dict(names=list("abcd"), forces=list("abcd")), "names goes without"),
+        (dict(fix=["all"]), "fix must be one of lines, time-convention"),
+        (dict(blame="me"), "blame must be one of responses, forces"),
+        (dict(h=np.ones((786, 4, 3))), "4 responses and 3 forces: name them"),
+        (dict(freq_hz=[1.0]), r"freq_hz must have shape \(786\)"),
+    ],
+)
+def test_bad_arguments_get_one_sentence(change, message):
+    with pytest.raises(ValueError, match=message):
+        jf.check_frfs(**(dict(freq_hz=S.freq, h=noisy()) | change))
