@@ -12,6 +12,12 @@ module jointfrf_engine
   use jointfrf_lane_kernels_v3, only: set_v3 => set_kernels
   use jointfrf_lane_kernels_v4, only: set_v4 => set_kernels
 #endif
+  use jointfrf_manifold_kernels_plain, only: set_manifold_plain => set_manifold_kernels
+#ifdef JF_X86
+  use jointfrf_manifold_kernels_v2, only: set_manifold_v2 => set_manifold_kernels
+  use jointfrf_manifold_kernels_v3, only: set_manifold_v3 => set_manifold_kernels
+  use jointfrf_manifold_kernels_v4, only: set_manifold_v4 => set_manifold_kernels
+#endif
   use jointfrf_noise_kernels_plain, only: set_noise_plain => set_noise_kernels
 #ifdef JF_X86
   use jointfrf_noise_kernels_v2, only: set_noise_v2 => set_noise_kernels
@@ -69,8 +75,8 @@ contains
     if (engine == engine_automatic) engine = best()
   end subroutine get_engine
 
-  !> The kernels of the engine in use; `found` is false for the reference engine, which has those for noise only: they
-  !> give the same bits with every instruction set.
+  !> The kernels of the engine in use; `found` is false for the reference engine. Those of the widest instruction set
+  !> stand in for it where there is no LAPACK: for noise, which has the same bits with all of them, and the manifold.
   subroutine find_kernels(kernels, found, info)
     type(lane_kernels), intent(out) :: kernels
     logical, intent(out) :: found
@@ -81,29 +87,25 @@ contains
     call get_engine(engine, info)
     if (info /= info_good) return
     found = engine /= engine_lapack
+    if (.not. found) engine = best()
     select case (engine)
     case (engine_plain)
       call set_plain(kernels)
+      call set_noise_plain(kernels)
+      call set_manifold_plain(kernels)
 #ifdef JF_X86
     case (engine_v2)
       call set_v2(kernels)
+      call set_noise_v2(kernels)
+      call set_manifold_v2(kernels)
     case (engine_v3)
       call set_v3(kernels)
+      call set_noise_v3(kernels)
+      call set_manifold_v3(kernels)
     case (engine_v4)
       call set_v4(kernels)
-#endif
-    end select
-    if (engine == engine_lapack) engine = best()
-    select case (engine)
-    case (engine_plain)
-      call set_noise_plain(kernels)
-#ifdef JF_X86
-    case (engine_v2)
-      call set_noise_v2(kernels)
-    case (engine_v3)
-      call set_noise_v3(kernels)
-    case (engine_v4)
       call set_noise_v4(kernels)
+      call set_manifold_v4(kernels)
 #endif
     end select
   end subroutine find_kernels

@@ -13,6 +13,7 @@ module jointfrf_lanes
   use jointfrf_elimination_plan, only: elimination_plan
   use jointfrf_kinds, only: dp, ip
   use jointfrf_lookahead, only: lookahead
+  use jointfrf_manifold_plan, only: manifold_plan
   implicit none
   private
   public :: lane_kernels, element_space, padded, to_register, real_lines, flat, in_memory, row_starts, &
@@ -273,6 +274,36 @@ module jointfrf_lanes
       real(dp), intent(inout) :: k_joint(2, *)
       real(dp), intent(out) :: rcond(n_lines)
     end subroutine identify_lines_routine
+
+    !> FRFs nearest to given ones that fit a joint, see jointfrf_manifold_plan.
+    !> steps       at most
+    !> least_gain  a line has arrived when a step lowers its squares by no more
+    !> w           weights of the entries of gamma, shape (lanes, n_entry)
+    !> whitening   rows of the triangular factor up to the diagonal, shape (lanes, n_entry*(n_entry + 1)/2)
+    !> x           holds C, the target, and the best H and M, also on return
+    !> squares     weighted squares of the distance; not finite where the first point was not, and is still there
+    subroutine project_routine(plan, steps, least_gain, w, whitening, x, squares)
+      import :: dp, lanes, manifold_plan
+      implicit none
+      type(manifold_plan), intent(in) :: plan
+      integer, intent(in) :: steps
+      real(dp), intent(in) :: least_gain, w(lanes, *), whitening(lanes, *)
+      real(dp), intent(inout) :: x(lanes, 2, *)
+      real(dp), intent(out) :: squares(lanes)
+    end subroutine project_routine
+
+    !> Information on the free entries of C, gradients and squares of the residuals, H and M eliminated.
+    !> w, whitening   as in project_routine
+    !> x              holds C, H, M and the targets; on return the information in `result`, and gradients in `normal`
+    !> squares        shape (lanes, n_target)
+    subroutine joint_form_routine(plan, w, whitening, x, squares)
+      import :: dp, lanes, manifold_plan
+      implicit none
+      type(manifold_plan), intent(in) :: plan
+      real(dp), intent(in) :: w(lanes, *), whitening(lanes, *)
+      real(dp), intent(inout) :: x(lanes, 2, *)
+      real(dp), intent(out) :: squares(lanes, plan%n_target)
+    end subroutine joint_form_routine
   end interface
 
   !> The kernels of one instruction set.
@@ -298,6 +329,8 @@ module jointfrf_lanes
     procedure(pollute_lanes_routine), pointer, nopass :: pollute_lanes => null()
     procedure(largest_routine), pointer, nopass :: largest => null()
     procedure(moments_routine), pointer, nopass :: moments => null()
+    procedure(project_routine), pointer, nopass :: project => null()
+    procedure(joint_form_routine), pointer, nopass :: joint_form => null()
   end type lane_kernels
 
   !> The elements of a block, given out one after the other. What was taken in the end is what the block needs.

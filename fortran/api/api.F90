@@ -49,9 +49,9 @@ module jointfrf
   use jointfrf_brick, only: brick_matrices, brick_quality
   use jointfrf_checks, only: check_brick_matrices, check_brick_quality, check_central_difference, &
     check_compliance_covariance, check_compliance_factors, check_couple, check_decouple, &
-    check_difference_weights, check_invert, check_matrices, check_modify, check_monte_carlo, &
-    check_pollute, check_rational_fit, check_receptance, check_receptance_banded, check_receptance_modal, &
-    check_relocate_poles, check_solve, check_transform
+    check_difference_weights, check_invert, check_joint_forms, check_matrices, check_modify, check_monte_carlo, &
+    check_pollute, check_project_on_joint, check_rational_fit, check_receptance, check_receptance_banded, &
+    check_receptance_modal, check_relocate_poles, check_solve, check_transform
   use jointfrf_compliance, only: compliance_covariance, compliance_factors, joint_compliance
   use jointfrf_coupling, only: couple
   use jointfrf_decoupling, only: decouple
@@ -62,6 +62,7 @@ module jointfrf
   use jointfrf_ismm, only: inverse_substructuring, ismm
   use jointfrf_kinds, only: ip, long
   use jointfrf_linear_algebra, only: invert, solve
+  use jointfrf_manifold, only: joint_forms, project_on_joint
   use jointfrf_modal, only: receptance_modal
   use jointfrf_modification, only: find_modification, modify
   use jointfrf_monte_carlo, only: monte_carlo
@@ -80,6 +81,7 @@ module jointfrf
   public :: jf_couple, jf_modify, jf_find_modification
   public :: jf_ismm, jf_inverse_substructuring, jf_decouple
   public :: jf_joint_compliance, jf_compliance_factors, jf_compliance_covariance
+  public :: jf_project_on_joint, jf_joint_forms
   public :: jf_difference_weights, jf_central_difference, jf_transform
   public :: jf_pollute, jf_monte_carlo
   public :: jf_brick_matrices, jf_brick_quality
@@ -583,6 +585,90 @@ contains
     end if
     call release_traps(host)
   end subroutine jf_compliance_covariance
+
+  !> The FRFs nearest to measured ones that fit a joint of compliance C, on every line.
+  !> Such FRFs are gamma_jj = H, gamma_jk = H T, gamma_kj = T' H, gamma_kk = T' H T + C T with T = 1 - M C, T' = 1 - C M
+  !> and two free matrices H and M. They are found by Levenberg-Marquardt steps, in lanes whatever engine is chosen.
+  !> reciprocal     1: C, H and M are symmetric, and of gamma the upper triangle is read; 0: they are general
+  !> n              number of joint DOFs, at least 1
+  !> n_correlated   n_entry, or 0 for no whitening: whitening is not read then. n_entry is the number of entries of
+  !>                gamma that are read, n (2 n + 1) or 4 n^2.
+  !> steps          at most
+  !> least_gain     a line has arrived when a step lowers its squares by no more
+  !> gamma          FRFs at DOFs j, then k, shape (2 n, 2 n, n_freq), m/N
+  !> inverse_std    1/sqrt(E|e|^2) of the noise e of gamma, shape (2 n, 2 n, n_freq), N/m; 0 where an entry is not used,
+  !>                and then it is not read
+  !> whitening      lower triangular matrix that makes the entries, divided by their deviations, uncorrelated,
+  !>                shape (n_correlated, n_correlated, n_freq). Entries of gamma count row by row, with reciprocal 1
+  !>                from the diagonal on.
+  !> c_joint        C, shape (n, n, n_freq), m/N
+  !> free_h         H, shape (n, n, n_freq), m/N: where to begin, then what was found; symmetric with reciprocal 1
+  !> free_m         M, shape (n, n, n_freq), N/m: likewise
+  !> squares        weighted squares of the distance, shape (n_freq)
+  !> line_info      as above; -1 also for a weight that is negative
+  subroutine jf_project_on_joint(trans, reciprocal, n, n_correlated, n_freq, steps, least_gain, gamma, inverse_std, &
+                                 whitening, c_joint, free_h, free_m, squares, line_info, info) &
+    bind(C, name='jf_project_on_joint_')
+    character(kind=c_char), intent(in) :: trans
+    integer(ip), intent(in) :: reciprocal, n, n_correlated, n_freq, steps
+    real(c_double), intent(in) :: least_gain
+    complex(c_double_complex), target, intent(in) :: gamma(2_long*n, 2_long*n, n_freq)
+    real(c_double), target, intent(in) :: inverse_std(2_long*n, 2_long*n, n_freq)
+    real(c_double), target, intent(in) :: whitening(n_correlated, n_correlated, n_freq)
+    complex(c_double_complex), target, intent(in) :: c_joint(n, n, n_freq)
+    complex(c_double_complex), target, intent(inout) :: free_h(n, n, n_freq), free_m(n, n, n_freq)
+    real(c_double), target, intent(out) :: squares(n_freq)
+    integer(ip), target, intent(out) :: line_info(n_freq)
+    integer(ip), intent(out) :: info
+    type(host_state) :: host
+
+    call hold_traps(host)
+    info = check_project_on_joint(trans, reciprocal, n, n_correlated, n_freq, steps, least_gain)
+    if (info == info_good) then
+      call project_on_joint(is_transposed(trans), reciprocal == 1, steps, least_gain, gamma, inverse_std, whitening, &
+                            c_joint, free_h, free_m, squares, line_info, info)
+    end if
+    call release_traps(host)
+  end subroutine jf_project_on_joint
+
+  !> What measured FRFs say of the compliance C of a joint near FRFs that fit it, H and M being free.
+  !> With d the change of the free entries of C, the weighted squares of the residual, least over H and M, are
+  !> s - 2 Re(d^H p) + d^H W d near that point. Free entries are all n^2, row by row, or with reciprocal 1 the
+  !> n (n + 1)/2 of the upper triangle.
+  !> reciprocal, n, n_correlated, inverse_std, whitening, c_joint    as in jf_project_on_joint
+  !> n_free         number of free entries of C
+  !> n_target       number of FRFs whose gradients are wanted, at least 1
+  !> gamma          measured FRFs at DOFs j, then k, shape (2 n, 2 n, n_freq, n_target), m/N
+  !> free_h         H of the point, shape (n, n, n_freq), m/N
+  !> free_m         M of the point, shape (n, n, n_freq), N/m
+  !> information    W, shape (n_free, n_free, n_freq), (N/m)^2
+  !> gradient       p, shape (n_free, n_freq, n_target), N/m
+  !> squares        s, shape (n_freq, n_target)
+  !> line_info      as in jf_project_on_joint
+  subroutine jf_joint_forms(trans, reciprocal, n, n_free, n_correlated, n_freq, n_target, gamma, inverse_std, &
+                            whitening, c_joint, free_h, free_m, information, gradient, squares, line_info, info) &
+    bind(C, name='jf_joint_forms_')
+    character(kind=c_char), intent(in) :: trans
+    integer(ip), intent(in) :: reciprocal, n, n_free, n_correlated, n_freq, n_target
+    complex(c_double_complex), target, intent(in) :: gamma(2_long*n, 2_long*n, n_freq, n_target)
+    real(c_double), target, intent(in) :: inverse_std(2_long*n, 2_long*n, n_freq)
+    real(c_double), target, intent(in) :: whitening(n_correlated, n_correlated, n_freq)
+    complex(c_double_complex), target, intent(in) :: c_joint(n, n, n_freq), free_h(n, n, n_freq), free_m(n, n, n_freq)
+    complex(c_double_complex), target, intent(out) :: information(n_free, n_free, n_freq)
+    complex(c_double_complex), target, intent(out) :: gradient(n_free, n_freq, n_target)
+    real(c_double), target, intent(out) :: squares(n_freq, n_target)
+    integer(ip), target, intent(out) :: line_info(n_freq)
+    integer(ip), intent(out) :: info
+    type(host_state) :: host
+
+    call hold_traps(host)
+    info = check_joint_forms(trans, reciprocal, n, n_free, n_correlated, n_freq, n_target)
+    if (info == info_good) then
+      call joint_forms(is_transposed(trans), reciprocal == 1, gamma, inverse_std, whitening, c_joint, free_h, free_m, &
+                       information, gradient, squares, line_info, info)
+    end if
+    call release_traps(host)
+  end subroutine jf_joint_forms
 
   !> Weights for displacement and slope at a reference from points along a line. Eq. (2.59) for any spacing.
   !> m         number of points, at least 2

@@ -15,7 +15,7 @@ module jointfrf_checks
   private
   public :: check_invert, check_solve, check_receptance, check_receptance_banded, check_receptance_modal
   public :: check_couple, check_modify, check_matrices, check_decouple, check_compliance_factors
-  public :: check_compliance_covariance
+  public :: check_compliance_covariance, check_joint_forms, check_project_on_joint
   public :: check_difference_weights, check_central_difference, check_transform, check_pollute, check_monte_carlo
   public :: check_brick_matrices, check_brick_quality, check_rational_fit, check_relocate_poles
 
@@ -184,6 +184,47 @@ contains
     if (reciprocal /= 0 .and. reciprocal /= 1) info = -2
     if (unknown_order(trans)) info = -1
   end function check_compliance_covariance
+
+  pure function check_project_on_joint(trans, reciprocal, n, n_correlated, n_freq, steps, least_gain) result(info)
+    character(kind=c_char), intent(in) :: trans
+    integer(ip), intent(in) :: reciprocal, n, n_correlated, n_freq, steps
+    real(c_double), intent(in) :: least_gain
+    integer(ip) :: info
+
+    info = info_good
+    if (not_finite(least_gain) .or. least_gain < 0.0_c_double) info = -7
+    if (bad_size(steps)) info = -6
+    if (bad_size(n_freq)) info = -5
+    if (n_correlated /= 0 .and. n_correlated /= entries_of_square(reciprocal, 2_ip, n)) info = -4
+    if (n < 1 .or. bad_size(n)) info = -3
+    if (reciprocal /= 0 .and. reciprocal /= 1) info = -2
+    if (unknown_order(trans)) info = -1
+  end function check_project_on_joint
+
+  pure function check_joint_forms(trans, reciprocal, n, n_free, n_correlated, n_freq, n_target) result(info)
+    character(kind=c_char), intent(in) :: trans
+    integer(ip), intent(in) :: reciprocal, n, n_free, n_correlated, n_freq, n_target
+    integer(ip) :: info
+
+    info = info_good
+    if (n_target < 1 .or. bad_size(n_target)) info = -7
+    if (bad_size(n_freq)) info = -6
+    if (n_correlated /= 0 .and. n_correlated /= entries_of_square(reciprocal, 2_ip, n)) info = -5
+    if (n_free /= entries_of_square(reciprocal, 1_ip, n)) info = -4
+    if (n < 1 .or. bad_size(n)) info = -3
+    if (reciprocal /= 0 .and. reciprocal /= 1) info = -2
+    if (unknown_order(trans)) info = -1
+  end function check_joint_forms
+
+  !> The number of entries of a matrix of order blocks*n, or of its upper triangle; of an n that is refused anyway, any.
+  pure function entries_of_square(reciprocal, blocks, n) result(entries)
+    integer(ip), intent(in) :: reciprocal, blocks, n
+    integer(long) :: entries, order
+
+    order = blocks*int(min(max(n, 0_ip), 2_ip**30), long)
+    entries = order*order
+    if (reciprocal == 1) entries = (entries + order)/2
+  end function entries_of_square
 
   pure function check_difference_weights(m, offset) result(info)
     integer(ip), intent(in) :: m

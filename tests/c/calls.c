@@ -10,8 +10,8 @@
 const char *const routine_name[ROUTINES] = {
     "invert", "solve", "receptance", "receptance_banded", "receptance_modal", "couple", "modify", "find_modification",
     "ismm", "inverse_substructuring", "decouple", "joint_compliance", "compliance_factors", "compliance_covariance",
-    "transform", "central_difference", "pollute", "monte_carlo", "brick_matrices", "brick_quality",
-    "difference_weights",
+    "transform", "central_difference", "project_on_joint", "joint_forms", "pollute", "monte_carlo", "brick_matrices",
+    "brick_quality", "difference_weights",
 };
 /* The number of LWORK among the arguments; that of LIWORK is two more. */
 const int lwork_argument[WORK_ROUTINES] = {8, 11, 20, 22, 16, 15, 12, 10, 11, 9, 18, 9, 11, 13, 14};
@@ -128,6 +128,17 @@ jf_int call(const problem *p, const workspace *w, double *out, jf_int *line_info
     case TRANSFORM: CALL(transform, t, s, s + 1, s + 2, s + 3, n_freq, a, in[1], in[2], h); break;
     case CENTRAL_DIFFERENCE: jf_central_difference(t, s + 1, n_freq, in[1], a, h, line_info, rcond, &info); break;
     case DIFFERENCE_WEIGHTS: jf_difference_weights(s + 1, in[1], out, &info); break;
+    case PROJECT_ON_JOINT:
+        memcpy(out, in[4], 2 * square * lines * sizeof *out);
+        memcpy(out + 2 * square * lines, in[5], 2 * square * lines * sizeof *out);
+        jf_project_on_joint(t, &p->flag, s, s + 2, n_freq, s + 3, &p->number, a, in[1], in[2], (jf_complex *)in[3], h,
+                            h + square * lines, rcond, line_info, &info);
+        break;
+    case JOINT_FORMS:
+        jf_joint_forms(t, &p->flag, s, s + 4, s + 2, n_freq, &one, a, in[1], in[2], (jf_complex *)in[3],
+                       (jf_complex *)in[4], (jf_complex *)in[5], h, h + (size_t)(s[4] * s[4]) * lines, rcond,
+                       line_info, &info);
+        break;
     case POLLUTE:
         jf_pollute(t, letters, letters + 1, &p->flag, &one, &p->number, seed, s, s, n_freq, &first, &count, a, h,
                    &info);

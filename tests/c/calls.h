@@ -24,6 +24,8 @@ enum {
     TRANSFORM,
     WORK_ROUTINES,      /* those before have a form in memory of the caller */
     CENTRAL_DIFFERENCE = WORK_ROUTINES,
+    PROJECT_ON_JOINT,
+    JOINT_FORMS,
     POLLUTE,
     MONTE_CARLO,
     BRICK_MATRICES,

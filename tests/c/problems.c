@@ -8,7 +8,7 @@
 int variants(int routine)
 {
     switch (routine) {
-    case RECEPTANCE: case RECEPTANCE_BANDED: case DECOUPLE: return 4;
+    case RECEPTANCE: case RECEPTANCE_BANDED: case DECOUPLE: case PROJECT_ON_JOINT: case JOINT_FORMS: return 4;
     case COMPLIANCE_COVARIANCE: return 2;
     case POLLUTE: return 5;
     case MONTE_CARLO: case BRICK_MATRICES: return 3;
@@ -219,6 +219,20 @@ problem new_problem(int routine, char trans, int n, int n_freq, int variant)
         for (i = 0; i < m; i++)
             p.in[1][i] += 3 * i;
         p.out_line = routine == CENTRAL_DIFFERENCE ? 8 : 2 * (size_t)m;
+        break;
+    case PROJECT_ON_JOINT: case JOINT_FORMS:
+        p.size[3] = 4;
+        p.size[4] = p.flag ? n * (n + 1) / 2 : n * n;
+        p.size[2] = variant & 2 ? p.flag ? n * (joint + 1) : joint * joint : 0;
+        lines(&p, 0, joint, joint, &state);
+        numbers(&p, 1, (size_t)joint * (size_t)joint, 0, &state);
+        for (i = 0; i < (int)p.in_all[1]; i++)
+            p.in[1][i] = 2.0 + p.in[1][i];
+        numbers(&p, 2, (size_t)p.size[2] * (size_t)p.size[2], 0, &state);
+        for (i = 3; i <= 5; i++)
+            lines(&p, i, n, n, &state);
+        p.out_line = routine == PROJECT_ON_JOINT ? 4 * (size_t)(n * n)
+                                                 : 2 * (size_t)p.size[4] * (size_t)(p.size[4] + 1);
         break;
     case POLLUTE:
         p.letters[0] = "CPNUS"[variant];

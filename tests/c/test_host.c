@@ -115,7 +115,12 @@ static jf_int call(void)
     double *rcond = out[1];
     const jf_int part = any_part(MOST), n_damping = next(3) ? (int)next(2) * n : any_part(MOST);
     const jf_int n_structural = next(3) ? (int)next(2) * n : any_part(MOST), kl = next(40) ? flag : INT_MAX;
-    const int routine = (int)next(22);
+    const int routine = (int)next(24);
+    const jf_int few = any_size(2), order = few > 0 ? few : 1;
+    const jf_int n_free = next(20) ? flag == 1 ? order * (order + 1) / 2 : order * order : m;
+    const jf_int n_correlated = next(3) ? 0 : next(9) ? flag == 1 ? order * (2 * order + 1) : 4 * order * order : m;
+    jf_complex *second = (jf_complex *)out[1];
+    double *squares = out[1] + ROOM / 2;
     jf_int info = 12345;
 
     lwork = any_length();
@@ -155,9 +160,17 @@ static jf_int call(void)
         jf_brick_matrices(&t, &n_freq, in[0], in[1], in[2], in[3], &number, &flag, out[0], out[1], line_info, &info);
         break;
     case 19:
+        jf_project_on_joint(&t, &flag, &few, &n_correlated, &n_freq, &q, &number, frf(0), in[1], in[2], frf(3), h, second,
+                            squares, line_info, &info);
+        break;
+    case 20:
+        jf_joint_forms(&t, &flag, &few, &n_free, &n_correlated, &n_freq, &m, frf(0), in[1], in[2], frf(3), frf(4), frf(5),
+                       h, second, squares, line_info, &info);
+        break;
+    case 21:
         jf_relocate_poles(&n, &m, &n_freq, &p, &number, frf(0), frf(1), in[2], h, out[1], &info);
         break;
-    case 20: jf_rational_fit(&n, &m, &n_freq, frf(0), frf(1), in[2], frf(3), h, out[1], out[1] + 1, &info); break;
+    case 22: jf_rational_fit(&n, &m, &n_freq, frf(0), frf(1), in[2], frf(3), h, out[1], out[1] + 1, &info); break;
     default: jf_brick_quality(&n_freq, in[0], out[0], out[1], &info);
     }
     return info;

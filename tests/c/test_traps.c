@@ -183,11 +183,13 @@ static void one_problem(int routine, char trans, int n, int variant, jf_int engi
     }
 }
 
-/* Orders that say nothing new: bricks have none, and no engine either; noise goes entry by entry. */
+/* Orders that say nothing new: bricks have none, and no engine either; noise goes entry by entry. The manifold has one
+   code for all. */
 static int too_many(int routine, int n, jf_int engine)
 {
     switch (routine) {
     case BRICK_MATRICES: case BRICK_QUALITY: return n > 2 || engine != JF_ENGINE_LAPACK;
+    case PROJECT_ON_JOINT: case JOINT_FORMS: return n > 3;
     case POLLUTE: case MONTE_CARLO: return n > 2;
     case COMPLIANCE_COVARIANCE: return n > 5;
     case DECOUPLE: return n > 8;
@@ -256,7 +258,9 @@ static void workers(jf_int engine)
 
     for (routine = 0; routine < ROUTINES; routine++)
         for (variant = 0; variant < variants(routine); variant += 3) {
-            const int n = routine == COMPLIANCE_COVARIANCE || routine == MONTE_CARLO ? 3 : 9;
+            const int large = routine == COMPLIANCE_COVARIANCE || routine == MONTE_CARLO || routine == PROJECT_ON_JOINT
+                              || routine == JOINT_FORMS;
+            const int n = large ? 3 : 9;
             problem p = new_problem(routine, 'N', n, MANY_LINES, variant);
             outcome expected = new_outcome(&p), o = new_outcome(&p);
             int line, kept = 1;

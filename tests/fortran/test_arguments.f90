@@ -4,7 +4,8 @@ module trials
   use testing, only: check, check_untouched, dp, infinity, ip, not_a_number, random_regular, untouched
   use jointfrf, only: jf_central_difference, jf_compliance_covariance, jf_compliance_factors, jf_couple, jf_decouple, &
     jf_difference_weights, jf_find_modification, jf_inverse_substructuring, jf_invert, jf_ismm, jf_joint_compliance, &
-    jf_modify, jf_receptance, jf_receptance_banded, jf_receptance_modal, jf_solve, jf_transform
+    jf_joint_forms, jf_modify, jf_project_on_joint, jf_receptance, jf_receptance_banded, jf_receptance_modal, &
+    jf_solve, jf_transform
   use jointfrf_arguments, only: bad_offsets, is_transposed, lower, names, not_finite, out_of_range, repeated, &
     unknown_equation, unknown_order
   implicit none
@@ -15,6 +16,7 @@ module trials
   integer, parameter :: room = 4, lines = 2
   complex(dp) :: h(room, room, lines), g(room, room, lines), small(room, room, lines), result(2*room, 2*room, lines)
   real(dp) :: matrix(room, room), omega(lines), rcond(lines), variance(room, room, lines), weights(2, room)
+  real(dp) :: factor(room, room, lines)                !< a triangular one
   integer(ip) :: line_info(lines), info
   integer(ip), parameter :: both(2) = [1_ip, 2_ip], twice(2) = [2_ip, 2_ip], below(2) = [1_ip, 0_ip], &
     above(2) = [2_ip, 4_ip]
@@ -51,6 +53,7 @@ contains
     matrix = real(h(:, :, 1), dp)
     omega = [1.0_dp, 2.0_dp]
     variance = 1.0_dp
+    factor = 1.0_dp
     call invert_arguments()
     call solve_arguments()
     call receptance_arguments()
@@ -62,6 +65,8 @@ contains
     call decouple_arguments()
     call factor_arguments()
     call covariance_arguments()
+    call project_arguments()
+    call form_arguments()
     call difference_arguments()
     call transform_arguments()
   end subroutine all_arguments
@@ -410,6 +415,75 @@ contains
       call expect(expected, 'compliance_covariance')
     end subroutine try
   end subroutine covariance_arguments
+
+  subroutine project_arguments()
+    call try(0, 'N', 1, 2, 0, 2, 3, 0.1_dp)
+    call try(0, 'T', 0, 2, 0, 2, 0, 0.0_dp)
+    call try(0, 'N', 1, 1, 3, 2, 3, 0.1_dp)
+    call try(0, 't', 0, 1, 4, 2, 3, 0.1_dp)
+    call try(-1, 'X', 1, 2, 0, 2, 3, 0.1_dp)
+    call try(-2, 'N', 2, 2, 0, 2, 3, 0.1_dp)
+    call try(-2, 'N', -1, 2, 0, 2, 3, 0.1_dp)
+    call try(-3, 'N', 1, 0, 0, 2, 3, 0.1_dp)
+    call try(-3, 'N', 1, -2, 0, 2, 3, 0.1_dp)
+    call try(-4, 'N', 1, 1, 4, 2, 3, 0.1_dp)
+    call try(-4, 'N', 0, 1, 3, 2, 3, 0.1_dp)
+    call try(-4, 'N', 1, 1, -1, 2, 3, 0.1_dp)
+    call try(-5, 'N', 1, 1, 0, -2, 3, 0.1_dp)
+    call try(-6, 'N', 1, 1, 0, 2, -3, 0.1_dp)
+    call try(-7, 'N', 1, 1, 0, 2, 3, -0.1_dp)
+    call try(-7, 'N', 1, 1, 0, 2, 3, infinity())
+    call try(-7, 'N', 1, 1, 0, 2, 3, not_a_number())
+
+  contains
+
+    subroutine try(expected, trans, reciprocal, n, n_correlated, n_freq, steps, least_gain)
+      integer, intent(in) :: expected, reciprocal, n, n_correlated, n_freq, steps
+      character, intent(in) :: trans
+      real(dp), intent(in) :: least_gain
+      complex(dp) :: free(room, room, lines)
+
+      call prepare()
+      if (expected == 0) result = small(1, 1, 1)
+      free = result(:room, :room, :)
+      call jf_project_on_joint(trans, int(reciprocal, ip), int(n, ip), int(n_correlated, ip), int(n_freq, ip), &
+                               int(steps, ip), least_gain, h, variance, factor, small, result, free, rcond, &
+                               line_info, info)
+      call expect(expected, 'project_on_joint')
+      if (expected < 0) call check_untouched(free, 'project_on_joint')
+    end subroutine try
+  end subroutine project_arguments
+
+  subroutine form_arguments()
+    call try(0, 'N', 1, 2, 3, 0, 2, 1)
+    call try(0, 'T', 0, 2, 4, 0, 2, 1)
+    call try(0, 'N', 1, 1, 1, 3, 2, 1)
+    call try(-1, 'X', 1, 2, 3, 0, 2, 1)
+    call try(-2, 'N', 2, 2, 3, 0, 2, 1)
+    call try(-3, 'N', 1, 0, 0, 0, 2, 1)
+    call try(-3, 'N', 1, -1, 0, 0, 2, 1)
+    call try(-4, 'N', 1, 2, 4, 0, 2, 1)
+    call try(-4, 'N', 0, 2, 3, 0, 2, 1)
+    call try(-5, 'N', 1, 1, 1, 4, 2, 1)
+    call try(-6, 'N', 1, 1, 1, 0, -2, 1)
+    call try(-7, 'N', 1, 1, 1, 0, 2, 0)
+
+  contains
+
+    subroutine try(expected, trans, reciprocal, n, n_free, n_correlated, n_freq, n_target)
+      integer, intent(in) :: expected, reciprocal, n, n_free, n_correlated, n_freq, n_target
+      character, intent(in) :: trans
+      complex(dp) :: gradient(room, room, 1)
+
+      call prepare()
+      gradient = untouched
+      call jf_joint_forms(trans, int(reciprocal, ip), int(n, ip), int(n_free, ip), int(n_correlated, ip), &
+                          int(n_freq, ip), int(n_target, ip), h, variance, factor, small, g, g, result, gradient, &
+                          rcond, line_info, info)
+      call expect(expected, 'joint_forms')
+      if (expected < 0) call check_untouched(gradient, 'joint_forms')
+    end subroutine try
+  end subroutine form_arguments
 
   subroutine difference_arguments()
     real(dp) :: offset(3)

@@ -15,7 +15,7 @@ from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
 __all__ = ["METHODS", "fit_measured", "fit_viscous"]
 
-METHODS: tuple[str, ...] = get_args(IdentificationMethod)
+METHODS: tuple[str, ...] = tuple(method for method in get_args(IdentificationMethod) if method != "manifold")
 #: Standard errors by which a fitted parameter may still move: far less than realisations differ.
 _TOLERANCE = 0.5
 #: Relative noise for the weights of a fit to data whose noise is not asked for.

@@ -9,10 +9,20 @@ from typing import Literal, get_args
 from numpy.typing import ArrayLike
 
 from jointfrf.channels.check.check import check_frfs, warn_of_frfs
+from jointfrf.channels.check.finding import FrfCheck
 from jointfrf.identification.compliance_fit.joint_terms import CrossTerms, DampingTerms
-from jointfrf.identification.describe import describe_band_mean, describe_compliance
+from jointfrf.identification.describe import Described, describe_band_mean, describe_compliance
 from jointfrf.identification.fit import fit_band_mean, fit_compliance
 from jointfrf.identification.joint_fit import JointFit
+from jointfrf.identification.manifold_fit.describe import describe_manifold
+from jointfrf.identification.manifold_fit.fit import fit_manifold
+from jointfrf.identification.manifold_fit.prepare import (
+    ManifoldOptions,
+    ManifoldProblem,
+    NoiseOptions,
+    as_channel_frfs,
+    prepare_manifold,
+)
 from jointfrf.identification.prepare import (
     BandsOfDofs,
     ComplianceOptions,
@@ -25,7 +35,7 @@ from jointfrf.substructuring.methods import JointFrfs, StiffnessMethod
 
 __all__ = ["IdentificationMethod", "identify"]
 
-IdentificationMethod = Literal["compliance", StiffnessMethod]
+IdentificationMethod = Literal["compliance", "manifold", StiffnessMethod]
 _METHODS: tuple[IdentificationMethod, ...] = get_args(IdentificationMethod)
 
 
@@ -36,10 +46,12 @@ def identify(
     method: IdentificationMethod = "compliance",
     bands: BandsOfDofs = None,
     *,
-    transform: ArrayLike | None = None,
-    damping: DampingTerms | Literal["auto"] = "viscous",
+    transform: ArrayLike | tuple[ArrayLike, ArrayLike] | None = None,
+    damping: DampingTerms | Literal["auto"] | Sequence[DampingTerms] = "viscous",
     cross: CrossTerms = "zero",
     noise: float | ArrayLike | None = None,
+    coherence: ArrayLike | None = None,
+    averages: float | None = None,
     reciprocal: bool = True,
     alpha: ArrayLike | None = None,
     k_initial: ArrayLike | None = None,
@@ -66,8 +78,10 @@ def identify(
         "compliance": maximum likelihood in the compliance domain, with error bars; needs no model of the
         substructures. "ismm", "ismm-kj": inverse structural modification (2.47) with D_jk or D_kj, need `alpha` and
         `k_initial`. "inverse-substructuring": -(gamma^-1)_jk, which ISMM reduces to. "decoupling-rr", "-rs", "-sr",
-        "-ss": (2.53)-(2.56), need `h_a`, `h_b` and the DOF lists. All but the first take the mean over bands, as the
-        thesis does.
+        "-ss": (2.53)-(2.56), need `h_a`, `h_b` and the DOF lists. These take the mean over bands, as the thesis does.
+        "manifold": maximum likelihood linearised about smooth FRFs that fit a joint; for stiff and coupled joints,
+        noise that is not relative or is correlated, and rectangular FRFs. Not the default: with `cross` "ignore" on
+        FRFs that no joint fits it is slow and may not converge, which it says.
     bands : None, (low, high), sequence of these, or mapping of DOF name to these, optional
         Sensitive bands in Hz; all lines by default. The compliance fit weights each line by its information and needs
         none.
@@ -75,14 +89,16 @@ def identify(
         From measured points to joint DOFs j, then k: rotations by finite differences. Noise is then taken as
         independent between the measured FRFs, not between the transformed ones.
     damping : {"viscous", "hysteretic", "both", "none", "auto"}
-        Terms of K* = k (1 + i eta) + i w c to fit. "auto" takes those with the lowest Bayesian information criterion.
-        Compliance fit only.
+        Terms of K* = k (1 + i eta) + i w c to fit. "auto" takes those with the lowest Bayesian information criterion;
+        method "manifold" chooses for each DOF, and takes a sequence of words, one for each DOF. Not for band means.
     cross : {"zero", "ignore", "fit"}
         Terms that couple the DOFs of the joint: none, and this is used; unknown and not fitted; fitted, symmetric.
         Compliance fit only.
     noise : float or array_like, shape (n_freq, m, m), optional
         Relative noise level of each entry, 0.01 for 1 %; or the variance E|e|^2 of each, (m/N)^2. By default relative,
         with its level estimated from the differences gamma_pq - gamma_qp.
+    coherence, averages : optional
+        As in `estimate_noise`, where `noise` is not given; method "manifold" only.
     reciprocal : bool
         Whether the structure is reciprocal, so that gamma_pq and gamma_qp may be averaged. Compliance fit only.
     alpha : array_like, shape (n_freq, 2 n, 2 n), optional
@@ -133,20 +149,58 @@ def identify(
     (True, True)
     """
     check_choice("method", method, _METHODS)
+    if method == "manifold":
+        words = damping if isinstance(damping, str) else tuple(damping)
+        problem = prepare_manifold(
+            as_channel_frfs(freq_hz, gamma), dofs, bands, transform,
+            NoiseOptions(noise, coherence, averages), ManifoldOptions(words, cross, reciprocal),
+        )  # fmt: skip
+        if reciprocal:
+            warn_of_frfs(_checked(problem, by_transform=transform is not None))
+        described = describe_manifold(fit_manifold(problem), problem)
+        return _warned(described)
+    if coherence is not None or averages is not None:
+        raise ValueError("coherence and averages are for method 'manifold'")
+    if isinstance(transform, tuple):
+        raise ValueError("a pair of transforms, for responses and for forces, is for method 'manifold'")
     measured = as_measured(freq_hz, gamma)
     if method == "compliance":
+        if not isinstance(damping, str):
+            raise ValueError("damping of each DOF by itself is for method 'manifold'")
         options = ComplianceOptions(damping, cross, reciprocal)
-        problem = prepare_compliance(measured, dofs, bands, transform, noise, options)
-        names = None if transform is not None else [f"{side}:{dof}" for side in "jk" for dof in problem.dofs]
-        warn_of_frfs(check_frfs(problem.freq_hz, problem.measured, names))
-        described = describe_compliance(fit_compliance(problem), cross)
+        lines = prepare_compliance(measured, dofs, bands, transform, noise, options)
+        names = None if transform is not None else [f"{side}:{dof}" for side in "jk" for dof in lines.dofs]
+        warn_of_frfs(check_frfs(lines.freq_hz, lines.measured, names))
+        described = describe_compliance(fit_compliance(lines), cross)
     else:
         known = JointFrfs(
             alpha=alpha, k_initial=k_initial, h_a=h_a, h_b=h_b,
             dofs_j=dofs_j, dofs_k=dofs_k, dofs_r=dofs_r, dofs_s=dofs_s,
         )  # fmt: skip
-        lines = prepare_band_mean(method, measured, known, dofs, bands, transform)
-        described = describe_band_mean(fit_band_mean(lines))
+        means = prepare_band_mean(method, measured, known, dofs, bands, transform)
+        described = describe_band_mean(fit_band_mean(means))
+    return _warned(described)
+
+
+def _warned(described: Described) -> JointFit:
+    """Issue the warnings of a fit."""
     for warning in described.warnings:
-        warnings.warn(warning, stacklevel=2)
+        warnings.warn(warning, stacklevel=3)
     return described.fit
+
+
+def _checked(problem: ManifoldProblem, *, by_transform: bool) -> FrfCheck:
+    """Look at the FRFs of the lines used, by the names of the joint DOFs where these are the channels."""
+    frfs = problem.frfs
+    if not by_transform:
+        return check_frfs(problem.freq_hz, frfs.measured, [f"{side}:{dof}" for side in "jk" for dof in problem.dofs])
+    if frfs.responses is frfs.forces:
+        return check_frfs(problem.freq_hz, frfs.measured)
+    rows, columns = (
+        [f"{what} {i}" for i in range(count)]
+        for what, count in zip(("response", "force"), frfs.measured.shape[1:], strict=True)
+    )
+    transform = (frfs.responses, frfs.forces)
+    return check_frfs(
+        problem.freq_hz, frfs.measured, responses=rows, forces=columns, transform=transform, dofs=problem.dofs
+    )

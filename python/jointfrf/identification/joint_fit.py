@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Unpack
 
@@ -48,6 +48,8 @@ class JointFit:
         What a reader must know before using the numbers.
     notes : tuple of str
         How the numbers came about.
+    intervals : callable, optional
+        From a probability to the interval of each parameter, where the method has its own.
     """
 
     method: str
@@ -61,6 +63,7 @@ class JointFit:
     bands: tuple[tuple[tuple[float, float], ...], ...]
     warnings: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    intervals: Callable[[float], dict[str, tuple[float, float]]] | None = field(default=None, repr=False, compare=False)
 
     @cached_property
     def terms(self) -> tuple[Parameter, ...]:
@@ -135,6 +138,8 @@ class JointFit:
         """
         if not 0 < probability < 1:
             raise ValueError(f"probability must lie between 0 and 1, not {probability}")
+        if self.intervals is not None:
+            return self.intervals(probability)
         reach = float(stats.norm.ppf((1 + probability) / 2))
         intervals = {}
         values = zip(self.terms, self.parameters.values(), self.std_error.values(), strict=True)

@@ -12,10 +12,12 @@ def symmetric(values, n):
 
 
 def term_matrices(basis):
-    """Matrix of each parameter on each line, shape (n_parameters, n_freq, n, n)."""
+    """Matrix of each parameter on each line, shape (n_parameters, n_freq, n, n); of a `Basis` or of `JointTerms`."""
     units = np.zeros((len(basis.pairs), basis.n, basis.n))
     for unit, (a, b) in zip(units, basis.pairs, strict=True):
         unit[a, b] = unit[b, a] = 1
+    if hasattr(basis, "kinds"):
+        return basis.factors[basis.kinds][:, :, None, None] * units[:, None]
     return (basis.factors[:, None, :, None, None] * units[:, None]).reshape(
         -1, basis.factors.shape[1], *units.shape[1:]
     )

@@ -1,0 +1,378 @@
+!> FRFs that fit a joint: the manifold on which a fit of measured FRFs is linearised.
+!>
+!> Whatever the substructures are, the receptances at the two sides of a joint of compliance C can be written with two
+!> free matrices H and M, symmetric where the structure is reciprocal:
+!>   gamma_jj = H, gamma_jk = H T, gamma_kj = T' H, gamma_kk = T' H T + C T,   T = 1 - M C, T' = 1 - C M.
+!> M is (Y_B + C)^-1 with the receptance Y_B of side k by itself. Nothing is inverted: gamma_jk may be singular, and the
+!> joint rigid.
+!>
+!> Lanes are frequency lines, also with the engine that is LAPACK elsewhere, and for a single line; blocks of lines are
+!> shared among threads.
+module jointfrf_manifold
+  use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
+  use, intrinsic :: iso_c_binding, only: c_f_pointer, c_loc
+  use jointfrf_engine, only: find_kernels
+  use jointfrf_kinds, only: dp, ip, long
+  use jointfrf_lanes, only: in_memory, lane_kernels, lanes, real_lines, to_register
+  use jointfrf_line_layout, only: store_nan
+  use jointfrf_manifold_plan, only: make_manifold_plan, manifold_plan
+  use jointfrf_sharing, only: serial_flops_lanes, share, shared_work, threads_for
+  use jointfrf_status, only: info_good, info_no_memory, line_good, line_not_finite, line_overflow
+  implicit none
+  private
+  public :: joint_forms, project_on_joint
+
+  !> The workspace of one thread.
+  type :: block_space
+    real(dp), allocatable :: room(:)                       !< where the others lie
+    real(dp), pointer, contiguous :: x(:, :, :) => null()
+    real(dp), pointer, contiguous :: w(:, :) => null()
+    real(dp), pointer, contiguous :: whitening(:, :) => null()
+    real(dp), allocatable :: squares(:, :)
+  end type block_space
+
+  !> Lines as work to be shared: an item is a block of them.
+  type, abstract, extends(shared_work) :: manifold_work
+    type(manifold_plan) :: plan
+    type(lane_kernels) :: kernels
+    logical :: transposed = .false.
+    integer, allocatable :: target(:, :), square(:)        !< where gamma and square matrices go, in the caller's order
+    integer, allocatable :: weight(:)                      !< where the caller has the weight of each entry
+    real(dp), pointer, contiguous :: gamma(:, :, :, :) => null()         !< pairs, numbers, lines, targets
+    real(dp), pointer, contiguous :: c(:, :, :) => null(), h(:, :, :) => null(), m(:, :, :) => null()
+    real(dp), pointer, contiguous :: inverse_std(:, :) => null(), whitening(:, :, :) => null()
+    integer(ip), pointer, contiguous :: line_info(:) => null()
+    type(block_space), pointer, contiguous :: space(:) => null()
+  contains
+    procedure :: do_items => do_blocks
+    procedure(block_routine), deferred :: do_block
+  end type manifold_work
+
+  type, extends(manifold_work) :: projection
+    integer :: steps = 0
+    real(dp) :: least_gain = 0.0_dp
+    complex(dp), pointer, contiguous :: free_h(:, :, :) => null(), free_m(:, :, :) => null()
+    real(dp), pointer, contiguous :: squares(:) => null()
+  contains
+    procedure :: do_block => project_block
+  end type projection
+
+  type, extends(manifold_work) :: form_finding
+    integer, allocatable :: result(:)
+    complex(dp), pointer, contiguous :: information(:, :, :) => null(), gradient(:, :, :) => null()
+    real(dp), pointer, contiguous :: information_pairs(:, :, :) => null(), gradient_pairs(:, :, :, :) => null()
+    real(dp), pointer, contiguous :: squares(:, :) => null()
+  contains
+    procedure :: do_block => find_block
+  end type form_finding
+
+  abstract interface
+    !> Lines first .. first + n_lines - 1, at most `lanes` of them; their data are in the workspace.
+    subroutine block_routine(self, first, n_lines, space)
+      import :: block_space, manifold_work
+      implicit none
+      class(manifold_work), intent(in) :: self
+      integer, intent(in) :: first, n_lines
+      type(block_space), intent(inout) :: space
+    end subroutine block_routine
+  end interface
+
+contains
+
+  !> The FRFs nearest to given ones that fit a joint, by Levenberg-Marquardt steps for H and M on every line.
+  !> gamma        FRFs at DOFs j, then k, shape (2 n, 2 n, n_freq), m/N
+  !> inverse_std  weights of their entries, same shape, N/m; 0 where an entry is not used
+  !> whitening    lower triangular factor that is applied to the weighted entries, shape (q, q, n_freq); of size 0 where
+  !>              there is none. Entries are counted row by row, of a reciprocal structure from the diagonal on.
+  !> c_joint      C, shape (n, n, n_freq), m/N
+  !> h, m         H, m/N, and M, N/m, shape (n, n, n_freq): where to begin, and what was found
+  !> squares      weighted squares of the distance, shape (n_freq)
+  !> steps        at most
+  !> least_gain   a line has arrived when a step lowers its squares by no more
+  subroutine project_on_joint(transposed, reciprocal, steps, least_gain, gamma, inverse_std, whitening, c_joint, h, m, &
+                              squares, line_info, info)
+    logical, intent(in) :: transposed, reciprocal
+    integer(ip), intent(in) :: steps
+    real(dp), intent(in) :: least_gain
+    complex(dp), contiguous, target, intent(in) :: gamma(:, :, :), c_joint(:, :, :)
+    real(dp), contiguous, target, intent(in) :: inverse_std(:, :, :), whitening(:, :, :)
+    complex(dp), contiguous, target, intent(inout) :: h(:, :, :), m(:, :, :)
+    real(dp), contiguous, target, intent(out) :: squares(:)
+    integer(ip), contiguous, target, intent(out) :: line_info(:)
+    integer(ip), intent(out) :: info
+    type(projection) :: work
+    complex(dp), pointer, contiguous :: one_target(:, :, :, :)
+
+    work%steps = int(steps)
+    work%least_gain = least_gain
+    work%free_h => h
+    work%free_m => m
+    work%squares => squares
+    one_target(1:size(gamma, 1), 1:size(gamma, 2), 1:size(gamma, 3), 1:1) => gamma
+    call make_manifold_plan(reciprocal, size(c_joint, 1), .false., 1, size(whitening) > 0, work%plan)
+    call set_data(work, transposed, one_target, inverse_std, whitening, c_joint, h, m, line_info)
+    call run(work, 30.0_dp*steps, info)
+  end subroutine project_on_joint
+
+  !> Information that FRFs give on a joint about a point of the manifold, H and M eliminated: with d the change of the
+  !> free entries of C, the least squares over H and M are, to second order, s - 2 Re(d^H p) + d^H W d.
+  !> gamma        FRFs at DOFs j, then k, shape (2 n, 2 n, n_freq, n_target), m/N
+  !> inverse_std, whitening, c_joint    as in `project_on_joint`, the same for all targets
+  !> h, m         the point, shape (n, n, n_freq)
+  !> information  W, shape (u, u, n_freq); free entries of C are the upper triangle row by row, or all
+  !> gradient     p, shape (u, n_freq, n_target)
+  !> squares      s, shape (n_freq, n_target)
+  subroutine joint_forms(transposed, reciprocal, gamma, inverse_std, whitening, c_joint, h, m, information, gradient, &
+                         squares, line_info, info)
+    logical, intent(in) :: transposed, reciprocal
+    complex(dp), contiguous, target, intent(in) :: gamma(:, :, :, :), c_joint(:, :, :), h(:, :, :), m(:, :, :)
+    real(dp), contiguous, target, intent(in) :: inverse_std(:, :, :), whitening(:, :, :)
+    complex(dp), contiguous, target, intent(out) :: information(:, :, :), gradient(:, :, :)
+    real(dp), contiguous, target, intent(out) :: squares(:, :)
+    integer(ip), contiguous, target, intent(out) :: line_info(:)
+    integer(ip), intent(out) :: info
+    type(form_finding) :: work
+    integer :: i
+
+    call make_manifold_plan(reciprocal, size(c_joint, 1), .true., size(gamma, 4), size(whitening) > 0, work%plan)
+    call set_data(work, transposed, gamma, inverse_std, whitening, c_joint, h, m, line_info)
+    associate (plan => work%plan)
+      work%result = in_memory(.not. transposed, reshape([(plan%result + i, i=1, plan%n_free**2)], &
+                                                        [plan%n_free, plan%n_free]))
+    end associate
+    work%information => information
+    work%information_pairs => real_lines(information)
+    work%gradient => gradient
+    call c_f_pointer(c_loc(gradient), work%gradient_pairs, [2, size(gradient, 1), size(gradient, 2), size(gradient, 3)])
+    work%squares => squares
+    call run(work, 60.0_dp, info)
+  end subroutine joint_forms
+
+  subroutine set_data(work, transposed, gamma, inverse_std, whitening, c_joint, h, m, line_info)
+    class(manifold_work), intent(inout) :: work
+    logical, intent(in) :: transposed
+    complex(dp), contiguous, target, intent(in) :: gamma(:, :, :, :), c_joint(:, :, :), h(:, :, :), m(:, :, :)
+    real(dp), contiguous, target, intent(in) :: inverse_std(:, :, :), whitening(:, :, :)
+    integer(ip), contiguous, target, intent(inout) :: line_info(:)
+    integer :: element(2*work%plan%n, 2*work%plan%n), n, e, i, t
+
+    n = work%plan%n
+    work%transposed = transposed
+    allocate (work%weight(work%plan%n_entry), work%target(4*n*n, work%plan%n_target))
+    element = work%plan%unused + 4
+    do t = 1, work%plan%n_target
+      do e = 1, work%plan%n_entry
+        associate (row => work%plan%gamma_row(e), column => work%plan%gamma_column(e))
+          element(row, column) = work%plan%target + (t - 1)*work%plan%n_entry + e
+          work%weight(e) = merge(column + (row - 1)*2*n, row + (column - 1)*2*n, transposed)
+        end associate
+      end do
+      work%target(:, t) = in_memory(transposed, element)
+    end do
+    work%square = in_memory(.not. transposed, reshape([(i, i=1, n*n)], [n, n]))
+    call c_f_pointer(c_loc(gamma), work%gamma, [2, 4*n*n, size(gamma, 3), size(gamma, 4)])
+    work%c => real_lines(c_joint)
+    work%h => real_lines(h)
+    work%m => real_lines(m)
+    work%inverse_std(1:4*n*n, 1:size(inverse_std, 3)) => inverse_std
+    work%whitening => whitening
+    work%line_info => line_info
+  end subroutine set_data
+
+  !> Share the blocks of lines.
+  !> products   of two numbers of all columns, in squares of their number
+  subroutine run(work, products, info)
+    class(manifold_work), intent(inout) :: work
+    real(dp), intent(in) :: products
+    integer(ip), intent(out) :: info
+    integer(long) :: n_blocks
+    integer :: threads, t, stat
+    logical :: found
+    real(dp) :: flops
+
+    call find_kernels(work%kernels, found, info)
+    if (info /= info_good .or. size(work%line_info) == 0) return
+    flops = products*real(work%plan%n_entry, dp)*real(work%plan%n_free, dp)**2*size(work%line_info)
+    n_blocks = (size(work%line_info, kind=long) - 1)/lanes + 1
+    threads = threads_for(flops, n_blocks, serial_flops_lanes)
+    allocate (work%space(threads), stat=stat)
+    if (stat /= 0) then
+      info = info_no_memory
+      return
+    end if
+    do t = 1, threads
+      if (stat == 0) call prepare(work%plan, work%space(t), stat)
+    end do
+    if (stat == 0) then
+      call share(work, n_blocks, threads, even=.false.)
+      info = count(work%line_info /= line_good, kind=ip)
+    else
+      info = info_no_memory
+    end if
+    deallocate (work%space)
+  end subroutine run
+
+  !> Workspace of one thread. Elements begin where a register does.
+  subroutine prepare(plan, space, stat)
+    type(manifold_plan), intent(in) :: plan
+    type(block_space), target, intent(inout) :: space
+    integer, intent(out) :: stat
+    integer(long) :: n_x, n_w, n_whitening, at
+
+    n_x = int(lanes, long)*2*plan%n_element
+    n_w = int(lanes, long)*plan%n_entry
+    n_whitening = 0
+    if (plan%correlated) n_whitening = n_w*(plan%n_entry + 1)/2
+    allocate (space%room(n_x + n_w + n_whitening + lanes), space%squares(lanes, plan%n_target), stat=stat)
+    if (stat /= 0) return
+    at = to_register(c_loc(space%room))
+    space%x(1:lanes, 1:2, 1:plan%n_element) => space%room(at + 1:at + n_x)
+    at = at + n_x
+    space%w(1:lanes, 1:plan%n_entry) => space%room(at + 1:at + n_w)
+    at = at + n_w
+    space%whitening(1:lanes, 1:n_whitening/lanes) => space%room(at + 1:at + n_whitening)
+  end subroutine prepare
+
+  !> The blocks from first to last.
+  subroutine do_blocks(self, first, last, thread)
+    class(manifold_work), intent(in) :: self
+    integer(long), intent(in) :: first, last
+    integer, intent(in) :: thread
+    integer(long) :: i
+    integer :: line, n_lines
+
+    do i = first, last
+      line = int((i - 1)*lanes) + 1
+      n_lines = min(lanes, size(self%line_info) - line + 1)
+      call load_block(self, line, n_lines, self%space(thread), self%line_info(line:line + n_lines - 1))
+      call self%do_block(line, n_lines, self%space(thread))
+    end do
+  end subroutine do_blocks
+
+  !> The caller's lines into lanes, and which of them hold NaN or Inf, or a weight that is negative.
+  subroutine load_block(self, first, n_lines, space, line_info)
+    class(manifold_work), intent(in) :: self
+    integer, intent(in) :: first, n_lines
+    type(block_space), intent(inout) :: space
+    integer(ip), intent(out) :: line_info(n_lines)
+    real(dp) :: total(lanes), of_targets(lanes), least(lanes)
+    integer :: n2, q, e, t, l, line, i, j
+
+    q = self%plan%n_entry
+    n2 = self%plan%n**2
+    least = 0.0_dp
+    do e = 1, q
+      do l = 1, lanes
+        space%w(l, e) = self%inverse_std(self%weight(e), first + min(l, n_lines) - 1)
+      end do
+      least = min(least, space%w(:, e))
+    end do
+    total = sum(abs(space%w), dim=2)
+    if (self%plan%correlated) then
+      do l = 1, lanes
+        line = first + min(l, n_lines) - 1
+        do i = 1, q
+          do j = 1, i
+            space%whitening(l, (i*(i - 1))/2 + j) = self%whitening(merge(j, i, self%transposed), &
+                                                                   merge(i, j, self%transposed), line)
+          end do
+        end do
+      end do
+      total = total + sum(abs(space%whitening), dim=2)
+    end if
+    call load_square(self%c, self%plan%c)
+    call load_square(self%h, self%plan%h)
+    call load_square(self%m, self%plan%m)
+    do t = 1, self%plan%n_target
+      call self%kernels%load(4*n2, self%target(:, t), first, n_lines, self%gamma(:, :, :, t), space%x)
+      associate (data => space%x(:, :, self%plan%target + (t - 1)*q + 1:self%plan%target + t*q))
+        do e = 1, q
+          do l = 1, lanes
+            if (abs(space%w(l, e)) > 0.0_dp) cycle
+            data(l, :, e) = 0.0_dp                         ! not used
+          end do
+        end do
+      end associate
+    end do
+    call self%kernels%total(q*self%plan%n_target, [(self%plan%target + i, i=1, q*self%plan%n_target)], space%x, &
+                            of_targets)
+    total = total + of_targets
+    line_info = merge(line_good, line_not_finite, total(:n_lines) <= huge(1.0_dp) .and. .not. least(:n_lines) < 0.0_dp)
+
+  contains
+
+    subroutine load_square(lines, before)
+      real(dp), contiguous, intent(in) :: lines(:, :, :)
+      integer, intent(in) :: before
+      real(dp) :: here(lanes)
+
+      call self%kernels%load(n2, before + self%square, first, n_lines, lines, space%x)
+      call self%kernels%total(n2, before + self%square, space%x, here)
+      total = total + here
+    end subroutine load_square
+  end subroutine load_block
+
+  subroutine project_block(self, first, n_lines, space)
+    class(projection), intent(in) :: self
+    integer, intent(in) :: first, n_lines
+    type(block_space), intent(inout) :: space
+    integer :: n2, l, line
+
+    n2 = self%plan%n**2
+    associate (plan => self%plan, x => space%x)
+      x(:, :, plan%best_h + 1:plan%best_h + n2) = x(:, :, plan%h + 1:plan%h + n2)
+      x(:, :, plan%best_m + 1:plan%best_m + n2) = x(:, :, plan%m + 1:plan%m + n2)
+      call self%kernels%project(plan, self%steps, self%least_gain, space%w, space%whitening, x, space%squares(:, 1))
+      call self%kernels%store(n2, plan%best_h + self%square, first, n_lines, x, self%h)
+      call self%kernels%store(n2, plan%best_m + self%square, first, n_lines, x, self%m)
+    end associate
+    do l = 1, n_lines
+      line = first + l - 1
+      self%squares(line) = space%squares(l, 1)
+      if (.not. space%squares(l, 1) <= huge(1.0_dp)) call overflow(self%line_info(line))
+      if (self%line_info(line) == line_good) cycle
+      call store_nan(self%free_h(:, :, line))
+      call store_nan(self%free_m(:, :, line))
+      self%squares(line) = ieee_value(1.0_dp, ieee_quiet_nan)
+    end do
+  end subroutine project_block
+
+  subroutine find_block(self, first, n_lines, space)
+    class(form_finding), intent(in) :: self
+    integer, intent(in) :: first, n_lines
+    type(block_space), intent(inout) :: space
+    real(dp) :: total(lanes), of_gradient(lanes)
+    integer :: u, m, t, i, l, line
+    integer :: place(self%plan%n_free)
+
+    u = self%plan%n_free
+    m = self%plan%n_column - 2*u
+    call self%kernels%joint_form(self%plan, space%w, space%whitening, space%x, space%squares)
+    call self%kernels%store(u*u, self%result, first, n_lines, space%x, self%information_pairs)
+    call self%kernels%total(u*u, self%result, space%x, total)
+    do t = 1, self%plan%n_target
+      place = [(self%plan%normal + (u + t - 1)*m + i, i=1, u)]
+      call self%kernels%store(u, place, first, n_lines, space%x, self%gradient_pairs(:, :, :, t))
+      call self%kernels%total(u, place, space%x, of_gradient)
+      total = total + of_gradient + space%squares(:, t)
+    end do
+    do l = 1, n_lines
+      line = first + l - 1
+      self%squares(line, :) = space%squares(l, :)
+      if (.not. total(l) <= huge(1.0_dp)) call overflow(self%line_info(line))
+      if (self%line_info(line) == line_good) cycle
+      call store_nan(self%information(:, :, line))
+      do t = 1, self%plan%n_target
+        call store_nan(self%gradient(:, line:line, t))
+      end do
+      self%squares(line, :) = ieee_value(1.0_dp, ieee_quiet_nan)
+    end do
+  end subroutine find_block
+
+  !> A good line becomes one whose result is not finite.
+  subroutine overflow(line_info)
+    integer(ip), intent(inout) :: line_info
+
+    if (line_info == line_good) line_info = line_overflow
+  end subroutine overflow
+end module jointfrf_manifold

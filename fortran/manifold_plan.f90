@@ -1,0 +1,228 @@
+!> Where the numbers lie with which FRFs of a joint are written, for the manifold kernels.
+!>
+!> gamma_jj = H, gamma_jk = H T, gamma_kj = T' H, gamma_kk = T' H T + C T with T = 1 - M C, T' = 1 - C M; C is the joint
+!> compliance, H and M are free. Entries of gamma that are used are counted jk row by row, kj column by column, kk and
+!> jj row by row: of a reciprocal structure without kj and what is below the diagonals. Free entries of H, M and C are
+!> the upper triangle row by row, or all.
+!>
+!> A column of derivatives has an element for each entry of gamma. Many of its elements are zero; `groups` are the runs
+!> of entries that have the same columns not zero, so that products of columns leave the zeros out.
+module jointfrf_manifold_plan
+  implicit none
+  private
+  public :: make_manifold_plan
+
+  !> Entries first + 1 .. first + n, and the columns that are not zero there, ascending.
+  type, public :: entry_group
+    integer :: first = 0, n = 0
+    integer, allocatable :: column(:)
+  end type entry_group
+
+  type, public :: manifold_plan
+    logical :: reciprocal = .true.
+    integer :: n = 0                       !< joint DOFs
+    integer :: n_free = 0                  !< free entries of H, of M and of C
+    integer :: n_entry = 0                 !< entries of gamma
+    integer :: n_column = 0                !< columns: by H, by M, then by C where asked for, then residuals
+    integer :: n_target = 1                !< residuals
+    logical :: correlated = .false.        !< whether columns are whitened by a triangular factor
+    integer :: n_element = 0               !< elements that all this takes
+    !> The element before each matrix, which lies row by row.
+    integer :: c = 0, h = 0, m = 0         !< at the point that is looked at
+    integer :: best_h = 0, best_m = 0      !< at the best point so far
+    integer :: right = 0, left = 0         !< T and T'
+    integer :: jk = 0, kj = 0, kk = 0      !< blocks of gamma
+    integer :: kj_c = 0, jk_c = 0          !< gamma_kj + C and gamma_jk + C
+    integer :: of_c(4) = 0                 !< what columns by C are made of
+    integer :: target = 0                  !< entries of the FRFs, one run of entries a target
+    integer :: columns = 0                 !< columns, one run of entries each
+    integer :: whitened = 0                !< the same whitened; where that changes nothing, the same place
+    integer :: normal = 0                  !< products of columns, row by row; n_column elements a row
+    integer :: result = 0                  !< n_free by n_free, row by row
+    integer :: unused = 0                  !< elements that nobody reads
+    integer, allocatable :: row(:), column(:)        !< of each free entry
+    integer, allocatable :: gamma_row(:), gamma_column(:)      !< of each entry of gamma
+    integer, allocatable :: gamma(:)       !< the element where each entry of gamma is computed
+    integer, allocatable :: in_rows(:)     !< the entry that is number i of the matrix gamma row by row
+    integer, allocatable :: kk_first(:)    !< the entry before the first one of each row of kk
+    type(entry_group), allocatable :: groups(:)      !< of the columns by H and M and one residual
+    type(entry_group) :: joint_groups(1)             !< of the columns by C and all residuals
+  end type manifold_plan
+
+contains
+
+  !> Plan for n joint DOFs.
+  !> by_c        whether columns by C are wanted
+  !> n_target    FRFs whose residuals are wanted
+  !> correlated  whether columns are whitened by a triangular factor
+  subroutine make_manifold_plan(reciprocal, n, by_c, n_target, correlated, plan)
+    logical, intent(in) :: reciprocal, by_c, correlated
+    integer, intent(in) :: n, n_target
+    type(manifold_plan), intent(out) :: plan
+    integer :: i
+
+    plan%reciprocal = reciprocal
+    plan%n = n
+    plan%n_target = n_target
+    plan%correlated = correlated
+    plan%n_free = merge((n*(n + 1))/2, n*n, reciprocal)
+    plan%n_entry = merge(n*(2*n + 1), 4*n*n, reciprocal)
+    plan%n_column = 2*plan%n_free + merge(plan%n_free, 0, by_c) + n_target
+    allocate (plan%row(plan%n_free), plan%column(plan%n_free))
+    call list_triangle(reciprocal, n, plan%row, plan%column)
+    call place_elements(plan, by_c)
+    call list_entries(plan)
+    call list_groups(plan)
+    plan%joint_groups(1) = entry_group(0, plan%n_entry, [(i, i=2*plan%n_free + 1, plan%n_column)])
+  end subroutine make_manifold_plan
+
+  !> Rows and columns of the upper triangle row by row, or of all entries.
+  pure subroutine list_triangle(upper, n, row, column)
+    logical, intent(in) :: upper
+    integer, intent(in) :: n
+    integer, intent(out) :: row(:), column(:)
+    integer :: i, j, k
+
+    k = 0
+    do i = 1, n
+      do j = merge(i, 1, upper), n
+        k = k + 1
+        row(k) = i
+        column(k) = j
+      end do
+    end do
+  end subroutine list_triangle
+
+  subroutine place_elements(plan, by_c)
+    type(manifold_plan), intent(inout) :: plan
+    logical, intent(in) :: by_c
+    integer :: n2, i
+
+    n2 = plan%n*plan%n
+    plan%c = run(n2)
+    plan%h = run(n2)
+    plan%m = run(n2)
+    plan%best_h = run(n2)
+    plan%best_m = run(n2)
+    plan%right = run(n2)
+    plan%left = run(n2)
+    plan%jk = run(n2)
+    plan%kj = run(n2)
+    plan%kk = run(n2)
+    plan%kj_c = run(n2)
+    plan%jk_c = run(n2)
+    plan%target = run(plan%n_entry*plan%n_target)
+    plan%columns = run(plan%n_entry*plan%n_column)
+    plan%whitened = plan%columns
+    if (plan%correlated) plan%whitened = run(plan%n_entry*plan%n_column)
+    plan%normal = run(plan%n_column**2)
+    if (by_c) then
+      plan%result = run(plan%n_free**2)
+      do i = 1, size(plan%of_c)
+        plan%of_c(i) = run(n2)
+      end do
+    end if
+    plan%unused = run(4)
+
+  contains
+
+    !> The next n elements: the element before them.
+    integer function run(n)
+      integer, intent(in) :: n
+
+      run = plan%n_element
+      plan%n_element = plan%n_element + n
+    end function run
+  end subroutine place_elements
+
+  !> The entries of gamma in their order.
+  subroutine list_entries(plan)
+    type(manifold_plan), intent(inout) :: plan
+    integer :: number(2*plan%n, 2*plan%n), n, i, j, e
+
+    n = plan%n
+    e = 0
+    number = 0
+    allocate (plan%gamma_row(plan%n_entry), plan%gamma_column(plan%n_entry), plan%gamma(plan%n_entry), &
+              plan%in_rows(plan%n_entry), plan%kk_first(n))
+    do i = 1, n
+      do j = 1, n
+        call add(i, n + j, plan%jk + (i - 1)*n + j)
+      end do
+    end do
+    if (.not. plan%reciprocal) then
+      do j = 1, n
+        do i = 1, n
+          call add(n + i, j, plan%kj + (i - 1)*n + j)
+        end do
+      end do
+    end if
+    do i = 1, n
+      plan%kk_first(i) = e
+      do j = merge(i, 1, plan%reciprocal), n
+        call add(n + i, n + j, plan%kk + (i - 1)*n + j)
+      end do
+    end do
+    do i = 1, n
+      do j = merge(i, 1, plan%reciprocal), n
+        call add(i, j, plan%h + (i - 1)*n + j)
+      end do
+    end do
+    e = 0
+    do i = 1, 2*n
+      do j = 1, 2*n
+        if (number(i, j) == 0) cycle
+        e = e + 1
+        plan%in_rows(e) = number(i, j)
+      end do
+    end do
+
+  contains
+
+    subroutine add(row, column, element)
+      integer, intent(in) :: row, column, element
+
+      e = e + 1
+      plan%gamma_row(e) = row
+      plan%gamma_column(e) = column
+      plan%gamma(e) = element
+      number(row, column) = e
+    end subroutine add
+  end subroutine list_entries
+
+  !> Columns by H are zero in most rows of jk, in most columns of kj, and but for one entry in jj; those by M in jj.
+  subroutine list_groups(plan)
+    type(manifold_plan), intent(inout) :: plan
+    integer :: n, u, k, i, g, by_m(plan%n_free + 1)
+    integer :: every(2*plan%n_free + 1)
+
+    n = plan%n
+    u = plan%n_free
+    by_m = [(u + k, k=1, u + 1)]
+    every = [(k, k=1, 2*u + 1)]
+    if (plan%correlated) then
+      allocate (plan%groups(1))
+      plan%groups(1) = entry_group(0, plan%n_entry, every)
+      return
+    end if
+    g = 0
+    allocate (plan%groups(n + merge(0, n, plan%reciprocal) + 1 + u))
+    do i = 1, n
+      g = g + 1
+      plan%groups(g) = entry_group((i - 1)*n, n, [pack([(k, k=1, u)], plan%row == i .or. &
+                                                       (plan%reciprocal .and. plan%column == i)), by_m])
+    end do
+    if (.not. plan%reciprocal) then
+      do i = 1, n
+        g = g + 1
+        plan%groups(g) = entry_group(n*n + (i - 1)*n, n, [pack([(k, k=1, u)], plan%column == i), by_m])
+      end do
+    end if
+    g = g + 1
+    plan%groups(g) = entry_group(plan%kk_first(1), u, every)
+    do k = 1, u
+      g = g + 1
+      plan%groups(g) = entry_group(plan%n_entry - u + k - 1, 1, [k, 2*u + 1])
+    end do
+  end subroutine list_groups
+end module jointfrf_manifold_plan

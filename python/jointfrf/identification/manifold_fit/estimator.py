@@ -1,0 +1,149 @@
+"""Joint parameters from interface FRFs: every group of DOFs fitted on its own, and put together."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointfrf.dofs import Parameter
+from jointfrf.identification.compliance_fit.joint_terms import CrossTerms
+from jointfrf.identification.manifold_fit.group_fit import GroupFit, GroupProblem, fit_dofs
+from jointfrf.identification.manifold_fit.interface_frfs import InterfaceFrfs
+from jointfrf.identification.manifold_fit.joint_terms import CoupledJoint, DiagonalJoint, JointCoordinates, JointTerms
+from jointfrf.identification.manifold_fit.line_forms import inverse_of_information
+from jointfrf.identification.manifold_fit.starts import first_joints
+from jointfrf.kernel.arguments import FloatArray
+
+__all__ = ["FittedGroup", "JointEstimate", "estimate_on_manifold"]
+
+
+#: A compliance is not taken below this share of its standard error, nor of the receptances around it.
+_RIGID, _ROUNDING = 1e-3, 1e-12
+
+
+class FittedGroup(NamedTuple):
+    """The fit of one group of DOFs.
+
+    Attributes
+    ----------
+    dofs : ndarray of int
+    which : ndarray of int
+        Its parameters among all.
+    joint : DiagonalJoint or CoupledJoint
+    problem : GroupProblem
+    fit : GroupFit
+    """
+
+    dofs: NDArray[np.intp]
+    which: NDArray[np.intp]
+    joint: JointCoordinates
+    problem: GroupProblem
+    fit: GroupFit
+
+
+class JointEstimate(NamedTuple):
+    """Result of `estimate`.
+
+    Attributes
+    ----------
+    parameters : tuple of Parameter, length p
+        Those that the FRFs depend on: no cross terms between DOFs of different groups.
+    theta : ndarray, shape (p,)
+        Their values.
+    covariance : ndarray, shape (p, p)
+        From the noise of the FRFs, as if lines were independent.
+    groups : tuple of FittedGroup
+    excess : float
+        Mean square of the residual in units of the noise.
+    equations : float
+        Complex equations used.
+    """
+
+    parameters: tuple[Parameter, ...]
+    theta: FloatArray
+    covariance: FloatArray
+    groups: tuple[FittedGroup, ...]
+    excess: float
+    equations: float
+
+    @property
+    def converged(self) -> bool:
+        """Whether the fits of all groups did."""
+        return all(group.fit.converged for group in self.groups)
+
+
+def estimate_on_manifold(
+    frfs: InterfaceFrfs, terms: JointTerms, cross: CrossTerms = "zero", used: NDArray[np.bool_] | None = None
+) -> JointEstimate:
+    """Fit a joint to FRFs whose noise is known.
+
+    Parameters
+    ----------
+    frfs : InterfaceFrfs
+    terms : JointTerms
+        Terms of K* that are sought.
+    cross : {"zero", "ignore", "fit"}
+        Whether cross terms of C that are not sought are zero, or unknown.
+    used : ndarray of bool, shape (n_freq, n), optional
+        Lines used for each DOF; all by default.
+    """
+    groups = []
+    for dofs in frfs.groups():
+        own, which = terms.of_dofs(dofs)
+        data = frfs.of_dofs(dofs)
+        joint = coordinates_of(own)
+        problem = GroupProblem(data, joint, _unknown(dofs, cross, used, len(data.measured)))
+        fit = fit_dofs(problem, first_joints(data, joint))
+        groups.append(FittedGroup(dofs, which, joint, problem, fit))
+    return assembled(terms, groups)
+
+
+def coordinates_of(terms: JointTerms) -> JointCoordinates:
+    """Return the coordinates in which a joint is fitted."""
+    return CoupledJoint(terms) if terms.has_cross_terms else DiagonalJoint(terms)
+
+
+def assembled(terms: JointTerms, groups: list[FittedGroup]) -> JointEstimate:
+    """Put the fits of all groups together."""
+    p = len(terms.parameters)
+    theta, covariance = np.full(p, np.nan), np.zeros((p, p))
+    for group in groups:
+        own = inverse_of_information(2 * group.fit.minimum.information)
+        x = group.fit.minimum.x.copy()
+        if isinstance(group.joint, DiagonalJoint):
+            # A stiffness beyond what the data can tell stays a number; its interval says that it is open.
+            a = slice(0, len(group.dofs))
+            error = np.sqrt(np.maximum(np.diagonal(own)[a], 0))
+            x[a] = np.maximum(x[a], np.maximum(_RIGID * error, _ROUNDING * group.problem.data.own_size))
+        theta[group.which] = group.joint.theta(x)
+        slope = group.joint.theta_slope(x)
+        covariance[group.which[:, None], group.which] = slope @ own @ slope.T
+    kept = np.sort(np.concatenate([group.which for group in groups]))
+    place = np.full(p, -1)
+    place[kept] = np.arange(kept.size)
+    equations = sum(group.fit.equations for group in groups)
+    squares = sum(group.fit.minimum.cost for group in groups)
+    return JointEstimate(
+        tuple(terms.parameters[i] for i in kept),
+        theta[kept],
+        covariance[kept[:, None], kept],
+        tuple(group._replace(which=place[group.which]) for group in groups),
+        squares / max(equations - kept.size / 2, 1),
+        equations,
+    )
+
+
+def _unknown(
+    dofs: NDArray[np.intp], cross: CrossTerms, used: NDArray[np.bool_] | None, n_freq: int
+) -> NDArray[np.bool_]:
+    """Return which entries of C are unknown, shape (n_freq, n * n)."""
+    n = len(dofs)
+    unknown = np.zeros((n_freq, n, n), bool)
+    if cross == "ignore":
+        unknown |= ~np.eye(n, dtype=bool)
+    if used is not None:
+        outside = ~used[:, dofs]
+        unknown |= outside[:, :, None] | outside[:, None, :]
+    return unknown.reshape(n_freq, n * n)

@@ -1,0 +1,158 @@
+"""From a prepared problem to numbers: the fit on the manifold with its choice of damping."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from jointfrf.errors import IllConditionedWarning
+from jointfrf.identification.compliance_fit.joint_terms import CrossTerms, DampingTerms
+from jointfrf.identification.joint_fit import JointFit
+from jointfrf.identification.manifold_fit.damping_choice import DofDamping, choose_damping
+from jointfrf.identification.manifold_fit.estimator import JointEstimate, estimate_on_manifold
+from jointfrf.identification.manifold_fit.intervals import LikelihoodIntervals, Spread, spread_of
+from jointfrf.identification.manifold_fit.joint_terms import joint_terms
+from jointfrf.identification.manifold_fit.misfit import Misfit, diagnose
+from jointfrf.identification.manifold_fit.prepare import ManifoldProblem
+from jointfrf.substructuring.ismm import inverse_substructuring
+
+__all__ = ["ManifoldFit", "fit_manifold"]
+
+#: An assumed noise level is replaced by that of the residual until both agree to this factor.
+_AGREE = 1.3
+_MOST_LEVELS = 6
+#: The residual of exact FRFs is rounding: models are not compared below this share of the noise.
+_LEAST_EXCESS = 1e-12
+#: Residual of FRFs without noise, in units of the level assumed.
+_NO_NOISE = 1e-3
+
+
+class ManifoldFit(NamedTuple):
+    """Result of `fit_manifold`.
+
+    Attributes
+    ----------
+    joint : JointFit
+        Parameters, covariance and levels, without notes and warnings.
+    estimate : JointEstimate
+        What they come from.
+    spread : Spread
+        By how much variances exceed those from independent noise.
+    misfit : Misfit
+        The residual against the noise.
+    cross_fits : bool
+        Whether cross terms would remove a misfit.
+    choices : tuple of DofDamping
+        Empty where the damping terms were given.
+    """
+
+    joint: JointFit
+    estimate: JointEstimate
+    spread: Spread
+    misfit: Misfit
+    cross_fits: bool
+    choices: tuple[DofDamping, ...]
+
+
+def fit_manifold(problem: ManifoldProblem) -> ManifoldFit:
+    """Fit the joint by maximum likelihood in the compliance domain."""
+    problem, result, choices = _fitted(problem)
+    noise = problem.noise
+    level, scale = noise.level, float(np.sqrt(result.excess))
+    if noise.is_assumed:
+        level = scale * level
+    spread = spread_of(result, noise.inflation, is_level_known=not noise.is_assumed)
+    root = np.sqrt(spread.factor)
+    frfs = problem.frfs
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", IllConditionedWarning)
+        k_lines = inverse_substructuring(frfs.gamma(frfs.measured), on_singular="nan")
+    with np.errstate(invalid="ignore"):
+        covariance = result.covariance * np.outer(root, root)
+    names = [one.name for one in result.parameters]
+    joint = JointFit(
+        method="manifold",
+        dofs=problem.dofs,
+        parameters=dict(zip(names, result.theta.tolist(), strict=True)),
+        covariance=covariance,
+        noise_level=level,
+        residual_level=scale * noise.level,
+        freq_hz=problem.freq_hz,
+        k_lines=k_lines,
+        bands=problem.bands,
+        intervals=LikelihoodIntervals(result, spread.factor),
+    )
+    misfit = diagnose(result, problem.freq_hz, noise.inflation)
+    return ManifoldFit(joint, result, spread, misfit, _cross_fits(problem, result, misfit), choices)
+
+
+def _cross_fits(problem: ManifoldProblem, result: JointEstimate, misfit: Misfit) -> bool:
+    """Whether a fit with cross terms leaves a residual that is noise, where that without does not."""
+    coupled = any(len(group.dofs) > 1 for group in result.groups)
+    if problem.noise.is_assumed or problem.options.cross != "zero" or not (misfit.is_large and coupled):
+        return False
+    damping = problem.options.damping
+    words = "viscous" if damping == "auto" else damping
+    other = _estimate(problem, words, "fit")
+    return bool(np.sqrt(other.excess) - 1 < (misfit.ratio - 1) / 4)
+
+
+def _fitted(problem: ManifoldProblem) -> tuple[ManifoldProblem, JointEstimate, tuple[DofDamping, ...]]:
+    """Fit with the damping terms asked for; where no noise level is known, at that of the residual."""
+    result, choices = _with_damping(problem)
+    for _ in range(_MOST_LEVELS if problem.noise.is_assumed else 0):
+        scale = float(np.sqrt(result.excess))
+        if scale < _NO_NOISE or 1 / _AGREE < scale < _AGREE:
+            break
+        noise = replace(problem.noise, level=scale * problem.noise.level)
+        frfs = problem.frfs._replace(variance=problem.frfs.variance * scale**2)
+        problem = replace(problem, noise=noise, frfs=frfs)
+        result, choices = _with_damping(problem)
+    return problem, result, choices
+
+
+def _with_damping(problem: ManifoldProblem) -> tuple[JointEstimate, tuple[DofDamping, ...]]:
+    damping = problem.options.damping
+    if damping != "auto":
+        return _estimate(problem, damping), ()
+    if problem.options.cross == "fit":
+        return _with_common_damping(problem)
+    both = _estimate(problem, "both")
+    factor = problem.noise.inflation * max(both.excess, _LEAST_EXCESS if problem.noise.is_assumed else 1.0)
+    of_dof = {}
+    for group in both.groups:
+        for one in choose_damping(group, tuple(problem.dofs[d] for d in group.dofs), factor):
+            of_dof[one.dof] = one
+    choices = tuple(of_dof[dof] for dof in problem.dofs)
+    chosen = tuple(one.best for one in choices)
+    if all(kind == "both" for kind in chosen):
+        return both, choices
+    return _estimate(problem, chosen), choices
+
+
+def _with_common_damping(problem: ManifoldProblem) -> tuple[JointEstimate, tuple[DofDamping, ...]]:
+    """Choose the damping terms of a joint with cross terms: the same for all DOFs."""
+    kinds: tuple[DampingTerms, ...] = ("viscous", "hysteretic", "both")
+    results = {kind: _estimate(problem, kind) for kind in kinds}
+    factor = problem.noise.inflation * max(results["both"].excess, _LEAST_EXCESS)
+    scores = {}
+    for kind, result in results.items():
+        squares = sum(group.fit.squares for group in result.groups)
+        scores[kind] = 2 * squares / factor + len(result.parameters) * np.log(max(2 * result.equations / factor, 2.0))
+    best, second = sorted(scores, key=lambda kind: scores[kind])[:2]
+    margin = scores[second] - scores[best]
+    return results[best], tuple(DofDamping(dof, best, second, margin) for dof in problem.dofs)
+
+
+def _estimate(
+    problem: ManifoldProblem, damping: DampingTerms | tuple[DampingTerms, ...], cross: CrossTerms | None = None
+) -> JointEstimate:
+    cross = problem.options.cross if cross is None else cross
+    terms = joint_terms(2 * np.pi * problem.freq_hz, problem.dofs, damping, cross)
+    with warnings.catch_warnings():
+        # Lines on which noise hides the joint are ill-conditioned; they weigh little.
+        warnings.simplefilter("ignore", IllConditionedWarning)
+        return estimate_on_manifold(problem.frfs, terms, cross, problem.used)

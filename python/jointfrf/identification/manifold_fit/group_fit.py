@@ -1,0 +1,280 @@
+"""The fit of one group of joint DOFs: project smooth FRFs, linearise there, minimise, until nothing moves."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointfrf.identification.manifold_fit.joint_terms import DiagonalJoint, JointCoordinates
+from jointfrf.identification.manifold_fit.line_forms import (
+    FormMinimum,
+    LineForms,
+    inverse_of_information,
+    minimise_forms,
+)
+from jointfrf.identification.manifold_fit.manifold import LineData, OnManifold, normal_forms, project
+from jointfrf.identification.manifold_fit.starts import smooth_compliance, starts_on_manifold
+from jointfrf.kernel.arguments import ComplexArray, FloatArray
+
+__all__ = ["GroupFit", "GroupProblem", "fit_dofs"]
+
+#: Linearisations at most.
+_MOST = 25
+#: The fit has converged when the coordinates move by less than this many standard errors.
+_MOVED = 0.02
+#: Steps of the projection: of the first one, and of those that follow a small change of the joint.
+_FIRST_STEPS, _NEXT_STEPS = 30, 8
+#: A line that stays farther from the manifold than this, in squares per unknown and of the noise, is not trusted.
+_FAR = 3.0
+_PATIENCE = 8
+#: A fit is far from the data when the squares exceed their number by this factor.
+_LOST = 9.0
+#: A compliance is barely seen when its standard error exceeds this share of it.
+_BARELY = 0.1
+#: Of a compliance with this relative error, damping is not known: its rate is taken below 1 where it is linearised.
+_HARDLY = 0.3
+#: Another start replaces a fit when it lowers the squares by so much.
+_GAIN = 10.0
+
+
+class GroupProblem(NamedTuple):
+    """The fit of one group.
+
+    Attributes
+    ----------
+    data : LineData
+        Its noise is known: a weighted residual has mean square 1.
+    joint : JointCoordinates
+    unknown : ndarray of bool, shape (n_freq, n * n)
+        Entries of C, row by row, that may have any value on a line: cross terms that are not sought, and DOFs outside
+        their bands.
+    """
+
+    data: LineData
+    joint: JointCoordinates
+    unknown: NDArray[np.bool_]
+
+    @property
+    def is_diagonal(self) -> bool:
+        """Whether C is diagonal."""
+        return isinstance(self.joint, DiagonalJoint)
+
+    def of_joint(self, entries: ComplexArray) -> ComplexArray:
+        """Return C, shape (n_freq, n, n), of the entries that the coordinates change."""
+        n = self.data.entries.n
+        c = np.zeros((len(entries), n, n), np.complex128)
+        rows, columns = np.diag_indices(n) if self.is_diagonal else np.triu_indices(n)
+        c[:, rows, columns] = c[:, columns, rows] = entries
+        return c
+
+
+class GroupFit(NamedTuple):
+    """Result of `fit_dofs`.
+
+    Attributes
+    ----------
+    minimum : FormMinimum
+        Coordinates, squares, information, and what each line adds to them.
+    forms : LineForms
+        Quadratic forms of the last linearisation; lines that are not trusted weigh nothing.
+    trusted : ndarray of bool, shape (n_freq,)
+        Lines on which the FRFs can fit a joint near the one found.
+    equations : float
+        Complex equations used.
+    possible : float
+        Complex equations of all lines.
+    iterations : int
+    converged : bool
+    """
+
+    minimum: FormMinimum
+    forms: LineForms
+    trusted: NDArray[np.bool_]
+    equations: float
+    possible: float
+    iterations: int
+    converged: bool
+
+    @property
+    def squares(self) -> float:
+        """Squares of the residual; a line that is not trusted counts as one that just is not."""
+        return self.minimum.cost + _FAR * (self.possible - self.equations)
+
+    @property
+    def excess(self) -> float:
+        """Mean square of the residual in units of the noise."""
+        return self.minimum.cost / max(self.equations - self.minimum.x.size / 2, 1)
+
+
+def fit_dofs(problem: GroupProblem, starts: Iterable[FloatArray]) -> GroupFit:
+    """Fit from one start after the other until the residual is that of the noise; else keep the lowest.
+
+    Parameters
+    ----------
+    problem : GroupProblem
+    starts : iterable of ndarray, shape (p,)
+        Coordinates of the joint.
+    """
+    best: GroupFit | None = None
+    for start in starts:
+        if not np.isfinite(start).all():
+            continue
+        found = _iterate(problem, start)
+        if best is None or found.squares < best.squares:
+            best = found
+        if best.converged and best.excess < 1.15**2:
+            break
+    if best is None:
+        raise np.linalg.LinAlgError("no start of the fit is finite")
+    return _from_softer(problem, best) if problem.is_diagonal else best
+
+
+def _from_softer(problem: GroupProblem, best: GroupFit) -> GroupFit:
+    """Start again from softer values of the DOFs that are barely seen: stiff joints have a second stationary point.
+
+    From a few times the compliance that the data can tell, up to that of the structure around the joint.
+    """
+    n = problem.data.entries.n
+    softest = problem.data.own_size
+    factor = 3.0
+    while True:
+        a = best.minimum.x[:n]
+        error = np.sqrt(np.diagonal(inverse_of_information(2 * best.minimum.information))[:n])
+        softer = factor * np.maximum(a, error)
+        barely = (error > _BARELY * a) & (softer < softest)
+        if not barely.any():
+            return best
+        start = best.minimum.x.copy()
+        start[:n] = np.where(barely, softer, a)
+        # A rate that belongs to another compliance says nothing here.
+        start[n:] = np.where(barely[problem.joint.terms.pairs[n:, 0]], 0.0, start[n:])
+        found = _iterate(problem, start)
+        if found.squares < best.squares - _GAIN / 2:
+            best, factor = found, 3.0
+        else:
+            factor *= 4.0
+
+
+def _iterate(problem: GroupProblem, start: FloatArray) -> GroupFit:
+    data, joint = problem.data, problem.joint
+    free = _equations(problem)
+    x: FloatArray = start
+    linearised_at: FloatArray = start
+    on: OnManifold | None = None
+    unknown = smooth_compliance(data) if problem.unknown.any() else None
+    for step in range(1, _MOST + 1):
+        c = problem.of_joint(joint.compliance(linearised_at))
+        if unknown is not None:
+            c = np.where(problem.unknown.reshape(c.shape), unknown, c)
+        on = project(data.smooth, data, c, on, _NEXT_STEPS) if on else starts_on_manifold(data, c, _FIRST_STEPS)
+        on, trusted = _trusted(data, c, on, joint)
+        (forms, of_smooth) = normal_forms(data, c, on, (data.measured, data.smooth))
+        # Unknown entries of C move on all lines: they may bring a line back to where it is trusted.
+        forms, unknown = _used(problem, forms, of_smooth, c)
+        forms = forms.scaled(trusted.astype(float))
+        minimum = minimise_forms(forms, joint, x)
+        error = np.sqrt(np.maximum(np.diagonal(inverse_of_information(2 * minimum.information)), 1e-300))
+        # In standard errors along the direction of the step: what the data do not see may go anywhere.
+        change = minimum.x - x
+        moved = float(np.sqrt(abs(2 * (change @ minimum.information @ change))))
+        x = minimum.x
+        equations = float(free[trusted].sum())
+        converged = moved < _MOVED and step > 1
+        if converged or (step > _PATIENCE and minimum.cost > _LOST * equations):
+            break
+        linearised_at = _within_sight(problem.joint, x, error) if problem.is_diagonal else x
+    return GroupFit(minimum, forms, trusted, equations, float(free.sum()), step, converged)
+
+
+def _within_sight(joint: JointCoordinates, x: FloatArray, error: FloatArray) -> FloatArray:
+    """Return where to linearise: not nearer to a rigid joint, nor at a larger rate of one, than the data can tell."""
+    terms, n = joint.terms, joint.terms.n
+    at = x.copy()
+    at[:n] = np.maximum(x[:n], np.where(np.isfinite(error[:n]), error[:n], 0))
+    hardly = (error[:n] > _HARDLY * x[:n])[terms.pairs[n:, 0]]
+    reach = np.where(terms.kinds[n:] == 1, 1.0, 1 / max(float(terms.omega.max()), np.finfo(float).tiny))
+    at[n:] = np.where(hardly, np.clip(x[n:], -reach, reach), x[n:])
+    return at
+
+
+def _equations(problem: GroupProblem) -> FloatArray:
+    """Return the complex equations of each line: entries used, less what is free and what is unknown."""
+    entries = problem.data.entries
+    places = np.array([np.flatnonzero(one.ravel())[0] for one in entries.units])
+    unknown = np.count_nonzero(problem.unknown[:, places], axis=1)
+    used = np.count_nonzero(problem.data.used, axis=1)
+    equations: FloatArray = np.maximum(used - 2 * len(places) - unknown, 0).astype(float)
+    return equations
+
+
+def _trusted(
+    data: LineData, c: ComplexArray, on: OnManifold, joint: JointCoordinates
+) -> tuple[OnManifold, NDArray[np.bool_]]:
+    """Give lines far from the manifold other starts; return the points, and which lines are near enough."""
+    bound = _FAR * data.entries.n**2
+    far = np.flatnonzero(~(on.squares <= bound))
+    if far.size and far.size < len(c):
+        own = data.on_lines(far)
+        other = starts_on_manifold(own, c[far], 25)
+        squares = on.squares.copy()
+        h, m = on.h.copy(), on.m.copy()
+        nearer = other.squares < squares[far]
+        h[far[nearer]], m[far[nearer]], squares[far[nearer]] = (x[nearer] for x in other)
+        on = OnManifold(h, m, squares)
+    trusted = on.squares <= bound
+    if np.count_nonzero(trusted) < max(joint.lower.size, len(c) // 4):
+        trusted = on.squares <= np.quantile(on.squares, 0.5)
+    return on, trusted
+
+
+def _used(
+    problem: GroupProblem, forms: LineForms, of_smooth: LineForms, c: ComplexArray
+) -> tuple[LineForms, ComplexArray | None]:
+    """Return the forms of the entries of C that the coordinates change, and the unknown ones of the smooth FRFs.
+
+    Entries of C that are unknown on a line are eliminated from its form; all others that the coordinates do not change
+    are zero.
+    """
+    n, unit = problem.data.entries.n, problem.data.entries.units
+    places = np.array([np.flatnonzero(one.ravel())[0] for one in unit])
+    unknown = problem.unknown[:, places]
+    found = None
+    if unknown.any():
+        forms, step = _eliminated(forms, of_smooth, unknown)
+        found = np.where(problem.unknown, c.reshape(len(c), -1), 0).reshape(c.shape) + np.tensordot(step, unit, 1)
+    if problem.is_diagonal:
+        kept = np.flatnonzero(places % (n + 1) == 0)
+        weight = forms.weight[:, kept[:, None], kept]
+        forms = LineForms(forms.compliance[:, kept], weight, forms.gradient[:, kept], forms.squares)
+    elif len(unit) > n * (n + 1) // 2:
+        forms = _symmetric(forms, n)
+    return forms, found
+
+
+def _eliminated(forms: LineForms, of_smooth: LineForms, unknown: NDArray[np.bool_]) -> tuple[LineForms, ComplexArray]:
+    """Minimise each form over its unknown entries; return the forms left, and the step there of the smooth FRFs."""
+    w, p = forms.weight, forms.gradient
+    size = np.sqrt(np.maximum(np.einsum("lqq->lq", w).real, np.finfo(float).tiny))
+    outer = size[:, :, None] * size[:, None, :]
+    both = unknown[:, :, None] & unknown[:, None, :]
+    masked = np.where(both, w / outer, 0) + (~unknown)[:, :, None] * np.eye(w.shape[1])
+    inverse = np.where(both, np.linalg.pinv(masked, hermitian=True), 0) / outer
+    across = w @ inverse
+    known = ~unknown
+    weight = (w - across @ w) * known[:, :, None] * known[:, None, :]
+    gradient = (p - (across @ p[..., None])[..., 0]) * known
+    squares = forms.squares - (p.conj() * (inverse @ p[..., None])[..., 0]).real.sum(axis=1)
+    step = (inverse @ of_smooth.gradient[..., None])[..., 0]
+    return LineForms(forms.compliance, weight, gradient, squares), step
+
+
+def _symmetric(forms: LineForms, n: int) -> LineForms:
+    """Return the forms of the upper triangle of a symmetric C from those of all its entries."""
+    a, b = np.triu_indices(n)
+    fold = np.zeros((n * n, a.size))
+    fold[a * n + b, np.arange(a.size)] = 1
+    fold[b * n + a, np.arange(a.size)] = 1
+    return LineForms(forms.compliance[:, a * n + b], fold.T @ forms.weight @ fold, forms.gradient @ fold, forms.squares)

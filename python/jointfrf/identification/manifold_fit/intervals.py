@@ -1,0 +1,255 @@
+"""Uncertainty of the parameters: from noise, from the scatter between parts of the band, by profile likelihood."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy import optimize, stats
+
+from jointfrf.identification.manifold_fit.estimator import FittedGroup, JointEstimate
+from jointfrf.identification.manifold_fit.joint_terms import DiagonalJoint
+from jointfrf.identification.manifold_fit.line_forms import LineForms, inverse_of_information, minimise_forms
+from jointfrf.kernel.arguments import FloatArray
+
+__all__ = ["BLOCKS", "LikelihoodIntervals", "Spread", "block_jackknife", "profile_interval", "spread_of"]
+
+#: Squares of profiles are minimised to this.
+_PRECISE = 1e-3
+#: Relative standard error of a compliance from which on intervals come from the profile of the likelihood.
+_CURVED = 0.1
+#: Parts of the band that the jackknife leaves out in turn.
+BLOCKS = 10
+#: Probability at which a jackknife that exceeds the noise is taken for chance.
+_CHANCE = 0.95
+
+
+class Spread(NamedTuple):
+    """Factors by which the variance of parameters exceeds that from independent noise, shape (p,) each.
+
+    Attributes
+    ----------
+    information : ndarray
+        From the correlation between lines, and from a residual larger than the noise.
+    jackknife : ndarray
+        From the scatter between parts of the band; NaN where there are too few lines.
+    factor : ndarray
+        The one used.
+    """
+
+    information: FloatArray
+    jackknife: FloatArray
+    factor: FloatArray
+
+
+def block_jackknife(group: FittedGroup, blocks: int = BLOCKS) -> FloatArray:
+    """Covariance of the coordinates of a group from leaving out one block of neighbouring lines after the other.
+
+    Returns
+    -------
+    ndarray, shape (p, p)
+        NaN where there are fewer than two lines a block.
+
+    Notes
+    -----
+    It needs no noise model, and includes what the model of the joint cannot follow over frequency. To first order, by
+    one Gauss-Newton step without the block.
+    """
+    minimum = group.fit.minimum
+    p = minimum.x.size
+    lines = np.flatnonzero(group.fit.trusted & minimum.line_information.any(axis=(1, 2)))
+    if lines.size < 2 * blocks:
+        return np.full((p, p), np.nan)
+    change = np.empty((blocks, p))
+    # Blocks of equal information, so that each says about as much as the others.
+    size = np.maximum(np.diagonal(minimum.information), np.finfo(float).tiny)
+    share = (np.einsum("lpp->lp", minimum.line_information)[lines] / size).sum(axis=1)
+    share = share / share.sum() + 1 / lines.size
+    at = ((np.cumsum(share) - share / 2) / share.sum() * blocks).astype(int)
+    for b in range(blocks):
+        own = lines[at == b]
+        information = minimum.information - minimum.line_information[own].sum(axis=0)
+        gradient = minimum.gradient - minimum.line_gradient[own].sum(axis=0)
+        change[b] = inverse_of_information(information) @ gradient
+    change -= change.mean(axis=0)
+    covariance: FloatArray = (blocks - 1) / blocks * change.T @ change
+    return covariance
+
+
+def spread_of(found: JointEstimate, inflation: float, *, is_level_known: bool = True) -> Spread:
+    """Return by how much the variance of each parameter exceeds that from independent noise of the level known.
+
+    Parameters
+    ----------
+    found : JointEstimate
+    inflation : float
+        By how much correlation between lines makes the variance of a mean larger, at least 1.
+    is_level_known : bool
+        Whether the noise is known; otherwise its level is that of the residual.
+
+    Notes
+    -----
+    The larger of information and jackknife; the jackknife only where it exceeds the information by more than chance,
+    for one parameter or for all together: with ten blocks its variance is known to 47 %.
+    """
+    scale = max(found.excess, 1.0) if is_level_known else found.excess
+    by_noise = np.full(len(found.parameters), inflation * scale)
+    by_blocks = np.full_like(by_noise, np.nan)
+    for group in found.groups:
+        blocks = np.diagonal(block_jackknife(group))
+        own = np.diagonal(inverse_of_information(2 * group.fit.minimum.information))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            by_blocks[group.which] = np.where(own > 0, blocks / own, np.nan)
+    ratio = by_blocks / by_noise
+    factor = by_noise.copy()
+    known = np.isfinite(ratio)
+    if known.any():
+        degrees = BLOCKS - 1
+        single = stats.chi2.ppf(1 - (1 - _CHANCE) / known.sum(), degrees) / degrees
+        together = stats.chi2.ppf(_CHANCE, degrees * known.sum()) / (degrees * known.sum())
+        mean = float(ratio[known].mean())
+        if mean > together:
+            factor *= mean
+        larger = known & (ratio > single)
+        # Student's t for the few blocks.
+        few = (stats.t.ppf(0.975, degrees) / stats.norm.ppf(0.975)) ** 2
+        factor[larger] = np.maximum(factor, few * by_blocks)[larger]
+    return Spread(by_noise, by_blocks, factor)
+
+
+class LikelihoodIntervals:
+    """Intervals of the parameters of a fit, by their probability.
+
+    Parameters
+    ----------
+    found : JointEstimate
+    factor : ndarray, shape (p,)
+        By how much the variance of each parameter exceeds that from independent noise.
+    """
+
+    def __init__(self, found: JointEstimate, factor: FloatArray) -> None:
+        self.found, self.factor = found, factor
+        self._known: dict[float, dict[str, tuple[float, float]]] = {}
+
+    def __call__(self, probability: float) -> dict[str, tuple[float, float]]:
+        """Return the interval of every parameter that contains the true one with the given probability.
+
+        Symmetric in the compliance of a DOF that is well determined, in which noise is nearly normal; by profile
+        likelihood where it is not.
+        """
+        if probability not in self._known:
+            limits = [
+                (parameter.name, _limits(group, i, float(self.factor[group.which[i]]), probability))
+                for group in self.found.groups
+                for i, parameter in enumerate(group.joint.terms.parameters)
+            ]
+            by_name = dict(limits)
+            self._known[probability] = {one.name: by_name[one.name] for one in self.found.parameters}
+        return self._known[probability]
+
+
+def _limits(group: FittedGroup, i: int, factor: float, probability: float) -> tuple[float, float]:
+    """Return the limits of one parameter of a group."""
+    terms, x = group.joint.terms, group.fit.minimum.x
+    covariance = inverse_of_information(2 * group.fit.minimum.information) * factor
+    reach = float(stats.norm.ppf((1 + probability) / 2))
+    a = int(terms.pairs[i, 0])
+    is_diagonal = isinstance(group.joint, DiagonalJoint)
+    if is_diagonal and np.sqrt(max(covariance[a, a], 0)) > _CURVED * x[a]:
+        return profile_interval(group, i, factor, probability)
+    if is_diagonal and terms.kinds[i] == 0:
+        own = reach * float(np.sqrt(max(covariance[i, i], 0)))
+        return float(1 / (x[i] + own)), float(1 / (x[i] - own))
+    slope = group.joint.theta_slope(x)[i]
+    value, own = float(group.joint.theta(x)[i]), reach * float(np.sqrt(max(slope @ covariance @ slope, 0)))
+    return value - own, value + own
+
+
+def profile_interval(group: FittedGroup, index: int, factor: float, probability: float = 0.95) -> tuple[float, float]:
+    """Interval of one parameter of a joint without cross terms, by profile likelihood.
+
+    Parameters
+    ----------
+    group : FittedGroup
+        Its joint is a `DiagonalJoint`.
+    index : int
+        Parameter among those of the group.
+    factor : float
+        By how much the variance exceeds that from independent noise.
+    probability : float
+
+    Returns
+    -------
+    low, high : float
+        In units of the parameter; inf where the data give no limit.
+
+    Notes
+    -----
+    The squares of the quadratic forms are minimised over all other coordinates, for values of the compliance a = 1/k
+    >= 0 or of the damping; the interval is where they exceed their minimum by the quantile of chi^2, times the variance
+    factor.
+    """
+    terms = group.joint.terms
+    of_stiffness = terms.kinds[index] == 0
+    joint = DiagonalJoint(terms, by_rate=bool(of_stiffness))
+    forms = group.fit.forms
+    start = joint.coordinates(group.joint.theta(group.fit.minimum.x))
+    if of_stiffness:
+        start = group.fit.minimum.x
+    best = minimise_forms(forms, joint, start)
+    limit = stats.chi2.ppf(probability, 1) * factor / 2
+    error = np.sqrt(np.maximum(np.diagonal(inverse_of_information(2 * best.information)), 0) * factor)[index]
+    if not of_stiffness and _may_be_rigid(group, int(joint.dofs[index]), limit):
+        # A rigid DOF shows no damping.
+        return -np.inf, np.inf
+    profile = _Profile(forms, joint, index, best.x, best.cost, limit)
+    reach = stats.norm.ppf((1 + probability) / 2) * error
+    low = profile.crossing(-1, reach, 0.0 if of_stiffness else -np.inf)
+    high = profile.crossing(1, reach, np.inf)
+    if of_stiffness:
+        with np.errstate(divide="ignore"):
+            return (float(np.divide(1, high)) if high > 0 else np.inf, 1 / low if low > 0 else np.inf)
+    return low, high
+
+
+def _may_be_rigid(group: FittedGroup, dof: int, limit: float) -> bool:
+    """Whether the squares of a rigid DOF exceed their minimum by less than the limit."""
+    minimum = group.fit.minimum
+    start = minimum.x.copy()
+    start[dof] = 0.0
+    rigid = minimise_forms(group.fit.forms, group.joint, start, dof, _PRECISE)
+    return rigid.cost - minimum.cost < limit
+
+
+class _Profile:
+    """Squares beyond their minimum, less the limit, as a function of one coordinate."""
+
+    def __init__(
+        self, forms: LineForms, joint: DiagonalJoint, index: int, best: FloatArray, cost: float, limit: float
+    ) -> None:
+        self.forms, self.joint, self.index = forms, joint, index
+        self.best, self.cost, self.limit = best, cost, limit
+
+    def excess(self, value: float) -> float:
+        """Return the squares at a value of the coordinate, minimised over the others, beyond the limit."""
+        start = self.best.copy()
+        start[self.index] = value
+        return minimise_forms(self.forms, self.joint, start, self.index, _PRECISE).cost - self.cost - self.limit
+
+    def crossing(self, sign: int, reach: float, bound: float) -> float:
+        """Return where the excess crosses zero on one side, or the bound where it does not."""
+        at = float(self.best[self.index])
+        if not np.isfinite(reach) or reach <= 0:
+            return bound
+        near, step = at, reach
+        for _ in range(30):
+            there = at + sign * step
+            if sign < 0 and there <= bound:
+                there = bound
+            if self.excess(there) > 0:
+                root: float = optimize.brentq(self.excess, near, there, xtol=1e-3 * reach, rtol=1e-6)
+                return root
+            if there == bound:
+                return bound
+            near, step = there, 1.7 * step
+        return sign * np.inf if bound == sign * np.inf or sign > 0 else bound

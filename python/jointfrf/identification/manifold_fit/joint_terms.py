@@ -1,0 +1,264 @@
+"""K*(w) of a joint as a sum of terms, and its compliance as a function of coordinates in which a fit is well behaved.
+
+A joint without cross terms is fitted in the compliance a = 1/k and the rates eta = h/k and tau = c/k of each DOF:
+regular for a rigid DOF, a = 0, where k runs to infinity. A joint with cross terms is fitted in the entries of K*.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointfrf.dofs import Parameter, ParameterKind, joint_parameters
+from jointfrf.identification.compliance_fit.joint_terms import CrossTerms, DampingTerms
+from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.kernel.linear_algebra import invert
+
+__all__ = [
+    "CoupledJoint",
+    "DiagonalJoint",
+    "JointCoordinates",
+    "JointTerms",
+    "joint_terms",
+]
+
+_KINDS: Mapping[DampingTerms, tuple[ParameterKind, ...]] = {
+    "none": ("k",),
+    "viscous": ("k", "c"),
+    "hysteretic": ("k", "h"),
+    "both": ("k", "h", "c"),
+}
+#: Rates eta and w tau are limited: K* is then damping only.
+_LARGEST_RATE = 100.0
+
+
+class JointTerms(NamedTuple):
+    """K*(w) as a sum of parameters times a function of frequency times a symmetric pair of DOFs.
+
+    Attributes
+    ----------
+    parameters : tuple of Parameter, length p
+        By kind, k before h before c, and within a kind the diagonal first.
+    omega : ndarray, shape (n_freq,)
+        rad/s.
+    kinds : ndarray of int, shape (p,)
+        0, 1, 2 for k, h, c: the functions of frequency 1, i, i w.
+    pairs : ndarray of int, shape (p, 2)
+        Row and column of each parameter in K*.
+    """
+
+    parameters: tuple[Parameter, ...]
+    omega: FloatArray
+    kinds: NDArray[np.intp]
+    pairs: NDArray[np.intp]
+
+    @property
+    def n(self) -> int:
+        """Number of joint DOFs."""
+        return int(self.pairs.max()) + 1
+
+    @property
+    def has_cross_terms(self) -> bool:
+        """Whether a parameter couples two DOFs."""
+        return bool((self.pairs[:, 0] != self.pairs[:, 1]).any())
+
+    @property
+    def factors(self) -> ComplexArray:
+        """Functions of frequency of the three kinds, shape (3, n_freq)."""
+        one = np.ones_like(self.omega)
+        return np.array([one, 1j * one, 1j * self.omega])
+
+    def on_lines(self, lines: NDArray[np.intp] | slice) -> JointTerms:
+        """Return the same terms on some of the lines."""
+        return self._replace(omega=self.omega[lines])
+
+    def of_dofs(self, dofs: NDArray[np.intp]) -> tuple[JointTerms, NDArray[np.intp]]:
+        """Return the terms between some of the DOFs, and which of the parameters these are."""
+        which = np.flatnonzero(np.isin(self.pairs, dofs).all(axis=1))
+        pairs = np.searchsorted(dofs, self.pairs[which])
+        own = JointTerms(tuple(self.parameters[i] for i in which), self.omega, self.kinds[which], pairs)
+        return own, which
+
+    def stiffness(self, theta: FloatArray) -> ComplexArray:
+        """Return K*(w) of parameters, shape (n_freq, n, n), N/m."""
+        k = np.zeros((self.omega.size, self.n, self.n), np.complex128)
+        for value, kind, (a, b) in zip(theta, self.kinds, self.pairs, strict=True):
+            k[:, a, b] += value * self.factors[kind]
+            if a != b:
+                k[:, b, a] += value * self.factors[kind]
+        return k
+
+
+def joint_terms(
+    omega: FloatArray, dofs: Sequence[str], damping: DampingTerms | Sequence[DampingTerms], cross: CrossTerms
+) -> JointTerms:
+    """Return the terms of K*(w) = k + i h + i w c asked for.
+
+    Parameters
+    ----------
+    omega : ndarray, shape (n_freq,)
+        rad/s.
+    dofs : sequence of str
+        Names of the n joint DOFs.
+    damping : str, or sequence of str of length n
+        Damping terms of all DOFs, or of each. A cross term has those that both its DOFs have.
+    cross : {"zero", "ignore", "fit"}
+        Symmetric cross terms are parameters where it is "fit".
+    """
+    of_dof = [damping] * len(dofs) if isinstance(damping, str) else list(damping)
+    place = {dof: i for i, dof in enumerate(dofs)}
+    kept = [
+        one
+        for one in joint_parameters(dofs, ("k", "h", "c"), cross=cross == "fit")
+        if all(one.kind in _KINDS[of_dof[place[dof]]] for dof in (one.row, one.column))
+    ]
+    return JointTerms(
+        tuple(kept),
+        omega,
+        np.array(["khc".index(one.kind) for one in kept], np.intp),
+        np.array([(place[one.row], place[one.column]) for one in kept], np.intp),
+    )
+
+
+class JointCoordinates(Protocol):
+    """The compliance C = K*^-1 of a joint as a function of coordinates x of length p, one for each parameter.
+
+    Attributes
+    ----------
+    terms : JointTerms
+    lower, upper : ndarray, shape (p,)
+        Smallest and largest value of each coordinate.
+    """
+
+    terms: JointTerms
+    lower: FloatArray
+    upper: FloatArray
+
+    def compliance(self, x: FloatArray) -> ComplexArray:
+        """Return the entries of C that the coordinates change, shape (n_freq, q)."""
+
+    def slope(self, x: FloatArray, entries: ComplexArray) -> ComplexArray:
+        """Return their derivatives by the coordinates, shape (n_freq, q, p)."""
+
+    def theta(self, x: FloatArray) -> FloatArray:
+        """Return the parameters, shape (p,)."""
+
+    def coordinates(self, theta: FloatArray) -> FloatArray:
+        """Return the coordinates of parameters."""
+
+    def theta_slope(self, x: FloatArray) -> FloatArray:
+        """Return the derivatives of the parameters by the coordinates, shape (p, p)."""
+
+
+class DiagonalJoint:
+    """A joint without cross terms: C_dd = a_d / (1 + i eta_d + i w tau_d); entries of C are its diagonal.
+
+    With `by_rate` false the coordinates of damping are h and c themselves, C_dd = a_d / (1 + i a_d h_d + i w a_d
+    c_d): for the profile of their likelihood.
+    """
+
+    def __init__(self, terms: JointTerms, *, by_rate: bool = True) -> None:
+        self.terms = terms
+        self.by_rate = by_rate
+        self.dofs = terms.pairs[:, 0]
+        self.rates = np.flatnonzero(terms.kinds > 0)
+        p, fastest = len(terms.parameters), max(float(terms.omega.max()), np.finfo(float).tiny)
+        self.upper = np.full(p, np.inf)
+        self.upper[self.rates] = np.where(terms.kinds[self.rates] == 1, _LARGEST_RATE, _LARGEST_RATE / fastest)
+        if not by_rate:
+            self.upper[self.rates] = np.inf
+        self.lower = np.where(terms.kinds > 0, -self.upper, 0.0)
+
+    def _turn(self, x: FloatArray) -> ComplexArray:
+        """Return 1/(1 + i eta + i w tau) of each DOF, shape (n_freq, n)."""
+        whole = np.ones((self.terms.omega.size, self.terms.n), np.complex128)
+        for i in self.rates:
+            rate = x[i] if self.by_rate else x[i] * x[self.dofs[i]]
+            whole[:, self.dofs[i]] += rate * self.terms.factors[self.terms.kinds[i]]
+        return 1 / whole
+
+    def compliance(self, x: FloatArray) -> ComplexArray:
+        """Return the diagonal of C, shape (n_freq, n)."""
+        diagonal: ComplexArray = x[: self.terms.n] * self._turn(x)
+        return diagonal
+
+    def slope(self, x: FloatArray, entries: ComplexArray) -> ComplexArray:
+        """Return the derivatives of the diagonal, shape (n_freq, n, p)."""
+        turn = self._turn(x)
+        slope = np.zeros((*entries.shape, x.size), np.complex128)
+        d = np.arange(self.terms.n)
+        slope[:, d, d] = turn if self.by_rate else turn**2
+        for i in self.rates:
+            own = self.dofs[i]
+            last = turn[:, own] if self.by_rate else entries[:, own]
+            slope[:, own, i] = -self.terms.factors[self.terms.kinds[i]] * entries[:, own] * last
+        return slope
+
+    def theta(self, x: FloatArray) -> FloatArray:
+        """Return k = 1/a, h = eta/a, c = tau/a; infinite for a rigid DOF."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            theta: FloatArray = np.where(self.terms.kinds > 0, x, 1.0) / x[self.dofs]
+        if not self.by_rate:
+            theta[self.rates] = x[self.rates]
+        return theta
+
+    def coordinates(self, theta: FloatArray) -> FloatArray:
+        """Return a, eta and tau, inside their limits."""
+        k = theta[self.dofs]
+        x = np.divide(np.where(self.terms.kinds > 0, theta, 1.0), k, out=np.zeros_like(k), where=np.isfinite(k))
+        if not self.by_rate:
+            x = np.where(self.terms.kinds > 0, theta, x)
+        inside: FloatArray = np.clip(np.nan_to_num(x), self.lower, self.upper)
+        return inside
+
+    def theta_slope(self, x: FloatArray) -> FloatArray:
+        """Return the derivatives of the parameters by a, eta, tau, shape (p, p)."""
+        p = x.size
+        slope, a = np.zeros((p, p)), x[self.dofs]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            slope[np.arange(p), self.dofs] = -np.where(self.terms.kinds > 0, x, 1.0) / a**2
+            slope[self.rates, self.rates] = 1 / a[self.rates]
+        if not self.by_rate:
+            slope[self.rates] = np.eye(p)[self.rates]
+        return slope
+
+
+class CoupledJoint:
+    """A joint with cross terms: its coordinates are the parameters themselves; entries are the upper triangle of C."""
+
+    def __init__(self, terms: JointTerms) -> None:
+        self.terms = terms
+        self.rows, self.columns = np.triu_indices(terms.n)
+        self.lower = np.full(len(terms.parameters), -np.inf)
+        self.upper = -self.lower
+
+    def compliance(self, x: FloatArray) -> ComplexArray:
+        """Return the upper triangle of C, shape (n_freq, n (n + 1)/2); NaN where K* is singular."""
+        return invert(self.terms.stiffness(x), on_singular="nan")[:, self.rows, self.columns]
+
+    def slope(self, x: FloatArray, entries: ComplexArray) -> ComplexArray:
+        """Return the derivatives of the upper triangle, -C E C, shape (n_freq, n (n + 1)/2, p)."""
+        n = self.terms.n
+        c = np.empty((len(entries), n, n), np.complex128)
+        c[:, self.rows, self.columns] = c[:, self.columns, self.rows] = entries
+        a, b = self.terms.pairs.T
+        left, right = c[:, :, a], c[:, :, b]
+        slope = left[:, self.rows] * right[:, self.columns]
+        slope += np.where(a != b, left[:, self.columns] * right[:, self.rows], 0)
+        slope *= -self.terms.factors[self.terms.kinds].T[:, None, :]
+        return slope
+
+    def theta(self, x: FloatArray) -> FloatArray:
+        """Return the parameters."""
+        return x
+
+    def coordinates(self, theta: FloatArray) -> FloatArray:
+        """Return the parameters."""
+        return theta
+
+    def theta_slope(self, x: FloatArray) -> FloatArray:
+        """Return the unit matrix."""
+        return np.eye(x.size)

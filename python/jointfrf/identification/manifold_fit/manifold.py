@@ -1,0 +1,234 @@
+"""FRFs that fit a joint: the manifold on which a fit is linearised.
+
+Whatever the substructures are, the receptances at the two sides of a joint of compliance C can be written on every line
+with two matrices H and M that are free (symmetric where the structure is reciprocal):
+
+    gamma_jj = H,   gamma_jk = H T,   gamma_kj = T' H,   gamma_kk = T' H T + C T,   T = 1 - M C,   T' = 1 - C M.
+
+M is (Y_B + C)^-1 with Y_B the receptance of side k by itself. No inverse is needed: the form is regular where gamma_jk
+is singular and for a rigid joint, C = 0.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointfrf.identification.manifold_fit.line_forms import LineForms
+from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.kernel.call import call
+
+__all__ = ["FrfEntries", "LineData", "OnManifold", "frfs_of_joint", "normal_forms", "project"]
+
+_Numbers = TypeVar("_Numbers", ComplexArray, FloatArray)
+#: A line has arrived when a step gains less than this of the squares, in units of the noise.
+_GAIN = 1e-5
+
+
+class FrfEntries(NamedTuple):
+    """Which entries of the FRFs of one line are used, and the unit matrices of what is free on it.
+
+    Attributes
+    ----------
+    n : int
+        Joint DOFs.
+    rows, columns : ndarray of int, shape (q,)
+        Entries of gamma, shape (2 n, 2 n): its upper triangle where the structure is reciprocal, else all.
+    units : ndarray, shape (u, n, n)
+        Symmetric unit matrices, or all unit matrices.
+    """
+
+    n: int
+    rows: NDArray[np.intp]
+    columns: NDArray[np.intp]
+    units: FloatArray
+
+    @classmethod
+    def of(cls, n: int, *, reciprocal: bool) -> FrfEntries:
+        """Return the entries of n joint DOFs."""
+        if reciprocal:
+            rows, columns = np.triu_indices(2 * n)
+            a, b = np.triu_indices(n)
+        else:
+            rows, columns = (x.ravel() for x in np.indices((2 * n, 2 * n)))
+            a, b = (x.ravel() for x in np.indices((n, n)))
+        units = np.zeros((a.size, n, n))
+        k = np.arange(a.size)
+        units[k, a, b] = 1
+        if reciprocal:
+            units[k, b, a] = 1
+        return cls(n, rows, columns, units)
+
+    def take(self, gamma: ComplexArray) -> ComplexArray:
+        """Return the entries of gamma, shape (..., q)."""
+        return gamma[..., self.rows, self.columns]
+
+    @property
+    def reciprocal(self) -> bool:
+        """Whether the structure is reciprocal."""
+        return self.rows.size == self.n * (2 * self.n + 1)
+
+    @property
+    def free(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Rows and columns of the free entries of H, M and C, shape (u,)."""
+        pattern = np.ones((self.n, self.n), np.bool_)
+        a, b = np.nonzero(np.triu(pattern) if self.reciprocal else pattern)
+        return a, b
+
+    def matrix(self, values: _Numbers) -> _Numbers:
+        """Return gamma, or weights, of its entries, shape (n_freq, 2 n, 2 n)."""
+        gamma = np.empty((len(values), 2 * self.n, 2 * self.n), values.dtype)
+        gamma[:, self.columns, self.rows] = values
+        gamma[:, self.rows, self.columns] = values
+        return gamma
+
+
+class LineData(NamedTuple):
+    """Measured and smooth FRFs of one group of DOFs, with their noise.
+
+    Attributes
+    ----------
+    entries : FrfEntries
+    measured, smooth : ndarray, shape (n_freq, q)
+        Entries of gamma, m/N.
+    inverse_std : ndarray, shape (n_freq, q)
+        1/sqrt(E|e|^2) of the measured entries; 0 where an entry is not used.
+    correlation : ndarray, shape (n_freq, q, q), optional
+        Where noise of entries is correlated, lower triangles L that make entries of unit variance uncorrelated.
+    """
+
+    entries: FrfEntries
+    measured: ComplexArray
+    smooth: ComplexArray
+    inverse_std: FloatArray
+    correlation: FloatArray | None = None
+
+    @property
+    def used(self) -> NDArray[np.bool_]:
+        """Which entries are used, shape (n_freq, q)."""
+        return np.asarray(self.inverse_std > 0)
+
+    @property
+    def own_size(self) -> FloatArray:
+        """Median size of the receptances of each DOF, the larger of both sides, shape (n,), m/N."""
+        own = abs(np.einsum("lpp->lp", self.entries.matrix(self.smooth)))
+        size: FloatArray = np.median(own, axis=0).reshape(2, self.entries.n).max(axis=0)
+        return size
+
+    def on_lines(self, lines: NDArray[np.intp]) -> LineData:
+        """Return some of the lines."""
+        correlation = None if self.correlation is None else self.correlation[lines]
+        return LineData(self.entries, self.measured[lines], self.smooth[lines], self.inverse_std[lines], correlation)
+
+
+class OnManifold(NamedTuple):
+    """FRFs that fit a joint.
+
+    Attributes
+    ----------
+    h, m : ndarray, shape (n_freq, n, n)
+        The free matrices H, m/N, and M, N/m.
+    squares : ndarray, shape (n_freq,)
+        Weighted squares of the distance to the FRFs that were projected.
+    """
+
+    h: ComplexArray
+    m: ComplexArray
+    squares: FloatArray
+
+    def better_of(self, other: OnManifold) -> OnManifold:
+        """Return on each line the nearer one."""
+        nearer = ~(other.squares >= self.squares)
+        pick = nearer[:, None, None]
+        return OnManifold(
+            np.where(pick, other.h, self.h),
+            np.where(pick, other.m, self.m),
+            np.where(nearer, other.squares, self.squares),
+        )
+
+
+def frfs_of_joint(h: ComplexArray, m: ComplexArray, c: ComplexArray) -> ComplexArray:
+    """Return the receptances gamma of H, M and C, shape (n_freq, 2 n, 2 n)."""
+    one = np.eye(h.shape[-1])
+    right, left = one - m @ c, one - c @ m
+    h_right = h @ right
+    return np.block([[h, h_right], [left @ h, left @ h_right + c @ right]])
+
+
+def project(target: ComplexArray, data: LineData, c: ComplexArray, start: OnManifold, steps: int) -> OnManifold:
+    """Find the FRFs nearest to `target` that fit a joint, by Levenberg-Marquardt steps on each line.
+
+    Parameters
+    ----------
+    target : ndarray, shape (n_freq, q)
+        Entries of FRFs, m/N.
+    data : LineData
+        Their weights.
+    c : ndarray, shape (n_freq, n, n)
+        Compliance of the joint, m/N.
+    start : OnManifold
+        Its squares are not used.
+    steps : int
+        At most.
+
+    Returns
+    -------
+    OnManifold
+        Squares are infinite, and H and M those of the start, where the line holds NaN or Inf or the start overflows.
+    """
+    n_freq = len(target)
+    h, m = (np.array(x, np.complex128, order="C") for x in (start.h, start.m))
+    squares, line_info = np.empty(n_freq), np.empty(n_freq, np.int32)
+    if n_freq:
+        sizes = (int(data.entries.reciprocal), data.entries.n, _correlated(data), n_freq)
+        lines = _lines(data, data.entries.matrix(target), c)
+        call("project_on_joint", [*sizes, steps, _GAIN, *lines, h, m, squares, line_info])
+    bad = line_info != 0
+    h[bad], m[bad], squares[bad] = start.h[bad], start.m[bad], np.inf
+    return OnManifold(h, m, squares)
+
+
+def normal_forms(data: LineData, c: ComplexArray, on: OnManifold, targets: tuple[ComplexArray, ...]) -> list[LineForms]:
+    """Return the quadratic forms of C that FRFs give about a point of the manifold; H and M are eliminated.
+
+    Parameters
+    ----------
+    data : LineData
+    c : ndarray, shape (n_freq, n, n)
+    on : OnManifold
+        Point about which is linearised.
+    targets : tuple of ndarray, shape (n_freq, q)
+        Entries of FRFs.
+
+    Returns
+    -------
+    list of LineForms
+        One for each of `targets`; entries of C are by the unit matrices of `FrfEntries`. NaN where a line holds NaN or
+        Inf.
+    """
+    entries, n_freq = data.entries, len(c)
+    u = len(entries.units)
+    weight = np.empty((n_freq, u, u), np.complex128)
+    gradient = np.empty((len(targets), n_freq, u), np.complex128)
+    squares, line_info = np.empty((len(targets), n_freq)), np.empty(n_freq, np.int32)
+    if n_freq:
+        sizes = (int(entries.reciprocal), entries.n, u, _correlated(data), n_freq, len(targets))
+        lines = _lines(data, np.array([entries.matrix(target) for target in targets]), c)
+        point = [np.ascontiguousarray(x) for x in (on.h, on.m)]
+        call("joint_forms", [*sizes, *lines, *point, weight, gradient, squares, line_info])
+    a, b = entries.free
+    return [LineForms(c[:, a, b], weight, p, s) for p, s in zip(gradient, squares, strict=True)]
+
+
+def _lines(data: LineData, gamma: ComplexArray, c: ComplexArray) -> tuple[NDArray[Any], ...]:
+    """Return FRFs, weights, whitening and C as the kernel takes them."""
+    weights = data.entries.matrix(data.inverse_std)
+    correlation = np.zeros((len(c), 1, 1)) if data.correlation is None else np.ascontiguousarray(data.correlation)
+    return gamma, weights, correlation, np.ascontiguousarray(c, np.complex128)
+
+
+def _correlated(data: LineData) -> int:
+    """Return the order of the whitening matrices, 0 where there are none."""
+    return 0 if data.correlation is None else data.correlation.shape[1]

@@ -1,0 +1,216 @@
+"""Where a fit begins: points of the manifold near smooth FRFs, and a first joint from their compliance."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from jointfrf.identification.manifold_fit.joint_terms import CoupledJoint, DiagonalJoint, JointCoordinates
+from jointfrf.identification.manifold_fit.line_forms import LineForms, minimise_forms
+from jointfrf.identification.manifold_fit.manifold import LineData, OnManifold, project
+from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.kernel.linear_algebra import invert, solve
+from jointfrf.substructuring.compliance import compliance_covariance, joint_compliance
+
+__all__ = ["first_joints", "smooth_compliance", "starts_on_manifold"]
+
+#: Smooth FRFs have about this share of the noise.
+_SMOOTH = 0.2
+#: Lines count less from this relative noise of gamma_jk on.
+_HIDDEN = 0.1
+
+
+def starts_on_manifold(data: LineData, c: ComplexArray, steps: int) -> OnManifold:
+    """Find the FRFs nearest to the smooth ones that fit a joint of compliance c; the best of several starts of a line.
+
+    Parameters
+    ----------
+    data : LineData
+    c : ndarray, shape (n_freq, n, n)
+        Compliance of the joint, m/N.
+    steps : int
+        Steps of the projection at most.
+    """
+    n = data.entries.n
+    gamma = data.entries.matrix(data.smooth)
+    h = gamma[:, :n, :n]
+    nothing = np.full(len(c), np.inf)
+    best = OnManifold(h, np.zeros_like(h), nothing)
+    for start in _first_m(gamma, c):
+        m = start()
+        if np.array_equal(data.entries.units, data.entries.units.swapaxes(1, 2)):
+            m = (m + m.swapaxes(1, 2)) / 2
+        m = np.where(np.isfinite(m).all(axis=(1, 2), keepdims=True), m, 0)
+        far = np.flatnonzero(~(best.squares <= 4 * np.median(best.squares)) | ~np.isfinite(best.squares))
+        if far.size == 0:
+            break
+        own = data.on_lines(far)
+        found = project(own.smooth, own, c[far], OnManifold(h[far], m[far], nothing[far]), steps)
+        old = OnManifold(best.h[far], best.m[far], best.squares[far])
+        new = old.better_of(found)
+        for whole, part in zip(best, new, strict=True):
+            whole[far] = part
+    return best
+
+
+def _first_m(gamma: ComplexArray, c: ComplexArray) -> list[Callable[[], ComplexArray]]:
+    """Return algebraic first values of M, exact without noise: two blocks of gamma give T, and M = (1 - T) K*."""
+    n = c.shape[-1]
+    jj, jk, kj, kk = gamma[:, :n, :n], gamma[:, :n, n:], gamma[:, n:, :n], gamma[:, n:, n:]
+    one = np.eye(n)
+
+    def quiet(f: Callable[[], ComplexArray]) -> Callable[[], ComplexArray]:
+        def run() -> ComplexArray:
+            with np.errstate(all="ignore"):
+                return f()
+
+        return run
+
+    def divided(a: ComplexArray, b: ComplexArray) -> ComplexArray:
+        return solve(a, b, on_singular="nan")
+
+    def by_c(x: ComplexArray) -> ComplexArray:
+        return x @ invert(c, on_singular="nan")
+
+    return [
+        quiet(lambda: by_c(one - divided(jj, jk))),
+        quiet(lambda: by_c(one - divided(kj + c, kk))),
+        quiet(
+            lambda: invert(
+                c
+                + invert(invert(gamma, on_singular="nan")[:, n:, n:] - invert(c, on_singular="nan"), on_singular="nan"),
+                on_singular="nan",
+            )
+        ),
+        quiet(lambda: np.zeros_like(c)),
+    ]
+
+
+def smooth_compliance(data: LineData) -> ComplexArray:
+    """Return C of the smooth FRFs, shape (n_freq, n, n); zero where they do not give it."""
+    compliance = joint_compliance(data.entries.matrix(data.smooth), on_singular="nan")
+    if data.entries.reciprocal:
+        compliance = (compliance + compliance.swapaxes(1, 2)) / 2
+    good = np.isfinite(compliance).all(axis=(1, 2), keepdims=True)
+    found: ComplexArray = np.where(good, compliance, 0)
+    return found
+
+
+def first_joints(data: LineData, joint: JointCoordinates) -> list[FloatArray]:
+    """Return coordinates of the joint from the compliance of the smooth FRFs, the likeliest first.
+
+    C = gamma_kk gamma_jk^-1 gamma_jj - gamma_kj of the smooth FRFs on every line, with the covariance that a share of
+    the noise gives it; lines on which noise hides gamma_jk count little.
+    """
+    n = data.entries.n
+    gamma = data.entries.matrix(data.smooth)
+    spread = data.entries.matrix(_variance(data))
+    compliance = joint_compliance(gamma, on_singular="nan")
+    covariance = _SMOOTH**2 * compliance_covariance(gamma, spread, np.eye(2 * n), on_singular="nan")
+    ratio = _hidden(gamma, spread)
+    good = np.isfinite(compliance).all(axis=(1, 2)) & np.isfinite(covariance).all(axis=(1, 2)) & np.isfinite(ratio)
+    if not good.any():
+        return []
+    compliance, covariance, ratio = compliance[good], covariance[good], ratio[good]
+    here = type(joint)(joint.terms.on_lines(np.flatnonzero(good)))  # type: ignore[call-arg]
+    threshold = _HIDDEN if np.count_nonzero(ratio < _HIDDEN) > 2 * joint.lower.size else float(np.median(ratio))
+    line_weight = 1 / (1 + (ratio / threshold) ** 8)
+    a = range(n)
+    own = covariance.reshape(-1, n, n, n, n)[:, a, a, a, a].real
+    if isinstance(here, DiagonalJoint):
+        return _diagonal_starts(compliance[:, a, a], own, line_weight, here)
+    assert isinstance(here, CoupledJoint)
+    return _coupled_starts(compliance, covariance, own, line_weight, here)
+
+
+def _variance(data: LineData) -> FloatArray:
+    """Return the variance of the entries, 0 where one is not used, shape (n_freq, q)."""
+    w = data.inverse_std
+    return np.where(w > 0, 1 / np.where(w > 0, w, 1) ** 2, 0)
+
+
+def _hidden(gamma: ComplexArray, spread: FloatArray) -> FloatArray:
+    """Return the largest relative noise of gamma_jk on the diagonal of gamma_jk^-1 dgamma_jk, shape (n_freq,)."""
+    n = gamma.shape[-1] // 2
+    inverse = invert(gamma[:, :n, n:], on_singular="nan")
+    squares = abs(inverse) ** 2 @ spread[:, :n, n:]
+    ratio: FloatArray = np.sqrt(np.diagonal(squares, axis1=1, axis2=2).max(axis=1))
+    return ratio
+
+
+def _diagonal_starts(
+    value: ComplexArray, variance: FloatArray, line_weight: FloatArray, joint: DiagonalJoint
+) -> list[FloatArray]:
+    """Fit each DOF's compliance by itself."""
+    n, p = joint.terms.n, joint.lower.size
+    information = line_weight[:, None] / np.maximum(variance, np.finfo(float).tiny)
+    mean = (information * value.real).sum(axis=0) / information.sum(axis=0)
+    error = 1 / np.sqrt(information.sum(axis=0))
+    weight = np.zeros((len(value), n, n), np.complex128)
+    weight[:, range(n), range(n)] = information
+    forms = LineForms(value, weight, np.zeros_like(value), np.zeros(len(value)))
+    start = np.zeros(p)
+    start[:n] = np.maximum(mean, error)
+    found = minimise_forms(forms, joint, start).x
+    found[:n] = np.maximum(found[:n], 1e-3 * error)
+    return [found, start]
+
+
+def _coupled_starts(
+    value: ComplexArray, covariance: ComplexArray, own: FloatArray, line_weight: FloatArray, joint: CoupledJoint
+) -> list[FloatArray]:
+    """Fit all entries of C; first values from K* C = 1 by linear least squares, and from the mean of C."""
+    n = joint.terms.n
+    a, b = joint.rows, joint.columns
+    size = np.sqrt(np.maximum(np.einsum("lqq->lq", covariance).real, np.finfo(float).tiny))
+    scaled = covariance / (size[:, :, None] * size[:, None, :])
+    q = n * n
+    weight = np.linalg.pinv(scaled + 1e-10 * np.eye(q), hermitian=True) / (size[:, :, None] * size[:, None, :])
+    fold = np.zeros((q, a.size))
+    fold[a * n + b, np.arange(a.size)] = 1
+    fold[b * n + a, np.arange(a.size)] = 1
+    weight = (fold.T @ weight @ fold) * line_weight[:, None, None]
+    mean = ((value + value.swapaxes(1, 2)) / 2)[:, a, b]
+    forms = LineForms(mean, weight, np.zeros_like(mean), np.zeros(len(mean)))
+    starts = [_linear_start(value, own, line_weight, joint), _mean_start(value, own, line_weight, joint)]
+    starts = [start for start in starts if np.isfinite(start).all()]
+    minima = sorted((minimise_forms(forms, joint, start) for start in starts), key=lambda found: found.cost)
+    return [found.x for found in minima] + starts
+
+
+def _mean_start(value: ComplexArray, own: FloatArray, line_weight: FloatArray, joint: CoupledJoint) -> FloatArray:
+    """Return the stiffness whose compliance is the weighted mean of Re C, no damping."""
+    w = line_weight / own.max(axis=1)
+    size = np.sqrt(np.median(abs(np.einsum("laa->la", value)), axis=0))
+    scaled = value.real / np.outer(size, size)
+    w = line_weight / (own / size**4).max(axis=1)
+    mean = np.tensordot(w, scaled, 1) / w.sum()
+    k = np.linalg.pinv((mean + mean.T) / 2, hermitian=True) / np.outer(size, size)
+    start = np.zeros(len(joint.terms.parameters))
+    of_stiffness = joint.terms.kinds == 0
+    start[of_stiffness] = k[joint.terms.pairs[of_stiffness, 0], joint.terms.pairs[of_stiffness, 1]]
+    return start
+
+
+def _linear_start(value: ComplexArray, own: FloatArray, line_weight: FloatArray, joint: CoupledJoint) -> FloatArray:
+    """Solve K*(theta) C = 1 by weighted linear least squares in units of each DOF: exact without noise."""
+    terms, n = joint.terms, joint.terms.n
+    size = np.sqrt(np.median(abs(np.einsum("laa->la", value)), axis=0))
+    c = value / np.outer(size, size)
+    root = np.sqrt(line_weight / (own / size**4).max(axis=1))
+    scale = abs(terms.factors).max(axis=1)
+    factors = terms.factors / scale[:, None]
+    columns = []
+    for kind, (a, b) in zip(terms.kinds, terms.pairs, strict=True):
+        column = np.zeros_like(c)
+        column[:, a] = c[:, b]
+        if a != b:
+            column[:, b] = c[:, a]
+        columns.append((column * (root * factors[kind])[:, None, None]).ravel())
+    right = (root[:, None, None] * np.eye(n)).astype(np.complex128).ravel()
+    matrix = np.array(columns).T
+    theta = np.linalg.lstsq(np.r_[matrix.real, matrix.imag], np.r_[right.real, right.imag], rcond=1e-12)[0]
+    units = size[terms.pairs[:, 0]] * size[terms.pairs[:, 1]]
+    start: FloatArray = theta / scale[terms.kinds] / units
+    return start

@@ -1,0 +1,160 @@
+"""Study of the compliance fit: RMSE against the Cramer-Rao bound, and coverage of its 95 % intervals.
+
+    tests/accuracy/run                          all trials, 300 draws each
+    tests/accuracy/run bound stiff --draws 50   some of them
+
+Draw number i of a trial has the seed i, so that a longer run continues a shorter one.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+import warnings
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "python" / "support"))
+
+from trials import TRIALS, Trial, system
+
+import jointfrf as jf
+from cramer_rao import cramer_rao
+from jointfrf.identification.manifold_fit.joint_terms import joint_terms
+
+#: A parameter so many times away from the truth, while its interval says otherwise, has run off.
+_RUN_OFF = 3.0
+
+
+@dataclass(frozen=True)
+class Draw:
+    """One fit: parameters by name, limits of the intervals, seconds."""
+
+    value: dict[str, float]
+    interval: dict[str, tuple[float, float]]
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Row:
+    """One trial: what the table shows."""
+
+    name: str
+    draws: int
+    rmse_to_bound: dict[str, float]
+    coverage: dict[str, float]
+    run_off: int
+    seconds: float
+
+
+def one_draw(trial: Trial, seed: int) -> Draw:
+    """Fit one draw, nothing told of its noise."""
+    freq, gamma, joint = trial.draw(seed)
+    start = time.perf_counter()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        fit = jf.identify(freq, gamma, joint.dofs, "manifold", damping="viscous", cross=trial.cross)
+        intervals = fit.confidence_interval(0.95)
+    return Draw(fit.parameters, intervals, time.perf_counter() - start)
+
+
+def truth_of(trial: Trial) -> tuple[dict[str, float], dict[str, float]]:
+    """Parameters of the joint, and their Cramer-Rao bound for circular noise relative to each entry."""
+    own = system(trial.system, trial.factor)
+    freq, gamma, joint = own.freq_hz[:: trial.step], own.gamma[:: trial.step], own.joint
+    terms = joint_terms(2 * np.pi * freq, joint.dofs, "viscous", trial.cross)
+    matrices = {0: joint.stiffness, 2: joint.damping}
+    values = [matrices[kind][a, b] for kind, (a, b) in zip(terms.kinds, terms.pairs, strict=True)]
+    names = [one.name for one in terms.parameters]
+    bound = np.full(len(names), np.nan)
+    for group in _groups(gamma):
+        own_terms, which = terms.of_dofs(group)
+        at = np.concatenate([group, group + len(joint.dofs)])
+        k = joint.dynamic_stiffness(freq)[:, group[:, None], group]
+        covariance = cramer_rao(gamma[:, at[:, None], at], k, own_terms)
+        bound[which] = trial.level * np.sqrt(np.diag(covariance))
+    return dict(zip(names, values, strict=True)), dict(zip(names, bound.tolist(), strict=True))
+
+
+def _groups(gamma: np.ndarray) -> list[np.ndarray]:
+    n = gamma.shape[1] // 2
+    size = np.sqrt(abs(np.einsum("lpp->lp", gamma)))
+    coupled = (abs(gamma) > 1e-8 * size[:, :, None] * size[:, None, :]).any(axis=0)
+    both = coupled[:n, :n] | coupled[:n, n:] | coupled[n:, n:]
+    left, groups = set(range(n)), []
+    while left:
+        group, reached = set(), {min(left)}
+        while reached - group:
+            group |= reached
+            reached = {int(j) for i in group for j in np.flatnonzero(both[i])}
+        groups.append(np.array(sorted(group)))
+        left -= group
+    return groups
+
+
+def row_of(trial: Trial, draws: Sequence[Draw]) -> Row:
+    """Compare draws with the truth.
+
+    A stiffness is compared by its compliance, in which the noise is nearly normal: 1/k exists where k does not.
+    """
+    truth, bound = truth_of(trial)
+    ratio, coverage, run_off = {}, {}, np.zeros(len(draws), bool)
+    for name, true in truth.items():
+        value = np.array([draw.value.get(name, np.nan) for draw in draws])
+        low, high = np.array([draw.interval.get(name, (np.nan, np.nan)) for draw in draws]).T
+        inside = (low <= true) & (true <= high)
+        coverage[name] = float(inside.mean())
+        error, scale = value - true, bound[name]
+        if name.startswith("k") and trial.cross != "fit":
+            with np.errstate(divide="ignore"):
+                error, scale = 1 / value - 1 / true, bound[name] / true**2
+        ratio[name] = float(np.sqrt((error**2).mean()) / scale)
+        with np.errstate(invalid="ignore"):
+            far = (
+                (value > _RUN_OFF * true) | (value < true / _RUN_OFF)
+                if name.startswith("k")
+                else np.zeros_like(run_off)
+            )
+        run_off |= far & ~inside
+    seconds = float(np.median([draw.seconds for draw in draws]))
+    return Row(trial.name, len(draws), ratio, coverage, int(run_off.sum()), seconds)
+
+
+def table(rows: Sequence[Row]) -> str:
+    """Markdown table: the worst and the mean over the parameters of each trial."""
+    head = "| trial | draws | RMSE / bound, worst | coverage of 95 %, lowest .. highest, mean | false by 3 | s a fit |"
+    lines = [head, "|---|---|---|---|---|---|"]
+    for row in rows:
+        coverage = np.array(list(row.coverage.values())) * 100
+        worst = max(row.rmse_to_bound.values())
+        lines.append(
+            f"| {row.name} | {row.draws} | {worst:.2f} | {coverage.min():.0f} .. {coverage.max():.0f}, "
+            f"{coverage.mean():.1f} | {row.run_off} | {row.seconds:.2g} |"
+        )
+    return "\n".join(lines)
+
+
+def main() -> None:
+    """Run the trials asked for and print their table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("parts", nargs="*", choices=[*TRIALS, []], help=f"out of {', '.join(TRIALS)}; all by default")
+    parser.add_argument("--draws", type=int, default=300)
+    parser.add_argument("--workers", type=int, default=None, help="processes; one a core by default")
+    args = parser.parse_args()
+    rows = []
+    with ProcessPoolExecutor(args.workers) as pool:
+        for part in args.parts or TRIALS:
+            for trial in TRIALS[part]:
+                rows.append(row_of(trial, list(pool.map(partial(one_draw, trial), range(args.draws)))))
+                print(table(rows[-1:]).splitlines()[-1], flush=True)
+    print(f"\n{table(rows)}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,375 @@
+!> FRFs that fit a joint, against what they must satisfy: no distance where there is none, a least distance where there
+!> is one, and quadratic forms that are what another joint costs.
+program test_manifold
+  use testing, only: check, check_close, check_same, dp, finish, infinity, ip, not_a_number, random_lines, seed, &
+    set_threads, transposed, uniform
+  use jointfrf_manifold, only: joint_forms, project_on_joint
+  use jointfrf_engine, only: engine_automatic, engine_lapack, engine_plain, set_engine
+  implicit none
+  integer, parameter :: lines = 19
+  real(dp), parameter :: gain = 1.0e-8_dp
+
+  !> Matrices of a case, all lines.
+  type :: sample
+    logical :: reciprocal
+    integer :: n, n_free, n_entry
+    complex(dp), allocatable :: h(:, :, :), m(:, :, :), c(:, :, :), gamma(:, :, :)
+    real(dp), allocatable :: w(:, :, :), whitening(:, :, :)
+  end type sample
+
+  call seed(12)
+  call exact(1, .true., .false.)
+  call exact(2, .true., .false.)
+  call exact(2, .false., .false.)
+  call exact(3, .true., .true.)
+  call exact(6, .true., .false.)
+  call stationary(2, .true., .false.)
+  call stationary(3, .false., .false.)
+  call stationary(2, .true., .true.)
+  call other_joint(2, .true., .false.)
+  call other_joint(2, .false., .true.)
+  call other_joint(3, .true., .false.)
+  call orders_of_storage(.true.)
+  call orders_of_storage(.false.)
+  call bad_lines()
+  call threads_and_neighbours()
+  call nothing()
+  call finish('manifold')
+
+contains
+
+  function make_sample(n, reciprocal, correlated) result(s)
+    integer, intent(in) :: n
+    logical, intent(in) :: reciprocal, correlated
+    type(sample) :: s
+    integer :: i, p, q
+
+    s%reciprocal = reciprocal
+    s%n = n
+    s%n_free = merge((n*(n + 1))/2, n*n, reciprocal)
+    s%n_entry = merge(n*(2*n + 1), 4*n*n, reciprocal)
+    allocate (s%h(n, n, lines), s%m(n, n, lines), s%c(n, n, lines), s%gamma(2*n, 2*n, lines))
+    s%h = square(s)
+    s%m = square(s)/n
+    s%c = square(s)/n
+    s%gamma = frfs(s%h, s%m, s%c)
+    q = merge(s%n_entry, 0, correlated)
+    allocate (s%w(2*n, 2*n, lines), s%whitening(q, q, lines))
+    do i = 1, lines
+      do q = 1, 2*n
+        do p = 1, 2*n
+          s%w(p, q, i) = 50*(1 + uniform())
+        end do
+      end do
+      s%w(1 + mod(i, 2), 2, i) = 0                 ! one entry is not used
+      s%gamma(1 + mod(i, 2), 2, i) = cmplx(not_a_number(), 0.0_dp, dp)
+      if (reciprocal) s%gamma(2, 1, i) = cmplx(0.0_dp, infinity(), dp)
+      do q = 1, size(s%whitening, 1)
+        s%whitening(:, q, i) = [(0.3_dp*(uniform() - 0.5_dp), p=1, s%n_entry)]
+        s%whitening(q, q, i) = 1
+        s%whitening(:q - 1, q, i) = not_a_number()
+      end do
+    end do
+  end function make_sample
+
+  function square(s) result(a)
+    type(sample), intent(in) :: s
+    complex(dp) :: a(s%n, s%n, lines)
+
+    a = random_lines(s%n, s%n, lines)
+    if (s%reciprocal) a = (a + transposed(a))/2
+  end function square
+
+  !> The FRFs of H, M and C.
+  function frfs(h, m, c) result(gamma)
+    complex(dp), intent(in) :: h(:, :, :), m(:, :, :), c(:, :, :)
+    complex(dp) :: gamma(2*size(h, 1), 2*size(h, 1), size(h, 3)), right(size(h, 1), size(h, 1))
+    complex(dp) :: left(size(h, 1), size(h, 1))
+    integer :: i, a, n
+
+    n = size(h, 1)
+    do i = 1, size(h, 3)
+      right = -matmul(m(:, :, i), c(:, :, i))
+      left = -matmul(c(:, :, i), m(:, :, i))
+      do a = 1, n
+        right(a, a) = right(a, a) + 1
+        left(a, a) = left(a, a) + 1
+      end do
+      gamma(:n, :n, i) = h(:, :, i)
+      gamma(:n, n + 1:, i) = matmul(h(:, :, i), right)
+      gamma(n + 1:, :n, i) = matmul(left, h(:, :, i))
+      gamma(n + 1:, n + 1:, i) = matmul(matmul(left, h(:, :, i)) + c(:, :, i), right)
+    end do
+  end function frfs
+
+  !> Squares of the distance of FRFs, entries taken one by one.
+  function distance(s, gamma) result(squares)
+    type(sample), intent(in) :: s
+    complex(dp), intent(in) :: gamma(:, :, :)
+    real(dp) :: squares(lines)
+    complex(dp) :: r(s%n_entry)
+    integer :: i, p, q, e
+
+    do i = 1, lines
+      e = 0
+      do p = 1, 2*s%n
+        do q = merge(p, 1, s%reciprocal), 2*s%n
+          e = e + 1
+          r(e) = 0
+          if (s%w(p, q, i) > 0.0_dp) r(e) = s%w(p, q, i)*(s%gamma(p, q, i) - gamma(p, q, i))
+        end do
+      end do
+      squares(i) = 0
+      do e = 1, s%n_entry
+        if (size(s%whitening) > 0) then
+          squares(i) = squares(i) + abs(sum(s%whitening(e, :e, i)*r(:e)))**2
+        else
+          squares(i) = squares(i) + abs(r(e))**2
+        end if
+      end do
+    end do
+  end function distance
+
+  subroutine project(s, h, m, squares, steps)
+    type(sample), intent(in) :: s
+    complex(dp), contiguous, intent(inout) :: h(:, :, :), m(:, :, :)
+    real(dp), intent(out) :: squares(lines)
+    integer, intent(in) :: steps
+    integer(ip) :: line_info(lines), info
+
+    call project_on_joint(.false., s%reciprocal, int(steps, ip), gain, s%gamma, s%w, s%whitening, s%c, h, m, squares, &
+                          line_info, info)
+    call check(info == 0 .and. all(line_info == 0), 'good')
+  end subroutine project
+
+  subroutine exact(n, reciprocal, correlated)
+    integer, intent(in) :: n
+    logical, intent(in) :: reciprocal, correlated
+    type(sample) :: s
+    complex(dp) :: h(n, n, lines), m(n, n, lines)
+    real(dp) :: squares(lines)
+
+    s = make_sample(n, reciprocal, correlated)
+    h = s%h + 0.02_dp*square(s)
+    m = s%m + 0.02_dp*square(s)
+    call project(s, h, m, squares, 40)
+    call check(all(squares < 1.0e-6_dp), 'exact FRFs have no distance')
+    call check(maxval(abs(squares - distance(s, frfs(h, m, s%c)))) < 1.0e-8_dp, 'squares of exact FRFs')
+  end subroutine exact
+
+  !> No change of H or M comes nearer to FRFs with noise.
+  subroutine stationary(n, reciprocal, correlated)
+    integer, intent(in) :: n
+    logical, intent(in) :: reciprocal, correlated
+    type(sample) :: s
+    complex(dp) :: h(n, n, lines), m(n, n, lines), dh(n, n, lines), dm(n, n, lines)
+    real(dp) :: squares(lines), there(lines), back(lines)
+    integer :: k
+
+    s = make_sample(n, reciprocal, correlated)
+    s%gamma = s%gamma + 0.02_dp*random_lines(2*n, 2*n, lines)
+    h = s%h
+    m = s%m
+    call project(s, h, m, squares, 60)
+    call check_close(sum(squares), sum(distance(s, frfs(h, m, s%c))), 1.0e-12_dp, 'squares')
+    do k = 1, 4
+      dh = 1.0e-3_dp*square(s)
+      dm = 1.0e-3_dp*square(s)
+      there = distance(s, frfs(h + dh, m + dm, s%c))
+      back = distance(s, frfs(h - dh, m - dm, s%c))
+      call check(all(there + back > 2*squares), 'a minimum')
+      call check(all(abs(there - back) < 0.1_dp*(there + back - 2*squares)), 'stationary')
+    end do
+  end subroutine stationary
+
+  !> What a projection for another C costs is what W says.
+  subroutine other_joint(n, reciprocal, correlated)
+    integer, intent(in) :: n
+    logical, intent(in) :: reciprocal, correlated
+    type(sample) :: s
+    complex(dp) :: h(n, n, lines), m(n, n, lines), d(n, n, lines), change(n*n)
+    complex(dp), allocatable :: information(:, :, :), gradient(:, :, :)
+    real(dp) :: squares(lines), left(lines, 1), cost
+    integer(ip) :: line_info(lines), info
+    integer :: i, a, b, k
+
+    s = make_sample(n, reciprocal, correlated)
+    s%w = 1.0e4_dp*s%w
+    allocate (information(s%n_free, s%n_free, lines), gradient(s%n_free, lines, 1))
+    call joint_forms(.false., reciprocal, reshape(s%gamma, [2*n, 2*n, lines, 1]), s%w, s%whitening, s%c, s%h, s%m, &
+                     information, gradient, left, line_info, info)
+    call check(info == 0 .and. all(line_info == 0), 'forms: good')
+    call check(all(left < 1.0e-12_dp), 'forms: no distance')
+    d = 1.0e-6_dp*square(s)
+    s%c = s%c + d
+    h = s%h
+    m = s%m
+    call project(s, h, m, squares, 60)
+    do i = 1, lines
+      k = 0
+      do a = 1, n
+        do b = merge(a, 1, reciprocal), n
+          k = k + 1
+          change(k) = d(a, b, i)
+        end do
+      end do
+      cost = real(dot_product(change(:k), matmul(information(:, :, i), change(:k))), dp)
+      call check(abs(squares(i) - cost) < 1.0e-3_dp*cost + 1.0e-6_dp, 'the cost of another joint')
+    end do
+  end subroutine other_joint
+
+  !> Lines stored as C does, several targets, and a gradient for each.
+  subroutine orders_of_storage(reciprocal)
+    logical, intent(in) :: reciprocal
+    integer, parameter :: n = 2
+    type(sample) :: s
+    complex(dp) :: h(n, n, lines), m(n, n, lines), h_t(n, n, lines), m_t(n, n, lines)
+    complex(dp) :: targets(2*n, 2*n, lines, 2), targets_t(2*n, 2*n, lines, 2)
+    complex(dp), allocatable :: w(:, :, :), w_t(:, :, :), p(:, :, :), p_t(:, :, :)
+    real(dp) :: squares(lines), squares_t(lines), left(lines, 2), left_t(lines, 2)
+    real(dp), allocatable :: factor_t(:, :, :), weights_t(:, :, :)
+    integer(ip) :: line_info(lines), info
+    integer :: i
+
+    s = make_sample(n, reciprocal, .true.)
+    s%gamma = s%gamma + 0.02_dp*random_lines(2*n, 2*n, lines)
+    allocate (w(s%n_free, s%n_free, lines), w_t(s%n_free, s%n_free, lines))
+    allocate (p(s%n_free, lines, 2), p_t(s%n_free, lines, 2))
+    allocate (factor_t, source=s%whitening)
+    allocate (weights_t, source=s%w)
+    do i = 1, lines
+      factor_t(:, :, i) = transpose(s%whitening(:, :, i))
+      weights_t(:, :, i) = transpose(s%w(:, :, i))
+    end do
+    h = s%h
+    m = s%m
+    call project(s, h, m, squares, 10)
+    h_t = transposed(s%h)
+    m_t = transposed(s%m)
+    call project_on_joint(.true., reciprocal, 10_ip, gain, transposed(s%gamma), weights_t, factor_t, transposed(s%c), &
+                          h_t, m_t, squares_t, line_info, info)
+    call check_same(transposed(h_t), h, 'H, transposed')
+    call check_same(transposed(m_t), m, 'M, transposed')
+    call check_same(squares_t, squares, 'squares, transposed')
+
+    targets(:, :, :, 1) = s%gamma
+    targets(:, :, :, 2) = s%gamma + 0.01_dp*random_lines(2*n, 2*n, lines)
+    do i = 1, 2
+      targets_t(:, :, :, i) = transposed(targets(:, :, :, i))
+    end do
+    call joint_forms(.false., reciprocal, targets, s%w, s%whitening, s%c, h, m, w, p, left, line_info, info)
+    call joint_forms(.true., reciprocal, targets_t, weights_t, factor_t, transposed(s%c), h_t, m_t, w_t, p_t, left_t, &
+                     line_info, info)
+    call check_same(transposed(w_t), w, 'W, transposed')
+    call check_close(w, conjg(transposed(w)), 0.0_dp, 'W is Hermitian')
+    call check_same(p_t, p, 'gradients do not depend on the order of storage')
+    call check_same(left_t(:, 2), left(:, 2), 'squares of the second target')
+    call joint_forms(.false., reciprocal, targets(:, :, :, 2:2), s%w, s%whitening, s%c, h, m, w_t, p_t(:, :, :1), &
+                     left_t(:, :1), line_info, info)
+    call check_close(p_t(:, :, 1:1), p(:, :, 2:2), 1.0e-10_dp, 'a target alone')
+  end subroutine orders_of_storage
+
+  subroutine bad_lines()
+    integer, parameter :: n = 2
+    type(sample) :: s
+    complex(dp) :: h(n, n, lines), m(n, n, lines), good_h(n, n, lines), good_m(n, n, lines), w(3, 3, lines)
+    complex(dp) :: p(3, lines, 1)
+    real(dp) :: squares(lines), left(lines, 1)
+    integer(ip) :: line_info(lines), info, expected(lines)
+    integer :: i
+
+    s = make_sample(n, .true., .false.)
+    good_h = s%h
+    good_m = s%m
+    s%gamma = s%gamma + 0.02_dp*random_lines(2*n, 2*n, lines)
+    call project(s, good_h, good_m, squares, 10)
+    h = s%h
+    m = s%m
+    s%gamma(3, 3, 2) = cmplx(not_a_number(), 0.0_dp, dp)
+    s%c(1, 1, 3) = cmplx(0.0_dp, infinity(), dp)
+    s%w(3, 4, 9) = -1
+    s%w(3, 4, 10) = not_a_number()
+    m(:, :, 17) = 1.0e200_dp
+    expected = 0
+    expected([2, 3, 9, 10]) = -1
+    expected(17) = -2
+    call project_on_joint(.false., .true., 10_ip, gain, s%gamma, s%w, s%whitening, s%c, h, m, squares, line_info, info)
+    call check(info == 5 .and. all(line_info == expected), 'bad lines')
+    do i = 1, lines
+      if (expected(i) == 0) then
+        call check_same(h(:, :, i:i), good_h(:, :, i:i), 'H beside bad lines')
+        call check_same(m(:, :, i:i), good_m(:, :, i:i), 'M beside bad lines')
+      else
+        call check(all(.not. abs(h(:, :, i)) <= huge(1.0_dp)) .and. all(.not. abs(m(:, :, i)) <= huge(1.0_dp)) .and. &
+                   .not. squares(i) <= huge(1.0_dp), 'a bad line is NaN')
+      end if
+    end do
+    m = s%m
+    m(:, :, 17) = 1.0e200_dp
+    call joint_forms(.false., .true., reshape(s%gamma, [2*n, 2*n, lines, 1]), s%w, s%whitening, s%c, s%h, m, w, p, &
+                     left, line_info, info)
+    call check(info == 5 .and. all(line_info == expected), 'bad forms')
+    do i = 1, lines
+      call check(all(abs(w(:, :, i)) <= huge(1.0_dp) .eqv. expected(i) == 0) .and. &
+                 all(abs(p(:, i, 1)) <= huge(1.0_dp) .eqv. expected(i) == 0), 'a bad form is NaN')
+    end do
+  end subroutine bad_lines
+
+  !> The same bits for a line alone, on any number of threads, and with the engine that is LAPACK elsewhere.
+  subroutine threads_and_neighbours()
+    integer, parameter :: n = 3
+    type(sample) :: s
+    complex(dp) :: h(n, n, lines), m(n, n, lines), one_h(n, n, lines), one_m(n, n, lines)
+    real(dp) :: squares(lines), one(lines)
+    integer(ip) :: line_info(lines), info
+    integer :: i, threads
+
+    s = make_sample(n, .true., .false.)
+    s%gamma = s%gamma + 0.02_dp*random_lines(2*n, 2*n, lines)
+    h = s%h
+    m = s%m
+    call project(s, h, m, squares, 300)
+    one_h = s%h
+    one_m = s%m
+    do i = 1, lines
+      call project_on_joint(.false., .true., 300_ip, gain, s%gamma(:, :, i:i), s%w(:, :, i:i), s%whitening, &
+                            s%c(:, :, i:i), one_h(:, :, i:i), one_m(:, :, i:i), one(i:i), line_info(i:i), info)
+    end do
+    call check_same(one_h, h, 'H of a line alone')
+    call check_same(one_m, m, 'M of a line alone')
+    call check_same(one, squares, 'squares of a line alone')
+    do threads = 1, 3
+      call set_threads(threads)
+      one_h = s%h
+      one_m = s%m
+      call project(s, one_h, one_m, one, 300)
+      call check_same(one_h, h, 'threads')
+    end do
+    call set_threads(1)
+    call set_engine(engine_lapack, info)
+    one_h = s%h
+    one_m = s%m
+    call project(s, one_h, one_m, one, 300)
+    call check_same(one_m, m, 'engine lapack')
+    call set_engine(engine_plain, info)
+    one_h = s%h
+    one_m = s%m
+    call project(s, one_h, one_m, one, 300)
+    call check_close(sum(one), sum(squares), 1.0e-8_dp, 'engine plain')
+    call set_engine(engine_automatic, info)
+  end subroutine threads_and_neighbours
+
+  subroutine nothing()
+    complex(dp) :: a(1, 1, 0), gamma(2, 2, 0), w(1, 1, 0), p(1, 0, 1)
+    real(dp) :: weights(2, 2, 0), factor(0, 0, 0), squares(0), left(0, 1)
+    integer(ip) :: line_info(0), info
+
+    info = 5
+    call project_on_joint(.true., .true., 3_ip, gain, gamma, weights, factor, a, a, a, squares, line_info, info)
+    call check(info == 0, 'no lines')
+    info = 5
+    call joint_forms(.true., .true., reshape(gamma, [2, 2, 0, 1]), weights, factor, a, a, a, w, p, left, line_info, &
+                     info)
+    call check(info == 0, 'no lines, forms')
+  end subroutine nothing
+end program test_manifold

@@ -1,0 +1,196 @@
+"""Intervals of parameters: against formulas where the problem is linear, and against the scatter of many fits."""
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from compliance_lines import exact_compliance, fitted, fitted_group, white
+from jointfrf.identification.manifold_fit.intervals import (
+    BLOCKS,
+    LikelihoodIntervals,
+    block_jackknife,
+    profile_interval,
+    spread_of,
+)
+from jointfrf.identification.manifold_fit.joint_terms import joint_terms
+
+FREQ = np.linspace(20.0, 500.0, 100)
+OMEGA = 2 * np.pi * FREQ
+VISCOUS = joint_terms(OMEGA, ["x", "y"], "viscous", "zero")
+THETA = np.array([6e5, 2e5, 150.0, 40.0])
+#: Only the stiffness: its compliance a is the mean of the lines, and the squares are quadratic in it.
+SPRING = joint_terms(OMEGA, ["x"], "none", "zero")
+REACH = stats.norm.ppf(0.975)
+
+
+def noisy(noise, seed=0, terms=VISCOUS, theta=THETA):
+    """Compliances with relative noise, and its standard deviation."""
+    exact = exact_compliance(terms, theta)
+    std = noise * abs(exact)
+    return exact + std * white(exact.shape, seed), std
+
+
+def group_of(noise, seed=0, terms=VISCOUS, theta=THETA):
+    return fitted_group(terms, *noisy(noise, seed, terms, theta), theta)
+
+
+def spring(mean, std=1e-7, seed=0):
+    """A spring whose compliances have exactly this mean; returned with the standard error of the mean."""
+    e = white((FREQ.size, 1), seed)
+    measured = mean + std * (e - e.mean())
+    return fitted_group(SPRING, measured, std, np.array([1e6])), std / np.sqrt(2 * FREQ.size)
+
+
+@pytest.mark.parametrize("factor", [1.0, 4.0])
+@pytest.mark.parametrize("index", range(4))
+def test_the_profile_of_a_nearly_linear_problem_is_normal(index, factor):
+    group = group_of(0.01)
+    low, high = profile_interval(group, index, factor)
+    x = group.fit.minimum.x
+    slope = group.joint.theta_slope(x)
+    error = np.sqrt(factor * (slope @ np.linalg.inv(2 * group.fit.minimum.information) @ slope.T)[index, index])
+    value = group.joint.theta(x)[index]
+    np.testing.assert_allclose([value - low, high - value], REACH * error, rtol=0.02)
+
+
+@pytest.mark.parametrize("probability", [0.68, 0.95, 0.99])
+def test_the_profile_of_a_spring_is_that_of_its_mean_compliance(probability):
+    group, error = spring(5e-8)
+    reach = stats.norm.ppf((1 + probability) / 2) * error
+    found = profile_interval(group, 0, 1.0, probability)
+    np.testing.assert_allclose(found, [1 / (5e-8 + reach), 1 / (5e-8 - reach)], rtol=2e-3)
+
+
+def test_a_spring_too_stiff_to_be_seen_is_open_above():
+    group, error = spring(1.5 * 1e-7 / np.sqrt(200))
+    low, high = profile_interval(group, 0, 1.0)
+    assert high == np.inf
+    assert low == pytest.approx(1 / ((1.5 + REACH) * error), rel=2e-3)
+
+
+def test_a_compliance_measured_below_zero_is_that_of_a_rigid_joint():
+    """The best is a = 0; the squares there are e^2/2 above those of the mean -e, and grow on."""
+    group, error = spring(-1e-7 / np.sqrt(200))
+    assert group.fit.minimum.x[0] == 0
+    low, high = profile_interval(group, 0, 1.0)
+    assert high == np.inf
+    # (a + e)^2 - e^2 = REACH^2 e^2.
+    assert low == pytest.approx(1 / ((np.sqrt(1 + REACH**2) - 1) * error), rel=2e-3)
+
+
+def test_a_dof_that_may_be_rigid_shows_no_damping():
+    theta = np.array([6e9, 2e5, 150.0, 40.0])
+    exact = exact_compliance(VISCOUS, theta)
+    std = np.broadcast_to(0.05 * abs(exact[:, 1:]), exact.shape)
+    group = fitted_group(VISCOUS, exact + std * white(exact.shape, 2), std, theta)
+    assert profile_interval(group, 2, 1.0) == (-np.inf, np.inf)
+    assert profile_interval(group, 0, 1.0)[1] == np.inf
+    low, high = profile_interval(group, 3, 1.0)
+    assert low < 40 < high < 60
+
+
+@pytest.mark.parametrize("index", [0, 1])
+def test_the_profile_contains_the_true_parameter_as_often_as_said(index):
+    """Compliance known to a third: k and c of one DOF."""
+    terms, theta = joint_terms(OMEGA, ["x"], "viscous", "zero"), np.array([6e5, 400.0])
+    std = 3.5 / 6e5
+    exact = exact_compliance(terms, theta)
+    inside = 0
+    for seed in range(60):
+        group = fitted_group(terms, exact + std * white(exact.shape, seed), std, theta)
+        low, high = profile_interval(group, index, 1.0)
+        inside += low <= theta[index] <= high
+    # 95 % of 60 is 57, with a standard deviation of 1.7.
+    assert inside >= 52
+
+
+def test_intervals_of_a_well_determined_joint_are_symmetric_in_the_compliance():
+    found = fitted(VISCOUS, *noisy(0.05), THETA)
+    intervals = LikelihoodIntervals(found, np.array([1.0, 4.0, 1.0, 4.0]))
+    limits = intervals(0.95)
+    assert list(limits) == ["k_x", "k_y", "c_x", "c_y"]
+    a = found.groups[0].fit.minimum.x
+    error = np.sqrt(np.diagonal(np.linalg.inv(2 * found.groups[0].fit.minimum.information)))
+    for i, (name, widened) in enumerate((("k_x", 1), ("k_y", 2))):
+        reach = REACH * widened * error[i]
+        np.testing.assert_allclose(limits[name], [1 / (a[i] + reach), 1 / (a[i] - reach)], rtol=1e-6)
+    np.testing.assert_allclose(
+        [(high - low) / 2 for low, high in (limits["c_x"], limits["c_y"])],
+        REACH * np.sqrt(np.diagonal(found.covariance)[2:]) * [1, 2],
+        rtol=1e-6,
+    )
+    assert intervals(0.95) is limits
+    assert intervals(0.5)["k_x"][0] > limits["k_x"][0]
+
+
+def test_intervals_of_a_poorly_determined_joint_are_those_of_the_profile():
+    found = fitted(VISCOUS, *noisy(3.0), THETA)
+    limits = LikelihoodIntervals(found, np.ones(4))(0.95)
+    for i, name in enumerate(limits):
+        assert limits[name] == profile_interval(found.groups[0], i, 1.0)
+
+
+def test_both_kinds_of_interval_meet_where_one_follows_the_other():
+    """Relative errors of 9 %, still symmetric in the compliance, against the profile."""
+    found = fitted(VISCOUS, *noisy(0.9), THETA)
+    limits = LikelihoodIntervals(found, np.ones(4))(0.95)
+    for i, name in enumerate(limits):
+        np.testing.assert_allclose(limits[name], profile_interval(found.groups[0], i, 1.0), rtol=0.04)
+
+
+def test_the_jackknife_of_a_mean_is_the_scatter_of_block_means():
+    """Lines of equal weight and one parameter: delete-one-block is the textbook formula."""
+    rng = np.random.default_rng(4)
+    of_block = 1e-6 * (1 + 0.1 * rng.standard_normal(BLOCKS))
+    measured = np.repeat(of_block, FREQ.size // BLOCKS)[:, None].astype(complex)
+    group = fitted_group(SPRING, measured, 1e-8, np.array([1e6]))
+    expected = of_block.var(ddof=1) / BLOCKS
+    np.testing.assert_allclose(block_jackknife(group), [[expected]], rtol=1e-6)
+
+
+def test_the_jackknife_of_white_noise_is_on_average_that_of_the_noise():
+    ratios = []
+    for seed in range(150):
+        group = group_of(0.05, seed)
+        by_noise = np.diagonal(np.linalg.inv(2 * group.fit.minimum.information))
+        ratios.append(np.diagonal(block_jackknife(group)) / by_noise)
+    # One is known to sqrt(2/9) = 47 %, the mean of 150 to 4 %.
+    np.testing.assert_allclose(np.mean(ratios, axis=0), 1, atol=0.2)
+
+
+def test_too_few_lines_have_no_jackknife():
+    few = slice(0, 2 * BLOCKS - 1)
+    terms = VISCOUS.on_lines(few)
+    found = fitted(terms, *noisy(0.05, terms=terms), THETA)
+    assert np.isnan(block_jackknife(found.groups[0])).all()
+    spread = spread_of(found, 3.0)
+    np.testing.assert_allclose(spread.factor, 3.0 * max(found.excess, 1.0))
+    assert np.isnan(spread.jackknife).all()
+
+
+def test_variances_take_the_correlation_and_a_residual_above_the_noise():
+    measured, std = noisy(0.05)
+    found = fitted(VISCOUS, measured, std / 2, THETA)
+    assert found.excess == pytest.approx(4, rel=0.2)
+    np.testing.assert_allclose(spread_of(found, 2.0).information, 2 * found.excess)
+    small = fitted(VISCOUS, measured, 2 * std, THETA)
+    np.testing.assert_allclose(spread_of(small, 2.0).information, 2.0)
+    np.testing.assert_allclose(spread_of(small, 2.0, is_level_known=False).information, 2 * small.excess)
+
+
+def test_white_noise_is_seldom_widened_by_blocks():
+    """Two tests of 5 % each: at most one in ten, and never by much."""
+    factors = [spread_of(fitted(VISCOUS, *noisy(0.05, seed), THETA), 1.0) for seed in range(100)]
+    widened = [one for one in factors if (one.factor > 1.01 * one.information).any()]
+    assert len(widened) <= 15
+    assert max(one.factor.max() for one in factors) < 6
+
+
+def test_parts_of_the_band_that_disagree_widen_the_variance_of_what_they_disagree_on():
+    k_x = np.repeat([5e5, 7e5] * (BLOCKS // 2), FREQ.size // BLOCKS)
+    exact = 1 / np.stack([k_x + 1j * OMEGA * 150, 2e5 + 1j * OMEGA * 40], axis=1)
+    std = 0.05 * abs(exact)
+    spread = spread_of(fitted(VISCOUS, exact + std * white(exact.shape, 2), std, THETA), 1.0)
+    assert spread.factor[0] > 5 * spread.information[0]
+    assert spread.factor[0] >= spread.jackknife[0]
+    assert spread.jackknife[1] < 3

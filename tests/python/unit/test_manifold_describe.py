@@ -1,0 +1,285 @@
+"""What a reader is told of a fit: each sentence for its cause, and none without."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import jointfrf as jf
+from jointfrf.identification.manifold_fit.damping_choice import DofDamping
+from jointfrf.identification.manifold_fit.describe import describe_manifold
+from jointfrf.identification.manifold_fit.fit import fit_manifold
+from jointfrf.identification.manifold_fit.misfit import Misfit, Trend
+from jointfrf.identification.manifold_fit.prepare import (
+    ManifoldOptions,
+    NoiseOptions,
+    as_channel_frfs,
+    prepare_manifold,
+)
+
+LEVEL = 0.01
+
+
+def between(s, stiffness):
+    """FRFs at the joint of the assembly for any K*(w)."""
+    h = jf.couple(s.h_a, s.h_b, stiffness, s.at, s.at)
+    dofs = s.at + [2 * s.n + i for i in s.at]
+    return h[:, dofs][:, :, dofs]
+
+
+def told(freq, h, dofs, *, noise=LEVEL, damping="viscous", cross="zero"):
+    """Return the fit described."""
+    options = ManifoldOptions(damping, cross, True)
+    problem = prepare_manifold(as_channel_frfs(freq, h), dofs, None, None, NoiseOptions(noise), options)
+    return describe_manifold(fit_manifold(problem), problem).fit
+
+
+class Found:
+    """A fit with its problem, numbers of which may be changed."""
+
+    def __init__(self, fit, problem):
+        self.fit, self.problem = fit, problem
+
+    def described(self):
+        return describe_manifold(self.fit, self.problem)
+
+    def with_(self, **change):
+        return Found(self.fit._replace(**change), self.problem)
+
+    def of_noise(self, **change):
+        return Found(self.fit, replace(self.problem, noise=replace(self.problem.noise, **change)))
+
+    def of_groups(self, **change):
+        groups = tuple(one._replace(fit=one.fit._replace(**change)) for one in self.fit.estimate.groups)
+        return self.with_(estimate=self.fit.estimate._replace(groups=groups))
+
+    def of_intervals(self, **limits):
+        """Other intervals of some parameters."""
+        known = self.fit.joint.confidence_interval(0.95)
+        return self.with_(joint=replace(self.fit.joint, intervals=lambda probability: known | limits))
+
+
+@pytest.fixture(scope="module")
+def found(beams):
+    """A fit of which there is nothing to tell."""
+    gamma = as_channel_frfs(beams.freq, jf.pollute(beams.gamma(beams.joint), LEVEL, seed=3))
+    options = ManifoldOptions("viscous", "zero", True)
+    problem = prepare_manifold(gamma, ["y", "theta"], None, None, NoiseOptions(LEVEL), options)
+    return Found(fit_manifold(problem), problem)
+
+
+def test_nothing_to_tell(found):
+    described = found.described()
+    assert described.fit.notes == described.fit.warnings == described.warnings == ()
+    assert described.fit.parameters == found.fit.joint.parameters
+
+
+def test_a_fit_that_did_not_converge_warns_of_its_own_kind(found):
+    described = found.of_groups(converged=False, iterations=17).described()
+    assert [type(warning) for warning in described.warnings] == [jf.ConvergenceWarning]
+    assert described.fit.warnings == ("the fit did not converge in 17 iterations",)
+
+
+@pytest.mark.parametrize(("margin", "strength"), [(11.0, "clearly"), (3.0, "weakly"), (1.0, "hardly")])
+def test_how_the_damping_of_each_dof_was_chosen(found, margin, strength):
+    choices = (DofDamping("y", "viscous", "both", margin), DofDamping("theta", "hysteretic", "none", 50.0))
+    assert found.with_(choices=choices).described().fit.notes == (
+        f"damping of y: viscous, {strength} preferred to both (difference of BIC {margin:.1f})",
+        "damping of theta: hysteretic, clearly preferred to none (difference of BIC 50.0)",
+    )
+
+
+def test_damping_chosen_by_the_data_is_told_by_dof(beams):
+    joint = jf.Joint([6e5, 5e3], [20, 0], ["y", "theta"], structural_damping=[0, 400])
+    fit = told(beams.freq, jf.pollute(beams.gamma(joint), LEVEL, seed=3), ["y", "theta"], damping="auto")
+    assert [note.split(",")[0] for note in fit.notes] == ["damping of y: viscous", "damping of theta: hysteretic"]
+    assert list(fit.parameters) == ["k_y", "k_theta", "h_theta", "c_y"]
+
+
+def test_a_level_from_the_residual_is_noted(found, chains):
+    (note,) = found.of_noise(is_assumed=True).described().fit.notes
+    assert note == "the noise level is taken from the residual: the FRFs do not show it otherwise"
+    h = chains.gamma(chains.joint)
+    assert told(chains.freq, (h + h.swapaxes(1, 2)) / 2, ["x"], noise=None).notes == (note,)
+
+
+def test_correlated_noise_is_noted_by_the_number_of_independent_lines(found, beams):
+    assert not found.of_noise(inflation=1.1).described().fit.notes
+    assert found.of_noise(inflation=4.0).described().fit.notes == (
+        "the noise of neighbouring lines is correlated: 158 lines say as much as 40 independent ones",
+    )
+    e = np.random.default_rng(2).standard_normal((beams.freq.size + 3, 4, 4, 2)) @ [1, 1j]
+    mean_of_four = (e[:-3] + e[1:-2] + e[2:-1] + e[3:]) / np.sqrt(8)
+    fit = told(beams.freq, beams.gamma(beams.joint) * (1 + LEVEL * mean_of_four), ["y", "theta"], noise=None)
+    (note,) = fit.notes
+    assert 30 < float(note.split("as much as ")[1].split()[0]) < 60
+
+
+def test_outlying_lines_are_listed(found, beams):
+    start = "lines with far more noise than their neighbours weigh less: "
+    (note,) = found.of_noise(outlying=np.arange(9)).described().fit.notes
+    assert note == start + "15, 20, 25, 30, 35, 40, 45, 50 and 1 more Hz"
+    exact, hum = beams.gamma(beams.joint), [20, 90]
+    h = jf.pollute(exact, LEVEL, seed=3)
+    h[hum] = jf.pollute(exact[hum], 0.3, seed=9)
+    assert told(beams.freq, h, ["y", "theta"], noise=None).notes == (start + "115, 465 Hz",)
+
+
+def test_damping_that_may_be_zero_is_noted_but_not_a_stiffness(found):
+    described = found.of_intervals(c_y=(-1.0, 2.0)).described()
+    assert described.fit.notes == ("c_y: not significantly different from zero (95 % interval)",)
+    assert not described.warnings
+
+
+@pytest.mark.parametrize(
+    ("limits", "text"),
+    [
+        ((2000.0, 8000.0), "k_theta: poorly determined by the data, 95 % interval 2e+03 .. 8e+03 N m/rad"),
+        (
+            (3210.0, np.inf),
+            "k_theta: this DOF cannot be distinguished from a rigid one; at least 3.21e+03 N m/rad (95 %)",
+        ),
+        ((0.0, np.inf), "k_theta: this DOF cannot be distinguished from a rigid one; the data give no bound"),
+        ((0.0, 8000.0), "k_theta: cannot be distinguished from no joint; at most 8e+03 N m/rad (95 %)"),
+    ],
+)
+def test_stiffnesses_that_the_data_do_not_determine(found, limits, text):
+    assert found.of_intervals(k_theta=limits).described().fit.warnings == (text,)
+
+
+def test_an_interval_as_wide_as_the_value_is_not_yet_poor(found):
+    k = found.fit.joint.parameters["k_theta"]
+    assert not found.of_intervals(k_theta=(0.51 * k, 1.49 * k)).described().warnings
+
+
+def test_a_rigid_dof_is_told_with_a_bound_below_it(beams):
+    k = beams.joint.dynamic_stiffness(beams.freq)
+    k[:, 0, 0] = 1e13
+    fit = told(beams.freq, jf.pollute(between(beams, k), LEVEL, seed=3), ["y", "theta"])
+    (text,) = fit.warnings
+    assert text.startswith("k_y: this DOF cannot be distinguished from a rigid one; at least ")
+    assert fit.notes == ("c_y: not significantly different from zero (95 % interval)",)
+
+
+def test_damping_of_the_other_time_convention_is_negative(beams):
+    h = jf.pollute(beams.gamma(beams.joint), LEVEL, seed=4).conj()
+    fit = told(beams.freq, h, ["y", "theta"])
+    for name in ("c_y", "c_theta"):
+        assert any(text.startswith(f"{name}: significantly negative, -") for text in fit.warnings)
+    assert fit.damping[0] == pytest.approx(-20, rel=0.03)
+
+
+def test_a_residual_below_the_noise_is_told(beams):
+    (text,) = told(
+        beams.freq, jf.pollute(beams.gamma(beams.joint), LEVEL, seed=3), ["y", "theta"], noise=2 * LEVEL
+    ).warnings
+    assert text.startswith("the residual is 0.50 times the noise, 18 sigma below it: the noise is smaller than said")
+
+
+def test_a_residual_above_the_noise_is_told(beams):
+    h = jf.pollute(beams.gamma(beams.joint), LEVEL, seed=3)
+    (text,) = told(beams.freq, h, ["y", "theta"], noise=LEVEL / 2).warnings
+    assert text.startswith("the residual is 2.01 times the noise, 36 sigma above it")
+    assert text.endswith("the joint does not fit the data")
+
+
+def test_no_residual_is_compared_with_a_level_that_it_gave(found):
+    far = Misfit(2.0, 0.05, (), ())
+    assert "2.00 times the noise" in found.with_(misfit=far).described().fit.warnings[0]
+    assert not found.with_(misfit=far).of_noise(is_assumed=True).described().warnings
+
+
+def test_a_local_misfit_names_the_lines(found):
+    local = Misfit(2.0, 0.05, ((300.0, 350.0, 0.8), (100.0, 105.0, 0.2)), ())
+    (text,) = found.with_(misfit=local).described().fit.warnings
+    assert "; the excess is local: 300-350 Hz (80 %), 100-105 Hz (20 %): bad lines, or local modes" in text
+
+
+def test_a_trend_names_the_parameter_and_where_it_is_least_and_largest(found):
+    trend = Trend("k_y", np.array([50.0, 200.0, 600.0]), np.array([6e5, 5e5, 7e5]), 1e-6)
+    assert found.with_(misfit=Misfit(1.0, 0.05, (), (trend,))).described().fit.warnings == (
+        "k_y is not one constant over frequency: parts of the band give 5e+05 .. 7e+05 (near 200 and 600 Hz)",
+    )
+
+
+def test_a_stiffness_that_drifts_over_the_band_is_told(beams):
+    k = beams.joint.dynamic_stiffness(beams.freq)
+    k[:, 1, 1] *= np.linspace(1, 1.2, beams.freq.size)
+    texts = told(beams.freq, jf.pollute(between(beams, k), LEVEL, seed=3), ["y", "theta"]).warnings
+    assert any(text.startswith("k_theta is not one constant over frequency: parts of the band give") for text in texts)
+    assert not any(text.startswith("k_y is not") for text in texts)
+
+
+def coupled(beams, k_cross, seed):
+    k = beams.joint.dynamic_stiffness(beams.freq)
+    k[:, 0, 1] = k[:, 1, 0] = k_cross
+    return jf.pollute(between(beams, k), LEVEL, seed=seed)
+
+
+def test_coupled_dofs_are_told_instead_of_what_follows_from_them(beams):
+    h = coupled(beams, 2e4, 3)
+    (text,) = told(beams.freq, h, ["y", "theta"]).warnings
+    assert "with cross terms it does: the DOFs of the joint are coupled" in text
+    assert not told(beams.freq, h, ["y", "theta"], cross="fit").warnings
+
+
+def test_cross_terms_ignored_cost_no_lines(beams):
+    """What is unknown of the compliance moves with the fit on lines that do not fit yet."""
+    fit = told(beams.freq, coupled(beams, 2e3, 4), ["y", "theta"], cross="ignore")
+    assert not fit.warnings
+    # 1/C_dd, which is k less 0.1 %.
+    np.testing.assert_allclose(fit.stiffness, [599207, 4997.3], rtol=0.01)
+
+
+def test_lines_that_do_not_fit_are_counted_unless_cross_terms_explain_them(found):
+    trusted = np.arange(158) >= 10
+    out = found.of_groups(trusted=trusted)
+    text = "10 of 158 lines do not fit the joint found within their noise and are left out"
+    assert out.described().fit.warnings == (text,)
+    assert not out.with_(cross_fits=True).described().warnings
+    assert not found.of_groups(trusted=np.arange(158) >= 3).described().warnings
+
+
+def test_random_phases_on_ten_lines_are_left_out(beams):
+    h = jf.pollute(beams.gamma(beams.joint), LEVEL, seed=3)
+    h[60:70] = abs(h[60:70]) * np.exp(2j * np.pi * np.random.default_rng(1).random((10, 4, 4)))
+    fit = told(beams.freq, h, ["y", "theta"])
+    # A neighbour may go with them: smooth FRFs see across it.
+    (text,) = fit.warnings
+    assert re.fullmatch(r"1[0-2] of 158 lines do not fit the joint found within their noise and are left out", text)
+    np.testing.assert_allclose(fit.stiffness, [6e5, 5e3], rtol=0.02)
+
+
+def test_intervals_widened_by_scatter_are_told(found):
+    spread = found.fit.spread
+    factor = spread.information * np.array([1.0, 6.0, 4.9, 5.1])
+    wide = found.with_(spread=spread._replace(factor=factor))
+    assert wide.described().fit.warnings == (
+        "k_theta, c_theta: parts of the band scatter more than the noise explains; the intervals are widened by that",
+    )
+    exact = wide.with_(joint=replace(found.fit.joint, noise_level=1e-12))
+    assert not exact.described().warnings
+
+
+def two_chains(chains):
+    """Two assemblies side by side that do not know each other: joint DOFs x and y."""
+    gamma = chains.gamma(chains.joint)
+    h = np.zeros((len(gamma), 4, 4), complex)
+    h[:, ::2, ::2], h[:, 1::2, 1::2] = (jf.pollute(gamma, LEVEL, seed=seed) for seed in (1, 2))
+    return h
+
+
+def test_groups_are_named(chains):
+    text = "the FRFs between (x) and (y) are zero: each group is fitted separately"
+    assert told(chains.freq, two_chains(chains), ["x", "y"]).notes == (text,)
+    coupled = told(chains.freq, two_chains(chains), ["x", "y"], cross="fit")
+    assert coupled.notes == (text + ", and cross terms between them cannot be identified",)
+    assert list(coupled.parameters) == ["k_x", "k_y", "c_x", "c_y"]
+
+
+def test_lines_left_out_of_a_group_name_its_dofs(chains):
+    h = two_chains(chains)
+    h[40:50, ::2, ::2] *= np.exp(2j * np.pi * np.random.default_rng(1).random((10, 2, 2)))
+    (text,) = told(chains.freq, h, ["x", "y"]).warnings
+    assert text.startswith("10 of 191 lines of x do not fit")
