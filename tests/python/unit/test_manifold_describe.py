@@ -157,9 +157,9 @@ def test_a_rigid_dof_is_told_with_a_bound_below_it(beams):
     k = beams.joint.dynamic_stiffness(beams.freq)
     k[:, 0, 0] = 1e13
     fit = told(beams.freq, jf.pollute(between(beams, k), LEVEL, seed=3), ["y", "theta"])
-    (text,) = fit.warnings
-    assert text.startswith("k_y: this DOF cannot be distinguished from a rigid one; at least ")
-    assert fit.notes == ("c_y: not significantly different from zero (95 % interval)",)
+    told_of_k = "k_y: this DOF cannot be distinguished from a rigid one; at least "
+    assert any(text.startswith(told_of_k) for text in fit.warnings)
+    assert "c_y: not significantly different from zero (95 % interval)" in fit.notes
 
 
 def test_damping_of_the_other_time_convention_is_negative(beams):
