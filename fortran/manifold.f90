@@ -209,6 +209,9 @@ contains
     else
       info = info_no_memory
     end if
+    do t = 1, threads
+      if (allocated(work%space(t)%room)) deallocate (work%space(t)%room, work%space(t)%squares)
+    end do
     deallocate (work%space)
   end subroutine run
 
