@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from jointfrf.errors import ConvergenceWarning, IdentificationWarning
 from jointfrf.identification.compliance_fit.estimator import ComplianceEstimate
@@ -14,7 +16,7 @@ from jointfrf.identification.compliance_fit.joint_terms import CrossTerms
 from jointfrf.identification.fit import ComplianceFit, DampingChoice
 from jointfrf.identification.joint_fit import JointFit
 
-__all__ = ["Described", "describe_band_mean", "describe_compliance"]
+__all__ = ["Described", "describe_band_mean", "describe_compliance", "group_notes", "listed", "significance_notes"]
 
 #: A parameter is called poorly determined when its standard error exceeds this share of it.
 _UNCERTAIN = 0.5
@@ -40,8 +42,8 @@ def describe_compliance(found: ComplianceFit, cross: CrossTerms) -> Described:
         *_choice_notes(found.choice),
         *_level_notes(found.level_from_residual),
         *_left_out_notes(result, fit.dofs),
-        *_significance_notes(fit),
-        *_group_notes(result, fit.dofs, cross),
+        *significance_notes(fit),
+        *group_notes(result.groups, fit.dofs, cross),
     ]
     doubts = [
         *_lost_warnings(result, fit.dofs),
@@ -55,7 +57,8 @@ def describe_compliance(found: ComplianceFit, cross: CrossTerms) -> Described:
     return Described(described, tuple(told))
 
 
-def _listed(names: list[str]) -> str:
+def listed(names: Sequence[str]) -> str:
+    """Return names in a row."""
     return ", ".join(names)
 
 
@@ -73,20 +76,18 @@ def _level_notes(from_residual: bool) -> list[str]:
     return [told] * from_residual
 
 
-def _significance_notes(fit: JointFit) -> list[str]:
+def significance_notes(fit: JointFit) -> list[str]:
     """Name damping and cross terms whose sign is not known."""
-    intervals = fit.confidence_interval(0.95).values()
-    open_ = [
-        one.name for one, (low, high) in zip(fit.terms, intervals, strict=True) if one.kind != "k" and low < 0 < high
-    ]
-    return [f"{_listed(open_)}: not significantly different from zero (95 % interval)"] if open_ else []
+    intervals = fit.confidence_interval(0.95)
+    open_ = [one.name for one in fit.terms if one.kind != "k" and intervals[one.name][0] < 0 < intervals[one.name][1]]
+    return [f"{listed(open_)}: not significantly different from zero (95 % interval)"] if open_ else []
 
 
-def _group_notes(result: ComplianceEstimate, dofs: tuple[str, ...], cross: CrossTerms) -> list[str]:
+def group_notes(groups: Sequence[NDArray[np.intp]], dofs: tuple[str, ...], cross: CrossTerms) -> list[str]:
     """Name groups of DOFs between which the FRFs are zero."""
-    if len(result.groups) < 2:
+    if len(groups) < 2:
         return []
-    names = " and ".join(f"({_listed([dofs[d] for d in group])})" for group in result.groups)
+    names = " and ".join(f"({listed([dofs[d] for d in group])})" for group in groups)
     told = f"the FRFs between {names} are zero: each group is fitted separately"
     return [told + (", and cross terms between them cannot be identified" if cross == "fit" else "")]
 
@@ -96,7 +97,7 @@ def _by_group(result: ComplianceEstimate, dofs: tuple[str, ...]) -> list[tuple[s
     several = len(result.groups) > 1
     return [
         (
-            f" of {_listed([dofs[d] for d in group])}" if several else "",
+            f" of {listed([dofs[d] for d in group])}" if several else "",
             int(np.count_nonzero(result.left_out[0, :, group[0]])),
             int(np.count_nonzero(result.lost[:, group[0]])),
         )

@@ -18,19 +18,18 @@ from jointfrf.identification.manifold_fit.describe import describe_manifold
 from jointfrf.identification.manifold_fit.fit import fit_manifold
 from jointfrf.identification.manifold_fit.prepare import (
     ManifoldOptions,
-    ManifoldProblem,
     NoiseOptions,
-    as_channel_frfs,
     prepare_manifold,
 )
 from jointfrf.identification.prepare import (
     BandsOfDofs,
     ComplianceOptions,
+    MeasuredFrfs,
     as_measured,
     prepare_band_mean,
     prepare_compliance,
 )
-from jointfrf.kernel.arguments import check_choice
+from jointfrf.kernel.arguments import FloatArray, check_choice
 from jointfrf.substructuring.methods import JointFrfs, StiffnessMethod
 
 __all__ = ["IdentificationMethod", "identify"]
@@ -68,7 +67,7 @@ def identify(
     ----------
     freq_hz : array_like, shape (n_freq,)
         Hz.
-    gamma : array_like, shape (n_freq, 2 n, 2 n), or (n_freq, m, m) with `transform`, or (n_freq, n, n) for decoupling
+    gamma : array_like, shape (n_freq, 2 n, 2 n), (n_freq, m_r, m_f) with `transform`, or (n_freq, n, n) for decoupling
         Measured receptances, m/N: at joint DOFs j, then k; or at the points that `transform` takes there; or, for
         decoupling, between the internal points that the equation names.
     dofs : sequence of str, optional
@@ -85,22 +84,23 @@ def identify(
     bands : None, (low, high), sequence of these, or mapping of DOF name to these, optional
         Sensitive bands in Hz; all lines by default. The compliance fit weights each line by its information and needs
         none.
-    transform : array_like, shape (2 n, m), optional
-        From measured points to joint DOFs j, then k: rotations by finite differences. Noise is then taken as
-        independent between the measured FRFs, not between the transformed ones.
+    transform : array_like, shape (2 n, m), or a pair of shapes (2 n, m_r) and (2 n, m_f), optional
+        From channels to joint DOFs j, then k: finite differences, virtual points. Noise is then taken as independent
+        between the channels, not between the transformed FRFs. A pair, for responses and for forces, with "manifold".
     damping : {"viscous", "hysteretic", "both", "none", "auto"}
         Terms of K* = k (1 + i eta) + i w c to fit. "auto" takes those with the lowest Bayesian information criterion;
         method "manifold" chooses for each DOF, and takes a sequence of words, one for each DOF. Not for band means.
     cross : {"zero", "ignore", "fit"}
         Terms that couple the DOFs of the joint: none, and this is used; unknown and not fitted; fitted, symmetric.
-        Compliance fit only.
-    noise : float or array_like, shape (n_freq, m, m), optional
-        Relative noise level of each entry, 0.01 for 1 %; or the variance E|e|^2 of each, (m/N)^2. By default relative,
-        with its level estimated from the differences gamma_pq - gamma_qp.
+        Not for band means.
+    noise : float or array_like, shape (n_freq, m_r, m_f), optional
+        Relative noise level of each entry, 0.01 for 1 %; or the variance E|e|^2 of each, (m/N)^2. By default
+        "compliance" takes it as relative, with its level from the differences gamma_pq - gamma_qp, and "manifold" finds
+        it by entry and frequency, as `estimate_noise` does.
     coherence, averages : optional
         As in `estimate_noise`, where `noise` is not given; method "manifold" only.
     reciprocal : bool
-        Whether the structure is reciprocal, so that gamma_pq and gamma_qp may be averaged. Compliance fit only.
+        Whether the structure is reciprocal, so that gamma_pq and gamma_qp may be averaged. Not for band means.
     alpha : array_like, shape (n_freq, 2 n, 2 n), optional
         Calculated receptance of the assembly with the first estimate, for ISMM.
     k_initial : array_like, shape (n_freq, n, n) or (n, n), optional
@@ -126,14 +126,18 @@ def identify(
     ConvergenceWarning
         The fit did not converge.
     FrfCheckWarning
-        The FRFs look wrong (`check_frfs`): sign, quantity, gain, delay, a dead or doubled channel. Compliance fit only.
+        The FRFs look wrong (`check_frfs`): sign, quantity, gain, delay, a dead or doubled channel. Not for
+        band means, nor where the structure is not reciprocal.
 
     Notes
     -----
-    Standard errors of the compliance fit: first-order propagation of the noise, at the larger of the noise
+    Standard errors of "compliance": first-order propagation of the noise, at the larger of the noise
     level and the level the residual shows; where the residual exceeds the noise by 30 %, not below those of a
-    jackknife over ten parts of the band, which includes what the model of the joint cannot follow. Standard errors of a
-    band mean: scatter of its lines over the root of their number; its bias is not included.
+    jackknife over ten parts of the band, which includes what the model of the joint cannot follow. Of "manifold":
+    inverse information of the noise, times the correlation between lines, times the residual over the noise where it is
+    above 1, or the jackknife where it exceeds that by more than chance; intervals by the profile of the likelihood
+    where they are not symmetric. Of a band mean: scatter of its lines over the root of their number; its bias is not
+    included.
 
     Examples
     --------
@@ -152,13 +156,13 @@ def identify(
     if method == "manifold":
         words = damping if isinstance(damping, str) else tuple(damping)
         problem = prepare_manifold(
-            as_channel_frfs(freq_hz, gamma), dofs, bands, transform,
+            as_measured(freq_hz, gamma, square=False), dofs, bands, transform,
             NoiseOptions(noise, coherence, averages), ManifoldOptions(words, cross, reciprocal),
         )  # fmt: skip
         if reciprocal:
-            warn_of_frfs(_checked(problem, by_transform=transform is not None))
-        described = describe_manifold(fit_manifold(problem), problem)
-        return _warned(described)
+            transforms = None if transform is None else (problem.frfs.responses, problem.frfs.forces)
+            warn_of_frfs(_checked(MeasuredFrfs(problem.freq_hz, problem.frfs.measured), problem.dofs, transforms))
+        return _warned(describe_manifold(fit_manifold(problem), problem))
     if coherence is not None or averages is not None:
         raise ValueError("coherence and averages are for method 'manifold'")
     if isinstance(transform, tuple):
@@ -169,8 +173,9 @@ def identify(
             raise ValueError("damping of each DOF by itself is for method 'manifold'")
         options = ComplianceOptions(damping, cross, reciprocal)
         lines = prepare_compliance(measured, dofs, bands, transform, noise, options)
-        names = None if transform is not None else [f"{side}:{dof}" for side in "jk" for dof in lines.dofs]
-        warn_of_frfs(check_frfs(lines.freq_hz, lines.measured, names))
+        if reciprocal:
+            transforms = None if transform is None else (lines.transform, lines.transform)
+            warn_of_frfs(_checked(MeasuredFrfs(lines.freq_hz, lines.measured), lines.dofs, transforms))
         described = describe_compliance(fit_compliance(lines), cross)
     else:
         known = JointFrfs(
@@ -189,18 +194,17 @@ def _warned(described: Described) -> JointFit:
     return described.fit
 
 
-def _checked(problem: ManifoldProblem, *, by_transform: bool) -> FrfCheck:
+def _checked(
+    measured: MeasuredFrfs, dofs: tuple[str, ...], transforms: tuple[FloatArray, FloatArray] | None
+) -> FrfCheck:
     """Look at the FRFs of the lines used, by the names of the joint DOFs where these are the channels."""
-    frfs = problem.frfs
-    if not by_transform:
-        return check_frfs(problem.freq_hz, frfs.measured, [f"{side}:{dof}" for side in "jk" for dof in problem.dofs])
-    if frfs.responses is frfs.forces:
-        return check_frfs(problem.freq_hz, frfs.measured)
+    freq, h = measured.freq_hz, measured.h
+    if transforms is None:
+        return check_frfs(freq, h, [f"{side}:{dof}" for side in "jk" for dof in dofs])
+    responses, forces = transforms
+    if responses is forces:
+        return check_frfs(freq, h)
     rows, columns = (
-        [f"{what} {i}" for i in range(count)]
-        for what, count in zip(("response", "force"), frfs.measured.shape[1:], strict=True)
+        [f"{what} {i}" for i in range(count)] for what, count in zip(("response", "force"), h.shape[1:], strict=True)
     )
-    transform = (frfs.responses, frfs.forces)
-    return check_frfs(
-        problem.freq_hz, frfs.measured, responses=rows, forces=columns, transform=transform, dofs=problem.dofs
-    )
+    return check_frfs(freq, h, responses=rows, forces=columns, transform=transforms, dofs=dofs)

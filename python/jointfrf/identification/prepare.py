@@ -16,6 +16,7 @@ from jointfrf.kernel.arguments import (
     ComplexArray,
     FloatArray,
     as_frequency,
+    as_lines,
     as_number,
     as_real,
     as_square,
@@ -31,7 +32,9 @@ __all__ = [
     "ComplianceProblem",
     "MeasuredFrfs",
     "MeasurementNoise",
+    "as_dof_names",
     "as_measured",
+    "as_transform",
     "prepare_band_mean",
     "prepare_compliance",
 ]
@@ -50,8 +53,8 @@ class MeasuredFrfs:
     Attributes
     ----------
     freq_hz : ndarray, shape (n_freq,)
-    h : ndarray, shape (n_freq, m, m)
-        m/N.
+    h : ndarray, shape (n_freq, m_r, m_f)
+        Responses by forces, m/N.
     """
 
     freq_hz: FloatArray
@@ -144,9 +147,9 @@ class BandMeanProblem:
     bands: tuple[tuple[Band, ...], ...]
 
 
-def as_measured(freq_hz: ArrayLike, gamma: ArrayLike) -> MeasuredFrfs:
-    """Check measured FRFs and their frequencies."""
-    h = as_square("gamma", gamma)
+def as_measured(freq_hz: ArrayLike, gamma: ArrayLike, *, square: bool = True) -> MeasuredFrfs:
+    """Check measured FRFs and their frequencies; `square` asks for as many responses as forces."""
+    h = as_square("gamma", gamma) if square else as_lines("gamma", gamma)
     freq = as_frequency(freq_hz, h.shape[0])
     if freq.size == 0:
         raise ValueError("gamma has no frequency lines")
@@ -164,8 +167,8 @@ def prepare_compliance(
 ) -> ComplianceProblem:
     """Check the arguments of a compliance fit and keep the lines in the bands; arguments as in `identify`."""
     freq, h = measured.freq_hz, measured.h
-    t = _as_transform(transform, h)
-    names = _as_names(dofs, t.shape[0] // 2)
+    t = as_transform(transform, h.shape[1])
+    names = as_dof_names(dofs, t.shape[0] // 2)
     own = as_bands(bands, names, freq)
     used = np.stack([in_bands(freq, b) for b in own], axis=1)
     kept = np.asarray(used.any(axis=1))
@@ -198,26 +201,30 @@ def prepare_band_mean(
     elif transform is None:
         frfs = replace(frfs, gamma=h)
     else:
-        t = _as_transform(transform, h)
+        t = as_transform(transform, h.shape[1])
         frfs = replace(frfs, gamma=t @ h @ t.T)
     k_lines = joint_stiffness(method, frfs, freq_hz=freq)
-    names = _as_names(dofs, k_lines.shape[1])
+    names = as_dof_names(dofs, k_lines.shape[1])
     return BandMeanProblem(method, names, freq, k_lines, tuple(map(tuple, as_bands(bands, names, freq))))
 
 
-def _as_names(dofs: Sequence[str] | None, n: int) -> tuple[str, ...]:
+def as_dof_names(dofs: Sequence[str] | None, n: int) -> tuple[str, ...]:
+    """Return the names of the n joint DOFs, by default their numbers."""
     names = tuple(str(i) for i in range(n)) if dofs is None else tuple(dofs)
     if len(names) != n or len(set(names)) != n or not all(names) or any("," in name for name in names):
         raise ValueError(f"dofs must name {n} different joint DOFs without commas, not {', '.join(names) or 'none'}")
     return names
 
 
-def _as_transform(transform: ArrayLike | None, h: ComplexArray) -> FloatArray:
-    m = h.shape[1]
-    t = as_real("transform", np.eye(m) if transform is None else transform, (None, m))
+def as_transform(transform: ArrayLike | None, m: int, name: str = "transform") -> FloatArray:
+    """Check a transform from m channels to joint DOFs, shape (2 n, m); without one the channels are the DOFs."""
+    t = as_real(name, np.eye(m) if transform is None else transform, (None, m))
     if t.shape[0] == 0 or t.shape[0] % 2:
-        what = "transform" if transform is not None else "gamma"
+        what = name if transform is not None else "gamma"
         raise ValueError(f"{what} must have an even number of rows, DOFs j, then k, not {t.shape[0]}")
+    if not t.any(axis=1).all():
+        row = int(np.flatnonzero(~t.any(axis=1))[0])
+        raise ValueError(f"{name}: row {row} is zero, so no channel shows this joint DOF")
     return t
 
 

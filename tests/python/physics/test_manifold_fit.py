@@ -7,11 +7,11 @@ import pytest
 
 import jointfrf as jf
 from cramer_rao import cramer_rao, term_matrices
+from jointfrf.identification.compliance_fit.least_squares import inverse_information
 from jointfrf.identification.manifold_fit.estimator import estimate_on_manifold
 from jointfrf.identification.manifold_fit.interface_frfs import InterfaceFrfs
 from jointfrf.identification.manifold_fit.intervals import block_jackknife
 from jointfrf.identification.manifold_fit.joint_terms import joint_terms
-from jointfrf.identification.manifold_fit.line_forms import inverse_of_information
 
 TRUTH = np.array([6e5, 5e3, 20, 1.5])
 
@@ -147,7 +147,7 @@ def test_jackknife_agrees_where_the_model_is_right(beams):
     ratios = []
     for h in jf.realisations(gamma, 0.02, seed=11, count=60):
         found = estimate_on_manifold(with_noise(h, 0.02, smooth=gamma), terms_of(beams))
-        own = np.diag(inverse_of_information(2 * found.groups[0].fit.minimum.information))
+        own = np.diag(inverse_information(2 * found.groups[0].fit.minimum.information))
         ratios.append(np.diag(block_jackknife(found.groups[0])) / own)
     np.testing.assert_allclose(np.sqrt(np.mean(ratios, axis=0)), 1, atol=0.4)
 

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from scipy import optimize
 
+from jointfrf.identification.compliance_fit.least_squares import inverse_information
 from jointfrf.identification.manifold_fit.joint_terms import CoupledJoint, DiagonalJoint, joint_terms
-from jointfrf.identification.manifold_fit.line_forms import LineForms, inverse_of_information, minimise_forms
+from jointfrf.identification.manifold_fit.line_forms import LineForms, minimise_forms
 
 OMEGA = 2 * np.pi * np.linspace(20, 400, 12)
 
@@ -169,7 +170,7 @@ def test_inverse_of_an_information_of_very_different_sizes():
     a = rng.standard_normal((6, 3))
     size = np.array([1e-9, 1.0, 1e8])
     plain = np.linalg.inv(a.T @ a)
-    found = inverse_of_information((a.T @ a) * np.outer(size, size))
+    found = inverse_information((a.T @ a) * np.outer(size, size))
     np.testing.assert_allclose(found, plain / np.outer(size, size), rtol=1e-9)
 
 
@@ -178,7 +179,7 @@ def test_what_is_not_seen_does_not_disturb_what_is():
     information = np.zeros((4, 4))
     information[0, 0] = 4.0
     information[2:, 2:] = 2.0
-    found = inverse_of_information(information)
+    found = inverse_information(information)
     assert found[0, 0] == pytest.approx(0.25)
     np.testing.assert_allclose(found[2:, 2:], 0.125, rtol=1e-12)
     np.testing.assert_array_equal(found[0, 1:], 0)

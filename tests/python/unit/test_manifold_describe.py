@@ -14,9 +14,9 @@ from jointfrf.identification.manifold_fit.misfit import Misfit, Trend
 from jointfrf.identification.manifold_fit.prepare import (
     ManifoldOptions,
     NoiseOptions,
-    as_channel_frfs,
     prepare_manifold,
 )
+from jointfrf.identification.prepare import as_measured
 
 LEVEL = 0.01
 
@@ -31,7 +31,7 @@ def between(s, stiffness):
 def told(freq, h, dofs, *, noise=LEVEL, damping="viscous", cross="zero"):
     """Return the fit described."""
     options = ManifoldOptions(damping, cross, True)
-    problem = prepare_manifold(as_channel_frfs(freq, h), dofs, None, None, NoiseOptions(noise), options)
+    problem = prepare_manifold(as_measured(freq, h, square=False), dofs, None, None, NoiseOptions(noise), options)
     return describe_manifold(fit_manifold(problem), problem).fit
 
 
@@ -63,7 +63,7 @@ class Found:
 @pytest.fixture(scope="module")
 def found(beams):
     """A fit of which there is nothing to tell."""
-    gamma = as_channel_frfs(beams.freq, jf.pollute(beams.gamma(beams.joint), LEVEL, seed=3))
+    gamma = as_measured(beams.freq, jf.pollute(beams.gamma(beams.joint), LEVEL, seed=3), square=False)
     options = ManifoldOptions("viscous", "zero", True)
     problem = prepare_manifold(gamma, ["y", "theta"], None, None, NoiseOptions(LEVEL), options)
     return Found(fit_manifold(problem), problem)

@@ -7,9 +7,9 @@ import jointfrf as jf
 from jointfrf.identification.manifold_fit.prepare import (
     ManifoldOptions,
     NoiseOptions,
-    as_channel_frfs,
     prepare_manifold,
 )
+from jointfrf.identification.prepare import as_measured
 
 OPTIONS = ManifoldOptions("viscous", "zero", True)
 #: From points 20 mm apart on each side of a joint of two DOFs to y and theta, and back.
@@ -18,7 +18,7 @@ TO_JOINT = np.linalg.inv(POINTS)
 
 
 def measured(s, level=0.01):
-    return as_channel_frfs(s.freq, jf.pollute(s.gamma(s.joint), level, seed=3))
+    return as_measured(s.freq, jf.pollute(s.gamma(s.joint), level, seed=3), square=False)
 
 
 def prepared(s, **change):
@@ -51,7 +51,7 @@ def test_smooth_frfs_are_nearer_to_the_exact_ones_than_the_measured(beams, noise
 def test_smooth_frfs_that_miss_a_line_give_way_to_the_measured(beams):
     h = measured(beams).h.copy()
     h[40] *= 3
-    given = prepared(beams, measured=as_channel_frfs(beams.freq, h), noise=NoiseOptions(0.01))
+    given = prepared(beams, measured=as_measured(beams.freq, h, square=False), noise=NoiseOptions(0.01))
     np.testing.assert_array_equal(given.frfs.smooth[40], h[40])
     assert (given.frfs.smooth[:35] != h[:35]).all()
 
@@ -60,7 +60,7 @@ def test_noise_is_estimated_from_the_lines_kept_where_nothing_is_said(beams):
     h = measured(beams).h.copy()
     low = beams.freq < 400
     h[low] = jf.pollute(beams.gamma(beams.joint)[low], 0.2, seed=4)
-    noisy = as_channel_frfs(beams.freq, h)
+    noisy = as_measured(beams.freq, h, square=False)
     kept = prepared(beams, measured=noisy, bands=(400, 800))
     assert kept.noise.level == pytest.approx(0.01, rel=0.2)
     assert not kept.noise.is_assumed
@@ -90,7 +90,7 @@ def test_coherence_brings_the_noise_of_each_line_and_averages_scale_it(beams):
     level = np.where((beams.freq > 300) & (beams.freq < 450), 0.09, 0.02)[:, None, None]
     rng = np.random.default_rng(5)
     e = (rng.standard_normal(exact.shape) + 1j * rng.standard_normal(exact.shape)) / np.sqrt(2)
-    noisy = as_channel_frfs(beams.freq, exact * (1 + level * e))
+    noisy = as_measured(beams.freq, exact * (1 + level * e), square=False)
     coherence = np.broadcast_to(1 / (1 + n_averages * level**2), exact.shape)
     kept = (beams.freq >= 200) & (beams.freq <= 700)
     problem = prepared(
@@ -106,7 +106,7 @@ def test_coherence_brings_the_noise_of_each_line_and_averages_scale_it(beams):
 def test_frfs_that_show_no_noise_take_a_level_for_the_residual_to_replace(chains, lines):
     """Exact FRFs that a rational function follows to rounding; and three lines, too few to tell noise."""
     h = chains.gamma(chains.joint)[lines]
-    symmetric = as_channel_frfs(chains.freq[lines], (h + h.swapaxes(1, 2)) / 2)
+    symmetric = as_measured(chains.freq[lines], (h + h.swapaxes(1, 2)) / 2, square=False)
     problem = prepared(chains, measured=symmetric, dofs=["x"])
     assert problem.noise.is_assumed
     assert problem.noise.level == 0.01
@@ -116,7 +116,7 @@ def test_frfs_that_show_no_noise_take_a_level_for_the_residual_to_replace(chains
 def test_frfs_made_reciprocal_are_told_from_measured_ones(beams):
     whole = measured(beams)
     assert not prepared(beams).frfs.symmetrised
-    mean = as_channel_frfs(beams.freq, (whole.h + whole.h.swapaxes(1, 2)) / 2)
+    mean = as_measured(beams.freq, (whole.h + whole.h.swapaxes(1, 2)) / 2, square=False)
     assert prepared(beams, measured=mean).frfs.symmetrised
 
 
@@ -150,7 +150,7 @@ def test_names_and_transform_have_defaults(chains):
 
 
 def test_one_transform_serves_responses_and_forces(beams):
-    at_points = as_channel_frfs(beams.freq, POINTS @ measured(beams).h @ POINTS.T)
+    at_points = as_measured(beams.freq, POINTS @ measured(beams).h @ POINTS.T, square=False)
     frfs = prepared(beams, measured=at_points, transform=TO_JOINT, noise=NoiseOptions(0.01)).frfs
     assert frfs.responses is frfs.forces
     np.testing.assert_allclose(frfs.gamma(frfs.measured), measured(beams).h, rtol=1e-6, atol=1e-14)
@@ -159,7 +159,7 @@ def test_one_transform_serves_responses_and_forces(beams):
 def test_a_pair_of_transforms_takes_rectangular_frfs_to_the_joint(beams):
     """Three responses a side, the middle one the mean of the outer two, and forces at the joint DOFs themselves."""
     three = np.kron(np.eye(2), [[1.0, 0.01], [1.0, 0.0], [1.0, -0.01]])
-    rectangular = as_channel_frfs(beams.freq, three @ measured(beams).h)
+    rectangular = as_measured(beams.freq, three @ measured(beams).h, square=False)
     assert rectangular.h.shape == (beams.freq.size, 6, 4)
     pair = (np.linalg.pinv(three), np.eye(4))
     frfs = prepared(beams, measured=rectangular, transform=pair, noise=NoiseOptions(0.01)).frfs
@@ -184,21 +184,21 @@ def test_transforms_that_cannot_be(beams, transform, told):
 
 def test_rectangular_frfs_need_a_pair_of_transforms(beams):
     with pytest.raises(ValueError, match="gamma has 3 responses and 4 forces: transform must be a pair"):
-        prepared(beams, measured=as_channel_frfs(beams.freq, measured(beams).h[:, :3]))
+        prepared(beams, measured=as_measured(beams.freq, measured(beams).h[:, :3], square=False))
 
 
 def test_frfs_that_do_not_see_the_joint_are_refused(beams):
     h = measured(beams).h.copy()
     h[:, :2, 2:] = h[:, 2:, :2] = 0
     with pytest.raises(ValueError, match="gamma is zero between sides j and k of the joint"):
-        prepared(beams, measured=as_channel_frfs(beams.freq, h), noise=NoiseOptions(0.01))
+        prepared(beams, measured=as_measured(beams.freq, h, square=False), noise=NoiseOptions(0.01))
 
 
 def test_noise_alone_is_refused(beams):
     rng = np.random.default_rng(1)
     h = rng.standard_normal((beams.freq.size, 4, 4)) + 1j * rng.standard_normal((beams.freq.size, 4, 4))
     with pytest.raises(ValueError, match="gamma consists of noise"):
-        prepared(beams, measured=as_channel_frfs(beams.freq, 1e-6 * h))
+        prepared(beams, measured=as_measured(beams.freq, 1e-6 * h, square=False))
 
 
 def test_words_are_checked_when_they_are_chosen():

@@ -84,9 +84,14 @@ class Minimum(NamedTuple):
 
 
 def inverse_information(information: FloatArray) -> FloatArray:
-    """Inverse of information matrices of parameters of very different size; a pseudo-inverse where one has none."""
-    size = np.sqrt(np.maximum(np.einsum("raa->ra", information), np.finfo(float).tiny))
-    outer = size[:, :, None] * size[:, None, :]
+    """Inverse of information matrices of parameters of very different size; a pseudo-inverse where one has none.
+
+    Parameters
+    ----------
+    information : ndarray, shape (..., p, p)
+    """
+    size = np.sqrt(np.maximum(np.einsum("...aa->...a", information), np.finfo(float).tiny))
+    outer = size[..., :, None] * size[..., None, :]
     inverse: FloatArray = np.linalg.pinv(information / outer, hermitian=True) / outer
     return inverse
 

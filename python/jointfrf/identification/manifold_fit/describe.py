@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from jointfrf.errors import ConvergenceWarning, IdentificationWarning
-from jointfrf.identification.describe import Described
+from jointfrf.identification.describe import Described, group_notes, listed, significance_notes
 from jointfrf.identification.joint_fit import JointFit
 from jointfrf.identification.manifold_fit.damping_choice import DofDamping
 from jointfrf.identification.manifold_fit.estimator import JointEstimate
@@ -27,8 +27,6 @@ _WIDENED = 5.0
 _ROUNDING = 1e-7
 #: Share of lines that cannot fit the joint from which on a warning says so.
 _UNTRUSTED = 0.02
-
-
 _COUPLED = (
     "; with cross terms it does: the DOFs of the joint are coupled, so ignore or fit the cross terms (cross), or move "
     "the reference point"
@@ -36,14 +34,14 @@ _COUPLED = (
 
 
 def describe_manifold(found: ManifoldFit, problem: ManifoldProblem) -> Described:
-    """Add the notes and warnings of a compliance fit."""
+    """Add the notes and warnings of a fit on the manifold."""
     fit, result = found.joint, found.estimate
     intervals = fit.confidence_interval(0.95)
     notes = [
         *_choice_notes(found.choices),
         *_noise_notes(problem),
-        *_group_notes(result, fit.dofs, problem.options.cross),
-        *_significance_notes(fit, intervals),
+        *group_notes([group.dofs for group in result.groups], fit.dofs, problem.options.cross),
+        *significance_notes(fit),
     ]
     doubts = [
         *([] if found.cross_fits else _untrusted_warnings(result, fit.dofs)),
@@ -58,10 +56,6 @@ def describe_manifold(found: ManifoldFit, problem: ManifoldProblem) -> Described
         told.append(ConvergenceWarning(f"the fit did not converge in {most} iterations"))
     described = replace(fit, notes=tuple(notes), warnings=tuple(str(warning) for warning in told))
     return Described(described, tuple(told))
-
-
-def _listed(names: Sequence[str]) -> str:
-    return ", ".join(names)
 
 
 def _choice_notes(choices: Sequence[DofDamping]) -> list[str]:
@@ -87,25 +81,10 @@ def _noise_notes(problem: ManifoldProblem) -> list[str]:
             f"{problem.freq_hz.size / noise.inflation:.0f} independent ones"
         )
     if noise.outlying.size:
-        shown = _listed([f"{problem.freq_hz[i]:g}" for i in noise.outlying[:8]])
+        shown = listed([f"{problem.freq_hz[i]:g}" for i in noise.outlying[:8]])
         rest = f" and {noise.outlying.size - 8} more" if noise.outlying.size > 8 else ""
         told.append(f"lines with far more noise than their neighbours weigh less: {shown}{rest} Hz")
     return told
-
-
-def _significance_notes(fit: JointFit, intervals: dict[str, tuple[float, float]]) -> list[str]:
-    """Name damping and cross terms whose sign is not known."""
-    open_ = [one.name for one in fit.terms if one.kind != "k" and intervals[one.name][0] < 0 < intervals[one.name][1]]
-    return [f"{_listed(open_)}: not significantly different from zero (95 % interval)"] if open_ else []
-
-
-def _group_notes(result: JointEstimate, dofs: tuple[str, ...], cross: str) -> list[str]:
-    """Name groups of DOFs between which the FRFs are zero."""
-    if len(result.groups) < 2:
-        return []
-    names = " and ".join(f"({_listed([dofs[d] for d in group.dofs])})" for group in result.groups)
-    told = f"the FRFs between {names} are zero: each group is fitted separately"
-    return [told + (", and cross terms between them cannot be identified" if cross == "fit" else "")]
 
 
 def _untrusted_warnings(result: JointEstimate, dofs: tuple[str, ...]) -> list[str]:
@@ -115,7 +94,7 @@ def _untrusted_warnings(result: JointEstimate, dofs: tuple[str, ...]) -> list[st
     for group in result.groups:
         out, total = int(np.count_nonzero(~group.fit.trusted)), group.fit.trusted.size
         if out > _UNTRUSTED * total:
-            whose = f" of {_listed([dofs[d] for d in group.dofs])}" if several else ""
+            whose = f" of {listed([dofs[d] for d in group.dofs])}" if several else ""
             told.append(f"{out} of {total} lines{whose} do not fit the joint found within their noise and are left out")
     return told
 
@@ -174,7 +153,7 @@ def _misfit_warnings(found: ManifoldFit, problem: ManifoldProblem) -> list[str]:
 def _where(misfit: Misfit) -> str:
     if not misfit.local:
         return ""
-    places = _listed([f"{low:g}-{high:g} Hz ({100 * share:.0f} %)" for low, high, share in misfit.local])
+    places = listed([f"{low:g}-{high:g} Hz ({100 * share:.0f} %)" for low, high, share in misfit.local])
     return f"; the excess is local: {places}: bad lines, or local modes that the joint DOFs do not describe"
 
 
@@ -189,5 +168,5 @@ def _scatter_warnings(fit: JointFit, spread: Spread) -> list[str]:
     if not wide:
         return []
     return [
-        f"{_listed(wide)}: parts of the band scatter more than the noise explains; the intervals are widened by that"
+        f"{listed(wide)}: parts of the band scatter more than the noise explains; the intervals are widened by that"
     ]

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from jointfrf.dofs import Parameter
 from jointfrf.identification.compliance_fit.joint_terms import CrossTerms
+from jointfrf.identification.compliance_fit.least_squares import inverse_information
 from jointfrf.identification.manifold_fit.group_fit import GroupFit, GroupProblem, fit_dofs
 from jointfrf.identification.manifold_fit.interface_frfs import InterfaceFrfs
 from jointfrf.identification.manifold_fit.joint_terms import CoupledJoint, DiagonalJoint, JointCoordinates, JointTerms
-from jointfrf.identification.manifold_fit.line_forms import inverse_of_information
 from jointfrf.identification.manifold_fit.starts import first_joints
 from jointfrf.kernel.arguments import FloatArray
 
@@ -110,7 +110,7 @@ def assembled(terms: JointTerms, groups: list[FittedGroup]) -> JointEstimate:
     p = len(terms.parameters)
     theta, covariance = np.full(p, np.nan), np.zeros((p, p))
     for group in groups:
-        own = inverse_of_information(2 * group.fit.minimum.information)
+        own = inverse_information(2 * group.fit.minimum.information)
         x = group.fit.minimum.x.copy()
         if isinstance(group.joint, DiagonalJoint):
             # A stiffness beyond what the data can tell stays a number; its interval says that it is open.

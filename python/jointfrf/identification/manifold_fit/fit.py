@@ -58,7 +58,7 @@ class ManifoldFit(NamedTuple):
 
 
 def fit_manifold(problem: ManifoldProblem) -> ManifoldFit:
-    """Fit the joint by maximum likelihood in the compliance domain."""
+    """Fit the joint by maximum likelihood, linearised on the manifold of FRFs that fit it."""
     problem, result, choices = _fitted(problem)
     noise = problem.noise
     level, scale = noise.level, float(np.sqrt(result.excess))
@@ -86,16 +86,21 @@ def fit_manifold(problem: ManifoldProblem) -> ManifoldFit:
         intervals=LikelihoodIntervals(result, spread.factor),
     )
     misfit = diagnose(result, problem.freq_hz, noise.inflation)
-    return ManifoldFit(joint, result, spread, misfit, _cross_fits(problem, result, misfit), choices)
+    return ManifoldFit(joint, result, spread, misfit, _cross_fits(problem, result, misfit, choices), choices)
 
 
-def _cross_fits(problem: ManifoldProblem, result: JointEstimate, misfit: Misfit) -> bool:
+def _cross_fits(
+    problem: ManifoldProblem,
+    result: JointEstimate,
+    misfit: Misfit,
+    choices: tuple[DofDamping, ...],
+) -> bool:
     """Whether a fit with cross terms leaves a residual that is noise, where that without does not."""
     coupled = any(len(group.dofs) > 1 for group in result.groups)
     if problem.noise.is_assumed or problem.options.cross != "zero" or not (misfit.is_large and coupled):
         return False
     damping = problem.options.damping
-    words = "viscous" if damping == "auto" else damping
+    words = tuple(one.best for one in choices) if damping == "auto" else damping
     other = _estimate(problem, words, "fit")
     return bool(np.sqrt(other.excess) - 1 < (misfit.ratio - 1) / 4)
 

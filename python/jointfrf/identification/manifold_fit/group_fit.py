@@ -8,11 +8,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from jointfrf.identification.compliance_fit.least_squares import inverse_information
 from jointfrf.identification.manifold_fit.joint_terms import DiagonalJoint, JointCoordinates
 from jointfrf.identification.manifold_fit.line_forms import (
     FormMinimum,
     LineForms,
-    inverse_of_information,
     minimise_forms,
 )
 from jointfrf.identification.manifold_fit.manifold import LineData, OnManifold, normal_forms, project
@@ -142,7 +142,7 @@ def _from_softer(problem: GroupProblem, best: GroupFit) -> GroupFit:
     factor = 3.0
     while True:
         a = best.minimum.x[:n]
-        error = np.sqrt(np.diagonal(inverse_of_information(2 * best.minimum.information))[:n])
+        error = np.sqrt(np.diagonal(inverse_information(2 * best.minimum.information))[:n])
         softer = factor * np.maximum(a, error)
         barely = (error > _BARELY * a) & (softer < softest)
         if not barely.any():
@@ -176,7 +176,7 @@ def _iterate(problem: GroupProblem, start: FloatArray) -> GroupFit:
         forms, unknown = _used(problem, forms, of_smooth, c)
         forms = forms.scaled(trusted.astype(float))
         minimum = minimise_forms(forms, joint, x)
-        error = np.sqrt(np.maximum(np.diagonal(inverse_of_information(2 * minimum.information)), 1e-300))
+        error = np.sqrt(np.maximum(np.diagonal(inverse_information(2 * minimum.information)), 1e-300))
         # In standard errors along the direction of the step: what the data do not see may go anywhere.
         change = minimum.x - x
         moved = float(np.sqrt(abs(2 * (change @ minimum.information @ change))))

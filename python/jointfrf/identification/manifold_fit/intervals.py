@@ -7,9 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from scipy import optimize, stats
 
+from jointfrf.identification.compliance_fit.least_squares import inverse_information
 from jointfrf.identification.manifold_fit.estimator import FittedGroup, JointEstimate
 from jointfrf.identification.manifold_fit.joint_terms import DiagonalJoint
-from jointfrf.identification.manifold_fit.line_forms import LineForms, inverse_of_information, minimise_forms
+from jointfrf.identification.manifold_fit.line_forms import LineForms, minimise_forms
 from jointfrf.kernel.arguments import FloatArray
 
 __all__ = ["BLOCKS", "LikelihoodIntervals", "Spread", "block_jackknife", "profile_interval", "spread_of"]
@@ -70,7 +71,7 @@ def block_jackknife(group: FittedGroup, blocks: int = BLOCKS) -> FloatArray:
         own = lines[at == b]
         information = minimum.information - minimum.line_information[own].sum(axis=0)
         gradient = minimum.gradient - minimum.line_gradient[own].sum(axis=0)
-        change[b] = inverse_of_information(information) @ gradient
+        change[b] = inverse_information(information) @ gradient
     change -= change.mean(axis=0)
     covariance: FloatArray = (blocks - 1) / blocks * change.T @ change
     return covariance
@@ -97,7 +98,7 @@ def spread_of(found: JointEstimate, inflation: float, *, is_level_known: bool = 
     by_blocks = np.full_like(by_noise, np.nan)
     for group in found.groups:
         blocks = np.diagonal(block_jackknife(group))
-        own = np.diagonal(inverse_of_information(2 * group.fit.minimum.information))
+        own = np.diagonal(inverse_information(2 * group.fit.minimum.information))
         with np.errstate(divide="ignore", invalid="ignore"):
             by_blocks[group.which] = np.where(own > 0, blocks / own, np.nan)
     ratio = by_blocks / by_noise
@@ -151,7 +152,7 @@ class LikelihoodIntervals:
 def _limits(group: FittedGroup, i: int, factor: float, probability: float) -> tuple[float, float]:
     """Return the limits of one parameter of a group."""
     terms, x = group.joint.terms, group.fit.minimum.x
-    covariance = inverse_of_information(2 * group.fit.minimum.information) * factor
+    covariance = inverse_information(2 * group.fit.minimum.information) * factor
     reach = float(stats.norm.ppf((1 + probability) / 2))
     a = int(terms.pairs[i, 0])
     is_diagonal = isinstance(group.joint, DiagonalJoint)
@@ -198,7 +199,7 @@ def profile_interval(group: FittedGroup, index: int, factor: float, probability:
         start = group.fit.minimum.x
     best = minimise_forms(forms, joint, start)
     limit = stats.chi2.ppf(probability, 1) * factor / 2
-    error = np.sqrt(np.maximum(np.diagonal(inverse_of_information(2 * best.information)), 0) * factor)[index]
+    error = np.sqrt(np.maximum(np.diagonal(inverse_information(2 * best.information)), 0) * factor)[index]
     if not of_stiffness and _may_be_rigid(group, int(joint.dofs[index]), limit):
         # A rigid DOF shows no damping.
         return -np.inf, np.inf

@@ -9,7 +9,7 @@ import numpy as np
 from jointfrf.identification.manifold_fit.joint_terms import JointCoordinates
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
-__all__ = ["FormMinimum", "LineForms", "inverse_of_information", "minimise_forms"]
+__all__ = ["FormMinimum", "LineForms", "minimise_forms"]
 
 _STEPS = 100
 #: Levenberg's parameter: first value, factor where a step fails, largest value.
@@ -76,14 +76,6 @@ class FormMinimum(NamedTuple):
     gradient: FloatArray
     line_gradient: FloatArray
     line_information: FloatArray
-
-
-def inverse_of_information(information: FloatArray) -> FloatArray:
-    """Inverse of an information matrix of parameters of very different size; a pseudo-inverse where it has none."""
-    size = np.sqrt(np.maximum(np.diagonal(information), np.finfo(float).tiny))
-    outer = np.outer(size, size)
-    inverse: FloatArray = np.linalg.pinv(information / outer, hermitian=True) / outer
-    return inverse
 
 
 def _at(forms: LineForms, joint: JointCoordinates, x: FloatArray) -> tuple[float, ComplexArray, ComplexArray]:

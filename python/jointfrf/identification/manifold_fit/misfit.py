@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy import stats
 
+from jointfrf.identification.compliance_fit.least_squares import inverse_information
 from jointfrf.identification.manifold_fit.estimator import FittedGroup, JointEstimate
 from jointfrf.identification.manifold_fit.intervals import BLOCKS
-from jointfrf.identification.manifold_fit.line_forms import inverse_of_information
 from jointfrf.kernel.arguments import FloatArray
 
 __all__ = ["Misfit", "Trend", "diagnose"]
@@ -124,7 +124,7 @@ def _trends(group: FittedGroup, freq_hz: FloatArray, factor: float) -> list[Tren
     p = minimum.x.size
     if lines.size < BLOCKS * (p + 2):
         return []
-    whole = inverse_of_information(2 * minimum.information)
+    whole = inverse_information(2 * minimum.information)
     # In parameters, not in coordinates: where only k drifts, c/k does, and c does not.
     theta, slope = group.joint.theta(minimum.x), group.joint.theta_slope(minimum.x)
     parts = np.array_split(lines, BLOCKS)
@@ -134,7 +134,7 @@ def _trends(group: FittedGroup, freq_hz: FloatArray, factor: float) -> list[Tren
         size = np.sqrt(np.maximum(np.diagonal(information), np.finfo(float).tiny))
         if np.linalg.cond(information / np.outer(size, size)) > 1e8:
             continue
-        covariance = inverse_of_information(2 * information)
+        covariance = inverse_information(2 * information)
         step = 2 * covariance @ minimum.line_gradient[own].sum(axis=0)
         values[b] = group.joint.theta(minimum.x + step)
         with np.errstate(invalid="ignore"):

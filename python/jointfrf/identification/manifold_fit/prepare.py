@@ -12,29 +12,24 @@ from numpy.typing import ArrayLike, NDArray
 from jointfrf.frf.bands import Band, as_bands, in_bands
 from jointfrf.frf.noise_estimate import ZERO
 from jointfrf.frf.noise_model import estimate_noise
-from jointfrf.frf.smoothing import smooth_frfs
+from jointfrf.frf.smoothing import near_squares, smooth_frfs
 from jointfrf.identification.compliance_fit.joint_terms import CrossTerms, DampingTerms
 from jointfrf.identification.manifold_fit.interface_frfs import InterfaceFrfs
-from jointfrf.identification.prepare import BandsOfDofs
+from jointfrf.identification.prepare import BandsOfDofs, MeasuredFrfs, as_dof_names, as_transform
 from jointfrf.kernel.arguments import (
     ComplexArray,
     FloatArray,
-    as_frequency,
-    as_lines,
     as_number,
     as_real,
     check_choice,
-    check_finite_lines,
 )
 
 __all__ = [
-    "ChannelFrfs",
     "KnownNoise",
     "ManifoldOptions",
     "ManifoldProblem",
     "NoiseOptions",
     "Transforms",
-    "as_channel_frfs",
     "as_transforms",
     "prepare_manifold",
 ]
@@ -50,21 +45,6 @@ _LEAST_LEVEL = 1e-7
 
 
 @dataclass(frozen=True)
-class ChannelFrfs:
-    """Measured FRFs, finite, at least one line.
-
-    Attributes
-    ----------
-    freq_hz : ndarray, shape (n_freq,)
-    h : ndarray, shape (n_freq, m_r, m_f)
-        m/N.
-    """
-
-    freq_hz: FloatArray
-    h: ComplexArray
-
-
-@dataclass(frozen=True)
 class NoiseOptions:
     """What is known of the noise, as in `identify`."""
 
@@ -75,7 +55,7 @@ class NoiseOptions:
 
 @dataclass(frozen=True)
 class ManifoldOptions:
-    """Choices of a compliance fit, as in `identify`."""
+    """Choices of a fit on the manifold, as in `identify`."""
 
     damping: DampingTerms | Literal["auto"] | tuple[DampingTerms, ...]
     cross: CrossTerms
@@ -135,7 +115,7 @@ class KnownNoise:
 
 @dataclass(frozen=True)
 class ManifoldProblem:
-    """A compliance fit, ready to be computed: lines inside the bands only.
+    """A fit on the manifold, ready to be computed: lines inside the bands only.
 
     Attributes
     ----------
@@ -161,28 +141,18 @@ class ManifoldProblem:
     options: ManifoldOptions
 
 
-def as_channel_frfs(freq_hz: ArrayLike, gamma: ArrayLike) -> ChannelFrfs:
-    """Check measured FRFs and their frequencies."""
-    h = as_lines("gamma", gamma)
-    freq = as_frequency(freq_hz, h.shape[0])
-    if freq.size == 0:
-        raise ValueError("gamma has no frequency lines")
-    check_finite_lines("gamma", h, freq)
-    return ChannelFrfs(freq, h)
-
-
 def prepare_manifold(
-    measured: ChannelFrfs,
+    measured: MeasuredFrfs,
     dofs: Sequence[str] | None,
     bands: BandsOfDofs,
     transform: ArrayLike | tuple[ArrayLike, ArrayLike] | None,
     noise: NoiseOptions,
     options: ManifoldOptions,
 ) -> ManifoldProblem:
-    """Check the arguments of a compliance fit, find the noise, and keep the lines in the bands; as in `identify`."""
+    """Check the arguments of the fit, find the noise, and keep the lines in the bands; as in `identify`."""
     freq, h = measured.freq_hz, measured.h
     responses, forces = as_transforms(transform, h)
-    names = _as_names(dofs, responses.shape[0] // 2)
+    names = as_dof_names(dofs, responses.shape[0] // 2)
     if not isinstance(options.damping, str) and len(options.damping) != len(names):
         raise ValueError(f"damping must hold one word for each of {len(names)} DOFs, not {len(options.damping)}")
     own = as_bands(bands, names, freq)
@@ -245,7 +215,7 @@ def as_transforms(
             raise ValueError(
                 f"gamma has {m_r} responses and {m_f} forces: transform must be a pair, for responses and for forces"
             )
-        both = as_transform(transform, m_r, "transform" if transform is not None else "gamma")
+        both = as_transform(transform, m_r)
         return both, both
     if len(transform) != 2:
         raise ValueError(f"transform must be one matrix or a pair for responses and forces, not {len(transform)}")
@@ -257,17 +227,6 @@ def as_transforms(
             f"{forces.shape[0]}"
         )
     return responses, forces
-
-
-def as_transform(transform: ArrayLike | None, m: int, name: str) -> FloatArray:
-    """Check one transform, shape (2 n, m)."""
-    t = as_real(name, np.eye(m) if transform is None else transform, (None, m))
-    if t.shape[0] == 0 or t.shape[0] % 2:
-        raise ValueError(f"{name} must have an even number of rows, DOFs j, then k, not {t.shape[0]}")
-    if not t.any(axis=1).all():
-        row = int(np.flatnonzero(~t.any(axis=1))[0])
-        raise ValueError(f"{name}: row {row} is zero, so no channel shows this joint DOF")
-    return t
 
 
 def _is_symmetrised(h: ComplexArray) -> bool:
@@ -287,7 +246,7 @@ def _known_noise(
         level = as_number("noise", options.noise)
         if level <= 0:
             raise ValueError(f"noise must be positive, not {level:g}")
-        variance = _relative_variance(_local_size(h), level)
+        variance = _relative_variance(np.sqrt(near_squares(h)), level)
     else:
         variance = as_real("noise", options.noise, h.shape)
         if (variance <= 0).any():
@@ -315,17 +274,6 @@ def _estimated_noise(
     return transforms.gamma(_near(model.smooth.h, h, variance)), variance, known
 
 
-def _local_size(h: ComplexArray) -> FloatArray:
-    """Return the root mean square of |h| over a line and its neighbours."""
-    squares = abs(h) ** 2
-    total, count = squares.copy(), np.ones(len(h))
-    for one, other in ((slice(1, None), slice(None, -1)), (slice(None, -1), slice(1, None))):
-        total[one] += squares[other]
-        count[one] += 1
-    size: FloatArray = np.sqrt(total / count[:, None, None])
-    return size
-
-
 def _near(smooth: ComplexArray, h: ComplexArray, variance: FloatArray) -> ComplexArray:
     """Return smooth FRFs, and the measured ones on lines that smoothing misses by more than their noise."""
     squares = (abs(h - smooth) ** 2 / variance).mean(axis=(1, 2))
@@ -337,10 +285,3 @@ def _relative_variance(h: ComplexArray | FloatArray, level: float) -> FloatArray
     size = np.sqrt(np.maximum(abs(h) ** 2, np.median(abs(h) ** 2, axis=0) * ZERO**2 + (ZERO**2 * abs(h).max()) ** 2))
     variance: FloatArray = (level * size) ** 2
     return variance
-
-
-def _as_names(dofs: Sequence[str] | None, n: int) -> tuple[str, ...]:
-    names = tuple(str(i) for i in range(n)) if dofs is None else tuple(dofs)
-    if len(names) != n or len(set(names)) != n or not all(names) or any("," in name for name in names):
-        raise ValueError(f"dofs must name {n} different joint DOFs without commas, not {', '.join(names) or 'none'}")
-    return names
