@@ -8,7 +8,8 @@ from compliance_lines import exact_compliance, fitted, fitted_group, white
 from jointfrf.identification.manifold_fit.intervals import (
     BLOCKS,
     LikelihoodIntervals,
-    block_jackknife,
+    block_scatter,
+    line_scatter,
     profile_interval,
     spread_of,
 )
@@ -138,34 +139,62 @@ def test_both_kinds_of_interval_meet_where_one_follows_the_other():
         np.testing.assert_allclose(limits[name], profile_interval(found.groups[0], i, 1.0), rtol=0.04)
 
 
-def test_the_jackknife_of_a_mean_is_the_scatter_of_block_means():
+def test_the_scatter_of_equal_blocks_is_the_jackknife_of_their_means():
     """Lines of equal weight and one parameter: delete-one-block is the textbook formula."""
     rng = np.random.default_rng(4)
     of_block = 1e-6 * (1 + 0.1 * rng.standard_normal(BLOCKS))
     measured = np.repeat(of_block, FREQ.size // BLOCKS)[:, None].astype(complex)
-    group = fitted_group(SPRING, measured, 1e-8, np.array([1e6]))
-    expected = of_block.var(ddof=1) / BLOCKS
-    np.testing.assert_allclose(block_jackknife(group), [[expected]], rtol=1e-6)
+    variance, degrees = block_scatter(fitted_group(SPRING, measured, 1e-8, np.array([1e6])))
+    np.testing.assert_allclose(variance, [of_block.var(ddof=1) / BLOCKS], rtol=1e-6)
+    np.testing.assert_allclose(degrees, BLOCKS - 1)
 
 
-def test_the_jackknife_of_white_noise_is_on_average_that_of_the_noise():
+def test_a_block_with_all_the_information_leaves_no_degrees_of_freedom():
+    std = np.full((FREQ.size, 1), 1e-5)
+    std[40] = 1e-8
+    group = fitted_group(SPRING, 1e-6 + std * white(std.shape, 1), std, np.array([1e6]))
+    assert block_scatter(group)[1] < 0.1
+    assert line_scatter(group)[1] < 0.1
+    assert np.isfinite(
+        spread_of(fitted(SPRING, group.fit.forms.gradient * std**2, std, np.array([1e6])), 1.0).factor
+    ).all()
+
+
+@pytest.mark.parametrize(("scatter", "known_to"), [(block_scatter, 0.2), (line_scatter, 0.08)])
+def test_the_scatter_of_white_noise_is_on_average_that_of_the_noise(scatter, known_to):
     ratios = []
     for seed in range(150):
         group = group_of(0.05, seed)
         by_noise = np.diagonal(np.linalg.inv(2 * group.fit.minimum.information))
-        ratios.append(np.diagonal(block_jackknife(group)) / by_noise)
-    # One is known to sqrt(2/9) = 47 %, the mean of 150 to 4 %.
-    np.testing.assert_allclose(np.mean(ratios, axis=0), 1, atol=0.2)
+        ratios.append(scatter(group)[0] / by_noise)
+    # Of a variance of nine degrees of freedom one is known to 47 %, the mean of 150 to 4 %.
+    np.testing.assert_allclose(np.mean(ratios, axis=0), 1, atol=known_to)
 
 
-def test_too_few_lines_have_no_jackknife():
+def test_noise_of_one_direction_is_seen_between_lines():
+    """Real noise of a real compliance is all in the spring, none in its damping: twice and none of the variance."""
+    ratios, factors = [], []
+    terms = joint_terms(OMEGA, ["x"], "hysteretic", "zero")
+    for seed in range(60):
+        noise = np.random.default_rng(seed).standard_normal((FREQ.size, 1))
+        found = fitted(terms, 1e-6 + 1e-7 * noise, 1e-7, np.array([1e6, 0.0]))
+        by_noise = np.diagonal(np.linalg.inv(2 * found.groups[0].fit.minimum.information))
+        ratios.append(line_scatter(found.groups[0])[0] / by_noise)
+        factors.append(spread_of(found, 1.0).factor)
+    np.testing.assert_allclose(np.mean(factors, axis=0), [2, 1], atol=0.15)
+    np.testing.assert_allclose(np.mean(ratios, axis=0), [2, 0], atol=0.1)
+
+
+def test_too_few_lines_have_no_scatter_of_blocks():
     few = slice(0, 2 * BLOCKS - 1)
     terms = VISCOUS.on_lines(few)
     found = fitted(terms, *noisy(0.05, terms=terms), THETA)
-    assert np.isnan(block_jackknife(found.groups[0])).all()
+    variance, degrees = block_scatter(found.groups[0])
+    assert np.isnan(variance).all()
+    assert not degrees.any()
     spread = spread_of(found, 3.0)
     np.testing.assert_allclose(spread.factor, 3.0 * max(found.excess, 1.0))
-    assert np.isnan(spread.jackknife).all()
+    assert np.isnan(spread.blocks).all()
 
 
 def test_variances_take_the_correlation_and_a_residual_above_the_noise():
@@ -187,10 +216,12 @@ def test_white_noise_is_seldom_widened_by_blocks():
 
 
 def test_parts_of_the_band_that_disagree_widen_the_variance_of_what_they_disagree_on():
-    k_x = np.repeat([5e5, 7e5] * (BLOCKS // 2), FREQ.size // BLOCKS)
+    k_x = np.where(FREQ < 250, 5e5, 7e5)
     exact = 1 / np.stack([k_x + 1j * OMEGA * 150, 2e5 + 1j * OMEGA * 40], axis=1)
     std = 0.05 * abs(exact)
     spread = spread_of(fitted(VISCOUS, exact + std * white(exact.shape, 2), std, THETA), 1.0)
-    assert spread.factor[0] > 5 * spread.information[0]
-    assert spread.factor[0] >= spread.jackknife[0]
-    assert spread.jackknife[1] < 3
+    assert spread.factor[0] > 3 * spread.information[0]
+    assert spread.chance[0] < 1e-6
+    assert spread.chance[1] > 1e-3
+    assert spread.factor[0] >= spread.blocks[0]
+    assert spread.blocks[1] < 3

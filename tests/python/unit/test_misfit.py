@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from compliance_lines import exact_compliance, fitted, white
+from jointfrf.identification.manifold_fit.intervals import spread_of
 from jointfrf.identification.manifold_fit.joint_terms import joint_terms
 from jointfrf.identification.manifold_fit.misfit import Misfit, diagnose
 
@@ -21,6 +22,10 @@ def found(stiffness=None, offset=0.0, noise=NOISE, seed=0):
     return fitted(TERMS, exact + noise * abs(exact) * white(exact.shape, seed) + offset * std, std, THETA)
 
 
+def diagnosed(estimate, inflation, freq=FREQ):
+    return diagnose(estimate, freq, inflation, spread_of(estimate, inflation))
+
+
 def of_joint(k_x=THETA[0], c_x=THETA[2]):
     x = k_x + 1j * OMEGA * c_x
     return np.stack([x, THETA[1] + 1j * OMEGA * THETA[3]], axis=1)
@@ -28,7 +33,7 @@ def of_joint(k_x=THETA[0], c_x=THETA[2]):
 
 @pytest.mark.parametrize("seed", range(8))
 def test_nothing_is_found_where_the_model_is_right(seed):
-    misfit = diagnose(found(seed=seed), FREQ, 1.0)
+    misfit = diagnosed(found(seed=seed), 1.0)
     assert not misfit.is_large
     assert not misfit.is_small
     assert not misfit.local
@@ -37,21 +42,21 @@ def test_nothing_is_found_where_the_model_is_right(seed):
 
 def test_findings_by_chance_are_as_rare_as_said():
     """Of a hundred right models, trends at 0.1 % each and misfits beyond three sigma."""
-    told = [diagnose(found(seed=seed), FREQ, 1.0) for seed in range(100)]
+    told = [diagnosed(found(seed=seed), 1.0) for seed in range(100)]
     assert sum(bool(one.trends) for one in told) <= 1
     assert sum(one.is_large or one.is_small for one in told) <= 1
 
 
 def test_sigma_is_the_scatter_of_a_ratio_to_a_level_from_as_many_data():
     ratios = [np.sqrt(found(seed=s).excess / np.mean(abs(white(2 * FREQ.size, 1000 + s)) ** 2)) for s in range(300)]
-    sigma = diagnose(found(), FREQ, 1.0).sigma
+    sigma = diagnosed(found(), 1.0).sigma
     assert sigma == pytest.approx(np.std(ratios), rel=0.15)
-    assert diagnose(found(), FREQ, 4.0).sigma == pytest.approx(2 * sigma)
+    assert diagnosed(found(), 4.0).sigma == pytest.approx(2 * sigma)
 
 
 @pytest.mark.parametrize(("noise", "large"), [(1.5 * NOISE, True), (0.5 * NOISE, False)])
 def test_noise_that_is_not_what_it_was_said_to_be(noise, large):
-    misfit = diagnose(found(noise=noise), FREQ, 1.0)
+    misfit = diagnosed(found(noise=noise), 1.0)
     assert misfit.ratio == pytest.approx(noise / NOISE, rel=0.1)
     assert (misfit.is_large, misfit.is_small) == (large, not large)
     assert not misfit.local
@@ -68,7 +73,7 @@ def test_bad_lines_are_found_where_they_are():
     offset = np.zeros((FREQ.size, 2))
     offset[60:66] = 8.0 * np.array([1, -1])
     offset[150] = 6.0
-    misfit = diagnose(found(offset=offset), FREQ, 1.0)
+    misfit = diagnosed(found(offset=offset), 1.0)
     assert misfit.is_large
     (first, second) = misfit.local[:2]
     assert first[:2] == (FREQ[60], FREQ[65])
@@ -77,12 +82,12 @@ def test_bad_lines_are_found_where_they_are():
 
 
 def test_an_excess_on_all_lines_is_not_local():
-    assert not diagnose(found(stiffness=of_joint(k_x=np.linspace(4e5, 8e5, FREQ.size))), FREQ, 1.0).local
+    assert not diagnosed(found(stiffness=of_joint(k_x=np.linspace(4e5, 8e5, FREQ.size))), 1.0).local
 
 
 def test_a_stiffness_that_drifts_is_named_with_its_values():
     k_x = np.linspace(4.5e5, 7.5e5, FREQ.size)
-    (trend,) = diagnose(found(stiffness=of_joint(k_x=k_x)), FREQ, 1.0).trends
+    (trend,) = diagnosed(found(stiffness=of_joint(k_x=k_x)), 1.0).trends
     assert trend.name == "k_x"
     assert trend.probability < 1e-4
     np.testing.assert_allclose(trend.values, np.interp(trend.centres, FREQ, k_x), rtol=0.12)
@@ -90,7 +95,7 @@ def test_a_stiffness_that_drifts_is_named_with_its_values():
 
 
 def test_damping_that_drifts_is_named():
-    (trend,) = diagnose(found(stiffness=of_joint(c_x=np.linspace(80, 220, FREQ.size))), FREQ, 1.0).trends
+    (trend,) = diagnosed(found(stiffness=of_joint(c_x=np.linspace(80, 220, FREQ.size))), 1.0).trends
     assert trend.name == "c_x"
     assert trend.values[-1] > 1.3 * trend.values[0]
 
@@ -98,8 +103,8 @@ def test_damping_that_drifts_is_named():
 def test_a_drift_within_the_inflated_noise_is_chance():
     """Correlation between lines: as few independent ones say less."""
     estimate = found(stiffness=of_joint(k_x=np.linspace(5.8e5, 6.2e5, FREQ.size)))
-    assert [one.name for one in diagnose(estimate, FREQ, 1.0).trends] == ["k_x"]
-    assert not diagnose(estimate, FREQ, 20.0).trends
+    assert [one.name for one in diagnosed(estimate, 1.0).trends] == ["k_x"]
+    assert not diagnosed(estimate, 20.0).trends
 
 
 def test_too_few_lines_show_no_trend():
@@ -108,4 +113,4 @@ def test_too_few_lines_show_no_trend():
     exact = 1 / of_joint(k_x=np.linspace(4.5e5, 7.5e5, FREQ.size))[few]
     std = NOISE * abs(exact)
     estimate = fitted(terms, exact + std * white(exact.shape, 0), std, THETA)
-    assert not diagnose(estimate, FREQ[few], 1.0).trends
+    assert not diagnosed(estimate, 1.0, FREQ[few]).trends

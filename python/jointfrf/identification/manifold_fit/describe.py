@@ -15,14 +15,14 @@ from jointfrf.identification.manifold_fit.estimator import JointEstimate
 from jointfrf.identification.manifold_fit.fit import ManifoldFit
 from jointfrf.identification.manifold_fit.intervals import Spread
 from jointfrf.identification.manifold_fit.misfit import Misfit
-from jointfrf.identification.manifold_fit.prepare import ManifoldProblem
+from jointfrf.identification.manifold_fit.prepare import KnownNoise, ManifoldProblem
 
 __all__ = ["describe_manifold"]
 
 #: A parameter is called poorly determined when its interval is wider than this share of it.
 _UNCERTAIN = 0.5
-#: Variances that exceed those from noise by this factor are told; less is widened without a word.
-_WIDENED = 5.0
+#: Parts of the band that scatter so much are told; what may be chance widens the intervals without a word.
+_BY_CHANCE = 1e-3
 #: Relative noise below this is rounding.
 _ROUNDING = 1e-7
 #: Share of lines that cannot fit the joint from which on a warning says so.
@@ -40,6 +40,7 @@ def describe_manifold(found: ManifoldFit, problem: ManifoldProblem) -> Described
     notes = [
         *_choice_notes(found.choices),
         *_noise_notes(problem),
+        *_small_residual_notes(found.misfit, problem.noise),
         *group_notes([group.dofs for group in result.groups], fit.dofs, problem.options.cross),
         *significance_notes(fit),
     ]
@@ -85,6 +86,17 @@ def _noise_notes(problem: ManifoldProblem) -> list[str]:
         rest = f" and {noise.outlying.size - 8} more" if noise.outlying.size > 8 else ""
         told.append(f"lines with far more noise than their neighbours weigh less: {shown}{rest} Hz")
     return told
+
+
+def _small_residual_notes(misfit: Misfit, noise: KnownNoise) -> list[str]:
+    """Say that the residual is below the noise: intervals are then wider than they need be."""
+    if noise.is_assumed or not misfit.is_small:
+        return []
+    why = "said" if noise.model is None else "their reciprocity shows"
+    return [
+        f"the residual is {misfit.ratio:.2g} times the noise: the FRFs have less noise than {why}, or were smoothed; "
+        "the intervals are wider than they need be"
+    ]
 
 
 def _untrusted_warnings(result: JointEstimate, dofs: tuple[str, ...]) -> list[str]:
@@ -134,11 +146,6 @@ def _misfit_warnings(found: ManifoldFit, problem: ManifoldProblem) -> list[str]:
     if not problem.noise.is_assumed and misfit.is_large:
         text = f"the residual is {misfit.ratio:.2f} times the noise, {apart} above it: the joint does not fit the data"
         told.append(text + (_COUPLED if found.cross_fits else _where(misfit)))
-    if not problem.noise.is_assumed and misfit.is_small:
-        told.append(
-            f"the residual is {misfit.ratio:.2f} times the noise, {apart} below it: the noise is smaller than said, "
-            "or the FRFs were smoothed"
-        )
     if found.cross_fits:
         return told
     for trend in misfit.trends:
@@ -161,10 +168,8 @@ def _scatter_warnings(fit: JointFit, spread: Spread) -> list[str]:
     """Name parameters whose interval comes from the scatter between parts of the band."""
     if fit.noise_level < _ROUNDING:
         return []
-    wide = [
-        one.name for one, used, by_noise in zip(fit.terms, spread.factor, spread.information, strict=True)
-        if used > _WIDENED * by_noise
-    ]  # fmt: skip
+    clear = _BY_CHANCE / len(fit.terms)
+    wide = [one.name for one, chance in zip(fit.terms, spread.chance, strict=True) if chance < clear]
     if not wide:
         return []
     return [

@@ -74,7 +74,7 @@ def fit_manifold(problem: ManifoldProblem) -> ManifoldFit:
         covariance = result.covariance * np.outer(root, root)
     names = [one.name for one in result.parameters]
     joint = JointFit(
-        method="manifold",
+        method="compliance",
         dofs=problem.dofs,
         parameters=dict(zip(names, result.theta.tolist(), strict=True)),
         covariance=covariance,
@@ -85,7 +85,7 @@ def fit_manifold(problem: ManifoldProblem) -> ManifoldFit:
         bands=problem.bands,
         intervals=LikelihoodIntervals(result, spread.factor),
     )
-    misfit = diagnose(result, problem.freq_hz, noise.inflation)
+    misfit = diagnose(result, problem.freq_hz, noise.inflation, spread)
     return ManifoldFit(joint, result, spread, misfit, _cross_fits(problem, result, misfit, choices), choices)
 
 
@@ -160,4 +160,4 @@ def _estimate(
     with warnings.catch_warnings():
         # Lines on which noise hides the joint are ill-conditioned; they weigh little.
         warnings.simplefilter("ignore", IllConditionedWarning)
-        return estimate_on_manifold(problem.frfs, terms, cross, problem.used)
+        return estimate_on_manifold(problem.frfs, terms, cross, problem.used, problem.near)

@@ -9,7 +9,7 @@ from scipy import stats
 
 from jointfrf.identification.compliance_fit.least_squares import inverse_information
 from jointfrf.identification.manifold_fit.estimator import FittedGroup, JointEstimate
-from jointfrf.identification.manifold_fit.intervals import BLOCKS
+from jointfrf.identification.manifold_fit.intervals import BLOCKS, Spread
 from jointfrf.kernel.arguments import FloatArray
 
 __all__ = ["Misfit", "Trend", "diagnose"]
@@ -73,7 +73,7 @@ class Misfit(NamedTuple):
         return self.ratio < 1 - _SIGMA * self.sigma
 
 
-def diagnose(found: JointEstimate, freq_hz: FloatArray, inflation: float) -> Misfit:
+def diagnose(found: JointEstimate, freq_hz: FloatArray, inflation: float, spread: Spread) -> Misfit:
     """Compare the residual with the noise.
 
     Parameters
@@ -83,6 +83,8 @@ def diagnose(found: JointEstimate, freq_hz: FloatArray, inflation: float) -> Mis
         Hz.
     inflation : float
         By how much correlation between lines makes the variance of a mean larger.
+    spread : Spread
+        Variance factors of the parameters.
 
     Notes
     -----
@@ -92,7 +94,8 @@ def diagnose(found: JointEstimate, freq_hz: FloatArray, inflation: float) -> Mis
     """
     sigma = float(np.sqrt(2 * inflation / max(found.equations, 1.0)) / 2)
     ratio = float(np.sqrt(found.excess))
-    trends = tuple(t for group in found.groups for t in _trends(group, freq_hz, inflation * max(found.excess, 1.0)))
+    factor = np.fmax(np.maximum(spread.information, inflation), spread.lines)
+    trends = tuple(t for group in found.groups for t in _trends(group, freq_hz, factor[group.which]))
     misfit = Misfit(ratio, sigma, (), trends)
     return misfit._replace(local=_local(found, freq_hz)) if misfit.is_large else misfit
 
@@ -117,7 +120,7 @@ def _local(found: JointEstimate, freq_hz: FloatArray) -> tuple[tuple[float, floa
     return tuple(sorted(told, key=lambda run: -run[2])[:5])
 
 
-def _trends(group: FittedGroup, freq_hz: FloatArray, factor: float) -> list[Trend]:
+def _trends(group: FittedGroup, freq_hz: FloatArray, factor: FloatArray) -> list[Trend]:
     """Return the parameters that parts of the band disagree on."""
     minimum, terms = group.fit.minimum, group.joint.terms
     lines = np.flatnonzero(group.fit.trusted)
