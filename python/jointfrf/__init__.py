@@ -46,6 +46,7 @@ from jointfrf.frf.smoothing import SmoothFrfs, smooth_frfs
 from jointfrf.identification.identify import identify
 from jointfrf.identification.joint_fit import JointFit
 from jointfrf.identification.monte_carlo import BandStatistics, MonteCarlo, monte_carlo
+from jointfrf.identification.realisations import identify_realisations
 from jointfrf.identification.sensitivity import propose_bands, sensitivity
 from jointfrf.joint import Joint
 from jointfrf.kernel.call import VERSION
@@ -138,6 +139,7 @@ __all__ = [
     "get_engine",
     "has_peak",
     "identify",
+    "identify_realisations",
     "impact_consistency",
     "in_bands",
     "interface",

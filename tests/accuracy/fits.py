@@ -59,7 +59,7 @@ def one_draw(trial: Trial, seed: int) -> Draw:
     start = time.perf_counter()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        fit = jf.identify(freq, gamma, joint.dofs, "manifold", damping="viscous", cross=trial.cross)
+        fit = jf.identify(freq, gamma, joint.dofs, damping="viscous", cross=trial.cross)
         intervals = fit.confidence_interval(0.95)
     return Draw(fit.parameters, intervals, time.perf_counter() - start)
 

@@ -8,16 +8,14 @@ from typing import get_args
 import numpy as np
 
 from jointfrf.errors import ConvergenceWarning, FrfCheckWarning, IdentificationWarning, IllConditionedWarning
-from jointfrf.identification.compliance_fit.estimator import estimate, joint_basis
 from jointfrf.identification.identify import IdentificationMethod, identify
 from jointfrf.identification.joint_fit import JointFit
+from jointfrf.identification.realisations import identify_realisations
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
 __all__ = ["METHODS", "fit_measured", "fit_viscous"]
 
-METHODS: tuple[str, ...] = tuple(method for method in get_args(IdentificationMethod) if method != "manifold")
-#: Standard errors by which a fitted parameter may still move: far less than realisations differ.
-_TOLERANCE = 0.5
+METHODS: tuple[str, ...] = get_args(IdentificationMethod)
 #: Relative noise for the weights of a fit to data whose noise is not asked for.
 _ASSUMED = 0.01
 
@@ -39,10 +37,8 @@ def fit_viscous(freq_hz: FloatArray, dofs: tuple[str, ...], gammas: ComplexArray
     ndarray, shape (r, 2 n)
         Stiffness of all DOFs, then damping.
     """
-    basis = joint_basis(2 * np.pi * freq_hz, dofs, "viscous", "zero")
-    # One realisation at a time: a slow one does not hold up others, and all stays in the processor's cache.
-    fits = [estimate(one[None], np.eye(2 * len(dofs)), basis, tolerance=_TOLERANCE).theta for one in gammas]
-    return np.concatenate(fits)
+    fits = identify_realisations(freq_hz, gammas, dofs, damping="viscous")
+    return np.array([[*fit.stiffness, *fit.damping] for fit in fits])
 
 
 def fit_measured(freq_hz: FloatArray, dofs: tuple[str, ...], h: ComplexArray, transform: FloatArray) -> JointFit:

@@ -23,7 +23,7 @@ from jointfrf.io.cards import CardFormat
 
 __all__ = ["add_arguments", "run"]
 
-_METHODS = ("compliance", "manifold", "inverse-substructuring")
+_METHODS = ("compliance", "inverse-substructuring")
 
 
 def _methods(text: str) -> list[str]:

@@ -28,6 +28,8 @@ _MOST_TAKEN = 0.8
 _MOST_TURNS = 4
 _SETTLED = 1.5
 _SETTLED_SHARE = 0.97
+#: The residual about smooth FRFs with the poles of others is this many times their noise at most.
+_LIKE = 1.2
 _TINY = float(np.finfo(float).tiny)
 
 
@@ -80,6 +82,16 @@ class NoiseModel:
         """Numbers of the outlying lines."""
         return np.flatnonzero(self.line_factor > 1)
 
+    def in_order(self, lines: NDArray[np.intp]) -> NoiseModel:
+        """Return the same with lines in this order."""
+        return replace(
+            self,
+            variance=self.variance[lines],
+            line_level=self.line_level[lines],
+            line_factor=self.line_factor[lines],
+            smooth=self.smooth.in_order(lines),
+        )
+
     @property
     def level(self) -> float:
         """Median of the noise relative to the FRFs, over entries that are not zero and lines."""
@@ -98,6 +110,7 @@ def estimate_noise(
     coherence: ArrayLike | None = None,
     averages: float | None = None,
     max_poles: int = 60,
+    like: NoiseModel | None = None,
 ) -> NoiseModel:
     """Estimate the noise of measured FRFs, and smooth them.
 
@@ -115,6 +128,9 @@ def estimate_noise(
         Number of averages behind the coherence; 1 if it is not given, `coherence_factor` then holds 1/sqrt(averages).
     max_poles : int
         As in `smooth_frfs`.
+    like : NoiseModel, optional
+        Of other FRFs of the same structure on the same lines, such as another realisation: its poles and variances are
+        the first ones, which saves most of the search. It is not used where it does not describe these FRFs.
 
     Returns
     -------
@@ -145,35 +161,31 @@ def estimate_noise(
     freq, lines = checked_frfs(freq_hz, h)
     given = _coherence_variance(lines, coherence, averages)
     up = np.argsort(freq)
-    model = _estimated(freq[up], lines[up], None if given is None else given[up], max_poles, reciprocal=reciprocal)
-    back = np.argsort(up)
-    return replace(
-        model,
-        variance=model.variance[back],
-        line_level=model.line_level[back],
-        line_factor=model.line_factor[back],
-        smooth=model.smooth.in_order(back),
-    )
+    sorted_given = None if given is None else given[up]
+    before = None if like is None or like.variance.shape != lines.shape else like.in_order(up)
+    model = _estimated(freq[up], lines[up], sorted_given, max_poles, before, reciprocal=reciprocal)
+    return model.in_order(np.argsort(up))
 
 
 def _estimated(
-    freq: FloatArray, lines: ComplexArray, given: FloatArray | None, max_poles: int, *, reciprocal: bool
+    freq: FloatArray,
+    lines: ComplexArray,
+    given: FloatArray | None,
+    max_poles: int,
+    like: NoiseModel | None,
+    *,
+    reciprocal: bool,
 ) -> NoiseModel:
     """Noise model of checked FRFs, lines in rising order."""
     differences = reciprocity_differences(lines) if reciprocal else None
-    inflation = None
-    if differences is None:
-        variance = first_variance(lines)
-    else:
-        variance = np.maximum(differences.variance_of_parts(near_squares(lines)), _TINY)
-        inflation = differences.inflation(variance, differences.line_levels(variance).factor)
-        levels = differences.line_levels(variance, inflation)
-        variance *= (levels.usual * levels.factor)[:, None, None]
     patience = 2 if differences is None else 1  # a worse start
-    smooth = smoothed(freq, lines, variance, OrderSearch(inflation, max_poles, patience), reciprocal=reciprocal)
+    begun = None if like is None else _begun_like(freq, lines, like, max_poles, reciprocal=reciprocal)
+    smooth, variance, inflation = begun or _begun(
+        freq, lines, differences, OrderSearch(None, max_poles, patience), reciprocal=reciprocal
+    )
     if not smooth.is_smooth:
         return _without_smoothing(lines, smooth, reciprocal=reciprocal)
-    for _ in range(_MOST_TURNS):
+    for _ in range(0 if begun else _MOST_TURNS):
         model = _model(lines, smooth, given, inflation or 1.0, differences, robust=True)
         inflation, _ = _found_inflation(lines, differences, model)
         before, variance = variance, np.maximum(model.variance, _TINY)
@@ -185,6 +197,39 @@ def _estimated(
     model = _model(lines, smooth, given, inflation or 1.0, differences, robust=False)
     inflation, source = _found_inflation(lines, differences, model)
     return replace(model, inflation=inflation, inflation_source=source)
+
+
+def _begun(
+    freq: FloatArray,
+    lines: ComplexArray,
+    differences: ReciprocityDifferences | None,
+    search: OrderSearch,
+    *,
+    reciprocal: bool,
+) -> tuple[SmoothFrfs, FloatArray, float | None]:
+    """Return first smooth FRFs, with the variance and inflation they were found with."""
+    inflation = None
+    if differences is None:
+        variance = first_variance(lines)
+    else:
+        variance = np.maximum(differences.variance_of_parts(near_squares(lines)), _TINY)
+        inflation = differences.inflation(variance, differences.line_levels(variance).factor)
+        levels = differences.line_levels(variance, inflation)
+        variance *= (levels.usual * levels.factor)[:, None, None]
+    smooth = smoothed(freq, lines, variance, replace(search, inflation=inflation), reciprocal=reciprocal)
+    return smooth, variance, inflation
+
+
+def _begun_like(
+    freq: FloatArray, lines: ComplexArray, like: NoiseModel, max_poles: int, *, reciprocal: bool
+) -> tuple[SmoothFrfs, FloatArray, float | None] | None:
+    """Return smooth FRFs with the poles of others, relocated; None where these leave more than noise like theirs."""
+    if not like.smooth.is_smooth:
+        return None
+    variance = np.maximum(like.variance, _TINY)
+    search = OrderSearch(like.inflation, max_poles, 0)
+    smooth = smoothed(freq, lines, variance, search, reciprocal=reciprocal, start=like.smooth.poles)
+    return (smooth, variance, like.inflation) if smooth.is_smooth and smooth.level < _LIKE else None
 
 
 def _alike(before: FloatArray, variance: FloatArray) -> bool:

@@ -157,7 +157,7 @@ def smoothed(
     reciprocal: bool,
     start: tuple[ComplexArray, ...] = (),
 ) -> SmoothFrfs:
-    """Smooth checked FRFs, lines in rising order, as `smooth_frfs` does; poles `start` are in rad/s."""
+    """Smooth checked FRFs, lines in rising order, as `smooth_frfs` does; poles `start` of each group are in rad/s."""
     n_freq, n_out, n_in = h.shape
     measured = SmoothFrfs(freq, h, False, (), 1.0, np.zeros((n_out, n_in)))
     if n_freq < _FEWEST_LINES or not h.any():
@@ -165,8 +165,9 @@ def smoothed(
     unit = 2 * np.pi * freq.max()
     values, share, fits = np.zeros_like(h), np.zeros((1, n_out, n_in)), []
     squares = freedom = exactness = 0.0
-    for number, group in enumerate(entry_groups(h, reciprocal=reciprocal)):
-        before = start[number] / unit if start else None
+    groups = entry_groups(h, reciprocal=reciprocal)
+    for number, group in enumerate(groups):
+        before = start[number] / unit if len(start) == len(groups) else None
         entries, fit = _smooth_group(freq, h, variance, group, search, before)
         parameters = entries.n_parameters(len(fit.poles))
         squares, freedom = squares + fit.squares, freedom + entries.n_data - parameters

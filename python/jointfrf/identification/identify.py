@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 from jointfrf.channels.check.check import check_frfs, warn_of_frfs
 from jointfrf.channels.check.finding import FrfCheck
 from jointfrf.identification.compliance_fit.joint_terms import CrossTerms, DampingTerms
-from jointfrf.identification.describe import Described, describe_band_mean, describe_compliance
-from jointfrf.identification.fit import fit_band_mean, fit_compliance
+from jointfrf.identification.describe import Described, describe_band_mean
+from jointfrf.identification.fit import fit_band_mean
 from jointfrf.identification.joint_fit import JointFit
 from jointfrf.identification.manifold_fit.describe import describe_manifold
 from jointfrf.identification.manifold_fit.fit import fit_manifold
@@ -23,18 +23,16 @@ from jointfrf.identification.manifold_fit.prepare import (
 )
 from jointfrf.identification.prepare import (
     BandsOfDofs,
-    ComplianceOptions,
     MeasuredFrfs,
     as_measured,
     prepare_band_mean,
-    prepare_compliance,
 )
 from jointfrf.kernel.arguments import FloatArray, check_choice
 from jointfrf.substructuring.methods import JointFrfs, StiffnessMethod
 
 __all__ = ["IdentificationMethod", "identify"]
 
-IdentificationMethod = Literal["compliance", "manifold", StiffnessMethod]
+IdentificationMethod = Literal["compliance", StiffnessMethod]
 _METHODS: tuple[IdentificationMethod, ...] = get_args(IdentificationMethod)
 
 
@@ -46,7 +44,7 @@ def identify(
     bands: BandsOfDofs = None,
     *,
     transform: ArrayLike | tuple[ArrayLike, ArrayLike] | None = None,
-    damping: DampingTerms | Literal["auto"] | Sequence[DampingTerms] = "viscous",
+    damping: DampingTerms | Literal["auto"] | Sequence[DampingTerms] = "auto",
     cross: CrossTerms = "zero",
     noise: float | ArrayLike | None = None,
     coherence: ArrayLike | None = None,
@@ -153,7 +151,7 @@ def identify(
     (True, True)
     """
     check_choice("method", method, _METHODS)
-    if method == "manifold":
+    if method == "compliance":
         words = damping if isinstance(damping, str) else tuple(damping)
         problem = prepare_manifold(
             as_measured(freq_hz, gamma, square=False), dofs, bands, transform,
@@ -164,27 +162,15 @@ def identify(
             warn_of_frfs(_checked(MeasuredFrfs(problem.freq_hz, problem.frfs.measured), problem.dofs, transforms))
         return _warned(describe_manifold(fit_manifold(problem), problem))
     if coherence is not None or averages is not None:
-        raise ValueError("coherence and averages are for method 'manifold'")
+        raise ValueError("coherence and averages are for method 'compliance'")
     if isinstance(transform, tuple):
-        raise ValueError("a pair of transforms, for responses and for forces, is for method 'manifold'")
-    measured = as_measured(freq_hz, gamma)
-    if method == "compliance":
-        if not isinstance(damping, str):
-            raise ValueError("damping of each DOF by itself is for method 'manifold'")
-        options = ComplianceOptions(damping, cross, reciprocal)
-        lines = prepare_compliance(measured, dofs, bands, transform, noise, options)
-        if reciprocal:
-            transforms = None if transform is None else (lines.transform, lines.transform)
-            warn_of_frfs(_checked(MeasuredFrfs(lines.freq_hz, lines.measured), lines.dofs, transforms))
-        described = describe_compliance(fit_compliance(lines), cross)
-    else:
-        known = JointFrfs(
-            alpha=alpha, k_initial=k_initial, h_a=h_a, h_b=h_b,
-            dofs_j=dofs_j, dofs_k=dofs_k, dofs_r=dofs_r, dofs_s=dofs_s,
-        )  # fmt: skip
-        means = prepare_band_mean(method, measured, known, dofs, bands, transform)
-        described = describe_band_mean(fit_band_mean(means))
-    return _warned(described)
+        raise ValueError("a pair of transforms, for responses and for forces, is for method 'compliance'")
+    known = JointFrfs(
+        alpha=alpha, k_initial=k_initial, h_a=h_a, h_b=h_b,
+        dofs_j=dofs_j, dofs_k=dofs_k, dofs_r=dofs_r, dofs_s=dofs_s,
+    )  # fmt: skip
+    means = prepare_band_mean(method, as_measured(freq_hz, gamma), known, dofs, bands, transform)
+    return _warned(describe_band_mean(fit_band_mean(means)))
 
 
 def _warned(described: Described) -> JointFit:

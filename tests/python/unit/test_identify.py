@@ -71,16 +71,17 @@ def test_a_given_noise_level_and_given_variances_are_used(beams):
     assert level.std_error["k_y"] == pytest.approx(2 * free.std_error["k_y"], rel=0.15)
     variances = (0.01 * abs(beams.gamma(beams.joint))) ** 2
     given = jf.identify(beams.freq, measured, ["y", "theta"], noise=variances)
-    assert given.residual_level == pytest.approx(1, rel=0.15)
-    assert given.std_error["k_theta"] == pytest.approx(free.std_error["k_theta"], rel=0.15)
+    assert given.residual_level == pytest.approx(0.01, rel=0.15)
+    assert given.std_error["k_theta"] == pytest.approx(free.std_error["k_theta"], rel=0.3)
     assert given.parameters["k_theta"] == pytest.approx(free.parameters["k_theta"], rel=0.02)
 
 
-def test_reciprocal_data_take_their_noise_from_the_residual(beams):
+def test_noise_of_reciprocal_data_is_found_from_what_smooth_frfs_leave(beams):
     measured = jf.pollute(beams.gamma(beams.joint), 0.01, seed=3, reciprocal=True)
     measured = (measured + measured.swapaxes(1, 2)) / 2
     fit = jf.identify(beams.freq, measured, ["y", "theta"])
-    assert "taken from the residual" in fit.notes[-1]
+    # Mean of two measurements, off the diagonal.
+    assert 0.007 < fit.noise_level < 0.011
     low, high = fit.confidence_interval(0.999)["k_theta"]
     assert low < 5e3 < high
 
@@ -88,14 +89,11 @@ def test_reciprocal_data_take_their_noise_from_the_residual(beams):
 def test_damping_terms_that_the_data_support(beams):
     hysteretic = jf.Joint([6e5, 5e3], dofs=["y", "theta"], loss_factor=[0.3, 0.4])
     both = jf.Joint([6e5, 5e3], [40, 3], ["y", "theta"], [0.3, 0.4])
-    for joint, expected in (
-        (beams.joint, "damping viscous"),
-        (hysteretic, "damping hysteretic"),
-        (both, "damping both"),
-    ):
+    for joint, expected in ((beams.joint, "viscous"), (hysteretic, "hysteretic"), (both, "both")):
         measured = jf.pollute(beams.gamma(joint), 0.005, seed=1)
-        fit = jf.identify(beams.freq, measured, ["y", "theta"], damping="auto")
-        assert any(note.startswith(expected) for note in fit.notes), (expected, fit.notes)
+        fit = jf.identify(beams.freq, measured, ["y", "theta"])
+        for dof in ("y", "theta"):
+            assert any(note.startswith(f"damping of {dof}: {expected},") for note in fit.notes), fit.notes
     np.testing.assert_allclose(fit.loss_factor, [0.3, 0.4], atol=0.06)
     assert fit.unit("h_theta") == "N m/rad"
 
@@ -137,14 +135,6 @@ def test_points_instead_of_dofs(beams):
         beams.freq, measured, ["y", "theta"], "inverse-substructuring", BANDS, transform=np.linalg.inv(points)
     )
     assert np.isfinite(same.stiffness).all()
-
-
-def test_nearly_singular_interface_is_told(beams):
-    few = jf.pollute(beams.gamma(beams.joint), 0.9, seed=4)
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        jf.identify(beams.freq, few, ["y", "theta"])
-    assert any("gamma_jk is nearly singular" in str(w.message) for w in caught)
 
 
 def test_the_table_and_the_dictionary_say_the_same(beams):
@@ -222,7 +212,7 @@ def test_one_line_is_enough_for_one_complex_stiffness(chains):
 
 
 def test_six_dofs_of_a_structure_with_many_modes():
-    """Lines on which the noise hides the joint are left out, and the rest suffice: the fit stays on its feet."""
+    """Most lines hide the joint in noise, and no line is left out for that."""
     freq = np.arange(20.0, 620.0)
     stiffness = np.array([1e6, 2e6, 5e5, 1e6, 3e6, 8e5])
     damping = np.array([50.0, 20.0, 30.0, 10.0, 40.0, 20.0])
@@ -236,19 +226,12 @@ def test_six_dofs_of_a_structure_with_many_modes():
     exact = jf.couple(*sides, joint.dynamic_stiffness(freq), range(6), range(6), freq_hz=freq)
     measured = jf.pollute(exact, 0.02, seed=1)
     for cross in ("zero", "ignore", "fit"):
-        with pytest.warns(jf.IdentificationWarning, match="only the other .* are used"):
-            fit = jf.identify(freq, measured, cross=cross)
+        fit = jf.identify(freq, measured, cross=cross)
+        assert not fit.warnings
         assert fit.residual_level == pytest.approx(0.02, rel=0.1)
         errors = np.array([fit.std_error[f"k_{i}"] for i in range(6)])
         assert (abs(fit.stiffness - stiffness) < 4 * errors).all()
         assert (errors < 0.02 * stiffness).all()
-
-
-def test_a_few_lost_lines_are_noted(beams):
-    fit = jf.identify(beams.freq, jf.pollute(beams.gamma(beams.joint), 0.05, seed=3), ["y", "theta"])
-    assert any("lines are left out" in note for note in fit.notes)
-    for name, (low, high) in fit.confidence_interval(0.999).items():
-        assert low < TRUTH[name] < high
 
 
 def test_two_bands_are_not_taken_for_neighbours(beams):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -13,6 +14,7 @@ from jointfrf.identification.compliance_fit.least_squares import inverse_informa
 from jointfrf.identification.manifold_fit.group_fit import GroupFit, GroupProblem, fit_dofs
 from jointfrf.identification.manifold_fit.interface_frfs import InterfaceFrfs
 from jointfrf.identification.manifold_fit.joint_terms import CoupledJoint, DiagonalJoint, JointCoordinates, JointTerms
+from jointfrf.identification.manifold_fit.manifold import LineData
 from jointfrf.identification.manifold_fit.starts import first_joints
 from jointfrf.kernel.arguments import FloatArray
 
@@ -75,7 +77,11 @@ class JointEstimate(NamedTuple):
 
 
 def estimate_on_manifold(
-    frfs: InterfaceFrfs, terms: JointTerms, cross: CrossTerms = "zero", used: NDArray[np.bool_] | None = None
+    frfs: InterfaceFrfs,
+    terms: JointTerms,
+    cross: CrossTerms = "zero",
+    used: NDArray[np.bool_] | None = None,
+    near: JointEstimate | None = None,
 ) -> JointEstimate:
     """Fit a joint to FRFs whose noise is known.
 
@@ -88,16 +94,26 @@ def estimate_on_manifold(
         Whether cross terms of C that are not sought are zero, or unknown.
     used : ndarray of bool, shape (n_freq, n), optional
         Lines used for each DOF; all by default.
+    near : JointEstimate, optional
+        Of other FRFs of the same structure: where the fits start first.
     """
     groups = []
+    known = {} if near is None else {tuple(group.dofs.tolist()): group for group in near.groups}
     for dofs in frfs.groups():
         own, which = terms.of_dofs(dofs)
         data = frfs.of_dofs(dofs)
         joint = coordinates_of(own)
         problem = GroupProblem(data, joint, _unknown(dofs, cross, used, len(data.measured)))
-        fit = fit_dofs(problem, first_joints(data, joint))
+        fit = fit_dofs(problem, _starts(data, joint, known.get(tuple(dofs.tolist()))))
         groups.append(FittedGroup(dofs, which, joint, problem, fit))
     return assembled(terms, groups)
+
+
+def _starts(data: LineData, joint: JointCoordinates, near: FittedGroup | None) -> Iterator[FloatArray]:
+    """Return first joints: that of other FRFs, where it has the same parameters and converged, then those of these."""
+    if near is not None and near.fit.converged and near.joint.terms.parameters == joint.terms.parameters:
+        yield near.fit.minimum.x
+    yield from first_joints(data, joint)
 
 
 def coordinates_of(terms: JointTerms) -> JointCoordinates:

@@ -11,9 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from jointfrf.frf.bands import Band, as_bands, in_bands
 from jointfrf.frf.noise_estimate import ZERO
-from jointfrf.frf.noise_model import estimate_noise
+from jointfrf.frf.noise_model import NoiseModel, estimate_noise
 from jointfrf.frf.smoothing import near_squares, smooth_frfs
 from jointfrf.identification.compliance_fit.joint_terms import CrossTerms, DampingTerms
+from jointfrf.identification.manifold_fit.estimator import JointEstimate
 from jointfrf.identification.manifold_fit.interface_frfs import InterfaceFrfs
 from jointfrf.identification.prepare import BandsOfDofs, MeasuredFrfs, as_dof_names, as_transform
 from jointfrf.kernel.arguments import (
@@ -46,11 +47,12 @@ _LEAST_LEVEL = 1e-7
 
 @dataclass(frozen=True)
 class NoiseOptions:
-    """What is known of the noise, as in `identify`."""
+    """What is known of the noise, as in `identify` and `estimate_noise`."""
 
     noise: float | ArrayLike | None = None
     coherence: ArrayLike | None = None
     averages: float | None = None
+    like: NoiseModel | None = None
 
 
 @dataclass(frozen=True)
@@ -105,12 +107,15 @@ class KnownNoise:
         Whether the level is only a guess, to be replaced by that of the residual.
     outlying : ndarray of int
         Lines whose noise is far above that of the others.
+    model : NoiseModel, optional
+        Noise of the channels, where it was found from their FRFs.
     """
 
     level: float
     inflation: float
     is_assumed: bool
     outlying: NDArray[np.intp]
+    model: NoiseModel | None = None
 
 
 @dataclass(frozen=True)
@@ -130,6 +135,8 @@ class ManifoldProblem:
     bands : tuple
         For each DOF its bands, (low, high) in Hz.
     options : ManifoldOptions
+    near : JointEstimate, optional
+        Of other FRFs of the same structure: where the fit starts first.
     """
 
     dofs: tuple[str, ...]
@@ -139,6 +146,7 @@ class ManifoldProblem:
     used: NDArray[np.bool_]
     bands: tuple[tuple[Band, ...], ...]
     options: ManifoldOptions
+    near: JointEstimate | None = None
 
 
 def prepare_manifold(
@@ -263,14 +271,16 @@ def _estimated_noise(
     freq: FloatArray, h: ComplexArray, options: NoiseOptions, transforms: Transforms, *, reciprocal: bool
 ) -> tuple[ComplexArray, FloatArray, KnownNoise]:
     """Find smooth FRFs and noise of the channels from the FRFs themselves."""
-    model = estimate_noise(freq, h, reciprocal=reciprocal, coherence=options.coherence, averages=options.averages)
+    model = estimate_noise(
+        freq, h, reciprocal=reciprocal, coherence=options.coherence, averages=options.averages, like=options.like
+    )
     # Below this, what looks like noise is rounding.
     is_assumed = model.source == "none" or model.level < _LEAST_LEVEL
     least = _ASSUMED_LEVEL if is_assumed else _LEAST_LEVEL
     variance = _relative_variance(model.smooth.h, least)
     if not is_assumed:
         variance = np.maximum(model.variance, variance)
-    known = KnownNoise(least if is_assumed else model.level, model.inflation, is_assumed, model.outlying)
+    known = KnownNoise(least if is_assumed else model.level, model.inflation, is_assumed, model.outlying, model)
     return transforms.gamma(_near(model.smooth.h, h, variance)), variance, known
 
 

@@ -1,0 +1,81 @@
+"""Joints from many sets of FRFs of one structure: repeated measurements, realisations of noise."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Literal
+
+from numpy.typing import ArrayLike
+
+from jointfrf.identification.compliance_fit.joint_terms import CrossTerms, DampingTerms
+from jointfrf.identification.joint_fit import JointFit
+from jointfrf.identification.manifold_fit.describe import describe_manifold
+from jointfrf.identification.manifold_fit.fit import fit_manifold
+from jointfrf.identification.manifold_fit.prepare import ManifoldOptions, NoiseOptions, prepare_manifold
+from jointfrf.identification.prepare import BandsOfDofs, as_measured
+
+__all__ = ["identify_realisations"]
+
+
+def identify_realisations(
+    freq_hz: ArrayLike,
+    gammas: Sequence[ArrayLike],
+    dofs: Sequence[str] | None = None,
+    bands: BandsOfDofs = None,
+    *,
+    transform: ArrayLike | tuple[ArrayLike, ArrayLike] | None = None,
+    damping: DampingTerms | Literal["auto"] | Sequence[DampingTerms] = "auto",
+    cross: CrossTerms = "zero",
+    noise: float | ArrayLike | None = None,
+    reciprocal: bool = True,
+) -> Iterator[JointFit]:
+    """Identify a joint from each of several sets of FRFs of the same structure.
+
+    Parameters
+    ----------
+    freq_hz : array_like, shape (n_freq,)
+        Hz.
+    gammas : sequence of array_like, shape (n_freq, m_r, m_f)
+        Measured receptances, m/N, as `identify` takes them: realisations of noise, repeated measurements.
+    dofs, bands, transform, damping, cross, noise, reciprocal
+        As in `identify` with the method "compliance".
+
+    Yields
+    ------
+    JointFit
+        One for each set, as it is asked for. Warnings are in its `warnings` and are not issued; the FRFs are not looked
+        at as `check_frfs` does.
+
+    Raises
+    ------
+    ValueError
+        As `identify`.
+
+    Notes
+    -----
+    Each fit stands for itself, by its own noise. What makes a set faster than `identify`: the search for poles of the
+    smooth FRFs, for the noise and for the joint begins at those of the first set, and ends at once where the set is
+    alike.
+
+    Examples
+    --------
+    >>> import numpy as np, jointfrf as jf
+    >>> freq = np.linspace(0.5, 10, 400)
+    >>> a = jf.chain([5, 3], [2500, 3500], [3, 4], ground="start").receptance(freq)
+    >>> b = jf.chain([4, 2], [2000, 2500], [2, 1], ground="end").receptance(freq)
+    >>> gamma = jf.couple(a, b, jf.Joint([2000.0], [3.0]).dynamic_stiffness(freq), [1], [0])[:, 1:3, 1:3]
+    >>> drawn = jf.realisations(gamma, 0.05, seed=2, count=20)
+    >>> k = [fit.stiffness[0] for fit in jf.identify_realisations(freq, drawn, ["x"], damping="viscous")]
+    >>> bool(abs(np.mean(k) / 2000 - 1) < 0.005), bool(np.std(k) / 2000 < 0.01)
+    (True, True)
+    """
+    options = ManifoldOptions(damping if isinstance(damping, str) else tuple(damping), cross, reciprocal)
+    known, near = NoiseOptions(noise), None
+    for gamma in gammas:
+        measured = as_measured(freq_hz, gamma, square=False)
+        problem = replace(prepare_manifold(measured, dofs, bands, transform, known, options), near=near)
+        found = fit_manifold(problem)
+        if near is None:
+            near, known = found.estimate, replace(known, like=problem.noise.model)
+        yield describe_manifold(found, problem).fit

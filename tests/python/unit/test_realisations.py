@@ -1,0 +1,57 @@
+"""Many sets of FRFs of one structure: each is fitted as by itself, and sooner."""
+
+import numpy as np
+import pytest
+
+import jointfrf as jf
+
+
+@pytest.fixture(scope="module")
+def drawn(beams):
+    return list(jf.realisations(beams.gamma(beams.joint), 0.02, seed=5, count=4))
+
+
+def test_each_fit_is_that_of_identify(beams, drawn):
+    fits = list(jf.identify_realisations(beams.freq, drawn, ["y", "theta"], damping="viscous"))
+    for fit, gamma in zip(fits, drawn, strict=True):
+        alone = jf.identify(beams.freq, gamma, ["y", "theta"], damping="viscous")
+        for name, value in alone.parameters.items():
+            # The smooth FRFs of both differ by a small part of the noise.
+            assert abs(fit.parameters[name] - value) < 0.1 * alone.std_error[name]
+            assert fit.std_error[name] == pytest.approx(alone.std_error[name], rel=0.5)
+        assert fit.noise_level == pytest.approx(alone.noise_level, rel=0.05)
+
+
+def test_a_set_of_another_structure_is_searched_anew(beams, chains, drawn):
+    other = beams.gamma(jf.Joint([1e5, 1e3], [5, 0.5], ["y", "theta"]))
+    sets = [drawn[0], jf.pollute(other, 0.02, seed=1)]
+    _, fit = jf.identify_realisations(beams.freq, sets, ["y", "theta"], damping="viscous")
+    alone = jf.identify(beams.freq, sets[1], ["y", "theta"], damping="viscous")
+    assert fit.noise_level == pytest.approx(alone.noise_level, rel=0.05)
+    for name, value in alone.parameters.items():
+        assert abs(fit.parameters[name] - value) < 0.1 * alone.std_error[name]
+
+
+def test_sets_are_taken_one_at_a_time_and_checked(beams, drawn):
+    def sets():
+        yield drawn[0]
+        yield drawn[1][:, :3, :3]
+
+    fits = jf.identify_realisations(beams.freq, sets(), ["y", "theta"])
+    assert next(fits).stiffness[0] == pytest.approx(6e5, rel=0.05)
+    with pytest.raises(ValueError, match="even number of rows"):
+        next(fits)
+
+
+def test_noise_of_other_frfs_is_a_first_value_only(beams, drawn):
+    exact = beams.gamma(beams.joint)
+    first = jf.estimate_noise(beams.freq, drawn[0])
+    like = jf.estimate_noise(beams.freq, drawn[1], like=first)
+    alone = jf.estimate_noise(beams.freq, drawn[1])
+    assert like.level == pytest.approx(alone.level, rel=0.05)
+    error = [np.sqrt((abs((m.smooth.h - exact) / exact) ** 2).mean()) for m in (like, alone)]
+    assert error[0] == pytest.approx(error[1], rel=0.2)
+    far = jf.estimate_noise(beams.freq, jf.pollute(exact, 0.1, seed=9), like=first)
+    assert far.level == pytest.approx(0.1, rel=0.1)
+    # Of other lines, and of other sizes: not used.
+    assert jf.estimate_noise(beams.freq[:80], drawn[1][:80], like=first).level == pytest.approx(0.02, rel=0.2)
