@@ -16,9 +16,9 @@ from jointfrf.cli.extras import check_installed
 from jointfrf.cli.measured_file import add_file_arguments, in_some_band, interface_of, nodes, read_frfs, words
 from jointfrf.dofs import is_rotation
 from jointfrf.errors import ConvergenceWarning, FrfCheckWarning, IdentificationWarning
-from jointfrf.identification.compliance_fit.joint_terms import CrossTerms, DampingTerms
 from jointfrf.identification.identify import identify
 from jointfrf.identification.joint_fit import JointFit
+from jointfrf.identification.manifold_fit.joint_terms import CrossTerms, DampingTerms
 from jointfrf.io.cards import CardFormat
 
 __all__ = ["add_arguments", "run"]

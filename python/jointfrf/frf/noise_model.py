@@ -189,7 +189,8 @@ def _estimated(
         model = _model(lines, smooth, given, inflation or 1.0, differences, robust=True)
         inflation, _ = _found_inflation(lines, differences, model)
         before, variance = variance, np.maximum(model.variance, _TINY)
-        settled = _alike(before, variance)
+        shown = (smooth.h != 0).any(axis=0)
+        settled = _alike(before[:, shown], variance[:, shown])
         search = OrderSearch(None if differences is None else inflation, max_poles, 0 if settled else patience)
         smooth = smoothed(freq, lines, variance, search, reciprocal=reciprocal, start=smooth.poles)
         if settled:

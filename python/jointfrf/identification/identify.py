@@ -10,12 +10,11 @@ from numpy.typing import ArrayLike
 
 from jointfrf.channels.check.check import check_frfs, warn_of_frfs
 from jointfrf.channels.check.finding import FrfCheck
-from jointfrf.identification.compliance_fit.joint_terms import CrossTerms, DampingTerms
-from jointfrf.identification.describe import Described, describe_band_mean
-from jointfrf.identification.fit import fit_band_mean
+from jointfrf.identification.band_means import fit_band_mean, prepare_band_mean
 from jointfrf.identification.joint_fit import JointFit
-from jointfrf.identification.manifold_fit.describe import describe_manifold
+from jointfrf.identification.manifold_fit.describe import Described, describe_manifold
 from jointfrf.identification.manifold_fit.fit import fit_manifold
+from jointfrf.identification.manifold_fit.joint_terms import CrossTerms, DampingTerms
 from jointfrf.identification.manifold_fit.prepare import (
     ManifoldOptions,
     NoiseOptions,
@@ -25,7 +24,6 @@ from jointfrf.identification.prepare import (
     BandsOfDofs,
     MeasuredFrfs,
     as_measured,
-    prepare_band_mean,
 )
 from jointfrf.kernel.arguments import FloatArray, check_choice
 from jointfrf.substructuring.methods import JointFrfs, StiffnessMethod
@@ -170,7 +168,7 @@ def identify(
         dofs_j=dofs_j, dofs_k=dofs_k, dofs_r=dofs_r, dofs_s=dofs_s,
     )  # fmt: skip
     means = prepare_band_mean(method, as_measured(freq_hz, gamma), known, dofs, bands, transform)
-    return _warned(describe_band_mean(fit_band_mean(means)))
+    return fit_band_mean(means)
 
 
 def _warned(described: Described) -> JointFit:

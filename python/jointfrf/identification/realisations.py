@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import Literal
 
 from numpy.typing import ArrayLike
 
-from jointfrf.identification.compliance_fit.joint_terms import CrossTerms, DampingTerms
 from jointfrf.identification.joint_fit import JointFit
 from jointfrf.identification.manifold_fit.describe import describe_manifold
 from jointfrf.identification.manifold_fit.fit import fit_manifold
+from jointfrf.identification.manifold_fit.joint_terms import CrossTerms, DampingTerms
 from jointfrf.identification.manifold_fit.prepare import ManifoldOptions, NoiseOptions, prepare_manifold
 from jointfrf.identification.prepare import BandsOfDofs, as_measured
 
@@ -20,7 +20,7 @@ __all__ = ["identify_realisations"]
 
 def identify_realisations(
     freq_hz: ArrayLike,
-    gammas: Sequence[ArrayLike],
+    gammas: Iterable[ArrayLike],
     dofs: Sequence[str] | None = None,
     bands: BandsOfDofs = None,
     *,
@@ -36,7 +36,7 @@ def identify_realisations(
     ----------
     freq_hz : array_like, shape (n_freq,)
         Hz.
-    gammas : sequence of array_like, shape (n_freq, m_r, m_f)
+    gammas : iterable of array_like, shape (n_freq, m_r, m_f)
         Measured receptances, m/N, as `identify` takes them: realisations of noise, repeated measurements.
     dofs, bands, transform, damping, cross, noise, reciprocal
         As in `identify` with the method "compliance".

@@ -7,11 +7,11 @@ import pytest
 
 import jointfrf as jf
 from cramer_rao import cramer_rao, term_matrices
-from jointfrf.identification.compliance_fit.least_squares import inverse_information
 from jointfrf.identification.manifold_fit.estimator import estimate_on_manifold
 from jointfrf.identification.manifold_fit.interface_frfs import InterfaceFrfs
 from jointfrf.identification.manifold_fit.intervals import block_scatter
 from jointfrf.identification.manifold_fit.joint_terms import joint_terms
+from jointfrf.identification.manifold_fit.line_forms import inverse_information
 
 TRUTH = np.array([6e5, 5e3, 20, 1.5])
 

@@ -4,24 +4,26 @@ import numpy as np
 import pytest
 
 import jointfrf as jf
-from jointfrf.identification.prepare import (
-    ComplianceOptions,
-    as_measured,
-    prepare_band_mean,
-    prepare_compliance,
+from jointfrf.identification.manifold_fit.prepare import (
+    ManifoldOptions,
+    NoiseOptions,
+    prepare_manifold,
 )
-from jointfrf.substructuring.methods import JointFrfs
+from jointfrf.identification.prepare import as_measured
 
-OPTIONS = ComplianceOptions("viscous", "zero", True)
+OPTIONS = ManifoldOptions("viscous", "zero", True)
+#: From points 20 mm apart on each side of a joint of two DOFs to y and theta, and back.
+POINTS = np.kron(np.eye(2), [[1.0, 0.01], [1.0, -0.01]])
+TO_JOINT = np.linalg.inv(POINTS)
 
 
 def measured(s, level=0.01):
-    return as_measured(s.freq, jf.pollute(s.gamma(s.joint), level, seed=3))
+    return as_measured(s.freq, jf.pollute(s.gamma(s.joint), level, seed=3), square=False)
 
 
 def prepared(s, **change):
-    arguments = dict(measured=measured(s), dofs=["y", "theta"], bands=None, transform=None, noise=None)
-    return prepare_compliance(**(arguments | dict(options=OPTIONS) | change))
+    arguments = dict(measured=measured(s), dofs=["y", "theta"], bands=None, transform=None, noise=NoiseOptions())
+    return prepare_manifold(**(arguments | dict(options=OPTIONS) | change))
 
 
 def test_lines_outside_all_bands_are_left_out_and_each_dof_keeps_its_own(beams):
@@ -34,59 +36,180 @@ def test_lines_outside_all_bands_are_left_out_and_each_dof_keeps_its_own(beams):
     assert problem.used.any(axis=1).all()
     assert problem.bands == (((200.0, 400.0),), ((300.0, 500.0), (700.0, 800.0)))
     whole = measured(beams)
-    np.testing.assert_array_equal(problem.measured, whole.h[np.isin(whole.freq_hz, freq)])
+    np.testing.assert_array_equal(problem.frfs.measured, whole.h[np.isin(whole.freq_hz, freq)])
+    assert problem.frfs.smooth.shape == problem.frfs.variance.shape == problem.frfs.measured.shape
 
 
-def test_the_first_line_of_a_band_knows_its_neighbours_outside(beams):
-    problem, whole = prepared(beams, bands=(200, 400)), measured(beams)
-    first = int(np.flatnonzero(whole.freq_hz == 200)[0])
-    around = whole.h[[first - 2, first - 1, first + 1, first + 2]]
-    np.testing.assert_allclose(problem.initial[0], around.mean(axis=0), rtol=1e-13)
+@pytest.mark.parametrize("noise", [NoiseOptions(), NoiseOptions(0.05)])
+def test_smooth_frfs_are_nearer_to_the_exact_ones_than_the_measured(beams, noise):
+    exact = beams.gamma(beams.joint)
+    frfs = prepared(beams, measured=measured(beams, 0.05), noise=noise).frfs
+    off = [np.sqrt(np.mean(abs(h / exact - 1) ** 2)) for h in (frfs.smooth, frfs.measured)]
+    assert off[0] < 0.5 * off[1]
 
 
-def test_the_noise_is_that_of_the_lines_kept(beams):
+def test_smooth_frfs_that_miss_a_line_give_way_to_the_measured(beams):
+    h = measured(beams).h.copy()
+    h[40] *= 3
+    given = prepared(beams, measured=as_measured(beams.freq, h, square=False), noise=NoiseOptions(0.01))
+    np.testing.assert_array_equal(given.frfs.smooth[40], h[40])
+    assert (given.frfs.smooth[:35] != h[:35]).all()
+
+
+def test_noise_is_estimated_from_the_lines_kept_where_nothing_is_said(beams):
+    h = measured(beams).h.copy()
+    low = beams.freq < 400
+    h[low] = jf.pollute(beams.gamma(beams.joint)[low], 0.2, seed=4)
+    noisy = as_measured(beams.freq, h, square=False)
+    kept = prepared(beams, measured=noisy, bands=(400, 800))
+    assert kept.noise.level == pytest.approx(0.01, rel=0.2)
+    assert not kept.noise.is_assumed
+    size = np.median(np.sqrt(kept.frfs.variance) / abs(kept.frfs.smooth))
+    assert size == pytest.approx(kept.noise.level, rel=0.05)
+
+
+def test_noise_given_as_a_level_is_relative_to_the_smooth_frfs(beams):
+    problem = prepared(beams, noise=NoiseOptions(0.03))
+    assert problem.noise.level == 0.03
+    assert problem.noise.inflation == 1
+    assert not problem.noise.is_assumed
+    assert problem.noise.outlying.size == 0
+    np.testing.assert_allclose(problem.frfs.variance, (0.03 * abs(problem.frfs.smooth)) ** 2, rtol=1e-9)
+
+
+def test_noise_given_as_variances_keeps_the_lines_of_the_bands(beams):
     given = (0.02 * abs(beams.gamma(beams.joint))) ** 2
-    assert prepared(beams).noise.level == pytest.approx(0.01, rel=0.15)
-    assert prepared(beams, noise=0.03).noise.level == 0.03
-    noise = prepared(beams, noise=given, bands=(200, 400)).noise
-    assert noise.level == 1
-    np.testing.assert_array_equal(noise.variance, given[(beams.freq >= 200) & (beams.freq <= 400)])
-    h = beams.gamma(beams.joint)
-    symmetric = as_measured(beams.freq, (h + h.swapaxes(1, 2)) / 2)
-    assert prepared(beams, measured=symmetric).noise.level == 0
+    problem = prepared(beams, noise=NoiseOptions(given), bands=(200, 400))
+    np.testing.assert_array_equal(problem.frfs.variance, given[(beams.freq >= 200) & (beams.freq <= 400)])
+    assert problem.noise.level == pytest.approx(0.02, rel=0.02)
+
+
+def test_coherence_brings_the_noise_of_each_line_and_averages_scale_it(beams):
+    """A band with twenty times the noise power, told by the coherence alone."""
+    exact, n_averages = beams.gamma(beams.joint), 16
+    level = np.where((beams.freq > 300) & (beams.freq < 450), 0.09, 0.02)[:, None, None]
+    rng = np.random.default_rng(5)
+    e = (rng.standard_normal(exact.shape) + 1j * rng.standard_normal(exact.shape)) / np.sqrt(2)
+    noisy = as_measured(beams.freq, exact * (1 + level * e), square=False)
+    coherence = np.broadcast_to(1 / (1 + n_averages * level**2), exact.shape)
+    kept = (beams.freq >= 200) & (beams.freq <= 700)
+    problem = prepared(
+        beams, measured=noisy, noise=NoiseOptions(coherence=coherence, averages=n_averages), bands=(200, 700)
+    )
+    found = np.sqrt(problem.frfs.variance) / abs(problem.frfs.smooth)
+    np.testing.assert_allclose(np.median(found / level[kept], axis=0), 1, rtol=0.2)
+    loud = (problem.freq_hz > 300) & (problem.freq_hz < 450)
+    assert np.median(found[loud]) > 3.5 * np.median(found[~loud])
+
+
+@pytest.mark.parametrize("lines", [slice(None), slice(50, 53)])
+def test_frfs_that_show_no_noise_take_a_level_for_the_residual_to_replace(chains, lines):
+    """Exact FRFs that a rational function follows to rounding; and three lines, too few to tell noise."""
+    h = chains.gamma(chains.joint)[lines]
+    symmetric = as_measured(chains.freq[lines], (h + h.swapaxes(1, 2)) / 2, square=False)
+    problem = prepared(chains, measured=symmetric, dofs=["x"])
+    assert problem.noise.is_assumed
+    assert problem.noise.level == 0.01
+    np.testing.assert_allclose(problem.frfs.variance, (0.01 * abs(h)) ** 2, rtol=1e-6)
+
+
+def test_frfs_made_reciprocal_are_told_from_measured_ones(beams):
+    whole = measured(beams)
+    assert not prepared(beams).frfs.symmetrised
+    mean = as_measured(beams.freq, (whole.h + whole.h.swapaxes(1, 2)) / 2, square=False)
+    assert prepared(beams, measured=mean).frfs.symmetrised
+
+
+@pytest.mark.parametrize(
+    ("noise", "told"),
+    [
+        (NoiseOptions(-0.1), "noise must be positive, not -0.1"),
+        (NoiseOptions(0.0), "noise must be positive, not 0"),
+        (NoiseOptions(np.zeros((158, 4, 4))), "noise must hold positive variances"),
+        (NoiseOptions(np.ones((158, 4))), "noise must have shape"),
+        (NoiseOptions(0.01, averages=4), "coherence and averages are used where noise is not given"),
+        (
+            NoiseOptions(0.01, coherence=np.ones((158, 4, 4))),
+            "coherence and averages are used where noise is not given",
+        ),
+        (NoiseOptions(averages=4), "averages are used with coherence only"),
+        (NoiseOptions(coherence=np.full((158, 4, 4), 1.1)), "coherence must be above 0 and at most 1"),
+        (NoiseOptions(coherence=np.ones((10, 4, 4))), "coherence must have shape"),
+    ],
+)
+def test_noise_that_cannot_be(beams, noise, told):
+    with pytest.raises(ValueError, match=told):
+        prepared(beams, noise=noise)
 
 
 def test_names_and_transform_have_defaults(chains):
     problem = prepared(chains, dofs=None)
     assert problem.dofs == ("0",)
-    np.testing.assert_array_equal(problem.transform, np.eye(2))
+    np.testing.assert_array_equal(problem.frfs.responses, np.eye(2))
+    np.testing.assert_array_equal(problem.frfs.forces, np.eye(2))
+
+
+def test_one_transform_serves_responses_and_forces(beams):
+    at_points = as_measured(beams.freq, POINTS @ measured(beams).h @ POINTS.T, square=False)
+    frfs = prepared(beams, measured=at_points, transform=TO_JOINT, noise=NoiseOptions(0.01)).frfs
+    assert frfs.responses is frfs.forces
+    np.testing.assert_allclose(frfs.gamma(frfs.measured), measured(beams).h, rtol=1e-6, atol=1e-14)
+
+
+def test_a_pair_of_transforms_takes_rectangular_frfs_to_the_joint(beams):
+    """Three responses a side, the middle one the mean of the outer two, and forces at the joint DOFs themselves."""
+    three = np.kron(np.eye(2), [[1.0, 0.01], [1.0, 0.0], [1.0, -0.01]])
+    rectangular = as_measured(beams.freq, three @ measured(beams).h, square=False)
+    assert rectangular.h.shape == (beams.freq.size, 6, 4)
+    pair = (np.linalg.pinv(three), np.eye(4))
+    frfs = prepared(beams, measured=rectangular, transform=pair, noise=NoiseOptions(0.01)).frfs
+    np.testing.assert_allclose(frfs.gamma(frfs.measured), measured(beams).h, rtol=1e-6, atol=1e-14)
+    assert not frfs.symmetrised
+
+
+@pytest.mark.parametrize(
+    ("transform", "told"),
+    [
+        (np.eye(3), "transform must have shape"),
+        (np.eye(4)[:3], "transform must have an even number of rows"),
+        (np.diag([1.0, 1, 0, 1]), "transform: row 2 is zero"),
+        ((np.eye(4),), "transform must be one matrix or a pair for responses and forces, not 1"),
+        ((np.eye(4), np.eye(4)[:2]), "transform must lead to the same DOFs from responses and forces, not to 4 and 2"),
+    ],
+)
+def test_transforms_that_cannot_be(beams, transform, told):
+    with pytest.raises(ValueError, match=told):
+        prepared(beams, transform=transform)
+
+
+def test_rectangular_frfs_need_a_pair_of_transforms(beams):
+    with pytest.raises(ValueError, match="gamma has 3 responses and 4 forces: transform must be a pair"):
+        prepared(beams, measured=as_measured(beams.freq, measured(beams).h[:, :3], square=False))
+
+
+def test_frfs_that_do_not_see_the_joint_are_refused(beams):
+    h = measured(beams).h.copy()
+    h[:, :2, 2:] = h[:, 2:, :2] = 0
+    with pytest.raises(ValueError, match="gamma is zero between sides j and k of the joint"):
+        prepared(beams, measured=as_measured(beams.freq, h, square=False), noise=NoiseOptions(0.01))
+
+
+def test_noise_alone_is_refused(beams):
+    rng = np.random.default_rng(1)
+    h = rng.standard_normal((beams.freq.size, 4, 4)) + 1j * rng.standard_normal((beams.freq.size, 4, 4))
+    with pytest.raises(ValueError, match="gamma consists of noise"):
+        prepared(beams, measured=as_measured(beams.freq, 1e-6 * h, square=False))
 
 
 def test_words_are_checked_when_they_are_chosen():
     with pytest.raises(ValueError, match="damping must be one of none, viscous, hysteretic, both, auto, not 'dry'"):
-        ComplianceOptions("dry", "zero", True)
+        ManifoldOptions("dry", "zero", True)
+    with pytest.raises(ValueError, match="damping must be one of none, viscous, hysteretic, both, not 'auto'"):
+        ManifoldOptions(("viscous", "auto"), "zero", True)
     with pytest.raises(ValueError, match="cross must be one of zero, ignore, fit, not 'some'"):
-        ComplianceOptions("auto", "some", True)
+        ManifoldOptions("auto", "some", True)
 
 
-def test_a_band_mean_transforms_what_is_measured_at_points(beams):
-    mix = np.kron(np.eye(2), [[1.0, 0.01], [1.0, -0.01]])
-    h = beams.gamma(beams.joint)
-    at_points = as_measured(beams.freq, mix @ h @ mix.T)
-    method, back = "inverse-substructuring", np.linalg.inv(mix)
-    problem = prepare_band_mean(method, at_points, JointFrfs(), ["y", "theta"], (200, 800), back)
-    assert problem.method == method
-    assert problem.bands == (((200.0, 800.0),),) * 2
-    np.testing.assert_array_equal(problem.freq_hz, beams.freq)
-    np.testing.assert_allclose(problem.k_lines, jf.inverse_substructuring(h), rtol=1e-6, atol=1e-3)
-
-
-def test_a_decoupling_takes_what_is_measured_between_internal_points(beams):
-    s = beams
-    known = JointFrfs(h_a=s.h_a, h_b=s.h_b, dofs_j=s.at, dofs_k=s.at, dofs_r=s.inner)
-    h_c = s.coupled(s.joint)[:, s.inner][:, :, s.inner]
-    problem = prepare_band_mean("decoupling-rr", as_measured(s.freq, h_c), known, None, None, None)
-    assert problem.dofs == ("0", "1")
-    np.testing.assert_array_equal(
-        problem.k_lines, jf.decouple("rr", s.h_a, s.h_b, h_c, s.at, s.at, s.inner, freq_hz=s.freq)
-    )
+def test_damping_by_dof_needs_a_word_for_each(beams):
+    with pytest.raises(ValueError, match="damping must hold one word for each of 2 DOFs, not 1"):
+        prepared(beams, options=ManifoldOptions(("viscous",), "zero", True))

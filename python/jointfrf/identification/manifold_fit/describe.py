@@ -4,20 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from jointfrf.errors import ConvergenceWarning, IdentificationWarning
-from jointfrf.identification.describe import Described, group_notes, listed, significance_notes
 from jointfrf.identification.joint_fit import JointFit
 from jointfrf.identification.manifold_fit.damping_choice import DofDamping
 from jointfrf.identification.manifold_fit.estimator import JointEstimate
 from jointfrf.identification.manifold_fit.fit import ManifoldFit
 from jointfrf.identification.manifold_fit.intervals import Spread
+from jointfrf.identification.manifold_fit.joint_terms import CrossTerms
 from jointfrf.identification.manifold_fit.misfit import Misfit
 from jointfrf.identification.manifold_fit.prepare import KnownNoise, ManifoldProblem
 
-__all__ = ["describe_manifold"]
+__all__ = ["Described", "describe_manifold"]
 
 #: A parameter is called poorly determined when its interval is wider than this share of it.
 _UNCERTAIN = 0.5
@@ -33,6 +35,13 @@ _COUPLED = (
 )
 
 
+class Described(NamedTuple):
+    """A fit with its notes and warnings, and the warnings to be issued."""
+
+    fit: JointFit
+    warnings: tuple[Warning, ...] = ()
+
+
 def describe_manifold(found: ManifoldFit, problem: ManifoldProblem) -> Described:
     """Add the notes and warnings of a fit on the manifold."""
     fit, result = found.joint, found.estimate
@@ -41,8 +50,8 @@ def describe_manifold(found: ManifoldFit, problem: ManifoldProblem) -> Described
         *_choice_notes(found.choices),
         *_noise_notes(problem),
         *_small_residual_notes(found.misfit, problem.noise),
-        *group_notes([group.dofs for group in result.groups], fit.dofs, problem.options.cross),
-        *significance_notes(fit),
+        *_group_notes([group.dofs for group in result.groups], fit.dofs, problem.options.cross),
+        *_significance_notes(fit),
     ]
     doubts = [
         *([] if found.cross_fits else _untrusted_warnings(result, fit.dofs)),
@@ -57,6 +66,27 @@ def describe_manifold(found: ManifoldFit, problem: ManifoldProblem) -> Described
         told.append(ConvergenceWarning(f"the fit did not converge in {most} iterations"))
     described = replace(fit, notes=tuple(notes), warnings=tuple(str(warning) for warning in told))
     return Described(described, tuple(told))
+
+
+def _listed(names: Sequence[str]) -> str:
+    """Return names in a row."""
+    return ", ".join(names)
+
+
+def _significance_notes(fit: JointFit) -> list[str]:
+    """Name damping and cross terms whose sign is not known."""
+    intervals = fit.confidence_interval(0.95)
+    open_ = [one.name for one in fit.terms if one.kind != "k" and intervals[one.name][0] < 0 < intervals[one.name][1]]
+    return [f"{_listed(open_)}: not significantly different from zero (95 % interval)"] if open_ else []
+
+
+def _group_notes(groups: Sequence[NDArray[np.intp]], dofs: tuple[str, ...], cross: CrossTerms) -> list[str]:
+    """Name groups of DOFs between which the FRFs are zero."""
+    if len(groups) < 2:
+        return []
+    names = " and ".join(f"({_listed([dofs[d] for d in group])})" for group in groups)
+    told = f"the FRFs between {names} are zero: each group is fitted separately"
+    return [told + (", and cross terms between them cannot be identified" if cross == "fit" else "")]
 
 
 def _choice_notes(choices: Sequence[DofDamping]) -> list[str]:
@@ -82,7 +112,7 @@ def _noise_notes(problem: ManifoldProblem) -> list[str]:
             f"{problem.freq_hz.size / noise.inflation:.0f} independent ones"
         )
     if noise.outlying.size:
-        shown = listed([f"{problem.freq_hz[i]:g}" for i in noise.outlying[:8]])
+        shown = _listed([f"{problem.freq_hz[i]:g}" for i in noise.outlying[:8]])
         rest = f" and {noise.outlying.size - 8} more" if noise.outlying.size > 8 else ""
         told.append(f"lines with far more noise than their neighbours weigh less: {shown}{rest} Hz")
     return told
@@ -106,7 +136,7 @@ def _untrusted_warnings(result: JointEstimate, dofs: tuple[str, ...]) -> list[st
     for group in result.groups:
         out, total = int(np.count_nonzero(~group.fit.trusted)), group.fit.trusted.size
         if out > _UNTRUSTED * total:
-            whose = f" of {listed([dofs[d] for d in group.dofs])}" if several else ""
+            whose = f" of {_listed([dofs[d] for d in group.dofs])}" if several else ""
             told.append(f"{out} of {total} lines{whose} do not fit the joint found within their noise and are left out")
     return told
 
@@ -160,7 +190,7 @@ def _misfit_warnings(found: ManifoldFit, problem: ManifoldProblem) -> list[str]:
 def _where(misfit: Misfit) -> str:
     if not misfit.local:
         return ""
-    places = listed([f"{low:g}-{high:g} Hz ({100 * share:.0f} %)" for low, high, share in misfit.local])
+    places = _listed([f"{low:g}-{high:g} Hz ({100 * share:.0f} %)" for low, high, share in misfit.local])
     return f"; the excess is local: {places}: bad lines, or local modes that the joint DOFs do not describe"
 
 
@@ -173,5 +203,5 @@ def _scatter_warnings(fit: JointFit, spread: Spread) -> list[str]:
     if not wide:
         return []
     return [
-        f"{listed(wide)}: parts of the band scatter more than the noise explains; the intervals are widened by that"
+        f"{_listed(wide)}: parts of the band scatter more than the noise explains; the intervals are widened by that"
     ]

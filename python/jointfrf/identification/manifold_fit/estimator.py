@@ -9,11 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf.dofs import Parameter
-from jointfrf.identification.compliance_fit.joint_terms import CrossTerms
-from jointfrf.identification.compliance_fit.least_squares import inverse_information
 from jointfrf.identification.manifold_fit.group_fit import GroupFit, GroupProblem, fit_dofs
 from jointfrf.identification.manifold_fit.interface_frfs import InterfaceFrfs
-from jointfrf.identification.manifold_fit.joint_terms import CoupledJoint, DiagonalJoint, JointCoordinates, JointTerms
+from jointfrf.identification.manifold_fit.joint_terms import (
+    CoupledJoint,
+    CrossTerms,
+    DiagonalJoint,
+    JointCoordinates,
+    JointTerms,
+)
+from jointfrf.identification.manifold_fit.line_forms import inverse_information
 from jointfrf.identification.manifold_fit.manifold import LineData
 from jointfrf.identification.manifold_fit.starts import first_joints
 from jointfrf.kernel.arguments import FloatArray

@@ -9,12 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from jointfrf.errors import IllConditionedWarning
-from jointfrf.identification.compliance_fit.joint_terms import CrossTerms, DampingTerms
 from jointfrf.identification.joint_fit import JointFit
 from jointfrf.identification.manifold_fit.damping_choice import DofDamping, choose_damping
 from jointfrf.identification.manifold_fit.estimator import JointEstimate, estimate_on_manifold
 from jointfrf.identification.manifold_fit.intervals import LikelihoodIntervals, Spread, spread_of
-from jointfrf.identification.manifold_fit.joint_terms import joint_terms
+from jointfrf.identification.manifold_fit.joint_terms import CrossTerms, DampingTerms, joint_terms
 from jointfrf.identification.manifold_fit.misfit import Misfit, diagnose
 from jointfrf.identification.manifold_fit.prepare import ManifoldProblem
 from jointfrf.substructuring.ismm import inverse_substructuring

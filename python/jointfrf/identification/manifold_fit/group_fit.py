@@ -8,11 +8,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from jointfrf.identification.compliance_fit.least_squares import inverse_information
 from jointfrf.identification.manifold_fit.joint_terms import DiagonalJoint, JointCoordinates
 from jointfrf.identification.manifold_fit.line_forms import (
     FormMinimum,
     LineForms,
+    inverse_information,
     minimise_forms,
 )
 from jointfrf.identification.manifold_fit.manifold import LineData, OnManifold, normal_forms, project

@@ -7,10 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy import optimize, stats
 
-from jointfrf.identification.compliance_fit.least_squares import inverse_information
 from jointfrf.identification.manifold_fit.estimator import FittedGroup, JointEstimate
 from jointfrf.identification.manifold_fit.joint_terms import DiagonalJoint
-from jointfrf.identification.manifold_fit.line_forms import LineForms, minimise_forms
+from jointfrf.identification.manifold_fit.line_forms import LineForms, inverse_information, minimise_forms
 from jointfrf.kernel.arguments import FloatArray
 
 __all__ = ["BLOCKS", "LikelihoodIntervals", "Spread", "block_scatter", "line_scatter", "profile_interval", "spread_of"]

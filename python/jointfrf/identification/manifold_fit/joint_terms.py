@@ -7,23 +7,29 @@ regular for a rigid DOF, a = 0, where k runs to infinity. A joint with cross ter
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple, Protocol
+from typing import Literal, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf.dofs import Parameter, ParameterKind, joint_parameters
-from jointfrf.identification.compliance_fit.joint_terms import CrossTerms, DampingTerms
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.kernel.linear_algebra import invert
 
 __all__ = [
     "CoupledJoint",
+    "CrossTerms",
+    "DampingTerms",
     "DiagonalJoint",
     "JointCoordinates",
     "JointTerms",
     "joint_terms",
 ]
+
+#: Terms of K* beside its stiffness.
+DampingTerms = Literal["none", "viscous", "hysteretic", "both"]
+#: Terms that couple the DOFs of a joint: none, and this is used; perhaps, but not sought; fitted.
+CrossTerms = Literal["zero", "ignore", "fit"]
 
 _KINDS: Mapping[DampingTerms, tuple[ParameterKind, ...]] = {
     "none": ("k",),

@@ -9,7 +9,7 @@ import numpy as np
 from jointfrf.identification.manifold_fit.joint_terms import JointCoordinates
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
-__all__ = ["FormMinimum", "LineForms", "minimise_forms"]
+__all__ = ["FormMinimum", "LineForms", "inverse_information", "minimise_forms"]
 
 _STEPS = 100
 #: Levenberg's parameter: first value, factor where a step fails, largest value.
@@ -76,6 +76,19 @@ class FormMinimum(NamedTuple):
     gradient: FloatArray
     line_gradient: FloatArray
     line_information: FloatArray
+
+
+def inverse_information(information: FloatArray) -> FloatArray:
+    """Inverse of information matrices of parameters of very different size; a pseudo-inverse where one has none.
+
+    Parameters
+    ----------
+    information : ndarray, shape (..., p, p)
+    """
+    size = np.sqrt(np.maximum(np.einsum("...aa->...a", information), np.finfo(float).tiny))
+    outer = size[..., :, None] * size[..., None, :]
+    inverse: FloatArray = np.linalg.pinv(information / outer, hermitian=True) / outer
+    return inverse
 
 
 def _at(forms: LineForms, joint: JointCoordinates, x: FloatArray) -> tuple[float, ComplexArray, ComplexArray]:

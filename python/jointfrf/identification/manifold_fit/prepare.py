@@ -13,9 +13,9 @@ from jointfrf.frf.bands import Band, as_bands, in_bands
 from jointfrf.frf.noise_estimate import ZERO
 from jointfrf.frf.noise_model import NoiseModel, estimate_noise
 from jointfrf.frf.smoothing import near_squares, smooth_frfs
-from jointfrf.identification.compliance_fit.joint_terms import CrossTerms, DampingTerms
 from jointfrf.identification.manifold_fit.estimator import JointEstimate
 from jointfrf.identification.manifold_fit.interface_frfs import InterfaceFrfs
+from jointfrf.identification.manifold_fit.joint_terms import CrossTerms, DampingTerms
 from jointfrf.identification.prepare import BandsOfDofs, MeasuredFrfs, as_dof_names, as_transform
 from jointfrf.kernel.arguments import (
     ComplexArray,
