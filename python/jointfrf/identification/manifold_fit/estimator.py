@@ -14,6 +14,7 @@ from jointfrf.identification.manifold_fit.group_fit import GroupFit, GroupProble
 from jointfrf.identification.manifold_fit.interface_frfs import InterfaceFrfs
 from jointfrf.identification.manifold_fit.joint_terms import CoupledJoint, DiagonalJoint, JointCoordinates, JointTerms
 from jointfrf.identification.manifold_fit.starts import first_joints
+from jointfrf.identification.manifold_fit.unknown_cross import fit_unknown_cross
 from jointfrf.kernel.arguments import FloatArray
 
 __all__ = ["FittedGroup", "JointEstimate", "estimate_on_manifold"]
@@ -57,6 +58,8 @@ class JointEstimate(NamedTuple):
     groups : tuple of FittedGroup
     excess : float
         Mean square of the residual in units of the noise.
+    scale : float
+        The same in the units in which lines were weighted: those of the noise, unless lines were seen to vary.
     equations : float
         Complex equations used.
     """
@@ -66,6 +69,7 @@ class JointEstimate(NamedTuple):
     covariance: FloatArray
     groups: tuple[FittedGroup, ...]
     excess: float
+    scale: float
     equations: float
 
     @property
@@ -95,7 +99,8 @@ def estimate_on_manifold(
         data = frfs.of_dofs(dofs)
         joint = coordinates_of(own)
         problem = GroupProblem(data, joint, _unknown(dofs, cross, used, len(data.measured)))
-        fit = fit_dofs(problem, first_joints(data, joint))
+        fitted = fit_unknown_cross if cross == "ignore" and len(dofs) > 1 else fit_dofs
+        fit = fitted(problem, first_joints(data, joint))
         groups.append(FittedGroup(dofs, which, joint, problem, fit))
     return assembled(terms, groups)
 
@@ -124,13 +129,14 @@ def assembled(terms: JointTerms, groups: list[FittedGroup]) -> JointEstimate:
     place = np.full(p, -1)
     place[kept] = np.arange(kept.size)
     equations = sum(group.fit.equations for group in groups)
-    squares = sum(group.fit.minimum.cost for group in groups)
+    degrees = max(equations - kept.size / 2, 1)
     return JointEstimate(
         tuple(terms.parameters[i] for i in kept),
         theta[kept],
         covariance[kept[:, None], kept],
         tuple(group._replace(which=place[group.which]) for group in groups),
-        squares / max(equations - kept.size / 2, 1),
+        sum(group.fit.noise_squares for group in groups) / degrees,
+        sum(group.fit.minimum.cost for group in groups) / degrees,
         equations,
     )
 

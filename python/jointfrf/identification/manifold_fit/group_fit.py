@@ -19,7 +19,7 @@ from jointfrf.identification.manifold_fit.manifold import LineData, OnManifold, 
 from jointfrf.identification.manifold_fit.starts import smooth_compliance, starts_on_manifold
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
-__all__ = ["GroupFit", "GroupProblem", "fit_dofs"]
+__all__ = ["GroupFit", "GroupProblem", "Misfitting", "fit_dofs"]
 
 #: Linearisations at most.
 _MOST = 25
@@ -71,8 +71,29 @@ class GroupProblem(NamedTuple):
         return c
 
 
+class Misfitting(NamedTuple):
+    """What lines say beside the joint where cross terms of C are unknown.
+
+    Attributes
+    ----------
+    noise_squares : float
+        Squares of the residual in units of the noise alone.
+    asymmetry : float
+        Residual of the conditions that C is symmetric, in units of the noise; NaN where there are none.
+    scatter : ndarray, shape (n,), optional
+        Standard deviation of the diagonal of C between lines, beside its noise, m/N; where it is more than noise.
+    hidden : int
+        Lines that count less than half because noise hides gamma_jk.
+    """
+
+    noise_squares: float
+    asymmetry: float
+    scatter: FloatArray | None
+    hidden: int
+
+
 class GroupFit(NamedTuple):
-    """Result of `fit_dofs`.
+    """Result of the fit of one group.
 
     Attributes
     ----------
@@ -88,6 +109,8 @@ class GroupFit(NamedTuple):
         Complex equations of all lines.
     iterations : int
     converged : bool
+    beside : Misfitting, optional
+        Where cross terms of C are unknown.
     """
 
     minimum: FormMinimum
@@ -97,6 +120,12 @@ class GroupFit(NamedTuple):
     possible: float
     iterations: int
     converged: bool
+    beside: Misfitting | None = None
+
+    @property
+    def noise_squares(self) -> float:
+        """Squares of the residual in units of the noise."""
+        return self.beside.noise_squares if self.beside else self.minimum.cost
 
     @property
     def squares(self) -> float:

@@ -93,7 +93,7 @@ def spread_of(found: JointEstimate, inflation: float, *, is_level_known: bool = 
     The larger of information and jackknife; the jackknife only where it exceeds the information by more than chance,
     for one parameter or for all together: with ten blocks its variance is known to 47 %.
     """
-    scale = max(found.excess, 1.0) if is_level_known else found.excess
+    scale = max(found.scale, 1.0) if is_level_known else found.scale
     by_noise = np.full(len(found.parameters), inflation * scale)
     by_blocks = np.full_like(by_noise, np.nan)
     for group in found.groups:

@@ -92,7 +92,7 @@ def diagnose(found: JointEstimate, freq_hz: FloatArray, inflation: float) -> Mis
     """
     sigma = float(np.sqrt(2 * inflation / max(found.equations, 1.0)) / 2)
     ratio = float(np.sqrt(found.excess))
-    trends = tuple(t for group in found.groups for t in _trends(group, freq_hz, inflation * max(found.excess, 1.0)))
+    trends = tuple(t for group in found.groups for t in _trends(group, freq_hz, inflation * max(found.scale, 1.0)))
     misfit = Misfit(ratio, sigma, (), trends)
     return misfit._replace(local=_local(found, freq_hz)) if misfit.is_large else misfit
 

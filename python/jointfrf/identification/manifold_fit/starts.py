@@ -13,7 +13,7 @@ from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.kernel.linear_algebra import invert, solve
 from jointfrf.substructuring.compliance import compliance_covariance, joint_compliance
 
-__all__ = ["first_joints", "smooth_compliance", "starts_on_manifold"]
+__all__ = ["first_joints", "hidden_share", "smooth_compliance", "starts_on_manifold"]
 
 #: Smooth FRFs have about this share of the noise.
 _SMOOTH = 0.2
@@ -128,6 +128,11 @@ def _variance(data: LineData) -> FloatArray:
     """Return the variance of the entries, 0 where one is not used, shape (n_freq, q)."""
     w = data.inverse_std
     return np.where(w > 0, 1 / np.where(w > 0, w, 1) ** 2, 0)
+
+
+def hidden_share(data: LineData) -> FloatArray:
+    """Return the largest relative noise of gamma_jk, of the smooth FRFs, on each line, shape (n_freq,)."""
+    return _hidden(data.entries.matrix(data.smooth), data.entries.matrix(_variance(data)))
 
 
 def _hidden(gamma: ComplexArray, spread: FloatArray) -> FloatArray:
