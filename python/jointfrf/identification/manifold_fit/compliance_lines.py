@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
 
 from jointfrf.identification.manifold_fit.manifold import FrfEntries, LineData
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
@@ -50,72 +50,79 @@ class ComplianceLines(NamedTuple):
     variance: FloatArray
 
 
-def compliance_lines(data: LineData, *, symmetric: bool) -> ComplianceLines:
+def compliance_lines(data: LineData) -> tuple[ComplianceLines, ComplianceLines]:
     """Return the diagonal of C and its covariance, linearised at the smooth FRFs.
 
     Parameters
     ----------
     data : LineData
-    symmetric : bool
-        Whether C is that of a joint: symmetric where the structure is reciprocal, else the same from gamma_jk and from
-        gamma_kj. Otherwise each cross term is unknown for itself.
 
     Returns
     -------
-    ComplianceLines
-        NaN on a line where gamma_jk of the smooth FRFs is singular.
+    symmetric, plain : ComplianceLines
+        If C is that of a joint: symmetric where the structure is reciprocal, else the same from gamma_jk and from
+        gamma_kj; and if each cross term is unknown for itself. NaN on a line where gamma_jk of the smooth FRFs is
+        singular.
 
     Notes
     -----
     Noise of C = C(S) + L (gamma - S) R with L = (gamma_kk gamma_jk^-1, -1), R = (1, -gamma_jk^-1 gamma_jj) of the
     smooth FRFs S; by the best linear estimate where conditions are correlated with the diagonal.
     """
-    pieces = []
+    pieces: tuple[list[ComplianceLines], list[ComplianceLines]] = ([], [])
     with np.errstate(all="ignore"):
         for first in range(0, len(data.measured), _PIECE):
             lines = np.arange(first, min(first + _PIECE, len(data.measured)))
-            pieces.append(_piece(data.on_lines(lines), symmetric=symmetric))
-    return ComplianceLines(*(np.concatenate(parts) for parts in zip(*pieces, strict=True)))
+            for kept, piece in zip(pieces, _piece(data.on_lines(lines)), strict=True):
+                kept.append(piece)
+    symmetric, plain = (ComplianceLines(*map(np.concatenate, zip(*kept, strict=True))) for kept in pieces)
+    return symmetric, plain
 
 
-def _conditions(entries: FrfEntries, *, symmetric: bool) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return pairs of elements of C, first from gamma_jk and then from gamma_kj, that are the same."""
-    n = entries.n
-    a, b = (x.ravel() for x in np.indices((n, n)))
-    if entries.reciprocal:
-        # The second C is the transpose of the first.
-        kept = (a < b) & symmetric
-        return (a * n + b)[kept], (b * n + a)[kept]
-    kept = (a == b) | symmetric
-    return (a * n + b)[kept], (n * n + a * n + b)[kept]
-
-
-def _piece(data: LineData, *, symmetric: bool) -> ComplianceLines:
-    n = data.entries.n
+def _piece(data: LineData) -> tuple[ComplianceLines, ComplianceLines]:
+    """Return both for some lines."""
+    n, reciprocal = data.entries.n, data.entries.reciprocal
     value, slope = _linear(data)
-    first, second = _conditions(data.entries, symmetric=symmetric)
-    diagonal = np.arange(n) * (n + 1)
-    own, noise = value[:, diagonal], slope[:, diagonal]
-    covariance = noise @ noise.conj().swapaxes(1, 2)
-    if first.size == 0:
-        return ComplianceLines(own, covariance, np.zeros(len(own)), value[:, first], np.zeros((len(own), 0)))
-    apart, noise_apart = value[:, first] - value[:, second], slope[:, first] - slope[:, second]
-    size = np.linalg.norm(noise_apart, axis=2)
-    noise_apart = noise_apart / size[:, :, None]
-    adjoint = noise_apart.conj().swapaxes(1, 2)
-    across = noise @ adjoint
-    inner = noise_apart @ adjoint + _OWN_NOISE * np.eye(first.size)
-    right = np.concatenate([(apart / size)[:, :, None], across.conj().swapaxes(1, 2)], axis=2)
-    solved = solve(inner, right, on_singular="nan")
-    correction = across @ solved
-    squares = ((apart / size).conj() * solved[:, :, 0]).real.sum(axis=1)
-    return ComplianceLines(
-        own - correction[:, :, 0], covariance - correction[:, :, 1:], squares, apart, size**2
+    # The second C is the transpose of the first where the structure is reciprocal.
+    a, b = np.triu_indices(n, 1) if reciprocal else np.nonzero(~np.eye(n, dtype=bool))
+    d = np.arange(n)
+    diagonal, first = d * (n + 1), a * n + b
+    second = b * n + a if reciprocal else n * n + first
+    if reciprocal:
+        rows = [(diagonal, None), (first, second)]
+    else:
+        rows = [(diagonal, None), (diagonal, n * n + diagonal), (first, second)]
+    values = [value[:, i] - (0 if j is None else value[:, j]) for i, j in rows]
+    slopes = [slope[:, i] - (0 if j is None else slope[:, j]) for i, j in rows]
+    noise = _coloured(np.concatenate(slopes, axis=1), data)
+    apart, always = np.concatenate(values[1:], axis=1), 0 if reciprocal else n
+    return (
+        _conditioned(values[0], noise[:, :n], apart, noise[:, n:]),
+        _conditioned(values[0], noise[:, :n], apart[:, :always], noise[:, n : n + always]),
     )
 
 
+def _conditioned(
+    value: ComplexArray, noise: ComplexArray, apart: ComplexArray, noise_apart: ComplexArray
+) -> ComplianceLines:
+    """Return the best linear estimate of values, given others that are zero but for their noise."""
+    covariance = noise @ noise.conj().swapaxes(1, 2)
+    size = np.linalg.norm(noise_apart, axis=2)
+    if apart.shape[1] == 0:
+        return ComplianceLines(value, covariance, np.zeros(len(value)), apart, size**2)
+    scaled, noise_apart = apart / size, noise_apart / size[:, :, None]
+    adjoint = noise_apart.conj().swapaxes(1, 2)
+    across = noise @ adjoint
+    inner = noise_apart @ adjoint + _OWN_NOISE * np.eye(apart.shape[1])
+    right = np.concatenate([scaled[:, :, None], across.conj().swapaxes(1, 2)], axis=2)
+    solved = solve(inner, right, on_singular="nan")
+    correction = across @ solved
+    squares = (scaled.conj() * solved[:, :, 0]).real.sum(axis=1)
+    return ComplianceLines(value - correction[:, :, 0], covariance - correction[:, :, 1:], squares, apart, size**2)
+
+
 def _linear(data: LineData) -> tuple[ComplexArray, ComplexArray]:
-    """Return C of the measured FRFs and its derivatives by independent noise of unit variance: all its entries.
+    """Return C of the measured FRFs to first order, and its derivatives by their entries: all its entries.
 
     Shapes (n_freq, n^2) and (n_freq, n^2, q); without reciprocity those of C from gamma_kj follow.
     """
@@ -123,15 +130,13 @@ def _linear(data: LineData) -> tuple[ComplexArray, ComplexArray]:
     gamma = data.entries.matrix(data.smooth)
     change = data.entries.matrix(data.measured) - gamma
     value, slope = _compliance(gamma, change, data.entries)
-    if not data.entries.reciprocal:
-        # With sides exchanged gamma_jk and gamma_kj are, and C is the same.
-        turned = np.r_[n : 2 * n, 0:n]
-        rows, columns = turned[data.entries.rows], turned[data.entries.columns]
-        entries = data.entries._replace(rows=rows, columns=columns)
-        both = (x[:, turned[:, None], turned] for x in (gamma, change))
-        other_value, other_slope = _compliance(*both, entries)
-        value, slope = np.concatenate([value, other_value], 1), np.concatenate([slope, other_slope], 1)
-    return value, _coloured(slope, data)
+    if data.entries.reciprocal:
+        return value, slope
+    # With sides exchanged gamma_jk and gamma_kj are, and C is the same.
+    turned = np.r_[n : 2 * n, 0:n]
+    entries = data.entries._replace(rows=turned[data.entries.rows], columns=turned[data.entries.columns])
+    other = _compliance(*(x[:, turned[:, None], turned] for x in (gamma, change)), entries)
+    return np.concatenate([value, other[0]], axis=1), np.concatenate([slope, other[1]], axis=1)
 
 
 def _compliance(gamma: ComplexArray, change: ComplexArray, entries: FrfEntries) -> tuple[ComplexArray, ComplexArray]:
@@ -157,9 +162,6 @@ def _coloured(slope: ComplexArray, data: LineData) -> ComplexArray:
     if data.correlation is None:
         return slope
     # Entries over their deviation are L^-1 times independent noise.
-    adjoint = data.correlation.swapaxes(1, 2)
-    rows = slope.shape[1]
-    both = np.concatenate([slope.real, slope.imag], axis=1).swapaxes(1, 2)
-    solved = np.linalg.solve(adjoint, both).swapaxes(1, 2)
-    coloured: ComplexArray = solved[:, :rows] + 1j * solved[:, rows:]
-    return coloured
+    for line, triangle in enumerate(data.correlation):
+        slope[line] = solve_triangular(triangle, slope[line].T, trans="T", lower=True, check_finite=False).T
+    return slope

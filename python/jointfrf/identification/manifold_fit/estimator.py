@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from jointfrf.dofs import Parameter
 from jointfrf.identification.compliance_fit.joint_terms import CrossTerms
 from jointfrf.identification.compliance_fit.least_squares import inverse_information
-from jointfrf.identification.manifold_fit.group_fit import GroupFit, GroupProblem, fit_dofs
+from jointfrf.identification.manifold_fit.group_fit import LITTLE_PATIENCE, GroupFit, GroupProblem, fit_dofs
 from jointfrf.identification.manifold_fit.interface_frfs import InterfaceFrfs
 from jointfrf.identification.manifold_fit.joint_terms import CoupledJoint, DiagonalJoint, JointCoordinates, JointTerms
 from jointfrf.identification.manifold_fit.starts import first_joints
@@ -22,6 +22,8 @@ __all__ = ["FittedGroup", "JointEstimate", "estimate_on_manifold"]
 
 #: A compliance is not taken below this share of its standard error, nor of the receptances around it.
 _RIGID, _ROUNDING = 1e-3, 1e-12
+#: A fit that leaves cross terms unknown fits far better from this ratio of the mean squares on.
+_FAR_BETTER = 4.0
 
 
 class FittedGroup(NamedTuple):
@@ -99,10 +101,27 @@ def estimate_on_manifold(
         data = frfs.of_dofs(dofs)
         joint = coordinates_of(own)
         problem = GroupProblem(data, joint, _unknown(dofs, cross, used, len(data.measured)))
-        fitted = fit_unknown_cross if cross == "ignore" and len(dofs) > 1 else fit_dofs
-        fit = fitted(problem, first_joints(data, joint))
+        fit = _fitted(problem, cross)
         groups.append(FittedGroup(dofs, which, joint, problem, fit))
     return assembled(terms, groups)
+
+
+def _fitted(problem: GroupProblem, cross: CrossTerms) -> GroupFit:
+    """Fit a group: on the manifold, or to the diagonal of C where its cross terms are unknown or deny every joint."""
+    starts = first_joints(problem.data, problem.joint)
+    if not problem.is_diagonal or problem.data.entries.n == 1:
+        return fit_dofs(problem, starts)
+    diagonal = fit_unknown_cross(problem, starts)
+    if cross == "ignore":
+        return diagonal
+    found = fit_dofs(problem, [diagonal.minimum.x], LITTLE_PATIENCE)
+    # Where the diagonal of C fits far better, other starts do not help: cross terms are not zero.
+    if not found.is_good and not (found.is_lost and found.excess > _FAR_BETTER * diagonal.excess):
+        found = min(found, fit_dofs(problem, starts), key=lambda one: one.squares)
+    if not found.is_lost:
+        return found
+    assert diagonal.beside is not None
+    return diagonal._replace(beside=diagonal.beside._replace(noise_squares=found.excess * diagonal.equations))
 
 
 def coordinates_of(terms: JointTerms) -> JointCoordinates:

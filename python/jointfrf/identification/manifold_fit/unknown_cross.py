@@ -100,7 +100,7 @@ def _lines(problem: GroupProblem) -> tuple[_Lines, float]:
     data = problem.data
     n = data.entries.n
     known = ~problem.unknown.reshape(-1, n, n)[:, range(n), range(n)]
-    found = compliance_lines(data, symmetric=True)
+    found, plain = compliance_lines(data)
     weight = _weight(hidden_share(data), found, 2 * problem.joint.lower.size)
     found = _finite(found)
     asymmetry = np.nan
@@ -109,8 +109,7 @@ def _lines(problem: GroupProblem) -> tuple[_Lines, float]:
         asymmetry = float(np.sqrt((weight * found.squares).sum() / conditions))
         by_line = asymmetry**2 > max(_MISFIT**2, 1 + _SIGMA / np.sqrt(conditions))
         if by_line or _mean_squares(found, weight).max() > _CERTAIN:
-            found = _finite(compliance_lines(data, symmetric=False))
-            return _Lines(found, known, weight), max(asymmetry, _MISFIT)
+            return _Lines(_finite(plain), known, weight), max(asymmetry, _MISFIT)
     return _Lines(found, known, weight), asymmetry
 
 
@@ -169,6 +168,7 @@ def _with_scatter(
     variance = np.maximum(variance, least)
     # Of a line that counts less, so does its likelihood.
     w = np.maximum(lines.weight, np.finfo(float).tiny)
+    reach, last = np.full(variance.size, _FASTEST), np.zeros(variance.size)
     for step in range(1, _STEPS + 1):
         forms = lines.forms(variance)
         best = _best_of([minimise_forms(forms, joint, start) for start in starts])
@@ -177,10 +177,10 @@ def _with_scatter(
         slope = (abs(weighted) ** 2 / w[:, None]).sum(axis=0) - np.einsum("laa->a", forms.weight).real
         information = (abs(forms.weight) ** 2 / w[:, None, None]).sum(axis=0)
         change = inverse_information(information) @ slope
-        there = np.clip(variance + change, variance / _FASTEST, variance * _FASTEST)
-        there = np.maximum(there, least)
-        gain = float(slope @ (there - variance))
-        if abs(gain) < _SETTLED:
+        # Where the slope changes its sign the maximum lies between: steps become shorter.
+        reach, last = np.where(slope * last < 0, np.sqrt(reach), reach), slope
+        there = np.maximum(np.clip(variance + change, variance / reach, variance * reach), least)
+        if float(abs(slope * (there - variance)).sum()) < _SETTLED:
             return best, forms, np.sqrt(variance), step, True
         variance = there
     return best, forms, np.sqrt(variance), step, False
