@@ -82,8 +82,8 @@ class Misfitting(NamedTuple):
     ----------
     noise_squares : float
         Squares of the residual in units of the noise alone.
-    asymmetry : float
-        Residual of the conditions that C is symmetric, in units of the noise; NaN where there are none.
+    is_symmetric : bool
+        Whether C is symmetric to noise; otherwise its symmetry was not used.
     scatter : ndarray, shape (n,), optional
         Standard deviation of the diagonal of C between lines, beside its noise, m/N; where it is more than noise.
     hidden : int
@@ -91,7 +91,7 @@ class Misfitting(NamedTuple):
     """
 
     noise_squares: float
-    asymmetry: float
+    is_symmetric: bool
     scatter: FloatArray | None
     hidden: int
 

@@ -17,6 +17,8 @@ __all__ = ["first_joints", "hidden_share", "smooth_compliance", "starts_on_manif
 
 #: Smooth FRFs have about this share of the noise.
 _SMOOTH = 0.2
+#: Squares of a start are minimised to this.
+_ROUGH = 0.1
 #: Lines count less from this relative noise of gamma_jk on.
 _HIDDEN = 0.1
 
@@ -180,7 +182,8 @@ def _coupled_starts(
     forms = LineForms(mean, weight, np.zeros_like(mean), np.zeros(len(mean)))
     starts = [_linear_start(value, own, line_weight, joint), _mean_start(value, own, line_weight, joint)]
     starts = [start for start in starts if np.isfinite(start).all()]
-    minima = sorted((minimise_forms(forms, joint, start) for start in starts), key=lambda found: found.cost)
+    found = (minimise_forms(forms, joint, start, least_gain=_ROUGH) for start in starts)
+    minima = sorted(found, key=lambda one: one.cost)
     return [found.x for found in minima] + starts
 
 

@@ -80,7 +80,7 @@ def fit_unknown_cross(problem: GroupProblem, starts: Iterable[FloatArray]) -> Gr
     alone what the best constant is.
     """
     joint = problem.joint
-    lines, asymmetry = _lines(problem)
+    lines, is_symmetric = _lines(problem)
     by_noise = lines.forms(np.zeros(joint.terms.n))
     best = _best_of([minimise_forms(by_noise, joint, start) for start in [*starts, _middle(lines, joint)]])
     equations = float((lines.weight[:, None] * lines.known).sum())
@@ -91,26 +91,31 @@ def fit_unknown_cross(problem: GroupProblem, starts: Iterable[FloatArray]) -> Gr
         best, forms, scatter, steps, converged = _with_scatter(lines, joint, best)
     noise_squares = float(by_noise.at(joint.compliance(best.x))[0].sum())
     seen = lines.weight > 0
-    told = Misfitting(noise_squares, asymmetry, scatter, int(np.count_nonzero(lines.weight < 0.5)))
+    told = Misfitting(noise_squares, is_symmetric, scatter, int(np.count_nonzero(lines.weight < 0.5)))
     return GroupFit(best, forms, seen, equations, possible, steps, converged, told)
 
 
-def _lines(problem: GroupProblem) -> tuple[_Lines, float]:
-    """Return the lines, and the residual of the conditions that C is symmetric, in units of the noise."""
+def _lines(problem: GroupProblem) -> tuple[_Lines, bool]:
+    """Return the lines, and whether C is symmetric."""
     data = problem.data
     n = data.entries.n
     known = ~problem.unknown.reshape(-1, n, n)[:, range(n), range(n)]
     found, plain = compliance_lines(data)
     weight = _weight(hidden_share(data), found, 2 * problem.joint.lower.size)
     found = _finite(found)
-    asymmetry = np.nan
-    if found.apart.size:
-        conditions = float(weight.sum()) * found.apart.shape[1]
-        asymmetry = float(np.sqrt((weight * found.squares).sum() / conditions))
-        by_line = asymmetry**2 > max(_MISFIT**2, 1 + _SIGMA / np.sqrt(conditions))
-        if by_line or _mean_squares(found, weight).max() > _CERTAIN:
-            return _Lines(_finite(plain), known, weight), max(asymmetry, _MISFIT)
-    return _Lines(found, known, weight), asymmetry
+    if _are_zero(found, weight):
+        return _Lines(found, known, weight), True
+    return _Lines(_finite(plain), known, weight), False
+
+
+def _are_zero(found: ComplianceLines, weight: FloatArray) -> bool:
+    """Whether the conditions are zero but for noise, on lines and in their means over all lines."""
+    count = float(weight.sum()) * found.apart.shape[1]
+    if count == 0:
+        return True
+    mean_square = float((weight * found.squares).sum()) / count
+    by_line = mean_square > max(_MISFIT**2, 1 + _SIGMA / np.sqrt(count))
+    return not by_line and bool(_mean_squares(found, weight).max() < _CERTAIN)
 
 
 def _mean_squares(found: ComplianceLines, weight: FloatArray) -> FloatArray:
