@@ -23,10 +23,11 @@ def term_matrices(basis):
     )
 
 
-def cramer_rao(gamma, k_joint, basis):
+def cramer_rao(gamma, k_joint, basis, *, unknown_cross=False):
     """Covariance for unit relative noise of independent entries of gamma, when nothing is known around the joint.
 
-    Unknown on every line: the symmetric dynamic stiffnesses Z_A and Z_B of both sides; measured: all entries of gamma.
+    Unknown on every line: the symmetric dynamic stiffnesses Z_A and Z_B of both sides, and where `unknown_cross` the
+    cross terms of the joint's compliance; measured: all entries of gamma.
     """
     n = k_joint.shape[-1]
     inverse = np.linalg.inv(gamma)
@@ -54,6 +55,10 @@ def cramer_rao(gamma, k_joint, basis):
         steps = 1e-5 * np.concatenate([np.outer(root, root)[upper] for root in roots])
         moved = np.diag(steps).astype(complex)
         free = ((model(k, sides + moved) - model(k, sides - moved)) / (2 * steps[:, None])).T
+        if unknown_cross:
+            small = 1e-6 * symmetric(np.eye(q // 2), n)[[a != b for a, b in zip(*upper, strict=True)]] / size
+            by_cross = (model(k + k @ small @ k, sides) - model(k - k @ small @ k, sides)).T
+            free = np.concatenate([free, by_cross], axis=1)
         weight = 1 / abs(gamma[i].ravel())[:, None]
         slopes, free = slopes * weight, free * weight
         free = free / np.linalg.norm(free, axis=0)

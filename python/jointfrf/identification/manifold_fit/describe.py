@@ -29,6 +29,8 @@ _BY_CHANCE = 1e-3
 _ROUNDING = 1e-7
 #: Share of lines that cannot fit the joint from which on a warning says so.
 _UNTRUSTED = 0.02
+#: Share of a compliance by which it varies between lines from which on a warning says so.
+_VARIES = 0.05
 _COUPLED = (
     "; with cross terms it does: the DOFs of the joint are coupled, so ignore or fit the cross terms (cross), or move "
     "the reference point"
@@ -51,12 +53,14 @@ def describe_manifold(found: ManifoldFit, problem: ManifoldProblem) -> Described
         *_noise_notes(problem),
         *_small_residual_notes(found.misfit, problem.noise),
         *_group_notes([group.dofs for group in result.groups], fit.dofs, problem.options.cross),
+        *_hidden_notes(result, fit.dofs),
         *_significance_notes(fit),
     ]
     doubts = [
         *([] if found.cross_fits else _untrusted_warnings(result, fit.dofs)),
         *_parameter_warnings(fit, intervals),
         *_misfit_warnings(found, problem),
+        *_diagonal_warnings(result, fit.dofs, problem.options.cross),
         *_scatter_warnings(fit, found.spread),
         *_sign_warnings(fit, intervals),
     ]
@@ -134,10 +138,50 @@ def _untrusted_warnings(result: JointEstimate, dofs: tuple[str, ...]) -> list[st
     several = len(result.groups) > 1
     told = []
     for group in result.groups:
+        if group.fit.beside is not None:
+            continue
         out, total = int(np.count_nonzero(~group.fit.trusted)), group.fit.trusted.size
         if out > _UNTRUSTED * total:
             whose = f" of {_listed([dofs[d] for d in group.dofs])}" if several else ""
             told.append(f"{out} of {total} lines{whose} do not fit the joint found within their noise and are left out")
+    return told
+
+
+def _hidden_notes(result: JointEstimate, dofs: tuple[str, ...]) -> list[str]:
+    """Count the lines on which noise hides the transmission of the joint, where its cross terms are unknown."""
+    told = []
+    for group in result.groups:
+        beside, total = group.fit.beside, group.fit.trusted.size
+        if beside is not None and beside.hidden > _UNTRUSTED * total:
+            told.append(
+                f"on {beside.hidden} of {total} lines noise hides gamma_jk of {_listed([dofs[d] for d in group.dofs])} "
+                "(nearly singular): they count less"
+            )
+    return told
+
+
+def _diagonal_warnings(result: JointEstimate, dofs: tuple[str, ...], cross: CrossTerms) -> list[str]:
+    """Say what denies a joint where only the diagonal of its compliance was fitted."""
+    told = []
+    for group in result.groups:
+        beside = group.fit.beside
+        if beside is None:
+            continue
+        whose = _listed([dofs[d] for d in group.dofs])
+        if cross != "ignore":
+            told.append(f"no joint without cross terms is near the data of {whose}: its cross terms were ignored")
+        if not beside.is_symmetric:
+            told.append(
+                f"the compliance between {whose} is not symmetric: the DOFs of both sides are not those of one point, "
+                "or more than a joint connects them; its symmetry was not used"
+            )
+        if beside.scatter is not None:
+            share = beside.scatter / np.maximum(group.fit.minimum.x[: len(group.dofs)], np.finfo(float).tiny)
+            varying = [f"{dofs[d]} by {100 * s:.0f} %" for d, s in zip(group.dofs, share, strict=True) if s > _VARIES]
+            if varying:
+                told.append(
+                    f"the compliance varies from line to line beyond its noise: {_listed(varying)}; its mean was fitted"
+                )
     return told
 
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf.dofs import Parameter
-from jointfrf.identification.manifold_fit.group_fit import GroupFit, GroupProblem, fit_dofs
+from jointfrf.identification.manifold_fit.group_fit import LITTLE_PATIENCE, GroupFit, GroupProblem, fit_dofs
 from jointfrf.identification.manifold_fit.interface_frfs import InterfaceFrfs
 from jointfrf.identification.manifold_fit.joint_terms import (
     CoupledJoint,
@@ -19,8 +18,8 @@ from jointfrf.identification.manifold_fit.joint_terms import (
     JointTerms,
 )
 from jointfrf.identification.manifold_fit.line_forms import inverse_information
-from jointfrf.identification.manifold_fit.manifold import LineData
 from jointfrf.identification.manifold_fit.starts import first_joints
+from jointfrf.identification.manifold_fit.unknown_cross import fit_unknown_cross
 from jointfrf.kernel.arguments import FloatArray
 
 __all__ = ["FittedGroup", "JointEstimate", "estimate_on_manifold"]
@@ -28,6 +27,8 @@ __all__ = ["FittedGroup", "JointEstimate", "estimate_on_manifold"]
 
 #: A compliance is not taken below this share of its standard error, nor of the receptances around it.
 _RIGID, _ROUNDING = 1e-3, 1e-12
+#: A fit that leaves cross terms unknown fits far better from this ratio of the mean squares on.
+_FAR_BETTER = 4.0
 
 
 class FittedGroup(NamedTuple):
@@ -64,6 +65,8 @@ class JointEstimate(NamedTuple):
     groups : tuple of FittedGroup
     excess : float
         Mean square of the residual in units of the noise.
+    scale : float
+        The same in the units in which lines were weighted: those of the noise, unless lines were seen to vary.
     equations : float
         Complex equations used.
     """
@@ -73,6 +76,7 @@ class JointEstimate(NamedTuple):
     covariance: FloatArray
     groups: tuple[FittedGroup, ...]
     excess: float
+    scale: float
     equations: float
 
     @property
@@ -109,16 +113,36 @@ def estimate_on_manifold(
         data = frfs.of_dofs(dofs)
         joint = coordinates_of(own)
         problem = GroupProblem(data, joint, _unknown(dofs, cross, used, len(data.measured)))
-        fit = fit_dofs(problem, _starts(data, joint, known.get(tuple(dofs.tolist()))))
+        fit = _fitted(problem, cross, known.get(tuple(dofs.tolist())))
         groups.append(FittedGroup(dofs, which, joint, problem, fit))
     return assembled(terms, groups)
 
 
-def _starts(data: LineData, joint: JointCoordinates, near: FittedGroup | None) -> Iterator[FloatArray]:
-    """Return first joints: that of other FRFs, where it has the same parameters and converged, then those of these."""
-    if near is not None and near.fit.converged and near.joint.terms.parameters == joint.terms.parameters:
-        yield near.fit.minimum.x
-    yield from first_joints(data, joint)
+def _fitted(problem: GroupProblem, cross: CrossTerms, near: FittedGroup | None) -> GroupFit:
+    """Fit a group: on the manifold, or to the diagonal of C where its cross terms are unknown or deny every joint."""
+    if near is not None and cross != "ignore" and _is_near(near, problem):
+        found = fit_dofs(problem, [near.fit.minimum.x], LITTLE_PATIENCE)
+        if found.is_good:
+            return found
+    starts = first_joints(problem.data, problem.joint)
+    if not problem.is_diagonal or problem.data.entries.n == 1:
+        return fit_dofs(problem, starts)
+    diagonal = fit_unknown_cross(problem, starts)
+    if cross == "ignore":
+        return diagonal
+    found = fit_dofs(problem, [diagonal.minimum.x], LITTLE_PATIENCE)
+    # Where the diagonal of C fits far better, other starts do not help: cross terms are not zero.
+    if not found.is_good and not (found.is_lost and found.excess > _FAR_BETTER * diagonal.excess):
+        found = min(found, fit_dofs(problem, starts), key=lambda one: one.squares)
+    if not found.is_lost:
+        return found
+    assert diagonal.beside is not None
+    return diagonal._replace(beside=diagonal.beside._replace(noise_squares=found.excess * diagonal.equations))
+
+
+def _is_near(near: FittedGroup, problem: GroupProblem) -> bool:
+    """Whether the fit of other FRFs has the same parameters, and converged."""
+    return near.fit.converged and near.joint.terms.parameters == problem.joint.terms.parameters
 
 
 def coordinates_of(terms: JointTerms) -> JointCoordinates:
@@ -145,13 +169,14 @@ def assembled(terms: JointTerms, groups: list[FittedGroup]) -> JointEstimate:
     place = np.full(p, -1)
     place[kept] = np.arange(kept.size)
     equations = sum(group.fit.equations for group in groups)
-    squares = sum(group.fit.minimum.cost for group in groups)
+    degrees = max(equations - kept.size / 2, 1)
     return JointEstimate(
         tuple(terms.parameters[i] for i in kept),
         theta[kept],
         covariance[kept[:, None], kept],
         tuple(group._replace(which=place[group.which]) for group in groups),
-        squares / max(equations - kept.size / 2, 1),
+        sum(group.fit.noise_squares for group in groups) / degrees,
+        sum(group.fit.minimum.cost for group in groups) / degrees,
         equations,
     )
 

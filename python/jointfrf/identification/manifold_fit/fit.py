@@ -125,7 +125,7 @@ def _with_damping(problem: ManifoldProblem) -> tuple[JointEstimate, tuple[DofDam
     if problem.options.cross == "fit":
         return _with_common_damping(problem)
     both = _estimate(problem, "both")
-    factor = problem.noise.inflation * max(both.excess, _LEAST_EXCESS if problem.noise.is_assumed else 1.0)
+    factor = problem.noise.inflation * max(both.scale, _LEAST_EXCESS if problem.noise.is_assumed else 1.0)
     of_dof = {}
     for group in both.groups:
         for one in choose_damping(group, tuple(problem.dofs[d] for d in group.dofs), factor):

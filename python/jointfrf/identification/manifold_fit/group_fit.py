@@ -19,19 +19,23 @@ from jointfrf.identification.manifold_fit.manifold import LineData, OnManifold, 
 from jointfrf.identification.manifold_fit.starts import smooth_compliance, starts_on_manifold
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
-__all__ = ["GroupFit", "GroupProblem", "fit_dofs"]
+__all__ = ["LITTLE_PATIENCE", "GroupFit", "GroupProblem", "Misfitting", "fit_dofs"]
 
 #: Linearisations at most.
 _MOST = 25
-#: The fit has converged when the coordinates move by less than this many standard errors.
+#: The fit has converged when the coordinates move by less than this many standard errors, root mean square.
 _MOVED = 0.02
 #: Steps of the projection: of the first one, and of those that follow a small change of the joint.
 _FIRST_STEPS, _NEXT_STEPS = 30, 8
 #: A line that stays farther from the manifold than this, in squares per unknown and of the noise, is not trusted.
 _FAR = 3.0
-_PATIENCE = 8
+#: Linearisations of a fit that stays far from the data, from the first start and from others; after twice the first
+#: number lines that are not trusted do not come back.
+PATIENCE, LITTLE_PATIENCE = 8, 4
 #: A fit is far from the data when the squares exceed their number by this factor.
 _LOST = 9.0
+#: A residual up to this many times the noise may be noise.
+_GOOD = 1.15
 #: A compliance is barely seen when its standard error exceeds this share of it.
 _BARELY = 0.1
 #: Of a compliance with this relative error, damping is not known: its rate is taken below 1 where it is linearised.
@@ -71,8 +75,29 @@ class GroupProblem(NamedTuple):
         return c
 
 
+class Misfitting(NamedTuple):
+    """What lines say beside the joint where cross terms of C are unknown.
+
+    Attributes
+    ----------
+    noise_squares : float
+        Squares of the residual in units of the noise alone.
+    is_symmetric : bool
+        Whether C is symmetric to noise; otherwise its symmetry was not used.
+    scatter : ndarray, shape (n,), optional
+        Standard deviation of the diagonal of C between lines, beside its noise, m/N; where it is more than noise.
+    hidden : int
+        Lines that count less than half because noise hides gamma_jk.
+    """
+
+    noise_squares: float
+    is_symmetric: bool
+    scatter: FloatArray | None
+    hidden: int
+
+
 class GroupFit(NamedTuple):
-    """Result of `fit_dofs`.
+    """Result of the fit of one group.
 
     Attributes
     ----------
@@ -88,6 +113,8 @@ class GroupFit(NamedTuple):
         Complex equations of all lines.
     iterations : int
     converged : bool
+    beside : Misfitting, optional
+        Where cross terms of C are unknown.
     """
 
     minimum: FormMinimum
@@ -97,6 +124,12 @@ class GroupFit(NamedTuple):
     possible: float
     iterations: int
     converged: bool
+    beside: Misfitting | None = None
+
+    @property
+    def noise_squares(self) -> float:
+        """Squares of the residual in units of the noise."""
+        return self.beside.noise_squares if self.beside else self.minimum.cost
 
     @property
     def squares(self) -> float:
@@ -104,12 +137,22 @@ class GroupFit(NamedTuple):
         return self.minimum.cost + _FAR * (self.possible - self.equations)
 
     @property
+    def is_lost(self) -> bool:
+        """Whether it ended far from the data."""
+        return not self.converged and self.excess > _LOST
+
+    @property
+    def is_good(self) -> bool:
+        """Whether it converged, and the residual is that of the noise."""
+        return self.converged and self.excess < _GOOD**2
+
+    @property
     def excess(self) -> float:
         """Mean square of the residual in units of the noise."""
-        return self.minimum.cost / max(self.equations - self.minimum.x.size / 2, 1)
+        return self.noise_squares / max(self.equations - self.minimum.x.size / 2, 1)
 
 
-def fit_dofs(problem: GroupProblem, starts: Iterable[FloatArray]) -> GroupFit:
+def fit_dofs(problem: GroupProblem, starts: Iterable[FloatArray], patience: int = PATIENCE) -> GroupFit:
     """Fit from one start after the other until the residual is that of the noise; else keep the lowest.
 
     Parameters
@@ -117,19 +160,21 @@ def fit_dofs(problem: GroupProblem, starts: Iterable[FloatArray]) -> GroupFit:
     problem : GroupProblem
     starts : iterable of ndarray, shape (p,)
         Coordinates of the joint.
+    patience : int
+        Linearisations from the first start after which a fit far from the data ends.
     """
     best: GroupFit | None = None
     for start in starts:
         if not np.isfinite(start).all():
             continue
-        found = _iterate(problem, start)
+        found = _iterate(problem, start, patience if best is None else LITTLE_PATIENCE)
         if best is None or found.squares < best.squares:
             best = found
-        if best.converged and best.excess < 1.15**2:
+        if best.is_good:
             break
     if best is None:
         raise np.linalg.LinAlgError("no start of the fit is finite")
-    return _from_softer(problem, best) if problem.is_diagonal else best
+    return _from_softer(problem, best) if problem.is_diagonal and not best.is_lost else best
 
 
 def _from_softer(problem: GroupProblem, best: GroupFit) -> GroupFit:
@@ -158,19 +203,22 @@ def _from_softer(problem: GroupProblem, best: GroupFit) -> GroupFit:
             factor *= 4.0
 
 
-def _iterate(problem: GroupProblem, start: FloatArray) -> GroupFit:
+def _iterate(problem: GroupProblem, start: FloatArray, patience: int = PATIENCE) -> GroupFit:
     data, joint = problem.data, problem.joint
     free = _equations(problem)
     x: FloatArray = start
     linearised_at: FloatArray = start
     on: OnManifold | None = None
     unknown = smooth_compliance(data) if problem.unknown.any() else None
+    trusted = np.ones(len(data.measured), np.bool_)
     for step in range(1, _MOST + 1):
         c = problem.of_joint(joint.compliance(linearised_at))
         if unknown is not None:
             c = np.where(problem.unknown.reshape(c.shape), unknown, c)
         on = project(data.smooth, data, c, on, _NEXT_STEPS) if on else starts_on_manifold(data, c, _FIRST_STEPS)
-        on, trusted = _trusted(data, c, on, joint)
+        on = _rescued(data, c, on)
+        near = _trusted(on, data.entries.n, joint)
+        trusted = near & trusted if step > 2 * PATIENCE and (near & trusted).any() else near
         (forms, of_smooth) = normal_forms(data, c, on, (data.measured, data.smooth))
         # Unknown entries of C move on all lines: they may bring a line back to where it is trusted.
         forms, unknown = _used(problem, forms, of_smooth, c)
@@ -182,8 +230,8 @@ def _iterate(problem: GroupProblem, start: FloatArray) -> GroupFit:
         moved = float(np.sqrt(abs(2 * (change @ minimum.information @ change))))
         x = minimum.x
         equations = float(free[trusted].sum())
-        converged = moved < _MOVED and step > 1
-        if converged or (step > _PATIENCE and minimum.cost > _LOST * equations):
+        converged = bool(moved < _MOVED * np.sqrt(x.size)) and step > 1
+        if converged or (step > patience and minimum.cost > _LOST * equations):
             break
         linearised_at = _within_sight(problem.joint, x, error) if problem.is_diagonal else x
     return GroupFit(minimum, forms, trusted, equations, float(free.sum()), step, converged)
@@ -210,24 +258,25 @@ def _equations(problem: GroupProblem) -> FloatArray:
     return equations
 
 
-def _trusted(
-    data: LineData, c: ComplexArray, on: OnManifold, joint: JointCoordinates
-) -> tuple[OnManifold, NDArray[np.bool_]]:
-    """Give lines far from the manifold other starts; return the points, and which lines are near enough."""
-    bound = _FAR * data.entries.n**2
-    far = np.flatnonzero(~(on.squares <= bound))
-    if far.size and far.size < len(c):
-        own = data.on_lines(far)
-        other = starts_on_manifold(own, c[far], 25)
-        squares = on.squares.copy()
-        h, m = on.h.copy(), on.m.copy()
-        nearer = other.squares < squares[far]
-        h[far[nearer]], m[far[nearer]], squares[far[nearer]] = (x[nearer] for x in other)
-        on = OnManifold(h, m, squares)
-    trusted = on.squares <= bound
-    if np.count_nonzero(trusted) < max(joint.lower.size, len(c) // 4):
+def _rescued(data: LineData, c: ComplexArray, on: OnManifold) -> OnManifold:
+    """Give lines far from the manifold other starts."""
+    far = np.flatnonzero(~(on.squares <= _FAR * data.entries.n**2))
+    if far.size == 0 or far.size == len(c):
+        return on
+    other = starts_on_manifold(data.on_lines(far), c[far], 25)
+    squares = on.squares.copy()
+    h, m = on.h.copy(), on.m.copy()
+    nearer = other.squares < squares[far]
+    h[far[nearer]], m[far[nearer]], squares[far[nearer]] = (x[nearer] for x in other)
+    return OnManifold(h, m, squares)
+
+
+def _trusted(on: OnManifold, n: int, joint: JointCoordinates) -> NDArray[np.bool_]:
+    """Return which lines are near enough to the manifold; half of them where few are."""
+    trusted = np.asarray(on.squares <= _FAR * n**2)
+    if np.count_nonzero(trusted) < max(joint.lower.size, len(trusted) // 4):
         trusted = on.squares <= np.quantile(on.squares, 0.5)
-    return on, trusted
+    return trusted
 
 
 def _used(

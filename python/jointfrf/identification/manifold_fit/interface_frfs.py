@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
+from scipy.linalg import lapack
 
 from jointfrf.identification.manifold_fit.manifold import FrfEntries, LineData
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
@@ -119,12 +120,25 @@ class InterfaceFrfs(NamedTuple):
         g = of_channels.reshape(len(p), -1)
         unused = ~np.isfinite(self.variance.reshape(len(variance), -1))
         dead = unused @ (g != 0).T
-        inverse_std, whitening = np.empty((len(variance), len(p))), np.empty((len(variance), len(p), len(p)))
-        for line, own in enumerate(variance.reshape(len(variance), -1)):
-            covariance = (g * own) @ g.T
-            total = covariance.diagonal()
-            inverse_std[line] = np.where(dead[line], 0, 1 / np.sqrt(np.where(dead[line], 1, total)))
-            scaled = covariance * np.outer(inverse_std[line], inverse_std[line]) + np.diag(dead[line].astype(float))
-            # DOFs made of the same channels may leave an entry without noise of its own.
-            whitening[line] = np.linalg.inv(np.linalg.cholesky(scaled + _OWN_NOISE * np.eye(len(p))))
+        covariance = _covariance(sparse.csr_array(g), variance.reshape(len(variance), -1))
+        total = np.einsum("lpp->lp", covariance)
+        inverse_std = np.where(dead, 0, 1 / np.sqrt(np.where(dead, 1, total)))
+        scaled = covariance * inverse_std[:, :, None] * inverse_std[:, None, :]
+        own = np.arange(len(p))
+        # DOFs made of the same channels may leave an entry without noise of its own.
+        scaled[:, own, own] += dead + _OWN_NOISE
+        whitening = np.linalg.cholesky(scaled)
+        for triangle in whitening:
+            triangle[:] = lapack.dtrtri(triangle, lower=1)[0]
         return inverse_std, whitening
+
+
+def _covariance(g: sparse.csr_array, variance: FloatArray) -> FloatArray:
+    """Return G diag(variance) G^T of each line; each entry comes from few channels."""
+    q = g.shape[0]
+    a, b = np.tril_indices(q)
+    products = sparse.csr_array(g[a].multiply(g[b]))
+    covariance = np.empty((len(variance), q, q))
+    covariance[:, a, b] = (products @ variance.T).T
+    covariance[:, b, a] = covariance[:, a, b]
+    return covariance

@@ -132,7 +132,7 @@ def spread_of(found: JointEstimate, inflation: float, *, is_level_known: bool = 
     The largest of information, scatter between lines and scatter between blocks; the latter two only where they exceed
     the former by more than chance, for one parameter or for all together.
     """
-    scale = max(found.excess, 1.0) if is_level_known else found.excess
+    scale = max(found.scale, 1.0) if is_level_known else found.scale
     by_noise = np.full(len(found.parameters), inflation * scale)
     by_lines, by_blocks, of_lines, of_blocks = (np.full_like(by_noise, np.nan) for _ in range(4))
     for group in found.groups:

@@ -90,11 +90,11 @@ class JointTerms(NamedTuple):
 
     def stiffness(self, theta: FloatArray) -> ComplexArray:
         """Return K*(w) of parameters, shape (n_freq, n, n), N/m."""
-        k = np.zeros((self.omega.size, self.n, self.n), np.complex128)
+        k, factors = np.zeros((self.omega.size, self.n, self.n), np.complex128), self.factors
         for value, kind, (a, b) in zip(theta, self.kinds, self.pairs, strict=True):
-            k[:, a, b] += value * self.factors[kind]
+            k[:, a, b] += value * factors[kind]
             if a != b:
-                k[:, b, a] += value * self.factors[kind]
+                k[:, b, a] += value * factors[kind]
         return k
 
 
@@ -149,6 +149,11 @@ class JointCoordinates(Protocol):
     def slope(self, x: FloatArray, entries: ComplexArray) -> ComplexArray:
         """Return their derivatives by the coordinates, shape (n_freq, q, p)."""
 
+    def normal_equations(
+        self, x: FloatArray, entries: ComplexArray, weight: ComplexArray, residual: ComplexArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return Re(J^H W J), shape (p, p), and Re(J^H r), shape (p,), of all lines; J is the slope."""
+
     def theta(self, x: FloatArray) -> FloatArray:
         """Return the parameters, shape (p,)."""
 
@@ -180,10 +185,10 @@ class DiagonalJoint:
 
     def _turn(self, x: FloatArray) -> ComplexArray:
         """Return 1/(1 + i eta + i w tau) of each DOF, shape (n_freq, n)."""
-        whole = np.ones((self.terms.omega.size, self.terms.n), np.complex128)
+        whole, factors = np.ones((self.terms.omega.size, self.terms.n), np.complex128), self.terms.factors
         for i in self.rates:
             rate = x[i] if self.by_rate else x[i] * x[self.dofs[i]]
-            whole[:, self.dofs[i]] += rate * self.terms.factors[self.terms.kinds[i]]
+            whole[:, self.dofs[i]] += rate * factors[self.terms.kinds[i]]
         return 1 / whole
 
     def compliance(self, x: FloatArray) -> ComplexArray:
@@ -193,15 +198,24 @@ class DiagonalJoint:
 
     def slope(self, x: FloatArray, entries: ComplexArray) -> ComplexArray:
         """Return the derivatives of the diagonal, shape (n_freq, n, p)."""
-        turn = self._turn(x)
+        turn, factors = self._turn(x), self.terms.factors
         slope = np.zeros((*entries.shape, x.size), np.complex128)
         d = np.arange(self.terms.n)
         slope[:, d, d] = turn if self.by_rate else turn**2
         for i in self.rates:
             own = self.dofs[i]
             last = turn[:, own] if self.by_rate else entries[:, own]
-            slope[:, own, i] = -self.terms.factors[self.terms.kinds[i]] * entries[:, own] * last
+            slope[:, own, i] = -factors[self.terms.kinds[i]] * entries[:, own] * last
         return slope
+
+    def normal_equations(
+        self, x: FloatArray, entries: ComplexArray, weight: ComplexArray, residual: ComplexArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the information, shape (p, p), and the gradient, shape (p,), of all lines."""
+        slope = self.slope(x, entries)
+        flat = slope.reshape(-1, x.size)
+        information = (flat.conj().T @ (weight @ slope).reshape(-1, x.size)).real
+        return information, (flat.conj().T @ residual.ravel()).real
 
     def theta(self, x: FloatArray) -> FloatArray:
         """Return k = 1/a, h = eta/a, c = tau/a; infinite for a rigid DOF."""
@@ -238,6 +252,8 @@ class CoupledJoint:
     def __init__(self, terms: JointTerms) -> None:
         self.terms = terms
         self.rows, self.columns = np.triu_indices(terms.n)
+        self.pairs, place = np.unique(terms.pairs, axis=0, return_inverse=True)
+        self.pair_of = place.ravel()
         self.lower = np.full(len(terms.parameters), -np.inf)
         self.upper = -self.lower
 
@@ -245,17 +261,39 @@ class CoupledJoint:
         """Return the upper triangle of C, shape (n_freq, n (n + 1)/2); NaN where K* is singular."""
         return invert(self.terms.stiffness(x), on_singular="nan")[:, self.rows, self.columns]
 
-    def slope(self, x: FloatArray, entries: ComplexArray) -> ComplexArray:
-        """Return the derivatives of the upper triangle, -C E C, shape (n_freq, n (n + 1)/2, p)."""
+    def _by_pair(self, entries: ComplexArray) -> ComplexArray:
+        """Return C E C of each pair of DOFs, upper triangle, shape (n_freq, n (n + 1)/2, m)."""
         n = self.terms.n
         c = np.empty((len(entries), n, n), np.complex128)
         c[:, self.rows, self.columns] = c[:, self.columns, self.rows] = entries
-        a, b = self.terms.pairs.T
+        a, b = self.pairs.T
         left, right = c[:, :, a], c[:, :, b]
-        slope = left[:, self.rows] * right[:, self.columns]
-        slope += np.where(a != b, left[:, self.columns] * right[:, self.rows], 0)
+        by_pair: ComplexArray = left[:, self.rows] * right[:, self.columns]
+        by_pair += np.where(a != b, left[:, self.columns] * right[:, self.rows], 0)
+        return by_pair
+
+    def slope(self, x: FloatArray, entries: ComplexArray) -> ComplexArray:
+        """Return the derivatives of the upper triangle, -C E C, shape (n_freq, n (n + 1)/2, p)."""
+        slope: ComplexArray = self._by_pair(entries)[:, :, self.pair_of]
         slope *= -self.terms.factors[self.terms.kinds].T[:, None, :]
         return slope
+
+    def normal_equations(
+        self, x: FloatArray, entries: ComplexArray, weight: ComplexArray, residual: ComplexArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the information, shape (p, p), and the gradient, shape (p,), of all lines.
+
+        Terms of the same pair differ by a function of frequency only: products are of pairs.
+        """
+        factors, by_pair = self.terms.factors, self._by_pair(entries)
+        adjoint = by_pair.conj().swapaxes(1, 2)
+        products = (adjoint @ (weight @ by_pair)).reshape(len(entries), -1)
+        m = len(self.pairs)
+        of_kinds = (factors.conj()[:, None] * factors).reshape(9, -1) @ products
+        i, kinds = self.pair_of, self.terms.kinds
+        information = of_kinds.real.reshape(3, 3, m, m)[kinds[:, None], kinds, i[:, None], i]
+        gradient = -(factors.conj() @ (adjoint @ residual[..., None])[..., 0]).real[kinds, i]
+        return information, gradient
 
     def theta(self, x: FloatArray) -> FloatArray:
         """Return the parameters."""

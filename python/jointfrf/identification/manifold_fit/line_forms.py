@@ -124,7 +124,7 @@ def minimise_forms(
     damping, small = _FIRST, 0
     cost, entries, residual = _at(forms, joint, x)
     for _ in range(_STEPS):
-        information, gradient = _normal_equations(forms, joint.slope(x, entries), residual)
+        information, gradient = joint.normal_equations(x, entries, forms.weight, residual)
         pressed = ((x <= lower) & (gradient < 0)) | ((x >= upper) & (gradient > 0))
         moving = np.flatnonzero(free & ~pressed)
         step = np.zeros_like(x)
@@ -153,12 +153,3 @@ def minimise_forms(
     return FormMinimum(
         x, cost, line_information.sum(axis=0), line_gradient.sum(axis=0), line_gradient, line_information
     )
-
-
-def _normal_equations(forms: LineForms, slope: ComplexArray, residual: ComplexArray) -> tuple[FloatArray, FloatArray]:
-    """Return the information, shape (p, p), and the gradient, shape (p,), of all lines."""
-    p = slope.shape[-1]
-    flat = slope.reshape(-1, p)
-    information = (flat.conj().T @ (forms.weight @ slope).reshape(-1, p)).real
-    gradient = (flat.conj().T @ residual.ravel()).real
-    return information, gradient

@@ -13,10 +13,12 @@ from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.kernel.linear_algebra import invert, solve
 from jointfrf.substructuring.compliance import compliance_covariance, joint_compliance
 
-__all__ = ["first_joints", "smooth_compliance", "starts_on_manifold"]
+__all__ = ["first_joints", "hidden_share", "smooth_compliance", "starts_on_manifold"]
 
 #: Smooth FRFs have about this share of the noise.
 _SMOOTH = 0.2
+#: Squares of a start are minimised to this.
+_ROUGH = 0.1
 #: Lines count less from this relative noise of gamma_jk on.
 _HIDDEN = 0.1
 
@@ -130,6 +132,11 @@ def _variance(data: LineData) -> FloatArray:
     return np.where(w > 0, 1 / np.where(w > 0, w, 1) ** 2, 0)
 
 
+def hidden_share(data: LineData) -> FloatArray:
+    """Return the largest relative noise of gamma_jk, of the smooth FRFs, on each line, shape (n_freq,)."""
+    return _hidden(data.entries.matrix(data.smooth), data.entries.matrix(_variance(data)))
+
+
 def _hidden(gamma: ComplexArray, spread: FloatArray) -> FloatArray:
     """Return the largest relative noise of gamma_jk on the diagonal of gamma_jk^-1 dgamma_jk, shape (n_freq,)."""
     n = gamma.shape[-1] // 2
@@ -175,7 +182,8 @@ def _coupled_starts(
     forms = LineForms(mean, weight, np.zeros_like(mean), np.zeros(len(mean)))
     starts = [_linear_start(value, own, line_weight, joint), _mean_start(value, own, line_weight, joint)]
     starts = [start for start in starts if np.isfinite(start).all()]
-    minima = sorted((minimise_forms(forms, joint, start) for start in starts), key=lambda found: found.cost)
+    found = (minimise_forms(forms, joint, start, least_gain=_ROUGH) for start in starts)
+    minima = sorted(found, key=lambda one: one.cost)
     return [found.x for found in minima] + starts
 
 

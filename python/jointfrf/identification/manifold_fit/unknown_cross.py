@@ -1,0 +1,195 @@
+"""The fit where cross terms of C are unknown: of the joint to the diagonal of C on every line."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointfrf.identification.manifold_fit.compliance_lines import ComplianceLines, compliance_lines
+from jointfrf.identification.manifold_fit.group_fit import GroupFit, GroupProblem, Misfitting
+from jointfrf.identification.manifold_fit.joint_terms import JointCoordinates
+from jointfrf.identification.manifold_fit.line_forms import FormMinimum, LineForms, inverse_information, minimise_forms
+from jointfrf.identification.manifold_fit.starts import hidden_share
+from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.kernel.linear_algebra import invert
+
+__all__ = ["fit_unknown_cross"]
+
+#: Lines count less from this relative noise of gamma_jk on.
+_HIDDEN = 0.3
+#: A residual larger than this is not noise: C varies between lines, or is not symmetric.
+_MISFIT = 1.15
+#: A mean square is told from 1 at this many standard deviations.
+_SIGMA = 4.0
+#: Squares of the mean over lines, in units of its noise, above which it is not zero.
+_CERTAIN = 16.0
+#: Steps for the scatter between lines at most; the change of its log-likelihood at which they end; by which factor a
+#: variance changes in one step at most.
+_STEPS, _SETTLED, _FASTEST = 60, 0.01, 10.0
+
+
+class _Lines(NamedTuple):
+    """What lines say of the diagonal of C.
+
+    Attributes
+    ----------
+    of : ComplianceLines
+    known : ndarray of bool, shape (n_freq, n)
+        DOFs inside their bands.
+    weight : ndarray, shape (n_freq,)
+        Near 1; near 0 where noise hides gamma_jk.
+    """
+
+    of: ComplianceLines
+    known: NDArray[np.bool_]
+    weight: FloatArray
+
+    def forms(self, variance: FloatArray) -> LineForms:
+        """Return the quadratic forms where C varies between lines with this variance, shape (n,), beside its noise."""
+        n = self.known.shape[1]
+        diagonal = np.arange(n)
+        both = self.known[:, :, None] & self.known[:, None, :]
+        covariance = np.where(both, self.of.covariance, 0)
+        covariance[:, diagonal, diagonal] += np.where(self.known, variance, 1)
+        size = np.sqrt(np.einsum("laa->la", covariance).real)
+        outer = size[:, :, None] * size[:, None, :]
+        information = np.where(both, invert(covariance / outer, on_singular="nan") / outer, 0)
+        information = self.weight[:, None, None] * information
+        value = self.of.value
+        return LineForms(value, information, np.zeros_like(value), np.zeros(len(value)))
+
+
+def fit_unknown_cross(problem: GroupProblem, starts: Iterable[FloatArray]) -> GroupFit:
+    """Fit the diagonal of C by weighted least squares; lines that vary by more than their noise count alike.
+
+    Parameters
+    ----------
+    problem : GroupProblem
+        Its joint has no cross terms, and all cross terms of C are unknown.
+    starts : iterable of ndarray, shape (p,)
+        Coordinates of the joint.
+
+    Notes
+    -----
+    The symmetry of C is used unless the FRFs contradict it. Where the residual exceeds the noise, C is taken to vary
+    from line to line, with a variance of each DOF found by maximum likelihood: lines of little noise then do not decide
+    alone what the best constant is.
+    """
+    joint = problem.joint
+    lines, is_symmetric = _lines(problem)
+    by_noise = lines.forms(np.zeros(joint.terms.n))
+    best = _best_of([minimise_forms(by_noise, joint, start) for start in [*starts, _middle(lines, joint)]])
+    equations = float((lines.weight[:, None] * lines.known).sum())
+    possible = float(lines.known.sum())
+    scatter, forms, steps, converged = None, by_noise, 1, True
+    degrees = max(equations - best.x.size / 2, 1.0)
+    if best.cost / degrees > max(_MISFIT**2, 1 + _SIGMA / np.sqrt(degrees)):
+        best, forms, scatter, steps, converged = _with_scatter(lines, joint, best)
+    noise_squares = float(by_noise.at(joint.compliance(best.x))[0].sum())
+    seen = lines.weight > 0
+    told = Misfitting(noise_squares, is_symmetric, scatter, int(np.count_nonzero(lines.weight < 0.5)))
+    return GroupFit(best, forms, seen, equations, possible, steps, converged, told)
+
+
+def _lines(problem: GroupProblem) -> tuple[_Lines, bool]:
+    """Return the lines, and whether C is symmetric."""
+    data = problem.data
+    n = data.entries.n
+    known = ~problem.unknown.reshape(-1, n, n)[:, range(n), range(n)]
+    found, plain = compliance_lines(data)
+    weight = _weight(hidden_share(data), found, 2 * problem.joint.lower.size)
+    found = _finite(found)
+    if _are_zero(found, weight):
+        return _Lines(found, known, weight), True
+    return _Lines(_finite(plain), known, weight), False
+
+
+def _are_zero(found: ComplianceLines, weight: FloatArray) -> bool:
+    """Whether the conditions are zero but for noise, on lines and in their means over all lines."""
+    count = float(weight.sum()) * found.apart.shape[1]
+    if count == 0:
+        return True
+    mean_square = float((weight * found.squares).sum()) / count
+    by_line = mean_square > max(_MISFIT**2, 1 + _SIGMA / np.sqrt(count))
+    return not by_line and bool(_mean_squares(found, weight).max() < _CERTAIN)
+
+
+def _mean_squares(found: ComplianceLines, weight: FloatArray) -> FloatArray:
+    """Return squares of the mean of each condition over all lines, in units of its noise."""
+    w = weight[:, None] / np.maximum(found.variance, np.finfo(float).tiny)
+    squares: FloatArray = abs((w * found.apart).sum(axis=0)) ** 2 / np.maximum(w.sum(axis=0), np.finfo(float).tiny)
+    return squares
+
+
+def _weight(hidden: FloatArray, found: ComplianceLines, least: int) -> FloatArray:
+    """Return weights of lines that fall off where noise hides gamma_jk; half the lines count where it does on most."""
+    good = np.isfinite(found.value).all(axis=1) & np.isfinite(found.covariance).all(axis=(1, 2))
+    good &= np.isfinite(found.squares) & np.isfinite(hidden) & np.isfinite(found.variance).all(axis=1)
+    if not good.any():
+        raise np.linalg.LinAlgError("gamma_jk is singular on all lines")
+    few = np.count_nonzero(hidden[good] < _HIDDEN) < least
+    threshold = float(np.median(hidden[good])) if few else _HIDDEN
+    with np.errstate(over="ignore"):
+        weight: FloatArray = np.where(good, 1 / (1 + (np.where(good, hidden, 0) / threshold) ** 8), 0)
+    return weight
+
+
+def _finite(found: ComplianceLines) -> ComplianceLines:
+    """Return the lines with numbers in those that are not finite: they weigh nothing."""
+    value, covariance, squares, apart = (np.where(np.isfinite(x), x, 0) for x in found[:4])
+    return ComplianceLines(value, covariance, squares, apart, np.where(np.isfinite(found.variance), found.variance, 1))
+
+
+def _middle(lines: _Lines, joint: JointCoordinates) -> FloatArray:
+    """Return the stiffness of the median of C, no damping."""
+    n = joint.terms.n
+    start = np.zeros(joint.lower.size)
+    for d in range(n):
+        seen = lines.known[:, d] & (lines.weight > 0.5)
+        start[d] = np.median(lines.of.value[seen if seen.any() else slice(None), d].real)
+    return start
+
+
+def _best_of(minima: list[FormMinimum]) -> FormMinimum:
+    return min(minima, key=lambda one: one.cost)
+
+
+def _with_scatter(
+    lines: _Lines, joint: JointCoordinates, best: FormMinimum
+) -> tuple[FormMinimum, LineForms, FloatArray, int, bool]:
+    """Find the variance of C between lines by maximum likelihood, and fit with it.
+
+    By Fisher's scoring: with r the residual of a line and W its information, variance included, the likelihood of the
+    variance of a DOF has the slope sum of |W r|_d^2 - W_dd, and the information sum of |W_de|^2.
+    """
+    starts = [best.x, _middle(lines, joint)]
+    residual = _residual(lines, joint, starts[1])
+    variance = np.array([np.median(abs(residual[own, d]) ** 2) for d, own in enumerate(lines.known.T)]) / np.log(2)
+    least = 1e-12 * np.median(abs(lines.of.value) ** 2, axis=0) + np.finfo(float).tiny
+    variance = np.maximum(variance, least)
+    # Of a line that counts less, so does its likelihood.
+    w = np.maximum(lines.weight, np.finfo(float).tiny)
+    reach, last = np.full(variance.size, _FASTEST), np.zeros(variance.size)
+    for step in range(1, _STEPS + 1):
+        forms = lines.forms(variance)
+        best = _best_of([minimise_forms(forms, joint, start) for start in starts])
+        starts = [best.x]
+        weighted = (forms.weight @ _residual(lines, joint, best.x)[..., None])[..., 0]
+        slope = (abs(weighted) ** 2 / w[:, None]).sum(axis=0) - np.einsum("laa->a", forms.weight).real
+        information = (abs(forms.weight) ** 2 / w[:, None, None]).sum(axis=0)
+        change = inverse_information(information) @ slope
+        # Where the slope changes its sign the maximum lies between: steps become shorter.
+        reach, last = np.where(slope * last < 0, np.sqrt(reach), reach), slope
+        there = np.maximum(np.clip(variance + change, variance / reach, variance * reach), least)
+        if float(abs(slope * (there - variance)).sum()) < _SETTLED:
+            return best, forms, np.sqrt(variance), step, True
+        variance = there
+    return best, forms, np.sqrt(variance), step, False
+
+
+def _residual(lines: _Lines, joint: JointCoordinates, x: FloatArray) -> ComplexArray:
+    residual: ComplexArray = np.where(lines.known, lines.of.value - joint.compliance(x), 0)
+    return residual
