@@ -94,9 +94,9 @@ def identify(
         Terms that couple the DOFs of the joint: none, and this is used; unknown and not fitted; fitted, symmetric.
         Not for band means.
     noise : float or array_like, shape (n_freq, m_r, m_f), optional
-        Relative noise level of each entry, 0.01 for 1 %; or the variance E|e|^2 of each, (m/N)^2. By default
-        "compliance" takes it as relative, with its level from the differences gamma_pq - gamma_qp, and "manifold" finds
-        it by entry and frequency, as `estimate_noise` does.
+        Relative noise level of each entry, 0.01 for 1 %, sqrt(E|e|^2) of real and imaginary part together; or the
+        variance E|e|^2 of each, (m/N)^2. By default "compliance" takes it as relative, with its level from the
+        differences gamma_pq - gamma_qp, and "manifold" finds it by entry and frequency, as `estimate_noise` does.
     coherence, averages : optional
         As in `estimate_noise`, where `noise` is not given; method "manifold" only.
     reciprocal : bool

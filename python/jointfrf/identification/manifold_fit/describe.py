@@ -27,6 +27,13 @@ _WIDENED = 5.0
 _ROUNDING = 1e-7
 #: Share of lines that cannot fit the joint from which on a warning says so.
 _UNTRUSTED = 0.02
+#: A residual so near to sqrt(2) times the noise said is that of noise said by part.
+_BY_PART = 0.03
+_PER_PART = (
+    ", or the noise was said for real and imaginary parts each: its level is sqrt(E|e|^2) of both together, 1.41 times "
+    "that"
+)
+_MEAN_OF_TWO = "; where h_pq and h_qp were replaced by their mean, their noise is that of the mean"
 _COUPLED = (
     "; with cross terms it does: the DOFs of the joint are coupled, so ignore or fit the cross terms (cross), or move "
     "the reference point"
@@ -133,11 +140,12 @@ def _misfit_warnings(found: ManifoldFit, problem: ManifoldProblem) -> list[str]:
     apart = f"{abs(misfit.ratio - 1) / misfit.sigma:.0f} sigma"
     if not problem.noise.is_assumed and misfit.is_large:
         text = f"the residual is {misfit.ratio:.2f} times the noise, {apart} above it: the joint does not fit the data"
-        told.append(text + (_COUPLED if found.cross_fits else _where(misfit)))
+        by_part = problem.noise.is_told and abs(misfit.ratio / np.sqrt(2) - 1) < _BY_PART
+        told.append(text + (_COUPLED if found.cross_fits else _PER_PART if by_part else _where(misfit)))
     if not problem.noise.is_assumed and misfit.is_small:
         told.append(
             f"the residual is {misfit.ratio:.2f} times the noise, {apart} below it: the noise is smaller than said, "
-            "or the FRFs were smoothed"
+            "or the FRFs were smoothed" + (_MEAN_OF_TWO if problem.frfs.symmetrised and problem.noise.is_told else "")
         )
     if found.cross_fits:
         return told

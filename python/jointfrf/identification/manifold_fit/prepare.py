@@ -105,12 +105,15 @@ class KnownNoise:
         Whether the level is only a guess, to be replaced by that of the residual.
     outlying : ndarray of int
         Lines whose noise is far above that of the others.
+    is_told : bool
+        Whether the user said the noise.
     """
 
     level: float
     inflation: float
     is_assumed: bool
     outlying: NDArray[np.intp]
+    is_told: bool = False
 
 
 @dataclass(frozen=True)
@@ -252,11 +255,14 @@ def _known_noise(
         if (variance <= 0).any():
             raise ValueError("noise must hold positive variances")
         level = float(np.median(np.sqrt(variance) / np.maximum(abs(h), np.finfo(float).tiny)))
+    known = KnownNoise(level, 1.0, False, np.empty(0, np.intp), is_told=True)
     gamma, of_gamma = transforms.gamma(h), transforms.variance(variance)
     smooth = smooth_frfs(freq, gamma, of_gamma, reciprocal=reciprocal).h
     if np.ndim(options.noise) == 0 and transforms.are_units:
+        # Measured FRFs as weights favour lines that noise has made small.
+        smooth = smooth_frfs(freq, gamma, _relative_variance(smooth, level), reciprocal=reciprocal).h
         variance = of_gamma = _relative_variance(smooth, level)
-    return _near(smooth, gamma, of_gamma), variance, KnownNoise(level, 1.0, False, np.empty(0, np.intp))
+    return _near(smooth, gamma, of_gamma), variance, known
 
 
 def _estimated_noise(
@@ -266,6 +272,8 @@ def _estimated_noise(
     model = estimate_noise(freq, h, reciprocal=reciprocal, coherence=options.coherence, averages=options.averages)
     # Below this, what looks like noise is rounding.
     is_assumed = model.source == "none" or model.level < _LEAST_LEVEL
+    # What a rational function leaves of FRFs that it meets but for so little is no noise, either.
+    is_assumed |= model.source == "residual" and not model.smooth.is_smooth
     least = _ASSUMED_LEVEL if is_assumed else _LEAST_LEVEL
     variance = _relative_variance(model.smooth.h, least)
     if not is_assumed:
