@@ -167,8 +167,11 @@ def _estimated(
     differences = reciprocity_differences(lines) if reciprocal else None
     smooth, variance, inflation = _first_smooth(freq, lines, differences, max_poles, reciprocal=reciprocal)
     if differences is not None and smooth.is_smooth and smooth.level > _UNSEEN:
-        differences = None
-        smooth, variance, inflation = _first_smooth(freq, lines, None, max_poles, reciprocal=reciprocal)
+        other = _first_smooth(freq, lines, None, max_poles, reciprocal=reciprocal)
+        # Where no rational function fits, nothing is gained by leaving the differences.
+        if np.median((abs(lines - other[0].h) ** 2 / variance)[:, (other[0].h != 0).any(axis=0)]) < _UNSEEN:
+            differences = None
+            smooth, variance, inflation = other
     if not smooth.is_smooth:
         return _without_smoothing(lines, smooth, differences, reciprocal=reciprocal)
     patience = _patience(differences)
