@@ -30,6 +30,10 @@ _SETTLED = 1.5
 _SETTLED_SHARE = 0.97
 #: The residual about smooth FRFs with the poles of others is this many times their noise at most.
 _LIKE = 1.2
+#: Differences that are so many times smaller than measured minus smooth do not see the noise of driving points.
+_UNSEEN = 3.0
+#: Relative noise that weights are not taken below.
+_ROUNDING = 1e-4
 _TINY = float(np.finfo(float).tiny)
 
 
@@ -178,17 +182,18 @@ def _estimated(
 ) -> NoiseModel:
     """Noise model of checked FRFs, lines in rising order."""
     differences = reciprocity_differences(lines) if reciprocal else None
-    patience = 2 if differences is None else 1  # a worse start
     begun = None if like is None else _begun_like(freq, lines, like, max_poles, reciprocal=reciprocal)
-    smooth, variance, inflation = begun or _begun(
-        freq, lines, differences, OrderSearch(None, max_poles, patience), reciprocal=reciprocal
-    )
+    if begun is None:
+        differences, smooth, variance, inflation = _begun(freq, lines, differences, max_poles, reciprocal=reciprocal)
+    else:
+        smooth, variance, inflation = begun
     if not smooth.is_smooth:
-        return _without_smoothing(lines, smooth, reciprocal=reciprocal)
-    for _ in range(0 if begun else _MOST_TURNS):
+        return _without_smoothing(lines, smooth, differences, reciprocal=reciprocal)
+    patience = _patience(differences)
+    for _ in range(_MOST_TURNS if begun is None else 0):
         model = _model(lines, smooth, given, inflation or 1.0, differences, robust=True)
         inflation, _ = _found_inflation(lines, differences, model)
-        before, variance = variance, np.maximum(model.variance, _TINY)
+        before, variance = variance, _weighing(lines, model.variance)
         shown = (smooth.h != 0).any(axis=0)
         settled = _alike(before[:, shown], variance[:, shown])
         search = OrderSearch(None if differences is None else inflation, max_poles, 0 if settled else patience)
@@ -204,21 +209,18 @@ def _begun(
     freq: FloatArray,
     lines: ComplexArray,
     differences: ReciprocityDifferences | None,
-    search: OrderSearch,
+    max_poles: int,
     *,
     reciprocal: bool,
-) -> tuple[SmoothFrfs, FloatArray, float | None]:
-    """Return first smooth FRFs, with the variance and inflation they were found with."""
-    inflation = None
-    if differences is None:
-        variance = first_variance(lines)
-    else:
-        variance = np.maximum(differences.variance_of_parts(near_squares(lines)), _TINY)
-        inflation = differences.inflation(variance, differences.line_levels(variance).factor)
-        levels = differences.line_levels(variance, inflation)
-        variance *= (levels.usual * levels.factor)[:, None, None]
-    smooth = smoothed(freq, lines, variance, replace(search, inflation=inflation), reciprocal=reciprocal)
-    return smooth, variance, inflation
+) -> tuple[ReciprocityDifferences | None, SmoothFrfs, FloatArray, float | None]:
+    """Return first smooth FRFs, their variance and inflation, and the differences if these see the noise."""
+    smooth, variance, inflation = _first_smooth(freq, lines, differences, max_poles, reciprocal=reciprocal)
+    if differences is not None and smooth.is_smooth and smooth.level > _UNSEEN:
+        other = _first_smooth(freq, lines, None, max_poles, reciprocal=reciprocal)
+        # Where no rational function fits, nothing is gained by leaving the differences.
+        if np.median((abs(lines - other[0].h) ** 2 / variance)[:, (other[0].h != 0).any(axis=0)]) < _UNSEEN:
+            return None, *other
+    return differences, smooth, variance, inflation
 
 
 def _begun_like(
@@ -227,10 +229,41 @@ def _begun_like(
     """Return smooth FRFs with the poles of others, relocated; None where these leave more than noise like theirs."""
     if not like.smooth.is_smooth:
         return None
-    variance = np.maximum(like.variance, _TINY)
+    variance = _weighing(lines, like.variance)
     search = OrderSearch(like.inflation, max_poles, 0)
     smooth = smoothed(freq, lines, variance, search, reciprocal=reciprocal, start=like.smooth.poles)
     return (smooth, variance, like.inflation) if smooth.is_smooth and smooth.level < _LIKE else None
+
+
+def _first_smooth(
+    freq: FloatArray,
+    lines: ComplexArray,
+    differences: ReciprocityDifferences | None,
+    max_poles: int,
+    *,
+    reciprocal: bool,
+) -> tuple[SmoothFrfs, FloatArray, float | None]:
+    """Return smooth FRFs by weights from differences where there are any, these variances, and the inflation."""
+    inflation = None
+    if differences is None:
+        variance = first_variance(lines)
+    else:
+        variance = _weighing(lines, differences.variance_of_parts(near_squares(lines)))
+        inflation = differences.inflation(variance, differences.line_levels(variance).factor)
+        levels = differences.line_levels(variance, inflation)
+        variance *= (levels.usual * levels.factor)[:, None, None]
+    search = OrderSearch(inflation, max_poles, _patience(differences))
+    return smoothed(freq, lines, variance, search, reciprocal=reciprocal), variance, inflation
+
+
+def _patience(differences: ReciprocityDifferences | None) -> int:
+    return 2 if differences is None else 1  # a worse start
+
+
+def _weighing(lines: ComplexArray, variance: FloatArray) -> FloatArray:
+    """Variance for weights: not below rounding, where differences of most lines are zero."""
+    least: FloatArray = np.maximum(_ROUNDING**2 * first_variance(lines), _TINY)
+    return np.maximum(variance, least)
 
 
 def _alike(before: FloatArray, variance: FloatArray) -> bool:
@@ -283,9 +316,9 @@ def _model(
     """
     n_freq, n_out, n_in = h.shape
     shown = (smooth.h != 0).any(axis=0)
-    squares = (abs(h - smooth.h)[:, shown] ** 2).T
     taken = np.minimum(inflation * smooth.share[shown], _MOST_TAKEN)
-    squares = squares / (1 - taken)[:, None]
+    noise = (h - smooth.h)[:, shown].T / np.sqrt(1 - taken)[:, None]
+    squares = noise.real**2 + noise.imag**2
     terms = [abs(smooth.h[:, shown]).T ** 2, np.ones(squares.shape)]
     if given is not None:
         terms.append(given[:, shown].T)
@@ -302,7 +335,7 @@ def _model(
         if differences is not None:
             levels.append(differences.line_levels(variance, inflation))
         if not robust or differences is None:
-            levels.append(line_levels(squares / described, inflation))
+            levels.append(line_levels(noise / np.sqrt(described), inflation))
         factor = np.max([found.factor for found in levels], axis=0)
         if turn == 1:
             if (levels[-1].usual == 1).all():
@@ -320,7 +353,9 @@ def _described(parts: FloatArray, terms: FloatArray) -> FloatArray:
     return np.asarray((parts[:, :, None] * terms).sum(axis=0))
 
 
-def _without_smoothing(h: ComplexArray, smooth: SmoothFrfs, *, reciprocal: bool) -> NoiseModel:
+def _without_smoothing(
+    h: ComplexArray, smooth: SmoothFrfs, differences: ReciprocityDifferences | None, *, reciprocal: bool
+) -> NoiseModel:
     """Relative noise alike for all entries, for few lines and for nearly exact FRFs."""
     n_freq, n_out, n_in = h.shape
     level, source = 0.0, "none"
@@ -331,15 +366,18 @@ def _without_smoothing(h: ComplexArray, smooth: SmoothFrfs, *, reciprocal: bool)
     relative = np.zeros((1, n_out, n_in))
     for group in entry_groups(h, reciprocal=reciprocal):
         group.put(np.full((len(group.rows), 1), level), relative)
+    variance, factor = relative**2 * abs(h) ** 2, np.ones(n_freq)
+    if differences is not None and smooth.poles:  # enough lines to say which of them are outlying
+        factor = differences.line_levels(_weighing(h, variance)).factor
     return NoiseModel(
         relative=relative[0],
         floor=np.zeros((n_out, n_in)),
         coherence_factor=np.zeros((n_out, n_in)),
-        variance=relative**2 * abs(h) ** 2,
+        variance=variance * factor[:, None, None],
         inflation=1.0,
         inflation_source="none",
         line_level=np.ones(n_freq),
-        line_factor=np.ones(n_freq),
+        line_factor=factor,
         source=cast(NoiseSource, source),
         smooth=smooth,
     )

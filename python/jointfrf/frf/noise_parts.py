@@ -25,8 +25,9 @@ _ITERATIONS = 60
 _HARDLY = 1e-3
 #: Probability of calling one line of a sweep without outliers outlying.
 _FALSE_ALARM = 1e-2
-#: Most lines in a row that are called outlying.
-_LONGEST_RUN = 3
+#: More outlying lines in a row than this may be a mode that smooth FRFs miss: they are not, where neighbours correlate.
+_SHORT_RUN = 3
+_ALIKE = 0.5
 #: Lines over which the usual residual of a line is taken: so many, and so many times the lines that go together.
 _USUAL = 41
 _USUAL_CORRELATED = 5
@@ -142,15 +143,17 @@ class LineLevels:
     factor: FloatArray
 
 
-def line_levels(ratio: FloatArray, inflation: float = 1.0) -> LineLevels:
+def line_levels(noise: ComplexArray, inflation: float = 1.0, *, is_residual: bool = True) -> LineLevels:
     """Find slow variation of the noise over frequency, and outlying lines.
 
     Parameters
     ----------
-    ratio : ndarray, shape (n_entries, n_freq)
-        |e|^2 over its variance.
+    noise : ndarray, shape (n_entries, n_freq)
+        Noise of unit variance.
     inflation : float
         Lines that carry the noise of one independent line.
+    is_residual : bool
+        Whether the noise is measured minus smooth, in which modes that are missed show, too.
 
     Returns
     -------
@@ -158,13 +161,13 @@ def line_levels(ratio: FloatArray, inflation: float = 1.0) -> LineLevels:
 
     Notes
     -----
-    The mean over the entries is compared with its running median. Its distribution without outliers is taken to be a
-    gamma distribution whose shape follows from the quartiles of its logarithm, so entries that share their noise and
-    noise that is not circular are allowed for. The running median, relative to its own median, is the slow variation
-    if its spread is well above that of medians of so many independent lines. More than a few lines in a row are not
-    outlying: there smooth FRFs do not fit, or the noise is another.
+    The mean square over the entries is compared with its running median. Its distribution without outliers is taken to
+    be a gamma distribution whose shape follows from the quartiles of its logarithm, so entries that share their noise
+    and noise that is not circular are allowed for. The running median, relative to its own median, is the slow
+    variation if its spread is well above that of medians of so many independent lines. Of a residual more than a few
+    lines in a row are outlying only where it jumps from line to line: else smooth FRFs do not fit there.
     """
-    line = ratio.mean(axis=0)
+    line = (noise.real**2 + noise.imag**2).mean(axis=0)
     n_freq = len(line)
     reach = int(min(max(_USUAL, _USUAL_CORRELATED * inflation), n_freq)) // 2
     tiny = np.finfo(float).tiny
@@ -177,16 +180,22 @@ def line_levels(ratio: FloatArray, inflation: float = 1.0) -> LineLevels:
     low, high = np.quantile(np.log(usual), [0.1, 0.9])
     varies = (high - low) / 2.56 > max(_VARIES * by_chance, _VARIES_LEAST)
     slow = usual / np.median(usual) if varies else np.ones(n_freq)
-    return LineLevels(slow, np.where(_in_short_runs(factor > limit), factor, 1.0))
+    outlying = factor > limit
+    if is_residual:
+        outlying &= ~_missed(noise, outlying)
+    return LineLevels(slow, np.where(outlying, factor, 1.0))
 
 
-def _in_short_runs(chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Which of the chosen lines have few chosen neighbours in a row."""
+def _missed(residual: ComplexArray, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Which of the chosen lines are in long runs through which the residual goes smoothly."""
     steps = np.diff(np.pad(chosen.astype(int), 1))
-    short = chosen.copy()
+    missed = np.zeros_like(chosen)
     for first, end in zip(np.flatnonzero(steps > 0), np.flatnonzero(steps < 0), strict=True):
-        short[first:end] = end - first <= _LONGEST_RUN
-    return short
+        if end - first > _SHORT_RUN:
+            run = residual[:, first:end] / np.sqrt((abs(residual[:, first:end]) ** 2).sum(axis=0))
+            alike = (run[:, 1:] * run[:, :-1].conj()).sum(axis=0).real.mean()
+            missed[first:end] = alike > _ALIKE
+    return missed
 
 
 def _running_median(values: FloatArray, reach: int) -> FloatArray:

@@ -62,7 +62,8 @@ class ReciprocityDifferences:
 
     def line_levels(self, variance: FloatArray, inflation: float = 1.0) -> LineLevels:
         """Return slow variation and outlying lines of the noise of FRFs of this variance (n_freq, m, m)."""
-        return line_levels(abs(self.values) ** 2 / self._variance(variance), inflation)
+        noise = self.values / np.sqrt(self._variance(variance))
+        return line_levels(noise, inflation, is_residual=False)
 
     def inflation(self, variance: FloatArray, line_factor: FloatArray) -> float:
         """Return how many lines carry the noise of one independent line; outlying lines do not count."""

@@ -70,31 +70,28 @@ def identify(
         Names of the n joint DOFs; names beginning with theta, rx, ry, rz are rotations. ``"0"``, ``"1"``, ... by
         default.
     method : str
-        "compliance": maximum likelihood in the compliance domain, with error bars; needs no model of the
-        substructures. "ismm", "ismm-kj": inverse structural modification (2.47) with D_jk or D_kj, need `alpha` and
-        `k_initial`. "inverse-substructuring": -(gamma^-1)_jk, which ISMM reduces to. "decoupling-rr", "-rs", "-sr",
-        "-ss": (2.53)-(2.56), need `h_a`, `h_b` and the DOF lists. These take the mean over bands, as the thesis does.
-        "manifold": maximum likelihood linearised about smooth FRFs that fit a joint; for stiff and coupled joints,
-        noise that is not relative or is correlated, and rectangular FRFs. Not the default: with `cross` "ignore" on
-        FRFs that no joint fits it is slow and may not converge, which it says.
+        "compliance": maximum likelihood, with error bars; needs no model of the substructures. "ismm", "ismm-kj":
+        inverse structural modification (2.47) with D_jk or D_kj, need `alpha` and `k_initial`.
+        "inverse-substructuring": -(gamma^-1)_jk, which ISMM reduces to. "decoupling-rr", "-rs", "-sr", "-ss":
+        (2.53)-(2.56), need `h_a`, `h_b` and the DOF lists. All but the first take the mean over bands, as the thesis
+        does.
     bands : None, (low, high), sequence of these, or mapping of DOF name to these, optional
-        Sensitive bands in Hz; all lines by default. The compliance fit weights each line by its information and needs
-        none.
+        Sensitive bands in Hz; all lines by default. "compliance" weights each line by its information and needs none.
     transform : array_like, shape (2 n, m), or a pair of shapes (2 n, m_r) and (2 n, m_f), optional
         From channels to joint DOFs j, then k: finite differences, virtual points. Noise is then taken as independent
-        between the channels, not between the transformed FRFs. A pair, for responses and for forces, with "manifold".
-    damping : {"viscous", "hysteretic", "both", "none", "auto"}
-        Terms of K* = k (1 + i eta) + i w c to fit. "auto" takes those with the lowest Bayesian information criterion;
-        method "manifold" chooses for each DOF, and takes a sequence of words, one for each DOF. Not for band means.
+        between the channels, not between the transformed FRFs. A pair, for responses and for forces, with "compliance".
+    damping : {"auto", "viscous", "hysteretic", "both", "none"}, or a sequence of these, one for each DOF
+        Terms of K* = k (1 + i eta) + i w c to fit. "auto" chooses for each DOF by the Bayesian information criterion,
+        with `cross` "fit" for all DOFs together. Not for band means, which give viscous damping.
     cross : {"zero", "ignore", "fit"}
         Terms that couple the DOFs of the joint: none, and this is used; unknown and not fitted; fitted, symmetric.
         Not for band means.
     noise : float or array_like, shape (n_freq, m_r, m_f), optional
-        Relative noise level of each entry, 0.01 for 1 %; or the variance E|e|^2 of each, (m/N)^2. By default
-        "compliance" takes it as relative, with its level from the differences gamma_pq - gamma_qp, and "manifold" finds
-        it by entry and frequency, as `estimate_noise` does.
+        Relative noise level of each entry, 0.01 for 1 %, sqrt(E|e|^2) of real and imaginary part together; or the
+        variance E|e|^2 of each, (m/N)^2. By default it is found by entry and frequency, as
+        `estimate_noise` does. Not for band means.
     coherence, averages : optional
-        As in `estimate_noise`, where `noise` is not given; method "manifold" only.
+        As in `estimate_noise`, where `noise` is not given. Not for band means.
     reciprocal : bool
         Whether the structure is reciprocal, so that gamma_pq and gamma_qp may be averaged. Not for band means.
     alpha : array_like, shape (n_freq, 2 n, 2 n), optional
@@ -127,13 +124,12 @@ def identify(
 
     Notes
     -----
-    Standard errors of "compliance": first-order propagation of the noise, at the larger of the noise
-    level and the level the residual shows; where the residual exceeds the noise by 30 %, not below those of a
-    jackknife over ten parts of the band, which includes what the model of the joint cannot follow. Of "manifold":
-    inverse information of the noise, times the correlation between lines, times the residual over the noise where it is
-    above 1, or the jackknife where it exceeds that by more than chance; intervals by the profile of the likelihood
-    where they are not symmetric. Of a band mean: scatter of its lines over the root of their number; its bias is not
-    included.
+    "compliance" is linearised at the smooth FRFs, on the manifold of FRFs that fit a joint: regular for stiff joints and
+    on lines where gamma_jk is singular. Its standard errors: inverse information of the noise, times the correlation
+    between lines, times the residual over the noise where it is above 1; the scatter between lines, or between ten
+    parts of the band, replaces that where it exceeds it by more than chance. Intervals by the profile of the likelihood
+    where they are not symmetric. Standard errors of a band mean: scatter of its lines over the root of their number;
+    its bias is not included.
 
     Examples
     --------

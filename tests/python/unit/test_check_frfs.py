@@ -8,6 +8,7 @@ import pytest
 
 import jointfrf as jf
 from jointfrf.channels.check.check import warn_of_frfs
+from jointfrf.channels.check.ratio_line import ratio_line
 from measurement_errors import ERRORS, KINDS_OF_NOISE, check_with_error, measured, names, structure
 
 S = structure("3.3")
@@ -56,6 +57,54 @@ def test_numbers_of_gain_and_delay_have_true_errors():
     assert np.mean(gains) == pytest.approx(1.07, abs=4 * expected / np.sqrt(10))
     assert 0.4 * expected < np.std(np.log(gains)) < 2 * expected
     assert np.mean(delays) == pytest.approx(30e-6, abs=1e-6)
+
+
+@pytest.mark.parametrize("name", ["3.3", "six"])
+def test_a_delay_is_found_in_noise_that_is_correlated_over_lines(name):
+    for error in ("delay of a sensor, 20 us", "delay of a force, 20 us"):
+        for seed in range(4):
+            told = check_with_error(structure(name), ERRORS[error], "correlated 25", 0.05, seed)
+            assert told.found, told.check
+            assert told.alone, told.check
+
+
+@pytest.mark.parametrize("kind", ["complex", "correlated 25"])
+def test_the_error_of_a_delay_is_that_of_its_scatter(kind):
+    """Where the phase is known at 0 Hz, and on 786 lines that say as much as 31."""
+    omega = 2 * np.pi * S.freq
+    z = []
+    for seed in range(40):
+        h = measured(S, kind, 0.05, seed)[1]
+        line = ratio_line(omega, np.log(h[:, :1, 3] / h[:, 3, :1]), np.zeros(1), np.ones(1, bool))
+        z.append(line.slope[0] / line.slope_error[0])
+        assert abs(line.phase_at_zero()[0]) < 1e-12
+    assert 0.75 < np.sqrt(np.mean(np.square(z))) < 1.6
+    if kind == "complex":
+        expected = 0.05 / np.sqrt((omega**2).sum())  # var Im log(h_pq/h_qp) = 2 * 0.05^2 / 2
+        assert line.slope_error[0] == pytest.approx(expected, rel=0.1)
+
+
+def test_a_phase_that_is_no_sign_is_fitted_beside_the_delay():
+    omega = 2 * np.pi * S.freq
+    rng = np.random.default_rng(1)
+    noise = 0.01 * (rng.standard_normal((omega.size, 1)) + 1j * rng.standard_normal((omega.size, 1)))
+    turn = np.array([0.3])
+    line = ratio_line(omega, noise + 1j * 1e-6 * (omega - omega.mean())[:, None], turn, np.ones(1, bool))
+    assert line.phase_at_zero()[0] == pytest.approx(0.3 - 1e-6 * omega.mean(), abs=0.005)
+    assert line.slope[0] == pytest.approx(1e-6, rel=0.8)
+    quarter = ratio_line(omega, noise, turn * 0 + np.pi / 2, np.ones(1, bool))
+    assert quarter.phase_at_zero()[0] == pytest.approx(np.pi / 2, abs=1e-12)
+
+
+def test_of_two_channels_the_copy_is_the_one_that_is_no_driving_point():
+    for error in ("response doubled", "force doubled"):
+        for seed in range(6):
+            for kind in ("complex", "floor", "correlated 25"):
+                told = check_with_error(structure("3.1"), ERRORS[error], kind, 0.05, seed)
+                assert told.found, told.check
+                assert told.alone, told.check
+                (finding,) = told.check.findings
+                assert names(structure("3.1"))[seed % 2] in finding.channels[1]
 
 
 @pytest.mark.parametrize(

@@ -108,7 +108,7 @@ def test_covariance_is_the_cramer_rao_bound_with_unknown_cross_terms(beams):
 
 def identified(freq, gamma, dofs, **options):
     with pytest.warns(jf.IdentificationWarning):
-        return jf.identify(freq, gamma, dofs, "manifold", damping="none", **options)
+        return jf.identify(freq, gamma, dofs, damping="none", **options)
 
 
 def test_points_that_are_not_one_are_told(beams):

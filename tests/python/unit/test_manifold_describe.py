@@ -190,6 +190,35 @@ def test_no_residual_is_compared_with_a_level_that_it_gave(found):
     assert not found.with_(misfit=far).of_noise(is_assumed=True).described().warnings
 
 
+def test_exact_frfs_made_reciprocal_show_no_noise(beams):
+    """What a rational function leaves of them is its own error."""
+    h = beams.gamma(beams.joint)
+    fit = told(beams.freq, (h + h.swapaxes(1, 2)) / 2, ["y", "theta"], noise=None)
+    assert fit.warnings == ()
+    assert fit.noise_level < 1e-9
+
+
+def test_noise_said_of_a_mean_of_two(beams):
+    h = jf.pollute(beams.gamma(beams.joint), LEVEL, seed=3)
+    (text,) = told(beams.freq, (h + h.swapaxes(1, 2)) / 2, ["y", "theta"]).warnings
+    assert text.endswith("where h_pq and h_qp were replaced by their mean, their noise is that of the mean")
+
+
+def test_noise_said_by_part(beams):
+    h = jf.pollute(beams.gamma(beams.joint), 0.1, "complex-per-part", seed=3)
+    (text,) = told(beams.freq, h, ["y", "theta"], noise=0.1).warnings
+    assert re.match(
+        r"the residual is 1\.4\d times the noise, .* or the noise was said for real and imaginary parts", text
+    )
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_the_residual_of_large_noise_is_that_said(chains, seed):
+    """Smooth FRFs by weights that noise has changed would be too small, and the residual too large for them."""
+    fit = told(chains.freq, jf.pollute(chains.gamma(chains.joint), 0.5, seed=seed), ["x"], noise=0.5)
+    assert fit.residual_level == pytest.approx(0.5, rel=0.045)
+
+
 def test_a_local_misfit_names_the_lines(found):
     local = Misfit(2.0, 0.05, ((300.0, 350.0, 0.8), (100.0, 105.0, 0.2)), ())
     (text,) = found.with_(misfit=local).described().fit.warnings

@@ -111,6 +111,66 @@ def test_hum_is_found_and_does_not_bend_the_smooth_frfs(h, reciprocal):
     assert (noise.variance[hum] > 10 * (0.01 * abs(h[hum])) ** 2).mean() > 0.9
 
 
+def garbage(h, lines, seed, *, entries=None):
+    """Noise on some lines, 50 times the usual size of the FRFs, in all entries or in one."""
+    x = jf.pollute(h, 0.02, seed=seed)
+    e = 50 * size(h) * circular((len(lines), *h.shape[1:]), seed + 20)
+    at = np.ix_(lines, *([i] for i in entries)) if entries else lines
+    x[at] = e[:, entries[0], entries[1]][:, None, None] if entries else e
+    return x
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("kind", ["both directions", "reciprocal", "rectangular"])
+@pytest.mark.parametrize("run", [1, 4, 20])
+def test_lines_that_are_noise_only_do_not_change_the_others(h, kind, run, seed):
+    starts = np.random.default_rng(seed).permutation(len(FREQ) // 20)[: 20 if run == 1 else 2] * 20
+    bad = (starts[:, None] + np.arange(run)).ravel()
+    x = garbage(h, bad, seed)
+    if kind == "reciprocal":
+        x = (x + x.swapaxes(1, 2)) / 2
+    x = x[:, :, :3] if kind == "rectangular" else x
+    noise = jf.estimate_noise(FREQ, x)
+    assert set(bad) <= set(noise.outlying)
+    assert noise.outlying.size <= bad.size + 2
+    good = np.setdiff1d(np.arange(len(FREQ)), bad)
+    expected = 0.02 * abs(h[:, :, : x.shape[2]]) * (np.where(np.eye(4), 1, 0.5**0.5) if kind == "reciprocal" else 1)
+    ratio = np.sqrt(noise.variance[good]) / expected[good]
+    assert np.quantile(abs(ratio - 1), 0.95) < (0.12 if kind == "both directions" else 0.3)
+    assert np.median(abs(noise.smooth.h - h[:, :, : x.shape[2]])[good] / expected[good]) < 0.3
+
+
+@pytest.mark.parametrize("entries", [(0, 0), (0, 1)])
+def test_noise_of_one_frf_on_some_lines(h, entries):
+    """Of a driving point as well, which no difference shows."""
+    bad = np.random.default_rng(3).permutation(len(FREQ))[:20]
+    noise = jf.estimate_noise(FREQ, garbage(h, bad, 1, entries=entries))
+    assert set(bad) <= set(noise.outlying)
+    assert noise.level == pytest.approx(0.02, rel=0.05)
+
+
+def test_outlying_lines_of_nearly_exact_frfs(h):
+    x = jf.pollute(h, 5e-5, seed=1)
+    bad = np.array([50, 51, 52, 53, 54, 300])
+    x[bad] = 20 * size(h) * circular((6, 4, 4), 2)
+    noise = jf.estimate_noise(FREQ, x)
+    assert noise.source == "reciprocity"
+    assert set(bad) <= set(noise.outlying)
+    assert noise.level == pytest.approx(5e-5, rel=0.05)
+
+
+def test_a_mode_that_is_missed_is_not_outlying():
+    """A long run of large residuals counts where it jumps from line to line, not where it goes smoothly."""
+    noise = circular((4, 600), 1)
+    noise[:, 200:212] = 30 * circular((4, 12), 2)
+    noise[:, 400:412] = 30 * circular((4, 1), 3) * np.exp(0.2j * np.arange(12))
+    found = np.flatnonzero(line_levels(noise).factor > 1)
+    assert set(range(200, 212)) <= set(found)
+    assert not set(range(400, 412)) & set(found)
+    both = np.flatnonzero(line_levels(noise, is_residual=False).factor > 1)
+    assert set(range(400, 412)) <= set(both)
+
+
 def test_missing_lines(h):
     keep = np.random.default_rng(3).random(len(FREQ)) > 0.4
     noise = jf.estimate_noise(FREQ[keep], jf.pollute(h, 0.02, seed=6)[keep])
@@ -182,8 +242,7 @@ def test_parts_by_maximum_likelihood_against_a_search():
 
 
 def test_independent_lines_are_not_outlying_and_not_correlated():
-    ratio = np.random.default_rng(1).exponential(size=(50, 3, 1000))
-    found = [np.count_nonzero(line_levels(one).factor > 1) for one in ratio]
+    found = [np.count_nonzero(line_levels(one).factor > 1) for one in circular((50, 3, 1000), 1)]
     assert np.mean(found) < 0.3
     assert np.median([line_correlation(circular((3, 1000), seed)) for seed in range(50)]) < 1.05
 

@@ -237,7 +237,10 @@ def _look_at_ratios(look: _Look, m: Measurement, pairs: PairRatios) -> None:
         left = look.corrected()
         noise = _noise(pairs, m.rows.size)
         delayed = {name for finding in look.findings if finding.kind == "delay" for name in finding.channels}
-        active = passivity_findings(left, _driving(left.square), noise, pairs.inflation)
+        # Where a channel that is left out took all pairs along, nothing is known of the correlation between lines.
+        is_lost = not pairs.usable.any() and any(finding.kind == "doubled" for finding in look.findings)
+        inflation = np.inf if is_lost else pairs.inflation
+        active = passivity_findings(left, _driving(left.square), noise, inflation)
         # A delay of a force turns its driving point the other way than one of the response that was taken out.
         look.findings.extend(finding for finding in active if not delayed.issuperset(finding.channels))
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from jointfrf.channels.check.measurement import modulus
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
-__all__ = ["Circles", "Sectors", "circles", "mean_exponent", "sectors"]
+__all__ = ["Circles", "Sectors", "circles", "mean_exponent", "one_sidedness", "sectors"]
 
 #: Im (or Re) of a driving-point FRF has one sign to this share, (sum of values) / (sum of their sizes).
 _ONE_SIDED = 0.3
@@ -82,14 +82,9 @@ def mean_exponent(omega: FloatArray, h: ComplexArray) -> float:
 
 def sectors(driving: ComplexArray) -> Sectors:
     """Tell the half plane of driving-point FRFs, shape (n_freq, n)."""
-    size = modulus(driving)
-    u = np.where(size > 0, driving / np.where(size > 0, size, 1), 0)
-    imaginary = u.imag.sum(axis=0) / np.maximum(abs(u.imag).sum(axis=0), np.finfo(float).tiny)
-    real = u.real.sum(axis=0) / np.maximum(abs(u.real).sum(axis=0), np.finfo(float).tiny)
-    # Between resonances a receptance is nearly real and a mobility nearly imaginary.
-    on_real_axis = (u**2).real.mean(axis=0) > 0
+    u, real, imaginary = _balances(driving)
     quarter = np.where(
-        on_real_axis,
+        _on_real_axis(u),
         np.where(imaginary < -_ONE_SIDED, 0, np.where(imaginary > _ONE_SIDED, 2, -1)),
         np.where(real > _ONE_SIDED, 1, np.where(real < -_ONE_SIDED, 3, -1)),
     )
@@ -97,3 +92,25 @@ def sectors(driving: ComplexArray) -> Sectors:
     damped = (abs((u**2).real.mean(axis=0)) < 0.2) & (abs(imaginary) > 0.9)
     quarter = np.where(damped, np.where(imaginary < 0, 0, 2), quarter)
     return Sectors(quarter.astype(np.intp), (driving.imag < 0).mean(axis=0), imaginary)
+
+
+def one_sidedness(driving: ComplexArray) -> FloatArray:
+    """Tell how far each driving-point FRF, shape (n_freq, n), lies in one half plane: 1 on all lines, 0 on half."""
+    u, real, imaginary = _balances(driving)
+    share: FloatArray = np.where(_on_real_axis(u), abs(imaginary), abs(real))
+    return share
+
+
+def _balances(driving: ComplexArray) -> tuple[ComplexArray, FloatArray, FloatArray]:
+    """Return h / |h|, and sums of its real and imaginary parts over the sums of their sizes."""
+    size = modulus(driving)
+    u: ComplexArray = np.where(size > 0, driving / np.where(size > 0, size, 1), 0)
+    imaginary = u.imag.sum(axis=0) / np.maximum(abs(u.imag).sum(axis=0), np.finfo(float).tiny)
+    real = u.real.sum(axis=0) / np.maximum(abs(u.real).sum(axis=0), np.finfo(float).tiny)
+    return u, real, imaginary
+
+
+def _on_real_axis(u: ComplexArray) -> NDArray[np.bool_]:
+    """Between resonances a receptance is nearly real and a mobility nearly imaginary."""
+    on: NDArray[np.bool_] = (u**2).real.mean(axis=0) > 0
+    return on

@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from jointfrf.channels.check.driving_points import one_sidedness
 from jointfrf.channels.check.pair_ratios import BROKEN, ONE_SIDED, are_one_sided, are_signals, scatter_of
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
@@ -21,6 +22,8 @@ _MOST_LINES = 200
 _MUCH, _ALIKE = 2.0, 0.1
 #: Two channels of one direction are exchanged if this divides the scatter of their ratios by so much.
 _LESS, _ROUND_OFF = 1.4, 1e-6
+#: A copy whose scatter is not larger than the least by more than this is as good.
+_AS_GOOD = 1.01
 #: A cause explains if it leaves at most this share of the broken pairs.
 _LEFT = 0.25
 
@@ -185,12 +188,16 @@ def _exchanged(evidence: _Evidence, before: float) -> Cause | None:
 
 
 def _doubled(evidence: _Evidence, before: float) -> Cause | None:
-    """Return a channel that holds all broken pairs and shows the same as another one."""
+    """Return a channel that holds all broken pairs and shows the same as another one.
+
+    Of two that both do, the copy is the one whose driving point is less like one.
+    """
     n = evidence.size.shape[0]
     holds = np.flatnonzero(evidence.broken.sum(axis=1) == np.triu(evidence.broken).sum())
     across = np.ascontiguousarray(evidence.h.swapaxes(1, 2))
+    driving = one_sidedness(np.einsum("faa->fa", evidence.h))
     found: list[Cause] = []
-    for copy in holds:
+    for copy in holds[np.argsort(driving[holds])]:
         for h, size, kind in (
             (evidence.h, evidence.size, "doubled response"), (across, evidence.size.T, "doubled force")
         ):  # fmt: skip
@@ -200,4 +207,5 @@ def _doubled(evidence: _Evidence, before: float) -> Cause | None:
             other = int(np.argmin(worst))
             if worst[other] < BROKEN / 2:
                 found.append(Cause(kind, (other, int(copy)), before, float(worst[other])))  # type: ignore[arg-type]
-    return min(found, key=lambda cause: cause.after, default=None)
+    least = min((cause.after for cause in found), default=0.0)
+    return next((cause for cause in found if cause.after <= _AS_GOOD * least), None)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf.channels.check.measurement import LEAST_SMOOTHNESS, modulus
+from jointfrf.channels.check.ratio_line import block_medians, ratio_line
 from jointfrf.frf.noise_estimate import ZERO
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
@@ -17,7 +18,6 @@ __all__ = [
     "PairRatios",
     "are_one_sided",
     "are_signals",
-    "block_medians",
     "pair_ratios",
     "scatter_of",
 ]
@@ -28,14 +28,8 @@ _SMALL = 1e-2
 BROKEN = 0.5
 #: Scatter of a pair of which one is zero.
 ONE_SIDED = 3.0
-#: Lines whose scatter is taken together.
-_BLOCK = 15
-#: Values beyond this number of standard deviations are clipped.
-_CLIP = 2.5
 #: Delays that are tried first: this many steps of half a period of the whole band, either way.
 _STEPS = 16
-#: Standard errors are never taken smaller: round-off, and small errors that every sensor has.
-_LEAST_ERROR = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,8 +48,8 @@ class PairRatios:
         Natural logarithm, and its standard error.
     delay, delay_error : ndarray
         s.
-    phase, phase_error : ndarray
-        rad, at 0 Hz with the delay, and at the middle of the band without.
+    phase : ndarray
+        rad, at 0 Hz.
     scatter : ndarray
         Median of |log(ratio / model)| over lines.
     inflation : float
@@ -72,7 +66,6 @@ class PairRatios:
     delay: FloatArray
     delay_error: FloatArray
     phase: FloatArray
-    phase_error: FloatArray
     scatter: FloatArray
     inflation: float
 
@@ -107,30 +100,16 @@ def pair_ratios(omega: FloatArray, h: ComplexArray, smooth: FloatArray) -> PairR
     broken |= alone
     scatter[alone] = ONE_SIDED
 
-    deviation = _block_deviation(rest)
-    weight = deviation**-2
-    clipped = _clipped(rest, deviation)
-    total = weight.sum(axis=0)
-    mean = (weight * clipped).sum(axis=0) / total
-    at = (weight * omega[:, None]).sum(axis=0) / total
-    lever = omega[:, None] - at
-    inertia = (weight * lever**2).sum(axis=0)
-    slope = (weight * lever * clipped.imag).sum(axis=0) / inertia
-    left = clipped - mean - 1j * lever * slope
-    # What a delay leaves in the phase is not noise: taken out before.
-    inflation = _inflation((left / deviation)[:, usable])
-    real, imaginary = ((weight * part**2).mean(axis=0) * inflation for part in (left.real, left.imag))
-    span = omega[-1]
+    line = ratio_line(omega, rest, np.angle(direction), usable)
     return PairRatios(
         p, q, usable, broken, power,
-        log_gain=middle + mean.real,
-        gain_error=np.hypot(np.sqrt(real / total), _LEAST_ERROR),
-        delay=delay - slope,
-        delay_error=np.hypot(np.sqrt(imaginary / inertia), _LEAST_ERROR / span),
-        phase=np.angle(direction) + mean.imag - at * slope,
-        phase_error=np.hypot(np.sqrt(imaginary / total), _LEAST_ERROR),
+        log_gain=middle + line.mean.real,
+        gain_error=line.gain_error,
+        delay=delay - line.slope,
+        delay_error=line.slope_error,
+        phase=line.phase_at_zero(),
         scatter=scatter,
-        inflation=inflation,
+        inflation=line.inflation,
     )  # fmt: skip
 
 
@@ -170,16 +149,6 @@ def _parts(above: ComplexArray, below: ComplexArray) -> tuple[FloatArray, Comple
     return np.log(size), ratio / size
 
 
-def block_medians(values: FloatArray, length: int = _BLOCK) -> FloatArray:
-    """Return the median over blocks of lines, shape (n_blocks, ...); the last block takes what is left."""
-    n = max(values.shape[0] // length, 1)
-    whole = min(n * length, values.shape[0])
-    medians = np.median(values[:whole].reshape(n, whole // n, *values.shape[1:]), axis=1)
-    if values.shape[0] > whole:
-        medians[-1] = np.median(values[whole - whole // n :], axis=0)
-    return medians
-
-
 def _unit(values: ComplexArray) -> ComplexArray:
     size = abs(values)
     unit: ComplexArray = np.where(size > 0, values / np.where(size > 0, size, 1), 1)
@@ -210,35 +179,3 @@ def _powers(omega: FloatArray, amplitude: FloatArray) -> NDArray[np.intp]:
     left = ((y - slope * x) ** 2).sum(axis=0)
     explained = (abs(slope - power) < 0.3) & (left < 0.1 * (y**2).sum(axis=0))
     return np.where(explained, power, 0).astype(np.intp)
-
-
-def _block_deviation(rest: ComplexArray) -> FloatArray:
-    """Return the standard deviation of each line, from the median in its block, and not far below that of all."""
-    squares = block_medians(rest.real**2 + rest.imag**2) / np.log(2)
-    squares = np.maximum(squares, 0.01 * np.median(squares, axis=0) + _LEAST_ERROR**2)
-    length = max(rest.shape[0] // squares.shape[0], 1)
-    length = _BLOCK if rest.shape[0] >= _BLOCK else length
-    place = np.minimum(np.arange(rest.shape[0]) // length, squares.shape[0] - 1)
-    deviation: FloatArray = np.sqrt(squares)[place]
-    return deviation
-
-
-def _clipped(rest: ComplexArray, deviation: FloatArray) -> ComplexArray:
-    limit = _CLIP * deviation
-    return np.clip(rest.real, -limit, limit) + 1j * np.clip(rest.imag, -limit, limit)
-
-
-def _inflation(standard: ComplexArray) -> float:
-    """Sum of the autocorrelation over lags, to the first that is not significant, of all pairs together."""
-    n_freq, n_pairs = standard.shape
-    if n_pairs == 0:
-        return 1.0
-    standard = standard - standard.mean(axis=0)
-    spectrum = (abs(np.fft.fft(standard, 2 * n_freq, axis=0)) ** 2).sum(axis=1)
-    covariance = np.fft.ifft(spectrum).real[: n_freq // 4 + 1]
-    if covariance[0] <= 0:
-        return 1.0
-    correlation = covariance[1:] / covariance[0]
-    small = np.flatnonzero(correlation < 2 / np.sqrt(n_freq * n_pairs))
-    last = small[0] if small.size else correlation.size
-    return float(1 + 2 * correlation[:last].sum())

@@ -6,7 +6,7 @@ import numpy as np
 
 from jointfrf.channels.check.finding import FrfFinding
 from jointfrf.channels.check.measurement import Measurement, modulus
-from jointfrf.channels.check.pair_ratios import block_medians
+from jointfrf.channels.check.ratio_line import block_medians
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
 __all__ = ["passivity_findings"]

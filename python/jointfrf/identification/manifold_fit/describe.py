@@ -17,7 +17,7 @@ from jointfrf.identification.manifold_fit.fit import ManifoldFit
 from jointfrf.identification.manifold_fit.intervals import Spread
 from jointfrf.identification.manifold_fit.joint_terms import CrossTerms
 from jointfrf.identification.manifold_fit.misfit import Misfit
-from jointfrf.identification.manifold_fit.prepare import KnownNoise, ManifoldProblem
+from jointfrf.identification.manifold_fit.prepare import ManifoldProblem
 
 __all__ = ["Described", "describe_manifold"]
 
@@ -31,6 +31,13 @@ _ROUNDING = 1e-7
 _UNTRUSTED = 0.02
 #: Share of a compliance by which it varies between lines from which on a warning says so.
 _VARIES = 0.05
+#: A residual so near to sqrt(2) times the noise said is that of noise said by part.
+_BY_PART = 0.03
+_PER_PART = (
+    ", or the noise was said for real and imaginary parts each: its level is sqrt(E|e|^2) of both together, 1.41 times "
+    "that"
+)
+_MEAN_OF_TWO = ", or h_pq and h_qp were replaced by their mean, whose noise is smaller"
 _COUPLED = (
     "; with cross terms it does: the DOFs of the joint are coupled, so ignore or fit the cross terms (cross), or move "
     "the reference point"
@@ -51,7 +58,7 @@ def describe_manifold(found: ManifoldFit, problem: ManifoldProblem) -> Described
     notes = [
         *_choice_notes(found.choices),
         *_noise_notes(problem),
-        *_small_residual_notes(found.misfit, problem.noise),
+        *_small_residual_notes(found.misfit, problem),
         *_group_notes([group.dofs for group in result.groups], fit.dofs, problem.options.cross),
         *_hidden_notes(result, fit.dofs),
         *_significance_notes(fit),
@@ -122,14 +129,16 @@ def _noise_notes(problem: ManifoldProblem) -> list[str]:
     return told
 
 
-def _small_residual_notes(misfit: Misfit, noise: KnownNoise) -> list[str]:
+def _small_residual_notes(misfit: Misfit, problem: ManifoldProblem) -> list[str]:
     """Say that the residual is below the noise: intervals are then wider than they need be."""
+    noise = problem.noise
     if noise.is_assumed or not misfit.is_small:
         return []
-    why = "said" if noise.model is None else "their reciprocity shows"
+    why = "said" if noise.is_told else "their reciprocity shows"
+    mean = _MEAN_OF_TWO if problem.frfs.symmetrised and noise.is_told else ""
     return [
-        f"the residual is {misfit.ratio:.2g} times the noise: the FRFs have less noise than {why}, or were smoothed; "
-        "the intervals are wider than they need be"
+        f"the residual is {misfit.ratio:.2g} times the noise: the FRFs have less noise than {why}, or were smoothed"
+        f"{mean}; the intervals are wider than they need be"
     ]
 
 
@@ -219,7 +228,8 @@ def _misfit_warnings(found: ManifoldFit, problem: ManifoldProblem) -> list[str]:
     apart = f"{abs(misfit.ratio - 1) / misfit.sigma:.0f} sigma"
     if not problem.noise.is_assumed and misfit.is_large:
         text = f"the residual is {misfit.ratio:.2f} times the noise, {apart} above it: the joint does not fit the data"
-        told.append(text + (_COUPLED if found.cross_fits else _where(misfit)))
+        by_part = problem.noise.is_told and abs(misfit.ratio / np.sqrt(2) - 1) < _BY_PART
+        told.append(text + (_COUPLED if found.cross_fits else _PER_PART if by_part else _where(misfit)))
     if found.cross_fits:
         return told
     for trend in misfit.trends:

@@ -12,6 +12,7 @@ from jointfrf.errors import IllConditionedWarning
 from jointfrf.identification.joint_fit import JointFit
 from jointfrf.identification.manifold_fit.damping_choice import DofDamping, choose_damping
 from jointfrf.identification.manifold_fit.estimator import JointEstimate, estimate_on_manifold
+from jointfrf.identification.manifold_fit.from_nothing import check_estimate
 from jointfrf.identification.manifold_fit.intervals import LikelihoodIntervals, Spread, spread_of
 from jointfrf.identification.manifold_fit.joint_terms import CrossTerms, DampingTerms, joint_terms
 from jointfrf.identification.manifold_fit.misfit import Misfit, diagnose
@@ -58,8 +59,14 @@ class ManifoldFit(NamedTuple):
 
 def fit_manifold(problem: ManifoldProblem) -> ManifoldFit:
     """Fit the joint by maximum likelihood, linearised on the manifold of FRFs that fit it."""
-    problem, result, choices = _fitted(problem)
+    freq = problem.freq_hz
+    span = f"{freq.size} lines, {freq.min():g} to {freq.max():g} Hz" if freq.size > 1 else f"one line, {freq[0]:g} Hz"
+    try:
+        problem, result, choices = _fitted(problem)
+    except np.linalg.LinAlgError as error:
+        raise ValueError(f"no joint was found that fits gamma ({span}): {error}") from error
     noise = problem.noise
+    check_estimate(result, noise.level, span, is_level_known=not noise.is_assumed)
     level, scale = noise.level, float(np.sqrt(result.excess))
     if noise.is_assumed:
         level = scale * level
@@ -156,7 +163,7 @@ def _estimate(
 ) -> JointEstimate:
     cross = problem.options.cross if cross is None else cross
     terms = joint_terms(2 * np.pi * problem.freq_hz, problem.dofs, damping, cross)
-    with warnings.catch_warnings():
-        # Lines on which noise hides the joint are ill-conditioned; they weigh little.
+    with warnings.catch_warnings(), np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+        # Lines on which noise hides the joint are ill-conditioned; they weigh little. A start may lead to infinity.
         warnings.simplefilter("ignore", IllConditionedWarning)
         return estimate_on_manifold(problem.frfs, terms, cross, problem.used, problem.near)

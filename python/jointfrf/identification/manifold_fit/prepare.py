@@ -14,6 +14,7 @@ from jointfrf.frf.noise_estimate import ZERO
 from jointfrf.frf.noise_model import NoiseModel, estimate_noise
 from jointfrf.frf.smoothing import near_squares, smooth_frfs
 from jointfrf.identification.manifold_fit.estimator import JointEstimate
+from jointfrf.identification.manifold_fit.from_nothing import check_channels, check_joint_seen, check_transform
 from jointfrf.identification.manifold_fit.interface_frfs import InterfaceFrfs
 from jointfrf.identification.manifold_fit.joint_terms import CrossTerms, DampingTerms
 from jointfrf.identification.prepare import BandsOfDofs, MeasuredFrfs, as_dof_names, as_transform
@@ -109,6 +110,8 @@ class KnownNoise:
         Lines whose noise is far above that of the others.
     model : NoiseModel, optional
         Noise of the channels, where it was found from their FRFs.
+    is_told : bool
+        Whether the user said the noise.
     """
 
     level: float
@@ -116,6 +119,7 @@ class KnownNoise:
     is_assumed: bool
     outlying: NDArray[np.intp]
     model: NoiseModel | None = None
+    is_told: bool = False
 
 
 @dataclass(frozen=True)
@@ -174,8 +178,9 @@ def prepare_manifold(
     # Whether channels are the same points is known where both transforms are one.
     square = h.shape[1] == h.shape[2] and np.array_equal(responses, forces)
     transforms = Transforms(responses, forces)
+    _check_joint_dofs(transforms, h, names)
     smooth, variance, known = _known_noise(freq, h, noise, transforms, reciprocal=options.reciprocal and square)
-    _check_joint_seen(freq, smooth, known)
+    check_joint_seen(freq, smooth, transforms.variance(variance))
     return ManifoldProblem(
         dofs=names,
         freq_hz=freq,
@@ -195,22 +200,14 @@ def prepare_manifold(
     )
 
 
-def _check_joint_seen(freq: FloatArray, gamma: ComplexArray, noise: KnownNoise) -> None:
-    """Refuse FRFs that are noise only, or that say nothing across the joint."""
-    span = f"{freq.min():g} to {freq.max():g} Hz"
-    if noise.level >= 1 and not noise.is_assumed:
-        raise ValueError(
-            f"gamma consists of noise ({span}: its noise is {100 * noise.level:.0f} % of the smooth FRFs): nothing can "
-            "be identified from it"
-        )
-    n = gamma.shape[1] // 2
-    size = np.sqrt(abs(np.einsum("lpp->lp", gamma)))
-    across = abs(gamma) / np.maximum(size[:, :, None] * size[:, None, :], np.finfo(float).tiny)
-    if not (across[:, :n, n:] > ZERO).any() and not (across[:, n:, :n] > ZERO).any():
-        raise ValueError(
-            f"gamma is zero between sides j and k of the joint ({span}): no joint connects them, or DOFs j and k are "
-            "not where they are said to be"
-        )
+def _check_joint_dofs(transforms: Transforms, h: ComplexArray, names: tuple[str, ...]) -> None:
+    """Refuse channels that do not show every joint DOF, once on each side."""
+    labels = [f"{side}:{name}" for side in "jk" for name in names]
+    if not transforms.are_units:
+        both = np.array_equal(transforms.responses, transforms.forces)
+        check_transform("transform" if both else "transform[0]", transforms.responses, labels)
+        check_transform("transform[1]", transforms.forces, labels)
+    check_channels(transforms.gamma(h), labels)
 
 
 def as_transforms(
@@ -260,11 +257,14 @@ def _known_noise(
         if (variance <= 0).any():
             raise ValueError("noise must hold positive variances")
         level = float(np.median(np.sqrt(variance) / np.maximum(abs(h), np.finfo(float).tiny)))
+    known = KnownNoise(level, 1.0, False, np.empty(0, np.intp), is_told=True)
     gamma, of_gamma = transforms.gamma(h), transforms.variance(variance)
     smooth = smooth_frfs(freq, gamma, of_gamma, reciprocal=reciprocal).h
     if np.ndim(options.noise) == 0 and transforms.are_units:
+        # Measured FRFs as weights favour lines that noise has made small.
+        smooth = smooth_frfs(freq, gamma, _relative_variance(smooth, level), reciprocal=reciprocal).h
         variance = of_gamma = _relative_variance(smooth, level)
-    return _near(smooth, gamma, of_gamma), variance, KnownNoise(level, 1.0, False, np.empty(0, np.intp))
+    return _near(smooth, gamma, of_gamma), variance, known
 
 
 def _estimated_noise(
@@ -276,6 +276,8 @@ def _estimated_noise(
     )
     # Below this, what looks like noise is rounding.
     is_assumed = model.source == "none" or model.level < _LEAST_LEVEL
+    # What a rational function leaves of FRFs that it meets but for so little is no noise, either.
+    is_assumed |= model.source == "residual" and not model.smooth.is_smooth
     least = _ASSUMED_LEVEL if is_assumed else _LEAST_LEVEL
     variance = _relative_variance(model.smooth.h, least)
     if not is_assumed:

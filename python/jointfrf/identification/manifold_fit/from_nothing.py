@@ -1,0 +1,157 @@
+"""What no joint can be found from, each in one sentence: FRFs that are not there, or the same twice, or noise."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from jointfrf.frf.noise_estimate import ZERO
+from jointfrf.identification.manifold_fit.estimator import JointEstimate
+from jointfrf.kernel.arguments import ComplexArray, FloatArray
+
+__all__ = ["check_channels", "check_estimate", "check_joint_seen", "check_transform"]
+
+#: Rows whose normalised products leave an eigenvalue below this are the same to rounding, or a sum of others.
+_DEPENDENT = 1e-13
+#: Lines that are looked at for that, evenly spread.
+_MOST_LINES = 500
+#: Rows of a transform that are a sum of others to this share.
+_RANK = 1e-9
+#: Noise of driving points from this share of them on hides what they are.
+_HIDDEN = 1.0
+#: FRFs that are above their noise on so small a share of lines are not seen.
+_SEEN = 0.02
+#: A residual of this share of the FRFs, and so many times the noise, is that of no joint.
+_NO_FIT, _FAR = 0.5, 2.0
+
+
+def check_transform(name: str, transform: FloatArray, labels: list[str]) -> None:
+    """Refuse a transform that makes one joint DOF of the others: some channels are the same, or stand in one line."""
+    size = np.linalg.norm(transform, axis=1, keepdims=True)
+    rank = int(np.linalg.matrix_rank(transform / size, tol=_RANK))
+    if rank < len(transform):
+        raise ValueError(
+            f"{name}: {len(transform)} joint DOFs ({', '.join(labels)}) come from channels that show {rank} only: "
+            "channels are the same, or do not see one of the DOFs"
+        )
+
+
+def check_channels(gamma: ComplexArray, labels: list[str]) -> None:
+    """Refuse measured FRFs between joint DOFs j, then k, that hold no signal, or one DOF twice.
+
+    On the two sides of a rigid joint calculated FRFs are the same; measured ones differ by their noise.
+    """
+    half = len(labels) // 2
+    some = gamma[:: -(-len(gamma) // _MOST_LINES)]
+    for what, h in (("responses", some), ("forces", some.swapaxes(1, 2))):
+        size = np.sqrt((abs(h) ** 2).mean(axis=(0, 2)))
+        if not size.all():
+            dead = [labels[i] for i in np.flatnonzero(size == 0)]
+            raise ValueError(f"gamma: the {what} {', '.join(dead)} are zero: nothing was measured there")
+        flat = _normalised(h)
+        product = flat @ flat.conj().T
+        for side in (slice(0, half), slice(half, 2 * half)):
+            least, vectors = np.linalg.eigh(product[side, side])
+            if least[0] < _DEPENDENT:
+                own = np.array(labels[side])[abs(vectors[:, 0]) > 1e-3].tolist()
+                raise ValueError(
+                    f"gamma: the {what} {', '.join(own)} are not independent: one of these DOFs is the others measured "
+                    "again, or their sum"
+                )
+        if _is_measured(gamma):
+            for i in range(half):
+                two = np.array([i, i + half])
+                if np.linalg.eigvalsh(product[np.ix_(two, two)])[0] < _DEPENDENT:
+                    raise ValueError(
+                        f"gamma: the {what} {labels[i]} and {labels[i + half]} are the same numbers, noise included: "
+                        "measure both sides of the joint"
+                    )
+
+
+def _normalised(h: ComplexArray) -> ComplexArray:
+    """Return rows of norm 1, shape (rows, n_freq columns), to which every line and column adds alike."""
+    h = h / np.maximum(np.sqrt((abs(h) ** 2).mean(axis=(0, 1))), np.finfo(float).tiny)
+    h = h / np.maximum(np.sqrt((abs(h) ** 2).mean(axis=(1, 2), keepdims=True)), np.finfo(float).tiny)
+    flat = h.swapaxes(0, 1).reshape(h.shape[1], -1)
+    rows: ComplexArray = flat / np.linalg.norm(flat, axis=1, keepdims=True)
+    return rows
+
+
+def _is_measured(gamma: ComplexArray) -> bool:
+    """Whether there is noise between h_pq and h_qp."""
+    return bool(abs(gamma - gamma.swapaxes(1, 2)).max() > 1e-9 * abs(gamma).max())
+
+
+def check_joint_seen(freq: FloatArray, smooth: ComplexArray, variance: FloatArray) -> None:
+    """Refuse FRFs that are noise only, or that say nothing across the joint.
+
+    Parameters
+    ----------
+    freq : ndarray, shape (n_freq,)
+    smooth : ndarray, shape (n_freq, 2 n, 2 n)
+        Smooth FRFs between joint DOFs j, then k.
+    variance : ndarray, shape (n_freq, 2 n, 2 n)
+        E|e|^2 of the measured ones.
+    """
+    span = f"{freq.min():g} to {freq.max():g} Hz"
+    n = smooth.shape[1] // 2
+    driving = np.einsum("lpp->lp", smooth)
+    tiny = np.finfo(float).tiny
+    noise = np.sqrt(np.einsum("lpp->lp", variance)) / np.maximum(abs(driving), tiny)
+    level = float(np.median(noise))
+    if level >= _HIDDEN:
+        raise ValueError(
+            f"gamma consists of noise ({span}: the noise of driving points is {_percent(level)} of what is smooth in "
+            "them): nothing can be identified from it"
+        )
+    size = np.sqrt(abs(driving))
+    across = abs(smooth) / np.maximum(size[:, :, None] * size[:, None, :], tiny)
+    if not (across[:, :n, n:] > ZERO).any() and not (across[:, n:, :n] > ZERO).any():
+        raise ValueError(
+            f"gamma is zero between sides j and k of the joint ({span}): no joint connects them, or DOFs j and k are "
+            "not where they are said to be"
+        )
+    seen = (abs(smooth) ** 2 > _HIDDEN**2 * variance).mean(axis=0) > _SEEN
+    if not seen[:n, n:].any() and not seen[n:, :n].any():
+        raise ValueError(
+            f"gamma between sides j and k of the joint consists of noise ({span}): no joint is seen, or the noise "
+            "hides it"
+        )
+
+
+def check_estimate(found: JointEstimate, level: float, span: str, *, is_level_known: bool) -> None:
+    """Refuse a result that fits nothing, or that fewer equations than parameters give.
+
+    Parameters
+    ----------
+    found : JointEstimate
+    level : float
+        Noise relative to the FRFs.
+    span : str
+        The lines, in words.
+    is_level_known : bool
+        Whether that is known from elsewhere than from the residual.
+    """
+    for group in found.groups:
+        equations, unknowns = 2 * group.fit.equations, group.fit.minimum.x.size
+        if equations < unknowns:
+            raise ValueError(
+                f"gamma gives {equations:.0f} real equations ({span}, without those that no joint fits) for {unknowns} "
+                "parameters of the joint: more lines are needed, or fewer parameters"
+            )
+    ratio = float(np.sqrt(max(found.excess, 0.0)))
+    left = ratio * level
+    if left > _NO_FIT and (ratio > _FAR or not is_level_known):
+        raise ValueError(
+            f"no joint was found that fits gamma ({span}): {_percent(left)} of the FRFs is left: look at the order and "
+            "places of channels (check_frfs), at transform, and at the noise that was said"
+        )
+    variance = np.diagonal(found.covariance)
+    names = [
+        one.name for one, v, x in zip(found.parameters, variance, found.theta, strict=True) if not (v > 0 and x == x)
+    ]
+    if names:
+        raise ValueError(f"gamma does not determine {', '.join(names)} ({span}): no standard error can be given")
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.0f} %" if share < 10 else "far more than 100 %"
