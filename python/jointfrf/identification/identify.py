@@ -124,12 +124,12 @@ def identify(
 
     Notes
     -----
-    "compliance" is linearised at the smooth FRFs, on the manifold of FRFs that fit a joint: regular for stiff joints and
-    on lines where gamma_jk is singular. Its standard errors: inverse information of the noise, times the correlation
-    between lines, times the residual over the noise where it is above 1; the scatter between lines, or between ten
-    parts of the band, replaces that where it exceeds it by more than chance. Intervals by the profile of the likelihood
-    where they are not symmetric. Standard errors of a band mean: scatter of its lines over the root of their number;
-    its bias is not included.
+    "compliance" is linearised at the smooth FRFs, on the manifold of FRFs that fit a joint: regular for stiff joints
+    and on lines where gamma_jk is singular. Its standard errors: inverse information of the noise, times the
+    correlation between lines, times the residual over the noise where it is above 1; the scatter between lines, or
+    between ten parts of the band, replaces that where it exceeds it by more than chance. Intervals by the profile of
+    the likelihood where they are not symmetric. Standard errors of a band mean: scatter of its lines over the root of
+    their number; its bias is not included.
 
     Examples
     --------
