@@ -79,8 +79,7 @@ def identify(
         `k_initial`. "inverse-substructuring": -(gamma^-1)_jk, which ISMM reduces to. "decoupling-rr", "-rs", "-sr",
         "-ss": (2.53)-(2.56), need `h_a`, `h_b` and the DOF lists. These take the mean over bands, as the thesis does.
         "manifold": maximum likelihood linearised about smooth FRFs that fit a joint; for stiff and coupled joints,
-        noise that is not relative or is correlated, and rectangular FRFs. Not the default: with `cross` "ignore" on
-        FRFs that no joint fits it is slow and may not converge, which it says.
+        noise that is not relative or is correlated, and rectangular FRFs.
     bands : None, (low, high), sequence of these, or mapping of DOF name to these, optional
         Sensitive bands in Hz; all lines by default. The compliance fit weights each line by its information and needs
         none.
@@ -92,7 +91,7 @@ def identify(
         method "manifold" chooses for each DOF, and takes a sequence of words, one for each DOF. Not for band means.
     cross : {"zero", "ignore", "fit"}
         Terms that couple the DOFs of the joint: none, and this is used; unknown and not fitted; fitted, symmetric.
-        Not for band means.
+        Where they are unknown, k is 1/C_dd of the compliance. Not for band means.
     noise : float or array_like, shape (n_freq, m_r, m_f), optional
         Relative noise level of each entry, 0.01 for 1 %; or the variance E|e|^2 of each, (m/N)^2. By default
         "compliance" takes it as relative, with its level from the differences gamma_pq - gamma_qp, and "manifold" finds
