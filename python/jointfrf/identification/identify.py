@@ -85,7 +85,7 @@ def identify(
         with `cross` "fit" for all DOFs together. Not for band means, which give viscous damping.
     cross : {"zero", "ignore", "fit"}
         Terms that couple the DOFs of the joint: none, and this is used; unknown and not fitted; fitted, symmetric.
-        Not for band means.
+        Where they are unknown, k is 1/C_dd of the compliance. Not for band means.
     noise : float or array_like, shape (n_freq, m_r, m_f), optional
         Relative noise level of each entry, 0.01 for 1 %, sqrt(E|e|^2) of real and imaginary part together; or the
         variance E|e|^2 of each, (m/N)^2. By default it is found by entry and frequency, as

@@ -124,7 +124,7 @@ def test_points_that_are_not_one_are_told(beams):
 
 
 def test_a_compliance_that_varies_is_averaged_and_told(beams):
-    """Far more than the noise, by 30 % from line to line: precise lines do not decide alone, and the interval is wide."""
+    """By up to 30 % from line to line, far more than the noise: precise lines do not decide alone."""
     rng = np.random.default_rng(5)
     c = np.array([1 / 6e5, 1 / 5e3]) * (1 + 0.3 * rng.uniform(-1, 1, (beams.freq.size, 2)))
     k = np.einsum("la,ab->lab", 1 / c, np.eye(2)).astype(complex)

@@ -135,7 +135,7 @@ def _linear(data: LineData) -> tuple[ComplexArray, ComplexArray]:
     # With sides exchanged gamma_jk and gamma_kj are, and C is the same.
     turned = np.r_[n : 2 * n, 0:n]
     entries = data.entries._replace(rows=turned[data.entries.rows], columns=turned[data.entries.columns])
-    other = _compliance(*(x[:, turned[:, None], turned] for x in (gamma, change)), entries)
+    other = _compliance(gamma[:, turned[:, None], turned], change[:, turned[:, None], turned], entries)
     return np.concatenate([value, other[0]], axis=1), np.concatenate([slope, other[1]], axis=1)
 
 

@@ -122,12 +122,12 @@ class InterfaceFrfs(NamedTuple):
         dead = unused @ (g != 0).T
         covariance = _covariance(sparse.csr_array(g), variance.reshape(len(variance), -1))
         total = np.einsum("lpp->lp", covariance)
-        inverse_std = np.where(dead, 0, 1 / np.sqrt(np.where(dead, 1, total)))
+        inverse_std: FloatArray = np.where(dead, 0, 1 / np.sqrt(np.where(dead, 1, total)))
         scaled = covariance * inverse_std[:, :, None] * inverse_std[:, None, :]
         own = np.arange(len(p))
         # DOFs made of the same channels may leave an entry without noise of its own.
         scaled[:, own, own] += dead + _OWN_NOISE
-        whitening = np.linalg.cholesky(scaled)
+        whitening = np.linalg.cholesky(scaled).astype(np.float64, copy=False)
         for triangle in whitening:
             triangle[:] = lapack.dtrtri(triangle, lower=1)[0]
         return inverse_std, whitening

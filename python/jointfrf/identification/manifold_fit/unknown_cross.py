@@ -52,12 +52,12 @@ class _Lines(NamedTuple):
         n = self.known.shape[1]
         diagonal = np.arange(n)
         both = self.known[:, :, None] & self.known[:, None, :]
-        covariance = np.where(both, self.of.covariance, 0)
+        covariance: ComplexArray = np.where(both, self.of.covariance, 0)
         covariance[:, diagonal, diagonal] += np.where(self.known, variance, 1)
         size = np.sqrt(np.einsum("laa->la", covariance).real)
         outer = size[:, :, None] * size[:, None, :]
-        information = np.where(both, invert(covariance / outer, on_singular="nan") / outer, 0)
-        information = self.weight[:, None, None] * information
+        inverse = invert(covariance / outer, on_singular="nan") / outer
+        information = np.where(both, self.weight[:, None, None] * inverse, 0).astype(np.complex128)
         value = self.of.value
         return LineForms(value, information, np.zeros_like(value), np.zeros(len(value)))
 
