@@ -95,7 +95,7 @@ def noise_panel(
     up = np.argsort(freq_hz)
     at = (slice(None), *entry)
     freq: FloatArray = freq_hz[up]
-    smooth: FloatArray = abs(noise.smooth.h[at])[up]
+    smooth = np.asarray(abs(noise.smooth.h[at])[up], np.float64)
     found = np.asarray(np.sqrt(noise.variance[at])[up], np.float64)
     usual = np.asarray(np.sqrt(noise.line_level)[up], np.float64)
     outlying = (noise.line_factor > 1)[up]
@@ -107,7 +107,7 @@ def noise_panel(
     if noise.coherence_factor[entry] > 0:
         rest = level**2 - sum(part**2 for _, part, _ in parts)
         parts.append(("part that coherence tells", np.asarray(np.sqrt(np.maximum(rest, 0))), "stiffness-initial"))
-    curves = [Curve("measured", freq, abs(h)[up], "dots")]
+    curves = [Curve("measured", freq, np.asarray(abs(h)[up], np.float64), "dots")]
     if noise.smooth.is_smooth:
         curves.append(Curve("smooth", freq, smooth, "actual"))
     curves += [
