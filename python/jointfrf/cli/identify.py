@@ -16,6 +16,7 @@ from jointfrf.cli.extras import check_installed
 from jointfrf.cli.measured_file import add_file_arguments, in_some_band, interface_of, nodes, read_frfs, words
 from jointfrf.dofs import is_rotation
 from jointfrf.errors import ConvergenceWarning, FrfCheckWarning, IdentificationWarning
+from jointfrf.frf.noise_model import estimate_noise
 from jointfrf.identification.identify import identify
 from jointfrf.identification.joint_fit import JointFit
 from jointfrf.identification.manifold_fit.joint_terms import CrossTerms, DampingTerms
@@ -127,9 +128,15 @@ def run(args: argparse.Namespace) -> int:
         print(fits[0].export(program, ends[:2], rotation_nodes=ends[2:] or None, damping=damping), end="")
     if args.out is not None:
         from jointfrf.report.fit import write_fit
+        from jointfrf.report.noise import noise_figure
 
+        figures = []
+        if "manifold" in args.method and args.noise is None:
+            freq_hz, h = in_some_band(frfs.freq_hz, measured, args.band)
+            names = [str(channel) for channel in sides.channels]
+            figures.append(noise_figure(freq_hz, h, estimate_noise(freq_hz, h), names, names))
         print()
-        for path in write_fit(fits, args.out, args.file.name):
+        for path in write_fit(fits, args.out, args.file.name, figures):
             print(f"wrote {path}")
     return 0
 

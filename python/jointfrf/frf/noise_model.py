@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Literal, cast
 
@@ -13,7 +14,15 @@ from jointfrf.frf.noise_estimate import reciprocity_noise
 from jointfrf.frf.noise_parts import line_correlation, line_levels, noise_parts
 from jointfrf.frf.order_search import OrderSearch
 from jointfrf.frf.reciprocity_differences import ReciprocityDifferences, reciprocity_differences
-from jointfrf.frf.smoothing import SmoothFrfs, checked_frfs, first_variance, near_squares, smoothed
+from jointfrf.frf.smoothing import (
+    SmoothFrfs,
+    checked_frfs,
+    first_variance,
+    joined,
+    near_squares,
+    pieces,
+    smoothed,
+)
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_number, as_real
 
 __all__ = ["NoiseModel", "NoiseSource", "estimate_noise"]
@@ -151,7 +160,8 @@ def estimate_noise(
     by the part of the noise that the smooth FRFs have not taken up, give the parts of the variance by entry. From
     coherence g^2 of n averages, v = (1 - g^2)/(n g^2) |h|^2 is E|e|^2; |h| alone has half of it as its variance. v
     enters as one more part with a factor of its own, so the residual, which sees all noise, decides how far the
-    coherence is believed.
+    coherence is believed. More than 8192 lines are cut into pieces of equal length, each with parts of its own;
+    `variance` is by these, `relative`, `floor` and `coherence_factor` are their root mean squares.
 
     Examples
     --------
@@ -164,11 +174,45 @@ def estimate_noise(
     """
     freq, lines = checked_frfs(freq_hz, h)
     given = _coherence_variance(lines, coherence, averages)
-    up = np.argsort(freq)
-    sorted_given = None if given is None else given[up]
-    before = None if like is None or like.variance.shape != lines.shape else like.in_order(up)
-    model = _estimated(freq[up], lines[up], sorted_given, max_poles, before, reciprocal=reciprocal)
-    return model.in_order(np.argsort(up))
+    places = pieces(np.argsort(freq))
+    if like is not None and (len(places) > 1 or like.variance.shape != lines.shape):
+        like = None
+    parts = (
+        _estimated(
+            freq[own],
+            lines[own],
+            None if given is None else given[own],
+            max_poles,
+            None if like is None else like.in_order(own),
+            reciprocal=reciprocal,
+        )
+        for own in places
+    )
+    return _joined(places, parts, lines.shape)
+
+
+def _joined(places: list[NDArray[np.intp]], parts: Iterable[NoiseModel], shape: tuple[int, ...]) -> NoiseModel:
+    """Return the noise of FRFs of this shape, pieces of the lines at their places; parts and inflation are means."""
+    n_freq = shape[0]
+    variance, by_entry = np.empty(shape), np.zeros((3, *shape[1:]))
+    levels, inflation, known = np.empty((2, n_freq)), 0.0, []
+
+    def smooth() -> Iterator[SmoothFrfs]:
+        nonlocal inflation
+        for own, one in zip(places, parts, strict=True):
+            variance[own] = one.variance
+            levels[:, own] = one.line_level, one.line_factor
+            by_entry[:] += np.square([one.relative, one.floor, one.coherence_factor]) * len(own) / n_freq
+            inflation += one.inflation * len(own) / n_freq
+            known.append((one.source, one.inflation_source))
+            yield one.smooth
+
+    smooth_frfs = joined(places, smooth(), shape)
+    source, inflation_source = max(known, key=known.count)
+    relative, floor, of_coherence = np.sqrt(by_entry)
+    return NoiseModel(
+        relative, floor, of_coherence, variance, inflation, inflation_source, levels[0], levels[1], source, smooth_frfs
+    )  # fmt: skip
 
 
 def _estimated(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,8 +21,19 @@ from jointfrf.kernel.arguments import (
     check_finite_lines,
 )
 
-__all__ = ["SmoothFrfs", "checked_frfs", "first_variance", "near_squares", "smooth_frfs", "smoothed"]
+__all__ = [
+    "SmoothFrfs",
+    "checked_frfs",
+    "first_variance",
+    "joined",
+    "near_squares",
+    "pieces",
+    "smooth_frfs",
+    "smoothed",
+]
 
+#: Lines that are smoothed together at most.
+_PIECE = 8192
 #: Fewer lines are returned as they were measured.
 _FEWEST_LINES = 16
 #: A residual below this share of the FRFs is not noise that smoothing could remove.
@@ -43,7 +55,8 @@ class SmoothFrfs:
     is_smooth : bool
         False where there are too few lines, or no noise that could be removed: `h` is then what was measured.
     poles : tuple of ndarray
-        Poles of positive frequencies, rad/s, of each group of coupled entries.
+        Poles of positive frequencies, rad/s, of each group of coupled entries; one piece of the lines after the other
+        where they are many.
     level : float
         Root mean square of measured minus smooth relative to sqrt(variance), corrected for the parameters.
     share : ndarray, shape (n_out, n_in)
@@ -110,7 +123,8 @@ def smooth_frfs(
     peaks of the FRFs upwards, new poles where the residual is largest. Only poles of positive frequencies are taken,
     with complex residues: receptance with structural damping is met exactly by as many poles as there are modes near
     the lines and a few more for all others. Entries that are zero (by symmetry) stay out, and groups of entries that
-    are not coupled have poles of their own. Work is proportional to n_freq n_entries n_poles^2.
+    are not coupled have poles of their own. Work is proportional to n_freq n_entries n_poles^2. More than 8192 lines
+    are cut into pieces of equal length, each smoothed by itself.
 
     Examples
     --------
@@ -129,10 +143,32 @@ def smooth_frfs(
         raise ValueError(f"inflation must be 1 or more, not {inflation}")
     if max_poles < 1:
         raise ValueError(f"max_poles must be 1 or more, not {max_poles}")
-    up = np.argsort(freq)
     search = OrderSearch(inflation=inflation, max_poles=max_poles)
-    smooth = smoothed(freq[up], lines[up], None if spread is None else spread[up], search, reciprocal=reciprocal)
-    return smooth.in_order(np.argsort(up))
+    places = pieces(np.argsort(freq))
+    parts = (
+        smoothed(freq[own], lines[own], None if spread is None else spread[own], search, reciprocal=reciprocal)
+        for own in places
+    )
+    return joined(places, parts, lines.shape)
+
+
+def pieces(order: NDArray[np.intp]) -> list[NDArray[np.intp]]:
+    """Cut lines in rising order into pieces that are smoothed each by itself: memory does not grow with the lines."""
+    return np.array_split(order, -(-len(order) // _PIECE) or 1)
+
+
+def joined(places: Sequence[NDArray[np.intp]], parts: Iterable[SmoothFrfs], shape: tuple[int, ...]) -> SmoothFrfs:
+    """Return smooth FRFs of this shape, pieces at their places; poles are those of each, level and share means."""
+    freq, h, share = np.empty(shape[0]), np.empty(shape, np.complex128), np.zeros(shape[1:])
+    is_smooth, power = False, 0.0
+    poles: list[ComplexArray] = []
+    for own, one in zip(places, parts, strict=True):
+        freq[own], h[own] = one.freq_hz, one.h
+        is_smooth |= one.is_smooth
+        poles += one.poles
+        power += one.level**2 * len(own) / shape[0]
+        share += one.share * len(own) / shape[0]
+    return SmoothFrfs(freq, h, is_smooth, tuple(poles), float(np.sqrt(power)), share)
 
 
 def checked_frfs(freq_hz: ArrayLike, h: ArrayLike) -> tuple[FloatArray, ComplexArray]:

@@ -51,6 +51,7 @@ STYLES = {
     "high": Style("#e07b00", "--", 1.2),
     "faint": Style("#a8a8a8", "-", 0.3),
     "dots": Style("#8c8c8c", "", 1.0, "."),
+    "outlying": Style("#7b1a10", "", 1.0, "x"),
 }
 _SHADES = ("#ececec", "#d2d2d2", "#bdbdbd")
 #: Dots an inch of a PNG file, and of images inside an SVG file.

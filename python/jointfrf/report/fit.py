@@ -74,7 +74,7 @@ def _panels(
     return panels
 
 
-def write_fit(fits: Sequence[JointFit], folder: Path, source: str) -> list[Path]:
+def write_fit(fits: Sequence[JointFit], folder: Path, source: str, figures: Sequence[Figure] = ()) -> list[Path]:
     """Write ``identification.json`` and a PNG and an SVG file a DOF for each fit; nothing is left half-written.
 
     Parameters
@@ -85,6 +85,8 @@ def write_fit(fits: Sequence[JointFit], folder: Path, source: str) -> list[Path]
         Made if it is missing.
     source : str
         Name of the file that was measured, written into the JSON.
+    figures : sequence of Figure
+        Drawn beside those of the fits.
 
     Returns
     -------
@@ -104,6 +106,8 @@ def write_fit(fits: Sequence[JointFit], folder: Path, source: str) -> list[Path]
         for figure in fit_figures(fit):
             stem = figure.key if i == 0 else f"{figure.key}_{fit.method}"
             contents[f"{stem}.png"], contents[f"{stem}.svg"] = draw(figure)
+    for figure in figures:
+        contents[f"{figure.key}.png"], contents[f"{figure.key}.svg"] = draw(figure)
     folder.mkdir(parents=True, exist_ok=True)
     for file, content in contents.items():
         write_file(folder / file, content)

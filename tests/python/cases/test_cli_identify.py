@@ -191,3 +191,10 @@ def test_a_file_without_coordinates_and_a_spacing(tmp_path, beams):
     assert "1, 9001, 9002\n" in cards
     assert "2, 9003, 9004\n" in cards
     assert "damping left out" in cards
+
+
+def test_the_noise_found_is_drawn(tmp_path):
+    run(BARS, *JOINT_OF_BARS, "--method", "manifold", "--out", tmp_path)
+    assert {path.name for path in tmp_path.iterdir()} >= {"noise_found.png", "noise_found.svg", "joint_y.png"}
+    run(BARS, *JOINT_OF_BARS, "--method", "manifold", "--noise", "0.01", "--out", tmp_path / "told")
+    assert not (tmp_path / "told" / "noise_found.png").exists()

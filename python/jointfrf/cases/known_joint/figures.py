@@ -15,6 +15,7 @@ from jointfrf.cases.known_joint.study import ALL_LINES, Identified
 from jointfrf.cases.known_joint.tables import identified_rows
 from jointfrf.dofs import Parameter
 from jointfrf.frf.bands import Band
+from jointfrf.frf.noise_model import estimate_noise
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.report.axes import (
     FREQUENCY,
@@ -28,6 +29,7 @@ from jointfrf.report.axes import (
     symbol,
 )
 from jointfrf.report.figure import Curve, Figure, Interval, Level, NamedBands, Panel, Ribbon
+from jointfrf.report.noise import noise_figure
 from jointfrf.report.receptance import ReceptanceCurve, receptance_panels, side_by_side
 
 __all__ = ["known_joint_figures"]
@@ -48,6 +50,8 @@ _SINGLE = ("ismm", "decoupling-ss")
 _VARIED = ((0.5, "low"), (2.0, "high"))
 #: Panels that still fit on a page.
 _ONE_FIGURE = 6
+#: Joint DOFs whose FRFs across the joint are drawn beside their driving points.
+_BOTH_SIDES = 3
 #: Noise levels side by side.
 _MOST_LEVELS = 3
 #: A parameter whose sensitivity stays below this share of the largest one does not change an FRF visibly.
@@ -66,7 +70,7 @@ def known_joint_figures(result: KnownJointResult) -> list[Figure]:
     list of Figure
     """
     makers: tuple[Callable[[KnownJointResult], Iterator[Figure]], ...] = (
-        _modes, _receptances, _polluted, _sensitivities, _identified, _noise, _methods, _regenerated,
+        _modes, _receptances, _polluted, _noise_found, _sensitivities, _identified, _noise, _methods, _regenerated,
     )  # fmt: skip
     return [figure for make in makers for figure in make(result)]
 
@@ -128,6 +132,19 @@ def _polluted(result: KnownJointResult) -> Iterator[Figure]:
             pairs.append(receptance_panels(f"noise: {noise.name}", label, curves))
     caption = "Receptance of the assembly at the joint, exact and polluted (one realisation); right: close up"
     yield Figure("polluted", caption, side_by_side(pairs, 2), 2)
+
+
+def _noise_found(result: KnownJointResult) -> Iterator[Figure]:
+    """Noise that the polluted FRFs show of themselves, of the first level: one response a joint DOF."""
+    exact, n = result.exact, len(result.case.joint.dofs)
+    if not result.case.noises:
+        return
+    h = result.case.noises[0].pollute(exact.interface(exact.h_c), result.case.seed)
+    names = [f"{side}:{dof}" for side in "jk" for dof in result.case.joint.dofs]
+    entries = [(d, other) for d in range(n) for other in ((d, n + d) if n <= _BOTH_SIDES else (d,))]
+    figure = noise_figure(exact.freq_hz, h, estimate_noise(exact.freq_hz, h), names, names, entries=entries)
+    caption = f"{figure.caption}; from one realisation of {result.case.noises[0].name} alone"
+    yield replace(figure, key="noise-found", caption=caption, heading="")
 
 
 def _sensitivities(result: KnownJointResult) -> Iterator[Figure]:
