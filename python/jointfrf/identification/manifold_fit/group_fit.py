@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from jointfrf.identification.compliance_fit.least_squares import inverse_information
 from jointfrf.identification.manifold_fit.joint_terms import DiagonalJoint, JointCoordinates
+from jointfrf.identification.manifold_fit.likely_m import PriorOfM, expected_m, prior_of_m
 from jointfrf.identification.manifold_fit.line_forms import (
     FormMinimum,
     LineForms,
@@ -32,12 +33,12 @@ _FAR = 3.0
 _PATIENCE = 8
 #: A fit is far from the data when the squares exceed their number by this factor.
 _LOST = 9.0
-#: A compliance is barely seen when its standard error exceeds this share of it.
-_BARELY = 0.1
+#: Largest mean square of a residual that may be noise.
+_NOISE = 1.15
+#: A compliance is barely seen when its standard error exceeds this share of it: the FRFs may then hardly show M.
+_BARELY = 0.05
 #: Of a compliance with this relative error, damping is not known: its rate is taken below 1 where it is linearised.
 _HARDLY = 0.3
-#: Another start replaces a fit when it lowers the squares by so much.
-_GAIN = 10.0
 
 
 class GroupProblem(NamedTuple):
@@ -104,6 +105,11 @@ class GroupFit(NamedTuple):
         return self.minimum.cost + _FAR * (self.possible - self.equations)
 
     @property
+    def is_noise(self) -> bool:
+        """Whether the residual is no larger than the noise, and hardly a line is not trusted."""
+        return self.squares < _NOISE * max(self.possible, 1.0)
+
+    @property
     def excess(self) -> float:
         """Mean square of the residual in units of the noise."""
         return self.minimum.cost / max(self.equations - self.minimum.x.size / 2, 1)
@@ -125,37 +131,35 @@ def fit_dofs(problem: GroupProblem, starts: Iterable[FloatArray]) -> GroupFit:
         found = _iterate(problem, start)
         if best is None or found.squares < best.squares:
             best = found
-        if best.converged and best.excess < 1.15**2:
+        if best.converged and best.is_noise:
             break
     if best is None:
         raise np.linalg.LinAlgError("no start of the fit is finite")
-    return _from_softer(problem, best) if problem.is_diagonal else best
+    return _from_softer(problem, best) if problem.is_diagonal and not best.is_noise else best
 
 
 def _from_softer(problem: GroupProblem, best: GroupFit) -> GroupFit:
-    """Start again from softer values of the DOFs that are barely seen: stiff joints have a second stationary point.
+    """Start again from softer values of the DOFs that are barely seen: far too stiff, a fit may be caught.
 
     From a few times the compliance that the data can tell, up to that of the structure around the joint.
     """
     n = problem.data.entries.n
     softest = problem.data.own_size
     factor = 3.0
-    while True:
+    while not best.is_noise:
         a = best.minimum.x[:n]
         error = np.sqrt(np.diagonal(inverse_information(2 * best.minimum.information))[:n])
         softer = factor * np.maximum(a, error)
         barely = (error > _BARELY * a) & (softer < softest)
         if not barely.any():
-            return best
+            break
         start = best.minimum.x.copy()
         start[:n] = np.where(barely, softer, a)
         # A rate that belongs to another compliance says nothing here.
         start[n:] = np.where(barely[problem.joint.terms.pairs[n:, 0]], 0.0, start[n:])
         found = _iterate(problem, start)
-        if found.squares < best.squares - _GAIN / 2:
-            best, factor = found, 3.0
-        else:
-            factor *= 4.0
+        best, factor = (found, 3.0) if found.squares < best.squares else (best, 4 * factor)
+    return best
 
 
 def _iterate(problem: GroupProblem, start: FloatArray) -> GroupFit:
@@ -165,13 +169,16 @@ def _iterate(problem: GroupProblem, start: FloatArray) -> GroupFit:
     linearised_at: FloatArray = start
     on: OnManifold | None = None
     unknown = smooth_compliance(data) if problem.unknown.any() else None
+    prior: PriorOfM | None = prior_of_m(data) if problem.is_diagonal else None
+    hidden = problem.is_diagonal
     for step in range(1, _MOST + 1):
         c = problem.of_joint(joint.compliance(linearised_at))
         if unknown is not None:
             c = np.where(problem.unknown.reshape(c.shape), unknown, c)
         on = project(data.smooth, data, c, on, _NEXT_STEPS) if on else starts_on_manifold(data, c, _FIRST_STEPS)
         on, trusted = _trusted(data, c, on, joint)
-        (forms, of_smooth) = normal_forms(data, c, on, (data.measured, data.smooth))
+        likely = expected_m(data, c, on, prior) if prior and hidden else on
+        (forms, of_smooth) = normal_forms(data, c, likely, (data.measured, data.smooth))
         # Unknown entries of C move on all lines: they may bring a line back to where it is trusted.
         forms, unknown = _used(problem, forms, of_smooth, c)
         forms = forms.scaled(trusted.astype(float))
@@ -183,20 +190,32 @@ def _iterate(problem: GroupProblem, start: FloatArray) -> GroupFit:
         x = minimum.x
         equations = float(free[trusted].sum())
         converged = moved < _MOVED and step > 1
+        barely = bool((error > _BARELY * abs(x))[: joint.terms.n].any())
+        hidden, converged = barely or (hidden and step > 1), converged and (hidden or not barely)
         if converged or (step > _PATIENCE and minimum.cost > _LOST * equations):
             break
-        linearised_at = _within_sight(problem.joint, x, error) if problem.is_diagonal else x
+        linearised_at = _within_sight(forms, problem.joint, x, error) if problem.is_diagonal else x
     return GroupFit(minimum, forms, trusted, equations, float(free.sum()), step, converged)
 
 
-def _within_sight(joint: JointCoordinates, x: FloatArray, error: FloatArray) -> FloatArray:
+def _within_sight(forms: LineForms, joint: JointCoordinates, x: FloatArray, error: FloatArray) -> FloatArray:
     """Return where to linearise: not nearer to a rigid joint, nor at a larger rate of one, than the data can tell."""
     terms, n = joint.terms, joint.terms.n
+    hardly = ~(error[:n] <= _HARDLY * x[:n])
+    of_rate = hardly[terms.pairs[n:, 0]]
     at = x.copy()
-    at[:n] = np.maximum(x[:n], np.where(np.isfinite(error[:n]), error[:n], 0))
-    hardly = (error[:n] > _HARDLY * x[:n])[terms.pairs[n:, 0]]
+    if hardly.any():
+        # The size of C itself: of a DOF that is mostly damping, the compliance alone may be anything.
+        size = abs(joint.compliance(x)).mean(axis=0)
+        at[n:][of_rate] = 0.0
+        slope = joint.slope(at, joint.compliance(at))
+        known = np.r_[np.ones(n, bool), ~of_rate]
+        information = (slope.conj().swapaxes(1, 2) @ forms.weight @ slope).real.sum(axis=0)[np.ix_(known, known)]
+        error = np.sqrt(np.maximum(np.diagonal(inverse_information(2 * information)), 0))
+        at[:n] = np.where(hardly, np.maximum(size, error[:n]), x[:n])
+    at[:n] = np.maximum(at[:n], np.where(np.isfinite(error[:n]), error[:n], 0))
     reach = np.where(terms.kinds[n:] == 1, 1.0, 1 / max(float(terms.omega.max()), np.finfo(float).tiny))
-    at[n:] = np.where(hardly, np.clip(x[n:], -reach, reach), x[n:])
+    at[n:] = np.where(of_rate, np.clip(x[n:], -reach, reach), x[n:])
     return at
 
 
