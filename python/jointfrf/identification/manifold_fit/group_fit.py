@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf.identification.manifold_fit.joint_terms import DiagonalJoint, JointCoordinates
+from jointfrf.identification.manifold_fit.likely_m import PriorOfM, expected_m, prior_of_m
 from jointfrf.identification.manifold_fit.line_forms import (
     FormMinimum,
     LineForms,
@@ -34,14 +35,12 @@ _FAR = 3.0
 PATIENCE, LITTLE_PATIENCE = 8, 4
 #: A fit is far from the data when the squares exceed their number by this factor.
 _LOST = 9.0
-#: A residual up to this many times the noise may be noise.
-_GOOD = 1.15
-#: A compliance is barely seen when its standard error exceeds this share of it.
-_BARELY = 0.1
+#: Largest mean square of a residual that may be noise.
+_NOISE = 1.15
+#: A compliance is barely seen when its standard error exceeds this share of it: the FRFs may then hardly show M.
+_BARELY = 0.05
 #: Of a compliance with this relative error, damping is not known: its rate is taken below 1 where it is linearised.
 _HARDLY = 0.3
-#: Another start replaces a fit when it lowers the squares by so much.
-_GAIN = 10.0
 
 
 class GroupProblem(NamedTuple):
@@ -142,9 +141,14 @@ class GroupFit(NamedTuple):
         return not self.converged and self.excess > _LOST
 
     @property
+    def is_noise(self) -> bool:
+        """Whether the residual is no larger than the noise, and hardly a line is not trusted."""
+        return self.squares < _NOISE * max(self.possible, 1.0)
+
+    @property
     def is_good(self) -> bool:
         """Whether it converged, and the residual is that of the noise."""
-        return self.converged and self.excess < _GOOD**2
+        return self.converged and self.is_noise
 
     @property
     def excess(self) -> float:
@@ -174,33 +178,31 @@ def fit_dofs(problem: GroupProblem, starts: Iterable[FloatArray], patience: int 
             break
     if best is None:
         raise np.linalg.LinAlgError("no start of the fit is finite")
-    return _from_softer(problem, best) if problem.is_diagonal and not best.is_lost else best
+    return _from_softer(problem, best) if problem.is_diagonal and not (best.is_noise or best.is_lost) else best
 
 
 def _from_softer(problem: GroupProblem, best: GroupFit) -> GroupFit:
-    """Start again from softer values of the DOFs that are barely seen: stiff joints have a second stationary point.
+    """Start again from softer values of the DOFs that are barely seen: far too stiff, a fit may be caught.
 
     From a few times the compliance that the data can tell, up to that of the structure around the joint.
     """
     n = problem.data.entries.n
     softest = problem.data.own_size
     factor = 3.0
-    while True:
+    while not best.is_noise:
         a = best.minimum.x[:n]
         error = np.sqrt(np.diagonal(inverse_information(2 * best.minimum.information))[:n])
         softer = factor * np.maximum(a, error)
         barely = (error > _BARELY * a) & (softer < softest)
         if not barely.any():
-            return best
+            break
         start = best.minimum.x.copy()
         start[:n] = np.where(barely, softer, a)
         # A rate that belongs to another compliance says nothing here.
         start[n:] = np.where(barely[problem.joint.terms.pairs[n:, 0]], 0.0, start[n:])
         found = _iterate(problem, start)
-        if found.squares < best.squares - _GAIN / 2:
-            best, factor = found, 3.0
-        else:
-            factor *= 4.0
+        best, factor = (found, 3.0) if found.squares < best.squares else (best, 4 * factor)
+    return best
 
 
 def _iterate(problem: GroupProblem, start: FloatArray, patience: int = PATIENCE) -> GroupFit:
@@ -211,6 +213,8 @@ def _iterate(problem: GroupProblem, start: FloatArray, patience: int = PATIENCE)
     on: OnManifold | None = None
     unknown = smooth_compliance(data) if problem.unknown.any() else None
     trusted = np.ones(len(data.measured), np.bool_)
+    prior: PriorOfM | None = prior_of_m(data) if problem.is_diagonal else None
+    hidden = problem.is_diagonal
     for step in range(1, _MOST + 1):
         c = problem.of_joint(joint.compliance(linearised_at))
         if unknown is not None:
@@ -219,7 +223,8 @@ def _iterate(problem: GroupProblem, start: FloatArray, patience: int = PATIENCE)
         on = _rescued(data, c, on)
         near = _trusted(on, data.entries.n, joint)
         trusted = near & trusted if step > 2 * PATIENCE and (near & trusted).any() else near
-        (forms, of_smooth) = normal_forms(data, c, on, (data.measured, data.smooth))
+        likely = expected_m(data, c, on, prior) if prior and hidden else on
+        (forms, of_smooth) = normal_forms(data, c, likely, (data.measured, data.smooth))
         # Unknown entries of C move on all lines: they may bring a line back to where it is trusted.
         forms, unknown = _used(problem, forms, of_smooth, c)
         forms = forms.scaled(trusted.astype(float))
@@ -231,20 +236,32 @@ def _iterate(problem: GroupProblem, start: FloatArray, patience: int = PATIENCE)
         x = minimum.x
         equations = float(free[trusted].sum())
         converged = bool(moved < _MOVED * np.sqrt(x.size)) and step > 1
+        barely = bool((error > _BARELY * abs(x))[: joint.terms.n].any())
+        hidden, converged = barely or (hidden and step > 1), converged and (hidden or not barely)
         if converged or (step > patience and minimum.cost > _LOST * equations):
             break
-        linearised_at = _within_sight(problem.joint, x, error) if problem.is_diagonal else x
+        linearised_at = _within_sight(forms, problem.joint, x, error) if problem.is_diagonal else x
     return GroupFit(minimum, forms, trusted, equations, float(free.sum()), step, converged)
 
 
-def _within_sight(joint: JointCoordinates, x: FloatArray, error: FloatArray) -> FloatArray:
+def _within_sight(forms: LineForms, joint: JointCoordinates, x: FloatArray, error: FloatArray) -> FloatArray:
     """Return where to linearise: not nearer to a rigid joint, nor at a larger rate of one, than the data can tell."""
     terms, n = joint.terms, joint.terms.n
+    hardly = ~(error[:n] <= _HARDLY * x[:n])
+    of_rate = hardly[terms.pairs[n:, 0]]
     at = x.copy()
-    at[:n] = np.maximum(x[:n], np.where(np.isfinite(error[:n]), error[:n], 0))
-    hardly = (error[:n] > _HARDLY * x[:n])[terms.pairs[n:, 0]]
+    if hardly.any():
+        # The size of C itself: of a DOF that is mostly damping, the compliance alone may be anything.
+        size = abs(joint.compliance(x)).mean(axis=0)
+        at[n:][of_rate] = 0.0
+        slope = joint.slope(at, joint.compliance(at))
+        known = np.r_[np.ones(n, bool), ~of_rate]
+        information = (slope.conj().swapaxes(1, 2) @ forms.weight @ slope).real.sum(axis=0)[np.ix_(known, known)]
+        error = np.sqrt(np.maximum(np.diagonal(inverse_information(2 * information)), 0))
+        at[:n] = np.where(hardly, np.maximum(size, error[:n]), x[:n])
+    at[:n] = np.maximum(at[:n], np.where(np.isfinite(error[:n]), error[:n], 0))
     reach = np.where(terms.kinds[n:] == 1, 1.0, 1 / max(float(terms.omega.max()), np.finfo(float).tiny))
-    at[n:] = np.where(hardly, np.clip(x[n:], -reach, reach), x[n:])
+    at[n:] = np.where(of_rate, np.clip(x[n:], -reach, reach), x[n:])
     return at
 
 

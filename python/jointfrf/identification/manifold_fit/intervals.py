@@ -252,12 +252,13 @@ def profile_interval(group: FittedGroup, index: int, factor: float, probability:
     best = minimise_forms(forms, joint, start)
     limit = stats.chi2.ppf(probability, 1) * factor / 2
     error = np.sqrt(np.maximum(np.diagonal(inverse_information(2 * best.information)), 0) * factor)[index]
-    if not of_stiffness and _may_be_rigid(group, int(joint.dofs[index]), limit):
+    may_be_rigid = _may_be_rigid(group, int(joint.dofs[index]), factor, probability)
+    if may_be_rigid and not of_stiffness:
         # A rigid DOF shows no damping.
         return -np.inf, np.inf
     profile = _Profile(forms, joint, index, best.x, best.cost, limit)
     reach = stats.norm.ppf((1 + probability) / 2) * error
-    low = profile.crossing(-1, reach, 0.0 if of_stiffness else -np.inf)
+    low = 0.0 if may_be_rigid else profile.crossing(-1, reach, 0.0 if of_stiffness else -np.inf)
     high = profile.crossing(1, reach, np.inf)
     if of_stiffness:
         with np.errstate(divide="ignore"):
@@ -265,13 +266,14 @@ def profile_interval(group: FittedGroup, index: int, factor: float, probability:
     return low, high
 
 
-def _may_be_rigid(group: FittedGroup, dof: int, limit: float) -> bool:
-    """Whether the squares of a rigid DOF exceed their minimum by less than the limit."""
+def _may_be_rigid(group: FittedGroup, dof: int, factor: float, probability: float) -> bool:
+    """Whether the squares of a rigid DOF, which has none of its parameters, exceed their minimum by chance."""
     minimum = group.fit.minimum
     start = minimum.x.copy()
     start[dof] = 0.0
     rigid = minimise_forms(group.fit.forms, group.joint, start, dof, _PRECISE)
-    return rigid.cost - minimum.cost < limit
+    parameters = int(np.count_nonzero(group.joint.terms.pairs[:, 0] == dof))
+    return bool(rigid.cost - minimum.cost < stats.chi2.ppf(probability, parameters) * factor / 2)
 
 
 class _Profile:
