@@ -131,7 +131,7 @@ def run(args: argparse.Namespace) -> int:
         from jointfrf.report.noise import noise_figure
 
         figures = []
-        if "manifold" in args.method and args.noise is None:
+        if "compliance" in args.method and args.noise is None:
             freq_hz, h = in_some_band(frfs.freq_hz, measured, args.band)
             names = [str(channel) for channel in sides.channels]
             figures.append(noise_figure(freq_hz, h, estimate_noise(freq_hz, h), names, names))
