@@ -288,7 +288,9 @@ def _estimated_noise(
 
 def _near(smooth: ComplexArray, h: ComplexArray, variance: FloatArray) -> ComplexArray:
     """Return smooth FRFs, and the measured ones on lines that smoothing misses by more than their noise."""
-    squares = (abs(h - smooth) ** 2 / variance).mean(axis=(1, 2))
+    # Entries that are zero by symmetry hold rounding.
+    shown = (smooth != 0).any(axis=0)
+    squares = (abs(h - smooth) ** 2 / variance)[:, shown].mean(axis=1)
     return np.where((squares <= _MISSED**2)[:, None, None], smooth, h)
 
 
