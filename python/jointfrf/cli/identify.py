@@ -12,10 +12,10 @@ import numpy as np
 from jointfrf.channels.check.check import check_frfs, warn_of_frfs
 from jointfrf.channels.finite_differences import difference_error
 from jointfrf.channels.point_lines import Interface
-from jointfrf.cli.extras import check_installed
 from jointfrf.cli.measured_file import add_file_arguments, in_some_band, interface_of, nodes, read_frfs, words
 from jointfrf.dofs import is_rotation
 from jointfrf.errors import ConvergenceWarning, FrfCheckWarning, IdentificationWarning
+from jointfrf.extras import check_extras
 from jointfrf.identification.compliance_fit.joint_terms import CrossTerms, DampingTerms
 from jointfrf.identification.identify import identify
 from jointfrf.identification.joint_fit import JointFit
@@ -96,7 +96,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Carry out the command; the caller turns exceptions into messages."""
     if args.out is not None:
-        check_installed("matplotlib")
+        check_extras("matplotlib")
     frfs = read_frfs(args)
     if not (args.j and args.k and args.dofs):
         print(frfs.summary())

@@ -8,10 +8,10 @@ import os
 import sys
 import warnings
 from collections.abc import Sequence
-from importlib.metadata import version
 from typing import Any
 
 from jointfrf.cli.usage import UsageError
+from jointfrf.extras import MissingPackageError
 
 __all__ = ["main"]
 
@@ -55,7 +55,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         except OSError as error:
             where = f"{error.filename}: " if error.filename else ""
             return _complain(f"{where}{error.strerror or error}", _FAILURE)
-        except (ValueError, TypeError, ArithmeticError, MemoryError, RuntimeError) as error:
+        except (ValueError, TypeError, ArithmeticError, MemoryError, RuntimeError, MissingPackageError) as error:
             return _complain(error, _FAILURE)
         except KeyboardInterrupt:
             return _complain("interrupted", _INTERRUPTED)
@@ -70,9 +70,19 @@ def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
     print(f"jointfrf: warning: {message}", file=sys.stderr)
 
 
+class _Version(argparse.Action):
+    """Prints the version, which takes time to find."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
+        from importlib.metadata import version
+
+        print(f"jointfrf {version('jointfrf')}")
+        parser.exit()
+
+
 def _parser(words: list[str]) -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="jointfrf", description="Stiffness and damping of joints from FRFs.")
-    parser.add_argument("--version", action="version", version=f"jointfrf {version('jointfrf')}")
+    parser.add_argument("--version", action=_Version, nargs=0, help="print the version and stop")
     commands = parser.add_subparsers(metavar="COMMAND", required=True)
     for name, what in _COMMANDS.items():
         command = commands.add_parser(name, help=what)

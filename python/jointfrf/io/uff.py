@@ -97,7 +97,7 @@ def read_uff(path: str | PathLike[str], quantity: str | None = None) -> FrfSet:
         There is no such file.
     FileContentError
         The file cannot be read, or lacks something; the message says what, and in which dataset, counted from 1.
-    ImportError
+    MissingPackageError
         The package pyuff is not installed.
 
     Warns

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from jointfrf.errors import FileContentError, FileContentWarning
+from jointfrf.extras import import_extra
 from jointfrf.io.units import UnitSystem
 
 __all__ = ["UniversalFile", "name_some"]
@@ -34,11 +35,7 @@ class UniversalFile:
     """
 
     def __init__(self, path: Path) -> None:
-        try:
-            import pyuff
-        except ImportError as error:
-            message = "reading Universal Files needs the package pyuff: pip install jointfrf[uff]"
-            raise ImportError(message) from error
+        pyuff = import_extra("pyuff")
         self.path = path
         self._notes: dict[str, list[int]] = {}
         self._systems: dict[int, UnitSystem] | None = None

@@ -93,7 +93,7 @@ def write_fit(fits: Sequence[JointFit], folder: Path, source: str) -> list[Path]
 
     Raises
     ------
-    ImportError
+    MissingPackageError
         matplotlib is missing.
     OSError
         The files cannot be written.
