@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -331,6 +331,35 @@ class FrfSet:
             held = f"the {self.freq_hz.size} lines are {self._range()}" if self.freq_hz.size else "there are none"
             raise FileContentError(f"{self._name()}no frequency line in {low:g} to {high:g} Hz: {held}")
         return self._lines(inside)
+
+    def at_nodes(self, nodes: Collection[int]) -> FrfSet:
+        """Return the FRFs between some nodes.
+
+        Parameters
+        ----------
+        nodes : collection of int
+            Numbers of points.
+
+        Raises
+        ------
+        FileContentError
+            There is no FRF between them.
+        """
+        rows, columns = (
+            [i for i, channel in enumerate(side) if channel.node in nodes]
+            for side in (self.responses, self.excitations)
+        )
+        if not self.measured[np.ix_(rows, columns)].any():
+            raise FileContentError(f"{self._name()}no FRF between nodes {', '.join(map(str, sorted(nodes)))}")
+        return replace(
+            self,
+            responses=tuple(self.responses[i] for i in rows),
+            excitations=tuple(self.excitations[j] for j in columns),
+            h=self.h[:, rows][:, :, columns],
+            coherence=None if self.coherence is None else self.coherence[:, rows][:, :, columns],
+            averages=None if self.averages is None else self.averages[np.ix_(rows, columns)],
+            coordinates={node: place for node, place in self.coordinates.items() if node in nodes},
+        )
 
     def summary(self) -> str:
         """Say what the set holds."""

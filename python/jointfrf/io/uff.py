@@ -57,6 +57,7 @@ _OTHER_FUNCTION = ("function of another kind", "functions of another kind")
 _FRF, _COHERENCE = 4, 6
 _DIRECTIONS = {1: "+x", 2: "+y", 3: "+z", 4: "+rx", 5: "+ry", 6: "+rz"}
 _DIRECTIONS |= {-code: "-" + direction[1:] for code, direction in _DIRECTIONS.items()}
+_MOST_DECADES = 60
 _HZ = {"": 1.0, "hz": 1.0, "khz": 1e3, "rad/s": 0.5 / np.pi, "rad/sec": 0.5 / np.pi, "rpm": 1.0 / 60.0}
 
 
@@ -390,6 +391,8 @@ def _read_function(
         value = value.real
     if n < 1 or not n <= value.size <= n + 1:
         raise file.error(f"is damaged: dataset {dataset} ({name}) holds {value.size} of {n} values")
+    if content["binary"] and _is_scrambled(value):
+        raise file.error(f"is damaged: in dataset {dataset} ({name}) the byte order is not the one that is stated")
     kind = content["abscissa_spec_data_type"]
     if kind not in (0, 1, 18):
         raise file.error(f"gives dataset {dataset} ({name}) over {DATA_TYPES.get(kind, kind)}, not frequency")
@@ -401,6 +404,13 @@ def _read_function(
     if freq_hz.size != n or not np.isfinite(freq_hz).all() or freq_hz[0] < 0.0 or (np.diff(freq_hz) <= 0.0).any():
         raise file.error(f"is damaged: the frequencies of dataset {dataset} ({name}) do not increase from 0 Hz or more")
     return freq_hz, np.array(value[:n], dtype=dtype)
+
+
+def _is_scrambled(value: NDArray[Any]) -> bool:
+    """Whether values reach over more decades than any measurement, as numbers with their bytes turned round do."""
+    parts = abs(np.ascontiguousarray(value).view(np.float64))
+    parts = parts[np.isfinite(parts) & (parts > 0.0)]
+    return bool(parts.size and np.log10(parts.max()) - np.log10(parts.min()) > _MOST_DECADES)
 
 
 def _without_bad_zero_line(

