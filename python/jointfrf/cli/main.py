@@ -21,6 +21,7 @@ _COMMANDS = {
     "run": "run cases: tables, figures and a report each",
     "cases": "list the cases that come with jointfrf",
     "check": "look at measured FRFs: what is wrong, in which channel, what to do",
+    "convert": "measured FRFs of one file or several into another format",
     "readings": "compare printed values with every reading of the noise",
     "identify": "identify a joint from a file of measured FRFs",
 }

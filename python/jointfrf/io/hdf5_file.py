@@ -16,6 +16,7 @@ from jointfrf.frf.frf_set import FrfSet
 from jointfrf.io.arrays import FrfArrays
 from jointfrf.io.layout import MARK, fields_of, own_arrays
 from jointfrf.io.mapping import FrfMapping, mapped_arrays
+from jointfrf.io.trial import survives
 
 __all__ = ["hdf5_arrays", "hdf5_fields", "write_hdf5"]
 
@@ -23,6 +24,7 @@ _UNREADABLE = (OSError, ValueError, KeyError, TypeError, RuntimeError, MemoryErr
 #: More than this, deflate cannot make of a byte.
 _MOST_COMPRESSED = 1100
 _DEEPEST = 20
+_TRIAL = "import h5py, sys\nwith h5py.File(sys.argv[1]) as file: [file[name][()] for name in sys.argv[2:]]"
 
 
 def hdf5_arrays(path: Path, mapping: FrfMapping) -> FrfArrays:
@@ -55,12 +57,26 @@ def hdf5_fields(path: Path) -> dict[str, Any]:
     h5py = import_extra("h5py")
     try:
         with h5py.File(path, "r") as file:
+            _check_texts(h5py, file, path)
             return _group(h5py, file, path, 0)
     except FileContentError:
         raise
     except _UNREADABLE as error:
         why = (str(error).strip().splitlines() or [type(error).__name__])[0]
         raise FileContentError(f"{path} cannot be read as an HDF5 file: {why}") from error
+
+
+def _check_texts(h5py: Any, file: Any, path: Path) -> None:
+    """Read texts of variable length in another process first: of damaged ones the HDF5 library crashes or hangs."""
+    found: list[str] = []
+
+    def note(name: str, item: Any) -> None:
+        if isinstance(item, h5py.Dataset) and item.dtype.kind == "O" and h5py.check_string_dtype(item.dtype):
+            found.append(name)
+
+    file.visititems(note)
+    if found and not survives(_TRIAL, str(path), *found):
+        raise FileContentError(f"{path} is damaged: its texts cannot be read")
 
 
 def _group(h5py: Any, group: Any, path: Path, depth: int) -> dict[str, Any]:
@@ -135,14 +151,12 @@ def write_hdf5(path: str | PathLike[str], frfs: FrfSet) -> None:
 
     Notes
     -----
-    Complex numbers are compounds of ``r`` and ``i`` and texts UTF-8, as h5py writes them.
+    Complex numbers are compounds of ``r`` and ``i``, as h5py writes them; texts have a fixed length.
     """
     h5py = import_extra("h5py")
     content = io.BytesIO()
     with h5py.File(content, "w") as file:
         for name, value in fields_of(frfs).items():
-            if value.dtype.kind == "U":
-                file.create_dataset(name, data=value.astype(object), dtype=h5py.string_dtype("utf-8"))
-            else:
-                file.create_dataset(name, data=value, compression="gzip" if value.size > 1 else None)
+            fixed = np.char.encode(value, "ascii") if value.dtype.kind == "U" else value
+            file.create_dataset(name, data=fixed, compression="gzip" if value.dtype.kind in "fc" else None)
     write_file(Path(path), content.getvalue())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import tokenize
 import zipfile
 import zlib
 from os import PathLike
@@ -24,7 +25,7 @@ from jointfrf.io.mapping import FrfMapping, mapped_arrays
 __all__ = ["npz_arrays", "write_npz"]
 
 _UNREADABLE = (OSError, ValueError, KeyError, EOFError, MemoryError, NotImplementedError, RuntimeError,
-               zipfile.BadZipFile, zlib.error)  # fmt: skip
+               zipfile.BadZipFile, zlib.error, tokenize.TokenError)  # fmt: skip
 _FRF = 4
 
 
