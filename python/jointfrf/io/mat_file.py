@@ -6,7 +6,7 @@ import struct
 import zlib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,7 @@ from jointfrf.io.hdf5_file import hdf5_fields
 from jointfrf.io.labels import channels_of
 from jointfrf.io.loose import LooseFunction, arrays_of_functions
 from jointfrf.io.mapping import FrfMapping, mapped_arrays
+from jointfrf.io.mat_check import check_variables
 from jointfrf.io.trial import survives
 from jointfrf.io.units import parse_unit
 
@@ -26,8 +27,6 @@ __all__ = ["mat_arrays"]
 _UNREADABLE = (OSError, ValueError, TypeError, LookupError, EOFError, ArithmeticError, MemoryError,
                NotImplementedError, AttributeError, RuntimeError, struct.error, zlib.error)  # fmt: skip
 _TRIAL = "import scipy.io, sys; scipy.io.loadmat(sys.argv[1])"
-#: Where the first variable of a file of version 5 begins, and the type of one that is compressed.
-_FIRST_TAG, _COMPRESSED = 128, 15
 _HDF5_FROM = b"MATLAB 7.3"
 _TOLERANCE = 1e-3
 
@@ -67,7 +66,11 @@ def mat_arrays(path: Path, mapping: FrfMapping) -> FrfArrays:
 def _loaded(path: Path) -> dict[str, Any]:
     import scipy.io
 
-    if not _has_checksums(path) and not survives(_TRIAL, str(path)):
+    try:
+        has_checksums = check_variables(path)
+    except (ValueError, zlib.error) as error:
+        raise FileContentError(f"{path} cannot be read as a MATLAB file: {error}") from error
+    if not has_checksums and not survives(_TRIAL, str(path)):
         raise FileContentError(f"{path} cannot be read as a MATLAB file: it is damaged")
     try:
         found = scipy.io.loadmat(path, simplify_cells=True)
@@ -75,21 +78,6 @@ def _loaded(path: Path) -> dict[str, Any]:
         why = (str(error).strip().splitlines() or [type(error).__name__])[0]
         raise FileContentError(f"{path} cannot be read as a MATLAB file: {why}") from error
     return {name: value for name, value in found.items() if not name.startswith("__")}
-
-
-def _has_checksums(path: Path) -> bool:
-    """Whether all variables are compressed, as MATLAB does it: damage is then noticed before they are read."""
-    with path.open("rb") as file:
-        head = file.read(_FIRST_TAG)
-        order: Literal["little", "big"] = "little" if head.endswith(b"IM") else "big"
-        size, place = path.stat().st_size, _FIRST_TAG
-        while place < size:
-            file.seek(place)
-            tag = file.read(8)
-            if int.from_bytes(tag[:4], order) != _COMPRESSED:
-                return False
-            place += 8 + int.from_bytes(tag[4:], order)
-    return head.startswith(b"MATLAB") and place == size > _FIRST_TAG
 
 
 def _records(content: Any) -> Iterator[Mapping[str, Any]]:

@@ -62,7 +62,7 @@ def structure_of_testlab(frfs, *, label="g/N", factor=1.0, type_="FRF", values=N
     }
 
 
-def write_mat(path, *, compressed=False, **fields):
+def write_mat(path, *, compressed=True, **fields):
     scipy.io.savemat(path, fields, do_compression=compressed)
     return path
 

@@ -3,18 +3,12 @@
 import numpy as np
 import pytest
 
-import frf_files
-from frf_files import FREQ_HZ, frf_set, full_set, names, structure_of_testlab, write_mat73, write_sdynpy
+from frf_files import FREQ_HZ, frf_set, full_set, names, structure_of_testlab, write_mat, write_mat73, write_sdynpy
 from jointfrf.errors import FileContentError, FileContentWarning
 from jointfrf.io import FrfMapping, frfs_of_arrays, read_frfs, write_csv, write_hdf5, write_npz, write_uff
 
 pytest.importorskip("pyuff")
 pytest.importorskip("h5py")
-
-
-def write_mat(path, **fields):
-    return frf_files.write_mat(path, compressed=True, **fields)
-
 
 WRITERS = {"a.uff": write_uff, "a.npz": write_npz, "a.h5": write_hdf5, "a.csv": write_csv}
 GRAVITY = 9.80665
