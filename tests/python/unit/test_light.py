@@ -41,6 +41,12 @@ def test_a_name_imports_only_what_it_needs():
     assert not found & (HEAVY - {"numpy", "jointfrf._kernel"})
 
 
+def test_methods_of_identification_import_no_statistics():
+    found = modules_after("import jointfrf\njointfrf.identify")
+    assert "jointfrf.identification.manifold_fit.fit" in found
+    assert not found & {"scipy.stats", "scipy.optimize", "scipy.interpolate", "scipy.io", "scipy.signal"}
+
+
 def test_every_public_name_is_found():
     for name in jointfrf.__all__:
         assert getattr(jointfrf, name) is not None, name

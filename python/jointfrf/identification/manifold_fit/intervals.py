@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy import optimize, stats
+from scipy import special
 
 from jointfrf.identification.compliance_fit.least_squares import inverse_information
 from jointfrf.identification.manifold_fit.estimator import FittedGroup, JointEstimate
@@ -106,14 +106,14 @@ def spread_of(found: JointEstimate, inflation: float, *, is_level_known: bool = 
     known = np.isfinite(ratio)
     if known.any():
         degrees = BLOCKS - 1
-        single = stats.chi2.ppf(1 - (1 - _CHANCE) / known.sum(), degrees) / degrees
-        together = stats.chi2.ppf(_CHANCE, degrees * known.sum()) / (degrees * known.sum())
+        single = _chi_squared(1 - (1 - _CHANCE) / known.sum(), degrees) / degrees
+        together = _chi_squared(_CHANCE, degrees * known.sum()) / (degrees * known.sum())
         mean = float(ratio[known].mean())
         if mean > together:
             factor *= mean
         larger = known & (ratio > single)
         # Student's t for the few blocks.
-        few = (stats.t.ppf(0.975, degrees) / stats.norm.ppf(0.975)) ** 2
+        few = (special.stdtrit(degrees, 0.975) / special.ndtri(0.975)) ** 2
         factor[larger] = np.maximum(factor, few * by_blocks)[larger]
     return Spread(by_noise, by_blocks, factor)
 
@@ -153,7 +153,7 @@ def _limits(group: FittedGroup, i: int, factor: float, probability: float) -> tu
     """Return the limits of one parameter of a group."""
     terms, x = group.joint.terms, group.fit.minimum.x
     covariance = inverse_information(2 * group.fit.minimum.information) * factor
-    reach = float(stats.norm.ppf((1 + probability) / 2))
+    reach = float(special.ndtri((1 + probability) / 2))
     a = int(terms.pairs[i, 0])
     is_diagonal = isinstance(group.joint, DiagonalJoint)
     if is_diagonal and np.sqrt(max(covariance[a, a], 0)) > _CURVED * x[a]:
@@ -198,13 +198,13 @@ def profile_interval(group: FittedGroup, index: int, factor: float, probability:
     if of_stiffness:
         start = group.fit.minimum.x
     best = minimise_forms(forms, joint, start)
-    limit = stats.chi2.ppf(probability, 1) * factor / 2
+    limit = _chi_squared(probability, 1) * factor / 2
     error = np.sqrt(np.maximum(np.diagonal(inverse_information(2 * best.information)), 0) * factor)[index]
     if not of_stiffness and _may_be_rigid(group, int(joint.dofs[index]), limit):
         # A rigid DOF shows no damping.
         return -np.inf, np.inf
     profile = _Profile(forms, joint, index, best.x, best.cost, limit)
-    reach = stats.norm.ppf((1 + probability) / 2) * error
+    reach = special.ndtri((1 + probability) / 2) * error
     low = profile.crossing(-1, reach, 0.0 if of_stiffness else -np.inf)
     high = profile.crossing(1, reach, np.inf)
     if of_stiffness:
@@ -220,6 +220,11 @@ def _may_be_rigid(group: FittedGroup, dof: int, limit: float) -> bool:
     start[dof] = 0.0
     rigid = minimise_forms(group.fit.forms, group.joint, start, dof, _PRECISE)
     return rigid.cost - minimum.cost < limit
+
+
+def _chi_squared(probability: float, degrees: float) -> float:
+    """Quantile of chi-squared, without the time that scipy.stats takes to import."""
+    return float(2 * special.gammaincinv(degrees / 2, probability))
 
 
 class _Profile:
@@ -248,6 +253,8 @@ class _Profile:
             if sign < 0 and there <= bound:
                 there = bound
             if self.excess(there) > 0:
+                from scipy import optimize
+
                 root: float = optimize.brentq(self.excess, near, there, xtol=1e-3 * reach, rtol=1e-6)
                 return root
             if there == bound:
