@@ -178,6 +178,23 @@ class FrfSet:
         """Which FRFs there are, shape (n_responses, n_excitations)."""
         return np.logical_not(np.isnan(self.h).all(axis=0))
 
+    def check_whole(self) -> None:
+        """Check that every FRF that is there is finite on all lines.
+
+        Raises
+        ------
+        ValueError
+            There is no FRF, or one is NaN or infinite on some lines; the message names the first.
+        """
+        measured = self.measured
+        if not measured.any():
+            raise ValueError("frfs holds no FRF")
+        bad = ~np.isfinite(self.h) & measured
+        if bad.any():
+            line, i, j = (int(places[0]) for places in np.nonzero(bad))
+            name = f"{self.responses[i]} / {self.excitations[j]}"
+            raise ValueError(f"FRF {name} holds NaN or Inf, first at {self.freq_hz[line]:g} Hz")
+
     def receptance(self) -> FrfSet:
         """Return the same set as displacement per force.
 

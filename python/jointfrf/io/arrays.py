@@ -131,7 +131,6 @@ def as_frf_set(
         shape = (freq_hz.size, len(responses), len(excitations))
         h = _in_order("FRFs", content.h, content.axes, shape).astype(np.complex128)
         used, factor, note = _quantity(content, (*responses, *excitations), quantity, forced=forced)
-        _check_values(h, freq_hz, responses, excitations)
         coherence = None
         if content.coherence is not None:
             coherence = _in_order("coherence", content.coherence, content.axes, shape).astype(np.float64)
@@ -140,9 +139,11 @@ def as_frf_set(
             averages = _numbers("averages", averages)
             averages = averages.reshape(shape[1:] if averages.size == shape[1] * shape[2] else averages.shape)
         stated = f"{content.quantity or 'FRFs of an unnamed quantity'} [{content.unit or 'no unit'}]"
-        h *= factor
+        with np.errstate(over="ignore", invalid="ignore"):
+            h *= factor
         places = content.coordinates
         found = FrfSet(freq_hz, responses, excitations, h, used, places, where, coherence, averages, stated)
+        found.check_whole()
     except (ValueError, TypeError, OverflowError) as error:
         raise FileContentError(f"{where}: {error}") from error
     if note:
@@ -254,17 +255,3 @@ def _quantity(
 
 def _fits(unit: Unit, power: int) -> bool:
     return unit.exponents == (1, -1, -power)
-
-
-def _check_values(
-    h: NDArray[np.complex128],
-    freq_hz: NDArray[np.float64],
-    responses: tuple[Channel, ...],
-    excitations: tuple[Channel, ...],
-) -> None:
-    bad = ~np.isfinite(h) & ~np.isnan(h).all(axis=0)
-    if bad.any():
-        line, i, j = (int(k[0]) for k in np.nonzero(bad))
-        raise ValueError(f"FRF {responses[i]} / {excitations[j]} holds NaN or Inf, first at {freq_hz[line]:g} Hz")
-    if np.isnan(h).all():
-        raise ValueError("there is no FRF: all values are NaN")

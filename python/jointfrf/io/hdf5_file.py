@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from jointfrf.errors import FileContentError
+from jointfrf.errors import FileContentError, first_line
 from jointfrf.extras import import_extra
 from jointfrf.files import write_file
 from jointfrf.frf.frf_set import FrfSet
@@ -62,8 +62,7 @@ def hdf5_fields(path: Path) -> dict[str, Any]:
     except FileContentError:
         raise
     except _UNREADABLE as error:
-        why = (str(error).strip().splitlines() or [type(error).__name__])[0]
-        raise FileContentError(f"{path} cannot be read as an HDF5 file: {why}") from error
+        raise FileContentError(f"{path} cannot be read as an HDF5 file: {first_line(error)}") from error
 
 
 def _check_texts(h5py: Any, file: Any, path: Path) -> None:

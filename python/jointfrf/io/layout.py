@@ -29,13 +29,7 @@ def fields_of(frfs: FrfSet) -> dict[str, NDArray[Any]]:
     ValueError
         An FRF is NaN or infinite on some lines only, or there is none.
     """
-    if not frfs.measured.any():
-        raise ValueError("frfs holds no FRF")
-    partial = ~np.isfinite(frfs.h) & frfs.measured
-    if partial.any():
-        line, i, j = (int(k[0]) for k in np.nonzero(partial))
-        name = f"{frfs.responses[i]} / {frfs.excitations[j]}"
-        raise ValueError(f"FRF {name} holds NaN or Inf, first at {frfs.freq_hz[line]:g} Hz")
+    frfs.check_whole()
     fields: dict[str, NDArray[Any]] = {
         MARK: np.array(_LAYOUT),
         "freq_hz": frfs.freq_hz,

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from jointfrf.errors import FileContentError
+from jointfrf.errors import FileContentError, first_line
 from jointfrf.frf.frf_set import Channel
 from jointfrf.io.arrays import FrfArrays
 from jointfrf.io.hdf5_file import hdf5_fields
@@ -75,8 +75,7 @@ def _loaded(path: Path) -> dict[str, Any]:
     try:
         found = scipy.io.loadmat(path, simplify_cells=True)
     except (*_UNREADABLE, scipy.io.matlab.MatReadError) as error:
-        why = (str(error).strip().splitlines() or [type(error).__name__])[0]
-        raise FileContentError(f"{path} cannot be read as a MATLAB file: {why}") from error
+        raise FileContentError(f"{path} cannot be read as a MATLAB file: {first_line(error)}") from error
     return {name: value for name, value in found.items() if not name.startswith("__")}
 
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from jointfrf.errors import FileContentError
+from jointfrf.errors import FileContentError, first_line
 from jointfrf.files import write_file
 from jointfrf.frf.frf_set import FrfSet
 from jointfrf.io.arrays import FrfArrays
@@ -59,7 +59,7 @@ def npz_arrays(path: Path, mapping: FrfMapping) -> FrfArrays:
     except FileContentError:
         raise
     except _UNREADABLE as error:
-        raise FileContentError(f"{path} cannot be read as an NPZ file: {_first_line(error)}") from error
+        raise FileContentError(f"{path} cannot be read as an NPZ file: {first_line(error)}") from error
     fields = {name: value.item() if value.ndim == 0 else value for name, value in fields.items()}
     where = str(path)
     if MARK in fields:
@@ -148,7 +148,3 @@ def write_npz(path: str | PathLike[str], frfs: FrfSet) -> None:
     content = io.BytesIO()
     np.savez_compressed(content, **fields_of(frfs))  # type: ignore[arg-type]
     write_file(Path(path), content.getvalue())
-
-
-def _first_line(error: BaseException) -> str:
-    return (str(error).strip().splitlines() or [type(error).__name__])[0]

@@ -16,47 +16,16 @@ from numpy.typing import NDArray
 from jointfrf.errors import FileContentError
 from jointfrf.frf.frf_set import POWER_OF_I_OMEGA, ROUND_OFF, Channel, FrfSet, same_frf
 from jointfrf.frf.merge import same_lines
+from jointfrf.io.labels import DIRECTION_CODES
 from jointfrf.io.quantity import check_quantity, contradiction, state
+from jointfrf.io.uff_contents import contents_without_frf
 from jointfrf.io.uff_file import UniversalFile, name_some
 from jointfrf.io.uff_nodes import node_coordinates
 from jointfrf.io.uff_ordinate import DATA_TYPES, Axis, kind_of_frf, ordinate_factor, ordinate_quantity
 
 __all__ = ["read_uff", "read_uff_part"]
 
-_DATASETS = {
-    15: "nodes",
-    18: "coordinate systems",
-    55: "data at nodes",
-    82: "trace lines",
-    151: "header",
-    164: "units",
-    1858: "qualifiers of dataset 58",
-    2400: "model header",
-    2411: "nodes",
-    2412: "elements",
-    2414: "analysis data",
-    2420: "coordinate systems",
-    2429: "groups",
-    2467: "groups",
-}
-_FUNCTIONS = {
-    1: ("time history", "time histories"),
-    2: ("auto spectrum", "auto spectra"),
-    3: ("cross spectrum", "cross spectra"),
-    5: ("transmissibility", "transmissibilities"),
-    6: ("coherence", "coherences"),
-    7: ("auto correlation", "auto correlations"),
-    8: ("cross correlation", "cross correlations"),
-    9: ("power spectral density", "power spectral densities"),
-    12: ("spectrum", "spectra"),
-    25: ("impulse response", "impulse responses"),
-    26: ("multiple coherence", "multiple coherences"),
-    27: ("order function", "order functions"),
-}
-_OTHER_FUNCTION = ("function of another kind", "functions of another kind")
 _FRF, _COHERENCE = 4, 6
-_DIRECTIONS = {1: "+x", 2: "+y", 3: "+z", 4: "+rx", 5: "+ry", 6: "+rz"}
-_DIRECTIONS |= {-code: "-" + direction[1:] for code, direction in _DIRECTIONS.items()}
 _MOST_DECADES = 60
 _HZ = {"": 1.0, "hz": 1.0, "khz": 1e3, "rad/s": 0.5 / np.pi, "rad/sec": 0.5 / np.pi, "rpm": 1.0 / 60.0}
 
@@ -249,7 +218,7 @@ def _no_frf(file: UniversalFile, content: _Content, nodes: Collection[int] | Non
         return file.error(f"holds no FRF that can be used: {why}")
     if content.functions[_FRF] and nodes is not None:
         return file.error(f"holds no FRF between {name_some('node', sorted(nodes))}")
-    return file.error(f"holds {_contents(file, content.functions)}")
+    return file.error(f"holds {contents_without_frf(file.types, content.functions)}")
 
 
 def _describe_frf(
@@ -308,9 +277,9 @@ def _channel(header: dict[str, Any], prefix: str, role: str) -> Channel:
     node, direction = header[f"{prefix}_node"], header[f"{prefix}_dir"]
     if node < 1:
         raise _UnusableFrfError(f"it names no {role} node (node {node})")
-    if direction not in _DIRECTIONS:
+    if direction not in DIRECTION_CODES:
         raise _UnusableFrfError(f"it names no {role} direction (code {direction})")
-    return Channel(node, _DIRECTIONS[direction])
+    return Channel(node, DIRECTION_CODES[direction])
 
 
 def _unique(file: UniversalFile, frfs: list[_Frf]) -> list[_Frf]:
@@ -436,20 +405,6 @@ def _without_bad_zero_line(
     if not drop:
         return freq_hz, h, coherence
     return freq_hz[1:], h[1:], None if coherence is None else coherence[1:]
-
-
-def _contents(file: UniversalFile, functions: Counter[int]) -> str:
-    """Say what a file without FRFs holds."""
-    if functions:
-        held = ", ".join(f"{_count(n, kind)} (dataset 58, function type {kind})" for kind, n in functions.items())
-        return f"{held} and no FRF"
-    kinds = [f"{kind} ({_DATASETS[kind]})" if kind in _DATASETS else str(kind) for kind in sorted(set(file.types))]
-    return f"dataset{'s' if len(kinds) > 1 else ''} {', '.join(kinds)} and no FRF (dataset 58, function type {_FRF})"
-
-
-def _count(n: int, function_type: int) -> str:
-    singular, plural = _FUNCTIONS.get(function_type, _OTHER_FUNCTION)
-    return f"{n} {singular if n == 1 else plural}"
 
 
 def _lines(freq_hz: NDArray[np.float64]) -> str:

@@ -84,15 +84,10 @@ def write_uff(
     """
     if not (title.isascii() and title.isprintable() and len(title) <= _WIDTH):
         raise ValueError(f"title {title!r} is not one line of at most {_WIDTH} ASCII characters")
-    measured = np.argwhere(frfs.measured)
-    if not measured.size:
-        raise ValueError("frfs holds no FRF")
+    frfs.check_whole()
     parts = [_header(title), _units(), _nodes(frfs)]
-    for i, j in measured:
+    for i, j in np.argwhere(frfs.measured):
         values = frfs.h[:, i, j]
-        if not np.isfinite(values).all():
-            name = f"{frfs.responses[i]} / {frfs.excitations[j]}"
-            raise ValueError(f"FRF {name} holds NaN or Inf, first at {frfs.freq_hz[~np.isfinite(values)][0]:g} Hz")
         place = _place(frfs.responses[i], frfs.excitations[j])
         head = _Head(place, f"FRF {frfs.responses[i]} / {frfs.excitations[j]}", title, _FRF, axes=_ordinate(frfs, i, j))
         parts.append(_function(head, frfs.freq_hz, values, binary, single))

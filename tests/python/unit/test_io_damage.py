@@ -201,7 +201,6 @@ def test_a_matlab_file_without_checksums(tmp_path):
 
 def test_damaged_texts_of_an_hdf5_file(tmp_path, monkeypatch):
     """Texts of variable length stand in a heap of their own, where the library follows every number."""
-    monkeypatch.setattr("jointfrf.io.trial._LONGEST", 2)
     path = tmp_path / "texts.h5"
     with h5py.File(path, "w") as file:
         for key, value in FIELDS.items():
@@ -209,6 +208,7 @@ def test_damaged_texts_of_an_hdf5_file(tmp_path, monkeypatch):
     np.testing.assert_array_equal(read_frfs(path).h, GIVEN.h)
     content = path.read_bytes()
     heap = content.index(b"GCOL")
+    monkeypatch.setattr("jointfrf.io.trial._LONGEST", 2)
     for numbers in (b"\xff" * 16, b"\0" * 16):
         path.write_bytes(content[: heap + 16] + numbers + content[heap + 32 :])
         refused(path)
