@@ -3,174 +3,39 @@
 Time convention exp(+i w t). Arrays over frequency have shape (n_freq, out, in), complex128, C order. SI units.
 """
 
-from jointfrf.channels.check.check import check_frfs
-from jointfrf.channels.check.finding import FrfCheck, FrfFinding
-from jointfrf.channels.consistency import (
-    Consistency,
-    DrivingPointCheck,
-    driving_point_check,
-    impact_consistency,
-    sensor_consistency,
-)
-from jointfrf.channels.finite_differences import (
-    DifferenceError,
-    central_difference,
-    difference_error,
-    difference_weights,
-    transform,
-)
-from jointfrf.channels.point_lines import Interface, interface
-from jointfrf.channels.virtual_point import (
-    VirtualPoint,
-    append_virtual_point,
-    channel_geometry,
-    virtual_point,
-    virtual_points,
-)
-from jointfrf.dofs import rigid_offset
-from jointfrf.errors import (
-    ConvergenceWarning,
-    CopyWarning,
-    FileContentError,
-    FileContentWarning,
-    FrfCheckWarning,
-    IdentificationWarning,
-    IllConditionedWarning,
-    SingularLineError,
-)
-from jointfrf.frf.bands import as_bands, band_mean, in_bands
-from jointfrf.frf.metrics import amplitude_error, frequency_error, has_peak, peak
-from jointfrf.frf.noise import pollute, realisations
-from jointfrf.frf.noise_model import NoiseModel, estimate_noise
-from jointfrf.frf.smoothing import SmoothFrfs, smooth_frfs
-from jointfrf.identification.identify import identify
-from jointfrf.identification.joint_fit import JointFit
-from jointfrf.identification.monte_carlo import BandStatistics, MonteCarlo, monte_carlo
-from jointfrf.identification.realisations import identify_realisations
-from jointfrf.identification.sensitivity import propose_bands, sensitivity
-from jointfrf.joint import Joint
-from jointfrf.kernel.call import VERSION
-from jointfrf.kernel.engine import get_engine, set_engine, use_engine
-from jointfrf.kernel.linear_algebra import invert, reciprocal_condition, solve
-from jointfrf.kernel.status import RCOND_LIMIT
-from jointfrf.models.beam import beam
-from jointfrf.models.chain import chain
-from jointfrf.models.model import Model, assemble
-from jointfrf.models.receptance.receptance import ReceptanceInfo, receptance
-from jointfrf.solids.bolt import PROOF_STRENGTH, STRESS_AREA, Bolt, preload_force
-from jointfrf.solids.bolted_lap import BoltedLap, LapDivisions, bolted_lap
-from jointfrf.solids.brick import Material, assemble_bricks, brick_quality, element_matrices
-from jointfrf.solids.brick_beam import Hole, brick_beam
-from jointfrf.solids.contact_pairs import ContactLaw
-from jointfrf.solids.interpolation import interpolation
-from jointfrf.solids.mesh import Mesh
-from jointfrf.solids.preload import PreloadedLap, preload
-from jointfrf.solids.solid import Patch, SolidModel, solid_model
-from jointfrf.substructuring.compliance import compliance_covariance, compliance_factors, joint_compliance
-from jointfrf.substructuring.coupling import couple
-from jointfrf.substructuring.decoupling import decouple
-from jointfrf.substructuring.ismm import inverse_substructuring, ismm
-from jointfrf.substructuring.modification import find_modification, modify
-from jointfrf.substructuring.multi_point import MultiPointJoint, multi_point_compliance, multi_point_stiffness
+from functools import cache
+from importlib import import_module
+from pathlib import Path
 
-__all__ = [
-    "PROOF_STRENGTH",
-    "RCOND_LIMIT",
-    "STRESS_AREA",
-    "BandStatistics",
-    "Bolt",
-    "BoltedLap",
-    "Consistency",
-    "ContactLaw",
-    "ConvergenceWarning",
-    "CopyWarning",
-    "DifferenceError",
-    "DrivingPointCheck",
-    "FileContentError",
-    "FileContentWarning",
-    "FrfCheck",
-    "FrfCheckWarning",
-    "FrfFinding",
-    "Hole",
-    "IdentificationWarning",
-    "IllConditionedWarning",
-    "Interface",
-    "Joint",
-    "JointFit",
-    "LapDivisions",
-    "Material",
-    "Mesh",
-    "Model",
-    "MonteCarlo",
-    "MultiPointJoint",
-    "NoiseModel",
-    "Patch",
-    "PreloadedLap",
-    "ReceptanceInfo",
-    "SingularLineError",
-    "SmoothFrfs",
-    "SolidModel",
-    "VirtualPoint",
-    "amplitude_error",
-    "append_virtual_point",
-    "as_bands",
-    "assemble",
-    "assemble_bricks",
-    "band_mean",
-    "beam",
-    "bolted_lap",
-    "brick_beam",
-    "brick_quality",
-    "central_difference",
-    "chain",
-    "channel_geometry",
-    "check_frfs",
-    "compliance_covariance",
-    "compliance_factors",
-    "couple",
-    "decouple",
-    "difference_error",
-    "difference_weights",
-    "driving_point_check",
-    "element_matrices",
-    "estimate_noise",
-    "find_modification",
-    "frequency_error",
-    "get_engine",
-    "has_peak",
-    "identify",
-    "identify_realisations",
-    "impact_consistency",
-    "in_bands",
-    "interface",
-    "interpolation",
-    "inverse_substructuring",
-    "invert",
-    "ismm",
-    "joint_compliance",
-    "modify",
-    "monte_carlo",
-    "multi_point_compliance",
-    "multi_point_stiffness",
-    "peak",
-    "pollute",
-    "preload",
-    "preload_force",
-    "propose_bands",
-    "realisations",
-    "receptance",
-    "reciprocal_condition",
-    "rigid_offset",
-    "sensitivity",
-    "sensor_consistency",
-    "set_engine",
-    "smooth_frfs",
-    "solid_model",
-    "solve",
-    "transform",
-    "use_engine",
-    "virtual_point",
-    "virtual_points",
-]
+#: Rooms that are reached as attributes, as in ``jointfrf.io.read_uff``.
+_ROOMS = ("io", "report", "solids")
 
-__version__ = VERSION
+
+@cache
+def _places() -> dict[str, str]:
+    """Public names and their modules: the imports of ``__init__.pyi``, which type checkers read, too."""
+    import ast
+
+    stub = Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8")
+    imports = [node for node in ast.parse(stub).body if isinstance(node, ast.ImportFrom) and node.module != __name__]
+    return {alias.name: node.module for node in imports if node.module for alias in node.names}
+
+
+def __getattr__(name: str) -> object:
+    """Import a public name when it is asked for: what needs scipy takes its time to import."""
+    if name in _ROOMS:
+        return import_module(f"{__name__}.{name}")
+    if name == "__version__":
+        value: object = import_module("jointfrf.kernel.call").VERSION
+    elif name == "__all__":
+        value = sorted(_places())
+    elif name in _places():
+        value = getattr(import_module(_places()[name]), name)
+    else:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}", name=name, obj=None)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_ROOMS, *_places(), "__all__", "__version__"})

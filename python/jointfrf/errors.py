@@ -14,6 +14,7 @@ __all__ = [
     "IdentificationWarning",
     "IllConditionedWarning",
     "SingularLineError",
+    "first_line",
 ]
 
 
@@ -60,3 +61,8 @@ class IdentificationWarning(UserWarning):
 
 class ConvergenceWarning(UserWarning):
     """An iteration stopped before it converged."""
+
+
+def first_line(error: BaseException) -> str:
+    """Return what an error of another library says, in one line."""
+    return (str(error).strip().splitlines() or [type(error).__name__])[0]

@@ -159,7 +159,8 @@ def _lines_of_file(table: TomlTable) -> FloatArray:
 def read_frf_file(table: TomlTable, key: str, quantity: str | None = None) -> FrfSet:
     """Read the receptances of a file that a key names; a line at 0 Hz that they do not have is left out."""
     path = table.file(key)
-    frfs = table.build(lambda: read_uff(path, quantity), key)
+    # A quantity in case.toml is meant, also where the file says something else.
+    frfs = table.build(lambda: read_uff(path, quantity, force_quantity=True), key)
     with warnings.catch_warnings():
         # No case has a line at 0 Hz.
         warnings.simplefilter("ignore", FileContentWarning)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from jointfrf.channels.check.check import check_frfs
-from jointfrf.cli.measured_file import add_file_arguments, in_some_band, interface_of, read_frfs
+from jointfrf.cli.measured_file import add_file_arguments, in_some_band, interface_of, read_receptances
 from jointfrf.errors import FileContentError
 
 __all__ = ["add_arguments", "run"]
@@ -23,7 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry out the command; the caller turns exceptions into messages."""
-    frfs = read_frfs(args)
+    frfs = read_receptances(args)
     if args.j and args.k and args.dofs:
         channels = interface_of(args, frfs).channels
         responses, forces, h = channels, channels, frfs.matrix(channels, channels)

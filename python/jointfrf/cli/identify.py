@@ -5,21 +5,22 @@ from __future__ import annotations
 import argparse
 import warnings
 from pathlib import Path
-from typing import cast, get_args
+from typing import Any, cast, get_args
 
 import numpy as np
 
 from jointfrf.channels.check.check import check_frfs, warn_of_frfs
 from jointfrf.channels.finite_differences import difference_error
 from jointfrf.channels.point_lines import Interface
-from jointfrf.cli.extras import check_installed
-from jointfrf.cli.measured_file import add_file_arguments, in_some_band, interface_of, nodes, read_frfs, words
+from jointfrf.cli.measured_file import add_file_arguments, in_some_band, interface_of, nodes, read_receptances, words
 from jointfrf.dofs import is_rotation
 from jointfrf.errors import ConvergenceWarning, FrfCheckWarning, IdentificationWarning
+from jointfrf.extras import check_extras
 from jointfrf.frf.noise_model import estimate_noise
 from jointfrf.identification.identify import identify
 from jointfrf.identification.joint_fit import JointFit
 from jointfrf.identification.manifold_fit.joint_terms import CrossTerms, DampingTerms
+from jointfrf.io import FrfSet
 from jointfrf.io.cards import CardFormat
 
 __all__ = ["add_arguments", "run"]
@@ -97,8 +98,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Carry out the command; the caller turns exceptions into messages."""
     if args.out is not None:
-        check_installed("matplotlib")
-    frfs = read_frfs(args)
+        check_extras("matplotlib")
+    frfs = read_receptances(args)
     if not (args.j and args.k and args.dofs):
         print(frfs.summary())
         print("\nname the points and DOFs of the joint to identify it: --j NODES --k NODES --dofs DOFS")
@@ -106,7 +107,7 @@ def run(args: argparse.Namespace) -> int:
     sides = interface_of(args, frfs)
     measured = frfs.matrix(sides.channels, sides.channels)
     warn_of_frfs(check_frfs(*in_some_band(frfs.freq_hz, measured, args.band), sides.channels))
-    fits = [_fit(args, method, frfs.freq_hz, measured, sides) for method in args.method]
+    fits = [_fit(args, method, frfs, measured, sides) for method in args.method]
     points = " and ".join(", ".join(map(str, side)) for side in (args.j, args.k))
     print(
         f"{args.file.name}: {frfs.h.shape[1]} responses x {frfs.h.shape[2]} excitations; joint between points {points}"
@@ -156,15 +157,13 @@ def _tell_differences(args: argparse.Namespace, sides: Interface) -> None:
         )
 
 
-def _fit(
-    args: argparse.Namespace, method: str, freq_hz: np.ndarray, measured: np.ndarray, sides: Interface
-) -> JointFit:
+def _fit(args: argparse.Namespace, method: str, frfs: FrfSet, measured: np.ndarray, sides: Interface) -> JointFit:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", IdentificationWarning)  # they stand in the table
         warnings.simplefilter("ignore", ConvergenceWarning)
         warnings.simplefilter("ignore", FrfCheckWarning)  # told with the names of the channels
         return identify(
-            freq_hz,
+            frfs.freq_hz,
             measured,
             args.dofs,
             method,  # type: ignore[arg-type]
@@ -173,4 +172,13 @@ def _fit(
             damping=args.damping,
             cross=args.cross,
             noise=args.noise,
+            **(_coherence(frfs, sides) if method == "compliance" else {}),
         )
+
+
+def _coherence(frfs: FrfSet, sides: Interface) -> dict[str, Any]:
+    """Coherence and number of averages, where the file has them."""
+    coherence = frfs.coherence_matrix(sides.channels, sides.channels)
+    if coherence is None:
+        return {}
+    return {"coherence": coherence, "averages": frfs.least_averages(sides.channels, sides.channels)}

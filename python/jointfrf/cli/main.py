@@ -8,10 +8,10 @@ import os
 import sys
 import warnings
 from collections.abc import Sequence
-from importlib.metadata import version
 from typing import Any
 
 from jointfrf.cli.usage import UsageError
+from jointfrf.extras import MissingPackageError
 
 __all__ = ["main"]
 
@@ -21,6 +21,7 @@ _COMMANDS = {
     "run": "run cases: tables, figures and a report each",
     "cases": "list the cases that come with jointfrf",
     "check": "look at measured FRFs: what is wrong, in which channel, what to do",
+    "convert": "measured FRFs of one file or several into another format",
     "readings": "compare printed values with every reading of the noise",
     "identify": "identify a joint from a file of measured FRFs",
 }
@@ -55,7 +56,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         except OSError as error:
             where = f"{error.filename}: " if error.filename else ""
             return _complain(f"{where}{error.strerror or error}", _FAILURE)
-        except (ValueError, TypeError, ArithmeticError, MemoryError, RuntimeError) as error:
+        except (ValueError, TypeError, ArithmeticError, MemoryError, RuntimeError, MissingPackageError) as error:
             return _complain(error, _FAILURE)
         except KeyboardInterrupt:
             return _complain("interrupted", _INTERRUPTED)
@@ -70,9 +71,19 @@ def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
     print(f"jointfrf: warning: {message}", file=sys.stderr)
 
 
+class _Version(argparse.Action):
+    """Prints the version, which takes time to find."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
+        from importlib.metadata import version
+
+        print(f"jointfrf {version('jointfrf')}")
+        parser.exit()
+
+
 def _parser(words: list[str]) -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="jointfrf", description="Stiffness and damping of joints from FRFs.")
-    parser.add_argument("--version", action="version", version=f"jointfrf {version('jointfrf')}")
+    parser.add_argument("--version", action=_Version, nargs=0, help="print the version and stop")
     commands = parser.add_subparsers(metavar="COMMAND", required=True)
     for name, what in _COMMANDS.items():
         command = commands.add_parser(name, help=what)

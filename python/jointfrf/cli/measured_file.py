@@ -1,4 +1,4 @@
-"""A Universal File on the command line: which one, the points and DOFs of the joint in it."""
+"""A file of FRFs on the command line: which one, the points and DOFs of the joint in it."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import argparse
 import sys
 import warnings
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -13,10 +14,20 @@ from jointfrf.channels.point_lines import Interface, interface
 from jointfrf.dofs import is_rotation
 from jointfrf.errors import FileContentError
 from jointfrf.frf.bands import in_bands
-from jointfrf.io import FrfSet, read_uff
+from jointfrf.io import FrfSet, read_frfs
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
-__all__ = ["add_file_arguments", "in_some_band", "interface_of", "nodes", "read_frfs", "words"]
+__all__ = [
+    "add_file_arguments",
+    "add_quantity_arguments",
+    "in_some_band",
+    "interface_of",
+    "nodes",
+    "parse_band",
+    "read_receptances",
+    "read_with_warnings",
+    "words",
+]
 
 
 def words(text: str) -> list[str]:
@@ -32,7 +43,8 @@ def nodes(text: str) -> list[int]:
         raise argparse.ArgumentTypeError(f"{text!r} is not a list of node numbers like 102,104") from None
 
 
-def _band(text: str) -> tuple[float, float]:
+def parse_band(text: str) -> tuple[float, float]:
+    """Return the ends of a band in Hz."""
     try:
         low, high = (float(part) for part in text.split(":"))
     except ValueError:
@@ -42,14 +54,18 @@ def _band(text: str) -> tuple[float, float]:
 
 def add_file_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the file, the points on both sides, the DOFs, the bands."""
-    parser.add_argument("file", type=Path, help="Universal File with the FRF matrix of the points around the joint")
+    parser.add_argument(
+        "file",
+        type=Path,
+        help="FRFs of the points around the joint: Universal File, MATLAB, NPZ, HDF5 or CSV file",
+    )
     parser.add_argument("--j", type=nodes, metavar="NODES", help="nodes on side j, along a line: 102,104")
     parser.add_argument("--k", type=nodes, metavar="NODES", help="nodes on side k, in the same order: 202,204")
     parser.add_argument(
         "--dofs", type=words, metavar="DOFS", help="joint DOFs out of x,y,z,theta_x,theta_y,theta_z, like y,theta_x"
     )
     parser.add_argument(
-        "--band", type=_band, action="append", metavar="LOW:HIGH", help="frequency band in Hz; may be repeated"
+        "--band", type=parse_band, action="append", metavar="LOW:HIGH", help="frequency band in Hz; may be repeated"
     )
     parser.add_argument(
         "--spacing",
@@ -58,18 +74,32 @@ def add_file_arguments(parser: argparse.ArgumentParser) -> None:
         help="distance between neighbouring nodes, where the file has no coordinates; needs --axis",
     )
     parser.add_argument("--axis", choices=("x", "y", "z"), help="direction of the line of nodes, with --spacing")
+    add_quantity_arguments(parser)
+
+
+def add_quantity_arguments(parser: argparse.ArgumentParser) -> None:
+    """Describe what a user says of the FRFs of a file."""
     parser.add_argument(
         "--quantity",
         choices=("receptance", "mobility", "accelerance"),
         help="what the FRFs are, where the file does not say",
     )
+    parser.add_argument(
+        "--force-quantity", action="store_true", help="take --quantity also where the file says something else"
+    )
 
 
-def read_frfs(args: argparse.Namespace) -> FrfSet:
+def read_receptances(args: argparse.Namespace) -> FrfSet:
     """Read the file as receptances; what had to be assumed is told as a warning."""
+    return read_with_warnings(args.file, quantity=args.quantity, force_quantity=args.force_quantity, receptance=True)
+
+
+def read_with_warnings(*paths: Path, receptance: bool = False, **options: Any) -> FrfSet:
+    """Read files; what had to be assumed is told as a warning."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        frfs = read_uff(args.file, quantity=args.quantity).receptance()
+        frfs = read_frfs(*paths, **options)
+        frfs = frfs.receptance() if receptance else frfs
     for message in caught:
         print(f"jointfrf: warning: {message.message}", file=sys.stderr)
     return frfs

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from jointfrf.cases.catalogue import CaseOutput, UnknownCaseError, find_case, list_cases, run_case
 from jointfrf.cases.workers import started_workers
-from jointfrf.cli.extras import check_installed
 from jointfrf.cli.usage import UsageError, available_cores, positive, progress
+from jointfrf.extras import check_extras
 from jointfrf.report.table import as_text
 
 __all__ = ["add_arguments", "run"]
@@ -27,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Carry out the command."""
-    check_installed("matplotlib", "jinja2")
+    check_extras("matplotlib", "jinja2")
     try:
         folders = [find_case(word).resolve() for word in options.cases] or list_cases()
     except UnknownCaseError as error:

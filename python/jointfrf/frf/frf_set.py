@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import re
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from jointfrf.errors import FileContentError, FileContentWarning
 
-__all__ = ["POWER_OF_I_OMEGA", "Channel", "FrfSet"]
+__all__ = ["POWER_OF_I_OMEGA", "ROUND_OFF", "Channel", "FrfSet", "same_frf"]
 
 POWER_OF_I_OMEGA = {"receptance": 0, "mobility": 1, "accelerance": 2}
 """How often a receptance is differentiated in time to give the quantity."""
@@ -25,6 +25,8 @@ _PLURALS = {
 _DIRECTION = re.compile(r"([+-]?)(r?[xyz])")
 _CHANNEL = re.compile(r"(\d+)\s*:?\s*([+-]?r?[xyz])")
 _NAMES_SHOWN = 10
+#: How far above 1 single precision may leave a coherence.
+ROUND_OFF = 1e-5
 
 
 @dataclass(frozen=True, order=True)
@@ -116,6 +118,12 @@ class FrfSet:
         Global cartesian coordinates of the nodes in m, empty where unknown.
     source : str
         Where the set comes from, named in messages.
+    coherence : ndarray, shape (n_freq, n_responses, n_excitations), optional
+        Ordinary coherence (gamma^2, 0 to 1) of each FRF; NaN where it is not known.
+    averages : number or ndarray, shape (n_responses, n_excitations), optional
+        How many measurements each FRF is the average of; NaN where it is not known.
+    stated : str
+        What the file says of quantity and unit, in its own words.
 
     Examples
     --------
@@ -145,6 +153,9 @@ class FrfSet:
     quantity: str = "receptance"
     coordinates: Mapping[int, NDArray[np.float64]] = field(default_factory=dict)
     source: str = ""
+    coherence: NDArray[np.float64] | None = None
+    averages: NDArray[np.float64] | None = None
+    stated: str = ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "freq_hz", np.asarray(self.freq_hz, dtype=np.float64))
@@ -157,11 +168,32 @@ class FrfSet:
         for name in ("responses", "excitations"):
             if len(set(getattr(self, name))) < len(getattr(self, name)):
                 raise ValueError(f"{name} names a channel twice")
+        if self.coherence is not None:
+            object.__setattr__(self, "coherence", _checked_coherence(self.coherence, shape))
+        if self.averages is not None:
+            object.__setattr__(self, "averages", _checked_averages(self.averages, shape[1:]))
 
     @property
     def measured(self) -> NDArray[np.bool_]:
         """Which FRFs there are, shape (n_responses, n_excitations)."""
         return np.logical_not(np.isnan(self.h).all(axis=0))
+
+    def check_whole(self) -> None:
+        """Check that every FRF that is there is finite on all lines.
+
+        Raises
+        ------
+        ValueError
+            There is no FRF, or one is NaN or infinite on some lines; the message names the first.
+        """
+        measured = self.measured
+        if not measured.any():
+            raise ValueError("frfs holds no FRF")
+        bad = ~np.isfinite(self.h) & measured
+        if bad.any():
+            line, i, j = (int(places[0]) for places in np.nonzero(bad))
+            name = f"{self.responses[i]} / {self.excitations[j]}"
+            raise ValueError(f"FRF {name} holds NaN or Inf, first at {self.freq_hz[line]:g} Hz")
 
     def receptance(self) -> FrfSet:
         """Return the same set as displacement per force.
@@ -198,7 +230,7 @@ class FrfSet:
         freq_hz = self.freq_hz[usable]
         i_omega = 2j * np.pi * freq_hz
         h = self.h[usable] / i_omega[:, None, None] ** power
-        return replace(self, freq_hz=freq_hz, h=h, quantity="receptance")
+        return replace(self._lines(usable), h=h, quantity="receptance")
 
     def has(self, output: ChannelLike, input: ChannelLike) -> bool:
         """Whether the FRF is there, possibly measured along the opposite direction."""
@@ -247,6 +279,52 @@ class FrfSet:
         h = self.h[:, places[0], places[1]] * signs
         return np.ascontiguousarray(h)
 
+    def coherence_matrix(
+        self, outputs: Sequence[ChannelLike], inputs: Sequence[ChannelLike]
+    ) -> NDArray[np.float64] | None:
+        """Coherence of the FRFs between named channels, as `identify` and `estimate_noise` take it.
+
+        Parameters
+        ----------
+        outputs, inputs : sequence of Channel or str
+            As for `matrix`.
+
+        Returns
+        -------
+        ndarray, shape (n_freq, n_outputs, n_inputs), or None
+            None where the coherence of one of them is not known.
+
+        Raises
+        ------
+        FileContentError
+            FRFs are missing.
+        """
+        if self.coherence is None:
+            return None
+        self.matrix(outputs, inputs)  # all there?
+        places = self._locate(outputs, inputs)[0]
+        found = np.ascontiguousarray(self.coherence[:, places[0], places[1]])
+        return None if np.isnan(found).any() else found
+
+    def least_averages(self, outputs: Sequence[ChannelLike], inputs: Sequence[ChannelLike]) -> float | None:
+        """Smallest number of averages of the FRFs between named channels.
+
+        Parameters
+        ----------
+        outputs, inputs : sequence of Channel or str
+            As for `matrix`.
+
+        Returns
+        -------
+        float or None
+            None where one of them is not known.
+        """
+        if self.averages is None:
+            return None
+        places = self._locate(outputs, inputs)[0]
+        least = float(self.averages[places].min())
+        return None if np.isnan(least) else least
+
     def select(self, band: tuple[float, float]) -> FrfSet:
         """Return the lines in a band.
 
@@ -269,7 +347,36 @@ class FrfSet:
         if not inside.any():
             held = f"the {self.freq_hz.size} lines are {self._range()}" if self.freq_hz.size else "there are none"
             raise FileContentError(f"{self._name()}no frequency line in {low:g} to {high:g} Hz: {held}")
-        return replace(self, freq_hz=self.freq_hz[inside], h=self.h[inside])
+        return self._lines(inside)
+
+    def at_nodes(self, nodes: Collection[int]) -> FrfSet:
+        """Return the FRFs between some nodes.
+
+        Parameters
+        ----------
+        nodes : collection of int
+            Numbers of points.
+
+        Raises
+        ------
+        FileContentError
+            There is no FRF between them.
+        """
+        rows, columns = (
+            [i for i, channel in enumerate(side) if channel.node in nodes]
+            for side in (self.responses, self.excitations)
+        )
+        if not self.measured[np.ix_(rows, columns)].any():
+            raise FileContentError(f"{self._name()}no FRF between nodes {', '.join(map(str, sorted(nodes)))}")
+        return replace(
+            self,
+            responses=tuple(self.responses[i] for i in rows),
+            excitations=tuple(self.excitations[j] for j in columns),
+            h=self.h[:, rows][:, :, columns],
+            coherence=None if self.coherence is None else self.coherence[:, rows][:, :, columns],
+            averages=None if self.averages is None else self.averages[np.ix_(rows, columns)],
+            coordinates={node: place for node, place in self.coordinates.items() if node in nodes},
+        )
 
     def summary(self) -> str:
         """Say what the set holds."""
@@ -281,10 +388,13 @@ class FrfSet:
             f"{measured.sum()} {_PLURALS[self.quantity]}: {len(self.responses)} responses x "
             f"{len(self.excitations)} excitations, {n_missing or 'none'} missing",
             f"{self.freq_hz.size} lines, {self._range()}, {self._spacing()}" if self.freq_hz.size else "no lines",
+            *self._quality(),
             f"coordinates of {located} of {len(nodes)} nodes" if located else "no coordinates",
             f"responses: {_by_node(self.responses)}",
             f"excitations: {_by_node(self.excitations)}",
         ]
+        if self.stated:
+            lines[:1] = [f"in the file: {self.stated}", f"used as: {lines[0]}"]
         return "\n".join([self.source, *lines] if self.source else lines)
 
     def __str__(self) -> str:
@@ -292,6 +402,23 @@ class FrfSet:
 
     def __repr__(self) -> str:
         return f"<FrfSet {self.h.shape} {self.quantity}>"
+
+    def _lines(self, kept: NDArray[np.bool_]) -> FrfSet:
+        """Return some of the lines."""
+        coherence = None if self.coherence is None else self.coherence[kept]
+        return replace(self, freq_hz=self.freq_hz[kept], h=self.h[kept], coherence=coherence)
+
+    def _quality(self) -> list[str]:
+        """Say what is known about coherence and averages."""
+        said = []
+        measured = self.measured
+        if self.coherence is not None and measured.any():
+            known = np.logical_not(np.isnan(self.coherence).all(axis=0)) & measured
+            said.append(f"coherence of {known.sum()} of {measured.sum()} FRFs")
+        if self.averages is not None and np.isfinite(self.averages[measured]).any():
+            low, high = np.nanmin(self.averages[measured]), np.nanmax(self.averages[measured])
+            said.append(f"{low:g} averages" if low == high else f"{low:g} to {high:g} averages")
+        return [", ".join(said)] if said else []
 
     def _locate(
         self, outputs: Iterable[ChannelLike], inputs: Iterable[ChannelLike]
@@ -307,7 +434,7 @@ class FrfSet:
         missing = []
         for i, row in enumerate(rows):
             for j, column in enumerate(columns):
-                for output, input_ in _same_frf(row, column):
+                for output, input_ in same_frf(row, column):
                     place = row_of.get(output, -1), column_of.get(input_, -1)
                     if min(place) >= 0 and measured[place]:
                         i_row[i, j], i_column[i, j] = place
@@ -332,7 +459,27 @@ class FrfSet:
         return f"uneven spacing {steps.min():.4g} to {steps.max():.4g} Hz"
 
 
-def _same_frf(output: Channel, input_: Channel) -> list[tuple[Channel, Channel]]:
+def _checked_coherence(values: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    coherence = np.ascontiguousarray(values, dtype=np.float64)
+    if coherence.shape != shape:
+        raise ValueError(f"coherence has shape {coherence.shape}, expected that of h, {shape}")
+    known = coherence[~np.isnan(coherence)]
+    if known.size and not (known.min() >= 0 and known.max() <= 1 + ROUND_OFF):
+        raise ValueError(f"coherence must be from 0 to 1, not {known.min():g} to {known.max():g}")
+    return np.minimum(coherence, 1.0)
+
+
+def _checked_averages(values: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    averages = np.asarray(values, dtype=np.float64)
+    if averages.shape not in ((), shape):
+        raise ValueError(f"averages has shape {averages.shape}, expected one number or one for each FRF, {shape}")
+    known = averages[~np.isnan(averages)]
+    if known.size and not (known.min() >= 1 and np.isfinite(known.max())):
+        raise ValueError(f"averages must be 1 or more, not {known.min() if known.min() < 1 else known.max():g}")
+    return np.ascontiguousarray(np.broadcast_to(averages, shape))
+
+
+def same_frf(output: Channel, input_: Channel) -> list[tuple[Channel, Channel]]:
     """List the four pairs of channels that measure the same FRF up to its sign, the exact one first."""
     return [(o, i) for o in (output, output.opposite()) for i in (input_, input_.opposite())]
 

@@ -9,7 +9,7 @@ from typing import Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy import stats
+from scipy.special import ndtri
 
 from jointfrf.dofs import Parameter, ParameterKind
 from jointfrf.io.cards import CardFormat, CardOptions
@@ -140,7 +140,7 @@ class JointFit:
             raise ValueError(f"probability must lie between 0 and 1, not {probability}")
         if self.intervals is not None:
             return self.intervals(probability)
-        reach = float(stats.norm.ppf((1 + probability) / 2))
+        reach = float(ndtri((1 + probability) / 2))
         intervals = {}
         values = zip(self.terms, self.parameters.values(), self.std_error.values(), strict=True)
         for term, value, error in values:

@@ -1,7 +1,26 @@
-"""Measured FRFs: what a file holds (`FrfSet`), how it is read (`read_uff`) and written (`write_uff`)."""
+"""Measured FRFs: what a file holds (`FrfSet`), how it is read (`read_frfs`) and written."""
 
 from jointfrf.frf.frf_set import Channel, FrfSet
+from jointfrf.frf.merge import merge_frfs
+from jointfrf.io.arrays import frfs_of_arrays
+from jointfrf.io.csv_file import write_csv
+from jointfrf.io.hdf5_file import write_hdf5
+from jointfrf.io.mapping import FrfMapping
+from jointfrf.io.npz_file import write_npz
+from jointfrf.io.read import read_frfs
 from jointfrf.io.uff import read_uff
 from jointfrf.io.uff_write import write_uff
 
-__all__ = ["Channel", "FrfSet", "read_uff", "write_uff"]
+__all__ = [
+    "Channel",
+    "FrfMapping",
+    "FrfSet",
+    "frfs_of_arrays",
+    "merge_frfs",
+    "read_frfs",
+    "read_uff",
+    "write_csv",
+    "write_hdf5",
+    "write_npz",
+    "write_uff",
+]

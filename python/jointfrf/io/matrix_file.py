@@ -13,7 +13,7 @@ import scipy.io
 from scipy import sparse
 
 from jointfrf.dofs import DIRECTIONS
-from jointfrf.errors import FileContentError
+from jointfrf.errors import FileContentError, first_line
 
 __all__ = ["read_dof_names", "read_matrix"]
 
@@ -49,8 +49,7 @@ def read_matrix(path: Path, name: str) -> sparse.csr_array:
         raise
     except _UNREADABLE as error:
         kind = "an NPZ" if path.suffix.lower() == ".npz" else "a Matrix Market"
-        why = str(error).strip().splitlines()[:1] or [type(error).__name__]
-        raise FileContentError(f"{path} cannot be read as {kind} file: {why[0]}") from error
+        raise FileContentError(f"{path} cannot be read as {kind} file: {first_line(error)}") from error
     return _checked(path, found)
 
 

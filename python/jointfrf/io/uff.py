@@ -3,60 +3,37 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
+from collections.abc import Collection
+from contextlib import suppress
+from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from jointfrf.frf.frf_set import POWER_OF_I_OMEGA, Channel, FrfSet
+from jointfrf.errors import FileContentError
+from jointfrf.frf.frf_set import POWER_OF_I_OMEGA, ROUND_OFF, Channel, FrfSet, same_frf
+from jointfrf.frf.merge import same_lines
+from jointfrf.io.labels import DIRECTION_CODES
+from jointfrf.io.quantity import check_quantity, contradiction, state
+from jointfrf.io.uff_contents import contents_without_frf
 from jointfrf.io.uff_file import UniversalFile, name_some
 from jointfrf.io.uff_nodes import node_coordinates
 from jointfrf.io.uff_ordinate import DATA_TYPES, Axis, kind_of_frf, ordinate_factor, ordinate_quantity
 
-__all__ = ["read_uff"]
+__all__ = ["read_uff", "read_uff_part"]
 
-_DATASETS = {
-    15: "nodes",
-    18: "coordinate systems",
-    55: "data at nodes",
-    82: "trace lines",
-    151: "header",
-    164: "units",
-    1858: "qualifiers of dataset 58",
-    2400: "model header",
-    2411: "nodes",
-    2412: "elements",
-    2414: "analysis data",
-    2420: "coordinate systems",
-    2429: "groups",
-    2467: "groups",
-}
-_FUNCTIONS = {
-    1: ("time history", "time histories"),
-    2: ("auto spectrum", "auto spectra"),
-    3: ("cross spectrum", "cross spectra"),
-    5: ("transmissibility", "transmissibilities"),
-    6: ("coherence", "coherences"),
-    7: ("auto correlation", "auto correlations"),
-    8: ("cross correlation", "cross correlations"),
-    9: ("power spectral density", "power spectral densities"),
-    12: ("spectrum", "spectra"),
-    25: ("impulse response", "impulse responses"),
-    26: ("multiple coherence", "multiple coherences"),
-    27: ("order function", "order functions"),
-}
-_OTHER_FUNCTION = ("function of another kind", "functions of another kind")
-_FRF = 4
-_DIRECTIONS = {1: "+x", 2: "+y", 3: "+z", 4: "+rx", 5: "+ry", 6: "+rz"}
-_DIRECTIONS |= {-code: "-" + direction[1:] for code, direction in _DIRECTIONS.items()}
+_FRF, _COHERENCE = 4, 6
+_MOST_DECADES = 60
 _HZ = {"": 1.0, "hz": 1.0, "khz": 1e3, "rad/s": 0.5 / np.pi, "rad/sec": 0.5 / np.pi, "rpm": 1.0 / 60.0}
-_SAME_LINES = 1e-5
 
 
-@dataclass(frozen=True)
+_Number = TypeVar("_Number", np.float64, np.complex128)
+
+
+@dataclass(frozen=True, slots=True)
 class _Frf:
     """Where an FRF stands in the file, and what it means."""
 
@@ -65,16 +42,33 @@ class _Frf:
     entities: tuple[str, str]
     quantity: str
     factor: float
+    stated: str
 
     def __str__(self) -> str:
         return f"{self.channels[0]} / {self.channels[1]}"
+
+
+@dataclass
+class _Content:
+    """What the headers of the file say."""
+
+    frfs: list[_Frf] = field(default_factory=list)
+    coherences: list[tuple[int, tuple[Channel, Channel]]] = field(default_factory=list)
+    functions: Counter[int] = field(default_factory=Counter)
+    unusable: dict[str, list[int]] = field(default_factory=dict)
 
 
 class _UnusableFrfError(Exception):
     """Why an FRF of a sound file is left out."""
 
 
-def read_uff(path: str | PathLike[str], quantity: str | None = None) -> FrfSet:
+def read_uff(
+    path: str | PathLike[str],
+    quantity: str | None = None,
+    *,
+    force_quantity: bool = False,
+    nodes: Collection[int] | None = None,
+) -> FrfSet:
     """Read the FRFs of a Universal File.
 
     Parameters
@@ -82,22 +76,28 @@ def read_uff(path: str | PathLike[str], quantity: str | None = None) -> FrfSet:
     path : path-like
         An ASCII or binary (58b) Universal File.
     quantity : {"receptance", "mobility", "accelerance"}, optional
-        What every FRF of the file is, where its data types do not say it or confuse displacement, velocity and
-        acceleration. Default: by the file.
+        What every FRF of the file is, where its data types do not say it or contradict its units. Default: by the
+        file.
+    force_quantity : bool
+        Take `quantity` also where data types and units of the file agree on another one.
+    nodes : collection of int, optional
+        Read only FRFs between these nodes; all by default. Headers are read first, and then only what is wanted.
 
     Returns
     -------
     FrfSet
-        All FRFs of motion per force (function type 4), in SI units, channels in the order of the file. Where the file
-        mixes quantities, all are given as the one that is differentiated most often.
+        All FRFs of motion per force (function type 4), in SI units, channels in the order of the file, with their
+        coherence (function type 6) where the file holds it. Where the file mixes quantities, all are given as the one
+        that is differentiated most often.
 
     Raises
     ------
     FileNotFoundError
         There is no such file.
     FileContentError
-        The file cannot be read, or lacks something; the message says what, and in which dataset, counted from 1.
-    ImportError
+        The file cannot be read, lacks something, or contradicts `quantity`; the message says what, and in which
+        dataset, counted from 1.
+    MissingPackageError
         The package pyuff is not installed.
 
     Warns
@@ -124,45 +124,106 @@ def read_uff(path: str | PathLike[str], quantity: str | None = None) -> FrfSet:
     >>> frfs = jointfrf.io.read_uff("lap_joint.uff")  # doctest: +SKIP
     >>> h = frfs.receptance().matrix(["102:+y", "202:+y"], ["102:+y", "202:+y"])  # doctest: +SKIP
     """
-    if quantity is not None and quantity not in POWER_OF_I_OMEGA:
-        raise ValueError(f"quantity {quantity!r} is none of {', '.join(POWER_OF_I_OMEGA)}")
+    return read_uff_part(path, quantity, force_quantity=force_quantity, nodes=nodes, stacklevel=4)
+
+
+def read_uff_part(
+    path: str | PathLike[str],
+    quantity: str | None = None,
+    *,
+    force_quantity: bool = False,
+    nodes: Collection[int] | None = None,
+    coherence_will_do: bool = False,
+    stacklevel: int = 3,
+) -> FrfSet:
+    """Read a Universal File as `read_uff` does, or one of several that make a set.
+
+    Parameters
+    ----------
+    path, quantity, force_quantity, nodes
+        As for `read_uff`.
+    coherence_will_do : bool
+        Accept a file with coherences and no FRF: all FRFs of the set are then NaN.
+    stacklevel : int
+        Of warnings.
+
+    Returns
+    -------
+    FrfSet
+    """
+    check_quantity(quantity)
     file = UniversalFile(Path(path))
-    frfs = _unique(file, _describe(file, quantity))
-    freq_hz, values, common = _values(file, frfs)
-    responses = tuple(dict.fromkeys(frf.channels[0] for frf in frfs))
-    excitations = tuple(dict.fromkeys(frf.channels[1] for frf in frfs))
-    row_of = {channel: i for i, channel in enumerate(responses)}
-    column_of = {channel: i for i, channel in enumerate(excitations)}
-    h = np.full((freq_hz.size, len(responses), len(excitations)), np.nan + 0j)
-    for frf, value in zip(frfs, values, strict=True):
-        h[:, row_of[frf.channels[0]], column_of[frf.channels[1]]] = value
-    coordinates = node_coordinates(file, {channel.node for channel in (*responses, *excitations)})
-    file.warn(stacklevel=3)
-    return FrfSet(freq_hz, responses, excitations, h, common, coordinates, str(path))
-
-
-def _describe(file: UniversalFile, quantity: str | None) -> list[_Frf]:
-    """Find the FRFs that can be used, and what their headers say."""
-    headers = {number: file.read(number, header_only=True) for number in file.datasets(58)}
-    frfs = {number: header for number, header in headers.items() if header["func_type"] == _FRF}
-    if not frfs:
-        raise file.error(f"holds {_contents(file, headers)}")
-    found: list[_Frf] = []
-    reasons: dict[str, list[int]] = {}
-    for number, header in frfs.items():
-        try:
-            found.append(_describe_frf(file, number, header, quantity))
-        except _UnusableFrfError as error:
-            reasons.setdefault(str(error), []).append(number)
-    if not found:
-        why = "; ".join(f"{reason} ({name_some('dataset', numbers)})" for reason, numbers in reasons.items())
-        raise file.error(f"holds no FRF that can be used: {why}")
-    for reason, numbers in reasons.items():
+    content = _describe(file, quantity, forced=force_quantity, nodes=nodes)
+    only_coherence = coherence_will_do and not content.frfs and not content.unusable and content.coherences
+    if not content.frfs and not only_coherence:
+        raise _no_frf(file, content, nodes)
+    for reason, numbers in content.unusable.items():
         file.note(f"FRF left out: {reason}", *numbers)
-    return found
+    frfs = _unique(file, content.frfs)
+    pairs = [frf.channels for frf in frfs] or [channels for _, channels in content.coherences]
+    matrix = _Matrix(pairs)
+    freq_hz, h, common = _values(file, frfs, matrix)
+    freq_hz, coherence = _coherence(file, content, matrix, freq_hz)
+    if h is None:
+        h = np.full((freq_hz.size, *matrix.shape), np.nan + 0j)
+    freq_hz, h, coherence = _without_bad_zero_line(file, frfs, matrix, freq_hz, h, coherence)
+    coordinates = node_coordinates(file, {channel.node for pair in pairs for channel in pair})
+    file.warn(stacklevel=stacklevel)
+    stated = state(frf.stated for frf in frfs)
+    return FrfSet(
+        freq_hz, matrix.responses, matrix.excitations, h, common, coordinates, str(path), coherence, None, stated
+    )
 
 
-def _describe_frf(file: UniversalFile, number: int, header: dict[str, Any], quantity: str | None) -> _Frf:
+class _Matrix:
+    """Rows and columns of FRFs in the order in which the file names their channels."""
+
+    def __init__(self, pairs: list[tuple[Channel, Channel]]) -> None:
+        self.responses = tuple(dict.fromkeys(pair[0] for pair in pairs))
+        self.excitations = tuple(dict.fromkeys(pair[1] for pair in pairs))
+        self.shape = len(self.responses), len(self.excitations)
+        row_of = {channel: i for i, channel in enumerate(self.responses)}
+        column_of = {channel: j for j, channel in enumerate(self.excitations)}
+        self.place_of = {pair: (row_of[pair[0]], column_of[pair[1]]) for pair in pairs}
+
+
+def _describe(file: UniversalFile, quantity: str | None, *, forced: bool, nodes: Collection[int] | None) -> _Content:
+    """Find the FRFs that can be used and are wanted, and what their headers say."""
+    content = _Content()
+    for number in file.datasets(58):
+        header = file.read(number, header_only=True)
+        kind = header["func_type"]
+        content.functions[kind] += 1
+        is_wanted = nodes is None or {header["rsp_node"], header["ref_node"]} <= set(nodes)
+        if kind not in (_FRF, _COHERENCE) or not is_wanted:
+            continue
+        try:
+            if kind == _FRF:
+                content.frfs.append(_describe_frf(file, number, header, quantity, forced=forced))
+            else:
+                channels = _channel(header, "rsp", "response"), _channel(header, "ref", "reference")
+                content.coherences.append((number, channels))
+        except _UnusableFrfError as error:
+            if kind == _FRF:
+                content.unusable.setdefault(str(error), []).append(number)
+            else:
+                file.note(f"coherence left out: {error}", number)
+    return content
+
+
+def _no_frf(file: UniversalFile, content: _Content, nodes: Collection[int] | None) -> FileContentError:
+    """Error of a file that holds no FRF, none that can be used, or none that is wanted."""
+    if content.unusable:
+        why = "; ".join(f"{reason} ({name_some('dataset', numbers)})" for reason, numbers in content.unusable.items())
+        return file.error(f"holds no FRF that can be used: {why}")
+    if content.functions[_FRF] and nodes is not None:
+        return file.error(f"holds no FRF between {name_some('node', sorted(nodes))}")
+    return file.error(f"holds {contents_without_frf(file.types, content.functions)}")
+
+
+def _describe_frf(
+    file: UniversalFile, number: int, header: dict[str, Any], quantity: str | None, *, forced: bool
+) -> _Frf:
     """Channels, quantity and factor to SI of one FRF."""
     _check_form(file, number, header)
     numerator, denominator = Axis.of(header, "ordinate"), Axis.of(header, "orddenom")
@@ -170,10 +231,19 @@ def _describe_frf(file: UniversalFile, number: int, header: dict[str, Any], quan
     if other is not None:
         raise _UnusableFrfError(f"it is {other}, not motion per force")
     channels = _channel(header, "rsp", "response"), _channel(header, "ref", "reference")
-    found = quantity or ordinate_quantity(numerator, denominator, channels)
+    system = file.unit_system(number)
+    said = ordinate_quantity(numerator, denominator, channels)
+    if quantity and said and said != quantity and not forced:
+        contradicts = False
+        with suppress(ValueError):  # where the file contradicts itself, the caller decides
+            ordinate_factor(numerator, denominator, channels, said, system, trust_labels=True, note=lambda _: None)
+            contradicts = True
+        if contradicts:
+            words = f"{numerator.words} per {denominator.words} in dataset {number}"
+            raise file.error(contradiction(said, quantity, words))
+    found = quantity or said
     if found is None:
         raise _UnusableFrfError(f"its data types {numerator} per {denominator} do not say what it is; give quantity=")
-    system = file.unit_system(number)
     try:
         factor = ordinate_factor(
             numerator,
@@ -188,7 +258,8 @@ def _describe_frf(file: UniversalFile, number: int, header: dict[str, Any], quan
         raise file.error(f"contradicts itself in dataset {number}: {error}; give quantity=") from error
     if not 0.0 < factor < np.inf:
         raise file.error(f"has a unit in dataset {number} that cannot be converted to SI")
-    return _Frf(number, channels, (header["rsp_ent_name"], header["ref_ent_name"]), found, factor)
+    stated = f"{numerator.words} per {denominator.words}"
+    return _Frf(number, channels, (header["rsp_ent_name"], header["ref_ent_name"]), found, factor, stated)
 
 
 def _check_form(file: UniversalFile, number: int, header: dict[str, Any]) -> None:
@@ -206,9 +277,9 @@ def _channel(header: dict[str, Any], prefix: str, role: str) -> Channel:
     node, direction = header[f"{prefix}_node"], header[f"{prefix}_dir"]
     if node < 1:
         raise _UnusableFrfError(f"it names no {role} node (node {node})")
-    if direction not in _DIRECTIONS:
+    if direction not in DIRECTION_CODES:
         raise _UnusableFrfError(f"it names no {role} direction (code {direction})")
-    return Channel(node, _DIRECTIONS[direction])
+    return Channel(node, DIRECTION_CODES[direction])
 
 
 def _unique(file: UniversalFile, frfs: list[_Frf]) -> list[_Frf]:
@@ -227,55 +298,102 @@ def _unique(file: UniversalFile, frfs: list[_Frf]) -> list[_Frf]:
     return list(first.values())
 
 
-def _values(file: UniversalFile, frfs: list[_Frf]) -> tuple[NDArray[np.float64], list[NDArray[np.complex128]], str]:
+def _values(
+    file: UniversalFile, frfs: list[_Frf], matrix: _Matrix
+) -> tuple[NDArray[np.float64] | None, NDArray[np.complex128] | None, str]:
     """Frequency lines, the FRFs in SI units, and the one quantity they are all given as."""
-    common = max((frf.quantity for frf in frfs), key=POWER_OF_I_OMEGA.__getitem__)
+    common = max((frf.quantity for frf in frfs), key=POWER_OF_I_OMEGA.__getitem__, default="receptance")
     lines: NDArray[np.float64] | None = None
-    values = []
+    h: NDArray[np.complex128] | None = None
     for frf in frfs:
-        freq_hz, value = _read_frf(file, frf)
-        if lines is None:
+        freq_hz, value = _read_function(file, frf.dataset, str(frf), np.complex128)
+        if lines is None or h is None:
             lines = freq_hz
-        elif lines.shape != freq_hz.shape or not np.allclose(freq_hz, lines, rtol=_SAME_LINES, atol=0.0):
+            h = np.full((freq_hz.size, *matrix.shape), np.nan + 0j)
+        elif not same_lines(lines, freq_hz):
             held = [f"{_lines(f)} in dataset {each.dataset} ({each})" for f, each in ((lines, frfs[0]), (freq_hz, frf))]
             raise file.error(f"holds FRFs at different frequencies: {held[0]}, {held[1]}")
         power = POWER_OF_I_OMEGA[common] - POWER_OF_I_OMEGA[frf.quantity]
         with np.errstate(over="ignore", invalid="ignore"):
-            values.append(value * frf.factor * (2j * np.pi * freq_hz) ** power if power else value * frf.factor)
-    assert lines is not None
-    return *_without_bad_zero_line(file, frfs, lines, values), common
+            value = value * frf.factor * (2j * np.pi * freq_hz) ** power if power else value * frf.factor
+        h[:, *matrix.place_of[frf.channels]] = value
+    return lines, h, common
 
 
-def _read_frf(file: UniversalFile, frf: _Frf) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
-    """Frequencies in Hz and values in the file's units of one FRF."""
-    content = file.read(frf.dataset)
-    n, value = content["num_pts"], np.asarray(content["data"], dtype=np.complex128)
+def _coherence(
+    file: UniversalFile, content: _Content, matrix: _Matrix, lines: NDArray[np.float64] | None
+) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
+    """Frequency lines, and the coherence of the FRFs; None where the file holds none of it."""
+    found: NDArray[np.float64] | None = None
+    for number, channels in content.coherences:
+        place = next((matrix.place_of[pair] for pair in same_frf(*channels) if pair in matrix.place_of), None)
+        if place is None:
+            continue
+        freq_hz, value = _read_function(file, number, f"coherence {channels[0]} / {channels[1]}", np.float64)
+        lines = freq_hz if lines is None else lines
+        if not same_lines(lines, freq_hz):
+            file.note("coherence left out: its frequency lines are not those of the FRFs", number)
+            continue
+        if np.isnan(value[0]) and freq_hz[0] == 0.0:
+            value[0] = 0.0  # 0/0: there is no signal
+        if not (value.min() >= 0.0 and value.max() <= 1.0 + ROUND_OFF):
+            file.note("coherence left out: it is not from 0 to 1", number)
+            continue
+        if found is None:
+            found = np.full((lines.size, *matrix.shape), np.nan)
+        if np.isfinite(found[0, *place]):
+            file.note("a second coherence between the same channels is left out", number)
+            continue
+        found[:, *place] = value
+    if lines is None:
+        raise file.error("holds no coherence that can be used")
+    return lines, found
+
+
+def _read_function(
+    file: UniversalFile, dataset: int, name: str, dtype: type[_Number]
+) -> tuple[NDArray[np.float64], NDArray[_Number]]:
+    """Frequencies in Hz and values in the file's units of one function."""
+    content = file.read(dataset)
+    n, value = content["num_pts"], np.asarray(content["data"])
+    if np.iscomplexobj(value) and dtype is np.float64:
+        value = value.real
     if n < 1 or not n <= value.size <= n + 1:
-        raise file.error(f"is damaged: dataset {frf.dataset} ({frf}) holds {value.size} of {n} values")
+        raise file.error(f"is damaged: dataset {dataset} ({name}) holds {value.size} of {n} values")
+    if content["binary"] and _is_scrambled(value):
+        raise file.error(f"is damaged: in dataset {dataset} ({name}) the byte order is not the one that is stated")
     kind = content["abscissa_spec_data_type"]
     if kind not in (0, 1, 18):
-        raise file.error(
-            f"gives the FRF in dataset {frf.dataset} ({frf}) over {DATA_TYPES.get(kind, kind)}, not frequency"
-        )
+        raise file.error(f"gives dataset {dataset} ({name}) over {DATA_TYPES.get(kind, kind)}, not frequency")
     label = content["abscissa_axis_units_lab"].strip().lower()
     label = "" if label == "none" else label
     if label not in _HZ or (not label and kind != 18):
-        file.note(f"the unit '{label}' of the frequencies is not known: Hz is assumed", frf.dataset)
+        file.note(f"the unit '{label}' of the frequencies is not known: Hz is assumed", dataset)
     freq_hz = np.asarray(content["x"], dtype=np.float64)[:n] * _HZ.get(label, 1.0)
     if freq_hz.size != n or not np.isfinite(freq_hz).all() or freq_hz[0] < 0.0 or (np.diff(freq_hz) <= 0.0).any():
-        raise file.error(
-            f"is damaged: the frequencies of dataset {frf.dataset} ({frf}) do not increase from 0 Hz or more"
-        )
-    return freq_hz, value[:n]
+        raise file.error(f"is damaged: the frequencies of dataset {dataset} ({name}) do not increase from 0 Hz or more")
+    return freq_hz, np.array(value[:n], dtype=dtype)
+
+
+def _is_scrambled(value: NDArray[Any]) -> bool:
+    """Whether values reach over more decades than any measurement, as numbers with their bytes turned round do."""
+    parts = abs(np.ascontiguousarray(value).view(np.float64))
+    parts = parts[np.isfinite(parts) & (parts > 0.0)]
+    return bool(parts.size and np.log10(parts.max()) - np.log10(parts.min()) > _MOST_DECADES)
 
 
 def _without_bad_zero_line(
-    file: UniversalFile, frfs: list[_Frf], freq_hz: NDArray[np.float64], values: list[NDArray[np.complex128]]
-) -> tuple[NDArray[np.float64], list[NDArray[np.complex128]]]:
+    file: UniversalFile,
+    frfs: list[_Frf],
+    matrix: _Matrix,
+    freq_hz: NDArray[np.float64],
+    h: NDArray[np.complex128],
+    coherence: NDArray[np.float64] | None,
+) -> tuple[NDArray[np.float64], NDArray[np.complex128], NDArray[np.float64] | None]:
     """Drop a line at 0 Hz with NaN or Inf, as division by a zero spectrum leaves it; refuse them elsewhere."""
     drop = False
-    for frf, value in zip(frfs, values, strict=True):
-        bad = freq_hz[~np.isfinite(value)]
+    for frf in frfs:
+        bad = freq_hz[~np.isfinite(h[:, *matrix.place_of[frf.channels]])]
         if bad.size and bad[-1] > 0.0:
             first = bad[bad > 0.0][0]
             raise file.error(f"holds NaN or Inf in dataset {frf.dataset} ({frf}), first at {first:g} Hz")
@@ -284,22 +402,9 @@ def _without_bad_zero_line(
             drop = True
     if drop and freq_hz.size == 1:
         raise file.error("holds nothing but NaN or Inf at 0 Hz")
-    return (freq_hz[1:], [value[1:] for value in values]) if drop else (freq_hz, values)
-
-
-def _contents(file: UniversalFile, headers: dict[int, dict[str, Any]]) -> str:
-    """Say what a file without FRFs holds."""
-    if headers:
-        functions = Counter(header["func_type"] for header in headers.values())
-        held = ", ".join(f"{_count(n, kind)} (dataset 58, function type {kind})" for kind, n in functions.items())
-        return f"{held} and no FRF"
-    kinds = [f"{kind} ({_DATASETS[kind]})" if kind in _DATASETS else str(kind) for kind in sorted(set(file.types))]
-    return f"dataset{'s' if len(kinds) > 1 else ''} {', '.join(kinds)} and no FRF (dataset 58, function type {_FRF})"
-
-
-def _count(n: int, function_type: int) -> str:
-    singular, plural = _FUNCTIONS.get(function_type, _OTHER_FUNCTION)
-    return f"{n} {singular if n == 1 else plural}"
+    if not drop:
+        return freq_hz, h, coherence
+    return freq_hz[1:], h[1:], None if coherence is None else coherence[1:]
 
 
 def _lines(freq_hz: NDArray[np.float64]) -> str:

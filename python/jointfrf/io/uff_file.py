@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import struct
 import sys
 import warnings
@@ -10,13 +9,18 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
+import numpy as np
+
 from jointfrf.errors import FileContentError, FileContentWarning
+from jointfrf.extras import import_extra
+from jointfrf.io.uff_index import Dataset, index_datasets
 from jointfrf.io.units import UnitSystem
 
 __all__ = ["UniversalFile", "name_some"]
 
-_DELIMITER = re.compile(rb"    -1(?=[\r\n]|\Z| {74})")
 _NUMBERS_SHOWN = 5
+#: What the text before the numbers of a dataset 58 takes at most.
+_HEADER = 1 << 13
 #: What pyuff runs into where a file is damaged; it raises a bare `Exception` instead, for these and for any other.
 _DAMAGE = (ValueError, LookupError, ArithmeticError, struct.error)
 _Answer = TypeVar("_Answer")
@@ -34,27 +38,23 @@ class UniversalFile:
     """
 
     def __init__(self, path: Path) -> None:
-        try:
-            import pyuff
-        except ImportError as error:
-            message = "reading Universal Files needs the package pyuff: pip install jointfrf[uff]"
-            raise ImportError(message) from error
+        pyuff = import_extra("pyuff")
         self.path = path
         self._notes: dict[str, list[int]] = {}
         self._systems: dict[int, UnitSystem] | None = None
-        content = self._content()
-        n_delimiters = len(_DELIMITER.findall(content))
-        if n_delimiters == 0:
-            raise self.error("is not a Universal File: no dataset delimiters (-1)")
-        cut = "cannot be divided into datasets"
-        self._reader = self._ask(cut, lambda: pyuff.UFF(str(path)))
-        self.types = [int(number) for number in self._ask(cut, self._reader.get_set_types)]
-        if not self.types:
-            raise self.error("ends inside its first dataset")
+        self._check_file()
+        index, is_cut = index_datasets(path)
+        if not index:
+            raise self.error(
+                "ends inside its first dataset" if is_cut else "is not a Universal File: no dataset delimiters (-1)"
+            )
+        self.types = [dataset.kind for dataset in index]
         for number, kind in enumerate(self.types, start=1):
             if kind <= 0:
                 raise self.error(f"is damaged: dataset {number} has no type, a delimiter (-1) is missing before it")
-        if n_delimiters % 2:
+        self._reader = _reader(pyuff, path, index)
+        self._headers = _reader(pyuff, path, [each._replace(end=min(each.end, each.start + _HEADER)) for each in index])
+        if is_cut:
             self.note("ends inside a dataset, which is left out", len(self.types) + 1)
 
     def error(self, sentence: str) -> FileContentError:
@@ -78,9 +78,8 @@ class UniversalFile:
     def read(self, dataset: int, header_only: bool = False) -> dict[str, Any]:
         """Content of a dataset."""
         sentence = f"is damaged: dataset {dataset} (type {self.types[dataset - 1]}) cannot be read"
-        content: dict[str, Any] = self._ask(
-            sentence, lambda: self._reader.read_sets(dataset - 1, header_only=header_only)
-        )
+        reader = self._headers if header_only else self._reader
+        content: dict[str, Any] = self._ask(sentence, lambda: reader.read_sets(dataset - 1, header_only=header_only))
         return content
 
     def unit_system(self, dataset: int) -> UnitSystem | None:
@@ -109,18 +108,33 @@ class UniversalFile:
                 raise
             raise self.error(sentence) from error
 
-    def _content(self) -> bytes:
+    def _check_file(self) -> None:
         if not self.path.exists():
             raise FileNotFoundError(f"there is no file {self.path}")
         if self.path.is_dir():
             raise self.error("is a folder, not a file")
         try:
-            content = self.path.read_bytes()
+            with self.path.open("rb") as file:
+                is_empty = not file.read(_HEADER).strip()
         except OSError as error:
             raise self.error(f"cannot be read: {error.strerror}") from error
-        if not content.strip():
+        if is_empty and self.path.stat().st_size <= _HEADER:
             raise self.error("is empty")
-        return content
+
+
+def _reader(pyuff: Any, path: Path, index: Sequence[Dataset]) -> Any:
+    """Reader of pyuff that takes datasets from where the index says and does not read the whole file to find them."""
+
+    class Indexed(pyuff.UFF):
+        def refresh(self) -> bool:
+            self._block_ind = np.array([(each.start, each.end - 1) for each in index])
+            self._n_sets = len(index)
+            self._set_types = np.array([each.kind for each in index])
+            self._set_formats = np.zeros(len(index))
+            self._refreshed = True
+            return True
+
+    return Indexed(str(path))
 
 
 def _is_damage(error: BaseException, outside: BaseException | None) -> bool:

@@ -57,6 +57,11 @@ class Axis:
         """The data type in words."""
         return DATA_TYPES.get(self.data_type, f"data type {self.data_type}")
 
+    @property
+    def words(self) -> str:
+        """The data type and the unit, as they are shown."""
+        return f"{self.name} [{self.label or 'no unit'}]"
+
     def __str__(self) -> str:
         return f"{self.data_type} ({self.name}, unit '{self.label or 'NONE'}')"
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from os import PathLike
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,7 @@ _AXES = {"x": 1, "y": 2, "z": 3, "rx": 4, "ry": 5, "rz": 6}
 _DATA_TYPES = (8, 11, 12)  # displacement, velocity, acceleration
 _FORCE, _FREQUENCY = 13, 18
 _PER_TIME = ("", "/s", "/s^2")
-_FRF = 4
+_FRF, _COHERENCE = 4, 6
 _N_TEXT_LINES = 11
 _WIDTH = 80
 #: How far, relative to it, a line may lie from where an even spacing puts it.
@@ -36,7 +37,7 @@ def write_uff(
         In a folder that exists; an older file is replaced as a whole or not at all.
     frfs : FrfSet
         The FRFs, in the quantity that they have; those that are not there (NaN on all lines) are left out. Coordinates
-        are written where they are known.
+        and coherence are written where they are known. The format has no place for numbers of averages.
     title : str
         One line of ASCII, at most 80 characters, for the header and for every FRF.
     binary : bool
@@ -83,16 +84,17 @@ def write_uff(
     """
     if not (title.isascii() and title.isprintable() and len(title) <= _WIDTH):
         raise ValueError(f"title {title!r} is not one line of at most {_WIDTH} ASCII characters")
-    measured = np.argwhere(frfs.measured)
-    if not measured.size:
-        raise ValueError("frfs holds no FRF")
+    frfs.check_whole()
     parts = [_header(title), _units(), _nodes(frfs)]
-    for i, j in measured:
+    for i, j in np.argwhere(frfs.measured):
         values = frfs.h[:, i, j]
-        if not np.isfinite(values).all():
-            name = f"{frfs.responses[i]} / {frfs.excitations[j]}"
-            raise ValueError(f"FRF {name} holds NaN or Inf, first at {frfs.freq_hz[~np.isfinite(values)][0]:g} Hz")
-        parts.append(_function(frfs, frfs.responses[i], frfs.excitations[j], values, title, binary, single))
+        place = _place(frfs.responses[i], frfs.excitations[j])
+        head = _Head(place, f"FRF {frfs.responses[i]} / {frfs.excitations[j]}", title, _FRF, axes=_ordinate(frfs, i, j))
+        parts.append(_function(head, frfs.freq_hz, values, binary, single))
+        if frfs.coherence is not None and np.isfinite(frfs.coherence[:, i, j]).all():
+            name = f"coherence {frfs.responses[i]} / {frfs.excitations[j]}"
+            head = _Head(place, name, title, _COHERENCE, [_axis(0, "Coherence", "NONE"), _axis(0, "NONE", "NONE")])
+            parts.append(_function(head, frfs.freq_hz, frfs.coherence[:, i, j], binary, single))
     write_file(Path(path), b"".join(parts))
 
 
@@ -119,41 +121,56 @@ def _nodes(frfs: FrfSet) -> bytes:
     return _dataset("  2411", *records) if records else b""
 
 
+class _Head(NamedTuple):
+    """What the records before the numbers say of one function."""
+
+    place: str
+    name: str
+    title: str
+    kind: int
+    axes: list[str]
+
+
+def _ordinate(frfs: FrfSet, i: int, j: int) -> list[str]:
+    """Write records 9 and 10 of an FRF."""
+    power = POWER_OF_I_OMEGA[frfs.quantity]
+    motion = ("rad" if frfs.responses[i].is_rotation else "m") + _PER_TIME[power]
+    force = "N m" if frfs.excitations[j].is_rotation else "N"
+    return [_axis(_DATA_TYPES[power], "Response", motion), _axis(_FORCE, "Excitation", force)]
+
+
 def _function(
-    frfs: FrfSet,
-    response: Channel,
-    excitation: Channel,
-    values: NDArray[np.complex128],
-    title: str,
+    head: _Head,
+    freq_hz: NDArray[np.float64],
+    values: NDArray[np.complex128] | NDArray[np.float64],
     binary: bool,
     single: bool,
 ) -> bytes:
-    """Dataset 58 or 58b of one FRF."""
-    start, step = _spacing(frfs.freq_hz)
-    is_even = step is not None
-    power = POWER_OF_I_OMEGA[frfs.quantity]
-    motion = ("rad" if response.is_rotation else "m") + _PER_TIME[power]
+    """Dataset 58 or 58b of one FRF or of its coherence."""
+    start, step = _spacing(freq_hz)
+    is_even, is_complex = step is not None, np.iscomplexobj(values)
+    number_type = (5 if single else 6) if is_complex else (2 if single else 4)
     records = [
-        f"FRF {response} / {excitation}",
-        title or "NONE",
+        head.name,
+        head.title or "NONE",
         *["NONE"] * 3,
-        f"{_FRF:5d}{0:10d}{0:5d}{0:10d} {'NONE':<10}{_place(response)} {'NONE':<10}{_place(excitation)}",
-        f"{5 if single else 6:10d}{values.size:10d}{int(is_even):10d}{start}{step or _short(0.0)}{_short(0.0)}",
+        f"{head.kind:5d}{0:10d}{0:5d}{0:10d} {head.place}",
+        f"{number_type:10d}{values.size:10d}{int(is_even):10d}{start}{step or _short(0.0)}{_short(0.0)}",
         _axis(_FREQUENCY, "Frequency", "Hz"),
-        _axis(_DATA_TYPES[power], "Response", motion),
-        _axis(_FORCE, "Excitation", "N m" if excitation.is_rotation else "N"),
+        *head.axes,
         _axis(0, "NONE", "NONE"),
     ]
     if not (binary and is_even):
-        return _dataset("    58", *records, *_text(frfs.freq_hz, values, is_even, single))
-    data = values.astype("<c8" if single else "<c16").tobytes()
+        return _dataset("    58", *records, *_text(freq_hz, values, is_even, single))
+    data = values.astype(("<c8" if single else "<c16") if is_complex else ("<f4" if single else "<f8")).tobytes()
     kind = f"    58b{1:6d}{2:6d}{_N_TEXT_LINES:12d}{len(data):12d}{0:6d}{0:6d}{0:12d}{0:12d}"
     text = "\n".join([_DELIMITER, kind, *records, ""]).encode("ascii")
     return text + data + f"\n{_DELIMITER}\n".encode("ascii")
 
 
-def _place(channel: Channel) -> str:
-    return f"{channel.node:10d}{channel.sign * _AXES[channel.axis]:4d}"
+def _place(*channels: Channel) -> str:
+    """Fields of record 6 that name response and reference."""
+    return " ".join(f"{'NONE':<10}{each.node:10d}{each.sign * _AXES[each.axis]:4d}" for each in channels)
 
 
 def _axis(data_type: int, label: str, unit: str) -> str:
@@ -169,15 +186,18 @@ def _spacing(freq_hz: NDArray[np.float64]) -> tuple[str, str | None]:
     return texts if is_even else (_short(0.0), None)
 
 
-def _text(freq_hz: NDArray[np.float64], values: NDArray[np.complex128], is_even: bool, single: bool) -> list[str]:
-    """Record 12: values four or six a line; with an uneven spacing, each after its frequency."""
+def _text(
+    freq_hz: NDArray[np.float64], values: NDArray[np.complex128] | NDArray[np.float64], is_even: bool, single: bool
+) -> list[str]:
+    """Record 12: four or six numbers a line; with an uneven spacing, each value after its frequency."""
     numbers = [f"{x:13.5E}" if single else f"{x:20.11E}" for x in np.ascontiguousarray(values).view(np.float64)]
     if is_even:
         a_line = 6 if single else 4
         return ["".join(numbers[i : i + a_line]) for i in range(0, len(numbers), a_line)]
-    triples = [(_short(f), *numbers[2 * i : 2 * i + 2]) for i, f in enumerate(freq_hz)]
-    a_line = 2 if single else 1
-    return ["".join(x for triple in triples[i : i + a_line] for x in triple) for i in range(0, len(triples), a_line)]
+    of_each = 2 if np.iscomplexobj(values) else 1
+    parts = [(_short(f), *numbers[of_each * i : of_each * (i + 1)]) for i, f in enumerate(freq_hz)]
+    a_line = (6 if single else 4) // (1 + of_each) if single or of_each == 1 else 1
+    return ["".join(x for part in parts[i : i + a_line] for x in part) for i in range(0, len(parts), a_line)]
 
 
 def _short(value: float) -> str:

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from jointfrf.extras import check_extras
 from jointfrf.report.figure import Figure, Panel, Surface
 from jointfrf.report.svg import shortened
 from jointfrf.report.ticks import format_axis
@@ -88,6 +89,7 @@ def draw(figure: Figure) -> Drawing:
     Drawing
         A PNG and an SVG file; the same data give the same files.
     """
+    check_extras("matplotlib")
     import matplotlib
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.backends.backend_svg import FigureCanvasSVG

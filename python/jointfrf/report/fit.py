@@ -95,7 +95,7 @@ def write_fit(fits: Sequence[JointFit], folder: Path, source: str, figures: Sequ
 
     Raises
     ------
-    ImportError
+    MissingPackageError
         matplotlib is missing.
     OSError
         The files cannot be written.

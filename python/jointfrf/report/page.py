@@ -11,6 +11,7 @@ from typing import Any
 from urllib.parse import quote
 
 from jointfrf.dofs import Parameter
+from jointfrf.extras import check_extras
 from jointfrf.report.draw import Drawing
 from jointfrf.report.figure import Figure
 from jointfrf.report.table import VERDICT, Table, shown, turned, written
@@ -68,9 +69,10 @@ def make_page(page: Page) -> str:
 
     Raises
     ------
-    ImportError
+    MissingPackageError
         jinja2 is missing.
     """
+    check_extras("jinja2")
     import jinja2
 
     environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, keep_trailing_newline=True)

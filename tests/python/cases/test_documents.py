@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from jointfrf.cli.main import main
+
 ROOT = Path(__file__).resolve().parents[3]
 DOCUMENTS = {
     str(path.relative_to(ROOT)): path.read_text(encoding="utf-8")
@@ -38,6 +40,26 @@ def test_python_example_of_solid_bodies(capsys):
     assert found["k_x"] == pytest.approx(1e6, rel=0.02)
     assert found["k_theta_x"] == pytest.approx(1e3, rel=0.05)
     assert len(found) == 12
+
+
+def test_python_of_the_page_on_files_prints_what_it_shows(capsys, monkeypatch):
+    pytest.importorskip("pyuff")
+    monkeypatch.chdir(ROOT)
+    (example,) = blocks("python", DOCUMENTS["docs/files.md"])
+    exec(example, {})
+    assert capsys.readouterr().out == blocks("text", DOCUMENTS["docs/files.md"])[0]
+
+
+def test_convert_prints_what_is_shown(capsys, tmp_path, monkeypatch):
+    pytest.importorskip("pyuff")
+    (shown,) = (block for block in blocks("text", DOCUMENTS["docs/command-line.md"]) if "$ jointfrf convert" in block)
+    command, expected = shown.removeprefix("$ ").split("\n", 1)
+    _, *arguments, file, target = shlex.split(command)
+    (tmp_path / file).parent.mkdir(parents=True)
+    shutil.copy(ROOT / file, tmp_path / file)
+    monkeypatch.chdir(tmp_path)
+    assert main([*arguments, file, target]) == 0
+    assert capsys.readouterr().out == expected
 
 
 def words(text: str) -> list[float | str]:

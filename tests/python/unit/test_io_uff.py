@@ -282,7 +282,7 @@ def test_missing_files_and_folders(tmp_path):
 
 def test_without_pyuff_one_sentence_tells_what_to_install(write, monkeypatch):
     monkeypatch.setitem(sys.modules, "pyuff", None)
-    with pytest.raises(ImportError, match=r"pip install jointfrf\[uff\]"):
+    with pytest.raises(ImportError, match=r"pip install 'jointfrf\[uff\]'"):
         read_uff(write(function()))
 
 

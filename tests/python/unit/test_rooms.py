@@ -10,7 +10,7 @@ PACKAGE = Path(jointfrf.__file__).parent
 #: From the ground up; rooms of one floor do not know each other, a room imports what stands below its floor.
 FLOORS = (
     {"errors", "files"},
-    {"kernel"},
+    {"extras", "kernel"},
     {"dofs"},
     {"frf"},
     {"channels", "io"},

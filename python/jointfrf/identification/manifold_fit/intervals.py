@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from scipy import optimize, stats
+from scipy import special
 
 from jointfrf.identification.manifold_fit.estimator import FittedGroup, JointEstimate
 from jointfrf.identification.manifold_fit.joint_terms import DiagonalJoint
@@ -144,7 +144,7 @@ def spread_of(found: JointEstimate, inflation: float, *, is_level_known: bool = 
             by_blocks[group.which] = np.where(own > 0, blocks / own, np.nan)
     factor = _larger_than_chance(by_noise, by_lines, of_lines / inflation)
     with np.errstate(divide="ignore", invalid="ignore"):
-        chance = np.nan_to_num(stats.chi2.sf(of_blocks * by_blocks / factor, of_blocks), nan=1.0)
+        chance = np.nan_to_num(special.chdtrc(of_blocks, of_blocks * by_blocks / factor), nan=1.0)
     factor = _larger_than_chance(factor, by_blocks, of_blocks)
     return Spread(by_noise, by_lines, by_blocks, factor, chance)
 
@@ -161,10 +161,10 @@ def _larger_than_chance(factor: FloatArray, other: FloatArray, degrees: FloatArr
         return factor
     raised = factor.copy()
     count, few = int(known.sum()), float(np.median(degrees[known]))
-    if (mean := float(ratio[known].mean())) > stats.chi2.ppf(_CHANCE, few * count) / (few * count):
+    if (mean := float(ratio[known].mean())) > _chi_squared(_CHANCE, few * count) / (few * count):
         raised *= mean
-    single = stats.chi2.ppf(1 - (1 - _CHANCE) / count, degrees[known]) / degrees[known]
-    student = (stats.t.ppf(0.975, degrees[known]) / stats.norm.ppf(0.975)) ** 2
+    single = _chi_squared(1 - (1 - _CHANCE) / count, degrees[known]) / degrees[known]
+    student = (special.stdtrit(degrees[known], 0.975) / special.ndtri(0.975)) ** 2
     larger = np.where(ratio[known] > single, student * other[known], 0)
     raised[known] = np.maximum(raised[known], larger)
     return raised
@@ -205,7 +205,7 @@ def _limits(group: FittedGroup, i: int, factor: float, probability: float) -> tu
     """Return the limits of one parameter of a group."""
     terms, x = group.joint.terms, group.fit.minimum.x
     covariance = inverse_information(2 * group.fit.minimum.information) * factor
-    reach = float(stats.norm.ppf((1 + probability) / 2))
+    reach = float(special.ndtri((1 + probability) / 2))
     a = int(terms.pairs[i, 0])
     is_diagonal = isinstance(group.joint, DiagonalJoint)
     if is_diagonal and np.sqrt(max(covariance[a, a], 0)) > _CURVED * x[a]:
@@ -250,14 +250,14 @@ def profile_interval(group: FittedGroup, index: int, factor: float, probability:
     if of_stiffness:
         start = group.fit.minimum.x
     best = minimise_forms(forms, joint, start)
-    limit = stats.chi2.ppf(probability, 1) * factor / 2
+    limit = float(_chi_squared(probability, 1) * factor / 2)
     error = np.sqrt(np.maximum(np.diagonal(inverse_information(2 * best.information)), 0) * factor)[index]
     may_be_rigid = _may_be_rigid(group, int(joint.dofs[index]), factor, probability)
     if may_be_rigid and not of_stiffness:
         # A rigid DOF shows no damping.
         return -np.inf, np.inf
     profile = _Profile(forms, joint, index, best.x, best.cost, limit)
-    reach = stats.norm.ppf((1 + probability) / 2) * error
+    reach = special.ndtri((1 + probability) / 2) * error
     low = 0.0 if may_be_rigid else profile.crossing(-1, reach, 0.0 if of_stiffness else -np.inf)
     high = profile.crossing(1, reach, np.inf)
     if of_stiffness:
@@ -273,7 +273,12 @@ def _may_be_rigid(group: FittedGroup, dof: int, factor: float, probability: floa
     start[dof] = 0.0
     rigid = minimise_forms(group.fit.forms, group.joint, start, dof, _PRECISE)
     parameters = int(np.count_nonzero(group.joint.terms.pairs[:, 0] == dof))
-    return bool(rigid.cost - minimum.cost < stats.chi2.ppf(probability, parameters) * factor / 2)
+    return bool(rigid.cost - minimum.cost < _chi_squared(probability, parameters) * factor / 2)
+
+
+def _chi_squared(probability: float, degrees: float | FloatArray) -> Any:
+    """Quantile of chi-squared, without the time that scipy.stats takes to import."""
+    return 2 * special.gammaincinv(np.asarray(degrees) / 2, probability)
 
 
 class _Profile:
@@ -302,6 +307,8 @@ class _Profile:
             if sign < 0 and there <= bound:
                 there = bound
             if self.excess(there) > 0:
+                from scipy import optimize
+
                 root: float = optimize.brentq(self.excess, near, there, xtol=1e-3 * reach, rtol=1e-6)
                 return root
             if there == bound:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy import stats
+from scipy import special
 
 from jointfrf.identification.manifold_fit.estimator import FittedGroup, JointEstimate
 from jointfrf.identification.manifold_fit.intervals import BLOCKS, Spread
@@ -152,7 +152,7 @@ def _trends(group: FittedGroup, freq_hz: FloatArray, factor: FloatArray) -> list
         if np.count_nonzero(known) < 3:
             continue
         squares = ((changes[known, i] / errors[known, i]) ** 2).sum()
-        probability = float(stats.chi2.sf(squares, np.count_nonzero(known) - 1))
+        probability = float(special.chdtrc(np.count_nonzero(known) - 1, squares))
         if probability < _DISAGREE / p:
             centres = np.array([freq_hz[own].mean() for own in parts])
             told.append(Trend(parameter.name, centres[known], values[known, i], probability))

@@ -1,0 +1,98 @@
+"""`jointfrf convert`: measured FRFs of one file or several into one file of another format."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+from jointfrf.cli.measured_file import add_quantity_arguments, nodes, parse_band, read_with_warnings
+from jointfrf.cli.usage import UsageError
+from jointfrf.frf.frf_set import FrfSet
+from jointfrf.io import write_csv, write_hdf5, write_npz, write_uff
+
+__all__ = ["add_arguments", "run"]
+
+_WRITERS: dict[str, Callable[[Path, FrfSet], None]] = {
+    ".uff": write_uff,
+    ".unv": write_uff,
+    ".npz": write_npz,
+    ".h5": write_hdf5,
+    ".hdf5": write_hdf5,
+    ".csv": write_csv,
+}
+_FIELDS = ("freq_hz", "h", "responses", "excitations", "axes", "quantity", "unit", "coherence", "averages")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Describe the arguments of the command."""
+    parser.description = (
+        "Read measured FRFs (Universal File, MATLAB, NPZ, HDF5, CSV; what a file is, is told by its content) and write "
+        "them, in SI units, as a Universal File (.uff), NPZ (.npz), HDF5 (.h5) or text table (.csv). Several files of "
+        "one test become one. Options stand before or after all files."
+    )
+    parser.add_argument("files", nargs="+", type=Path, metavar="IN", help="files to read, and last the one to write")
+    add_quantity_arguments(parser)
+    parser.add_argument(
+        "--map", type=_field, action="append", default=[], metavar="FIELD=NAME",
+        help=f"which field of a MATLAB, NPZ or HDF5 file is what: {', '.join(_FIELDS)}; channels also as names "
+        "(responses=1:x,2:x), axes as freq,out,in in their order; may be repeated",
+    )  # fmt: skip
+    parser.add_argument("--nodes", type=nodes, metavar="NODES", help="only FRFs between these nodes: 102,104")
+    parser.add_argument("--band", type=parse_band, metavar="LOW:HIGH", help="only the lines in this band in Hz")
+    parser.add_argument("--averages", type=float, metavar="N", help="number of averages, where the files do not say it")
+    parser.add_argument("--json", action="store_true", help="print what was written as JSON")
+    parser.add_argument("--quiet", action="store_true", help="print nothing but warnings and errors")
+
+
+def _field(text: str) -> tuple[str, str]:
+    field, equals, name = text.partition("=")
+    if not equals or field not in _FIELDS or not name:
+        raise argparse.ArgumentTypeError(f"{text!r} is not like FIELD=NAME with a field out of {', '.join(_FIELDS)}")
+    return field, name
+
+
+def run(args: argparse.Namespace) -> int:
+    """Carry out the command; the caller turns exceptions into messages."""
+    *sources, target = args.files
+    if not sources:
+        raise UsageError("name the files to read, and last the one to write: jointfrf convert IN ... OUT")
+    writer = _WRITERS.get(target.suffix.lower())
+    if writer is None:
+        raise UsageError(f"{target} has no suffix of a format that is written: {', '.join(_WRITERS)}")
+    if not target.parent.is_dir():
+        raise UsageError(f"there is no folder {target.parent}")
+    if any(target.exists() and source.exists() and target.samefile(source) for source in sources):
+        raise UsageError(f"{target} is one of the files to read")
+    frfs = read_with_warnings(
+        *sources,
+        quantity=args.quantity,
+        force_quantity=args.force_quantity,
+        nodes=args.nodes,
+        mapping=dict(args.map),
+        averages=args.averages,
+    )
+    if args.band is not None:
+        frfs = frfs.select(args.band)
+    writer(target, frfs)
+    if args.json:
+        print(json.dumps(_described(frfs, target), indent=2))
+    elif not args.quiet:
+        print(f"{frfs.summary()}\nwrote {target}")
+    return 0
+
+
+def _described(frfs: FrfSet, target: Path) -> dict[str, object]:
+    return {
+        "written": str(target),
+        "sources": frfs.source.split(", "),
+        "stated": frfs.stated,
+        "quantity": frfs.quantity,
+        "frfs": int(frfs.measured.sum()),
+        "responses": [str(channel) for channel in frfs.responses],
+        "excitations": [str(channel) for channel in frfs.excitations],
+        "lines": frfs.freq_hz.size,
+        "band_hz": [float(frfs.freq_hz[0]), float(frfs.freq_hz[-1])],
+        "coherence": frfs.coherence is not None,
+    }

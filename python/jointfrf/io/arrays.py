@@ -1,0 +1,257 @@
+"""FRFs from arrays: axes, channels, quantity and unit are made those of a set, and everything is checked."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from jointfrf.errors import FileContentError, FileContentWarning
+from jointfrf.frf.frf_set import POWER_OF_I_OMEGA, Channel, FrfSet
+from jointfrf.io.labels import channels_of, channels_of_table, is_table
+from jointfrf.io.quantity import check_quantity, contradiction
+from jointfrf.io.units import Unit, parse_unit
+
+__all__ = ["FrfArrays", "as_frf_set", "frfs_of_arrays"]
+
+_AXES = ("freq", "out", "in")
+
+
+@dataclass
+class FrfArrays:
+    """What a file holds, as it stands there."""
+
+    freq_hz: Any
+    h: Any
+    axes: str = ""
+    responses: Any = None
+    excitations: Any = None
+    quantity: str = ""
+    unit: str = ""
+    coherence: Any = None
+    averages: Any = None
+    coordinates: Mapping[int, NDArray[np.float64]] = field(default_factory=dict)
+
+
+def frfs_of_arrays(
+    freq_hz: ArrayLike,
+    h: ArrayLike,
+    responses: Any,
+    excitations: Any,
+    *,
+    quantity: str | None = None,
+    unit: str = "",
+    axes: str = "freq,out,in",
+    coherence: ArrayLike | None = None,
+    averages: ArrayLike | None = None,
+    source: str = "arrays",
+) -> FrfSet:
+    """Make a set of FRFs from arrays, such as those of pyFBS.
+
+    Parameters
+    ----------
+    freq_hz : array_like, shape (n_freq,)
+        Frequency lines in Hz, increasing.
+    h : array_like of complex, three axes in the order of `axes`
+        The FRFs; NaN on all lines where there is none.
+    responses, excitations : sequence of str, Channel or (int, int); or a table
+        Names such as ``102:+y``; pairs of node and direction code (1 to 6: x, y, z, rx, ry, rz; negative against the
+        axis); or both as tables of pyFBS, mappings or DataFrames with columns ``Position_1`` to ``Position_3`` (m) and
+        ``Direction_1`` to ``Direction_3``: channels at one place get one node, counted from 1.
+    quantity : {"receptance", "mobility", "accelerance"}, optional
+        What the FRFs are; by default as `unit` says.
+    unit : str
+        Such as ``g/N`` or ``(m/s^2)/N``; SI where it is not given.
+    axes : str
+        Order of the axes of `h` and `coherence`: ``freq,out,in``, ``out,in,freq``, ...
+    coherence : array_like, shape of `h`, optional
+        Ordinary coherence, 0 to 1.
+    averages : number or array_like, shape (n_responses, n_excitations), optional
+        Number of averages.
+    source : str
+        Named in messages.
+
+    Returns
+    -------
+    FrfSet
+        In SI units.
+
+    Raises
+    ------
+    FileContentError
+        Sizes, names or units do not fit each other, or values are not finite; what, is said.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> frfs = frfs_of_arrays([10, 20], np.ones((2, 1, 2)), ["1:y"], ["1:y", "2:y"], unit="mm/s^2/N")
+    >>> frfs.quantity, frfs.h[0, 0].real.tolist()
+    ('accelerance', [0.001, 0.001])
+    """
+    coordinates: Mapping[int, NDArray[np.float64]] = {}
+    if is_table(responses) or is_table(excitations):
+        responses, excitations, coordinates = channels_of_table(responses, excitations)
+    content = FrfArrays(freq_hz, h, axes, responses, excitations, "", unit, coherence, averages, coordinates)
+    return as_frf_set(content, source, quantity, stacklevel=3)
+
+
+def as_frf_set(
+    content: FrfArrays, where: str, quantity: str | None = None, *, forced: bool = False, stacklevel: int = 2
+) -> FrfSet:
+    """Make a set of what a file holds.
+
+    Parameters
+    ----------
+    content : FrfArrays
+        What stands in the file.
+    where : str
+        Its name, with which messages begin.
+    quantity, forced
+        What the user says the FRFs are, and whether against the file.
+    stacklevel : int
+        Of warnings.
+
+    Returns
+    -------
+    FrfSet
+
+    Raises
+    ------
+    FileContentError
+        Something does not fit; the message is one sentence.
+    """
+    check_quantity(quantity)
+    try:
+        freq_hz = _frequencies(content.freq_hz)
+        responses, excitations = _channels(content)
+        shape = (freq_hz.size, len(responses), len(excitations))
+        h = _in_order("FRFs", content.h, content.axes, shape).astype(np.complex128)
+        used, factor, note = _quantity(content, (*responses, *excitations), quantity, forced=forced)
+        coherence = None
+        if content.coherence is not None:
+            coherence = _in_order("coherence", content.coherence, content.axes, shape).astype(np.float64)
+        averages = content.averages
+        if averages is not None:
+            averages = _numbers("averages", averages)
+            averages = averages.reshape(shape[1:] if averages.size == shape[1] * shape[2] else averages.shape)
+        stated = f"{content.quantity or 'FRFs of an unnamed quantity'} [{content.unit or 'no unit'}]"
+        with np.errstate(over="ignore", invalid="ignore"):
+            h *= factor
+        places = content.coordinates
+        found = FrfSet(freq_hz, responses, excitations, h, used, places, where, coherence, averages, stated)
+        found.check_whole()
+    except (ValueError, TypeError, OverflowError) as error:
+        raise FileContentError(f"{where}: {error}") from error
+    if note:
+        warnings.warn(f"{where}: {note}", FileContentWarning, stacklevel=stacklevel)
+    return found
+
+
+def _numbers(what: str, values: Any) -> NDArray[Any]:
+    found = np.asarray(values)
+    if found.dtype.kind not in "biufc":
+        raise ValueError(f"the {what} are no numbers")
+    return found
+
+
+def _frequencies(values: Any) -> NDArray[np.float64]:
+    freq_hz = _numbers("frequencies", values)
+    freq_hz = freq_hz.reshape(-1) if freq_hz.size == max(freq_hz.shape, default=1) else freq_hz
+    if freq_hz.ndim != 1 or not freq_hz.size or freq_hz.dtype.kind == "c":
+        raise ValueError(f"the frequencies have shape {np.shape(values)}, expected one column of real numbers")
+    if not np.isfinite(freq_hz).all() or freq_hz[0] < 0 or (np.diff(freq_hz) <= 0).any():
+        raise ValueError("the frequencies do not increase from 0 Hz or more")
+    return freq_hz.astype(np.float64)
+
+
+def _channels(content: FrfArrays) -> tuple[tuple[Channel, ...], tuple[Channel, ...]]:
+    for name in ("responses", "excitations"):
+        if getattr(content, name) is None:
+            raise ValueError(f"the {name} are not named: give them, such as 102:+y")
+    return channels_of("responses", content.responses), channels_of("excitations", content.excitations)
+
+
+def _in_order(what: str, values: Any, axes: str, shape: tuple[int, int, int]) -> NDArray[Any]:
+    """Values with axes frequency, response, excitation."""
+    array = _numbers(what, values)
+    if axes:
+        names = [name.strip() for name in axes.split(",")]
+        if sorted(names) != sorted(_AXES):
+            raise ValueError(f"axes {axes!r} are not freq, out and in, in their order, such as out,in,freq")
+        array = _with_single_axes(what, array, shape, names)
+        array = array.transpose([names.index(name) for name in _AXES])
+    else:
+        array = _by_sizes(what, array, shape)
+    if array.shape != shape:
+        held = " x ".join(map(str, array.shape))
+        wanted = "{} lines, {} responses, {} excitations".format(*shape)
+        raise ValueError(f"the {what} have the sizes {held}, which do not fit {wanted}")
+    return np.ascontiguousarray(array)
+
+
+def _with_single_axes(what: str, array: NDArray[Any], shape: tuple[int, int, int], names: list[str]) -> NDArray[Any]:
+    """Axes of length 1 that a program has dropped."""
+    ordered = tuple(shape[_AXES.index(name)] for name in names)
+    if array.ndim != 3 and array.size == np.prod(ordered) and _squeezed(array.shape) == _squeezed(ordered):
+        return array.reshape(ordered)
+    if array.ndim != 3:
+        raise ValueError(f"the {what} have {array.ndim} axes, not the three of {','.join(names)}")
+    return array
+
+
+def _squeezed(shape: tuple[int, ...]) -> tuple[int, ...]:
+    return tuple(n for n in shape if n != 1)
+
+
+def _by_sizes(what: str, array: NDArray[Any], shape: tuple[int, int, int]) -> NDArray[Any]:
+    """Find which axis is which by the sizes: responses stand before excitations."""
+    orders = [(0, 1, 2), (1, 2, 0), (1, 0, 2)]  # freq,out,in; out,in,freq; out,freq,in
+    fitting = []
+    for order in orders:
+        ordered = tuple(shape[axis] for axis in order)
+        if array.size == np.prod(ordered) and _squeezed(array.shape) == _squeezed(ordered):
+            fitting.append(np.moveaxis(array.reshape(ordered), [0, 1, 2], order))
+    if not fitting:
+        held = " x ".join(map(str, array.shape))
+        wanted = "{} lines, {} responses, {} excitations".format(*shape)
+        raise ValueError(f"the {what} have the sizes {held}, which do not fit {wanted}; give axes=")
+    if any(not np.array_equal(fitting[0], other, equal_nan=True) for other in fitting[1:]):
+        raise ValueError(
+            f"which axis of the {what} is frequency is not clear from the sizes: give axes=, such as freq,out,in"
+        )
+    return fitting[0]
+
+
+def _quantity(
+    content: FrfArrays, channels: tuple[Channel, ...], quantity: str | None, *, forced: bool
+) -> tuple[str, float, str]:
+    """Quantity, factor to SI, and what had to be assumed."""
+    unit = parse_unit(content.unit)
+    said = content.quantity.strip().lower()
+    if said == "inertance":
+        said = "accelerance"
+    if said and said not in POWER_OF_I_OMEGA:
+        raise ValueError(f"the quantity {content.quantity!r} is none of {', '.join(POWER_OF_I_OMEGA)}")
+    by_unit = next((name for name, power in POWER_OF_I_OMEGA.items() if unit and _fits(unit, power)), "")
+    if said and by_unit and said != by_unit and not quantity:
+        raise ValueError(f"the unit '{content.unit}' does not fit {said}; give quantity=")
+    agreed = {said, by_unit} - {""}
+    if quantity and len(agreed) == 1 and agreed != {quantity} and not forced:
+        raise ValueError(f"the file {contradiction(agreed.pop(), quantity, content.unit or 'no unit')}")
+    used = quantity or said or by_unit
+    if not used:
+        raise ValueError("it is not said what the FRFs are: give quantity= (receptance, mobility or accelerance)")
+    if unit is not None and _fits(unit, POWER_OF_I_OMEGA[used]):
+        if unit.to_si != 1.0 and any(channel.is_rotation for channel in channels):
+            raise ValueError(f"the unit '{content.unit}' says nothing of rotations: give SI units")
+        return used, unit.to_si, ""
+    why = f"the unit '{content.unit}' is not used" if content.unit else "there is no unit"
+    return used, 1.0, f"{why}: SI units are assumed"
+
+
+def _fits(unit: Unit, power: int) -> bool:
+    return unit.exponents == (1, -1, -power)

@@ -1,0 +1,231 @@
+"""FRFs in text tables: a column of frequencies, and two columns for each FRF."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointfrf.errors import FileContentError
+from jointfrf.files import write_file
+from jointfrf.frf.frf_set import Channel, FrfSet
+from jointfrf.io.arrays import FrfArrays
+from jointfrf.io.labels import channels_of
+from jointfrf.io.layout import fields_of
+from jointfrf.io.loose import LooseFunction, arrays_of_functions
+
+__all__ = ["csv_arrays", "write_csv"]
+
+_PARTS = {
+    "real": "real", "re": "real", "imag": "imag", "imaginary": "imag", "im": "imag",
+    "mag": "magnitude", "magnitude": "magnitude", "abs": "magnitude", "amplitude": "magnitude", "amp": "magnitude",
+    "phase": "phase", "arg": "phase", "angle": "phase",
+    "coherence": "coherence", "coh": "coherence",
+}  # fmt: skip
+_CHANNEL = r"[^\s/,;()\[\]]*?\d+[\s:._]*[+-]?r?[xyz][+-]?"
+_PAIR = re.compile(rf"({_CHANNEL})\s*/\s*({_CHANNEL})(?![a-z])", re.IGNORECASE)
+_UNIT = re.compile(r"\[([^\]]*)\]")
+_FREQUENCY = re.compile(r"(f|freq|frequency|freq_hz|hz)\b", re.IGNORECASE)
+_HZ = {"": 1.0, "hz": 1.0, "khz": 1e3, "rad/s": 0.5 / np.pi}
+_RADIANS = {"": np.pi / 180, "deg": np.pi / 180, "°": np.pi / 180, "rad": 1.0}
+_ENCODINGS = ((b"\xff\xfe", "utf-16"), (b"\xfe\xff", "utf-16"), (b"\xef\xbb\xbf", "utf-8-sig"))
+
+
+@dataclass
+class _Table:
+    """Comments with a colon, the words of the heading, and the numbers below it."""
+
+    stated: dict[str, str] = field(default_factory=dict)
+    heading: list[str] = field(default_factory=list)
+    numbers: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))
+
+
+def csv_arrays(path: Path) -> FrfArrays:
+    """Read a text table.
+
+    Parameters
+    ----------
+    path : Path
+        Columns between commas, semicolons or tabs (decimal commas between semicolons or tabs), one heading. The first
+        column is the frequency. The others name response and excitation, ``102:+y / 101:+y``, and a part: ``real`` and
+        ``imag``, or ``magnitude`` and ``phase`` (degrees, or ``[rad]``), or ``coherence``; the unit stands in square
+        brackets. Lines before it that begin with ``#`` may state ``quantity:``, ``unit:`` and ``averages:``.
+
+    Returns
+    -------
+    FrfArrays
+
+    Raises
+    ------
+    FileContentError
+        Something is missing or no number; the message names line and column.
+    """
+    table = _table(path)
+    where = str(path)
+    parts: dict[tuple[Channel, Channel], dict[str, tuple[str, NDArray[np.float64]]]] = {}
+    first = table.heading[0]
+    if not _FREQUENCY.match(first):
+        raise FileContentError(f"{where}: the first column must be the frequency, not {first[:40]!r}")
+    hz = _unit_of(first).lower()
+    if hz not in _HZ:
+        raise FileContentError(f"{where}: the unit '{hz}' of the frequency is none of Hz, kHz, rad/s")
+    for name, column in zip(table.heading[1:], table.numbers.T[1:], strict=True):
+        pair, part = _column(name, where)
+        if part in parts.setdefault(pair, {}):
+            raise FileContentError(f"{where} has two columns {name!r}")
+        parts[pair][part] = _unit_of(name), column
+    freq_hz = table.numbers[:, 0] * _HZ[hz]
+    functions = [each for pair, columns in parts.items() for each in _functions(pair, columns, freq_hz, where)]
+    found = arrays_of_functions(functions, where)
+    found.quantity = table.stated.get("quantity", "")
+    found.unit = found.unit or table.stated.get("unit", "")
+    if "averages" in table.stated:
+        try:
+            found.averages = float(table.stated["averages"])
+        except ValueError as error:
+            raise FileContentError(f"{where}: averages {table.stated['averages']!r} is no number") from error
+    return found
+
+
+def _column(name: str, where: str) -> tuple[tuple[Channel, Channel], str]:
+    """Response, excitation and part that a heading names."""
+    match = _PAIR.search(name)
+    if match is not None:
+        rest = _UNIT.sub(" ", name[: match.start()] + " " + name[match.end() :])
+        named = {_PARTS[word] for word in re.findall(r"[a-z]+", rest.lower()) if word in _PARTS}
+        if len(named) == 1:
+            try:
+                pair = channels_of("heading", [match[1]])[0], channels_of("heading", [match[2]])[0]
+            except ValueError as error:
+                raise FileContentError(f"{where} {error}") from error
+            return pair, named.pop()
+    raise FileContentError(
+        f"{where}: column {name[:60]!r} does not name response / excitation and real, imag, magnitude, phase or "
+        "coherence, such as '102:+y / 101:+y real'"
+    )
+
+
+def _unit_of(name: str) -> str:
+    match = _UNIT.search(name)
+    return match[1].strip() if match else ""
+
+
+def _functions(
+    pair: tuple[Channel, Channel],
+    columns: dict[str, tuple[str, NDArray[np.float64]]],
+    freq_hz: NDArray[np.float64],
+    where: str,
+) -> list[LooseFunction]:
+    """FRF of one pair of channels, and its coherence where there is one."""
+    found = []
+    parts = set(columns) - {"coherence"}
+    if parts == {"real", "imag"}:
+        unit, values = columns["real"][0], columns["real"][1] + 1j * columns["imag"][1]
+        if columns["imag"][0] != unit:
+            raise FileContentError(f"{where}: real and imag of {pair[0]} / {pair[1]} have different units")
+    elif parts == {"magnitude", "phase"}:
+        unit, angle = columns["magnitude"][0], columns["phase"][0].lower()
+        if unit.lower().startswith("db") or angle not in _RADIANS:
+            raise FileContentError(
+                f"{where}: magnitude of {pair[0]} / {pair[1]} must be linear and phase in deg or rad, "
+                f"not [{unit}] and [{angle}]"
+            )
+        values = columns["magnitude"][1] * np.exp(1j * _RADIANS[angle] * columns["phase"][1])
+    else:
+        held = " and ".join(sorted(columns))
+        raise FileContentError(
+            f"{where} has {held} of {pair[0]} / {pair[1]}: it takes real and imag, or magnitude and phase"
+        )
+    found.append(LooseFunction(*pair, freq_hz, values, unit=unit))
+    if "coherence" in columns:
+        found.append(LooseFunction(*pair, freq_hz, columns["coherence"][1], is_coherence=True))
+    return found
+
+
+def _table(path: Path) -> _Table:
+    """Words and numbers of the file."""
+    lines = list(enumerate(_decoded(path).splitlines(), start=1))
+    table, separator = _Table(), ""
+    rows: list[list[float]] = []
+    for number, line in lines:
+        text = line.strip().strip("\x1a")
+        if not text.strip(",;\t "):
+            continue
+        if text.startswith("#") and not table.heading:
+            key, colon, value = text.lstrip("# ").partition(":")
+            if colon:
+                table.stated[key.strip().lower()] = value.strip(" ,;\t")
+        elif not table.heading:
+            separator = next((each for each in ("\t", ";", ",") if each in text), "")
+            if not separator:
+                raise FileContentError(f"{path}: line {number} is no heading of columns: {text[:40]!r}")
+            table.heading = [word.strip().strip('"').strip() for word in text.split(separator)]
+        else:
+            rows.append(_row(path, number, line.strip("\r\n"), separator, len(table.heading)))
+    if not table.heading or not rows:
+        raise FileContentError(f"{path} holds no table of numbers below a heading")
+    table.numbers = np.array(rows)
+    return table
+
+
+def _row(path: Path, number: int, line: str, separator: str, n: int) -> list[float]:
+    words = [word.strip().strip('"') for word in line.split(separator)]
+    if len(words) != n:
+        raise FileContentError(f"{path}: line {number} has {len(words)} columns, the heading has {n}")
+    row = []
+    for i, word in enumerate(words, start=1):
+        try:
+            row.append(float(word.replace(",", ".") if separator != "," else word))
+        except ValueError as error:
+            raise FileContentError(f"{path}: line {number}, column {i}: {word[:30]!r} is no number") from error
+    return row
+
+
+def _decoded(path: Path) -> str:
+    content = path.read_bytes()
+    encoding = next((name for mark, name in _ENCODINGS if content.startswith(mark)), "utf-8")
+    try:
+        return content.decode(encoding)
+    except UnicodeDecodeError as error:
+        if encoding != "utf-8" or b"\0" in content:
+            raise FileContentError(f"{path} is not a text file") from error
+        return content.decode("latin-1")  # as older test systems write m/s²
+
+
+def write_csv(path: str | PathLike[str], frfs: FrfSet) -> None:
+    """Write measured FRFs as a text table, real and imaginary part and where it is known coherence.
+
+    Parameters
+    ----------
+    path : path-like
+        In a folder that exists; an older file is replaced as a whole or not at all.
+    frfs : FrfSet
+        The FRFs. Coordinates are not written; a number of averages only where it is one.
+
+    Raises
+    ------
+    ValueError
+        There is no FRF, or one is NaN or infinite on some lines only.
+    OSError
+        The file cannot be written; nothing is left behind.
+    """
+    fields: dict[str, Any] = fields_of(frfs)
+    head = [f"# quantity: {fields['quantity']}"]
+    averages = {} if frfs.averages is None else set(frfs.averages[frfs.measured])
+    if len(averages) == 1 and not np.isnan(next(iter(averages))):
+        head.append(f"# averages: {next(iter(averages)):g}")
+    names, columns = ["frequency [Hz]"], [frfs.freq_hz]
+    for i, j in np.argwhere(frfs.measured):
+        pair, unit = f"{frfs.responses[i]} / {frfs.excitations[j]}", fields["unit"]
+        names += [f"{pair} real [{unit}]", f"{pair} imag [{unit}]"]
+        columns += [frfs.h[:, i, j].real, frfs.h[:, i, j].imag]
+        if frfs.coherence is not None and np.isfinite(frfs.coherence[:, i, j]).all():
+            names.append(f"{pair} coherence")
+            columns.append(frfs.coherence[:, i, j])
+    rows = [",".join(map(repr, row)) for row in np.stack(columns, axis=1).tolist()]
+    write_file(Path(path), "\n".join([*head, ",".join(names), *rows, ""]))

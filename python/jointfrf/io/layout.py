@@ -1,0 +1,85 @@
+"""The project's own layout of FRFs as named arrays, for NPZ and HDF5 files alike."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointfrf.errors import FileContentError
+from jointfrf.frf.frf_set import POWER_OF_I_OMEGA, FrfSet
+from jointfrf.io.arrays import FrfArrays
+
+__all__ = ["MARK", "fields_of", "own_arrays"]
+
+#: The field that says whose layout it is; its value is the number of the layout.
+MARK = "jointfrf_frfs"
+_LAYOUT = 1
+_REQUIRED = ("freq_hz", "h", "responses", "excitations", "quantity")
+_UNITS = ("m/N", "m/s/N", "m/s^2/N")
+
+
+def fields_of(frfs: FrfSet) -> dict[str, NDArray[Any]]:
+    """Arrays of a set, texts as arrays of texts.
+
+    Raises
+    ------
+    ValueError
+        An FRF is NaN or infinite on some lines only, or there is none.
+    """
+    frfs.check_whole()
+    fields: dict[str, NDArray[Any]] = {
+        MARK: np.array(_LAYOUT),
+        "freq_hz": frfs.freq_hz,
+        "h": frfs.h,
+        "responses": np.array([str(channel) for channel in frfs.responses]),
+        "excitations": np.array([str(channel) for channel in frfs.excitations]),
+        "quantity": np.array(frfs.quantity),
+        "unit": np.array(_UNITS[POWER_OF_I_OMEGA[frfs.quantity]]),
+    }
+    if frfs.coherence is not None:
+        fields["coherence"] = frfs.coherence
+    if frfs.averages is not None:
+        fields["averages"] = frfs.averages
+    if frfs.coordinates:
+        nodes = sorted(frfs.coordinates)
+        fields["nodes"] = np.array(nodes)
+        fields["coordinates"] = np.array([frfs.coordinates[node] for node in nodes])
+    return fields
+
+
+def own_arrays(fields: Mapping[str, Any], where: str) -> FrfArrays:
+    """FRFs of the fields of a file in the own layout.
+
+    Raises
+    ------
+    FileContentError
+        A field is missing, or the layout is of a later version.
+    """
+    layout = np.asarray(fields[MARK])
+    if layout.size != 1 or layout.dtype.kind not in "iu" or int(layout.item()) != _LAYOUT:
+        raise FileContentError(
+            f"{where} has layout {fields[MARK]!s:.20}, this version of jointfrf reads layout {_LAYOUT}"
+        )
+    missing = [name for name in _REQUIRED if name not in fields]
+    if missing:
+        raise FileContentError(f"{where} lacks {', '.join(missing)}")
+    nodes, places = np.asarray(fields.get("nodes", [])), np.asarray(fields.get("coordinates", np.zeros((0, 3))))
+    if nodes.dtype.kind not in "iuf" or places.shape != (nodes.size, 3) or not np.isfinite(places).all():
+        raise FileContentError(
+            f"{where}: coordinates have shape {places.shape}, expected three for each of {nodes.size} nodes"
+        )
+    return FrfArrays(
+        fields["freq_hz"],
+        fields["h"],
+        "freq,out,in",
+        fields["responses"],
+        fields["excitations"],
+        str(fields["quantity"]),
+        str(fields.get("unit", "")),
+        fields.get("coherence"),
+        fields.get("averages"),
+        {int(node): place.astype(np.float64) for node, place in zip(nodes.ravel(), places, strict=True)},
+    )

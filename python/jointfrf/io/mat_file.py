@@ -1,0 +1,207 @@
+"""FRFs in MATLAB files: structures of Simcenter Testlab, and arrays of scripts."""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointfrf.errors import FileContentError, first_line
+from jointfrf.frf.frf_set import Channel
+from jointfrf.io.arrays import FrfArrays
+from jointfrf.io.hdf5_file import hdf5_fields
+from jointfrf.io.labels import channels_of
+from jointfrf.io.loose import LooseFunction, arrays_of_functions
+from jointfrf.io.mapping import FrfMapping, mapped_arrays
+from jointfrf.io.mat_check import check_variables
+from jointfrf.io.trial import survives
+from jointfrf.io.units import parse_unit
+
+__all__ = ["mat_arrays"]
+
+_UNREADABLE = (OSError, ValueError, TypeError, LookupError, EOFError, ArithmeticError, MemoryError,
+               NotImplementedError, AttributeError, RuntimeError, struct.error, zlib.error)  # fmt: skip
+_TRIAL = "import scipy.io, sys; scipy.io.loadmat(sys.argv[1])"
+_HDF5_FROM = b"MATLAB 7.3"
+_TOLERANCE = 1e-3
+
+
+def mat_arrays(path: Path, mapping: FrfMapping) -> FrfArrays:
+    """Read a MATLAB file.
+
+    Parameters
+    ----------
+    path : Path
+        Of version 4 to 7 (by scipy) or 7.3 (by h5py). Structures with ``x_values``, ``y_values`` and
+        ``function_record`` are read as Simcenter Testlab writes them; other files by the names of `mapping`.
+    mapping : FrfMapping
+        Which field is what.
+
+    Returns
+    -------
+    FrfArrays
+
+    Raises
+    ------
+    FileContentError
+        The file is damaged or lacks something.
+    MissingPackageError
+        The file is of version 7.3 and the package h5py is not installed.
+    """
+    with path.open("rb") as file:
+        is_hdf5 = file.read(len(_HDF5_FROM)) == _HDF5_FROM
+    content = hdf5_fields(path) if is_hdf5 else _loaded(path)
+    records = list(_records(content))
+    if records and mapping.h is None:
+        functions = [function for record in records for function in _functions(record, mapping, str(path))]
+        return arrays_of_functions(functions, str(path))
+    return mapped_arrays(content, mapping, str(path))
+
+
+def _loaded(path: Path) -> dict[str, Any]:
+    import scipy.io
+
+    try:
+        has_checksums = check_variables(path)
+    except (ValueError, zlib.error) as error:
+        raise FileContentError(f"{path} cannot be read as a MATLAB file: {error}") from error
+    if not has_checksums and not survives(_TRIAL, str(path)):
+        raise FileContentError(f"{path} cannot be read as a MATLAB file: it is damaged")
+    try:
+        found = scipy.io.loadmat(path, simplify_cells=True)
+    except (*_UNREADABLE, scipy.io.matlab.MatReadError) as error:
+        raise FileContentError(f"{path} cannot be read as a MATLAB file: {first_line(error)}") from error
+    return {name: value for name, value in found.items() if not name.startswith("__")}
+
+
+def _records(content: Any) -> Iterator[Mapping[str, Any]]:
+    """Structures of Testlab, wherever they stand."""
+    if isinstance(content, Mapping):
+        if {"x_values", "y_values"} <= set(content):
+            yield content
+        else:
+            for value in content.values():
+                yield from _records(value)
+    elif isinstance(content, list) or (isinstance(content, np.ndarray) and content.dtype == object):
+        for value in content:
+            yield from _records(value)
+
+
+def _functions(record: Mapping[str, Any], mapping: FrfMapping, where: str) -> Iterator[LooseFunction]:
+    """FRFs and coherences of one structure, which holds a column for each."""
+    about = record.get("function_record")
+    about = about if isinstance(about, Mapping) else {}
+    kind = " ".join(_texts(about.get("type"))).lower()
+    is_coherence = "coherence" in kind
+    x_values, y_values = _part(record, "x_values", where), _part(record, "y_values", where)
+    values = np.asarray(_needed(y_values, "values", where))
+    freq_hz = _lines(x_values, values, where)
+    columns = values.reshape(freq_hz.size, -1)
+    if values.ndim == 2 and values.shape[0] != freq_hz.size:
+        columns = values.T
+    if not (is_coherence or columns.dtype.kind == "c"):
+        return  # spectra and time histories of the same export
+    unit = "" if is_coherence else _unit(y_values, mapping, where)
+    pairs = _pairs(about, columns.shape[1], mapping, where)
+    for (response, excitation), column in zip(pairs, columns.T, strict=True):
+        yield LooseFunction(response, excitation, freq_hz, column, is_coherence, unit)
+
+
+def _part(record: Mapping[str, Any], name: str, where: str) -> Mapping[str, Any]:
+    part = record.get(name)
+    if not isinstance(part, Mapping):
+        raise FileContentError(f"{where} is damaged: {name} of a function is no structure")
+    return part
+
+
+def _needed(part: Mapping[str, Any], name: str, where: str) -> Any:
+    if name not in part:
+        raise FileContentError(f"{where} is damaged: a function has no {name}")
+    return part[name]
+
+
+def _lines(x_values: Mapping[str, Any], values: NDArray[Any], where: str) -> NDArray[np.float64]:
+    """Frequencies by start, increment and number, or one by one; as many as one axis of the values has."""
+    if values.dtype.kind not in "biufc" or values.ndim not in (1, 2):
+        raise FileContentError(f"{where} is damaged: the values of a function are no columns of numbers")
+    try:
+        if "increment" in x_values:
+            start, step, n = (
+                float(np.ravel(x_values[name])[0]) for name in ("start_value", "increment", "number_of_values")
+            )
+            size = int(n)
+        else:
+            given = np.asarray(x_values["values"], dtype=np.float64).reshape(-1)
+            start, step, size = 0.0, 0.0, given.size
+    except (ValueError, TypeError, LookupError, OverflowError) as error:
+        raise FileContentError(f"{where} is damaged: the frequencies of a function cannot be read") from error
+    if size < 1 or size not in values.shape:
+        raise FileContentError(f"{where} is damaged: {values.size} values at {size:.6g} frequency lines")
+    return np.asarray(start + step * np.arange(size)) if "increment" in x_values else given
+
+
+def _unit(y_values: Mapping[str, Any], mapping: FrfMapping, where: str) -> str:
+    """Return the unit of the values: the label, unless the file gives a factor that says otherwise."""
+    if mapping.unit is not None:
+        return mapping.unit
+    quantity = y_values.get("quantity")
+    quantity = quantity if isinstance(quantity, Mapping) else {}
+    label = (_texts(quantity.get("label")) or [""])[0].strip()
+    transformation = quantity.get("unit_transformation")
+    factor = transformation.get("factor", 1.0) if isinstance(transformation, Mapping) else 1.0
+    unit = parse_unit(label)
+    to_si = float(np.ravel(factor)[0])
+    if unit is not None and not any(abs(to_si / sound - 1) < _TOLERANCE for sound in (1.0, unit.to_si)):
+        raise FileContentError(
+            f"{where} gives the unit '{label}' with the factor {to_si:g}: whether the values are in that unit or in SI "
+            "units is not clear; say unit= by mapping, the unit of the values"
+        )
+    return label
+
+
+def _pairs(about: Mapping[str, Any], n: int, mapping: FrfMapping, where: str) -> list[tuple[Channel, Channel]]:
+    """Response and excitation of each column."""
+    sides = []
+    for what, given, key in (
+        ("responses", mapping.responses, "primary_channel"),
+        ("excitations", mapping.excitations, "reference_channel"),
+    ):
+        labels = given if given is not None else _point_names(about.get(key), n)
+        labels = labels.split(",") if isinstance(labels, str) else labels
+        if labels is None or len(labels) not in (1, n):
+            raise FileContentError(
+                f"{where} does not name the {what} of its functions ({key}): say {what}= by mapping, such as 102:+y"
+            )
+        try:
+            channels = [channels_of(what, [label])[0] for label in labels]
+        except ValueError as error:
+            raise FileContentError(f"{where} {error}; say {what}= by mapping") from error
+        sides.append(channels * n if len(channels) == 1 else channels)
+    return list(zip(*sides, strict=True))
+
+
+def _point_names(channel: Any, n: int) -> list[str] | None:
+    """Names of points with their directions, from fields that exports have under several names."""
+    if isinstance(channel, Mapping):
+        points = next((_texts(channel[key]) for key in ("point_id", "label", "name", "point") if key in channel), [])
+        ways = next((_texts(channel[key]) for key in ("direction", "point_direction") if key in channel), [])
+        if len(points) != len(ways) or not ways:
+            return points or None
+        return [f"{point}:{way}" for point, way in zip(points, ways, strict=True)]
+    if isinstance(channel, list | np.ndarray) and n == len(channel):
+        names = [_point_names(each, 1) for each in channel]
+        return None if any(each is None for each in names) else [each[0] for each in names if each]
+    return None
+
+
+def _texts(value: Any) -> list[str]:
+    if value is None:
+        return []
+    if isinstance(value, str):
+        return [value]
+    return [str(each) for each in np.ravel(np.asarray(value, dtype=object))]

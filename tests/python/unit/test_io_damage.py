@@ -1,0 +1,322 @@
+"""Damaged, foreign and misleading files: each is read as far as it goes or refused in one sentence that names it."""
+
+import io
+import pickle
+import random
+import warnings
+import zipfile
+from contextlib import suppress
+
+import numpy as np
+import pytest
+
+from frf_files import FREQ_HZ, frf_set, full_set, names, structure_of_testlab, write_mat, write_mat73, write_sdynpy
+from jointfrf.errors import FileContentError, FileContentWarning
+from jointfrf.io import read_frfs, write_csv, write_hdf5, write_npz, write_uff
+from uff_writer import VALUES, dataset, function
+
+pytest.importorskip("pyuff")
+h5py = pytest.importorskip("h5py")
+
+GIVEN = frf_set()
+FIELDS = {
+    "f": FREQ_HZ,
+    "H": GIVEN.h,
+    "responses": names(GIVEN.responses),
+    "excitations": names(GIVEN.excitations),
+    "unit": "m/s^2/N",
+}
+MAKERS = {
+    "text.uff": lambda path: write_uff(path, full_set(), binary=False),
+    "binary.uff": lambda path: write_uff(path, full_set()),
+    "own.npz": lambda path: write_npz(path, full_set()),
+    "sdynpy.npz": lambda path: write_sdynpy(path, GIVEN),
+    "own.h5": lambda path: write_hdf5(path, full_set()),
+    "script.mat": lambda path: write_mat(path, **FIELDS),
+    "testlab.mat": lambda path: write_mat(path, FRF=structure_of_testlab(GIVEN)),
+    "script73.mat": lambda path: write_mat73(path, **FIELDS),
+    "table.csv": lambda path: write_csv(path, full_set()),
+}
+
+
+def refused(path, **options):
+    """One sentence about a file that is not read."""
+    with pytest.raises(FileContentError) as caught:
+        read_frfs(path, **options)
+    sentence = str(caught.value)
+    assert "\n" not in sentence
+    assert path.name in sentence
+    assert len(sentence) < 400
+    return sentence
+
+
+def read_or_refused(path):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FileContentWarning)
+        with suppress(FileContentError):
+            assert np.isfinite(read_frfs(path, quantity="accelerance").h[:, 0, 0]).all()
+
+
+@pytest.mark.parametrize("name", MAKERS)
+def test_a_file_cut_anywhere(tmp_path, name):
+    path = tmp_path / name
+    MAKERS[name](path)
+    content = path.read_bytes()
+    for end in np.linspace(1, len(content) - 1, 41).astype(int):
+        path.write_bytes(content[:end])
+        read_or_refused(path)
+    path.write_bytes(content[: len(content) // 3])
+    if not name.endswith((".uff", ".csv")):  # which hold one FRF, one line after the other
+        assert "cannot be read as" in refused(path)
+
+
+@pytest.mark.parametrize("name", MAKERS)
+def test_a_file_with_bytes_changed(tmp_path, name):
+    path = tmp_path / name
+    MAKERS[name](path)
+    sound, chance = path.read_bytes(), random.Random(11)
+    for _ in range(60):
+        content = bytearray(sound)
+        for _ in range(chance.randrange(1, 6)):
+            start = chance.randrange(len(content))
+            content[start : start + chance.randrange(1, 5)] = chance.randbytes(chance.randrange(5))
+        path.write_bytes(content)
+        read_or_refused(path)
+
+
+@pytest.mark.parametrize("suffix", [".uff", ".npz", ".h5", ".mat", ".csv", ""])
+@pytest.mark.parametrize(("content", "message"), [(b"", "is empty"), (b" \n\r\n", "is empty")])
+def test_an_empty_file(tmp_path, suffix, content, message):
+    path = tmp_path / f"none{suffix}"
+    path.write_bytes(content)
+    assert message in refused(path)
+
+
+def pickled():
+    return pickle.dumps({"freq": FREQ_HZ})
+
+
+def array_file():
+    content = io.BytesIO()
+    np.save(content, GIVEN.h)
+    return content.getvalue()
+
+
+KNOWN = (
+    "is of an unknown format; known are Universal File (.uff .unv), MATLAB (.mat), NPZ (.npz), HDF5 (.h5 .hdf5) and "
+    "CSV (.csv .txt)"
+)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"%PDF-1.7\n\0\1\2", KNOWN),
+        (b"some words\nand more\n", KNOWN),
+        (bytes(range(1, 256)) + b"\0", KNOWN),
+        (pickled(), "is a pickle, which is not read because that can run any program"),
+        (array_file(), "is an NPY file, one array without frequencies"),
+        (b"\x1f\x8b\x08", "is compressed by gzip: unpack it"),
+        (b"TDSm\0\0", "is a TDMS file: export a Universal File"),
+        (b"PK\x03\x04 and nothing", "cannot be read as an NPZ file"),
+        (b"\x89HDF\r\n\x1a\n and nothing", "cannot be read as an HDF5 file"),
+        (b"MATLAB 5.0 MAT-file and nothing", "cannot be read as a MATLAB file"),
+        (b"MATLAB 7.3 MAT-file and nothing", "cannot be read as an HDF5 file"),
+    ],
+)
+def test_what_is_no_file_of_frfs(tmp_path, content, message):
+    path = tmp_path / "unknown.dat"
+    path.write_bytes(content)
+    assert message in refused(path)
+
+
+@pytest.mark.parametrize(
+    ("suffix", "message"),
+    [
+        (".uff", "is not a Universal File: no dataset delimiters"),
+        (".mat", "cannot be read as a MATLAB file"),
+        (".npz", KNOWN),
+        (".h5", KNOWN),
+        (".csv", KNOWN),
+    ],
+)
+def test_a_suffix_that_promises_too_much(tmp_path, suffix, message):
+    path = tmp_path / f"words{suffix}"
+    path.write_bytes(b"only a few words, then noise\n\0" if suffix == ".csv" else b"only words\n")
+    assert message in refused(path)
+
+
+def test_folders_and_missing_files(tmp_path):
+    assert "is a folder" in refused(tmp_path)
+    with pytest.raises(FileNotFoundError, match=r"there is no file .*none\.npz"):
+        read_frfs(tmp_path / "none.npz")
+
+
+def npz_with_header(path, shape, dtype="<c16"):
+    header = io.BytesIO()
+    np.lib.format.write_array_header_1_0(header, {"descr": dtype, "fortran_order": False, "shape": shape})
+    write_npz(path, GIVEN)
+    with zipfile.ZipFile(path) as archive:
+        members = {info.filename: archive.read(info) for info in archive.infolist()}
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, content in members.items():
+            archive.writestr(name, header.getvalue() + bytes(64) if name == "h.npy" else content)
+
+
+def test_stated_sizes_that_exceed_the_file(tmp_path):
+    path = tmp_path / "huge.npz"
+    for shape in ((10**12, 1, 1), (10**6, 10**6, 10**9)):
+        npz_with_header(path, shape)
+        assert "is damaged: h.npy does not hold the" in refused(path)
+    path = tmp_path / "huge.h5"
+    write_hdf5(path, GIVEN)
+    with h5py.File(path, "r+") as file:
+        del file["h"]
+        file.create_dataset("h", shape=(10**12, 3, 2), dtype="c16", chunks=(1000, 3, 2))
+    assert "is damaged: /h does not hold the 1000000000000 x 3 x 2 values that it states" in refused(path)
+    path = tmp_path / "huge.uff"
+    path.write_bytes(function(n_values=999_999_999))
+    assert "holds 3 of 999999999 values" in refused(path)
+    path.write_bytes(function(binary=True, n_values=999_999_999))
+    assert "of 999999999 values" in refused(path)
+    path = tmp_path / "huge.mat"
+    record = structure_of_testlab(GIVEN)
+    record["x_values"]["number_of_values"] = 1e8
+    assert "is damaged: 30 values at 1e+08 frequency lines" in refused(write_mat(path, FRF=record))
+    content = write_mat(path, compressed=False, **FIELDS).read_bytes()
+    sizes = np.array([5, 3, 2], "<i4").tobytes()
+    assert content.count(sizes) == 1
+    path.write_bytes(content.replace(sizes, np.array([2**30, 2**30, 2], "<i4").tobytes()))
+    assert "cannot be read as a MATLAB file" in refused(path)
+
+
+def test_a_matlab_file_without_checksums(tmp_path):
+    """Read in a process of its own first: some damaged ones crash the reader."""
+    path = write_mat(tmp_path / "plain.mat", compressed=False, **FIELDS)
+    np.testing.assert_array_equal(read_frfs(path).h, GIVEN.h)
+    content = path.read_bytes()
+    path.write_bytes(content[: len(content) // 2])
+    assert "cannot be read as a MATLAB file: it ends inside a variable, or one is damaged" in refused(path)
+
+
+def test_damaged_texts_of_an_hdf5_file(tmp_path, monkeypatch):
+    """Texts of variable length stand in a heap of their own, where the library follows every number."""
+    path = tmp_path / "texts.h5"
+    with h5py.File(path, "w") as file:
+        for key, value in FIELDS.items():
+            file[key] = value
+    np.testing.assert_array_equal(read_frfs(path).h, GIVEN.h)
+    content = path.read_bytes()
+    heap = content.index(b"GCOL")
+    monkeypatch.setattr("jointfrf.io.trial._LONGEST", 2)
+    for numbers in (b"\xff" * 16, b"\0" * 16):
+        path.write_bytes(content[: heap + 16] + numbers + content[heap + 32 :])
+        refused(path)
+
+
+def test_python_objects_are_not_read(tmp_path):
+    path = tmp_path / "objects.npz"
+    np.savez(path, freq=FREQ_HZ, h=np.array([{"a": 1}], dtype=object))
+    assert "holds Python objects (h.npy), which are not read because that can run any program" in refused(path)
+
+
+def test_numbers_of_the_other_byte_order(tmp_path):
+    """Where the file states it, nothing is lost; where it states the wrong one, that is noticed."""
+    path = tmp_path / "big.npz"
+    np.savez(path, **(FIELDS | {"f": FREQ_HZ.astype(">f8"), "H": GIVEN.h.astype(">c16")}))
+    np.testing.assert_array_equal(read_frfs(path).h, GIVEN.h)
+    path = tmp_path / "big.h5"
+    write_hdf5(path, GIVEN)
+    with h5py.File(path, "r+") as file:
+        del file["h"]
+        file["h"] = GIVEN.h.astype(">c16")
+    np.testing.assert_array_equal(read_frfs(path).h, GIVEN.h)
+    path = tmp_path / "big.uff"
+    values = np.linspace(1, 2, 50) + 3j
+    freq_hz = np.arange(10.0, 60.0)
+    little = function(values, freq_hz, binary=True)
+    swapped = little.replace(values.astype("<c16").tobytes(), values.astype("<c16").byteswap().tobytes())
+    big = swapped.replace(b"58b     1     2", b"58b     2     2")
+    path.write_bytes(big)
+    np.testing.assert_array_equal(read_frfs(path).h[:, 0, 0], values)
+    path.write_bytes(swapped)
+    assert "the byte order is not the one that is stated" in refused(path)
+
+
+def test_names_that_are_not_ascii(tmp_path):
+    folder = tmp_path / "Prüfling 测试"
+    folder.mkdir()
+    for name, make in MAKERS.items():
+        path = folder / f"größe {name}"
+        make(path)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", FileContentWarning)
+            assert read_frfs(path, quantity="accelerance").responses == GIVEN.responses
+    path = folder / "kopf.uff"
+    path.write_bytes(function().replace(b"NONE\n", "Prüfstand m/s²\n".encode("latin-1"), 2))
+    np.testing.assert_allclose(read_frfs(path).h[:, 0, 0], VALUES)
+    path = folder / "namen.mat"
+    write_mat(path, **(FIELDS | {"responses": ["Träger:101:+X", "Träger:102:-Y", "Träger:103:+Z"]}))
+    assert read_frfs(path).responses == GIVEN.responses
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"jointfrf_frfs": 2}, "has layout 2, this version of jointfrf reads layout 1"),
+        ({"jointfrf_frfs": "one"}, "has layout one"),
+        ({"h": None, "quantity": None}, "lacks h, quantity"),
+        ({"responses": ["101:+x"]}, "sizes 5 x 3 x 2, which do not fit 5 lines, 1 responses"),
+        (
+            {"nodes": [1, 2], "coordinates": np.zeros((1, 3))},
+            "have shape (1, 3), expected three for each of 2 nodes",
+        ),
+        ({"quantity": "impedance"}, "quantity 'impedance' is none of"),
+    ],
+)
+@pytest.mark.parametrize("name", ["a.npz", "a.h5"])
+def test_an_own_file_that_was_tampered_with(tmp_path, name, change, message):
+    path = tmp_path / name
+    fields = {
+        "jointfrf_frfs": 1, "freq_hz": FREQ_HZ, "h": GIVEN.h, "responses": FIELDS["responses"],
+        "excitations": FIELDS["excitations"], "quantity": "accelerance", "unit": "m/s^2/N",
+    } | change  # fmt: skip
+    fields = {key: value for key, value in fields.items() if value is not None}
+    if name == "a.npz":
+        np.savez(path, **fields)
+    else:
+        with h5py.File(path, "w") as file:
+            for key, value in fields.items():
+                file[key] = value
+    assert message in refused(path)
+
+
+def test_mixed_files(tmp_path):
+    """Time histories, spectra and other datasets beside FRFs do no harm; alone they are named."""
+    path = tmp_path / "mixed.uff"
+    others = [dataset(151, *["x"] * 7).encode(), function(np.ones(3), function_type=1, number_type=4)]
+    path.write_bytes(b"".join([*others, function(), *others]))
+    np.testing.assert_allclose(read_frfs(path).h[:, 0, 0], VALUES)
+    path.write_bytes(b"".join(others))
+    assert "holds 1 time history" in refused(path)
+    path = tmp_path / "mixed.mat"
+    signal = structure_of_testlab(GIVEN, type_="Signal", values=GIVEN.h.real)
+    write_mat(path, Signal=signal, FRF=structure_of_testlab(GIVEN, label="m/s^2/N"), text="März", n=3)
+    np.testing.assert_array_equal(read_frfs(path).h, GIVEN.h)
+    assert "holds no FRF" in refused(write_mat(path, Signal=signal))
+    assert "has no field for the frequencies" in refused(write_mat(path, text="März", n=3))
+
+
+@pytest.mark.parametrize("write", [write_uff, write_npz, write_hdf5, write_csv])
+def test_nothing_is_left_of_a_file_that_could_not_be_written(tmp_path, monkeypatch, write):
+    path = tmp_path / "out.file"
+    path.write_bytes(b"old")
+
+    def no_room(*_):
+        raise OSError("No space left on device")
+
+    monkeypatch.setattr("pathlib.Path.replace", no_room)
+    with pytest.raises(OSError, match="No space left"):
+        write(path, GIVEN)
+    assert [each.name for each in tmp_path.iterdir()] == ["out.file"]
+    assert path.read_bytes() == b"old"

@@ -1,0 +1,342 @@
+"""FRFs come back from every format: as written here, and as other programs write them."""
+
+import numpy as np
+import pytest
+
+from frf_files import FREQ_HZ, frf_set, full_set, names, structure_of_testlab, write_mat, write_mat73, write_sdynpy
+from jointfrf.errors import FileContentError, FileContentWarning
+from jointfrf.io import FrfMapping, frfs_of_arrays, read_frfs, write_csv, write_hdf5, write_npz, write_uff
+
+pytest.importorskip("pyuff")
+pytest.importorskip("h5py")
+
+WRITERS = {"a.uff": write_uff, "a.npz": write_npz, "a.h5": write_hdf5, "a.csv": write_csv}
+GRAVITY = 9.80665
+
+
+def same(found, given, *, rtol=1e-14):
+    assert found.quantity == given.quantity
+    assert (found.responses, found.excitations) == (given.responses, given.excitations)
+    np.testing.assert_allclose(found.freq_hz, given.freq_hz, rtol=1e-9)
+    np.testing.assert_allclose(found.h, given.h, rtol=rtol)
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_what_is_written_comes_back(tmp_path, name):
+    given = full_set()
+    WRITERS[name](tmp_path / name, given)
+    assert [path.name for path in tmp_path.iterdir()] == [name]
+    found = read_frfs(tmp_path / name)
+    same(found, given)
+    np.testing.assert_array_equal(found.coherence, given.coherence)
+    if name != "a.uff":
+        np.testing.assert_array_equal(found.averages, given.averages)
+    if name != "a.csv":
+        assert found.coordinates.keys() == given.coordinates.keys()
+        np.testing.assert_allclose(found.coordinates[102], given.coordinates[102], rtol=1e-14)
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_the_content_tells_the_format(tmp_path, name):
+    path = tmp_path / "measured.dat"
+    WRITERS[name](path, frf_set())
+    same(read_frfs(path), frf_set())
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_writers_refuse_what_cannot_be_read(tmp_path, name):
+    h = frf_set().h.copy()
+    with pytest.raises(ValueError, match="holds no FRF"):
+        WRITERS[name](tmp_path / name, frf_set(h=np.full(h.shape, np.nan)))
+    h[2, 1, 1] = np.nan
+    with pytest.raises(ValueError, match=r"FRF 102:-y / 201:\+y holds NaN or Inf, first at 30 Hz"):
+        WRITERS[name](tmp_path / name, frf_set(h=h))
+    assert not list(tmp_path.iterdir())
+
+
+def test_own_arrays_are_those_of_the_documentation(tmp_path):
+    write_npz(tmp_path / "a.npz", full_set())
+    with np.load(tmp_path / "a.npz", allow_pickle=False) as found:
+        assert found["jointfrf_frfs"] == 1
+        assert found["h"].shape == (5, 3, 2)
+        assert found["responses"].tolist() == ["101:+x", "102:-y", "103:+z"]
+        assert (str(found["quantity"]), str(found["unit"])) == ("accelerance", "m/s^2/N")
+        assert found["coordinates"].shape == (2, 3)
+
+
+@pytest.mark.parametrize("write", [write_mat, write_mat73])
+@pytest.mark.parametrize(
+    ("axes", "order"),
+    [("freq,out,in", (0, 1, 2)), ("out,in,freq", (1, 2, 0)), ("out,freq,in", (1, 0, 2)), ("in,out,freq", (2, 1, 0))],
+)
+def test_arrays_of_scripts_in_matlab_files(tmp_path, write, axes, order):
+    given = frf_set()
+    path = write(
+        tmp_path / "test.mat",
+        Freq=FREQ_HZ[:, None],
+        FRF=given.h.transpose(order),
+        coh=np.full(given.h.shape, 0.9).transpose(order),
+        responses=np.array(names(given.responses), dtype=object),
+        references=np.array(names(given.excitations), dtype=object),
+        unit="(m/s^2)/N",
+        navg=10.0,
+    )
+    found = read_frfs(path, mapping={"axes": axes} if axes.startswith("in") else None)
+    same(found, given)
+    assert found.coherence[0, 0, 0] == 0.9
+    assert found.least_averages(["101:x"], ["101:x"]) == 10
+    assert found.stated == "FRFs of an unnamed quantity [(m/s^2)/N]"
+
+
+@pytest.mark.filterwarnings("ignore::jointfrf.errors.FileContentWarning")
+@pytest.mark.parametrize("write", [write_mat, write_mat73])
+def test_a_mapping_says_which_field_is_what(tmp_path, write):
+    given = frf_set("mobility")
+    path = write(tmp_path / "a.mat", test={"w": 2 * np.pi * FREQ_HZ, "A": given.h, "B": given.h * 2}, note="März")
+    mapping = {
+        "h": "test.A",
+        "responses": names(given.responses),
+        "excitations": "101:+x,201:+y",
+        "axes": "freq,out,in",
+    }
+    with pytest.warns(FileContentWarning, match="there is no unit: SI units are assumed"):
+        same(read_frfs(path, quantity="mobility", mapping=mapping), given, rtol=1e-12)
+    with pytest.raises(FileContentError, match=r"no field for the FRFs .*: say which of .*test\.A"):
+        read_frfs(path)
+    with pytest.raises(FileContentError, match=r"no field 'test\.C'; it has .*test\.B"):
+        read_frfs(path, mapping={"h": "test.C"})
+    with pytest.raises(ValueError, match=r"mapping names 'axis', which is none of .*; did you mean axes"):
+        read_frfs(path, mapping={"axis": "freq,out,in"})
+    assert read_frfs(path, quantity="mobility", mapping=FrfMapping(**(mapping | {"h": "test.B"}))).h[0, 0, 0] == (
+        2 * given.h[0, 0, 0]
+    )
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"H": np.ones((4, 3, 2))}, "the sizes 4 x 3 x 2, which do not fit 5 lines, 3 responses, 2 excitations"),
+        ({"f": np.array([1.0, 2, 3, 3, 4])}, "frequencies do not increase"),
+        ({"f": np.ones((2, 2))}, r"frequencies have shape \(2, 2\)"),
+        ({"f": "text"}, "frequencies are no numbers"),
+        ({"H": "text"}, "FRFs are no numbers"),
+        ({"responses": ["101:x", "left", "103:z"]}, "has 'left' in its responses: expected a point and a direction"),
+        ({"responses": ["101:x", "101:x", "103:z"]}, r"names 101:\+x twice in its responses"),
+        ({"responses": np.array([[101, 1], [102, -2], [103, 9]])}, "node 103 with direction code 9"),
+        ({"unit": "furlong"}, "it is not said what the FRFs are: give quantity="),
+        ({"quantity": "impedance"}, "quantity 'impedance' is none of"),
+        ({"quantity": "mobility"}, r"the unit 'm/s\^2/N' does not fit mobility"),
+        ({"coherence": np.full((5, 3, 2), 2.0)}, "coherence must be from 0 to 1"),
+        ({"averages": 0.5}, "averages must be 1 or more"),
+        ({"FRF": np.ones((5, 3, 2))}, r"several fields for h: say which of H, FRF by mapping"),
+        (
+            {"H": np.where(np.arange(30).reshape(5, 3, 2) == 8, np.inf, 1)},
+            r"102:-y / 101:\+x holds NaN or Inf, first at 20",
+        ),
+    ],
+)
+def test_what_does_not_fit_is_one_sentence(tmp_path, change, message):
+    given = frf_set()
+    sound = {
+        "f": FREQ_HZ,
+        "H": given.h,
+        "responses": names(given.responses),
+        "excitations": np.array([[101, 1], [201, 2]]),
+        "unit": "m/s^2/N",
+    }
+    same(read_frfs(write_mat(tmp_path / "a.mat", **sound)), given)
+    with pytest.raises(FileContentError, match=message) as caught:
+        read_frfs(write_mat(tmp_path / "a.mat", **(sound | change)))
+    assert "\n" not in str(caught.value)
+    assert str(tmp_path / "a.mat") in str(caught.value)
+
+
+def test_an_unclear_order_of_axes_must_be_said():
+    channels = ["1:x", "2:x", "3:x"]
+    h = np.arange(27.0).reshape(3, 3, 3)
+    arguments = {"responses": channels, "excitations": channels, "quantity": "receptance", "unit": "m/N"}
+    with pytest.raises(FileContentError, match="is frequency is not clear from the sizes: give axes="):
+        frfs_of_arrays([1, 2, 3], h, axes="", **arguments)
+    np.testing.assert_array_equal(frfs_of_arrays([1, 2, 3], h, axes="out,in,freq", **arguments).h[0], h[:, :, 0])
+
+
+@pytest.mark.parametrize("write", [write_mat, write_mat73])
+def test_structures_of_testlab(tmp_path, write):
+    given = frf_set()
+    coherence = np.full(given.h.shape, 0.75)
+    path = write(
+        tmp_path / "a.mat",
+        FRF=structure_of_testlab(given),
+        Coherence=structure_of_testlab(given, label="", type_="Coherence", values=coherence),
+        Signal=structure_of_testlab(given, label="g", type_="Signal", values=coherence),
+    )
+    found = read_frfs(path)
+    same(found, frf_set(h=GRAVITY * given.h))
+    np.testing.assert_array_equal(found.coherence, coherence)
+    assert found.stated == "FRFs of an unnamed quantity [g/N]"
+
+
+def test_the_factor_of_testlab_must_not_contradict_its_unit(tmp_path):
+    given = frf_set()
+    path = write_mat(tmp_path / "a.mat", FRF=structure_of_testlab(given, factor=GRAVITY))
+    same(read_frfs(path), frf_set(h=GRAVITY * given.h))
+    path = write_mat(tmp_path / "a.mat", FRF=structure_of_testlab(given, factor=1 / GRAVITY))
+    with pytest.raises(FileContentError, match=r"unit 'g/N' with the factor 0.101972: whether .* say unit= by mapping"):
+        read_frfs(path)
+    same(read_frfs(path, mapping={"unit": "m/s^2/N"}), given)
+
+
+@pytest.mark.parametrize(
+    ("part", "key", "value", "message"),
+    [
+        ("x_values", "number_of_values", 7.0, "is damaged: 30 values at 7 frequency lines"),
+        ("x_values", "number_of_values", 1e300, r"30 values at 1e\+300 frequency lines"),
+        ("x_values", "increment", "x", "frequencies of a function cannot be read"),
+        ("y_values", "values", None, "a function has no values"),
+        ("function_record", "primary_channel", None, "does not name the responses of its functions"),
+    ],
+)
+def test_a_damaged_structure_of_structure_of_testlab(tmp_path, part, key, value, message):
+    record = structure_of_testlab(frf_set())
+    if value is None:
+        del record[part][key]
+    else:
+        record[part][key] = value
+    with pytest.raises(FileContentError, match=message):
+        read_frfs(write_mat(tmp_path / "a.mat", FRF=record))
+
+
+def test_functions_of_sdynpy(tmp_path):
+    given = frf_set()
+    path = write_sdynpy(tmp_path / "a.npz", given)
+    with pytest.warns(FileContentWarning, match="there is no unit: SI units are assumed"):
+        same(read_frfs(path, quantity="accelerance"), given)
+    with pytest.raises(FileContentError, match="it is not said what the FRFs are: give quantity="):
+        read_frfs(path)
+    with pytest.raises(FileContentError, match="functions of type 6 of sdynpy, not FRFs"):
+        read_frfs(write_sdynpy(tmp_path / "a.npz", given, function_type=6))
+
+
+def test_arrays_of_pyfbs():
+    places = np.array([[0.0, 0, 0], [0.0, 0, 0], [0.1, 0, 0]])
+    ways = np.array([[1.0, 0, 0], [0, -1.0, 0], [0, 0, 2.0]])
+    table = {f"Position_{k + 1}": places[:, k] for k in range(3)} | {f"Direction_{k + 1}": ways[:, k] for k in range(3)}
+    h = frf_set().h[:, :, [0, 1, 0]]
+    found = frfs_of_arrays(FREQ_HZ, h, table, table, quantity="accelerance", unit="m/s^2/N")
+    assert names(found.responses) == ["1:+x", "1:-y", "2:+z"]
+    np.testing.assert_array_equal(found.coordinates[2], [0.1, 0, 0])
+    np.testing.assert_array_equal(found.h, h)
+    with pytest.raises(ValueError, match=r"row 2 of the responses points along \(1, 1, 0\), not along an axis"):
+        frfs_of_arrays(FREQ_HZ, h, table | {"Direction_1": [1, 1, 0], "Direction_2": [0, 1, 0]}, table)
+    with pytest.raises(ValueError, match="table of the excitations has no column Position_1"):
+        frfs_of_arrays(FREQ_HZ, h, table, {"Direction_1": [], "Direction_2": [], "Direction_3": []})
+
+
+def test_units_are_shown_as_the_file_has_them_and_as_used(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("f [kHz];1:x/1:x real [g/N];1:x/1:x imag [g/N]\n0,01;1,5;0\n0,02;2;-1\n")
+    found = read_frfs(path)
+    assert found.freq_hz.tolist() == [10, 20]
+    np.testing.assert_allclose(found.h[:, 0, 0], [1.5 * GRAVITY, (2 - 1j) * GRAVITY])
+    shown = str(found).splitlines()
+    assert shown[1] == "in the file: FRFs of an unnamed quantity [g/N]"
+    assert shown[2] == "used as: 1 accelerances (m/s^2)/N: 1 responses x 1 excitations, none missing"
+    with pytest.raises(FileContentError, match=r"the file says that it holds accelerance \(g/N\), not mobility"):
+        read_frfs(path, quantity="mobility")
+    with pytest.warns(FileContentWarning, match="unit 'g/N' is not used: SI units are assumed"):
+        assert read_frfs(path, quantity="mobility", force_quantity=True).h[0, 0, 0] == 1.5
+
+
+PLAIN = "freq,1:x / 1:x mag [m/N],1:x / 1:x phase,1:x / 1:x coherence\n1,2,90,0.5\n2,3,-180,1\n"
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        PLAIN.encode(),
+        PLAIN.replace(",", "\t").encode(),
+        b"\xef\xbb\xbf" + PLAIN.encode(),
+        PLAIN.encode("utf-16"),
+        PLAIN.replace("\n", "\r\n").encode() + b"\x1a",
+        PLAIN.replace("phase", "phase [rad]").replace("90", repr(np.pi / 2)).replace("-180", repr(-np.pi)).encode(),
+        PLAIN.replace("phase", "phase [°]").encode("latin-1"),
+        ("# Prüfstand: Halle 3\n# averages: 4\n" + PLAIN).encode(),
+        PLAIN.replace("1:x / 1:x", '"Balken:1:+X/Balken:1:+X"').encode(),
+    ],
+)
+def test_forms_of_text_tables(tmp_path, content):
+    path = tmp_path / "größe.csv"
+    path.write_bytes(content)
+    found = read_frfs(path)
+    assert names(found.responses) == ["1:+x"]
+    np.testing.assert_allclose(found.h[:, 0, 0], [2j, -3], atol=1e-15)
+    assert found.coherence[:, 0, 0].tolist() == [0.5, 1]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("1,2,90,0.5", "1,2,90", "line 2 has 3 columns, the heading has 4"),
+        ("1,2,90,0.5", "1,2,ninety,0.5", "line 2, column 3: 'ninety' is no number"),
+        ("freq", "time", "first column must be the frequency, not 'time'"),
+        ("freq", "freq [rpm]", "unit 'rpm' of the frequency is none of"),
+        ("1:x / 1:x mag", "channel 1 mag", "does not name response / excitation and real"),
+        ("1:x / 1:x phase", "1:x / 1:x mag", "has two columns '1:x / 1:x mag'"),
+        ("1:x / 1:x phase", "1:x / 1:x imag", r"holds? .*takes real and imag, or magnitude and phase|has .* it takes"),
+        ("mag [m/N]", "mag [dB]", r"magnitude of 1:\+x / 1:\+x must be linear"),
+        ("1,2,90,0.5\n2,3,-180,1\n", "", "no table of numbers below a heading"),
+        ("freq", "# averages: many\nfreq", "averages 'many' is no number"),
+        (",0.5", ",-0.5", "coherence must be from 0 to 1"),
+        ("2,3,-180,1", "2,nan,-180,1", "holds NaN or Inf, first at 2 Hz"),
+    ],
+)
+def test_a_wrong_text_table_is_one_sentence(tmp_path, old, new, message):
+    path = tmp_path / "a.csv"
+    path.write_text(PLAIN.replace(old, new))
+    with pytest.raises(FileContentError, match=message):
+        read_frfs(path)
+
+
+def test_several_files_of_one_test(tmp_path):
+    given = frf_set()
+    half = frf_set(coherence=np.full(given.h.shape, 0.5))
+    write_npz(tmp_path / "a.npz", given)
+    write_uff(tmp_path / "b.uff", half)
+    found = read_frfs(tmp_path / "a.npz", tmp_path / "b.uff", averages=4)
+    same(found, given)
+    assert found.coherence[0, 0, 0] == 0.5
+    assert found.averages[0, 0] == 4
+    write_csv(tmp_path / "c.csv", frf_set(h=given.h + 1))
+    with pytest.raises(FileContentError, match=r"FRF 101:\+x / 101:\+x in .*a\.npz and in .*c\.csv contradict"):
+        read_frfs(tmp_path / "a.npz", tmp_path / "c.csv")
+    with pytest.raises(ValueError, match="no file is named"):
+        read_frfs()
+
+
+def test_coherence_in_a_file_of_its_own(tmp_path):
+    given = frf_set(coherence=np.full((5, 3, 2), 0.5))
+    write_uff(tmp_path / "both.uff", given, binary=False)
+    datasets = (tmp_path / "both.uff").read_text().split("    -1\n")
+    functions = [text for text in datasets if text.startswith("    58")]
+    for name, kind in (("frf", "    4"), ("coherence", "    6")):
+        chosen = [text for text in functions if text.split("\n")[6][:5] == kind]
+        assert len(chosen) == 6
+        (tmp_path / f"{name}.uff").write_text("".join(f"    -1\n{text}    -1\n" for text in chosen))
+    found = read_frfs(tmp_path / "frf.uff", tmp_path / "coherence.uff")
+    same(found, given, rtol=1e-11)
+    np.testing.assert_array_equal(found.coherence, given.coherence)
+    with pytest.raises(FileContentError, match=r"holds 6 coherences .* and no FRF"):
+        read_frfs(tmp_path / "coherence.uff")
+    with pytest.raises(FileContentError, match="there is no FRF"):
+        read_frfs(tmp_path / "coherence.uff", tmp_path / "coherence.uff")
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_nodes_that_are_wanted(tmp_path, name):
+    WRITERS[name](tmp_path / name, full_set())
+    found = read_frfs(tmp_path / name, nodes={101, 102})
+    assert names(found.responses) == ["101:+x", "102:-y"]
+    assert names(found.excitations) == ["101:+x"]
+    np.testing.assert_array_equal(found.coherence, full_set().coherence[:, :2, :1])
+    with pytest.raises(FileContentError, match="no FRF between nodes 7, 8"):
+        read_frfs(tmp_path / name, nodes={7, 8})
