@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from jointfrf.channels.check.check import check_frfs, warn_of_frfs
 from jointfrf.channels.check.finding import FrfCheck
+from jointfrf.frf.bands import PIECE
 from jointfrf.identification.compliance_fit.joint_terms import CrossTerms, DampingTerms
 from jointfrf.identification.describe import Described, describe_band_mean, describe_compliance
 from jointfrf.identification.fit import fit_band_mean, fit_compliance
@@ -35,8 +36,6 @@ from jointfrf.substructuring.methods import JointFrfs, StiffnessMethod
 __all__ = ["IdentificationMethod", "identify"]
 
 IdentificationMethod = Literal["compliance", "manifold", StiffnessMethod]
-#: Lines that are looked at before a fit at most, evenly spread.
-_LOOKED_AT = 8192
 _METHODS: tuple[IdentificationMethod, ...] = get_args(IdentificationMethod)
 
 
@@ -200,7 +199,8 @@ def _checked(
     measured: MeasuredFrfs, dofs: tuple[str, ...], transforms: tuple[FloatArray, FloatArray] | None
 ) -> FrfCheck:
     """Look at the FRFs of the lines used, by the names of the joint DOFs where these are the channels."""
-    some = slice(None, None, -(-measured.freq_hz.size // _LOOKED_AT))
+    # A look at some lines, evenly spread, tells as much.
+    some = slice(None, None, -(-measured.freq_hz.size // PIECE))
     freq, h = measured.freq_hz[some], measured.h[some]
     if transforms is None:
         return check_frfs(freq, h, [f"{side}:{dof}" for side in "jk" for dof in dofs])

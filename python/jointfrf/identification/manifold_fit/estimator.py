@@ -8,11 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf.dofs import Parameter
+from jointfrf.frf.bands import PIECE, line_slices
 from jointfrf.identification.compliance_fit.joint_terms import CrossTerms
 from jointfrf.identification.compliance_fit.least_squares import inverse_information
 from jointfrf.identification.manifold_fit.group_fit import GroupFit, GroupProblem, fit_dofs
 from jointfrf.identification.manifold_fit.interface_frfs import InterfaceFrfs
 from jointfrf.identification.manifold_fit.joint_terms import CoupledJoint, DiagonalJoint, JointCoordinates, JointTerms
+from jointfrf.identification.manifold_fit.manifold import LineData
 from jointfrf.identification.manifold_fit.starts import first_joints
 from jointfrf.kernel.arguments import FloatArray
 
@@ -90,12 +92,15 @@ def estimate_on_manifold(
         Lines used for each DOF; all by default.
     """
     groups = []
-    for dofs in frfs.groups():
+    lines = np.arange(len(frfs.measured))
+    some = lines[:: -(-lines.size // PIECE)]
+    for dofs in frfs.on_lines(some).groups():
         own, which = terms.of_dofs(dofs)
-        data = frfs.of_dofs(dofs)
+        data = LineData.joined([frfs.on_lines(lines[piece]).of_dofs(dofs) for piece in line_slices(lines.size)])
         joint = coordinates_of(own)
         problem = GroupProblem(data, joint, _unknown(dofs, cross, used, len(data.measured)))
-        fit = fit_dofs(problem, first_joints(data, joint))
+        # Some lines, evenly spread, start as well as all.
+        fit = fit_dofs(problem, first_joints(data.on_lines(some), coordinates_of(own.on_lines(some))))
         groups.append(FittedGroup(dofs, which, joint, problem, fit))
     return assembled(terms, groups)
 
