@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import reprlib
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -11,9 +12,24 @@ from numpy.typing import ArrayLike, NDArray
 
 from jointfrf.kernel.arguments import FloatArray, as_frequency, as_square
 
-__all__ = ["Band", "BandMean", "as_bands", "band_mean", "in_bands"]
+__all__ = ["PIECE", "Band", "BandMean", "as_bands", "band_mean", "in_bands", "line_slices"]
 
 Band = tuple[float, float]
+#: Lines of long sweeps that are taken together at most: memory for what is in between does not grow with the lines.
+PIECE = 8192
+
+
+def line_slices(n_freq: int) -> list[slice]:
+    """Cut lines into pieces of about equal length, `PIECE` at most.
+
+    Examples
+    --------
+    >>> from jointfrf.frf.bands import line_slices
+    >>> line_slices(10000)
+    [slice(0, 5000, None), slice(5000, 10000, None)]
+    """
+    ends = np.linspace(0, n_freq, (-(-n_freq // PIECE) or 1) + 1).astype(int).tolist()
+    return [slice(first, end) for first, end in pairwise(ends)]
 
 
 def in_bands(freq_hz: ArrayLike, bands: Sequence[Band]) -> NDArray[np.bool_]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from jointfrf.frf.bands import line_slices
 from jointfrf.frf.entry_groups import EntryGroup, entry_groups
 from jointfrf.frf.order_search import OrderSearch, search_order
 from jointfrf.frf.rational_fit import Entries, RationalFit
@@ -32,8 +33,6 @@ __all__ = [
     "smoothed",
 ]
 
-#: Lines that are smoothed together at most.
-_PIECE = 8192
 #: Fewer lines are returned as they were measured.
 _FEWEST_LINES = 16
 #: A residual below this share of the FRFs is not noise that smoothing could remove.
@@ -154,7 +153,7 @@ def smooth_frfs(
 
 def pieces(order: NDArray[np.intp]) -> list[NDArray[np.intp]]:
     """Cut lines in rising order into pieces that are smoothed each by itself: memory does not grow with the lines."""
-    return np.array_split(order, -(-len(order) // _PIECE) or 1)
+    return [order[own] for own in line_slices(len(order))]
 
 
 def joined(places: Sequence[NDArray[np.intp]], parts: Iterable[SmoothFrfs], shape: tuple[int, ...]) -> SmoothFrfs:

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from jointfrf.channels.check.check import check_frfs, warn_of_frfs
 from jointfrf.channels.check.finding import FrfCheck
+from jointfrf.frf.bands import PIECE
 from jointfrf.identification.band_means import fit_band_mean, prepare_band_mean
 from jointfrf.identification.joint_fit import JointFit
 from jointfrf.identification.manifold_fit.describe import Described, describe_manifold
@@ -31,8 +32,6 @@ from jointfrf.substructuring.methods import JointFrfs, StiffnessMethod
 __all__ = ["IdentificationMethod", "identify"]
 
 IdentificationMethod = Literal["compliance", StiffnessMethod]
-#: Lines that are looked at before a fit at most, evenly spread.
-_LOOKED_AT = 8192
 _METHODS: tuple[IdentificationMethod, ...] = get_args(IdentificationMethod)
 
 
@@ -180,7 +179,8 @@ def _checked(
     measured: MeasuredFrfs, dofs: tuple[str, ...], transforms: tuple[FloatArray, FloatArray] | None
 ) -> FrfCheck:
     """Look at the FRFs of the lines used, by the names of the joint DOFs where these are the channels."""
-    some = slice(None, None, -(-measured.freq_hz.size // _LOOKED_AT))
+    # A look at some lines, evenly spread, tells as much.
+    some = slice(None, None, -(-measured.freq_hz.size // PIECE))
     freq, h = measured.freq_hz[some], measured.h[some]
     if transforms is None:
         return check_frfs(freq, h, [f"{side}:{dof}" for side in "jk" for dof in dofs])

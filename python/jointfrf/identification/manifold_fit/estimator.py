@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf.dofs import Parameter
+from jointfrf.frf.bands import PIECE, line_slices
 from jointfrf.identification.manifold_fit.group_fit import LITTLE_PATIENCE, GroupFit, GroupProblem, fit_dofs
 from jointfrf.identification.manifold_fit.interface_frfs import InterfaceFrfs
 from jointfrf.identification.manifold_fit.joint_terms import (
@@ -18,6 +19,7 @@ from jointfrf.identification.manifold_fit.joint_terms import (
     JointTerms,
 )
 from jointfrf.identification.manifold_fit.line_forms import inverse_information
+from jointfrf.identification.manifold_fit.manifold import LineData
 from jointfrf.identification.manifold_fit.starts import first_joints
 from jointfrf.identification.manifold_fit.unknown_cross import fit_unknown_cross
 from jointfrf.kernel.arguments import FloatArray
@@ -108,14 +110,20 @@ def estimate_on_manifold(
     """
     groups = []
     known = {} if near is None else {tuple(group.dofs.tolist()): group for group in near.groups}
-    for dofs in frfs.groups():
+    lines = np.arange(len(frfs.measured))
+    for dofs in frfs.on_lines(_some(lines)).groups():
         own, which = terms.of_dofs(dofs)
-        data = frfs.of_dofs(dofs)
+        data = LineData.joined([frfs.on_lines(lines[piece]).of_dofs(dofs) for piece in line_slices(lines.size)])
         joint = coordinates_of(own)
         problem = GroupProblem(data, joint, _unknown(dofs, cross, used, len(data.measured)))
         fit = _fitted(problem, cross, known.get(tuple(dofs.tolist())))
         groups.append(FittedGroup(dofs, which, joint, problem, fit))
     return assembled(terms, groups)
+
+
+def _some(lines: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return no more lines than are treated at once, evenly spread."""
+    return lines[:: -(-lines.size // PIECE)]
 
 
 def _fitted(problem: GroupProblem, cross: CrossTerms, near: FittedGroup | None) -> GroupFit:
@@ -124,7 +132,9 @@ def _fitted(problem: GroupProblem, cross: CrossTerms, near: FittedGroup | None) 
         found = fit_dofs(problem, [near.fit.minimum.x], LITTLE_PATIENCE)
         if found.is_good:
             return found
-    starts = first_joints(problem.data, problem.joint)
+    # Some lines, evenly spread, start as well as all.
+    some = _some(np.arange(len(problem.data.measured)))
+    starts = first_joints(problem.data.on_lines(some), coordinates_of(problem.joint.terms.on_lines(some)))
     if not problem.is_diagonal or problem.data.entries.n == 1:
         return fit_dofs(problem, starts)
     diagonal = fit_unknown_cross(problem, starts)

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jointfrf.errors import IllConditionedWarning
+from jointfrf.frf.bands import line_slices
 from jointfrf.identification.joint_fit import JointFit
 from jointfrf.identification.manifold_fit.damping_choice import DofDamping, choose_damping
 from jointfrf.identification.manifold_fit.estimator import JointEstimate, estimate_on_manifold
@@ -75,7 +76,12 @@ def fit_manifold(problem: ManifoldProblem) -> ManifoldFit:
     frfs = problem.frfs
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", IllConditionedWarning)
-        k_lines = inverse_substructuring(frfs.gamma(frfs.measured), on_singular="nan")
+        k_lines = np.concatenate(
+            [
+                inverse_substructuring(frfs.gamma(frfs.measured[own]), on_singular="nan")
+                for own in line_slices(freq.size)
+            ]
+        )
     with np.errstate(invalid="ignore"):
         covariance = result.covariance * np.outer(root, root)
     names = [one.name for one in result.parameters]

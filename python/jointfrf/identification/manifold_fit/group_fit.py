@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from jointfrf.frf.bands import line_slices
 from jointfrf.identification.manifold_fit.joint_terms import DiagonalJoint, JointCoordinates
 from jointfrf.identification.manifold_fit.likely_m import PriorOfM, expected_m, prior_of_m
 from jointfrf.identification.manifold_fit.line_forms import (
@@ -219,15 +220,12 @@ def _iterate(problem: GroupProblem, start: FloatArray, patience: int = PATIENCE)
         c = problem.of_joint(joint.compliance(linearised_at))
         if unknown is not None:
             c = np.where(problem.unknown.reshape(c.shape), unknown, c)
-        on = project(data.smooth, data, c, on, _NEXT_STEPS) if on else starts_on_manifold(data, c, _FIRST_STEPS)
+        on = project(data.smooth, data, c, on, _NEXT_STEPS) if on else _first_points(data, c)
         on = _rescued(data, c, on)
         near = _trusted(on, data.entries.n, joint)
         trusted = near & trusted if step > 2 * PATIENCE and (near & trusted).any() else near
-        likely = expected_m(data, c, on, prior) if prior and hidden else on
-        (forms, of_smooth) = normal_forms(data, c, likely, (data.measured, data.smooth))
         # Unknown entries of C move on all lines: they may bring a line back to where it is trusted.
-        forms, unknown = _used(problem, forms, of_smooth, c)
-        forms = forms.scaled(trusted.astype(float))
+        forms, unknown = _linearised(problem, c, on, trusted, prior if hidden else None)
         minimum = minimise_forms(forms, joint, x)
         error = np.sqrt(np.maximum(np.diagonal(inverse_information(2 * minimum.information)), 1e-300))
         # In standard errors along the direction of the step: what the data do not see may go anywhere.
@@ -242,6 +240,33 @@ def _iterate(problem: GroupProblem, start: FloatArray, patience: int = PATIENCE)
             break
         linearised_at = _within_sight(forms, problem.joint, x, error) if problem.is_diagonal else x
     return GroupFit(minimum, forms, trusted, equations, float(free.sum()), step, converged)
+
+
+def _first_points(data: LineData, c: ComplexArray) -> OnManifold:
+    """Start on every line, a piece of the lines at a time."""
+    parts = [starts_on_manifold(data.on_slice(own), c[own], _FIRST_STEPS) for own in line_slices(len(c))]
+    h, m = (np.concatenate([one[i] for one in parts]) for i in (0, 1))
+    return OnManifold(h, m, np.concatenate([one.squares for one in parts]))
+
+
+def _linearised(
+    problem: GroupProblem, c: ComplexArray, on: OnManifold, trusted: NDArray[np.bool_], prior: PriorOfM | None
+) -> tuple[LineForms, ComplexArray | None]:
+    """Return what `_used` does, lines that are not trusted weighing nothing, a piece of the lines at a time."""
+    parts, found = [], np.zeros_like(c)
+    for own in line_slices(len(c)):
+        here = problem._replace(data=problem.data.on_slice(own), unknown=problem.unknown[own])
+        point = OnManifold(on.h[own], on.m[own], on.squares[own])
+        if prior is not None:
+            point = expected_m(here.data, c[own], point, prior.on_lines(own))
+        forms, of_smooth = normal_forms(here.data, c[own], point, (here.data.measured, here.data.smooth))
+        forms, some = _used(here, forms, of_smooth, c[own])
+        parts.append(forms.scaled(trusted[own].astype(float)))
+        if some is not None:
+            found[own] = some
+    compliance, weight, gradient = (np.concatenate([one[i] for one in parts]) for i in (0, 1, 2))
+    whole = LineForms(compliance, weight, gradient, np.concatenate([one.squares for one in parts]))
+    return whole, found if problem.unknown.any() else None
 
 
 def _within_sight(forms: LineForms, joint: JointCoordinates, x: FloatArray, error: FloatArray) -> FloatArray:

@@ -37,6 +37,10 @@ class PriorOfM(NamedTuple):
     size: FloatArray
     share: float
 
+    def on_lines(self, lines: slice) -> PriorOfM:
+        """Return some of the lines."""
+        return self._replace(size=self.size[lines])
+
 
 def prior_of_m(data: LineData) -> PriorOfM:
     """Return the prior: entries of M are as large as those of gamma_jj^-1, there and elsewhere in the band."""

@@ -11,11 +11,13 @@ is singular and for a rigid joint, C = 0.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from jointfrf.frf.bands import line_slices
 from jointfrf.identification.manifold_fit.line_forms import LineForms
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.kernel.call import call
@@ -122,6 +124,20 @@ class LineData(NamedTuple):
         correlation = None if self.correlation is None else self.correlation[lines]
         return LineData(self.entries, self.measured[lines], self.smooth[lines], self.inverse_std[lines], correlation)
 
+    def on_slice(self, lines: slice) -> LineData:
+        """Return neighbouring lines, without a copy."""
+        correlation = None if self.correlation is None else self.correlation[lines]
+        return LineData(self.entries, self.measured[lines], self.smooth[lines], self.inverse_std[lines], correlation)
+
+    @classmethod
+    def joined(cls, parts: Sequence[LineData]) -> LineData:
+        """Put lines one after the other."""
+        correlation = None
+        if parts[0].correlation is not None:
+            correlation = np.concatenate([one.correlation for one in parts if one.correlation is not None])
+        measured, smooth, inverse_std = (np.concatenate([one[i] for one in parts]) for i in (1, 2, 3))
+        return cls(parts[0].entries, measured, smooth, inverse_std, correlation)
+
 
 class OnManifold(NamedTuple):
     """FRFs that fit a joint.
@@ -181,10 +197,11 @@ def project(target: ComplexArray, data: LineData, c: ComplexArray, start: OnMani
     n_freq = len(target)
     h, m = (np.array(x, np.complex128, order="C") for x in (start.h, start.m))
     squares, line_info = np.empty(n_freq), np.empty(n_freq, np.int32)
-    if n_freq:
-        sizes = (int(data.entries.reciprocal), data.entries.n, _correlated(data), n_freq)
-        lines = _lines(data, data.entries.matrix(target), c)
-        call("project_on_joint", [*sizes, steps, _GAIN, *lines, h, m, squares, line_info])
+    for own in line_slices(n_freq) if n_freq else []:
+        part = data.on_slice(own)
+        sizes = (int(data.entries.reciprocal), data.entries.n, _correlated(data), len(part.measured))
+        lines = _lines(part, data.entries.matrix(target[own]), c[own])
+        call("project_on_joint", [*sizes, steps, _GAIN, *lines, h[own], m[own], squares[own], line_info[own]])
     bad = line_info != 0
     h[bad], m[bad], squares[bad] = start.h[bad], start.m[bad], np.inf
     return OnManifold(h, m, squares)
@@ -212,12 +229,16 @@ def normal_forms(data: LineData, c: ComplexArray, on: OnManifold, targets: tuple
     u = len(entries.units)
     weight = np.empty((n_freq, u, u), np.complex128)
     gradient = np.empty((len(targets), n_freq, u), np.complex128)
-    squares, line_info = np.empty((len(targets), n_freq)), np.empty(n_freq, np.int32)
-    if n_freq:
-        sizes = (int(entries.reciprocal), entries.n, u, _correlated(data), n_freq, len(targets))
-        lines = _lines(data, np.array([entries.matrix(target) for target in targets]), c)
-        point = [np.ascontiguousarray(x) for x in (on.h, on.m)]
-        call("joint_forms", [*sizes, *lines, *point, weight, gradient, squares, line_info])
+    squares = np.empty((len(targets), n_freq))
+    for own in line_slices(n_freq) if n_freq else []:
+        part = data.on_slice(own)
+        n_own = len(part.measured)
+        sizes = (int(entries.reciprocal), entries.n, u, _correlated(data), n_own, len(targets))
+        lines = _lines(part, np.array([entries.matrix(target[own]) for target in targets]), c[own])
+        point = [np.ascontiguousarray(x[own]) for x in (on.h, on.m)]
+        found = np.empty((len(targets), n_own, u), np.complex128), np.empty((len(targets), n_own))
+        call("joint_forms", [*sizes, *lines, *point, weight[own], *found, np.empty(n_own, np.int32)])
+        gradient[:, own], squares[:, own] = found
     a, b = entries.free
     return [LineForms(c[:, a, b], weight, p, s) for p, s in zip(gradient, squares, strict=True)]
 

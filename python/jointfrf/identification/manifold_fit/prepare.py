@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from jointfrf.frf.bands import Band, as_bands, in_bands
+from jointfrf.frf.bands import PIECE, Band, as_bands, in_bands, line_slices
 from jointfrf.frf.noise_estimate import ZERO
 from jointfrf.frf.noise_model import NoiseModel, estimate_noise
 from jointfrf.frf.smoothing import near_squares, smooth_frfs
@@ -170,7 +170,8 @@ def prepare_manifold(
     own = as_bands(bands, names, freq)
     used = np.stack([in_bands(freq, b) for b in own], axis=1)
     kept = np.asarray(used.any(axis=1))
-    freq, h = freq[kept], h[kept]
+    if not kept.all():  # no copy of long sweeps otherwise
+        freq, h = freq[kept], h[kept]
     if noise.coherence is not None:
         noise = replace(noise, coherence=as_real("coherence", noise.coherence, measured.h.shape)[kept])
     if noise.noise is not None and np.ndim(noise.noise) > 0:
@@ -281,21 +282,32 @@ def _estimated_noise(
     least = _ASSUMED_LEVEL if is_assumed else _LEAST_LEVEL
     variance = _relative_variance(model.smooth.h, least)
     if not is_assumed:
-        variance = np.maximum(model.variance, variance)
-    known = KnownNoise(least if is_assumed else model.level, model.inflation, is_assumed, model.outlying, model)
-    return transforms.gamma(_near(model.smooth.h, h, variance)), variance, known
+        np.maximum(model.variance, variance, out=variance)
+    # Other realisations start from the model; of a long sweep it would take too much memory.
+    kept = model if len(freq) <= PIECE else None
+    known = KnownNoise(least if is_assumed else model.level, model.inflation, is_assumed, model.outlying, kept)
+    smooth = model.smooth.h.copy() if kept else model.smooth.h
+    del model
+    return transforms.gamma(_near(smooth, h, variance)), variance, known
 
 
 def _near(smooth: ComplexArray, h: ComplexArray, variance: FloatArray) -> ComplexArray:
-    """Return smooth FRFs, and the measured ones on lines that smoothing misses by more than their noise."""
+    """Put the measured FRFs in place of the smooth ones on lines that smoothing misses by more than their noise."""
     # Entries that are zero by symmetry hold rounding.
     shown = (smooth != 0).any(axis=0)
-    squares = (abs(h - smooth) ** 2 / variance)[:, shown].mean(axis=1)
-    return np.where((squares <= _MISSED**2)[:, None, None], smooth, h)
+    for own in line_slices(len(h)):
+        squares = (abs(h[own] - smooth[own]) ** 2 / variance[own])[:, shown].mean(axis=1)
+        missed = squares > _MISSED**2
+        smooth[own][missed] = h[own][missed]
+    return smooth
 
 
 def _relative_variance(h: ComplexArray | FloatArray, level: float) -> FloatArray:
     """Return level^2 |h|^2, with a floor for FRFs that are zero to rounding."""
-    size = np.sqrt(np.maximum(abs(h) ** 2, np.median(abs(h) ** 2, axis=0) * ZERO**2 + (ZERO**2 * abs(h).max()) ** 2))
-    variance: FloatArray = (level * size) ** 2
+    variance = np.empty(h.shape)
+    for own in line_slices(len(h)):
+        variance[own] = abs(h[own]) ** 2
+    least = np.median(variance[:: -(-len(h) // PIECE)], axis=0) * ZERO**2 + ZERO**4 * variance.max()
+    np.maximum(variance, least, out=variance)
+    variance *= level**2
     return variance

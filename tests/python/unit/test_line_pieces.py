@@ -1,0 +1,71 @@
+"""Long sweeps, piece by piece: what is found does not depend on where they are cut."""
+
+import numpy as np
+import pytest
+
+import jointfrf as jf
+from jointfrf.frf import bands
+from jointfrf.frf.bands import line_slices
+from jointfrf.identification.manifold_fit.fit import fit_manifold
+from jointfrf.identification.manifold_fit.prepare import ManifoldOptions, NoiseOptions, prepare_manifold
+from jointfrf.identification.prepare import as_measured
+
+
+@pytest.mark.parametrize("n", [1, 8192, 8193, 100_000])
+def test_pieces_hold_every_line_once(n):
+    pieces = line_slices(n)
+    assert np.concatenate([np.arange(n)[own] for own in pieces]).tolist() == list(range(n))
+    sizes = [own.stop - own.start for own in pieces]
+    assert max(sizes) <= 8192
+    assert max(sizes) - min(sizes) <= 1
+
+
+@pytest.fixture
+def cut(monkeypatch):
+    """Pieces of 60 lines at most, for sweeps that a test can afford."""
+    return lambda: monkeypatch.setattr(bands, "PIECE", 60)
+
+
+def test_noise_and_smooth_frfs_of_pieces(chains, cut):
+    h = chains.gamma(chains.joint)
+    order = np.random.default_rng(1).permutation(chains.freq.size)
+    x = jf.pollute(h, 0.02, seed=1)
+    whole = jf.estimate_noise(chains.freq, x)
+    cut()
+    noise = jf.estimate_noise(chains.freq[order], x[order])
+    assert noise.level == pytest.approx(0.02, rel=0.15)
+    np.testing.assert_allclose(noise.relative, whole.relative, rtol=0.35)
+    ratio = np.sqrt(noise.variance) / (0.02 * abs(h[order]))
+    assert np.quantile(abs(np.log(ratio)), 0.9) < 0.35
+    np.testing.assert_array_equal(noise.smooth.freq_hz, chains.freq[order])
+    assert np.median(abs(noise.smooth.h / h[order] - 1)) < 0.01
+    smooth = jf.smooth_frfs(chains.freq[order], x[order])
+    assert np.median(abs(smooth.h / h[order] - 1)) < 0.01
+    assert len(smooth.poles) == 4
+    assert smooth.share.max() > whole.smooth.share.max()
+
+
+@pytest.mark.parametrize("cross", ["zero", "ignore", "fit"])
+def test_a_fit_of_pieces_is_that_of_all_lines(beams, cut, cross):
+    """Everything after smoothing is by line."""
+    x = as_measured(beams.freq, jf.pollute(beams.gamma(beams.joint), 0.01, seed=1), square=False)
+    own = {"y": (100, 400), "theta": (300, 800)} if cross == "ignore" else None
+    options = ManifoldOptions("viscous", cross, True)
+    problem = prepare_manifold(x, ["y", "theta"], own, None, NoiseOptions(), options)
+    whole = fit_manifold(problem).joint
+    cut()
+    fit = fit_manifold(problem).joint
+    np.testing.assert_allclose(fit.k_lines, whole.k_lines, rtol=1e-9)
+    for name, value in whole.parameters.items():
+        # Starts see some lines only: both end where steps are far below a standard error.
+        assert abs(fit.parameters[name] - value) < 0.01 * whole.std_error[name]
+    np.testing.assert_allclose(fit.covariance, whole.covariance, rtol=1e-3)
+
+
+def test_a_fit_of_noisy_pieces(beams, cut):
+    x = jf.pollute(beams.gamma(beams.joint), 0.01, seed=1)
+    whole = jf.identify(beams.freq, x, beams.joint.dofs, "manifold")
+    cut()
+    fit = jf.identify(beams.freq, x, beams.joint.dofs, "manifold")
+    for name, value in whole.parameters.items():
+        assert abs(fit.parameters[name] - value) < 0.7 * whole.std_error[name]
