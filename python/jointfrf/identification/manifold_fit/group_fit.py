@@ -9,13 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf.identification.compliance_fit.least_squares import inverse_information
+from jointfrf.identification.manifold_fit.diagonal_minimum import lowest_minimum, within_reach
 from jointfrf.identification.manifold_fit.joint_terms import DiagonalJoint, JointCoordinates
 from jointfrf.identification.manifold_fit.likely_m import PriorOfM, expected_m, prior_of_m
-from jointfrf.identification.manifold_fit.line_forms import (
-    FormMinimum,
-    LineForms,
-    minimise_forms,
-)
+from jointfrf.identification.manifold_fit.line_forms import FormMinimum, LineForms
 from jointfrf.identification.manifold_fit.manifold import LineData, OnManifold, normal_forms, project
 from jointfrf.identification.manifold_fit.starts import smooth_compliance, starts_on_manifold
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
@@ -182,7 +179,7 @@ def _iterate(problem: GroupProblem, start: FloatArray) -> GroupFit:
         # Unknown entries of C move on all lines: they may bring a line back to where it is trusted.
         forms, unknown = _used(problem, forms, of_smooth, c)
         forms = forms.scaled(trusted.astype(float))
-        minimum = minimise_forms(forms, joint, x)
+        minimum = lowest_minimum(forms, joint, x)
         error = np.sqrt(np.maximum(np.diagonal(inverse_information(2 * minimum.information)), 1e-300))
         # In standard errors along the direction of the step: what the data do not see may go anywhere.
         change = minimum.x - x
@@ -214,7 +211,7 @@ def _within_sight(forms: LineForms, joint: JointCoordinates, x: FloatArray, erro
         error = np.sqrt(np.maximum(np.diagonal(inverse_information(2 * information)), 0))
         at[:n] = np.where(hardly, np.maximum(size, error[:n]), x[:n])
     at[:n] = np.maximum(at[:n], np.where(np.isfinite(error[:n]), error[:n], 0))
-    reach = np.where(terms.kinds[n:] == 1, 1.0, 1 / max(float(terms.omega.max()), np.finfo(float).tiny))
+    reach = within_reach(joint)
     at[n:] = np.where(of_rate, np.clip(x[n:], -reach, reach), x[n:])
     return at
 

@@ -1,8 +1,8 @@
 """M of a stiff joint, which FRFs hardly show: its expected value instead of the one nearest to the smooth FRFs.
 
-FRFs depend on M by the product M C alone. Errors of the smooth FRFs give an M that grows as C shrinks, and the larger M,
-the better C seems to be known: a joint found too stiff confirms itself. M is known to be no larger than what it is part
-of: H^-1 = Z_A + M for a stiff joint, with the dynamic stiffness Z_A of side j.
+FRFs depend on M by the product M C alone. Errors of the smooth FRFs give an M that grows as C shrinks, and the larger
+M, the better C seems to be known: a joint found too stiff confirms itself. M is known to be no larger than what it is
+part of: H^-1 = Z_A + M for a stiff joint, with the dynamic stiffness Z_A of side j.
 """
 
 from __future__ import annotations
@@ -41,9 +41,10 @@ class PriorOfM(NamedTuple):
 def prior_of_m(data: LineData) -> PriorOfM:
     """Return the prior: entries of M are as large as those of gamma_jj^-1, there and elsewhere in the band."""
     n = data.entries.n
-    size = abs(invert(data.entries.matrix(data.smooth)[:, :n, :n], on_singular="nan"))
+    size: FloatArray = abs(invert(data.entries.matrix(data.smooth)[:, :n, :n], on_singular="nan"))
     size = np.where(np.isfinite(size), size, 0)
-    size = np.maximum(np.hypot(size, np.median(size, axis=0)), np.finfo(float).tiny)
+    size = np.hypot(size, np.median(size, axis=0))
+    size[size == 0] = np.finfo(float).tiny
     # Of FRFs that were not smoothed, nothing is left: their error is the noise.
     left = (abs((data.measured - data.smooth) * data.inverse_std) ** 2).sum() / max(np.count_nonzero(data.used), 1)
     return PriorOfM(size, float(np.sqrt(np.clip(1 - left, _LEAST_SHARE**2, 1))))
