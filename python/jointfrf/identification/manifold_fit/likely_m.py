@@ -41,7 +41,8 @@ class PriorOfM(NamedTuple):
 def prior_of_m(data: LineData) -> PriorOfM:
     """Return the prior: entries of M are as large as those of gamma_jj^-1, there and elsewhere in the band."""
     n = data.entries.n
-    size: FloatArray = abs(invert(data.entries.matrix(data.smooth)[:, :n, :n], on_singular="nan"))
+    inverse = invert(data.entries.matrix(data.smooth)[:, :n, :n], on_singular="nan")
+    size: FloatArray = np.abs(inverse)
     size = np.where(np.isfinite(size), size, 0)
     size = np.hypot(size, np.median(size, axis=0))
     size[size == 0] = np.finfo(float).tiny
