@@ -12,6 +12,8 @@ __all__ = ["lowest_minimum", "within_reach"]
 
 #: Share of the largest rate beyond which a DOF is all damping.
 _ALL_DAMPING = 0.1
+#: Other starts are followed until a step gains less than this of the squares of one residual.
+_COARSE = 1e-2
 
 
 def within_reach(joint: JointCoordinates) -> FloatArray:
@@ -61,6 +63,7 @@ def lowest_minimum(
         other = share * reach / (1.0 if joint.by_rate else np.maximum(x[of_rate], np.finfo(float).tiny))
         moved = caught[of_rate] & (joint.rates != held)
         x[joint.rates] = np.where(moved, other, x[joint.rates])
-        there = minimise_forms(forms, joint, x, held, least_gain)
-        found = there if there.cost < found.cost else found
+        there = minimise_forms(forms, joint, x, held, max(least_gain, _COARSE))
+        if there.cost < found.cost - _COARSE:
+            found = minimise_forms(forms, joint, there.x, held, least_gain)
     return found

@@ -11,7 +11,7 @@ from jointfrf.identification.compliance_fit.least_squares import inverse_informa
 from jointfrf.identification.manifold_fit.diagonal_minimum import lowest_minimum
 from jointfrf.identification.manifold_fit.estimator import FittedGroup, JointEstimate
 from jointfrf.identification.manifold_fit.joint_terms import DiagonalJoint
-from jointfrf.identification.manifold_fit.line_forms import LineForms
+from jointfrf.identification.manifold_fit.line_forms import LineForms, minimise_forms
 from jointfrf.kernel.arguments import FloatArray
 
 __all__ = ["BLOCKS", "LikelihoodIntervals", "Spread", "block_jackknife", "profile_interval", "spread_of"]
@@ -238,7 +238,10 @@ class _Profile:
         """Return the squares at a value of the coordinate, minimised over the others, beyond the limit."""
         start = self.best.copy()
         start[self.index] = value
-        return lowest_minimum(self.forms, self.joint, start, self.index, _PRECISE).cost - self.cost - self.limit
+        most = self.cost + self.limit
+        near = minimise_forms(self.forms, self.joint, start, self.index, _PRECISE).cost - most
+        # A value is excluded only if no other damping brings it back.
+        return near if near <= 0 else lowest_minimum(self.forms, self.joint, start, self.index, _PRECISE).cost - most
 
     def crossing(self, sign: int, reach: float, bound: float) -> float:
         """Return where the excess crosses zero on one side, or the bound where it does not."""
