@@ -187,8 +187,10 @@ def _iterate(problem: GroupProblem, start: FloatArray) -> GroupFit:
         x = minimum.x
         equations = float(free[trusted].sum())
         converged = moved < _MOVED and step > 1
-        barely = bool((error > _BARELY * abs(x))[: joint.terms.n].any())
-        hidden, converged = barely or (hidden and step > 1), converged and (hidden or not barely)
+        barely = problem.is_diagonal and bool((error > _BARELY * abs(x))[: joint.terms.n].any())
+        converged = converged and (hidden or not barely)
+        # The first step tells, with M that cannot feign it; a joint barely seen once is treated so to the end.
+        hidden = barely or (hidden and step > 1)
         if converged or (step > _PATIENCE and minimum.cost > _LOST * equations):
             break
         linearised_at = _within_sight(forms, problem.joint, x, error) if problem.is_diagonal else x
