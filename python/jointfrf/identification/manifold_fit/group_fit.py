@@ -9,14 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf.frf.bands import line_slices
+from jointfrf.identification.manifold_fit.diagonal_minimum import lowest_minimum, within_reach
 from jointfrf.identification.manifold_fit.joint_terms import DiagonalJoint, JointCoordinates
 from jointfrf.identification.manifold_fit.likely_m import PriorOfM, expected_m, prior_of_m
-from jointfrf.identification.manifold_fit.line_forms import (
-    FormMinimum,
-    LineForms,
-    inverse_information,
-    minimise_forms,
-)
+from jointfrf.identification.manifold_fit.line_forms import FormMinimum, LineForms, inverse_information
 from jointfrf.identification.manifold_fit.manifold import LineData, OnManifold, normal_forms, project
 from jointfrf.identification.manifold_fit.starts import smooth_compliance, starts_on_manifold
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
@@ -226,7 +222,7 @@ def _iterate(problem: GroupProblem, start: FloatArray, patience: int = PATIENCE)
         trusted = near & trusted if step > 2 * PATIENCE and (near & trusted).any() else near
         # Unknown entries of C move on all lines: they may bring a line back to where it is trusted.
         forms, unknown = _linearised(problem, c, on, trusted, prior if hidden else None)
-        minimum = minimise_forms(forms, joint, x)
+        minimum = lowest_minimum(forms, joint, x)
         error = np.sqrt(np.maximum(np.diagonal(inverse_information(2 * minimum.information)), 1e-300))
         # In standard errors along the direction of the step: what the data do not see may go anywhere.
         change = minimum.x - x
@@ -234,8 +230,10 @@ def _iterate(problem: GroupProblem, start: FloatArray, patience: int = PATIENCE)
         x = minimum.x
         equations = float(free[trusted].sum())
         converged = bool(moved < _MOVED * np.sqrt(x.size)) and step > 1
-        barely = bool((error > _BARELY * abs(x))[: joint.terms.n].any())
-        hidden, converged = barely or (hidden and step > 1), converged and (hidden or not barely)
+        barely = problem.is_diagonal and bool((error > _BARELY * abs(x))[: joint.terms.n].any())
+        converged = converged and (hidden or not barely)
+        # The first step tells, with M that cannot feign it; a joint barely seen once is treated so to the end.
+        hidden = barely or (hidden and step > 1)
         if converged or (step > patience and minimum.cost > _LOST * equations):
             break
         linearised_at = _within_sight(forms, problem.joint, x, error) if problem.is_diagonal else x
@@ -285,7 +283,7 @@ def _within_sight(forms: LineForms, joint: JointCoordinates, x: FloatArray, erro
         error = np.sqrt(np.maximum(np.diagonal(inverse_information(2 * information)), 0))
         at[:n] = np.where(hardly, np.maximum(size, error[:n]), x[:n])
     at[:n] = np.maximum(at[:n], np.where(np.isfinite(error[:n]), error[:n], 0))
-    reach = np.where(terms.kinds[n:] == 1, 1.0, 1 / max(float(terms.omega.max()), np.finfo(float).tiny))
+    reach = within_reach(joint)
     at[n:] = np.where(of_rate, np.clip(x[n:], -reach, reach), x[n:])
     return at
 

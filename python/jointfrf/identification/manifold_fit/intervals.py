@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy import special
 
+from jointfrf.identification.manifold_fit.diagonal_minimum import lowest_minimum
 from jointfrf.identification.manifold_fit.estimator import FittedGroup, JointEstimate
 from jointfrf.identification.manifold_fit.joint_terms import DiagonalJoint
 from jointfrf.identification.manifold_fit.line_forms import LineForms, inverse_information, minimise_forms
@@ -249,7 +250,7 @@ def profile_interval(group: FittedGroup, index: int, factor: float, probability:
     start = joint.coordinates(group.joint.theta(group.fit.minimum.x))
     if of_stiffness:
         start = group.fit.minimum.x
-    best = minimise_forms(forms, joint, start)
+    best = lowest_minimum(forms, joint, start)
     limit = float(_chi_squared(probability, 1) * factor / 2)
     error = np.sqrt(np.maximum(np.diagonal(inverse_information(2 * best.information)), 0) * factor)[index]
     may_be_rigid = _may_be_rigid(group, int(joint.dofs[index]), factor, probability)
@@ -271,7 +272,7 @@ def _may_be_rigid(group: FittedGroup, dof: int, factor: float, probability: floa
     minimum = group.fit.minimum
     start = minimum.x.copy()
     start[dof] = 0.0
-    rigid = minimise_forms(group.fit.forms, group.joint, start, dof, _PRECISE)
+    rigid = lowest_minimum(group.fit.forms, group.joint, start, dof, _PRECISE)
     parameters = int(np.count_nonzero(group.joint.terms.pairs[:, 0] == dof))
     return bool(rigid.cost - minimum.cost < _chi_squared(probability, parameters) * factor / 2)
 
@@ -294,7 +295,10 @@ class _Profile:
         """Return the squares at a value of the coordinate, minimised over the others, beyond the limit."""
         start = self.best.copy()
         start[self.index] = value
-        return minimise_forms(self.forms, self.joint, start, self.index, _PRECISE).cost - self.cost - self.limit
+        most = self.cost + self.limit
+        near = minimise_forms(self.forms, self.joint, start, self.index, _PRECISE).cost - most
+        # A value is excluded only if no other damping brings it back.
+        return near if near <= 0 else lowest_minimum(self.forms, self.joint, start, self.index, _PRECISE).cost - most
 
     def crossing(self, sign: int, reach: float, bound: float) -> float:
         """Return where the excess crosses zero on one side, or the bound where it does not."""

@@ -177,10 +177,10 @@ class DiagonalJoint:
         self.dofs = terms.pairs[:, 0]
         self.rates = np.flatnonzero(terms.kinds > 0)
         p, fastest = len(terms.parameters), max(float(terms.omega.max()), np.finfo(float).tiny)
+        self.largest_rate = np.where(terms.kinds[self.rates] == 1, _LARGEST_RATE, _LARGEST_RATE / fastest)
         self.upper = np.full(p, np.inf)
-        self.upper[self.rates] = np.where(terms.kinds[self.rates] == 1, _LARGEST_RATE, _LARGEST_RATE / fastest)
-        if not by_rate:
-            self.upper[self.rates] = np.inf
+        if by_rate:
+            self.upper[self.rates] = self.largest_rate
         self.lower = np.where(terms.kinds > 0, -self.upper, 0.0)
 
     def _turn(self, x: FloatArray) -> ComplexArray:

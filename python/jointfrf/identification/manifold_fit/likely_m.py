@@ -45,9 +45,11 @@ class PriorOfM(NamedTuple):
 def prior_of_m(data: LineData) -> PriorOfM:
     """Return the prior: entries of M are as large as those of gamma_jj^-1, there and elsewhere in the band."""
     n = data.entries.n
-    size = abs(invert(data.entries.matrix(data.smooth)[:, :n, :n], on_singular="nan"))
+    inverse = invert(data.entries.matrix(data.smooth)[:, :n, :n], on_singular="nan")
+    size: FloatArray = np.abs(inverse)
     size = np.where(np.isfinite(size), size, 0)
-    size = np.maximum(np.sqrt(size**2 + np.median(size, axis=0) ** 2), np.finfo(float).tiny)
+    size = np.hypot(size, np.median(size, axis=0))
+    size[size == 0] = np.finfo(float).tiny
     # Of FRFs that were not smoothed, nothing is left: their error is the noise.
     left = (abs((data.measured - data.smooth) * data.inverse_std) ** 2).sum() / max(np.count_nonzero(data.used), 1)
     return PriorOfM(np.asarray(size, np.float64), float(np.sqrt(np.clip(1 - left, _LEAST_SHARE**2, 1))))

@@ -9,13 +9,13 @@ import numpy as np
 from jointfrf.identification.manifold_fit.joint_terms import JointCoordinates
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
-__all__ = ["FormMinimum", "LineForms", "inverse_information", "minimise_forms"]
+__all__ = ["LEAST_GAIN", "FormMinimum", "LineForms", "inverse_information", "minimise_forms"]
 
 _STEPS = 100
 #: Levenberg's parameter: first value, factor where a step fails, largest value.
 _FIRST, _RAISED, _LARGEST = 1e-4, 6.0, 1e10
 #: A minimum is found when two steps gain less than this of the squares of one residual.
-_LEAST_GAIN = 1e-6
+LEAST_GAIN = 1e-6
 
 
 class LineForms(NamedTuple):
@@ -104,7 +104,7 @@ def minimise_forms(
     joint: JointCoordinates,
     start: FloatArray,
     held: int | None = None,
-    least_gain: float = _LEAST_GAIN,
+    least_gain: float = LEAST_GAIN,
 ) -> FormMinimum:
     """Minimise by Levenberg-Marquardt steps, coordinates not below their bounds.
 
@@ -130,7 +130,7 @@ def minimise_forms(
         step = np.zeros_like(x)
         size = np.sqrt(np.maximum(np.diagonal(information), np.finfo(float).tiny))
         scaled = (information / np.outer(size, size))[np.ix_(moving, moving)]
-        done = moving.size == 0
+        done = moving.size == 0 or not np.isfinite(scaled).all()
         while not done and damping <= _LARGEST:
             damped = scaled + damping * np.eye(moving.size)
             step[moving] = np.linalg.lstsq(damped, (gradient / size)[moving], rcond=1e-13)[0] / size[moving]

@@ -1,0 +1,82 @@
+"""M that FRFs hardly show, against the least squares that define it."""
+
+import numpy as np
+import pytest
+
+import manifold_numpy as plain
+from jointfrf.identification.manifold_fit.likely_m import PriorOfM, expected_m, prior_of_m
+from jointfrf.identification.manifold_fit.manifold import FrfEntries, LineData, OnManifold, frfs_of_joint
+
+N_FREQ, NOISE = 9, 1e-2
+
+
+class Problem:
+    """FRFs that fit a joint, on the manifold."""
+
+    def __init__(self, n, reciprocal, stiff=1.0):
+        rng = np.random.default_rng(n + 10 * reciprocal)
+
+        def square():
+            a = rng.standard_normal((N_FREQ, n, n)) + 1j * rng.standard_normal((N_FREQ, n, n))
+            return (a + a.swapaxes(1, 2)) / 2 if reciprocal else a
+
+        entries = FrfEntries.of(n, reciprocal=reciprocal)
+        h, m = square(), square()
+        self.c = 0.3 * square() / stiff
+        exact = entries.take(frfs_of_joint(h, m, self.c))
+        self.factor = np.eye(exact.shape[1]) + 0.2 * np.tril(rng.standard_normal((N_FREQ, *2 * exact.shape[1:])), -1)
+        self.data = LineData(entries, exact, exact, rng.uniform(0.5, 2, exact.shape) / NOISE)
+        self.on = OnManifold(h, m, np.zeros(N_FREQ))
+        self.size = rng.uniform(0.5, 2, (N_FREQ, n, n))
+        self.size += self.size.swapaxes(1, 2)
+
+
+@pytest.mark.parametrize("correlated", [False, True])
+@pytest.mark.parametrize("reciprocal", [True, False])
+@pytest.mark.parametrize("n", [1, 2, 3])
+def test_least_squares_of_the_error_and_of_m(n, reciprocal, correlated):
+    p = Problem(n, reciprocal, stiff=100.0)
+    data = p.data._replace(correlation=p.factor) if correlated else p.data
+    found = expected_m(data, p.c, p.on, PriorOfM(p.size, 0.3))
+    slope = plain.free_columns(data, p.on.h, p.on.m, p.c, p.factor if correlated else None)
+    a, b = data.entries.free
+    u = a.size
+    for line in range(N_FREQ):
+        ridge = np.zeros((u, 2 * u), complex)
+        ridge[:, u:] = np.diag(0.3 / p.size[line, a, b])
+        right = np.r_[np.zeros(slope.shape[1]), -ridge[:, u:] @ p.on.m[line, a, b]]
+        step = np.linalg.lstsq(np.r_[slope[line], ridge], right, rcond=None)[0]
+        np.testing.assert_allclose(found.h[line, a, b], p.on.h[line, a, b] + step[:u], rtol=1e-6, atol=1e-8)
+        np.testing.assert_allclose(found.m[line, a, b], p.on.m[line, a, b] + step[u:], rtol=1e-6, atol=1e-8)
+
+
+def test_m_that_frfs_show_stays():
+    p = Problem(2, reciprocal=True)
+    found = expected_m(p.data, p.c, p.on, PriorOfM(1e6 * p.size, 0.2))
+    np.testing.assert_allclose(found.m, p.on.m, rtol=1e-9)
+    np.testing.assert_allclose(found.h, p.on.h, rtol=1e-9)
+
+
+def test_m_that_frfs_do_not_show_vanishes_and_frfs_stay():
+    p = Problem(2, reciprocal=True)
+    rigid = np.zeros_like(p.c)
+    found = expected_m(p.data, rigid, p.on, PriorOfM(p.size, 0.2))
+    np.testing.assert_allclose(found.m, 0, atol=1e-9)
+    np.testing.assert_allclose(frfs_of_joint(*found[:2], rigid), frfs_of_joint(*p.on[:2], rigid), rtol=1e-6)
+
+
+def test_prior_of_m(beams):
+    """Of a stiff joint, M is hardly larger; FRFs that were not smoothed have the noise as their error."""
+    entries = FrfEntries.of(2, reciprocal=True)
+    stiff = 1e6 * beams.joint.stiffness
+    gamma = entries.take(beams.gamma(type(beams.joint)(stiff, None, beams.joint.dofs)))
+    rng = np.random.default_rng(1)
+    error = (rng.standard_normal(gamma.shape) + 1j * rng.standard_normal(gamma.shape)) / np.sqrt(2)
+    measured = gamma * (1 + 0.05 * error)
+    smooth = LineData(entries, measured, gamma, 20 / abs(gamma))
+    m = np.linalg.inv(beams.h_b[:, :2, :2])
+    ratio = abs(m) / prior_of_m(smooth).size
+    assert np.median(ratio) > 0.1
+    assert np.quantile(ratio, 0.9) < 3
+    assert prior_of_m(smooth).share == pytest.approx(0.2, abs=0.1)
+    assert prior_of_m(smooth._replace(smooth=measured)).share == pytest.approx(1)
