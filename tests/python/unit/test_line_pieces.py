@@ -64,8 +64,8 @@ def test_a_fit_of_pieces_is_that_of_all_lines(beams, cut, cross):
 
 def test_a_fit_of_noisy_pieces(beams, cut):
     x = jf.pollute(beams.gamma(beams.joint), 0.01, seed=1)
-    whole = jf.identify(beams.freq, x, beams.joint.dofs, "manifold")
+    whole = jf.identify(beams.freq, x, beams.joint.dofs)
     cut()
-    fit = jf.identify(beams.freq, x, beams.joint.dofs, "manifold")
+    fit = jf.identify(beams.freq, x, beams.joint.dofs)
     for name, value in whole.parameters.items():
         assert abs(fit.parameters[name] - value) < 0.7 * whole.std_error[name]
