@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from jointfrf.channels.check.check import check_frfs, warn_of_frfs
 from jointfrf.channels.check.finding import FrfCheck
+from jointfrf.channels.point_lines import Interface
 from jointfrf.identification.compliance_fit.joint_terms import CrossTerms, DampingTerms
 from jointfrf.identification.describe import Described, describe_band_mean, describe_compliance
 from jointfrf.identification.fit import fit_band_mean, fit_compliance
@@ -19,6 +20,7 @@ from jointfrf.identification.manifold_fit.fit import fit_manifold
 from jointfrf.identification.manifold_fit.prepare import (
     ManifoldOptions,
     NoiseOptions,
+    Transform,
     prepare_manifold,
 )
 from jointfrf.identification.prepare import (
@@ -45,7 +47,7 @@ def identify(
     method: IdentificationMethod = "compliance",
     bands: BandsOfDofs = None,
     *,
-    transform: ArrayLike | tuple[ArrayLike, ArrayLike] | None = None,
+    transform: Transform | tuple[Transform, Transform] | None = None,
     damping: DampingTerms | Literal["auto"] | Sequence[DampingTerms] = "viscous",
     cross: CrossTerms = "zero",
     noise: float | ArrayLike | None = None,
@@ -84,9 +86,13 @@ def identify(
     bands : None, (low, high), sequence of these, or mapping of DOF name to these, optional
         Sensitive bands in Hz; all lines by default. The compliance fit weights each line by its information and needs
         none.
-    transform : array_like, shape (2 n, m), or a pair of shapes (2 n, m_r) and (2 n, m_f), optional
+    transform : array_like, shape (2 n, m), or Interface, or a pair of these, optional
         From channels to joint DOFs j, then k: finite differences, virtual points. Noise is then taken as independent
-        between the channels, not between the transformed FRFs. A pair, for responses and for forces, with "manifold".
+        between the channels, not between the transformed FRFs. A pair, for responses and for forces, of shapes
+        (2 n, m_r) and (2 n, m_f), with "manifold". An `Interface`, as `interface` and `virtual_interface` make it, has
+        the geometry of the channels: "manifold" then names DOFs left out that enter those sought, and widens intervals
+        by what is not rigid between the channels; of a plain matrix it does the latter where the channels move as those
+        of which it is the least-squares inverse.
     damping : {"viscous", "hysteretic", "both", "none", "auto"}
         Terms of K* = k (1 + i eta) + i w c to fit. "auto" takes those with the lowest Bayesian information criterion;
         method "manifold" chooses for each DOF, and takes a sequence of words, one for each DOF. Not for band means.
@@ -165,6 +171,8 @@ def identify(
         return _warned(describe_manifold(fit_manifold(problem), problem))
     if coherence is not None or averages is not None:
         raise ValueError("coherence and averages are for method 'manifold'")
+    if isinstance(transform, Interface):
+        transform = transform.transform
     if isinstance(transform, tuple):
         raise ValueError("a pair of transforms, for responses and for forces, is for method 'manifold'")
     measured = as_measured(freq_hz, gamma)

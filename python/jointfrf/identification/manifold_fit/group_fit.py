@@ -19,7 +19,7 @@ from jointfrf.identification.manifold_fit.manifold import LineData, OnManifold, 
 from jointfrf.identification.manifold_fit.starts import smooth_compliance, starts_on_manifold
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
-__all__ = ["GroupFit", "GroupProblem", "fit_dofs"]
+__all__ = ["GroupFit", "GroupProblem", "fit_dofs", "gradients_of"]
 
 #: Linearisations at most.
 _MOST = 25
@@ -88,6 +88,10 @@ class GroupFit(NamedTuple):
         Complex equations of all lines.
     iterations : int
     converged : bool
+    on : OnManifold
+        Point about which is linearised.
+    c : ndarray, shape (n_freq, n, n)
+        Compliance there, m/N.
     """
 
     minimum: FormMinimum
@@ -97,6 +101,8 @@ class GroupFit(NamedTuple):
     possible: float
     iterations: int
     converged: bool
+    on: OnManifold
+    c: ComplexArray
 
     @property
     def squares(self) -> float:
@@ -130,6 +136,30 @@ def fit_dofs(problem: GroupProblem, starts: Iterable[FloatArray]) -> GroupFit:
     if best is None:
         raise np.linalg.LinAlgError("no start of the fit is finite")
     return _from_softer(problem, best) if problem.is_diagonal else best
+
+
+def gradients_of(problem: GroupProblem, fit: GroupFit, changes: Iterable[ComplexArray]) -> FloatArray:
+    """Return by how much changes of the measured FRFs change the gradient at the minimum, shape (number, p).
+
+    Parameters
+    ----------
+    problem : GroupProblem
+    fit : GroupFit
+    changes : iterable of ndarray, shape (n_freq, q)
+        Of the entries of gamma, m/N.
+    """
+    data, trusted = problem.data, fit.trusted.astype(float)
+    adjoint = problem.joint.slope(fit.minimum.x, problem.joint.compliance(fit.minimum.x)).conj()
+
+    def gradient(target: ComplexArray) -> ComplexArray:
+        (forms,) = normal_forms(data, fit.c, fit.on, (target,))
+        return _used(problem, forms, forms, fit.c)[0].gradient
+
+    base = gradient(data.smooth)
+    found = [
+        np.einsum("lqp,lq,l->p", adjoint, gradient(data.smooth + change) - base, trusted).real for change in changes
+    ]
+    return np.array(found)
 
 
 def _from_softer(problem: GroupProblem, best: GroupFit) -> GroupFit:
@@ -186,7 +216,8 @@ def _iterate(problem: GroupProblem, start: FloatArray) -> GroupFit:
         if converged or (step > _PATIENCE and minimum.cost > _LOST * equations):
             break
         linearised_at = _within_sight(problem.joint, x, error) if problem.is_diagonal else x
-    return GroupFit(minimum, forms, trusted, equations, float(free.sum()), step, converged)
+    assert on is not None
+    return GroupFit(minimum, forms, trusted, equations, float(free.sum()), step, converged, on, c)
 
 
 def _within_sight(joint: JointCoordinates, x: FloatArray, error: FloatArray) -> FloatArray:
