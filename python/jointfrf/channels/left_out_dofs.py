@@ -79,10 +79,11 @@ def left_out_dofs(h: ComplexArray, interface: Interface) -> tuple[LeftOutDof, ..
             relative = abs(weights[:, d]) * unit[d] / unit_kept
             if relative.max() < _NOTHING:
                 continue
-            shares = abs(weights[:, d]) * size[d] / np.maximum(of_kept, np.finfo(float).tiny)
+            weight = np.where(relative < _NOTHING, 0, weights[:, d])
+            shares = abs(weight) * size[d] / np.maximum(of_kept, np.finfo(float).tiny)
             most = int((shares if shown[d] else relative).argmax())
             share = float(shares[most]) if shown[d] else np.nan
-            found.append(LeftOutDof(_SIDES[side], dof, interface.dofs[most], float(weights[most, d]), share))
+            found.append(LeftOutDof(_SIDES[side], dof, interface.dofs[most], float(weight[most]), share))
     return tuple(found)
 
 

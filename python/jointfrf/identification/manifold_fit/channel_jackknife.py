@@ -53,13 +53,18 @@ def channel_spread(found: JointEstimate, frfs: InterfaceFrfs, compliance: FloatA
     Notes
     -----
     The jackknife variance over channels, sum of redundancy times squared change when one is left out (unbiased for
-    errors that are independent between channels), times Student's t for the few of them, and the square of the change
-    for a compliance of every DOF. To first order, by one Gauss-Newton step. Where responses and forces are the same
+    errors that are independent between channels), and the square of the change for a compliance of every DOF; both
+    times Student's t for the few channels. To first order, by one Gauss-Newton step. Where responses and forces are the
+    same
     channels both are left out together: a body deforms alike where it is struck and where it is measured.
     """
     without = _without_channels(frfs)
     if without is None and compliance is None:
         return None
+    few = 1.0
+    if without is not None:
+        degrees = max(float(without.redundancy.sum()), 1.0)
+        few = (stats.t.ppf(0.975, degrees) / stats.norm.ppf(0.975)) ** 2
     std_error, factor = np.zeros((2, len(found.parameters)))
     for group in found.groups:
         minimum = group.fit.minimum
@@ -68,12 +73,15 @@ def channel_spread(found: JointEstimate, frfs: InterfaceFrfs, compliance: FloatA
         if without is not None:
             entries = (frfs.entries_of(group.dofs, one) for one in without.gamma)
             changes = gradients_of(group.problem, group.fit, entries) @ inverse
-            degrees = max(float(without.redundancy.sum()), 1.0)
-            weights = without.redundancy * (stats.t.ppf(0.975, degrees) / stats.norm.ppf(0.975)) ** 2
+            weights = without.redundancy
         if compliance is not None:
-            changes = np.vstack([changes, _softer(group, compliance[group.dofs]) @ inverse])
+            softer = _softer(group, compliance[group.dofs]) @ inverse
+            if isinstance(group.joint, DiagonalJoint):
+                # Whatever the damping takes up of it.
+                softer[:, : group.dofs.size] = np.diag(compliance[group.dofs])
+            changes = np.vstack([changes, softer])
             weights = np.append(weights, np.ones(group.dofs.size))
-        std_error[group.which], factor[group.which] = _spread(group, changes, weights, inverse / 2)
+        std_error[group.which], factor[group.which] = _spread(group, changes, few * weights, inverse / 2)
     return ChannelSpread(std_error, factor)
 
 

@@ -171,21 +171,32 @@ def _limits(group: FittedGroup, i: int, factor: float, probability: float) -> tu
 
 
 def _widened(group: FittedGroup, limits: list[tuple[float, float]], reach: FloatArray) -> list[tuple[float, float]]:
-    """Return the limits of all parameters of a group with another, independent error of this reach."""
+    """Return the limits of all parameters of a group with another, independent error of this reach.
+
+    Of a stiffness it is one of the compliance, as it comes from compliance between the channels.
+    """
     theta, x, terms = group.joint.theta(group.fit.minimum.x), group.fit.minimum.x, group.joint.terms
     is_diagonal = isinstance(group.joint, DiagonalJoint)
     found: list[tuple[float, float]] = []
     for i, ((low, high), own) in enumerate(zip(limits, reach, strict=True)):
-        if is_diagonal and terms.kinds[i] == 0:
-            softest, stiffest = 1 / low if low > 0 else np.inf, 1 / high
-            softest, stiffest = x[i] + np.hypot(softest - x[i], own), x[i] - np.hypot(x[i] - stiffest, own)
-            found.append((1 / softest, 1 / stiffest if stiffest > 0 else np.inf))
+        is_stiffness = terms.kinds[i] == 0 and terms.pairs[i, 0] == terms.pairs[i, 1]
+        if is_diagonal and is_stiffness:
+            found.append(_softened(x[i], low, high, own))
+        elif is_stiffness and theta[i] > 0 and low > 0:
+            found.append(_softened(1 / theta[i], low, high, own / theta[i] ** 2))
         elif is_diagonal and not np.isfinite(found[terms.pairs[i, 0]][1]):
             # A rigid DOF shows no damping.
             found.append((-np.inf, np.inf))
         else:
             found.append((theta[i] - np.hypot(theta[i] - low, own), theta[i] + np.hypot(high - theta[i], own)))
     return [(float(low), float(high)) for low, high in found]
+
+
+def _softened(compliance: float, low: float, high: float, own: float) -> tuple[float, float]:
+    """Return the limits of a stiffness whose compliance has another error of this reach."""
+    softest = compliance + np.hypot((1 / low if low > 0 else np.inf) - compliance, own)
+    stiffest = compliance - np.hypot(compliance - 1 / high, own)
+    return 1 / softest, 1 / stiffest if stiffest > 0 else np.inf
 
 
 def profile_interval(group: FittedGroup, index: int, factor: float, probability: float = 0.95) -> tuple[float, float]:
