@@ -19,9 +19,9 @@ DAMPING = np.array([150.0, 120, 200, 0.06, 0.08, 0.05])
 
 def block(start: float, end: float):
     """A block along z; the middle of its face at z = 0 follows a point as a rigid body."""
-    count = round(abs(end - start) / 0.01)
-    plan = rectangle(np.linspace(start, end, count + 1), np.linspace(-0.04, 0.04, 9))
-    mesh = extrude((plan, np.linspace(-0.03, 0.03, 7)))
+    count = round(abs(end - start) / 0.02)
+    plan = rectangle(np.linspace(start, end, count + 1), np.linspace(-0.04, 0.04, 5))
+    mesh = extrude((plan, np.linspace(-0.03, 0.03, 5)))
     x, y, z = mesh.nodes.T
     face = np.flatnonzero((abs(z) < 1e-9) & (abs(x) < 0.0201) & (abs(y) < 0.0151))
     return solid_model(mesh, ALUMINIUM, patches={"joint": Patch(np.zeros(3), face)})
