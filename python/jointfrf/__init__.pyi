@@ -23,6 +23,7 @@ from jointfrf.channels.virtual_point import (
     VirtualPoint,
     append_virtual_point,
     channel_geometry,
+    virtual_interface,
     virtual_point,
     virtual_points,
 )
@@ -43,6 +44,7 @@ from jointfrf.frf.metrics import amplitude_error, frequency_error, has_peak, pea
 from jointfrf.frf.noise import pollute, realisations
 from jointfrf.frf.noise_model import NoiseModel, estimate_noise
 from jointfrf.frf.smoothing import SmoothFrfs, smooth_frfs
+from jointfrf.identification.elastic_centre import ElasticCentre, elastic_centre
 from jointfrf.identification.identify import identify
 from jointfrf.identification.joint_fit import JointFit
 from jointfrf.identification.monte_carlo import BandStatistics, MonteCarlo, monte_carlo
@@ -85,6 +87,7 @@ __all__ = [
     "CopyWarning",
     "DifferenceError",
     "DrivingPointCheck",
+    "ElasticCentre",
     "FileContentError",
     "FileContentWarning",
     "FrfCheck",
@@ -132,6 +135,7 @@ __all__ = [
     "difference_error",
     "difference_weights",
     "driving_point_check",
+    "elastic_centre",
     "element_matrices",
     "estimate_noise",
     "find_modification",
@@ -169,6 +173,7 @@ __all__ = [
     "solve",
     "transform",
     "use_engine",
+    "virtual_interface",
     "virtual_point",
     "virtual_points",
 ]

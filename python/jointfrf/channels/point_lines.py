@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from jointfrf.channels.finite_differences import difference_weights
-from jointfrf.dofs import DIRECTIONS, direction_places
+from jointfrf.channels.finite_differences import difference_error, difference_weights
+from jointfrf.dofs import DIRECTIONS, direction_names, direction_places, rigid_motion
 from jointfrf.frf.frf_set import Channel
 from jointfrf.kernel.arguments import FloatArray
 
@@ -31,11 +31,29 @@ class Interface(NamedTuple):
         From the channels to the joint DOFs j, then k.
     references : tuple of ndarray, shape (3,)
         Reference points of the two sides, m: the middle of the points of each.
+    dofs : tuple of str, length n
+        Names of the joint DOFs.
+    motion : ndarray, shape (m, 12)
+        Motion of each channel for a unit of x, y, z, theta_x, theta_y, theta_z of the reference point of side j, then
+        of side k, where the sides are rigid: 1 or m/rad.
+    compliance : ndarray, shape (n,), or None
+        What the bending of the sides between the points is expected to add to the compliance of each joint DOF, m/N or
+        rad/(N m), where that is known.
     """
 
     channels: tuple[Channel, ...]
     transform: FloatArray
     references: tuple[FloatArray, FloatArray]
+    dofs: tuple[str, ...]
+    motion: FloatArray
+    compliance: FloatArray | None = None
+
+    @property
+    def modes(self) -> FloatArray:
+        """Motion of each channel for a unit of each joint DOF, j then k, shape (m, 2 n)."""
+        at = direction_places(self.dofs)
+        modes: FloatArray = self.motion[:, np.concatenate([at, at + len(DIRECTIONS)])]
+        return modes
 
 
 def interface(
@@ -43,6 +61,8 @@ def interface(
     points_k: Sequence[int],
     dofs: Sequence[str],
     coordinates: Mapping[int, NDArray[np.float64]],
+    *,
+    bending_stiffness: float | None = None,
 ) -> Interface:
     """Build the joint DOFs of both sides from points along lines.
 
@@ -55,6 +75,9 @@ def interface(
         Joint DOFs: ``"x"``, ``"y"``, ``"z"``, ``"theta_x"``, ``"theta_y"``, ``"theta_z"``.
     coordinates : mapping of int to array_like, shape (3,)
         Positions of the nodes, m.
+    bending_stiffness : float, optional
+        E I of the sides, N m^2, from which `difference_error` estimates what rotations miss; `identify` widens their
+        intervals by it.
 
     Returns
     -------
@@ -63,8 +86,8 @@ def interface(
     Raises
     ------
     ValueError
-        An unknown DOF, a node without coordinates, points that are not on a line along an axis, a rotation about the
-        line of its points.
+        A stiffness that is not positive, an unknown DOF, a node without coordinates, points that are not on a line
+        along an axis, a rotation about the line of its points.
 
     Notes
     -----
@@ -93,7 +116,25 @@ def interface(
     transform = np.zeros((2 * n, len(channels_j) + len(channels_k)))
     transform[:n, : len(channels_j)] = rows_j
     transform[n:, len(channels_j) :] = rows_k
-    return Interface((*channels_j, *channels_k), transform, (at_j, at_k))
+    motion = np.zeros((transform.shape[1], 12))
+    motion[: len(channels_j), :6] = _motion(channels_j, coordinates, at_j)
+    motion[len(channels_j) :, 6:] = _motion(channels_k, coordinates, at_k)
+    compliance = None
+    if bending_stiffness is not None:
+        reach = [np.ptp([coordinates[node] for node in points], axis=0).max() / 2 for points in (points_j, points_k)]
+        # Half of what both sides together add is that of each.
+        own = sum(difference_error([-r, r], bending_stiffness, 1.0).compliance / 2 for r in reach if r > 0)
+        compliance = np.where(np.array(places) < len(_AXES), 0.0, own)
+    return Interface((*channels_j, *channels_k), transform, (at_j, at_k), direction_names(dofs), motion, compliance)
+
+
+def _motion(
+    channels: Sequence[Channel], coordinates: Mapping[int, NDArray[np.float64]], about: FloatArray
+) -> FloatArray:
+    """Return the motion of channels for unit motions of a reference point, shape (m, 6)."""
+    at = np.array([np.asarray(coordinates[channel.node], dtype=float) for channel in channels])
+    motion: FloatArray = rigid_motion(at, about)[np.arange(len(at)), [_AXES.index(c.axis) for c in channels]]
+    return motion
 
 
 def _one_side(

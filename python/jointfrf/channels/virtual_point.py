@@ -9,11 +9,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from jointfrf.channels.finite_differences import transform
-from jointfrf.dofs import DIRECTIONS, direction_places, is_rotation, rigid_motion
+from jointfrf.channels.point_lines import Interface
+from jointfrf.dofs import DIRECTIONS, direction_names, direction_places, is_rotation, rigid_motion
 from jointfrf.frf.frf_set import Channel
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_dofs, as_real, as_square
 
-__all__ = ["VirtualPoint", "append_virtual_point", "channel_geometry", "virtual_point", "virtual_points"]
+__all__ = [
+    "VirtualPoint",
+    "append_virtual_point",
+    "channel_geometry",
+    "virtual_interface",
+    "virtual_point",
+    "virtual_points",
+]
 
 #: A motion that the channels show this many times more weakly than the best one is not seen.
 _UNSEEN = 1e-6
@@ -38,6 +46,11 @@ class VirtualPoint(NamedTuple):
         Condition number of W^(1/2) R with rotations times the reach of the channels (root mean square distance to the
         point), so that it does not depend on units. 1 is best; above some hundreds the point lies far from the
         channels, or they hardly show some DOF.
+    point : ndarray, shape (3,)
+        Where it is, m.
+    motion : ndarray, shape (m, 6)
+        Displacement of each channel for a unit of x, y, z, theta_x, theta_y, theta_z of the point, 1 or m/rad: `modes`
+        and what they leave out.
     """
 
     dofs: tuple[str, ...]
@@ -45,6 +58,8 @@ class VirtualPoint(NamedTuple):
     transform: FloatArray
     weights: FloatArray
     condition: float
+    point: FloatArray
+    motion: FloatArray
 
     @property
     def noise_gain(self) -> FloatArray:
@@ -149,7 +164,7 @@ def virtual_point(
     _check_seen(names, size, right)
     # (R^T W R)^-1 R^T W by the singular values of W^(1/2) R
     inverse = (right.T / size) @ left.T * root / scale[:, None]
-    return VirtualPoint(names, modes, inverse, weight, float(size[0] / size[-1]))
+    return VirtualPoint(names, modes, inverse, weight, float(size[0] / size[-1]), reference, motion)
 
 
 def virtual_points(side_j: VirtualPoint, side_k: VirtualPoint) -> FloatArray:
@@ -172,9 +187,9 @@ def virtual_points(side_j: VirtualPoint, side_k: VirtualPoint) -> FloatArray:
 
     Notes
     -----
-    ``identify(freq_hz, h, vp.dofs, transform=...)`` wants impacts at the places and in the directions of the channels.
-    Where they are elsewhere, apply ``transform(h, t_out, t_in)`` with a transformation of each and hand over the
-    result; its noise is then no longer independent between entries, and intervals are approximate.
+    ``identify(freq_hz, h, vp.dofs, transform=...)`` takes one transformation where impacts are at the places and in the
+    directions of the channels, and with the method "compliance" a pair, of responses and of forces, where they are
+    elsewhere. `virtual_interface` holds the geometry of the channels, too, from which the fit sees what is not rigid.
 
     Examples
     --------
@@ -191,6 +206,38 @@ def virtual_points(side_j: VirtualPoint, side_k: VirtualPoint) -> FloatArray:
     both_sides[:n, :m_j] = side_j.transform
     both_sides[n:, m_j:] = side_k.transform
     return both_sides
+
+
+def virtual_interface(side_j: VirtualPoint, side_k: VirtualPoint) -> Interface:
+    """Put the virtual points of both sides of a joint together with the geometry of their channels, for `identify`.
+
+    Parameters
+    ----------
+    side_j, side_k : VirtualPoint
+        As in `virtual_points`.
+
+    Returns
+    -------
+    Interface
+        Without names of channels.
+
+    Raises
+    ------
+    ValueError
+        The sides have different DOFs.
+
+    Examples
+    --------
+    >>> import jointfrf as jf
+    >>> side = jf.virtual_point([[-0.01, 0, 0], [0.01, 0, 0]], [[0, 1, 0]] * 2, [0, 0, 0], ["y", "theta_z"])
+    >>> jf.virtual_interface(side, side).modes[:2].tolist()
+    [[1.0, -0.01, 0.0, 0.0], [1.0, 0.01, 0.0, 0.0]]
+    """
+    transform = virtual_points(side_j, side_k)
+    motion = np.zeros((transform.shape[1], 12))
+    motion[: len(side_j.motion), :6] = side_j.motion
+    motion[len(side_j.motion) :, 6:] = side_k.motion
+    return Interface((), transform, (side_j.point, side_k.point), direction_names(side_j.dofs), motion)
 
 
 def append_virtual_point(h: ArrayLike, channels: ArrayLike, point: VirtualPoint) -> ComplexArray:

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from jointfrf.channels.check.check import check_frfs, warn_of_frfs
 from jointfrf.channels.check.finding import FrfCheck
+from jointfrf.channels.point_lines import Interface
 from jointfrf.frf.bands import PIECE
 from jointfrf.identification.band_means import fit_band_mean, prepare_band_mean
 from jointfrf.identification.joint_fit import JointFit
@@ -19,6 +20,7 @@ from jointfrf.identification.manifold_fit.joint_terms import CrossTerms, Damping
 from jointfrf.identification.manifold_fit.prepare import (
     ManifoldOptions,
     NoiseOptions,
+    Transform,
     prepare_manifold,
 )
 from jointfrf.identification.prepare import (
@@ -42,7 +44,7 @@ def identify(
     method: IdentificationMethod = "compliance",
     bands: BandsOfDofs = None,
     *,
-    transform: ArrayLike | tuple[ArrayLike, ArrayLike] | None = None,
+    transform: Transform | tuple[Transform, Transform] | None = None,
     damping: DampingTerms | Literal["auto"] | Sequence[DampingTerms] = "auto",
     cross: CrossTerms = "zero",
     noise: float | ArrayLike | None = None,
@@ -78,9 +80,13 @@ def identify(
         does.
     bands : None, (low, high), sequence of these, or mapping of DOF name to these, optional
         Sensitive bands in Hz; all lines by default. "compliance" weights each line by its information and needs none.
-    transform : array_like, shape (2 n, m), or a pair of shapes (2 n, m_r) and (2 n, m_f), optional
+    transform : array_like, shape (2 n, m), or Interface, or a pair of these, optional
         From channels to joint DOFs j, then k: finite differences, virtual points. Noise is then taken as independent
-        between the channels, not between the transformed FRFs. A pair, for responses and for forces, with "compliance".
+        between the channels, not between the transformed FRFs. A pair, for responses and for forces, of shapes
+        (2 n, m_r) and (2 n, m_f), with "compliance". An `Interface`, as `interface` and `virtual_interface` make it,
+        has the geometry of the channels: "compliance" then names DOFs left out that enter those sought, and widens
+        intervals by what is not rigid between the channels; of a plain matrix it does the latter where the channels
+        move as those of which it is the least-squares inverse.
     damping : {"auto", "viscous", "hysteretic", "both", "none"}, or a sequence of these, one for each DOF
         Terms of K* = k (1 + i eta) + i w c to fit. "auto" chooses for each DOF by the Bayesian information criterion,
         with `cross` "fit" for all DOFs together. Not for band means, which give viscous damping.
@@ -158,6 +164,8 @@ def identify(
         return _warned(describe_manifold(fit_manifold(problem), problem))
     if coherence is not None or averages is not None:
         raise ValueError("coherence and averages are for method 'compliance'")
+    if isinstance(transform, Interface):
+        transform = transform.transform
     if isinstance(transform, tuple):
         raise ValueError("a pair of transforms, for responses and for forces, is for method 'compliance'")
     known = JointFrfs(

@@ -9,7 +9,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from jointfrf.dofs import compliance_unit, is_rotation
 from jointfrf.errors import ConvergenceWarning, IdentificationWarning
+from jointfrf.identification.elastic_centre import elastic_centre
 from jointfrf.identification.joint_fit import JointFit
 from jointfrf.identification.manifold_fit.damping_choice import DofDamping
 from jointfrf.identification.manifold_fit.estimator import JointEstimate
@@ -17,7 +19,7 @@ from jointfrf.identification.manifold_fit.fit import ManifoldFit
 from jointfrf.identification.manifold_fit.intervals import Spread
 from jointfrf.identification.manifold_fit.joint_terms import CrossTerms
 from jointfrf.identification.manifold_fit.misfit import Misfit
-from jointfrf.identification.manifold_fit.prepare import ManifoldProblem
+from jointfrf.identification.manifold_fit.prepare import ManifoldProblem, Transforms
 
 __all__ = ["Described", "describe_manifold"]
 
@@ -27,6 +29,14 @@ _UNCERTAIN = 0.5
 _BY_CHANCE = 1e-3
 #: Relative noise below this is rounding.
 _ROUNDING = 1e-7
+#: Share of the motion of a DOF from which on another one that enters it is named.
+_ENTERS = 0.05
+#: Variances that exceed those from noise by this factor are mostly due to something else.
+_MOSTLY = 5.0
+#: Relative standard errors above this are told where they are due to sides that are not rigid.
+_FLEXIBLE = 0.02
+#: A reference point is proposed where it lowers the largest coupling to this share.
+_LESS = 0.5
 #: Share of lines that cannot fit the joint from which on a warning says so.
 _UNTRUSTED = 0.02
 #: Share of a compliance by which it varies between lines from which on a warning says so.
@@ -58,14 +68,18 @@ def describe_manifold(found: ManifoldFit, problem: ManifoldProblem) -> Described
     notes = [
         *_choice_notes(found.choices),
         *_noise_notes(problem),
-        *_small_residual_notes(found.misfit, problem),
+        *_small_residual_notes(found, problem),
+        *_channel_notes(found, problem),
         *_group_notes([group.dofs for group in result.groups], fit.dofs, problem.options.cross),
         *_hidden_notes(result, fit.dofs),
         *_significance_notes(fit),
+        *_reference_notes(fit),
     ]
     doubts = [
         *([] if found.cross_fits else _untrusted_warnings(result, fit.dofs)),
+        *_left_out_warnings(problem),
         *_parameter_warnings(fit, intervals),
+        *_rigidity_warnings(found),
         *_misfit_warnings(found, problem),
         *_diagonal_warnings(result, fit.dofs, problem.options.cross),
         *_scatter_warnings(fit, found.spread),
@@ -129,16 +143,98 @@ def _noise_notes(problem: ManifoldProblem) -> list[str]:
     return told
 
 
-def _small_residual_notes(misfit: Misfit, problem: ManifoldProblem) -> list[str]:
+def _small_residual_notes(found: ManifoldFit, problem: ManifoldProblem) -> list[str]:
     """Say that the residual is below the noise: intervals are then wider than they need be."""
-    noise = problem.noise
-    if noise.is_assumed or not misfit.is_small:
+    misfit, noise = found.misfit, problem.noise
+    # What is not rigid in the channels weighs as noise, and averages out of a residual of joint DOFs.
+    if noise.is_assumed or found.channels is not None or not misfit.is_small:
         return []
     why = "said" if noise.is_told else "their reciprocity shows"
     mean = _MEAN_OF_TWO if problem.frfs.symmetrised and noise.is_told else ""
     return [
         f"the residual is {misfit.ratio:.2g} times the noise: the FRFs have less noise than {why}, or were smoothed"
         f"{mean}; the intervals are wider than they need be"
+    ]
+
+
+def _channel_notes(found: ManifoldFit, problem: ManifoldProblem) -> list[str]:
+    """Say what is known of the flexibility between channels."""
+    frfs = problem.frfs
+    if Transforms(frfs.responses, frfs.forces).are_units:
+        return []
+    if found.channels is None:
+        return [
+            "the channels cannot check that the sides of the joint are rigid between them: what their flexibility does "
+            "is not in the intervals"
+        ]
+    told = []
+    if problem.added_compliance is not None:
+        values = _listed(
+            [
+                f"{value:.2g} {compliance_unit(dof, dof)} for {dof}"
+                for dof, value in zip(problem.dofs, problem.added_compliance, strict=True)
+                if value > 0
+            ]
+        )
+        told.append(f"the sides have about this compliance between the channels, and intervals allow for it: {values}")
+    return told
+
+
+def _reference_notes(fit: JointFit) -> list[str]:
+    """Propose the reference point at which the stiffness is most nearly diagonal."""
+    try:
+        centre = elastic_centre(fit) if any(one.is_cross for one in fit.terms) else None
+    except ValueError:
+        # Names that tell no direction, or a stiffness that is not positive: there is nothing to propose.
+        centre = None
+    if centre is None or centre.coupling > _LESS * centre.coupling_before:
+        return []
+    where = _listed(
+        [
+            f"{axis} {1e3 * r:+.3g} +- {1e3 * error:.2g} mm"
+            for axis, r, error in zip("xyz", centre.offset, centre.std_error, strict=True)
+            if np.isfinite(error)
+        ]
+    )
+    return [
+        f"the stiffness is most nearly diagonal with the reference points moved by {where} (standard error): the "
+        f"largest coupling falls from {centre.coupling_before:.2g} to {centre.coupling:.2g} (elastic_centre)"
+    ]
+
+
+def _left_out_warnings(problem: ManifoldProblem) -> list[str]:
+    """Name DOFs that are not sought, but enter those that are."""
+    told = []
+    for one in problem.left_out:
+        if one.share < _ENTERS:
+            continue
+        unit = " m" if is_rotation(one.dof) > is_rotation(one.into) else ""
+        how = f"{one.weight:.3g}{unit} of {one.dof}, which is left out, enters {one.into} of side {one.side}"
+        size = (
+            f"{100 * one.share:.0f} % of its motion"
+            if np.isfinite(one.share)
+            else "how much cannot be seen from these channels"
+        )
+        told.append(f"{how} ({size}): fit {one.dof}, too, or move the reference point or the channels")
+    return told
+
+
+def _rigidity_warnings(found: ManifoldFit) -> list[str]:
+    """Name stiffnesses whose uncertainty is mostly that of sides that are not rigid."""
+    if found.channels is None:
+        return []
+    fit = found.joint
+    wide = [
+        one.name
+        for one, added, noise in zip(fit.terms, found.channels.factor, found.spread.factor, strict=True)
+        if one.kind == "k" and not one.is_cross and added > _MOSTLY * noise
+        if fit.std_error[one.name] > _FLEXIBLE * abs(fit.parameters[one.name])
+    ]
+    if not wide:
+        return []
+    return [
+        f"{_listed(wide)}: between the channels the sides deform so much that the intervals are mostly due to that, "
+        "not to noise: channels nearer to the joint, or more of them, would narrow them"
     ]
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -11,6 +10,7 @@ import numpy as np
 from jointfrf.errors import IllConditionedWarning
 from jointfrf.frf.bands import line_slices
 from jointfrf.identification.joint_fit import JointFit
+from jointfrf.identification.manifold_fit.channel_jackknife import ChannelSpread, channel_spread
 from jointfrf.identification.manifold_fit.damping_choice import DofDamping, choose_damping
 from jointfrf.identification.manifold_fit.estimator import JointEstimate, estimate_on_manifold
 from jointfrf.identification.manifold_fit.from_nothing import check_estimate
@@ -42,6 +42,8 @@ class ManifoldFit(NamedTuple):
         What they come from.
     spread : Spread
         By how much variances exceed those from independent noise.
+    channels : ChannelSpread or None
+        What sides that are not rigid add to that; None where the channels do not tell.
     misfit : Misfit
         The residual against the noise.
     cross_fits : bool
@@ -53,6 +55,7 @@ class ManifoldFit(NamedTuple):
     joint: JointFit
     estimate: JointEstimate
     spread: Spread
+    channels: ChannelSpread | None
     misfit: Misfit
     cross_fits: bool
     choices: tuple[DofDamping, ...]
@@ -72,8 +75,9 @@ def fit_manifold(problem: ManifoldProblem) -> ManifoldFit:
     if noise.is_assumed:
         level = scale * level
     spread = spread_of(result, noise.inflation, is_level_known=not noise.is_assumed)
-    root = np.sqrt(spread.factor)
     frfs = problem.frfs
+    channels = channel_spread(result, frfs, problem.added_compliance)
+    root = np.sqrt(spread.factor if channels is None else spread.factor + channels.factor)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", IllConditionedWarning)
         k_lines = np.concatenate(
@@ -95,10 +99,10 @@ def fit_manifold(problem: ManifoldProblem) -> ManifoldFit:
         freq_hz=problem.freq_hz,
         k_lines=k_lines,
         bands=problem.bands,
-        intervals=LikelihoodIntervals(result, spread.factor),
+        intervals=LikelihoodIntervals(result, spread.factor, None if channels is None else channels.std_error),
     )
     misfit = diagnose(result, problem.freq_hz, noise.inflation, spread)
-    return ManifoldFit(joint, result, spread, misfit, _cross_fits(problem, result, misfit, choices), choices)
+    return ManifoldFit(joint, result, spread, channels, misfit, _cross_fits(problem, result, misfit, choices), choices)
 
 
 def _cross_fits(
@@ -124,9 +128,7 @@ def _fitted(problem: ManifoldProblem) -> tuple[ManifoldProblem, JointEstimate, t
         scale = float(np.sqrt(result.excess))
         if scale < _NO_NOISE or 1 / _AGREE < scale < _AGREE:
             break
-        noise = replace(problem.noise, level=scale * problem.noise.level)
-        frfs = problem.frfs._replace(variance=problem.frfs.variance * scale**2)
-        problem = replace(problem, noise=noise, frfs=frfs)
+        problem = problem.with_noise(scale)
         result, choices = _with_damping(problem)
     return problem, result, choices
 

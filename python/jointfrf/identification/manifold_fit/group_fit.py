@@ -17,7 +17,7 @@ from jointfrf.identification.manifold_fit.manifold import LineData, OnManifold, 
 from jointfrf.identification.manifold_fit.starts import smooth_compliance, starts_on_manifold
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
-__all__ = ["LITTLE_PATIENCE", "GroupFit", "GroupProblem", "Misfitting", "fit_dofs"]
+__all__ = ["LITTLE_PATIENCE", "GroupFit", "GroupProblem", "Misfitting", "fit_dofs", "gradients_of"]
 
 #: Linearisations at most.
 _MOST = 25
@@ -176,6 +176,35 @@ def fit_dofs(problem: GroupProblem, starts: Iterable[FloatArray], patience: int 
     if best is None:
         raise np.linalg.LinAlgError("no start of the fit is finite")
     return _from_softer(problem, best) if problem.is_diagonal and not (best.is_noise or best.is_lost) else best
+
+
+def gradients_of(problem: GroupProblem, fit: GroupFit, changes: Iterable[ComplexArray]) -> FloatArray:
+    """Return by how much changes of the measured FRFs change the gradient at the minimum, shape (number, p).
+
+    Parameters
+    ----------
+    problem : GroupProblem
+    fit : GroupFit
+    changes : iterable of ndarray, shape (n_freq, q)
+        Of the entries of gamma, m/N.
+    """
+    data, trusted = problem.data, fit.trusted.astype(float)
+    if problem.unknown.any():
+        # Where cross terms are unknown there is no point of the manifold.
+        return np.zeros((len(list(changes)), fit.minimum.x.size))
+    c = problem.of_joint(fit.forms.compliance)
+    on = _rescued(data, c, _first_points(data, c))
+    adjoint = problem.joint.slope(fit.minimum.x, problem.joint.compliance(fit.minimum.x)).conj()
+
+    def gradient(target: ComplexArray) -> ComplexArray:
+        (forms,) = normal_forms(data, c, on, (target,))
+        return _used(problem, forms, forms, c)[0].gradient
+
+    base = gradient(data.smooth)
+    found = [
+        np.einsum("lqp,lq,l->p", adjoint, gradient(data.smooth + change) - base, trusted).real for change in changes
+    ]
+    return np.array(found)
 
 
 def _from_softer(problem: GroupProblem, best: GroupFit) -> GroupFit:

@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.linalg import lapack
 
 from jointfrf.identification.manifold_fit.manifold import FrfEntries, LineData
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
@@ -38,6 +37,8 @@ class InterfaceFrfs(NamedTuple):
         Whether gamma_pq and gamma_qp are one.
     symmetrised : bool
         Whether h_pq and h_qp are one measurement, as where FRFs were made reciprocal before.
+    response_modes, force_modes : ndarray, shapes (m_r, 2 n), (m_f, 2 n), optional
+        Motion of the channels for a unit of each joint DOF where the sides are rigid; None where it is not known.
     """
 
     measured: ComplexArray
@@ -47,6 +48,8 @@ class InterfaceFrfs(NamedTuple):
     forces: FloatArray
     reciprocal: bool
     symmetrised: bool = False
+    response_modes: FloatArray | None = None
+    force_modes: FloatArray | None = None
 
     @property
     def n(self) -> int:
@@ -87,6 +90,11 @@ class InterfaceFrfs(NamedTuple):
         measured, smooth = (entries.take(self._mean(gamma)) for gamma in between)
         return LineData(entries, measured, smooth, *self._weights(entries, t_r, t_f))
 
+    def entries_of(self, dofs: NDArray[np.intp], gamma: ComplexArray) -> ComplexArray:
+        """Return the entries between some joint DOFs, as `of_dofs` does, of FRFs between all, shape (n_freq, q)."""
+        at = np.concatenate([dofs, dofs + self.n])
+        return FrfEntries.of(len(dofs), reciprocal=self.reciprocal).take(self._mean(gamma[:, at[:, None], at]))
+
     def _mean(self, gamma: ComplexArray) -> ComplexArray:
         return (gamma + gamma.swapaxes(1, 2)) / 2 if self.reciprocal else gamma
 
@@ -118,27 +126,29 @@ class InterfaceFrfs(NamedTuple):
             )
             of_channels = np.triu(of_channels)
         g = of_channels.reshape(len(p), -1)
-        unused = ~np.isfinite(self.variance.reshape(len(variance), -1))
-        dead = unused @ (g != 0).T
-        covariance = _covariance(sparse.csr_array(g), variance.reshape(len(variance), -1))
-        total = np.einsum("lpp->lp", covariance)
-        inverse_std: FloatArray = np.where(dead, 0, 1 / np.sqrt(np.where(dead, 1, total)))
-        scaled = covariance * inverse_std[:, :, None] * inverse_std[:, None, :]
-        own = np.arange(len(p))
-        # DOFs made of the same channels may leave an entry without noise of its own.
-        scaled[:, own, own] += dead + _OWN_NOISE
-        whitening = np.linalg.cholesky(scaled).astype(np.float64, copy=False)
-        for triangle in whitening:
-            triangle[:] = lapack.dtrtri(triangle, lower=1)[0]
+        own = variance.reshape(len(variance), -1)
+        dead = ~np.isfinite(self.variance.reshape(own.shape)) @ (g != 0).T
+        total = own @ (g**2).T
+        inverse_std = np.where(dead, 0, 1 / np.sqrt(np.where(dead, 1, total)))
+        whitening = np.zeros((len(own), len(p), len(p)))
+        for block in _blocks(g):
+            whitening[:, block[:, None], block] = _whitening(g[block], own, inverse_std[:, block], dead[:, block])
         return inverse_std, whitening
 
 
-def _covariance(g: sparse.csr_array, variance: FloatArray) -> FloatArray:
-    """Return G diag(variance) G^T of each line; each entry comes from few channels."""
-    q = g.shape[0]
-    a, b = np.tril_indices(q)
-    products = sparse.csr_array(g[a].multiply(g[b]))
-    covariance = np.empty((len(variance), q, q))
-    covariance[:, a, b] = (products @ variance.T).T
-    covariance[:, b, a] = covariance[:, a, b]
-    return covariance
+def _blocks(g: FloatArray) -> list[NDArray[np.intp]]:
+    """Entries that share channels: those within a side, and those between the sides."""
+    shared = sparse.csr_array(g != 0).astype(float)
+    _, label = sparse.csgraph.connected_components(shared @ shared.T, directed=False)
+    return [np.flatnonzero(label == one) for one in range(label.max() + 1)]
+
+
+def _whitening(g: FloatArray, variance: FloatArray, inverse_std: FloatArray, dead: NDArray[np.bool_]) -> FloatArray:
+    """Return the triangles that whiten entries sum_c G_ic h_c, shape (n_freq, q, q)."""
+    seen = np.flatnonzero(g.any(axis=0))
+    scaled_g = inverse_std[:, :, None] * g[:, seen]
+    covariance = (scaled_g * variance[:, None, seen]) @ scaled_g.swapaxes(1, 2)
+    # DOFs made of the same channels may leave an entry without noise of its own.
+    covariance[:, range(len(g)), range(len(g))] += dead + _OWN_NOISE
+    inverse: FloatArray = np.linalg.inv(np.linalg.cholesky(covariance))
+    return inverse

@@ -179,10 +179,14 @@ class LikelihoodIntervals:
     found : JointEstimate
     factor : ndarray, shape (p,)
         By how much the variance of each parameter exceeds that from independent noise.
+    added : ndarray, shape (p,), optional
+        Standard error of each parameter that is not in this; of the compliance where a joint without cross terms has a
+        stiffness.
     """
 
-    def __init__(self, found: JointEstimate, factor: FloatArray) -> None:
+    def __init__(self, found: JointEstimate, factor: FloatArray, added: FloatArray | None = None) -> None:
         self.found, self.factor = found, factor
+        self.added = np.zeros_like(factor) if added is None else added
         self._known: dict[float, dict[str, tuple[float, float]]] = {}
 
     def __call__(self, probability: float) -> dict[str, tuple[float, float]]:
@@ -192,12 +196,12 @@ class LikelihoodIntervals:
         likelihood where it is not.
         """
         if probability not in self._known:
-            limits = [
-                (parameter.name, _limits(group, i, float(self.factor[group.which[i]]), probability))
-                for group in self.found.groups
-                for i, parameter in enumerate(group.joint.terms.parameters)
-            ]
-            by_name = dict(limits)
+            by_name: dict[str, tuple[float, float]] = {}
+            for group in self.found.groups:
+                own = [_limits(group, i, float(self.factor[which]), probability) for i, which in enumerate(group.which)]
+                reach = float(special.ndtri((1 + probability) / 2)) * self.added[group.which]
+                names = [parameter.name for parameter in group.joint.terms.parameters]
+                by_name |= dict(zip(names, _widened(group, own, reach) if reach.any() else own, strict=True))
             self._known[probability] = {one.name: by_name[one.name] for one in self.found.parameters}
         return self._known[probability]
 
@@ -217,6 +221,35 @@ def _limits(group: FittedGroup, i: int, factor: float, probability: float) -> tu
     slope = group.joint.theta_slope(x)[i]
     value, own = float(group.joint.theta(x)[i]), reach * float(np.sqrt(max(slope @ covariance @ slope, 0)))
     return value - own, value + own
+
+
+def _widened(group: FittedGroup, limits: list[tuple[float, float]], reach: FloatArray) -> list[tuple[float, float]]:
+    """Return the limits of all parameters of a group with another, independent error of this reach.
+
+    Of a stiffness it is one of the compliance, as it comes from compliance between the channels.
+    """
+    theta, x, terms = group.joint.theta(group.fit.minimum.x), group.fit.minimum.x, group.joint.terms
+    is_diagonal = isinstance(group.joint, DiagonalJoint)
+    found: list[tuple[float, float]] = []
+    for i, ((low, high), own) in enumerate(zip(limits, reach, strict=True)):
+        is_stiffness = terms.kinds[i] == 0 and terms.pairs[i, 0] == terms.pairs[i, 1]
+        if is_diagonal and is_stiffness:
+            found.append(_softened(x[i], low, high, own))
+        elif is_stiffness and theta[i] > 0 and low > 0:
+            found.append(_softened(1 / theta[i], low, high, own / theta[i] ** 2))
+        elif is_diagonal and not np.isfinite(found[terms.pairs[i, 0]][1]):
+            # A rigid DOF shows no damping.
+            found.append((-np.inf, np.inf))
+        else:
+            found.append((theta[i] - np.hypot(theta[i] - low, own), theta[i] + np.hypot(high - theta[i], own)))
+    return [(float(low), float(high)) for low, high in found]
+
+
+def _softened(compliance: float, low: float, high: float, own: float) -> tuple[float, float]:
+    """Return the limits of a stiffness whose compliance has another error of this reach."""
+    softest = compliance + np.hypot((1 / low if low > 0 else np.inf) - compliance, own)
+    stiffest = compliance - np.hypot(compliance - 1 / high, own)
+    return 1 / softest, 1 / stiffest if stiffest > 0 else np.inf
 
 
 def profile_interval(group: FittedGroup, index: int, factor: float, probability: float = 0.95) -> tuple[float, float]:

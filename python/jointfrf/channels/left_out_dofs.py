@@ -1,0 +1,93 @@
+"""DOFs of an interface that are not asked for, but whose motion the channels take for one that is."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from jointfrf.channels.point_lines import Interface
+from jointfrf.dofs import DIRECTIONS
+from jointfrf.kernel.arguments import ComplexArray, FloatArray
+
+__all__ = ["LeftOutDof", "left_out_dofs"]
+
+_SIDES = "jk"
+#: Geometry below this share of the reach of the channels is rounding.
+_NOTHING = 1e-6
+#: The channels show a DOF when it is known to this part of a unit.
+_SHOWN = 1e-6
+
+
+class LeftOutDof(NamedTuple):
+    """A DOF left out that enters one that is kept.
+
+    Attributes
+    ----------
+    side : {"j", "k"}
+    dof, into : str
+        The DOF left out, and the one that its motion is taken for.
+    weight : float
+        Of its motion there: 1, m, 1/m.
+    share : float
+        Its part in the motion found of that DOF, root mean square over lines and forces; NaN where the channels do not
+        show the DOF.
+    """
+
+    side: str
+    dof: str
+    into: str
+    weight: float
+    share: float
+
+
+def left_out_dofs(h: ComplexArray, interface: Interface) -> tuple[LeftOutDof, ...]:
+    """Find the DOFs whose motion goes into others.
+
+    Parameters
+    ----------
+    h : ndarray, shape (n_freq, m, m_in)
+        FRFs of the channels of the interface.
+    interface : Interface
+
+    Returns
+    -------
+    tuple of LeftOutDof
+        Of each DOF left out, the one kept that it disturbs most on each side.
+
+    Notes
+    -----
+    A channel 6 mm from the reference point along y shows x - 0.006 theta_z where the side turns: with theta_z left out,
+    T M holds -0.006 for its rigid motion M. How much theta_z there is comes from all DOFs that the channels show.
+    """
+    n, found = len(interface.dofs), []
+    for side in range(2):
+        own = interface.transform[side * n : (side + 1) * n]
+        at = np.flatnonzero(own.any(axis=0))
+        motion = interface.motion[at][:, side * 6 : side * 6 + 6]
+        inverse = np.linalg.pinv(motion)
+        size = _rms(inverse @ h[:, at])
+        shown = abs(np.diagonal(inverse @ motion) - 1) < _SHOWN
+        of_kept = _rms(own @ h)
+        weights = own[:, at] @ motion
+        reach = np.sqrt((motion[:, 3:] ** 2).sum(axis=1).max())
+        unit = np.array([1.0] * 3 + [1 / (reach or 1.0)] * 3)
+        unit_kept = unit[[DIRECTIONS.index(dof) for dof in interface.dofs]]
+        for d, dof in enumerate(DIRECTIONS):
+            if dof in interface.dofs:
+                continue
+            relative = abs(weights[:, d]) * unit[d] / unit_kept
+            if relative.max() < _NOTHING:
+                continue
+            weight = np.where(relative < _NOTHING, 0, weights[:, d])
+            shares = abs(weight) * size[d] / np.maximum(of_kept, np.finfo(float).tiny)
+            most = int((shares if shown[d] else relative).argmax())
+            share = float(shares[most]) if shown[d] else np.nan
+            found.append(LeftOutDof(_SIDES[side], dof, interface.dofs[most], float(weight[most]), share))
+    return tuple(found)
+
+
+def _rms(q: ComplexArray) -> FloatArray:
+    """Return the root mean square of each row over its columns, and its median over lines."""
+    size: FloatArray = np.median(np.sqrt((abs(q) ** 2).mean(axis=2)), axis=0)
+    return size

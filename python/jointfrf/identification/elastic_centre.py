@@ -1,0 +1,198 @@
+"""Where a joint is most nearly diagonal: the elastic centre, and how far its stiffness is from diagonal there."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy import optimize
+
+from jointfrf.dofs import is_rotation
+from jointfrf.identification.joint_fit import JointFit
+from jointfrf.joint import Joint
+from jointfrf.kernel.arguments import FloatArray
+
+__all__ = ["ElasticCentre", "elastic_centre"]
+
+#: Directions in which the coupling changes less than this share of the most, for the same offset, do not matter.
+_UNSEEN = 1e-6
+#: Coupling below this is not weighted further: a joint is hardly ever diagonal to more.
+_FLOOR = 0.01
+
+
+class ElasticCentre(NamedTuple):
+    """The reference point at which a joint is most nearly diagonal.
+
+    Attributes
+    ----------
+    offset : ndarray, shape (3,)
+        From the present reference points along x, y, z, m; 0 where nothing depends on it.
+    std_error : ndarray, shape (3,)
+        From the covariance of the stiffness, m; 0 without one, inf along directions on which nothing depends.
+    covariance : ndarray, shape (3, 3)
+        Of the offset, m^2, along directions on which something depends.
+    coupling_before, coupling : float
+        Largest |K_ab| / sqrt(K_aa K_bb) between two DOFs at the present point and there.
+    joint : Joint
+        The joint there, see `Joint.moved`.
+    """
+
+    offset: FloatArray
+    std_error: FloatArray
+    covariance: FloatArray
+    coupling_before: float
+    coupling: float
+    joint: Joint
+
+
+def elastic_centre(joint: Joint | JointFit) -> ElasticCentre:
+    """Find the reference point at which the stiffness of a joint is most nearly diagonal.
+
+    Parameters
+    ----------
+    joint : Joint or JointFit
+        With its full stiffness: a fit with ``cross="fit"``. Of a fit, coupling that is poorly known counts less, and
+        the offset has a standard error.
+
+    Returns
+    -------
+    ElasticCentre
+
+    Raises
+    ------
+    ValueError
+        No translation and rotation together, names of DOFs that do not tell a direction, a stiffness that is not
+        positive on the diagonal.
+
+    Notes
+    -----
+    The sum of the squares K_ab^2 / (K_aa K_bb) over pairs of DOFs is minimised over the offset r of K moved by it,
+    T^-T K T^-1. Only terms between translations and rotations, and those between rotations, depend on it. For a joint
+    that is diagonal somewhere this is the centre of stiffness and of compliance; else the best compromise. The
+    covariance of r is that of K through the implicit derivative of the minimum.
+
+    References
+    ----------
+    J. Loncaric, Normal forms of stiffness and compliance matrices, IEEE Journal of Robotics and Automation 3 (1987).
+
+    Examples
+    --------
+    >>> import jointfrf as jf
+    >>> joint = jf.Joint([1e6, 2e6, 3e6, 1e3, 2e3, 3e3], dofs=["x", "y", "z", "theta_x", "theta_y", "theta_z"])
+    >>> (-jf.elastic_centre(joint.moved([0, 0.006, 0])).offset).round(9).tolist()
+    [-0.0, 0.006, -0.0]
+    """
+    covariance = _stiffness_covariance(joint) if isinstance(joint, JointFit) else None
+    if isinstance(joint, JointFit):
+        joint = joint.joint
+    turns = [is_rotation(dof) for dof in joint.dofs]
+    if all(turns) or not any(turns):
+        raise ValueError(f"joint needs translations and rotations to have an elastic centre, not {', '.join(joint.dofs)}")
+    diagonal = np.diagonal(joint.stiffness)
+    if not (diagonal > 0).all():
+        bad = int(np.argmin(diagonal))
+        raise ValueError(f"joint: the stiffness of {joint.dofs[bad]} must be positive, not {diagonal[bad]:g}")
+    return _found(_Coupling(joint, covariance))
+
+
+def _stiffness_covariance(fit: JointFit) -> FloatArray:
+    """Return the covariance of the entries of the stiffness, shape (n, n, n, n)."""
+    n = len(fit.dofs)
+    place = np.zeros((n, n, len(fit.terms)))
+    for i, term in enumerate(fit.terms):
+        if term.kind == "k":
+            a, b = fit.dofs.index(term.row), fit.dofs.index(term.column)
+            place[a, b, i] = place[b, a, i] = 1
+    covariance: FloatArray = np.einsum("abi,ij,cdj->abcd", place, fit.covariance, place)
+    return covariance
+
+
+class _Coupling:
+    """Normalised, weighted coupling as a function of offset and stiffness."""
+
+    def __init__(self, joint: Joint, covariance: FloatArray | None) -> None:
+        self.joint, self.covariance = joint, covariance
+        self.rows, self.columns = np.triu_indices(len(joint.dofs), 1)
+        # Rotations in units in which the stiffness of a rotation is that of a translation.
+        turns = np.array([is_rotation(dof) for dof in joint.dofs])
+        k = np.diagonal(joint.stiffness)
+        self.length = float(np.sqrt(np.median(k[turns]) / np.median(k[~turns])))
+        self.weight = np.ones(self.rows.size)
+        if covariance is not None:
+            slope = self._by_stiffness(np.zeros(3))
+            variance = np.einsum("iab,abcd,icd->i", slope, covariance, slope)
+            self.weight = 1 / np.sqrt(np.maximum(variance, 0) + _FLOOR**2)
+
+    def at(self, offset: FloatArray, stiffness: FloatArray | None = None) -> FloatArray:
+        """Return the coupling of all pairs, not weighted."""
+        k = self.joint.stiffness if stiffness is None else stiffness
+        moved = Joint(k, dofs=self.joint.dofs).moved(offset).stiffness
+        root = np.sqrt(abs(np.diagonal(moved)))
+        coupling: FloatArray = (moved / np.outer(root, root))[self.rows, self.columns]
+        return coupling
+
+    def weighted(self, scaled: FloatArray) -> FloatArray:
+        """Return the weighted coupling at an offset in units of the length."""
+        return self.weight * self.at(scaled * self.length)
+
+    def linear(self) -> FloatArray:
+        """Return the scaled offset at which translations and rotations are least coupled, by linear least squares."""
+        joint, turns = self.joint, np.array([is_rotation(dof) for dof in self.joint.dofs])
+        root = np.sqrt(np.diagonal(joint.stiffness)[~turns])[:, None]
+
+        def coupled(offset: FloatArray) -> FloatArray:
+            block: FloatArray = (joint.moved(offset).stiffness[~turns][:, turns] / root).ravel()
+            return block
+
+        base = coupled(np.zeros(3))
+        slope = np.stack([coupled(self.length * unit) - base for unit in np.eye(3)], axis=1)
+        found: FloatArray = -np.linalg.pinv(slope, rcond=_UNSEEN) @ base
+        return found
+
+    def _by_stiffness(self, offset: FloatArray) -> FloatArray:
+        """Return the derivatives by the entries of the stiffness, shape (pairs, n, n), by central differences."""
+        k = self.joint.stiffness
+        root = np.sqrt(np.diagonal(k))
+        slope = np.zeros((self.rows.size, *k.shape))
+        for a in range(len(k)):
+            for b in range(len(k)):
+                step = np.zeros_like(k)
+                step[a, b] = 1e-6 * root[a] * root[b]
+                slope[:, a, b] = (self.at(offset, k + step) - self.at(offset, k - step)) / (2 * step[a, b])
+        return slope
+
+    def offset_covariance(self, offset: FloatArray, jacobian: FloatArray, seen: FloatArray) -> FloatArray:
+        """Return the covariance of the offset from that of the stiffness."""
+        if self.covariance is None:
+            return np.zeros((3, 3))
+        to_offset = -self.length * seen @ np.linalg.pinv(jacobian @ seen) * self.weight
+        by_stiffness = np.tensordot(to_offset, self._by_stiffness(offset), 1)
+        found: FloatArray = np.einsum("iab,abcd,jcd->ij", by_stiffness, self.covariance, by_stiffness)
+        return found
+
+
+def _found(coupling: _Coupling) -> ElasticCentre:
+    """Minimise the coupling from the present point, and from where its linear part vanishes."""
+    start = optimize.least_squares(coupling.weighted, np.zeros(3), xtol=1e-14, ftol=1e-14, gtol=1e-14)
+    linear = optimize.least_squares(coupling.weighted, coupling.linear(), xtol=1e-14, ftol=1e-14, gtol=1e-14)
+    best = min((start, linear), key=lambda one: one.cost)
+    jacobian = _slope(coupling, best.x)
+    _, size, right = np.linalg.svd(jacobian, full_matrices=True)
+    size = np.pad(size, (0, 3 - size.size))
+    is_seen = size > _UNSEEN * max(size[0], np.finfo(float).tiny)
+    seen = right[is_seen].T
+    offset: FloatArray = coupling.length * (seen @ (seen.T @ best.x))
+    covariance = coupling.offset_covariance(offset, jacobian, seen)
+    blind = (right[~is_seen] ** 2).sum(axis=0) > _UNSEEN
+    error = np.where(blind, np.inf, np.sqrt(np.maximum(np.diagonal(covariance), 0)))
+    before, after = (float(abs(coupling.at(at)).max()) for at in (np.zeros(3), offset))
+    return ElasticCentre(offset, error, covariance, before, after, coupling.joint.moved(offset))
+
+
+def _slope(coupling: _Coupling, at: FloatArray) -> FloatArray:
+    """Return the derivatives of the weighted coupling by the scaled offset, shape (pairs, 3)."""
+    steps = 1e-6 * np.eye(3)
+    slope: FloatArray = np.stack(
+        [(coupling.weighted(at + step) - coupling.weighted(at - step)) / 2e-6 for step in steps], axis=1
+    )
+    return slope

@@ -1,0 +1,137 @@
+"""Uncertainty of the parameters from sides that are not rigid: channels left out, and compliance between channels."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy import special
+
+from jointfrf.identification.manifold_fit.estimator import FittedGroup, JointEstimate
+from jointfrf.identification.manifold_fit.group_fit import gradients_of
+from jointfrf.identification.manifold_fit.interface_frfs import InterfaceFrfs
+from jointfrf.identification.manifold_fit.joint_terms import DiagonalJoint
+from jointfrf.identification.manifold_fit.line_forms import inverse_information
+from jointfrf.identification.manifold_fit.rigidity import ChannelModes, left_out
+from jointfrf.kernel.arguments import ComplexArray, FloatArray
+
+__all__ = ["ChannelSpread", "channel_spread"]
+
+
+class _Changes(NamedTuple):
+    """Changes of gamma without a channel, shape (n_freq, 2 n, 2 n) each, and redundancies of the channels."""
+
+    gamma: list[ComplexArray]
+    redundancy: FloatArray
+
+
+class ChannelSpread(NamedTuple):
+    """What sides that are not rigid add to the uncertainty, shape (p,) each.
+
+    Attributes
+    ----------
+    std_error : ndarray
+        Standard error of each parameter; of the compliance a = 1/k where a joint without cross terms has a stiffness.
+    factor : ndarray
+        Variance of each parameter in units of that from independent noise.
+    """
+
+    std_error: FloatArray
+    factor: FloatArray
+
+
+def channel_spread(found: JointEstimate, frfs: InterfaceFrfs, compliance: FloatArray | None) -> ChannelSpread | None:
+    """Return what sides that are not rigid add to the uncertainty; None where the channels do not tell.
+
+    Parameters
+    ----------
+    found : JointEstimate
+    frfs : InterfaceFrfs
+    compliance : ndarray, shape (n,), optional
+        What the sides add to the compliance of each joint DOF, taken as its standard error, m/N or rad/(N m).
+
+    Notes
+    -----
+    The jackknife variance over channels, sum of redundancy times squared change when one is left out (unbiased for
+    errors that are independent between channels), and the square of the change for a compliance of every DOF; both
+    times Student's t for the few channels. To first order, by one Gauss-Newton step. Where responses and forces are the
+    same
+    channels both are left out together: a body deforms alike where it is struck and where it is measured.
+    """
+    without = _without_channels(frfs)
+    if without is None and compliance is None:
+        return None
+    few = 1.0
+    if without is not None:
+        degrees = max(float(without.redundancy.sum()), 1.0)
+        few = (special.stdtrit(degrees, 0.975) / special.ndtri(0.975)) ** 2
+    std_error, factor = np.zeros((2, len(found.parameters)))
+    for group in found.groups:
+        minimum = group.fit.minimum
+        inverse = inverse_information(minimum.information)
+        changes, weights = np.zeros((0, minimum.x.size)), np.zeros(0)
+        if without is not None:
+            entries = (frfs.entries_of(group.dofs, one) for one in without.gamma)
+            changes = gradients_of(group.problem, group.fit, entries) @ inverse
+            weights = without.redundancy
+        if compliance is not None:
+            softer = _softer(group, compliance[group.dofs]) @ inverse
+            if isinstance(group.joint, DiagonalJoint):
+                # Whatever the damping takes up of it.
+                softer[:, : group.dofs.size] = np.diag(compliance[group.dofs])
+            changes = np.vstack([changes, softer])
+            weights = np.append(weights, np.ones(group.dofs.size))
+        std_error[group.which], factor[group.which] = _spread(group, changes, few * weights, inverse / 2)
+    return ChannelSpread(std_error, factor)
+
+
+def _spread(
+    group: FittedGroup, changes: FloatArray, weights: FloatArray, noise: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return standard errors, and variances over those from noise, of weighted changes of the coordinates."""
+    slope = group.joint.theta_slope(group.fit.minimum.x)
+    found = []
+    for to_parameters in (np.eye(len(slope)), slope):
+        with np.errstate(divide="ignore", invalid="ignore"):
+            own = weights @ (changes @ to_parameters.T) ** 2
+            found.append((np.sqrt(own), own / np.einsum("ij,jk,ik->i", to_parameters, noise, to_parameters)))
+    (of_coordinate, of_coordinates), (of_parameter, ratio) = found
+    # A rigid DOF has no finite slope.
+    ratio = np.where(np.isfinite(ratio), ratio, of_coordinates)
+    in_compliance = isinstance(group.joint, DiagonalJoint) & (group.joint.terms.kinds == 0)
+    return np.where(in_compliance, of_coordinate, of_parameter), np.nan_to_num(ratio)
+
+
+def _softer(group: FittedGroup, compliance: FloatArray) -> FloatArray:
+    """Return by how much the gradient changes when the compliance of each DOF is larger, shape (n, p)."""
+    minimum, joint, forms = group.fit.minimum, group.joint, group.fit.forms
+    n = group.dofs.size
+    entries = forms.compliance.shape[1]
+    rows, columns = np.diag_indices(n) if entries == n else np.triu_indices(n)
+    adjoint = joint.slope(minimum.x, joint.compliance(minimum.x)).conj()
+    change = np.zeros((n, entries))
+    for d in range(n):
+        change[d, (rows == d) & (columns == d)] = compliance[d]
+    weighted = np.einsum("lqr,dr->ldq", forms.weight, change)
+    found: FloatArray = np.einsum("lqp,ldq->dp", adjoint, weighted).real
+    return found
+
+
+def _without_channels(frfs: InterfaceFrfs) -> _Changes | None:
+    """Return what leaving out one channel after the other changes."""
+    if frfs.response_modes is None or frfs.force_modes is None:
+        return None
+    responses = list(left_out(ChannelModes(frfs.responses, frfs.response_modes)))
+    forces = list(left_out(ChannelModes(frfs.forces, frfs.force_modes)))
+    h, base, gamma = frfs.measured, frfs.gamma(frfs.measured), []
+    if frfs.responses.shape == frfs.forces.shape and np.array_equal(frfs.responses, frfs.forces):
+        for one in responses:
+            t = frfs.responses + one.change
+            gamma.append(t @ h @ t.T - base)
+        forces = []
+    else:
+        gamma += [one.change @ h @ frfs.forces.T for one in responses]
+        gamma += [frfs.responses @ h @ one.change.T for one in forces]
+    if not gamma:
+        return None
+    return _Changes(gamma, np.array([one.redundancy for one in (*responses, *forces)]))
