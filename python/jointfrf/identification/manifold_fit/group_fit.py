@@ -32,8 +32,8 @@ _FAR = 3.0
 PATIENCE, LITTLE_PATIENCE = 8, 4
 #: A fit is far from the data when the squares exceed their number by this factor.
 _LOST = 9.0
-#: Largest mean square of a residual that may be noise.
-_NOISE = 1.15
+#: A residual may be noise up to this mean square, for what is not known of the noise, and so many standard deviations.
+_NOISE, _SIGMA = 1.03, 5.0
 #: A compliance is barely seen when its standard error exceeds this share of it: the FRFs may then hardly show M.
 _BARELY = 0.05
 #: Of a compliance with this relative error, damping is not known: its rate is taken below 1 where it is linearised.
@@ -140,7 +140,8 @@ class GroupFit(NamedTuple):
     @property
     def is_noise(self) -> bool:
         """Whether the residual is no larger than the noise, and hardly a line is not trusted."""
-        return self.squares < _NOISE * max(self.possible, 1.0)
+        possible = max(self.possible, 1.0)
+        return bool(self.squares < (_NOISE + _SIGMA / np.sqrt(possible)) * possible)
 
     @property
     def is_good(self) -> bool:
