@@ -17,9 +17,9 @@ from jointfrf.dofs import is_rotation
 from jointfrf.errors import ConvergenceWarning, FrfCheckWarning, IdentificationWarning
 from jointfrf.extras import check_extras
 from jointfrf.frf.noise_model import estimate_noise
+from jointfrf.identification.compliance_fit.joint_terms import CrossTerms, DampingTerms
 from jointfrf.identification.identify import identify
 from jointfrf.identification.joint_fit import JointFit
-from jointfrf.identification.manifold_fit.joint_terms import CrossTerms, DampingTerms
 from jointfrf.io import FrfSet
 from jointfrf.io.cards import CardFormat
 

@@ -87,7 +87,9 @@ def elastic_centre(joint: Joint | JointFit) -> ElasticCentre:
         joint = joint.joint
     turns = [is_rotation(dof) for dof in joint.dofs]
     if all(turns) or not any(turns):
-        raise ValueError(f"joint needs translations and rotations to have an elastic centre, not {', '.join(joint.dofs)}")
+        raise ValueError(
+            f"joint needs translations and rotations to have an elastic centre, not {', '.join(joint.dofs)}"
+        )
     diagonal = np.diagonal(joint.stiffness)
     if not (diagonal > 0).all():
         bad = int(np.argmin(diagonal))

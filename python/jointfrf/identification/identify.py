@@ -13,16 +13,16 @@ from jointfrf.channels.check.finding import FrfCheck
 from jointfrf.channels.point_lines import Interface
 from jointfrf.frf.bands import PIECE
 from jointfrf.identification.band_means import fit_band_mean, prepare_band_mean
-from jointfrf.identification.joint_fit import JointFit
-from jointfrf.identification.manifold_fit.describe import Described, describe_manifold
-from jointfrf.identification.manifold_fit.fit import fit_manifold
-from jointfrf.identification.manifold_fit.joint_terms import CrossTerms, DampingTerms
-from jointfrf.identification.manifold_fit.prepare import (
-    ManifoldOptions,
+from jointfrf.identification.compliance_fit.describe import Described, describe_compliance
+from jointfrf.identification.compliance_fit.fit import fit_compliance
+from jointfrf.identification.compliance_fit.joint_terms import CrossTerms, DampingTerms
+from jointfrf.identification.compliance_fit.prepare import (
+    FitOptions,
     NoiseOptions,
     Transform,
-    prepare_manifold,
+    prepare_compliance,
 )
+from jointfrf.identification.joint_fit import JointFit
 from jointfrf.identification.prepare import (
     BandsOfDofs,
     MeasuredFrfs,
@@ -154,14 +154,14 @@ def identify(
     check_choice("method", method, _METHODS)
     if method == "compliance":
         words = damping if isinstance(damping, str) else tuple(damping)
-        problem = prepare_manifold(
+        problem = prepare_compliance(
             as_measured(freq_hz, gamma, square=False), dofs, bands, transform,
-            NoiseOptions(noise, coherence, averages), ManifoldOptions(words, cross, reciprocal),
+            NoiseOptions(noise, coherence, averages), FitOptions(words, cross, reciprocal),
         )  # fmt: skip
         if reciprocal:
             transforms = None if transform is None else (problem.frfs.responses, problem.frfs.forces)
             warn_of_frfs(_checked(MeasuredFrfs(problem.freq_hz, problem.frfs.measured), problem.dofs, transforms))
-        return _warned(describe_manifold(fit_manifold(problem), problem))
+        return _warned(describe_compliance(fit_compliance(problem), problem))
     if coherence is not None or averages is not None:
         raise ValueError("coherence and averages are for method 'compliance'")
     if isinstance(transform, Interface):

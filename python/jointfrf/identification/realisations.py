@@ -8,11 +8,11 @@ from typing import Literal
 
 from numpy.typing import ArrayLike
 
+from jointfrf.identification.compliance_fit.describe import describe_compliance
+from jointfrf.identification.compliance_fit.fit import fit_compliance
+from jointfrf.identification.compliance_fit.joint_terms import CrossTerms, DampingTerms
+from jointfrf.identification.compliance_fit.prepare import FitOptions, NoiseOptions, prepare_compliance
 from jointfrf.identification.joint_fit import JointFit
-from jointfrf.identification.manifold_fit.describe import describe_manifold
-from jointfrf.identification.manifold_fit.fit import fit_manifold
-from jointfrf.identification.manifold_fit.joint_terms import CrossTerms, DampingTerms
-from jointfrf.identification.manifold_fit.prepare import ManifoldOptions, NoiseOptions, prepare_manifold
 from jointfrf.identification.prepare import BandsOfDofs, as_measured
 
 __all__ = ["identify_realisations"]
@@ -70,12 +70,12 @@ def identify_realisations(
     >>> bool(abs(np.mean(k) / 2000 - 1) < 0.005), bool(np.std(k) / 2000 < 0.01)
     (True, True)
     """
-    options = ManifoldOptions(damping if isinstance(damping, str) else tuple(damping), cross, reciprocal)
+    options = FitOptions(damping if isinstance(damping, str) else tuple(damping), cross, reciprocal)
     known, near = NoiseOptions(noise), None
     for gamma in gammas:
         measured = as_measured(freq_hz, gamma, square=False)
-        problem = replace(prepare_manifold(measured, dofs, bands, transform, known, options), near=near)
-        found = fit_manifold(problem)
+        problem = replace(prepare_compliance(measured, dofs, bands, transform, known, options), near=near)
+        found = fit_compliance(problem)
         if near is None:
             near, known = found.estimate, replace(known, like=problem.noise.model)
-        yield describe_manifold(found, problem).fit
+        yield describe_compliance(found, problem).fit

@@ -8,9 +8,9 @@ import pytest
 import jointfrf as jf
 from cramer_rao import cramer_rao
 from jointfrf.frf.noise_estimate import reciprocity_noise
-from jointfrf.identification.manifold_fit.estimator import estimate_on_manifold
-from jointfrf.identification.manifold_fit.interface_frfs import InterfaceFrfs
-from jointfrf.identification.manifold_fit.joint_terms import joint_terms
+from jointfrf.identification.compliance_fit.estimator import estimate_joint
+from jointfrf.identification.compliance_fit.interface_frfs import InterfaceFrfs
+from jointfrf.identification.compliance_fit.joint_terms import joint_terms
 from six_dof_beams import DOFS, FREQ, GROUPS, JOINT, assembly, side, sides
 
 pytestmark = pytest.mark.long
@@ -94,7 +94,7 @@ def test_groups_are_found_also_behind_points_and_round_off(gamma):
 
 
 def test_exact_without_noise_and_at_the_bound(gamma, bound):
-    found = estimate_on_manifold(with_noise(gamma, np.eye(12)), TERMS)
+    found = estimate_joint(with_noise(gamma, np.eye(12)), TERMS)
     np.testing.assert_allclose(found.theta, TRUTH, rtol=1e-9)
     assert found.converged
     np.testing.assert_allclose(np.sqrt(np.diag(found.covariance)), 0.01 * bound, rtol=1e-3)

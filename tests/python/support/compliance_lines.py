@@ -4,10 +4,10 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from jointfrf.identification.manifold_fit.estimator import FittedGroup, JointEstimate, assembled, coordinates_of
-from jointfrf.identification.manifold_fit.group_fit import GroupFit
-from jointfrf.identification.manifold_fit.line_forms import LineForms, minimise_forms
-from jointfrf.identification.manifold_fit.manifold import OnManifold
+from jointfrf.identification.compliance_fit.estimator import FittedGroup, JointEstimate, assembled, coordinates_of
+from jointfrf.identification.compliance_fit.group_fit import GroupFit
+from jointfrf.identification.compliance_fit.line_forms import LineForms, minimise_forms
+from jointfrf.identification.compliance_fit.manifold import OnManifold
 
 
 def white(shape, seed):

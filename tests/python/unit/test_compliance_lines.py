@@ -5,11 +5,11 @@ import pytest
 
 import jointfrf as jf
 from cramer_rao import cramer_rao
-from jointfrf.identification.manifold_fit.compliance_lines import compliance_lines
-from jointfrf.identification.manifold_fit.estimator import estimate_on_manifold
-from jointfrf.identification.manifold_fit.interface_frfs import InterfaceFrfs
-from jointfrf.identification.manifold_fit.joint_terms import joint_terms
-from jointfrf.identification.manifold_fit.manifold import FrfEntries, LineData
+from jointfrf.identification.compliance_fit.compliance_lines import compliance_lines
+from jointfrf.identification.compliance_fit.estimator import estimate_joint
+from jointfrf.identification.compliance_fit.interface_frfs import InterfaceFrfs
+from jointfrf.identification.compliance_fit.joint_terms import joint_terms
+from jointfrf.identification.compliance_fit.manifold import FrfEntries, LineData
 
 LEVEL = 1e-6
 
@@ -98,7 +98,7 @@ def test_covariance_is_the_cramer_rao_bound_with_unknown_cross_terms(beams):
     terms = joint_terms(2 * np.pi * beams.freq, beams.joint.dofs, "viscous", "zero")
     one = np.eye(4)
     frfs = InterfaceFrfs(gamma, gamma, (1e-4 * abs(gamma)) ** 2, one, one, reciprocal=True)
-    found = estimate_on_manifold(frfs, terms, "ignore")
+    found = estimate_joint(frfs, terms, "ignore")
     k = beams.joint.dynamic_stiffness(beams.freq)
     bound = 1e-4 * np.sqrt(np.diag(cramer_rao(gamma, k, terms, unknown_cross=True)))
     np.testing.assert_allclose(np.sqrt(np.diag(found.covariance)), bound, rtol=1e-3)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from jointfrf.identification.manifold_fit.interface_frfs import InterfaceFrfs
+from jointfrf.identification.compliance_fit.interface_frfs import InterfaceFrfs
 
 N_FREQ = 3
 

@@ -5,7 +5,7 @@ import pytest
 from scipy import stats
 
 from compliance_lines import exact_compliance, fitted, fitted_group, white
-from jointfrf.identification.manifold_fit.intervals import (
+from jointfrf.identification.compliance_fit.intervals import (
     BLOCKS,
     LikelihoodIntervals,
     block_scatter,
@@ -13,7 +13,7 @@ from jointfrf.identification.manifold_fit.intervals import (
     profile_interval,
     spread_of,
 )
-from jointfrf.identification.manifold_fit.joint_terms import joint_terms
+from jointfrf.identification.compliance_fit.joint_terms import joint_terms
 
 FREQ = np.linspace(20.0, 500.0, 100)
 OMEGA = 2 * np.pi * FREQ

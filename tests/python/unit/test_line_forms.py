@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy import optimize
 
-from jointfrf.identification.manifold_fit.joint_terms import CoupledJoint, DiagonalJoint, joint_terms
-from jointfrf.identification.manifold_fit.line_forms import LineForms, inverse_information, minimise_forms
+from jointfrf.identification.compliance_fit.joint_terms import CoupledJoint, DiagonalJoint, joint_terms
+from jointfrf.identification.compliance_fit.line_forms import LineForms, inverse_information, minimise_forms
 
 OMEGA = 2 * np.pi * np.linspace(20, 400, 12)
 

@@ -6,8 +6,8 @@ import pytest
 import jointfrf as jf
 from jointfrf.frf import bands
 from jointfrf.frf.bands import line_slices
-from jointfrf.identification.manifold_fit.fit import fit_manifold
-from jointfrf.identification.manifold_fit.prepare import ManifoldOptions, NoiseOptions, prepare_manifold
+from jointfrf.identification.compliance_fit.fit import fit_compliance
+from jointfrf.identification.compliance_fit.prepare import FitOptions, NoiseOptions, prepare_compliance
 from jointfrf.identification.prepare import as_measured
 
 
@@ -50,11 +50,11 @@ def test_a_fit_of_pieces_is_that_of_all_lines(beams, cut, cross):
     """Everything after smoothing is by line."""
     x = as_measured(beams.freq, jf.pollute(beams.gamma(beams.joint), 0.01, seed=1), square=False)
     own = {"y": (100, 400), "theta": (300, 800)} if cross == "ignore" else None
-    options = ManifoldOptions("viscous", cross, True)
-    problem = prepare_manifold(x, ["y", "theta"], own, None, NoiseOptions(), options)
-    whole = fit_manifold(problem).joint
+    options = FitOptions("viscous", cross, True)
+    problem = prepare_compliance(x, ["y", "theta"], own, None, NoiseOptions(), options)
+    whole = fit_compliance(problem).joint
     cut()
-    fit = fit_manifold(problem).joint
+    fit = fit_compliance(problem).joint
     np.testing.assert_allclose(fit.k_lines, whole.k_lines, rtol=1e-9)
     for name, value in whole.parameters.items():
         # Starts see some lines only: both end where steps are far below a standard error.

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import manifold_numpy as plain
-from jointfrf.identification.manifold_fit.manifold import (
+from jointfrf.identification.compliance_fit.manifold import (
     FrfEntries,
     LineData,
     OnManifold,

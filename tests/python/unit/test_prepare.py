@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 import jointfrf as jf
-from jointfrf.identification.manifold_fit.prepare import (
-    ManifoldOptions,
+from jointfrf.identification.compliance_fit.prepare import (
+    FitOptions,
     NoiseOptions,
-    prepare_manifold,
+    prepare_compliance,
 )
 from jointfrf.identification.prepare import as_measured
 
-OPTIONS = ManifoldOptions("viscous", "zero", True)
+OPTIONS = FitOptions("viscous", "zero", True)
 #: From points 20 mm apart on each side of a joint of two DOFs to y and theta, and back.
 POINTS = np.kron(np.eye(2), [[1.0, 0.01], [1.0, -0.01]])
 TO_JOINT = np.linalg.inv(POINTS)
@@ -23,7 +23,7 @@ def measured(s, level=0.01):
 
 def prepared(s, **change):
     arguments = dict(measured=measured(s), dofs=["y", "theta"], bands=None, transform=None, noise=NoiseOptions())
-    return prepare_manifold(**(arguments | dict(options=OPTIONS) | change))
+    return prepare_compliance(**(arguments | dict(options=OPTIONS) | change))
 
 
 def test_lines_outside_all_bands_are_left_out_and_each_dof_keeps_its_own(beams):
@@ -203,13 +203,13 @@ def test_noise_alone_is_refused(beams):
 
 def test_words_are_checked_when_they_are_chosen():
     with pytest.raises(ValueError, match="damping must be one of none, viscous, hysteretic, both, auto, not 'dry'"):
-        ManifoldOptions("dry", "zero", True)
+        FitOptions("dry", "zero", True)
     with pytest.raises(ValueError, match="damping must be one of none, viscous, hysteretic, both, not 'auto'"):
-        ManifoldOptions(("viscous", "auto"), "zero", True)
+        FitOptions(("viscous", "auto"), "zero", True)
     with pytest.raises(ValueError, match="cross must be one of zero, ignore, fit, not 'some'"):
-        ManifoldOptions("auto", "some", True)
+        FitOptions("auto", "some", True)
 
 
 def test_damping_by_dof_needs_a_word_for_each(beams):
     with pytest.raises(ValueError, match="damping must hold one word for each of 2 DOFs, not 1"):
-        prepared(beams, options=ManifoldOptions(("viscous",), "zero", True))
+        prepared(beams, options=FitOptions(("viscous",), "zero", True))

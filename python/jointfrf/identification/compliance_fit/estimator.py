@@ -9,22 +9,22 @@ from numpy.typing import NDArray
 
 from jointfrf.dofs import Parameter
 from jointfrf.frf.bands import PIECE, line_slices
-from jointfrf.identification.manifold_fit.group_fit import LITTLE_PATIENCE, GroupFit, GroupProblem, fit_dofs
-from jointfrf.identification.manifold_fit.interface_frfs import InterfaceFrfs
-from jointfrf.identification.manifold_fit.joint_terms import (
+from jointfrf.identification.compliance_fit.group_fit import LITTLE_PATIENCE, GroupFit, GroupProblem, fit_dofs
+from jointfrf.identification.compliance_fit.interface_frfs import InterfaceFrfs
+from jointfrf.identification.compliance_fit.joint_terms import (
     CoupledJoint,
     CrossTerms,
     DiagonalJoint,
     JointCoordinates,
     JointTerms,
 )
-from jointfrf.identification.manifold_fit.line_forms import inverse_information
-from jointfrf.identification.manifold_fit.manifold import LineData
-from jointfrf.identification.manifold_fit.starts import first_joints
-from jointfrf.identification.manifold_fit.unknown_cross import fit_unknown_cross
+from jointfrf.identification.compliance_fit.line_forms import inverse_information
+from jointfrf.identification.compliance_fit.manifold import LineData
+from jointfrf.identification.compliance_fit.starts import first_joints
+from jointfrf.identification.compliance_fit.unknown_cross import fit_unknown_cross
 from jointfrf.kernel.arguments import FloatArray
 
-__all__ = ["FittedGroup", "JointEstimate", "estimate_on_manifold"]
+__all__ = ["FittedGroup", "JointEstimate", "estimate_joint"]
 
 
 #: A compliance is not taken below this share of its standard error, nor of the receptances around it.
@@ -87,7 +87,7 @@ class JointEstimate(NamedTuple):
         return all(group.fit.converged for group in self.groups)
 
 
-def estimate_on_manifold(
+def estimate_joint(
     frfs: InterfaceFrfs,
     terms: JointTerms,
     cross: CrossTerms = "zero",

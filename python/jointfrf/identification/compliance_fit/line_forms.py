@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from jointfrf.identification.manifold_fit.joint_terms import JointCoordinates
+from jointfrf.identification.compliance_fit.joint_terms import JointCoordinates
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
 __all__ = ["LEAST_GAIN", "FormMinimum", "LineForms", "inverse_information", "minimise_forms"]

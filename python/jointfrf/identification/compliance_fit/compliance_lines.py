@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from jointfrf.identification.manifold_fit.manifold import FrfEntries, LineData
+from jointfrf.identification.compliance_fit.manifold import FrfEntries, LineData
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.kernel.linear_algebra import invert, solve
 

@@ -7,10 +7,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy import special
 
-from jointfrf.identification.manifold_fit.diagonal_minimum import lowest_minimum
-from jointfrf.identification.manifold_fit.estimator import FittedGroup, JointEstimate
-from jointfrf.identification.manifold_fit.joint_terms import DiagonalJoint
-from jointfrf.identification.manifold_fit.line_forms import LineForms, inverse_information, minimise_forms
+from jointfrf.identification.compliance_fit.diagonal_minimum import lowest_minimum
+from jointfrf.identification.compliance_fit.estimator import FittedGroup, JointEstimate
+from jointfrf.identification.compliance_fit.joint_terms import DiagonalJoint
+from jointfrf.identification.compliance_fit.line_forms import LineForms, inverse_information, minimise_forms
 from jointfrf.kernel.arguments import FloatArray
 
 __all__ = ["BLOCKS", "LikelihoodIntervals", "Spread", "block_scatter", "line_scatter", "profile_interval", "spread_of"]

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf.frf.bands import line_slices
-from jointfrf.identification.manifold_fit.line_forms import LineForms
+from jointfrf.identification.compliance_fit.line_forms import LineForms
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.kernel.call import call
 

@@ -7,12 +7,12 @@ from typing import NamedTuple
 import numpy as np
 from scipy import special
 
-from jointfrf.identification.manifold_fit.estimator import FittedGroup, JointEstimate
-from jointfrf.identification.manifold_fit.group_fit import gradients_of
-from jointfrf.identification.manifold_fit.interface_frfs import InterfaceFrfs
-from jointfrf.identification.manifold_fit.joint_terms import DiagonalJoint
-from jointfrf.identification.manifold_fit.line_forms import inverse_information
-from jointfrf.identification.manifold_fit.rigidity import ChannelModes, left_out
+from jointfrf.identification.compliance_fit.estimator import FittedGroup, JointEstimate
+from jointfrf.identification.compliance_fit.group_fit import gradients_of
+from jointfrf.identification.compliance_fit.interface_frfs import InterfaceFrfs
+from jointfrf.identification.compliance_fit.joint_terms import DiagonalJoint
+from jointfrf.identification.compliance_fit.line_forms import inverse_information
+from jointfrf.identification.compliance_fit.rigidity import ChannelModes, left_out
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
 __all__ = ["ChannelSpread", "channel_spread"]

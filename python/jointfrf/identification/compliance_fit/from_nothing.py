@@ -6,7 +6,7 @@ import numpy as np
 
 from jointfrf.frf.bands import PIECE
 from jointfrf.frf.noise_estimate import ZERO
-from jointfrf.identification.manifold_fit.estimator import JointEstimate
+from jointfrf.identification.compliance_fit.estimator import JointEstimate
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
 __all__ = ["check_channels", "check_estimate", "check_joint_seen", "check_transform"]

@@ -6,9 +6,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from jointfrf.identification.manifold_fit.joint_terms import CoupledJoint, DiagonalJoint, JointCoordinates
-from jointfrf.identification.manifold_fit.line_forms import LineForms, minimise_forms
-from jointfrf.identification.manifold_fit.manifold import LineData, OnManifold, project
+from jointfrf.identification.compliance_fit.joint_terms import CoupledJoint, DiagonalJoint, JointCoordinates
+from jointfrf.identification.compliance_fit.line_forms import LineForms, minimise_forms
+from jointfrf.identification.compliance_fit.manifold import LineData, OnManifold, project
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.kernel.linear_algebra import invert, solve
 from jointfrf.substructuring.compliance import compliance_covariance, joint_compliance

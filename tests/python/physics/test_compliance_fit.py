@@ -8,11 +8,11 @@ import pytest
 
 import jointfrf as jf
 from cramer_rao import cramer_rao, term_matrices
-from jointfrf.identification.manifold_fit.estimator import estimate_on_manifold
-from jointfrf.identification.manifold_fit.interface_frfs import InterfaceFrfs
-from jointfrf.identification.manifold_fit.intervals import block_scatter
-from jointfrf.identification.manifold_fit.joint_terms import joint_terms
-from jointfrf.identification.manifold_fit.line_forms import inverse_information
+from jointfrf.identification.compliance_fit.estimator import estimate_joint
+from jointfrf.identification.compliance_fit.interface_frfs import InterfaceFrfs
+from jointfrf.identification.compliance_fit.intervals import block_scatter
+from jointfrf.identification.compliance_fit.joint_terms import joint_terms
+from jointfrf.identification.compliance_fit.line_forms import inverse_information
 
 TRUTH = np.array([6e5, 5e3, 20, 1.5])
 
@@ -39,7 +39,7 @@ def terms_of(s, damping="viscous", cross="zero"):
 def test_covariance_is_the_cramer_rao_bound(name, request):
     s = request.getfixturevalue(name)
     gamma = s.gamma(s.joint)
-    found = estimate_on_manifold(with_noise(gamma, 0.01), terms_of(s))
+    found = estimate_joint(with_noise(gamma, 0.01), terms_of(s))
     bound = 0.01 * np.sqrt(np.diag(cramer_rao(gamma, s.joint.dynamic_stiffness(s.freq), terms_of(s))))
     np.testing.assert_allclose(np.sqrt(np.diag(found.covariance)), bound, rtol=1e-3)
 
@@ -56,7 +56,7 @@ def test_exact_without_noise(beams, damping, cross):
     if cross == "fit":
         joint = jf.Joint([[6e5, 4e3], [4e3, 5e3]], joint.damping, joint.dofs, joint.loss_factor)
     terms = joint_terms(2 * np.pi * beams.freq, joint.dofs, damping, cross)
-    found = estimate_on_manifold(with_noise(beams.gamma(joint), 1e-3), terms, cross)
+    found = estimate_joint(with_noise(beams.gamma(joint), 1e-3), terms, cross)
     fitted = np.einsum("p,pfab->fab", found.theta, term_matrices(terms))
     np.testing.assert_allclose(fitted, joint.dynamic_stiffness(beams.freq), rtol=1e-6, atol=1e-3)
     assert found.converged
@@ -94,19 +94,19 @@ def test_the_band_mean_is_far_from_it(beams):
 
 def test_ignoring_cross_terms_costs_accuracy_but_no_bias(beams):
     gamma = beams.gamma(beams.joint)
-    known = estimate_on_manifold(with_noise(gamma, 0.02), terms_of(beams))
-    unknown = estimate_on_manifold(with_noise(gamma, 0.02), terms_of(beams), "ignore")
+    known = estimate_joint(with_noise(gamma, 0.02), terms_of(beams))
+    unknown = estimate_joint(with_noise(gamma, 0.02), terms_of(beams), "ignore")
     own, least = (np.sqrt(np.diag(found.covariance)) for found in (unknown, known))
     assert (own >= least * 0.999).all()
     drawn = jf.realisations(gamma, 0.02, seed=6, count=60)
-    found = [estimate_on_manifold(with_noise(h, 0.02, smooth=gamma), terms_of(beams), "ignore").theta for h in drawn]
+    found = [estimate_joint(with_noise(h, 0.02, smooth=gamma), terms_of(beams), "ignore").theta for h in drawn]
     assert (abs(np.mean(found, axis=0) - TRUTH) < 0.5 * own).all()
 
 
 def test_ignoring_cross_terms_finds_the_diagonal_of_c(beams):
     """A coupled joint: the fit that ignores cross terms gives the diagonal of its compliance."""
     joint = jf.Joint([[6e5, 8e3], [8e3, 5e3]], None, beams.joint.dofs)
-    found = estimate_on_manifold(with_noise(beams.gamma(joint), 1e-3), terms_of(beams, "none"), "ignore")
+    found = estimate_joint(with_noise(beams.gamma(joint), 1e-3), terms_of(beams, "none"), "ignore")
     np.testing.assert_allclose(1 / found.theta, np.diag(np.linalg.inv(joint.stiffness)), rtol=1e-3)
 
 
@@ -120,7 +120,7 @@ def test_channels_instead_of_dofs(beams):
 
     def fit(noisy):
         frfs = InterfaceFrfs(noisy, back @ h @ back.T, variance, back, back, reciprocal=True)
-        return estimate_on_manifold(frfs, terms_of(beams))
+        return estimate_joint(frfs, terms_of(beams))
 
     error = np.sqrt(np.diag(fit(h).covariance))
     found = np.array([fit(noisy).theta for noisy in jf.realisations(h, 0.002, seed=9, count=60)])
@@ -147,7 +147,7 @@ def test_scatter_of_blocks_agrees_where_the_model_is_right(beams):
     gamma = beams.gamma(beams.joint)
     ratios = []
     for h in jf.realisations(gamma, 0.02, seed=11, count=60):
-        found = estimate_on_manifold(with_noise(h, 0.02, smooth=gamma), terms_of(beams))
+        found = estimate_joint(with_noise(h, 0.02, smooth=gamma), terms_of(beams))
         own = np.diag(inverse_information(2 * found.groups[0].fit.minimum.information))
         ratios.append(block_scatter(found.groups[0])[0] / own)
     np.testing.assert_allclose(np.sqrt(np.mean(ratios, axis=0)), 1, atol=0.4)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from jointfrf.identification.manifold_fit.joint_terms import DiagonalJoint, JointCoordinates
-from jointfrf.identification.manifold_fit.line_forms import LEAST_GAIN, FormMinimum, LineForms, minimise_forms
+from jointfrf.identification.compliance_fit.joint_terms import DiagonalJoint, JointCoordinates
+from jointfrf.identification.compliance_fit.line_forms import LEAST_GAIN, FormMinimum, LineForms, minimise_forms
 from jointfrf.kernel.arguments import FloatArray
 
 __all__ = ["lowest_minimum", "within_reach"]

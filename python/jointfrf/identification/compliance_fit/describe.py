@@ -11,17 +11,17 @@ from numpy.typing import NDArray
 
 from jointfrf.dofs import compliance_unit, is_rotation
 from jointfrf.errors import ConvergenceWarning, IdentificationWarning
+from jointfrf.identification.compliance_fit.damping_choice import DofDamping
+from jointfrf.identification.compliance_fit.estimator import JointEstimate
+from jointfrf.identification.compliance_fit.fit import ComplianceFit
+from jointfrf.identification.compliance_fit.intervals import Spread
+from jointfrf.identification.compliance_fit.joint_terms import CrossTerms
+from jointfrf.identification.compliance_fit.misfit import Misfit
+from jointfrf.identification.compliance_fit.prepare import FitProblem, Transforms
 from jointfrf.identification.elastic_centre import elastic_centre
 from jointfrf.identification.joint_fit import JointFit
-from jointfrf.identification.manifold_fit.damping_choice import DofDamping
-from jointfrf.identification.manifold_fit.estimator import JointEstimate
-from jointfrf.identification.manifold_fit.fit import ManifoldFit
-from jointfrf.identification.manifold_fit.intervals import Spread
-from jointfrf.identification.manifold_fit.joint_terms import CrossTerms
-from jointfrf.identification.manifold_fit.misfit import Misfit
-from jointfrf.identification.manifold_fit.prepare import ManifoldProblem, Transforms
 
-__all__ = ["Described", "describe_manifold"]
+__all__ = ["Described", "describe_compliance"]
 
 #: A parameter is called poorly determined when its interval is wider than this share of it.
 _UNCERTAIN = 0.5
@@ -61,7 +61,7 @@ class Described(NamedTuple):
     warnings: tuple[Warning, ...] = ()
 
 
-def describe_manifold(found: ManifoldFit, problem: ManifoldProblem) -> Described:
+def describe_compliance(found: ComplianceFit, problem: FitProblem) -> Described:
     """Add the notes and warnings of a fit on the manifold."""
     fit, result = found.joint, found.estimate
     intervals = fit.confidence_interval(0.95)
@@ -126,7 +126,7 @@ def _choice_notes(choices: Sequence[DofDamping]) -> list[str]:
     return told
 
 
-def _noise_notes(problem: ManifoldProblem) -> list[str]:
+def _noise_notes(problem: FitProblem) -> list[str]:
     noise = problem.noise
     told = []
     if noise.is_assumed:
@@ -143,7 +143,7 @@ def _noise_notes(problem: ManifoldProblem) -> list[str]:
     return told
 
 
-def _small_residual_notes(found: ManifoldFit, problem: ManifoldProblem) -> list[str]:
+def _small_residual_notes(found: ComplianceFit, problem: FitProblem) -> list[str]:
     """Say that the residual is below the noise: intervals are then wider than they need be."""
     misfit, noise = found.misfit, problem.noise
     # What is not rigid in the channels weighs as noise, and averages out of a residual of joint DOFs.
@@ -157,7 +157,7 @@ def _small_residual_notes(found: ManifoldFit, problem: ManifoldProblem) -> list[
     ]
 
 
-def _channel_notes(found: ManifoldFit, problem: ManifoldProblem) -> list[str]:
+def _channel_notes(found: ComplianceFit, problem: FitProblem) -> list[str]:
     """Say what is known of the flexibility between channels."""
     frfs = problem.frfs
     if Transforms(frfs.responses, frfs.forces).are_units:
@@ -202,7 +202,7 @@ def _reference_notes(fit: JointFit) -> list[str]:
     ]
 
 
-def _left_out_warnings(problem: ManifoldProblem) -> list[str]:
+def _left_out_warnings(problem: FitProblem) -> list[str]:
     """Name DOFs that are not sought, but enter those that are."""
     told = []
     for one in problem.left_out:
@@ -219,7 +219,7 @@ def _left_out_warnings(problem: ManifoldProblem) -> list[str]:
     return told
 
 
-def _rigidity_warnings(found: ManifoldFit) -> list[str]:
+def _rigidity_warnings(found: ComplianceFit) -> list[str]:
     """Name stiffnesses whose uncertainty is mostly that of sides that are not rigid."""
     if found.channels is None:
         return []
@@ -318,7 +318,7 @@ def _sign_warnings(fit: JointFit, intervals: dict[str, tuple[float, float]]) -> 
     ]
 
 
-def _misfit_warnings(found: ManifoldFit, problem: ManifoldProblem) -> list[str]:
+def _misfit_warnings(found: ComplianceFit, problem: FitProblem) -> list[str]:
     """Say whether the residual differs from the noise, and how."""
     misfit, told = found.misfit, []
     apart = f"{abs(misfit.ratio - 1) / misfit.sigma:.0f} sigma"

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf.frf.bands import line_slices
-from jointfrf.identification.manifold_fit.diagonal_minimum import lowest_minimum, within_reach
-from jointfrf.identification.manifold_fit.joint_terms import DiagonalJoint, JointCoordinates
-from jointfrf.identification.manifold_fit.likely_m import PriorOfM, expected_m, prior_of_m
-from jointfrf.identification.manifold_fit.line_forms import FormMinimum, LineForms, inverse_information
-from jointfrf.identification.manifold_fit.manifold import LineData, OnManifold, normal_forms, project
-from jointfrf.identification.manifold_fit.starts import smooth_compliance, starts_on_manifold
+from jointfrf.identification.compliance_fit.diagonal_minimum import lowest_minimum, within_reach
+from jointfrf.identification.compliance_fit.joint_terms import DiagonalJoint, JointCoordinates
+from jointfrf.identification.compliance_fit.likely_m import PriorOfM, expected_m, prior_of_m
+from jointfrf.identification.compliance_fit.line_forms import FormMinimum, LineForms, inverse_information
+from jointfrf.identification.compliance_fit.manifold import LineData, OnManifold, normal_forms, project
+from jointfrf.identification.compliance_fit.starts import smooth_compliance, starts_on_manifold
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
 __all__ = ["LITTLE_PATIENCE", "GroupFit", "GroupProblem", "Misfitting", "fit_dofs", "gradients_of"]

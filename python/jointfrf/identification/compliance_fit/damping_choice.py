@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from jointfrf.identification.manifold_fit.estimator import FittedGroup
-from jointfrf.identification.manifold_fit.joint_terms import DampingTerms, DiagonalJoint, joint_terms
-from jointfrf.identification.manifold_fit.line_forms import minimise_forms
+from jointfrf.identification.compliance_fit.estimator import FittedGroup
+from jointfrf.identification.compliance_fit.joint_terms import DampingTerms, DiagonalJoint, joint_terms
+from jointfrf.identification.compliance_fit.line_forms import minimise_forms
 
 __all__ = ["DofDamping", "choose_damping"]
 

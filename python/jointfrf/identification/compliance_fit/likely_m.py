@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from jointfrf.identification.manifold_fit.manifold import LineData, OnManifold
+from jointfrf.identification.compliance_fit.manifold import LineData, OnManifold
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.kernel.linear_algebra import invert
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import manifold_numpy as plain
-from jointfrf.identification.manifold_fit.likely_m import PriorOfM, expected_m, prior_of_m
-from jointfrf.identification.manifold_fit.manifold import FrfEntries, LineData, OnManifold, frfs_of_joint
+from jointfrf.identification.compliance_fit.likely_m import PriorOfM, expected_m, prior_of_m
+from jointfrf.identification.compliance_fit.manifold import FrfEntries, LineData, OnManifold, frfs_of_joint
 
 N_FREQ, NOISE = 9, 1e-2
 

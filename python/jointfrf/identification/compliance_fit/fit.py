@@ -9,18 +9,18 @@ import numpy as np
 
 from jointfrf.errors import IllConditionedWarning
 from jointfrf.frf.bands import line_slices
+from jointfrf.identification.compliance_fit.channel_jackknife import ChannelSpread, channel_spread
+from jointfrf.identification.compliance_fit.damping_choice import DofDamping, choose_damping
+from jointfrf.identification.compliance_fit.estimator import JointEstimate, estimate_joint
+from jointfrf.identification.compliance_fit.from_nothing import check_estimate
+from jointfrf.identification.compliance_fit.intervals import LikelihoodIntervals, Spread, spread_of
+from jointfrf.identification.compliance_fit.joint_terms import CrossTerms, DampingTerms, joint_terms
+from jointfrf.identification.compliance_fit.misfit import Misfit, diagnose
+from jointfrf.identification.compliance_fit.prepare import FitProblem
 from jointfrf.identification.joint_fit import JointFit
-from jointfrf.identification.manifold_fit.channel_jackknife import ChannelSpread, channel_spread
-from jointfrf.identification.manifold_fit.damping_choice import DofDamping, choose_damping
-from jointfrf.identification.manifold_fit.estimator import JointEstimate, estimate_on_manifold
-from jointfrf.identification.manifold_fit.from_nothing import check_estimate
-from jointfrf.identification.manifold_fit.intervals import LikelihoodIntervals, Spread, spread_of
-from jointfrf.identification.manifold_fit.joint_terms import CrossTerms, DampingTerms, joint_terms
-from jointfrf.identification.manifold_fit.misfit import Misfit, diagnose
-from jointfrf.identification.manifold_fit.prepare import ManifoldProblem
 from jointfrf.substructuring.ismm import inverse_substructuring
 
-__all__ = ["ManifoldFit", "fit_manifold"]
+__all__ = ["ComplianceFit", "fit_compliance"]
 
 #: An assumed noise level is replaced by that of the residual until both agree to this factor.
 _AGREE = 1.3
@@ -31,8 +31,8 @@ _LEAST_EXCESS = 1e-12
 _NO_NOISE = 1e-3
 
 
-class ManifoldFit(NamedTuple):
-    """Result of `fit_manifold`.
+class ComplianceFit(NamedTuple):
+    """Result of `fit_compliance`.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ class ManifoldFit(NamedTuple):
     choices: tuple[DofDamping, ...]
 
 
-def fit_manifold(problem: ManifoldProblem) -> ManifoldFit:
+def fit_compliance(problem: FitProblem) -> ComplianceFit:
     """Fit the joint by maximum likelihood, linearised on the manifold of FRFs that fit it."""
     freq = problem.freq_hz
     span = f"{freq.size} lines, {freq.min():g} to {freq.max():g} Hz" if freq.size > 1 else f"one line, {freq[0]:g} Hz"
@@ -102,11 +102,13 @@ def fit_manifold(problem: ManifoldProblem) -> ManifoldFit:
         intervals=LikelihoodIntervals(result, spread.factor, None if channels is None else channels.std_error),
     )
     misfit = diagnose(result, problem.freq_hz, noise.inflation, spread)
-    return ManifoldFit(joint, result, spread, channels, misfit, _cross_fits(problem, result, misfit, choices), choices)
+    return ComplianceFit(
+        joint, result, spread, channels, misfit, _cross_fits(problem, result, misfit, choices), choices
+    )
 
 
 def _cross_fits(
-    problem: ManifoldProblem,
+    problem: FitProblem,
     result: JointEstimate,
     misfit: Misfit,
     choices: tuple[DofDamping, ...],
@@ -121,7 +123,7 @@ def _cross_fits(
     return bool(np.sqrt(other.excess) - 1 < (misfit.ratio - 1) / 4)
 
 
-def _fitted(problem: ManifoldProblem) -> tuple[ManifoldProblem, JointEstimate, tuple[DofDamping, ...]]:
+def _fitted(problem: FitProblem) -> tuple[FitProblem, JointEstimate, tuple[DofDamping, ...]]:
     """Fit with the damping terms asked for; where no noise level is known, at that of the residual."""
     result, choices = _with_damping(problem)
     for _ in range(_MOST_LEVELS if problem.noise.is_assumed else 0):
@@ -133,7 +135,7 @@ def _fitted(problem: ManifoldProblem) -> tuple[ManifoldProblem, JointEstimate, t
     return problem, result, choices
 
 
-def _with_damping(problem: ManifoldProblem) -> tuple[JointEstimate, tuple[DofDamping, ...]]:
+def _with_damping(problem: FitProblem) -> tuple[JointEstimate, tuple[DofDamping, ...]]:
     damping = problem.options.damping
     if damping != "auto":
         return _estimate(problem, damping), ()
@@ -152,7 +154,7 @@ def _with_damping(problem: ManifoldProblem) -> tuple[JointEstimate, tuple[DofDam
     return _estimate(problem, chosen), choices
 
 
-def _with_common_damping(problem: ManifoldProblem) -> tuple[JointEstimate, tuple[DofDamping, ...]]:
+def _with_common_damping(problem: FitProblem) -> tuple[JointEstimate, tuple[DofDamping, ...]]:
     """Choose the damping terms of a joint with cross terms: the same for all DOFs."""
     kinds: tuple[DampingTerms, ...] = ("viscous", "hysteretic", "both")
     results = {kind: _estimate(problem, kind) for kind in kinds}
@@ -167,11 +169,11 @@ def _with_common_damping(problem: ManifoldProblem) -> tuple[JointEstimate, tuple
 
 
 def _estimate(
-    problem: ManifoldProblem, damping: DampingTerms | tuple[DampingTerms, ...], cross: CrossTerms | None = None
+    problem: FitProblem, damping: DampingTerms | tuple[DampingTerms, ...], cross: CrossTerms | None = None
 ) -> JointEstimate:
     cross = problem.options.cross if cross is None else cross
     terms = joint_terms(2 * np.pi * problem.freq_hz, problem.dofs, damping, cross)
     with warnings.catch_warnings(), np.errstate(over="ignore", divide="ignore", invalid="ignore"):
         # Lines on which noise hides the joint are ill-conditioned; they weigh little. A start may lead to infinity.
         warnings.simplefilter("ignore", IllConditionedWarning)
-        return estimate_on_manifold(problem.frfs, terms, cross, problem.used, problem.near)
+        return estimate_joint(problem.frfs, terms, cross, problem.used, problem.near)

@@ -8,11 +8,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from jointfrf.identification.manifold_fit.compliance_lines import ComplianceLines, compliance_lines
-from jointfrf.identification.manifold_fit.group_fit import GroupFit, GroupProblem, Misfitting
-from jointfrf.identification.manifold_fit.joint_terms import JointCoordinates
-from jointfrf.identification.manifold_fit.line_forms import FormMinimum, LineForms, inverse_information, minimise_forms
-from jointfrf.identification.manifold_fit.starts import hidden_share
+from jointfrf.identification.compliance_fit.compliance_lines import ComplianceLines, compliance_lines
+from jointfrf.identification.compliance_fit.group_fit import GroupFit, GroupProblem, Misfitting
+from jointfrf.identification.compliance_fit.joint_terms import JointCoordinates
+from jointfrf.identification.compliance_fit.line_forms import (
+    FormMinimum,
+    LineForms,
+    inverse_information,
+    minimise_forms,
+)
+from jointfrf.identification.compliance_fit.starts import hidden_share
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.kernel.linear_algebra import invert
 

@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy import special
 
-from jointfrf.identification.manifold_fit.estimator import FittedGroup, JointEstimate
-from jointfrf.identification.manifold_fit.intervals import BLOCKS, Spread
-from jointfrf.identification.manifold_fit.line_forms import inverse_information
+from jointfrf.identification.compliance_fit.estimator import FittedGroup, JointEstimate
+from jointfrf.identification.compliance_fit.intervals import BLOCKS, Spread
+from jointfrf.identification.compliance_fit.line_forms import inverse_information
 from jointfrf.kernel.arguments import FloatArray
 
 __all__ = ["Misfit", "Trend", "diagnose"]

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 import jointfrf as jf
-from jointfrf.identification.manifold_fit.damping_choice import DofDamping
-from jointfrf.identification.manifold_fit.describe import describe_manifold
-from jointfrf.identification.manifold_fit.fit import fit_manifold
-from jointfrf.identification.manifold_fit.misfit import Misfit, Trend
-from jointfrf.identification.manifold_fit.prepare import (
-    ManifoldOptions,
+from jointfrf.identification.compliance_fit.damping_choice import DofDamping
+from jointfrf.identification.compliance_fit.describe import describe_compliance
+from jointfrf.identification.compliance_fit.fit import fit_compliance
+from jointfrf.identification.compliance_fit.misfit import Misfit, Trend
+from jointfrf.identification.compliance_fit.prepare import (
+    FitOptions,
     NoiseOptions,
-    prepare_manifold,
+    prepare_compliance,
 )
 from jointfrf.identification.prepare import as_measured
 
@@ -30,9 +30,9 @@ def between(s, stiffness):
 
 def told(freq, h, dofs, *, noise=LEVEL, damping="viscous", cross="zero"):
     """Return the fit described."""
-    options = ManifoldOptions(damping, cross, True)
-    problem = prepare_manifold(as_measured(freq, h, square=False), dofs, None, None, NoiseOptions(noise), options)
-    return describe_manifold(fit_manifold(problem), problem).fit
+    options = FitOptions(damping, cross, True)
+    problem = prepare_compliance(as_measured(freq, h, square=False), dofs, None, None, NoiseOptions(noise), options)
+    return describe_compliance(fit_compliance(problem), problem).fit
 
 
 class Found:
@@ -42,7 +42,7 @@ class Found:
         self.fit, self.problem = fit, problem
 
     def described(self):
-        return describe_manifold(self.fit, self.problem)
+        return describe_compliance(self.fit, self.problem)
 
     def with_(self, **change):
         return Found(self.fit._replace(**change), self.problem)
@@ -64,9 +64,9 @@ class Found:
 def found(beams):
     """A fit of which there is nothing to tell."""
     gamma = as_measured(beams.freq, jf.pollute(beams.gamma(beams.joint), LEVEL, seed=3), square=False)
-    options = ManifoldOptions("viscous", "zero", True)
-    problem = prepare_manifold(gamma, ["y", "theta"], None, None, NoiseOptions(LEVEL), options)
-    return Found(fit_manifold(problem), problem)
+    options = FitOptions("viscous", "zero", True)
+    problem = prepare_compliance(gamma, ["y", "theta"], None, None, NoiseOptions(LEVEL), options)
+    return Found(fit_compliance(problem), problem)
 
 
 def test_nothing_to_tell(found):

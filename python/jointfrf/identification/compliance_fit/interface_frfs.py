@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from jointfrf.identification.manifold_fit.manifold import FrfEntries, LineData
+from jointfrf.identification.compliance_fit.manifold import FrfEntries, LineData
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
 __all__ = ["InterfaceFrfs"]

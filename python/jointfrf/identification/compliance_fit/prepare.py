@@ -15,11 +15,11 @@ from jointfrf.frf.bands import PIECE, Band, as_bands, in_bands, line_slices
 from jointfrf.frf.noise_estimate import ZERO
 from jointfrf.frf.noise_model import NoiseModel, estimate_noise
 from jointfrf.frf.smoothing import near_squares, smooth_frfs
-from jointfrf.identification.manifold_fit.estimator import JointEstimate
-from jointfrf.identification.manifold_fit.from_nothing import check_channels, check_joint_seen, check_transform
-from jointfrf.identification.manifold_fit.interface_frfs import InterfaceFrfs
-from jointfrf.identification.manifold_fit.joint_terms import CrossTerms, DampingTerms
-from jointfrf.identification.manifold_fit.rigidity import (
+from jointfrf.identification.compliance_fit.estimator import JointEstimate
+from jointfrf.identification.compliance_fit.from_nothing import check_channels, check_joint_seen, check_transform
+from jointfrf.identification.compliance_fit.interface_frfs import InterfaceFrfs
+from jointfrf.identification.compliance_fit.joint_terms import CrossTerms, DampingTerms
+from jointfrf.identification.compliance_fit.rigidity import (
     ChannelModes,
     deformation_compliance,
     deformation_variance,
@@ -35,14 +35,14 @@ from jointfrf.kernel.arguments import (
 )
 
 __all__ = [
+    "FitOptions",
+    "FitProblem",
     "KnownNoise",
-    "ManifoldOptions",
-    "ManifoldProblem",
     "NoiseOptions",
     "Transform",
     "Transforms",
     "as_transforms",
-    "prepare_manifold",
+    "prepare_compliance",
 ]
 
 #: What a transform may be given as.
@@ -69,7 +69,7 @@ class NoiseOptions:
 
 
 @dataclass(frozen=True)
-class ManifoldOptions:
+class FitOptions:
     """Choices of a fit on the manifold, as in `identify`."""
 
     damping: DampingTerms | Literal["auto"] | tuple[DampingTerms, ...]
@@ -196,7 +196,7 @@ class PreparedFrfs(NamedTuple):
 
 
 @dataclass(frozen=True)
-class ManifoldProblem:
+class FitProblem:
     """A fit on the manifold, ready to be computed: lines inside the bands only.
 
     Attributes
@@ -211,7 +211,7 @@ class ManifoldProblem:
         Lines used for each DOF.
     bands : tuple
         For each DOF its bands, (low, high) in Hz.
-    options : ManifoldOptions
+    options : FitOptions
     near : JointEstimate, optional
         Of other FRFs of the same structure: where the fit starts first.
     deformation : ndarray, shape (n_freq, m_r, m_f), optional
@@ -228,13 +228,13 @@ class ManifoldProblem:
     noise: KnownNoise
     used: NDArray[np.bool_]
     bands: tuple[tuple[Band, ...], ...]
-    options: ManifoldOptions
+    options: FitOptions
     near: JointEstimate | None = None
     deformation: FloatArray | None = None
     added_compliance: FloatArray | None = None
     left_out: tuple[LeftOutDof, ...] = ()
 
-    def with_noise(self, scale: float) -> ManifoldProblem:
+    def with_noise(self, scale: float) -> FitProblem:
         """Return the same with another noise level."""
         noise = replace(self.noise, level=scale * self.noise.level)
         flexible = 0.0 if self.deformation is None else self.deformation
@@ -242,14 +242,14 @@ class ManifoldProblem:
         return replace(self, noise=noise, frfs=self.frfs._replace(variance=variance))
 
 
-def prepare_manifold(
+def prepare_compliance(
     measured: MeasuredFrfs,
     dofs: Sequence[str] | None,
     bands: BandsOfDofs,
     transform: Transform | tuple[Transform, Transform] | None,
     noise: NoiseOptions,
-    options: ManifoldOptions,
-) -> ManifoldProblem:
+    options: FitOptions,
+) -> FitProblem:
     """Check the arguments of the fit, find the noise, and keep the lines in the bands; as in `identify`."""
     freq, h = measured.freq_hz, measured.h
     transforms = as_transforms(transform, h)
@@ -273,7 +273,7 @@ def prepare_manifold(
     _check_joint_dofs(transforms, h, names)
     found = _known_noise(freq, h, noise, transforms, reciprocal=options.reciprocal and square)
     check_joint_seen(freq, found.smooth, transforms.variance(found.variance))
-    return ManifoldProblem(
+    return FitProblem(
         dofs=names,
         freq_hz=freq,
         frfs=InterfaceFrfs(

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from jointfrf.identification.manifold_fit.diagonal_minimum import lowest_minimum, within_reach
-from jointfrf.identification.manifold_fit.joint_terms import DiagonalJoint, joint_terms
-from jointfrf.identification.manifold_fit.line_forms import LineForms, minimise_forms
+from jointfrf.identification.compliance_fit.diagonal_minimum import lowest_minimum, within_reach
+from jointfrf.identification.compliance_fit.joint_terms import DiagonalJoint, joint_terms
+from jointfrf.identification.compliance_fit.line_forms import LineForms, minimise_forms
 
 OMEGA = 2 * np.pi * np.linspace(10, 500, 40)
 
