@@ -157,7 +157,16 @@ def _trials() -> dict[str, list[Trial]]:
     levels = [Trial("3.3", "complex", level) for level in (0.005, 0.01, 0.05, 0.1)]
     stiff = [
         Trial("3.3", "complex", level, factor)
-        for factor, level in [(100, 0.05), (300, 0.01), (300, 0.05), (1e3, 0.01), (1e4, 0.01), (1e5, 0.01)]
+        for factor, level in [
+            (10, 0.05),
+            (100, 0.05),
+            (300, 0.01),
+            (300, 0.05),
+            (1e3, 0.01),
+            (1e3, 0.05),
+            (1e4, 0.01),
+            (1e5, 0.01),
+        ]
     ]
     few = [Trial("3.3", "complex", 0.05, step=step) for step in (300, 160, 80, 40)]
     return {

@@ -62,4 +62,4 @@ def fit_measured(freq_hz: FloatArray, dofs: tuple[str, ...], h: ComplexArray, tr
     with warnings.catch_warnings():
         for category in (IdentificationWarning, IllConditionedWarning, ConvergenceWarning, FrfCheckWarning):
             warnings.simplefilter("ignore", category)
-        return identify(freq_hz, h, dofs, transform=transform, cross="ignore", noise=_ASSUMED)
+        return identify(freq_hz, h, dofs, transform=transform, damping="viscous", cross="ignore", noise=_ASSUMED)

@@ -104,7 +104,7 @@ def run(args: argparse.Namespace) -> int:
         print(frfs.summary())
         print("\nname the points and DOFs of the joint to identify it: --j NODES --k NODES --dofs DOFS")
         return 0
-    sides = interface_of(args, frfs)
+    sides = interface_of(args, frfs, args.bending_stiffness)
     measured = frfs.matrix(sides.channels, sides.channels)
     warn_of_frfs(check_frfs(*in_some_band(frfs.freq_hz, measured, args.band), sides.channels))
     fits = [_fit(args, method, frfs, measured, sides) for method in args.method]
@@ -168,7 +168,7 @@ def _fit(args: argparse.Namespace, method: str, frfs: FrfSet, measured: np.ndarr
             args.dofs,
             method,  # type: ignore[arg-type]
             args.band,
-            transform=sides.transform,
+            transform=sides,
             damping=args.damping,
             cross=args.cross,
             noise=args.noise,

@@ -113,8 +113,8 @@ def in_some_band(
     return freq_hz[kept], np.ascontiguousarray(h[kept])
 
 
-def interface_of(args: argparse.Namespace, frfs: FrfSet) -> Interface:
-    """Return the joint DOFs of both sides."""
+def interface_of(args: argparse.Namespace, frfs: FrfSet, bending_stiffness: float | None = None) -> Interface:
+    """Return the joint DOFs of both sides; E I of the sides in N m^2 widens intervals of rotations."""
     places = dict(frfs.coordinates)
     if (args.spacing is None) != (args.axis is None):
         raise ValueError("--spacing and --axis go together")
@@ -135,4 +135,5 @@ def interface_of(args: argparse.Namespace, frfs: FrfSet) -> Interface:
             )
         if node not in places and (len(args.j) > 1 or any(is_rotation(dof) for dof in args.dofs)):
             raise FileContentError(f"{args.file} has no coordinates of node {node}: say --spacing and --axis")
-    return interface(args.j, args.k, args.dofs, {node: places.get(node, np.zeros(3)) for node in (*args.j, *args.k)})
+    at = {node: places.get(node, np.zeros(3)) for node in (*args.j, *args.k)}
+    return interface(args.j, args.k, args.dofs, at, bending_stiffness=bending_stiffness)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy import optimize
 
 from jointfrf.dofs import is_rotation
 from jointfrf.identification.joint_fit import JointFit
@@ -175,6 +174,8 @@ class _Coupling:
 
 def _found(coupling: _Coupling) -> ElasticCentre:
     """Minimise the coupling from the present point, and from where its linear part vanishes."""
+    from scipy import optimize
+
     start = optimize.least_squares(coupling.weighted, np.zeros(3), xtol=1e-14, ftol=1e-14, gtol=1e-14)
     linear = optimize.least_squares(coupling.weighted, coupling.linear(), xtol=1e-14, ftol=1e-14, gtol=1e-14)
     best = min((start, linear), key=lambda one: one.cost)

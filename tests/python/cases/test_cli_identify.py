@@ -70,6 +70,7 @@ def test_figures_are_written_and_nothing_else(identified):
     names = {path.name for path in folder.iterdir()}
     assert names == {
         "identification.json",
+        "noise_found.png",
         "joint_y.png",
         "joint_theta_x.png",
         "joint_y_inverse-substructuring.png",

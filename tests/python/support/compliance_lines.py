@@ -7,7 +7,6 @@ import numpy as np
 from jointfrf.identification.compliance_fit.estimator import FittedGroup, JointEstimate, assembled, coordinates_of
 from jointfrf.identification.compliance_fit.group_fit import GroupFit
 from jointfrf.identification.compliance_fit.line_forms import LineForms, minimise_forms
-from jointfrf.identification.compliance_fit.manifold import OnManifold
 
 
 def white(shape, seed):
@@ -32,9 +31,7 @@ def fitted_group(terms, measured, std, start):
     )
     found = minimise_forms(forms, joint, joint.coordinates(start))
     trusted = np.ones(len(measured), bool)
-    none = np.zeros((len(measured), 0, 0), complex)
-    nowhere = OnManifold(none, none, np.zeros(len(measured)))
-    fit = GroupFit(found, forms, trusted, float(measured.size), float(measured.size), 1, True, nowhere, none)
+    fit = GroupFit(found, forms, trusted, float(measured.size), float(measured.size), 1, True)
     # There are no FRFs; their size, below which a compliance is rounding, is taken as zero.
     problem = SimpleNamespace(data=SimpleNamespace(own_size=np.zeros(terms.n)))
     return FittedGroup(np.arange(terms.n), np.arange(len(terms.parameters)), joint, problem, fit)

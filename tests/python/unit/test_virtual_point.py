@@ -214,7 +214,8 @@ def test_a_fully_coupled_joint_is_identified(six_dof_joint):
         off.append((value - exact) / noisy.std_error[name])
     assert len(off) == 42
     assert max(abs(np.array(off))) < 4.5
-    assert 0.7 < np.sqrt(np.mean(np.square(off))) < 1.5
+    # Intervals that allow for sides that are not rigid are somewhat wider than noise makes them.
+    assert 0.4 < np.sqrt(np.mean(np.square(off))) < 1.5
     np.testing.assert_allclose(noisy.stiffness, np.diag(joint.stiffness), rtol=0.003)
 
 
@@ -224,18 +225,16 @@ def test_over_determination_sharpens_the_joint(six_dof_joint):
     few = [virtual_point(p[:9], d[:9], POINT) for p, d in (triaxial(POINT + AROUND), triaxial(POINT - 0.8 * AROUND))]
     nine = [*range(9), *range(12, 21)]
     variance = np.full(gamma.shape, 1e-22)  # equal in all FRFs, as least squares with equal weights takes it
-    with warnings.catch_warnings():
-        # The diagonal of the compliance of a coupled joint is not that of a spring and a dashpot.
-        warnings.simplefilter("ignore", jf.IdentificationWarning)
-        many = jf.identify(freq, gamma, DOFS, transform=virtual_points(*sides), noise=variance, cross="ignore")
-        fewer = jf.identify(
-            freq,
-            gamma[:, nine][:, :, nine],
-            DOFS,
-            transform=virtual_points(*few),
-            noise=variance[:, :18, :18],
-            cross="ignore",
-        )
+    options = dict(damping="viscous", cross="fit")
+    many = jf.identify(freq, gamma, DOFS, transform=virtual_points(*sides), noise=variance, **options)
+    fewer = jf.identify(
+        freq,
+        gamma[:, nine][:, :, nine],
+        DOFS,
+        transform=virtual_points(*few),
+        noise=variance[:, :18, :18],
+        **options,
+    )
     for dof in DOFS:
         assert many.std_error[f"k_{dof}"] < fewer.std_error[f"k_{dof}"]
 
@@ -302,4 +301,5 @@ def test_a_bolted_lap_joint_in_six_dofs():
             frfs.freq_hz, h, SOURCE_ORDER, bands=(20, 550), transform=virtual_points(*sides), cross="ignore"
         )
     assert fit.noise_level == pytest.approx(0.01, rel=0.05)
-    assert fit.residual_level == pytest.approx(0.01, rel=0.1)
+    # What is not rigid in the channels adds to their variance.
+    assert 0.006 < fit.residual_level < 0.011

@@ -18,6 +18,10 @@ from jointfrf.kernel.arguments import ComplexArray, FloatArray
 __all__ = ["ChannelSpread", "channel_spread"]
 
 
+#: How often the noise of an FRF is left out: with its response, and with its force.
+_TIMES = 2.0
+
+
 class _Changes(NamedTuple):
     """Changes of gamma without a channel, shape (n_freq, 2 n, 2 n) each, and redundancies of the channels."""
 
@@ -53,10 +57,10 @@ def channel_spread(found: JointEstimate, frfs: InterfaceFrfs, compliance: FloatA
     Notes
     -----
     The jackknife variance over channels, sum of redundancy times squared change when one is left out (unbiased for
-    errors that are independent between channels), and the square of the change for a compliance of every DOF; both
-    times Student's t for the few channels. To first order, by one Gauss-Newton step. Where responses and forces are the
-    same
-    channels both are left out together: a body deforms alike where it is struck and where it is measured.
+    errors that are independent between channels) less what noise makes of it, and the square of the change for a
+    compliance of every DOF; both times Student's t for the few channels. To first order, by one Gauss-Newton step.
+    Where responses and forces are the same channels both are left out together: a body deforms alike where it is struck
+    and where it is measured.
     """
     without = _without_channels(frfs)
     if without is None and compliance is None:
@@ -69,32 +73,38 @@ def channel_spread(found: JointEstimate, frfs: InterfaceFrfs, compliance: FloatA
     for group in found.groups:
         minimum = group.fit.minimum
         inverse = inverse_information(minimum.information)
-        changes, weights = np.zeros((0, minimum.x.size)), np.zeros(0)
+        changes, weights, of_noise = np.zeros((0, minimum.x.size)), np.zeros(0), 0.0
         if without is not None:
             entries = (frfs.entries_of(group.dofs, one) for one in without.gamma)
             changes = gradients_of(group.problem, group.fit, entries) @ inverse
-            weights = without.redundancy
+            weights, of_noise = without.redundancy, few * _TIMES
         if compliance is not None:
             softer = _softer(group, compliance[group.dofs]) @ inverse
             if isinstance(group.joint, DiagonalJoint):
                 # Whatever the damping takes up of it.
                 softer[:, : group.dofs.size] = np.diag(compliance[group.dofs])
-            changes = np.vstack([changes, softer])
-            weights = np.append(weights, np.ones(group.dofs.size))
-        std_error[group.which], factor[group.which] = _spread(group, changes, few * weights, inverse / 2)
+        else:
+            softer = np.zeros((0, minimum.x.size))
+        scatters = (few * weights, changes), (np.full(len(softer), few), softer)
+        std_error[group.which], factor[group.which] = _spread(group, scatters, of_noise, inverse / 2)
     return ChannelSpread(std_error, factor)
 
 
 def _spread(
-    group: FittedGroup, changes: FloatArray, weights: FloatArray, noise: FloatArray
+    group: FittedGroup, scatters: tuple[tuple[FloatArray, FloatArray], ...], of_noise: float, noise: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return standard errors, and variances over those from noise, of weighted changes of the coordinates."""
+    """Return standard errors, and variances over those from noise, of weighted changes of the coordinates.
+
+    The first changes are those of channels left out, of which noise makes up `of_noise` of its variance.
+    """
     slope = group.joint.theta_slope(group.fit.minimum.x)
     found = []
     for to_parameters in (np.eye(len(slope)), slope):
         with np.errstate(divide="ignore", invalid="ignore"):
-            own = weights @ (changes @ to_parameters.T) ** 2
-            found.append((np.sqrt(own), own / np.einsum("ij,jk,ik->i", to_parameters, noise, to_parameters)))
+            of_channels, of_compliance = (w @ (changes @ to_parameters.T) ** 2 for w, changes in scatters)
+            by_noise = np.einsum("ij,jk,ik->i", to_parameters, noise, to_parameters)
+            own = np.maximum(of_channels - of_noise * by_noise, 0) + of_compliance
+            found.append((np.sqrt(own), own / by_noise))
     (of_coordinate, of_coordinates), (of_parameter, ratio) = found
     # A rigid DOF has no finite slope.
     ratio = np.where(np.isfinite(ratio), ratio, of_coordinates)

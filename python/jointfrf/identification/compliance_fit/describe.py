@@ -168,7 +168,7 @@ def _channel_notes(found: ComplianceFit, problem: FitProblem) -> list[str]:
             "is not in the intervals"
         ]
     told = []
-    if problem.added_compliance is not None:
+    if problem.added_compliance is not None and problem.added_compliance.any():
         values = _listed(
             [
                 f"{value:.2g} {compliance_unit(dof, dof)} for {dof}"

@@ -114,7 +114,8 @@ def deformation_compliance(
     -----
     FRFs between the channels of one side, less what is rigid in responses and in forces, are a compliance
     F = (1 - R T) h (1 - R T)^T, averaged over the lines by their noise. Its mean singular value delta is what one
-    channel deforms; weights t_r and t_f of a DOF give it |t_r| |t_f| delta.
+    channel deforms, noise included: less than that cannot be excluded. Weights t_r and t_f of a DOF give it
+    |t_r| |t_f| delta.
     """
     n = len(responses.transform) // 2
     total = np.zeros(n)
