@@ -50,6 +50,7 @@ class Row:
     rmse_to_bound: dict[str, float]
     coverage: dict[str, float]
     run_off: int
+    refused: int
     seconds: float
 
 
@@ -59,7 +60,11 @@ def one_draw(trial: Trial, seed: int) -> Draw:
     start = time.perf_counter()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        fit = jf.identify(freq, gamma, joint.dofs, damping="viscous", cross=trial.cross)
+        try:
+            fit = jf.identify(freq, gamma, joint.dofs, damping="viscous", cross=trial.cross)
+        except ValueError:
+            # No joint was found, and that is said.
+            return Draw({}, {}, time.perf_counter() - start)
         intervals = fit.confidence_interval(0.95)
     return Draw(fit.parameters, intervals, time.perf_counter() - start)
 
@@ -104,6 +109,8 @@ def row_of(trial: Trial, draws: Sequence[Draw]) -> Row:
     A stiffness is compared by its compliance, in which the noise is nearly normal: 1/k exists where k does not.
     """
     truth, bound = truth_of(trial)
+    refused = sum(not draw.value for draw in draws)
+    draws = [draw for draw in draws if draw.value]
     ratio, coverage, run_off = {}, {}, np.zeros(len(draws), bool)
     for name, true in truth.items():
         value = np.array([draw.value.get(name, np.nan) for draw in draws])
@@ -123,19 +130,22 @@ def row_of(trial: Trial, draws: Sequence[Draw]) -> Row:
             )
         run_off |= far & ~inside
     seconds = float(np.median([draw.seconds for draw in draws]))
-    return Row(trial.name, len(draws), ratio, coverage, int(run_off.sum()), seconds)
+    return Row(trial.name, len(draws) + refused, ratio, coverage, int(run_off.sum()), refused, seconds)
 
 
 def table(rows: Sequence[Row]) -> str:
     """Markdown table: the worst and the mean over the parameters of each trial."""
-    head = "| trial | draws | RMSE / bound, worst | coverage of 95 %, lowest .. highest, mean | false by 3 | s a fit |"
-    lines = [head, "|---|---|---|---|---|---|"]
+    head = (
+        "| trial | draws | RMSE / bound, worst | coverage of 95 %, lowest .. highest, mean | false by 3 | refused | "
+        "s a fit |"
+    )
+    lines = [head, "|---|---|---|---|---|---|---|"]
     for row in rows:
         coverage = np.array(list(row.coverage.values())) * 100
         worst = max(row.rmse_to_bound.values())
         lines.append(
             f"| {row.name} | {row.draws} | {worst:.2f} | {coverage.min():.0f} .. {coverage.max():.0f}, "
-            f"{coverage.mean():.1f} | {row.run_off} | {row.seconds:.2g} |"
+            f"{coverage.mean():.1f} | {row.run_off} | {row.refused} | {row.seconds:.2g} |"
         )
     return "\n".join(lines)
 

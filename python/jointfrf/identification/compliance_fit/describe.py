@@ -78,6 +78,7 @@ def describe_compliance(found: ComplianceFit, problem: FitProblem) -> Described:
     doubts = [
         *([] if found.cross_fits else _untrusted_warnings(result, fit.dofs)),
         *_left_out_warnings(problem),
+        *_band_part_warnings(found),
         *_parameter_warnings(fit, intervals),
         *_rigidity_warnings(found),
         *_misfit_warnings(found, problem),
@@ -287,6 +288,26 @@ def _diagonal_warnings(result: JointEstimate, dofs: tuple[str, ...], cross: Cros
                 told.append(
                     f"the compliance varies from line to line beyond its noise: {_listed(varying)}; its mean was fitted"
                 )
+    return told
+
+
+def _band_part_warnings(found: ComplianceFit) -> list[str]:
+    """Name parameters on which parts of the band do not agree, each fitted by itself."""
+    parts = found.parts
+    if parts is None:
+        return []
+    told = []
+    for name, values, disagree in zip(found.joint.parameters, parts.values.T, parts.disagree, strict=True):
+        if disagree:
+            seen = [
+                f"{value:.3g} at {low:g}-{high:g} Hz"
+                for value, (low, high) in zip(values, parts.spans, strict=True)
+                if np.isfinite(value)
+            ]
+            told.append(
+                f"{name}: parts of the band, fitted by themselves, do not agree: {_listed(seen)}; the interval allows "
+                "for that, but the joint as described does not fit the data"
+            )
     return told
 
 

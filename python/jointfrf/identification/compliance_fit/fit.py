@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 import warnings
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from jointfrf.errors import IllConditionedWarning
 from jointfrf.frf.bands import line_slices
+from jointfrf.identification.compliance_fit.band_parts import BandParts, fit_band_parts, left_out_share
 from jointfrf.identification.compliance_fit.channel_jackknife import ChannelSpread, channel_spread
 from jointfrf.identification.compliance_fit.damping_choice import DofDamping, choose_damping
 from jointfrf.identification.compliance_fit.estimator import JointEstimate, estimate_joint
 from jointfrf.identification.compliance_fit.from_nothing import check_estimate
 from jointfrf.identification.compliance_fit.intervals import LikelihoodIntervals, Spread, spread_of
-from jointfrf.identification.compliance_fit.joint_terms import CrossTerms, DampingTerms, joint_terms
+from jointfrf.identification.compliance_fit.joint_terms import CrossTerms, DampingTerms, DiagonalJoint, joint_terms
 from jointfrf.identification.compliance_fit.misfit import Misfit, diagnose
 from jointfrf.identification.compliance_fit.prepare import FitProblem
 from jointfrf.identification.joint_fit import JointFit
+from jointfrf.kernel.arguments import FloatArray
 from jointfrf.substructuring.ismm import inverse_substructuring
 
 __all__ = ["ComplianceFit", "fit_compliance"]
@@ -27,6 +31,8 @@ _AGREE = 1.3
 _MOST_LEVELS = 6
 #: The residual of exact FRFs is rounding: models are not compared below this share of the noise.
 _LEAST_EXCESS = 1e-12
+#: Share of lines left out, and lines at least, from which on parts of the band are compared.
+_LEFT_OUT, _FEW = 0.02, 40
 #: Residual of FRFs without noise, in units of the level assumed.
 _NO_NOISE = 1e-3
 
@@ -44,6 +50,8 @@ class ComplianceFit(NamedTuple):
         By how much variances exceed those from independent noise.
     channels : ChannelSpread or None
         What sides that are not rigid add to that; None where the channels do not tell.
+    parts : BandParts, optional
+        Where lines that do not fit the joint were left out: whether parts of the band give it.
     misfit : Misfit
         The residual against the noise.
     cross_fits : bool
@@ -56,6 +64,7 @@ class ComplianceFit(NamedTuple):
     estimate: JointEstimate
     spread: Spread
     channels: ChannelSpread | None
+    parts: BandParts | None
     misfit: Misfit
     cross_fits: bool
     choices: tuple[DofDamping, ...]
@@ -78,6 +87,8 @@ def fit_compliance(problem: FitProblem) -> ComplianceFit:
     frfs = problem.frfs
     channels = channel_spread(result, frfs, problem.added_compliance)
     root = np.sqrt(spread.factor if channels is None else spread.factor + channels.factor)
+    parts = _band_parts(problem, result, spread, choices)
+    added = [one.std_error for one in (channels, parts) if one is not None]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", IllConditionedWarning)
         k_lines = np.concatenate(
@@ -88,6 +99,7 @@ def fit_compliance(problem: FitProblem) -> ComplianceFit:
         )
     with np.errstate(invalid="ignore"):
         covariance = result.covariance * np.outer(root, root)
+        covariance += np.diag(_of_parameters(result, parts))
     names = [one.name for one in result.parameters]
     joint = JointFit(
         method="compliance",
@@ -99,12 +111,45 @@ def fit_compliance(problem: FitProblem) -> ComplianceFit:
         freq_hz=problem.freq_hz,
         k_lines=k_lines,
         bands=problem.bands,
-        intervals=LikelihoodIntervals(result, spread.factor, None if channels is None else channels.std_error),
+        intervals=LikelihoodIntervals(result, spread.factor, np.sqrt(np.square(added).sum(axis=0)) if added else None),
     )
     misfit = diagnose(result, problem.freq_hz, noise.inflation, spread)
-    return ComplianceFit(
-        joint, result, spread, channels, misfit, _cross_fits(problem, result, misfit, choices), choices
-    )
+    cross_fits = _cross_fits(problem, result, misfit, choices)
+    return ComplianceFit(joint, result, spread, channels, parts, misfit, cross_fits, choices)
+
+
+def _band_parts(
+    problem: FitProblem, result: JointEstimate, spread: Spread, choices: tuple[DofDamping, ...]
+) -> BandParts | None:
+    """Fit parts of the band where lines were left out of the fit of all of it."""
+    if left_out_share(result) < _LEFT_OUT or problem.freq_hz.size < _FEW:
+        return None
+    words = _chosen(problem, choices)
+
+    def fit(lines: NDArray[np.intp]) -> JointEstimate:
+        frfs = problem.frfs.on_lines(lines)
+        part = replace(problem, freq_hz=problem.freq_hz[lines], frfs=frfs, used=problem.used[lines], near=None)
+        return _estimate(part, words)
+
+    return fit_band_parts(result, problem.freq_hz, spread.information, fit)
+
+
+def _of_parameters(result: JointEstimate, parts: BandParts | None) -> FloatArray:
+    """Return the variance that disagreeing parts of the band add to each parameter."""
+    if parts is None:
+        return np.zeros(result.theta.size)
+    slope = np.ones(result.theta.size)
+    for group in result.groups:
+        if isinstance(group.joint, DiagonalJoint):
+            slope[group.which] = np.where(group.joint.terms.kinds == 0, result.theta[group.which] ** 2, 1.0)
+    variance: FloatArray = np.square(slope * parts.std_error)
+    return variance
+
+
+def _chosen(problem: FitProblem, choices: tuple[DofDamping, ...]) -> DampingTerms | tuple[DampingTerms, ...]:
+    """Return the damping terms that were fitted."""
+    damping = problem.options.damping
+    return tuple(one.best for one in choices) if damping == "auto" else damping
 
 
 def _cross_fits(
@@ -117,9 +162,7 @@ def _cross_fits(
     coupled = any(len(group.dofs) > 1 for group in result.groups)
     if problem.noise.is_assumed or problem.options.cross != "zero" or not (misfit.is_large and coupled):
         return False
-    damping = problem.options.damping
-    words = tuple(one.best for one in choices) if damping == "auto" else damping
-    other = _estimate(problem, words, "fit")
+    other = _estimate(problem, _chosen(problem, choices), "fit")
     return bool(np.sqrt(other.excess) - 1 < (misfit.ratio - 1) / 4)
 
 
