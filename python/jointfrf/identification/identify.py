@@ -13,15 +13,12 @@ from jointfrf.channels.check.finding import FrfCheck
 from jointfrf.channels.point_lines import Interface
 from jointfrf.frf.bands import PIECE
 from jointfrf.identification.band_means import fit_band_mean, prepare_band_mean
+from jointfrf.identification.compliance_fit.channel_noise import NoiseOptions
 from jointfrf.identification.compliance_fit.describe import Described, describe_compliance
 from jointfrf.identification.compliance_fit.fit import fit_compliance
 from jointfrf.identification.compliance_fit.joint_terms import CrossTerms, DampingTerms
-from jointfrf.identification.compliance_fit.prepare import (
-    FitOptions,
-    NoiseOptions,
-    Transform,
-    prepare_compliance,
-)
+from jointfrf.identification.compliance_fit.prepare import FitOptions, prepare_compliance
+from jointfrf.identification.compliance_fit.transforms import Transform
 from jointfrf.identification.joint_fit import JointFit
 from jointfrf.identification.prepare import (
     BandsOfDofs,

@@ -8,10 +8,11 @@ from typing import Literal
 
 from numpy.typing import ArrayLike
 
+from jointfrf.identification.compliance_fit.channel_noise import NoiseOptions
 from jointfrf.identification.compliance_fit.describe import describe_compliance
 from jointfrf.identification.compliance_fit.fit import fit_compliance
 from jointfrf.identification.compliance_fit.joint_terms import CrossTerms, DampingTerms
-from jointfrf.identification.compliance_fit.prepare import FitOptions, NoiseOptions, prepare_compliance
+from jointfrf.identification.compliance_fit.prepare import FitOptions, prepare_compliance
 from jointfrf.identification.joint_fit import JointFit
 from jointfrf.identification.prepare import BandsOfDofs, as_measured
 

@@ -38,7 +38,7 @@ def test_parts_of_different_stiffness_disagree_by_their_scatter():
     stiffness = np.repeat([5e5, 8e5, 5e5, 8e5], FREQ.size // 4)
     found = parts_of(stiffness)
     assert found.disagree.tolist() == [True, False, False, False]
-    assert found.std_error[0] == pytest.approx(np.std([1 / 5e5, 1 / 8e5] * 2, ddof=1), rel=0.05)
+    assert found.std_error[0] == pytest.approx(np.std([1 / 5e5, 1 / 8e5] * 2, ddof=1), rel=0.15)
     assert not found.std_error[1:].any()
 
 

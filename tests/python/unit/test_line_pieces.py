@@ -6,8 +6,9 @@ import pytest
 import jointfrf as jf
 from jointfrf.frf import bands
 from jointfrf.frf.bands import line_slices
+from jointfrf.identification.compliance_fit.channel_noise import NoiseOptions
 from jointfrf.identification.compliance_fit.fit import fit_compliance
-from jointfrf.identification.compliance_fit.prepare import FitOptions, NoiseOptions, prepare_compliance
+from jointfrf.identification.compliance_fit.prepare import FitOptions, prepare_compliance
 from jointfrf.identification.prepare import as_measured
 
 

@@ -17,7 +17,8 @@ from jointfrf.identification.compliance_fit.fit import ComplianceFit
 from jointfrf.identification.compliance_fit.intervals import Spread
 from jointfrf.identification.compliance_fit.joint_terms import CrossTerms
 from jointfrf.identification.compliance_fit.misfit import Misfit
-from jointfrf.identification.compliance_fit.prepare import FitProblem, Transforms
+from jointfrf.identification.compliance_fit.prepare import FitProblem
+from jointfrf.identification.compliance_fit.transforms import Transforms
 from jointfrf.identification.elastic_centre import elastic_centre
 from jointfrf.identification.joint_fit import JointFit
 
