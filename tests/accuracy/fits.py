@@ -125,7 +125,7 @@ def row_of(trial: Trial, draws: Sequence[Draw]) -> Row:
         with np.errstate(invalid="ignore"):
             far = (
                 (value > _RUN_OFF * true) | (value < true / _RUN_OFF)
-                if name.startswith("k")
+                if name.startswith("k") and "," not in name
                 else np.zeros_like(run_off)
             )
         run_off |= far & ~inside
