@@ -295,7 +295,7 @@ def _diagonal_warnings(result: JointEstimate, dofs: tuple[str, ...], cross: Cros
 def _band_part_warnings(found: ComplianceFit) -> list[str]:
     """Name parameters on which parts of the band do not agree, each fitted by itself."""
     parts = found.parts
-    if parts is None:
+    if parts is None or found.cross_fits:
         return []
     told = []
     for name, values, disagree in zip(found.joint.parameters, parts.values.T, parts.disagree, strict=True):
