@@ -107,7 +107,9 @@ def known_noise(
         variance = as_real("noise", options.noise, h.shape)
         if (variance <= 0).any():
             raise ValueError("noise must hold positive variances")
-        level = float(np.median(np.sqrt(variance) / np.maximum(abs(h), np.finfo(float).tiny)))
+        of_entry = np.median(np.sqrt(variance) / np.maximum(abs(h), np.finfo(float).tiny), axis=0)
+        # Entries that are zero by symmetry have noise, but no relative noise.
+        level = float(np.median(of_entry[of_entry < 1] if (of_entry < 1).any() else of_entry))
     smooth = smooth_frfs(freq, h, variance, reciprocal=reciprocal).h
     if np.ndim(options.noise) == 0:
         # Measured FRFs as weights favour lines that noise has made small.

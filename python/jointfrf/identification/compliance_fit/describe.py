@@ -287,7 +287,8 @@ def _diagonal_warnings(result: JointEstimate, dofs: tuple[str, ...], cross: Cros
             varying = [f"{dofs[d]} by {100 * s:.0f} %" for d, s in zip(group.dofs, share, strict=True) if s > _VARIES]
             if varying:
                 told.append(
-                    f"the compliance varies from line to line beyond its noise: {_listed(varying)}; its mean was fitted"
+                    f"the compliance varies from line to line beyond its noise: {_listed(varying)}; "
+                    "its mean was fitted, weighted by what the lines show"
                 )
     return told
 

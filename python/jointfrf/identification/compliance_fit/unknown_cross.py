@@ -14,7 +14,6 @@ from jointfrf.identification.compliance_fit.joint_terms import JointCoordinates
 from jointfrf.identification.compliance_fit.line_forms import (
     FormMinimum,
     LineForms,
-    inverse_information,
     minimise_forms,
 )
 from jointfrf.identification.compliance_fit.starts import hidden_share
@@ -31,9 +30,6 @@ _MISFIT = 1.15
 _SIGMA = 4.0
 #: Squares of the mean over lines, in units of its noise, above which it is not zero.
 _CERTAIN = 16.0
-#: Steps for the scatter between lines at most; the change of its log-likelihood at which they end; by which factor a
-#: variance changes in one step at most.
-_STEPS, _SETTLED, _FASTEST = 60, 0.01, 10.0
 
 
 class _Lines(NamedTuple):
@@ -52,13 +48,13 @@ class _Lines(NamedTuple):
     known: NDArray[np.bool_]
     weight: FloatArray
 
-    def forms(self, variance: FloatArray) -> LineForms:
-        """Return the quadratic forms where C varies between lines with this variance, shape (n,), beside its noise."""
+    def forms(self) -> LineForms:
+        """Return the quadratic forms."""
         n = self.known.shape[1]
         diagonal = np.arange(n)
         both = self.known[:, :, None] & self.known[:, None, :]
         covariance: ComplexArray = np.where(both, self.of.covariance, 0)
-        covariance[:, diagonal, diagonal] += np.where(self.known, variance, 1)
+        covariance[:, diagonal, diagonal] += np.where(self.known, 0, 1)
         size = np.sqrt(np.einsum("laa->la", covariance).real)
         outer = size[:, :, None] * size[:, None, :]
         inverse = invert(covariance / outer, on_singular="nan") / outer
@@ -68,7 +64,7 @@ class _Lines(NamedTuple):
 
 
 def fit_unknown_cross(problem: GroupProblem, starts: Iterable[FloatArray]) -> GroupFit:
-    """Fit the diagonal of C by weighted least squares; lines that vary by more than their noise count alike.
+    """Fit the diagonal of C by weighted least squares.
 
     Parameters
     ----------
@@ -79,24 +75,22 @@ def fit_unknown_cross(problem: GroupProblem, starts: Iterable[FloatArray]) -> Gr
 
     Notes
     -----
-    The symmetry of C is used unless the FRFs contradict it. Where the residual exceeds the noise, C is taken to vary
-    from line to line, with a variance of each DOF found by maximum likelihood: lines of little noise then do not decide
-    alone what the best constant is.
+    The symmetry of C is used unless the FRFs contradict it. Where the residual exceeds the noise, C varies from line to
+    line. Lines still count by their noise: those on which FRFs show C best are those on which C makes the FRFs, and the
+    constant found there regenerates them best. The scatter of the others is in the intervals.
     """
     joint = problem.joint
     lines, is_symmetric = _lines(problem)
-    by_noise = lines.forms(np.zeros(joint.terms.n))
+    by_noise = lines.forms()
     best = _best_of([minimise_forms(by_noise, joint, start) for start in [*starts, _middle(lines, joint)]])
     equations = float((lines.weight[:, None] * lines.known).sum())
     possible = float(lines.known.sum())
-    scatter, forms, steps, converged = None, by_noise, 1, True
+    scatter = None
     degrees = max(equations - best.x.size / 2, 1.0)
     if best.cost / degrees > max(_MISFIT**2, 1 + _SIGMA / np.sqrt(degrees)):
-        best, forms, scatter, steps, converged = _with_scatter(lines, joint, best)
-    noise_squares = float(by_noise.at(joint.compliance(best.x))[0].sum())
-    seen = lines.weight > 0
-    told = Misfitting(noise_squares, is_symmetric, scatter, int(np.count_nonzero(lines.weight < 0.5)))
-    return GroupFit(best, forms, seen, equations, possible, steps, converged, told)
+        scatter = _scatter_between_lines(lines, joint, best.x)
+    told = Misfitting(best.cost, is_symmetric, scatter, int(np.count_nonzero(lines.weight < 0.5)))
+    return GroupFit(best, by_noise, lines.weight > 0, equations, possible, 1, True, told)
 
 
 def _lines(problem: GroupProblem) -> tuple[_Lines, bool]:
@@ -162,37 +156,17 @@ def _best_of(minima: list[FormMinimum]) -> FormMinimum:
     return min(minima, key=lambda one: one.cost)
 
 
-def _with_scatter(
-    lines: _Lines, joint: JointCoordinates, best: FormMinimum
-) -> tuple[FormMinimum, LineForms, FloatArray, int, bool]:
-    """Find the variance of C between lines by maximum likelihood, and fit with it.
-
-    By Fisher's scoring: with r the residual of a line and W its information, variance included, the likelihood of the
-    variance of a DOF has the slope sum of |W r|_d^2 - W_dd, and the information sum of |W_de|^2.
-    """
-    starts = [best.x, _middle(lines, joint)]
-    residual = _residual(lines, joint, starts[1])
-    variance = np.array([np.median(abs(residual[own, d]) ** 2) for d, own in enumerate(lines.known.T)]) / np.log(2)
-    least = 1e-12 * np.median(abs(lines.of.value) ** 2, axis=0) + np.finfo(float).tiny
-    variance = np.maximum(variance, least)
-    # Of a line that counts less, so does its likelihood.
-    w = np.maximum(lines.weight, np.finfo(float).tiny)
-    reach, last = np.full(variance.size, _FASTEST), np.zeros(variance.size)
-    for step in range(1, _STEPS + 1):
-        forms = lines.forms(variance)
-        best = _best_of([minimise_forms(forms, joint, start) for start in starts])
-        starts = [best.x]
-        weighted = (forms.weight @ _residual(lines, joint, best.x)[..., None])[..., 0]
-        slope = (abs(weighted) ** 2 / w[:, None]).sum(axis=0) - np.einsum("laa->a", forms.weight).real
-        information = (abs(forms.weight) ** 2 / w[:, None, None]).sum(axis=0)
-        change = inverse_information(information) @ slope
-        # Where the slope changes its sign the maximum lies between: steps become shorter.
-        reach, last = np.where(slope * last < 0, np.sqrt(reach), reach), slope
-        there = np.maximum(np.clip(variance + change, variance / reach, variance * reach), least)
-        if float(abs(slope * (there - variance)).sum()) < _SETTLED:
-            return best, forms, np.sqrt(variance), step, True
-        variance = there
-    return best, forms, np.sqrt(variance), step, False
+def _scatter_between_lines(lines: _Lines, joint: JointCoordinates, x: FloatArray) -> FloatArray:
+    """Return the standard deviation of the diagonal of C between lines, beside its noise, by the median over lines."""
+    residual = abs(_residual(lines, joint, x)) ** 2
+    noise = np.einsum("laa->la", lines.of.covariance).real
+    # Squares of circular noise are exponential: their median is ln 2 of their mean.
+    variance = [
+        np.median(residual[own, d]) / np.log(2) - np.median(noise[own, d])
+        for d, own in enumerate((lines.known & (lines.weight > 0.5)[:, None]).T)
+    ]
+    found: FloatArray = np.sqrt(np.maximum(np.nan_to_num(variance), 0))
+    return found
 
 
 def _residual(lines: _Lines, joint: JointCoordinates, x: FloatArray) -> ComplexArray:
