@@ -54,14 +54,22 @@ def test_bending_plane_of_the_lap_joint(identified):
     found = fit["parameters"]["k_theta_x"]
     assert 5e3 < found["value"] < 9e3
     low, high = found["confidence_interval_95"]
-    assert low < 7e3 < high
+    # Open above: parts of the band do not agree, which is said.
+    assert low < 7e3
+    assert high is None or high > 7e3
     assert 3e7 < fit["parameters"]["k_y"]["value"] < 2e8
     assert fit["noise_level"] == pytest.approx(0.01, rel=0.1)
     # The plain band mean shrinks both stiffnesses on the same data.
     assert plain["parameters"]["k_theta_x"]["value"] < 0.6 * found["value"]
     assert plain["parameters"]["k_y"]["value"] < 0.6 * fit["parameters"]["k_y"]["value"]
     assert content["source"] == "lap_joint.uff"
-    for word in ("k_theta_x", "95 % interval", "residual", "warning:", "reference points 12 mm apart"):
+    for word in (
+        "k_theta_x",
+        "95 % interval",
+        "residual",
+        "parts of the band, fitted by themselves, do not agree",
+        "reference points 12 mm apart",
+    ):
         assert word in result.stdout
 
 
