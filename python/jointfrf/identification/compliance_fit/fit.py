@@ -16,12 +16,13 @@ from jointfrf.identification.compliance_fit.channel_jackknife import ChannelSpre
 from jointfrf.identification.compliance_fit.damping_choice import DofDamping, choose_damping
 from jointfrf.identification.compliance_fit.estimator import JointEstimate, estimate_joint
 from jointfrf.identification.compliance_fit.from_nothing import check_estimate
+from jointfrf.identification.compliance_fit.interface_frfs import InterfaceFrfs
 from jointfrf.identification.compliance_fit.intervals import LikelihoodIntervals, Spread, spread_of
 from jointfrf.identification.compliance_fit.joint_terms import CrossTerms, DampingTerms, DiagonalJoint, joint_terms
 from jointfrf.identification.compliance_fit.misfit import Misfit, diagnose
 from jointfrf.identification.compliance_fit.prepare import FitProblem
 from jointfrf.identification.joint_fit import JointFit
-from jointfrf.kernel.arguments import FloatArray
+from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.substructuring.ismm import inverse_substructuring
 
 __all__ = ["ComplianceFit", "fit_compliance"]
@@ -89,14 +90,6 @@ def fit_compliance(problem: FitProblem) -> ComplianceFit:
     root = np.sqrt(spread.factor if channels is None else spread.factor + channels.factor)
     parts = _band_parts(problem, result, spread, choices)
     added = [one.std_error for one in (channels, parts) if one is not None]
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", IllConditionedWarning)
-        k_lines = np.concatenate(
-            [
-                inverse_substructuring(frfs.gamma(frfs.measured[own]), on_singular="nan")
-                for own in line_slices(freq.size)
-            ]
-        )
     with np.errstate(invalid="ignore"):
         covariance = result.covariance * np.outer(root, root)
         covariance += np.diag(_of_parameters(result, parts))
@@ -109,13 +102,25 @@ def fit_compliance(problem: FitProblem) -> ComplianceFit:
         noise_level=level,
         residual_level=scale * noise.level,
         freq_hz=problem.freq_hz,
-        k_lines=k_lines,
+        k_lines=_stiffness_of_lines(frfs),
         bands=problem.bands,
         intervals=LikelihoodIntervals(result, spread.factor, np.sqrt(np.square(added).sum(axis=0)) if added else None),
     )
     misfit = diagnose(result, problem.freq_hz, noise.inflation, spread)
     cross_fits = _cross_fits(problem, result, misfit, choices)
     return ComplianceFit(joint, result, spread, channels, parts, misfit, cross_fits, choices)
+
+
+def _stiffness_of_lines(frfs: InterfaceFrfs) -> ComplexArray:
+    """Return K*(w) of each line by itself, NaN where it cannot be inverted; a piece of the lines at a time."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", IllConditionedWarning)
+        return np.concatenate(
+            [
+                inverse_substructuring(frfs.gamma(frfs.measured[own]), on_singular="nan")
+                for own in line_slices(len(frfs.measured))
+            ]
+        )
 
 
 def _band_parts(

@@ -76,8 +76,8 @@ def fit_unknown_cross(problem: GroupProblem, starts: Iterable[FloatArray]) -> Gr
     Notes
     -----
     The symmetry of C is used unless the FRFs contradict it. Where the residual exceeds the noise, C varies from line to
-    line. Lines still count by their noise: those on which FRFs show C best are those on which C makes the FRFs, and the
-    constant found there regenerates them best. The scatter of the others is in the intervals.
+    line; lines still count by their noise, and the scatter between them is in the intervals. The constant is a mean of
+    C_dd: where no joint fits, it need not regenerate the FRFs.
     """
     joint = problem.joint
     lines, is_symmetric = _lines(problem)
