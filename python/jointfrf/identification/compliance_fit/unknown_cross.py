@@ -105,8 +105,7 @@ def fit_unknown_cross(problem: GroupProblem, starts: Iterable[FloatArray]) -> Gr
     degrees = max(equations - best.x.size / 2, 1.0)
     if best.cost / degrees > max(_MISFIT**2, 1 + _SIGMA / np.sqrt(degrees)):
         found = _with_scatter(lines, joint, best.x)
-    noise_squares = float(by_noise.at(joint.compliance(found.minimum.x))[0].sum())
-    told = Misfitting(noise_squares, is_symmetric, found.scatter, int(np.count_nonzero(lines.weight < 0.5)))
+    told = Misfitting(best.cost, is_symmetric, found.scatter, int(np.count_nonzero(lines.weight < 0.5)))
     return GroupFit(
         found.minimum, found.forms, lines.weight > 0, equations, possible, found.steps, found.converged, told
     )
