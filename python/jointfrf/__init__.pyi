@@ -56,7 +56,6 @@ from jointfrf.kernel.linear_algebra import invert, reciprocal_condition, solve
 from jointfrf.kernel.status import RCOND_LIMIT
 from jointfrf.models.beam import beam
 from jointfrf.models.chain import chain
-from jointfrf.models.matrices import from_triangle
 from jointfrf.models.model import Model, assemble
 from jointfrf.models.receptance.receptance import ReceptanceInfo, receptance
 from jointfrf.solids.bolt import PROOF_STRENGTH, STRESS_AREA, Bolt, preload_force
