@@ -33,7 +33,7 @@ def peak(h: ArrayLike, freq_hz: ArrayLike, band: Band | None = None, *, refine: 
     Raises
     ------
     ValueError
-        Shapes that do not agree, a band without lines, NaN.
+        Shapes that do not agree, a band without lines, NaN; with `refine`, neighbours at the same frequency.
 
     Examples
     --------
@@ -45,6 +45,8 @@ def peak(h: ArrayLike, freq_hz: ArrayLike, band: Band | None = None, *, refine: 
     amplitude, inside, at = _largest(h, freq, band)
     if not refine or at in (inside[0], inside[-1]) or amplitude[at - 1 : at + 2].min() <= 0:
         return float(amplitude[at]), float(freq[at])
+    if np.unique(freq[at - 1 : at + 2]).size < 3:
+        raise ValueError(f"freq_hz: lines {at - 1} to {at + 1} are not at three frequencies, as refine needs them")
     parabola = np.polyfit(freq[at - 1 : at + 2] - freq[at], np.log(amplitude[at - 1 : at + 2]), 2)
     offset = -parabola[1] / (2 * parabola[0])
     return float(np.exp(np.polyval(parabola, offset))), float(freq[at] + offset)
