@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import get_args
 
 from jointfrf.cases.fitting import METHODS
-from jointfrf.cases.keys import Key, KeyTable
 from jointfrf.frf.noise import NoiseKind, NoiseReference
 from jointfrf.solids.brick_beam import Preset
+from jointfrf.toml.keys import Key, KeyTable
 
 __all__ = [
     "COMMON_KEYS",

@@ -10,7 +10,6 @@ from typing import cast, get_args
 import numpy as np
 
 from jointfrf.cases.fitting import METHODS
-from jointfrf.cases.toml_table import TomlTable
 from jointfrf.dofs import Parameter, is_rotation, joint_parameters
 from jointfrf.errors import FileContentWarning
 from jointfrf.frf.bands import Band, in_bands
@@ -20,6 +19,7 @@ from jointfrf.io.uff import read_uff
 from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.solids.brick import Material
+from jointfrf.toml.table import TomlTable
 
 __all__ = [
     "BandSet",

@@ -10,12 +10,12 @@ from scipy import sparse
 
 from jointfrf.cases.definitions import read_frf_file
 from jointfrf.cases.known_joint.structure import MeasuredStructure, ModelStructure, lines_at
-from jointfrf.cases.toml_table import TomlTable
 from jointfrf.frf.frf_set import POWER_OF_I_OMEGA
 from jointfrf.io.matrix_file import read_dof_names, read_matrix
 from jointfrf.kernel.arguments import FloatArray
 from jointfrf.models.matrices import ModelMatrices
 from jointfrf.models.model import Model
+from jointfrf.toml.table import TomlTable
 
 __all__ = ["read_matrices", "read_receptances"]
 

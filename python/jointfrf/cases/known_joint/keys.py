@@ -14,11 +14,11 @@ from jointfrf.cases.common_keys import (
     one_of,
 )
 from jointfrf.cases.fitting import METHODS
-from jointfrf.cases.keys import Key, KeyTable
 from jointfrf.frf.frf_set import POWER_OF_I_OMEGA
 from jointfrf.models.beam import BeamElement, End
 from jointfrf.models.chain import Ground
 from jointfrf.solids.brick_beam import Face
+from jointfrf.toml.keys import Key, KeyTable
 
 __all__ = ["EXPECTED_KEYS", "KNOWN_JOINT_KEYS"]
 

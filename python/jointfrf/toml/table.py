@@ -11,8 +11,9 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from jointfrf.cases.keys import KeyTable, look_alike
 from jointfrf.errors import FileContentError
+from jointfrf.spelling import look_alike
+from jointfrf.toml.keys import KeyTable
 
 __all__ = ["TomlTable", "read_toml"]
 
