@@ -100,7 +100,7 @@ def write_fit(fits: Sequence[JointFit], folder: Path, source: str, figures: Sequ
     OSError
         The files cannot be written.
     """
-    text = json.dumps({"source": source, "fits": [fit.to_dict() for fit in fits]}, indent=2)
+    text = json.dumps({"source": source, "fits": [fit.to_dict(lines=False) for fit in fits]}, indent=2)
     contents: dict[str, str | bytes] = {"identification.json": text + "\n"}
     for i, fit in enumerate(fits):
         for figure in fit_figures(fit):
