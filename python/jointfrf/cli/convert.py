@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import json
 from collections.abc import Callable
 from pathlib import Path
 
 from jointfrf.cli.measured_file import add_quantity_arguments, nodes, parse_band, read_with_warnings
+from jointfrf.cli.output import Output
 from jointfrf.cli.usage import UsageError
 from jointfrf.frf.frf_set import FrfSet
 from jointfrf.io import write_csv, write_hdf5, write_npz, write_uff
@@ -42,8 +42,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--nodes", type=nodes, metavar="NODES", help="only FRFs between these nodes: 102,104")
     parser.add_argument("--band", type=parse_band, metavar="LOW:HIGH", help="only the lines in this band in Hz")
     parser.add_argument("--averages", type=float, metavar="N", help="number of averages, where the files do not say it")
-    parser.add_argument("--json", action="store_true", help="print what was written as JSON")
-    parser.add_argument("--quiet", action="store_true", help="print nothing but warnings and errors")
 
 
 def _field(text: str) -> tuple[str, str]:
@@ -69,17 +67,16 @@ def run(args: argparse.Namespace) -> int:
         *sources,
         quantity=args.quantity,
         force_quantity=args.force_quantity,
-        nodes=args.nodes,
+        nodes=None if args.nodes is None else args.nodes.numbers,
         mapping=dict(args.map),
         averages=args.averages,
     )
     if args.band is not None:
         frfs = frfs.select(args.band)
     writer(target, frfs)
-    if args.json:
-        print(json.dumps(_described(frfs, target), indent=2))
-    elif not args.quiet:
-        print(f"{frfs.summary()}\nwrote {target}")
+    out = Output(args)
+    out.say(frfs.summary(), f"wrote {target}")
+    out.give(_described(frfs, target))
     return 0
 
 
