@@ -38,7 +38,7 @@ _FREQUENCY = KeyTable(
             "required without `from_file`"),
         Key("step", "number, above 0", "Spacing of the lines; not with `from_file`.", "Hz",
             "required without `from_file`"),
-        Key("from_file", "name of a Universal File", "Take the lines of the FRFs in this file.", "", "evenly spaced"),
+        Key("from_file", "name of a file of FRFs", "Take the lines of the FRFs in this file.", "", "evenly spaced"),
     ),
 )  # fmt: skip
 _STUDY = KeyTable(

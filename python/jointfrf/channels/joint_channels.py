@@ -192,7 +192,7 @@ def joint_channels(
         for kind, own in (("response", frfs.responses), ("excitation", frfs.excitations))
         for side in _SIDES
     }
-    points = {
+    points: dict[tuple[str, str], VirtualPoint] = {
         (kind, side): _point(frfs, kind, side, own, references[side], dofs) for (kind, side), own in chosen.items()
     }
     interfaces = []
@@ -291,5 +291,5 @@ def _agreement(
 def _weighted(point: VirtualPoint, power: FloatArray) -> VirtualPoint:
     """Return the same point with each channel weighted by the inverse of its power."""
     root = np.sqrt(point.weights / power)
-    inverse: FloatArray = np.linalg.pinv(root[:, None] * point.modes) * root
-    return point._replace(transform=inverse, weights=root**2)
+    inverse = np.linalg.pinv(root[:, None] * point.modes) * root
+    return point._replace(transform=inverse.astype(np.float64), weights=root**2)

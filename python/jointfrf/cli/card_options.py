@@ -51,7 +51,7 @@ def parse_export(text: str) -> tuple[CardFormat, list[int]]:
     ends = list(nodes(rest).numbers) if rest else []
     if len(ends) not in (2, 4 if program == "calculix" else 2):
         raise argparse.ArgumentTypeError(
-            f"{text!r} is not a program and nodes j and k like abaqus:9001,9002; calculix takes two ROT NODEs after them"
+            f"{text!r} is not a program and nodes j and k like abaqus:9001,9002; calculix takes two ROT NODEs more"
         )
     return cast(CardFormat, program), ends
 

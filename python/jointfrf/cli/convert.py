@@ -3,25 +3,16 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
 from pathlib import Path
 
 from jointfrf.cli.measured_file import add_quantity_arguments, nodes, parse_band, read_with_warnings
 from jointfrf.cli.output import Output
+from jointfrf.cli.structure_file import check_target, write_frfs
 from jointfrf.cli.usage import UsageError
 from jointfrf.frf.frf_set import FrfSet
-from jointfrf.io import write_csv, write_hdf5, write_npz, write_uff
 
 __all__ = ["add_arguments", "run"]
 
-_WRITERS: dict[str, Callable[[Path, FrfSet], None]] = {
-    ".uff": write_uff,
-    ".unv": write_uff,
-    ".npz": write_npz,
-    ".h5": write_hdf5,
-    ".hdf5": write_hdf5,
-    ".csv": write_csv,
-}
 _FIELDS = ("freq_hz", "h", "responses", "excitations", "axes", "quantity", "unit", "coherence", "averages")
 
 
@@ -56,11 +47,7 @@ def run(args: argparse.Namespace) -> int:
     *sources, target = args.files
     if not sources:
         raise UsageError("name the files to read, and last the one to write: jointfrf convert IN ... OUT")
-    writer = _WRITERS.get(target.suffix.lower())
-    if writer is None:
-        raise UsageError(f"{target} has no suffix of a format that is written: {', '.join(_WRITERS)}")
-    if not target.parent.is_dir():
-        raise UsageError(f"there is no folder {target.parent}")
+    check_target(target)
     if any(target.exists() and source.exists() and target.samefile(source) for source in sources):
         raise UsageError(f"{target} is one of the files to read")
     frfs = read_with_warnings(
@@ -73,7 +60,7 @@ def run(args: argparse.Namespace) -> int:
     )
     if args.band is not None:
         frfs = frfs.select(args.band)
-    writer(target, frfs)
+    write_frfs(target, frfs)
     out = Output(args)
     out.say(frfs.summary(), f"wrote {target}")
     out.give(_described(frfs, target))

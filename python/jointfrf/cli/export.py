@@ -17,6 +17,7 @@ from jointfrf.cli.card_options import (
 from jointfrf.cli.joint_file import JointFile, read_joint_file
 from jointfrf.cli.output import Output
 from jointfrf.files import write_file
+from jointfrf.io.cards import CardOptions
 from jointfrf.kernel.arguments import FloatArray
 
 __all__ = ["add_arguments", "run"]
@@ -33,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "export",
         type=parse_export,
         metavar="PROGRAM:J,K",
-        help="program and nodes j and k of its model: nastran:9001,9002; rotations of calculix need two ROT NODEs after",
+        help="program and nodes j and k of its model: nastran:9001,9002; calculix: two ROT NODEs more for rotations",
     )
     add_joint_place(parser)
     add_card_arguments(parser)
@@ -50,7 +51,8 @@ def run(args: argparse.Namespace) -> int:
     if found.fit is not None:
         text = written_cards(found.fit, request, found.about)
     else:
-        text = found.joint.export(request.program, request.nodes, **request.options, comments=found.about)
+        options: CardOptions = {**request.options, "comments": found.about}
+        text = found.joint.export(request.program, request.nodes, **options)
         if request.output is not None:
             write_file(request.output, text)
     written = [] if args.output is None else [str(args.output)]

@@ -37,7 +37,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         top_parser().parse_args(words)  # prints help, version or what is wrong, and ends
     if words[0] not in COMMANDS:
         return _complain(
-            f"there is no command {words[0]!r}{did_you_mean(words[0], COMMANDS)}: jointfrf --help lists them",
+            f"there is no command {words[0]!r}{did_you_mean(words[0], COMMANDS) or ': jointfrf --help lists them'}",
             _USAGE_ERROR,
         )
     parser = command_parser(words[0])

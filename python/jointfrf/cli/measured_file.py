@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jointfrf.cli.usage import UsageError
-from jointfrf.dofs import direction_places
+from jointfrf.dofs import direction_names
 from jointfrf.errors import FileContentError
 from jointfrf.frf.bands import in_bands
 from jointfrf.io import FrfSet, read_frfs
@@ -110,15 +110,14 @@ def nodes(text: str) -> Nodes:
 
 
 def joint_dofs(text: str) -> list[str]:
-    """Return the names of joint DOFs."""
-    found = words(text)
+    """Return the names of joint DOFs, theta_x for rx."""
     try:
-        direction_places(found)
+        found = direction_names(words(text))
     except ValueError as error:
         raise argparse.ArgumentTypeError(str(error)) from None
     if not found:
         raise argparse.ArgumentTypeError(f"{text!r} names no DOFs, like y,theta_x")
-    return found
+    return list(found)
 
 
 def numbers(text: str, count: int, like: str) -> tuple[float, ...]:

@@ -14,11 +14,11 @@ from jointfrf.channels.joint_channels import JointChannels, SideAgreement, joint
 from jointfrf.channels.left_out_dofs import LeftOutDof, OffsetCoupling, left_out_dofs, offset_couplings
 from jointfrf.channels.node_dofs import node_dofs
 from jointfrf.channels.point_lines import Interface, interface
-from jointfrf.cli.measured_file import in_some_band, shown_nodes
+from jointfrf.cli.measured_file import Nodes, in_some_band, shown_nodes
 from jointfrf.cli.usage import UsageError
 from jointfrf.dofs import is_rotation
 from jointfrf.errors import FileContentError
-from jointfrf.frf.channel_place import ChannelPlace, places_of_nodes
+from jointfrf.frf.channel_place import ChannelPlace, JointSide, places_of_nodes
 from jointfrf.frf.frf_set import Channel
 from jointfrf.io import FrfSet, read_channel_table
 from jointfrf.io.channel_table import channels_of_table
@@ -242,7 +242,8 @@ def _check_options(args: argparse.Namespace, frfs: FrfSet, table: object) -> Non
         what = "; ".join(needs[name][1] for name in missing)
         verb = "is" if len(missing) == 1 else "are"
         nodes = "" if missing == ["--dofs"] else f" ({args.file.name} has nodes {known})"
-        raise UsageError(f"{' and '.join(missing)} {verb} missing: {what}{nodes}")
+        names = ", ".join([*missing[:-2], " and ".join(missing[-2:])])
+        raise UsageError(f"{names} {verb} missing: {what}{nodes}")
     if args.at is None:
         for name, value in (("--at-k", args.at_k), ("a table of channels", table)):
             if value is not None:
@@ -259,10 +260,9 @@ def _on_sides(table: tuple[ChannelPlace, ...], args: argparse.Namespace, known: 
     """Return the channels of a table that belong to the joint, each with its side."""
     if args.j is None and args.k is None:
         return table
-    sides = {
-        node: side
-        for side, nodes in (("j", args.j), ("k", args.k))
-        for node in ([] if nodes is None else nodes.among(known, args.file))
+    named: tuple[tuple[JointSide, Nodes | None], ...] = (("j", args.j), ("k", args.k))
+    sides: dict[int, JointSide] = {
+        node: side for side, nodes in named for node in ([] if nodes is None else nodes.among(known, args.file))
     }
     kept = []
     for place in table:

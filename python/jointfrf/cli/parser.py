@@ -34,8 +34,8 @@ _NEGATIVE = re.compile(r"-\.?\d")
 class CommandParser(argparse.ArgumentParser):
     """A parser whose errors say what was meant; options are written in full."""
 
-    def __init__(self, *args: Any, **more: Any) -> None:
-        super().__init__(*args, allow_abbrev=False, **more)
+    def __init__(self, **options: Any) -> None:
+        super().__init__(allow_abbrev=False, **options)
         self._given: set[str] = set()
 
     def error(self, message: str) -> NoReturn:

@@ -88,7 +88,10 @@ def read_receptances(table: TomlTable, freq_hz: FloatArray) -> MeasuredStructure
         One sentence that names the key and the file.
     """
     quantity = table.text("quantity", tuple(POWER_OF_I_OMEGA)) if "quantity" in table else None
-    frfs = read_frf_file(table, "file", quantity)
+    forced = table.truth("force_quantity") if "force_quantity" in table else False
+    if forced and quantity is None:
+        raise table.wrong("force_quantity", "there is no quantity to force")
+    frfs = read_frf_file(table, "file", quantity, force_quantity=forced)
     table.close()
     table.build(lambda: lines_at(frfs, freq_hz), "file")
     return MeasuredStructure(frfs)
