@@ -30,7 +30,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the arguments of the command."""
     parser.description = (
         "Compute receptances of a model and write them as a Universal File (.uff), NPZ, HDF5 or CSV. The model is "
-        "a TOML file with the keys of a substructure of a case (chain, beam, brick-beam, matrices), or matrices given by options."
+        "a TOML file with the keys of a substructure of a case (chain, beam, brick-beam, matrices), or "
+        "matrices named by options."
     )
     parser.add_argument("model", nargs="?", type=Path, help="TOML file of a model; or --stiffness and --mass")
     parser.add_argument("--output", type=Path, metavar="FILE", help="file to write: .uff, .npz, .h5 or .csv")

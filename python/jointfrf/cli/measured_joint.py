@@ -21,7 +21,7 @@ from jointfrf.errors import FileContentError
 from jointfrf.frf.channel_place import ChannelPlace, JointSide, places_of_nodes
 from jointfrf.frf.frf_set import Channel
 from jointfrf.io import FrfSet, read_channel_table
-from jointfrf.io.channel_table import channels_of_table
+from jointfrf.io.channel_table import places_of_table
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.toml.table import read_toml
 
@@ -225,7 +225,7 @@ def _table(args: argparse.Namespace) -> tuple[ChannelPlace, ...] | None:
     if args.configuration is None:
         return None
     table = read_toml(args.configuration)
-    return channels_of_table(table) if "channel" in table else None
+    return places_of_table(table) if "channel" in table else None
 
 
 def _check_options(args: argparse.Namespace, frfs: FrfSet, table: object) -> None:

@@ -332,9 +332,17 @@ def _nastran_bush(link: _Link) -> list[str]:
         *link.comments("$"),
         *(f"$ {line}" for line in apart),
         *system,
-        *_large("CBUSH", [link.element, link.number, *link.nodes[:2], "", "", "", 0, *where]),
+        *_bush(link, where),
         *_large("PBUSH", fields),
     ]
+
+
+def _bush(link: _Link, where: list[str | int | float]) -> list[str]:
+    """Write a CBUSH whose axes are those of the basic system."""
+    numbers = [link.element, link.number, *link.nodes[:2]]
+    if where:
+        return _large("CBUSH", [*numbers, "", "", "", 0, *where])
+    return [f"{'CBUSH':<8}" + "".join(f"{number:8d}" for number in numbers) + " " * 24 + f"{0:8d}"]
 
 
 def _bush_place(link: _Link) -> tuple[list[str], list[str | int | float]] | None:

@@ -19,7 +19,7 @@ from jointfrf.spelling import did_you_mean
 from jointfrf.toml.keys import Key, KeyTable
 from jointfrf.toml.table import TomlTable, read_toml
 
-__all__ = ["CHANNEL_KEYS", "channels_of_table", "read_channel_table"]
+__all__ = ["CHANNEL_KEYS", "places_of_table", "read_channel_table"]
 
 _UNITS = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "in": 0.0254}
 _TRIAXIAL = np.eye(3)
@@ -79,7 +79,7 @@ def read_channel_table(path: str | PathLike[str]) -> tuple[ChannelPlace, ...]:
     file = Path(path)
     if file.suffix.lower() == ".toml":
         table = read_toml(file)
-        places = channels_of_table(table)
+        places = places_of_table(table)
         table.close()
         return places
     found = tuple(place for row in _csv_rows(file) for place in row)
@@ -88,7 +88,7 @@ def read_channel_table(path: str | PathLike[str]) -> tuple[ChannelPlace, ...]:
     return found
 
 
-def channels_of_table(table: TomlTable) -> tuple[ChannelPlace, ...]:
+def places_of_table(table: TomlTable) -> tuple[ChannelPlace, ...]:
     """Take the keys ``unit`` and ``[[channel]]`` of a TOML file; as `read_channel_table`."""
     if "channel" not in table:
         hint = did_you_mean("channel", table.keys())

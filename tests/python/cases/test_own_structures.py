@@ -107,12 +107,18 @@ def test_lines_of_a_file_may_be_limited(by_receptances):
 
 @pytest.mark.filterwarnings("ignore::jointfrf.FileContentWarning")
 def test_a_quantity_may_be_said(by_receptances):
-    """The file says accelerance; the key goes before it."""
+    """The file says accelerance: another quantity must be forced."""
     path = by_receptances / "case.toml"
     text, power = path.read_text(), {"accelerance": 2, "mobility": 1, "receptance": 0}
     h = {}
     for quantity in power:
-        path.write_text(text.replace('file = "a.uff"', f'file = "a.uff"\nquantity = "{quantity}"'))
+        said = f'file = "a.uff"\nquantity = "{quantity}"'
+        if quantity != "accelerance":
+            path.write_text(text.replace('file = "a.uff"', said))
+            with pytest.raises(jf.FileContentError, match="says that it holds accelerance"):
+                read_case(by_receptances)
+            said += "\nforce_quantity = true"
+        path.write_text(text.replace('file = "a.uff"', said))
         h[quantity] = read_case(by_receptances).a.receptance(BEAMS.freq_hz, ["3:y", "3:rz"])
     i_omega = 2j * np.pi * BEAMS.freq_hz[:, None, None]
     for quantity, n in power.items():
