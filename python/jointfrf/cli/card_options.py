@@ -9,7 +9,7 @@ from typing import NamedTuple, cast, get_args
 
 import numpy as np
 
-from jointfrf.cli.measured_file import nodes, numbers, point
+from jointfrf.cli.measured_file import nodes, numbers, point, words
 from jointfrf.cli.usage import UsageError, positive
 from jointfrf.files import write_file
 from jointfrf.identification.joint_fit import JointFit
@@ -49,6 +49,8 @@ def parse_export(text: str) -> tuple[CardFormat, list[int]]:
     if program not in known:
         raise argparse.ArgumentTypeError(f"{program!r} is none of {', '.join(known)}{did_you_mean(program, known)}")
     ends = list(nodes(rest).numbers) if rest else []
+    if 0 < len(ends) < len(words(rest)):
+        raise argparse.ArgumentTypeError(f"{text!r} names a node twice")
     if len(ends) not in (2, 4 if program == "calculix" else 2):
         raise argparse.ArgumentTypeError(
             f"{text!r} is not a program and nodes j and k like abaqus:9001,9002; calculix takes two ROT NODEs more"

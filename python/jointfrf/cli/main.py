@@ -34,7 +34,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     words = list(sys.argv[1:] if arguments is None else arguments)
     if not words or words[0].startswith("-"):
-        top_parser().parse_args(words)  # prints help, version or what is wrong, and ends
+        top_parser().parse_words(words)  # prints help, version or what is wrong, and ends
     if words[0] not in COMMANDS:
         return _complain(
             f"there is no command {words[0]!r}{did_you_mean(words[0], COMMANDS) or ': jointfrf --help lists them'}",

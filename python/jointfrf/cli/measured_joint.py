@@ -104,13 +104,13 @@ class MeasuredJoint:
         yield from (f"{one}; --at X,Y,Z gives both sides one" for one in self.offsets if one.is_left_out)
         for group in self.agreement:
             share = _not_rigid(group)
-            for channel in group.channels if share > _NOT_RIGID else ():
-                if channel.blame > _MUCH:
-                    yield (
-                        f"{100 * channel.blame:.0f} % of what is not rigid in the {group.kind}s of side {group.side} "
-                        f"({100 * share:.2g} % of their motion) is gone without {channel.channel}: look at its sign, "
-                        "direction, gain and place"
-                    )
+            worst = max(group.channels, key=lambda channel: np.nan_to_num(channel.blame))
+            if share > _NOT_RIGID and worst.blame > _MUCH:
+                yield (
+                    f"{100 * worst.blame:.0f} % of what is not rigid in the {group.kind}s of side {group.side} "
+                    f"({100 * share:.2g} % of their motion) is gone without {worst.channel}: look at its sign, "
+                    "direction, gain and place"
+                )
 
     def text(self) -> Iterator[str]:
         """Describe reference points, and channels beside rigid motion, line by line."""
