@@ -52,6 +52,9 @@ STYLES = {
     "high": Style("#e07b00", "--", 1.2),
     "faint": Style("#a8a8a8", "-", 0.3),
     "dots": Style("#8c8c8c", "", 1.0, "."),
+    "wide": Style("#eeb574", "-", 4.0),
+    "fitted": Style("#16365f", "-", 1.1),
+    "difference": Style("#8c8c8c", "-", 0.7),
     "outlying": Style("#7b1a10", "", 1.0, "x"),
 }
 _SHADES = ("#ececec", "#d2d2d2", "#bdbdbd")
