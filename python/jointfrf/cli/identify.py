@@ -92,6 +92,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="also print the joint (by the first method) as input of abaqus, calculix (stiffness only), nastran or "
         "ansys, between its nodes J and K: abaqus:9001,9002; rotations of calculix need two ROT NODEs after them",
     )
+    parser.add_argument(
+        "--report",
+        type=Path,
+        metavar="FILE",
+        help="also write the identification (by the first method) as one HTML page, like report.html",
+    )
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder for identification.json and figures")
 
 
@@ -99,6 +105,8 @@ def run(args: argparse.Namespace) -> int:
     """Carry out the command; the caller turns exceptions into messages."""
     if args.out is not None:
         check_extras("matplotlib")
+    if args.report is not None:
+        check_extras("jinja2")
     frfs = read_receptances(args)
     if not (args.j and args.k and args.dofs):
         print(frfs.summary())
@@ -127,6 +135,9 @@ def run(args: argparse.Namespace) -> int:
         damping = program != "calculix"  # it has none between DOFs, and says so in the text
         print()
         print(fits[0].export(program, ends[:2], rotation_nodes=ends[2:] or None, damping=damping), end="")
+    if args.report is not None:
+        ends = (1, 2) if args.export is None else args.export[1]
+        print(f"\nwrote {fits[0].report(args.report, source=args.file.name, command=args.typed, nodes=ends)}")
     if args.out is not None:
         from jointfrf.report.fit import write_fit
         from jointfrf.report.noise import noise_figure

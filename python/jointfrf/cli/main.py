@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import importlib
 import os
+import shlex
 import sys
 import warnings
 from collections.abc import Sequence
@@ -40,7 +41,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     int
         0 good, 1 something in the data or the files is wrong, 2 wrong usage, 130 interrupted.
     """
-    options = _parser(list(sys.argv[1:] if arguments is None else arguments)).parse_args(arguments)
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    options = _parser(words).parse_args(words, argparse.Namespace(typed=shlex.join(["jointfrf", *words])))
     with warnings.catch_warnings():
         warnings.showwarning = _show_warning
         try:

@@ -193,6 +193,23 @@ class JointFit:
         """Return the unit of a parameter, by the names of its DOFs as `Parameter.unit` reads them."""
         return Parameter.parse(parameter).unit
 
+    def plot(self) -> Any:
+        """Draw the joint over frequency, K* and compliance of each DOF, and measured against regenerated FRFs.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            ``fit.plot().savefig("joint.png")`` writes it. A fit that was loaded shows no FRFs.
+
+        Raises
+        ------
+        MissingPackageError
+            matplotlib is missing.
+        """
+        from jointfrf.report.fit_plot import plot_fit
+
+        return plot_fit(self)
+
     def report(self, path: Path | str, *, source: str = "", command: str = "", nodes: Sequence[int] = (1, 2)) -> Path:
         """Write a report: one HTML file with all that is needed to judge and to quote the joint, no link to another.
 

@@ -29,7 +29,7 @@ _DOT, _CROSS = 2.4, 4.0
 #: Dashes of matplotlib's names, in widths of the line.
 _DASHES = {"-": (), "--": (4, 2), ":": (1, 1.8), "-.": (6, 2, 1, 2)}
 #: Lightness of colours on a dark page: from, to.
-_DARK = (0.55, 0.92)
+_DARK = (0.36, 0.92)
 
 
 @dataclass(frozen=True)
