@@ -87,6 +87,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     results = parser.add_argument_group("results")
     results.add_argument("--out", type=Path, metavar="DIR", help="folder for identification.json and figures")
     results.add_argument(
+        "--report", type=Path, metavar="FILE", help="the identification (by the first method) as one HTML page"
+    )
+    results.add_argument(
         "--save", type=Path, metavar="FILE", help="keep the joint (by the first method) in a JSON file"
     )
     results.add_argument(
@@ -103,6 +106,8 @@ def run(args: argparse.Namespace) -> int:
     """Carry out the command; the caller turns exceptions into messages."""
     if args.out is not None:
         check_extras("matplotlib")
+    if args.report is not None:
+        check_extras("jinja2")
     out = Output(args)
     frfs = read_receptances(args)
     joint = measured_joint(args, frfs, args.bending_stiffness)
@@ -128,6 +133,9 @@ def run(args: argparse.Namespace) -> int:
         written.append(args.save)
     if text and args.output is None:
         out.say("", text.rstrip("\n"))
+    if args.report is not None:
+        ends = (1, 2) if args.export is None else args.export[1]
+        written.append(fits[0].report(args.report, source=args.file.name, command=args.typed, nodes=ends))
     if args.out is not None:
         written += _write_figures(args, frfs, joint, fits)
     out.say(*([""] if written else []), *(f"wrote {path}" for path in written))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 import sys
 import warnings
 from collections.abc import Sequence
@@ -42,6 +43,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         )
     parser = command_parser(words[0])
     given = parser.parse_words(words[1:])
+    given.typed = shlex.join(["jointfrf", *words])
     with warnings.catch_warnings():
         warnings.showwarning = _show_warning
         try:

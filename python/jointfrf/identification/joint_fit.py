@@ -17,6 +17,7 @@ from scipy.special import ndtri
 from jointfrf.dofs import Parameter, ParameterKind
 from jointfrf.files import write_file
 from jointfrf.identification.fit_cards import fit_cards
+from jointfrf.identification.fit_data import FitData
 from jointfrf.identification.fit_record import fields_of_record, read_record, record_of
 from jointfrf.io.cards import CardFormat, CardOptions
 from jointfrf.joint import Joint
@@ -64,6 +65,8 @@ class JointFit:
     intervals : callable, optional
         From a probability to the interval of each parameter, where the method has its own; a fit that was loaded has
         those of some probabilities.
+    data : FitData, optional
+        What it was made from, for figures and reports; a fit that was loaded has none.
     """
 
     method: str
@@ -78,6 +81,7 @@ class JointFit:
     warnings: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     intervals: Callable[[float], dict[str, tuple[float, float]]] | None = field(default=None, repr=False, compare=False)
+    data: FitData | None = field(default=None, repr=False, compare=False)
 
     @cached_property
     def terms(self) -> tuple[Parameter, ...]:
@@ -218,6 +222,55 @@ class JointFit:
     def unit(self, parameter: str) -> str:
         """Return the unit of a parameter, by the names of its DOFs as `Parameter.unit` reads them."""
         return Parameter.parse(parameter).unit
+
+    def plot(self) -> Any:
+        """Draw the joint over frequency, K* and compliance of each DOF, and measured against regenerated FRFs.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            ``fit.plot().savefig("joint.png")`` writes it. A fit that was loaded shows no FRFs.
+
+        Raises
+        ------
+        MissingPackageError
+            matplotlib is missing.
+        """
+        from jointfrf.report.fit_plot import plot_fit
+
+        return plot_fit(self)
+
+    def report(self, path: Path | str, *, source: str = "", command: str = "", nodes: Sequence[int] = (1, 2)) -> Path:
+        """Write a report: one HTML file with all that is needed to judge and to quote the joint, no link to another.
+
+        Parameters
+        ----------
+        path : Path or str
+            In a folder that exists.
+        source : str
+            Name of the file that was measured.
+        command : str
+            How the fit was made, as typed.
+        nodes : sequence of two or four int
+            Nodes j and k of the finite-element cards; then ROT NODEs of CalculiX.
+
+        Returns
+        -------
+        Path
+            The file written.
+
+        Raises
+        ------
+        ValueError
+            The fit does not hold the measured FRFs: it was loaded, or is a mean over bands.
+        MissingPackageError
+            jinja2 is missing.
+        OSError
+            The file cannot be written.
+        """
+        from jointfrf.report.fit_page import ReportOptions, write_report
+
+        return write_report(self, Path(path), ReportOptions(source, command, nodes))
 
     def to_dict(self, *, probabilities: Sequence[float] | None = None, lines: bool = True) -> dict[str, Any]:
         """Everything as plain numbers and text, ready for JSON; `from_dict` gives the same fit again.

@@ -5,13 +5,15 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from jointfrf.dofs import Parameter, compliance_unit
 from jointfrf.files import write_file
 from jointfrf.identification.joint_fit import JointFit
-from jointfrf.kernel.arguments import ComplexArray
+from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.kernel.linear_algebra import invert
 from jointfrf.report.axes import FREQUENCY, bulk_limits
 from jointfrf.report.draw import draw
@@ -33,20 +35,39 @@ def fit_figures(fit: JointFit) -> list[Figure]:
     list of Figure
         ``"joint_<dof>"`` for each DOF.
     """
-    fitted = fit.k_joint(fit.freq_hz)
-    lines = fit.k_lines
+    up = np.argsort(fit.freq_hz, kind="stable")
+    freq, lines = fit.freq_hz[up], fit.k_lines[up]
+    fitted = fit.k_joint(freq)
     compliance = invert(fitted, on_singular="nan")
-    each_compliance = invert(np.where(np.isfinite(lines), lines, 0), on_singular="nan")
+    if fit.data is None:
+        inverse = invert(np.where(np.isfinite(lines), lines, 0), on_singular="nan")
+        each_compliance = np.asarray(np.einsum("ldd->ld", inverse))
+    else:
+        each_compliance = fit.data.line_compliance()[up]
+    used = np.ones(lines.shape[:2], np.bool_) if fit.data is None else fit.data.fitted[up]
     figures = []
     for d, dof in enumerate(fit.dofs):
         stiffness = Parameter.of_dof("k", dof)
-        panels = [
-            *_panels(fit, f"K*, {stiffness.unit}", lines[:, d, d], fitted[:, d, d], _interval(fit, stiffness)),
-            *_panels(fit, f"C, {compliance_unit(dof, dof)}", each_compliance[:, d, d], compliance[:, d, d], ()),
-        ]
+        panels = []
+        for label, each, curve, ribbons in (
+            (f"K*, {stiffness.unit}", lines[:, d, d], fitted, _interval(fit, stiffness)),
+            (f"C, {compliance_unit(dof, dof)}", each_compliance[:, d], compliance, ()),
+        ):
+            panels += _panels(_Lines(fit.method, label, freq, each, curve[:, d, d], used[:, d]), ribbons)
         words = f"Joint DOF {dof}: complex stiffness K* and compliance C"
         figures.append(Figure(f"joint_{dof}", words, tuple(panels), 2, heading=words))
     return figures
+
+
+class _Lines(NamedTuple):
+    """One entry of K* or C: values of each line by itself, as fitted, and which lines were used."""
+
+    method: str
+    label: str
+    freq_hz: FloatArray
+    each: ComplexArray
+    fitted: ComplexArray
+    used: NDArray[np.bool_]
 
 
 def _interval(fit: JointFit, stiffness: Parameter) -> tuple[Ribbon, ...]:
@@ -54,23 +75,28 @@ def _interval(fit: JointFit, stiffness: Parameter) -> tuple[Ribbon, ...]:
     low, high = fit.confidence_interval(0.95)[stiffness.name]
     if not (np.isfinite(low) and np.isfinite(high)):
         return ()
-    ends = fit.freq_hz[[0, -1]]
+    ends = np.array([fit.freq_hz.min(), fit.freq_hz.max()])
     return (Ribbon("95 % interval of k", ends, np.full(2, low), np.full(2, high), "low"),)
 
 
-def _panels(
-    fit: JointFit, label: str, each: ComplexArray, fitted: ComplexArray, interval: tuple[Ribbon, ...]
-) -> list[Panel]:
+def _panels(lines: _Lines, interval: tuple[Ribbon, ...]) -> list[Panel]:
     """Real and imaginary part of one entry; the interval belongs to the real part."""
     panels = []
-    for part, values, curve in (("Re", each.real, fitted.real), ("Im", each.imag, fitted.imag)):
-        curves = (
-            Curve("each line", fit.freq_hz, values, "dots"),
-            Curve(f"fit ({fit.method})", fit.freq_hz, curve, "actual"),
-        )
+    used, out = lines.used, ~lines.used
+    for part, values, curve in (
+        ("Re", lines.each.real, lines.fitted.real),
+        ("Im", lines.each.imag, lines.fitted.imag),
+    ):
+        curves = [
+            Curve("each line", lines.freq_hz[used], values[used], "dots"),
+            Curve(f"fit ({lines.method})", lines.freq_hz, curve, "actual"),
+        ]
+        if out.any():
+            curves.append(Curve("lines left out", lines.freq_hz[out], values[out], "outlying"))
         ribbons = interval if part == "Re" else ()
         shown = [float(curve.min()), float(curve.max())] if np.isfinite(curve).all() else []
-        panels.append(Panel("", FREQUENCY, f"{part} {label}", curves, ribbons, y_limits=bulk_limits([values], shown)))
+        limits = bulk_limits([values], shown)
+        panels.append(Panel("", FREQUENCY, f"{part} {lines.label}", tuple(curves), ribbons, y_limits=limits))
     return panels
 
 
