@@ -242,7 +242,7 @@ def _point(
 ) -> VirtualPoint:
     """Return the virtual point of the responses or excitations of a side."""
     if not places:
-        raise ValueError(f"side {side} of the joint has no {kind}s")
+        raise ValueError(f"side {side} of the joint has no {kind}s: name the nodes of sensors and of impacts")
     positions = [_position(frfs, place) for place in places]
     weights = [place.weight for place in places]
     try:

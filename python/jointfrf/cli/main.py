@@ -34,7 +34,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         0 good, 1 something in the data or the files is wrong, 2 wrong usage, 130 interrupted.
     """
     words = list(sys.argv[1:] if arguments is None else arguments)
-    if not words or words[0].startswith("-"):
+    if not words:
+        top_parser().print_help(sys.stderr)
+        return _USAGE_ERROR
+    if words[0].startswith("-"):
         top_parser().parse_words(words)  # prints help, version or what is wrong, and ends
     if words[0] not in COMMANDS:
         return _complain(

@@ -42,7 +42,7 @@ def _elsewhere(tmp_path, monkeypatch):
         (["check", "a.uff", "--force-quantity"], "--force-quantity needs --quantity"),
         (["completion", "bsh"], "did you mean bash?"),
         (["cases", "--key"], "did you mean --keys?"),
-        ([], "the following arguments are required: COMMAND"),
+        ([], "identify a joint from a file of measured FRFs"),
         (["--hlep"], "unknown option --hlep; did you mean --help?"),
     ],
 )

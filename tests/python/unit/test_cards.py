@@ -300,12 +300,18 @@ def rigid_model(size, density, reference):
     return jf.Model(np.zeros((6, 6)), m, DOFS)
 
 
-def rigid_bricks(joint_cards):
+#: Where the REF NODEs are from the reference points of the joint, m, and where these are.
+BESIDE = np.array([[0.02, -0.01, 0.015], [-0.01, 0.03, 0.0]])
+APART = np.array([[0.0, 0, 0], [0.001, 0, 0]])
+
+
+def rigid_bricks(joint_cards, beside=0 * BESIDE):
     corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]]) - 0.5
     lines = ["*NODE, NSET=ALL"]
     for body, (size, _, reference) in enumerate(BRICKS):
         at = -np.array(reference) + body * np.array([0.001, 0, 0])
-        points = [*(at + corners * size), at + reference, at + reference]
+        node = at + reference + beside[body]
+        points = [*(at + corners * size), node, node]
         lines += [f"{10 * body + i}, " + ", ".join(f"{x:.12g}" for x in p) for i, p in enumerate(points, 1)]
     for body, (_, density, _) in enumerate(BRICKS):
         first = 10 * body
@@ -330,7 +336,7 @@ def rigid_bricks(joint_cards):
 
 
 @pytest.mark.skipif(CCX is None, reason="CalculiX (ccx) is not on PATH")
-@pytest.mark.parametrize("kind", ["diagonal", "coupled"])
+@pytest.mark.parametrize("kind", ["diagonal", "coupled", "nodes beside the joint"])
 def test_natural_frequencies_of_calculix(kind, tmp_path):
     stiffness = np.diag([1e6, 3e6, 2e6, 1e3, 4e3, 2e3])
     if kind == "coupled":
@@ -340,7 +346,11 @@ def test_natural_frequencies_of_calculix(kind, tmp_path):
     joint = jf.Joint(stiffness, dofs=DOFS)
     a, b = (rigid_model(*brick) for brick in BRICKS)
     ours = jf.assemble(a, b, joint, range(6), range(6)).natural_frequencies()[6:]
-    text = rigid_bricks(joint.export("calculix", (9, 19), rotation_nodes=(10, 20), element=100))
+    beside = BESIDE if kind.startswith("nodes") else 0 * BESIDE
+    places = {"positions": APART + beside, "points": APART}
+    cards = joint.export("calculix", (9, 19), rotation_nodes=(10, 20), element=100, **places)
+    assert ("SPRING1" in cards) == kind.startswith("nodes")
+    text = rigid_bricks(cards, beside)
     theirs = natural_frequencies(CCX, text, tmp_path)
     np.testing.assert_allclose(theirs[6:], ours, rtol=1e-6)
 
