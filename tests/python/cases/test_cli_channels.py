@@ -8,7 +8,7 @@ import pytest
 
 from command import run_command
 from hammer_test import JOINT, hammer_test, noisy
-from jointfrf.io import write_npz, write_uff
+from jointfrf.io import Channel, write_npz, write_uff
 from rigid_bodies import DOFS, POINT
 
 pytest.importorskip("pyuff")
@@ -92,6 +92,19 @@ def test_a_dof_left_out_is_named_before_the_fit(test_file):
     result = run_command("identify", test_file, *words, "--band", "20:200")
     assert "which is left out, enters" in result.stderr
     assert "fit theta_" in result.stderr
+
+
+def test_an_offset_between_two_nodes_is_named_before_the_fit(tmp_path):
+    """Points 6 mm apart along y: where both sides turn about z, they move against each other along x."""
+    frfs = hammer_test()
+    ends = (Channel(1, "+x"), Channel(2, "+x"))
+    places = {1: np.zeros(3), 2: np.array([0, 0.006, 0])}
+    write_uff(
+        tmp_path / "two.uff", replace(frfs, responses=ends, excitations=ends, h=frfs.h[:, :2, :2], coordinates=places)
+    )
+    said = run_command("check", tmp_path / "two.uff", "--j", "1", "--k", "2", "--dofs", "x").stdout
+    assert "couples x with theta_z, which is left out: -6 mm; --at X,Y,Z gives both sides one" in said
+    assert "reference points 6 mm apart: x, y, z = 0, 6, 0 mm" in said
 
 
 def csv_table(frfs):

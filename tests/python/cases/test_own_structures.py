@@ -105,6 +105,22 @@ def test_lines_of_a_file_may_be_limited(by_receptances):
     np.testing.assert_allclose(read_case(folder).freq_hz, BEAMS.freq_hz, rtol=1e-12)
 
 
+def test_receptances_may_stand_in_any_format(by_receptances):
+    """What `jointfrf convert` writes gives the same case: NPZ and CSV instead of Universal Files."""
+    path = by_receptances / "case.toml"
+    points = [["3:y", "3:rz"], ["1:y", "1:rz"]]
+    before = read_case(by_receptances)
+    text = path.read_text()
+    for old, new, write in (("a.uff", "a.npz", jf.io.write_npz), ("b.uff", "b.csv", jf.io.write_csv)):
+        write(by_receptances / new, jf.io.read_frfs(by_receptances / old))
+        (by_receptances / old).unlink()
+        text = text.replace(f'"{old}"', f'"{new}"')
+    path.write_text(text)
+    after = read_case(by_receptances)
+    for one, other, at in zip((before.a, before.b), (after.a, after.b), points, strict=True):
+        same_frfs(one.receptance(BEAMS.freq_hz, at), other.receptance(BEAMS.freq_hz, at))
+
+
 @pytest.mark.filterwarnings("ignore::jointfrf.FileContentWarning")
 def test_a_quantity_may_be_said(by_receptances):
     """The file says accelerance: another quantity must be forced."""
