@@ -6,7 +6,7 @@ import argparse
 
 from jointfrf.channels.check.check import check_frfs
 from jointfrf.channels.check.finding import FrfCheck
-from jointfrf.cli.measured_file import add_file_arguments, in_some_band, read_receptances
+from jointfrf.cli.measured_file import add_file_arguments, file_names, in_some_band, read_receptances
 from jointfrf.cli.measured_joint import MeasuredJoint, measured_joint
 from jointfrf.cli.output import Output
 from jointfrf.errors import FileContentError
@@ -50,12 +50,12 @@ def run(args: argparse.Namespace) -> int:
         missing = int((~frfs.measured).sum())
         if missing:
             raise FileContentError(
-                f"{args.file}: {missing} FRFs are missing between its channels: name those of the joint, "
+                f"{frfs.source}: {missing} FRFs are missing between its channels: name those of the joint, "
                 "--j NODES --k NODES --dofs DOFS"
             )
         lines = in_some_band(frfs.freq_hz, frfs.h, args.band)
         check, warned = check_frfs(*lines, responses=frfs.responses, forces=frfs.excitations), []
-    out.say(f"{args.file.name}: {check}")
+    out.say(f"{file_names(args)}: {check}")
     about = {} if joint is None else {"joint": joint.to_dict(), "warnings": warned}
-    out.give({"source": str(args.file), "quantity": frfs.stated, **check.to_dict(), **about})
+    out.give({"sources": [str(path) for path in args.files], "quantity": frfs.stated, **check.to_dict(), **about})
     return 0 if check.ok and not warned else 1

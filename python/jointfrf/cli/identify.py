@@ -16,7 +16,14 @@ from jointfrf.channels.check.finding import FrfCheck
 from jointfrf.channels.finite_differences import difference_error
 from jointfrf.cli.card_options import add_card_arguments, card_request, parse_export, written_cards
 from jointfrf.cli.check import check_joint
-from jointfrf.cli.measured_file import add_file_arguments, in_some_band, read_receptances, shown_nodes, words
+from jointfrf.cli.measured_file import (
+    add_file_arguments,
+    file_names,
+    in_some_band,
+    read_receptances,
+    shown_nodes,
+    words,
+)
 from jointfrf.cli.measured_joint import MeasuredJoint, measured_joint
 from jointfrf.cli.output import Output, plain
 from jointfrf.cli.usage import waiting
@@ -125,17 +132,17 @@ def run(args: argparse.Namespace) -> int:
         out.say("", fits[-1])
     text, written = "", []
     if request is not None:
-        about = [f"from {args.file.name}", *_places(joint)]
+        about = [f"from {file_names(args)}", *_places(joint)]
         text = written_cards(fits[0], request, about)
         written += [] if args.output is None else [args.output]
     if args.save is not None:
-        _save(args.save, fits[0], args.file.name, joint)
+        _save(args.save, fits[0], file_names(args), joint)
         written.append(args.save)
     if text and args.output is None:
         out.say("", text.rstrip("\n"))
     if args.report is not None:
         ends = (1, 2) if args.export is None else args.export[1]
-        written.append(fits[0].report(args.report, source=args.file.name, command=args.typed, nodes=ends))
+        written.append(fits[0].report(args.report, source=file_names(args), command=args.typed, nodes=ends))
     if args.out is not None:
         written += _write_figures(args, frfs, joint, fits)
     out.say(*([""] if written else []), *(f"wrote {path}" for path in written))
@@ -152,7 +159,7 @@ def _content(
     written: list[Path],
 ) -> dict[str, Any]:
     return {
-        "source": str(args.file),
+        "sources": [str(path) for path in args.files],
         "joint": joint.to_dict(),
         "checks": check.to_dict(),
         "warnings": [*joint.warnings()],
@@ -167,9 +174,8 @@ def _heading(args: argparse.Namespace, frfs: FrfSet, joint: MeasuredJoint) -> It
     points = " and ".join(
         shown_nodes(side) if joint.channels is not None else ", ".join(map(str, side)) for side in joint.nodes
     )
-    yield (
-        f"{args.file.name}: {frfs.h.shape[1]} responses x {frfs.h.shape[2]} excitations; joint between points {points}"
-    )
+    size = f"{frfs.h.shape[1]} responses x {frfs.h.shape[2]} excitations"
+    yield f"{file_names(args)}: {size}; joint between points {points}"
     yield from joint.text()
     if joint.channels is None and len(joint.nodes[0]) > 1:
         yield from _differences(args, joint)
@@ -247,4 +253,4 @@ def _write_figures(args: argparse.Namespace, frfs: FrfSet, joint: MeasuredJoint,
         freq_hz, h = in_some_band(frfs.freq_hz, joint.h, args.band)
         names = [[str(channel) for channel in side.channels] for side in (joint.responses, joint.forces)]
         figures.append(noise_figure(freq_hz, h, estimate_noise(freq_hz, h), *names))
-    return write_fit(fits, args.out, args.file.name, figures)
+    return write_fit(fits, args.out, file_names(args), figures)

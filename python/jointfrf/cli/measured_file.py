@@ -23,6 +23,7 @@ __all__ = [
     "add_file_arguments",
     "add_joint_arguments",
     "add_quantity_arguments",
+    "file_names",
     "in_some_band",
     "joint_dofs",
     "nodes",
@@ -148,9 +149,12 @@ def parse_band(text: str) -> tuple[float, float]:
 def add_file_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the file, the points on both sides, the DOFs, the bands."""
     parser.add_argument(
-        "file",
+        "files",
+        nargs="+",
         type=Path,
-        help="FRFs of the points around the joint: Universal File, MATLAB, NPZ, HDF5 or CSV file",
+        metavar="FILE",
+        help="FRFs of the points around the joint: Universal File, MATLAB, NPZ, HDF5 or CSV; several files of one test "
+        "become one",
     )
     add_joint_arguments(parser)
 
@@ -210,7 +214,12 @@ def read_receptances(args: argparse.Namespace) -> FrfSet:
     """Read the file as receptances; what had to be assumed is told as a warning."""
     if args.force_quantity and args.quantity is None:
         raise UsageError("--force-quantity needs --quantity")
-    return read_with_warnings(args.file, quantity=args.quantity, force_quantity=args.force_quantity, receptance=True)
+    return read_with_warnings(*args.files, quantity=args.quantity, force_quantity=args.force_quantity, receptance=True)
+
+
+def file_names(args: argparse.Namespace) -> str:
+    """Return the names of the files without their folders."""
+    return ", ".join(path.name for path in args.files)
 
 
 def read_with_warnings(*paths: Path, receptance: bool = False, **options: Any) -> FrfSet:

@@ -14,7 +14,7 @@ from jointfrf.channels.joint_channels import JointChannels, SideAgreement, joint
 from jointfrf.channels.left_out_dofs import LeftOutDof, OffsetCoupling, left_out_dofs, offset_couplings
 from jointfrf.channels.node_dofs import node_dofs
 from jointfrf.channels.point_lines import Interface, interface
-from jointfrf.cli.measured_file import Nodes, in_some_band, shown_nodes
+from jointfrf.cli.measured_file import Nodes, file_names, in_some_band, shown_nodes
 from jointfrf.cli.usage import UsageError
 from jointfrf.dofs import is_rotation
 from jointfrf.errors import FileContentError
@@ -203,10 +203,10 @@ def measured_joint(args: argparse.Namespace, frfs: FrfSet, bending_stiffness: fl
     _check_options(args, frfs, table)
     known = {channel.node for channel in (*frfs.responses, *frfs.excitations)}
     if table is not None:
-        places = _on_sides(table, args, known)
+        places = _on_sides(table, args, known, frfs.source)
         nodes = _nodes_of(places, "j"), _nodes_of(places, "k")
     else:
-        nodes = args.j.among(known, args.file), args.k.among(known, args.file)
+        nodes = args.j.among(known, frfs.source), args.k.among(known, frfs.source)
         places = ()
     if args.at is not None:
         places = places or places_of_nodes(frfs, *nodes)
@@ -241,7 +241,7 @@ def _check_options(args: argparse.Namespace, frfs: FrfSet, table: object) -> Non
     if missing:
         what = "; ".join(needs[name][1] for name in missing)
         verb = "is" if len(missing) == 1 else "are"
-        nodes = "" if missing == ["--dofs"] else f" ({args.file.name} has nodes {known})"
+        nodes = "" if missing == ["--dofs"] else f" ({file_names(args)} has nodes {known})"
         names = ", ".join([*missing[:-2], " and ".join(missing[-2:])])
         raise UsageError(f"{names} {verb} missing: {what}{nodes}")
     if args.at is None:
@@ -256,13 +256,15 @@ def _check_options(args: argparse.Namespace, frfs: FrfSet, table: object) -> Non
         raise UsageError(f"--spacing must be positive, not {args.spacing:g}")
 
 
-def _on_sides(table: tuple[ChannelPlace, ...], args: argparse.Namespace, known: set[int]) -> tuple[ChannelPlace, ...]:
+def _on_sides(
+    table: tuple[ChannelPlace, ...], args: argparse.Namespace, known: set[int], source: str
+) -> tuple[ChannelPlace, ...]:
     """Return the channels of a table that belong to the joint, each with its side."""
     if args.j is None and args.k is None:
         return table
     named: tuple[tuple[JointSide, Nodes | None], ...] = (("j", args.j), ("k", args.k))
     sides: dict[int, JointSide] = {
-        node: side for side, nodes in named for node in ([] if nodes is None else nodes.among(known, args.file))
+        node: side for side, nodes in named for node in ([] if nodes is None else nodes.among(known, source))
     }
     kept = []
     for place in table:
@@ -308,7 +310,7 @@ def _point_lines(
     for node in (*nodes[0], *nodes[1]):
         if node not in places and (len(nodes[0]) > 1 or any(is_rotation(dof) for dof in args.dofs)):
             raise FileContentError(
-                f"{args.file} has no coordinates of node {node}: say --spacing and --axis, or --at and --channels"
+                f"{frfs.source} has no coordinates of node {node}: say --spacing and --axis, or --at and --channels"
             )
     at = {node: places.get(node, np.zeros(3)) for node in (*nodes[0], *nodes[1])}
     try:

@@ -107,6 +107,19 @@ def test_an_offset_between_two_nodes_is_named_before_the_fit(tmp_path):
     assert "reference points 6 mm apart: x, y, z = 0, 6, 0 mm" in said
 
 
+def test_several_files_of_one_test(test_file, tmp_path):
+    """One file for each side of the impacts, as a test system writes them run by run."""
+    frfs = noisy(hammer_test())
+    for name, own in (("a.npz", slice(0, 12)), ("b.npz", slice(12, 24))):
+        write_npz(tmp_path / name, replace(frfs, excitations=frfs.excitations[own], h=frfs.h[:, :, own]))
+    words = [*JOINT_WORDS, *QUICK, "--band", "20:120", "--json"]
+    parts = json.loads(run_command("identify", tmp_path / "a.npz", tmp_path / "b.npz", *words).stdout)
+    whole = json.loads(run_command("identify", test_file, *words).stdout)
+    assert [path[-5:] for path in parts["sources"]] == ["a.npz", "b.npz"]
+    for name, found in whole["fits"][0]["parameters"].items():
+        assert parts["fits"][0]["parameters"][name]["value"] == pytest.approx(found["value"], rel=1e-4), name
+
+
 def csv_table(frfs):
     """The geometry of a test as a table, sensors and impacts."""
     rows = ["channel,side,role,x [mm],y [mm],z [mm]"]
