@@ -20,7 +20,7 @@ class Output:
 
     def say(self, *lines: object) -> None:
         """Print lines of text, unless JSON or nothing is wanted."""
-        if self.is_text:
+        if self.is_text and lines:
             print(*lines, sep="\n")
 
     def give(self, content: Mapping[str, Any]) -> None:
