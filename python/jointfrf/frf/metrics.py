@@ -113,7 +113,7 @@ def amplitude_error(
     Raises
     ------
     ValueError
-        As in `peak`.
+        As in `peak`; the exact FRF is zero.
 
     Examples
     --------
@@ -122,6 +122,8 @@ def amplitude_error(
     25.0
     """
     exact, obtained = (peak(x, freq_hz, band, refine=refine)[0] for x in (h_exact, h))
+    if exact == 0:
+        raise ValueError("h_exact is zero on all lines: no error relative to it")
     return abs((exact - obtained) / exact) * 100
 
 
@@ -145,7 +147,7 @@ def frequency_error(
     Raises
     ------
     ValueError
-        As in `peak`.
+        As in `peak`; the exact FRF is largest at 0 Hz.
 
     Examples
     --------
@@ -154,4 +156,6 @@ def frequency_error(
     9.090909090909092
     """
     exact, obtained = (peak(x, freq_hz, band, refine=refine)[1] for x in (h_exact, h))
+    if exact == 0:
+        raise ValueError("h_exact is largest at 0 Hz: no error relative to that frequency; give a band above it")
     return abs((exact - obtained) / exact) * 100

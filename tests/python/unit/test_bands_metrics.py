@@ -149,3 +149,10 @@ def test_joint_matrices():
 def test_bad_models_get_one_sentence(make, message):
     with pytest.raises(ValueError, match=message):
         make()
+
+
+def test_errors_relative_to_nothing_get_one_sentence():
+    with pytest.raises(ValueError, match="h_exact is zero on all lines"):
+        jf.amplitude_error(np.zeros(10), np.ones(10), FREQ)
+    with pytest.raises(ValueError, match="h_exact is largest at 0 Hz"):
+        jf.frequency_error(np.arange(10, 0, -1), np.ones(10), FREQ - 1)

@@ -9,7 +9,8 @@ PACKAGE = Path(jointfrf.__file__).parent
 
 #: From the ground up; rooms of one floor do not know each other, a room imports what stands below its floor.
 FLOORS = (
-    {"errors", "files", "spelling"},
+    {"errors", "spelling"},
+    {"files"},
     {"extras", "kernel", "toml"},
     {"dofs"},
     {"frf"},
