@@ -16,6 +16,7 @@ from jointfrf.files import write_file
 from jointfrf.identification.fit_data import FitData
 from jointfrf.identification.joint_fit import JointFit
 from jointfrf.io.cards import CardFormat
+from jointfrf.kernel.arguments import FloatArray
 from jointfrf.kernel.engine import get_engine
 from jointfrf.report.chart import Chart, count_points
 from jointfrf.report.document import Document, Listing, Part, Section, Sketch, Words, make_document
@@ -31,7 +32,7 @@ from jointfrf.report.table import Cell, Table
 __all__ = ["ReportOptions", "fit_document", "write_report"]
 
 #: Points of all curves of a page together, each about nine bytes, and of a curve at least.
-_POINTS, _LEAST = 75_000, 240
+_POINTS, _LEAST = 130_000, 240
 #: FRFs that are shown at once; the others when the reader asks for them.
 _AT_ONCE = 6
 _PROGRAMS = {"abaqus": "Abaqus", "calculix": "CalculiX", "nastran": "Nastran", "ansys": "Ansys"}
@@ -98,9 +99,15 @@ def fit_document(fit: JointFit, options: ReportOptions) -> Document:
     freq = fit.freq_hz
     about = (
         f"Joint DOFs {', '.join(fit.dofs)}; {len(data.response_names)} responses, {len(data.force_names)} forces; "
-        f"{freq.size} frequency lines from {freq.min():g} to {freq.max():g} Hz; method {fit.method}."
+        f"{_span(freq)}; method {fit.method}."
     )
     return Document(title, about, [section for section in sections if section.parts])
+
+
+def _span(freq_hz: FloatArray) -> str:
+    if freq_hz.size == 1:
+        return f"one frequency line, {freq_hz[0]:g} Hz"
+    return f"{freq_hz.size} frequency lines from {freq_hz.min():g} to {freq_hz.max():g} Hz"
 
 
 def _most_points(figures: Iterable[Figure]) -> int:
