@@ -167,8 +167,9 @@ def residual_map(compared: ComparedFrfs) -> HeatMap:
     where = "channel" if compared.of_channels else "joint DOF"
     note = (
         "Root mean square of measured minus regenerated over the lines used, in units of the noise of the FRF, or of "
-        "rigid motion there if that has more. About 1 or below is noise; a row or column well above 1 is a channel that does not fit: gain, place, direction, or a side that "
-        "is not rigid there."
+        "rigid motion there if that has more. About 1 or below is noise. A row and a column well above 1 are a channel "
+        "that does not fit (gain, place, direction); the rows and columns of a side, one whose channels do not move "
+        "as a rigid body."
     )
     return HeatMap(
         "residual-map", f"Residual by {where}, in units of the noise", "response \\ force", compared.rows,
