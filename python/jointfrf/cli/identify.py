@@ -13,6 +13,7 @@ from jointfrf.channels.check.check import check_frfs, warn_of_frfs
 from jointfrf.channels.finite_differences import difference_error
 from jointfrf.channels.point_lines import Interface
 from jointfrf.cli.measured_file import add_file_arguments, in_some_band, interface_of, nodes, read_receptances, words
+from jointfrf.cli.usage import UsageError
 from jointfrf.dofs import is_rotation
 from jointfrf.errors import ConvergenceWarning, FrfCheckWarning, IdentificationWarning
 from jointfrf.extras import check_extras
@@ -96,7 +97,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--report",
         type=Path,
         metavar="FILE",
-        help="also write the identification (by the first method) as one HTML page, like report.html",
+        help="also write the identification by method compliance as one HTML page, like report.html",
     )
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder for identification.json and figures")
 
@@ -107,6 +108,8 @@ def run(args: argparse.Namespace) -> int:
         check_extras("matplotlib")
     if args.report is not None:
         check_extras("jinja2")
+        if "compliance" not in args.method:
+            raise UsageError("--report is of method compliance: name it among the methods")
     frfs = read_receptances(args)
     if not (args.j and args.k and args.dofs):
         print(frfs.summary())
@@ -136,8 +139,10 @@ def run(args: argparse.Namespace) -> int:
         print()
         print(fits[0].export(program, ends[:2], rotation_nodes=ends[2:] or None, damping=damping), end="")
     if args.report is not None:
+        fit = fits[args.method.index("compliance")]
         ends = (1, 2) if args.export is None else args.export[1]
-        print(f"\nwrote {fits[0].report(args.report, source=args.file.name, command=args.typed, nodes=ends)}")
+        args.report.parent.mkdir(parents=True, exist_ok=True)
+        print(f"\nwrote {fit.report(args.report, source=args.file.name, command=args.typed, nodes=ends)}")
     if args.out is not None:
         from jointfrf.report.fit import write_fit
         from jointfrf.report.noise import noise_figure

@@ -106,6 +106,21 @@ def test_hammer_test_that_comes_with_the_project(tmp_path):
         assert word in result.stdout
 
 
+def test_the_report_is_written_where_it_is_asked_for(tmp_path):
+    pytest.importorskip("jinja2")
+    page = tmp_path / "for" / "customer.html"
+    words = (BARS, *JOINT_OF_BARS, "--method", "inverse-substructuring,compliance", "--report", page)
+    result = run(*words, "--export", "nastran:9001,9002")
+    assert result.stdout.endswith(f"wrote {page}\n")
+    text = page.read_text(encoding="utf-8")
+    for said in ("Joint identified from two_bars.uff", "jointfrf identify ", "--report", "Rotational stiffness about z",
+                 "       1       1    9001    9002"):  # fmt: skip
+        assert said in text, said
+    assert [path.name for path in page.parent.iterdir()] == ["customer.html"]
+    result = run(BARS, *JOINT_OF_BARS, "--method", "inverse-substructuring", "--report", page, expect=2)
+    assert "--report is of method compliance" in result.stderr
+
+
 def test_without_a_joint_it_tells_what_the_file_holds():
     printed = run(BARS).stdout
     assert "36 receptances m/N: 6 responses x 6 excitations, none missing" in printed
