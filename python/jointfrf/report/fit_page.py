@@ -35,6 +35,8 @@ __all__ = ["ReportOptions", "fit_document", "write_report"]
 _POINTS, _LEAST = 130_000, 240
 #: FRFs that are shown at once; the others when the reader asks for them.
 _AT_ONCE = 6
+#: Lines of cards that are printed at most.
+_PRINTED = 40
 _PROGRAMS = {"abaqus": "Abaqus", "calculix": "CalculiX", "nastran": "Nastran", "ansys": "Ansys"}
 
 
@@ -64,8 +66,8 @@ def fit_document(fit: JointFit, options: ReportOptions) -> Document:
     data = fit.data
     if data is None:
         raise ValueError(
-            "a report shows the measured FRFs, and this fit holds none (it was loaded, or is a mean over bands): call "
-            "identify with the FRFs and method 'compliance', and report what that returns"
+            "a report shows the measured FRFs, and this fit holds none, as fits that were loaded, means over bands and "
+            "those of many realisations: call identify with the FRFs and method 'compliance', and report that"
         )
     up = np.argsort(fit.freq_hz, kind="stable")
     compared = compare_frfs(data, fit.dofs)
@@ -209,20 +211,21 @@ def _noise_parts(fit: JointFit, figure: Figure | None, most: int) -> list[Part]:
 def _cards(fit: JointFit, nodes: Sequence[int]) -> list[Part]:
     """Return the joint as input of each program, or why there is none."""
     j, k = nodes[:2]
-    told = f"In SI units, between node {j} on side j and node {k} on side k, along the global axes."
-    parts: list[Part] = [Words([told])]
-    refused = []
+    listings, refused = [], []
     for program in get_args(CardFormat):
-        rotation = (tuple(nodes[2:4]) or (max(j, k) + 1, max(j, k) + 2)) if program == "calculix" else None
+        is_calculix = program == "calculix"
+        rotation = (tuple(nodes[2:4]) or (max(j, k) + 1, max(j, k) + 2)) if is_calculix else None
+        name = _PROGRAMS[program] + (" (stiffness only)" if is_calculix else "")
         try:
-            text = fit.export(program, (j, k), damping=program != "calculix", rotation_nodes=rotation)
+            text = fit.export(program, (j, k), damping=not is_calculix, rotation_nodes=rotation)
         except ValueError as error:
             refused.append(f"{_PROGRAMS[program]}: {error}.")
         else:
-            parts.append(
-                Listing(_PROGRAMS[program] + (" (stiffness only)" if program == "calculix" else ""), text, printed=True)
-            )
-    return [*parts, *([Words(refused, "notes")] if refused else [])]
+            listings.append(Listing(name, text, printed=text.count("\n") <= _PRINTED))
+    told = f"In SI units, between node {j} on side j and node {k} on side k, along the global axes."
+    if not all(listing.printed for listing in listings):
+        told += f" Those of more than {_PRINTED} lines are on the screen only, not on paper."
+    return [Words([told]), *listings, *([Words(refused, "notes")] if refused else [])]
 
 
 def _made(fit: JointFit, options: ReportOptions) -> Table:

@@ -39,10 +39,8 @@ def _rounded(value: float, uncertainty: float | None) -> str:
 
 
 def _named(term: Parameter) -> str:
-    """Name a parameter in words."""
+    """Name a parameter of one DOF in words."""
     kind = {"k": "stiffness", "h": "hysteretic stiffness", "c": "viscous damping"}[term.kind]
-    if term.is_cross:
-        return f"{kind} that couples {term.row} and {term.column}"
     axis = term.row.rpartition("_")[2].lstrip("r")
     if is_rotation(term.row) and axis in ("x", "y", "z"):
         return f"{'rotational ' if term.kind != 'c' else ''}{kind} about {axis}"
@@ -50,18 +48,24 @@ def _named(term: Parameter) -> str:
 
 
 def finding_sentences(fit: JointFit) -> list[str]:
-    """Return one sentence a parameter: its value and where it lies with 95 % probability."""
+    """Return one sentence a parameter, its value and where it lies with 95 % probability; one for all cross terms."""
     intervals = fit.confidence_interval(_PROBABILITY)
     told = []
     for term, value in zip(fit.terms, fit.parameters.values(), strict=True):
         low, high = intervals[term.name]
         name = _named(term)
-        told.append(f"{name[0].upper()}{name[1:]} ({term.name}): {_value_sentence(term, value, low, high)}")
+        if not term.is_cross:
+            told.append(f"{name[0].upper()}{name[1:]} ({term.name}): {_value_sentence(term, value, low, high)}")
+    cross = [term.name for term in fit.terms if term.is_cross]
+    if cross:
+        clear = [name for name in cross if not intervals[name][0] <= 0 <= intervals[name][1]]
+        which = f"{len(clear)} of {len(cross)}: {', '.join(clear)}" if clear else f"none of {len(cross)}"
+        told.append(f"Cross terms significantly different from zero (values in the table): {which}.")
     return told
 
 
 def _value_sentence(term: Parameter, value: float, low: float, high: float) -> str:
-    if term.kind == "k" and not term.is_cross:
+    if term.kind == "k":
         if not np.isfinite(high):
             bound = f"at least {with_unit(low, term.unit)} (95 %)" if low > 0 else "the data give no bound"
             return f"cannot be distinguished from rigid; {bound}."

@@ -129,6 +129,7 @@ def test_sensors_of_three_axes_without_names_lie_where_they_were_put():
 @pytest.fixture(scope="module")
 def fits(beams):
     gamma = jf.pollute(beams.gamma(beams.joint), 0.01, seed=5)
+    coupled = jf.pollute(beams.gamma(jf.Joint([[6e5, 1e4], [1e4, 5e3]], [20, 1.5])), 0.005, seed=1)
     stiff = jf.Joint([1e12, 5e3], [0, 1.5], ["y", "theta"])
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", jf.IdentificationWarning)
@@ -136,12 +137,13 @@ def fits(beams):
             "plain": jf.identify(beams.freq, gamma, ["y", "theta_z"]),
             "open": jf.identify(beams.freq, jf.pollute(beams.gamma(stiff), 0.01, seed=2), ["y", "theta_z"]),
             "ignore": jf.identify(beams.freq, gamma, ["y", "theta_z"], cross="ignore"),
+            "cross": jf.identify(beams.freq, coupled, ["y", "theta_z"], cross="fit"),
             "one line": jf.identify(beams.freq[50:51], gamma[50:51], ["y", "theta_z"], noise=0.01),
             "numbers": jf.identify(beams.freq[::-1], gamma[::-1], reciprocal=False),
         }
 
 
-@pytest.mark.parametrize("kind", ["plain", "open", "ignore", "one line", "numbers"])
+@pytest.mark.parametrize("kind", ["plain", "open", "ignore", "cross", "one line", "numbers"])
 def test_every_fit_has_a_report(fits, kind, tmp_path):
     fit = fits[kind]
     path = fit.report(tmp_path / "report.html", source="<bars & plates>.uff", command="jointfrf identify")
@@ -151,7 +153,7 @@ def test_every_fit_has_a_report(fits, kind, tmp_path):
     assert not re.search(r'(?:src|href)="(?!data:|#)', text)
     assert "nan" not in re.sub(r"<script>.*</script>", "", text, flags=re.DOTALL).lower().split()
     for name in fit.parameters:
-        assert f"({name})" in text
+        assert f"({name})" in text or (name.count(",") and kind == "cross")
     for said in (*fit.warnings, *fit.notes):
         assert said.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;").replace("'", "&#39;") in text
     for limits in re.findall(r'data-limits="([^"]*)"', text):
@@ -169,6 +171,9 @@ def test_sentences_say_what_the_intervals_say(fits):
         np.testing.assert_allclose([float(numbers[1]), float(numbers[2])], [low / size, high / size], rtol=5e-3)
     assert said[0].startswith("Stiffness along y (k_y): ")
     assert said[1].startswith("Rotational stiffness about z (k_theta_z): ")
+    crossed = finding_sentences(fits["cross"])
+    assert len(crossed) == 5
+    assert crossed[-1].endswith("(values in the table): 1 of 2: k_y,theta_z.")
     low, _ = fits["open"].confidence_interval(0.95)["k_y"]
     assert finding_sentences(fits["open"])[0] == (
         f"Stiffness along y (k_y): cannot be distinguished from rigid; at least {low / 1e6:.4g} MN/m (95 %)."
