@@ -87,7 +87,7 @@ def quality_sentences(fit: JointFit) -> list[str]:
     if np.isfinite(fit.noise_level) and fit.noise_level > 0:
         ratio = fit.residual_level / fit.noise_level
         verdict = (
-            "the joint explains the FRFs to within their noise."
+            "the joint explains the FRFs of the lines used to within their noise."
             if ratio < _NOISE
             else "the joint as described does not explain all that the FRFs show."
         )
@@ -103,6 +103,8 @@ def quality_sentences(fit: JointFit) -> list[str]:
             told.append(
                 f"Lines left out, outside the bands or because they do not fit the joint found: {', '.join(names)}."
             )
+    if fit.warnings:
+        told.append("Read the warnings below before quoting these numbers.")
     return told
 
 
@@ -112,8 +114,9 @@ def parameter_table(fit: JointFit) -> Table:
     rows: list[tuple[Cell, ...]] = []
     for term, value in zip(fit.terms, fit.parameters.values(), strict=True):
         low, high = intervals[term.name]
-        shown = None if term.kind == "k" and not term.is_cross and not np.isfinite(high) else value
-        rows.append((term, shown, errors[term.name], low, high, term.unit))
+        is_open = term.kind == "k" and not term.is_cross and not np.isfinite(high)
+        ends: tuple[Cell, ...] = (low, "open") if is_open else (low, high)
+        rows.append((term, "open" if is_open else value, errors[term.name], *ends, term.unit))
     etas = [
         f"{dof} {eta:.3g}" for dof, eta in zip(fit.dofs, fit.loss_factor, strict=True) if np.isfinite(eta) and eta != 0
     ]

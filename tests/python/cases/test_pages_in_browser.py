@@ -162,6 +162,13 @@ def test_without_a_script_the_page_shows_the_same(browser, pages):
     for selector in ("#joint_y svg.plot path.s-dots", "#frf-1 .x-ticks span", "#residual-map td", "#sketch svg"):
         assert page.locator(selector).first.is_visible(), selector
     assert not page.locator(".tools").first.is_visible()
+    # The script writes the same numbers along the axes as the page without it.
+    texts = """all => all.map(ticks => [...ticks.children].map(mark => mark.textContent).join(' '))"""
+    scripted = Opened(browser, pages / "fit.html").page
+    for axis in (".x-ticks", ".y-ticks"):
+        found = page.eval_on_selector_all(axis, texts)
+        assert len(found) > 20
+        assert scripted.eval_on_selector_all(axis, texts) == found
 
 
 def test_headings_alternatives_and_names_are_there(browser, pages):
