@@ -26,7 +26,7 @@ from jointfrf.cli.measured_file import (
 )
 from jointfrf.cli.measured_joint import MeasuredJoint, measured_joint
 from jointfrf.cli.output import Output, plain
-from jointfrf.cli.usage import waiting
+from jointfrf.cli.usage import UsageError, waiting
 from jointfrf.dofs import is_rotation
 from jointfrf.errors import ConvergenceWarning, FrfCheckWarning, IdentificationWarning
 from jointfrf.extras import check_extras
@@ -94,7 +94,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     results = parser.add_argument_group("results")
     results.add_argument("--out", type=Path, metavar="DIR", help="folder for identification.json and figures")
     results.add_argument(
-        "--report", type=Path, metavar="FILE", help="the identification (by the first method) as one HTML page"
+        "--report", type=Path, metavar="FILE", help="the identification by method compliance as one HTML page"
     )
     results.add_argument(
         "--save", type=Path, metavar="FILE", help="keep the joint (by the first method) in a JSON file"
@@ -115,6 +115,8 @@ def run(args: argparse.Namespace) -> int:
         check_extras("matplotlib")
     if args.report is not None:
         check_extras("jinja2")
+        if "compliance" not in args.method:
+            raise UsageError("--report is of method compliance: name it among the methods")
     out = Output(args)
     frfs = read_receptances(args)
     joint = measured_joint(args, frfs, args.bending_stiffness)
@@ -141,8 +143,10 @@ def run(args: argparse.Namespace) -> int:
     if text and args.output is None:
         out.say("", text.rstrip("\n"))
     if args.report is not None:
+        fit = fits[args.method.index("compliance")]
         ends = (1, 2) if args.export is None else args.export[1]
-        written.append(fits[0].report(args.report, source=file_names(args), command=args.typed, nodes=ends))
+        args.report.parent.mkdir(parents=True, exist_ok=True)
+        written.append(fit.report(args.report, source=file_names(args), command=args.typed, nodes=ends))
     if args.out is not None:
         written += _write_figures(args, frfs, joint, fits)
     out.say(*([""] if written else []), *(f"wrote {path}" for path in written))

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import warnings
 from functools import partial
 
 import numpy as np
 
 from jointfrf.channels.point_lines import Interface
+from jointfrf.errors import IllConditionedWarning
 from jointfrf.identification.compliance_fit.estimator import FittedGroup, JointEstimate
 from jointfrf.identification.compliance_fit.fit import ComplianceFit
 from jointfrf.identification.compliance_fit.interface_frfs import InterfaceFrfs
@@ -80,7 +82,7 @@ def channel_names(
         for what, count in zip(("response", "force"), frfs.measured.shape[1:], strict=True)
     ]
     found = [
-        tuple(map(str, given.channels)) if isinstance(given, Interface) else tuple(other)
+        tuple(map(str, given.channels)) if isinstance(given, Interface) and given.channels else tuple(other)
         for given, other in zip(transforms, numbered, strict=True)
     ]
     return found[0], found[1]
@@ -115,7 +117,8 @@ def _of_group(group: FittedGroup, lines: slice) -> ComplexArray:
     entries = type(joint)(joint.terms.on_lines(lines)).compliance(group.fit.minimum.x)  # type: ignore[call-arg]
     c = group.problem.of_joint(entries)
     unknown = group.problem.unknown[lines].reshape(c.shape)
-    with np.errstate(all="ignore"):
+    with warnings.catch_warnings(), np.errstate(all="ignore"):
+        warnings.simplefilter("ignore", IllConditionedWarning)
         if unknown.any():
             c = np.where(unknown, smooth_compliance(data), c)
         on = project(data.measured, data, c, starts_on_manifold(data, c, _STEPS), _STEPS)

@@ -5,9 +5,11 @@ from __future__ import annotations
 import colorsys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from jointfrf.kernel.arguments import FloatArray
 from jointfrf.report.draw import STYLES, Style
@@ -22,6 +24,8 @@ _WIDE, _HIGH = 20000, 8000
 #: How far off the panel a curve is drawn, in heights of it.
 _OFF = 3
 _MOST_X, _MOST_Y = 6, 5
+#: A step along x so many times longer than those beside it parts a curve.
+_GAP = 6.0
 #: Decades of a logarithmic axis from which on only powers of ten are written.
 _DECADES = 2.0
 #: Dots and outlying lines, points wide.
@@ -158,14 +162,24 @@ def _path(curve: Curve, place_x: Any, place_y: Any, most: int) -> str:
         steps = np.diff(points, axis=0, prepend=np.zeros((1, 2), int))
         return "".join(f"m{a} {b}h0" for a, b in steps.tolist())
     pieces, at = [], np.zeros(2, int)
-    ends = np.flatnonzero(np.diff(np.r_[0, known.astype(int), 0]))
-    for first, end in ends.reshape(-1, 2).tolist():
+    part = _parts(np.asarray(curve.x, np.float64))[kept]
+    cuts = np.flatnonzero(np.diff(part) | (np.diff(known.astype(int)) != 0)) + 1
+    for first, end in pairwise([0, *cuts.tolist(), known.size]):
+        if not known[first:end].any():
+            continue
         points = np.stack([x[first:end], y[first:end]], axis=1).astype(int)
         steps = np.diff(points, axis=0, prepend=at[None])
         moved = " ".join(f"{a} {b}" for a, b in steps.tolist())
         pieces.append(f"m{moved.replace(' -', '-')}" + ("h0" if end == first + 1 else ""))
         at = points[-1]
     return "".join(pieces)
+
+
+def _parts(x: FloatArray) -> NDArray[np.intp]:
+    """Return the number of the part of a curve that each point is in: between bands there is nothing to draw."""
+    step = np.diff(x)
+    beside = np.fmax(np.r_[-np.inf, step[:-1]], np.r_[step[1:], -np.inf])
+    return np.r_[0, np.cumsum((beside > 0) & (step > _GAP * beside))] if step.size > 1 else np.zeros(x.size, np.intp)
 
 
 def _area(ribbon: Ribbon, place_x: Any, place_y: Any) -> str:
@@ -194,7 +208,8 @@ def _line_rule(name: str, style: Style) -> str:
         return f".s-{name}{{{rule}stroke-width:{width:g};stroke-linecap:{cap}}}"
     pattern = _DASHES[style.dashes] if isinstance(style.dashes, str) else style.dashes[1]
     dashes = " ".join(f"{max(style.width, 1) * part:.3g}" for part in pattern)
-    return f".s-{name}{{{rule}stroke-width:{style.width:g}" + (f";stroke-dasharray:{dashes}" if dashes else "") + "}"
+    rest = f";stroke-dasharray:{dashes}" if dashes else ";stroke-linecap:round"
+    return f".s-{name}{{{rule}stroke-width:{style.width:g}{rest}}}"
 
 
 def _on_dark(colour: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -11,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf.dofs import Parameter, compliance_unit
+from jointfrf.errors import IllConditionedWarning
 from jointfrf.files import write_file
 from jointfrf.identification.joint_fit import JointFit
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
@@ -38,12 +40,11 @@ def fit_figures(fit: JointFit) -> list[Figure]:
     up = np.argsort(fit.freq_hz, kind="stable")
     freq, lines = fit.freq_hz[up], fit.k_lines[up]
     fitted = fit.k_joint(freq)
-    compliance = invert(fitted, on_singular="nan")
-    if fit.data is None:
-        inverse = invert(np.where(np.isfinite(lines), lines, 0), on_singular="nan")
-        each_compliance = np.asarray(np.einsum("ldd->ld", inverse))
-    else:
-        each_compliance = fit.data.line_compliance()[up]
+    with warnings.catch_warnings():
+        # Displacements and rotations differ by orders of magnitude.
+        warnings.simplefilter("ignore", IllConditionedWarning)
+        compliance = invert(fitted, on_singular="nan")
+        each_compliance = _inverted(lines) if fit.data is None else fit.data.line_compliance()[up]
     used = np.ones(lines.shape[:2], np.bool_) if fit.data is None else fit.data.fitted[up]
     figures = []
     for d, dof in enumerate(fit.dofs):
@@ -53,14 +54,21 @@ def fit_figures(fit: JointFit) -> list[Figure]:
             (f"K*, {stiffness.unit}", lines[:, d, d], fitted, _interval(fit, stiffness)),
             (f"C, {compliance_unit(dof, dof)}", each_compliance[:, d], compliance, ()),
         ):
-            panels += _panels(_Lines(fit.method, label, freq, each, curve[:, d, d], used[:, d]), ribbons)
+            own = _Lines(fit.method, label, freq, each, curve[:, d, d], used[:, d], ribbons)
+            panels += _panels(own if label.startswith("C") else _as_open(own, fit, stiffness))
         words = f"Joint DOF {dof}: complex stiffness K* and compliance C"
         figures.append(Figure(f"joint_{dof}", words, tuple(panels), 2, heading=words))
     return figures
 
 
+def _inverted(k_lines: ComplexArray) -> ComplexArray:
+    """Return the diagonal of the compliance of each line, shape (n_freq, n)."""
+    inverse = invert(np.where(np.isfinite(k_lines), k_lines, 0), on_singular="nan")
+    return np.asarray(np.einsum("ldd->ld", inverse))
+
+
 class _Lines(NamedTuple):
-    """One entry of K* or C: values of each line by itself, as fitted, and which lines were used."""
+    """One entry of K* or C: values of each line by itself, as fitted, which lines were used, interval or bound."""
 
     method: str
     label: str
@@ -68,6 +76,8 @@ class _Lines(NamedTuple):
     each: ComplexArray
     fitted: ComplexArray
     used: NDArray[np.bool_]
+    interval: tuple[Ribbon, ...] = ()
+    bound: float | None = None
 
 
 def _interval(fit: JointFit, stiffness: Parameter) -> tuple[Ribbon, ...]:
@@ -79,22 +89,31 @@ def _interval(fit: JointFit, stiffness: Parameter) -> tuple[Ribbon, ...]:
     return (Ribbon("95 % interval of k", ends, np.full(2, low), np.full(2, high), "low"),)
 
 
-def _panels(lines: _Lines, interval: tuple[Ribbon, ...]) -> list[Panel]:
-    """Real and imaginary part of one entry; the interval belongs to the real part."""
+def _as_open(lines: _Lines, fit: JointFit, stiffness: Parameter) -> _Lines:
+    """Put the lower bound in place of a stiffness that cannot be distinguished from a rigid one."""
+    low, high = fit.confidence_interval(0.95)[stiffness.name]
+    return lines if np.isfinite(high) else lines._replace(bound=max(low, 0.0))
+
+
+def _panels(lines: _Lines) -> list[Panel]:
+    """Real and imaginary part of one entry; interval and bound belong to the real part."""
     panels = []
     used, out = lines.used, ~lines.used
     for part, values, curve in (
         ("Re", lines.each.real, lines.fitted.real),
         ("Im", lines.each.imag, lines.fitted.imag),
     ):
-        curves = [
-            Curve("each line", lines.freq_hz[used], values[used], "dots"),
-            Curve(f"fit ({lines.method})", lines.freq_hz, curve, "actual"),
-        ]
+        curves, shown = [Curve("each line", lines.freq_hz[used], values[used], "dots")], []
+        if lines.bound is None:
+            curves.append(Curve(f"fit ({lines.method})", lines.freq_hz, curve, "actual"))
+            shown = [float(curve.min()), float(curve.max())] if np.isfinite(curve).all() else []
+        elif part == "Re" and lines.bound > 0:
+            ends = lines.freq_hz[[0, -1]]
+            curves.append(Curve("lower bound of k, 95 %", ends, np.full(2, lines.bound), "high"))
+            shown = [lines.bound]
         if out.any():
             curves.append(Curve("lines left out", lines.freq_hz[out], values[out], "outlying"))
-        ribbons = interval if part == "Re" else ()
-        shown = [float(curve.min()), float(curve.max())] if np.isfinite(curve).all() else []
+        ribbons = lines.interval if part == "Re" else ()
         limits = bulk_limits([values], shown)
         panels.append(Panel("", FREQUENCY, f"{part} {lines.label}", tuple(curves), ribbons, y_limits=limits))
     return panels

@@ -18,7 +18,7 @@ from jointfrf.report.receptance import ReceptanceCurve, receptance_panels
 __all__ = ["ComparedFrfs", "compare_frfs", "frf_figures", "reciprocity_map", "residual_map"]
 
 #: FRFs that are drawn at most.
-_MOST = 36
+_MOST = 24
 #: Values from which on cells of a map are shaded, and those of the darkest.
 _LIGHT, _DARK = 1.0, 3.0
 #: Share of the differences that may lie below a panel.
@@ -39,7 +39,8 @@ class ComparedFrfs:
     measured, regenerated : ndarray, shape (n_freq, n_entries)
         m/N.
     residual : ndarray, shape (n_rows, n_columns)
-        Root mean square of measured minus regenerated, in units of the noise, over the lines that were fitted.
+        Root mean square of measured minus regenerated, in units of the noise (of the FRF, or of rigid motion there if
+        that has more), over the lines that were fitted.
     reciprocity : ndarray, shape (n_rows, n_columns), or None
         The same of h_pq - h_qp; NaN on the diagonal. None where rows and columns differ, or FRFs need not be
         reciprocal.
@@ -76,11 +77,16 @@ def compare_frfs(data: FitData, dofs: tuple[str, ...]) -> ComparedFrfs:
         if modes is None:
             h = data.responses @ h @ data.forces.T
             variance = data.responses**2 @ variance @ (data.forces**2).T
+            apart = variance
         else:
             regenerated = modes[0] @ regenerated @ modes[1].T
+            # Rigid motion at a channel carries the noise of the others, too.
+            rigid = [(mode @ own) ** 2 for mode, own in zip(modes, (data.responses, data.forces), strict=True)]
+            of_rigid = rigid[0] @ np.where(np.isfinite(variance), variance, 0) @ rigid[1].T
+            apart = np.where(np.isfinite(variance), np.maximum(variance, of_rigid), np.inf)
         shown[0, own], shown[1, own] = h[:, p, q], regenerated[:, p, q]
         kept = fitted[own]
-        _add(squares[0], counts[0], abs(h - regenerated)[kept] ** 2, variance[kept])
+        _add(squares[0], counts[0], abs(h - regenerated)[kept] ** 2, apart[kept])
         if same:
             both = variance + variance.swapaxes(1, 2)
             _add(squares[1], counts[1], abs(h - h.swapaxes(1, 2))[kept] ** 2, both[kept])
@@ -160,9 +166,10 @@ def residual_map(compared: ComparedFrfs) -> HeatMap:
     """Return the map of what is left by response and force."""
     where = "channel" if compared.of_channels else "joint DOF"
     note = (
-        "Root mean square of measured minus regenerated over the lines used, in units of the noise. About 1 or below "
-        "is noise; a row or column well above 1 is a channel that does not fit: gain, place, direction, or a side that "
-        "is not rigid there."
+        "Root mean square of measured minus regenerated over the lines used, in units of the noise of the FRF, or of "
+        "rigid motion there if that has more. About 1 or below is noise. A row and a column well above 1 are a channel "
+        "that does not fit (gain, place, direction); the rows and columns of a side, one whose channels do not move "
+        "as a rigid body."
     )
     return HeatMap(
         "residual-map", f"Residual by {where}, in units of the noise", "response \\ force", compared.rows,

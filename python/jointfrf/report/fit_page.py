@@ -16,6 +16,7 @@ from jointfrf.files import write_file
 from jointfrf.identification.fit_data import FitData
 from jointfrf.identification.joint_fit import JointFit
 from jointfrf.io.cards import CardFormat
+from jointfrf.kernel.arguments import FloatArray
 from jointfrf.kernel.engine import get_engine
 from jointfrf.report.chart import Chart, count_points
 from jointfrf.report.document import Document, Listing, Part, Section, Sketch, Words, make_document
@@ -31,9 +32,11 @@ from jointfrf.report.table import Cell, Table
 __all__ = ["ReportOptions", "fit_document", "write_report"]
 
 #: Points of all curves of a page together, each about nine bytes, and of a curve at least.
-_POINTS, _LEAST = 75_000, 240
+_POINTS, _LEAST = 130_000, 240
 #: FRFs that are shown at once; the others when the reader asks for them.
 _AT_ONCE = 6
+#: Lines of cards that are printed at most.
+_PRINTED = 40
 _PROGRAMS = {"abaqus": "Abaqus", "calculix": "CalculiX", "nastran": "Nastran", "ansys": "Ansys"}
 
 
@@ -63,8 +66,8 @@ def fit_document(fit: JointFit, options: ReportOptions) -> Document:
     data = fit.data
     if data is None:
         raise ValueError(
-            "a report shows the measured FRFs, and this fit holds none (it was loaded, or is a mean over bands): call "
-            "identify with the FRFs and method 'compliance', and report what that returns"
+            "a report shows the measured FRFs, and this fit holds none, as fits that were loaded, means over bands and "
+            "those of many realisations: call identify with the FRFs and method 'compliance', and report that"
         )
     up = np.argsort(fit.freq_hz, kind="stable")
     compared = compare_frfs(data, fit.dofs)
@@ -98,9 +101,15 @@ def fit_document(fit: JointFit, options: ReportOptions) -> Document:
     freq = fit.freq_hz
     about = (
         f"Joint DOFs {', '.join(fit.dofs)}; {len(data.response_names)} responses, {len(data.force_names)} forces; "
-        f"{freq.size} frequency lines from {freq.min():g} to {freq.max():g} Hz; method {fit.method}."
+        f"{_span(freq)}; method {fit.method}."
     )
     return Document(title, about, [section for section in sections if section.parts])
+
+
+def _span(freq_hz: FloatArray) -> str:
+    if freq_hz.size == 1:
+        return f"one frequency line, {freq_hz[0]:g} Hz"
+    return f"{freq_hz.size} frequency lines from {freq_hz.min():g} to {freq_hz.max():g} Hz"
 
 
 def _most_points(figures: Iterable[Figure]) -> int:
@@ -202,20 +211,21 @@ def _noise_parts(fit: JointFit, figure: Figure | None, most: int) -> list[Part]:
 def _cards(fit: JointFit, nodes: Sequence[int]) -> list[Part]:
     """Return the joint as input of each program, or why there is none."""
     j, k = nodes[:2]
-    told = f"In SI units, between node {j} on side j and node {k} on side k, along the global axes."
-    parts: list[Part] = [Words([told])]
-    refused = []
+    listings, refused = [], []
     for program in get_args(CardFormat):
-        rotation = (tuple(nodes[2:4]) or (max(j, k) + 1, max(j, k) + 2)) if program == "calculix" else None
+        is_calculix = program == "calculix"
+        rotation = (tuple(nodes[2:4]) or (max(j, k) + 1, max(j, k) + 2)) if is_calculix else None
+        name = _PROGRAMS[program] + (" (stiffness only)" if is_calculix else "")
         try:
-            text = fit.export(program, (j, k), damping=program != "calculix", rotation_nodes=rotation)
+            text = fit.export(program, (j, k), damping=not is_calculix, rotation_nodes=rotation)
         except ValueError as error:
             refused.append(f"{_PROGRAMS[program]}: {error}.")
         else:
-            parts.append(
-                Listing(_PROGRAMS[program] + (" (stiffness only)" if program == "calculix" else ""), text, printed=True)
-            )
-    return [*parts, *([Words(refused, "notes")] if refused else [])]
+            listings.append(Listing(name, text, printed=text.count("\n") <= _PRINTED))
+    told = f"In SI units, between node {j} on side j and node {k} on side k, along the global axes."
+    if not all(listing.printed for listing in listings):
+        told += f" Those of more than {_PRINTED} lines are on the screen only, not on paper."
+    return [Words([told]), *listings, *([Words(refused, "notes")] if refused else [])]
 
 
 def _made(fit: JointFit, options: ReportOptions) -> Table:

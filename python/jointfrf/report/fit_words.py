@@ -39,10 +39,8 @@ def _rounded(value: float, uncertainty: float | None) -> str:
 
 
 def _named(term: Parameter) -> str:
-    """Name a parameter in words."""
+    """Name a parameter of one DOF in words."""
     kind = {"k": "stiffness", "h": "hysteretic stiffness", "c": "viscous damping"}[term.kind]
-    if term.is_cross:
-        return f"{kind} that couples {term.row} and {term.column}"
     axis = term.row.rpartition("_")[2].lstrip("r")
     if is_rotation(term.row) and axis in ("x", "y", "z"):
         return f"{'rotational ' if term.kind != 'c' else ''}{kind} about {axis}"
@@ -50,18 +48,24 @@ def _named(term: Parameter) -> str:
 
 
 def finding_sentences(fit: JointFit) -> list[str]:
-    """Return one sentence a parameter: its value and where it lies with 95 % probability."""
+    """Return one sentence a parameter, its value and where it lies with 95 % probability; one for all cross terms."""
     intervals = fit.confidence_interval(_PROBABILITY)
     told = []
     for term, value in zip(fit.terms, fit.parameters.values(), strict=True):
         low, high = intervals[term.name]
         name = _named(term)
-        told.append(f"{name[0].upper()}{name[1:]} ({term.name}): {_value_sentence(term, value, low, high)}")
+        if not term.is_cross:
+            told.append(f"{name[0].upper()}{name[1:]} ({term.name}): {_value_sentence(term, value, low, high)}")
+    cross = [term.name for term in fit.terms if term.is_cross]
+    if cross:
+        clear = [name for name in cross if not intervals[name][0] <= 0 <= intervals[name][1]]
+        which = f"{len(clear)} of {len(cross)}: {', '.join(clear)}" if clear else f"none of {len(cross)}"
+        told.append(f"Cross terms significantly different from zero (values in the table): {which}.")
     return told
 
 
 def _value_sentence(term: Parameter, value: float, low: float, high: float) -> str:
-    if term.kind == "k" and not term.is_cross:
+    if term.kind == "k":
         if not np.isfinite(high):
             bound = f"at least {with_unit(low, term.unit)} (95 %)" if low > 0 else "the data give no bound"
             return f"cannot be distinguished from rigid; {bound}."
@@ -83,7 +87,7 @@ def quality_sentences(fit: JointFit) -> list[str]:
     if np.isfinite(fit.noise_level) and fit.noise_level > 0:
         ratio = fit.residual_level / fit.noise_level
         verdict = (
-            "the joint explains the FRFs to within their noise."
+            "the joint explains the FRFs of the lines used to within their noise."
             if ratio < _NOISE
             else "the joint as described does not explain all that the FRFs show."
         )
@@ -99,6 +103,8 @@ def quality_sentences(fit: JointFit) -> list[str]:
             told.append(
                 f"Lines left out, outside the bands or because they do not fit the joint found: {', '.join(names)}."
             )
+    if fit.warnings:
+        told.append("Read the warnings below before quoting these numbers.")
     return told
 
 
@@ -108,8 +114,9 @@ def parameter_table(fit: JointFit) -> Table:
     rows: list[tuple[Cell, ...]] = []
     for term, value in zip(fit.terms, fit.parameters.values(), strict=True):
         low, high = intervals[term.name]
-        shown = None if term.kind == "k" and not term.is_cross and not np.isfinite(high) else value
-        rows.append((term, shown, errors[term.name], low, high, term.unit))
+        is_open = term.kind == "k" and not term.is_cross and not np.isfinite(high)
+        ends: tuple[Cell, ...] = (low, "open") if is_open else (low, high)
+        rows.append((term, "open" if is_open else value, errors[term.name], *ends, term.unit))
     etas = [
         f"{dof} {eta:.3g}" for dof, eta in zip(fit.dofs, fit.loss_factor, strict=True) if np.isfinite(eta) and eta != 0
     ]

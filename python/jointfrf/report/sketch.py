@@ -22,6 +22,8 @@ _VIEW = np.array([[0.87, -0.32], [0.0, 0.95], [0.5, 0.42]]).T
 _WIDTH, _HEIGHT, _MARGIN, _ARROW = 520.0, 260.0, 62.0, 34.0
 #: Points nearer than this share of the extent count as one place.
 _SAME = 1e-6
+#: Directions whose triple product is above this tell a place.
+_INDEPENDENT = 0.1
 #: Sides whose points are nearer on the page are drawn so far apart, each way.
 _APART = 30.0
 
@@ -30,9 +32,9 @@ _OnPage = Callable[[FloatArray, int], FloatArray]
 
 
 class InterfacePoint(NamedTuple):
-    """A measured point: its node, side 0 (j) or 1 (k), place in m, and the directions of its channels."""
+    """A measured point: its name, side 0 (j) or 1 (k), place in m, and the directions of its channels."""
 
-    node: int
+    name: str
     side: int
     place: FloatArray
     directions: tuple[FloatArray, ...]
@@ -44,27 +46,54 @@ def interface_points(interface: Interface) -> list[InterfacePoint]:
     Notes
     -----
     A channel along d at r from the reference point moves by r x d for a unit rotation: of one direction that tells all
-    of r but its part along d, which is taken as zero.
+    of r but its part along d, which is taken as zero. Channels without names are points of their own, by their
+    numbers; three in a row that can be at one place, as those of a sensor of three axes, are one.
     """
-    found: dict[tuple[int, int], list[tuple[FloatArray, FloatArray]]] = {}
-    for channel, motion in zip(interface.channels, interface.motion, strict=True):
-        side = int(motion[6:].any())
-        own = motion[6 * side : 6 * side + 6]
-        found.setdefault((channel.node, side), []).append((own[:3], own[3:]))
     points = []
-    for (node, side), channels in found.items():
-        # r x d is linear in r: the sum of r_a times e_a x d.
-        crosses = np.vstack([rigid_motion(d[None], np.zeros(3))[0][:, 3:] for d, _ in channels])
-        r = np.linalg.lstsq(crosses, np.concatenate([turned for _, turned in channels]), rcond=None)[0]
-        points.append(InterfacePoint(node, side, interface.references[side] + r, tuple(d for d, _ in channels)))
+    for name, own in _grouped(interface):
+        motion = interface.motion[own]
+        side = int(motion[0, 6:].any())
+        motion = motion[:, 6 * side : 6 * side + 6]
+        r, _ = _place(motion)
+        points.append(InterfacePoint(name, side, interface.references[side] + r, tuple(motion[:, :3])))
     return points
+
+
+def _place(motion: FloatArray) -> tuple[FloatArray, float]:
+    """Return where channels are that move so with their reference point, and by how much that does not hold."""
+    # r x d is linear in r: the sum of r_a times e_a x d.
+    crosses = np.vstack([rigid_motion(d[None], np.zeros(3))[0][:, 3:] for d in motion[:, :3]])
+    turned = motion[:, 3:].ravel()
+    r = np.linalg.lstsq(crosses, turned, rcond=None)[0]
+    return r, float(abs(crosses @ r - turned).max())
+
+
+def _grouped(interface: Interface) -> list[tuple[str, list[int]]]:
+    """Return names of points, and the numbers of their channels."""
+    if interface.channels:
+        by_node: dict[int, list[int]] = {}
+        for i, channel in enumerate(interface.channels):
+            by_node.setdefault(channel.node, []).append(i)
+        return [(str(node), own) for node, own in by_node.items()]
+    found: list[tuple[str, list[int]]] = []
+    first, count = 0, len(interface.motion)
+    while first < count:
+        own = [first]
+        if first + 2 < count:
+            motion = interface.motion[first : first + 3]
+            for side in (motion[:, :6], motion[:, 6:]):
+                if abs(np.linalg.det(side[:, :3])) > _INDEPENDENT and _place(side)[1] <= _SAME * abs(side).max():
+                    own = [first, first + 1, first + 2]
+        found.append((f"{own[0]}-{own[-1]}" if len(own) > 1 else str(first), own))
+        first = own[-1] + 1
+    return found
 
 
 def point_table(points: list[InterfacePoint]) -> Table:
     """Return the points with their places and directions."""
     rows: tuple[tuple[Cell, ...], ...] = tuple(
         (
-            str(p.node),
+            p.name,
             "jk"[p.side],
             *(float(1e3 * x) for x in np.round(p.place, 9)),
             ", ".join(map(_axis, p.directions)),
@@ -105,7 +134,7 @@ def interface_sketch(interface: Interface, points: list[InterfacePoint], dofs: t
     parts.append(_spring(*ends))
     parts.append(_axes())
     svg = f'<svg viewBox="0 0 {_WIDTH:g} {_HEIGHT:g}" aria-hidden="true">' + "".join(parts) + "</svg>"
-    sides = [", ".join(str(p.node) for p in points if p.side == side) for side in (0, 1)]
+    sides = [", ".join(p.name for p in points if p.side == side) for side in (0, 1)]
     apart = 1e3 * float(np.linalg.norm(interface.references[1] - interface.references[0]))
     where = "at one place" if apart < 1e-6 else f"{apart:.3g} mm apart"
     caption = (
@@ -141,7 +170,7 @@ def _point(point: InterfacePoint, at: _OnPage) -> str:
     up = -12 if point.side == 0 else 20
     anchor = "end" if point.side == 0 else "start"
     beside = x + (-8 if point.side == 0 else 8)
-    drawn.append(f'<text x="{beside:.1f}" y="{y + up:.1f}" text-anchor="{anchor}">{point.node}</text>')
+    drawn.append(f'<text x="{beside:.1f}" y="{y + up:.1f}" text-anchor="{anchor}">{point.name}</text>')
     return "".join(drawn)
 
 

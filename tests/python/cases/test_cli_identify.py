@@ -123,6 +123,21 @@ def test_what_is_missing_on_the_command_line_is_named(words, missing):
     assert result.stdout == ""
 
 
+def test_the_report_is_written_where_it_is_asked_for(tmp_path):
+    pytest.importorskip("jinja2")
+    page = tmp_path / "for" / "customer.html"
+    words = (BARS, *JOINT_OF_BARS, "--method", "inverse-substructuring,compliance", "--report", page)
+    result = run(*words, "--export", "nastran:9001,9002")
+    assert result.stdout.endswith(f"wrote {page}\n")
+    text = page.read_text(encoding="utf-8")
+    for said in ("Joint identified from two_bars.uff", "jointfrf identify ", "--report", "Rotational stiffness about z",
+                 "       1       1    9001    9002"):  # fmt: skip
+        assert said in text, said
+    assert [path.name for path in page.parent.iterdir()] == ["customer.html"]
+    result = run(BARS, *JOINT_OF_BARS, "--method", "inverse-substructuring", "--report", page, expect=2)
+    assert "--report is of method compliance" in result.stderr
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [

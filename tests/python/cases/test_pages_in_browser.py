@@ -10,6 +10,7 @@ import pytest
 
 import jointfrf as jf
 from browser import started_browser
+from jointfrf.report.document import Document, HeatMap, Section, make_document
 from jointfrf.report.draw import draw
 from jointfrf.report.figure import Curve, Figure, Panel
 from jointfrf.report.page import Page, make_page
@@ -33,6 +34,9 @@ def pages(tmp_path_factory):
     rows = tuple((f"row {i}", *map(float, range(11))) for i in range(120))
     table = Table("long", "A long table", ("name", *(f"column {c}, N/m" for c in range(11))), rows)
     (folder / "case.html").write_text(make_page(Page("A case", "About.", [table], [], [(figure, draw(figure))])))
+    names = [f"response {i}" for i in range(24)]
+    heat = HeatMap("map", "A map", "response \\ force", names, names, np.linspace(0, 12, 576).reshape(24, 24), 1, 3)
+    (folder / "map.html").write_text(make_document(Document("A map", "", [Section("s", "Map", [heat])])))
     return folder
 
 
@@ -63,7 +67,7 @@ class Opened:
         return float(linear @ [0.2126, 0.7152, 0.0722])
 
 
-@pytest.mark.parametrize("name", ["fit.html", "case.html"])
+@pytest.mark.parametrize("name", ["fit.html", "case.html", "map.html"])
 @pytest.mark.parametrize("width", [1100, 400])
 def test_a_page_fits_its_window_and_complains_of_nothing(browser, pages, name, width):
     opened = Opened(browser, pages / name, width)
@@ -158,6 +162,13 @@ def test_without_a_script_the_page_shows_the_same(browser, pages):
     for selector in ("#joint_y svg.plot path.s-dots", "#frf-1 .x-ticks span", "#residual-map td", "#sketch svg"):
         assert page.locator(selector).first.is_visible(), selector
     assert not page.locator(".tools").first.is_visible()
+    # The script writes the same numbers along the axes as the page without it.
+    texts = """all => all.map(ticks => [...ticks.children].map(mark => mark.textContent).join(' '))"""
+    scripted = Opened(browser, pages / "fit.html").page
+    for axis in (".x-ticks", ".y-ticks"):
+        found = page.eval_on_selector_all(axis, texts)
+        assert len(found) > 20
+        assert scripted.eval_on_selector_all(axis, texts) == found
 
 
 def test_headings_alternatives_and_names_are_there(browser, pages):
@@ -186,7 +197,7 @@ def paths_outside(page):
     )
 
 
-@pytest.mark.parametrize("name", ["fit.html", "case.html"])
+@pytest.mark.parametrize("name", ["fit.html", "case.html", "map.html"])
 def test_paper_shows_all_of_every_table(browser, pages, name):
     # A4 between margins of 15 mm.
     opened = Opened(browser, pages / name, 680, scheme="dark")
@@ -197,7 +208,7 @@ def test_paper_shows_all_of_every_table(browser, pages, name):
         assert opened.page.locator("#cards ~ details.printed pre").first.bounding_box()["height"] > 50
     paper = opened.page.pdf(format="A4", margin=dict.fromkeys(("top", "bottom", "left", "right"), "15mm"))
     assert paper.startswith(b"%PDF")
-    assert 2 <= len(re.findall(rb"/Type\s*/Page\b", paper + inflated(paper))) <= 20
+    assert (name != "map.html") < len(re.findall(rb"/Type\s*/Page\b", paper + inflated(paper))) <= 20
 
 
 def inflated(paper: bytes) -> bytes:
