@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from jointfrf.cases.known_joint.keys import SUBSTRUCTURE_KEYS
+from jointfrf.cases.known_joint.keys import SUBSTRUCTURE
 from jointfrf.cases.known_joint.structure import ModelStructure
 from jointfrf.cases.known_joint.substructures import read_substructure
 from jointfrf.cli.measured_file import parse_band, read_with_warnings
@@ -106,9 +106,9 @@ def model_of_table(table: TomlTable) -> ModelStructure:
     FileContentError
         A key is missing or wrong; FRFs are named instead of a model.
     """
-    if table.text("model", tuple(SUBSTRUCTURE_KEYS.variants)) == "receptances":
+    if table.text("model", tuple(SUBSTRUCTURE.variants)) == "receptances":
         raise table.wrong("model", "a file of FRFs is named by itself, not by a TOML file")
-    table.expect(SUBSTRUCTURE_KEYS)
+    table.expect(SUBSTRUCTURE)
     found = read_substructure(table, np.ones(1))
     assert isinstance(found, ModelStructure)
     return found

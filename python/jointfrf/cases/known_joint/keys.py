@@ -20,7 +20,7 @@ from jointfrf.models.chain import Ground
 from jointfrf.solids.brick_beam import Face
 from jointfrf.toml.keys import Key, KeyTable
 
-__all__ = ["EXPECTED_KEYS", "KNOWN_JOINT_KEYS", "SUBSTRUCTURE_KEYS"]
+__all__ = ["EXPECTED_KEYS", "KNOWN_JOINT_KEYS", "SUBSTRUCTURE"]
 
 
 def _of(model: str, about: str, *keys: Key) -> KeyTable:
@@ -96,7 +96,7 @@ _MATRICES = _of(
 _RECEPTANCES = _of(
     "receptances",
     "FRFs of the substructure, measured or computed elsewhere, in any format that `jointfrf.io.read_frfs` reads. "
-    " They must be there between all DOFs of `[points]` on "
+    "They must be there between all DOFs of `[points]` on "
     "this side, on the lines of `[frequency]`. Natural frequencies and mode shapes are left out of the report.",
     Key("file", "name of a file of FRFs", "Mobilities and accelerances become receptances."),
     Key("quantity", one_of(POWER_OF_I_OMEGA), "What the FRFs are, where the file does not say.", "", "by the file"),
@@ -108,7 +108,7 @@ _RECEPTANCES = _of(
         "`false`",
     ),
 )
-SUBSTRUCTURE_KEYS = KeyTable(
+SUBSTRUCTURE = KeyTable(
     "[substructure_a], [substructure_b]",
     "The two structures that the joint connects.",
     (),
@@ -146,8 +146,8 @@ KNOWN_JOINT_KEYS = KeyTable(
     "Two substructures and a joint of known parameters, identified from simulated measurements.",
     (
         *COMMON_KEYS,
-        Key("substructure_a", "table", "Side j of the joint.", inner=SUBSTRUCTURE_KEYS),
-        Key("substructure_b", "table", "Side k of the joint.", inner=SUBSTRUCTURE_KEYS),
+        Key("substructure_a", "table", "Side j of the joint.", inner=SUBSTRUCTURE),
+        Key("substructure_b", "table", "Side k of the joint.", inner=SUBSTRUCTURE),
         Key("points", "table", "DOFs of the joint, and internal ones.", inner=_POINTS),
         Key("joint", "tables", "The joint.", inner=JOINT),
         Key("observed", "tables", "FRFs that are looked at.", "", "first DOF of r and of s", _OBSERVED),
