@@ -10,7 +10,7 @@ from typing import NamedTuple, cast, get_args
 import numpy as np
 
 from jointfrf.cli.measured_file import nodes, numbers, point, words
-from jointfrf.cli.usage import UsageError, positive
+from jointfrf.cli.usage import UsageError, check_folder, positive
 from jointfrf.files import write_file
 from jointfrf.identification.joint_fit import JointFit
 from jointfrf.io.cards import CardFormat, CardOptions
@@ -107,8 +107,7 @@ def card_request(
             if given is not None:
                 raise UsageError(f"{name} is for cards: say --export PROGRAM:J,K, too")
         return None
-    if args.output is not None and not args.output.parent.is_dir():
-        raise UsageError(f"--output: there is no folder {args.output.parent}")
+    check_folder("--output", args.output)
     program, ends = args.export
     options: CardOptions = {
         "element": args.element,

@@ -21,7 +21,7 @@ from jointfrf.cli.measured_file import (
 )
 from jointfrf.cli.output import Output
 from jointfrf.cli.structure_file import own_matrix, read_structures
-from jointfrf.cli.usage import UsageError, waiting
+from jointfrf.cli.usage import UsageError, check_folder, waiting
 from jointfrf.errors import FileContentError, IdentificationWarning
 from jointfrf.files import write_file
 from jointfrf.identification.identify import IdentificationMethod, identify
@@ -95,6 +95,8 @@ def run(args: argparse.Namespace) -> int:
     """Carry out the command; the caller turns exceptions into messages."""
     out = Output(args)
     _check(args)
+    check_folder("--save", args.save)
+    check_folder("--output", args.output)
     a, b, assembly = read_structures(
         [args.a, args.b, args.assembly], None, quantity=args.quantity, force_quantity=args.force_quantity
     )

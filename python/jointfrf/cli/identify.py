@@ -26,7 +26,7 @@ from jointfrf.cli.measured_file import (
 )
 from jointfrf.cli.measured_joint import MeasuredJoint, measured_joint
 from jointfrf.cli.output import Output, plain
-from jointfrf.cli.usage import UsageError, waiting
+from jointfrf.cli.usage import UsageError, check_folder, waiting
 from jointfrf.dofs import is_rotation
 from jointfrf.errors import ConvergenceWarning, FrfCheckWarning, IdentificationWarning
 from jointfrf.extras import check_extras
@@ -117,6 +117,7 @@ def run(args: argparse.Namespace) -> int:
         check_extras("jinja2")
         if "compliance" not in args.method:
             raise UsageError("--report is of method compliance: name it among the methods")
+    check_folder("--save", args.save)
     out = Output(args)
     frfs = read_receptances(args)
     joint = measured_joint(args, frfs, args.bending_stiffness)

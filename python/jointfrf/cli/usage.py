@@ -9,8 +9,9 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
-__all__ = ["UsageError", "available_cores", "positive", "progress", "waiting"]
+__all__ = ["UsageError", "available_cores", "check_folder", "positive", "progress", "waiting"]
 
 #: Seconds after which the speed so far says something.
 _SETTLED = 0.5
@@ -18,6 +19,22 @@ _SETTLED = 0.5
 
 class UsageError(Exception):
     """A wrong word on the command line."""
+
+
+def check_folder(option: str, path: Path | None) -> None:
+    """Check, before anything is computed, that a file can be written there.
+
+    Raises
+    ------
+    UsageError
+        There is no such folder, or the path is a folder.
+    """
+    if path is None:
+        return
+    if not path.parent.is_dir():
+        raise UsageError(f"{option}: there is no folder {path.parent}")
+    if path.is_dir():
+        raise UsageError(f"{option}: {path} is a folder, not a file")
 
 
 def positive(word: str) -> int:

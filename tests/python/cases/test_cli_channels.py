@@ -29,7 +29,7 @@ def test_file(tmp_path_factory):
 def identified(test_file):
     folder = test_file.parent
     words = ["--save", folder / "joint.json", "--export", "nastran:9001,9002", "--output", folder / "joint.bdf"]
-    result = run_command("identify", test_file, *JOINT_WORDS, *QUICK, "--band", "20:420", *words)
+    result = run_command("identify", test_file, *JOINT_WORDS, *QUICK, "--band", "20:260", *words)
     assert result.returncode == 0, result.stderr
     return result, folder
 
@@ -89,7 +89,7 @@ def test_a_wrong_channel_is_named(tmp_path):
 
 def test_a_dof_left_out_is_named_before_the_fit(test_file):
     words = ["--at", f"0,0.006,{POINT[2]}", *JOINT_WORDS[2:-1], "x,y,z", *QUICK]
-    result = run_command("identify", test_file, *words, "--band", "20:200")
+    result = run_command("identify", test_file, *words, "--band", "20:120")
     assert "which is left out, enters" in result.stderr
     assert "fit theta_" in result.stderr
 
@@ -135,7 +135,7 @@ def test_a_table_of_channels_stands_for_the_coordinates_of_the_file(test_file, t
     write_npz(tmp_path / "bare.npz", replace(frfs, coordinates={}))
     (tmp_path / "channels.csv").write_text(csv_table(frfs))
     monkeypatch.chdir(tmp_path)
-    words = [*QUICK, "--band", "20:200", "--json"]
+    words = [*QUICK, "--band", "20:120", "--json"]
     of_file = run_command("identify", test_file, *JOINT_WORDS, *words)
     missing = run_command("identify", "bare.npz", *JOINT_WORDS, *words)
     assert missing.returncode == 1
@@ -154,7 +154,7 @@ def test_a_table_of_channels_stands_for_the_coordinates_of_the_file(test_file, t
     )
     (tmp_path / "jointfrf.toml").write_text(
         f'dofs = ["x", "y", "z", "rx", "ry", "rz"]\nat = [{AT}]\nunit = "mm"\n{table}'
-        '[identify]\ndamping = "viscous"\nnoise = 0.01\nband = [20, 200]\n'
+        '[identify]\ndamping = "viscous"\nnoise = 0.01\nband = [20, 120]\n'
     )
     of_project = run_command("identify", "bare.npz", "--json")
     assert of_project.returncode == 0, of_project.stderr
@@ -172,7 +172,9 @@ def test_a_table_of_channels_stands_for_the_coordinates_of_the_file(test_file, t
         ([*JOINT_WORDS, "--export", "ansys:1,2"], "say --damping viscous, or --no-damping"),
         ([*JOINT_WORDS, "--export", "nastrn:1,2"], "did you mean nastran?"),
         ([*JOINT_WORDS, "--output", "a.bdf"], "--output is for cards: say --export PROGRAM:J,K, too"),
-        ([*JOINT_WORDS, "--export", "ansys:1,2", "--output", "no/a.bdf"], "there is no folder no"),
+        ([*JOINT_WORDS, "--export", "nastran:1,2", "--output", "no/a.bdf"], "--output: there is no folder no"),
+        ([*JOINT_WORDS, "--save", "no/joint.json"], "--save: there is no folder no"),
+        ([*JOINT_WORDS, "--save", "."], "--save: . is a folder, not a file"),
     ],
 )
 def test_wrong_usage(test_file, words, message):
