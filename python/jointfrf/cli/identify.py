@@ -44,11 +44,12 @@ _METHODS = ("compliance", "inverse-substructuring")
 
 
 def _methods(text: str) -> list[str]:
-    for word in words(text):
+    found = words(text)
+    for word in found or [text]:
         if word not in _METHODS:
             hint = did_you_mean(word, _METHODS)
             raise argparse.ArgumentTypeError(f"{word!r} is not one of {', '.join(_METHODS)}{hint}")
-    return words(text)
+    return found
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

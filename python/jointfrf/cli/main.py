@@ -70,12 +70,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _complain(message: object, status: int) -> int:
-    print(f"jointfrf: error: {message}", file=sys.stderr)
+    print(f"jointfrf: error: {_one_line(message)}", file=sys.stderr)
     return status
 
 
 def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
-    print(f"jointfrf: warning: {message}", file=sys.stderr)
+    print(f"jointfrf: warning: {_one_line(message)}", file=sys.stderr)
+
+
+def _one_line(message: object) -> str:
+    """Return a message as one line: the name of a file may hold another."""
+    if isinstance(message, MemoryError) and not str(message):
+        return "not enough memory for what was asked for: fewer nodes, a narrower band or fewer realisations need less"
+    return str(message).replace("\r", "\\r").replace("\n", "\\n")
 
 
 if __name__ == "__main__":

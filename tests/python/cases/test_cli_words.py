@@ -201,3 +201,15 @@ def test_time_left_on_a_terminal(monkeypatch, capsys):
     assert "case: 50 %, about 20 s left" in said
     assert "about 17 min left" in said
     assert said.endswith("\r\x1b[K")
+
+
+def test_a_list_of_methods_names_one():
+    result = run_command("identify", BARS, *JOINT, "--method", ",")
+    assert result.returncode == 2
+    assert "argument --method: ',' is not one of compliance, inverse-substructuring" in result.stderr
+
+
+def test_a_message_is_one_line_whatever_a_file_is_called():
+    result = run_command("check", "two\nlines.uff")
+    assert (result.returncode, result.stdout) == (1, "")
+    assert result.stderr == "jointfrf: error: there is no file two\\nlines.uff\n"
