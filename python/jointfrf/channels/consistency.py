@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from jointfrf.channels.virtual_point import VirtualPoint
-from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_lines, as_square, check_finite_lines
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_lines, as_square, check_finite_lines, check_type
 
 __all__ = ["Consistency", "DrivingPointCheck", "driving_point_check", "impact_consistency", "sensor_consistency"]
 
@@ -90,6 +90,7 @@ def sensor_consistency(h: ArrayLike, point: VirtualPoint) -> Consistency:
 
     Three channels less two DOFs leave one residual: it cannot say which of them is wrong.
     """
+    check_type("point", point, VirtualPoint)
     measured = as_lines("h", h, point.modes.shape[0])
     check_finite_lines("h", measured)
     weight = point.weights[:, None]
@@ -144,6 +145,7 @@ def impact_consistency(h: ArrayLike, point: VirtualPoint) -> Consistency:
     >>> impact_consistency([[[1.0, 2.0, 3.0]]], vp).specific.round(6).tolist()
     [[1.0, 1.0, 1.0]]
     """
+    check_type("point", point, VirtualPoint)
     lines = as_lines("h", h, None, point.modes.shape[0])
     return sensor_consistency(np.ascontiguousarray(lines.swapaxes(1, 2)), point)
 

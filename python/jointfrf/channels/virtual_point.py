@@ -12,12 +12,13 @@ from jointfrf.channels.finite_differences import transform
 from jointfrf.channels.point_lines import Interface
 from jointfrf.dofs import DIRECTIONS, direction_names, direction_places, is_rotation, rigid_motion
 from jointfrf.frf.frf_set import Channel
-from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_dofs, as_real, as_square
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_dofs, as_real, as_square, check_type
 
 __all__ = [
     "VirtualPoint",
     "append_virtual_point",
     "channel_geometry",
+    "check_sides",
     "virtual_interface",
     "virtual_point",
     "virtual_points",
@@ -167,6 +168,15 @@ def virtual_point(
     return VirtualPoint(names, modes, inverse, weight, float(size[0] / size[-1]), reference, motion)
 
 
+def check_sides(side_j: VirtualPoint, side_k: VirtualPoint) -> None:
+    """Raise unless both sides of a joint are virtual points with the same DOFs."""
+    for name, side in (("side_j", side_j), ("side_k", side_k)):
+        check_type(name, side, VirtualPoint)
+    if side_j.dofs != side_k.dofs:
+        both = f"{', '.join(side_j.dofs)} and {', '.join(side_k.dofs)}"
+        raise ValueError(f"side_j and side_k must have the same DOFs in the same order, not {both}")
+
+
 def virtual_points(side_j: VirtualPoint, side_k: VirtualPoint) -> FloatArray:
     """Put the transformations of both sides of a joint into one, for `identify`.
 
@@ -198,9 +208,7 @@ def virtual_points(side_j: VirtualPoint, side_k: VirtualPoint) -> FloatArray:
     >>> virtual_points(side, side).round(6).tolist()[1]
     [-50.0, 50.0, 0.0, 0.0]
     """
-    if side_j.dofs != side_k.dofs:
-        both = f"{', '.join(side_j.dofs)} and {', '.join(side_k.dofs)}"
-        raise ValueError(f"side_j and side_k must have the same DOFs in the same order, not {both}")
+    check_sides(side_j, side_k)
     (n, m_j), m_k = side_j.transform.shape, side_k.transform.shape[1]
     both_sides = np.zeros((2 * n, m_j + m_k))
     both_sides[:n, :m_j] = side_j.transform

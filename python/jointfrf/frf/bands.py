@@ -109,6 +109,7 @@ def as_bands(
     >>> jf.as_bands({"y": (1, 2), "theta": [(1, 2), (3, 4)]}, ["y", "theta"], np.arange(5.0))
     [[(1.0, 2.0)], [(1.0, 2.0), (3.0, 4.0)]]
     """
+    freq_hz = as_frequency(freq_hz)
 
     def several(entry: Band | Sequence[Band] | None) -> list[Band]:
         if entry is None:

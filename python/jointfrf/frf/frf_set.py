@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from jointfrf.errors import FileContentError, FileContentWarning
-from jointfrf.kernel.arguments import as_array
+from jointfrf.kernel.arguments import as_array, check_type
 
 __all__ = ["POWER_OF_I_OMEGA", "ROUND_OFF", "Channel", "FrfSet", "same_frf"]
 
@@ -66,9 +66,12 @@ class Channel:
         ------
         ValueError
             The text is no such name.
+        TypeError
+            It is no text.
         """
         if isinstance(text, Channel):
             return text
+        check_type("channel", text, str)
         match = _CHANNEL.fullmatch(text.strip().lower())
         if match is None:
             raise ValueError(f"{text!r} is no channel: expected a node and a direction such as 102:+y or 102:rx")

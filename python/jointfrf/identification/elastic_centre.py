@@ -9,7 +9,7 @@ import numpy as np
 from jointfrf.dofs import is_rotation
 from jointfrf.identification.joint_fit import JointFit
 from jointfrf.joint import Joint
-from jointfrf.kernel.arguments import FloatArray
+from jointfrf.kernel.arguments import FloatArray, check_type
 
 __all__ = ["ElasticCentre", "elastic_centre"]
 
@@ -84,6 +84,7 @@ def elastic_centre(joint: Joint | JointFit) -> ElasticCentre:
     covariance = _stiffness_covariance(joint) if isinstance(joint, JointFit) else None
     if isinstance(joint, JointFit):
         joint = joint.joint
+    check_type("joint", joint, Joint)
     turns = [is_rotation(dof) for dof in joint.dofs]
     if all(turns) or not any(turns):
         raise ValueError(

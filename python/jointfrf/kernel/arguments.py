@@ -29,6 +29,7 @@ __all__ = [
     "as_values",
     "check_choice",
     "check_finite_lines",
+    "check_type",
     "checked_out",
     "optional_frequency",
 ]
@@ -145,6 +146,12 @@ def check_choice(name: str, value: object, known: Sequence[str]) -> None:
     """Raise unless the value is one of the words that are known."""
     if not isinstance(value, str) or value not in known:
         raise ValueError(f"{name} must be one of {', '.join(known)}, not {reprlib.repr(value)}")
+
+
+def check_type(name: str, value: object, kind: type) -> None:
+    """Raise unless an argument is an object of the class that it must be of."""
+    if not isinstance(value, kind):
+        raise TypeError(f"{name} must be a {kind.__name__}, not {type(value).__name__}")
 
 
 def check_finite_lines(name: str, lines: ComplexArray, freq_hz: FloatArray | None = None) -> None:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from jointfrf.channels.virtual_point import VirtualPoint
+from jointfrf.channels.virtual_point import VirtualPoint, check_sides
 from jointfrf.errors import IdentificationWarning, SingularLineError
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_number, as_real, as_square, check_finite_lines
 
@@ -208,9 +208,7 @@ def multi_point_compliance(
 
 def _as_sides(gamma: ArrayLike, side_j: VirtualPoint, side_k: VirtualPoint) -> tuple[ComplexArray, int]:
     """Return the lines and the number of channels of side j."""
-    if side_j.dofs != side_k.dofs:
-        both = f"{', '.join(side_j.dofs)} and {', '.join(side_k.dofs)}"
-        raise ValueError(f"side_j and side_k must have the same DOFs in the same order, not {both}")
+    check_sides(side_j, side_k)
     lines = as_square("gamma", gamma)
     m_j, m_k = side_j.modes.shape[0], side_k.modes.shape[0]
     if lines.shape[1] != m_j + m_k:
