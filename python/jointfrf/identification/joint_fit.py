@@ -16,6 +16,7 @@ from scipy.special import ndtri
 
 from jointfrf.dofs import Parameter, ParameterKind
 from jointfrf.files import write_file
+from jointfrf.identification.fit_cards import fit_cards
 from jointfrf.identification.fit_data import FitData
 from jointfrf.identification.fit_record import fields_of_record, read_record, record_of
 from jointfrf.io.cards import CardFormat, CardOptions
@@ -185,9 +186,38 @@ class JointFit:
         """
         return self.joint.dynamic_stiffness(freq_hz)
 
-    def export(self, program: CardFormat, nodes: Sequence[int], **options: Unpack[CardOptions]) -> str:
-        """Write the joint found as input of a finite-element program; all as in `Joint.export`."""
-        return self.joint.export(program, nodes, **options)
+    def export(
+        self,
+        program: CardFormat,
+        nodes: Sequence[int],
+        *,
+        about: Sequence[str] = (),
+        all_damping: bool = False,
+        **options: Unpack[CardOptions],
+    ) -> str:
+        """Write the joint found as input of a finite-element program, with comments on what each number is worth.
+
+        Parameters
+        ----------
+        program, nodes, **options
+            As in `Joint.export`.
+        about : sequence of str
+            Where the fit comes from: first lines of comment.
+        all_damping : bool
+            Also damping that is negative or not significantly above zero (95 %), which is left out otherwise, with the
+            cross terms of its DOF.
+
+        Returns
+        -------
+        str
+            Lines of input.
+
+        Raises
+        ------
+        ValueError
+            As `Joint.export`; or a stiffness is infinite.
+        """
+        return fit_cards(self, program, nodes, about, all_damping=all_damping, **options)
 
     def unit(self, parameter: str) -> str:
         """Return the unit of a parameter, by the names of its DOFs as `Parameter.unit` reads them."""

@@ -9,8 +9,9 @@ PACKAGE = Path(jointfrf.__file__).parent
 
 #: From the ground up; rooms of one floor do not know each other, a room imports what stands below its floor.
 FLOORS = (
-    {"errors", "files"},
-    {"extras", "kernel"},
+    {"errors", "spelling"},
+    {"files"},
+    {"extras", "kernel", "toml"},
     {"dofs"},
     {"frf"},
     {"channels", "io"},
