@@ -134,8 +134,7 @@ def make_document(document: Document) -> str:
         document=document,
         version=version("jointfrf"),
         verdict=VERDICT,
-        style=Markup((_FOLDER / "page.css").read_text(encoding="utf-8")),
-        chart_style=Markup(_chart_style(charts)) if charts else "",
+        style=Markup(_style(parts, charts)),
         script=Markup(script),
         sections=[
             {
@@ -150,8 +149,12 @@ def make_document(document: Document) -> str:
     )
 
 
-def _chart_style(charts: Sequence[Chart]) -> str:
-    return (_FOLDER / "chart.css").read_text(encoding="utf-8") + style_rules(charts)
+def _style(parts: Sequence[Part], charts: Sequence[Chart]) -> str:
+    """Return the rules of style of a page: those of all pages, and those of the parts it has."""
+    kinds = {"chart": Chart, "map": HeatMap, "sketch": Sketch}
+    names = ["page", *(name for name, kind in kinds.items() if any(isinstance(part, kind) for part in parts))]
+    rules = [(_FOLDER / f"{name}.css").read_text(encoding="utf-8") for name in names]
+    return "".join(rules) + (style_rules(charts) if charts else "")
 
 
 def _view(part: Part) -> dict[str, Any]:

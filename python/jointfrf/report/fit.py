@@ -54,7 +54,7 @@ def fit_figures(fit: JointFit) -> list[Figure]:
             (f"K*, {stiffness.unit}", lines[:, d, d], fitted, _interval(fit, stiffness)),
             (f"C, {compliance_unit(dof, dof)}", each_compliance[:, d], compliance, ()),
         ):
-            own = _Lines(fit.method, label, freq, each, curve[:, d, d], used[:, d], ribbons)
+            own = _EntryLines(fit.method, label, freq, each, curve[:, d, d], used[:, d], ribbons)
             panels += _panels(own if label.startswith("C") else _as_open(own, fit, stiffness))
         words = f"Joint DOF {dof}: complex stiffness K* and compliance C"
         figures.append(Figure(f"joint_{dof}", words, tuple(panels), 2, heading=words))
@@ -67,7 +67,7 @@ def _inverted(k_lines: ComplexArray) -> ComplexArray:
     return np.asarray(np.einsum("ldd->ld", inverse))
 
 
-class _Lines(NamedTuple):
+class _EntryLines(NamedTuple):
     """One entry of K* or C: values of each line by itself, as fitted, which lines were used, interval or bound."""
 
     method: str
@@ -89,13 +89,13 @@ def _interval(fit: JointFit, stiffness: Parameter) -> tuple[Ribbon, ...]:
     return (Ribbon("95 % interval of k", ends, np.full(2, low), np.full(2, high), "low"),)
 
 
-def _as_open(lines: _Lines, fit: JointFit, stiffness: Parameter) -> _Lines:
+def _as_open(lines: _EntryLines, fit: JointFit, stiffness: Parameter) -> _EntryLines:
     """Put the lower bound in place of a stiffness that cannot be distinguished from a rigid one."""
     low, high = fit.confidence_interval(0.95)[stiffness.name]
     return lines if np.isfinite(high) else lines._replace(bound=max(low, 0.0))
 
 
-def _panels(lines: _Lines) -> list[Panel]:
+def _panels(lines: _EntryLines) -> list[Panel]:
     """Real and imaginary part of one entry; interval and bound belong to the real part."""
     panels = []
     used, out = lines.used, ~lines.used

@@ -178,6 +178,8 @@ def _frf_section(fit: JointFit, compared: ComparedFrfs, figures: Sequence[Figure
         else f"{len(figures)} of {total} FRFs between the {where} are on this page, first those with response and "
         "force at one place, then those across the joint; the maps below are of all."
     )
+    if len(figures) > _AT_ONCE:
+        told[-1] += f" On paper there are the first {_AT_ONCE}."
     if fit.freq_hz.size > most:
         told.append(
             f"Curves of more than {most} lines are drawn through the smallest and the largest value of each of "

@@ -286,6 +286,13 @@ def test_a_loaded_fit_says_what_a_report_needs(fits, tmp_path):
         fits["plain"].report(tmp_path / "missing" / "report.html")
 
 
+def test_the_same_fit_gives_the_same_page(fits, tmp_path, monkeypatch):
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "86400")
+    pages = [fits["plain"].report(tmp_path / name).read_bytes() for name in ("a.html", "b.html")]
+    assert pages[0] == pages[1]
+    assert b"1970-01-02" in pages[0]
+
+
 def test_cards_stand_between_the_nodes_named(fits):
     parts = {part.name: part.text for section in fit_document(fits["plain"], ReportOptions(nodes=(7, 9))).sections
              if section.key == "cards" for part in section.parts if hasattr(part, "text")}  # fmt: skip
