@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from jointfrf.dofs import compliance_unit
 from jointfrf.frf.bands import line_slices
+from jointfrf.frf.noise_estimate import ZERO, own_size
 from jointfrf.identification.fit_data import FitData
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.report.document import HeatMap
@@ -19,6 +20,8 @@ __all__ = ["ComparedFrfs", "compare_frfs", "frf_figures", "reciprocity_map", "re
 
 #: FRFs that are drawn at most.
 _MOST = 24
+#: An FRF with less noise than this share of it has none.
+_NO_NOISE = 1e-9
 #: Values from which on cells of a map are shaded, and those of the darkest.
 _LIGHT, _DARK = 1.0, 3.0
 #: Share of the differences that may lie below a panel.
@@ -88,7 +91,10 @@ def compare_frfs(data: FitData, dofs: tuple[str, ...]) -> ComparedFrfs:
         kept = fitted[own]
         _add(squares[0], counts[0], abs(h - regenerated)[kept] ** 2, apart[kept])
         if same:
+            # An FRF that is zero by symmetry says nothing, and has no noise of its own.
             both = variance + variance.swapaxes(1, 2)
+            is_there = (abs(h) ** 2 > ZERO**2 * own_size(h)) & (both > (_NO_NOISE * abs(h)) ** 2)
+            both = np.where(is_there, both, 0)
             _add(squares[1], counts[1], abs(h - h.swapaxes(1, 2))[kept] ** 2, both[kept])
     with np.errstate(invalid="ignore", divide="ignore"):
         residual, reciprocity = np.sqrt(squares / np.where(counts > 0, counts, np.nan))
