@@ -304,6 +304,25 @@ module jointfrf_lanes
       real(dp), intent(inout) :: x(lanes, 2, *)
       real(dp), intent(out) :: squares(lanes, plan%n_target)
     end subroutine joint_form_routine
+
+    !> Squares s - 2 Re(d^H p) + d^H W d of a joint without cross terms, d = C - C0, and their derivatives, added up.
+    !> by_rate   whether damping is given by its rates, C = a/(1 + i (eta + w tau)), or C = a/(1 + i a (h + w c))
+    !> damped    whether derivatives by damping are wanted; else only those by a are added
+    !> joint     a, eta or h, tau or c of each DOF, shape (3, n)
+    !> squares   s, shape (lanes)
+    !> x         elements of C0 (n), of p (n), and of the upper triangle of W, column by column
+    !> cost      the squares, shape (lanes)
+    !> descent   Re(J^H r), r = p - W d, by a, by eta and by tau of each DOF, shape (lanes, 3, n)
+    !> normal    Re(J^H W J) of each entry of that triangle, u the derivative by a and v that by eta: uu, uv, w uv, vu,
+    !>           w vu, vv, w vv, w^2 vv, the first for the row; shape (lanes, 8, n (n + 1)/2)
+    subroutine diagonal_form_routine(n, by_rate, damped, joint, omega, squares, x, cost, descent, normal)
+      import :: dp, lanes
+      implicit none
+      integer, intent(in) :: n
+      logical, intent(in) :: by_rate, damped
+      real(dp), intent(in) :: joint(3, n), omega(lanes), squares(lanes), x(lanes, 2, *)
+      real(dp), intent(inout) :: cost(lanes), descent(lanes, 3, n), normal(lanes, 8, (n*(n + 1))/2)
+    end subroutine diagonal_form_routine
   end interface
 
   !> The kernels of one instruction set.
@@ -331,6 +350,7 @@ module jointfrf_lanes
     procedure(moments_routine), pointer, nopass :: moments => null()
     procedure(project_routine), pointer, nopass :: project => null()
     procedure(joint_form_routine), pointer, nopass :: joint_form => null()
+    procedure(diagonal_form_routine), pointer, nopass :: diagonal_form => null()
   end type lane_kernels
 
   !> The elements of a block, given out one after the other. What was taken in the end is what the block needs.
