@@ -103,12 +103,8 @@ def block_scatter(group: FittedGroup, blocks: int = BLOCKS) -> tuple[FloatArray,
     share = share / share.sum() + 1 / lines.size
     member = np.zeros((blocks, len(diagonal)))
     member[((np.cumsum(share) - share / 2) / share.sum() * blocks).astype(int), lines] = 1
-    gradient, information = np.zeros((blocks, p)), np.zeros((blocks, p, p))
-    for own in pieces:
-        part = minimum.of_lines(own)
-        gradient += member[:, own] @ part.gradient
-        information += np.tensordot(member[:, own], part.information, 1)
-    return _scatter(information.sum(axis=0), [LineParts(gradient, information)])
+    found = minimum.of_groups(member)
+    return _scatter(found.information.sum(axis=0), [found])
 
 
 def _scatter(whole: FloatArray, pieces: Iterable[LineParts]) -> tuple[FloatArray, FloatArray]:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from jointfrf.frf.bands import PIECE
+from jointfrf.frf.bands import PIECE, line_slices
 from jointfrf.identification.compliance_fit.joint_terms import CoupledJoint, DiagonalJoint, JointCoordinates
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.kernel.call import call_for_number
@@ -102,6 +102,15 @@ class FormMinimum:
         if len(self.forms.squares) > PIECE:
             return self._parts(lines)
         return LineParts(*(part[lines] for part in self._all_parts))
+
+    def of_groups(self, member: FloatArray) -> LineParts:
+        """Return the sums over groups of lines; `member`, shape (n_groups, n_freq), says how far a line is one of each."""
+        gradient, information = np.zeros((len(member), self.x.size)), np.zeros((len(member), *self.information.shape))
+        for own in line_slices(member.shape[1]):
+            part = self.of_lines(own)
+            gradient += member[:, own] @ part.gradient
+            information += np.tensordot(member[:, own], part.information, 1)
+        return LineParts(gradient, information)
 
     @cached_property
     def _all_parts(self) -> LineParts:
