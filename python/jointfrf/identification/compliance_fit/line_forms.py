@@ -104,7 +104,7 @@ class FormMinimum:
         return LineParts(*(part[lines] for part in self._all_parts))
 
     def of_groups(self, member: FloatArray) -> LineParts:
-        """Return the sums over groups of lines; `member`, shape (n_groups, n_freq), says how far a line is one of each."""
+        """Return the sums over groups of lines; `member`, shape (n_groups, n_freq), says how much of a line."""
         gradient, information = np.zeros((len(member), self.x.size)), np.zeros((len(member), *self.information.shape))
         for own in line_slices(member.shape[1]):
             part = self.of_lines(own)
