@@ -164,7 +164,8 @@ contains
     if (.not. all(abs(scaled(moving, moving)) <= huge(1.0_dp))) return
     do while (damping <= largest_damping)
       trial = x
-      call move(scaled(moving, moving), here%descent(moving)/length(moving), damping, length(moving), moving, trial, solved)
+      call move(scaled(moving, moving), here%descent(moving)/length(moving), damping, length(moving), moving, trial, &
+                solved)
       if (solved) then
         where (moves) trial = min(max(trial, limits%lower), limits%upper)
         call evaluate(joint, sums, trial, there)

@@ -292,6 +292,19 @@ module jointfrf_lanes
       real(dp), intent(out) :: squares(lanes)
     end subroutine project_routine
 
+    !> Expected FRFs that fit a joint, where entries of M are normal about 0 and the error of the FRFs is.
+    !> share          error of the FRFs over the noise that w weighs by
+    !> w, whitening   as in project_routine
+    !> x              holds C, the best H and M, and in `target` the standard deviations of the free entries of M; on
+    !>                return the expected H and M
+    subroutine expect_routine(plan, share, w, whitening, x)
+      import :: dp, lanes, manifold_plan
+      implicit none
+      type(manifold_plan), intent(in) :: plan
+      real(dp), intent(in) :: share, w(lanes, *), whitening(lanes, *)
+      real(dp), intent(inout) :: x(lanes, 2, *)
+    end subroutine expect_routine
+
     !> Information on the free entries of C, gradients and squares of the residuals, H and M eliminated.
     !> w, whitening   as in project_routine
     !> x              holds C, H, M and the targets; on return the information in `result`, and gradients in `normal`
@@ -349,6 +362,7 @@ module jointfrf_lanes
     procedure(largest_routine), pointer, nopass :: largest => null()
     procedure(moments_routine), pointer, nopass :: moments => null()
     procedure(project_routine), pointer, nopass :: project => null()
+    procedure(expect_routine), pointer, nopass :: expect => null()
     procedure(joint_form_routine), pointer, nopass :: joint_form => null()
     procedure(diagonal_form_routine), pointer, nopass :: diagonal_form => null()
   end type lane_kernels

@@ -49,9 +49,9 @@ module jointfrf
   use jointfrf_brick, only: brick_matrices, brick_quality
   use jointfrf_checks, only: check_brick_matrices, check_brick_quality, check_central_difference, &
     check_compliance_covariance, check_compliance_factors, check_couple, check_decouple, &
-    check_difference_weights, check_fit_diagonal_joint, check_invert, check_joint_forms, check_matrices, &
-    check_modify, check_monte_carlo, check_pollute, check_project_on_joint, check_rational_fit, check_receptance, &
-    check_receptance_banded, check_receptance_modal, check_relocate_poles, check_solve, check_transform
+    check_difference_weights, check_expect_on_joint, check_fit_diagonal_joint, check_invert, check_joint_forms, &
+    check_matrices, check_modify, check_monte_carlo, check_pollute, check_project_on_joint, check_rational_fit, &
+    check_receptance, check_receptance_banded, check_receptance_modal, check_relocate_poles, check_solve, check_transform
   use jointfrf_compliance, only: compliance_covariance, compliance_factors, joint_compliance
   use jointfrf_coupling, only: couple
   use jointfrf_decoupling, only: decouple
@@ -63,7 +63,7 @@ module jointfrf
   use jointfrf_ismm, only: inverse_substructuring, ismm
   use jointfrf_kinds, only: ip, long
   use jointfrf_linear_algebra, only: invert, solve
-  use jointfrf_manifold, only: joint_forms, project_on_joint
+  use jointfrf_manifold, only: expect_on_joint, joint_forms, project_on_joint
   use jointfrf_modal, only: receptance_modal
   use jointfrf_modification, only: find_modification, modify
   use jointfrf_monte_carlo, only: monte_carlo
@@ -82,7 +82,7 @@ module jointfrf
   public :: jf_couple, jf_modify, jf_find_modification
   public :: jf_ismm, jf_inverse_substructuring, jf_decouple
   public :: jf_joint_compliance, jf_compliance_factors, jf_compliance_covariance
-  public :: jf_project_on_joint, jf_joint_forms, jf_fit_diagonal_joint
+  public :: jf_project_on_joint, jf_expect_on_joint, jf_joint_forms, jf_fit_diagonal_joint
   public :: jf_difference_weights, jf_central_difference, jf_transform
   public :: jf_pollute, jf_monte_carlo
   public :: jf_brick_matrices, jf_brick_quality
@@ -631,6 +631,40 @@ contains
     end if
     call release_traps(host)
   end subroutine jf_project_on_joint
+
+  !> The expected FRFs of a joint of compliance C near ones that fit it, where entries of M are normal about 0.
+  !> FRFs show M by the product M C alone: those nearest to FRFs with errors have an M that grows as C shrinks. The mean
+  !> of M, and of the H that belongs to it, is the least squares of M over its deviations and of the change of the FRFs
+  !> over their error, by one Gauss-Newton step.
+  !> reciprocal, n, n_correlated, inverse_std, whitening, c_joint    as in jf_project_on_joint
+  !> share          error of the FRFs that H and M come from over the noise that inverse_std says, > 0
+  !> spread_m       standard deviations of the entries of M, shape (n, n, n_freq), > 0, N/m; with reciprocal 1 the upper
+  !>                triangle counts
+  !> free_h         H, shape (n, n, n_freq), m/N: of the FRFs that fit the joint, then expected
+  !> free_m         M, shape (n, n, n_freq), N/m: likewise
+  !> line_info      as in jf_project_on_joint
+  subroutine jf_expect_on_joint(trans, reciprocal, n, n_correlated, n_freq, share, spread_m, inverse_std, whitening, &
+                                c_joint, free_h, free_m, line_info, info) bind(C, name='jf_expect_on_joint_')
+    character(kind=c_char), intent(in) :: trans
+    integer(ip), intent(in) :: reciprocal, n, n_correlated, n_freq
+    real(c_double), intent(in) :: share
+    real(c_double), target, intent(in) :: spread_m(n, n, n_freq)
+    real(c_double), target, intent(in) :: inverse_std(2_long*n, 2_long*n, n_freq)
+    real(c_double), target, intent(in) :: whitening(n_correlated, n_correlated, n_freq)
+    complex(c_double_complex), target, intent(in) :: c_joint(n, n, n_freq)
+    complex(c_double_complex), target, intent(inout) :: free_h(n, n, n_freq), free_m(n, n, n_freq)
+    integer(ip), target, intent(out) :: line_info(n_freq)
+    integer(ip), intent(out) :: info
+    type(host_state) :: host
+
+    call hold_traps(host)
+    info = check_expect_on_joint(trans, reciprocal, n, n_correlated, n_freq, share, spread_m)
+    if (info == info_good) then
+      call expect_on_joint(is_transposed(trans), reciprocal == 1, share, spread_m, inverse_std, whitening, c_joint, &
+                           free_h, free_m, line_info, info)
+    end if
+    call release_traps(host)
+  end subroutine jf_expect_on_joint
 
   !> What measured FRFs say of the compliance C of a joint near FRFs that fit it, H and M being free.
   !> With d the change of the free entries of C, the weighted squares of the residual, least over H and M, are

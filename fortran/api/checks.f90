@@ -16,7 +16,8 @@ module jointfrf_checks
   private
   public :: check_invert, check_solve, check_receptance, check_receptance_banded, check_receptance_modal
   public :: check_couple, check_modify, check_matrices, check_decouple, check_compliance_factors
-  public :: check_compliance_covariance, check_fit_diagonal_joint, check_joint_forms, check_project_on_joint
+  public :: check_compliance_covariance, check_expect_on_joint, check_fit_diagonal_joint, check_joint_forms
+  public :: check_project_on_joint
   public :: check_difference_weights, check_central_difference, check_transform, check_pollute, check_monte_carlo
   public :: check_brick_matrices, check_brick_quality, check_rational_fit, check_relocate_poles
 
@@ -201,6 +202,18 @@ contains
     if (reciprocal /= 0 .and. reciprocal /= 1) info = -2
     if (unknown_order(trans)) info = -1
   end function check_project_on_joint
+
+  pure function check_expect_on_joint(trans, reciprocal, n, n_correlated, n_freq, share, spread_m) result(info)
+    character(kind=c_char), intent(in) :: trans
+    integer(ip), intent(in) :: reciprocal, n, n_correlated, n_freq
+    real(c_double), intent(in) :: share, spread_m(:, :, :)
+    integer(ip) :: info
+
+    info = check_project_on_joint(trans, reciprocal, n, n_correlated, n_freq, 0_ip, 0.0_c_double)
+    if (info /= info_good) return
+    if (.not. all(spread_m > 0.0_c_double .and. spread_m <= huge(spread_m))) info = -7
+    if (not_finite(share) .or. .not. share > 0.0_c_double) info = -6
+  end function check_expect_on_joint
 
   pure function check_joint_forms(trans, reciprocal, n, n_free, n_correlated, n_freq, n_target) result(info)
     character(kind=c_char), intent(in) :: trans

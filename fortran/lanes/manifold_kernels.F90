@@ -17,6 +17,7 @@ contains
     type(lane_kernels), intent(inout) :: kernels
 
     kernels%project => project_lanes
+    kernels%expect => expect_lanes
     kernels%joint_form => joint_form_lanes
     kernels%diagonal_form => diagonal_form_lanes
   end subroutine set_manifold_kernels

@@ -115,7 +115,7 @@ static jf_int call(void)
     double *rcond = out[1];
     const jf_int part = any_part(MOST), n_damping = next(3) ? (int)next(2) * n : any_part(MOST);
     const jf_int n_structural = next(3) ? (int)next(2) * n : any_part(MOST), kl = next(40) ? flag : INT_MAX;
-    const int routine = (int)next(25);
+    const int routine = (int)next(26);
     const jf_int few = any_size(2), order = few > 0 ? few : 1;
     const jf_int n_free = next(20) ? flag == 1 ? order * (order + 1) / 2 : order * order : m;
     const jf_int n_correlated = next(3) ? 0 : next(9) ? flag == 1 ? order * (2 * order + 1) : 4 * order * order : m;
@@ -187,6 +187,10 @@ static jf_int call(void)
                               frf(1), frf(2), in[4], out[1], out[0], out[1] + 50, out[1] + 100, &info);
         break;
     }
+    case 24:
+        jf_expect_on_joint(&t, &flag, &few, &n_correlated, &n_freq, &number, in[1], in[2], in[3], frf(0), h, second, line_info,
+                           &info);
+        break;
     default: jf_brick_quality(&n_freq, in[0], out[0], out[1], &info);
     }
     return info;

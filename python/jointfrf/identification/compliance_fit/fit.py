@@ -38,8 +38,10 @@ _AGREE = 1.3
 _MOST_LEVELS = 6
 #: The residual of exact FRFs is rounding: models are not compared below this share of the noise.
 _LEAST_EXCESS = 1e-12
-#: Share of lines left out, and lines at least, from which on parts of the band are compared.
-_LEFT_OUT, _FEW = 0.02, 40
+#: Share of lines left out from which on parts of the band are compared.
+_LEFT_OUT = 0.02
+#: Of fewer lines parts are not compared, and a fit may have several minima: each searches its own starts.
+_FEW = 40
 #: Residual of FRFs without noise, in units of the level assumed.
 _NO_NOISE = 1e-3
 
@@ -205,9 +207,11 @@ def _with_damping(problem: FitProblem) -> tuple[JointEstimate, tuple[DofDamping,
     chosen = tuple(one.best for one in choices)
     if all(kind == "both" for kind in chosen):
         return both, choices
-    terms = _terms(problem, chosen, problem.options.cross)
-    near = both._replace(groups=tuple(with_terms(group, terms.of_dofs(group.dofs)[0]) for group in both.groups))
-    return _estimate(replace(problem, near=near), chosen, like=both), choices
+    if problem.freq_hz.size >= _FEW and left_out_share(both) == 0:
+        terms = _terms(problem, chosen, problem.options.cross)
+        near = tuple(with_terms(group, terms.of_dofs(group.dofs)[0]) for group in both.groups)
+        problem = replace(problem, near=both._replace(groups=near))
+    return _estimate(problem, chosen, like=both), choices
 
 
 def _with_common_damping(problem: FitProblem) -> tuple[JointEstimate, tuple[DofDamping, ...]]:
