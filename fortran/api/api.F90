@@ -51,7 +51,8 @@ module jointfrf
     check_compliance_covariance, check_compliance_factors, check_couple, check_decouple, &
     check_difference_weights, check_expect_on_joint, check_fit_diagonal_joint, check_invert, check_joint_forms, &
     check_matrices, check_modify, check_monte_carlo, check_pollute, check_project_on_joint, check_rational_fit, &
-    check_receptance, check_receptance_banded, check_receptance_modal, check_relocate_poles, check_solve, check_transform
+    check_receptance, check_receptance_banded, check_receptance_modal, check_relocate_poles, check_solve, &
+    check_transform
   use jointfrf_compliance, only: compliance_covariance, compliance_factors, joint_compliance
   use jointfrf_coupling, only: couple
   use jointfrf_decoupling, only: decouple
