@@ -124,8 +124,8 @@ contains
     call run(work, 30.0_dp*steps, info)
   end subroutine project_on_joint
 
-  !> The expected FRFs about ones that fit a joint, where entries of M are normal about 0 with deviations known before, and
-  !> the error of the FRFs is `share` times their noise: least squares of both by one Gauss-Newton step.
+  !> The expected FRFs about ones that fit a joint, where entries of M are normal about 0 with deviations known before,
+  !> and the error of the FRFs is `share_of_noise` times their noise: least squares of both by one Gauss-Newton step.
   !> spread_m     standard deviations of the entries of M, shape (n, n, n_freq), > 0, N/m
   !> inverse_std, whitening, c_joint, h, m    as in `project_on_joint`
   subroutine expect_on_joint(transposed, reciprocal, share_of_noise, spread_m, inverse_std, whitening, c_joint, h, m, &

@@ -224,8 +224,8 @@ contains
     end do
   end subroutine other_joint
 
-  !> Expected H and M minimise squares of M over its deviations and of the linear change of the FRFs over their error: no
-  !> other step is lower. Lines that hold NaN are left.
+  !> Expected H and M minimise squares of M over its deviations and of the linear change of the FRFs over their error:
+  !> no other step is lower. A line that holds NaN is NaN.
   subroutine expected(n, reciprocal, correlated)
     integer, intent(in) :: n
     logical, intent(in) :: reciprocal, correlated
