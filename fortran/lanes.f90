@@ -292,6 +292,19 @@ module jointfrf_lanes
       real(dp), intent(out) :: squares(lanes)
     end subroutine project_routine
 
+    !> Expected FRFs that fit a joint, where entries of M are normal about 0 and the error of the FRFs is.
+    !> share          error of the FRFs over the noise that w weighs by
+    !> w, whitening   as in project_routine
+    !> x              holds C, the best H and M, and in `target` the standard deviations of the free entries of M; on
+    !>                return the expected H and M
+    subroutine expect_routine(plan, share, w, whitening, x)
+      import :: dp, lanes, manifold_plan
+      implicit none
+      type(manifold_plan), intent(in) :: plan
+      real(dp), intent(in) :: share, w(lanes, *), whitening(lanes, *)
+      real(dp), intent(inout) :: x(lanes, 2, *)
+    end subroutine expect_routine
+
     !> Information on the free entries of C, gradients and squares of the residuals, H and M eliminated.
     !> w, whitening   as in project_routine
     !> x              holds C, H, M and the targets; on return the information in `result`, and gradients in `normal`
@@ -304,6 +317,25 @@ module jointfrf_lanes
       real(dp), intent(inout) :: x(lanes, 2, *)
       real(dp), intent(out) :: squares(lanes, plan%n_target)
     end subroutine joint_form_routine
+
+    !> Squares s - 2 Re(d^H p) + d^H W d of a joint without cross terms, d = C - C0, and their derivatives, added up.
+    !> by_rate   whether damping is given by its rates, C = a/(1 + i (eta + w tau)), or C = a/(1 + i a (h + w c))
+    !> damped    whether derivatives by damping are wanted; else only those by a are added
+    !> joint     a, eta or h, tau or c of each DOF, shape (3, n)
+    !> squares   s, shape (lanes)
+    !> x         elements of C0 (n), of p (n), and of the upper triangle of W, column by column
+    !> cost      the squares, shape (lanes)
+    !> descent   Re(J^H r), r = p - W d, by a, by eta and by tau of each DOF, shape (lanes, 3, n)
+    !> normal    Re(J^H W J) of each entry of that triangle, u the derivative by a and v that by eta: uu, uv, w uv, vu,
+    !>           w vu, vv, w vv, w^2 vv, the first for the row; shape (lanes, 8, n (n + 1)/2)
+    subroutine diagonal_form_routine(n, by_rate, damped, joint, omega, squares, x, cost, descent, normal)
+      import :: dp, lanes
+      implicit none
+      integer, intent(in) :: n
+      logical, intent(in) :: by_rate, damped
+      real(dp), intent(in) :: joint(3, n), omega(lanes), squares(lanes), x(lanes, 2, *)
+      real(dp), intent(inout) :: cost(lanes), descent(lanes, 3, n), normal(lanes, 8, (n*(n + 1))/2)
+    end subroutine diagonal_form_routine
   end interface
 
   !> The kernels of one instruction set.
@@ -330,7 +362,9 @@ module jointfrf_lanes
     procedure(largest_routine), pointer, nopass :: largest => null()
     procedure(moments_routine), pointer, nopass :: moments => null()
     procedure(project_routine), pointer, nopass :: project => null()
+    procedure(expect_routine), pointer, nopass :: expect => null()
     procedure(joint_form_routine), pointer, nopass :: joint_form => null()
+    procedure(diagonal_form_routine), pointer, nopass :: diagonal_form => null()
   end type lane_kernels
 
   !> The elements of a block, given out one after the other. What was taken in the end is what the block needs.

@@ -20,7 +20,7 @@ module jointfrf_manifold
   use jointfrf_status, only: info_good, info_no_memory, line_good, line_not_finite, line_overflow
   implicit none
   private
-  public :: joint_forms, project_on_joint
+  public :: expect_on_joint, joint_forms, project_on_joint
 
   !> The workspace of one thread.
   type :: block_space
@@ -36,6 +36,7 @@ module jointfrf_manifold
     type(manifold_plan) :: plan
     type(lane_kernels) :: kernels
     logical :: transposed = .false.
+    integer :: n_target = 0                                !< FRFs of the caller
     integer, allocatable :: target(:, :), square(:)        !< where gamma and square matrices go, in the caller's order
     integer, allocatable :: weight(:)                      !< where the caller has the weight of each entry
     real(dp), pointer, contiguous :: gamma(:, :, :, :) => null()         !< pairs, numbers, lines, targets
@@ -65,6 +66,15 @@ module jointfrf_manifold
   contains
     procedure :: do_block => find_block
   end type form_finding
+
+  type, extends(manifold_work) :: expectation
+    real(dp) :: share = 0.0_dp
+    integer, allocatable :: free(:)                        !< where the caller has each free entry of M
+    complex(dp), pointer, contiguous :: free_h(:, :, :) => null(), free_m(:, :, :) => null()
+    real(dp), pointer, contiguous :: spread_m(:, :) => null()
+  contains
+    procedure :: do_block => expect_block
+  end type expectation
 
   abstract interface
     !> Lines first .. first + n_lines - 1, at most `lanes` of them; their data are in the workspace.
@@ -113,6 +123,34 @@ contains
     call set_data(work, transposed, one_target, inverse_std, whitening, c_joint, h, m, line_info)
     call run(work, 30.0_dp*steps, info)
   end subroutine project_on_joint
+
+  !> The expected FRFs about ones that fit a joint, where entries of M are normal about 0 with deviations known before,
+  !> and the error of the FRFs is `share_of_noise` times their noise: least squares of both by one Gauss-Newton step.
+  !> spread_m     standard deviations of the entries of M, shape (n, n, n_freq), > 0, N/m
+  !> inverse_std, whitening, c_joint, h, m    as in `project_on_joint`
+  subroutine expect_on_joint(transposed, reciprocal, share_of_noise, spread_m, inverse_std, whitening, c_joint, h, m, &
+                             line_info, info)
+    logical, intent(in) :: transposed, reciprocal
+    real(dp), intent(in) :: share_of_noise
+    real(dp), contiguous, target, intent(in) :: spread_m(:, :, :), inverse_std(:, :, :), whitening(:, :, :)
+    complex(dp), contiguous, target, intent(in) :: c_joint(:, :, :)
+    complex(dp), contiguous, target, intent(inout) :: h(:, :, :), m(:, :, :)
+    integer(ip), contiguous, target, intent(out) :: line_info(:)
+    integer(ip), intent(out) :: info
+    type(expectation) :: work
+    complex(dp), target :: no_target(2*size(c_joint, 1), 2*size(c_joint, 1), size(line_info), 0)
+
+    work%share = share_of_noise
+    work%free_h => h
+    work%free_m => m
+    work%spread_m(1:size(c_joint, 1)**2, 1:size(line_info)) => spread_m
+    call make_manifold_plan(reciprocal, size(c_joint, 1), .false., 1, size(whitening) > 0, work%plan)
+    call set_data(work, transposed, no_target, inverse_std, whitening, c_joint, h, m, line_info)
+    associate (plan => work%plan)
+      work%free = merge(plan%column + (plan%row - 1)*plan%n, plan%row + (plan%column - 1)*plan%n, transposed)
+    end associate
+    call run(work, 30.0_dp, info)
+  end subroutine expect_on_joint
 
   !> Information that FRFs give on a joint about a point of the manifold, H and M eliminated: with d the change of the
   !> free entries of C, the least squares over H and M are, to second order, s - 2 Re(d^H p) + d^H W d.
@@ -170,7 +208,8 @@ contains
       work%target(:, t) = in_memory(transposed, element)
     end do
     work%square = in_memory(.not. transposed, reshape([(i, i=1, n*n)], [n, n]))
-    call c_f_pointer(c_loc(gamma), work%gamma, [2, 4*n*n, size(gamma, 3), size(gamma, 4)])
+    work%n_target = size(gamma, 4)
+    if (work%n_target > 0) call c_f_pointer(c_loc(gamma), work%gamma, [2, 4*n*n, size(gamma, 3), size(gamma, 4)])
     work%c => real_lines(c_joint)
     work%h => real_lines(h)
     work%m => real_lines(m)
@@ -286,7 +325,7 @@ contains
     call load_square(self%c, self%plan%c)
     call load_square(self%h, self%plan%h)
     call load_square(self%m, self%plan%m)
-    do t = 1, self%plan%n_target
+    do t = 1, self%n_target
       call self%kernels%load(4*n2, self%target(:, t), first, n_lines, self%gamma(:, :, :, t), space%x)
       associate (data => space%x(:, :, self%plan%target + (t - 1)*q + 1:self%plan%target + t*q))
         do e = 1, q
@@ -297,8 +336,7 @@ contains
         end do
       end associate
     end do
-    call self%kernels%total(q*self%plan%n_target, [(self%plan%target + i, i=1, q*self%plan%n_target)], space%x, &
-                            of_targets)
+    call self%kernels%total(q*self%n_target, [(self%plan%target + i, i=1, q*self%n_target)], space%x, of_targets)
     total = total + of_targets
     line_info = merge(line_good, line_not_finite, total(:n_lines) <= huge(1.0_dp) .and. .not. least(:n_lines) < 0.0_dp)
 
@@ -339,6 +377,37 @@ contains
       self%squares(line) = ieee_value(1.0_dp, ieee_quiet_nan)
     end do
   end subroutine project_block
+
+  subroutine expect_block(self, first, n_lines, space)
+    class(expectation), intent(in) :: self
+    integer, intent(in) :: first, n_lines
+    type(block_space), intent(inout) :: space
+    real(dp) :: of_h(lanes), of_m(lanes)
+    integer :: n2, k, l, line
+
+    n2 = self%plan%n**2
+    associate (plan => self%plan, x => space%x)
+      x(:, :, plan%best_h + 1:plan%best_h + n2) = x(:, :, plan%h + 1:plan%h + n2)
+      x(:, :, plan%best_m + 1:plan%best_m + n2) = x(:, :, plan%m + 1:plan%m + n2)
+      do k = 1, plan%n_free
+        do l = 1, lanes
+          x(l, 1, plan%target + k) = self%spread_m(self%free(k), first + min(l, n_lines) - 1)
+        end do
+      end do
+      call self%kernels%expect(plan, self%share, space%w, space%whitening, x)
+      call self%kernels%total(n2, plan%h + self%square, x, of_h)
+      call self%kernels%total(n2, plan%m + self%square, x, of_m)
+      call self%kernels%store(n2, plan%h + self%square, first, n_lines, x, self%h)
+      call self%kernels%store(n2, plan%m + self%square, first, n_lines, x, self%m)
+    end associate
+    do l = 1, n_lines
+      line = first + l - 1
+      if (.not. of_h(l) + of_m(l) <= huge(1.0_dp)) call overflow(self%line_info(line))
+      if (self%line_info(line) == line_good) cycle
+      call store_nan(self%free_h(:, :, line))
+      call store_nan(self%free_m(:, :, line))
+    end do
+  end subroutine expect_block
 
   subroutine find_block(self, first, n_lines, space)
     class(form_finding), intent(in) :: self

@@ -49,12 +49,14 @@ module jointfrf
   use jointfrf_brick, only: brick_matrices, brick_quality
   use jointfrf_checks, only: check_brick_matrices, check_brick_quality, check_central_difference, &
     check_compliance_covariance, check_compliance_factors, check_couple, check_decouple, &
-    check_difference_weights, check_invert, check_joint_forms, check_matrices, check_modify, check_monte_carlo, &
-    check_pollute, check_project_on_joint, check_rational_fit, check_receptance, check_receptance_banded, &
-    check_receptance_modal, check_relocate_poles, check_solve, check_transform
+    check_difference_weights, check_expect_on_joint, check_fit_diagonal_joint, check_invert, check_joint_forms, &
+    check_matrices, check_modify, check_monte_carlo, check_pollute, check_project_on_joint, check_rational_fit, &
+    check_receptance, check_receptance_banded, check_receptance_modal, check_relocate_poles, check_solve, &
+    check_transform
   use jointfrf_compliance, only: compliance_covariance, compliance_factors, joint_compliance
   use jointfrf_coupling, only: couple
   use jointfrf_decoupling, only: decouple
+  use jointfrf_diagonal_joint, only: diagonal_joint, fit_diagonal_joint, line_forms, search_limits
   use jointfrf_dynamic_stiffness, only: receptance_banded, receptance_dense
   use jointfrf_engine, only: engine_automatic, engine_lapack, engine_plain, engine_v2, engine_v3, engine_v4, &
     get_engine, set_engine
@@ -62,7 +64,7 @@ module jointfrf
   use jointfrf_ismm, only: inverse_substructuring, ismm
   use jointfrf_kinds, only: ip, long
   use jointfrf_linear_algebra, only: invert, solve
-  use jointfrf_manifold, only: joint_forms, project_on_joint
+  use jointfrf_manifold, only: expect_on_joint, joint_forms, project_on_joint
   use jointfrf_modal, only: receptance_modal
   use jointfrf_modification, only: find_modification, modify
   use jointfrf_monte_carlo, only: monte_carlo
@@ -81,7 +83,7 @@ module jointfrf
   public :: jf_couple, jf_modify, jf_find_modification
   public :: jf_ismm, jf_inverse_substructuring, jf_decouple
   public :: jf_joint_compliance, jf_compliance_factors, jf_compliance_covariance
-  public :: jf_project_on_joint, jf_joint_forms
+  public :: jf_project_on_joint, jf_expect_on_joint, jf_joint_forms, jf_fit_diagonal_joint
   public :: jf_difference_weights, jf_central_difference, jf_transform
   public :: jf_pollute, jf_monte_carlo
   public :: jf_brick_matrices, jf_brick_quality
@@ -631,6 +633,40 @@ contains
     call release_traps(host)
   end subroutine jf_project_on_joint
 
+  !> The expected FRFs of a joint of compliance C near ones that fit it, where entries of M are normal about 0.
+  !> FRFs show M by the product M C alone: those nearest to FRFs with errors have an M that grows as C shrinks. The mean
+  !> of M, and of the H that belongs to it, is the least squares of M over its deviations and of the change of the FRFs
+  !> over their error, by one Gauss-Newton step.
+  !> reciprocal, n, n_correlated, inverse_std, whitening, c_joint    as in jf_project_on_joint
+  !> share          error of the FRFs that H and M come from over the noise that inverse_std says, > 0
+  !> spread_m       standard deviations of the entries of M, shape (n, n, n_freq), > 0, N/m; with reciprocal 1 the upper
+  !>                triangle counts
+  !> free_h         H, shape (n, n, n_freq), m/N: of the FRFs that fit the joint, then expected
+  !> free_m         M, shape (n, n, n_freq), N/m: likewise
+  !> line_info      as in jf_project_on_joint
+  subroutine jf_expect_on_joint(trans, reciprocal, n, n_correlated, n_freq, share, spread_m, inverse_std, whitening, &
+                                c_joint, free_h, free_m, line_info, info) bind(C, name='jf_expect_on_joint_')
+    character(kind=c_char), intent(in) :: trans
+    integer(ip), intent(in) :: reciprocal, n, n_correlated, n_freq
+    real(c_double), intent(in) :: share
+    real(c_double), target, intent(in) :: spread_m(n, n, n_freq)
+    real(c_double), target, intent(in) :: inverse_std(2_long*n, 2_long*n, n_freq)
+    real(c_double), target, intent(in) :: whitening(n_correlated, n_correlated, n_freq)
+    complex(c_double_complex), target, intent(in) :: c_joint(n, n, n_freq)
+    complex(c_double_complex), target, intent(inout) :: free_h(n, n, n_freq), free_m(n, n, n_freq)
+    integer(ip), target, intent(out) :: line_info(n_freq)
+    integer(ip), intent(out) :: info
+    type(host_state) :: host
+
+    call hold_traps(host)
+    info = check_expect_on_joint(trans, reciprocal, n, n_correlated, n_freq, share, spread_m)
+    if (info == info_good) then
+      call expect_on_joint(is_transposed(trans), reciprocal == 1, share, spread_m, inverse_std, whitening, c_joint, &
+                           free_h, free_m, line_info, info)
+    end if
+    call release_traps(host)
+  end subroutine jf_expect_on_joint
+
   !> What measured FRFs say of the compliance C of a joint near FRFs that fit it, H and M being free.
   !> With d the change of the free entries of C, the weighted squares of the residual, least over H and M, are
   !> s - 2 Re(d^H p) + d^H W d near that point. Free entries are all n^2, row by row, or with reciprocal 1 the
@@ -669,6 +705,56 @@ contains
     end if
     call release_traps(host)
   end subroutine jf_joint_forms
+
+  !> The joint without cross terms that minimises quadratic forms of its compliance, as jf_joint_forms finds them.
+  !> The squares are the sum over the lines of s - 2 Re(d^H p) + d^H W d, where d = C - C0 has an entry for each DOF:
+  !> C = a/(1 + i (eta + w tau)), or a/(1 + i a (h + w c)), so that k = 1/a and a rigid DOF has a = 0. By
+  !> Levenberg-Marquardt steps, in lanes whatever engine is chosen.
+  !> by_rate       1: damping is given by its rates eta = h/k and tau = c/k, s; 0: by h, N/m, and c, N s/m
+  !> n             number of joint DOFs, 1 to 1000
+  !> n_par         number of parameters, n to 3 n
+  !> steps         at most
+  !> held          the parameter that keeps its value, counted from 1; 0 for none
+  !> least_gain    the search ends when two steps in a row lower the squares by no more; >= 0
+  !> dofs          the DOF of each parameter, counted from 1, shape (n_par)
+  !> kinds         what it is, shape (n_par): 0 a, m/N, which every DOF has; 1 eta or h; 2 tau or c. None twice.
+  !> lower         least value of each parameter, shape (n_par)
+  !> upper         largest value, shape (n_par)
+  !> omega         angular frequencies, shape (n_freq), rad/s
+  !> c_joint       C0, shape (n, n_freq), m/N
+  !> information   W, shape (n, n, n_freq), (N/m)^2; its upper triangle is read
+  !> gradient      p, shape (n, n_freq), N/m
+  !> squares       s, shape (n_freq)
+  !> x             the parameters, shape (n_par): where to begin, then what was found
+  !> normal        Re(J^H W J) summed over the lines, J the derivative of C by the parameters: half the second
+  !>               derivative of the squares, shape (n_par, n_par)
+  !> descent       Re(J^H (p - W d)), minus half the first derivative, shape (n_par)
+  !> cost          the squares; +Inf, and x as it was, where they are not finite to begin with
+  !> info          0, -i, -1000 as above
+  subroutine jf_fit_diagonal_joint(trans, by_rate, n, n_par, n_freq, steps, held, least_gain, dofs, kinds, lower, &
+                                   upper, omega, c_joint, information, gradient, squares, x, normal, descent, &
+                                   cost, info) bind(C, name='jf_fit_diagonal_joint_')
+    character(kind=c_char), intent(in) :: trans
+    integer(ip), intent(in) :: by_rate, n, n_par, n_freq, steps, held, dofs(n_par), kinds(n_par)
+    real(c_double), intent(in) :: least_gain, lower(n_par), upper(n_par)
+    real(c_double), target, intent(in) :: omega(n_freq), squares(n_freq)
+    complex(c_double_complex), target, intent(in) :: c_joint(n, n_freq), information(n, n, n_freq), gradient(n, n_freq)
+    real(c_double), intent(inout) :: x(n_par)
+    real(c_double), intent(out) :: normal(n_par, n_par), descent(n_par), cost
+    integer(ip), intent(out) :: info
+    type(host_state) :: host
+
+    call hold_traps(host)
+    info = check_fit_diagonal_joint(trans, by_rate, n, n_par, n_freq, steps, held, least_gain, dofs, kinds, lower, &
+                                    upper)
+    if (info == info_good) then
+      call fit_diagonal_joint(diagonal_joint(int(n), by_rate == 1, int(dofs), int(kinds)), &
+                              line_forms(is_transposed(trans), omega, c_joint, information, gradient, squares), &
+                              search_limits(int(steps), int(held), least_gain, lower, upper), &
+                              x, normal, descent, cost, info)
+    end if
+    call release_traps(host)
+  end subroutine jf_fit_diagonal_joint
 
   !> Weights for displacement and slope at a reference from points along a line. Eq. (2.59) for any spacing.
   !> m         number of points, at least 2

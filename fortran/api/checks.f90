@@ -6,6 +6,7 @@ module jointfrf_checks
   use jointfrf_arguments, only: bad_offsets, bad_size, names, not_finite, out_of_range, repeated, unknown_equation, &
     unknown_order
   use jointfrf_brick, only: is_formulation
+  use jointfrf_diagonal_joint, only: most_dofs
   use jointfrf_kinds, only: ip, long
   use jointfrf_monte_carlo, only: is_method
   use jointfrf_noise, only: is_kind, is_reference
@@ -15,7 +16,8 @@ module jointfrf_checks
   private
   public :: check_invert, check_solve, check_receptance, check_receptance_banded, check_receptance_modal
   public :: check_couple, check_modify, check_matrices, check_decouple, check_compliance_factors
-  public :: check_compliance_covariance, check_joint_forms, check_project_on_joint
+  public :: check_compliance_covariance, check_expect_on_joint, check_fit_diagonal_joint, check_joint_forms
+  public :: check_project_on_joint
   public :: check_difference_weights, check_central_difference, check_transform, check_pollute, check_monte_carlo
   public :: check_brick_matrices, check_brick_quality, check_rational_fit, check_relocate_poles
 
@@ -201,6 +203,18 @@ contains
     if (unknown_order(trans)) info = -1
   end function check_project_on_joint
 
+  pure function check_expect_on_joint(trans, reciprocal, n, n_correlated, n_freq, share, spread_m) result(info)
+    character(kind=c_char), intent(in) :: trans
+    integer(ip), intent(in) :: reciprocal, n, n_correlated, n_freq
+    real(c_double), intent(in) :: share, spread_m(:, :, :)
+    integer(ip) :: info
+
+    info = check_project_on_joint(trans, reciprocal, n, n_correlated, n_freq, 0_ip, 0.0_c_double)
+    if (info /= info_good) return
+    if (.not. all(spread_m > 0.0_c_double .and. spread_m <= huge(spread_m))) info = -7
+    if (not_finite(share) .or. .not. share > 0.0_c_double) info = -6
+  end function check_expect_on_joint
+
   pure function check_joint_forms(trans, reciprocal, n, n_free, n_correlated, n_freq, n_target) result(info)
     character(kind=c_char), intent(in) :: trans
     integer(ip), intent(in) :: reciprocal, n, n_free, n_correlated, n_freq, n_target
@@ -215,6 +229,28 @@ contains
     if (reciprocal /= 0 .and. reciprocal /= 1) info = -2
     if (unknown_order(trans)) info = -1
   end function check_joint_forms
+
+  pure function check_fit_diagonal_joint(trans, by_rate, n, n_par, n_freq, steps, held, least_gain, dofs, kinds, &
+                                         lower, upper) result(info)
+    character(kind=c_char), intent(in) :: trans
+    integer(ip), intent(in) :: by_rate, n, n_par, n_freq, steps, held, dofs(:), kinds(:)
+    real(c_double), intent(in) :: least_gain, lower(:), upper(:)
+    integer(ip) :: info
+
+    info = info_good
+    if (not_finite(least_gain) .or. least_gain < 0.0_c_double) info = -8
+    if (held < 0 .or. held > n_par) info = -7
+    if (bad_size(steps)) info = -6
+    if (bad_size(n_freq)) info = -5
+    if (n_par < n .or. n_par > 3*int(max(n, 0_ip), long)) info = -4
+    if (n < 1 .or. n > most_dofs) info = -3
+    if (by_rate /= 0 .and. by_rate /= 1) info = -2
+    if (unknown_order(trans)) info = -1
+    if (info /= info_good) return
+    if (any(.not. lower <= upper)) info = -12
+    if (out_of_range(kinds + 1, 3_ip) .or. count(kinds == 0) /= n .or. repeated(3*dofs + kinds)) info = -10
+    if (out_of_range(dofs, n)) info = -9
+  end function check_fit_diagonal_joint
 
   !> The number of entries of a matrix of order blocks*n, or of its upper triangle; of an n that is refused anyway, any.
   pure function entries_of_square(reciprocal, blocks, n) result(entries)

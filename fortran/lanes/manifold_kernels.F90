@@ -17,7 +17,9 @@ contains
     type(lane_kernels), intent(inout) :: kernels
 
     kernels%project => project_lanes
+    kernels%expect => expect_lanes
     kernels%joint_form => joint_form_lanes
+    kernels%diagonal_form => diagonal_form_lanes
   end subroutine set_manifold_kernels
 
 #include "product.inc"
@@ -25,4 +27,5 @@ contains
 #include "normal_equations.inc"
 #include "projection.inc"
 #include "joint_form.inc"
+#include "diagonal_joint.inc"
 end module JF_MODULE

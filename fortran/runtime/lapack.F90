@@ -10,9 +10,20 @@ module jointfrf_lapack
   use jointfrf_kinds, only: blas_ip, dp
   implicit none
   private
-  public :: dgemm, zgeev, zgesv, zgetrf, zgetri, zgecon, zgbtrf, zgbtrs, zgbcon, zgemm
+  public :: dgemm, dposv, zgeev, zgesv, zgetrf, zgetri, zgecon, zgbtrf, zgbtrs, zgbcon, zgemm
 
   interface
+    !> Solve A X = B of a positive definite A by Cholesky's factors.
+    subroutine dposv(uplo, n, nrhs, a, lda, b, ldb, info, uplo_len) bind(C, name=JF_BLAS_PREFIX//"dposv_")
+      import :: blas_ip, c_char, c_size_t, dp
+      implicit none
+      character(kind=c_char), intent(in) :: uplo
+      integer(blas_ip), intent(in) :: n, nrhs, lda, ldb
+      real(dp), intent(inout) :: a(lda, *), b(ldb, *)
+      integer(blas_ip), intent(out) :: info
+      integer(c_size_t), value :: uplo_len
+    end subroutine dposv
+
     !> Solve A X = B by LU with partial pivoting; A leaves as its factors.
     subroutine zgesv(n, nrhs, a, lda, ipiv, b, ldb, info) bind(C, name=JF_BLAS_PREFIX//"zgesv_")
       import :: dp, blas_ip

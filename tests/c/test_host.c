@@ -115,7 +115,7 @@ static jf_int call(void)
     double *rcond = out[1];
     const jf_int part = any_part(MOST), n_damping = next(3) ? (int)next(2) * n : any_part(MOST);
     const jf_int n_structural = next(3) ? (int)next(2) * n : any_part(MOST), kl = next(40) ? flag : INT_MAX;
-    const int routine = (int)next(24);
+    const int routine = (int)next(26);
     const jf_int few = any_size(2), order = few > 0 ? few : 1;
     const jf_int n_free = next(20) ? flag == 1 ? order * (order + 1) / 2 : order * order : m;
     const jf_int n_correlated = next(3) ? 0 : next(9) ? flag == 1 ? order * (2 * order + 1) : 4 * order * order : m;
@@ -171,6 +171,26 @@ static jf_int call(void)
         jf_relocate_poles(&n, &m, &n_freq, &p, &number, frf(0), frf(1), in[2], h, out[1], &info);
         break;
     case 22: jf_rational_fit(&n, &m, &n_freq, frf(0), frf(1), in[2], frf(3), h, out[1], out[1] + 1, &info); break;
+    case 23: {
+        const jf_int n_par = next(10) ? n > 0 ? n + (jf_int)next(2 * (unsigned)n + 1) : n : m;
+        jf_int own[3 * MOST], kinds[3 * MOST];
+        double lower[3 * MOST], upper[3 * MOST];
+        int i;
+
+        for (i = 0; i < 3 * MOST; i++) {
+            own[i] = next(60) ? 1 + i % (n > 0 ? n : 1) : dofs[0][i];
+            kinds[i] = next(60) ? i / (n > 0 ? n : 1) : dofs[1][i];
+            lower[i] = next(20) ? -fabs(in[4][i]) : in[4][i];
+            upper[i] = next(20) ? fabs(in[4][i]) : in[5][i];
+        }
+        jf_fit_diagonal_joint(&t, &flag, &n, &n_par, &n_freq, &q, &p, &number, own, kinds, lower, upper, in[3], frf(0),
+                              frf(1), frf(2), in[4], out[1], out[0], out[1] + 50, out[1] + 100, &info);
+        break;
+    }
+    case 24:
+        jf_expect_on_joint(&t, &flag, &few, &n_correlated, &n_freq, &number, in[1], in[2], in[3], frf(0), h, second, line_info,
+                           &info);
+        break;
     default: jf_brick_quality(&n_freq, in[0], out[0], out[1], &info);
     }
     return info;

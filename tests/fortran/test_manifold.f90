@@ -3,7 +3,8 @@
 program test_manifold
   use testing, only: check, check_close, check_same, dp, finish, infinity, ip, not_a_number, random_lines, seed, &
     set_threads, transposed, uniform
-  use jointfrf_manifold, only: joint_forms, project_on_joint
+  use jointfrf, only: jf_expect_on_joint
+  use jointfrf_manifold, only: expect_on_joint, joint_forms, project_on_joint
   use jointfrf_engine, only: engine_automatic, engine_lapack, engine_plain, set_engine
   implicit none
   integer, parameter :: lines = 19
@@ -29,6 +30,11 @@ program test_manifold
   call other_joint(2, .true., .false.)
   call other_joint(2, .false., .true.)
   call other_joint(3, .true., .false.)
+  call expected(1, .true., .false.)
+  call expected(2, .true., .true.)
+  call expected(3, .false., .false.)
+  call expected(6, .true., .false.)
+  call expected_arguments()
   call orders_of_storage(.true.)
   call orders_of_storage(.false.)
   call bad_lines()
@@ -217,6 +223,99 @@ contains
       call check(abs(squares(i) - cost) < 1.0e-3_dp*cost + 1.0e-6_dp, 'the cost of another joint')
     end do
   end subroutine other_joint
+
+  !> Expected H and M minimise squares of M over its deviations and of the linear change of the FRFs over their error:
+  !> no other step is lower. A line that holds NaN is NaN.
+  subroutine expected(n, reciprocal, correlated)
+    integer, intent(in) :: n
+    logical, intent(in) :: reciprocal, correlated
+    real(dp), parameter :: share = 0.3_dp
+    type(sample) :: s
+    complex(dp), dimension(n, n, lines) :: h, m, dh, dm
+    real(dp) :: spread_m(n, n, lines), least(lines), other(lines)
+    integer(ip) :: line_info(lines), info
+    integer :: k
+
+    s = make_sample(n, reciprocal, correlated)
+    s%c = 0.1_dp*s%c
+    spread_m = 0.5_dp
+    spread_m(1, n, :) = 2
+    if (reciprocal) spread_m(n, 1, :) = 2
+    h = s%h
+    m = s%m
+    m(n, 1, 4) = cmplx(not_a_number(), 0.0_dp, dp)
+    call expect_on_joint(.false., reciprocal, share, spread_m, s%w, s%whitening, s%c, h, m, line_info, info)
+    call check(info == 1 .and. line_info(4) == -1 .and. count(line_info == 0) == lines - 1, 'expected: one bad line')
+    call check(.not. abs(m(1, 1, 4)) <= huge(1.0_dp), 'expected: a bad line is NaN')
+    h(:, :, 4) = s%h(:, :, 4)
+    m(:, :, 4) = s%m(:, :, 4)
+    least = expectation(s, share, spread_m, h - s%h, m - s%m)
+    do k = 1, 20
+      dh = 1.0e-4_dp*square(s)
+      dm = 1.0e-3_dp*square(s)
+      other = expectation(s, share, spread_m, h - s%h + dh, m - s%m + dm)
+      other(4) = huge(1.0_dp)
+      call check(all(other >= least*(1 - 1.0e-9_dp)), 'expected: least squares')
+    end do
+  end subroutine expected
+
+  !> Squares of M and of the change of the FRFs, which is linear in those of H and M.
+  function expectation(s, share, spread_m, dh, dm) result(squares)
+    type(sample), intent(in) :: s
+    real(dp), intent(in) :: share, spread_m(:, :, :)
+    complex(dp), intent(in) :: dh(:, :, :), dm(:, :, :)
+    real(dp) :: squares(lines)
+    real(dp), parameter :: little = 1.0e-6_dp
+    type(sample) :: moved
+    integer :: i, a, b
+
+    moved = s
+    moved%gamma = (frfs(s%h + little*dh, s%m + little*dm, s%c) - frfs(s%h - little*dh, s%m - little*dm, s%c))/(2*little)
+    squares = distance(moved, 0*moved%gamma)/share**2
+    do i = 1, lines
+      do a = 1, s%n
+        do b = merge(a, 1, s%reciprocal), s%n
+          squares(i) = squares(i) + abs((s%m(a, b, i) + dm(a, b, i))/spread_m(a, b, i))**2
+        end do
+      end do
+    end do
+  end function expectation
+
+  subroutine expected_arguments()
+    call try_expected(0, 'N', 1, 2, 0, lines, 0.1_dp, 1.0_dp)
+    call try_expected(0, 'T', 0, 2, 0, lines, 0.1_dp, 1.0_dp)
+    call try_expected(0, 'N', 1, 2, 0, 0, 0.1_dp, 1.0_dp)
+    call try_expected(-1, 'X', 1, 2, 0, lines, 0.1_dp, 1.0_dp)
+    call try_expected(-2, 'N', 2, 2, 0, lines, 0.1_dp, 1.0_dp)
+    call try_expected(-3, 'N', 1, 0, 0, lines, 0.1_dp, 1.0_dp)
+    call try_expected(-4, 'N', 1, 2, 3, lines, 0.1_dp, 1.0_dp)
+    call try_expected(-5, 'N', 1, 2, 0, -1, 0.1_dp, 1.0_dp)
+    call try_expected(-6, 'N', 1, 2, 0, lines, 0.0_dp, 1.0_dp)
+    call try_expected(-6, 'N', 1, 2, 0, lines, not_a_number(), 1.0_dp)
+    call try_expected(-7, 'N', 1, 2, 0, lines, 0.1_dp, 0.0_dp)
+  end subroutine expected_arguments
+
+  subroutine try_expected(wanted, trans, reciprocal, n, n_correlated, n_freq, share, one_spread)
+    integer, intent(in) :: wanted, reciprocal, n, n_correlated, n_freq
+    character, intent(in) :: trans
+    real(dp), intent(in) :: share, one_spread
+    type(sample) :: s
+    complex(dp) :: h(2, 2, lines), m(2, 2, lines)
+    real(dp) :: spread_m(2, 2, lines)
+    integer(ip) :: line_info(lines), info
+
+    s = make_sample(2, .true., .false.)
+    spread_m = 1
+    spread_m(2, 1, 3) = one_spread
+    h = s%h
+    m = s%m
+    call jf_expect_on_joint(trans, int(reciprocal, ip), int(n, ip), int(n_correlated, ip), int(n_freq, ip), share, &
+                            spread_m, s%w, s%whitening, s%c, h, m, line_info, info)
+    call check(info == wanted, 'expected: arguments')
+    if (wanted == 0 .and. n_freq > 0) return
+    call check_same(h, s%h, 'expected: H is not touched')
+    call check_same(m, s%m, 'expected: M is not touched')
+  end subroutine try_expected
 
   !> Lines stored as C does, several targets, and a gradient for each.
   subroutine orders_of_storage(reciprocal)

@@ -9,6 +9,7 @@ from typing import Literal, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from jointfrf.frf.bands import line_slices
 from jointfrf.frf.entry_groups import entry_groups
 from jointfrf.frf.noise_estimate import reciprocity_noise
 from jointfrf.frf.noise_parts import line_correlation, line_levels, noise_parts
@@ -108,11 +109,14 @@ class NoiseModel:
     @property
     def level(self) -> float:
         """Median of the noise relative to the FRFs, over entries that are not zero and lines."""
-        size = abs(self.smooth.h)
         counts = (self.relative > 0) | (self.floor > 0) | (self.coherence_factor > 0)
         if not counts.any():
             return 0.0
-        return float(np.median(np.sqrt(self.variance[:, counts]) / np.maximum(size[:, counts], _TINY)))
+        ratio = np.empty((len(self.variance), np.count_nonzero(counts)))
+        for own in line_slices(len(ratio)):
+            size = np.maximum(abs(self.smooth.h[own][:, counts]), _TINY)
+            ratio[own] = np.sqrt(self.variance[own][:, counts]) / size
+        return float(np.median(ratio, overwrite_input=True))
 
 
 def estimate_noise(

@@ -119,12 +119,18 @@ def _binned(squares: FloatArray, terms: FloatArray, *, robust: bool) -> tuple[Fl
         return np.asarray(np.add.reduceat(values, edges[:-1], axis=1) / count)
 
     ordered = np.take_along_axis(squares, order, axis=1)
-    if robust:
-        bins = np.split(ordered, edges[1:-1], axis=1)
-        y = np.stack([np.median(one, axis=1) for one in bins], axis=1) / np.log(2)
-    else:
-        y = means(ordered)
+    y = _bin_medians(ordered, edges) / np.log(2) if robust else means(ordered)
     return y, np.stack([means(np.take_along_axis(term, order, axis=1)) for term in terms]), count
+
+
+def _bin_medians(values: FloatArray, edges: NDArray[np.intp]) -> FloatArray:
+    """Medians over bins of values, shape (n_entries, n_bins): of all bins of one length at once."""
+    length = np.diff(edges)
+    medians = np.empty((len(values), len(length)))
+    for one in np.unique(length):
+        own = np.flatnonzero(length == one)
+        medians[:, own] = np.median(values[:, edges[own][:, None] + np.arange(one)], axis=2)
+    return medians
 
 
 @dataclass(frozen=True)

@@ -108,7 +108,9 @@ def test_the_minimum_is_that_of_a_general_minimiser(kind, factor):
 def test_information_and_gradient_are_sums_of_the_lines(problem):
     found = minimise_forms(problem.forms, problem.joint, problem.true)
     np.testing.assert_allclose(found.information, found.line_information.sum(axis=0), rtol=1e-12)
-    np.testing.assert_allclose(found.gradient, found.line_gradient.sum(axis=0), rtol=1e-9, atol=1e-12)
+    # At a minimum the parts of the lines cancel: what is left differs by rounding of the parts.
+    rounding = 1e-13 * abs(found.line_gradient).sum(axis=0)
+    assert (abs(found.gradient - found.line_gradient.sum(axis=0)) <= rounding).all()
     slope = np.einsum("lab,lbp->lap", problem.a, problem.joint.slope(found.x, problem.joint.compliance(found.x)))
     np.testing.assert_allclose(found.line_information, np.einsum("lap,laq->lpq", slope.conj(), slope).real, rtol=1e-9)
     assert (abs(found.gradient) < 1e-2 * np.sqrt(np.diagonal(found.information))).all()

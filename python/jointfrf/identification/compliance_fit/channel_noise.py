@@ -141,7 +141,8 @@ def _estimated_noise(
         freq, h, reciprocal=reciprocal, coherence=options.coherence, averages=options.averages, like=options.like
     )
     # Below this, what looks like noise is rounding.
-    is_assumed = model.source == "none" or model.level < _LEAST_LEVEL
+    level = model.level
+    is_assumed = model.source == "none" or level < _LEAST_LEVEL
     # What a rational function leaves of FRFs that it meets but for so little is no noise, either.
     is_assumed |= model.source == "residual" and not model.smooth.is_smooth
     least = _ASSUMED_LEVEL if is_assumed else _LEAST_LEVEL
@@ -150,7 +151,7 @@ def _estimated_noise(
         np.maximum(model.variance, variance, out=variance)
     # Other realisations start from the model; of a long sweep it would take too much memory.
     kept = model if len(freq) <= PIECE else None
-    known = KnownNoise(least if is_assumed else model.level, model.inflation, is_assumed, model.outlying, kept)
+    known = KnownNoise(least if is_assumed else level, model.inflation, is_assumed, model.outlying, kept)
     smooth = model.smooth.h.copy() if kept else model.smooth.h
     del model
     return _prepared(h, _near(smooth, h, variance), variance, transforms, known)

@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 
 from jointfrf.identification.compliance_fit.estimator import FittedGroup
-from jointfrf.identification.compliance_fit.joint_terms import DampingTerms, DiagonalJoint, joint_terms
-from jointfrf.identification.compliance_fit.line_forms import minimise_forms
+from jointfrf.identification.compliance_fit.joint_terms import DampingTerms, DiagonalJoint, JointTerms, joint_terms
+from jointfrf.identification.compliance_fit.line_forms import FormMinimum, minimise_forms
 
-__all__ = ["DofDamping", "choose_damping"]
+__all__ = ["DofDamping", "choose_damping", "with_terms"]
 
 _KINDS: tuple[DampingTerms, ...] = ("none", "viscous", "hysteretic", "both")
 
@@ -50,7 +50,6 @@ def choose_damping(group: FittedGroup, dofs: tuple[str, ...], factor: float) -> 
     nearly cancel each other are noise, so "both" needs two terms that are positive.
     """
     fit, own = group.fit, group.joint.terms
-    theta = group.joint.theta(fit.minimum.x)
     price = np.log(max(2 * fit.equations / factor, 2.0))
     choices = []
     for d, dof in enumerate(dofs):
@@ -59,9 +58,7 @@ def choose_damping(group: FittedGroup, dofs: tuple[str, ...], factor: float) -> 
             kinds: list[DampingTerms] = ["both"] * len(dofs)
             kinds[d] = kind
             terms = joint_terms(own.omega, dofs, kinds, "zero")
-            joint = DiagonalJoint(terms)
-            kept = [own.parameters.index(one) for one in terms.parameters]
-            found = minimise_forms(fit.forms, joint, joint.coordinates(theta[kept]))
+            found = _minimum(group, terms)
             damping = found.x[(terms.pairs[:, 0] == d) & (terms.kinds > 0)]
             scores[kind] = 2 * found.cost / factor + len(terms.parameters) * price
             if kind == "both" and (damping <= 0).any():
@@ -69,3 +66,16 @@ def choose_damping(group: FittedGroup, dofs: tuple[str, ...], factor: float) -> 
         best, second = sorted(scores, key=lambda kind: scores[kind])[:2]
         choices.append(DofDamping(dof, best, second, scores[second] - scores[best]))
     return choices
+
+
+def with_terms(group: FittedGroup, terms: JointTerms) -> FittedGroup:
+    """Return the fit with fewer terms, by its quadratic forms alone: where a fit with these terms may begin."""
+    found = _minimum(group, terms)
+    return group._replace(joint=found.joint, fit=group.fit._replace(minimum=found))
+
+
+def _minimum(group: FittedGroup, terms: JointTerms) -> FormMinimum:
+    """Minimise the forms of a group with fewer terms, from the joint found with all."""
+    own, joint = group.joint.terms, DiagonalJoint(terms)
+    kept = [own.parameters.index(one) for one in terms.parameters]
+    return minimise_forms(group.fit.forms, joint, joint.coordinates(group.joint.theta(group.fit.minimum.x)[kept]))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -93,6 +94,7 @@ def estimate_joint(
     cross: CrossTerms = "zero",
     used: NDArray[np.bool_] | None = None,
     near: JointEstimate | None = None,
+    like: JointEstimate | None = None,
 ) -> JointEstimate:
     """Fit a joint to FRFs whose noise is known.
 
@@ -106,19 +108,26 @@ def estimate_joint(
     used : ndarray of bool, shape (n_freq, n), optional
         Lines used for each DOF; all by default.
     near : JointEstimate, optional
-        Of other FRFs of the same structure: where the fits start first.
+        Of other FRFs of the same structure, or of other terms: where the fits start first.
+    like : JointEstimate, optional
+        Of the same FRFs with the same noise: its groups of DOFs and their data are taken.
     """
     groups = []
     known = {} if near is None else {tuple(group.dofs.tolist()): group for group in near.groups}
-    lines = np.arange(len(frfs.measured))
-    for dofs in frfs.on_lines(_some(lines)).groups():
+    for dofs, data in _grouped(frfs) if like is None else [(one.dofs, one.problem.data) for one in like.groups]:
         own, which = terms.of_dofs(dofs)
-        data = LineData.joined([frfs.on_lines(lines[piece]).of_dofs(dofs) for piece in line_slices(lines.size)])
         joint = coordinates_of(own)
         problem = GroupProblem(data, joint, _unknown(dofs, cross, used, len(data.measured)))
         fit = _fitted(problem, cross, known.get(tuple(dofs.tolist())))
         groups.append(FittedGroup(dofs, which, joint, problem, fit))
     return assembled(terms, groups)
+
+
+def _grouped(frfs: InterfaceFrfs) -> Iterator[tuple[NDArray[np.intp], LineData]]:
+    """Return groups of DOFs that are fitted each by itself, and their FRFs."""
+    lines = np.arange(len(frfs.measured))
+    for dofs in frfs.on_lines(_some(lines)).groups():
+        yield dofs, LineData.joined([frfs.on_lines(lines[own]).of_dofs(dofs) for own in line_slices(lines.size)])
 
 
 def _some(lines: NDArray[np.intp]) -> NDArray[np.intp]:

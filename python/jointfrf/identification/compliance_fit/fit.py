@@ -13,12 +13,18 @@ from jointfrf.errors import IllConditionedWarning
 from jointfrf.frf.bands import line_slices
 from jointfrf.identification.compliance_fit.band_parts import BandParts, fit_band_parts, left_out_share
 from jointfrf.identification.compliance_fit.channel_jackknife import ChannelSpread, channel_spread
-from jointfrf.identification.compliance_fit.damping_choice import DofDamping, choose_damping
+from jointfrf.identification.compliance_fit.damping_choice import DofDamping, choose_damping, with_terms
 from jointfrf.identification.compliance_fit.estimator import JointEstimate, estimate_joint
 from jointfrf.identification.compliance_fit.from_nothing import check_estimate
 from jointfrf.identification.compliance_fit.interface_frfs import InterfaceFrfs
 from jointfrf.identification.compliance_fit.intervals import LikelihoodIntervals, Spread, spread_of
-from jointfrf.identification.compliance_fit.joint_terms import CrossTerms, DampingTerms, DiagonalJoint, joint_terms
+from jointfrf.identification.compliance_fit.joint_terms import (
+    CrossTerms,
+    DampingTerms,
+    DiagonalJoint,
+    JointTerms,
+    joint_terms,
+)
 from jointfrf.identification.compliance_fit.misfit import Misfit, diagnose
 from jointfrf.identification.compliance_fit.prepare import FitProblem
 from jointfrf.identification.joint_fit import JointFit
@@ -32,8 +38,10 @@ _AGREE = 1.3
 _MOST_LEVELS = 6
 #: The residual of exact FRFs is rounding: models are not compared below this share of the noise.
 _LEAST_EXCESS = 1e-12
-#: Share of lines left out, and lines at least, from which on parts of the band are compared.
-_LEFT_OUT, _FEW = 0.02, 40
+#: Share of lines left out from which on parts of the band are compared.
+_LEFT_OUT = 0.02
+#: Of fewer lines parts are not compared, and a fit may have several minima: each searches its own starts.
+_FEW = 40
 #: Residual of FRFs without noise, in units of the level assumed.
 _NO_NOISE = 1e-3
 
@@ -167,7 +175,7 @@ def _cross_fits(
     coupled = any(len(group.dofs) > 1 for group in result.groups)
     if problem.noise.is_assumed or problem.options.cross != "zero" or not (misfit.is_large and coupled):
         return False
-    other = _estimate(problem, _chosen(problem, choices), "fit")
+    other = _estimate(problem, _chosen(problem, choices), "fit", result)
     return bool(np.sqrt(other.excess) - 1 < (misfit.ratio - 1) / 4)
 
 
@@ -199,13 +207,18 @@ def _with_damping(problem: FitProblem) -> tuple[JointEstimate, tuple[DofDamping,
     chosen = tuple(one.best for one in choices)
     if all(kind == "both" for kind in chosen):
         return both, choices
-    return _estimate(problem, chosen), choices
+    if problem.freq_hz.size >= _FEW and left_out_share(both) == 0:
+        terms = _terms(problem, chosen, problem.options.cross)
+        near = tuple(with_terms(group, terms.of_dofs(group.dofs)[0]) for group in both.groups)
+        problem = replace(problem, near=both._replace(groups=near))
+    return _estimate(problem, chosen, like=both), choices
 
 
 def _with_common_damping(problem: FitProblem) -> tuple[JointEstimate, tuple[DofDamping, ...]]:
     """Choose the damping terms of a joint with cross terms: the same for all DOFs."""
     kinds: tuple[DampingTerms, ...] = ("viscous", "hysteretic", "both")
-    results = {kind: _estimate(problem, kind) for kind in kinds}
+    first = _estimate(problem, kinds[0])
+    results = {kinds[0]: first} | {kind: _estimate(problem, kind, like=first) for kind in kinds[1:]}
     factor = problem.noise.inflation * max(results["both"].excess, _LEAST_EXCESS)
     scores = {}
     for kind, result in results.items():
@@ -216,12 +229,20 @@ def _with_common_damping(problem: FitProblem) -> tuple[JointEstimate, tuple[DofD
     return results[best], tuple(DofDamping(dof, best, second, margin) for dof in problem.dofs)
 
 
+def _terms(problem: FitProblem, damping: DampingTerms | tuple[DampingTerms, ...], cross: CrossTerms) -> JointTerms:
+    return joint_terms(2 * np.pi * problem.freq_hz, problem.dofs, damping, cross)
+
+
 def _estimate(
-    problem: FitProblem, damping: DampingTerms | tuple[DampingTerms, ...], cross: CrossTerms | None = None
+    problem: FitProblem,
+    damping: DampingTerms | tuple[DampingTerms, ...],
+    cross: CrossTerms | None = None,
+    like: JointEstimate | None = None,
 ) -> JointEstimate:
+    """Fit with these terms; `like` is a fit of the same FRFs with others."""
     cross = problem.options.cross if cross is None else cross
-    terms = joint_terms(2 * np.pi * problem.freq_hz, problem.dofs, damping, cross)
+    terms = _terms(problem, damping, cross)
     with warnings.catch_warnings(), np.errstate(over="ignore", divide="ignore", invalid="ignore"):
         # Lines on which noise hides the joint are ill-conditioned; they weigh little. A start may lead to infinity.
         warnings.simplefilter("ignore", IllConditionedWarning)
-        return estimate_joint(problem.frfs, terms, cross, problem.used, problem.near)
+        return estimate_joint(problem.frfs, terms, cross, problem.used, problem.near, like)

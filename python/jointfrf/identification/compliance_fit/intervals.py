@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
 from scipy import special
 
+from jointfrf.frf.bands import line_slices
 from jointfrf.identification.compliance_fit.diagonal_minimum import lowest_minimum
 from jointfrf.identification.compliance_fit.estimator import FittedGroup, JointEstimate
 from jointfrf.identification.compliance_fit.joint_terms import DiagonalJoint
-from jointfrf.identification.compliance_fit.line_forms import LineForms, inverse_information, minimise_forms
+from jointfrf.identification.compliance_fit.line_forms import (
+    LineForms,
+    LineParts,
+    inverse_information,
+    minimise_forms,
+)
 from jointfrf.kernel.arguments import FloatArray
 
 __all__ = ["BLOCKS", "LikelihoodIntervals", "Spread", "block_scatter", "line_scatter", "profile_interval", "spread_of"]
@@ -66,7 +73,8 @@ def line_scatter(group: FittedGroup) -> tuple[FloatArray, FloatArray]:
     taken up: the sum of the squares is scaled by that.
     """
     minimum = group.fit.minimum
-    return _scatter(minimum.line_information, minimum.line_gradient)
+    pieces = line_slices(len(minimum.forms.squares))
+    return _scatter(minimum.information, (minimum.of_lines(own) for own in pieces))
 
 
 def block_scatter(group: FittedGroup, blocks: int = BLOCKS) -> tuple[FloatArray, FloatArray]:
@@ -84,36 +92,46 @@ def block_scatter(group: FittedGroup, blocks: int = BLOCKS) -> tuple[FloatArray,
     most of the information on a parameter leaves few degrees of freedom.
     """
     minimum = group.fit.minimum
-    p = minimum.x.size
-    lines = np.flatnonzero(group.fit.trusted & minimum.line_information.any(axis=(1, 2)))
+    p, pieces = minimum.x.size, line_slices(len(minimum.forms.squares))
+    diagonal = np.concatenate([np.einsum("lpp->lp", minimum.of_lines(own).information) for own in pieces])
+    lines = np.flatnonzero(group.fit.trusted & diagonal.any(axis=1))
     if lines.size < 2 * blocks:
         return np.full(p, np.nan), np.zeros(p)
     # Blocks of equal information, so that each says about as much as the others.
     size = np.maximum(np.diagonal(minimum.information), np.finfo(float).tiny)
-    share = (np.einsum("lpp->lp", minimum.line_information)[lines] / size).sum(axis=1)
+    share = (diagonal[lines] / size).sum(axis=1)
     share = share / share.sum() + 1 / lines.size
-    at = ((np.cumsum(share) - share / 2) / share.sum() * blocks).astype(int)
-    member = (at == np.arange(blocks)[:, None]).astype(float)
-    return _scatter(np.tensordot(member, minimum.line_information[lines], 1), member @ minimum.line_gradient[lines])
+    member = np.zeros((blocks, len(diagonal)))
+    member[((np.cumsum(share) - share / 2) / share.sum() * blocks).astype(int), lines] = 1
+    found = minimum.of_groups(member)
+    return _scatter(found.information.sum(axis=0), [found])
 
 
-def _scatter(information: FloatArray, gradient: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the variance that the gradients of parts show, shape (b, p), and its degrees of freedom, shape (p,)."""
-    whole = information.sum(axis=0)
+def _scatter(whole: FloatArray, pieces: Iterable[LineParts]) -> tuple[FloatArray, FloatArray]:
+    """Return the variance that the gradients of parts show, and its degrees of freedom, shape (p,) each.
+
+    Parameters
+    ----------
+    whole : ndarray, shape (p, p)
+        Sum of the information of all parts.
+    pieces : iterable of LineParts
+    """
     size = np.sqrt(np.maximum(np.diagonal(whole), np.finfo(float).tiny))
     value, vector = np.linalg.eigh(whole / np.outer(size, size))
     # Coordinates in which the whole information is 1; directions that the data do not see are left out.
     seen = value > _SEEN * value[-1]
     root = vector[:, seen] / np.sqrt(value[seen]) / size[:, None]
-    share = root.T @ information @ root
-    moved = share @ root.T
     variance = (root**2).sum(axis=1)
-    left = np.maximum(variance - (moved**2).sum(axis=(0, 1)), 0)
-    expected = np.einsum("ar,bra->ba", root, moved)
+    taken, of_expected, of_steps = np.zeros((3, len(size)))
+    for piece in pieces:
+        moved = (root.T @ piece.information @ root) @ root.T
+        taken += (moved**2).sum(axis=(0, 1))
+        of_expected += (np.einsum("ar,bra->ba", root, moved) ** 2).sum(axis=0)
+        of_steps += ((piece.gradient @ root @ root.T) ** 2).sum(axis=0)
+    left = np.maximum(variance - taken, 0)
     with np.errstate(divide="ignore", invalid="ignore"):
-        step = gradient @ root @ root.T
-        scatter = (step**2).sum(axis=0) * variance / left
-        degrees = variance**2 / (expected**2).sum(axis=0) * left / variance
+        scatter = of_steps * variance / left
+        degrees = variance**2 / of_expected * left / variance
     return scatter, np.nan_to_num(degrees)
 
 

@@ -149,10 +149,8 @@ class JointCoordinates(Protocol):
     def slope(self, x: FloatArray, entries: ComplexArray) -> ComplexArray:
         """Return their derivatives by the coordinates, shape (n_freq, q, p)."""
 
-    def normal_equations(
-        self, x: FloatArray, entries: ComplexArray, weight: ComplexArray, residual: ComplexArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return Re(J^H W J), shape (p, p), and Re(J^H r), shape (p,), of all lines; J is the slope."""
+    def on_lines(self, lines: slice) -> JointCoordinates:
+        """Return the same on some of the lines."""
 
     def theta(self, x: FloatArray) -> FloatArray:
         """Return the parameters, shape (p,)."""
@@ -208,14 +206,9 @@ class DiagonalJoint:
             slope[:, own, i] = -factors[self.terms.kinds[i]] * entries[:, own] * last
         return slope
 
-    def normal_equations(
-        self, x: FloatArray, entries: ComplexArray, weight: ComplexArray, residual: ComplexArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return the information, shape (p, p), and the gradient, shape (p,), of all lines."""
-        slope = self.slope(x, entries)
-        flat = slope.reshape(-1, x.size)
-        information = (flat.conj().T @ (weight @ slope).reshape(-1, x.size)).real
-        return information, (flat.conj().T @ residual.ravel()).real
+    def on_lines(self, lines: slice) -> DiagonalJoint:
+        """Return the same on some of the lines."""
+        return DiagonalJoint(self.terms.on_lines(lines), by_rate=self.by_rate)
 
     def theta(self, x: FloatArray) -> FloatArray:
         """Return k = 1/a, h = eta/a, c = tau/a; infinite for a rigid DOF."""
@@ -278,10 +271,14 @@ class CoupledJoint:
         slope *= -self.terms.factors[self.terms.kinds].T[:, None, :]
         return slope
 
+    def on_lines(self, lines: slice) -> CoupledJoint:
+        """Return the same on some of the lines."""
+        return CoupledJoint(self.terms.on_lines(lines))
+
     def normal_equations(
         self, x: FloatArray, entries: ComplexArray, weight: ComplexArray, residual: ComplexArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Return the information, shape (p, p), and the gradient, shape (p,), of all lines.
+        """Return Re(J^H W J), shape (p, p), and Re(J^H r), shape (p,), of all lines; J is the slope.
 
         Terms of the same pair differ by a function of frequency only: products are of pairs.
         """

@@ -11,16 +11,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from jointfrf.identification.compliance_fit.manifold import LineData, OnManifold
+from jointfrf.identification.compliance_fit.manifold import LineData, OnManifold, correlated, weighing
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.kernel.call import call
 from jointfrf.kernel.linear_algebra import invert
 
 __all__ = ["PriorOfM", "expected_m", "prior_of_m"]
 
 #: Smooth FRFs have at least this share of the noise.
 _LEAST_SHARE = 0.2
-#: Keeps the equations of H regular where no entry shows it.
-_ROUNDING = 1e-12
 
 
 class PriorOfM(NamedTuple):
@@ -72,41 +71,11 @@ def expected_m(data: LineData, c: ComplexArray, on: OnManifold, prior: PriorOfM)
     The mean of M where it is normal about 0 and the error of the smooth FRFs is normal: the least squares of both
     together, by one Gauss-Newton step for H and M. Where FRFs show M well, it stays as it is.
     """
-    a, b = data.entries.free
-    u, size = a.size, prior.size[:, a, b]
-    of_h, of_m = _slopes(data, c, on)
-    unit = np.linalg.norm(of_h, axis=1)
-    unit = np.where(unit > 0, unit, 1.0)
-    slope = np.concatenate([of_h / unit[:, None], of_m * size[:, None]], axis=2)
-    normal = slope.conj().swapaxes(1, 2) @ slope
-    normal[:, range(2 * u), range(2 * u)] += np.r_[np.full(u, _ROUNDING), np.full(u, prior.share**2)]
-    right = np.zeros((len(c), 2 * u), np.complex128)
-    right[:, u:] = -(prior.share**2) * on.m[:, a, b] / size
-    step = np.linalg.solve(normal, right[..., None])[..., 0]
-    units = data.entries.units
-    h = on.h + np.tensordot(step[:, :u] / unit, units, 1)
-    m = on.m + np.tensordot(step[:, u:] * size, units, 1)
-    good = np.isfinite(h).all(axis=(1, 2), keepdims=True) & np.isfinite(m).all(axis=(1, 2), keepdims=True)
-    return on._replace(h=np.where(good, h, on.h), m=np.where(good, m, on.m))
-
-
-def _slopes(data: LineData, c: ComplexArray, on: OnManifold) -> tuple[ComplexArray, ComplexArray]:
-    """Return the derivatives of the weighted entries by the free ones of H and of M, shape (n_freq, q, u) each."""
-    n, units = data.entries.n, data.entries.units
-    one, zero = np.eye(n), np.zeros((n, n))
-    h, m, c = on.h[:, None], on.m[:, None], c[:, None]
-    right, left = one - m @ c, one - c @ m
-    uc, cu = units @ c, c @ units
-    of_h = (units, units @ right, left @ units, left @ units @ right)
-    of_m = (zero, -h @ uc, -cu @ h, -cu @ h @ right - left @ h @ uc - c @ uc)
-    return _entries(data, of_h), _entries(data, of_m)
-
-
-def _entries(data: LineData, blocks: tuple[ComplexArray | FloatArray, ...]) -> ComplexArray:
-    """Return the weighted entries of the blocks jj, jk, kj, kk, shape (n_freq, q, u)."""
-    entries = data.entries
-    n = entries.n
-    gamma = np.empty((len(data.smooth), len(entries.units), 2 * n, 2 * n), np.complex128)
-    gamma[..., :n, :n], gamma[..., :n, n:], gamma[..., n:, :n], gamma[..., n:, n:] = blocks
-    weighted = (entries.take(gamma) * data.inverse_std[:, None]).swapaxes(1, 2)
-    return weighted if data.correlation is None else data.correlation @ weighted
+    h, m = (np.array(x, np.complex128, order="C") for x in (on.h, on.m))
+    line_info = np.empty(len(c), np.int32)
+    sizes = (int(data.entries.reciprocal), data.entries.n, correlated(data), len(c))
+    spread = np.ascontiguousarray(prior.size)
+    call("expect_on_joint", [*sizes, prior.share, spread, *weighing(data), np.ascontiguousarray(c), h, m, line_info])
+    bad = line_info != 0
+    h[bad], m[bad] = on.h[bad], on.m[bad]
+    return on._replace(h=h, m=m)

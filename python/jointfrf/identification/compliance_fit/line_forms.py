@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
-from jointfrf.identification.compliance_fit.joint_terms import JointCoordinates
+from jointfrf.frf.bands import PIECE, line_slices
+from jointfrf.identification.compliance_fit.joint_terms import CoupledJoint, DiagonalJoint, JointCoordinates
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.kernel.call import call_for_number
 
-__all__ = ["LEAST_GAIN", "FormMinimum", "LineForms", "inverse_information", "minimise_forms"]
+__all__ = ["LEAST_GAIN", "FormMinimum", "LineForms", "LineParts", "inverse_information", "minimise_forms"]
 
 _STEPS = 100
 #: Levenberg's parameter: first value, factor where a step fails, largest value.
@@ -38,6 +42,10 @@ class LineForms(NamedTuple):
     gradient: ComplexArray
     squares: FloatArray
 
+    def on_slice(self, lines: slice) -> LineForms:
+        """Return neighbouring lines, without a copy."""
+        return LineForms(self.compliance[lines], self.weight[lines], self.gradient[lines], self.squares[lines])
+
     def scaled(self, line_weight: FloatArray) -> LineForms:
         """Return the same with each line weighted."""
         w = line_weight
@@ -51,7 +59,21 @@ class LineForms(NamedTuple):
         return squares, self.gradient - weighted
 
 
-class FormMinimum(NamedTuple):
+class LineParts(NamedTuple):
+    """What each line adds to the normal equations.
+
+    Attributes
+    ----------
+    gradient : ndarray, shape (n_lines, p)
+    information : ndarray, shape (n_lines, p, p)
+    """
+
+    gradient: FloatArray
+    information: FloatArray
+
+
+@dataclass(frozen=True)
+class FormMinimum:
     """A minimum.
 
     Attributes
@@ -64,18 +86,53 @@ class FormMinimum(NamedTuple):
         Re(J^H W J), half the second derivative.
     gradient : ndarray, shape (p,)
         Re(J^H r): zero but for coordinates at their bound.
-    line_gradient : ndarray, shape (n_freq, p)
-        Part of each line in the gradient.
-    line_information : ndarray, shape (n_freq, p, p)
-        Part of each line in the information.
+    forms : LineForms
+    joint : JointCoordinates
     """
 
     x: FloatArray
     cost: float
     information: FloatArray
     gradient: FloatArray
-    line_gradient: FloatArray
-    line_information: FloatArray
+    forms: LineForms
+    joint: JointCoordinates
+
+    def of_lines(self, lines: slice) -> LineParts:
+        """Return the parts of neighbouring lines; those of a long sweep are not kept."""
+        if len(self.forms.squares) > PIECE:
+            return self._parts(lines)
+        return LineParts(*(part[lines] for part in self._all_parts))
+
+    def of_groups(self, member: FloatArray) -> LineParts:
+        """Return the sums over groups of lines; `member`, shape (n_groups, n_freq), says how much of a line."""
+        gradient, information = np.zeros((len(member), self.x.size)), np.zeros((len(member), *self.information.shape))
+        for own in line_slices(member.shape[1]):
+            part = self.of_lines(own)
+            gradient += member[:, own] @ part.gradient
+            information += np.tensordot(member[:, own], part.information, 1)
+        return LineParts(gradient, information)
+
+    @cached_property
+    def _all_parts(self) -> LineParts:
+        return self._parts(slice(None))
+
+    def _parts(self, lines: slice) -> LineParts:
+        joint, forms = self.joint.on_lines(lines), self.forms.on_slice(lines)
+        entries = joint.compliance(self.x)
+        slope = joint.slope(self.x, entries)
+        adjoint = slope.conj().swapaxes(1, 2)
+        residual = forms.at(entries)[1]
+        return LineParts((adjoint @ residual[..., None])[..., 0].real, (adjoint @ (forms.weight @ slope)).real)
+
+    @property
+    def line_gradient(self) -> FloatArray:
+        """Part of each line in the gradient, shape (n_freq, p)."""
+        return self.of_lines(slice(None)).gradient
+
+    @property
+    def line_information(self) -> FloatArray:
+        """Part of each line in the information, shape (n_freq, p, p)."""
+        return self.of_lines(slice(None)).information
 
 
 def inverse_information(information: FloatArray) -> FloatArray:
@@ -89,14 +146,6 @@ def inverse_information(information: FloatArray) -> FloatArray:
     outer = size[..., :, None] * size[..., None, :]
     inverse: FloatArray = np.linalg.pinv(information / outer, hermitian=True) / outer
     return inverse
-
-
-def _at(forms: LineForms, joint: JointCoordinates, x: FloatArray) -> tuple[float, ComplexArray, ComplexArray]:
-    entries = joint.compliance(x)
-    with np.errstate(all="ignore"):
-        squares, residual = forms.at(entries)
-    cost = float(squares.sum())
-    return cost if np.isfinite(cost) else np.inf, entries, residual
 
 
 def minimise_forms(
@@ -118,23 +167,46 @@ def minimise_forms(
     least_gain : float
         The iteration ends when two steps in a row lower the squares by less; a residual has mean square 1.
     """
-    lower, upper = joint.lower, joint.upper
-    free = np.arange(start.size) != (-1 if held is None else held)
-    x = np.where(free, np.clip(start, lower, upper), start)
-    damping, small = _FIRST, 0
+    if isinstance(joint, DiagonalJoint):
+        return _minimise_diagonal(forms, joint, start, held, least_gain)
+    assert isinstance(joint, CoupledJoint)
+    return _minimise_coupled(forms, joint, start, least_gain)
+
+
+def _minimise_diagonal(
+    forms: LineForms, joint: DiagonalJoint, start: FloatArray, held: int | None, least_gain: float
+) -> FormMinimum:
+    """Minimise over the coordinates of a joint without cross terms, in the kernel."""
+    terms, p, n_freq = joint.terms, start.size, len(forms.squares)
+    dofs, kinds = (joint.dofs + 1).astype(np.int32), terms.kinds.astype(np.int32)
+    sizes = (int(joint.by_rate), terms.n, p, n_freq, _STEPS, 0 if held is None else held + 1)
+    x, information, gradient = np.array(start, np.float64), np.empty((p, p)), np.empty(p)
+    lines = (terms.omega, *map(np.ascontiguousarray, forms))
+    args = (*sizes, least_gain, dofs, kinds, joint.lower, joint.upper, *lines, x, information, gradient)
+    cost, _ = call_for_number("fit_diagonal_joint", args)
+    return FormMinimum(x, cost, information, gradient, forms, joint)
+
+
+def _at(forms: LineForms, joint: CoupledJoint, x: FloatArray) -> tuple[float, ComplexArray, ComplexArray]:
+    entries = joint.compliance(x)
+    with np.errstate(all="ignore"):
+        squares, residual = forms.at(entries)
+    cost = float(squares.sum())
+    return cost if np.isfinite(cost) else np.inf, entries, residual
+
+
+def _minimise_coupled(forms: LineForms, joint: CoupledJoint, start: FloatArray, least_gain: float) -> FormMinimum:
+    """Minimise over the entries of K* of a joint with cross terms; they have no bounds."""
+    x, damping, small = start, _FIRST, 0
     cost, entries, residual = _at(forms, joint, x)
+    information, gradient = joint.normal_equations(x, entries, forms.weight, residual)
     for _ in range(_STEPS):
-        information, gradient = joint.normal_equations(x, entries, forms.weight, residual)
-        pressed = ((x <= lower) & (gradient < 0)) | ((x >= upper) & (gradient > 0))
-        moving = np.flatnonzero(free & ~pressed)
-        step = np.zeros_like(x)
         size = np.sqrt(np.maximum(np.diagonal(information), np.finfo(float).tiny))
-        scaled = (information / np.outer(size, size))[np.ix_(moving, moving)]
-        done = moving.size == 0 or not np.isfinite(scaled).all()
+        scaled = information / np.outer(size, size)
+        done = not np.isfinite(scaled).all()
         while not done and damping <= _LARGEST:
-            damped = scaled + damping * np.eye(moving.size)
-            step[moving] = np.linalg.lstsq(damped, (gradient / size)[moving], rcond=1e-13)[0] / size[moving]
-            there = np.where(free, np.clip(x + step, lower, upper), x)
+            damped = scaled + damping * np.eye(x.size)
+            there = x + np.linalg.lstsq(damped, gradient / size, rcond=1e-13)[0] / size
             new_cost, new_entries, new_residual = _at(forms, joint, there)
             if new_cost <= cost + 1e-13 * abs(cost):
                 break
@@ -142,14 +214,9 @@ def minimise_forms(
         if done or damping > _LARGEST:
             break
         gain, x, cost, entries, residual = cost - new_cost, there, new_cost, new_entries, new_residual
+        information, gradient = joint.normal_equations(x, entries, forms.weight, residual)
         damping = damping / _RAISED if damping > 1e-12 else damping
         small = small + 1 if gain <= least_gain * max(1.0, 1e-6 * cost) else 0
         if small == 2:
             break
-    slope = joint.slope(x, entries)
-    adjoint = slope.conj().swapaxes(1, 2)
-    line_gradient = (adjoint @ residual[..., None])[..., 0].real
-    line_information = (adjoint @ forms.weight @ slope).real
-    return FormMinimum(
-        x, cost, line_information.sum(axis=0), line_gradient.sum(axis=0), line_gradient, line_information
-    )
+    return FormMinimum(x, cost, information, gradient, forms, joint)

@@ -22,7 +22,16 @@ from jointfrf.identification.compliance_fit.line_forms import LineForms
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.kernel.call import call
 
-__all__ = ["FrfEntries", "LineData", "OnManifold", "frfs_of_joint", "normal_forms", "project"]
+__all__ = [
+    "FrfEntries",
+    "LineData",
+    "OnManifold",
+    "correlated",
+    "frfs_of_joint",
+    "normal_forms",
+    "project",
+    "weighing",
+]
 
 _Numbers = TypeVar("_Numbers", ComplexArray, FloatArray)
 #: A line has arrived when a step gains less than this of the squares, in units of the noise.
@@ -115,7 +124,7 @@ class LineData(NamedTuple):
     @property
     def own_size(self) -> FloatArray:
         """Median size of the receptances of each DOF, the larger of both sides, shape (n,), m/N."""
-        own = abs(np.einsum("lpp->lp", self.entries.matrix(self.smooth)))
+        own = abs(self.smooth[:, self.entries.rows == self.entries.columns])
         size: FloatArray = np.median(own, axis=0).reshape(2, self.entries.n).max(axis=0)
         return size
 
@@ -199,7 +208,7 @@ def project(target: ComplexArray, data: LineData, c: ComplexArray, start: OnMani
     squares, line_info = np.empty(n_freq), np.empty(n_freq, np.int32)
     for own in line_slices(n_freq) if n_freq else []:
         part = data.on_slice(own)
-        sizes = (int(data.entries.reciprocal), data.entries.n, _correlated(data), len(part.measured))
+        sizes = (int(data.entries.reciprocal), data.entries.n, correlated(data), len(part.measured))
         lines = _lines(part, data.entries.matrix(target[own]), c[own])
         call("project_on_joint", [*sizes, steps, _GAIN, *lines, h[own], m[own], squares[own], line_info[own]])
     bad = line_info != 0
@@ -233,7 +242,7 @@ def normal_forms(data: LineData, c: ComplexArray, on: OnManifold, targets: tuple
     for own in line_slices(n_freq) if n_freq else []:
         part = data.on_slice(own)
         n_own = len(part.measured)
-        sizes = (int(entries.reciprocal), entries.n, u, _correlated(data), n_own, len(targets))
+        sizes = (int(entries.reciprocal), entries.n, u, correlated(data), n_own, len(targets))
         lines = _lines(part, np.array([entries.matrix(target[own]) for target in targets]), c[own])
         point = [np.ascontiguousarray(x[own]) for x in (on.h, on.m)]
         found = np.empty((len(targets), n_own, u), np.complex128), np.empty((len(targets), n_own))
@@ -245,11 +254,17 @@ def normal_forms(data: LineData, c: ComplexArray, on: OnManifold, targets: tuple
 
 def _lines(data: LineData, gamma: ComplexArray, c: ComplexArray) -> tuple[NDArray[Any], ...]:
     """Return FRFs, weights, whitening and C as the kernel takes them."""
+    return gamma, *weighing(data), np.ascontiguousarray(c, np.complex128)
+
+
+def weighing(data: LineData) -> tuple[FloatArray, FloatArray]:
+    """Return weights and whitening as the kernel takes them."""
     weights = data.entries.matrix(data.inverse_std)
-    correlation = np.zeros((len(c), 1, 1)) if data.correlation is None else np.ascontiguousarray(data.correlation)
-    return gamma, weights, correlation, np.ascontiguousarray(c, np.complex128)
+    if data.correlation is None:
+        return weights, np.zeros((len(weights), 1, 1))
+    return weights, np.ascontiguousarray(data.correlation)
 
 
-def _correlated(data: LineData) -> int:
+def correlated(data: LineData) -> int:
     """Return the order of the whitening matrices, 0 where there are none."""
     return 0 if data.correlation is None else data.correlation.shape[1]

@@ -20,6 +20,8 @@ _SIGMA = 3.0
 _LOCAL_SHARE, _FEW = 0.5, 0.1
 #: Probability at which parts of the band are said to disagree.
 _DISAGREE = 1e-3
+#: A part whose information has a larger condition does not show all parameters.
+_SINGULAR = 1e8
 
 
 class Trend(NamedTuple):
@@ -131,19 +133,20 @@ def _trends(group: FittedGroup, freq_hz: FloatArray, factor: FloatArray) -> list
     # In parameters, not in coordinates: where only k drifts, c/k does, and c does not.
     theta, slope = group.joint.theta(minimum.x), group.joint.theta_slope(minimum.x)
     parts = np.array_split(lines, BLOCKS)
+    member = np.zeros((BLOCKS, freq_hz.size))
+    for of_part, own in zip(member, parts, strict=True):
+        of_part[own] = 1
+    gradient, information = minimum.of_groups(member)
+    size = np.sqrt(np.maximum(np.einsum("bpp->bp", information), np.finfo(float).tiny))
+    seen = np.linalg.cond(information / (size[:, :, None] * size[:, None, :])) <= _SINGULAR
     values, changes, errors = (np.full((BLOCKS, p), np.nan) for _ in range(3))
-    for b, own in enumerate(parts):
-        information = minimum.line_information[own].sum(axis=0)
-        size = np.sqrt(np.maximum(np.diagonal(information), np.finfo(float).tiny))
-        if np.linalg.cond(information / np.outer(size, size)) > 1e8:
-            continue
-        covariance = inverse_information(2 * information)
-        step = 2 * covariance @ minimum.line_gradient[own].sum(axis=0)
-        values[b] = group.joint.theta(minimum.x + step)
-        with np.errstate(invalid="ignore"):
-            changes[b] = slope @ step
-            variance = np.einsum("ij,jk,ik->i", slope, covariance - whole, slope)
-            errors[b] = np.sqrt(np.maximum(variance, 0) * factor)
+    covariance = inverse_information(2 * information[seen])
+    step = 2 * (covariance @ gradient[seen, :, None])[..., 0]
+    values[seen] = [group.joint.theta(minimum.x + one) for one in step]
+    with np.errstate(invalid="ignore"):
+        changes[seen] = step @ slope.T
+        variance = np.einsum("ij,bjk,ik->bi", slope, covariance - whole, slope)
+        errors[seen] = np.sqrt(np.maximum(variance, 0) * factor)
     told = []
     for i, parameter in enumerate(terms.parameters):
         known = np.isfinite(changes[:, i]) & (errors[:, i] > 0)

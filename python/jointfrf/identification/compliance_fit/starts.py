@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from jointfrf.frf.bands import line_slices
 from jointfrf.identification.compliance_fit.joint_terms import CoupledJoint, DiagonalJoint, JointCoordinates
 from jointfrf.identification.compliance_fit.line_forms import LineForms, minimise_forms
 from jointfrf.identification.compliance_fit.manifold import LineData, OnManifold, project
@@ -134,7 +135,8 @@ def _variance(data: LineData) -> FloatArray:
 
 def hidden_share(data: LineData) -> FloatArray:
     """Return the largest relative noise of gamma_jk, of the smooth FRFs, on each line, shape (n_freq,)."""
-    return _hidden(data.entries.matrix(data.smooth), data.entries.matrix(_variance(data)))
+    matrix, parts = data.entries.matrix, (data.on_slice(own) for own in line_slices(len(data.smooth)))
+    return np.concatenate([_hidden(matrix(part.smooth), matrix(_variance(part))) for part in parts])
 
 
 def _hidden(gamma: ComplexArray, spread: FloatArray) -> FloatArray:

@@ -1,0 +1,335 @@
+!> The joint without cross terms that fits best: least squares of quadratic forms of its compliance on every line.
+!>
+!> The compliance of DOF d is C_d = a_d/(1 + i (eta_d + w tau_d)), or a_d/(1 + i a_d (h_d + w c_d)) where damping is not
+!> given by its rates: regular for a rigid DOF, a = 0. A line costs s - 2 Re(d^H p) + d^H W d with d = C - C0, as
+!> jointfrf_manifold finds it. Levenberg-Marquardt steps, parameters inside their limits.
+!>
+!> Lanes are frequency lines, also with the engine that is LAPACK elsewhere. Sums are those of shares of the lines,
+!> which do not depend on the number of threads.
+module jointfrf_diagonal_joint
+  use, intrinsic :: ieee_arithmetic, only: ieee_positive_inf, ieee_value
+  use, intrinsic :: iso_c_binding, only: c_f_pointer, c_loc, c_size_t
+  use jointfrf_blas_threads, only: hold_blas_threads, release_blas_threads
+  use jointfrf_engine, only: find_kernels
+  use jointfrf_kinds, only: blas_ip, dp, ip, long
+  use jointfrf_lanes, only: in_memory, lane_kernels, lanes, to_register
+  use jointfrf_lapack, only: dposv
+  use jointfrf_sharing, only: serial_flops_lanes, share, shared_work, threads_for
+  use jointfrf_status, only: info_good, info_no_memory
+  implicit none
+  private
+  public :: diagonal_joint, fit_diagonal_joint, line_forms, search_limits
+
+  !> Their sums are counted by default integers, with room to spare.
+  integer, parameter, public :: most_dofs = 1000
+  !> Blocks of lines whose sums are found together.
+  integer, parameter :: share_blocks = 64
+  !> Levenberg's parameter: first value, factors after a good and a bad step, the least that is lowered or follows a bad
+  !> step, and the largest.
+  real(dp), parameter :: first_damping = 1.0e-4_dp, lowered = 1.0_dp/6.0_dp, raised = 6.0_dp
+  real(dp), parameter :: least_lowered = 1.0e-12_dp, least_raised = 1.0e-6_dp, largest_damping = 1.0e10_dp
+  !> Squares are the same to rounding within this share; with that of a residual the least gain grows in long sums.
+  real(dp), parameter :: rounding = 1.0e-13_dp, share_of_cost = 1.0e-6_dp
+
+  !> Which terms the joint has.
+  type :: diagonal_joint
+    integer :: n = 0                          !< DOFs
+    logical :: by_rate = .true.
+    integer, allocatable :: dof(:)            !< of each parameter
+    integer, allocatable :: kind(:)           !< 0 a, 1 eta or h, 2 tau or c
+  end type diagonal_joint
+
+  !> The caller's forms.
+  type :: line_forms
+    logical :: transposed = .false.
+    real(dp), pointer, contiguous :: omega(:) => null()                  !< rad/s
+    complex(dp), pointer, contiguous :: c_joint(:, :) => null()          !< C0, (n, n_freq)
+    complex(dp), pointer, contiguous :: information(:, :, :) => null()   !< W, (n, n, n_freq)
+    complex(dp), pointer, contiguous :: gradient(:, :) => null()         !< p, (n, n_freq)
+    real(dp), pointer, contiguous :: squares(:) => null()                !< s, (n_freq)
+  end type line_forms
+
+  !> Where and how long is searched.
+  type :: search_limits
+    integer :: steps = 0, held = 0            !< the parameter that keeps its value, 0 for none
+    real(dp) :: least_gain = 0.0_dp
+    real(dp), allocatable :: lower(:), upper(:)
+  end type search_limits
+
+  !> Sums over the lines; an item is a share of them.
+  type, extends(shared_work) :: form_sums
+    integer :: n = 0, n_blocks = 0, threads = 1
+    logical :: by_rate = .true., damped = .true.
+    type(lane_kernels) :: kernels
+    real(dp), allocatable :: room(:)                               !< where x lies
+    real(dp), allocatable :: omega(:, :), squares(:, :)            !< (lanes, n_blocks)
+    real(dp), pointer, contiguous :: x(:, :, :, :) => null()       !< of the kernel, (lanes, 2, elements, n_blocks)
+    real(dp), allocatable :: joint(:, :)                           !< of the kernel, (3, n)
+    real(dp), pointer, contiguous :: partial(:, :, :) => null()    !< cost, descent, normal: (lanes, sums, shares)
+  contains
+    procedure :: do_items => sum_shares
+  end type form_sums
+
+  !> What is known at one set of parameters.
+  type :: evaluation
+    real(dp) :: cost = 0.0_dp
+    real(dp), allocatable :: normal(:, :), descent(:)
+  end type evaluation
+
+contains
+
+  !> Minimise the squares.
+  !> x         parameters: where to begin, then what was found
+  !> normal    Re(J^H W J) of all lines there, half the second derivative
+  !> descent   Re(J^H r) there, half of what the squares fall by
+  !> cost      the squares; +Inf where they are not finite where the search begins, and x stays
+  subroutine fit_diagonal_joint(joint, forms, limits, x, normal, descent, cost, info)
+    type(diagonal_joint), intent(in) :: joint
+    type(line_forms), intent(in) :: forms
+    type(search_limits), intent(in) :: limits
+    real(dp), intent(inout) :: x(:)
+    real(dp), intent(out) :: normal(:, :), descent(:), cost
+    integer(ip), intent(out) :: info
+    type(form_sums), target :: sums
+    type(evaluation) :: here, there
+    real(dp) :: damping
+    logical :: found
+    integer :: step, small
+
+    normal = 0.0_dp
+    descent = 0.0_dp
+    cost = 0.0_dp
+    info = info_good
+    call find_kernels(sums%kernels, found, info)
+    if (info == info_good) call prepare(joint, forms, sums, info)
+    if (info /= info_good) return
+    allocate (here%normal(size(x), size(x)), here%descent(size(x)), there%normal(size(x), size(x)), &
+              there%descent(size(x)))
+    call hold_blas_threads()
+    where (is_free(limits, size(x))) x = min(max(x, limits%lower), limits%upper)
+    call evaluate(joint, sums, x, here)
+    damping = first_damping
+    small = 0
+    do step = 1, limits%steps
+      call take_step(joint, sums, limits, damping, x, here, there, found)
+      if (.not. found) exit
+      small = merge(small + 1, 0, here%cost - there%cost <= limits%least_gain*max(1.0_dp, share_of_cost*there%cost))
+      here = there
+      if (damping > least_lowered) damping = damping*lowered
+      if (small == 2) exit
+    end do
+    call release_blas_threads()
+    normal = here%normal
+    descent = here%descent
+    cost = here%cost
+    deallocate (sums%partial)
+  end subroutine fit_diagonal_joint
+
+  pure function is_free(limits, p) result(free)
+    type(search_limits), intent(in) :: limits
+    integer, intent(in) :: p
+    logical :: free(p)
+    integer :: i
+
+    free = [(i /= limits%held, i=1, p)]
+  end function is_free
+
+  !> One step to squares that are no larger, with as much damping as it takes.
+  !> found   whether there is one; x and `there` are then what it leads to
+  subroutine take_step(joint, sums, limits, damping, x, here, there, found)
+    type(diagonal_joint), intent(in) :: joint
+    type(form_sums), intent(inout) :: sums
+    type(search_limits), intent(in) :: limits
+    real(dp), intent(inout) :: damping, x(:)
+    type(evaluation), intent(in) :: here
+    type(evaluation), intent(inout) :: there
+    logical, intent(out) :: found
+    real(dp) :: scaled(size(x), size(x)), length(size(x)), trial(size(x))
+    integer, allocatable :: moving(:)
+    logical :: moves(size(x)), solved
+    integer :: i
+
+    found = .false.
+    if (.not. here%cost <= huge(1.0_dp)) return
+    moves = is_free(limits, size(x)) .and. .not. ((x <= limits%lower .and. here%descent < 0.0_dp) .or. &
+                                                  (x >= limits%upper .and. here%descent > 0.0_dp))
+    moving = pack([(i, i=1, size(x))], moves)
+    if (size(moving) == 0) return
+    do i = 1, size(x)
+      length(i) = sqrt(max(here%normal(i, i), tiny(1.0_dp)))
+    end do
+    do i = 1, size(x)
+      scaled(:, i) = here%normal(:, i)/(length*length(i))
+    end do
+    if (.not. all(abs(scaled(moving, moving)) <= huge(1.0_dp))) return
+    do while (damping <= largest_damping)
+      trial = x
+      call move(scaled(moving, moving), here%descent(moving)/length(moving), damping, length(moving), moving, trial, &
+                solved)
+      if (solved) then
+        where (moves) trial = min(max(trial, limits%lower), limits%upper)
+        call evaluate(joint, sums, trial, there)
+        found = there%cost <= here%cost + rounding*abs(here%cost)
+      end if
+      if (found) exit
+      damping = max(raised*damping, least_raised)
+    end do
+    if (found) x = trial
+  end subroutine take_step
+
+  !> The damped step of the parameters that move.
+  subroutine move(scaled, descent, damping, length, moving, trial, solved)
+    real(dp), intent(in) :: scaled(:, :), descent(:), damping, length(:)
+    integer, intent(in) :: moving(:)
+    real(dp), intent(inout) :: trial(:)
+    logical, intent(out) :: solved
+    real(dp) :: damped(size(descent), size(descent)), step(size(descent), 1)
+    integer(blas_ip) :: m, stat
+    integer :: i
+
+    m = size(descent, kind=blas_ip)
+    damped = scaled
+    do i = 1, size(descent)
+      damped(i, i) = damped(i, i) + damping
+    end do
+    step(:, 1) = descent
+    call dposv('U', m, 1_blas_ip, damped, m, step, m, stat, 1_c_size_t)
+    solved = stat == 0
+    if (solved) trial(moving) = trial(moving) + step(:, 1)/length
+  end subroutine move
+
+  !> Squares, normal equations and descent at some parameters; a cost that is not finite is +Inf.
+  subroutine evaluate(joint, sums, x, at)
+    type(diagonal_joint), intent(in) :: joint
+    type(form_sums), intent(inout) :: sums
+    real(dp), intent(in) :: x(:)
+    type(evaluation), intent(inout) :: at
+    real(dp) :: total(size(sums%partial, 2))
+    integer :: k, i
+
+    sums%joint = 0.0_dp
+    do k = 1, size(x)
+      sums%joint(1 + joint%kind(k), joint%dof(k)) = x(k)
+    end do
+    call share(sums, size(sums%partial, 3, kind=long), sums%threads, even=.true.)
+    total = 0.0_dp
+    do k = 1, size(sums%partial, 3)
+      do i = 1, size(total)
+        total(i) = total(i) + sum(sums%partial(:, i, k))
+      end do
+    end do
+    at%cost = total(1)
+    if (.not. abs(at%cost) <= huge(1.0_dp)) at%cost = ieee_value(1.0_dp, ieee_positive_inf)
+    call assemble(joint, total, at%descent, at%normal)
+  end subroutine evaluate
+
+  !> Normal equations of the parameters from sums by DOFs.
+  pure subroutine assemble(joint, total, descent, normal)
+    type(diagonal_joint), intent(in) :: joint
+    real(dp), intent(in) :: total(:)
+    real(dp), intent(out) :: descent(:), normal(:, :)
+    !> The sum for derivatives by a (0), eta (1) and tau (2) of the first DOF of a pair, and of the second.
+    integer, parameter :: place(0:2, 0:2) = reshape([1, 4, 5, 2, 6, 7, 3, 7, 8], [3, 3])
+    integer :: i, j, p, q, before
+
+    before = 1 + 3*joint%n
+    associate (dof => joint%dof, kind => joint%kind)
+      do i = 1, size(descent)
+        descent(i) = total(1 + 3*(dof(i) - 1) + kind(i) + 1)
+        do j = 1, i
+          p = merge(i, j, dof(i) < dof(j))
+          q = i + j - p
+          normal(p, q) = total(before + 8*((dof(q)*(dof(q) - 1))/2 + dof(p) - 1) + place(kind(p), kind(q)))
+          normal(q, p) = normal(p, q)
+        end do
+      end do
+    end associate
+  end subroutine assemble
+
+  !> The caller's forms into lanes.
+  subroutine prepare(joint, forms, sums, info)
+    type(diagonal_joint), intent(in) :: joint
+    type(line_forms), intent(in) :: forms
+    type(form_sums), target, intent(inout) :: sums
+    integer(ip), intent(out) :: info
+    integer(long) :: length
+    integer :: n, n_element, n_sum, n_shares, n_freq, at, stat
+
+    info = info_good
+    n = joint%n
+    n_freq = size(forms%squares)
+    n_element = 2*n + (n*(n + 1))/2 + 1                    ! one that nobody reads
+    n_sum = 1 + 3*n + 4*n*(n + 1)
+    sums%n = n
+    sums%by_rate = joint%by_rate
+    sums%damped = any(joint%kind > 0)
+    sums%n_blocks = (n_freq + lanes - 1)/lanes
+    n_shares = (sums%n_blocks + share_blocks - 1)/share_blocks
+    length = int(2*lanes, long)*n_element*sums%n_blocks
+    allocate (sums%room(length + lanes), sums%omega(lanes, sums%n_blocks), sums%squares(lanes, sums%n_blocks), &
+              sums%joint(3, n), sums%partial(lanes, n_sum, n_shares), stat=stat)
+    if (stat /= 0) then
+      info = info_no_memory
+      return
+    end if
+    at = to_register(c_loc(sums%room))
+    sums%x(1:lanes, 1:2, 1:n_element, 1:sums%n_blocks) => sums%room(at + 1:at + length)
+    sums%threads = threads_for((30.0_dp*n + 20.0_dp*n*(n + 1))*n_freq, int(n_shares, long), serial_flops_lanes)
+    if (n_freq > 0) call load_forms(forms, n, n_element, sums)
+  end subroutine prepare
+
+  !> Lanes beyond the last line hold forms that are zero.
+  subroutine load_forms(forms, n, n_element, sums)
+    type(line_forms), intent(in) :: forms
+    integer, intent(in) :: n, n_element
+    type(form_sums), intent(inout) :: sums
+    real(dp), pointer, contiguous :: c_joint(:, :, :), gradient(:, :, :), information(:, :, :)
+    integer :: element(n, n), triangle(n*n), b, first, n_lines, n_freq, i, j
+
+    n_freq = size(forms%squares)
+    element = n_element
+    do j = 1, n
+      do i = 1, j
+        element(i, j) = 2*n + (j*(j - 1))/2 + i
+      end do
+    end do
+    triangle = in_memory(forms%transposed, element)
+    call c_f_pointer(c_loc(forms%c_joint), c_joint, [2, n, n_freq])
+    call c_f_pointer(c_loc(forms%gradient), gradient, [2, n, n_freq])
+    call c_f_pointer(c_loc(forms%information), information, [2, n*n, n_freq])
+    do b = 1, sums%n_blocks
+      first = (b - 1)*lanes + 1
+      n_lines = min(lanes, n_freq - first + 1)
+      associate (x => sums%x(:, :, :, b))
+        call sums%kernels%load(n, [(i, i=1, n)], first, n_lines, c_joint, x)
+        call sums%kernels%load(n, [(n + i, i=1, n)], first, n_lines, gradient, x)
+        call sums%kernels%load(n*n, triangle, first, n_lines, information, x)
+        x(n_lines + 1:, :, n + 1:) = 0.0_dp
+      end associate
+      sums%omega(:, b) = forms%omega(first + n_lines - 1)
+      sums%omega(:n_lines, b) = forms%omega(first:first + n_lines - 1)
+      sums%squares(:, b) = 0.0_dp
+      sums%squares(:n_lines, b) = forms%squares(first:first + n_lines - 1)
+    end do
+  end subroutine load_forms
+
+  !> The shares from first to last.
+  subroutine sum_shares(self, first, last, thread)
+    class(form_sums), intent(in) :: self
+    integer(long), intent(in) :: first, last
+    integer, intent(in) :: thread
+    integer(long) :: item
+    integer :: b, before
+
+    if (thread < 1) return                    ! each share has its own sums, each call its own stack
+    before = 1 + 3*self%n
+    do item = first, last
+      self%partial(:, :, item) = 0.0_dp
+      do b = int(item - 1)*share_blocks + 1, min(int(item)*share_blocks, self%n_blocks)
+        call self%kernels%diagonal_form(self%n, self%by_rate, self%damped, self%joint, self%omega(:, b), &
+                                        self%squares(:, b), self%x(:, :, :, b), self%partial(:, 1, item), &
+                                        self%partial(:, 2:before, item), self%partial(:, before + 1:, item))
+      end do
+    end do
+  end subroutine sum_shares
+end module jointfrf_diagonal_joint
