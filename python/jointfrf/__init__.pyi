@@ -54,6 +54,11 @@ from jointfrf.joint import Joint
 from jointfrf.kernel.engine import get_engine, set_engine, use_engine
 from jointfrf.kernel.linear_algebra import invert, reciprocal_condition, solve
 from jointfrf.kernel.status import RCOND_LIMIT
+from jointfrf.laws.function_law import FunctionLaw
+from jointfrf.laws.law import JointLaw, LawField
+from jointfrf.laws.law_joint import LawJoint
+from jointfrf.laws.springs import SpringLaw
+from jointfrf.laws.viscoelastic import FractionalZener, PowerLaw, StandardLinearSolid
 from jointfrf.models.beam import beam
 from jointfrf.models.chain import chain
 from jointfrf.models.model import Model, assemble
@@ -90,16 +95,21 @@ __all__ = [
     "ElasticCentre",
     "FileContentError",
     "FileContentWarning",
+    "FractionalZener",
     "FrfCheck",
     "FrfCheckWarning",
     "FrfFinding",
+    "FunctionLaw",
     "Hole",
     "IdentificationWarning",
     "IllConditionedWarning",
     "Interface",
     "Joint",
     "JointFit",
+    "JointLaw",
     "LapDivisions",
+    "LawField",
+    "LawJoint",
     "Material",
     "Mesh",
     "MissingPackageError",
@@ -108,11 +118,14 @@ __all__ = [
     "MultiPointJoint",
     "NoiseModel",
     "Patch",
+    "PowerLaw",
     "PreloadedLap",
     "ReceptanceInfo",
     "SingularLineError",
     "SmoothFrfs",
     "SolidModel",
+    "SpringLaw",
+    "StandardLinearSolid",
     "VirtualPoint",
     "amplitude_error",
     "append_virtual_point",

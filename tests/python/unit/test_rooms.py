@@ -15,6 +15,7 @@ FLOORS = (
     {"frf"},
     {"channels", "io"},
     {"joint"},
+    {"laws"},
     {"substructuring", "models"},
     {"identification"},
     {"solids"},
