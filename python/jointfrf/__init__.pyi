@@ -47,6 +47,12 @@ from jointfrf.frf.smoothing import SmoothFrfs, smooth_frfs
 from jointfrf.identification.elastic_centre import ElasticCentre, elastic_centre
 from jointfrf.identification.identify import identify
 from jointfrf.identification.joint_fit import JointFit
+from jointfrf.identification.model_fit.assembly import Assembly
+from jointfrf.identification.model_fit.attachments import AddedMass, GroundSpring
+from jointfrf.identification.model_fit.identify_model import identify_model
+from jointfrf.identification.model_fit.model_fit import ModelFit
+from jointfrf.identification.model_fit.substructure import Substructure
+from jointfrf.identification.model_fit.unknown import Unknown
 from jointfrf.identification.monte_carlo import BandStatistics, MonteCarlo, monte_carlo
 from jointfrf.identification.realisations import identify_realisations
 from jointfrf.identification.sensitivity import propose_bands, sensitivity
@@ -83,6 +89,8 @@ __all__ = [
     "PROOF_STRENGTH",
     "RCOND_LIMIT",
     "STRESS_AREA",
+    "AddedMass",
+    "Assembly",
     "BandStatistics",
     "Bolt",
     "BoltedLap",
@@ -100,6 +108,7 @@ __all__ = [
     "FrfCheckWarning",
     "FrfFinding",
     "FunctionLaw",
+    "GroundSpring",
     "Hole",
     "IdentificationWarning",
     "IllConditionedWarning",
@@ -114,6 +123,7 @@ __all__ = [
     "Mesh",
     "MissingPackageError",
     "Model",
+    "ModelFit",
     "MonteCarlo",
     "MultiPointJoint",
     "NoiseModel",
@@ -126,6 +136,8 @@ __all__ = [
     "SolidModel",
     "SpringLaw",
     "StandardLinearSolid",
+    "Substructure",
+    "Unknown",
     "VirtualPoint",
     "amplitude_error",
     "append_virtual_point",
@@ -156,6 +168,7 @@ __all__ = [
     "get_engine",
     "has_peak",
     "identify",
+    "identify_model",
     "identify_realisations",
     "impact_consistency",
     "in_bands",
