@@ -12,6 +12,7 @@ from jointfrf.identification.model_fit.directions import OpenDirection
 from jointfrf.identification.model_fit.fit import FoundModel
 from jointfrf.identification.model_fit.model_fit import ModelFit
 from jointfrf.identification.model_fit.prepare import Channels
+from jointfrf.identification.model_fit.profile import ProfileIntervals
 
 __all__ = ["DescribedModel", "describe_model"]
 
@@ -19,6 +20,8 @@ __all__ = ["DescribedModel", "describe_model"]
 _CORRELATED = 0.95
 #: A parameter is called poorly determined when its interval is wider than this share of it.
 _UNCERTAIN = 0.5
+#: One whose standard error is below this share is not.
+_WELL = 0.1
 #: A prior that the FRFs narrow by less than this is told.
 _UNCHANGED = 0.9
 #: Another minimum whose squares are higher by less than this is told.
@@ -59,7 +62,12 @@ def describe_model(found: FoundModel, channels: Channels) -> DescribedModel:
         is_converged=found.minimum.converged,
         intervals=found.intervals,
     )
-    doubts = [*_residual_warnings(fit), *_parameter_warnings(fit), *_direction_warnings(fit), *_other_warnings(found)]
+    doubts = [
+        *_residual_warnings(fit),
+        *_parameter_warnings(fit, found.intervals),
+        *_direction_warnings(fit),
+        *_other_warnings(found),
+    ]
     notes = [*_noise_notes(found), *_prior_notes(fit), *_correlation_notes(fit)]
     told: list[Warning] = [IdentificationWarning(text) for text in doubts]
     if not found.minimum.converged:
@@ -94,14 +102,14 @@ def _residual_warnings(fit: ModelFit) -> list[str]:
     return told
 
 
-def _parameter_warnings(fit: ModelFit) -> list[str]:
+def _parameter_warnings(fit: ModelFit, intervals: ProfileIntervals) -> list[str]:
     """Name parameters of the joint that the data determine poorly or not at all."""
-    intervals, told = fit.confidence_interval(0.95), []
-    for one in fit.fitted:
-        low, high = intervals[one.name]
-        if one.origin != "joint" or not one.is_log or one.unit == "s":
-            continue
+    errors, told = fit.std_error, []
+    for i, one in enumerate(fit.fitted):
         value = fit.parameters[one.name]
+        if one.origin != "joint" or not one.is_log or one.unit == "s" or errors[one.name] < _WELL * value:
+            continue
+        low, high = intervals.of(i, 0.95)
         if not np.isfinite(high) and low > 0:
             told.append(f"{one.name}: cannot be distinguished from rigid; at least {low:.3g} {one.unit} (95 %)")
         elif not low > 0:

@@ -71,18 +71,21 @@ def minimise(
             converged = True
             break
         while damping <= _LARGEST:
-            step, _ = _step(at, moving, damping)
+            step, left = _step(at, moving, damping)
+            if left < 0.1 * least:
+                damping = 2 * _LARGEST
+                break
             there = np.where(free, np.clip(x + np.clip(step, -_LONGEST, _LONGEST), lower, upper), x)
             cost = squares.cost(there)
             if cost < at.cost:
                 break
             damping *= _RAISED
-        else:
+        if damping > _LARGEST:
             # No step lowers the squares: they are at the rounding of their sum.
-            converged = promised < 1e-6 * at.cost
+            converged = promised < max(10 * least, 1e-6 * at.cost)
             break
         gain = at.cost - cost
-        damping = max(damping * _LOWERED, 1e-12)
+        damping = max(damping * _LOWERED, 1e-9)
         x, at = there, squares.linearised(there)
         if gain < 1e-12 * cost:
             converged = True

@@ -114,7 +114,7 @@ def prepare_model_fit(
 def _shown(lines: ComplexArray, freq: FloatArray) -> NDArray[np.bool_]:
     """Return which FRFs were measured, shape (n_o, n_i); an FRF is NaN on all lines or on none."""
     missing = np.isnan(lines)
-    never = missing.all(axis=0)
+    never: NDArray[np.bool_] = np.asarray(missing.all(axis=0))
     bad = np.argwhere((missing & ~never) | np.isinf(lines))
     if bad.size:
         line, row, column = bad[0].tolist()
@@ -124,17 +124,16 @@ def _shown(lines: ComplexArray, freq: FloatArray) -> NDArray[np.bool_]:
         )
     if never.all():
         raise ValueError("h holds no FRF: all are NaN")
-    found: NDArray[np.bool_] = ~never
-    return found
+    return ~never
 
 
 def _noise(
     freq: FloatArray, lines: ComplexArray, shown: NDArray[np.bool_], channels: Channels, told: ChannelNoise
 ) -> tuple[NoiseModel | None, FloatArray, ComplexArray, float, bool]:
-    """Return the noise model, E|e|^2 (inf: nothing measured), smooth FRFs, inflation, whether the level is assumed."""
+    """Return noise model, E|e|^2 (inf: nothing measured), smooth FRFs, inflation, whether the level is assumed."""
     size = abs(np.where(shown, lines, 0))
     largest = np.maximum(size.max(axis=(1, 2), keepdims=True), np.finfo(float).tiny)
-    zero: NDArray[np.bool_] = np.asarray((size <= _ZERO * largest).all(axis=0)) & shown
+    zero = np.logical_and(np.all(size <= _ZERO * largest, axis=0), shown)
     if told.noise is not None:
         if told.coherence is not None or told.averages is not None:
             raise ValueError("noise is told: leave coherence and averages out")

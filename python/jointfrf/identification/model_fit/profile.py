@@ -40,17 +40,18 @@ class ProfileIntervals:
 
     def __init__(self, likelihood: Likelihood, minimum: Minimum, covariance: FloatArray, factor: float) -> None:
         self.likelihood, self.minimum, self.covariance, self.factor = likelihood, minimum, covariance, factor
-        self._known: dict[float, dict[str, tuple[float, float]]] = {}
+        self._known: dict[tuple[int, float], tuple[float, float]] = {}
 
     def __call__(self, probability: float) -> dict[str, tuple[float, float]]:
         """Return the interval of every free parameter that contains the true one with the given probability."""
-        if probability not in self._known:
-            vector = self.likelihood.vector
+        return {one.name: self.of(i, probability) for i, one in enumerate(self.likelihood.vector.fitted)}
+
+    def of(self, i: int, probability: float) -> tuple[float, float]:
+        """Return the interval of one free parameter, by its number."""
+        if (i, probability) not in self._known:
             limit = float(special.ndtri((1 + probability) / 2)) ** 2 * self.factor
-            self._known[probability] = {
-                one.name: (self._limit(i, -1, limit), self._limit(i, 1, limit)) for i, one in enumerate(vector.fitted)
-            }
-        return self._known[probability]
+            self._known[i, probability] = self._limit(i, -1, limit), self._limit(i, 1, limit)
+        return self._known[i, probability]
 
     def _limit(self, i: int, sign: int, limit: float) -> float:
         """Return the limit of one parameter on one side, in its unit; its bound, or infinity, where there is none."""

@@ -9,7 +9,9 @@ import numpy as np
 from scipy import linalg
 from scipy.sparse import linalg as sparse_linalg
 
+from jointfrf.identification.model_fit.matrix_polynomial import MatrixPolynomial
 from jointfrf.identification.model_fit.substructure import FrfSource, Substructure, same_lines
+from jointfrf.identification.model_fit.unknown import Unknown
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.kernel.linear_algebra import solve
 from jointfrf.models.matrices import ModelMatrices
@@ -18,21 +20,17 @@ from jointfrf.models.ports import as_ports
 from jointfrf.models.receptance.direct import SYMMETRIC
 from jointfrf.models.receptance.krylov import reduce_model
 
-__all__ = ["ReducedSlope", "ReducedSubstructure", "SubstructureState"]
+__all__ = ["ReducedSlope", "ReducedSubstructure", "SubstructureState", "range_of"]
 
 #: The basis is good beyond the band of the measurement by this share, for models that are stiffer or lighter.
 _MARGIN = 0.15
 #: Tolerance of a reduction, and what its FRFs may differ from those of the model for other values of the unknowns.
-_TOLERANCE, _ALLOWED = 1e-8, 1e-5
+_TOLERANCE, _ALLOWED = 1e-8, 1e-4
 #: A direction smaller than this share of its vector is not new.
 _NEW = 1e-9
-#: Unknowns of geometry are varied by so many standard deviations for the basis; by this share where there is no prior.
-_REACH, _SHARE = 2.5, 0.03
-#: Relative step of differences of the fourth order: they are exact to about 1e-12.
-_STEP = 1e-3
-#: Derivatives of matrices are taken again for values that differ by less than this share: an error of the information,
-#: and of the step that residuals which are noise ask for, of the same size.
-_NEAR = 2e-3
+#: Unknowns of a function vary by so many standard deviations for the basis and for the polynomials of the matrices, by
+#: this share of their value where there is no prior; and may be found within a larger range.
+_REACH, _SHARE, _RANGE = 2.5, 0.06, 2.0
 #: A modal damping matrix is diagonal if nothing beside its diagonal exceeds this share of it.
 _DIAGONAL = 1e-10
 #: Lines at which a reduced model is compared with the model.
@@ -93,6 +91,19 @@ class SubstructureState(NamedTuple):
     shapes: FloatArray
 
 
+def reach_of(unknown: Unknown) -> float:
+    """Return how far an argument of a function that builds a model is varied from its believed value."""
+    return _REACH * unknown.std if unknown.std is not None else _SHARE * max(abs(unknown.value), 1e-9)
+
+
+def range_of(part: Substructure, unknown: Unknown) -> tuple[float, float]:
+    """Return the limits within which an unknown of a substructure is sought."""
+    if isinstance(part.source, Model):
+        return unknown.lower, unknown.upper
+    widest = _RANGE * reach_of(unknown)
+    return max(unknown.lower, unknown.value - widest), min(unknown.upper, unknown.value + widest)
+
+
 class ReducedSubstructure:
     """A substructure between some of its DOFs.
 
@@ -111,7 +122,8 @@ class ReducedSubstructure:
         self.basis = np.zeros((0, 0))
         self._nominal: _Matrices | None = None
         self._last: tuple[tuple[float, ...], SubstructureState] | None = None
-        self._differences: dict[str, tuple[dict[str, float], _Matrices]] = {}
+        self._polynomial: MatrixPolynomial | None = None
+        self._narrowed = 1.0
         if isinstance(part.source, FrfSource):
             same_lines(name, part.source, freq_hz)
             none = np.zeros(0)
@@ -125,9 +137,7 @@ class ReducedSubstructure:
         trials: list[dict[str, float]] = [{}]
         if not isinstance(self.part.source, Model):
             for name, unknown in self.part.unknowns.items():
-                reach = _SHARE * abs(unknown.value) if unknown.std is None else _REACH * unknown.std
-                ends = np.clip(unknown.value + reach * np.array([-1, 1]), unknown.lower, unknown.upper)
-                trials += [{name: float(end)} for end in ends if end != unknown.value]
+                trials += [{name: unknown.value + sign * reach_of(unknown)} for sign in (-1, 1)]
         return trials
 
     def _space(self, trials: Sequence[Mapping[str, float]]) -> FloatArray:
@@ -140,7 +150,7 @@ class ReducedSubstructure:
             ports = as_ports("dofs", model.ports(*self.dofs), len(model.dofs))
             matrices = ModelMatrices(model.stiffness, model.mass, None, None, max(model.loss_factor, 1e-3))
             found.append(reduce_model(band, matrices, ports, ports, _TOLERANCE).shapes)
-        scale = np.sqrt(np.maximum(_diagonal(self.part.model().mass), 1e-30))
+        scale = np.sqrt(np.maximum(_diagonal(self.part.nominal_model.mass), 1e-30))
         scale = np.maximum(scale, 1e-6 * scale.max())[:, None]
         if len(found) == 1:
             return found[0]
@@ -170,7 +180,11 @@ class ReducedSubstructure:
     def _matrices(self, values: Mapping[str, float]) -> _Matrices:
         """Return the reduced matrices for values of the unknowns."""
         if not isinstance(self.part.source, Model):
-            return self._reduced(self.part.model(values))
+            if not values:
+                return self._reduced(self.part.model())
+            if self._polynomial is None:
+                self._polynomial = self._polynomial_about(values)
+            return self._of_arrays(self._polynomial.at(np.array(list(values.values()))))
         if self._nominal is None:
             self._nominal = self._reduced(self.part.model())
         own, unknowns = self._nominal, self.part.unknowns
@@ -192,7 +206,7 @@ class ReducedSubstructure:
         squared, shapes = linalg.eigh(own.k, own.m)
         seen = own.ports @ shapes
         diagonal = (1 + 1j * own.eta) * squared - self.omega[:, None] ** 2
-        full: list[tuple[ComplexArray, Any]] = []
+        full: list[tuple[Any, Any]] = []
         for matrix, factor in ((own.c, 1j * self.omega), (own.h, 1j + 0 * self.omega)):
             if matrix is None:
                 continue
@@ -228,30 +242,34 @@ class ReducedSubstructure:
                 return ReducedSlope(m=np.full(state.squared.size, 1 / values[name]))
             h = None if own.h is None else shapes.T @ own.h @ shapes / values[name]
             return ReducedSlope(k=state.squared / values[name], h=h)
-        by = self._difference(values, name)
-        k, m, c, h = (None if one is None else shapes.T @ one @ shapes for one in (by.k, by.m, by.c, by.h))
+        assert self._polynomial is not None
+        arrays = self._polynomial.slope(np.array(list(values.values())), list(values).index(name))
+        by = self._of_arrays(arrays)
+        k, m, c, h = (
+            shapes.T @ one @ shapes if one is not None and one.any() else None for one in (by.k, by.m, by.c, by.h)
+        )
         eta = by.eta * state.squared if by.eta else None
         return ReducedSlope(k, m, c, h, eta, by.ports @ shapes if by.ports.any() else None)
 
-    def _difference(self, values: Mapping[str, float], name: str) -> _Matrices:
-        """Return the derivatives of the matrices in the basis by one argument of the function that builds the model.
+    def _polynomial_about(self, values: Mapping[str, float], share: float = 1.0) -> MatrixPolynomial:
+        """Return the reduced matrices as polynomials of the unknowns around some values."""
+        names = list(values)
+        reach = share * np.array([reach_of(self.part.unknowns[name]) for name in names])
 
-        They change little: those of values near by are taken again.
-        """
-        known = self._differences.get(name)
-        if known is not None and all(abs(known[0][one] - value) <= _NEAR * abs(value) for one, value in values.items()):
-            return known[1]
-        step = _STEP * max(abs(values[name]), 1e-9)
-        around = [self._matrices({**values, name: values[name] + n * step}) for n in (-2, -1, 1, 2)]
+        def build(numbers: FloatArray) -> list[FloatArray]:
+            own = self._reduced(self.part.model(dict(zip(names, numbers.tolist(), strict=True))))
+            return [np.asarray(one, float) for one in own if one is not None]
 
-        def difference(parts: Sequence[Any]) -> Any:
-            if any(part is None for part in parts):
-                return None
-            return (parts[0] - 8 * parts[1] + 8 * parts[2] - parts[3]) / (12 * step)
+        return MatrixPolynomial(build, np.array(list(values.values())), reach)
 
-        found = _Matrices(*(difference([one[place] for one in around]) for place in range(6)))
-        self._differences[name] = dict(values), found
-        return found
+    def _of_arrays(self, arrays: Sequence[FloatArray]) -> _Matrices:
+        """Return matrices from those arrays that the model has."""
+        left = list(arrays)
+        model = self.part.nominal_model
+        k, m = left.pop(0), left.pop(0)
+        c = None if model.damping is None else left.pop(0)
+        h = None if model.structural_damping is None else left.pop(0)
+        return _Matrices(k, m, c, h, float(left[0]), left[1])
 
     def refine(self, values: Mapping[str, float]) -> bool:
         """Compare with the model at a few lines; return whether the basis had to be extended."""
@@ -259,7 +277,9 @@ class ReducedSubstructure:
             return False
         self.basis = self._space([values])
         self._nominal = self._last = None
-        self._differences.clear()
+        if self._polynomial is not None:
+            self._narrowed /= 3
+            self._polynomial = self._polynomial_about(values, self._narrowed)
         return True
 
     def _error(self, values: Mapping[str, float]) -> float:

@@ -125,7 +125,8 @@ class Substructure:
         return {name: unknown.value for name, unknown in self.unknowns.items()}
 
     @cached_property
-    def _model(self) -> Model:
+    def nominal_model(self) -> Model:
+        """The model for the values believed."""
         return self.model()
 
     def model(self, values: Mapping[str, float] | None = None) -> Model:
@@ -161,7 +162,7 @@ class Substructure:
         if isinstance(self.source, FrfSource):
             return dof in self.source.dofs
         try:
-            self._model.ports(dof)
+            self.nominal_model.ports(dof)
         except ValueError:
             return False
         return True
@@ -171,7 +172,7 @@ class Substructure:
         if isinstance(self.source, FrfSource):
             at = [self.source.dofs.index(dof) for dof in dofs]
             return self.source.h[:, at][:, :, at]
-        model = self._model
+        model = self.nominal_model
         return model.receptance(freq_hz, model.ports(*dofs))
 
 

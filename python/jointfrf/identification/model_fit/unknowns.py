@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from jointfrf.identification.model_fit.assembly import Assembly
 from jointfrf.identification.model_fit.attachments import Attachment
+from jointfrf.identification.model_fit.reduced import range_of
 from jointfrf.identification.model_fit.substructure import Substructure
 from jointfrf.identification.model_fit.unknown import Unknown
 from jointfrf.kernel.arguments import FloatArray
@@ -106,8 +107,7 @@ class ParameterVector:
         own = values[self.free]
         with np.errstate(divide="ignore", invalid="ignore"):
             logs = np.log(np.where(self.is_log, own, 1))
-        found: FloatArray = np.clip(np.where(self.is_log, logs, own / self.scale), *self.bounds)
-        return found
+        return np.asarray(np.clip(np.where(self.is_log, logs, own / self.scale), *self.bounds))
 
     def to_values(self, x: FloatArray) -> FloatArray:
         """Return the values of all from coordinates."""
@@ -117,8 +117,7 @@ class ParameterVector:
 
     def _own(self, x: FloatArray) -> FloatArray:
         found: FloatArray = np.where(self.is_log, np.exp(np.where(self.is_log, x, 0)), x * self.scale)
-        inside: FloatArray = np.clip(found, self.limits[0], self.limits[1])
-        return inside
+        return np.asarray(np.clip(found, self.limits[0], self.limits[1]))
 
     def slope(self, x: FloatArray) -> FloatArray:
         """Return the derivatives of the free values by their coordinates."""
@@ -195,7 +194,9 @@ def parameter_vector(
     sides: tuple[tuple[ParameterOrigin, Substructure], ...] = (("A", whole.a), ("B", whole.b))
     for side, part in sides:
         for name, unknown in part.unknowns.items():
-            found.append(_of_unknown(f"{side}/{name}", _UNITS.get(name, ""), side, (name,), unknown))
+            lower, upper = range_of(part, unknown)
+            own = _of_unknown(f"{side}/{name}", _UNITS.get(name, ""), side, (name,), unknown)
+            found.append(own._replace(lower=lower, upper=upper))
     for i, one in enumerate(whole.attachments):
         found += _of_attachment(one, i)
     words: tuple[ParameterOrigin, ParameterOrigin] = ("response", "force")
