@@ -10,6 +10,7 @@ workers        processes that share the work
 toml_table     a TOML table read key by key, with errors that name file and key
 known_joint/   two simulated substructures and a joint of known parameters
 bolted_lap/    a lap joint with a preloaded bolt of solid elements
+modelled_joint/  a joint of any laws, from FRFs at any points, with models of the substructures
 
 A new kind of case is a folder with a `CaseKind`, and one line in `kinds`.
 """

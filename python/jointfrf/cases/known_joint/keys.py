@@ -20,7 +20,7 @@ from jointfrf.models.beam import BeamElement, End
 from jointfrf.models.chain import Ground
 from jointfrf.solids.brick_beam import Face
 
-__all__ = ["EXPECTED_KEYS", "KNOWN_JOINT_KEYS"]
+__all__ = ["EXPECTED_KEYS", "KNOWN_JOINT_KEYS", "SUBSTRUCTURE"]
 
 
 def _of(model: str, about: str, *keys: Key) -> KeyTable:
@@ -100,7 +100,7 @@ _RECEPTANCES = _of(
     Key("file", "name of a Universal File", "FRFs (dataset 58); mobilities and accelerances become receptances."),
     Key("quantity", one_of(POWER_OF_I_OMEGA), "What the FRFs are, where the file does not say.", "", "by the file"),
 )
-_SUBSTRUCTURE = KeyTable(
+SUBSTRUCTURE = KeyTable(
     "[substructure_a], [substructure_b]",
     "The two structures that the joint connects.",
     (),
@@ -138,8 +138,8 @@ KNOWN_JOINT_KEYS = KeyTable(
     "Two substructures and a joint of known parameters, identified from simulated measurements.",
     (
         *COMMON_KEYS,
-        Key("substructure_a", "table", "Side j of the joint.", inner=_SUBSTRUCTURE),
-        Key("substructure_b", "table", "Side k of the joint.", inner=_SUBSTRUCTURE),
+        Key("substructure_a", "table", "Side j of the joint.", inner=SUBSTRUCTURE),
+        Key("substructure_b", "table", "Side k of the joint.", inner=SUBSTRUCTURE),
         Key("points", "table", "DOFs of the joint, and internal ones.", inner=_POINTS),
         Key("joint", "tables", "The joint.", inner=JOINT),
         Key("observed", "tables", "FRFs that are looked at.", "", "first DOF of r and of s", _OBSERVED),

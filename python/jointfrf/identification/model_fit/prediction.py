@@ -222,6 +222,12 @@ def _by_slope(
     total = np.zeros((omega.size, left.shape[1], right.shape[2]), np.complex128)
     for matrix, factor in parts:
         if matrix is not None:
-            middle = left * matrix if matrix.ndim == 1 else left @ matrix
+            middle = left * matrix if matrix.ndim == 1 else _times(left, matrix)
             total -= factor[:, None, None] * (middle @ right)
     return total
+
+
+def _times(left: ComplexArray, matrix: FloatArray) -> ComplexArray:
+    """Return left @ matrix as one product of all lines."""
+    found: ComplexArray = left.reshape(-1, left.shape[2]) @ matrix.astype(complex)
+    return found.reshape(left.shape)

@@ -119,8 +119,8 @@ def _shown(lines: ComplexArray, freq: FloatArray) -> NDArray[np.bool_]:
     if bad.size:
         line, row, column = bad[0].tolist()
         raise ValueError(
-            f"h[{line}, {row}, {column}] at {freq[line]:g} Hz is not finite (an FRF that was not measured is NaN on all "
-            "lines)"
+            f"h[{line}, {row}, {column}] at {freq[line]:g} Hz is not finite (an FRF that was not measured is NaN on "
+            "all lines)"
         )
     if never.all():
         raise ValueError("h holds no FRF: all are NaN")
@@ -130,7 +130,7 @@ def _shown(lines: ComplexArray, freq: FloatArray) -> NDArray[np.bool_]:
 def _noise(
     freq: FloatArray, lines: ComplexArray, shown: NDArray[np.bool_], channels: Channels, told: ChannelNoise
 ) -> tuple[NoiseModel | None, FloatArray, ComplexArray, float, bool]:
-    """Return noise model, E|e|^2 (inf: nothing measured), smooth FRFs, inflation, whether the level is assumed."""
+    """Return noise model, E|e|^2 (inf: nothing measured), smooth FRFs, inflation, whether it is assumed."""
     size = abs(np.where(shown, lines, 0))
     largest = np.maximum(size.max(axis=(1, 2), keepdims=True), np.finfo(float).tiny)
     zero = np.logical_and(np.all(size <= _ZERO * largest, axis=0), shown)

@@ -18,7 +18,7 @@ from jointfrf.substructuring.compliance import joint_compliance
 __all__ = ["from_lines", "ranked_trials", "refined"]
 
 #: Trials, lines at which they are compared, and how many of the best are refined.
-_TRIALS, _LINES, _BEST = 400, 60, 6
+_TRIALS, _LINES, _BEST = 200, 60, 5
 #: Trials are drawn from this seed: the same data give the same fit.
 _SEED = 1
 #: Stiffnesses of trials lie within this factor of that of the substructures.
