@@ -84,6 +84,7 @@ from jointfrf.substructuring.decoupling import decouple
 from jointfrf.substructuring.ismm import inverse_substructuring, ismm
 from jointfrf.substructuring.modification import find_modification, modify
 from jointfrf.substructuring.multi_point import MultiPointJoint, multi_point_compliance, multi_point_stiffness
+from jointfrf.substructuring.semm import semm
 
 __all__ = [
     "PROOF_STRENGTH",
@@ -191,6 +192,7 @@ __all__ = [
     "receptance",
     "reciprocal_condition",
     "rigid_offset",
+    "semm",
     "sensitivity",
     "sensor_consistency",
     "set_engine",

@@ -81,7 +81,7 @@ def compute_modelled(case: ModelledJointCase, n_realisations: int, workers: Work
     draws = tuple(workers.counted(workers.map(partial(_fitted, case, exact), range(n_realisations)), n_realisations))
     measured = pollute(exact, case.noise, seed=case.seed)
     at_truth = replace(case.believed, joint=case.truth.joint)
-    bound = _fit(case, at_truth, exact, (case.noise * abs(exact)) ** 2).std_error
+    bound = _fit(case, at_truth, exact, np.asarray((case.noise * abs(exact)) ** 2, float)).std_error
     constant = replace(case.believed, joint=_constant(case.believed.joint))
     return ModelledJointResult(
         case, draws, bound, _fit(case, case.believed, measured), measured, _fit(case, constant, measured)

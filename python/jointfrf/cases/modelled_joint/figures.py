@@ -52,7 +52,7 @@ def _frfs(result: ModelledJointResult) -> Figure:
                 ("fitted", result.first.predicted, "actual"),
                 ("springs and dashpots", result.constant.predicted, "mean"),
             )
-            curves = tuple(Curve(label, case.freq_hz, abs(h[:, row, column]), style) for label, h, style in lines)
+            curves = tuple(Curve(label, case.freq_hz, np.abs(h[:, row, column]), style) for label, h, style in lines)
             panels.append(Panel(f"{response} by {force}", "frequency, Hz", "|H|, m/N", curves=curves, log_y=True))
     return Figure(
         "frfs", "FRFs of the first realisation: measured, fitted, and fitted by springs and dashpots.", tuple(panels),

@@ -140,9 +140,9 @@ def _ratio(likelihood: Likelihood, minimum: Minimum, inflation: float) -> float:
 def _lowest(problem: ModelProblem) -> tuple[Minimum, float]:
     """Return the lowest minimum of several starts, and by how much the next one is higher."""
     likelihood, vector = problem.likelihood, problem.vector
-    given = [vector.values]
+    given: list[FloatArray] = []
     found: list[Minimum] = []
-    for values in _values_of_lines(problem):
+    for values in itertools.chain(_values_of_lines(problem), [vector.values]):
         given.append(values)
         found.append(minimise(likelihood, vector.to_coordinates(values)))
         if _ratio(likelihood, found[-1], problem.inflation) < _GOOD:

@@ -151,7 +151,7 @@ class ParameterVector:
     def pull_slopes(self, x: FloatArray) -> FloatArray:
         """Return their derivatives by the coordinates."""
         std = np.array([one.std or np.inf for one in self.fitted])
-        return self.slope(x) / std
+        return np.asarray(self.slope(x) / std)
 
     def places_of(self, origin: ParameterOrigin) -> list[int]:
         """Return the places, among all, of the parameters of an origin."""
