@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from jointfrf.identification.model_fit.attachments import AddedMass, Attachment
-from jointfrf.identification.model_fit.substructure import FrfSource, Substructure, same_lines
+from jointfrf.identification.model_fit.substructure import FrfSource, Substructure, check_same_lines
 from jointfrf.identification.model_fit.unknown import Unknown
 from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_frequency
@@ -110,7 +110,7 @@ class Assembly:
         h = np.zeros((freq.size, n, n), np.complex128)
         for name, part, own in (("A", self.a, slice(0, n_a)), ("B", self.b, slice(n_a, n))):
             if isinstance(part.source, FrfSource):
-                same_lines(name, part.source, freq)
+                check_same_lines(name, part.source, freq)
             h[:, own, own] = part.receptance(freq, places.a if name == "A" else places.b)
         numbers = [
             [number.value if isinstance(number, Unknown) else number for number in one.numbers]

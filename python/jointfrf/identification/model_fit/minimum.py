@@ -16,6 +16,8 @@ __all__ = ["Minimum", "minimise"]
 _FIRST, _LOWERED, _RAISED, _LARGEST = 1e-3, 0.1, 8.0, 1e9
 #: A minimum is found when a step promises less than this of squares that are 1 for one residual.
 _LEAST = 1e-4
+#: Or when two steps in a row gain less than this.
+_SMALL = 1e-3
 #: No step changes a coordinate by more than this; logarithms and standard deviations alike.
 _LONGEST = 4.0
 
@@ -61,7 +63,7 @@ def minimise(
     lower, upper = squares.vector.bounds
     free = np.arange(start.size) != (-1 if held is None else held)
     x = np.where(free, np.clip(start, lower, upper), start)
-    damping, at, converged = _FIRST, squares.linearised(x), False
+    damping, at, converged, small = _FIRST, squares.linearised(x), False, 0
     for _ in range(steps):
         if not np.isfinite(at.information).all():
             break
@@ -87,7 +89,9 @@ def minimise(
         gain = at.cost - cost
         damping = max(damping * _LOWERED, 1e-9)
         x, at = there, squares.linearised(there)
-        if gain < 1e-12 * cost:
+        small = small + 1 if gain < _SMALL + 1e-12 * cost else 0
+        if small == 2:
+            # In a direction that the squares hardly hold, steps promise more than they gain.
             converged = True
             break
     return Minimum(x, at.cost, at.information, converged, (x <= lower) | (x >= upper))

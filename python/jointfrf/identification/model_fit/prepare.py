@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from jointfrf.frf.entry_groups import entry_groups
 from jointfrf.frf.noise_model import NoiseModel, estimate_noise
 from jointfrf.identification.identify import identify
 from jointfrf.identification.model_fit.assembly import Assembly
@@ -26,8 +27,8 @@ __all__ = ["ChannelNoise", "Channels", "prepare_model_fit"]
 _ASSUMED = 0.01
 #: Noise below this share of the FRFs is rounding.
 _ROUNDING = 1e-7
-#: An FRF below this share of the largest of its line is zero, by symmetry.
-_ZERO = 1e-9
+#: Relative noise is not taken below this share of that of the largest line of an FRF.
+_LEAST = 1e-6
 
 
 @dataclass(frozen=True)
@@ -132,8 +133,11 @@ def _noise(
 ) -> tuple[NoiseModel | None, FloatArray, ComplexArray, float, bool]:
     """Return noise model, E|e|^2 (inf: nothing measured), smooth FRFs, inflation, whether it is assumed."""
     size = abs(np.where(shown, lines, 0))
-    largest = np.maximum(size.max(axis=(1, 2), keepdims=True), np.finfo(float).tiny)
-    zero = np.logical_and(np.all(size <= _ZERO * largest, axis=0), shown)
+    kept = np.zeros(shown.shape, bool)
+    for group in entry_groups(np.where(shown, lines, 0), reciprocal=False):
+        kept[group.rows, group.columns] = True
+    kept &= shown  # without FRFs that are zero, by symmetry
+    least = np.maximum(_LEAST * size.max(axis=0), np.finfo(float).tiny)
     if told.noise is not None:
         if told.coherence is not None or told.averages is not None:
             raise ValueError("noise is told: leave coherence and averages out")
@@ -141,14 +145,13 @@ def _noise(
             level = as_number("noise", told.noise)
             if level <= 0:
                 raise ValueError(f"noise must be positive, not {level:g}")
-            variance = (level * np.maximum(size, _ZERO * largest)) ** 2
+            variance = (level * np.maximum(size, least)) ** 2
         else:
             variance = as_real("noise", told.noise, lines.shape)
             if not (variance[:, shown] > 0).all():
                 raise ValueError("noise must be positive: E|e|^2 of each FRF that was measured")
-        return None, _hidden(variance, shown & ~zero), np.where(shown, lines, 0), 1.0, False
+        return None, _hidden(variance, kept), np.where(shown, lines, 0), 1.0, False
     reciprocal = channels.responses == channels.forces and bool(shown.all())
-    kept = shown & ~zero
     rows, columns = np.flatnonzero(kept.any(axis=1)), np.flatnonzero(kept.any(axis=0))
     coherence = None if told.coherence is None else as_real("coherence", told.coherence, lines.shape)
     is_block = bool(kept[np.ix_(rows, columns)].all())
@@ -166,7 +169,7 @@ def _noise(
     model = replace(found, relative=relative, floor=floor, coherence_factor=of_coherence, variance=variance)
     is_assumed = found.source == "none" or found.level < _ROUNDING
     if is_assumed:
-        variance = (_ASSUMED * np.maximum(size, _ZERO * largest)) ** 2
+        variance = (_ASSUMED * np.maximum(size, least)) ** 2
         smooth = np.where(shown, lines, 0)
     return model, _hidden(variance, kept), smooth, found.inflation, is_assumed
 

@@ -10,7 +10,7 @@ from scipy import linalg
 from scipy.sparse import linalg as sparse_linalg
 
 from jointfrf.identification.model_fit.matrix_polynomial import MatrixPolynomial
-from jointfrf.identification.model_fit.substructure import FrfSource, Substructure, same_lines
+from jointfrf.identification.model_fit.substructure import FrfSource, Substructure, check_same_lines
 from jointfrf.identification.model_fit.unknown import Unknown
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.kernel.linear_algebra import solve
@@ -125,7 +125,7 @@ class ReducedSubstructure:
         self._polynomial: MatrixPolynomial | None = None
         self._narrowed = 1.0
         if isinstance(part.source, FrfSource):
-            same_lines(name, part.source, freq_hz)
+            check_same_lines(name, part.source, freq_hz)
             none = np.zeros(0)
             h = part.receptance(freq_hz, self.dofs)
             self._last = ((), SubstructureState(h, np.zeros((*h.shape[:2], 0), complex), None, none, none[:, None]))

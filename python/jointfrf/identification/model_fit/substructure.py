@@ -176,7 +176,7 @@ class Substructure:
         return model.receptance(freq_hz, model.ports(*dofs))
 
 
-def same_lines(name: str, source: FrfSource, freq_hz: FloatArray) -> None:
+def check_same_lines(name: str, source: FrfSource, freq_hz: FloatArray) -> None:
     """Raise an error if FRFs of a substructure are not on the lines of the measurement."""
     if source.freq_hz.shape != freq_hz.shape or not np.allclose(source.freq_hz, freq_hz, rtol=1e-9, atol=0):
         raise ValueError(
