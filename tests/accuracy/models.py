@@ -3,7 +3,7 @@
     tests/accuracy/run models                     all trials, 100 draws each, 20 of wrong models
     tests/accuracy/run models remote --draws 20   those whose name holds a word
 
-Draw number i of a trial has the seed i.
+Draw number i of trial number t, counted from 0 in the order of the table, has the seed 1000 t + i.
 """
 
 from __future__ import annotations
@@ -110,7 +110,8 @@ def exact(trial: ModelTrial) -> np.ndarray:
 def one_draw(trial: ModelTrial, seed: int) -> tuple[dict[str, float], dict[str, tuple[float, float]], bool, float]:
     """Values, intervals, whether the residual is noise, seconds."""
     channels = CHANNELS[trial.channels]
-    h = jf.pollute(exact(trial), trial.level, seed=seed)
+    # Noise of its own for each trial: the same one would make all rows lucky together.
+    h = jf.pollute(exact(trial), trial.level, seed=1000 * TRIALS.index(trial) + seed)
     joint: jf.Joint | jf.LawJoint = GUESS
     if trial.wrong == "rotation taken as rigid":
         joint = jf.LawJoint({"y": jf.SpringLaw(1e5, c=5.0)}, rigid=["theta"])

@@ -34,7 +34,7 @@ _REACH, _SHARE, _RANGE = 2.5, 0.06, 2.0
 #: A modal damping matrix is diagonal if nothing beside its diagonal exceeds this share of it.
 _DIAGONAL = 1e-10
 #: Lines at which a reduced model is compared with the model.
-_SPOTS = 3
+_SPOTS = 2
 
 
 class _Matrices(NamedTuple):
