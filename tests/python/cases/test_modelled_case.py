@@ -63,6 +63,11 @@ def test_laws_of_all_kinds_are_read(tmp_path):
         ('"A/5:y", ', '"A/99:y", ', r"responses: responses 'A/99:y': neither A nor B has such a DOF"),
         ("noise = 0.02", "noise = 0.0", r"noise must be above 0"),
         ("alpha = 0.5", "alpha = 1.5", r"alpha of PowerLaw must lie in 0.001 to 1, not 1.5"),
+        (
+            "alpha = 0.5, reference_hz",
+            "tau = 0.5, reference_hz",
+            r"tau: the law 'power' takes k, k_a, alpha, reference_hz",
+        ),
         ("std_percent = 2.0", "std_percent = 0.0", r"std must be positive"),
         ('model = "beam"', 'model = "receptances"\nfile = "x.uff"', r"unknown key 'length'"),
     ],

@@ -134,8 +134,13 @@ def _read_laws(table: TomlTable) -> tuple[LawJoint, LawJoint]:
 
 
 def _law(table: TomlTable, word: str) -> JointLaw:
-    names = [name for name in LAWS[word] if word != "spring" or name == "k" or name in table]
-    values = {name: table.number(name) for name in names}
+    takes, values = LAWS[word], {}
+    for name in dict.fromkeys(name for names in LAWS.values() for name in names):
+        given = name in table
+        if given and name not in takes:
+            raise table.wrong(name, f"the law {word!r} takes {', '.join(takes)}")
+        if given or (name in takes and (word != "spring" or name == "k")):
+            values[name] = table.number(name)
     table.close()
     return table.build(lambda: _MAKERS[word](**values))
 
