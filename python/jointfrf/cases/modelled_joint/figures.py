@@ -47,14 +47,20 @@ def _frfs(result: ModelledJointResult) -> Figure:
     case, panels = result.case, []
     for row, response in enumerate(case.responses):
         for column, force in enumerate(case.forces):
-            lines = (
-                ("measured", result.measured, "measured"),
-                ("fitted", result.first.predicted, "actual"),
-                ("springs and dashpots", result.constant.predicted, "mean"),
+            title, freq = f"{response} by {force}", case.freq_hz
+            curves = (
+                Curve("fitted", freq, np.abs(result.first.predicted[:, row, column]), "actual"),
+                Curve("measured", freq, np.abs(result.measured[:, row, column]), "measured"),
             )
-            curves = tuple(Curve(label, case.freq_hz, np.abs(h[:, row, column]), style) for label, h, style in lines)
-            panels.append(Panel(f"{response} by {force}", "frequency, Hz", "|H|, m/N", curves=curves, log_y=True))
+            panels.append(Panel(title, "frequency, Hz", "|H|, m/N", curves=curves, log_y=True))
+            residuals = (
+                Curve("springs and dashpots", freq, np.abs(result.constant.residual[:, row, column]), "low"),
+                Curve("laws of the case", freq, np.abs(result.first.residual[:, row, column]), "measured"),
+            )
+            panels.append(Panel(title, "frequency, Hz", "|residual| over noise", curves=residuals, log_y=True))
     return Figure(
-        "frfs", "FRFs of the first realisation: measured, fitted, and fitted by springs and dashpots.", tuple(panels),
-        columns=min(2, len(panels)),
-    )  # fmt: skip
+        "frfs",
+        "FRFs of the first realisation, measured and fitted; and their residual beside that of springs and dashpots.",
+        tuple(panels),
+        columns=2,
+    )
