@@ -16,6 +16,8 @@ module jointfrf_lines_lapack
   integer, parameter :: inverse_block = 32
   !> Up to this order the condition number comes from the inverse itself, which costs a third of an estimate by zgecon.
   integer, parameter :: exact_condition = 32
+  !> A matrix of a larger norm is scaled, by a power of two: |z|^2 and sums of products overflow in LAPACK.
+  real(dp), parameter :: large = 2.0_dp**900
 
 contains
 
@@ -57,7 +59,7 @@ contains
     integer(ip), intent(out) :: info
     real(dp), intent(out) :: rcond
     integer(blas_ip), pointer, contiguous :: pivot(:)
-    real(dp) :: norm
+    real(dp) :: norm, factor
     integer(blas_ip) :: n, code
 
     n = size(a, 1, kind=blas_ip)
@@ -65,11 +67,12 @@ contains
     info = line_good
     if (n == 0 .or. size(b, 2) == 0) return        ! OpenBLAS does not factor A without right-hand sides
     call space%take_pivots(int(n), pivot)
-    norm = one_norm(a)
+    call bring_down(a, norm, factor)
     call zgesv(n, size(b, 2, kind=blas_ip), a, n, pivot, b, n, code)
     info = int(code, ip)
     if (info /= line_good) return
     call condition(norm, a, pivot, space, rcond)
+    call multiply_by(factor, b)                    ! X = factor (factor A)^-1 B
     if (.not. all_finite(b)) info = line_overflow
   end subroutine solve_line
 
@@ -124,7 +127,7 @@ contains
     real(dp), intent(out) :: rcond
     complex(dp), pointer, contiguous :: work(:, :)
     integer(blas_ip), pointer, contiguous :: pivot(:)
-    real(dp) :: norm
+    real(dp) :: norm, factor
     integer(blas_ip) :: n, code
     integer(long) :: before
 
@@ -133,7 +136,7 @@ contains
     info = line_good
     if (n == 0) return
     call space%take_pivots(int(n), pivot)
-    norm = one_norm(a)
+    call bring_down(a, norm, factor)
     call zgetrf(n, n, a, n, pivot, code)
     info = int(code, ip)
     if (info /= line_good) return
@@ -147,8 +150,32 @@ contains
       info = line_overflow
     else
       rcond = min(1.0_dp, (1.0_dp/norm)/one_norm(a))
+      call multiply_by(factor, a)                  ! A^-1 = factor (factor A)^-1
     end if
   end subroutine invert_line
+
+  !> Scale a matrix whose norm is large down, to a modest one.
+  !> norm     of the scaled matrix
+  !> factor   by which it was multiplied, a power of two; 1 where the norm is not large
+  pure subroutine bring_down(a, norm, factor)
+    complex(dp), contiguous, intent(inout) :: a(:, :)
+    real(dp), intent(out) :: norm, factor
+
+    factor = 1.0_dp
+    norm = one_norm(a)
+    if (norm <= large) return
+    factor = scale(1.0_dp, -min(exponent(max(maxval(abs(real(a, dp))), maxval(abs(aimag(a))))), 1000))   ! never denormal
+    call multiply_by(factor, a)
+    norm = one_norm(a)
+  end subroutine bring_down
+
+  !> A becomes factor A, each part by itself: no product of it overflows.
+  pure subroutine multiply_by(factor, a)
+    real(dp), intent(in) :: factor
+    complex(dp), contiguous, intent(inout) :: a(:, :)
+
+    if (factor < 1.0_dp) a = cmplx(factor*real(a, dp), factor*aimag(a), dp)
+  end subroutine multiply_by
 
   !> C = C + factor op(A) op(B), op by 'N', 'T' or 'C', with zgemm.
   subroutine product_line(trans_a, trans_b, factor, a, b, c)

@@ -5,6 +5,7 @@
 module jointfrf_sharing
   !$ use omp_lib, only: omp_get_max_threads, omp_get_thread_num, omp_in_parallel
   use jointfrf_blas_threads, only: blas_takes_threads
+  use jointfrf_forks, only: has_its_threads, watch_forks
   use jointfrf_kinds, only: dp, long
   use jointfrf_traps, only: hold_traps, host_state, release_traps
   implicit none
@@ -48,6 +49,7 @@ contains
     integer(long) :: item
     integer :: t
 
+    if (threads > 1) call watch_forks()
     if (threads == 1) then
       call hold_traps(host)
       call work%do_items(1_long, n_items, 1)
@@ -84,8 +86,8 @@ contains
     first = ((thread - 1)*n_items)/threads + 1
   end function first_of
 
-  !> One thread for little work, inside somebody else's parallel region, or where the BLAS takes one only; else what
-  !> OpenMP would take.
+  !> One thread for little work, inside somebody else's parallel region, in a forked process whose threads are in its
+  !> parent, or where the BLAS takes one only; else what OpenMP would take.
   !> flops     floating-point operations of all items
   !> serial    so many are not worth a second thread
   function threads_for(flops, n_items, serial) result(threads)
@@ -95,7 +97,7 @@ contains
 
     threads = 1
     if (flops < serial .or. n_items < 2) return
-    !$ if (omp_in_parallel()) return
+    !$ if (omp_in_parallel() .or. .not. has_its_threads()) return
     !$ if (blas_takes_threads()) threads = int(min(int(omp_get_max_threads(), long), n_items))
   end function threads_for
 end module jointfrf_sharing

@@ -3,7 +3,7 @@
 # .venv with the package installed editable. Does nothing when all is up to date.
 #
 #   sh python/bootstrap.sh run     what the cases need
-#   sh python/bootstrap.sh test    also what the tests need
+#   sh python/bootstrap.sh test    also what the tests need; a browser where the system has one to install
 #
 # PYTHON names the interpreter for a new .venv, FC and CC the compilers.
 # Exit status: 3 when system packages are missing and may not be installed from here, 1 for any other failure.
@@ -98,6 +98,7 @@ package() {
     apt-get/python) echo python3 ;;
     apt-get/headers) echo "python$version-dev" ;;
     apt-get/venv) echo "python$version-venv" ;;
+    apt-get/browser | dnf/browser | zypper/browser | pacman/browser) echo chromium ;;
     dnf/fortran | zypper/fortran | pacman/fortran) [ $manager = dnf ] && echo gcc-gfortran || echo gcc-fortran ;;
     dnf/c | zypper/c | pacman/c | brew/fortran | brew/c) echo gcc ;;
     dnf/headers) echo "python$version-devel" ;;
@@ -109,11 +110,9 @@ package() {
   esac
 }
 
-install_missing() {
-  if ! find_manager; then
-    say "missing:$missing. Install them with the system's package manager and start again."
-    exit 3
-  fi
+# -> packages, install, refresh, command: how to install what is missing
+plan_installation() {
+  refresh=
   packages=$(for item in $missing; do package "$item"; done | tr ' ' '\n' | sort -u | tr '\n' ' ')
   packages=${packages% }
   case $manager in
@@ -134,22 +133,50 @@ install_missing() {
       install="brew install $packages"
       command=$install ;;
   esac
+}
+
+# -> sudo: what precedes the command
+may_install() {
   sudo=
-  if [ $manager != brew ] && [ "$(id -u)" != 0 ]; then
-    if ! sudo -n true >/dev/null 2>&1; then
-      command -v sudo >/dev/null 2>&1 || command="su -c '$(echo "$command" | sed 's/sudo //g')'"
-      say "missing:$missing. Type this, then start again:"
-      echo "  $command" >&2
-      exit 3
-    fi
-    sudo='sudo -n'
-  fi
+  [ "$manager" = brew ] || [ "$(id -u)" = 0 ] && return
+  sudo='sudo -n'
+  sudo -n true >/dev/null 2>&1
+}
+
+run_installation() {
   say "installing $packages"
   # shellcheck disable=SC2086  # the commands are lists of words
   $sudo $install >>"$log" 2>&1 </dev/null ||
-    { [ "${refresh-}" ] && $sudo $refresh >>"$log" 2>&1 </dev/null && $sudo $install >>"$log" 2>&1 </dev/null; } ||
-    fail "could not install the system packages"
+    { [ "$refresh" ] && $sudo $refresh >>"$log" 2>&1 </dev/null && $sudo $install >>"$log" 2>&1 </dev/null; } || return 1
   hash -r
+}
+
+install_missing() {
+  if ! find_manager; then
+    say "missing:$missing. Install them with the system's package manager and start again."
+    exit 3
+  fi
+  plan_installation
+  if ! may_install; then
+    command -v sudo >/dev/null 2>&1 || command="su -c '$(echo "$command" | sed 's/sudo //g')'"
+    say "missing:$missing. Type this, then start again:"
+    echo "  $command" >&2
+    exit 3
+  fi
+  run_installation || fail "could not install the system packages"
+}
+
+# Tests of pages are skipped without a browser: one is installed where that is possible.
+offer_browser() {
+  for name in chromium chromium-browser google-chrome google-chrome-stable; do
+    command -v $name >/dev/null 2>&1 && return
+  done
+  missing=' browser'
+  if find_manager && [ "$manager" != brew ]; then
+    plan_installation
+    may_install && run_installation && return
+  fi
+  say "no browser (chromium): tests of pages will be skipped"
 }
 
 # ---------------------------------------------------------------- one at a time
@@ -221,4 +248,5 @@ if [ "$missing" ]; then
   find_missing
   [ -z "$missing" ] || fail "still missing after installation:$missing"
 fi
+if [ "$1" = test ]; then offer_browser; fi
 make_venv "$1"

@@ -18,6 +18,7 @@ from jointfrf.channels.finite_differences import (
     difference_weights,
     transform,
 )
+from jointfrf.channels.joint_channels import ChannelAgreement, JointChannels, SideAgreement, joint_channels
 from jointfrf.channels.point_lines import Interface, interface
 from jointfrf.channels.virtual_point import (
     VirtualPoint,
@@ -40,6 +41,7 @@ from jointfrf.errors import (
 )
 from jointfrf.extras import MissingPackageError
 from jointfrf.frf.bands import as_bands, band_mean, in_bands
+from jointfrf.frf.channel_place import ChannelPlace, places_of_nodes
 from jointfrf.frf.metrics import amplitude_error, frequency_error, has_peak, peak
 from jointfrf.frf.noise import pollute, realisations
 from jointfrf.frf.noise_model import NoiseModel, estimate_noise
@@ -95,6 +97,8 @@ __all__ = [
     "BandStatistics",
     "Bolt",
     "BoltedLap",
+    "ChannelAgreement",
+    "ChannelPlace",
     "Consistency",
     "ContactLaw",
     "ConvergenceWarning",
@@ -115,6 +119,7 @@ __all__ = [
     "IllConditionedWarning",
     "Interface",
     "Joint",
+    "JointChannels",
     "JointFit",
     "JointLaw",
     "LapDivisions",
@@ -132,6 +137,7 @@ __all__ = [
     "PowerLaw",
     "PreloadedLap",
     "ReceptanceInfo",
+    "SideAgreement",
     "SingularLineError",
     "SmoothFrfs",
     "SolidModel",
@@ -178,12 +184,14 @@ __all__ = [
     "inverse_substructuring",
     "invert",
     "ismm",
+    "joint_channels",
     "joint_compliance",
     "modify",
     "monte_carlo",
     "multi_point_compliance",
     "multi_point_stiffness",
     "peak",
+    "places_of_nodes",
     "pollute",
     "preload",
     "preload_force",
@@ -205,5 +213,3 @@ __all__ = [
     "virtual_point",
     "virtual_points",
 ]
-
-__version__: str

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from jointfrf.kernel.arguments import FloatArray, as_real
+from jointfrf.spelling import did_you_mean
 
 __all__ = [
     "DIRECTIONS",
@@ -162,7 +163,8 @@ def direction_places(dofs: Sequence[str]) -> NDArray[np.intp]:
     names = [str(dof).lower() for dof in dofs]
     unknown = [dof for dof, name in zip(dofs, names, strict=True) if name not in _PLACES]
     if unknown:
-        raise ValueError(f"dofs must be among {', '.join(DIRECTIONS)}, not {reprlib.repr(unknown[0])}")
+        hint = did_you_mean(unknown[0], DIRECTIONS)
+        raise ValueError(f"dofs must be among {', '.join(DIRECTIONS)}, not {reprlib.repr(unknown[0])}{hint}")
     places = np.array([_PLACES[name] for name in names], np.intp)
     if np.unique(places).size != places.size:
         raise ValueError(f"dofs must name each direction once, not {', '.join(dofs)}")

@@ -14,6 +14,7 @@ _EXTRAS = {
     "jinja2": ("reports", "report"),
     "matplotlib": ("figures", "plot"),
     "pyuff": ("Universal Files", "uff"),
+    "shtab": ("completions for shells", "completion"),
 }
 
 

@@ -1,4 +1,4 @@
-"""Writing of result files: whole or not at all."""
+"""Files: how one begins, and writing whole or not at all."""
 
 from __future__ import annotations
 
@@ -6,7 +6,48 @@ import os
 import tempfile
 from pathlib import Path
 
-__all__ = ["write_file"]
+from jointfrf.errors import FileContentError
+
+__all__ = ["HEAD", "head_of", "write_file"]
+
+#: How much of a file shows what it is, bytes.
+HEAD = 1 << 13
+
+
+def head_of(path: Path) -> bytes:
+    """Return the first bytes of a file that holds something.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    bytes
+        `HEAD` of them, or all there are.
+
+    Raises
+    ------
+    FileNotFoundError
+        There is no such file.
+    FileContentError
+        It is a folder, a pipe or a device, cannot be read, or is empty.
+    """
+    if not path.exists():
+        raise FileNotFoundError(f"there is no file {path}")
+    if path.is_dir():
+        raise FileContentError(f"{path} is a folder, not a file")
+    if not path.is_file():
+        # Whoever opens a pipe waits for a writer; a device has no end.
+        raise FileContentError(f"{path} is a pipe or a device, not a file: save what it gives first")
+    try:
+        with path.open("rb") as file:
+            head = file.read(HEAD)
+    except OSError as error:
+        raise FileContentError(f"{path} cannot be read: {error.strerror}") from error
+    if not head.strip() and path.stat().st_size <= HEAD:
+        raise FileContentError(f"{path} is empty")
+    return head
 
 
 def write_file(path: Path, content: str | bytes) -> None:

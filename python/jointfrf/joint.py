@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from jointfrf.dofs import rigid_offset
-from jointfrf.io.cards import CardFormat, cards
+from jointfrf.io.cards import CardFormat, CardOptions, cards
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_frequency, as_real
 
 __all__ = ["Joint"]
@@ -163,34 +164,31 @@ class Joint:
         k, c, h = (back.T @ matrix @ back for matrix in (self.stiffness, self.damping, self.hysteretic_stiffness))
         return Joint(k, c, self.dofs, structural_damping=h)
 
-    def export(
-        self,
-        program: CardFormat,
-        nodes: Sequence[int],
-        *,
-        element: int = 1,
-        number: int = 1,
-        rotation_nodes: Sequence[int] | None = None,
-        damping: bool = True,
-        full_matrix: bool = False,
-    ) -> str:
+    def export(self, program: CardFormat, nodes: Sequence[int], **options: Unpack[CardOptions]) -> str:
         """Write the joint as input of a finite-element program, in the units it has (SI).
 
         Parameters
         ----------
         program : {"abaqus", "calculix", "nastran", "ansys"}
             Whose input. Abaqus: SPRING2 (complex with hysteretic damping) and DASHPOT2, or MATRIX INPUT where DOFs are
-            coupled. CalculiX: SPRING2. Nastran: CBUSH and PBUSH, or DMIG where DOFs are coupled. Ansys: MATRIX27.
+            coupled or nodes lie beside the joint. CalculiX: SPRING2, SPRING1. Nastran: CBUSH and PBUSH, or DMIG where
+            DOFs are coupled. Ansys: MATRIX27.
         nodes : sequence of two int
             Nodes j on A and k on B. Directions are the global ones (Ansys: those of the nodal coordinate systems).
         element, number : int
-            First number of the new elements; first number of property, type and real constants, and part of names.
+            (1) First number of the new elements; first number of property, type and real constants, and part of names.
         rotation_nodes : sequence of two int, optional
             CalculiX only, and needed there for rotations: the ROT NODEs of rigid bodies whose REF NODEs are `nodes`.
         damping : bool
-            Whether damping is written.
+            Whether damping is written (by default it is).
         full_matrix : bool
-            Whether matrices are written where springs would do: Abaqus, and Nastran where the nodes do not coincide.
+            Whether matrices are written where springs would do: Abaqus, Nastran.
+        positions : array_like, shape (2, 3), optional
+            Where the two nodes are in the model, m; rigid arms then lead from them to `points`.
+        points : array_like, shape (3,) or (2, 3), optional
+            Reference point of the joint, or those of its sides j and k, m; with `positions`.
+        comments : sequence of str, optional
+            Lines of comment before the input.
 
         Returns
         -------
@@ -206,9 +204,11 @@ class Joint:
 
         Notes
         -----
-        Forces are K* (u_j - u_k), DOF by DOF, with no arm between nodes that are apart. CBUSH has such an arm, and is
-        the same joint only between coincident grids. Coupled springs of CalculiX: K_ab q_a q_b with q = u_j - u_k is
-        the sum of four springs, two of them negative.
+        Forces are K* (u_j - u_k), DOF by DOF, between the reference points of the joint. Nodes that are elsewhere (or
+        apart) move them by rigid arms r, u_point = u + theta x r, and receive the moments r x f: T^T K* T. Without
+        `positions` the nodes are taken to be the reference points, with no arm between them; a CBUSH has arms of its
+        own, to the middle between its grids, and is the same joint where they coincide. Coupled springs of CalculiX:
+        K_ab q_a q_b with q = u_j - u_k is the sum of four springs, two of them negative.
 
         Examples
         --------
@@ -227,14 +227,5 @@ class Joint:
         2.0000000000000E+01
         <BLANKLINE>
         """
-        return cards(
-            program,
-            self.dofs,
-            (self.stiffness, self.damping, self.hysteretic_stiffness),
-            nodes,
-            element=element,
-            number=number,
-            rotation_nodes=rotation_nodes,
-            damping=damping,
-            full_matrix=full_matrix,
-        )
+        matrices = self.stiffness, self.damping, self.hysteretic_stiffness
+        return cards(program, self.dofs, matrices, nodes, **options)

@@ -52,7 +52,7 @@ def requirements(versions: str) -> list[str]:
     """What is installed before the package: for its build, its run, and its tests."""
     extras = _PROJECT["project"]["optional-dependencies"]
     wanted = [*_PROJECT["build-system"]["requires"], *_PROJECT["project"]["dependencies"], *extras["all"]]
-    wanted += [each for each in extras["test"] if not each.startswith(("ruff", "mypy", "gcovr"))]
+    wanted += [each for each in extras["test"] if not each.startswith(("ruff", "mypy", "gcovr", "playwright"))]
     return [each.replace(">=", "==") for each in wanted] if versions == "lowest" else wanted
 
 

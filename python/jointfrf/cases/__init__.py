@@ -7,7 +7,6 @@ definitions    what several kinds read: frequencies, joint, bands, noise, observ
 comparison     expected natural frequencies, and the table that compares them
 fitting        the fit in the compliance domain, as cases call it
 workers        processes that share the work
-toml_table     a TOML table read key by key, with errors that name file and key
 known_joint/   two simulated substructures and a joint of known parameters
 bolted_lap/    a lap joint with a preloaded bolt of solid elements
 modelled_joint/  a joint of any laws, from FRFs at any points, with models of the substructures

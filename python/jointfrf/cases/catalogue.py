@@ -12,13 +12,13 @@ from typing import Any
 from jointfrf.cases.definitions import read_frequency
 from jointfrf.cases.kind import Case, CaseKind
 from jointfrf.cases.kinds import KINDS
-from jointfrf.cases.toml_table import TomlTable, read_toml
 from jointfrf.cases.workers import Workers
 from jointfrf.files import write_file
 from jointfrf.report.draw import draw
 from jointfrf.report.figure import Figure, figure_csv
 from jointfrf.report.page import Page, make_page
 from jointfrf.report.table import Table, plain_rows, shown, table_csv
+from jointfrf.toml.table import TomlTable, read_toml
 
 __all__ = [
     "CaseOutput",

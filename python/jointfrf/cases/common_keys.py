@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import get_args
 
 from jointfrf.cases.fitting import METHODS
-from jointfrf.cases.keys import Key, KeyTable
 from jointfrf.frf.noise import NoiseKind, NoiseReference
 from jointfrf.solids.brick_beam import Preset
+from jointfrf.toml.keys import Key, KeyTable
 
 __all__ = [
     "COMMON_KEYS",
@@ -38,7 +38,7 @@ _FREQUENCY = KeyTable(
             "required without `from_file`"),
         Key("step", "number, above 0", "Spacing of the lines; not with `from_file`.", "Hz",
             "required without `from_file`"),
-        Key("from_file", "name of a Universal File", "Take the lines of the FRFs in this file.", "", "evenly spaced"),
+        Key("from_file", "name of a file of FRFs", "Take the lines of the FRFs in this file.", "", "evenly spaced"),
     ),
 )  # fmt: skip
 _STUDY = KeyTable(

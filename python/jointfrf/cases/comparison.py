@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from jointfrf.cases.toml_table import TomlTable
 from jointfrf.report.table import Cell, Table
+from jointfrf.toml.table import TomlTable
 
 __all__ = ["ExpectedFrequencies", "agreement", "frequency_table", "read_expected_frequencies", "verdict"]
 

@@ -10,16 +10,16 @@ from typing import cast, get_args
 import numpy as np
 
 from jointfrf.cases.fitting import METHODS
-from jointfrf.cases.toml_table import TomlTable
 from jointfrf.dofs import Parameter, is_rotation, joint_parameters
 from jointfrf.errors import FileContentWarning
 from jointfrf.frf.bands import Band, in_bands
 from jointfrf.frf.frf_set import FrfSet
 from jointfrf.frf.noise import NoiseKind, NoiseReference, pollute, realisations
-from jointfrf.io.uff import read_uff
+from jointfrf.io.read import read_frfs
 from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.solids.brick import Material
+from jointfrf.toml.table import TomlTable
 
 __all__ = [
     "BandSet",
@@ -156,11 +156,10 @@ def _lines_of_file(table: TomlTable) -> FloatArray:
     return lines
 
 
-def read_frf_file(table: TomlTable, key: str, quantity: str | None = None) -> FrfSet:
+def read_frf_file(table: TomlTable, key: str, quantity: str | None = None, *, force_quantity: bool = False) -> FrfSet:
     """Read the receptances of a file that a key names; a line at 0 Hz that they do not have is left out."""
     path = table.file(key)
-    # A quantity in case.toml is meant, also where the file says something else.
-    frfs = table.build(lambda: read_uff(path, quantity, force_quantity=True), key)
+    frfs = table.build(lambda: read_frfs(path, quantity=quantity, force_quantity=force_quantity), key)
     with warnings.catch_warnings():
         # No case has a line at 0 Hz.
         warnings.simplefilter("ignore", FileContentWarning)

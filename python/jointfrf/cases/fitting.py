@@ -25,7 +25,7 @@ METHODS: tuple[str, ...] = (*get_args(IdentificationMethod), "decoupling-fit")
 FITTED = ("compliance", "decoupling-fit")
 #: Relative noise for the weights of a fit to data whose noise is not asked for.
 _ASSUMED = 0.01
-#: Least part of its largest variance that an FRF has: entries that are zero have no noise of their own.
+#: Least variance of an FRF as a share of that of its driving points: entries that are zero have no noise of their own.
 _ROUNDING = 1e-20
 
 
@@ -119,7 +119,8 @@ def fit_measured(freq_hz: FloatArray, dofs: tuple[str, ...], h: ComplexArray, tr
     gamma = transform @ h @ transform.T
     # Of each FRF between joint DOFs by itself: the covariance of all of many channels takes ten times as long.
     variance = transform**2 @ (_ASSUMED * abs(h)) ** 2 @ (transform**2).T
-    variance = np.maximum(variance, _ROUNDING * variance.max(axis=0))
+    largest = np.sqrt(np.diagonal(variance.max(axis=0)))
+    variance = np.maximum(variance, _ROUNDING * np.outer(largest, largest))
     with warnings.catch_warnings():
         for category in (IdentificationWarning, IllConditionedWarning, ConvergenceWarning, FrfCheckWarning):
             warnings.simplefilter("ignore", category)

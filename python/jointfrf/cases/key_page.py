@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from jointfrf.cases.keys import Key, KeyTable
 from jointfrf.cases.kinds import KINDS
+from jointfrf.toml.keys import Key, KeyTable
 
 __all__ = ["key_page"]
 

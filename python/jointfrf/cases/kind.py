@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
-from jointfrf.cases.keys import KeyTable
-from jointfrf.cases.toml_table import TomlTable
 from jointfrf.cases.workers import Workers
 from jointfrf.kernel.arguments import FloatArray
 from jointfrf.report.figure import Figure
 from jointfrf.report.table import Table
+from jointfrf.toml.keys import KeyTable
+from jointfrf.toml.table import TomlTable
 
 __all__ = ["Case", "CaseKind"]
 

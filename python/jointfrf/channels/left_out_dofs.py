@@ -7,16 +7,20 @@ from typing import NamedTuple
 import numpy as np
 
 from jointfrf.channels.point_lines import Interface
-from jointfrf.dofs import DIRECTIONS
+from jointfrf.dofs import DIRECTIONS, direction_places, is_rotation
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
-__all__ = ["LeftOutDof", "left_out_dofs"]
+__all__ = ["LeftOutDof", "OffsetCoupling", "left_out_dofs", "offset_couplings"]
 
 _SIDES = "jk"
 #: Geometry below this share of the reach of the channels is rounding.
 _NOTHING = 1e-6
 #: The channels show a DOF when it is known to this part of a unit.
 _SHOWN = 1e-6
+#: Share of the motion of a DOF from which on another one that enters it is named.
+_ENTERS = 0.05
+#: Arms below this are rounding, m.
+_NO_ARM = 1e-6
 
 
 class LeftOutDof(NamedTuple):
@@ -39,6 +43,88 @@ class LeftOutDof(NamedTuple):
     into: str
     weight: float
     share: float
+
+    @property
+    def matters(self) -> bool:
+        """Whether it is a noticeable part of the motion found, or may be."""
+        return not self.share < _ENTERS
+
+    def __str__(self) -> str:
+        unit = " m" if is_rotation(self.dof) > is_rotation(self.into) else ""
+        size = (
+            f"{100 * self.share:.0f} % of its motion"
+            if np.isfinite(self.share)
+            else "how much cannot be seen from these channels"
+        )
+        return (
+            f"{self.weight:.3g}{unit} of {self.dof}, which is left out, enters {self.into} of side {self.side} "
+            f"({size}): fit {self.dof}, too, or move the reference point or the channels"
+        )
+
+
+class OffsetCoupling(NamedTuple):
+    """A rotation that an offset between the reference points of the two sides turns into relative displacement.
+
+    Attributes
+    ----------
+    translation, rotation : str
+        The DOF kept, and the rotation of both sides together.
+    arm : float
+        Relative displacement for a unit of the rotation, m.
+    is_left_out : bool
+        Whether the rotation is no DOF of the joint.
+    """
+
+    translation: str
+    rotation: str
+    arm: float
+    is_left_out: bool
+
+    def __str__(self) -> str:
+        left = ", which is left out" if self.is_left_out else ""
+        return (
+            f"the offset between the reference points couples {self.translation} with {self.rotation}{left}: "
+            f"{1e3 * self.arm:.3g} mm"
+        )
+
+
+def offset_couplings(interface: Interface) -> tuple[OffsetCoupling, ...]:
+    """Find the rotations that reference points which are apart turn into displacements of the joint.
+
+    Parameters
+    ----------
+    interface : Interface
+
+    Returns
+    -------
+    tuple of OffsetCoupling
+        Empty where both sides have one reference point.
+
+    Notes
+    -----
+    Where both sides turn by theta as one body, points that are d apart move theta x d against each other: a joint
+    between them resists that, and its stiffness is not diagonal.
+
+    Examples
+    --------
+    >>> import jointfrf as jf
+    >>> from jointfrf.channels.left_out_dofs import offset_couplings
+    >>> sides = jf.interface([1], [2], ["x"], {1: (0, 0, 0), 2: (0, 0.006, 0)})
+    >>> print(*offset_couplings(sides))
+    the offset between the reference points couples x with theta_z, which is left out: -6 mm
+    """
+    apart = interface.references[1] - interface.references[0]
+    kept = direction_places(interface.dofs)
+    found = []
+    for axis in range(3):
+        moved = np.cross(np.eye(3)[axis], apart)
+        rotation = DIRECTIONS[3 + axis]
+        found += [
+            OffsetCoupling(DIRECTIONS[place], rotation, float(moved[place]), 3 + axis not in kept)
+            for place in kept
+            if place < 3 and abs(moved[place]) > _NO_ARM
+        ]
+    return tuple(found)
 
 
 def left_out_dofs(h: ComplexArray, interface: Interface) -> tuple[LeftOutDof, ...]:

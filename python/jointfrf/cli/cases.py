@@ -6,6 +6,7 @@ import argparse
 
 from jointfrf.cases.catalogue import list_cases, read_case
 from jointfrf.cases.key_page import key_page
+from jointfrf.cli.output import Output
 
 __all__ = ["add_arguments", "run"]
 
@@ -21,10 +22,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Carry out the command."""
     if options.keys:
-        print(key_page(), end="")
+        print(key_page(), end="")  # a page for a file, whatever else is asked for
         return 0
+    out = Output(options)
     found = [read_case(folder) for folder in list_cases()]
     width = max((len(case.name) for case in found), default=0)
-    for case in found:
-        print(f"{case.name.ljust(width)}  {case.title}")
+    out.say(*(f"{case.name.ljust(width)}  {case.title}" for case in found))
+    out.give({"cases": [{"name": case.name, "title": case.title, "folder": str(case.folder)} for case in found]})
     return 0

@@ -3,25 +3,16 @@
 from __future__ import annotations
 
 import argparse
-import json
-from collections.abc import Callable
 from pathlib import Path
 
 from jointfrf.cli.measured_file import add_quantity_arguments, nodes, parse_band, read_with_warnings
+from jointfrf.cli.output import Output
+from jointfrf.cli.structure_file import check_target, write_frfs
 from jointfrf.cli.usage import UsageError
 from jointfrf.frf.frf_set import FrfSet
-from jointfrf.io import write_csv, write_hdf5, write_npz, write_uff
 
 __all__ = ["add_arguments", "run"]
 
-_WRITERS: dict[str, Callable[[Path, FrfSet], None]] = {
-    ".uff": write_uff,
-    ".unv": write_uff,
-    ".npz": write_npz,
-    ".h5": write_hdf5,
-    ".hdf5": write_hdf5,
-    ".csv": write_csv,
-}
 _FIELDS = ("freq_hz", "h", "responses", "excitations", "axes", "quantity", "unit", "coherence", "averages")
 
 
@@ -42,8 +33,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--nodes", type=nodes, metavar="NODES", help="only FRFs between these nodes: 102,104")
     parser.add_argument("--band", type=parse_band, metavar="LOW:HIGH", help="only the lines in this band in Hz")
     parser.add_argument("--averages", type=float, metavar="N", help="number of averages, where the files do not say it")
-    parser.add_argument("--json", action="store_true", help="print what was written as JSON")
-    parser.add_argument("--quiet", action="store_true", help="print nothing but warnings and errors")
 
 
 def _field(text: str) -> tuple[str, str]:
@@ -58,28 +47,23 @@ def run(args: argparse.Namespace) -> int:
     *sources, target = args.files
     if not sources:
         raise UsageError("name the files to read, and last the one to write: jointfrf convert IN ... OUT")
-    writer = _WRITERS.get(target.suffix.lower())
-    if writer is None:
-        raise UsageError(f"{target} has no suffix of a format that is written: {', '.join(_WRITERS)}")
-    if not target.parent.is_dir():
-        raise UsageError(f"there is no folder {target.parent}")
+    check_target(target)
     if any(target.exists() and source.exists() and target.samefile(source) for source in sources):
         raise UsageError(f"{target} is one of the files to read")
     frfs = read_with_warnings(
         *sources,
         quantity=args.quantity,
         force_quantity=args.force_quantity,
-        nodes=args.nodes,
+        nodes=None if args.nodes is None else args.nodes.numbers,
         mapping=dict(args.map),
         averages=args.averages,
     )
     if args.band is not None:
         frfs = frfs.select(args.band)
-    writer(target, frfs)
-    if args.json:
-        print(json.dumps(_described(frfs, target), indent=2))
-    elif not args.quiet:
-        print(f"{frfs.summary()}\nwrote {target}")
+    write_frfs(target, frfs)
+    out = Output(args)
+    out.say(frfs.summary(), f"wrote {target}")
+    out.give(_described(frfs, target))
     return 0
 
 

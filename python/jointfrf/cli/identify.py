@@ -1,27 +1,42 @@
-"""`jointfrf identify`: from a Universal File to the parameters of a joint."""
+"""`jointfrf identify`: from measured FRFs to the parameters of a joint."""
 
 from __future__ import annotations
 
 import argparse
+import json
 import warnings
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, cast, get_args
+from typing import Any, get_args
 
 import numpy as np
 
-from jointfrf.channels.check.check import check_frfs, warn_of_frfs
+from jointfrf.channels.check.check import warn_of_frfs
+from jointfrf.channels.check.finding import FrfCheck
 from jointfrf.channels.finite_differences import difference_error
-from jointfrf.channels.point_lines import Interface
-from jointfrf.cli.measured_file import add_file_arguments, in_some_band, interface_of, nodes, read_receptances, words
+from jointfrf.cli.card_options import add_card_arguments, card_request, parse_export, written_cards
+from jointfrf.cli.check import check_joint
+from jointfrf.cli.measured_file import (
+    add_file_arguments,
+    file_names,
+    in_some_band,
+    read_receptances,
+    shown_nodes,
+    words,
+)
+from jointfrf.cli.measured_joint import MeasuredJoint, measured_joint
+from jointfrf.cli.output import Output, plain
+from jointfrf.cli.usage import UsageError, check_folder, waiting
 from jointfrf.dofs import is_rotation
 from jointfrf.errors import ConvergenceWarning, FrfCheckWarning, IdentificationWarning
 from jointfrf.extras import check_extras
+from jointfrf.files import write_file
 from jointfrf.frf.noise_model import estimate_noise
 from jointfrf.identification.compliance_fit.joint_terms import CrossTerms, DampingTerms
 from jointfrf.identification.identify import identify
 from jointfrf.identification.joint_fit import JointFit
 from jointfrf.io import FrfSet
-from jointfrf.io.cards import CardFormat
+from jointfrf.spelling import did_you_mean
 
 __all__ = ["add_arguments", "run"]
 
@@ -29,156 +44,219 @@ _METHODS = ("compliance", "inverse-substructuring")
 
 
 def _methods(text: str) -> list[str]:
-    for word in words(text):
+    found = words(text)
+    for word in found or [text]:
         if word not in _METHODS:
-            raise argparse.ArgumentTypeError(f"{word!r} is not one of {', '.join(_METHODS)}")
-    return words(text)
-
-
-def _export(text: str) -> tuple[CardFormat, list[int]]:
-    program, _, numbers = text.partition(":")
-    ends = nodes(numbers)
-    wanted = 4 if program == "calculix" else 2
-    if program not in get_args(CardFormat) or len(ends) not in (2, wanted):
-        raise argparse.ArgumentTypeError(
-            f"{text!r} is not a program ({', '.join(get_args(CardFormat))}) and nodes j and k like abaqus:9001,9002; "
-            "calculix takes two ROT NODEs after them"
-        )
-    return cast(CardFormat, program), ends
+            hint = did_you_mean(word, _METHODS)
+            raise argparse.ArgumentTypeError(f"{word!r} is not one of {', '.join(_METHODS)}{hint}")
+    return found
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the arguments of the command."""
     parser.description = (
-        "Identify a joint from the FRFs of an assembly in a Universal File (dataset 58). Accelerances and mobilities "
-        "become receptances; rotations come from points along a line by central differences."
+        "Identify a joint from the FRFs of an assembly. Accelerances and mobilities become receptances. The DOFs of "
+        "the joint are those of virtual points of all channels around it (--at), of points along a line (rotations by "
+        "central differences), or of two nodes whose rotations are in the file."
     )
     add_file_arguments(parser)
-    parser.add_argument(
+    fit = parser.add_argument_group("the fit")
+    fit.add_argument(
         "--method",
         type=_methods,
         default=["compliance"],
         metavar="METHODS",
         help=f"one or several of {','.join(_METHODS)} (default: compliance)",
     )
-    parser.add_argument(
+    fit.add_argument(
         "--damping",
         choices=(*get_args(DampingTerms), "auto"),
         default="auto",
         help="damping terms of K* = k (1 + i eta) + i w c (default: auto, what the data support)",
     )
-    parser.add_argument(
+    fit.add_argument(
         "--cross",
         choices=get_args(CrossTerms),
         default="zero",
         help="terms between the joint DOFs: none (default), not looked at, fitted",
     )
-    parser.add_argument(
+    fit.add_argument(
         "--noise",
         type=float,
         metavar="LEVEL",
         help="relative noise of the FRFs, 0.01 for 1 %% (default: from their reciprocity)",
     )
-    parser.add_argument(
+    fit.add_argument(
         "--bending-stiffness",
         type=float,
         metavar="EI",
-        help="E I of the thinner part in N m^2: tells how much compliance the differences add",
+        help="E I of the thinner part in N m^2: tells how much compliance the differences along a line add",
     )
-    parser.add_argument(
+    results = parser.add_argument_group("results")
+    results.add_argument("--out", type=Path, metavar="DIR", help="folder for identification.json and figures")
+    results.add_argument(
+        "--report", type=Path, metavar="FILE", help="the identification by method compliance as one HTML page"
+    )
+    results.add_argument(
+        "--save", type=Path, metavar="FILE", help="keep the joint (by the first method) in a JSON file"
+    )
+    results.add_argument(
         "--export",
-        type=_export,
+        type=parse_export,
         metavar="PROGRAM:J,K",
-        help="also print the joint (by the first method) as input of abaqus, calculix (stiffness only), nastran or "
-        "ansys, between its nodes J and K: abaqus:9001,9002; rotations of calculix need two ROT NODEs after them",
+        help="the joint (by the first method) as input of abaqus, calculix (stiffness only), nastran or ansys, between "
+        "its nodes J and K: abaqus:9001,9002; rotations of calculix need two ROT NODEs after them",
     )
-    parser.add_argument("--out", type=Path, metavar="DIR", help="folder for identification.json and figures")
+    add_card_arguments(results)
 
 
 def run(args: argparse.Namespace) -> int:
     """Carry out the command; the caller turns exceptions into messages."""
     if args.out is not None:
         check_extras("matplotlib")
+    if args.report is not None:
+        check_extras("jinja2")
+        if "compliance" not in args.method:
+            raise UsageError("--report is of method compliance: name it among the methods")
+    check_folder("--save", args.save)
+    out = Output(args)
     frfs = read_receptances(args)
-    if not (args.j and args.k and args.dofs):
-        print(frfs.summary())
-        print("\nname the points and DOFs of the joint to identify it: --j NODES --k NODES --dofs DOFS")
-        return 0
-    sides = interface_of(args, frfs, args.bending_stiffness)
-    measured = frfs.matrix(sides.channels, sides.channels)
-    warn_of_frfs(check_frfs(*in_some_band(frfs.freq_hz, measured, args.band), sides.channels))
-    fits = [_fit(args, method, frfs, measured, sides) for method in args.method]
-    points = " and ".join(", ".join(map(str, side)) for side in (args.j, args.k))
-    print(
-        f"{args.file.name}: {frfs.h.shape[1]} responses x {frfs.h.shape[2]} excitations; joint between points {points}"
-    )
-    apart = sides.references[1] - sides.references[0]
-    if np.linalg.norm(apart) > 0:
-        print(
-            f"reference points {1e3 * np.linalg.norm(apart):.3g} mm apart: x, y, z = "
-            + ", ".join(f"{1e3 * value:.3g}" for value in apart)
-            + " mm"
-        )
-    _tell_differences(args, sides)
-    for fit in fits:
-        print(f"\n{fit}")
-    if args.export is not None:
-        program, ends = args.export
-        damping = program != "calculix"  # it has none between DOFs, and says so in the text
-        print()
-        print(fits[0].export(program, ends[:2], rotation_nodes=ends[2:] or None, damping=damping), end="")
+    joint = measured_joint(args, frfs, args.bending_stiffness)
+    points = np.array(joint.responses.references)
+    request = card_request(args, joint.dofs, damping=args.damping, cross=args.cross, points=points)
+    check = check_joint(joint)
+    warn_of_frfs(check)
+    for text in joint.warnings():
+        warnings.warn(text, FrfCheckWarning, stacklevel=2)
+    out.say(*_heading(args, frfs, joint))
+    fits = []
+    for method in args.method:
+        with waiting(f"fit by {method}"):
+            fits.append(_fit(args, method, frfs, joint))
+        out.say("", fits[-1])
+    text, written = "", []
+    if request is not None:
+        about = [f"from {file_names(args)}", *_places(joint)]
+        text = written_cards(fits[0], request, about)
+        written += [] if args.output is None else [args.output]
+    if args.save is not None:
+        _save(args.save, fits[0], file_names(args), joint)
+        written.append(args.save)
+    if text and args.output is None:
+        out.say("", text.rstrip("\n"))
+    if args.report is not None:
+        fit = fits[args.method.index("compliance")]
+        ends = (1, 2) if args.export is None else args.export[1]
+        args.report.parent.mkdir(parents=True, exist_ok=True)
+        written.append(fit.report(args.report, source=file_names(args), command=args.typed, nodes=ends))
     if args.out is not None:
-        from jointfrf.report.fit import write_fit
-        from jointfrf.report.noise import noise_figure
-
-        figures = []
-        if "compliance" in args.method and args.noise is None:
-            freq_hz, h = in_some_band(frfs.freq_hz, measured, args.band)
-            names = [str(channel) for channel in sides.channels]
-            figures.append(noise_figure(freq_hz, h, estimate_noise(freq_hz, h), names, names))
-        print()
-        for path in write_fit(fits, args.out, args.file.name, figures):
-            print(f"wrote {path}")
+        written += _write_figures(args, frfs, joint, fits)
+    out.say(*([""] if written else []), *(f"wrote {path}" for path in written))
+    out.give(_content(args, joint, check, fits, text, written))
     return 0
 
 
-def _tell_differences(args: argparse.Namespace, sides: Interface) -> None:
+def _content(
+    args: argparse.Namespace,
+    joint: MeasuredJoint,
+    check: FrfCheck,
+    fits: list[JointFit],
+    text: str,
+    written: list[Path],
+) -> dict[str, Any]:
+    return {
+        "sources": [str(path) for path in args.files],
+        "joint": joint.to_dict(),
+        "checks": check.to_dict(),
+        "warnings": [*joint.warnings()],
+        "fits": [fit.to_dict(lines=False) for fit in fits],
+        "cards": text or None,
+        "written": [str(path) for path in written],
+    }
+
+
+def _heading(args: argparse.Namespace, frfs: FrfSet, joint: MeasuredJoint) -> Iterator[str]:
+    """Say what is identified from what."""
+    points = " and ".join(
+        shown_nodes(side) if joint.channels is not None else ", ".join(map(str, side)) for side in joint.nodes
+    )
+    size = f"{frfs.h.shape[1]} responses x {frfs.h.shape[2]} excitations"
+    yield f"{file_names(args)}: {size}; joint between points {points}"
+    yield from joint.text()
+    if joint.channels is None and len(joint.nodes[0]) > 1:
+        yield from _differences(args, joint)
+
+
+def _differences(args: argparse.Namespace, joint: MeasuredJoint) -> Iterator[str]:
     """Say what the central differences do to a rotational joint stiffness, before the result is read."""
-    rotations = [i for i, dof in enumerate(args.dofs) if is_rotation(dof)]
+    rotations = [i for i, dof in enumerate(joint.dofs) if is_rotation(dof)]
     if not rotations:
         return
-    reach = 1 / abs(sides.transform[rotations[0]]).max() / 2
-    print(f"rotations by central differences over +-{1e3 * reach:.3g} mm")
+    reach = 1 / abs(joint.responses.transform[rotations[0]]).max() / 2
+    yield f"rotations by central differences over +-{1e3 * reach:.3g} mm"
     if args.bending_stiffness is not None:
         error = difference_error(reach, args.bending_stiffness, 1.0)
-        print(
+        yield (
             f"they add about dx/(3 E I) = {error.compliance:.3g} rad/(N m) to the compliance of a rotational DOF: "
             f"a joint much stiffer than {1 / error.compliance:.3g} N m/rad cannot be distinguished from a rigid one"
         )
 
 
-def _fit(args: argparse.Namespace, method: str, frfs: FrfSet, measured: np.ndarray, sides: Interface) -> JointFit:
+def _fit(args: argparse.Namespace, method: str, frfs: FrfSet, joint: MeasuredJoint) -> JointFit:
+    more = _of_compliance(args, frfs, joint) if method == "compliance" else {"transform": _one_transform(joint)}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", IdentificationWarning)  # they stand in the table
         warnings.simplefilter("ignore", ConvergenceWarning)
         warnings.simplefilter("ignore", FrfCheckWarning)  # told with the names of the channels
-        return identify(
-            frfs.freq_hz,
-            measured,
-            args.dofs,
-            method,  # type: ignore[arg-type]
-            args.band,
-            transform=sides,
-            damping=args.damping,
-            cross=args.cross,
-            noise=args.noise,
-            **(_coherence(frfs, sides) if method == "compliance" else {}),
-        )
+        return identify(frfs.freq_hz, _measured(method, joint), joint.dofs, method, args.band, **more)  # type: ignore[arg-type]
 
 
-def _coherence(frfs: FrfSet, sides: Interface) -> dict[str, Any]:
-    """Coherence and number of averages, where the file has them."""
-    coherence = frfs.coherence_matrix(sides.channels, sides.channels)
-    if coherence is None:
-        return {}
-    return {"coherence": coherence, "averages": frfs.least_averages(sides.channels, sides.channels)}
+def _measured(method: str, joint: MeasuredJoint) -> np.ndarray:
+    """FRFs as the method takes them: band means know one transform only."""
+    if method == "compliance" or joint.is_square:
+        return joint.h
+    return np.ascontiguousarray(joint.responses.transform @ joint.h @ joint.forces.transform.T)
+
+
+def _one_transform(joint: MeasuredJoint) -> Any:
+    return joint.responses if joint.is_square else None
+
+
+def _of_compliance(args: argparse.Namespace, frfs: FrfSet, joint: MeasuredJoint) -> dict[str, Any]:
+    """Return the options of the compliance fit: damping, cross terms, noise, coherence where the file has it."""
+    names = joint.responses.channels, joint.forces.channels
+    coherence = frfs.coherence_matrix(*names)
+    known = {} if coherence is None else {"coherence": coherence, "averages": frfs.least_averages(*names)}
+    return {
+        "transform": joint.transform,
+        "damping": args.damping,
+        "cross": args.cross,
+        "noise": args.noise,
+        **known,
+    }
+
+
+def _places(joint: MeasuredJoint) -> list[str]:
+    """Say where the reference points are."""
+    one, other = joint.responses.references
+    if np.array_equal(one, other):
+        return [f"reference point x, y, z = {', '.join(f'{value:.6g}' for value in one + 0.0)} m"]
+    both = [", ".join(f"{value:.6g}" for value in place + 0.0) for place in (one, other)]
+    return [f"reference points x, y, z = {both[0]} m (j) and {both[1]} m (k)"]
+
+
+def _save(path: Path, fit: JointFit, source: str, joint: MeasuredJoint) -> None:
+    about = {"source": source, "reference_points_m": plain(dict(zip("jk", joint.responses.references, strict=True)))}
+    write_file(path, json.dumps(fit.to_dict() | about, indent=1, allow_nan=False) + "\n")
+
+
+def _write_figures(args: argparse.Namespace, frfs: FrfSet, joint: MeasuredJoint, fits: list[JointFit]) -> list[Path]:
+    from jointfrf.report.fit import write_fit
+    from jointfrf.report.noise import noise_figure
+
+    figures = []
+    if "compliance" in args.method and args.noise is None:
+        freq_hz, h = in_some_band(frfs.freq_hz, joint.h, args.band)
+        names = [[str(channel) for channel in side.channels] for side in (joint.responses, joint.forces)]
+        figures.append(noise_figure(freq_hz, h, estimate_noise(freq_hz, h), *names))
+    return write_fit(fits, args.out, file_names(args), figures)

@@ -2,29 +2,22 @@
 
 from __future__ import annotations
 
-import argparse
-import importlib
 import os
+import shlex
 import sys
 import warnings
 from collections.abc import Sequence
 from typing import Any
 
+from jointfrf.cli.configuration import with_configuration
+from jointfrf.cli.parser import COMMANDS, command_parser, top_parser
 from jointfrf.cli.usage import UsageError
 from jointfrf.extras import MissingPackageError
+from jointfrf.spelling import did_you_mean
 
 __all__ = ["main"]
 
 _USAGE_ERROR, _FAILURE, _INTERRUPTED = 2, 1, 130
-#: The commands, each the module of its name, and what they do.
-_COMMANDS = {
-    "run": "run cases: tables, figures and a report each",
-    "cases": "list the cases that come with jointfrf",
-    "check": "look at measured FRFs: what is wrong, in which channel, what to do",
-    "convert": "measured FRFs of one file or several into another format",
-    "readings": "compare printed values with every reading of the noise",
-    "identify": "identify a joint from a file of measured FRFs",
-}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -40,10 +33,24 @@ def main(arguments: Sequence[str] | None = None) -> int:
     int
         0 good, 1 something in the data or the files is wrong, 2 wrong usage, 130 interrupted.
     """
-    options = _parser(list(sys.argv[1:] if arguments is None else arguments)).parse_args(arguments)
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    if not words:
+        top_parser().print_help(sys.stderr)
+        return _USAGE_ERROR
+    if words[0].startswith("-"):
+        top_parser().parse_words(words)  # prints help, version or what is wrong, and ends
+    if words[0] not in COMMANDS:
+        return _complain(
+            f"there is no command {words[0]!r}{did_you_mean(words[0], COMMANDS) or ': jointfrf --help lists them'}",
+            _USAGE_ERROR,
+        )
+    parser = command_parser(words[0])
+    given = parser.parse_words(words[1:])
+    given.typed = shlex.join(["jointfrf", *words])
     with warnings.catch_warnings():
         warnings.showwarning = _show_warning
         try:
+            options = with_configuration(given, parser, words[0])
             status: int = options.action(options)
             sys.stdout.flush()
             return status
@@ -63,36 +70,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _complain(message: object, status: int) -> int:
-    print(f"jointfrf: error: {message}", file=sys.stderr)
+    print(f"jointfrf: error: {_one_line(message)}", file=sys.stderr)
     return status
 
 
 def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
-    print(f"jointfrf: warning: {message}", file=sys.stderr)
+    print(f"jointfrf: warning: {_one_line(message)}", file=sys.stderr)
 
 
-class _Version(argparse.Action):
-    """Prints the version, which takes time to find."""
-
-    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
-        from importlib.metadata import version
-
-        print(f"jointfrf {version('jointfrf')}")
-        parser.exit()
-
-
-def _parser(words: list[str]) -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="jointfrf", description="Stiffness and damping of joints from FRFs.")
-    parser.add_argument("--version", action=_Version, nargs=0, help="print the version and stop")
-    commands = parser.add_subparsers(metavar="COMMAND", required=True)
-    for name, what in _COMMANDS.items():
-        command = commands.add_parser(name, help=what)
-        # Only the command that is asked for is imported: the others need time, and packages that may be missing.
-        if words[:1] == [name]:
-            module = importlib.import_module(f"jointfrf.cli.{name}")
-            module.add_arguments(command)
-            command.set_defaults(action=module.run)
-    return parser
+def _one_line(message: object) -> str:
+    """Return a message as one line: the name of a file may hold another."""
+    if isinstance(message, MemoryError) and not str(message):
+        return "not enough memory for what was asked for: fewer nodes, a narrower band or fewer realisations need less"
+    return str(message).replace("\r", "\\r").replace("\n", "\\n")
 
 
 if __name__ == "__main__":

@@ -1,33 +1,87 @@
-"""A file of FRFs on the command line: which one, the points and DOFs of the joint in it."""
+"""A file of FRFs on the command line: which one, and the points and DOFs of the joint in it."""
 
 from __future__ import annotations
 
 import argparse
 import sys
 import warnings
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from jointfrf.channels.point_lines import Interface, interface
-from jointfrf.dofs import is_rotation
+from jointfrf.cli.usage import UsageError
+from jointfrf.dofs import direction_names
 from jointfrf.errors import FileContentError
 from jointfrf.frf.bands import in_bands
 from jointfrf.io import FrfSet, read_frfs
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
 __all__ = [
+    "Nodes",
     "add_file_arguments",
+    "add_joint_arguments",
     "add_quantity_arguments",
+    "file_names",
     "in_some_band",
-    "interface_of",
+    "joint_dofs",
     "nodes",
+    "numbers",
     "parse_band",
+    "point",
     "read_receptances",
     "read_with_warnings",
+    "shown_nodes",
     "words",
 ]
+
+#: Longer ranges of nodes are slips.
+_MOST_NODES = 100_000
+_NODES_SHOWN = 40
+
+
+class Nodes(NamedTuple):
+    """Nodes as they were named: one by one, and ranges of which not all need exist.
+
+    Attributes
+    ----------
+    numbers : tuple of int
+        All.
+    single : frozenset of int
+        Those that were named by themselves.
+    """
+
+    numbers: tuple[int, ...]
+    single: frozenset[int]
+
+    def among(self, known: Iterable[int], source: object) -> list[int]:
+        """Return the nodes that there are.
+
+        Raises
+        ------
+        FileContentError
+            One that was named by itself is not there, or none of all.
+        """
+        there = set(known)
+        missing = [node for node in self.numbers if node in self.single and node not in there]
+        found = [node for node in self.numbers if node in there]
+        if missing or not found:
+            which = f"node {missing[0]}" if missing else f"nodes {self.numbers[0]} to {self.numbers[-1]}"
+            raise FileContentError(f"{source} has no FRF at {which}; it has nodes {shown_nodes(there)}")
+        return found
+
+
+def shown_nodes(found: Iterable[int]) -> str:
+    """Write nodes in their order, neighbours as ranges: 101 to 104, 201."""
+    ranges: list[list[int]] = []
+    for node in sorted(found):
+        if ranges and node == ranges[-1][1] + 1:
+            ranges[-1][1] = node
+        else:
+            ranges.append([node, node])
+    texts = [str(a) if a == b else f"{a}, {b}" if b == a + 1 else f"{a} to {b}" for a, b in ranges]
+    return ", ".join(texts[:_NODES_SHOWN]) + (", ..." if len(texts) > _NODES_SHOWN else "")
 
 
 def words(text: str) -> list[str]:
@@ -35,12 +89,52 @@ def words(text: str) -> list[str]:
     return [word.strip() for word in text.split(",") if word.strip()]
 
 
-def nodes(text: str) -> list[int]:
-    """Return node numbers between commas."""
+def nodes(text: str) -> Nodes:
+    """Return nodes: numbers between commas, and ranges like 101:116, ends included."""
+    found: list[int] = []
+    single: set[int] = set()
+    for word in words(text):
+        first, colon, last = word.partition(":")
+        try:
+            low, high = int(first), int(last if colon else first)
+        except ValueError:
+            low, high = 0, 0
+        if not 0 < low <= high:
+            raise argparse.ArgumentTypeError(f"{word!r} is no node number or range like 102,104 or 101:116")
+        if high - low >= _MOST_NODES:
+            raise argparse.ArgumentTypeError(f"{word} are more than {_MOST_NODES} nodes")
+        found += range(low, high + 1)
+        single |= set() if colon else {low}
+    if not found:
+        raise argparse.ArgumentTypeError(f"{text!r} names no nodes: 102,104 or 101:116")
+    return Nodes(tuple(dict.fromkeys(found)), frozenset(single))
+
+
+def joint_dofs(text: str) -> list[str]:
+    """Return the names of joint DOFs, theta_x for rx."""
     try:
-        return [int(word) for word in words(text)]
+        found = direction_names(words(text))
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+    if not found:
+        raise argparse.ArgumentTypeError(f"{text!r} names no DOFs, like y,theta_x")
+    return list(found)
+
+
+def numbers(text: str, count: int, like: str) -> tuple[float, ...]:
+    """Return some finite numbers between commas."""
+    try:
+        found = tuple(float(word) for word in words(text))
     except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a list of node numbers like 102,104") from None
+        found = ()
+    if len(found) != count or not np.isfinite(found).all():
+        raise argparse.ArgumentTypeError(f"{text!r} is not like {like}")
+    return found
+
+
+def point(text: str) -> tuple[float, ...]:
+    """Return the coordinates of a point, m."""
+    return numbers(text, 3, "x,y,z in m: 0.0625,0,0")
 
 
 def parse_band(text: str) -> tuple[float, float]:
@@ -55,29 +149,56 @@ def parse_band(text: str) -> tuple[float, float]:
 def add_file_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the file, the points on both sides, the DOFs, the bands."""
     parser.add_argument(
-        "file",
+        "files",
+        nargs="+",
         type=Path,
-        help="FRFs of the points around the joint: Universal File, MATLAB, NPZ, HDF5 or CSV file",
+        metavar="FILE",
+        help="FRFs of the points around the joint: Universal File, MATLAB, NPZ, HDF5 or CSV; several files of one test "
+        "become one",
     )
-    parser.add_argument("--j", type=nodes, metavar="NODES", help="nodes on side j, along a line: 102,104")
-    parser.add_argument("--k", type=nodes, metavar="NODES", help="nodes on side k, in the same order: 202,204")
-    parser.add_argument(
-        "--dofs", type=words, metavar="DOFS", help="joint DOFs out of x,y,z,theta_x,theta_y,theta_z, like y,theta_x"
+    add_joint_arguments(parser)
+
+
+def add_joint_arguments(parser: argparse.ArgumentParser) -> None:
+    """Describe the points on both sides, the DOFs, the bands, the quantity: what belongs to a project."""
+    joint = parser.add_argument_group("the joint in the file")
+    joint.add_argument("--j", type=nodes, metavar="NODES", help="nodes on side j: 102,104 or 101:116")
+    joint.add_argument("--k", type=nodes, metavar="NODES", help="nodes on side k; without --at in the same order")
+    joint.add_argument(
+        "--dofs",
+        type=joint_dofs,
+        metavar="DOFS",
+        help="joint DOFs out of x,y,z,theta_x,theta_y,theta_z (or rx,ry,rz), like y,theta_x",
     )
-    parser.add_argument(
-        "--band", type=parse_band, action="append", metavar="LOW:HIGH", help="frequency band in Hz; may be repeated"
+    joint.add_argument(
+        "--at",
+        type=point,
+        metavar="X,Y,Z",
+        help="reference point of the joint in m: its DOFs are then those of virtual points there, from all channels of "
+        "the nodes; without it, the nodes of each side lie along a line",
     )
-    parser.add_argument(
+    joint.add_argument("--at-k", type=point, metavar="X,Y,Z", help="reference point of side k, where it is another one")
+    joint.add_argument(
+        "--channels",
+        type=Path,
+        metavar="TABLE",
+        help="TOML or CSV table of sensors and impacts: side, position, direction; where the file of FRFs lacks them "
+        "(needs --at)",
+    )
+    joint.add_argument(
         "--spacing",
         type=float,
         metavar="METRES",
-        help="distance between neighbouring nodes, where the file has no coordinates; needs --axis",
+        help="distance between neighbouring nodes along a line, where the file has no coordinates; needs --axis",
     )
-    parser.add_argument("--axis", choices=("x", "y", "z"), help="direction of the line of nodes, with --spacing")
-    add_quantity_arguments(parser)
+    joint.add_argument("--axis", choices=("x", "y", "z"), help="direction of the line of nodes, with --spacing")
+    joint.add_argument(
+        "--band", type=parse_band, action="append", metavar="LOW:HIGH", help="frequency band in Hz; may be repeated"
+    )
+    add_quantity_arguments(joint)
 
 
-def add_quantity_arguments(parser: argparse.ArgumentParser) -> None:
+def add_quantity_arguments(parser: argparse._ActionsContainer) -> None:
     """Describe what a user says of the FRFs of a file."""
     parser.add_argument(
         "--quantity",
@@ -91,7 +212,14 @@ def add_quantity_arguments(parser: argparse.ArgumentParser) -> None:
 
 def read_receptances(args: argparse.Namespace) -> FrfSet:
     """Read the file as receptances; what had to be assumed is told as a warning."""
-    return read_with_warnings(args.file, quantity=args.quantity, force_quantity=args.force_quantity, receptance=True)
+    if args.force_quantity and args.quantity is None:
+        raise UsageError("--force-quantity needs --quantity")
+    return read_with_warnings(*args.files, quantity=args.quantity, force_quantity=args.force_quantity, receptance=True)
+
+
+def file_names(args: argparse.Namespace) -> str:
+    """Return the names of the files without their folders."""
+    return ", ".join(path.name for path in args.files)
 
 
 def read_with_warnings(*paths: Path, receptance: bool = False, **options: Any) -> FrfSet:
@@ -111,29 +239,3 @@ def in_some_band(
     """Return the lines in the bands; all where there are none."""
     kept = in_bands(freq_hz, bands) if bands else np.ones(freq_hz.size, bool)
     return freq_hz[kept], np.ascontiguousarray(h[kept])
-
-
-def interface_of(args: argparse.Namespace, frfs: FrfSet, bending_stiffness: float | None = None) -> Interface:
-    """Return the joint DOFs of both sides; E I of the sides in N m^2 widens intervals of rotations."""
-    places = dict(frfs.coordinates)
-    if (args.spacing is None) != (args.axis is None):
-        raise ValueError("--spacing and --axis go together")
-    if args.spacing is not None:
-        if not args.spacing > 0:
-            raise ValueError(f"--spacing must be positive, not {args.spacing:g}")
-        for nodes in (args.j, args.k):
-            for i, node in enumerate(nodes):
-                places[node] = np.zeros(3)
-                places[node]["xyz".index(args.axis)] = args.spacing * i
-    if len(args.j) != len(args.k):
-        raise ValueError(f"--j and --k must name the same number of nodes, not {len(args.j)} and {len(args.k)}")
-    known = {channel.node for channel in (*frfs.responses, *frfs.excitations)}
-    for node in (*args.j, *args.k):
-        if node not in known:
-            raise FileContentError(
-                f"{args.file} has no FRF at node {node}; it has nodes {', '.join(map(str, sorted(known)))}"
-            )
-        if node not in places and (len(args.j) > 1 or any(is_rotation(dof) for dof in args.dofs)):
-            raise FileContentError(f"{args.file} has no coordinates of node {node}: say --spacing and --axis")
-    at = {node: places.get(node, np.zeros(3)) for node in (*args.j, *args.k)}
-    return interface(args.j, args.k, args.dofs, at, bending_stiffness=bending_stiffness)

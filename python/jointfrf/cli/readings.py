@@ -19,9 +19,10 @@ from jointfrf.cases.known_joint.readings.study import (
 )
 from jointfrf.cases.known_joint.readings.tables import altogether_table, choices_table, source_tables, values_table
 from jointfrf.cases.workers import started_workers
+from jointfrf.cli.output import Output
 from jointfrf.cli.usage import UsageError, available_cores, positive, progress
 from jointfrf.files import write_file
-from jointfrf.report.table import Table, as_text, table_csv
+from jointfrf.report.table import Table, as_text, plain_rows, table_csv
 
 __all__ = ["add_arguments", "run"]
 
@@ -70,14 +71,17 @@ def run(options: argparse.Namespace) -> int:
             at_work = replace(workers, progress=progress(group.cases[0].name))
             explained += study_readings(group, plan, at_work)
     every = totals(explained, options.spacing)
-    print(f"{options.realisations} realisations of each reading, seed {options.seed}\n")
+    out = Output(options)
+    out.say(f"{options.realisations} realisations of each reading, seed {options.seed}\n")
     for table in (*source_tables(explained, options.top), choices_table(every), altogether_table(every, options.top)):
-        print(as_text(table), end="\n\n")
+        out.say(as_text(table) + "\n")
+    whole = [*source_tables(explained), choices_table(every), altogether_table(every), values_table(explained)]
     if options.out is not None:
-        _write(
-            options.out,
-            [*source_tables(explained), choices_table(every), altogether_table(every), values_table(explained)],
-        )
+        _write(options.out, whole)
+        out.say(f"written: {options.out}")
+    out.give({"realisations": options.realisations, "seed": options.seed, "tables": {
+        table.key: {"title": table.title, "columns": table.columns, "rows": plain_rows(table)} for table in whole
+    }})  # fmt: skip
     return 0
 
 
@@ -103,4 +107,3 @@ def _write(folder: Path, tables: list[Table]) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for table in tables:
         write_file(folder / f"{table.key}.csv", table_csv(table))
-    print(f"written: {folder}")

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import argparse
+import json
+import sys
 import time
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 from jointfrf.cases.catalogue import CaseOutput, UnknownCaseError, find_case, list_cases, run_case
 from jointfrf.cases.workers import started_workers
+from jointfrf.cli.output import Output
 from jointfrf.cli.usage import UsageError, available_cores, positive, progress
 from jointfrf.extras import check_extras
 from jointfrf.report.table import as_text
@@ -38,24 +42,26 @@ def run(options: argparse.Namespace) -> int:
     twice = {folder.name for folder in folders if [f.name for f in folders].count(folder.name) > 1}
     if twice:
         raise UsageError(f"two cases are called {min(twice)}: their results would overwrite each other")
-    reports = []
+    out, reports = Output(options), []
     with started_workers(options.jobs) as workers:
         for folder in folders:
             start = time.perf_counter()
             at_work = replace(workers, progress=progress(folder.name))
             output = run_case(folder, options.out, realisations=options.realisations, workers=at_work)
-            _show_output(output)
-            print(f"{time.perf_counter() - start:.1f} s, report: {output.report}\n", flush=True)
+            out.say(*_shown(output), f"{time.perf_counter() - start:.1f} s, report: {output.report}\n")
+            sys.stdout.flush()
             reports.append(output.report)
             del output  # before the next case needs the memory
     if len(reports) > 1:
-        print("Reports:", *(f"  {report}" for report in reports), sep="\n")
+        out.say("Reports:", *(f"  {report}" for report in reports))
+    out.give({"cases": [json.loads((path.parent / "results.json").read_text("utf-8")) for path in reports],
+              "reports": [str(path) for path in reports]})  # fmt: skip
     return 0
 
 
-def _show_output(output: CaseOutput) -> None:
-    """Print the summary and the tables of a case."""
+def _shown(output: CaseOutput) -> Iterator[str]:
+    """Give the summary and the tables of a case."""
     heading = f"{output.case.name}: {output.case.title}"
-    print(f"{heading}\n{'=' * len(heading)}\n")
+    yield f"{heading}\n{'=' * len(heading)}\n"
     for table in (*output.summary, *output.printed):
-        print(as_text(table), end="\n\n")
+        yield as_text(table) + "\n"

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from jointfrf.errors import FileContentError, FileContentWarning
+from jointfrf.kernel.arguments import as_array
 
 __all__ = ["POWER_OF_I_OMEGA", "ROUND_OFF", "Channel", "FrfSet", "same_frf"]
 
@@ -158,8 +159,8 @@ class FrfSet:
     stated: str = ""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "freq_hz", np.asarray(self.freq_hz, dtype=np.float64))
-        object.__setattr__(self, "h", np.ascontiguousarray(self.h, dtype=np.complex128))
+        object.__setattr__(self, "freq_hz", as_array("freq_hz", self.freq_hz).astype(np.float64, copy=False))
+        object.__setattr__(self, "h", np.ascontiguousarray(as_array("h", self.h), dtype=np.complex128))
         shape = (*self.freq_hz.shape, len(self.responses), len(self.excitations))
         if self.freq_hz.ndim != 1 or self.h.shape != shape:
             raise ValueError(f"h has shape {self.h.shape}, expected (n_freq, n_responses, n_excitations) = {shape}")

@@ -33,7 +33,7 @@ def peak(h: ArrayLike, freq_hz: ArrayLike, band: Band | None = None, *, refine: 
     Raises
     ------
     ValueError
-        Shapes that do not agree, a band without lines, NaN.
+        Shapes that do not agree, a band without lines, NaN; with `refine`, neighbours at the same frequency.
 
     Examples
     --------
@@ -45,6 +45,8 @@ def peak(h: ArrayLike, freq_hz: ArrayLike, band: Band | None = None, *, refine: 
     amplitude, inside, at = _largest(h, freq, band)
     if not refine or at in (inside[0], inside[-1]) or amplitude[at - 1 : at + 2].min() <= 0:
         return float(amplitude[at]), float(freq[at])
+    if np.unique(freq[at - 1 : at + 2]).size < 3:
+        raise ValueError(f"freq_hz: lines {at - 1} to {at + 1} are not at three frequencies, as refine needs them")
     parabola = np.polyfit(freq[at - 1 : at + 2] - freq[at], np.log(amplitude[at - 1 : at + 2]), 2)
     offset = -parabola[1] / (2 * parabola[0])
     return float(np.exp(np.polyval(parabola, offset))), float(freq[at] + offset)
@@ -113,7 +115,7 @@ def amplitude_error(
     Raises
     ------
     ValueError
-        As in `peak`.
+        As in `peak`; the exact FRF is zero.
 
     Examples
     --------
@@ -122,6 +124,8 @@ def amplitude_error(
     25.0
     """
     exact, obtained = (peak(x, freq_hz, band, refine=refine)[0] for x in (h_exact, h))
+    if exact == 0:
+        raise ValueError("h_exact is zero on all lines: no error relative to it")
     return abs((exact - obtained) / exact) * 100
 
 
@@ -145,7 +149,7 @@ def frequency_error(
     Raises
     ------
     ValueError
-        As in `peak`.
+        As in `peak`; the exact FRF is largest at 0 Hz.
 
     Examples
     --------
@@ -154,4 +158,6 @@ def frequency_error(
     9.090909090909092
     """
     exact, obtained = (peak(x, freq_hz, band, refine=refine)[1] for x in (h_exact, h))
+    if exact == 0:
+        raise ValueError("h_exact is largest at 0 Hz: no error relative to that frequency; give a band above it")
     return abs((exact - obtained) / exact) * 100

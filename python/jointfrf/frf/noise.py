@@ -138,7 +138,13 @@ def realisations(
     """
     lines = as_lines("h", h)
     noise = noise_arguments(level, kind, seed, relative_to, reciprocal, block, first, count, lines.shape[1:])
-    polluted = np.empty((count, *lines.shape), np.complex128)
+    try:
+        polluted = np.empty((count, *lines.shape), np.complex128)
+    except MemoryError as error:
+        size = count * lines.nbytes / 2**30
+        raise MemoryError(
+            f"count: {count} realisations of h take {size:.3g} GiB: draw them in parts by first and count"
+        ) from error
     if polluted.size:
         n_freq, n_out, n_in = lines.shape
         call("pollute", (*noise, n_out, n_in, n_freq, first, count, lines, polluted))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Literal, get_args
 
 from numpy.typing import ArrayLike
@@ -13,6 +14,7 @@ from jointfrf.channels.check.finding import FrfCheck
 from jointfrf.channels.point_lines import Interface
 from jointfrf.frf.bands import PIECE
 from jointfrf.identification.band_means import fit_band_mean, prepare_band_mean
+from jointfrf.identification.compliance_data import compliance_data
 from jointfrf.identification.compliance_fit.channel_noise import NoiseOptions
 from jointfrf.identification.compliance_fit.describe import Described, describe_compliance
 from jointfrf.identification.compliance_fit.fit import fit_compliance
@@ -158,7 +160,9 @@ def identify(
         if reciprocal:
             transforms = None if transform is None else (problem.frfs.responses, problem.frfs.forces)
             warn_of_frfs(_checked(MeasuredFrfs(problem.freq_hz, problem.frfs.measured), problem.dofs, transforms))
-        return _warned(describe_compliance(fit_compliance(problem), problem))
+        found = fit_compliance(problem)
+        fit = _warned(describe_compliance(found, problem))
+        return replace(fit, data=compliance_data(found, problem, transform))
     if coherence is not None or averages is not None:
         raise ValueError("coherence and averages are for method 'compliance'")
     if isinstance(transform, Interface):

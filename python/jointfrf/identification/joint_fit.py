@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import json
+import textwrap
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from pathlib import Path
 from typing import Any, Unpack
 
 import numpy as np
@@ -12,11 +15,22 @@ from numpy.typing import ArrayLike
 from scipy.special import ndtri
 
 from jointfrf.dofs import Parameter, ParameterKind
+from jointfrf.files import write_file
+from jointfrf.identification.fit_cards import fit_cards
+from jointfrf.identification.fit_data import FitData
+from jointfrf.identification.fit_record import fields_of_record, read_record, record_of
 from jointfrf.io.cards import CardFormat, CardOptions
 from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
 __all__ = ["JointFit"]
+
+#: Columns of a printed fit.
+_WIDTH = 80
+
+
+def _wrapped(text: str) -> str:
+    return textwrap.fill(text, _WIDTH, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False)
 
 
 @dataclass(frozen=True)
@@ -49,7 +63,10 @@ class JointFit:
     notes : tuple of str
         How the numbers came about.
     intervals : callable, optional
-        From a probability to the interval of each parameter, where the method has its own.
+        From a probability to the interval of each parameter, where the method has its own; a fit that was loaded has
+        those of some probabilities.
+    data : FitData, optional
+        What it was made from, for figures and reports; a fit that was loaded has none.
     """
 
     method: str
@@ -64,6 +81,7 @@ class JointFit:
     warnings: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     intervals: Callable[[float], dict[str, tuple[float, float]]] | None = field(default=None, repr=False, compare=False)
+    data: FitData | None = field(default=None, repr=False, compare=False)
 
     @cached_property
     def terms(self) -> tuple[Parameter, ...]:
@@ -134,7 +152,8 @@ class JointFit:
         Raises
         ------
         ValueError
-            The probability is not between 0 and 1.
+            The probability is not between 0 and 1; or the fit was loaded and does not keep the interval of this one,
+            see `to_dict`.
         """
         if not 0 < probability < 1:
             raise ValueError(f"probability must lie between 0 and 1, not {probability}")
@@ -167,43 +186,195 @@ class JointFit:
         """
         return self.joint.dynamic_stiffness(freq_hz)
 
-    def export(self, program: CardFormat, nodes: Sequence[int], **options: Unpack[CardOptions]) -> str:
-        """Write the joint found as input of a finite-element program; all as in `Joint.export`."""
-        return self.joint.export(program, nodes, **options)
+    def export(
+        self,
+        program: CardFormat,
+        nodes: Sequence[int],
+        *,
+        about: Sequence[str] = (),
+        all_damping: bool = False,
+        **options: Unpack[CardOptions],
+    ) -> str:
+        """Write the joint found as input of a finite-element program, with comments on what each number is worth.
+
+        Parameters
+        ----------
+        program, nodes, **options
+            As in `Joint.export`.
+        about : sequence of str
+            Where the fit comes from: first lines of comment.
+        all_damping : bool
+            Also damping that is negative or not significantly above zero (95 %), which is left out otherwise, with the
+            cross terms of its DOF.
+
+        Returns
+        -------
+        str
+            Lines of input.
+
+        Raises
+        ------
+        ValueError
+            As `Joint.export`; or a stiffness is infinite.
+        """
+        return fit_cards(self, program, nodes, about, all_damping=all_damping, **options)
 
     def unit(self, parameter: str) -> str:
         """Return the unit of a parameter, by the names of its DOFs as `Parameter.unit` reads them."""
         return Parameter.parse(parameter).unit
 
-    def to_dict(self) -> dict[str, Any]:
-        """Everything but the lines, as plain numbers and text, ready for JSON (an open interval ends at None)."""
-        intervals = self.confidence_interval(0.95)
-        errors = self.std_error
+    def plot(self) -> Any:
+        """Draw the joint over frequency, K* and compliance of each DOF, and measured against regenerated FRFs.
 
-        def plain(number: float) -> float | None:
-            return float(number) if np.isfinite(number) else None
+        Returns
+        -------
+        matplotlib.figure.Figure
+            ``fit.plot().savefig("joint.png")`` writes it. A fit that was loaded shows no FRFs.
 
-        return {
-            "method": self.method,
-            "dofs": list(self.dofs),
-            "parameters": {
-                term.name: {
-                    "value": float(self.parameters[term.name]),
-                    "unit": term.unit,
-                    "std_error": plain(errors[term.name]),
-                    "confidence_interval_95": [plain(limit) for limit in intervals[term.name]],
-                }
-                for term in self.terms
-            },
-            "loss_factor": {dof: plain(eta) for dof, eta in zip(self.dofs, self.loss_factor, strict=True)},
-            "noise_level": plain(self.noise_level),
-            "residual_level": plain(self.residual_level),
-            "frequency_hz": [float(self.freq_hz.min()), float(self.freq_hz.max())],
-            "n_lines": int(self.freq_hz.size),
-            "bands_hz": {d: [list(b) for b in own] for d, own in zip(self.dofs, self.bands, strict=True)},
-            "warnings": list(self.warnings),
-            "notes": list(self.notes),
-        }
+        Raises
+        ------
+        MissingPackageError
+            matplotlib is missing.
+        """
+        from jointfrf.report.fit_plot import plot_fit
+
+        return plot_fit(self)
+
+    def report(self, path: Path | str, *, source: str = "", command: str = "", nodes: Sequence[int] = (1, 2)) -> Path:
+        """Write a report: one HTML file with all that is needed to judge and to quote the joint, no link to another.
+
+        Parameters
+        ----------
+        path : Path or str
+            In a folder that exists.
+        source : str
+            Name of the file that was measured.
+        command : str
+            How the fit was made, as typed.
+        nodes : sequence of two or four int
+            Nodes j and k of the finite-element cards; then ROT NODEs of CalculiX.
+
+        Returns
+        -------
+        Path
+            The file written.
+
+        Raises
+        ------
+        ValueError
+            The fit does not hold the measured FRFs: it was loaded, or is a mean over bands.
+        MissingPackageError
+            jinja2 is missing.
+        OSError
+            The file cannot be written.
+        """
+        from jointfrf.report.fit_page import ReportOptions, write_report
+
+        return write_report(self, Path(path), ReportOptions(source, command, nodes))
+
+    def to_dict(self, *, probabilities: Sequence[float] | None = None, lines: bool = True) -> dict[str, Any]:
+        """Everything as plain numbers and text, ready for JSON; `from_dict` gives the same fit again.
+
+        Parameters
+        ----------
+        probabilities : sequence of float, optional
+            Probabilities of the intervals that are kept beside 0.5, 0.6827, 0.9, 0.95 and 0.99: where intervals follow
+            from the profile of the likelihood they cannot be found again without the FRFs.
+        lines : bool
+            Whether K*(w) of each line is kept, two numbers for each of the n n entries.
+
+        Returns
+        -------
+        dict
+            ``"format"``, ``"format_version"``, and under ``"parameters"`` value, unit, standard error and 95 % interval
+            of each; in an interval there, None is an open end. Elsewhere None is NaN, ``"inf"`` infinity.
+
+        Raises
+        ------
+        ValueError
+            A probability is not between 0 and 1, or not known to a fit that was loaded.
+        """
+        return record_of(self, probabilities, lines=lines)
+
+    @classmethod
+    def from_dict(cls, content: dict[str, Any]) -> JointFit:
+        """Make a fit of what `to_dict` wrote.
+
+        Parameters
+        ----------
+        content : dict
+
+        Returns
+        -------
+        JointFit
+            The same numbers; intervals at the probabilities kept, and no FRFs: no report can be made of it.
+
+        Raises
+        ------
+        FileContentError
+            It is no fit, of a later version of jointfrf, or something is missing or damaged.
+
+        Examples
+        --------
+        >>> import numpy as np, jointfrf as jf
+        >>> freq = np.linspace(0.5, 10, 100)
+        >>> a = jf.chain([5], [2500], [3], ground="start").receptance(freq)
+        >>> b = jf.chain([4], [2000], [2], ground="end").receptance(freq)
+        >>> gamma = jf.couple(a, b, jf.Joint([2000.0], [3.0]).dynamic_stiffness(freq), [0], [0])
+        >>> fit = jf.identify(freq, jf.pollute(gamma, 0.02, seed=1), ["x"])
+        >>> same = jf.JointFit.from_dict(fit.to_dict())
+        >>> same.confidence_interval(0.95) == fit.confidence_interval(0.95), str(same) == str(fit)
+        (True, True)
+        """
+        return cls(**fields_of_record(content))
+
+    def save(self, path: Path | str, *, probabilities: Sequence[float] | None = None, lines: bool = True) -> Path:
+        """Write the fit to a JSON file, whole or not at all.
+
+        Parameters
+        ----------
+        path : Path or str
+            In a folder that exists.
+        probabilities, lines : optional
+            As in `to_dict`.
+
+        Returns
+        -------
+        Path
+            The file written.
+
+        Raises
+        ------
+        ValueError
+            As `to_dict`.
+        OSError
+            The file cannot be written.
+        """
+        content = self.to_dict(probabilities=probabilities, lines=lines)
+        write_file(Path(path), json.dumps(content, indent=1, allow_nan=False) + "\n")
+        return Path(path)
+
+    @classmethod
+    def load(cls, path: Path | str) -> JointFit:
+        """Read a fit that `save` wrote.
+
+        Parameters
+        ----------
+        path : Path or str
+
+        Returns
+        -------
+        JointFit
+            As `from_dict` makes it.
+
+        Raises
+        ------
+        FileContentError
+            The file is no such file, of a later version of jointfrf, or damaged.
+        OSError
+            It cannot be read.
+        """
+        return cls(**read_record(Path(path)))
 
     def __str__(self) -> str:
         """Return a table of the parameters with their intervals, and the warnings."""
@@ -222,5 +393,6 @@ class JointFit:
         head = [f"method {self.method}, {span}"]
         if np.isfinite(self.noise_level):
             head.append(f"noise {100 * self.noise_level:.2g} %, residual {100 * self.residual_level:.2g} % of the FRFs")
-        tail = [f"note: {text}" for text in self.notes] + [f"warning: {text}" for text in self.warnings]
+        tail = [_wrapped(f"note: {text}") for text in self.notes]
+        tail += [_wrapped(f"warning: {text}") for text in self.warnings]
         return "\n".join([*head, "", *lines, *([""] if tail else []), *tail])

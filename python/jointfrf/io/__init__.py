@@ -3,6 +3,7 @@
 from jointfrf.frf.frf_set import Channel, FrfSet
 from jointfrf.frf.merge import merge_frfs
 from jointfrf.io.arrays import frfs_of_arrays
+from jointfrf.io.channel_table import read_channel_table
 from jointfrf.io.csv_file import write_csv
 from jointfrf.io.hdf5_file import write_hdf5
 from jointfrf.io.mapping import FrfMapping
@@ -17,6 +18,7 @@ __all__ = [
     "FrfSet",
     "frfs_of_arrays",
     "merge_frfs",
+    "read_channel_table",
     "read_frfs",
     "read_uff",
     "write_csv",

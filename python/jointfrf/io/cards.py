@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import reprlib
+import textwrap
 from collections.abc import Sequence
-from typing import Literal, NamedTuple, TypedDict, get_args
+from typing import Literal, NamedTuple, TypedDict, Unpack, get_args
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from jointfrf.dofs import DIRECTIONS, direction_places
-from jointfrf.kernel.arguments import FloatArray, check_choice
+from jointfrf.dofs import DIRECTIONS, direction_places, rigid_offset
+from jointfrf.kernel.arguments import FloatArray, as_real, check_choice
 
 __all__ = ["CardFormat", "CardOptions", "cards"]
 
@@ -19,6 +21,12 @@ CardFormat = Literal["abaqus", "calculix", "nastran", "ansys"]
 _LARGEST = 99_999_999
 #: How far from symmetric, relative to the largest entry, round-off may leave a matrix.
 _ROUND_OFF = 1e-10
+#: Shorter arms are rounding, m.
+_NO_ARM = 1e-9
+#: How far, relative to their distance, a point may lie from the line between two nodes.
+_ON_LINE = 1e-9
+#: Characters of a line of comment: Nastran reads 72 columns.
+_COMMENT = 68
 
 
 class CardOptions(TypedDict, total=False):
@@ -29,10 +37,17 @@ class CardOptions(TypedDict, total=False):
     rotation_nodes: Sequence[int] | None
     damping: bool
     full_matrix: bool
+    positions: ArrayLike | None
+    points: ArrayLike | None
+    comments: Sequence[str]
 
 
 class _Link(NamedTuple):
-    """A joint in all six directions: stiffness, viscous and hysteretic damping, shape (6, 6), and its numbers."""
+    """A joint in all six directions: stiffness, viscous and hysteretic damping, shape (6, 6), and its numbers.
+
+    `arms` (2, 3) lead from the nodes to the reference points of the joint on the two sides, m; `positions` (2, 3) are
+    those of the nodes, where they are known.
+    """
 
     stiffness: FloatArray
     damping: FloatArray
@@ -40,11 +55,38 @@ class _Link(NamedTuple):
     nodes: tuple[int, ...]
     element: int
     number: int
-    note: str
+    notes: tuple[str, ...]
+    arms: FloatArray
+    positions: FloatArray | None
 
     @property
     def matrices(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         return self.stiffness, self.damping, self.hysteretic
+
+    @property
+    def has_arms(self) -> bool:
+        return bool(self.arms.any())
+
+    def both_sides(self, matrix: FloatArray) -> FloatArray:
+        """T^T [[K, -K], [-K, K]] T: the joint resists the difference of the motions of its two points, shape (12, 12).
+
+        T takes the motions of the nodes to those of the points that are rigidly connected to them.
+        """
+        whole = np.kron(np.array([[1.0, -1.0], [-1.0, 1.0]]), matrix)
+        if not self.has_arms:
+            return whole
+        turn = np.zeros((12, 12))
+        for side in range(2):
+            own = slice(6 * side, 6 * side + 6)
+            turn[own, own] = rigid_offset(DIRECTIONS, self.arms[side])
+        moved = turn.T @ whole @ turn
+        # What cancels but for rounding is nothing.
+        moved[abs(moved) < _ROUND_OFF * np.sqrt(np.outer(moved.diagonal(), moved.diagonal()))] = 0
+        return (moved + moved.T) / 2
+
+    def comments(self, mark: str) -> list[str]:
+        """Write the notes as lines of comment."""
+        return [f"{mark} {note}" for note in self.notes]
 
 
 def cards(
@@ -52,12 +94,7 @@ def cards(
     dofs: Sequence[str],
     matrices: tuple[FloatArray, FloatArray, FloatArray],
     nodes: Sequence[int],
-    *,
-    element: int = 1,
-    number: int = 1,
-    rotation_nodes: Sequence[int] | None = None,
-    damping: bool = True,
-    full_matrix: bool = False,
+    **options: Unpack[CardOptions],
 ) -> str:
     """Write a joint as input of a finite-element program; `Joint.export` describes arguments and errors.
 
@@ -69,7 +106,7 @@ def cards(
         Names of the n DOFs.
     matrices : tuple of three ndarray, shape (n, n)
         Stiffness, viscous damping, hysteretic damping; N/m, N s/m, N/m and their like for rotations.
-    nodes, element, number, rotation_nodes, damping, full_matrix
+    nodes, **options
         As for `Joint.export`.
 
     Returns
@@ -78,6 +115,27 @@ def cards(
         Lines of input.
     """
     check_choice("program", program, get_args(CardFormat))
+    link = _link(program, dofs, matrices, nodes, options)
+    is_matrix = options.get("full_matrix", False) or _coupled(link)
+    if program == "calculix":
+        lines = _calculix(link)
+    elif program == "ansys":
+        lines = _ansys(link)
+    elif program == "abaqus":
+        lines = _abaqus_matrices(link) if is_matrix or link.has_arms else _abaqus_springs(link)
+    else:
+        lines = _nastran_matrices(link) if is_matrix else _nastran_bush(link)
+    return "\n".join(lines) + "\n"
+
+
+def _link(
+    program: CardFormat,
+    dofs: Sequence[str],
+    matrices: tuple[FloatArray, FloatArray, FloatArray],
+    nodes: Sequence[int],
+    options: CardOptions,
+) -> _Link:
+    """Check the arguments of `cards`."""
     places = direction_places(dofs)
     wide = []
     for name, matrix in zip(("stiffness", "damping", "hysteretic damping"), matrices, strict=True):
@@ -87,26 +145,51 @@ def cards(
         whole[np.ix_(places, places)] = (matrix + matrix.T) / 2
         wide.append(whole)
     note = f"DOFs {', '.join(DIRECTIONS[place] for place in sorted(places))}; SI units, written by jointfrf"
-    if not damping:
+    if not options.get("damping", True):
         note += ", damping left out"
         wide[1:] = [np.zeros((6, 6)), np.zeros((6, 6))]
     numbers = _two_nodes("nodes", nodes)
-    turning = () if rotation_nodes is None else _two_nodes("rotation_nodes", rotation_nodes)
-    if program == "calculix" and full_matrix:
+    turning_nodes = options.get("rotation_nodes")
+    turning = () if turning_nodes is None else _two_nodes("rotation_nodes", turning_nodes)
+    if program == "calculix" and options.get("full_matrix", False):
         raise ValueError("full_matrix is not for calculix, which reads no matrices: leave it out")
     if turning and program != "calculix":
         raise ValueError(f"rotation_nodes are for calculix: the nodes of {program} have rotations of their own")
-    element, number = _number("element", element), _number("number", number)
-    link = _Link(wide[0], wide[1], wide[2], (*numbers, *turning), element, number, note)
-    if program == "calculix":
-        lines = _calculix(link)
-    elif program == "ansys":
-        lines = _ansys(link)
-    elif program == "abaqus":
-        lines = _abaqus_matrices(link) if full_matrix or _coupled(link) else _abaqus_springs(link)
-    else:
-        lines = _nastran_matrices(link) if full_matrix or _coupled(link) else _nastran_bush(link)
-    return "\n".join(lines) + "\n"
+    element, number = _number("element", options.get("element", 1)), _number("number", options.get("number", 1))
+    positions, arms = _geometry(options)
+    notes = (note, *_text_lines(options.get("comments", ())), *_arm_note(arms))
+    return _Link(wide[0], wide[1], wide[2], (*numbers, *turning), element, number, notes, arms, positions)
+
+
+def _geometry(options: CardOptions) -> tuple[FloatArray | None, FloatArray]:
+    """Return the positions of the nodes, where they are known, and the arms from them to the reference points."""
+    given, points = options.get("positions"), options.get("points")
+    if given is None:
+        if points is not None:
+            raise ValueError("points needs positions, those of the two nodes")
+        return None, np.zeros((2, 3))
+    positions = as_real("positions", given, (2, 3))
+    if points is None:
+        raise ValueError("positions needs points, the reference point of the joint or those of its two sides")
+    ends = as_real("points", np.broadcast_to(np.asarray(points, dtype=np.float64), (2, 3)), (2, 3))
+    arms = ends - positions
+    arms[abs(arms) < _NO_ARM] = 0
+    return positions, arms
+
+
+def _text_lines(comments: Sequence[str]) -> list[str]:
+    """Return comments in lines that every program reads."""
+    if isinstance(comments, str):
+        raise TypeError("comments must be a sequence of texts, not one text")
+    lines = [line for comment in comments for line in textwrap.wrap(str(comment), _COMMENT, subsequent_indent="    ")]
+    return [line.encode("ascii", "replace").decode("ascii") for line in lines]
+
+
+def _arm_note(arms: FloatArray) -> list[str]:
+    if not arms.any():
+        return []
+    both = [", ".join(f"{value:.6g}" for value in arm + 0.0) for arm in arms]
+    return [f"rigid arms from the nodes to the joint: {both[0]} m (j), {both[1]} m (k)"]
 
 
 def _number(name: str, value: int) -> int:
@@ -125,14 +208,9 @@ def _coupled(link: _Link) -> bool:
     return any(np.count_nonzero(matrix - np.diag(matrix.diagonal())) > 0 for matrix in link.matrices)
 
 
-def _both_sides(matrix: FloatArray) -> FloatArray:
-    """[[K, -K], [-K, K]]: the joint resists the difference of the motions j and k, shape (12, 12)."""
-    return np.kron(np.array([[1.0, -1.0], [-1.0, 1.0]]), matrix)
-
-
-def _upper_entries(matrix: FloatArray, nodes: tuple[int, ...]) -> list[tuple[int, int, int, int, float]]:
+def _upper_entries(link: _Link, matrix: FloatArray) -> list[tuple[int, int, int, int, float]]:
     """(node, DOF, node, DOF, entry), DOFs from 1, of the upper triangle row by row."""
-    whole = _both_sides(matrix)
+    whole, nodes = link.both_sides(matrix), link.nodes
     found = [(r, c) for r in range(12) for c in range(r, 12) if whole[r, c] != 0]
     return [(nodes[r // 6], r % 6 + 1, nodes[c // 6], c % 6 + 1, float(whole[r, c])) for r, c in found]
 
@@ -143,7 +221,7 @@ def _real(value: float) -> str:
 
 
 def _abaqus_springs(link: _Link) -> list[str]:
-    lines = [f"** {link.note}"]
+    lines = link.comments("**")
     element = link.element
     joined = f"{link.nodes[0]}, {link.nodes[1]}"
     for i in range(6):
@@ -165,7 +243,7 @@ def _abaqus_springs(link: _Link) -> list[str]:
 
 def _abaqus_matrices(link: _Link) -> list[str]:
     lines = [
-        f"** {link.note}",
+        *link.comments("**"),
         "** matrices take part in steps of the SIM architecture, not in direct steady-state ones",
     ]
     used = []
@@ -175,38 +253,38 @@ def _abaqus_matrices(link: _Link) -> list[str]:
             name = f"JOINT{link.number}_{letter}"
             used.append(f"{word}={name}")
             lines += [f"*MATRIX INPUT, NAME={name}, TYPE=SYMMETRIC"]
-            lines += [f"{a}, {i}, {b}, {j}, {_real(x)}" for a, i, b, j, x in _upper_entries(matrix, link.nodes)]
+            lines += [f"{a}, {i}, {b}, {j}, {_real(x)}" for a, i, b, j, x in _upper_entries(link, matrix)]
     if used:
         lines.append("*MATRIX ASSEMBLE, " + ", ".join(used))
     return lines
 
 
 def _calculix(link: _Link) -> list[str]:
-    """Springs between DOFs; K_ab q_a q_b, with q = u_j - u_k, is four springs that cancel on the diagonal."""
+    """Springs that add up to the matrix: SPRING2 for each entry off the diagonal, SPRING1 for what a row sums up to."""
     if link.damping.any() or link.hysteretic.any():
         raise ValueError("calculix has no dashpot between DOFs and no complex spring: damping=False leaves damping out")
-    if link.stiffness[3:].any() and len(link.nodes) < 4:
+    whole = link.both_sides(link.stiffness)
+    turns = whole[3:6].any() or whole[9:].any()
+    if turns and len(link.nodes) < 4:
         raise ValueError(
             "rotation_nodes must name the ROT NODEs of the two rigid bodies: calculix has rotations nowhere else"
         )
 
-    def at(side: int, place: int) -> tuple[int, int]:
-        return (link.nodes[side], place + 1) if place < 3 else (link.nodes[2 + side], place - 2)
+    def at(place: int) -> tuple[int, int]:
+        side, direction = divmod(place, 6)
+        return (link.nodes[side], direction + 1) if direction < 3 else (link.nodes[2 + side], direction - 2)
 
-    springs: list[tuple[tuple[int, int], tuple[int, int], float]] = []
-    for a in range(6):
-        for b in range(a, 6):
-            k = float(link.stiffness[a, b])
-            if k != 0 and a == b:
-                springs.append((at(0, a), at(1, a), k))
-            elif k != 0:
-                springs += [(at(0, a), at(0, b), -k), (at(0, a), at(1, b), k)]
-                springs += [(at(1, a), at(0, b), k), (at(1, a), at(1, b), -k)]
-    lines = [f"** {link.note}"]
-    for i, ((node_a, dof_a), (node_b, dof_b), k) in enumerate(springs):
+    springs: list[tuple[list[tuple[int, int]], float]] = []
+    for a in range(12):
+        springs += [([at(a), at(b)], -float(whole[a, b])) for b in range(a + 1, 12) if whole[a, b] != 0]
+        if abs(whole[a].sum()) > _ROUND_OFF * abs(whole[a]).sum():
+            springs.append(([at(a)], float(whole[a].sum())))
+    lines = link.comments("**")
+    for i, (ends, k) in enumerate(springs):
         name = f"JOINT{link.number}_{i + 1}"
-        lines += [f"*ELEMENT, TYPE=SPRING2, ELSET={name}", f"{link.element + i}, {node_a}, {node_b}"]
-        lines += [f"*SPRING, ELSET={name}", f"{dof_a}, {dof_b}", _real(k)]
+        lines += [f"*ELEMENT, TYPE=SPRING{len(ends)}, ELSET={name}"]
+        lines += [", ".join(map(str, (link.element + i, *(node for node, _ in ends))))]
+        lines += [f"*SPRING, ELSET={name}", ", ".join(str(dof) for _, dof in ends), _real(k)]
     return lines
 
 
@@ -242,14 +320,51 @@ def _nastran_bush(link: _Link) -> list[str]:
     for word, values in (("B", c), ("GE", eta)):
         if values.any():
             fields += ["", word, *values.tolist()]
-    j, k_side = link.nodes[:2]
-    blank = " " * 8
+    apart = [] if link.positions is not None else [
+        "CBUSH puts rigid arms between grids that are apart: the joint then",
+        "    acts midway between them",
+    ]  # fmt: skip
+    place = _bush_place(link)
+    if place is None:
+        return _nastran_matrices(link)
+    system, where = place
     return [
-        f"$ {link.note}",
-        "$ exact where the two grids coincide: CBUSH puts rigid arms between grids that are apart",
-        f"CBUSH   {link.element:8d}{link.number:8d}{j:8d}{k_side:8d}{blank}{blank}{blank}{0:8d}",
+        *link.comments("$"),
+        *(f"$ {line}" for line in apart),
+        *system,
+        *_bush(link, where),
         *_large("PBUSH", fields),
     ]
+
+
+def _bush(link: _Link, where: list[str | int | float]) -> list[str]:
+    """Write a CBUSH whose axes are those of the basic system."""
+    numbers = [link.element, link.number, *link.nodes[:2]]
+    if where:
+        return _large("CBUSH", [*numbers, "", "", "", 0, *where])
+    return [f"{'CBUSH':<8}" + "".join(f"{number:8d}" for number in numbers) + " " * 24 + f"{0:8d}"]
+
+
+def _bush_place(link: _Link) -> tuple[list[str], list[str | int | float]] | None:
+    """Say where the spring of a CBUSH is: cards of a coordinate system, and the fields S, OCID, S1, S2, S3.
+
+    None where the joint has not one point on both sides: a CBUSH has one.
+    """
+    if link.positions is None or not link.has_arms:
+        return [], []
+    node_j, node_k = link.positions
+    at = node_j + link.arms[0]
+    if not np.allclose(at, node_k + link.arms[1], rtol=0, atol=_NO_ARM):
+        return None
+    apart = node_k - node_j
+    length = float(np.linalg.norm(apart))
+    share = float(link.arms[0] @ apart) / length**2 if length > 0 else -1.0
+    if 0 <= share <= 1 and np.linalg.norm(link.arms[0] - share * apart) <= _ON_LINE * length:
+        return [], [share]
+    # A coordinate system that begins at grid GA: the same place, whether S1 to S3 count from there or from the system.
+    corners = [node_j, node_j + np.array([0.0, 0.0, 1.0]), node_j + np.array([1.0, 0.0, 0.0])]
+    fields: list[str | int | float] = [link.number, 0, *(float(x) for corner in corners for x in corner)]
+    return _large("CORD2R", fields), ["", link.number, *(float(x) for x in link.arms[0])]
 
 
 def _nastran_matrices(link: _Link) -> list[str]:
@@ -257,11 +372,11 @@ def _nastran_matrices(link: _Link) -> list[str]:
     used = [(command, names[command], m) for command, m in zip(names, link.matrices, strict=True) if m.any()]
     if any(len(name) > 8 for _, name, _ in used):
         raise ValueError("number must have at most six digits: it is part of a name of eight characters")
-    lines = [f"$ {link.note}", "$ case control: " + ", ".join(f"{command} = {name}" for command, name, _ in used)]
+    lines = [*link.comments("$"), "$ case control: " + ", ".join(f"{command} = {name}" for command, name, _ in used)]
     for _, name, matrix in used:
         lines.append(f"DMIG    {name:<8}{0:8d}{6:8d}{2:8d}{0:8d}")
         column = None
-        for node_a, dof_a, node_b, dof_b, value in _upper_entries(matrix, link.nodes):
+        for node_a, dof_a, node_b, dof_b, value in _upper_entries(link, matrix):
             # Symmetric: the entry of a row of the upper triangle is that of a column of the lower one.
             if (node_a, dof_a) != column:
                 column = (node_a, dof_a)
@@ -274,13 +389,13 @@ def _nastran_matrices(link: _Link) -> list[str]:
 def _ansys(link: _Link) -> list[str]:
     """MATRIX27 elements: the upper triangle row by row, UX ... ROTZ of node j, then of node k."""
     if link.hysteretic.any():
-        raise ValueError("ansys' MATRIX27 has no hysteretic damping: damping=False leaves damping out")
-    lines = [f"! {link.note}; directions are those of the nodal coordinate systems"]
+        raise ValueError("MATRIX27 of ansys has no hysteretic damping: damping=False leaves damping out")
+    lines = [*link.comments("!"), "! directions are those of the nodal coordinate systems"]
     i = 0
     for option, matrix in ((4, link.stiffness), (5, link.damping)):
         if not matrix.any():
             continue
-        constants = [f"{value:.12E}" if value else "0" for value in _both_sides(matrix)[np.triu_indices(12)]]
+        constants = [f"{value:.12E}" if value else "0" for value in link.both_sides(matrix)[np.triu_indices(12)]]
         kind = link.number + i
         lines.append(f"ET,{kind},MATRIX27,,0,{option}")
         for first in range(0, len(constants), 6):

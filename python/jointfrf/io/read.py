@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from jointfrf.errors import FileContentError
+from jointfrf.files import head_of
 from jointfrf.frf.frf_set import FrfSet
 from jointfrf.frf.merge import merge_frfs
 from jointfrf.io.arrays import FrfArrays, as_frf_set
@@ -33,7 +34,6 @@ FORMATS = {
     "HDF5": (".h5", ".hdf5"),
     "CSV": (".csv", ".txt"),
 }
-_HEAD = 1 << 13
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 #: Beginnings of files that are something else, and what is said of them.
 _OTHERS = (
@@ -127,7 +127,7 @@ def read_frfs(
 
 def _read(path: Path, wanted: _Wanted) -> FrfSet:
     """Read one file."""
-    reader = _reader(path, _head(path))
+    reader = _reader(path, head_of(path))
     if reader is None:
         return read_uff_part(
             path,
@@ -139,21 +139,6 @@ def _read(path: Path, wanted: _Wanted) -> FrfSet:
         )
     found = as_frf_set(reader(path, wanted.mapping), str(path), wanted.quantity, forced=wanted.forced, stacklevel=5)
     return found if wanted.nodes is None else found.at_nodes(wanted.nodes)
-
-
-def _head(path: Path) -> bytes:
-    if not path.exists():
-        raise FileNotFoundError(f"there is no file {path}")
-    if path.is_dir():
-        raise FileContentError(f"{path} is a folder, not a file")
-    try:
-        with path.open("rb") as file:
-            head = file.read(_HEAD)
-    except OSError as error:
-        raise FileContentError(f"{path} cannot be read: {error.strerror}") from error
-    if not head.strip() and path.stat().st_size <= _HEAD:
-        raise FileContentError(f"{path} is empty")
-    return head
 
 
 def _reader(path: Path, head: bytes) -> Callable[[Path, FrfMapping], FrfArrays] | None:

@@ -13,14 +13,13 @@ import numpy as np
 
 from jointfrf.errors import FileContentError, FileContentWarning
 from jointfrf.extras import import_extra
+from jointfrf.files import HEAD, head_of
 from jointfrf.io.uff_index import Dataset, index_datasets
 from jointfrf.io.units import UnitSystem
 
 __all__ = ["UniversalFile", "name_some"]
 
 _NUMBERS_SHOWN = 5
-#: What the text before the numbers of a dataset 58 takes at most.
-_HEADER = 1 << 13
 #: What pyuff runs into where a file is damaged; it raises a bare `Exception` instead, for these and for any other.
 _DAMAGE = (ValueError, LookupError, ArithmeticError, struct.error)
 _Answer = TypeVar("_Answer")
@@ -42,7 +41,7 @@ class UniversalFile:
         self.path = path
         self._notes: dict[str, list[int]] = {}
         self._systems: dict[int, UnitSystem] | None = None
-        self._check_file()
+        head_of(path)  # what is no file, or empty, is said before anything is sought in it
         index, is_cut = index_datasets(path)
         if not index:
             raise self.error(
@@ -53,7 +52,7 @@ class UniversalFile:
             if kind <= 0:
                 raise self.error(f"is damaged: dataset {number} has no type, a delimiter (-1) is missing before it")
         self._reader = _reader(pyuff, path, index)
-        self._headers = _reader(pyuff, path, [each._replace(end=min(each.end, each.start + _HEADER)) for each in index])
+        self._headers = _reader(pyuff, path, [each._replace(end=min(each.end, each.start + HEAD)) for each in index])
         if is_cut:
             self.note("ends inside a dataset, which is left out", len(self.types) + 1)
 
@@ -107,19 +106,6 @@ class UniversalFile:
             if not _is_damage(error, outside):
                 raise
             raise self.error(sentence) from error
-
-    def _check_file(self) -> None:
-        if not self.path.exists():
-            raise FileNotFoundError(f"there is no file {self.path}")
-        if self.path.is_dir():
-            raise self.error("is a folder, not a file")
-        try:
-            with self.path.open("rb") as file:
-                is_empty = not file.read(_HEADER).strip()
-        except OSError as error:
-            raise self.error(f"cannot be read: {error.strerror}") from error
-        if is_empty and self.path.stat().st_size <= _HEADER:
-            raise self.error("is empty")
 
 
 def _reader(pyuff: Any, path: Path, index: Sequence[Dataset]) -> Any:

@@ -17,6 +17,7 @@ __all__ = [
     "LARGE_COPY",
     "ComplexArray",
     "FloatArray",
+    "as_array",
     "as_dofs",
     "as_frequency",
     "as_interface",
@@ -39,11 +40,20 @@ FloatArray = NDArray[np.float64]
 LARGE_COPY = 16 * 2**20
 
 
+def as_array(name: str, value: ArrayLike) -> NDArray[Any]:
+    """Return an array of any type; masked entries, which `numpy.asarray` would uncover, are refused."""
+    if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
+        mask = np.ma.getmaskarray(value)
+        first = tuple(int(i) for i in np.unravel_index(int(np.argmax(mask)), mask.shape))
+        raise ValueError(f"{name} has masked entries, the first at index {first}: leave their lines out, or fill them")
+    return np.asarray(value)
+
+
 def _converted(name: str, value: ArrayLike, dtype: type, *, later: bool = False) -> NDArray[Any]:
     """Return contiguous numbers of the type; with `later`, an array in a file is left for `run` to convert."""
     if type(value) is np.ndarray and value.dtype == dtype and value.flags.c_contiguous:
         return value
-    array = np.asarray(value)
+    array = as_array(name, value)
     if array.dtype.kind not in ("biufc" if dtype is np.complex128 else "biuf"):
         wanted = "numbers" if dtype is np.complex128 else "real numbers"
         raise TypeError(f"{name} must hold {wanted}, not {array.dtype}")
@@ -87,7 +97,7 @@ def as_square(name: str, value: ArrayLike, n_freq: int | None = None, *, later: 
 
 def as_joint_lines(name: str, value: ArrayLike, n: int | None, n_freq: int) -> ComplexArray:
     """Return joint matrices (n_freq, n, n) for `run`; one matrix (n, n) serves all lines."""
-    array = np.asarray(value)
+    array = as_array(name, value)
     if array.ndim == 2:
         one = as_square(name, array[None])
         lines: ComplexArray = np.broadcast_to(one, (n_freq, *array.shape))
@@ -147,7 +157,7 @@ def check_finite_lines(name: str, lines: ComplexArray, freq_hz: FloatArray | Non
 
 def as_number(name: str, value: object) -> float:
     """Return one finite real number."""
-    if isinstance(value, str | bytes) or np.ndim(value) or np.asarray(value).dtype.kind not in "biuf":  # type: ignore[arg-type]
+    if isinstance(value, str | bytes) or np.ndim(value) or as_array(name, value).dtype.kind not in "biuf":  # type: ignore[arg-type]
         raise TypeError(f"{name} must be one real number, not {reprlib.repr(value)}")
     number = float(value)  # type: ignore[arg-type]
     if not np.isfinite(number):
@@ -165,7 +175,7 @@ def as_values(name: str, value: ArrayLike, n: int) -> ComplexArray:
 
 def as_dofs(name: str, dofs: ArrayLike, n: int, *, unique: bool = True) -> NDArray[np.int32]:
     """Return DOF indices, counted from 0 by the caller, as the kernel counts them (from 1)."""
-    array = np.asarray(dofs)
+    array = as_array(name, dofs)
     if array.ndim != 1 or (array.size and array.dtype.kind not in "iu"):
         raise TypeError(f"{name} must be a list of DOF numbers")
     array = array.astype(np.int64)
@@ -183,6 +193,8 @@ def checked_out(
     """Return `out` if results can be written into it; no array of `args` may share its memory."""
     if not isinstance(out, np.ndarray):
         raise TypeError(f"out must be a numpy array, not {type(out).__name__}")
+    if isinstance(out, np.ma.MaskedArray):
+        raise TypeError("out must be a plain numpy array, not a masked one")
     if out.shape != shape:
         raise ValueError(f"out must have shape {shape}, not {out.shape}")
     if out.dtype != np.complex128:

@@ -10,9 +10,9 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse import csc_matrix
 
-from jointfrf.kernel.arguments import FloatArray, as_real
+from jointfrf.kernel.arguments import FloatArray, as_array, as_real
 
-__all__ = ["Matrix", "ModelMatrices"]
+__all__ = ["Matrix", "ModelMatrices", "from_triangle"]
 
 Matrix = Any  # array_like or scipy sparse array
 
@@ -56,6 +56,15 @@ class ModelMatrices:
                 wanted = "(n, n)" if n is None else f"({n}, {n})"
                 raise ValueError(f"{name} must have shape {wanted}, not {tuple(shape)}")
             n = shape[0]
+            if not sparse.issparse(matrix):
+                object.__setattr__(self, name, as_real(name, matrix, (n, n)))
+            half = _half(self.named[name])
+            # Beside a stiffness that is not symmetric, as with rotors or friction, half a matrix may be meant.
+            if half is not None and (name == "stiffness" or self.is_symmetric("stiffness")):
+                raise ValueError(
+                    f"{name} holds its {half} triangle only, as files of symmetric matrices do: complete it by "
+                    "from_triangle"
+                )
 
     @property
     def named(self) -> dict[str, Matrix | None]:
@@ -122,6 +131,56 @@ class ModelMatrices:
         if viscous is None or structural is None:
             return None
         return viscous[0], viscous[1], self.loss_factor + structural[1]
+
+
+def from_triangle(matrix: Matrix) -> Matrix:
+    """Return the symmetric matrix of which one triangle, with the diagonal, is given.
+
+    Parameters
+    ----------
+    matrix : array_like or scipy sparse array, shape (n, n)
+        Its other triangle is empty, as finite-element programs write symmetric matrices.
+
+    Returns
+    -------
+    ndarray or scipy sparse array, shape (n, n)
+
+    Raises
+    ------
+    ValueError
+        The matrix is not square, or has entries on both sides of the diagonal.
+
+    Examples
+    --------
+    >>> import jointfrf as jf
+    >>> jf.from_triangle([[2.0, 0.0], [-1.0, 2.0]]).tolist()
+    [[2.0, -1.0], [-1.0, 2.0]]
+    """
+    whole = sparse.csc_array(matrix) if sparse.issparse(matrix) else as_array("matrix", matrix)
+    if len(whole.shape) != 2 or whole.shape[0] != whole.shape[1]:
+        raise ValueError(f"matrix must have shape (n, n), not {tuple(whole.shape)}")
+    below, above = _sides(whole)
+    if below and above:
+        raise ValueError("matrix has entries on both sides of the diagonal: it is whole already")
+    if sparse.issparse(whole):
+        return whole + whole.T - sparse.diags_array(whole.diagonal())
+    return whole + whole.T - np.diag(np.diagonal(whole))
+
+
+def _half(matrix: Matrix) -> str | None:
+    """Return which triangle of a matrix is there where the other is empty."""
+    below, above = _sides(matrix)
+    return None if below == above else "lower" if below else "upper"
+
+
+def _sides(matrix: Matrix) -> tuple[bool, bool]:
+    """Return whether a square matrix has entries below, and above its diagonal."""
+    if sparse.issparse(matrix):
+        entries = sparse.coo_array(matrix)
+        at = entries.row[entries.data != 0], entries.col[entries.data != 0]
+        return bool((at[0] > at[1]).any()), bool((at[0] < at[1]).any())
+    array = np.asarray(matrix)
+    return bool(np.tril(array, -1).any()), bool(np.triu(array, 1).any())
 
 
 def _largest(matrix: sparse.csc_array) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -55,6 +56,11 @@ class Model:
     structural_damping: sparse.sparray | FloatArray | None = None
     loss_factor: float = 0.0
 
+    def __post_init__(self) -> None:
+        n = np.shape(self.stiffness)[0]
+        if len(self.dofs) != n or len(set(self.dofs)) != n:
+            raise ValueError(f"dofs must name {n} different DOFs, those of stiffness, not {len(set(self.dofs))}")
+
     def index(self, *names: str) -> int | list[int]:
         """Return the number of a DOF, or the list of several, counted from 0.
 
@@ -83,11 +89,15 @@ class Model:
     def receptance(
         self,
         freq_hz: ArrayLike,
-        outputs: ArrayLike | Matrix | None = None,
-        inputs: ArrayLike | Matrix | None = None,
+        outputs: Sequence[str] | ArrayLike | Matrix | None = None,
+        inputs: Sequence[str] | ArrayLike | Matrix | None = None,
         method: ReceptanceMethod = "auto",
     ) -> ComplexArray:
-        """Receptance of the model, see `jointfrf.receptance`; `inputs` are the `outputs` by default."""
+        """Receptance of the model, see `jointfrf.receptance`; `inputs` are the `outputs` by default.
+
+        Both are names of DOFs, or what `jointfrf.receptance` takes.
+        """
+        outputs = self._numbered(outputs)
         return receptance(
             freq_hz,
             self.stiffness,
@@ -96,9 +106,17 @@ class Model:
             self.loss_factor,
             self.structural_damping,
             outputs,
-            outputs if inputs is None else inputs,
+            outputs if inputs is None else self._numbered(inputs),
             method=method,
         )
+
+    def _numbered(self, ports: Any) -> Any:
+        """Return the numbers of DOFs that are named, anything else as it is."""
+        if isinstance(ports, str):
+            return self.ports(ports)
+        if isinstance(ports, list | tuple) and ports and all(isinstance(one, str) for one in ports):
+            return self.ports(*ports)
+        return ports
 
     def natural_frequencies(self, count: int | None = None) -> FloatArray:
         """Undamped natural frequencies, lowest first.

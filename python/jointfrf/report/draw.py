@@ -12,7 +12,7 @@ from jointfrf.report.figure import Figure, Panel, Surface
 from jointfrf.report.svg import shortened
 from jointfrf.report.ticks import format_axis
 
-__all__ = ["STYLES", "Drawing", "Style", "draw"]
+__all__ = ["STYLES", "Drawing", "Style", "draw", "laid_out"]
 
 
 class Drawing(NamedTuple):
@@ -52,6 +52,9 @@ STYLES = {
     "high": Style("#e07b00", "--", 1.2),
     "faint": Style("#a8a8a8", "-", 0.3),
     "dots": Style("#8c8c8c", "", 1.0, "."),
+    "wide": Style("#eeb574", "-", 4.0),
+    "fitted": Style("#16365f", "-", 1.1),
+    "difference": Style("#8c8c8c", "-", 0.7),
     "outlying": Style("#7b1a10", "", 1.0, "x"),
 }
 _SHADES = ("#ececec", "#d2d2d2", "#bdbdbd")
@@ -90,15 +93,31 @@ def draw(figure: Figure) -> Drawing:
         A PNG and an SVG file; the same data give the same files.
     """
     check_extras("matplotlib")
-    import matplotlib
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.backends.backend_svg import FigureCanvasSVG
+
+    canvas = laid_out(figure)
+    with _settings(figure):
+        png, svg = io.BytesIO(), io.BytesIO()
+        canvas.set_dpi(_RESOLUTION)
+        canvas.draw_without_rendering()
+        # The layout is found: each file is drawn once, by its own canvas (`savefig` would lay out and draw twice).
+        canvas.set_layout_engine("none")
+        # No version and no date inside.
+        FigureCanvasAgg(canvas).print_png(png, metadata={"Software": None})
+        canvas.set_dpi(_RESOLUTION_INSIDE)
+        FigureCanvasSVG(canvas).print_svg(svg, metadata={"Date": None, "Creator": None})
+    return Drawing(png.getvalue(), shortened(svg.getvalue().decode()).encode())
+
+
+def laid_out(figure: Figure) -> Any:
+    """Return a figure as matplotlib has it, `matplotlib.figure.Figure`, not yet drawn."""
+    check_extras("matplotlib")
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure as Canvas
 
     heights = _row_heights(figure)
-    # The settings hold inside this block only.
-    settings: dict[str, Any] = {**_FONTS, **_SETTINGS, "svg.hashsalt": figure.key}
-    with matplotlib.rc_context(settings):  # type: ignore[arg-type]
+    with _settings(figure):
         canvas = Canvas(figsize=(_WIDTH, sum(heights) + 0.4), layout="constrained")
         FigureCanvasAgg(canvas)
         grid = canvas.add_gridspec(len(heights), figure.columns, height_ratios=heights)
@@ -115,16 +134,15 @@ def draw(figure: Figure) -> Drawing:
         canvas.align_ylabels(axes)
         if figure.heading:
             canvas.suptitle(figure.heading, fontsize=_HEADING)
-        png, svg = io.BytesIO(), io.BytesIO()
-        canvas.set_dpi(_RESOLUTION)
-        canvas.draw_without_rendering()
-        # The layout is found: each file is drawn once, by its own canvas (`savefig` would lay out and draw twice).
-        canvas.set_layout_engine("none")
-        # No version and no date inside.
-        FigureCanvasAgg(canvas).print_png(png, metadata={"Software": None})
-        canvas.set_dpi(_RESOLUTION_INSIDE)
-        FigureCanvasSVG(canvas).print_svg(svg, metadata={"Date": None, "Creator": None})
-    return Drawing(png.getvalue(), shortened(svg.getvalue().decode()).encode())
+    return canvas
+
+
+def _settings(figure: Figure) -> Any:
+    """Return the settings of matplotlib for a figure, which hold inside a `with` block only."""
+    import matplotlib
+
+    settings: dict[str, Any] = {**_FONTS, **_SETTINGS, "svg.hashsalt": figure.key}
+    return matplotlib.rc_context(settings)  # type: ignore[arg-type]
 
 
 def _names(panel: Panel) -> list[str]:

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import json
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from jointfrf.dofs import Parameter, compliance_unit
+from jointfrf.errors import IllConditionedWarning
 from jointfrf.files import write_file
 from jointfrf.identification.joint_fit import JointFit
-from jointfrf.kernel.arguments import ComplexArray
+from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.kernel.linear_algebra import invert
 from jointfrf.report.axes import FREQUENCY, bulk_limits
 from jointfrf.report.draw import draw
@@ -33,20 +37,47 @@ def fit_figures(fit: JointFit) -> list[Figure]:
     list of Figure
         ``"joint_<dof>"`` for each DOF.
     """
-    fitted = fit.k_joint(fit.freq_hz)
-    lines = fit.k_lines
-    compliance = invert(fitted, on_singular="nan")
-    each_compliance = invert(np.where(np.isfinite(lines), lines, 0), on_singular="nan")
+    up = np.argsort(fit.freq_hz, kind="stable")
+    freq, lines = fit.freq_hz[up], fit.k_lines[up]
+    fitted = fit.k_joint(freq)
+    with warnings.catch_warnings():
+        # Displacements and rotations differ by orders of magnitude.
+        warnings.simplefilter("ignore", IllConditionedWarning)
+        compliance = invert(fitted, on_singular="nan")
+        each_compliance = _inverted(lines) if fit.data is None else fit.data.line_compliance()[up]
+    used = np.ones(lines.shape[:2], np.bool_) if fit.data is None else fit.data.fitted[up]
     figures = []
     for d, dof in enumerate(fit.dofs):
         stiffness = Parameter.of_dof("k", dof)
-        panels = [
-            *_panels(fit, f"K*, {stiffness.unit}", lines[:, d, d], fitted[:, d, d], _interval(fit, stiffness)),
-            *_panels(fit, f"C, {compliance_unit(dof, dof)}", each_compliance[:, d, d], compliance[:, d, d], ()),
-        ]
+        panels = []
+        for label, each, curve, ribbons in (
+            (f"K*, {stiffness.unit}", lines[:, d, d], fitted, _interval(fit, stiffness)),
+            (f"C, {compliance_unit(dof, dof)}", each_compliance[:, d], compliance, ()),
+        ):
+            own = _Lines(fit.method, label, freq, each, curve[:, d, d], used[:, d], ribbons)
+            panels += _panels(own if label.startswith("C") else _as_open(own, fit, stiffness))
         words = f"Joint DOF {dof}: complex stiffness K* and compliance C"
         figures.append(Figure(f"joint_{dof}", words, tuple(panels), 2, heading=words))
     return figures
+
+
+def _inverted(k_lines: ComplexArray) -> ComplexArray:
+    """Return the diagonal of the compliance of each line, shape (n_freq, n)."""
+    inverse = invert(np.where(np.isfinite(k_lines), k_lines, 0), on_singular="nan")
+    return np.asarray(np.einsum("ldd->ld", inverse))
+
+
+class _Lines(NamedTuple):
+    """One entry of K* or C: values of each line by itself, as fitted, which lines were used, interval or bound."""
+
+    method: str
+    label: str
+    freq_hz: FloatArray
+    each: ComplexArray
+    fitted: ComplexArray
+    used: NDArray[np.bool_]
+    interval: tuple[Ribbon, ...] = ()
+    bound: float | None = None
 
 
 def _interval(fit: JointFit, stiffness: Parameter) -> tuple[Ribbon, ...]:
@@ -54,23 +85,37 @@ def _interval(fit: JointFit, stiffness: Parameter) -> tuple[Ribbon, ...]:
     low, high = fit.confidence_interval(0.95)[stiffness.name]
     if not (np.isfinite(low) and np.isfinite(high)):
         return ()
-    ends = fit.freq_hz[[0, -1]]
+    ends = np.array([fit.freq_hz.min(), fit.freq_hz.max()])
     return (Ribbon("95 % interval of k", ends, np.full(2, low), np.full(2, high), "low"),)
 
 
-def _panels(
-    fit: JointFit, label: str, each: ComplexArray, fitted: ComplexArray, interval: tuple[Ribbon, ...]
-) -> list[Panel]:
-    """Real and imaginary part of one entry; the interval belongs to the real part."""
+def _as_open(lines: _Lines, fit: JointFit, stiffness: Parameter) -> _Lines:
+    """Put the lower bound in place of a stiffness that cannot be distinguished from a rigid one."""
+    low, high = fit.confidence_interval(0.95)[stiffness.name]
+    return lines if np.isfinite(high) else lines._replace(bound=max(low, 0.0))
+
+
+def _panels(lines: _Lines) -> list[Panel]:
+    """Real and imaginary part of one entry; interval and bound belong to the real part."""
     panels = []
-    for part, values, curve in (("Re", each.real, fitted.real), ("Im", each.imag, fitted.imag)):
-        curves = (
-            Curve("each line", fit.freq_hz, values, "dots"),
-            Curve(f"fit ({fit.method})", fit.freq_hz, curve, "actual"),
-        )
-        ribbons = interval if part == "Re" else ()
-        shown = [float(curve.min()), float(curve.max())] if np.isfinite(curve).all() else []
-        panels.append(Panel("", FREQUENCY, f"{part} {label}", curves, ribbons, y_limits=bulk_limits([values], shown)))
+    used, out = lines.used, ~lines.used
+    for part, values, curve in (
+        ("Re", lines.each.real, lines.fitted.real),
+        ("Im", lines.each.imag, lines.fitted.imag),
+    ):
+        curves, shown = [Curve("each line", lines.freq_hz[used], values[used], "dots")], []
+        if lines.bound is None:
+            curves.append(Curve(f"fit ({lines.method})", lines.freq_hz, curve, "actual"))
+            shown = [float(curve.min()), float(curve.max())] if np.isfinite(curve).all() else []
+        elif part == "Re" and lines.bound > 0:
+            ends = lines.freq_hz[[0, -1]]
+            curves.append(Curve("lower bound of k, 95 %", ends, np.full(2, lines.bound), "high"))
+            shown = [lines.bound]
+        if out.any():
+            curves.append(Curve("lines left out", lines.freq_hz[out], values[out], "outlying"))
+        ribbons = lines.interval if part == "Re" else ()
+        limits = bulk_limits([values], shown)
+        panels.append(Panel("", FREQUENCY, f"{part} {lines.label}", tuple(curves), ribbons, y_limits=limits))
     return panels
 
 
@@ -100,7 +145,7 @@ def write_fit(fits: Sequence[JointFit], folder: Path, source: str, figures: Sequ
     OSError
         The files cannot be written.
     """
-    text = json.dumps({"source": source, "fits": [fit.to_dict() for fit in fits]}, indent=2)
+    text = json.dumps({"source": source, "fits": [fit.to_dict(lines=False) for fit in fits]}, indent=2)
     contents: dict[str, str | bytes] = {"identification.json": text + "\n"}
     for i, fit in enumerate(fits):
         for figure in fit_figures(fit):

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["format_axis", "prefixed_unit", "tick_texts"]
+__all__ = ["axis_values", "format_axis", "prefixed_unit", "tick_texts", "value_text"]
 
 _PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"}
 #: Units that a prefix may precede, by how they begin; hertz, percent, decibel and lengths are shown as they are.
@@ -16,6 +16,7 @@ _TAKE_PREFIX = ("N", "m/N", "rad/")
 _SHORT = (0.1, 1e4)
 #: Decades of a logarithmic axis: below the first, numbers at equal distances; below the second at 1, 2, 5; else at 1.
 _NARROW, _WIDE = 0.7, 2.0
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _MOST_TICKS, _MOST_BESIDE = 10, 5
 
 
@@ -67,6 +68,56 @@ def tick_texts(values: Sequence[float]) -> list[str]:
         texts = [f"{value:g}" for value in values]
     # A zero has no sign, and a minus is as long as a plus.
     return [(text[1:] if text.startswith("-") and float(text) == 0 else text).replace("-", "−") for text in texts]
+
+
+def axis_values(low: float, high: float, most: int, *, log: bool = False) -> list[float]:
+    """Choose values along an axis at which numbers are written; the script of a page that zooms chooses the same.
+
+    Parameters
+    ----------
+    low, high : float
+        Limits, logarithms to base ten with `log`.
+    most : int
+        Values at most, about.
+    log : bool
+        Whether the axis is logarithmic: values are logarithms, too.
+
+    Examples
+    --------
+    >>> from jointfrf.report.ticks import axis_values
+    >>> axis_values(0.0, 9.9, 6), axis_values(-9.2, -3.1, 5, log=True)
+    ([0.0, 2.0, 4.0, 6.0, 8.0], [-8.0, -6.0, -4.0])
+    """
+    if log and high - low < _WIDE:
+        inside = [np.log10(v) + n for n in range(int(np.floor(low)), int(np.ceil(high)) + 1) for v in (1, 2, 5)]
+        inside = [float(value) for value in inside if low <= value <= high]
+        if high - low >= _NARROW and len(inside) > 1:
+            return inside
+        values = axis_values(10.0**low, 10.0**high, most)
+        return [float(np.log10(value)) for value in values if value > 0]
+    rough = (high - low) / most
+    if log:
+        step = float(max(1, np.ceil(rough)))
+    else:
+        size = 10.0 ** np.floor(np.log10(rough))
+        step = float(size * next(nice for nice in (1, 2, 2.5, 5, 10) if nice * size >= rough * (1 - 1e-9)))
+    first = np.ceil(low / step - 1e-9)
+    return [float(step * number) + 0.0 for number in np.arange(first, np.floor(high / step + 1e-9) + 1)]
+
+
+def value_text(value: float) -> str:
+    """Write a power of ten as one, and other values with four digits.
+
+    Examples
+    --------
+    >>> from jointfrf.report.ticks import value_text
+    >>> value_text(1e-7), value_text(1.0), value_text(0.05)
+    ('10⁻⁷', '1', '0.05')
+    """
+    power = round(np.log10(value)) if value > 0 else 0
+    if power in (0, 1) or not np.isclose(value, 10.0**power, rtol=1e-9, atol=0):
+        return f"{value:.4g}"
+    return "10" + str(power).translate(_RAISED)
 
 
 def format_axis(axis: Any, label: str, *, log: bool = False, step: float | None = None, beside: int = 1) -> None:

@@ -10,11 +10,11 @@ import pytest
 from jointfrf.cases import catalogue
 from jointfrf.cases.catalogue import find_case, list_cases, read_case
 from jointfrf.cases.key_page import key_page
-from jointfrf.cases.keys import look_alike
 from jointfrf.cases.kinds import KINDS
-from jointfrf.cases.toml_table import TomlTable, read_toml
 from jointfrf.cli.main import main
 from jointfrf.errors import FileContentError
+from jointfrf.spelling import look_alike
+from jointfrf.toml.table import TomlTable, read_toml
 from own_case import write_by_matrices, write_by_receptances
 
 #: Cases that are read without a mesh.

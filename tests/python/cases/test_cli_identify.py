@@ -106,11 +106,36 @@ def test_hammer_test_that_comes_with_the_project(tmp_path):
         assert word in result.stdout
 
 
-def test_without_a_joint_it_tells_what_the_file_holds():
-    printed = run(BARS).stdout
-    assert "36 receptances m/N: 6 responses x 6 excitations, none missing" in printed
-    assert "coordinates of 6 of 6 nodes" in printed
-    assert "--dofs" in printed
+@pytest.mark.parametrize(
+    ("words", "missing"),
+    [
+        ([], "--j, --k and --dofs are missing"),
+        (["--k", "201", "--dofs", "y"], "--j is missing: the nodes on side j"),
+        (["--j", "101", "--dofs", "y"], "--k is missing: the nodes on side k of the joint, such as --k 201,202"),
+        (["--j", "101", "--k", "201"], "--dofs is missing"),
+    ],
+)
+def test_what_is_missing_on_the_command_line_is_named(words, missing):
+    result = run(BARS, *words, expect=2)
+    assert missing in result.stderr
+    assert "--dofs" in missing or "two_bars.uff has nodes 101 to 103, 201 to 203" in result.stderr
+    assert len(result.stderr.splitlines()) == 1
+    assert result.stdout == ""
+
+
+def test_the_report_is_written_where_it_is_asked_for(tmp_path):
+    pytest.importorskip("jinja2")
+    page = tmp_path / "for" / "customer.html"
+    words = (BARS, *JOINT_OF_BARS, "--method", "inverse-substructuring,compliance", "--report", page)
+    result = run(*words, "--export", "nastran:9001,9002")
+    assert result.stdout.endswith(f"wrote {page}\n")
+    text = page.read_text(encoding="utf-8")
+    for said in ("Joint identified from two_bars.uff", "jointfrf identify ", "--report", "Rotational stiffness about z",
+                 "       1       1    9001    9002"):  # fmt: skip
+        assert said in text, said
+    assert [path.name for path in page.parent.iterdir()] == ["customer.html"]
+    result = run(BARS, *JOINT_OF_BARS, "--method", "inverse-substructuring", "--report", page, expect=2)
+    assert "--report is of method compliance" in result.stderr
 
 
 @pytest.mark.parametrize(
@@ -119,10 +144,7 @@ def test_without_a_joint_it_tells_what_the_file_holds():
         (["--j", "101,102", "--k", "201,202", "--dofs", "x"], "101:+x / 101:+x"),
         (["--j", "101,999", "--k", "201,202", "--dofs", "y"], "no FRF at node 999"),
         (["--j", "101,103", "--k", "201,203", "--dofs", "y,theta_x"], "theta_x cannot be seen from nodes 101, 103"),
-        (["--j", "101", "--k", "201,202", "--dofs", "y"], "same number of nodes"),
         ([*JOINT_OF_BARS, "--band", "1700:1900"], "holds no frequency line"),
-        ([*JOINT_OF_BARS, "--spacing", "0.01"], "--spacing and --axis go together"),
-        ([*JOINT_OF_BARS[:-1], "phi"], "dofs must be among x, y, z, theta_x, theta_y, theta_z, not 'phi'"),
     ],
 )
 def test_what_is_missing_is_said_in_one_sentence(words, message, capsys):
@@ -130,6 +152,20 @@ def test_what_is_missing_is_said_in_one_sentence(words, message, capsys):
     printed = capsys.readouterr().err
     assert message in printed
     assert printed.startswith("jointfrf: error:")
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--j", "101", "--k", "201,202", "--dofs", "y"], "same number of nodes"),
+        ([*JOINT_OF_BARS, "--spacing", "0.01"], "--spacing and --axis go together"),
+        ([*JOINT_OF_BARS[:-1], "phi"], "dofs must be among x, y, z, theta_x, theta_y, theta_z, not 'phi'"),
+        ([*JOINT_OF_BARS[:-1], "theta_w"], "did you mean theta_"),
+    ],
+)
+def test_words_that_do_not_go_together_are_a_usage_error(words, message):
+    result = run(BARS, *words, expect=2)
+    assert message in result.stderr.splitlines()[-1]
 
 
 @needs_data
@@ -159,7 +195,7 @@ def test_a_file_that_is_missing_or_no_universal_file(tmp_path):
 @needs_data
 def test_vendor_files_give_a_sentence(capsys):
     for path in sorted((DATA / "uff").iterdir()):
-        assert main(["identify", str(path)]) == 1
+        assert main(["identify", str(path), *JOINT]) == 1
         printed = capsys.readouterr().err.splitlines()
         errors = [line for line in printed if line.startswith("jointfrf: error:")]
         assert len(errors) == 1, path

@@ -118,7 +118,7 @@ def test_files_that_are_named_exist(name):
 def test_links_lead_to_files_and_headings(name):
     for link in re.findall(r"\]\((?!https?:)([^)\s]+)\)", DOCUMENTS[name]):
         file, _, heading = link.partition("#")
-        target = (ROOT / name).parent / file
+        target = (ROOT / name).parent / file if file else ROOT / name
         assert target.exists(), link
         if heading:
             titles = re.findall(r"^#+ (.*)$", target.read_text(encoding="utf-8"), re.MULTILINE)

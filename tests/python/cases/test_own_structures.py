@@ -105,14 +105,36 @@ def test_lines_of_a_file_may_be_limited(by_receptances):
     np.testing.assert_allclose(read_case(folder).freq_hz, BEAMS.freq_hz, rtol=1e-12)
 
 
+def test_receptances_may_stand_in_any_format(by_receptances):
+    """What `jointfrf convert` writes gives the same case: NPZ and CSV instead of Universal Files."""
+    path = by_receptances / "case.toml"
+    points = [["3:y", "3:rz"], ["1:y", "1:rz"]]
+    before = read_case(by_receptances)
+    text = path.read_text()
+    for old, new, write in (("a.uff", "a.npz", jf.io.write_npz), ("b.uff", "b.csv", jf.io.write_csv)):
+        write(by_receptances / new, jf.io.read_frfs(by_receptances / old))
+        (by_receptances / old).unlink()
+        text = text.replace(f'"{old}"', f'"{new}"')
+    path.write_text(text)
+    after = read_case(by_receptances)
+    for one, other, at in zip((before.a, before.b), (after.a, after.b), points, strict=True):
+        same_frfs(one.receptance(BEAMS.freq_hz, at), other.receptance(BEAMS.freq_hz, at))
+
+
 @pytest.mark.filterwarnings("ignore::jointfrf.FileContentWarning")
 def test_a_quantity_may_be_said(by_receptances):
-    """The file says accelerance; the key goes before it."""
+    """The file says accelerance: another quantity must be forced."""
     path = by_receptances / "case.toml"
     text, power = path.read_text(), {"accelerance": 2, "mobility": 1, "receptance": 0}
     h = {}
     for quantity in power:
-        path.write_text(text.replace('file = "a.uff"', f'file = "a.uff"\nquantity = "{quantity}"'))
+        said = f'file = "a.uff"\nquantity = "{quantity}"'
+        if quantity != "accelerance":
+            path.write_text(text.replace('file = "a.uff"', said))
+            with pytest.raises(jf.FileContentError, match="says that it holds accelerance"):
+                read_case(by_receptances)
+            said += "\nforce_quantity = true"
+        path.write_text(text.replace('file = "a.uff"', said))
         h[quantity] = read_case(by_receptances).a.receptance(BEAMS.freq_hz, ["3:y", "3:rz"])
     i_omega = 2j * np.pi * BEAMS.freq_hz[:, None, None]
     for quantity, n in power.items():

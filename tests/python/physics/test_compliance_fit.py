@@ -215,3 +215,17 @@ def test_no_joint_and_noise_alone_are_refused(beams):
     noise = rng.standard_normal(apart.shape) + 1j * rng.standard_normal(apart.shape)
     with pytest.raises(ValueError, match="consists of noise"):
         jf.identify(beams.freq, noise, beams.joint.dofs)
+
+
+@pytest.mark.parametrize(("seed", "cross"), [(4, "ignore"), (15, "ignore"), (2, "zero"), (21, "zero")])
+def test_damping_of_a_dof_found_rigid_is_open_and_the_others_are_known(beams, seed, cross):
+    """Nothing shows the rate of a compliance that ends at zero, not even a step of the fit."""
+    joint = jf.Joint([6e5, 5e9], [20.0, 0.0], beams.joint.dofs)
+    gamma = jf.pollute(beams.gamma(joint), 0.05, seed=seed)
+    fit = identified(beams.freq, gamma, joint.dofs, damping="viscous", cross=cross, noise=0.05)
+    assert any("k_theta: this DOF cannot be distinguished from a rigid one" in text for text in fit.warnings)
+    limits = fit.confidence_interval(0.99)
+    assert limits["c_theta"] == (-np.inf, np.inf)
+    assert limits["k_theta"][1] == np.inf
+    assert limits["k_y"][0] < 6e5 < limits["k_y"][1]
+    assert all(np.isfinite(error) and error > 0 for error in fit.std_error.values())

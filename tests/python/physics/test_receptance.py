@@ -509,3 +509,50 @@ def test_bad_weights_get_one_sentence(outputs, error, message):
     k, m, _, _ = model()
     with pytest.raises(error, match=message):
         jf.receptance(FREQ, k, m, outputs=outputs)
+
+
+@pytest.mark.parametrize("side", ["lower", "upper"])
+@pytest.mark.parametrize("name", ["stiffness", "mass", "damping"])
+@pytest.mark.parametrize("kind", [np.asarray, sparse.csr_array])
+def test_half_a_symmetric_matrix_is_refused_and_completed_when_asked(side, name, kind):
+    """Finite-element programs write one triangle; taken as it is, receptances are wrong by far."""
+    k, m, c, _ = model()
+    whole = {"stiffness": k + k.T, "mass": m + m.T, "damping": c + c.T}
+    half = np.tril if side == "lower" else np.triu
+    given = {key: kind(half(x) if key == name else x) for key, x in whole.items()}
+    with pytest.raises(ValueError, match=f"{name} holds its {side} triangle only.*from_triangle"):
+        jf.receptance(FREQ, **given)
+    given[name] = jf.from_triangle(given[name])
+    np.testing.assert_allclose(jf.receptance(FREQ, **given), jf.receptance(FREQ, **whole), rtol=1e-10)
+
+
+def test_a_whole_matrix_is_not_completed():
+    with pytest.raises(ValueError, match="both sides of the diagonal"):
+        jf.from_triangle(model()[0])
+    with pytest.raises(ValueError, match=r"must have shape \(n, n\), not \(2, 3\)"):
+        jf.from_triangle(np.zeros((2, 3)))
+
+
+@pytest.mark.parametrize("dtype", [object, "U32"])
+def test_matrices_that_hold_no_numbers_get_one_sentence(dtype):
+    with pytest.raises(TypeError, match="stiffness must hold real numbers, not"):
+        jf.receptance(FREQ, np.eye(2).astype(dtype), np.eye(2))
+
+
+def test_numbers_of_another_byte_order_are_numbers():
+    k, m, _, _ = model()
+    given = [(x + x.T).astype(">f8") for x in (k, m)]
+    np.testing.assert_array_equal(jf.receptance(FREQ, *given), jf.receptance(FREQ, k + k.T, m + m.T))
+
+
+def test_a_model_takes_names_of_dofs():
+    beam = jf.beam(0.3, 2, youngs_modulus=67e9, density=2700.0, width=0.025, height=0.006)
+    h = beam.receptance([50.0, 60.0])
+    np.testing.assert_array_equal(beam.receptance([50.0, 60.0], ["3:y", "1:theta"], "2:y")[:, :, 0], h[:, [4, 1], 2])
+    with pytest.raises(ValueError, match="the model has no DOF '9:y'"):
+        beam.receptance([50.0], ["9:y"])
+
+
+def test_a_model_has_a_name_for_each_dof():
+    with pytest.raises(ValueError, match="dofs must name 2 different DOFs, those of stiffness, not 1"):
+        jf.Model(np.eye(2), np.eye(2), ("1:x",))

@@ -149,3 +149,15 @@ def test_joint_matrices():
 def test_bad_models_get_one_sentence(make, message):
     with pytest.raises(ValueError, match=message):
         make()
+
+
+def test_errors_relative_to_nothing_get_one_sentence():
+    with pytest.raises(ValueError, match="h_exact is zero on all lines"):
+        jf.amplitude_error(np.zeros(10), np.ones(10), FREQ)
+    with pytest.raises(ValueError, match="h_exact is largest at 0 Hz"):
+        jf.frequency_error(np.arange(10, 0, -1), np.ones(10), FREQ - 1)
+
+
+def test_a_parabola_needs_three_frequencies():
+    with pytest.raises(ValueError, match="lines 3 to 5 are not at three frequencies, as refine needs them"):
+        jf.peak(np.exp(-((FREQ - 5) ** 2)), np.full(10, 3.0), refine=True)

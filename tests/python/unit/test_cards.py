@@ -300,12 +300,18 @@ def rigid_model(size, density, reference):
     return jf.Model(np.zeros((6, 6)), m, DOFS)
 
 
-def rigid_bricks(joint_cards):
+#: Where the REF NODEs are from the reference points of the joint, m, and where these are.
+BESIDE = np.array([[0.02, -0.01, 0.015], [-0.01, 0.03, 0.0]])
+APART = np.array([[0.0, 0, 0], [0.001, 0, 0]])
+
+
+def rigid_bricks(joint_cards, beside=0 * BESIDE):
     corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]]) - 0.5
     lines = ["*NODE, NSET=ALL"]
     for body, (size, _, reference) in enumerate(BRICKS):
         at = -np.array(reference) + body * np.array([0.001, 0, 0])
-        points = [*(at + corners * size), at + reference, at + reference]
+        node = at + reference + beside[body]
+        points = [*(at + corners * size), node, node]
         lines += [f"{10 * body + i}, " + ", ".join(f"{x:.12g}" for x in p) for i, p in enumerate(points, 1)]
     for body, (_, density, _) in enumerate(BRICKS):
         first = 10 * body
@@ -330,7 +336,7 @@ def rigid_bricks(joint_cards):
 
 
 @pytest.mark.skipif(CCX is None, reason="CalculiX (ccx) is not on PATH")
-@pytest.mark.parametrize("kind", ["diagonal", "coupled"])
+@pytest.mark.parametrize("kind", ["diagonal", "coupled", "nodes beside the joint"])
 def test_natural_frequencies_of_calculix(kind, tmp_path):
     stiffness = np.diag([1e6, 3e6, 2e6, 1e3, 4e3, 2e3])
     if kind == "coupled":
@@ -340,6 +346,148 @@ def test_natural_frequencies_of_calculix(kind, tmp_path):
     joint = jf.Joint(stiffness, dofs=DOFS)
     a, b = (rigid_model(*brick) for brick in BRICKS)
     ours = jf.assemble(a, b, joint, range(6), range(6)).natural_frequencies()[6:]
-    text = rigid_bricks(joint.export("calculix", (9, 19), rotation_nodes=(10, 20), element=100))
+    beside = BESIDE if kind.startswith("nodes") else 0 * BESIDE
+    places = {"positions": APART + beside, "points": APART}
+    cards = joint.export("calculix", (9, 19), rotation_nodes=(10, 20), element=100, **places)
+    assert ("SPRING1" in cards) == kind.startswith("nodes")
+    text = rigid_bricks(cards, beside)
     theirs = natural_frequencies(CCX, text, tmp_path)
     np.testing.assert_allclose(theirs[6:], ours, rtol=1e-6)
+
+
+# Nodes of a model beside a joint: motions of its two points by rigid-body kinematics, written out without matrices.
+AT_J, AT_K = np.array([0.10, -0.02, 0.03]), np.array([0.14, 0.05, -0.01])
+PLACES_OF_JOINT = {
+    "midway": (AT_J + AT_K) / 2,
+    "on the line": AT_J + 0.2 * (AT_K - AT_J),
+    "beside the line": np.array([0.11, 0.03, 0.02]),
+    "at node j": AT_J,
+    "one for each side": np.array([[0.11, 0.03, 0.02], [0.12, 0.03, 0.02]]),
+}
+
+
+def energy(matrix, points, motion):
+    """Twice the energy of K q q where q is the difference of the motions of the points that follow the nodes."""
+    ends = []
+    for node, point, own in zip((AT_J, AT_K), np.broadcast_to(points, (2, 3)), np.reshape(motion, (2, 6)), strict=True):
+        ends.append(np.concatenate([own[:3] + np.cross(own[3:], point - node), own[3:]]))
+    q = ends[0] - ends[1]
+    return q @ matrix @ q
+
+
+def read_placed_bush(text):
+    """CBUSH with a spring at a place: on the line by S, or by S1, S2, S3 in a system that begins at grid GA."""
+    systems = {}
+    for fields in nastran_fields(text):
+        if fields[0] == "CORD2R":
+            values = [nastran_real(field) for field in fields[3:12]]
+            assert fields[2] == "0"
+            origin, z_axis, xz = (np.array(values[i : i + 3]) for i in (0, 3, 6))
+            np.testing.assert_allclose([z_axis - origin, xz - origin], [[0, 0, 1], [1, 0, 0]], atol=1e-9)
+            systems[fields[1]] = origin
+        elif fields[0] == "CBUSH":
+            assert (fields[3], fields[4], fields[8]) == ("102", "202", "0")
+            s, ocid, *offset = (fields[9:14] + [""] * 5)[:5]
+            if s:
+                assert not ocid
+                point = AT_J + nastran_real(s) * (AT_K - AT_J)
+            else:
+                point = systems[ocid] + [nastran_real(field) for field in offset]
+        else:
+            assert fields[0] == "PBUSH"
+            k = np.array([nastran_real(field) for field in fields[3:9]])
+    return k, point
+
+
+@pytest.mark.parametrize("place", PLACES_OF_JOINT)
+@pytest.mark.parametrize("program", ["nastran", "nastran matrix", "abaqus", "ansys", "calculix"])
+def test_nodes_that_lie_beside_the_joint_have_arms(place, program):
+    points, k = PLACES_OF_JOINT[place], np.diag([2e6, 3e6, 5e6, 2e3, 3e3, 1e3])
+    joint = jf.Joint(k, dofs=DOFS)
+    more = {"positions": [AT_J, AT_K], "points": points}
+    readers = {"abaqus": read_abaqus_matrices, "ansys": read_matrix27, "nastran matrix": read_dmig}
+    motions = np.random.default_rng(8).standard_normal((6, 12)) * np.tile([1e-3] * 3 + [1e-2] * 3, 2)
+    if program == "nastran":
+        text = joint.export("nastran", NODES, **more)
+        if np.ndim(points) == 2:
+            assert "DMIG" in text  # a CBUSH has one place
+            return
+        found, point = read_placed_bush(text)
+        np.testing.assert_allclose(point, points, atol=1e-9)
+        np.testing.assert_allclose(np.diag(found), k, rtol=1e-10)
+        return
+    if program == "calculix":
+        whole = read_springs_of_any_kind(joint.export("calculix", (1, 3), rotation_nodes=(2, 4), **more))
+    else:
+        word, _, full = program.partition(" ")
+        whole = readers[program](joint.export(word, NODES, full_matrix=bool(full), **more))[0]
+    for motion in motions:
+        assert motion @ whole @ motion == pytest.approx(energy(k, points, motion), rel=1e-9)
+    for axis, offset in enumerate(np.eye(3)):
+        turn = np.concatenate([np.cross(offset, AT_J), offset, np.cross(offset, AT_K), offset])
+        if np.ndim(points) == 1:  # turned as one body about the origin: no force
+            assert abs(whole @ turn).max() < 1e-9 * abs(whole).max()
+        assert abs(whole @ np.tile(np.eye(6)[axis], 2)).max() < 1e-9 * abs(whole).max()
+
+
+def read_springs_of_any_kind(text):
+    """Stiffness, (12, 12), from SPRING1 and SPRING2 of rigid bodies with REF NODEs 1, 3 and ROT NODEs 2, 4."""
+    place = {(node, i + 1): 3 * (node - 1) + i for node in range(1, 5) for i in range(3)}
+    whole, ends = np.zeros((12, 12)), {}
+    for word, parameters, rows in keywords(text):
+        name = parameters["ELSET"]
+        if word == "*ELEMENT":
+            ends[name] = [int(node) for node in rows[0][1:]]
+            assert parameters["TYPE"] == f"SPRING{len(ends[name])}"
+            continue
+        at = [place[node, int(dof)] for node, dof in zip(ends[name], rows[0], strict=True)]
+        value = float(rows[1][0])
+        if len(at) == 1:
+            whole[at[0], at[0]] += value
+        else:
+            spring(whole, *at, value)
+    return whole
+
+
+def test_arms_take_all_kinds_of_damping_along():
+    joint = jf.Joint([1e6], [20.0], ["z"], loss_factor=[0.1])
+    text = joint.export("nastran", NODES, positions=[AT_J, AT_K], points=[0, 0, 0], full_matrix=True)
+    stiffness, damping, hysteretic = read_dmig(text)
+    np.testing.assert_allclose(damping, 2e-5 * stiffness, atol=1e-12)
+    np.testing.assert_allclose(hysteretic, 0.1 * stiffness, atol=1e-6)
+    assert "rigid arms from the nodes to the joint: -0.1, 0.02, -0.03 m (j)" in text
+
+
+def test_nodes_at_the_joint_need_no_arms():
+    text = DIAGONAL.export("abaqus", NODES, positions=[AT_J, AT_J], points=AT_J)
+    assert read_springs(text).tolist() == read_springs(DIAGONAL.export("abaqus", NODES)).tolist()
+    plain = DIAGONAL.export("nastran", NODES, positions=[AT_J, AT_J], points=AT_J)
+    np.testing.assert_allclose(read_bush(plain)[0], read_bush(DIAGONAL.export("nastran", NODES))[0])
+    assert "midway between them" not in plain
+    assert "midway between them" in DIAGONAL.export("nastran", NODES)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"points": AT_J}, "points needs positions"),
+        ({"positions": [AT_J, AT_K]}, "positions needs points"),
+        ({"positions": AT_J, "points": AT_J}, "positions must have shape"),
+        ({"positions": [AT_J, AT_K], "points": [np.nan, 0, 0]}, "points"),
+    ],
+)
+def test_wrong_places(options, message):
+    with pytest.raises(ValueError, match=message):
+        DIAGONAL.export("abaqus", NODES, **options)
+
+
+def test_comments_are_lines_that_programs_read():
+    long = "k_y = 1 N/m: " + "words of a comment that goes on and on " * 5
+    for program, mark in (("abaqus", "**"), ("nastran", "$"), ("ansys", "!")):
+        text = WITHOUT_LOSS.export(program, NODES, comments=[long, "naïve"])
+        lines = [line for line in text.splitlines() if line.startswith(mark + " ")]
+        assert all(len(line) <= 72 for line in lines if "comment" in line)
+        assert "".join(lines).count("on and on") >= 4
+        assert f"{mark} na?ve" in lines
+    with pytest.raises(TypeError, match="comments must be a sequence"):
+        DIAGONAL.export("abaqus", NODES, comments="one")

@@ -149,3 +149,20 @@ def test_a_joint_of_the_wrong_form_converges_and_says_so(beams):
     assert any("with cross terms it does" in text for text in fit.warnings)
     assert any("no joint without cross terms is near the data" in text for text in fit.warnings)
     np.testing.assert_allclose(1 / fit.stiffness, np.diag(np.linalg.inv(joint.stiffness)), rtol=0.02)
+
+
+def test_the_most_precise_lines_do_not_decide_alone(beams):
+    """Eight lines of a sixth of the noise, on which a local mode doubles the compliance."""
+    n = beams.freq.size
+    precise = np.arange(n) % 20 == 7
+    c = np.tile([1 / 6e5, 1 / 5e3], (n, 1))
+    c[precise, 1] *= 2
+    k = np.einsum("la,ab->lab", 1 / c, np.eye(2)).astype(complex)
+    at = beams.at + [4 + i for i in beams.at]
+    gamma = jf.couple(beams.h_a, beams.h_b, k, beams.at, beams.at)[:, at][:, :, at]
+    level = np.where(precise, 0.005, 0.03)[:, None, None]
+    noisy = gamma + level / 0.03 * (jf.pollute(gamma, 0.03, seed=3) - gamma)
+    fit = identified(beams.freq, noisy, beams.joint.dofs, cross="ignore", noise=(level * abs(gamma)) ** 2)
+    low, high = fit.confidence_interval(0.95)["k_theta"]
+    assert low < 1 / c[:, 1].mean() < high
+    assert any("theta by" in text and "varies from line to line" in text for text in fit.warnings)

@@ -1,18 +1,20 @@
 """Damaged, foreign and misleading files: each is read as far as it goes or refused in one sentence that names it."""
 
 import io
+import os
 import pickle
 import random
 import warnings
 import zipfile
 from contextlib import suppress
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from frf_files import FREQ_HZ, frf_set, full_set, names, structure_of_testlab, write_mat, write_mat73, write_sdynpy
 from jointfrf.errors import FileContentError, FileContentWarning
-from jointfrf.io import read_frfs, write_csv, write_hdf5, write_npz, write_uff
+from jointfrf.io import read_frfs, read_uff, write_csv, write_hdf5, write_npz, write_uff
 from uff_writer import VALUES, dataset, function
 
 pytest.importorskip("pyuff")
@@ -320,3 +322,14 @@ def test_nothing_is_left_of_a_file_that_could_not_be_written(tmp_path, monkeypat
         write(path, GIVEN)
     assert [each.name for each in tmp_path.iterdir()] == ["out.file"]
     assert path.read_bytes() == b"old"
+
+
+@pytest.mark.parametrize("suffix", [".uff", ".mat", ".csv"])
+def test_pipes_and_devices_are_not_waited_for(tmp_path, suffix):
+    """Opening a pipe waits for a writer, for ever if there is none; a device has no end."""
+    pipe = tmp_path / f"pipe{suffix}"
+    os.mkfifo(pipe)
+    assert "is a pipe or a device, not a file" in refused(pipe)
+    assert "is a pipe or a device, not a file" in refused(Path("/dev/zero"))
+    with pytest.raises(FileContentError, match="is a pipe or a device, not a file"):
+        read_uff(pipe)

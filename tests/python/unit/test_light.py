@@ -12,7 +12,7 @@ import jointfrf
 from command import run_command
 from jointfrf.extras import check_extras, import_extra
 
-HEAVY = {"numpy", "scipy", "matplotlib", "jinja2", "pyuff", "h5py", "importlib.metadata", "jointfrf._kernel"}
+HEAVY = {"numpy", "scipy", "matplotlib", "jinja2", "pyuff", "h5py", "shtab", "importlib.metadata", "jointfrf._kernel"}
 
 
 def modules_after(code: str) -> set[str]:
@@ -63,7 +63,7 @@ def test_the_stub_names_in_all_what_it_imports():
     assert sorted(names) == jointfrf.__all__
 
 
-@pytest.mark.parametrize("package", ["h5py", "jinja2", "matplotlib", "pyuff"])
+@pytest.mark.parametrize("package", ["h5py", "jinja2", "matplotlib", "pyuff", "shtab"])
 def test_a_missing_package_is_one_sentence(package, monkeypatch):
     monkeypatch.setitem(sys.modules, package, None)
     for ask in (import_extra, check_extras):
@@ -84,7 +84,7 @@ def test_extras_are_those_of_the_project():
     """What the sentence says to install exists and brings the package; `all` brings every one."""
     project = Path(__file__).resolve().parents[3] / "pyproject.toml"
     extras = tomllib.loads(project.read_text(encoding="utf-8"))["project"]["optional-dependencies"]
-    for package in ("h5py", "jinja2", "matplotlib", "pyuff"):
+    for package in ("h5py", "jinja2", "matplotlib", "pyuff", "shtab"):
         with pytest.MonkeyPatch.context() as patch:
             patch.setitem(sys.modules, package, None)
             with pytest.raises(jointfrf.MissingPackageError) as caught:

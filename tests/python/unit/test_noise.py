@@ -152,3 +152,8 @@ def test_no_level_no_noise():
 def test_bad_arguments_get_one_sentence(change, message):
     with pytest.raises(ValueError, match=message):
         jf.pollute(**(dict(h=H, level=0.05) | change))
+
+
+def test_more_realisations_than_memory_are_refused(random_lines):
+    with pytest.raises(MemoryError, match=r"count: 1000000000 realisations of h take .* GiB: draw them in parts"):
+        jf.realisations(random_lines(200, 4), 0.05, seed=1, count=10**9)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -23,9 +22,8 @@ from jointfrf.cases.bolted_lap.routes import (
     route_lines,
 )
 from jointfrf.cases.definitions import Noise, constant_joint
-from jointfrf.cases.fitting import fit_viscous
+from jointfrf.cases.fitting import fit_measured
 from jointfrf.cases.workers import Workers
-from jointfrf.errors import IllConditionedWarning
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.solids.preload import PreloadedLap
 
@@ -62,7 +60,7 @@ class Unmeasured(NamedTuple):
     name : str
     k_lines : ndarray, shape (n_freq, 6, 6)
     theta, fitted : ndarray, shape (12,)
-        Means over bands, and the compliance fit.
+        Means over bands, and the compliance fit, cross terms ignored.
     shift : ndarray, shape (2,)
         Largest error (4.12) of a resonance of the tip in x and in y, regenerated with theta, percent.
     """
@@ -235,10 +233,9 @@ def _unmeasured(case: BoltedLapCase, beams: BeamFrfs) -> list[Unmeasured]:
     for name, h in masked.items():
         lines = joint_stiffness_lines(h)
         theta = band_means(case, lines)
-        with warnings.catch_warnings():
-            # Without some of its entries a matrix may be singular.
-            warnings.simplefilter("ignore", IllConditionedWarning)
-            fitted = fit_viscous(case.freq_hz, DOFS, h[None])[0]
+        # Without some of its entries gamma belongs to no joint whose cross terms are zero.
+        fit = fit_measured(case.freq_hz, DOFS, h, np.eye(12))
+        fitted = np.concatenate([fit.stiffness, fit.damping])
         found.append(Unmeasured(name, lines, theta, fitted, _shift(case, beams, theta)))
     return found
 

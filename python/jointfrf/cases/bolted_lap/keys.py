@@ -13,8 +13,8 @@ from jointfrf.cases.common_keys import (
     PRESET,
     one_of,
 )
-from jointfrf.cases.keys import Key, KeyTable
 from jointfrf.solids.bolt import PROOF_STRENGTH, STRESS_AREA
+from jointfrf.toml.keys import Key, KeyTable
 
 __all__ = ["BOLTED_LAP_KEYS", "EXPECTED_BOLTED_KEYS"]
 

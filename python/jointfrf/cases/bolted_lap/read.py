@@ -17,7 +17,6 @@ from jointfrf.cases.definitions import (
     read_noises,
 )
 from jointfrf.cases.kind import Case
-from jointfrf.cases.toml_table import TomlTable
 from jointfrf.dofs import Parameter, joint_parameters
 from jointfrf.frf.bands import Band
 from jointfrf.joint import Joint
@@ -25,6 +24,7 @@ from jointfrf.kernel.arguments import FloatArray
 from jointfrf.solids.bolt import PROOF_STRENGTH, STRESS_AREA, Bolt, preload_force
 from jointfrf.solids.brick import Material
 from jointfrf.solids.brick_beam import Preset
+from jointfrf.toml.table import TomlTable
 
 __all__ = ["BoltedLapCase", "LapGeometry", "read_bolted_lap"]
 

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from jointfrf.cases.comparison import ExpectedFrequencies, read_expected_frequencies
 from jointfrf.cases.definitions import check_bands
 from jointfrf.cases.fitting import FITTED, METHODS
-from jointfrf.cases.toml_table import TomlTable
 from jointfrf.dofs import Parameter
 from jointfrf.frf.bands import Band
 from jointfrf.kernel.arguments import FloatArray
+from jointfrf.toml.table import TomlTable
 
 __all__ = [
     "Expected",

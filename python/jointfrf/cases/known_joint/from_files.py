@@ -10,12 +10,12 @@ from scipy import sparse
 
 from jointfrf.cases.definitions import read_frf_file
 from jointfrf.cases.known_joint.structure import MeasuredStructure, ModelStructure, lines_at
-from jointfrf.cases.toml_table import TomlTable
 from jointfrf.frf.frf_set import POWER_OF_I_OMEGA
 from jointfrf.io.matrix_file import read_dof_names, read_matrix
 from jointfrf.kernel.arguments import FloatArray
 from jointfrf.models.matrices import ModelMatrices
 from jointfrf.models.model import Model
+from jointfrf.toml.table import TomlTable
 
 __all__ = ["read_matrices", "read_receptances"]
 
@@ -88,7 +88,10 @@ def read_receptances(table: TomlTable, freq_hz: FloatArray) -> MeasuredStructure
         One sentence that names the key and the file.
     """
     quantity = table.text("quantity", tuple(POWER_OF_I_OMEGA)) if "quantity" in table else None
-    frfs = read_frf_file(table, "file", quantity)
+    forced = table.truth("force_quantity") if "force_quantity" in table else False
+    if forced and quantity is None:
+        raise table.wrong("force_quantity", "there is no quantity to force")
+    frfs = read_frf_file(table, "file", quantity, force_quantity=forced)
     table.close()
     table.build(lambda: lines_at(frfs, freq_hz), "file")
     return MeasuredStructure(frfs)

@@ -14,11 +14,11 @@ from jointfrf.cases.common_keys import (
     one_of,
 )
 from jointfrf.cases.fitting import METHODS
-from jointfrf.cases.keys import Key, KeyTable
 from jointfrf.frf.frf_set import POWER_OF_I_OMEGA
 from jointfrf.models.beam import BeamElement, End
 from jointfrf.models.chain import Ground
 from jointfrf.solids.brick_beam import Face
+from jointfrf.toml.keys import Key, KeyTable
 
 __all__ = ["EXPECTED_KEYS", "KNOWN_JOINT_KEYS", "SUBSTRUCTURE"]
 
@@ -95,10 +95,18 @@ _MATRICES = _of(
 )  # fmt: skip
 _RECEPTANCES = _of(
     "receptances",
-    "FRFs of the substructure, measured or computed elsewhere. They must be there between all DOFs of `[points]` on "
+    "FRFs of the substructure, measured or computed elsewhere, in any format that `jointfrf.io.read_frfs` reads. "
+    "They must be there between all DOFs of `[points]` on "
     "this side, on the lines of `[frequency]`. Natural frequencies and mode shapes are left out of the report.",
-    Key("file", "name of a Universal File", "FRFs (dataset 58); mobilities and accelerances become receptances."),
+    Key("file", "name of a file of FRFs", "Mobilities and accelerances become receptances."),
     Key("quantity", one_of(POWER_OF_I_OMEGA), "What the FRFs are, where the file does not say.", "", "by the file"),
+    Key(
+        "force_quantity",
+        "true or false",
+        "`true`: `quantity` holds also where the file says something else.",
+        "",
+        "`false`",
+    ),
 )
 SUBSTRUCTURE = KeyTable(
     "[substructure_a], [substructure_b]",

@@ -20,11 +20,11 @@ from jointfrf.cases.kind import Case
 from jointfrf.cases.known_joint.expected import Expected, Known, read_expected
 from jointfrf.cases.known_joint.structure import ModelStructure, Structure
 from jointfrf.cases.known_joint.substructures import read_substructure
-from jointfrf.cases.toml_table import TomlTable
 from jointfrf.dofs import Parameter, joint_parameters
 from jointfrf.errors import FileContentError
 from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import FloatArray
+from jointfrf.toml.table import TomlTable
 
 __all__ = ["KnownJointCase", "read_known_joint"]
 

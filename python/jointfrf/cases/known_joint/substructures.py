@@ -10,11 +10,11 @@ import numpy as np
 from jointfrf.cases.definitions import read_material
 from jointfrf.cases.known_joint.from_files import read_matrices, read_receptances
 from jointfrf.cases.known_joint.structure import ModelStructure, Structure
-from jointfrf.cases.toml_table import TomlTable
 from jointfrf.kernel.arguments import FloatArray
 from jointfrf.models.beam import BeamElement, End, beam
 from jointfrf.models.chain import Ground, chain
 from jointfrf.solids.brick_beam import Face, Hole, Preset, brick_beam
+from jointfrf.toml.table import TomlTable
 
 __all__ = ["read_substructure"]
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from jointfrf.cases.common_keys import COMMON_KEYS, FIGURES, one_of
-from jointfrf.cases.keys import Key, KeyTable
 from jointfrf.cases.known_joint.keys import SUBSTRUCTURE
+from jointfrf.toml.keys import Key, KeyTable
 
 __all__ = ["LAWS", "MODELLED_EXPECTED_KEYS", "MODELLED_JOINT_KEYS"]
 

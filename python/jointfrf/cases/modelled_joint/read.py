@@ -12,7 +12,6 @@ from jointfrf.cases.kind import Case
 from jointfrf.cases.known_joint.structure import ModelStructure
 from jointfrf.cases.known_joint.substructures import read_substructure
 from jointfrf.cases.modelled_joint.keys import LAWS
-from jointfrf.cases.toml_table import TomlTable
 from jointfrf.identification.model_fit.assembly import Assembly
 from jointfrf.identification.model_fit.attachments import AddedMass
 from jointfrf.identification.model_fit.substructure import Substructure
@@ -22,6 +21,7 @@ from jointfrf.laws.law_joint import LawJoint
 from jointfrf.laws.springs import SpringLaw
 from jointfrf.laws.viscoelastic import FractionalZener, PowerLaw, StandardLinearSolid
 from jointfrf.models.model import Model
+from jointfrf.toml.table import TomlTable
 
 __all__ = ["ModelledJointCase", "read_modelled_joint"]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal, get_args
 
 import numpy as np
@@ -41,6 +41,8 @@ FrfFix = Literal["lines", "time-convention", "exchanged", "quantity", "sign", "u
 _LEAST_LINES = 20
 #: Share of FRFs that run backwards from which all are conjugated.
 _BACKWARDS = 0.8
+#: Relative noise of channels that may hide small FRFs of joint DOFs, which are differences of large ones.
+_HIDING = 0.05
 
 
 def check_frfs(
@@ -171,10 +173,18 @@ def _findings_at_joint(
             f"dofs must name {t_out.shape[0] / 2:g} joint DOFs, half the rows of transform, not {len(names)}"
         )
     labels = [f"{side}:{name}" for side in "jk" for name in names]
-    joint = _Look(as_measurement(m.freq_hz, t_out @ m.h @ t_in.T, labels, labels), look.side)
+    h = t_out @ m.h @ t_in.T
+    hidden = np.median(abs(h), axis=0) < _HIDING * np.median(_propagated(m.h, t_out, t_in), axis=0)
+    joint = _Look(replace(as_measurement(m.freq_hz, h, labels, labels), hidden=hidden), look.side)
     _look_at_channels(joint)
     known = {finding.kind for finding in look.findings}
     return [finding for finding in joint.findings if finding.kind not in known]
+
+
+def _propagated(h: ComplexArray, t_out: FloatArray, t_in: FloatArray) -> FloatArray:
+    """Return the deviation of transformed FRFs where that of each channel is its size."""
+    deviation: FloatArray = np.sqrt(t_out**2 @ abs(h) ** 2 @ (t_in**2).T)
+    return deviation
 
 
 def _look_at_channels(look: _Look) -> None:

@@ -34,6 +34,8 @@ class Measurement:
         Responses and forces that share a DOF.
     signs : ndarray, shape (n,)
         -1 where they point in opposite directions.
+    hidden : ndarray of bool, shape (n_responses, n_forces), or None
+        FRFs that noise of the channels they come from may hide: they tell nothing.
     """
 
     freq_hz: FloatArray
@@ -43,6 +45,7 @@ class Measurement:
     rows: NDArray[np.intp]
     columns: NDArray[np.intp]
     signs: FloatArray
+    hidden: NDArray[np.bool_] | None = None
 
     @property
     def omega(self) -> FloatArray:
@@ -51,8 +54,9 @@ class Measurement:
 
     @cached_property
     def smoothness(self) -> FloatArray:
-        """As `smoothness` of `h`, shape (n_responses, n_forces)."""
-        return smoothness(self.h)
+        """As `smoothness` of `h`, shape (n_responses, n_forces); 0 where it is hidden."""
+        found = smoothness(self.h)
+        return found if self.hidden is None else np.where(self.hidden, 0.0, found)
 
     @cached_property
     def square(self) -> ComplexArray:

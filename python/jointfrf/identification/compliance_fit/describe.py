@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from jointfrf.dofs import compliance_unit, is_rotation
+from jointfrf.dofs import compliance_unit
 from jointfrf.errors import ConvergenceWarning, IdentificationWarning
 from jointfrf.identification.compliance_fit.damping_choice import DofDamping
 from jointfrf.identification.compliance_fit.estimator import JointEstimate
@@ -30,8 +30,6 @@ _UNCERTAIN = 0.5
 _BY_CHANCE = 1e-3
 #: Relative noise below this is rounding.
 _ROUNDING = 1e-7
-#: Share of the motion of a DOF from which on another one that enters it is named.
-_ENTERS = 0.05
 #: Variances that exceed those from noise by this factor are mostly due to something else.
 _MOSTLY = 5.0
 #: Relative standard errors above this are told where they are due to sides that are not rigid.
@@ -206,19 +204,7 @@ def _reference_notes(fit: JointFit) -> list[str]:
 
 def _left_out_warnings(problem: FitProblem) -> list[str]:
     """Name DOFs that are not sought, but enter those that are."""
-    told = []
-    for one in problem.left_out:
-        if one.share < _ENTERS:
-            continue
-        unit = " m" if is_rotation(one.dof) > is_rotation(one.into) else ""
-        how = f"{one.weight:.3g}{unit} of {one.dof}, which is left out, enters {one.into} of side {one.side}"
-        size = (
-            f"{100 * one.share:.0f} % of its motion"
-            if np.isfinite(one.share)
-            else "how much cannot be seen from these channels"
-        )
-        told.append(f"{how} ({size}): fit {one.dof}, too, or move the reference point or the channels")
-    return told
+    return [str(one) for one in problem.left_out if one.matters]
 
 
 def _rigidity_warnings(found: ComplianceFit) -> list[str]:

@@ -171,6 +171,7 @@ def assembled(terms: JointTerms, groups: list[FittedGroup]) -> JointEstimate:
             # A stiffness beyond what the data can tell stays a number; its interval says that it is open.
             a = slice(0, len(group.dofs))
             error = np.sqrt(np.maximum(np.diagonal(own)[a], 0))
+            own = _with_hidden_rates(own, group, error)
             x[a] = np.maximum(x[a], np.maximum(_RIGID * error, _ROUNDING * group.problem.data.own_size))
         theta[group.which] = group.joint.theta(x)
         slope = group.joint.theta_slope(x)
@@ -189,6 +190,25 @@ def assembled(terms: JointTerms, groups: list[FittedGroup]) -> JointEstimate:
         sum(group.fit.minimum.cost for group in groups) / degrees,
         equations,
     )
+
+
+def _with_hidden_rates(covariance: FloatArray, group: FittedGroup, error: FloatArray) -> FloatArray:
+    """Return the covariance with that of rates which nothing shows because their DOF was found rigid.
+
+    A pseudo-inverse has zero there. They get the variance that they would have if the compliance were as large as its
+    standard error.
+    """
+    joint, minimum = group.joint, group.fit.minimum
+    hidden = np.flatnonzero((minimum.x[joint.terms.pairs[:, 0]] == 0) & (joint.terms.kinds > 0))
+    if hidden.size == 0:
+        return covariance
+    at = minimum.x.copy()
+    at[: error.size] = np.maximum(at[: error.size], error)
+    slope = joint.slope(at, joint.compliance(at))[:, :, hidden]
+    information = np.einsum("lqh,lqr,lrh->h", slope.conj(), group.fit.forms.weight, slope).real
+    known = covariance.copy()
+    known[hidden, hidden] = 1 / np.maximum(2 * information, np.finfo(float).tiny)
+    return known
 
 
 def _unknown(

@@ -77,7 +77,7 @@ class Misfitting(NamedTuple):
     Attributes
     ----------
     noise_squares : float
-        Squares of the residual in units of the noise alone.
+        Squares of the residual in units of the noise alone, at their own minimum.
     is_symmetric : bool
         Whether C is symmetric to noise; otherwise its symmetry was not used.
     scatter : ndarray, shape (n,), optional

@@ -30,6 +30,11 @@ _MISFIT = 1.15
 _SIGMA = 4.0
 #: Squares of the mean over lines, in units of its noise, above which it is not zero.
 _CERTAIN = 16.0
+#: Steps for the scatter between lines at most; they end when the coordinates move by less than this many standard
+#: errors.
+_STEPS, _SETTLED = 30, 0.02
+#: Halvings of the range of a variance.
+_HALVINGS = 50
 
 
 class _Lines(NamedTuple):
@@ -48,13 +53,13 @@ class _Lines(NamedTuple):
     known: NDArray[np.bool_]
     weight: FloatArray
 
-    def forms(self) -> LineForms:
-        """Return the quadratic forms."""
+    def forms(self, variance: FloatArray) -> LineForms:
+        """Return the quadratic forms where C varies between lines with this variance, shape (n,), beside its noise."""
         n = self.known.shape[1]
         diagonal = np.arange(n)
         both = self.known[:, :, None] & self.known[:, None, :]
         covariance: ComplexArray = np.where(both, self.of.covariance, 0)
-        covariance[:, diagonal, diagonal] += np.where(self.known, 0, 1)
+        covariance[:, diagonal, diagonal] += np.where(self.known, variance, 1)
         size = np.sqrt(np.einsum("laa->la", covariance).real)
         outer = size[:, :, None] * size[:, None, :]
         inverse = invert(covariance / outer, on_singular="nan") / outer
@@ -63,8 +68,18 @@ class _Lines(NamedTuple):
         return LineForms(value, information, np.zeros_like(value), np.zeros(len(value)))
 
 
+class _Weighted(NamedTuple):
+    """The minimum, with the forms and the standard deviation between lines, m/N, that belong to it."""
+
+    minimum: FormMinimum
+    forms: LineForms
+    scatter: FloatArray | None
+    steps: int
+    converged: bool
+
+
 def fit_unknown_cross(problem: GroupProblem, starts: Iterable[FloatArray]) -> GroupFit:
-    """Fit the diagonal of C by weighted least squares.
+    """Fit the diagonal of C by weighted least squares; lines that vary by more than their noise count more alike.
 
     Parameters
     ----------
@@ -75,22 +90,25 @@ def fit_unknown_cross(problem: GroupProblem, starts: Iterable[FloatArray]) -> Gr
 
     Notes
     -----
-    The symmetry of C is used unless the FRFs contradict it. Where the residual exceeds the noise, C varies from line to
-    line; lines still count by their noise, and the scatter between them is in the intervals. The constant is a mean of
-    C_dd: where no joint fits, it need not regenerate the FRFs.
+    The symmetry of C is used unless the FRFs contradict it. Where the residual exceeds the noise, C is taken to vary
+    from line to line beside its noise, by as much as the median of the residuals shows: otherwise the lines of least
+    noise, often those of an antiresonance, would decide alone what the constant is. It is a mean of C_dd: where no
+    joint fits, it need not regenerate the FRFs.
     """
     joint = problem.joint
     lines, is_symmetric = _lines(problem)
-    by_noise = lines.forms()
+    by_noise = lines.forms(np.zeros(joint.terms.n))
     best = _best_of([minimise_forms(by_noise, joint, start) for start in [*starts, _middle(lines, joint)]])
     equations = float((lines.weight[:, None] * lines.known).sum())
     possible = float(lines.known.sum())
-    scatter = None
+    found = _Weighted(best, by_noise, None, 1, True)
     degrees = max(equations - best.x.size / 2, 1.0)
     if best.cost / degrees > max(_MISFIT**2, 1 + _SIGMA / np.sqrt(degrees)):
-        scatter = _scatter_between_lines(lines, joint, best.x)
-    told = Misfitting(best.cost, is_symmetric, scatter, int(np.count_nonzero(lines.weight < 0.5)))
-    return GroupFit(best, by_noise, lines.weight > 0, equations, possible, 1, True, told)
+        found = _with_scatter(lines, joint, best.x)
+    told = Misfitting(best.cost, is_symmetric, found.scatter, int(np.count_nonzero(lines.weight < 0.5)))
+    return GroupFit(
+        found.minimum, found.forms, lines.weight > 0, equations, possible, found.steps, found.converged, told
+    )
 
 
 def _lines(problem: GroupProblem) -> tuple[_Lines, bool]:
@@ -156,17 +174,59 @@ def _best_of(minima: list[FormMinimum]) -> FormMinimum:
     return min(minima, key=lambda one: one.cost)
 
 
-def _scatter_between_lines(lines: _Lines, joint: JointCoordinates, x: FloatArray) -> FloatArray:
-    """Return the standard deviation of the diagonal of C between lines, beside its noise, by the median over lines."""
-    residual = abs(_residual(lines, joint, x)) ** 2
+def _with_scatter(lines: _Lines, joint: JointCoordinates, start: FloatArray) -> _Weighted:
+    """Fit with the scatter between lines in their weights, and find it anew, until nothing moves."""
+    x = start
+    variance = _variance_between_lines(lines, joint, x)
+    for step in range(1, _STEPS + 1):
+        forms = lines.forms(variance)
+        best = _best_of([minimise_forms(forms, joint, one) for one in (x, _middle(lines, joint))])
+        change, x = best.x - x, best.x
+        converged = bool(np.sqrt(abs(2 * (change @ best.information @ change))) < _SETTLED * np.sqrt(x.size))
+        if converged and step > 1:
+            break
+        # The mean of both: by itself a scatter that is too large is followed by one that is too small.
+        variance = (variance + _variance_between_lines(lines, joint, x)) / 2
+    return _Weighted(best, forms, np.sqrt(variance), step, converged)
+
+
+def _variance_between_lines(lines: _Lines, joint: JointCoordinates, x: FloatArray) -> FloatArray:
+    """Return the variance of the diagonal of C between lines, beside its noise, shape (n,).
+
+    With it the squares of the residual are those of noise in the median over lines, each by its weight: it takes no
+    account of lines that say little, nor of the size of the largest residuals.
+    """
+    squares = abs(_residual(lines, joint, x)) ** 2
     noise = np.einsum("laa->la", lines.of.covariance).real
+    return np.array(
+        [
+            _beside_noise(squares[own, d], noise[own, d], lines.weight[own])
+            for d, own in enumerate((lines.known & (lines.weight > 0)[:, None]).T)
+        ]
+    )
+
+
+def _beside_noise(squares: FloatArray, noise: FloatArray, weight: FloatArray) -> float:
+    """Return the variance beside that of the noise that explains the weighted median of squares."""
+    if squares.size == 0:
+        return 0.0
     # Squares of circular noise are exponential: their median is ln 2 of their mean.
-    variance = [
-        np.median(residual[own, d]) / np.log(2) - np.median(noise[own, d])
-        for d, own in enumerate((lines.known & (lines.weight > 0.5)[:, None]).T)
-    ]
-    found: FloatArray = np.sqrt(np.maximum(np.nan_to_num(variance), 0))
-    return found
+    low, high = 0.0, float(squares.max()) / np.log(2)
+    for _ in range(_HALVINGS):
+        middle = (low + high) / 2
+        variance = noise + middle
+        if _weighted_median(squares / variance, weight / variance) > np.log(2):
+            low = middle
+        else:
+            high = middle
+    return 0.0 if low == 0 else high
+
+
+def _weighted_median(values: FloatArray, weight: FloatArray) -> float:
+    """Return the value below which half of the weight lies."""
+    order = np.argsort(values)
+    share = np.cumsum(weight[order])
+    return float(values[order][np.searchsorted(share, share[-1] / 2)])
 
 
 def _residual(lines: _Lines, joint: JointCoordinates, x: FloatArray) -> ComplexArray:

@@ -11,8 +11,9 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from jointfrf.cases.keys import KeyTable, look_alike
 from jointfrf.errors import FileContentError
+from jointfrf.spelling import look_alike
+from jointfrf.toml.keys import KeyTable
 
 __all__ = ["TomlTable", "read_toml"]
 
@@ -82,7 +83,7 @@ class TomlTable:
             names = [key.name for key in self.known.keys]
             for key in self._content:
                 if key not in self.known:
-                    raise self._unknown(key, names)
+                    raise self.unknown(key, names)
 
     def __contains__(self, key: str) -> bool:
         self._ask(key)
@@ -94,7 +95,8 @@ class TomlTable:
         if key not in self._asked:
             self._asked.append(key)
 
-    def _unknown(self, key: str, names: Sequence[str]) -> FileContentError:
+    def unknown(self, key: str, names: Sequence[str]) -> FileContentError:
+        """Return the exception that says which keys there are instead of an unknown one."""
         similar = look_alike(key, names)
         hint = f"; did you mean {similar!r}?" if similar else ""
         return FileContentError(f"{self.where}: unknown key {key!r}; it takes {', '.join(names)}{hint}")
@@ -135,9 +137,10 @@ class TomlTable:
         """Raise an error if there is a key that nobody asked for."""
         unknown = [key for key in self._content if key not in self._asked]
         if unknown:
-            raise self._unknown(unknown[0], self._asked)
+            raise self.unknown(unknown[0], self._asked)
 
-    def _value(self, key: str) -> Any:
+    def value(self, key: str) -> Any:
+        """Return the value of a key as it stands in the file."""
         self._ask(key)
         if key not in self._content:
             similar = look_alike(key, [other for other in self._content if other not in self._asked])
@@ -150,14 +153,14 @@ class TomlTable:
 
     def text(self, key: str, choice: Sequence[str] = ()) -> str:
         """Return a string, one of `choice` if given."""
-        value = self._value(key)
+        value = self.value(key)
         if not isinstance(value, str) or (choice and value not in choice):
             raise self.error(key, f"one of {', '.join(choice)}" if choice else "a text")
         return value
 
     def texts(self, key: str, choice: Sequence[str] = ()) -> tuple[str, ...]:
         """Return a list of at least one string, each one of `choice` if given."""
-        value = self._value(key)
+        value = self.value(key)
         is_list = isinstance(value, list) and bool(value) and all(isinstance(v, str) for v in value)
         if not is_list or (choice and any(v not in choice for v in value)):
             raise self.error(key, f"a list of {', '.join(choice) if choice else 'texts'}")
@@ -183,21 +186,21 @@ class TomlTable:
 
     def number(self, key: str, lowest: float = -np.inf) -> float:
         """Return a finite number, not below `lowest`."""
-        value = self._value(key)
+        value = self.value(key)
         if not _is_number(value) or value < lowest:
             raise self.error(key, "a number" + (f", at least {lowest:g}" if np.isfinite(lowest) else ""))
         return float(value)
 
     def numbers(self, key: str) -> list[float]:
         """Return a list of finite numbers."""
-        value = self._value(key)
+        value = self.value(key)
         if not isinstance(value, list) or not all(_is_number(v) for v in value):
             raise self.error(key, "a list of numbers")
         return [float(v) for v in value]
 
     def whole(self, key: str, lowest: int = 0, highest: int = 2**31 - 1) -> int:
         """Return a whole number from `lowest` to `highest`."""
-        value = self._value(key)
+        value = self.value(key)
         if not isinstance(value, int) or isinstance(value, bool) or value < lowest:
             raise self.error(key, f"a whole number, at least {lowest}")
         if value > highest:
@@ -206,14 +209,14 @@ class TomlTable:
 
     def truth(self, key: str) -> bool:
         """Return true or false."""
-        value = self._value(key)
+        value = self.value(key)
         if not isinstance(value, bool):
             raise self.error(key, "true or false")
         return value
 
     def bands(self, key: str) -> list[tuple[float, float]]:
         """Return bands [[low, high], ...] in Hz."""
-        value = self._value(key)
+        value = self.value(key)
         pairs = isinstance(value, list) and value and all(isinstance(v, list) and len(v) == 2 for v in value)
         if not pairs or not all(_is_number(a) and _is_number(b) and 0 <= a <= b for a, b in value):
             raise self.error(key, "a list of bands [low, high] in Hz")
@@ -225,14 +228,14 @@ class TomlTable:
 
     def table(self, key: str) -> TomlTable:
         """Return a table inside this one."""
-        value = self._value(key)
+        value = self.value(key)
         if not isinstance(value, dict):
             raise self.error(key, "a table")
         return TomlTable(value, f"{self.where}: [{key}]", self.folder, self._inner(key))
 
     def tables(self, key: str) -> list[TomlTable]:
         """Return an array of at least one table."""
-        value = self._value(key)
+        value = self.value(key)
         if not isinstance(value, list) or not value or not all(isinstance(v, dict) for v in value):
             raise self.error(key, f"at least one table [[{key}]]")
         return [

@@ -1,13 +1,12 @@
-"""What the keys of a case file mean: the reference, and what a misspelt key is compared with."""
+"""What the keys of a TOML file mean: the reference, and what a misspelt key is compared with."""
 
 from __future__ import annotations
 
-import difflib
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
-__all__ = ["Key", "KeyTable", "look_alike"]
+__all__ = ["Key", "KeyTable"]
 
 
 @dataclass(frozen=True)
@@ -91,11 +90,3 @@ class KeyTable:
                 yield table
             inner = [key.inner for key in table.keys if key.inner is not None]
             waiting = [*table.variants.values(), *inner, *waiting]
-
-
-def look_alike(word: str, known: Iterable[str]) -> str:
-    """Return the known word that another one looks like; empty if there is none."""
-    names: Sequence[str] = list(known)
-    by_lower = {name.lower(): name for name in names}
-    found = difflib.get_close_matches(word.lower(), list(by_lower), 1)
-    return by_lower[found[0]] if found else ""

@@ -1,0 +1,295 @@
+"""From the channels around a joint to its DOFs: virtual points on both sides, of the sensors and of the impacts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from jointfrf.channels.consistency import impact_consistency, sensor_consistency
+from jointfrf.channels.left_out_dofs import LeftOutDof, left_out_dofs
+from jointfrf.channels.point_lines import Interface
+from jointfrf.channels.virtual_point import VirtualPoint, virtual_interface, virtual_point
+from jointfrf.dofs import DIRECTIONS
+from jointfrf.frf.channel_place import ChannelPlace, JointSide
+from jointfrf.frf.frf_set import Channel, FrfSet
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_real
+
+__all__ = ["ChannelAgreement", "JointChannels", "SideAgreement", "joint_channels"]
+
+_Kind = Literal["response", "excitation"]
+_SIDES: tuple[JointSide, JointSide] = ("j", "k")
+
+
+@dataclass(frozen=True)
+class ChannelAgreement:
+    """How far one channel agrees with the rigid motion of its side.
+
+    Attributes
+    ----------
+    channel : Channel
+    consistency : float
+        Median over lines of the specific consistency, 0 to 1; 1: the channel moves as the others say.
+    blame : float
+        Mean over lines of the share of the inconsistency of its side that is gone without it, 0 to 1; NaN where the
+        other channels cannot check it.
+    """
+
+    channel: Channel
+    consistency: float
+    blame: float
+
+
+@dataclass(frozen=True)
+class SideAgreement:
+    """The channels of one kind on one side of a joint beside rigid motion.
+
+    Attributes
+    ----------
+    kind : {"response", "excitation"}
+    side : {"j", "k"}
+    rigid : float
+        Median over lines of the overall consistency, 0 to 1; 1: all motion is rigid.
+    condition : float
+        Condition number of the virtual point, `VirtualPoint.condition`.
+    channels : tuple of ChannelAgreement
+    """
+
+    kind: _Kind
+    side: JointSide
+    rigid: float
+    condition: float
+    channels: tuple[ChannelAgreement, ...]
+
+
+@dataclass(frozen=True)
+class JointChannels:
+    """How the DOFs of a joint follow from the measured responses and excitations around it.
+
+    Attributes
+    ----------
+    responses, forces : Interface
+        From the responses, and from the excitations, to the joint DOFs; the same object where both are the same
+        channels at the same places.
+    points : mapping of (kind, side) to VirtualPoint
+        ``("response", "j")``, ...
+    """
+
+    responses: Interface
+    forces: Interface
+    points: Mapping[tuple[str, str], VirtualPoint]
+
+    @property
+    def dofs(self) -> tuple[str, ...]:
+        """Names of the joint DOFs."""
+        return self.responses.dofs
+
+    @property
+    def transform(self) -> Interface | tuple[Interface, Interface]:
+        """What `identify` takes as `transform`."""
+        return self.responses if self.responses is self.forces else (self.responses, self.forces)
+
+    def gamma(self, frfs: FrfSet) -> ComplexArray:
+        """FRFs between the channels, shape (n_freq, m_r, m_f), as `identify` takes them.
+
+        Raises
+        ------
+        FileContentError
+            FRFs are missing.
+        """
+        return frfs.matrix(self.responses.channels, self.forces.channels)
+
+    def agreement(self, h: ComplexArray) -> tuple[SideAgreement, ...]:
+        """Sensor and impact consistency of both sides, and what each channel has to do with it.
+
+        Parameters
+        ----------
+        h : ndarray, shape (n_freq, m_r, m_f)
+            As `gamma` gives them.
+
+        Returns
+        -------
+        tuple of SideAgreement
+            Responses of sides j and k, then excitations.
+        """
+        found = []
+        for kind, interface in (("response", self.responses), ("excitation", self.forces)):
+            first = 0
+            for side in _SIDES:
+                point = self.points[kind, side]
+                own = slice(first, first + point.modes.shape[0])
+                first = own.stop
+                names = interface.channels[own]
+                found.append(_agreement(kind, side, names, point, h[:, own] if kind == "response" else h[:, :, own]))
+        return tuple(found)
+
+    def left_out(self, h: ComplexArray) -> tuple[LeftOutDof, ...]:
+        """Name DOFs left out whose motion enters one that is kept, of responses and of excitations."""
+        found = left_out_dofs(h, self.responses)
+        if self.forces is self.responses:
+            return found
+        return found + left_out_dofs(np.ascontiguousarray(h.swapaxes(1, 2)), self.forces)
+
+
+def joint_channels(
+    frfs: FrfSet,
+    places: Iterable[ChannelPlace],
+    at: ArrayLike,
+    dofs: Sequence[str] = DIRECTIONS,
+    *,
+    at_k: ArrayLike | None = None,
+) -> JointChannels:
+    """Build the DOFs of a joint from all channels around it: virtual points of both sides.
+
+    Parameters
+    ----------
+    frfs : FrfSet
+        Which responses and excitations there are, and coordinates of nodes.
+    places : iterable of ChannelPlace
+        Channels on both sides, as `places_of_nodes` or `jointfrf.io.read_channel_table` list them.
+    at : array_like, shape (3,)
+        Reference point of the joint, m.
+    dofs : sequence of str
+        Joint DOFs.
+    at_k : array_like, shape (3,), optional
+        Reference point of side k where it is another one than that of side j.
+
+    Returns
+    -------
+    JointChannels
+
+    Raises
+    ------
+    ValueError
+        A channel without a side, without a place or not in the set, or named twice; too few channels on a side for the
+        DOFs, or channels that do not show them.
+
+    Notes
+    -----
+    Sensors and impacts may be different channels: responses and excitations each have a virtual point on each side
+    (`virtual_point`).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import jointfrf as jf
+    >>> nodes = {1: (-0.01, 0, 0), 2: (0.01, 0, 0), 3: (-0.01, 0, 0), 4: (0.01, 0, 0)}
+    >>> ends = tuple(jf.io.Channel(node, "y") for node in nodes)
+    >>> frfs = jf.io.FrfSet(np.array([10.0]), ends, ends, np.ones((1, 4, 4)), coordinates=nodes)
+    >>> sides = jf.joint_channels(frfs, jf.places_of_nodes(frfs, [1, 2], [3, 4]), [0, 0, 0], ["y", "rz"])
+    >>> sides.dofs, sides.responses.transform[:2, :2].round(6).tolist()
+    (('y', 'theta_z'), [[0.5, 0.5], [-50.0, 50.0]])
+    """
+    reference = as_real("at", at, (3,))
+    references = {"j": reference, "k": reference if at_k is None else as_real("at_k", at_k, (3,))}
+    given = list(places)
+    _check_known(frfs, given)
+    chosen = {
+        (kind, side): [place for place in given if place.side == side and _counts(place, kind, own)]
+        for kind, own in (("response", frfs.responses), ("excitation", frfs.excitations))
+        for side in _SIDES
+    }
+    points: dict[tuple[str, str], VirtualPoint] = {
+        (kind, side): _point(frfs, kind, side, own, references[side], dofs) for (kind, side), own in chosen.items()
+    }
+    interfaces = []
+    for kind in ("response", "excitation"):
+        channels = [place.channel for side in _SIDES for place in chosen[kind, side]]
+        made = virtual_interface(points[kind, "j"], points[kind, "k"])
+        interfaces.append(made._replace(channels=tuple(channels)))
+    one, other = interfaces
+    same = one.channels == other.channels and np.array_equal(one.transform, other.transform)
+    return JointChannels(one, one if same else other, points)
+
+
+def _is_there(channel: Channel, known: Sequence[Channel]) -> bool:
+    return channel in known or channel.opposite() in known
+
+
+def _counts(place: ChannelPlace, kind: str, known: Sequence[Channel]) -> bool:
+    return place.role in (kind, "both") and place.weight > 0 and _is_there(place.channel, known)
+
+
+def _check_known(frfs: FrfSet, places: Sequence[ChannelPlace]) -> None:
+    """Check that each channel has a side, is a translation, stands once, and is in the set."""
+    seen: dict[tuple[int, str, str], ChannelPlace] = {}
+    for place in places:
+        where = f"{place.where}: " if place.where else ""
+        if place.side is None:
+            raise ValueError(f"{where}channel {place.channel} has no side: j or k")
+        if place.channel.is_rotation:
+            raise ValueError(f"{where}channel {place.channel} is a rotation, a virtual point needs translations")
+        for kind in ("response", "excitation") if place.role == "both" else (place.role,):
+            key = place.channel.node, place.channel.axis, kind
+            if key in seen:
+                raise ValueError(f"{where}channel {place.channel} stands there twice as {kind}")
+            seen[key] = place
+        known = {
+            "response": frfs.responses,
+            "excitation": frfs.excitations,
+            "both": (*frfs.responses, *frfs.excitations),
+        }[place.role]
+        if not place.optional and not _is_there(place.channel, known):
+            what = "channel" if place.role == "both" else place.role
+            raise ValueError(f"{where}{frfs.source or 'the set'} has no {what} {place.channel}")
+
+
+def _point(
+    frfs: FrfSet, kind: str, side: str, places: Sequence[ChannelPlace], reference: FloatArray, dofs: Sequence[str]
+) -> VirtualPoint:
+    """Return the virtual point of the responses or excitations of a side."""
+    if not places:
+        raise ValueError(f"side {side} of the joint has no {kind}s: name the nodes of sensors and of impacts")
+    positions = [_position(frfs, place) for place in places]
+    weights = [place.weight for place in places]
+    try:
+        return virtual_point(positions, [place.unit for place in places], reference, dofs, weights)
+    except ValueError as error:
+        names = ", ".join(str(place.channel) for place in places[:6]) + (", ..." if len(places) > 6 else "")
+        raise ValueError(f"{kind}s of side {side} ({names}): {error}") from error
+
+
+def _position(frfs: FrfSet, place: ChannelPlace) -> NDArray[np.float64]:
+    if place.position is not None:
+        return place.position
+    node = place.channel.node
+    if node not in frfs.coordinates:
+        where = f"{place.where}: " if place.where else ""
+        raise ValueError(
+            f"{where}node {node} has no coordinates, neither in {frfs.source or 'the set'} nor in a table of channels"
+        )
+    return np.asarray(frfs.coordinates[node], dtype=np.float64)
+
+
+def _agreement(
+    kind: _Kind | str, side: JointSide, names: Sequence[Channel], point: VirtualPoint, h: ComplexArray
+) -> SideAgreement:
+    # Directions that move much more than others would hide an error of the small ones behind their noise.
+    of_each = (0, 2) if kind == "response" else (0, 1)
+    power = np.mean(abs(h) ** 2, axis=of_each)
+    weighted = _weighted(point, np.where(power > 0, power, power.max() or 1.0))
+    check = sensor_consistency if kind == "response" else impact_consistency
+    found = check(np.ascontiguousarray(h), weighted)
+    with np.errstate(invalid="ignore"):
+        specific, blame = np.nanmedian(found.specific, axis=0), np.nanmean(found.blame, axis=0)
+    unchecked = weighted.redundancy < 1e-6
+    return SideAgreement(
+        kind,  # type: ignore[arg-type]
+        side,
+        float(np.nanmedian(found.overall)),
+        point.condition,
+        tuple(
+            ChannelAgreement(name, float(one), float("nan") if free else float(share))
+            for name, one, share, free in zip(names, specific, blame, unchecked, strict=True)
+        ),
+    )
+
+
+def _weighted(point: VirtualPoint, power: FloatArray) -> VirtualPoint:
+    """Return the same point with each channel weighted by the inverse of its power."""
+    root = np.sqrt(point.weights / power)
+    inverse = np.linalg.pinv(root[:, None] * point.modes) * root
+    return point._replace(transform=inverse.astype(np.float64), weights=root**2)

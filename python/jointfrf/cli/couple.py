@@ -1,0 +1,166 @@
+"""`jointfrf couple`: FRFs of the assembly of two substructures and a joint."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from jointfrf.channels.virtual_point import append_virtual_point, channel_geometry, virtual_point
+from jointfrf.cli.joint_file import read_joint_file
+from jointfrf.cli.measured_file import Nodes, add_quantity_arguments, nodes, point
+from jointfrf.cli.output import Output
+from jointfrf.cli.structure_file import (
+    add_line_arguments,
+    check_target,
+    lines_of,
+    own_matrix,
+    read_structures,
+    write_frfs,
+)
+from jointfrf.cli.usage import UsageError, waiting
+from jointfrf.dofs import direction_places
+from jointfrf.errors import FileContentError
+from jointfrf.io import Channel, FrfSet
+from jointfrf.joint import Joint
+from jointfrf.substructuring.coupling import couple
+
+__all__ = ["add_arguments", "joint_channels_of", "renumbered", "run", "shifted"]
+
+_CHANNELS = ("x", "y", "z", "rx", "ry", "rz")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Describe the arguments of the command."""
+    parser.description = (
+        "Couple two substructures by a joint (2.26) and write the FRFs of the assembly. A substructure is a file of "
+        "FRFs or a TOML file of a model; the joint is a JSON file of identify --save, or a TOML file with dofs, "
+        "stiffness, damping, loss_factor."
+    )
+    parser.add_argument("a", type=Path, metavar="A", help="substructure A: file of FRFs, or model (.toml)")
+    parser.add_argument("b", type=Path, metavar="B", help="substructure B")
+    parser.add_argument("--joint", type=Path, metavar="FILE", help="the joint: .json or .toml")
+    parser.add_argument("--j", type=nodes, metavar="NODES", help="node of A at the joint, which has its DOFs; or, with "
+                        "--at, nodes around it")  # fmt: skip
+    parser.add_argument("--k", type=nodes, metavar="NODES", help="node or nodes of B")
+    parser.add_argument("--at", type=point, metavar="X,Y,Z", help="reference point of virtual points, m")
+    parser.add_argument(
+        "--renumber-b", type=int, default=0, metavar="N", help="add N to the nodes of B, where both have the same"
+    )
+    parser.add_argument(
+        "--shift-b", type=point, default=(0.0, 0.0, 0.0), metavar="X,Y,Z", help="add this to the coordinates of B, m"
+    )
+    parser.add_argument("--output", type=Path, metavar="FILE", help="file to write: .uff, .npz, .h5 or .csv")
+    add_line_arguments(parser)
+    add_quantity_arguments(parser)
+
+
+def renumbered(frfs: FrfSet, add: int, shift: Sequence[float] = (0.0, 0.0, 0.0)) -> FrfSet:
+    """Return the same FRFs with other numbers of nodes, at places that are shifted."""
+    try:
+        sides = [tuple(Channel(c.node + add, c.direction) for c in side) for side in (frfs.responses, frfs.excitations)]
+    except ValueError as error:
+        raise UsageError(f"--renumber-b {add}: {error}") from error
+    places = {node + add: np.asarray(place) + shift for node, place in frfs.coordinates.items()}
+    return replace(frfs, responses=sides[0], excitations=sides[1], coordinates=places)
+
+
+def shifted(named: Nodes, add: int) -> Nodes:
+    """Return nodes with other numbers."""
+    return Nodes(tuple(node + add for node in named.numbers), frozenset(node + add for node in named.single))
+
+
+def joint_channels_of(node: int, dofs: Sequence[str]) -> list[Channel]:
+    """Return the channels of a node in the directions of a joint."""
+    return [Channel(node, _CHANNELS[place]) for place in direction_places(dofs)]
+
+
+def run(args: argparse.Namespace) -> int:
+    """Carry out the command; the caller turns exceptions into messages."""
+    out = Output(args)
+    for name, value in (("--joint", args.joint), ("--j", args.j), ("--k", args.k), ("--output", args.output)):
+        if value is None:
+            raise UsageError(f"{name} is missing: jointfrf couple A B --joint FILE --j NODE --k NODE --output FILE")
+    check_target(args.output)
+    found = read_joint_file(args.joint)
+    options = {"quantity": args.quantity, "force_quantity": args.force_quantity}
+    a, b = read_structures([args.a, args.b], lines_of(args), **options)
+    if args.band is not None:
+        a, b = a.select(args.band), b.select(args.band)
+    b = renumbered(b, args.renumber_b, args.shift_b)
+    k_side = shifted(args.k, args.renumber_b)
+    with waiting("coupling"):
+        assembly = _coupled(a, b, found.joint, (args.j, k_side), args.at)
+    write_frfs(args.output, assembly)
+    out.say(assembly.summary(), f"wrote {args.output}")
+    out.give(
+        {
+            "written": str(args.output),
+            "a": str(args.a),
+            "b": str(args.b),
+            "joint": {"file": str(args.joint), "dofs": found.joint.dofs, "stiffness": found.joint.stiffness},
+            "channels": [str(channel) for channel in assembly.responses],
+            "lines": assembly.freq_hz.size,
+            "band_hz": [assembly.freq_hz[0], assembly.freq_hz[-1]],
+        }
+    )
+    return 0
+
+
+def _coupled(a: FrfSet, b: FrfSet, joint: Joint, sides: tuple[Nodes, Nodes], at: tuple[float, ...] | None) -> FrfSet:
+    """Return the FRFs of the assembly at all channels of both."""
+    channels, matrices, ends = [], [], []
+    for frfs, side in ((a, sides[0]), (b, sides[1])):
+        names, h = own_matrix(frfs)
+        whole, at_joint = _with_joint(frfs, names, h, joint, side, at)
+        channels.append(names)
+        matrices.append(whole)
+        ends.append(at_joint)
+    shared = {c.node for c in channels[0]} & {c.node for c in channels[1]}
+    if shared:
+        raise FileContentError(
+            f"node {min(shared)} is in {a.source} and in {b.source}: --renumber-b N adds a number to those of B"
+        )
+    k_joint = joint.dynamic_stiffness(a.freq_hz)
+    h = couple(matrices[0], matrices[1], k_joint, ends[0], ends[1], freq_hz=a.freq_hz)
+    # Virtual points stand behind the channels of their side, and are not measured.
+    n_a, own_a, own_b = matrices[0].shape[1], len(channels[0]), len(channels[1])
+    kept = [*range(own_a), *range(n_a, n_a + own_b)]
+    names = (*channels[0], *channels[1])
+    places = {**a.coordinates, **b.coordinates}
+    source = f"{a.source} and {b.source}, coupled"
+    return FrfSet(a.freq_hz, names, names, h[:, kept][:, :, kept], coordinates=places, source=source)
+
+
+def _with_joint(
+    frfs: FrfSet,
+    names: tuple[Channel, ...],
+    h: np.ndarray,
+    joint: Joint,
+    side: Nodes,
+    at: tuple[float, ...] | None,
+) -> tuple[np.ndarray, list[int]]:
+    """Return FRFs with the DOFs of the joint among them, and which these are."""
+    found = side.among({channel.node for channel in names}, frfs.source)
+    if at is not None:
+        own = [i for i, channel in enumerate(names) if channel.node in found and not channel.is_rotation]
+        missing = [node for node in found if node not in frfs.coordinates]
+        if missing:
+            raise FileContentError(f"{frfs.source} has no coordinates of node {missing[0]}, which --at needs")
+        geometry = channel_geometry([names[i] for i in own], frfs.coordinates)
+        vp = virtual_point(*geometry, at, joint.dofs)
+        whole = append_virtual_point(h, own, vp)
+        return whole, list(range(len(names), whole.shape[1]))
+    if len(found) != 1:
+        raise UsageError(f"several nodes at the joint ({found[0]}, {found[1]}, ...) need --at X,Y,Z, a virtual point")
+    places = []
+    for wanted in joint_channels_of(found[0], joint.dofs):
+        if wanted not in names:
+            raise FileContentError(
+                f"{frfs.source} has no FRFs at {wanted}, a DOF of the joint; nodes around it and --at X,Y,Z give one"
+            )
+        places.append(names.index(wanted))
+    return h, places

@@ -1,0 +1,171 @@
+"""`jointfrf decouple`: a joint from FRFs of the assembly away from it, and of both substructures."""
+
+from __future__ import annotations
+
+import argparse
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from jointfrf.cli.couple import joint_channels_of, renumbered, shifted
+from jointfrf.cli.measured_file import (
+    Nodes,
+    add_quantity_arguments,
+    joint_dofs,
+    nodes,
+    parse_band,
+    shown_nodes,
+    words,
+)
+from jointfrf.cli.output import Output
+from jointfrf.cli.structure_file import own_matrix, read_structures
+from jointfrf.cli.usage import UsageError, check_folder, waiting
+from jointfrf.errors import FileContentError, IdentificationWarning
+from jointfrf.files import write_file
+from jointfrf.identification.identify import IdentificationMethod, identify
+from jointfrf.identification.joint_fit import JointFit
+from jointfrf.io import Channel, FrfSet
+from jointfrf.kernel.arguments import ComplexArray
+
+__all__ = ["add_arguments", "run"]
+
+_METHODS: dict[str, IdentificationMethod] = {
+    "rr": "decoupling-rr",
+    "rs": "decoupling-rs",
+    "sr": "decoupling-sr",
+    "ss": "decoupling-ss",
+}
+
+
+def _channels(text: str) -> list[Channel]:
+    try:
+        return [Channel.parse(word) for word in words(text)]
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Describe the arguments of the command."""
+    parser.description = (
+        "Identify a joint by FRF decoupling, (2.53) to (2.56): from FRFs of the assembly at internal points r of A and "
+        "s of B, and from both substructures (files of FRFs, or TOML files of models). Exact without noise, and very "
+        "sensitive to it: jointfrf identify, with FRFs at the joint, is not."
+    )
+    parser.add_argument("a", type=Path, metavar="A", help="substructure A: file of FRFs, or model (.toml)")
+    parser.add_argument("b", type=Path, metavar="B", help="substructure B")
+    parser.add_argument("assembly", type=Path, metavar="ASSEMBLY", help="file of FRFs of the assembly")
+    parser.add_argument(
+        "--equation",
+        choices=tuple(_METHODS),
+        default="ss",
+        help="responding and excited point: (2.53) rr, (2.54) rs, (2.55) sr, (2.56) ss (default)",
+    )
+    parser.add_argument("--j", type=nodes, metavar="NODE", help="node of A at the joint")
+    parser.add_argument("--k", type=nodes, metavar="NODE", help="node of B at the joint")
+    parser.add_argument("--dofs", type=joint_dofs, metavar="DOFS", help="joint DOFs, which both nodes have: y,rz")
+    parser.add_argument("--r", type=_channels, metavar="CHANNELS", help="as many channels of A: 7:y,7:rz")
+    parser.add_argument("--s", type=_channels, metavar="CHANNELS", help="as many channels of B")
+    parser.add_argument(
+        "--renumber-b",
+        type=int,
+        default=0,
+        metavar="N",
+        help="add N to the nodes of B, --k and --s, as jointfrf couple did for the assembly",
+    )
+    parser.add_argument(
+        "--band", type=parse_band, action="append", metavar="LOW:HIGH", help="sensitive band in Hz; may be repeated"
+    )
+    parser.add_argument("--save", type=Path, metavar="FILE", help="keep the joint in a JSON file")
+    parser.add_argument("--output", type=Path, metavar="FILE", help="K* of each line as a CSV file")
+    add_quantity_arguments(parser)
+
+
+@dataclass(frozen=True)
+class _Side:
+    """One substructure: FRFs between its channels, and which of these are at the joint and which internal."""
+
+    h: ComplexArray
+    joint: list[int]
+    internal: list[int] | None
+
+
+def run(args: argparse.Namespace) -> int:
+    """Carry out the command; the caller turns exceptions into messages."""
+    out = Output(args)
+    _check(args)
+    check_folder("--save", args.save)
+    check_folder("--output", args.output)
+    a, b, assembly = read_structures(
+        [args.a, args.b, args.assembly], None, quantity=args.quantity, force_quantity=args.force_quantity
+    )
+    b = renumbered(b, args.renumber_b)
+    k = shifted(args.k, args.renumber_b)
+    s = None if args.s is None else [Channel(c.node + args.renumber_b, c.direction) for c in args.s]
+    at = {"r": args.r, "s": s}
+    side_a = _side(a, args.j, args.dofs, args.r)
+    side_b = _side(b, k, args.dofs, s)
+    measured = assembly.matrix(at[args.equation[0]], at[args.equation[1]])
+    with warnings.catch_warnings(), waiting("decoupling"):
+        warnings.simplefilter("ignore", IdentificationWarning)  # they stand in the table
+        fit = identify(
+            a.freq_hz, measured, args.dofs, _METHODS[args.equation], args.band,
+            h_a=side_a.h, h_b=side_b.h, dofs_j=side_a.joint, dofs_k=side_b.joint,
+            dofs_r=side_a.internal, dofs_s=side_b.internal,
+        )  # fmt: skip
+    written = []
+    if args.save is not None:
+        fit.save(args.save)
+        written.append(args.save)
+    if args.output is not None:
+        write_file(args.output, _line_table(fit))
+        written.append(args.output)
+    out.say(fit, *([""] if written else []), *(f"wrote {path}" for path in written))
+    fits = [fit.to_dict(lines=False)]
+    out.give({"equation": args.equation, "fits": fits, "written": [str(path) for path in written]})
+    return 0
+
+
+def _check(args: argparse.Namespace) -> None:
+    """Check that all is named that the equation needs."""
+    wanted = {"--j": args.j, "--k": args.k, "--dofs": args.dofs}
+    wanted |= {f"--{point}": getattr(args, point) for point in dict.fromkeys(args.equation)}
+    missing = [name for name, value in wanted.items() if value is None]
+    if missing:
+        raise UsageError(f"equation {args.equation} needs {' and '.join(missing)}: see jointfrf decouple --help")
+    for name, channels in (("--r", args.r), ("--s", args.s)):
+        if channels is not None and len(channels) != len(args.dofs):
+            raise UsageError(f"{name} must name {len(args.dofs)} channels, as many as --dofs, not {len(channels)}")
+    for name, side in (("--j", args.j), ("--k", args.k)):
+        if len(side.numbers) != 1:
+            raise UsageError(f"{name} must name one node, not {shown_nodes(side.numbers)}")
+
+
+def _side(frfs: FrfSet, at: Nodes, dofs: list[str], internal: list[Channel] | None) -> _Side:
+    """Find the DOFs of a substructure at the joint and inside."""
+    (node,) = at.among({channel.node for channel in (*frfs.responses, *frfs.excitations)}, frfs.source)
+    names, h = own_matrix(frfs)
+    return _Side(
+        h,
+        _found(frfs, names, joint_channels_of(node, dofs)),
+        None if internal is None else _found(frfs, names, internal),
+    )
+
+
+def _found(frfs: FrfSet, names: tuple[Channel, ...], wanted: list[Channel]) -> list[int]:
+    for channel in wanted:
+        if channel not in names:
+            raise FileContentError(f"{frfs.source} has no FRFs at {channel} (response and excitation)")
+    return [names.index(channel) for channel in wanted]
+
+
+def _line_table(fit: JointFit) -> str:
+    """Write K* of each line, N/m and its like, as a CSV table."""
+    pairs = [(p, q) for p in range(len(fit.dofs)) for q in range(len(fit.dofs))]
+    names = [f"{part} K_{fit.dofs[p]},{fit.dofs[q]}" for p, q in pairs for part in ("Re", "Im")]
+    rows = [",".join(["frequency [Hz]", *(f'"{name}"' for name in names)])]
+    for freq, k in zip(fit.freq_hz, fit.k_lines, strict=True):
+        values = [number for p, q in pairs for number in (k[p, q].real, k[p, q].imag)]
+        rows.append(",".join(f"{number:.12g}" for number in (freq, *np.asarray(values))))
+    return "\n".join(rows) + "\n"

@@ -1,0 +1,321 @@
+"""The joint in a measured file: which channels, how they give its DOFs, and what is to be said of them beforehand."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from jointfrf.channels.joint_channels import JointChannels, SideAgreement, joint_channels
+from jointfrf.channels.left_out_dofs import LeftOutDof, OffsetCoupling, left_out_dofs, offset_couplings
+from jointfrf.channels.node_dofs import node_dofs
+from jointfrf.channels.point_lines import Interface, interface
+from jointfrf.cli.measured_file import Nodes, file_names, in_some_band, shown_nodes
+from jointfrf.cli.usage import UsageError
+from jointfrf.dofs import is_rotation
+from jointfrf.errors import FileContentError
+from jointfrf.frf.channel_place import ChannelPlace, JointSide, places_of_nodes
+from jointfrf.frf.frf_set import Channel
+from jointfrf.io import FrfSet, read_channel_table
+from jointfrf.io.channel_table import places_of_table
+from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.toml.table import read_toml
+
+__all__ = ["MeasuredJoint", "measured_joint"]
+
+#: A channel explains what is not rigid on its side where leaving it out removes more than this share of it,
+_MUCH = 0.7
+#: and what is not rigid is more than this share of the motion.
+_NOT_RIGID = 0.05
+
+
+@dataclass(frozen=True)
+class MeasuredJoint:
+    """A joint as a file of FRFs shows it.
+
+    Attributes
+    ----------
+    freq_hz : ndarray, shape (n_freq,)
+        Hz.
+    h : ndarray, shape (n_freq, m_r, m_f)
+        Receptances between its channels.
+    responses, forces : Interface
+        From the channels to the joint DOFs.
+    channels : JointChannels or None
+        Virtual points, where there are any.
+    nodes : tuple of two lists of int
+        On sides j and k.
+    bands : list of (low, high), or None
+        Hz; what is said of channels is said of these lines.
+    """
+
+    freq_hz: FloatArray
+    h: ComplexArray
+    responses: Interface
+    forces: Interface
+    channels: JointChannels | None
+    nodes: tuple[list[int], list[int]]
+    bands: list[tuple[float, float]] | None
+
+    @property
+    def transform(self) -> Interface | tuple[Interface, Interface]:
+        """What `identify` takes."""
+        return self.responses if self.responses is self.forces else (self.responses, self.forces)
+
+    @property
+    def dofs(self) -> tuple[str, ...]:
+        """Names of the joint DOFs."""
+        return self.responses.dofs
+
+    @property
+    def is_square(self) -> bool:
+        """Whether responses and excitations are the same channels."""
+        return self.responses is self.forces
+
+    @cached_property
+    def _lines(self) -> ComplexArray:
+        return in_some_band(self.freq_hz, self.h, self.bands)[1]
+
+    @cached_property
+    def agreement(self) -> tuple[SideAgreement, ...]:
+        """What each channel has to do with motion that is not rigid; empty without virtual points."""
+        return () if self.channels is None else self.channels.agreement(self._lines)
+
+    @cached_property
+    def left_out(self) -> tuple[LeftOutDof, ...]:
+        """DOFs left out that enter those that are kept."""
+        found = left_out_dofs(self._lines, self.responses)
+        if not self.is_square:
+            found += left_out_dofs(np.ascontiguousarray(self._lines.swapaxes(1, 2)), self.forces)
+        return tuple({(one.side, one.dof, one.into): one for one in found if one.matters}.values())
+
+    @property
+    def offsets(self) -> tuple[OffsetCoupling, ...]:
+        """Rotations that reference points which are apart turn into displacements."""
+        return offset_couplings(self.responses)
+
+    def warnings(self) -> Iterator[str]:
+        """Say what a reader must know before the fit."""
+        yield from (str(one) for one in self.left_out)
+        yield from (f"{one}; --at X,Y,Z gives both sides one" for one in self.offsets if one.is_left_out)
+        for group in self.agreement:
+            share = _not_rigid(group)
+            worst = max(group.channels, key=lambda channel: np.nan_to_num(channel.blame))
+            if share > _NOT_RIGID and worst.blame > _MUCH:
+                yield (
+                    f"{100 * worst.blame:.0f} % of what is not rigid in the {group.kind}s of side {group.side} "
+                    f"({100 * share:.2g} % of their motion) is gone without {worst.channel}: look at its sign, "
+                    "direction, gain and place"
+                )
+
+    def text(self) -> Iterator[str]:
+        """Describe reference points, and channels beside rigid motion, line by line."""
+        one, other = self.responses.references
+        if self.channels is not None and np.array_equal(one, other):
+            yield f"virtual points at x, y, z = {_millimetres(one)} mm on both sides"
+        elif self.channels is not None:
+            yield f"virtual points at x, y, z = {_millimetres(one)} mm (j) and {_millimetres(other)} mm (k)"
+        if np.linalg.norm(other - one) > 0:
+            yield (
+                f"reference points {1e3 * np.linalg.norm(other - one):.3g} mm apart: x, y, z = "
+                f"{_millimetres(other - one)} mm"
+            )
+        yield from (str(one) for one in self.offsets if not one.is_left_out)
+        if self.agreement:
+            yield from ("", *_agreement_table(self.agreement))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything said here, for JSON."""
+        return {
+            "nodes": {"j": self.nodes[0], "k": self.nodes[1]},
+            "dofs": self.dofs,
+            "reference_points_m": dict(zip("jk", self.responses.references, strict=True)),
+            "responses": [str(channel) for channel in self.responses.channels],
+            "excitations": [str(channel) for channel in self.forces.channels],
+            "left_out": [one._asdict() for one in self.left_out],
+            "offset_couplings": [one._asdict() for one in self.offsets],
+            "agreement": [
+                {
+                    "kind": group.kind,
+                    "side": group.side,
+                    "not_rigid": _not_rigid(group),
+                    "condition": group.condition,
+                    "channels": {
+                        str(one.channel): {"consistency": one.consistency, "blame": one.blame} for one in group.channels
+                    },
+                }
+                for group in self.agreement
+            ],
+        }
+
+
+def _millimetres(place: FloatArray) -> str:
+    return ", ".join(f"{1e3 * value:.4g}" for value in place + 0.0)
+
+
+def _not_rigid(group: SideAgreement) -> float:
+    """Part of the motion that is not rigid, root mean square."""
+    return float(np.sqrt(max(1 - group.rigid**2, 0)))
+
+
+def _agreement_table(groups: tuple[SideAgreement, ...]) -> Iterator[str]:
+    """Write the channels of each side beside one another: consistency and blame."""
+    for kind in ("response", "excitation"):
+        j, k = (group for group in groups if group.kind == kind)
+        for group in (j, k):
+            yield (
+                f"{kind}s of side {group.side}: {len(group.channels)} channels, condition {group.condition:.3g}; "
+                f"{100 * _not_rigid(group):.2g} % of their motion is not rigid"
+            )
+        heading = f"  {'channel':<12}{'consistency':>12}{'blame':>8}"
+        yield f"{heading}    {heading.strip()}"
+        rows = max(len(j.channels), len(k.channels))
+        for i in range(rows):
+            cells = []
+            for group in (j, k):
+                if i >= len(group.channels):
+                    cells.append(" " * 32)
+                    continue
+                one = group.channels[i]
+                blame = "  ?" if np.isnan(one.blame) else f"{100 * one.blame:.0f} %"
+                cells.append(f"{one.channel!s:<12}{one.consistency:>12.3f}{blame:>8}")
+            yield ("  " + "    ".join(cells)).rstrip()
+        yield ""
+    yield "consistency: 1 where a channel moves as the others say"
+    yield "blame: share of what is not rigid on its side that is gone without it"
+
+
+def measured_joint(args: argparse.Namespace, frfs: FrfSet, bending_stiffness: float | None = None) -> MeasuredJoint:
+    """Find the channels of a joint and the way to its DOFs.
+
+    Raises
+    ------
+    UsageError
+        An option is missing.
+    FileContentError, ValueError
+        Words and files do not fit each other.
+    """
+    table = _table(args)
+    _check_options(args, frfs, table)
+    known = {channel.node for channel in (*frfs.responses, *frfs.excitations)}
+    if table is not None:
+        places = _on_sides(table, args, known, frfs.source)
+        nodes = _nodes_of(places, "j"), _nodes_of(places, "k")
+    else:
+        nodes = args.j.among(known, frfs.source), args.k.among(known, frfs.source)
+        places = ()
+    if args.at is not None:
+        places = places or places_of_nodes(frfs, *nodes)
+        found = joint_channels(frfs, places, args.at, args.dofs, at_k=args.at_k)
+        h = found.gamma(frfs)
+        return MeasuredJoint(frfs.freq_hz, h, found.responses, found.forces, found, nodes, args.band)
+    sides = _node_dofs(args, frfs, nodes) or _point_lines(args, frfs, nodes, bending_stiffness)
+    h = frfs.matrix(sides.channels, sides.channels)
+    return MeasuredJoint(frfs.freq_hz, h, sides, sides, None, nodes, args.band)
+
+
+def _table(args: argparse.Namespace) -> tuple[ChannelPlace, ...] | None:
+    """Read the table of channels: the one that is named, or that of the project."""
+    if args.channels is not None:
+        return read_channel_table(args.channels)
+    if args.configuration is None:
+        return None
+    table = read_toml(args.configuration)
+    return places_of_table(table) if "channel" in table else None
+
+
+def _check_options(args: argparse.Namespace, frfs: FrfSet, table: object) -> None:
+    known = shown_nodes({channel.node for channel in (*frfs.responses, *frfs.excitations)})
+    needs = {
+        "--j": (args.j, "the nodes on side j of the joint, such as --j 101,102"),
+        "--k": (args.k, "the nodes on side k of the joint, such as --k 201,202"),
+        "--dofs": (args.dofs, "the DOFs of the joint, such as --dofs y,theta_z"),
+    }
+    missing = [name for name, (value, _) in needs.items() if value is None]
+    if table is not None:
+        missing = [name for name in missing if name == "--dofs"]
+    if missing:
+        what = "; ".join(needs[name][1] for name in missing)
+        verb = "is" if len(missing) == 1 else "are"
+        nodes = "" if missing == ["--dofs"] else f" ({file_names(args)} has nodes {known})"
+        names = ", ".join([*missing[:-2], " and ".join(missing[-2:])])
+        raise UsageError(f"{names} {verb} missing: {what}{nodes}")
+    if args.at is None:
+        for name, value in (("--at-k", args.at_k), ("a table of channels", table)):
+            if value is not None:
+                raise UsageError(f"{name} needs --at X,Y,Z, the reference point of the joint")
+    if (args.spacing is None) != (args.axis is None):
+        raise UsageError("--spacing and --axis go together")
+    if args.spacing is not None and args.at is not None:
+        raise UsageError("--spacing is for nodes along a line, --at for virtual points: name one of them")
+    if args.spacing is not None and not args.spacing > 0:
+        raise UsageError(f"--spacing must be positive, not {args.spacing:g}")
+
+
+def _on_sides(
+    table: tuple[ChannelPlace, ...], args: argparse.Namespace, known: set[int], source: str
+) -> tuple[ChannelPlace, ...]:
+    """Return the channels of a table that belong to the joint, each with its side."""
+    if args.j is None and args.k is None:
+        return table
+    named: tuple[tuple[JointSide, Nodes | None], ...] = (("j", args.j), ("k", args.k))
+    sides: dict[int, JointSide] = {
+        node: side for side, nodes in named for node in ([] if nodes is None else nodes.among(known, source))
+    }
+    kept = []
+    for place in table:
+        side = sides.get(place.channel.node, place.side if None in (args.j, args.k) else None)
+        if side is not None:
+            kept.append(replace(place, side=side))
+    return tuple(kept)
+
+
+def _nodes_of(places: tuple[ChannelPlace, ...], side: str) -> list[int]:
+    return list(dict.fromkeys(place.channel.node for place in places if place.side == side))
+
+
+def _node_dofs(args: argparse.Namespace, frfs: FrfSet, nodes: tuple[list[int], list[int]]) -> Interface | None:
+    """Return the DOFs of two nodes whose rotations stand in the file, too."""
+    rotations = [dof for dof in args.dofs if is_rotation(dof)]
+    if len(nodes[0]) != 1 or len(nodes[1]) != 1 or not rotations:
+        return None
+    found = node_dofs(nodes[0][0], nodes[1][0], args.dofs, frfs.coordinates)
+    turning = [channel for channel in found.channels if channel.is_rotation]
+    return found if all(_is_there(channel, frfs) for channel in turning) else None
+
+
+def _is_there(channel: Channel, frfs: FrfSet) -> bool:
+    return any(each in (*frfs.responses, *frfs.excitations) for each in (channel, channel.opposite()))
+
+
+def _point_lines(
+    args: argparse.Namespace, frfs: FrfSet, nodes: tuple[list[int], list[int]], bending_stiffness: float | None
+) -> Interface:
+    """Return the DOFs of points along lines; E I of the sides in N m^2 widens intervals of rotations."""
+    places = dict(frfs.coordinates)
+    if args.spacing is not None:
+        for own in nodes:
+            for i, node in enumerate(own):
+                places[node] = np.zeros(3)
+                places[node]["xyz".index(args.axis)] = args.spacing * i
+    if len(nodes[0]) != len(nodes[1]):
+        raise UsageError(
+            f"--j and --k must name the same number of nodes, not {len(nodes[0])} and {len(nodes[1])}; virtual points "
+            "(--at X,Y,Z) take any"
+        )
+    for node in (*nodes[0], *nodes[1]):
+        if node not in places and (len(nodes[0]) > 1 or any(is_rotation(dof) for dof in args.dofs)):
+            raise FileContentError(
+                f"{frfs.source} has no coordinates of node {node}: say --spacing and --axis, or --at and --channels"
+            )
+    at = {node: places.get(node, np.zeros(3)) for node in (*nodes[0], *nodes[1])}
+    try:
+        return interface(*nodes, args.dofs, at, bending_stiffness=bending_stiffness)
+    except ValueError as error:
+        if args.spacing is not None or any(node not in frfs.coordinates for node in at):
+            raise
+        raise ValueError(f"{error}; or say --at X,Y,Z for virtual points of all channels") from error

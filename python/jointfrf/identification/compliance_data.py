@@ -1,0 +1,164 @@
+"""What a compliance fit shows beside its numbers: FRFs regenerated with the joint, and which lines tell of what."""
+
+from __future__ import annotations
+
+import warnings
+from functools import partial
+
+import numpy as np
+
+from jointfrf.channels.point_lines import Interface
+from jointfrf.errors import IllConditionedWarning
+from jointfrf.identification.compliance_fit.estimator import FittedGroup, JointEstimate
+from jointfrf.identification.compliance_fit.fit import ComplianceFit
+from jointfrf.identification.compliance_fit.interface_frfs import InterfaceFrfs
+from jointfrf.identification.compliance_fit.line_forms import inverse_information
+from jointfrf.identification.compliance_fit.manifold import frfs_of_joint, project
+from jointfrf.identification.compliance_fit.prepare import FitProblem
+from jointfrf.identification.compliance_fit.starts import smooth_compliance, starts_on_manifold
+from jointfrf.identification.compliance_fit.transforms import Transform, Transforms
+from jointfrf.identification.fit_data import FitData
+from jointfrf.kernel.arguments import ComplexArray, FloatArray
+
+__all__ = ["channel_names", "compliance_data", "information_shares", "line_compliance", "regenerated_frfs"]
+
+#: Steps of the projection.
+_STEPS = 30
+#: Directions of less information than this share of the largest are not seen by a line.
+_SEEN = 1e-10
+
+
+def compliance_data(
+    found: ComplianceFit, problem: FitProblem, transform: Transform | tuple[Transform, Transform] | None
+) -> FitData:
+    """Gather what a fit was made from; `transform` as in `identify`."""
+    frfs = problem.frfs
+    fitted = problem.used.copy()
+    for group in found.estimate.groups:
+        fitted[:, group.dofs] &= group.fit.trusted[:, None]
+    # A level that was assumed has been replaced by that of the residual.
+    scale = (found.joint.noise_level / problem.noise.level) ** 2 if problem.noise.is_assumed else 1.0
+    # An `Interface` is a tuple, too.
+    pair = transform if isinstance(transform, tuple) and not isinstance(transform, Interface) else (transform,) * 2
+    names = channel_names(frfs, problem.dofs, (pair[0], pair[1]))
+    return FitData(
+        measured=frfs.measured,
+        response_names=names[0],
+        force_names=names[1],
+        responses=frfs.responses,
+        forces=frfs.forces,
+        modes=_modes(frfs),
+        interface=pair[0] if isinstance(pair[0], Interface) else None,
+        reciprocal=frfs.reciprocal,
+        variance=frfs.variance,
+        variance_scale=float(scale),
+        deformation=problem.deformation,
+        noise=problem.noise.model,
+        fitted=fitted,
+        regenerated=partial(regenerated_frfs, found.estimate, frfs.n),
+        line_compliance=partial(line_compliance, found.estimate, frfs.n),
+        information=partial(information_shares, found.estimate),
+    )
+
+
+def _modes(frfs: InterfaceFrfs) -> tuple[FloatArray, FloatArray] | None:
+    """Return the rigid motion of responses and of forces, where both are known."""
+    if Transforms(frfs.responses, frfs.forces).are_units:
+        return frfs.responses, frfs.forces
+    if frfs.response_modes is None or frfs.force_modes is None:
+        return None
+    return frfs.response_modes, frfs.force_modes
+
+
+def channel_names(
+    frfs: InterfaceFrfs, dofs: tuple[str, ...], transforms: tuple[Transform | None, Transform | None]
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return names of responses and forces: of the channels, of the joint DOFs, or their numbers."""
+    if Transforms(frfs.responses, frfs.forces).are_units:
+        own = tuple(f"{side}:{dof}" for side in "jk" for dof in dofs)
+        return own, own
+    numbered = [
+        [f"{what} {i}" for i in range(count)]
+        for what, count in zip(("response", "force"), frfs.measured.shape[1:], strict=True)
+    ]
+    found = [
+        tuple(map(str, given.channels)) if isinstance(given, Interface) and given.channels else tuple(other)
+        for given, other in zip(transforms, numbered, strict=True)
+    ]
+    return found[0], found[1]
+
+
+def regenerated_frfs(found: JointEstimate, n: int, lines: slice) -> ComplexArray:
+    """Return the FRFs between joint DOFs nearest to the measured ones among all that fit the joint found.
+
+    Parameters
+    ----------
+    found : JointEstimate
+    n : int
+        Joint DOFs.
+    lines : slice
+
+    Returns
+    -------
+    ndarray, shape (lines, 2 n, 2 n)
+        m/N; zero between DOFs of different groups, NaN on lines where no such FRFs were found.
+    """
+    parts = [(group, _of_group(group, lines)) for group in found.groups]
+    gamma = np.zeros((len(parts[0][1]), 2 * n, 2 * n), np.complex128)
+    for group, own in parts:
+        at = np.concatenate([group.dofs, group.dofs + n])
+        gamma[:, at[:, None], at] = own
+    return gamma
+
+
+def _of_group(group: FittedGroup, lines: slice) -> ComplexArray:
+    """Return the regenerated FRFs of one group of DOFs."""
+    data, joint = group.problem.data.on_slice(lines), group.joint
+    entries = type(joint)(joint.terms.on_lines(lines)).compliance(group.fit.minimum.x)  # type: ignore[call-arg]
+    c = group.problem.of_joint(entries)
+    unknown = group.problem.unknown[lines].reshape(c.shape)
+    with warnings.catch_warnings(), np.errstate(all="ignore"):
+        warnings.simplefilter("ignore", IllConditionedWarning)
+        if unknown.any():
+            c = np.where(unknown, smooth_compliance(data), c)
+        on = project(data.measured, data, c, starts_on_manifold(data, c, _STEPS), _STEPS)
+        gamma = frfs_of_joint(on.h, on.m, c)
+    gamma[~np.isfinite(on.squares)] = np.nan
+    return gamma
+
+
+def line_compliance(found: JointEstimate, n: int) -> ComplexArray:
+    """Return the diagonal of C of each line by itself, shape (n_freq, n), m/N: the minimum of its quadratic form."""
+    whole = np.full((len(found.groups[0].fit.trusted), n), np.nan + 1j * np.nan)
+    for group in found.groups:
+        forms, own = group.fit.forms, group.dofs.size
+        entries = forms.compliance.shape[1]
+        rows, columns = np.diag_indices(own) if entries == own else np.triu_indices(own)
+        size = np.sqrt(np.einsum("lqq->lq", forms.weight).real)
+        known = (size > 0).all(axis=1) & np.isfinite(size).all(axis=1)
+        outer = size[known, :, None] * size[known, None, :]
+        scaled = np.linalg.pinv(forms.weight[known] / outer, rcond=_SEEN, hermitian=True)
+        step = (scaled @ (forms.gradient[known] / size[known])[..., None])[..., 0] / size[known]
+        whole[np.ix_(known, group.dofs)] = (forms.compliance[known] + step)[:, rows == columns]
+    return whole
+
+
+def information_shares(found: JointEstimate) -> FloatArray:
+    """Return the share of each line in what is known of each parameter, shape (n_freq, p); sums are 1.
+
+    Notes
+    -----
+    With A the information on the coordinates x of all lines, A_l that of a line, and s = dtheta/dx, the variance of a
+    parameter is s^T A^-1 s, and to first order a line of weight 1 + w changes it by -w s^T A^-1 A_l A^-1 s.
+    """
+    n_freq = len(found.groups[0].fit.trusted)
+    share = np.zeros((n_freq, len(found.parameters)))
+    for group in found.groups:
+        minimum = group.fit.minimum
+        slope = group.joint.theta_slope(minimum.x)
+        # Only shares count: rows of any size, also those of a rigid DOF.
+        slope = np.nan_to_num(slope / np.maximum(abs(slope).max(axis=1, keepdims=True), np.finfo(float).tiny))
+        to = slope @ inverse_information(minimum.information)
+        own = np.einsum("pa,lab,pb->lp", to, minimum.line_information, to, optimize=True)
+        share[:, group.which] = np.maximum(own, 0) / np.maximum(own.sum(axis=0), np.finfo(float).tiny)
+    return share

@@ -1,0 +1,78 @@
+"""What a fit was made from, kept by reference for those who want to look at it: FRFs, noise, what each line says."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointfrf.channels.point_lines import Interface
+from jointfrf.frf.noise_model import NoiseModel
+from jointfrf.kernel.arguments import ComplexArray, FloatArray
+
+__all__ = ["FitData"]
+
+
+@dataclass(frozen=True, eq=False)
+class FitData:
+    """Measured FRFs behind a `JointFit`, on its lines and in their order; nothing is copied.
+
+    Attributes
+    ----------
+    measured : ndarray, shape (n_freq, m_r, m_f)
+        FRFs of the channels, m/N.
+    response_names, force_names : tuple of str
+        Names of the channels.
+    responses, forces : ndarray, shapes (2 n, m_r), (2 n, m_f)
+        From channels to joint DOFs j, then k.
+    modes : tuple of ndarray, shapes (m_r, 2 n) and (m_f, 2 n), or None
+        Motion of the channels for a unit of each joint DOF where the sides are rigid; None where it is not known.
+    interface : Interface or None
+        Geometry of the channels, where it is known.
+    reciprocal : bool
+        Whether h_pq and h_qp are the same FRF.
+    variance : ndarray, shape (n_freq, m_r, m_f)
+        E|e|^2 of the noise as it weighs in the fit, (m/N)^2: `variance_scale` times this is that of the noise found.
+    variance_scale : float
+    deformation : ndarray, shape (n_freq, m_r, m_f), or None
+        Part of the variance that is not noise: squares of what is not rigid in the channels, (m/N)^2.
+    noise : NoiseModel or None
+        Where the noise was found from the FRFs, and these are not too many.
+    fitted : ndarray of bool, shape (n_freq, n)
+        Lines used for each DOF: inside its bands, and fitting a joint within their noise.
+    regenerated : callable
+        From a slice of the lines to the FRFs between the joint DOFs, shape (lines, 2 n, 2 n), m/N: nearest to the
+        measured ones among all that fit the joint found. NaN where there are none.
+    line_compliance : callable
+        Returns the diagonal of the joint's compliance C by line, shape (n_freq, n), m/N, as the fit sees it: linearised
+        at FRFs that fit the joint, so without the bias of an inverse of noise. NaN where a line does not give it.
+    information : callable
+        Returns the share of each line in what is known of each parameter, shape (n_freq, p).
+    """
+
+    measured: ComplexArray
+    response_names: tuple[str, ...]
+    force_names: tuple[str, ...]
+    responses: FloatArray
+    forces: FloatArray
+    modes: tuple[FloatArray, FloatArray] | None
+    interface: Interface | None
+    reciprocal: bool
+    variance: FloatArray
+    variance_scale: float
+    deformation: FloatArray | None
+    noise: NoiseModel | None
+    fitted: NDArray[np.bool_]
+    regenerated: Callable[[slice], ComplexArray]
+    line_compliance: Callable[[], ComplexArray]
+    information: Callable[[], FloatArray]
+
+    def noise_variance(self, lines: slice) -> FloatArray:
+        """Return E|e|^2 of the noise found on some lines, shape (lines, m_r, m_f); inf where an FRF is not used."""
+        own: FloatArray = self.variance[lines]
+        if self.deformation is not None:
+            with np.errstate(invalid="ignore"):
+                own = np.where(np.isfinite(own), own - self.deformation[lines], np.inf)
+        return own * self.variance_scale

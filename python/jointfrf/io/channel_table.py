@@ -1,0 +1,248 @@
+"""Tables of channels: where each sensor and each impact is, which way it points, on which side of a joint."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Iterator, Mapping
+from os import PathLike
+from pathlib import Path
+from typing import Any, cast, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointfrf.errors import FileContentError
+from jointfrf.frf.channel_place import ChannelPlace, ChannelRole, JointSide
+from jointfrf.frf.frf_set import Channel
+from jointfrf.spelling import did_you_mean
+from jointfrf.toml.keys import Key, KeyTable
+from jointfrf.toml.table import TomlTable, read_toml
+
+__all__ = ["CHANNEL_KEYS", "places_of_table", "read_channel_table"]
+
+_UNITS = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "in": 0.0254}
+_TRIAXIAL = np.eye(3)
+#: How far from one the length of a direction may be by rounding; the virtual point brings it to one.
+_UNIT = 1e-2
+CHANNEL_KEYS = KeyTable(
+    "[[channel]]",
+    "One table for each channel, or for each node with several.",
+    (
+        Key("channel", "text", "Name of the channel in the file of FRFs: `101:+x`.", "", "`node`"),
+        Key("node", "whole number, at least 1", "Instead: all channels along x, y, z of this node in the file."),
+        Key("side", "`j` or `k`", "Side of the joint.", "", "by `--j` and `--k`"),
+        Key(
+            "role", "`response`, `excitation` or `both`", "As what the channel counts.", "", "`both`: what the file has"
+        ),
+        Key("at", "list of three numbers", "Position.", "`unit`", "coordinates of the file"),
+        Key("direction", "list of three numbers", "Direction of the channel; with `channel`.", "", "by its name"),
+        Key("axes", "three lists of three numbers", "Directions of the sensor's x, y, z; with `node`.", "", "x, y, z"),
+        Key("weight", "number, at least 0", "In the virtual point; 0 leaves the channel out.", "", "1"),
+    ),
+)
+_COLUMNS = ("channel", "node", "side", "role", "x", "y", "z", "direction_x", "direction_y", "direction_z", "weight")
+
+
+def read_channel_table(path: str | PathLike[str]) -> tuple[ChannelPlace, ...]:
+    r"""Read a table of channels from a TOML or a CSV file.
+
+    Parameters
+    ----------
+    path : path-like
+        ``.toml``: tables ``[[channel]]`` with the keys of `CHANNEL_KEYS`, and ``unit`` of positions (``"m"``, ``"mm"``,
+        ``"cm"``, ``"in"``; m by default). Any other name: one row for each channel under a heading out of channel,
+        node, side, role, x, y, z, direction_x, direction_y, direction_z, weight, between commas, semicolons or tabs;
+        units of positions in the heading as in ``x [mm]``.
+
+    Returns
+    -------
+    tuple of ChannelPlace
+        In the order of the file.
+
+    Raises
+    ------
+    FileContentError
+        The file cannot be read, or something in it is wrong: one sentence with the row or the table.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import jointfrf as jf
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = pathlib.Path(folder) / "channels.csv"
+    ...     _ = path.write_text("channel,side,x [mm],y [mm],z [mm]\n101:-z,j,12.5,0,6\n")
+    ...     (place,) = jf.io.read_channel_table(path)
+    >>> str(place.channel), place.side, place.position.tolist(), place.unit.tolist()
+    ('101:-z', 'j', [0.0125, 0.0, 0.006], [0.0, 0.0, -1.0])
+    """
+    file = Path(path)
+    if file.suffix.lower() == ".toml":
+        table = read_toml(file)
+        places = places_of_table(table)
+        table.close()
+        return places
+    found = tuple(place for row in _csv_rows(file) for place in row)
+    if not found:
+        raise FileContentError(f"{file} holds no channels")
+    return found
+
+
+def places_of_table(table: TomlTable) -> tuple[ChannelPlace, ...]:
+    """Take the keys ``unit`` and ``[[channel]]`` of a TOML file; as `read_channel_table`."""
+    if "channel" not in table:
+        hint = did_you_mean("channel", table.keys())
+        raise FileContentError(f"{table.where}: has no tables [[channel]]{hint}")
+    return tuple(place for row in _toml_rows(table) for place in row)
+
+
+def _toml_rows(table: TomlTable) -> Iterator[list[ChannelPlace]]:
+    scale = _UNITS[table.text("unit", tuple(_UNITS))] if "unit" in table else 1.0
+    for row in table.tables("channel"):
+        row.expect(CHANNEL_KEYS)
+        values: dict[str, Any] = {key: row.value(key) for key in row.keys()}  # noqa: SIM118
+        if "at" in values:
+            values["at"] = scale * np.array(_three(row, "at"))
+        if "direction" in values:
+            values["direction"] = np.array(_three(row, "direction"))
+        if "axes" in values:
+            values["axes"] = _axes(row)
+        if "weight" in values:
+            values["weight"] = row.number("weight", 0)
+        if "node" in values:
+            values["node"] = row.whole("node", 1)
+        for key in ("channel", "side", "role"):
+            if key in values:
+                values[key] = row.text(key)
+        yield _places(values, row.where)
+
+
+def _three(row: TomlTable, key: str) -> list[float]:
+    values = row.numbers(key)
+    if len(values) != 3:
+        raise row.error(key, "three numbers")
+    return values
+
+
+def _axes(row: TomlTable) -> NDArray[np.float64]:
+    given = row.value("axes")
+    inner = [TomlTable({"axes": each}, row.where) for each in given] if isinstance(given, list) else []
+    if len(inner) != 3:
+        raise row.error("axes", "three lists of three numbers")
+    return np.array([_three(each, "axes") for each in inner])
+
+
+def _csv_rows(file: Path) -> Iterator[list[ChannelPlace]]:
+    try:
+        text = file.read_text(encoding="utf-8-sig")
+    except OSError as error:
+        raise FileContentError(f"{file} cannot be read: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise FileContentError(f"{file} is no text file: {error}") from error
+    lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip()]
+    lines = [(number, line) for number, line in lines if not line.lstrip().startswith("#")]
+    if not lines:
+        raise FileContentError(f"{file} is empty")
+    mark = next((mark for mark in ("\t", ";") if mark in lines[0][1]), ",")
+    rows = list(csv.reader((line for _, line in lines), delimiter=mark))
+    columns = [_column(file, word) for word in rows[0]]
+    names = [name for name, _ in columns]
+    if len(set(names)) < len(names):
+        raise FileContentError(f"{file}: a column stands there twice: {', '.join(names)}")
+    for (number, _), cells in zip(lines[1:], rows[1:], strict=True):
+        where = f"{file}: line {number}"
+        if len(cells) != len(columns):
+            raise FileContentError(f"{where} has {len(cells)} columns, the heading has {len(columns)}")
+        given = {name: cell.strip() for (name, _), cell in zip(columns, cells, strict=True) if cell.strip()}
+        yield _places(_csv_values(where, given, dict(columns), decimal_comma=mark != ","), where)
+
+
+def _column(file: Path, word: str) -> tuple[str, float]:
+    """Return the name of a column, and what one of its unit is in m."""
+    match = re.fullmatch(r"\s*(\w+)\s*(?:\[\s*(\w+)\s*\])?\s*", word)
+    name = match[1].lower() if match else word.strip()
+    if name not in _COLUMNS or match is None:
+        hint = did_you_mean(name, _COLUMNS)
+        raise FileContentError(f"{file}: unknown column {name!r}; it takes {', '.join(_COLUMNS)}{hint}")
+    unit = match[2] or ""
+    if unit and (name not in "xyz" or unit not in _UNITS):
+        raise FileContentError(f"{file}: column {word.strip()!r}: only x, y, z have a unit, out of {', '.join(_UNITS)}")
+    return name, _UNITS.get(unit, 1.0)
+
+
+def _csv_values(
+    where: str, given: Mapping[str, str], scales: Mapping[str, float], *, decimal_comma: bool
+) -> dict[str, Any]:
+    """Return the cells of a row as a TOML table would have them."""
+
+    def number(name: str) -> float:
+        text = given[name].replace(",", ".") if decimal_comma else given[name]
+        try:
+            value = float(text)
+        except ValueError:
+            value = float("nan")
+        if not np.isfinite(value):
+            raise FileContentError(f"{where}: {name} must be a number, not {given[name]!r}")
+        return value
+
+    values: dict[str, Any] = {key: given[key] for key in ("channel", "side", "role") if key in given}
+    for key, names in (("at", ("x", "y", "z")), ("direction", ("direction_x", "direction_y", "direction_z"))):
+        there = [name for name in names if name in given]
+        if there and len(there) < 3:
+            missing = next(name for name in names if name not in given)
+            raise FileContentError(f"{where}: {there[0]} is there, {missing} is not")
+        if there:
+            values[key] = np.array([number(name) * scales[name] for name in names])
+    if "node" in given:
+        if not given["node"].isdecimal() or int(given["node"]) < 1:
+            raise FileContentError(f"{where}: node must be a whole number, at least 1, not {given['node']!r}")
+        values["node"] = int(given["node"])
+    if "weight" in given:
+        values["weight"] = number("weight")
+    return values
+
+
+def _places(values: Mapping[str, Any], where: str) -> list[ChannelPlace]:
+    """Return the channels that a row or table names."""
+    _check_words(values, where)
+    weight = float(values.get("weight", 1.0))
+    if weight < 0:
+        raise FileContentError(f"{where}: weight must not be negative, it is {weight:g}")
+    side, role = cast(JointSide | None, values.get("side")), cast(ChannelRole, values.get("role", "both"))
+    if "channel" in values:
+        try:
+            channel = Channel.parse(values["channel"])
+        except ValueError as error:
+            raise FileContentError(f"{where}: {error}") from error
+        direction = None if "direction" not in values else _unit(values["direction"], "direction", where)
+        return [ChannelPlace(channel, side, role, values.get("at"), direction, weight, where=where)]
+    axes = values.get("axes", _TRIAXIAL)
+    return [
+        ChannelPlace(
+            Channel(values["node"], axis), side, role, values.get("at"), _unit(one, "axes", where), weight, True, where
+        )
+        for axis, one in zip("xyz", axes, strict=True)
+    ]
+
+
+def _check_words(values: Mapping[str, Any], where: str) -> None:
+    if ("channel" in values) == ("node" in values):
+        raise FileContentError(f"{where}: either channel or node must be named")
+    if "direction" in values and "node" in values:
+        raise FileContentError(f"{where}: direction goes with channel; the directions of a node are axes")
+    if "axes" in values and "channel" in values:
+        raise FileContentError(f"{where}: axes go with node; the direction of a channel is direction")
+    for key, choice in (("side", get_args(JointSide)), ("role", get_args(ChannelRole))):
+        if key in values and values[key] not in choice:
+            raise FileContentError(
+                f"{where}: {key} must be one of {', '.join(choice)}, not {values[key]!r}"
+                f"{did_you_mean(str(values[key]), choice)}"
+            )
+
+
+def _unit(vector: NDArray[np.float64], key: str, where: str) -> NDArray[np.float64]:
+    length = float(np.linalg.norm(vector))
+    if not abs(length - 1) < _UNIT:
+        raise FileContentError(f"{where}: {key} must have length 1, not {length:g}")
+    unit: NDArray[np.float64] = vector / length
+    return unit

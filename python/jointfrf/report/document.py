@@ -1,0 +1,213 @@
+"""One self-contained HTML page of sections and their parts; for screens of any width, light or dark, and for paper."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+import numpy as np
+
+from jointfrf.dofs import Parameter
+from jointfrf.extras import check_extras
+from jointfrf.kernel.arguments import FloatArray
+from jointfrf.report.chart import Chart, chart_view, style_rules
+from jointfrf.report.draw import Drawing
+from jointfrf.report.figure import Figure
+from jointfrf.report.table import VERDICT, Table, shown, turned, written
+
+__all__ = ["Document", "HeatMap", "Listing", "Part", "Picture", "Section", "Sketch", "Words", "make_document"]
+
+#: Up to so many columns fit on any screen; more than so many are written smaller; more than so many become rows.
+_NARROW, _WIDE, _WIDEST = 4, 9, 12
+_FOLDER = Path(__file__).parent
+#: A map with more columns is written smaller.
+_DENSE = 8
+
+
+@dataclass(frozen=True)
+class Words:
+    """Sentences: paragraphs, or with `kind` a list of notes, warnings or findings."""
+
+    sentences: Sequence[str]
+    kind: str = ""
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure as it is drawn: its SVG file becomes part of the page."""
+
+    figure: Figure
+    drawing: Drawing
+
+
+@dataclass(frozen=True)
+class Sketch:
+    """A drawing of our own: SVG whose colours follow the page, what stands below it, and the same in words."""
+
+    key: str
+    svg: str
+    caption: str
+    alt: str
+
+
+@dataclass(frozen=True)
+class HeatMap:
+    """Numbers by row and column, shaded from `light` (no shade) to `dark`; NaN is left empty."""
+
+    key: str
+    title: str
+    corner: str
+    rows: Sequence[str]
+    columns: Sequence[str]
+    values: FloatArray
+    light: float
+    dark: float
+    note: str = ""
+    digits: int = 2
+
+
+@dataclass(frozen=True)
+class Listing:
+    """A text shown as it is written when the reader asks for it; with `printed` on paper, too."""
+
+    name: str
+    text: str
+    printed: bool = False
+
+
+Part = Table | Words | Picture | Chart | Sketch | HeatMap | Listing
+
+
+@dataclass(frozen=True)
+class Section:
+    """A heading and what stands below it; `more` are parts shown when the reader asks for them, under a name."""
+
+    key: str
+    heading: str
+    parts: Sequence[Part]
+    more: tuple[str, Sequence[Part]] = ("", ())
+
+
+@dataclass(frozen=True)
+class Document:
+    """What a page holds."""
+
+    title: str
+    about: str
+    sections: Sequence[Section] = field(default_factory=tuple)
+
+
+def make_document(document: Document) -> str:
+    """Write a page.
+
+    Parameters
+    ----------
+    document : Document
+
+    Returns
+    -------
+    str
+        HTML without any link to another file.
+
+    Raises
+    ------
+    MissingPackageError
+        jinja2 is missing.
+    """
+    check_extras("jinja2")
+    import jinja2
+    from markupsafe import Markup
+
+    parts = [part for section in document.sections for part in (*section.parts, *section.more[1])]
+    charts = [part for part in parts if isinstance(part, Chart)]
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(_FOLDER), autoescape=True, undefined=jinja2.StrictUndefined,
+        keep_trailing_newline=True, trim_blocks=True, lstrip_blocks=True,
+    )  # fmt: skip
+    script = (_FOLDER / "chart.js").read_text(encoding="utf-8") if charts else ""
+    return environment.get_template("page.html.jinja").render(
+        document=document,
+        version=version("jointfrf"),
+        verdict=VERDICT,
+        style=Markup((_FOLDER / "page.css").read_text(encoding="utf-8")),
+        chart_style=Markup(_chart_style(charts)) if charts else "",
+        script=Markup(script),
+        sections=[
+            {
+                "key": section.key,
+                "heading": section.heading,
+                "parts": [_view(part) for part in section.parts],
+                "more": section.more[0],
+                "hidden": [_view(part) for part in section.more[1]],
+            }
+            for section in document.sections
+        ],
+    )
+
+
+def _chart_style(charts: Sequence[Chart]) -> str:
+    return (_FOLDER / "chart.css").read_text(encoding="utf-8") + style_rules(charts)
+
+
+def _view(part: Part) -> dict[str, Any]:
+    """Return what the template shows of a part; `kind` names its macro."""
+    if isinstance(part, Table):
+        return {"kind": "table", **_table_view(part)}
+    if isinstance(part, Picture):
+        return {"kind": "picture", "figure": part.figure, "image": _as_address(part.drawing.svg)}
+    if isinstance(part, Chart):
+        return {"kind": "chart", **chart_view(part)}
+    if isinstance(part, HeatMap):
+        return {"kind": "map", **_map_view(part)}
+    if isinstance(part, Sketch):
+        from markupsafe import Markup
+
+        return {"kind": "sketch", "sketch": part, "svg": Markup(part.svg)}
+    return {"kind": "words" if isinstance(part, Words) else "listing", "part": part}
+
+
+def _as_address(svg: bytes) -> str:
+    """Return a drawing as the address of an image, in a quarter less than base64 takes."""
+    text = re.sub("<[^>]*>", lambda tag: tag[0].replace("'", "").replace('"', "'"), svg.decode())
+    return "data:image/svg+xml," + quote(" ".join(text.split()), safe=" !$&'()*+,-./:;=?@_~|")
+
+
+def _map_view(part: HeatMap) -> dict[str, Any]:
+    """Return the cells of a map: text, and its shade from 0 to 100."""
+    span = part.dark - part.light
+    shades = 100 * np.clip((np.nan_to_num(part.values, nan=part.light) - part.light) / span, 0, 1)
+    rows = [
+        (name, [("" if np.isnan(v) else f"{v:.{part.digits}f}", f"{s:.0f}") for v, s in zip(own, shade, strict=True)])
+        for name, own, shade in zip(part.rows, part.values.tolist(), shades.tolist(), strict=True)
+    ]
+    return {"map": part, "rows": rows, "dense": len(part.columns) > _DENSE}
+
+
+def _table_view(table: Table) -> dict[str, Any]:
+    table = shown(table)
+    if len(table.columns) > _WIDEST and len(table.rows) < _WIDEST:
+        table = turned(table)
+    cells = [
+        [_marked(cell) if isinstance(cell, Parameter) else text for cell, text in zip(row, texts, strict=True)]
+        for row, texts in zip(table.rows, written(table), strict=True)
+    ]
+    return {"table": table, "numeric": table.is_number, "rows": cells, "shape": _shape(table)}
+
+
+def _shape(table: Table) -> str:
+    """Return the class of style of a table."""
+    count = len(table.columns)
+    return "narrow" if count <= _NARROW else "usual" if count <= _WIDE else "wide"
+
+
+def _marked(parameter: Parameter) -> str:
+    """Write a parameter with its index and Greek letter."""
+    from markupsafe import Markup
+
+    index = parameter.name.partition("_")[2].replace("theta_", "θ").replace("theta", "θ")
+    return Markup("<i>{}</i><sub>{}</sub>").format(parameter.kind, index)

@@ -1,0 +1,249 @@
+"""The report of one identification: a page that holds what was found, from what, and how well it fits."""
+
+from __future__ import annotations
+
+import os
+import platform
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import get_args
+
+import numpy as np
+
+from jointfrf.files import write_file
+from jointfrf.identification.fit_data import FitData
+from jointfrf.identification.joint_fit import JointFit
+from jointfrf.io.cards import CardFormat
+from jointfrf.kernel.arguments import FloatArray
+from jointfrf.kernel.engine import get_engine
+from jointfrf.report.chart import Chart, count_points
+from jointfrf.report.document import Document, Listing, Part, Section, Sketch, Words, make_document
+from jointfrf.report.figure import Figure
+from jointfrf.report.fit import fit_figures
+from jointfrf.report.fit_frfs import ComparedFrfs, compare_frfs, frf_figures, reciprocity_map, residual_map
+from jointfrf.report.fit_words import finding_sentences, parameter_table, quality_sentences
+from jointfrf.report.information import information_figure, information_table
+from jointfrf.report.noise import noise_figure
+from jointfrf.report.sketch import interface_points, interface_sketch, point_table
+from jointfrf.report.table import Cell, Table
+
+__all__ = ["ReportOptions", "fit_document", "write_report"]
+
+#: Points of all curves of a page together, each about nine bytes, and of a curve at least.
+_POINTS, _LEAST = 130_000, 240
+#: FRFs that are shown at once; the others when the reader asks for them.
+_AT_ONCE = 6
+#: Lines of cards that are printed at most.
+_PRINTED = 40
+_PROGRAMS = {"abaqus": "Abaqus", "calculix": "CalculiX", "nastran": "Nastran", "ansys": "Ansys"}
+
+
+@dataclass(frozen=True)
+class ReportOptions:
+    """What a report says beside the fit: the file measured, the command typed, nodes j and k of cards."""
+
+    source: str = ""
+    command: str = ""
+    nodes: Sequence[int] = (1, 2)
+
+
+def write_report(fit: JointFit, path: Path, options: ReportOptions) -> Path:
+    """Write the report of a fit, whole or not at all; as `JointFit.report`."""
+    write_file(path, make_document(fit_document(fit, options)))
+    return path
+
+
+def fit_document(fit: JointFit, options: ReportOptions) -> Document:
+    """Return the report of a fit as sections and their parts.
+
+    Raises
+    ------
+    ValueError
+        The fit does not hold the measured FRFs.
+    """
+    data = fit.data
+    if data is None:
+        raise ValueError(
+            "a report shows the measured FRFs, and this fit holds none, as fits that were loaded, means over bands and "
+            "those of many realisations: call identify with the FRFs and method 'compliance', and report that"
+        )
+    up = np.argsort(fit.freq_hz, kind="stable")
+    compared = compare_frfs(data, fit.dofs)
+    frfs = frf_figures(compared, fit.freq_hz, up)
+    joint = fit_figures(fit)
+    shares = data.information()[up]
+    information = information_figure(fit, fit.freq_hz[up], shares)
+    noise = _noise_figure(fit, data)
+    most = _most_points([*frfs, *joint, *(one for one in (information, noise) if one is not None)])
+    sections = [
+        _summary(fit),
+        _doubts(fit),
+        Section("joint", "The joint and its channels", _geometry(fit, data)),
+        Section(
+            "stiffness",
+            "Stiffness and compliance over frequency",
+            [
+                Words([_how_joint(fit)]),
+                *_charts(joint, most, fit, "real and imaginary part of joint stiffness K* and compliance C"),
+                *_charts([information] if information else [], most, fit, "share of the information by frequency"),
+                information_table(fit, fit.freq_hz[up], shares),
+            ],
+        ),
+        _frf_section(fit, compared, frfs, most),
+        Section("maps", "Residual and reciprocity by channel", _maps(compared)),
+        Section("noise", "Noise", _noise_parts(fit, noise, most)),
+        Section("cards", "Input of finite-element programs", _cards(fit, options.nodes)),
+        Section("made", "How this was made", [_made(fit, options)]),
+    ]
+    title = f"Joint identified from {options.source}" if options.source else "Joint identified from FRFs"
+    freq = fit.freq_hz
+    about = (
+        f"Joint DOFs {', '.join(fit.dofs)}; {len(data.response_names)} responses, {len(data.force_names)} forces; "
+        f"{_span(freq)}; method {fit.method}."
+    )
+    return Document(title, about, [section for section in sections if section.parts])
+
+
+def _span(freq_hz: FloatArray) -> str:
+    if freq_hz.size == 1:
+        return f"one frequency line, {freq_hz[0]:g} Hz"
+    return f"{freq_hz.size} frequency lines from {freq_hz.min():g} to {freq_hz.max():g} Hz"
+
+
+def _most_points(figures: Iterable[Figure]) -> int:
+    """Return how many points a curve may have so that the page stays small."""
+    counts = np.sort(np.array(count_points(figures)))
+    for done, size in enumerate(counts):
+        rest = counts.size - done
+        if counts[:done].sum() + rest * size > _POINTS:
+            return max(_LEAST, int((_POINTS - counts[:done].sum()) / rest))
+    return int(counts[-1])
+
+
+def _charts(figures: Iterable[Figure], most: int, fit: JointFit, what: str) -> list[Chart]:
+    span = f"{fit.freq_hz.min():g} to {fit.freq_hz.max():g} Hz"
+    return [Chart(replace(figure, heading=""), f"{figure.caption}: {what}, {span}", most) for figure in figures]
+
+
+def _summary(fit: JointFit) -> Section:
+    return Section(
+        "summary",
+        "Summary",
+        [Words(finding_sentences(fit), "findings"), Words(quality_sentences(fit)), parameter_table(fit)],
+    )
+
+
+def _doubts(fit: JointFit) -> Section:
+    parts: list[Part] = []
+    if fit.warnings:
+        parts.append(Words([f"{text}." for text in fit.warnings], "warnings"))
+    if fit.notes:
+        parts.append(Words([f"{text}." for text in fit.notes], "notes"))
+    return Section("doubts", "Warnings and notes" if fit.warnings else "Notes", parts)
+
+
+def _geometry(fit: JointFit, data: FitData) -> list[Part]:
+    if data.interface is None:
+        names = ", ".join(data.response_names)
+        known = f"Responses {names}" + (
+            "" if names == ", ".join(data.force_names) else f"; forces {', '.join(data.force_names)}"
+        )
+        return [Words([f"Where the channels lie was not said, so there is no sketch. {known}."])]
+    points = interface_points(data.interface)
+    sketch: Sketch = interface_sketch(data.interface, points, fit.dofs)
+    return [sketch, point_table(points)]
+
+
+def _how_joint(fit: JointFit) -> str:
+    return (
+        "Lines: the joint found, from all frequency lines together; the shaded band is the 95 % interval of k. Dots of "
+        "K*: each line inverted by itself, which scatters, and is biased towards zero where noise hides the joint. "
+        "Dots of C: each line as the fit sees it, without that bias. Drag across a chart to zoom in, double-click for "
+        "the whole band; with the keyboard + and − zoom, arrows move, 0 shows all."
+    )
+
+
+def _frf_section(fit: JointFit, compared: ComparedFrfs, figures: Sequence[Figure], most: int) -> Section:
+    total = len(compared.rows) * len(compared.columns)
+    where = "channels" if compared.of_channels else "joint DOFs"
+    told = [
+        "Regenerated FRFs are those nearest to the measured ones that any two structures with the joint found between "
+        "them can have: where they leave the measured ones by more than noise, the joint does not explain the data."
+    ]
+    told.append(
+        f"All {total} FRFs between the {where} are on this page."
+        if len(figures) == total
+        else f"{len(figures)} of {total} FRFs between the {where} are on this page, first those with response and "
+        "force at one place, then those across the joint; the maps below are of all."
+    )
+    if fit.freq_hz.size > most:
+        told.append(
+            f"Curves of more than {most} lines are drawn through the smallest and the largest value of each of "
+            f"{most // 2} parts of the band, so that no peak is lost; all numbers are from all lines."
+        )
+    charts = _charts(figures, most, fit, "measured and regenerated, modulus and phase")
+    more = f"{len(charts) - _AT_ONCE} more FRFs"
+    return Section(
+        "frfs", "Measured and regenerated FRFs", [Words(told), *charts[:_AT_ONCE]], (more, charts[_AT_ONCE:])
+    )
+
+
+def _maps(compared: ComparedFrfs) -> list[Part]:
+    reciprocity = reciprocity_map(compared)
+    return [residual_map(compared), *([reciprocity] if reciprocity else [])]
+
+
+def _noise_figure(fit: JointFit, data: FitData) -> Figure | None:
+    if data.noise is None:
+        return None
+    return noise_figure(fit.freq_hz, data.measured, data.noise, data.response_names, data.force_names)
+
+
+def _noise_parts(fit: JointFit, figure: Figure | None, most: int) -> list[Part]:
+    if figure is None:
+        told = f"Noise of {100 * fit.noise_level:.2g} % of the FRFs (median) was used; how it varies is not kept."
+        return [Words([told])]
+    return list(_charts([figure], most, fit, "measured and smooth FRFs and the noise found in them"))
+
+
+def _cards(fit: JointFit, nodes: Sequence[int]) -> list[Part]:
+    """Return the joint as input of each program, or why there is none."""
+    j, k = nodes[:2]
+    listings, refused = [], []
+    for program in get_args(CardFormat):
+        is_calculix = program == "calculix"
+        rotation = (tuple(nodes[2:4]) or (max(j, k) + 1, max(j, k) + 2)) if is_calculix else None
+        name = _PROGRAMS[program] + (" (stiffness only)" if is_calculix else "")
+        try:
+            text = fit.export(program, (j, k), damping=not is_calculix, rotation_nodes=rotation)
+        except ValueError as error:
+            refused.append(f"{_PROGRAMS[program]}: {error}.")
+        else:
+            listings.append(Listing(name, text, printed=text.count("\n") <= _PRINTED))
+    told = f"In SI units, between node {j} on side j and node {k} on side k, along the global axes."
+    if not all(listing.printed for listing in listings):
+        told += f" Those of more than {_PRINTED} lines are on the screen only, not on paper."
+    return [Words([told]), *listings, *([Words(refused, "notes")] if refused else [])]
+
+
+def _made(fit: JointFit, options: ReportOptions) -> Table:
+    """Return what is needed to get the same again."""
+    import scipy
+
+    epoch = os.environ.get("SOURCE_DATE_EPOCH")
+    when = datetime.fromtimestamp(int(epoch), UTC) if epoch else datetime.now(UTC)
+    versions = f"Python {platform.python_version()}, numpy {np.__version__}, scipy {scipy.__version__}"
+    rows: list[tuple[Cell, ...]] = [
+        *([("file", options.source)] if options.source else []),
+        *([("command", options.command)] if options.command else []),
+        ("bands", "; ".join(f"{dof} {_bands(own)} Hz" for dof, own in zip(fit.dofs, fit.bands, strict=True))),
+        ("versions", f"{versions}, engine {get_engine()}, {platform.system()} {platform.machine()}"),
+        ("written on", f"{when:%Y-%m-%d}"),
+    ]
+    return Table("versions", "Command and versions", ("what", "which"), tuple(rows))
+
+
+def _bands(bands: Sequence[tuple[float, float]]) -> str:
+    return ", ".join(f"{low:g}-{high:g}" for low, high in bands)

@@ -1,0 +1,44 @@
+"""An identification as one figure: stiffness and compliance of the joint, measured and regenerated FRFs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from jointfrf.identification.joint_fit import JointFit
+from jointfrf.report.draw import laid_out
+from jointfrf.report.figure import Figure, Panel
+from jointfrf.report.fit import fit_figures
+from jointfrf.report.fit_frfs import compare_frfs, frf_figures
+
+__all__ = ["fit_overview", "plot_fit"]
+
+#: FRFs that are drawn, two beside each other.
+_FRFS = 4
+
+
+def fit_overview(fit: JointFit) -> Figure:
+    """Return K* and compliance of each DOF, and the first FRFs where the fit holds them, as one figure."""
+    panels: list[Panel] = []
+    for dof, figure in zip(fit.dofs, fit_figures(fit), strict=True):
+        titles = (f"DOF {dof}: joint stiffness", "", f"DOF {dof}: joint compliance", "")
+        panels += [replace(panel, title=title) for panel, title in zip(figure.panels, titles, strict=True)]
+    if fit.data is not None:
+        up = np.argsort(fit.freq_hz, kind="stable")
+        frfs = frf_figures(compare_frfs(fit.data, fit.dofs), fit.freq_hz, up)[:_FRFS]
+        for first in range(0, len(frfs), 2):
+            beside = frfs[first : first + 2]
+            for part in zip(*(figure.panels for figure in beside), strict=True):
+                own = [
+                    replace(panel, title=figure.caption if panel.log_y else "")
+                    for panel, figure in zip(part, beside, strict=True)
+                ]
+                panels += [*own, *([Panel("", "", "")] * (2 - len(own)))]
+    return Figure("joint", "Joint found", tuple(panels), 2)
+
+
+def plot_fit(fit: JointFit) -> Any:
+    """Draw a fit; as `JointFit.plot`."""
+    return laid_out(fit_overview(fit))

@@ -1,0 +1,212 @@
+"""A sketch of a joint: where its channels lie, which way they point, and the reference points between which it acts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointfrf.channels.point_lines import Interface
+from jointfrf.dofs import rigid_motion
+from jointfrf.kernel.arguments import FloatArray
+from jointfrf.report.document import Sketch
+from jointfrf.report.table import Cell, Table
+
+__all__ = ["InterfacePoint", "interface_points", "interface_sketch", "point_table"]
+
+#: Directions on the page, to the right and up, of x, y and z.
+_VIEW = np.array([[0.87, -0.32], [0.0, 0.95], [0.5, 0.42]]).T
+#: Size of the drawing, its margin, and of arrows.
+_WIDTH, _HEIGHT, _MARGIN, _ARROW = 520.0, 260.0, 62.0, 34.0
+#: Points nearer than this share of the extent count as one place.
+_SAME = 1e-6
+#: Directions whose triple product is above this tell a place.
+_INDEPENDENT = 0.1
+#: Sides whose points are nearer on the page are drawn so far apart, each way.
+_APART = 30.0
+
+
+_OnPage = Callable[[FloatArray, int], FloatArray]
+
+
+class InterfacePoint(NamedTuple):
+    """A measured point: its name, side 0 (j) or 1 (k), place in m, and the directions of its channels."""
+
+    name: str
+    side: int
+    place: FloatArray
+    directions: tuple[FloatArray, ...]
+
+
+def interface_points(interface: Interface) -> list[InterfacePoint]:
+    """Return the points of an interface, with places from the rigid motion of their channels.
+
+    Notes
+    -----
+    A channel along d at r from the reference point moves by r x d for a unit rotation: of one direction that tells all
+    of r but its part along d, which is taken as zero. Channels without names are points of their own, by their
+    numbers; three in a row that can be at one place, as those of a sensor of three axes, are one.
+    """
+    points = []
+    for name, own in _grouped(interface):
+        motion = interface.motion[own]
+        side = int(motion[0, 6:].any())
+        motion = motion[:, 6 * side : 6 * side + 6]
+        r, _ = _place(motion)
+        points.append(InterfacePoint(name, side, interface.references[side] + r, tuple(motion[:, :3])))
+    return points
+
+
+def _place(motion: FloatArray) -> tuple[FloatArray, float]:
+    """Return where channels are that move so with their reference point, and by how much that does not hold."""
+    # r x d is linear in r: the sum of r_a times e_a x d.
+    crosses = np.vstack([rigid_motion(d[None], np.zeros(3))[0][:, 3:] for d in motion[:, :3]])
+    turned = motion[:, 3:].ravel()
+    r = np.linalg.lstsq(crosses, turned, rcond=None)[0]
+    return r, float(abs(crosses @ r - turned).max())
+
+
+def _grouped(interface: Interface) -> list[tuple[str, list[int]]]:
+    """Return names of points, and the numbers of their channels."""
+    if interface.channels:
+        by_node: dict[int, list[int]] = {}
+        for i, channel in enumerate(interface.channels):
+            by_node.setdefault(channel.node, []).append(i)
+        return [(str(node), own) for node, own in by_node.items()]
+    found: list[tuple[str, list[int]]] = []
+    first, count = 0, len(interface.motion)
+    while first < count:
+        own = [first]
+        if first + 2 < count:
+            motion = interface.motion[first : first + 3]
+            for side in (motion[:, :6], motion[:, 6:]):
+                if abs(np.linalg.det(side[:, :3])) > _INDEPENDENT and _place(side)[1] <= _SAME * abs(side).max():
+                    own = [first, first + 1, first + 2]
+        found.append((f"{own[0]}-{own[-1]}" if len(own) > 1 else str(first), own))
+        first = own[-1] + 1
+    return found
+
+
+def point_table(points: list[InterfacePoint]) -> Table:
+    """Return the points with their places and directions."""
+    rows: tuple[tuple[Cell, ...], ...] = tuple(
+        (
+            p.name,
+            "jk"[p.side],
+            *(float(1e3 * x) for x in np.round(p.place, 9)),
+            ", ".join(map(_axis, p.directions)),
+        )
+        for p in points
+    )
+    columns = ("point", "side", "x, mm", "y, mm", "z, mm", "directions")
+    return Table("points", "Points and directions", columns, rows)
+
+
+def _axis(direction: FloatArray) -> str:
+    at = int(np.argmax(abs(direction)))
+    if abs(direction[at]) > 0.999:
+        return f"{'-' if direction[at] < 0 else '+'}{'xyz'[at]}"
+    return "(" + " ".join(f"{x:.2g}" for x in direction) + ")"
+
+
+def interface_sketch(interface: Interface, points: list[InterfacePoint], dofs: tuple[str, ...]) -> Sketch:
+    """Draw the points of both sides with their directions, and the joint between the reference points."""
+    places = np.array([p.place for p in points] + list(interface.references))
+    flat = places @ _VIEW.T
+    extent = np.ptp(flat, axis=0)
+    scale = min((size - 2 * _MARGIN) / max(e, _SAME) for size, e in zip((_WIDTH, _HEIGHT), extent, strict=True))
+    scale = 1.0 if extent.max() <= _SAME else scale
+    middle = (flat.min(axis=0) + flat.max(axis=0)) / 2
+
+    # Sides that lie on each other are drawn apart.
+    near = _nearest(flat[: len(points)] * scale, np.array([p.side for p in points]))
+    shift = _APART if near < _APART else 0.0
+
+    def at(place: FloatArray, side: int) -> FloatArray:
+        right, up = (place @ _VIEW.T - middle) * scale
+        return np.array([_WIDTH / 2 + right, _HEIGHT / 2 - up + (side - 0.5) * 2 * shift])
+
+    ends = [at(reference, side) for side, reference in enumerate(interface.references)]
+    parts = [_links(points, at, side, ends[side]) for side in (0, 1)]
+    parts += [_point(p, at) for p in points]
+    parts.append(_spring(*ends))
+    parts.append(_axes())
+    svg = f'<svg viewBox="0 0 {_WIDTH:g} {_HEIGHT:g}" aria-hidden="true">' + "".join(parts) + "</svg>"
+    sides = [", ".join(p.name for p in points if p.side == side) for side in (0, 1)]
+    apart = 1e3 * float(np.linalg.norm(interface.references[1] - interface.references[0]))
+    where = "at one place" if apart < 1e-6 else f"{apart:.3g} mm apart"
+    caption = (
+        f"Side j (filled): points {sides[0]}; side k (open): points {sides[1]}; arrows: measured directions; spring: "
+        f"the joint in {', '.join(dofs)} between the reference points, which are {where}"
+        + ("; the sides are drawn apart" if shift else "")
+    )
+    return Sketch("sketch", svg, caption, f"Sketch of the joint. {caption}.")
+
+
+def _nearest(flat: FloatArray, side: NDArray[np.intp]) -> float:
+    """Return the smallest distance on the page between points of both sides."""
+    between = flat[side == 0][:, None] - flat[side == 1][None]
+    return float(np.linalg.norm(between, axis=2).min(initial=np.inf))
+
+
+def _links(points: list[InterfacePoint], at: _OnPage, side: int, end: FloatArray) -> str:
+    own = [at(p.place, side) for p in points if p.side == side]
+    path = "".join(f"M{end[0]:.1f} {end[1]:.1f}L{x:.1f} {y:.1f}" for x, y in own)
+    return f'<path class="{"jk"[side]} link" stroke-width="1.2" stroke-dasharray="{("none", "5 3")[side]}" d="{path}"/>'
+
+
+def _point(point: InterfacePoint, at: _OnPage) -> str:
+    x, y = at(point.place, point.side)
+    side = "jk"[point.side]
+    drawn = [
+        f'<circle class="{side}{" open" if point.side else ""}" cx="{x:.1f}" cy="{y:.1f}" r="4.5" stroke-width="2"/>'
+    ]
+    for direction in point.directions:
+        step = (_VIEW @ direction) * (1, -1) * _ARROW
+        drawn.append(_arrow(side, x, y, step))
+    # Names of both sides do not collide where the points do.
+    up = -12 if point.side == 0 else 20
+    anchor = "end" if point.side == 0 else "start"
+    beside = x + (-8 if point.side == 0 else 8)
+    drawn.append(f'<text x="{beside:.1f}" y="{y + up:.1f}" text-anchor="{anchor}">{point.name}</text>')
+    return "".join(drawn)
+
+
+def _arrow(style: str, x: float, y: float, step: FloatArray) -> str:
+    length = float(np.hypot(*step)) or 1.0
+    along, across = step / length, np.array([-step[1], step[0]]) / length
+    tip = np.array([x, y]) + step
+    left, right = tip - 8 * along + 3.2 * across, tip - 8 * along - 3.2 * across
+    head = " ".join(f"{a:.1f},{b:.1f}" for a, b in (tip, left, right))
+    shaft = tip - 6 * along
+    return (
+        f'<path class="{style} link" stroke-width="1.6" d="M{x:.1f} {y:.1f}L{shaft[0]:.1f} {shaft[1]:.1f}"/>'
+        f'<polygon class="{style}" points="{head}"/>'
+    )
+
+
+def _spring(first: FloatArray, last: FloatArray) -> str:
+    """Draw a spring between two places."""
+    step = last - first
+    length = float(np.hypot(*step)) or 1.0
+    along, across = step / length, np.array([-step[1], step[0]]) / length
+    turns = [(0.0, 0.0), (0.25, 0.0)]
+    turns += [(0.25 + 0.5 * (i + 0.5) / 6, 6.0 * (-1) ** i) for i in range(6)]
+    turns += [(0.75, 0.0), (1.0, 0.0)]
+    places = [first + share * length * along + off * across for share, off in turns]
+    path = "L".join(f"{a:.1f} {b:.1f}" for a, b in places)
+    return f'<path class="joint open" stroke-width="1.6" stroke-linejoin="round" d="M{path}"/>'
+
+
+def _axes() -> str:
+    """Draw the axes of space in the corner."""
+    x, y = 30.0, _HEIGHT - 32.0
+    drawn = []
+    for letter, direction in zip("xyz", _VIEW.T, strict=True):
+        step = direction * (1, -1) * 26
+        drawn.append(_arrow("axis", x, y, step))
+        a, b = np.array([x, y]) + 1.38 * step
+        drawn.append(f'<text x="{a:.1f}" y="{b + 4:.1f}" text-anchor="middle" font-style="italic">{letter}</text>')
+    return "".join(drawn)

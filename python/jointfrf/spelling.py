@@ -1,0 +1,36 @@
+"""Which known word a misspelt one looks like."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+__all__ = ["did_you_mean", "look_alike"]
+
+
+def look_alike(word: str, known: Iterable[str]) -> str:
+    """Return the known word that another one looks like; empty if there is none.
+
+    Examples
+    --------
+    >>> from jointfrf.spelling import look_alike
+    >>> look_alike("identfy", ["check", "identify"]), look_alike("no", ["check", "identify"])
+    ('identify', '')
+    """
+    import difflib  # only where something is misspelt
+
+    by_lower = {name.lower(): name for name in known}
+    found = difflib.get_close_matches(word.lower(), list(by_lower), 1)
+    return by_lower[found[0]] if found else ""
+
+
+def did_you_mean(word: str, known: Iterable[str]) -> str:
+    """Return the end of a sentence that proposes the known word; empty if there is none.
+
+    Examples
+    --------
+    >>> from jointfrf.spelling import did_you_mean
+    >>> print("unknown option --dof" + did_you_mean("--dof", ["--dofs", "--band"]))
+    unknown option --dof; did you mean --dofs?
+    """
+    similar = look_alike(word, known)
+    return f"; did you mean {similar}?" if similar else ""

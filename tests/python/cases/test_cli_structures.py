@@ -1,0 +1,204 @@
+"""`jointfrf frf`, `couple`, `decouple`, `export`: from models to FRFs of an assembly, and back to the joint."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.io
+from scipy import sparse
+
+import jointfrf as jf
+from command import run_command
+from jointfrf.io import read_frfs
+
+pytest.importorskip("pyuff")
+SECTION = dict(youngs_modulus=67e9, density=2700.0, width=0.025, height=0.006, loss_factor=0.01)
+A = jf.beam(0.3, 4, ends=("clamped", "free"), **SECTION)
+B = jf.beam(0.225, 3, **SECTION)
+JOINT = jf.Joint([6e5, 5e3], [20.0, 1.5], ["y", "theta_z"])
+FREQ_HZ = np.arange(20.0, 401.0, 4.0)
+MODEL = """
+model = "beam"
+length = {length}
+elements = {elements}
+element = "euler-bernoulli"
+axial = false
+ends = ["{first}", "free"]
+youngs_modulus = 67e9
+density = 2700.0
+width = 0.025
+height = 0.006
+loss_factor = 0.01
+"""
+JOINT_TOML = 'dofs = ["y", "rz"]\nstiffness = [6e5, 5e3]\ndamping = [20.0, 1.5]\n'
+LINES = ["--band", "20:400", "--step", "4"]
+COUPLE = ["couple", "a.toml", "b.uff", "--joint", "joint.toml", "--j", "5", "--k", "1", "--renumber-b", "100"]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Models of both beams, FRFs of B, and those of the assembly, each written by the command."""
+    place = tmp_path_factory.mktemp("structures")
+    (place / "a.toml").write_text(MODEL.format(length=0.3, elements=4, first="clamped"))
+    (place / "b.toml").write_text(MODEL.format(length=0.225, elements=3, first="free"))
+    (place / "joint.toml").write_text(JOINT_TOML)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(place)
+        for words in (["frf", "b.toml", *LINES, "--output", "b.uff"], [*COUPLE, "--output", "c.npz"]):
+            result = run_command(*words)
+            assert result.returncode == 0, result.stderr
+    return place
+
+
+@pytest.fixture(autouse=True)
+def _there(folder, monkeypatch):
+    monkeypatch.chdir(folder)
+
+
+def test_receptances_of_a_model():
+    frfs = read_frfs("b.uff")
+    assert [str(channel) for channel in frfs.responses[:3]] == ["1:+y", "1:+rz", "2:+y"]
+    np.testing.assert_allclose(frfs.h, B.receptance(FREQ_HZ), rtol=1e-9, atol=1e-20)
+    assert frfs.coordinates[4].tolist() == pytest.approx([0.225, 0, 0])
+
+
+def test_receptances_of_matrices(tmp_path):
+    for name, matrix in (("k", B.stiffness), ("m", B.mass)):
+        scipy.io.mmwrite(tmp_path / f"{name}.mtx", sparse.coo_array(matrix))
+    (tmp_path / "dofs.txt").write_text("\n".join(B.dofs))
+    words = ["--stiffness", tmp_path / "k.mtx", "--mass", tmp_path / "m.mtx", "--dof-names", tmp_path / "dofs.txt"]
+    target = tmp_path / "b.csv"
+    said = run_command(
+        "frf",
+        *words,
+        "--loss-factor",
+        "0.01",
+        "--lines-of",
+        "b.uff",
+        "--points",
+        "1:y,1:theta",
+        "--output",
+        target,
+        "--json",
+    )
+    assert said.returncode == 0, said.stderr
+    assert json.loads(said.stdout)["channels"] == ["1:+y", "1:+rz"]
+    np.testing.assert_allclose(read_frfs(target).h, B.receptance(FREQ_HZ, [0, 1]), rtol=1e-6, atol=1e-20)
+
+
+def test_the_assembly_is_that_of_the_matrices():
+    found = read_frfs("c.npz")
+    at = A.index("5:y", "5:theta"), B.index("1:y", "1:theta")
+    whole = jf.assemble(A, B, JOINT, *at)
+    exact = whole.receptance(FREQ_HZ)
+    assert [channel.node for channel in found.responses] == [n for n in (2, 3, 4, 5, 101, 102, 103, 104) for _ in "yr"]
+    np.testing.assert_allclose(found.h, exact, rtol=1e-6, atol=1e-9 * abs(exact).max())
+
+
+def test_the_joint_comes_back_from_the_assembly():
+    words = ["identify", "c.npz", "--j", "5", "--k", "101", "--dofs", "y,rz", "--damping", "viscous", "--noise", "1e-4"]
+    fit = json.loads(run_command(*words, "--json").stdout)["fits"][0]["parameters"]
+    for name, value in (("k_y", 6e5), ("k_theta_z", 5e3), ("c_y", 20), ("c_theta_z", 1.5)):
+        assert fit[name]["value"] == pytest.approx(value, rel=1e-5)
+
+
+@pytest.mark.parametrize("equation", ["rr", "rs", "sr", "ss"])
+def test_the_joint_comes_back_by_decoupling(equation, tmp_path):
+    points = ["--r", "3:y,3:rz", "--s", "4:y,4:rz", "--renumber-b", "100"]
+    words = ["decouple", "a.toml", "b.uff", "c.npz", "--j", "5", "--k", "1", "--dofs", "y,rz", *points]
+    lines, saved = tmp_path / "k.csv", tmp_path / "joint.json"
+    result = run_command(*words, "--equation", equation, "--output", lines, "--save", saved)
+    assert result.returncode == 0, result.stderr
+    assert f"method decoupling-{equation}" in result.stdout
+    rows = lines.read_text().splitlines()
+    assert rows[0].startswith('frequency [Hz],"Re K_y,y","Im K_y,y"')
+    table = np.array([[float(x) for x in row.split(",")] for row in rows[1:]])
+    np.testing.assert_allclose(table[:, 0], FREQ_HZ)
+    np.testing.assert_allclose(table[:, 1], 6e5, rtol=1e-3)
+    np.testing.assert_allclose(table[:, 2], 2 * np.pi * FREQ_HZ * 20, rtol=0.1, atol=60)
+    assert jf.JointFit.load(saved).stiffness == pytest.approx([6e5, 5e3], rel=1e-3)
+
+
+def test_a_virtual_point_couples_channels_around_the_joint(tmp_path):
+    """Two points a side that follow a rigid end: the assembly is that of the end itself."""
+    from jointfrf.io import Channel, FrfSet, write_npz
+
+    for name, model, end, node, x in (("a", A, ("5:y", "5:theta"), 10, 0.0), ("b", B, ("1:y", "1:theta"), 20, 0.0)):
+        arms = np.array([[1, -0.01], [1, 0.02]])  # y of points at x - 10 mm and x + 20 mm
+        h = arms @ model.receptance(FREQ_HZ, model.index(*end)) @ arms.T
+        ends = (Channel(node, "y"), Channel(node + 1, "y"))
+        places = {node: np.array([x - 0.01, 0, 0]), node + 1: np.array([x + 0.02, 0, 0])}
+        write_npz(tmp_path / f"{name}.npz", FrfSet(FREQ_HZ, ends, ends, h, coordinates=places))
+    words = ["--joint", "joint.toml", "--j", "10,11", "--k", "20:21", "--at", "0,0,0", "--output", tmp_path / "c.npz"]
+    result = run_command("couple", tmp_path / "a.npz", tmp_path / "b.npz", *words)
+    assert result.returncode == 0, result.stderr
+    exact = read_frfs("c.npz").matrix(["5:y", "5:rz", "101:y", "101:rz"], ["5:y", "5:rz", "101:y", "101:rz"])
+    arms = np.kron(np.eye(2), [[1, -0.01], [1, 0.02]])
+    found = read_frfs(tmp_path / "c.npz").h
+    np.testing.assert_allclose(found, arms @ exact @ arms.T, rtol=1e-6, atol=1e-9 * abs(exact).max())
+
+
+def test_a_joint_by_hand_is_exported():
+    result = run_command("export", "joint.toml", "abaqus:1,2")
+    assert result.returncode == 0
+    assert "** from joint.toml" in result.stdout
+    assert result.stdout.count("DASHPOT2") == 2
+    result = run_command("export", "joint.toml", "nastran:1,2", "--nodes-at", "0,0,0,0,0,0")
+    assert "--nodes-at needs --joint-at X,Y,Z" in result.stderr
+    assert result.returncode == 2
+
+
+WRONG = [
+    (["frf", "b.toml", *LINES], 2, "--output is missing"),
+    (["frf", "b.toml", "--output", "x.xls", *LINES], 2, "x.xls has no suffix of a format"),
+    (["frf", "b.toml", "--output", "x.npz"], 2, "frequency lines are missing"),
+    (["frf", "b.toml", "--output", "x.npz", "--step", "1"], 2, "--step needs --band"),
+    (["frf", "b.toml", "--output", "x.npz", "--band", "1:1e9", "--step", "1"], 2, "more than 1000000"),
+    (["frf", "b.toml", "--output", "x.npz", "--band", "9:1", "--step", "1"], 2, "must be positive and increase"),
+    (["frf", "b.toml", "--output", "x.npz", *LINES, "--points", "9:y"], 1, "the model has no DOF '9:y'"),
+    (["frf", "b.toml", "--output", "x.npz", *LINES, "--mass", "m.mtx"], 2, "are both named: leave one out"),
+    (["frf", "--output", "x.npz", *LINES, "--mass", "m.mtx"], 2, "--stiffness, --dof-names: missing"),
+    (["frf", "b.uff", "--output", "x.npz", *LINES], 2, "is no TOML file of a model"),
+    (["frf", "no.toml", "--output", "x.npz", *LINES], 1, "no.toml: cannot be read"),
+    (["frf", "joint.toml", "--output", "x.npz", *LINES], 1, "the key 'model' is missing"),
+    ([*COUPLE[:-2], "--output", "x.npz"], 1, "is in a.toml and in b.uff: --renumber-b N"),
+    (["couple", "a.toml", "b.toml", *COUPLE[3:], "--output", "x.npz"], 2, "models need frequency lines"),
+    ([*COUPLE[:7], "--output", "x.npz"], 2, "--k is missing"),
+    ([*COUPLE, "--output", "x.npz", "--j", "9"], 1, "has no FRF at node 9"),
+    ([*COUPLE, "--output", "x.npz", "--j", "4,5"], 2, "need --at X,Y,Z, a virtual point"),
+    ([*COUPLE, "--output", "x.npz", "--at", "0,0,0"], 1, "a.toml has no coordinates of node 5"),
+    ([*COUPLE, "--output", "x.npz", "--joint", "no.json"], 1, "there is no file no.json"),
+    ([*COUPLE, "--output", "x.npz", "--joint", "b.uff"], 1, "b.uff is no file of a joint"),
+    (["decouple", "a.toml", "b.uff", "c.npz", "--j", "5"], 2, "equation ss needs --k and --dofs and --s"),
+    (["export", "joint.toml", "nastran:1"], 2, "is not a program and nodes j and k"),
+    (["export", "joint.toml", "abacus:1,2"], 2, "did you mean abaqus?"),
+    (["export", "joint.toml", "ansys:1,1"], 2, "names a node twice"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("words", "status", "message"), WRONG)
+def test_what_is_wrong_is_one_sentence(words, status, message):
+    before = set(Path().iterdir())
+    result = run_command(*words)
+    assert message in result.stderr
+    assert result.returncode == status
+    assert result.stderr.splitlines()[-1].startswith("jointfrf: error: ")
+    assert set(Path().iterdir()) == before
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("stiffness", "stifness", "unknown key 'stifness'"),
+        ("[6e5, 5e3]", "[6e5]", "joint.toml"),
+        ("[6e5, 5e3]", '["a", "b"]', "joint.toml"),
+        ('"rz"', '"rw"', "rw"),
+    ],
+)
+def test_a_joint_by_hand_that_is_wrong(tmp_path, old, new, message):
+    (tmp_path / "joint.toml").write_text(JOINT_TOML.replace(old, new))
+    result = run_command("export", tmp_path / "joint.toml", "abaqus:1,2")
+    assert result.returncode in (1, 2)
+    assert message in result.stderr
+    assert len(result.stderr.splitlines()) == 1

@@ -1,0 +1,215 @@
+"""Words of the command line: what was meant, the project's own file, JSON and quiet, completion, exit codes."""
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from command import run_command
+from jointfrf.cli.main import main
+from jointfrf.cli.parser import COMMANDS, command_parser, options_of
+
+pytest.importorskip("pyuff")
+ROOT = Path(__file__).resolve().parents[3]
+BARS = ROOT / "cases" / "hammer-test" / "two_bars.uff"
+JOINT = ["--j", "101,102", "--k", "201,202", "--dofs", "y,rz", "--band", "20:150"]
+
+
+@pytest.fixture(autouse=True)
+def _elsewhere(tmp_path, monkeypatch):
+    """Where there is no jointfrf.toml but that of the test."""
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["identfy"], "there is no command 'identfy'; did you mean identify?"),
+        (["nothing"], "there is no command 'nothing': jointfrf --help lists them"),
+        (["identify", "a.uff", "--dof", "y"], "unknown option --dof; did you mean --dofs?"),
+        (["identify", "a.uff", "--qiet"], "unknown option --qiet; did you mean --quiet?"),
+        (["identify", "a.uff", "--damping=viscos"], "'viscos' is none of none, viscous, hysteretic, both, auto"),
+        (["identify", "a.uff", "--damping", "viscos"], "did you mean viscous?"),
+        (["identify", "a.uff", "--method", "complience"], "did you mean compliance?"),
+        (["check", "a.uff", "--dofs", "thetax,tz"], "not 'tz'"),
+        (["check", "a.uff", "--dofs", "theta_q"], "did you mean theta_"),
+        (["check", "a.uff", "--j", "5:3"], "'5:3' is no node number or range"),
+        (["check", "a.uff", "--j", "1:9999999"], "are more than 100000 nodes"),
+        (["check", "a.uff", "--config", "no.toml"], "--config: there is no file no.toml"),
+        (["check", "a.uff", "--force-quantity"], "--force-quantity needs --quantity"),
+        (["completion", "bsh"], "did you mean bash?"),
+        (["cases", "--key"], "did you mean --keys?"),
+        ([], "identify a joint from a file of measured FRFs"),
+        (["--hlep"], "unknown option --hlep; did you mean --help?"),
+    ],
+)
+def test_what_was_meant(words, message):
+    result = run_command(*words)
+    assert result.returncode == 2
+    assert message in result.stderr
+    if words and words[0] in COMMANDS and "usage" in result.stderr:
+        assert result.stderr.startswith(f"usage: jointfrf {words[0]} ")  # of this command only
+        assert not any(f" {name} " in result.stderr for name in COMMANDS if name not in words)
+
+
+def test_options_are_written_in_full():
+    assert "unknown option --spac; did you mean --" in run_command("check", BARS, "--spac", "1").stderr
+
+
+def test_a_value_may_begin_with_a_minus():
+    for words in (["--at", "-0.01,-.5,0"], ["--at=-0.01,-.5,0"]):
+        args = command_parser("check").parse_words(["a.uff", *words])
+        assert args.at == (-0.01, -0.5, 0.0)
+
+
+def test_help_names_every_command_and_ends_well(capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(["--help"])
+    assert stop.value.code == 0
+    said = capsys.readouterr().out
+    for name, what in COMMANDS.items():
+        assert re.search(rf"^    {name}\s", said, re.MULTILINE)
+        assert what.split(":")[0][:30] in re.sub(r"\s+", " ", said)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_has_the_common_options(command):
+    options = options_of(command_parser(command))
+    assert {"--help", "--json", "--quiet", "--config", "--no-config"} <= set(options)
+    result = run_command(command, "--help")
+    assert (result.returncode, result.stderr) == (0, "")
+    assert result.stdout.startswith(f"usage: jointfrf {command} ")
+
+
+def test_json_is_json_and_nothing_else():
+    result = run_command("identify", BARS, *JOINT, "--json")
+    content = json.loads(result.stdout, parse_constant=lambda word: pytest.fail(f"{word} is no JSON"))
+    assert content["fits"][0]["dofs"] == ["y", "theta_z"]
+    assert content["joint"]["responses"] == ["101:+y", "102:+y", "201:+y", "202:+y"]
+    assert content["written"] == []
+    cases = json.loads(run_command("cases", "--json").stdout)["cases"]
+    assert {"name", "title", "folder"} == set(cases[0])
+    check = json.loads(run_command("check", BARS, "--json").stdout)
+    assert check["ok"] is True
+
+
+def test_quiet_prints_nothing(tmp_path):
+    result = run_command("identify", BARS, *JOINT, "--quiet", "--save", "joint.json")
+    assert (result.returncode, result.stdout) == (0, "")
+    assert json.loads((tmp_path / "joint.json").read_text())["format"] == "jointfrf joint"
+    assert run_command("cases", "--quiet") == (0, "", "")
+
+
+PROJECT = """
+quantity = "accelerance"
+dofs = ["y", "theta_z"]
+j = [101, 102]
+k = "201:202"
+
+[identify]
+band = [[20, 100], [110, 150]]
+damping = "viscous"
+save = "kept.json"
+"""
+
+
+def test_a_project_has_defaults_of_its_own(tmp_path):
+    Path("jointfrf.toml").write_text(PROJECT)
+    content = json.loads(run_command("identify", BARS, "--json").stdout)
+    fit = content["fits"][0]
+    assert fit["dofs"] == ["y", "theta_z"]
+    assert fit["bands_hz"]["y"] == [[20, 100], [110, 150]]
+    assert not any("damping of y" in note for note in fit["notes"])
+    assert (tmp_path / "kept.json").exists()
+    assert run_command("check", BARS).returncode == 0
+
+
+def test_the_command_line_wins(tmp_path):
+    (tmp_path / "deep").mkdir()
+    Path("deep/other.toml").write_text(PROJECT)
+    words = ["--config", "deep/other.toml", "--dofs", "y", "--band", "20:150", "--json"]
+    content = json.loads(run_command("identify", BARS, *words).stdout)
+    fit = content["fits"][0]
+    assert (fit["dofs"], fit["bands_hz"]["y"]) == (["y"], [[20, 150]])
+    assert (tmp_path / "deep" / "kept.json").exists()  # files stand beside the configuration
+    Path("jointfrf.toml").write_text(PROJECT)
+    assert "--j, --k and --dofs are missing" in run_command("identify", BARS, "--no-config").stderr
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("quantity", "quantitty", "jointfrf.toml: unknown key 'quantitty'"),
+        ("quantity", "quantitty", "did you mean 'quantity'?"),
+        ("[identify]", "[identfy]", "did you mean 'identify'?"),
+        ("damping", "dampening", "[identify]: unknown key 'dampening'"),
+        ('"viscous"', '"viscos"', "[identify]: damping: 'viscos' is none of none, viscous"),
+        ("[101, 102]", "[0]", "jointfrf.toml: j: '0' is no node number"),
+        ('"y", "theta_z"', '"y", "theta_"', "dofs: dofs must be among"),
+        ("[20, 100]", "[20]", "band: '20' is not a band like 200:550"),
+        ('quantity = "accelerance"', "quiet = 1", "quiet: must be true or false, not 1"),
+        ('quantity = "accelerance"', "quantity = 2020-01-01", "quantity: must be a text, a number or a list"),
+        ("[identify]", "[identify", "not a TOML file"),
+        ("[identify]", "identify = 3\n[run]", "identify must be a table"),
+    ],
+)
+def test_what_is_wrong_in_the_file_of_a_project(old, new, message):
+    Path("jointfrf.toml").write_text(PROJECT.replace(old, new))
+    result = run_command("identify", BARS)
+    assert result.returncode == 1
+    assert message in result.stderr
+    assert len(result.stderr.splitlines()) == 1
+
+
+def test_completion_of_the_shells():
+    pytest.importorskip("shtab")
+    for shell in ("bash", "zsh", "fish"):
+        result = run_command("completion", shell)
+        assert (result.returncode, result.stderr) == (0, "")
+        for word in (*COMMANDS, "bending-stiffness", "renumber-b"):
+            assert word in result.stdout
+    script = run_command("completion", "bash").stdout
+    asked = 'COMP_WORDS=(jointfrf identify --ba); COMP_CWORD=2; _shtab_jointfrf; printf "%s\\n" "${COMPREPLY[@]}"'
+    done = subprocess.run(["bash", "-c", script + "\n" + asked], capture_output=True, text=True)
+    assert done.stdout.split() == ["--band"], done.stderr
+
+
+def test_progress_is_for_terminals_only():
+    done = subprocess.run(
+        [sys.executable, "-m", "jointfrf", "identify", str(BARS), *JOINT], capture_output=True, text=True, timeout=120
+    )
+    assert done.returncode == 0
+    assert "\r" not in done.stderr + done.stdout
+
+
+def test_time_left_on_a_terminal(monkeypatch, capsys):
+    from jointfrf.cli import usage
+
+    clock = iter([0.0, 10.0, 20.0, 1000.0, 2000.0])
+    monkeypatch.setattr(usage.time, "monotonic", lambda: next(clock))
+    monkeypatch.setattr(usage.sys.stderr, "isatty", lambda: True, raising=False)
+    show = usage.progress("case")
+    show(1, 4)
+    show(2, 4)
+    show(3, 6)
+    show(4, 4)
+    said = capsys.readouterr().err
+    assert "case: 25 %, about 30 s left" in said
+    assert "case: 50 %, about 20 s left" in said
+    assert "about 17 min left" in said
+    assert said.endswith("\r\x1b[K")
+
+
+def test_a_list_of_methods_names_one():
+    result = run_command("identify", BARS, *JOINT, "--method", ",")
+    assert result.returncode == 2
+    assert "argument --method: ',' is not one of compliance, inverse-substructuring" in result.stderr
+
+
+def test_a_message_is_one_line_whatever_a_file_is_called():
+    result = run_command("check", "two\nlines.uff")
+    assert (result.returncode, result.stdout) == (1, "")
+    assert result.stderr == "jointfrf: error: there is no file two\\nlines.uff\n"

@@ -1,0 +1,322 @@
+"""The report of an identification: what it says and draws, and that what is thinned hides nothing."""
+
+import json
+import re
+import warnings
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import jointfrf as jf
+from jointfrf.dofs import DIRECTIONS, joint_parameters
+from jointfrf.identification.fit_data import FitData
+from jointfrf.identification.joint_fit import JointFit
+from jointfrf.report.chart import Chart, chart_view
+from jointfrf.report.draw import STYLES
+from jointfrf.report.figure import Curve, Figure, Panel
+from jointfrf.report.fit import fit_figures
+from jointfrf.report.fit_frfs import compare_frfs
+from jointfrf.report.fit_page import ReportOptions, fit_document
+from jointfrf.report.fit_words import finding_sentences, quality_sentences
+from jointfrf.report.sketch import interface_points
+from jointfrf.report.thinning import thinned_dots, thinned_line
+
+
+def points_of(path: str) -> np.ndarray:
+    """Places of the points of a path, shape (n, 2)."""
+    found, at = [], np.zeros(2)
+    for piece in path.split("m")[1:]:
+        for step in np.array(re.findall(r"-?\d+", piece.split("h")[0]), float).reshape(-1, 2):
+            at = at + step
+            found.append(at)
+    return np.array(found)
+
+
+def drawn(x, y, most=4000, log_y=False, style="actual"):
+    """Values of the points of a chart with one curve, and what the template shows of it."""
+    figure = Figure("f", "f", (Panel("", "frequency, Hz", "h, m/N", (Curve("a", x, y, style),), log_y=log_y),))
+    view = chart_view(Chart(figure, "alt", most))
+    (panel,) = view["panels"]
+    points, limits = points_of(panel["curves"][0]["path"]), panel["limits"]
+    (x_low, x_high), (low, high) = limits["x"], limits["y"]
+    found_x = x_low + points[:, 0] / view["wide"] * (x_high - x_low)
+    found_y = low + (1 - points[:, 1] / view["high"]) * (high - low)
+    return found_x, 10**found_y if log_y else found_y, panel
+
+
+@pytest.mark.parametrize("log_y", [False, True])
+def test_a_path_holds_the_curve(log_y):
+    x = np.linspace(20, 1000, 491)
+    y = 1e-6 * (2 + np.sin(x / 30)) * 10 ** (np.cos(x / 200))
+    found_x, found_y, panel = drawn(x, y, log_y=log_y)
+    np.testing.assert_allclose(found_x, x, atol=0.03)
+    if log_y:
+        np.testing.assert_allclose(found_y, y, rtol=1e-3)
+    else:
+        np.testing.assert_allclose(found_y, y, atol=1e-4 * np.ptp(y))
+    ticks = [(at, float(text.replace("−", "-"))) for at, text in panel["x_ticks"]]
+    for at, value in ticks:
+        assert at == pytest.approx(100 * (value - 20) / 980)
+
+
+def test_gaps_stay_gaps():
+    x = np.r_[np.arange(10.0), np.arange(50.0, 60.0)]
+    y = x.copy()
+    y[4] = np.nan
+    *_, panel = drawn(x, y)
+    assert panel["curves"][0]["path"].count("m") == 3
+    steps = np.repeat(np.arange(10.0), 2)[1:-1]
+    *_, panel = drawn(steps, np.repeat(np.arange(9.0), 2))
+    assert panel["curves"][0]["path"].count("m") == 1
+
+
+def test_thinning_keeps_every_peak():
+    rng = np.random.default_rng(3)
+    y = rng.standard_normal(100_000)
+    peaks = rng.choice(y.size, 40, replace=False)
+    y[peaks[:20]], y[peaks[20:]] = 50 + rng.random(20), -50 - rng.random(20)
+    y[70_000:71_000] = np.nan
+    kept = thinned_line(y, 1000)
+    assert kept.size <= 1000
+    assert (np.diff(kept) > 0).all()
+    edges = np.linspace(0, y.size, 500, endpoint=False).astype(int)
+    for first, end in zip(edges, np.r_[edges[1:], y.size], strict=True):
+        own, column = y[kept[(kept >= first) & (kept < end)]], y[first:end]
+        assert own.size
+        if np.isfinite(column).any():
+            assert (np.nanmin(own), np.nanmax(own)) == (np.nanmin(column), np.nanmax(column))
+    assert np.isnan(y[kept[(kept >= 70_400) & (kept < 70_600)]]).all()
+    dots = thinned_dots(y, 1000)
+    assert dots.size <= 1000
+    assert {np.nanmax(y), np.nanmin(y)} <= set(y[dots])
+    np.testing.assert_array_equal(thinned_line(y[:900], 1000), np.arange(900))
+
+
+def test_dots_and_lines_come_back():
+    x = np.arange(1.0, 30.0)
+    found_x, found_y, _ = drawn(x, x**2, style="dots")
+    np.testing.assert_allclose(found_x, x, atol=0.01)
+    np.testing.assert_allclose(found_y, x**2, atol=0.2)
+
+
+def test_points_of_an_interface_lie_where_they_were_put():
+    places = {1: (0.1, 0.02, 0.3), 2: (0.1, 0.02, 0.34), 3: (0.1, 0.0, 0.3), 4: (0.1, 0.0, 0.34)}
+    sides = jf.interface([1, 2], [3, 4], ["y", "theta_x"], places)
+    for point in interface_points(sides):
+        np.testing.assert_allclose(point.place, places[int(point.name)], atol=1e-12)
+        assert point.side == (int(point.name) > 2)
+
+
+def test_sensors_of_three_axes_without_names_lie_where_they_were_put():
+    rng = np.random.default_rng(2)
+    at = rng.uniform(-0.1, 0.1, (8, 3))
+    axes = np.linalg.qr(rng.standard_normal((8, 3, 3)))[0]
+    sides = [
+        jf.virtual_point(np.repeat(at[own], 3, axis=0), axes[own].reshape(-1, 3), about, DIRECTIONS)
+        for own, about in ((slice(4), [0.01, 0, 0]), (slice(4, 8), [0, 0.02, 0]))
+    ]
+    points = interface_points(jf.virtual_interface(*sides))
+    assert [point.name for point in points] == [f"{3 * i}-{3 * i + 2}" for i in range(8)]
+    assert [point.side for point in points] == [0] * 4 + [1] * 4
+    np.testing.assert_allclose([point.place for point in points], at, atol=1e-12)
+    # One direction each: what is along it is not known.
+    single = [jf.virtual_point(at[own], [[0, 1, 0]] * 4, [0, 0, 0], ["y"]) for own in (slice(4), slice(4, 8))]
+    points = interface_points(jf.virtual_interface(*single))
+    np.testing.assert_allclose([point.place for point in points], at * [1, 0, 1], atol=1e-12)
+
+
+@pytest.fixture(scope="module")
+def fits(beams):
+    gamma = jf.pollute(beams.gamma(beams.joint), 0.01, seed=5)
+    coupled = jf.pollute(beams.gamma(jf.Joint([[6e5, 1e4], [1e4, 5e3]], [20, 1.5])), 0.005, seed=1)
+    stiff = jf.Joint([1e12, 5e3], [0, 1.5], ["y", "theta"])
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", jf.IdentificationWarning)
+        return {
+            "plain": jf.identify(beams.freq, gamma, ["y", "theta_z"]),
+            "open": jf.identify(beams.freq, jf.pollute(beams.gamma(stiff), 0.01, seed=2), ["y", "theta_z"]),
+            "ignore": jf.identify(beams.freq, gamma, ["y", "theta_z"], cross="ignore"),
+            "cross": jf.identify(beams.freq, coupled, ["y", "theta_z"], cross="fit"),
+            "one line": jf.identify(beams.freq[50:51], gamma[50:51], ["y", "theta_z"], noise=0.01),
+            "numbers": jf.identify(beams.freq[::-1], gamma[::-1], reciprocal=False),
+        }
+
+
+@pytest.mark.parametrize("kind", ["plain", "open", "ignore", "cross", "one line", "numbers"])
+def test_every_fit_has_a_report(fits, kind, tmp_path):
+    fit = fits[kind]
+    path = fit.report(tmp_path / "report.html", source="<bars & plates>.uff", command="jointfrf identify")
+    text = path.read_text(encoding="utf-8")
+    assert [p.name for p in tmp_path.iterdir()] == ["report.html"]
+    assert "&lt;bars &amp; plates&gt;.uff" in text
+    assert not re.search(r'(?:src|href)="(?!data:|#)', text)
+    assert "nan" not in re.sub(r"<script>.*</script>", "", text, flags=re.DOTALL).lower().split()
+    for name in fit.parameters:
+        assert f"({name})" in text or (name.count(",") and kind == "cross")
+    for said in (*fit.warnings, *fit.notes):
+        assert said.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;").replace("'", "&#39;") in text
+    for limits in re.findall(r'data-limits="([^"]*)"', text):
+        json.loads(limits.replace("&#34;", '"'))
+
+
+def test_sentences_say_what_the_intervals_say(fits):
+    fit = fits["plain"]
+    said = finding_sentences(fit)
+    assert len(said) == len(fit.parameters)
+    for sentence, (name, (low, high)) in zip(said, fit.confidence_interval(0.95).items(), strict=True):
+        assert f"({name})" in sentence
+        numbers = re.search(r"between ([\d.]+) and ([\d.]+) (k?)N", sentence)
+        size = 1e3 if numbers[3] else 1.0
+        np.testing.assert_allclose([float(numbers[1]), float(numbers[2])], [low / size, high / size], rtol=5e-3)
+    assert said[0].startswith("Stiffness along y (k_y): ")
+    assert said[1].startswith("Rotational stiffness about z (k_theta_z): ")
+    crossed = finding_sentences(fits["cross"])
+    assert len(crossed) == 5
+    assert crossed[-1].endswith("(values in the table): 1 of 2: k_y,theta_z.")
+    low, _ = fits["open"].confidence_interval(0.95)["k_y"]
+    assert finding_sentences(fits["open"])[0] == (
+        f"Stiffness along y (k_y): cannot be distinguished from rigid; at least {low / 1e6:.4g} MN/m (95 %)."
+    )
+    assert "explains the FRFs of the lines used to within their noise" in quality_sentences(fit)[0]
+    assert "does not explain all" in quality_sentences(replace(fit, residual_level=0.03))[0]
+
+
+def test_a_rigid_dof_is_drawn_by_its_bound(fits):
+    stiffness, loss, *_ = fit_figures(fits["open"])[0].panels
+    low, _ = fits["open"].confidence_interval(0.95)["k_y"]
+    assert [curve.label for curve in stiffness.curves] == ["each line", "lower bound of k, 95 %"]
+    assert stiffness.curves[1].y.tolist() == [low, low]
+    assert [curve.label for curve in loss.curves] == ["each line"]
+
+
+def test_lines_left_out_are_drawn_apart(fits):
+    fit = fits["plain"]
+    fitted = fit.data.fitted.copy()
+    fitted[20:30, 0] = False
+    panel = fit_figures(replace(fit, data=replace(fit.data, fitted=fitted)))[0].panels[0]
+    used, _, out = panel.curves
+    np.testing.assert_array_equal(out.x, fit.freq_hz[20:30])
+    np.testing.assert_array_equal(out.y, fit.k_lines[20:30, 0, 0].real)
+    assert used.x.size == fit.freq_hz.size - 10
+
+
+def test_maps_show_the_channel_that_is_wrong(beams):
+    places = {i + 1: (0.03 * (i % 5), 0.0, 0.0) for i in range(10)}
+    sides = jf.interface(range(1, 6), range(6, 11), ["y", "theta_z"], places)
+    h = jf.pollute(sides.modes @ beams.gamma(beams.joint) @ sides.modes.T, 0.01, seed=4)
+    gain = np.ones(10)
+    gain[1] = 1.05
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        good, of_both, of_responses = (
+            compare_frfs(jf.identify(beams.freq, own, transform=sides).data, sides.dofs)
+            for own in (h, gain[:, None] * h * gain, (0.6 + 0.4 * gain)[:, None] * h)
+        )
+    apart = ~np.eye(10, dtype=bool)
+    assert good.of_channels
+    assert good.residual.max() < 1.3
+    assert np.median(good.residual) == pytest.approx(0.8, abs=0.3)
+    np.testing.assert_allclose(good.reciprocity[apart], 1, atol=0.2)
+    # The gain of a point, struck and measured, is not seen by reciprocity; the rigid motion of its side is.
+    assert np.argmax(of_both.residual) == 11
+    assert of_both.residual[1, 1] > 3
+    assert of_both.residual[5:, 5:].max() < 1.3
+    np.testing.assert_allclose(of_both.reciprocity[apart], 1, atol=0.2)
+    # That of its sensor alone is.
+    by_row = np.nanmean(of_responses.reciprocity, axis=1)
+    assert np.argmax(by_row) == 1
+    assert by_row[1] > 1.1 * np.delete(by_row, 1).max()
+
+
+def test_reciprocity_says_nothing_of_frfs_made_reciprocal(beams):
+    gamma = jf.pollute(beams.gamma(beams.joint), 0.01, seed=5)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        fit = jf.identify(beams.freq, (gamma + gamma.swapaxes(1, 2)) / 2, ["y", "theta_z"])
+    assert compare_frfs(fit.data, fit.dofs).reciprocity is None
+
+
+def long_fit(n_freq: int, n: int) -> JointFit:
+    """A fit of n DOFs on many lines whose FRFs need no computing."""
+    rng = np.random.default_rng(0)
+    freq = np.linspace(1, 2000, n_freq)
+    h = np.empty((n_freq, 2 * n, 2 * n), complex)
+    for a in range(2 * n):
+        for b in range(2 * n):
+            h[:, a, b] = 1e-6 / (1 - (freq / (100 + 50 * (a + b))) ** 2 + 0.01j)
+    h += 1e-8 * rng.standard_normal(h.shape)
+    dofs = DIRECTIONS[:n]
+    names = tuple(f"{side}:{dof}" for side in "jk" for dof in dofs)
+    parameters = {one.name: 1e4 for one in joint_parameters(dofs)}
+    k = np.eye(n) * 1e4 * (1 + 0.1 * rng.standard_normal((n_freq, 1, 1))) + 0j
+    data = FitData(
+        h, names, names, np.eye(2 * n), np.eye(2 * n), (np.eye(2 * n), np.eye(2 * n)), None, True, 1e-4 * abs(h) ** 2,
+        1.0, None, None, np.ones((n_freq, n), bool), lambda own: 0.99 * h[own], lambda: np.full((n_freq, n), 1e-4 + 0j),
+        lambda: np.full((n_freq, 2 * n), 1 / n_freq),
+    )  # fmt: skip
+    bands = (((1.0, 2000.0),),) * n
+    return JointFit("compliance", dofs, parameters, np.eye(2 * n), 0.01, 0.01, freq, k, bands, data=data)
+
+
+@pytest.mark.parametrize(("n_freq", "n"), [(100_000, 1), (3000, 6)])
+def test_the_page_of_large_data_is_small_and_says_what_it_leaves_out(n_freq, n, tmp_path):
+    fit = long_fit(n_freq, n)
+    path = fit.report(tmp_path / "report.html")
+    assert path.stat().st_size < 1.5e6
+    text = path.read_text(encoding="utf-8")
+    assert ("24 of 144 FRFs between the channels" in text) == (n == 6)
+    (most,) = re.findall(r"Curves of more than (\d+) lines", text)
+    # The resonance of the first FRF is on the page as high as it was measured.
+    (path_of_first,) = re.findall(r'id="frf-1".*?class="s-wide" data-label="measured" d="([^"]*)"', text, re.DOTALL)
+    points = points_of(path_of_first)
+    assert 100 < len(points) <= int(most)
+    limits = json.loads(re.findall(r'id="frf-1".*?data-limits="([^"]*)"', text, re.DOTALL)[0].replace("&#34;", '"'))
+    low, high = limits["y"]
+    highest = 10 ** (low + (1 - points[:, 1].min() / 8000) * (high - low))
+    assert highest == pytest.approx(abs(fit.data.measured[:, 0, 0]).max(), rel=2e-3)
+
+
+def test_a_loaded_fit_says_what_a_report_needs(fits, tmp_path):
+    loaded = JointFit.from_dict(fits["plain"].to_dict())
+    with pytest.raises(ValueError, match="call identify with the FRFs"):
+        loaded.report(tmp_path / "report.html")
+    assert list(tmp_path.iterdir()) == []
+    with pytest.raises(FileNotFoundError):
+        fits["plain"].report(tmp_path / "missing" / "report.html")
+
+
+def test_cards_stand_between_the_nodes_named(fits):
+    parts = {part.name: part.text for section in fit_document(fits["plain"], ReportOptions(nodes=(7, 9))).sections
+             if section.key == "cards" for part in section.parts if hasattr(part, "text")}  # fmt: skip
+    assert list(parts) == ["Abaqus", "CalculiX (stiffness only)", "Nastran", "Ansys"]
+    assert parts["Abaqus"] == fits["plain"].export("abaqus", (7, 9))
+    # DOFs without a direction have no cards, which is said.
+    document = fit_document(fits["numbers"], ReportOptions())
+    (cards,) = (section for section in document.sections if section.key == "cards")
+    assert any("dofs must be among" in said for said in cards.parts[-1].sentences)
+
+
+def test_a_fit_is_drawn_with_its_frfs_and_without(fits):
+    pytest.importorskip("matplotlib")
+    canvas = fits["plain"].plot()
+    labels = {text.get_text() for text in canvas.legends[0].get_texts()}
+    assert {"measured", "regenerated with the joint found", "each line"} <= labels
+    loaded = JointFit.from_dict(fits["plain"].to_dict()).plot()
+    assert "measured" not in {text.get_text() for text in loaded.legends[0].get_texts()}
+    assert len(canvas.axes) == len(loaded.axes) + 8
+
+
+def test_styles_differ_in_grey():
+    """Curves that share a panel of a report: by lightness, dashes, or width."""
+    for names in (("wide", "fitted", "difference"), ("dots", "actual", "outlying"), ("ismm", "high", "stiffness")):
+        looks = []
+        for name in names:
+            style = STYLES[name]
+            red, green, blue = (int(style.colour[i : i + 2], 16) for i in (1, 3, 5))
+            looks.append((0.2126 * red + 0.7152 * green + 0.0722 * blue, str(style.dashes), style.width, style.marker))
+        for i, one in enumerate(looks):
+            for other in looks[:i]:
+                assert (
+                    abs(one[0] - other[0]) > 25 or one[1] != other[1] or one[3] != other[3] or one[2] > 1.5 * other[2]
+                )

@@ -1,0 +1,104 @@
+"""The DOFs of a joint from sensors and impacts around it, and what each channel has to do with rigid motion."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import jointfrf as jf
+from hammer_test import FREQ_HZ, JOINT, hammer_test, noisy
+from jointfrf.io import Channel
+from rigid_bodies import DOFS, POINT
+
+NODES_J, NODES_K = [*range(101, 123)], [*range(201, 223)]
+J, K = ([node for node in side if node % 100 in (*range(1, 5), *range(11, 23))] for side in (NODES_J, NODES_K))
+
+
+def sides(frfs, at=POINT, dofs=DOFS, **more):
+    return jf.joint_channels(frfs, jf.places_of_nodes(frfs, J, K), at, dofs, **more)
+
+
+def test_the_joint_comes_back_from_sensors_and_impacts_at_different_places():
+    frfs = hammer_test().receptance()
+    found = sides(frfs)
+    assert len(found.responses.channels) == len(found.forces.channels) == 24
+    gamma = found.responses.transform @ found.gamma(frfs) @ found.forces.transform.T
+    k = jf.inverse_substructuring(gamma)
+    exact = JOINT.dynamic_stiffness(FREQ_HZ)
+    size = np.sqrt(abs(np.diagonal(exact, axis1=1, axis2=2)))
+    assert abs((k - exact) / size[:, :, None] / size[:, None, :]).max() < 1e-6
+    for group in found.agreement(found.gamma(frfs)):
+        assert group.rigid == pytest.approx(1, abs=1e-9)
+        assert all(one.consistency == pytest.approx(1, abs=1e-9) for one in group.channels)
+
+
+@pytest.mark.parametrize(("kind", "name"), [("response", "203:+y"), ("excitation", "114:+x")])
+def test_the_channel_that_is_wrong_is_to_blame(kind, name):
+    frfs = noisy(hammer_test()).receptance()
+    channels = frfs.responses if kind == "response" else frfs.excitations
+    at = channels.index(Channel.parse(name)) if Channel.parse(name) in channels else None
+    at = channels.index(Channel.parse(name).opposite()) if at is None else at
+    h = frfs.h.copy()
+    h[(slice(None), at) if kind == "response" else (slice(None), slice(None), at)] *= 1.6
+    wrong = replace(frfs, h=h)
+    found = sides(wrong)
+    groups = found.agreement(found.gamma(wrong))
+    (guilty,) = [group for group in groups if group.rigid < 0.9999]
+    assert (guilty.kind, guilty.side) == (kind, "j" if name[0] == "1" else "k")
+    blames = {(one.channel.node, one.channel.axis): one.blame for one in guilty.channels}
+    worst = max(blames, key=blames.get)
+    assert worst == (Channel.parse(name).node, Channel.parse(name).axis)
+    assert blames[worst] > 0.9
+
+
+def test_one_channel_both_ways_is_one():
+    """A sensor along +z and a hammer along -z at one node: one place, found with its signs."""
+    frfs = hammer_test()
+    ends = (Channel(1, "+z"), Channel(2, "+z"))
+    hits = tuple(channel.opposite() for channel in ends)
+    small = replace(frfs, responses=ends, excitations=hits, h=frfs.h[:, :2, :2], coordinates={1: POINT, 2: POINT})
+    found = jf.joint_channels(small, jf.places_of_nodes(small, [1], [2]), POINT, ["z"])
+    assert found.responses is found.forces
+    np.testing.assert_array_equal(found.gamma(small), -small.h)
+
+
+def test_dofs_left_out_are_named():
+    frfs = hammer_test().receptance()
+    found = sides(frfs, at=POINT + np.array([0, 0.006, 0]), dofs=["x", "y", "z"])
+    told = {(one.dof, one.into) for one in found.left_out(found.gamma(frfs)) if one.matters}
+    assert any(dof.startswith("theta") for dof, _ in told)
+
+
+def test_two_reference_points():
+    frfs = hammer_test().receptance()
+    found = sides(frfs, at_k=POINT + np.array([0, 0.01, 0]))
+    np.testing.assert_allclose(found.responses.references[1] - found.responses.references[0], [0, 0.01, 0])
+    told = [str(one) for one in jf.channels.left_out_dofs.offset_couplings(found.responses)]
+    assert told == [
+        "the offset between the reference points couples z with theta_x: 10 mm",
+        "the offset between the reference points couples x with theta_z: -10 mm",
+    ]
+
+
+def test_what_is_wrong_is_said():
+    frfs = hammer_test().receptance()
+    places = jf.places_of_nodes(frfs, J, K)
+    with pytest.raises(ValueError, match="channel 101:\\+x has no side"):
+        jf.joint_channels(frfs, [replace(places[0], side=None), *places[1:]], POINT)
+    with pytest.raises(ValueError, match=r"table: .* has no response 999:\+x"):
+        jf.joint_channels(
+            frfs, [*places, replace(places[0], channel=Channel(999, "x"), role="response", where="table")], POINT
+        )
+    with pytest.raises(ValueError, match="stands there twice as response"):
+        jf.joint_channels(frfs, [*places, places[0]], POINT)
+    with pytest.raises(ValueError, match="node 101 has no coordinates"):
+        jf.joint_channels(replace(frfs, coordinates={}), places, POINT)
+    few = [place for place in places if place.channel.node not in (101, 102, 103)]
+    with pytest.raises(ValueError, match=r"responses of side j .*too few for 6 DOFs"):
+        jf.joint_channels(frfs, few, POINT)
+    with pytest.raises(ValueError, match="side k of the joint has no responses"):
+        jf.joint_channels(frfs, [place for place in places if place.side == "j"], POINT)
+    with pytest.raises(ValueError, match="node 101 is named on both sides"):
+        jf.places_of_nodes(frfs, [101], [101])
+    with pytest.raises(ValueError, match="node 5 has no channel"):
+        jf.places_of_nodes(frfs, [5], [101])
