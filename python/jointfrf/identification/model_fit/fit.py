@@ -121,7 +121,7 @@ def fit_assembly(problem: ModelProblem) -> FoundModel:
             if not problem.prediction.refine(problem.vector, problem.vector.to_values(minimum.x)):
                 break
             minimum = minimise(problem.likelihood, minimum.x)
-        for _ in range(2):
+        for _ in range(2 if problem.is_assumed else 1):
             changed = _with_noise_of_model(problem, minimum)
             if changed is None:
                 break
