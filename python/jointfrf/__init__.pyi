@@ -49,6 +49,12 @@ from jointfrf.frf.smoothing import SmoothFrfs, smooth_frfs
 from jointfrf.identification.elastic_centre import ElasticCentre, elastic_centre
 from jointfrf.identification.identify import identify
 from jointfrf.identification.joint_fit import JointFit
+from jointfrf.identification.model_fit.assembly import Assembly
+from jointfrf.identification.model_fit.attachments import AddedMass, GroundSpring
+from jointfrf.identification.model_fit.identify_model import identify_model
+from jointfrf.identification.model_fit.model_fit import ModelFit
+from jointfrf.identification.model_fit.substructure import Substructure
+from jointfrf.identification.model_fit.unknown import Unknown
 from jointfrf.identification.monte_carlo import BandStatistics, MonteCarlo, monte_carlo
 from jointfrf.identification.realisations import identify_realisations
 from jointfrf.identification.sensitivity import propose_bands, sensitivity
@@ -56,6 +62,11 @@ from jointfrf.joint import Joint
 from jointfrf.kernel.engine import get_engine, set_engine, use_engine
 from jointfrf.kernel.linear_algebra import invert, reciprocal_condition, solve
 from jointfrf.kernel.status import RCOND_LIMIT
+from jointfrf.laws.function_law import FunctionLaw
+from jointfrf.laws.law import JointLaw, LawField
+from jointfrf.laws.law_joint import LawJoint
+from jointfrf.laws.springs import SpringLaw
+from jointfrf.laws.viscoelastic import FractionalZener, PowerLaw, StandardLinearSolid
 from jointfrf.models.beam import beam
 from jointfrf.models.chain import chain
 from jointfrf.models.model import Model, assemble
@@ -75,11 +86,14 @@ from jointfrf.substructuring.decoupling import decouple
 from jointfrf.substructuring.ismm import inverse_substructuring, ismm
 from jointfrf.substructuring.modification import find_modification, modify
 from jointfrf.substructuring.multi_point import MultiPointJoint, multi_point_compliance, multi_point_stiffness
+from jointfrf.substructuring.semm import semm
 
 __all__ = [
     "PROOF_STRENGTH",
     "RCOND_LIMIT",
     "STRESS_AREA",
+    "AddedMass",
+    "Assembly",
     "BandStatistics",
     "Bolt",
     "BoltedLap",
@@ -94,9 +108,12 @@ __all__ = [
     "ElasticCentre",
     "FileContentError",
     "FileContentWarning",
+    "FractionalZener",
     "FrfCheck",
     "FrfCheckWarning",
     "FrfFinding",
+    "FunctionLaw",
+    "GroundSpring",
     "Hole",
     "IdentificationWarning",
     "IllConditionedWarning",
@@ -104,21 +121,30 @@ __all__ = [
     "Joint",
     "JointChannels",
     "JointFit",
+    "JointLaw",
     "LapDivisions",
+    "LawField",
+    "LawJoint",
     "Material",
     "Mesh",
     "MissingPackageError",
     "Model",
+    "ModelFit",
     "MonteCarlo",
     "MultiPointJoint",
     "NoiseModel",
     "Patch",
+    "PowerLaw",
     "PreloadedLap",
     "ReceptanceInfo",
     "SideAgreement",
     "SingularLineError",
     "SmoothFrfs",
     "SolidModel",
+    "SpringLaw",
+    "StandardLinearSolid",
+    "Substructure",
+    "Unknown",
     "VirtualPoint",
     "amplitude_error",
     "append_virtual_point",
@@ -149,6 +175,7 @@ __all__ = [
     "get_engine",
     "has_peak",
     "identify",
+    "identify_model",
     "identify_realisations",
     "impact_consistency",
     "in_bands",
@@ -173,6 +200,7 @@ __all__ = [
     "receptance",
     "reciprocal_condition",
     "rigid_offset",
+    "semm",
     "sensitivity",
     "sensor_consistency",
     "set_engine",

@@ -9,6 +9,7 @@ fitting        the fit in the compliance domain, as cases call it
 workers        processes that share the work
 known_joint/   two simulated substructures and a joint of known parameters
 bolted_lap/    a lap joint with a preloaded bolt of solid elements
+modelled_joint/  a joint of any laws, from FRFs at any points, with models of the substructures
 
 A new kind of case is a folder with a `CaseKind`, and one line in `kinds`.
 """

@@ -79,10 +79,15 @@ def cases_folder() -> Path | None:
 
 
 def list_cases() -> list[Path]:
-    """Return the folders of the cases that come with the package, in the order of their numbers."""
+    """Return the folders of the cases that come with the package, in the order of their numbers; others last."""
     folder = cases_folder()
     found = [] if folder is None else [path.parent for path in folder.glob("*/case.toml")]
-    return sorted(found, key=lambda path: [int(x) for x in path.name.split("-")[0].split(".") if x.isdigit()])
+
+    def place(path: Path) -> tuple[bool, list[int], str]:
+        numbers = [int(x) for x in path.name.split("-")[0].split(".") if x.isdigit()]
+        return not numbers, numbers, path.name
+
+    return sorted(found, key=place)
 
 
 def find_case(word: str) -> Path:

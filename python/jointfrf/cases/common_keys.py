@@ -50,7 +50,7 @@ _STUDY = KeyTable(
     ),
 )
 COMMON_KEYS = (
-    Key("kind", one_of(("known-joint", "bolted-lap")), "Kind of the case.", "", "`known-joint`"),
+    Key("kind", one_of(("known-joint", "bolted-lap", "modelled-joint")), "Kind of the case.", "", "`known-joint`"),
     Key("title", "text", "Title of the report."),
     Key("section", "text", "Where the source treats the case."),
     Key("frequency", "table", "Frequency lines.", inner=_FREQUENCY),

@@ -10,12 +10,19 @@ import numpy as np
 from jointfrf.errors import ConvergenceWarning, FrfCheckWarning, IdentificationWarning, IllConditionedWarning
 from jointfrf.identification.identify import IdentificationMethod, identify
 from jointfrf.identification.joint_fit import JointFit
+from jointfrf.identification.model_fit.assembly import Assembly
+from jointfrf.identification.model_fit.identify_model import identify_model
+from jointfrf.identification.model_fit.substructure import Substructure
 from jointfrf.identification.realisations import identify_realisations
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.laws.law_joint import LawJoint
+from jointfrf.laws.springs import SpringLaw
 
-__all__ = ["METHODS", "fit_measured", "fit_viscous"]
+__all__ = ["FITTED", "METHODS", "fit_decoupling", "fit_measured", "fit_viscous"]
 
-METHODS: tuple[str, ...] = get_args(IdentificationMethod)
+METHODS: tuple[str, ...] = (*get_args(IdentificationMethod), "decoupling-fit")
+#: Methods that take all lines, not means over bands.
+FITTED = ("compliance", "decoupling-fit")
 #: Relative noise for the weights of a fit to data whose noise is not asked for.
 _ASSUMED = 0.01
 #: Least variance of an FRF as a share of that of its driving points: entries that are zero have no noise of their own.
@@ -41,6 +48,54 @@ def fit_viscous(freq_hz: FloatArray, dofs: tuple[str, ...], gammas: ComplexArray
     """
     fits = identify_realisations(freq_hz, gammas, dofs, damping="viscous")
     return np.array([[*fit.stiffness, *fit.damping] for fit in fits])
+
+
+def fit_decoupling(
+    freq_hz: FloatArray,
+    dofs: tuple[str, ...],
+    substructures: tuple[ComplexArray, ComplexArray],
+    k_initial: ComplexArray,
+    measured: ComplexArray,
+) -> FloatArray:
+    """Fit stiffness and viscous damping to all FRFs between internal points, given those of the substructures.
+
+    Parameters
+    ----------
+    freq_hz : ndarray, shape (n_freq,)
+        Hz.
+    dofs : tuple of str
+        Names of the n joint DOFs.
+    substructures : pair of ndarray, shape (n_freq, 2 n, 2 n)
+        Receptances of A at j, then r, and of B at k, then s, m/N.
+    k_initial : ndarray, shape (n_freq, n, n)
+        First estimate of K*, N/m.
+    measured : ndarray, shape (r, n_freq, 2 n, 2 n)
+        Several sets of receptances of the assembly at r, then s, m/N.
+
+    Returns
+    -------
+    ndarray, shape (r, 2 n)
+        Stiffness of all DOFs, then damping.
+
+    Notes
+    -----
+    What (2.53)-(2.56) take one block each is one maximum-likelihood fit of all four.
+    """
+    n = len(dofs)
+    joint, inner = [f"joint {dof}" for dof in dofs], [f"inner {dof}" for dof in dofs]
+    a, b = (Substructure.of_frfs(freq_hz, h, [*joint, *inner], joint) for h in substructures)
+    diagonal = np.einsum("laa->la", k_initial)
+    k, c = np.median(diagonal.real, axis=0), np.median(diagonal.imag / (2 * np.pi * freq_hz)[:, None], axis=0)
+    whole = Assembly(a, b, LawJoint({dof: SpringLaw(k[i], c=c[i]) for i, dof in enumerate(dofs)}))
+    channels = [*(f"A/{name}" for name in inner), *(f"B/{name}" for name in inner)]
+    found = np.empty((len(measured), 2 * n))
+    with warnings.catch_warnings():
+        for category in (IdentificationWarning, ConvergenceWarning):
+            warnings.simplefilter("ignore", category)
+        for i, h in enumerate(measured):
+            joint_found = identify_model(freq_hz, h, whole, channels, channels).joint.constant_joint()
+            found[i] = *joint_found.stiffness.diagonal(), *joint_found.damping.diagonal()
+    return found
 
 
 def fit_measured(freq_hz: FloatArray, dofs: tuple[str, ...], h: ComplexArray, transform: FloatArray) -> JointFit:

@@ -85,7 +85,7 @@ class CaseKind(Generic[CaseT, ResultT]):
     --------
     >>> from jointfrf.cases.kinds import KINDS
     >>> list(KINDS)
-    ['known-joint', 'bolted-lap']
+    ['known-joint', 'bolted-lap', 'modelled-joint']
     """
 
     name: str

@@ -8,6 +8,7 @@ from typing import Any
 from jointfrf.cases.bolted_lap.kind import BOLTED_LAP
 from jointfrf.cases.kind import CaseKind
 from jointfrf.cases.known_joint.kind import KNOWN_JOINT
+from jointfrf.cases.modelled_joint.kind import MODELLED_JOINT
 
 __all__ = ["KINDS"]
 
@@ -17,5 +18,6 @@ KINDS: Mapping[str, CaseKind[Any, Any]] = {
     for kind in (
         KNOWN_JOINT,
         BOLTED_LAP,
+        MODELLED_JOINT,
     )
 }

@@ -43,6 +43,12 @@ def test_python_example_of_solid_bodies(capsys):
     assert len(found) >= 10
 
 
+def test_python_of_the_page_on_fits_with_models_prints_what_it_shows(capsys):
+    (example,) = blocks("python", DOCUMENTS["docs/model-fit.md"])
+    exec(example, {})
+    agree(capsys.readouterr().out, blocks("text", DOCUMENTS["docs/model-fit.md"])[0])
+
+
 def test_python_of_the_page_on_files_prints_what_it_shows(capsys, monkeypatch):
     pytest.importorskip("pyuff")
     monkeypatch.chdir(ROOT)

@@ -10,6 +10,7 @@ from scipy.sparse.linalg import eigsh
 
 import jointfrf as jf
 from jointfrf.cases.catalogue import find_case, read_case
+from jointfrf.cases.fitting import FITTED
 from jointfrf.cases.known_joint.compute import compute
 from jointfrf.cases.known_joint.tables import known_joint_tables
 from jointfrf.dofs import Parameter
@@ -29,11 +30,11 @@ COUNT = 6
 
 @pytest.fixture(scope="module")
 def results():
-    """All cases of a known joint on all lines, with few realisations and without the compliance fit, to save time."""
+    """All cases of a known joint on all lines, with few realisations and without fits, to save time."""
     found = {}
     for name in NAMES:
         case = read_case(find_case(name))
-        noises = (dataclasses.replace(n, methods=tuple(m for m in n.methods if m != "compliance")) for n in case.noises)
+        noises = (dataclasses.replace(n, methods=tuple(m for m in n.methods if m not in FITTED)) for n in case.noises)
         tables = tuple(table for table in case.expected.tables if table.method != "compliance")
         expected = dataclasses.replace(case.expected, tables=tables)
         found[name] = compute(dataclasses.replace(case, noises=tuple(noises), expected=expected), COUNT)

@@ -16,6 +16,7 @@ FLOORS = (
     {"frf"},
     {"channels", "io"},
     {"joint"},
+    {"laws"},
     {"substructuring", "models"},
     {"identification"},
     {"solids"},

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from jointfrf.cases.comparison import ExpectedFrequencies, read_expected_frequencies
 from jointfrf.cases.definitions import check_bands
-from jointfrf.cases.fitting import METHODS
+from jointfrf.cases.fitting import FITTED, METHODS
 from jointfrf.dofs import Parameter
 from jointfrf.frf.bands import Band
 from jointfrf.kernel.arguments import FloatArray
@@ -161,7 +161,7 @@ def _applied(entry: TomlTable, known: Known) -> tuple[str, str, str]:
 
 def _expected_parameters(entry: TomlTable, known: Known) -> ExpectedParameters:
     source, noise, method = _applied(entry, known)
-    bands = "" if method == "compliance" else entry.text("bands", known.band_sets)
+    bands = "" if method in FITTED else entry.text("bands", known.band_sets)
     values, rmse_below = (_by_parameter(entry, key, known) for key in ("values", "rmse_below"))
     entry.close()
     return ExpectedParameters(source, noise, method, bands, values, rmse_below)

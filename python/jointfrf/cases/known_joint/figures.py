@@ -43,6 +43,7 @@ _METHOD_NAMES = {
     "decoupling-rs": "decoupling (2.54)",
     "decoupling-sr": "decoupling (2.55)",
     "decoupling-ss": "decoupling (2.56)",
+    "decoupling-fit": "fit of (2.53)-(2.56)",
 }
 #: Methods of which a single realisation is drawn, too.
 _SINGLE = ("ismm", "decoupling-ss")

@@ -169,7 +169,8 @@ _IDENTIFIED = KeyTable(
     "Published parameters of one identification.",
     (
         *_APPLIED,
-        Key("bands", "text", "Name of a set of bands of the case.", "", "required but for `compliance`"),
+        Key("bands", "text", "Name of a set of bands of the case.", "",
+            "required but for `compliance` and `decoupling-fit`"),
         Key("values", "table", "Published values.", "as the parameters", "none",
             KeyTable("values, in [[identified]]", "Published values of the parameters.", _BY_PARAMETER)),
         Key("rmse_below", "table", "Largest root-mean-square error allowed.", "%", "none",

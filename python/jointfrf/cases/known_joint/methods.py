@@ -26,9 +26,12 @@ def measured(exact: Exact, method: str) -> ComplexArray:
 
     Returns
     -------
-    ndarray, shape (n_freq, n, n) for decoupling, else (n_freq, 2 n, 2 n)
-        Between the internal points that the equation names; at joint DOFs j, then k. m/N.
+    ndarray, shape (n_freq, n, n) for decoupling by an equation, else (n_freq, 2 n, 2 n)
+        Between the internal points that the equation names; at r, then s; at joint DOFs j, then k. m/N.
     """
+    if method == "decoupling-fit":
+        at = np.r_[exact.where("r"), exact.where("s")]
+        return np.ascontiguousarray(exact.h_c[:, at[:, None], at])
     if method not in _DECOUPLING:
         return exact.interface(exact.h_c)
     points = method.removeprefix("decoupling-")
@@ -37,7 +40,8 @@ def measured(exact: Exact, method: str) -> ComplexArray:
 
 def noise_stream(method: str) -> int:
     """Return what a method adds to the seed: FRFs at other points have noise of their own."""
-    return 1 + [str(name) for name in _DECOUPLING].index(method) if method in _DECOUPLING else 0
+    names = [*(str(name) for name in _DECOUPLING), "decoupling-fit"]
+    return 1 + names.index(method) if method in names else 0
 
 
 def joint_lines(exact: Exact, method: str, h: ComplexArray, on_singular: OnSingular = "raise") -> ComplexArray:

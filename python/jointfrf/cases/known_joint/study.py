@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jointfrf.cases.definitions import BandSet, Noise
-from jointfrf.cases.fitting import fit_viscous
+from jointfrf.cases.fitting import FITTED, fit_decoupling, fit_viscous
 from jointfrf.cases.known_joint.exact import Exact
 from jointfrf.cases.known_joint.methods import joint_lines, measured, noise_stream
 from jointfrf.cases.known_joint.read import KnownJointCase
@@ -86,8 +86,12 @@ def _identify(chunk: _Chunk) -> _ChunkResult:
     with warnings.catch_warnings():
         # Noise makes any line ill-conditioned now and then.
         warnings.simplefilter("ignore", IllConditionedWarning)
-        if method == "compliance":
-            theta = fit_viscous(exact.freq_hz, exact.dofs, h)
+        if method in FITTED:
+            theta = (
+                fit_viscous(exact.freq_hz, exact.dofs, h)
+                if method == "compliance"
+                else fit_decoupling(exact.freq_hz, exact.dofs, (exact.h_a, exact.h_b), exact.k_initial, h)
+            )
             no_lines = np.empty((0, exact.freq_hz.size, exact.n), np.complex128)
             return _ChunkResult(theta[None], no_lines, np.empty((1, 0, theta.shape[1])))
         k_joint = joint_lines(exact, method, h, "nan")
@@ -142,7 +146,7 @@ def run_study(
     Returns
     -------
     list of Identified
-        One for each noise, method and set of bands (`ALL_LINES` for the compliance fit). A realisation depends on the
+        One for each noise, method and set of bands (`ALL_LINES` for fits). A realisation depends on the
         seed and its own number only: neither on `workers` nor on how many there are.
     """
     at_work = workers or Workers()
@@ -160,6 +164,6 @@ def run_study(
         own = parts[i * len(spans) : (i + 1) * len(spans)]
         theta, theta_kj = (np.concatenate([getattr(p, x) for p in own], axis=1) for x in ("theta", "theta_kj"))
         k_lines = np.concatenate([part.k_lines for part in own])
-        names = [ALL_LINES] if method == "compliance" else [band_set.name for band_set in case.band_sets]
+        names = [ALL_LINES] if method in FITTED else [band_set.name for band_set in case.band_sets]
         found += [Identified(noise.name, method, name, theta[b], k_lines, theta_kj[b]) for b, name in enumerate(names)]
     return found

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from jointfrf.cases.comparison import agreement
+from jointfrf.cases.fitting import FITTED
 from jointfrf.cases.known_joint.compute import KnownJointResult
 from jointfrf.cases.known_joint.tables import Row, identified_rows
 from jointfrf.report.table import Cell, Table
@@ -22,7 +23,7 @@ def _methods(rows: list[Row]) -> list[Table]:
         errors: dict[str, dict[Cell, float]] = {}
         for row in rows:
             if row.noise == noise:
-                name = row.method if row.method == "compliance" else f"{row.method} ({row.bands})"
+                name = row.method if row.method in FITTED else f"{row.method} ({row.bands})"
                 errors.setdefault(name, {})[row.parameter] = row.rmse_percent
         if len(errors) > 1:
             parameters = next(iter(errors.values()))

@@ -51,12 +51,15 @@ class Reduction:
         Size of the reduced model.
     attainable : float
         What rounding leaves of a direct solution, times what a sum of modes may lose more; 2.2e-4 at most.
+    shapes : ndarray, shape (n, n_vectors)
+        Shapes of the modes in all DOFs, 1/sqrt(kg): a basis for models that differ little.
     """
 
     modes: Modes
     error_estimate: float
     n_vectors: int
     attainable: float
+    shapes: FloatArray
 
 
 def reduce_model(
@@ -186,7 +189,7 @@ class _Reducer:
         if not size:
             empty = np.zeros(0)
             none = Modes(empty, empty, empty, np.zeros((len(self.outputs), 0)), np.zeros((len(self.inputs), 0)), empty)
-            return Reduction(none, np.inf, size, 0.0), freq[[freq.size // 2]]
+            return Reduction(none, np.inf, size, 0.0, np.zeros((self.matrices.n, 0))), freq[[freq.size // 2]]
         uncertainty = np.concatenate([rigid.uncertainty, np.zeros(squared.size)])
         squared = np.concatenate([rigid.stiffness, squared])
         shapes = np.hstack([rigid.shapes, shapes])
@@ -199,7 +202,7 @@ class _Reducer:
             spots.append(freq.argmin())
         lines = np.unique(spots)
         error, attainable = spot_error(freq[lines], self.matrices, modes, self.outputs, self.inputs, self.rigid)
-        return Reduction(modes, error, size, attainable), freq[worst]
+        return Reduction(modes, error, size, attainable, shapes), freq[worst]
 
     def _worst_lines(self, modes: Modes, shapes: FloatArray) -> NDArray[np.intp]:
         """Lines among candidates in the order of their residual Z x - b, largest first."""

@@ -1,0 +1,110 @@
+"""Realisations of the measurement of a modelled joint, each fitted."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from jointfrf.cases.modelled_joint.read import ModelledJointCase
+from jointfrf.cases.workers import Workers
+from jointfrf.frf.noise import pollute
+from jointfrf.identification.model_fit.assembly import Assembly
+from jointfrf.identification.model_fit.identify_model import identify_model
+from jointfrf.identification.model_fit.model_fit import ModelFit
+from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.laws.law import JointLaw
+from jointfrf.laws.law_joint import LawJoint
+from jointfrf.laws.springs import SpringLaw
+
+__all__ = ["FittedDraw", "ModelledJointResult", "compute_modelled"]
+
+
+@dataclass(frozen=True)
+class FittedDraw:
+    """What one realisation gave.
+
+    Attributes
+    ----------
+    values : dict of str to float
+    intervals : dict of str to (low, high)
+        Of 95 %.
+    is_noise : bool
+        Whether the residual is noise.
+    stiffness : ndarray, shape (n_freq, n)
+        K*(w) of the DOFs that have a law, N/m.
+    """
+
+    values: dict[str, float]
+    intervals: dict[str, tuple[float, float]]
+    is_noise: bool
+    stiffness: ComplexArray
+
+
+@dataclass(frozen=True)
+class ModelledJointResult:
+    """Result of a case of a modelled joint.
+
+    Attributes
+    ----------
+    case : ModelledJointCase
+    draws : tuple of FittedDraw
+    bound : dict of str to float
+        Standard deviations at the Cramer-Rao bound.
+    first : ModelFit
+        The first realisation.
+    measured : ndarray
+        Its FRFs.
+    constant : ModelFit
+        The same fitted by springs and dashpots in place of laws that depend on frequency.
+    """
+
+    case: ModelledJointCase
+    draws: tuple[FittedDraw, ...]
+    bound: dict[str, float]
+    first: ModelFit
+    measured: ComplexArray
+    constant: ModelFit
+
+
+def moving_stiffness(joint: LawJoint, freq_hz: FloatArray) -> ComplexArray:
+    """Return K*(w) of the DOFs that have a law, shape (n_freq, n), N/m."""
+    laws = {pair: law for pair, law in joint.laws.items() if pair[0] == pair[1]}
+    return np.array([law.stiffness(2 * np.pi * freq_hz) for law in laws.values()]).T
+
+
+def compute_modelled(case: ModelledJointCase, n_realisations: int, workers: Workers) -> ModelledJointResult:
+    """Simulate measurements and fit each."""
+    exact = case.truth.receptance(case.freq_hz, case.responses, case.forces)
+    draws = tuple(workers.counted(workers.map(partial(_fitted, case, exact), range(n_realisations)), n_realisations))
+    measured = pollute(exact, case.noise, seed=case.seed)
+    at_truth = replace(case.believed, joint=case.truth.joint)
+    bound = _fit(case, at_truth, exact, np.asarray((case.noise * abs(exact)) ** 2, float)).std_error
+    constant = replace(case.believed, joint=_constant(case.believed.joint))
+    return ModelledJointResult(
+        case, draws, bound, _fit(case, case.believed, measured), measured, _fit(case, constant, measured)
+    )
+
+
+def _fit(case: ModelledJointCase, whole: Assembly, h: ComplexArray, noise: FloatArray | None = None) -> ModelFit:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return identify_model(case.freq_hz, h, whole, case.responses, case.forces, noise=noise)
+
+
+def _fitted(case: ModelledJointCase, exact: ComplexArray, number: int) -> FittedDraw:
+    """Fit one realisation: that of seed + number."""
+    fit = _fit(case, case.believed, pollute(exact, case.noise, seed=case.seed + number))
+    stiffness = moving_stiffness(fit.joint, case.freq_hz)
+    return FittedDraw(fit.parameters, fit.confidence_interval(0.95), fit.test.is_noise, stiffness)
+
+
+def _constant(joint: LawJoint) -> LawJoint:
+    """Return springs and dashpots in place of laws that depend on frequency."""
+    laws: dict[tuple[str, str], JointLaw] = {
+        pair: law if law.constant_terms is not None else SpringLaw(float(abs(law.values[0])), c=1.0)
+        for pair, law in joint.laws.items()
+    }
+    return LawJoint(laws, joint.rigid, joint.mass, joint.dofs)

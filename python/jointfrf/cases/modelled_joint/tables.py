@@ -1,0 +1,121 @@
+"""Tables and numbers of a case of a modelled joint."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from jointfrf.cases.modelled_joint.compute import ModelledJointResult, moving_stiffness
+from jointfrf.dofs import is_rotation
+from jointfrf.report.table import Cell, Table, number
+
+__all__ = ["modelled_numbers", "modelled_summary", "modelled_tables"]
+
+#: Chance of a coverage as low as that of a row that is said not to fit.
+_CHANCE = 0.005
+
+
+def modelled_tables(result: ModelledJointResult) -> list[Table]:
+    """Return the tables in the order in which they are shown."""
+    return [_parameters(result), _stiffness(result), _residuals(result)]
+
+
+def _parameters(result: ModelledJointResult) -> Table:
+    """Parameters beside their bound, and how often intervals hold them."""
+    from scipy.stats import binom
+
+    rows: list[tuple[Cell, ...]] = []
+    failing = []
+    for one in result.first.fitted:
+        actual = result.case.actual[one.name]
+        values = np.array([draw.values[one.name] for draw in result.draws])
+        low, high = np.array([draw.intervals[one.name] for draw in result.draws]).T
+        inside = int(np.count_nonzero((low <= actual) & (actual <= high)))
+        fits = bool(binom.cdf(inside, len(values), 0.95) > _CHANCE)
+        rmse = float(np.sqrt(np.mean((values - actual) ** 2)))
+        limits = [float(np.percentile(values, share)) for share in (50, 2.5, 97.5)]
+        if not fits:
+            failing.append(len(rows))
+        rows.append((
+            one.name, one.unit, actual, *limits, 100 * rmse / abs(actual),
+            100 * result.bound[one.name] / abs(actual), 100 * inside / len(values), "fits" if fits else "does not fit",
+        ))  # fmt: skip
+    columns = ("parameter", "unit", "actual", "median", "2.5 %", "97.5 %", "RMSE, %", "bound, %", "coverage, %", "")
+    return Table(
+        "parameters", "Parameters of the joint and of the models", columns, tuple(rows), tuple(failing),
+        "Bound: Cramér-Rao, with the models and the priors. Coverage: how often the 95 % interval holds the actual "
+        "value; it does not fit where so few are likely by less than 0.5 %.",
+        ("RMSE, %", "bound, %", "coverage, %"),
+    )  # fmt: skip
+
+
+def _stiffness(result: ModelledJointResult) -> Table:
+    """Stiffness and loss factor of each law at some frequencies."""
+    case = result.case
+    exact = moving_stiffness(case.truth.joint, case.show_hz)
+    constant = moving_stiffness(result.constant.joint, case.show_hz)
+    at = [int(np.argmin(abs(case.freq_hz - f))) for f in case.show_hz]
+    found = np.array([draw.stiffness[at] for draw in result.draws])
+    rows: list[tuple[Cell, ...]] = []
+    dofs = [a for a, b in case.truth.joint.laws if a == b]
+    for d, dof in enumerate(dofs):
+        unit = "N m/rad" if is_rotation(dof) else "N/m"
+        for f, freq in enumerate(case.show_hz.tolist()):
+            k = found[:, f, d]
+            rows.append((
+                dof, unit, freq, exact[f, d].real, float(np.median(k.real)), constant[f, d].real,
+                exact[f, d].imag / exact[f, d].real, float(np.median(k.imag / k.real)),
+                constant[f, d].imag / constant[f, d].real,
+            ))  # fmt: skip
+    columns = ("DOF", "unit", "Hz", "Re K*", "found", "by k + iωc", "loss factor", "found ", "by k + iωc ")
+    return Table(
+        "stiffness", "Stiffness and loss factor over frequency", columns, tuple(rows),
+        note="Found: median of the realisations. By k + iωc: springs and dashpots fitted to the first realisation.",
+    )  # fmt: skip
+
+
+def _residuals(result: ModelledJointResult) -> Table:
+    """Whether the residual is noise: of the laws of the case, and of springs and dashpots."""
+    count = len(result.draws)
+    alarms = sum(not draw.is_noise for draw in result.draws)
+    rows: list[tuple[Cell, ...]] = [
+        ("laws of the case", f"{count - alarms} of {count}", result.first.test.ratio, _where(result.first.test.bands)),
+        (
+            "springs and dashpots",
+            "yes" if result.constant.test.is_noise else "no",
+            result.constant.test.ratio,
+            _where(result.constant.test.bands),
+        ),
+    ]
+    columns = ("joint", "residual is noise", "residual over noise", "most at")
+    return Table("residual", "Is the residual noise?", columns, tuple(rows), note="Ratio and bands: first realisation.")
+
+
+def _where(bands: tuple[tuple[float, float, float], ...]) -> str:
+    return ", ".join(f"{low:g}-{high:g} Hz ({ratio:.2g})" for low, high, ratio in bands[:4])
+
+
+def modelled_summary(result: ModelledJointResult, tables: list[Table]) -> list[Table]:
+    """Return what came out, in short."""
+    worst = max(
+        (float(row[6]) / float(row[7]), str(row[0]))  # type: ignore[arg-type]
+        for row in tables[0].rows
+    )
+    held = [float(row[8]) for row in tables[0].rows]  # type: ignore[arg-type]
+    cells: tuple[tuple[Cell, ...], ...] = (
+        ("RMSE over bound, worst", f"{worst[0]:.2f} ({worst[1]})"),
+        ("coverage of 95 % intervals", f"{min(held):.0f} to {max(held):.0f} %"),
+        ("residual over noise, laws of the case", number(result.first.test.ratio, 3)),
+        ("residual over noise, springs and dashpots", number(result.constant.test.ratio, 3)),
+    )
+    return [Table("outcome", "What came out", ("quantity", "value"), cells)]
+
+
+def modelled_numbers(result: ModelledJointResult) -> dict[str, Any]:
+    """Return what `results.json` holds beside tables: the first realisation, and all values."""
+    names = list(result.first.parameters)
+    return {
+        "first": result.first.to_dict(),
+        "values": {name: [draw.values[name] for draw in result.draws] for name in names},
+    }

@@ -1,0 +1,178 @@
+"""An assembly of two substructures, a joint and what is attached to it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from jointfrf.identification.model_fit.attachments import AddedMass, Attachment
+from jointfrf.identification.model_fit.substructure import FrfSource, Substructure, check_same_lines
+from jointfrf.identification.model_fit.unknown import Unknown
+from jointfrf.joint import Joint
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_frequency
+from jointfrf.laws.law_joint import Connection, LawJoint
+from jointfrf.substructuring.connection import connect
+
+__all__ = ["Assembly", "Places", "assembly_connection", "places_of"]
+
+
+@dataclass(frozen=True)
+class Places:
+    """DOFs of both substructures that matter: joint, attachments, channels; those of A stand first.
+
+    Attributes
+    ----------
+    a, b : tuple of str
+        Names in A and B, without ``"A/"`` and ``"B/"``.
+    """
+
+    a: tuple[str, ...]
+    b: tuple[str, ...]
+
+    def at(self, names: Sequence[str]) -> list[int]:
+        """Return where DOFs ``"A/..."``, ``"B/..."`` stand among all."""
+        return [
+            self.a.index(name[2:]) if name.startswith("A/") else len(self.a) + self.b.index(name[2:]) for name in names
+        ]
+
+
+@dataclass(frozen=True)
+class Assembly:
+    """Two substructures, a joint between them, and what is attached.
+
+    DOFs of the assembly are named ``"A/..."`` and ``"B/..."``, as by `assemble`.
+
+    Parameters
+    ----------
+    a, b : Substructure
+    joint : LawJoint or Joint
+        Its laws; a `Joint` becomes springs and dampers. Its values are where a fit may start.
+    attachments : sequence of AddedMass or GroundSpring
+
+    Raises
+    ------
+    ValueError
+        A number of joint DOFs that is not that of the joint; a DOF that does not exist.
+
+    Examples
+    --------
+    >>> import numpy as np, jointfrf as jf
+    >>> a = jf.Substructure(jf.chain([5, 3], [2500, 3500], [3, 4], ground="start"), ["2:x"])
+    >>> b = jf.Substructure(jf.chain([4, 2], [2000, 2500], [2, 1], ground="end"), ["1:x"])
+    >>> whole = jf.Assembly(a, b, jf.Joint([2000.0], [3.0], dofs=["x"]))
+    >>> whole.receptance([2.0, 3.0], ["A/1:x"], ["B/2:x"]).shape
+    (2, 1, 1)
+    """
+
+    a: Substructure
+    b: Substructure
+    joint: LawJoint
+    attachments: tuple[Attachment, ...] = ()
+
+    def __post_init__(self) -> None:
+        if isinstance(self.joint, Joint):
+            object.__setattr__(self, "joint", LawJoint.of_joint(self.joint))
+        object.__setattr__(self, "attachments", tuple(self.attachments))
+        for side, part in (("a", self.a), ("b", self.b)):
+            if len(part.joint) != len(self.joint.dofs):
+                raise ValueError(
+                    f"{side}: the substructure has {len(part.joint)} joint DOFs, the joint {len(self.joint.dofs)}"
+                )
+            self.check([f"{side.upper()}/{dof}" for dof in part.joint], "joint DOF")
+        for one in self.attachments:
+            self.check(one.places, "attachment")
+
+    def check(self, names: Sequence[str], what: str) -> None:
+        """Raise an error for a DOF that neither substructure has."""
+        for name in names:
+            side = {"A/": self.a, "B/": self.b}.get(str(name)[:2])
+            if side is None or not side.has(name[2:]):
+                raise ValueError(f"{what} {name!r}: neither A nor B has such a DOF (names begin with 'A/' or 'B/')")
+
+    def receptance(self, freq_hz: ArrayLike, responses: Sequence[str], forces: Sequence[str]) -> ComplexArray:
+        """Return the FRFs of the assembly as believed, shape (n_freq, n_responses, n_forces), m/N.
+
+        Raises
+        ------
+        ValueError
+            A DOF that does not exist; FRFs of a substructure on other lines.
+        SingularLineError
+            An undamped assembly resonates at a line.
+        """
+        freq = as_frequency(freq_hz)
+        for names, what in ((responses, "response"), (forces, "force")):
+            self.check(names, what)
+        places = places_of(self, responses, forces)
+        n_a, n = len(places.a), len(places.a) + len(places.b)
+        h = np.zeros((freq.size, n, n), np.complex128)
+        for name, part, own in (("A", self.a, slice(0, n_a)), ("B", self.b, slice(n_a, n))):
+            if isinstance(part.source, FrfSource):
+                check_same_lines(name, part.source, freq)
+            h[:, own, own] = part.receptance(freq, places.a if name == "A" else places.b)
+        numbers = [
+            [number.value if isinstance(number, Unknown) else number for number in one.numbers]
+            for one in self.attachments
+        ]
+        link = assembly_connection(self, places, 2 * np.pi * freq, self.joint, numbers)
+        connected = connect(h, link, freq)
+        return np.ascontiguousarray(connected[:, places.at(responses)][:, :, places.at(forces)])
+
+
+def places_of(whole: Assembly, responses: Sequence[str], forces: Sequence[str]) -> Places:
+    """Return the DOFs that matter: those of the joint first, each once."""
+    named = [*responses, *forces, *(dof for one in whole.attachments for dof in one.places)]
+    of_side = {"A/": list(whole.a.joint), "B/": list(whole.b.joint)}
+    for name in named:
+        of_side[name[:2]].append(name[2:])
+    return Places(tuple(dict.fromkeys(of_side["A/"])), tuple(dict.fromkeys(of_side["B/"])))
+
+
+def assembly_connection(
+    whole: Assembly, places: Places, omega: FloatArray, joint: LawJoint, numbers: Sequence[Sequence[float]]
+) -> Connection:
+    """Return all that connects the substructures and holds or loads them: the joint first, then attachments.
+
+    Parameters
+    ----------
+    whole : Assembly
+    places : Places
+    omega : ndarray, shape (n_freq,)
+        rad/s.
+    joint : LawJoint
+        With the values wanted.
+    numbers : sequence of sequence of float
+        Those of each attachment.
+
+    Returns
+    -------
+    Connection
+        Pattern of shape (m, q).
+    """
+    own = joint.connection(omega)
+    q = own.pattern.shape[1]
+    attached = [dof for one in whole.attachments for dof in one.places]
+    total = q + len(attached)
+    pattern = np.zeros((len(places.a) + len(places.b), total))
+    at_joint = [*places.at([f"A/{dof}" for dof in whole.a.joint]), *places.at([f"B/{dof}" for dof in whole.b.joint])]
+    pattern[at_joint, :q] = own.pattern
+    s, t = np.zeros((2, omega.size, total, total), np.complex128)
+    s[:, :q, :q], t[:, :q, :q] = own.s, own.t
+    rest = np.arange(q, total)
+    pattern[places.at(attached), rest] = 1
+    s[:, rest, rest] = 1
+    place = q
+    for one, values in zip(whole.attachments, numbers, strict=True):
+        for _ in one.places:
+            t[:, place, place] = attachment_factors(one, omega).T @ np.asarray(values)
+            place += 1
+    return Connection(pattern, s, t)
+
+
+def attachment_factors(one: Attachment, omega: FloatArray) -> ComplexArray:
+    """Return by what each number of an attachment enters its dynamic stiffness, shape (n_numbers, n_freq)."""
+    if isinstance(one, AddedMass):
+        return np.asarray([-(omega**2)], np.complex128)
+    return np.asarray([np.ones_like(omega), 1j * omega], np.complex128)

@@ -1,0 +1,214 @@
+"""From a prepared problem to numbers: starts, minimum, noise once more, covariance, tests."""
+
+from __future__ import annotations
+
+import itertools
+import warnings
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from jointfrf.errors import IllConditionedWarning
+from jointfrf.frf.noise_model import NoiseModel
+from jointfrf.identification.compliance_fit.line_forms import inverse_information
+from jointfrf.identification.model_fit.directions import OpenDirection, open_directions
+from jointfrf.identification.model_fit.likelihood import Likelihood
+from jointfrf.identification.model_fit.minimum import Minimum, minimise
+from jointfrf.identification.model_fit.prediction import Prediction
+from jointfrf.identification.model_fit.profile import ProfileIntervals
+from jointfrf.identification.model_fit.residual_check import ResidualTest, check_residual
+from jointfrf.identification.model_fit.starts import from_lines, ranked_trials, refined
+from jointfrf.identification.model_fit.unknowns import ParameterVector
+from jointfrf.kernel.arguments import ComplexArray, FloatArray
+
+__all__ = ["FoundModel", "ModelProblem", "fit_assembly"]
+
+#: A start is good whose minimum leaves a residual below this many times the noise.
+_GOOD = 1.1
+#: Starts that are followed to their minimum at most.
+_FOLLOWED = 4
+#: Reductions of the models are extended at most so many times.
+_REFINED = 3
+
+
+@dataclass(frozen=True)
+class ModelProblem:
+    """A fit, ready to be computed.
+
+    Attributes
+    ----------
+    prediction : Prediction
+    vector : ParameterVector
+    freq_hz : ndarray, shape (n_freq,)
+    measured : ndarray, shape (n_freq, n_o, n_i)
+        m/N; NaN where nothing is measured.
+    variance : ndarray, shape (n_freq, n_o, n_i)
+        E|e|^2, inf where nothing is measured.
+    smooth : ndarray, shape (n_freq, n_o, n_i)
+        Smooth FRFs.
+    inflation : float
+        Lines that carry the noise of one independent line.
+    noise : NoiseModel or None
+        None where the noise was told.
+    is_assumed : bool
+        Whether the level of the noise follows from the residual.
+    joint_channels : pair of list of int, or None
+        Responses and forces at the joint DOFs j, then k, where all are measured.
+    compliance_start : callable or None
+        Returns values of the joint from the compliance fit, or None.
+    """
+
+    prediction: Prediction
+    vector: ParameterVector
+    freq_hz: FloatArray
+    measured: ComplexArray
+    variance: FloatArray
+    smooth: ComplexArray
+    inflation: float
+    noise: NoiseModel | None
+    is_assumed: bool
+    joint_channels: tuple[list[int], list[int]] | None
+    compliance_start: Callable[[], FloatArray | None]
+
+    @property
+    def likelihood(self) -> Likelihood:
+        """The likelihood for this variance."""
+        return Likelihood.of_variance(self.prediction, self.vector, self.measured, self.variance, self.inflation)
+
+
+class FoundModel(NamedTuple):
+    """Result of `fit_assembly`.
+
+    Attributes
+    ----------
+    problem : ModelProblem
+        With the noise used in the end.
+    minimum : Minimum
+    values : ndarray
+        Of all parameters.
+    covariance : ndarray, shape (p, p)
+        Of the values of the free parameters.
+    intervals : ProfileIntervals
+    predicted : ndarray, shape (n_freq, n_o, n_i)
+    residual : ndarray, shape (n_freq, n_o, n_i)
+        Over the standard deviation of the noise; NaN where nothing is measured.
+    test : ResidualTest
+    directions : tuple of OpenDirection
+    other : float
+        Squares by which the next lowest minimum of another start is higher; inf where none was followed.
+    """
+
+    problem: ModelProblem
+    minimum: Minimum
+    values: FloatArray
+    covariance: FloatArray
+    intervals: ProfileIntervals
+    predicted: ComplexArray
+    residual: ComplexArray
+    test: ResidualTest
+    directions: tuple[OpenDirection, ...]
+    other: float
+
+
+def fit_assembly(problem: ModelProblem) -> FoundModel:
+    """Fit all free parameters by maximum likelihood."""
+    with warnings.catch_warnings(), np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+        warnings.simplefilter("ignore", IllConditionedWarning)
+        minimum, other = _lowest(problem)
+        for _ in range(_REFINED):
+            if not problem.prediction.refine(problem.vector, problem.vector.to_values(minimum.x)):
+                break
+            minimum = minimise(problem.likelihood, minimum.x)
+        for _ in range(2 if problem.is_assumed else 1):
+            changed = _with_noise_of_model(problem, minimum)
+            if changed is None:
+                break
+            problem = changed
+            minimum = minimise(problem.likelihood, minimum.x)
+        return _judged(problem, minimum, other)
+
+
+def _ratio(likelihood: Likelihood, minimum: Minimum, inflation: float) -> float:
+    """Return the residual over the noise."""
+    squares = minimum.cost - float((likelihood.vector.pulls(minimum.x) ** 2).sum())
+    count = float(likelihood.used.sum())
+    return float(np.sqrt(squares * inflation / max(2 * count - minimum.x.size, 1.0)))
+
+
+def _lowest(problem: ModelProblem) -> tuple[Minimum, float]:
+    """Return the lowest minimum of several starts, and by how much the next one is higher."""
+    likelihood, vector = problem.likelihood, problem.vector
+    given: list[FloatArray] = []
+    found: list[Minimum] = []
+    for values in itertools.chain(_values_of_lines(problem), [vector.values]):
+        given.append(values)
+        found.append(minimise(likelihood, vector.to_coordinates(values)))
+        if _ratio(likelihood, found[-1], problem.inflation) < _GOOD:
+            return found[-1], np.inf
+    trials = ranked_trials(likelihood, given)
+    for x in itertools.islice(refined(likelihood, trials), _FOLLOWED):
+        found.append(minimise(likelihood, x))
+        if _ratio(likelihood, found[-1], problem.inflation) < _GOOD and not problem.is_assumed:
+            break
+    best = min(found, key=lambda one: one.cost)
+    apart = [one.cost - best.cost for one in found if abs(one.x - best.x).max(initial=0) > 0.1 and one.cost > best.cost]
+    return best, min(apart, default=np.inf)
+
+
+def _values_of_lines(problem: ModelProblem) -> Iterator[FloatArray]:
+    """Yield values of all parameters from FRFs between all joint DOFs: of single lines, and of the compliance fit."""
+    if problem.joint_channels is None:
+        return
+    vector, joint = problem.vector, problem.prediction.whole.joint
+    own = vector.places_of("joint")
+    for values_of in (
+        lambda: from_lines(
+            joint, problem.prediction.omega, problem.smooth, problem.variance, problem.joint_channels or ([], [])
+        ),
+        problem.compliance_start,
+    ):
+        values = values_of()
+        if values is not None:
+            free = np.array([vector.all[i].is_free for i in own])
+            whole = vector.values.copy()
+            whole[own] = np.where(free, values, whole[own])
+            yield whole
+
+
+def _with_noise_of_model(problem: ModelProblem, minimum: Minimum) -> ModelProblem | None:
+    """Return the problem with noise relative to fitted FRFs where these fit, or of the level of the residual."""
+    likelihood = problem.likelihood
+    ratio = _ratio(likelihood, minimum, problem.inflation)
+    if problem.is_assumed:
+        return None if abs(ratio - 1) < 1e-3 else replace(problem, variance=problem.variance * ratio**2)
+    noise = problem.noise
+    if noise is None or noise.source != "residual" or ratio > _GOOD or noise.coherence_factor.any():
+        return None
+    predicted = problem.prediction.frfs(problem.vector, problem.vector.to_values(minimum.x))
+    parts = [noise.relative**2 * abs(h) ** 2 + noise.floor**2 for h in (predicted, problem.smooth)]
+    usable = np.isfinite(problem.variance) & (parts[0] > 0) & (parts[1] > 0)
+    share = np.where(usable, parts[0] / np.where(usable, parts[1], 1), 1)
+    return replace(problem, variance=problem.variance * share, smooth=predicted)
+
+
+def _judged(problem: ModelProblem, minimum: Minimum, other: float) -> FoundModel:
+    """Return covariance, intervals and tests at a minimum."""
+    likelihood, vector = problem.likelihood, problem.vector
+    values = vector.to_values(minimum.x)
+    predicted = problem.prediction.frfs(vector, values)
+    std = np.sqrt(np.where(likelihood.used, problem.variance, np.nan))
+    residual = (likelihood.measured - predicted) / std
+    test = check_residual(
+        residual, problem.freq_hz, vector.pulls(minimum.x),
+        parameters=minimum.x.size, inflation=problem.inflation, is_told=problem.noise is None,
+    )  # fmt: skip
+    factor = max(1.0, test.ratio**2) if test.ratio > 1 + 3 * test.sigma else 1.0
+    own = inverse_information(minimum.information)
+    slope = vector.slope(minimum.x)
+    covariance = own * factor * np.outer(slope, slope)
+    return FoundModel(
+        problem, minimum, values, covariance, ProfileIntervals(likelihood, minimum, own, factor), predicted, residual,
+        test, open_directions(vector, minimum.x, minimum.information), other,
+    )  # fmt: skip

@@ -1,0 +1,114 @@
+"""From any measured FRFs and models of the substructures to a joint: the door to the fit of a model."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping, Sequence
+
+from numpy.typing import ArrayLike
+
+from jointfrf.identification.model_fit.assembly import Assembly
+from jointfrf.identification.model_fit.describe import describe_model
+from jointfrf.identification.model_fit.fit import fit_assembly
+from jointfrf.identification.model_fit.model_fit import ModelFit
+from jointfrf.identification.model_fit.prepare import ChannelNoise, Channels, prepare_model_fit
+from jointfrf.identification.model_fit.unknown import Unknown
+
+__all__ = ["identify_model"]
+
+
+def identify_model(
+    freq_hz: ArrayLike,
+    h: ArrayLike,
+    assembly: Assembly,
+    responses: Sequence[str],
+    forces: Sequence[str],
+    *,
+    response_gains: Mapping[str, Unknown] | None = None,
+    force_gains: Mapping[str, Unknown] | None = None,
+    fixed: Sequence[str] = (),
+    noise: float | ArrayLike | None = None,
+    coherence: ArrayLike | None = None,
+    averages: float | None = None,
+) -> ModelFit:
+    """Identify a joint from any measured FRFs of the assembly, given its substructures as models or FRFs.
+
+    `identify` needs all FRFs between the joint DOFs, and no model; this needs models, and any FRFs: remote points,
+    translations only, one shaker position.
+
+    Parameters
+    ----------
+    freq_hz : array_like, shape (n_freq,)
+        Hz.
+    h : array_like, shape (n_freq, n_responses, n_forces)
+        Measured receptances, m/N; NaN on all lines for an FRF that was not measured.
+    assembly : Assembly
+        Substructures, joint with its laws, masses and springs attached; with what is unknown of them.
+    responses, forces : sequence of str
+        DOFs ``"A/..."`` or ``"B/..."`` of the channels.
+    response_gains, force_gains : mapping of str to Unknown, optional
+        Calibration factors of channels that are not exactly 1: measured = factor times true.
+    fixed : sequence of str
+        Parameters of the joint that keep the value they have in `assembly`, such as ``"c_y"``.
+    noise : float or array_like, shape of h, optional
+        Relative noise level of each FRF, or E|e|^2 of each, (m/N)^2. By default it is found, as `estimate_noise` does.
+    coherence, averages : optional
+        As in `estimate_noise`, where `noise` is not given.
+
+    Returns
+    -------
+    ModelFit
+        Parameters of the joint and the unknowns, their intervals, correlations, and whether the residual is noise.
+
+    Raises
+    ------
+    ValueError
+        Wrong shapes or names; NaN or Inf in a line; an unknown that there is not; fewer numbers than unknowns.
+    SingularLineError
+        An undamped substructure resonates at a line.
+
+    Warns
+    -----
+    IdentificationWarning
+        The residual is more than noise, with where; a parameter is poorly determined, or a combination of them.
+    ConvergenceWarning
+        The fit did not converge.
+
+    Notes
+    -----
+    Maximum likelihood for circular noise and normal priors. Models are reduced once; derivatives of the FRFs are
+    -H dZ H in the reduced model, those of matrices that a function builds by differences of the fourth order. The start
+    is K* of the smooth FRFs and the compliance fit where the FRFs between all joint DOFs are among those measured, else
+    the best of many trials. Noise that is relative is taken relative to the fitted FRFs in the end. Intervals by
+    profile likelihood.
+
+    The price of a model is its error: 1 % of Young's modulus or of a length may move a stiffness by 20 %. What is not
+    exactly known of the models must be among the unknowns. An error that none of these describes shows in the residual,
+    and a warning says at which frequencies and in which channels, or in a prior that the FRFs deny.
+
+    FRFs of a substructure are taken as exact.
+
+    Examples
+    --------
+    One driving point far from the joint; Young's modulus of the left chain is known to 2 %:
+
+    >>> import numpy as np, jointfrf as jf
+    >>> freq = np.linspace(0.5, 10, 400)
+    >>> a = jf.Substructure(jf.chain([5, 3], [2500, 3500], [3, 4], ground="start"), ["2:x"],
+    ...                     {"youngs_modulus": jf.Unknown(1.0, 0.02)})
+    >>> b = jf.Substructure(jf.chain([4, 2], [2000, 2500], [2, 1], ground="end"), ["1:x"])
+    >>> truth = jf.Assembly(a, b, jf.Joint([2000.0], [3.0], dofs=["x"]))
+    >>> h = jf.pollute(truth.receptance(freq, ["A/1:x"], ["A/1:x"]), 0.05, seed=2)
+    >>> guess = jf.Assembly(a, b, jf.Joint([100.0], [1.0], dofs=["x"]))
+    >>> fit = jf.identify_model(freq, h, guess, ["A/1:x"], ["A/1:x"])
+    >>> low, high = fit.confidence_interval(0.95)["k_x"]
+    >>> bool(low < 2000 < high), bool(high - low < 200), fit.test.is_noise
+    (True, True, True)
+    """
+    channels = Channels(tuple(responses), tuple(forces), dict(response_gains or {}), dict(force_gains or {}))
+    told = ChannelNoise(noise, coherence, averages)
+    problem = prepare_model_fit(freq_hz, h, assembly, channels, told, fixed)
+    described = describe_model(fit_assembly(problem), channels)
+    for warning in described.warnings:
+        warnings.warn(warning, stacklevel=2)
+    return described.fit

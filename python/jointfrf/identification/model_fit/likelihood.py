@@ -1,0 +1,151 @@
+"""Squares to be minimised: residuals of the FRFs over their noise, and how far priors are off."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointfrf.identification.model_fit.prediction import Prediction
+from jointfrf.identification.model_fit.unknowns import ParameterVector
+from jointfrf.kernel.arguments import ComplexArray, FloatArray
+
+__all__ = ["Likelihood", "Linearised", "LogLikelihood", "Squares"]
+
+
+class Linearised(NamedTuple):
+    """Squares about a point: cost, half of their second derivatives, and minus half of their first.
+
+    Attributes
+    ----------
+    cost : float
+    information : ndarray, shape (p, p)
+    gradient : ndarray, shape (p,)
+    """
+
+    cost: float
+    information: FloatArray
+    gradient: FloatArray
+
+
+class Squares(Protocol):
+    """A sum of squares of the coordinates of the free parameters."""
+
+    @property
+    def vector(self) -> ParameterVector:
+        """The parameters."""
+
+    def cost(self, x: FloatArray) -> float:
+        """Return the sum."""
+
+    def linearised(self, x: FloatArray) -> Linearised:
+        """Return it with its derivatives."""
+
+
+@dataclass(frozen=True)
+class Likelihood:
+    """-2 log likelihood of measured FRFs with circular noise, and of priors, but for a constant.
+
+    Attributes
+    ----------
+    prediction : Prediction
+    vector : ParameterVector
+    measured : ndarray, shape (n_freq, n_o, n_i)
+        m/N.
+    inverse_std : ndarray, shape (n_freq, n_o, n_i)
+        sqrt(2 / E|e|^2) over the root of the inflation; 0 for what is not measured.
+    """
+
+    prediction: Prediction
+    vector: ParameterVector
+    measured: ComplexArray
+    inverse_std: FloatArray
+
+    @classmethod
+    def of_variance(
+        cls,
+        prediction: Prediction,
+        vector: ParameterVector,
+        measured: ComplexArray,
+        variance: FloatArray,
+        inflation: float,
+    ) -> Likelihood:
+        """Return the likelihood for noise of this variance E|e|^2, infinite where nothing is measured."""
+        usable = np.isfinite(variance) & (variance > 0)
+        inverse = np.sqrt(2 / (inflation * np.where(usable, variance, 1)))
+        return cls(prediction, vector, np.where(usable, measured, 0), np.where(usable, inverse, 0))
+
+    @property
+    def used(self) -> NDArray[np.bool_]:
+        """What is measured, shape (n_freq, n_o, n_i)."""
+        return self.inverse_std > 0
+
+    def residual(self, x: FloatArray) -> ComplexArray:
+        """Return measured minus predicted over sqrt(E|e|^2 / 2 inflation), shape (n_freq, n_o, n_i)."""
+        y = self.prediction.frfs(self.vector, self.vector.to_values(x))
+        return (self.measured - y) * self.inverse_std
+
+    def cost(self, x: FloatArray) -> float:
+        """Return the sum of the squares; inf where a line is singular."""
+        squares = _squares(self.residual(x)) + float((self.vector.pulls(x) ** 2).sum())
+        return squares if np.isfinite(squares) else np.inf
+
+    def linearised(self, x: FloatArray) -> Linearised:
+        """Return the squares with information and gradient."""
+        y, slopes = self.prediction.linearised(self.vector, self.vector.to_values(x))
+        residual = ((self.measured - y) * self.inverse_std).ravel()
+        flat = (slopes * self.inverse_std).reshape(len(slopes), -1) * self.vector.slope(x)[:, None]
+        return _with_priors(self.vector, x, residual, flat)
+
+
+@dataclass(frozen=True)
+class LogLikelihood:
+    """Squares of ln(measured / predicted), with a common level: broad minima, for FRFs whose resonances are far off.
+
+    Attributes
+    ----------
+    prediction, vector, measured
+        As of `Likelihood`.
+    weight : ndarray, shape (n_freq, n_o, n_i)
+        1 over the standard deviation taken; 0 for what is not measured.
+    """
+
+    prediction: Prediction
+    vector: ParameterVector
+    measured: ComplexArray
+    weight: FloatArray
+
+    def cost(self, x: FloatArray) -> float:
+        """Return the sum of the squares."""
+        y = self.prediction.frfs(self.vector, self.vector.to_values(x))
+        squares = _squares(self.log_ratio(y) * self.weight) + float((self.vector.pulls(x) ** 2).sum())
+        return squares if np.isfinite(squares) else np.inf
+
+    def log_ratio(self, y: ComplexArray) -> ComplexArray:
+        """Return ln(measured / predicted), 0 where there is no FRF."""
+        known = (self.weight > 0) & (self.measured != 0) & (y != 0)
+        return np.log(np.where(known, self.measured, 1) / np.where(known, y, 1))
+
+    def linearised(self, x: FloatArray) -> Linearised:
+        """Return the squares with information and gradient."""
+        y, slopes = self.prediction.linearised(self.vector, self.vector.to_values(x))
+        residual = (self.log_ratio(y) * self.weight).ravel()
+        flat = (slopes * (self.weight / np.where(y == 0, 1, y))).reshape(len(slopes), -1)
+        return _with_priors(self.vector, x, residual, flat * self.vector.slope(x)[:, None])
+
+
+def _squares(residual: ComplexArray) -> float:
+    with np.errstate(all="ignore"):
+        return float((residual.real**2 + residual.imag**2).sum())
+
+
+def _with_priors(vector: ParameterVector, x: FloatArray, residual: ComplexArray, flat: ComplexArray) -> Linearised:
+    """Return the squares of FRFs and priors; `flat` holds the derivatives of predicted FRFs over noise, (p, n)."""
+    pulls, slopes = vector.pulls(x), vector.pull_slopes(x)
+    real = flat.view(np.float64)
+    information = real @ real.T + np.diag(slopes**2)
+    gradient = real @ np.ascontiguousarray(residual).view(np.float64) - slopes * pulls
+    cost = _squares(residual) + float((pulls**2).sum())
+    return Linearised(cost if np.isfinite(cost) else np.inf, information, gradient)

@@ -1,0 +1,170 @@
+"""What a fit of a model found, with its uncertainty."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from jointfrf.identification.model_fit.assembly import Assembly
+from jointfrf.identification.model_fit.directions import OpenDirection
+from jointfrf.identification.model_fit.residual_check import ResidualTest
+from jointfrf.identification.model_fit.unknowns import FitParameter
+from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.laws.law_joint import LawJoint
+
+__all__ = ["ModelFit"]
+
+
+@dataclass(frozen=True)
+class ModelFit:
+    """Parameters of a joint and unknowns of the models, found together, and their uncertainty.
+
+    Attributes
+    ----------
+    assembly : Assembly
+        What was fitted.
+    joint : LawJoint
+        The joint found.
+    parameters : dict of str to float
+        Free parameters in the order of the covariance: those of the joint (``"k_y"``, ``"tau_y"``), then unknowns
+        (``"A/youngs_modulus"``, ``"mass A/151:y"``, ``"gain of response B/226:y"``).
+    covariance : ndarray, shape (p, p)
+        Covariance of the parameters, priors included.
+    fitted : tuple of FitParameter
+        The free parameters: units, priors, limits.
+    noise_level, residual_level : float
+        Median of the noise relative to the FRFs, and what the residual shows of it.
+    freq_hz : ndarray, shape (n_freq,)
+        Hz.
+    responses, forces : tuple of str
+        Channels.
+    predicted : ndarray, shape (n_freq, n_o, n_i)
+        FRFs of the assembly found, m/N.
+    residual : ndarray, shape (n_freq, n_o, n_i)
+        Measured minus predicted over the standard deviation of the noise; NaN where nothing was measured.
+    test : ResidualTest
+        Whether the residual is noise.
+    open_directions : tuple of OpenDirection
+        What the FRFs do not hold.
+    is_converged : bool
+    warnings : tuple of str
+        What a reader must know before using the numbers.
+    notes : tuple of str
+        How the numbers came about.
+    intervals : callable
+        From a probability to the interval of each parameter.
+    """
+
+    assembly: Assembly
+    joint: LawJoint
+    parameters: dict[str, float]
+    covariance: FloatArray
+    fitted: tuple[FitParameter, ...]
+    noise_level: float
+    residual_level: float
+    freq_hz: FloatArray
+    responses: tuple[str, ...]
+    forces: tuple[str, ...]
+    predicted: ComplexArray = field(repr=False)
+    residual: ComplexArray = field(repr=False)
+    test: ResidualTest
+    open_directions: tuple[OpenDirection, ...]
+    is_converged: bool
+    intervals: Callable[[float], dict[str, tuple[float, float]]] = field(repr=False, compare=False)
+    warnings: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @property
+    def joint_parameters(self) -> dict[str, float]:
+        """Those of the parameters that belong to the joint."""
+        return {one.name: self.parameters[one.name] for one in self.fitted if one.origin == "joint"}
+
+    @property
+    def std_error(self) -> dict[str, float]:
+        """Standard error of each parameter, in its unit."""
+        errors = np.sqrt(np.maximum(np.diagonal(self.covariance), 0))
+        return dict(zip(self.parameters, errors.tolist(), strict=True))
+
+    @property
+    def correlation(self) -> FloatArray:
+        """Correlation of the errors of all parameters, shape (p, p)."""
+        size = np.sqrt(np.maximum(np.diagonal(self.covariance), np.finfo(float).tiny))
+        return np.asarray(self.covariance / np.outer(size, size))
+
+    def confidence_interval(self, probability: float = 0.95) -> dict[str, tuple[float, float]]:
+        """Interval that contains the true parameter with the given probability, by profile likelihood.
+
+        Raises
+        ------
+        ValueError
+            The probability is not between 0 and 1.
+        """
+        if not 0 < probability < 1:
+            raise ValueError(f"probability must lie between 0 and 1, not {probability}")
+        return self.intervals(probability)
+
+    def k_joint(self, freq_hz: ArrayLike) -> ComplexArray:
+        """Complex joint stiffness found, shape (n_freq, n, n), N/m, rotational N m/rad."""
+        return self.joint.dynamic_stiffness(freq_hz)
+
+    def unit(self, parameter: str) -> str:
+        """Return the unit of a parameter."""
+        return next(one.unit for one in self.fitted if one.name == parameter)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything but the lines, as plain numbers and text, ready for JSON (an open interval ends at None)."""
+        intervals, errors = self.confidence_interval(0.95), self.std_error
+
+        def plain(number: float) -> float | None:
+            return float(number) if np.isfinite(number) else None
+
+        return {
+            "method": "model",
+            "dofs": list(self.joint.dofs),
+            "rigid": list(self.joint.rigid),
+            "parameters": {
+                one.name: {
+                    "value": float(self.parameters[one.name]),
+                    "unit": one.unit,
+                    "std_error": plain(errors[one.name]),
+                    "confidence_interval_95": [plain(limit) for limit in intervals[one.name]],
+                    "prior": None if one.std is None else [one.value, one.std],
+                }
+                for one in self.fitted
+            },
+            "correlation": [[float(value) for value in row] for row in self.correlation],
+            "noise_level": plain(self.noise_level),
+            "residual_level": plain(self.residual_level),
+            "residual_is_noise": self.test.is_noise,
+            "frequency_hz": [float(self.freq_hz.min()), float(self.freq_hz.max())],
+            "n_lines": int(self.freq_hz.size),
+            "responses": list(self.responses),
+            "forces": list(self.forces),
+            "warnings": list(self.warnings),
+            "notes": list(self.notes),
+        }
+
+    def __str__(self) -> str:
+        """Return a table of the parameters with their intervals, and the warnings."""
+        intervals, errors = self.confidence_interval(0.95), self.std_error
+        rows = [("parameter", "value", "std error", "95 % interval", "prior", "unit")]
+        for one in self.fitted:
+            value = self.parameters[one.name]
+            low, high = intervals[one.name]
+            prior = "" if one.std is None else f"{one.value:.4g} +- {one.std:.2g}"
+            error = f"{errors[one.name]:.2g}"
+            rows.append((one.name, f"{value:.5g}", error, f"{low:.4g} .. {high:.4g}", prior, one.unit))
+        widths = [max(len(row[i]) for row in rows) for i in range(6)]
+        lines = ["  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in rows]
+        lines.insert(1, "-" * max(map(len, lines)))
+        span = f"{self.freq_hz.min():g} to {self.freq_hz.max():g} Hz, {self.freq_hz.size} lines"
+        head = [
+            f"method model, {span}, {len(self.responses)} responses x {len(self.forces)} forces",
+            f"noise {100 * self.noise_level:.2g} %, residual {100 * self.residual_level:.2g} % of the FRFs",
+        ]
+        tail = [f"note: {text}" for text in self.notes] + [f"warning: {text}" for text in self.warnings]
+        return "\n".join([*head, "", *lines, *([""] if tail else []), *tail])

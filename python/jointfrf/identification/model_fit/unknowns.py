@@ -1,0 +1,239 @@
+"""All parameters of a fit in one vector, and the coordinates in which they are sought."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointfrf.identification.model_fit.assembly import Assembly
+from jointfrf.identification.model_fit.attachments import Attachment
+from jointfrf.identification.model_fit.reduced import range_of
+from jointfrf.identification.model_fit.substructure import Substructure
+from jointfrf.identification.model_fit.unknown import Unknown
+from jointfrf.kernel.arguments import FloatArray
+from jointfrf.laws.law_joint import JointQuantity
+
+__all__ = ["FitParameter", "ParameterOrigin", "ParameterVector", "parameter_vector"]
+
+#: What a parameter belongs to.
+ParameterOrigin = Literal["joint", "A", "B", "attachment", "response", "force"]
+
+#: Units of unknowns of models by their usual names.
+_UNITS = {
+    "youngs_modulus": "N/m^2", "density": "kg/m^3", "loss_factor": "1", "length": "m", "width": "m", "height": "m",
+    "poisson": "1",
+}  # fmt: skip
+#: Stiffnesses of the joint are sought within this factor of the stiffness that the substructures have there.
+_WIDEST = 1e6
+
+
+class FitParameter(NamedTuple):
+    """One parameter of a fit.
+
+    Attributes
+    ----------
+    name, unit : str
+    origin : str
+        What it belongs to.
+    place : tuple
+        Where it stands there: its number in the joint; number of the attachment and of its number; name of an unknown;
+        number of a channel.
+    value : float
+        Where the fit may start, and the mean of the prior.
+    std : float or None
+        Standard deviation of the prior.
+    lower, upper : float
+    is_log : bool
+        Whether it is sought as its logarithm.
+    is_free : bool
+        Whether it is fitted.
+    """
+
+    name: str
+    unit: str
+    origin: ParameterOrigin
+    place: tuple[int | str, ...]
+    value: float
+    std: float | None
+    lower: float
+    upper: float
+    is_log: bool
+    is_free: bool
+
+
+@dataclass(frozen=True)
+class ParameterVector:
+    """The parameters of a fit; vectors hold the values of all, coordinates those of the free ones.
+
+    Attributes
+    ----------
+    all : tuple of FitParameter
+    """
+
+    all: tuple[FitParameter, ...]
+
+    @cached_property
+    def free(self) -> NDArray[np.intp]:
+        """Places of the free parameters among all."""
+        return np.array([i for i, one in enumerate(self.all) if one.is_free], np.intp)
+
+    @property
+    def fitted(self) -> tuple[FitParameter, ...]:
+        """The free parameters."""
+        return tuple(self.all[i] for i in self.free)
+
+    @cached_property
+    def values(self) -> FloatArray:
+        """Values of all to begin with."""
+        return np.array([one.value for one in self.all])
+
+    @cached_property
+    def is_log(self) -> NDArray[np.bool_]:
+        """Which of the free ones are sought as logarithms."""
+        return np.array([one.is_log for one in self.fitted], bool)
+
+    @cached_property
+    def scale(self) -> FloatArray:
+        """Unit of the coordinate of each free one that is not a logarithm."""
+        return np.array([one.std or abs(one.value) or 1.0 for one in self.fitted])
+
+    def to_coordinates(self, values: FloatArray) -> FloatArray:
+        """Return the coordinates of values of all."""
+        own = values[self.free]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            logs = np.log(np.where(self.is_log, own, 1))
+        return np.asarray(np.clip(np.where(self.is_log, logs, own / self.scale), *self.bounds))
+
+    def to_values(self, x: FloatArray) -> FloatArray:
+        """Return the values of all from coordinates."""
+        values = self.values.copy()
+        values[self.free] = self._own(x)
+        return values
+
+    def _own(self, x: FloatArray) -> FloatArray:
+        found: FloatArray = np.where(self.is_log, np.exp(np.where(self.is_log, x, 0)), x * self.scale)
+        return np.asarray(np.clip(found, self.limits[0], self.limits[1]))
+
+    def slope(self, x: FloatArray) -> FloatArray:
+        """Return the derivatives of the free values by their coordinates."""
+        found: FloatArray = np.where(self.is_log, self._own(x), self.scale)
+        return found
+
+    @cached_property
+    def limits(self) -> tuple[FloatArray, FloatArray]:
+        """Smallest and largest values of the free ones."""
+        return np.array([one.lower for one in self.fitted]), np.array([one.upper for one in self.fitted])
+
+    @cached_property
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        """The same in coordinates."""
+        lower, upper = self.limits
+        with np.errstate(divide="ignore"):
+            logs = [np.log(np.where(self.is_log, np.maximum(limit, 0), 1)) for limit in (lower, upper)]
+        return np.where(self.is_log, logs[0], lower / self.scale), np.where(self.is_log, logs[1], upper / self.scale)
+
+    @cached_property
+    def has_prior(self) -> NDArray[np.bool_]:
+        """Which of the free ones have a prior."""
+        return np.array([one.std is not None for one in self.fitted], bool)
+
+    def pulls(self, x: FloatArray) -> FloatArray:
+        """Return by how many standard deviations of its prior each free value is off; 0 without one."""
+        std = np.array([one.std or np.inf for one in self.fitted])
+        found: FloatArray = (self._own(x) - self.values[self.free]) / std
+        return found
+
+    def pull_slopes(self, x: FloatArray) -> FloatArray:
+        """Return their derivatives by the coordinates."""
+        std = np.array([one.std or np.inf for one in self.fitted])
+        return np.asarray(self.slope(x) / std)
+
+    def places_of(self, origin: ParameterOrigin) -> list[int]:
+        """Return the places, among all, of the parameters of an origin."""
+        return [i for i, one in enumerate(self.all) if one.origin == origin]
+
+    def of_joint(self) -> ParameterVector:
+        """Return the same with the parameters of the joint free only."""
+        return ParameterVector(tuple(one._replace(is_free=one.is_free and one.origin == "joint") for one in self.all))
+
+
+def parameter_vector(
+    whole: Assembly,
+    gains: tuple[Mapping[int, tuple[str, Unknown]], Mapping[int, tuple[str, Unknown]]],
+    fixed: Sequence[str],
+    joint_stiffness: FloatArray,
+) -> ParameterVector:
+    """Put all parameters of an assembly and its channels together.
+
+    Parameters
+    ----------
+    whole : Assembly
+    gains : pair of mappings of int to (str, Unknown)
+        Factors of responses and of forces, by the number of the channel: its name and factor.
+    fixed : sequence of str
+        Parameters of the joint that keep their value.
+    joint_stiffness : ndarray, shape (n,)
+        Dynamic stiffness that the substructures have at the joint DOFs: stiffnesses of the joint are sought around it.
+
+    Raises
+    ------
+    ValueError
+        `fixed` names what is no parameter of the joint.
+    """
+    names = whole.joint.names
+    for name in fixed:
+        if name not in names:
+            raise ValueError(f"fixed names {name!r}, which is no parameter of the joint: {', '.join(names)}")
+    size = dict(zip(whole.joint.dofs, joint_stiffness.tolist(), strict=True))
+    found = [_of_joint(one, i, one.name not in fixed, size) for i, one in enumerate(whole.joint.quantities)]
+    sides: tuple[tuple[ParameterOrigin, Substructure], ...] = (("A", whole.a), ("B", whole.b))
+    for side, part in sides:
+        for name, unknown in part.unknowns.items():
+            lower, upper = range_of(part, unknown)
+            own = _of_unknown(f"{side}/{name}", _UNITS.get(name, ""), side, (name,), unknown)
+            found.append(own._replace(lower=lower, upper=upper))
+    for i, one in enumerate(whole.attachments):
+        found += _of_attachment(one, i)
+    words: tuple[ParameterOrigin, ParameterOrigin] = ("response", "force")
+    for origin, of_channels in zip(words, gains, strict=True):
+        for place, (channel, unknown) in of_channels.items():
+            found.append(_of_unknown(f"gain of {origin} {channel}", "1", origin, (place,), unknown))
+    return ParameterVector(tuple(found))
+
+
+def _of_joint(one: JointQuantity, place: int, is_free: bool, size: Mapping[str, float]) -> FitParameter:
+    """Return a parameter of the joint; a stiffness or a time that cannot be negative is sought as its logarithm."""
+    kind, lower, upper = one.field.kind, one.field.lower, one.field.upper
+    is_log = kind in ("stiffness", "time") and lower >= 0
+    if is_log and kind == "stiffness":
+        dof = one.name.partition("_")[2]
+        known = next((value for name, value in size.items() if dof == name or dof.endswith(f"_{name}")), one.value)
+        lower, upper = max(lower, min(known, one.value or known) / _WIDEST), min(upper, max(known, one.value) * _WIDEST)
+    if is_log and kind == "time":
+        upper = min(upper, max(1e3, 10 * one.value))
+    value = float(np.clip(one.value, lower, upper))
+    return FitParameter(one.name, one.unit, "joint", (place,), value, None, lower, upper, is_log, is_free)
+
+
+def _of_unknown(
+    name: str, unit: str, origin: ParameterOrigin, place: tuple[int | str, ...], unknown: Unknown
+) -> FitParameter:
+    return FitParameter(
+        name, unit, origin, place, unknown.value, unknown.std, unknown.lower, unknown.upper, False, True
+    )
+
+
+def _of_attachment(one: Attachment, place: int) -> list[FitParameter]:
+    found = []
+    for i, (name, unit, number) in enumerate(zip(one.names, one.units, one.numbers, strict=True)):
+        if isinstance(number, Unknown):
+            found.append(_of_unknown(name, unit, "attachment", (place, i), number))
+        else:
+            fixed = FitParameter(name, unit, "attachment", (place, i), number, None, -np.inf, np.inf, False, False)
+            found.append(fixed)
+    return found

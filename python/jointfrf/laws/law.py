@@ -1,0 +1,177 @@
+"""A law of a joint DOF: K*(w) from a few parameters, its derivatives, and values to start a fit from."""
+
+from __future__ import annotations
+
+import itertools
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from typing import Literal, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_real
+
+__all__ = ["FieldKind", "JointLaw", "LawField"]
+
+#: What a parameter of a law is; it sets the unit.
+FieldKind = Literal["stiffness", "damping", "time", "number"]
+
+#: By how much a value that starts a fit stays inside its bounds, as a share of it.
+_INSIDE = 1e-6
+
+
+class LawField(NamedTuple):
+    """A parameter of a law.
+
+    Attributes
+    ----------
+    name : str
+        Such as ``"k"`` or ``"tau"``.
+    kind : {"stiffness", "damping", "time", "number"}
+        In K*(w) a stiffness and a damping are factors; a time and a number are not.
+    lower, upper : float
+        Smallest and largest value.
+    """
+
+    name: str
+    kind: FieldKind
+    lower: float = -np.inf
+    upper: float = np.inf
+
+    def unit(self, rotations: int) -> str:
+        """Return the unit between two DOFs of which so many (0, 1, 2) are rotations."""
+        if self.kind in ("time", "number"):
+            return "s" if self.kind == "time" else "1"
+        return (("N/m", "N", "N m/rad"), ("N s/m", "N s", "N m s/rad"))[self.kind == "damping"][rotations]
+
+    @property
+    def is_factor(self) -> bool:
+        """Whether K*(w) is proportional to it, the others but its like being zero."""
+        return self.kind in ("stiffness", "damping")
+
+
+class JointLaw(ABC):
+    """K*(w) between one DOF of A and one of B, from a few parameters.
+
+    A law has `fields`, their `values`, and computes K*(w) and its derivatives; laws do not change, `with_values` makes
+    another one.
+    """
+
+    @property
+    @abstractmethod
+    def fields(self) -> tuple[LawField, ...]:
+        """The parameters: names, kinds and bounds."""
+
+    @property
+    @abstractmethod
+    def values(self) -> FloatArray:
+        """Values of the parameters, shape (p,)."""
+
+    @abstractmethod
+    def with_values(self, values: ArrayLike) -> Self:
+        """Return the same law with other values of its parameters, shape (p,)."""
+
+    @abstractmethod
+    def stiffness(self, omega: FloatArray) -> ComplexArray:
+        """Return K*(w) at angular frequencies in rad/s, shape (n_freq,), N/m."""
+
+    @abstractmethod
+    def slopes(self, omega: FloatArray) -> ComplexArray:
+        """Return the derivatives of K*(w) by each parameter, shape (p, n_freq)."""
+
+    @property
+    def constant_terms(self) -> tuple[float, float, float] | None:
+        """(k, c, h) of K* = k + i h + i w c where the law is that, else None."""
+        return None
+
+    def trial_numbers(self, omega: FloatArray) -> list[list[float]]:
+        """Values from which a fit may start, a list for each field that is no factor, in their order."""
+        low, high = float(omega.min()), float(omega.max())
+        choices = []
+        for field, value in zip(self.fields, self.values, strict=True):
+            if field.kind == "time":
+                choices.append(np.geomspace(0.1 / high, 10 / max(low, 1e-3 * high), 17).tolist())
+            elif field.kind == "number":
+                bounded = np.isfinite(field.lower) and np.isfinite(field.upper)
+                share = np.array([0.2, 0.35, 0.5, 0.65, 0.8]) if bounded else np.zeros(0)
+                choices.append([value, *(field.lower + share * (field.upper - field.lower)).tolist()])
+        return choices
+
+    def started(self, omega: FloatArray, k_lines: ComplexArray, weight: FloatArray | None = None) -> Self:
+        """Return the law with values that come near to K*(w) of single lines.
+
+        Parameters
+        ----------
+        omega : ndarray, shape (n_freq,)
+            rad/s.
+        k_lines : ndarray, shape (n_freq,)
+            K*(w) of each line by itself, N/m; NaN does not count.
+        weight : ndarray, shape (n_freq,), optional
+            1 over the variance of each line; 1 by default.
+
+        Notes
+        -----
+        Times and numbers are tried on a grid; factors follow by linear least squares, inside their bounds.
+        """
+        known = np.isfinite(k_lines)
+        if not known.any():
+            return self
+        own_omega, target = omega[known], k_lines[known]
+        root = np.ones(target.size) if weight is None else np.sqrt(weight[known])
+        fields, best, least = self.fields, self, np.inf
+        factors = [i for i, field in enumerate(fields) if field.is_factor]
+        others = [i for i, field in enumerate(fields) if not field.is_factor]
+        for numbers in itertools.product(*self.trial_numbers(own_omega)):
+            values = np.zeros(len(fields))
+            values[others] = numbers
+            basis = np.array([self._of_one(values, i).stiffness(own_omega) for i in factors]).T * root[:, None]
+            solved = _least_squares(basis, target * root)
+            values[factors] = [
+                _within(value, fields[i], float(np.median(abs(target))))
+                for i, value in zip(factors, solved, strict=True)
+            ]
+            trial = self.with_values(values)
+            misfit = float((abs((trial.stiffness(own_omega) - target) * root) ** 2).sum())
+            if misfit < least:
+                best, least = trial, misfit
+        return best
+
+    def _of_one(self, values: FloatArray, i: int) -> Self:
+        """Return the law with one factor of 1, the others as small as they may be."""
+        own = values.copy()
+        for place, field in enumerate(self.fields):
+            if field.is_factor:
+                own[place] = 1.0 if place == i else max(field.lower, 0.0)
+        return self.with_values(own)
+
+
+def _least_squares(basis: ComplexArray, target: ComplexArray) -> FloatArray:
+    """Return real factors of complex columns."""
+    both = np.concatenate([basis.real, basis.imag]), np.concatenate([target.real, target.imag])
+    size = np.maximum(np.linalg.norm(both[0], axis=0), np.finfo(float).tiny)
+    found: FloatArray = np.linalg.lstsq(both[0] / size, both[1], rcond=None)[0] / size
+    return found
+
+
+def _within(value: float, field: LawField, size: float) -> float:
+    """Return a value inside the bounds of its field, above zero by a share of a size where zero is a bound."""
+    low = field.lower
+    if np.isfinite(low):
+        low += 1e-3 * size if field.kind == "stiffness" else _INSIDE * abs(low)
+    return float(np.clip(value, low, field.upper - _INSIDE * abs(field.upper) if np.isfinite(field.upper) else np.inf))
+
+
+def checked_values(law: str, fields: Sequence[LawField], values: ArrayLike) -> FloatArray:
+    """Check values of the parameters of a law.
+
+    Raises
+    ------
+    ValueError
+        A wrong number of them, NaN or Inf, or a value outside its bounds.
+    """
+    found = as_real("values", values, (len(fields),))
+    for field, value in zip(fields, found, strict=True):
+        if not field.lower <= value <= field.upper:
+            raise ValueError(f"{field.name} of {law} must lie in {field.lower:g} to {field.upper:g}, not {value:g}")
+    return found

@@ -1,0 +1,343 @@
+"""A joint of laws: one for each DOF, cross terms, masses, DOFs that are rigid."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from jointfrf.dofs import is_rotation
+from jointfrf.io.cards import CardFormat
+from jointfrf.joint import Joint
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_frequency, as_number, as_real
+from jointfrf.kernel.linear_algebra import invert
+from jointfrf.laws.joint_cards import joint_cards
+from jointfrf.laws.law import JointLaw, LawField
+from jointfrf.laws.springs import SpringLaw
+
+__all__ = ["Connection", "JointQuantity", "LawJoint"]
+
+#: The mass of a joint DOF, half of it on either side.
+_MASS = LawField("m", "number", 0.0)
+
+
+class JointQuantity(NamedTuple):
+    """A number of a joint.
+
+    Attributes
+    ----------
+    name : str
+        Field and DOF, ``"k_y"``; of a cross term ``"k_y,theta"``.
+    field : LawField
+    unit : str
+    value : float
+    """
+
+    name: str
+    field: LawField
+    unit: str
+    value: float
+
+
+class Connection(NamedTuple):
+    """What connects DOFs of structures, without an inverse: forces f with S f = T u, u = E^T x.
+
+    A stiffness has S = 1 and T = K*, a rigid connection S = 0 and T = 1.
+
+    Attributes
+    ----------
+    pattern : ndarray, shape (m, q)
+        E: motions u of the connection from those of the m DOFs; forces on these are -E f.
+    s, t : ndarray, shape (n_freq, q, q)
+    """
+
+    pattern: FloatArray
+    s: ComplexArray
+    t: ComplexArray
+
+
+@dataclass(frozen=True, init=False)
+class LawJoint:
+    """Joint with a law for each DOF, cross terms, masses, and DOFs that are rigid.
+
+    Parameters
+    ----------
+    laws : mapping of str or (str, str) to JointLaw
+        The law of each DOF that moves; of a pair of DOFs, its symmetric cross term K*_ab.
+    rigid : sequence of str
+        DOFs that do not move: constraints between both sides, not stiff springs.
+    mass : mapping of str to float
+        Mass of the joint by DOF, kg (rotations kg m^2); half of it moves with either side.
+    dofs : sequence of str, optional
+        Order of the DOFs; by default those of `laws`, then the rigid ones.
+
+    Raises
+    ------
+    ValueError
+        A DOF with two laws or none, a cross term with a rigid DOF, a mass that is not positive.
+
+    Examples
+    --------
+    A rubber mount that is rigid in rotation:
+
+    >>> import jointfrf as jf
+    >>> mount = jf.LawJoint({"y": jf.StandardLinearSolid(1e5, 2e5, 1e-3)}, rigid=["theta"])
+    >>> mount.dofs, mount.names
+    (('y', 'theta'), ('k_y', 'k_m_y', 'tau_y'))
+    >>> mount.compliance([0.0])[0].real.tolist()
+    [[1e-05, 0.0], [0.0, 0.0]]
+    """
+
+    laws: Mapping[tuple[str, str], JointLaw]
+    rigid: tuple[str, ...]
+    mass: Mapping[str, float]
+    dofs: tuple[str, ...]
+
+    def __init__(
+        self,
+        laws: Mapping[Any, JointLaw],
+        rigid: Sequence[str] = (),
+        mass: Mapping[str, float] | None = None,
+        dofs: Sequence[str] | None = None,
+    ) -> None:
+        by_pair: dict[tuple[str, str], JointLaw] = {}
+        for key, law in laws.items():
+            if not isinstance(law, JointLaw):
+                raise TypeError(f"laws: that of {key!r} must be a JointLaw, not {type(law).__name__}")
+            by_pair[(key, key) if isinstance(key, str) else key] = law
+        moving = [a for a, b in by_pair if a == b]
+        names = (*moving, *rigid) if dofs is None else tuple(dofs)
+        if sorted(names) != sorted([*moving, *rigid]) or len(set(names)) != len(names) or not names:
+            raise ValueError(
+                f"every DOF must have one law or be rigid: laws of {', '.join(moving) or 'none'}, rigid "
+                f"{', '.join(rigid) or 'none'}, dofs {', '.join(names) or 'none'}"
+            )
+        for a, b in by_pair:
+            if a not in moving or b not in moving:
+                raise ValueError(f"the cross term {a},{b} must be between two DOFs that have laws")
+            if a != b and (b, a) in by_pair:
+                raise ValueError(f"the cross term {a},{b} is there twice: it is symmetric")
+        masses = {dof: as_number(f"mass of {dof}", value) for dof, value in (mass or {}).items()}
+        for dof, value in masses.items():
+            if dof not in names:
+                raise ValueError(f"mass names {dof!r}, which is no DOF of the joint ({', '.join(names)})")
+            if value < 0:
+                raise ValueError(f"the mass of {dof} must not be negative, not {value:g}")
+        object.__setattr__(self, "laws", by_pair)
+        object.__setattr__(self, "rigid", tuple(rigid))
+        object.__setattr__(self, "mass", masses)
+        object.__setattr__(self, "dofs", names)
+
+    @classmethod
+    def of_joint(cls, joint: Joint) -> LawJoint:
+        """Return a joint of springs and dampers that is the same as one of matrices.
+
+        Raises
+        ------
+        ValueError
+            Matrices that are not symmetric, a negative stiffness of a DOF.
+        """
+        k, c, h = joint.stiffness, joint.damping, joint.hysteretic_stiffness
+        for name, matrix in (("stiffness", k), ("damping", c), ("hysteretic damping", h)):
+            if not np.allclose(matrix, matrix.T, rtol=1e-10, atol=0):
+                raise ValueError(f"the {name} of the joint must be symmetric")
+        laws: dict[str | tuple[str, str], JointLaw] = {}
+        n = len(joint.dofs)
+        for a in range(n):
+            laws[joint.dofs[a]] = SpringLaw(k[a, a], c[a, a], h[a, a])
+        for a in range(n):
+            for b in range(a + 1, n):
+                if k[a, b] or c[a, b] or h[a, b]:
+                    laws[joint.dofs[a], joint.dofs[b]] = SpringLaw(k[a, b], c[a, b], h[a, b], is_cross=True)
+        return cls(laws)
+
+    @property
+    def quantities(self) -> tuple[JointQuantity, ...]:
+        """All parameters, law by law, then masses."""
+        found = []
+        for (a, b), law in self.laws.items():
+            rotations = is_rotation(a) + is_rotation(b)
+            where = a if a == b else f"{a},{b}"
+            for field, value in zip(law.fields, law.values.tolist(), strict=True):
+                found.append(JointQuantity(f"{field.name}_{where}", field, field.unit(rotations), value))
+        for dof, mass in self.mass.items():
+            found.append(JointQuantity(f"m_{dof}", _MASS, "kg m^2" if is_rotation(dof) else "kg", mass))
+        return tuple(found)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of all parameters."""
+        return tuple(one.name for one in self.quantities)
+
+    @property
+    def values(self) -> FloatArray:
+        """Values of all parameters, shape (p,)."""
+        return np.array([one.value for one in self.quantities])
+
+    def with_values(self, values: ArrayLike) -> Self:
+        """Return the same joint with other values of its parameters, shape (p,)."""
+        found = as_real("values", values, (len(self.names),))
+        laws, at = {}, 0
+        for pair, law in self.laws.items():
+            laws[pair] = law.with_values(found[at : at + len(law.fields)])
+            at += len(law.fields)
+        mass = dict(zip(self.mass, found[at:].tolist(), strict=True))
+        return type(self)(laws, self.rigid, mass, self.dofs)
+
+    def _place(self, pair: tuple[str, str]) -> tuple[int, int]:
+        return self.dofs.index(pair[0]), self.dofs.index(pair[1])
+
+    def _moving_stiffness(self, omega: FloatArray) -> ComplexArray:
+        """K*(w) with zeros for rigid DOFs, shape (n_freq, n, n)."""
+        k = np.zeros((omega.size, len(self.dofs), len(self.dofs)), np.complex128)
+        for pair, law in self.laws.items():
+            a, b = self._place(pair)
+            k[:, a, b] = k[:, b, a] = law.stiffness(omega)
+        return k
+
+    def dynamic_stiffness(self, freq_hz: ArrayLike) -> ComplexArray:
+        """Complex stiffness K*(w), without masses, shape (n_freq, n, n), N/m, rotational N m/rad.
+
+        Raises
+        ------
+        ValueError
+            A DOF is rigid: it has no stiffness; `compliance` is zero for it.
+        """
+        if self.rigid:
+            raise ValueError(f"{', '.join(self.rigid)}: a rigid DOF has no finite stiffness; its compliance is zero")
+        return self._moving_stiffness(2 * np.pi * as_frequency(freq_hz))
+
+    def compliance(self, freq_hz: ArrayLike) -> ComplexArray:
+        """Complex compliance K*^-1(w), zero for rigid DOFs, shape (n_freq, n, n), m/N, rotational rad/(N m)."""
+        freq = as_frequency(freq_hz)
+        moving = [i for i, dof in enumerate(self.dofs) if dof not in self.rigid]
+        c = np.zeros((freq.size, len(self.dofs), len(self.dofs)), np.complex128)
+        k = self._moving_stiffness(2 * np.pi * freq)[:, moving][:, :, moving]
+        if moving:
+            c[:, np.array(moving)[:, None], moving] = invert(k, freq_hz=freq)
+        return c
+
+    def connection(self, omega: FloatArray) -> Connection:
+        """Return how the joint connects its DOFs j of A, then k of B; its masses stand last, on j, then on k."""
+        n, masses = len(self.dofs), list(self.mass)
+        q = n + 2 * len(masses)
+        pattern = np.zeros((2 * n, q))
+        pattern[np.arange(n), np.arange(n)] = 1
+        pattern[n + np.arange(n), np.arange(n)] = -1
+        s, t = np.zeros((2, omega.size, q, q), np.complex128)
+        s[:, np.arange(q), np.arange(q)] = 1
+        t[:, :n, :n] = self._moving_stiffness(omega)
+        for dof in self.rigid:
+            i = self.dofs.index(dof)
+            s[:, i, i], t[:, i, i] = 0, 1
+        for i, dof in enumerate(masses):
+            for place, row in ((n + i, 0), (n + len(masses) + i, n)):
+                pattern[row + self.dofs.index(dof), place] = 1
+                t[:, place, place] = -(omega**2) * self.mass[dof] / 2
+        return Connection(pattern, s, t)
+
+    def connection_slopes(self, omega: FloatArray) -> list[tuple[list[tuple[int, int]], ComplexArray]]:
+        """Return, for each parameter, which entries of T it changes, and its derivative there, shape (n_freq,)."""
+        found: list[tuple[list[tuple[int, int]], ComplexArray]] = []
+        for pair, law in self.laws.items():
+            a, b = self._place(pair)
+            entries = [(a, a)] if a == b else [(a, b), (b, a)]
+            found += [(entries, slope) for slope in law.slopes(omega)]
+        n, count = len(self.dofs), len(self.mass)
+        for i in range(count):
+            places = [(n + i, n + i), (n + count + i, n + count + i)]
+            found.append((places, np.asarray(-(omega**2) / 2, np.complex128)))
+        return found
+
+    def constant_joint(self, freq_hz: float | None = None) -> Joint:
+        """Return the joint of constant matrices that this is, or is at one frequency.
+
+        Parameters
+        ----------
+        freq_hz : float, optional
+            Where laws are taken that depend on frequency: k = Re K*, h = Im K* there.
+
+        Raises
+        ------
+        ValueError
+            A rigid DOF, a mass, or, without `freq_hz`, a law that depends on frequency.
+        """
+        if self.rigid or self.mass:
+            what = f"{', '.join(self.rigid)} rigid" if self.rigid else f"a mass in {', '.join(self.mass)}"
+            raise ValueError(f"a joint with {what} is not one of stiffness and damping alone")
+        n = len(self.dofs)
+        k, c, h = np.zeros((3, n, n))
+        for pair, law in self.laws.items():
+            a, b = self._place(pair)
+            terms = law.constant_terms
+            if terms is None and freq_hz is None:
+                raise ValueError(
+                    f"{type(law).__name__} of {','.join(dict.fromkeys(pair))} depends on frequency: name the freq_hz "
+                    "at which it is taken"
+                )
+            if terms is None:
+                at = law.stiffness(2 * np.pi * as_frequency([float(freq_hz or 0)]))[0]
+                terms = float(at.real), 0.0, float(at.imag)
+            for matrix, value in zip((k, c, h), terms, strict=True):
+                matrix[a, b] = matrix[b, a] = value
+        return Joint(k, c, self.dofs, structural_damping=h)
+
+    def export(
+        self,
+        program: CardFormat,
+        nodes: Sequence[int],
+        *,
+        freq_hz: float | None = None,
+        element: int = 1,
+        number: int = 1,
+        damping: bool = True,
+    ) -> str:
+        """Write the joint as input of a finite-element program, in SI units.
+
+        Parameters
+        ----------
+        program : {"abaqus", "calculix", "nastran", "ansys"}
+        nodes : sequence of two int
+            Nodes j on A and k on B.
+        freq_hz : float, optional
+            Where laws are taken that depend on frequency, which these cards cannot represent: stiffness and hysteretic
+            damping at that frequency. A comment says so.
+        element, number, damping
+            As for `Joint.export`.
+
+        Returns
+        -------
+        str
+            Springs and dashpots as by `Joint.export`; rigid DOFs as equations between the nodes; masses as point masses
+            on both nodes.
+
+        Raises
+        ------
+        ValueError
+            What the program cannot represent: a law that depends on frequency without `freq_hz`; masses that differ by
+            direction or turn; what `Joint.export` refuses.
+
+        Examples
+        --------
+        >>> import jointfrf as jf
+        >>> print(jf.LawJoint({}, rigid=["y"]).export("abaqus", (102, 202)))
+        ** rigid DOFs y: one equation each, written by jointfrf
+        *EQUATION
+        2
+        102, 2, 1., 202, 2, -1.
+        <BLANKLINE>
+        """
+        springs = LawJoint(self.laws).constant_joint(freq_hz) if self.laws else None
+        varying = [
+            f"{type(law).__name__} of {','.join(dict.fromkeys(pair))}"
+            for pair, law in self.laws.items()
+            if law.constant_terms is None
+        ]
+        return joint_cards(
+            program, springs, self.rigid, self.mass, nodes,
+            note=f"{', '.join(varying)} at {freq_hz:g} Hz" if varying else "",
+            element=element, number=number, damping=damping,
+        )  # fmt: skip

@@ -1,0 +1,398 @@
+"""The fit of a model: its FRFs, their derivatives, what it finds from which FRFs, intervals, residual, messages."""
+
+import warnings
+
+import numpy as np
+import pytest
+
+import jointfrf as jf
+from jointfrf.identification.model_fit.matrix_polynomial import MatrixPolynomial
+from jointfrf.identification.model_fit.prediction import Prediction
+from jointfrf.identification.model_fit.prepare import ChannelNoise, Channels, prepare_model_fit
+from jointfrf.identification.model_fit.unknowns import parameter_vector
+
+FREQ = np.linspace(12, 620, 77)
+SECTION = {"density": 2700.0, "width": 0.025, "height": 0.006, "loss_factor": 0.01}
+
+
+def arm(length=0.3, youngs_modulus=67e9):
+    return jf.beam(length, 6, ends=("clamped", "free"), youngs_modulus=youngs_modulus, **SECTION)
+
+
+def free_beam(length=0.225, youngs_modulus=67e9):
+    return jf.beam(length, 5, youngs_modulus=youngs_modulus, **SECTION)
+
+
+MOUNT = jf.LawJoint({"y": jf.FractionalZener(2e5, 6e5, 3e-4, 0.7), "theta": jf.SpringLaw(5e3, c=1.5)}, mass={"y": 0.03})
+PLAIN = jf.Joint([6e5, 5e3], [20, 1.5], ["y", "theta"])
+CHANNELS = ("A/4:y", "A/7:y", "B/6:y")
+
+
+def assembly(joint=PLAIN, attachments=(), *, unknown_a=None, unknown_b=None, built=False):
+    a, b = (arm, free_beam) if built else (arm(), free_beam())
+    return jf.Assembly(
+        jf.Substructure(a, ["7:y", "7:theta"], unknown_a or {}),
+        jf.Substructure(b, ["1:y", "1:theta"], unknown_b or {}),
+        joint,
+        attachments,
+    )
+
+
+def fit_of(*args, **options):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return jf.identify_model(*args, **options)
+
+
+def real_blocks(z):
+    """[[Re, -Im], [Im, Re]] of Re + i Im where both may carry a complex step."""
+    re, im = z
+    return np.block([[re, -im], [im, re]])
+
+
+def euler_bernoulli(length, count, clamped, modulus=67e9, density=2700.0):
+    """K and M of a beam whose length may be complex."""
+    a, inertia, area = length / count, 0.025 * 0.006**3 / 12, 0.025 * 0.006
+    k = (
+        np.array(
+            [
+                [12, 6 * a, -12, 6 * a],
+                [6 * a, 4 * a**2, -6 * a, 2 * a**2],
+                [-12, -6 * a, 12, -6 * a],
+                [6 * a, 2 * a**2, -6 * a, 4 * a**2],
+            ]
+        )
+        * modulus
+        * inertia
+        / a**3
+    )
+    m = (
+        np.array(
+            [
+                [156, 22 * a, 54, -13 * a],
+                [22 * a, 4 * a**2, 13 * a, -3 * a**2],
+                [54, 13 * a, 156, -22 * a],
+                [-13 * a, -3 * a**2, -22 * a, 4 * a**2],
+            ]
+        )
+        * density
+        * area
+        * a
+        / 420
+    )
+    n = 2 * count + 2
+    whole = np.zeros((2, n, n), complex)
+    for e in range(count):
+        own = slice(2 * e, 2 * e + 4)
+        whole[0, own, own] += k
+        whole[1, own, own] += m
+    return whole[:, 2:, 2:] if clamped else whole
+
+
+def frfs_by_real_blocks(values, omega):
+    """FRFs of the assembly of the test of derivatives, real and imaginary part, for values of which one is complex."""
+    v = values
+    k_a, m_a = euler_bernoulli(v["A/length"], 6, True, v["A/youngs_modulus"])
+    k_b, m_b = euler_bernoulli(0.225, 5, False, 67e9 * v["B/youngs_modulus"] / 67e9, v["B/density"])
+    n_a, n = len(k_a), len(k_a) + len(k_b)
+    re, im = np.zeros((2, n, n), complex)
+    re[:n_a, :n_a] = k_a - omega**2 * m_a
+    re[n_a:, n_a:] = k_b - omega**2 * m_b
+    im[:n_a, :n_a], im[n_a:, n_a:] = 0.01 * k_a, v["B/loss_factor"] * k_b
+    # (i w tau)^alpha in real numbers, so that a parameter may carry a complex step.
+    size, turn = (omega * v["tau_y"]) ** v["alpha_y"], v["alpha_y"] * np.pi / 2
+    x, y = size * np.cos(turn), size * np.sin(turn)
+    below = (1 + x) ** 2 + y**2
+    joint = {
+        "y": (v["k_y"] + v["k_m_y"] * (x * (1 + x) + y**2) / below, v["k_m_y"] * y / below),
+        "theta": (v["k_theta"], omega * v["c_theta"]),
+    }
+    for offset, (k_re, k_im) in zip((0, 1), joint.values(), strict=True):
+        j, other = 10 + offset, n_a + offset
+        for part, value in ((re, k_re), (im, k_im)):
+            part[j, j] += value
+            part[other, other] += value
+            part[j, other] -= value
+            part[other, j] -= value
+    re[10, 10] -= omega**2 * v["m_y"] / 2
+    re[n_a, n_a] -= omega**2 * v["m_y"] / 2
+    re[4, 4] -= omega**2 * v["mass A/4:y"]
+    re[n - 2, n - 2] += v["ground stiffness B/6:y"]
+    im[n - 2, n - 2] += omega * v["ground damping B/6:y"]
+    h = np.linalg.inv(real_blocks((re, im)))
+    at = np.array([4, 10, n - 2])
+    gains = np.array([v["gain of response A/4:y"], 1, 1])[:, None] * np.array([1, v["gain of force A/7:y"], 1])
+    return h[np.ix_(at, at)] * gains, h[np.ix_(n + at, at)] * gains
+
+
+def test_derivatives_are_those_of_complex_steps():
+    attached = (
+        jf.AddedMass("A/4:y", jf.Unknown(0.02, 0.01)), jf.GroundSpring("B/6:y", jf.Unknown(3e4), jf.Unknown(2.0)),
+    )  # fmt: skip
+    whole = jf.Assembly(
+        jf.Substructure(
+            arm, ["7:y", "7:theta"], {"length": jf.Unknown(0.3, 0.006), "youngs_modulus": jf.Unknown(67e9, 1e9)}
+        ),
+        jf.Substructure(
+            free_beam(),
+            ["1:y", "1:theta"],
+            {
+                "youngs_modulus": jf.Unknown(67e9, 1e9),
+                "density": jf.Unknown(2700.0, 50),
+                "loss_factor": jf.Unknown(0.01, 0.002),
+            },
+        ),
+        MOUNT,
+        attached,
+    )
+    channels = Channels(CHANNELS, CHANNELS, {"A/4:y": jf.Unknown(1.0, 0.01)}, {"A/7:y": jf.Unknown(1.0, 0.01)})
+    prediction = Prediction(whole, FREQ, CHANNELS, CHANNELS)
+    vector = parameter_vector(whole, channels.gains(), (), prediction.joint_stiffness())
+    values = vector.values.copy()
+    names = [one.name for one in vector.all]
+    values[names.index("A/length")] = 0.302
+    values[names.index("gain of response A/4:y")] = 1.01
+    y, slopes = prediction.linearised(vector, values)
+    assert len(slopes) == len(names) == 17
+    assert np.allclose(y, prediction.frfs(vector, values), rtol=1e-9, atol=0)
+    named = dict(zip(names, values.tolist(), strict=True))
+    for line in (3, 40, 70):
+        omega = 2 * np.pi * FREQ[line]
+        re, im = frfs_by_real_blocks(named, omega)
+        assert np.allclose(y[line], re.real + 1j * im.real, rtol=1e-4, atol=1e-5 * abs(y[line]).max())
+        for i, name in enumerate(names):
+            step = 1e-30 * named[name]
+            re, im = frfs_by_real_blocks(named | {name: named[name] + 1j * step}, omega)
+            exact = (re.imag + 1j * im.imag) / step
+            assert np.allclose(slopes[i, line], exact, rtol=1e-3, atol=2e-4 * abs(exact).max()), name
+
+
+def test_frfs_of_the_assembly_are_those_of_its_matrices():
+    whole = assembly()
+    model = jf.assemble(arm(), free_beam(), PLAIN, arm().index("7:y", "7:theta"), free_beam().index("1:y", "1:theta"))
+    exact = model.receptance(FREQ, model.index(*CHANNELS))
+    assert np.allclose(whole.receptance(FREQ, CHANNELS, CHANNELS), exact, rtol=1e-8, atol=0)
+
+
+def test_exact_frfs_of_remote_points_give_the_joint_and_the_models():
+    """One response, one force, both on B; Young's modulus and length of A are off by two standard deviations."""
+    unknown = {"length": jf.Unknown(0.3, 0.003), "youngs_modulus": jf.Unknown(67e9, 1e9)}
+    truth = jf.Assembly(
+        jf.Substructure(arm(0.303, 65.5e9), ["7:y", "7:theta"]), jf.Substructure(free_beam(), ["1:y", "1:theta"]), PLAIN
+    )
+    h = truth.receptance(FREQ, ["B/6:y"], ["B/5:y"])
+    guess = jf.Joint([1e5, 1e3], [5, 0.5], ["y", "theta"])
+    fit = fit_of(FREQ, h, assembly(guess, unknown_a=unknown, built=True), ["B/6:y"], ["B/5:y"], noise=1e-4)
+    found = fit.parameters
+    assert found["A/length"] == pytest.approx(0.303, rel=1e-4)
+    assert found["A/youngs_modulus"] == pytest.approx(65.5e9, rel=1e-3)
+    assert [found[name] for name in PLAIN_NAMES] == pytest.approx([6e5, 20, 5e3, 1.5], rel=2e-3)
+
+
+PLAIN_NAMES = ("k_y", "c_y", "k_theta", "c_theta")
+
+
+def test_substructures_may_be_given_by_frfs():
+    a, b = arm(), free_beam()
+    names_a, names_b = ("7:y", "7:theta", "4:y"), ("1:y", "1:theta", "6:y")
+    whole = jf.Assembly(
+        jf.Substructure.of_frfs(FREQ, a.receptance(FREQ, a.index(*names_a)), names_a, names_a[:2]),
+        jf.Substructure.of_frfs(FREQ, b.receptance(FREQ, b.index(*names_b)), names_b, names_b[:2]),
+        jf.Joint([1e5, 1e3], [5, 0.5], ["y", "theta"]),
+    )
+    channels = ("A/4:y", "B/6:y")
+    h = jf.pollute(assembly().receptance(FREQ, channels, channels), 0.01, seed=4)
+    fit = fit_of(FREQ, h, whole, channels, channels)
+    same = fit_of(FREQ, h, assembly(jf.Joint([1e5, 1e3], [5, 0.5], ["y", "theta"])), channels, channels)
+    assert [fit.parameters[n] for n in PLAIN_NAMES] == pytest.approx(
+        [same.parameters[n] for n in PLAIN_NAMES], rel=1e-3
+    )
+    for name, true in zip(PLAIN_NAMES, (6e5, 20, 5e3, 1.5), strict=True):
+        assert abs(fit.parameters[name] - true) < 4 * fit.std_error[name]
+
+
+def test_a_mount_with_mass_and_a_rigid_rotation_is_found():
+    mount = jf.LawJoint({"y": jf.StandardLinearSolid(2e5, 6e5, 5e-4)}, rigid=["theta"], mass={"y": 0.06})
+    guess = jf.LawJoint({"y": jf.StandardLinearSolid(1e5, 1e5, 1e-3)}, rigid=["theta"], mass={"y": 0.01})
+    h = jf.pollute(assembly(mount).receptance(FREQ, CHANNELS, CHANNELS), 0.01, seed=3)
+    fit = fit_of(FREQ, h, assembly(guess), CHANNELS, CHANNELS)
+    assert fit.test.is_noise, fit.warnings
+    for one in mount.quantities:
+        assert abs(fit.parameters[one.name] - one.value) < 4 * fit.std_error[one.name]
+        assert fit.std_error[one.name] < 0.2 * one.value
+    assert fit.joint.rigid == ("theta",)
+
+
+def test_an_frf_that_was_not_measured_is_left_out():
+    channels = ("A/4:y", "A/7:y", "B/6:y")
+    h = jf.pollute(assembly().receptance(FREQ, channels, channels), 0.02, seed=5)
+    h[:, 0, 2] = h[:, 2, 0] = np.nan
+    fit = fit_of(FREQ, h, assembly(jf.Joint([1e5, 1e3], [5, 0.5], ["y", "theta"])), channels, channels)
+    assert np.isnan(fit.residual[:, 0, 2]).all()
+    assert np.isfinite(fit.predicted).all()
+    assert abs(fit.parameters["k_y"] - 6e5) < 4 * fit.std_error["k_y"]
+
+
+@pytest.mark.parametrize("wrong", ["length", "mass", "rigid"])
+def test_a_wrong_model_is_found_in_the_residual(wrong):
+    """5 % of a length, 20 g that the model has not, a DOF left out; nothing is said where nothing is wrong."""
+    joint, guess = PLAIN, jf.Joint([1e5, 1e3], [5, 0.5], ["y", "theta"])
+    truth = assembly()
+    if wrong == "length":
+        truth = jf.Assembly(jf.Substructure(arm(0.315), ["7:y", "7:theta"]), truth.b, joint)
+    if wrong == "mass":
+        truth = assembly(attachments=(jf.AddedMass("A/4:y", 0.02),))
+    if wrong == "rigid":
+        guess = jf.LawJoint({"y": jf.SpringLaw(1e5, c=5.0)}, rigid=["theta"])
+    h = jf.pollute(truth.receptance(FREQ, CHANNELS, CHANNELS), 0.05, seed=6)
+    with pytest.warns(jf.IdentificationWarning, match=r"do not fit the FRFs: residual .* at .* Hz"):
+        fit = jf.identify_model(FREQ, h, assembly(guess), CHANNELS, CHANNELS)
+    assert not fit.test.is_noise
+    good = fit_of(FREQ, jf.pollute(assembly().receptance(FREQ, CHANNELS, CHANNELS), 0.05, seed=6),
+                  assembly(jf.Joint([1e5, 1e3], [5, 0.5], ["y", "theta"])), CHANNELS, CHANNELS)  # fmt: skip
+    assert good.test.is_noise, good.warnings
+
+
+def test_a_prior_that_the_frfs_deny_is_told():
+    unknown = {"density": jf.Unknown(2700.0, 27.0)}
+    truth = jf.Assembly(
+        jf.Substructure(arm(), ["7:y", "7:theta"]),
+        jf.Substructure(jf.beam(0.225, 5, youngs_modulus=67e9, **(SECTION | {"density": 2900.0})), ["1:y", "1:theta"]),
+        PLAIN,
+    )
+    h = jf.pollute(truth.receptance(FREQ, CHANNELS, CHANNELS), 0.02, seed=1)
+    fit = fit_of(FREQ, h, assembly(unknown_b=unknown), CHANNELS, CHANNELS)
+    assert any("deny what was believed" in text and "B/density" in text for text in fit.warnings)
+
+
+def test_what_frfs_do_not_hold_is_named_by_its_direction():
+    """Below the first resonance a chain shows one number: joint and right spring in series."""
+    freq = np.linspace(0.5, 1.5, 40)
+    a = jf.Substructure(jf.chain([5.0], [4000.0], [3.0], ground="start"), ["1:x"])
+    b = jf.Substructure(
+        jf.chain([0.01], [2000.0], [2.0], ground="end"), ["1:x"], {"youngs_modulus": jf.Unknown(1.0, 0.5, lower=0.1)}
+    )
+    joint = jf.LawJoint({"x": jf.SpringLaw(1500.0, damping="none")})
+    whole = jf.Assembly(a, b, joint)
+    h = jf.pollute(whole.receptance(freq, ["A/1:x"], ["A/1:x"]), 0.02, seed=1)
+    fit = fit_of(freq, h, whole, ["A/1:x"], ["A/1:x"], noise=0.02)
+    (open_,) = fit.open_directions
+    assert {name for name, _ in open_.parts} == {"k_x", "B/youngs_modulus"}
+    assert abs(fit.correlation[0, 1]) > 0.9
+    text = str(fit)
+    assert "k_x" in text
+    assert "B/youngs_modulus" in text
+
+
+def test_intervals_are_profiles_of_the_likelihood():
+    """Brute force: the other parameter minimised on a grid."""
+    freq = np.linspace(0.5, 10, 60)
+    a = jf.Substructure(jf.chain([5, 3], [2500, 3500], [3, 4], ground="start"), ["2:x"])
+    b = jf.Substructure(jf.chain([4, 2], [2000, 2500], [2, 1], ground="end"), ["1:x"])
+    whole = jf.Assembly(a, b, jf.Joint([2000.0], [3.0], dofs=["x"]))
+    h = jf.pollute(whole.receptance(freq, ["A/1:x"], ["B/2:x"]), 0.2, seed=8)
+    fit = fit_of(freq, h, whole, ["A/1:x"], ["B/2:x"], noise=0.2)
+    variance = (0.2 * abs(h)) ** 2
+
+    def cost(k, c):
+        other = jf.Assembly(a, b, jf.Joint([k], [c], dofs=["x"]))
+        return 2 * (abs(other.receptance(freq, ["A/1:x"], ["B/2:x"]) - h) ** 2 / variance).sum()
+
+    least = cost(fit.parameters["k_x"], fit.parameters["c_x"])
+    for limit in fit.confidence_interval(0.95)["k_x"]:
+        profile = min(cost(limit, c) for c in fit.parameters["c_x"] + fit.std_error["c_x"] * np.linspace(-2, 2, 41))
+        assert profile - least == pytest.approx(3.84, rel=0.12)
+    with pytest.raises(ValueError, match="probability must lie between 0 and 1"):
+        fit.confidence_interval(1.0)
+
+
+def test_gains_of_channels_are_found_beside_the_joint():
+    h = assembly().receptance(FREQ, CHANNELS, CHANNELS)
+    h[:, 1] *= 1.07
+    h = jf.pollute(h, 0.02, seed=2)
+    gains = {"A/7:y": jf.Unknown(1.0, 0.05)}
+    fit = fit_of(FREQ, h, assembly(), CHANNELS, CHANNELS, response_gains=gains, fixed=["c_theta"])
+    assert fit.parameters["gain of response A/7:y"] == pytest.approx(
+        1.07, abs=5 * fit.std_error["gain of response A/7:y"]
+    )
+    assert "c_theta" not in fit.parameters
+    assert fit.unit("gain of response A/7:y") == "1"
+    assert fit.to_dict()["parameters"]["gain of response A/7:y"]["prior"] == [1.0, 0.05]
+    assert fit.k_joint([100.0]).shape == (1, 2, 2)
+    assert set(fit.joint_parameters) == {"k_y", "c_y", "k_theta"}
+
+
+def test_interface_frfs_without_a_noise_level_take_it_from_the_residual():
+    freq = np.linspace(0.5, 10, 9)
+    a = jf.Substructure(jf.chain([5, 3], [2500, 3500], [3, 4], ground="start"), ["2:x"])
+    b = jf.Substructure(jf.chain([4, 2], [2000, 2500], [2, 1], ground="end"), ["1:x"])
+    whole = jf.Assembly(a, b, jf.Joint([2000.0], [3.0], dofs=["x"]))
+    h = jf.pollute(whole.receptance(freq, ["A/1:x"], ["B/2:x"]), 0.05, seed=8)
+    fit = fit_of(freq, h, whole, ["A/1:x"], ["B/2:x"])
+    assert any("taken from the residual" in note for note in fit.notes)
+    assert 0.02 < fit.noise_level < 0.1
+
+
+def test_polynomials_of_matrices_and_their_derivatives():
+    def build(v):
+        return [np.array([[v[0] ** -3, v[1]], [v[1] / v[0], 1.0]]), np.array([v[0] * v[1] ** 2])]
+
+    polynomial = MatrixPolynomial(build, np.array([0.3, 2.0]), np.array([0.015, 0.1]))
+    at = np.array([0.306, 2.05])
+    for found, exact in zip(polynomial.at(at), build(at), strict=True):
+        assert np.allclose(found, exact, rtol=1e-7)
+    slopes = polynomial.slope(at, 0)
+    assert np.allclose(slopes[0], [[-3 * at[0] ** -4, 0], [-at[1] / at[0] ** 2, 0]], rtol=1e-5, atol=1e-4)
+    assert np.allclose(slopes[1], at[1] ** 2, rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"responses": ["A/99:y"]}, "response 'A/99:y': neither A nor B has such a DOF"),
+        ({"responses": ["4:y"]}, "names begin with 'A/' or 'B/'"),
+        ({"responses": ["A/4:y", "B/6:y"]}, "h must have 2 responses and 1 forces"),
+        ({"responses": []}, "responses must name at least one DOF"),
+        ({"fixed": ["k_x"]}, "fixed names 'k_x', which is no parameter of the joint"),
+        ({"fixed": list(PLAIN_NAMES)}, "there is nothing to fit"),
+        ({"noise": -1.0}, "noise must be positive"),
+        ({"noise": 0.1, "averages": 4}, "noise is told: leave coherence and averages out"),
+        ({"force_gains": {"A/4:y": jf.Unknown(1.0)}}, "force_gains names 'A/4:y', which is no force"),
+        ({"bad": np.nan}, r"h\[3, 0, 0\] at 36 Hz is not finite"),
+    ],
+)
+def test_what_is_wrong_is_one_sentence(change, message):
+    h = assembly().receptance(FREQ, ["A/4:y"], ["B/6:y"])
+    change = dict(change)
+    if "bad" in change:
+        h[3] = change.pop("bad")
+    responses = change.pop("responses", ["A/4:y"])
+    with pytest.raises(ValueError, match=message):
+        jf.identify_model(FREQ, h, assembly(), responses, ["B/6:y"], **change)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: jf.Unknown(1.0, -1.0), "std must be positive"),
+        (lambda: jf.Unknown(1.0, lower=2.0), "value must lie in 2 to inf"),
+        (lambda: jf.Substructure(arm(), ["7:y"], {"length": jf.Unknown(1.0)}), "give a function that builds it"),
+        (
+            lambda: jf.Assembly(jf.Substructure(arm(), ["7:y"]), jf.Substructure(free_beam(), ["1:y"]), PLAIN),
+            "has 1 joint",
+        ),
+        (lambda: assembly(attachments=(jf.AddedMass("A/9:y", 1.0),)), "attachment 'A/9:y'"),
+        (lambda: jf.Substructure.of_frfs([1.0], np.ones((1, 2, 2)), ["a"], ["a"]), "dofs must name 2 different"),
+    ],
+)
+def test_what_is_wrong_with_an_assembly_is_one_sentence(make, message):
+    with pytest.raises(ValueError, match=message):
+        make()
+
+
+def test_frfs_of_a_substructure_must_be_on_the_lines_of_the_measurement():
+    a = arm()
+    part = jf.Substructure.of_frfs(FREQ[1:], a.receptance(FREQ[1:], a.index("7:y", "7:theta")), ["y", "t"], ["y", "t"])
+    whole = jf.Assembly(part, jf.Substructure(free_beam(), ["1:y", "1:theta"]), PLAIN)
+    with pytest.raises(ValueError, match="the FRFs of A must be on the lines of the measurement"):
+        prepare_model_fit(FREQ, np.ones((77, 1, 1)), whole, Channels(("A/y",), ("A/y",)), ChannelNoise(), ())
