@@ -139,6 +139,8 @@ def _trends(group: FittedGroup, freq_hz: FloatArray, factor: FloatArray) -> list
     gradient, information = minimum.of_groups(member)
     size = np.sqrt(np.maximum(np.einsum("bpp->bp", information), np.finfo(float).tiny))
     seen = np.linalg.cond(information / (size[:, :, None] * size[:, None, :])) <= _SINGULAR
+    if not seen.any():
+        return []
     values, changes, errors = (np.full((BLOCKS, p), np.nan) for _ in range(3))
     covariance = inverse_information(2 * information[seen])
     step = 2 * (covariance @ gradient[seen, :, None])[..., 0]
