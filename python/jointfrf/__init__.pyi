@@ -69,6 +69,7 @@ from jointfrf.laws.springs import SpringLaw
 from jointfrf.laws.viscoelastic import FractionalZener, PowerLaw, StandardLinearSolid
 from jointfrf.models.beam import beam
 from jointfrf.models.chain import chain
+from jointfrf.models.matrices import from_triangle
 from jointfrf.models.model import Model, assemble
 from jointfrf.models.receptance.receptance import ReceptanceInfo, receptance
 from jointfrf.solids.bolt import PROOF_STRENGTH, STRESS_AREA, Bolt, preload_force
@@ -172,6 +173,7 @@ __all__ = [
     "estimate_noise",
     "find_modification",
     "frequency_error",
+    "from_triangle",
     "get_engine",
     "has_peak",
     "identify",

@@ -12,7 +12,7 @@ from scipy.sparse import csc_matrix
 
 from jointfrf.kernel.arguments import FloatArray, as_array, as_real
 
-__all__ = ["Matrix", "ModelMatrices", "from_triangle"]
+__all__ = ["Matrix", "ModelMatrices", "from_triangle", "is_symmetric"]
 
 Matrix = Any  # array_like or scipy sparse array
 
@@ -119,8 +119,7 @@ class ModelMatrices:
 
     def is_symmetric(self, name: str) -> bool:
         """Whether K or M is symmetric."""
-        matrix = self.sparse(name)
-        return bool(_largest(matrix - matrix.T) <= _SYMMETRIC * _largest(matrix))
+        return is_symmetric(self.sparse(name))
 
     @cached_property
     def proportional(self) -> tuple[float, float, float] | None:
@@ -131,6 +130,11 @@ class ModelMatrices:
         if viscous is None or structural is None:
             return None
         return viscous[0], viscous[1], self.loss_factor + structural[1]
+
+
+def is_symmetric(matrix: sparse.csc_array) -> bool:
+    """Whether a matrix is symmetric to rounding."""
+    return bool(_largest(matrix - matrix.T) <= _SYMMETRIC * _largest(matrix))
 
 
 def from_triangle(matrix: Matrix) -> Matrix:

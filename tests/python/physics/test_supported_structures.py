@@ -6,6 +6,7 @@ line times the machine's precision.
 
 import functools
 import os
+import signal
 import subprocess
 import sys
 
@@ -128,5 +129,7 @@ def test_rounding_excuses_no_error_beyond_what_is_announced(monkeypatch):
 def test_random_free_beams_are_recognised_with_other_kernels_of_openblas(kernel):
     environment = os.environ | {"OPENBLAS_CORETYPE": kernel, "OPENBLAS_NUM_THREADS": "1"}
     command = [sys.executable, supported_structures.__file__, "9"]
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
-    assert done.stdout == ""
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    if hasattr(signal, "SIGILL") and done.returncode == -signal.SIGILL:
+        pytest.skip(f"this processor has not the instructions of {kernel}")
+    assert (done.returncode, done.stdout) == (0, ""), done.stderr

@@ -13,7 +13,7 @@ from jointfrf.cases.known_joint.structure import MeasuredStructure, ModelStructu
 from jointfrf.frf.frf_set import POWER_OF_I_OMEGA
 from jointfrf.io.matrix_file import read_dof_names, read_matrix
 from jointfrf.kernel.arguments import FloatArray
-from jointfrf.models.matrices import ModelMatrices
+from jointfrf.models.matrices import is_symmetric
 from jointfrf.models.model import Model
 from jointfrf.toml.table import TomlTable
 
@@ -36,14 +36,13 @@ def read_matrices(table: TomlTable) -> ModelStructure:
     named = table.texts_or_file("dofs")
     table.close()
     found = {key: table.build(partial(read_matrix, path, key), key) for key, path in paths.items()}
-    k, m, c, h = (found.get(key) for key in ("stiffness", "mass", *_OPTIONAL))
+    c, h = (found.get(key) for key in _OPTIONAL)
     n = found["stiffness"].shape[0]
     for key, matrix in found.items():
         if matrix.shape != (n, n):
             raise table.wrong(key, f"{paths[key]} holds {matrix.shape[0]} DOFs, {paths['stiffness']} holds {n}")
-    matrices = ModelMatrices(k, m, c, h, loss_factor)
     for key in ("stiffness", "mass"):
-        if not matrices.is_symmetric(key):
+        if not is_symmetric(sparse.csc_array(found[key])):
             raise table.wrong(key, _unsymmetric(paths[key], found[key]))
     if (found["mass"].diagonal() < 0).any() or not found["mass"].diagonal().any():
         raise table.wrong("mass", f"{paths['mass']} must have a diagonal that is not negative, and not zero as a whole")
