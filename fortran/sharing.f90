@@ -97,7 +97,8 @@ contains
 
     threads = 1
     if (flops < serial .or. n_items < 2) return
-    !$ if (omp_in_parallel() .or. .not. has_its_threads()) return
+    !$ if (omp_in_parallel()) return
+    if (.not. has_its_threads()) return
     !$ if (blas_takes_threads()) threads = int(min(int(omp_get_max_threads(), long), n_items))
   end function threads_for
 end module jointfrf_sharing

@@ -248,8 +248,10 @@ contains
     if (unknown_order(trans)) info = -1
     if (info /= info_good) return
     if (any(.not. lower <= upper)) info = -12
-    if (out_of_range(kinds + 1, 3_ip) .or. count(kinds == 0) /= n .or. repeated(3*dofs + kinds)) info = -10
+    if (any(kinds < 0 .or. kinds > 2) .or. count(kinds == 0) /= n) info = -10
     if (out_of_range(dofs, n)) info = -9
+    if (info == -9 .or. info == -10) return
+    if (repeated(3*dofs + kinds)) info = -10
   end function check_fit_diagonal_joint
 
   !> The number of entries of a matrix of order blocks*n, or of its upper triangle; of an n that is refused anyway, any.

@@ -193,9 +193,20 @@ def test_one_prefix_holds_both(libraries):
 
 #: Real arguments for which every routine does something; the others are zero.
 NUMBERS = {"offset": [0.0, 1.0], "youngs_modulus": [1.0], "density": [1.0], "level": [0.1], "coordinates": [0.0] * 24}
+NUMBERS |= {"share": [1.0], "spread_m": [1.0]}
 LETTERS = {"equation": b"rs", "trans": b"N", "kind": b"N", "reference": b"E", "method": b"S", "formulation": b"R"}
 #: Integer arguments that are not 1.
-INTEGERS = {"m": 2, "reciprocal": 0, "n_correlated": 0, "kl": 0, "ku": 0, "first": 0, "lwork": 500, "liwork": 500}
+INTEGERS = {
+    "m": 2,
+    "reciprocal": 0,
+    "kinds": 0,
+    "n_correlated": 0,
+    "kl": 0,
+    "ku": 0,
+    "first": 0,
+    "lwork": 500,
+    "liwork": 500,
+}
 #: Those that may have any value: of a seed the lower 32 bits count, and memory may be as long as it likes.
 FREE = {"seed", "lwork", "liwork", "n_text"}
 ROUTINES = {
