@@ -164,7 +164,8 @@ contains
     factor = 1.0_dp
     norm = one_norm(a)
     if (norm <= large) return
-    factor = scale(1.0_dp, -min(exponent(max(maxval(abs(real(a, dp))), maxval(abs(aimag(a))))), 1000))   ! never denormal
+    ! Never denormal, which a processor may take for zero.
+    factor = scale(1.0_dp, -min(exponent(max(maxval(abs(real(a, dp))), maxval(abs(aimag(a))))), 1000))
     call multiply_by(factor, a)
     norm = one_norm(a)
   end subroutine bring_down
