@@ -542,13 +542,14 @@ def test_matrices_that_hold_no_numbers_get_one_sentence(dtype):
 def test_numbers_of_another_byte_order_are_numbers():
     k, m, _, _ = model()
     given = [(x + x.T).astype(">f8") for x in (k, m)]
-    np.testing.assert_array_equal(jf.receptance(FREQ, *given), jf.receptance(FREQ, k + k.T, m + m.T))
+    np.testing.assert_allclose(jf.receptance(FREQ, *given), jf.receptance(FREQ, k + k.T, m + m.T), rtol=1e-9)
 
 
 def test_a_model_takes_names_of_dofs():
     beam = jf.beam(0.3, 2, youngs_modulus=67e9, density=2700.0, width=0.025, height=0.006)
     h = beam.receptance([50.0, 60.0])
-    np.testing.assert_array_equal(beam.receptance([50.0, 60.0], ["3:y", "1:theta"], "2:y")[:, :, 0], h[:, [4, 1], 2])
+    named = beam.receptance([50.0, 60.0], ["3:y", "1:theta"], "2:y")
+    np.testing.assert_allclose(named[:, :, 0], h[:, [4, 1], 2], rtol=1e-9)
     with pytest.raises(ValueError, match="the model has no DOF '9:y'"):
         beam.receptance([50.0], ["9:y"])
 
