@@ -11,7 +11,8 @@ from jointfrf.errors import ConvergenceWarning, FrfCheckWarning, IdentificationW
 from jointfrf.identification.identify import IdentificationMethod, identify
 from jointfrf.identification.joint_fit import JointFit
 from jointfrf.identification.model_fit.assembly import Assembly
-from jointfrf.identification.model_fit.identify_model import identify_model
+from jointfrf.identification.model_fit.prepare import Channels
+from jointfrf.identification.model_fit.realisations import joints_of_realisations
 from jointfrf.identification.model_fit.substructure import Substructure
 from jointfrf.identification.realisations import identify_realisations
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
@@ -79,23 +80,18 @@ def fit_decoupling(
 
     Notes
     -----
-    What (2.53)-(2.56) take one block each is one maximum-likelihood fit of all four.
+    What (2.53)-(2.56) take one block each is one maximum-likelihood fit of all four. The first set is fitted with nothing
+    told, the others start there.
     """
-    n = len(dofs)
     joint, inner = [f"joint {dof}" for dof in dofs], [f"inner {dof}" for dof in dofs]
     a, b = (Substructure.of_frfs(freq_hz, h, [*joint, *inner], joint) for h in substructures)
     diagonal = np.einsum("laa->la", k_initial)
     k, c = np.median(diagonal.real, axis=0), np.median(diagonal.imag / (2 * np.pi * freq_hz)[:, None], axis=0)
     whole = Assembly(a, b, LawJoint({dof: SpringLaw(k[i], c=c[i]) for i, dof in enumerate(dofs)}))
-    channels = [*(f"A/{name}" for name in inner), *(f"B/{name}" for name in inner)]
-    found = np.empty((len(measured), 2 * n))
-    with warnings.catch_warnings():
-        for category in (IdentificationWarning, ConvergenceWarning):
-            warnings.simplefilter("ignore", category)
-        for i, h in enumerate(measured):
-            joint_found = identify_model(freq_hz, h, whole, channels, channels).joint.constant_joint()
-            found[i] = *joint_found.stiffness.diagonal(), *joint_found.damping.diagonal()
-    return found
+    names = (*(f"A/{name}" for name in inner), *(f"B/{name}" for name in inner))
+    channels = Channels(names, names)
+    found = [one.constant_joint() for one in joints_of_realisations(freq_hz, measured, whole, channels)]
+    return np.array([[*joint.stiffness.diagonal(), *joint.damping.diagonal()] for joint in found])
 
 
 def fit_measured(freq_hz: FloatArray, dofs: tuple[str, ...], h: ComplexArray, transform: FloatArray) -> JointFit:

@@ -9,7 +9,7 @@ from jointfrf.kernel.linear_algebra import solve
 from jointfrf.kernel.status import OnSingular
 from jointfrf.laws.law_joint import Connection
 
-__all__ = ["connect", "connection_matrix"]
+__all__ = ["connect", "connection_forces", "connection_matrix"]
 
 
 def connection_matrix(
@@ -30,7 +30,14 @@ def connection_matrix(
         (S + T E^T H E)^-1 T, N/m; S = 0 leaves the dual form of a constraint, S = 1 the form of a modification (2.35).
     """
     e = link.pattern
-    left = link.s + link.t @ (e.T @ h @ e)
+    return connection_forces(e.T @ h @ e, link, freq_hz, on_singular)
+
+
+def connection_forces(
+    between: ComplexArray, link: Connection, freq_hz: FloatArray | None = None, on_singular: OnSingular = "raise"
+) -> ComplexArray:
+    """Return W of `connection_matrix` from the receptances E^T H E across the connections, shape (n_freq, q, q)."""
+    left = link.s + link.t @ between
     # A constraint and a stiffness have rows of very different size.
     size = abs(left).max(axis=2, keepdims=True)
     size[size == 0] = 1

@@ -17,4 +17,5 @@ fit              the steps of a fit in their order
 describe         notes and warnings
 model_fit        the result
 identify_model   the door
+realisations     many sets of FRFs of one assembly
 """

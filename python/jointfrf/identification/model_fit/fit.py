@@ -16,10 +16,15 @@ from jointfrf.identification.compliance_fit.line_forms import inverse_informatio
 from jointfrf.identification.model_fit.directions import OpenDirection, open_directions
 from jointfrf.identification.model_fit.likelihood import Likelihood
 from jointfrf.identification.model_fit.minimum import Minimum, minimise
-from jointfrf.identification.model_fit.prediction import Prediction
+from jointfrf.identification.model_fit.prediction import LineCompliance, Prediction
 from jointfrf.identification.model_fit.profile import ProfileIntervals
 from jointfrf.identification.model_fit.residual_check import ResidualTest, check_residual
-from jointfrf.identification.model_fit.starts import from_lines, ranked_trials, refined
+from jointfrf.identification.model_fit.starts import (
+    from_lines,
+    interface_compliance,
+    ranked_trials,
+    refined,
+)
 from jointfrf.identification.model_fit.unknowns import ParameterVector
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
@@ -158,17 +163,23 @@ def _lowest(problem: ModelProblem) -> tuple[Minimum, float]:
 
 
 def _values_of_lines(problem: ModelProblem) -> Iterator[FloatArray]:
-    """Yield values of all parameters from FRFs between all joint DOFs: of single lines, and of the compliance fit."""
-    if problem.joint_channels is None:
-        return
-    vector, joint = problem.vector, problem.prediction.whole.joint
-    own = vector.places_of("joint")
-    for values_of in (
-        lambda: from_lines(
-            joint, problem.prediction.omega, problem.smooth, problem.variance, problem.joint_channels or ([], [])
-        ),
-        problem.compliance_start,
-    ):
+    """Yield values of all parameters by the joint of single lines, without and with the models; by the compliance fit.
+
+    The first and the last where the FRFs between all joint DOFs were measured.
+    """
+    vector, prediction = problem.vector, problem.prediction
+    joint, omega = prediction.whole.joint, prediction.omega
+    own, at = vector.places_of("joint"), problem.joint_channels
+    lines = []
+    if at is not None:
+        lines.append(lambda: interface_compliance(problem.smooth, problem.variance, at))
+    if np.isfinite(problem.measured).all():
+        lines.append(lambda: prediction.joint_compliance(vector, problem.smooth, problem.variance))
+
+    def of_lines(found: LineCompliance | None) -> FloatArray | None:
+        return None if found is None else from_lines(joint, omega, found)
+
+    for values_of in (*(lambda one=one: of_lines(one()) for one in lines), problem.compliance_start):  # type: ignore[misc]
         values = values_of()
         if values is not None:
             free = np.array([vector.all[i].is_free for i in own])

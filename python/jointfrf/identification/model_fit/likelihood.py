@@ -96,8 +96,8 @@ class Likelihood:
         """Return the squares with information and gradient."""
         y, slopes = self.prediction.linearised(self.vector, self.vector.to_values(x))
         residual = ((self.measured - y) * self.inverse_std).ravel()
-        flat = (slopes * self.inverse_std).reshape(len(slopes), -1) * self.vector.slope(x)[:, None]
-        return _with_priors(self.vector, x, residual, flat)
+        slopes *= self.inverse_std
+        return _with_priors(self.vector, x, residual, slopes.reshape(len(slopes), -1))
 
 
 @dataclass(frozen=True)
@@ -132,8 +132,8 @@ class LogLikelihood:
         """Return the squares with information and gradient."""
         y, slopes = self.prediction.linearised(self.vector, self.vector.to_values(x))
         residual = (self.log_ratio(y) * self.weight).ravel()
-        flat = (slopes * (self.weight / np.where(y == 0, 1, y))).reshape(len(slopes), -1)
-        return _with_priors(self.vector, x, residual, flat * self.vector.slope(x)[:, None])
+        slopes *= self.weight / np.where(y == 0, 1, y)
+        return _with_priors(self.vector, x, residual, slopes.reshape(len(slopes), -1))
 
 
 def _squares(residual: ComplexArray) -> float:
@@ -142,10 +142,10 @@ def _squares(residual: ComplexArray) -> float:
 
 
 def _with_priors(vector: ParameterVector, x: FloatArray, residual: ComplexArray, flat: ComplexArray) -> Linearised:
-    """Return the squares of FRFs and priors; `flat` holds the derivatives of predicted FRFs over noise, (p, n)."""
-    pulls, slopes = vector.pulls(x), vector.pull_slopes(x)
+    """Return the squares of FRFs and priors; `flat`, (p, n), holds derivatives by the values, over noise."""
+    pulls, slopes, by_x = vector.pulls(x), vector.pull_slopes(x), vector.slope(x)
     real = flat.view(np.float64)
-    information = real @ real.T + np.diag(slopes**2)
-    gradient = real @ np.ascontiguousarray(residual).view(np.float64) - slopes * pulls
+    information = (real @ real.T) * np.outer(by_x, by_x) + np.diag(slopes**2)
+    gradient = (real @ np.ascontiguousarray(residual).view(np.float64)) * by_x - slopes * pulls
     cost = _squares(residual) + float((pulls**2).sum())
     return Linearised(cost if np.isfinite(cost) else np.inf, information, gradient)

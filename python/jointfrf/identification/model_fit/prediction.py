@@ -12,10 +12,33 @@ from jointfrf.identification.model_fit.assembly import Assembly, assembly_connec
 from jointfrf.identification.model_fit.reduced import ReducedSlope, ReducedSubstructure, SubstructureState
 from jointfrf.identification.model_fit.unknowns import ParameterVector
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.kernel.linear_algebra import invert
 from jointfrf.laws.law_joint import Connection
-from jointfrf.substructuring.connection import connection_matrix
+from jointfrf.substructuring.connection import connect, connection_forces
 
-__all__ = ["Prediction"]
+__all__ = ["LineCompliance", "Prediction"]
+
+
+class _Open(NamedTuple):
+    """FRFs before the substructures are connected: they change with the models only.
+
+    Attributes
+    ----------
+    h : ndarray, shape (n_freq, m, m)
+        Of all DOFs that matter, m/N.
+    free : ndarray, shape (n_freq, n_o, n_i)
+        Of the channels.
+    to_out, to_in : ndarray, shapes (n_freq, n_o, q), (n_freq, q, n_i)
+        From connections to responses, from forces to connections.
+    between : ndarray, shape (n_freq, q, q)
+        Across the connections.
+    """
+
+    h: ComplexArray
+    free: ComplexArray
+    to_out: ComplexArray
+    to_in: ComplexArray
+    between: ComplexArray
 
 
 class _Coupled(NamedTuple):
@@ -25,19 +48,31 @@ class _Coupled(NamedTuple):
     ----------
     y : ndarray, shape (n_freq, n_o, n_i)
         Without gains, m/N.
-    out, into : ndarray, shapes (n_freq, n_o, m), (n_freq, m, n_i)
-        dY = out dH into.
-    link : Connection
+    w : ndarray, shape (n_freq, q, q)
+        Forces of the connections by the motions across them.
     across_out, across_in : ndarray, shapes (n_freq, n_o, q), (n_freq, q, n_i)
         dY = -across_out dT across_in.
     """
 
     y: ComplexArray
-    out: ComplexArray
-    into: ComplexArray
-    link: Connection
+    w: ComplexArray
     across_out: ComplexArray
     across_in: ComplexArray
+
+
+class LineCompliance(NamedTuple):
+    """Compliance of the joint on each line by itself.
+
+    Attributes
+    ----------
+    c : ndarray, shape (n_freq, n, n)
+        K*^-1, m/N; NaN on lines that do not give it.
+    variance : ndarray, shape (n_freq, n)
+        Of the noise of its diagonal, but for a factor.
+    """
+
+    c: ComplexArray
+    variance: FloatArray
 
 
 class Prediction:
@@ -55,6 +90,7 @@ class Prediction:
         self.whole, self.freq_hz, self.omega = whole, freq_hz, 2 * np.pi * freq_hz
         self.places = places_of(whole, responses, forces)
         self.responses, self.forces = self.places.at(responses), self.places.at(forces)
+        self._last: tuple[tuple[SubstructureState, ...], _Open] | None = None
         self.sides = (
             ReducedSubstructure("A", whole.a, freq_hz, self.places.a),
             ReducedSubstructure("B", whole.b, freq_hz, self.places.b),
@@ -67,15 +103,55 @@ class Prediction:
         found: FloatArray = np.median(1 / (size[0] + size[1]), axis=0)
         return found
 
+    def joint_compliance(
+        self, vector: ParameterVector, smooth: ComplexArray, variance: FloatArray
+    ) -> LineCompliance | None:
+        """Return the compliance of the joint on each line by itself, all else being as believed.
+
+        Parameters
+        ----------
+        vector : ParameterVector
+        smooth, variance : ndarray, shape (n_freq, n_o, n_i)
+            Smooth FRFs, and E|e|^2 of the measured ones; inf for those that are zero by symmetry.
+
+        Returns
+        -------
+        LineCompliance or None
+            None where there are fewer responses or forces than joint DOFs.
+
+        Notes
+        -----
+        Y = H_oi - H_oj W H_ji with W = (C + H_jj)^-1, j being the motions across the joint: by least squares, rows and
+        columns weighted by their noise.
+        """
+        n = len(self.whole.joint.dofs)
+        if min(smooth.shape[1:]) < n:
+            return None
+        link, states = self._parts(vector, vector.values)
+        h, e, rest = self._open(link, states).h, link.pattern[:, :n], slice(n, None)
+        if link.pattern.shape[1] > n:  # masses and attachments
+            h = connect(h, Connection(link.pattern[:, rest], link.s[:, rest, rest], link.t[:, rest, rest]), None, "nan")
+        gains, noise = self._gains(vector, vector.values), np.where(np.isfinite(variance), variance, 0)
+        taken = (h[:, self.responses][:, :, self.forces] - smooth / gains) * np.isfinite(variance)
+        row, column = (_weights(noise, axis) for axis in (2, 1))
+        with np.errstate(all="ignore"):
+            good = np.isfinite(h).all(axis=(1, 2))
+            left = np.linalg.pinv(np.where(good[:, None, None], h[:, self.responses] @ e * row, 0)) * row.swapaxes(1, 2)
+            right = column.swapaxes(1, 2) * np.linalg.pinv(
+                np.where(good[:, None, None], e.T @ h[:, :, self.forces] * column, 0)
+            )
+            back = invert(left @ taken @ right, on_singular="nan")
+            of_rows, of_columns = back @ left, right @ back
+            spread = np.einsum("ldp,lpq,lqd->ld", abs(of_rows) ** 2, noise, abs(of_columns) ** 2, optimize=True)
+        return LineCompliance(back - e.T @ h @ e, spread)
+
     def of_joint(
         self, vector: ParameterVector, values: FloatArray, lines: NDArray[np.intp]
     ) -> Callable[[FloatArray], ComplexArray]:
         """Return the FRFs of some lines as a function of values of which only those of the joint change."""
         link, states = self._parts(vector, values)
-        h, omega, own = _together(states)[lines], self.omega[lines], vector.places_of("joint")
-        gains, e = self._gains(vector, values), link.pattern
-        to_out, to_in = h[:, self.responses] @ e, e.T @ h[:, :, self.forces]
-        free, between = h[:, self.responses][:, :, self.forces], e.T @ h @ e
+        free, to_out, to_in, between = (part[lines] for part in self._open(link, states)[1:])
+        omega, own, gains = self.omega[lines], vector.places_of("joint"), self._gains(vector, values)
         s, t = link.s[lines], link.t[lines]
         q = self.whole.joint.connection(omega[:1]).pattern.shape[1]
 
@@ -91,12 +167,9 @@ class Prediction:
     def frfs(self, vector: ParameterVector, values: FloatArray) -> ComplexArray:
         """Return the FRFs for values of all parameters, shape (n_freq, n_o, n_i), m/N."""
         link, states = self._parts(vector, values)
-        h = _together(states)
-        w = connection_matrix(h, link, self.freq_hz, "nan")
-        across_out = h[:, self.responses] @ link.pattern
-        across_in = link.pattern.T @ h[:, :, self.forces]
-        y = h[:, self.responses][:, :, self.forces] - across_out @ w @ across_in
-        return y * self._gains(vector, values)
+        opened = self._open(link, states)
+        w = connection_forces(opened.between, link, self.freq_hz, "nan")
+        return (opened.free - opened.to_out @ (w @ opened.to_in)) * self._gains(vector, values)
 
     def linearised(self, vector: ParameterVector, values: FloatArray) -> tuple[ComplexArray, ComplexArray]:
         """Return the FRFs and their derivatives by the free values, shape (p, n_freq, n_o, n_i)."""
@@ -105,15 +178,16 @@ class Prediction:
         gains = self._gains(vector, values)
         slopes = np.zeros((len(vector.all), *coupled.y.shape), np.complex128)
         self._joint_slopes(vector, values, coupled, slopes)
-        self._model_slopes(vector, values, coupled, states, slopes)
-        slopes *= gains
+        self._model_slopes(vector, values, coupled, (link, states), slopes)
+        if (gains != 1).any():
+            slopes *= gains
         for i in vector.places_of("response"):
             row = int(vector.all[i].place[0])
             slopes[i, :, row] = (coupled.y * gains)[:, row] / values[i]
         for i in vector.places_of("force"):
             column = int(vector.all[i].place[0])
             slopes[i, :, :, column] = (coupled.y * gains)[:, :, column] / values[i]
-        return coupled.y * gains, slopes[vector.free]
+        return coupled.y * gains, slopes if len(slopes) == vector.free.size else slopes[vector.free]
 
     def refine(self, vector: ParameterVector, values: FloatArray) -> bool:
         """Return whether a basis had to be extended to be good for these values."""
@@ -134,15 +208,21 @@ class Prediction:
         states = [side.at(self._of_side(vector, values, name)) for side, name in zip(self.sides, "AB", strict=True)]
         return link, tuple(states)
 
+    def _open(self, link: Connection, states: tuple[SubstructureState, ...]) -> _Open:
+        """Return the FRFs before the substructures are connected; those of the same states are kept."""
+        if self._last is None or any(one is not other for one, other in zip(self._last[0], states, strict=True)):
+            h, e = _together(states), link.pattern
+            to_out, to_in = h[:, self.responses] @ e, e.T @ h[:, :, self.forces]
+            free = np.ascontiguousarray(h[:, self.responses][:, :, self.forces])
+            self._last = states, _Open(h, free, to_out, to_in, e.T @ h @ e)
+        return self._last[1]
+
     def _coupled(self, link: Connection, states: tuple[SubstructureState, ...]) -> _Coupled:
-        h, e = _together(states), link.pattern
-        w = connection_matrix(h, link, self.freq_hz, "nan")
-        to_out, to_in = h[:, self.responses] @ e, e.T @ h[:, :, self.forces]
-        unit = np.eye(h.shape[1])
-        out = unit[self.responses] - (to_out @ w) @ e.T
-        into = unit[:, self.forces] - e @ (w @ to_in)
-        y = h[:, self.responses][:, :, self.forces] - to_out @ w @ to_in
-        return _Coupled(y, out, into, link, out @ (h @ e), (e.T @ h) @ into)
+        opened = self._open(link, states)
+        w = connection_forces(opened.between, link, self.freq_hz, "nan")
+        out_w, w_in = opened.to_out @ w, w @ opened.to_in
+        across_out, across_in = opened.to_out - out_w @ opened.between, opened.to_in - opened.between @ w_in
+        return _Coupled(opened.free - opened.to_out @ w_in, w, across_out, across_in)
 
     def _gains(self, vector: ParameterVector, values: FloatArray) -> FloatArray:
         rows, columns = np.ones(len(self.responses)), np.ones(len(self.forces))
@@ -166,22 +246,29 @@ class Prediction:
             one = self.whole.attachments[at]
             entries = [(int(starts[at]) + n, int(starts[at]) + n) for n in range(len(one.places))]
             changes[i] = (entries, attachment_factors(one, self.omega)[number])
+        last: list[tuple[int, int]] = []
         for i, (entries, slope) in changes.items():
-            if vector.all[i].is_free:
-                for row, column in entries:
-                    left = coupled.across_out[:, :, row] * slope[:, None]
-                    slopes[i] -= left[:, :, None] * coupled.across_in[:, column, None, :]
+            if not vector.all[i].is_free:
+                continue
+            if entries != last:  # parameters of one law change the same entries
+                last = entries
+                moved = sum(
+                    coupled.across_out[:, :, row, None] * coupled.across_in[:, column, None, :]
+                    for row, column in entries
+                )
+            np.multiply(moved, -slope[:, None, None], out=slopes[i])
 
     def _model_slopes(
         self,
         vector: ParameterVector,
         values: FloatArray,
         coupled: _Coupled,
-        states: tuple[SubstructureState, ...],
+        parts: tuple[Connection, tuple[SubstructureState, ...]],
         slopes: ComplexArray,
     ) -> None:
         """Put the derivatives by unknowns of the models into their places."""
-        first = 0
+        link, states = parts
+        first, opened = 0, self._open(link, states)
         for side, state, name in zip(self.sides, states, "AB", strict=True):
             own = slice(first, first + len(side.dofs))
             first = own.stop
@@ -190,14 +277,18 @@ class Prediction:
                 continue
             names = [str(vector.all[i].place[0]) for i in places]
             of_side = side.slopes(self._of_side(vector, values, name), names)
-            left = coupled.out[:, :, own] @ state.x
-            right = state.x.swapaxes(1, 2) @ coupled.into[:, own]
+            # dY = out dH into
+            unit, e = np.eye(opened.h.shape[1])[own], link.pattern[own]
+            out = unit[:, self.responses].T - (opened.to_out @ coupled.w) @ e.T
+            into = unit[:, self.forces] - e @ (coupled.w @ opened.to_in)
+            left = out @ state.x
+            right = state.x.swapaxes(1, 2) @ into
             assert state.matrices is not None
             for i, slope in zip(places, of_side, strict=True):
                 slopes[i] = _by_slope(slope, state.matrices.eta, self.omega, left, right)
                 if slope.ports is not None:
-                    slopes[i] += coupled.out[:, :, own] @ (slope.ports @ right)
-                    slopes[i] += (left @ slope.ports.T) @ coupled.into[:, own]
+                    slopes[i] += out @ (slope.ports @ right)
+                    slopes[i] += (left @ slope.ports.T) @ into
 
 
 def _together(states: tuple[SubstructureState, ...]) -> ComplexArray:
@@ -206,6 +297,13 @@ def _together(states: tuple[SubstructureState, ...]) -> ComplexArray:
     h = np.zeros((len(a), n, n), np.complex128)
     h[:, :n_a, :n_a], h[:, n_a:, n_a:] = a, b
     return h
+
+
+def _weights(variance: FloatArray, axis: int) -> FloatArray:
+    """Return 1 over the standard deviation of rows or columns, 0 where all is zero; the axis that is averaged is kept."""
+    mean = variance.mean(axis=axis, keepdims=True)
+    found: FloatArray = np.where(mean > 0, 1 / np.sqrt(np.where(mean > 0, mean, 1)), 0)
+    return found
 
 
 def _by_slope(

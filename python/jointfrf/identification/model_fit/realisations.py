@@ -1,0 +1,97 @@
+"""Joints from many sets of FRFs of one assembly: realisations of noise, repeated measurements."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable, Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from jointfrf.errors import IllConditionedWarning
+from jointfrf.frf.noise_parts import noise_parts
+from jointfrf.identification.model_fit.assembly import Assembly
+from jointfrf.identification.model_fit.fit import FoundModel, fit_assembly
+from jointfrf.identification.model_fit.likelihood import Likelihood
+from jointfrf.identification.model_fit.minimum import minimise
+from jointfrf.identification.model_fit.prepare import ChannelNoise, Channels, prepare_model_fit
+from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.laws.law_joint import LawJoint
+
+__all__ = ["joints_of_realisations"]
+
+#: Noise is found from measured minus fitted FRFs so many times, first from those of the first set.
+_TURNS = 2
+#: A set whose noise exceeds that of the first by this factor gets starts of its own.
+_LIKE = 1.1
+
+
+class _Noise(NamedTuple):
+    """E|e|^2 of FRFs, inf where nothing is measured, and its median level relative to them."""
+
+    variance: FloatArray
+    level: float
+
+
+def joints_of_realisations(
+    freq_hz: FloatArray, measured: Iterable[ComplexArray], whole: Assembly, channels: Channels
+) -> Iterator[LawJoint]:
+    """Yield the joint of each of several sets of FRFs of the same assembly.
+
+    Parameters
+    ----------
+    freq_hz : ndarray, shape (n_freq,)
+        Hz.
+    measured : iterable of ndarray, shape (n_freq, n_o, n_i)
+        Each as `identify_model` takes it, all FRFs measured, m/N.
+    whole : Assembly
+    channels : Channels
+
+    Notes
+    -----
+    The first set is fitted as by `identify_model`. The others start there, and their noise, relative part and floor by
+    entry, is found from measured minus fitted FRFs in place of smooth ones. Each minimum is its own; a set that comes to
+    another noise, or does not converge, is fitted as the first.
+    """
+    first: FoundModel | None = None
+    level = np.inf
+    for h in measured:
+        if first is not None:
+            near = _near(first, h, level)
+            if near is not None:
+                yield near
+                continue
+        found = fit_assembly(prepare_model_fit(freq_hz, h, whole, channels, ChannelNoise(), ()))
+        yield _joint_of(found, found.values)
+        if first is None and found.minimum.converged and found.test.is_noise and not found.problem.is_assumed:
+            first, level = found, _noise(found, h, found.predicted).level
+
+
+def _joint_of(found: FoundModel, values: FloatArray) -> LawJoint:
+    return found.problem.prediction.whole.joint.with_values(values[found.problem.vector.places_of("joint")])
+
+
+def _near(first: FoundModel, h: ComplexArray, level: float) -> LawJoint | None:
+    """Return the joint of the minimum near to that of other FRFs, None where the noise is not like theirs."""
+    problem, x, predicted = first.problem, first.minimum.x, first.predicted
+    vector, prediction = problem.vector, problem.prediction
+    with warnings.catch_warnings(), np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+        warnings.simplefilter("ignore", IllConditionedWarning)
+        for _ in range(_TURNS):
+            noise = _noise(first, h, predicted)
+            minimum = minimise(Likelihood.of_variance(prediction, vector, h, noise.variance, problem.inflation), x)
+            x = minimum.x
+            predicted = prediction.frfs(vector, vector.to_values(x))
+    is_like = _noise(first, h, predicted).level < _LIKE * level
+    return _joint_of(first, vector.to_values(x)) if minimum.converged and is_like else None
+
+
+def _noise(first: FoundModel, h: ComplexArray, predicted: ComplexArray) -> _Noise:
+    """Return the noise of FRFs about fitted ones."""
+    used = np.isfinite(first.problem.variance).all(axis=0)
+    squares, size = (np.ascontiguousarray((abs(part[:, used]) ** 2).T) for part in (h - predicted, predicted))
+    relative, floor = noise_parts(squares, np.stack([size, np.ones_like(size)]))
+    own = np.maximum(relative[:, None] * size + floor[:, None], np.finfo(float).tiny)
+    variance = np.full(h.shape, np.inf)
+    variance[:, used] = own.T
+    return _Noise(variance, float(np.median(np.sqrt(own / np.maximum(size, np.finfo(float).tiny)))))
