@@ -40,6 +40,10 @@ _MOTIONS = ("translation", "rotation")
 _MOST_LINES = 1_000_000
 #: A higher level of noise is more often 5 % written as 5 than meant.
 _HIGH_LEVEL = 0.5
+#: E|e|^2 of a noise number of level 1.
+_SQUARES: dict[NoiseKind, float] = {
+    "complex": 1.0, "complex-per-part": 2.0, "real-normal": 1.0, "real-uniform": 1 / 3, "real-uniform-std": 1.0,
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -97,6 +101,14 @@ class Noise:
             h, self.level, self.kind, seed, relative_to=self.relative_to, reciprocal=self.reciprocal,
             block=self.block, first=first, count=count,
         )  # fmt: skip
+
+    def variance(self, h: ComplexArray) -> FloatArray:
+        """Return E|e|^2 of FRFs, shape (n_freq, n, n)."""
+        size: FloatArray = abs(h)
+        if self.relative_to != "entry":
+            own = (1, 2) if self.relative_to == "line" else (0, 1, 2)
+            size = np.broadcast_to(size.max(axis=own, keepdims=True), h.shape)
+        return np.asarray(_SQUARES[self.kind] * (self.level * size) ** 2)
 
 
 def actual_values(joint: Joint) -> FloatArray:

@@ -9,17 +9,21 @@ import numpy as np
 
 from jointfrf.errors import ConvergenceWarning, FrfCheckWarning, IdentificationWarning, IllConditionedWarning
 from jointfrf.identification.identify import IdentificationMethod, identify
+from jointfrf.identification.compliance_fit.line_forms import inverse_information
 from jointfrf.identification.joint_fit import JointFit
 from jointfrf.identification.model_fit.assembly import Assembly
+from jointfrf.identification.model_fit.likelihood import Likelihood
+from jointfrf.identification.model_fit.prediction import Prediction
 from jointfrf.identification.model_fit.prepare import Channels
 from jointfrf.identification.model_fit.realisations import joints_of_realisations
 from jointfrf.identification.model_fit.substructure import Substructure
+from jointfrf.identification.model_fit.unknowns import parameter_vector
 from jointfrf.identification.realisations import identify_realisations
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.laws.law_joint import LawJoint
 from jointfrf.laws.springs import SpringLaw
 
-__all__ = ["FITTED", "METHODS", "fit_decoupling", "fit_measured", "fit_viscous"]
+__all__ = ["FITTED", "METHODS", "decoupling_bound", "fit_decoupling", "fit_measured", "fit_viscous"]
 
 METHODS: tuple[str, ...] = (*get_args(IdentificationMethod), "decoupling-fit")
 #: Methods that take all lines, not means over bands.
@@ -83,15 +87,51 @@ def fit_decoupling(
     What (2.53)-(2.56) take one block each is one maximum-likelihood fit of all four. The first set is fitted with nothing
     told, the others start there.
     """
-    joint, inner = [f"joint {dof}" for dof in dofs], [f"inner {dof}" for dof in dofs]
-    a, b = (Substructure.of_frfs(freq_hz, h, [*joint, *inner], joint) for h in substructures)
-    diagonal = np.einsum("laa->la", k_initial)
-    k, c = np.median(diagonal.real, axis=0), np.median(diagonal.imag / (2 * np.pi * freq_hz)[:, None], axis=0)
-    whole = Assembly(a, b, LawJoint({dof: SpringLaw(k[i], c=c[i]) for i, dof in enumerate(dofs)}))
-    names = (*(f"A/{name}" for name in inner), *(f"B/{name}" for name in inner))
-    channels = Channels(names, names)
+    whole, channels = _decoupled(freq_hz, dofs, substructures, k_initial)
     found = [one.constant_joint() for one in joints_of_realisations(freq_hz, measured, whole, channels)]
     return np.array([[*joint.stiffness.diagonal(), *joint.damping.diagonal()] for joint in found])
+
+
+def _decoupled(
+    freq_hz: FloatArray, dofs: tuple[str, ...], substructures: tuple[ComplexArray, ComplexArray], k_joint: ComplexArray
+) -> tuple[Assembly, Channels]:
+    """Return substructures by their FRFs, with springs and dashpots near to K*, and the channels at r, then s."""
+    joint, inner = [f"joint {dof}" for dof in dofs], [f"inner {dof}" for dof in dofs]
+    a, b = (Substructure.of_frfs(freq_hz, h, [*joint, *inner], joint) for h in substructures)
+    diagonal = np.einsum("laa->la", k_joint)
+    k, c = np.median(diagonal.real, axis=0), np.median(diagonal.imag / (2 * np.pi * freq_hz)[:, None], axis=0)
+    names = (*(f"A/{name}" for name in inner), *(f"B/{name}" for name in inner))
+    laws = {dof: SpringLaw(k[i], c=c[i], damping="viscous") for i, dof in enumerate(dofs)}
+    return Assembly(a, b, LawJoint(laws)), Channels(names, names)
+
+
+def decoupling_bound(
+    freq_hz: FloatArray,
+    dofs: tuple[str, ...],
+    substructures: tuple[ComplexArray, ComplexArray],
+    k_joint: ComplexArray,
+    variance: FloatArray,
+) -> FloatArray:
+    """Return the Cramer-Rao bound of `fit_decoupling`: relative standard deviations, shape (2 n,).
+
+    Parameters
+    ----------
+    freq_hz, dofs, substructures
+        As of `fit_decoupling`.
+    k_joint : ndarray, shape (n_freq, n, n)
+        The actual K* of springs and dashpots, N/m.
+    variance : ndarray, shape (n_freq, 2 n, 2 n)
+        E|e|^2 of circular noise, (m/N)^2, independent between the FRFs; 0 for FRFs that are zero.
+    """
+    whole, channels = _decoupled(freq_hz, dofs, substructures, k_joint)
+    prediction = Prediction(whole, freq_hz, channels.responses, channels.forces)
+    vector = parameter_vector(whole, ({}, {}), (), prediction.joint_stiffness())
+    exact = prediction.frfs(vector, vector.values)
+    at_truth = Likelihood.of_variance(prediction, vector, exact, variance, 1.0)
+    x = vector.to_coordinates(vector.values)
+    covariance = inverse_information(at_truth.linearised(x).information)
+    relative = np.sqrt(np.diagonal(covariance)) * vector.slope(x) / abs(vector.values)
+    return np.concatenate([relative[::2], relative[1::2]])
 
 
 def fit_measured(freq_hz: FloatArray, dofs: tuple[str, ...], h: ComplexArray, transform: FloatArray) -> JointFit:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Self
 
@@ -179,13 +180,17 @@ class LawJoint:
 
     def with_values(self, values: ArrayLike) -> Self:
         """Return the same joint with other values of its parameters, shape (p,)."""
-        found = as_real("values", values, (len(self.names),))
+        found = as_real("values", values, (sum(len(law.fields) for law in self.laws.values()) + len(self.mass),))
         laws, at = {}, 0
         for pair, law in self.laws.items():
             laws[pair] = law.with_values(found[at : at + len(law.fields)])
             at += len(law.fields)
-        mass = dict(zip(self.mass, found[at:].tolist(), strict=True))
-        return type(self)(laws, self.rigid, mass, self.dofs)
+        if (found[at:] < 0).any():
+            raise ValueError(f"the mass of the joint must not be negative, not {found[at:].min():g}")
+        other = copy(self)
+        object.__setattr__(other, "laws", laws)
+        object.__setattr__(other, "mass", dict(zip(self.mass, found[at:].tolist(), strict=True)))
+        return other
 
     def _place(self, pair: tuple[str, str]) -> tuple[int, int]:
         return self.dofs.index(pair[0]), self.dofs.index(pair[1])

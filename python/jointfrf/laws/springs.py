@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass
+from functools import cache
 from typing import Literal, Self, get_args
 
 import numpy as np
@@ -14,6 +16,16 @@ from jointfrf.laws.law import JointLaw, LawField, checked_values
 __all__ = ["SpringDamping", "SpringLaw"]
 
 SpringDamping = Literal["none", "viscous", "hysteretic", "both"]
+
+
+@cache
+def _fields(damping: SpringDamping, is_cross: bool) -> tuple[LawField, ...]:  # noqa: FBT001
+    found = [LawField("k", "stiffness", -np.inf if is_cross else 0.0)]
+    if damping in ("hysteretic", "both"):
+        found.append(LawField("h", "stiffness"))
+    if damping in ("viscous", "both"):
+        found.append(LawField("c", "damping"))
+    return tuple(found)
 
 
 @dataclass(frozen=True)
@@ -68,12 +80,8 @@ class SpringLaw(JointLaw):
     @property
     def fields(self) -> tuple[LawField, ...]:
         """k, then h, then c, as far as they are parameters."""
-        found = [LawField("k", "stiffness", -np.inf if self.is_cross else 0.0)]
-        if self.damping in ("hysteretic", "both"):
-            found.append(LawField("h", "stiffness"))
-        if self.damping in ("viscous", "both"):
-            found.append(LawField("c", "damping"))
-        return tuple(found)
+        assert self.damping is not None
+        return _fields(self.damping, self.is_cross)
 
     @property
     def values(self) -> FloatArray:
@@ -83,8 +91,10 @@ class SpringLaw(JointLaw):
     def with_values(self, values: ArrayLike) -> Self:
         """Return the same law with other values."""
         found = checked_values("a spring", self.fields, values)
-        named = {"c": 0.0, "h": 0.0} | dict(zip((f.name for f in self.fields), found.tolist(), strict=True))
-        return type(self)(**named, damping=self.damping, is_cross=self.is_cross)
+        other = copy(self)
+        for field, value in zip(self.fields, found.tolist(), strict=True):
+            object.__setattr__(other, field.name, value)
+        return other
 
     def stiffness(self, omega: FloatArray) -> ComplexArray:
         """Return k + i h + i w c, shape (n_freq,)."""

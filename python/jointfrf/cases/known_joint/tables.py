@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from jointfrf.cases.comparison import frequency_table, verdict
+from jointfrf.cases.known_joint.bounds import decoupling_bounds
 from jointfrf.cases.known_joint.compute import KnownJointResult
 from jointfrf.cases.known_joint.expected import ExpectedErrors, ExpectedParameters
 from jointfrf.cases.known_joint.published_tables import (
@@ -105,6 +106,7 @@ def known_joint_tables(result: KnownJointResult) -> list[Table]:
         *region_tables(result),
         *_frequencies(result),
         _identified(rows, result.n_realisations),
+        *_bounds(result),
         *_blocks(result),
         *_limits(result, rows),
         band_table(result),
@@ -155,6 +157,27 @@ def _identified(rows: list[Row], count: int) -> Table:
     )
     title = f"Identified joint parameters, {count} realisations"
     return Table("identified", title, columns, tuple(seen), percentages=("RMSE, %",))
+
+
+def _bounds(result: KnownJointResult) -> list[Table]:
+    """Table of the decoupling fit beside its bound; none where no case applies it to noise that has one."""
+    cells: list[tuple[Cell, ...]] = []
+    for name, bound in decoupling_bounds(result.case, result.exact).items():
+        theta = next(one.theta for one in result.identified if (one.noise, one.method) == (name, "decoupling-fit"))
+        for p, (parameter, actual) in enumerate(zip(result.case.parameters, result.case.actual.tolist(), strict=True)):
+            error = 100 * float(np.sqrt(((theta[:, p] / actual - 1) ** 2).mean()))
+            least = 100 * float(bound[p])
+            cells.append((name, parameter, parameter.unit, actual, error, least, error / least))
+    if not cells:
+        return []
+    columns = ("noise", "parameter", "unit", "actual", "RMSE, %", "bound, %", "ratio")
+    note = (
+        "Bound: the Cramer-Rao bound of all FRFs between internal points with the FRFs of the substructures, for "
+        "circular noise of the variance that the noise has. Noise that changes no phase can be undercut, and need not "
+        "reach it."
+    )
+    title = "The decoupling fit beside its bound"
+    return [Table("bounds", title, columns, tuple(cells), note=note, percentages=("RMSE, %", "bound, %"))]
 
 
 def _blocks(result: KnownJointResult) -> list[Table]:

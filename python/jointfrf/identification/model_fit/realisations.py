@@ -20,8 +20,9 @@ from jointfrf.laws.law_joint import LawJoint
 
 __all__ = ["joints_of_realisations"]
 
-#: Noise is found from measured minus fitted FRFs so many times, first from those of the first set.
-_TURNS = 2
+#: Noise is found from measured minus fitted FRFs twice, first from those fitted to the first set; steps end when they
+#: promise to lower the squares by less than this.
+_LEAST = (1e-2, 1e-4)
 #: A set whose noise exceeds that of the first by this factor gets starts of its own.
 _LIKE = 1.1
 
@@ -77,13 +78,16 @@ def _near(first: FoundModel, h: ComplexArray, level: float) -> LawJoint | None:
     vector, prediction = problem.vector, problem.prediction
     with warnings.catch_warnings(), np.errstate(over="ignore", divide="ignore", invalid="ignore"):
         warnings.simplefilter("ignore", IllConditionedWarning)
-        for _ in range(_TURNS):
+        for turn in range(len(_LEAST)):
+            if turn:
+                predicted = prediction.frfs(vector, vector.to_values(x))
             noise = _noise(first, h, predicted)
-            minimum = minimise(Likelihood.of_variance(prediction, vector, h, noise.variance, problem.inflation), x)
+            if turn and not noise.level < _LIKE * level:
+                return None
+            squares = Likelihood.of_variance(prediction, vector, h, noise.variance, problem.inflation)
+            minimum = minimise(squares, x, least=_LEAST[turn])
             x = minimum.x
-            predicted = prediction.frfs(vector, vector.to_values(x))
-    is_like = _noise(first, h, predicted).level < _LIKE * level
-    return _joint_of(first, vector.to_values(x)) if minimum.converged and is_like else None
+    return _joint_of(first, vector.to_values(x)) if minimum.converged else None
 
 
 def _noise(first: FoundModel, h: ComplexArray, predicted: ComplexArray) -> _Noise:
