@@ -104,7 +104,7 @@ class Noise:
 
     def variance(self, h: ComplexArray) -> FloatArray:
         """Return E|e|^2 of FRFs, shape (n_freq, n, n)."""
-        size: FloatArray = abs(h)
+        size: FloatArray = np.abs(h)
         if self.relative_to != "entry":
             own = (1, 2) if self.relative_to == "line" else (0, 1, 2)
             size = np.broadcast_to(size.max(axis=own, keepdims=True), h.shape)

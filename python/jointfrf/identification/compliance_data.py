@@ -13,6 +13,7 @@ from jointfrf.identification.compliance_fit.estimator import FittedGroup, JointE
 from jointfrf.identification.compliance_fit.fit import ComplianceFit
 from jointfrf.identification.compliance_fit.interface_frfs import InterfaceFrfs
 from jointfrf.identification.compliance_fit.line_forms import inverse_information
+from jointfrf.identification.compliance_fit.joint_terms import terms_of
 from jointfrf.identification.compliance_fit.manifold import frfs_of_joint, project
 from jointfrf.identification.compliance_fit.prepare import FitProblem
 from jointfrf.identification.compliance_fit.starts import smooth_compliance, starts_on_manifold
@@ -114,7 +115,7 @@ def regenerated_frfs(found: JointEstimate, n: int, lines: slice) -> ComplexArray
 def _of_group(group: FittedGroup, lines: slice) -> ComplexArray:
     """Return the regenerated FRFs of one group of DOFs."""
     data, joint = group.problem.data.on_slice(lines), group.joint
-    entries = type(joint)(joint.terms.on_lines(lines)).compliance(group.fit.minimum.x)  # type: ignore[call-arg]
+    entries = type(joint)(terms_of(joint).on_lines(lines)).compliance(group.fit.minimum.x)  # type: ignore[call-arg]
     c = group.problem.of_joint(entries)
     unknown = group.problem.unknown[lines].reshape(c.shape)
     with warnings.catch_warnings(), np.errstate(all="ignore"):

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy import special
 
 from jointfrf.identification.compliance_fit.estimator import JointEstimate
-from jointfrf.identification.compliance_fit.joint_terms import DiagonalJoint
+from jointfrf.identification.compliance_fit.joint_terms import DiagonalJoint, terms_of
 from jointfrf.kernel.arguments import FloatArray
 
 __all__ = ["BandParts", "fit_band_parts", "left_out_share"]
@@ -74,7 +74,7 @@ def fit_band_parts(
     in_compliance = np.zeros(factor.size, bool)
     for group in found.groups:
         if isinstance(group.joint, DiagonalJoint):
-            in_compliance[group.which] = group.joint.terms.kinds == 0
+            in_compliance[group.which] = terms_of(group.joint).kinds == 0
     parts = [np.sort(own) for own in np.array_split(np.argsort(freq_hz), _PARTS)]
     theta, variance = (np.full((_PARTS, factor.size), np.nan) for _ in range(2))
     for b, own in enumerate(parts):

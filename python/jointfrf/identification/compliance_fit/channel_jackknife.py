@@ -10,7 +10,7 @@ from scipy import special
 from jointfrf.identification.compliance_fit.estimator import FittedGroup, JointEstimate
 from jointfrf.identification.compliance_fit.group_fit import gradients_of
 from jointfrf.identification.compliance_fit.interface_frfs import InterfaceFrfs
-from jointfrf.identification.compliance_fit.joint_terms import DiagonalJoint
+from jointfrf.identification.compliance_fit.joint_terms import DiagonalJoint, terms_of
 from jointfrf.identification.compliance_fit.line_forms import inverse_information
 from jointfrf.identification.compliance_fit.rigidity import ChannelModes, left_out
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
@@ -108,7 +108,7 @@ def _spread(
     (of_coordinate, of_coordinates), (of_parameter, ratio) = found
     # A rigid DOF has no finite slope.
     ratio = np.where(np.isfinite(ratio), ratio, of_coordinates)
-    in_compliance = isinstance(group.joint, DiagonalJoint) & (group.joint.terms.kinds == 0)
+    in_compliance = isinstance(group.joint, DiagonalJoint) & (terms_of(group.joint).kinds == 0)
     return np.where(in_compliance, of_coordinate, of_parameter), np.nan_to_num(ratio)
 
 

@@ -7,7 +7,13 @@ from typing import NamedTuple
 import numpy as np
 
 from jointfrf.identification.compliance_fit.estimator import FittedGroup
-from jointfrf.identification.compliance_fit.joint_terms import DampingTerms, DiagonalJoint, JointTerms, joint_terms
+from jointfrf.identification.compliance_fit.joint_terms import (
+    DampingTerms,
+    DiagonalJoint,
+    JointTerms,
+    joint_terms,
+    terms_of,
+)
 from jointfrf.identification.compliance_fit.line_forms import FormMinimum, minimise_forms
 
 __all__ = ["DofDamping", "choose_damping", "with_terms"]
@@ -49,7 +55,7 @@ def choose_damping(group: FittedGroup, dofs: tuple[str, ...], factor: float) -> 
     BIC = 2 squares / factor + p ln(2 equations / factor). A joint supplies no energy: terms of opposite sign that
     nearly cancel each other are noise, so "both" needs two terms that are positive.
     """
-    fit, own = group.fit, group.joint.terms
+    fit, own = group.fit, terms_of(group.joint)
     price = np.log(max(2 * fit.equations / factor, 2.0))
     choices = []
     for d, dof in enumerate(dofs):
@@ -76,6 +82,6 @@ def with_terms(group: FittedGroup, terms: JointTerms) -> FittedGroup:
 
 def _minimum(group: FittedGroup, terms: JointTerms) -> FormMinimum:
     """Minimise the forms of a group with fewer terms, from the joint found with all."""
-    own, joint = group.joint.terms, DiagonalJoint(terms)
+    own, joint = terms_of(group.joint), DiagonalJoint(terms)
     kept = [own.parameters.index(one) for one in terms.parameters]
     return minimise_forms(group.fit.forms, joint, joint.coordinates(group.joint.theta(group.fit.minimum.x)[kept]))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from jointfrf.identification.compliance_fit.joint_terms import DiagonalJoint, JointCoordinates
+from jointfrf.identification.compliance_fit.joint_terms import DiagonalJoint, JointCoordinates, terms_of
 from jointfrf.identification.compliance_fit.line_forms import LEAST_GAIN, FormMinimum, LineForms, minimise_forms
 from jointfrf.kernel.arguments import FloatArray
 
@@ -18,7 +18,7 @@ _COARSE = 1e-2
 
 def within_reach(joint: JointCoordinates) -> FloatArray:
     """Return rates at which damping is as large as stiffness on the highest line, one for each damping parameter."""
-    terms = joint.terms
+    terms = terms_of(joint)
     fastest = max(float(terms.omega.max()), np.finfo(float).tiny)
     reach: FloatArray = np.where(terms.kinds[terms.n :] == 1, 1.0, 1 / fastest)
     return reach

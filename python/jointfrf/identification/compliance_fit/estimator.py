@@ -18,6 +18,7 @@ from jointfrf.identification.compliance_fit.joint_terms import (
     DiagonalJoint,
     JointCoordinates,
     JointTerms,
+    terms_of,
 )
 from jointfrf.identification.compliance_fit.line_forms import inverse_information
 from jointfrf.identification.compliance_fit.manifold import LineData
@@ -143,7 +144,7 @@ def _fitted(problem: GroupProblem, cross: CrossTerms, near: FittedGroup | None) 
             return found
     # Some lines, evenly spread, start as well as all.
     some = _some(np.arange(len(problem.data.measured)))
-    starts = first_joints(problem.data.on_lines(some), coordinates_of(problem.joint.terms.on_lines(some)))
+    starts = first_joints(problem.data.on_lines(some), coordinates_of(terms_of(problem.joint).on_lines(some)))
     if not problem.is_diagonal or problem.data.entries.n == 1:
         return fit_dofs(problem, starts)
     diagonal = fit_unknown_cross(problem, starts)
@@ -161,7 +162,7 @@ def _fitted(problem: GroupProblem, cross: CrossTerms, near: FittedGroup | None) 
 
 def _is_near(near: FittedGroup, problem: GroupProblem) -> bool:
     """Whether the fit of other FRFs has the same parameters, and converged."""
-    return near.fit.converged and near.joint.terms.parameters == problem.joint.terms.parameters
+    return near.fit.converged and terms_of(near.joint).parameters == terms_of(problem.joint).parameters
 
 
 def coordinates_of(terms: JointTerms) -> JointCoordinates:
@@ -208,7 +209,7 @@ def _with_hidden_rates(covariance: FloatArray, group: FittedGroup, error: FloatA
     standard error.
     """
     joint, minimum = group.joint, group.fit.minimum
-    hidden = np.flatnonzero((minimum.x[joint.terms.pairs[:, 0]] == 0) & (joint.terms.kinds > 0))
+    hidden = np.flatnonzero((minimum.x[terms_of(joint).pairs[:, 0]] == 0) & (terms_of(joint).kinds > 0))
     if hidden.size == 0:
         return covariance
     at = minimum.x.copy()

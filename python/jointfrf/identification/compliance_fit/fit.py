@@ -24,6 +24,7 @@ from jointfrf.identification.compliance_fit.joint_terms import (
     DiagonalJoint,
     JointTerms,
     joint_terms,
+    terms_of,
 )
 from jointfrf.identification.compliance_fit.misfit import Misfit, diagnose
 from jointfrf.identification.compliance_fit.prepare import FitProblem
@@ -154,7 +155,7 @@ def _of_parameters(result: JointEstimate, parts: BandParts | None) -> FloatArray
     slope = np.ones(result.theta.size)
     for group in result.groups:
         if isinstance(group.joint, DiagonalJoint):
-            slope[group.which] = np.where(group.joint.terms.kinds == 0, result.theta[group.which] ** 2, 1.0)
+            slope[group.which] = np.where(terms_of(group.joint).kinds == 0, result.theta[group.which] ** 2, 1.0)
     variance: FloatArray = np.square(slope * parts.std_error)
     return variance
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from jointfrf.frf.bands import line_slices
 from jointfrf.identification.compliance_fit.diagonal_minimum import lowest_minimum, within_reach
-from jointfrf.identification.compliance_fit.joint_terms import DiagonalJoint, JointCoordinates
+from jointfrf.identification.compliance_fit.joint_terms import DiagonalJoint, JointCoordinates, terms_of
 from jointfrf.identification.compliance_fit.likely_m import PriorOfM, expected_m, prior_of_m
 from jointfrf.identification.compliance_fit.line_forms import FormMinimum, LineForms, inverse_information
 from jointfrf.identification.compliance_fit.manifold import LineData, OnManifold, normal_forms, project
@@ -226,7 +226,7 @@ def _from_softer(problem: GroupProblem, best: GroupFit) -> GroupFit:
         start = best.minimum.x.copy()
         start[:n] = np.where(barely, softer, a)
         # A rate that belongs to another compliance says nothing here.
-        start[n:] = np.where(barely[problem.joint.terms.pairs[n:, 0]], 0.0, start[n:])
+        start[n:] = np.where(barely[terms_of(problem.joint).pairs[n:, 0]], 0.0, start[n:])
         found = _iterate(problem, start)
         best, factor = (found, 3.0) if found.squares < best.squares else (best, 4 * factor)
     return best
@@ -260,7 +260,7 @@ def _iterate(problem: GroupProblem, start: FloatArray, patience: int = PATIENCE)
         x = minimum.x
         equations = float(free[trusted].sum())
         converged = bool(moved < _MOVED * np.sqrt(x.size)) and step > 1
-        barely = problem.is_diagonal and bool((error > _BARELY * abs(x))[: joint.terms.n].any())
+        barely = problem.is_diagonal and bool((error > _BARELY * abs(x))[: terms_of(joint).n].any())
         converged = converged and (hidden or not barely)
         # The first step tells, with M that cannot feign it; a joint barely seen once is treated so to the end.
         hidden = barely or (hidden and step > 1)
@@ -299,7 +299,7 @@ def _linearised(
 
 def _within_sight(forms: LineForms, joint: JointCoordinates, x: FloatArray, error: FloatArray) -> FloatArray:
     """Return where to linearise: not nearer to a rigid joint, nor at a larger rate of one, than the data can tell."""
-    terms, n = joint.terms, joint.terms.n
+    terms, n = terms_of(joint), terms_of(joint).n
     hardly = ~(error[:n] <= _HARDLY * x[:n])
     of_rate = hardly[terms.pairs[n:, 0]]
     at = x.copy()

@@ -11,7 +11,7 @@ from scipy import special
 from jointfrf.frf.bands import line_slices
 from jointfrf.identification.compliance_fit.diagonal_minimum import lowest_minimum
 from jointfrf.identification.compliance_fit.estimator import FittedGroup, JointEstimate
-from jointfrf.identification.compliance_fit.joint_terms import DiagonalJoint
+from jointfrf.identification.compliance_fit.joint_terms import DiagonalJoint, terms_of
 from jointfrf.identification.compliance_fit.line_forms import (
     LineForms,
     LineParts,
@@ -218,7 +218,7 @@ class LikelihoodIntervals:
             for group in self.found.groups:
                 own = [_limits(group, i, float(self.factor[which]), probability) for i, which in enumerate(group.which)]
                 reach = float(special.ndtri((1 + probability) / 2)) * self.added[group.which]
-                names = [parameter.name for parameter in group.joint.terms.parameters]
+                names = group.joint.names
                 by_name |= dict(zip(names, _widened(group, own, reach) if reach.any() else own, strict=True))
             self._known[probability] = {one.name: by_name[one.name] for one in self.found.parameters}
         return self._known[probability]
@@ -226,7 +226,7 @@ class LikelihoodIntervals:
 
 def _limits(group: FittedGroup, i: int, factor: float, probability: float) -> tuple[float, float]:
     """Return the limits of one parameter of a group."""
-    terms, x = group.joint.terms, group.fit.minimum.x
+    terms, x = terms_of(group.joint), group.fit.minimum.x
     covariance = inverse_information(2 * group.fit.minimum.information) * factor
     reach = float(special.ndtri((1 + probability) / 2))
     a = int(terms.pairs[i, 0])
@@ -246,7 +246,7 @@ def _widened(group: FittedGroup, limits: list[tuple[float, float]], reach: Float
 
     Of a stiffness it is one of the compliance, as it comes from compliance between the channels.
     """
-    theta, x, terms = group.joint.theta(group.fit.minimum.x), group.fit.minimum.x, group.joint.terms
+    theta, x, terms = group.joint.theta(group.fit.minimum.x), group.fit.minimum.x, terms_of(group.joint)
     is_diagonal = isinstance(group.joint, DiagonalJoint)
     found: list[tuple[float, float]] = []
     for i, ((low, high), own) in enumerate(zip(limits, reach, strict=True)):
@@ -294,7 +294,7 @@ def profile_interval(group: FittedGroup, index: int, factor: float, probability:
     >= 0 or of the damping; the interval is where they exceed their minimum by the quantile of chi^2, times the variance
     factor.
     """
-    terms = group.joint.terms
+    terms = terms_of(group.joint)
     of_stiffness = terms.kinds[index] == 0
     joint = DiagonalJoint(terms, by_rate=bool(of_stiffness))
     forms = group.fit.forms
@@ -324,7 +324,7 @@ def _may_be_rigid(group: FittedGroup, dof: int, factor: float, probability: floa
     start = minimum.x.copy()
     start[dof] = 0.0
     rigid = lowest_minimum(group.fit.forms, group.joint, start, dof, _PRECISE)
-    parameters = int(np.count_nonzero(group.joint.terms.pairs[:, 0] == dof))
+    parameters = int(np.count_nonzero(terms_of(group.joint).pairs[:, 0] == dof))
     return bool(rigid.cost - minimum.cost < _chi_squared(probability, parameters) * factor / 2)
 
 

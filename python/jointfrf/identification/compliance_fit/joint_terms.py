@@ -24,6 +24,7 @@ __all__ = [
     "JointCoordinates",
     "JointTerms",
     "joint_terms",
+    "terms_of",
 ]
 
 #: Terms of K* beside its stiffness.
@@ -134,14 +135,16 @@ class JointCoordinates(Protocol):
 
     Attributes
     ----------
-    terms : JointTerms
     lower, upper : ndarray, shape (p,)
         Smallest and largest value of each coordinate.
     """
 
-    terms: JointTerms
     lower: FloatArray
     upper: FloatArray
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the parameters."""
 
     def compliance(self, x: FloatArray) -> ComplexArray:
         """Return the entries of C that the coordinates change, shape (n_freq, q)."""
@@ -180,6 +183,11 @@ class DiagonalJoint:
         if by_rate:
             self.upper[self.rates] = self.largest_rate
         self.lower = np.where(terms.kinds > 0, -self.upper, 0.0)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the parameters."""
+        return tuple(one.name for one in self.terms.parameters)
 
     def _turn(self, x: FloatArray) -> ComplexArray:
         """Return 1/(1 + i eta + i w tau) of each DOF, shape (n_freq, n)."""
@@ -250,6 +258,11 @@ class CoupledJoint:
         self.lower = np.full(len(terms.parameters), -np.inf)
         self.upper = -self.lower
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the parameters."""
+        return tuple(one.name for one in self.terms.parameters)
+
     def compliance(self, x: FloatArray) -> ComplexArray:
         """Return the upper triangle of C, shape (n_freq, n (n + 1)/2); NaN where K* is singular."""
         return invert(self.terms.stiffness(x), on_singular="nan")[:, self.rows, self.columns]
@@ -303,3 +316,9 @@ class CoupledJoint:
     def theta_slope(self, x: FloatArray) -> FloatArray:
         """Return the unit matrix."""
         return np.eye(x.size)
+
+
+def terms_of(joint: JointCoordinates) -> JointTerms:
+    """Return the terms of a joint of springs and dampers."""
+    assert isinstance(joint, DiagonalJoint | CoupledJoint)
+    return joint.terms

@@ -169,8 +169,7 @@ def minimise_forms(
     """
     if isinstance(joint, DiagonalJoint):
         return _minimise_diagonal(forms, joint, start, held, least_gain)
-    assert isinstance(joint, CoupledJoint)
-    return _minimise_coupled(forms, joint, start, least_gain)
+    return _minimise_general(forms, joint, start, held, least_gain)
 
 
 def _minimise_diagonal(
@@ -187,7 +186,7 @@ def _minimise_diagonal(
     return FormMinimum(x, cost, information, gradient, forms, joint)
 
 
-def _at(forms: LineForms, joint: CoupledJoint, x: FloatArray) -> tuple[float, ComplexArray, ComplexArray]:
+def _at(forms: LineForms, joint: JointCoordinates, x: FloatArray) -> tuple[float, ComplexArray, ComplexArray]:
     entries = joint.compliance(x)
     with np.errstate(all="ignore"):
         squares, residual = forms.at(entries)
@@ -195,18 +194,34 @@ def _at(forms: LineForms, joint: CoupledJoint, x: FloatArray) -> tuple[float, Co
     return cost if np.isfinite(cost) else np.inf, entries, residual
 
 
-def _minimise_coupled(forms: LineForms, joint: CoupledJoint, start: FloatArray, least_gain: float) -> FormMinimum:
-    """Minimise over the entries of K* of a joint with cross terms; they have no bounds."""
-    x, damping, small = start, _FIRST, 0
+def _normal_equations(
+    forms: LineForms, joint: JointCoordinates, x: FloatArray, entries: ComplexArray, residual: ComplexArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return Re(J^H W J) and Re(J^H r) of all lines."""
+    if isinstance(joint, CoupledJoint):
+        return joint.normal_equations(x, entries, forms.weight, residual)
+    slope = joint.slope(x, entries)
+    adjoint = slope.conj().swapaxes(1, 2)
+    return (adjoint @ (forms.weight @ slope)).real.sum(axis=0), (adjoint @ residual[..., None])[..., 0].real.sum(axis=0)
+
+
+def _minimise_general(
+    forms: LineForms, joint: JointCoordinates, start: FloatArray, held: int | None, least_gain: float
+) -> FormMinimum:
+    """Minimise over coordinates that may have bounds: of a joint with cross terms, or of any laws."""
+    free = np.arange(start.size) != (-1 if held is None else held)
+    x, damping, small = np.where(free, np.clip(start, joint.lower, joint.upper), start), _FIRST, 0
     cost, entries, residual = _at(forms, joint, x)
-    information, gradient = joint.normal_equations(x, entries, forms.weight, residual)
+    information, gradient = _normal_equations(forms, joint, x, entries, residual)
     for _ in range(_STEPS):
+        moving = free & ~(((x <= joint.lower) & (gradient < 0)) | ((x >= joint.upper) & (gradient > 0)))
         size = np.sqrt(np.maximum(np.diagonal(information), np.finfo(float).tiny))
-        scaled = information / np.outer(size, size)
-        done = not np.isfinite(scaled).all()
+        scaled = (information / np.outer(size, size))[np.ix_(moving, moving)]
+        done = not (np.isfinite(scaled).all() and moving.any())
         while not done and damping <= _LARGEST:
-            damped = scaled + damping * np.eye(x.size)
-            there = x + np.linalg.lstsq(damped, gradient / size, rcond=1e-13)[0] / size
+            damped, step = scaled + damping * np.eye(len(scaled)), np.zeros(x.size)
+            step[moving] = np.linalg.lstsq(damped, (gradient / size)[moving], rcond=1e-13)[0] / size[moving]
+            there = np.where(free, np.clip(x + step, joint.lower, joint.upper), x)
             new_cost, new_entries, new_residual = _at(forms, joint, there)
             if new_cost <= cost + 1e-13 * abs(cost):
                 break
@@ -214,7 +229,7 @@ def _minimise_coupled(forms: LineForms, joint: CoupledJoint, start: FloatArray, 
         if done or damping > _LARGEST:
             break
         gain, x, cost, entries, residual = cost - new_cost, there, new_cost, new_entries, new_residual
-        information, gradient = joint.normal_equations(x, entries, forms.weight, residual)
+        information, gradient = _normal_equations(forms, joint, x, entries, residual)
         damping = damping / _RAISED if damping > 1e-12 else damping
         small = small + 1 if gain <= least_gain * max(1.0, 1e-6 * cost) else 0
         if small == 2:

@@ -124,7 +124,7 @@ def _local(found: JointEstimate, freq_hz: FloatArray) -> tuple[tuple[float, floa
 
 def _trends(group: FittedGroup, freq_hz: FloatArray, factor: FloatArray) -> list[Trend]:
     """Return the parameters that parts of the band disagree on."""
-    minimum, terms = group.fit.minimum, group.joint.terms
+    minimum = group.fit.minimum
     lines = np.flatnonzero(group.fit.trusted)
     p = minimum.x.size
     if lines.size < BLOCKS * (p + 2):
@@ -150,7 +150,7 @@ def _trends(group: FittedGroup, freq_hz: FloatArray, factor: FloatArray) -> list
         variance = np.einsum("ij,bjk,ik->bi", slope, covariance - whole, slope)
         errors[seen] = np.sqrt(np.maximum(variance, 0) * factor)
     told = []
-    for i, parameter in enumerate(terms.parameters):
+    for i, name in enumerate(group.joint.names):
         known = np.isfinite(changes[:, i]) & (errors[:, i] > 0)
         # A part that does not see the parameter says nothing about it.
         known &= errors[:, i] < abs(theta[i])
@@ -160,5 +160,5 @@ def _trends(group: FittedGroup, freq_hz: FloatArray, factor: FloatArray) -> list
         probability = float(special.chdtrc(np.count_nonzero(known) - 1, squares))
         if probability < _DISAGREE / p:
             centres = np.array([freq_hz[own].mean() for own in parts])
-            told.append(Trend(parameter.name, centres[known], values[known, i], probability))
+            told.append(Trend(name, centres[known], values[known, i], probability))
     return told

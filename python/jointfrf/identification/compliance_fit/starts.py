@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from jointfrf.frf.bands import line_slices
-from jointfrf.identification.compliance_fit.joint_terms import CoupledJoint, DiagonalJoint, JointCoordinates
+from jointfrf.identification.compliance_fit.joint_terms import CoupledJoint, DiagonalJoint, JointCoordinates, terms_of
 from jointfrf.identification.compliance_fit.line_forms import LineForms, minimise_forms
 from jointfrf.identification.compliance_fit.manifold import LineData, OnManifold, project
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
@@ -116,7 +116,7 @@ def first_joints(data: LineData, joint: JointCoordinates) -> list[FloatArray]:
     if not good.any():
         return []
     compliance, covariance, ratio = compliance[good], covariance[good], ratio[good]
-    here = type(joint)(joint.terms.on_lines(np.flatnonzero(good)))  # type: ignore[call-arg]
+    here = type(joint)(terms_of(joint).on_lines(np.flatnonzero(good)))  # type: ignore[call-arg]
     threshold = _HIDDEN if np.count_nonzero(ratio < _HIDDEN) > 2 * joint.lower.size else float(np.median(ratio))
     line_weight = 1 / (1 + (ratio / threshold) ** 8)
     a = range(n)
@@ -152,7 +152,7 @@ def _diagonal_starts(
     value: ComplexArray, variance: FloatArray, line_weight: FloatArray, joint: DiagonalJoint
 ) -> list[FloatArray]:
     """Fit each DOF's compliance by itself."""
-    n, p = joint.terms.n, joint.lower.size
+    n, p = terms_of(joint).n, joint.lower.size
     information = line_weight[:, None] / np.maximum(variance, np.finfo(float).tiny)
     mean = (information * value.real).sum(axis=0) / information.sum(axis=0)
     error = 1 / np.sqrt(information.sum(axis=0))
@@ -170,7 +170,7 @@ def _coupled_starts(
     value: ComplexArray, covariance: ComplexArray, own: FloatArray, line_weight: FloatArray, joint: CoupledJoint
 ) -> list[FloatArray]:
     """Fit all entries of C; first values from K* C = 1 by linear least squares, and from the mean of C."""
-    n = joint.terms.n
+    n = terms_of(joint).n
     a, b = joint.rows, joint.columns
     size = np.sqrt(np.maximum(np.einsum("lqq->lq", covariance).real, np.finfo(float).tiny))
     scaled = covariance / (size[:, :, None] * size[:, None, :])
@@ -197,15 +197,15 @@ def _mean_start(value: ComplexArray, own: FloatArray, line_weight: FloatArray, j
     w = line_weight / (own / size**4).max(axis=1)
     mean = np.tensordot(w, scaled, 1) / w.sum()
     k = np.linalg.pinv((mean + mean.T) / 2, hermitian=True) / np.outer(size, size)
-    start = np.zeros(len(joint.terms.parameters))
-    of_stiffness = joint.terms.kinds == 0
-    start[of_stiffness] = k[joint.terms.pairs[of_stiffness, 0], joint.terms.pairs[of_stiffness, 1]]
+    start = np.zeros(len(terms_of(joint).parameters))
+    of_stiffness = terms_of(joint).kinds == 0
+    start[of_stiffness] = k[terms_of(joint).pairs[of_stiffness, 0], terms_of(joint).pairs[of_stiffness, 1]]
     return start
 
 
 def _linear_start(value: ComplexArray, own: FloatArray, line_weight: FloatArray, joint: CoupledJoint) -> FloatArray:
     """Solve K*(theta) C = 1 by weighted linear least squares in units of each DOF: exact without noise."""
-    terms, n = joint.terms, joint.terms.n
+    terms, n = terms_of(joint), terms_of(joint).n
     size = np.sqrt(np.median(abs(np.einsum("laa->la", value)), axis=0))
     c = value / np.outer(size, size)
     root = np.sqrt(line_weight / (own / size**4).max(axis=1))

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from jointfrf.identification.compliance_fit.compliance_lines import ComplianceLines, compliance_lines
 from jointfrf.identification.compliance_fit.group_fit import GroupFit, GroupProblem, Misfitting
-from jointfrf.identification.compliance_fit.joint_terms import JointCoordinates
+from jointfrf.identification.compliance_fit.joint_terms import JointCoordinates, terms_of
 from jointfrf.identification.compliance_fit.line_forms import (
     FormMinimum,
     LineForms,
@@ -97,7 +97,7 @@ def fit_unknown_cross(problem: GroupProblem, starts: Iterable[FloatArray]) -> Gr
     """
     joint = problem.joint
     lines, is_symmetric = _lines(problem)
-    by_noise = lines.forms(np.zeros(joint.terms.n))
+    by_noise = lines.forms(np.zeros(terms_of(joint).n))
     best = _best_of([minimise_forms(by_noise, joint, start) for start in [*starts, _middle(lines, joint)]])
     equations = float((lines.weight[:, None] * lines.known).sum())
     possible = float(lines.known.sum())
@@ -162,7 +162,7 @@ def _finite(found: ComplianceLines) -> ComplianceLines:
 
 def _middle(lines: _Lines, joint: JointCoordinates) -> FloatArray:
     """Return the stiffness of the median of C, no damping."""
-    n = joint.terms.n
+    n = terms_of(joint).n
     start = np.zeros(joint.lower.size)
     for d in range(n):
         seen = lines.known[:, d] & (lines.weight > 0.5)

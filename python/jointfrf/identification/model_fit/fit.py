@@ -170,7 +170,7 @@ def _values_of_lines(problem: ModelProblem) -> Iterator[FloatArray]:
     vector, prediction = problem.vector, problem.prediction
     joint, omega = prediction.whole.joint, prediction.omega
     own, at = vector.places_of("joint"), problem.joint_channels
-    lines = []
+    lines: list[Callable[[], LineCompliance | None]] = []
     if at is not None:
         lines.append(lambda: interface_compliance(problem.smooth, problem.variance, at))
     if np.isfinite(problem.measured).all():
@@ -179,7 +179,7 @@ def _values_of_lines(problem: ModelProblem) -> Iterator[FloatArray]:
     def of_lines(found: LineCompliance | None) -> FloatArray | None:
         return None if found is None else from_lines(joint, omega, found)
 
-    for values_of in (*(lambda one=one: of_lines(one()) for one in lines), problem.compliance_start):  # type: ignore[misc]
+    for values_of in (*(lambda one=one: of_lines(one()) for one in lines), problem.compliance_start):
         values = values_of()
         if values is not None:
             free = np.array([vector.all[i].is_free for i in own])

@@ -135,15 +135,15 @@ class Prediction:
         taken = (h[:, self.responses][:, :, self.forces] - smooth / gains) * np.isfinite(variance)
         row, column = (_weights(noise, axis) for axis in (2, 1))
         with np.errstate(all="ignore"):
-            good = np.isfinite(h).all(axis=(1, 2))
-            left = np.linalg.pinv(np.where(good[:, None, None], h[:, self.responses] @ e * row, 0)) * row.swapaxes(1, 2)
+            good = np.asarray(np.isfinite(h).all(axis=(1, 2)))[:, None, None]
+            left = np.linalg.pinv(np.where(good, h[:, self.responses] @ e * row, 0)) * row.swapaxes(1, 2)
             right = column.swapaxes(1, 2) * np.linalg.pinv(
-                np.where(good[:, None, None], e.T @ h[:, :, self.forces] * column, 0)
+                np.where(good, e.T @ h[:, :, self.forces] * column, 0)
             )
             back = invert(left @ taken @ right, on_singular="nan")
             of_rows, of_columns = back @ left, right @ back
             spread = np.einsum("ldp,lpq,lqd->ld", abs(of_rows) ** 2, noise, abs(of_columns) ** 2, optimize=True)
-        return LineCompliance(back - e.T @ h @ e, spread)
+        return LineCompliance(back - e.T @ h @ e, np.asarray(spread, float))
 
     def of_joint(
         self, vector: ParameterVector, values: FloatArray, lines: NDArray[np.intp]

@@ -93,7 +93,7 @@ def _near(first: FoundModel, h: ComplexArray, level: float) -> LawJoint | None:
 def _noise(first: FoundModel, h: ComplexArray, predicted: ComplexArray) -> _Noise:
     """Return the noise of FRFs about fitted ones."""
     used = np.isfinite(first.problem.variance).all(axis=0)
-    squares, size = (np.ascontiguousarray((abs(part[:, used]) ** 2).T) for part in (h - predicted, predicted))
+    squares, size = (np.asarray((abs(part[:, used]) ** 2).T, float, "C") for part in (h - predicted, predicted))
     relative, floor = noise_parts(squares, np.stack([size, np.ones_like(size)]))
     own = np.maximum(relative[:, None] * size + floor[:, None], np.finfo(float).tiny)
     variance = np.full(h.shape, np.inf)

@@ -72,7 +72,7 @@ def from_lines(joint: LawJoint, omega: FloatArray, lines: LineCompliance) -> Flo
     """
     values, laws = [], dict(joint.laws)
     coupled = {dof for pair in joint.laws if pair[0] != pair[1] for dof in pair}
-    known = np.isfinite(lines.c).all(axis=(1, 2))
+    known = np.asarray(np.isfinite(lines.c).all(axis=(1, 2)))
     moving = [i for i, dof in enumerate(joint.dofs) if dof not in joint.rigid]
     c = np.where(known[:, None, None], lines.c, np.eye(len(joint.dofs)))[:, moving][:, :, moving]
     with np.errstate(all="ignore"):
