@@ -49,6 +49,7 @@ from jointfrf.frf.smoothing import SmoothFrfs, smooth_frfs
 from jointfrf.identification.elastic_centre import ElasticCentre, elastic_centre
 from jointfrf.identification.identify import identify
 from jointfrf.identification.joint_fit import JointFit
+from jointfrf.identification.law_fit.law_fit import LawFit
 from jointfrf.identification.model_fit.assembly import Assembly
 from jointfrf.identification.model_fit.attachments import AddedMass, GroundSpring
 from jointfrf.identification.model_fit.identify_model import identify_model
@@ -125,6 +126,7 @@ __all__ = [
     "JointLaw",
     "LapDivisions",
     "LawField",
+    "LawFit",
     "LawJoint",
     "Material",
     "Mesh",

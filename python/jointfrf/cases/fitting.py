@@ -8,8 +8,8 @@ from typing import get_args
 import numpy as np
 
 from jointfrf.errors import ConvergenceWarning, FrfCheckWarning, IdentificationWarning, IllConditionedWarning
-from jointfrf.identification.identify import IdentificationMethod, identify
 from jointfrf.identification.compliance_fit.line_forms import inverse_information
+from jointfrf.identification.identify import IdentificationMethod, identify
 from jointfrf.identification.joint_fit import JointFit
 from jointfrf.identification.model_fit.assembly import Assembly
 from jointfrf.identification.model_fit.likelihood import Likelihood

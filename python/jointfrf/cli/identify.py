@@ -208,7 +208,7 @@ def _fit(args: argparse.Namespace, method: str, frfs: FrfSet, joint: MeasuredJoi
         warnings.simplefilter("ignore", IdentificationWarning)  # they stand in the table
         warnings.simplefilter("ignore", ConvergenceWarning)
         warnings.simplefilter("ignore", FrfCheckWarning)  # told with the names of the channels
-        return identify(frfs.freq_hz, _measured(method, joint), joint.dofs, method, args.band, **more)  # type: ignore[arg-type]
+        return identify(frfs.freq_hz, _measured(method, joint), joint.dofs, method, args.band, **more)  # type: ignore[call-overload, no-any-return]
 
 
 def _measured(method: str, joint: MeasuredJoint) -> np.ndarray:

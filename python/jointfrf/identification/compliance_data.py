@@ -12,8 +12,8 @@ from jointfrf.errors import IllConditionedWarning
 from jointfrf.identification.compliance_fit.estimator import FittedGroup, JointEstimate
 from jointfrf.identification.compliance_fit.fit import ComplianceFit
 from jointfrf.identification.compliance_fit.interface_frfs import InterfaceFrfs
-from jointfrf.identification.compliance_fit.line_forms import inverse_information
 from jointfrf.identification.compliance_fit.joint_terms import terms_of
+from jointfrf.identification.compliance_fit.line_forms import inverse_information
 from jointfrf.identification.compliance_fit.manifold import frfs_of_joint, project
 from jointfrf.identification.compliance_fit.prepare import FitProblem
 from jointfrf.identification.compliance_fit.starts import smooth_compliance, starts_on_manifold

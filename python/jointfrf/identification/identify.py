@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Literal, get_args
+from typing import Literal, get_args, overload
 
 from numpy.typing import ArrayLike
 
@@ -19,21 +19,68 @@ from jointfrf.identification.compliance_fit.channel_noise import NoiseOptions
 from jointfrf.identification.compliance_fit.describe import Described, describe_compliance
 from jointfrf.identification.compliance_fit.fit import fit_compliance
 from jointfrf.identification.compliance_fit.joint_terms import CrossTerms, DampingTerms
-from jointfrf.identification.compliance_fit.prepare import FitOptions, prepare_compliance
+from jointfrf.identification.compliance_fit.prepare import FitOptions, FitProblem, prepare_compliance
 from jointfrf.identification.compliance_fit.transforms import Transform
 from jointfrf.identification.joint_fit import JointFit
+from jointfrf.identification.law_fit.identify_laws import check_law_joint, identify_laws
+from jointfrf.identification.law_fit.law_fit import LawFit
 from jointfrf.identification.prepare import (
     BandsOfDofs,
     MeasuredFrfs,
     as_measured,
 )
 from jointfrf.kernel.arguments import FloatArray, check_choice
+from jointfrf.laws.law_joint import LawJoint
 from jointfrf.substructuring.methods import JointFrfs, StiffnessMethod
 
 __all__ = ["IdentificationMethod", "identify"]
 
 IdentificationMethod = Literal["compliance", StiffnessMethod]
 _METHODS: tuple[IdentificationMethod, ...] = get_args(IdentificationMethod)
+
+
+@overload
+def identify(
+    freq_hz: ArrayLike,
+    gamma: ArrayLike,
+    dofs: Sequence[str] | None = None,
+    method: IdentificationMethod = "compliance",
+    bands: BandsOfDofs = None,
+    *,
+    transform: Transform | tuple[Transform, Transform] | None = None,
+    damping: DampingTerms | Literal["auto"] | Sequence[DampingTerms] = "auto",
+    cross: CrossTerms = "zero",
+    noise: float | ArrayLike | None = None,
+    coherence: ArrayLike | None = None,
+    averages: float | None = None,
+    reciprocal: bool = True,
+    alpha: ArrayLike | None = None,
+    k_initial: ArrayLike | None = None,
+    h_a: ArrayLike | None = None,
+    h_b: ArrayLike | None = None,
+    dofs_j: ArrayLike | None = None,
+    dofs_k: ArrayLike | None = None,
+    dofs_r: ArrayLike | None = None,
+    dofs_s: ArrayLike | None = None,
+    joint: None = None,
+) -> JointFit: ...
+
+
+@overload
+def identify(
+    freq_hz: ArrayLike,
+    gamma: ArrayLike,
+    dofs: Sequence[str] | None = None,
+    method: Literal["compliance"] = "compliance",
+    bands: BandsOfDofs = None,
+    *,
+    transform: Transform | tuple[Transform, Transform] | None = None,
+    noise: float | ArrayLike | None = None,
+    coherence: ArrayLike | None = None,
+    averages: float | None = None,
+    reciprocal: bool = True,
+    joint: LawJoint,
+) -> LawFit: ...
 
 
 def identify(
@@ -58,7 +105,8 @@ def identify(
     dofs_k: ArrayLike | None = None,
     dofs_r: ArrayLike | None = None,
     dofs_s: ArrayLike | None = None,
-) -> JointFit:
+    joint: LawJoint | None = None,
+) -> JointFit | LawFit:
     """Identify a joint from measured FRFs of the assembly.
 
     Parameters
@@ -106,10 +154,13 @@ def identify(
         First estimate K0, for ISMM.
     h_a, h_b, dofs_j, dofs_k, dofs_r, dofs_s : optional
         As in `decouple`.
+    joint : LawJoint, optional
+        Laws to fit in place of k (1 + i eta) + i w c, with rigid DOFs and cross terms, for "compliance"; it says what
+        `damping` and `cross` do for springs. Masses need models: `identify_model`.
 
     Returns
     -------
-    JointFit
+    JointFit, or LawFit with `joint`
 
     Raises
     ------
@@ -149,8 +200,32 @@ def identify(
     >>> low, high = fit.confidence_interval(0.95)["k_x"]
     >>> bool(low < 2000 < high), bool(abs(fit.stiffness[0] / 2000 - 1) < 0.01)
     (True, True)
+
+    A mount whose stiffness rises with frequency:
+
+    >>> mount = jf.LawJoint({"x": jf.StandardLinearSolid(1500.0, 2000.0, tau=0.05)})
+    >>> assembly = jf.couple(a, b, mount, [1], [0], freq_hz=freq)
+    >>> gamma = jf.pollute(assembly[:, 1:3, 1:3], 0.02, seed=2)
+    >>> guess = jf.LawJoint({"x": jf.StandardLinearSolid(100.0, 100.0, tau=1.0)})
+    >>> found = jf.identify(freq, gamma, joint=guess)
+    >>> [bool(low < true < high) for true, (low, high) in zip(mount.values, found.confidence_interval().values())]
+    [True, True, True]
     """
     check_choice("method", method, _METHODS)
+    if joint is not None:
+        if method != "compliance" or not isinstance(damping, str) or (damping, cross) != ("auto", "zero"):
+            raise ValueError("joint says which laws are fitted, by method 'compliance': leave damping and cross out")
+        own = check_law_joint(joint, dofs)
+        problem = prepare_compliance(
+            as_measured(freq_hz, gamma, square=False), own.dofs, bands, transform,
+            NoiseOptions(noise, coherence, averages), FitOptions("viscous", "zero", reciprocal),
+        )  # fmt: skip
+        if reciprocal:
+            _look_at(problem, transform)
+        described = identify_laws(problem, own)
+        for warning in described.warnings:
+            warnings.warn(warning, stacklevel=2)
+        return described.fit
     if method == "compliance":
         words = damping if isinstance(damping, str) else tuple(damping)
         problem = prepare_compliance(
@@ -158,8 +233,7 @@ def identify(
             NoiseOptions(noise, coherence, averages), FitOptions(words, cross, reciprocal),
         )  # fmt: skip
         if reciprocal:
-            transforms = None if transform is None else (problem.frfs.responses, problem.frfs.forces)
-            warn_of_frfs(_checked(MeasuredFrfs(problem.freq_hz, problem.frfs.measured), problem.dofs, transforms))
+            _look_at(problem, transform)
         found = fit_compliance(problem)
         fit = _warned(describe_compliance(found, problem))
         return replace(fit, data=compliance_data(found, problem, transform))
@@ -175,6 +249,12 @@ def identify(
     )  # fmt: skip
     means = prepare_band_mean(method, as_measured(freq_hz, gamma), known, dofs, bands, transform)
     return fit_band_mean(means)
+
+
+def _look_at(problem: FitProblem, transform: Transform | tuple[Transform, Transform] | None) -> None:
+    """Warn of FRFs that look wrong."""
+    transforms = None if transform is None else (problem.frfs.responses, problem.frfs.forces)
+    warn_of_frfs(_checked(MeasuredFrfs(problem.freq_hz, problem.frfs.measured), problem.dofs, transforms), 3)
 
 
 def _warned(described: Described) -> JointFit:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import textwrap
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -19,18 +18,12 @@ from jointfrf.files import write_file
 from jointfrf.identification.fit_cards import fit_cards
 from jointfrf.identification.fit_data import FitData
 from jointfrf.identification.fit_record import fields_of_record, read_record, record_of
+from jointfrf.identification.parameter_table import wrapped
 from jointfrf.io.cards import CardFormat, CardOptions
 from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
 __all__ = ["JointFit"]
-
-#: Columns of a printed fit.
-_WIDTH = 80
-
-
-def _wrapped(text: str) -> str:
-    return textwrap.fill(text, _WIDTH, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False)
 
 
 @dataclass(frozen=True)
@@ -393,6 +386,6 @@ class JointFit:
         head = [f"method {self.method}, {span}"]
         if np.isfinite(self.noise_level):
             head.append(f"noise {100 * self.noise_level:.2g} %, residual {100 * self.residual_level:.2g} % of the FRFs")
-        tail = [_wrapped(f"note: {text}") for text in self.notes]
-        tail += [_wrapped(f"warning: {text}") for text in self.warnings]
+        tail = [wrapped(f"note: {text}") for text in self.notes]
+        tail += [wrapped(f"warning: {text}") for text in self.warnings]
         return "\n".join([*head, "", *lines, *([""] if tail else []), *tail])

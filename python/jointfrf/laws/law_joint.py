@@ -15,6 +15,7 @@ from jointfrf.io.cards import CardFormat
 from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_frequency, as_number, as_real
 from jointfrf.kernel.linear_algebra import invert
+from jointfrf.kernel.status import OnSingular
 from jointfrf.laws.joint_cards import joint_cards
 from jointfrf.laws.law import JointLaw, LawField
 from jointfrf.laws.springs import SpringLaw
@@ -215,14 +216,20 @@ class LawJoint:
             raise ValueError(f"{', '.join(self.rigid)}: a rigid DOF has no finite stiffness; its compliance is zero")
         return self._moving_stiffness(2 * np.pi * as_frequency(freq_hz))
 
-    def compliance(self, freq_hz: ArrayLike) -> ComplexArray:
-        """Complex compliance K*^-1(w), zero for rigid DOFs, shape (n_freq, n, n), m/N, rotational rad/(N m)."""
+    def compliance(self, freq_hz: ArrayLike, *, on_singular: OnSingular = "raise") -> ComplexArray:
+        """Complex compliance K*^-1(w), zero for rigid DOFs, shape (n_freq, n, n), m/N, rotational rad/(N m).
+
+        Raises
+        ------
+        SingularLineError
+            A line where K* is singular, unless `on_singular` is "nan".
+        """
         freq = as_frequency(freq_hz)
         moving = [i for i, dof in enumerate(self.dofs) if dof not in self.rigid]
         c = np.zeros((freq.size, len(self.dofs), len(self.dofs)), np.complex128)
         k = self._moving_stiffness(2 * np.pi * freq)[:, moving][:, :, moving]
         if moving:
-            c[:, np.array(moving)[:, None], moving] = invert(k, freq_hz=freq)
+            c[:, np.array(moving)[:, None], moving] = invert(k, freq_hz=freq, on_singular=on_singular)
         return c
 
     def connection(self, omega: FloatArray) -> Connection:

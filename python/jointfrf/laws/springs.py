@@ -19,7 +19,7 @@ SpringDamping = Literal["none", "viscous", "hysteretic", "both"]
 
 
 @cache
-def _fields(damping: SpringDamping, is_cross: bool) -> tuple[LawField, ...]:  # noqa: FBT001
+def _fields(damping: SpringDamping, is_cross: bool) -> tuple[LawField, ...]:
     found = [LawField("k", "stiffness", -np.inf if is_cross else 0.0)]
     if damping in ("hysteretic", "both"):
         found.append(LawField("h", "stiffness"))

@@ -22,7 +22,14 @@ from jointfrf.identification.compliance_fit.transforms import Transforms
 from jointfrf.identification.elastic_centre import elastic_centre
 from jointfrf.identification.joint_fit import JointFit
 
-__all__ = ["Described", "describe_compliance"]
+__all__ = [
+    "Described",
+    "describe_compliance",
+    "left_out_warnings",
+    "noise_notes",
+    "places_of_excess",
+    "untrusted_warnings",
+]
 
 #: A parameter is called poorly determined when its interval is wider than this share of it.
 _UNCERTAIN = 0.5
@@ -66,7 +73,7 @@ def describe_compliance(found: ComplianceFit, problem: FitProblem) -> Described:
     intervals = fit.confidence_interval(0.95)
     notes = [
         *_choice_notes(found.choices),
-        *_noise_notes(problem),
+        *noise_notes(problem),
         *_small_residual_notes(found, problem),
         *_channel_notes(found, problem),
         *_group_notes([group.dofs for group in result.groups], fit.dofs, problem.options.cross),
@@ -75,8 +82,8 @@ def describe_compliance(found: ComplianceFit, problem: FitProblem) -> Described:
         *_reference_notes(fit),
     ]
     doubts = [
-        *([] if found.cross_fits else _untrusted_warnings(result, fit.dofs)),
-        *_left_out_warnings(problem),
+        *([] if found.cross_fits else untrusted_warnings(result, fit.dofs)),
+        *left_out_warnings(problem),
         *_band_part_warnings(found),
         *_parameter_warnings(fit, intervals),
         *_rigidity_warnings(found),
@@ -126,7 +133,7 @@ def _choice_notes(choices: Sequence[DofDamping]) -> list[str]:
     return told
 
 
-def _noise_notes(problem: FitProblem) -> list[str]:
+def noise_notes(problem: FitProblem) -> list[str]:
     noise = problem.noise
     told = []
     if noise.is_assumed:
@@ -202,7 +209,7 @@ def _reference_notes(fit: JointFit) -> list[str]:
     ]
 
 
-def _left_out_warnings(problem: FitProblem) -> list[str]:
+def left_out_warnings(problem: FitProblem) -> list[str]:
     """Name DOFs that are not sought, but enter those that are."""
     return [str(one) for one in problem.left_out if one.matters]
 
@@ -226,7 +233,7 @@ def _rigidity_warnings(found: ComplianceFit) -> list[str]:
     ]
 
 
-def _untrusted_warnings(result: JointEstimate, dofs: tuple[str, ...]) -> list[str]:
+def untrusted_warnings(result: JointEstimate, dofs: tuple[str, ...]) -> list[str]:
     """Count the lines that no joint near the one found fits."""
     several = len(result.groups) > 1
     told = []
@@ -334,7 +341,7 @@ def _misfit_warnings(found: ComplianceFit, problem: FitProblem) -> list[str]:
     if not problem.noise.is_assumed and misfit.is_large:
         text = f"the residual is {misfit.ratio:.2f} times the noise, {apart} above it: the joint does not fit the data"
         by_part = problem.noise.is_told and abs(misfit.ratio / np.sqrt(2) - 1) < _BY_PART
-        told.append(text + (_COUPLED if found.cross_fits else _PER_PART if by_part else _where(misfit)))
+        told.append(text + (_COUPLED if found.cross_fits else _PER_PART if by_part else places_of_excess(misfit)))
     if found.cross_fits:
         return told
     for trend in misfit.trends:
@@ -346,7 +353,7 @@ def _misfit_warnings(found: ComplianceFit, problem: FitProblem) -> list[str]:
     return told
 
 
-def _where(misfit: Misfit) -> str:
+def places_of_excess(misfit: Misfit) -> str:
     if not misfit.local:
         return ""
     places = _listed([f"{low:g}-{high:g} Hz ({100 * share:.0f} %)" for low, high, share in misfit.local])

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import NamedTuple
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from jointfrf.dofs import Parameter
 from jointfrf.frf.bands import PIECE, line_slices
 from jointfrf.identification.compliance_fit.group_fit import LITTLE_PATIENCE, GroupFit, GroupProblem, fit_dofs
 from jointfrf.identification.compliance_fit.interface_frfs import InterfaceFrfs
@@ -26,13 +25,21 @@ from jointfrf.identification.compliance_fit.starts import first_joints
 from jointfrf.identification.compliance_fit.unknown_cross import fit_unknown_cross
 from jointfrf.kernel.arguments import FloatArray
 
-__all__ = ["FittedGroup", "JointEstimate", "estimate_joint"]
+__all__ = ["FittedGroup", "JointEstimate", "NamedParameter", "estimate_joint", "grouped", "unknown_entries"]
 
 
 #: A compliance is not taken below this share of its standard error, nor of the receptances around it.
 _RIGID, _ROUNDING = 1e-3, 1e-12
 #: A fit that leaves cross terms unknown fits far better from this ratio of the mean squares on.
 _FAR_BETTER = 4.0
+
+
+class NamedParameter(Protocol):
+    """A parameter of a joint, of springs or of any law."""
+
+    @property
+    def name(self) -> str:
+        """Its name."""
 
 
 class FittedGroup(NamedTuple):
@@ -43,7 +50,7 @@ class FittedGroup(NamedTuple):
     dofs : ndarray of int
     which : ndarray of int
         Its parameters among all.
-    joint : DiagonalJoint or CoupledJoint
+    joint : JointCoordinates
     problem : GroupProblem
     fit : GroupFit
     """
@@ -60,7 +67,7 @@ class JointEstimate(NamedTuple):
 
     Attributes
     ----------
-    parameters : tuple of Parameter, length p
+    parameters : sequence of Parameter, or of parameters of laws, length p
         Those that the FRFs depend on: no cross terms between DOFs of different groups.
     theta : ndarray, shape (p,)
         Their values.
@@ -75,7 +82,7 @@ class JointEstimate(NamedTuple):
         Complex equations used.
     """
 
-    parameters: tuple[Parameter, ...]
+    parameters: Sequence[NamedParameter]
     theta: FloatArray
     covariance: FloatArray
     groups: tuple[FittedGroup, ...]
@@ -115,16 +122,16 @@ def estimate_joint(
     """
     groups = []
     known = {} if near is None else {tuple(group.dofs.tolist()): group for group in near.groups}
-    for dofs, data in _grouped(frfs) if like is None else [(one.dofs, one.problem.data) for one in like.groups]:
+    for dofs, data in grouped(frfs) if like is None else [(one.dofs, one.problem.data) for one in like.groups]:
         own, which = terms.of_dofs(dofs)
         joint = coordinates_of(own)
-        problem = GroupProblem(data, joint, _unknown(dofs, cross, used, len(data.measured)))
+        problem = GroupProblem(data, joint, unknown_entries(dofs, cross, used, len(data.measured)))
         fit = _fitted(problem, cross, known.get(tuple(dofs.tolist())))
         groups.append(FittedGroup(dofs, which, joint, problem, fit))
     return assembled(terms, groups)
 
 
-def _grouped(frfs: InterfaceFrfs) -> Iterator[tuple[NDArray[np.intp], LineData]]:
+def grouped(frfs: InterfaceFrfs) -> Iterator[tuple[NDArray[np.intp], LineData]]:
     """Return groups of DOFs that are fitted each by itself, and their FRFs."""
     lines = np.arange(len(frfs.measured))
     for dofs in frfs.on_lines(_some(lines)).groups():
@@ -221,7 +228,7 @@ def _with_hidden_rates(covariance: FloatArray, group: FittedGroup, error: FloatA
     return known
 
 
-def _unknown(
+def unknown_entries(
     dofs: NDArray[np.intp], cross: CrossTerms, used: NDArray[np.bool_] | None, n_freq: int
 ) -> NDArray[np.bool_]:
     """Return which entries of C are unknown, shape (n_freq, n * n)."""

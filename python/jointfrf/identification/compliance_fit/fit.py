@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
 from dataclasses import replace
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +33,9 @@ from jointfrf.identification.joint_fit import JointFit
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.substructuring.ismm import inverse_substructuring
 
-__all__ = ["ComplianceFit", "fit_compliance"]
+__all__ = ["ComplianceFit", "at_level_of_residual", "fit_compliance", "stiffness_of_lines"]
+
+FoundT = TypeVar("FoundT")
 
 #: An assumed noise level is replaced by that of the residual until both agree to this factor.
 _AGREE = 1.3
@@ -111,7 +114,7 @@ def fit_compliance(problem: FitProblem) -> ComplianceFit:
         noise_level=level,
         residual_level=scale * noise.level,
         freq_hz=problem.freq_hz,
-        k_lines=_stiffness_of_lines(frfs),
+        k_lines=stiffness_of_lines(frfs),
         bands=problem.bands,
         intervals=LikelihoodIntervals(result, spread.factor, np.sqrt(np.square(added).sum(axis=0)) if added else None),
     )
@@ -120,7 +123,7 @@ def fit_compliance(problem: FitProblem) -> ComplianceFit:
     return ComplianceFit(joint, result, spread, channels, parts, misfit, cross_fits, choices)
 
 
-def _stiffness_of_lines(frfs: InterfaceFrfs) -> ComplexArray:
+def stiffness_of_lines(frfs: InterfaceFrfs) -> ComplexArray:
     """Return K*(w) of each line by itself, NaN where it cannot be inverted; a piece of the lines at a time."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", IllConditionedWarning)
@@ -182,14 +185,30 @@ def _cross_fits(
 
 def _fitted(problem: FitProblem) -> tuple[FitProblem, JointEstimate, tuple[DofDamping, ...]]:
     """Fit with the damping terms asked for; where no noise level is known, at that of the residual."""
-    result, choices = _with_damping(problem)
+    problem, (result, choices) = at_level_of_residual(problem, _with_damping, lambda found: found[0].excess)
+    return problem, result, choices
+
+
+def at_level_of_residual(
+    problem: FitProblem, fit: Callable[[FitProblem], FoundT], excess: Callable[[FoundT], float]
+) -> tuple[FitProblem, FoundT]:
+    """Fit; where the noise level is assumed, again with that of the residual until both agree.
+
+    Parameters
+    ----------
+    problem : FitProblem
+    fit : callable
+    excess : callable
+        Returns, of what `fit` does, the mean square of the residual in units of the noise.
+    """
+    found = fit(problem)
     for _ in range(_MOST_LEVELS if problem.noise.is_assumed else 0):
-        scale = float(np.sqrt(result.excess))
+        scale = float(np.sqrt(excess(found)))
         if scale < _NO_NOISE or 1 / _AGREE < scale < _AGREE:
             break
         problem = problem.with_noise(scale)
-        result, choices = _with_damping(problem)
-    return problem, result, choices
+        found = fit(problem)
+    return problem, found
 
 
 def _with_damping(problem: FitProblem) -> tuple[JointEstimate, tuple[DofDamping, ...]]:

@@ -51,11 +51,14 @@ class GroupProblem(NamedTuple):
     unknown : ndarray of bool, shape (n_freq, n * n)
         Entries of C, row by row, that may have any value on a line: cross terms that are not sought, and DOFs outside
         their bands.
+    hidden : int
+        Entries of M that no FRF shows: those between rigid DOFs.
     """
 
     data: LineData
     joint: JointCoordinates
     unknown: NDArray[np.bool_]
+    hidden: int = 0
 
     @property
     def is_diagonal(self) -> bool:
@@ -324,7 +327,7 @@ def _equations(problem: GroupProblem) -> FloatArray:
     places = np.array([np.flatnonzero(one.ravel())[0] for one in entries.units])
     unknown = np.count_nonzero(problem.unknown[:, places], axis=1)
     used = np.count_nonzero(problem.data.used, axis=1)
-    equations: FloatArray = np.maximum(used - 2 * len(places) - unknown, 0).astype(float)
+    equations: FloatArray = np.maximum(used - 2 * len(places) + problem.hidden - unknown, 0).astype(float)
     return equations
 
 

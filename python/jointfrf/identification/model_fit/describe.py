@@ -13,15 +13,10 @@ from jointfrf.identification.model_fit.fit import FoundModel
 from jointfrf.identification.model_fit.model_fit import ModelFit
 from jointfrf.identification.model_fit.prepare import Channels
 from jointfrf.identification.model_fit.profile import ProfileIntervals
+from jointfrf.identification.parameter_table import correlation_notes, parameter_warnings
 
 __all__ = ["DescribedModel", "describe_model"]
 
-#: Correlations beyond this are told.
-_CORRELATED = 0.95
-#: A parameter is called poorly determined when its interval is wider than this share of it.
-_UNCERTAIN = 0.5
-#: One whose standard error is below this share is not.
-_WELL = 0.1
 #: A prior that the FRFs narrow by less than this is told.
 _UNCHANGED = 0.9
 #: Another minimum whose squares are higher by less than this is told.
@@ -68,7 +63,7 @@ def describe_model(found: FoundModel, channels: Channels) -> DescribedModel:
         *_direction_warnings(fit),
         *_other_warnings(found),
     ]
-    notes = [*_noise_notes(found), *_prior_notes(fit), *_correlation_notes(fit)]
+    notes = [*_noise_notes(found), *_prior_notes(fit), *correlation_notes(list(fit.parameters), fit.correlation)]
     told: list[Warning] = [IdentificationWarning(text) for text in doubts]
     if not found.minimum.converged:
         told.append(ConvergenceWarning("the fit did not converge"))
@@ -104,19 +99,9 @@ def _residual_warnings(fit: ModelFit) -> list[str]:
 
 def _parameter_warnings(fit: ModelFit, intervals: ProfileIntervals) -> list[str]:
     """Name parameters of the joint that the data determine poorly or not at all."""
-    errors, told = fit.std_error, []
-    for i, one in enumerate(fit.fitted):
-        value = fit.parameters[one.name]
-        if one.origin != "joint" or not one.is_log or one.unit == "s" or errors[one.name] < _WELL * value:
-            continue
-        low, high = intervals.of(i, 0.95)
-        if not np.isfinite(high) and low > 0:
-            told.append(f"{one.name}: cannot be distinguished from rigid; at least {low:.3g} {one.unit} (95 %)")
-        elif not low > 0:
-            told.append(f"{one.name}: cannot be distinguished from zero; at most {high:.3g} {one.unit} (95 %)")
-        elif high - low > 2 * _UNCERTAIN * abs(value):
-            told.append(f"{one.name}: poorly determined by the data, 95 % interval {low:.3g} .. {high:.3g} {one.unit}")
-    return told
+    errors, places = fit.std_error, {one.name: i for i, one in enumerate(fit.fitted)}
+    shown = [(one, fit.parameters[one.name], errors[one.name]) for one in fit.fitted if one.origin == "joint"]
+    return parameter_warnings(shown, lambda name: intervals.of(places[name], 0.95))
 
 
 def _direction_warnings(fit: ModelFit) -> list[str]:
@@ -163,17 +148,3 @@ def _prior_notes(fit: ModelFit) -> list[str]:
     told = [f"{', '.join(same)}: known from the prior, hardly from the FRFs"] if same else []
     held = [one for one in fit.open_directions if one.is_held_by_prior and len(one.parts) > 1]
     return told + [f"priors hold what the FRFs do not: {_direction(one)}" for one in held[:_SHOWN]]
-
-
-def _correlation_notes(fit: ModelFit) -> list[str]:
-    """Name pairs of parameters that the data hardly part."""
-    rho, names = fit.correlation, list(fit.parameters)
-    pairs = [
-        (abs(rho[i, j]), f"{names[i]} and {names[j]} ({rho[i, j]:+.3f})")
-        for i in range(len(names))
-        for j in range(i + 1, len(names))
-        if abs(rho[i, j]) > _CORRELATED
-    ]
-    return (
-        [f"correlated errors: {', '.join(text for _, text in sorted(pairs, reverse=True)[:_SHOWN])}"] if pairs else []
-    )

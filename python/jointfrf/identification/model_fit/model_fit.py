@@ -13,6 +13,7 @@ from jointfrf.identification.model_fit.assembly import Assembly
 from jointfrf.identification.model_fit.directions import OpenDirection
 from jointfrf.identification.model_fit.residual_check import ResidualTest
 from jointfrf.identification.model_fit.unknowns import FitParameter
+from jointfrf.identification.parameter_table import columns_of
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.laws.law_joint import LawJoint
 
@@ -158,13 +159,10 @@ class ModelFit:
             prior = "" if one.std is None else f"{one.value:.4g} +- {one.std:.2g}"
             error = f"{errors[one.name]:.2g}"
             rows.append((one.name, f"{value:.5g}", error, f"{low:.4g} .. {high:.4g}", prior, one.unit))
-        widths = [max(len(row[i]) for row in rows) for i in range(6)]
-        lines = ["  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in rows]
-        lines.insert(1, "-" * max(map(len, lines)))
         span = f"{self.freq_hz.min():g} to {self.freq_hz.max():g} Hz, {self.freq_hz.size} lines"
         head = [
             f"method model, {span}, {len(self.responses)} responses x {len(self.forces)} forces",
             f"noise {100 * self.noise_level:.2g} %, residual {100 * self.residual_level:.2g} % of the FRFs",
         ]
         tail = [f"note: {text}" for text in self.notes] + [f"warning: {text}" for text in self.warnings]
-        return "\n".join([*head, "", *lines, *([""] if tail else []), *tail])
+        return "\n".join([*head, "", *columns_of(rows), *([""] if tail else []), *tail])

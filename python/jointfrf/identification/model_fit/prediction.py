@@ -137,9 +137,7 @@ class Prediction:
         with np.errstate(all="ignore"):
             good = np.asarray(np.isfinite(h).all(axis=(1, 2)))[:, None, None]
             left = np.linalg.pinv(np.where(good, h[:, self.responses] @ e * row, 0)) * row.swapaxes(1, 2)
-            right = column.swapaxes(1, 2) * np.linalg.pinv(
-                np.where(good, e.T @ h[:, :, self.forces] * column, 0)
-            )
+            right = column.swapaxes(1, 2) * np.linalg.pinv(np.where(good, e.T @ h[:, :, self.forces] * column, 0))
             back = invert(left @ taken @ right, on_singular="nan")
             of_rows, of_columns = back @ left, right @ back
             spread = np.einsum("ldp,lpq,lqd->ld", abs(of_rows) ** 2, noise, abs(of_columns) ** 2, optimize=True)

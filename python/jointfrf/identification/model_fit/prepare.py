@@ -209,7 +209,7 @@ def _of_compliance_fit(
         warnings.simplefilter("ignore")
         try:
             own = variance[:, at[0]][:, :, at[1]]
-            found = identify(freq, gamma, joint.dofs, damping="viscous", cross=cross, noise=own)  # type: ignore[arg-type]
+            found = identify(freq, gamma, joint.dofs, damping="viscous", cross=cross, noise=own)  # type: ignore[call-overload]
         except (ValueError, np.linalg.LinAlgError):
             return None
     k, c = found.stiffness_matrix, found.damping_matrix

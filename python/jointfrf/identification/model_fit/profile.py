@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import special
 
-from jointfrf.identification.model_fit.likelihood import Likelihood
+from jointfrf.identification.model_fit.likelihood import Squares
 from jointfrf.identification.model_fit.minimum import Minimum, minimise
 from jointfrf.kernel.arguments import FloatArray
 
@@ -24,7 +24,7 @@ class ProfileIntervals:
 
     Parameters
     ----------
-    likelihood : Likelihood
+    likelihood : Squares
     minimum : Minimum
     covariance : ndarray, shape (p, p)
         Of the coordinates, for independent noise as told.
@@ -38,7 +38,7 @@ class ProfileIntervals:
     limit follows from it without a minimisation.
     """
 
-    def __init__(self, likelihood: Likelihood, minimum: Minimum, covariance: FloatArray, factor: float) -> None:
+    def __init__(self, likelihood: Squares, minimum: Minimum, covariance: FloatArray, factor: float) -> None:
         self.likelihood, self.minimum, self.covariance, self.factor = likelihood, minimum, covariance, factor
         self._known: dict[tuple[int, float], tuple[float, float]] = {}
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator, Sequence
+
 import numpy as np
 
 from jointfrf.errors import IllConditionedWarning
@@ -31,9 +32,7 @@ _COMPLIANCE_STEPS, _LARGEST_RATIO = 4, 1.5
 _BROAD, _CUT = 0.3, 3.0
 
 
-def interface_compliance(
-    smooth: ComplexArray, variance: FloatArray, at: tuple[list[int], list[int]]
-) -> LineCompliance:
+def interface_compliance(smooth: ComplexArray, variance: FloatArray, at: tuple[list[int], list[int]]) -> LineCompliance:
     """Return the compliance of the joint from FRFs between all joint DOFs, which needs no model.
 
     Parameters

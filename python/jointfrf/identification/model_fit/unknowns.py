@@ -16,9 +16,9 @@ from jointfrf.identification.model_fit.reduced import range_of
 from jointfrf.identification.model_fit.substructure import Substructure
 from jointfrf.identification.model_fit.unknown import Unknown
 from jointfrf.kernel.arguments import FloatArray
-from jointfrf.laws.law_joint import JointQuantity
+from jointfrf.laws.law_joint import JointQuantity, LawJoint
 
-__all__ = ["FitParameter", "ParameterOrigin", "ParameterVector", "parameter_vector"]
+__all__ = ["FitParameter", "ParameterOrigin", "ParameterVector", "joint_vector", "parameter_vector"]
 
 #: What a parameter belongs to.
 ParameterOrigin = Literal["joint", "A", "B", "attachment", "response", "force"]
@@ -185,12 +185,7 @@ def parameter_vector(
     ValueError
         `fixed` names what is no parameter of the joint.
     """
-    names = whole.joint.names
-    for name in fixed:
-        if name not in names:
-            raise ValueError(f"fixed names {name!r}, which is no parameter of the joint: {', '.join(names)}")
-    size = dict(zip(whole.joint.dofs, joint_stiffness.tolist(), strict=True))
-    found = [_of_joint(one, i, one.name not in fixed, size) for i, one in enumerate(whole.joint.quantities)]
+    found = list(joint_vector(whole.joint, fixed, joint_stiffness).all)
     sides: tuple[tuple[ParameterOrigin, Substructure], ...] = (("A", whole.a), ("B", whole.b))
     for side, part in sides:
         for name, unknown in part.unknowns.items():
@@ -204,6 +199,25 @@ def parameter_vector(
         for place, (channel, unknown) in of_channels.items():
             found.append(_of_unknown(f"gain of {origin} {channel}", "1", origin, (place,), unknown))
     return ParameterVector(tuple(found))
+
+
+def joint_vector(joint: LawJoint, fixed: Sequence[str], joint_stiffness: FloatArray) -> ParameterVector:
+    """Put the parameters of a joint together.
+
+    Parameters
+    ----------
+    joint : LawJoint
+    fixed, joint_stiffness
+        As in `parameter_vector`.
+    """
+    names = joint.names
+    for name in fixed:
+        if name not in names:
+            raise ValueError(f"fixed names {name!r}, which is no parameter of the joint: {', '.join(names)}")
+    size = dict(zip(joint.dofs, joint_stiffness.tolist(), strict=True))
+    return ParameterVector(
+        tuple(_of_joint(one, i, one.name not in fixed, size) for i, one in enumerate(joint.quantities))
+    )
 
 
 def _of_joint(one: JointQuantity, place: int, is_free: bool, size: Mapping[str, float]) -> FitParameter:
