@@ -48,6 +48,7 @@ from jointfrf.frf.noise_model import NoiseModel, estimate_noise
 from jointfrf.frf.smoothing import SmoothFrfs, smooth_frfs
 from jointfrf.identification.elastic_centre import ElasticCentre, elastic_centre
 from jointfrf.identification.identify import identify
+from jointfrf.identification.joint_file import read_joint, write_joint
 from jointfrf.identification.joint_fit import JointFit
 from jointfrf.identification.law_fit.law_fit import LawFit
 from jointfrf.identification.model_fit.assembly import Assembly
@@ -200,6 +201,7 @@ __all__ = [
     "preload",
     "preload_force",
     "propose_bands",
+    "read_joint",
     "realisations",
     "receptance",
     "reciprocal_condition",
@@ -216,4 +218,5 @@ __all__ = [
     "virtual_interface",
     "virtual_point",
     "virtual_points",
+    "write_joint",
 ]

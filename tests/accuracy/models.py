@@ -1,7 +1,8 @@
 """Study of the model fit: RMSE against the Cramer-Rao bound with the models, and coverage of its 95 % intervals.
 
-    tests/accuracy/run models                     all trials, 100 draws each, 20 of wrong models
-    tests/accuracy/run models remote --draws 20   those whose name holds a word
+    tests/accuracy/run models                            all trials, 100 draws each, 20 of wrong models
+    tests/accuracy/run models remote --draws 20          those whose name holds a word
+    tests/accuracy/run models "exact models" --only right --draws 200
 
 Draw number i of trial number t, counted from 0 in the order of the table, has the seed 1000 t + i.
 """
@@ -165,12 +166,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("words", nargs="*", help="trials whose name holds one of these; all by default")
     parser.add_argument("--draws", type=int, default=100)
+    parser.add_argument("--only", choices=["right", "wrong"], help="trials of right models, or of wrong ones")
     parser.add_argument("--workers", type=int, default=None, help="processes; one a core by default")
     args = parser.parse_args()
     print(HEAD, flush=True)
     with ProcessPoolExecutor(args.workers) as pool:
         for trial in TRIALS:
-            if not args.words or any(word in trial.name for word in args.words):
+            kind = "right" if trial.wrong == "nothing" else "wrong"
+            if args.only in (None, kind) and (not args.words or any(word in trial.name for word in args.words)):
                 # A fit of a wrong model follows all starts: fewer draws tell as much.
                 draws = args.draws if trial.wrong == "nothing" else -(-args.draws // 5)
                 print(row(trial, list(pool.map(partial(one_draw, trial), range(draws)))), flush=True)

@@ -29,9 +29,9 @@ __all__ = [
     "check_bands",
     "constant_joint",
     "read_bands",
+    "read_case_joint",
     "read_frequency",
     "read_frf_file",
-    "read_joint",
     "read_material",
     "read_noises",
 ]
@@ -185,7 +185,7 @@ def read_material(table: TomlTable) -> Material:
     return table.build(lambda: Material(*values))
 
 
-def read_joint(tables: list[TomlTable]) -> tuple[Joint, Joint]:
+def read_case_joint(tables: list[TomlTable]) -> tuple[Joint, Joint]:
     """Read a joint and its first estimate, one table a DOF."""
     dofs = []
     values: dict[str, list[float]] = {

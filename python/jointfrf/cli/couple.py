@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 
 from jointfrf.channels.virtual_point import append_virtual_point, channel_geometry, virtual_point
-from jointfrf.cli.joint_file import read_joint_file
 from jointfrf.cli.measured_file import Nodes, add_quantity_arguments, nodes, point
 from jointfrf.cli.output import Output
 from jointfrf.cli.structure_file import (
@@ -24,8 +23,10 @@ from jointfrf.cli.structure_file import (
 from jointfrf.cli.usage import UsageError, waiting
 from jointfrf.dofs import direction_places
 from jointfrf.errors import FileContentError
+from jointfrf.identification.joint_file import read_joint_file
 from jointfrf.io import Channel, FrfSet
 from jointfrf.joint import Joint
+from jointfrf.laws.law_joint import LawJoint
 from jointfrf.substructuring.coupling import couple
 
 __all__ = ["add_arguments", "joint_channels_of", "renumbered", "run", "shifted"]
@@ -38,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.description = (
         "Couple two substructures by a joint (2.26) and write the FRFs of the assembly. A substructure is a file of "
         "FRFs or a TOML file of a model; the joint is a JSON file of identify --save, or a TOML file with dofs, "
-        "stiffness, damping, loss_factor."
+        "stiffness, damping, loss_factor, or with laws of its DOFs."
     )
     parser.add_argument("a", type=Path, metavar="A", help="substructure A: file of FRFs, or model (.toml)")
     parser.add_argument("b", type=Path, metavar="B", help="substructure B")
@@ -101,7 +102,7 @@ def run(args: argparse.Namespace) -> int:
             "written": str(args.output),
             "a": str(args.a),
             "b": str(args.b),
-            "joint": {"file": str(args.joint), "dofs": found.joint.dofs, "stiffness": found.joint.stiffness},
+            "joint": {"file": str(args.joint), "dofs": found.joint.dofs, **_numbers(found.joint)},
             "channels": [str(channel) for channel in assembly.responses],
             "lines": assembly.freq_hz.size,
             "band_hz": [assembly.freq_hz[0], assembly.freq_hz[-1]],
@@ -110,7 +111,16 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _coupled(a: FrfSet, b: FrfSet, joint: Joint, sides: tuple[Nodes, Nodes], at: tuple[float, ...] | None) -> FrfSet:
+def _numbers(joint: Joint | LawJoint) -> dict[str, object]:
+    """Return the numbers of a joint for JSON."""
+    if isinstance(joint, Joint):
+        return {"stiffness": joint.stiffness}
+    return {"parameters": {one.name: one.value for one in joint.quantities}, "rigid": list(joint.rigid)}
+
+
+def _coupled(
+    a: FrfSet, b: FrfSet, joint: Joint | LawJoint, sides: tuple[Nodes, Nodes], at: tuple[float, ...] | None
+) -> FrfSet:
     """Return the FRFs of the assembly at all channels of both."""
     channels, matrices, ends = [], [], []
     for frfs, side in ((a, sides[0]), (b, sides[1])):
@@ -124,8 +134,7 @@ def _coupled(a: FrfSet, b: FrfSet, joint: Joint, sides: tuple[Nodes, Nodes], at:
         raise FileContentError(
             f"node {min(shared)} is in {a.source} and in {b.source}: --renumber-b N adds a number to those of B"
         )
-    k_joint = joint.dynamic_stiffness(a.freq_hz)
-    h = couple(matrices[0], matrices[1], k_joint, ends[0], ends[1], freq_hz=a.freq_hz)
+    h = couple(matrices[0], matrices[1], joint, ends[0], ends[1], freq_hz=a.freq_hz)
     # Virtual points stand behind the channels of their side, and are not measured.
     n_a, own_a, own_b = matrices[0].shape[1], len(channels[0]), len(channels[1])
     kept = [*range(own_a), *range(n_a, n_a + own_b)]
@@ -139,7 +148,7 @@ def _with_joint(
     frfs: FrfSet,
     names: tuple[Channel, ...],
     h: np.ndarray,
-    joint: Joint,
+    joint: Joint | LawJoint,
     side: Nodes,
     at: tuple[float, ...] | None,
 ) -> tuple[np.ndarray, list[int]]:

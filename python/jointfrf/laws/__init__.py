@@ -5,5 +5,7 @@ springs       springs with viscous and hysteretic damping
 viscoelastic  rubber and polymers: standard linear solid, fractional Zener, power law
 function_law  a law of one's own
 law_joint     a joint of laws by DOF, cross terms, masses, rigid DOFs
+law_table     laws by their word in TOML files
+joint_toml    joints in TOML files
 joint_cards   what finite-element programs can be given of it
 """

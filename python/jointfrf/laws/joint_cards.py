@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from jointfrf.dofs import DIRECTIONS, direction_places
-from jointfrf.io.cards import CardFormat
+from jointfrf.io.cards import CardFormat, CardOptions
 from jointfrf.joint import Joint
 
 __all__ = ["joint_cards"]
@@ -21,16 +21,17 @@ def joint_cards(
     nodes: Sequence[int],
     *,
     note: str,
-    element: int,
-    number: int,
-    damping: bool,
+    options: CardOptions,
 ) -> str:
     """Write springs, equations of rigid DOFs and point masses; `LawJoint.export` describes arguments and errors."""
     comment = {"abaqus": "**", "calculix": "**", "nastran": "$", "ansys": "!"}.get(program, "")
+    number = options.get("number", 1)
+    if (rigid or mass) and options.get("positions") is not None:
+        raise ValueError("equations of rigid DOFs and masses stand at the nodes: leave positions out")
     parts = [f"{comment} {note}: stiffness and hysteretic damping of that frequency hold there only\n"] if note else []
-    last = element
+    last = options.get("element", 1)
     if springs is not None:
-        text = springs.export(program, nodes, element=element, number=number, damping=damping)
+        text = springs.export(program, nodes, **options)
         parts.append(text)
         last += len(text.splitlines())  # beyond every element that these lines name
     if rigid:

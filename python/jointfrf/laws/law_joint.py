@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Self
+from typing import Any, NamedTuple, Self, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from jointfrf.dofs import is_rotation
-from jointfrf.io.cards import CardFormat
+from jointfrf.io.cards import CardFormat, CardOptions
 from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_frequency, as_number, as_real
 from jointfrf.kernel.linear_algebra import invert
@@ -303,9 +303,7 @@ class LawJoint:
         nodes: Sequence[int],
         *,
         freq_hz: float | None = None,
-        element: int = 1,
-        number: int = 1,
-        damping: bool = True,
+        **options: Unpack[CardOptions],
     ) -> str:
         """Write the joint as input of a finite-element program, in SI units.
 
@@ -317,8 +315,8 @@ class LawJoint:
         freq_hz : float, optional
             Where laws are taken that depend on frequency, which these cards cannot represent: stiffness and hysteretic
             damping at that frequency. A comment says so.
-        element, number, damping
-            As for `Joint.export`.
+        element, number, rotation_nodes, damping, full_matrix, positions, points, comments
+            As for `Joint.export`; `positions` of a joint of springs alone.
 
         Returns
         -------
@@ -351,5 +349,5 @@ class LawJoint:
         return joint_cards(
             program, springs, self.rigid, self.mass, nodes,
             note=f"{', '.join(varying)} at {freq_hz:g} Hz" if varying else "",
-            element=element, number=number, damping=damping,
+            options=options,
         )  # fmt: skip

@@ -13,6 +13,7 @@ from scipy.sparse import linalg as sparse_linalg
 
 from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.laws.law_joint import LawJoint
 from jointfrf.models.matrices import Matrix
 from jointfrf.models.receptance.receptance import ReceptanceMethod, receptance
 
@@ -190,15 +191,15 @@ def _block_diagonal(
     return sparse.csr_array(sparse.block_diag(blocks, format="csr"))
 
 
-def assemble(a: Model, b: Model, joint: Joint, dofs_a: Sequence[int], dofs_b: Sequence[int]) -> Model:
+def assemble(a: Model, b: Model, joint: Joint | LawJoint, dofs_a: Sequence[int], dofs_b: Sequence[int]) -> Model:
     """Assembly of two models through a joint, by adding the joint to the matrices.
 
     Parameters
     ----------
     a, b : Model
         The substructures.
-    joint : Joint
-        The joint.
+    joint : Joint or LawJoint
+        The joint; laws that are springs and dampers, their masses on either side.
     dofs_a, dofs_b : sequence of int
         Joint DOFs j of A and k of B, counted from 0, in the order of the joint.
 
@@ -210,7 +211,8 @@ def assemble(a: Model, b: Model, joint: Joint, dofs_a: Sequence[int], dofs_b: Se
     Raises
     ------
     ValueError
-        The numbers of DOFs differ.
+        The numbers of DOFs differ; a rigid DOF, or a law that depends on frequency: matrices cannot hold these, `couple`
+        takes them.
 
     Examples
     --------
@@ -223,6 +225,7 @@ def assemble(a: Model, b: Model, joint: Joint, dofs_a: Sequence[int], dofs_b: Se
     n_a, n_b, n_j = len(a.dofs), len(b.dofs), len(joint.dofs)
     if not len(dofs_a) == len(dofs_b) == n_j:
         raise ValueError(f"dofs_a and dofs_b must name {n_j} DOFs each, not {len(dofs_a)} and {len(dofs_b)}")
+    springs, added = _constants(joint)
     rows = np.tile(np.arange(n_j), 2)
     columns = np.concatenate([np.asarray(dofs_a), n_a + np.asarray(dofs_b)])
     relative = sparse.csr_array((np.repeat([1.0, -1.0], n_j), (rows, columns)), shape=(n_j, n_a + n_b))
@@ -234,9 +237,23 @@ def assemble(a: Model, b: Model, joint: Joint, dofs_a: Sequence[int], dofs_b: Se
         (0 if m.structural_damping is None else m.structural_damping) + m.loss_factor * m.stiffness for m in (a, b)
     ]
     return Model(
-        stiffness=_block_diagonal(a.stiffness, b.stiffness, n_a, n_b) + across(joint.stiffness),
-        mass=_block_diagonal(a.mass, b.mass, n_a, n_b),
-        damping=_block_diagonal(a.damping, b.damping, n_a, n_b) + across(joint.damping),
-        structural_damping=_block_diagonal(losses[0], losses[1], n_a, n_b) + across(joint.hysteretic_stiffness),
+        stiffness=_block_diagonal(a.stiffness, b.stiffness, n_a, n_b) + across(springs.stiffness),
+        mass=_block_diagonal(a.mass, b.mass, n_a, n_b)
+        + abs(relative).T @ sparse.diags_array(added / 2) @ abs(relative),
+        damping=_block_diagonal(a.damping, b.damping, n_a, n_b) + across(springs.damping),
+        structural_damping=_block_diagonal(losses[0], losses[1], n_a, n_b) + across(springs.hysteretic_stiffness),
         dofs=tuple(f"A/{d}" for d in a.dofs) + tuple(f"B/{d}" for d in b.dofs),
     )
+
+
+def _constants(joint: Joint | LawJoint) -> tuple[Joint, FloatArray]:
+    """Return springs and dampers of a joint, and its mass by DOF."""
+    if isinstance(joint, Joint):
+        return joint, np.zeros(len(joint.dofs))
+    if joint.rigid:
+        raise ValueError(f"joint: {', '.join(joint.rigid)} is rigid, which adds no spring to matrices: use couple")
+    varying = [type(law).__name__ for law in joint.laws.values() if law.constant_terms is None]
+    if varying:
+        raise ValueError(f"joint: a {varying[0]} depends on frequency, which matrices do not: use couple")
+    springs = LawJoint(joint.laws, dofs=joint.dofs).constant_joint()
+    return springs, np.array([joint.mass.get(dof, 0.0) for dof in joint.dofs])

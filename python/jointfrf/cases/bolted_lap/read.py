@@ -12,7 +12,7 @@ from jointfrf.cases.definitions import (
     Noise,
     actual_values,
     read_bands,
-    read_joint,
+    read_case_joint,
     read_material,
     read_noises,
 )
@@ -156,7 +156,7 @@ def _spacing(table: TomlTable) -> tuple[float, float]:
 
 def _joint(tables: list[TomlTable]) -> tuple[Joint, Joint]:
     """Read the joint and its first estimate: six DOFs in the order of (4.5)."""
-    joint, initial = read_joint(tables)
+    joint, initial = read_case_joint(tables)
     if len(tables) != len(DOFS):
         raise tables[0].error("dof", f"the first of six: {', '.join(DOFS)}")
     for table, dof, name in zip(tables, DOFS, joint.dofs, strict=True):

@@ -9,6 +9,7 @@ expected       what the source says about the case: tables, errors of regenerate
 exact          FRFs without noise
 methods        K*(w) line by line, by each method
 study          many realisations of the noise: identified parameters
+bounds         the bound of the decoupling fit
 regenerate     FRFs of the assembly from identified parameters, and their errors
 printed        FRFs from published parameters as they are printed, and their errors
 noise_free     how exact the equations are without noise

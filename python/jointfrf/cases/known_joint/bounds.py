@@ -17,8 +17,8 @@ __all__ = ["decoupling_bounds"]
 def decoupling_bounds(case: KnownJointCase, exact: Exact) -> dict[str, FloatArray]:
     """Return relative standard deviations of all parameters, shape (2 n,), by the name of the noise.
 
-    Noise of which FRFs share numbers, in blocks or by reciprocity, has another bound, and is left out. FRFs that are zero
-    by symmetry say nothing.
+    Noise of which FRFs share numbers, in blocks or by reciprocity, has another bound, and is left out. FRFs that are
+    zero by symmetry say nothing.
     """
     h = measured(exact, "decoupling-fit")
     shown = np.zeros(h.shape[1:], bool)

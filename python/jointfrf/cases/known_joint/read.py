@@ -13,7 +13,7 @@ from jointfrf.cases.definitions import (
     actual_values,
     check_bands,
     read_bands,
-    read_joint,
+    read_case_joint,
     read_noises,
 )
 from jointfrf.cases.kind import Case
@@ -84,7 +84,7 @@ def read_known_joint(common: Case, table: TomlTable, expected: TomlTable) -> Kno
         One sentence that names the file and the key.
     """
     a, b = (read_substructure(table.table(f"substructure_{side}"), common.freq_hz) for side in "ab")
-    joint, initial = read_joint(table.tables("joint"))
+    joint, initial = read_case_joint(table.tables("joint"))
     points = _points(table.table("points"), a, b, len(joint.dofs))
     observed = _observed(table, joint.dofs, common.freq_hz)
     band_sets = tuple(read_bands(entry, joint.dofs, common.freq_hz) for entry in table.tables("bands"))

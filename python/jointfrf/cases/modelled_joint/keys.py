@@ -4,19 +4,11 @@ from __future__ import annotations
 
 from jointfrf.cases.common_keys import COMMON_KEYS, FIGURES, one_of
 from jointfrf.cases.known_joint.keys import SUBSTRUCTURE
+from jointfrf.laws.law_table import LAW_VALUES, LAW_WORDS, takes_in_words
 from jointfrf.toml.keys import Key, KeyTable
 
-__all__ = ["LAWS", "MODELLED_EXPECTED_KEYS", "MODELLED_JOINT_KEYS"]
+__all__ = ["MODELLED_EXPECTED_KEYS", "MODELLED_JOINT_KEYS"]
 
-#: Laws by their word, and the parameters that each takes.
-LAWS: dict[str, tuple[str, ...]] = {
-    "spring": ("k", "c", "h"),
-    "standard-linear-solid": ("k", "k_m", "tau"),
-    "fractional-zener": ("k", "k_m", "tau", "alpha"),
-    "power": ("k", "k_a", "alpha", "reference_hz"),
-    "rigid": (),
-}
-_OF = {word: ", ".join(f"`{name}`" for name in names) for word, names in LAWS.items()}
 _POINTS = KeyTable(
     "[points], of a modelled joint",
     "DOFs of the joint on both substructures, in the order of the tables `[[law]]`.",
@@ -27,25 +19,15 @@ _POINTS = KeyTable(
 )
 _VALUES = KeyTable(
     "actual, start, in [[law]]",
-    "Parameters of the law, those that it takes: "
-    + "; ".join(f"`{word}` {names}" for word, names in _OF.items() if names) + ".",
-    (
-        Key("k", "number, at least 0", "Stiffness, at rest.", "N/m, N m/rad", "0"),
-        Key("c", "number", "Viscous damping.", "N s/m, N m s/rad", "0"),
-        Key("h", "number", "Hysteretic damping.", "N/m, N m/rad", "0"),
-        Key("k_m", "number, at least 0", "What is added at high frequencies.", "N/m, N m/rad", "0"),
-        Key("k_a", "number, at least 0", "Modulus of the spring-pot at the reference frequency.", "N/m, N m/rad", "0"),
-        Key("tau", "number, above 0", "Relaxation time.", "s", "0"),
-        Key("alpha", "number, 0 to 1", "Order of the derivative.", "", "0"),
-        Key("reference_hz", "number, above 0", "Reference frequency of the power law.", "Hz", "0"),
-    ),
-)  # fmt: skip
+    f"Parameters of the law, those that it takes: {takes_in_words()}.",
+    LAW_VALUES,
+)
 _LAW = KeyTable(
     "[[law]]",
     "One table for each joint DOF: its law, the actual parameters, and those from which the fit starts.",
     (
         Key("dof", "text", "Name of the DOF: `y`, `theta_z`, ..."),
-        Key("law", one_of(tuple(LAWS)), "The law; `rigid`: both sides move alike."),
+        Key("law", one_of(LAW_WORDS), "The law; `rigid`: both sides move alike."),
         Key("actual", "table", "Actual parameters.", "", "required but for `rigid`", _VALUES),
         Key("start", "table", "Where the fit starts.", "", "required but for `rigid`", _VALUES),
         Key("mass", "number, at least 0", "Mass of the joint in this direction, half of it on either side; fitted.",

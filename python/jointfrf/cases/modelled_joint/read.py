@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, fields
 from typing import cast
 
@@ -11,26 +10,17 @@ import numpy as np
 from jointfrf.cases.kind import Case
 from jointfrf.cases.known_joint.structure import ModelStructure
 from jointfrf.cases.known_joint.substructures import read_substructure
-from jointfrf.cases.modelled_joint.keys import LAWS
 from jointfrf.identification.model_fit.assembly import Assembly
 from jointfrf.identification.model_fit.attachments import AddedMass
 from jointfrf.identification.model_fit.substructure import Substructure
 from jointfrf.identification.model_fit.unknown import Unknown
 from jointfrf.laws.law import JointLaw
 from jointfrf.laws.law_joint import LawJoint
-from jointfrf.laws.springs import SpringLaw
-from jointfrf.laws.viscoelastic import FractionalZener, PowerLaw, StandardLinearSolid
+from jointfrf.laws.law_table import LAW_WORDS, read_law
 from jointfrf.models.model import Model
 from jointfrf.toml.table import TomlTable
 
 __all__ = ["ModelledJointCase", "read_modelled_joint"]
-
-_MAKERS: dict[str, Callable[..., JointLaw]] = {
-    "spring": SpringLaw,
-    "standard-linear-solid": StandardLinearSolid,
-    "fractional-zener": FractionalZener,
-    "power": PowerLaw,
-}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -121,28 +111,16 @@ def _read_laws(table: TomlTable) -> tuple[LawJoint, LawJoint]:
     rigid, mass, dofs = [], {}, []
     tables = table.tables("law")
     for own in tables:
-        dof, word = own.text("dof"), own.text("law", tuple(LAWS))
+        dof, word = own.text("dof"), own.text("law", LAW_WORDS)
         dofs.append(dof)
         if word == "rigid":
             rigid.append(dof)
         else:
-            actual[dof], start[dof] = (_law(own.table(key), word) for key in ("actual", "start"))
+            actual[dof], start[dof] = (read_law(own.table(key), word) for key in ("actual", "start"))
         if "mass" in own:
             mass[dof] = own.number("mass", 0)
         own.close()
     return table.build(lambda: (LawJoint(actual, rigid, mass, dofs), LawJoint(start, rigid, mass, dofs)), "law")
-
-
-def _law(table: TomlTable, word: str) -> JointLaw:
-    takes, values = LAWS[word], {}
-    for name in dict.fromkeys(name for names in LAWS.values() for name in names):
-        given = name in table
-        if given and name not in takes:
-            raise table.wrong(name, f"the law {word!r} takes {', '.join(takes)}")
-        if given or (name in takes and (word != "spring" or name == "k")):
-            values[name] = table.number(name)
-    table.close()
-    return table.build(lambda: _MAKERS[word](**values))
 
 
 def _read_unknowns(table: TomlTable) -> tuple[dict[str, dict[str, Unknown]], dict[str, dict[str, float]]]:

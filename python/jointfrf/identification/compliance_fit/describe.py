@@ -134,6 +134,7 @@ def _choice_notes(choices: Sequence[DofDamping]) -> list[str]:
 
 
 def noise_notes(problem: FitProblem) -> list[str]:
+    """Say how the noise was found, and what is special about it."""
     noise = problem.noise
     told = []
     if noise.is_assumed:
@@ -354,6 +355,7 @@ def _misfit_warnings(found: ComplianceFit, problem: FitProblem) -> list[str]:
 
 
 def places_of_excess(misfit: Misfit) -> str:
+    """Say where a residual that is too large is; nothing where it is everywhere."""
     if not misfit.local:
         return ""
     places = _listed([f"{low:g}-{high:g} Hz ({100 * share:.0f} %)" for low, high, share in misfit.local])

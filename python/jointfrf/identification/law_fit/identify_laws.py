@@ -31,8 +31,8 @@ def check_law_joint(joint: LawJoint, dofs: Sequence[str] | None) -> LawJoint:
         raise ValueError(f"dofs must name those of joint, {', '.join(joint.dofs)}, not {', '.join(names)}")
     if joint.mass:
         raise ValueError(
-            f"joint has a mass in {', '.join(joint.mass)}: FRFs at the joint cannot part it from the structures that it "
-            "moves with; leave it out, or give models of these to identify_model"
+            f"joint has a mass in {', '.join(joint.mass)}: FRFs at the joint cannot part it from the structures that "
+            "it moves with; leave it out, or give models of these to identify_model"
         )
     if not joint.laws:
         raise ValueError("joint has no law to fit: all DOFs are rigid")

@@ -298,7 +298,7 @@ def _together(states: tuple[SubstructureState, ...]) -> ComplexArray:
 
 
 def _weights(variance: FloatArray, axis: int) -> FloatArray:
-    """Return 1 over the standard deviation of rows or columns, 0 where all is zero; the axis that is averaged is kept."""
+    """Return 1 over the standard deviation of rows or columns, 0 where all is zero; the mean's axis is kept."""
     mean = variance.mean(axis=axis, keepdims=True)
     found: FloatArray = np.where(mean > 0, 1 / np.sqrt(np.where(mean > 0, mean, 1)), 0)
     return found

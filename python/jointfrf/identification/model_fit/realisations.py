@@ -51,8 +51,8 @@ def joints_of_realisations(
     Notes
     -----
     The first set is fitted as by `identify_model`. The others start there, and their noise, relative part and floor by
-    entry, is found from measured minus fitted FRFs in place of smooth ones. Each minimum is its own; a set that comes to
-    another noise, or does not converge, is fitted as the first.
+    entry, is found from measured minus fitted FRFs in place of smooth ones. Each minimum is its own; a set that comes
+    to another noise, or does not converge, is fitted as the first.
     """
     first: FoundModel | None = None
     level = np.inf

@@ -1,0 +1,139 @@
+"""A joint in a file: saved with its fit as JSON, or as TOML."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from jointfrf.errors import FileContentError
+from jointfrf.files import write_file
+from jointfrf.identification.joint_fit import JointFit
+from jointfrf.joint import Joint
+from jointfrf.kernel.arguments import FloatArray, as_real
+from jointfrf.laws.joint_toml import joint_text, read_joint_table
+from jointfrf.laws.law_joint import LawJoint
+from jointfrf.toml.table import TomlTable, read_toml
+
+__all__ = ["JointFile", "read_joint", "read_joint_file", "write_joint"]
+
+
+class JointFile(NamedTuple):
+    """What a file says of a joint.
+
+    Attributes
+    ----------
+    joint : Joint or LawJoint
+    fit : JointFit or None
+        Where the file was saved by an identification.
+    points : ndarray, shape (2, 3), or None
+        Reference points of both sides, m.
+    about : tuple of str
+        Where the joint comes from.
+    """
+
+    joint: Joint | LawJoint
+    fit: JointFit | None
+    points: FloatArray | None
+    about: tuple[str, ...]
+
+
+def read_joint_file(path: Path) -> JointFile:
+    """Read a joint from a file.
+
+    Raises
+    ------
+    FileNotFoundError
+        There is no such file.
+    FileContentError
+        It is no joint, or something in it is wrong.
+    """
+    if not path.is_file():
+        raise FileNotFoundError(f"there is no file {path}")
+    return _written(read_toml(path)) if path.suffix.lower() == ".toml" else _saved(path)
+
+
+def _saved(path: Path) -> JointFile:
+    fit = JointFit.load(path)
+    content = json.loads(path.read_text(encoding="utf-8"))
+    source, given = content.get("source"), content.get("reference_points_m")
+    points = None
+    if given is not None:
+        try:
+            points = as_real("reference_points_m", [given["j"], given["k"]], (2, 3))
+        except (ValueError, TypeError, KeyError):
+            raise FileContentError(f'{path}: "reference_points_m" is damaged') from None
+    about = (f"from {source}",) if isinstance(source, str) else (f"from {path.name}",)
+    return JointFile(fit.joint, fit, points, about)
+
+
+def _written(table: TomlTable) -> JointFile:
+    joint = read_joint_table(table)
+    points = np.tile(as_real("at", table.numbers("at"), (3,)), (2, 1)) if "at" in table else None
+    return JointFile(joint, None, points, (f"from {Path(table.where).name}",))
+
+
+def read_joint(path: Path | str) -> Joint | LawJoint:
+    """Read a joint from a file.
+
+    Parameters
+    ----------
+    path : Path or str
+        A TOML file of constants (`dofs`, `stiffness`, ...) or of laws (tables `[[law]]`), as `write_joint` writes; or a
+        JSON file of `JointFit.save`.
+
+    Returns
+    -------
+    Joint or LawJoint
+
+    Raises
+    ------
+    FileNotFoundError
+        There is no such file.
+    FileContentError
+        It is no joint, or something in it is wrong.
+
+    Examples
+    --------
+    >>> import tempfile, jointfrf as jf
+    >>> mount = jf.LawJoint({"y": jf.StandardLinearSolid(1e5, 2e5, 1e-3)}, rigid=["theta"])
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     same = jf.read_joint(jf.write_joint(f"{folder}/mount.toml", mount))
+    >>> same == mount
+    True
+    """
+    return read_joint_file(Path(path)).joint
+
+
+def write_joint(path: Path | str, joint: Joint | LawJoint) -> Path:
+    """Write a joint to a TOML file, whole or not at all; `read_joint` gives the same joint again.
+
+    Parameters
+    ----------
+    path : Path or str
+        Its name ends in .toml; in a folder that exists.
+    joint : Joint or LawJoint
+
+    Returns
+    -------
+    Path
+        The file written.
+
+    Raises
+    ------
+    ValueError
+        Another ending; a `FunctionLaw`, which a file cannot hold.
+    TypeError
+        It is no joint.
+    OSError
+        The file cannot be written.
+    """
+    if not isinstance(joint, Joint | LawJoint):
+        raise TypeError(f"joint must be a Joint or a LawJoint, not {type(joint).__name__}")
+    target = Path(path)
+    if target.suffix.lower() != ".toml":
+        raise ValueError(f"a joint is written as TOML: name a file that ends in .toml, not {target.name}")
+    write_file(target, joint_text(joint))
+    return target
