@@ -211,8 +211,8 @@ def assemble(a: Model, b: Model, joint: Joint | LawJoint, dofs_a: Sequence[int],
     Raises
     ------
     ValueError
-        The numbers of DOFs differ; a rigid DOF, or a law that depends on frequency: matrices cannot hold these, `couple`
-        takes them.
+        The numbers of DOFs differ; a rigid DOF, or a law that depends on frequency: matrices cannot hold these,
+        `couple` takes them.
 
     Examples
     --------
@@ -238,8 +238,7 @@ def assemble(a: Model, b: Model, joint: Joint | LawJoint, dofs_a: Sequence[int],
     ]
     return Model(
         stiffness=_block_diagonal(a.stiffness, b.stiffness, n_a, n_b) + across(springs.stiffness),
-        mass=_block_diagonal(a.mass, b.mass, n_a, n_b)
-        + abs(relative).T @ sparse.diags_array(added / 2) @ abs(relative),
+        mass=_block_diagonal(a.mass, b.mass, n_a, n_b) + sparse.diags_array(abs(relative).T @ (added / 2)),
         damping=_block_diagonal(a.damping, b.damping, n_a, n_b) + across(springs.damping),
         structural_damping=_block_diagonal(losses[0], losses[1], n_a, n_b) + across(springs.hysteretic_stiffness),
         dofs=tuple(f"A/{d}" for d in a.dofs) + tuple(f"B/{d}" for d in b.dofs),

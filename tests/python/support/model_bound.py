@@ -33,13 +33,15 @@ def model_bound(whole, freq, responses, forces, level, truth=None):
             priors[f"{name}/{key}"] = unknown.std or np.inf
     values |= truth or {}
     h = moved(whole, values).receptance(freq, responses, forces)
+    size = np.sqrt((abs(h) ** 2).mean(axis=0))
+    shown = size > 1e-8 * np.sqrt(np.outer(size.max(axis=1), size.max(axis=0)))  # without zeros of symmetry
     slopes = []
     for name, value in values.items():
         step = 1e-4 * value
         ends = [
             moved(whole, {**values, name: value + sign * step}).receptance(freq, responses, forces) for sign in (-1, 1)
         ]
-        slopes.append(((ends[1] - ends[0]) / (2 * step) / (level * abs(h))).ravel())
+        slopes.append(((ends[1] - ends[0]) / (2 * step) / (level * abs(h)))[:, shown].ravel())
     slopes = np.array(slopes)
     size = np.array(list(values.values()))
     scaled = slopes * size[:, None]

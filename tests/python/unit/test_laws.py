@@ -172,3 +172,27 @@ def test_elements_of_cards_have_different_numbers():
     numbers = [line.split(",")[0] for before, line in pairwise(lines) if before.startswith("*ELEMENT")]
     assert len(numbers) == len(set(numbers)) == 4
     assert numbers[0] == "7"
+
+
+def test_matrices_of_an_assembly_hold_springs_and_masses_of_laws():
+    """Against coupling of the FRFs."""
+    freq = np.array([1.0, 2.9, 6.0])
+    a, b = jf.chain([5, 3], [2500, 3500], [3, 4], ground="start"), jf.chain([4, 2], [2000, 2500], [2, 1], ground="end")
+    joint = jf.LawJoint({"x": jf.SpringLaw(2000.0, c=3.0, h=50.0)}, mass={"x": 0.4})
+    whole = jf.assemble(a, b, joint, [1], [0]).receptance(freq)
+    coupled = jf.couple(a.receptance(freq), b.receptance(freq), joint, [1], [0], freq_hz=freq)
+    assert np.allclose(whole, coupled, rtol=1e-9)
+    for other, message in (
+        (jf.LawJoint({"x": LAWS["zener"]}), "a FractionalZener depends on frequency"),
+        (jf.LawJoint({}, rigid=["x"]), "x is rigid"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            jf.assemble(a, b, other, [1], [0])
+
+
+def test_cards_of_springs_take_positions_and_those_of_equations_do_not():
+    arms = {"positions": [[0, 0, 0], [0, 0, 0.01]], "points": [0, 0, 0.005]}
+    springs = jf.LawJoint({"y": LAWS["viscous"]})
+    assert springs.export("nastran", (1, 2), **arms) == springs.constant_joint().export("nastran", (1, 2), **arms)
+    with pytest.raises(ValueError, match="leave positions out"):
+        jf.LawJoint({"y": LAWS["viscous"]}, rigid=["x"]).export("nastran", (1, 2), **arms)

@@ -6,10 +6,13 @@ import numpy as np
 import pytest
 
 import jointfrf as jf
+from jointfrf.cases.fitting import decoupling_bound, fit_decoupling
 from jointfrf.identification.model_fit.matrix_polynomial import MatrixPolynomial
 from jointfrf.identification.model_fit.prediction import Prediction
 from jointfrf.identification.model_fit.prepare import ChannelNoise, Channels, prepare_model_fit
+from jointfrf.identification.model_fit.starts import from_lines
 from jointfrf.identification.model_fit.unknowns import parameter_vector
+from model_bound import model_bound
 
 FREQ = np.linspace(12, 620, 77)
 SECTION = {"density": 2700.0, "width": 0.025, "height": 0.006, "loss_factor": 0.01}
@@ -396,3 +399,56 @@ def test_frfs_of_a_substructure_must_be_on_the_lines_of_the_measurement():
     whole = jf.Assembly(part, jf.Substructure(free_beam(), ["1:y", "1:theta"]), PLAIN)
     with pytest.raises(ValueError, match="the FRFs of A must be on the lines of the measurement"):
         prepare_model_fit(FREQ, np.ones((77, 1, 1)), whole, Channels(("A/y",), ("A/y",)), ChannelNoise(), ())
+
+
+def decoupling_data(level, count):
+    """FRFs between internal points, of the substructures and of many measurements, and the variance of the latter."""
+    freq = np.linspace(0.5, 10, 300)
+    a, b = jf.chain([5, 3], [2500, 3500], [3, 4], ground="start"), jf.chain([4, 2], [2000, 2500], [2, 1], ground="end")
+    h_a, h_b = a.receptance(freq)[:, ::-1, ::-1], b.receptance(freq)
+    k_joint = jf.Joint([2000.0], [3.0]).dynamic_stiffness(freq)
+    exact = jf.couple(a.receptance(freq), b.receptance(freq), k_joint, [1], [0])[:, [0, 3]][:, :, [0, 3]]
+    return freq, (h_a, h_b), k_joint, exact, jf.realisations(np.ascontiguousarray(exact), level, seed=3, count=count)
+
+
+def test_realisations_of_a_decoupling_fit_are_those_of_single_fits():
+    freq, sides, k_joint, _, measured = decoupling_data(0.05, 4)
+    many = fit_decoupling(freq, ("x",), sides, 0.2 * k_joint, measured)
+    for found, h in zip(many, measured, strict=True):
+        parts = [jf.Substructure.of_frfs(freq, own, ["j", "i"], ["j"]) for own in sides]
+        fit = fit_of(freq, h, jf.Assembly(*parts, jf.Joint([500.0], [1.0], ["x"])), ["A/i", "B/i"], ["A/i", "B/i"])
+        for value, name in zip(found, ("k_x", "c_x"), strict=True):
+            assert abs(value - fit.parameters[name]) < 0.2 * fit.std_error[name]
+
+
+def test_a_realisation_unlike_the_first_is_fitted_by_itself():
+    """Noise three times that of the first set, then the first once more."""
+    freq, sides, k_joint, exact, measured = decoupling_data(0.02, 2)
+    loud = jf.pollute(np.ascontiguousarray(exact), 0.06, seed=9)
+    first, other, last = fit_decoupling(freq, ("x",), sides, k_joint, np.stack([measured[0], loud, measured[0]]))
+    assert abs(other[0] / 2000 - 1) < 0.02
+    assert np.allclose(first, last, rtol=1e-3)
+
+
+def test_the_bound_of_a_decoupling_fit_is_that_of_differences():
+    freq, sides, k_joint, exact, _ = decoupling_data(0.05, 1)
+    bound = decoupling_bound(freq, ("x",), sides, k_joint, (0.05 * abs(exact)) ** 2)
+    parts = [jf.Substructure.of_frfs(freq, own, ["j", "i"], ["j"]) for own in sides]
+    whole = jf.Assembly(*parts, jf.Joint([2000.0], [3.0], ["x"]))
+    other = model_bound(whole, freq, ["A/i", "B/i"], ["A/i", "B/i"], 0.05)
+    assert np.allclose(bound, [other["k_x"] / 2000, other["c_x"] / 3], rtol=1e-4)
+
+
+def test_channels_that_span_the_joint_give_it_line_by_line():
+    """Attachments and masses of the joint are part of the models; exact FRFs give the exact compliance."""
+    joint = jf.LawJoint({"y": jf.SpringLaw(6e5, c=20.0), "theta": jf.SpringLaw(5e3, c=1.5)}, mass={"y": 0.05})
+    whole = assembly(joint, (jf.AddedMass("B/6:y", 0.01),))
+    channels = ("A/4:y", "A/7:y", "B/6:y")
+    prediction = Prediction(whole, FREQ, channels, channels)
+    vector = parameter_vector(whole, ({}, {}), (), prediction.joint_stiffness())
+    h = whole.receptance(FREQ, channels, channels)
+    found = prediction.joint_compliance(vector, h, np.full(h.shape, 1e-20))
+    exact = joint.compliance(FREQ)
+    assert np.median(abs(found.c - exact) / abs(exact).max()) < 1e-6
+    assert from_lines(joint, 2 * np.pi * FREQ, found)[:4] == pytest.approx(joint.values[:4], rel=1e-3)
+    assert Prediction(whole, FREQ, channels[:1], channels).joint_compliance(vector, h[:, :1], abs(h[:, :1])) is None

@@ -18,7 +18,7 @@ _FIRST, _LOWERED, _RAISED, _LARGEST = 1e-3, 0.1, 8.0, 1e9
 _LEAST = 1e-4
 #: Or when two steps in a row gain less than this.
 _SMALL = 1e-3
-#: No step changes a coordinate by more than this; logarithms and standard deviations alike.
+#: No step changes a logarithm, or standard deviations of a prior, by more than this; damping may be anything.
 _LONGEST = 4.0
 
 
@@ -61,6 +61,7 @@ def minimise(
         The iteration ends when the next step promises to lower the squares by less.
     """
     lower, upper = squares.vector.bounds
+    longest = np.where(squares.vector.is_log | squares.vector.has_prior, _LONGEST, np.inf)
     free = np.arange(start.size) != (-1 if held is None else held)
     x = np.where(free, np.clip(start, lower, upper), start)
     damping, at, converged, small = _FIRST, squares.linearised(x), False, 0
@@ -77,7 +78,7 @@ def minimise(
             if left < 0.1 * least:
                 damping = 2 * _LARGEST
                 break
-            there = np.where(free, np.clip(x + np.clip(step, -_LONGEST, _LONGEST), lower, upper), x)
+            there = np.where(free, np.clip(x + np.clip(step, -longest, longest), lower, upper), x)
             cost = squares.cost(there)
             if cost < at.cost:
                 break

@@ -152,19 +152,21 @@ def _noise(
                 raise ValueError("noise must be positive: E|e|^2 of each FRF that was measured")
         return None, _hidden(variance, kept), np.where(shown, lines, 0), 1.0, False
     reciprocal = channels.responses == channels.forces and bool(shown.all())
-    rows, columns = np.flatnonzero(kept.any(axis=1)), np.flatnonzero(kept.any(axis=0))
+    # Of a square matrix FRFs that are zero by symmetry may stay: reciprocity says more of the noise.
+    given = shown if reciprocal else kept
+    rows, columns = np.flatnonzero(given.any(axis=1)), np.flatnonzero(given.any(axis=0))
     coherence = None if told.coherence is None else as_real("coherence", told.coherence, lines.shape)
-    is_block = bool(kept[np.ix_(rows, columns)].all())
-    lines_kept = lines[:, rows][:, :, columns] if is_block else lines[:, kept][:, None]
+    is_block = bool(given[np.ix_(rows, columns)].all())
+    lines_kept = lines[:, rows][:, :, columns] if is_block else lines[:, given][:, None]
     if coherence is not None:
-        coherence = coherence[:, rows][:, :, columns] if is_block else coherence[:, kept][:, None]
+        coherence = coherence[:, rows][:, :, columns] if is_block else coherence[:, given][:, None]
     found = estimate_noise(
         freq, np.ascontiguousarray(lines_kept), reciprocal=reciprocal and is_block,
         coherence=coherence, averages=told.averages,
     )  # fmt: skip
-    variance, smooth = _placed(found.variance, kept).real, _placed(found.smooth.h, kept)
+    variance, smooth = _placed(found.variance, given).real, _placed(found.smooth.h, given)
     relative, floor, of_coherence = (
-        _placed(part[None], kept)[0].real for part in (found.relative, found.floor, found.coherence_factor)
+        _placed(part[None], given)[0].real for part in (found.relative, found.floor, found.coherence_factor)
     )
     model = replace(found, relative=relative, floor=floor, coherence_factor=of_coherence, variance=variance)
     is_assumed = found.source == "none" or found.level < _ROUNDING
