@@ -11,13 +11,13 @@ from numpy.typing import ArrayLike
 
 from jointfrf.dofs import rigid_offset
 from jointfrf.io.cards import CardFormat, CardOptions, cards
-from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_frequency, as_real
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_array, as_frequency, as_names, as_real
 
 __all__ = ["Joint"]
 
 
 def _as_matrix(name: str, value: ArrayLike, n: int | None) -> FloatArray:
-    array = np.atleast_1d(np.asarray(value))
+    array = np.atleast_1d(as_array(name, value))
     if array.ndim == 1:
         return np.diag(as_real(name, array, (n,)))
     return as_real(name, array, (n or len(array), n or len(array)))
@@ -124,6 +124,7 @@ class Joint:
         ValueError
             Other names than those of its DOFs.
         """
+        dofs = as_names("dofs", dofs)
         if len(dofs) != len(self.dofs) or set(dofs) != set(self.dofs):
             raise ValueError(f"dofs must name {', '.join(self.dofs)} in some order, not {', '.join(map(str, dofs))}")
         order = [self.dofs.index(dof) for dof in dofs]

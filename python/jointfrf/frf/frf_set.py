@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from jointfrf.errors import FileContentError, FileContentWarning
-from jointfrf.kernel.arguments import as_array, check_type
+from jointfrf.kernel.arguments import as_array, as_integer, as_nodes, as_real, check_type
 
 __all__ = ["POWER_OF_I_OMEGA", "ROUND_OFF", "Channel", "FrfSet", "same_frf"]
 
@@ -51,6 +51,8 @@ class Channel:
     direction: str
 
     def __post_init__(self) -> None:
+        as_integer("node", self.node)
+        check_type("direction", self.direction, str)
         match = _DIRECTION.fullmatch(self.direction.strip().lower())
         if match is None:
             raise ValueError(f"direction {self.direction!r} is none of +x -x +y -y +z -z +rx -rx +ry -ry +rz -rz")
@@ -344,7 +346,7 @@ class FrfSet:
         FileContentError
             No line lies in the band.
         """
-        low, high = band
+        low, high = as_real("band", band, (2,)).tolist()
         if not low <= high:
             raise ValueError(f"band ({low:g}, {high:g}) Hz does not increase")
         inside = (self.freq_hz >= low) & (self.freq_hz <= high)
@@ -366,6 +368,7 @@ class FrfSet:
         FileContentError
             There is no FRF between them.
         """
+        nodes = as_nodes("nodes", nodes)
         rows, columns = (
             [i for i, channel in enumerate(side) if channel.node in nodes]
             for side in (self.responses, self.excitations)
@@ -428,6 +431,9 @@ class FrfSet:
         self, outputs: Iterable[ChannelLike], inputs: Iterable[ChannelLike]
     ) -> tuple[tuple[NDArray[np.intp], NDArray[np.intp]], NDArray[np.float64], list[tuple[Channel, Channel]]]:
         """Row, column and sign of every entry of a matrix, and the entries that are not there."""
+        for name, named in (("outputs", outputs), ("inputs", inputs)):
+            if not isinstance(named, Iterable):
+                raise TypeError(f"{name} must be a sequence of channels, not {type(named).__name__}")
         rows = [Channel.parse(output) for output in outputs]
         columns = [Channel.parse(input_) for input_ in inputs]
         shape = (len(rows), len(columns))
@@ -464,7 +470,7 @@ class FrfSet:
 
 
 def _checked_coherence(values: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:
-    coherence = np.ascontiguousarray(values, dtype=np.float64)
+    coherence = np.ascontiguousarray(as_array("coherence", values), dtype=np.float64)
     if coherence.shape != shape:
         raise ValueError(f"coherence has shape {coherence.shape}, expected that of h, {shape}")
     known = coherence[~np.isnan(coherence)]
@@ -474,7 +480,7 @@ def _checked_coherence(values: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.
 
 
 def _checked_averages(values: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:
-    averages = np.asarray(values, dtype=np.float64)
+    averages = np.asarray(as_array("averages", values), dtype=np.float64)
     if averages.shape not in ((), shape):
         raise ValueError(f"averages has shape {averages.shape}, expected one number or one for each FRF, {shape}")
     known = averages[~np.isnan(averages)]

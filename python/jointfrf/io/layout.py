@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from jointfrf.errors import FileContentError
 from jointfrf.frf.frf_set import POWER_OF_I_OMEGA, FrfSet
 from jointfrf.io.arrays import FrfArrays
+from jointfrf.kernel.arguments import check_type
 
 __all__ = ["MARK", "fields_of", "own_arrays"]
 
@@ -29,6 +30,7 @@ def fields_of(frfs: FrfSet) -> dict[str, NDArray[Any]]:
     ValueError
         An FRF is NaN or infinite on some lines only, or there is none.
     """
+    check_type("frfs", frfs, FrfSet)
     frfs.check_whole()
     fields: dict[str, NDArray[Any]] = {
         MARK: np.array(_LAYOUT),

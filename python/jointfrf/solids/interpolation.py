@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 from scipy.spatial import cKDTree
 
-from jointfrf.kernel.arguments import FloatArray, as_number, as_real
+from jointfrf.kernel.arguments import FloatArray, as_number, as_real, check_type
 from jointfrf.solids.mesh import Mesh
 
 __all__ = ["interpolation"]
@@ -73,6 +73,7 @@ def interpolation(
     >>> weights.shape, weights.data.tolist()
     ((1, 24), [0.25, 0.25, 0.25, 0.25])
     """
+    check_type("mesh", mesh, Mesh)
     places = as_real("points", points, (None, 3))
     if as_number("tolerance", tolerance) < 0:
         raise ValueError(f"tolerance must not be negative, not {tolerance:g} m")
