@@ -36,7 +36,10 @@ class SingularLineError(np.linalg.LinAlgError):
 
 
 class FileContentError(ValueError):
-    """A file cannot be read, or lacks something that is needed."""
+    """A file cannot be read, or lacks something that is needed; one line, whatever the file is called."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(" ".join(message.splitlines()))
 
 
 class FileContentWarning(UserWarning):

@@ -71,10 +71,11 @@ class Joint:
     ) -> None:
         k = _as_matrix("stiffness", stiffness, None)
         n = len(k)
-        names = tuple(str(i) for i in range(n)) if dofs is None else tuple(dofs)
+        names = tuple(str(i) for i in range(n)) if dofs is None else as_names("dofs", dofs)
         if len(names) != n or len(set(names)) != n:
             raise ValueError(f"dofs must name {n} different DOFs, not {names}")
-        eta = as_real("loss_factor", np.broadcast_to(np.asarray(loss_factor, dtype=np.float64), (n,)), (n,))
+        losses = as_array("loss_factor", loss_factor)
+        eta = as_real("loss_factor", losses if losses.ndim else np.broadcast_to(losses, (n,)), (n,))
         if (eta < 0).any():
             raise ValueError(f"loss_factor must not be negative, not {eta.min():g}")
         c, h = (

@@ -191,7 +191,7 @@ def _guarded(name: str, call: Callable[..., Any], positional: list[Any], named: 
         warnings.simplefilter("always")
         try:
             result = call(*positional, **named)
-            if isinstance(result, contextlib.AbstractContextManager):
+            if isinstance(result, contextlib._GeneratorContextManager):
                 with result:
                     result = None
             elif isinstance(result, Iterator):

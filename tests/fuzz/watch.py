@@ -104,6 +104,10 @@ def _process(
     found.broken += content["broken"]
     if content["ended"] and worker.returncode == 0:
         return last
+    if not (folder / COUNTS).exists():
+        raise RuntimeError(
+            f"the part {name} cannot be made:\n{(folder / PRINTED).read_text(errors='replace')[-_TAIL:]}"
+        )
     at = int.from_bytes(progress.read_bytes()[:8], "little")
     # Cases that ended well after the counts were saved last.
     found.counts["ended before a crash or hang"] += max(0, at - content["done"])

@@ -35,6 +35,7 @@ def run_cases(name: str, seed: int, first: int, last: int, folder: Path, deadlin
     saved = time.monotonic()
     part = make_part(name, own)
     done = first
+    _save(folder, counts, broken, done, ended=False)
     for number in range(first, last):
         if time.time() > deadline:
             break

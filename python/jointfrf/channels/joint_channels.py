@@ -216,6 +216,7 @@ def _counts(place: ChannelPlace, kind: str, known: Sequence[Channel]) -> bool:
 
 def _check_known(frfs: FrfSet, places: Sequence[ChannelPlace]) -> None:
     """Check that each channel has a side, is a translation, stands once, and is in the set."""
+    check_type("frfs", frfs, FrfSet)
     seen: dict[tuple[int, str, str], ChannelPlace] = {}
     for place in places:
         where = f"{place.where}: " if place.where else ""

@@ -6,6 +6,7 @@ import re
 import warnings
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -164,8 +165,8 @@ class FrfSet:
     stated: str = ""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "freq_hz", as_array("freq_hz", self.freq_hz).astype(np.float64, copy=False))
-        object.__setattr__(self, "h", np.ascontiguousarray(as_array("h", self.h), dtype=np.complex128))
+        object.__setattr__(self, "freq_hz", _numbers("freq_hz", self.freq_hz, "biuf").astype(np.float64, copy=False))
+        object.__setattr__(self, "h", np.ascontiguousarray(_numbers("h", self.h, "biufc"), dtype=np.complex128))
         shape = (*self.freq_hz.shape, len(self.responses), len(self.excitations))
         if self.freq_hz.ndim != 1 or self.h.shape != shape:
             raise ValueError(f"h has shape {self.h.shape}, expected (n_freq, n_responses, n_excitations) = {shape}")
@@ -469,8 +470,15 @@ class FrfSet:
         return f"uneven spacing {steps.min():.4g} to {steps.max():.4g} Hz"
 
 
+def _numbers(name: str, values: ArrayLike, kinds: str) -> NDArray[Any]:
+    found = as_array(name, values)
+    if found.dtype.kind not in kinds:
+        raise TypeError(f"{name} must hold {'numbers' if 'c' in kinds else 'real numbers'}, not {found.dtype}")
+    return found
+
+
 def _checked_coherence(values: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:
-    coherence = np.ascontiguousarray(as_array("coherence", values), dtype=np.float64)
+    coherence = np.ascontiguousarray(_numbers("coherence", values, "biuf"), dtype=np.float64)
     if coherence.shape != shape:
         raise ValueError(f"coherence has shape {coherence.shape}, expected that of h, {shape}")
     known = coherence[~np.isnan(coherence)]
@@ -480,7 +488,7 @@ def _checked_coherence(values: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.
 
 
 def _checked_averages(values: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:
-    averages = np.asarray(as_array("averages", values), dtype=np.float64)
+    averages = np.asarray(_numbers("averages", values, "biuf"), dtype=np.float64)
     if averages.shape not in ((), shape):
         raise ValueError(f"averages has shape {averages.shape}, expected one number or one for each FRF, {shape}")
     known = averages[~np.isnan(averages)]

@@ -43,6 +43,9 @@ __all__ = [
 ComplexArray = NDArray[np.complex128]
 FloatArray = NDArray[np.float64]
 
+#: Characters of a value that a message shows.
+_SHOWN = 80
+
 #: A conversion that copies more than this many bytes is announced by a `CopyWarning`.
 LARGE_COPY = 16 * 2**20
 
@@ -153,7 +156,8 @@ def optional_frequency(freq_hz: ArrayLike | None, n_freq: int) -> FloatArray | N
 
 def one_line(value: object) -> str:
     """Show a value in a few words of one line."""
-    return " ".join(reprlib.repr(value).split())
+    words = " ".join(reprlib.repr(value).split())
+    return words if len(words) <= _SHOWN else words[: _SHOWN - 3] + "..."
 
 
 def check_choice(name: str, value: object, known: Sequence[str]) -> None:

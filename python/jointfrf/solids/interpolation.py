@@ -133,6 +133,9 @@ def _located(
     for count in (min(_FIRST, len(bricks)), len(bricks)):
         for i in left.tolist():
             near = np.atleast_1d(tree.query(places[i], count)[1])
+            near = near[near < len(bricks)]  # none of a point too far away for its distance to be a number
+            if not near.size:
+                continue
             functions, off = _nearest(mesh.nodes[mesh.elements[bricks[near]]], places[i])
             closest = int(off.argmin())
             best[i], weights[i], distance[i] = near[closest], functions[closest], off[closest]

@@ -99,7 +99,8 @@ class Assembly:
 
     def check(self, names: Sequence[str], what: str) -> None:
         """Raise an error for a DOF that neither substructure has."""
-        for name in names:
+        check_type("what", what, str)
+        for name in as_names("names", names):
             side = {"A/": self.a, "B/": self.b}.get(str(name)[:2])
             if side is None or not side.has(name[2:]):
                 raise ValueError(
