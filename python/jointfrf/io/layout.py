@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping
 from typing import Any
 
@@ -18,6 +19,8 @@ __all__ = ["MARK", "fields_of", "own_arrays"]
 #: The field that says whose layout it is; its value is the number of the layout.
 MARK = "jointfrf_frfs"
 _LAYOUT = 1
+#: The field with a checksum of all others; who edits a file takes it out.
+_CHECKSUM = "sha256"
 _REQUIRED = ("freq_hz", "h", "responses", "excitations", "quantity")
 _UNITS = ("m/N", "m/s/N", "m/s^2/N")
 
@@ -49,7 +52,26 @@ def fields_of(frfs: FrfSet) -> dict[str, NDArray[Any]]:
         nodes = sorted(frfs.coordinates)
         fields["nodes"] = np.array(nodes)
         fields["coordinates"] = np.array([frfs.coordinates[node] for node in nodes])
+    fields[_CHECKSUM] = np.array(_checksum(fields))
     return fields
+
+
+def _checksum(fields: Mapping[str, Any]) -> str:
+    """SHA-256 of names, shapes and values: a field that was lost or renamed shows as a changed value does."""
+    found = hashlib.sha256()
+    for name in sorted(fields):
+        if name == _CHECKSUM:
+            continue
+        value = np.asarray(fields[name])
+        is_text = value.dtype.kind in "US"
+        content = "\n".join(map(str, value.ravel().tolist())).encode() if is_text else _values(value).tobytes()
+        found.update(f"{name} {value.shape} ".encode() + content)
+    return found.hexdigest()
+
+
+def _values(value: NDArray[Any]) -> NDArray[Any]:
+    """Values in one type and byte order, whatever a program that copied the file has chosen."""
+    return np.ascontiguousarray(value, dtype="<c16" if value.dtype.kind == "c" else "<f8")
 
 
 def own_arrays(fields: Mapping[str, Any], where: str) -> FrfArrays:
@@ -68,6 +90,8 @@ def own_arrays(fields: Mapping[str, Any], where: str) -> FrfArrays:
     missing = [name for name in _REQUIRED if name not in fields]
     if missing:
         raise FileContentError(f"{where} lacks {', '.join(missing)}")
+    if _CHECKSUM in fields and str(fields[_CHECKSUM]) != _checksum(fields):
+        raise FileContentError(f"{where} is damaged or was edited: its content does not fit its field {_CHECKSUM}")
     nodes, places = np.asarray(fields.get("nodes", [])), np.asarray(fields.get("coordinates", np.zeros((0, 3))))
     if nodes.dtype.kind not in "iuf" or places.shape != (nodes.size, 3) or not np.isfinite(places).all():
         raise FileContentError(

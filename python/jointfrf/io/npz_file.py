@@ -130,7 +130,8 @@ def write_npz(path: str | PathLike[str], frfs: FrfSet) -> None:
     The arrays, SI units: ``jointfrf_frfs`` (1, the number of the layout), ``freq_hz`` (n_freq), ``h`` complex
     (n_freq, n_responses, n_excitations), NaN where there is no FRF, ``responses`` and ``excitations`` (texts such as
     ``102:+y``), ``quantity`` (text: receptance, mobility, accelerance), ``unit`` (text); where known ``coherence``
-    (shape of h), ``averages`` (n_responses, n_excitations), ``nodes`` (n) and ``coordinates`` (n, 3) in m.
+    (shape of h), ``averages`` (n_responses, n_excitations), ``nodes`` (n) and ``coordinates`` (n, 3) in m; ``sha256``, a
+    checksum of all of these, by which a reader sees a damaged file: a program that edits the file takes it out.
 
     Examples
     --------
