@@ -18,6 +18,10 @@ __all__ = [
 ]
 
 
+#: Characters of what an error of another library says that are repeated.
+_LONGEST = 200
+
+
 class SingularLineError(np.linalg.LinAlgError):
     """A matrix that had to be inverted is singular at some frequency lines.
 
@@ -68,4 +72,5 @@ class ConvergenceWarning(UserWarning):
 
 def first_line(error: BaseException) -> str:
     """Return what an error of another library says, in one line."""
-    return (str(error).strip().splitlines() or [type(error).__name__])[0]
+    line = (str(error).strip().splitlines() or [type(error).__name__])[0]
+    return line if len(line) <= _LONGEST else f"{line[:_LONGEST]}..."

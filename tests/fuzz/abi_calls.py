@@ -101,7 +101,8 @@ class AbiCalls:
         for name, content in before.items():
             if guarded[name].tobytes() != content:
                 raise BrokenError(f"{routine.name} changes its input {name}: {numbers}")
-        info = int(guarded["info"][_GUARD]) if "info" in guarded else 0
+        answers = any(each.name == "info" and each.intent == "out" for each in routine.arguments)
+        info = int(guarded["info"][_GUARD]) if answers else 0
         if info < 0:
             written = [each.name for each in routine.arguments
                        if each.declared and each.intent == "out" and _is_written(guarded[each.name])]  # fmt: skip

@@ -13,7 +13,7 @@ import numpy as np
 
 from frf_files import frf_set
 from jointfrf.cli.main import main
-from jointfrf.cli.parser import build_parser
+from jointfrf.cli.parser import COMMANDS, command_parser
 from jointfrf.io import write_csv, write_npz, write_uff
 
 from .part import BrokenError
@@ -37,8 +37,7 @@ class Commands:
         write_csv(folder / "a.csv", given)
         (folder / "broken.uff").write_bytes((folder / "a.uff").read_bytes()[:999])
         self.files = [str(folder / name) for name in ("a.uff", "a.npz", "a.csv", "broken.uff", "none.uff")]
-        action = next(each for each in build_parser()._actions if isinstance(each, argparse._SubParsersAction))
-        self.commands = {name: parser for name, parser in action.choices.items() if name not in _UNTRIED}
+        self.commands = {name: command_parser(name) for name in COMMANDS if name not in _UNTRIED}
 
     def run(self, random: np.random.Generator) -> str:
         """Run one command line in this process."""

@@ -219,6 +219,7 @@ def _check_known(frfs: FrfSet, places: Sequence[ChannelPlace]) -> None:
     check_type("frfs", frfs, FrfSet)
     seen: dict[tuple[int, str, str], ChannelPlace] = {}
     for place in places:
+        check_type("place", place, ChannelPlace)
         where = f"{place.where}: " if place.where else ""
         if place.side is None:
             raise ValueError(f"{where}channel {place.channel} has no side: j or k")

@@ -183,7 +183,7 @@ def band_mean(
     lines = as_square("k_joint", k_joint)
     n_freq, n, _ = lines.shape
     freq = as_frequency(freq_hz, n_freq)
-    names = [str(i) for i in range(n)] if dofs is None else list(dofs)
+    names = [str(i) for i in range(n)] if dofs is None else list(as_names("dofs", dofs))
     if len(names) != n:
         raise ValueError(f"dofs must name {n} DOFs, not {len(names)}")
     stiffness, damping = np.empty(n), np.empty(n)

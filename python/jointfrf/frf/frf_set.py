@@ -167,6 +167,10 @@ class FrfSet:
     def __post_init__(self) -> None:
         object.__setattr__(self, "freq_hz", _numbers("freq_hz", self.freq_hz, "biuf").astype(np.float64, copy=False))
         object.__setattr__(self, "h", np.ascontiguousarray(_numbers("h", self.h, "biufc"), dtype=np.complex128))
+        for name in ("responses", "excitations"):
+            named = getattr(self, name)
+            if not isinstance(named, tuple | list) or not all(isinstance(each, Channel) for each in named):
+                raise TypeError(f"{name} must be a tuple of Channel, not {type(named).__name__}")
         shape = (*self.freq_hz.shape, len(self.responses), len(self.excitations))
         if self.freq_hz.ndim != 1 or self.h.shape != shape:
             raise ValueError(f"h has shape {self.h.shape}, expected (n_freq, n_responses, n_excitations) = {shape}")

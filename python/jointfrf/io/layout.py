@@ -14,12 +14,13 @@ from jointfrf.frf.frf_set import POWER_OF_I_OMEGA, FrfSet
 from jointfrf.io.arrays import FrfArrays
 from jointfrf.kernel.arguments import check_type
 
-__all__ = ["MARK", "fields_of", "own_arrays"]
+__all__ = ["MARK", "fields_of", "is_own", "own_arrays"]
 
 #: The field that says whose layout it is; its value is the number of the layout.
 MARK = "jointfrf_frfs"
-_LAYOUT = 1
-#: The field with a checksum of all others; who edits a file takes it out.
+#: The layout that is written, and the one without a checksum, which is read, too.
+_LAYOUT, _UNCHECKED = 2, 1
+#: The field with a checksum of all others, which layout 1 lacks; who edits a file writes layout 1 without it.
 _CHECKSUM = "sha256"
 _REQUIRED = ("freq_hz", "h", "responses", "excitations", "quantity")
 _UNITS = ("m/N", "m/s/N", "m/s^2/N")
@@ -74,6 +75,11 @@ def _values(value: NDArray[Any]) -> NDArray[Any]:
     return np.ascontiguousarray(value, dtype="<c16" if value.dtype.kind == "c" else "<f8")
 
 
+def is_own(fields: Mapping[str, Any]) -> bool:
+    """Whether a file is one of our own, by its mark or, where that is damaged, by its checksum."""
+    return MARK in fields or _CHECKSUM in fields
+
+
 def own_arrays(fields: Mapping[str, Any], where: str) -> FrfArrays:
     """FRFs of the fields of a file in the own layout.
 
@@ -82,12 +88,15 @@ def own_arrays(fields: Mapping[str, Any], where: str) -> FrfArrays:
     FileContentError
         A field is missing, or the layout is of a later version.
     """
+    if MARK not in fields:
+        raise FileContentError(f"{where} lacks {MARK}")
     layout = np.asarray(fields[MARK])
-    if layout.size != 1 or layout.dtype.kind not in "iu" or int(layout.item()) != _LAYOUT:
+    if layout.size != 1 or layout.dtype.kind not in "iu" or int(layout.item()) not in (_LAYOUT, _UNCHECKED):
         raise FileContentError(
-            f"{where} has layout {fields[MARK]!s:.20}, this version of jointfrf reads layout {_LAYOUT}"
+            f"{where} has layout {fields[MARK]!s:.20}, this version of jointfrf reads layouts {_UNCHECKED} and {_LAYOUT}"
         )
-    missing = [name for name in _REQUIRED if name not in fields]
+    required = _REQUIRED if int(layout.item()) == _UNCHECKED else (*_REQUIRED, _CHECKSUM)
+    missing = [name for name in required if name not in fields]
     if missing:
         raise FileContentError(f"{where} lacks {', '.join(missing)}")
     if _CHECKSUM in fields and str(fields[_CHECKSUM]) != _checksum(fields):

@@ -9,7 +9,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_limits
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_limits, check_type
 from jointfrf.laws.law import JointLaw, LawField, checked_values
 
 __all__ = ["FunctionLaw"]
@@ -77,6 +77,7 @@ class FunctionLaw(JointLaw):
         except TypeError as error:
             raise TypeError("fields must hold name, kind and bounds of each parameter, as LawField has them") from error
         for field in named:
+            check_type("name of a parameter", field.name, str)
             as_limits(field.name, field.lower, field.upper)
         found = checked_values("the law", named, values)
         object.__setattr__(self, "function", function)

@@ -100,8 +100,10 @@ def beam(
     area = width * height
     step = length / n_elements
     inertia = width * height**3 / 12
-    if not 0 < inertia < np.inf:
-        raise ValueError(f"width {width:g} m and height {height:g} m give a section of no second moment of area")
+    if not 0 < step**3 < np.inf or not 0 < inertia < np.inf:
+        raise ValueError(
+            f"length {length:g} m, width {width:g} m and height {height:g} m give a section of no second moment of area"
+        )
     if element == "euler-bernoulli":
         stiffness, mass = _euler_bernoulli(step, youngs_modulus * inertia, density * area)
     else:

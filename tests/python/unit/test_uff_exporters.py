@@ -1,5 +1,6 @@
 """Universal Files as programs export them: read to the last digit that they hold, or refused in one sentence."""
 
+import gc
 import warnings
 
 import numpy as np
@@ -67,6 +68,7 @@ def test_what_cannot_be_read_is_refused_in_one_sentence(tmp_path, name):
     assert "\n" not in str(raised.value)
 
 
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # it leaves its file open
 @pytest.mark.parametrize("binary", [0, 1])
 def test_files_that_pyuff_writes(tmp_path, binary):
     """An independent writer, in double precision; the length that it states of complex numbers is half of theirs."""
@@ -80,5 +82,6 @@ def test_files_that_pyuff_writes(tmp_path, binary):
             id1="FRF", id2="NONE", id3="NONE", id4="NONE", id5="NONE", rsp_ent_name="NONE", ref_ent_name="NONE",
         )  # fmt: skip
         pyuff.UFF(str(path)).write_sets([record], "add")
+    gc.collect()
     frfs = read_uff(path)
     np.testing.assert_allclose(frfs.h[:, :, 0].T, VALUES, rtol=1e-11)
