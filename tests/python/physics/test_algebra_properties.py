@@ -121,9 +121,12 @@ def test_reciprocity_is_kept(case):
 
 
 @PROFILE
-@given(structures(), st.integers(-200, 200))
+@given(structures(), st.integers(-60, 60))
 def test_scaling_by_a_power_of_two_is_exact(case, power):
-    """FRFs in units of 2^p are the same numbers times 2^p: no digit depends on the unit."""
+    """FRFs in units of 2^p are the same numbers times 2^p: no digit depends on the unit.
+
+    Lines whose numbers lie beyond 2^+-120 or so leave the closed forms of small orders for LAPACK: within rounding then.
+    """
     n, h_a, h_b, k, first = case
     unit = 2.0**power
     whole, gamma = assembled(n, h_a, h_b, k)
@@ -135,6 +138,16 @@ def test_scaling_by_a_power_of_two_is_exact(case, power):
     np.testing.assert_array_equal(jf.inverse_substructuring(gamma_scaled), jf.inverse_substructuring(gamma) / unit)
     np.testing.assert_array_equal(jf.joint_compliance(gamma_scaled), jf.joint_compliance(gamma) * unit)
     np.testing.assert_array_equal(jf.invert(h_a * unit), jf.invert(h_a) / unit)
+
+
+@PROFILE
+@given(structures(), st.integers(-300, 300))
+def test_any_power_of_two_changes_no_more_than_rounding(case, power):
+    n, h_a, h_b, k, first = case
+    alpha, gamma = (assembled(n, h_a, h_b, each)[1] for each in (first, k))
+    found = jf.ismm(alpha * 2.0**power, gamma * 2.0**power, first / 2.0**power) * 2.0**power
+    size = max(abs(k).max(), abs(first).max()) / abs(k).max(axis=(1, 2)).min()
+    assert_close(found, k, min(1.0, SLACK * EPS * condition(alpha, gamma) * condition(k, first) * size))
 
 
 @PROFILE

@@ -49,7 +49,10 @@ def test_what_breaks_is_said(tmp_path, monkeypatch):
     seen = set()
     for number in range(500):
         try:
-            part.call(part.callables[[each.name for each in part.callables].index([*broken][number % 3])], random_of(1, number))
+            part.call(
+                part.callables[[each.name for each in part.callables].index([*broken][number % 3])],
+                random_of(1, number),
+            )
         except BrokenError as error:
             seen.add(str(error).split(":")[0].split()[0])
     assert seen == broken.keys()
