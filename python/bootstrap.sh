@@ -236,7 +236,10 @@ print(*tomllib.load(open("pyproject.toml", "rb"))["build-system"]["requires"], s
 }
 
 up_to_date "$1" && exit
-mkdir -p build
+if ! mkdir -p build 2>/dev/null || [ ! -w build ] || [ ! -w . ]; then
+  say "$root cannot be written: copy or clone the project to a folder of your own"
+  exit 1
+fi
 take_lock
 up_to_date "$1" && exit
 date >"$log"

@@ -11,7 +11,7 @@ from typing import Literal, cast, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from jointfrf.kernel.arguments import FloatArray, as_real
+from jointfrf.kernel.arguments import FloatArray, as_names, as_real
 from jointfrf.spelling import did_you_mean
 
 __all__ = [
@@ -160,7 +160,8 @@ def direction_places(dofs: Sequence[str]) -> NDArray[np.intp]:
     ValueError
         A name that is not known or comes twice.
     """
-    names = [str(dof).lower() for dof in dofs]
+    dofs = as_names("dofs", dofs)
+    names = [dof.lower() for dof in dofs]
     unknown = [dof for dof, name in zip(dofs, names, strict=True) if name not in _PLACES]
     if unknown:
         hint = did_you_mean(unknown[0], DIRECTIONS)

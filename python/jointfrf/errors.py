@@ -18,6 +18,10 @@ __all__ = [
 ]
 
 
+#: Characters of what an error of another library says that are repeated.
+_LONGEST = 200
+
+
 class SingularLineError(np.linalg.LinAlgError):
     """A matrix that had to be inverted is singular at some frequency lines.
 
@@ -36,7 +40,10 @@ class SingularLineError(np.linalg.LinAlgError):
 
 
 class FileContentError(ValueError):
-    """A file cannot be read, or lacks something that is needed."""
+    """A file cannot be read, or lacks something that is needed; one line, whatever the file is called."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(" ".join(message.splitlines()))
 
 
 class FileContentWarning(UserWarning):
@@ -65,4 +72,5 @@ class ConvergenceWarning(UserWarning):
 
 def first_line(error: BaseException) -> str:
     """Return what an error of another library says, in one line."""
-    return (str(error).strip().splitlines() or [type(error).__name__])[0]
+    line = (str(error).strip().splitlines() or [type(error).__name__])[0]
+    return line if len(line) <= _LONGEST else f"{line[:_LONGEST]}..."

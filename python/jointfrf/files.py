@@ -8,10 +8,49 @@ from pathlib import Path
 
 from jointfrf.errors import FileContentError
 
-__all__ = ["HEAD", "head_of", "write_file"]
+__all__ = ["HEAD", "check_file", "head_of", "write_file"]
 
 #: How much of a file shows what it is, bytes.
 HEAD = 1 << 13
+#: Files beyond this are not read, GB; the environment variable says another limit.
+_LIMIT, _LIMIT_VARIABLE = 16.0, "JOINTFRF_FILE_LIMIT_GB"
+
+
+def check_file(path: Path) -> None:
+    """Check that a file can be read to its end: that it is one, and not larger than memory is likely to hold.
+
+    Parameters
+    ----------
+    path : Path
+
+    Raises
+    ------
+    FileNotFoundError
+        There is no such file.
+    FileContentError
+        It is a folder, a pipe or a device, or larger than 16 GB. The environment variable JOINTFRF_FILE_LIMIT_GB takes
+        another limit.
+    """
+    if not path.exists():
+        raise FileNotFoundError(f"there is no file {path}")
+    if path.is_dir():
+        raise FileContentError(f"{path} is a folder, not a file")
+    if not path.is_file():
+        # Whoever opens a pipe waits for a writer; a device has no end.
+        raise FileContentError(f"{path} is a pipe or a device, not a file: save what it gives first")
+    word = os.environ.get(_LIMIT_VARIABLE, "")
+    try:
+        limit = float(word or _LIMIT)
+    except ValueError:
+        limit = -1.0
+    if not limit > 0:
+        raise FileContentError(f"the environment variable {_LIMIT_VARIABLE} is {word!r}: it must be a number of GB")
+    size = path.stat().st_size / 1e9
+    if size > limit:
+        raise FileContentError(
+            f"{path} has {size:.3g} GB, more than the {limit:.3g} GB that are read: the environment variable "
+            f"{_LIMIT_VARIABLE} raises this limit"
+        )
 
 
 def head_of(path: Path) -> bytes:
@@ -33,13 +72,7 @@ def head_of(path: Path) -> bytes:
     FileContentError
         It is a folder, a pipe or a device, cannot be read, or is empty.
     """
-    if not path.exists():
-        raise FileNotFoundError(f"there is no file {path}")
-    if path.is_dir():
-        raise FileContentError(f"{path} is a folder, not a file")
-    if not path.is_file():
-        # Whoever opens a pipe waits for a writer; a device has no end.
-        raise FileContentError(f"{path} is a pipe or a device, not a file: save what it gives first")
+    check_file(path)
     try:
         with path.open("rb") as file:
             head = file.read(HEAD)

@@ -11,13 +11,13 @@ from numpy.typing import ArrayLike
 
 from jointfrf.dofs import rigid_offset
 from jointfrf.io.cards import CardFormat, CardOptions, cards
-from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_frequency, as_real
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_array, as_frequency, as_names, as_real
 
 __all__ = ["Joint"]
 
 
 def _as_matrix(name: str, value: ArrayLike, n: int | None) -> FloatArray:
-    array = np.atleast_1d(np.asarray(value))
+    array = np.atleast_1d(as_array(name, value))
     if array.ndim == 1:
         return np.diag(as_real(name, array, (n,)))
     return as_real(name, array, (n or len(array), n or len(array)))
@@ -71,10 +71,11 @@ class Joint:
     ) -> None:
         k = _as_matrix("stiffness", stiffness, None)
         n = len(k)
-        names = tuple(str(i) for i in range(n)) if dofs is None else tuple(dofs)
+        names = tuple(str(i) for i in range(n)) if dofs is None else as_names("dofs", dofs)
         if len(names) != n or len(set(names)) != n:
             raise ValueError(f"dofs must name {n} different DOFs, not {names}")
-        eta = as_real("loss_factor", np.broadcast_to(np.asarray(loss_factor, dtype=np.float64), (n,)), (n,))
+        losses = as_array("loss_factor", loss_factor)
+        eta = as_real("loss_factor", losses if losses.ndim else np.broadcast_to(losses, (n,)), (n,))
         if (eta < 0).any():
             raise ValueError(f"loss_factor must not be negative, not {eta.min():g}")
         c, h = (
@@ -124,6 +125,7 @@ class Joint:
         ValueError
             Other names than those of its DOFs.
         """
+        dofs = as_names("dofs", dofs)
         if len(dofs) != len(self.dofs) or set(dofs) != set(self.dofs):
             raise ValueError(f"dofs must name {', '.join(self.dofs)} in some order, not {', '.join(map(str, dofs))}")
         order = [self.dofs.index(dof) for dof in dofs]

@@ -101,7 +101,7 @@ def central_difference(
     >>> jf.central_difference(-(1 + np.outer(x, x))[None], 0.1).real.round(12).tolist()
     [[[-1.0, 0.0], [0.0, -1.0]]]
     """
-    if sign not in (1, -1):
+    if as_number("sign", sign) not in (1, -1):
         raise ValueError(f"sign must be 1 or -1, not {sign}")
     t = difference_weights(spacing) * np.array([[1.0], [sign]])
     lines = as_lines("h", h, t.shape[1], t.shape[1], later=True)
@@ -205,7 +205,9 @@ def difference_error(spacing: float | ArrayLike, bending_stiffness: float, joint
     >>> round(error.bias, 3), round(error.compliance * 1e5, 2)
     (0.276, 5.53)
     """
-    if not (bending_stiffness > 0 and joint_stiffness > 0):
+    if not (
+        as_number("bending_stiffness", bending_stiffness) > 0 and as_number("joint_stiffness", joint_stiffness) > 0
+    ):
         raise ValueError("bending_stiffness and joint_stiffness must be positive")
     t = difference_weights(spacing)
     reach = float(spacing) if np.ndim(spacing) == 0 else float(np.ptp(np.asarray(spacing))) / 2  # type: ignore[arg-type]

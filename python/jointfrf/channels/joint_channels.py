@@ -16,7 +16,7 @@ from jointfrf.channels.virtual_point import VirtualPoint, virtual_interface, vir
 from jointfrf.dofs import DIRECTIONS
 from jointfrf.frf.channel_place import ChannelPlace, JointSide
 from jointfrf.frf.frf_set import Channel, FrfSet
-from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_real
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_real, check_type
 
 __all__ = ["ChannelAgreement", "JointChannels", "SideAgreement", "joint_channels"]
 
@@ -100,6 +100,7 @@ class JointChannels:
         FileContentError
             FRFs are missing.
         """
+        check_type("frfs", frfs, FrfSet)
         return frfs.matrix(self.responses.channels, self.forces.channels)
 
     def agreement(self, h: ComplexArray) -> tuple[SideAgreement, ...]:
@@ -215,8 +216,10 @@ def _counts(place: ChannelPlace, kind: str, known: Sequence[Channel]) -> bool:
 
 def _check_known(frfs: FrfSet, places: Sequence[ChannelPlace]) -> None:
     """Check that each channel has a side, is a translation, stands once, and is in the set."""
+    check_type("frfs", frfs, FrfSet)
     seen: dict[tuple[int, str, str], ChannelPlace] = {}
     for place in places:
+        check_type("place", place, ChannelPlace)
         where = f"{place.where}: " if place.where else ""
         if place.side is None:
             raise ValueError(f"{where}channel {place.channel} has no side: j or k")

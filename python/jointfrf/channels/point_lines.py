@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from jointfrf.channels.finite_differences import difference_error, difference_weights
 from jointfrf.dofs import DIRECTIONS, direction_names, direction_places, rigid_motion
 from jointfrf.frf.frf_set import Channel
-from jointfrf.kernel.arguments import FloatArray
+from jointfrf.kernel.arguments import FloatArray, as_names, as_nodes, as_real
 
 __all__ = ["Interface", "interface"]
 
@@ -104,6 +104,10 @@ def interface(
     >>> sides.transform[:2, :2].tolist()
     [[0.5, 0.5], [50.0, -50.0]]
     """
+    dofs = as_names("dofs", dofs)
+    points_j, points_k = as_nodes("points_j", points_j), as_nodes("points_k", points_k)
+    if not isinstance(coordinates, Mapping):
+        raise TypeError("coordinates must be a mapping of nodes to x, y, z")
     if not dofs:
         raise ValueError("dofs must name at least one joint DOF")
     places = direction_places(dofs).tolist()
@@ -145,7 +149,7 @@ def _one_side(
     missing = [node for node in points if node not in coordinates]
     if missing:
         raise ValueError(f"node {missing[0]} has no coordinates")
-    at = np.array([np.asarray(coordinates[node], dtype=float) for node in points])
+    at = np.array([as_real(f"coordinates of node {node}", coordinates[node], (3,)) for node in points])
     middle = (at.min(axis=0) + at.max(axis=0)) / 2
     extent = np.ptp(at, axis=0)
     along = int(np.argmax(extent))

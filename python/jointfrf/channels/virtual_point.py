@@ -283,6 +283,7 @@ def append_virtual_point(h: ArrayLike, channels: ArrayLike, point: VirtualPoint)
     >>> append_virtual_point(np.eye(3)[None], [1, 2], vp)[0, -1].real.round(12).tolist()
     [0.0, 0.5, 0.5, 0.5]
     """
+    check_type("point", point, VirtualPoint)
     lines = as_square("h", h, later=True)
     n_all = lines.shape[1]
     at = as_dofs("channels", channels, n_all) - 1
@@ -323,6 +324,13 @@ def channel_geometry(
     >>> positions.tolist(), directions.tolist()
     ([[0.0, 0.0, 0.0], [0.02, 0.0, 0.0]], [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
     """
+    if not isinstance(channels, Iterable) or not isinstance(coordinates, Mapping):
+        what = (
+            "coordinates must be a mapping of nodes to x, y, z"
+            if isinstance(channels, Iterable)
+            else ("channels must be a sequence of channels")
+        )
+        raise TypeError(what)
     named = [Channel.parse(channel) for channel in channels]
     for channel in named:
         if channel.is_rotation:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import reprlib
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import NamedTuple
@@ -10,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from jointfrf.kernel.arguments import FloatArray, as_frequency, as_square
+from jointfrf.kernel.arguments import FloatArray, as_frequency, as_names, as_square, one_line
 
 __all__ = ["PIECE", "Band", "BandMean", "as_bands", "band_mean", "in_bands", "line_slices"]
 
@@ -75,7 +74,7 @@ def _pairs(bands: object) -> list[Band]:
     except (TypeError, ValueError):
         pairs = [(np.nan, np.nan)]
     if not all(0 <= low <= high < np.inf for low, high in pairs):
-        raise ValueError(f"a band must be (low, high) in Hz with 0 <= low <= high, not {reprlib.repr(bands)}")
+        raise ValueError(f"a band must be (low, high) in Hz with 0 <= low <= high, not {one_line(bands)}")
     return pairs
 
 
@@ -110,6 +109,7 @@ def as_bands(
     [[(1.0, 2.0)], [(1.0, 2.0), (3.0, 4.0)]]
     """
     freq_hz = as_frequency(freq_hz)
+    dofs = as_names("dofs", dofs)
 
     def several(entry: Band | Sequence[Band] | None) -> list[Band]:
         if entry is None:
@@ -183,7 +183,7 @@ def band_mean(
     lines = as_square("k_joint", k_joint)
     n_freq, n, _ = lines.shape
     freq = as_frequency(freq_hz, n_freq)
-    names = [str(i) for i in range(n)] if dofs is None else list(dofs)
+    names = [str(i) for i in range(n)] if dofs is None else list(as_names("dofs", dofs))
     if len(names) != n:
         raise ValueError(f"dofs must name {n} DOFs, not {len(names)}")
     stiffness, damping = np.empty(n), np.empty(n)

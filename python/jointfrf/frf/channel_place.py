@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf.frf.frf_set import Channel, FrfSet
+from jointfrf.kernel.arguments import as_nodes, check_type
 
 __all__ = ["ChannelPlace", "ChannelRole", "JointSide", "places_of_nodes"]
 
@@ -50,6 +51,9 @@ class ChannelPlace:
     optional: bool = False
     where: str = ""
 
+    def __post_init__(self) -> None:
+        check_type("channel", self.channel, Channel)
+
     @property
     def unit(self) -> NDArray[np.float64]:
         """Direction of the channel, shape (3,)."""
@@ -89,6 +93,8 @@ def places_of_nodes(frfs: FrfSet, nodes_j: Sequence[int], nodes_k: Sequence[int]
     >>> [(str(place.channel), place.side) for place in places_of_nodes(frfs, [1], [2])]
     [('1:+y', 'j'), ('2:-z', 'k')]
     """
+    check_type("frfs", frfs, FrfSet)
+    nodes_j, nodes_k = as_nodes("nodes_j", nodes_j), as_nodes("nodes_k", nodes_k)
     shared = set(nodes_j) & set(nodes_k)
     if shared:
         raise ValueError(f"node {min(shared)} is named on both sides of the joint")

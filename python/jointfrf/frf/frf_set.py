@@ -6,12 +6,13 @@ import re
 import warnings
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from jointfrf.errors import FileContentError, FileContentWarning
-from jointfrf.kernel.arguments import as_array, check_type
+from jointfrf.kernel.arguments import as_array, as_integer, as_nodes, as_real, check_type
 
 __all__ = ["POWER_OF_I_OMEGA", "ROUND_OFF", "Channel", "FrfSet", "same_frf"]
 
@@ -51,6 +52,8 @@ class Channel:
     direction: str
 
     def __post_init__(self) -> None:
+        as_integer("node", self.node)
+        check_type("direction", self.direction, str)
         match = _DIRECTION.fullmatch(self.direction.strip().lower())
         if match is None:
             raise ValueError(f"direction {self.direction!r} is none of +x -x +y -y +z -z +rx -rx +ry -ry +rz -rz")
@@ -162,8 +165,12 @@ class FrfSet:
     stated: str = ""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "freq_hz", as_array("freq_hz", self.freq_hz).astype(np.float64, copy=False))
-        object.__setattr__(self, "h", np.ascontiguousarray(as_array("h", self.h), dtype=np.complex128))
+        object.__setattr__(self, "freq_hz", _numbers("freq_hz", self.freq_hz, "biuf").astype(np.float64, copy=False))
+        object.__setattr__(self, "h", np.ascontiguousarray(_numbers("h", self.h, "biufc"), dtype=np.complex128))
+        for name in ("responses", "excitations"):
+            named = getattr(self, name)
+            if not isinstance(named, tuple | list) or not all(isinstance(each, Channel) for each in named):
+                raise TypeError(f"{name} must be a tuple of Channel, not {type(named).__name__}")
         shape = (*self.freq_hz.shape, len(self.responses), len(self.excitations))
         if self.freq_hz.ndim != 1 or self.h.shape != shape:
             raise ValueError(f"h has shape {self.h.shape}, expected (n_freq, n_responses, n_excitations) = {shape}")
@@ -344,7 +351,7 @@ class FrfSet:
         FileContentError
             No line lies in the band.
         """
-        low, high = band
+        low, high = as_real("band", band, (2,)).tolist()
         if not low <= high:
             raise ValueError(f"band ({low:g}, {high:g}) Hz does not increase")
         inside = (self.freq_hz >= low) & (self.freq_hz <= high)
@@ -366,6 +373,7 @@ class FrfSet:
         FileContentError
             There is no FRF between them.
         """
+        nodes = as_nodes("nodes", nodes)
         rows, columns = (
             [i for i, channel in enumerate(side) if channel.node in nodes]
             for side in (self.responses, self.excitations)
@@ -428,6 +436,9 @@ class FrfSet:
         self, outputs: Iterable[ChannelLike], inputs: Iterable[ChannelLike]
     ) -> tuple[tuple[NDArray[np.intp], NDArray[np.intp]], NDArray[np.float64], list[tuple[Channel, Channel]]]:
         """Row, column and sign of every entry of a matrix, and the entries that are not there."""
+        for name, named in (("outputs", outputs), ("inputs", inputs)):
+            if not isinstance(named, Iterable):
+                raise TypeError(f"{name} must be a sequence of channels, not {type(named).__name__}")
         rows = [Channel.parse(output) for output in outputs]
         columns = [Channel.parse(input_) for input_ in inputs]
         shape = (len(rows), len(columns))
@@ -463,8 +474,15 @@ class FrfSet:
         return f"uneven spacing {steps.min():.4g} to {steps.max():.4g} Hz"
 
 
+def _numbers(name: str, values: ArrayLike, kinds: str) -> NDArray[Any]:
+    found = as_array(name, values)
+    if found.dtype.kind not in kinds:
+        raise TypeError(f"{name} must hold {'numbers' if 'c' in kinds else 'real numbers'}, not {found.dtype}")
+    return found
+
+
 def _checked_coherence(values: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:
-    coherence = np.ascontiguousarray(values, dtype=np.float64)
+    coherence = np.ascontiguousarray(_numbers("coherence", values, "biuf"), dtype=np.float64)
     if coherence.shape != shape:
         raise ValueError(f"coherence has shape {coherence.shape}, expected that of h, {shape}")
     known = coherence[~np.isnan(coherence)]
@@ -474,7 +492,7 @@ def _checked_coherence(values: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.
 
 
 def _checked_averages(values: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:
-    averages = np.asarray(values, dtype=np.float64)
+    averages = np.asarray(_numbers("averages", values, "biuf"), dtype=np.float64)
     if averages.shape not in ((), shape):
         raise ValueError(f"averages has shape {averages.shape}, expected one number or one for each FRF, {shape}")
     known = averages[~np.isnan(averages)]

@@ -58,6 +58,8 @@ def merge_frfs(sets: Sequence[FrfSet]) -> FrfSet:
     >>> merge_frfs([one, two]).h.shape
     (2, 2, 1)
     """
+    if not isinstance(sets, Sequence) or not all(isinstance(each, FrfSet) for each in sets):
+        raise TypeError("sets must be a list of FrfSet")
     if not sets:
         raise ValueError("there is no set of FRFs to merge")
     if len(sets) == 1:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from operator import index
 from typing import Final, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from jointfrf.kernel.arguments import ComplexArray, as_lines, as_number, check_choice
+from jointfrf.kernel.arguments import ComplexArray, as_integer, as_lines, as_number, check_choice
 from jointfrf.kernel.call import call
 
 __all__ = ["NoiseKind", "NoiseReference", "noise_arguments", "pollute", "realisations"]
@@ -171,12 +170,12 @@ def noise_arguments(
     n_out, n_in = shape
     if reciprocal and n_out != n_in:
         raise ValueError(f"reciprocal noise needs square matrices, not {n_out} x {n_in}")
-    size = 1 if block is None else index(block)
+    size = 1 if block is None else as_integer("block", block)
     if size < 1 or n_out % size or n_in % size:
         raise ValueError(f"block {block} does not divide matrices of {n_out} x {n_in}")
-    if index(first) < 0 or index(count) < 0 or first + count > _MOST:
+    if as_integer("first", first) < 0 or as_integer("count", count) < 0 or first + count > _MOST:
         raise ValueError(f"realisations are counted from 0 to {_MOST - 1}: not {count} from {first} on")
-    if not 0 <= index(seed) < 2**64:
+    if not 0 <= as_integer("seed", seed) < 2**64:
         raise ValueError(f"seed must lie between 0 and 2**64 - 1, not {seed}")
     words = np.array([seed & 0xFFFFFFFF, seed >> 32], np.uint32).view(np.int32)
     return _KINDS[kind], relative_to[0].upper(), int(reciprocal), size, number, words

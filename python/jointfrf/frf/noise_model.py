@@ -24,7 +24,7 @@ from jointfrf.frf.smoothing import (
     pieces,
     smoothed,
 )
-from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_number, as_real
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_integer, as_number, as_real, check_type
 
 __all__ = ["NoiseModel", "NoiseSource", "estimate_noise"]
 
@@ -177,6 +177,10 @@ def estimate_noise(
     True
     """
     freq, lines = checked_frfs(freq_hz, h)
+    if as_integer("max_poles", max_poles) < 1:
+        raise ValueError(f"max_poles must be 1 or more, not {max_poles}")
+    if like is not None:
+        check_type("like", like, NoiseModel)
     given = _coherence_variance(lines, coherence, averages)
     places = pieces(np.argsort(freq))
     if like is not None and (len(places) > 1 or like.variance.shape != lines.shape):

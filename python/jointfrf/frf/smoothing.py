@@ -16,6 +16,7 @@ from jointfrf.kernel.arguments import (
     ComplexArray,
     FloatArray,
     as_frequency,
+    as_integer,
     as_lines,
     as_number,
     as_real,
@@ -140,7 +141,7 @@ def smooth_frfs(
         raise ValueError("variance must be positive")
     if as_number("inflation", inflation) < 1:
         raise ValueError(f"inflation must be 1 or more, not {inflation}")
-    if max_poles < 1:
+    if as_integer("max_poles", max_poles) < 1:
         raise ValueError(f"max_poles must be 1 or more, not {max_poles}")
     search = OrderSearch(inflation=inflation, max_poles=max_poles)
     places = pieces(np.argsort(freq))

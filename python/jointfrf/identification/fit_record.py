@@ -12,6 +12,7 @@ import numpy as np
 
 from jointfrf.dofs import Parameter
 from jointfrf.errors import FileContentError
+from jointfrf.files import check_file
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.kernel.call import VERSION
 
@@ -269,6 +270,8 @@ def read_record(path: Path) -> dict[str, Any]:
     OSError
         It cannot be read.
     """
+    if path.exists():
+        check_file(path)
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
     except (UnicodeDecodeError, json.JSONDecodeError):

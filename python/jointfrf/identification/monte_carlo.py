@@ -19,6 +19,7 @@ from jointfrf.kernel.arguments import (
     as_interface,
     as_joint_lines,
     check_choice,
+    one_line,
     optional_frequency,
 )
 from jointfrf.kernel.call import call
@@ -117,7 +118,7 @@ class MonteCarlo:
         freq = as_frequency(freq_hz, self.good.size)
         inside = in_bands(freq, bands)
         if not inside.any() or not freq[inside].all():
-            raise ValueError(f"the band must contain lines, and none at 0 Hz: {bands}")
+            raise ValueError(f"the band must contain lines, and none at 0 Hz: {one_line(bands)}")
         number = int(inside.sum())
         omega = 2 * np.pi * freq[inside, None, None]
         mean, covariance = self.mean[inside], self.covariance[inside]

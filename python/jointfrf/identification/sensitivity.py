@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from jointfrf.dofs import joint_parameters
 from jointfrf.frf.bands import Band
 from jointfrf.joint import Joint
-from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_dofs, as_frequency, as_square, as_values
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_dofs, as_frequency, as_number, as_square, as_values
 
 __all__ = ["Sensitivity", "propose_bands", "sensitivity"]
 
@@ -138,6 +138,8 @@ def propose_bands(
     """
     freq = as_frequency(freq_hz)
     level = abs(as_values("change", change, freq.size))
+    for name, number in (("drop_db", drop_db), ("smooth", smooth), ("shortest", shortest)):
+        as_number(name, number)
     if freq.size < 2 or (np.diff(freq) <= 0).any():
         raise ValueError("freq_hz must hold at least two lines and increase")
     extent = freq[-1] - freq[0]

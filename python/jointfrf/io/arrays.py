@@ -15,6 +15,7 @@ from jointfrf.frf.frf_set import POWER_OF_I_OMEGA, Channel, FrfSet
 from jointfrf.io.labels import channels_of, channels_of_table, is_table
 from jointfrf.io.quantity import check_quantity, contradiction
 from jointfrf.io.units import Unit, parse_unit
+from jointfrf.kernel.arguments import as_array, check_type
 
 __all__ = ["FrfArrays", "as_frf_set", "frfs_of_arrays"]
 
@@ -92,6 +93,8 @@ def frfs_of_arrays(
     >>> frfs.quantity, frfs.h[0, 0].real.tolist()
     ('accelerance', [0.001, 0.001])
     """
+    for name, value in (("unit", unit), ("axes", axes), ("source", source)):
+        check_type(name, value, str)
     coordinates: Mapping[int, NDArray[np.float64]] = {}
     if is_table(responses) or is_table(excitations):
         responses, excitations, coordinates = channels_of_table(responses, excitations)
@@ -152,7 +155,7 @@ def as_frf_set(
 
 
 def _numbers(what: str, values: Any) -> NDArray[Any]:
-    found = np.asarray(values)
+    found = as_array(f"the {what}", values)
     if found.dtype.kind not in "biufc":
         raise ValueError(f"the {what} are no numbers")
     return found
@@ -179,7 +182,7 @@ def _in_order(what: str, values: Any, axes: str, shape: tuple[int, int, int]) ->
     """Values with axes frequency, response, excitation."""
     array = _numbers(what, values)
     if axes:
-        names = [name.strip() for name in axes.split(",")]
+        names = [name.strip() for name in str(axes).split(",")]
         if sorted(names) != sorted(_AXES):
             raise ValueError(f"axes {axes!r} are not freq, out and in, in their order, such as out,in,freq")
         array = _with_single_axes(what, array, shape, names)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf.errors import FileContentError
+from jointfrf.files import check_file
 from jointfrf.frf.channel_place import ChannelPlace, ChannelRole, JointSide
 from jointfrf.frf.frf_set import Channel
 from jointfrf.spelling import did_you_mean
@@ -133,6 +134,8 @@ def _axes(row: TomlTable) -> NDArray[np.float64]:
 
 
 def _csv_rows(file: Path) -> Iterator[list[ChannelPlace]]:
+    if file.exists():
+        check_file(file)
     try:
         text = file.read_text(encoding="utf-8-sig")
     except OSError as error:

@@ -14,7 +14,7 @@ from jointfrf.extras import import_extra
 from jointfrf.files import write_file
 from jointfrf.frf.frf_set import FrfSet
 from jointfrf.io.arrays import FrfArrays
-from jointfrf.io.layout import MARK, fields_of, own_arrays
+from jointfrf.io.layout import fields_of, is_own, own_arrays
 from jointfrf.io.mapping import FrfMapping, mapped_arrays
 from jointfrf.io.trial import survives
 
@@ -38,7 +38,7 @@ def hdf5_arrays(path: Path, mapping: FrfMapping) -> FrfArrays:
         The package h5py is not installed.
     """
     fields = hdf5_fields(path)
-    return own_arrays(fields, str(path)) if MARK in fields else mapped_arrays(fields, mapping, str(path))
+    return own_arrays(fields, str(path)) if is_own(fields) else mapped_arrays(fields, mapping, str(path))
 
 
 def hdf5_fields(path: Path) -> dict[str, Any]:

@@ -67,10 +67,12 @@ def as_mapping(given: Mapping[str, Any] | FrfMapping | None) -> FrfMapping:
     """
     if isinstance(given, FrfMapping):
         return given
+    if not isinstance(given, Mapping | None):
+        raise TypeError(f"mapping must be a mapping or an FrfMapping, not {type(given).__name__}")
     names = [each.name for each in fields(FrfMapping)]
     for name in given or {}:
         if name not in names:
-            near = get_close_matches(name, names, 1)
+            near = get_close_matches(str(name), names, 1)
             hint = f"; did you mean {near[0]}?" if near else ""
             raise ValueError(f"mapping names {name!r}, which is none of {', '.join(names)}{hint}")
     return FrfMapping(**(given or {}))

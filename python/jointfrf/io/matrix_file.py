@@ -14,6 +14,7 @@ from scipy import sparse
 
 from jointfrf.dofs import DIRECTIONS
 from jointfrf.errors import FileContentError, first_line
+from jointfrf.files import check_file
 
 __all__ = ["read_dof_names", "read_matrix"]
 
@@ -43,6 +44,8 @@ def read_matrix(path: Path, name: str) -> sparse.csr_array:
     FileContentError
         The file cannot be read, or does not hold a finite real square matrix.
     """
+    if path.exists():
+        check_file(path)
     try:
         found = _read_npz(path, name) if path.suffix.lower() == ".npz" else _read_market(path)
     except FileContentError:
@@ -126,6 +129,8 @@ def read_dof_names(path: Path) -> tuple[str, ...]:
     ...     read_dof_names(path)
     ('1:y', '1:theta_z', '2:y')
     """
+    if path.exists():
+        check_file(path)
     try:
         lines = path.read_text(encoding="utf-8").splitlines()
     except (OSError, UnicodeDecodeError) as error:

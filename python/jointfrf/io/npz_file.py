@@ -18,7 +18,7 @@ from jointfrf.files import write_file
 from jointfrf.frf.frf_set import FrfSet
 from jointfrf.io.arrays import FrfArrays
 from jointfrf.io.labels import channels_of
-from jointfrf.io.layout import MARK, fields_of, own_arrays
+from jointfrf.io.layout import fields_of, is_own, own_arrays
 from jointfrf.io.loose import LooseFunction, arrays_of_functions
 from jointfrf.io.mapping import FrfMapping, mapped_arrays
 
@@ -62,7 +62,7 @@ def npz_arrays(path: Path, mapping: FrfMapping) -> FrfArrays:
         raise FileContentError(f"{path} cannot be read as an NPZ file: {first_line(error)}") from error
     fields = {name: value.item() if value.ndim == 0 else value for name, value in fields.items()}
     where = str(path)
-    if MARK in fields:
+    if is_own(fields):
         return own_arrays(fields, where)
     data = fields.get("data")
     if isinstance(data, np.ndarray) and set(data.dtype.names or ()) >= {"abscissa", "ordinate", "coordinate"}:
@@ -127,10 +127,12 @@ def write_npz(path: str | PathLike[str], frfs: FrfSet) -> None:
 
     Notes
     -----
-    The arrays, SI units: ``jointfrf_frfs`` (1, the number of the layout), ``freq_hz`` (n_freq), ``h`` complex
+    The arrays, SI units: ``jointfrf_frfs`` (2, the number of the layout), ``freq_hz`` (n_freq), ``h`` complex
     (n_freq, n_responses, n_excitations), NaN where there is no FRF, ``responses`` and ``excitations`` (texts such as
     ``102:+y``), ``quantity`` (text: receptance, mobility, accelerance), ``unit`` (text); where known ``coherence``
-    (shape of h), ``averages`` (n_responses, n_excitations), ``nodes`` (n) and ``coordinates`` (n, 3) in m.
+    (shape of h), ``averages`` (n_responses, n_excitations), ``nodes`` (n) and ``coordinates`` (n, 3) in m; ``sha256``, a
+    checksum of all of these, by which a reader sees a damaged file. Layout 1 is the same without it: what a program of
+    one's own writes or edits.
 
     Examples
     --------

@@ -23,6 +23,7 @@ from jointfrf.io.mat_file import mat_arrays
 from jointfrf.io.npz_file import npz_arrays
 from jointfrf.io.quantity import check_quantity
 from jointfrf.io.uff import read_uff_part
+from jointfrf.kernel.arguments import as_nodes
 
 __all__ = ["FORMATS", "read_frfs"]
 
@@ -116,7 +117,7 @@ def read_frfs(
     check_quantity(quantity)
     if not paths:
         raise ValueError("no file is named")
-    kept = None if nodes is None else frozenset(nodes)
+    kept = None if nodes is None else frozenset(as_nodes("nodes", nodes))
     wanted = _Wanted(quantity, force_quantity, kept, as_mapping(mapping), len(paths) > 1)
     sets = [_read(Path(path), wanted) for path in paths]
     merged = merge_frfs(sets)

@@ -22,6 +22,7 @@ from jointfrf.io.uff_contents import contents_without_frf
 from jointfrf.io.uff_file import UniversalFile, name_some
 from jointfrf.io.uff_nodes import node_coordinates
 from jointfrf.io.uff_ordinate import DATA_TYPES, Axis, kind_of_frf, ordinate_factor, ordinate_quantity
+from jointfrf.kernel.arguments import as_nodes
 
 __all__ = ["read_uff", "read_uff_part"]
 
@@ -152,6 +153,8 @@ def read_uff_part(
     FrfSet
     """
     check_quantity(quantity)
+    if nodes is not None:
+        nodes = frozenset(as_nodes("nodes", nodes))
     file = UniversalFile(Path(path))
     content = _describe(file, quantity, forced=force_quantity, nodes=nodes)
     only_coherence = coherence_will_do and not content.frfs and not content.unusable and content.coherences

@@ -15,6 +15,9 @@ _REACH = 96
 _CHUNK = 1 << 22
 #: The first two lines of a dataset and the text before binary numbers take no more than this.
 _HEAD = 1 << 13
+#: Bytes of a value by the data type of record 7, and of the abscissa before it where the spacing is uneven.
+_VALUE_BYTES = {2: 4, 4: 8, 5: 8, 6: 16}
+_ABSCISSA_BYTES = 4
 
 
 class Dataset(NamedTuple):
@@ -93,7 +96,11 @@ class _Window:
         return None
 
     def after_binary(self, start: int) -> int | None:
-        """Return the place of the delimiter after the binary numbers of a dataset 58b, by their stated length."""
+        """Return the place of the delimiter after the binary numbers of a dataset 58b, by their length.
+
+        The one that is stated, or, where no delimiter follows there, the one that record 7 gives: some programs state
+        another.
+        """
         head = self.part(start, _HEAD)
         lines = head.split(b"\n", 13)
         if len(lines) < 14 or lines[1][6:7].lower() != b"b":
@@ -105,12 +112,25 @@ class _Window:
         if n_lines != 11 or n_bytes < 0:
             return None
         numbers = start + sum(len(line) + 1 for line in lines[:13])
-        match = _AFTER_NUMBERS.match(self.part(numbers + n_bytes, _REACH))
-        return None if match is None else numbers + n_bytes + match.end() - 6
+        for length in (n_bytes, _length_of_values(lines[8])):
+            match = _AFTER_NUMBERS.match(self.part(numbers + length, _REACH))
+            if match is not None:
+                return numbers + length + match.end() - 6
+        return None
 
     def _move(self, position: int) -> None:
         self.file.seek(position)
         self.start, self.content = position, self.file.read(_CHUNK)
+
+
+def _length_of_values(record: bytes) -> int:
+    """Return how many bytes the values take that record 7 describes; 0 where it does not say."""
+    try:
+        kind, count, is_even = int(record[:10]), int(record[10:20]), int(record[20:30])
+    except ValueError:
+        return 0
+    size = _VALUE_BYTES.get(kind, 0)
+    return max(count, 0) * (size + (0 if is_even else _ABSCISSA_BYTES))
 
 
 def _kind(head: bytes) -> int:

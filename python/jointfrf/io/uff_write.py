@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from jointfrf.files import write_file
 from jointfrf.frf.frf_set import POWER_OF_I_OMEGA, Channel, FrfSet
+from jointfrf.kernel.arguments import check_type
 
 __all__ = ["write_uff"]
 
@@ -82,6 +83,8 @@ def write_uff(
     >>> again.quantity, again.h[:, 0, 0].tolist()
     ('mobility', [(1+2j), (3+0j)])
     """
+    check_type("frfs", frfs, FrfSet)
+    check_type("title", title, str)
     if not (title.isascii() and title.isprintable() and len(title) <= _WIDTH):
         raise ValueError(f"title {title!r} is not one line of at most {_WIDTH} ASCII characters")
     frfs.check_whole()

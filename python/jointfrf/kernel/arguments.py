@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import operator
 import reprlib
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -20,9 +21,13 @@ __all__ = [
     "as_array",
     "as_dofs",
     "as_frequency",
+    "as_integer",
     "as_interface",
     "as_joint_lines",
+    "as_limits",
     "as_lines",
+    "as_names",
+    "as_nodes",
     "as_number",
     "as_real",
     "as_square",
@@ -31,11 +36,15 @@ __all__ = [
     "check_finite_lines",
     "check_type",
     "checked_out",
+    "one_line",
     "optional_frequency",
 ]
 
 ComplexArray = NDArray[np.complex128]
 FloatArray = NDArray[np.float64]
+
+#: Characters of a value that a message shows.
+_SHOWN = 80
 
 #: A conversion that copies more than this many bytes is announced by a `CopyWarning`.
 LARGE_COPY = 16 * 2**20
@@ -47,7 +56,10 @@ def as_array(name: str, value: ArrayLike) -> NDArray[Any]:
         mask = np.ma.getmaskarray(value)
         first = tuple(int(i) for i in np.unravel_index(int(np.argmax(mask)), mask.shape))
         raise ValueError(f"{name} has masked entries, the first at index {first}: leave their lines out, or fill them")
-    return np.asarray(value)
+    try:
+        return np.asarray(value)
+    except ValueError as error:  # lists of lists that make no rectangle
+        raise ValueError(f"{name} must be an array of numbers: its rows differ in length or kind") from error
 
 
 def _converted(name: str, value: ArrayLike, dtype: type, *, later: bool = False) -> NDArray[Any]:
@@ -142,16 +154,57 @@ def optional_frequency(freq_hz: ArrayLike | None, n_freq: int) -> FloatArray | N
     return None if freq_hz is None else as_frequency(freq_hz, n_freq)
 
 
+def one_line(value: object) -> str:
+    """Show a value in a few words of one line."""
+    words = " ".join(reprlib.repr(value).split())
+    return words if len(words) <= _SHOWN else words[: _SHOWN - 3] + "..."
+
+
 def check_choice(name: str, value: object, known: Sequence[str]) -> None:
     """Raise unless the value is one of the words that are known."""
     if not isinstance(value, str) or value not in known:
-        raise ValueError(f"{name} must be one of {', '.join(known)}, not {reprlib.repr(value)}")
+        raise ValueError(f"{name} must be one of {', '.join(known)}, not {one_line(value)}")
 
 
 def check_type(name: str, value: object, kind: type) -> None:
     """Raise unless an argument is an object of the class that it must be of."""
     if not isinstance(value, kind):
         raise TypeError(f"{name} must be a {kind.__name__}, not {type(value).__name__}")
+
+
+def as_names(name: str, value: object) -> tuple[str, ...]:
+    """Return a sequence of names."""
+    if isinstance(value, Iterable):
+        listed = list(value)
+        if all(isinstance(each, str) for each in listed):
+            return tuple(map(str, listed))
+    raise TypeError(f"{name} must be a sequence of names, not {one_line(value)}")
+
+
+def as_nodes(name: str, value: object) -> tuple[int, ...]:
+    """Return a collection of whole numbers that name nodes."""
+    listed = value.tolist() if isinstance(value, np.ndarray) else value
+    if not isinstance(listed, Iterable) or isinstance(listed, str | bytes):
+        raise TypeError(f"{name} must be a list of node numbers, not {one_line(value)}")
+    found = list(listed)
+    if not all(isinstance(each, int | np.integer) for each in found):
+        raise TypeError(f"{name} must be a list of node numbers, not {one_line(value)}")
+    return tuple(int(each) for each in found)
+
+
+def as_integer(name: str, value: object) -> int:
+    """Return one whole number."""
+    try:
+        return operator.index(value)  # type: ignore[arg-type]
+    except TypeError:
+        raise TypeError(f"{name} must be a whole number, not {one_line(value)}") from None
+
+
+def as_limits(name: str, lower: object, upper: object) -> None:
+    """Raise unless two bounds are real numbers, infinite ones among them."""
+    for value in (lower, upper):
+        if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating) or value != value:
+            raise TypeError(f"{name} must be real numbers, not {one_line(value)}")
 
 
 def check_finite_lines(name: str, lines: ComplexArray, freq_hz: FloatArray | None = None) -> None:
@@ -165,7 +218,7 @@ def check_finite_lines(name: str, lines: ComplexArray, freq_hz: FloatArray | Non
 def as_number(name: str, value: object) -> float:
     """Return one finite real number."""
     if isinstance(value, str | bytes) or np.ndim(value) or as_array(name, value).dtype.kind not in "biuf":  # type: ignore[arg-type]
-        raise TypeError(f"{name} must be one real number, not {reprlib.repr(value)}")
+        raise TypeError(f"{name} must be one real number, not {one_line(value)}")
     number = float(value)  # type: ignore[arg-type]
     if not np.isfinite(number):
         raise ValueError(f"{name} must be finite, not {number}")

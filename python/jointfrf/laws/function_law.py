@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_limits, check_type
 from jointfrf.laws.law import JointLaw, LawField, checked_values
 
 __all__ = ["FunctionLaw"]
@@ -67,7 +67,18 @@ class FunctionLaw(JointLaw):
         fields: object,
         values: ArrayLike,
     ) -> None:
-        named = tuple(LawField(*field) for field in fields)  # type: ignore[attr-defined]
+        if not isinstance(fields, Iterable):
+            raise TypeError(f"fields must be a sequence of LawField, not {type(fields).__name__}")
+        for name, each in (("function", function), ("derivatives", derivatives)):
+            if not callable(each):
+                raise TypeError(f"{name} must be a function of omega and values, not {type(each).__name__}")
+        try:
+            named = tuple(LawField(*field) for field in fields)
+        except TypeError as error:
+            raise TypeError("fields must hold name, kind and bounds of each parameter, as LawField has them") from error
+        for field in named:
+            check_type("name of a parameter", field.name, str)
+            as_limits(field.name, field.lower, field.upper)
         found = checked_values("the law", named, values)
         object.__setattr__(self, "function", function)
         object.__setattr__(self, "derivatives", derivatives)

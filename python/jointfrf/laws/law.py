@@ -10,7 +10,7 @@ from typing import Literal, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_real
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_real, one_line
 
 __all__ = ["FieldKind", "JointLaw", "LawField"]
 
@@ -43,6 +43,8 @@ class LawField(NamedTuple):
         """Return the unit between two DOFs of which so many (0, 1, 2) are rotations."""
         if self.kind in ("time", "number"):
             return "s" if self.kind == "time" else "1"
+        if rotations not in (0, 1, 2):
+            raise ValueError(f"rotations must be 0, 1 or 2, not {one_line(rotations)}")
         return (("N/m", "N", "N m/rad"), ("N s/m", "N s", "N m s/rad"))[self.kind == "damping"][rotations]
 
     @property

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from jointfrf.dofs import is_rotation
 from jointfrf.io.cards import CardFormat, CardOptions
 from jointfrf.joint import Joint
-from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_frequency, as_number, as_real
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_frequency, as_names, as_number, as_real, check_type
 from jointfrf.kernel.linear_algebra import invert
 from jointfrf.kernel.status import OnSingular
 from jointfrf.laws.joint_cards import joint_cards
@@ -105,13 +105,17 @@ class LawJoint:
         mass: Mapping[str, float] | None = None,
         dofs: Sequence[str] | None = None,
     ) -> None:
+        if not isinstance(laws, Mapping) or not isinstance(mass, Mapping | None):
+            what = "mass" if isinstance(laws, Mapping) else "laws"
+            raise TypeError(f"{what} must be a mapping by the names of DOFs")
+        rigid = as_names("rigid", rigid)
         by_pair: dict[tuple[str, str], JointLaw] = {}
         for key, law in laws.items():
             if not isinstance(law, JointLaw):
                 raise TypeError(f"laws: that of {key!r} must be a JointLaw, not {type(law).__name__}")
             by_pair[(key, key) if isinstance(key, str) else key] = law
         moving = [a for a, b in by_pair if a == b]
-        names = (*moving, *rigid) if dofs is None else tuple(dofs)
+        names = (*moving, *rigid) if dofs is None else as_names("dofs", dofs)
         if sorted(names) != sorted([*moving, *rigid]) or len(set(names)) != len(names) or not names:
             raise ValueError(
                 f"every DOF must have one law or be rigid: laws of {', '.join(moving) or 'none'}, rigid "
@@ -142,6 +146,7 @@ class LawJoint:
         ValueError
             Matrices that are not symmetric, a negative stiffness of a DOF.
         """
+        check_type("joint", joint, Joint)
         k, c, h = joint.stiffness, joint.damping, joint.hysteretic_stiffness
         for name, matrix in (("stiffness", k), ("damping", c), ("hysteretic damping", h)):
             if not np.allclose(matrix, matrix.T, rtol=1e-10, atol=0):

@@ -8,7 +8,7 @@ from typing import Literal, get_args
 import numpy as np
 from scipy import sparse
 
-from jointfrf.kernel.arguments import FloatArray, check_choice
+from jointfrf.kernel.arguments import FloatArray, as_number, as_real, check_choice
 from jointfrf.models.model import Model
 
 __all__ = ["BeamElement", "End", "beam"]
@@ -91,14 +91,19 @@ def beam(
         check_choice("ends", end, get_args(End))
     sizes = {"length": length, "youngs_modulus": youngs_modulus, "density": density, "width": width, "height": height}
     for name, value in sizes.items():
-        if not (np.isfinite(value) and value > 0):
+        if as_number(name, value) <= 0:
             raise ValueError(f"{name} must be positive, not {value}")
-    if n_elements < 1 or int(n_elements) != n_elements:
+    if as_number("n_elements", n_elements) < 1 or int(n_elements) != n_elements:
         raise ValueError(f"n_elements must be a whole number, at least 1, not {n_elements}")
+    viscous = tuple(as_real("viscous", viscous, (2,)).tolist())
 
     area = width * height
     step = length / n_elements
     inertia = width * height**3 / 12
+    if not 0 < step**3 < np.inf or not 0 < inertia < np.inf:
+        raise ValueError(
+            f"length {length:g} m, width {width:g} m and height {height:g} m give a section of no second moment of area"
+        )
     if element == "euler-bernoulli":
         stiffness, mass = _euler_bernoulli(step, youngs_modulus * inertia, density * area)
     else:

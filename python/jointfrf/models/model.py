@@ -12,7 +12,7 @@ from scipy import linalg, sparse
 from scipy.sparse import linalg as sparse_linalg
 
 from jointfrf.joint import Joint
-from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_dofs, as_names, check_type
 from jointfrf.laws.law_joint import LawJoint
 from jointfrf.models.matrices import Matrix
 from jointfrf.models.receptance.receptance import ReceptanceMethod, receptance
@@ -58,7 +58,12 @@ class Model:
     loss_factor: float = 0.0
 
     def __post_init__(self) -> None:
+        for name in ("stiffness", "mass"):
+            shape = np.shape(getattr(self, name))
+            if len(shape) != 2 or shape[0] != shape[1]:
+                raise ValueError(f"{name} must be a square matrix, not of shape {shape}")
         n = np.shape(self.stiffness)[0]
+        object.__setattr__(self, "dofs", as_names("dofs", self.dofs))
         if len(self.dofs) != n or len(set(self.dofs)) != n:
             raise ValueError(f"dofs must name {n} different DOFs, those of stiffness, not {len(set(self.dofs))}")
 
@@ -70,7 +75,7 @@ class Model:
         ValueError
             The model has no such DOF.
         """
-        for name in names:
+        for name in as_names("names", names):
             if name not in self.dofs:
                 raise ValueError(f"the model has no DOF {name!r}; it has {self.dofs[0]!r} to {self.dofs[-1]!r}")
         found = [self.dofs.index(name) for name in names]
@@ -222,6 +227,10 @@ def assemble(a: Model, b: Model, joint: Joint | LawJoint, dofs_a: Sequence[int],
     >>> jf.assemble(a, b, jf.Joint([2000.0], [3.0]), [1], [0]).natural_frequencies().round(3).tolist()
     [2.598, 4.682, 7.77, 8.374]
     """
+    for name, value, kind in (("a", a, Model), ("b", b, Model), ("joint", joint, Joint)):
+        check_type(name, value, kind)
+    as_dofs("dofs_a", dofs_a, len(a.dofs))
+    as_dofs("dofs_b", dofs_b, len(b.dofs))
     n_a, n_b, n_j = len(a.dofs), len(b.dofs), len(joint.dofs)
     if not len(dofs_a) == len(dofs_b) == n_j:
         raise ValueError(f"dofs_a and dofs_b must name {n_j} DOFs each, not {len(dofs_a)} and {len(dofs_b)}")

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from jointfrf.kernel.arguments import FloatArray, as_dofs, as_real
+from jointfrf.kernel.arguments import FloatArray, as_array, as_dofs, as_real
 
 __all__ = ["Ports", "as_ports", "directions"]
 
@@ -52,7 +52,7 @@ class Ports:
 
 def as_ports(name: str, value: Any, n: int) -> Ports:
     """Check DOFs counted from 0, or a matrix of weights of shape (m, n); all DOFs for None."""
-    if sparse.issparse(value) or np.ndim(value) == 2:
+    if sparse.issparse(value) or as_array(name, value).ndim == 2:
         given = value if sparse.issparse(value) else as_real(name, value, (None, None))
         if given.shape[1:] != (n,):
             raise ValueError(f"{name} must be DOFs, or weights of shape (m, {n}), not {tuple(given.shape)}")

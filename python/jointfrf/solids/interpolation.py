@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 from scipy.spatial import cKDTree
 
-from jointfrf.kernel.arguments import FloatArray, as_number, as_real
+from jointfrf.kernel.arguments import FloatArray, as_number, as_real, check_type
 from jointfrf.solids.mesh import Mesh
 
 __all__ = ["interpolation"]
@@ -73,6 +73,7 @@ def interpolation(
     >>> weights.shape, weights.data.tolist()
     ((1, 24), [0.25, 0.25, 0.25, 0.25])
     """
+    check_type("mesh", mesh, Mesh)
     places = as_real("points", points, (None, 3))
     if as_number("tolerance", tolerance) < 0:
         raise ValueError(f"tolerance must not be negative, not {tolerance:g} m")
@@ -132,6 +133,9 @@ def _located(
     for count in (min(_FIRST, len(bricks)), len(bricks)):
         for i in left.tolist():
             near = np.atleast_1d(tree.query(places[i], count)[1])
+            near = near[near < len(bricks)]  # none of a point too far away for its distance to be a number
+            if not near.size:
+                continue
             functions, off = _nearest(mesh.nodes[mesh.elements[bricks[near]]], places[i])
             closest = int(off.argmin())
             best[i], weights[i], distance[i] = near[closest], functions[closest], off[closest]

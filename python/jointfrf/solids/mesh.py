@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
-from jointfrf.kernel.arguments import FloatArray, as_number, as_real
+from jointfrf.kernel.arguments import FloatArray, as_array, as_number, as_real
 
 __all__ = ["Mesh", "Plan", "as_count", "disc", "extrude", "holed_rectangle", "join_plans", "rectangle"]
 
@@ -50,6 +50,16 @@ class Mesh:
 
     nodes: FloatArray
     elements: NDArray[np.int32]
+
+    def __post_init__(self) -> None:
+        as_real("nodes", self.nodes, (None, 3))
+        elements = as_array("elements", self.elements)
+        if elements.ndim != 2 or elements.shape[1] != 8 or elements.dtype.kind not in "iu":
+            raise ValueError(
+                f"elements must hold eight node numbers each, not {elements.dtype} of shape {elements.shape}"
+            )
+        if elements.size and not (elements.min() >= 0 and elements.max() < len(self.nodes)):
+            raise ValueError(f"elements must name nodes 0 to {len(self.nodes) - 1}")
 
     def near(self, point: ArrayLike) -> int:
         """Return the node at a point.

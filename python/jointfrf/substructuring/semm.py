@@ -11,6 +11,7 @@ from jointfrf.kernel.arguments import (
     ComplexArray,
     as_dofs,
     as_lines,
+    as_number,
     check_choice,
     check_finite_lines,
     optional_frequency,
@@ -86,6 +87,7 @@ def semm(
     """
     check_choice("method", method, get_args(SemmMethod))
     model = as_lines("h_model", h_model)
+    rcond = as_number("rcond", rcond)
     n_freq, n, columns = model.shape
     if n != columns:
         raise ValueError(f"h_model must be square, not {n} x {columns}")

@@ -12,6 +12,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from jointfrf.errors import FileContentError
+from jointfrf.files import check_file
 from jointfrf.spelling import look_alike
 from jointfrf.toml.keys import KeyTable
 
@@ -31,6 +32,8 @@ def read_toml(path: Path) -> TomlTable:
     FileContentError
         The file is missing, cannot be read, or is not TOML.
     """
+    if path.exists():
+        check_file(path)
     try:
         return TomlTable(tomllib.loads(path.read_text(encoding="utf-8")), str(path), path.parent)
     except OSError as error:

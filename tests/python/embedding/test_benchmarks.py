@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from filelock import FileLock
 
 from installed_library import run
 
@@ -18,16 +19,18 @@ BUILD = TESTS.parent / "build" / "benchmarks_plain"
 
 def command(*arguments: str, module: str = "benchmarks") -> subprocess.CompletedProcess[str]:
     """The command on a kernel that is built without optimisation, for nothing here is about its speed."""
-    if not (BUILD / "build.ninja").exists():
-        run(["meson", "setup", BUILD, TESTS.parent, "-Dbuildtype=plain", "-Dlapack=scipy-openblas32"])
-    path = os.pathsep.join([str(TESTS), *filter(None, [os.environ.get("PYTHONPATH")])])
-    return subprocess.run(
-        [sys.executable, "-m", module, *arguments],
-        capture_output=True,
-        text=True,
-        env={**os.environ, "PYTHONPATH": path, "JOINTFRF_BENCHMARK_BUILD": str(BUILD)},
-        timeout=300,
-    )
+    BUILD.parent.mkdir(exist_ok=True)
+    with FileLock(BUILD.with_suffix(".lock")):  # processes that test at once take turns
+        if not (BUILD / "build.ninja").exists():
+            run(["meson", "setup", BUILD, TESTS.parent, "-Dbuildtype=plain", "-Dlapack=scipy-openblas32"])
+        path = os.pathsep.join([str(TESTS), *filter(None, [os.environ.get("PYTHONPATH")])])
+        return subprocess.run(
+            [sys.executable, "-m", module, *arguments],
+            capture_output=True,
+            text=True,
+            env={**os.environ, "PYTHONPATH": path, "JOINTFRF_BENCHMARK_BUILD": str(BUILD)},
+            timeout=300,
+        )
 
 
 @pytest.fixture(scope="module")

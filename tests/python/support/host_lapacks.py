@@ -15,8 +15,9 @@ from pathlib import Path
 
 #: What a static OpenBLAS must be asked for, so that its threads are held (fortran/runtime/blas_threads.c).
 THREAD_CONTROL = "-Wl,-u,openblas_get_parallel"
-#: Words that tell other libraries from the reference one, which may have the same name.
-OTHERS = (b"openblas", b"flexiblas", b"bli_init", b"mkl_")
+#: Words that tell other libraries from the reference one, which may have the same name: Debian's BLIS is a libblas.so.3,
+#: too, which hides its own functions but names its source files.
+OTHERS = (b"openblas", b"flexiblas", b"bli_", b"mkl_", b"ATL_")
 
 
 @dataclass(frozen=True)
@@ -70,12 +71,14 @@ def find(folders: list[Path], *patterns: str) -> Iterator[Path]:
             yield first
 
 
+def of_netlib(folders: list[Path], name: str) -> Path | None:
+    """The first library of a name that is the reference one."""
+    files = (file for file in find(folders, name) if not any(word in file.read_bytes() for word in OTHERS))
+    return next(files, None)
+
+
 def reference(folders: list[Path], suffix: str, bits: str = "") -> Lapack | None:
-    parts = []
-    for name in ("liblapack" + bits, "libblas" + bits):
-        files = (file for file in find(folders, name + suffix) if not any(word in file.read_bytes() for word in OTHERS))
-        parts.append(next(files, None))
-    lapack, blas = parts
+    lapack, blas = (of_netlib(folders, name + bits + suffix) for name in ("liblapack", "libblas"))
     if lapack is None or blas is None:
         return None
     return Lapack(f"reference{bits}{suffix}", (lapack, blas))
@@ -106,16 +109,18 @@ def mkl(folders: list[Path], interface: str = "LP64") -> Iterator[Lapack]:
 
 
 def blis(folders: list[Path]) -> Iterator[Lapack]:
-    """BLIS brings a BLAS only; the LAPACK above it is the reference one, of which the BLAS comes last.
+    """BLIS brings a BLAS only; the LAPACK above it is the reference one, of which the BLAS, if it is there, comes last.
 
-    Where its threads have to share processors, each product of small matrices waits for them.
+    Where its threads have to share processors, each product of small matrices waits for them. The kernel holds them where
+    it finds the functions for it: a libblis exports them, the libblas.so.3 of Debian's BLIS does not.
     """
-    lapack = reference(folders, ".so.3")
+    lapack, blas = of_netlib(folders, "liblapack.so.3"), of_netlib(folders, "libblas.so.3")
     for file in find(folders, "libblis*.so.*", "libblis.so"):
         if lapack is not None:
+            files = (file, lapack) if blas is None else (file, lapack, blas)
             threaded = file.parent.name in ("blis-pthread", "blis-openmp")
             name = f"BLIS {file.parent.name} {file.name}"
-            yield Lapack(name, (file, *lapack.files), (), {"BLIS_NUM_THREADS": "1"}, holds=threaded)
+            yield Lapack(name, files, (), {"BLIS_NUM_THREADS": "1"}, holds=threaded)
 
 
 def find_lapacks(*, ilp64: bool = False) -> dict[str, list[Lapack]]:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from filelock import FileLock
 
 import jointfrf as jf
 from host_lapacks import Lapack
@@ -45,12 +46,9 @@ class HostLibrary:
         if missing:
             pytest.skip(f"{', '.join(missing)} not found")
         build, self.name = BUILDS[ilp64], "jointfrf64" if ilp64 else "jointfrf"
-        if not (build / "build.ninja").exists():
-            options = ["-Dilp64=true", "-Dlapack_ilp64=true"] if ilp64 else []
-            options += ["-Dlapack=host", "-Dbuildtype=plain", "-Dprefix=/prefix", "-Dlibdir=lib"]
-            run(["meson", "setup", build, ROOT, *options])
-        run(["meson", "compile", "-C", build])
-        run(["meson", "install", "-C", build, "--no-rebuild", "--destdir", folder])
+        build.parent.mkdir(exist_ok=True)
+        with FileLock(build.with_suffix(".lock")):  # processes that test at once take turns
+            self._build(build, folder, ilp64=ilp64)
         self.objects = folder / "objects"
         self.objects.mkdir()
         (self.pc,) = (folder / "prefix").rglob(f"{self.name}.pc")
@@ -59,7 +57,17 @@ class HostLibrary:
             ["pkg-config", "--static", "--cflags", "--libs", self.name], env={"PKG_CONFIG_PATH": str(self.pc.parent)}
         ).split()
         (self.module,) = self.folder.parent.glob(f"include/{self.name}/*/jointfrf.mod")
+        # Module files as they are now: another process may bring the build up to date later.
         self.modules = [f"-I{path}" for path in sorted(build.glob("fortran/*.p"))]
+
+    def _build(self, build: Path, folder: Path, *, ilp64: bool) -> None:
+        """Bring the build up to date and install it below a folder."""
+        if not (build / "build.ninja").exists():
+            options = ["-Dilp64=true", "-Dlapack_ilp64=true"] if ilp64 else []
+            options += ["-Dlapack=host", "-Dbuildtype=plain", "-Dprefix=/prefix", "-Dlibdir=lib"]
+            run(["meson", "setup", build, ROOT, *options])
+        run(["meson", "compile", "-C", build])
+        run(["meson", "install", "-C", build, "--no-rebuild", "--destdir", folder])
 
     def compile(self, source: Path, *flags: str | Path) -> Path:
         compiler = "gcc" if source.suffix == ".c" else "gfortran"

@@ -265,7 +265,9 @@ def test_names_that_are_not_ascii(tmp_path):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"jointfrf_frfs": 2}, "has layout 2, this version of jointfrf reads layout 1"),
+        ({"jointfrf_frfs": 3}, "has layout 3, this version of jointfrf reads layouts 1 and 2"),
+        ({"jointfrf_frfs": 2}, "lacks sha256"),
+        ({"jointfrf_frfs": 2, "sha256": "0"}, "does not fit its field sha256"),
         ({"jointfrf_frfs": "one"}, "has layout one"),
         ({"h": None, "quantity": None}, "lacks h, quantity"),
         ({"responses": ["101:+x"]}, "sizes 5 x 3 x 2, which do not fit 5 lines, 1 responses"),

@@ -57,7 +57,7 @@ def test_writers_refuse_what_cannot_be_read(tmp_path, name):
 def test_own_arrays_are_those_of_the_documentation(tmp_path):
     write_npz(tmp_path / "a.npz", full_set())
     with np.load(tmp_path / "a.npz", allow_pickle=False) as found:
-        assert found["jointfrf_frfs"] == 1
+        assert found["jointfrf_frfs"] == 2
         assert found["h"].shape == (5, 3, 2)
         assert found["responses"].tolist() == ["101:+x", "102:-y", "103:+z"]
         assert (str(found["quantity"]), str(found["unit"])) == ("accelerance", "m/s^2/N")

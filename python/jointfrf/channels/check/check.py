@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal, get_args
+from typing import Literal, cast, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -32,7 +32,7 @@ from jointfrf.channels.check.ratio_findings import (
 from jointfrf.channels.check.signals import check_signals
 from jointfrf.errors import FrfCheckWarning
 from jointfrf.frf.frf_set import Channel
-from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_frequency, as_lines, as_real, check_choice
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_frequency, as_lines, as_names, as_real, check_choice
 
 __all__ = ["FrfFix", "check_frfs", "warn_of_frfs"]
 
@@ -120,6 +120,7 @@ def check_frfs(
     lines = as_lines("h", h)
     freq = as_frequency(freq_hz, lines.shape[0])
     rows, columns = as_channel_names(lines.shape[1:], names, responses, forces)
+    fix = cast("tuple[FrfFix, ...]", as_names("fix", fix))
     for word in fix:
         check_choice("fix", word, get_args(FrfFix))
     check_choice("blame", blame, ("responses", "forces"))
@@ -164,6 +165,8 @@ def _findings_at_joint(
     look: _Look, transform: tuple[ArrayLike, ArrayLike], dofs: Sequence[str] | None
 ) -> list[FrfFinding]:
     """Return what the FRFs of the joint DOFs show, besides what the channels have shown already."""
+    if not isinstance(transform, tuple | list) or len(transform) != 2:
+        raise TypeError(f"transform must be a pair, for responses and forces, not {type(transform).__name__}")
     m = look.corrected()
     t_out = as_real("transform[0]", transform[0], (None, m.h.shape[1]))
     t_in = as_real("transform[1]", transform[1], (t_out.shape[0], m.h.shape[2]))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,7 +13,7 @@ from jointfrf.identification.model_fit.attachments import AddedMass, Attachment
 from jointfrf.identification.model_fit.substructure import FrfSource, Substructure, check_same_lines
 from jointfrf.identification.model_fit.unknown import Unknown
 from jointfrf.joint import Joint
-from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_frequency
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_frequency, as_names, check_type, one_line
 from jointfrf.laws.law_joint import Connection, LawJoint
 from jointfrf.substructuring.connection import connect
 
@@ -75,7 +76,18 @@ class Assembly:
     def __post_init__(self) -> None:
         if isinstance(self.joint, Joint):
             object.__setattr__(self, "joint", LawJoint.of_joint(self.joint))
+        for name, value, kind in (
+            ("a", self.a, Substructure),
+            ("b", self.b, Substructure),
+            ("joint", self.joint, LawJoint),
+        ):
+            check_type(name, value, kind)
+        if not isinstance(self.attachments, tuple | list):
+            raise TypeError(f"attachments must be a tuple of attachments, not {one_line(self.attachments)}")
         object.__setattr__(self, "attachments", tuple(self.attachments))
+        for one in self.attachments:
+            if not isinstance(one, get_args(Attachment)):
+                raise TypeError(f"attachments must hold AddedMass and GroundSpring, not {type(one).__name__}")
         for side, part in (("a", self.a), ("b", self.b)):
             if len(part.joint) != len(self.joint.dofs):
                 raise ValueError(
@@ -87,10 +99,13 @@ class Assembly:
 
     def check(self, names: Sequence[str], what: str) -> None:
         """Raise an error for a DOF that neither substructure has."""
-        for name in names:
+        check_type("what", what, str)
+        for name in as_names("names", names):
             side = {"A/": self.a, "B/": self.b}.get(str(name)[:2])
             if side is None or not side.has(name[2:]):
-                raise ValueError(f"{what} {name!r}: neither A nor B has such a DOF (names begin with 'A/' or 'B/')")
+                raise ValueError(
+                    f"{what} {one_line(name)}: neither A nor B has such a DOF (names begin with 'A/' or 'B/')"
+                )
 
     def receptance(self, freq_hz: ArrayLike, responses: Sequence[str], forces: Sequence[str]) -> ComplexArray:
         """Return the FRFs of the assembly as believed, shape (n_freq, n_responses, n_forces), m/N.
@@ -103,6 +118,7 @@ class Assembly:
             An undamped assembly resonates at a line.
         """
         freq = as_frequency(freq_hz)
+        responses, forces = as_names("responses", responses), as_names("forces", forces)
         for names, what in ((responses, "response"), (forces, "force")):
             self.check(names, what)
         places = places_of(self, responses, forces)

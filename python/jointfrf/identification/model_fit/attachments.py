@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from jointfrf.dofs import is_rotation
 from jointfrf.identification.model_fit.unknown import Unknown
+from jointfrf.kernel.arguments import as_names, check_type
 
 __all__ = ["AddedMass", "Attachment", "GroundSpring"]
 
@@ -30,6 +31,10 @@ class AddedMass:
 
     dofs: str | tuple[str, ...]
     mass: Unknown | float
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.dofs, str) and not as_names("dofs", self.dofs):
+            raise ValueError("dofs must name at least one DOF")
 
     @property
     def places(self) -> tuple[str, ...]:
@@ -75,6 +80,9 @@ class GroundSpring:
     dof: str
     stiffness: Unknown | float
     damping: Unknown | float = 0.0
+
+    def __post_init__(self) -> None:
+        check_type("dof", self.dof, str)
 
     @property
     def places(self) -> tuple[str, ...]:

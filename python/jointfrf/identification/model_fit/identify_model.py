@@ -13,6 +13,7 @@ from jointfrf.identification.model_fit.fit import fit_assembly
 from jointfrf.identification.model_fit.model_fit import ModelFit
 from jointfrf.identification.model_fit.prepare import ChannelNoise, Channels, prepare_model_fit
 from jointfrf.identification.model_fit.unknown import Unknown
+from jointfrf.kernel.arguments import as_names, check_type
 
 __all__ = ["identify_model"]
 
@@ -105,7 +106,12 @@ def identify_model(
     >>> bool(low < 2000 < high), bool(high - low < 200), fit.test.is_noise
     (True, True, True)
     """
-    channels = Channels(tuple(responses), tuple(forces), dict(response_gains or {}), dict(force_gains or {}))
+    check_type("assembly", assembly, Assembly)
+    for name, gains in (("response_gains", response_gains), ("force_gains", force_gains)):
+        if not isinstance(gains, Mapping | None):
+            raise TypeError(f"{name} must be a mapping of channels to Unknown, not {type(gains).__name__}")
+    named = as_names("responses", responses), as_names("forces", forces)
+    channels = Channels(*named, dict(response_gains or {}), dict(force_gains or {}))
     told = ChannelNoise(noise, coherence, averages)
     problem = prepare_model_fit(freq_hz, h, assembly, channels, told, fixed)
     described = describe_model(fit_assembly(problem), channels)

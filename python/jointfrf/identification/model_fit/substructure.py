@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from jointfrf.identification.model_fit.unknown import Unknown
-from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_frequency, as_square, check_finite_lines
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_frequency, as_names, as_square, check_finite_lines
 from jointfrf.models.model import Model
 
 __all__ = ["FrfSource", "Substructure"]
@@ -74,7 +74,9 @@ class Substructure:
     unknowns: Mapping[str, Unknown] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "joint", tuple(self.joint))
+        object.__setattr__(self, "joint", as_names("joint", self.joint))
+        if not isinstance(self.unknowns, Mapping):
+            raise TypeError(f"unknowns must be a mapping of names to Unknown, not {type(self.unknowns).__name__}")
         for name, unknown in self.unknowns.items():
             if not isinstance(unknown, Unknown):
                 raise TypeError(f"unknowns: {name} must be an Unknown, not {type(unknown).__name__}")
@@ -114,10 +116,10 @@ class Substructure:
         lines = as_square("h", h)
         freq = as_frequency(freq_hz, len(lines))
         check_finite_lines("h", lines, freq)
-        names = tuple(dofs)
+        names = as_names("dofs", dofs)
         if len(names) != lines.shape[1] or len(set(names)) != len(names):
             raise ValueError(f"dofs must name {lines.shape[1]} different DOFs, not {', '.join(names)}")
-        return cls(FrfSource(freq, lines, names), tuple(joint))
+        return cls(FrfSource(freq, lines, names), as_names("joint", joint))
 
     @property
     def nominal(self) -> dict[str, float]:
@@ -137,6 +139,8 @@ class Substructure:
         TypeError
             It is given by FRFs, or the function returns no model.
         """
+        if not isinstance(values, Mapping | None):
+            raise TypeError(f"values must be a mapping of names to numbers, not {type(values).__name__}")
         named = self.nominal | dict(values or {})
         if isinstance(self.source, FrfSource):
             raise TypeError("a substructure given by FRFs has no model")

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from jointfrf.kernel.arguments import as_number
+from jointfrf.kernel.arguments import as_limits, as_number
 
 __all__ = ["Unknown"]
 
@@ -49,5 +49,6 @@ class Unknown:
             object.__setattr__(self, "std", as_number("std", self.std))
             if self.std <= 0:
                 raise ValueError(f"std must be positive, not {self.std:g}")
+        as_limits("bounds", self.lower, self.upper)
         if not self.lower <= self.value <= self.upper:
             raise ValueError(f"value must lie in {self.lower:g} to {self.upper:g}, not {self.value:g}")

@@ -1,0 +1,246 @@
+"""Sound arguments of every public function, by its parameters: what random arguments are made from."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import jointfrf as jf
+
+__all__ = ["sound_arguments"]
+
+
+def sound_arguments(folder: Path) -> dict[str, dict[str, Any]]:
+    """Return arguments by the names of functions and parameters; files for those that read are put into the folder."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        arrays = _arrays()
+        return {**arrays, **_structures(), **_identification(arrays), **_solids(), **_files(folder)}
+
+
+def _chains() -> dict[str, Any]:
+    freq = np.linspace(0.5, 10, 24)
+    a = jf.chain([5, 3], [2500, 3500], [3, 4], ground="start")
+    b = jf.chain([4, 2], [2000, 2500], [2, 1], ground="end")
+    h_a, h_b = a.receptance(freq), b.receptance(freq)
+    joint, first = jf.Joint([2000.0], [3.0], ["x"]), jf.Joint([1000.0], [1.5], ["x"])
+    whole = jf.couple(h_a, h_b, joint.dynamic_stiffness(freq), [1], [0])
+    begun = jf.couple(h_a, h_b, first.dynamic_stiffness(freq), [1], [0])
+    inner = np.ix_(range(24), [1, 2], [1, 2])
+    return dict(freq=freq, a=a, b=b, h_a=h_a, h_b=h_b, joint=joint, first=first, whole=whole, gamma=whole[inner],
+                alpha=begun[inner])  # fmt: skip
+
+
+def _arrays() -> dict[str, dict[str, Any]]:
+    """Functions of the algebra."""
+    c = _chains()
+    rng = np.random.default_rng(3)
+    lines = rng.standard_normal((6, 4, 4)) + 1j * rng.standard_normal((6, 4, 4)) + 3 * np.eye(4)
+    freq, pairs = np.linspace(1.0, 6.0, 6), {"freq_hz": c["freq"], "h_exact": c["gamma"][:, 0, 0], "band": (1.0, 9.0)}
+    x = np.linspace(-1.0, 1.0, 4)
+    k0 = c["first"].dynamic_stiffness(c["freq"])
+    out = {"freq_hz": freq}
+    return {
+        "invert": {"a": lines, **out},
+        "solve": {"a": lines, "b": lines[:, :, :2], **out},
+        "reciprocal_condition": {"a": lines},
+        "couple": {
+            "h_a": c["h_a"], "h_b": c["h_b"], "k_joint": c["joint"].dynamic_stiffness(c["freq"]), "dofs_a": [1],
+            "dofs_b": [0], "freq_hz": c["freq"],
+        },
+        "modify": {"alpha": lines, "d": lines[:, :2, :2], "dofs": [1, 2], **out},
+        "find_modification": {"alpha": lines, "gamma": lines + np.eye(4), **out},
+        "ismm": {"alpha": c["alpha"], "gamma": c["gamma"], "k_initial": k0, "freq_hz": c["freq"]},
+        "inverse_substructuring": {"gamma": c["gamma"], "freq_hz": c["freq"]},
+        "joint_compliance": {"gamma": c["gamma"], "freq_hz": c["freq"]},
+        "compliance_factors": {"gamma": lines, "transform": np.eye(4), **out},
+        "compliance_covariance": {"gamma": lines, "variance": abs(lines) ** 2, "transform": np.eye(4), **out},
+        "decouple": {
+            "equation": "rs", "h_a": lines, "h_b": lines, "h_c": lines[:, :1, :1], "dofs_j": [0], "dofs_k": [1],
+            "dofs_r": [2], "dofs_s": [3], **out,
+        },
+        "central_difference": {"h": lines, "spacing": x, "sign": -1.0, **out},
+        "difference_weights": {"spacing": x},
+        "difference_error": {"spacing": 0.01, "bending_stiffness": 2000.0, "joint_stiffness": 5e3},
+        "transform": {"h": lines, "t_out": np.ones((3, 4)), "t_in": np.ones((2, 4)), **out},
+        "pollute": {"h": lines, "level": 0.05, "seed": 1},
+        "realisations": {"h": lines, "level": 0.05, "seed": 1, "count": 2},
+        "semm": {"h_model": lines, "h_measured": lines[:, :2, :2], "outputs": [0, 1], "inputs": [0, 1], **out},
+        "band_mean": {"freq_hz": c["freq"], "k_joint": k0, "bands": (1.0, 9.0), "dofs": ["x"]},
+        "in_bands": {"freq_hz": c["freq"], "bands": [(1.0, 4.0), (5.0, 9.0)]},
+        "as_bands": {"bands": {"x": (1.0, 9.0)}, "dofs": ["x"], "freq_hz": c["freq"]},
+        "amplitude_error": {**pairs, "h": 1.01 * c["gamma"][:, 0, 0]},
+        "frequency_error": {**pairs, "h": 1.01 * c["gamma"][:, 0, 0]},
+        "has_peak": {"h": c["gamma"][:, 0, 0], "freq_hz": c["freq"], "band": (1.0, 9.0)},
+        "peak": {"h": c["gamma"][:, 0, 0], "freq_hz": c["freq"], "band": (1.0, 9.0)},
+        "sensitivity": {
+            "freq_hz": c["freq"], "h_c": c["whole"], "joint": c["joint"], "dofs_j": [1], "dofs_k": [2], "output": 0,
+            "input": 3,
+        },
+        "propose_bands": {"freq_hz": c["freq"], "change": abs(c["gamma"][:, 0, 0]) + 1e-9},
+        "monte_carlo": {
+            "gamma": c["gamma"], "level": 0.05, "count": 3, "alpha": c["alpha"], "k_initial": k0, "freq_hz": c["freq"],
+        },
+        "driving_point_check": {"h": c["gamma"]},
+        "set_engine": {"engine": "auto"},
+        "use_engine": {"engine": "plain"},
+        "frfs_of_arrays": {
+            "freq_hz": freq, "h": lines[:, :2, :2], "responses": ["1:x", "2:y"], "excitations": ["1:x", "2:y"],
+            "unit": "m/N", "coherence": np.full((6, 2, 2), 0.9), "averages": 8,
+        },
+    }  # fmt: skip
+
+
+def _structures() -> dict[str, dict[str, Any]]:
+    """Models, joints and laws."""
+    c = _chains()
+    k, m = np.diag([3.0, 4.0, 5.0]), np.eye(3)
+    substructures = [jf.Substructure(model, (dof,)) for model, dof in ((c["a"], "2:x"), (c["b"], "1:x"))]
+    law = jf.LawJoint({"x": jf.SpringLaw(2000.0, 3.0)})
+    return {
+        "chain": {"masses": [5, 3], "stiffness": [2500, 3500], "damping": [3, 4]},
+        "beam": dict(length=0.3, n_elements=3, youngs_modulus=67e9, density=2700.0, width=0.025, height=0.006),
+        "Model": {"stiffness": k, "mass": m, "dofs": ("1:x", "2:x", "3:x"), "damping": 0.1 * k},
+        "receptance": {
+            "freq_hz": [0.1, 0.2, 0.3], "stiffness": k, "mass": m, "loss_factor": 0.01, "outputs": [0, 1],
+            "inputs": [2],
+        },
+        "from_triangle": {"matrix": np.triu(k + 1)},
+        "assemble": {"a": c["a"], "b": c["b"], "joint": c["joint"], "dofs_a": [1], "dofs_b": [0]},
+        "Joint": {"stiffness": [6e5, 5e3], "damping": [20, 1.5], "dofs": ["y", "theta"]},
+        "rigid_offset": {"dofs": ["x", "y", "rz"], "offset": [0.1, 0.0, 0.2]},
+        "SpringLaw": {"k": 2000.0, "c": 3.0},
+        "StandardLinearSolid": {"k": 1e3, "k_m": 5e2, "tau": 0.01},
+        "FractionalZener": {"k": 1e3, "k_m": 5e2, "tau": 0.01, "alpha": 0.5},
+        "PowerLaw": {"k": 1e3, "k_a": 5e2, "alpha": 0.5},
+        "LawJoint": {"laws": {"x": jf.SpringLaw(2000.0, 3.0), "y": jf.PowerLaw(1e3, 5e2, 0.5)}},
+        "LawField": {"name": "k", "kind": "stiffness"},
+        "FunctionLaw": {
+            "function": _spring, "derivatives": _slope, "fields": (jf.LawField("k", "stiffness"),), "values": [1e3],
+        },
+        "Unknown": {"value": 70e9, "std": 1e9, "lower": 0.0, "upper": 1e12},
+        "AddedMass": {"dofs": ("1:x",), "mass": 0.1},
+        "GroundSpring": {"dof": "1:x", "stiffness": 10.0, "damping": 0.1},
+        "Substructure": {"source": c["a"], "joint": ("2:x",)},
+        "Assembly": {"a": substructures[0], "b": substructures[1], "joint": law},
+    }  # fmt: skip
+
+
+def _spring(values: Any, freq_hz: Any) -> Any:
+    return values[0] + 0j * freq_hz
+
+
+def _slope(values: Any, freq_hz: Any) -> Any:
+    return np.ones((1, len(freq_hz))) + 0j
+
+
+def _identification(arrays: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """Fits and what prepares them."""
+    c = _chains()
+    gamma = jf.pollute(c["gamma"], 0.01, seed=1)
+    freq = c["freq"]
+    positions = np.array([[0.0, 0, 0], [0.1, 0, 0], [0, 0.1, 0], [0, 0, 0.1]]).repeat(3, axis=0)
+    point = jf.virtual_point(positions, np.tile(np.eye(3), (4, 1)), [0.05, 0.05, 0.05])
+    rng = np.random.default_rng(4)
+    rigid = point.modes @ (rng.standard_normal((4, 6, 6)) + 3 * np.eye(6)) @ point.modes.T + 0j
+    both = np.zeros((4, 24, 24), complex)
+    both[:, :12, :12] = both[:, 12:, 12:] = rigid + 0.1 * np.eye(12)
+    both[:, :12, 12:] = both[:, 12:, :12] = 0.1 * rigid
+    channels = [jf.io.Channel(node, f"+{axis}") for node in (1, 2, 3, 4) for axis in "xyz"]
+    places = {node: positions[3 * (node - 1)] for node in (1, 2, 3, 4)}
+    all_channels = (*channels, *(jf.io.Channel(10 + one.node, one.direction) for one in channels))
+    coordinates = {**places, **{10 + node: place + 0.5 for node, place in places.items()}}
+    frfs = jf.io.FrfSet(np.arange(1.0, 5.0), all_channels, all_channels, both, coordinates=coordinates)
+    assembly = jf.Assembly(
+        jf.Substructure(c["a"], ("2:x",)), jf.Substructure(c["b"], ("1:x",)),
+        jf.LawJoint({"x": jf.SpringLaw(1900.0, 3.0)}),
+    )  # fmt: skip
+    cross = jf.Joint([[6e5, 5e3], [5e3, 5e3]], dofs=["y", "rz"])
+    return {
+        "identify": {"freq_hz": freq, "gamma": gamma, "dofs": ["x"], "bands": (1.0, 9.0)},
+        "identify_realisations": {"freq_hz": freq, "gammas": [gamma, gamma], "dofs": ["x"]},
+        "identify_model": {
+            "freq_hz": freq, "h": jf.pollute(c["whole"], 0.01, seed=2)[:, [0, 3]][:, :, [0, 3]], "assembly": assembly,
+            "responses": ["a:1:x", "b:2:x"], "forces": ["a:1:x", "b:2:x"], "noise": 0.01,
+        },
+        "check_frfs": {"freq_hz": freq, "h": gamma, "names": ["j:x", "k:x"]},
+        "estimate_noise": {"freq_hz": freq, "h": gamma, "max_poles": 6},
+        "smooth_frfs": {"freq_hz": freq, "h": gamma, "max_poles": 6},
+        "elastic_centre": {"joint": cross},
+        "virtual_point": {
+            "positions": positions, "directions": np.tile(np.eye(3), (4, 1)), "point": [0.05, 0.05, 0.05],
+        },
+        "virtual_points": {"side_j": point, "side_k": point},
+        "virtual_interface": {"side_j": point, "side_k": point},
+        "append_virtual_point": {"h": rigid, "channels": list(range(12)), "point": point},
+        "sensor_consistency": {"h": rigid, "point": point},
+        "impact_consistency": {"h": rigid, "point": point},
+        "channel_geometry": {"channels": channels, "coordinates": places},
+        "multi_point_compliance": {"gamma": both, "side_j": point, "side_k": point},
+        "multi_point_stiffness": {"gamma": both, "side_j": point, "side_k": point},
+        "interface": {
+            "points_j": [1, 2], "points_k": [3, 4], "dofs": ["y", "rz"],
+            "coordinates": {n: np.array([0.02 * n, 0, 0]) for n in (1, 2, 3, 4)}, "bending_stiffness": 2000.0,
+        },
+        "places_of_nodes": {"frfs": frfs, "nodes_j": [1, 2, 3, 4], "nodes_k": [11, 12, 13, 14]},
+        "joint_channels": {
+            "frfs": frfs, "places": jf.places_of_nodes(frfs, [1, 2, 3, 4], [11, 12, 13, 14]), "at": [0.3, 0.3, 0.3],
+        },
+        "ChannelPlace": {"channel": channels[0], "side": "j"},
+        "Channel": {"node": 1, "direction": "+y"},
+        "FrfSet": {
+            "freq_hz": np.arange(1.0, 5.0), "responses": tuple(channels), "excitations": tuple(channels), "h": rigid,
+        },
+        "merge_frfs": {"sets": [frfs]},
+    }  # fmt: skip
+
+
+def _solids() -> dict[str, dict[str, Any]]:
+    """Bricks and bolts."""
+    aluminium = jf.Material(70e9, 0.33, 2700.0)
+    block = jf.brick_beam(1.0, 1.0, 1.0, aluminium, divisions=(1, 1, 2))
+    mesh = block.mesh
+    bricks = {"nodes": mesh.nodes, "elements": mesh.elements}
+    divisions = jf.LapDivisions(across=4, layers=1, rings=1, circles=4, head=1, nut=1)
+    lap = jf.bolted_lap((0.05, 0.05), divisions=divisions)
+    return {
+        "Material": {"youngs_modulus": 70e9, "poisson": 0.33, "density": 2700.0, "loss_factor": 0.01},
+        "Hole": {"position": 0.5, "radius": 0.1, "patch_radius": 0.2},
+        "brick_beam": dict(length=1.0, width=1.0, height=1.0, material=aluminium, divisions=(1, 1, 2)),
+        "Mesh": bricks,
+        "brick_quality": bricks,
+        "assemble_bricks": {**bricks, "materials": aluminium},
+        "element_matrices": {"coordinates": mesh.nodes[mesh.elements], "materials": aluminium},
+        "solid_model": {"mesh": mesh, "materials": aluminium, "clamped": [0, 1]},
+        "Patch": {"point": np.zeros(3), "nodes": np.array([0, 1, 2, 3], np.int32)},
+        "interpolation": {"mesh": mesh, "points": [[0.5, 0.0, 0.0]], "directions": "xyz"},
+        "preload_force": {"tensile_area": 36.6e-6, "proof_strength": 640e6, "share": 0.75},
+        "Bolt": {},
+        "LapDivisions": dict(across=4, layers=1, rings=1),
+        "ContactLaw": {"friction": 0.3},
+        "bolted_lap": {"lengths": (0.05, 0.05), "divisions": divisions},
+        "preload": {"lap": lap, "force": 5e3, "max_iterations": 4},
+    }
+
+
+def _files(folder: Path) -> dict[str, dict[str, Any]]:
+    """Files in and out; those that are read are there."""
+    rng = np.random.default_rng(5)
+    h = rng.standard_normal((5, 2, 2)) + 1j * rng.standard_normal((5, 2, 2))
+    channels = (jf.io.Channel(1, "+x"), jf.io.Channel(2, "-y"))
+    frfs = jf.io.FrfSet(np.arange(10.0, 60.0, 10.0), channels, channels, h)
+    jf.io.write_uff(folder / "a.uff", frfs)
+    jf.io.write_npz(folder / "a.npz", frfs)
+    (folder / "table.csv").write_text("channel,side\n1:x,j\n2:y,k\n")
+    written = {name: {"path": folder / f"out.{name}", "frfs": frfs} for name in ("uff", "npz", "csv", "hdf5")}
+    return {
+        "read_uff": {"path": folder / "a.uff"},
+        "read_frfs": {"paths": folder / "a.npz"},
+        "read_channel_table": {"path": folder / "table.csv"},
+        "FrfMapping": {"freq_hz": "f", "h": "H"},
+        **{f"write_{name}": arguments for name, arguments in written.items()},
+    }

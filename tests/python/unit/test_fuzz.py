@@ -1,0 +1,115 @@
+"""The attack of tests/fuzz in its short form: a few seconds of each part."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+
+pytest.importorskip("h5py")
+pytest.importorskip("pyuff")
+
+from fuzz import drills  # noqa: E402
+from fuzz.part import BrokenError, random_of  # noqa: E402
+from fuzz.parts import PARTS, make_part  # noqa: E402
+from fuzz.python_calls import public_callables  # noqa: E402
+from fuzz.watch import Found, attack  # noqa: E402
+
+SHORT = {"calls": 700, "files": 150, "abi": 1500, "overlaps": 50, "commands": 8}
+linux = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="processes and limits of Linux")
+
+
+@pytest.mark.parametrize("name", PARTS)
+def test_nothing_breaks(tmp_path, name):
+    part = make_part(name, tmp_path)
+    found = {part.run(random_of(11, number)) for number in range(SHORT[name])}
+    assert len(found) > 1, found
+
+
+def test_every_public_function_is_called(tmp_path):
+    """With sound arguments each function answers, so that what is spoiled later would be a result."""
+    part = make_part("calls", tmp_path)
+    functions = {name for name, each in public_callables().items() if not isinstance(each, type)}
+    assert functions <= {each.name for each in part.callables}
+    assert functions <= part.sound.keys() | {"get_engine"}
+
+
+def test_what_breaks_is_said(tmp_path, monkeypatch):
+    """An error of a foreign kind, arguments that are changed, results that differ: none would pass."""
+    part = make_part("calls", tmp_path)
+    broken = {
+        "invert": lambda a, **_: {}["x"],
+        "solve": lambda a, b, **_: a.__setitem__(0, 1) if isinstance(a, np.ndarray) and a.flags.writeable else None,
+        "reciprocal_condition": lambda a: np.random.default_rng().random(),
+    }
+    for each in part.callables:
+        monkeypatch.setattr(each, "call", broken.get(each.name, each.call))
+    seen = set()
+    for number in range(500):
+        try:
+            part.call(
+                part.callables[[each.name for each in part.callables].index([*broken][number % 3])],
+                random_of(1, number),
+            )
+        except BrokenError as error:
+            seen.add(str(error).split(":")[0].split()[0])
+    assert seen == broken.keys()
+
+
+def test_a_crash_and_a_hang_are_counted(monkeypatch, tmp_path):
+    """The processes are watched from outside; the part stands in a module of its own."""
+    (tmp_path / "sitecustomize.py").write_text(
+        "import os, time\nimport fuzz.parts\n"
+        "class Bad:\n"
+        "    def run(self, random):\n"
+        "        number = int(random.bit_generator.state['state']['counter'][1])\n"
+        "        if number == 3: os.abort()\n"
+        "        if number == 5: time.sleep(600)\n"
+        "        return 'result'\n"
+        "fuzz.parts.make_part = lambda name, folder: Bad()\n"
+    )
+    tests = str(Path(__file__).resolve().parents[2])
+    monkeypatch.setenv("PYTHONPATH", f"{tmp_path}:{tests}")
+    found = attack("calls", 8, longest=3.0)
+    assert (found.crashes, found.hangs, found.cases) == (1, 1, 8)
+    assert ["--first 3" in found.broken[0], "--first 5" in found.broken[1]] == [True, True]
+
+
+@linux
+@pytest.mark.parametrize(("name", "count"), [("kills", 1), ("disk-full", 1), ("unwritable", 1)])
+def test_drills(name, count):
+    found = drills.run_drill(name, count)
+    assert found.broken == []
+    assert found.counts.total() >= 1
+
+
+@linux
+def test_a_second_set_up_needs_no_network():
+    """That of this checkout, where it was set up by the script at all."""
+    if not (drills.ROOT / ".venv" / "set-up.run").exists():
+        pytest.skip("this checkout was not set up by python/bootstrap.sh")
+    process = drills.set_up(drills.ROOT, **drills.OFFLINE)
+    text = process.communicate(timeout=60)[0]
+    assert (process.returncode, text) == (0, "")
+
+
+@linux
+@pytest.mark.parametrize("name", ["with blanks and 'quotes'", "größe-测试", "a$b;c&d"])
+def test_two_set_ups_at_an_odd_place_take_turns(tmp_path, name):
+    """Both fail, since no interpreter is given: each in a sentence, one after the other, and no lock is left."""
+    clone = drills.small_clone(tmp_path / name)
+    both = [drills.set_up(clone, PYTHON="/nowhere/python") for _ in range(2)]
+    for process in both:
+        text = process.communicate(timeout=60)[0]
+        assert process.returncode == 1
+        assert "PYTHON=/nowhere/python is not Python 3.11 or newer" in text
+    assert [path.name for path in (clone / "build").iterdir()] == ["set-up.log"]
+
+
+def test_counts_add_up():
+    one, other = Found(), Found()
+    one.counts["result"], other.counts["result"], other.crashes = 3, 2, 1
+    one.add(other)
+    assert (one.cases, one.crashes) == (6, 1)
