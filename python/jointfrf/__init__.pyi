@@ -81,6 +81,10 @@ from jointfrf.solids.interpolation import interpolation
 from jointfrf.solids.mesh import Mesh
 from jointfrf.solids.preload import PreloadedLap, preload
 from jointfrf.solids.solid import Patch, SolidModel, solid_model
+from jointfrf.studies.design import StudyDesign
+from jointfrf.studies.result import StudyResult, read_study
+from jointfrf.studies.run import merge_studies, study
+from jointfrf.studies.summary import ParameterSummary
 from jointfrf.substructuring.compliance import compliance_covariance, compliance_factors, joint_compliance
 from jointfrf.substructuring.coupling import couple
 from jointfrf.substructuring.decoupling import decouple
@@ -134,6 +138,7 @@ __all__ = [
     "MonteCarlo",
     "MultiPointJoint",
     "NoiseModel",
+    "ParameterSummary",
     "Patch",
     "PowerLaw",
     "PreloadedLap",
@@ -144,6 +149,8 @@ __all__ = [
     "SolidModel",
     "SpringLaw",
     "StandardLinearSolid",
+    "StudyDesign",
+    "StudyResult",
     "Substructure",
     "Unknown",
     "VirtualPoint",
@@ -188,6 +195,7 @@ __all__ = [
     "ismm",
     "joint_channels",
     "joint_compliance",
+    "merge_studies",
     "modify",
     "monte_carlo",
     "multi_point_compliance",
@@ -198,6 +206,7 @@ __all__ = [
     "preload",
     "preload_force",
     "propose_bands",
+    "read_study",
     "realisations",
     "receptance",
     "reciprocal_condition",
@@ -209,6 +218,7 @@ __all__ = [
     "smooth_frfs",
     "solid_model",
     "solve",
+    "study",
     "transform",
     "use_engine",
     "virtual_interface",

@@ -14,6 +14,12 @@ _EXTRAS = {
     "jinja2": ("reports", "report"),
     "matplotlib": ("figures", "plot"),
     "pyuff": ("Universal Files", "uff"),
+    "pyarrow": ("Parquet files", "parquet"),
+    "zarr": ("Zarr arrays", "zarr"),
+    "loky": ("processes of loky", "loky"),
+    "dask": ("Dask clusters", "dask"),
+    "distributed": ("Dask clusters", "dask"),
+    "mpi4py": ("MPI pools", "mpi"),
     "shtab": ("completions for shells", "completion"),
 }
 

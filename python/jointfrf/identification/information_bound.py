@@ -66,7 +66,7 @@ def _units(n: int) -> tuple[FloatArray, FloatArray]:
 
 
 def _weighted(gamma: ComplexArray, units: FloatArray, weight: FloatArray) -> ComplexArray:
-    """Derivatives of gamma over the standard deviation of its entries, shape (n_freq, 4 n^2, n_units)."""
+    """Return derivatives of gamma over the standard deviation of its entries, shape (n_freq, 4 n^2, n_units)."""
     moved = gamma[:, None] @ units @ gamma[:, None] * weight[:, None]
     found = moved.reshape(*moved.shape[:2], -1).swapaxes(1, 2)
     scaled: ComplexArray = found

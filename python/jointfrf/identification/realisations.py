@@ -28,12 +28,12 @@ class FitStart(NamedTuple):
     ----------
     estimate : JointEstimate
         The joint, and the FRFs that fit it.
-    noise : NoiseModel
+    noise : NoiseModel or None
         With the poles of the smooth FRFs.
     """
 
     estimate: JointEstimate
-    noise: NoiseModel
+    noise: NoiseModel | None
 
     @classmethod
     def of(

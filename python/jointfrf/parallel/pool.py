@@ -165,7 +165,7 @@ def _workers_of(executor: Executor) -> int:
         found = getattr(executor, name, None)
         if isinstance(found, int) and found > 0:
             return found
-    client = getattr(executor, "_client", None)  # of Dask
-    if hasattr(client, "ncores"):
-        return max(1, sum(client.ncores().values()))
+    client: Any = getattr(executor, "_client", None)  # of Dask
+    if client is not None and hasattr(client, "ncores"):
+        return max(1, int(sum(client.ncores().values())))
     return available_cores()

@@ -242,19 +242,17 @@ def _group(
 
 
 def _bound(exact: Exact, noise: Noise | Pollution) -> FloatArray:
-    """Return least standard deviations without a model of the sides; NaN where entries share noise, or where it is
-    not circular.
-    """
+    """Return least standard deviations without a model of the sides; NaN where noise is shared, or not circular."""
     missing = np.full(2 * exact.n, np.nan)
     if not isinstance(noise, Noise) or noise.kind not in _CIRCULAR or noise.reciprocal or noise.block > 1:
         return missing
     gamma = exact.interface(exact.h_c)
-    size = abs(gamma)
+    size: FloatArray = np.abs(gamma)
     if noise.relative_to == "line":
         size = np.broadcast_to(size.max(axis=(1, 2), keepdims=True), size.shape)
     elif noise.relative_to == "spectrum":
         size = np.full(size.shape, size.max())
-    variance = (_CIRCULAR[noise.kind] * noise.level * size) ** 2
+    variance: FloatArray = (_CIRCULAR[noise.kind] * noise.level * size) ** 2
     if not variance.all():
         return missing
     return least_std_errors(exact.freq_hz, gamma, variance)
