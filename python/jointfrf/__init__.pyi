@@ -72,6 +72,10 @@ from jointfrf.models.chain import chain
 from jointfrf.models.matrices import from_triangle
 from jointfrf.models.model import Model, assemble
 from jointfrf.models.receptance.receptance import ReceptanceInfo, receptance
+from jointfrf.parallel.pool import BrokenPoolError
+from jointfrf.parallel.processes import SeparateProcesses
+from jointfrf.parallel.sweep import plan_sweep, sweep
+from jointfrf.parallel.sweep_plan import SweepPlan
 from jointfrf.solids.bolt import PROOF_STRENGTH, STRESS_AREA, Bolt, preload_force
 from jointfrf.solids.bolted_lap import BoltedLap, LapDivisions, bolted_lap
 from jointfrf.solids.brick import Material, assemble_bricks, brick_quality, element_matrices
@@ -102,6 +106,7 @@ __all__ = [
     "BandStatistics",
     "Bolt",
     "BoltedLap",
+    "BrokenPoolError",
     "ChannelAgreement",
     "ChannelPlace",
     "Consistency",
@@ -143,6 +148,7 @@ __all__ = [
     "PowerLaw",
     "PreloadedLap",
     "ReceptanceInfo",
+    "SeparateProcesses",
     "SideAgreement",
     "SingularLineError",
     "SmoothFrfs",
@@ -152,6 +158,7 @@ __all__ = [
     "StudyDesign",
     "StudyResult",
     "Substructure",
+    "SweepPlan",
     "Unknown",
     "VirtualPoint",
     "amplitude_error",
@@ -202,6 +209,7 @@ __all__ = [
     "multi_point_stiffness",
     "peak",
     "places_of_nodes",
+    "plan_sweep",
     "pollute",
     "preload",
     "preload_force",
@@ -219,6 +227,7 @@ __all__ = [
     "solid_model",
     "solve",
     "study",
+    "sweep",
     "transform",
     "use_engine",
     "virtual_interface",
