@@ -48,7 +48,7 @@ def _enter(libraries: list[Any]) -> None:
             _before[:] = [(one, int(one.get_num_threads())) for one in libraries]
         _at_work += 1
         for library in libraries:
-            library.set_num_threads(1)
+            _set(library, 1)
 
 
 def _leave() -> None:
@@ -57,5 +57,13 @@ def _leave() -> None:
         _at_work -= 1
         if _at_work == 0:
             for library, threads in _before:
-                library.set_num_threads(threads)
+                _set(library, threads)
             _before.clear()
+
+
+def _set(library: Any, threads: int) -> None:
+    """Set the number of threads of a BLAS: threadpoolctl takes it from the thread that did so first, and no other."""
+    release = getattr(library, "clear_controlling_thread", lambda force: None)
+    release(force=True)
+    library.set_num_threads(threads)
+    release(force=True)

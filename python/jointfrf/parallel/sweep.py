@@ -272,5 +272,7 @@ def _write_seconds(out: Lines, values: NDArray[Any]) -> float:
         values.copy()
     else:
         with tempfile.TemporaryFile(dir=out.place.parent) as file:
-            file.write(values.tobytes())
+            mapped = np.memmap(file, values.dtype, "w+", shape=values.shape)
+            mapped[:] = values
+            mapped.flush()
     return perf_counter() - start
