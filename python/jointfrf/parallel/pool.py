@@ -151,7 +151,7 @@ def opened_pool(executor: AnyExecutor | None = None, jobs: int | None = None) ->
     try:
         yield pool
     finally:
-        pool.executor.shutdown(wait=True, cancel_futures=True)
+        pool.executor.shutdown(wait=True)
 
 
 def _own(jobs: int) -> Callable[[], Executor]:
