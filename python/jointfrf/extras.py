@@ -17,7 +17,6 @@ _EXTRAS = {
     "pyarrow": ("Parquet files", "parquet"),
     "zarr": ("Zarr arrays", "zarr"),
     "loky": ("processes of loky", "loky"),
-    "dask": ("Dask clusters", "dask"),
     "distributed": ("Dask clusters", "dask"),
     "mpi4py": ("MPI pools", "mpi"),
     "shtab": ("completions for shells", "completion"),

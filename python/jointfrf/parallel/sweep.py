@@ -31,7 +31,7 @@ LineFunction = Callable[..., NDArray[Any]]
 
 
 @dataclass(frozen=True)
-class _Task:
+class _SweepTask:
     """Some lines: where they are read, and where the result goes, None where it is sent back."""
 
     operation: LineFunction
@@ -48,7 +48,7 @@ class _Done(NamedTuple):
     seconds: float
 
 
-def _do(task: _Task) -> _Done:
+def _do(task: _SweepTask) -> _Done:
     """Do a task on one thread."""
     with one_thread(), warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", IllConditionedWarning)
@@ -89,10 +89,10 @@ class _Sweep:
     def n_lines(self) -> int:
         return self.out.shape[0]
 
-    def task(self, lines: slice, *, is_written: bool = True) -> _Task:
+    def task(self, lines: slice, *, is_written: bool = True) -> _SweepTask:
         """Return the task of some lines."""
         result = self.out if is_written and self.out.is_written_by_tasks else None
-        return _Task(self.operation, {name: own.of(lines) for name, own in self.inputs.items()}, result, lines)
+        return _SweepTask(self.operation, {name: own.of(lines) for name, own in self.inputs.items()}, result, lines)
 
 
 def _checked(operation: LineFunction, arrays: Mapping[str, ArrayLike], out: Any) -> _Sweep:
@@ -234,7 +234,7 @@ def plan_sweep(
         return _measured(whole, pool)
 
 
-def _tasks(whole: _Sweep, plan: SweepPlan) -> Iterator[_Task]:
+def _tasks(whole: _Sweep, plan: SweepPlan) -> Iterator[_SweepTask]:
     return (whole.task(lines) for lines in plan.chunks())
 
 
@@ -260,7 +260,7 @@ def _measured(whole: _Sweep, pool: Pool[Any]) -> SweepPlan:
     return planned_sweep(whole.name, shapes, whole.n_lines, pool.workers, whole.out.step, cost)
 
 
-def _one(pool: Pool[Any], task: _Task) -> _Done:
+def _one(pool: Pool[Any], task: _SweepTask) -> _Done:
     ((_, done),) = pool.completed(_do, iter([task]))
     return done
 

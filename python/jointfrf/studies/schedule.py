@@ -116,7 +116,8 @@ class Schedule:
         """Take the next realisations of a group, up to the end of those that are computed side by side."""
         queue = self._queues[number]
         span, together = queue.spans[0], queue.group.side_by_side
-        end = min(span.end, -(-(span.first + size) // together) * together)
+        first_end = (span.first // together + 1) * together
+        end = min(span.end, max(first_end, (span.first + size) // together * together))
         count = end - span.first
         queue.spans[:1] = [Span(end, span.end - end)] if end < span.end else []
         queue.at_work += count

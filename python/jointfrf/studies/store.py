@@ -204,7 +204,7 @@ class StudyStore:
 
 def _read_chunk(path: Path, skip: int) -> Estimates:
     try:
-        with np.load(path, allow_pickle=False) as held:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as held:
             values = held["values"][skip:]
             if "low" not in held:
                 return Estimates.without_intervals(values)
