@@ -56,7 +56,7 @@ from jointfrf.identification.model_fit.model_fit import ModelFit
 from jointfrf.identification.model_fit.substructure import Substructure
 from jointfrf.identification.model_fit.unknown import Unknown
 from jointfrf.identification.monte_carlo import BandStatistics, MonteCarlo, monte_carlo
-from jointfrf.identification.realisations import identify_realisations
+from jointfrf.identification.realisations import FitStart, identify_realisations
 from jointfrf.identification.sensitivity import propose_bands, sensitivity
 from jointfrf.joint import Joint
 from jointfrf.kernel.engine import get_engine, set_engine, use_engine
@@ -118,6 +118,7 @@ __all__ = [
     "ElasticCentre",
     "FileContentError",
     "FileContentWarning",
+    "FitStart",
     "FractionalZener",
     "FrfCheck",
     "FrfCheckWarning",

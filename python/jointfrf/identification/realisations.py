@@ -30,6 +30,19 @@ class FitStart(NamedTuple):
         The joint, and the FRFs that fit it.
     noise : NoiseModel or None
         With the poles of the smooth FRFs.
+
+    Examples
+    --------
+    >>> import numpy as np, jointfrf as jf
+    >>> freq = np.linspace(0.5, 10, 200)
+    >>> h = jf.chain([5, 3], [2500, 3500], [3, 4], ground="start").receptance(freq)[:, 1:, 1:]
+    >>> gamma = jf.couple(h, h, jf.Joint([2000.0], [3.0]).dynamic_stiffness(freq), [0], [0])
+    >>> drawn = jf.realisations(gamma, 0.02, count=3)
+    >>> start = jf.FitStart.of(freq, drawn[0], ["x"])
+    >>> alone, *_ = jf.identify_realisations(freq, drawn[2:], ["x"], start=start)
+    >>> *_, last = jf.identify_realisations(freq, drawn, ["x"], start=start)
+    >>> alone.stiffness == last.stiffness
+    array([ True])
     """
 
     estimate: JointEstimate
@@ -45,7 +58,24 @@ class FitStart(NamedTuple):
         damping: DampingTerms | Literal["auto"] | Sequence[DampingTerms] = "auto",
         cross: CrossTerms = "zero",
     ) -> FitStart:
-        """Fit one set of FRFs; arguments as in `identify_realisations`."""
+        """Fit one set of FRFs.
+
+        Parameters
+        ----------
+        freq_hz, dofs, damping, cross
+            As in `identify_realisations`.
+        gamma : array_like, shape (n_freq, 2 n, 2 n)
+            Receptances of the same structure, m/N.
+
+        Returns
+        -------
+        FitStart
+
+        Raises
+        ------
+        ValueError
+            As `identify`.
+        """
         options = FitOptions(damping if isinstance(damping, str) else tuple(damping), cross, reciprocal=True)
         measured = as_measured(freq_hz, gamma, square=False)
         problem = prepare_compliance(measured, dofs, None, None, NoiseOptions(None), options)
