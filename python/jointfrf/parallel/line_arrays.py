@@ -96,20 +96,20 @@ class MappedLines(Lines):
         """Return the place of the file."""
         return self
 
-    def _mapped(self, lines: slice, mode: Any) -> NDArray[Any]:
-        size = np.dtype(self.dtype).itemsize * math.prod(self.shape[1:])
-        shape = (lines.stop - lines.start, *self.shape[1:])
-        return np.memmap(self.path, self.dtype, mode, self.offset + lines.start * size, shape)
+    def _start(self, lines: slice) -> int:
+        """Return where lines begin in the file, bytes."""
+        return self.offset + lines.start * np.dtype(self.dtype).itemsize * math.prod(self.shape[1:])
 
     def read(self, lines: slice) -> NDArray[Any]:
         """Map lines."""
-        return self._mapped(lines, "r")
+        shape = (lines.stop - lines.start, *self.shape[1:])
+        return np.memmap(self.path, self.dtype, "r", self._start(lines), shape)
 
     def write(self, lines: slice, values: NDArray[Any]) -> None:
-        """Write lines into the file."""
-        mapped = self._mapped(lines, "r+")
-        mapped[:] = values
-        mapped.flush()  # type: ignore[attr-defined]
+        """Write lines into the file and close it: then other machines see them, unlike what is written into a map."""
+        with self.path.open("r+b") as file:
+            file.seek(self._start(lines))
+            np.ascontiguousarray(values, self.dtype).tofile(file)
 
 
 @dataclass(frozen=True)

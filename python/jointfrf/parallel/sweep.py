@@ -272,7 +272,5 @@ def _write_seconds(out: Lines, values: NDArray[Any]) -> float:
         values.copy()
     else:
         with tempfile.TemporaryFile(dir=out.place.parent) as file:
-            mapped = np.memmap(file, values.dtype, "w+", shape=values.shape)
-            mapped[:] = values
-            mapped.flush()
+            file.write(values.tobytes())
     return perf_counter() - start
