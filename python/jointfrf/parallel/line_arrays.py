@@ -98,7 +98,7 @@ class MappedLines(Lines):
 
     def _start(self, lines: slice) -> int:
         """Return where lines begin in the file, bytes."""
-        return self.offset + lines.start * np.dtype(self.dtype).itemsize * math.prod(self.shape[1:])
+        return self.offset + int(lines.start) * np.dtype(self.dtype).itemsize * math.prod(self.shape[1:])
 
     def read(self, lines: slice) -> NDArray[Any]:
         """Map lines."""

@@ -23,8 +23,8 @@ from jointfrf.parallel.sweep_plan import SweepCost, SweepPlan, planned_sweep
 __all__ = ["plan_sweep", "sweep"]
 
 #: Lines on which the cost of a line is measured, few and many: the difference is that of the lines.
-_SAMPLES = (512, 4096)
-#: Tasks that do nothing, for each worker, and times that lines are measured.
+_SAMPLES = (512, 8192)
+#: Tasks that do nothing, for each worker, and places where lines are measured.
 _EMPTY, _REPEATED = 4, 3
 #: An operation, line by line: takes arrays by name, returns the result.
 LineFunction = Callable[..., NDArray[Any]]
@@ -219,7 +219,7 @@ def plan_sweep(
     Raises
     ------
     SingularLineError, ValueError
-        As in `sweep`, in the first 4096 lines.
+        As in `sweep`, in the lines that are measured.
 
     Examples
     --------
@@ -248,7 +248,9 @@ def _measured(whole: _Sweep, pool: Pool[Any]) -> SweepPlan:
     few, many = (min(sample, whole.n_lines) for sample in _SAMPLES)
     values = np.empty(0)
     for lines in (few, many):
-        tried = [_one(pool, whole.task(slice(0, lines), is_written=False)) for _ in range(_REPEATED)]
+        # Each time at another place, where the lines have not been read before.
+        places = [(whole.n_lines - lines) * place // _REPEATED for place in range(_REPEATED)]
+        tried = [_one(pool, whole.task(slice(at, at + lines), is_written=False)) for at in places]
         seconds.append(median(one.seconds for one in tried))
         values = tried[-1].values if tried[-1].values is not None else values
     if values.shape != (many, *whole.out.shape[1:]):
