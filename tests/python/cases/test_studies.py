@@ -2,11 +2,14 @@
 
 import json
 import os
+import re
+import shlex
 import shutil
 import signal
 import subprocess
 import sys
 import time
+import tomllib
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -19,6 +22,7 @@ from command import run_command
 from jointfrf.cases.catalogue import find_case, read_case
 from jointfrf.cases.known_joint.exact import exact_frfs
 from jointfrf.cases.known_joint.study import run_study
+from jointfrf.cli.parser import command_parser
 from studied_case import CASE, DESIGN, WORDS, N, broken_off, doubled, same
 
 
@@ -227,3 +231,18 @@ def test_wrong_words_are_one_sentence(words, status, message, tmp_path, monkeypa
     assert message in done.stderr
     assert len([line for line in done.stderr.splitlines() if "error" in line]) == 1
     assert not (tmp_path / "out").exists()
+
+
+def test_commands_of_the_page_are_understood():
+    page = (Path(__file__).resolve().parents[3] / "docs" / "studies.md").read_text(encoding="utf-8")
+    blocks = "".join(re.findall(r"```sh\n(.*?)```", page, re.DOTALL)).replace("\\\n", "")
+    words = [
+        shlex.split(re.sub(r"\$\(\(.*?\)\)|\$\w+", "4", line), comments=True)[1:]
+        for line in blocks.splitlines()
+        if line.startswith("jointfrf ")
+    ]
+    for command, *rest in words:
+        command_parser(command).parse_words(rest)  # ends the test where it is wrong
+    assert len(words) >= 5
+    extras = tomllib.loads((Path(__file__).resolve().parents[3] / "pyproject.toml").read_text(encoding="utf-8"))
+    assert {"loky", "dask", "mpi", "parquet", "zarr"} <= set(extras["project"]["optional-dependencies"])
