@@ -59,12 +59,14 @@ def test_processes_give_the_same_numbers_and_tell_progress(reference, tmp_path):
     assert seen[-1][0] == seen[-1][1]
 
 
+@pytest.mark.long
 def test_loky_gives_the_same_numbers(reference, tmp_path):
     loky = pytest.importorskip("loky")
     made = lambda: loky.get_reusable_executor(max_workers=2)  # noqa: E731
     assert same(studied(tmp_path, executor=made), reference)
 
 
+@pytest.mark.long
 @pytest.mark.filterwarnings("ignore::ResourceWarning")
 def test_a_dask_cluster_of_two_workers_gives_the_same_numbers(reference, tmp_path):
     distributed = pytest.importorskip("distributed")
@@ -79,6 +81,7 @@ def mpiexec() -> str | None:
     return shutil.which("mpiexec", path=os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]]))
 
 
+@pytest.mark.long
 @pytest.mark.skipif(mpiexec() is None, reason="mpiexec is not on PATH")
 def test_two_processes_of_mpi_give_the_same_numbers(reference, tmp_path):
     pytest.importorskip("mpi4py")
