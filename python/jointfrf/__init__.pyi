@@ -58,7 +58,7 @@ from jointfrf.identification.model_fit.model_fit import ModelFit
 from jointfrf.identification.model_fit.substructure import Substructure
 from jointfrf.identification.model_fit.unknown import Unknown
 from jointfrf.identification.monte_carlo import BandStatistics, MonteCarlo, monte_carlo
-from jointfrf.identification.realisations import identify_realisations
+from jointfrf.identification.realisations import FitStart, identify_realisations
 from jointfrf.identification.sensitivity import propose_bands, sensitivity
 from jointfrf.joint import Joint
 from jointfrf.kernel.engine import get_engine, set_engine, use_engine
@@ -74,6 +74,10 @@ from jointfrf.models.chain import chain
 from jointfrf.models.matrices import from_triangle
 from jointfrf.models.model import Model, assemble
 from jointfrf.models.receptance.receptance import ReceptanceInfo, receptance
+from jointfrf.parallel.pool import BrokenPoolError
+from jointfrf.parallel.processes import SeparateProcesses
+from jointfrf.parallel.sweep import plan_sweep, sweep
+from jointfrf.parallel.sweep_plan import SweepPlan
 from jointfrf.solids.bolt import PROOF_STRENGTH, STRESS_AREA, Bolt, preload_force
 from jointfrf.solids.bolted_lap import BoltedLap, LapDivisions, bolted_lap
 from jointfrf.solids.brick import Material, assemble_bricks, brick_quality, element_matrices
@@ -83,6 +87,10 @@ from jointfrf.solids.interpolation import interpolation
 from jointfrf.solids.mesh import Mesh
 from jointfrf.solids.preload import PreloadedLap, preload
 from jointfrf.solids.solid import Patch, SolidModel, solid_model
+from jointfrf.studies.design import StudyDesign
+from jointfrf.studies.result import StudyResult, read_study
+from jointfrf.studies.run import merge_studies, study
+from jointfrf.studies.summary import ParameterSummary
 from jointfrf.substructuring.compliance import compliance_covariance, compliance_factors, joint_compliance
 from jointfrf.substructuring.coupling import couple
 from jointfrf.substructuring.decoupling import decouple
@@ -100,6 +108,7 @@ __all__ = [
     "BandStatistics",
     "Bolt",
     "BoltedLap",
+    "BrokenPoolError",
     "ChannelAgreement",
     "ChannelPlace",
     "Consistency",
@@ -111,6 +120,7 @@ __all__ = [
     "ElasticCentre",
     "FileContentError",
     "FileContentWarning",
+    "FitStart",
     "FractionalZener",
     "FrfCheck",
     "FrfCheckWarning",
@@ -137,17 +147,22 @@ __all__ = [
     "MonteCarlo",
     "MultiPointJoint",
     "NoiseModel",
+    "ParameterSummary",
     "Patch",
     "PowerLaw",
     "PreloadedLap",
     "ReceptanceInfo",
+    "SeparateProcesses",
     "SideAgreement",
     "SingularLineError",
     "SmoothFrfs",
     "SolidModel",
     "SpringLaw",
     "StandardLinearSolid",
+    "StudyDesign",
+    "StudyResult",
     "Substructure",
+    "SweepPlan",
     "Unknown",
     "VirtualPoint",
     "amplitude_error",
@@ -191,17 +206,20 @@ __all__ = [
     "ismm",
     "joint_channels",
     "joint_compliance",
+    "merge_studies",
     "modify",
     "monte_carlo",
     "multi_point_compliance",
     "multi_point_stiffness",
     "peak",
     "places_of_nodes",
+    "plan_sweep",
     "pollute",
     "preload",
     "preload_force",
     "propose_bands",
     "read_joint",
+    "read_study",
     "realisations",
     "receptance",
     "reciprocal_condition",
@@ -213,6 +231,8 @@ __all__ = [
     "smooth_frfs",
     "solid_model",
     "solve",
+    "study",
+    "sweep",
     "transform",
     "use_engine",
     "virtual_interface",

@@ -38,6 +38,10 @@ class SingularLineError(np.linalg.LinAlgError):
         self.lines = lines
         self.freq_hz = freq_hz
 
+    def __reduce__(self) -> tuple[type[SingularLineError], tuple[object, ...]]:
+        """Return how another process makes it again."""
+        return type(self), (str(self), self.lines, self.freq_hz)
+
 
 class FileContentError(ValueError):
     """A file cannot be read, or lacks something that is needed; one line, whatever the file is called."""

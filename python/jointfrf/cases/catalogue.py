@@ -29,6 +29,7 @@ __all__ = [
     "numbered",
     "read_case",
     "read_case_and_kind",
+    "read_case_of",
     "run_case",
 ]
 
@@ -146,9 +147,15 @@ def read_case_and_kind(
     folder: Path, kinds: Mapping[str, CaseKind[Any, Any]] = KINDS
 ) -> tuple[Case, CaseKind[Any, Any]]:
     """Read a case as `read_case` does, and return its kind, too."""
-    table = read_toml(folder / "case.toml")
     path = folder / "expected.toml"
     expected = read_toml(path) if path.is_file() else TomlTable({}, str(path))
+    return read_case_of(folder, read_toml(folder / "case.toml"), expected, kinds)
+
+
+def read_case_of(
+    folder: Path, table: TomlTable, expected: TomlTable, kinds: Mapping[str, CaseKind[Any, Any]] = KINDS
+) -> tuple[Case, CaseKind[Any, Any]]:
+    """Read a case from tables: of its `case.toml`, and of what is known about it."""
     kind = kinds[table.text("kind", tuple(kinds))] if "kind" in table else next(iter(kinds.values()))
     for one, known in ((table, kind.keys), (expected, kind.expected_keys)):
         if known is not None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
+from jointfrf.cases.studied import StudiedGroup, StudyChoice
 from jointfrf.cases.workers import Workers
 from jointfrf.kernel.arguments import FloatArray
 from jointfrf.report.figure import Figure
@@ -75,6 +76,9 @@ class CaseKind(Generic[CaseT, ResultT]):
         ``summary(result, tables)`` returns short tables that say what came out.
     numbers : callable
         ``numbers(result)`` returns what `results.json` holds beside the common part and the tables.
+    studied : callable, optional
+        ``studied(case, choice)`` returns what a study of the case computes, see `jointfrf.cases.studied.StudiedGroup`.
+        It raises ValueError.
     not_printed : tuple of str
         Keys of tables that stand in the report but are not printed.
     keys, expected_keys : KeyTable, optional
@@ -95,6 +99,7 @@ class CaseKind(Generic[CaseT, ResultT]):
     figures: Callable[[ResultT], list[Figure]]
     summary: Callable[[ResultT, list[Table]], list[Table]]
     numbers: Callable[[ResultT], dict[str, Any]]
+    studied: Callable[[CaseT, StudyChoice], list[StudiedGroup]] | None = None
     not_printed: tuple[str, ...] = ()
     keys: KeyTable | None = None
     expected_keys: KeyTable | None = None

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import os
-import signal
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
-from multiprocessing import connection, get_context, parent_process
-from threading import Thread
+from multiprocessing import get_context
 from typing import Any, TypeVar
+
+from jointfrf.parallel.processes import begin_process
 
 __all__ = ["Workers", "started_workers"]
 
@@ -59,25 +59,11 @@ def started_workers(jobs: int) -> Iterator[Workers]:
         yield Workers()
         return
     with _environment(dict.fromkeys(_THREADS, "1")):
-        pool = ProcessPoolExecutor(jobs, get_context("spawn"), initializer=_begin)
+        pool = ProcessPoolExecutor(jobs, get_context("spawn"), initializer=begin_process)
         try:
             yield Workers(pool)
         finally:
             pool.shutdown(cancel_futures=True)
-
-
-def _begin() -> None:
-    """Begin a process of the pool: an interrupt goes to the one that waits for it, and it ends when that one does."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    parent = parent_process()
-    if parent is not None:
-        Thread(target=_end_with, args=(parent.sentinel,), daemon=True).start()
-
-
-def _end_with(sentinel: int) -> None:
-    """Wait for the end of another process, and end this one: whoever is killed cannot tell its processes."""
-    connection.wait([sentinel])
-    os._exit(1)
 
 
 @contextmanager

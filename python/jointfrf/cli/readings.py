@@ -20,8 +20,9 @@ from jointfrf.cases.known_joint.readings.study import (
 from jointfrf.cases.known_joint.readings.tables import altogether_table, choices_table, source_tables, values_table
 from jointfrf.cases.workers import started_workers
 from jointfrf.cli.output import Output
-from jointfrf.cli.usage import UsageError, available_cores, positive, progress
+from jointfrf.cli.usage import UsageError, positive, progress
 from jointfrf.files import write_file
+from jointfrf.parallel.cores import available_cores
 from jointfrf.report.table import Table, as_text, plain_rows, table_csv
 
 __all__ = ["add_arguments", "run"]

@@ -13,8 +13,9 @@ from pathlib import Path
 from jointfrf.cases.catalogue import CaseOutput, UnknownCaseError, find_case, list_cases, run_case
 from jointfrf.cases.workers import started_workers
 from jointfrf.cli.output import Output
-from jointfrf.cli.usage import UsageError, available_cores, positive, progress
+from jointfrf.cli.usage import UsageError, positive, progress
 from jointfrf.extras import check_extras
+from jointfrf.parallel.cores import available_cores
 from jointfrf.report.table import as_text
 
 __all__ = ["add_arguments", "run"]

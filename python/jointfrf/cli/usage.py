@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 import threading
 import time
@@ -11,7 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-__all__ = ["UsageError", "available_cores", "check_folder", "positive", "progress", "waiting"]
+__all__ = ["UsageError", "check_folder", "positive", "progress", "waiting"]
 
 #: Seconds after which the speed so far says something.
 _SETTLED = 0.5
@@ -42,11 +41,6 @@ def positive(word: str) -> int:
     if not word.isdecimal() or int(word) < 1:
         raise argparse.ArgumentTypeError(f"must be a whole number, at least 1, not {word!r}")
     return int(word)
-
-
-def available_cores() -> int:
-    """Return the number of processors that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def progress(name: str) -> Callable[[int, int], None]:

@@ -4,19 +4,82 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from numpy.typing import ArrayLike
 
+from jointfrf.frf.noise_model import NoiseModel
 from jointfrf.identification.compliance_fit.channel_noise import NoiseOptions
 from jointfrf.identification.compliance_fit.describe import describe_compliance
+from jointfrf.identification.compliance_fit.estimator import JointEstimate
 from jointfrf.identification.compliance_fit.fit import fit_compliance
 from jointfrf.identification.compliance_fit.joint_terms import CrossTerms, DampingTerms
 from jointfrf.identification.compliance_fit.prepare import FitOptions, prepare_compliance
 from jointfrf.identification.joint_fit import JointFit
 from jointfrf.identification.prepare import BandsOfDofs, as_measured
 
-__all__ = ["identify_realisations"]
+__all__ = ["FitStart", "identify_realisations"]
+
+
+class FitStart(NamedTuple):
+    """Where searches begin: what an earlier fit to FRFs of the same structure has found.
+
+    Attributes
+    ----------
+    estimate : JointEstimate
+        The joint, and the FRFs that fit it.
+    noise : NoiseModel or None
+        With the poles of the smooth FRFs.
+
+    Examples
+    --------
+    >>> import numpy as np, jointfrf as jf
+    >>> freq = np.linspace(0.5, 10, 200)
+    >>> h = jf.chain([5, 3], [2500, 3500], [3, 4], ground="start").receptance(freq)[:, 1:, 1:]
+    >>> gamma = jf.couple(h, h, jf.Joint([2000.0], [3.0]).dynamic_stiffness(freq), [0], [0])
+    >>> drawn = jf.realisations(gamma, 0.02, count=3)
+    >>> start = jf.FitStart.of(freq, drawn[0], ["x"])
+    >>> alone, *_ = jf.identify_realisations(freq, drawn[2:], ["x"], start=start)
+    >>> *_, last = jf.identify_realisations(freq, drawn, ["x"], start=start)
+    >>> alone.stiffness == last.stiffness
+    array([ True])
+    """
+
+    estimate: JointEstimate
+    noise: NoiseModel | None
+
+    @classmethod
+    def of(
+        cls,
+        freq_hz: ArrayLike,
+        gamma: ArrayLike,
+        dofs: Sequence[str] | None = None,
+        *,
+        damping: DampingTerms | Literal["auto"] | Sequence[DampingTerms] = "auto",
+        cross: CrossTerms = "zero",
+    ) -> FitStart:
+        """Fit one set of FRFs.
+
+        Parameters
+        ----------
+        freq_hz, dofs, damping, cross
+            As in `identify_realisations`.
+        gamma : array_like, shape (n_freq, 2 n, 2 n)
+            Receptances of the same structure, m/N.
+
+        Returns
+        -------
+        FitStart
+
+        Raises
+        ------
+        ValueError
+            As `identify`.
+        """
+        options = FitOptions(damping if isinstance(damping, str) else tuple(damping), cross, reciprocal=True)
+        measured = as_measured(freq_hz, gamma, square=False)
+        problem = prepare_compliance(measured, dofs, None, None, NoiseOptions(None), options)
+        return cls(fit_compliance(problem).estimate, problem.noise.model)
 
 
 def identify_realisations(
@@ -30,6 +93,7 @@ def identify_realisations(
     cross: CrossTerms = "zero",
     noise: float | ArrayLike | None = None,
     reciprocal: bool = True,
+    start: FitStart | None = None,
 ) -> Iterator[JointFit]:
     """Identify a joint from each of several sets of FRFs of the same structure.
 
@@ -41,6 +105,9 @@ def identify_realisations(
         Measured receptances, m/N, as `identify` takes them: realisations of noise, repeated measurements.
     dofs, bands, transform, damping, cross, noise, reciprocal
         As in `identify` with the method "compliance".
+    start : FitStart, optional
+        Where the searches begin, in place of the first set: then a result depends on its own set only, whatever others
+        are in the same call.
 
     Yields
     ------
@@ -73,6 +140,8 @@ def identify_realisations(
     """
     options = FitOptions(damping if isinstance(damping, str) else tuple(damping), cross, reciprocal)
     known, near = NoiseOptions(noise), None
+    if start is not None:
+        near, known = start.estimate, replace(known, like=start.noise)
     for gamma in gammas:
         measured = as_measured(freq_hz, gamma, square=False)
         problem = replace(prepare_compliance(measured, dofs, bands, transform, known, options), near=near)

@@ -56,6 +56,11 @@ STYLES = {
     "fitted": Style("#16365f", "-", 1.1),
     "difference": Style("#8c8c8c", "-", 0.7),
     "outlying": Style("#7b1a10", "", 1.0, "x"),
+    "ismm-points": Style("#1b4f9c", "-", 1.1, "o"),
+    "compliance-points": Style("#e07b00", "-.", 1.5, "D"),
+    "third-points": Style("#5aa469", (0, (5, 1)), 1.1, "s"),
+    "fourth-points": Style("#9b72b0", (0, (3, 1, 1, 1)), 1.1, "^"),
+    "fifth-points": Style("#c0392b", ":", 1.5, "v"),
 }
 _SHADES = ("#ececec", "#d2d2d2", "#bdbdbd")
 #: Dots an inch of a PNG file, and of images inside an SVG file.
@@ -168,7 +173,7 @@ def _draw_panel(ax: Any, panel: Panel, beside: int) -> None:
         format_axis(ax.xaxis, panel.x_label, beside=beside)
     else:
         _draw_curves(ax, panel)
-        format_axis(ax.xaxis, panel.x_label, beside=beside)
+        format_axis(ax.xaxis, panel.x_label, log=panel.log_x, beside=beside)
         format_axis(ax.yaxis, panel.y_label, log=panel.log_y, step=panel.y_step)
         ax.tick_params(labelbottom=bool(panel.x_label))
     ax.set_title(panel.title)
@@ -220,6 +225,8 @@ def _draw_curves(ax: Any, panel: Panel) -> None:
                        label=None if b else label)  # fmt: skip
     if panel.log_y:
         ax.set_yscale("log")
+    if panel.log_x:
+        ax.set_xscale("log")
     if panel.x_limits:
         ax.set_xlim(*panel.x_limits)
     elif panel.curves:

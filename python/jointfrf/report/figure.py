@@ -92,6 +92,7 @@ class Panel:
     shades: NamedBands = ()
     strips: NamedBands = ()
     log_y: bool = False
+    log_x: bool = False
     x_limits: tuple[float, float] | None = None
     y_limits: tuple[float, float] | None = None
     surface: Surface | None = None

@@ -104,6 +104,11 @@ class TomlTable:
         hint = f"; did you mean {similar!r}?" if similar else ""
         return FileContentError(f"{self.where}: unknown key {key!r}; it takes {', '.join(names)}{hint}")
 
+    @property
+    def content(self) -> dict[str, Any]:
+        """The keys and values as they stand in the file."""
+        return self._content
+
     def keys(self) -> list[str]:
         """Return all keys."""
         return list(self._content)

@@ -441,3 +441,21 @@ def test_numbers_and_report(ran):
     assert text.count('src="data:image/svg+xml,') == len(ran.output.figures)
     assert "2 realisations of each noise level" in text
     assert "strength_class" in text  # the case itself
+
+
+def test_a_study_gives_the_realisations_of_the_run(ran, tmp_path):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(frfs, "bolted_lap", partial(bolted_lap, divisions=COARSE))
+        found = jf.study("4.3.3", tmp_path, 2, jobs=1)
+    seen = 0
+    for number, group in enumerate(found.groups):
+        labels = np.array([column.estimator for column in group.columns])
+        values = found.estimates(number)[1]
+        for one in ran.result.noisy:
+            own = labels == f"{one.estimator}, {one.route}"
+            if one.noise == group.noise and own.any():
+                np.testing.assert_allclose(values[:, own], one.theta, rtol=1e-6)
+                seen += 1
+    assert seen == len(ran.result.noisy)
+    with pytest.raises(ValueError, match="a bolted lap joint has no estimator 'decoupling-rr'"):
+        jf.study("4.3.3", tmp_path / "b", 2, design=jf.StudyDesign(estimators=["decoupling-rr"]), jobs=1)

@@ -12,7 +12,7 @@ FLOORS = (
     {"errors", "spelling"},
     {"files"},
     {"extras", "kernel", "toml"},
-    {"dofs"},
+    {"dofs", "parallel"},
     {"frf"},
     {"channels", "io"},
     {"joint"},
@@ -22,6 +22,7 @@ FLOORS = (
     {"solids"},
     {"report"},
     {"cases"},
+    {"studies"},
     {"cli"},
     {"__main__"},
 )

@@ -27,7 +27,16 @@ from jointfrf.cases.workers import Workers
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.solids.preload import PreloadedLap
 
-__all__ = ["LINES", "BoltedLapResult", "NoiseStudy", "RegeneratedTip", "Unmeasured", "compute_bolted_lap"]
+__all__ = [
+    "LINES",
+    "BoltedLapResult",
+    "NoiseStudy",
+    "NoisyLap",
+    "RegeneratedTip",
+    "Unmeasured",
+    "compute_bolted_lap",
+    "identify_noisy",
+]
 
 #: K* of the reference points as it is, without constants for the joint.
 LINES = "K* line by line, cross terms"
@@ -160,8 +169,7 @@ def compute_bolted_lap(case: BoltedLapCase, n_realisations: int, workers: Worker
     peaks, other_peaks = (resonances(one.tip_hz, one.tip) for one in (solid, other))
     # Processes repeat it with noise while the rest is done here.
     repeated = [
-        (noise, at_work.map(_identify_noisy, _realisations(case, noise, solid, n_realisations)))
-        for noise in case.noises
+        (noise, at_work.map(identify_noisy, _realisations(case, noise, solid, n_realisations))) for noise in case.noises
     ]
     k_lines = route_lines(solid.points, solid.channels, solid.reference)
     regenerated = _regenerated(case, solid, beams, k_lines, (peaks, other_peaks))
@@ -249,8 +257,19 @@ def _shift(case: BoltedLapCase, beams: BeamFrfs, theta: FloatArray) -> FloatArra
     return np.array([max(one, default=0.0) for one in own])
 
 
-class _Realisation(NamedTuple):
-    """What a process needs for one noisy measurement."""
+class NoisyLap(NamedTuple):
+    """What a process needs for one noisy measurement.
+
+    Attributes
+    ----------
+    case : BoltedLapCase
+    noise : Noise
+    points : tuple of FivePoints
+    channels : ndarray, shape (n_freq, 30, 30)
+        Exact FRFs of the measured points, m/N.
+    number : int
+        Of the realisation.
+    """
 
     case: BoltedLapCase
     noise: Noise
@@ -259,12 +278,12 @@ class _Realisation(NamedTuple):
     number: int
 
 
-def _realisations(case: BoltedLapCase, noise: Noise, solid: SolidFrfs, count: int) -> list[_Realisation]:
-    return [_Realisation(case, noise, solid.points, solid.channels, i) for i in range(count)]
+def _realisations(case: BoltedLapCase, noise: Noise, solid: SolidFrfs, count: int) -> list[NoisyLap]:
+    return [NoisyLap(case, noise, solid.points, solid.channels, i) for i in range(count)]
 
 
-def _identify_noisy(task: _Realisation) -> list[Found]:
-    """Identify the joint from one realisation of the noise, by the estimators that the case asks for."""
+def identify_noisy(task: NoisyLap) -> list[Found]:
+    """Identify the joint from one realisation of the noise, by the estimators that the noise asks for."""
     noise = task.noise
     h = noise.pollute(task.channels, task.case.seed, task.number)
     found = []

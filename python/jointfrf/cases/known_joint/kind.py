@@ -7,6 +7,7 @@ from jointfrf.cases.known_joint.compute import KnownJointResult, compute
 from jointfrf.cases.known_joint.figures import known_joint_figures
 from jointfrf.cases.known_joint.keys import EXPECTED_KEYS, KNOWN_JOINT_KEYS
 from jointfrf.cases.known_joint.read import KnownJointCase, read_known_joint
+from jointfrf.cases.known_joint.studied import known_joint_studied
 from jointfrf.cases.known_joint.summary import known_joint_summary
 from jointfrf.cases.known_joint.tables import known_joint_numbers, known_joint_tables
 
@@ -20,6 +21,7 @@ KNOWN_JOINT: CaseKind[KnownJointCase, KnownJointResult] = CaseKind(
     figures=known_joint_figures,
     summary=known_joint_summary,
     numbers=known_joint_numbers,
+    studied=known_joint_studied,
     not_printed=("bands", "blocks", "regenerated"),
     keys=KNOWN_JOINT_KEYS,
     expected_keys=EXPECTED_KEYS,

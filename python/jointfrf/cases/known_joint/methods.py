@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import cast
 
 import numpy as np
@@ -11,7 +12,10 @@ from jointfrf.kernel.arguments import ComplexArray
 from jointfrf.kernel.status import OnSingular
 from jointfrf.substructuring.methods import STIFFNESS_METHODS, JointFrfs, StiffnessMethod, joint_stiffness
 
-__all__ = ["joint_lines", "measured", "noise_stream"]
+__all__ = ["SHORT_FORM", "joint_lines", "measured", "needed_frfs", "noise_stream"]
+
+#: Equal up to rounding, and without the model: (2.47) and its short form.
+SHORT_FORM = {"ismm": "inverse-substructuring"}
 
 _DECOUPLING = tuple(name for name, method in STIFFNESS_METHODS.items() if method.measured == "h_c")
 
@@ -36,6 +40,14 @@ def measured(exact: Exact, method: str) -> ComplexArray:
         return exact.interface(exact.h_c)
     points = method.removeprefix("decoupling-")
     return np.ascontiguousarray(exact.h_c[:, exact.where(points[0]), exact.where(points[1])])
+
+
+def needed_frfs(exact: Exact, method: str) -> Exact:
+    """Leave out the FRFs that a method does not take from a model: a task goes to another process."""
+    needed = STIFFNESS_METHODS[cast(StiffnessMethod, SHORT_FORM.get(method, method))].model
+    slim = exact if "alpha" in needed else replace(exact, h_initial=exact.h_initial[:0])
+    slim = replace(slim, h_c=exact.h_c[:0])
+    return slim if "h_a" in needed else replace(slim, h_a=exact.h_a[:0], h_b=exact.h_b[:0])
 
 
 def noise_stream(method: str) -> int:

@@ -19,7 +19,7 @@ from jointfrf.laws.law import JointLaw
 from jointfrf.laws.law_joint import LawJoint
 from jointfrf.laws.springs import SpringLaw
 
-__all__ = ["FittedDraw", "ModelledJointResult", "compute_modelled"]
+__all__ = ["FittedDraw", "ModelledJointResult", "compute_modelled", "fit_of_exact", "fitted_draw"]
 
 
 @dataclass(frozen=True)
@@ -78,14 +78,21 @@ def moving_stiffness(joint: LawJoint, freq_hz: FloatArray) -> ComplexArray:
 def compute_modelled(case: ModelledJointCase, n_realisations: int, workers: Workers) -> ModelledJointResult:
     """Simulate measurements and fit each."""
     exact = case.truth.receptance(case.freq_hz, case.responses, case.forces)
-    draws = tuple(workers.counted(workers.map(partial(_fitted, case, exact), range(n_realisations)), n_realisations))
+    draws = tuple(
+        workers.counted(workers.map(partial(fitted_draw, case, exact), range(n_realisations)), n_realisations)
+    )
     measured = pollute(exact, case.noise, seed=case.seed)
-    at_truth = replace(case.believed, joint=case.truth.joint)
-    bound = _fit(case, at_truth, exact, np.asarray((case.noise * abs(exact)) ** 2, float)).std_error
+    bound = fit_of_exact(case, exact).std_error
     constant = replace(case.believed, joint=_constant(case.believed.joint))
     return ModelledJointResult(
         case, draws, bound, _fit(case, case.believed, measured), measured, _fit(case, constant, measured)
     )
+
+
+def fit_of_exact(case: ModelledJointCase, exact: ComplexArray) -> ModelFit:
+    """Fit exact FRFs from the actual joint, with the noise known: standard errors are at the Cramer-Rao bound."""
+    at_truth = replace(case.believed, joint=case.truth.joint)
+    return _fit(case, at_truth, exact, np.asarray((case.noise * abs(exact)) ** 2, float))
 
 
 def _fit(case: ModelledJointCase, whole: Assembly, h: ComplexArray, noise: FloatArray | None = None) -> ModelFit:
@@ -94,7 +101,7 @@ def _fit(case: ModelledJointCase, whole: Assembly, h: ComplexArray, noise: Float
         return identify_model(case.freq_hz, h, whole, case.responses, case.forces, noise=noise)
 
 
-def _fitted(case: ModelledJointCase, exact: ComplexArray, number: int) -> FittedDraw:
+def fitted_draw(case: ModelledJointCase, exact: ComplexArray, number: int) -> FittedDraw:
     """Fit one realisation: that of seed + number."""
     fit = _fit(case, case.believed, pollute(exact, case.noise, seed=case.seed + number))
     stiffness = moving_stiffness(fit.joint, case.freq_hz)

@@ -7,6 +7,7 @@ from jointfrf.cases.modelled_joint.compute import ModelledJointResult, compute_m
 from jointfrf.cases.modelled_joint.figures import modelled_figures
 from jointfrf.cases.modelled_joint.keys import MODELLED_EXPECTED_KEYS, MODELLED_JOINT_KEYS
 from jointfrf.cases.modelled_joint.read import ModelledJointCase, read_modelled_joint
+from jointfrf.cases.modelled_joint.studied import modelled_joint_studied
 from jointfrf.cases.modelled_joint.tables import modelled_numbers, modelled_summary, modelled_tables
 
 __all__ = ["MODELLED_JOINT"]
@@ -19,6 +20,7 @@ MODELLED_JOINT: CaseKind[ModelledJointCase, ModelledJointResult] = CaseKind(
     figures=modelled_figures,
     summary=modelled_summary,
     numbers=modelled_numbers,
+    studied=modelled_joint_studied,
     keys=MODELLED_JOINT_KEYS,
     expected_keys=MODELLED_EXPECTED_KEYS,
 )

@@ -19,10 +19,7 @@ from jointfrf.errors import IllConditionedWarning
 from jointfrf.frf.bands import in_bands
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
-__all__ = ["SHORT_FORM", "DrawTask", "Realised", "Window", "find_window", "needed_frfs", "realise"]
-
-#: Equal up to rounding, and without the model: (2.47) and its short form.
-SHORT_FORM = {"ismm": "inverse-substructuring"}
+__all__ = ["DrawTask", "Realised", "Window", "find_window", "realise"]
 
 
 @dataclass(frozen=True)
@@ -79,12 +76,6 @@ class Realised:
 
     theta: dict[str, FloatArray]
     errors: dict[ExpectedErrors, FloatArray]
-
-
-def needed_frfs(exact: Exact, method: str) -> Exact:
-    """Leave out the FRFs that a method does not take from a model: a task goes to another process."""
-    slim = replace(exact, h_initial=exact.h_initial[:0], h_c=exact.h_c[:0])
-    return replace(slim, h_a=exact.h_a[:0], h_b=exact.h_b[:0]) if method in SHORT_FORM else slim
 
 
 def find_window(exact: Exact, known: ExpectedErrors, observed: Observed) -> Window:

@@ -11,16 +11,14 @@ import numpy as np
 from jointfrf.cases.definitions import Observed
 from jointfrf.cases.known_joint.exact import Exact, exact_frfs
 from jointfrf.cases.known_joint.expected import ExpectedErrors
-from jointfrf.cases.known_joint.methods import measured, noise_stream
+from jointfrf.cases.known_joint.methods import SHORT_FORM, measured, needed_frfs, noise_stream
 from jointfrf.cases.known_joint.read import KnownJointCase
 from jointfrf.cases.known_joint.readings.printed_values import ErrorQuantity, PrintedTable, printed_tables
 from jointfrf.cases.known_joint.readings.reading import Draw, NoiseScale, Reading, every_reading
 from jointfrf.cases.known_joint.readings.realise import (
-    SHORT_FORM,
     DrawTask,
     Realised,
     find_window,
-    needed_frfs,
     realise,
 )
 from jointfrf.cases.known_joint.readings.score import Score, score

@@ -1,0 +1,139 @@
+"""What a study asks of a kind of case: estimates of single realisations, whatever runs them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from jointfrf.cases.definitions import Noise
+from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.spelling import did_you_mean
+
+__all__ = [
+    "Estimates",
+    "Estimator",
+    "Pollution",
+    "RealisationSource",
+    "StudiedColumn",
+    "StudiedGroup",
+    "StudyChoice",
+    "chosen_noises",
+]
+
+
+class Estimates(NamedTuple):
+    """What realisations gave, a row each; NaN where one gave nothing.
+
+    Attributes
+    ----------
+    values : ndarray, shape (count, n_columns)
+        In the units of the columns.
+    low, high : ndarray, shape (count, n_columns)
+        Limits of the intervals of 95 %; NaN where there are none.
+    """
+
+    values: FloatArray
+    low: FloatArray
+    high: FloatArray
+
+    @classmethod
+    def without_intervals(cls, values: FloatArray) -> Estimates:
+        """Return values of an estimator that gives no intervals."""
+        missing = np.full(values.shape, np.nan)
+        return cls(values, missing, missing)
+
+
+#: Called with the number of the first realisation and how many. Realisation k is the same whatever is asked for with
+#: it; the object can be sent to another process.
+RealisationSource = Callable[[int, int], Estimates]
+
+#: An estimator of one's own: lines, Hz, FRFs at the joint DOFs j, then k, and names of the joint DOFs to stiffness of
+#: all DOFs, then damping.
+Estimator = Callable[[FloatArray, ComplexArray, tuple[str, ...]], FloatArray]
+
+
+@dataclass(frozen=True)
+class StudiedColumn:
+    """One parameter by one estimator.
+
+    Attributes
+    ----------
+    estimator, parameter, unit : str
+    actual : float
+        NaN where it is not known.
+    bound : float
+        Least standard deviation of an unbiased estimate (Cramer-Rao), NaN where it is not known.
+    """
+
+    estimator: str
+    parameter: str
+    unit: str
+    actual: float
+    bound: float
+
+
+@dataclass(frozen=True)
+class StudiedGroup:
+    """Estimates that come from the same FRFs by one method.
+
+    Attributes
+    ----------
+    noise : str
+        Name of the noise.
+    columns : tuple of StudiedColumn
+    source : callable
+        Gives the estimates of realisations, see `RealisationSource`.
+    side_by_side : int
+        Realisations that are best computed in one call.
+    """
+
+    noise: str
+    columns: tuple[StudiedColumn, ...]
+    source: RealisationSource
+    side_by_side: int = 1
+
+
+#: Noise of one's own: exact FRFs, seed and number of the realisation to FRFs with noise.
+Pollution = Callable[[ComplexArray, int, int], ComplexArray]
+
+
+@dataclass(frozen=True)
+class StudyChoice:
+    """What of a case is studied.
+
+    Attributes
+    ----------
+    noises : tuple of str
+        Names; all noises of the case if empty.
+    estimators : tuple of str
+        Methods of the kind; those that the case names for each noise if empty.
+    own_estimators : mapping of str to callable
+        See `Estimator`.
+    own_noises : mapping of str to callable
+        See `Pollution`; in the place of the noises of the case.
+    """
+
+    noises: tuple[str, ...] = ()
+    estimators: tuple[str, ...] = ()
+    own_estimators: Mapping[str, Estimator] = field(default_factory=dict)
+    own_noises: Mapping[str, Pollution] = field(default_factory=dict)
+
+
+def chosen_noises(noises: Sequence[Noise], choice: StudyChoice) -> list[Noise]:
+    """Return the noises of a case that a study takes.
+
+    Raises
+    ------
+    ValueError
+        The case has no noise of such a name.
+    """
+    names = [noise.name for noise in noises]
+    for name in choice.noises:
+        if name not in names:
+            raise ValueError(
+                f"the case has no noise {name!r}{did_you_mean(name, names) or ': it has ' + ', '.join(names)}"
+            )
+    return [noise for noise in noises if noise.name in choice.noises or not choice.noises]

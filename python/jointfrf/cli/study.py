@@ -1,0 +1,163 @@
+"""`jointfrf study`: realisations of a case over a design of factors; `jointfrf study merge`: parts put together."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, get_args
+
+from jointfrf.cases.catalogue import UnknownCaseError
+from jointfrf.cli.output import Output
+from jointfrf.cli.usage import UsageError, positive, progress
+from jointfrf.extras import check_extras, import_extra
+from jointfrf.parallel.cores import available_cores
+from jointfrf.parallel.pool import AnyExecutor
+from jointfrf.studies.design import Arrangement, StudyDesign, parse_factor
+from jointfrf.studies.result import StudyResult
+from jointfrf.studies.run import merge_studies, study
+
+__all__ = ["add_arguments", "run"]
+
+_EXECUTORS = ("processes", "threads", "loky", "mpi", "dask:ADDRESS")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Describe the arguments of the command."""
+    parser.description = (
+        "Estimate the joint of a case from many realisations of the noise, over a design of factors. What is finished "
+        "is kept in the folder: the same command goes on where it was stopped. `jointfrf study merge PART... --out "
+        "DIR` puts parts together."
+    )
+    parser.add_argument("words", nargs="+", metavar="CASE | merge PART...",
+                        help="name, number, or folder with a case.toml; or merge and folders of parts")  # fmt: skip
+    parser.add_argument("--realisations", type=_whole, metavar="N", help="instead of the number the case names")
+    parser.add_argument("--factor", action="append", default=[], metavar="NAME=V,V,...",
+                        help="vary noise, spacing, lines, stiffness, damping, or a key of case.toml such as "
+                        "frequency.last or joint.stiffness; a * before = multiplies; may be repeated")  # fmt: skip
+    parser.add_argument("--arrangement", choices=get_args(Arrangement), default="full",
+                        help="every combination of values, or one factor at a time (full)")  # fmt: skip
+    parser.add_argument("--estimator", action="append", default=[], metavar="WORD",
+                        help="a method instead of those that the case names; may be repeated")  # fmt: skip
+    parser.add_argument("--noise", action="append", default=[], metavar="NAME",
+                        help="a noise of the case, instead of all; may be repeated")  # fmt: skip
+    parser.add_argument("--first", type=_whole, metavar="N", help="compute realisations from this one on, a part only")
+    parser.add_argument("--count", type=positive, metavar="N", help="how many of them")
+    parser.add_argument("--jobs", type=positive, metavar="N", help="workers (all cores)")
+    parser.add_argument("--executor", type=_executor, default="processes", metavar="WORD",
+                        help=f"what the workers are: {', '.join(_EXECUTORS)} (processes)")  # fmt: skip
+    parser.add_argument("--out", type=Path, metavar="DIR", help="where results go (studies/NAME of the case)")
+    parser.add_argument("--values", type=_format, action="append", default=[], metavar="FORMAT",
+                        help="write single realisations, too: parquet or npz")  # fmt: skip
+
+
+def _whole(word: str) -> int:
+    if not word.isdecimal():
+        raise argparse.ArgumentTypeError(f"must be a whole number, at least 0, not {word!r}")
+    return int(word)
+
+
+def _executor(word: str) -> str:
+    if word not in _EXECUTORS[:-1] and not (word.startswith("dask:") and len(word) > len("dask:")):
+        raise argparse.ArgumentTypeError(f"must be one of {', '.join(_EXECUTORS)}, not {word!r}")
+    return word
+
+
+def _format(word: str) -> str:
+    if word not in ("parquet", "npz"):
+        raise argparse.ArgumentTypeError(f"must be parquet or npz, not {word!r}")
+    return word
+
+
+def run(options: argparse.Namespace) -> int:
+    """Carry out the command."""
+    check_extras("matplotlib", "jinja2", *(["pyarrow"] if "parquet" in options.values else []))
+    out = Output(options)
+    is_part = options.first is not None or options.count is not None
+    found = _merged(options) if options.words[0] == "merge" else _studied(options, is_part)
+    if is_part:
+        own = _range(options)
+        out.say(
+            f"{found.folder}: realisations {own.start} to {own.stop - 1} (jointfrf study merge puts parts together)"
+        )
+        out.give({"folder": str(found.folder), "missing": found.missing})
+        return 0
+    page = found.report()
+    files = {kind: getattr(found, f"save_{kind}")(found.folder / f"realisations.{kind}") for kind in options.values}
+    out.say(found, "", *(f"{kind}: {path}" for kind, path in files.items()), f"report: {page}")
+    written = {kind: str(path) for kind, path in files.items()}
+    out.give({**found.to_dict(), "folder": str(found.folder), "report": str(page), **written})
+    return 0
+
+
+def _merged(options: argparse.Namespace) -> StudyResult:
+    if len(options.words) < 2 or options.out is None:
+        raise UsageError("merge needs the folders of parts, and --out DIR")
+    return merge_studies(options.words[1:], options.out)
+
+
+def _studied(options: argparse.Namespace, is_part: bool) -> StudyResult:
+    if len(options.words) > 1:
+        raise UsageError(f"one case at a time, not {' and '.join(options.words)}")
+    (case,) = options.words
+    factors = _factors(options.factor)
+    try:
+        design = StudyDesign(factors, options.arrangement, options.noise, options.estimator)
+        name = Path(case).resolve().name if (Path(case) / "case.toml").is_file() else case
+        with _started(options.executor, options.jobs) as executor:
+            return study(
+                case,
+                options.out or Path("studies") / name,
+                options.realisations,
+                design=design,
+                part=_range(options) if is_part else None,
+                executor=executor,
+                jobs=options.jobs,
+                progress=progress(name),
+            )
+    except UnknownCaseError as error:
+        raise UsageError(error) from error
+
+
+def _factors(words: list[str]) -> dict[str, Any]:
+    factors = {}
+    for word in words:
+        try:
+            name, values = parse_factor(word)
+        except ValueError as error:
+            raise UsageError(f"--factor: {error}") from error
+        if name in factors:
+            raise UsageError(f"--factor: {name} is given twice")
+        factors[name] = values
+    return factors
+
+
+def _range(options: argparse.Namespace) -> range:
+    if options.first is None or options.count is None:
+        raise UsageError("--first and --count belong together")
+    return range(options.first, options.first + options.count)
+
+
+@contextmanager
+def _started(word: str, jobs: int | None) -> Iterator[AnyExecutor | None]:
+    """Start the executor that a word names."""
+    if word == "threads":
+        from concurrent.futures import ThreadPoolExecutor
+
+        with ThreadPoolExecutor(jobs or available_cores()) as pool:
+            yield pool
+    elif word == "loky":
+        loky = import_extra("loky")
+        yield lambda: loky.get_reusable_executor(max_workers=jobs or available_cores())
+    elif word == "mpi":
+        futures, rank = import_extra("mpi4py.futures"), import_extra("mpi4py.MPI").COMM_WORLD.Get_rank()
+        if rank:
+            raise UsageError("--executor mpi: start it as mpiexec -n N python -m mpi4py.futures -m jointfrf study ...")
+        with futures.MPIPoolExecutor() as pool:
+            yield pool
+    elif word.startswith("dask:"):
+        with import_extra("distributed").Client(word.removeprefix("dask:"), set_as_default=False) as client:
+            yield client.get_executor()
+    else:
+        yield None

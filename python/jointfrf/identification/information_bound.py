@@ -1,0 +1,73 @@
+"""The Cramer-Rao bound of a joint without cross terms between structures of which nothing is known."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.kernel.linear_algebra import invert
+
+__all__ = ["least_std_errors"]
+
+
+def least_std_errors(freq_hz: FloatArray, gamma: ComplexArray, variance: FloatArray) -> FloatArray:
+    """Least standard deviations of unbiased estimates of stiffness and viscous damping.
+
+    Parameters
+    ----------
+    freq_hz : ndarray, shape (n_freq,)
+        Hz.
+    gamma : ndarray, shape (n_freq, 2 n, 2 n)
+        Exact receptance of the assembly at joint DOFs j, then k, m/N; symmetric.
+    variance : ndarray, shape (n_freq, 2 n, 2 n)
+        E|e|^2 of each entry, (m/N)^2: independent, circular and normal, above 0.
+
+    Returns
+    -------
+    ndarray, shape (2 n,)
+        Of the stiffness of all DOFs, then of damping.
+
+    Notes
+    -----
+    Unknown on each line are the symmetric dynamic stiffnesses of both sides, Z_A and Z_B; with
+    gamma^-1 = [[Z_A + K*, -K*], [-K*, Z_B + K*]] all derivatives are -gamma dZ gamma. gamma is analytic in the unknowns
+    of a line: they take a complex subspace out of what the line says of the parameters.
+    """
+    n = gamma.shape[1] // 2
+    weight = 1 / np.sqrt(variance)
+    joint, sides = _units(n)
+    omega = 2 * np.pi * freq_hz[:, None]
+    slopes = _weighted(gamma, joint, weight)
+    free = np.linalg.qr(_weighted(gamma, sides, weight))[0]
+    left = slopes - free @ (free.conj().swapaxes(1, 2) @ slopes)
+    products = left.conj().swapaxes(1, 2) @ left
+    factors = np.concatenate([np.ones((freq_hz.size, n)), np.broadcast_to(1j * omega, (freq_hz.size, n))], axis=1)
+    each = np.tile(products, (1, 2, 2)) * factors.conj()[:, :, None] * factors[:, None, :]
+    information = 2 * each.real.sum(axis=0)
+    # Stiffness and damping differ by many orders of magnitude.
+    size = 1 / np.sqrt(np.diagonal(information))
+    scaled = information * np.outer(size, size)
+    errors: FloatArray = size * np.sqrt(np.diagonal(invert(scaled[None])[0].real))
+    return errors
+
+
+def _units(n: int) -> tuple[FloatArray, FloatArray]:
+    """Return derivatives of the dynamic stiffness by K* of each DOF, and by entries of Z_A and Z_B."""
+    joint = np.zeros((n, 2 * n, 2 * n))
+    for d in range(n):
+        joint[d][np.ix_([d, n + d], [d, n + d])] = [[1, -1], [-1, 1]]
+    sides = []
+    for start in (0, n):
+        for a, b in zip(*np.triu_indices(n), strict=True):
+            unit = np.zeros((2 * n, 2 * n))
+            unit[start + a, start + b] = unit[start + b, start + a] = 1
+            sides.append(unit)
+    return joint, np.array(sides)
+
+
+def _weighted(gamma: ComplexArray, units: FloatArray, weight: FloatArray) -> ComplexArray:
+    """Return derivatives of gamma over the standard deviation of its entries, shape (n_freq, 4 n^2, n_units)."""
+    moved = gamma[:, None] @ units @ gamma[:, None] * weight[:, None]
+    found = moved.reshape(*moved.shape[:2], -1).swapaxes(1, 2)
+    scaled: ComplexArray = found
+    return scaled

@@ -1,0 +1,1 @@
+"""Work shared among threads, processes and machines, by any executor of `concurrent.futures`."""

@@ -1,0 +1,224 @@
+"""Arrays over frequency lines that tasks on other processes and machines read and write a piece at a time."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from jointfrf.extras import import_extra
+
+__all__ = ["Lines", "lines_of"]
+
+
+@dataclass(frozen=True)
+class Lines(ABC):
+    """An array whose first axis is that of the lines, as a task is told of it.
+
+    Attributes
+    ----------
+    shape : tuple of int
+    """
+
+    shape: tuple[int, ...]
+    #: Whether tasks write their results themselves; otherwise they are sent back.
+    is_written_by_tasks: ClassVar[bool] = False
+
+    @property
+    def step(self) -> int:
+        """Lines that must be written together."""
+        return 1
+
+    @property
+    def line_bytes(self) -> int:
+        """Bytes of a line as complex numbers."""
+        return 16 * math.prod(self.shape[1:])
+
+    @property
+    def place(self) -> Path | None:
+        """The file or folder that holds it; None in memory."""
+        return None
+
+    @abstractmethod
+    def of(self, lines: slice) -> Lines:
+        """Return what a task that needs these lines is told."""
+
+    @abstractmethod
+    def read(self, lines: slice) -> NDArray[Any]:
+        """Return these lines, in the task."""
+
+    def write(self, lines: slice, values: NDArray[Any]) -> None:
+        """Write these lines."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True)
+class MemoryLines(Lines):
+    """An array in memory: the lines of a task are sent to it, and its results back."""
+
+    array: Any
+    first: int = 0
+
+    def of(self, lines: slice) -> Lines:
+        """Return the lines themselves."""
+        return MemoryLines(self.shape, np.asarray(self.array[lines]), lines.start)
+
+    def read(self, lines: slice) -> NDArray[Any]:
+        """Return lines that the task was sent."""
+        found: NDArray[Any] = self.array[lines.start - self.first : lines.stop - self.first]
+        return found
+
+    def write(self, lines: slice, values: NDArray[Any]) -> None:
+        """Write lines, where the array is."""
+        self.array[lines] = values
+
+
+@dataclass(frozen=True)
+class MappedLines(Lines):
+    """An array in a file, `numpy.memmap`: each task maps the lines it needs."""
+
+    path: Path
+    dtype: str
+    offset: int
+    is_written_by_tasks: ClassVar[bool] = True
+
+    @property
+    def place(self) -> Path:
+        """The file."""
+        return self.path
+
+    def of(self, lines: slice) -> Lines:
+        """Return the place of the file."""
+        return self
+
+    def _start(self, lines: slice) -> int:
+        """Return where lines begin in the file, bytes."""
+        return self.offset + int(lines.start) * np.dtype(self.dtype).itemsize * math.prod(self.shape[1:])
+
+    def read(self, lines: slice) -> NDArray[Any]:
+        """Map lines."""
+        shape = (lines.stop - lines.start, *self.shape[1:])
+        return np.memmap(self.path, self.dtype, "r", self._start(lines), shape)
+
+    def write(self, lines: slice, values: NDArray[Any]) -> None:
+        """Write lines into the file and close it: then other machines see them, unlike what is written into a map."""
+        with self.path.open("r+b") as file:
+            file.seek(self._start(lines))
+            np.ascontiguousarray(values, self.dtype).tofile(file)
+
+
+@dataclass(frozen=True)
+class ZarrLines(Lines):
+    """A Zarr array in a folder: each task opens it."""
+
+    root: Path
+    path: str
+    together: int
+    is_written_by_tasks: ClassVar[bool] = True
+
+    @property
+    def step(self) -> int:
+        """Lines of a chunk, or of a shard: two tasks must not write the same file."""
+        return self.together
+
+    @property
+    def place(self) -> Path:
+        """The folder of the array."""
+        return self.root / self.path
+
+    def of(self, lines: slice) -> Lines:
+        """Return the place of the folder."""
+        return self
+
+    def _open(self, mode: str) -> Any:
+        return import_extra("zarr").open_array(str(self.root), path=self.path, mode=mode)
+
+    def read(self, lines: slice) -> NDArray[Any]:
+        """Read lines."""
+        return np.asarray(self._open("r")[lines])
+
+    def write(self, lines: slice, values: NDArray[Any]) -> None:
+        """Write lines."""
+        self._open("r+")[lines] = values
+
+
+@dataclass(frozen=True)
+class Hdf5Lines(Lines):
+    """A dataset of an HDF5 file that is only read: each task opens the file."""
+
+    path: Path
+    dataset: str
+
+    @property
+    def place(self) -> Path:
+        """The file."""
+        return self.path
+
+    def of(self, lines: slice) -> Lines:
+        """Return the place of the file."""
+        return self
+
+    def read(self, lines: slice) -> NDArray[Any]:
+        """Read lines."""
+        with import_extra("h5py").File(self.path, "r") as file:
+            return np.asarray(file[self.dataset][lines])
+
+
+def lines_of(name: str, array: ArrayLike, *, is_result: bool = False) -> Lines:
+    """Find out what an array is, and how tasks come to its lines.
+
+    Parameters
+    ----------
+    name : str
+        Of the argument, for messages.
+    array : array_like, numpy.memmap, zarr.Array or h5py.Dataset
+    is_result : bool
+        Whether results are written into it.
+
+    Raises
+    ------
+    TypeError
+        Results cannot be written into it.
+    ValueError
+        It has no axis of lines, or cannot be written.
+    """
+    package = type(array).__module__.partition(".")[0]
+    found = _zarr(array) if package == "zarr" else _hdf5(array, is_result) if package == "h5py" else _numpy(array)
+    if is_result and isinstance(found, MemoryLines) and not hasattr(array, "__setitem__"):
+        raise TypeError(f"{name} must be an array that results are written into, not {type(array).__name__}")
+    if isinstance(array, np.ndarray) and is_result and not array.flags.writeable:
+        raise ValueError(f"{name} cannot be written: it is open for reading only")
+    if not found.shape:
+        raise ValueError(f"{name} must have an axis of lines, not the shape ()")
+    return found
+
+
+def _numpy(array: ArrayLike) -> Lines:
+    if isinstance(array, np.memmap) and array.filename is not None and array.flags.c_contiguous and array.mode != "c":
+        # A view of the mapped array lies further on in the file.
+        root: Any = array
+        while isinstance(root.base, np.ndarray):
+            root = root.base
+        offset = int(root.offset) + array.ctypes.data - root.ctypes.data
+        return MappedLines(array.shape, Path(array.filename).resolve(), array.dtype.str, offset)
+    values = np.asarray(array)
+    return MemoryLines(values.shape, values)
+
+
+def _zarr(array: Any) -> Lines:
+    root = getattr(array.store, "root", None)
+    if root is None or not Path(root).is_dir():
+        return MemoryLines(array.shape, array)  # in memory, or on the network: this process reads and writes it
+    together = int((getattr(array, "shards", None) or array.chunks)[0])
+    return ZarrLines(tuple(array.shape), Path(root).resolve(), str(array.path), together)
+
+
+def _hdf5(array: Any, is_result: bool) -> Lines:
+    if is_result or array.file.mode != "r":
+        return MemoryLines(array.shape, array)  # HDF5 files have one writer and, with it, no readers
+    return Hdf5Lines(tuple(array.shape), Path(array.file.filename).resolve(), str(array.name))

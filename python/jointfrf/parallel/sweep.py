@@ -1,0 +1,278 @@
+"""The lines of one large sweep, shared among the workers of an executor; results are written in their place."""
+
+from __future__ import annotations
+
+import tempfile
+import warnings
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import partial
+from statistics import median
+from time import perf_counter
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from jointfrf.errors import IllConditionedWarning, SingularLineError
+from jointfrf.parallel.line_arrays import Lines, lines_of
+from jointfrf.parallel.one_thread import one_thread
+from jointfrf.parallel.pool import AnyExecutor, Pool, opened_pool
+from jointfrf.parallel.sweep_plan import SweepCost, SweepPlan, planned_sweep
+
+__all__ = ["plan_sweep", "sweep"]
+
+#: Lines on which the cost of a line is measured, few and many: the difference is that of the lines.
+_SAMPLES = (512, 8192)
+#: Tasks that do nothing, for each worker, and places where lines are measured.
+_EMPTY, _REPEATED = 4, 3
+#: An operation, line by line: takes arrays by name, returns the result.
+LineFunction = Callable[..., NDArray[Any]]
+
+
+@dataclass(frozen=True)
+class _SweepTask:
+    """Some lines: where they are read, and where the result goes, None where it is sent back."""
+
+    operation: LineFunction
+    inputs: Mapping[str, Lines]
+    result: Lines | None
+    lines: slice
+
+
+class _Done(NamedTuple):
+    """What a task gave: its result where it is not written yet, a warning, and seconds."""
+
+    values: NDArray[Any] | None
+    warning: str
+    seconds: float
+
+
+def _do(task: _SweepTask) -> _Done:
+    """Do a task on one thread."""
+    with one_thread(), warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", IllConditionedWarning)
+        start = perf_counter()
+        arrays = {name: own.read(task.lines) for name, own in task.inputs.items()}
+        try:
+            values = np.asarray(task.operation(**arrays))
+        except SingularLineError as error:
+            lines = error.lines + task.lines.start
+            raise SingularLineError(f"{error} counted from line {task.lines.start}", lines, error.freq_hz) from error
+        except (ValueError, ArithmeticError) as error:
+            raise type(error)(f"lines {task.lines.start} to {task.lines.stop - 1}: {error}") from error
+        if task.result is not None:
+            task.result.write(task.lines, values)
+        seconds = perf_counter() - start
+    told = [str(one.message) for one in caught if issubclass(one.category, IllConditionedWarning)]
+    return _Done(None if task.result is not None else values, told[0] if told else "", seconds)
+
+
+def _nothing(_: int) -> None:
+    pass
+
+
+@dataclass(frozen=True)
+class _Sweep:
+    """What is computed, its arrays checked."""
+
+    operation: LineFunction
+    inputs: dict[str, Lines]
+    out: Lines
+
+    @property
+    def name(self) -> str:
+        whole = self.operation.func if isinstance(self.operation, partial) else self.operation
+        return str(getattr(whole, "__name__", type(whole).__name__))
+
+    @property
+    def n_lines(self) -> int:
+        return self.out.shape[0]
+
+    def task(self, lines: slice, *, is_written: bool = True) -> _SweepTask:
+        """Return the task of some lines."""
+        result = self.out if is_written and self.out.is_written_by_tasks else None
+        return _SweepTask(self.operation, {name: own.of(lines) for name, own in self.inputs.items()}, result, lines)
+
+
+def _checked(operation: LineFunction, arrays: Mapping[str, ArrayLike], out: Any) -> _Sweep:
+    if not callable(operation):
+        raise TypeError(f"operation must be a function such as jointfrf.invert, not {type(operation).__name__}")
+    inputs = {name: lines_of(name, array) for name, array in arrays.items()}
+    result = lines_of("out", out, is_result=True)
+    for name, own in inputs.items():
+        if own.shape[0] != result.shape[0]:
+            raise ValueError(f"{name} has {own.shape[0]} lines and out {result.shape[0]}")
+        same = own.place is not None and own.place == result.place
+        if same or (isinstance(arrays[name], np.ndarray) and isinstance(out, np.ndarray)
+                    and np.may_share_memory(arrays[name], out)):  # fmt: skip
+            raise ValueError(f"out must not lie where {name} lies: a task that is done again would read its own result")
+    if not inputs or not result.shape[0]:
+        raise ValueError("arrays must hold at least one array, with at least one line")
+    return _Sweep(operation, inputs, result)
+
+
+def sweep(
+    operation: LineFunction,
+    arrays: Mapping[str, ArrayLike],
+    out: Any,
+    *,
+    executor: AnyExecutor | None = None,
+    jobs: int | None = None,
+    plan: SweepPlan | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> SweepPlan:
+    """Compute the lines of a sweep larger than memory, or than one machine, in chunks.
+
+    Parameters
+    ----------
+    operation : callable
+        Computes each line by itself, such as `invert`, `inverse_substructuring`, or `couple` with what is the same for
+        all lines: ``functools.partial(jf.couple, dofs_a=[0], dofs_b=[0])``. Takes the arrays by name.
+    arrays : mapping of str to array_like
+        Name of the argument to array, n_lines along its first axis: `numpy.memmap` and Zarr arrays of a folder that all
+        workers see, HDF5 datasets of a file open for reading, each read where it is needed; others are sent.
+    out : ndarray, numpy.memmap, zarr.Array or h5py.Dataset
+        Where results go, n_lines along its first axis. Workers write a memory map and a Zarr array of a folder
+        themselves; into others this process writes what they send back.
+    executor, jobs
+        As in `study`.
+    plan : SweepPlan, optional
+        What `plan_sweep` gave; measured first by default.
+    progress : callable, optional
+        Called with the number of lines done and in all.
+
+    Returns
+    -------
+    SweepPlan
+        By which it was computed.
+
+    Raises
+    ------
+    SingularLineError
+        A line is singular; `lines` counts from the first line of the sweep. Other chunks may have been written.
+    ValueError
+        Wrong shapes; `out` where an input lies; what the operation raises, with the lines of the chunk.
+    BrokenPoolError
+        As in `study`.
+
+    Warns
+    -----
+    IllConditionedWarning
+        Once, for the first chunk with such lines.
+
+    Notes
+    -----
+    Results are bit-identical on any number of workers, and to one call with all lines on the same engine: chunks are
+    multiples of 512 lines. Each task computes on one thread.
+
+    Examples
+    --------
+    >>> import numpy as np, jointfrf as jf
+    >>> a = np.random.default_rng(1).standard_normal((5000, 2, 2)) + 3 * np.eye(2)
+    >>> found = np.empty(a.shape, complex)
+    >>> plan = jf.sweep(jf.invert, {"a": a}, found, jobs=1)
+    >>> bool((found == jf.invert(a)).all())
+    True
+    """
+    whole = _checked(operation, arrays, out)
+    with opened_pool(executor, jobs) as pool:
+        used = plan or _measured(whole, pool)
+        if used.n_lines != whole.n_lines:
+            raise ValueError(f"plan is of {used.n_lines} lines, not of {whole.n_lines}")
+        told, done = [], 0
+        for task, result in pool.completed(_do, _tasks(whole, used)):
+            if result.values is not None:
+                whole.out.write(task.lines, result.values)
+            if result.warning:
+                told.append((task.lines.start, result.warning))
+            done += task.lines.stop - task.lines.start
+            if progress is not None:
+                progress(done, whole.n_lines)
+    if told:
+        first, text = min(told)
+        more = f"; so are lines of {len(told) - 1} other chunks" if len(told) > 1 else ""
+        warnings.warn(f"{text}, counted from line {first}{more}", IllConditionedWarning, stacklevel=2)
+    return used
+
+
+def plan_sweep(
+    operation: LineFunction,
+    arrays: Mapping[str, ArrayLike],
+    out: Any,
+    *,
+    executor: AnyExecutor | None = None,
+    jobs: int | None = None,
+) -> SweepPlan:
+    """Measure what a sweep costs on a few of its lines, and plan it; `out` is not touched.
+
+    Parameters
+    ----------
+    operation, arrays, out, executor, jobs
+        As in `sweep`.
+
+    Returns
+    -------
+    SweepPlan
+        Printed, it says how long the sweep will take, in how many tasks of how many lines.
+
+    Raises
+    ------
+    SingularLineError, ValueError
+        As in `sweep`, in the lines that are measured.
+
+    Examples
+    --------
+    >>> import numpy as np, jointfrf as jf
+    >>> a = np.random.default_rng(1).standard_normal((5000, 2, 2)) + 3 * np.eye(2)
+    >>> plan = jf.plan_sweep(jf.invert, {"a": a}, np.empty(a.shape, complex), jobs=1)
+    >>> plan.n_lines, plan.chunk_lines % 512, plan.seconds < 10
+    (5000, 0, True)
+    """
+    whole = _checked(operation, arrays, out)
+    with opened_pool(executor, jobs) as pool:
+        return _measured(whole, pool)
+
+
+def _tasks(whole: _Sweep, plan: SweepPlan) -> Iterator[_SweepTask]:
+    return (whole.task(lines) for lines in plan.chunks())
+
+
+def _measured(whole: _Sweep, pool: Pool[Any]) -> SweepPlan:
+    """Measure the cost of lines and of tasks, and plan."""
+    empty = list(pool.completed(_nothing, iter(range(pool.workers))))  # starts the workers
+    start, number = perf_counter(), _EMPTY * pool.workers
+    empty = list(pool.completed(_nothing, iter(range(number))))
+    task = (perf_counter() - start) / len(empty) * pool.workers
+    seconds = []
+    few, many = (min(sample, whole.n_lines) for sample in _SAMPLES)
+    values = np.empty(0)
+    for lines in (few, many):
+        # Each time at another place, where the lines have not been read before.
+        places = [(whole.n_lines - lines) * place // _REPEATED for place in range(_REPEATED)]
+        tried = [_one(pool, whole.task(slice(at, at + lines), is_written=False)) for at in places]
+        seconds.append(median(one.seconds for one in tried))
+        values = tried[-1].values if tried[-1].values is not None else values
+    if values.shape != (many, *whole.out.shape[1:]):
+        raise ValueError(f"out must have the shape {(whole.n_lines, *values.shape[1:])}, not {whole.out.shape}")
+    rate = (seconds[1] - seconds[0]) / (many - few) if many > few else seconds[1] / many
+    line = rate if rate > 0 else seconds[1] / many
+    shapes = {name: own.shape for name, own in whole.inputs.items()} | {"out": whole.out.shape}
+    cost = SweepCost(line, _write_seconds(whole.out, values) / many, task)
+    return planned_sweep(whole.name, shapes, whole.n_lines, pool.workers, whole.out.step, cost)
+
+
+def _one(pool: Pool[Any], task: _SweepTask) -> _Done:
+    ((_, done),) = pool.completed(_do, iter([task]))
+    return done
+
+
+def _write_seconds(out: Lines, values: NDArray[Any]) -> float:
+    """Return what writing takes: to a file beside that of the results, or in memory."""
+    start = perf_counter()
+    if out.place is None:
+        values.copy()
+    else:
+        with tempfile.TemporaryFile(dir=out.place.parent) as file:
+            file.write(values.tobytes())
+    return perf_counter() - start

@@ -1,0 +1,208 @@
+"""Running a study, going on with one, and putting parts of one together."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from operator import index
+from pathlib import Path
+
+from jointfrf.cases.catalogue import find_case
+from jointfrf.cases.studied import StudiedGroup
+from jointfrf.errors import FileContentError
+from jointfrf.parallel.pool import AnyExecutor, Pool, opened_pool
+from jointfrf.studies.design import StudyDesign, in_words
+from jointfrf.studies.result import StudyResult
+from jointfrf.studies.schedule import Schedule, compute_chunk
+from jointfrf.studies.store import GroupRecord, Span, StudyRecord, StudyStore
+
+__all__ = ["merge_studies", "study"]
+
+#: Realisations are counted in 31 bits.
+_MOST = 2**31 - 1
+
+
+def study(
+    case: str | Path,
+    out: str | Path,
+    realisations: int | None = None,
+    *,
+    design: StudyDesign | None = None,
+    part: range | None = None,
+    executor: AnyExecutor | None = None,
+    jobs: int | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> StudyResult:
+    """Estimate the joint of a case from many realisations of the noise, over a design of factors.
+
+    Parameters
+    ----------
+    case : str or Path
+        Name or number of a case that comes with jointfrf, or a folder with a `case.toml`, of any kind.
+    out : str or Path
+        Folder that holds what has been found: what is there already is not computed again. It is made where it is not.
+    realisations : int, optional
+        Of each noise at each point of the design; the number in the case by default.
+    design : StudyDesign, optional
+        Factors, noises and estimators; by default the case as it is.
+    part : range, optional
+        Compute these realisations only, for a job of many: ``range(200, 300)``. See `merge_studies`.
+    executor : Executor or callable, optional
+        Any executor of `concurrent.futures`, of which only `submit` is used: threads, loky, Dask
+        (``client.get_executor()``), MPI (``mpi4py.futures.MPIPoolExecutor()``); or what makes one, such as
+        ``loky.get_reusable_executor``, which is called again where the executor breaks. By default processes of this
+        machine, of which one that dies costs its chunk only.
+    jobs : int, optional
+        Workers: of the default executor (all cores), otherwise what the executor says of itself. With 1 everything is
+        computed in this thread.
+    progress : callable, optional
+        Called with the work done and in all, in milliseconds of one worker, after each chunk.
+
+    Returns
+    -------
+    StudyResult
+
+    Raises
+    ------
+    FileContentError
+        The case or a point of the design is wrong; the folder holds another study, or a damaged file.
+    UnknownCaseError
+        There is no such case.
+    BrokenPoolError
+        The executor has lost its workers, and there is nothing that makes another one. What is finished is kept.
+    ValueError
+        The case knows no such noise or estimator; `part` does not fit.
+
+    Notes
+    -----
+    Realisation k has the same numbers, bit for bit, whatever the number of workers, the chunks and the parts, on
+    machines with the same processor and engine (`set_engine`); others differ by rounding. All points of the design have
+    the same noise numbers. Each task computes on one thread. Memory does not depend on `realisations`.
+
+    Whatever ends the process, what chunks have given is kept: the same call goes on. A chunk takes about 2 s.
+
+    Scripts that start processes need ``if __name__ == "__main__":`` around what they do.
+
+    Examples
+    --------
+    >>> import jointfrf as jf, tempfile
+    >>> design = jf.StudyDesign({"noise": [0.02, 0.05]}, estimators=["inverse-substructuring"])
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     found = jf.study("3.1", folder, 50, design=design, jobs=1)
+    ...     rows = found.summary
+    >>> [(row.point["noise"], row.parameter, abs(row.bias / row.actual) < 0.05) for row in rows][::2]
+    [(0.02, 'k_x', True), (0.05, 'k_x', True)]
+    """
+    folder, plan = find_case(str(case)).resolve(), design or StudyDesign()
+    store, identity = StudyStore(Path(out)), plan.identity(folder)
+    held = store.check(identity) if store.exists else None
+    groups: list[StudiedGroup] = []
+    if held is None:
+        groups, record = _prepared(folder, plan, realisations)
+    else:
+        count = held.realisations if realisations is None else _count(realisations)
+        record = replace(held, realisations=max(count, held.realisations))
+    wanted = _wanted(part, record.realisations)
+    if held is None or held.realisations < record.realisations:
+        store.begin(record)
+    missing = store.missing(len(record.groups), wanted)
+    if any(missing):
+        groups = groups or _prepared(folder, plan, realisations)[0]
+        with opened_pool(executor, jobs) as pool:
+            _compute(store, Schedule(groups, missing, pool.workers), pool, progress or _silent)
+    return StudyResult(store.folder)
+
+
+def _compute(store: StudyStore, schedule: Schedule, pool: Pool, progress: Callable[[int, int], None]) -> None:
+    """Compute what is missing, and keep each chunk as it comes."""
+    for chunk, result in pool.completed(compute_chunk, iter(schedule)):
+        store.write(chunk.group, chunk.first, result.estimates)
+        schedule.learn(chunk, result.seconds)
+        progress(*schedule.done)
+
+
+def _prepared(folder: Path, design: StudyDesign, realisations: int | None) -> tuple[list[StudiedGroup], StudyRecord]:
+    """Return what is computed at all points, and what the study is."""
+    groups: list[StudiedGroup] = []
+    records: list[GroupRecord] = []
+    seen = None
+    for point, case, kind in design.cases(folder):
+        if kind.studied is None:
+            raise ValueError(f"cases of kind {kind.name} cannot be studied")
+        try:
+            own = kind.studied(case, design.choice)
+        except ValueError as error:
+            raise ValueError(f"{in_words(point)}: {error}" if point else str(error)) from error
+        groups += own
+        records += [GroupRecord(point, group.noise, group.columns) for group in own]
+        seen = case
+    assert seen is not None
+    count = seen.realisations if realisations is None else _count(realisations)
+    return groups, StudyRecord(folder.name, seen.title, seen.seed, count, design.identity(folder), tuple(records))
+
+
+def _count(realisations: int) -> int:
+    if not 1 <= index(realisations) <= _MOST:
+        raise ValueError(f"realisations must be from 1 to {_MOST}, not {realisations}")
+    return index(realisations)
+
+
+def _wanted(part: range | None, realisations: int) -> Span:
+    if part is None:
+        return Span(0, realisations)
+    if part.step != 1 or not len(part) or part.start < 0 or part.stop > realisations:
+        raise ValueError(
+            f"a part must be realisations in a row, at least one, from 0 to {realisations - 1}, not {part.start} to "
+            f"{part.stop - 1}"
+        )
+    return Span(part.start, len(part))
+
+
+def merge_studies(parts: Sequence[str | Path], out: str | Path) -> StudyResult:
+    """Put parts of one study, computed into different folders, together.
+
+    Parameters
+    ----------
+    parts : sequence of str or Path
+        Folders of the parts; they stay as they are.
+    out : str or Path
+        Folder of the whole; it may hold a part already.
+
+    Returns
+    -------
+    StudyResult
+        Its `missing` says which realisations are in no part; `study` into the same folder computes them.
+
+    Raises
+    ------
+    FileContentError
+        A folder holds no study, or parts of different studies.
+    ValueError
+        No part was named.
+
+    Examples
+    --------
+    >>> import jointfrf as jf, tempfile
+    >>> from pathlib import Path
+    >>> with tempfile.TemporaryDirectory() as at:
+    ...     parts = [Path(at) / "a", Path(at) / "b"]
+    ...     for folder, part in zip(parts, (range(0, 4), range(4, 8))):
+    ...         found = jf.study("3.1", folder, 8, part=part, jobs=1)
+    ...     jf.merge_studies(parts, Path(at) / "whole").missing
+    0
+    """
+    stores, target = [StudyStore(Path(part)) for part in parts], StudyStore(Path(out))
+    if not stores:
+        raise ValueError("no part of a study was named")
+    first = stores[0].read()
+    known = [target] if target.exists else []
+    records = [one.check(first.identity) for one in (*stores, *known)]
+    if any(len(one.groups) != len(first.groups) for one in records):
+        raise FileContentError(f"{out}: the parts were computed by different versions of jointfrf")
+    target.begin(replace(first, realisations=max(one.realisations for one in records)))
+    target.take(stores)
+    return StudyResult(target.folder)
+
+
+def _silent(done: int, total: int) -> None:
+    pass

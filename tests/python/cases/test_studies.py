@@ -1,0 +1,251 @@
+"""Studies on every executor: the same numbers, stopped and gone on with, of any kind of case and any estimator."""
+
+import json
+import os
+import re
+import shlex
+import shutil
+import signal
+import subprocess
+import sys
+import time
+import tomllib
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import jointfrf as jf
+from command import run_command
+from jointfrf.cases.catalogue import find_case, read_case
+from jointfrf.cases.known_joint.exact import exact_frfs
+from jointfrf.cases.known_joint.study import run_study
+from jointfrf.cli.parser import command_parser
+from studied_case import CASE, DESIGN, WORDS, N, broken_off, doubled, same
+
+
+@pytest.fixture(scope="module")
+def reference(tmp_path_factory) -> jf.StudyResult:
+    return jf.study(CASE, tmp_path_factory.mktemp("study"), N, design=DESIGN, jobs=1)
+
+
+def studied(folder, **how):
+    return jf.study(CASE, folder, N, design=DESIGN, **how)
+
+
+def test_estimates_are_those_of_the_case(reference):
+    """Those that `jointfrf run` computes from the same noise numbers, the fits begun elsewhere."""
+    case = read_case(find_case(CASE))
+    lines = np.round(0.01 + (9.99 / 99) * np.arange(100), 9)
+    case = replace(case, freq_hz=lines, noises=(replace(case.noises[0], methods=("ismm", "compliance")),))
+    for group, one in enumerate(run_study(case, exact_frfs(case), N)):
+        assert one.method == reference.groups[group].columns[0].estimator
+        _, values, low, high = reference.estimates(group)
+        near = 1e-11 * abs(values) if np.isnan(low).all() else 0.01 * (high - low)
+        assert (abs(values - one.theta) <= near).all()
+
+
+def test_threads_give_the_same_numbers(reference, tmp_path):
+    with ThreadPoolExecutor(2) as executor:
+        assert same(studied(tmp_path, executor=executor), reference)
+
+
+def test_processes_give_the_same_numbers_and_tell_progress(reference, tmp_path):
+    seen = []
+    assert same(studied(tmp_path, jobs=2, progress=lambda *done: seen.append(done)), reference)
+    assert all(done <= total for done, total in seen)
+    assert seen[-1][0] == seen[-1][1]
+
+
+@pytest.mark.long
+def test_loky_gives_the_same_numbers(reference, tmp_path):
+    loky = pytest.importorskip("loky")
+    made = lambda: loky.get_reusable_executor(max_workers=2)  # noqa: E731
+    assert same(studied(tmp_path, executor=made), reference)
+
+
+@pytest.mark.long
+@pytest.mark.filterwarnings("ignore::ResourceWarning")
+def test_a_dask_cluster_of_two_workers_gives_the_same_numbers(reference, tmp_path):
+    distributed = pytest.importorskip("distributed")
+    with (
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        assert same(studied(tmp_path, executor=client.get_executor()), reference)
+
+
+def mpiexec() -> str | None:
+    return shutil.which("mpiexec", path=os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]]))
+
+
+@pytest.mark.long
+@pytest.mark.skipif(mpiexec() is None, reason="mpiexec is not on PATH")
+def test_two_processes_of_mpi_give_the_same_numbers(reference, tmp_path):
+    pytest.importorskip("mpi4py")
+    words = [mpiexec(), "-n", "2", sys.executable, "-m", "mpi4py.futures", "-m", "jointfrf", "study", *WORDS]
+    words += ["--executor", "mpi", "--realisations", str(N), "--first", "0", "--count", str(N), "--out", str(tmp_path)]
+    allowed = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+    done = subprocess.run(
+        words, env={**os.environ, **allowed}, capture_output=True, text=True, timeout=120, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert same(jf.read_study(tmp_path), reference)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+def test_a_killed_study_goes_on_without_loss(tmp_path):
+    """Killed as soon as some chunks are there, and once more; what is there then is not computed again."""
+    design = jf.StudyDesign({"lines": [100]}, noises=["5 %"], estimators=["compliance"])
+    words = [sys.executable, "-m", "jointfrf", "study", "3.1", "--factor", "lines=100", "--noise", "5 %"]
+    words += ["--estimator", "compliance", "--realisations", "400", "--out", str(tmp_path / "a"), "--jobs", "1"]
+    kept: set[tuple[str, int]] = set()
+    for most in (1, 3):
+        with subprocess.Popen(words, stderr=subprocess.DEVNULL) as process:
+            for _ in range(3000):
+                if len(list((tmp_path / "a" / "chunks").glob("[0-9]*.npz"))) >= most:
+                    break
+                time.sleep(0.01)
+            process.send_signal(signal.SIGKILL)
+        there = {(path.name, path.stat().st_mtime_ns) for path in (tmp_path / "a" / "chunks").glob("[0-9]*.npz")}
+        assert kept <= there
+        assert len(there) >= most
+        kept = there
+    found = jf.read_study(tmp_path / "a")
+    assert 0 < found.missing < 400
+    numbers, values, low, high = found.estimates(0)
+    for first, count in ((0, 2), (int(numbers[-1]) - 1, 2)):
+        other = jf.study("3.1", tmp_path / f"b{first}", 400, design=design, part=range(first, first + count), jobs=1)
+        at = np.searchsorted(numbers, first)
+        for x, y in zip(other.estimates(0)[1:], (values, low, high), strict=True):
+            np.testing.assert_array_equal(x, y[at : at + count])
+    end = int(numbers[-1]) + 1
+    assert numbers.tolist() == list(range(end))
+    whole = jf.study("3.1", tmp_path / "a", 400, design=design, part=range(0, end + 3), jobs=1)
+    assert kept <= {(path.name, path.stat().st_mtime_ns) for path in (tmp_path / "a" / "chunks").iterdir()}
+    assert whole.estimates(0)[0].tolist() == list(range(end + 3))
+    np.testing.assert_array_equal(whole.estimates(0)[1][:end], values)
+
+
+def test_parts_are_merged(reference, tmp_path):
+    parts = [tmp_path / name for name in "abc"]
+    for folder, part in zip(parts, (range(0, 3), range(3, 8), range(6, N)), strict=True):
+        jf.study(CASE, folder, N, design=DESIGN, part=part, jobs=1)
+    merged = jf.merge_studies(parts[:2], tmp_path / "whole")
+    assert merged.missing == 2 * (N - 8)
+    merged = jf.merge_studies(parts[2:], tmp_path / "whole")
+    assert merged.missing == 0
+    assert same(merged, reference)
+    assert str(merged) == str(reference)
+
+
+def test_more_realisations_are_added_to_what_is_there(reference, tmp_path):
+    shutil.copytree(reference.folder, tmp_path / "a")
+    more = jf.study(CASE, tmp_path / "a", N + 3, design=DESIGN, jobs=1)
+    assert more.missing == 0
+    assert more.estimates(1)[0].tolist() == list(range(N + 3))
+    np.testing.assert_array_equal(more.estimates(1)[1][:N], reference.estimates(1)[1])
+    fewer = jf.study(CASE, tmp_path / "a", 2, design=DESIGN, jobs=1)
+    assert fewer.record.realisations == N + 3
+
+
+def test_another_study_does_not_go_into_the_same_folder(reference):
+    with pytest.raises(jf.FileContentError, match=r"holds another study, of 3\.1-discrete, whose factors differ"):
+        jf.study(CASE, reference.folder, N, design=replace(DESIGN, factors={"lines": [50]}))
+    with pytest.raises(jf.FileContentError, match="whose case differ"):
+        jf.study("3.2", reference.folder, N)
+
+
+def test_own_estimators_and_noises(tmp_path):
+    design = jf.StudyDesign(
+        {"lines": [50]}, estimators={"middle": broken_off, "inverse-substructuring": None},
+        own_noises={"factor": doubled},
+    )  # fmt: skip
+    found = jf.study(CASE, tmp_path / "a", 4, design=design, jobs=1)
+    assert [group.columns[0].estimator for group in found.groups] == ["inverse-substructuring", "middle"]
+    # every FRF times 1 + 0.31 + k: K* over the same
+    expected = 2000 / (1.31 + np.arange(4))
+    for group in (0, 1):
+        np.testing.assert_allclose(found.estimates(group)[1][:, 0], expected, rtol=1e-9)
+    assert all(np.isnan(row.bound) for row in found.summary)
+    with pytest.raises(ValueError, match="an estimator must return 2 numbers"):
+        jf.study(CASE, tmp_path / "b", 2, design=jf.StudyDesign(estimators={"bad": lambda *_: [1.0]}), jobs=1)
+
+
+def test_a_realisation_without_a_joint_counts_as_failed(tmp_path):
+    design = jf.StudyDesign(estimators=["compliance"], own_noises={"nothing": lambda h, seed, number: h * 0})
+    found = jf.study(CASE, tmp_path, 2, design=design, jobs=1)
+    assert {(row.count, row.failed) for row in found.summary} == {(2, 2)}
+    assert "failed" in str(found)
+
+
+def test_a_modelled_joint(tmp_path):
+    found = jf.study("rubber-mount", tmp_path, 1, design=jf.StudyDesign({"noise": [0.005]}), jobs=1)
+    rows = {row.parameter: row for row in found.summary}
+    assert {"k_y", "alpha_y", "A/youngs_modulus"} <= set(rows)
+    assert all(abs(row.bias) < 5 * row.bound for row in rows.values())
+    with pytest.raises(ValueError, match="has the estimator model-fit only"):
+        jf.study("rubber-mount", tmp_path / "b", 2, design=jf.StudyDesign(estimators=["ismm"]), jobs=1)
+
+
+def test_command_says_what_the_study_holds(reference, tmp_path):
+    out = tmp_path / "a"
+    words = ("study", *WORDS, "--realisations", N, "--out", out, "--jobs", 1, "--values", "npz")
+    done = run_command(*words, "--json")
+    assert (done.returncode, done.stderr) == (0, "")
+    told = json.loads(done.stdout)
+    assert told["summary"][0]["rmse"] == reference.summary[0].rmse
+    assert told["missing"] == 0
+    page = Path(told["report"]).read_text(encoding="utf-8")
+    assert "Cramér-Rao" in page
+    assert "data:image/svg" in page
+    with np.load(told["npz"]) as held:
+        np.testing.assert_array_equal(held["values_1"], reference.estimates(1)[1])
+    text = run_command(*words).stdout
+    assert text.startswith(f"Estimates over {N} realisations, seed 31\n")
+    merged = run_command("study", "merge", out, "--out", tmp_path / "b", "--quiet")
+    assert (merged.returncode, merged.stdout) == (0, "")
+
+
+@pytest.mark.parametrize(
+    ("words", "status", "message"),
+    [
+        (["3.1", "--factor", "noise"], 2, "--factor: a factor is NAME=VALUE,VALUE,..., not 'noise'"),
+        (["3.1", "--factor", "noise=1%"], 1, "level must be a number, at least 0, not '1%'"),
+        (["3.1", "--factor", "nois=0.1"], 1, "no key for the factor 'nois'; did you mean noise?"),
+        (["3.1", "--first", "3"], 2, "--first and --count belong together"),
+        (["3.1", "--realisations", "5", "--first", "3", "--count", "3"], 1, "from 0 to 4, not 3 to 5"),
+        (["3.1", "3.2"], 2, "one case at a time, not 3.1 and 3.2"),
+        (["3.11"], 2, "there is no case '3.11'"),
+        (["merge", "somewhere"], 2, "merge needs the folders of parts, and --out DIR"),
+        (["merge", "somewhere", "--out", "there"], 1, "somewhere holds no study"),
+        (["3.1", "--estimator", "compliances"], 1, "no estimator 'compliances'; did you mean compliance?"),
+        (["3.1", "--noise", "6 %"], 1, "the case has no noise '6 %'"),
+        (["3.1", "--executor", "dusk"], 2, "must be one of processes, threads, loky, mpi, dask:ADDRESS, not 'dusk'"),
+        (["3.1", "--values", "csv"], 2, "must be parquet or npz, not 'csv'"),
+    ],
+)
+def test_wrong_words_are_one_sentence(words, status, message, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    done = run_command("study", *words, *([] if "--out" in words else ["--out", "out"] * (words[0] != "merge")))
+    assert (done.returncode, done.stdout) == (status, "")
+    assert message in done.stderr
+    assert len([line for line in done.stderr.splitlines() if "error" in line]) == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_commands_of_the_page_are_understood():
+    page = (Path(__file__).resolve().parents[3] / "docs" / "studies.md").read_text(encoding="utf-8")
+    blocks = "".join(re.findall(r"```sh\n(.*?)```", page, re.DOTALL)).replace("\\\n", "")
+    words = [
+        shlex.split(re.sub(r"\$\(\(.*?\)\)|\$\w+", "4", line), comments=True)[1:]
+        for line in blocks.splitlines()
+        if line.startswith("jointfrf ")
+    ]
+    for command, *rest in words:
+        command_parser(command).parse_words(rest)  # ends the test where it is wrong
+    assert len(words) >= 5
+    extras = tomllib.loads((Path(__file__).resolve().parents[3] / "pyproject.toml").read_text(encoding="utf-8"))
+    assert {"loky", "dask", "mpi", "parquet", "zarr"} <= set(extras["project"]["optional-dependencies"])

@@ -1,0 +1,171 @@
+"""Sweeps in chunks over executors: the bits of one call, from files of several formats, planned by their cost."""
+
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from unittest.mock import patch
+
+import numpy as np
+import pytest
+
+import jointfrf as jf
+from jointfrf.parallel.sweep_plan import SweepCost, planned_sweep
+
+N = 2600
+COST = SweepCost(1e-6, 1e-7, 1e-3)
+
+
+@pytest.fixture
+def lines():
+    rng = np.random.default_rng(4)
+    return rng.standard_normal((N, 3, 3)) + 1j * rng.standard_normal((N, 3, 3)) + 4 * np.eye(3)
+
+
+def plan_of(chunk_lines, n_lines=N, workers=2):
+    return jf.SweepPlan("invert", {}, n_lines, chunk_lines, workers, 288, COST)
+
+
+def mapped(path, values):
+    found = np.memmap(path, values.dtype, "w+", shape=values.shape)
+    found[:] = values
+    found.flush()
+    return found
+
+
+@pytest.fixture
+def one_call(lines, threads):
+    return jf.invert(lines)
+
+
+def test_bits_are_those_of_one_call_whatever_the_chunks(lines, one_call, tmp_path):
+    source = mapped(tmp_path / "a", np.concatenate([lines[:5], lines]))[5:]
+    result = np.memmap(tmp_path / "out", complex, "w+", shape=lines.shape)
+    with ThreadPoolExecutor(3) as executor:
+        for how in ({"jobs": 1}, {"executor": executor}):
+            for chunk in (512, 1024, 4096):
+                result[:] = 0
+                jf.sweep(jf.invert, {"a": source}, result, plan=plan_of(chunk), **how)
+                assert (result == one_call).all()
+
+
+def test_processes_write_a_memory_map_in_its_place(lines, one_call, tmp_path):
+    source = mapped(tmp_path / "a", lines)
+    result = np.memmap(tmp_path / "out", complex, "w+", shape=lines.shape)
+    seen = []
+    used = jf.sweep(jf.invert, {"a": source}, result, jobs=2, progress=lambda *done: seen.append(done))
+    assert (np.fromfile(tmp_path / "out", complex).reshape(lines.shape) == one_call).all()
+    assert seen[-1] == (N, N)
+    assert used.workers == 2
+    assert used.n_tasks == len(seen)
+
+
+def test_several_arrays_and_what_is_the_same_for_all_lines(lines):
+    coupled = partial(jf.couple, dofs_a=[0], dofs_b=[1])
+    k = np.full((N, 1, 1), 5.0 + 1j)
+    result = np.empty((N, 6, 6), complex)
+    jf.sweep(coupled, {"h_a": lines, "h_b": 2 * lines, "k_joint": k}, result, plan=plan_of(512), jobs=1)
+    assert (result == coupled(h_a=lines, h_b=2 * lines, k_joint=k)).all()
+
+
+def test_zarr_arrays_in_folders(lines, one_call, tmp_path):
+    zarr = pytest.importorskip("zarr")
+    source = zarr.create_array(str(tmp_path / "a"), data=lines, chunks=(700, 3, 3))
+    result = zarr.create_array(str(tmp_path / "out"), shape=lines.shape, chunks=(300, 3, 3), dtype="complex128")
+    used = jf.sweep(jf.invert, {"a": source}, result, jobs=1)
+    assert used.chunk_lines % np.lcm(300, 512) == 0
+    with ThreadPoolExecutor(2) as executor:
+        jf.sweep(jf.invert, {"a": source}, result, executor=executor, plan=plan_of(used.chunk_lines))
+    assert (result[:] == one_call).all()
+
+
+def test_hdf5_datasets(lines, one_call, tmp_path):
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["a"] = lines
+    with h5py.File(tmp_path / "a.h5", "r") as file, h5py.File(tmp_path / "out.h5", "w") as target:
+        result = target.create_dataset("out", lines.shape, complex)
+        jf.sweep(jf.invert, {"a": file["a"]}, result, plan=plan_of(512), jobs=1)
+        assert (result[:] == one_call).all()
+
+
+def test_a_singular_line_is_named_by_its_number_in_the_sweep(lines):
+    lines[1300] = 0
+    result = np.empty_like(lines)
+    for how in ({"jobs": 1}, {"jobs": 2}):
+        with pytest.raises(jf.SingularLineError, match="counted from line 1024") as caught:
+            jf.sweep(jf.invert, {"a": lines}, result, plan=plan_of(512), **how)
+        assert caught.value.lines.tolist() == [1300]
+    jf.sweep(partial(jf.invert, on_singular="nan"), {"a": lines}, result, plan=plan_of(512), jobs=1)
+    assert np.isnan(result).any(axis=(1, 2)).nonzero()[0].tolist() == [1300]
+
+
+def test_ill_conditioned_lines_are_told_once(lines):
+    lines[600:1300] = np.diag([1.0, 1e-15, 1.0])
+    with pytest.warns(jf.IllConditionedWarning, match="counted from line 512; so are lines of 1 other chunk") as told:
+        jf.sweep(jf.invert, {"a": lines}, np.empty_like(lines), plan=plan_of(512), jobs=1)
+    assert len(told) == 1
+
+
+def test_what_does_not_fit_is_said_before_anything_is_computed(lines, tmp_path):
+    source = mapped(tmp_path / "a", lines)
+    with pytest.raises(ValueError, match="out must not lie where a lies"):
+        jf.sweep(jf.invert, {"a": source}, np.memmap(tmp_path / "a", complex, "r+", shape=lines.shape))
+    with pytest.raises(ValueError, match="out must not lie where a lies"):
+        jf.sweep(jf.invert, {"a": lines}, lines)
+    with pytest.raises(ValueError, match="a has 2600 lines and out 5"):
+        jf.sweep(jf.invert, {"a": lines}, lines[:5].copy())
+    with pytest.raises(ValueError, match=r"out must have the shape \(2600, 3, 3\), not \(2600, 2, 2\)"):
+        jf.plan_sweep(jf.invert, {"a": lines}, np.empty((N, 2, 2), complex), jobs=1)
+    with pytest.raises(ValueError, match="cannot be written"):
+        jf.sweep(jf.invert, {"a": lines}, np.memmap(tmp_path / "a", complex, "r", shape=lines.shape))
+    with pytest.raises(TypeError, match="must be an array that results are written into"):
+        jf.sweep(jf.invert, {"a": lines}, (1, 2))
+    with pytest.raises(TypeError, match="operation must be a function"):
+        jf.sweep("invert", {"a": lines}, np.empty_like(lines))
+    with pytest.raises(ValueError, match="plan is of 7 lines"):
+        jf.sweep(jf.invert, {"a": lines}, np.empty_like(lines), plan=plan_of(512, 7), jobs=1)
+
+
+def test_chunks_follow_from_the_cost():
+    def planned(cost, n_lines=10**8, workers=2, step=1):
+        return planned_sweep("invert", {"a": (n_lines, 2, 2), "out": (n_lines, 2, 2)}, n_lines, workers, step, cost)
+
+    cheap = planned(SweepCost(1e-7, 0.0, 1e-4))
+    assert cheap.chunk_lines % 512 == 0
+    # an expensive task is outweighed by its lines: 50 ms a task at 0.1 us a line need more memory than there is
+    dear = planned(SweepCost(1e-7, 0.0, 5e-2))
+    assert dear.chunk_lines == 2**26 // dear.line_bytes
+    assert planned(SweepCost(1e-5, 0.0, 5e-3)).chunk_lines * 1e-5 * 1.01 >= 5e-3 * 50
+    # every worker has tasks
+    assert planned(SweepCost(1e-5, 0.0, 1.0), 10**5, 8).n_tasks >= 3 * 8
+    assert planned(SweepCost(1e-5, 0.0, 1e-3), step=300).chunk_lines % 38400 == 0
+    assert dear.seconds == pytest.approx(10**8 * 1e-7 / 2 + dear.n_tasks / 2 * 5e-2, rel=0.01)
+    assert [lines.stop - lines.start for lines in plan_of(1024).chunks()] == [1024, 1024, N - 2048]
+
+
+def test_hundred_million_lines_are_planned_on_a_few_of_them(tmp_path):
+    shape = (10**8, 1, 1)
+    source = np.memmap(tmp_path / "a", complex, "w+", shape=shape)  # a file with holes: 1.6 GB that take no place
+    source[:8192] = 2.0
+    result = np.memmap(tmp_path / "out", complex, "w+", shape=shape)
+    plan = jf.plan_sweep(partial(jf.invert, on_singular="nan"), {"a": source}, result, jobs=1)
+    assert not result[:8192].any()
+    assert plan.n_lines == 10**8
+    assert plan.n_tasks * plan.chunk_lines >= 10**8
+    assert plan.task_bytes <= 64 * 2**20
+    assert 0.1 < plan.seconds < 10**4
+    text = str(plan)
+    assert text.startswith("invert: 100,000,000 lines (a 1 x 1, out 1 x 1), 2.98 GiB\nmeasured: ")
+    assert f"{plan.n_tasks} tasks of {plan.chunk_lines:,} lines" in text
+
+
+def test_the_cost_of_a_line_is_the_difference_of_few_and_many(lines):
+    """A clock that runs by the lines read: 3 us each and 1 ms a call."""
+    now, whole = [0.0], np.tile(lines, (2, 1, 1))
+
+    def operation(a):
+        now[0] += 1e-3 + 3e-6 * len(a)
+        return jf.invert(a)
+
+    with patch("jointfrf.parallel.sweep.perf_counter", lambda: now[0]):
+        plan = jf.plan_sweep(operation, {"a": whole}, np.empty_like(whole), jobs=1)
+    assert plan.cost.line == pytest.approx(3e-6)
