@@ -22,6 +22,8 @@ module jointfrf_lanes
   !> Lines side by side. One register of AVX-512, two of AVX2, four of SSE2.
   integer, parameter, public :: lanes = 8
 
+  !> Up to this order there is an inverse of its own for each order; its matrix lies row by row.
+  integer, parameter, public :: largest_constant = 8
   !> Above this order of a matrix to be inverted LAPACK is as fast.
   integer, parameter, public :: largest_in_lanes = 64
   !> Above this size of what only enters products, or is solved for, a block leaves the caches.
@@ -275,6 +277,18 @@ module jointfrf_lanes
       real(dp), intent(out) :: rcond(n_lines)
     end subroutine identify_lines_routine
 
+    !> Short form of ISMM for one joint DOF, without workspace. Arguments as in `inverse_substructuring`, as pairs of
+    !> real numbers.
+    subroutine invert_joint_lines_routine(transposed, first, n_lines, gamma, k_joint, rcond)
+      import :: dp
+      implicit none
+      logical, intent(in) :: transposed
+      integer, intent(in) :: first, n_lines
+      real(dp), intent(in) :: gamma(8, *)
+      real(dp), intent(inout) :: k_joint(2, *)
+      real(dp), intent(out) :: rcond(n_lines)
+    end subroutine invert_joint_lines_routine
+
     !> FRFs nearest to given ones that fit a joint, see jointfrf_manifold_plan.
     !> steps       at most
     !> least_gain  a line has arrived when a step lowers its squares by no more
@@ -352,6 +366,7 @@ module jointfrf_lanes
     procedure(solve_routine), pointer, nopass :: solve => null()
     procedure(invert_lines_routine), pointer, nopass :: invert_lines => null()
     procedure(identify_lines_routine), pointer, nopass :: identify_lines => null()
+    procedure(invert_joint_lines_routine), pointer, nopass :: invert_joint_lines => null()
     procedure(eliminate_routine), pointer, nopass :: eliminate => null()
     procedure(superpose_routine), pointer, nopass :: superpose => null()
     procedure(words_routine), pointer, nopass :: random_words => null()
@@ -393,13 +408,14 @@ contains
     integer :: elements
 
     elements = (padded(n) + 2)*(padded(n) + merge(n_rhs + 1, 0, n_rhs > 0))
+    if (n <= largest_constant .and. n_rhs == 0) elements = n**2
   end function system_size
 
   !> The element of a system [A, B] that holds entry (i, j) of A, or of B where j > n.
   !>
   !> The first two columns, which are eliminated next, lie apart from the others: both parts have rows of a fixed length
-  !> then, which is what lets the compiler run all lanes at once. A matrix of order 1 to 4 that is to be inverted lies
-  !> row by row.
+  !> then, which is what lets the compiler run all lanes at once. A matrix that is to be inverted lies row by row
+  !> up to order `largest_constant`.
   pure function system_position(n, n_rhs, i, j) result(element)
     integer, intent(in) :: n, n_rhs, i, j
     integer :: element, even, column, width
@@ -407,8 +423,8 @@ contains
     even = padded(n)
     width = even - 2 + merge(n_rhs + 1, 0, n_rhs > 0)
     column = merge(j, even + j - n, j <= n)
-    if (n <= 4 .and. n_rhs == 0) then
-      element = even*(i - 1) + j
+    if (n <= largest_constant .and. n_rhs == 0) then
+      element = n*(i - 1) + j
     else if (column <= 2) then
       element = 2*(i - 1) + column
     else
