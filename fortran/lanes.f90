@@ -16,7 +16,7 @@ module jointfrf_lanes
   use jointfrf_manifold_plan, only: manifold_plan
   implicit none
   private
-  public :: lane_kernels, element_space, padded, to_register, real_lines, flat, in_memory, row_starts, &
+  public :: lane_kernels, element_space, sparse_rows, padded, to_register, real_lines, flat, in_memory, row_starts, &
     rows_in_memory, worse_of
 
   !> Lines side by side. One register of AVX-512, two of AVX2, four of SSE2.
@@ -33,6 +33,15 @@ module jointfrf_lanes
   integer(ip), parameter, public :: in_doubt = huge(1_ip)
   !> Below this reciprocal condition number a line of a block is in doubt: LAPACK may find it exactly singular.
   real(dp), parameter, public :: doubtful = 1.0e-14_dp
+
+  !> A real matrix as the entries of its rows that are not zero.
+  type :: sparse_rows
+    integer :: n = 0                         !< rows
+    integer, allocatable :: start(:)         !< where the entries of each row begin, and one more, shape (n + 1)
+    integer, allocatable :: from(:)          !< their columns
+    real(dp), allocatable :: weight(:)       !< and values
+    logical :: unused = .false.              !< whether a column has no entry
+  end type sparse_rows
 
   abstract interface
     !> Which lines of a block are in doubt.
@@ -277,6 +286,20 @@ module jointfrf_lanes
       real(dp), intent(out) :: rcond(n_lines)
     end subroutine identify_lines_routine
 
+    !> Real transformations of both sides of a line, without workspace.
+    !> m_slow, m_fast   size of a line h as it is stored: columns, and rows, which lie side by side
+    !> slow, fast       what entries of the new line are made of, along either
+    !> total            shape (n_lines): sums in which NaN, Inf and overflow show
+    subroutine transform_lines_routine(m_slow, m_fast, slow, fast, first, n_lines, h, h_new, total)
+      import :: dp, sparse_rows
+      implicit none
+      integer, intent(in) :: m_slow, m_fast, first, n_lines
+      type(sparse_rows), intent(in) :: slow, fast
+      real(dp), intent(in) :: h(2, m_fast, m_slow, *)
+      real(dp), intent(inout) :: h_new(2, fast%n, slow%n, *)
+      real(dp), intent(out) :: total(n_lines)
+    end subroutine transform_lines_routine
+
     !> Short form of ISMM for one joint DOF, without workspace. Arguments as in `inverse_substructuring`, as pairs of
     !> real numbers.
     subroutine invert_joint_lines_routine(transposed, first, n_lines, gamma, k_joint, rcond)
@@ -369,6 +392,7 @@ module jointfrf_lanes
     procedure(invert_joint_lines_routine), pointer, nopass :: invert_joint_lines => null()
     procedure(eliminate_routine), pointer, nopass :: eliminate => null()
     procedure(superpose_routine), pointer, nopass :: superpose => null()
+    procedure(transform_lines_routine), pointer, nopass :: transform_lines => null()
     procedure(words_routine), pointer, nopass :: random_words => null()
     procedure(draw_routine), pointer, nopass :: normals => null()
     procedure(draw_routine), pointer, nopass :: uniforms => null()

@@ -7,7 +7,7 @@ module JF_MODULE
   use, intrinsic :: iso_fortran_env, only: int64
   use jointfrf_elimination_plan, only: elimination_plan
   use jointfrf_kinds, only: dp, ip
-  use jointfrf_lanes, only: doubtful, in_doubt, lane_kernels, lanes, largest_constant, largest_in_lanes, padded
+  use jointfrf_lanes, only: doubtful, in_doubt, lane_kernels, lanes, largest_constant, largest_in_lanes, padded, sparse_rows
   use jointfrf_lookahead, only: advance, lookahead, spread_over
   implicit none
   private
@@ -43,6 +43,7 @@ contains
     kernels%invert_joint_lines => invert_joint_lines
     kernels%eliminate => eliminate_by_plan
     kernels%superpose => superpose
+    kernels%transform_lines => transform_lines
   end subroutine set_kernels
 
   subroutine judge_lines(n_lines, total, line_info, rcond)
@@ -98,4 +99,5 @@ contains
 #include "closed_forms.inc"
 #include "condensation.inc"
 #include "modal_superposition.inc"
+#include "transformation.inc"
 end module JF_MODULE
