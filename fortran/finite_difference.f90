@@ -11,6 +11,9 @@ module jointfrf_finite_difference
   private
   public :: difference_weights, central_difference, transform_receptance
 
+  !> Up to this number of products of two weights these are formed once, and a line is one sum of few for each entry.
+  integer, parameter :: few_products = 100
+
   type, extends(line_operation) :: transformation
     logical :: transposed
     integer :: n_out, n_in, m_out, m_in
@@ -18,6 +21,7 @@ module jointfrf_finite_difference
     real(dp), pointer, contiguous :: t_out(:, :), t_in(:, :)
     real(dp), pointer, contiguous :: h_pairs(:, :, :), new_pairs(:, :, :)
     type(sparse_rows) :: slow, fast          !< the transformations of the slow and of the fast index of storage
+    type(sparse_rows) :: both                !< and of both, where there are few products of weights
   contains
     procedure :: line => transform_one
     procedure :: line_block => transform_block
@@ -117,9 +121,39 @@ contains
       operation%slow = rows_of_columns(transpose(operation%t_in))
       operation%fast = rows_of_columns(transpose(operation%t_out))
     end if
+    if (size(operation%slow%weight)*size(operation%fast%weight) <= few_products) &
+      operation%both = both_at_once(operation%slow, operation%fast, size(operation%h, 1))
     operation%block_lines = long_block
     operation%n_element = 1
   end subroutine plan_transformation
+
+  !> The entries of a line made of those of the line before, in one step.
+  !> m_fast   numbers side by side in memory
+  pure function both_at_once(slow, fast, m_fast) result(rows)
+    type(sparse_rows), intent(in) :: slow, fast
+    integer, intent(in) :: m_fast
+    type(sparse_rows) :: rows
+    integer :: i, j, k, s, t
+
+    rows%n = slow%n*fast%n
+    k = size(slow%weight)*size(fast%weight)
+    allocate (rows%start(rows%n + 1), rows%from(k), rows%weight(k))
+    k = 1
+    do i = 1, slow%n
+      do j = 1, fast%n
+        rows%start((i - 1)*fast%n + j) = k
+        do s = slow%start(i), slow%start(i + 1) - 1
+          do t = fast%start(j), fast%start(j + 1) - 1
+            rows%from(k) = (slow%from(s) - 1)*m_fast + fast%from(t)
+            rows%weight(k) = slow%weight(s)*fast%weight(t)
+            k = k + 1
+          end do
+        end do
+      end do
+    end do
+    rows%start(rows%n + 1) = k
+    rows%unused = slow%unused .or. fast%unused
+  end function both_at_once
 
   !> The entries of each column of a matrix that are not zero: of each row of its transpose.
   pure function rows_of_columns(t) result(rows)
@@ -155,8 +189,12 @@ contains
 
     associate (unused => space%used)
     end associate
-    call kernels%transform_lines(size(self%h, 2), size(self%h, 1), self%slow, self%fast, first, n_lines, &
-                                 self%h_pairs, self%new_pairs, total)                       ! (2.57)
+    if (self%both%n > 0) then
+      call kernels%weigh_lines(size(self%h_pairs, 2), self%both, first, n_lines, self%h_pairs, self%new_pairs, total)
+    else
+      call kernels%transform_lines(size(self%h, 2), size(self%h, 1), self%slow, self%fast, first, n_lines, &
+                                   self%h_pairs, self%new_pairs, total)                     ! (2.57)
+    end if
     rcond = 1.0_dp
     call kernels%judge(n_lines, total, line_info, rcond)
   end subroutine transform_block

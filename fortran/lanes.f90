@@ -300,6 +300,19 @@ module jointfrf_lanes
       real(dp), intent(out) :: total(n_lines)
     end subroutine transform_lines_routine
 
+    !> The same by the weights of both sides at once.
+    !> m      numbers of a line
+    !> rows   what each number of the new line is made of
+    subroutine weigh_lines_routine(m, rows, first, n_lines, h, h_new, total)
+      import :: dp, sparse_rows
+      implicit none
+      integer, intent(in) :: m, first, n_lines
+      type(sparse_rows), intent(in) :: rows
+      real(dp), intent(in) :: h(2, m, *)
+      real(dp), intent(inout) :: h_new(2, rows%n, *)
+      real(dp), intent(out) :: total(n_lines)
+    end subroutine weigh_lines_routine
+
     !> Short form of ISMM for one joint DOF, without workspace. Arguments as in `inverse_substructuring`, as pairs of
     !> real numbers.
     subroutine invert_joint_lines_routine(transposed, first, n_lines, gamma, k_joint, rcond)
@@ -393,6 +406,7 @@ module jointfrf_lanes
     procedure(eliminate_routine), pointer, nopass :: eliminate => null()
     procedure(superpose_routine), pointer, nopass :: superpose => null()
     procedure(transform_lines_routine), pointer, nopass :: transform_lines => null()
+    procedure(weigh_lines_routine), pointer, nopass :: weigh_lines => null()
     procedure(words_routine), pointer, nopass :: random_words => null()
     procedure(draw_routine), pointer, nopass :: normals => null()
     procedure(draw_routine), pointer, nopass :: uniforms => null()

@@ -44,6 +44,7 @@ contains
     kernels%eliminate => eliminate_by_plan
     kernels%superpose => superpose
     kernels%transform_lines => transform_lines
+    kernels%weigh_lines => weigh_lines
   end subroutine set_kernels
 
   subroutine judge_lines(n_lines, total, line_info, rcond)
