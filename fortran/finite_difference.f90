@@ -2,30 +2,26 @@
 module jointfrf_finite_difference
   use jointfrf_caller_memory, only: caller_memory
   use jointfrf_kinds, only: dp, ip
-  use jointfrf_lanes, only: element_space, in_memory, lane_kernels, lanes, largest_in_lanes, real_lines, row_starts
+  use jointfrf_lanes, only: lane_kernels, real_lines, sparse_rows
   use jointfrf_line_layout, only: all_finite, load, load_real, store
   use jointfrf_lines_lapack, only: product_line
   use jointfrf_status, only: line_good, line_not_finite, line_overflow
-  use jointfrf_sweep, only: line_operation, line_space, run_sweep, worth_a_plan
+  use jointfrf_sweep, only: line_operation, line_space, long_block, run_sweep, worth_a_plan
   implicit none
   private
   public :: difference_weights, central_difference, transform_receptance
 
-  !> Where the matrices lie in lanes.
-  type :: transformation_in_lanes
-    real(dp), pointer, contiguous :: h(:, :, :), h_new(:, :, :)
-    integer, allocatable :: h_place(:), new_place(:)             !< in the caller's order
-    integer, allocatable :: weight(:), sums(:)                   !< T_out and T_in^T; what products are added to
-    complex(dp), allocatable :: weight_value(:), nothing(:)
-    integer, allocatable :: out_row(:), in_row(:), h_row(:), half_row(:), new_row(:)   !< the element before each row
-  end type transformation_in_lanes
+  !> Up to this number of products of two weights these are formed once, and a line is one sum of few for each entry.
+  integer, parameter :: few_products = 100
 
   type, extends(line_operation) :: transformation
     logical :: transposed
     integer :: n_out, n_in, m_out, m_in
     complex(dp), pointer, contiguous :: h(:, :, :)
     real(dp), pointer, contiguous :: t_out(:, :), t_in(:, :)
-    type(transformation_in_lanes) :: plan
+    real(dp), pointer, contiguous :: h_pairs(:, :, :), new_pairs(:, :, :)
+    type(sparse_rows) :: slow, fast          !< the transformations of the slow and of the fast index of storage
+    type(sparse_rows) :: both                !< and of both, where there are few products of weights
   contains
     procedure :: line => transform_one
     procedure :: line_block => transform_block
@@ -105,48 +101,82 @@ contains
     operation%m_out = size(t_out, merge(1, 2, transposed))
     operation%n_in = size(t_in, merge(2, 1, transposed))
     operation%m_in = size(t_in, merge(1, 2, transposed))
-    operation%flops = 8.0_dp*operation%n_out*operation%m_in*(operation%m_out + operation%n_in)
+    operation%flops = 4.0_dp*(real(operation%m_in, dp)*count(t_out /= 0) + real(operation%n_out, dp)*count(t_in /= 0))
     if (worth_a_plan(size(h, 3), memory) &
-        .and. min(operation%n_out, operation%n_in, operation%m_out, operation%m_in) >= 1 &
-        .and. max(operation%n_out, operation%n_in, operation%m_out, operation%m_in) <= largest_in_lanes) &
+        .and. min(operation%n_out, operation%n_in, operation%m_out, operation%m_in) >= 1) &
       call plan_transformation(operation)
     call run_sweep(operation, size(h, 3, kind=ip), line_info, rcond, info, memory)
   end subroutine transform_receptance
 
   subroutine plan_transformation(operation)
     type(transformation), intent(inout) :: operation
-    integer :: t_out(operation%n_out, operation%m_out), t_in(operation%m_in, operation%n_in)
-    integer :: h(operation%m_out, operation%m_in), half(operation%n_out, operation%m_in)
-    integer :: h_new(operation%n_out, operation%n_in)
-    type(element_space) :: room
 
-    associate (n_out => operation%n_out, n_in => operation%n_in, m_out => operation%m_out, m_in => operation%m_in, &
-               plan => operation%plan)
-      t_out = room%matrix(n_out, m_out)
-      t_in = room%matrix(m_in, n_in)
-      h = room%matrix(m_out, m_in)
-      half = room%matrix(n_out, m_in)
-      h_new = room%matrix(n_out, n_in)
-      operation%n_element = room%taken
-      plan%h => real_lines(operation%h)
-      plan%h_new => real_lines(operation%result)
-      plan%h_place = in_memory(operation%transposed, h)
-      plan%new_place = in_memory(operation%transposed, h_new)
-      plan%weight = [in_memory(.true., t_out), in_memory(.true., t_in)]
-      if (operation%transposed) then
-        plan%weight_value = [reshape(operation%t_out, [n_out*m_out]), reshape(transpose(operation%t_in), [m_in*n_in])]
-      else
-        plan%weight_value = [reshape(transpose(operation%t_out), [n_out*m_out]), reshape(operation%t_in, [m_in*n_in])]
-      end if
-      plan%sums = [in_memory(.true., half), in_memory(.true., h_new)]
-      allocate (plan%nothing(size(plan%sums)), source=(0.0_dp, 0.0_dp))
-      plan%out_row = row_starts(t_out)
-      plan%in_row = row_starts(t_in)
-      plan%h_row = row_starts(h)
-      plan%half_row = row_starts(half)
-      plan%new_row = row_starts(h_new)
-    end associate
+    operation%h_pairs => real_lines(operation%h)
+    operation%new_pairs => real_lines(operation%result)
+    call operation%reads(operation%h_pairs)
+    if (operation%transposed) then
+      operation%slow = rows_of_columns(operation%t_out)
+      operation%fast = rows_of_columns(operation%t_in)
+    else
+      operation%slow = rows_of_columns(transpose(operation%t_in))
+      operation%fast = rows_of_columns(transpose(operation%t_out))
+    end if
+    if (size(operation%slow%weight)*size(operation%fast%weight) <= few_products) &
+      operation%both = both_at_once(operation%slow, operation%fast, size(operation%h, 1))
+    operation%block_lines = long_block
+    operation%n_element = 1
   end subroutine plan_transformation
+
+  !> The entries of a line made of those of the line before, in one step.
+  !> m_fast   numbers side by side in memory
+  pure function both_at_once(slow, fast, m_fast) result(rows)
+    type(sparse_rows), intent(in) :: slow, fast
+    integer, intent(in) :: m_fast
+    type(sparse_rows) :: rows
+    integer :: i, j, k, s, t
+
+    rows%n = slow%n*fast%n
+    k = size(slow%weight)*size(fast%weight)
+    allocate (rows%start(rows%n + 1), rows%from(k), rows%weight(k))
+    k = 1
+    do i = 1, slow%n
+      do j = 1, fast%n
+        rows%start((i - 1)*fast%n + j) = k
+        do s = slow%start(i), slow%start(i + 1) - 1
+          do t = fast%start(j), fast%start(j + 1) - 1
+            rows%from(k) = (slow%from(s) - 1)*m_fast + fast%from(t)
+            rows%weight(k) = slow%weight(s)*fast%weight(t)
+            k = k + 1
+          end do
+        end do
+      end do
+    end do
+    rows%start(rows%n + 1) = k
+    rows%unused = slow%unused .or. fast%unused
+  end function both_at_once
+
+  !> The entries of each column of a matrix that are not zero: of each row of its transpose.
+  pure function rows_of_columns(t) result(rows)
+    real(dp), intent(in) :: t(:, :)
+    type(sparse_rows) :: rows
+    integer :: i, j, k
+
+    rows%n = size(t, 2)
+    k = count(t /= 0)                        ! NaN counts
+    allocate (rows%start(rows%n + 1), rows%from(k), rows%weight(k))
+    k = 1
+    do j = 1, rows%n
+      rows%start(j) = k
+      do i = 1, size(t, 1)
+        if (t(i, j) == 0) cycle
+        rows%from(k) = i
+        rows%weight(k) = t(i, j)
+        k = k + 1
+      end do
+    end do
+    rows%start(rows%n + 1) = k
+    rows%unused = any(count(t /= 0, dim=2) == 0)
+  end function rows_of_columns
 
   subroutine transform_block(self, kernels, first, n_lines, space, line_info, rcond)
     class(transformation), intent(in) :: self
@@ -155,21 +185,18 @@ contains
     type(line_space), target, intent(inout) :: space
     integer(ip), intent(out) :: line_info(n_lines)
     real(dp), intent(out) :: rcond(n_lines)
-    real(dp) :: total(lanes), well(lanes)
+    real(dp) :: total(n_lines)
 
-    well = 1.0_dp
-    associate (plan => self%plan, x => space%x)
-      call kernels%fill(size(plan%weight), plan%weight_value, plan%weight, x)
-      call kernels%fill(size(plan%sums), plan%nothing, plan%sums, x)
-      call kernels%load(size(plan%h_place), plan%h_place, first, n_lines, plan%h, x)
-      call kernels%product(self%n_out, self%m_in, self%m_out, 1.0_dp, plan%out_row, plan%h_row, plan%half_row, x)
-      call kernels%product(self%n_out, self%n_in, self%m_in, 1.0_dp, plan%half_row, plan%in_row, plan%new_row, &
-                           x)                                                             ! (2.57)
-      call kernels%store(size(plan%new_place), plan%new_place, first, n_lines, x, self%plan%h_new)
-      call kernels%total(size(plan%new_place), plan%new_place, x, total)
-      rcond = well(:n_lines)
-      call kernels%judge(n_lines, total, line_info, rcond)
+    associate (unused => space%used)
     end associate
+    if (self%both%n > 0) then
+      call kernels%weigh_lines(size(self%h_pairs, 2), self%both, first, n_lines, self%h_pairs, self%new_pairs, total)
+    else
+      call kernels%transform_lines(size(self%h, 2), size(self%h, 1), self%slow, self%fast, first, n_lines, &
+                                   self%h_pairs, self%new_pairs, total)                     ! (2.57)
+    end if
+    rcond = 1.0_dp
+    call kernels%judge(n_lines, total, line_info, rcond)
   end subroutine transform_block
 
   subroutine transform_one(self, i, space, line_info, rcond)

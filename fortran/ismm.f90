@@ -12,6 +12,9 @@ module jointfrf_ismm
   private
   public :: ismm, inverse_substructuring
 
+  !> Up to this order a matrix is inverted as a whole: that costs no more than to solve for half of the columns.
+  integer, parameter :: largest_inverted = 6
+
   !> Where the matrices of ISMM lie in lanes. Elements are listed in the caller's order, unless said otherwise.
   type :: identification_in_lanes
     real(dp), pointer, contiguous :: alpha(:, :, :), gamma(:, :, :), k_initial(:, :, :), k_joint(:, :, :)
@@ -22,7 +25,8 @@ module jointfrf_ismm
     integer, allocatable :: unit(:)                !< right-hand sides E_k, row by row
     complex(dp), allocatable :: unit_value(:)      !< E_k, or zeros
     integer, allocatable :: difference_row(:), w_row(:)   !< the element before each row
-    integer, allocatable :: alpha_row(:), gamma_row(:), joint_row(:)   !< where alpha and gamma are inverted as a whole
+    integer, allocatable :: joint_row(:)           !< where alpha and gamma are inverted as a whole
+    integer, allocatable :: columns_k(:), columns_k_row(:)   !< columns k of gamma^-1 then, row by row
     integer, allocatable :: w(:)                   !< W, row by row
     integer :: alpha_before, gamma_before          !< the element before each system
   end type identification_in_lanes
@@ -31,6 +35,7 @@ module jointfrf_ismm
   type :: short_identification_in_lanes
     real(dp), pointer, contiguous :: gamma(:, :, :), k_joint(:, :, :)
     integer, allocatable :: gamma_place(:), unit(:)
+    integer, allocatable :: joint(:)               !< K*, where gamma is inverted as a whole
     complex(dp), allocatable :: unit_value(:)
     integer :: gamma_before
   end type short_identification_in_lanes
@@ -109,7 +114,7 @@ contains
       operation%block_lines = long_block
       operation%n_element = 1
       return
-    else if (n == 2) then
+    else if (m <= largest_inverted) then
       call plan_inversions(operation)
       return
     end if
@@ -132,35 +137,40 @@ contains
     end associate
   end subroutine plan_identification
 
-  !> Matrices of order 4 are inverted as a whole, which costs no more than to solve for two columns.
+  !> Small matrices are inverted as a whole.
   subroutine plan_inversions(operation)
     type(identification), intent(inout) :: operation
-    integer, parameter :: n = 2, m = 4
-    integer :: gamma(m, m), alpha(m, m), difference(m, m), w(m, n), joint(n, n)
+    integer :: gamma(2*operation%n, 2*operation%n), alpha(2*operation%n, 2*operation%n)
+    integer :: difference(2*operation%n, 2*operation%n), columns_k(2*operation%n, operation%n)
+    integer :: w(2*operation%n, operation%n), joint(operation%n, operation%n), n, m
     type(element_space) :: room
 
+    n = operation%n
+    m = 2*n
     gamma = room%system(m, 0, operation%plan%gamma_before)
     alpha = room%system(m, 0, operation%plan%alpha_before)
     difference = room%matrix(m, m)
+    columns_k = room%matrix(m, n)
     w = room%matrix(m, n)
     joint = room%matrix(n, n)
     operation%n_element = room%taken
+    operation%n_hint = 2*m
     associate (plan => operation%plan)
       plan%gamma_place = in_memory(operation%transposed, gamma)
       plan%alpha_place = in_memory(operation%transposed, alpha)
       plan%difference = in_memory(operation%transposed, difference)
       plan%joint = in_memory(operation%transposed, joint)
+      plan%columns_k = in_memory(.true., columns_k)
       plan%w = in_memory(.true., w)
       allocate (plan%unit_value(m*n), source=(0.0_dp, 0.0_dp))
-      plan%gamma_row = row_starts(gamma(:, n + 1:))
-      plan%alpha_row = row_starts(alpha(:n, :))
       plan%difference_row = row_starts(difference)
+      plan%columns_k_row = row_starts(columns_k)
       plan%w_row = row_starts(w)
       plan%joint_row = row_starts(joint)
     end associate
   end subroutine plan_inversions
 
-  !> `identify_block` for two joint DOFs.
+  !> `identify_block` for two and three joint DOFs.
   subroutine identify_by_inverses(self, kernels, first, n_lines, space, line_info, rcond)
     class(identification), intent(in) :: self
     type(lane_kernels), intent(in) :: kernels
@@ -169,25 +179,47 @@ contains
     integer(ip), intent(out) :: line_info(n_lines)
     real(dp), intent(out) :: rcond(n_lines)
     real(dp) :: rcond_alpha(lanes), rcond_gamma(lanes), total(lanes)
-    integer, parameter :: n = 2, m = 4
-    integer :: unmoved(m*m)
+    integer :: gamma_inverse(2*self%n, 2*self%n), alpha_inverse(2*self%n, 2*self%n)   ! where (column, row) lies
+    integer :: row(self%n), w_row(2*self%n), n, m
 
+    n = self%n
+    m = 2*n
     associate (plan => self%plan, x => space%x)
       call kernels%load(m*m, plan%gamma_place, first, n_lines, plan%gamma, x)
       call kernels%load(m*m, plan%alpha_place, first, n_lines, plan%alpha, x)
       call kernels%load(n*n, plan%joint, first, n_lines, plan%k_initial, x)
       call kernels%combine(m*m, 1.0_dp, plan%alpha_place, -1.0_dp, plan%gamma_place, plan%difference, x)
-      call kernels%invert(m, plan%gamma_before, x, space%hint, unmoved, rcond_gamma, space%ahead)
-      call kernels%invert(m, plan%alpha_before, x, space%hint, unmoved, rcond_alpha)
+      call kernels%invert(m, plan%gamma_before, x, space%hint(:m), gamma_inverse, rcond_gamma, space%ahead)
+      call kernels%invert(m, plan%alpha_before, x, space%hint(m + 1:), alpha_inverse, rcond_alpha)
+      call kernels%copy(m*n, 1.0_dp, gamma_inverse(n + 1:, :), plan%columns_k, x)
       call kernels%fill(m*n, plan%unit_value, plan%w, x)
-      call kernels%product(m, n, m, 1.0_dp, plan%difference_row, plan%gamma_row, plan%w_row, x)
-      call kernels%product(n, n, m, -1.0_dp, plan%alpha_row, plan%w_row, plan%joint_row, x)   ! (2.47), (2.48)
+      call kernels%product(m, n, m, 1.0_dp, plan%difference_row, plan%columns_k_row, plan%w_row, x)
+      call rows_as_they_lie(alpha_inverse, plan%w_row, row, w_row)
+      call kernels%product(n, n, m, -1.0_dp, row, w_row, plan%joint_row, x)   ! (2.47), (2.48)
       call kernels%store(n*n, plan%joint, first, n_lines, x, self%plan%k_joint)
       call kernels%total(n*n, plan%joint, x, total)
       rcond = worse_of(rcond_alpha(:n_lines), rcond_gamma(:n_lines))
       call kernels%judge(n_lines, total, line_info, rcond)
     end associate
   end subroutine identify_by_inverses
+
+  !> The columns of an inverse lie in one order in all rows: a product takes the rows of its second factor in that order.
+  !> place     where the inverse lies, (column, row)
+  !> b_row     the element before each row of the second factor
+  !> row       the element before each of the first rows of the inverse
+  !> ordered   b_row in the order of the inverse's columns
+  pure subroutine rows_as_they_lie(place, b_row, row, ordered)
+    integer, intent(in) :: place(:, :), b_row(:)
+    integer, intent(out) :: row(:), ordered(:)
+    integer :: i
+
+    do i = 1, size(row)
+      row(i) = minval(place(:, i)) - 1
+    end do
+    do i = 1, size(b_row)
+      ordered(place(i, 1) - row(1)) = b_row(i)
+    end do
+  end subroutine rows_as_they_lie
 
   !> X = gamma^-1 E_k, W = (alpha - gamma) X, and of Y = alpha^-1 W the rows j, which are eliminated last: D_jk.
   subroutine identify_block(self, kernels, first, n_lines, space, line_info, rcond)
@@ -205,7 +237,7 @@ contains
                                   self%plan%k_initial, self%plan%k_joint, rcond)
       call kernels%judge(n_lines, 0*rcond, line_info, rcond)
       return
-    else if (self%n == 2) then
+    else if (2*self%n <= largest_inverted) then
       call identify_by_inverses(self, kernels, first, n_lines, space, line_info, rcond)
       return
     end if
@@ -324,18 +356,29 @@ contains
 
   subroutine plan_short_identification(operation)
     type(short_identification), intent(inout) :: operation
-    integer :: element(2*operation%n, 3*operation%n), n, m
+    integer :: element(2*operation%n, 3*operation%n), joint(operation%n, operation%n), n, m
     type(element_space) :: room
 
     n = operation%n
     m = 2*n
+    operation%plan%gamma => real_lines(operation%gamma)
+    operation%plan%k_joint => real_lines(operation%result)
+    call operation%reads(operation%plan%gamma)
+    operation%n_hint = padded(m)
+    if (n == 1) then
+      operation%block_lines = long_block
+      operation%n_element = 1
+      return
+    else if (m <= largest_inverted) then
+      operation%plan%gamma_place = in_memory(operation%transposed, room%system(m, 0, operation%plan%gamma_before))
+      joint = room%matrix(n, n)
+      operation%plan%joint = in_memory(operation%transposed, joint)
+      operation%n_element = room%taken
+      return
+    end if
     element = room%system(m, n, operation%plan%gamma_before)
     operation%n_element = room%taken
-    operation%n_hint = padded(m)
     associate (plan => operation%plan)
-      plan%gamma => real_lines(operation%gamma)
-      plan%k_joint => real_lines(operation%result)
-      call operation%reads(plan%gamma)
       plan%gamma_place = in_memory(operation%transposed, element(:, cshift(row_numbers(m), n)))
       plan%unit = in_memory(.true., element(:, m + 1:))
       plan%unit_value = -unit_block(m, n)
@@ -351,12 +394,26 @@ contains
     integer(ip), intent(out) :: line_info(n_lines)
     real(dp), intent(out) :: rcond(n_lines)
     real(dp) :: rcond_lanes(lanes), total(lanes)
-    integer :: row(2*self%n), joint(self%n**2), n, m
+    integer :: row(2*self%n), joint(self%n**2), inverse(2*self%n, 2*self%n), n, m
 
     n = self%n
     m = 2*n
+    if (n == 1) then
+      call kernels%invert_joint_lines(self%transposed, first, n_lines, self%plan%gamma, self%plan%k_joint, rcond)
+      call kernels%judge(n_lines, 0*rcond, line_info, rcond)
+      return
+    end if
     associate (plan => self%plan, x => space%x)
       call kernels%load(m*m, plan%gamma_place, first, n_lines, plan%gamma, x)
+      if (m <= largest_inverted) then
+        call kernels%invert(m, plan%gamma_before, x, space%hint, inverse, rcond_lanes, space%ahead)
+        call kernels%copy(n*n, -1.0_dp, in_memory(self%transposed, transpose(inverse(n + 1:, :n))), plan%joint, x)
+        call kernels%store(n*n, plan%joint, first, n_lines, x, self%plan%k_joint)
+        call kernels%total(n*n, plan%joint, x, total)
+        rcond = rcond_lanes(:n_lines)
+        call kernels%judge(n_lines, total, line_info, rcond)
+        return
+      end if
       call kernels%fill(m*n, plan%unit_value, plan%unit, x)
       call kernels%solve(m, n, n, plan%gamma_before, x, space%hint, row, rcond_lanes, space%ahead)
       call rows_in_memory(self%transposed, row(n + 1:), n, joint)

@@ -16,12 +16,14 @@ module jointfrf_lanes
   use jointfrf_manifold_plan, only: manifold_plan
   implicit none
   private
-  public :: lane_kernels, element_space, padded, to_register, real_lines, flat, in_memory, row_starts, &
+  public :: lane_kernels, element_space, sparse_rows, padded, to_register, real_lines, flat, in_memory, row_starts, &
     rows_in_memory, worse_of
 
   !> Lines side by side. One register of AVX-512, two of AVX2, four of SSE2.
   integer, parameter, public :: lanes = 8
 
+  !> Up to this order there is an inverse of its own for each order; its matrix lies row by row.
+  integer, parameter, public :: largest_constant = 8
   !> Above this order of a matrix to be inverted LAPACK is as fast.
   integer, parameter, public :: largest_in_lanes = 64
   !> Above this size of what only enters products, or is solved for, a block leaves the caches.
@@ -31,6 +33,15 @@ module jointfrf_lanes
   integer(ip), parameter, public :: in_doubt = huge(1_ip)
   !> Below this reciprocal condition number a line of a block is in doubt: LAPACK may find it exactly singular.
   real(dp), parameter, public :: doubtful = 1.0e-14_dp
+
+  !> A real matrix as the entries of its rows that are not zero.
+  type :: sparse_rows
+    integer :: n = 0                         !< rows
+    integer, allocatable :: start(:)         !< where the entries of each row begin, and one more, shape (n + 1)
+    integer, allocatable :: from(:)          !< their columns
+    real(dp), allocatable :: weight(:)       !< and values
+    logical :: unused = .false.              !< whether a column has no entry
+  end type sparse_rows
 
   abstract interface
     !> Which lines of a block are in doubt.
@@ -275,6 +286,45 @@ module jointfrf_lanes
       real(dp), intent(out) :: rcond(n_lines)
     end subroutine identify_lines_routine
 
+    !> Real transformations of both sides of a line, without workspace.
+    !> m_slow, m_fast   size of a line h as it is stored: columns, and rows, which lie side by side
+    !> slow, fast       what entries of the new line are made of, along either
+    !> total            shape (n_lines): sums in which NaN, Inf and overflow show
+    subroutine transform_lines_routine(m_slow, m_fast, slow, fast, first, n_lines, h, h_new, total)
+      import :: dp, sparse_rows
+      implicit none
+      integer, intent(in) :: m_slow, m_fast, first, n_lines
+      type(sparse_rows), intent(in) :: slow, fast
+      real(dp), intent(in) :: h(2, m_fast, m_slow, *)
+      real(dp), intent(inout) :: h_new(2, fast%n, slow%n, *)
+      real(dp), intent(out) :: total(n_lines)
+    end subroutine transform_lines_routine
+
+    !> The same by the weights of both sides at once.
+    !> m      numbers of a line
+    !> rows   what each number of the new line is made of
+    subroutine weigh_lines_routine(m, rows, first, n_lines, h, h_new, total)
+      import :: dp, sparse_rows
+      implicit none
+      integer, intent(in) :: m, first, n_lines
+      type(sparse_rows), intent(in) :: rows
+      real(dp), intent(in) :: h(2, m, *)
+      real(dp), intent(inout) :: h_new(2, rows%n, *)
+      real(dp), intent(out) :: total(n_lines)
+    end subroutine weigh_lines_routine
+
+    !> Short form of ISMM for one joint DOF, without workspace. Arguments as in `inverse_substructuring`, as pairs of
+    !> real numbers.
+    subroutine invert_joint_lines_routine(transposed, first, n_lines, gamma, k_joint, rcond)
+      import :: dp
+      implicit none
+      logical, intent(in) :: transposed
+      integer, intent(in) :: first, n_lines
+      real(dp), intent(in) :: gamma(8, *)
+      real(dp), intent(inout) :: k_joint(2, *)
+      real(dp), intent(out) :: rcond(n_lines)
+    end subroutine invert_joint_lines_routine
+
     !> FRFs nearest to given ones that fit a joint, see jointfrf_manifold_plan.
     !> steps       at most
     !> least_gain  a line has arrived when a step lowers its squares by no more
@@ -352,8 +402,11 @@ module jointfrf_lanes
     procedure(solve_routine), pointer, nopass :: solve => null()
     procedure(invert_lines_routine), pointer, nopass :: invert_lines => null()
     procedure(identify_lines_routine), pointer, nopass :: identify_lines => null()
+    procedure(invert_joint_lines_routine), pointer, nopass :: invert_joint_lines => null()
     procedure(eliminate_routine), pointer, nopass :: eliminate => null()
     procedure(superpose_routine), pointer, nopass :: superpose => null()
+    procedure(transform_lines_routine), pointer, nopass :: transform_lines => null()
+    procedure(weigh_lines_routine), pointer, nopass :: weigh_lines => null()
     procedure(words_routine), pointer, nopass :: random_words => null()
     procedure(draw_routine), pointer, nopass :: normals => null()
     procedure(draw_routine), pointer, nopass :: uniforms => null()
@@ -393,13 +446,14 @@ contains
     integer :: elements
 
     elements = (padded(n) + 2)*(padded(n) + merge(n_rhs + 1, 0, n_rhs > 0))
+    if (n <= largest_constant .and. n_rhs == 0) elements = n**2
   end function system_size
 
   !> The element of a system [A, B] that holds entry (i, j) of A, or of B where j > n.
   !>
   !> The first two columns, which are eliminated next, lie apart from the others: both parts have rows of a fixed length
-  !> then, which is what lets the compiler run all lanes at once. A matrix of order 1 to 4 that is to be inverted lies
-  !> row by row.
+  !> then, which is what lets the compiler run all lanes at once. A matrix that is to be inverted lies row by row
+  !> up to order `largest_constant`.
   pure function system_position(n, n_rhs, i, j) result(element)
     integer, intent(in) :: n, n_rhs, i, j
     integer :: element, even, column, width
@@ -407,8 +461,8 @@ contains
     even = padded(n)
     width = even - 2 + merge(n_rhs + 1, 0, n_rhs > 0)
     column = merge(j, even + j - n, j <= n)
-    if (n <= 4 .and. n_rhs == 0) then
-      element = even*(i - 1) + j
+    if (n <= largest_constant .and. n_rhs == 0) then
+      element = n*(i - 1) + j
     else if (column <= 2) then
       element = 2*(i - 1) + column
     else

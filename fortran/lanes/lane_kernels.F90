@@ -7,7 +7,7 @@ module JF_MODULE
   use, intrinsic :: iso_fortran_env, only: int64
   use jointfrf_elimination_plan, only: elimination_plan
   use jointfrf_kinds, only: dp, ip
-  use jointfrf_lanes, only: doubtful, in_doubt, lane_kernels, lanes, largest_in_lanes, padded
+  use jointfrf_lanes, only: doubtful, in_doubt, lane_kernels, lanes, largest_constant, largest_in_lanes, padded, sparse_rows
   use jointfrf_lookahead, only: advance, lookahead, spread_over
   implicit none
   private
@@ -19,6 +19,8 @@ module JF_MODULE
   !> A pivot this large, of the largest candidate, is shared by all lanes. A half takes a fifth longer on
   !> noisy data; a quarter doubles the residual of partial pivoting.
   real(dp), parameter :: pivot_share = 1.0_dp/3.0_dp
+  !> The same for inverses of small order, where a line loses more to one poor pivot and an exchange of rows costs less.
+  real(dp), parameter :: small_pivot_share = 0.5_dp
 
 contains
 
@@ -38,8 +40,11 @@ contains
     kernels%solve => solve_lanes
     kernels%invert_lines => invert_lines
     kernels%identify_lines => identify_lines
+    kernels%invert_joint_lines => invert_joint_lines
     kernels%eliminate => eliminate_by_plan
     kernels%superpose => superpose
+    kernels%transform_lines => transform_lines
+    kernels%weigh_lines => weigh_lines
   end subroutine set_kernels
 
   subroutine judge_lines(n_lines, total, line_info, rcond)
@@ -61,8 +66,39 @@ contains
 #include "panel_elimination.inc"
 #include "inverse.inc"
 #include "small_inverse.inc"
+#define JF_ORDER 3
+#define JF_INVERT invert_order_3
+#include "constant_order.inc"
+#undef JF_ORDER
+#undef JF_INVERT
+#define JF_ORDER 4
+#define JF_INVERT invert_order_4
+#include "constant_order.inc"
+#undef JF_ORDER
+#undef JF_INVERT
+#define JF_ORDER 5
+#define JF_INVERT invert_order_5
+#include "constant_order.inc"
+#undef JF_ORDER
+#undef JF_INVERT
+#define JF_ORDER 6
+#define JF_INVERT invert_order_6
+#include "constant_order.inc"
+#undef JF_ORDER
+#undef JF_INVERT
+#define JF_ORDER 7
+#define JF_INVERT invert_order_7
+#include "constant_order.inc"
+#undef JF_ORDER
+#undef JF_INVERT
+#define JF_ORDER 8
+#define JF_INVERT invert_order_8
+#include "constant_order.inc"
+#undef JF_ORDER
+#undef JF_INVERT
 #include "solution.inc"
 #include "closed_forms.inc"
 #include "condensation.inc"
 #include "modal_superposition.inc"
+#include "transformation.inc"
 end module JF_MODULE

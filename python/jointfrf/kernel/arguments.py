@@ -45,6 +45,7 @@ FloatArray = NDArray[np.float64]
 
 #: Characters of a value that a message shows.
 _SHOWN = 80
+_COMPLEX = np.dtype(np.complex128)
 
 #: A conversion that copies more than this many bytes is announced by a `CopyWarning`.
 LARGE_COPY = 16 * 2**20
@@ -79,6 +80,19 @@ def _converted(name: str, value: ArrayLike, dtype: type, *, later: bool = False)
     return result
 
 
+def _fits(value: object, rows: int | None, columns: int | None, n_freq: int | None) -> bool:
+    """Whether a value is what `as_lines` returns: the case that must cost nothing."""
+    if type(value) is not np.ndarray or value.dtype is not _COMPLEX or value.ndim != 3:
+        return False
+    lines, n, m = value.shape
+    return (
+        (n_freq is None or lines == n_freq)
+        and (rows is None or n == rows)
+        and (columns is None or m == columns)
+        and value.flags.c_contiguous
+    )
+
+
 def as_lines(
     name: str,
     value: ArrayLike,
@@ -92,6 +106,8 @@ def as_lines(
 
     With `later`, an array in a file is returned as it is: `run` converts it chunk by chunk.
     """
+    if _fits(value, rows, columns, n_freq):
+        return value  # type: ignore[return-value]
     array = _converted(name, value, np.complex128, later=later)
     if array.ndim != 3 or any(w not in (None, s) for w, s in zip((n_freq, rows, columns), array.shape, strict=True)):
         labels = ["n_freq" if n_freq is None else str(n_freq)]
@@ -238,13 +254,13 @@ def as_dofs(name: str, dofs: ArrayLike, n: int, *, unique: bool = True) -> NDArr
     array = as_array(name, dofs)
     if array.ndim != 1 or (array.size and array.dtype.kind not in "iu"):
         raise TypeError(f"{name} must be a list of DOF numbers")
-    array = array.astype(np.int64)
-    if ((array < 0) | (array >= n)).any():
-        bad = int(array[(array < 0) | (array >= n)][0])
-        raise ValueError(f"{name} names DOF {bad}; there are DOFs 0 to {n - 1}")
-    if unique and np.unique(array).size != array.size:
-        raise ValueError(f"{name} names a DOF twice: {array.tolist()}")
-    return (array + 1).astype(np.int32)
+    numbers: list[int] = array.tolist()
+    bad = [number for number in numbers if not 0 <= number < n]
+    if bad:
+        raise ValueError(f"{name} names DOF {bad[0]}; there are DOFs 0 to {n - 1}")
+    if unique and len(set(numbers)) != len(numbers):
+        raise ValueError(f"{name} names a DOF twice: {numbers}")
+    return np.array([number + 1 for number in numbers], np.int32)
 
 
 def checked_out(

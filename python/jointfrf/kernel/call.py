@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 import reprlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, get_args
 
 import numpy as np
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 import jointfrf._kernel as _kernel
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, check_choice, checked_out
-from jointfrf.kernel.memory_maps import chunks, release
+from jointfrf.kernel.memory_maps import chunks, in_one_piece, release
 from jointfrf.kernel.status import RCOND_LIMIT, LineStatus, OnSingular, check_status
 
 __all__ = ["N_FREQ", "VERSION", "call", "call_for_number", "info_of", "kernel_engine", "run", "set_kernel_engine"]
@@ -24,6 +24,8 @@ __all__ = ["N_FREQ", "VERSION", "call", "call_for_number", "info_of", "kernel_en
 VERSION = ".".join(str(int(number)) for number in _kernel.jf_version())
 
 _NO_ENGINE = -1001
+_ON_SINGULAR = get_args(OnSingular)
+_COMPLEX, _INTEGER = np.dtype(np.complex128), np.dtype(np.int32)
 
 #: Stands for the number of lines among the arguments of a kernel routine.
 N_FREQ = object()
@@ -92,25 +94,43 @@ def run(
     result : ndarray, shape `shape`
     status : LineStatus
     """
-    check_choice("on_singular", on_singular, get_args(OnSingular))
+    check_choice("on_singular", on_singular, _ON_SINGULAR)
     n_freq = shape[0]
-    result = np.empty(shape, np.complex128) if out is None else checked_out(out, shape, args, sweeps)
-    status = LineStatus(np.empty(n_freq, np.int32), np.empty(n_freq))
+    result = np.empty(shape, _COMPLEX) if out is None else checked_out(out, shape, args, sweeps)
+    status = LineStatus(np.empty(n_freq, _INTEGER), np.empty(n_freq))
     if not result.size:
         status.line_info[:], status.rcond[:] = 0, 1
     else:
         kernel = getattr(_kernel, "jf_" + routine)
-        n_bad = 0
-        for lines in chunks(result, sweeps):
-            chunk = [_argument(a, lines, sweeps) for a in args]
-            info = kernel(*chunk, result[lines].T, status.line_info[lines], status.rcond[lines])
-            _check_info(routine, info)
-            n_bad += info
-            if lines.stop < n_freq:
-                for array in (result, *sweeps.values()):
-                    release(array[lines])
+        if in_one_piece(result, sweeps):
+            whole = [n_freq if a is N_FREQ else a.T if isinstance(a, np.ndarray) else a for a in args]
+            n_bad = kernel(*whole, result.T, *status)
+            _check_info(routine, n_bad)
+        else:
+            n_bad = _run_in_chunks(routine, kernel, args, result, status, sweeps)
         check_status(routine, status, n_bad, sweeps, freq_hz, on_singular, rcond_limit)
     return result, status
+
+
+def _run_in_chunks(
+    routine: str,
+    kernel: Callable[..., int],
+    args: Sequence[Any],
+    result: ComplexArray,
+    status: LineStatus,
+    sweeps: Mapping[str, NDArray[Any]],
+) -> int:
+    """Call a kernel routine chunk by chunk of lines and return the number of bad ones."""
+    n_bad = 0
+    for lines in chunks(result, sweeps):
+        chunk = [_argument(a, lines, sweeps) for a in args]
+        info = kernel(*chunk, result[lines].T, status.line_info[lines], status.rcond[lines])
+        _check_info(routine, info)
+        n_bad += info
+        if lines.stop < result.shape[0]:
+            for array in (result, *sweeps.values()):
+                release(array[lines])
+    return n_bad
 
 
 def _argument(value: Any, lines: slice, sweeps: Mapping[str, NDArray[Any]]) -> Any:

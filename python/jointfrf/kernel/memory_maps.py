@@ -10,7 +10,7 @@ import numpy as np
 from numpy.lib.array_utils import byte_bounds
 from numpy.typing import NDArray
 
-__all__ = ["CHUNK_BYTES", "chunks", "is_mapped", "release"]
+__all__ = ["CHUNK_BYTES", "chunks", "in_one_piece", "is_mapped", "release"]
 
 #: Arrays in files are processed in chunks of lines; inputs and result of one chunk take about this many bytes.
 CHUNK_BYTES = 64 * 2**20
@@ -25,6 +25,14 @@ def is_mapped(array: NDArray[Any]) -> bool:
     while isinstance(base, np.ndarray):
         base = base.base
     return isinstance(base, mmap.mmap)
+
+
+def in_one_piece(result: NDArray[np.complex128], sweeps: Mapping[str, NDArray[Any]]) -> bool:
+    """Whether a sweep is so small that it is never processed in chunks."""
+    size = result.nbytes
+    for sweep in sweeps.values():
+        size += 16 * sweep.size
+    return size <= CHUNK_BYTES
 
 
 def chunks(result: NDArray[np.complex128], sweeps: Mapping[str, NDArray[Any]]) -> Iterator[slice]:

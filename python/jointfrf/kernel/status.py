@@ -73,7 +73,7 @@ def check_status(
             singular,
             None if freq_hz is None else freq_hz[singular],
         )
-    if not n_bad and status.rcond.min() >= rcond_limit:
+    if not n_bad and np.minimum.reduce(status.rcond) >= rcond_limit:
         return
     poor = np.flatnonzero((status.rcond < rcond_limit) & (info == 0))
     if poor.size:
