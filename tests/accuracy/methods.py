@@ -1,6 +1,6 @@
 """All methods on the published cases, beside the Cramer-Rao bounds of what each of them knows.
 
-    tests/accuracy/run methods                  cases 3.1, 3.2, 3.3 and 4.3.1, 50 draws each
+    tests/accuracy/run methods                  cases 3.1, 3.2, 3.3 and 4.3.1, 30 draws each
     tests/accuracy/run methods 3.3 --draws 10
 
 5 % complex noise of each FRF, draw number i with the seed i; lines, points and first bands of the cases.
@@ -128,7 +128,7 @@ def main() -> None:
     """Print a table for each case asked for."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("cases", nargs="*", help="out of 3.1, 3.2, 3.3, 4.3.1; all by default")
-    parser.add_argument("--draws", type=int, default=50)
+    parser.add_argument("--draws", type=int, default=30)
     parser.add_argument("--workers", type=int, default=None, help="processes; one a core by default")
     args = parser.parse_args()
     with ProcessPoolExecutor(args.workers) as pool:

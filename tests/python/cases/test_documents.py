@@ -44,9 +44,10 @@ def test_python_example_of_solid_bodies(capsys):
 
 
 def test_python_of_the_page_on_fits_with_models_prints_what_it_shows(capsys):
-    (example,) = blocks("python", DOCUMENTS["docs/model-fit.md"])
-    exec(example, {})
-    agree(capsys.readouterr().out, blocks("text", DOCUMENTS["docs/model-fit.md"])[0])
+    shown = blocks("text", DOCUMENTS["docs/model-fit.md"])
+    for example, text in zip(blocks("python", DOCUMENTS["docs/model-fit.md"]), shown, strict=True):
+        exec(example, {})
+        agree(capsys.readouterr().out, text)
 
 
 def test_python_of_the_page_on_files_prints_what_it_shows(capsys, monkeypatch):

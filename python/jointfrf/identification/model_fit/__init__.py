@@ -8,6 +8,7 @@ reduced          a substructure reduced once, its FRFs and their derivatives for
 unknowns         all parameters of a fit in one vector, and the coordinates in which they are sought
 prediction       FRFs between channels, and their derivatives -H dZ H
 likelihood       residuals, priors, information
+noise_about      noise of measured FRFs about fitted ones
 minimum          Levenberg-Marquardt steps inside bounds
 starts           values to start from: K* of the lines, or many trials
 profile          intervals by profile likelihood

@@ -12,10 +12,12 @@ import numpy as np
 
 from jointfrf.errors import IllConditionedWarning
 from jointfrf.frf.noise_model import NoiseModel
+from jointfrf.frf.smoothing import pieces
 from jointfrf.identification.compliance_fit.line_forms import inverse_information
 from jointfrf.identification.model_fit.directions import OpenDirection, open_directions
 from jointfrf.identification.model_fit.likelihood import Likelihood
 from jointfrf.identification.model_fit.minimum import Minimum, minimise
+from jointfrf.identification.model_fit.noise_about import noise_about
 from jointfrf.identification.model_fit.prediction import LineCompliance, Prediction
 from jointfrf.identification.model_fit.profile import ProfileIntervals
 from jointfrf.identification.model_fit.residual_check import ResidualTest, check_residual
@@ -63,6 +65,8 @@ class ModelProblem:
         Responses and forces at the joint DOFs j, then k, where all are measured.
     compliance_start : callable or None
         Returns values of the joint from the compliance fit, or None.
+    tested : ndarray, shape (n_freq, n_o, n_i), optional
+        E|e|^2 found without the models, which the residual is compared with; `variance` by default.
     """
 
     prediction: Prediction
@@ -76,6 +80,7 @@ class ModelProblem:
     is_assumed: bool
     joint_channels: tuple[list[int], list[int]] | None
     compliance_start: Callable[[], FloatArray | None]
+    tested: FloatArray | None = None
 
     @property
     def likelihood(self) -> Likelihood:
@@ -189,7 +194,7 @@ def _values_of_lines(problem: ModelProblem) -> Iterator[FloatArray]:
 
 
 def _with_noise_of_model(problem: ModelProblem, minimum: Minimum) -> ModelProblem | None:
-    """Return the problem with noise relative to fitted FRFs where these fit, or of the level of the residual."""
+    """Return the problem with noise about fitted FRFs where these fit, or of the level of the residual."""
     likelihood = problem.likelihood
     ratio = _ratio(likelihood, minimum, problem.inflation)
     if problem.is_assumed:
@@ -201,7 +206,25 @@ def _with_noise_of_model(problem: ModelProblem, minimum: Minimum) -> ModelProble
     parts = [noise.relative**2 * abs(h) ** 2 + noise.floor**2 for h in (predicted, problem.smooth)]
     usable = np.isfinite(problem.variance) & (parts[0] > 0) & (parts[1] > 0)
     share = np.where(usable, parts[0] / np.where(usable, parts[1], 1), 1)
-    return replace(problem, variance=problem.variance * share, smooth=predicted)
+    tested = problem.variance * share
+    in_pieces = len(pieces(np.argsort(problem.freq_hz))) > 1
+    variance = tested if in_pieces else _about(problem, noise, predicted)
+    return replace(problem, variance=variance, tested=tested, smooth=predicted)
+
+
+def _about(problem: ModelProblem, noise: NoiseModel, predicted: ComplexArray) -> FloatArray:
+    """Return E|e|^2 by what measured FRFs differ from fitted ones, relative part and floor by entry.
+
+    Smooth FRFs are off at antiresonances, which looks like a floor and hides what small FRFs say.
+    """
+    used = np.isfinite(problem.variance).all(axis=0)
+    usual, outlying = noise.line_level, noise.line_factor
+    squares = np.asarray(abs((problem.measured - predicted)[:, used].T) ** 2 / usual, float)
+    size, good = np.asarray(abs(predicted[:, used].T) ** 2, float), outlying == 1
+    relative, floor = noise_about(squares[:, good], size[:, good])
+    variance = np.full(predicted.shape, np.inf)
+    variance[:, used] = ((relative[:, None] * size + floor[:, None]) * usual * outlying).T
+    return variance
 
 
 def _judged(problem: ModelProblem, minimum: Minimum, other: float) -> FoundModel:
@@ -209,7 +232,8 @@ def _judged(problem: ModelProblem, minimum: Minimum, other: float) -> FoundModel
     likelihood, vector = problem.likelihood, problem.vector
     values = vector.to_values(minimum.x)
     predicted = problem.prediction.frfs(vector, values)
-    std = np.sqrt(np.where(likelihood.used, problem.variance, np.nan))
+    tested = problem.variance if problem.tested is None else problem.tested
+    std = np.sqrt(np.where(likelihood.used, tested, np.nan))
     residual = (likelihood.measured - predicted) / std
     test = check_residual(
         residual, problem.freq_hz, vector.pulls(minimum.x),

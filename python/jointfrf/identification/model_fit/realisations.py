@@ -9,11 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from jointfrf.errors import IllConditionedWarning
-from jointfrf.frf.noise_parts import noise_parts
 from jointfrf.identification.model_fit.assembly import Assembly
 from jointfrf.identification.model_fit.fit import FoundModel, fit_assembly
 from jointfrf.identification.model_fit.likelihood import Likelihood
 from jointfrf.identification.model_fit.minimum import minimise
+from jointfrf.identification.model_fit.noise_about import noise_about
 from jointfrf.identification.model_fit.prepare import ChannelNoise, Channels, prepare_model_fit
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.laws.law_joint import LawJoint
@@ -94,7 +94,7 @@ def _noise(first: FoundModel, h: ComplexArray, predicted: ComplexArray) -> _Nois
     """Return the noise of FRFs about fitted ones."""
     used = np.isfinite(first.problem.variance).all(axis=0)
     squares, size = (np.asarray((abs(part[:, used]) ** 2).T, float, "C") for part in (h - predicted, predicted))
-    relative, floor = noise_parts(squares, np.stack([size, np.ones_like(size)]))
+    relative, floor = noise_about(squares, size)
     own = np.maximum(relative[:, None] * size + floor[:, None], np.finfo(float).tiny)
     variance = np.full(h.shape, np.inf)
     variance[:, used] = own.T
