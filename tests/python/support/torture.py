@@ -1,16 +1,17 @@
 """Matrices that torture elimination, and the operations of the kernel in long double as a reference.
 
-A reference solves with complete pivoting in the long double of the machine (64 bits of mantissa and exponents to 1e4932 on
-x86), so that nothing of it overflows and its rounding is 2000 times smaller.
+A reference solves with complete pivoting in the long double of the machine (64 bits of mantissa and exponents to
+1e4932 on x86), so that nothing of it overflows and its rounding is 2000 times smaller.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 
 import numpy as np
 
-__all__ = ["KINDS", "LONG", "OPERATIONS", "REFERENCES", "is_longer", "matrices", "solved"]
+__all__ = ["KINDS", "LONG", "OPERATIONS", "REFERENCES", "is_longer", "matrices", "rounded", "solved"]
 
 Lines = np.ndarray
 LONG = np.clongdouble
@@ -100,7 +101,7 @@ KINDS: dict[str, _Maker] = {
     "graded rows": lambda r, m, n: _normal(r, m, n) * (10.0 ** -np.linspace(0, 12, n))[:, None],
     "graded columns": lambda r, m, n: _normal(r, m, n) * 10.0 ** -np.linspace(0, 12, n),
     "displacements and rotations": lambda r, m, n: _normal(r, m, n) * np.outer(_units(n), _units(n)),
-    "nearly singular": lambda r, m, n: _of_singular_values(r, m, np.r_[np.ones(n - 1), 1e-10][-n:] if n > 1 else np.ones(1)),
+    "nearly singular": lambda r, m, n: _of_singular_values(r, m, np.r_[np.ones(n - 1), 1e-10 if n > 1 else 1.0]),
     "nearly equal rows": lambda r, m, n: _nearly_equal_rows(r, m, n) if n > 1 else _normal(r, m, n),
     "spread singular values": lambda r, m, n: _of_singular_values(r, m, 10.0 ** -np.linspace(0, 8, n)),
 }  # fmt: skip
@@ -111,9 +112,32 @@ def matrices(kind: str, random: np.random.Generator, lines: int, n: int) -> Line
     return np.ascontiguousarray(KINDS[kind](random, lines, n), complex)
 
 
+_steps: list[np.random.Generator] = []
+
+
+@contextmanager
+def rounded(random: np.random.Generator) -> Iterator[None]:
+    """Let each step of a reference change its inputs by rounding, relative to the largest number of the line."""
+    _steps.append(random)
+    try:
+        yield
+    finally:
+        _steps.pop()
+
+
+def _noise(a: Lines) -> Lines | float:
+    if not _steps:
+        return 0.0
+    parts = _steps[-1].uniform(-1, 1, (2, *a.shape))
+    return np.finfo(float).eps * abs(a).max(axis=(1, 2), keepdims=True) * (parts[0] + 1j * parts[1])
+
+
 def solved(a: Lines, b: Lines) -> Lines:
-    """Return A^-1 B of every line in long double, by Gauss-Jordan with complete pivoting."""
-    a, b = np.array(a, LONG), np.array(b, LONG)
+    """Return A^-1 B of every line in long double, by Gauss-Jordan with complete pivoting.
+
+    Within `rounded`, of A and B that are changed as a backward stable elimination in double precision changes them.
+    """
+    a, b = (each + _noise(each) for each in (np.array(a, LONG), np.array(b, LONG)))
     m, n = a.shape[:2]
     line, columns = np.arange(m), np.tile(np.arange(n), (m, 1))
     for step in range(n):
