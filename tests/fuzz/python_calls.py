@@ -258,7 +258,7 @@ def _fingerprint(value: Any, depth: int = 0) -> int:
         return _fingerprint([*value.keys(), *value.values()], depth + 1)
     if isinstance(value, list | tuple | np.ndarray):
         found = 1
-        for each in value:
+        for each in value.ravel() if isinstance(value, np.ndarray) else value:
             found = zlib.crc32(str(_fingerprint(each, depth + 1)).encode(), found)
         return found
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
