@@ -18,6 +18,8 @@ module jointfrf_lines_lapack
   integer, parameter :: exact_condition = 32
   !> A matrix of a larger norm is scaled, by a power of two: |z|^2 and sums of products overflow in LAPACK.
   real(dp), parameter :: large = 2.0_dp**900
+  !> One of a smaller norm is scaled, too: reciprocals of its pivots, and squares of them, are beyond all numbers.
+  real(dp), parameter :: small = 2.0_dp**(-900)
 
 contains
 
@@ -67,7 +69,7 @@ contains
     info = line_good
     if (n == 0 .or. size(b, 2) == 0) return        ! OpenBLAS does not factor A without right-hand sides
     call space%take_pivots(int(n), pivot)
-    call bring_down(a, norm, factor)
+    call bring_near_one(a, norm, factor)
     call zgesv(n, size(b, 2, kind=blas_ip), a, n, pivot, b, n, code)
     info = int(code, ip)
     if (info /= line_good) return
@@ -136,7 +138,7 @@ contains
     info = line_good
     if (n == 0) return
     call space%take_pivots(int(n), pivot)
-    call bring_down(a, norm, factor)
+    call bring_near_one(a, norm, factor)
     call zgetrf(n, n, a, n, pivot, code)
     info = int(code, ip)
     if (info /= line_good) return
@@ -151,31 +153,34 @@ contains
     else
       rcond = min(1.0_dp, (1.0_dp/norm)/one_norm(a))
       call multiply_by(factor, a)                  ! A^-1 = factor (factor A)^-1
+      if (factor > 1.0_dp) then
+        if (.not. all_finite(a)) info = line_overflow
+      end if
     end if
   end subroutine invert_line
 
-  !> Scale a matrix whose norm is large down, to a modest one.
+  !> Scale a matrix whose norm is large down and one whose norm is small up, to a modest one.
   !> norm     of the scaled matrix
-  !> factor   by which it was multiplied, a power of two; 1 where the norm is not large
-  pure subroutine bring_down(a, norm, factor)
+  !> factor   by which it was multiplied, a power of two; 1 where the norm is neither large nor small
+  pure subroutine bring_near_one(a, norm, factor)
     complex(dp), contiguous, intent(inout) :: a(:, :)
     real(dp), intent(out) :: norm, factor
 
     factor = 1.0_dp
     norm = one_norm(a)
-    if (norm <= large) return
+    if ((norm >= small .and. norm <= large) .or. norm <= 0) return
     ! Never denormal, which a processor may take for zero.
-    factor = scale(1.0_dp, -min(exponent(max(maxval(abs(real(a, dp))), maxval(abs(aimag(a))))), 1000))
+    factor = scale(1.0_dp, -max(-1000, min(exponent(max(maxval(abs(real(a, dp))), maxval(abs(aimag(a))))), 1000)))
     call multiply_by(factor, a)
     norm = one_norm(a)
-  end subroutine bring_down
+  end subroutine bring_near_one
 
-  !> A becomes factor A, each part by itself: no product of it overflows.
+  !> A becomes factor A, each part by itself: no product of it overflows but with a factor beyond 1.
   pure subroutine multiply_by(factor, a)
     real(dp), intent(in) :: factor
     complex(dp), contiguous, intent(inout) :: a(:, :)
 
-    if (factor < 1.0_dp) a = cmplx(factor*real(a, dp), factor*aimag(a), dp)
+    if (factor < 1.0_dp .or. factor > 1.0_dp) a = cmplx(factor*real(a, dp), factor*aimag(a), dp)
   end subroutine multiply_by
 
   !> C = C + factor op(A) op(B), op by 'N', 'T' or 'C', with zgemm.

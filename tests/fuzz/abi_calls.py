@@ -1,7 +1,8 @@
 """Random calls of every routine of the flat interface, as C and Fortran programs make them, each array within guards.
 
-Routines, arguments and shapes are those of api.F90, read as the build reads them. A call must answer with a code; it must
-leave guards and inputs alone, fill all lines of a bad one with NaN, and give the same bits when it is made again.
+Routines, arguments and shapes are those of api.F90, read as the build reads them. A call must answer with a code;
+it must leave guards and inputs alone, fill all lines of a bad one with NaN, and give the same bits when it is made
+again.
 """
 
 from __future__ import annotations

@@ -45,15 +45,15 @@ class Commands:
         words = [name, *self._words(self.commands[name], random)]
         said, told = io.StringIO(), io.StringIO()
         status: Any = 0
-        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(told), contextlib.chdir(self.folder):
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")
-                try:
-                    status = main(words)
-                except SystemExit as end:
-                    status = end.code
-                except BaseException as error:
-                    raise BrokenError(f"{words}: {type(error).__name__}: {error}") from None
+        quiet = warnings.catch_warnings()
+        with quiet, contextlib.redirect_stdout(said), contextlib.redirect_stderr(told), contextlib.chdir(self.folder):
+            warnings.simplefilter("ignore")
+            try:
+                status = main(words)
+            except SystemExit as end:
+                status = end.code
+            except BaseException as error:
+                raise BrokenError(f"{words}: {type(error).__name__}: {error}") from None
         if status not in (0, 1, 2, None) or "Traceback" in told.getvalue():
             raise BrokenError(f"{words}: status {status}: {told.getvalue()[:300]!r}")
         if status and not told.getvalue().strip() and not said.getvalue().strip():

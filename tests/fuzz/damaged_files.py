@@ -1,7 +1,8 @@
 """Files of FRFs of every format, damaged: read as far as they go, or refused in one sentence that names the file.
 
-What carries a checksum of its content (NPZ and HDF5 of our own, and whatever zip and deflate check) must never give other
-numbers without a word. Of text and plain binary numbers nobody can know: there a changed digit is counted, no more.
+What carries a checksum of its content (NPZ and HDF5 of our own, and whatever zip and deflate check) must never give
+other numbers without a word. Of text and plain binary numbers nobody can know: there a changed digit is counted, no
+more.
 """
 
 from __future__ import annotations
@@ -12,11 +13,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from uff_exporters import EXPORTERS
 
 import jointfrf as jf
 from frf_files import FREQ_HZ, frf_set, full_set, names, structure_of_testlab, write_mat, write_mat73, write_sdynpy
 from jointfrf.io import FrfSet, read_frfs, write_csv, write_hdf5, write_npz, write_uff
+from uff_exporters import EXPORTERS
 
 from .part import BrokenError
 
@@ -109,9 +110,7 @@ def _same(one: tuple[Any, ...], other: tuple[Any, ...]) -> bool:
         if isinstance(a, np.ndarray) and isinstance(b, np.ndarray):
             if a.shape != b.shape or not np.array_equal(a, b, equal_nan=True):
                 return False
-        elif not isinstance(a, np.ndarray) and isinstance(b, np.ndarray):
-            return False
-        elif isinstance(a, np.ndarray) or a != b:
+        elif (not isinstance(a, np.ndarray) and isinstance(b, np.ndarray)) or isinstance(a, np.ndarray) or a != b:
             return False
     return True
 

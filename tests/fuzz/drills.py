@@ -23,7 +23,7 @@ from jointfrf.io import read_frfs
 
 from .watch import Found
 
-__all__ = ["DRILLS", "ROOT", "disk_full", "kills", "run_drill", "run_kills", "small_clone", "set_ups", "set_up"]
+__all__ = ["DRILLS", "ROOT", "disk_full", "kills", "run_drill", "run_kills", "set_up", "set_ups", "small_clone"]
 
 ROOT = Path(__file__).resolve().parents[2]
 _SUFFIXES = ("uff", "npz", "h5", "csv")

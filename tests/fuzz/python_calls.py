@@ -1,7 +1,7 @@
 """Random calls of every public function, with the parameters that its signature names, and of methods of its results.
 
-Functions and classes must answer with a result or with one sentence of their own kind. Methods may refuse in the words of
-Python, too; those that take arrays of the package's own kind (annotated FloatArray, ...) serve its classes among
+Functions and classes must answer with a result or with one sentence of their own kind. Methods may refuse in the words
+of Python, too; those that take arrays of the package's own kind (annotated FloatArray, ...) serve its classes among
 themselves and get what these hand over.
 """
 
@@ -35,8 +35,10 @@ __all__ = ["PythonCalls", "public_callables"]
 #: Errors that a caller has to expect. IndexError, KeyError, AttributeError, ZeroDivisionError ... are foreign.
 _EXPECTED = (ValueError, TypeError, OverflowError, np.linalg.LinAlgError, OSError, jf.MissingPackageError)
 #: Words of messages that were not written for the caller of this package.
-_FOREIGN = ("ufunc", "ambiguous", "broadcast", "did not converge", "object has no attribute", "object is not", "gufunc",
-            "'NoneType'", "unsupported operand", "not subscriptable", "setting an array element", "_kernel")  # fmt: skip
+_FOREIGN = (
+    "ufunc", "ambiguous", "broadcast", "did not converge", "object has no attribute", "object is not", "'NoneType'",
+    "unsupported operand", "not subscriptable", "setting an array element", "_kernel",
+)  # fmt: skip
 #: One in so many calls is of these: they take their time.
 _SLOW = {
     "preload": 3000, "bolted_lap": 2000, "identify_model": 400, "identify": 60, "identify_realisations": 80,
@@ -256,7 +258,7 @@ def _fingerprint(value: Any, depth: int = 0) -> int:
         return _fingerprint([*value.keys(), *value.values()], depth + 1)
     if isinstance(value, list | tuple | np.ndarray):
         found = 1
-        for each in value:
+        for each in value.ravel() if isinstance(value, np.ndarray) else value:
             found = zlib.crc32(str(_fingerprint(each, depth + 1)).encode(), found)
         return found
     if dataclasses.is_dataclass(value) and not isinstance(value, type):

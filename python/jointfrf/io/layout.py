@@ -93,7 +93,8 @@ def own_arrays(fields: Mapping[str, Any], where: str) -> FrfArrays:
     layout = np.asarray(fields[MARK])
     if layout.size != 1 or layout.dtype.kind not in "iu" or int(layout.item()) not in (_LAYOUT, _UNCHECKED):
         raise FileContentError(
-            f"{where} has layout {fields[MARK]!s:.20}, this version of jointfrf reads layouts {_UNCHECKED} and {_LAYOUT}"
+            f"{where} has layout {fields[MARK]!s:.20}, this version of jointfrf reads layouts "
+            f"{_UNCHECKED} and {_LAYOUT}"
         )
     required = _REQUIRED if int(layout.item()) == _UNCHECKED else (*_REQUIRED, _CHECKSUM)
     missing = [name for name in required if name not in fields]

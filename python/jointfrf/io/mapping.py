@@ -154,7 +154,7 @@ def _field(flat: Mapping[str, Any], name: str, given: Any, where: str) -> tuple[
 
 
 def _names(flat: Mapping[str, Any]) -> str:
-    shown = list(flat)[:12]
+    shown = [name if len(name) <= 30 else f"{name[:27]}..." for name in list(flat)[:12]]
     return ", ".join(shown) + (f" and {len(flat) - 12} more" if len(flat) > 12 else "") if shown else "nothing"
 
 

@@ -125,7 +125,8 @@ def test_reciprocity_is_kept(case):
 def test_scaling_by_a_power_of_two_is_exact(case, power):
     """FRFs in units of 2^p are the same numbers times 2^p: no digit depends on the unit.
 
-    Lines whose numbers lie beyond 2^+-120 or so leave the closed forms of small orders for LAPACK: within rounding then.
+    Lines whose numbers lie beyond 2^+-120 or so leave the closed forms of small orders for LAPACK: within rounding
+    then.
     """
     n, h_a, h_b, k, first = case
     unit = 2.0**power

@@ -15,8 +15,8 @@ from pathlib import Path
 
 #: What a static OpenBLAS must be asked for, so that its threads are held (fortran/runtime/blas_threads.c).
 THREAD_CONTROL = "-Wl,-u,openblas_get_parallel"
-#: Words that tell other libraries from the reference one, which may have the same name: Debian's BLIS is a libblas.so.3,
-#: too, which hides its own functions but names its source files.
+#: Words that tell other libraries from the reference one, which may have the same name: Debian's BLIS is a
+#: libblas.so.3, too, which hides its own functions but names its source files.
 OTHERS = (b"openblas", b"flexiblas", b"bli_", b"mkl_", b"ATL_")
 
 
@@ -111,8 +111,8 @@ def mkl(folders: list[Path], interface: str = "LP64") -> Iterator[Lapack]:
 def blis(folders: list[Path]) -> Iterator[Lapack]:
     """BLIS brings a BLAS only; the LAPACK above it is the reference one, of which the BLAS, if it is there, comes last.
 
-    Where its threads have to share processors, each product of small matrices waits for them. The kernel holds them where
-    it finds the functions for it: a libblis exports them, the libblas.so.3 of Debian's BLIS does not.
+    Where its threads have to share processors, each product of small matrices waits for them. The kernel holds them
+    where it finds the functions for it: a libblis exports them, the libblas.so.3 of Debian's BLIS does not.
     """
     lapack, blas = of_netlib(folders, "liblapack.so.3"), of_netlib(folders, "libblas.so.3")
     for file in find(folders, "libblis*.so.*", "libblis.so"):

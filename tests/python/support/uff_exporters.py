@@ -1,12 +1,12 @@
 """Universal Files as programs export them, each form with where it was seen.
 
-Every form holds one measurement: accelerances of two responses and one hammer, five lines. The layout (line ends, padding,
-letters of exponents, order and content of headers, form of the numbers) is that of the source; where the file of the source
-is a time history or holds no measurement of forces, records 6 to 10 are those of FRFs. Sources:
+Every form holds one measurement: accelerances of two responses and one hammer, five lines. The layout (line ends,
+padding, letters of exponents, order and content of headers, form of the numbers) is that of the source; where the
+file of the source is a time history or holds no measurement of forces, records 6 to 10 are those of FRFs. Sources:
 
-definition   SDRC's definitions of datasets 58, 151, 164, 15 and 2411 and the one of 58b by the Structural Dynamics Research
-             Laboratory, University of Cincinnati (byte ordering 1 and 2; floating-point formats DEC VMS, IEEE 754, IBM; "no
-             CR/LF characters embedded in or following the binary data")
+definition   SDRC's definitions of datasets 58, 151, 164, 15 and 2411 and the one of 58b by the Structural Dynamics
+             Research Laboratory, University of Cincinnati (byte ordering 1 and 2; floating-point formats DEC VMS,
+             IEEE 754, IBM; "no CR/LF characters embedded in or following the binary data")
 pyuff        files of measurement programs among the test data of pyuff (github ladisk/pyuff, folder data)
 issue 38     github ladisk/pyuff: a program whose 58b counts a line end after the numbers among their bytes
 NI           manual of the Sound and Vibration Toolkit for LabVIEW, SV UFF58 Format ASCII Header
@@ -144,7 +144,7 @@ _TESTLAB = Form(padded=True, exponent="E+00", units=("m/s2", "N"), id_lines=(
 
 
 def _testlab() -> bytes:
-    """LMS Test.Lab: pyuff, TestLab 161 164 18 15 82.uff: delimiters of 80 columns before sets 151 and 164, of 6 after."""
+    """LMS Test.Lab: pyuff, TestLab 161 164 18 15 82.uff: delimiters of 80 columns for sets 151 and 164, then of 6."""
     plain = replace(_TESTLAB, padded=False)
     head = _dataset(_TESTLAB, 151, "AME_Test", "NONE", "LMS Test.Lab Rev project-15A", "11-Oct-17 09:34:21",
                     "11-Oct-17 09:34:21", "LMS Test.Lab Rev project-15A", "17-Oct-17 13:50:13 ")  # fmt: skip
@@ -212,7 +212,8 @@ EXPORTERS: dict[str, Callable[[], bytes]] = {
         padded=True, exponent="E+000", encoding="utf-8", units=("m/s²", "N"), types=(1, 13),
         id_lines=("1x : m/s²", "UFF58 file created by HBM catman", "30-Apr-20 19:12:52", "NONE", "NONE"))),
     # pyuff, dataset_milestone_in_header.uff: delimiters of 80 columns, empty records of 80 blanks
-    "delimiters of 80 columns": lambda: _pair(Form(padded=True, id_lines=("M.REDON", "", "07-Dec-17 14:38:01", "", ""))),
+    "delimiters of 80 columns": lambda: _pair(Form(
+        padded=True, id_lines=("M.REDON", "", "07-Dec-17 14:38:01", "", ""))),
     # pyuff, sample_dataset58_psd.uff (VibControl): abscissa "Hz" of an unknown data type, uneven, units in Latin-1
     "VibControl": lambda: _pair(Form(
         uneven=True, abscissa=(0, "Hz"), units=("m/s²", "N"),
@@ -220,7 +221,8 @@ EXPORTERS: dict[str, Callable[[], bytes]] = {
     # pyuff, non_ascii_header.uff: one label for the whole ratio, numerator of general type
     "one label for the ratio": lambda: _pair(Form(
         exponent="e+00", units=("(1/N)*(m/s²)", "NONE"), types=(1, 0),
-        id_lines=("ref6_23_Mar".ljust(80), "NONE", "23-Mar-17 19:02:23", "Record 1 of Dataset no 58", "H1 : #  2 / #  1"))),
+        id_lines=("ref6_23_Mar".ljust(80), "NONE", "23-Mar-17 19:02:23", "Record 1 of Dataset no 58",
+                  "H1 : #  2 / #  1"))),
     # NI
     "NI Sound and Vibration Toolkit": lambda: _pair(Form(
         id_lines=("Frequency response".ljust(80), "NONE".ljust(80), "18-04-16 13:49:58".ljust(80), "NONE".ljust(80),

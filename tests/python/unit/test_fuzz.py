@@ -11,11 +11,11 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 pytest.importorskip("h5py")
 pytest.importorskip("pyuff")
 
-from fuzz import drills  # noqa: E402
-from fuzz.part import BrokenError, random_of  # noqa: E402
-from fuzz.parts import PARTS, make_part  # noqa: E402
-from fuzz.python_calls import public_callables  # noqa: E402
-from fuzz.watch import Found, attack  # noqa: E402
+from fuzz import drills
+from fuzz.part import BrokenError, random_of
+from fuzz.parts import PARTS, make_part
+from fuzz.python_calls import public_callables
+from fuzz.watch import Found, attack
 
 SHORT = {"calls": 700, "files": 150, "abi": 1500, "overlaps": 50, "commands": 8}
 linux = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="processes and limits of Linux")

@@ -335,3 +335,54 @@ def test_pipes_and_devices_are_not_waited_for(tmp_path, suffix):
     assert "is a pipe or a device, not a file" in refused(Path("/dev/zero"))
     with pytest.raises(FileContentError, match="is a pipe or a device, not a file"):
         read_uff(pipe)
+
+
+def test_files_beyond_a_limit_are_not_read(tmp_path, monkeypatch):
+    path = tmp_path / "own.npz"
+    write_npz(path, GIVEN)
+    monkeypatch.setenv("JOINTFRF_FILE_LIMIT_GB", "1e-6")
+    assert "more than the 1e-06 GB that are read: the environment variable JOINTFRF_FILE_LIMIT_GB" in refused(path)
+    monkeypatch.setenv("JOINTFRF_FILE_LIMIT_GB", "2")
+    np.testing.assert_array_equal(read_frfs(path).h, GIVEN.h)
+    monkeypatch.setenv("JOINTFRF_FILE_LIMIT_GB", "much")
+    with pytest.raises(FileContentError, match="JOINTFRF_FILE_LIMIT_GB is 'much': it must be a number of GB"):
+        read_frfs(path)
+
+
+@pytest.mark.parametrize("name", ["own.npz", "own.h5"])
+@pytest.mark.parametrize("lost", ["coherence", "averages", "coordinates", "nodes", "unit", "sha256"])
+def test_a_field_that_was_lost_is_noticed(tmp_path, name, lost):
+    """All but the checksum itself may be absent; a file that had one and lost it is damaged."""
+    path = tmp_path / name
+    MAKERS[name](path)
+    if name == "own.npz":
+        with np.load(path) as archive:
+            fields = {key: archive[key] for key in archive.files if key != lost}
+        np.savez(path, **fields)
+    else:
+        with h5py.File(path, "r+") as file:
+            del file[lost]
+    assert "is damaged or was edited" in refused(path) if lost != "sha256" else "lacks sha256" in refused(path)
+
+
+def test_a_name_with_a_line_end_does_not_split_the_message(tmp_path):
+    path = tmp_path / "a\nb.npz"
+    path.write_bytes(b"PK\x03\x04 and nothing")
+    with pytest.raises(FileContentError) as caught:
+        read_frfs(path)
+    assert "\n" not in str(caught.value)
+
+
+def test_no_file_of_any_kind_is_waited_for(tmp_path):
+    """Tables of channels, matrices, DOF names, joints and TOML files, too."""
+    from jointfrf import JointFit
+    from jointfrf.io import read_channel_table
+    from jointfrf.io.matrix_file import read_dof_names, read_matrix
+    from jointfrf.toml.table import read_toml
+
+    for suffix, read in ((".csv", read_channel_table), (".toml", read_channel_table), (".toml", read_toml),
+                         (".mtx", read_matrix), (".txt", read_dof_names), (".json", JointFit.load)):  # fmt: skip
+        pipe = tmp_path / f"{read.__name__}{suffix}"
+        os.mkfifo(pipe)
+        with pytest.raises(FileContentError, match="is a pipe or a device, not a file"):
+            read(pipe, "") if read is read_matrix else read(pipe)

@@ -25,3 +25,68 @@ FREQ = np.arange(1.0, 6.0)
 def test_the_argument_is_named(random_lines, call, message):
     with pytest.raises(TypeError, match=f"^{message}$"):
         call(random_lines(5, 2))
+
+
+def chain():
+    return jf.chain([5, 3], [2500, 3500], ground="start")
+
+
+SPRING = jf.SpringLaw(1e3)
+FREQUENCIES = np.linspace(1.0, 9.0, 9)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: jf.Assembly("a", chain(), jf.Joint([1.0])), "a must be a Substructure, not str"),
+        (lambda: jf.Substructure(chain(), None), "joint must be a sequence of names, not None"),
+        (lambda: jf.Substructure(chain(), ["2:x"], [1]), "unknowns must be a mapping of names to Unknown, not list"),
+        (lambda: jf.LawJoint([SPRING]), "laws must be a mapping by the names of DOFs"),
+        (lambda: jf.LawJoint({"x": SPRING}, mass=[1.0]), "mass must be a mapping by the names of DOFs"),
+        (lambda: jf.LawJoint({"x": SPRING}, rigid=True), "rigid must be a sequence of names, not True"),
+        (lambda: jf.LawJoint.of_joint([1.0]), "joint must be a Joint, not list"),
+        (lambda: jf.LawField("k", "stiffness").unit(10**20), "rotations must be 0, 1 or 2, not 1000"),
+        (lambda: jf.FunctionLaw(1, 2, 3, [1.0]), "fields must be a sequence of LawField, not int"),
+        (lambda: jf.AddedMass((), 0.1), "dofs must name at least one DOF"),
+        (lambda: jf.GroundSpring(3, 1.0), "dof must be a str, not int"),
+        (lambda: jf.Unknown(1.0, lower=[0.0]), "bounds must be real numbers, not"),
+        (lambda: jf.difference_error(0.01, [1.0, 2.0], 1.0), "bending_stiffness must be one real number, not"),
+        (lambda: jf.central_difference(np.eye(2)[None], 0.1, sign=[]), "sign must be one real number, not"),
+        (lambda: jf.interface([1], [2], ["y"], None), "coordinates must be a mapping of nodes to x, y, z"),
+        (lambda: jf.interface(None, [2], ["y"], {}), "points_j must be a list of node numbers, not None"),
+        (lambda: jf.append_virtual_point(np.eye(3)[None], [0], [1.0]), "point must be a VirtualPoint, not list"),
+        (lambda: jf.interpolation([(1, 2)], [[0, 0, 0]]), "mesh must be a Mesh, not list"),
+        (lambda: jf.Mesh(np.zeros((8, 3)), np.array([[0, 1, 2, 3, 4, 5, 6, 8]])), "elements must name nodes 0 to 7"),
+        (lambda: jf.Mesh(np.zeros((8, 3)), np.zeros((1, 7), int)), "elements must hold eight node numbers each"),
+        (lambda: jf.places_of_nodes(None, [1], [2]), "frfs must be a FrfSet, not NoneType"),
+        (lambda: jf.assemble(chain(), "b", jf.Joint([1.0]), [0], [0]), "b must be a Model, not str"),
+        (lambda: jf.Model(3.0, np.eye(2), ("x", "y")), r"stiffness must be a square matrix, not of shape \(\)"),
+        (lambda: chain().index([1.0]), r"names must be a sequence of names, not"),
+        (lambda: jf.beam([], 3, youngs_modulus=1, density=1, width=1, height=1), "length must be one real number"),
+        (lambda: jf.beam(1e-300, 3, youngs_modulus=1, density=1, width=1, height=1), "length 1e-300 m, width 1 m"),
+        (lambda: jf.beam(1, 3, youngs_modulus=1, density=1, width=1e-320, height=1e-9), "no second moment of area"),
+        (lambda: jf.Joint([1.0], dofs=False), "dofs must be a sequence of names, not False"),
+        (lambda: jf.Joint([1.0, [2.0]]), "stiffness must be an array of numbers: its rows differ in length or kind"),
+        (lambda: jf.Joint([1.0, 2.0], loss_factor=[1, 2, 3]), r"loss_factor must have shape \(2\), not \(3,\)"),
+        (lambda: jf.pollute(np.ones((1, 1, 1)), 0.1, seed=None), "seed must be a whole number, not None"),
+        (lambda: jf.io.Channel(None, "+y"), "node must be a whole number, not None"),
+        (lambda: jf.io.Channel(1, 2.0), "direction must be a str, not float"),
+        (lambda: jf.io.FrfSet([1.0], None, (), [[[1.0]]]), "responses must be a tuple of Channel, not NoneType"),
+        (lambda: jf.io.merge_frfs(np.zeros(0)), "sets must be a list of FrfSet"),
+        (lambda: jf.io.read_frfs("none", mapping=[1]), "mapping must be a mapping or an FrfMapping, not list"),
+        (lambda: jf.io.read_uff("none", nodes=3), "nodes must be a list of node numbers, not 3"),
+        (lambda: jf.io.write_npz("none", 3), "frfs must be a FrfSet, not int"),
+        (lambda: jf.io.write_uff("none", 3), "frfs must be a FrfSet, not int"),
+        (lambda: jf.smooth_frfs(FREQUENCIES, np.ones((9, 1, 1)), max_poles=None), "max_poles must be a whole number"),
+        (lambda: jf.estimate_noise(FREQUENCIES, np.ones((9, 1, 1)), like="x"), "like must be a NoiseModel, not str"),
+        (lambda: jf.propose_bands(FREQUENCIES, FREQUENCIES, drop_db="x"), "drop_db must be one real number, not 'x'"),
+        (lambda: jf.band_mean(FREQUENCIES, np.ones((9, 1, 1)), dofs=False), "dofs must be a sequence of names"),
+        (lambda: jf.rigid_offset(np.array([["x"]]), [0, 0, 0]), "dofs must be a sequence of names, not"),
+    ],
+)  # fmt: skip
+def test_one_sentence_of_our_own(call, message):
+    """All of these were AttributeError, IndexError, ZeroDivisionError, or a sentence of numpy's."""
+    with pytest.raises((TypeError, ValueError), match=message) as raised:
+        call()
+    assert "\n" not in str(raised.value)
+    assert len(str(raised.value)) < 300

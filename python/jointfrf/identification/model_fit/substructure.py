@@ -11,7 +11,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from jointfrf.identification.model_fit.unknown import Unknown
-from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_frequency, as_names, as_square, check_finite_lines
+from jointfrf.kernel.arguments import (
+    ComplexArray,
+    FloatArray,
+    as_frequency,
+    as_names,
+    as_square,
+    check_finite_lines,
+    one_line,
+)
 from jointfrf.models.model import Model
 
 __all__ = ["FrfSource", "Substructure"]
@@ -118,7 +126,7 @@ class Substructure:
         check_finite_lines("h", lines, freq)
         names = as_names("dofs", dofs)
         if len(names) != lines.shape[1] or len(set(names)) != len(names):
-            raise ValueError(f"dofs must name {lines.shape[1]} different DOFs, not {', '.join(names)}")
+            raise ValueError(f"dofs must name {lines.shape[1]} different DOFs, not {one_line(names)}")
         return cls(FrfSource(freq, lines, names), as_names("joint", joint))
 
     @property
