@@ -109,7 +109,7 @@ def _over(
         suffix = f"-{number}" if len(others) > 1 else ""
         clean = "".join(c if c.isalnum() else "-" for c in name).strip("-")
         what = factor_label(name).partition(",")[0]
-        told = caption.format(f"the {what}" if " " in what or what == name else what)
+        told = caption.format(f"the {what}")
         yield Figure(f"{key}-{clean}{suffix}", told + (f": {heading}" if heading else ""),
                      panels, columns=1 if len(panels) < 2 else 2, heading=heading)  # fmt: skip
 
