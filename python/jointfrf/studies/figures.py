@@ -37,10 +37,10 @@ def study_figures(record: StudyRecord, summary: Sequence[ParameterSummary]) -> l
     return [figure for figure in figures if not all(panel.is_blank for panel in figure.panels)]
 
 
-_RMSE = "Root-mean-square error over {}, and least standard deviation of an unbiased estimate (Cramér-Rao bound)."
+_RMSE = "Root-mean-square error over {}, and least standard deviation of an unbiased estimate (Cramér-Rao bound)"
 _COVERAGE = (
     "Share of the 95 % intervals that hold the actual value, over {}; shaded: where it lies for intervals that hold, "
-    "in 95 % of studies of so many realisations."
+    "in 95 % of studies of so many realisations"
 )
 
 
@@ -79,9 +79,9 @@ def _distributions(summary: Sequence[ParameterSummary]) -> Figure:
             levels=(Level("actual", around, "actual"),) if around is not None else (),
             x_limits=bulk_limits(values, around=around) if values else None,
         ) if rows else Panel("", "", ""))  # fmt: skip
-    caption = "Estimates: median, and 2.5 to 97.5 percentile."
+    caption = "Estimates: median, and 2.5 to 97.5 percentile"
     if len(summary) > _MOST_INTERVALS * len(panels):
-        caption += f" The first {_MOST_INTERVALS} of each parameter; the table has all."
+        caption += f"; the first {_MOST_INTERVALS} of each parameter, the table has all"
     return Figure("distributions", caption, tuple(panels), columns=1 if len(panels) < 2 else 2)
 
 
@@ -109,8 +109,8 @@ def _over(
         suffix = f"-{number}" if len(others) > 1 else ""
         clean = "".join(c if c.isalnum() else "-" for c in name).strip("-")
         what = factor_label(name).partition(",")[0]
-        told = caption.format(f"the {what}" if " " in what or what == name else what)
-        yield Figure(f"{key}-{clean}{suffix}", told + (f" {heading[0].upper()}{heading[1:]}." if heading else ""),
+        told = caption.format(f"the {what}")
+        yield Figure(f"{key}-{clean}{suffix}", told + (f": {heading}" if heading else ""),
                      panels, columns=1 if len(panels) < 2 else 2, heading=heading)  # fmt: skip
 
 

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from jointfrf.cases.studied import Estimates
 from jointfrf.extras import check_extras, import_extra
 from jointfrf.files import write_file, written_whole
+from jointfrf.report.document import Document, Listing, Picture, Section, make_document
 from jointfrf.report.draw import draw
 from jointfrf.report.figure import Figure, figure_csv
-from jointfrf.report.page import Page, make_page
 from jointfrf.report.table import Table, table_csv
 from jointfrf.studies.design import in_words
 from jointfrf.studies.store import GroupRecord, StudyRecord, StudyStore
@@ -39,16 +39,13 @@ def write_report_of(
         write_file(folder / "figures" / f"{figure.key}.csv", figure_csv(figure))
     write_file(folder / "tables" / "study.csv", table_csv(table))
     write_file(folder / "results.json", json.dumps(content, indent=1) + "\n")
-    page = Page(
-        title=f"Study: {record.title}",
-        about=_about(record),
-        summary=[],
-        tables=[table],
-        figures=drawn,
-        subject="The study",
-        sources=[("case and design", json.dumps(record.identity, indent=1))],
-    )
-    write_file(folder / "report.html", make_page(page))
+    sections = [
+        Section("estimates", "Estimates", [table]),
+        Section("figures", "Figures", [Picture(figure, drawing) for figure, drawing in drawn]),
+        Section("subject", "The study", [Listing("case and design", json.dumps(record.identity, indent=1))]),
+    ]
+    page = make_document(Document(f"Study: {record.title}", _about(record), sections))
+    write_file(folder / "report.html", page)
     return folder / "report.html"
 
 
