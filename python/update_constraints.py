@@ -21,12 +21,15 @@ HEAD = """\
 # What tests/run, cases/run and build_wheel.sh install. Written by python/update_constraints.py.
 # On Python {after} and later, for which some of these have no wheel, they do not apply.
 """
+#: Built from source with a library of the system: no wheel to lock.
+FROM_SOURCE = ("python-mumps",)
 
 
 def requirements(project: dict) -> list[str]:
     """Everything that pyproject.toml asks for, build and extras included."""
     groups = project["project"]["optional-dependencies"].values()
-    return [*project["build-system"]["requires"], *project["project"]["dependencies"], *(r for g in groups for r in g)]
+    extras = [each for group in groups for each in group if not each.startswith(FROM_SOURCE)]
+    return [*project["build-system"]["requires"], *project["project"]["dependencies"], *extras]
 
 
 def resolve(python: str, wanted: list[str], *options: str) -> dict[str, str] | None:

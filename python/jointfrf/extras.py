@@ -13,6 +13,9 @@ _EXTRAS = {
     "h5py": ("HDF5 files (MATLAB 7.3 among them)", "hdf5"),
     "jinja2": ("reports", "report"),
     "matplotlib": ("figures", "plot"),
+    "mumps": ("factors by MUMPS", "mumps"),
+    "pymetis": ("orders of elimination by METIS", "metis"),
+    "pypardiso": ("factors by PARDISO", "pardiso"),
     "pyuff": ("Universal Files", "uff"),
     "shtab": ("completions for shells", "completion"),
 }

@@ -122,6 +122,11 @@ class ModelMatrices:
         return is_symmetric(self.sparse(name))
 
     @cached_property
+    def are_symmetric(self) -> bool:
+        """Whether all matrices are symmetric."""
+        return all(self.is_symmetric(name) for name, matrix in self.named.items() if matrix is not None)
+
+    @cached_property
     def proportional(self) -> tuple[float, float, float] | None:
         """(a, b, eta) where C = a M + b K and all structural damping is eta K, else None; 1/s, s, 1."""
         k, m = self.sparse("stiffness"), self.sparse("mass")

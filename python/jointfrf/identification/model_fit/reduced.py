@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from scipy import linalg
-from scipy.sparse import linalg as sparse_linalg
 
 from jointfrf.identification.model_fit.matrix_polynomial import MatrixPolynomial
 from jointfrf.identification.model_fit.substructure import FrfSource, Substructure, check_same_lines
@@ -17,7 +16,7 @@ from jointfrf.kernel.linear_algebra import solve
 from jointfrf.models.matrices import ModelMatrices
 from jointfrf.models.model import Model
 from jointfrf.models.ports import as_ports
-from jointfrf.models.receptance.direct import SYMMETRIC
+from jointfrf.models.receptance.factors import SparseSolver
 from jointfrf.models.receptance.krylov import reduce_model
 
 __all__ = ["ReducedSlope", "ReducedSubstructure", "SubstructureState", "range_of"]
@@ -292,8 +291,9 @@ class ReducedSubstructure:
             model.stiffness, model.mass, model.damping, model.structural_damping, model.loss_factor
         )
         found, worst, spots = self.at(values).h, 0.0, 1 if matrices.n > _LARGE else _SPOTS
+        solver = SparseSolver()
         for line in np.unique(np.linspace(0, self.freq_hz.size - 1, spots + 2).astype(int)[1:-1]):
-            factors = sparse_linalg.splu(matrices.dynamic_stiffness(self.omega[line]), **SYMMETRIC)
+            factors = solver.factor(matrices.dynamic_stiffness(self.omega[line]), matrices.are_symmetric)
             exact = ports.of(factors.solve(ports.forces().astype(complex)))
             worst = max(worst, float(abs(found[line] - exact).max() / abs(exact).max()))
         return worst

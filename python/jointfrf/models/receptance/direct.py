@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,15 +14,9 @@ from jointfrf.kernel.call import N_FREQ, run
 from jointfrf.kernel.status import LineStatus, OnSingular, check_lines
 from jointfrf.models.matrices import ModelMatrices
 from jointfrf.models.ports import Ports
+from jointfrf.models.receptance.factors import Factors, SingularMatrixError, SparseSolver
 
-__all__ = ["SINGULAR", "SYMMETRIC", "solve_banded", "solve_dense", "solve_sparse"]
-
-#: SuperLU on a matrix of symmetric structure: less fill than ordered by columns, pivots from the diagonal where good.
-SYMMETRIC: Final[dict[str, Any]] = {
-    "permc_spec": "MMD_AT_PLUS_A",
-    "diag_pivot_thresh": 0.01,
-    "options": {"SymmetricMode": True},
-}
+__all__ = ["SINGULAR", "solve_banded", "solve_dense", "solve_sparse"]
 
 #: A fine mesh in mixed units has rcond 1e-13 and still gives nine digits: only singular to working precision is told.
 SINGULAR = float(np.finfo(np.float64).eps)
@@ -99,8 +93,8 @@ def solve_sparse(
     inputs: Ports,
     on_singular: OnSingular,
     out: ComplexArray | None = None,
-) -> tuple[ComplexArray, LineStatus]:
-    """Solve by a sparse factorisation of every line, SuperLU.
+) -> tuple[ComplexArray, LineStatus, str]:
+    """Solve by a sparse factorisation of every line.
 
     Returns
     -------
@@ -108,16 +102,19 @@ def solve_sparse(
         m/N.
     status : LineStatus
         With the reciprocal condition of each line; no line is announced as ill-conditioned yet.
+    solver : str
+        Library and order of elimination.
     """
     shape = (freq_hz.size, len(outputs), len(inputs))
     result = np.empty(shape, np.complex128) if out is None else checked_out(out, shape, (), {})
+    solver, is_symmetric = SparseSolver(), matrices.are_symmetric
     status = LineStatus(np.zeros(freq_hz.size, np.int32), np.ones(freq_hz.size))
     forces = inputs.forces().astype(np.complex128)
     for i, omega in enumerate(2 * np.pi * freq_hz):
         z = matrices.dynamic_stiffness(omega)
         try:
-            factors = sparse_linalg.splu(z, **SYMMETRIC)
-        except RuntimeError:  # exactly singular
+            factors = solver.factor(z, is_symmetric)
+        except SingularMatrixError:
             result[i], status.line_info[i], status.rcond[i] = np.nan, 1, 0
             continue
         result[i] = outputs.of(factors.solve(forces))
@@ -125,15 +122,14 @@ def solve_sparse(
         if not np.isfinite(result[i]).all():
             result[i], status.line_info[i], status.rcond[i] = np.nan, -2, 0
     check_lines("receptance", status, {}, freq_hz, on_singular)
-    return result, status
+    return result, status, solver.used
 
 
-def _reciprocal_condition(z: sparse.csc_matrix, factors: sparse_linalg.SuperLU) -> float:
+def _reciprocal_condition(z: sparse.csc_matrix, factors: Factors) -> float:
     """Estimate 1 / (||Z|| ||Z^-1||) in the 1-norm by a few solutions."""
 
     def adjoint(b: ComplexArray) -> ComplexArray:
-        x: ComplexArray = factors.solve(b, trans="H")
-        return x
+        return factors.solve(b, "H")
 
     inverse = sparse_linalg.LinearOperator(
         z.shape, matvec=factors.solve, rmatvec=adjoint, matmat=factors.solve, rmatmat=adjoint, dtype=np.complex128

@@ -6,18 +6,17 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg, sparse
-from scipy.sparse import linalg as sparse_linalg
+from scipy import linalg
 
 from jointfrf.kernel.arguments import FloatArray
-from jointfrf.kernel.status import RCOND_LIMIT
 from jointfrf.models.matrices import ModelMatrices
 from jointfrf.models.ports import Ports, directions
-from jointfrf.models.receptance.direct import SYMMETRIC
+from jointfrf.models.receptance.factors import Factors, SingularMatrixError, SparseSolver
 from jointfrf.models.receptance.modal import Modes
-from jointfrf.models.receptance.rigid_modes import RigidModes, find_rigid_modes, held
+from jointfrf.models.receptance.rigid_modes import find_rigid_modes
+from jointfrf.models.receptance.spots import TwoLevels, spot_error
 
-__all__ = ["Reduction", "reduce_model", "spot_error"]
+__all__ = ["Reduction", "reduce_model"]
 
 #: Shifts to begin with; solutions at each for every force, and in all: few forces need more of them.
 _FIRST_SHIFTS, _MOMENTS, _VECTORS = 1, 4, 40
@@ -29,12 +28,9 @@ _NEAR = 1e-4
 _NEW_DIRECTION = 1e-12
 #: Lines whose residual is looked at, and those of them that are solved directly.
 _CANDIDATES, _SPOTS = 40, 4
-#: In a model of this many DOFs a direct solution costs more than all the rest: it is compared at the worst line only.
-_LARGE, _FEW_SPOTS = 10_000, 1
-#: Rounding may move the modes of a reduced model by this many times what it moves a direct solution by, but no more
-#: than what rounding leaves of a solution with the smallest reciprocal condition that is not announced: four digits.
-_LOSS = 30
-_MOST_ROUNDING = float(np.finfo(np.float64).eps) / RCOND_LIMIT
+#: From this many DOFs on solutions of the whole model at these lines are found by iteration, not by factors of a line;
+#: from this many on they still cost as much as the rest: the worst line is looked at only.
+_ITERATED, _LARGE, _FEW_SPOTS = 2_000, 10_000, 1
 
 
 @dataclass(frozen=True)
@@ -53,6 +49,8 @@ class Reduction:
         What rounding leaves of a direct solution, times what a sum of modes may lose more; 2.2e-4 at most.
     shapes : ndarray, shape (n, n_vectors)
         Shapes of the modes in all DOFs, 1/sqrt(kg): a basis for models that differ little.
+    solver : str
+        What factored the matrices: library and order of elimination.
     """
 
     modes: Modes
@@ -60,6 +58,7 @@ class Reduction:
     n_vectors: int
     attainable: float
     shapes: FloatArray
+    solver: str
 
 
 def reduce_model(
@@ -113,7 +112,7 @@ def reduce_model(
             raise ValueError(f"{name} is not symmetric: method 'krylov' cannot be used, 'sparse' or 'dense' can")
     if matrices.proportional is None:
         raise ValueError("damping couples the modes: method 'krylov' cannot be used, 'sparse' or 'dense' can")
-    task = _Reducer(freq_hz, matrices, outputs, inputs)
+    task = _Reducer(freq_hz, matrices, outputs, inputs, tolerance)
     low, high = float(freq_hz.min()), float(freq_hz.max())
     place = (1 - np.cos(np.pi * (np.arange(_FIRST_SHIFTS) + 0.5) / _FIRST_SHIFTS)) / 2
     shifts = [(2 * np.pi * f) ** 2 for f in low + place * (high - low)]
@@ -140,25 +139,32 @@ def reduce_model(
 class _Reducer:
     """A model, what is asked of it, and the space found so far: orthonormal, without rigid-body modes."""
 
-    def __init__(self, freq_hz: FloatArray, matrices: ModelMatrices, outputs: Ports, inputs: Ports) -> None:
+    def __init__(
+        self, freq_hz: FloatArray, matrices: ModelMatrices, outputs: Ports, inputs: Ports, tolerance: float
+    ) -> None:
         assert matrices.proportional is not None
         self.freq_hz, self.matrices, self.outputs, self.inputs = freq_hz, matrices, outputs, inputs
+        self.tolerance = tolerance
         self.k, self.m = matrices.sparse("stiffness"), matrices.sparse("mass")
         self.a, self.b, self.eta = matrices.proportional
         self.forces = directions(outputs, inputs)
-        self.rigid = find_rigid_modes(self.k, self.m)
+        self.solver = SparseSolver()
+        self.rigid = find_rigid_modes(self.k, self.m, self.solver)
         self.basis = np.zeros((matrices.n, 0))
+        self.last: tuple[float, Factors] | None = None  # of one shift only: large factors fill the memory
 
     def extend(self, shift: float) -> None:
         """Add the solutions at one more shift."""
+        self.last = None
         try:
-            factors = sparse_linalg.splu(sparse.csc_matrix(self.k - shift * self.m), **SYMMETRIC)
-            vectors = [factors.solve(self.rigid.straining_forces(self.forces))]
-            for _ in range(max(_MOMENTS, -(-_VECTORS // self.forces.shape[1])) - 1):
-                last = self.rigid.strains(vectors[-1] / np.linalg.norm(vectors[-1], axis=0))
-                vectors.append(factors.solve(self.m @ last))
-        except RuntimeError:  # exactly singular: the next shift will do
+            factors = self.solver.factor(self.k - shift * self.m)
+        except SingularMatrixError:  # the next shift will do
             return
+        self.last = shift, factors
+        vectors = [factors.solve(self.rigid.straining_forces(self.forces))]
+        for _ in range(max(_MOMENTS, -(-_VECTORS // self.forces.shape[1])) - 1):
+            last = self.rigid.strains(vectors[-1] / np.linalg.norm(vectors[-1], axis=0))
+            vectors.append(factors.solve(self.m @ last))
         block = self.rigid.strains(np.hstack(vectors))
         if not np.isfinite(block).all():
             return
@@ -189,7 +195,8 @@ class _Reducer:
         if not size:
             empty = np.zeros(0)
             none = Modes(empty, empty, empty, np.zeros((len(self.outputs), 0)), np.zeros((len(self.inputs), 0)), empty)
-            return Reduction(none, np.inf, size, 0.0, np.zeros((self.matrices.n, 0))), freq[[freq.size // 2]]
+            found = Reduction(none, np.inf, size, 0.0, np.zeros((self.matrices.n, 0)), self.solver.used)
+            return found, freq[[freq.size // 2]]
         uncertainty = np.concatenate([rigid.uncertainty, np.zeros(squared.size)])
         squared = np.concatenate([rigid.stiffness, squared])
         shapes = np.hstack([rigid.shapes, shapes])
@@ -201,8 +208,13 @@ class _Reducer:
         if freq.min() == 0:  # where a structure that is softly held is worst conditioned
             spots.append(freq.argmin())
         lines = np.unique(spots)
-        error, attainable = spot_error(freq[lines], self.matrices, modes, self.outputs, self.inputs, self.rigid)
-        return Reduction(modes, error, size, attainable, shapes), freq[worst]
+        near = None
+        if self.matrices.n >= _ITERATED and self.last is not None:
+            near = TwoLevels(*self.last, modes, shapes, len(rigid), self.tolerance)
+        error, attainable = spot_error(
+            freq[lines], self.matrices, modes, self.outputs, self.inputs, self.rigid, near, self.solver
+        )
+        return Reduction(modes, error, size, attainable, shapes, self.solver.used), freq[worst]
 
     def _worst_lines(self, modes: Modes, shapes: FloatArray) -> NDArray[np.intp]:
         """Lines among candidates in the order of their residual Z x - b, largest first."""
@@ -222,54 +234,3 @@ class _Reducer:
             left = elastic + (1j * omega * self.a - omega**2) * (by_m @ x) - forces
             residual[i] = np.linalg.norm(left) / max(np.linalg.norm(elastic), np.finfo(float).tiny)
         return np.take(spread, np.argsort(residual)[::-1])
-
-
-def spot_error(
-    freq_hz: FloatArray,
-    matrices: ModelMatrices,
-    modes: Modes,
-    outputs: Ports,
-    inputs: Ports,
-    rigid: RigidModes | None = None,
-) -> tuple[float, float]:
-    """Largest difference to direct solutions at a few lines, and how small rounding lets it become.
-
-    Parameters
-    ----------
-    freq_hz : ndarray, shape (n_lines,)
-        A few frequencies, Hz.
-    rigid : RigidModes, optional
-        What is solved by its mass alone.
-
-    Returns
-    -------
-    error : float
-        Relative to the largest entry of the line; inf where there is no direct solution.
-    attainable : float
-        Some times the last step of a refinement of the direct solutions, which is all rounding; no more than the
-        rounding of a solution that is just not announced as ill-conditioned.
-    """
-    found = modes.lines(freq_hz, "nan")[0]
-    parts = held(matrices.n) if rigid is None else rigid
-    own = parts.dynamic_stiffness(matrices, 2 * np.pi * freq_hz)
-    forces = inputs.forces()
-    straining = parts.straining_forces(forces).astype(np.complex128)
-    seen, driven = outputs.of(parts.shapes), parts.shapes.T @ forces
-    errors, rounding = np.full(freq_hz.size, np.inf), 0.0
-    for i, omega in enumerate(2 * np.pi * freq_hz):
-        if not own[i].all():  # nothing holds the body: superposition names the line as singular
-            errors[i] = 0
-            continue
-        z = matrices.dynamic_stiffness(omega)
-        try:
-            factors = sparse_linalg.splu(z, **SYMMETRIC)
-        except RuntimeError:  # singular
-            continue
-        x = factors.solve(straining)
-        step = outputs.of(parts.strains(factors.solve(straining - z @ x)))
-        exact = outputs.of(parts.strains(x)) + step + seen @ (driven / own[i][:, None])
-        size = max(abs(exact).max(initial=0), np.finfo(float).tiny)
-        error = abs(found[i] - exact).max(initial=0) / size
-        errors[i] = error if np.isfinite(error) else np.inf
-        rounding = max(rounding, float(abs(step).max(initial=0) / size))
-    return float(errors.max(initial=0)), min(_LOSS * rounding, _MOST_ROUNDING)

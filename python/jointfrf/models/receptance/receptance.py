@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, cast, get_args, overload
 
 import numpy as np
@@ -16,9 +16,10 @@ from jointfrf.kernel.status import RCOND_LIMIT, LineStatus, OnSingular, check_li
 from jointfrf.models.matrices import Matrix, ModelMatrices
 from jointfrf.models.ports import Ports, as_ports, directions
 from jointfrf.models.receptance.direct import SINGULAR, solve_banded, solve_dense, solve_sparse
-from jointfrf.models.receptance.krylov import reduce_model, spot_error
+from jointfrf.models.receptance.krylov import reduce_model
 from jointfrf.models.receptance.modal import Modes, all_modes
 from jointfrf.models.receptance.rigid_modes import find_rigid_modes, mode_condition
+from jointfrf.models.receptance.spots import spot_error
 
 __all__ = ["ReceptanceInfo", "ReceptanceMethod", "receptance"]
 
@@ -56,6 +57,8 @@ class ReceptanceInfo:
         What the estimate had to meet, unless rounding keeps a direct solution from it, too.
     n_vectors : int or None
         Modes, or vectors of the reduced model.
+    solver : str or None
+        What factored sparse matrices, of "sparse" and "krylov": the library and the order of elimination.
     """
 
     method: Literal["dense", "banded", "sparse", "modal", "krylov"]
@@ -63,6 +66,7 @@ class ReceptanceInfo:
     error_estimate: float | None = None
     tolerance: float | None = None
     n_vectors: int | None = None
+    solver: str | None = None
 
 
 @dataclass(frozen=True)
@@ -156,7 +160,7 @@ def receptance(
         force, an array or sparse array: a mean, a difference, a point between nodes.
     method : {"auto", "dense", "banded", "sparse", "modal", "krylov"}
         "dense": full matrices solved on every line. "banded": the same in band storage. "sparse": a sparse
-        factorisation of every line (SuperLU). All three take any damping.
+        factorisation of every line. All three take any damping.
         "modal": all modes once, then their sum; for symmetric K and M and damping that the undamped modes diagonalise.
         "krylov": the model is reduced to solutions at a few frequencies; for symmetric K and M, damping a M + b K and
         one loss factor. Where `tolerance` is not met, the model is solved and a warning says so. "auto" chooses, see
@@ -207,6 +211,11 @@ def receptance(
     within 32 roundings of the terms it is the difference of. Where the tolerance is not met, the model is solved.
     The error between these lines is estimated, not bounded. Any other damping is solved, and so is a model of many DOFs
     and few entries, by a sparse factorisation.
+
+    Sparse matrices are factored by SuperLU, from 4 000 DOFs on in an order by nested dissection: that of METIS where
+    the package pymetis is installed. From 20 000 DOFs on symmetric ones are factored by PARDISO (package pypardiso,
+    real matrices, which is what a reduction needs) or MUMPS (package python-mumps) where they are installed.
+    `ReceptanceInfo.solver` says what did it.
 
     Examples
     --------
@@ -279,8 +288,9 @@ def _solved(task: _Task, how: Direct, reason: str) -> tuple[ComplexArray, Recept
     """Direct solution."""
     freq, matrices, on_singular = task.freq_hz, task.matrices, task.on_singular
     to, into = task.outputs, task.inputs
+    solver = None
     if how == "sparse":
-        result, status = solve_sparse(freq, matrices, to, into, on_singular, task.out)
+        result, status, solver = solve_sparse(freq, matrices, to, into, on_singular, task.out)
     else:
         solve = solve_banded if how == "banded" else solve_dense
         if to.picked is not None and into.picked is not None:
@@ -290,7 +300,7 @@ def _solved(task: _Task, how: Direct, reason: str) -> tuple[ComplexArray, Recept
             t_out, t_in = (ports.weights[:, ports.needed - 1].toarray() for ports in (to, into))
             result = transform(h, t_out, t_in, freq_hz=freq, on_singular=on_singular, out=task.out)
     check_lines("receptance", _in_doubt(matrices, freq, status), {}, freq, "nan", RCOND_LIMIT)
-    return result, ReceptanceInfo(how, reason)
+    return result, ReceptanceInfo(how, reason, solver=solver)
 
 
 def _in_doubt(matrices: ModelMatrices, freq: FloatArray, status: LineStatus) -> LineStatus:
@@ -333,7 +343,8 @@ def _reduced(task: _Task, reason: str) -> tuple[ComplexArray, ReceptanceInfo]:
     if task.is_empty:
         return _solved(task, _direct(task.matrices), "no lines, or no DOFs with a weight")
     found = reduce_model(task.freq_hz, task.matrices, task.outputs, task.inputs, task.tolerance)
-    return _finished(task, found.modes, found.error_estimate, found.attainable, "krylov", reason)
+    result, info = _finished(task, found.modes, found.error_estimate, found.attainable, "krylov", reason)
+    return result, replace(info, solver=found.solver) if info.method == "krylov" else info
 
 
 def _finished(

@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg, sparse
-from scipy.sparse import linalg as sparse_linalg
 
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.models.matrices import ModelMatrices
-from jointfrf.models.receptance.direct import SYMMETRIC
+from jointfrf.models.receptance.factors import SingularMatrixError, SparseSolver
 
 __all__ = ["RigidModes", "find_rigid_modes", "held", "mode_condition", "resistance"]
 
@@ -90,13 +89,15 @@ def mode_condition(dynamic_stiffness: ComplexArray, uncertainty: FloatArray) -> 
     return found
 
 
-def find_rigid_modes(k: sparse.csc_array, m: sparse.csc_array) -> RigidModes:
+def find_rigid_modes(k: sparse.csc_array, m: sparse.csc_array, solver: SparseSolver | None = None) -> RigidModes:
     """Find the modes whose stiffness rounding hides, by inverse iteration of a block of vectors.
 
     Parameters
     ----------
     k, m : sparse array, shape (n, n)
         Symmetric.
+    solver : SparseSolver, optional
+        One that is used for matrices of this pattern elsewhere.
 
     Returns
     -------
@@ -124,7 +125,7 @@ def find_rigid_modes(k: sparse.csc_array, m: sparse.csc_array) -> RigidModes:
     n = k.shape[0]
     size = min(_BLOCK, n)
     while True:
-        found = _lowest_modes(k, m, size)
+        found = _lowest_modes(k, m, size, solver or SparseSolver())
         if found is None:
             return held(n)
         squared, shapes, terms = found
@@ -147,7 +148,7 @@ def find_rigid_modes(k: sparse.csc_array, m: sparse.csc_array) -> RigidModes:
 
 
 def _lowest_modes(
-    k: sparse.csc_array, m: sparse.csc_array, size: int
+    k: sparse.csc_array, m: sparse.csc_array, size: int, solver: SparseSolver
 ) -> tuple[FloatArray, FloatArray, FloatArray] | None:
     """Return w^2, shapes (n, size) and the terms of w^2 of the lowest modes; None where K + s M is singular."""
     masses, magnitudes = m.diagonal(), abs(k)
@@ -158,8 +159,8 @@ def _lowest_modes(
     if not scale.all() or not scale.size:
         return None
     try:
-        factors = sparse_linalg.splu(sparse.csc_matrix(k + (_SHIFT * _EPS * mean) * m), **SYMMETRIC)
-    except RuntimeError:  # exactly singular
+        factors = solver.factor(k + (_SHIFT * _EPS * mean) * m)
+    except SingularMatrixError:
         return None
     shapes = np.random.default_rng(0).standard_normal((k.shape[0], size)) / scale[:, None]
     last = np.full(size, np.inf)

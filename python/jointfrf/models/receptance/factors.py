@@ -1,0 +1,207 @@
+"""Factors of sparse matrices: the one door to SuperLU, PARDISO and MUMPS."""
+
+from __future__ import annotations
+
+import weakref
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse import linalg as sparse_linalg
+
+from jointfrf.extras import MissingPackageError, import_extra
+from jointfrf.models.receptance.ordering import elimination_order
+
+__all__ = ["SYMMETRIC", "Factors", "SingularMatrixError", "SparseSolver", "factor"]
+
+Library = Literal["SuperLU", "PARDISO", "MUMPS"]
+Array = NDArray[Any]
+
+#: SuperLU on a matrix of symmetric structure: less fill than ordered by columns, pivots from the diagonal where good.
+SYMMETRIC: Final[dict[str, Any]] = {
+    "permc_spec": "MMD_AT_PLUS_A",
+    "diag_pivot_thresh": 0.01,
+    "options": {"SymmetricMode": True},
+}
+#: From this many DOFs on an order by dissection has smaller factors than one by minimum degree.
+_DISSECTED: Final = 4_000
+#: From this many DOFs on another library, where it is installed, is worth its start.
+_LARGE: Final = 20_000
+
+
+class SingularMatrixError(ArithmeticError):
+    """A pivot of a factorisation is zero."""
+
+
+@dataclass(frozen=True)
+class Factors:
+    """A factored matrix.
+
+    Parameters
+    ----------
+    solver : callable
+        Right-hand sides of the matrix's own type, shape (n, k), and "N" or "H", to solutions.
+    is_complex : bool
+    name : str
+        Library and order of elimination.
+    """
+
+    solver: Callable[[Array, str], Array]
+    is_complex: bool
+    name: str
+
+    def solve(self, b: Array, trans: Literal["N", "H"] = "N") -> Array:
+        """Solve A x = b, or A^H x = b; shape (n,) or (n, k), complex right-hand sides of a real matrix, too."""
+        columns = b.reshape(b.shape[0], -1)
+        if self.is_complex or not np.iscomplexobj(b):
+            found = self.solver(columns.astype(np.complex128 if self.is_complex else np.float64), trans)
+        else:
+            both = self.solver(np.hstack([columns.real, columns.imag]), trans)
+            found = both[:, : columns.shape[1]] + 1j * both[:, columns.shape[1] :]
+        return found.reshape(b.shape)
+
+
+class SparseSolver:
+    """Factors matrices of one pattern, whose order of elimination is found once.
+
+    Parameters
+    ----------
+    library : {"SuperLU", "PARDISO", "MUMPS"}, optional
+        By default the fastest that is installed and can do it: for symmetric matrices of 20 000 DOFs or more PARDISO
+        (package pypardiso; real ones only) or MUMPS (package python-mumps), else SuperLU.
+    """
+
+    def __init__(self, library: Library | None = None) -> None:
+        self.library = library
+        #: What did it in the end, the last time.
+        self.used = ""
+        self._order: tuple[NDArray[np.intp], str] | None = None
+
+    def factor(self, matrix: Any, is_symmetric: bool = True) -> Factors:
+        """Factor a matrix.
+
+        Parameters
+        ----------
+        matrix : sparse array, shape (n, n)
+            Real or complex; of the pattern of those before.
+        is_symmetric : bool
+            A = A^T; PARDISO and MUMPS, which take half of it, are asked for nothing else.
+
+        Raises
+        ------
+        SingularMatrixError
+            A pivot is exactly zero.
+        """
+        factors = self._by_library(matrix, is_symmetric) or self._by_superlu(matrix)
+        self.used = factors.name
+        return factors
+
+    def _by_library(self, matrix: Any, is_symmetric: bool) -> Factors | None:
+        """Factor by another library, if there is one that can."""
+        for library in self._choices(matrix, is_symmetric):
+            try:
+                return _MAKERS[library](matrix)
+            except (MissingPackageError, _NotFactoredError):
+                if self.library is not None:
+                    raise
+        return None
+
+    def _choices(self, matrix: Any, is_symmetric: bool) -> list[Library]:
+        """Libraries to try before SuperLU, best first."""
+        able: list[Library] = ["MUMPS"] if np.iscomplexobj(matrix) else ["PARDISO", "MUMPS"]
+        if not is_symmetric or (self.library is None and matrix.shape[0] < _LARGE):
+            return []
+        return able if self.library is None else [name for name in able if name == self.library]
+
+    def _by_superlu(self, matrix: Any) -> Factors:
+        """Factor by SuperLU, large matrices in an order by dissection."""
+        if matrix.shape[0] < _DISSECTED:
+            own = _superlu(sparse.csc_matrix(matrix), **SYMMETRIC)
+            return Factors(lambda b, trans: own.solve(b, trans=trans), np.iscomplexobj(matrix), "SuperLU")
+        if self._order is None:
+            self._order = elimination_order(matrix)
+        order, name = self._order
+        by_rows = sparse.csr_array(matrix)[order]
+        permuted = sparse.csc_matrix(sparse.csc_array(by_rows)[:, order])
+        permuted.sort_indices()
+        factors = _superlu(permuted, **(SYMMETRIC | {"permc_spec": "NATURAL"}))
+
+        def solve(b: Array, trans: str) -> Array:
+            x = np.empty_like(b)
+            x[order] = factors.solve(np.asfortranarray(b[order]), trans=trans)
+            return x
+
+        return Factors(solve, np.iscomplexobj(matrix), f"SuperLU, ordered by {name}")
+
+
+def factor(matrix: Any, is_symmetric: bool = True) -> Factors:
+    """Factor one matrix, see `SparseSolver.factor`."""
+    return SparseSolver().factor(matrix, is_symmetric)
+
+
+class _NotFactoredError(RuntimeError):
+    """A library could not do it, for want of memory or because of the matrix: SuperLU is asked."""
+
+
+def _superlu(matrix: sparse.csc_matrix, **options: Any) -> sparse_linalg.SuperLU:
+    try:
+        return sparse_linalg.splu(matrix, **options)
+    except RuntimeError as error:
+        raise SingularMatrixError("a pivot is zero") from error
+
+
+def _imported(module: str) -> Any:
+    try:
+        return import_extra(module)
+    except MissingPackageError:
+        raise
+    except ImportError as error:  # a library that it is linked with is not found
+        raise _NotFactoredError(str(error)) from error
+
+
+def _upper_half(matrix: Any) -> sparse.csr_matrix:
+    half = sparse.csr_matrix(sparse.triu(matrix, format="csr"))
+    half.sort_indices()
+    return half
+
+
+def _by_pardiso(matrix: Any) -> Factors:
+    """Factor half of a real symmetric matrix by PARDISO of MKL."""
+    wrapper = _imported("pypardiso").pardiso_wrapper
+    half = _upper_half(matrix)
+    try:
+        solver = wrapper.PyPardisoSolver(mtype=-2)  # real, symmetric, indefinite
+        solver.factorize(half)
+    except (ImportError, wrapper.PyPardisoError, ValueError) as error:  # no library, no memory, a row of zeros
+        raise _NotFactoredError(str(error)) from error
+
+    def solve(b: Array, _: str) -> Array:
+        found: Array = solver.solve(half, b)
+        return found
+
+    weakref.finalize(solve, solver.free_memory, everything=True)  # what the library holds
+    return Factors(solve, False, "PARDISO")
+
+
+def _by_mumps(matrix: Any) -> Factors:
+    """Factor half of a symmetric matrix, real or complex, by MUMPS."""
+    mumps = _imported("mumps")
+    context = mumps.Context()
+    try:
+        context.set_matrix(matrix, symmetric=True)
+        context.factor()
+    except mumps.MUMPSError as error:
+        raise _NotFactoredError(str(error)) from error
+
+    def solve(b: Array, trans: str) -> Array:
+        if trans == "H" and np.iscomplexobj(b):  # A^H is the conjugate of A = A^T
+            return np.asarray(context.solve(b.conj())).conj()
+        return np.asarray(context.solve(b))
+
+    return Factors(solve, np.iscomplexobj(matrix), "MUMPS")
+
+
+_MAKERS: Final[dict[Library, Callable[[Any], Factors]]] = {"PARDISO": _by_pardiso, "MUMPS": _by_mumps}
