@@ -2,8 +2,8 @@
 module jointfrf_linear_algebra
   use jointfrf_caller_memory, only: caller_memory
   use jointfrf_kinds, only: dp, ip
-  use jointfrf_lanes, only: element_space, in_memory, lane_kernels, lanes, largest_in_lanes, largest_product, largest_solved, padded, &
-    real_lines, rows_in_memory
+  use jointfrf_lanes, only: element_space, in_memory, lane_kernels, lanes, largest_in_lanes, largest_product, &
+    largest_solved, padded, real_lines, rows_in_memory
   use jointfrf_line_layout, only: all_finite, load, store
   use jointfrf_lines_lapack, only: invert_line, room_to_invert, room_to_solve, solve_line
   use jointfrf_status, only: line_not_finite
@@ -11,7 +11,6 @@ module jointfrf_linear_algebra
   implicit none
   private
   public :: invert, solve
-
 
   type, extends(line_operation) :: inversion
     integer :: n
