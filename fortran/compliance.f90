@@ -3,7 +3,7 @@
 module jointfrf_compliance
   use jointfrf_caller_memory, only: caller_memory
   use jointfrf_kinds, only: dp, ip
-  use jointfrf_lanes, only: element_space, in_memory, lane_kernels, lanes, largest_in_lanes, padded, real_lines, &
+  use jointfrf_lanes, only: element_space, in_memory, lane_kernels, lanes, largest_solved, padded, real_lines, &
     row_starts
   use jointfrf_line_layout, only: all_finite, load, load_real, store, take_block
   use jointfrf_lines_lapack, only: product_line, room_to_solve, solve_line
@@ -83,7 +83,7 @@ contains
     operation%gamma => gamma
     operation%result => c_joint
     operation%flops = 19.0_dp*real(n, dp)**3
-    if (worth_a_plan(size(gamma, 3), memory) .and. n >= 1 .and. n <= largest_in_lanes) call plan_compliance(operation)
+    if (worth_a_plan(size(gamma, 3), memory) .and. n >= 1 .and. n <= largest_solved) call plan_compliance(operation)
     call run_sweep(operation, size(gamma, 3, kind=ip), line_info, rcond, info, memory)
   end subroutine joint_compliance
 

@@ -2,7 +2,7 @@
 module jointfrf_coupling
   use jointfrf_caller_memory, only: caller_memory
   use jointfrf_kinds, only: dp, ip
-  use jointfrf_lanes, only: flat, in_memory, lane_kernels, lanes, largest_in_lanes, largest_product, padded, &
+  use jointfrf_lanes, only: flat, in_memory, lane_kernels, lanes, largest_solved, largest_product, padded, &
     real_lines
   use jointfrf_line_layout, only: all_finite, load, store
   use jointfrf_modification, only: apply_in_lanes, apply_modification, modification_in_lanes, modification_matrices, &
@@ -70,7 +70,7 @@ contains
     operation%dofs_b => dofs_b
     operation%result => h_c
     operation%flops = 8.0_dp*n_j*(real(n, dp)**2 + 2.0_dp*real(n_j, dp)*n)
-    if (worth_a_plan(size(h_a, 3), memory) .and. n_j >= 1 .and. n_j <= largest_in_lanes .and. n <= largest_product) &
+    if (worth_a_plan(size(h_a, 3), memory) .and. n_j >= 1 .and. n_j <= largest_solved .and. n <= largest_product) &
       call plan_coupling(operation)
     call run_sweep(operation, size(h_a, 3, kind=ip), line_info, rcond, info, memory)
   end subroutine couple

@@ -8,7 +8,7 @@ module jointfrf_dynamic_stiffness
   use jointfrf_caller_memory, only: caller_memory
   use jointfrf_elimination_plan, only: elimination_plan, make_plan
   use jointfrf_kinds, only: blas_ip, dp, ip
-  use jointfrf_lanes, only: element_space, in_memory, lane_kernels, lanes, largest_in_lanes, padded, real_lines, &
+  use jointfrf_lanes, only: element_space, in_memory, lane_kernels, lanes, largest_solved, padded, real_lines, &
     rows_in_memory
   use jointfrf_lapack, only: zgbcon, zgbtrf, zgbtrs
   use jointfrf_line_layout, only: all_finite, store
@@ -107,7 +107,7 @@ contains
     call set_model(operation, transposed, n, omega, stiffness, mass, damping, structural, loss_factor, outputs, &
                    inputs, h)
     operation%flops = 8.0_dp*real(n, dp)**2*(n/3.0_dp + size(inputs))
-    if (worth_a_plan(size(omega), memory) .and. n <= largest_in_lanes) &
+    if (worth_a_plan(size(omega), memory) .and. n <= largest_solved) &
       call prepare_block(operation, n - 1, n - 1, .true.)
     call run_sweep(operation, size(omega, kind=ip), line_info, rcond, info, memory)
   end subroutine receptance_dense
@@ -178,16 +178,16 @@ contains
     real(dp) :: reference
 
     reach = max(kl, ku)
-    if (size(operation%result) == 0 .or. reach >= largest_in_lanes) return
+    if (size(operation%result) == 0 .or. reach >= largest_solved) return
     call mark(operation%outputs, is_output)
     call mark(operation%inputs, retained)
     retained = retained .or. is_output .or. retain_all
-    if (count(retained) > largest_in_lanes) return
+    if (count(retained) > largest_solved) return
     call look_at_matrices(operation, reach, coupled, symmetric)
     call make_plan(operation%n, coupled, retained, dofs_of(is_output), symmetric, operation%plan)
     associate (n_left => operation%plan%n_retained, n_in => size(operation%inputs))
       reference = real(operation%n, dp)*(real(kl, dp)*(kl + ku + 1) + real(n_in, dp)*(2*kl + ku + 1)) + n_left**2
-      if (n_left > largest_in_lanes .or. operation%plan%products > gain_of_lanes*reference) return
+      if (n_left > largest_solved .or. operation%plan%products > gain_of_lanes*reference) return
       operation%n_wanted = count(is_output)
       operation%n_hint = padded(n_left)
     end associate

@@ -101,7 +101,8 @@ contains
     operation%m_out = size(t_out, merge(1, 2, transposed))
     operation%n_in = size(t_in, merge(2, 1, transposed))
     operation%m_in = size(t_in, merge(1, 2, transposed))
-    operation%flops = 4.0_dp*(real(operation%m_in, dp)*count(t_out /= 0) + real(operation%n_out, dp)*count(t_in /= 0))
+    operation%flops = 4.0_dp*(real(operation%m_in, dp)*count(has_weight(t_out)) &
+                              + real(operation%n_out, dp)*count(has_weight(t_in)))
     if (worth_a_plan(size(h, 3), memory) &
         .and. min(operation%n_out, operation%n_in, operation%m_out, operation%m_in) >= 1) &
       call plan_transformation(operation)
@@ -162,21 +163,29 @@ contains
     integer :: i, j, k
 
     rows%n = size(t, 2)
-    k = count(t /= 0)                        ! NaN counts
+    k = count(has_weight(t))
     allocate (rows%start(rows%n + 1), rows%from(k), rows%weight(k))
     k = 1
     do j = 1, rows%n
       rows%start(j) = k
       do i = 1, size(t, 1)
-        if (t(i, j) == 0) cycle
+        if (.not. has_weight(t(i, j))) cycle
         rows%from(k) = i
         rows%weight(k) = t(i, j)
         k = k + 1
       end do
     end do
     rows%start(rows%n + 1) = k
-    rows%unused = any(count(t /= 0, dim=2) == 0)
+    rows%unused = any(count(has_weight(t), dim=2) == 0)
   end function rows_of_columns
+
+  !> Whether a weight is not zero; NaN is not.
+  elemental function has_weight(weight) result(yes)
+    real(dp), intent(in) :: weight
+    logical :: yes
+
+    yes = .not. abs(weight) <= 0.0_dp
+  end function has_weight
 
   subroutine transform_block(self, kernels, first, n_lines, space, line_info, rcond)
     class(transformation), intent(in) :: self

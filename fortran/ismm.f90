@@ -180,7 +180,7 @@ contains
     real(dp), intent(out) :: rcond(n_lines)
     real(dp) :: rcond_alpha(lanes), rcond_gamma(lanes), total(lanes)
     integer :: gamma_inverse(2*self%n, 2*self%n), alpha_inverse(2*self%n, 2*self%n)   ! where (column, row) lies
-    integer :: row(self%n), w_row(2*self%n), n, m
+    integer :: columns_k(2*self%n**2), row(self%n), w_row(2*self%n), n, m
 
     n = self%n
     m = 2*n
@@ -191,7 +191,8 @@ contains
       call kernels%combine(m*m, 1.0_dp, plan%alpha_place, -1.0_dp, plan%gamma_place, plan%difference, x)
       call kernels%invert(m, plan%gamma_before, x, space%hint(:m), gamma_inverse, rcond_gamma, space%ahead)
       call kernels%invert(m, plan%alpha_before, x, space%hint(m + 1:), alpha_inverse, rcond_alpha)
-      call kernels%copy(m*n, 1.0_dp, gamma_inverse(n + 1:, :), plan%columns_k, x)
+      columns_k = reshape(gamma_inverse(n + 1:, :), [m*n])
+      call kernels%copy(m*n, 1.0_dp, columns_k, plan%columns_k, x)
       call kernels%fill(m*n, plan%unit_value, plan%w, x)
       call kernels%product(m, n, m, 1.0_dp, plan%difference_row, plan%columns_k_row, plan%w_row, x)
       call rows_as_they_lie(alpha_inverse, plan%w_row, row, w_row)

@@ -2,8 +2,8 @@
 module jointfrf_linear_algebra
   use jointfrf_caller_memory, only: caller_memory
   use jointfrf_kinds, only: dp, ip
-  use jointfrf_lanes, only: element_space, in_memory, lane_kernels, lanes, largest_in_lanes, largest_product, padded, &
-    real_lines, rows_in_memory
+  use jointfrf_lanes, only: element_space, in_memory, lane_kernels, lanes, largest_in_lanes, largest_product, &
+    largest_solved, padded, real_lines, rows_in_memory
   use jointfrf_line_layout, only: all_finite, load, store
   use jointfrf_lines_lapack, only: invert_line, room_to_invert, room_to_solve, solve_line
   use jointfrf_status, only: line_not_finite
@@ -131,7 +131,7 @@ contains
     operation%flops = 8.0_dp*real(operation%n, dp)**2*(operation%n/3.0_dp + operation%n_rhs)
     ! More right-hand sides than these leave the caches, eight lines at a time.
     if (worth_a_plan(size(a, 3), memory) .and. min(operation%n, operation%n_rhs) >= 1 &
-        .and. operation%n <= largest_in_lanes .and. operation%n_rhs <= largest_product) &
+        .and. operation%n <= largest_solved .and. operation%n_rhs <= largest_product) &
       call plan_solution(operation)
     call run_sweep(operation, size(a, 3, kind=ip), line_info, rcond, info, memory)
   end subroutine solve

@@ -3,7 +3,7 @@
 module jointfrf_modification
   use jointfrf_caller_memory, only: caller_memory
   use jointfrf_kinds, only: dp, ip
-  use jointfrf_lanes, only: element_space, flat, in_memory, lane_kernels, lanes, largest_in_lanes, largest_product, &
+  use jointfrf_lanes, only: element_space, flat, in_memory, lane_kernels, lanes, largest_solved, largest_product, &
     padded, real_lines, row_starts
   use jointfrf_line_layout, only: all_finite, load, store, subtract
   use jointfrf_lines_lapack, only: product_line, room_to_solve, solve_line
@@ -87,7 +87,7 @@ contains
     operation%dofs => dofs
     operation%result => gamma
     operation%flops = 8.0_dp*n_m*(real(n, dp)**2 + 2.0_dp*real(n_m, dp)*n)
-    if (worth_a_plan(size(alpha, 3), memory) .and. n_m >= 1 .and. n_m <= largest_in_lanes .and. n <= largest_product) &
+    if (worth_a_plan(size(alpha, 3), memory) .and. n_m >= 1 .and. n_m <= largest_solved .and. n <= largest_product) &
       call plan_block(operation)
     call run_sweep(operation, size(alpha, 3, kind=ip), line_info, rcond, info, memory)
   end subroutine modify

@@ -11,7 +11,7 @@ module jointfrf_monte_carlo
   use jointfrf_engine, only: find_kernels
   use jointfrf_ismm, only: inverse_substructuring
   use jointfrf_kinds, only: dp, ip, long
-  use jointfrf_lanes, only: element_space, in_memory, lane_kernels, lanes, largest_in_lanes, padded, real_lines, &
+  use jointfrf_lanes, only: element_space, in_memory, lane_kernels, lanes, largest_solved, padded, real_lines, &
     row_starts, rows_in_memory, to_register
   use jointfrf_line_layout, only: all_finite, load, store, take_block
   use jointfrf_lines_lapack, only: product_line, room_to_solve, solve_line
@@ -140,7 +140,7 @@ contains
 
     work%plan = make_plan(transposed, upper(method) == 'C', size(mean, 1), noise)
     work%noise = noise
-    work%blocks = work%blocks .and. work%plan%m <= largest_in_lanes
+    work%blocks = work%blocks .and. work%plan%m <= largest_solved
     work%first = int(first)
     work%count = int(count)
     work%slices = max(1, min((most_slices + n_freq - 1)/n_freq, work%count/fewest_realisations))

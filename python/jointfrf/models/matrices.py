@@ -87,7 +87,7 @@ class ModelMatrices:
         matrix = self.named[name]
         if matrix is None:
             return None
-        return as_real(name, matrix.toarray() if sparse.issparse(matrix) else matrix, (self.n, self.n))
+        return as_real(name, matrix.toarray(), (self.n, self.n)) if sparse.issparse(matrix) else matrix
 
     def sparse(self, name: str) -> sparse.csc_array:
         """Return a matrix by its entries, shape (n, n); empty where the model has none."""
@@ -111,8 +111,12 @@ class ModelMatrices:
         below = above = 0
         for matrix in self.named.values():
             if matrix is not None:
-                entries = sparse.coo_array(matrix)
-                distance = entries.col.astype(np.int64) - entries.row
+                if sparse.issparse(matrix):
+                    entries = sparse.coo_array(matrix)
+                    distance = entries.col.astype(np.int64) - entries.row
+                else:
+                    rows, columns = np.nonzero(matrix)
+                    distance = columns - rows
                 below = max(below, -int(distance.min(initial=0)))
                 above = max(above, int(distance.max(initial=0)))
         return below, above
@@ -188,8 +192,8 @@ def _sides(matrix: Matrix) -> tuple[bool, bool]:
         entries = sparse.coo_array(matrix)
         at = entries.row[entries.data != 0], entries.col[entries.data != 0]
         return bool((at[0] > at[1]).any()), bool((at[0] < at[1]).any())
-    array = np.asarray(matrix)
-    return bool(np.tril(array, -1).any()), bool(np.triu(array, 1).any())
+    rows, columns = np.nonzero(matrix)
+    return bool((rows > columns).any()), bool((rows < columns).any())
 
 
 def _largest(matrix: sparse.csc_array) -> float:

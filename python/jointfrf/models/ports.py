@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,18 +21,29 @@ class Ports:
 
     Parameters
     ----------
-    weights : sparse array, shape (m, n)
-        Weights of the n DOFs for each port.
+    n : int
+        Number of DOFs.
     picked : ndarray of int, or None
         The DOFs, counted from 1, where each port is one of them.
+    sums : sparse array, shape (m, n), or None
+        Otherwise weights of all DOFs for each port.
     """
 
-    weights: sparse.csr_array
-    picked: NDArray[np.int32] | None
+    n: int
+    picked: NDArray[np.int32] | None = None
+    sums: sparse.csr_array | None = None
 
     def __len__(self) -> int:
         """Return the number of ports."""
-        return int(self.weights.shape[0])
+        return int(self.weights.shape[0]) if self.picked is None else self.picked.size
+
+    @cached_property
+    def weights(self) -> sparse.csr_array:
+        """Weights of the DOFs for each port, shape (m, n); small models never ask for them."""
+        if self.picked is None:
+            return cast(sparse.csr_array, self.sums)
+        entries = (np.ones(self.picked.size), (np.arange(self.picked.size), self.picked - 1))
+        return sparse.csr_array(entries, shape=(self.picked.size, self.n))
 
     @property
     def needed(self) -> NDArray[np.int32]:
@@ -60,10 +72,10 @@ def as_ports(name: str, value: Any, n: int) -> Ports:
         values = as_real(name, entries.data, (None,))
         weights = sparse.csr_array((values, (entries.row, entries.col)), shape=given.shape)
         weights.eliminate_zeros()
-        return Ports(weights, None)
-    picked = as_dofs(name, np.arange(n) if value is None else value, n, unique=False)
-    entries = (np.ones(picked.size), (np.arange(picked.size), picked - 1))
-    return Ports(sparse.csr_array(entries, shape=(picked.size, n)), picked)
+        return Ports(n, sums=weights)
+    if value is None:
+        return Ports(n, np.arange(1, n + 1, dtype=np.int32))
+    return Ports(n, as_dofs(name, value, n, unique=False))
 
 
 def directions(*ports: Ports) -> FloatArray:

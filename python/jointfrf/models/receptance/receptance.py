@@ -28,6 +28,8 @@ ReceptanceMethod = Literal["auto", "dense", "banded", "sparse", "modal", "krylov
 
 #: A matrix with a wider band than this share of its size is solved as a dense one.
 _BAND_LIMIT = 0.25
+#: Up to this size nothing about a model is looked at but its numbers.
+_TINY = 8
 #: Up to this band, or this size, a direct solution of many lines side by side is as fast as any reduction.
 _NARROW, _SMALL = 64, 64
 #: Beyond this size all modes cost more than a reduced model.
@@ -253,20 +255,23 @@ def receptance(
 
 def _direct(matrices: ModelMatrices) -> Direct:
     """How a model is solved best on every line."""
+    if matrices.n <= _TINY:
+        return "dense"
     n, widths = matrices.n, matrices.widths
-    if n > 8 and max(widths) < _NARROW and sum(widths) < _BAND_LIMIT * n:
+    if max(widths) < _NARROW and sum(widths) < _BAND_LIMIT * n:
         return "banded"
     if n > _ALL_MODES and sum(matrices.sparse(name).nnz for name in ("stiffness", "mass")) < _SPARSE * n**2:
         return "sparse"
-    return "banded" if n > 8 and sum(widths) < _BAND_LIMIT * n else "dense"
+    return "banded" if sum(widths) < _BAND_LIMIT * n else "dense"
 
 
 def _automatic(task: _Task) -> tuple[ComplexArray, ReceptanceInfo]:
     """Choose by size, band, damping and number of lines."""
     matrices, n = task.matrices, task.matrices.n
+    if n <= _TINY:
+        return _solved(task, "dense", f"small model: {n} DOFs")
     kl, ku = matrices.widths
     direct = _direct(matrices)
-    n_ports = directions(task.outputs, task.inputs).shape[1]
     if direct == "banded" and max(kl, ku) < _NARROW:
         return _solved(task, direct, f"narrow band: {kl} diagonals below and {ku} above the main one")
     if n <= _SMALL:
@@ -279,6 +284,7 @@ def _automatic(task: _Task) -> tuple[ComplexArray, ReceptanceInfo]:
         return _solved(task, direct, "stiffness or mass is not symmetric")
     if n <= _ALL_MODES:
         return _summed(task, f"{task.freq_hz.size} lines of {n} DOFs whose modes the damping does not couple")
+    n_ports = directions(task.outputs, task.inputs).shape[1]
     if n_ports > _FEW_DOFS:
         return _solved(task, direct, f"many DOFs are asked for: {n_ports}")
     return _reduced(task, f"{task.freq_hz.size} lines of {n} DOFs whose modes the damping does not couple")
