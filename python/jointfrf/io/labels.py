@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf.frf.frf_set import Channel
+from jointfrf.kernel.arguments import one_line
 
 __all__ = ["DIRECTION_CODES", "channels_of", "channels_of_table", "is_table"]
 
@@ -73,7 +74,9 @@ def _channel(what: str, label: Any) -> Channel:
         raise ValueError(f"has node {node} with direction code {code} in its {what}: codes are 1 to 6, -1 to -6")
     match = _LABEL.fullmatch(str(label).strip())
     if match is None or int(match[1]) < 1:
-        raise ValueError(f"has {str(label).strip()!r} in its {what}: expected a point and a direction, such as 102:+y")
+        raise ValueError(
+            f"has {one_line(str(label).strip())} in its {what}: expected a point and a direction, such as 102:+y"
+        )
     return Channel(int(match[1]), f"{match[2] or match[4]}{match[3]}")
 
 

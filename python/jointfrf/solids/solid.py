@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 from jointfrf.dofs import DIRECTIONS, rigid_motion
-from jointfrf.kernel.arguments import FloatArray, as_real
+from jointfrf.kernel.arguments import FloatArray, as_array, as_real
 from jointfrf.models.model import Model
 from jointfrf.solids.brick import Formulation, Mass, Material, assemble_bricks
 from jointfrf.solids.mesh import Mesh
@@ -173,7 +173,7 @@ def mean_motion(mesh: Mesh, patch: Patch) -> sparse.csr_array:
 
 def _as_nodes(name: str, value: ArrayLike, mesh: Mesh) -> NDArray[np.int32]:
     """Return numbers of nodes that exist."""
-    nodes = np.asarray(value)
+    nodes = as_array(name, value)
     if nodes.ndim != 1 or (nodes.size and nodes.dtype.kind not in "iu"):
         raise TypeError(f"{name} must be a list of node numbers, not {nodes.dtype} of shape {nodes.shape}")
     if not nodes.size:

@@ -88,8 +88,13 @@ def test_drills(name, count):
 @linux
 def test_a_second_set_up_needs_no_network():
     """That of this checkout, where it was set up by the script at all."""
-    if not (drills.ROOT / ".venv" / "set-up.run").exists():
-        pytest.skip("this checkout was not set up by python/bootstrap.sh")
+    stamp = drills.ROOT / ".venv" / "set-up.run"
+    read = [
+        path for place in ("", "fortran", "fortran/api", "python") for path in (drills.ROOT / place).glob("meson.*")
+    ]
+    read += [drills.ROOT / "pyproject.toml", drills.ROOT / "python" / "constraints.txt"]
+    if not stamp.exists() or any(path.stat().st_mtime > stamp.stat().st_mtime for path in read):
+        pytest.skip("this checkout is not as python/bootstrap.sh has set it up")
     process = drills.set_up(drills.ROOT, **drills.OFFLINE)
     text = process.communicate(timeout=60)[0]
     assert (process.returncode, text) == (0, "")

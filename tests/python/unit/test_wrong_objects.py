@@ -32,6 +32,8 @@ def chain():
 
 
 SPRING = jf.SpringLaw(1e3)
+BRICK = jf.Mesh(np.eye(8, 3), np.arange(8)[None])
+STEEL = jf.Material(210e9, 0.3, 7850.0)
 FREQUENCIES = np.linspace(1.0, 9.0, 9)
 
 
@@ -81,6 +83,8 @@ FREQUENCIES = np.linspace(1.0, 9.0, 9)
         (lambda: jf.estimate_noise(FREQUENCIES, np.ones((9, 1, 1)), like="x"), "like must be a NoiseModel, not str"),
         (lambda: jf.propose_bands(FREQUENCIES, FREQUENCIES, drop_db="x"), "drop_db must be one real number, not 'x'"),
         (lambda: jf.band_mean(FREQUENCIES, np.ones((9, 1, 1)), dofs=False), "dofs must be a sequence of names"),
+        (lambda: jf.solid_model(BRICK, STEEL, clamped=[0, [1, 2]]), "clamped must be an array of numbers"),
+        (lambda: jf.io.frfs_of_arrays([1.0], [[[1.0]]], [[[1.0] * 99] * 9], ["1:x"]), r"has .* in its responses"),
         (lambda: jf.rigid_offset(np.array([["x"]]), [0, 0, 0]), "dofs must be a sequence of names, not"),
     ],
 )  # fmt: skip
