@@ -289,12 +289,14 @@ module jointfrf_lanes
     end subroutine identify_lines_routine
 
     !> Real transformations of both sides of a line, without workspace.
+    !> slow_first       which side is transformed first: results are the same in either order of storage
     !> m_slow, m_fast   size of a line h as it is stored: columns, and rows, which lie side by side
     !> slow, fast       what entries of the new line are made of, along either
     !> total            shape (n_lines): sums in which NaN, Inf and overflow show
-    subroutine transform_lines_routine(m_slow, m_fast, slow, fast, first, n_lines, h, h_new, total)
+    subroutine transform_lines_routine(slow_first, m_slow, m_fast, slow, fast, first, n_lines, h, h_new, total)
       import :: dp, sparse_rows
       implicit none
+      logical, intent(in) :: slow_first
       integer, intent(in) :: m_slow, m_fast, first, n_lines
       type(sparse_rows), intent(in) :: slow, fast
       real(dp), intent(in) :: h(2, m_fast, m_slow, *)
