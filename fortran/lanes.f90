@@ -24,7 +24,7 @@ module jointfrf_lanes
 
   !> Up to this order there is an inverse of its own for each order; its matrix lies row by row.
   integer, parameter, public :: largest_constant = 8
-  !> Above this order LAPACK line by line is as fast in an inverse and in what reads several matrices for a small result,
+  !> Above this order LAPACK line by line is as fast in an inverse, and where large matrices give a small result,
   integer, parameter, public :: largest_in_lanes = 128
   !> and above this one in a solution, and where a large result leaves the caches.
   integer, parameter, public :: largest_solved = 64
