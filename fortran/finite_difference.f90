@@ -123,14 +123,16 @@ contains
       operation%fast = rows_of_columns(transpose(operation%t_out))
     end if
     if (size(operation%slow%weight)*size(operation%fast%weight) <= few_products) &
-      operation%both = both_at_once(operation%slow, operation%fast, size(operation%h, 1))
+      operation%both = both_at_once(operation%transposed, operation%slow, operation%fast, size(operation%h, 1))
     operation%block_lines = long_block
     operation%n_element = 1
   end subroutine plan_transformation
 
   !> The entries of a line made of those of the line before, in one step.
-  !> m_fast   numbers side by side in memory
-  pure function both_at_once(slow, fast, m_fast) result(rows)
+  !> slow_is_out   whether the slow index counts responses: terms are summed response by response
+  !> m_fast        numbers side by side in memory
+  function both_at_once(slow_is_out, slow, fast, m_fast) result(rows)
+    logical, intent(in) :: slow_is_out
     type(sparse_rows), intent(in) :: slow, fast
     integer, intent(in) :: m_fast
     type(sparse_rows) :: rows
@@ -143,17 +145,31 @@ contains
     do i = 1, slow%n
       do j = 1, fast%n
         rows%start((i - 1)*fast%n + j) = k
-        do s = slow%start(i), slow%start(i + 1) - 1
-          do t = fast%start(j), fast%start(j + 1) - 1
-            rows%from(k) = (slow%from(s) - 1)*m_fast + fast%from(t)
-            rows%weight(k) = slow%weight(s)*fast%weight(t)
-            k = k + 1
+        if (slow_is_out) then
+          do s = slow%start(i), slow%start(i + 1) - 1
+            do t = fast%start(j), fast%start(j + 1) - 1
+              call add_product()
+            end do
           end do
-        end do
+        else
+          do t = fast%start(j), fast%start(j + 1) - 1
+            do s = slow%start(i), slow%start(i + 1) - 1
+              call add_product()
+            end do
+          end do
+        end if
       end do
     end do
     rows%start(rows%n + 1) = k
     rows%unused = slow%unused .or. fast%unused
+
+  contains
+
+    subroutine add_product()
+      rows%from(k) = (slow%from(s) - 1)*m_fast + fast%from(t)
+      rows%weight(k) = slow%weight(s)*fast%weight(t)
+      k = k + 1
+    end subroutine add_product
   end function both_at_once
 
   !> The entries of each column of a matrix that are not zero: of each row of its transpose.
@@ -201,8 +217,8 @@ contains
     if (self%both%n > 0) then
       call kernels%weigh_lines(size(self%h_pairs, 2), self%both, first, n_lines, self%h_pairs, self%new_pairs, total)
     else
-      call kernels%transform_lines(size(self%h, 2), size(self%h, 1), self%slow, self%fast, first, n_lines, &
-                                   self%h_pairs, self%new_pairs, total)                     ! (2.57)
+      call kernels%transform_lines(self%transposed, size(self%h, 2), size(self%h, 1), self%slow, self%fast, first, &
+                                   n_lines, self%h_pairs, self%new_pairs, total)            ! (2.57)
     end if
     rcond = 1.0_dp
     call kernels%judge(n_lines, total, line_info, rcond)

@@ -204,7 +204,7 @@ contains
     end associate
   end subroutine identify_by_inverses
 
-  !> The columns of an inverse lie in one order in all rows: a product takes the rows of its second factor in that order.
+  !> The columns of an inverse lie in one order in all rows: a product takes the rows of its second factor in it.
   !> place     where the inverse lies, (column, row)
   !> b_row     the element before each row of the second factor
   !> row       the element before each of the first rows of the inverse

@@ -24,7 +24,7 @@ module jointfrf_lanes
 
   !> Up to this order there is an inverse of its own for each order; its matrix lies row by row.
   integer, parameter, public :: largest_constant = 8
-  !> Above this order LAPACK line by line is as fast in an inverse and in what reads several matrices for a small result,
+  !> Above this order LAPACK line by line is as fast in an inverse, and where large matrices give a small result,
   integer, parameter, public :: largest_in_lanes = 128
   !> and above this one in a solution, and where a large result leaves the caches.
   integer, parameter, public :: largest_solved = 64
@@ -289,12 +289,14 @@ module jointfrf_lanes
     end subroutine identify_lines_routine
 
     !> Real transformations of both sides of a line, without workspace.
+    !> slow_first       which side is transformed first: results are the same in either order of storage
     !> m_slow, m_fast   size of a line h as it is stored: columns, and rows, which lie side by side
     !> slow, fast       what entries of the new line are made of, along either
     !> total            shape (n_lines): sums in which NaN, Inf and overflow show
-    subroutine transform_lines_routine(m_slow, m_fast, slow, fast, first, n_lines, h, h_new, total)
+    subroutine transform_lines_routine(slow_first, m_slow, m_fast, slow, fast, first, n_lines, h, h_new, total)
       import :: dp, sparse_rows
       implicit none
+      logical, intent(in) :: slow_first
       integer, intent(in) :: m_slow, m_fast, first, n_lines
       type(sparse_rows), intent(in) :: slow, fast
       real(dp), intent(in) :: h(2, m_fast, m_slow, *)

@@ -7,7 +7,8 @@ module JF_MODULE
   use, intrinsic :: iso_fortran_env, only: int64
   use jointfrf_elimination_plan, only: elimination_plan
   use jointfrf_kinds, only: dp, ip
-  use jointfrf_lanes, only: doubtful, in_doubt, lane_kernels, lanes, largest_constant, largest_in_lanes, padded, sparse_rows
+  use jointfrf_lanes, only: doubtful, in_doubt, lane_kernels, lanes, largest_constant, largest_in_lanes, &
+    padded, sparse_rows
   use jointfrf_lookahead, only: advance, lookahead, spread_over
   implicit none
   private

@@ -5,3 +5,5 @@ import os
 # Before numpy loads its BLAS. At these orders threads within a line do harm, to numpy most of all.
 for _name in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ[_name] = "1"
+# Every BLAS chooses its own kernels.
+os.environ.pop("OPENBLAS_CORETYPE", None)

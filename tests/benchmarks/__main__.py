@@ -18,7 +18,18 @@ import jointfrf as jf
 
 from . import report
 from .data import Data
-from .machine import QUICK_SIZES, ROOT, SIZES, Limits, as_dict, best_of, build_library, describe, measure_limits
+from .machine import (
+    QUICK_SIZES,
+    ROOT,
+    SIZES,
+    Limits,
+    as_dict,
+    best_of,
+    build_library,
+    describe,
+    measure_limits,
+    usable_cores,
+)
 from .measure import Candidate, time_interleaved
 from .operations import OPERATIONS, Operation, Reference
 from .options import numbers
@@ -117,7 +128,8 @@ def main(arguments: list[str] | None = None) -> int:
 def _measure(options: argparse.Namespace) -> Run:
     jf.set_engine(options.engine)
     library = build_library()
-    threads = tuple(count for count in options.threads if library.machine_set_threads(count) == count)
+    possible = [count for count in options.threads if count <= usable_cores()]
+    threads = tuple(count for count in possible if library.machine_set_threads(count) == count)
     machine = {**describe(), "engine": jf.get_engine()}
 
     def measured() -> dict[int, Limits]:

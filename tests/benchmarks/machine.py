@@ -135,6 +135,29 @@ def _processor() -> str:
     return names[0] if names else platform.machine()
 
 
+def _blas_kernels() -> dict[str, str]:
+    """Return which kernels each OpenBLAS of this process runs on, by the file of the library; empty where unknown."""
+    try:
+        lines = Path("/proc/self/maps").read_text().splitlines()
+    except OSError:
+        return {}
+    found = {}
+    for path in sorted({line.split()[-1] for line in lines if "openblas" in line and ".so" in line}):
+        library = ctypes.CDLL(path)
+        for name in ("openblas_get_corename", "scipy_openblas_get_corename", "scipy_openblas_get_corename64_"):
+            if hasattr(library, name):
+                ask = getattr(library, name)
+                ask.restype = ctypes.c_char_p
+                found[Path(path).name] = ask().decode()
+                break
+    return found
+
+
+def usable_cores() -> int:
+    """Return how many cores this process may run on: fewer than there are where it is pinned."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
 def describe() -> dict[str, Any]:
     """Return what the machine and the programs on it are called."""
     return {
@@ -145,5 +168,6 @@ def describe() -> dict[str, Any]:
         "fortran": _first_line(os.environ.get("FC", "gfortran"), "--version"),
         "python": platform.python_version(),
         **{name: version(name) for name in ("jointfrf", "numpy", "scipy", "scipy-openblas32")},
+        "blas": _blas_kernels(),
         "commit": _first_line("git", "--no-optional-locks", "-C", str(ROOT), "describe", "--always", "--dirty"),
     }

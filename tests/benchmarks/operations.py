@@ -307,6 +307,19 @@ def _our_difference(data: Data, **more: object) -> Array:
     return jf.transform(data["h"], data["t"], data["t"], **more)  # type: ignore[arg-type]
 
 
+def _numpy_difference(data: Data) -> Array:
+    """Return what slices give, which is faster than products with weights that are mostly zero."""
+    h, t = data["h"], data["t"]
+    factor = t[1, 2]
+    half = np.empty((len(h), t.shape[0], h.shape[2]), complex)
+    half[:, 0::2] = h[:, 1::3]
+    half[:, 1::2] = (h[:, 2::3] - h[:, 0::3]) * factor
+    found = np.empty((len(h), t.shape[0], t.shape[0]), complex)
+    found[..., 0::2] = half[..., 1::3]
+    found[..., 1::2] = (half[..., 2::3] - half[..., 0::3]) * factor
+    return found
+
+
 # ---------------------------------------------------------------- the bare loop
 
 
@@ -460,7 +473,7 @@ OPERATIONS: dict[str, Operation] = {
             lambda n: _COMPLEX * (9 + 4) * n**2,
             _points_data,
             _our_difference,
-            lambda data: data["t"] @ data["h"] @ data["t"].T,
+            _numpy_difference,
             routine=jf.transform,
         ),
         Operation(

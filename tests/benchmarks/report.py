@@ -21,6 +21,7 @@ def machine_text(machine: dict[str, Any], limits: list[dict[str, Any]]) -> str:
         f"{machine['fortran']}; Python {machine['python']}, numpy {machine['numpy']}, OpenBLAS "
         f"{machine['scipy-openblas32']}, jointfrf {machine['jointfrf']} ({machine['commit']}), "
         f"engine {machine['engine']}",
+        *(f"{library} runs on the kernels for {kernels}" for library, kernels in machine.get("blas", {}).items()),
     ]
     return "\n".join(
         text + limits_text(limits) + _warning(machine, "other programs are running: the numbers are rough")
