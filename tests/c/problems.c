@@ -268,6 +268,16 @@ static void set_unit(problem *p, int k, int line, double value)
         a[2 * (i * n + i)] = value;
 }
 
+/* What is tiny where the rest is large, so that results overflow: the blocks beside the diagonal of the first input. */
+static int is_tiny(int input, size_t entry, size_t entries)
+{
+    size_t order = 0;
+
+    while ((order + 1) * (order + 1) <= entries)
+        order++;
+    return input == 0 && (order == 0 || order % 2 == 1 || entry / order / (order / 2) != entry % order / (order / 2));
+}
+
 void spoil(problem *p, int line, char how)
 {
     const int by_omega = p->routine >= RECEPTANCE && p->routine <= RECEPTANCE_MODAL;
@@ -288,7 +298,9 @@ void spoil(problem *p, int line, char how)
         if (how == 's' && !by_omega && p->routine < BRICK_MATRICES && !(p->routine == COMPLIANCE_COVARIANCE && k == 2))
             set_unit(p, k, line, k == 0 ? 1.0 : k == 1 && p->routine == COUPLE ? 0.0 : -1.0);
         for (i = 0; i < p->in_line[k]; i++)
-            if (strchr("hlmt0", how) || (how == 's' && by_omega))
+            if (how == 'o')
+                a[i] *= is_tiny(k, i / 2, p->in_line[k] / 2) ? 1e-310 : 1e150;
+            else if (strchr("hlmt0", how) || (how == 's' && by_omega))
                 a[i] *= factor;
     }
 }

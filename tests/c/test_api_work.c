@@ -221,7 +221,7 @@ int main(void)
             for (t = 0; t < 2; t++)
                 for (variant = 0; variant < variants(routine); variant++) {
                     one_problem(routine, "NT"[t], orders[i], variant, "");
-                    one_problem(routine, "nt"[t], orders[i], variant, " n 0sh i tlm");
+                    one_problem(routine, "nt"[t], orders[i], variant, "on 0sh i tlm");
                 }
         }
         snprintf(what, sizeof what, "%s", routine_name[routine]);
