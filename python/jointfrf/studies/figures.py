@@ -32,12 +32,14 @@ def study_figures(record: StudyRecord, summary: Sequence[ParameterSummary]) -> l
     for name in record.identity["factors"]:
         over = [row for row in summary if isinstance(row.point.get(name), int | float)]
         if len({row.point[name] for row in over}) > 1:
-            figures += _over(name, over, _rmse_panel, "rmse", _RMSE)
+            has_bound = any(np.isfinite(row.bound) for row in over)
+            figures += _over(name, over, _rmse_panel, "rmse", _RMSE + (_BOUND if has_bound else ""))
             figures += _over(name, over, _coverage_panel, "coverage", _COVERAGE)
     return [figure for figure in figures if not all(panel.is_blank for panel in figure.panels)]
 
 
-_RMSE = "Root-mean-square error over {}, and least standard deviation of an unbiased estimate (Cramér-Rao bound)"
+_RMSE = "Root-mean-square error over {}"
+_BOUND = ", and least standard deviation of an unbiased estimate (Cramér-Rao bound)"
 _COVERAGE = (
     "Share of the 95 % intervals that hold the actual value, over {}; shaded: where it lies for intervals that hold, "
     "in 95 % of studies of so many realisations"

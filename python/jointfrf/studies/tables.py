@@ -13,11 +13,13 @@ __all__ = ["study_table"]
 
 _PERCENT = ("bias, %", "RMSE, %", "bound, %", "coverage, %")
 _NUMBERS = ("actual", "median", "2.5 %", "97.5 %", *_PERCENT)
-_NOTE = (
-    "RMSE: root-mean-square error, of the actual value. Bound: least standard deviation of an unbiased estimate "
-    "(Cramér-Rao) when nothing is known around the joint; with models, for fits with models. Coverage: share of the "
-    "95 % intervals that hold the actual value."
-)
+#: What columns mean that need a word.
+_MEANING = {
+    "RMSE, %": "RMSE: root-mean-square error, of the actual value.",
+    "bound, %": "Bound: least standard deviation of an unbiased estimate (Cramér-Rao) when nothing is known around the "
+    "joint; with models, for fits with models.",
+    "coverage, %": "Coverage: share of the 95 % intervals that hold the actual value.",
+}
 
 
 def study_table(record: StudyRecord, summary: Sequence[ParameterSummary], missing: int) -> Table:
@@ -40,7 +42,7 @@ def study_table(record: StudyRecord, summary: Sequence[ParameterSummary], missin
         f"Estimates over {record.realisations} realisations, seed {record.seed}",
         (*columns, "failed") if has_failed else columns,
         tuple(rows),
-        note=_NOTE + left,
+        note=" ".join(meaning for name, meaning in _MEANING.items() if name in columns) + left,
         percentages=_PERCENT,
     )
 
