@@ -45,8 +45,10 @@ _SLOW = {
     "estimate_noise": 15, "smooth_frfs": 15, "brick_beam": 10, "solid_model": 10, "check_frfs": 10, "write_hdf5": 4,
     "read_channel_table": 4, "write_uff": 2, "merge_frfs": 4, "receptance": 2, "joint_channels": 10,
     "BoltedLap": 4, "element_matrices": 4, "assemble_bricks": 4, "elastic_centre": 4, "multi_point_stiffness": 4,
-    "multi_point_compliance": 4,
+    "multi_point_compliance": 4, "study": 3000, "merge_studies": 100, "read_study": 10, "sweep": 20, "plan_sweep": 100,
 }  # fmt: skip
+#: What starts processes stays as it is.
+_WORKERS = ("executor", "jobs")
 _LONGEST_MESSAGE = 600
 #: Methods that write, draw or are slow are called, but seldom.
 _SELDOM = {"report": 0.002, "plot": 0.002, "save": 0.2, "modes": 0.3, "receptance": 0.3}
@@ -129,6 +131,9 @@ class PythonCalls:
             value = sound.get(name)
             is_needed = parameter.default is parameter.empty or name in sound
             if parameter.kind is parameter.VAR_KEYWORD or (not is_needed and random.random() > 0.25):
+                continue
+            if name in _WORKERS:
+                named |= {name: value} if name in sound else {}
                 continue
             if not is_needed and parameter.default is not None and value is None:
                 value = parameter.default

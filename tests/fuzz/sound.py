@@ -69,6 +69,8 @@ def _arrays() -> dict[str, dict[str, Any]]:
         "transform": {"h": lines, "t_out": np.ones((3, 4)), "t_in": np.ones((2, 4)), **out},
         "pollute": {"h": lines, "level": 0.05, "seed": 1},
         "realisations": {"h": lines, "level": 0.05, "seed": 1, "count": 2},
+        "sweep": {"operation": jf.invert, "arrays": {"a": lines}, "out": np.empty((6, 4, 4), complex), "jobs": 1},
+        "plan_sweep": {"operation": jf.invert, "arrays": {"a": lines}, "out": np.empty((6, 4, 4), complex), "jobs": 1},
         "semm": {"h_model": lines, "h_measured": lines[:, :2, :2], "outputs": [0, 1], "inputs": [0, 1], **out},
         "band_mean": {"freq_hz": c["freq"], "k_joint": k0, "bands": (1.0, 9.0), "dofs": ["x"]},
         "in_bands": {"freq_hz": c["freq"], "bands": [(1.0, 4.0), (5.0, 9.0)]},
@@ -236,11 +238,20 @@ def _files(folder: Path) -> dict[str, dict[str, Any]]:
     jf.io.write_uff(folder / "a.uff", frfs)
     jf.io.write_npz(folder / "a.npz", frfs)
     (folder / "table.csv").write_text("channel,side\n1:x,j\n2:y,k\n")
+    law = jf.LawJoint({"x": jf.SpringLaw(2000.0, 3.0)})
+    jf.write_joint(folder / "joint.toml", law)
+    first = jf.study("3.1", folder / "study", 2, design=jf.StudyDesign(estimators=["ismm"]), jobs=1)
     written = {name: {"path": folder / f"out.{name}", "frfs": frfs} for name in ("uff", "npz", "csv", "hdf5")}
     return {
         "read_uff": {"path": folder / "a.uff"},
         "read_frfs": {"paths": folder / "a.npz"},
         "read_channel_table": {"path": folder / "table.csv"},
+        "read_joint": {"path": folder / "joint.toml"},
+        "write_joint": {"path": folder / "written.toml", "joint": law},
+        "study": {"case": "3.1", "out": folder / "another", "realisations": 2, "jobs": 1},
+        "read_study": {"folder": first.folder},
+        "merge_studies": {"parts": [first.folder], "out": folder / "merged"},
+        "StudyDesign": {"factors": {"noise": [0.01, 0.05]}, "estimators": ["ismm"]},
         "FrfMapping": {"freq_hz": "f", "h": "H"},
         **{f"write_{name}": arguments for name, arguments in written.items()},
     }

@@ -28,6 +28,7 @@ def run_cases(name: str, seed: int, first: int, last: int, folder: Path, deadlin
     faulthandler.register(signal.SIGUSR1, all_threads=True)
     own = folder / "files"
     own.mkdir(exist_ok=True)
+    os.chdir(own)  # a random path is a file there
     with (folder / PROGRESS).open("r+b") as file:
         progress = mmap.mmap(file.fileno(), 8)
     counts: Counter[str] = Counter()

@@ -98,6 +98,8 @@ class _Sweep:
 def _checked(operation: LineFunction, arrays: Mapping[str, ArrayLike], out: Any) -> _Sweep:
     if not callable(operation):
         raise TypeError(f"operation must be a function such as jointfrf.invert, not {type(operation).__name__}")
+    if not isinstance(arrays, Mapping):
+        raise TypeError(f"arrays must map names of arguments to arrays, not {type(arrays).__name__}")
     inputs = {name: lines_of(name, array) for name, array in arrays.items()}
     result = lines_of("out", out, is_result=True)
     for name, own in inputs.items():

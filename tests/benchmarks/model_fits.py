@@ -1,0 +1,113 @@
+"""Seconds of fits with models on one thread: `tests/benchmarks/run-model-fits --help`."""
+
+from __future__ import annotations
+
+import argparse
+import statistics
+import time
+import warnings
+from collections.abc import Callable
+
+import numpy as np
+
+import jointfrf as jf
+
+_SECTION = {"youngs_modulus": 67e9, "density": 2700.0, "width": 0.025, "height": 0.006, "loss_factor": 0.01}
+#: Channels of the beams of 1 mm elements.
+_CHANNELS = {
+    "16 FRFs at the joint": ("A/301:y", "A/301:theta", "B/1:y", "B/1:theta"),
+    "16 at remote points": ("A/151:y", "A/251:y", "B/101:y", "B/226:y"),
+    "one": ("B/226:y",),
+}
+_DOFS = ("x", "y", "z", "theta_x", "theta_y", "theta_z")
+_TRUE = ([6e5, 6e5, 4e6, 5e3, 5e3, 400], [20, 20, 60, 1.5, 1.5, 0.2])
+_GUESS = ([1e5, 1e5, 1e6, 1e3, 1e3, 100], [5, 5, 5, 0.5, 0.5, 0.05])
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(prog="run-model-fits", description=__doc__)
+    parser.add_argument("--repetitions", type=int, default=3, metavar="N", help="draws of the noise, each timed")
+    options = parser.parse_args()
+    print(f"{'':44} median s   CPU s   largest error / standard error of the joint")
+    for name, channels in _CHANNELS.items():
+        _time(f"case 3.3, 786 lines, {name}", *_beams(channels), options.repetitions)
+    _time("bricks, 600 lines, 20 FRFs, 8 unknowns", *_bricks(), options.repetitions)
+    return 0
+
+
+def _time(name: str, fit: Callable[[int], jf.ModelFit], truth: dict[str, float], repetitions: int) -> None:
+    seconds, processor, errors = [], [], []
+    for seed in range(repetitions):
+        wall, cpu = time.perf_counter(), time.process_time()
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            found = fit(seed)
+        seconds.append(time.perf_counter() - wall)
+        processor.append(time.process_time() - cpu)
+        errors += [abs(found.parameters[key] - true) / found.std_error[key] for key, true in truth.items()]
+    print(f"{name:44} {statistics.median(seconds):8.2f} {statistics.median(processor):7.2f}   {max(errors):.1f}")
+
+
+def _beams(channels: tuple[str, ...]) -> tuple[Callable[[int], jf.ModelFit], dict[str, float]]:
+    """Case 3.3 with exact models."""
+    freq = np.arange(15.0, 801.0)
+    parts = (
+        jf.Substructure(jf.beam(0.3, 300, ends=("clamped", "free"), **_SECTION), ["301:y", "301:theta"]),
+        jf.Substructure(jf.beam(0.225, 225, **_SECTION), ["1:y", "1:theta"]),
+    )
+    truth = jf.Assembly(*parts, jf.Joint([6e5, 5e3], [20, 1.5], ["y", "theta"]))
+    exact = truth.receptance(freq, channels, channels)
+    believed = jf.Assembly(*parts, jf.Joint([1e5, 1e3], [5, 0.5], ["y", "theta"]))
+
+    def fit(seed: int) -> jf.ModelFit:
+        return jf.identify_model(freq, jf.pollute(exact, 0.05, seed=seed), believed, channels, channels)
+
+    return fit, {"k_y": 6e5, "k_theta": 5e3, "c_y": 20.0, "c_theta": 1.5}
+
+
+def _bar(length: float, clamped: bool, youngs_modulus: float, density: float, loss_factor: float) -> jf.Model:
+    """Brick beam with a joint at one end and observed sections along it."""
+    return jf.brick_beam(
+        length, 0.025, 0.006, jf.Material(youngs_modulus, 0.33, density, loss_factor), divisions=(5, 2, 88),
+        ends=("clamped" if clamped else "free", "free"), sections={"joint": length if clamped else 0.0},
+        observed={f"p{i}": length * i / 5 for i in ((1, 2, 3, 4) if clamped else (2, 3, 5))},
+    )  # fmt: skip
+
+
+def _arm(youngs_modulus: float, density: float, loss_factor: float) -> jf.Model:
+    return _bar(0.3, True, youngs_modulus, density, loss_factor)
+
+
+def _free(youngs_modulus: float, density: float, loss_factor: float) -> jf.Model:
+    return _bar(0.2, False, youngs_modulus, density, loss_factor)
+
+
+def _bricks() -> tuple[Callable[[int], jf.ModelFit], dict[str, float]]:
+    """Two brick beams, six joint DOFs; moduli, densities, loss factors and two sensors unknown."""
+    freq, ports = np.linspace(5.0, 900.0, 600), [f"joint:{dof}" for dof in _DOFS]
+    outputs = [f"A/p{i}:{axis}" for i in (2, 3, 4) for axis in "xyz"] + ["B/p5:y"]
+    forces = ["A/p4:y", "B/p5:y"]
+    actual = {"youngs_modulus": 1.01 * 67e9, "density": 2700.0, "loss_factor": 0.01}
+    unknown = {
+        "youngs_modulus": jf.Unknown(67e9, 0.02 * 67e9), "density": jf.Unknown(2700.0, 27.0),
+        "loss_factor": jf.Unknown(0.008, 0.005),
+    }  # fmt: skip
+    truth = jf.Assembly(
+        jf.Substructure(_arm(**actual), ports), jf.Substructure(_free(**actual), ports), jf.Joint(*_TRUE, list(_DOFS)),
+        [jf.AddedMass("A/p4:y", 0.003), jf.AddedMass("B/p5:y", 0.002)],
+    )  # fmt: skip
+    exact = truth.receptance(freq, outputs, forces)
+
+    def fit(seed: int) -> jf.ModelFit:
+        masses = [jf.AddedMass(at, jf.Unknown(0.002, 0.002)) for at in ("A/p4:y", "B/p5:y")]
+        believed = jf.Assembly(
+            jf.Substructure(_arm, ports, unknown), jf.Substructure(_free, ports, unknown),
+            jf.Joint(*_GUESS, list(_DOFS)), masses,
+        )  # fmt: skip
+        return jf.identify_model(freq, jf.pollute(exact, 0.02, seed=seed), believed, outputs, forces)
+
+    return fit, dict(zip([f"k_{dof}" for dof in _DOFS], _TRUE[0], strict=True))
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
