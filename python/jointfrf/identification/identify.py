@@ -16,7 +16,7 @@ from jointfrf.frf.bands import PIECE
 from jointfrf.identification.band_means import fit_band_mean, prepare_band_mean
 from jointfrf.identification.compliance_data import compliance_data
 from jointfrf.identification.compliance_fit.channel_noise import NoiseOptions
-from jointfrf.identification.compliance_fit.describe import Described, describe_compliance
+from jointfrf.identification.compliance_fit.describe import describe_compliance
 from jointfrf.identification.compliance_fit.fit import fit_compliance
 from jointfrf.identification.compliance_fit.joint_terms import CrossTerms, DampingTerms
 from jointfrf.identification.compliance_fit.prepare import FitOptions, FitProblem, prepare_compliance
@@ -24,11 +24,7 @@ from jointfrf.identification.compliance_fit.transforms import Transform
 from jointfrf.identification.joint_fit import JointFit
 from jointfrf.identification.law_fit.identify_laws import check_law_joint, identify_laws
 from jointfrf.identification.law_fit.law_fit import LawFit
-from jointfrf.identification.prepare import (
-    BandsOfDofs,
-    MeasuredFrfs,
-    as_measured,
-)
+from jointfrf.identification.prepare import BandsOfDofs, MeasuredFrfs, as_measured
 from jointfrf.kernel.arguments import FloatArray, check_choice
 from jointfrf.laws.law_joint import LawJoint
 from jointfrf.substructuring.methods import JointFrfs, StiffnessMethod
@@ -222,10 +218,9 @@ def identify(
         )  # fmt: skip
         if reciprocal:
             _look_at(problem, transform)
-        described = identify_laws(problem, own)
-        for warning in described.warnings:
-            warnings.warn(warning, stacklevel=2)
-        return described.fit
+        laws = identify_laws(problem, own)
+        _warn(laws.warnings)
+        return laws.fit
     if method == "compliance":
         words = damping if isinstance(damping, str) else tuple(damping)
         problem = prepare_compliance(
@@ -235,8 +230,9 @@ def identify(
         if reciprocal:
             _look_at(problem, transform)
         found = fit_compliance(problem)
-        fit = _warned(describe_compliance(found, problem))
-        return replace(fit, data=compliance_data(found, problem, transform))
+        described = describe_compliance(found, problem)
+        _warn(described.warnings)
+        return replace(described.fit, data=compliance_data(found, problem, transform))
     if coherence is not None or averages is not None:
         raise ValueError("coherence and averages are for method 'compliance'")
     if isinstance(transform, Interface):
@@ -257,11 +253,10 @@ def _look_at(problem: FitProblem, transform: Transform | tuple[Transform, Transf
     warn_of_frfs(_checked(MeasuredFrfs(problem.freq_hz, problem.frfs.measured), problem.dofs, transforms), 3)
 
 
-def _warned(described: Described) -> JointFit:
+def _warn(told: Sequence[Warning]) -> None:
     """Issue the warnings of a fit."""
-    for warning in described.warnings:
+    for warning in told:
         warnings.warn(warning, stacklevel=3)
-    return described.fit
 
 
 def _checked(

@@ -8,7 +8,7 @@ from typing import Protocol
 
 from jointfrf.kernel.arguments import FloatArray
 
-__all__ = ["ShownParameter", "columns_of", "correlation_notes", "parameter_warnings", "wrapped"]
+__all__ = ["ListedParameter", "ShownParameter", "columns_of", "correlation_notes", "parameter_warnings", "wrapped"]
 
 #: Columns of a printed fit.
 _WIDTH = 80
@@ -22,8 +22,8 @@ _WELL = 0.1
 _SHOWN = 4
 
 
-class ShownParameter(Protocol):
-    """A parameter of a joint that was fitted."""
+class ListedParameter(Protocol):
+    """A parameter as tables show it."""
 
     @property
     def name(self) -> str:
@@ -32,6 +32,10 @@ class ShownParameter(Protocol):
     @property
     def unit(self) -> str:
         """Its unit."""
+
+
+class ShownParameter(ListedParameter, Protocol):
+    """A parameter of a joint that was fitted."""
 
     @property
     def is_log(self) -> bool:

@@ -6,14 +6,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
 from numpy.typing import ArrayLike
 
+from jointfrf.identification.fitted_parameters import FittedParameters
 from jointfrf.identification.model_fit.assembly import Assembly
 from jointfrf.identification.model_fit.directions import OpenDirection
 from jointfrf.identification.model_fit.residual_check import ResidualTest
 from jointfrf.identification.model_fit.unknowns import FitParameter
-from jointfrf.identification.parameter_table import columns_of
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.laws.law_joint import LawJoint
 
@@ -21,7 +20,7 @@ __all__ = ["ModelFit"]
 
 
 @dataclass(frozen=True)
-class ModelFit:
+class ModelFit(FittedParameters):
     """Parameters of a joint and unknowns of the models, found together, and their uncertainty.
 
     Attributes
@@ -84,30 +83,6 @@ class ModelFit:
         """Those of the parameters that belong to the joint."""
         return {one.name: self.parameters[one.name] for one in self.fitted if one.origin == "joint"}
 
-    @property
-    def std_error(self) -> dict[str, float]:
-        """Standard error of each parameter, in its unit."""
-        errors = np.sqrt(np.maximum(np.diagonal(self.covariance), 0))
-        return dict(zip(self.parameters, errors.tolist(), strict=True))
-
-    @property
-    def correlation(self) -> FloatArray:
-        """Correlation of the errors of all parameters, shape (p, p)."""
-        size = np.sqrt(np.maximum(np.diagonal(self.covariance), np.finfo(float).tiny))
-        return np.asarray(self.covariance / np.outer(size, size))
-
-    def confidence_interval(self, probability: float = 0.95) -> dict[str, tuple[float, float]]:
-        """Interval that contains the true parameter with the given probability, by profile likelihood.
-
-        Raises
-        ------
-        ValueError
-            The probability is not between 0 and 1.
-        """
-        if not 0 < probability < 1:
-            raise ValueError(f"probability must lie between 0 and 1, not {probability}")
-        return self.intervals(probability)
-
     def k_joint(self, freq_hz: ArrayLike) -> ComplexArray:
         """Complex joint stiffness found, shape (n_freq, n, n), N/m, rotational N m/rad."""
         return self.joint.dynamic_stiffness(freq_hz)
@@ -118,51 +93,21 @@ class ModelFit:
 
     def to_dict(self) -> dict[str, Any]:
         """Everything but the lines, as plain numbers and text, ready for JSON (an open interval ends at None)."""
-        intervals, errors = self.confidence_interval(0.95), self.std_error
-
-        def plain(number: float) -> float | None:
-            return float(number) if np.isfinite(number) else None
-
+        told = self._plain(self.fitted)
+        for one in self.fitted:
+            told["parameters"][one.name]["prior"] = None if one.std is None else [one.value, one.std]
         return {
             "method": "model",
             "dofs": list(self.joint.dofs),
             "rigid": list(self.joint.rigid),
-            "parameters": {
-                one.name: {
-                    "value": float(self.parameters[one.name]),
-                    "unit": one.unit,
-                    "std_error": plain(errors[one.name]),
-                    "confidence_interval_95": [plain(limit) for limit in intervals[one.name]],
-                    "prior": None if one.std is None else [one.value, one.std],
-                }
-                for one in self.fitted
-            },
-            "correlation": [[float(value) for value in row] for row in self.correlation],
-            "noise_level": plain(self.noise_level),
-            "residual_level": plain(self.residual_level),
             "residual_is_noise": self.test.is_noise,
-            "frequency_hz": [float(self.freq_hz.min()), float(self.freq_hz.max())],
-            "n_lines": int(self.freq_hz.size),
             "responses": list(self.responses),
             "forces": list(self.forces),
-            "warnings": list(self.warnings),
-            "notes": list(self.notes),
+            **told,
         }
 
     def __str__(self) -> str:
         """Return a table of the parameters with their intervals, and the warnings."""
-        intervals, errors = self.confidence_interval(0.95), self.std_error
-        rows = [("parameter", "value", "std error", "95 % interval", "prior", "unit")]
-        for one in self.fitted:
-            value = self.parameters[one.name]
-            low, high = intervals[one.name]
-            prior = "" if one.std is None else f"{one.value:.4g} +- {one.std:.2g}"
-            error = f"{errors[one.name]:.2g}"
-            rows.append((one.name, f"{value:.5g}", error, f"{low:.4g} .. {high:.4g}", prior, one.unit))
-        span = f"{self.freq_hz.min():g} to {self.freq_hz.max():g} Hz, {self.freq_hz.size} lines"
-        head = [
-            f"method model, {span}, {len(self.responses)} responses x {len(self.forces)} forces",
-            f"noise {100 * self.noise_level:.2g} %, residual {100 * self.residual_level:.2g} % of the FRFs",
-        ]
-        tail = [f"note: {text}" for text in self.notes] + [f"warning: {text}" for text in self.warnings]
-        return "\n".join([*head, "", *columns_of(rows), *([""] if tail else []), *tail])
+        prior = ["" if one.std is None else f"{one.value:.4g} +- {one.std:.2g}" for one in self.fitted]
+        said = f", {len(self.responses)} responses x {len(self.forces)} forces"
+        return self._shown("model", self.fitted, said, prior=prior)
