@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from jointfrf.extras import import_extra
+from jointfrf.kernel.arguments import as_array
 
 __all__ = ["Lines", "lines_of"]
 
@@ -185,12 +186,12 @@ def lines_of(name: str, array: ArrayLike, *, is_result: bool = False) -> Lines:
     TypeError
         Results cannot be written into it.
     ValueError
-        It has no axis of lines, or cannot be written.
+        It has no axis of lines, masked entries, or cannot be written.
     """
     package = type(array).__module__.partition(".")[0]
-    found = _zarr(array) if package == "zarr" else _hdf5(array, is_result) if package == "h5py" else _numpy(array)
-    if is_result and isinstance(found, MemoryLines) and not hasattr(array, "__setitem__"):
+    if is_result and package not in ("zarr", "h5py") and not isinstance(array, np.ndarray):
         raise TypeError(f"{name} must be an array that results are written into, not {type(array).__name__}")
+    found = _zarr(array) if package == "zarr" else _hdf5(array, is_result) if package == "h5py" else _numpy(name, array)
     if isinstance(array, np.ndarray) and is_result and not array.flags.writeable:
         raise ValueError(f"{name} cannot be written: it is open for reading only")
     if not found.shape:
@@ -198,7 +199,7 @@ def lines_of(name: str, array: ArrayLike, *, is_result: bool = False) -> Lines:
     return found
 
 
-def _numpy(array: ArrayLike) -> Lines:
+def _numpy(name: str, array: ArrayLike) -> Lines:
     if isinstance(array, np.memmap) and array.filename is not None and array.flags.c_contiguous and array.mode != "c":
         # A view of the mapped array lies further on in the file.
         root: Any = array
@@ -206,7 +207,7 @@ def _numpy(array: ArrayLike) -> Lines:
             root = root.base
         offset = int(root.offset) + array.ctypes.data - root.ctypes.data
         return MappedLines(array.shape, Path(array.filename).resolve(), array.dtype.str, offset)
-    values = np.asarray(array)
+    values = as_array(name, array)
     return MemoryLines(values.shape, values)
 
 

@@ -242,10 +242,11 @@ def _tasks(whole: _Sweep, plan: SweepPlan) -> Iterator[_SweepTask]:
 
 def _measured(whole: _Sweep, pool: Pool[Any]) -> SweepPlan:
     """Measure the cost of lines and of tasks, and plan."""
-    empty = list(pool.completed(_nothing, iter(range(pool.workers))))  # starts the workers
-    start, number = perf_counter(), _EMPTY * pool.workers
-    empty = list(pool.completed(_nothing, iter(range(number))))
-    task = (perf_counter() - start) / len(empty) * pool.workers
+    for _ in pool.completed(_nothing, iter(range(pool.workers))):  # starts the workers
+        pass
+    start = perf_counter()
+    empty = sum(1 for _ in pool.completed(_nothing, iter(range(_EMPTY * pool.workers))))
+    task = (perf_counter() - start) / empty * pool.workers
     seconds = []
     few, many = (min(sample, whole.n_lines) for sample in _SAMPLES)
     values = np.empty(0)

@@ -119,6 +119,15 @@ def test_what_does_not_fit_is_said_before_anything_is_computed(lines, tmp_path):
         jf.sweep(jf.invert, {"a": lines}, np.memmap(tmp_path / "a", complex, "r", shape=lines.shape))
     with pytest.raises(TypeError, match="must be an array that results are written into"):
         jf.sweep(jf.invert, {"a": lines}, (1, 2))
+    with pytest.raises(TypeError, match="must be an array that results are written into, not list"):
+        jf.sweep(jf.invert, {"a": lines}, lines.tolist())  # a copy would take the results
+    masked = np.ma.masked_where(abs(lines) > np.median(abs(lines)), lines)
+    with pytest.raises(ValueError, match="a has masked entries"):
+        jf.sweep(jf.invert, {"a": masked}, np.empty_like(lines))
+    with pytest.raises(ValueError, match="out has masked entries"):
+        jf.sweep(jf.invert, {"a": lines}, masked)
+    with pytest.raises(TypeError, match="arrays must map names"):
+        jf.sweep(jf.invert, [lines], np.empty_like(lines))
     with pytest.raises(TypeError, match="operation must be a function"):
         jf.sweep("invert", {"a": lines}, np.empty_like(lines))
     with pytest.raises(ValueError, match="plan is of 7 lines"):
