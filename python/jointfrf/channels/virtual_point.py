@@ -324,13 +324,10 @@ def channel_geometry(
     >>> positions.tolist(), directions.tolist()
     ([[0.0, 0.0, 0.0], [0.02, 0.0, 0.0]], [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
     """
-    if not isinstance(channels, Iterable) or not isinstance(coordinates, Mapping):
-        what = (
-            "coordinates must be a mapping of nodes to x, y, z"
-            if isinstance(channels, Iterable)
-            else ("channels must be a sequence of channels")
-        )
-        raise TypeError(what)
+    if not isinstance(channels, Iterable):
+        raise TypeError("channels must be a sequence of channels")
+    if not isinstance(coordinates, Mapping):
+        raise TypeError("coordinates must be a mapping of nodes to x, y, z")
     named = [Channel.parse(channel) for channel in channels]
     for channel in named:
         if channel.is_rotation:

@@ -189,8 +189,8 @@ def check_type(name: str, value: object, kind: type) -> None:
 
 
 def as_names(name: str, value: object) -> tuple[str, ...]:
-    """Return a sequence of names."""
-    if isinstance(value, Iterable):
+    """Return a sequence of names; one text is none, though its letters are."""
+    if isinstance(value, Iterable) and not isinstance(value, str):
         listed = list(value)
         if all(isinstance(each, str) for each in listed):
             return tuple(map(str, listed))

@@ -94,3 +94,9 @@ def test_one_sentence_of_our_own(call, message):
         call()
     assert "\n" not in str(raised.value)
     assert len(str(raised.value)) < 300
+
+
+def test_one_text_is_no_sequence_of_names():
+    """Its letters would be names of DOFs."""
+    with pytest.raises(TypeError, match="dofs must be a sequence of names, not 'xy'"):
+        jf.Model(np.eye(2), np.eye(2), dofs="xy")
