@@ -21,7 +21,7 @@ _CHANNELS = {
 }
 _DOFS = ("x", "y", "z", "theta_x", "theta_y", "theta_z")
 _TRUE = ([6e5, 6e5, 4e6, 5e3, 5e3, 400], [20, 20, 60, 1.5, 1.5, 0.2])
-_GUESS = ([1e5, 1e5, 1e6, 1e3, 1e3, 100], [5, 5, 5, 0.5, 0.5, 0.05])
+_GUESS = ([3e5, 3e5, 2e6, 3e3, 3e3, 200], [10, 10, 30, 1, 1, 0.1])
 
 
 def main() -> int:
@@ -65,45 +65,36 @@ def _beams(channels: tuple[str, ...]) -> tuple[Callable[[int], jf.ModelFit], dic
     return fit, {"k_y": 6e5, "k_theta": 5e3, "c_y": 20.0, "c_theta": 1.5}
 
 
-def _bar(length: float, clamped: bool, youngs_modulus: float, density: float, loss_factor: float) -> jf.Model:
+def _bar(length: float, clamped: bool, material: jf.Material) -> jf.Model:
     """Brick beam with a joint at one end and observed sections along it."""
     return jf.brick_beam(
-        length, 0.025, 0.006, jf.Material(youngs_modulus, 0.33, density, loss_factor), divisions=(5, 2, 88),
+        length, 0.025, 0.006, material, divisions=(5, 2, 88),
         ends=("clamped" if clamped else "free", "free"), sections={"joint": length if clamped else 0.0},
         observed={f"p{i}": length * i / 5 for i in ((1, 2, 3, 4) if clamped else (2, 3, 5))},
     )  # fmt: skip
 
 
-def _arm(youngs_modulus: float, density: float, loss_factor: float) -> jf.Model:
-    return _bar(0.3, True, youngs_modulus, density, loss_factor)
-
-
-def _free(youngs_modulus: float, density: float, loss_factor: float) -> jf.Model:
-    return _bar(0.2, False, youngs_modulus, density, loss_factor)
-
-
 def _bricks() -> tuple[Callable[[int], jf.ModelFit], dict[str, float]]:
     """Two brick beams, six joint DOFs; moduli, densities, loss factors and two sensors unknown."""
     freq, ports = np.linspace(5.0, 900.0, 600), [f"joint:{dof}" for dof in _DOFS]
-    outputs = [f"A/p{i}:{axis}" for i in (2, 3, 4) for axis in "xyz"] + ["B/p5:y"]
-    forces = ["A/p4:y", "B/p5:y"]
-    actual = {"youngs_modulus": 1.01 * 67e9, "density": 2700.0, "loss_factor": 0.01}
+    outputs, forces = ["A/p4:x", "A/p4:y", "B/p5:x", "B/p5:y", "B/p5:z"], ["A/p3:x", "A/p3:y", "B/p5:x", "B/p5:z"]
     unknown = {
-        "youngs_modulus": jf.Unknown(67e9, 0.02 * 67e9), "density": jf.Unknown(2700.0, 27.0),
-        "loss_factor": jf.Unknown(0.008, 0.005),
-    }  # fmt: skip
-    truth = jf.Assembly(
-        jf.Substructure(_arm(**actual), ports), jf.Substructure(_free(**actual), ports), jf.Joint(*_TRUE, list(_DOFS)),
-        [jf.AddedMass("A/p4:y", 0.003), jf.AddedMass("B/p5:y", 0.002)],
-    )  # fmt: skip
+        "youngs_modulus": jf.Unknown(67e9, 0.02 * 67e9),
+        "density": jf.Unknown(2700.0, 27.0),
+        "loss_factor": jf.Unknown(0.008, 0.005, lower=1e-4),
+    }
+
+    def beams(youngs_modulus: float, loss_factor: float, unknowns: dict[str, jf.Unknown]) -> list[jf.Substructure]:
+        material = jf.Material(youngs_modulus, 0.33, 2700.0, loss_factor)
+        return [jf.Substructure(_bar(*own, material), ports, unknowns) for own in ((0.3, True), (0.2, False))]
+
+    sensors = [jf.AddedMass("A/p4:y", 0.003), jf.AddedMass("B/p5:y", 0.002)]
+    truth = jf.Assembly(*beams(1.01 * 67e9, 0.01, {}), jf.Joint(*_TRUE, list(_DOFS)), sensors)
     exact = truth.receptance(freq, outputs, forces)
+    masses = [jf.AddedMass(at, jf.Unknown(0.002, 0.002)) for at in ("A/p4:y", "B/p5:y")]
+    believed = jf.Assembly(*beams(67e9, 0.008, unknown), jf.Joint(*_GUESS, list(_DOFS)), masses)
 
     def fit(seed: int) -> jf.ModelFit:
-        masses = [jf.AddedMass(at, jf.Unknown(0.002, 0.002)) for at in ("A/p4:y", "B/p5:y")]
-        believed = jf.Assembly(
-            jf.Substructure(_arm, ports, unknown), jf.Substructure(_free, ports, unknown),
-            jf.Joint(*_GUESS, list(_DOFS)), masses,
-        )  # fmt: skip
         return jf.identify_model(freq, jf.pollute(exact, 0.02, seed=seed), believed, outputs, forces)
 
     return fit, dict(zip([f"k_{dof}" for dof in _DOFS], _TRUE[0], strict=True))

@@ -452,3 +452,22 @@ def test_channels_that_span_the_joint_give_it_line_by_line():
     assert np.median(abs(found.c - exact) / abs(exact).max()) < 1e-6
     assert from_lines(joint, 2 * np.pi * FREQ, found)[:4] == pytest.approx(joint.values[:4], rel=1e-3)
     assert Prediction(whole, FREQ, channels[:1], channels).joint_compliance(vector, h[:, :1], abs(h[:, :1])) is None
+
+
+def test_a_model_is_never_built_beyond_the_limits_of_its_unknowns():
+    """A loss factor known to a half: three standard deviations below it is negative, which no model takes."""
+    asked = []
+
+    def lossy(loss_factor):
+        asked.append(loss_factor)
+        return jf.beam(0.3, 6, ends=("clamped", "free"), youngs_modulus=67e9, **SECTION | {"loss_factor": loss_factor})
+
+    def whole(unknown):
+        part = jf.Substructure(lossy, ["7:y", "7:theta"], {"loss_factor": unknown})
+        return jf.Assembly(part, jf.Substructure(free_beam(), ["1:y", "1:theta"]), PLAIN)
+
+    h = jf.pollute(assembly().receptance(FREQ, CHANNELS, CHANNELS), 0.02, seed=4)
+    fit = fit_of(FREQ, h, whole(jf.Unknown(0.008, 0.004, lower=0.002, upper=0.011)), CHANNELS, CHANNELS)
+    low, high = fit.confidence_interval(0.95)["A/loss_factor"]
+    assert low < 0.01 < high
+    assert 0.002 <= min(asked) < max(asked) <= 0.011

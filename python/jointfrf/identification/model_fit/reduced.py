@@ -97,6 +97,12 @@ def reach_of(unknown: Unknown) -> float:
     return _REACH * unknown.std if unknown.std is not None else _SHARE * max(abs(unknown.value), 1e-9)
 
 
+def _box(unknown: Unknown, centre: float, share: float = 1.0) -> tuple[float, float]:
+    """Return the limits of an argument about a value, within its own: a function may refuse what is beyond them."""
+    reach = share * reach_of(unknown)
+    return max(unknown.lower, centre - reach), min(unknown.upper, centre + reach)
+
+
 def range_of(part: Substructure, unknown: Unknown) -> tuple[float, float]:
     """Return the limits within which an unknown of a substructure is sought."""
     if isinstance(part.source, Model):
@@ -138,7 +144,7 @@ class ReducedSubstructure:
         trials: list[dict[str, float]] = [{}]
         if not isinstance(self.part.source, Model):
             for name, unknown in self.part.unknowns.items():
-                trials += [{name: unknown.value + sign * reach_of(unknown)} for sign in (-1, 1)]
+                trials += [{name: limit} for limit in _box(unknown, unknown.value) if limit != unknown.value]
         return trials
 
     def _space(self, trials: Sequence[Mapping[str, float]]) -> FloatArray:
@@ -255,13 +261,14 @@ class ReducedSubstructure:
     def _polynomial_about(self, values: Mapping[str, float], share: float = 1.0) -> MatrixPolynomial:
         """Return the reduced matrices as polynomials of the unknowns around some values."""
         names = list(values)
-        reach = share * np.array([reach_of(self.part.unknowns[name]) for name in names])
+        box = np.array([_box(self.part.unknowns[name], value, share) for name, value in values.items()])
 
         def build(numbers: FloatArray) -> list[FloatArray]:
             own = self._reduced(self.part.model(dict(zip(names, numbers.tolist(), strict=True))))
             return [np.asarray(one, float) for one in own if one is not None]
 
-        return MatrixPolynomial(build, np.array(list(values.values())), reach)
+        reach = np.maximum(np.ptp(box, axis=1) / 2, np.finfo(float).tiny)
+        return MatrixPolynomial(build, box.mean(axis=1), reach)
 
     def _of_arrays(self, arrays: Sequence[FloatArray]) -> _Matrices:
         """Return matrices from those arrays that the model has."""
