@@ -5,7 +5,7 @@ Bounds are the condition of each step times rounding, computed from the numbers 
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import jointfrf as jf
@@ -18,7 +18,7 @@ SLACK = 200.0
 
 @st.composite
 def structures(draw, extra=1):
-    """Two structures at joint DOFs and `extra` more each, a joint and frequencies: H = (K (1 + i eta) - w^2 M)^-1."""
+    """Two structures, H = (K (1 + i eta) - w^2 M)^-1, at n joint DOFs and `extra` more each (n if None); two joints."""
     n = draw(st.integers(1, 4))
     seed = draw(st.integers(0, 2**32 - 1))
     stiff, light = draw(st.integers(-6, 9)), draw(st.integers(-4, 4))
@@ -31,7 +31,8 @@ def structures(draw, extra=1):
         h = np.linalg.inv(z) * 10.0**-stiff
         return (h + h.swapaxes(1, 2)) / 2
 
-    h_a, h_b = receptance(n + extra), receptance(n + extra)
+    size = 2 * n if extra is None else n + extra
+    h_a, h_b = receptance(size), receptance(size)
     joints = []
     for _ in range(2):
         root = rng.standard_normal((n, n))
@@ -62,18 +63,10 @@ def assert_close(found, expected, bound):
 
 
 @PROFILE
-@given(structures())
+@given(structures(extra=None))
 def test_decoupling_undoes_coupling(case):
     """K* from points away from the joint, all four equations (2.53)-(2.56)."""
     n, h_a, h_b, k, _ = case
-    # As many points away from the joint as joint DOFs.
-    if h_a.shape[1] != 2 * n:
-        h_a, h_b = h_a[:, : 2 * (h_a.shape[1] // 2)][:, :, : 2 * (h_a.shape[1] // 2)], h_b
-        n = min(n, h_a.shape[1] // 2, h_b.shape[1] // 2)
-        if n == 0:
-            return
-        k = k[:, :n, :n]
-        h_a, h_b = h_a[:, : 2 * n, : 2 * n], h_b[:, : 2 * n, : 2 * n]
     whole, _ = assembled(n, h_a, h_b, k)
     j, inner = list(range(n)), list(range(n, 2 * n))
     rows = {"r": inner, "s": [2 * n + i for i in inner]}
@@ -90,8 +83,8 @@ def test_decoupling_undoes_coupling(case):
         ).max() + max(np.linalg.norm(np.linalg.inv(h), 2, axis=(1, 2)).max() ** 2 for h in far)
         change = condition(y) * condition(k) * condition(*far) ** 2 * (1 + gain * size * abs(y).max())
         bound = SLACK * EPS * change * max(1.0, abs(y).max() * abs(k).max())
-        if bound < 1e-3:
-            assert_close(found, k, bound)
+        assume(bound < 1e-3)
+        assert_close(found, k, bound)
 
 
 @PROFILE
@@ -102,9 +95,9 @@ def test_ismm_finds_the_joint_from_any_first_estimate(case):
     found = jf.ismm(alpha, gamma, first)
     size = max(abs(k).max(), abs(first).max()) / abs(k).max(axis=(1, 2)).min()
     bound = SLACK * EPS * condition(alpha, gamma) * condition(k, first) * size
-    if bound < 1e-3:
-        assert_close(found, k, bound)
-        assert_close(jf.inverse_substructuring(gamma), k, bound)
+    assume(bound < 1e-3)
+    assert_close(found, k, bound)
+    assert_close(jf.inverse_substructuring(gamma), k, bound)
 
 
 @PROFILE
@@ -183,20 +176,20 @@ def test_conjugation_goes_through(case):
 
 
 @PROFILE
-@given(structures(), st.floats(0.01, 100.0))
+@given(structures(), st.floats(0.1, 10.0))
 def test_units_of_rotations_follow_the_lengths(case, length):
     """A rotation times a length is a displacement: K* transforms by S K* S where FRFs do by S^-1 H S^-1."""
     n, h_a, h_b, k, _ = case
-    if n < 2:
-        return
+    assume(n >= 2)
     s = np.ones(n)
     s[1::2] = length
     _, gamma = assembled(n, h_a, h_b, k)
     twice = np.concatenate([s, s])
-    found = jf.inverse_substructuring(gamma / np.outer(twice, twice))
-    bound = SLACK * EPS * condition(gamma) * max(length, 1 / length) ** 4 * condition(k)
-    if bound < 1e-3:
-        assert_close(found, jf.inverse_substructuring(gamma) * np.outer(s, s), bound)
+    scaled = gamma / np.outer(twice, twice)
+    worst = max(condition(gamma), condition(scaled)) * condition(k)
+    bound = SLACK * EPS * worst * max(length, 1 / length) ** 2
+    assume(bound < 1e-3)
+    assert_close(jf.inverse_substructuring(scaled), jf.inverse_substructuring(gamma) * np.outer(s, s), bound)
 
 
 @PROFILE
@@ -217,10 +210,10 @@ def test_coupling_with_a_stiff_joint_is_coupling_without_one(seed, n):
         / abs(rigid).max(axis=(1, 2)).min()
         * SLACK
     )
+    assume(bound < 1e-3)
     for rows in (slice(0, n), slice(n, 2 * n)):
         for columns in (slice(0, n), slice(n, 2 * n)):
-            if bound < 1e-3:
-                assert_close(gamma[:, rows, columns], rigid, bound)
+            assert_close(gamma[:, rows, columns], rigid, bound)
 
 
 def test_the_examples_are_the_same_in_each_run():
