@@ -101,13 +101,11 @@ def draw(figure: Figure) -> Drawing:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.backends.backend_svg import FigureCanvasSVG
 
-    canvas = laid_out(figure)
+    canvas, axes = _composed(figure)
     with _settings(figure):
         png, svg = io.BytesIO(), io.BytesIO()
         canvas.set_dpi(_RESOLUTION)
-        canvas.draw_without_rendering()
-        # The layout is found: each file is drawn once, by its own canvas (`savefig` would lay out and draw twice).
-        canvas.set_layout_engine("none")
+        _keep_layout(canvas, axes)
         # No version and no date inside.
         FigureCanvasAgg(canvas).print_png(png, metadata={"Software": None})
         canvas.set_dpi(_RESOLUTION_INSIDE)
@@ -117,6 +115,35 @@ def draw(figure: Figure) -> Drawing:
 
 def laid_out(figure: Figure) -> Any:
     """Return a figure as matplotlib has it, `matplotlib.figure.Figure`, not yet drawn."""
+    canvas, axes = _composed(figure)
+    canvas.align_ylabels(axes)
+    return canvas
+
+
+def _keep_layout(canvas: Any, axes: list[Any]) -> None:
+    """Find the layout and hold it; labels of panels above each other are aligned.
+
+    For each file matplotlib would find the places of labels and titles anew, and for each aligned label measure the
+    texts of all panels.
+    """
+    canvas.get_layout_engine().execute(canvas)
+    canvas.set_layout_engine("none")
+    places = {axis: axis.label.get_transform().transform(axis.label.get_position())
+              for ax in canvas.axes for axis in (ax.xaxis, ax.yaxis)}  # fmt: skip
+    columns: dict[int, list[Any]] = {}
+    for ax in axes:
+        columns.setdefault(ax.get_subplotspec().colspan.start, []).append(ax.yaxis)
+    for column in columns.values():
+        for axis in column:
+            places[axis] = (min(places[one][0] for one in column), places[axis][1])
+    for axis, place in places.items():
+        axis.set_label_coords(*axis.axes.transAxes.inverted().transform(place))
+    for ax in canvas.axes:
+        ax.set_title(ax.get_title(), y=1.0)
+
+
+def _composed(figure: Figure) -> tuple[Any, list[Any]]:
+    """Return a figure as matplotlib has it and its panels, without colour bars; places of labels are not yet found."""
     check_extras("matplotlib")
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure as Canvas
@@ -136,10 +163,9 @@ def laid_out(figure: Figure) -> Any:
                     axes[-1].tick_params(labelleft=False)
         _draw_axes_of_space([ax for ax in axes if not ax.axison])
         _add_legend(canvas, axes)
-        canvas.align_ylabels(axes)
         if figure.heading:
             canvas.suptitle(figure.heading, fontsize=_HEADING)
-    return canvas
+    return canvas, axes
 
 
 def _settings(figure: Figure) -> Any:

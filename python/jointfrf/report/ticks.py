@@ -140,6 +140,7 @@ def format_axis(axis: Any, label: str, *, log: bool = False, step: float | None 
     low, high = sorted(axis.get_view_interval())
     decades = np.log10(high / low) if log and low > 0 else np.inf
     if log and decades >= _WIDE:
+        axis.set_major_formatter(lambda value, _: value_text(value))  # mathematical text takes many times longer
         axis.set_minor_formatter(NullFormatter())
         axis.set_label_text(label)
         return
