@@ -14,6 +14,8 @@ import pytest
 
 import jointfrf as jf
 from installed_library import installed_library  # noqa: F401
+from jointfrf.cases import catalogue
+from jointfrf.report.draw import Drawing
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -106,6 +108,12 @@ def beams() -> Assembly:
 @pytest.fixture(params=["chains", "beams"])
 def assembly(request) -> Assembly:
     return request.getfixturevalue(request.param)
+
+
+@pytest.fixture
+def without_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave the pictures of a case empty: to draw them takes most of the time of a short one."""
+    monkeypatch.setattr(catalogue, "draw", lambda figure: Drawing(b"", b"<svg/>"))
 
 
 @pytest.fixture

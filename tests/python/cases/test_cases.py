@@ -472,7 +472,7 @@ def test_headings_stand_once_and_say_the_unit(results, solids, name):
             assert all(column.endswith((" %", "percentile", "")) for column in table.columns[5:])
 
 
-def test_every_method_of_the_table_has_a_name_and_a_style_in_figures(tmp_path):
+def test_every_method_of_the_table_has_a_name_and_a_style_in_figures(tmp_path, without_pictures):
     own = tmp_path / "mine"
     own.mkdir()
     text = (find_case("3.1") / "case.toml").read_text()
@@ -504,7 +504,7 @@ def test_published_values_are_ranked_among_the_realisations(results):
     assert (row.low, row.median, row.high) == pytest.approx(tuple(np.percentile(theta[:, 1], [2.5, 50, 97.5])))
 
 
-def test_files_of_a_case(tmp_path):
+def test_files_of_a_case(tmp_path, without_pictures):
     output = run_case(find_case("3.1"), tmp_path / "deep" / "out", realisations=5)
     folder = tmp_path / "deep" / "out" / "3.1-discrete"
     assert output.report == folder / "report.html"
@@ -522,7 +522,7 @@ def test_files_of_a_case(tmp_path):
     assert not [path.name for path in folder.rglob(".*")]
 
 
-def test_a_case_of_ones_own_without_expected_numbers(tmp_path):
+def test_a_case_of_ones_own_without_expected_numbers(tmp_path, without_pictures):
     own = tmp_path / "mine"
     own.mkdir()
     text = (find_case("3.1") / "case.toml").read_text()

@@ -97,7 +97,7 @@ def test_report_holds_every_table_and_figure_and_no_link(outputs):
         assert all(number in text for number in (f.number for f in figures))
 
 
-def test_report_escapes_what_a_user_writes(tmp_path):
+def test_report_escapes_what_a_user_writes(tmp_path, without_pictures):
     own = tmp_path / "own"
     own.mkdir()
     text = (find_case("3.1") / "case.toml").read_text()

@@ -13,7 +13,7 @@ import pytest
 
 import jointfrf as jf
 from abi import LISTED, prototypes
-from installed_library import COMPILERS, ROOT, InstalledLibrary, install, run
+from installed_library import CHECKED, COMPILERS, ROOT, InstalledLibrary, install, run
 
 pytestmark = pytest.mark.builds
 
@@ -25,9 +25,10 @@ LONG = 2**32 + 1
 
 
 @pytest.fixture(scope="module")
-def libraries(installed_library: InstalledLibrary) -> dict[int, InstalledLibrary]:
+def libraries(tmp_path_factory: pytest.TempPathFactory) -> dict[int, InstalledLibrary]:
     """Both libraries below one prefix, by the bytes of their integers."""
-    return {4: installed_library, 8: install("jointfrf64", installed_library.prefix.parent)}
+    folder = tmp_path_factory.mktemp("installed")
+    return {n_bytes: install(build, folder) for n_bytes, build in CHECKED.items()}
 
 
 @pytest.fixture(scope="module")

@@ -14,8 +14,22 @@ import pytest
 from filelock import FileLock
 
 ROOT = Path(__file__).resolve().parents[3]
-#: Optimised builds take half a minute; they are kept, and brought up to date by each run.
-BUILDS = {"jointfrf": ROOT / "build" / "installed", "jointfrf64": ROOT / "build" / "ilp64"}
+
+
+@dataclass(frozen=True)
+class Build:
+    """A folder below build/ that is kept and brought up to date by each run, and how it is set up."""
+
+    folder: str
+    options: tuple[str, ...]
+    name: str = "jointfrf"
+
+
+#: As a user builds it.
+OPTIMISED = Build("installed", ("-Dtests=false",))
+#: Those whose test programs `tests/run` runs: alike but for the length of integers, in bytes.
+_CHECKED = ("-Dbuildtype=debug", "-Doptimization=1", "-Dchecks=true")
+CHECKED = {4: Build("tests", _CHECKED), 8: Build("tests64", (*_CHECKED, "-Dilp64=true"), "jointfrf64")}
 #: Where meson and ninja lie, too, if the environment of this Python is not activated.
 PATH = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
 #: Nothing may be contracted: the last bit is compared.
@@ -56,34 +70,26 @@ class InstalledLibrary:
         return program
 
 
-def install(name: str, destination: Path) -> InstalledLibrary:
-    """Build as the Python extension is built, and install below a folder. Tests that run at once take turns."""
-    build = BUILDS[name]
-    build.parent.mkdir(exist_ok=True)
-    with FileLock(build.with_suffix(".lock")):
-        return _install(name, build, destination)
-
-
-def _install(name: str, build: Path, destination: Path) -> InstalledLibrary:
-    if not (build / "build.ninja").exists():
-        options = [
-            "-Dtests=false",
-            "-Dlapack=scipy-openblas32",
-            f"-Dlapack_python={sys.executable}",
-            "-Dprefix=/prefix",
-            f"-Dilp64={str(name == 'jointfrf64').lower()}",
-        ]
-        run(["meson", "setup", build, ROOT, *options])
-    run(["meson", "compile", "-C", build])
-    run(["meson", "install", "-C", build, "--no-rebuild", "--destdir", destination])
-    return InstalledLibrary(destination / "prefix", name)
+def install(build: Build, destination: Path) -> InstalledLibrary:
+    """Build, and install below a folder. Tests that run at once take turns."""
+    tools = ("meson", "pkg-config", "gfortran", "gcc")
+    missing = [name for name in tools if shutil.which(name, path=PATH) is None]
+    if missing:
+        pytest.skip(f"{', '.join(missing)} not found")
+    folder = ROOT / "build" / build.folder
+    folder.parent.mkdir(exist_ok=True)
+    with FileLock(folder.with_suffix(".lock")):
+        if not (folder / "build.ninja").exists():
+            lapack = ("-Dlapack=scipy-openblas32", f"-Dlapack_python={sys.executable}")
+            run(["meson", "setup", folder, ROOT, *lapack, *build.options])
+        run(["meson", "compile", "-C", folder])
+        run(["meson", "install", "-C", folder, "--no-rebuild", "--destdir", destination])
+    (file,) = destination.rglob(f"{build.name}.pc")
+    (prefix,) = (folder for folder in file.parents if (folder / "include").is_dir())
+    return InstalledLibrary(prefix, build.name)
 
 
 @pytest.fixture(scope="session")
 def installed_library(tmp_path_factory: pytest.TempPathFactory) -> InstalledLibrary:
     """Install to a folder of this run."""
-    tools = ("meson", "pkg-config", "gfortran", "gcc")
-    missing = [name for name in tools if shutil.which(name, path=PATH) is None]
-    if missing:
-        pytest.skip(f"{', '.join(missing)} not found")
-    return install("jointfrf", tmp_path_factory.mktemp("installed"))
+    return install(OPTIMISED, tmp_path_factory.mktemp("installed"))
