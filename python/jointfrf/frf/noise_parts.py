@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
+from jointfrf.frf.quantiles import medians, quantiles
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
 __all__ = ["LineLevels", "line_correlation", "line_levels", "noise_parts"]
@@ -78,15 +79,16 @@ def noise_parts(squares: FloatArray, terms: FloatArray, *, robust: bool = False)
 
 def _two_parts(y: FloatArray, a: FloatArray, count: FloatArray) -> FloatArray:
     """Parts of two terms of mean 1, shape (2, n_entries)."""
-    centre, reach = np.zeros(len(y[:, 0])), _WIDEST
+    centre, reach, entries = np.zeros(len(y)), _WIDEST, np.arange(len(y))
+    grid, total = np.linspace(-1, 1, _GRID)[:, None], count.sum()
+    weighted = count * y
     for _ in range(3):
-        odds = np.exp(centre + reach * np.linspace(-1, 1, _GRID)[:, None])
+        odds = np.exp(centre + reach * grid)
         share = np.stack([1 / (1 + odds), odds / (1 + odds)])  # (2, grid, n_entries)
         v = np.maximum(share[0][:, :, None] * a[0] + share[1][:, :, None] * a[1], np.finfo(float).tiny)
-        level = (count * y / v).sum(axis=2) / count.sum()
-        loss = (count * np.log(v)).sum(axis=2) + count.sum() * np.log(np.maximum(level, np.finfo(float).tiny))
+        level = (weighted / v).sum(axis=2) / total
+        loss = np.log(v) @ count + total * np.log(np.maximum(level, np.finfo(float).tiny))
         best = loss.argmin(axis=0)
-        entries = np.arange(len(y))
         centre, reach = np.log(odds[best, entries]), 2 * reach / (_GRID - 1)
     return np.asarray(share[:, best, entries] * level[best, entries])
 
@@ -126,11 +128,11 @@ def _binned(squares: FloatArray, terms: FloatArray, *, robust: bool) -> tuple[Fl
 def _bin_medians(values: FloatArray, edges: NDArray[np.intp]) -> FloatArray:
     """Medians over bins of values, shape (n_entries, n_bins): of all bins of one length at once."""
     length = np.diff(edges)
-    medians = np.empty((len(values), len(length)))
+    found = np.empty((len(values), len(length)))
     for one in np.unique(length):
         own = np.flatnonzero(length == one)
-        medians[:, own] = np.median(values[:, edges[own][:, None] + np.arange(one)], axis=2)
-    return medians
+        found[:, own] = medians(values[:, edges[own][:, None] + np.arange(one)])
+    return found
 
 
 @dataclass(frozen=True)
@@ -179,13 +181,13 @@ def line_levels(noise: ComplexArray, inflation: float = 1.0, *, is_residual: boo
     tiny = np.finfo(float).tiny
     usual = np.maximum(_running_median(line, reach), tiny)
     factor: FloatArray = line / usual
-    quarter, three_quarters = np.quantile(np.log(np.maximum(factor, tiny)), [0.25, 0.75])
+    quarter, three_quarters = quantiles(np.log(np.maximum(factor, tiny)), (0.25, 0.75))
     shape = (1.349 / max(three_quarters - quarter, 1e-3)) ** 2
     limit = special.gammainccinv(shape, _FALSE_ALARM / n_freq) / special.gammaincinv(shape, 0.5)
     by_chance = np.sqrt(inflation / (shape * (2 * reach + 1)))
-    low, high = np.quantile(np.log(usual), [0.1, 0.9])
+    low, high = quantiles(np.log(usual), (0.1, 0.9))
     varies = (high - low) / 2.56 > max(_VARIES * by_chance, _VARIES_LEAST)
-    slow = usual / np.median(usual) if varies else np.ones(n_freq)
+    slow = usual / medians(usual) if varies else np.ones(n_freq)
     outlying = factor > limit
     if is_residual:
         outlying &= ~_missed(noise, outlying)
@@ -194,8 +196,10 @@ def line_levels(noise: ComplexArray, inflation: float = 1.0, *, is_residual: boo
 
 def _missed(residual: ComplexArray, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Which of the chosen lines are in long runs through which the residual goes smoothly."""
-    steps = np.diff(np.pad(chosen.astype(int), 1))
     missed = np.zeros_like(chosen)
+    if np.count_nonzero(chosen) <= _SHORT_RUN:
+        return missed
+    steps = np.diff(np.pad(chosen.astype(int), 1))
     for first, end in zip(np.flatnonzero(steps > 0), np.flatnonzero(steps < 0), strict=True):
         if end - first > _SHORT_RUN:
             run = residual[:, first:end] / np.sqrt((abs(residual[:, first:end]) ** 2).sum(axis=0))
@@ -210,7 +214,7 @@ def _running_median(values: FloatArray, reach: int) -> FloatArray:
     step = max(1, reach // _STEPS)
     at = np.append(np.arange(0, len(values) - 1, step), len(values) - 1)
     windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1)[at]
-    return np.asarray(np.interp(np.arange(len(values)), at, np.median(windows, axis=1)))
+    return np.asarray(np.interp(np.arange(len(values)), at, medians(windows)))
 
 
 def line_correlation(noise: ComplexArray, share: float = 0.0) -> float:
@@ -229,15 +233,18 @@ def line_correlation(noise: ComplexArray, share: float = 0.0) -> float:
         1 + 2 sum of the autocorrelations up to the first that is not significant; at least 1.
     """
     n_freq = noise.shape[1]
-    size = abs(noise)
+    size: FloatArray = np.abs(noise)
     known: NDArray[np.bool_] = np.isfinite(size)
+    whole = bool(known.all())
     size = np.where(known, size, 0)
     if n_freq < 16 or not size.any():
         return 1.0
-    limit = _CUT * np.nanmedian(np.where(known, size, np.nan), axis=1, keepdims=True)
+    usual = medians(size) if whole else np.nanmedian(np.where(known, size, np.nan), axis=1)
+    limit = _CUT * usual[:, None]
     cut = np.where(known, noise, 0) * np.where(size > limit, limit / np.where(size > limit, size, 1), 1)
     n_lags = n_freq // 4
-    pairs = np.maximum(_autocorrelation(known.astype(float), n_lags), 1)
+    whole_pairs = len(noise) * (n_freq - np.arange(n_lags, dtype=float))
+    pairs = whole_pairs if whole else np.maximum(_autocorrelation(known.astype(float), n_lags), 1)
     rho = _autocorrelation(cut, n_lags) / pairs
     rho = (rho / rho[0] * (1 - share) + share)[1:]
     small = rho < _SIGNIFICANT / np.sqrt(pairs[0])

@@ -15,6 +15,8 @@ from jointfrf.kernel.call import call_for_number
 
 __all__ = ["LEAST_GAIN", "FormMinimum", "LineForms", "LineParts", "inverse_information", "minimise_forms"]
 
+#: Directions of less information than this share of the largest are not seen.
+_SEEN = 1e-15
 _STEPS = 100
 #: Levenberg's parameter: first value, factor where a step fails, largest value.
 _FIRST, _RAISED, _LARGEST = 1e-4, 6.0, 1e10
@@ -113,6 +115,11 @@ class FormMinimum:
         return LineParts(gradient, information)
 
     @cached_property
+    def covariance(self) -> FloatArray:
+        """Covariance of the coordinates where the squares are in units of independent noise, shape (p, p)."""
+        return inverse_information(2 * self.information)
+
+    @cached_property
     def _all_parts(self) -> LineParts:
         return self._parts(slice(None))
 
@@ -143,8 +150,11 @@ def inverse_information(information: FloatArray) -> FloatArray:
     information : ndarray, shape (..., p, p)
     """
     size = np.sqrt(np.maximum(np.einsum("...aa->...a", information), np.finfo(float).tiny))
-    outer = size[..., :, None] * size[..., None, :]
-    inverse: FloatArray = np.linalg.pinv(information / outer, hermitian=True) / outer
+    value, vector = np.linalg.eigh(information / (size[..., :, None] * size[..., None, :]))
+    length = abs(value)
+    seen = length > _SEEN * length.max(axis=-1, keepdims=True)
+    own = vector / size[..., :, None]
+    inverse: FloatArray = (own * np.where(seen, 1 / np.where(seen, value, 1), 0)[..., None, :]) @ own.swapaxes(-1, -2)
     return inverse
 
 
