@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from jointfrf.frf.bands import line_slices
 from jointfrf.frf.entry_groups import EntryGroup, entry_groups
 from jointfrf.frf.noise_estimate import reciprocity_noise
-from jointfrf.frf.noise_parts import line_correlation, line_levels, noise_parts
+from jointfrf.frf.noise_parts import NoiseTerms, line_correlation, line_levels
 from jointfrf.frf.order_search import OrderSearch
 from jointfrf.frf.quantiles import medians
 from jointfrf.frf.reciprocity_differences import ReciprocityDifferences, reciprocity_differences
@@ -179,7 +179,7 @@ def estimate_noise(
         like = None
     parts = (
         _estimated(
-            _Lines(freq[own], lines[own], entry_groups(lines[own], reciprocal=reciprocal), max_poles, reciprocal),
+            _NoisyLines(freq[own], lines[own], entry_groups(lines[own], reciprocal=reciprocal), max_poles, reciprocal),
             None if given is None else given[own],
             like,
             own,
@@ -214,7 +214,7 @@ def _joined(places: list[NDArray[np.intp]], parts: Iterable[NoiseModel], shape: 
 
 
 @dataclass(frozen=True)
-class _Lines:
+class _NoisyLines:
     """Checked FRFs whose noise is sought, lines in rising order.
 
     Attributes
@@ -254,7 +254,9 @@ class _Lines:
         return least
 
 
-def _estimated(lines: _Lines, given: FloatArray | None, like: NoiseModel | None, order: NDArray[np.intp]) -> NoiseModel:
+def _estimated(
+    lines: _NoisyLines, given: FloatArray | None, like: NoiseModel | None, order: NDArray[np.intp]
+) -> NoiseModel:
     """Noise model of checked FRFs; `order` says which lines of others these are."""
     differences = lines.differences()
     begun = None if like is None else _begun_like(lines, like, order)
@@ -281,7 +283,7 @@ def _estimated(lines: _Lines, given: FloatArray | None, like: NoiseModel | None,
 
 
 def _begun(
-    lines: _Lines, differences: ReciprocityDifferences | None
+    lines: _NoisyLines, differences: ReciprocityDifferences | None
 ) -> tuple[ReciprocityDifferences | None, SmoothFrfs, FloatArray, float | None]:
     """Return first smooth FRFs, their variance and inflation, and the differences if these see the noise."""
     smooth, variance, inflation = _first_smooth(lines, differences)
@@ -294,7 +296,7 @@ def _begun(
 
 
 def _begun_like(
-    lines: _Lines, like: NoiseModel, order: NDArray[np.intp]
+    lines: _NoisyLines, like: NoiseModel, order: NDArray[np.intp]
 ) -> tuple[SmoothFrfs, FloatArray, float | None] | None:
     """Return smooth FRFs with the poles of others, relocated; None where these leave more than noise like theirs."""
     if not like.smooth.is_smooth:
@@ -305,7 +307,7 @@ def _begun_like(
 
 
 def _first_smooth(
-    lines: _Lines, differences: ReciprocityDifferences | None
+    lines: _NoisyLines, differences: ReciprocityDifferences | None
 ) -> tuple[SmoothFrfs, FloatArray, float | None]:
     """Return smooth FRFs by weights from differences where there are any, these variances, and the inflation."""
     inflation = None
@@ -380,12 +382,14 @@ def _model(
     stacked[0] = (smooth.h.real**2 + smooth.h.imag**2)[:, shown].T
     if given is not None:
         stacked[2] = given[:, shown].T
-    usual, factor = np.ones(n_freq), np.ones(n_freq)
+    usual, factor, terms = np.ones(n_freq), np.ones(n_freq), None
     # Outlying lines; with these left out, slow variation; where there is some, parts and outlying lines once more.
     for turn in range(3):
         good = factor == 1
-        of_turn = (squares / usual, stacked) if good.all() else ((squares / usual)[:, good], stacked[:, :, good])
-        parts = noise_parts(*of_turn, robust=robust or turn == 0)
+        if terms is None or not good.all():
+            terms = NoiseTerms(stacked[:, :, good])
+        parts = terms.parts((squares / usual)[:, good], robust=robust or turn == 0)
+        terms = terms if good.all() else None
         described = np.maximum(_described(parts, stacked) * usual, _TINY)
         variance = np.zeros(h.shape)
         variance[:, shown] = described.T
@@ -411,7 +415,9 @@ def _described(parts: FloatArray, terms: FloatArray) -> FloatArray:
     return np.asarray(np.einsum("te,tel->el", parts, terms))
 
 
-def _without_smoothing(lines: _Lines, smooth: SmoothFrfs, differences: ReciprocityDifferences | None) -> NoiseModel:
+def _without_smoothing(
+    lines: _NoisyLines, smooth: SmoothFrfs, differences: ReciprocityDifferences | None
+) -> NoiseModel:
     """Relative noise alike for all entries, for few lines and for nearly exact FRFs."""
     h = lines.h
     n_freq, n_out, n_in = h.shape

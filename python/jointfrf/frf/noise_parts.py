@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,7 @@ from scipy import special
 from jointfrf.frf.quantiles import medians, quantiles
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
-__all__ = ["LineLevels", "line_correlation", "line_levels", "noise_parts"]
+__all__ = ["LineLevels", "NoiseTerms", "line_correlation", "line_levels", "noise_parts"]
 
 #: Entries are binned by |h|^2 into so many bins: within one the variance is nearly the same.
 _BINS = 32
@@ -67,14 +68,43 @@ def noise_parts(squares: FloatArray, terms: FloatArray, *, robust: bool = False)
     nearly alone, and one with all alike. The estimate holds for any distribution of e with this variance; it is
     efficient for circular normal e.
     """
-    if len(terms) == 2:
-        y, a, count = _binned(squares, terms, robust=robust)
-    else:  # the variance is not the same within a bin
-        y, a, count = squares, terms, np.ones(squares.shape[1])
-    size = np.maximum((a * count).sum(axis=2), np.finfo(float).tiny) / count.sum()
-    a = a / size[:, :, None]
-    parts = _two_parts(y, a, count) if len(terms) == 2 else _several_parts(y, a, count)
-    return np.asarray(parts / size)
+    return NoiseTerms(terms).parts(squares, robust=robust)
+
+
+class NoiseTerms:
+    """Terms of a variance as `noise_parts` takes them, binned once for several squares.
+
+    Parameters
+    ----------
+    terms : ndarray, shape (n_terms, n_entries, n_freq)
+    """
+
+    def __init__(self, terms: FloatArray) -> None:
+        n_freq = terms.shape[2]
+        self._order: NDArray[np.intp] | None = None
+        # Of more than two terms the variance is not the same within a bin.
+        if len(terms) == 2 and n_freq > _BINS:
+            self._order = np.argsort(terms[0], axis=1)
+            self._edges = np.linspace(0, n_freq, _BINS + 1).astype(int)
+            self._count = np.diff(self._edges).astype(float)
+            binned = np.stack([self._means(np.take_along_axis(term, self._order, axis=1)) for term in terms])
+        else:
+            self._count, binned = np.ones(n_freq), terms
+        self._size = np.maximum(binned @ self._count, np.finfo(float).tiny) / self._count.sum()
+        self._terms = binned / self._size[:, :, None]
+
+    def parts(self, squares: FloatArray, *, robust: bool = False) -> FloatArray:
+        """Return the parts as `noise_parts` does, shape (n_terms, n_entries)."""
+        y = squares
+        if self._order is not None:
+            y = np.take_along_axis(squares, self._order, axis=1)
+            y = _bin_medians(y, self._edges) / np.log(2) if robust else self._means(y)
+        found = (_two_parts if len(self._terms) == 2 else _several_parts)(y, self._terms, self._count)
+        return np.asarray(found / self._size)
+
+    def _means(self, values: FloatArray) -> FloatArray:
+        """Return means over the bins."""
+        return np.asarray(np.add.reduceat(values, self._edges[:-1], axis=1) / self._count)
 
 
 def _two_parts(y: FloatArray, a: FloatArray, count: FloatArray) -> FloatArray:
@@ -85,9 +115,11 @@ def _two_parts(y: FloatArray, a: FloatArray, count: FloatArray) -> FloatArray:
     for _ in range(3):
         odds = np.exp(centre + reach * grid)
         share = np.stack([1 / (1 + odds), odds / (1 + odds)])  # (2, grid, n_entries)
-        v = np.maximum(share[0][:, :, None] * a[0] + share[1][:, :, None] * a[1], np.finfo(float).tiny)
+        v = share[0][:, :, None] * a[0]
+        v += share[1][:, :, None] * a[1]
+        np.maximum(v, np.finfo(float).tiny, out=v)
         level = (weighted / v).sum(axis=2) / total
-        loss = np.log(v) @ count + total * np.log(np.maximum(level, np.finfo(float).tiny))
+        loss = np.log(v, out=v) @ count + total * np.log(np.maximum(level, np.finfo(float).tiny))
         best = loss.argmin(axis=0)
         centre, reach = np.log(odds[best, entries]), 2 * reach / (_GRID - 1)
     return np.asarray(share[:, best, entries] * level[best, entries])
@@ -106,23 +138,6 @@ def _several_parts(y: FloatArray, a: FloatArray, count: FloatArray) -> FloatArra
     v = np.maximum(np.einsum("ste,teb->seb", parts, a), np.finfo(float).tiny)
     best = (count * (np.log(v) + y / v)).sum(axis=2).argmin(axis=0)
     return np.asarray(parts[best, :, np.arange(parts.shape[2])].T)
-
-
-def _binned(squares: FloatArray, terms: FloatArray, *, robust: bool) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Means over bins of lines of similar |h|^2, and how many lines each bin holds."""
-    n_freq = squares.shape[1]
-    if n_freq <= _BINS:
-        return squares, terms, np.ones(n_freq)
-    order = np.argsort(terms[0], axis=1)
-    edges = np.linspace(0, n_freq, _BINS + 1).astype(int)
-    count = np.diff(edges).astype(float)
-
-    def means(values: FloatArray) -> FloatArray:
-        return np.asarray(np.add.reduceat(values, edges[:-1], axis=1) / count)
-
-    ordered = np.take_along_axis(squares, order, axis=1)
-    y = _bin_medians(ordered, edges) / np.log(2) if robust else means(ordered)
-    return y, np.stack([means(np.take_along_axis(term, order, axis=1)) for term in terms]), count
 
 
 def _bin_medians(values: FloatArray, edges: NDArray[np.intp]) -> FloatArray:
@@ -210,11 +225,16 @@ def _missed(residual: ComplexArray, chosen: NDArray[np.bool_]) -> NDArray[np.boo
 
 def _running_median(values: FloatArray, reach: int) -> FloatArray:
     """Median over so many lines on either side, interpolated between every few lines."""
-    padded = np.pad(values, reach, mode="reflect")
-    step = max(1, reach // _STEPS)
-    at = np.append(np.arange(0, len(values) - 1, step), len(values) - 1)
-    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1)[at]
-    return np.asarray(np.interp(np.arange(len(values)), at, medians(windows)))
+    middles, windows = _windows(len(values), reach)
+    return np.asarray(np.interp(np.arange(len(values)), middles, medians(values[windows])))
+
+
+@lru_cache(maxsize=16)
+def _windows(n: int, reach: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return middle lines, and the lines of the window about each; beyond the ends they are reflected."""
+    middles = np.append(np.arange(0, n - 1, max(1, reach // _STEPS)), n - 1)
+    around = np.pad(np.arange(n), reach, mode="reflect")
+    return middles, around[middles[:, None] + np.arange(2 * reach + 1)]
 
 
 def line_correlation(noise: ComplexArray, share: float = 0.0) -> float:

@@ -96,9 +96,12 @@ def search_order(entries: Entries, search: OrderSearch, start: ComplexArray | No
     """
     poles = first_poles(entries) if start is None else start
     for _ in range(_ROUNDS):
-        fit = _grown(entries, search, poles)
-        inflation = search.found_inflation(entries, fit)
-        fit = _pruned(entries, inflation, fit)
+        if search.patience == 0 and search.inflation is not None:
+            inflation, poles = search.inflation, poles[: search.most_poles(len(entries.s))]
+        else:
+            fit = _grown(entries, search, poles)
+            inflation, poles = search.found_inflation(entries, fit), fit.poles
+        fit = _pruned(entries, inflation, poles)
         alone, followed = _single_lines(entries, inflation, fit)
         if not followed.size:
             break
@@ -156,14 +159,14 @@ def _left_out(entries: Entries, lines: NDArray[np.intp]) -> Entries:
     return replace(entries, weight=weight)
 
 
-def _pruned(entries: Entries, inflation: float, fit: RationalFit) -> RationalFit:
+def _pruned(entries: Entries, inflation: float, poles: ComplexArray) -> RationalFit:
     """Fit without the poles that are not worth their parameters."""
     least = np.inf
-    best = fit
+    best: RationalFit | None = None
     while True:
-        fit = _converged(entries, fit.poles, _LAST_RELOCATIONS)
+        fit = _converged(entries, poles, _LAST_RELOCATIONS)
         score = _score(entries, inflation, fit)
-        if score > least:
+        if best is not None and score > least:
             return best
         best, least = fit, score
         variance = fit.squares / max(entries.n_data - entries.n_parameters(len(fit.poles)), 1)
@@ -172,7 +175,7 @@ def _pruned(entries: Entries, inflation: float, fit: RationalFit) -> RationalFit
             return best
         # Half of them at a time: what one describes another may describe as well.
         drop = worthless[fit.loss[worthless].argsort()][: (worthless.size + 1) // 2]
-        fit = replace(fit, poles=np.delete(fit.poles, drop[: len(fit.poles) - 1]))
+        poles = np.delete(fit.poles, drop[: len(fit.poles) - 1])
 
 
 def first_poles(entries: Entries) -> ComplexArray:

@@ -133,6 +133,9 @@ def estimate_joint(
 def grouped(frfs: InterfaceFrfs) -> Iterator[tuple[NDArray[np.intp], LineData]]:
     """Return groups of DOFs that are fitted each by itself, and their FRFs."""
     lines = np.arange(len(frfs.measured))
+    if lines.size <= PIECE:
+        yield from ((dofs, frfs.of_dofs(dofs)) for dofs in frfs.groups())
+        return
     for dofs in frfs.on_lines(_some(lines)).groups():
         yield dofs, LineData.joined([frfs.on_lines(lines[own]).of_dofs(dofs) for own in line_slices(lines.size)])
 

@@ -303,11 +303,14 @@ def _linearised(
         point = OnManifold(on.h[own], on.m[own], on.squares[own])
         if prior is not None:
             point = expected_m(here.data, c[own], point, prior.on_lines(own))
-        forms, of_smooth = normal_forms(here.data, c[own], point, (here.data.measured, here.data.smooth))
-        forms, some = _used(here, forms, of_smooth, c[own])
+        targets = (here.data.measured, here.data.smooth) if here.unknown.any() else (here.data.measured,)
+        found_forms = normal_forms(here.data, c[own], point, targets)
+        forms, some = _used(here, found_forms[0], found_forms[-1], c[own])
         parts.append(forms.scaled(trusted[own].astype(float)))
         if some is not None:
             found[own] = some
+    if len(parts) == 1:
+        return parts[0], found if problem.unknown.any() else None
     compliance, weight, gradient = (np.concatenate([one[i] for one in parts]) for i in (0, 1, 2))
     whole = LineForms(compliance, weight, gradient, np.concatenate([one.squares for one in parts]))
     return whole, found if problem.unknown.any() else None

@@ -151,8 +151,7 @@ def taken(h: NumbersT, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> Num
 
 def between(t_r: FloatArray, h: NumbersT, t_f: FloatArray) -> NumbersT:
     """Return T_r h T_f^T of every line; where the rows of both are those of unit matrices, without products."""
-    if all(np.array_equal(t.sum(axis=1), np.ones(len(t))) and (t.max(axis=1) == 1).all() and t.min() == 0
-           for t in (t_r, t_f)):  # fmt: skip
+    if all(np.count_nonzero(t) == len(t) and (t.max(axis=1) == 1).all() for t in (t_r, t_f)):
         return taken(h, t_r.argmax(axis=1), t_f.argmax(axis=1))
     return t_r @ h @ t_f.T
 

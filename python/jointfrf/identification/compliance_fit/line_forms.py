@@ -51,6 +51,8 @@ class LineForms(NamedTuple):
     def scaled(self, line_weight: FloatArray) -> LineForms:
         """Return the same with each line weighted."""
         w = line_weight
+        if (w == 1).all():
+            return self
         return LineForms(self.compliance, self.weight * w[:, None, None], self.gradient * w[:, None], self.squares * w)
 
     def at(self, entries: ComplexArray) -> tuple[FloatArray, ComplexArray]:
@@ -124,7 +126,8 @@ class FormMinimum:
         return self._parts(slice(None))
 
     def _parts(self, lines: slice) -> LineParts:
-        joint, forms = self.joint.on_lines(lines), self.forms.on_slice(lines)
+        whole = lines == slice(None)
+        joint, forms = (self.joint, self.forms) if whole else (self.joint.on_lines(lines), self.forms.on_slice(lines))
         entries = joint.compliance(self.x)
         slope = joint.slope(self.x, entries)
         adjoint = slope.conj().swapaxes(1, 2)
