@@ -6,6 +6,7 @@ import numpy as np
 
 from jointfrf.frf.bands import PIECE
 from jointfrf.frf.noise_estimate import ZERO
+from jointfrf.frf.quantiles import medians
 from jointfrf.identification.compliance_fit.estimator import JointEstimate
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
@@ -102,7 +103,7 @@ def check_joint_seen(freq: FloatArray, smooth: ComplexArray, variance: FloatArra
     driving = np.einsum("lpp->lp", smooth)
     tiny = np.finfo(float).tiny
     noise = np.sqrt(np.einsum("lpp->lp", variance)) / np.maximum(abs(driving), tiny)
-    level = float(np.median(noise))
+    level = float(medians(noise.ravel()))
     if level >= _HIDDEN:
         raise ValueError(
             f"gamma consists of noise ({span}: the noise of driving points is {_percent(level)} of what is smooth in "

@@ -9,6 +9,7 @@ import numpy as np
 from scipy import special
 
 from jointfrf.frf.bands import line_slices
+from jointfrf.frf.quantiles import medians
 from jointfrf.identification.compliance_fit.diagonal_minimum import lowest_minimum
 from jointfrf.identification.compliance_fit.estimator import FittedGroup, JointEstimate
 from jointfrf.identification.compliance_fit.joint_terms import DiagonalJoint, terms_of
@@ -31,6 +32,7 @@ BLOCKS = 10
 _SEEN = 1e-12
 #: Probability at which a scatter that exceeds the noise is taken for chance.
 _CHANCE = 0.95
+_TINY = float(np.finfo(float).tiny)
 
 
 class Spread(NamedTuple):
@@ -97,7 +99,7 @@ def block_scatter(group: FittedGroup, blocks: int = BLOCKS) -> tuple[FloatArray,
     if lines.size < 2 * blocks:
         return np.full(p, np.nan), np.zeros(p)
     # Blocks of equal information, so that each says about as much as the others.
-    size = np.maximum(np.diagonal(minimum.information), np.finfo(float).tiny)
+    size = np.maximum(np.diagonal(minimum.information), _TINY)
     share = (diagonal[lines] / size).sum(axis=1)
     share = share / share.sum() + 1 / lines.size
     member = np.zeros((blocks, len(diagonal)))
@@ -115,7 +117,7 @@ def _scatter(whole: FloatArray, pieces: Iterable[LineParts]) -> tuple[FloatArray
         Sum of the information of all parts.
     pieces : iterable of LineParts
     """
-    size = np.sqrt(np.maximum(np.diagonal(whole), np.finfo(float).tiny))
+    size = np.sqrt(np.maximum(np.diagonal(whole), _TINY))
     value, vector = np.linalg.eigh(whole / np.outer(size, size))
     # Coordinates in which the whole information is 1; directions that the data do not see are left out.
     seen = value > _SEEN * value[-1]
@@ -182,7 +184,7 @@ def _larger_than_chance(factor: FloatArray, other: FloatArray, degrees: FloatArr
     if not known.any():
         return factor
     raised = factor.copy()
-    count, few = int(known.sum()), float(np.median(degrees[known]))
+    count, few = int(known.sum()), float(medians(degrees[known]))
     if (mean := float(ratio[known].mean())) > _chi_squared(_CHANCE, few * count) / (few * count):
         raised *= mean
     single = _chi_squared(1 - (1 - _CHANCE) / count, degrees[known]) / degrees[known]

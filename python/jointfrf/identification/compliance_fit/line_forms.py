@@ -22,6 +22,7 @@ _STEPS = 100
 _FIRST, _RAISED, _LARGEST = 1e-4, 6.0, 1e10
 #: A minimum is found when two steps gain less than this of the squares of one residual.
 LEAST_GAIN = 1e-6
+_TINY = float(np.finfo(float).tiny)
 
 
 class LineForms(NamedTuple):
@@ -152,7 +153,7 @@ def inverse_information(information: FloatArray) -> FloatArray:
     ----------
     information : ndarray, shape (..., p, p)
     """
-    size = np.sqrt(np.maximum(np.einsum("...aa->...a", information), np.finfo(float).tiny))
+    size = np.sqrt(np.maximum(np.einsum("...aa->...a", information), _TINY))
     value, vector = np.linalg.eigh(information / (size[..., :, None] * size[..., None, :]))
     length = abs(value)
     seen = length > _SEEN * length.max(axis=-1, keepdims=True)
@@ -228,7 +229,7 @@ def _minimise_general(
     information, gradient = _normal_equations(forms, joint, x, entries, residual)
     for _ in range(_STEPS):
         moving = free & ~(((x <= joint.lower) & (gradient < 0)) | ((x >= joint.upper) & (gradient > 0)))
-        size = np.sqrt(np.maximum(np.diagonal(information), np.finfo(float).tiny))
+        size = np.sqrt(np.maximum(np.diagonal(information), _TINY))
         scaled = (information / np.outer(size, size))[np.ix_(moving, moving)]
         done = not (np.isfinite(scaled).all() and moving.any())
         while not done and damping <= _LARGEST:

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf.frf.bands import line_slices
+from jointfrf.frf.quantiles import medians
 from jointfrf.identification.compliance_fit.line_forms import LineForms
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.kernel.call import call
@@ -138,8 +139,8 @@ class LineData(NamedTuple):
     @property
     def own_size(self) -> FloatArray:
         """Median size of the receptances of each DOF, the larger of both sides, shape (n,), m/N."""
-        own = abs(self.smooth[:, self.entries.rows == self.entries.columns])
-        size: FloatArray = np.median(own, axis=0).reshape(2, self.entries.n).max(axis=0)
+        own: FloatArray = np.abs(self.smooth[:, self.entries.rows == self.entries.columns])
+        size: FloatArray = medians(own.T).reshape(2, self.entries.n).max(axis=0)
         return size
 
     def on_lines(self, lines: NDArray[np.intp]) -> LineData:
