@@ -177,16 +177,21 @@ def estimate_noise(
     places = pieces(np.argsort(freq))
     if like is not None and (len(places) > 1 or like.variance.shape != lines.shape):
         like = None
-    parts = (
-        _estimated(
-            _NoisyLines(freq[own], lines[own], entry_groups(lines[own], reciprocal=reciprocal), max_poles, reciprocal),
-            None if given is None else given[own],
-            like,
-            own,
+
+    def estimated(own: NDArray[np.intp] | slice) -> NoiseModel:
+        h = lines[own]
+        noisy = _NoisyLines(freq[own], h, entry_groups(h, reciprocal=reciprocal), max_poles, reciprocal)
+        return _estimated(
+            noisy, None if given is None else given[own], None if like is None else like.variance[own], like
         )
-        for own in places
-    )
-    return _joined(places, parts, lines.shape)
+
+    if len(places) == 1 and (np.diff(freq) > 0).all():
+        model = estimated(slice(None))
+        # What was measured is the caller's.
+        return (
+            model if model.smooth.is_smooth else replace(model, smooth=replace(model.smooth, h=model.smooth.h.copy()))
+        )
+    return _joined(places, (estimated(own) for own in places), lines.shape)
 
 
 def _joined(places: list[NDArray[np.intp]], parts: Iterable[NoiseModel], shape: tuple[int, ...]) -> NoiseModel:
@@ -255,11 +260,11 @@ class _NoisyLines:
 
 
 def _estimated(
-    lines: _NoisyLines, given: FloatArray | None, like: NoiseModel | None, order: NDArray[np.intp]
+    lines: _NoisyLines, given: FloatArray | None, near: FloatArray | None, like: NoiseModel | None
 ) -> NoiseModel:
-    """Noise model of checked FRFs; `order` says which lines of others these are."""
+    """Noise model of checked FRFs; `near` is the variance of others on these lines."""
     differences = lines.differences()
-    begun = None if like is None else _begun_like(lines, like, order)
+    begun = None if like is None or near is None else _begun_like(lines, near, like)
     if begun is None:
         differences, smooth, variance, inflation = _begun(lines, differences)
     else:
@@ -296,12 +301,12 @@ def _begun(
 
 
 def _begun_like(
-    lines: _NoisyLines, like: NoiseModel, order: NDArray[np.intp]
+    lines: _NoisyLines, near: FloatArray, like: NoiseModel
 ) -> tuple[SmoothFrfs, FloatArray, float | None] | None:
     """Return smooth FRFs with the poles of others, relocated; None where these leave more than noise like theirs."""
     if not like.smooth.is_smooth:
         return None
-    variance = lines.weighing(like.variance[order])
+    variance = lines.weighing(near)
     smooth = lines.smoothed(variance, like.inflation, 0, like.smooth.poles)
     return (smooth, variance, like.inflation) if smooth.is_smooth and smooth.level < _LIKE else None
 
