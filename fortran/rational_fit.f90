@@ -273,7 +273,8 @@ contains
     complex(dp), contiguous, intent(in) :: s(:), poles(:)
     real(dp), contiguous, intent(in) :: weight(:, :)
     type(orthonormal_basis), intent(inout) :: basis
-    complex(dp) :: part(size(poles) + 1, 1)
+    complex(dp), target :: numbers(size(poles) + 1)
+    complex(dp), pointer, contiguous :: part(:, :)
     real(dp) :: mean_weight(size(s)), length
     integer :: j, turn
 
@@ -286,9 +287,10 @@ contains
       end do
       do j = 1, size(psi, 2)
         do turn = 1, merge(0, 2, j == 1)
-          call multiply('C', psi(:, :j - 1), psi(:, j:j), part(:j - 1, :))
-          call take_off(psi(:, :j - 1), part(:j - 1, 1), psi(:, j))
-          triangle(:j - 1, j) = triangle(:j - 1, j) + part(:j - 1, 1)
+          part(1:j - 1, 1:1) => numbers(:j - 1)
+          call multiply('C', psi(:, :j - 1), psi(:, j:j), part)
+          call take_off(psi(:, :j - 1), numbers(:j - 1), psi(:, j))
+          triangle(:j - 1, j) = triangle(:j - 1, j) + numbers(:j - 1)
         end do
         length = sqrt(sum(real(psi(:, j))**2 + aimag(psi(:, j))**2))
         triangle(j, j) = length
