@@ -2,7 +2,7 @@
 module jointfrf_finite_difference
   use jointfrf_caller_memory, only: caller_memory
   use jointfrf_kinds, only: dp, ip
-  use jointfrf_lanes, only: lane_kernels, real_lines, sparse_rows
+  use jointfrf_lanes, only: has_weight, lane_kernels, real_lines, rows_of_columns, sparse_rows
   use jointfrf_line_layout, only: all_finite, load, load_real, store
   use jointfrf_lines_lapack, only: product_line
   use jointfrf_status, only: line_good, line_not_finite, line_overflow
@@ -171,37 +171,6 @@ contains
       k = k + 1
     end subroutine add_product
   end function both_at_once
-
-  !> The entries of each column of a matrix that are not zero: of each row of its transpose.
-  pure function rows_of_columns(t) result(rows)
-    real(dp), intent(in) :: t(:, :)
-    type(sparse_rows) :: rows
-    integer :: i, j, k
-
-    rows%n = size(t, 2)
-    k = count(has_weight(t))
-    allocate (rows%start(rows%n + 1), rows%from(k), rows%weight(k))
-    k = 1
-    do j = 1, rows%n
-      rows%start(j) = k
-      do i = 1, size(t, 1)
-        if (.not. has_weight(t(i, j))) cycle
-        rows%from(k) = i
-        rows%weight(k) = t(i, j)
-        k = k + 1
-      end do
-    end do
-    rows%start(rows%n + 1) = k
-    rows%unused = any(count(has_weight(t), dim=2) == 0)
-  end function rows_of_columns
-
-  !> Whether a weight is not zero; NaN is not.
-  elemental function has_weight(weight) result(yes)
-    real(dp), intent(in) :: weight
-    logical :: yes
-
-    yes = .not. abs(weight) <= 0.0_dp
-  end function has_weight
 
   subroutine transform_block(self, kernels, first, n_lines, space, line_info, rcond)
     class(transformation), intent(in) :: self

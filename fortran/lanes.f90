@@ -17,7 +17,7 @@ module jointfrf_lanes
   implicit none
   private
   public :: lane_kernels, element_space, sparse_rows, padded, to_register, real_lines, flat, in_memory, row_starts, &
-    rows_in_memory, worse_of
+    rows_in_memory, rows_of_columns, has_weight, worse_of
 
   !> Lines side by side. One register of AVX-512, two of AVX2, four of SSE2.
   integer, parameter, public :: lanes = 8
@@ -317,6 +317,33 @@ module jointfrf_lanes
       real(dp), intent(out) :: total(n_lines)
     end subroutine weigh_lines_routine
 
+    !> Rows of n elements weighed by real numbers: y_p = c_p + sum of w x_b, over the rows b that have a weight.
+    !> rows       for each y, which x and their weights
+    !> constant   c, the same in all lanes, shape (n, rows%n)
+    !> from, to   the element before the first x, and before the first y; rows follow each other
+    subroutine weigh_rows_routine(n, rows, constant, from, to, x)
+      import :: dp, lanes, sparse_rows
+      implicit none
+      integer, intent(in) :: n, from, to
+      type(sparse_rows), intent(in) :: rows
+      real(dp), intent(in) :: constant(n, rows%n)
+      real(dp), intent(inout) :: x(lanes, 2, *)
+    end subroutine weigh_rows_routine
+
+    !> Covariance of C from factors of its change, dC_ab = sum of U_ap V_qb e_pq over m by m entries.
+    !> reciprocal   whether e is (e + e^T)/2 of independent entries
+    !> u, v         the element before U and before V^T, column by column
+    !> spread       before the variances E|e_pq|^2, real parts, column by column; symmetric where reciprocal
+    !> work         before (n + 2) m elements of workspace
+    !> covariance   before E[dC_ab conj(dC_cd)], n^4 elements; b runs fastest, then d, a and c
+    subroutine propagate_routine(n, m, reciprocal, u, v, spread, work, covariance, x)
+      import :: dp, lanes
+      implicit none
+      integer, intent(in) :: n, m, u, v, spread, work, covariance
+      logical, intent(in) :: reciprocal
+      real(dp), intent(inout) :: x(lanes, 2, *)
+    end subroutine propagate_routine
+
     !> Short form of ISMM for one joint DOF, without workspace. Arguments as in `inverse_substructuring`, as pairs of
     !> real numbers.
     subroutine invert_joint_lines_routine(transposed, first, n_lines, gamma, k_joint, rcond)
@@ -411,6 +438,8 @@ module jointfrf_lanes
     procedure(superpose_routine), pointer, nopass :: superpose => null()
     procedure(transform_lines_routine), pointer, nopass :: transform_lines => null()
     procedure(weigh_lines_routine), pointer, nopass :: weigh_lines => null()
+    procedure(weigh_rows_routine), pointer, nopass :: weigh_rows => null()
+    procedure(propagate_routine), pointer, nopass :: propagate => null()
     procedure(words_routine), pointer, nopass :: random_words => null()
     procedure(draw_routine), pointer, nopass :: normals => null()
     procedure(draw_routine), pointer, nopass :: uniforms => null()
@@ -561,6 +590,37 @@ contains
 
     before = element(:, 1) - 1
   end function row_starts
+
+  !> The entries of each column of a matrix that are not zero: of each row of its transpose.
+  pure function rows_of_columns(t) result(rows)
+    real(dp), intent(in) :: t(:, :)
+    type(sparse_rows) :: rows
+    integer :: i, j, k
+
+    rows%n = size(t, 2)
+    k = count(has_weight(t))
+    allocate (rows%start(rows%n + 1), rows%from(k), rows%weight(k))
+    k = 1
+    do j = 1, rows%n
+      rows%start(j) = k
+      do i = 1, size(t, 1)
+        if (.not. has_weight(t(i, j))) cycle
+        rows%from(k) = i
+        rows%weight(k) = t(i, j)
+        k = k + 1
+      end do
+    end do
+    rows%start(rows%n + 1) = k
+    rows%unused = any(count(has_weight(t), dim=2) == 0)
+  end function rows_of_columns
+
+  !> Whether a weight is not zero; NaN is not.
+  elemental function has_weight(weight) result(yes)
+    real(dp), intent(in) :: weight
+    logical :: yes
+
+    yes = .not. abs(weight) <= 0.0_dp
+  end function has_weight
 
   !> The smaller of two reciprocal condition numbers; not finite where one of them is not, which MIN may forget.
   elemental function worse_of(a, b) result(rcond)

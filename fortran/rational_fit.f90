@@ -136,10 +136,9 @@ contains
     integer(ip), intent(out) :: info
     type(pair_sums), target :: gram
     type(orthonormal_basis) :: basis
-    complex(dp), allocatable :: back(:, :), pulled(:), normal(:, :)
-    real(dp) :: gain(size(poles))
-    integer :: n, e, stat
-    logical :: good
+    complex(dp), allocatable :: back(:, :), pulled(:, :), inverse(:, :, :), coefficients(:, :), pull(:, :)
+    logical :: good(size(h, 2))
+    integer :: n, m, e, turn, stat
 
     smooth = 0.0_dp
     squares = 0.0_dp
@@ -147,9 +146,11 @@ contains
     info = info_good
     if (size(h) == 0) return
     n = size(poles) + 1
-    call prepare_sums(size(h, 2), n, size(s), gram, info)
+    m = size(h, 2)
+    call prepare_sums(m, n, size(s), gram, info)
     if (info == info_good) then
-      allocate (basis%psi(size(s), n), basis%triangle(n, n), back(n, n), pulled(size(s)), normal(n, n), stat=stat)
+      allocate (basis%psi(size(s), n), basis%triangle(n, n), back(n, n), pulled(size(s), m), inverse(n, n, m), &
+                coefficients(n, m), pull(n, m), stat=stat)
       if (stat /= 0) info = info_no_memory
     end if
     if (info /= info_good) return
@@ -158,69 +159,72 @@ contains
     call make_basis(s, weight, poles, basis)
     call invert_triangle(basis%triangle, back)
     call sum_all(basis, gram)
-    do e = 1, size(h, 2)
-      call own_gram(gram, e, normal)
-      call fit_entry(basis%psi, back, normal, h(:, e), weight(:, e), pulled, smooth(:, e), gain, good)
-      if (good) then
-        loss = loss + gain
-      else
-        smooth(:, e) = 0.0_dp
-        info = info + 1
-      end if
+    do e = 1, m
+      call invert_gram(gram, e, inverse(:, :, e), good(e))
+    end do
+    coefficients = 0.0_dp
+    do turn = 1, 2
+      pulled = gram%weights*(h - smooth)
+      call multiply('C', basis%psi, pulled, pull)
+      do e = 1, m
+        if (good(e)) coefficients(:, e) = coefficients(:, e) + matmul(inverse(:, :, e), pull(:, e))
+      end do
+      call multiply('N', basis%psi, coefficients, smooth)
+    end do
+    do e = 1, m
+      if (good(e)) call add_loss(back, inverse(:, :, e), coefficients(:, e), loss)
       squares = squares + sum((weight(:, e)*abs(h(:, e) - smooth(:, e)))**2)
     end do
+    info = count(.not. good, kind=ip)
     call release_blas_threads()
     deallocate (gram%products, gram%sums)
   end subroutine rational_fit
 
-  !> Fit of one entry.
-  !> normal      Gram matrix of the entry; lost
-  !> pulled      workspace, shape (n_freq)
-  !> gain        what each pole takes off the sum of squares
-  subroutine fit_entry(psi, back, normal, h, weight, pulled, smooth, gain, good)
-    complex(dp), contiguous, intent(in) :: psi(:, :), back(:, :), h(:)
-    complex(dp), contiguous, intent(inout) :: normal(:, :), pulled(:), smooth(:)
-    real(dp), intent(in) :: weight(:)
-    real(dp), intent(out) :: gain(:)
+  !> Inverse of the Gram matrix of an entry.
+  subroutine invert_gram(gram, entry, inverse, good)
+    type(pair_sums), intent(in) :: gram
+    integer, intent(in) :: entry
+    complex(dp), contiguous, intent(out) :: inverse(:, :)
     logical, intent(out) :: good
-    complex(dp) :: residue, coefficients(size(psi, 2)), pull(size(psi, 2))
-    complex(dp) :: inverse(size(psi, 2), size(psi, 2)), right(size(psi, 2), size(psi, 2))
-    integer(blas_ip) :: pivot(size(psi, 2)), stat
-    integer :: n, j, turn
+    complex(dp) :: normal(gram%n, gram%n)
+    integer(blas_ip) :: pivot(gram%n), n, stat
+    integer :: j
 
-    n = size(psi, 2)
+    call own_gram(gram, entry, normal)
     inverse = 0.0_dp
-    do j = 1, n
+    do j = 1, gram%n
       inverse(j, j) = 1.0_dp
     end do
-    call zgesv(int(n, blas_ip), int(n, blas_ip), normal, int(n, blas_ip), pivot, inverse, int(n, blas_ip), stat)
+    n = int(gram%n, blas_ip)
+    call zgesv(n, n, normal, n, pivot, inverse, n, stat)
     good = stat == 0
-    if (.not. good) return
-    coefficients = 0.0_dp
-    smooth = 0.0_dp
-    do turn = 1, 2
-      pulled = weight**2*(h - smooth)
-      call multiply('C', psi, pulled, pull)
-      coefficients = coefficients + matmul(inverse, pull)
-      call multiply('N', psi, coefficients, smooth)
-    end do
-    right = matmul(inverse, transpose(conjg(back)))
-    do j = 2, n
-      residue = sum(back(j, :)*coefficients)
-      gain(j - 1) = abs(residue)**2/real(sum(back(j, :)*right(:, j)), dp)
-    end do
-  end subroutine fit_entry
+  end subroutine invert_gram
 
-  !> y = A x or A^H x.
+  !> What each pole takes off the sum of squares of an entry: |residue|^2 over its variance.
+  pure subroutine add_loss(back, inverse, coefficients, loss)
+    complex(dp), intent(in) :: back(:, :), inverse(:, :), coefficients(:)
+    real(dp), intent(inout) :: loss(:)
+    complex(dp) :: right(size(back, 1), size(back, 1)), residue
+    integer :: j
+
+    right = matmul(inverse, transpose(conjg(back)))
+    do j = 2, size(back, 1)
+      residue = sum(back(j, :)*coefficients)
+      loss(j - 1) = loss(j - 1) + abs(residue)**2/real(sum(back(j, :)*right(:, j)), dp)
+    end do
+  end subroutine add_loss
+
+  !> Y = A X or A^H X.
   subroutine multiply(operation, a, x, y)
     character, intent(in) :: operation
-    complex(dp), contiguous, intent(in) :: a(:, :), x(:)
-    complex(dp), contiguous, intent(out) :: y(:)
+    complex(dp), contiguous, intent(in) :: a(:, :), x(:, :)
+    complex(dp), contiguous, intent(out) :: y(:, :)
     integer(blas_ip) :: rows
 
     rows = size(a, 1, kind=blas_ip)
-    call zgemm(operation, 'N', size(y, kind=blas_ip), 1_blas_ip, size(x, kind=blas_ip), (1.0_dp, 0.0_dp), a, rows, x, &
-               size(x, kind=blas_ip), (0.0_dp, 0.0_dp), y, size(y, kind=blas_ip), 1_c_size_t, 1_c_size_t)
+    call zgemm(operation, 'N', size(y, 1, kind=blas_ip), size(y, 2, kind=blas_ip), size(x, 1, kind=blas_ip), &
+               (1.0_dp, 0.0_dp), a, rows, x, size(x, 1, kind=blas_ip), (0.0_dp, 0.0_dp), y, &
+               size(y, 1, kind=blas_ip), 1_c_size_t, 1_c_size_t)
   end subroutine multiply
 
   subroutine prepare_sums(n_sums, n, n_freq, gram, info)
@@ -269,7 +273,8 @@ contains
     complex(dp), contiguous, intent(in) :: s(:), poles(:)
     real(dp), contiguous, intent(in) :: weight(:, :)
     type(orthonormal_basis), intent(inout) :: basis
-    complex(dp) :: part(size(poles) + 1)
+    complex(dp), target :: numbers(size(poles) + 1)
+    complex(dp), pointer, contiguous :: part(:, :)
     real(dp) :: mean_weight(size(s)), length
     integer :: j, turn
 
@@ -282,9 +287,10 @@ contains
       end do
       do j = 1, size(psi, 2)
         do turn = 1, merge(0, 2, j == 1)
-          call multiply('C', psi(:, :j - 1), psi(:, j), part(:j - 1))
-          call take_off(psi(:, :j - 1), part(:j - 1), psi(:, j))
-          triangle(:j - 1, j) = triangle(:j - 1, j) + part(:j - 1)
+          part(1:j - 1, 1:1) => numbers(:j - 1)
+          call multiply('C', psi(:, :j - 1), psi(:, j:j), part)
+          call take_off(psi(:, :j - 1), numbers(:j - 1), psi(:, j))
+          triangle(:j - 1, j) = triangle(:j - 1, j) + numbers(:j - 1)
         end do
         length = sqrt(sum(real(psi(:, j))**2 + aimag(psi(:, j))**2))
         triangle(j, j) = length

@@ -53,7 +53,8 @@ module jointfrf
     check_matrices, check_modify, check_monte_carlo, check_pollute, check_project_on_joint, check_rational_fit, &
     check_receptance, check_receptance_banded, check_receptance_modal, check_relocate_poles, check_solve, &
     check_transform
-  use jointfrf_compliance, only: compliance_covariance, compliance_factors, joint_compliance
+  use jointfrf_compliance, only: joint_compliance
+  use jointfrf_compliance_noise, only: compliance_covariance, compliance_factors
   use jointfrf_coupling, only: couple
   use jointfrf_decoupling, only: decouple
   use jointfrf_diagonal_joint, only: diagonal_joint, fit_diagonal_joint, line_forms, search_limits

@@ -1,4 +1,5 @@
-!> The lane kernels: linear algebra, condensation and superposition of modes, for eight lines side by side.
+!> The lane kernels: linear algebra, condensation, superposition of modes and propagation of noise, for eight lines side
+!> by side.
 !>
 !> One source for all instruction sets: the build sets JF_MODULE, the name of the module, and the instructions that the
 !> compiler may use. Loops over lanes (index l) are outermost or alone and have no branches; inner loops step by a fixed
@@ -46,6 +47,8 @@ contains
     kernels%superpose => superpose
     kernels%transform_lines => transform_lines
     kernels%weigh_lines => weigh_lines
+    kernels%weigh_rows => weigh_rows_of_lanes
+    kernels%propagate => propagate_noise
   end subroutine set_kernels
 
   subroutine judge_lines(n_lines, total, line_info, rcond)
@@ -102,4 +105,5 @@ contains
 #include "condensation.inc"
 #include "modal_superposition.inc"
 #include "transformation.inc"
+#include "noise_propagation.inc"
 end module JF_MODULE

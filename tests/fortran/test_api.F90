@@ -10,7 +10,8 @@ program test_api
     jf_joint_compliance, jf_line_text, jf_modify, jf_receptance, jf_receptance_banded, jf_receptance_modal, &
       jf_set_engine, &
     jf_solve, jf_transform, jf_version
-  use jointfrf_compliance, only: compliance_covariance, compliance_factors, joint_compliance
+  use jointfrf_compliance, only: joint_compliance
+  use jointfrf_compliance_noise, only: compliance_covariance, compliance_factors
   use jointfrf_coupling, only: couple
   use jointfrf_decoupling, only: decouple
   use jointfrf_dynamic_stiffness, only: receptance_banded, receptance_dense

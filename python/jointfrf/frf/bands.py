@@ -27,7 +27,9 @@ def line_slices(n_freq: int) -> list[slice]:
     >>> line_slices(10000)
     [slice(0, 5000, None), slice(5000, 10000, None)]
     """
-    ends = np.linspace(0, n_freq, (-(-n_freq // PIECE) or 1) + 1).astype(int).tolist()
+    if n_freq <= PIECE:
+        return [slice(0, n_freq)]
+    ends = np.linspace(0, n_freq, -(-n_freq // PIECE) + 1).astype(int).tolist()
     return [slice(first, end) for first, end in pairwise(ends)]
 
 

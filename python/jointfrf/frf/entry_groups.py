@@ -6,11 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
-__all__ = ["EntryGroup", "entry_groups"]
+__all__ = ["EntryGroup", "connected", "entry_groups"]
 
 #: An FRF below this share of what is usual in its row and column is zero to rounding.
 _ZERO = 1e-8
@@ -79,7 +78,7 @@ def entry_groups(h: ComplexArray, *, reciprocal: bool) -> list[EntryGroup]:
     links[:n_out, n_out:] = counts
     if reciprocal:
         links[:n_out, n_out:] |= np.diag(counts.any(axis=0))
-    _, label = sparse.csgraph.connected_components(sparse.csr_array(links), directed=False)
+    label = connected(links)
     if reciprocal:
         counts = np.triu(counts)
     rows, columns = np.nonzero(counts)
@@ -93,6 +92,35 @@ def entry_groups(h: ComplexArray, *, reciprocal: bool) -> list[EntryGroup]:
         repeated[paired] = (abs(one - two) > _RECIPROCAL * (abs(one) + abs(two))).mean(axis=0) > 0.5
         groups.append(EntryGroup(p, q, paired, repeated))
     return groups
+
+
+def connected(links: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """Return the number of the set of connected nodes that each is in, by the order of their first nodes.
+
+    Parameters
+    ----------
+    links : ndarray of bool, shape (n, n)
+        Whether two nodes are linked, in either direction.
+
+    Returns
+    -------
+    ndarray of int, shape (n,)
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> connected(np.array([[0, 0, 1], [0, 0, 0], [0, 0, 0]], bool)).tolist()
+    [0, 1, 0]
+    """
+    label = np.full(len(links), -1)
+    both = links | links.T
+    for node in range(len(links)):
+        if label[node] < 0:
+            reached = both[node] | (np.arange(len(links)) == node)
+            while (more := both[reached].any(axis=0) & ~reached).any():
+                reached |= more
+            label[reached] = label.max() + 1
+    return label
 
 
 def _counting(h: ComplexArray) -> NDArray[np.bool_]:

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from jointfrf.frf.bands import line_slices
-from jointfrf.frf.entry_groups import entry_groups
+from jointfrf.frf.entry_groups import EntryGroup, entry_groups
 from jointfrf.frf.noise_estimate import reciprocity_noise
-from jointfrf.frf.noise_parts import line_correlation, line_levels, noise_parts
+from jointfrf.frf.noise_parts import NoiseTerms, line_correlation, line_levels
 from jointfrf.frf.order_search import OrderSearch
+from jointfrf.frf.quantiles import medians
 from jointfrf.frf.reciprocity_differences import ReciprocityDifferences, reciprocity_differences
 from jointfrf.frf.smoothing import (
     SmoothFrfs,
@@ -96,16 +98,6 @@ class NoiseModel:
         """Numbers of the outlying lines."""
         return np.flatnonzero(self.line_factor > 1)
 
-    def in_order(self, lines: NDArray[np.intp]) -> NoiseModel:
-        """Return the same with lines in this order."""
-        return replace(
-            self,
-            variance=self.variance[lines],
-            line_level=self.line_level[lines],
-            line_factor=self.line_factor[lines],
-            smooth=self.smooth.in_order(lines),
-        )
-
     @property
     def level(self) -> float:
         """Median of the noise relative to the FRFs, over entries that are not zero and lines."""
@@ -116,7 +108,7 @@ class NoiseModel:
         for own in line_slices(len(ratio)):
             size = np.maximum(abs(self.smooth.h[own][:, counts]), _TINY)
             ratio[own] = np.sqrt(self.variance[own][:, counts]) / size
-        return float(np.median(ratio, overwrite_input=True))
+        return float(medians(ratio.ravel()))
 
 
 def estimate_noise(
@@ -185,18 +177,21 @@ def estimate_noise(
     places = pieces(np.argsort(freq))
     if like is not None and (len(places) > 1 or like.variance.shape != lines.shape):
         like = None
-    parts = (
-        _estimated(
-            freq[own],
-            lines[own],
-            None if given is None else given[own],
-            max_poles,
-            None if like is None else like.in_order(own),
-            reciprocal=reciprocal,
+
+    def estimated(own: NDArray[np.intp] | slice) -> NoiseModel:
+        h = lines[own]
+        noisy = _NoisyLines(freq[own], h, entry_groups(h, reciprocal=reciprocal), max_poles, reciprocal)
+        return _estimated(
+            noisy, None if given is None else given[own], None if like is None else like.variance[own], like
         )
-        for own in places
-    )
-    return _joined(places, parts, lines.shape)
+
+    if len(places) == 1 and (np.diff(freq) > 0).all():
+        model = estimated(slice(None))
+        # What was measured is the caller's.
+        return (
+            model if model.smooth.is_smooth else replace(model, smooth=replace(model.smooth, h=model.smooth.h.copy()))
+        )
+    return _joined(places, (estimated(own) for own in places), lines.shape)
 
 
 def _joined(places: list[NDArray[np.intp]], parts: Iterable[NoiseModel], shape: tuple[int, ...]) -> NoiseModel:
@@ -223,99 +218,116 @@ def _joined(places: list[NDArray[np.intp]], parts: Iterable[NoiseModel], shape: 
     )  # fmt: skip
 
 
+@dataclass(frozen=True)
+class _NoisyLines:
+    """Checked FRFs whose noise is sought, lines in rising order.
+
+    Attributes
+    ----------
+    freq : ndarray, shape (n_freq,)
+    h : ndarray, shape (n_freq, n_out, n_in)
+    groups : list of EntryGroup
+    max_poles : int
+    reciprocal : bool
+    """
+
+    freq: FloatArray
+    h: ComplexArray
+    groups: list[EntryGroup]
+    max_poles: int
+    reciprocal: bool
+
+    def differences(self) -> ReciprocityDifferences | None:
+        """Return the differences of reciprocal entries, where there are any."""
+        return reciprocity_differences(self.h, self.groups) if self.reciprocal else None
+
+    def smoothed(
+        self, variance: FloatArray, inflation: float | None, patience: int, start: tuple[ComplexArray, ...] = ()
+    ) -> SmoothFrfs:
+        """Return smooth FRFs by weights of this variance; the search begins with the poles `start`, rad/s."""
+        return smoothed(
+            self.freq, self.h, variance, OrderSearch(inflation, self.max_poles, patience), self.groups, start
+        )
+
+    def weighing(self, variance: FloatArray) -> FloatArray:
+        """Return the variance for weights: not below rounding, where differences of most lines are zero."""
+        return np.maximum(variance, self._least)
+
+    @cached_property
+    def _least(self) -> FloatArray:
+        least: FloatArray = np.maximum(_ROUNDING**2 * first_variance(self.h), _TINY)
+        return least
+
+
 def _estimated(
-    freq: FloatArray,
-    lines: ComplexArray,
-    given: FloatArray | None,
-    max_poles: int,
-    like: NoiseModel | None,
-    *,
-    reciprocal: bool,
+    lines: _NoisyLines, given: FloatArray | None, near: FloatArray | None, like: NoiseModel | None
 ) -> NoiseModel:
-    """Noise model of checked FRFs, lines in rising order."""
-    differences = reciprocity_differences(lines) if reciprocal else None
-    begun = None if like is None else _begun_like(freq, lines, like, max_poles, reciprocal=reciprocal)
+    """Noise model of checked FRFs; `near` is the variance of others on these lines."""
+    differences = lines.differences()
+    begun = None if like is None or near is None else _begun_like(lines, near, like)
     if begun is None:
-        differences, smooth, variance, inflation = _begun(freq, lines, differences, max_poles, reciprocal=reciprocal)
+        differences, smooth, variance, inflation = _begun(lines, differences)
     else:
         smooth, variance, inflation = begun
     if not smooth.is_smooth:
-        return _without_smoothing(lines, smooth, differences, reciprocal=reciprocal)
+        return _without_smoothing(lines, smooth, differences)
     patience = _patience(differences)
     for _ in range(_MOST_TURNS if begun is None else 0):
-        model = _model(lines, smooth, given, inflation or 1.0, differences, robust=True)
-        inflation, _ = _found_inflation(lines, differences, model)
-        before, variance = variance, _weighing(lines, model.variance)
+        model = _model(lines.h, smooth, given, inflation or 1.0, differences, robust=True)
+        inflation, _ = _found_inflation(lines.h, differences, model)
+        before, variance = variance, lines.weighing(model.variance)
         shown = (smooth.h != 0).any(axis=0)
         settled = _alike(before[:, shown], variance[:, shown])
-        search = OrderSearch(None if differences is None else inflation, max_poles, 0 if settled else patience)
-        smooth = smoothed(freq, lines, variance, search, reciprocal=reciprocal, start=smooth.poles)
+        told = None if differences is None else inflation
+        smooth = lines.smoothed(variance, told, 0 if settled else patience, smooth.poles)
         if settled:
             break
-    model = _model(lines, smooth, given, inflation or 1.0, differences, robust=False)
-    inflation, source = _found_inflation(lines, differences, model)
+    model = _model(lines.h, smooth, given, inflation or 1.0, differences, robust=False)
+    inflation, source = _found_inflation(lines.h, differences, model)
     return replace(model, inflation=inflation, inflation_source=source)
 
 
 def _begun(
-    freq: FloatArray,
-    lines: ComplexArray,
-    differences: ReciprocityDifferences | None,
-    max_poles: int,
-    *,
-    reciprocal: bool,
+    lines: _NoisyLines, differences: ReciprocityDifferences | None
 ) -> tuple[ReciprocityDifferences | None, SmoothFrfs, FloatArray, float | None]:
     """Return first smooth FRFs, their variance and inflation, and the differences if these see the noise."""
-    smooth, variance, inflation = _first_smooth(freq, lines, differences, max_poles, reciprocal=reciprocal)
+    smooth, variance, inflation = _first_smooth(lines, differences)
     if differences is not None and smooth.is_smooth and smooth.level > _UNSEEN:
-        other = _first_smooth(freq, lines, None, max_poles, reciprocal=reciprocal)
+        other = _first_smooth(lines, None)
         # Where no rational function fits, nothing is gained by leaving the differences.
-        if np.median((abs(lines - other[0].h) ** 2 / variance)[:, (other[0].h != 0).any(axis=0)]) < _UNSEEN:
+        if np.median((abs(lines.h - other[0].h) ** 2 / variance)[:, (other[0].h != 0).any(axis=0)]) < _UNSEEN:
             return None, *other
     return differences, smooth, variance, inflation
 
 
 def _begun_like(
-    freq: FloatArray, lines: ComplexArray, like: NoiseModel, max_poles: int, *, reciprocal: bool
+    lines: _NoisyLines, near: FloatArray, like: NoiseModel
 ) -> tuple[SmoothFrfs, FloatArray, float | None] | None:
     """Return smooth FRFs with the poles of others, relocated; None where these leave more than noise like theirs."""
     if not like.smooth.is_smooth:
         return None
-    variance = _weighing(lines, like.variance)
-    search = OrderSearch(like.inflation, max_poles, 0)
-    smooth = smoothed(freq, lines, variance, search, reciprocal=reciprocal, start=like.smooth.poles)
+    variance = lines.weighing(near)
+    smooth = lines.smoothed(variance, like.inflation, 0, like.smooth.poles)
     return (smooth, variance, like.inflation) if smooth.is_smooth and smooth.level < _LIKE else None
 
 
 def _first_smooth(
-    freq: FloatArray,
-    lines: ComplexArray,
-    differences: ReciprocityDifferences | None,
-    max_poles: int,
-    *,
-    reciprocal: bool,
+    lines: _NoisyLines, differences: ReciprocityDifferences | None
 ) -> tuple[SmoothFrfs, FloatArray, float | None]:
     """Return smooth FRFs by weights from differences where there are any, these variances, and the inflation."""
     inflation = None
     if differences is None:
-        variance = first_variance(lines)
+        variance = first_variance(lines.h)
     else:
-        variance = _weighing(lines, differences.variance_of_parts(near_squares(lines)))
+        variance = lines.weighing(differences.variance_of_parts(near_squares(lines.h)))
         inflation = differences.inflation(variance, differences.line_levels(variance).factor)
         levels = differences.line_levels(variance, inflation)
         variance *= (levels.usual * levels.factor)[:, None, None]
-    search = OrderSearch(inflation, max_poles, _patience(differences))
-    return smoothed(freq, lines, variance, search, reciprocal=reciprocal), variance, inflation
+    return lines.smoothed(variance, inflation, _patience(differences)), variance, inflation
 
 
 def _patience(differences: ReciprocityDifferences | None) -> int:
     return 2 if differences is None else 1  # a worse start
-
-
-def _weighing(lines: ComplexArray, variance: FloatArray) -> FloatArray:
-    """Variance for weights: not below rounding, where differences of most lines are zero."""
-    least: FloatArray = np.maximum(_ROUNDING**2 * first_variance(lines), _TINY)
-    return np.maximum(variance, least)
 
 
 def _alike(before: FloatArray, variance: FloatArray) -> bool:
@@ -369,17 +381,20 @@ def _model(
     n_freq, n_out, n_in = h.shape
     shown = (smooth.h != 0).any(axis=0)
     taken = np.minimum(inflation * smooth.share[shown], _MOST_TAKEN)
-    noise = (h - smooth.h)[:, shown].T / np.sqrt(1 - taken)[:, None]
+    noise = np.ascontiguousarray((h - smooth.h)[:, shown].T) / np.sqrt(1 - taken)[:, None]
     squares = noise.real**2 + noise.imag**2
-    terms = [abs(smooth.h[:, shown]).T ** 2, np.ones(squares.shape)]
+    stacked = np.ones((2 if given is None else 3, *squares.shape))
+    stacked[0] = (smooth.h.real**2 + smooth.h.imag**2)[:, shown].T
     if given is not None:
-        terms.append(given[:, shown].T)
-    stacked = np.stack(terms)
-    usual, factor = np.ones(n_freq), np.ones(n_freq)
+        stacked[2] = given[:, shown].T
+    usual, factor, terms = np.ones(n_freq), np.ones(n_freq), None
     # Outlying lines; with these left out, slow variation; where there is some, parts and outlying lines once more.
     for turn in range(3):
         good = factor == 1
-        parts = noise_parts((squares / usual)[:, good], stacked[:, :, good], robust=robust or turn == 0)
+        if terms is None or not good.all():
+            terms = NoiseTerms(stacked[:, :, good])
+        parts = terms.parts((squares / usual)[:, good], robust=robust or turn == 0)
+        terms = terms if good.all() else None
         described = np.maximum(_described(parts, stacked) * usual, _TINY)
         variance = np.zeros(h.shape)
         variance[:, shown] = described.T
@@ -402,25 +417,26 @@ def _model(
 
 def _described(parts: FloatArray, terms: FloatArray) -> FloatArray:
     """Sum of parts times terms, shape (n_entries, n_freq)."""
-    return np.asarray((parts[:, :, None] * terms).sum(axis=0))
+    return np.asarray(np.einsum("te,tel->el", parts, terms))
 
 
 def _without_smoothing(
-    h: ComplexArray, smooth: SmoothFrfs, differences: ReciprocityDifferences | None, *, reciprocal: bool
+    lines: _NoisyLines, smooth: SmoothFrfs, differences: ReciprocityDifferences | None
 ) -> NoiseModel:
     """Relative noise alike for all entries, for few lines and for nearly exact FRFs."""
+    h = lines.h
     n_freq, n_out, n_in = h.shape
     level, source = 0.0, "none"
-    if reciprocal and n_out == n_in:
+    if lines.reciprocal and n_out == n_in:
         level, source = float(reciprocity_noise(h[None])[0]), "reciprocity"
     if level == 0:
         level, source = (smooth.level, "residual") if smooth.poles else (0.0, "none")
     relative = np.zeros((1, n_out, n_in))
-    for group in entry_groups(h, reciprocal=reciprocal):
+    for group in lines.groups:
         group.put(np.full((len(group.rows), 1), level), relative)
     variance, factor = relative**2 * abs(h) ** 2, np.ones(n_freq)
     if differences is not None and smooth.poles:  # enough lines to say which of them are outlying
-        factor = differences.line_levels(_weighing(h, variance)).factor
+        factor = differences.line_levels(lines.weighing(variance)).factor
     return NoiseModel(
         relative=relative[0],
         floor=np.zeros((n_out, n_in)),

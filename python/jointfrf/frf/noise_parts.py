@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
+from jointfrf.frf.quantiles import medians, quantiles
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
-__all__ = ["LineLevels", "line_correlation", "line_levels", "noise_parts"]
+__all__ = ["LineLevels", "NoiseTerms", "line_correlation", "line_levels", "noise_parts"]
 
 #: Entries are binned by |h|^2 into so many bins: within one the variance is nearly the same.
 _BINS = 32
@@ -39,6 +41,7 @@ _VARIES_LEAST = 0.15
 _SIGNIFICANT = 2.5
 #: Residuals beyond so many medians are cut to that, for correlations.
 _CUT = 3.0
+_TINY = float(np.finfo(float).tiny)
 
 
 def noise_parts(squares: FloatArray, terms: FloatArray, *, robust: bool = False) -> FloatArray:
@@ -66,27 +69,59 @@ def noise_parts(squares: FloatArray, terms: FloatArray, *, robust: bool = False)
     nearly alone, and one with all alike. The estimate holds for any distribution of e with this variance; it is
     efficient for circular normal e.
     """
-    if len(terms) == 2:
-        y, a, count = _binned(squares, terms, robust=robust)
-    else:  # the variance is not the same within a bin
-        y, a, count = squares, terms, np.ones(squares.shape[1])
-    size = np.maximum((a * count).sum(axis=2), np.finfo(float).tiny) / count.sum()
-    a = a / size[:, :, None]
-    parts = _two_parts(y, a, count) if len(terms) == 2 else _several_parts(y, a, count)
-    return np.asarray(parts / size)
+    return NoiseTerms(terms).parts(squares, robust=robust)
+
+
+class NoiseTerms:
+    """Terms of a variance as `noise_parts` takes them, binned once for several squares.
+
+    Parameters
+    ----------
+    terms : ndarray, shape (n_terms, n_entries, n_freq)
+    """
+
+    def __init__(self, terms: FloatArray) -> None:
+        n_freq = terms.shape[2]
+        self._order: NDArray[np.intp] | None = None
+        # Of more than two terms the variance is not the same within a bin.
+        if len(terms) == 2 and n_freq > _BINS:
+            self._order = np.argsort(terms[0], axis=1)
+            self._edges = np.linspace(0, n_freq, _BINS + 1).astype(int)
+            self._count = np.diff(self._edges).astype(float)
+            binned = np.stack([self._means(np.take_along_axis(term, self._order, axis=1)) for term in terms])
+        else:
+            self._count, binned = np.ones(n_freq), terms
+        self._size = np.maximum(binned @ self._count, _TINY) / self._count.sum()
+        self._terms = binned / self._size[:, :, None]
+
+    def parts(self, squares: FloatArray, *, robust: bool = False) -> FloatArray:
+        """Return the parts as `noise_parts` does, shape (n_terms, n_entries)."""
+        y = squares
+        if self._order is not None:
+            y = np.take_along_axis(squares, self._order, axis=1)
+            y = _bin_medians(y, self._edges) / np.log(2) if robust else self._means(y)
+        found = (_two_parts if len(self._terms) == 2 else _several_parts)(y, self._terms, self._count)
+        return np.asarray(found / self._size)
+
+    def _means(self, values: FloatArray) -> FloatArray:
+        """Return means over the bins."""
+        return np.asarray(np.add.reduceat(values, self._edges[:-1], axis=1) / self._count)
 
 
 def _two_parts(y: FloatArray, a: FloatArray, count: FloatArray) -> FloatArray:
     """Parts of two terms of mean 1, shape (2, n_entries)."""
-    centre, reach = np.zeros(len(y[:, 0])), _WIDEST
+    centre, reach, entries = np.zeros(len(y)), _WIDEST, np.arange(len(y))
+    grid, total = np.linspace(-1, 1, _GRID)[:, None], count.sum()
+    weighted = count * y
     for _ in range(3):
-        odds = np.exp(centre + reach * np.linspace(-1, 1, _GRID)[:, None])
+        odds = np.exp(centre + reach * grid)
         share = np.stack([1 / (1 + odds), odds / (1 + odds)])  # (2, grid, n_entries)
-        v = np.maximum(share[0][:, :, None] * a[0] + share[1][:, :, None] * a[1], np.finfo(float).tiny)
-        level = (count * y / v).sum(axis=2) / count.sum()
-        loss = (count * np.log(v)).sum(axis=2) + count.sum() * np.log(np.maximum(level, np.finfo(float).tiny))
+        v = share[0][:, :, None] * a[0]
+        v += share[1][:, :, None] * a[1]
+        np.maximum(v, _TINY, out=v)
+        level = (weighted / v).sum(axis=2) / total
+        loss = np.log(v, out=v) @ count + total * np.log(np.maximum(level, _TINY))
         best = loss.argmin(axis=0)
-        entries = np.arange(len(y))
         centre, reach = np.log(odds[best, entries]), 2 * reach / (_GRID - 1)
     return np.asarray(share[:, best, entries] * level[best, entries])
 
@@ -97,40 +132,23 @@ def _several_parts(y: FloatArray, a: FloatArray, count: FloatArray) -> FloatArra
     starts = np.concatenate([np.eye(n_terms) + _HARDLY, np.ones((1, n_terms)) / n_terms])
     parts = starts[:, :, None] * ((y * count).sum(axis=1) / count.sum())
     for _ in range(_ITERATIONS):
-        v = np.maximum(np.einsum("ste,teb->seb", parts, a), np.finfo(float).tiny)
+        v = np.maximum(np.einsum("ste,teb->seb", parts, a), _TINY)
         up = np.einsum("teb,seb->ste", a, count * y / v**2)
         down = np.einsum("teb,seb->ste", a, count / v)
-        parts *= np.sqrt(up / np.maximum(down, np.finfo(float).tiny))
-    v = np.maximum(np.einsum("ste,teb->seb", parts, a), np.finfo(float).tiny)
+        parts *= np.sqrt(up / np.maximum(down, _TINY))
+    v = np.maximum(np.einsum("ste,teb->seb", parts, a), _TINY)
     best = (count * (np.log(v) + y / v)).sum(axis=2).argmin(axis=0)
     return np.asarray(parts[best, :, np.arange(parts.shape[2])].T)
-
-
-def _binned(squares: FloatArray, terms: FloatArray, *, robust: bool) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Means over bins of lines of similar |h|^2, and how many lines each bin holds."""
-    n_freq = squares.shape[1]
-    if n_freq <= _BINS:
-        return squares, terms, np.ones(n_freq)
-    order = np.argsort(terms[0], axis=1)
-    edges = np.linspace(0, n_freq, _BINS + 1).astype(int)
-    count = np.diff(edges).astype(float)
-
-    def means(values: FloatArray) -> FloatArray:
-        return np.asarray(np.add.reduceat(values, edges[:-1], axis=1) / count)
-
-    ordered = np.take_along_axis(squares, order, axis=1)
-    y = _bin_medians(ordered, edges) / np.log(2) if robust else means(ordered)
-    return y, np.stack([means(np.take_along_axis(term, order, axis=1)) for term in terms]), count
 
 
 def _bin_medians(values: FloatArray, edges: NDArray[np.intp]) -> FloatArray:
     """Medians over bins of values, shape (n_entries, n_bins): of all bins of one length at once."""
     length = np.diff(edges)
-    medians = np.empty((len(values), len(length)))
+    found = np.empty((len(values), len(length)))
     for one in np.unique(length):
         own = np.flatnonzero(length == one)
-        medians[:, own] = np.median(values[:, edges[own][:, None] + np.arange(one)], axis=2)
-    return medians
+        found[:, own] = medians(values[:, edges[own][:, None] + np.arange(one)])
+    return found
 
 
 @dataclass(frozen=True)
@@ -176,16 +194,15 @@ def line_levels(noise: ComplexArray, inflation: float = 1.0, *, is_residual: boo
     line = (noise.real**2 + noise.imag**2).mean(axis=0)
     n_freq = len(line)
     reach = int(min(max(_USUAL, _USUAL_CORRELATED * inflation), n_freq)) // 2
-    tiny = np.finfo(float).tiny
-    usual = np.maximum(_running_median(line, reach), tiny)
+    usual = np.maximum(_running_median(line, reach), _TINY)
     factor: FloatArray = line / usual
-    quarter, three_quarters = np.quantile(np.log(np.maximum(factor, tiny)), [0.25, 0.75])
+    quarter, three_quarters = quantiles(np.log(np.maximum(factor, _TINY)), (0.25, 0.75))
     shape = (1.349 / max(three_quarters - quarter, 1e-3)) ** 2
     limit = special.gammainccinv(shape, _FALSE_ALARM / n_freq) / special.gammaincinv(shape, 0.5)
     by_chance = np.sqrt(inflation / (shape * (2 * reach + 1)))
-    low, high = np.quantile(np.log(usual), [0.1, 0.9])
+    low, high = quantiles(np.log(usual), (0.1, 0.9))
     varies = (high - low) / 2.56 > max(_VARIES * by_chance, _VARIES_LEAST)
-    slow = usual / np.median(usual) if varies else np.ones(n_freq)
+    slow = usual / medians(usual) if varies else np.ones(n_freq)
     outlying = factor > limit
     if is_residual:
         outlying &= ~_missed(noise, outlying)
@@ -194,8 +211,10 @@ def line_levels(noise: ComplexArray, inflation: float = 1.0, *, is_residual: boo
 
 def _missed(residual: ComplexArray, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Which of the chosen lines are in long runs through which the residual goes smoothly."""
-    steps = np.diff(np.pad(chosen.astype(int), 1))
     missed = np.zeros_like(chosen)
+    if np.count_nonzero(chosen) <= _SHORT_RUN:
+        return missed
+    steps = np.diff(np.pad(chosen.astype(int), 1))
     for first, end in zip(np.flatnonzero(steps > 0), np.flatnonzero(steps < 0), strict=True):
         if end - first > _SHORT_RUN:
             run = residual[:, first:end] / np.sqrt((abs(residual[:, first:end]) ** 2).sum(axis=0))
@@ -206,11 +225,16 @@ def _missed(residual: ComplexArray, chosen: NDArray[np.bool_]) -> NDArray[np.boo
 
 def _running_median(values: FloatArray, reach: int) -> FloatArray:
     """Median over so many lines on either side, interpolated between every few lines."""
-    padded = np.pad(values, reach, mode="reflect")
-    step = max(1, reach // _STEPS)
-    at = np.append(np.arange(0, len(values) - 1, step), len(values) - 1)
-    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1)[at]
-    return np.asarray(np.interp(np.arange(len(values)), at, np.median(windows, axis=1)))
+    middles, windows = _windows(len(values), reach)
+    return np.asarray(np.interp(np.arange(len(values)), middles, medians(values[windows])))
+
+
+@lru_cache(maxsize=16)
+def _windows(n: int, reach: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return middle lines, and the lines of the window about each; beyond the ends they are reflected."""
+    middles = np.append(np.arange(0, n - 1, max(1, reach // _STEPS)), n - 1)
+    around = np.pad(np.arange(n), reach, mode="reflect")
+    return middles, around[middles[:, None] + np.arange(2 * reach + 1)]
 
 
 def line_correlation(noise: ComplexArray, share: float = 0.0) -> float:
@@ -229,15 +253,18 @@ def line_correlation(noise: ComplexArray, share: float = 0.0) -> float:
         1 + 2 sum of the autocorrelations up to the first that is not significant; at least 1.
     """
     n_freq = noise.shape[1]
-    size = abs(noise)
+    size: FloatArray = np.abs(noise)
     known: NDArray[np.bool_] = np.isfinite(size)
+    whole = bool(known.all())
     size = np.where(known, size, 0)
     if n_freq < 16 or not size.any():
         return 1.0
-    limit = _CUT * np.nanmedian(np.where(known, size, np.nan), axis=1, keepdims=True)
+    usual = medians(size) if whole else np.nanmedian(np.where(known, size, np.nan), axis=1)
+    limit = _CUT * usual[:, None]
     cut = np.where(known, noise, 0) * np.where(size > limit, limit / np.where(size > limit, size, 1), 1)
     n_lags = n_freq // 4
-    pairs = np.maximum(_autocorrelation(known.astype(float), n_lags), 1)
+    whole_pairs = len(noise) * (n_freq - np.arange(n_lags, dtype=float))
+    pairs = whole_pairs if whole else np.maximum(_autocorrelation(known.astype(float), n_lags), 1)
     rho = _autocorrelation(cut, n_lags) / pairs
     rho = (rho / rho[0] * (1 - share) + share)[1:]
     small = rho < _SIGNIFICANT / np.sqrt(pairs[0])

@@ -96,9 +96,12 @@ def search_order(entries: Entries, search: OrderSearch, start: ComplexArray | No
     """
     poles = first_poles(entries) if start is None else start
     for _ in range(_ROUNDS):
-        fit = _grown(entries, search, poles)
-        inflation = search.found_inflation(entries, fit)
-        fit = _pruned(entries, inflation, fit)
+        if search.patience == 0 and search.inflation is not None:
+            inflation, poles = search.inflation, poles[: search.most_poles(len(entries.s))]
+        else:
+            fit = _grown(entries, search, poles)
+            inflation, poles = search.found_inflation(entries, fit), fit.poles
+        fit = _pruned(entries, inflation, poles)
         alone, followed = _single_lines(entries, inflation, fit)
         if not followed.size:
             break
@@ -156,14 +159,14 @@ def _left_out(entries: Entries, lines: NDArray[np.intp]) -> Entries:
     return replace(entries, weight=weight)
 
 
-def _pruned(entries: Entries, inflation: float, fit: RationalFit) -> RationalFit:
+def _pruned(entries: Entries, inflation: float, poles: ComplexArray) -> RationalFit:
     """Fit without the poles that are not worth their parameters."""
     least = np.inf
-    best = fit
+    best: RationalFit | None = None
     while True:
-        fit = _converged(entries, fit.poles, _LAST_RELOCATIONS)
+        fit = _converged(entries, poles, _LAST_RELOCATIONS)
         score = _score(entries, inflation, fit)
-        if score > least:
+        if best is not None and score > least:
             return best
         best, least = fit, score
         variance = fit.squares / max(entries.n_data - entries.n_parameters(len(fit.poles)), 1)
@@ -172,7 +175,7 @@ def _pruned(entries: Entries, inflation: float, fit: RationalFit) -> RationalFit
             return best
         # Half of them at a time: what one describes another may describe as well.
         drop = worthless[fit.loss[worthless].argsort()][: (worthless.size + 1) // 2]
-        fit = replace(fit, poles=np.delete(fit.poles, drop[: len(fit.poles) - 1]))
+        poles = np.delete(fit.poles, drop[: len(fit.poles) - 1])
 
 
 def first_poles(entries: Entries) -> ComplexArray:
@@ -192,8 +195,9 @@ def _at(places: FloatArray) -> ComplexArray:
 
 def _median_of_three(values: FloatArray) -> FloatArray:
     """Median of each line and its neighbours: a single outlying line is not a mode."""
-    padded = np.pad(values, 1, mode="edge")
-    return np.asarray(np.median(np.stack([padded[:-2], padded[1:-1], padded[2:]]), axis=0), float)
+    before, after = np.r_[values[:1], values[:-1]], np.r_[values[1:], values[-1:]]
+    least, most = np.minimum(before, after), np.maximum(before, after)
+    return np.asarray(np.clip(values, least, most), float)
 
 
 def _peaks(values: FloatArray) -> np.ndarray:

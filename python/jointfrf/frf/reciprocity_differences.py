@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from jointfrf.frf.entry_groups import entry_groups
+from jointfrf.frf.entry_groups import EntryGroup
 from jointfrf.frf.noise_parts import LineLevels, line_correlation, line_levels, noise_parts
+from jointfrf.frf.quantiles import medians
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
 __all__ = ["ReciprocityDifferences", "reciprocity_differences"]
@@ -45,7 +47,7 @@ class ReciprocityDifferences:
             Both entries of a pair are given the same parts; an entry that is in no pair has the means of those in its
             row and column, floors relative to the median of |h|^2.
         """
-        size = np.median(near, axis=0)
+        size = medians(near.T).T
         pair_size = size[self.rows, self.columns] + size[self.columns, self.rows]
         both: FloatArray = (near[:, self.rows, self.columns] + near[:, self.columns, self.rows]).T
         flat = np.broadcast_to(pair_size[:, None], both.shape)
@@ -71,12 +73,14 @@ class ReciprocityDifferences:
         return line_correlation(np.where(line_factor > 1, np.nan, noise))
 
 
-def reciprocity_differences(h: ComplexArray) -> ReciprocityDifferences | None:
+def reciprocity_differences(h: ComplexArray, groups: Sequence[EntryGroup]) -> ReciprocityDifferences | None:
     """Differences of reciprocal entries of measured FRFs.
 
     Parameters
     ----------
     h : ndarray, shape (n_freq, n_out, n_in)
+    groups : sequence of EntryGroup
+        Of the entries of a reciprocal structure.
 
     Returns
     -------
@@ -85,7 +89,6 @@ def reciprocity_differences(h: ComplexArray) -> ReciprocityDifferences | None:
     """
     if h.shape[1] != h.shape[2]:
         return None
-    groups = entry_groups(h, reciprocal=True)
     rows = np.concatenate([group.rows[group.repeated] for group in groups] or [np.zeros(0, np.intp)])
     columns = np.concatenate([group.columns[group.repeated] for group in groups] or [np.zeros(0, np.intp)])
     if not rows.size:

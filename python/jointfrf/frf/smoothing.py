@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from jointfrf.frf.bands import line_slices
 from jointfrf.frf.entry_groups import EntryGroup, entry_groups
 from jointfrf.frf.order_search import OrderSearch, search_order
+from jointfrf.frf.quantiles import medians
 from jointfrf.frf.rational_fit import Entries, RationalFit
 from jointfrf.kernel.arguments import (
     ComplexArray,
@@ -75,10 +76,6 @@ class SmoothFrfs:
     def order(self) -> int:
         """Number of poles of the group that has most."""
         return max((len(poles) for poles in self.poles), default=0)
-
-    def in_order(self, lines: NDArray[np.intp]) -> SmoothFrfs:
-        """Return the same with lines in this order."""
-        return replace(self, freq_hz=self.freq_hz[lines], h=self.h[lines])
 
 
 def smooth_frfs(
@@ -146,7 +143,13 @@ def smooth_frfs(
     search = OrderSearch(inflation=inflation, max_poles=max_poles)
     places = pieces(np.argsort(freq))
     parts = (
-        smoothed(freq[own], lines[own], None if spread is None else spread[own], search, reciprocal=reciprocal)
+        smoothed(
+            freq[own],
+            lines[own],
+            None if spread is None else spread[own],
+            search,
+            entry_groups(lines[own], reciprocal=reciprocal),
+        )
         for own in places
     )
     return joined(places, parts, lines.shape)
@@ -189,8 +192,7 @@ def smoothed(
     h: ComplexArray,
     variance: FloatArray | None,
     search: OrderSearch,
-    *,
-    reciprocal: bool,
+    groups: Sequence[EntryGroup],
     start: tuple[ComplexArray, ...] = (),
 ) -> SmoothFrfs:
     """Smooth checked FRFs, lines in rising order, as `smooth_frfs` does; poles `start` of each group are in rad/s."""
@@ -201,7 +203,6 @@ def smoothed(
     unit = 2 * np.pi * freq.max()
     values, share, fits = np.zeros_like(h), np.zeros((1, n_out, n_in)), []
     squares = freedom = exactness = 0.0
-    groups = entry_groups(h, reciprocal=reciprocal)
     for number, group in enumerate(groups):
         before = start[number] / unit if len(start) == len(groups) else None
         entries, fit = _smooth_group(freq, h, variance, group, search, before)
@@ -219,7 +220,7 @@ def smoothed(
 
 def _relative(entries: Entries, fit: RationalFit) -> float:
     """Median of |h - smooth| / |smooth|."""
-    return float(np.median(abs(entries.h - fit.smooth) / np.maximum(abs(fit.smooth), np.finfo(float).tiny)))
+    return float(medians((abs(entries.h - fit.smooth) / np.maximum(abs(fit.smooth), np.finfo(float).tiny)).ravel()))
 
 
 def _smooth_group(
@@ -247,7 +248,7 @@ def _smooth_group(
 def first_variance(h: ComplexArray) -> FloatArray:
     """Variance before anything is known of the noise: |h|^2 over neighbouring lines, not below a part of its median."""
     near = near_squares(h)
-    variance: FloatArray = np.maximum(near + _FIRST_FLOOR * np.median(near, axis=0), np.finfo(float).tiny)
+    variance: FloatArray = np.maximum(near + _FIRST_FLOOR * medians(near.T).T, np.finfo(float).tiny)
     return variance
 
 

@@ -6,19 +6,21 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import Literal, NamedTuple
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from jointfrf.frf.noise_model import NoiseModel
 from jointfrf.identification.compliance_fit.channel_noise import NoiseOptions
 from jointfrf.identification.compliance_fit.describe import describe_compliance
 from jointfrf.identification.compliance_fit.estimator import JointEstimate
-from jointfrf.identification.compliance_fit.fit import fit_compliance
+from jointfrf.identification.compliance_fit.fit import fit_compliance, fitted_joint
 from jointfrf.identification.compliance_fit.joint_terms import CrossTerms, DampingTerms
 from jointfrf.identification.compliance_fit.prepare import FitOptions, prepare_compliance
 from jointfrf.identification.joint_fit import JointFit
 from jointfrf.identification.prepare import BandsOfDofs, as_measured
+from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
-__all__ = ["FitStart", "identify_realisations"]
+__all__ = ["FitStart", "identify_realisations", "viscous_estimate"]
 
 
 class FitStart(NamedTuple):
@@ -149,3 +151,37 @@ def identify_realisations(
         if near is None:
             near, known = found.estimate, replace(known, like=problem.noise.model)
         yield describe_compliance(found, problem).fit
+
+
+def viscous_estimate(
+    freq_hz: FloatArray, gamma: ComplexArray, dofs: Sequence[str], start: FitStart | None
+) -> tuple[FloatArray, FloatArray]:
+    """Return stiffness and viscous damping of one set as `identify_realisations` gives them, without looking further.
+
+    Parameters
+    ----------
+    freq_hz : ndarray, shape (n_freq,)
+        Hz.
+    gamma : ndarray, shape (n_freq, 2 n, 2 n)
+        Measured receptances, m/N.
+    dofs : sequence of str
+        Names of the n joint DOFs.
+    start : FitStart, optional
+
+    Returns
+    -------
+    values : ndarray, shape (2 n,)
+        Stiffness of all DOFs, then damping.
+    intervals : ndarray, shape (2, 2 n)
+        Limits of the intervals of 95 %.
+
+    Raises
+    ------
+    ValueError
+        As `identify`.
+    """
+    noise = NoiseOptions(None, like=None if start is None else start.noise)
+    options = FitOptions("viscous", "zero", reciprocal=True)
+    problem = prepare_compliance(as_measured(freq_hz, gamma, square=False), dofs, None, None, noise, options)
+    found = fitted_joint(replace(problem, near=None if start is None else start.estimate))
+    return found.estimate.theta, np.array(list(found.intervals()(0.95).values())).T

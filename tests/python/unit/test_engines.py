@@ -220,7 +220,7 @@ OPERATIONS = {
     )
 } | {f"decouple_{equation}": decouple(equation) for equation in ("rr", "rs", "sr", "ss")}  # fmt: skip
 #: The covariance of n^2 entries grows with n^4, a band matrix and a joint's matrices of these orders take long.
-LARGEST = {"compliance_covariance": 5} | dict.fromkeys(
+LARGEST = {"compliance_covariance": 9} | dict.fromkeys(
     ["ismm", *(f"decouple_{e}" for e in ("rr", "rs", "sr", "ss"))], 33
 )
 

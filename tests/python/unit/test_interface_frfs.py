@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from jointfrf.identification.compliance_fit.interface_frfs import InterfaceFrfs
+from jointfrf.identification.compliance_fit.interface_frfs import InterfaceFrfs, between
 
 N_FREQ = 3
 
@@ -162,3 +162,12 @@ def test_frfs_seen_on_a_few_lines_join_their_dofs():
     smooth = f.smooth.copy()
     smooth[:3, 0, 1] = 1.0
     assert len(f._replace(smooth=smooth).groups()) == 1
+
+
+@pytest.mark.parametrize("rows", [[0, 1, 2], [2, 0, 1], [1, 1, 2], [2]])
+def test_rows_of_unit_matrices_take_frfs_as_products_do(rows):
+    rng = np.random.default_rng(4)
+    h = rng.standard_normal((5, 3, 3)) + 1j * rng.standard_normal((5, 3, 3))
+    t = np.eye(3)[rows]
+    for left, right in ((t, np.eye(3)), (np.eye(3), t), (t, t), (2 * t, t), (t, t - 0.5), (t[:, ::-1] + t, t)):
+        np.testing.assert_allclose(between(left, h, right), left @ h @ right.T, rtol=1e-14)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import jointfrf as jf
+from jointfrf.identification.realisations import viscous_estimate
 
 
 @pytest.fixture(scope="module")
@@ -55,3 +56,24 @@ def test_noise_of_other_frfs_is_a_first_value_only(beams, drawn):
     assert far.level == pytest.approx(0.1, rel=0.1)
     # Of other lines, and of other sizes: not used.
     assert jf.estimate_noise(beams.freq[:80], drawn[1][:80], like=first).level == pytest.approx(0.02, rel=0.2)
+
+
+def test_estimates_of_a_study_are_those_of_the_fits(beams, drawn):
+    dofs = ["y", "theta"]
+    start = jf.FitStart.of(beams.freq, drawn[0], dofs, damping="viscous")
+    fits = jf.identify_realisations(beams.freq, drawn[1:], dofs, damping="viscous", start=start)
+    for fit, gamma in zip(fits, drawn[1:], strict=True):
+        values, (low, high) = viscous_estimate(beams.freq, gamma, dofs, start)
+        np.testing.assert_array_equal(values, [*fit.stiffness, *fit.damping])
+        np.testing.assert_array_equal(np.array([low, high]).T, list(fit.confidence_interval(0.95).values()))
+
+
+def test_a_start_at_other_lines_is_where_the_joint_begins_only(beams, drawn):
+    """FRFs near those sought are those of the same lines."""
+    dofs, half = ["y", "theta"], beams.freq.size // 2
+    start = jf.FitStart.of(beams.freq, drawn[0], dofs, damping="viscous")
+    for own in (slice(half), slice(None, None, 2)):
+        (fit,) = jf.identify_realisations(beams.freq[own], [drawn[1][own]], dofs, damping="viscous", start=start)
+        alone = jf.identify(beams.freq[own], drawn[1][own], dofs, damping="viscous")
+        for name, value in alone.parameters.items():
+            assert abs(fit.parameters[name] - value) < 0.1 * alone.std_error[name]

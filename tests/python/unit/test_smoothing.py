@@ -5,7 +5,7 @@ import pytest
 
 import jointfrf as jf
 import six_dof_beams
-from jointfrf.frf.entry_groups import entry_groups
+from jointfrf.frf.entry_groups import connected, entry_groups
 from jointfrf.frf.rational_fit import Entries, rational_fit, relocated
 
 FREQ = np.linspace(10, 400, 500)
@@ -161,3 +161,15 @@ def test_bad_arguments(rational, change, message):
     _, h = rational
     with pytest.raises(ValueError, match=message):
         jf.smooth_frfs(**({"freq_hz": FREQ, "h": h} | change))
+
+
+def test_connected_nodes_are_those_that_powers_of_the_links_reach():
+    rng = np.random.default_rng(3)
+    for _ in range(50):
+        links = rng.random((9, 9)) < 0.08
+        both = (links | links.T | np.eye(9, dtype=bool)).astype(int)
+        reached = np.linalg.matrix_power(both, 9) > 0
+        label = connected(links)
+        np.testing.assert_array_equal(label[:, None] == label, reached)
+        # Numbered in the order of their first nodes.
+        assert [int(label[:i].max(initial=-1)) + 1 >= label[i] for i in range(9)] == [True] * 9

@@ -28,7 +28,7 @@ from jointfrf.cases.studied import (
 )
 from jointfrf.errors import IllConditionedWarning
 from jointfrf.identification.information_bound import least_std_errors
-from jointfrf.identification.realisations import FitStart, identify_realisations
+from jointfrf.identification.realisations import FitStart, viscous_estimate
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.spelling import did_you_mean
 
@@ -130,13 +130,10 @@ class ComplianceSource:
         found = np.full((3, count, 2 * len(self.dofs)), np.nan)
         for i, gamma in enumerate(self.frfs(first, count)):
             try:
-                (fit,) = identify_realisations(
-                    self.freq_hz, [gamma], self.dofs, damping="viscous", start=_start_of(self)
-                )
+                values, intervals = viscous_estimate(self.freq_hz, gamma, self.dofs, _start_of(self))
             except (ValueError, ArithmeticError):
                 continue  # no joint fits this realisation: it counts as failed
-            intervals = np.array(list(fit.confidence_interval(0.95).values())).T
-            found[:, i] = [*fit.stiffness, *fit.damping], *intervals
+            found[:, i] = values, *intervals
         return Estimates(*found)
 
 

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from jointfrf.frf.bands import PIECE, line_slices
 from jointfrf.frf.noise_estimate import ZERO
 from jointfrf.frf.noise_model import NoiseModel, estimate_noise
+from jointfrf.frf.quantiles import medians
 from jointfrf.frf.smoothing import near_squares, smooth_frfs
 from jointfrf.identification.compliance_fit.rigidity import deformation_compliance, deformation_variance
 from jointfrf.identification.compliance_fit.transforms import Transforms
@@ -173,7 +174,7 @@ def _relative_variance(h: ComplexArray | FloatArray, level: float) -> FloatArray
     variance = np.empty(h.shape)
     for own in line_slices(len(h)):
         variance[own] = abs(h[own]) ** 2
-    least = np.median(variance[:: -(-len(h) // PIECE)], axis=0) * ZERO**2 + ZERO**4 * variance.max()
+    least = medians(variance[:: -(-len(h) // PIECE)].T).T * ZERO**2 + ZERO**4 * variance.max()
     np.maximum(variance, least, out=variance)
     variance *= level**2
     return variance

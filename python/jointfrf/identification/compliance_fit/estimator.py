@@ -19,7 +19,6 @@ from jointfrf.identification.compliance_fit.joint_terms import (
     JointTerms,
     terms_of,
 )
-from jointfrf.identification.compliance_fit.line_forms import inverse_information
 from jointfrf.identification.compliance_fit.manifold import LineData
 from jointfrf.identification.compliance_fit.starts import first_joints
 from jointfrf.identification.compliance_fit.unknown_cross import fit_unknown_cross
@@ -134,6 +133,9 @@ def estimate_joint(
 def grouped(frfs: InterfaceFrfs) -> Iterator[tuple[NDArray[np.intp], LineData]]:
     """Return groups of DOFs that are fitted each by itself, and their FRFs."""
     lines = np.arange(len(frfs.measured))
+    if lines.size <= PIECE:
+        yield from ((dofs, frfs.of_dofs(dofs)) for dofs in frfs.groups())
+        return
     for dofs in frfs.on_lines(_some(lines)).groups():
         yield dofs, LineData.joined([frfs.on_lines(lines[own]).of_dofs(dofs) for own in line_slices(lines.size)])
 
@@ -146,7 +148,7 @@ def _some(lines: NDArray[np.intp]) -> NDArray[np.intp]:
 def _fitted(problem: GroupProblem, cross: CrossTerms, near: FittedGroup | None) -> GroupFit:
     """Fit a group: on the manifold, or to the diagonal of C where its cross terms are unknown or deny every joint."""
     if near is not None and cross != "ignore" and _is_near(near, problem):
-        found = fit_dofs(problem, [near.fit.minimum.x], LITTLE_PATIENCE)
+        found = fit_dofs(problem, [near.fit.minimum.x], LITTLE_PATIENCE, near.fit.on)
         if found.is_good:
             return found
     # Some lines, evenly spread, start as well as all.
@@ -182,7 +184,7 @@ def assembled(terms: JointTerms, groups: list[FittedGroup]) -> JointEstimate:
     p = len(terms.parameters)
     theta, covariance = np.full(p, np.nan), np.zeros((p, p))
     for group in groups:
-        own = inverse_information(2 * group.fit.minimum.information)
+        own = group.fit.minimum.covariance
         x = group.fit.minimum.x.copy()
         if isinstance(group.joint, DiagonalJoint):
             # A stiffness beyond what the data can tell stays a number; its interval says that it is open.

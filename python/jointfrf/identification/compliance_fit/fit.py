@@ -33,7 +33,14 @@ from jointfrf.identification.joint_fit import JointFit
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.substructuring.ismm import inverse_substructuring
 
-__all__ = ["ComplianceFit", "at_level_of_residual", "fit_compliance", "stiffness_of_lines"]
+__all__ = [
+    "ComplianceFit",
+    "FittedJoint",
+    "at_level_of_residual",
+    "fit_compliance",
+    "fitted_joint",
+    "stiffness_of_lines",
+]
 
 FoundT = TypeVar("FoundT")
 
@@ -83,44 +90,80 @@ class ComplianceFit(NamedTuple):
     choices: tuple[DofDamping, ...]
 
 
-def fit_compliance(problem: FitProblem) -> ComplianceFit:
-    """Fit the joint by maximum likelihood, linearised on the manifold of FRFs that fit it."""
-    freq = problem.freq_hz
-    span = f"{freq.size} lines, {freq.min():g} to {freq.max():g} Hz" if freq.size > 1 else f"one line, {freq[0]:g} Hz"
+class FittedJoint(NamedTuple):
+    """A joint with its uncertainty, before its residual is looked at.
+
+    Attributes
+    ----------
+    problem : FitProblem
+        With the noise level that was used.
+    estimate, spread, channels, parts, choices
+        As in `ComplianceFit`.
+    """
+
+    problem: FitProblem
+    estimate: JointEstimate
+    spread: Spread
+    channels: ChannelSpread | None
+    parts: BandParts | None
+    choices: tuple[DofDamping, ...]
+
+    def intervals(self) -> LikelihoodIntervals:
+        """Return the intervals of the parameters."""
+        added = [one.std_error for one in (self.channels, self.parts) if one is not None]
+        reach = np.sqrt(np.square(added).sum(axis=0)) if added else None
+        return LikelihoodIntervals(self.estimate, self.spread.factor, reach)
+
+    def covariance(self) -> FloatArray:
+        """Return the covariance of the parameters, shape (p, p)."""
+        factor = self.spread.factor if self.channels is None else self.spread.factor + self.channels.factor
+        root = np.sqrt(factor)
+        with np.errstate(invalid="ignore"):
+            covariance: FloatArray = self.estimate.covariance * np.outer(root, root)
+            covariance += np.diag(_of_parameters(self.estimate, self.parts))
+        return covariance
+
+
+def fitted_joint(problem: FitProblem) -> FittedJoint:
+    """Fit the joint by maximum likelihood, linearised on the manifold of FRFs that fit it; find its uncertainty."""
+    span = _span(problem.freq_hz)
     try:
         problem, result, choices = _fitted(problem)
     except np.linalg.LinAlgError as error:
         raise ValueError(f"no joint was found that fits gamma ({span}): {error}") from error
     noise = problem.noise
     check_estimate(result, noise.level, span, is_level_known=not noise.is_assumed)
-    level, scale = noise.level, float(np.sqrt(result.excess))
-    if noise.is_assumed:
-        level = scale * level
     spread = spread_of(result, noise.inflation, is_level_known=not noise.is_assumed)
-    frfs = problem.frfs
-    channels = channel_spread(result, frfs, problem.added_compliance)
-    root = np.sqrt(spread.factor if channels is None else spread.factor + channels.factor)
-    parts = _band_parts(problem, result, spread, choices)
-    added = [one.std_error for one in (channels, parts) if one is not None]
-    with np.errstate(invalid="ignore"):
-        covariance = result.covariance * np.outer(root, root)
-        covariance += np.diag(_of_parameters(result, parts))
+    channels = channel_spread(result, problem.frfs, problem.added_compliance)
+    return FittedJoint(problem, result, spread, channels, _band_parts(problem, result, spread, choices), choices)
+
+
+def fit_compliance(problem: FitProblem) -> ComplianceFit:
+    """Fit the joint as `fitted_joint` does, and compare its residual with the noise."""
+    found = fitted_joint(problem)
+    problem, result, noise = found.problem, found.estimate, found.problem.noise
+    scale = float(np.sqrt(result.excess))
     names = [one.name for one in result.parameters]
     joint = JointFit(
         method="compliance",
         dofs=problem.dofs,
         parameters=dict(zip(names, result.theta.tolist(), strict=True)),
-        covariance=covariance,
-        noise_level=level,
+        covariance=found.covariance(),
+        noise_level=scale * noise.level if noise.is_assumed else noise.level,
         residual_level=scale * noise.level,
         freq_hz=problem.freq_hz,
-        k_lines=stiffness_of_lines(frfs),
+        k_lines=stiffness_of_lines(problem.frfs),
         bands=problem.bands,
-        intervals=LikelihoodIntervals(result, spread.factor, np.sqrt(np.square(added).sum(axis=0)) if added else None),
+        intervals=found.intervals(),
     )
-    misfit = diagnose(result, problem.freq_hz, noise.inflation, spread)
-    cross_fits = _cross_fits(problem, result, misfit, choices)
-    return ComplianceFit(joint, result, spread, channels, parts, misfit, cross_fits, choices)
+    misfit = diagnose(result, problem.freq_hz, noise.inflation, found.spread)
+    cross_fits = _cross_fits(problem, result, misfit, found.choices)
+    return ComplianceFit(joint, result, found.spread, found.channels, found.parts, misfit, cross_fits, found.choices)
+
+
+def _span(freq: FloatArray) -> str:
+    """Return the lines in words."""
+    return f"{freq.size} lines, {freq.min():g} to {freq.max():g} Hz" if freq.size > 1 else f"one line, {freq[0]:g} Hz"
 
 
 def stiffness_of_lines(frfs: InterfaceFrfs) -> ComplexArray:

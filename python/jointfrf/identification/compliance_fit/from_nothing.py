@@ -6,6 +6,7 @@ import numpy as np
 
 from jointfrf.frf.bands import PIECE
 from jointfrf.frf.noise_estimate import ZERO
+from jointfrf.frf.quantiles import medians
 from jointfrf.identification.compliance_fit.estimator import JointEstimate
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
@@ -43,6 +44,7 @@ def check_channels(gamma: ComplexArray, labels: list[str]) -> None:
     """
     half = len(labels) // 2
     some = gamma[:: -(-len(gamma) // _MOST_LINES)]
+    measured = _is_measured(some)
     for what, h in (("responses", some), ("forces", some.swapaxes(1, 2))):
         size = np.sqrt((abs(h) ** 2).mean(axis=(0, 2)))
         if not size.all():
@@ -50,18 +52,19 @@ def check_channels(gamma: ComplexArray, labels: list[str]) -> None:
             raise ValueError(f"gamma: the {what} {', '.join(dead)} are zero: nothing was measured there")
         flat = _normalised(h)
         product = flat @ flat.conj().T
-        for side in (slice(0, half), slice(half, 2 * half)):
-            least, vectors = np.linalg.eigh(product[side, side])
-            if least[0] < _DEPENDENT:
-                own = np.array(labels[side])[abs(vectors[:, 0]) > 1e-3].tolist()
+        sides = slice(0, half), slice(half, 2 * half)
+        values, vectors = np.linalg.eigh(np.array([product[side, side] for side in sides]))
+        for side, least, vector in zip(sides, values[:, 0], vectors[:, :, 0], strict=True):
+            if least < _DEPENDENT:
+                own = np.array(labels[side])[abs(vector) > 1e-3].tolist()
                 raise ValueError(
                     f"gamma: the {what} {', '.join(own)} are not independent: one of these DOFs is the others measured "
                     "again, or their sum"
                 )
-        if _is_measured(some):
+        if measured:
             for i in range(half):
-                two = np.array([i, i + half])
-                if np.linalg.eigvalsh(product[np.ix_(two, two)])[0] < _DEPENDENT:
+                # The lower eigenvalue of the products of two rows of norm 1.
+                if 1 - abs(product[i, i + half]) < _DEPENDENT:
                     raise ValueError(
                         f"gamma: the {what} {labels[i]} and {labels[i + half]} are the same numbers, noise included: "
                         "measure both sides of the joint"
@@ -70,8 +73,8 @@ def check_channels(gamma: ComplexArray, labels: list[str]) -> None:
 
 def _normalised(h: ComplexArray) -> ComplexArray:
     """Return rows of norm 1, shape (rows, n_freq columns), to which every line and column adds alike."""
-    h = h / np.maximum(np.sqrt((abs(h) ** 2).mean(axis=(0, 1))), np.finfo(float).tiny)
-    h = h / np.maximum(np.sqrt((abs(h) ** 2).mean(axis=(1, 2), keepdims=True)), np.finfo(float).tiny)
+    h = h / np.maximum(np.sqrt((h.real**2 + h.imag**2).mean(axis=(0, 1))), np.finfo(float).tiny)
+    h /= np.maximum(np.sqrt((h.real**2 + h.imag**2).mean(axis=(1, 2), keepdims=True)), np.finfo(float).tiny)
     flat = h.swapaxes(0, 1).reshape(h.shape[1], -1)
     rows: ComplexArray = flat / np.linalg.norm(flat, axis=1, keepdims=True)
     return rows
@@ -100,7 +103,7 @@ def check_joint_seen(freq: FloatArray, smooth: ComplexArray, variance: FloatArra
     driving = np.einsum("lpp->lp", smooth)
     tiny = np.finfo(float).tiny
     noise = np.sqrt(np.einsum("lpp->lp", variance)) / np.maximum(abs(driving), tiny)
-    level = float(np.median(noise))
+    level = float(medians(noise.ravel()))
     if level >= _HIDDEN:
         raise ValueError(
             f"gamma consists of noise ({span}: the noise of driving points is {_percent(level)} of what is smooth in "

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from jointfrf.frf.bands import line_slices
+from jointfrf.frf.bands import PIECE, line_slices
 from jointfrf.identification.compliance_fit.diagonal_minimum import lowest_minimum, within_reach
 from jointfrf.identification.compliance_fit.joint_terms import DiagonalJoint, JointCoordinates, terms_of
 from jointfrf.identification.compliance_fit.likely_m import PriorOfM, expected_m, prior_of_m
@@ -114,6 +114,8 @@ class GroupFit(NamedTuple):
     converged : bool
     beside : Misfitting, optional
         Where cross terms of C are unknown.
+    on : OnManifold, optional
+        Point of the last linearisation, from which other FRFs of the same structure are near; not of long sweeps.
     """
 
     minimum: FormMinimum
@@ -124,6 +126,7 @@ class GroupFit(NamedTuple):
     iterations: int
     converged: bool
     beside: Misfitting | None = None
+    on: OnManifold | None = None
 
     @property
     def noise_squares(self) -> float:
@@ -157,7 +160,9 @@ class GroupFit(NamedTuple):
         return self.noise_squares / max(self.equations - self.minimum.x.size / 2, 1)
 
 
-def fit_dofs(problem: GroupProblem, starts: Iterable[FloatArray], patience: int = PATIENCE) -> GroupFit:
+def fit_dofs(
+    problem: GroupProblem, starts: Iterable[FloatArray], patience: int = PATIENCE, on: OnManifold | None = None
+) -> GroupFit:
     """Fit from one start after the other until the residual is that of the noise; else keep the lowest.
 
     Parameters
@@ -167,12 +172,14 @@ def fit_dofs(problem: GroupProblem, starts: Iterable[FloatArray], patience: int 
         Coordinates of the joint.
     patience : int
         Linearisations from the first start after which a fit far from the data ends.
+    on : OnManifold, optional
+        FRFs near the smooth ones that nearly fit the joint: where their projection begins.
     """
     best: GroupFit | None = None
     for start in starts:
         if not np.isfinite(start).all():
             continue
-        found = _iterate(problem, start, patience if best is None else LITTLE_PATIENCE)
+        found = _iterate(problem, start, patience if best is None else LITTLE_PATIENCE, on)
         if best is None or found.squares < best.squares:
             best = found
         if best.is_good:
@@ -221,7 +228,7 @@ def _from_softer(problem: GroupProblem, best: GroupFit) -> GroupFit:
     factor = 3.0
     while not best.is_noise:
         a = best.minimum.x[:n]
-        error = np.sqrt(np.diagonal(inverse_information(2 * best.minimum.information))[:n])
+        error = np.sqrt(np.diagonal(best.minimum.covariance)[:n])
         softer = factor * np.maximum(a, error)
         barely = (error > _BARELY * a) & (softer < softest)
         if not barely.any():
@@ -235,12 +242,16 @@ def _from_softer(problem: GroupProblem, best: GroupFit) -> GroupFit:
     return best
 
 
-def _iterate(problem: GroupProblem, start: FloatArray, patience: int = PATIENCE) -> GroupFit:
+def _iterate(
+    problem: GroupProblem, start: FloatArray, patience: int = PATIENCE, on: OnManifold | None = None
+) -> GroupFit:
     data, joint = problem.data, problem.joint
     free = _equations(problem)
     x: FloatArray = start
     linearised_at: FloatArray = start
-    on: OnManifold | None = None
+    steps = _FIRST_STEPS
+    if on is not None and on.h.shape != (len(data.measured), data.entries.n, data.entries.n):
+        on = None
     unknown = smooth_compliance(data) if problem.unknown.any() else None
     trusted = np.ones(len(data.measured), np.bool_)
     prior: PriorOfM | None = prior_of_m(data) if problem.is_diagonal else None
@@ -249,14 +260,15 @@ def _iterate(problem: GroupProblem, start: FloatArray, patience: int = PATIENCE)
         c = problem.of_joint(joint.compliance(linearised_at))
         if unknown is not None:
             c = np.where(problem.unknown.reshape(c.shape), unknown, c)
-        on = project(data.smooth, data, c, on, _NEXT_STEPS) if on else _first_points(data, c)
+        on = project(data.smooth, data, c, on, steps) if on else _first_points(data, c)
+        steps = _NEXT_STEPS
         on = _rescued(data, c, on)
         near = _trusted(on, data.entries.n, joint)
         trusted = near & trusted if step > 2 * PATIENCE and (near & trusted).any() else near
         # Unknown entries of C move on all lines: they may bring a line back to where it is trusted.
         forms, unknown = _linearised(problem, c, on, trusted, prior if hidden else None)
         minimum = lowest_minimum(forms, joint, x)
-        error = np.sqrt(np.maximum(np.diagonal(inverse_information(2 * minimum.information)), 1e-300))
+        error = np.sqrt(np.maximum(np.diagonal(minimum.covariance), 1e-300))
         # In standard errors along the direction of the step: what the data do not see may go anywhere.
         change = minimum.x - x
         moved = float(np.sqrt(abs(2 * (change @ minimum.information @ change))))
@@ -270,7 +282,8 @@ def _iterate(problem: GroupProblem, start: FloatArray, patience: int = PATIENCE)
         if converged or (step > patience and minimum.cost > _LOST * equations):
             break
         linearised_at = _within_sight(forms, problem.joint, x, error) if problem.is_diagonal else x
-    return GroupFit(minimum, forms, trusted, equations, float(free.sum()), step, converged)
+    kept = on if len(data.measured) <= PIECE else None
+    return GroupFit(minimum, forms, trusted, equations, float(free.sum()), step, converged, on=kept)
 
 
 def _first_points(data: LineData, c: ComplexArray) -> OnManifold:
@@ -290,11 +303,14 @@ def _linearised(
         point = OnManifold(on.h[own], on.m[own], on.squares[own])
         if prior is not None:
             point = expected_m(here.data, c[own], point, prior.on_lines(own))
-        forms, of_smooth = normal_forms(here.data, c[own], point, (here.data.measured, here.data.smooth))
-        forms, some = _used(here, forms, of_smooth, c[own])
+        targets = (here.data.measured, here.data.smooth) if here.unknown.any() else (here.data.measured,)
+        found_forms = normal_forms(here.data, c[own], point, targets)
+        forms, some = _used(here, found_forms[0], found_forms[-1], c[own])
         parts.append(forms.scaled(trusted[own].astype(float)))
         if some is not None:
             found[own] = some
+    if len(parts) == 1:
+        return parts[0], found if problem.unknown.any() else None
     compliance, weight, gradient = (np.concatenate([one[i] for one in parts]) for i in (0, 1, 2))
     whole = LineForms(compliance, weight, gradient, np.concatenate([one.squares for one in parts]))
     return whole, found if problem.unknown.any() else None

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
+from jointfrf.frf.entry_groups import connected
 from jointfrf.identification.compliance_fit.manifold import FrfEntries, LineData
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
 __all__ = ["InterfaceFrfs"]
 
+NumbersT = TypeVar("NumbersT", ComplexArray, FloatArray)
 #: A smooth FRF below this share of sqrt|h_pp h_qq| and of its own noise is zero by symmetry.
 _ZERO = 1e-8
 _BELOW_NOISE = 1.0
@@ -58,7 +59,7 @@ class InterfaceFrfs(NamedTuple):
 
     def gamma(self, h: ComplexArray) -> ComplexArray:
         """Return FRFs between joint DOFs, shape (n_freq, 2 n, 2 n), m/N."""
-        return self.responses @ h @ self.forces.T
+        return between(self.responses, h, self.forces)
 
     def on_lines(self, lines: NDArray[np.intp]) -> InterfaceFrfs:
         """Return some of the lines."""
@@ -73,12 +74,12 @@ class InterfaceFrfs(NamedTuple):
         size = np.sqrt(abs(np.einsum("lpp->lp", self.smooth)))
         relative = abs(self.smooth) / (size[:, :, None] * size[:, None, :])
         exact = (relative > _ZERO).any(axis=0)
-        noise = abs(self.responses) ** 2 @ self.variance @ (abs(self.forces) ** 2).T
+        noise = between(self.responses**2, self.variance, self.forces**2)
         with np.errstate(invalid="ignore", divide="ignore"):
             seen = abs(self.smooth) ** 2 > _BELOW_NOISE * noise
         coupled = exact & (seen.mean(axis=0) > 0.02)
         both = coupled[:n, :n] | coupled[:n, n:] | coupled[n:, :n] | coupled[n:, n:]
-        _, label = sparse.csgraph.connected_components(sparse.csr_array(both), directed=False)
+        label = connected(both)
         return [np.flatnonzero(label == own) for own in dict.fromkeys(label.tolist())]
 
     def of_dofs(self, dofs: NDArray[np.intp]) -> LineData:
@@ -86,8 +87,8 @@ class InterfaceFrfs(NamedTuple):
         at = np.concatenate([dofs, dofs + self.n])
         t_r, t_f = self.responses[at], self.forces[at]
         entries = FrfEntries.of(len(dofs), reciprocal=self.reciprocal)
-        between = (t_r @ self.measured @ t_f.T, self.smooth[:, at[:, None], at])
-        measured, smooth = (entries.take(self._mean(gamma)) for gamma in between)
+        measured = entries.take(self._mean(between(t_r, self.measured, t_f)))
+        smooth = entries.take(self._mean(taken(self.smooth, at, at)))
         return LineData(entries, measured, smooth, *self._weights(entries, t_r, t_f))
 
     def entries_of(self, dofs: NDArray[np.intp], gamma: ComplexArray) -> ComplexArray:
@@ -100,14 +101,18 @@ class InterfaceFrfs(NamedTuple):
 
     def _weights(self, entries: FrfEntries, t_r: FloatArray, t_f: FloatArray) -> tuple[FloatArray, FloatArray | None]:
         """Return 1/sqrt(variance), and unless every DOF is one channel, the triangles that whiten the correlation."""
-        variance = np.where(np.isfinite(self.variance), self.variance, 0)
+        known = np.isfinite(self.variance)
+        whole = bool(known.all())
+        variance = self.variance if whole else np.where(known, self.variance, 0)
         single = all(
             (np.count_nonzero(t, axis=0) <= 1).all() and (np.count_nonzero(t, axis=1) <= 1).all() for t in (t_r, t_f)
         )
         p, q = entries.rows, entries.columns
         if single:
-            of_entry = t_r**2 @ variance @ (t_f**2).T
-            unused = abs(t_r) @ ~np.isfinite(self.variance) @ abs(t_f).T > 0
+            of_entry = between(t_r**2, variance, t_f**2)
+            unused = (
+                np.zeros(of_entry.shape, bool) if whole else between(abs(t_r), (~known).astype(float), abs(t_f)) > 0
+            )
             total, dead = of_entry[:, p, q], unused[:, p, q]
             if self.reciprocal:
                 share = 2 if self.symmetrised else 4
@@ -127,7 +132,7 @@ class InterfaceFrfs(NamedTuple):
             of_channels = np.triu(of_channels)
         g = of_channels.reshape(len(p), -1)
         own = variance.reshape(len(variance), -1)
-        dead = ~np.isfinite(self.variance.reshape(own.shape)) @ (g != 0).T
+        dead = ~known.reshape(own.shape) @ (g != 0).T
         total = own @ (g**2).T
         inverse_std = np.where(dead, 0, 1 / np.sqrt(np.where(dead, 1, total)))
         whitening = np.zeros((len(own), len(p), len(p)))
@@ -136,10 +141,25 @@ class InterfaceFrfs(NamedTuple):
         return inverse_std, whitening
 
 
+def taken(h: NumbersT, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> NumbersT:
+    """Return rows and columns of every line; what is there where these are all, in order."""
+    whole = len(rows) == h.shape[1] and len(columns) == h.shape[2]
+    if whole and (np.diff(rows) == 1).all() and (np.diff(columns) == 1).all():
+        return h
+    return h[:, rows[:, None], columns]
+
+
+def between(t_r: FloatArray, h: NumbersT, t_f: FloatArray) -> NumbersT:
+    """Return T_r h T_f^T of every line; where the rows of both are those of unit matrices, without products."""
+    if all(np.count_nonzero(t) == len(t) and (t.max(axis=1) == 1).all() for t in (t_r, t_f)):
+        return taken(h, t_r.argmax(axis=1), t_f.argmax(axis=1))
+    return t_r @ h @ t_f.T
+
+
 def _blocks(g: FloatArray) -> list[NDArray[np.intp]]:
     """Entries that share channels: those within a side, and those between the sides."""
-    shared = sparse.csr_array(g != 0).astype(float)
-    _, label = sparse.csgraph.connected_components(shared @ shared.T, directed=False)
+    used = (g != 0).astype(float)
+    label = connected(used @ used.T > 0)
     return [np.flatnonzero(label == one) for one in range(label.max() + 1)]
 
 

@@ -9,13 +9,13 @@ import numpy as np
 from scipy import special
 
 from jointfrf.frf.bands import line_slices
+from jointfrf.frf.quantiles import medians
 from jointfrf.identification.compliance_fit.diagonal_minimum import lowest_minimum
 from jointfrf.identification.compliance_fit.estimator import FittedGroup, JointEstimate
 from jointfrf.identification.compliance_fit.joint_terms import DiagonalJoint, terms_of
 from jointfrf.identification.compliance_fit.line_forms import (
     LineForms,
     LineParts,
-    inverse_information,
     minimise_forms,
 )
 from jointfrf.kernel.arguments import FloatArray
@@ -32,6 +32,7 @@ BLOCKS = 10
 _SEEN = 1e-12
 #: Probability at which a scatter that exceeds the noise is taken for chance.
 _CHANCE = 0.95
+_TINY = float(np.finfo(float).tiny)
 
 
 class Spread(NamedTuple):
@@ -98,7 +99,7 @@ def block_scatter(group: FittedGroup, blocks: int = BLOCKS) -> tuple[FloatArray,
     if lines.size < 2 * blocks:
         return np.full(p, np.nan), np.zeros(p)
     # Blocks of equal information, so that each says about as much as the others.
-    size = np.maximum(np.diagonal(minimum.information), np.finfo(float).tiny)
+    size = np.maximum(np.diagonal(minimum.information), _TINY)
     share = (diagonal[lines] / size).sum(axis=1)
     share = share / share.sum() + 1 / lines.size
     member = np.zeros((blocks, len(diagonal)))
@@ -116,18 +117,22 @@ def _scatter(whole: FloatArray, pieces: Iterable[LineParts]) -> tuple[FloatArray
         Sum of the information of all parts.
     pieces : iterable of LineParts
     """
-    size = np.sqrt(np.maximum(np.diagonal(whole), np.finfo(float).tiny))
+    size = np.sqrt(np.maximum(np.diagonal(whole), _TINY))
     value, vector = np.linalg.eigh(whole / np.outer(size, size))
     # Coordinates in which the whole information is 1; directions that the data do not see are left out.
     seen = value > _SEEN * value[-1]
     root = vector[:, seen] / np.sqrt(value[seen]) / size[:, None]
-    variance = (root**2).sum(axis=1)
-    taken, of_expected, of_steps = np.zeros((3, len(size)))
+    variance, (p, k) = (root**2).sum(axis=1), root.shape
+    to_root = (root[:, None, :, None] * root[None, :, None, :]).reshape(p * p, k * k)
+    to_steps, to_variance = root @ root.T, (root[:, :, None] * root[:, None, :]).reshape(p, k * k).T
+    taken, of_expected, of_steps = np.zeros((3, p))
     for piece in pieces:
-        moved = (root.T @ piece.information @ root) @ root.T
-        taken += (moved**2).sum(axis=(0, 1))
-        of_expected += (np.einsum("ar,bra->ba", root, moved) ** 2).sum(axis=0)
-        of_steps += ((piece.gradient @ root @ root.T) ** 2).sum(axis=0)
+        # Information in those coordinates; with the root on one side, and on both.
+        within = piece.information.reshape(-1, p * p) @ to_root
+        squared = within.reshape(-1, k).T @ within.reshape(-1, k)
+        taken += np.einsum("ar,rs,as->a", root, squared, root)
+        of_expected += ((within @ to_variance) ** 2).sum(axis=0)
+        of_steps += ((piece.gradient @ to_steps) ** 2).sum(axis=0)
     left = np.maximum(variance - taken, 0)
     with np.errstate(divide="ignore", invalid="ignore"):
         scatter = of_steps * variance / left
@@ -155,7 +160,7 @@ def spread_of(found: JointEstimate, inflation: float, *, is_level_known: bool = 
     by_noise = np.full(len(found.parameters), inflation * scale)
     by_lines, by_blocks, of_lines, of_blocks = (np.full_like(by_noise, np.nan) for _ in range(4))
     for group in found.groups:
-        own = np.diagonal(inverse_information(2 * group.fit.minimum.information))
+        own = np.diagonal(group.fit.minimum.covariance)
         scatter, of_lines[group.which] = line_scatter(group)
         blocks, of_blocks[group.which] = block_scatter(group)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -179,7 +184,7 @@ def _larger_than_chance(factor: FloatArray, other: FloatArray, degrees: FloatArr
     if not known.any():
         return factor
     raised = factor.copy()
-    count, few = int(known.sum()), float(np.median(degrees[known]))
+    count, few = int(known.sum()), float(medians(degrees[known]))
     if (mean := float(ratio[known].mean())) > _chi_squared(_CHANCE, few * count) / (few * count):
         raised *= mean
     single = _chi_squared(1 - (1 - _CHANCE) / count, degrees[known]) / degrees[known]
@@ -227,7 +232,7 @@ class LikelihoodIntervals:
 def _limits(group: FittedGroup, i: int, factor: float, probability: float) -> tuple[float, float]:
     """Return the limits of one parameter of a group."""
     terms, x = terms_of(group.joint), group.fit.minimum.x
-    covariance = inverse_information(2 * group.fit.minimum.information) * factor
+    covariance = group.fit.minimum.covariance * factor
     reach = float(special.ndtri((1 + probability) / 2))
     a = int(terms.pairs[i, 0])
     is_diagonal = isinstance(group.joint, DiagonalJoint)
@@ -303,7 +308,7 @@ def profile_interval(group: FittedGroup, index: int, factor: float, probability:
         start = group.fit.minimum.x
     best = lowest_minimum(forms, joint, start)
     limit = float(_chi_squared(probability, 1) * factor / 2)
-    error = np.sqrt(np.maximum(np.diagonal(inverse_information(2 * best.information)), 0) * factor)[index]
+    error = np.sqrt(np.maximum(np.diagonal(best.covariance), 0) * factor)[index]
     may_be_rigid = _may_be_rigid(group, int(joint.dofs[index]), factor, probability)
     if may_be_rigid and not of_stiffness:
         # A rigid DOF shows no damping.

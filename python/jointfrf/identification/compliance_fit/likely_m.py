@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from jointfrf.frf.quantiles import medians
 from jointfrf.identification.compliance_fit.manifold import LineData, OnManifold, correlated, weighing
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.kernel.call import call
@@ -47,7 +48,7 @@ def prior_of_m(data: LineData) -> PriorOfM:
     inverse = invert(data.entries.matrix(data.smooth)[:, :n, :n], on_singular="nan")
     size: FloatArray = np.abs(inverse)
     size = np.where(np.isfinite(size), size, 0)
-    size = np.hypot(size, np.median(size, axis=0))
+    size = np.hypot(size, medians(size.T).T)
     size[size == 0] = np.finfo(float).tiny
     # Of FRFs that were not smoothed, nothing is left: their error is the noise.
     left = (abs((data.measured - data.smooth) * data.inverse_std) ** 2).sum() / max(np.count_nonzero(data.used), 1)

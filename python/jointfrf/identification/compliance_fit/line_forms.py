@@ -15,11 +15,14 @@ from jointfrf.kernel.call import call_for_number
 
 __all__ = ["LEAST_GAIN", "FormMinimum", "LineForms", "LineParts", "inverse_information", "minimise_forms"]
 
+#: Directions of less information than this share of the largest are not seen.
+_SEEN = 1e-15
 _STEPS = 100
 #: Levenberg's parameter: first value, factor where a step fails, largest value.
 _FIRST, _RAISED, _LARGEST = 1e-4, 6.0, 1e10
 #: A minimum is found when two steps gain less than this of the squares of one residual.
 LEAST_GAIN = 1e-6
+_TINY = float(np.finfo(float).tiny)
 
 
 class LineForms(NamedTuple):
@@ -49,6 +52,8 @@ class LineForms(NamedTuple):
     def scaled(self, line_weight: FloatArray) -> LineForms:
         """Return the same with each line weighted."""
         w = line_weight
+        if (w == 1).all():
+            return self
         return LineForms(self.compliance, self.weight * w[:, None, None], self.gradient * w[:, None], self.squares * w)
 
     def at(self, entries: ComplexArray) -> tuple[FloatArray, ComplexArray]:
@@ -113,11 +118,17 @@ class FormMinimum:
         return LineParts(gradient, information)
 
     @cached_property
+    def covariance(self) -> FloatArray:
+        """Covariance of the coordinates where the squares are in units of independent noise, shape (p, p)."""
+        return inverse_information(2 * self.information)
+
+    @cached_property
     def _all_parts(self) -> LineParts:
         return self._parts(slice(None))
 
     def _parts(self, lines: slice) -> LineParts:
-        joint, forms = self.joint.on_lines(lines), self.forms.on_slice(lines)
+        whole = lines == slice(None)
+        joint, forms = (self.joint, self.forms) if whole else (self.joint.on_lines(lines), self.forms.on_slice(lines))
         entries = joint.compliance(self.x)
         slope = joint.slope(self.x, entries)
         adjoint = slope.conj().swapaxes(1, 2)
@@ -142,9 +153,12 @@ def inverse_information(information: FloatArray) -> FloatArray:
     ----------
     information : ndarray, shape (..., p, p)
     """
-    size = np.sqrt(np.maximum(np.einsum("...aa->...a", information), np.finfo(float).tiny))
-    outer = size[..., :, None] * size[..., None, :]
-    inverse: FloatArray = np.linalg.pinv(information / outer, hermitian=True) / outer
+    size = np.sqrt(np.maximum(np.einsum("...aa->...a", information), _TINY))
+    value, vector = np.linalg.eigh(information / (size[..., :, None] * size[..., None, :]))
+    length = abs(value)
+    seen = length > _SEEN * length.max(axis=-1, keepdims=True)
+    own = vector / size[..., :, None]
+    inverse: FloatArray = (own * np.where(seen, 1 / np.where(seen, value, 1), 0)[..., None, :]) @ own.swapaxes(-1, -2)
     return inverse
 
 
@@ -215,7 +229,7 @@ def _minimise_general(
     information, gradient = _normal_equations(forms, joint, x, entries, residual)
     for _ in range(_STEPS):
         moving = free & ~(((x <= joint.lower) & (gradient < 0)) | ((x >= joint.upper) & (gradient > 0)))
-        size = np.sqrt(np.maximum(np.diagonal(information), np.finfo(float).tiny))
+        size = np.sqrt(np.maximum(np.diagonal(information), _TINY))
         scaled = (information / np.outer(size, size))[np.ix_(moving, moving)]
         done = not (np.isfinite(scaled).all() and moving.any())
         while not done and damping <= _LARGEST:

@@ -12,12 +12,14 @@ is singular and for a rigid joint, C = 0.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf.frf.bands import line_slices
+from jointfrf.frf.quantiles import medians
 from jointfrf.identification.compliance_fit.line_forms import LineForms
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.kernel.call import call
@@ -59,18 +61,7 @@ class FrfEntries(NamedTuple):
     @classmethod
     def of(cls, n: int, *, reciprocal: bool) -> FrfEntries:
         """Return the entries of n joint DOFs."""
-        if reciprocal:
-            rows, columns = np.triu_indices(2 * n)
-            a, b = np.triu_indices(n)
-        else:
-            rows, columns = (x.ravel() for x in np.indices((2 * n, 2 * n)))
-            a, b = (x.ravel() for x in np.indices((n, n)))
-        units = np.zeros((a.size, n, n))
-        k = np.arange(a.size)
-        units[k, a, b] = 1
-        if reciprocal:
-            units[k, b, a] = 1
-        return cls(n, rows, columns, units)
+        return _entries_of(n, reciprocal)
 
     def take(self, gamma: ComplexArray) -> ComplexArray:
         """Return the entries of gamma, shape (..., q)."""
@@ -90,10 +81,34 @@ class FrfEntries(NamedTuple):
 
     def matrix(self, values: _Numbers) -> _Numbers:
         """Return gamma, or weights, of its entries, shape (n_freq, 2 n, 2 n)."""
-        gamma = np.empty((len(values), 2 * self.n, 2 * self.n), values.dtype)
-        gamma[:, self.columns, self.rows] = values
-        gamma[:, self.rows, self.columns] = values
-        return gamma
+        m = 2 * self.n
+        return values.take(_places(self.n, self.reciprocal), axis=1).reshape(-1, m, m)
+
+
+@lru_cache(maxsize=64)
+def _entries_of(n: int, reciprocal: bool) -> FrfEntries:
+    if reciprocal:
+        rows, columns = np.triu_indices(2 * n)
+        a, b = np.triu_indices(n)
+    else:
+        rows, columns = (x.ravel() for x in np.indices((2 * n, 2 * n)))
+        a, b = (x.ravel() for x in np.indices((n, n)))
+    units = np.zeros((a.size, n, n))
+    k = np.arange(a.size)
+    units[k, a, b] = 1
+    if reciprocal:
+        units[k, b, a] = 1
+    for shared in (rows, columns, units):
+        shared.flags.writeable = False
+    return FrfEntries(n, rows, columns, units)
+
+
+@lru_cache(maxsize=64)
+def _places(n: int, reciprocal: bool) -> NDArray[np.intp]:
+    """Return the entry that stands at each place of gamma, row by row."""
+    entries, place = _entries_of(n, reciprocal), np.empty((2 * n, 2 * n), np.intp)
+    place[entries.columns, entries.rows] = place[entries.rows, entries.columns] = np.arange(entries.rows.size)
+    return place.ravel()
 
 
 class LineData(NamedTuple):
@@ -124,8 +139,8 @@ class LineData(NamedTuple):
     @property
     def own_size(self) -> FloatArray:
         """Median size of the receptances of each DOF, the larger of both sides, shape (n,), m/N."""
-        own = abs(self.smooth[:, self.entries.rows == self.entries.columns])
-        size: FloatArray = np.median(own, axis=0).reshape(2, self.entries.n).max(axis=0)
+        own: FloatArray = np.abs(self.smooth[:, self.entries.rows == self.entries.columns])
+        size: FloatArray = medians(own.T).reshape(2, self.entries.n).max(axis=0)
         return size
 
     def on_lines(self, lines: NDArray[np.intp]) -> LineData:
@@ -212,7 +227,8 @@ def project(target: ComplexArray, data: LineData, c: ComplexArray, start: OnMani
         lines = _lines(part, data.entries.matrix(target[own]), c[own])
         call("project_on_joint", [*sizes, steps, _GAIN, *lines, h[own], m[own], squares[own], line_info[own]])
     bad = line_info != 0
-    h[bad], m[bad], squares[bad] = start.h[bad], start.m[bad], np.inf
+    if bad.any():
+        h[bad], m[bad], squares[bad] = start.h[bad], start.m[bad], np.inf
     return OnManifold(h, m, squares)
 
 

@@ -129,7 +129,7 @@ def _trends(group: FittedGroup, freq_hz: FloatArray, factor: FloatArray) -> list
     p = minimum.x.size
     if lines.size < BLOCKS * (p + 2):
         return []
-    whole = inverse_information(2 * minimum.information)
+    whole = minimum.covariance
     # In parameters, not in coordinates: where only k drifts, c/k does, and c does not.
     theta, slope = group.joint.theta(minimum.x), group.joint.theta_slope(minimum.x)
     parts = np.array_split(lines, BLOCKS)

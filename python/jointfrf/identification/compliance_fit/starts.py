@@ -42,7 +42,7 @@ def starts_on_manifold(data: LineData, c: ComplexArray, steps: int) -> OnManifol
     best = OnManifold(h, np.zeros_like(h), nothing)
     for start in _first_m(gamma, c):
         m = start()
-        if np.array_equal(data.entries.units, data.entries.units.swapaxes(1, 2)):
+        if data.entries.reciprocal:
             m = (m + m.swapaxes(1, 2)) / 2
         m = np.where(np.isfinite(m).all(axis=(1, 2), keepdims=True), m, 0)
         far = np.flatnonzero(~(best.squares <= 4 * np.median(best.squares)) | ~np.isfinite(best.squares))
