@@ -72,6 +72,19 @@ module jointfrf_lanes
       real(dp), intent(inout) :: x(lanes, 2, *)
     end subroutine load_routine
 
+    !> Some numbers of the caller's lines into lanes.
+    !> n      numbers taken of a line
+    !> m      numbers a line
+    !> from   which numbers, shape (n)
+    !> Other arguments as in load.
+    subroutine pick_routine(n, m, from, place, first, n_lines, lines, x)
+      import :: dp, lanes
+      implicit none
+      integer, intent(in) :: n, m, from(n), place(n), first, n_lines
+      real(dp), intent(in) :: lines(2, m, *)
+      real(dp), intent(inout) :: x(lanes, 2, *)
+    end subroutine pick_routine
+
     !> Lanes into the caller's lines. Arguments as in load.
     subroutine store_routine(n, place, first, n_lines, x, lines)
       import :: dp, lanes
@@ -317,6 +330,15 @@ module jointfrf_lanes
       real(dp), intent(out) :: total(n_lines)
     end subroutine weigh_lines_routine
 
+    !> total = total + sum of |re| + |im| over numbers that lie side by side.
+    subroutine add_moduli_routine(n, x, total)
+      import :: dp
+      implicit none
+      integer, intent(in) :: n
+      real(dp), intent(in) :: x(2*n)
+      real(dp), intent(inout) :: total
+    end subroutine add_moduli_routine
+
     !> Short form of ISMM for one joint DOF, without workspace. Arguments as in `inverse_substructuring`, as pairs of
     !> real numbers.
     subroutine invert_joint_lines_routine(transposed, first, n_lines, gamma, k_joint, rcond)
@@ -396,6 +418,7 @@ module jointfrf_lanes
   type :: lane_kernels
     procedure(judge_routine), pointer, nopass :: judge => null()
     procedure(load_routine), pointer, nopass :: load => null()
+    procedure(pick_routine), pointer, nopass :: pick => null()
     procedure(store_routine), pointer, nopass :: store => null()
     procedure(total_routine), pointer, nopass :: total => null()
     procedure(copy_routine), pointer, nopass :: copy => null()
@@ -411,6 +434,7 @@ module jointfrf_lanes
     procedure(superpose_routine), pointer, nopass :: superpose => null()
     procedure(transform_lines_routine), pointer, nopass :: transform_lines => null()
     procedure(weigh_lines_routine), pointer, nopass :: weigh_lines => null()
+    procedure(add_moduli_routine), pointer, nopass :: add_moduli => null()
     procedure(words_routine), pointer, nopass :: random_words => null()
     procedure(draw_routine), pointer, nopass :: normals => null()
     procedure(draw_routine), pointer, nopass :: uniforms => null()

@@ -31,6 +31,7 @@ contains
 
     kernels%judge => judge_lines
     kernels%load => load_lanes
+    kernels%pick => pick_lanes
     kernels%store => store_lanes
     kernels%total => total_of_lanes
     kernels%copy => copy_elements
@@ -46,6 +47,7 @@ contains
     kernels%superpose => superpose
     kernels%transform_lines => transform_lines
     kernels%weigh_lines => weigh_lines
+    kernels%add_moduli => add_moduli
   end subroutine set_kernels
 
   subroutine judge_lines(n_lines, total, line_info, rcond)
