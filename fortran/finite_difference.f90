@@ -2,7 +2,7 @@
 module jointfrf_finite_difference
   use jointfrf_caller_memory, only: caller_memory
   use jointfrf_kinds, only: dp, ip
-  use jointfrf_lanes, only: lane_kernels, real_lines, sparse_rows
+  use jointfrf_lanes, only: lane_kernels, lanes, real_lines, sparse_rows
   use jointfrf_line_layout, only: all_finite, load, load_real, store
   use jointfrf_lines_lapack, only: product_line
   use jointfrf_status, only: line_good, line_not_finite, line_overflow
@@ -13,6 +13,8 @@ module jointfrf_finite_difference
 
   !> Up to this number of products of two weights these are formed once, and a line is one sum of few for each entry.
   integer, parameter :: few_products = 100
+  !> From this share of weights that are not zero on, leaving out the others costs more than it saves.
+  real(dp), parameter :: full_share = 0.4_dp
 
   type, extends(line_operation) :: transformation
     logical :: transposed
@@ -193,6 +195,11 @@ contains
     end do
     rows%start(rows%n + 1) = k
     rows%unused = any(count(has_weight(t), dim=2) == 0)
+    if (size(rows%weight) < full_share*size(t)) return
+    allocate (rows%full(lanes, size(t, 1), (rows%n - 1)/lanes + 1), source=0.0_dp)
+    do j = 1, rows%n
+      rows%full(mod(j - 1, lanes) + 1, :, (j - 1)/lanes + 1) = t(:, j)
+    end do
   end function rows_of_columns
 
   !> Whether a weight is not zero; NaN is not.

@@ -43,6 +43,9 @@ module jointfrf_lanes
     integer, allocatable :: from(:)          !< their columns
     real(dp), allocatable :: weight(:)       !< and values
     logical :: unused = .false.              !< whether a column has no entry
+    !> Where few entries are zero all of them, eight rows side by side: entry (i, j) is full(i - 8 s, j, s + 1), and
+    !> zeros follow the last row.
+    real(dp), allocatable :: full(:, :, :)
   end type sparse_rows
 
   abstract interface

@@ -104,4 +104,5 @@ contains
 #include "condensation.inc"
 #include "modal_superposition.inc"
 #include "transformation.inc"
+#include "full_transformation.inc"
 end module JF_MODULE
