@@ -1,17 +1,24 @@
 !> Receptances of two substructures joined by a complex joint stiffness (2.24)-(2.26), (2.42)-(2.45).
 module jointfrf_coupling
+  use, intrinsic :: iso_c_binding, only: c_f_pointer, c_loc
   use jointfrf_caller_memory, only: caller_memory
   use jointfrf_kinds, only: dp, ip
-  use jointfrf_lanes, only: flat, in_memory, lane_kernels, lanes, largest_solved, largest_product, padded, &
-    real_lines
+  use jointfrf_lanes, only: element_space, flat, in_memory, lane_kernels, lanes, largest_solved, &
+    largest_product, padded, real_lines, rows_in_memory
   use jointfrf_line_layout, only: all_finite, load, store
-  use jointfrf_modification, only: apply_in_lanes, apply_modification, modification_in_lanes, modification_matrices, &
-    plan_modification, take_matrices
+  use jointfrf_lines_lapack, only: product_block
+  use jointfrf_modification, only: apply_in_lanes, apply_modification, find_forces, forces_in_lanes, &
+    modification_in_lanes, modification_matrices, plan_forces, plan_modification, take_matrices
   use jointfrf_status, only: line_not_finite
   use jointfrf_sweep, only: line_operation, line_space, run_sweep, worth_a_plan
   implicit none
   private
   public :: couple
+
+  !> From this number of DOFs of the assembly on, products are faster line by line with the BLAS than in lanes,
+  integer, parameter :: fewest_large = 48
+  !> but for a single joint DOF. More elements than these, of which a system for the forces consists, leave the caches.
+  integer, parameter :: most_in_system = 12288
 
   type, extends(line_operation) :: coupling
     logical :: transposed
@@ -29,6 +36,15 @@ module jointfrf_coupling
     procedure :: line => couple_one
     procedure :: line_block => couple_block
   end type coupling
+
+  !> Many DOFs: only the forces in the joint are found in lanes.
+  type, extends(coupling) :: large_coupling
+    type(forces_in_lanes) :: forces
+    integer, allocatable :: in_a(:), place_a(:)            !< rows j of A: which numbers of a line, and where in lanes
+    integer, allocatable :: in_b(:), place_b(:)            !< rows k of B
+  contains
+    procedure :: line_block => couple_large_block
+  end type large_coupling
 
 contains
 
@@ -52,27 +68,49 @@ contains
     real(dp), contiguous, intent(out) :: rcond(:)
     integer(ip), intent(out) :: info
     type(caller_memory), intent(in), optional :: memory
-    type(coupling) :: operation
-    integer :: n_a, n_b, n, n_j
+    type(coupling) :: whole
+    type(large_coupling) :: large
+    logical :: planned
+    integer :: n, n_j
 
-    n_a = size(h_a, 1)
-    n_b = size(h_b, 1)
-    n = n_a + n_b
+    n = size(h_a, 1) + size(h_b, 1)
     n_j = size(dofs_a)
-    operation%transposed = transposed
-    operation%n_a = n_a
-    operation%n_b = n_b
-    operation%n_j = n_j
-    operation%h_a => h_a
-    operation%h_b => h_b
-    operation%k_joint => k_joint
-    operation%dofs_a => dofs_a
-    operation%dofs_b => dofs_b
-    operation%result => h_c
-    operation%flops = 8.0_dp*n_j*(real(n, dp)**2 + 2.0_dp*real(n_j, dp)*n)
-    if (worth_a_plan(size(h_a, 3), memory) .and. n_j >= 1 .and. n_j <= largest_solved .and. n <= largest_product) &
-      call plan_coupling(operation)
-    call run_sweep(operation, size(h_a, 3, kind=ip), line_info, rcond, info, memory)
+    planned = worth_a_plan(size(h_a, 3), memory) .and. n_j >= 1 .and. n_j <= largest_solved
+    if (planned .and. n_j > 1 .and. n >= fewest_large .and. n_j*(n_j + n) <= most_in_system) then
+      call set(large)
+      call plan_large_coupling(large)
+      call run_sweep(large, size(h_a, 3, kind=ip), line_info, rcond, info)
+    else
+      call set(whole)
+      if (planned .and. n <= largest_product) call plan_coupling(whole)
+      call run_sweep(whole, size(h_a, 3, kind=ip), line_info, rcond, info, memory)
+    end if
+
+  contains
+
+    subroutine set(operation)
+      class(coupling), intent(inout) :: operation
+
+      operation%transposed = transposed
+      operation%n_a = size(h_a, 1)
+      operation%n_b = size(h_b, 1)
+      operation%n_j = n_j
+      operation%h_a => h_a
+      operation%h_b => h_b
+      operation%k_joint => k_joint
+      operation%dofs_a => dofs_a
+      operation%dofs_b => dofs_b
+      operation%result => h_c
+      operation%flops = 8.0_dp*n_j*(real(n, dp)**2 + 2.0_dp*real(n_j, dp)*n)
+      operation%n_hint = padded(operation%n_j)
+      operation%a_pairs => real_lines(h_a)
+      operation%b_pairs => real_lines(h_b)
+      operation%k_pairs => real_lines(k_joint)
+      operation%result_pairs => real_lines(h_c)
+      call operation%reads(operation%a_pairs)
+      call operation%reads(operation%b_pairs)
+      call operation%reads(operation%k_pairs)
+    end subroutine set
   end subroutine couple
 
   subroutine plan_coupling(operation)
@@ -83,25 +121,17 @@ contains
     n = n_a + operation%n_b
     call plan_modification(n, operation%n_j, operation%plan)
     operation%n_element = operation%plan%n_element
-    operation%n_hint = padded(operation%n_j)
-    operation%a_pairs => real_lines(operation%h_a)
-    operation%b_pairs => real_lines(operation%h_b)
-    operation%k_pairs => real_lines(operation%k_joint)
-    operation%result_pairs => real_lines(operation%result)
-    call operation%reads(operation%a_pairs)
-    call operation%reads(operation%b_pairs)
-    call operation%reads(operation%k_pairs)
     associate (plan => operation%plan, j => operation%dofs_a, k => n_a + operation%dofs_b)
       operation%a_place = in_memory(operation%transposed, plan%h(:n_a, :n_a))
       operation%b_place = in_memory(operation%transposed, plan%h(n_a + 1:, n_a + 1:))
-      operation%k_place = in_memory(operation%transposed, plan%d)
+      operation%k_place = in_memory(operation%transposed, plan%forces%d)
       operation%h_place = in_memory(operation%transposed, plan%h)
       operation%apart = [flat(plan%h(:n_a, n_a + 1:)), flat(plan%h(n_a + 1:, :n_a))]
-      operation%of_a = [flat(plan%columns(:n_a, :)), flat(plan%rows(:, :n_a))]
+      operation%of_a = [flat(plan%columns(:n_a, :)), flat(plan%forces%rows(:, :n_a))]
       operation%from_a = [flat(plan%h(:n_a, j)), flat(plan%h(j, :n_a))]
-      operation%of_b = [flat(plan%columns(n_a + 1:, :)), flat(plan%rows(:, n_a + 1:))]
+      operation%of_b = [flat(plan%columns(n_a + 1:, :)), flat(plan%forces%rows(:, n_a + 1:))]
       operation%from_b = [flat(plan%h(n_a + 1:, k)), flat(plan%h(k, n_a + 1:))]
-      operation%relative = flat(plan%h_mm)
+      operation%relative = flat(plan%forces%h_mm)
       operation%relative_a = flat(plan%h(j, j))
       operation%relative_b = flat(plan%h(k, k))
     end associate
@@ -132,6 +162,141 @@ contains
       call kernels%judge(n_lines, total, line_info, rcond)
     end associate
   end subroutine couple_block
+
+  subroutine plan_large_coupling(operation)
+    type(large_coupling), intent(inout) :: operation
+    integer :: n_a, n_b, n_j
+    type(element_space) :: room
+
+    n_a = operation%n_a
+    n_b = operation%n_b
+    n_j = operation%n_j
+    call plan_forces(n_a + n_b, n_j, room, operation%forces)
+    operation%n_element = room%taken
+    associate (forces => operation%forces, number_a => numbers(operation%transposed, n_a), &
+               number_b => numbers(operation%transposed, n_b))
+      operation%k_place = in_memory(operation%transposed, forces%d)
+      operation%place_a = flat(forces%rows(:, :n_a))
+      operation%place_b = flat(forces%rows(:, n_a + 1:))
+      operation%in_a = flat(number_a(operation%dofs_a, :))
+      operation%in_b = flat(number_b(operation%dofs_b, :))
+      operation%relative = flat(forces%h_mm)
+      operation%relative_a = flat(forces%rows(:, operation%dofs_a))
+      operation%relative_b = flat(forces%rows(:, n_a + operation%dofs_b))
+    end associate
+
+  contains
+
+    !> Which number of a stored line is entry (i, j) of the matrix.
+    pure function numbers(transposed, n) result(number)
+      logical, intent(in) :: transposed
+      integer, intent(in) :: n
+      integer :: number(n, n), i, j
+
+      do j = 1, n
+        do i = 1, n
+          number(i, j) = merge(n*(i - 1) + j, n*(j - 1) + i, transposed)
+        end do
+      end do
+    end function numbers
+  end subroutine plan_large_coupling
+
+  !> Forces in the joint in lanes; then, line by line and where the result lies, their products with columns of H_A and
+  !> H_B by the BLAS.
+  subroutine couple_large_block(self, kernels, first, n_lines, space, line_info, rcond)
+    class(large_coupling), intent(in) :: self
+    type(lane_kernels), intent(in) :: kernels
+    integer, intent(in) :: first, n_lines
+    type(line_space), target, intent(inout) :: space
+    integer(ip), intent(out) :: line_info(n_lines)
+    real(dp), intent(out) :: rcond(n_lines)
+    complex(dp), pointer, contiguous :: force(:, :)
+    real(dp), pointer, contiguous :: force_pairs(:, :, :)
+    real(dp) :: rcond_lanes(lanes), total(lanes)
+    integer :: force_row(self%n_j), place(self%n_j*(self%n_a + self%n_b)), n, i, l
+
+    n = self%n_a + self%n_b
+    associate (x => space%x)
+      call kernels%pick(size(self%in_a), self%n_a**2, self%in_a, self%place_a, first, n_lines, self%a_pairs, x)
+      call kernels%pick(size(self%in_b), self%n_b**2, self%in_b, self%place_b, first, n_lines, self%b_pairs, x)
+      call kernels%load(size(self%k_place), self%k_place, first, n_lines, self%k_pairs, x)
+      call kernels%combine(size(self%relative), 1.0_dp, self%relative_a, 1.0_dp, self%relative_b, self%relative, x)
+      call find_forces(self%forces, kernels, x, space%hint, force_row, rcond_lanes, space%ahead)
+      call rows_in_memory(self%transposed, force_row, n, place)
+      call c_f_pointer(c_loc(x(1, 1, self%forces%right_before + 1)), force_pairs, [2, self%n_j*n, lanes])
+      call kernels%store(size(place), place, 1, n_lines, x, force_pairs)
+      call c_f_pointer(c_loc(force_pairs), force, [self%n_j*n, lanes])
+      total = 0
+      do l = 1, n_lines
+        i = first + l - 1
+        call join(self%transposed, self%n_a, self%n_b, self%n_j, self%h_a(:, :, i), self%h_b(:, :, i), self%dofs_a, &
+                  self%dofs_b, force(:, l), space%z, self%result(:, :, i))
+        call kernels%add_moduli(n*n, self%result_pairs(:, :, i), total(l))
+      end do
+      rcond = rcond_lanes(:n_lines)
+      call kernels%judge(n_lines, total, line_info, rcond)
+    end associate
+  end subroutine couple_large_block
+
+  !> The assembly from columns j of H_A, columns k of H_B, and forces in the joint that answer to their rows, unlike in
+  !> (2.26) with the same sign on either side: each of the four blocks is one product.
+  !> force     shape (n_j, n_a + n_b), or (n_a + n_b, n_j) where transposed
+  !> columns   workspace, n_j*max(n_a, n_b)
+  subroutine join(transposed, n_a, n_b, n_j, h_a, h_b, dofs_a, dofs_b, force, columns, h)
+    logical, intent(in) :: transposed
+    integer, intent(in) :: n_a, n_b, n_j
+    complex(dp), intent(in) :: h_a(n_a, n_a), h_b(n_b, n_b), force(n_j*(n_a + n_b))
+    integer(ip), intent(in) :: dofs_a(n_j), dofs_b(n_j)
+    complex(dp), intent(inout) :: columns(*)
+    complex(dp), intent(inout) :: h(n_a + n_b, n_a + n_b)
+
+    h(:n_a, :n_a) = h_a
+    h(n_a + 1:, n_a + 1:) = h_b
+    call take_columns(transposed, h_a, dofs_a, columns)
+    call add_product(n_a, 1, n_a, 1, -1.0_dp, 1.0_dp)
+    call add_product(n_a, 1, n_b, n_a + 1, 1.0_dp, 0.0_dp)
+    call take_columns(transposed, h_b, dofs_b, columns)
+    call add_product(n_b, n_a + 1, n_a, 1, 1.0_dp, 0.0_dp)
+    call add_product(n_b, n_a + 1, n_b, n_a + 1, -1.0_dp, 1.0_dp)
+
+  contains
+
+    !> One block = kept block + factor columns forces: n_out responses from number `out` on to n_in forces from `in` on.
+    subroutine add_product(n_out, out, n_in, in, factor, kept)
+      integer, intent(in) :: n_out, out, n_in, in
+      real(dp), intent(in) :: factor, kept
+      integer :: n
+
+      n = n_a + n_b
+      if (transposed) then
+        call product_block(n_in, n_out, n_j, factor, force(in), n, columns, n_j, kept, h(in, out), n)
+      else
+        call product_block(n_out, n_in, n_j, factor, columns, n_out, force((in - 1)*n_j + 1), n_j, kept, h(out, in), n)
+      end if
+    end subroutine add_product
+  end subroutine join
+
+  !> Some columns of a matrix, all as the caller stores it.
+  pure subroutine take_columns(transposed, h, dofs, columns)
+    logical, intent(in) :: transposed
+    complex(dp), contiguous, intent(in) :: h(:, :)
+    integer(ip), contiguous, intent(in) :: dofs(:)
+    complex(dp), intent(inout) :: columns(*)
+    integer :: i, j, n_j
+
+    n_j = size(dofs)
+    if (transposed) then
+      do i = 1, size(h, 2)
+        do j = 1, n_j
+          columns((i - 1)*n_j + j) = h(dofs(j), i)
+        end do
+      end do
+    else
+      do j = 1, n_j
+        columns((j - 1)*size(h, 1) + 1:j*size(h, 1)) = h(:, dofs(j))
+      end do
+    end if
+  end subroutine take_columns
 
   subroutine couple_one(self, i, space, line_info, rcond)
     class(coupling), intent(in) :: self

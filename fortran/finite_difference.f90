@@ -2,7 +2,7 @@
 module jointfrf_finite_difference
   use jointfrf_caller_memory, only: caller_memory
   use jointfrf_kinds, only: dp, ip
-  use jointfrf_lanes, only: has_weight, lane_kernels, real_lines, rows_of_columns, sparse_rows
+  use jointfrf_lanes, only: has_weight, lane_kernels, lanes, real_lines, rows_of_columns, sparse_rows
   use jointfrf_line_layout, only: all_finite, load, load_real, store
   use jointfrf_lines_lapack, only: product_line
   use jointfrf_status, only: line_good, line_not_finite, line_overflow
@@ -13,6 +13,8 @@ module jointfrf_finite_difference
 
   !> Up to this number of products of two weights these are formed once, and a line is one sum of few for each entry.
   integer, parameter :: few_products = 100
+  !> From this share of weights that are not zero on, leaving out the others costs more than it saves.
+  real(dp), parameter :: full_share = 0.4_dp
 
   type, extends(line_operation) :: transformation
     logical :: transposed
@@ -116,11 +118,11 @@ contains
     operation%new_pairs => real_lines(operation%result)
     call operation%reads(operation%h_pairs)
     if (operation%transposed) then
-      operation%slow = rows_of_columns(operation%t_out)
-      operation%fast = rows_of_columns(operation%t_in)
+      operation%slow = weights_of_columns(operation%t_out)
+      operation%fast = weights_of_columns(operation%t_in)
     else
-      operation%slow = rows_of_columns(transpose(operation%t_in))
-      operation%fast = rows_of_columns(transpose(operation%t_out))
+      operation%slow = weights_of_columns(transpose(operation%t_in))
+      operation%fast = weights_of_columns(transpose(operation%t_out))
     end if
     if (size(operation%slow%weight)*size(operation%fast%weight) <= few_products) &
       operation%both = both_at_once(operation%transposed, operation%slow, operation%fast, size(operation%h, 1))
@@ -171,6 +173,20 @@ contains
       k = k + 1
     end subroutine add_product
   end function both_at_once
+
+  !> The columns of a matrix as the kernels take them: what is not zero, and where that is much of it, all.
+  pure function weights_of_columns(t) result(rows)
+    real(dp), intent(in) :: t(:, :)
+    type(sparse_rows) :: rows
+    integer :: j
+
+    rows = rows_of_columns(t)
+    if (size(rows%weight) < full_share*size(t)) return
+    allocate (rows%full(lanes, size(t, 1), (rows%n - 1)/lanes + 1), source=0.0_dp)
+    do j = 1, rows%n
+      rows%full(mod(j - 1, lanes) + 1, :, (j - 1)/lanes + 1) = t(:, j)
+    end do
+  end function weights_of_columns
 
   subroutine transform_block(self, kernels, first, n_lines, space, line_info, rcond)
     class(transformation), intent(in) :: self

@@ -43,6 +43,9 @@ module jointfrf_lanes
     integer, allocatable :: from(:)          !< their columns
     real(dp), allocatable :: weight(:)       !< and values
     logical :: unused = .false.              !< whether a column has no entry
+    !> Where few entries are zero all of them, eight rows side by side: entry (i, j) is full(i - 8 s, j, s + 1), and
+    !> zeros follow the last row.
+    real(dp), allocatable :: full(:, :, :)
   end type sparse_rows
 
   abstract interface
@@ -71,6 +74,19 @@ module jointfrf_lanes
       real(dp), intent(in) :: lines(2, n, *)
       real(dp), intent(inout) :: x(lanes, 2, *)
     end subroutine load_routine
+
+    !> Some numbers of the caller's lines into lanes.
+    !> n      numbers taken of a line
+    !> m      numbers a line
+    !> from   which numbers, shape (n)
+    !> Other arguments as in load.
+    subroutine pick_routine(n, m, from, place, first, n_lines, lines, x)
+      import :: dp, lanes
+      implicit none
+      integer, intent(in) :: n, m, from(n), place(n), first, n_lines
+      real(dp), intent(in) :: lines(2, m, *)
+      real(dp), intent(inout) :: x(lanes, 2, *)
+    end subroutine pick_routine
 
     !> Lanes into the caller's lines. Arguments as in load.
     subroutine store_routine(n, place, first, n_lines, x, lines)
@@ -344,6 +360,15 @@ module jointfrf_lanes
       real(dp), intent(inout) :: x(lanes, 2, *)
     end subroutine propagate_routine
 
+    !> total = total + sum of |re| + |im| over numbers that lie side by side.
+    subroutine add_moduli_routine(n, x, total)
+      import :: dp
+      implicit none
+      integer, intent(in) :: n
+      real(dp), intent(in) :: x(2*n)
+      real(dp), intent(inout) :: total
+    end subroutine add_moduli_routine
+
     !> Short form of ISMM for one joint DOF, without workspace. Arguments as in `inverse_substructuring`, as pairs of
     !> real numbers.
     subroutine invert_joint_lines_routine(transposed, first, n_lines, gamma, k_joint, rcond)
@@ -423,6 +448,7 @@ module jointfrf_lanes
   type :: lane_kernels
     procedure(judge_routine), pointer, nopass :: judge => null()
     procedure(load_routine), pointer, nopass :: load => null()
+    procedure(pick_routine), pointer, nopass :: pick => null()
     procedure(store_routine), pointer, nopass :: store => null()
     procedure(total_routine), pointer, nopass :: total => null()
     procedure(copy_routine), pointer, nopass :: copy => null()
@@ -440,6 +466,7 @@ module jointfrf_lanes
     procedure(weigh_lines_routine), pointer, nopass :: weigh_lines => null()
     procedure(weigh_rows_routine), pointer, nopass :: weigh_rows => null()
     procedure(propagate_routine), pointer, nopass :: propagate => null()
+    procedure(add_moduli_routine), pointer, nopass :: add_moduli => null()
     procedure(words_routine), pointer, nopass :: random_words => null()
     procedure(draw_routine), pointer, nopass :: normals => null()
     procedure(draw_routine), pointer, nopass :: uniforms => null()

@@ -8,7 +8,7 @@ module jointfrf_lines_lapack
   use jointfrf_sweep, only: line_space
   implicit none
   private
-  public :: solve_line, invert_line, product_line, one_norm, room_to_solve, room_to_invert
+  public :: solve_line, invert_line, product_block, product_line, one_norm, room_to_solve, room_to_invert
 
   complex(dp), parameter :: one = (1.0_dp, 0.0_dp), zero = (0.0_dp, 0.0_dp)
   integer(c_size_t), parameter :: one_char = 1_c_size_t
@@ -198,6 +198,20 @@ contains
     call zgemm(trans_a, trans_b, m, n, k, factor*one, a, size(a, 1, kind=blas_ip), b, size(b, 1, kind=blas_ip), &
                one, c, m, one_char, one_char)
   end subroutine product_line
+
+  !> C = kept C + factor A B for blocks of larger matrices, with zgemm. What is kept 0 times need not be set.
+  !> m, n, k             A is m by k, B is k by n
+  !> ld_a, ld_b, ld_c    leading dimensions
+  subroutine product_block(m, n, k, factor, a, ld_a, b, ld_b, kept, c, ld_c)
+    integer, intent(in) :: m, n, k, ld_a, ld_b, ld_c
+    real(dp), intent(in) :: factor, kept
+    complex(dp), intent(in) :: a(ld_a, *), b(ld_b, *)
+    complex(dp), intent(inout) :: c(ld_c, *)
+
+    if (min(m, n) == 0) return
+    call zgemm('N', 'N', int(m, blas_ip), int(n, blas_ip), int(k, blas_ip), factor*one, a, int(ld_a, blas_ip), b, &
+               int(ld_b, blas_ip), kept*one, c, int(ld_c, blas_ip), one_char, one_char)
+  end subroutine product_block
 
   !> Largest column sum of |re| + |im|: within a factor 2 of the 1-norm, and no square root, which would cost as much as
   !> the inversion of a small matrix.

@@ -15,6 +15,7 @@ module jointfrf_modification
   public :: modify, find_modification
   public :: modification_matrices, take_matrices, apply_modification
   public :: modification_in_lanes, plan_modification, apply_in_lanes
+  public :: forces_in_lanes, plan_forces, find_forces
 
   !> The matrices of one line of n DOFs that is modified at n_m coordinates.
   type :: modification_matrices
@@ -27,14 +28,24 @@ module jointfrf_modification
     complex(dp), pointer, contiguous :: forces(:, :)     !< (I + D H_mm)^-1 D rows
   end type modification_matrices
 
-  !> Where the matrices of a modification lie in lanes: H, D, [H_mm, rows], columns, and the system
-  !> [I + D H_mm, D rows], which is solved for the forces.
-  type :: modification_in_lanes
-    integer :: n, n_m, n_element
-    integer, allocatable :: h(:, :), d(:, :), h_mm(:, :), rows(:, :), columns(:, :)
-    complex(dp), allocatable :: unit_value(:)      !< [I, 0], row by row
-    integer, allocatable :: d_row(:), right_row(:), product_row(:), product(:), in_system(:), columns_row(:), h_row(:)
+  !> Where the matrices lie in lanes from which the forces of a modification are found: D, [H_mm, rows], and the system
+  !> [I + D H_mm, D rows].
+  type :: forces_in_lanes
+    integer :: n, n_m
+    integer, allocatable :: d(:, :), h_mm(:, :), rows(:, :)
+    integer :: right_before                        !< the element before [H_mm, rows], free when the forces are found
+    integer, allocatable :: constant(:)            !< what the system begins with, [I, 0], and numbers without meaning
+    complex(dp), allocatable :: constant_value(:)
+    integer, allocatable :: d_row(:), right_row(:), panel_row(:), rest_row(:)
+    integer :: n_rest                              !< columns of the system beside its first two
     integer :: system_before                       !< the element before the system
+  end type forces_in_lanes
+
+  !> The same, H, and columns.
+  type :: modification_in_lanes
+    type(forces_in_lanes) :: forces
+    integer :: n_element
+    integer, allocatable :: h(:, :), columns(:, :), columns_row(:), h_row(:)
   end type modification_in_lanes
 
   type, extends(line_operation) :: modification
@@ -105,8 +116,8 @@ contains
     call operation%reads(operation%d_pairs)
     associate (plan => operation%plan, dofs => operation%dofs)
       operation%h_place = in_memory(operation%transposed, plan%h)
-      operation%d_place = in_memory(operation%transposed, plan%d)
-      operation%taken = [flat(plan%columns), flat(plan%rows), flat(plan%h_mm)]
+      operation%d_place = in_memory(operation%transposed, plan%forces%d)
+      operation%taken = [flat(plan%columns), flat(plan%forces%rows), flat(plan%forces%h_mm)]
       operation%taken_from = [flat(plan%h(:, dofs)), flat(plan%h(dofs, :)), flat(plan%h(dofs, dofs))]
     end associate
   end subroutine plan_block
@@ -135,32 +146,64 @@ contains
   subroutine plan_modification(n, n_m, plan)
     integer, intent(in) :: n, n_m
     type(modification_in_lanes), intent(out) :: plan
-    integer :: right(n_m, n_m + n), product(n_m, n_m + n), whole(n_m, n_m + n), i
     type(element_space) :: room
+
+    plan%h = room%matrix(n, n)
+    plan%columns = room%matrix(n, n_m)
+    plan%h_row = row_starts(plan%h)
+    plan%columns_row = row_starts(plan%columns)
+    call plan_forces(n, n_m, room, plan%forces)
+    plan%n_element = room%taken
+  end subroutine plan_modification
+
+  !> The product of D and [H_mm, rows] is added up where the system lies, whose columns are in two pieces, with one more
+  !> between them where n_m is odd.
+  subroutine plan_forces(n, n_m, room, plan)
+    integer, intent(in) :: n, n_m
+    type(element_space), intent(inout) :: room
+    type(forces_in_lanes), intent(out) :: plan
+    integer :: right(n_m, padded(n_m) + n), system(n_m, n_m + n), i
 
     plan%n = n
     plan%n_m = n_m
-    plan%h = room%matrix(n, n)
     plan%d = room%matrix(n_m, n_m)
-    right = room%matrix(n_m, n_m + n)
+    right = room%matrix(n_m, padded(n_m) + n)
+    plan%right_before = right(1, 1) - 1
     allocate (plan%h_mm, source=right(:, :n_m))
-    allocate (plan%rows, source=right(:, n_m + 1:))
-    product = room%matrix(n_m, n_m + n)
-    plan%columns = room%matrix(n, n_m)
-    whole = room%system(n_m, n, plan%system_before)
-    plan%n_element = room%taken
-    plan%product = in_memory(.true., product)
-    plan%in_system = in_memory(.true., whole)
-    allocate (plan%unit_value(size(product)), source=(0.0_dp, 0.0_dp))
-    do i = 1, n_m
-      plan%unit_value((i - 1)*(n_m + n) + i) = 1
-    end do
+    allocate (plan%rows, source=right(:, padded(n_m) + 1:))
+    system = room%system(n_m, n, plan%system_before)
+    plan%n_rest = padded(n_m) - 2 + n
     plan%d_row = row_starts(plan%d)
     plan%right_row = row_starts(right)
-    plan%product_row = row_starts(product)
-    plan%columns_row = row_starts(plan%columns)
-    plan%h_row = row_starts(plan%h)
-  end subroutine plan_modification
+    allocate (plan%panel_row(n_m), plan%rest_row(n_m))
+    plan%panel_row = system(:, 1) - 1
+    plan%rest_row = system(:, n_m + 1) - 1 - (padded(n_m) - 2)
+    plan%constant = [(plan%panel_row + i, i=1, 2), (plan%rest_row + i, i=1, plan%n_rest), &
+                     flat(right(:, n_m + 1:padded(n_m)))]
+    allocate (plan%constant_value(size(plan%constant)), source=(0.0_dp, 0.0_dp))
+    do i = 1, n_m
+      plan%constant_value((i - 1)*n_m + i) = 1
+    end do
+  end subroutine plan_forces
+
+  !> (I + D H_mm)^-1 D rows in lanes, once D, H_mm and rows are there.
+  !> force_row   the element before each row of the forces
+  subroutine find_forces(plan, kernels, x, hint, force_row, rcond, ahead)
+    type(forces_in_lanes), intent(in) :: plan
+    type(lane_kernels), intent(in) :: kernels
+    real(dp), contiguous, intent(inout) :: x(:, :, :)
+    integer, contiguous, intent(inout) :: hint(:)
+    integer, intent(out) :: force_row(plan%n_m)
+    real(dp), intent(out) :: rcond(lanes)
+    type(lookahead), intent(inout) :: ahead
+    integer :: n_m
+
+    n_m = plan%n_m
+    call kernels%fill(size(plan%constant), plan%constant_value, plan%constant, x)
+    call kernels%product(n_m, 2, n_m, 1.0_dp, plan%d_row, plan%right_row, plan%panel_row, x)
+    call kernels%product(n_m, plan%n_rest, n_m, 1.0_dp, plan%d_row, plan%right_row + 2, plan%rest_row, x)
+    call kernels%solve(n_m, plan%n, n_m, plan%system_before, x, hint, force_row, rcond, ahead)
+  end subroutine find_forces
 
   !> `apply_modification` in lanes, once H, D, H_mm, rows and columns are there.
   subroutine apply_in_lanes(plan, kernels, x, hint, rcond, ahead)
@@ -170,14 +213,11 @@ contains
     integer, contiguous, intent(inout) :: hint(:)
     real(dp), intent(out) :: rcond(lanes)
     type(lookahead), intent(inout) :: ahead
-    integer :: force_row(plan%n_m), n, n_m
+    integer :: force_row(plan%forces%n_m), n, n_m
 
-    n = plan%n
-    n_m = plan%n_m
-    call kernels%fill(size(plan%product), plan%unit_value, plan%product, x)
-    call kernels%product(n_m, n_m + n, n_m, 1.0_dp, plan%d_row, plan%right_row, plan%product_row, x)
-    call kernels%copy(size(plan%product), 1.0_dp, plan%product, plan%in_system, x)
-    call kernels%solve(n_m, n, n_m, plan%system_before, x, hint, force_row, rcond, ahead)
+    n = plan%forces%n
+    n_m = plan%forces%n_m
+    call find_forces(plan%forces, kernels, x, hint, force_row, rcond, ahead)
     call kernels%product(n, n, n_m, -1.0_dp, plan%columns_row, force_row, plan%h_row, x)
   end subroutine apply_in_lanes
 

@@ -32,6 +32,7 @@ contains
 
     kernels%judge => judge_lines
     kernels%load => load_lanes
+    kernels%pick => pick_lanes
     kernels%store => store_lanes
     kernels%total => total_of_lanes
     kernels%copy => copy_elements
@@ -49,6 +50,7 @@ contains
     kernels%weigh_lines => weigh_lines
     kernels%weigh_rows => weigh_rows_of_lanes
     kernels%propagate => propagate_noise
+    kernels%add_moduli => add_moduli
   end subroutine set_kernels
 
   subroutine judge_lines(n_lines, total, line_info, rcond)
@@ -106,4 +108,5 @@ contains
 #include "modal_superposition.inc"
 #include "transformation.inc"
 #include "noise_propagation.inc"
+#include "full_transformation.inc"
 end module JF_MODULE

@@ -3,7 +3,8 @@ program test_compliance
   use testing, only: assembled, check, check_bad_line, check_close, check_same, dp, finish, infinity, inverse, ip, &
     normal, not_a_number, qp, quad_inverse, random_lines, random_real, random_regular, seed, set_threads, &
     thesis_chain, transposed, two_pi, uniform
-  use jointfrf_compliance, only: compliance_covariance, compliance_factors, joint_compliance
+  use jointfrf_compliance, only: joint_compliance
+  use jointfrf_compliance_noise, only: compliance_covariance, compliance_factors
   use jointfrf_engine, only: engine_automatic, engine_lapack, set_engine
   implicit none
   real(dp), parameter :: tolerance = 1.0e-11_dp

@@ -11,6 +11,7 @@ program test_coupling
   call against_reference(5, 4, [4_ip, 1_ip, 5_ip], [2_ip, 4_ip, 1_ip])
   call against_reference(2, 6, [2_ip, 1_ip], [1_ip, 6_ip])
   call against_reference(1, 1, [1_ip], [1_ip])
+  call many_dofs()
   call free_joint_dofs()
   call nothing()
   call bad_lines()
@@ -56,6 +57,32 @@ contains
     call check_same(transposed(h_c_t), h_c, 'assembly, transposed')
     call check_same(rcond_t, rcond, 'rcond knows no order of storage')
   end subroutine against_reference
+
+  !> So many that products are done line by line, in whole blocks and one that is not full; joint DOFs anywhere.
+  subroutine many_dofs()
+    integer, parameter :: n_a = 31, n_b = 22, n_j = 5, lines = 11
+    integer(ip), parameter :: dofs_a(n_j) = [31_ip, 2_ip, 17_ip, 1_ip, 30_ip]
+    integer(ip), parameter :: dofs_b(n_j) = [1_ip, 22_ip, 9_ip, 8_ip, 3_ip]
+    complex(dp) :: h_a(n_a, n_a, lines), h_b(n_b, n_b, lines), k(n_j, n_j, lines)
+    complex(dp) :: h_c(n_a + n_b, n_a + n_b, lines), h_c_t(n_a + n_b, n_a + n_b, lines)
+    integer(ip) :: line_info(lines), info
+    real(dp) :: rcond(lines), rcond_t(lines)
+
+    h_a = random_regular(n_a, lines)
+    h_b = random_regular(n_b, lines)
+    k = random_lines(n_j, n_j, lines)
+    call couple(.false., h_a, h_b, k, dofs_a, dofs_b, h_c, line_info, rcond, info)
+    call check(info == 0 .and. all(line_info == 0), 'many DOFs: good')
+    call check_close(h_c, assembled(h_a, h_b, k, dofs_a, dofs_b), tolerance, 'many DOFs')
+    call couple(.true., transposed(h_a), transposed(h_b), transposed(k), dofs_a, dofs_b, h_c_t, line_info, rcond_t, &
+                info)
+    call check_close(transposed(h_c_t), h_c, tolerance, 'many DOFs, transposed')
+    call check_same(rcond_t, rcond, 'many DOFs: rcond knows no order of storage')
+    h_a(30, 7, 9) = not_a_number()
+    call couple(.false., h_a, h_b, k, dofs_a, dofs_b, h_c_t, line_info, rcond, info)
+    call check(info == 1 .and. line_info(9) == -1, 'many DOFs: NaN that no joint DOF sees')
+    call check_same(h_c_t(:, :, :8), h_c(:, :, :8), 'many DOFs: the other lines')
+  end subroutine many_dofs
 
   !> Joint DOFs without stiffness are allowed, though (2.25) inverts K*.
   subroutine free_joint_dofs()

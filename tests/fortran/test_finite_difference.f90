@@ -13,7 +13,12 @@ program test_finite_difference
   call polynomial([0.03_dp, -0.01_dp, 0.005_dp])
   call polynomial([0.1_dp, 0.2_dp, 0.4_dp, 0.7_dp])
   call polynomial([-0.05_dp, -0.03_dp, 0.0_dp, 0.01_dp, 0.04_dp])
-  call any_transformation()
+  call any_transformation(2, 4, 3, 5, 1)
+  call any_transformation(6, 9, 6, 12, 1)
+  call any_transformation(9, 17, 13, 11, 1)
+  call any_transformation(16, 24, 1, 40, 1)
+  call any_transformation(12, 25, 8, 7, 2)
+  call any_transformation(12, 25, 8, 7, 5)
   call nothing()
   call bad_lines()
   call scales()
@@ -67,17 +72,26 @@ contains
     call check_same(transposed(h_new_t), h_new, 'polynomial, transposed')
   end subroutine polynomial
 
-  !> H_new = T_out H T_in^T with all four sizes different.
-  subroutine any_transformation()
+  !> H_new = T_out H T_in^T. Weights of which few are zero, and of which most are, go ways of their own, and so do sums
+  !> of four rows, of eight entries, and what is left of them.
+  !> empty   every how many weights of T_out one is not zero
+  subroutine any_transformation(n_out, m_out, n_in, m_in, empty)
+    integer, intent(in) :: n_out, m_out, n_in, m_in, empty
     integer, parameter :: lines = 3
-    complex(dp) :: h(4, 5, lines), h_new(2, 3, lines), h_new_t(3, 2, lines), expected(2, 3, lines)
-    real(dp) :: t_out(2, 4), t_in(3, 5), rcond(lines)
+    complex(dp) :: h(m_out, m_in, lines), h_new(n_out, n_in, lines), h_new_t(n_in, n_out, lines)
+    complex(dp) :: expected(n_out, n_in, lines)
+    real(dp) :: t_out(n_out, m_out), t_in(n_in, m_in), rcond(lines)
     integer(ip) :: line_info(lines), info
-    integer :: i
+    integer :: i, j
 
-    h = random_lines(4, 5, lines)
-    t_out = random_real(2, 4)
-    t_in = random_real(3, 5)
+    h = random_lines(m_out, m_in, lines)
+    t_out = random_real(n_out, m_out)
+    t_in = random_real(n_in, m_in)
+    do j = 1, m_out
+      do i = 1, n_out
+        if (mod(i + j, empty) /= 0) t_out(i, j) = 0
+      end do
+    end do
     do i = 1, lines
       expected(:, :, i) = matmul(t_out, matmul(h(:, :, i), transpose(t_in)))
     end do
@@ -86,6 +100,9 @@ contains
     call check_close(h_new, expected, tolerance, 'any sizes')
     call transform_receptance(.true., transposed(h), transpose(t_out), transpose(t_in), h_new_t, line_info, rcond, info)
     call check_same(transposed(h_new_t), h_new, 'any sizes, transposed')
+    h(m_out, m_in, 2) = cmplx(0.0_dp, not_a_number(), dp)
+    call transform_receptance(.true., transposed(h), transpose(t_out), transpose(t_in), h_new_t, line_info, rcond, info)
+    call check(info == 1 .and. line_info(2) == -1, 'any sizes: NaN')
   end subroutine any_transformation
 
   subroutine nothing()

@@ -6,6 +6,7 @@ import operator
 import reprlib
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -148,7 +149,10 @@ def as_interface(name: str, value: ArrayLike, n_freq: int | None = None) -> tupl
 def as_real(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> FloatArray:
     """Return a finite real array of the given shape; sizes that are None are free."""
     array = _converted(name, value, np.float64)
-    if array.ndim != len(shape) or any(w is not None and w != s for w, s in zip(shape, array.shape, strict=True)):
+    fits = array.shape == shape or (
+        array.ndim == len(shape) and all(w in (None, s) for w, s in zip(shape, array.shape, strict=True))
+    )
+    if not fits:
         wanted = ", ".join("n" if w is None else str(w) for w in shape)
         raise ValueError(f"{name} must have shape ({wanted}), not {array.shape}")
     if not np.isfinite(array).all():
@@ -160,7 +164,7 @@ def as_real(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> Float
 def as_frequency(freq_hz: ArrayLike, n_freq: int | None = None) -> FloatArray:
     """Return the frequency lines in Hz, finite and not negative."""
     freq = as_real("freq_hz", freq_hz, (n_freq,))
-    if (freq < 0).any():
+    if np.minimum.reduce(freq, initial=0) < 0:
         raise ValueError(f"freq_hz must not be negative: line {int(np.argmax(freq < 0))} is {freq.min():g} Hz")
     return freq
 
@@ -233,6 +237,8 @@ def check_finite_lines(name: str, lines: ComplexArray, freq_hz: FloatArray | Non
 
 def as_number(name: str, value: object) -> float:
     """Return one finite real number."""
+    if type(value) is float and isfinite(value):
+        return value
     if isinstance(value, str | bytes) or np.ndim(value) or as_array(name, value).dtype.kind not in "biuf":  # type: ignore[arg-type]
         raise TypeError(f"{name} must be one real number, not {one_line(value)}")
     number = float(value)  # type: ignore[arg-type]

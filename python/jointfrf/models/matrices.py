@@ -18,6 +18,9 @@ Matrix = Any  # array_like or scipy sparse array
 
 #: Two entries differ by no more than this share of the largest where a matrix is called symmetric.
 _SYMMETRIC = 1e-10
+#: Up to this size sparse matrices are turned into arrays: what scipy does with their entries would take longer than
+#: all that is computed.
+_SMALL = 64
 #: Damping is a M + b K where no entry differs by more than this share of the largest.
 _PROPORTIONAL = 1e-13
 
@@ -46,19 +49,24 @@ class ModelMatrices:
 
     def __post_init__(self) -> None:
         n: int | None = None
-        for name, matrix in self.named.items():
+        for name, given in self.named.items():
+            matrix = given
             if matrix is None:
                 if name in ("stiffness", "mass"):
                     raise ValueError(f"{name} is missing")
                 continue
-            shape = matrix.shape if sparse.issparse(matrix) else np.shape(matrix)
+            is_sparse = not isinstance(matrix, np.ndarray) and sparse.issparse(matrix)
+            shape = matrix.shape if is_sparse else np.shape(matrix)
             if len(shape) != 2 or shape[0] != shape[1] or (n is not None and shape[0] != n):
                 wanted = "(n, n)" if n is None else f"({n}, {n})"
                 raise ValueError(f"{name} must have shape {wanted}, not {tuple(shape)}")
             n = shape[0]
-            if not sparse.issparse(matrix):
-                object.__setattr__(self, name, as_real(name, matrix, (n, n)))
-            half = _half(self.named[name])
+            if is_sparse and shape[0] <= _SMALL:
+                matrix, is_sparse = matrix.toarray(), False
+            if not is_sparse:
+                matrix = as_real(name, matrix, (n, n))
+                object.__setattr__(self, name, matrix)
+            half = _half(matrix)
             # Beside a stiffness that is not symmetric, as with rotors or friction, half a matrix may be meant.
             if half is not None and (name == "stiffness" or self.is_symmetric("stiffness")):
                 raise ValueError(
@@ -79,15 +87,14 @@ class ModelMatrices:
     @cached_property
     def n(self) -> int:
         """Number of DOFs."""
-        shape = self.stiffness.shape if sparse.issparse(self.stiffness) else np.shape(self.stiffness)
-        return int(shape[0])
+        return int(self.stiffness.shape[0])
 
     def dense(self, name: str) -> FloatArray | None:
         """Return a matrix as an array, shape (n, n); None where the model has none."""
         matrix = self.named[name]
-        if matrix is None:
-            return None
-        return as_real(name, matrix.toarray(), (self.n, self.n)) if sparse.issparse(matrix) else matrix
+        if matrix is None or isinstance(matrix, np.ndarray):
+            return matrix
+        return as_real(name, matrix.toarray(), (self.n, self.n))
 
     def sparse(self, name: str) -> sparse.csc_array:
         """Return a matrix by its entries, shape (n, n); empty where the model has none."""
@@ -182,6 +189,8 @@ def from_triangle(matrix: Matrix) -> Matrix:
 
 def _half(matrix: Matrix) -> str | None:
     """Return which triangle of a matrix is there where the other is empty."""
+    if isinstance(matrix, np.ndarray) and (matrix == matrix.T).all():
+        return None
     below, above = _sides(matrix)
     return None if below == above else "lower" if below else "upper"
 

@@ -64,6 +64,8 @@ class Ports:
 
 def as_ports(name: str, value: Any, n: int) -> Ports:
     """Check DOFs counted from 0, or a matrix of weights of shape (m, n); all DOFs for None."""
+    if value is None:
+        return Ports(n, np.arange(1, n + 1, dtype=np.int32))
     if sparse.issparse(value) or as_array(name, value).ndim == 2:
         given = value if sparse.issparse(value) else as_real(name, value, (None, None))
         if given.shape[1:] != (n,):
@@ -73,8 +75,6 @@ def as_ports(name: str, value: Any, n: int) -> Ports:
         weights = sparse.csr_array((values, (entries.row, entries.col)), shape=given.shape)
         weights.eliminate_zeros()
         return Ports(n, sums=weights)
-    if value is None:
-        return Ports(n, np.arange(1, n + 1, dtype=np.int32))
     return Ports(n, as_dofs(name, value, n, unique=False))
 
 

@@ -146,6 +146,14 @@ def couple(m: Maker) -> Call:
     return Call("couple", args, (m.n_freq, n_a + n_b, n_a + n_b), {"h_a": a, "h_b": b, "k_joint": k})
 
 
+def couple_large(m: Maker) -> Call:
+    """As many DOFs as are coupled by products line by line, and somewhat fewer and more."""
+    n_a, n_b, n_j = m.n + 24, 26, min(m.n, 26)
+    a, b, k = m.h(n_a), m.h(n_b), m.k(n_j)
+    args = [n_a, n_b, n_j, m.n_freq, a, b, k, m.dofs(n_j, n_a), m.dofs(n_j, n_b)]
+    return Call("couple", args, (m.n_freq, n_a + n_b, n_a + n_b), {"h_a": a, "h_b": b, "k_joint": k})
+
+
 def modify(m: Maker) -> Call:
     n_m = (m.n + 1) // 2
     alpha, d = m.h(m.n), m.k(n_m)
@@ -351,6 +359,40 @@ def test_a_bad_line_anywhere_in_a_block(operation, bad):
                     with jf.use_engine(engine):
                         assert call.failure() == expected, (name, engine)
                 sweep[where] = kept
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 6, 17, 24, 60, 160, 280])
+def test_couplings_of_many_dofs(n):
+    for n_freq in (3, 8, 19) if n < 60 else (9,):
+        check_parity(couple_large(Maker(n, n_freq)))
+
+
+@pytest.mark.parametrize("scale", [1e-150, 1e150])
+def test_couplings_of_many_dofs_at_every_scale(scale):
+    check_parity(couple_large(Maker(5, 11, scale)))
+
+
+@pytest.mark.filterwarnings("ignore:(overflow|invalid value) encountered")
+@pytest.mark.parametrize("bad", BAD)
+def test_a_bad_line_in_a_coupling_of_many_dofs(bad):
+    for where in (0, 7, 12):
+        call = couple_large(Maker(6, 13, seed=where))
+        for sweep in call.sweeps.values():
+            kept = sweep[where].copy()
+            BAD[bad](sweep[where : where + 1])
+            check_parity(call, (where,) if bad in DENORMAL else ())
+            sweep[where] = kept
+
+
+def test_the_number_of_threads_changes_no_bit_of_a_coupling_of_many_dofs(engine, threads):
+    if threads is None:
+        pytest.skip("needs OpenMP and /proc")
+    call = couple_large(Maker(6, 150))
+    threads(1)
+    one = on(engine, call)
+    threads(2)
+    for a, b in zip(one, on(engine, call), strict=True):
+        assert a.tobytes() == b.tobytes()
 
 
 def test_many_bad_lines(operation):

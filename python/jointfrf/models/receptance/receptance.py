@@ -25,6 +25,7 @@ __all__ = ["ReceptanceInfo", "ReceptanceMethod", "receptance"]
 
 Direct = Literal["dense", "banded", "sparse"]
 ReceptanceMethod = Literal["auto", "dense", "banded", "sparse", "modal", "krylov"]
+_METHODS = get_args(ReceptanceMethod)
 
 #: A matrix with a wider band than this share of its size is solved as a dense one.
 _BAND_LIMIT = 0.25
@@ -229,7 +230,7 @@ def receptance(
     >>> info.method, info.reason
     ('banded', 'narrow band: 3 diagonals below and 3 above the main one')
     """
-    check_choice("method", method, get_args(ReceptanceMethod))
+    check_choice("method", method, _METHODS)
     freq = as_frequency(freq_hz)
     matrices = ModelMatrices(stiffness, mass, damping, structural_damping, as_number("loss_factor", loss_factor))
     n = matrices.n
@@ -305,7 +306,8 @@ def _solved(task: _Task, how: Direct, reason: str) -> tuple[ComplexArray, Recept
             h, status = solve(freq, matrices, to.needed, into.needed, on_singular)
             t_out, t_in = (ports.weights[:, ports.needed - 1].toarray() for ports in (to, into))
             result = transform(h, t_out, t_in, freq_hz=freq, on_singular=on_singular, out=task.out)
-    check_lines("receptance", _in_doubt(matrices, freq, status), {}, freq, "nan", RCOND_LIMIT)
+    if np.minimum.reduce(status.rcond, initial=1) < RCOND_LIMIT:
+        check_lines("receptance", _in_doubt(matrices, freq, status), {}, freq, "nan", RCOND_LIMIT)
     return result, ReceptanceInfo(how, reason, solver=solver)
 
 
