@@ -48,8 +48,8 @@ _FEWEST_LINES = 200
 _PEERS = """\
 Other libraries are timed where they are there, on one thread; a line says which are left out, and why:
   Eigen                apt-get install libeigen3-dev      (compiled for the orders when first timed: minutes)
-  MKL loop, compact    .venv/bin/pip install mkl          (0.3 GB)
-  JAX                  .venv/bin/pip install jax          (0.4 GB)
+  MKL loop, compact    .venv/bin/pip install mkl          (315 MB to download)
+  JAX                  .venv/bin/pip install jax          (89 MB to download)
   torch                .venv/bin/pip install torch --index-url https://download.pytorch.org/whl/cpu
                        (from PyPI, on Linux, it brings gigabytes of libraries for graphics processors)
 """
