@@ -23,14 +23,17 @@ class Candidate:
     threads : int
     prepare : callable
         Called before every sample, not timed: engine, number of threads.
-    call : callable
+    call : callable, optional
         What is timed; returns the result.
+    sample : callable, optional
+        Instead of `call`: times so many calls somewhere else and returns the seconds of one, NaN where it cannot.
     """
 
     name: str
     threads: int
     prepare: Callable[[], None]
-    call: Callable[[], np.ndarray]
+    call: Callable[[], np.ndarray] | None = None
+    sample: Callable[[int], float] | None = None
 
 
 @dataclass(frozen=True)
@@ -51,17 +54,35 @@ class Timing:
         return float((high - low) / self.median)
 
 
-def _sample(candidate: Candidate, calls: int) -> float:
-    candidate.prepare()
-    candidate.call()  # not timed: each begins with its own numbers in the caches, not with its neighbour's
-    start = time.perf_counter()
+#: Seconds that pass, or that this process computes on any of its threads: those that other programs take do not count.
+CLOCKS: dict[str, Callable[[], float]] = {"wall": time.perf_counter, "processor": time.process_time}
+
+
+def call_repeatedly(call: Callable[[], object], calls: int, clock: str = "wall") -> float:
+    """Return the seconds of a call by a clock, the mean of so many."""
+    now = CLOCKS[clock]
+    call()  # not timed: each begins with its own numbers in the caches, not with its neighbour's
+    start = now()
     for _ in range(calls):
-        candidate.call()
-    return (time.perf_counter() - start) / calls
+        call()
+    return (now() - start) / calls
+
+
+def _sample(candidate: Candidate, calls: int, clock: str) -> float:
+    candidate.prepare()
+    if candidate.sample is not None:
+        return candidate.sample(calls)
+    assert candidate.call is not None
+    return call_repeatedly(candidate.call, calls, clock)
 
 
 def time_interleaved(
-    candidates: Sequence[Candidate], first: Sequence[float], budget: float, fewest: int, most: int = 51
+    candidates: Sequence[Candidate],
+    first: Sequence[float],
+    budget: float,
+    fewest: int,
+    most: int = 51,
+    clock: str = "wall",
 ) -> list[Timing]:
     """Time candidates in turn.
 
@@ -74,11 +95,13 @@ def time_interleaved(
         After so many seconds no new round begins, once there were `fewest`.
     fewest, most : int
         Number of rounds.
+    clock : str
+        One of `CLOCKS`.
 
     Returns
     -------
     list of Timing
-        In the order of the candidates.
+        In the order of the candidates; without samples where one could not be timed to the end.
     """
     ways = list(candidates)
     calls = [max(1, math.ceil(_SAMPLE / max(seconds, 1e-7))) for seconds in first]
@@ -90,5 +113,5 @@ def time_interleaved(
         # Each round begins with another one: none always follows the same.
         for k in range(len(ways)):
             i = (turn + k) % len(ways)
-            samples[i].append(_sample(ways[i], calls[i]))
-    return [Timing(tuple(some)) for some in samples]
+            samples[i].append(_sample(ways[i], calls[i], clock))
+    return [Timing(() if any(map(math.isnan, some)) else tuple(some)) for some in samples]

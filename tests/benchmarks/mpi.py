@@ -12,7 +12,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from .machine import ROOT, build_kernel
+from .machine import ROOT, build_kernel, usable_cores
 from .options import numbers
 
 _SOURCE = ROOT / "tests" / "mpi" / "sweep.f90"
@@ -33,6 +33,8 @@ def main() -> int:
     for tool in ("mpif90", "mpirun"):
         if shutil.which(tool) is None:
             parser.error(f"{tool} is not there (Debian: apt-get install libopenmpi-dev openmpi-bin)")
+    if max(options.processes) > usable_cores():
+        print(f"this process may run on {usable_cores()} of {os.cpu_count()} cores: more processes share them")
     records = []
     print("order  lines   processes  lines/s     speed-up  of which jf_couple")
     with tempfile.TemporaryDirectory() as folder:
@@ -44,7 +46,7 @@ def main() -> int:
                 print(_row(case, cases[0]), flush=True)
             records += cases
     if options.output is not None:
-        options.output.write_text(json.dumps({"cores": os.cpu_count(), "records": records}, indent=1) + "\n")
+        options.output.write_text(json.dumps({"cores": usable_cores(), "records": records}, indent=1) + "\n")
     return 0
 
 

@@ -74,6 +74,8 @@ class Operation:
         Lines done for one line of the data.
     accuracy : float
         Error that a method may have beside rounding.
+    normals : callable
+        Complex normal numbers of a line that the kernel's generator makes, by n.
     """
 
     name: str
@@ -92,6 +94,7 @@ class Operation:
     streams: bool = True
     per_call: int = 1
     accuracy: float = 0.0
+    normals: Callable[[int], float] = lambda n: 0.0
 
     @property
     def takes_out(self) -> bool:
@@ -530,10 +533,11 @@ OPERATIONS: dict[str, Operation] = {
             streams=False,
             accuracy=1e-6,
         ),
+        # A product and a sum for each number.
         Operation(
             "noise",
             "order of the FRF matrix",
-            lambda n: 0,
+            lambda n: 8 * n**2,
             lambda n: 2 * _COMPLEX * n**2,
             _noise_data,
             lambda data, **more: jf.pollute(data["h"], _LEVEL, seed=1, **more),
@@ -541,6 +545,7 @@ OPERATIONS: dict[str, Operation] = {
             routine=jf.pollute,
             verify=_verify_noise,
             kinds=("frf",),
+            normals=lambda n: n**2,
         ),
         Operation(
             "monte_carlo",
@@ -554,6 +559,7 @@ OPERATIONS: dict[str, Operation] = {
             kinds=("frf",),
             streams=False,
             per_call=_REALISATIONS,
+            normals=lambda n: 4 * n**2,
         ),
     )
 }

@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from .operations import OPERATIONS
+from .peers.client import PEER_NAMES
 from .results import LOOP, NUMPY, OURS, REFERENCE, Record, Run
 
 _COLUMNS = 4
@@ -18,6 +20,16 @@ _CURVES: tuple[tuple[str, int, bool, str, dict[str, Any]], ...] = (
     (OURS, 2, False, "jointfrf, 2 threads", {"color": "#1b4f9c", "ls": "--", "marker": "o", "mfc": "white", "lw": 1.1}),
     (OURS, 1, False, "jointfrf", {"color": "#0b2a57", "ls": "-", "marker": "o", "lw": 1.8}),
 )
+#: Curves of the figure of peers.
+_PEER_CURVES: dict[str, tuple[str, dict[str, Any]]] = {
+    NUMPY: ("numpy", {"color": "#e08a1e", "ls": "-", "marker": "s"}),
+    LOOP: ("loop over OpenBLAS", {"color": "#6b6b6b", "ls": ":", "marker": "v"}),
+    "Eigen": ("Eigen, fixed size", {"color": "#2a7f62", "ls": "-", "marker": "D"}),
+    "MKL loop": ("loop over MKL", {"color": "#8c4a9e", "ls": "--", "marker": "^", "mfc": "white"}),
+    "MKL compact": ("MKL compact", {"color": "#5a1f6b", "ls": "-", "marker": "^"}),
+    "torch": ("torch", {"color": "#b5323e", "ls": "-.", "marker": "P"}),
+    "JAX": ("JAX", {"color": "#3f78c4", "ls": "--", "marker": "x"}),
+}
 _FONTS = {"font.size": 8, "axes.titlesize": 9, "legend.fontsize": 8, "axes.grid": True, "grid.alpha": 0.3,
           "grid.linewidth": 0.5, "axes.axisbelow": True, "lines.markersize": 3.5}  # fmt: skip
 
@@ -47,6 +59,57 @@ def draw(run: Run, path: Path) -> None:
         kind = "FRFs with noise" if any(one.data == "frf" for one in run.records) else "random matrices"
         figure.suptitle(f"{run.machine['processor']}, {kind}; engine {run.machine['engine']}", fontsize=9)
         figure.savefig(path, dpi=120, metadata={"Software": None})
+
+
+def draw_peers(run: Run, path: Path) -> bool:
+    """Draw how many times longer other libraries take, one axes an operation; return whether there are any."""
+    import matplotlib
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    names = list(dict.fromkeys(one.operation for one in run.records if one.candidate in PEER_NAMES))
+    if not names:
+        return False
+    columns = min(2, len(names))
+    rows = -(-len(names) // columns)
+    with matplotlib.rc_context({**_FONTS, "lines.markersize": 5}):  # type: ignore[arg-type]
+        figure = Figure(figsize=(0.9 + 4.2 * columns, 1.3 + 3.0 * rows), layout="constrained")
+        FigureCanvasAgg(figure)
+        grid = figure.subplots(rows, columns, sharey=True, squeeze=False)
+        for i, name in enumerate(names):
+            ax = grid[i // columns, i % columns]
+            _draw_peers_of(run, name, ax)
+            if i % columns == 0:
+                ax.set_ylabel("times longer than jointfrf")
+        for ax in grid.flat[len(names) :]:
+            ax.set_axis_off()
+        handles, labels = _legend(figure)
+        figure.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False)
+        figure.suptitle(f"{run.machine['processor']}, one thread; engine {run.machine['engine']}", fontsize=9)
+        figure.savefig(path, dpi=120, metadata={"Software": None})
+    return True
+
+
+def _draw_peers_of(run: Run, name: str, ax: Any) -> None:
+    from matplotlib.ticker import FixedLocator, NullFormatter
+
+    cases = {one.case for one in run.records if one.operation == name and not one.streaming}
+    kinds = {kind for _, kind, _, _ in cases}
+    ours = [run.find(case, OURS) for case in sorted(cases) if case[1] == ("frf" if "frf" in kinds else "random")]
+    found = [one for one in ours if one is not None]
+    for candidate, (label, style) in _PEER_CURVES.items():
+        known = [(one.n, ratio) for one in found if (ratio := run.least_ratio(one, candidate)) is not None]
+        if known:
+            ax.plot(*zip(*known, strict=True), label=label, lw=1.1, **style)
+    ax.axhline(1, color="black", lw=1.8, label="jointfrf")
+    orders = [one.n for one in found]
+    ax.set(xscale="log", yscale="log", title=f"{name} (n: {OPERATIONS[name].counts})", xlabel="n")
+    ax.set_xticks([tick for tick in _TICKS if orders[0] <= tick <= orders[-1]] if len(orders) > 1 else orders)
+    ax.xaxis.set_major_formatter("{x:.0f}")
+    ax.xaxis.set_minor_formatter(NullFormatter())
+    ax.yaxis.set_major_locator(FixedLocator([0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200]))
+    ax.yaxis.set_major_formatter("{x:g}")
+    ax.yaxis.set_minor_formatter(NullFormatter())
 
 
 def _ratio_limits(run: Run) -> tuple[float, float]:

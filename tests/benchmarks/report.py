@@ -7,10 +7,14 @@ from pathlib import Path
 from typing import Any
 
 from .operations import OPERATIONS
+from .peers.client import PEER_NAMES
 from .results import LOOP, NUMPY, OURS, OUT, REFERENCE, Record, Run, faster, slower
 
-_BEGIN, _END = "<!-- speed: begin -->", "<!-- speed: end -->"
+#: Tables of the document, each between a line `<!-- NAME: begin -->` and one `<!-- NAME: end -->`.
+TABLES = ("speed", "peers")
 _DOCUMENT_ORDERS = (1, 2, 6, 12, 24, 48)
+_PEER_ORDERS = (1, 2, 3, 4, 6, 8, 12, 24, 48)
+_PEER_WORDS = {NUMPY: "numpy", LOOP: "OpenBLAS loop"}
 _KINDS = {"frf": "FRFs", "random": "random matrices"}
 
 
@@ -21,7 +25,10 @@ def machine_text(machine: dict[str, Any], limits: list[dict[str, Any]]) -> str:
         f"{machine['fortran']}; Python {machine['python']}, numpy {machine['numpy']}, OpenBLAS "
         f"{machine['scipy-openblas32']}, jointfrf {machine['jointfrf']} ({machine['commit']}), "
         f"engine {machine['engine']}",
-        *(f"{library} runs on the kernels for {kernels}" for library, kernels in machine.get("blas", {}).items()),
+        *(f"BLAS of {owner}: {kernels}" for owner, kernels in machine.get("blas", {}).items()),
+        *(f"peer {name}: {version}" for name, version in machine.get("peers", {}).items()),
+        *(f"BLAS of {owner} there: {kernels}" for owner, kernels in machine.get("blas_of_peers", {}).items()),
+        *(f"left out: {name}: {why}" for name, why in machine.get("left_out", {}).items()),
     ]
     return "\n".join(
         text + limits_text(limits) + _warning(machine, "other programs are running: the numbers are rough")
@@ -41,7 +48,7 @@ def limits_text(limits: list[dict[str, Any]]) -> list[str]:
         rates = ", ".join(f"{rate / 1e9:.0f} ({_size(size)})" for size, rate in sizes[:: max(1, len(sizes) // 5)])
         text.append(
             f"{_threads(limit['threads'])}: FMA {peaks} GFlop/s; read + write {rates}, memory "
-            f"{sizes[-1][1] / 1e9:.1f} GB/s"
+            f"{sizes[-1][1] / 1e9:.1f} GB/s; {limit.get('normals', 0) / 1e6:.0f} million complex normal numbers/s"
         )
     return text
 
@@ -54,7 +61,9 @@ def _size(size: int) -> str:
     return f"{size // 2**20} MiB" if size >= 2**20 else f"{size // 2**10} KiB"
 
 
-def heading(operation: str, kind: str, streaming: bool, threads: tuple[int, ...], with_out: bool) -> str:
+def heading(
+    operation: str, kind: str, streaming: bool, threads: tuple[int, ...], with_out: bool, peers: tuple[str, ...] = ()
+) -> str:
     """Return what stands above the rows of one operation."""
     counts = OPERATIONS[operation].counts
     more = threads[1:]
@@ -62,13 +71,19 @@ def heading(operation: str, kind: str, streaming: bool, threads: tuple[int, ...]
     columns += ["    out="] if with_out else []
     for count in more:
         columns += [f"{count} threads", "% limit"]
-    columns += ["x numpy", "x engine lapack", "x LAPACK loop"]
+    columns += ["x numpy", "x engine lapack", "x LAPACK loop", *(f"x {name}" for name in peers)]
     memory = "streaming from memory" if streaming else "repeated on the same lines"
     title = f"{operation}: ns a line ({_KINDS[kind]}, {memory}, {_threads(threads[0])}); n = {counts}"
     return f"\n{title}\n" + "  ".join(columns)
 
 
-def row(run: Run, case: tuple[str, str, bool, int], threads: tuple[int, ...], with_out: bool) -> str:
+def row(
+    run: Run,
+    case: tuple[str, str, bool, int],
+    threads: tuple[int, ...],
+    with_out: bool,
+    peers: tuple[str, ...] = (),
+) -> str:
     """Return the measured numbers of one case."""
     first = run.find(case, OURS, threads[0])
     assert first is not None
@@ -80,8 +95,8 @@ def row(run: Run, case: tuple[str, str, bool, int], threads: tuple[int, ...], wi
     for count in threads[1:]:
         other = run.find(case, OURS, count)
         cells += [f"{_ns(other.median):>9}", f"{other.percent:7.0f}"] if other else ["-", "-"]
-    for candidate, width in ((NUMPY, 7), (REFERENCE, 15), (LOOP, 13)):
-        cells.append(f"{_ratio(run.ratio(first, candidate)):>{width}}")
+    for candidate in (NUMPY, REFERENCE, LOOP, *peers):
+        cells.append(f"{_ratio(run.ratio(first, candidate)):>{len(candidate) + 2}}")
     return "  ".join(cells)
 
 
@@ -157,10 +172,53 @@ def document_table(run: Run) -> str:
     return "\n".join(text)
 
 
-def write_document(run: Run, path: Path) -> None:
-    """Put the table between the two markers of a document."""
-    before, begin, rest = path.read_text().partition(_BEGIN)
-    _, end, after = rest.partition(_END)
-    if not (begin and end):
-        raise ValueError(f"{path} has no markers {_BEGIN} and {_END}")
-    path.write_text(f"{before}{_BEGIN}\n{document_table(run)}\n{_END}{after}")
+def peer_table(run: Run) -> str:
+    """Return the table of the peers: the time of jointfrf, and how many times longer each of the others takes."""
+    machine = run.machine
+    there = [name for name in PEER_NAMES if any(r.candidate == name for r in run.records)]
+    lines = max(r.lines for r in run.records if r.candidate in there and not r.streaming)
+    clock = "processor time, " if machine.get("clock") == "processor" else ""
+    text = [
+        f"{machine['processor']}, one thread, {run.date[:10]}, engine {machine['engine']}; {lines} lines of FRFs with "
+        f"noise at most, in C order; {clock}least of repetitions in turn.",
+        "Time of a frequency line by jointfrf, and how many times longer the others take; below 1 they are faster.",
+        *_warning(machine, "Other programs were running."),
+        "",
+    ]
+    operations = [name for name in dict.fromkeys(r.operation for r in run.records)
+                  if any(r.operation == name and r.candidate in there for r in run.records)]  # fmt: skip
+    orders = [n for n in _PEER_ORDERS if any(run.find((name, "frf", False, n), OURS) for name in operations)]
+    text += [
+        "| | | " + " | ".join(f"n = {n}" if i == 0 else str(n) for i, n in enumerate(orders)) + " |",
+        "|---" * (len(orders) + 2) + "|",
+    ]
+    for name in operations:
+        ours = [run.find((name, "frf", False, n), OURS) for n in orders]
+        cells = [_time(one.least) if one else "" for one in ours]
+        text.append(f"| `{name}` | jointfrf | " + " | ".join(cells) + " |")
+        for candidate in (NUMPY, LOOP, *there):
+            ratios = [run.least_ratio(one, candidate) if one else None for one in ours]
+            if any(ratio is not None for ratio in ratios):
+                shown = ["" if ratio is None else f"{_ns(ratio)}×" for ratio in ratios]
+                text.append(f"| | {_PEER_WORDS.get(candidate, candidate)} | " + " | ".join(shown) + " |")
+    counts = "; ".join(f"`{name}`: {OPERATIONS[name].counts}" for name in operations)
+    versions = "; ".join(f"{name}: {machine['peers'][name]}" for name in there)
+    kernels = "; ".join(f"{owner}: {words}" for owner, words in machine["blas"].items())
+    words = f"What n counts: {counts}. Empty: not timed, or the result was wrong."
+    for line in (words, f"{versions}.", f"BLAS of {kernels}."):
+        text += ["", *textwrap.wrap(line, 150, break_on_hyphens=False, break_long_words=False)]
+    return "\n".join(text)
+
+
+def write_document(run: Run, path: Path, table: str) -> str:
+    """Put a table between its two markers of a document; return a sentence on what was done."""
+    if table == "peers" and not any(r.candidate in PEER_NAMES for r in run.records):
+        return f"{path.name}: no peers were timed, and their table stays as it is"
+    begin, end = f"<!-- {table}: begin -->", f"<!-- {table}: end -->"
+    before, found, rest = path.read_text().partition(begin)
+    _, closed, after = rest.partition(end)
+    if not (found and closed):
+        raise ValueError(f"{path} has no markers {begin} and {end}")
+    content = document_table(run) if table == "speed" else peer_table(run)
+    path.write_text(f"{before}{begin}\n{content}\n{end}{after}")
+    return f"wrote the table {table!r} of {path.name}"

@@ -19,7 +19,7 @@ _TOLERANCE = 0.10
 
 @dataclass(frozen=True)
 class Record:
-    """One candidate in one case; times in ns a line, least operations and bytes of a line."""
+    """One candidate in one case; times in ns a line; least operations, bytes and random numbers of a line."""
 
     operation: str
     data: str
@@ -35,6 +35,7 @@ class Record:
     moved: float
     limit: float
     samples: tuple[float, ...]
+    normals: float = 0.0
 
     @property
     def case(self) -> tuple[str, str, bool, int]:
@@ -55,20 +56,22 @@ def record(
     timing: Timing,
     flops: float,
     moved: float,
+    normals: float,
 ) -> Record:
     """Return times of a call that does so many lines as ns a line, and the limit."""
     ns = tuple(round(1e9 * seconds / lines, 3) for seconds in timing.samples)
-    median, limit = timing.median * 1e9 / lines, _limit(limits, flops, moved, lines)
-    return Record(*case, lines, candidate, limits.threads, median, min(ns), timing.spread, flops, moved, limit, ns)
+    median, limit = timing.median * 1e9 / lines, _limit(limits, flops, moved, normals, lines)
+    times = (median, min(ns), timing.spread)
+    return Record(*case, lines, candidate, limits.threads, *times, flops, moved, limit, ns, normals)
 
 
 def with_limits(one: Record, limits: dict[int, Limits]) -> Record:
     """Return a record with the limit computed again."""
-    return replace(one, limit=_limit(limits[one.threads], one.flops, one.moved, one.lines))
+    return replace(one, limit=_limit(limits[one.threads], one.flops, one.moved, one.normals, one.lines))
 
 
-def _limit(limits: Limits, flops: float, moved: float, lines: int) -> float:
-    return 1e9 * limits.seconds(flops, moved, moved * lines)
+def _limit(limits: Limits, flops: float, moved: float, normals: float, lines: int) -> float:
+    return 1e9 * limits.seconds(flops, moved, moved * lines, normals)
 
 
 @dataclass(frozen=True)
@@ -94,6 +97,11 @@ class Run:
         """
         other = self.find(ours.case, candidate, ours.threads) or self.find(ours.case, candidate)
         return other.median / ours.median if other else None
+
+    def least_ratio(self, ours: Record, candidate: str) -> float | None:
+        """Return the ratio of the least times on one thread, which other programs disturb less than medians."""
+        other = self.find(ours.case, candidate)
+        return other.least / ours.least if other else None
 
 
 def save(run: Run, path: Path) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from concurrent.futures import BrokenExecutor, Executor, Future
+from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from queue import SimpleQueue
@@ -22,10 +22,19 @@ AnyExecutor = Executor | Callable[[], Executor]
 _WAITING = 2
 #: Executors made in the place of broken ones, one after the other, without a task done in between.
 _MADE_AGAIN = 3
+#: What Dask raises where workers die again and again, or its cluster ends, beside cancelling tasks.
+_DASK_ERRORS = {"KilledWorker", "ClosedClientError"}
 
 
 class BrokenPoolError(RuntimeError):
     """An executor has lost its workers."""
+
+
+def _has_lost_workers(error: BaseException) -> bool:
+    """Whether an error says that there was nobody to do a task, rather than what the task itself raised."""
+    kind = type(error)
+    is_of_dask = kind.__module__.startswith("distributed.") and kind.__name__ in _DASK_ERRORS
+    return is_of_dask or isinstance(error, (BrokenExecutor, CancelledError))
 
 
 class _InThisThread(Executor):
@@ -85,8 +94,10 @@ class Pool(Generic[_T]):
         def submit(task: _T) -> None:
             try:
                 future = self.executor.submit(function, task)
-            except BrokenExecutor:
-                self._replace(self.executor)
+            except Exception as error:
+                if not _has_lost_workers(error):
+                    raise
+                self._replace(self.executor, error)
                 future = self.executor.submit(function, task)
             at_work[future] = task
             future.add_done_callback(done.put)
@@ -106,9 +117,13 @@ class Pool(Generic[_T]):
                 task = at_work.pop(future)
                 try:
                     result = future.result()
-                except BrokenExecutor as error:
-                    # The others break with it: they are done again on the new one.
+                except Exception as error:
+                    if not _has_lost_workers(error):
+                        raise
+                    # The others break with it, or are given up: they are done again on the new one.
                     again += [task, *at_work.values()]
+                    for other in at_work:
+                        other.cancel()
                     at_work.clear()
                     self._replace(self.executor, error)
                     continue

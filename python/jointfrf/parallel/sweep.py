@@ -7,6 +7,8 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
+from math import lcm
+from operator import index
 from statistics import median
 from time import perf_counter
 from typing import Any, NamedTuple
@@ -17,8 +19,8 @@ from numpy.typing import ArrayLike, NDArray
 from jointfrf.errors import IllConditionedWarning, SingularLineError
 from jointfrf.parallel.line_arrays import Lines, lines_of
 from jointfrf.parallel.one_thread import one_thread
-from jointfrf.parallel.pool import AnyExecutor, Pool, opened_pool
-from jointfrf.parallel.sweep_plan import SweepCost, SweepPlan, planned_sweep
+from jointfrf.parallel.pool import AnyExecutor, BrokenPoolError, Pool, opened_pool
+from jointfrf.parallel.sweep_plan import SHARE, SweepCost, SweepPlan, planned_sweep
 
 __all__ = ["plan_sweep", "sweep"]
 
@@ -95,6 +97,23 @@ class _Sweep:
         return _SweepTask(self.operation, {name: own.of(lines) for name, own in self.inputs.items()}, result, lines)
 
 
+class _Finished:
+    """Which lines are done: all before `end`, and chunks beyond it."""
+
+    def __init__(self, first: int) -> None:
+        self.count = self.end = first
+        self._beyond: dict[int, int] = {}
+
+    def add(self, lines: slice) -> None:
+        self.count += lines.stop - lines.start
+        self._beyond[lines.start] = lines.stop
+        while self.end in self._beyond:
+            self.end = self._beyond.pop(self.end)
+
+    def __str__(self) -> str:
+        return f"lines 0 to {self.end - 1} of out are written" if self.end else "no lines are written for good"
+
+
 def _checked(operation: LineFunction, arrays: Mapping[str, ArrayLike], out: Any) -> _Sweep:
     if not callable(operation):
         raise TypeError(f"operation must be a function such as jointfrf.invert, not {type(operation).__name__}")
@@ -123,6 +142,7 @@ def sweep(
     jobs: int | None = None,
     plan: SweepPlan | None = None,
     progress: Callable[[int, int], None] | None = None,
+    first: int = 0,
 ) -> SweepPlan:
     """Compute the lines of a sweep larger than memory, or than one machine, in chunks.
 
@@ -142,7 +162,10 @@ def sweep(
     plan : SweepPlan, optional
         What `plan_sweep` gave; measured first by default.
     progress : callable, optional
-        Called with the number of lines done and in all.
+        Called with the number of lines done, those before `first` included, and in all.
+    first : int
+        Line with which to begin, a multiple of 512 and of the lines that `out` writes together: that which
+        `BrokenPoolError` names, to go on with a sweep that lost its workers.
 
     Returns
     -------
@@ -156,7 +179,8 @@ def sweep(
     ValueError
         Wrong shapes; `out` where an input lies; what the operation raises, with the lines of the chunk.
     BrokenPoolError
-        As in `study`.
+        The executor has lost its workers, and there is nothing that makes another one. The text says up to which line
+        results are written, and with which `first` the rest is computed.
 
     Warns
     -----
@@ -178,23 +202,33 @@ def sweep(
     True
     """
     whole = _checked(operation, arrays, out)
-    with opened_pool(executor, jobs) as pool:
-        used = plan or _measured(whole, pool)
-        if used.n_lines != whole.n_lines:
-            raise ValueError(f"plan is of {used.n_lines} lines, not of {whole.n_lines}")
-        told, done = [], 0
-        for task, result in pool.completed(_do, _tasks(whole, used)):
-            if result.values is not None:
-                whole.out.write(task.lines, result.values)
-            if result.warning:
-                told.append((task.lines.start, result.warning))
-            done += task.lines.stop - task.lines.start
-            if progress is not None:
-                progress(done, whole.n_lines)
+    unit = lcm(SHARE, whole.out.step)
+    if not 0 <= index(first) < whole.n_lines or first % unit:
+        raise ValueError(f"first must be a multiple of {unit} from 0 to {whole.n_lines - 1}, not {first}")
+    told: list[tuple[int, str]] = []
+    finished = _Finished(first)
+    try:
+        with opened_pool(executor, jobs) as pool:
+            used = plan or _measured(whole, pool)
+            if used.n_lines != whole.n_lines:
+                raise ValueError(f"plan is of {used.n_lines} lines, not of {whole.n_lines}")
+            for task, result in pool.completed(_do, _tasks(whole, used, first)):
+                if result.values is not None:
+                    whole.out.write(task.lines, result.values)
+                if result.warning:
+                    told.append((task.lines.start, result.warning))
+                finished.add(task.lines)
+                if progress is not None:
+                    progress(finished.count, whole.n_lines)
+    except BrokenPoolError as error:
+        raise BrokenPoolError(
+            f"the workers of the executor have ended unexpectedly; {finished}: sweep(..., first={finished.end}) "
+            "computes the rest"
+        ) from error
     if told:
-        first, text = min(told)
+        start, text = min(told)
         more = f"; so are lines of {len(told) - 1} other chunks" if len(told) > 1 else ""
-        warnings.warn(f"{text}, counted from line {first}{more}", IllConditionedWarning, stacklevel=2)
+        warnings.warn(f"{text}, counted from line {start}{more}", IllConditionedWarning, stacklevel=2)
     return used
 
 
@@ -236,8 +270,8 @@ def plan_sweep(
         return _measured(whole, pool)
 
 
-def _tasks(whole: _Sweep, plan: SweepPlan) -> Iterator[_SweepTask]:
-    return (whole.task(lines) for lines in plan.chunks())
+def _tasks(whole: _Sweep, plan: SweepPlan, first: int) -> Iterator[_SweepTask]:
+    return (whole.task(lines) for lines in plan.chunks(first))
 
 
 def _measured(whole: _Sweep, pool: Pool[Any]) -> SweepPlan:

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 from jointfrf.kernel.memory_maps import CHUNK_BYTES
 
-__all__ = ["SweepCost", "SweepPlan", "planned_sweep"]
+__all__ = ["SHARE", "SweepCost", "SweepPlan", "planned_sweep"]
 
 #: Lines that the kernel takes as one share: chunks are multiples of it, so that they change no bit of a result.
-_SHARE = 512
+SHARE = 512
 #: Share of its time that a task may lose to being sent.
 _OVERHEAD = 0.02
 #: Memory of a task, unless it must be larger for the time it takes.
@@ -80,10 +80,10 @@ class SweepPlan:
         """Memory of a task: its lines of all inputs and of the result."""
         return min(self.chunk_lines, self.n_lines) * self.line_bytes
 
-    def chunks(self) -> Iterator[slice]:
-        """Give the lines of each task."""
-        for first in range(0, self.n_lines, self.chunk_lines):
-            yield slice(first, min(first + self.chunk_lines, self.n_lines))
+    def chunks(self, first: int = 0) -> Iterator[slice]:
+        """Give the lines of each task, from a line on."""
+        for start in range(first, self.n_lines, self.chunk_lines):
+            yield slice(start, min(start + self.chunk_lines, self.n_lines))
 
     def __str__(self) -> str:
         """Describe the plan for a reader."""
@@ -129,5 +129,5 @@ def planned_sweep(
     lines = cost.task / _OVERHEAD / max(cost.line + cost.write, 1e-12)
     # Larger tasks than that lose nothing either, as long as all workers have some and their memory is small.
     lines = min(max(lines, _USUAL_BYTES / line_bytes), CHUNK_BYTES / line_bytes, n_lines / (_TASKS * workers))
-    unit = math.lcm(_SHARE, step)
+    unit = math.lcm(SHARE, step)
     return SweepPlan(operation, shapes, n_lines, max(1, round(lines / unit)) * unit, workers, line_bytes, cost)

@@ -304,6 +304,16 @@ def _draw_axes_of_space(axes: list[Any]) -> None:
             ax.text(*place, letter, ha="center", va="center", style="italic", fontsize=7.5, color="#303030")
 
 
+def _mark_what_reaches_beyond(ax: Any, panel: Panel, places: np.ndarray, colour: str) -> None:
+    """Put an arrowhead where an interval reaches beyond the axis, so that it is not read as one that ends there."""
+    assert panel.x_limits is not None
+    left, right = panel.x_limits
+    beyond = [(left, place, "<") for i, place in zip(panel.intervals, places, strict=True) if i.low < left]
+    beyond += [(right, place, ">") for i, place in zip(panel.intervals, places, strict=True) if i.high > right]
+    for edge, place, marker in beyond:
+        ax.plot([edge], [place], marker, color=colour, ms=6, clip_on=False, zorder=5)
+
+
 def _draw_intervals(ax: Any, panel: Panel) -> None:
     places = np.arange(len(panel.intervals))[::-1]
     middle = np.array([i.median for i in panel.intervals])
@@ -320,4 +330,5 @@ def _draw_intervals(ax: Any, panel: Panel) -> None:
     ax.set_ylim(-0.7, len(places) - 0.3)
     if panel.x_limits:
         ax.set_xlim(*panel.x_limits)
+        _mark_what_reaches_beyond(ax, panel, places, colour)
     ax.set_ylabel(panel.y_label)

@@ -82,6 +82,9 @@ def _distributions(summary: Sequence[ParameterSummary]) -> Figure:
             x_limits=bulk_limits(values, around=around) if values else None,
         ) if rows else Panel("", "", ""))  # fmt: skip
     caption = "Estimates: median, and 2.5 to 97.5 percentile"
+    if any(one.low < panel.x_limits[0] or one.high > panel.x_limits[1]
+           for panel in panels if panel.x_limits for one in panel.intervals):  # fmt: skip
+        caption += "; an arrowhead: it reaches beyond the axis"
     if len(summary) > _MOST_INTERVALS * len(panels):
         caption += f"; the first {_MOST_INTERVALS} of each parameter, the table has all"
     return Figure("distributions", caption, tuple(panels), columns=1 if len(panels) < 2 else 2)

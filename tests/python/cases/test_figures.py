@@ -14,7 +14,7 @@ from jointfrf.cases.known_joint.read import KnownJointCase
 from jointfrf.cases.known_joint.summary import known_joint_summary
 from jointfrf.cases.known_joint.tables import known_joint_tables
 from jointfrf.report.draw import STYLES, draw
-from jointfrf.report.figure import Curve, Figure, Panel
+from jointfrf.report.figure import Curve, Figure, Interval, Panel
 from jointfrf.report.page import Page, make_page
 from jointfrf.report.receptance import PHASE, phase_degrees
 from jointfrf.report.svg import shortened
@@ -135,6 +135,20 @@ def test_numbers_along_axes_do_not_collide(figures, key):
     for column in {x for x, _, _ in numbers}:
         heights = sorted(y for x, y, _ in numbers if x == column)
         assert all(b - a > 8.5 for a, b in pairwise(heights))
+
+
+def test_an_interval_that_reaches_beyond_the_axis_ends_in_an_arrowhead():
+    def marks(low, high):
+        """Where marks lie: those of the axes, of the interval where they can be seen, arrowheads."""
+        panel = Panel("", "k, N/m", "", intervals=(Interval("fit", low, 5.0, high),), x_limits=(0.0, 10.0))
+        svg = draw(Figure("one", "caption", (panel,))).svg.decode()
+        return [float(x) for x in re.findall(r'<use [^>]*?x="([-\d.]+)"', svg)]
+
+    within = marks(1.0, 9.0)
+    left, right = min(within), max(within)
+    for low, high, more in ((1.0, 20.0, {right}), (-5.0, 9.0, {left}), (-5.0, 20.0, {left, right})):
+        found = marks(low, high)
+        assert all(found.count(edge) == within.count(edge) + (edge in more) for edge in (left, right))
 
 
 def test_a_short_drawing_has_the_same_lines():

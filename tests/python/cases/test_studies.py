@@ -78,7 +78,7 @@ def test_loky_gives_the_same_numbers(reference, tmp_path):
 def test_a_dask_cluster_of_two_workers_gives_the_same_numbers(reference, tmp_path):
     distributed = pytest.importorskip("distributed")
     with (
-        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as cluster,
         distributed.Client(cluster) as client,
     ):
         assert same(studied(tmp_path, executor=client.get_executor()), reference)

@@ -5,6 +5,7 @@ import math
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,12 @@ TESTS = Path(__file__).resolve().parents[2]
 BUILD = TESTS.parent / "build" / "benchmarks_plain"
 
 
-def command(*arguments: str, module: str = "benchmarks") -> subprocess.CompletedProcess[str]:
+def command(
+    *arguments: str,
+    module: str = "benchmarks",
+    environment: dict[str, str] | None = None,
+    cores: set[int] | None = None,
+) -> subprocess.CompletedProcess[str]:
     """The command on a kernel that is built without optimisation, for nothing here is about its speed."""
     BUILD.parent.mkdir(exist_ok=True)
     with FileLock(BUILD.with_suffix(".lock")):  # processes that test at once take turns
@@ -28,7 +34,8 @@ def command(*arguments: str, module: str = "benchmarks") -> subprocess.Completed
             [sys.executable, "-m", module, *arguments],
             capture_output=True,
             text=True,
-            env={**os.environ, "PYTHONPATH": path, "JOINTFRF_BENCHMARK_BUILD": str(BUILD)},
+            env={**os.environ, "PYTHONPATH": path, "JOINTFRF_BENCHMARK_BUILD": str(BUILD), **(environment or {})},
+            preexec_fn=(lambda: os.sched_setaffinity(0, cores)) if cores else None,
             timeout=300,
         )
 
@@ -38,7 +45,8 @@ def result(tmp_path_factory):
     """One short run: (folder, what it printed, what it wrote)."""
     folder = tmp_path_factory.mktemp("speed")
     names = ("--operations", "invert,ismm,noise", "--orders", "2,3", "--lines", "64")
-    done = command("--quick", *names, "--budget", "0", "--output", str(folder))
+    peers = ("--peers", "eigen", "--eigen", str(folder))  # which holds none
+    done = command("--quick", *names, *peers, "--budget", "0", "--output", str(folder))
     assert done.returncode == 0, done.stdout + done.stderr
     return folder, done.stdout, json.loads((folder / "speed.json").read_text())
 
@@ -82,6 +90,44 @@ def test_limits_are_those_of_a_machine(result):
 
 
 @pytest.mark.builds
+def test_noise_is_compared_with_its_generator(result):
+    run = result[2]
+    limit = next(limit for limit in run["limits"] if limit["threads"] == 1)
+    assert 1e5 < limit["normals"] < 1e11
+    for r in run["records"]:
+        drawn = r["n"] ** 2 if r["operation"] == "noise" else 0
+        assert r["normals"] == drawn
+        if r["threads"] == 1:
+            assert r["limit"] >= 1e9 * drawn / limit["normals"] * (1 - 1e-9)
+
+
+@pytest.mark.builds
+def test_peers_that_are_not_there_are_left_out_with_a_line(result):
+    folder, printed, run = result
+    assert f"left out: eigen: no Eigen/Dense in {folder} (Debian: apt-get install libeigen3-dev)" in printed
+    assert "Eigen" not in {r["candidate"] for r in run["records"]}
+    assert not (folder / "peers.png").exists()
+
+
+@pytest.mark.builds
+@pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="processes cannot be pinned here")
+def test_a_pinned_process_has_one_thread_and_blas_chooses_its_kernels(tmp_path):
+    one = {min(os.sched_getaffinity(0))}
+    names = ("--operations", "noise", "--orders", "2", "--lines", "64", "--threads", "1,2", "--peers", "none")
+    told = {"OPENBLAS_CORETYPE": "Nehalem", "JOINTFRF_ENGINE": "plain"}
+    done = command("--quick", *names, "--budget", "0", "--output", str(tmp_path), environment=told, cores=one)
+    assert done.returncode == 0, done.stdout + done.stderr
+    run = json.loads((tmp_path / "speed.json").read_text())
+    assert {r["threads"] for r in run["records"]} == {1}
+    assert "left out: 2 threads: this process may run on 1 of" in done.stdout
+    assert "2 threads" not in done.stdout.replace("left out: 2 threads", "")
+    ask = "import numpy, threadpoolctl as t; print(*(i.get('architecture') for i in t.threadpool_info()))"
+    free = {name: value for name, value in os.environ.items() if name != "OPENBLAS_CORETYPE"}
+    own = subprocess.run([sys.executable, "-c", ask], env=free, capture_output=True, text=True, check=True)
+    assert run["machine"]["blas"]["numpy"].split()[-1] == own.stdout.split()[0]
+
+
+@pytest.mark.builds
 def test_figure_is_a_png(result):
     assert (result[0] / "speed.png").read_bytes().startswith(b"\x89PNG")
 
@@ -108,7 +154,7 @@ def test_document_is_rewritten_between_the_markers_only(result, benchmarks, tmp_
     document = tmp_path / "README.md"
     document.write_text("before\n<!-- speed: begin -->\nold\n<!-- speed: end -->\nafter\n")
     run = benchmarks.results.load(result[0] / "speed.json")
-    benchmarks.report.write_document(run, document)
+    benchmarks.report.write_document(run, document, "speed")
     text = document.read_text()
     assert text.startswith("before\n<!-- speed: begin -->\n")
     assert text.endswith("\n<!-- speed: end -->\nafter\n")
@@ -116,7 +162,95 @@ def test_document_is_rewritten_between_the_markers_only(result, benchmarks, tmp_
     assert "old" not in text
     document.write_text("no markers")
     with pytest.raises(ValueError, match="markers"):
-        benchmarks.report.write_document(run, document)
+        benchmarks.report.write_document(run, document, "speed")
+
+
+@pytest.fixture
+def run_of_peers(benchmarks):
+    """A run whose times are known: jointfrf 10 n ns, numpy 40 n, Eigen 5 n up to n = 3 and wrong above, JAX 200 n."""
+    times = {"jointfrf": 10.0, "numpy": 40.0, "Eigen": 5.0, "JAX": 200.0}
+    records = [
+        benchmarks.results.Record(
+            name, "frf", False, n, 500, candidate, 1, 3 * each * n, each * n, 0.1, 1.0, 1.0, 1.0, (each * n,)
+        )
+        for name in ("invert", "solve_n") for n in (1, 2, 3, 6) for candidate, each in times.items()
+        if candidate != "Eigen" or n <= 3
+    ]  # fmt: skip
+    machine = {"processor": "P", "engine": "plain", "load": [], "blas": {"numpy": "openblas 1 Zen"},
+               "peers": {"Eigen": "Eigen 3", "JAX": "JAX 1", "torch": "torch 1"}}  # fmt: skip
+    return benchmarks.results.Run("2026-01-02T00:00:00", machine, [], records)
+
+
+def test_the_table_of_peers_is_written_between_its_own_markers(benchmarks, run_of_peers, tmp_path):
+    document = tmp_path / "README.md"
+    document.write_text(
+        "<!-- speed: begin -->\nleft\n<!-- speed: end -->\n<!-- peers: begin -->\n<!-- peers: end -->\n"
+    )
+    said = benchmarks.report.write_document(run_of_peers, document, "peers")
+    assert said == "wrote the table 'peers' of README.md"
+    text = document.read_text()
+    assert text.startswith("<!-- speed: begin -->\nleft\n")
+    assert text.endswith("\n<!-- peers: end -->\n")
+    rows = text.splitlines()
+    at = rows.index("| | | n = 1 | 2 | 3 | 6 |")
+    assert rows[at + 2 : at + 6] == [
+        "| `invert` | jointfrf | 10 ns | 20 ns | 30 ns | 60 ns |",
+        "| | numpy | 4.0× | 4.0× | 4.0× | 4.0× |",
+        "| | Eigen | 0.5× | 0.5× | 0.5× |  |",
+        "| | JAX | 20× | 20× | 20× | 20× |",
+    ]
+    assert "Eigen: Eigen 3; JAX: JAX 1." in text
+    assert "BLAS of numpy: openblas 1 Zen." in text
+    assert "torch" not in text
+    none = replace(run_of_peers, records=[r for r in run_of_peers.records if r.candidate in ("jointfrf", "numpy")])
+    assert "stays as it is" in benchmarks.report.write_document(none, document, "peers")
+    assert document.read_text() == text
+
+
+def test_the_figure_of_peers_is_drawn_where_there_are_any(benchmarks, run_of_peers, tmp_path):
+    pytest.importorskip("matplotlib")
+    from benchmarks.plot import draw_peers
+
+    assert draw_peers(run_of_peers, tmp_path / "peers.png")
+    assert (tmp_path / "peers.png").read_bytes().startswith(b"\x89PNG")
+    none = replace(run_of_peers, records=[r for r in run_of_peers.records if r.candidate == "jointfrf"])
+    assert not draw_peers(none, tmp_path / "none.png")
+    assert not (tmp_path / "none.png").exists()
+
+
+@pytest.mark.builds
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["eigen", "mkl", "torch", "jax"])
+def test_a_peer_that_is_there_gives_the_right_results_on_one_core(benchmarks, name, tmp_path):
+    with benchmarks.peers.client.PeerProcess([name], [2, 3], tmp_path) as peers:
+        if not peers.versions:
+            pytest.skip(f"{name}: {' '.join(peers.left_out.values())}")
+        assert set(peers.versions) <= set(benchmarks.peers.client.PEER_NAMES)
+        for operation, kind in (("invert", "frf"), ("solve_1", "random"), ("solve_n", "frf"), ("ismm", "frf")):
+            ways, first, faults = peers.candidates((operation, kind, False, 3), 200, 2)
+            assert {way.name for way in ways} | set(faults) <= set(peers.versions)
+            # Without row exchanges a result may be far off.
+            assert set(faults) <= {"MKL compact"}
+            timings = benchmarks.measure.time_interleaved(ways, first, 0.0, fewest=3)
+            assert all(len(timing.samples) == 3 and min(timing.samples) > 0 for timing in timings)
+
+
+def test_peers_whose_process_ends_are_left_out_from_then_on(benchmarks, monkeypatch, tmp_path):
+    client = benchmarks.peers.client
+    fake = tmp_path / "python"
+    fake.write_text(
+        '#!/bin/sh\necho \'{"peers": {"JAX": "1"}, "left_out": {}, "blas": {}}\'\nread request\n'
+        "echo '{\"JAX\": 0.001}'\nread request\nexit 3\n"
+    )
+    fake.chmod(0o755)
+    monkeypatch.setattr(client.sys, "executable", str(fake))
+    with client.PeerProcess(["jax"], [2], tmp_path) as peers:
+        ways, first, faults = peers.candidates(("invert", "frf", False, 2), 10, 1)
+        assert (first, faults) == ([0.001], {})
+        (timing,) = benchmarks.measure.time_interleaved(ways, first, 0.0, fewest=3)
+        assert timing.samples == ()
+        assert peers.left_out == {"JAX": "their process ended with status 3"}
+        assert peers.candidates(("invert", "frf", False, 3), 10, 1) == ([], [], {})
 
 
 def test_wrong_results_are_found(benchmarks):
@@ -140,6 +274,9 @@ def test_limit_is_that_of_the_cache_which_holds_the_data(benchmarks):
     assert limits.seconds(0, 4, 512) == pytest.approx(1e-9)
     assert limits.seconds(0, 4, 2048) == pytest.approx(2e-9)
     assert limits.seconds(0, 4, 1e9) == pytest.approx(4e-9)
+    slow = replace(limits, normals=1e8)
+    assert slow.seconds(0, 4, 1e9, 3) == pytest.approx(3e-8)
+    assert slow.seconds(50, 4, 1e9, 3) == pytest.approx(5e-8)
 
 
 def test_command_can_be_started():

@@ -113,6 +113,23 @@ def test_a_broken_executor_of_the_caller_is_said():
     assert set(done) <= {0, 1}
 
 
+@pytest.mark.parametrize("name", ["KilledWorker", "ClosedClientError"])
+def test_what_dask_says_of_lost_workers_is_said_alike(name):
+    error = type(name, (Exception,), {"__module__": "distributed.scheduler"})
+
+    class Lost(Fragile):
+        def submit(self, fn, /, *args, **kwargs):
+            future = super().submit(fn, *args, **kwargs)
+            if self.begun == 2:
+                raise error("first sentence. Second.")
+            return future
+
+    with opened_pool(Lost()) as pool, pytest.raises(jf.BrokenPoolError, match="the same call continues"):
+        list(pool.completed(abs, iter(range(3))))
+    with opened_pool(Lost) as pool:
+        assert sorted(pool.completed(abs, iter(range(3)))) == [(0, 0), (1, 1), (2, 2)]
+
+
 def test_an_executor_that_breaks_at_once_is_not_made_forever():
     class Dead(Fragile):
         def submit(self, fn, /, *args, **kwargs):

@@ -1,6 +1,7 @@
 """Sweeps in chunks over executors: the bits of one call, from files of several formats, planned by their cost."""
 
-from concurrent.futures import ThreadPoolExecutor
+import time
+from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
 from functools import partial
 from unittest.mock import patch
 
@@ -56,6 +57,47 @@ def test_processes_write_a_memory_map_in_its_place(lines, one_call, tmp_path):
     assert seen[-1] == (N, N)
     assert used.workers == 2
     assert used.n_tasks == len(seen)
+
+
+def test_a_sweep_begins_where_it_is_told(lines, one_call):
+    result = np.zeros(lines.shape, complex)
+    seen = []
+    jf.sweep(jf.invert, {"a": lines}, result, plan=plan_of(512), jobs=1, first=1024, progress=lambda *n: seen.append(n))
+    assert not result[:1024].any()
+    assert (result[1024:] == one_call[1024:]).all()
+    assert [done for done, _ in seen] == [1536, 2048, 2560, N]
+    for first in (-512, 100, 5120):
+        with pytest.raises(ValueError, match=f"first must be a multiple of 512 from 0 to {N - 1}, not {first}"):
+            jf.sweep(jf.invert, {"a": lines}, result, plan=plan_of(512), jobs=1, first=first)
+
+
+class LosesAll(ThreadPoolExecutor):
+    """Does the first and third task, and loses its workers."""
+
+    def __init__(self):
+        super().__init__(1)
+        self.asked = 0
+
+    def submit(self, fn, /, *args, **kwargs):
+        self.asked += 1
+        if self.asked in (1, 3):
+            return super().submit(fn, *args, **kwargs)
+        lost = Future()
+        if self.asked == 2:
+            super().submit(time.sleep, 0.3).add_done_callback(lambda _: lost.set_exception(CancelledError()))
+        return lost
+
+
+def test_a_sweep_that_lost_its_workers_says_where_to_go_on(lines, one_call):
+    result = np.zeros(lines.shape, complex)
+    with (
+        LosesAll() as executor,
+        pytest.raises(jf.BrokenPoolError, match=r"lines 0 to 511 of out .*first=512\) computes"),
+    ):
+        jf.sweep(jf.invert, {"a": lines}, result, plan=plan_of(512), executor=executor, jobs=2)
+    assert (result[:512] == one_call[:512]).all()
+    jf.sweep(jf.invert, {"a": lines}, result, plan=plan_of(512), jobs=1, first=512)
+    assert (result == one_call).all()
 
 
 def test_several_arrays_and_what_is_the_same_for_all_lines(lines):
