@@ -222,10 +222,9 @@ def identify(
         _warn(laws.warnings)
         return laws.fit
     if method == "compliance":
-        words = damping if isinstance(damping, str) else tuple(damping)
         problem = prepare_compliance(
             as_measured(freq_hz, gamma, square=False), dofs, bands, transform,
-            NoiseOptions(noise, coherence, averages), FitOptions(words, cross, reciprocal),
+            NoiseOptions(noise, coherence, averages), FitOptions(damping, cross, reciprocal),
         )  # fmt: skip
         if reciprocal:
             _look_at(problem, transform)

@@ -15,9 +15,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from jointfrf.errors import IllConditionedWarning, SingularLineError
+from jointfrf.kernel.arguments import check_type
 from jointfrf.parallel.line_arrays import Lines, lines_of
 from jointfrf.parallel.one_thread import one_thread
-from jointfrf.parallel.pool import AnyExecutor, Pool, opened_pool
+from jointfrf.parallel.pool import AnyExecutor, Pool, check_progress, opened_pool
 from jointfrf.parallel.sweep_plan import SweepCost, SweepPlan, planned_sweep
 
 __all__ = ["plan_sweep", "sweep"]
@@ -178,6 +179,9 @@ def sweep(
     True
     """
     whole = _checked(operation, arrays, out)
+    check_progress(progress)
+    if plan is not None:
+        check_type("plan", plan, SweepPlan)
     with opened_pool(executor, jobs) as pool:
         used = plan or _measured(whole, pool)
         if used.n_lines != whole.n_lines:

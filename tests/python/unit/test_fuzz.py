@@ -29,12 +29,14 @@ def test_nothing_breaks(tmp_path, name, monkeypatch):
     assert len(found) > 1, found
 
 
-def test_every_public_function_is_called(tmp_path):
+def test_every_public_function_is_called(tmp_path, monkeypatch):
     """With sound arguments each function answers, so that what is spoiled later would be a result."""
+    monkeypatch.chdir(tmp_path)
     part = make_part("calls", tmp_path)
     functions = {name for name, each in public_callables().items() if not isinstance(each, type)}
     assert functions <= {each.name for each in part.callables}
     assert functions <= part.sound.keys() | {"get_engine"}
+    assert {part.with_sound_arguments(each) for each in part.callables} == {"result"}
 
 
 def test_what_breaks_is_said(tmp_path, monkeypatch):
