@@ -209,7 +209,8 @@ def identify(
     """
     check_choice("method", method, _METHODS)
     if joint is not None:
-        if method != "compliance" or not isinstance(damping, str) or (damping, cross) != ("auto", "zero"):
+        is_free = isinstance(damping, str) and isinstance(cross, str) and (damping, cross) == ("auto", "zero")
+        if method != "compliance" or not is_free:
             raise ValueError("joint says which laws are fitted, by method 'compliance': leave damping and cross out")
         own = check_law_joint(joint, dofs)
         problem = prepare_compliance(

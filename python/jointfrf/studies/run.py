@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from jointfrf.cases.catalogue import find_case
 from jointfrf.cases.studied import StudiedGroup
 from jointfrf.errors import FileContentError
-from jointfrf.kernel.arguments import as_integer, check_type
+from jointfrf.kernel.arguments import as_integer, check_type, one_line
 from jointfrf.parallel.pool import AnyExecutor, Pool, check_progress, opened_pool
 from jointfrf.studies.design import StudyDesign, in_words
 from jointfrf.studies.result import StudyResult
@@ -196,6 +196,8 @@ def merge_studies(parts: Sequence[str | Path], out: str | Path) -> StudyResult:
     ...     jf.merge_studies(parts, Path(at) / "whole").missing
     0
     """
+    if isinstance(parts, str | Path) or not isinstance(parts, Iterable):
+        raise TypeError(f"parts must be a list of folders, not {one_line(parts)}")
     stores, target = [StudyStore(Path(part)) for part in parts], StudyStore(Path(out))
     if not stores:
         raise ValueError("no part of a study was named")

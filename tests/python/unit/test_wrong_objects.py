@@ -41,6 +41,11 @@ def swept(**options):
     jf.sweep(jf.invert, {"a": np.ones((2, 1, 1))}, np.zeros((2, 1, 1), complex), **options)
 
 
+def fitted_law(**options):
+    h = np.ones((9, 2, 2)) + np.eye(2)
+    return jf.identify(FREQUENCIES, h, **{"dofs": ["x"], "joint": jf.LawJoint({"x": SPRING})} | options)
+
+
 def realised(**options):
     return jf.identify_realisations(FREQUENCIES, [np.ones((9, 2, 2)) + np.eye(2)], **options)
 
@@ -112,6 +117,13 @@ def realised(**options):
         (lambda: swept(executor=list), "executor must make one of concurrent.futures, not list"),
         (lambda: swept(progress=False, jobs=1), "progress must be a function, not bool"),
         (lambda: swept(plan=1, jobs=1), "plan must be a SweepPlan, not int"),
+        (lambda: jf.smooth_frfs([], np.zeros((0, 1, 1))), "h has no frequency lines"),
+        (lambda: fitted_law(dofs=np.zeros((2, 2))), "dofs must be a sequence of names, not"),
+        (lambda: fitted_law(cross=np.zeros(2)), "joint says which laws are fitted"),
+        (lambda: jf.merge_studies("one", "all"), "parts must be a list of folders, not 'one'"),
+        (lambda: jf.merge_studies(2, "all"), "parts must be a list of folders, not 2"),
+        (lambda: jf.joint_channels(None, 3.0, [0, 0, 0]), "places must be a list of ChannelPlace, not float"),
+        (lambda: jf.virtual_point(np.eye(3), np.eye(3), [0, 0, 0], dofs=3), "dofs must be a sequence of names, not 3"),
         (lambda: jf.SeparateProcesses(0), "workers must be at least 1, not 0"),
         (lambda: jf.bolted_lap((0.1, 0.1, 0.1)), "lengths must be a pair, of A and of B, not"),
         (lambda: jf.bolted_lap(ends=["free"]), "ends must be a pair, of A and of B, not"),
