@@ -144,11 +144,11 @@ def _structures() -> dict[str, dict[str, Any]]:
 
 
 def _spring(freq_hz: Any, values: Any) -> Any:
-    return values[0] + 0j * freq_hz
+    return np.sum(values) + 0j * freq_hz
 
 
 def _slope(freq_hz: Any, values: Any) -> Any:
-    return np.ones((1, len(freq_hz))) + 0j
+    return np.ones((len(values), len(freq_hz))) + 0j
 
 
 def _identification(arrays: Mapping[str, Any]) -> dict[str, dict[str, Any]]:

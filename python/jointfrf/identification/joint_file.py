@@ -133,6 +133,6 @@ def write_joint(path: Path | str, joint: Joint | LawJoint) -> Path:
         raise TypeError(f"joint must be a Joint or a LawJoint, not {type(joint).__name__}")
     target = Path(path)
     if target.suffix.lower() != ".toml":
-        raise ValueError(f"a joint is written as TOML: name a file that ends in .toml, not {target.name}")
+        raise ValueError(f"a joint is written as TOML: name a file that ends in .toml, not {target.name!r}")
     write_file(target, joint_text(joint))
     return target

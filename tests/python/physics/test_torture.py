@@ -19,7 +19,7 @@ EPS = np.finfo(float).eps
 LINES = 4
 #: Rounding changes of the inputs, tried on the reference, and how many of the largest of them are allowed.
 TRIED, ALLOWED = 3, 60.0
-SCALES = {"1": 1.0, "1e-300": 1e-300, "1e300": 1e300, "1e-150": 1e-150, "1e150": 1e150}
+SCALES = {"1e-300": 1e-300, "1e300": 1e300, "1e-150": 1e-150, "1e150": 1e150}
 
 
 def kernel(operation, *m):

@@ -120,6 +120,7 @@ def realised(**options):
         (lambda: jf.smooth_frfs([], np.zeros((0, 1, 1))), "h has no frequency lines"),
         (lambda: fitted_law(dofs=np.zeros((2, 2))), "dofs must be a sequence of names, not"),
         (lambda: fitted_law(cross=np.zeros(2)), "joint says which laws are fitted"),
+        (lambda: jf.write_joint("a\nb", jf.Joint([1.0])), r"name a file that ends in .toml, not 'a\\nb'"),
         (lambda: jf.merge_studies("one", "all"), "parts must be a list of folders, not 'one'"),
         (lambda: jf.merge_studies(2, "all"), "parts must be a list of folders, not 2"),
         (lambda: jf.joint_channels(None, 3.0, [0, 0, 0]), "places must be a list of ChannelPlace, not float"),
