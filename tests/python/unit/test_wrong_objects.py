@@ -46,6 +46,15 @@ def fitted_law(**options):
     return jf.identify(FREQUENCIES, h, **{"dofs": ["x"], "joint": jf.LawJoint({"x": SPRING})} | options)
 
 
+def half_model():
+    """Its modes were those of the diagonal, without a word."""
+    return jf.Model(np.array([[3.0, 1.0], [0.0, 4.0]]), np.eye(2), ("x", "y"))
+
+
+def turned_model():
+    return jf.Model(np.array([[3.0, 1.0], [-1.0, 4.0]]), np.eye(2), ("x", "y"))
+
+
 def realised(**options):
     return jf.identify_realisations(FREQUENCIES, [np.ones((9, 2, 2)) + np.eye(2)], **options)
 
@@ -121,6 +130,10 @@ def realised(**options):
         (lambda: fitted_law(dofs=np.zeros((2, 2))), "dofs must be a sequence of names, not"),
         (lambda: fitted_law(cross=np.zeros(2)), "joint says which laws are fitted"),
         (lambda: jf.write_joint("a\nb", jf.Joint([1.0])), r"name a file that ends in .toml, not 'a\\nb'"),
+        (lambda: half_model().modes(), "stiffness holds its upper triangle only"),
+        (lambda: half_model().natural_frequencies(1), "stiffness holds its upper triangle only"),
+        (lambda: turned_model().modes(), "stiffness is not symmetric: the model has no real modes"),
+        (lambda: jf.beam(1, 3, youngs_modulus=1, density=1, width=1, height=1, poisson=-1), "poisson must lie between"),
         (lambda: jf.merge_studies("one", "all"), "parts must be a list of folders, not 'one'"),
         (lambda: jf.merge_studies(2, "all"), "parts must be a list of folders, not 2"),
         (lambda: jf.joint_channels(None, 3.0, [0, 0, 0]), "places must be a list of ChannelPlace, not float"),
