@@ -23,9 +23,9 @@ stamp=$venv/set-up
 
 say() { echo "jointfrf: $*" >&2; }
 
-# meson-python writes the path of the interpreter between apostrophes, as it is.
+# meson-python writes the path of the interpreter between apostrophes as it is, pip between quotation marks.
 case $root in
-  *[\'\\]*) say "a path with an apostrophe or a backslash cannot be built in, move the checkout: $root"; exit 1 ;;
+  *[\'\"\\]*) say "a path with a quotation mark or a backslash cannot be built in, move the checkout: $root"; exit 1 ;;
 esac
 
 # ---------------------------------------------------------------- what is there
