@@ -144,6 +144,8 @@ def identify_realisations(
     if start is not None:
         check_type("start", start, FitStart)
         near, known = start.estimate, replace(known, like=start.noise)
+    if not isinstance(gammas, Iterable):
+        raise TypeError(f"gammas must be a list of sets of FRFs, not {type(gammas).__name__}")
     for gamma in gammas:
         measured = as_measured(freq_hz, gamma, square=False)
         problem = replace(prepare_compliance(measured, dofs, bands, transform, known, options), near=near)
