@@ -23,6 +23,11 @@ stamp=$venv/set-up
 
 say() { echo "jointfrf: $*" >&2; }
 
+# meson-python writes the path of the interpreter between apostrophes as it is, pip between quotation marks.
+case $root in
+  *[\'\"\\]*) say "a path with a quotation mark or a backslash cannot be built in, move the checkout: $root"; exit 1 ;;
+esac
+
 # ---------------------------------------------------------------- what is there
 
 is_new_enough() { "$1" -c 'import sys; sys.exit(sys.version_info < (3, 11))' >/dev/null 2>&1; }

@@ -11,7 +11,7 @@ from typing import Literal, cast, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from jointfrf.kernel.arguments import FloatArray, as_names, as_real
+from jointfrf.kernel.arguments import FloatArray, as_names, as_real, check_type
 from jointfrf.spelling import did_you_mean
 
 __all__ = [
@@ -95,6 +95,7 @@ class Parameter:
         ValueError
             No such name.
         """
+        check_type("a parameter", name, str)
         kind, underscore, dofs = name.partition("_")
         row, _, column = dofs.partition(",")
         if kind not in get_args(ParameterKind) or not underscore or not row or dofs.endswith(","):

@@ -34,7 +34,7 @@ def check_file(path: Path) -> None:
         another limit.
     """
     if not path.exists():
-        raise FileNotFoundError(f"there is no file {path}")
+        raise FileNotFoundError("\\n".join(f"there is no file {path}".splitlines()))
     if path.is_dir():
         raise FileContentError(f"{path} is a folder, not a file")
     if not path.is_file():

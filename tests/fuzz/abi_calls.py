@@ -10,6 +10,7 @@ from __future__ import annotations
 import ctypes
 import re
 from collections.abc import Callable
+from math import prod
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,7 @@ _TYPES = {"integer": np.dtype(np.int32), "real": np.dtype(np.float64), "complex"
           "character": np.dtype("S1")}  # fmt: skip
 _GUARD = 8  # numbers before and after each array
 _PATTERN = 0x5A
+_EDGES = {dtype.itemsize: bytes([_PATTERN]) * (_GUARD * dtype.itemsize) for dtype in _TYPES.values()}
 #: An array beyond this is not made; a caller that has no such array makes no such call.
 _LARGEST = 20_000
 #: Words of letters by argument: all, and what is none of them.
@@ -67,7 +69,7 @@ class AbiCalls:
                 shape = tuple(self.shapes[size](numbers) for size in argument.shape)
                 if argument.name in _WORKSPACE:
                     shape = (max(1, numbers[f"l{argument.name}"]),)
-                if np.prod([max(n, 0) for n in shape], dtype=float) > _LARGEST:
+                if prod(max(n, 0) for n in shape) > _LARGEST:
                     return "left out: arrays too large"
                 arrays[argument.name] = _array(argument, shape, numbers, random)
         first = self._call(routine, numbers, arrays)
@@ -84,20 +86,18 @@ class AbiCalls:
         held: list[Any] = []
         guarded: dict[str, np.ndarray] = {}
         for argument in routine.arguments:
-            if argument.declared:
-                guarded[argument.name] = _guarded(arrays[argument.name])
-                held.append(guarded[argument.name][_GUARD:].ctypes.data_as(ctypes.c_void_p))
-            else:
-                number = np.array([numbers.get(argument.name, 0)], _TYPES[argument.type])
-                guarded[argument.name] = _guarded(number)
-                held.append(guarded[argument.name][_GUARD:].ctypes.data_as(ctypes.c_void_p))
+            values = arrays.get(argument.name)
+            if values is None:
+                values = np.array([numbers.get(argument.name, 0)], _TYPES[argument.type])
+            array = guarded[argument.name] = _guarded(values)
+            held.append(ctypes.c_void_p(array.__array_interface__["data"][0] + _GUARD * array.itemsize))
         before = {each.name: guarded[each.name].tobytes() for each in routine.arguments if each.intent == "in"}
         function = getattr(self.library, routine.name + "_")
         function.restype = None
         function(*held)
         for name, array in guarded.items():
-            edges = np.concatenate([array[:_GUARD], array[-_GUARD:]])
-            if (edges.view(np.uint8) != _PATTERN).any():
+            edge = _EDGES[array.itemsize]
+            if array[:_GUARD].tobytes() != edge or array[-_GUARD:].tobytes() != edge:
                 raise BrokenError(f"{routine.name} writes beyond {name}: {numbers}")
         for name, content in before.items():
             if guarded[name].tobytes() != content:
@@ -136,7 +136,7 @@ def _formula(text: str) -> Callable[[dict[str, Any]], int]:
     known = {"max": max, "min": min, "_merge": lambda a, b, c: a if c else b, "__builtins__": {}}
 
     def size(numbers: dict[str, Any]) -> int:
-        return int(eval(code, known, {key: value for key, value in numbers.items() if isinstance(value, int)}))
+        return int(eval(code, known, numbers))
 
     return size
 
@@ -187,7 +187,7 @@ def _integer(argument: Argument, n: int, is_wild: bool, random: np.random.Genera
 def _array(argument: Argument, shape: tuple[int, ...], numbers: dict[str, Any], random: np.random.Generator) -> Any:
     """Return what an array holds: numbers of many sizes, some of them none, or DOFs."""
     dtype = _TYPES[argument.type]
-    count = int(np.prod([max(size, 0) for size in shape]))
+    count = prod(max(size, 0) for size in shape)
     if argument.intent == "out" or argument.name in _WORKSPACE:
         values = np.empty(count, dtype)
         values.flags.writeable = False

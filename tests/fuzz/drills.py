@@ -194,7 +194,7 @@ def set_up(clone: Path, *, user: int | None = None, **variables: str) -> subproc
 #: No package can be fetched with these.
 OFFLINE = {"PIP_NO_INDEX": "1", "PIP_INDEX_URL": "http://127.0.0.1:9/", "http_proxy": "http://127.0.0.1:9",
            "https_proxy": "http://127.0.0.1:9"}  # fmt: skip
-_ODD = ("with blanks and 'quotes'", "größe-测试", "a$b;c&d", "-dash")
+_ODD = ("with blanks", "größe-测试", "a$b;c&d", "-dash")
 
 
 def set_ups(count: int, found: Found) -> None:
@@ -208,6 +208,8 @@ def set_ups(count: int, found: Found) -> None:
                 if each.returncode:
                     found.broken.append(f"set-up at {name!r}: status {each.returncode}\n{text[-1500:]}")
             found.counts["two set-ups at once at an odd place"] += 1
+            if any(each.returncode for each in both):
+                continue
             again = set_up(clone, **OFFLINE)
             text = again.communicate()[0]
             if again.returncode or text:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy import sparse
 
 import jointfrf as jf
 
@@ -52,6 +53,10 @@ def _arrays() -> dict[str, dict[str, Any]]:
             "h_a": c["h_a"], "h_b": c["h_b"], "k_joint": c["joint"].dynamic_stiffness(c["freq"]), "dofs_a": [1],
             "dofs_b": [0], "freq_hz": c["freq"],
         },
+        "couple (laws)": {
+            "h_a": c["h_a"], "h_b": c["h_b"], "k_joint": jf.LawJoint({"x": jf.PowerLaw(2e3, 1e2, 0.5)}), "dofs_a": [1],
+            "dofs_b": [0], "freq_hz": c["freq"],
+        },
         "modify": {"alpha": lines, "d": lines[:, :2, :2], "dofs": [1, 2], **out},
         "find_modification": {"alpha": lines, "gamma": lines + np.eye(4), **out},
         "ismm": {"alpha": c["alpha"], "gamma": c["gamma"], "k_initial": k0, "freq_hz": c["freq"]},
@@ -70,6 +75,7 @@ def _arrays() -> dict[str, dict[str, Any]]:
         "pollute": {"h": lines, "level": 0.05, "seed": 1},
         "realisations": {"h": lines, "level": 0.05, "seed": 1, "count": 2},
         "sweep": {"operation": jf.invert, "arrays": {"a": lines}, "out": np.empty((6, 4, 4), complex), "jobs": 1},
+        "SeparateProcesses": {"workers": 1},
         "plan_sweep": {"operation": jf.invert, "arrays": {"a": lines}, "out": np.empty((6, 4, 4), complex), "jobs": 1},
         "semm": {"h_model": lines, "h_measured": lines[:, :2, :2], "outputs": [0, 1], "inputs": [0, 1], **out},
         "band_mean": {"freq_hz": c["freq"], "k_joint": k0, "bands": (1.0, 9.0), "dofs": ["x"]},
@@ -86,6 +92,7 @@ def _arrays() -> dict[str, dict[str, Any]]:
         "propose_bands": {"freq_hz": c["freq"], "change": abs(c["gamma"][:, 0, 0]) + 1e-9},
         "monte_carlo": {
             "gamma": c["gamma"], "level": 0.05, "count": 3, "alpha": c["alpha"], "k_initial": k0, "freq_hz": c["freq"],
+            "method": "ismm",
         },
         "driving_point_check": {"h": c["gamma"]},
         "set_engine": {"engine": "auto"},
@@ -111,6 +118,10 @@ def _structures() -> dict[str, dict[str, Any]]:
             "freq_hz": [0.1, 0.2, 0.3], "stiffness": k, "mass": m, "loss_factor": 0.01, "outputs": [0, 1],
             "inputs": [2],
         },
+        "receptance (sparse)": {
+            "freq_hz": [0.1, 0.2, 0.3], "stiffness": sparse.csr_array(k), "mass": sparse.csr_array(m), "outputs": [1],
+            "structural_damping": sparse.csr_array(0.01 * k), "inputs": [2], "method": "krylov", "full_output": True,
+        },
         "from_triangle": {"matrix": np.triu(k + 1)},
         "assemble": {"a": c["a"], "b": c["b"], "joint": c["joint"], "dofs_a": [1], "dofs_b": [0]},
         "Joint": {"stiffness": [6e5, 5e3], "damping": [20, 1.5], "dofs": ["y", "theta"]},
@@ -132,12 +143,12 @@ def _structures() -> dict[str, dict[str, Any]]:
     }  # fmt: skip
 
 
-def _spring(values: Any, freq_hz: Any) -> Any:
-    return values[0] + 0j * freq_hz
+def _spring(freq_hz: Any, values: Any) -> Any:
+    return np.sum(values) + 0j * freq_hz
 
 
-def _slope(values: Any, freq_hz: Any) -> Any:
-    return np.ones((1, len(freq_hz))) + 0j
+def _slope(freq_hz: Any, values: Any) -> Any:
+    return np.ones((len(values), len(freq_hz))) + 0j
 
 
 def _identification(arrays: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
@@ -161,16 +172,31 @@ def _identification(arrays: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
         jf.Substructure(c["a"], ("2:x",)), jf.Substructure(c["b"], ("1:x",)),
         jf.LawJoint({"x": jf.SpringLaw(1900.0, 3.0)}),
     )  # fmt: skip
+    fit = {"freq_hz": freq, "gamma": gamma, "dofs": ["x"], "bands": (1.0, 9.0)}
+    first = c["first"].dynamic_stiffness(freq)
     cross = jf.Joint([[6e5, 5e3], [5e3, 5e3]], dofs=["y", "rz"])
     return {
-        "identify": {"freq_hz": freq, "gamma": gamma, "dofs": ["x"], "bands": (1.0, 9.0)},
+        "identify": fit,
+        "identify (ismm)": {**fit, "method": "ismm", "alpha": c["alpha"], "k_initial": first},
+        "identify (decoupling)": {
+            **fit, "gamma": c["whole"][:, :1, 3:], "method": "decoupling-rs", "h_a": c["h_a"], "h_b": c["h_b"],
+            "dofs_j": [1], "dofs_k": [0], "dofs_r": [0], "dofs_s": [1],
+        },
+        "identify (laws)": {**fit, "joint": jf.LawJoint({"x": jf.SpringLaw(1500.0, 2.0)}), "noise": 0.01},
         "identify_realisations": {"freq_hz": freq, "gammas": [gamma, gamma], "dofs": ["x"]},
         "identify_model": {
             "freq_hz": freq, "h": jf.pollute(c["whole"], 0.01, seed=2)[:, [0, 3]][:, :, [0, 3]], "assembly": assembly,
-            "responses": ["a:1:x", "b:2:x"], "forces": ["a:1:x", "b:2:x"], "noise": 0.01,
+            "responses": ["A/1:x", "B/2:x"], "forces": ["A/1:x", "B/2:x"], "noise": 0.01,
         },
         "check_frfs": {"freq_hz": freq, "h": gamma, "names": ["j:x", "k:x"]},
+        "check_frfs (transform)": {
+            "freq_hz": freq, "h": gamma, "responses": ["1:x", "2:x"], "forces": ["3:x", "4:x"],
+            "transform": (np.eye(2), np.eye(2)), "dofs": ["x"], "fix": ["gain", "sign"],
+        },
         "estimate_noise": {"freq_hz": freq, "h": gamma, "max_poles": 6},
+        "estimate_noise (coherence)": {
+            "freq_hz": freq, "h": gamma, "coherence": np.full(gamma.shape, 0.98), "averages": 8,
+        },
         "smooth_frfs": {"freq_hz": freq, "h": gamma, "max_poles": 6},
         "elastic_centre": {"joint": cross},
         "virtual_point": {
@@ -182,7 +208,7 @@ def _identification(arrays: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
         "sensor_consistency": {"h": rigid, "point": point},
         "impact_consistency": {"h": rigid, "point": point},
         "channel_geometry": {"channels": channels, "coordinates": places},
-        "multi_point_compliance": {"gamma": both, "side_j": point, "side_k": point},
+        "multi_point_compliance": {"gamma": both, "side_j": point, "side_k": point, "rank": 6},
         "multi_point_stiffness": {"gamma": both, "side_j": point, "side_k": point},
         "interface": {
             "points_j": [1, 2], "points_k": [3, 4], "dofs": ["y", "rz"],
@@ -251,6 +277,14 @@ def _files(folder: Path) -> dict[str, dict[str, Any]]:
         "study": {"case": "3.1", "out": folder / "another", "realisations": 2, "jobs": 1},
         "read_study": {"folder": first.folder},
         "merge_studies": {"parts": [first.folder], "out": folder / "merged"},
+        "study (design)": {
+            "case": "3.1",
+            "out": folder / "designed",
+            "realisations": 3,
+            "part": range(2),
+            "jobs": 1,
+            "design": jf.StudyDesign({"noise": [0.01, 0.05]}, estimators=["ismm"]),
+        },
         "StudyDesign": {"factors": {"noise": [0.01, 0.05]}, "estimators": ["ismm"]},
         "FrfMapping": {"freq_hz": "f", "h": "H"},
         **{f"write_{name}": arguments for name, arguments in written.items()},

@@ -39,7 +39,10 @@ _HIGHEST_SEED = 2**63 - 1
 
 
 class UnknownCaseError(ValueError):
-    """There is no such case."""
+    """There is no such case; one line, whatever was asked for."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__("\\n".join(message.splitlines()))
 
 
 @dataclass(frozen=True)

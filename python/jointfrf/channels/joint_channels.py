@@ -186,6 +186,8 @@ def joint_channels(
     """
     reference = as_real("at", at, (3,))
     references = {"j": reference, "k": reference if at_k is None else as_real("at_k", at_k, (3,))}
+    if not isinstance(places, Iterable):
+        raise TypeError(f"places must be a list of ChannelPlace, not {type(places).__name__}")
     given = list(places)
     _check_known(frfs, given)
     chosen = {

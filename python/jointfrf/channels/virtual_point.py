@@ -12,7 +12,7 @@ from jointfrf.channels.finite_differences import transform
 from jointfrf.channels.point_lines import Interface
 from jointfrf.dofs import DIRECTIONS, direction_names, direction_places, is_rotation, rigid_motion
 from jointfrf.frf.frf_set import Channel
-from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_dofs, as_real, as_square, check_type
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_dofs, as_names, as_real, as_square, check_type
 
 __all__ = [
     "VirtualPoint",
@@ -351,7 +351,7 @@ def _as_directions(directions: ArrayLike, m: int) -> FloatArray:
 
 
 def _as_names(dofs: Sequence[str]) -> tuple[str, ...]:
-    names = (dofs,) if isinstance(dofs, str) else tuple(dofs)
+    names = (dofs,) if isinstance(dofs, str) else as_names("dofs", dofs)
     if not names:
         raise ValueError("dofs must name at least one DOF")
     direction_places(names)

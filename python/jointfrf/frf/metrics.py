@@ -47,9 +47,12 @@ def peak(h: ArrayLike, freq_hz: ArrayLike, band: Band | None = None, *, refine: 
         return float(amplitude[at]), float(freq[at])
     if np.unique(freq[at - 1 : at + 2]).size < 3:
         raise ValueError(f"freq_hz: lines {at - 1} to {at + 1} are not at three frequencies, as refine needs them")
-    parabola = np.polyfit(freq[at - 1 : at + 2] - freq[at], np.log(amplitude[at - 1 : at + 2]), 2)
+    # In parts of the larger step: squares of steps of any size, where LAPACK would search for ever, have no place here.
+    steps = freq[at - 1 : at + 2] - freq[at]
+    width = abs(steps).max()
+    parabola = np.polyfit(steps / width, np.log(amplitude[at - 1 : at + 2]), 2)
     offset = -parabola[1] / (2 * parabola[0])
-    return float(np.exp(np.polyval(parabola, offset))), float(freq[at] + offset)
+    return float(np.exp(np.polyval(parabola, offset))), float(freq[at] + offset * width)
 
 
 def has_peak(h: ArrayLike, freq_hz: ArrayLike, band: Band) -> bool:

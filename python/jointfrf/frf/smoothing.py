@@ -133,6 +133,8 @@ def smooth_frfs(
     True
     """
     freq, lines = checked_frfs(freq_hz, h)
+    if freq.size == 0:
+        raise ValueError("h has no frequency lines")
     spread = None if variance is None else as_real("variance", variance, lines.shape)
     if spread is not None and not (spread > 0).all():
         raise ValueError("variance must be positive")

@@ -209,7 +209,8 @@ def identify(
     """
     check_choice("method", method, _METHODS)
     if joint is not None:
-        if method != "compliance" or not isinstance(damping, str) or (damping, cross) != ("auto", "zero"):
+        is_free = isinstance(damping, str) and isinstance(cross, str) and (damping, cross) == ("auto", "zero")
+        if method != "compliance" or not is_free:
             raise ValueError("joint says which laws are fitted, by method 'compliance': leave damping and cross out")
         own = check_law_joint(joint, dofs)
         problem = prepare_compliance(
@@ -222,10 +223,9 @@ def identify(
         _warn(laws.warnings)
         return laws.fit
     if method == "compliance":
-        words = damping if isinstance(damping, str) else tuple(damping)
         problem = prepare_compliance(
             as_measured(freq_hz, gamma, square=False), dofs, bands, transform,
-            NoiseOptions(noise, coherence, averages), FitOptions(words, cross, reciprocal),
+            NoiseOptions(noise, coherence, averages), FitOptions(damping, cross, reciprocal),
         )  # fmt: skip
         if reciprocal:
             _look_at(problem, transform)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jointfrf.errors import FileContentError
-from jointfrf.files import write_file
+from jointfrf.files import check_file, write_file
 from jointfrf.identification.joint_fit import JointFit
 from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import FloatArray, as_real
@@ -50,8 +50,7 @@ def read_joint_file(path: Path) -> JointFile:
     FileContentError
         It is no joint, or something in it is wrong.
     """
-    if not path.is_file():
-        raise FileNotFoundError(f"there is no file {path}")
+    check_file(path)
     return _written(read_toml(path)) if path.suffix.lower() == ".toml" else _saved(path)
 
 
@@ -134,6 +133,6 @@ def write_joint(path: Path | str, joint: Joint | LawJoint) -> Path:
         raise TypeError(f"joint must be a Joint or a LawJoint, not {type(joint).__name__}")
     target = Path(path)
     if target.suffix.lower() != ".toml":
-        raise ValueError(f"a joint is written as TOML: name a file that ends in .toml, not {target.name}")
+        raise ValueError(f"a joint is written as TOML: name a file that ends in .toml, not {target.name!r}")
     write_file(target, joint_text(joint))
     return target

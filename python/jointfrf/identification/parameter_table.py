@@ -6,9 +6,17 @@ import textwrap
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
-from jointfrf.kernel.arguments import FloatArray
+from jointfrf.kernel.arguments import FloatArray, one_line
 
-__all__ = ["ListedParameter", "ShownParameter", "columns_of", "correlation_notes", "parameter_warnings", "wrapped"]
+__all__ = [
+    "ListedParameter",
+    "ShownParameter",
+    "columns_of",
+    "correlation_notes",
+    "parameter_warnings",
+    "unit_of",
+    "wrapped",
+]
 
 #: Columns of a printed fit.
 _WIDTH = 80
@@ -40,6 +48,14 @@ class ShownParameter(ListedParameter, Protocol):
     @property
     def is_log(self) -> bool:
         """Whether it was sought as its logarithm."""
+
+
+def unit_of(name: str, listed: Sequence[ListedParameter]) -> str:
+    """Return the unit of the parameter of this name; ValueError where there is none."""
+    for one in listed:
+        if one.name == name:
+            return one.unit
+    raise ValueError(f"there is no parameter {one_line(name)}, only {', '.join(one.name for one in listed)}")
 
 
 def wrapped(text: str) -> str:

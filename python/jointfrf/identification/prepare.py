@@ -14,6 +14,7 @@ from jointfrf.kernel.arguments import (
     FloatArray,
     as_frequency,
     as_lines,
+    as_names,
     as_real,
     as_square,
     check_finite_lines,
@@ -58,7 +59,7 @@ def as_measured(freq_hz: ArrayLike, gamma: ArrayLike, *, square: bool = True) ->
 
 def as_dof_names(dofs: Sequence[str] | None, n: int) -> tuple[str, ...]:
     """Return the names of the n joint DOFs, by default their numbers."""
-    names = tuple(str(i) for i in range(n)) if dofs is None else tuple(dofs)
+    names = tuple(str(i) for i in range(n)) if dofs is None else as_names("dofs", dofs)
     if len(names) != n or len(set(names)) != n or not all(names) or any("," in name for name in names):
         raise ValueError(f"dofs must name {n} different joint DOFs without commas, not {', '.join(names) or 'none'}")
     return names

@@ -18,7 +18,7 @@ from jointfrf.identification.compliance_fit.joint_terms import CrossTerms, Dampi
 from jointfrf.identification.compliance_fit.prepare import FitOptions, prepare_compliance
 from jointfrf.identification.joint_fit import JointFit
 from jointfrf.identification.prepare import BandsOfDofs, as_measured
-from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, check_type
 
 __all__ = ["FitStart", "identify_realisations", "viscous_estimate"]
 
@@ -78,7 +78,7 @@ class FitStart(NamedTuple):
         ValueError
             As `identify`.
         """
-        options = FitOptions(damping if isinstance(damping, str) else tuple(damping), cross, reciprocal=True)
+        options = FitOptions(damping, cross, reciprocal=True)
         measured = as_measured(freq_hz, gamma, square=False)
         problem = prepare_compliance(measured, dofs, None, None, NoiseOptions(None), options)
         return cls(fit_compliance(problem).estimate, problem.noise.model)
@@ -140,10 +140,13 @@ def identify_realisations(
     >>> bool(abs(np.mean(k) / 2000 - 1) < 0.005), bool(np.std(k) / 2000 < 0.01)
     (True, True)
     """
-    options = FitOptions(damping if isinstance(damping, str) else tuple(damping), cross, reciprocal)
+    options = FitOptions(damping, cross, reciprocal)
     known, near = NoiseOptions(noise), None
     if start is not None:
+        check_type("start", start, FitStart)
         near, known = start.estimate, replace(known, like=start.noise)
+    if not isinstance(gammas, Iterable):
+        raise TypeError(f"gammas must be a list of sets of FRFs, not {type(gammas).__name__}")
     for gamma in gammas:
         measured = as_measured(freq_hz, gamma, square=False)
         problem = replace(prepare_compliance(measured, dofs, bands, transform, known, options), near=near)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from jointfrf.dofs import DIRECTIONS, direction_places, rigid_offset
-from jointfrf.kernel.arguments import FloatArray, as_real, check_choice
+from jointfrf.kernel.arguments import FloatArray, as_nodes, as_real, check_choice
 
 __all__ = ["CardFormat", "CardOptions", "cards"]
 
@@ -199,9 +199,10 @@ def _number(name: str, value: int) -> int:
 
 
 def _two_nodes(name: str, nodes: Sequence[int]) -> tuple[int, int]:
-    if len(nodes) != 2 or nodes[0] == nodes[1]:
+    two = as_nodes(name, nodes)
+    if len(two) != 2 or two[0] == two[1]:
         raise ValueError(f"{name} must be two different nodes, not {reprlib.repr(nodes)}")
-    return _number(name, nodes[0]), _number(name, nodes[1])
+    return _number(name, two[0]), _number(name, two[1])
 
 
 def _coupled(link: _Link) -> bool:

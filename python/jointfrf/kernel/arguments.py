@@ -193,10 +193,13 @@ def check_type(name: str, value: object, kind: type) -> None:
 
 
 def as_names(name: str, value: object) -> tuple[str, ...]:
-    """Return a sequence of names; one text is none, though its letters are."""
+    """Return a sequence of names, each in one line; one text is none, though its letters are."""
     if isinstance(value, Iterable) and not isinstance(value, str):
         listed = list(value)
         if all(isinstance(each, str) for each in listed):
+            split = next((each for each in listed if each and each.splitlines() != [each]), None)
+            if split is not None:
+                raise ValueError(f"{name} must hold names without line breaks, not {one_line(split)}")
             return tuple(map(str, listed))
     raise TypeError(f"{name} must be a sequence of names, not {one_line(value)}")
 

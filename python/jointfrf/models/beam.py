@@ -95,6 +95,8 @@ def beam(
             raise ValueError(f"{name} must be positive, not {value}")
     if as_number("n_elements", n_elements) < 1 or int(n_elements) != n_elements:
         raise ValueError(f"n_elements must be a whole number, at least 1, not {n_elements}")
+    if not -1 < as_number("poisson", poisson) < 0.5:
+        raise ValueError(f"poisson must lie between -1 and 0.5, not {poisson}")
     viscous = tuple(as_real("viscous", viscous, (2,)).tolist())
 
     area = width * height

@@ -14,7 +14,7 @@ from scipy.sparse import linalg as sparse_linalg
 from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_dofs, as_names, check_type
 from jointfrf.laws.law_joint import LawJoint
-from jointfrf.models.matrices import Matrix
+from jointfrf.models.matrices import Matrix, ModelMatrices
 from jointfrf.models.receptance.receptance import ReceptanceMethod, receptance
 
 __all__ = ["Model", "assemble"]
@@ -157,10 +157,14 @@ class Model:
         Raises
         ------
         ValueError
-            There are no modes: mass or stiffness is negative, or a motion has neither.
+            There are no modes: mass or stiffness is negative or not symmetric, or a motion has neither.
         """
         n = len(self.dofs)
-        k, m = sparse.csc_array(self.stiffness), sparse.csc_array(self.mass)
+        matrices = ModelMatrices(self.stiffness, self.mass, None, None, 0.0)
+        for name in ("stiffness", "mass"):
+            if not matrices.is_symmetric(name):  # half of it would be read
+                raise ValueError(f"{name} is not symmetric: the model has no real modes")
+        k, m = matrices.sparse("stiffness"), matrices.sparse("mass")
         try:
             if count is None or count > n - 2 or n <= _DENSE_LIMIT:
                 squared, shapes = _all_modes(k.toarray(), m.toarray())

@@ -10,9 +10,9 @@ from queue import SimpleQueue
 from typing import Any, Generic, TypeVar
 
 from jointfrf.parallel.cores import available_cores
-from jointfrf.parallel.processes import SeparateProcesses
+from jointfrf.parallel.processes import SeparateProcesses, as_workers
 
-__all__ = ["AnyExecutor", "BrokenPoolError", "Pool", "opened_pool"]
+__all__ = ["AnyExecutor", "BrokenPoolError", "Pool", "check_progress", "opened_pool"]
 
 _T = TypeVar("_T")
 _R = TypeVar("_R")
@@ -156,17 +156,33 @@ def opened_pool(executor: AnyExecutor | None = None, jobs: int | None = None) ->
     jobs : int, optional
         Workers: processes where there is no executor, one of them this one; otherwise what bounds the number of tasks
         submitted at the same time, by default what the executor says of itself.
+
+    Raises
+    ------
+    TypeError, ValueError
+        An executor that is none, a number of workers that is not a whole number from 1.
     """
+    jobs = None if jobs is None else as_workers("jobs", jobs)
     if isinstance(executor, Executor):
         yield Pool(executor, jobs or _workers_of(executor))
         return
+    if executor is not None and not callable(executor):
+        raise TypeError(f"executor must be one of concurrent.futures, or make one, not {type(executor).__name__}")
     make = executor if executor is not None else _own(jobs or available_cores())
     own = make()
+    if not callable(getattr(own, "submit", None)):
+        raise TypeError(f"executor must make one of concurrent.futures, not {type(own).__name__}")
     pool: Pool[Any] = Pool(own, jobs or _workers_of(own), None if isinstance(own, _InThisThread) else make)
     try:
         yield pool
     finally:
         pool.executor.shutdown(wait=True)
+
+
+def check_progress(progress: object) -> None:
+    """Raise unless what is told of the progress can be called."""
+    if progress is not None and not callable(progress):
+        raise TypeError(f"progress must be a function, not {type(progress).__name__}")
 
 
 def _own(jobs: int) -> Callable[[], Executor]:

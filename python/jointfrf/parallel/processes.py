@@ -12,12 +12,22 @@ from queue import Empty, SimpleQueue
 from threading import Lock, Thread
 from typing import Any, ParamSpec, TypeVar
 
-__all__ = ["SeparateProcesses", "begin_process"]
+from jointfrf.kernel.arguments import as_integer
+
+__all__ = ["SeparateProcesses", "as_workers", "begin_process"]
 
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
 #: A task that ends so many processes ends every one.
 _ATTEMPTS = 3
+
+
+def as_workers(name: str, value: object) -> int:
+    """Return a number of workers."""
+    count = as_integer(name, value)
+    if count < 1:
+        raise ValueError(f"{name} must be at least 1, not {count}")
+    return count
 
 
 def begin_process() -> None:
@@ -46,6 +56,11 @@ class SeparateProcesses(Executor):
     ----------
     workers : int
 
+    Raises
+    ------
+    TypeError, ValueError
+        `workers` is no whole number from 1.
+
     Notes
     -----
     `concurrent.futures.ProcessPoolExecutor` ends all of its processes when one of them dies. Here another process is
@@ -53,10 +68,10 @@ class SeparateProcesses(Executor):
     """
 
     def __init__(self, workers: int) -> None:
-        self.workers = workers
+        self.workers = as_workers("workers", workers)
         self._tasks: SimpleQueue[tuple[Future[Any], Callable[[ProcessPoolExecutor], Any]] | None] = SimpleQueue()
         self._lock, self._is_open = Lock(), True
-        self._threads = [Thread(target=self._serve, daemon=True) for _ in range(workers)]
+        self._threads = [Thread(target=self._serve, daemon=True) for _ in range(self.workers)]
         for thread in self._threads:
             thread.start()
 

@@ -17,9 +17,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from jointfrf.errors import IllConditionedWarning, SingularLineError
+from jointfrf.kernel.arguments import check_type
 from jointfrf.parallel.line_arrays import Lines, lines_of
 from jointfrf.parallel.one_thread import one_thread
-from jointfrf.parallel.pool import AnyExecutor, BrokenPoolError, Pool, opened_pool
+from jointfrf.parallel.pool import AnyExecutor, BrokenPoolError, Pool, check_progress, opened_pool
 from jointfrf.parallel.sweep_plan import SHARE, SweepCost, SweepPlan, planned_sweep
 
 __all__ = ["plan_sweep", "sweep"]
@@ -202,6 +203,9 @@ def sweep(
     True
     """
     whole = _checked(operation, arrays, out)
+    check_progress(progress)
+    if plan is not None:
+        check_type("plan", plan, SweepPlan)
     unit = lcm(SHARE, whole.out.step)
     if not 0 <= index(first) < whole.n_lines or first % unit:
         raise ValueError(f"first must be a multiple of {unit} from 0 to {whole.n_lines - 1}, not {first}")

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from jointfrf.kernel.arguments import FloatArray, as_number, check_choice
+from jointfrf.kernel.arguments import FloatArray, as_number, check_choice, check_type, one_line
 from jointfrf.models.beam import End
 from jointfrf.solids.bolt import Bolt
 from jointfrf.solids.brick import Material, brick_quality
@@ -169,6 +169,8 @@ def bolted_lap(
     ValueError
         A dimension that is not positive; a hole that is not wider than the shank; a head or nut that does not cover the
         hole or reaches beyond the overlap; bricks that are badly shaped.
+    TypeError
+        Not a pair where one is asked for; a bolt, material or divisions of another kind.
 
     Examples
     --------
@@ -177,7 +179,13 @@ def bolted_lap(
     >>> len(lap.mesh.elements), {name: len(pairs.area) for name, pairs in lap.interfaces.items()}
     (3840, {'head': 96, 'lap': 288, 'nut': 96})
     """
-    fastener, bricks = bolt or Bolt(), divisions or LapDivisions()
+    fastener = Bolt() if bolt is None else bolt
+    bricks = LapDivisions() if divisions is None else divisions
+    check_type("bolt", fastener, Bolt)
+    check_type("divisions", bricks, LapDivisions)
+    _check_pairs(lengths=lengths, heights=heights, materials=materials, ends=ends)
+    for material in materials:
+        check_type("materials", material, Material)
     _check_dimensions(lengths, heights, width, overlap, hole_radius, fastener)
     check_choice("preset", preset, get_args(Preset))
     for end in ends:
@@ -206,6 +214,12 @@ def bolted_lap(
         axis=np.array([0.0, 0.0, start + overlap / 2]),
         preset=preset,
     )
+
+
+def _check_pairs(**pairs: object) -> None:
+    for name, pair in pairs.items():
+        if not isinstance(pair, list | tuple | np.ndarray) or len(pair) != 2:
+            raise TypeError(f"{name} must be a pair, of A and of B, not {one_line(pair)}")
 
 
 def _check_dimensions(

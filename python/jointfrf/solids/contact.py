@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 from scipy.sparse import linalg as sparse_linalg
 
-from jointfrf.kernel.arguments import FloatArray, as_real
+from jointfrf.kernel.arguments import FloatArray, as_integer, as_real
 from jointfrf.models.receptance.factors import SYMMETRIC
 from jointfrf.solids.contact_pairs import NORMAL, TANGENTIAL, BoolArray, ContactInterface, ContactLaw, Pairs, tie
 
@@ -166,12 +166,12 @@ def solve_contact(
     """
     k = sparse.csr_array(stiffness)
     f = as_real("load", load, (k.shape[0],))
-    if int(max_iterations) != max_iterations or max_iterations < 1:
+    if as_integer("max_iterations", max_iterations) < 1:
         raise ValueError(f"max_iterations must be a whole number, at least 1, not {max_iterations}")
     if not f.any():
         raise ValueError("load must not be zero everywhere")
     problem = _Problem(k, f, Pairs(interfaces, k.shape[0]), law or ContactLaw(), np.asarray(fixed, np.int64))
-    return problem.iterate(int(max_iterations))
+    return problem.iterate(max_iterations)
 
 
 @dataclass

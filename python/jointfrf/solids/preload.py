@@ -10,7 +10,7 @@ import numpy as np
 from scipy import sparse
 
 from jointfrf.dofs import DIRECTIONS
-from jointfrf.kernel.arguments import FloatArray, as_number
+from jointfrf.kernel.arguments import FloatArray, as_number, check_type
 from jointfrf.solids.bolted_lap import BoltedLap
 from jointfrf.solids.brick import Formulation, assemble_bricks
 from jointfrf.solids.brick_beam import PRESETS
@@ -127,6 +127,8 @@ def preload(lap: BoltedLap, force: float, law: ContactLaw | None = None, *, max_
     ValueError
         A force that is not positive; no clamped end; contact that does not converge, opens everywhere, or leaves a body
         free to move.
+    TypeError
+        A lap or a law of another kind.
 
     Notes
     -----
@@ -154,11 +156,14 @@ def preload(lap: BoltedLap, force: float, law: ContactLaw | None = None, *, max_
     >>> {name: round(state.normal_force, 6) for name, state in tight.interfaces.items()}
     {'head': 20000.0, 'lap': 20000.0, 'nut': 20000.0}
     """
+    check_type("lap", lap, BoltedLap)
+    used = ContactLaw() if law is None else law
+    check_type("law", used, ContactLaw)
     if as_number("force", force) <= 0:
         raise ValueError(f"force must be positive, not {force:g} N")
     if lap.clamped.size == 0:
         raise ValueError("lap is not supported: one of its ends must be clamped")
-    used, formulation = law or ContactLaw(), PRESETS[lap.preset]
+    formulation = PRESETS[lap.preset]
     k, _ = assemble_bricks(lap.mesh.nodes, lap.mesh.elements, lap.element_materials(), formulation)
     coupling, own = _cut(lap, formulation)
     column = sparse.csr_array(coupling[:, None])

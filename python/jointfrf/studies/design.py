@@ -6,17 +6,19 @@ import copy
 import json
 import re
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 from pathlib import Path
 from typing import Any, Literal, get_args
 
+import numpy as np
+
 from jointfrf.cases.catalogue import read_case_of
 from jointfrf.cases.kind import Case, CaseKind
 from jointfrf.cases.studied import Estimator, Pollution, StudyChoice
 from jointfrf.errors import FileContentError
-from jointfrf.kernel.arguments import check_choice
+from jointfrf.kernel.arguments import as_names, check_choice, check_type, one_line
 from jointfrf.spelling import did_you_mean
 from jointfrf.toml.table import TomlTable, read_toml
 
@@ -74,6 +76,8 @@ class StudyDesign:
     ------
     ValueError
         A factor without values, the same value twice, an unknown arrangement.
+    TypeError
+        No mapping of names to values, names that are none, an estimator or a noise that is no function.
 
     Examples
     --------
@@ -90,13 +94,18 @@ class StudyDesign:
     own_noises: Mapping[str, Pollution] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Check the factors."""
+        """Check factors, and the kinds of the others; whether a case knows their names is seen with the case."""
         check_choice("arrangement", self.arrangement, get_args(Arrangement))
-        for name, values in self.factors.items():
-            if isinstance(values, str) or not len(values):
-                raise ValueError(f"factor {name!r} must have a list of values, not {values!r}")
-            if len({repr(value) for value in values}) < len(values):
-                raise ValueError(f"factor {name!r} has a value twice: {', '.join(map(str, values))}")
+        check_type("factors", self.factors, Mapping)
+        as_names("factors", self.factors)
+        object.__setattr__(self, "factors", {name: _values_of(name, each) for name, each in self.factors.items()})
+        as_names("noises", self.noises)
+        as_names("estimators", self.estimators)
+        if isinstance(self.estimators, Mapping):
+            _check_functions("estimators", {key: own for key, own in self.estimators.items() if own is not None})
+        check_type("own_noises", self.own_noises, Mapping)
+        as_names("own_noises", self.own_noises)
+        _check_functions("own_noises", self.own_noises)
 
     @property
     def points(self) -> list[StudyPoint]:
@@ -140,6 +149,27 @@ class StudyDesign:
             "noises": list(choice.noises) + list(choice.own_noises),
             "estimators": list(choice.estimators) + list(choice.own_estimators),
         }
+
+
+def _values_of(name: str, values: Any) -> list[FactorValue]:
+    """Return the values of a factor as a case file has them."""
+    if isinstance(values, str | bytes) or not isinstance(values, Iterable):
+        raise TypeError(f"factor {name!r} must have a list of values, not {one_line(values)}")
+    found = [value.item() if isinstance(value, np.generic) else value for value in values]
+    if not found:
+        raise ValueError(f"factor {name!r} must have a list of values, not an empty one")
+    for value in found:
+        if not isinstance(value, FactorValue):
+            raise TypeError(f"factor {name!r} takes numbers and words, not {one_line(value)}")
+    if len({repr(value) for value in found}) < len(found):
+        raise ValueError(f"factor {name!r} has a value twice: {', '.join(map(str, found))}")
+    return found
+
+
+def _check_functions(name: str, functions: Mapping[str, object]) -> None:
+    for key, each in functions.items():
+        if not callable(each):
+            raise TypeError(f"{name}: {key!r} must be a function, not {type(each).__name__}")
 
 
 def in_words(point: StudyPoint) -> str:

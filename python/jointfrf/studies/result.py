@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from jointfrf.kernel.arguments import FloatArray
+from jointfrf.kernel.arguments import FloatArray, as_integer
 from jointfrf.report.figure import Figure
 from jointfrf.report.table import Table, as_text
 from jointfrf.studies.figures import study_figures
@@ -72,7 +72,14 @@ class StudyResult:
             Of the realisations.
         values, low, high : ndarray, shape (r, n_columns)
             Estimates and the limits of their 95 % intervals in the units of the columns; NaN where there are none.
+
+        Raises
+        ------
+        ValueError
+            There is no such group.
         """
+        if not 0 <= as_integer("group", group) < len(self.groups):
+            raise ValueError(f"group must be from 0 to {len(self.groups) - 1}, not {group}")
         columns = len(self.groups[group].columns)
         numbers, parts = [np.empty(0, np.int64)], [np.empty((3, 0, columns))]
         for first, estimates in self._store.chunks(group):

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
-from operator import index
 from pathlib import Path
 
 from jointfrf.cases.catalogue import find_case
 from jointfrf.cases.studied import StudiedGroup
 from jointfrf.errors import FileContentError
-from jointfrf.parallel.pool import AnyExecutor, Pool, opened_pool
+from jointfrf.kernel.arguments import as_integer, check_type, one_line
+from jointfrf.parallel.pool import AnyExecutor, Pool, check_progress, opened_pool
 from jointfrf.studies.design import StudyDesign, in_words
 from jointfrf.studies.result import StudyResult
 from jointfrf.studies.schedule import Schedule, compute_chunk
@@ -93,7 +93,10 @@ def study(
     >>> [(row.point["noise"], row.parameter, abs(row.bias / row.actual) < 0.05) for row in rows][::2]
     [(0.02, 'k_x', True), (0.05, 'k_x', True)]
     """
-    folder, plan = find_case(str(case)).resolve(), design or StudyDesign()
+    plan = StudyDesign() if design is None else design
+    check_type("design", plan, StudyDesign)
+    check_progress(progress)
+    folder = find_case(str(case)).resolve()
     store, identity = StudyStore(Path(out)), plan.identity(folder)
     held = store.check(identity) if store.exists else None
     groups: list[StudiedGroup] = []
@@ -142,14 +145,16 @@ def _prepared(folder: Path, design: StudyDesign, realisations: int | None) -> tu
 
 
 def _count(realisations: int) -> int:
-    if not 1 <= index(realisations) <= _MOST:
+    count = as_integer("realisations", realisations)
+    if not 1 <= count <= _MOST:
         raise ValueError(f"realisations must be from 1 to {_MOST}, not {realisations}")
-    return index(realisations)
+    return count
 
 
 def _wanted(part: range | None, realisations: int) -> Span:
     if part is None:
         return Span(0, realisations)
+    check_type("part", part, range)
     if part.step != 1 or not len(part) or part.start < 0 or part.stop > realisations:
         raise ValueError(
             f"a part must be realisations in a row, at least one, from 0 to {realisations - 1}, not {part.start} to "
@@ -191,6 +196,8 @@ def merge_studies(parts: Sequence[str | Path], out: str | Path) -> StudyResult:
     ...     jf.merge_studies(parts, Path(at) / "whole").missing
     0
     """
+    if isinstance(parts, str | Path) or not isinstance(parts, Iterable):
+        raise TypeError(f"parts must be a list of folders, not {one_line(parts)}")
     stores, target = [StudyStore(Path(part)) for part in parts], StudyStore(Path(out))
     if not stores:
         raise ValueError("no part of a study was named")

@@ -16,7 +16,7 @@ import numpy as np
 
 from jointfrf.cases.studied import Estimates, StudiedColumn
 from jointfrf.errors import FileContentError
-from jointfrf.files import write_file, written_whole
+from jointfrf.files import check_file, write_file, written_whole
 from jointfrf.studies.design import StudyPoint, as_text_of
 
 __all__ = ["GroupRecord", "Span", "StudyRecord", "StudyStore"]
@@ -113,6 +113,7 @@ class StudyStore:
         """
         path = self.folder / "study.json"
         try:
+            check_file(path)
             held = json.loads(path.read_text(encoding="utf-8"))
             if held["format"] != _FORMAT:
                 raise FileContentError(f"{path}: format {held['format']} was written by another version of jointfrf")
@@ -204,6 +205,7 @@ class StudyStore:
 
 def _read_chunk(path: Path, skip: int) -> Estimates:
     try:
+        check_file(path)
         with path.open("rb") as file, np.load(file, allow_pickle=False) as held:
             values = held["values"][skip:]
             if "low" not in held:

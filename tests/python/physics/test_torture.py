@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import jointfrf as jf
-from torture import KINDS, LONG, OPERATIONS, REFERENCES, is_longer, matrices, rounded, solved
+from torture import KINDS, LONG, OMEGA, OPERATIONS, REFERENCES, is_longer, matrices, rounded, solved
 
 pytestmark = pytest.mark.skipif(not is_longer(), reason="long double is double on this machine")
 
@@ -19,7 +19,7 @@ EPS = np.finfo(float).eps
 LINES = 4
 #: Rounding changes of the inputs, tried on the reference, and how many of the largest of them are allowed.
 TRIED, ALLOWED = 3, 60.0
-SCALES = {"1": 1.0, "1e-300": 1e-300, "1e300": 1e300, "1e-150": 1e-150, "1e150": 1e150}
+SCALES = {"1e-300": 1e-300, "1e300": 1e300, "1e-150": 1e-150, "1e150": 1e150}
 
 
 def kernel(operation, *m):
@@ -34,9 +34,24 @@ def kernel(operation, *m):
             return jf.modify(*m, at, on_singular="nan")
         if name == "decouple":
             return jf.decouple(equation, *m, at, at, far, far, on_singular="nan")
+        if name == "receptance":
+            return np.concatenate([_receptance(*each) for each in zip(*m, strict=True)])
+        if name == "reciprocal_condition":
+            rcond = jf.reciprocal_condition(*m)[:, None, None]
+            return np.where(rcond == 0, np.nan, rcond)
+        if name == "compliance_factors":
+            return jf.compliance_factors(m[0], m[1][0].real, on_singular="nan")["uv".index(equation)]
+        if name == "compliance_covariance":
+            is_reciprocal = equation == "reciprocal"
+            return jf.compliance_covariance(m[0], m[2].real, m[1][0].real, reciprocal=is_reciprocal, on_singular="nan")
         if name == "transform":
             return jf.transform(m[0], m[1][0].real, m[2][0].real, on_singular="nan")
         return getattr(jf, name)(*m, on_singular="nan")
+
+
+def _receptance(k, m):
+    own = {"damping": m.imag, "structural_damping": k.imag, "method": "dense", "on_singular": "nan"}
+    return jf.receptance([OMEGA / (2 * np.pi)], k.real, m.real, **own)
 
 
 def arguments(operation, kind, random, n, scale):
@@ -46,7 +61,12 @@ def arguments(operation, kind, random, n, scale):
     if operation == "transform":
         found[1:] = [np.broadcast_to((each.real + each.imag)[0], each.shape) for each in found[1:]]
         return [found[0] * scale, *found[1:]]
-    if operation == "solve":
+    if operation.startswith("compliance_"):
+        found[1] = np.broadcast_to((found[1].real + found[1].imag)[0], found[1].shape)
+        return [found[0] * scale, found[1], *(abs(each) for each in found[2:])]
+    if operation == "receptance" and not all(np.tril(each, -1).any() and np.triu(each, 1).any() for each in found):
+        found = [each + each.swapaxes(1, 2) for each in found]  # half of a matrix is refused
+    if operation in ("solve", "receptance"):
         return [each * scale for each in found]
     inverse = 1.0 if operation.startswith("decouple") else 1 / scale
     return [each * (scale if size == 2 else 1 / scale if inverse != 1.0 else scale) for each, size in
@@ -60,7 +80,7 @@ def norms(a):
 def changed(random, m, operation):
     """The same to rounding: by eps of the largest number of the line; a transform by eps of each."""
     noise = random.uniform(-1, 1, m.shape) + 1j * random.uniform(-1, 1, m.shape)
-    if operation == "transform":
+    if operation == "transform" or (operation.startswith("compliance_") and not np.iscomplexobj(m)):
         return m.astype(LONG) * (1 + EPS * noise.real)
     return m.astype(LONG) + EPS * norms(m.astype(LONG)) * noise
 
@@ -118,7 +138,8 @@ def test_every_operation_on_every_kind(operation):
 
 
 @pytest.mark.parametrize("operation", ["invert", "solve", "inverse_substructuring", "joint_compliance", "transform",
-                                       "couple", "ismm"])  # fmt: skip
+                                       "couple", "ismm", "receptance", "reciprocal_condition", "compliance_factors u",
+                                       "compliance_covariance"])  # fmt: skip
 @pytest.mark.parametrize("scale", SCALES)
 def test_every_scale(operation, scale):
     """Products of two sizes may overflow where the result does not: such lines have a code, never wrong numbers."""

@@ -11,9 +11,11 @@ from contextlib import contextmanager
 
 import numpy as np
 
-__all__ = ["KINDS", "LONG", "OPERATIONS", "REFERENCES", "is_longer", "matrices", "rounded", "solved"]
+__all__ = ["KINDS", "LONG", "OMEGA", "OPERATIONS", "REFERENCES", "is_longer", "matrices", "rounded", "solved"]
 
 Lines = np.ndarray
+#: Angular frequency of receptances, rad/s; mass and damping times it are of the size of the stiffness.
+OMEGA = 0.75
 LONG = np.clongdouble
 
 
@@ -214,12 +216,20 @@ REFERENCES: dict[str, Callable[..., Lines]] = {
     "decouple sr": lambda a, b, c: _decouple("sr", a, b, c),
     "decouple ss": lambda a, b, c: _decouple("ss", a, b, c),
     "transform": lambda h, t, u: t @ h @ u.swapaxes(1, 2),
+    "receptance": lambda k, m: _inverse(k - OMEGA**2 * m.real + 1j * OMEGA * m.imag),
+    "reciprocal_condition": lambda a: _reciprocal_condition(a),
+    "compliance_factors u": lambda g, t: _factors(g, t)[0],
+    "compliance_factors v": lambda g, t: _factors(g, t)[1],
+    "compliance_covariance": lambda g, t, v: _covariance(*_factors(g, t), v),
+    "compliance_covariance reciprocal": lambda g, t, v: _reciprocal_covariance(*_factors(g, t), v),
 }
 #: The sizes of the arguments of each, in units of the number of joint DOFs.
 OPERATIONS: Mapping[str, tuple[int, ...]] = {
     "invert": (2,), "solve": (2, 2), "couple": (2, 2, 1), "modify": (2, 1), "find_modification": (2, 2),
     "ismm": (2, 2, 1), "inverse_substructuring": (2,), "joint_compliance": (2,), "decouple rr": (2, 2, 1),
     "decouple rs": (2, 2, 1), "decouple sr": (2, 2, 1), "decouple ss": (2, 2, 1), "transform": (2, 2, 2),
+    "receptance": (2, 2), "reciprocal_condition": (2,), "compliance_factors u": (2, 2), "compliance_factors v": (2, 2),
+    "compliance_covariance": (2, 2, 2), "compliance_covariance reciprocal": (2, 2, 2),
 }  # fmt: skip
 
 
@@ -236,3 +246,40 @@ def _decouple(equation: str, a: Lines, b: Lines, c: Lines) -> Lines:
     # K = (Y^-1 - H_a - H_b)^-1 = Y (1 - (H_a + H_b) Y)^-1
     h = a[:, :n, :n] + b[:, :n, :n]
     return solved((_identity(y) - h @ y).swapaxes(1, 2), y.swapaxes(1, 2)).swapaxes(1, 2)
+
+
+def _moduli(a: Lines) -> Lines:
+    """The largest sum of |re| + |im| in a row of each line."""
+    return (abs(a.real) + abs(a.imag)).sum(axis=2).max(axis=1)[:, None, None]
+
+
+def _reciprocal_condition(a: Lines) -> Lines:
+    with np.errstate(all="ignore"):
+        return np.minimum(1, 1 / (_moduli(a) * _moduli(_inverse(a))))
+
+
+def _factors(gamma: Lines, t: Lines) -> tuple[Lines, Lines]:
+    """U = [g_kk g_jk^-1, -1] T and V = T^T [1; -g_jk^-1 g_jj], of dC = U dh V."""
+    n = gamma.shape[1] // 2
+    jj, jk, kk = gamma[:, :n, :n], gamma[:, :n, n:], gamma[:, n:, n:]
+    one = _identity(jk)
+    left = solved(jk.swapaxes(1, 2), kk.swapaxes(1, 2)).swapaxes(1, 2)
+    right = solved(jk, jj)
+    u = np.concatenate([left, -one], axis=2) @ t
+    return u, t.swapaxes(1, 2) @ np.concatenate([one, -right], axis=1)
+
+
+def _of_changes(change: Lines, variance: Lines) -> Lines:
+    """The covariance of sum_pq W_ab,pq e_pq with E|e_pq|^2 = variance."""
+    m, n = change.shape[:2]
+    rows = change.reshape(m, n * n, -1)
+    return (rows * variance.reshape(m, 1, -1)) @ rows.conj().swapaxes(1, 2)
+
+
+def _covariance(u: Lines, v: Lines, variance: Lines) -> Lines:
+    return _of_changes(np.einsum("lap,lqb->labpq", u, v), variance)
+
+
+def _reciprocal_covariance(u: Lines, v: Lines, variance: Lines) -> Lines:
+    w = np.einsum("lap,lqb->labpq", u, v)
+    return _of_changes((w + w.swapaxes(3, 4)) / 2, variance)

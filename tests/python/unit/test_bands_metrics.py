@@ -161,3 +161,11 @@ def test_errors_relative_to_nothing_get_one_sentence():
 def test_a_parabola_needs_three_frequencies():
     with pytest.raises(ValueError, match="lines 3 to 5 are not at three frequencies, as refine needs them"):
         jf.peak(np.exp(-((FREQ - 5) ** 2)), np.full(10, 3.0), refine=True)
+
+
+@pytest.mark.parametrize("scale", [1e-300, 1.0, 1e300])
+def test_a_peak_between_lines_of_any_spacing(scale):
+    """Squares of steps left the range of doubles: LAPACK searched for singular values of NaN for ever."""
+    amplitude, frequency = jf.peak([1.0, 4.0, 2.0], np.array([1.0, 2.0, 3.0]) * scale, refine=True)
+    expected = jf.peak([1.0, 4.0, 2.0], [1.0, 2.0, 3.0], refine=True)
+    assert (amplitude, frequency / scale) == pytest.approx(expected, rel=1e-12)

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import jointfrf as jf
 from frf_files import FREQ_HZ, frf_set, full_set, names, structure_of_testlab, write_mat, write_mat73, write_sdynpy
 from jointfrf.errors import FileContentError, FileContentWarning
 from jointfrf.io import read_frfs, read_uff, write_csv, write_hdf5, write_npz, write_uff
@@ -335,6 +336,26 @@ def test_pipes_and_devices_are_not_waited_for(tmp_path, suffix):
     assert "is a pipe or a device, not a file" in refused(Path("/dev/zero"))
     with pytest.raises(FileContentError, match="is a pipe or a device, not a file"):
         read_uff(pipe)
+
+
+def test_a_study_or_a_joint_in_a_pipe_is_not_waited_for(tmp_path):
+    """`read_study` hung, and took all memory of /dev/zero."""
+    os.mkfifo(tmp_path / "study.json")
+    os.mkfifo(tmp_path / "joint.toml")
+    for read in (lambda: jf.read_study(tmp_path), lambda: jf.merge_studies([tmp_path], tmp_path / "all"),
+                 lambda: jf.read_joint(tmp_path / "joint.toml")):  # fmt: skip
+        with pytest.raises(FileContentError, match="is a pipe or a device, not a file"):
+            read()
+
+
+@pytest.mark.parametrize(
+    "read", [jf.read_joint, jf.io.read_frfs, jf.io.read_uff, lambda name: jf.study(name, "none", 2), jf.read_study]
+)
+def test_a_name_of_two_lines_leaves_the_message_one(read):
+    with pytest.raises((FileNotFoundError, ValueError)) as raised:
+        read("two\nlines")
+    assert len(str(raised.value).splitlines()) == 1
+    assert "two" in str(raised.value)
 
 
 def test_files_beyond_a_limit_are_not_read(tmp_path, monkeypatch):

@@ -113,6 +113,8 @@ def test_the_result_in_words_and_numbers(sides):
     assert "rigid: theta" in text
     assert "tau_y" in text
     assert fit.unit("tau_y") == "s"
+    with pytest.raises(ValueError, match=r"there is no parameter 'k_z', only k_y"):
+        fit.unit("k_z")  # was StopIteration, which ends a generator without a word
     content = fit.to_dict()
     assert content["laws"] == {"y": "StandardLinearSolid"}
     assert content["parameters"]["k_y"]["confidence_interval_95"][0] < fit.parameters["k_y"]

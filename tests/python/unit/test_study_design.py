@@ -81,6 +81,11 @@ def test_factors_without_sense():
         jf.StudyDesign({}, "fractional")
 
 
+def test_values_may_come_from_an_array():
+    """Their kind is that of a case file: numpy's whole numbers would be refused as numbers of lines."""
+    assert only({"lines": np.array([60])}).freq_hz.size == 60
+
+
 def test_words_of_the_command_line():
     assert parse_factor("noise=0.01, 1e-1") == ("noise", [0.01, 0.1])
     assert parse_factor("joint.stiffness*=2,3") == ("joint.stiffness*", [2, 3])

@@ -76,6 +76,13 @@ def test_realisations_of_chunks_that_overlap_count_once(drawn, tmp_path):
     np.testing.assert_array_equal(low, drawn.low)
 
 
+@pytest.mark.parametrize("group", [-1, 7, 2**70])
+def test_a_group_that_is_none_is_said(whole, group):
+    """-1 gave no realisations and no word, 7 an IndexError."""
+    with pytest.raises(ValueError, match="group must be from 0 to"):
+        whole.estimates(group)
+
+
 def test_what_is_missing(drawn, tmp_path):
     store = stored(tmp_path, drawn, (0, 7, 300), levels=(0.01,))
     store.write(0, 500, Estimates(*(part[500:600] for part in drawn)))

@@ -37,6 +37,28 @@ STEEL = jf.Material(210e9, 0.3, 7850.0)
 FREQUENCIES = np.linspace(1.0, 9.0, 9)
 
 
+def swept(**options):
+    jf.sweep(jf.invert, {"a": np.ones((2, 1, 1))}, np.zeros((2, 1, 1), complex), **options)
+
+
+def fitted_law(**options):
+    h = np.ones((9, 2, 2)) + np.eye(2)
+    return jf.identify(FREQUENCIES, h, **{"dofs": ["x"], "joint": jf.LawJoint({"x": SPRING})} | options)
+
+
+def half_model():
+    """Its modes were those of the diagonal, without a word."""
+    return jf.Model(np.array([[3.0, 1.0], [0.0, 4.0]]), np.eye(2), ("x", "y"))
+
+
+def turned_model():
+    return jf.Model(np.array([[3.0, 1.0], [-1.0, 4.0]]), np.eye(2), ("x", "y"))
+
+
+def realised(**options):
+    return jf.identify_realisations(FREQUENCIES, [np.ones((9, 2, 2)) + np.eye(2)], **options)
+
+
 @pytest.mark.parametrize(
     ("call", "message"),
     [
@@ -86,6 +108,50 @@ FREQUENCIES = np.linspace(1.0, 9.0, 9)
         (lambda: jf.solid_model(BRICK, STEEL, clamped=[0, [1, 2]]), "clamped must be an array of numbers"),
         (lambda: jf.io.frfs_of_arrays([1.0], [[[1.0]]], [[[1.0] * 99] * 9], ["1:x"]), r"has .* in its responses"),
         (lambda: jf.rigid_offset(np.array([["x"]]), [0, 0, 0]), "dofs must be a sequence of names, not"),
+        (lambda: jf.as_bands({}, ["a\nb"], FREQUENCIES), r"dofs must hold names without line breaks, not 'a\\nb'"),
+        (lambda: jf.StudyDesign([1]), "factors must be a Mapping, not list"),
+        (lambda: jf.StudyDesign({"noise": None}), "factor 'noise' must have a list of values, not None"),
+        (lambda: jf.StudyDesign({"noise": "0.1"}), "factor 'noise' must have a list of values, not '0.1'"),
+        (lambda: jf.StudyDesign({"noise": [None]}), "factor 'noise' takes numbers and words, not None"),
+        (lambda: jf.StudyDesign({3: [1.0]}), "factors must be a sequence of names"),
+        (lambda: jf.StudyDesign(estimators="ismm"), "estimators must be a sequence of names, not 'ismm'"),
+        (lambda: jf.StudyDesign(estimators={"mine": 3}), "estimators: 'mine' must be a function, not int"),
+        (lambda: jf.StudyDesign(own_noises={"mine": None}), "own_noises: 'mine' must be a function, not NoneType"),
+        (lambda: jf.study("3.1", "none", 2, design={"noise": [1.0]}), "design must be a StudyDesign, not dict"),
+        (lambda: jf.study("3.1", "none", 2, progress=3), "progress must be a function, not int"),
+        (lambda: swept(jobs=0), "jobs must be at least 1, not 0"),
+        (lambda: swept(jobs="2"), "jobs must be a whole number, not '2'"),
+        (lambda: swept(jobs=1.5), "jobs must be a whole number, not 1.5"),
+        (lambda: swept(executor="processes"), "executor must be one of concurrent.futures, or make one, not str"),
+        (lambda: swept(executor=list), "executor must make one of concurrent.futures, not list"),
+        (lambda: swept(progress=False, jobs=1), "progress must be a function, not bool"),
+        (lambda: swept(plan=1, jobs=1), "plan must be a SweepPlan, not int"),
+        (lambda: jf.smooth_frfs([], np.zeros((0, 1, 1))), "h has no frequency lines"),
+        (lambda: fitted_law(dofs=np.zeros((2, 2))), "dofs must be a sequence of names, not"),
+        (lambda: fitted_law(cross=np.zeros(2)), "joint says which laws are fitted"),
+        (lambda: jf.write_joint("a\nb", jf.Joint([1.0])), r"name a file that ends in .toml, not 'a\\nb'"),
+        (lambda: half_model().modes(), "stiffness holds its upper triangle only"),
+        (lambda: half_model().natural_frequencies(1), "stiffness holds its upper triangle only"),
+        (lambda: turned_model().modes(), "stiffness is not symmetric: the model has no real modes"),
+        (lambda: jf.beam(1, 3, youngs_modulus=1, density=1, width=1, height=1, poisson=-1), "poisson must lie between"),
+        (lambda: jf.merge_studies("one", "all"), "parts must be a list of folders, not 'one'"),
+        (lambda: jf.merge_studies(2, "all"), "parts must be a list of folders, not 2"),
+        (lambda: jf.joint_channels(None, 3.0, [0, 0, 0]), "places must be a list of ChannelPlace, not float"),
+        (lambda: jf.virtual_point(np.eye(3), np.eye(3), [0, 0, 0], dofs=3), "dofs must be a sequence of names, not 3"),
+        (lambda: jf.SeparateProcesses(0), "workers must be at least 1, not 0"),
+        (lambda: jf.bolted_lap((0.1, 0.1, 0.1)), "lengths must be a pair, of A and of B, not"),
+        (lambda: jf.bolted_lap(ends=["free"]), "ends must be a pair, of A and of B, not"),
+        (lambda: jf.bolted_lap(materials=(STEEL, None)), "materials must be a Material, not NoneType"),
+        (lambda: jf.bolted_lap(bolt=8), "bolt must be a Bolt, not int"),
+        (lambda: jf.bolted_lap(divisions=2), "divisions must be a LapDivisions, not int"),
+        (lambda: jf.preload([1], 5e3), "lap must be a BoltedLap, not list"),
+        (lambda: next(realised(start=0.5)), "start must be a FitStart, not float"),
+        (lambda: next(realised(damping=0.5)), "damping must be a sequence of names, not 0.5"),
+        (lambda: next(realised(dofs=3)), "dofs must be a sequence of names, not 3"),
+        (lambda: jf.check_frfs(FREQUENCIES, np.ones((9, 1, 1)), names=3), "names must be a sequence of names, not 3"),
+        (lambda: jf.check_frfs(FREQUENCIES, np.ones((9, 1, 1)), names="x"), "names must be a sequence of names, not"),
+        (lambda: jf.Joint([1.0], dofs=["x"]).export("ansys", {1: 2}), "nodes must be two different nodes, not"),
+        (lambda: jf.Joint([1.0], dofs=["x"]).export("ansys", {"x": 1, 3: 2}), "nodes must be a list of node numbers"),
     ],
 )  # fmt: skip
 def test_one_sentence_of_our_own(call, message):

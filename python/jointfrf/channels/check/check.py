@@ -170,7 +170,7 @@ def _findings_at_joint(
     m = look.corrected()
     t_out = as_real("transform[0]", transform[0], (None, m.h.shape[1]))
     t_in = as_real("transform[1]", transform[1], (t_out.shape[0], m.h.shape[2]))
-    names = [str(i) for i in range(t_out.shape[0] // 2)] if dofs is None else list(dofs)
+    names = [str(i) for i in range(t_out.shape[0] // 2)] if dofs is None else as_names("dofs", dofs)
     if 2 * len(names) != t_out.shape[0]:
         raise ValueError(
             f"dofs must name {t_out.shape[0] / 2:g} joint DOFs, half the rows of transform, not {len(names)}"

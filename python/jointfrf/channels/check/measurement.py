@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from jointfrf.dofs import is_rotation
 from jointfrf.frf.frf_set import Channel
-from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, one_line
 
 __all__ = ["LEAST_SMOOTHNESS", "Measurement", "as_channel_names", "as_measurement", "modulus", "smoothness"]
 
@@ -136,9 +136,12 @@ def as_channel_names(
             own = names if names is not None else None
         if own is None and (responses is not None or forces is not None):
             raise ValueError("responses and forces go together")
+        asked = word if names is None else "names"
+        if own is not None and (isinstance(own, str) or not isinstance(own, Iterable)):
+            raise TypeError(f"{asked} must be a sequence of names, not {one_line(own)}")
         labels = [str(i) for i in range(n)] if own is None else list(own)
         if len(labels) != n or len(set(map(str, labels))) != n:
-            raise ValueError(f"{word if names is None else 'names'} must name {n} different channels")
+            raise ValueError(f"{asked} must name {n} different channels")
         found.append(labels)
     return found[0], found[1]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import NamedTuple, TypeVar
 
@@ -206,7 +206,7 @@ def _of_parameters(result: JointEstimate, parts: BandParts | None) -> FloatArray
     return variance
 
 
-def _chosen(problem: FitProblem, choices: tuple[DofDamping, ...]) -> DampingTerms | tuple[DampingTerms, ...]:
+def _chosen(problem: FitProblem, choices: tuple[DofDamping, ...]) -> DampingTerms | Sequence[DampingTerms]:
     """Return the damping terms that were fitted."""
     damping = problem.options.damping
     return tuple(one.best for one in choices) if damping == "auto" else damping
@@ -292,13 +292,13 @@ def _with_common_damping(problem: FitProblem) -> tuple[JointEstimate, tuple[DofD
     return results[best], tuple(DofDamping(dof, best, second, margin) for dof in problem.dofs)
 
 
-def _terms(problem: FitProblem, damping: DampingTerms | tuple[DampingTerms, ...], cross: CrossTerms) -> JointTerms:
+def _terms(problem: FitProblem, damping: DampingTerms | Sequence[DampingTerms], cross: CrossTerms) -> JointTerms:
     return joint_terms(2 * np.pi * problem.freq_hz, problem.dofs, damping, cross)
 
 
 def _estimate(
     problem: FitProblem,
-    damping: DampingTerms | tuple[DampingTerms, ...],
+    damping: DampingTerms | Sequence[DampingTerms],
     cross: CrossTerms | None = None,
     like: JointEstimate | None = None,
 ) -> JointEstimate:

@@ -18,7 +18,7 @@ from jointfrf.identification.compliance_fit.interface_frfs import InterfaceFrfs
 from jointfrf.identification.compliance_fit.joint_terms import CrossTerms, DampingTerms
 from jointfrf.identification.compliance_fit.transforms import Transform, Transforms, as_transforms
 from jointfrf.identification.prepare import BandsOfDofs, MeasuredFrfs, as_dof_names
-from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_real, check_choice
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_names, as_real, check_choice
 
 __all__ = ["FitOptions", "FitProblem", "prepare_compliance"]
 
@@ -30,7 +30,7 @@ _RECIPROCAL = 1e-9
 class FitOptions:
     """Choices of a fit on the manifold, as in `identify`."""
 
-    damping: DampingTerms | Literal["auto"] | tuple[DampingTerms, ...]
+    damping: DampingTerms | Literal["auto"] | Sequence[DampingTerms]
     cross: CrossTerms
     reciprocal: bool
 
@@ -39,7 +39,7 @@ class FitOptions:
         if isinstance(self.damping, str):
             check_choice("damping", self.damping, (*get_args(DampingTerms), "auto"))
         else:
-            for word in self.damping:
+            for word in as_names("damping", self.damping):
                 check_choice("damping", word, get_args(DampingTerms))
         check_choice("cross", self.cross, get_args(CrossTerms))
 

@@ -9,7 +9,7 @@ import numpy as np
 from jointfrf.identification.compliance_fit.prepare import FitProblem
 from jointfrf.identification.law_fit.describe import DescribedLaws, describe_laws
 from jointfrf.identification.law_fit.fit import fit_laws
-from jointfrf.kernel.arguments import check_type
+from jointfrf.kernel.arguments import as_names, check_type
 from jointfrf.laws.law_joint import LawJoint
 
 __all__ = ["check_law_joint", "identify_laws"]
@@ -26,7 +26,7 @@ def check_law_joint(joint: LawJoint, dofs: Sequence[str] | None) -> LawJoint:
         Other DOFs than those of the FRFs; a mass; nothing to fit.
     """
     check_type("joint", joint, LawJoint)
-    names = joint.dofs if dofs is None else tuple(dofs)
+    names = joint.dofs if dofs is None else as_names("dofs", dofs)
     if sorted(names) != sorted(joint.dofs):
         raise ValueError(f"dofs must name those of joint, {', '.join(joint.dofs)}, not {', '.join(names)}")
     if joint.mass:

@@ -9,6 +9,7 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from jointfrf.identification.fitted_parameters import FittedParameters
+from jointfrf.identification.parameter_table import unit_of
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.laws.law_joint import LawJoint
 
@@ -70,8 +71,8 @@ class LawFit(FittedParameters):
         return self.joint.dynamic_stiffness(freq_hz)
 
     def unit(self, parameter: str) -> str:
-        """Return the unit of a parameter."""
-        return next(one.unit for one in self.joint.quantities if one.name == parameter)
+        """Return the unit of a parameter; ValueError where the fit has none of this name."""
+        return unit_of(parameter, self.joint.quantities)
 
     def to_dict(self) -> dict[str, Any]:
         """Everything but the lines, as plain numbers and text, ready for JSON (an open interval ends at None)."""

@@ -13,6 +13,7 @@ from jointfrf.identification.model_fit.assembly import Assembly
 from jointfrf.identification.model_fit.directions import OpenDirection
 from jointfrf.identification.model_fit.residual_check import ResidualTest
 from jointfrf.identification.model_fit.unknowns import FitParameter
+from jointfrf.identification.parameter_table import unit_of
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.laws.law_joint import LawJoint
 
@@ -88,8 +89,8 @@ class ModelFit(FittedParameters):
         return self.joint.dynamic_stiffness(freq_hz)
 
     def unit(self, parameter: str) -> str:
-        """Return the unit of a parameter."""
-        return next(one.unit for one in self.fitted if one.name == parameter)
+        """Return the unit of a parameter; ValueError where the fit has none of this name."""
+        return unit_of(parameter, self.fitted)
 
     def to_dict(self) -> dict[str, Any]:
         """Everything but the lines, as plain numbers and text, ready for JSON (an open interval ends at None)."""
