@@ -179,6 +179,8 @@ class FrfSet:
         for name in ("responses", "excitations"):
             if len(set(getattr(self, name))) < len(getattr(self, name)):
                 raise ValueError(f"{name} names a channel twice")
+        if not isinstance(self.coordinates, Mapping):
+            raise TypeError(f"coordinates must map nodes to places, not {type(self.coordinates).__name__}")
         if self.coherence is not None:
             object.__setattr__(self, "coherence", _checked_coherence(self.coherence, shape))
         if self.averages is not None:

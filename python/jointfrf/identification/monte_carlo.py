@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from operator import index
 from typing import Literal, NamedTuple, get_args
 
 import numpy as np
@@ -16,6 +15,7 @@ from jointfrf.kernel.arguments import (
     ComplexArray,
     FloatArray,
     as_frequency,
+    as_integer,
     as_interface,
     as_joint_lines,
     check_choice,
@@ -195,7 +195,7 @@ def monte_carlo(
     n_freq = exact.shape[0]
     check_choice("method", method, get_args(MonteCarloMethod))
     noise = noise_arguments(level, kind, seed, relative_to, reciprocal, block, first, count, exact.shape[1:])
-    if index(count) < 1:
+    if as_integer("count", count) < 1:
         raise ValueError(f"count must be positive, not {count}")
     needed = () if method == "compliance" else STIFFNESS_METHODS[method].model
     if any((name in needed) != (value is not None) for name, value in (("alpha", alpha), ("k_initial", k_initial))):

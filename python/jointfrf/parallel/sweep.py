@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
 from math import lcm
-from operator import index
 from statistics import median
 from time import perf_counter
 from typing import Any, NamedTuple
@@ -17,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from jointfrf.errors import IllConditionedWarning, SingularLineError
-from jointfrf.kernel.arguments import check_type
+from jointfrf.kernel.arguments import as_integer, check_type
 from jointfrf.parallel.line_arrays import Lines, lines_of
 from jointfrf.parallel.one_thread import one_thread
 from jointfrf.parallel.pool import AnyExecutor, BrokenPoolError, Pool, check_progress, opened_pool
@@ -207,7 +206,7 @@ def sweep(
     if plan is not None:
         check_type("plan", plan, SweepPlan)
     unit = lcm(SHARE, whole.out.step)
-    if not 0 <= index(first) < whole.n_lines or first % unit:
+    if not 0 <= as_integer("first", first) < whole.n_lines or first % unit:
         raise ValueError(f"first must be a multiple of {unit} from 0 to {whole.n_lines - 1}, not {first}")
     told: list[tuple[int, str]] = []
     finished = _Finished(first)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import warnings
-from operator import index
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +10,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from jointfrf.channels.virtual_point import VirtualPoint, check_sides
 from jointfrf.errors import IdentificationWarning, SingularLineError
-from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_number, as_real, as_square, check_finite_lines
+from jointfrf.kernel.arguments import (
+    ComplexArray,
+    FloatArray,
+    as_integer,
+    as_number,
+    as_real,
+    as_square,
+    check_finite_lines,
+)
 
 __all__ = ["MultiPointJoint", "multi_point_compliance", "multi_point_stiffness"]
 
@@ -249,10 +256,10 @@ def _truncated_inverse(
     n_freq, most = lines.shape[0], min(lines.shape[1:])
     if rank is not None and variance is not None:
         raise ValueError("rank and noise exclude one another: give one of them")
-    if rank is not None and not 1 <= index(rank) <= most:
+    if rank is not None and not 1 <= as_integer("rank", rank) <= most:
         raise ValueError(f"rank must lie between 1 and {most}, the singular values of {name}, not {rank}")
     left, size, right = np.linalg.svd(lines, full_matrices=False)
-    threshold, used = np.zeros(n_freq), np.full(n_freq, most if rank is None else index(rank))
+    threshold, used = np.zeros(n_freq), np.full(n_freq, most if rank is None else int(rank))
     if variance is not None:
         threshold = _noise_threshold(variance)
         used = np.count_nonzero(size > threshold[:, None], axis=1)

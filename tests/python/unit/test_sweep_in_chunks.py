@@ -69,6 +69,8 @@ def test_a_sweep_begins_where_it_is_told(lines, one_call):
     for first in (-512, 100, 5120):
         with pytest.raises(ValueError, match=f"first must be a multiple of 512 from 0 to {N - 1}, not {first}"):
             jf.sweep(jf.invert, {"a": lines}, result, plan=plan_of(512), jobs=1, first=first)
+    with pytest.raises(TypeError, match=r"first must be a whole number, not 1.5"):
+        jf.sweep(jf.invert, {"a": lines}, result, plan=plan_of(512), jobs=1, first=1.5)
 
 
 class LosesAll(ThreadPoolExecutor):

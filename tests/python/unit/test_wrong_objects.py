@@ -95,6 +95,10 @@ def realised(**options):
         (lambda: jf.pollute(np.ones((1, 1, 1)), 0.1, seed=None), "seed must be a whole number, not None"),
         (lambda: jf.io.Channel(None, "+y"), "node must be a whole number, not None"),
         (lambda: jf.io.Channel(1, 2.0), "direction must be a str, not float"),
+        (
+            lambda: jf.io.FrfSet([1.0], (), (), np.zeros((1, 0, 0)), coordinates=[1]),
+            "coordinates must map nodes to places, not list",
+        ),
         (lambda: jf.io.FrfSet([1.0], None, (), [[[1.0]]]), "responses must be a tuple of Channel, not NoneType"),
         (lambda: jf.io.merge_frfs(np.zeros(0)), "sets must be a list of FrfSet"),
         (lambda: jf.io.read_frfs("none", mapping=[1]), "mapping must be a mapping or an FrfMapping, not list"),
