@@ -358,6 +358,8 @@ def _read_function(
 ) -> tuple[NDArray[np.float64], NDArray[_Number]]:
     """Frequencies in Hz and values in the file's units of one function."""
     content = file.read(dataset)
+    if "data" not in content:
+        raise file.error(f"is damaged: ordinate data type {content.get('ord_data_type')} in dataset {dataset} ({name})")
     n, value = content["num_pts"], np.asarray(content["data"])
     if np.iscomplexobj(value) and dtype is np.float64:
         value = value.real

@@ -193,6 +193,17 @@ def test_stated_sizes_that_exceed_the_file(tmp_path):
     assert "cannot be read as a MATLAB file" in refused(path)
 
 
+def test_a_coherence_of_no_known_type(tmp_path):
+    path = tmp_path / "frfs.uff"
+    write_uff(path, full_set())
+    content = path.read_bytes()
+    real = b"\n         4         5         1"
+    assert real in content
+    path.write_bytes(content.replace(real, real.replace(b"4", b"0"), 1))
+    with pytest.raises(jf.FileContentError, match=r"is damaged: ordinate data type 0 in dataset \d+ \(coherence "):
+        read_frfs(path)
+
+
 def test_a_matlab_file_without_checksums(tmp_path):
     """Read in a process of its own first: some damaged ones crash the reader."""
     path = write_mat(tmp_path / "plain.mat", compressed=False, **FIELDS)
