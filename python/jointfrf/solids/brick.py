@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import reprlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, Literal, get_args
@@ -11,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
-from jointfrf.kernel.arguments import FloatArray, as_number, as_real, check_choice
+from jointfrf.kernel.arguments import FloatArray, as_number, as_real, check_choice, one_line
 from jointfrf.kernel.call import call
 
 __all__ = ["Formulation", "Mass", "Material", "assemble_bricks", "brick_quality", "element_matrices"]
@@ -276,7 +275,7 @@ def _properties(materials: Material | Sequence[Material], n: int) -> FloatArray:
     """Return Young's modulus, Poisson's ratio and density of every element, shape (3, n)."""
     each = [materials] * n if isinstance(materials, Material) else materials
     if isinstance(each, str) or not isinstance(each, Sequence) or not all(isinstance(m, Material) for m in each):
-        raise TypeError(f"materials must be one Material or a sequence of them, not {reprlib.repr(materials)}")
+        raise TypeError(f"materials must be one Material or a sequence of them, not {one_line(materials)}")
     if len(each) != n:
         raise ValueError(f"materials must name one material for each of the {n} elements, not {len(each)}")
     return np.array([[m.youngs_modulus for m in each], [m.poisson for m in each], [m.density for m in each]], float)

@@ -96,6 +96,8 @@ def study(
     plan = StudyDesign() if design is None else design
     check_type("design", plan, StudyDesign)
     check_progress(progress)
+    if not isinstance(case, str | Path):
+        raise TypeError(f"case must be the name or the folder of a case, not {one_line(case)}")
     folder = find_case(str(case)).resolve()
     store, identity = StudyStore(Path(out)), plan.identity(folder)
     held = store.check(identity) if store.exists else None

@@ -95,6 +95,7 @@ def realised(**options):
         (lambda: jf.pollute(np.ones((1, 1, 1)), 0.1, seed=None), "seed must be a whole number, not None"),
         (lambda: jf.io.Channel(None, "+y"), "node must be a whole number, not None"),
         (lambda: jf.io.Channel(1, 2.0), "direction must be a str, not float"),
+        (lambda: jf.study(np.zeros((9, 9)), "out"), "case must be the name or the folder of a case, not array"),
         (
             lambda: jf.io.FrfSet([1.0], (), (), np.zeros((1, 0, 0)), coordinates=[1]),
             "coordinates must map nodes to places, not list",
