@@ -72,6 +72,8 @@ def study(
         The executor has lost its workers, and there is nothing that makes another one. What is finished is kept.
     ValueError
         The case knows no such noise or estimator; `part` does not fit.
+    TypeError
+        An argument is of another kind: a case that is neither a name nor a folder, a design that is none.
 
     Notes
     -----
