@@ -163,7 +163,8 @@ module jointfrf_lanes
       type(lookahead), intent(inout), optional :: ahead
     end subroutine invert_routine
 
-    !> Solution of A X = B by elimination with threshold pivoting (1/3 of the largest) and back substitution.
+    !> Solution of A X = B by elimination with threshold pivoting (1/3 of the largest; partial pivoting where the order is
+    !> small) and back substitution.
     !> n        order
     !> n_rhs    right-hand sides
     !> n_last   how many of the last unknowns are wanted
@@ -292,6 +293,18 @@ module jointfrf_lanes
       real(dp), intent(inout) :: a_inverse(2, n*n, *)
       real(dp), intent(out) :: rcond(n_lines)
     end subroutine invert_lines_routine
+
+    !> Solution of lines of order 1 with one right-hand side, without workspace.
+    !> a, b, x   the caller's lines, of which n_lines from `first` on are done; any number of them
+    !> rcond     not finite where something overflowed
+    subroutine divide_lines_routine(first, n_lines, a, b, x, rcond)
+      import :: dp
+      implicit none
+      integer, intent(in) :: first, n_lines
+      real(dp), intent(in) :: a(2, *), b(2, *)
+      real(dp), intent(inout) :: x(2, *)
+      real(dp), intent(out) :: rcond(n_lines)
+    end subroutine divide_lines_routine
 
     !> ISMM for one joint DOF, without workspace. Arguments as in `ismm`, as pairs of real numbers.
     subroutine identify_lines_routine(transposed, first, n_lines, alpha, gamma, k_initial, k_joint, rcond)
@@ -458,6 +471,7 @@ module jointfrf_lanes
     procedure(invert_routine), pointer, nopass :: invert => null()
     procedure(solve_routine), pointer, nopass :: solve => null()
     procedure(invert_lines_routine), pointer, nopass :: invert_lines => null()
+    procedure(divide_lines_routine), pointer, nopass :: divide_lines => null()
     procedure(identify_lines_routine), pointer, nopass :: identify_lines => null()
     procedure(invert_joint_lines_routine), pointer, nopass :: invert_joint_lines => null()
     procedure(eliminate_routine), pointer, nopass :: eliminate => null()

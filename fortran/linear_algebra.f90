@@ -144,6 +144,7 @@ contains
     associate (n => operation%n, n_rhs => operation%n_rhs)
       element = room%system(n, n_rhs)
       operation%n_element = room%taken
+      if (divides(operation)) operation%block_lines = long_block
       operation%n_hint = padded(n)
       operation%a_place = in_memory(operation%transposed, element(:, :n))
       operation%b_place = in_memory(operation%transposed, element(:, n + 1:))
@@ -155,6 +156,14 @@ contains
     end associate
   end subroutine plan_solution
 
+  !> Whether a line is one number through another.
+  pure function divides(operation) result(yes)
+    class(solution), intent(in) :: operation
+    logical :: yes
+
+    yes = operation%n == 1 .and. operation%n_rhs == 1
+  end function divides
+
   subroutine solve_block(self, kernels, first, n_lines, space, line_info, rcond)
     class(solution), intent(in) :: self
     type(lane_kernels), intent(in) :: kernels
@@ -165,6 +174,11 @@ contains
     real(dp) :: rcond_lanes(lanes), total(lanes)
     integer :: row(self%n), place(self%n*self%n_rhs), n_x
 
+    if (divides(self)) then
+      call kernels%divide_lines(first, n_lines, self%a_pairs, self%b_pairs, self%result_pairs, rcond)
+      call kernels%judge(n_lines, 0*rcond, line_info, rcond)
+      return
+    end if
     n_x = self%n*self%n_rhs
     call kernels%load(self%n**2, self%a_place, first, n_lines, self%a_pairs, space%x)
     call kernels%load(n_x, self%b_place, first, n_lines, self%b_pairs, space%x)

@@ -1,9 +1,10 @@
 !> The lane kernels: linear algebra, condensation, superposition of modes and propagation of noise, for eight lines side
 !> by side.
 !>
-!> One source for all instruction sets: the build sets JF_MODULE, the name of the module, and the instructions that the
-!> compiler may use. Loops over lanes (index l) are outermost or alone and have no branches; inner loops step by a fixed
-!> number of elements and test at the bottom. The compiler then turns each statement into one instruction for all lanes.
+!> One source for all instruction sets: the build sets JF_MODULE, the name of the module, the instructions that the
+!> compiler may use, and JF_OWN_INVERSES and JF_OWN_SOLUTIONS, the orders up to which every line has pivots of its own.
+!> Loops over lanes (index l) are outermost or alone and have no branches; inner loops step by a fixed number of
+!> elements and test at the bottom. The compiler then turns each statement into one instruction for all lanes.
 module JF_MODULE
   use, intrinsic :: iso_fortran_env, only: int64
   use jointfrf_elimination_plan, only: elimination_plan
@@ -42,6 +43,7 @@ contains
     kernels%invert => invert_lanes
     kernels%solve => solve_lanes
     kernels%invert_lines => invert_lines
+    kernels%divide_lines => divide_lines
     kernels%identify_lines => identify_lines
     kernels%invert_joint_lines => invert_joint_lines
     kernels%eliminate => eliminate_by_plan
@@ -74,35 +76,57 @@ contains
 #include "small_inverse.inc"
 #define JF_ORDER 3
 #define JF_INVERT invert_order_3
+#include "own_inverse.inc"
 #include "constant_order.inc"
 #undef JF_ORDER
 #undef JF_INVERT
 #define JF_ORDER 4
 #define JF_INVERT invert_order_4
+#include "own_inverse.inc"
 #include "constant_order.inc"
 #undef JF_ORDER
 #undef JF_INVERT
 #define JF_ORDER 5
 #define JF_INVERT invert_order_5
+#include "own_inverse.inc"
 #include "constant_order.inc"
 #undef JF_ORDER
 #undef JF_INVERT
 #define JF_ORDER 6
 #define JF_INVERT invert_order_6
+#include "own_inverse.inc"
 #include "constant_order.inc"
 #undef JF_ORDER
 #undef JF_INVERT
 #define JF_ORDER 7
 #define JF_INVERT invert_order_7
+#include "own_inverse.inc"
 #include "constant_order.inc"
 #undef JF_ORDER
 #undef JF_INVERT
 #define JF_ORDER 8
 #define JF_INVERT invert_order_8
+#include "own_inverse.inc"
 #include "constant_order.inc"
 #undef JF_ORDER
 #undef JF_INVERT
 #include "solution.inc"
+#include "small_solution.inc"
+#define JF_ORDER 3
+#define JF_SOLVE solve_order_3
+#include "own_solution.inc"
+#undef JF_ORDER
+#undef JF_SOLVE
+#define JF_ORDER 4
+#define JF_SOLVE solve_order_4
+#include "own_solution.inc"
+#undef JF_ORDER
+#undef JF_SOLVE
+#define JF_ORDER 5
+#define JF_SOLVE solve_order_5
+#include "own_solution.inc"
+#undef JF_ORDER
+#undef JF_SOLVE
 #include "closed_forms.inc"
 #include "condensation.inc"
 #include "modal_superposition.inc"
