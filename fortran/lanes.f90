@@ -163,8 +163,8 @@ module jointfrf_lanes
       type(lookahead), intent(inout), optional :: ahead
     end subroutine invert_routine
 
-    !> Solution of A X = B by elimination with threshold pivoting (1/3 of the largest; partial pivoting where the order is
-    !> small) and back substitution.
+    !> Solution of A X = B by elimination with threshold pivoting (1/3 of the largest; partial pivoting where the order
+    !> is small) and back substitution.
     !> n        order
     !> n_rhs    right-hand sides
     !> n_last   how many of the last unknowns are wanted
