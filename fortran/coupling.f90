@@ -2,6 +2,7 @@
 module jointfrf_coupling
   use, intrinsic :: iso_c_binding, only: c_f_pointer, c_loc
   use jointfrf_caller_memory, only: caller_memory
+  use jointfrf_engine, only: engine_v4, get_engine
   use jointfrf_kinds, only: dp, ip
   use jointfrf_lanes, only: element_space, flat, in_memory, lane_kernels, lanes, largest_solved, &
     largest_product, padded, real_lines, rows_in_memory
@@ -15,9 +16,7 @@ module jointfrf_coupling
   private
   public :: couple
 
-  !> From this number of DOFs of the assembly on, products are faster line by line with the BLAS than in lanes,
-  integer, parameter :: fewest_large = 48
-  !> but for a single joint DOF. More elements than these, of which a system for the forces consists, leave the caches.
+  !> More elements than these, of which a system for the forces consists, leave the caches.
   integer, parameter :: most_in_system = 12288
 
   type, extends(line_operation) :: coupling
@@ -70,13 +69,15 @@ contains
     type(caller_memory), intent(in), optional :: memory
     type(coupling) :: whole
     type(large_coupling) :: large
-    logical :: planned
+    logical :: planned, by_blas
     integer :: n, n_j
 
     n = size(h_a, 1) + size(h_b, 1)
     n_j = size(dofs_a)
     planned = worth_a_plan(size(h_a, 3), memory) .and. n_j >= 1 .and. n_j <= largest_solved
-    if (planned .and. n_j > 1 .and. n >= fewest_large .and. n_j*(n_j + n) <= most_in_system) then
+    by_blas = .false.
+    if (planned) by_blas = products_by_blas(n, n_j)
+    if (by_blas) then
       call set(large)
       call plan_large_coupling(large)
       call run_sweep(large, size(h_a, 3, kind=ip), line_info, rcond, info)
@@ -87,6 +88,22 @@ contains
     end if
 
   contains
+
+    !> Whether products are faster line by line with the BLAS than in lanes. With AVX-512 lanes are as fast until a
+    !> block leaves the caches; a single joint DOF stays in lanes.
+    function products_by_blas(n, n_j) result(yes)
+      integer, intent(in) :: n, n_j
+      logical :: yes
+      integer(ip) :: engine, info
+
+      call get_engine(engine, info)
+      if (engine == engine_v4) then
+        yes = n > largest_product .or. (n >= 120 .and. 5*n_j >= n)
+      else
+        yes = n >= 96 .or. (n >= 64 .and. 5*n_j >= n)
+      end if
+      yes = yes .and. n_j > 1 .and. n_j*(n_j + n) <= most_in_system
+    end function products_by_blas
 
     subroutine set(operation)
       class(coupling), intent(inout) :: operation
