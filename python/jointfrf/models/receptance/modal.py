@@ -128,7 +128,7 @@ def all_modes(matrices: ModelMatrices, outputs: Ports, inputs: Ports) -> tuple[M
         return diagonal
 
     structural = modal("structural_damping")
-    alone = resistance(matrices.operand("structural_damping"), rigid.shapes)
+    alone = resistance(matrices, "structural_damping", rigid.shapes)
     structural[: len(rigid)] = alone
     stiffness[: len(rigid)] = np.where(rigid.stiffness > 0, rigid.stiffness, SINGULAR * alone)  # held by H alone
     losses = matrices.loss_factor + np.divide(structural, stiffness, out=np.zeros(matrices.n), where=stiffness > 0)

@@ -51,7 +51,7 @@ class RigidModes:
 
     def dynamic_stiffness(self, matrices: ModelMatrices, omega: FloatArray) -> ComplexArray:
         """Return r^T Z r = w_r^2 (1 + i eta) + i r^T H r + i w r^T C r - w^2, shape (n_freq, k), (rad/s)^2."""
-        structural, viscous = (resistance(matrices.operand(x), self.shapes) for x in ("structural_damping", "damping"))
+        structural, viscous = (resistance(matrices, x, self.shapes) for x in ("structural_damping", "damping"))
         w = omega[:, None]
         elastic = (1 + 1j * matrices.loss_factor) * self.stiffness
         return np.asarray(elastic + 1j * (structural + w * viscous) - w**2, np.complex128)
@@ -72,8 +72,11 @@ def held(n: int) -> RigidModes:
     return RigidModes(np.zeros((n, 0)), np.zeros((n, 0)), np.zeros(0), np.zeros(0))
 
 
-def resistance(matrix: Operand, shapes: FloatArray) -> FloatArray:
-    """Return r^T A r of each shape, shape (k,); 0 where it may be rounding of A."""
+def resistance(matrices: ModelMatrices, name: str, shapes: FloatArray) -> FloatArray:
+    """Return r^T A r of each shape, shape (k,); 0 where it may be rounding of A, or the model has none."""
+    if matrices.named[name] is None:
+        return np.zeros(shapes.shape[1])
+    matrix = matrices.operand(name)
     found = np.einsum("ij,ij->j", shapes, matrix @ shapes)
     return np.where(abs(found) <= _ROUNDINGS * _EPS * _terms(abs(matrix), shapes), 0, found)
 
