@@ -39,6 +39,11 @@ class LineStatus(NamedTuple):
     line_info: NDArray[np.int32]
     rcond: FloatArray
 
+    @property
+    def lowest_rcond(self) -> float:
+        """The lowest reciprocal condition number; 1 where there are no lines."""
+        return self.rcond.item(self.rcond.argmin()) if self.rcond.size else 1.0
+
 
 def _line_names(lines: NDArray[np.intp], freq_hz: FloatArray | None) -> str:
     """Return the first few lines in words."""
@@ -73,7 +78,7 @@ def check_status(
             singular,
             None if freq_hz is None else freq_hz[singular],
         )
-    if not n_bad and np.minimum.reduce(status.rcond) >= rcond_limit:
+    if not n_bad and (rcond_limit <= 0 or status.lowest_rcond >= rcond_limit):
         return
     poor = np.flatnonzero((status.rcond < rcond_limit) & (info == 0))
     if poor.size:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -12,20 +11,22 @@ from scipy.sparse import csc_matrix
 
 from jointfrf.kernel.arguments import FloatArray, as_array, as_real
 
-__all__ = ["Matrix", "ModelMatrices", "from_triangle", "is_symmetric"]
+__all__ = ["Matrix", "ModelMatrices", "Operand", "from_triangle", "is_symmetric"]
 
 Matrix = Any  # array_like or scipy sparse array
+Operand = Any  # ndarray or scipy sparse array
 
 #: Two entries differ by no more than this share of the largest where a matrix is called symmetric.
 _SYMMETRIC = 1e-10
 #: Up to this size sparse matrices are turned into arrays: what scipy does with their entries would take longer than
 #: all that is computed.
 _SMALL = 64
+#: Up to this size products, sums and factors of arrays take no longer than those of sparse matrices.
+_FULL = 200
 #: Damping is a M + b K where no entry differs by more than this share of the largest.
 _PROPORTIONAL = 1e-13
 
 
-@dataclass(frozen=True)
 class ModelMatrices:
     """K, M, C, H and the loss factor of a model, checked.
 
@@ -39,15 +40,30 @@ class ModelMatrices:
         Structural damping H, N/m.
     loss_factor : float
         eta of the whole stiffness.
+
+    Attributes
+    ----------
+    named : dict of str to ndarray, sparse array or None
+        The matrices by the names that the caller knows; sparse ones of a small model as arrays.
+    n : int
+        Number of DOFs.
     """
 
-    stiffness: Matrix
-    mass: Matrix
-    damping: Matrix | None
-    structural_damping: Matrix | None
-    loss_factor: float
-
-    def __post_init__(self) -> None:
+    def __init__(
+        self,
+        stiffness: Matrix,
+        mass: Matrix,
+        damping: Matrix | None,
+        structural_damping: Matrix | None,
+        loss_factor: float,
+    ) -> None:
+        self.loss_factor = loss_factor
+        self.named: dict[str, Matrix | None] = {
+            "stiffness": stiffness,
+            "mass": mass,
+            "damping": damping,
+            "structural_damping": structural_damping,
+        }
         n: int | None = None
         for name, given in self.named.items():
             matrix = given
@@ -55,17 +71,17 @@ class ModelMatrices:
                 if name in ("stiffness", "mass"):
                     raise ValueError(f"{name} is missing")
                 continue
-            is_sparse = not isinstance(matrix, np.ndarray) and sparse.issparse(matrix)
-            shape = matrix.shape if is_sparse else np.shape(matrix)
+            is_array = isinstance(matrix, np.ndarray)
+            is_sparse = not is_array and sparse.issparse(matrix)
+            shape = matrix.shape if is_array or is_sparse else np.shape(matrix)
             if len(shape) != 2 or shape[0] != shape[1] or (n is not None and shape[0] != n):
                 wanted = "(n, n)" if n is None else f"({n}, {n})"
                 raise ValueError(f"{name} must have shape {wanted}, not {tuple(shape)}")
-            n = shape[0]
-            if is_sparse and shape[0] <= _SMALL:
-                matrix, is_sparse = matrix.toarray(), False
+            self.n = n = int(shape[0])
+            if is_sparse and n <= _SMALL:
+                matrix, is_sparse = np.ascontiguousarray(matrix.toarray()), False
             if not is_sparse:
-                matrix = as_real(name, matrix, (n, n))
-                object.__setattr__(self, name, matrix)
+                matrix = self.named[name] = as_real(name, matrix, (n, n))
             half = _half(matrix)
             # Beside a stiffness that is not symmetric, as with rotors or friction, half a matrix may be meant.
             if half is not None and (name == "stiffness" or self.is_symmetric("stiffness")):
@@ -73,21 +89,6 @@ class ModelMatrices:
                     f"{name} holds its {half} triangle only, as files of symmetric matrices do: complete it by "
                     "from_triangle"
                 )
-
-    @property
-    def named(self) -> dict[str, Matrix | None]:
-        """The matrices by the names that the caller knows."""
-        return {
-            "stiffness": self.stiffness,
-            "mass": self.mass,
-            "damping": self.damping,
-            "structural_damping": self.structural_damping,
-        }
-
-    @cached_property
-    def n(self) -> int:
-        """Number of DOFs."""
-        return int(self.stiffness.shape[0])
 
     def dense(self, name: str) -> FloatArray | None:
         """Return a matrix as an array, shape (n, n); None where the model has none."""
@@ -105,6 +106,18 @@ class ModelMatrices:
         found.sum_duplicates()
         found.data = as_real(name, found.data, (None,))
         return found
+
+    def operand(self, name: str) -> Operand:
+        """Return a matrix in the form that is quicker to compute with; zeros where the model has none.
+
+        That is an array, shape (n, n), of a model of few DOFs, whatever was given, and `sparse` of a larger one.
+        """
+        matrix = self.named[name]
+        if self.n > _FULL:
+            return self.sparse(name)
+        if matrix is None:
+            return np.zeros((self.n, self.n))
+        return matrix if isinstance(matrix, np.ndarray) else self.sparse(name).toarray()
 
     def dynamic_stiffness(self, omega: float) -> csc_matrix:
         """Return Z = (1 + i eta) K + i H + i w C - w^2 M by its entries, N/m."""
@@ -130,7 +143,7 @@ class ModelMatrices:
 
     def is_symmetric(self, name: str) -> bool:
         """Whether K or M is symmetric."""
-        return is_symmetric(self.sparse(name))
+        return is_symmetric(self.operand(name))
 
     @cached_property
     def are_symmetric(self) -> bool:
@@ -140,17 +153,17 @@ class ModelMatrices:
     @cached_property
     def proportional(self) -> tuple[float, float, float] | None:
         """(a, b, eta) where C = a M + b K and all structural damping is eta K, else None; 1/s, s, 1."""
-        k, m = self.sparse("stiffness"), self.sparse("mass")
-        viscous = _combination(self.sparse("damping"), m, k)
-        structural = _combination(self.sparse("structural_damping"), 0 * m, k)
+        k, m = self.operand("stiffness"), self.operand("mass")
+        viscous = _combination(self.operand("damping"), m, k)
+        structural = _combination(self.operand("structural_damping"), 0 * m, k)
         if viscous is None or structural is None:
             return None
         return viscous[0], viscous[1], self.loss_factor + structural[1]
 
 
-def is_symmetric(matrix: sparse.csc_array) -> bool:
+def is_symmetric(matrix: Operand) -> bool:
     """Whether a matrix is symmetric to rounding."""
-    return bool(_largest(matrix - matrix.T) <= _SYMMETRIC * _largest(matrix))
+    return _is_own_transpose(matrix) or bool(_largest(matrix - matrix.T) <= _SYMMETRIC * _largest(matrix))
 
 
 def from_triangle(matrix: Matrix) -> Matrix:
@@ -187,9 +200,18 @@ def from_triangle(matrix: Matrix) -> Matrix:
     return whole + whole.T - np.diag(np.diagonal(whole))
 
 
+def _is_own_transpose(matrix: Matrix) -> bool:
+    """Whether a matrix is an array that is symmetric to the last digit, which is found at once."""
+    if not isinstance(matrix, np.ndarray):
+        return False
+    if len(matrix) <= _SMALL and matrix.tobytes() == matrix.tobytes("F"):  # all but zeros of two signs
+        return True
+    return bool(np.count_nonzero(matrix == matrix.T) == matrix.size)
+
+
 def _half(matrix: Matrix) -> str | None:
     """Return which triangle of a matrix is there where the other is empty."""
-    if isinstance(matrix, np.ndarray) and (matrix == matrix.T).all():
+    if _is_own_transpose(matrix):
         return None
     below, above = _sides(matrix)
     return None if below == above else "lower" if below else "upper"
@@ -205,11 +227,12 @@ def _sides(matrix: Matrix) -> tuple[bool, bool]:
     return bool((rows > columns).any()), bool((rows < columns).any())
 
 
-def _largest(matrix: sparse.csc_array) -> float:
-    return float(np.abs(matrix.data).max(initial=0.0))
+def _largest(matrix: Operand) -> float:
+    entries = matrix if isinstance(matrix, np.ndarray) else matrix.data
+    return float(np.abs(entries).max(initial=0.0))
 
 
-def _combination(c: sparse.csc_array, m: sparse.csc_array, k: sparse.csc_array) -> tuple[float, float] | None:
+def _combination(c: Operand, m: Operand, k: Operand) -> tuple[float, float] | None:
     """Return a, b of C = a M + b K; the simplest that holds."""
     if _largest(c) == 0:
         return 0.0, 0.0
@@ -219,6 +242,6 @@ def _combination(c: sparse.csc_array, m: sparse.csc_array, k: sparse.csc_array) 
     if kk * mm - km**2 > 1e-8 * kk * mm:
         choices.append(tuple(np.array([cm * kk - ck * km, ck * mm - cm * km]) / (kk * mm - km**2)))
     for a, b in choices:
-        if _largest(sparse.csc_array(c - a * m - b * k)) <= _PROPORTIONAL * _largest(c):
+        if _largest(c - a * m - b * k) <= _PROPORTIONAL * _largest(c):
             return float(a), float(b)
     return None

@@ -15,7 +15,7 @@ from jointfrf.kernel.arguments import FloatArray, as_array, as_dofs, as_real
 __all__ = ["Ports", "as_ports", "directions"]
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False)
 class Ports:
     """Responses, or forces, of a model.
 
@@ -66,8 +66,10 @@ def as_ports(name: str, value: Any, n: int) -> Ports:
     """Check DOFs counted from 0, or a matrix of weights of shape (m, n); all DOFs for None."""
     if value is None:
         return Ports(n, np.arange(1, n + 1, dtype=np.int32))
-    if sparse.issparse(value) or as_array(name, value).ndim == 2:
-        given = value if sparse.issparse(value) else as_real(name, value, (None, None))
+    is_sparse = sparse.issparse(value)
+    numbers = value if is_sparse else as_array(name, value)
+    if is_sparse or numbers.ndim == 2:
+        given = value if is_sparse else as_real(name, value, (None, None))
         if given.shape[1:] != (n,):
             raise ValueError(f"{name} must be DOFs, or weights of shape (m, {n}), not {tuple(given.shape)}")
         entries = sparse.coo_array(given)
@@ -75,7 +77,7 @@ def as_ports(name: str, value: Any, n: int) -> Ports:
         weights = sparse.csr_array((values, (entries.row, entries.col)), shape=given.shape)
         weights.eliminate_zeros()
         return Ports(n, sums=weights)
-    return Ports(n, as_dofs(name, value, n, unique=False))
+    return Ports(n, as_dofs(name, numbers, n, unique=False))
 
 
 def directions(*ports: Ports) -> FloatArray:

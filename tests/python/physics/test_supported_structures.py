@@ -99,6 +99,22 @@ def test_rigid_body_modes_do_not_strain(name):
     assert strained.max() < 1e3 * EPS
 
 
+@pytest.mark.parametrize("share", [0.0, 1e-10, 1e-3])
+@pytest.mark.parametrize("name", FREE)
+def test_rigid_body_modes_of_arrays_are_those_of_sparse_matrices(name, share):
+    structure = made(name)
+    spring = sparse.coo_array(([share * abs(structure.stiffness).max()], ([0], [0])), structure.stiffness.shape)
+    k, m = (sparse.csc_array(a) for a in (structure.stiffness + spring, structure.mass))
+    by_entries, full = find_rigid_modes(k, m), find_rigid_modes(k.toarray(), m.toarray())
+    assert len(full) == len(by_entries)
+    np.testing.assert_array_equal(full.stiffness > 0, by_entries.stiffness > 0)
+    resolved = full.uncertainty + by_entries.uncertainty + 1e3 * EPS * full.stiffness
+    assert (abs(full.stiffness - by_entries.stiffness) <= 64 * resolved).all()
+    np.testing.assert_allclose(
+        full.shapes @ full.momenta.T, by_entries.shapes @ by_entries.momenta.T, atol=1e-6 * np.sqrt(m.shape[0])
+    )
+
+
 def test_a_structure_held_by_structural_damping_alone_is_not_singular():
     structure = made("two masses")
     damper = np.diag([0.0, 3e3])

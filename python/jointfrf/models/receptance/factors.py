@@ -1,4 +1,4 @@
-"""Factors of sparse matrices: the one door to SuperLU, PARDISO and MUMPS."""
+"""Factors of matrices: the one door to SuperLU, PARDISO and MUMPS, and to LAPACK for those of few DOFs."""
 
 from __future__ import annotations
 
@@ -10,9 +10,11 @@ from typing import Any, Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
+from scipy.linalg import lapack
 from scipy.sparse import linalg as sparse_linalg
 
 from jointfrf.extras import MissingPackageError, import_extra
+from jointfrf.kernel.arguments import FloatArray
 from jointfrf.models.receptance.ordering import elimination_order
 
 __all__ = ["SYMMETRIC", "Factors", "SingularMatrixError", "SparseSolver", "factor"]
@@ -138,8 +140,8 @@ class SparseSolver:
 
 
 def factor(matrix: Any, is_symmetric: bool = True) -> Factors:
-    """Factor one matrix, see `SparseSolver.factor`."""
-    return SparseSolver().factor(matrix, is_symmetric)
+    """Factor one matrix: a real array by LAPACK, a sparse one as `SparseSolver.factor` does."""
+    return _by_lapack(matrix) if isinstance(matrix, np.ndarray) else SparseSolver().factor(matrix, is_symmetric)
 
 
 class _NotFactoredError(RuntimeError):
@@ -151,6 +153,19 @@ def _superlu(matrix: sparse.csc_matrix, **options: Any) -> sparse_linalg.SuperLU
         return sparse_linalg.splu(matrix, **options)
     except RuntimeError as error:
         raise SingularMatrixError("a pivot is zero") from error
+
+
+def _by_lapack(matrix: FloatArray) -> Factors:
+    """Factor a real array."""
+    lu, pivots, info = lapack.dgetrf(matrix)
+    if info > 0:
+        raise SingularMatrixError("a pivot is zero")
+
+    def solve(b: Array, trans: str) -> Array:
+        found: Array = lapack.dgetrs(lu, pivots, b, trans=trans == "H")[0]
+        return found
+
+    return Factors(solve, False, "LAPACK")
 
 
 def _imported(module: str) -> Any:

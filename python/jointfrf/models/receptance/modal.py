@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import linalg
 
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.kernel.call import N_FREQ, run
@@ -13,6 +12,7 @@ from jointfrf.kernel.status import RCOND_LIMIT, LineStatus, OnSingular, check_li
 from jointfrf.models.matrices import ModelMatrices
 from jointfrf.models.ports import Ports
 from jointfrf.models.receptance.direct import SINGULAR
+from jointfrf.models.receptance.lapack import eigh
 from jointfrf.models.receptance.rigid_modes import RigidModes, find_rigid_modes, mode_condition, resistance
 
 __all__ = ["Modes", "all_modes"]
@@ -104,11 +104,14 @@ def all_modes(matrices: ModelMatrices, outputs: Ports, inputs: Ports) -> tuple[M
     for name in ("stiffness", "mass"):
         if not matrices.is_symmetric(name):
             raise ValueError(f"{name} is not symmetric: method 'modal' cannot be used, 'dense' or 'sparse' can")
+    k, m = matrices.dense("stiffness"), matrices.dense("mass")
+    assert k is not None
+    assert m is not None
     try:
-        squared, shapes = linalg.eigh(matrices.dense("stiffness"), matrices.dense("mass"))
+        squared, shapes = eigh(k, m)
     except np.linalg.LinAlgError as error:
         raise ValueError("mass is not positive definite: method 'modal' cannot be used") from error
-    rigid = find_rigid_modes(matrices.sparse("stiffness"), matrices.sparse("mass"))
+    rigid = find_rigid_modes(matrices.operand("stiffness"), matrices.operand("mass"))
     shapes = np.hstack([rigid.shapes, rigid.strains(shapes[:, len(rigid) :])])
     stiffness = np.concatenate([rigid.stiffness, np.maximum(squared[len(rigid) :], 0)])
     uncertainty = np.concatenate([rigid.uncertainty, np.zeros(matrices.n - len(rigid))])
@@ -125,7 +128,7 @@ def all_modes(matrices: ModelMatrices, outputs: Ports, inputs: Ports) -> tuple[M
         return diagonal
 
     structural = modal("structural_damping")
-    alone = resistance(matrices.sparse("structural_damping"), rigid.shapes)
+    alone = resistance(matrices, "structural_damping", rigid.shapes)
     structural[: len(rigid)] = alone
     stiffness[: len(rigid)] = np.where(rigid.stiffness > 0, rigid.stiffness, SINGULAR * alone)  # held by H alone
     losses = matrices.loss_factor + np.divide(structural, stiffness, out=np.zeros(matrices.n), where=stiffness > 0)

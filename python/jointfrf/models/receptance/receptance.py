@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass, replace
-from typing import Literal, cast, get_args, overload
+from dataclasses import dataclass
+from typing import Literal, NamedTuple, TypedDict, cast, get_args, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -72,8 +72,18 @@ class ReceptanceInfo:
     solver: str | None = None
 
 
-@dataclass(frozen=True)
-class _Task:
+class _Made(TypedDict, total=False):
+    """The fields of a `ReceptanceInfo`, which is made only for those who ask for it."""
+
+    method: Literal["dense", "banded", "sparse", "modal", "krylov"]
+    reason: str
+    error_estimate: float
+    tolerance: float
+    n_vectors: int
+    solver: str | None
+
+
+class _Task(NamedTuple):
     """What was asked for."""
 
     freq_hz: FloatArray
@@ -234,24 +244,25 @@ def receptance(
     freq = as_frequency(freq_hz)
     matrices = ModelMatrices(stiffness, mass, damping, structural_damping, as_number("loss_factor", loss_factor))
     n = matrices.n
-    to, into = as_ports("outputs", outputs, n), as_ports("inputs", inputs, n)
+    to = as_ports("outputs", outputs, n)
+    into = to if inputs is outputs else as_ports("inputs", inputs, n)
     wanted = as_number("tolerance", tolerance)
     if not wanted > 0:
         raise ValueError(f"tolerance must be positive, not {wanted}")
     task = _Task(freq, matrices, to, into, on_singular, wanted, out)
     if method in ("dense", "banded", "sparse"):
-        result, info = _solved(task, cast(Direct, method), "as asked for")
+        result, made = _solved(task, cast(Direct, method), "as asked for")
     elif method == "modal":
         modes, _ = all_modes(matrices, to, into)
         result = modes.receptance(freq, on_singular, out)
-        info = ReceptanceInfo("modal", "as asked for", n_vectors=modes.stiffness.size)
+        made = _Made(method="modal", reason="as asked for", n_vectors=modes.stiffness.size)
     elif method == "krylov":
-        result, info = _reduced(task, "as asked for")
-        if info.method != "krylov" and not task.is_empty:
-            warnings.warn(f"receptance: {info.reason}", ConvergenceWarning, stacklevel=2)
+        result, made = _reduced(task, "as asked for")
+        if made["method"] != "krylov" and not task.is_empty:
+            warnings.warn(f"receptance: {made['reason']}", ConvergenceWarning, stacklevel=2)
     else:
-        result, info = _automatic(task)
-    return (result, info) if full_output else result
+        result, made = _automatic(task)
+    return (result, ReceptanceInfo(**made)) if full_output else result
 
 
 def _direct(matrices: ModelMatrices) -> Direct:
@@ -266,7 +277,7 @@ def _direct(matrices: ModelMatrices) -> Direct:
     return "banded" if sum(widths) < _BAND_LIMIT * n else "dense"
 
 
-def _automatic(task: _Task) -> tuple[ComplexArray, ReceptanceInfo]:
+def _automatic(task: _Task) -> tuple[ComplexArray, _Made]:
     """Choose by size, band, damping and number of lines."""
     matrices, n = task.matrices, task.matrices.n
     if n <= _TINY:
@@ -291,7 +302,7 @@ def _automatic(task: _Task) -> tuple[ComplexArray, ReceptanceInfo]:
     return _reduced(task, f"{task.freq_hz.size} lines of {n} DOFs whose modes the damping does not couple")
 
 
-def _solved(task: _Task, how: Direct, reason: str) -> tuple[ComplexArray, ReceptanceInfo]:
+def _solved(task: _Task, how: Direct, reason: str) -> tuple[ComplexArray, _Made]:
     """Direct solution."""
     freq, matrices, on_singular = task.freq_hz, task.matrices, task.on_singular
     to, into = task.outputs, task.inputs
@@ -306,9 +317,9 @@ def _solved(task: _Task, how: Direct, reason: str) -> tuple[ComplexArray, Recept
             h, status = solve(freq, matrices, to.needed, into.needed, on_singular)
             t_out, t_in = (ports.weights[:, ports.needed - 1].toarray() for ports in (to, into))
             result = transform(h, t_out, t_in, freq_hz=freq, on_singular=on_singular, out=task.out)
-    if np.minimum.reduce(status.rcond, initial=1) < RCOND_LIMIT:
+    if status.lowest_rcond < RCOND_LIMIT:
         check_lines("receptance", _in_doubt(matrices, freq, status), {}, freq, "nan", RCOND_LIMIT)
-    return result, ReceptanceInfo(how, reason, solver=solver)
+    return result, _Made(method=how, reason=reason, solver=solver)
 
 
 def _in_doubt(matrices: ModelMatrices, freq: FloatArray, status: LineStatus) -> LineStatus:
@@ -320,13 +331,13 @@ def _in_doubt(matrices: ModelMatrices, freq: FloatArray, status: LineStatus) -> 
     rcond = np.where(status.rcond < SINGULAR, status.rcond, 1.0)
     poor = (status.rcond < RCOND_LIMIT) & (status.rcond >= SINGULAR)
     if poor.any() and matrices.is_symmetric("stiffness") and matrices.is_symmetric("mass"):
-        rigid = find_rigid_modes(matrices.sparse("stiffness"), matrices.sparse("mass"))
+        rigid = find_rigid_modes(matrices.operand("stiffness"), matrices.operand("mass"))
         left = rigid.dynamic_stiffness(matrices, 2 * np.pi * freq[poor])
         rcond[poor] = mode_condition(left, rigid.uncertainty)
     return LineStatus(status.line_info, rcond)
 
 
-def _fallen_back(task: _Task, error: float, n_vectors: int, what: str) -> tuple[ComplexArray, ReceptanceInfo]:
+def _fallen_back(task: _Task, error: float, n_vectors: int, what: str) -> tuple[ComplexArray, _Made]:
     """Direct solution after a sum of modes that was not good enough."""
     reason = (
         f"{what} of {n_vectors} vectors has the error estimate {error:.1e}, above the tolerance {task.tolerance:.1e}"
@@ -334,7 +345,7 @@ def _fallen_back(task: _Task, error: float, n_vectors: int, what: str) -> tuple[
     return _solved(task, _direct(task.matrices), reason)
 
 
-def _summed(task: _Task, reason: str) -> tuple[ComplexArray, ReceptanceInfo]:
+def _summed(task: _Task, reason: str) -> tuple[ComplexArray, _Made]:
     """All modes, where they meet the tolerance."""
     try:
         modes, rigid = all_modes(task.matrices, task.outputs, task.inputs)
@@ -346,21 +357,25 @@ def _summed(task: _Task, reason: str) -> tuple[ComplexArray, ReceptanceInfo]:
     return _finished(task, modes, error, attainable, "modal", reason)
 
 
-def _reduced(task: _Task, reason: str) -> tuple[ComplexArray, ReceptanceInfo]:
+def _reduced(task: _Task, reason: str) -> tuple[ComplexArray, _Made]:
     """Reduced model, where it meets the tolerance."""
     if task.is_empty:
         return _solved(task, _direct(task.matrices), "no lines, or no DOFs with a weight")
     found = reduce_model(task.freq_hz, task.matrices, task.outputs, task.inputs, task.tolerance)
-    result, info = _finished(task, found.modes, found.error_estimate, found.attainable, "krylov", reason)
-    return result, replace(info, solver=found.solver) if info.method == "krylov" else info
+    result, made = _finished(task, found.modes, found.error_estimate, found.attainable, "krylov", reason)
+    if made["method"] == "krylov":
+        made["solver"] = found.solver
+    return result, made
 
 
 def _finished(
     task: _Task, modes: Modes, error: float, attainable: float, method: Literal["modal", "krylov"], reason: str
-) -> tuple[ComplexArray, ReceptanceInfo]:
+) -> tuple[ComplexArray, _Made]:
     """Sum of modes, or a direct solution where its error is too large."""
     n_vectors = modes.stiffness.size
     if not error <= max(task.tolerance, attainable):
         return _fallen_back(task, error, n_vectors, "a sum of modes" if method == "modal" else "a reduced model")
     result = modes.receptance(task.freq_hz, task.on_singular, task.out)
-    return result, ReceptanceInfo(method, reason, error, task.tolerance, n_vectors)
+    return result, _Made(
+        method=method, reason=reason, error_estimate=error, tolerance=task.tolerance, n_vectors=n_vectors
+    )

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg, sparse
 
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
-from jointfrf.models.matrices import ModelMatrices
-from jointfrf.models.receptance.factors import SingularMatrixError, SparseSolver
+from jointfrf.models.matrices import ModelMatrices, Operand
+from jointfrf.models.receptance.factors import SingularMatrixError, SparseSolver, factor
+from jointfrf.models.receptance.lapack import eigh, orthonormal
 
 __all__ = ["RigidModes", "find_rigid_modes", "held", "mode_condition", "resistance"]
 
@@ -51,7 +51,7 @@ class RigidModes:
 
     def dynamic_stiffness(self, matrices: ModelMatrices, omega: FloatArray) -> ComplexArray:
         """Return r^T Z r = w_r^2 (1 + i eta) + i r^T H r + i w r^T C r - w^2, shape (n_freq, k), (rad/s)^2."""
-        structural, viscous = (resistance(matrices.sparse(x), self.shapes) for x in ("structural_damping", "damping"))
+        structural, viscous = (resistance(matrices, x, self.shapes) for x in ("structural_damping", "damping"))
         w = omega[:, None]
         elastic = (1 + 1j * matrices.loss_factor) * self.stiffness
         return np.asarray(elastic + 1j * (structural + w * viscous) - w**2, np.complex128)
@@ -72,10 +72,13 @@ def held(n: int) -> RigidModes:
     return RigidModes(np.zeros((n, 0)), np.zeros((n, 0)), np.zeros(0), np.zeros(0))
 
 
-def resistance(matrix: sparse.csc_array, shapes: FloatArray) -> FloatArray:
-    """Return r^T A r of each shape, shape (k,); 0 where it may be rounding of A."""
+def resistance(matrices: ModelMatrices, name: str, shapes: FloatArray) -> FloatArray:
+    """Return r^T A r of each shape, shape (k,); 0 where it may be rounding of A, or the model has none."""
+    if matrices.named[name] is None:
+        return np.zeros(shapes.shape[1])
+    matrix = matrices.operand(name)
     found = np.einsum("ij,ij->j", shapes, matrix @ shapes)
-    return np.where(abs(found) <= _ROUNDINGS * _EPS * _terms(matrix, shapes), 0, found)
+    return np.where(abs(found) <= _ROUNDINGS * _EPS * _terms(abs(matrix), shapes), 0, found)
 
 
 def mode_condition(dynamic_stiffness: ComplexArray, uncertainty: FloatArray) -> FloatArray:
@@ -89,15 +92,15 @@ def mode_condition(dynamic_stiffness: ComplexArray, uncertainty: FloatArray) -> 
     return found
 
 
-def find_rigid_modes(k: sparse.csc_array, m: sparse.csc_array, solver: SparseSolver | None = None) -> RigidModes:
+def find_rigid_modes(k: Operand, m: Operand, solver: SparseSolver | None = None) -> RigidModes:
     """Find the modes whose stiffness rounding hides, by inverse iteration of a block of vectors.
 
     Parameters
     ----------
-    k, m : sparse array, shape (n, n)
-        Symmetric.
+    k, m : ndarray or sparse array, shape (n, n)
+        Symmetric; both of one kind.
     solver : SparseSolver, optional
-        One that is used for matrices of this pattern elsewhere.
+        One that is used for sparse matrices of this pattern elsewhere.
 
     Returns
     -------
@@ -122,10 +125,10 @@ def find_rigid_modes(k: sparse.csc_array, m: sparse.csc_array, solver: SparseSol
     .. [2] N. J. Higham, Accuracy and Stability of Numerical Algorithms, 2nd ed., SIAM, 2002, sec. 7.2: componentwise
        condition.
     """
-    n = k.shape[0]
+    n, magnitudes = k.shape[0], abs(k)
     size = min(_BLOCK, n)
     while True:
-        found = _lowest_modes(k, m, size, solver or SparseSolver())
+        found = _lowest_modes(k, magnitudes, m, size, solver)
         if found is None:
             return held(n)
         squared, shapes, terms = found
@@ -134,13 +137,14 @@ def find_rigid_modes(k: sparse.csc_array, m: sparse.csc_array, solver: SparseSol
         if size == n or not soft.all():
             break
         size = min(2 * size, n)
-    above = np.append(known[1:], np.inf if size == n else 0)
+    above = np.full(size, np.inf if size == n else 0.0)
+    above[:-1] = known[1:]
     apart = np.flatnonzero(soft & (above >= _GAP * known))
     count = apart[-1] + 1 if apart.size else 0
     if not count:
         return held(n)
     # apart from the others once more, whose w^2 is large enough to spoil the last digits of these
-    squared, shapes, terms = _ritz(k, m, shapes[:, :count])
+    squared, shapes, terms = _ritz(k, magnitudes, m, shapes[:, :count])
     rounding = _EPS * terms
     free = squared <= _ROUNDINGS * rounding
     uncertainty = np.where(free, np.where(squared <= rounding, 0, squared), rounding)
@@ -148,27 +152,28 @@ def find_rigid_modes(k: sparse.csc_array, m: sparse.csc_array, solver: SparseSol
 
 
 def _lowest_modes(
-    k: sparse.csc_array, m: sparse.csc_array, size: int, solver: SparseSolver
+    k: Operand, magnitudes: Operand, m: Operand, size: int, solver: SparseSolver | None
 ) -> tuple[FloatArray, FloatArray, FloatArray] | None:
     """Return w^2, shapes (n, size) and the terms of w^2 of the lowest modes; None where K + s M is singular."""
-    masses, magnitudes = m.diagonal(), abs(k)
+    masses = m.diagonal()
     with_mass = masses > 0
     unit = np.sqrt(np.divide(1, masses, out=np.zeros_like(masses), where=with_mass))  # unit mass in every DOF
     mean = float(unit @ (magnitudes @ unit)) / max(1, int(with_mass.sum())) or 1.0
     scale = np.sqrt(masses + magnitudes.diagonal() / mean) if (masses >= 0).all() else np.zeros(0)
     if not scale.all() or not scale.size:
         return None
+    shifted = k + (_SHIFT * _EPS * mean) * m
     try:
-        factors = solver.factor(k + (_SHIFT * _EPS * mean) * m)
+        factors = factor(shifted) if solver is None else solver.factor(shifted)
     except SingularMatrixError:
         return None
     shapes = np.random.default_rng(0).standard_normal((k.shape[0], size)) / scale[:, None]
     last = np.full(size, np.inf)
     for _ in range(_ITERATIONS):
         try:
-            basis = linalg.qr(scale[:, None] * factors.solve(m @ shapes), mode="economic")[0] / scale[:, None]
-            squared, shapes, terms = _ritz(k, m, basis)
-        except (linalg.LinAlgError, ValueError):  # no mass in some motion
+            basis = orthonormal(scale[:, None] * factors.solve(m @ shapes)) / scale[:, None]
+            squared, shapes, terms = _ritz(k, magnitudes, m, basis)
+        except np.linalg.LinAlgError:  # no mass in some motion
             return None
         if ((squared <= _ROUNDINGS * _EPS * terms) | (squared >= (1 - _SETTLED) * last)).all():
             break
@@ -176,14 +181,15 @@ def _lowest_modes(
     return squared, shapes, terms
 
 
-def _ritz(k: sparse.csc_array, m: sparse.csc_array, basis: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _ritz(k: Operand, magnitudes: Operand, m: Operand, basis: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return Ritz values of a space, Ritz vectors with unit modal masses, and the terms of the values."""
-    squared, mixed = linalg.eigh(basis.T @ (k @ basis), basis.T @ (m @ basis))
+    squared, mixed = eigh(basis.T @ (k @ basis), basis.T @ (m @ basis))
     shapes = basis @ mixed
-    return squared, shapes, _terms(k, shapes)
+    return squared, shapes, _terms(magnitudes, shapes)
 
 
-def _terms(matrix: sparse.csc_array, shapes: FloatArray) -> FloatArray:
-    """Return |r|^T |A| |r| of each shape, shape (k,)."""
-    found: FloatArray = np.einsum("ij,ij->j", abs(shapes), abs(matrix) @ abs(shapes))
+def _terms(magnitudes: Operand, shapes: FloatArray) -> FloatArray:
+    """Return |r|^T |A| |r| of each shape, shape (k,), from |A|."""
+    lengths = abs(shapes)
+    found: FloatArray = np.einsum("ij,ij->j", lengths, magnitudes @ lengths)
     return found
