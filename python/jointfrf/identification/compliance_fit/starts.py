@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from jointfrf.frf.bands import line_slices
+from jointfrf.frf.bands import in_pieces
 from jointfrf.identification.compliance_fit.joint_terms import CoupledJoint, DiagonalJoint, JointCoordinates, terms_of
 from jointfrf.identification.compliance_fit.line_forms import LineForms, minimise_forms
 from jointfrf.identification.compliance_fit.manifold import LineData, OnManifold, project
@@ -135,8 +135,14 @@ def _variance(data: LineData) -> FloatArray:
 
 def hidden_share(data: LineData) -> FloatArray:
     """Return the largest relative noise of gamma_jk, of the smooth FRFs, on each line, shape (n_freq,)."""
-    matrix, parts = data.entries.matrix, (data.on_slice(own) for own in line_slices(len(data.smooth)))
-    return np.concatenate([_hidden(matrix(part.smooth), matrix(_variance(part))) for part in parts])
+    matrix = data.entries.matrix
+
+    def of_lines(own: slice) -> list[FloatArray]:
+        part = data.on_slice(own)
+        return [_hidden(matrix(part.smooth), matrix(_variance(part)))]
+
+    (share,) = in_pieces(len(data.smooth), of_lines)
+    return share
 
 
 def _hidden(gamma: ComplexArray, spread: FloatArray) -> FloatArray:
