@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from jointfrf.kernel.arguments import FloatArray, as_frequency, as_names, as_square, one_line
 
-__all__ = ["PIECE", "Band", "BandMean", "as_bands", "band_mean", "in_bands", "line_slices"]
+__all__ = ["PIECE", "Band", "BandMean", "as_bands", "band_mean", "in_bands", "in_pieces", "line_slices"]
 
 Band = tuple[float, float]
 #: Lines of long sweeps that are taken together at most: memory for what is in between does not grow with the lines.
 PIECE = 8192
 
 
-def line_slices(n_freq: int) -> list[slice]:
-    """Cut lines into pieces of about equal length, `PIECE` at most.
+def line_slices(n_freq: int, most: int | None = None) -> list[slice]:
+    """Cut lines into pieces of about equal length, `most` at most, `PIECE` by default.
 
     Examples
     --------
@@ -27,10 +27,44 @@ def line_slices(n_freq: int) -> list[slice]:
     >>> line_slices(10000)
     [slice(0, 5000, None), slice(5000, 10000, None)]
     """
-    if n_freq <= PIECE:
+    most = PIECE if most is None else most
+    if n_freq <= most:
         return [slice(0, n_freq)]
-    ends = np.linspace(0, n_freq, -(-n_freq // PIECE) + 1).astype(int).tolist()
+    ends = np.linspace(0, n_freq, -(-n_freq // most) + 1).astype(int).tolist()
     return [slice(first, end) for first, end in pairwise(ends)]
+
+
+def in_pieces(
+    n_freq: int, of_lines: Callable[[slice], Sequence[NDArray[Any]]], most: int | None = None
+) -> list[NDArray[Any]]:
+    """Compute arrays of all lines a piece of the lines at a time: beside them memory is that of one piece.
+
+    Parameters
+    ----------
+    n_freq : int
+    of_lines : callable
+        From a slice of the lines to arrays whose first axis is theirs.
+    most : int, optional
+        Lines of a piece at most, `PIECE` by default.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from jointfrf.frf.bands import in_pieces
+    >>> h = np.arange(20000.0)
+    >>> (squares,) = in_pieces(len(h), lambda own: [h[own] ** 2])
+    >>> bool((squares == h**2).all())
+    True
+    """
+    first, *others = line_slices(n_freq, most)
+    parts = of_lines(first)
+    if not others:
+        return list(parts)
+    whole = [np.empty((n_freq, *part.shape[1:]), part.dtype) for part in parts]
+    for own in (first, *others):
+        for array, part in zip(whole, parts if own is first else of_lines(own), strict=True):
+            array[own] = part
+    return whole
 
 
 def in_bands(freq_hz: ArrayLike, bands: Sequence[Band]) -> NDArray[np.bool_]:

@@ -256,7 +256,8 @@ def first_variance(h: ComplexArray) -> FloatArray:
 
 def near_squares(h: ComplexArray) -> FloatArray:
     """Mean of |h|^2 over each line and its neighbours."""
-    squares = h.real**2 + h.imag**2
-    padded = np.pad(squares, ((1, 1), (0, 0), (0, 0)), mode="edge")
-    near: FloatArray = (padded[:-2] + padded[1:-1] + padded[2:]) / 3
+    padded = np.pad(h.real**2 + h.imag**2, ((1, 1), (0, 0), (0, 0)), mode="edge")
+    near: FloatArray = padded[:-2] + padded[1:-1]
+    near += padded[2:]
+    near /= 3
     return near

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from jointfrf.frf.noise_model import NoiseModel
 from jointfrf.identification.compliance_fit.channel_noise import NoiseOptions
 from jointfrf.identification.compliance_fit.describe import describe_compliance
-from jointfrf.identification.compliance_fit.estimator import JointEstimate
+from jointfrf.identification.compliance_fit.estimator import GroupStart, JointEstimate
 from jointfrf.identification.compliance_fit.fit import fit_compliance, fitted_joint
 from jointfrf.identification.compliance_fit.joint_terms import CrossTerms, DampingTerms
 from jointfrf.identification.compliance_fit.prepare import FitOptions, prepare_compliance
@@ -141,18 +141,19 @@ def identify_realisations(
     (True, True)
     """
     options = FitOptions(damping, cross, reciprocal)
-    known, near = NoiseOptions(noise), None
+    known = NoiseOptions(noise)
+    near: tuple[GroupStart, ...] | None = None
     if start is not None:
         check_type("start", start, FitStart)
-        near, known = start.estimate, replace(known, like=start.noise)
+        near, known = start.estimate.starts, replace(known, like=start.noise)
     if not isinstance(gammas, Iterable):
         raise TypeError(f"gammas must be a list of sets of FRFs, not {type(gammas).__name__}")
     for gamma in gammas:
         measured = as_measured(freq_hz, gamma, square=False)
-        problem = replace(prepare_compliance(measured, dofs, bands, transform, known, options), near=near)
+        problem = replace(prepare_compliance(measured, dofs, bands, transform, known, options), near=near or ())
         found = fit_compliance(problem)
         if near is None:
-            near, known = found.estimate, replace(known, like=problem.noise.model)
+            near, known = found.estimate.starts, replace(known, like=problem.noise.model)
         yield describe_compliance(found, problem).fit
 
 
@@ -186,5 +187,5 @@ def viscous_estimate(
     noise = NoiseOptions(None, like=None if start is None else start.noise)
     options = FitOptions("viscous", "zero", reciprocal=True)
     problem = prepare_compliance(as_measured(freq_hz, gamma, square=False), dofs, None, None, noise, options)
-    found = fitted_joint(replace(problem, near=None if start is None else start.estimate))
+    found = fitted_joint(replace(problem, near=() if start is None else start.estimate.starts))
     return found.estimate.theta, np.array(list(found.intervals()(0.95).values())).T

@@ -21,7 +21,7 @@ def with_noise(gamma, level, *, smooth=None):
     """Interface FRFs of known relative noise; smooth FRFs are the exact ones unless others are given."""
     smooth = gamma if smooth is None else smooth
     one = np.eye(gamma.shape[-1])
-    return InterfaceFrfs(gamma, smooth, (level * abs(smooth)) ** 2, one, one, reciprocal=True)
+    return InterfaceFrfs.of(gamma, smooth, (level * abs(smooth)) ** 2, one, one, reciprocal=True)
 
 
 def identified(freq, gamma, dofs, **options):
@@ -119,7 +119,7 @@ def test_channels_instead_of_dofs(beams):
     variance = (0.002 * abs(h)) ** 2
 
     def fit(noisy):
-        frfs = InterfaceFrfs(noisy, back @ h @ back.T, variance, back, back, reciprocal=True)
+        frfs = InterfaceFrfs.of(noisy, back @ h @ back.T, variance, back, back, reciprocal=True)
         return estimate_joint(frfs, terms_of(beams))
 
     error = np.sqrt(np.diag(fit(h).covariance))

@@ -70,7 +70,7 @@ def fitted(h):
 def with_noise(h, transform, level=0.01):
     """FRFs of known relative noise, smooth ones taken for the measured."""
     variance = level**2 * abs(h) ** 2 + 1e-60
-    return InterfaceFrfs(h, transform @ h @ transform.T, variance, transform, transform, reciprocal=True)
+    return InterfaceFrfs.of(h, transform @ h @ transform.T, variance, transform, transform, reciprocal=True)
 
 
 def uncoupled_groups(h, transform):

@@ -97,7 +97,7 @@ def test_covariance_is_the_cramer_rao_bound_with_unknown_cross_terms(beams):
     gamma = beams.gamma(beams.joint)
     terms = joint_terms(2 * np.pi * beams.freq, beams.joint.dofs, "viscous", "zero")
     one = np.eye(4)
-    frfs = InterfaceFrfs(gamma, gamma, (1e-4 * abs(gamma)) ** 2, one, one, reciprocal=True)
+    frfs = InterfaceFrfs.of(gamma, gamma, (1e-4 * abs(gamma)) ** 2, one, one, reciprocal=True)
     found = estimate_joint(frfs, terms, "ignore")
     k = beams.joint.dynamic_stiffness(beams.freq)
     bound = 1e-4 * np.sqrt(np.diag(cramer_rao(gamma, k, terms, unknown_cross=True)))

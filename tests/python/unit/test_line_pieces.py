@@ -1,11 +1,15 @@
 """Long sweeps, piece by piece: what is found does not depend on where they are cut."""
 
+import sys
+import tracemalloc
+
 import numpy as np
 import pytest
 
 import jointfrf as jf
+import six_dof_beams
 from jointfrf.frf import bands
-from jointfrf.frf.bands import line_slices
+from jointfrf.frf.bands import in_pieces, line_slices
 from jointfrf.identification.compliance_fit.channel_noise import NoiseOptions
 from jointfrf.identification.compliance_fit.fit import fit_compliance
 from jointfrf.identification.compliance_fit.prepare import FitOptions, prepare_compliance
@@ -19,6 +23,22 @@ def test_pieces_hold_every_line_once(n):
     sizes = [own.stop - own.start for own in pieces]
     assert max(sizes) <= 8192
     assert max(sizes) - min(sizes) <= 1
+
+
+@pytest.mark.parametrize("most", [3, 10, None])
+def test_arrays_in_pieces_are_those_of_all_lines(most):
+    h, seen = np.arange(20.0).reshape(10, 2), []
+
+    def of_lines(own):
+        seen.append(own)
+        return [h[own] ** 2, h[own, 0] > 4]
+
+    squares, large = in_pieces(10, of_lines, most)
+    np.testing.assert_array_equal(squares, h**2)
+    np.testing.assert_array_equal(large, h[:, 0] > 4)
+    assert large.dtype == np.bool_
+    assert seen == line_slices(10, most)
+    assert max(own.stop - own.start for own in seen) <= (most or 10)
 
 
 @pytest.fixture
@@ -70,3 +90,22 @@ def test_a_fit_of_noisy_pieces(beams, cut):
     fit = jf.identify(beams.freq, x, beams.joint.dofs)
     for name, value in whole.parameters.items():
         assert abs(fit.parameters[name] - value) < 0.7 * whole.std_error[name]
+
+
+@pytest.mark.parametrize("noise", [None, 0.03])
+def test_memory_of_a_fit_is_a_few_times_that_of_its_frfs(monkeypatch, noise):
+    """Beside the FRFs: smooth ones and variances, once each, and less; pieces are as small as of a long sweep."""
+    freq = np.linspace(1, 600, 5000)
+    h = jf.pollute(six_dof_beams.assembly(freq=freq), 0.03, seed=1)
+    jf.identify(freq[::100], h[::100], six_dof_beams.DOFS, noise=0.03)  # all that is imported and kept
+    for module in list(sys.modules.values()):
+        if module.__name__.startswith("jointfrf.") and "PIECE" in vars(module):
+            monkeypatch.setattr(module, "PIECE", 250)
+    tracemalloc.start()
+    try:
+        jf.identify(freq, h, six_dof_beams.DOFS, noise=noise).confidence_interval()
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    # 2.4; the FRFs as matrices once more are 1.0, as entries of both groups 0.3.
+    assert peak < 2.6 * h.nbytes

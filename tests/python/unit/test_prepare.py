@@ -34,14 +34,14 @@ def test_lines_outside_all_bands_are_left_out_and_each_dof_keeps_its_own(beams):
     assert problem.bands == (((200.0, 400.0),), ((300.0, 500.0), (700.0, 800.0)))
     whole = measured(beams)
     np.testing.assert_array_equal(problem.frfs.measured, whole.h[np.isin(whole.freq_hz, freq)])
-    assert problem.frfs.smooth.shape == problem.frfs.variance.shape == problem.frfs.measured.shape
+    assert problem.frfs.smooth_gamma.shape == problem.frfs.variance.shape == problem.frfs.measured.shape
 
 
 @pytest.mark.parametrize("noise", [NoiseOptions(), NoiseOptions(0.05)])
 def test_smooth_frfs_are_nearer_to_the_exact_ones_than_the_measured(beams, noise):
     exact = beams.gamma(beams.joint)
     frfs = prepared(beams, measured=measured(beams, 0.05), noise=noise).frfs
-    off = [np.sqrt(np.mean(abs(h / exact - 1) ** 2)) for h in (frfs.smooth, frfs.measured)]
+    off = [np.sqrt(np.mean(abs(h / exact - 1) ** 2)) for h in (frfs.smooth_gamma, frfs.measured)]
     assert off[0] < 0.5 * off[1]
 
 
@@ -49,8 +49,8 @@ def test_smooth_frfs_that_miss_a_line_give_way_to_the_measured(beams):
     h = measured(beams).h.copy()
     h[40] *= 3
     given = prepared(beams, measured=as_measured(beams.freq, h, square=False), noise=NoiseOptions(0.01))
-    np.testing.assert_array_equal(given.frfs.smooth[40], h[40])
-    assert (given.frfs.smooth[:35] != h[:35]).all()
+    np.testing.assert_array_equal(given.frfs.smooth_gamma[40], (h[40] + h[40].T) / 2)
+    assert (given.frfs.smooth_gamma[:35] != h[:35]).all()
 
 
 def test_noise_is_estimated_from_the_lines_kept_where_nothing_is_said(beams):
@@ -61,7 +61,7 @@ def test_noise_is_estimated_from_the_lines_kept_where_nothing_is_said(beams):
     kept = prepared(beams, measured=noisy, bands=(400, 800))
     assert kept.noise.level == pytest.approx(0.01, rel=0.2)
     assert not kept.noise.is_assumed
-    size = np.median(np.sqrt(kept.frfs.variance) / abs(kept.frfs.smooth))
+    size = np.median(np.sqrt(kept.frfs.variance) / abs(kept.frfs.smooth_gamma))
     assert size == pytest.approx(kept.noise.level, rel=0.05)
 
 
@@ -71,7 +71,7 @@ def test_noise_given_as_a_level_is_relative_to_the_smooth_frfs(beams):
     assert problem.noise.inflation == 1
     assert not problem.noise.is_assumed
     assert problem.noise.outlying.size == 0
-    np.testing.assert_allclose(problem.frfs.variance, (0.03 * abs(problem.frfs.smooth)) ** 2, rtol=1e-9)
+    np.testing.assert_allclose(problem.frfs.variance, (0.03 * abs(problem.frfs.smooth_gamma)) ** 2, rtol=1e-9)
 
 
 def test_noise_given_as_variances_keeps_the_lines_of_the_bands(beams):
@@ -93,7 +93,7 @@ def test_coherence_brings_the_noise_of_each_line_and_averages_scale_it(beams):
     problem = prepared(
         beams, measured=noisy, noise=NoiseOptions(coherence=coherence, averages=n_averages), bands=(200, 700)
     )
-    found = np.sqrt(problem.frfs.variance) / abs(problem.frfs.smooth)
+    found = np.sqrt(problem.frfs.variance) / abs(problem.frfs.smooth_gamma)
     np.testing.assert_allclose(np.median(found / level[kept], axis=0), 1, rtol=0.2)
     loud = (problem.freq_hz > 300) & (problem.freq_hz < 450)
     assert np.median(found[loud]) > 3.5 * np.median(found[~loud])

@@ -99,11 +99,14 @@ def known_noise(
         return _estimated_noise(freq, h, options, transforms, reciprocal=reciprocal)
     if options.coherence is not None or options.averages is not None:
         raise ValueError("coherence and averages are used where noise is not given: leave one of them out")
-    if np.ndim(options.noise) == 0:
+    is_level = np.ndim(options.noise) == 0
+    if is_level:
         level = as_number("noise", options.noise)
         if level <= 0:
             raise ValueError(f"noise must be positive, not {level:g}")
         variance = _relative_variance(np.sqrt(near_squares(h)), level)
+        # Measured FRFs as weights favour lines that noise has made small.
+        variance = _relative_variance(smooth_frfs(freq, h, variance, reciprocal=reciprocal).h, level)
     else:
         variance = as_real("noise", options.noise, h.shape)
         if (variance <= 0).any():
@@ -112,9 +115,7 @@ def known_noise(
         # Entries that are zero by symmetry have noise, but no relative noise.
         level = float(np.median(of_entry[of_entry < 1] if (of_entry < 1).any() else of_entry))
     smooth = smooth_frfs(freq, h, variance, reciprocal=reciprocal).h
-    if np.ndim(options.noise) == 0:
-        # Measured FRFs as weights favour lines that noise has made small.
-        smooth = smooth_frfs(freq, h, _relative_variance(smooth, level), reciprocal=reciprocal).h
+    if is_level:
         variance = _relative_variance(smooth, level)
     known = KnownNoise(level, 1.0, False, np.empty(0, np.intp), is_told=True)
     return _prepared(h, _near(smooth, h, variance), variance, transforms, known)

@@ -7,11 +7,13 @@ Both follow from C = gamma_kk gamma_jk^-1 gamma_jj - gamma_kj, linearised at the
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
+from jointfrf.frf.bands import in_pieces
 from jointfrf.identification.compliance_fit.manifold import FrfEntries, LineData
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.kernel.linear_algebra import invert, solve
@@ -69,14 +71,15 @@ def compliance_lines(data: LineData) -> tuple[ComplianceLines, ComplianceLines]:
     Noise of C = C(S) + L (gamma - S) R with L = (gamma_kk gamma_jk^-1, -1), R = (1, -gamma_jk^-1 gamma_jj) of the
     smooth FRFs S; by the best linear estimate where conditions are correlated with the diagonal.
     """
-    pieces: tuple[list[ComplianceLines], list[ComplianceLines]] = ([], [])
+
+    def of_lines(own: slice) -> tuple[NDArray[Any], ...]:
+        symmetric, plain = _piece(data.on_slice(own))
+        return *symmetric, *plain
+
     with np.errstate(all="ignore"):
-        for first in range(0, len(data.measured), _PIECE):
-            lines = np.arange(first, min(first + _PIECE, len(data.measured)))
-            for kept, piece in zip(pieces, _piece(data.on_lines(lines)), strict=True):
-                kept.append(piece)
-    symmetric, plain = (ComplianceLines(*map(np.concatenate, zip(*kept, strict=True))) for kept in pieces)
-    return symmetric, plain
+        both = in_pieces(len(data.measured), of_lines, _PIECE)
+    each = len(ComplianceLines._fields)
+    return ComplianceLines(*both[:each]), ComplianceLines(*both[each:])
 
 
 def _piece(data: LineData) -> tuple[ComplianceLines, ComplianceLines]:

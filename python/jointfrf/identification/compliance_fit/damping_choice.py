@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from jointfrf.identification.compliance_fit.estimator import FittedGroup
+from jointfrf.identification.compliance_fit.estimator import FittedGroup, GroupStart
 from jointfrf.identification.compliance_fit.joint_terms import (
     DampingTerms,
     DiagonalJoint,
@@ -74,10 +74,9 @@ def choose_damping(group: FittedGroup, dofs: tuple[str, ...], factor: float) -> 
     return choices
 
 
-def with_terms(group: FittedGroup, terms: JointTerms) -> FittedGroup:
-    """Return the fit with fewer terms, by its quadratic forms alone: where a fit with these terms may begin."""
-    found = _minimum(group, terms)
-    return group._replace(joint=found.joint, fit=group.fit._replace(minimum=found))
+def with_terms(group: FittedGroup, terms: JointTerms) -> GroupStart:
+    """Return where a fit with fewer terms may begin: at the minimum of the quadratic forms with these."""
+    return GroupStart.of(group, _minimum(group, terms))
 
 
 def _minimum(group: FittedGroup, terms: JointTerms) -> FormMinimum:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from jointfrf.frf.bands import PIECE, line_slices
+from jointfrf.dofs import Parameter
+from jointfrf.frf.bands import PIECE
 from jointfrf.identification.compliance_fit.group_fit import LITTLE_PATIENCE, GroupFit, GroupProblem, fit_dofs
 from jointfrf.identification.compliance_fit.interface_frfs import InterfaceFrfs
 from jointfrf.identification.compliance_fit.joint_terms import (
@@ -19,18 +20,32 @@ from jointfrf.identification.compliance_fit.joint_terms import (
     JointTerms,
     terms_of,
 )
-from jointfrf.identification.compliance_fit.manifold import LineData
+from jointfrf.identification.compliance_fit.line_forms import FormMinimum
+from jointfrf.identification.compliance_fit.manifold import LineData, OnManifold
 from jointfrf.identification.compliance_fit.starts import first_joints
 from jointfrf.identification.compliance_fit.unknown_cross import fit_unknown_cross
 from jointfrf.kernel.arguments import FloatArray
 
-__all__ = ["FittedGroup", "JointEstimate", "NamedParameter", "estimate_joint", "grouped", "unknown_entries"]
+__all__ = [
+    "FittedGroup",
+    "GroupData",
+    "GroupStart",
+    "JointEstimate",
+    "NamedParameter",
+    "estimate_joint",
+    "grouped",
+    "unknown_entries",
+]
 
 
 #: A compliance is not taken below this share of its standard error, nor of the receptances around it.
 _RIGID, _ROUNDING = 1e-3, 1e-12
 #: A fit that leaves cross terms unknown fits far better from this ratio of the mean squares on.
 _FAR_BETTER = 4.0
+
+
+#: A group of DOFs that is fitted by itself, and its FRFs.
+GroupData = tuple[NDArray[np.intp], LineData]
 
 
 class NamedParameter(Protocol):
@@ -59,6 +74,30 @@ class FittedGroup(NamedTuple):
     joint: JointCoordinates
     problem: GroupProblem
     fit: GroupFit
+
+
+class GroupStart(NamedTuple):
+    """Where the fit of a group of DOFs begins: at what another fit has found.
+
+    Attributes
+    ----------
+    dofs : ndarray of int
+    parameters : tuple of Parameter, length p
+    x : ndarray, shape (p,)
+        Coordinates of the joint.
+    on : OnManifold, optional
+        FRFs that nearly fit it.
+    """
+
+    dofs: NDArray[np.intp]
+    parameters: tuple[Parameter, ...]
+    x: FloatArray
+    on: OnManifold | None
+
+    @classmethod
+    def of(cls, group: FittedGroup, minimum: FormMinimum) -> GroupStart:
+        """Return the start at a minimum of the quadratic forms of a fit."""
+        return cls(group.dofs, terms_of(minimum.joint).parameters, minimum.x, group.fit.on)
 
 
 class JointEstimate(NamedTuple):
@@ -94,14 +133,24 @@ class JointEstimate(NamedTuple):
         """Whether the fits of all groups did."""
         return all(group.fit.converged for group in self.groups)
 
+    @property
+    def data(self) -> tuple[GroupData, ...]:
+        """Groups of DOFs and their FRFs."""
+        return tuple((group.dofs, group.problem.data) for group in self.groups)
+
+    @property
+    def starts(self) -> tuple[GroupStart, ...]:
+        """Where fits of other FRFs of the same structure begin; groups that did not converge have none."""
+        return tuple(GroupStart.of(group, group.fit.minimum) for group in self.groups if group.fit.converged)
+
 
 def estimate_joint(
     frfs: InterfaceFrfs,
     terms: JointTerms,
     cross: CrossTerms = "zero",
     used: NDArray[np.bool_] | None = None,
-    near: JointEstimate | None = None,
-    like: JointEstimate | None = None,
+    near: Sequence[GroupStart] = (),
+    data: Iterable[GroupData] | None = None,
 ) -> JointEstimate:
     """Fit a joint to FRFs whose noise is known.
 
@@ -114,46 +163,42 @@ def estimate_joint(
         Whether cross terms of C that are not sought are zero, or unknown.
     used : ndarray of bool, shape (n_freq, n), optional
         Lines used for each DOF; all by default.
-    near : JointEstimate, optional
+    near : sequence of GroupStart
         Of other FRFs of the same structure, or of other terms: where the fits start first.
-    like : JointEstimate, optional
-        Of the same FRFs with the same noise: its groups of DOFs and their data are taken.
+    data : iterable of (dofs, LineData), optional
+        What `grouped` returns, where it is known.
     """
     groups = []
-    known = {} if near is None else {tuple(group.dofs.tolist()): group for group in near.groups}
-    for dofs, data in grouped(frfs) if like is None else [(one.dofs, one.problem.data) for one in like.groups]:
+    known = {tuple(start.dofs.tolist()): start for start in near}
+    for dofs, lines in grouped(frfs) if data is None else data:
         own, which = terms.of_dofs(dofs)
         joint = coordinates_of(own)
-        problem = GroupProblem(data, joint, unknown_entries(dofs, cross, used, len(data.measured)))
+        problem = GroupProblem(lines, joint, unknown_entries(dofs, cross, used, len(lines.measured)))
         fit = _fitted(problem, cross, known.get(tuple(dofs.tolist())))
         groups.append(FittedGroup(dofs, which, joint, problem, fit))
     return assembled(terms, groups)
 
 
-def grouped(frfs: InterfaceFrfs) -> Iterator[tuple[NDArray[np.intp], LineData]]:
+def grouped(frfs: InterfaceFrfs) -> Iterator[GroupData]:
     """Return groups of DOFs that are fitted each by itself, and their FRFs."""
-    lines = np.arange(len(frfs.measured))
-    if lines.size <= PIECE:
-        yield from ((dofs, frfs.of_dofs(dofs)) for dofs in frfs.groups())
-        return
-    for dofs in frfs.on_lines(_some(lines)).groups():
-        yield dofs, LineData.joined([frfs.on_lines(lines[own]).of_dofs(dofs) for own in line_slices(lines.size)])
+    for dofs in frfs.on_lines(_some(len(frfs.measured))).groups():
+        yield dofs, frfs.of_dofs(dofs)
 
 
-def _some(lines: NDArray[np.intp]) -> NDArray[np.intp]:
+def _some(n_freq: int) -> slice:
     """Return no more lines than are treated at once, evenly spread."""
-    return lines[:: -(-lines.size // PIECE)]
+    return slice(None, None, max(1, -(-n_freq // PIECE)))
 
 
-def _fitted(problem: GroupProblem, cross: CrossTerms, near: FittedGroup | None) -> GroupFit:
+def _fitted(problem: GroupProblem, cross: CrossTerms, near: GroupStart | None) -> GroupFit:
     """Fit a group: on the manifold, or to the diagonal of C where its cross terms are unknown or deny every joint."""
-    if near is not None and cross != "ignore" and _is_near(near, problem):
-        found = fit_dofs(problem, [near.fit.minimum.x], LITTLE_PATIENCE, near.fit.on)
+    if near is not None and cross != "ignore" and near.parameters == terms_of(problem.joint).parameters:
+        found = fit_dofs(problem, [near.x], LITTLE_PATIENCE, near.on)
         if found.is_good:
             return found
     # Some lines, evenly spread, start as well as all.
-    some = _some(np.arange(len(problem.data.measured)))
-    starts = first_joints(problem.data.on_lines(some), coordinates_of(terms_of(problem.joint).on_lines(some)))
+    some = _some(len(problem.data.measured))
+    starts = first_joints(problem.data.on_slice(some), coordinates_of(terms_of(problem.joint).on_lines(some)))
     if not problem.is_diagonal or problem.data.entries.n == 1:
         return fit_dofs(problem, starts)
     diagonal = fit_unknown_cross(problem, starts)
@@ -167,11 +212,6 @@ def _fitted(problem: GroupProblem, cross: CrossTerms, near: FittedGroup | None) 
         return found
     assert diagonal.beside is not None
     return diagonal._replace(beside=diagonal.beside._replace(noise_squares=found.excess * diagonal.equations))
-
-
-def _is_near(near: FittedGroup, problem: GroupProblem) -> bool:
-    """Whether the fit of other FRFs has the same parameters, and converged."""
-    return near.fit.converged and terms_of(near.joint).parameters == terms_of(problem.joint).parameters
 
 
 def coordinates_of(terms: JointTerms) -> JointCoordinates:

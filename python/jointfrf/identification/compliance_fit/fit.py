@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import NamedTuple, TypeVar
 
@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf.errors import IllConditionedWarning
-from jointfrf.frf.bands import line_slices
+from jointfrf.frf.bands import in_pieces
 from jointfrf.identification.compliance_fit.band_parts import BandParts, fit_band_parts, left_out_share
 from jointfrf.identification.compliance_fit.channel_jackknife import ChannelSpread, channel_spread
 from jointfrf.identification.compliance_fit.damping_choice import DofDamping, choose_damping, with_terms
-from jointfrf.identification.compliance_fit.estimator import JointEstimate, estimate_joint
+from jointfrf.identification.compliance_fit.estimator import GroupData, JointEstimate, estimate_joint
 from jointfrf.identification.compliance_fit.from_nothing import check_estimate
 from jointfrf.identification.compliance_fit.interface_frfs import InterfaceFrfs
 from jointfrf.identification.compliance_fit.intervals import LikelihoodIntervals, Spread, spread_of
@@ -168,14 +168,11 @@ def _span(freq: FloatArray) -> str:
 
 def stiffness_of_lines(frfs: InterfaceFrfs) -> ComplexArray:
     """Return K*(w) of each line by itself, NaN where it cannot be inverted; a piece of the lines at a time."""
+    h = frfs.measured
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", IllConditionedWarning)
-        return np.concatenate(
-            [
-                inverse_substructuring(frfs.gamma(frfs.measured[own]), on_singular="nan")
-                for own in line_slices(len(frfs.measured))
-            ]
-        )
+        (found,) = in_pieces(len(h), lambda own: [inverse_substructuring(frfs.gamma(h[own]), on_singular="nan")])
+    return found
 
 
 def _band_parts(
@@ -188,7 +185,7 @@ def _band_parts(
 
     def fit(lines: NDArray[np.intp]) -> JointEstimate:
         frfs = problem.frfs.on_lines(lines)
-        part = replace(problem, freq_hz=problem.freq_hz[lines], frfs=frfs, used=problem.used[lines], near=None)
+        part = replace(problem, freq_hz=problem.freq_hz[lines], frfs=frfs, used=problem.used[lines], near=())
         return _estimate(part, words)
 
     return fit_band_parts(result, problem.freq_hz, spread.information, fit)
@@ -222,7 +219,7 @@ def _cross_fits(
     coupled = any(len(group.dofs) > 1 for group in result.groups)
     if problem.noise.is_assumed or problem.options.cross != "zero" or not (misfit.is_large and coupled):
         return False
-    other = _estimate(problem, _chosen(problem, choices), "fit", result)
+    other = _estimate(problem, _chosen(problem, choices), "fit", result.data)
     return bool(np.sqrt(other.excess) - 1 < (misfit.ratio - 1) / 4)
 
 
@@ -272,16 +269,19 @@ def _with_damping(problem: FitProblem) -> tuple[JointEstimate, tuple[DofDamping,
         return both, choices
     if problem.freq_hz.size >= _FEW and left_out_share(both) == 0:
         terms = _terms(problem, chosen, problem.options.cross)
-        near = tuple(with_terms(group, terms.of_dofs(group.dofs)[0]) for group in both.groups)
-        problem = replace(problem, near=both._replace(groups=near))
-    return _estimate(problem, chosen, like=both), choices
+        near = [with_terms(group, terms.of_dofs(group.dofs)[0]) for group in both.groups if group.fit.converged]
+        problem = replace(problem, near=tuple(near))
+    data = both.data
+    # Its quadratic forms, of which a long sweep has many, are not needed any more.
+    del both, group
+    return _estimate(problem, chosen, data=data), choices
 
 
 def _with_common_damping(problem: FitProblem) -> tuple[JointEstimate, tuple[DofDamping, ...]]:
     """Choose the damping terms of a joint with cross terms: the same for all DOFs."""
     kinds: tuple[DampingTerms, ...] = ("viscous", "hysteretic", "both")
     first = _estimate(problem, kinds[0])
-    results = {kinds[0]: first} | {kind: _estimate(problem, kind, like=first) for kind in kinds[1:]}
+    results = {kinds[0]: first} | {kind: _estimate(problem, kind, data=first.data) for kind in kinds[1:]}
     factor = problem.noise.inflation * max(results["both"].excess, _LEAST_EXCESS)
     scores = {}
     for kind, result in results.items():
@@ -300,12 +300,12 @@ def _estimate(
     problem: FitProblem,
     damping: DampingTerms | Sequence[DampingTerms],
     cross: CrossTerms | None = None,
-    like: JointEstimate | None = None,
+    data: Iterable[GroupData] | None = None,
 ) -> JointEstimate:
-    """Fit with these terms; `like` is a fit of the same FRFs with others."""
+    """Fit with these terms; `data` as in `estimate_joint`."""
     cross = problem.options.cross if cross is None else cross
     terms = _terms(problem, damping, cross)
     with warnings.catch_warnings(), np.errstate(over="ignore", divide="ignore", invalid="ignore"):
         # Lines on which noise hides the joint are ill-conditioned; they weigh little. A start may lead to infinity.
         warnings.simplefilter("ignore", IllConditionedWarning)
-        return estimate_joint(problem.frfs, terms, cross, problem.used, problem.near, like)
+        return estimate_joint(problem.frfs, terms, cross, problem.used, problem.near, data)

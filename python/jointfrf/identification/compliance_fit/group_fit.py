@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import NamedTuple
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from jointfrf.frf.bands import PIECE, line_slices
+from jointfrf.frf.bands import PIECE, in_pieces
 from jointfrf.identification.compliance_fit.diagonal_minimum import lowest_minimum, within_reach
 from jointfrf.identification.compliance_fit.joint_terms import DiagonalJoint, JointCoordinates, terms_of
 from jointfrf.identification.compliance_fit.likely_m import PriorOfM, expected_m, prior_of_m
@@ -256,7 +256,9 @@ def _iterate(
     trusted = np.ones(len(data.measured), np.bool_)
     prior: PriorOfM | None = prior_of_m(data) if problem.is_diagonal else None
     hidden = problem.is_diagonal
-    for step in range(1, _MOST + 1):
+    step = 0
+    while True:
+        step += 1
         c = problem.of_joint(joint.compliance(linearised_at))
         if unknown is not None:
             c = np.where(problem.unknown.reshape(c.shape), unknown, c)
@@ -279,26 +281,26 @@ def _iterate(
         converged = converged and (hidden or not barely)
         # The first step tells, with M that cannot feign it; a joint barely seen once is treated so to the end.
         hidden = barely or (hidden and step > 1)
-        if converged or (step > patience and minimum.cost > _LOST * equations):
-            break
+        if converged or step == _MOST or (step > patience and minimum.cost > _LOST * equations):
+            kept = on if len(data.measured) <= PIECE else None
+            return GroupFit(minimum, forms, trusted, equations, float(free.sum()), step, converged, on=kept)
         linearised_at = _within_sight(forms, problem.joint, x, error) if problem.is_diagonal else x
-    kept = on if len(data.measured) <= PIECE else None
-    return GroupFit(minimum, forms, trusted, equations, float(free.sum()), step, converged, on=kept)
+        # Of a long sweep the forms of one step take as much memory as those of the next.
+        del forms, minimum
 
 
 def _first_points(data: LineData, c: ComplexArray) -> OnManifold:
     """Start on every line, a piece of the lines at a time."""
-    parts = [starts_on_manifold(data.on_slice(own), c[own], _FIRST_STEPS) for own in line_slices(len(c))]
-    h, m = (np.concatenate([one[i] for one in parts]) for i in (0, 1))
-    return OnManifold(h, m, np.concatenate([one.squares for one in parts]))
+    return OnManifold(*in_pieces(len(c), lambda own: starts_on_manifold(data.on_slice(own), c[own], _FIRST_STEPS)))
 
 
 def _linearised(
     problem: GroupProblem, c: ComplexArray, on: OnManifold, trusted: NDArray[np.bool_], prior: PriorOfM | None
 ) -> tuple[LineForms, ComplexArray | None]:
     """Return what `_used` does, lines that are not trusted weighing nothing, a piece of the lines at a time."""
-    parts, found = [], np.zeros_like(c)
-    for own in line_slices(len(c)):
+    found = np.zeros_like(c) if problem.unknown.any() else None
+
+    def of_lines(own: slice) -> Sequence[NDArray[Any]]:
         here = problem._replace(data=problem.data.on_slice(own), unknown=problem.unknown[own])
         point = OnManifold(on.h[own], on.m[own], on.squares[own])
         if prior is not None:
@@ -306,14 +308,11 @@ def _linearised(
         targets = (here.data.measured, here.data.smooth) if here.unknown.any() else (here.data.measured,)
         found_forms = normal_forms(here.data, c[own], point, targets)
         forms, some = _used(here, found_forms[0], found_forms[-1], c[own])
-        parts.append(forms.scaled(trusted[own].astype(float)))
-        if some is not None:
+        if found is not None and some is not None:
             found[own] = some
-    if len(parts) == 1:
-        return parts[0], found if problem.unknown.any() else None
-    compliance, weight, gradient = (np.concatenate([one[i] for one in parts]) for i in (0, 1, 2))
-    whole = LineForms(compliance, weight, gradient, np.concatenate([one.squares for one in parts]))
-    return whole, found if problem.unknown.any() else None
+        return forms.scaled(trusted[own].astype(float))
+
+    return LineForms(*in_pieces(len(c), of_lines)), found
 
 
 def _within_sight(forms: LineForms, joint: JointCoordinates, x: FloatArray, error: FloatArray) -> FloatArray:

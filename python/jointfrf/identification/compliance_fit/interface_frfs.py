@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from jointfrf.frf.bands import in_pieces
 from jointfrf.frf.entry_groups import connected
 from jointfrf.identification.compliance_fit.manifold import FrfEntries, LineData
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
@@ -28,8 +29,8 @@ class InterfaceFrfs(NamedTuple):
     ----------
     measured : ndarray, shape (n_freq, m_r, m_f)
         Between the channels, m/N.
-    smooth : ndarray, shape (n_freq, 2 n, 2 n)
-        Smooth FRFs between the joint DOFs, m/N.
+    smooth : ndarray, shape (n_freq, q)
+        Smooth FRFs between the joint DOFs, m/N: the entries of `FrfEntries`.
     variance : ndarray, shape (n_freq, m_r, m_f)
         E|e|^2 of the measured FRFs, (m/N)^2; inf where one is not used.
     responses, forces : ndarray, shapes (2 n, m_r), (2 n, m_f)
@@ -52,16 +53,39 @@ class InterfaceFrfs(NamedTuple):
     response_modes: FloatArray | None = None
     force_modes: FloatArray | None = None
 
+    @classmethod
+    def of(
+        cls,
+        measured: ComplexArray,
+        smooth: ComplexArray,
+        variance: FloatArray,
+        responses: FloatArray,
+        forces: FloatArray,
+        reciprocal: bool,
+        symmetrised: bool = False,
+        response_modes: FloatArray | None = None,
+        force_modes: FloatArray | None = None,
+    ) -> InterfaceFrfs:
+        """Return the same of smooth FRFs of shape (n_freq, 2 n, 2 n); their mean where two are one."""
+        entries = FrfEntries.of(len(responses) // 2, reciprocal=reciprocal)
+        (kept,) = in_pieces(len(smooth), lambda own: [entries.take(_mean(smooth[own], reciprocal))])
+        return cls(measured, kept, variance, responses, forces, reciprocal, symmetrised, response_modes, force_modes)
+
     @property
     def n(self) -> int:
         """Number of joint DOFs."""
         return int(self.responses.shape[0]) // 2
 
+    @property
+    def smooth_gamma(self) -> ComplexArray:
+        """Smooth FRFs between the joint DOFs as matrices, shape (n_freq, 2 n, 2 n), m/N."""
+        return FrfEntries.of(self.n, reciprocal=self.reciprocal).matrix(self.smooth)
+
     def gamma(self, h: ComplexArray) -> ComplexArray:
         """Return FRFs between joint DOFs, shape (n_freq, 2 n, 2 n), m/N."""
         return between(self.responses, h, self.forces)
 
-    def on_lines(self, lines: NDArray[np.intp]) -> InterfaceFrfs:
+    def on_lines(self, lines: NDArray[np.intp] | slice) -> InterfaceFrfs:
         """Return some of the lines."""
         return self._replace(measured=self.measured[lines], smooth=self.smooth[lines], variance=self.variance[lines])
 
@@ -70,13 +94,13 @@ class InterfaceFrfs(NamedTuple):
 
         Each group is a problem of its own: where a structure is symmetric, the FRFs between some DOFs vanish.
         """
-        n = self.n
-        size = np.sqrt(abs(np.einsum("lpp->lp", self.smooth)))
-        relative = abs(self.smooth) / (size[:, :, None] * size[:, None, :])
+        n, smooth = self.n, abs(self.smooth_gamma)
+        size = np.sqrt(np.einsum("lpp->lp", smooth))
+        relative = smooth / (size[:, :, None] * size[:, None, :])
         exact = (relative > _ZERO).any(axis=0)
         noise = between(self.responses**2, self.variance, self.forces**2)
         with np.errstate(invalid="ignore", divide="ignore"):
-            seen = abs(self.smooth) ** 2 > _BELOW_NOISE * noise
+            seen = smooth**2 > _BELOW_NOISE * noise
         coupled = exact & (seen.mean(axis=0) > 0.02)
         both = coupled[:n, :n] | coupled[:n, n:] | coupled[n:, :n] | coupled[n:, n:]
         label = connected(both)
@@ -87,17 +111,28 @@ class InterfaceFrfs(NamedTuple):
         at = np.concatenate([dofs, dofs + self.n])
         t_r, t_f = self.responses[at], self.forces[at]
         entries = FrfEntries.of(len(dofs), reciprocal=self.reciprocal)
-        measured = entries.take(self._mean(between(t_r, self.measured, t_f)))
-        smooth = entries.take(self._mean(taken(self.smooth, at, at)))
-        return LineData(entries, measured, smooth, *self._weights(entries, t_r, t_f))
+
+        def of_lines(own: slice) -> list[NDArray[Any]]:
+            part = self.on_lines(own)
+            measured = entries.take(_mean(between(t_r, part.measured, t_f), self.reciprocal))
+            inverse_std, whitening = part._weights(entries, t_r, t_f)
+            return [measured, inverse_std] if whitening is None else [measured, inverse_std, whitening]
+
+        measured, *weights = in_pieces(len(self.measured), of_lines)
+        return LineData(entries, measured, self.smooth_of(dofs), *weights)
+
+    def smooth_of(self, dofs: NDArray[np.intp]) -> ComplexArray:
+        """Return the smooth FRFs between some joint DOFs, shape (n_freq, q); what is there where these are all."""
+        at = np.concatenate([dofs, dofs + self.n])
+        own = FrfEntries.of(len(dofs), reciprocal=self.reciprocal)
+        entries = FrfEntries.of(self.n, reciprocal=self.reciprocal).places[at[own.rows], at[own.columns]]
+        return self.smooth if np.array_equal(entries, np.arange(self.smooth.shape[1])) else self.smooth.take(entries, 1)
 
     def entries_of(self, dofs: NDArray[np.intp], gamma: ComplexArray) -> ComplexArray:
         """Return the entries between some joint DOFs, as `of_dofs` does, of FRFs between all, shape (n_freq, q)."""
         at = np.concatenate([dofs, dofs + self.n])
-        return FrfEntries.of(len(dofs), reciprocal=self.reciprocal).take(self._mean(gamma[:, at[:, None], at]))
-
-    def _mean(self, gamma: ComplexArray) -> ComplexArray:
-        return (gamma + gamma.swapaxes(1, 2)) / 2 if self.reciprocal else gamma
+        entries = FrfEntries.of(len(dofs), reciprocal=self.reciprocal)
+        return entries.take(_mean(gamma[:, at[:, None], at], self.reciprocal))
 
     def _weights(self, entries: FrfEntries, t_r: FloatArray, t_f: FloatArray) -> tuple[FloatArray, FloatArray | None]:
         """Return 1/sqrt(variance), and unless every DOF is one channel, the triangles that whiten the correlation."""
@@ -139,6 +174,11 @@ class InterfaceFrfs(NamedTuple):
         for block in _blocks(g):
             whitening[:, block[:, None], block] = _whitening(g[block], own, inverse_std[:, block], dead[:, block])
         return inverse_std, whitening
+
+
+def _mean(gamma: ComplexArray, reciprocal: bool) -> ComplexArray:
+    """Return the mean of gamma_pq and gamma_qp where they are one."""
+    return (gamma + gamma.swapaxes(1, 2)) / 2 if reciprocal else gamma
 
 
 def taken(h: NumbersT, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> NumbersT:

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy import special
 
-from jointfrf.frf.bands import line_slices
+from jointfrf.frf.bands import in_pieces, line_slices
 from jointfrf.frf.quantiles import medians
 from jointfrf.identification.compliance_fit.diagonal_minimum import lowest_minimum
 from jointfrf.identification.compliance_fit.estimator import FittedGroup, JointEstimate
@@ -93,8 +93,8 @@ def block_scatter(group: FittedGroup, blocks: int = BLOCKS) -> tuple[FloatArray,
     most of the information on a parameter leaves few degrees of freedom.
     """
     minimum = group.fit.minimum
-    p, pieces = minimum.x.size, line_slices(len(minimum.forms.squares))
-    diagonal = np.concatenate([np.einsum("lpp->lp", minimum.of_lines(own).information) for own in pieces])
+    p, n_freq = minimum.x.size, len(minimum.forms.squares)
+    (diagonal,) = in_pieces(n_freq, lambda own: [np.einsum("lpp->lp", minimum.of_lines(own).information)])
     lines = np.flatnonzero(group.fit.trusted & diagonal.any(axis=1))
     if lines.size < 2 * blocks:
         return np.full(p, np.nan), np.zeros(p)

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from jointfrf.frf.bands import in_pieces
 from jointfrf.frf.quantiles import medians
 from jointfrf.identification.compliance_fit.manifold import LineData, OnManifold, correlated, weighing
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
@@ -45,14 +46,19 @@ class PriorOfM(NamedTuple):
 def prior_of_m(data: LineData) -> PriorOfM:
     """Return the prior: entries of M are as large as those of gamma_jj^-1, there and elsewhere in the band."""
     n = data.entries.n
-    inverse = invert(data.entries.matrix(data.smooth)[:, :n, :n], on_singular="nan")
-    size: FloatArray = np.abs(inverse)
-    size = np.where(np.isfinite(size), size, 0)
-    size = np.hypot(size, medians(size.T).T)
+
+    def of_lines(own: slice) -> tuple[FloatArray, FloatArray]:
+        part = data.on_slice(own)
+        size = np.abs(invert(part.entries.matrix(part.smooth)[:, :n, :n], on_singular="nan"))
+        squares = abs((part.measured - part.smooth) * part.inverse_std) ** 2
+        return np.where(np.isfinite(size), size, 0), squares.sum(axis=1)
+
+    size, squares = in_pieces(len(data.smooth), of_lines)
+    np.hypot(size, medians(size.T).T, out=size)
     size[size == 0] = np.finfo(float).tiny
     # Of FRFs that were not smoothed, nothing is left: their error is the noise.
-    left = (abs((data.measured - data.smooth) * data.inverse_std) ** 2).sum() / max(np.count_nonzero(data.used), 1)
-    return PriorOfM(np.asarray(size, np.float64), float(np.sqrt(np.clip(1 - left, _LEAST_SHARE**2, 1))))
+    left = squares.sum() / max(np.count_nonzero(data.inverse_std), 1)
+    return PriorOfM(size, float(np.sqrt(np.clip(1 - left, _LEAST_SHARE**2, 1))))
 
 
 def expected_m(data: LineData, c: ComplexArray, on: OnManifold, prior: PriorOfM) -> OnManifold:

@@ -11,7 +11,6 @@ is singular and for a rigid joint, C = 0.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple, TypeVar
 
@@ -82,7 +81,12 @@ class FrfEntries(NamedTuple):
     def matrix(self, values: _Numbers) -> _Numbers:
         """Return gamma, or weights, of its entries, shape (n_freq, 2 n, 2 n)."""
         m = 2 * self.n
-        return values.take(_places(self.n, self.reciprocal), axis=1).reshape(-1, m, m)
+        return values.take(self.places.ravel(), axis=1).reshape(-1, m, m)
+
+    @property
+    def places(self) -> NDArray[np.intp]:
+        """The entry that stands at each place of gamma, shape (2 n, 2 n)."""
+        return _places(self.n, self.reciprocal)
 
 
 @lru_cache(maxsize=64)
@@ -105,10 +109,11 @@ def _entries_of(n: int, reciprocal: bool) -> FrfEntries:
 
 @lru_cache(maxsize=64)
 def _places(n: int, reciprocal: bool) -> NDArray[np.intp]:
-    """Return the entry that stands at each place of gamma, row by row."""
+    """Return the entry that stands at each place of gamma."""
     entries, place = _entries_of(n, reciprocal), np.empty((2 * n, 2 * n), np.intp)
     place[entries.columns, entries.rows] = place[entries.rows, entries.columns] = np.arange(entries.rows.size)
-    return place.ravel()
+    place.flags.writeable = False
+    return place
 
 
 class LineData(NamedTuple):
@@ -137,6 +142,12 @@ class LineData(NamedTuple):
         return np.asarray(self.inverse_std > 0)
 
     @property
+    def arrays(self) -> tuple[NDArray[Any], ...]:
+        """The arrays by line: FRFs, noise, and its correlation where there is one."""
+        arrays = self.measured, self.smooth, self.inverse_std
+        return arrays if self.correlation is None else (*arrays, self.correlation)
+
+    @property
     def own_size(self) -> FloatArray:
         """Median size of the receptances of each DOF, the larger of both sides, shape (n,), m/N."""
         own: FloatArray = np.abs(self.smooth[:, self.entries.rows == self.entries.columns])
@@ -145,22 +156,11 @@ class LineData(NamedTuple):
 
     def on_lines(self, lines: NDArray[np.intp]) -> LineData:
         """Return some of the lines."""
-        correlation = None if self.correlation is None else self.correlation[lines]
-        return LineData(self.entries, self.measured[lines], self.smooth[lines], self.inverse_std[lines], correlation)
+        return LineData(self.entries, *(array[lines] for array in self.arrays))
 
     def on_slice(self, lines: slice) -> LineData:
         """Return neighbouring lines, without a copy."""
-        correlation = None if self.correlation is None else self.correlation[lines]
-        return LineData(self.entries, self.measured[lines], self.smooth[lines], self.inverse_std[lines], correlation)
-
-    @classmethod
-    def joined(cls, parts: Sequence[LineData]) -> LineData:
-        """Put lines one after the other."""
-        correlation = None
-        if parts[0].correlation is not None:
-            correlation = np.concatenate([one.correlation for one in parts if one.correlation is not None])
-        measured, smooth, inverse_std = (np.concatenate([one[i] for one in parts]) for i in (1, 2, 3))
-        return cls(parts[0].entries, measured, smooth, inverse_std, correlation)
+        return LineData(self.entries, *(array[lines] for array in self.arrays))
 
 
 class OnManifold(NamedTuple):

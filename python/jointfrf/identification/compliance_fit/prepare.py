@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from jointfrf.channels.left_out_dofs import LeftOutDof, left_out_dofs
 from jointfrf.frf.bands import Band, as_bands, in_bands, line_slices
 from jointfrf.identification.compliance_fit.channel_noise import KnownNoise, NoiseOptions, known_noise
-from jointfrf.identification.compliance_fit.estimator import JointEstimate
+from jointfrf.identification.compliance_fit.estimator import GroupStart
 from jointfrf.identification.compliance_fit.from_nothing import check_channels, check_joint_seen, check_transform
 from jointfrf.identification.compliance_fit.interface_frfs import InterfaceFrfs
 from jointfrf.identification.compliance_fit.joint_terms import CrossTerms, DampingTerms
@@ -61,7 +61,7 @@ class FitProblem:
     bands : tuple
         For each DOF its bands, (low, high) in Hz.
     options : FitOptions
-    near : JointEstimate, optional
+    near : tuple of GroupStart
         Of other FRFs of the same structure: where the fit starts first.
     deformation : ndarray, shape (n_freq, m_r, m_f), optional
         Part of the variance that is not noise: squares of what is not rigid in the channels, (m/N)^2.
@@ -78,7 +78,7 @@ class FitProblem:
     used: NDArray[np.bool_]
     bands: tuple[tuple[Band, ...], ...]
     options: FitOptions
-    near: JointEstimate | None = None
+    near: tuple[GroupStart, ...] = ()
     deformation: FloatArray | None = None
     added_compliance: FloatArray | None = None
     left_out: tuple[LeftOutDof, ...] = ()
@@ -125,7 +125,7 @@ def prepare_compliance(
     return FitProblem(
         dofs=names,
         freq_hz=freq,
-        frfs=InterfaceFrfs(
+        frfs=InterfaceFrfs.of(
             h,
             found.smooth,
             found.variance if found.deformation is None else found.variance + found.deformation,

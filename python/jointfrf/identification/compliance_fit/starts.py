@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from jointfrf.frf.bands import line_slices
+from jointfrf.frf.bands import in_pieces
 from jointfrf.identification.compliance_fit.joint_terms import CoupledJoint, DiagonalJoint, JointCoordinates, terms_of
 from jointfrf.identification.compliance_fit.line_forms import LineForms, minimise_forms
 from jointfrf.identification.compliance_fit.manifold import LineData, OnManifold, project
@@ -18,6 +20,8 @@ __all__ = ["first_joints", "hidden_share", "smooth_compliance", "starts_on_manif
 
 #: Smooth FRFs have about this share of the noise.
 _SMOOTH = 0.2
+#: Lines whose covariance of all entries of C is there at once: n^4 numbers a line.
+_PIECE = 1024
 #: Squares of a start are minimised to this.
 _ROUGH = 0.1
 #: Lines count less from this relative noise of gamma_jk on.
@@ -106,25 +110,30 @@ def first_joints(data: LineData, joint: JointCoordinates) -> list[FloatArray]:
     C = gamma_kk gamma_jk^-1 gamma_jj - gamma_kj of the smooth FRFs on every line, with the covariance that a share of
     the noise gives it; lines on which noise hides gamma_jk count little.
     """
-    n = data.entries.n
-    gamma = data.entries.matrix(data.smooth)
-    spread = data.entries.matrix(_variance(data))
-    compliance = joint_compliance(gamma, on_singular="nan")
-    covariance = _SMOOTH**2 * compliance_covariance(gamma, spread, np.eye(2 * n), on_singular="nan")
-    ratio = _hidden(gamma, spread)
-    good = np.isfinite(compliance).all(axis=(1, 2)) & np.isfinite(covariance).all(axis=(1, 2)) & np.isfinite(ratio)
+    n, is_diagonal = data.entries.n, isinstance(joint, DiagonalJoint)
+    a = range(n)
+
+    def of_lines(own: slice) -> list[NDArray[Any]]:
+        part = data.on_slice(own)
+        gamma, spread = part.entries.matrix(part.smooth), part.entries.matrix(_variance(part))
+        compliance = joint_compliance(gamma, on_singular="nan")
+        covariance = _SMOOTH**2 * compliance_covariance(gamma, spread, np.eye(2 * n), on_singular="nan")
+        ratio = _hidden(gamma, spread)
+        good = np.isfinite(compliance).all(axis=(1, 2)) & np.isfinite(covariance).all(axis=(1, 2)) & np.isfinite(ratio)
+        variance = covariance.reshape(-1, n, n, n, n)[:, a, a, a, a].real
+        return [good, compliance, variance, ratio] if is_diagonal else [good, compliance, variance, ratio, covariance]
+
+    good, *found = in_pieces(len(data.smooth), of_lines, _PIECE)
     if not good.any():
         return []
-    compliance, covariance, ratio = compliance[good], covariance[good], ratio[good]
+    compliance, own, ratio, *covariance = (x[good] for x in found)
     here = type(joint)(terms_of(joint).on_lines(np.flatnonzero(good)))  # type: ignore[call-arg]
     threshold = _HIDDEN if np.count_nonzero(ratio < _HIDDEN) > 2 * joint.lower.size else float(np.median(ratio))
     line_weight = 1 / (1 + (ratio / threshold) ** 8)
-    a = range(n)
-    own = covariance.reshape(-1, n, n, n, n)[:, a, a, a, a].real
     if isinstance(here, DiagonalJoint):
         return _diagonal_starts(compliance[:, a, a], own, line_weight, here)
     assert isinstance(here, CoupledJoint)
-    return _coupled_starts(compliance, covariance, own, line_weight, here)
+    return _coupled_starts(compliance, covariance[0], own, line_weight, here)
 
 
 def _variance(data: LineData) -> FloatArray:
@@ -135,8 +144,14 @@ def _variance(data: LineData) -> FloatArray:
 
 def hidden_share(data: LineData) -> FloatArray:
     """Return the largest relative noise of gamma_jk, of the smooth FRFs, on each line, shape (n_freq,)."""
-    matrix, parts = data.entries.matrix, (data.on_slice(own) for own in line_slices(len(data.smooth)))
-    return np.concatenate([_hidden(matrix(part.smooth), matrix(_variance(part))) for part in parts])
+    matrix = data.entries.matrix
+
+    def of_lines(own: slice) -> list[FloatArray]:
+        part = data.on_slice(own)
+        return [_hidden(matrix(part.smooth), matrix(_variance(part)))]
+
+    (share,) = in_pieces(len(data.smooth), of_lines)
+    return share
 
 
 def _hidden(gamma: ComplexArray, spread: FloatArray) -> FloatArray:

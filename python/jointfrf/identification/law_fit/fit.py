@@ -15,6 +15,7 @@ from jointfrf.identification.compliance_fit.from_nothing import check_estimate
 from jointfrf.identification.compliance_fit.group_fit import GroupProblem, fit_dofs
 from jointfrf.identification.compliance_fit.intervals import Spread, spread_of
 from jointfrf.identification.compliance_fit.line_forms import inverse_information
+from jointfrf.identification.compliance_fit.manifold import FrfEntries
 from jointfrf.identification.compliance_fit.misfit import Misfit, diagnose
 from jointfrf.identification.compliance_fit.prepare import FitProblem
 from jointfrf.identification.law_fit.form_squares import FormSquares
@@ -153,7 +154,7 @@ def _gamma(problem: FitProblem, dofs: NDArray[np.intp]) -> tuple[ComplexArray, F
     at = np.concatenate([dofs, dofs + frfs.n])
     variance = np.where(np.isfinite(frfs.variance), frfs.variance, 0)
     of_joint = frfs.responses[at] ** 2 @ variance @ (frfs.forces[at] ** 2).T
-    return frfs.smooth[:, at[:, None], at], of_joint
+    return FrfEntries.of(dofs.size, reciprocal=frfs.reciprocal).matrix(frfs.smooth_of(dofs)), of_joint
 
 
 def _size(problem: FitProblem, dofs: NDArray[np.intp]) -> FloatArray:
