@@ -29,8 +29,8 @@ module jointfrf_sweep
   !> only, so that results do not depend on the number of threads.
   integer, parameter :: most_blocks = 8
   real(dp), parameter :: chunk_flops = 2.0e6_dp
-  !> A sweep that reads no more bytes than this stays in the caches, and looking ahead would only cost time.
-  integer(c_intptr_t), parameter :: near_bytes = 2**23
+  !> A sweep that reads no more bytes than this stays in the second cache, and looking ahead would only cost time.
+  integer(c_intptr_t), parameter :: near_bytes = 2**19
   !> Lines of a block that needs no workspace.
   integer, parameter, public :: long_block = 64*lanes
   !> Fewer lines than these are not worth a block.
