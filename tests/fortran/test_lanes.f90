@@ -334,13 +334,13 @@ contains
     call check(all(line_info == expected_info), 'divisions out of range: codes')
     call check(count(line_info /= 0) > 20 .and. count(line_info == 0) > 10, 'divisions out of range: some of each')
     call check(all(ieee_is_nan(real(x(1, 1, :))) .eqv. line_info /= 0), 'divisions out of range: NaN in bad lines')
-    call check(all(line_info /= 0 .or. abs(x(1, 1, :) - expected(1, 1, :)) <= 8*eps*abs(expected(1, 1, :)) + 1.0e-322_dp), &
-               'divisions out of range: values')
+    call check(all(line_info /= 0 .or. abs(x(1, 1, :) - expected(1, 1, :)) <= 8*eps*abs(expected(1, 1, :)) &
+                   + 1.0e-322_dp), 'divisions out of range: values')
   end subroutine extreme_divisions
 
   !> |A X - I| and |X A - I| over eps |A| |X|, and |A X - B| over eps (|A| |X|), in quadruple precision: no more than a
-  !> few times those of LAPACK. An inverse may be that of the transpose, transposed, whose rows are scaled as the columns
-  !> were: it is held to the worse of both.
+  !> few times those of LAPACK. An inverse may be that of the transpose, transposed, whose rows are scaled as the
+  !> columns were: it is held to the worse of both.
   subroutine residuals()
     integer, parameter :: sizes(10) = [1, 2, 3, 4, 5, 6, 7, 8, 13, 24]
     character(len=*), parameter :: families(5) = [character(len=8) :: 'random', 'rows', 'columns', 'rank', 'growth']
