@@ -16,6 +16,9 @@ module jointfrf_coupling
   private
   public :: couple
 
+  !> From so many DOFs of the assembly on products are faster line by line with the BLAS than in lanes, and from the
+  !> second number on where a fifth of them are joint DOFs; with AVX-512 not before a block leaves the caches.
+  integer, parameter :: fewest_for_blas(2) = [96, 64], fewest_with_avx512(2) = [largest_product + 1, 120]
   !> More elements than these, of which a system for the forces consists, leave the caches.
   integer, parameter :: most_in_system = 12288
 
@@ -89,19 +92,16 @@ contains
 
   contains
 
-    !> Whether products are faster line by line with the BLAS than in lanes. With AVX-512 lanes are as fast until a
-    !> block leaves the caches; a single joint DOF stays in lanes.
+    !> Whether products are left to the BLAS. Those of a single joint DOF stay in lanes.
     function products_by_blas(n, n_j) result(yes)
       integer, intent(in) :: n, n_j
       logical :: yes
       integer(ip) :: engine, info
+      integer :: fewest(2)
 
       call get_engine(engine, info)
-      if (engine == engine_v4) then
-        yes = n > largest_product .or. (n >= 120 .and. 5*n_j >= n)
-      else
-        yes = n >= 96 .or. (n >= 64 .and. 5*n_j >= n)
-      end if
+      fewest = merge(fewest_with_avx512, fewest_for_blas, engine == engine_v4)
+      yes = n >= fewest(1) .or. (n >= fewest(2) .and. 5*n_j >= n)
       yes = yes .and. n_j > 1 .and. n_j*(n_j + n) <= most_in_system
     end function products_by_blas
 
