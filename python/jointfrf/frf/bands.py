@@ -11,11 +11,39 @@ from numpy.typing import ArrayLike, NDArray
 
 from jointfrf.kernel.arguments import FloatArray, as_frequency, as_names, as_square, one_line
 
-__all__ = ["PIECE", "Band", "BandMean", "as_bands", "band_mean", "in_bands", "in_pieces", "line_slices"]
+__all__ = [
+    "PIECE",
+    "Band",
+    "BandMean",
+    "as_bands",
+    "band_mean",
+    "in_bands",
+    "in_pieces",
+    "is_long",
+    "line_slices",
+    "spread_lines",
+]
 
 Band = tuple[float, float]
 #: Lines of long sweeps that are taken together at most: memory for what is in between does not grow with the lines.
 PIECE = 8192
+
+
+def is_long(n_freq: int) -> bool:
+    """Return whether a sweep is taken in pieces, and what is in between is not kept."""
+    return n_freq > PIECE
+
+
+def spread_lines(n_freq: int) -> slice:
+    """Return no more lines than are taken together, evenly spread.
+
+    Examples
+    --------
+    >>> from jointfrf.frf.bands import spread_lines
+    >>> spread_lines(20000)
+    slice(None, None, 3)
+    """
+    return slice(None, None, max(1, -(-n_freq // PIECE)))
 
 
 def line_slices(n_freq: int, most: int | None = None) -> list[slice]:

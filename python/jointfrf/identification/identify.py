@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from jointfrf.channels.check.check import check_frfs, warn_of_frfs
 from jointfrf.channels.check.finding import FrfCheck
 from jointfrf.channels.point_lines import Interface
-from jointfrf.frf.bands import PIECE
+from jointfrf.frf.bands import spread_lines
 from jointfrf.identification.band_means import fit_band_mean, prepare_band_mean
 from jointfrf.identification.compliance_data import compliance_data
 from jointfrf.identification.compliance_fit.channel_noise import NoiseOptions
@@ -264,7 +264,7 @@ def _checked(
 ) -> FrfCheck:
     """Look at the FRFs of the lines used, by the names of the joint DOFs where these are the channels."""
     # A look at some lines, evenly spread, tells as much.
-    some = slice(None, None, -(-measured.freq_hz.size // PIECE))
+    some = spread_lines(measured.freq_hz.size)
     freq, h = measured.freq_hz[some], measured.h[some]
     if transforms is None:
         return check_frfs(freq, h, [f"{side}:{dof}" for side in "jk" for dof in dofs])

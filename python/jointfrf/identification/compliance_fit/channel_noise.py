@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from jointfrf.frf.bands import PIECE, line_slices
+from jointfrf.frf.bands import is_long, line_slices, spread_lines
 from jointfrf.frf.noise_estimate import ZERO
 from jointfrf.frf.noise_model import NoiseModel, estimate_noise
 from jointfrf.frf.quantiles import medians
@@ -152,7 +152,7 @@ def _estimated_noise(
     if not is_assumed:
         np.maximum(model.variance, variance, out=variance)
     # Other realisations start from the model; of a long sweep it would take too much memory.
-    kept = model if len(freq) <= PIECE else None
+    kept = None if is_long(len(freq)) else model
     known = KnownNoise(least if is_assumed else level, model.inflation, is_assumed, model.outlying, kept)
     smooth = model.smooth.h.copy() if kept else model.smooth.h
     del model
@@ -175,7 +175,7 @@ def _relative_variance(h: ComplexArray | FloatArray, level: float) -> FloatArray
     variance = np.empty(h.shape)
     for own in line_slices(len(h)):
         variance[own] = abs(h[own]) ** 2
-    least = medians(variance[:: -(-len(h) // PIECE)].T).T * ZERO**2 + ZERO**4 * variance.max()
+    least = medians(variance[spread_lines(len(h))].T).T * ZERO**2 + ZERO**4 * variance.max()
     np.maximum(variance, least, out=variance)
     variance *= level**2
     return variance

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf.dofs import Parameter
-from jointfrf.frf.bands import PIECE
+from jointfrf.frf.bands import spread_lines
 from jointfrf.identification.compliance_fit.group_fit import LITTLE_PATIENCE, GroupFit, GroupProblem, fit_dofs
 from jointfrf.identification.compliance_fit.interface_frfs import InterfaceFrfs
 from jointfrf.identification.compliance_fit.joint_terms import (
@@ -181,13 +181,8 @@ def estimate_joint(
 
 def grouped(frfs: InterfaceFrfs) -> Iterator[GroupData]:
     """Return groups of DOFs that are fitted each by itself, and their FRFs."""
-    for dofs in frfs.on_lines(_some(len(frfs.measured))).groups():
+    for dofs in frfs.on_lines(spread_lines(len(frfs.measured))).groups():
         yield dofs, frfs.of_dofs(dofs)
-
-
-def _some(n_freq: int) -> slice:
-    """Return no more lines than are treated at once, evenly spread."""
-    return slice(None, None, max(1, -(-n_freq // PIECE)))
 
 
 def _fitted(problem: GroupProblem, cross: CrossTerms, near: GroupStart | None) -> GroupFit:
@@ -197,7 +192,7 @@ def _fitted(problem: GroupProblem, cross: CrossTerms, near: GroupStart | None) -
         if found.is_good:
             return found
     # Some lines, evenly spread, start as well as all.
-    some = _some(len(problem.data.measured))
+    some = spread_lines(len(problem.data.measured))
     starts = first_joints(problem.data.on_slice(some), coordinates_of(terms_of(problem.joint).on_lines(some)))
     if not problem.is_diagonal or problem.data.entries.n == 1:
         return fit_dofs(problem, starts)

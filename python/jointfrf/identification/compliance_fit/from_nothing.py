@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from jointfrf.frf.bands import PIECE
+from jointfrf.frf.bands import spread_lines
 from jointfrf.frf.noise_estimate import ZERO
 from jointfrf.frf.quantiles import medians
 from jointfrf.identification.compliance_fit.estimator import JointEstimate
@@ -97,7 +97,7 @@ def check_joint_seen(freq: FloatArray, smooth: ComplexArray, variance: FloatArra
         E|e|^2 of the measured ones.
     """
     span = f"{freq.min():g} to {freq.max():g} Hz"
-    some = slice(None, None, -(-len(freq) // PIECE))
+    some = spread_lines(len(freq))
     smooth, variance = smooth[some], variance[some]
     n = smooth.shape[1] // 2
     driving = np.einsum("lpp->lp", smooth)

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from jointfrf.frf.bands import PIECE, in_pieces
+from jointfrf.frf.bands import in_pieces, is_long
 from jointfrf.identification.compliance_fit.diagonal_minimum import lowest_minimum, within_reach
 from jointfrf.identification.compliance_fit.joint_terms import DiagonalJoint, JointCoordinates, terms_of
 from jointfrf.identification.compliance_fit.likely_m import PriorOfM, expected_m, prior_of_m
@@ -282,7 +282,7 @@ def _iterate(
         # The first step tells, with M that cannot feign it; a joint barely seen once is treated so to the end.
         hidden = barely or (hidden and step > 1)
         if converged or step == _MOST or (step > patience and minimum.cost > _LOST * equations):
-            kept = on if len(data.measured) <= PIECE else None
+            kept = None if is_long(len(data.measured)) else on
             return GroupFit(minimum, forms, trusted, equations, float(free.sum()), step, converged, on=kept)
         linearised_at = _within_sight(forms, problem.joint, x, error) if problem.is_diagonal else x
         # Of a long sweep the forms of one step take as much memory as those of the next.

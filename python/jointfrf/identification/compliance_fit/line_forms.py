@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from jointfrf.frf.bands import PIECE, line_slices
+from jointfrf.frf.bands import is_long, line_slices
 from jointfrf.identification.compliance_fit.joint_terms import CoupledJoint, DiagonalJoint, JointCoordinates
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.kernel.call import call_for_number
@@ -104,7 +104,7 @@ class FormMinimum:
 
     def of_lines(self, lines: slice) -> LineParts:
         """Return the parts of neighbouring lines; those of a long sweep are not kept."""
-        if len(self.forms.squares) > PIECE:
+        if is_long(len(self.forms.squares)):
             return self._parts(lines)
         return LineParts(*(part[lines] for part in self._all_parts))
 
