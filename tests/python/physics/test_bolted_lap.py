@@ -1,6 +1,5 @@
 """The preloaded bolt in solid elements: its mesh, its static state, and its vibrations."""
 
-import time
 from dataclasses import replace
 
 import numpy as np
@@ -22,11 +21,9 @@ CALCULIX = [14.65, 60.43, 86.86, 261.3, 345.0, 484.8, 552.9]
 
 @pytest.fixture(scope="module")
 def default():
-    """Case study 2, and the seconds it took."""
-    start = time.perf_counter()
+    """Case study 2."""
     tight = preload(bolted_lap(), FORCE)
-    model = tight.model()
-    return tight, model, time.perf_counter() - start
+    return tight, tight.model()
 
 
 @pytest.fixture(scope="module")
@@ -125,7 +122,7 @@ def test_preload_of_bolts():
 
 
 def test_static_state_of_the_case_study(default):
-    tight, _, seconds = default
+    tight, _ = default
     assert len(tight.lap.mesh.elements) == 3840
     assert len(tight.history) <= 5
     assert tight.history[-1].changed == 0
@@ -138,11 +135,10 @@ def test_static_state_of_the_case_study(default):
     assert 0.009 < tight.contact_radius < 0.0105
     assert tight.interfaces["head"].closed.all()
     assert tight.interfaces["nut"].closed.all()
-    assert seconds < 60  # 5 s on a free machine
 
 
 def test_forces_balance_on_every_body(default):
-    tight, _, _ = default
+    tight, _ = default
     at = {name: tight.lap.mesh.nodes[pairs.upper] for name, pairs in tight.lap.interfaces.items()}
     force = {name: state.force for name, state in tight.interfaces.items()}
     # The bolt: head on its upper side, nut below. B: lap above, nut below; nothing else holds it.
@@ -155,7 +151,7 @@ def test_forces_balance_on_every_body(default):
 
 
 def test_pressure_is_symmetric(default):
-    tight, _, _ = default
+    tight, _ = default
     for name, pairs in tight.lap.interfaces.items():
         place = tight.lap.mesh.nodes[pairs.upper]
         mirrored = place * [-1, 1, 1]
@@ -166,7 +162,7 @@ def test_pressure_is_symmetric(default):
 
 
 def test_pressure_maps(default):
-    tight, _, _ = default
+    tight, _ = default
     maps = tight.pressure_maps()
     assert list(maps) == ["head", "lap", "nut"]
     for name, one in maps.items():
@@ -179,7 +175,7 @@ def test_pressure_maps(default):
 
 
 def test_frequencies_of_the_case_study(default):
-    _, model, _ = default
+    _, model = default
     freq = model.natural_frequencies(7)
     assert abs(freq / CALCULIX - 1).max() < 0.0015
     # The same with other meshes; the fifth mode, which turns the joint, depends on them most.
@@ -193,7 +189,7 @@ def test_frequencies_of_one_point_bricks():
 
 
 def test_model_takes_its_outputs_from_all_nodes(default):
-    tight, model, _ = default
+    tight, model = default
     assert isinstance(model.dofs, tuple)
     assert model.loss_factor == 0.01
     assert model.structural_damping is None
