@@ -4,18 +4,23 @@ from __future__ import annotations
 
 import ctypes
 import os
+import pickle
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from filelock import FileLock
 
 import jointfrf as jf
 from installed_library import installed_library  # noqa: F401
 from jointfrf.cases import catalogue
+from jointfrf.cases.known_joint.compute import KnownJointResult
 from jointfrf.report.draw import Drawing
+from thinned_cases import compute_thinned
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -108,6 +113,32 @@ def beams() -> Assembly:
 @pytest.fixture(params=["chains", "beams"])
 def assembly(request) -> Assembly:
     return request.getfixturevalue(request.param)
+
+
+@pytest.fixture(scope="session")
+def once(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, Callable[[], Any]], Any]:
+    """Compute what several tests look at once a run: the process that asks first computes, the others read it."""
+    folder = tmp_path_factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        folder = folder.parent
+    kept = {}
+
+    def get(key: str, compute: Callable[[], Any]) -> Any:
+        if key not in kept:
+            path = folder / f"{key}.pickle"
+            with FileLock(path.with_suffix(".lock")):
+                if not path.exists():
+                    path.write_bytes(pickle.dumps(compute()))
+            kept[key] = pickle.loads(path.read_bytes())
+        return kept[key]
+
+    return get
+
+
+@pytest.fixture(scope="session")
+def thinned(once) -> Callable[[str], KnownJointResult]:
+    """From the name of a case of a known joint to its results in a short form."""
+    return lambda name: once(name, partial(compute_thinned, name))
 
 
 @pytest.fixture

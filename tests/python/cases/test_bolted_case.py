@@ -27,8 +27,6 @@ from jointfrf.solids.bolted_lap import LapDivisions, bolted_lap
 from jointfrf.solids.contact import ContactLaw
 from jointfrf.solids.preload import preload
 
-pytestmark = pytest.mark.long
-
 FOLDER = find_case("4.3.3")
 COARSE = LapDivisions(across=6, rings=1, circles=0, head=1, nut=1)
 #: Columns of `rigid_motion` in the order of the joint DOFs.

@@ -11,7 +11,6 @@ import pytest
 import jointfrf as jf
 from jointfrf.cases.catalogue import UnknownCaseError, find_case, list_cases, numbered, read_case, run_case
 from jointfrf.cases.fitting import fit_viscous
-from jointfrf.cases.known_joint.compute import compute
 from jointfrf.cases.known_joint.exact import exact_frfs
 from jointfrf.cases.known_joint.figures import known_joint_figures
 from jointfrf.cases.known_joint.noise_free import noise_free_errors
@@ -22,37 +21,23 @@ from jointfrf.cases.workers import Workers
 from jointfrf.dofs import Parameter
 from jointfrf.report.page import Page, make_page
 from jointfrf.substructuring.methods import STIFFNESS_METHODS
+from thinned_cases import PLANE, SOLID
 
-pytestmark = pytest.mark.long
-
-PLANE = ["3.1-discrete", "3.2-fe-beams", "3.3-beams-1mm", "3.3.1-decoupling"]
-SOLID = ["4.3.1-six-dof", "4.3.2-six-dof-decoupling"]
 NAMES = [*PLANE, *SOLID, "4.3.3-bolt"]
-#: Every so many lines are left, to save time.
-THINNED = {"3.1-discrete": 1, "3.2-fe-beams": 1, "3.3-beams-1mm": 3, "3.3.1-decoupling": 3}
+#: Realisations of the plane cases of beams.
 COUNT = 60
 #: Realisations where tails are looked at.
 MANY = 300
 
 
 @pytest.fixture(scope="module")
-def results():
-    found = {}
-    for name in PLANE:
-        case = read_case(find_case(name))
-        case = dataclasses.replace(case, freq_hz=case.freq_hz[:: THINNED[name]])
-        found[name] = compute(case, MANY if name == "3.2-fe-beams" else COUNT)
-    return found
+def results(thinned):
+    return {name: thinned(name) for name in PLANE}
 
 
 @pytest.fixture(scope="module")
-def solids():
-    """The cases of bricks with every fourth line."""
-    found = {}
-    for name, count in zip(SOLID, (8, 4), strict=True):
-        case = read_case(find_case(name))
-        found[name] = compute(dataclasses.replace(case, freq_hz=case.freq_hz[::4]), count)
-    return found
+def solids(thinned):
+    return {name: thinned(name) for name in SOLID}
 
 
 @pytest.fixture(scope="module")

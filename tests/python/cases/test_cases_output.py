@@ -1,7 +1,6 @@
 """Figures, reports, tables in print, and the command line."""
 
 import csv
-import dataclasses
 import io
 import re
 import subprocess
@@ -12,8 +11,7 @@ import pytest
 from PIL import Image
 
 import jointfrf as jf
-from jointfrf.cases.catalogue import find_case, list_cases, numbered, read_case, run_case
-from jointfrf.cases.known_joint.compute import compute
+from jointfrf.cases.catalogue import find_case, list_cases, numbered, run_case
 from jointfrf.cases.known_joint.figures import known_joint_figures
 from jointfrf.cli.main import main
 from jointfrf.dofs import Parameter
@@ -21,8 +19,6 @@ from jointfrf.report.axes import symbol
 from jointfrf.report.draw import draw
 from jointfrf.report.figure import Curve, Figure, Interval, Panel, figure_csv
 from jointfrf.report.table import Table, as_text, number
-
-pytestmark = pytest.mark.long
 
 COMMAND = [sys.executable, "-m", "jointfrf"]
 
@@ -75,10 +71,9 @@ def test_figures_of_the_source_are_drawn(outputs, which):
         assert len(rows) > 10
 
 
-def test_case_3_3_has_all_figures_of_the_source():
-    case = read_case(find_case("3.3"))
-    case = dataclasses.replace(case, freq_hz=case.freq_hz[::25])
-    numbers = {figure.number for figure in numbered(case, known_joint_figures(compute(case, 2)))} - {""}
+def test_case_3_3_has_all_figures_of_the_source(thinned):
+    result = thinned("3.3-beams-1mm")
+    numbers = {figure.number for figure in numbered(result.case, known_joint_figures(result))} - {""}
     assert numbers == {f"3-{i}" for i in range(16, 28)}
 
 

@@ -1,14 +1,12 @@
 """What figures and pages owe to a reader: phases, scales, order, styles, tables that fit on any screen."""
 
-import dataclasses
 import re
 from itertools import combinations, pairwise
 
 import numpy as np
 import pytest
 
-from jointfrf.cases.catalogue import find_case, list_cases, numbered, read_case
-from jointfrf.cases.known_joint.compute import compute
+from jointfrf.cases.catalogue import list_cases, numbered, read_case
 from jointfrf.cases.known_joint.figures import known_joint_figures
 from jointfrf.cases.known_joint.read import KnownJointCase
 from jointfrf.cases.known_joint.summary import known_joint_summary
@@ -24,9 +22,8 @@ X = np.linspace(0, 10, 50)
 
 
 @pytest.fixture(scope="module")
-def result():
-    case = read_case(find_case("3.2"))
-    return compute(dataclasses.replace(case, freq_hz=case.freq_hz[::2]), 4)
+def result(thinned):
+    return thinned("3.2-fe-beams")
 
 
 @pytest.fixture(scope="module")

@@ -1,6 +1,5 @@
 """What tables of the cases say of published values: each recomputed by another route, from the files of the case."""
 
-import dataclasses
 import tomllib
 
 import numpy as np
@@ -9,36 +8,17 @@ from scipy import sparse
 from scipy.sparse.linalg import eigsh
 
 import jointfrf as jf
-from jointfrf.cases.catalogue import find_case, read_case
-from jointfrf.cases.fitting import FITTED
-from jointfrf.cases.known_joint.compute import compute
+from jointfrf.cases.catalogue import find_case
 from jointfrf.cases.known_joint.tables import known_joint_tables
 from jointfrf.dofs import Parameter
+from thinned_cases import PLANE, SOLID
 
-pytestmark = pytest.mark.long
-
-NAMES = [
-    "3.1-discrete",
-    "3.2-fe-beams",
-    "3.3-beams-1mm",
-    "3.3.1-decoupling",
-    "4.3.1-six-dof",
-    "4.3.2-six-dof-decoupling",
-]
-COUNT = 6
+NAMES = [*PLANE, *SOLID]
 
 
 @pytest.fixture(scope="module")
-def results():
-    """All cases of a known joint on all lines, with few realisations and without fits, to save time."""
-    found = {}
-    for name in NAMES:
-        case = read_case(find_case(name))
-        noises = (dataclasses.replace(n, methods=tuple(m for m in n.methods if m not in FITTED)) for n in case.noises)
-        tables = tuple(table for table in case.expected.tables if table.method != "compliance")
-        expected = dataclasses.replace(case.expected, tables=tables)
-        found[name] = compute(dataclasses.replace(case, noises=tuple(noises), expected=expected), COUNT)
-    return found
+def results(thinned):
+    return {name: thinned(name) for name in NAMES}
 
 
 def expected_of(name):
@@ -59,9 +39,7 @@ def test_parameters_fit_where_they_lie_inside_the_interval_that_is_shown(results
         for row in t.rows
     ]
     rows = [row for row in rows if "percentile" in row and "parameter" in row]
-    printed = [
-        one for one in expected_of(name).get("identified", []) if one.get("values") and one["method"] != "compliance"
-    ]
+    printed = [one for one in expected_of(name).get("identified", []) if one.get("values")]
     assert len(rows) == sum(len(one["values"]) for one in printed)
     names = [parameter.name for parameter in result.case.parameters]
     left = list(rows)

@@ -53,6 +53,7 @@ def test_threads_give_the_same_numbers(reference, tmp_path):
         assert same(studied(tmp_path, executor=executor), reference)
 
 
+@pytest.mark.long
 def test_processes_give_the_same_numbers_though_one_is_killed(reference, tmp_path):
     seen = []
 

@@ -10,8 +10,6 @@ from jointfrf.solids.bolted_lap import ALUMINIUM, LapDivisions, bolted_lap
 from jointfrf.solids.contact import ContactLaw
 from jointfrf.solids.preload import preload
 
-pytestmark = pytest.mark.long
-
 FORCE = 22784.0
 COARSE = LapDivisions(across=4, rings=1, circles=0, head=1, nut=1)
 RIGID = ContactLaw(0.3, None, None)
@@ -182,6 +180,7 @@ def test_frequencies_of_the_case_study(default):
     assert abs(freq / [14.67, 60.48, 86.94, 261.4, 346.8, 485.6, 554.2] - 1).max() < 0.005
 
 
+@pytest.mark.long
 def test_frequencies_of_one_point_bricks():
     lap = bolted_lap(preset="seed")
     freq = preload(lap, FORCE).model().natural_frequencies(7)

@@ -104,6 +104,7 @@ def test_exactly_as_many_channels_as_dofs_are_said_not_to_be_checked():
     assert grown["y"] < 1e-3 / fit.parameters["k_y"]
 
 
+@pytest.mark.long
 @pytest.mark.skipif(not LAP.exists(), reason="the measured files are not beside the project (JOINTFRF_TEST_DATA)")
 def test_intervals_of_a_bolted_lap_joint():
     """Ten channels a side, the reference on the lap interface: its flexibility is as large as that of the joint."""

@@ -13,8 +13,6 @@ from jointfrf.identification.compliance_fit.interface_frfs import InterfaceFrfs
 from jointfrf.identification.compliance_fit.joint_terms import joint_terms
 from six_dof_beams import DOFS, FREQ, GROUPS, JOINT, assembly, side, sides
 
-pytestmark = pytest.mark.long
-
 TRUTH = np.concatenate([JOINT.stiffness.diagonal(), JOINT.damping.diagonal()])
 TERMS = joint_terms(2 * np.pi * FREQ, DOFS, "viscous", "zero")
 
@@ -218,6 +216,7 @@ def test_decoupling_of_a_full_joint(equation):
     assert (abs(found - k_joint) / size).max() < 1e-6
 
 
+@pytest.mark.long
 def test_a_full_joint_with_noise(bound):
     """21 stiffnesses and 21 dampings at 1 %, within their error bars."""
     h = jf.pollute(assembly(FULL, across=0.003), 0.01, seed=6)
@@ -243,6 +242,7 @@ def test_a_full_joint_with_noise(bound):
     assert fit.unit("k_x,theta_y") == "N"
 
 
+@pytest.mark.long
 def test_cross_terms_between_groups_are_not_seen_and_this_is_said(gamma):
     h = jf.pollute(gamma, 0.01, seed=7)
     with warnings.catch_warnings():

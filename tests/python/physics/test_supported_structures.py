@@ -20,8 +20,6 @@ from jointfrf.models.receptance import krylov
 from jointfrf.models.receptance.rigid_modes import find_rigid_modes, held
 from supported_structures import EPS, FREE, HELD, calculated, exact, relative_error
 
-pytestmark = pytest.mark.long
-
 METHODS = ["auto", "dense", "banded", "sparse", "modal", "krylov"]
 LOSS_FACTOR = 0.01
 #: A stiffness within this many roundings counts as none: what sums of modes may leave out.
@@ -141,6 +139,7 @@ def test_rounding_excuses_no_error_beyond_what_is_announced(monkeypatch):
     assert any("line 0 (0 Hz)" in str(t.message) for t in told)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kernel", ["Prescott", "Haswell", "SkylakeX"])
 def test_random_free_beams_are_recognised_with_other_kernels_of_openblas(kernel):
     environment = os.environ | {"OPENBLAS_CORETYPE": kernel, "OPENBLAS_NUM_THREADS": "1"}

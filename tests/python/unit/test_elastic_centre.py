@@ -54,6 +54,7 @@ def fit_of(stiffness, error):
     )  # fmt: skip
 
 
+@pytest.mark.long
 def test_the_standard_error_is_the_scatter_over_draws():
     away, error = np.array([0.003, -0.002, 0.004]), 0.02
     exact = jf.Joint(STIFFNESS, dofs=DIRECTIONS).moved(away).stiffness

@@ -62,6 +62,7 @@ def test_what_breaks_is_said(tmp_path, monkeypatch):
     assert seen == broken.keys()
 
 
+@pytest.mark.long
 def test_a_crash_and_a_hang_are_counted(monkeypatch, tmp_path):
     """The processes are watched from outside; the part stands in a module of its own."""
     (tmp_path / "sitecustomize.py").write_text(
@@ -81,6 +82,7 @@ def test_a_crash_and_a_hang_are_counted(monkeypatch, tmp_path):
     assert ["--first 3" in found.broken[0], "--first 5" in found.broken[1]] == [True, True]
 
 
+@pytest.mark.long
 @linux
 @pytest.mark.parametrize(("name", "count"), [("kills", 1), ("disk-full", 1), ("unwritable", 1)])
 def test_drills(name, count):

@@ -211,6 +211,7 @@ def test_one_line_is_enough_for_one_complex_stiffness(chains):
     assert fit.parameters["c_x"] == pytest.approx(3, rel=1e-6)
 
 
+@pytest.mark.long
 def test_six_dofs_of_a_structure_with_many_modes():
     """Most lines hide the joint in noise, and no line is left out for that."""
     freq = np.arange(20.0, 620.0)

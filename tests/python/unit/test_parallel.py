@@ -58,6 +58,7 @@ def test_tasks_that_overlap_in_threads_stay_on_one_thread():
     assert numbers_of_threads() == before
 
 
+@pytest.mark.long
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="signals of POSIX")
 def test_a_process_that_dies_costs_its_task_only(tmp_path):
     with jf.SeparateProcesses(2) as pool:

@@ -196,6 +196,7 @@ def six_dof_joint():
     return freq, joint, whole[:, measured][:, :, measured], sides, bodies, whole
 
 
+@pytest.mark.long
 def test_a_fully_coupled_joint_is_identified(six_dof_joint):
     """Translations only, 0.3 % noise: all 21 stiffnesses lie where their standard errors say."""
     freq, joint, gamma, sides, _, _ = six_dof_joint
