@@ -441,6 +441,7 @@ def test_numbers_and_report(ran):
     assert "strength_class" in text  # the case itself
 
 
+@pytest.mark.long
 def test_a_study_gives_the_realisations_of_the_run(ran, tmp_path):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(frfs, "bolted_lap", partial(bolted_lap, divisions=COARSE))

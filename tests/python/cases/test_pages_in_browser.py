@@ -19,6 +19,9 @@ from jointfrf.report.table import Table
 BARS = Path(__file__).resolve().parents[3] / "cases" / "hammer-test" / "two_bars.uff"
 
 
+pytestmark = pytest.mark.long
+
+
 @pytest.fixture(scope="module")
 def pages(tmp_path_factory):
     """A page of each kind."""

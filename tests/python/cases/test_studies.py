@@ -108,7 +108,7 @@ def test_a_killed_study_goes_on_without_loss(tmp_path):
     """Killed as soon as some chunks are there, and once more; what is there then is not computed again."""
     design = jf.StudyDesign({"lines": [100]}, noises=["5 %"], estimators=["compliance"])
     words = [sys.executable, "-m", "jointfrf", "study", "3.1", "--factor", "lines=100", "--noise", "5 %"]
-    words += ["--estimator", "compliance", "--realisations", "400", "--out", str(tmp_path / "a"), "--jobs", "1"]
+    words += ["--estimator", "compliance", "--realisations", "4000", "--out", str(tmp_path / "a"), "--jobs", "1"]
     kept: set[tuple[str, int]] = set()
     for most in (1, 3):
         with subprocess.Popen(words, stderr=subprocess.DEVNULL) as process:
@@ -122,16 +122,16 @@ def test_a_killed_study_goes_on_without_loss(tmp_path):
         assert len(there) >= most
         kept = there
     found = jf.read_study(tmp_path / "a")
-    assert 0 < found.missing < 400
+    assert 0 < found.missing < 4000
     numbers, values, low, high = found.estimates(0)
     for first, count in ((0, 2), (int(numbers[-1]) - 1, 2)):
-        other = jf.study("3.1", tmp_path / f"b{first}", 400, design=design, part=range(first, first + count), jobs=1)
+        other = jf.study("3.1", tmp_path / f"b{first}", 4000, design=design, part=range(first, first + count), jobs=1)
         at = np.searchsorted(numbers, first)
         for x, y in zip(other.estimates(0)[1:], (values, low, high), strict=True):
             np.testing.assert_array_equal(x, y[at : at + count])
     end = int(numbers[-1]) + 1
     assert numbers.tolist() == list(range(end))
-    whole = jf.study("3.1", tmp_path / "a", 400, design=design, part=range(0, end + 3), jobs=1)
+    whole = jf.study("3.1", tmp_path / "a", 4000, design=design, part=range(0, end + 3), jobs=1)
     assert kept <= {(path.name, path.stat().st_mtime_ns) for path in (tmp_path / "a" / "chunks").iterdir()}
     assert whole.estimates(0)[0].tolist() == list(range(end + 3))
     np.testing.assert_array_equal(whole.estimates(0)[1][:end], values)

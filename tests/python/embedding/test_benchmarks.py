@@ -28,7 +28,8 @@ def command(
     BUILD.parent.mkdir(exist_ok=True)
     with FileLock(BUILD.with_suffix(".lock")):  # processes that test at once take turns
         if not (BUILD / "build.ninja").exists():
-            run(["meson", "setup", BUILD, TESTS.parent, "-Dbuildtype=plain", "-Dlapack=scipy-openblas32"])
+            quick = ["-Dbuildtype=plain", "-Dinstruction_sets=false", "-Dlapack=scipy-openblas32"]
+            run(["meson", "setup", BUILD, TESTS.parent, *quick])
         path = os.pathsep.join([str(TESTS), *filter(None, [os.environ.get("PYTHONPATH")])])
         return subprocess.run(
             [sys.executable, "-m", module, *arguments],

@@ -177,7 +177,9 @@ def test_units_know_every_way_to_write_a_rotation():
         fit.unit("stiffness")
 
 
-@pytest.mark.parametrize("joint", [JOINT, MOVED, FULL], ids=["diagonal", "moved", "full"])
+@pytest.mark.parametrize(
+    "joint", [pytest.param(JOINT, marks=pytest.mark.long), MOVED, FULL], ids=["diagonal", "moved", "full"]
+)
 def test_every_method_is_exact(joint):
     k_joint = joint.dynamic_stiffness(SHORT)
     gamma = assembly(joint, SHORT, across=0.003)

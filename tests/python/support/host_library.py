@@ -64,7 +64,13 @@ class HostLibrary:
         """Bring the build up to date and install it below a folder."""
         if not (build / "build.ninja").exists():
             options = ["-Dilp64=true", "-Dlapack_ilp64=true"] if ilp64 else []
-            options += ["-Dlapack=host", "-Dbuildtype=plain", "-Dprefix=/prefix", "-Dlibdir=lib"]
+            options += [
+                "-Dlapack=host",
+                "-Dbuildtype=plain",
+                "-Dinstruction_sets=false",
+                "-Dprefix=/prefix",
+                "-Dlibdir=lib",
+            ]
             run(["meson", "setup", build, ROOT, *options])
         run(["meson", "compile", "-C", build])
         run(["meson", "install", "-C", build, "--no-rebuild", "--destdir", folder])
