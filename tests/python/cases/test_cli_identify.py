@@ -33,7 +33,7 @@ def run(*words, expect=0):
 def test_the_program_prints_what_the_command_gives():
     words = ["identify", BARS, *JOINT_OF_BARS]
     started = subprocess.run(
-        [sys.executable, "-m", "jointfrf", *map(str, words)], capture_output=True, text=True, timeout=120
+        [sys.executable, "-m", "jointfrf", *map(str, words)], capture_output=True, text=True, timeout=900
     )
     assert (started.returncode, started.stdout, started.stderr) == run_command(*words)
 

@@ -37,7 +37,7 @@ def command(
             text=True,
             env={**os.environ, "PYTHONPATH": path, "JOINTFRF_BENCHMARK_BUILD": str(BUILD), **(environment or {})},
             preexec_fn=(lambda: os.sched_setaffinity(0, cores)) if cores else None,
-            timeout=300,
+            timeout=900,
         )
 
 

@@ -21,7 +21,7 @@ BAD = 14
 
 def ended(program: Path, threads: int = 2) -> subprocess.CompletedProcess[str]:
     environment = os.environ | {"OMP_NUM_THREADS": str(threads)}
-    return subprocess.run([program], capture_output=True, text=True, timeout=60, env=environment)
+    return subprocess.run([program], capture_output=True, text=True, timeout=900, env=environment)
 
 
 @pytest.mark.parametrize("engine", ["lapack", "auto"])

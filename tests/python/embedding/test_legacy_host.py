@@ -193,7 +193,7 @@ def test_straight_inclined_cantilever_is_a_beam(frame):
 )
 def test_bad_cards_end_the_program(frame, card, message):
     deck = (F77 / "frame.deck").read_text().replace("END\n", f"{card}\nEND\n")
-    done = subprocess.run([frame], input=deck, capture_output=True, text=True, timeout=60)
+    done = subprocess.run([frame], input=deck, capture_output=True, text=True, timeout=900)
     assert done.returncode == 1
     assert message in done.stdout
 
@@ -214,7 +214,7 @@ def test_patch_changes_nothing_without_a_joint(frame, patched):
 
 
 def test_without_the_patch_there_is_no_joint(frame, with_joint):
-    done = subprocess.run([frame], input=with_joint, capture_output=True, text=True, timeout=60)
+    done = subprocess.run([frame], input=with_joint, capture_output=True, text=True, timeout=900)
     assert done.returncode == 1
     assert "CARD NOT KNOWN: JOINT" in done.stdout
 
@@ -241,6 +241,6 @@ def test_identified_joint(patched, deck, with_joint):
 
 def test_joint_at_a_node_that_is_not_there(patched, with_joint):
     deck = with_joint.replace(f"{'JOINT':8}{5:8d}{6:8d}", f"{'JOINT':8}{5:8d}{99:8d}")
-    done = subprocess.run([patched], input=deck, capture_output=True, text=True, timeout=60)
+    done = subprocess.run([patched], input=deck, capture_output=True, text=True, timeout=900)
     assert done.returncode == 1
     assert "NUMBER ON A CARD" in done.stdout

@@ -32,7 +32,7 @@ def command(*words):
         capture_output=True,
         text=True,
         env={**os.environ, "PYTHONPATH": path},
-        timeout=300,
+        timeout=900,
         check=False,
     )
 

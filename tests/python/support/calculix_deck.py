@@ -55,7 +55,7 @@ def static_step(node, force):
 def rows(ccx: str, text: str, folder: Path):
     """Run CalculiX and return the rows of numbers of its output."""
     (folder / "model.inp").write_text(text)
-    run = subprocess.run([ccx, "model"], cwd=folder, capture_output=True, text=True, timeout=300, check=False)
+    run = subprocess.run([ccx, "model"], cwd=folder, capture_output=True, text=True, timeout=900, check=False)
     assert "Job finished" in run.stdout, run.stdout[-2000:]
     lines = [line.split() for line in (folder / "model.dat").read_text().splitlines()]
     return [line for line in lines if len(line) > 3 and line[0].isdigit()]

@@ -92,7 +92,7 @@ class HostLibrary:
         variables = lapack.environment | {"JOINTFRF_ENGINE": engine, "OMP_NUM_THREADS": str(threads)}
         variables["LD_LIBRARY_PATH"] += f"{os.pathsep}{self.folder}"
         environment = {k: v for k, v in os.environ.items() if k != "OPENBLAS_NUM_THREADS"} | variables
-        return subprocess.run([program], capture_output=True, text=True, timeout=120, check=False, env=environment)
+        return subprocess.run([program], capture_output=True, text=True, timeout=900, check=False, env=environment)
 
     def compile_programs(self) -> dict[str, list[Path]]:
         """Objects of the test programs of the kernel; two of them are compiled at once."""

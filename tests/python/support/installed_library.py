@@ -44,7 +44,7 @@ FLAGS = ["-Wall", "-Wextra", "-Werror", "-O2", "-ffp-contract=off"]
 def run(command: list[str | Path], **options: Any) -> str:
     """Run a command; where it fails, the test shows all that it printed."""
     environment = os.environ | {"PATH": PATH} | options.pop("env", {})
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300, env=environment, **options)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=900, env=environment, **options)
     assert done.returncode == 0, f"{command}\n{done.stdout}\n{done.stderr}"
     return done.stdout
 

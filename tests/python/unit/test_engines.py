@@ -521,7 +521,7 @@ def test_an_engine_of_another_machine_is_refused(monkeypatch):
 
 def python(code: str, word: str) -> subprocess.CompletedProcess:
     environment = os.environ | {"JOINTFRF_ENGINE": word}
-    return subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, timeout=120)
+    return subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, timeout=900)
 
 
 @pytest.mark.parametrize("word", ["lapack", "plain"])

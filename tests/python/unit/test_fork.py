@@ -27,6 +27,6 @@ with multiprocessing.get_context("fork").Pool(2) as pool:
 def test_a_forked_process_computes():
     environment = os.environ | {"OMP_NUM_THREADS": "2"}
     done = subprocess.run(
-        [sys.executable, "-c", _SCRIPT], capture_output=True, text=True, timeout=100, check=True, env=environment
+        [sys.executable, "-c", _SCRIPT], capture_output=True, text=True, timeout=900, check=True, env=environment
     )
     assert done.stdout.strip() == "[False, False, False]", done.stderr

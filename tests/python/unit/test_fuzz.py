@@ -102,7 +102,7 @@ def test_a_second_set_up_needs_no_network():
     if not stamp.exists() or any(path.stat().st_mtime > stamp.stat().st_mtime for path in read):
         pytest.skip("this checkout is not as python/bootstrap.sh has set it up")
     process = drills.set_up(drills.ROOT, **drills.OFFLINE)
-    text = process.communicate(timeout=60)[0]
+    text = process.communicate(timeout=900)[0]
     assert (process.returncode, text) == (0, "")
 
 
@@ -113,7 +113,7 @@ def test_two_set_ups_at_an_odd_place_take_turns(tmp_path, name):
     clone = drills.small_clone(tmp_path / name)
     both = [drills.set_up(clone, PYTHON="/nowhere/python") for _ in range(2)]
     for process in both:
-        text = process.communicate(timeout=60)[0]
+        text = process.communicate(timeout=900)[0]
         assert process.returncode == 1
         assert "PYTHON=/nowhere/python is not Python 3.11 or newer" in text
     assert [path.name for path in (clone / "build").iterdir()] == ["set-up.log"]
@@ -124,7 +124,7 @@ def test_two_set_ups_at_an_odd_place_take_turns(tmp_path, name):
 def test_a_place_where_nothing_can_be_built_is_refused(tmp_path, name):
     """It was found after minutes, in forty lines of the build."""
     process = drills.set_up(drills.small_clone(tmp_path / name))
-    text = process.communicate(timeout=60)[0]
+    text = process.communicate(timeout=900)[0]
     assert process.returncode == 1
     said = "a path with a quotation mark or a backslash cannot be built in, move the checkout"
     assert text.splitlines() == [f"jointfrf: {said}: {tmp_path / name}"]
