@@ -40,8 +40,9 @@
 !> single large line by jf_NAME may take threads of the BLAS, and round otherwise. Lengths do not depend on n_freq, so
 !> one query serves a whole loop.
 !>
-!> Floating-point traps of the program are held off during a call, so that a bad line gets its code instead of a signal;
-!> afterwards traps, flags and rounding are what they were.
+!> Floating-point traps of the program are held off during a call, so that a bad line gets its code instead of a signal,
+!> and numbers are rounded to the nearest, whatever the program does; afterwards traps, flags and rounding are what they
+!> were.
 module jointfrf
   use, intrinsic :: iso_c_binding, only: c_char, c_double, c_double_complex
   use jointfrf_api_work       ! generated from this file; what is public of it is named below
