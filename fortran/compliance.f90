@@ -73,7 +73,7 @@ contains
     call operation%reads(operation%plan%gamma)
     associate (plan => operation%plan)
       plan%c_joint => real_lines(operation%result)
-      call room%in_memory(operation%transposed, reshape([jj, kj, jk, kk], [2, 2]), plan%gamma_place)
+      call room%in_memory(operation%transposed, jj, jk, kj, kk, plan%gamma_place)
       call room%in_memory(operation%transposed, kj, plan%c)
       call room%row_starts(kk, plan%kk_row)
       call room%row_starts(kj, plan%c_row)

@@ -126,8 +126,7 @@ contains
       call room%pick(jk, plan%jk)
       call room%pick(jk_transposed%transpose(), plan%jk_transposed)
       plan%gamma => real_lines(operation%gamma)
-      call room%in_memory(operation%transposed, reshape([jj, kj, jk, kk_transposed%transpose()], [2, 2]), &
-                          plan%gamma_place)
+      call room%in_memory(operation%transposed, jj, jk, kj, kk_transposed%transpose(), plan%gamma_place)
       call place_solution(plan%right)
       call place_solution(plan%left)
       plan%left%weighed = room%run(n*m)

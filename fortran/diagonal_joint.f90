@@ -185,7 +185,7 @@ contains
     end do
     if (.not. all(abs(space%scaled(:n*n)) <= huge(1.0_dp))) return
     do while (damping <= largest_damping)
-      space%trial = x
+      space%trial(:) = x
       call move(n, here%descent, damping, space, solved)
       if (solved) then
         do i = 1, n

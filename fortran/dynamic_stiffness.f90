@@ -185,7 +185,7 @@ contains
     if (operation%no_memory) return
     call mark(operation%outputs, is_output)
     call mark(operation%inputs, retained)
-    retained = retained .or. is_output .or. retain_all
+    retained(:) = retained .or. is_output .or. retain_all
     if (count(retained) > largest_solved) return
     call look_at_matrices(operation, reach, coupled, symmetric, stat)
     if (stat == 0) call plan_elimination(operation, coupled, retained, is_output, symmetric, stat)

@@ -338,7 +338,7 @@ contains
     allocate (given(n), stat=stat)
     if (stat /= 0) return
     call find_parts(n, coupled, part)
-    given = retained
+    given(:) = retained
     do at = 1, n
       if (.not. given(at)) cycle
       fewest = huge(1)

@@ -746,25 +746,39 @@ contains
   end subroutine matrix_in_memory
 
   !> The same of a matrix that consists of four square blocks of one size.
-  subroutine blocks_in_memory(self, transposed, blocks, list)
+  subroutine blocks_in_memory(self, transposed, a11, a12, a21, a22, list)
     class(element_space), intent(inout) :: self
     logical, intent(in) :: transposed
-    type(element_matrix), intent(in) :: blocks(2, 2)
+    type(element_matrix), intent(in) :: a11, a12, a21, a22
     integer, allocatable, intent(out) :: list(:)
-    integer :: i, j, n, place, row, column
+    integer :: n
 
-    n = blocks(1, 1)%n_rows
+    n = a11%n_rows
     call self%new_list(4*n*n, list)
     if (self%no_memory) return
-    place = 0
-    do j = 0, 2*n - 1
-      do i = 0, 2*n - 1
-        place = place + 1
-        row = merge(j, i, transposed)
-        column = merge(i, j, transposed)
-        list(place) = blocks(row/n + 1, column/n + 1)%at(mod(row, n) + 1, mod(column, n) + 1)
+    call put(a11, 0, 0)
+    call put(a21, n, 0)
+    call put(a12, 0, n)
+    call put(a22, n, n)
+
+  contains
+
+    !> A block that follows so many rows and columns.
+    subroutine put(a, row, column)
+      type(element_matrix), intent(in) :: a
+      integer, intent(in) :: row, column
+      integer :: i, j
+
+      do j = 1, n
+        do i = 1, n
+          if (transposed) then
+            list((row + i - 1)*2*n + column + j) = a%at(i, j)
+          else
+            list((column + j - 1)*2*n + row + i) = a%at(i, j)
+          end if
+        end do
       end do
-    end do
+    end subroutine put
   end subroutine blocks_in_memory
 
   !> The element before each row of a matrix whose rows lie in one piece.

@@ -234,7 +234,7 @@ contains
     if (stat == 0) call count_up(1, plan%groups(g)%column)
     do k = 1, u
       if (stat == 0) call set_group(plan%n_entry - u + k - 1, 1, 2, plan%groups(g + k), stat)
-      if (stat == 0) plan%groups(g + k)%column = [k, 2*u + 1]
+      if (stat == 0) plan%groups(g + k)%column(:) = [k, 2*u + 1]
     end do
 
   contains

@@ -97,7 +97,7 @@ contains
         if (symmetric) operation%place(in_memory(i, o)) = before + e
       end do
     end do
-    operation%loss = operation%loss_factor*operation%stiffness
+    operation%loss(:) = operation%loss_factor*operation%stiffness
     operation%result_pairs => real_lines(operation%result)
 
   contains

@@ -250,7 +250,7 @@ contains
       call room%row_starts(kk, plan%kk_row)
       call room%row_starts(kj, plan%c_row)
       call room%in_memory(transposed, kj, plan%result)
-      call room%in_memory(transposed, reshape([jj, kj, jk, kk], [2, 2]), plan%gamma)
+      call room%in_memory(transposed, jj, jk, kj, kk, plan%gamma)
     else
       call room%system(2*n, n, plan%system_before, gamma, unit)
       gamma%turn = n
@@ -336,7 +336,7 @@ contains
       here = min(lanes, count - done)
       high = [(first + done + l, l=0, lanes - 1)]
       code = not(line_good)
-      space%from = plan%result
+      space%from(:) = plan%result
       if (blocks) call identify_lanes(plan, noise, kernels, high, gamma, space, code, rcond)
       if (any(code(:here) /= line_good)) &
         call repeat_lanes(plan, noise, kernels, high, here, gamma, space, code, rcond)
