@@ -166,7 +166,7 @@ contains
     real(dp), intent(in) :: corners(3, nodes)
     real(dp), intent(out) :: x(3, nodes), cofactor(3, nodes, points), determinant(points)
     integer(ip), intent(out) :: element_info
-    real(dp) :: jacobian(3, 3)
+    real(dp) :: jacobian(3, 3), c(3, 3)
     integer :: i, g
 
     element_info = line_not_finite
@@ -179,7 +179,10 @@ contains
       jacobian = matmul(x, transpose(cube%slope(:, :, g)))
       if (.not. scaled_volume(jacobian, maxval(abs(corners))) > rounding) return
       determinant(g) = volume(jacobian)
-      cofactor(:, :, g) = matmul(cofactors(jacobian), cube%slope(:, :, g))
+      c = cofactors(jacobian)
+      do i = 1, nodes
+        cofactor(:, i, g) = c(:, 1)*cube%slope(1, i, g) + c(:, 2)*cube%slope(2, i, g) + c(:, 3)*cube%slope(3, i, g)
+      end do
     end do
     element_info = line_good
   end subroutine map_element

@@ -2,8 +2,7 @@
 module jointfrf_compliance
   use jointfrf_caller_memory, only: caller_memory
   use jointfrf_kinds, only: dp, ip
-  use jointfrf_lanes, only: element_space, in_memory, lane_kernels, lanes, largest_solved, padded, real_lines, &
-    row_starts
+  use jointfrf_lanes, only: element_matrix, element_space, lane_kernels, lanes, largest_solved, padded, real_lines
   use jointfrf_line_layout, only: all_finite, load, store, take_block
   use jointfrf_lines_lapack, only: product_line, room_to_solve, solve_line
   use jointfrf_status, only: line_good, line_not_finite, line_overflow
@@ -61,26 +60,25 @@ contains
 
   subroutine plan_compliance(operation)
     type(compliance), intent(inout) :: operation
-    integer :: gamma(2*operation%n, 2*operation%n), solved(operation%n, 2*operation%n), n
+    type(element_matrix) :: jk, jj, kk, kj
     type(element_space) :: room
+    integer :: n
 
     n = operation%n
-    solved = room%system(n, n, operation%plan%jk_before)
-    gamma(:n, n + 1:) = solved(:, :n)               ! jk, to be inverted
-    gamma(:n, :n) = solved(:, n + 1:)               ! jj, the right-hand sides
-    gamma(n + 1:, n + 1:) = room%matrix(n, n)       ! kk
-    gamma(n + 1:, :n) = room%matrix(n, n)           ! kj, where C will be
-    operation%n_element = room%taken
+    call room%system(n, n, operation%plan%jk_before, jk, jj)     ! jk is to be inverted, jj the right-hand sides
+    kk = room%matrix(n, n)
+    kj = room%matrix(n, n)                                       ! where C will be
     operation%n_hint = padded(n)
     operation%plan%gamma => real_lines(operation%gamma)
     call operation%reads(operation%plan%gamma)
     associate (plan => operation%plan)
       plan%c_joint => real_lines(operation%result)
-      plan%gamma_place = in_memory(operation%transposed, gamma)
-      plan%c = in_memory(operation%transposed, gamma(n + 1:, :n))
-      plan%kk_row = row_starts(gamma(n + 1:, n + 1:))
-      plan%c_row = row_starts(gamma(n + 1:, :n))
+      call room%in_memory(operation%transposed, jj, jk, kj, kk, plan%gamma_place)
+      call room%in_memory(operation%transposed, kj, plan%c)
+      call room%row_starts(kk, plan%kk_row)
+      call room%row_starts(kj, plan%c_row)
     end associate
+    call operation%lies_in(room, n)
   end subroutine plan_compliance
 
   subroutine compliance_block(self, kernels, first, n_lines, space, line_info, rcond)
@@ -91,10 +89,10 @@ contains
     integer(ip), intent(out) :: line_info(n_lines)
     real(dp), intent(out) :: rcond(n_lines)
     real(dp) :: rcond_lanes(lanes), total(lanes)
-    integer :: row(self%n), n
+    integer :: n
 
     n = self%n
-    associate (plan => self%plan, x => space%x)
+    associate (plan => self%plan, x => space%x, row => space%list)
       call kernels%load(4*n*n, plan%gamma_place, first, n_lines, plan%gamma, x)
       call kernels%solve(n, n, n, plan%jk_before, x, space%hint, row, rcond_lanes, space%ahead)  ! gamma_jk^-1 gamma_jj
       call kernels%copy(n*n, -1.0_dp, plan%c, plan%c, x)

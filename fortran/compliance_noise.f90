@@ -3,8 +3,8 @@ module jointfrf_compliance_noise
   use, intrinsic :: ieee_arithmetic, only: ieee_positive_inf, ieee_value
   use jointfrf_caller_memory, only: caller_memory
   use jointfrf_kinds, only: dp, ip
-  use jointfrf_lanes, only: element_space, flat, in_memory, lane_kernels, lanes, largest_solved, padded, real_lines, &
-    rows_of_columns, sparse_rows, worse_of
+  use jointfrf_lanes, only: element_matrix, element_space, find_rows, lane_kernels, lanes, largest_solved, padded, real_lines, &
+    rows_in_memory, sparse_rows, worse_of
   use jointfrf_line_layout, only: all_finite, load, load_real, store, take_block
   use jointfrf_lines_lapack, only: product_line, room_to_solve, solve_line
   use jointfrf_status, only: line_good, line_not_finite, line_overflow
@@ -20,6 +20,7 @@ module jointfrf_compliance_noise
   type :: weighed_system
     integer :: before                        !< the element before the system
     integer :: solved                        !< before its solution, row by row
+    integer, allocatable :: solution(:)      !< its elements
     integer :: weighed                       !< before what comes of it, column by column
     type(sparse_rows) :: weights             !< of the rows of the solution, for each measured point
     real(dp), allocatable :: constant(:, :)  !< what is added, shape (n, m)
@@ -29,7 +30,7 @@ module jointfrf_compliance_noise
   type :: linearisation_in_lanes
     real(dp), pointer, contiguous :: gamma(:, :, :), result(:, :, :)
     integer, allocatable :: gamma_place(:), result_place(:)              !< in the caller's order
-    integer, allocatable :: jk(:), jk_transposed(:), solved(:)           !< elements of n by n matrices
+    integer, allocatable :: jk(:), jk_transposed(:)                      !< elements of n by n matrices
     type(weighed_system) :: right, left      !< gamma_jk R = gamma_jj, gamma_jk^T L^T = gamma_kk^T
   end type linearisation_in_lanes
 
@@ -113,58 +114,92 @@ contains
   subroutine plan_linearisation(operation, room)
     class(linearisation), intent(inout) :: operation
     type(element_space), intent(inout) :: room
-    integer :: gamma(2*operation%n, 2*operation%n), right(operation%n, 2*operation%n), left(operation%n, 2*operation%n)
-    real(dp) :: t(2*operation%n, operation%m)
-    integer :: n, m, i
+    type(element_matrix) :: jk, jj, jk_transposed, kk_transposed, kj
+    integer :: n, m
 
     n = operation%n
     m = operation%m
-    if (operation%transposed) then
-      t = transpose(operation%transform)
-    else
-      t = operation%transform
-    end if
     associate (plan => operation%plan)
-      right = room%system(n, n, plan%right%before)
-      left = room%system(n, n, plan%left%before)
-      gamma(:n, n + 1:) = right(:, :n)                      ! jk, to be solved with
-      gamma(:n, :n) = right(:, n + 1:)                      ! jj, the right-hand sides of R
-      gamma(n + 1:, n + 1:) = transpose(left(:, n + 1:))    ! kk^T, those of L^T
-      gamma(n + 1:, :n) = room%matrix(n, n)                 ! kj, which must be finite
-      plan%jk = flat(right(:, :n))
-      plan%jk_transposed = flat(transpose(left(:, :n)))
+      call room%system(n, n, plan%right%before, jk, jj)                        ! jj are the right-hand sides of R
+      call room%system(n, n, plan%left%before, jk_transposed, kk_transposed)   ! kk^T those of L^T
+      kj = room%matrix(n, n)                                                   ! must be finite
+      call room%pick(jk, plan%jk)
+      call room%pick(jk_transposed%transpose(), plan%jk_transposed)
       plan%gamma => real_lines(operation%gamma)
-      plan%gamma_place = in_memory(operation%transposed, gamma)
-      plan%solved = [(i, i=1, n*n)]
-      plan%right%solved = room%run(n*n)
-      plan%left%solved = room%run(n*n)
+      call room%in_memory(operation%transposed, jj, jk, kj, kk_transposed%transpose(), plan%gamma_place)
+      call place_solution(plan%right)
+      call place_solution(plan%left)
       plan%left%weighed = room%run(n*m)
       plan%right%weighed = room%run(n*m)
-      plan%left%weights = rows_of_columns(t(:n, :))          ! U = L T_j - T_k
-      plan%left%constant = -t(n + 1:, :)
-      plan%right%weights = rows_of_columns(-t(n + 1:, :))    ! V^T = T_j - R^T T_k
-      plan%right%constant = t(:n, :)
+      if (operation%transposed) then
+        call weigh(operation%transform(:, :n), operation%transform(:, n + 1:))
+      else
+        call weigh(operation%transform(:n, :), operation%transform(n + 1:, :))
+      end if
     end associate
     operation%n_hint = 2*padded(n)
+
+  contains
+
+    subroutine place_solution(one)
+      type(weighed_system), intent(inout) :: one
+      type(element_matrix) :: solution
+
+      solution = room%matrix(n, n)
+      one%solved = solution%before
+      call room%in_memory(.true., solution, one%solution)
+    end subroutine place_solution
+
+    !> U = L T_j - T_k and V^T = T_j - R^T T_k, column by column.
+    subroutine weigh(t_j, t_k)
+      real(dp), intent(in) :: t_j(:, :), t_k(:, :)
+
+      call set(1.0_dp, t_j, -1.0_dp, t_k, operation%plan%left)
+      call set(-1.0_dp, t_k, 1.0_dp, t_j, operation%plan%right)
+    end subroutine weigh
+
+    subroutine set(factor, weights, constant_factor, constant, one)
+      real(dp), intent(in) :: factor, weights(:, :), constant_factor, constant(:, :)
+      type(weighed_system), intent(inout) :: one
+      integer :: stat, i
+
+      if (room%no_memory) return
+      call find_rows(factor, weights, .not. operation%transposed, one%weights, stat)
+      if (stat == 0) allocate (one%constant(n, m), stat=stat)
+      room%no_memory = stat /= 0
+      if (room%no_memory) return
+      do i = 1, n
+        if (operation%transposed) then
+          one%constant(i, :) = constant_factor*constant(:, i)
+        else
+          one%constant(i, :) = constant_factor*constant(i, :)
+        end if
+      end do
+    end subroutine set
   end subroutine plan_linearisation
 
   subroutine plan_factors(operation)
     type(factorisation), intent(inout) :: operation
-    integer :: factor(2*operation%n, operation%m), n, p
+    integer :: n, m, i, p, above, below
     type(element_space) :: room
 
     n = operation%n
+    m = operation%m
     call plan_linearisation(operation, room)
-    associate (plan => operation%plan)
-      do p = 1, operation%m
-        factor(:n, p) = plan%left%weighed + (p - 1)*n + plan%solved(:n)
-        factor(n + 1:, p) = plan%right%weighed + (p - 1)*n + plan%solved(:n)
+    call room%new_list(2*n*m, operation%plan%result_place)
+    if (.not. room%no_memory) then
+      do p = 1, m
+        do i = 1, n
+          above = merge((i - 1)*m + p, (p - 1)*2*n + i, operation%transposed)
+          below = merge((n + i - 1)*m + p, (p - 1)*2*n + n + i, operation%transposed)
+          operation%plan%result_place(above) = operation%plan%left%weighed + (p - 1)*n + i
+          operation%plan%result_place(below) = operation%plan%right%weighed + (p - 1)*n + i
+        end do
       end do
-      plan%result => real_lines(operation%result)
-      plan%result_place = in_memory(operation%transposed, factor)
-      call operation%reads(plan%gamma)
-    end associate
-    operation%n_element = room%taken
+    end if
+    operation%plan%result => real_lines(operation%result)
+    call operation%reads(operation%plan%gamma)
+    call operation%lies_in(room, n + n*n)
   end subroutine plan_factors
 
   !> U and V^T of a block of lines.
@@ -196,16 +231,15 @@ contains
       integer, intent(inout) :: hint(:)
       real(dp), intent(out) :: rcond_one(lanes)
       real(dp) :: of_solution(lanes)
-      integer :: row(n), from(n*n), b
 
-      call kernels%solve(n, n, n, one%before, space%x, hint, row, rcond_one, space%ahead)
-      do b = 1, n
-        from((b - 1)*n + 1:b*n) = row(b) + self%plan%solved(:n)
-      end do
-      call kernels%total(n*n, from, space%x, of_solution)
-      total = total + of_solution
-      call kernels%copy(n*n, 1.0_dp, from, one%solved + self%plan%solved, space%x)
-      call kernels%weigh_rows(n, one%weights, one%constant, one%solved, one%weighed, space%x)
+      associate (row => space%list(:n), from => space%list(n + 1:))
+        call kernels%solve(n, n, n, one%before, space%x, hint, row, rcond_one, space%ahead)
+        call rows_in_memory(.true., row, n, from)
+        call kernels%total(n*n, from, space%x, of_solution)
+        total = total + of_solution
+        call kernels%copy(n*n, 1.0_dp, from, one%solution, space%x)
+        call kernels%weigh_rows(n, one%weights, one%constant, one%solved, one%weighed, space%x)
+      end associate
     end subroutine solve_and_weigh
   end subroutine linearise_block
 
@@ -377,7 +411,6 @@ contains
 
   subroutine plan_propagation(operation)
     type(propagation), intent(inout) :: operation
-    integer, allocatable :: covariance(:, :)
     type(element_space) :: room
     integer :: n, m, a, b, c, d, ab, cd
 
@@ -387,24 +420,24 @@ contains
     operation%spread_before = room%run(m*m)
     operation%work_before = room%run((n + 2)*m)
     operation%covariance_before = room%run(n**4)
-    allocate (covariance(n*n, n*n))
-    do d = 1, n
-      do c = 1, n
-        cd = merge(d + (c - 1)*n, c + (d - 1)*n, operation%transposed)
-        do b = 1, n
-          do a = 1, n
-            ab = merge(b + (a - 1)*n, a + (b - 1)*n, operation%transposed)
-            covariance(ab, cd) = operation%covariance_before + (((c - 1)*n + a - 1)*n + d - 1)*n + b
+    call room%new_list(n**4, operation%plan%result_place)
+    if (.not. room%no_memory) then
+      do d = 1, n
+        do c = 1, n
+          cd = merge(d + (c - 1)*n, c + (d - 1)*n, operation%transposed)
+          do b = 1, n
+            do a = 1, n
+              ab = merge(b + (a - 1)*n, a + (b - 1)*n, operation%transposed)
+              operation%plan%result_place(merge((ab - 1)*n*n + cd, (cd - 1)*n*n + ab, operation%transposed)) = &
+                operation%covariance_before + (((c - 1)*n + a - 1)*n + d - 1)*n + b
+            end do
           end do
         end do
       end do
-    end do
-    associate (plan => operation%plan)
-      plan%result => real_lines(operation%result)
-      plan%result_place = in_memory(operation%transposed, covariance)
-      call operation%reads(plan%gamma)
-    end associate
-    operation%n_element = room%taken
+    end if
+    operation%plan%result => real_lines(operation%result)
+    call operation%reads(operation%plan%gamma)
+    call operation%lies_in(room, n + n*n)
   end subroutine plan_propagation
 
   subroutine propagate_block(self, kernels, first, n_lines, space, line_info, rcond)

@@ -4,8 +4,8 @@ module jointfrf_coupling
   use jointfrf_caller_memory, only: caller_memory
   use jointfrf_engine, only: engine_v4, get_engine
   use jointfrf_kinds, only: dp, ip
-  use jointfrf_lanes, only: element_space, flat, in_memory, lane_kernels, lanes, largest_solved, &
-    largest_product, padded, real_lines, rows_in_memory
+  use jointfrf_lanes, only: element_matrix, element_space, lane_kernels, lanes, largest_solved, largest_product, padded, &
+    real_lines, rows_in_memory
   use jointfrf_line_layout, only: all_finite, load, store
   use jointfrf_lines_lapack, only: product_block
   use jointfrf_modification, only: apply_in_lanes, apply_modification, find_forces, forces_in_lanes, &
@@ -132,27 +132,53 @@ contains
 
   subroutine plan_coupling(operation)
     type(coupling), intent(inout) :: operation
-    integer :: n_a, n
+    type(element_space) :: room
+    type(element_matrix) :: a, b
+    integer :: n_a, n_b, n_j, used
 
     n_a = operation%n_a
-    n = n_a + operation%n_b
-    call plan_modification(n, operation%n_j, operation%plan)
-    operation%n_element = operation%plan%n_element
-    associate (plan => operation%plan, j => operation%dofs_a, k => n_a + operation%dofs_b)
-      operation%a_place = in_memory(operation%transposed, plan%h(:n_a, :n_a))
-      operation%b_place = in_memory(operation%transposed, plan%h(n_a + 1:, n_a + 1:))
-      operation%k_place = in_memory(operation%transposed, plan%forces%d)
-      operation%h_place = in_memory(operation%transposed, plan%h)
-      operation%apart = [flat(plan%h(:n_a, n_a + 1:)), flat(plan%h(n_a + 1:, :n_a))]
-      operation%of_a = [flat(plan%columns(:n_a, :)), flat(plan%forces%rows(:, :n_a))]
-      operation%from_a = [flat(plan%h(:n_a, j)), flat(plan%h(j, :n_a))]
-      operation%of_b = [flat(plan%columns(n_a + 1:, :)), flat(plan%forces%rows(:, n_a + 1:))]
-      operation%from_b = [flat(plan%h(n_a + 1:, k)), flat(plan%h(k, n_a + 1:))]
-      operation%relative = flat(plan%forces%h_mm)
-      operation%relative_a = flat(plan%h(j, j))
-      operation%relative_b = flat(plan%h(k, k))
+    n_b = operation%n_b
+    n_j = operation%n_j
+    call plan_modification(n_a + n_b, n_j, room, operation%plan)
+    associate (plan => operation%plan, j => operation%dofs_a, k => operation%dofs_b)
+      a = plan%h%block(0, n_a, 0, n_a)
+      b = plan%h%block(n_a, n_b, n_a, n_b)
+      call room%in_memory(operation%transposed, a, operation%a_place)
+      call room%in_memory(operation%transposed, b, operation%b_place)
+      call room%in_memory(operation%transposed, plan%forces%d, operation%k_place)
+      call room%in_memory(operation%transposed, plan%h, operation%h_place)
+      call room%new_list(2*n_a*n_b, operation%apart)
+      call room%new_values(2*n_a*n_b, operation%apart_value)
+      used = 0
+      call room%add(plan%h%block(0, n_a, n_a, n_b), operation%apart, used)
+      call room%add(plan%h%block(n_a, n_b, 0, n_a), operation%apart, used)
+      call list_relative(0, a, j, operation%of_a, operation%from_a)
+      call list_relative(n_a, b, k, operation%of_b, operation%from_b)
+      call room%pick(plan%forces%h_mm, operation%relative)
+      call room%pick(a, operation%relative_a, j, j)
+      call room%pick(b, operation%relative_b, k, k)
     end associate
-    allocate (operation%apart_value(size(operation%apart)), source=(0.0_dp, 0.0_dp))
+    call operation%lies_in(room, n_j)
+
+  contains
+
+    !> Columns and rows of a substructure in the coordinates x_j - x_k, and where they come from.
+    !> before   DOFs of the assembly before its own
+    subroutine list_relative(before, h, dofs, to, from)
+      integer, intent(in) :: before
+      type(element_matrix), intent(in) :: h
+      integer(ip), intent(in) :: dofs(:)
+      integer, allocatable, intent(out) :: to(:), from(:)
+
+      call room%new_list(2*n_j*h%n_rows, to)
+      call room%new_list(2*n_j*h%n_rows, from)
+      used = 0
+      call room%add(operation%plan%columns%block(before, h%n_rows, 0, n_j), to, used)
+      call room%add(operation%plan%forces%rows%block(0, n_j, before, h%n_rows), to, used)
+      used = 0
+      call room%add(h, from, used, columns=dofs)
+      call room%add(h, from, used, rows=dofs)
+    end subroutine list_relative
   end subroutine plan_coupling
 
   subroutine couple_block(self, kernels, first, n_lines, space, line_info, rcond)
@@ -172,7 +198,7 @@ contains
       call kernels%copy(size(self%of_a), 1.0_dp, self%from_a, self%of_a, x)
       call kernels%copy(size(self%of_b), -1.0_dp, self%from_b, self%of_b, x)
       call kernels%combine(size(self%relative), 1.0_dp, self%relative_a, 1.0_dp, self%relative_b, self%relative, x)
-      call apply_in_lanes(self%plan, kernels, x, space%hint, rcond_lanes, space%ahead)              ! (2.26)
+      call apply_in_lanes(self%plan, kernels, x, space%hint, space%list, rcond_lanes, space%ahead)  ! (2.26)
       call kernels%store(size(self%h_place), self%h_place, first, n_lines, x, self%result_pairs)
       call kernels%total(size(self%h_place), self%h_place, x, total)
       rcond = rcond_lanes(:n_lines)
@@ -182,40 +208,45 @@ contains
 
   subroutine plan_large_coupling(operation)
     type(large_coupling), intent(inout) :: operation
-    integer :: n_a, n_b, n_j
     type(element_space) :: room
+    type(element_matrix) :: a, b
+    integer :: n_a, n_b, n_j
 
     n_a = operation%n_a
     n_b = operation%n_b
     n_j = operation%n_j
     call plan_forces(n_a + n_b, n_j, room, operation%forces)
-    operation%n_element = room%taken
-    associate (forces => operation%forces, number_a => numbers(operation%transposed, n_a), &
-               number_b => numbers(operation%transposed, n_b))
-      operation%k_place = in_memory(operation%transposed, forces%d)
-      operation%place_a = flat(forces%rows(:, :n_a))
-      operation%place_b = flat(forces%rows(:, n_a + 1:))
-      operation%in_a = flat(number_a(operation%dofs_a, :))
-      operation%in_b = flat(number_b(operation%dofs_b, :))
-      operation%relative = flat(forces%h_mm)
-      operation%relative_a = flat(forces%rows(:, operation%dofs_a))
-      operation%relative_b = flat(forces%rows(:, n_a + operation%dofs_b))
+    associate (forces => operation%forces)
+      a = forces%rows%block(0, n_j, 0, n_a)
+      b = forces%rows%block(0, n_j, n_a, n_b)
+      call room%in_memory(operation%transposed, forces%d, operation%k_place)
+      call room%pick(a, operation%place_a)
+      call room%pick(b, operation%place_b)
+      call list_rows(n_a, operation%dofs_a, operation%in_a)
+      call list_rows(n_b, operation%dofs_b, operation%in_b)
+      call room%pick(forces%h_mm, operation%relative)
+      call room%pick(a, operation%relative_a, columns=operation%dofs_a)
+      call room%pick(b, operation%relative_b, columns=operation%dofs_b)
     end associate
+    call operation%lies_in(room, n_j*(1 + n_a + n_b))
 
   contains
 
-    !> Which number of a stored line is entry (i, j) of the matrix.
-    pure function numbers(transposed, n) result(number)
-      logical, intent(in) :: transposed
+    !> Which numbers of a stored line of order n are these rows.
+    subroutine list_rows(n, dofs, number)
       integer, intent(in) :: n
-      integer :: number(n, n), i, j
+      integer(ip), intent(in) :: dofs(:)
+      integer, allocatable, intent(out) :: number(:)
+      integer :: i, j
 
+      call room%new_list(n_j*n, number)
+      if (room%no_memory) return
       do j = 1, n
-        do i = 1, n
-          number(i, j) = merge(n*(i - 1) + j, n*(j - 1) + i, transposed)
+        do i = 1, n_j
+          number((j - 1)*n_j + i) = merge(n*int(dofs(i) - 1) + j, n*(j - 1) + int(dofs(i)), operation%transposed)
         end do
       end do
-    end function numbers
+    end subroutine list_rows
   end subroutine plan_large_coupling
 
   !> Forces in the joint in lanes; then, line by line and where the result lies, their products with columns of H_A and
@@ -230,10 +261,10 @@ contains
     complex(dp), pointer, contiguous :: force(:, :)
     real(dp), pointer, contiguous :: force_pairs(:, :, :)
     real(dp) :: rcond_lanes(lanes), total(lanes)
-    integer :: force_row(self%n_j), place(self%n_j*(self%n_a + self%n_b)), n, i, l
+    integer :: n, i, l
 
     n = self%n_a + self%n_b
-    associate (x => space%x)
+    associate (x => space%x, force_row => space%list(:self%n_j), place => space%list(self%n_j + 1:))
       call kernels%pick(size(self%in_a), self%n_a**2, self%in_a, self%place_a, first, n_lines, self%a_pairs, x)
       call kernels%pick(size(self%in_b), self%n_b**2, self%in_b, self%place_b, first, n_lines, self%b_pairs, x)
       call kernels%load(size(self%k_place), self%k_place, first, n_lines, self%k_pairs, x)

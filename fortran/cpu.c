@@ -1,5 +1,8 @@
-/* What Fortran has no word for: which instruction sets the processor has, and asking for memory before it is needed. */
+/* What Fortran has no word for: which instruction sets the processor has, asking for memory before it is needed, and
+   reading the environment without memory of its own. */
 #include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
 
 /* 2, 3 or 4 for x86-64-v2, -v3 or -v4; 0 for less and for other processors. The operating system's support of the wide
    registers is part of the answer. */
@@ -37,4 +40,14 @@ void jointfrf_prefetch(intptr_t from, intptr_t to, int write)
   (void)to;
   (void)write;
 #endif
+}
+
+void jointfrf_read_engine(int length, char *word)
+{
+  const char *value = getenv("JOINTFRF_ENGINE");
+  const size_t used = value == NULL ? 0 : strlen(value);
+
+  memset(word, used > (size_t)length ? '?' : ' ', (size_t)length);
+  if (used > 0 && used <= (size_t)length)
+    memcpy(word, value, used);
 }

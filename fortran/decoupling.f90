@@ -3,8 +3,8 @@
 module jointfrf_decoupling
   use jointfrf_caller_memory, only: caller_memory
   use jointfrf_kinds, only: dp, ip
-  use jointfrf_lanes, only: element_space, flat, in_memory, lane_kernels, lanes, largest_in_lanes, padded, real_lines, &
-    row_starts, worse_of
+  use jointfrf_lanes, only: element_matrix, element_space, lane_kernels, lanes, largest_in_lanes, padded, real_lines, &
+    worse_of
   use jointfrf_line_layout, only: all_finite, load, store
   use jointfrf_lines_lapack, only: invert_line, product_line, room_to_invert, room_to_solve, solve_line
   use jointfrf_status, only: line_good, line_not_finite
@@ -95,10 +95,9 @@ contains
 
   subroutine plan_decoupling(operation)
     type(decoupling), intent(inout) :: operation
-    integer :: a(operation%n_a, operation%n_a), b(operation%n_b, operation%n_b)
-    integer :: measured(operation%n, operation%n), to_joint(operation%n, operation%n), z(operation%n, operation%n)
-    integer :: whole(operation%n, 2*operation%n), inverse(operation%n, operation%n), n
+    type(element_matrix) :: a, b, measured, to_joint, z, m, q, inverse
     type(element_space) :: room
+    integer :: n, used
 
     n = operation%n
     a = room%matrix(operation%n_a, operation%n_a)
@@ -106,13 +105,11 @@ contains
     measured = room%matrix(n, n)
     to_joint = room%matrix(n, n)
     z = room%matrix(n, n)
-    whole = room%system(n, n, operation%plan%m_before)
-    inverse = room%system(n, 0, operation%plan%z_before)
-    operation%n_element = room%taken
+    call room%system(n, n, operation%plan%m_before, m, q)
+    call room%system(n, 0, operation%plan%z_before, inverse)
     operation%n_hint = 2*padded(n)
     associate (plan => operation%plan, j => operation%dofs_j, k => operation%dofs_k, r => operation%dofs_r, &
                s => operation%dofs_s, equation => operation%equation)
-      plan%z_system = flat(inverse)
       plan%a => real_lines(operation%h_a)
       plan%b => real_lines(operation%h_b)
       plan%c => real_lines(operation%h_c)
@@ -120,33 +117,43 @@ contains
       call operation%reads(plan%a)
       call operation%reads(plan%b)
       call operation%reads(plan%c)
-      plan%a_place = in_memory(operation%transposed, a)
-      plan%b_place = in_memory(operation%transposed, b)
-      plan%c_place = in_memory(operation%transposed, measured)
-      plan%given = [plan%a_place, plan%b_place, plan%c_place]
-      plan%measured = flat(measured)
-      plan%m = flat(whole(:, :n))
-      plan%q = flat(whole(:, n + 1:))
-      plan%p = flat(to_joint)
-      plan%z = flat(z)
-      plan%z_from_j = flat(a(j, j))
-      plan%z_from_k = flat(b(k, k))
+      call room%in_memory(operation%transposed, a, plan%a_place)
+      call room%in_memory(operation%transposed, b, plan%b_place)
+      call room%in_memory(operation%transposed, measured, plan%c_place)
+      call room%new_list(operation%n_a**2 + operation%n_b**2 + n*n, plan%given)
+      used = 0
+      call room%add(a, plan%given, used)
+      call room%add(b, plan%given, used)
+      call room%add(measured, plan%given, used)
+      call room%pick(measured, plan%measured)
+      call room%pick(m, plan%m)
+      call room%pick(q, plan%q)
+      call room%pick(to_joint, plan%p)
+      call room%pick(z, plan%z)
+      call room%pick(inverse, plan%z_system)
+      call room%pick(a, plan%z_from_j, j, j)
+      call room%pick(b, plan%z_from_k, k, k)
       if (equation(1:1) == 'r') then
-        plan%q_from = flat(a(r, j))
+        call room%pick(a, plan%q_from, r, j)
       else
-        plan%q_from = flat(b(s, k))
+        call room%pick(b, plan%q_from, s, k)
       end if
       if (equation(2:2) == 'r') then
-        plan%p_from = flat(a(j, r))
+        call room%pick(a, plan%p_from, j, r)
       else
-        plan%p_from = flat(b(k, s))
+        call room%pick(b, plan%p_from, k, s)
       end if
-      plan%model = [integer ::]
-      if (equation == 'rr') plan%model = flat(a(r, r))
-      if (equation == 'ss') plan%model = flat(b(s, s))
-      plan%p_row = row_starts(to_joint)
-      plan%z_row = row_starts(z)
+      if (equation == 'rr') then
+        call room%pick(a, plan%model, r, r)
+      else if (equation == 'ss') then
+        call room%pick(b, plan%model, s, s)
+      else
+        call room%new_list(0, plan%model)
+      end if
+      call room%row_starts(to_joint, plan%p_row)
+      call room%row_starts(z, plan%z_row)
     end associate
+    call operation%lies_in(room, n + 2*n*n)
   end subroutine plan_decoupling
 
   subroutine decouple_block(self, kernels, first, n_lines, space, line_info, rcond)
@@ -157,10 +164,11 @@ contains
     integer(ip), intent(out) :: line_info(n_lines)
     real(dp), intent(out) :: rcond(n_lines)
     real(dp) :: rcond_m(lanes), rcond_z(lanes), total(lanes)
-    integer :: row(self%n), inverse(self%n**2), place(self%n**2), n
+    integer :: n, i, j
 
     n = self%n
-    associate (plan => self%plan, x => space%x)
+    associate (plan => self%plan, x => space%x, row => space%list(:n), inverse => space%list(n + 1:n + n*n), &
+               place => space%list(n + n*n + 1:))
       call kernels%load(size(plan%a_place), plan%a_place, first, n_lines, plan%a, x)
       call kernels%load(size(plan%b_place), plan%b_place, first, n_lines, plan%b, x)
       call kernels%load(n*n, plan%c_place, first, n_lines, plan%c, x)
@@ -177,8 +185,11 @@ contains
       call kernels%product(n, n, n, 1.0_dp, plan%p_row, row, plan%z_row, x)
       call kernels%copy(n*n, 1.0_dp, plan%z, plan%z_system, x)
       call kernels%invert(n, plan%z_before, x, space%hint(padded(n) + 1:), inverse, rcond_z)  ! (2.53)-(2.56)
-      place = inverse
-      if (.not. self%transposed) place = reshape(transpose(reshape(inverse, [n, n])), [n*n])
+      do j = 1, n
+        do i = 1, n
+          place((j - 1)*n + i) = inverse(merge((j - 1)*n + i, (i - 1)*n + j, self%transposed))
+        end do
+      end do
       call kernels%store(n*n, place, first, n_lines, x, self%plan%k_joint)
       rcond = worse_of(rcond_m(:n_lines), rcond_z(:n_lines))
       call kernels%judge(n_lines, total, line_info, rcond)

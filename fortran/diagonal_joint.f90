@@ -12,7 +12,7 @@ module jointfrf_diagonal_joint
   use jointfrf_blas_threads, only: hold_blas_threads, release_blas_threads
   use jointfrf_engine, only: find_kernels
   use jointfrf_kinds, only: blas_ip, dp, ip, long
-  use jointfrf_lanes, only: in_memory, lane_kernels, lanes, to_register
+  use jointfrf_lanes, only: lane_kernels, lanes, to_register
   use jointfrf_lapack, only: dposv
   use jointfrf_sharing, only: serial_flops_lanes, share, shared_work, threads_for
   use jointfrf_status, only: info_good, info_no_memory
@@ -62,9 +62,12 @@ module jointfrf_diagonal_joint
     logical :: by_rate = .true., damped = .true.
     type(lane_kernels) :: kernels
     real(dp), allocatable :: room(:)                               !< where x lies
+    integer, allocatable :: place(:)                               !< where the numbers of a line go
     real(dp), allocatable :: omega(:, :), squares(:, :)            !< (lanes, n_blocks)
     real(dp), pointer, contiguous :: x(:, :, :, :) => null()       !< of the kernel, (lanes, 2, elements, n_blocks)
     real(dp), allocatable :: joint(:, :)                           !< of the kernel, (3, n)
+    real(dp), allocatable :: total(:)                              !< of all lines
+    real(dp), allocatable :: partial_room(:)                       !< where the next lies
     real(dp), pointer, contiguous :: partial(:, :, :) => null()    !< cost, descent, normal: (lanes, sums, shares)
   contains
     procedure :: do_items => sum_shares
@@ -75,6 +78,14 @@ module jointfrf_diagonal_joint
     real(dp) :: cost = 0.0_dp
     real(dp), allocatable :: normal(:, :), descent(:)
   end type evaluation
+
+  !> What a step takes, of the parameters that move.
+  type :: step_space
+    real(dp), allocatable :: scaled(:), damped(:)                  !< normal equations, column by column
+    real(dp), allocatable :: length(:), step(:)
+    integer, allocatable :: moving(:)
+    real(dp), allocatable :: trial(:)                              !< of all parameters
+  end type step_space
 
 contains
 
@@ -92,29 +103,30 @@ contains
     integer(ip), intent(out) :: info
     type(form_sums), target :: sums
     type(evaluation) :: here, there
+    type(step_space) :: space
     real(dp) :: damping
     logical :: found
-    integer :: step, small
+    integer :: step, small, i
 
-    normal = 0.0_dp
-    descent = 0.0_dp
-    cost = 0.0_dp
     info = info_good
     call find_kernels(sums%kernels, found, info)
+    if (info == info_good) call prepare_search(size(x), here, there, space, info)
     if (info == info_good) call prepare(joint, forms, sums, info)
     if (info /= info_good) return
-    allocate (here%normal(size(x), size(x)), here%descent(size(x)), there%normal(size(x), size(x)), &
-              there%descent(size(x)))
     call hold_blas_threads()
-    where (is_free(limits, size(x))) x = min(max(x, limits%lower), limits%upper)
+    do i = 1, size(x)
+      if (i /= limits%held) x(i) = min(max(x(i), limits%lower(i)), limits%upper(i))
+    end do
     call evaluate(joint, sums, x, here)
     damping = first_damping
     small = 0
     do step = 1, limits%steps
-      call take_step(joint, sums, limits, damping, x, here, there, found)
+      call take_step(joint, sums, limits, damping, x, here, there, space, found)
       if (.not. found) exit
       small = merge(small + 1, 0, here%cost - there%cost <= limits%least_gain*max(1.0_dp, share_of_cost*there%cost))
-      here = there
+      here%cost = there%cost
+      here%normal(:, :) = there%normal
+      here%descent(:) = there%descent
       if (damping > least_lowered) damping = damping*lowered
       if (small == 2) exit
     end do
@@ -122,80 +134,95 @@ contains
     normal = here%normal
     descent = here%descent
     cost = here%cost
-    deallocate (sums%partial)
   end subroutine fit_diagonal_joint
 
-  pure function is_free(limits, p) result(free)
-    type(search_limits), intent(in) :: limits
-    integer, intent(in) :: p
-    logical :: free(p)
-    integer :: i
+  !> Memory of a search for n_par parameters.
+  subroutine prepare_search(n_par, here, there, space, info)
+    integer, intent(in) :: n_par
+    type(evaluation), intent(inout) :: here, there
+    type(step_space), intent(inout) :: space
+    integer(ip), intent(out) :: info
+    integer :: stat
 
-    free = [(i /= limits%held, i=1, p)]
-  end function is_free
+    allocate (here%normal(n_par, n_par), here%descent(n_par), there%normal(n_par, n_par), there%descent(n_par), &
+              space%scaled(n_par*n_par), space%damped(n_par*n_par), space%length(n_par), space%trial(n_par), &
+              space%step(n_par), space%moving(n_par), stat=stat)
+    info = info_good
+    if (stat /= 0) info = info_no_memory
+  end subroutine prepare_search
 
   !> One step to squares that are no larger, with as much damping as it takes.
   !> found   whether there is one; x and `there` are then what it leads to
-  subroutine take_step(joint, sums, limits, damping, x, here, there, found)
+  subroutine take_step(joint, sums, limits, damping, x, here, there, space, found)
     type(diagonal_joint), intent(in) :: joint
     type(form_sums), intent(inout) :: sums
     type(search_limits), intent(in) :: limits
     real(dp), intent(inout) :: damping, x(:)
     type(evaluation), intent(in) :: here
     type(evaluation), intent(inout) :: there
+    type(step_space), intent(inout) :: space
     logical, intent(out) :: found
-    real(dp) :: scaled(size(x), size(x)), length(size(x)), trial(size(x))
-    integer, allocatable :: moving(:)
-    logical :: moves(size(x)), solved
-    integer :: i
+    logical :: solved
+    integer :: n, i, j
 
     found = .false.
     if (.not. here%cost <= huge(1.0_dp)) return
-    moves = is_free(limits, size(x)) .and. .not. ((x <= limits%lower .and. here%descent < 0.0_dp) .or. &
-                                                  (x >= limits%upper .and. here%descent > 0.0_dp))
-    moving = pack([(i, i=1, size(x))], moves)
-    if (size(moving) == 0) return
+    n = 0
     do i = 1, size(x)
-      length(i) = sqrt(max(here%normal(i, i), tiny(1.0_dp)))
+      if (i == limits%held .or. (x(i) <= limits%lower(i) .and. here%descent(i) < 0.0_dp) .or. &
+          (x(i) >= limits%upper(i) .and. here%descent(i) > 0.0_dp)) cycle
+      n = n + 1
+      space%moving(n) = i
     end do
-    do i = 1, size(x)
-      scaled(:, i) = here%normal(:, i)/(length*length(i))
+    if (n == 0) return
+    do i = 1, n
+      space%length(i) = sqrt(max(here%normal(space%moving(i), space%moving(i)), tiny(1.0_dp)))
     end do
-    if (.not. all(abs(scaled(moving, moving)) <= huge(1.0_dp))) return
+    do i = 1, n
+      do j = 1, n
+        space%scaled((i - 1)*n + j) = here%normal(space%moving(j), space%moving(i))/(space%length(j)*space%length(i))
+      end do
+    end do
+    if (.not. all(abs(space%scaled(:n*n)) <= huge(1.0_dp))) return
     do while (damping <= largest_damping)
-      trial = x
-      call move(scaled(moving, moving), here%descent(moving)/length(moving), damping, length(moving), moving, trial, &
-                solved)
+      space%trial(:) = x
+      call move(n, here%descent, damping, space, solved)
       if (solved) then
-        where (moves) trial = min(max(trial, limits%lower), limits%upper)
-        call evaluate(joint, sums, trial, there)
+        do i = 1, n
+          associate (p => space%moving(i))
+            space%trial(p) = min(max(space%trial(p), limits%lower(p)), limits%upper(p))
+          end associate
+        end do
+        call evaluate(joint, sums, space%trial, there)
         found = there%cost <= here%cost + rounding*abs(here%cost)
       end if
       if (found) exit
       damping = max(raised*damping, least_raised)
     end do
-    if (found) x = trial
+    if (found) x = space%trial
   end subroutine take_step
 
-  !> The damped step of the parameters that move.
-  subroutine move(scaled, descent, damping, length, moving, trial, solved)
-    real(dp), intent(in) :: scaled(:, :), descent(:), damping, length(:)
-    integer, intent(in) :: moving(:)
-    real(dp), intent(inout) :: trial(:)
+  !> The damped step of the n parameters that move.
+  subroutine move(n, descent, damping, space, solved)
+    integer, intent(in) :: n
+    real(dp), intent(in) :: descent(:), damping
+    type(step_space), intent(inout) :: space
     logical, intent(out) :: solved
-    real(dp) :: damped(size(descent), size(descent)), step(size(descent), 1)
     integer(blas_ip) :: m, stat
     integer :: i
 
-    m = size(descent, kind=blas_ip)
-    damped = scaled
-    do i = 1, size(descent)
-      damped(i, i) = damped(i, i) + damping
+    m = int(n, blas_ip)
+    space%damped(:n*n) = space%scaled(:n*n)
+    do i = 1, n
+      space%damped((i - 1)*n + i) = space%damped((i - 1)*n + i) + damping
+      space%step(i) = descent(space%moving(i))/space%length(i)
     end do
-    step(:, 1) = descent
-    call dposv('U', m, 1_blas_ip, damped, m, step, m, stat, 1_c_size_t)
+    call dposv('U', m, 1_blas_ip, space%damped, m, space%step, m, stat, 1_c_size_t)
     solved = stat == 0
-    if (solved) trial(moving) = trial(moving) + step(:, 1)/length
+    if (.not. solved) return
+    do i = 1, n
+      space%trial(space%moving(i)) = space%trial(space%moving(i)) + space%step(i)/space%length(i)
+    end do
   end subroutine move
 
   !> Squares, normal equations and descent at some parameters; a cost that is not finite is +Inf.
@@ -204,7 +231,6 @@ contains
     type(form_sums), intent(inout) :: sums
     real(dp), intent(in) :: x(:)
     type(evaluation), intent(inout) :: at
-    real(dp) :: total(size(sums%partial, 2))
     integer :: k, i
 
     sums%joint = 0.0_dp
@@ -212,15 +238,15 @@ contains
       sums%joint(1 + joint%kind(k), joint%dof(k)) = x(k)
     end do
     call share(sums, size(sums%partial, 3, kind=long), sums%threads, even=.true.)
-    total = 0.0_dp
+    sums%total = 0.0_dp
     do k = 1, size(sums%partial, 3)
-      do i = 1, size(total)
-        total(i) = total(i) + sum(sums%partial(:, i, k))
+      do i = 1, size(sums%total)
+        sums%total(i) = sums%total(i) + sum(sums%partial(:, i, k))
       end do
     end do
-    at%cost = total(1)
+    at%cost = sums%total(1)
     if (.not. abs(at%cost) <= huge(1.0_dp)) at%cost = ieee_value(1.0_dp, ieee_positive_inf)
-    call assemble(joint, total, at%descent, at%normal)
+    call assemble(joint, sums%total, at%descent, at%normal)
   end subroutine evaluate
 
   !> Normal equations of the parameters from sums by DOFs.
@@ -267,11 +293,13 @@ contains
     n_shares = (sums%n_blocks + share_blocks - 1)/share_blocks
     length = int(2*lanes, long)*n_element*sums%n_blocks
     allocate (sums%room(length + lanes), sums%omega(lanes, sums%n_blocks), sums%squares(lanes, sums%n_blocks), &
-              sums%joint(3, n), sums%partial(lanes, n_sum, n_shares), stat=stat)
+              sums%joint(3, n), sums%total(n_sum), sums%place(2*n + n*n), &
+              sums%partial_room(int(lanes*n_sum, long)*n_shares), stat=stat)
     if (stat /= 0) then
       info = info_no_memory
       return
     end if
+    sums%partial(1:lanes, 1:n_sum, 1:n_shares) => sums%partial_room
     at = to_register(c_loc(sums%room))
     sums%x(1:lanes, 1:2, 1:n_element, 1:sums%n_blocks) => sums%room(at + 1:at + length)
     sums%threads = threads_for((30.0_dp*n + 20.0_dp*n*(n + 1))*n_freq, int(n_shares, long), serial_flops_lanes)
@@ -284,16 +312,18 @@ contains
     integer, intent(in) :: n, n_element
     type(form_sums), intent(inout) :: sums
     real(dp), pointer, contiguous :: c_joint(:, :, :), gradient(:, :, :), information(:, :, :)
-    integer :: element(n, n), triangle(n*n), b, first, n_lines, n_freq, i, j
+    integer :: b, first, n_lines, n_freq, i, j
 
     n_freq = size(forms%squares)
-    element = n_element
+    do i = 1, 2*n
+      sums%place(i) = i
+    end do
+    sums%place(2*n + 1:) = n_element
     do j = 1, n
       do i = 1, j
-        element(i, j) = 2*n + (j*(j - 1))/2 + i
+        sums%place(2*n + merge((i - 1)*n + j, (j - 1)*n + i, forms%transposed)) = 2*n + (j*(j - 1))/2 + i
       end do
     end do
-    triangle = in_memory(forms%transposed, element)
     call c_f_pointer(c_loc(forms%c_joint), c_joint, [2, n, n_freq])
     call c_f_pointer(c_loc(forms%gradient), gradient, [2, n, n_freq])
     call c_f_pointer(c_loc(forms%information), information, [2, n*n, n_freq])
@@ -301,9 +331,9 @@ contains
       first = (b - 1)*lanes + 1
       n_lines = min(lanes, n_freq - first + 1)
       associate (x => sums%x(:, :, :, b))
-        call sums%kernels%load(n, [(i, i=1, n)], first, n_lines, c_joint, x)
-        call sums%kernels%load(n, [(n + i, i=1, n)], first, n_lines, gradient, x)
-        call sums%kernels%load(n*n, triangle, first, n_lines, information, x)
+        call sums%kernels%load(n, sums%place(:n), first, n_lines, c_joint, x)
+        call sums%kernels%load(n, sums%place(n + 1:2*n), first, n_lines, gradient, x)
+        call sums%kernels%load(n*n, sums%place(2*n + 1:), first, n_lines, information, x)
         x(n_lines + 1:, :, n + 1:) = 0.0_dp
       end associate
       sums%omega(:, b) = forms%omega(first + n_lines - 1)

@@ -8,7 +8,7 @@ module jointfrf_dynamic_stiffness
   use jointfrf_caller_memory, only: caller_memory
   use jointfrf_elimination_plan, only: elimination_plan, make_plan
   use jointfrf_kinds, only: blas_ip, dp, ip
-  use jointfrf_lanes, only: element_space, in_memory, lane_kernels, lanes, largest_solved, padded, real_lines, &
+  use jointfrf_lanes, only: element_matrix, element_space, lane_kernels, lanes, largest_solved, padded, real_lines, &
     rows_in_memory
   use jointfrf_lapack, only: zgbcon, zgbtrf, zgbtrs
   use jointfrf_line_layout, only: all_finite, store
@@ -173,18 +173,24 @@ contains
     class(dynamic_stiffness), intent(inout) :: operation
     integer, intent(in) :: kl, ku
     logical, intent(in) :: retain_all
-    logical :: coupled(max(kl, ku), operation%n), is_output(operation%n), retained(operation%n), symmetric
-    integer :: reach
+    logical, allocatable :: coupled(:, :), is_output(:), retained(:)
+    logical :: symmetric
+    integer :: reach, stat
     real(dp) :: reference
 
     reach = max(kl, ku)
     if (size(operation%result) == 0 .or. reach >= largest_solved) return
+    allocate (coupled(reach, operation%n), is_output(operation%n), retained(operation%n), stat=stat)
+    operation%no_memory = stat /= 0
+    if (operation%no_memory) return
     call mark(operation%outputs, is_output)
     call mark(operation%inputs, retained)
-    retained = retained .or. is_output .or. retain_all
+    retained(:) = retained .or. is_output .or. retain_all
     if (count(retained) > largest_solved) return
-    call look_at_matrices(operation, reach, coupled, symmetric)
-    call make_plan(operation%n, coupled, retained, dofs_of(is_output), symmetric, operation%plan)
+    call look_at_matrices(operation, reach, coupled, symmetric, stat)
+    if (stat == 0) call plan_elimination(operation, coupled, retained, is_output, symmetric, stat)
+    operation%no_memory = stat /= 0
+    if (operation%no_memory) return
     associate (n_left => operation%plan%n_retained, n_in => size(operation%inputs))
       reference = real(operation%n, dp)*(real(kl, dp)*(kl + ku + 1) + real(n_in, dp)*(2*kl + ku + 1)) + n_left**2
       if (n_left > largest_solved .or. operation%plan%products > gain_of_lanes*reference) return
@@ -193,8 +199,28 @@ contains
     end associate
     call set_coefficients(operation)
     call set_places(operation)
-    call set_result(operation)
   end subroutine prepare_block
+
+  !> Wanted are the outputs, in ascending order.
+  subroutine plan_elimination(operation, coupled, retained, is_output, symmetric, stat)
+    class(dynamic_stiffness), intent(inout) :: operation
+    logical, contiguous, intent(in) :: coupled(:, :)
+    logical, intent(inout) :: retained(:)
+    logical, intent(in) :: is_output(:), symmetric
+    integer, intent(out) :: stat
+    integer, allocatable :: wanted(:)
+    integer :: i, j
+
+    allocate (wanted(count(is_output)), stat=stat)
+    if (stat /= 0) return
+    i = 0
+    do j = 1, size(is_output)
+      if (.not. is_output(j)) cycle
+      i = i + 1
+      wanted(i) = j
+    end do
+    call make_plan(operation%n, coupled, retained, wanted, symmetric, operation%plan, stat)
+  end subroutine plan_elimination
 
   !> The numbers of the plan's entries, scaled.
   subroutine set_coefficients(operation)
@@ -211,20 +237,24 @@ contains
   !> From the plan's square to the system that is solved, and its right-hand sides: a unit force at each input.
   subroutine set_places(operation)
     class(dynamic_stiffness), intent(inout) :: operation
-    integer :: whole(operation%plan%n_retained, operation%plan%n_retained + size(operation%inputs))
-    integer :: n_left, n_in, i, j, square
+    type(element_matrix) :: system, right
     type(element_space) :: room
+    integer :: n_left, n_in, i, j, square, stat
 
     n_left = operation%plan%n_retained
     n_in = size(operation%inputs)
     square = room%run(operation%plan%n_slots**2)
-    whole = room%system(n_left, n_in, operation%system_before)
-    operation%n_element = room%taken
-    operation%to = in_memory(.true., whole(:, :n_left))
-    operation%rhs = in_memory(.true., whole(:, n_left + 1:))
-    allocate (operation%from(n_left**2))
-    allocate (operation%row_of(operation%n), source=0)
-    allocate (operation%forces(n_left*n_in), source=(0.0_dp, 0.0_dp))
+    call room%system(n_left, n_in, operation%system_before, system, right)
+    call room%in_memory(.true., system, operation%to)
+    call room%in_memory(.true., right, operation%rhs)
+    call room%new_list(n_left**2, operation%from)
+    call room%new_list(operation%n, operation%row_of)
+    call room%new_values(n_left*n_in, operation%forces)
+    allocate (operation%result_scale(size(operation%result, 1), size(operation%result, 2)), stat=stat)
+    room%no_memory = room%no_memory .or. stat /= 0
+    call operation%lies_in(room, n_left + size(operation%outputs)*(1 + n_in))
+    if (room%no_memory) return
+    operation%row_of = 0
     do i = 1, n_left
       do j = 1, n_left
         operation%from((i - 1)*n_left + j) = square + element(operation%plan, i, j)
@@ -234,6 +264,7 @@ contains
       end do
       operation%row_of(operation%plan%unknown(i)) = i
     end do
+    call set_result(operation)
   end subroutine set_places
 
   !> The caller's result as numbers to be stored, and the scale of each entry.
@@ -241,7 +272,6 @@ contains
     class(dynamic_stiffness), intent(inout) :: operation
     integer :: i, j
 
-    allocate (operation%result_scale(size(operation%result, 1), size(operation%result, 2)))
     do j = 1, size(operation%result, 2)
       do i = 1, size(operation%result, 1)
         if (operation%transposed) then
@@ -276,32 +306,22 @@ contains
     end do
   end subroutine mark
 
-  !> The DOFs that are marked, ascending.
-  pure function dofs_of(named) result(dofs)
-    logical, intent(in) :: named(:)
-    integer :: dofs(count(named))
-    integer :: i, j
-
-    i = 0
-    do j = 1, size(named)
-      if (.not. named(j)) cycle
-      i = i + 1
-      dofs(i) = j
-    end do
-  end function dofs_of
-
   !> Which DOFs are coupled, whether the matrices are symmetric, their norms, and the scale of each DOF.
-  subroutine look_at_matrices(operation, reach, coupled, symmetric)
+  subroutine look_at_matrices(operation, reach, coupled, symmetric, stat)
     class(dynamic_stiffness), intent(inout) :: operation
     integer, intent(in) :: reach
     logical, intent(out) :: coupled(reach, operation%n)
     logical, intent(out) :: symmetric
-    real(dp) :: above(4), below(4), sums(4, operation%n), omega, size_of_z
+    integer, intent(out) :: stat
+    real(dp), allocatable :: sums(:, :)
+    real(dp) :: above(4), below(4), omega, size_of_z
     integer :: i, j, d
 
     coupled = .false.
-    allocate (operation%scale(operation%n), source=1.0_dp)
     symmetric = .true.
+    allocate (operation%scale(operation%n), sums(4, operation%n), stat=stat)
+    if (stat /= 0) return
+    operation%scale = 1.0_dp
     omega = maxval(operation%omega, mask=abs(operation%omega) <= huge(1.0_dp))
     sums = 0
     do j = 1, operation%n
@@ -367,8 +387,7 @@ contains
     integer(ip), intent(out) :: line_info(n_lines)
     real(dp), intent(out) :: rcond(n_lines)
     real(dp) :: omega(lanes), smallest(lanes), rcond_lanes(lanes), total(lanes), norm, largest
-    integer :: n_left, n_in, last, l
-    integer :: row(self%plan%n_retained), place(size(self%result_scale))
+    integer :: n_left, n_in, n_out, last, l
 
     n_left = self%plan%n_retained
     n_in = size(self%inputs)
@@ -379,10 +398,17 @@ contains
     call kernels%eliminate(self%plan, omega, space%x, smallest)
     call kernels%copy(n_left**2, 1.0_dp, self%from, self%to, space%x)
     call kernels%fill(n_left*n_in, self%forces, self%rhs, space%x)
-    call kernels%solve(n_left, n_in, self%n_wanted, self%system_before, space%x, space%hint, row, rcond_lanes)  ! (2.28)
-    call rows_in_memory(self%transposed, row(self%row_of(self%outputs)), n_in, place)
-    call kernels%total(size(place), place, space%x, total)
-    call kernels%store(size(place), place, first, n_lines, space%x, self%result_pairs)
+    n_out = size(self%outputs)
+    associate (row => space%list(:n_left), wanted => space%list(n_left + 1:n_left + n_out), &
+               place => space%list(n_left + n_out + 1:))
+      call kernels%solve(n_left, n_in, self%n_wanted, self%system_before, space%x, space%hint, row, rcond_lanes)  ! (2.28)
+      do l = 1, n_out
+        wanted(l) = row(self%row_of(self%outputs(l)))
+      end do
+      call rows_in_memory(self%transposed, wanted, n_in, place)
+      call kernels%total(n_out*n_in, place, space%x, total)
+      call kernels%store(n_out*n_in, place, first, n_lines, space%x, self%result_pairs)
+    end associate
     do l = 1, n_lines
       self%result(:, :, first + l - 1) = self%result(:, :, first + l - 1)*self%result_scale
       largest = largest_sum(self%transposed, self%result(:, :, first + l - 1))

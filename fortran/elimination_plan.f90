@@ -15,7 +15,7 @@
 !>
 !> With n unknowns, a reach b of the band and m unknowns coupled with a pivot (m <= 2 b + retained ones), the second and
 !> third step cost O(n (b + m)), the fourth O(n m^2): in all in proportion to the multiplications of one line. Memory:
-!> the lists, one item a number that is touched, and the square.
+!> the lists, one item a number that is touched, and the square. Where there is not enough of it, `stat` is not 0.
 module jointfrf_elimination_plan
   use jointfrf_kinds, only: dp
   implicit none
@@ -53,39 +53,48 @@ contains
   !> retained    whether an unknown is not to be eliminated; on return also those that cut the structure in parts
   !> wanted      retained unknowns that shall have the last slots, in this order
   !> symmetric   whether the matrix is
-  subroutine make_plan(n, coupled, retained, wanted, symmetric, plan)
+  !> stat        not 0 where there is no memory
+  subroutine make_plan(n, coupled, retained, wanted, symmetric, plan, stat)
     integer, intent(in) :: n, wanted(:)
     logical, contiguous, intent(in) :: coupled(:, :)
     logical, intent(inout) :: retained(n)
     logical, intent(in) :: symmetric
     type(elimination_plan), intent(out) :: plan
+    integer, intent(out) :: stat
     type(elimination_structure) :: structure
-    integer, allocatable :: order(:), slot_of(:)
+    integer, allocatable :: order(:), slot_of(:), part(:), work(:)
 
-    allocate (order(n))
-    allocate (slot_of(n), source=0)
+    allocate (order(n), slot_of(n), part(n), work(4*n), stat=stat)
+    if (stat /= 0) return
+    slot_of = 0
     plan%symmetric = symmetric
-    call add_separators(n, coupled, retained)
-    call set_slots(wanted, retained, slot_of, plan)
-    call find_order(n, coupled, retained, order, plan%n_steps)
-    call find_structure(n, coupled, order(:plan%n_steps), structure)
-    call assign_slots(order(:plan%n_steps), structure, slot_of, plan)
-    call list_elements(coupled, order(:plan%n_steps), structure, slot_of, plan)
-    allocate (plan%coefficient(4, plan%last_entry(plan%n_steps + 2)), source=0.0_dp)
+    if (.not. all(retained)) call add_separators(n, coupled, retained, part, stat)
+    if (stat == 0) call set_slots(wanted, retained, slot_of, plan, stat)
+    if (stat /= 0) return
+    call find_order(n, coupled, retained, part, work, order, plan%n_steps)
+    call find_structure(n, coupled, order(:plan%n_steps), work(:n), work(n + 1:2*n), work(2*n + 1:3*n), work(3*n + 1:), &
+                        structure, stat)
+    if (stat == 0) call assign_slots(order(:plan%n_steps), structure, slot_of, work(:n), work(n + 1:2*n), plan, stat)
+    if (stat == 0) call list_elements(coupled, order(:plan%n_steps), structure, slot_of, plan, stat)
+    if (stat == 0) allocate (plan%coefficient(4, plan%last_entry(plan%n_steps + 2)), stat=stat)
+    if (stat == 0) plan%coefficient = 0.0_dp
   end subroutine make_plan
 
   !> Symbolic elimination. A pivot is coupled with what the matrix couples it with, and with what those unknowns were
   !> coupled with that found it as their first neighbour to be eliminated: its children in the elimination tree.
   !> order   the unknowns to be eliminated, shape (n_steps)
-  subroutine find_structure(n, coupled, order, structure)
+  !> step_of, seen_by, first_child, next_child   workspace
+  subroutine find_structure(n, coupled, order, step_of, seen_by, first_child, next_child, structure, stat)
     integer, intent(in) :: n, order(:)
     logical, contiguous, intent(in) :: coupled(:, :)
+    integer, intent(out) :: step_of(n), seen_by(n), first_child(n), next_child(n)
     type(elimination_structure), intent(out) :: structure
-    integer :: step_of(n), seen_by(n), first_child(n), next_child(size(order))
+    integer, intent(out) :: stat
     integer :: s, p, j, e, child, parent
 
-    allocate (structure%last(size(order) + 1), source=0)
-    allocate (structure%unknown(size(coupled)))
+    allocate (structure%last(size(order) + 1), structure%unknown(size(coupled)), stat=stat)
+    if (stat /= 0) return
+    structure%last = 0
     step_of = huge(1)                                     ! retained unknowns come after all others
     do s = 1, size(order)
       step_of(order(s)) = s
@@ -106,9 +115,13 @@ contains
         end do
         child = next_child(child)
       end do
+      if (stat /= 0) return
       associate (near => structure%unknown(structure%last(s) + 1:structure%last(s + 1)))
         if (size(near) == 0) cycle
-        parent = near(minloc(step_of(near), dim=1))
+        parent = near(1)
+        do e = 2, size(near)
+          if (step_of(near(e)) < step_of(parent)) parent = near(e)
+        end do
       end associate
       next_child(s) = first_child(parent)
       first_child(parent) = s
@@ -122,26 +135,31 @@ contains
 
       if (seen_by(unknown) == s .or. step_of(unknown) <= s) return
       seen_by(unknown) = s
-      call append(structure%unknown, structure%last(s + 1), unknown)
+      call append(structure%unknown, structure%last(s + 1), unknown, stat)
     end subroutine add
   end subroutine find_structure
 
   !> Slots of the unknowns while they are worked on: the first that is free when an unknown is first needed. The
   !> unknowns of each step of the structure are put into the order of their slots.
-  !> slot_of   the slot of each unknown, 0 where it has none yet
-  subroutine assign_slots(order, structure, slot_of, plan)
+  !> slot_of     the slot of each unknown, 0 where it has none yet
+  !> in_slot     workspace: its unknown, 0 for a free slot
+  !> needed_in   workspace: the last step that needs a slot
+  subroutine assign_slots(order, structure, slot_of, in_slot, needed_in, plan, stat)
     integer, intent(in) :: order(:)
     type(elimination_structure), intent(inout) :: structure
     integer, intent(inout) :: slot_of(:)
+    integer, intent(out) :: in_slot(:), needed_in(:)
     type(elimination_plan), intent(inout) :: plan
-    integer :: in_slot(size(slot_of)), needed_in(size(slot_of))    ! its unknown, 0 for a free slot; the last step
+    integer, intent(out) :: stat
     integer :: s, e, m, slot
 
     in_slot = 0
     in_slot(:plan%n_retained) = plan%unknown
     needed_in = 0
     plan%n_slots = plan%n_retained
-    allocate (plan%pivot(plan%n_steps))
+    allocate (plan%pivot(plan%n_steps), plan%last_near(plan%n_steps + 1), plan%near(structure%last(plan%n_steps + 1)), &
+              stat=stat)
+    if (stat /= 0) return
     do s = 1, plan%n_steps
       call take_slot(order(s))
       do e = structure%last(s) + 1, structure%last(s + 1)
@@ -159,9 +177,10 @@ contains
       m = structure%last(s + 1) - structure%last(s)
       plan%products = plan%products + merge((m*(m + 1))/2, m*m, plan%symmetric)
     end do
-    allocate (plan%last_near(plan%n_steps + 1), plan%near(structure%last(plan%n_steps + 1)))
     plan%last_near(:) = structure%last
-    plan%near(:) = slot_of(structure%unknown(:size(plan%near)))
+    do e = 1, size(plan%near)
+      plan%near(e) = slot_of(structure%unknown(e))
+    end do
 
   contains
 
@@ -177,17 +196,22 @@ contains
 
   !> What elements of the square begin with, in the step that needs them first; after the last step come those of
   !> retained unknowns that no step has touched.
-  subroutine list_elements(coupled, order, structure, slot_of, plan)
+  subroutine list_elements(coupled, order, structure, slot_of, plan, stat)
     logical, contiguous, intent(in) :: coupled(:, :)
     integer, intent(in) :: order(:), slot_of(:)
     type(elimination_structure), intent(in) :: structure
     type(elimination_plan), intent(inout) :: plan
-    logical :: begun(plan%n_slots, plan%n_slots)          ! pairs of slots that hold a number
+    integer, intent(out) :: stat
+    logical, allocatable :: begun(:, :)                   ! pairs of slots that hold a number
     integer :: s, i, j
 
+    allocate (begun(plan%n_slots, plan%n_slots), plan%last_zero(plan%n_steps + 2), plan%last_entry(plan%n_steps + 2), &
+              plan%zero(size(coupled)), plan%entry(size(coupled)), plan%row(size(coupled)), plan%column(size(coupled)), &
+              stat=stat)
+    if (stat /= 0) return
     begun = .false.
-    allocate (plan%last_zero(plan%n_steps + 2), plan%last_entry(plan%n_steps + 2), source=0)
-    allocate (plan%zero(size(coupled)), plan%entry(size(coupled)), plan%row(size(coupled)), plan%column(size(coupled)))
+    plan%last_zero = 0
+    plan%last_entry = 0
     do s = 1, plan%n_steps + 1
       plan%last_zero(s + 1) = plan%last_zero(s)
       plan%last_entry(s + 1) = plan%last_entry(s)
@@ -234,12 +258,12 @@ contains
       element = (slot_of(row) - 1)*plan%n_slots + slot_of(column)
       if (row == column .or. are_coupled(coupled, row, column)) then
         used = plan%last_entry(s + 1)
-        call append(plan%row, used, row)
+        call append(plan%row, used, row, stat)
         used = plan%last_entry(s + 1)
-        call append(plan%column, used, column)
-        call append(plan%entry, plan%last_entry(s + 1), element)
+        call append(plan%column, used, column, stat)
+        call append(plan%entry, plan%last_entry(s + 1), element, stat)
       else
-        call append(plan%zero, plan%last_zero(s + 1), element)
+        call append(plan%zero, plan%last_zero(s + 1), element, stat)
       end if
     end subroutine begin_one
   end subroutine list_elements
@@ -255,15 +279,17 @@ contains
   end function are_coupled
 
   !> Slots of the retained unknowns: the wanted ones last.
-  subroutine set_slots(wanted, retained, slot_of, plan)
+  subroutine set_slots(wanted, retained, slot_of, plan, stat)
     integer, intent(in) :: wanted(:)
     logical, intent(in) :: retained(:)
     integer, intent(inout) :: slot_of(:)
     type(elimination_plan), intent(inout) :: plan
+    integer, intent(out) :: stat
     integer :: j, slot
 
     plan%n_retained = count(retained)
-    allocate (plan%unknown(plan%n_retained))
+    allocate (plan%unknown(plan%n_retained), stat=stat)
+    if (stat /= 0) return
     slot = plan%n_retained - size(wanted)
     do j = 1, size(wanted)
       slot_of(wanted(j)) = slot + j
@@ -279,15 +305,18 @@ contains
     end do
   end subroutine set_slots
 
-  !> Append to a list of which `used` items are used; it grows.
-  subroutine append(list, used, item)
+  !> Append to a list of which `used` items are used; it grows. Nothing is done where there was no memory before.
+  subroutine append(list, used, item, stat)
     integer, allocatable, intent(inout) :: list(:)
     integer, intent(inout) :: used
     integer, intent(in) :: item
+    integer, intent(inout) :: stat
     integer, allocatable :: longer(:)
 
+    if (stat /= 0) return
     if (used == size(list)) then
-      allocate (longer(2*size(list) + 16))
+      allocate (longer(2*size(list) + 16), stat=stat)
+      if (stat /= 0) return
       longer(:used) = list
       call move_alloc(longer, list)
     end if
@@ -297,18 +326,19 @@ contains
 
   !> Retain also unknowns that cut the structure in two beside each group of retained ones, so that what lies between
   !> two groups is coupled with these two groups only.
-  subroutine add_separators(n, coupled, retained)
+  !> part   workspace
+  subroutine add_separators(n, coupled, retained, part, stat)
     integer, intent(in) :: n
     logical, contiguous, intent(in) :: coupled(:, :)
     logical, intent(inout) :: retained(n)
-    logical :: given(n)
-    integer, allocatable :: part(:)
+    integer, intent(out) :: part(n), stat
+    logical, allocatable :: given(:)
     integer :: at, cut, best, fewest, more, j
 
-    if (all(retained)) return
-    allocate (part(n))
+    allocate (given(n), stat=stat)
+    if (stat /= 0) return
     call find_parts(n, coupled, part)
-    given = retained
+    given(:) = retained
     do at = 1, n
       if (.not. given(at)) cycle
       fewest = huge(1)
@@ -390,12 +420,13 @@ contains
   end subroutine find_parts
 
   !> Unknowns to eliminate: ascending up to the last retained one of their part, then the others descending.
-  subroutine find_order(n, coupled, retained, order, n_steps)
+  !> part, last   workspace
+  subroutine find_order(n, coupled, retained, part, last, order, n_steps)
     integer, intent(in) :: n
     logical, contiguous, intent(in) :: coupled(:, :)
     logical, intent(in) :: retained(n)
-    integer, intent(out) :: order(n), n_steps
-    integer :: part(n), last(n), j
+    integer, intent(out) :: part(n), last(n), order(n), n_steps
+    integer :: j
 
     call find_parts(n, coupled, part)
     last = 0

@@ -3,7 +3,7 @@
 !> The choice is one number for the whole process: that of the environment variable JOINTFRF_ENGINE when the kernel is
 !> first used, until `set_engine` is called. JF_X86 is set by the build where the lane kernels of x86-64 exist.
 module jointfrf_engine
-  use, intrinsic :: iso_c_binding, only: c_int
+  use, intrinsic :: iso_c_binding, only: c_char, c_int
   use jointfrf_kinds, only: ip
   use jointfrf_lanes, only: lane_kernels
   use jointfrf_lane_kernels_plain, only: set_plain => set_kernels
@@ -43,6 +43,14 @@ module jointfrf_engine
       implicit none
       integer(c_int) :: level
     end function cpu_level
+
+    !> JOINTFRF_ENGINE, padded with blanks, which it is where it is not set; question marks where it is longer.
+    subroutine read_engine(length, word) bind(C, name='jointfrf_read_engine')
+      import :: c_char, c_int
+      implicit none
+      integer(c_int), value :: length
+      character(kind=c_char), intent(out) :: word(*)
+    end subroutine read_engine
   end interface
 
 contains
@@ -134,13 +142,10 @@ contains
   function from_environment() result(engine)
     integer(ip) :: engine
     character(len=16) :: word
-    integer :: stat
 
-    call get_environment_variable('JOINTFRF_ENGINE', word, status=stat)
+    call read_engine(len(word, kind=c_int), word)
     engine = engine_automatic
-    if (stat == 1 .or. (stat == 0 .and. word == '')) return        ! not there, or empty
-    engine = unknown
-    if (stat /= 0) return
+    if (word == '') return
     engine = findloc(names, word, dim=1, kind=ip) - 1_ip
     if (.not. available(engine)) engine = unknown
   end function from_environment

@@ -2,10 +2,10 @@
 module jointfrf_finite_difference
   use jointfrf_caller_memory, only: caller_memory
   use jointfrf_kinds, only: dp, ip
-  use jointfrf_lanes, only: has_weight, lane_kernels, lanes, real_lines, rows_of_columns, sparse_rows
+  use jointfrf_lanes, only: find_rows, has_weight, lane_kernels, lanes, real_lines, sparse_rows
   use jointfrf_line_layout, only: all_finite, load, load_real, store
   use jointfrf_lines_lapack, only: product_line
-  use jointfrf_status, only: line_good, line_not_finite, line_overflow
+  use jointfrf_status, only: info_no_memory, line_good, line_not_finite, line_overflow
   use jointfrf_sweep, only: line_operation, line_space, long_block, run_sweep, worth_a_plan
   implicit none
   private
@@ -67,11 +67,16 @@ contains
     integer(ip), contiguous, intent(out) :: line_info(:)
     real(dp), contiguous, intent(out) :: rcond(:)
     integer(ip), intent(out) :: info
-    real(dp), target :: weights(2, size(offset)), weights_transposed(size(offset), 2)
+    real(dp), allocatable, target :: weights(:, :), weights_transposed(:, :)
+    integer :: stat
 
+    info = info_no_memory
+    allocate (weights(2, size(offset)), weights_transposed(size(offset), 2), stat=stat)
+    if (stat /= 0) return
     call difference_weights(offset, weights)
     if (transposed) then
-      weights_transposed = transpose(weights)
+      weights_transposed(:, 1) = weights(1, :)
+      weights_transposed(:, 2) = weights(2, :)
       call transform_receptance(.true., h, weights_transposed, weights_transposed, h_new, line_info, rcond, info)
     else
       call transform_receptance(.false., h, weights, weights, h_new, line_info, rcond, info)
@@ -113,19 +118,23 @@ contains
 
   subroutine plan_transformation(operation)
     type(transformation), intent(inout) :: operation
+    integer :: stat
 
     operation%h_pairs => real_lines(operation%h)
     operation%new_pairs => real_lines(operation%result)
     call operation%reads(operation%h_pairs)
     if (operation%transposed) then
-      operation%slow = weights_of_columns(operation%t_out)
-      operation%fast = weights_of_columns(operation%t_in)
+      call find_weights(operation%t_out, .true., operation%slow, stat)
+      if (stat == 0) call find_weights(operation%t_in, .true., operation%fast, stat)
     else
-      operation%slow = weights_of_columns(transpose(operation%t_in))
-      operation%fast = weights_of_columns(transpose(operation%t_out))
+      call find_weights(operation%t_in, .false., operation%slow, stat)
+      if (stat == 0) call find_weights(operation%t_out, .false., operation%fast, stat)
     end if
-    if (size(operation%slow%weight)*size(operation%fast%weight) <= few_products) &
-      operation%both = both_at_once(operation%transposed, operation%slow, operation%fast, size(operation%h, 1))
+    if (stat == 0) then
+      if (size(operation%slow%weight)*size(operation%fast%weight) <= few_products) &
+        call multiply(operation%transposed, operation%slow, operation%fast, size(operation%h, 1), operation%both, stat)
+    end if
+    operation%no_memory = stat /= 0
     operation%block_lines = long_block
     operation%n_element = 1
   end subroutine plan_transformation
@@ -133,16 +142,18 @@ contains
   !> The entries of a line made of those of the line before, in one step.
   !> slow_is_out   whether the slow index counts responses: terms are summed response by response
   !> m_fast        numbers side by side in memory
-  function both_at_once(slow_is_out, slow, fast, m_fast) result(rows)
+  subroutine multiply(slow_is_out, slow, fast, m_fast, rows, stat)
     logical, intent(in) :: slow_is_out
     type(sparse_rows), intent(in) :: slow, fast
     integer, intent(in) :: m_fast
-    type(sparse_rows) :: rows
+    type(sparse_rows), intent(out) :: rows
+    integer, intent(out) :: stat
     integer :: i, j, k, s, t
 
-    rows%n = slow%n*fast%n
     k = size(slow%weight)*size(fast%weight)
-    allocate (rows%start(rows%n + 1), rows%from(k), rows%weight(k))
+    allocate (rows%start(slow%n*fast%n + 1), rows%from(k), rows%weight(k), stat=stat)
+    if (stat /= 0) return
+    rows%n = slow%n*fast%n
     k = 1
     do i = 1, slow%n
       do j = 1, fast%n
@@ -172,21 +183,30 @@ contains
       rows%weight(k) = slow%weight(s)*fast%weight(t)
       k = k + 1
     end subroutine add_product
-  end function both_at_once
+  end subroutine multiply
 
-  !> The columns of a matrix as the kernels take them: what is not zero, and where that is much of it, all.
-  pure function weights_of_columns(t) result(rows)
+  !> The rows of a matrix, or its columns, as the kernels take them: what is not zero, and where that is much of it, all.
+  subroutine find_weights(t, by_columns, rows, stat)
     real(dp), intent(in) :: t(:, :)
-    type(sparse_rows) :: rows
+    logical, intent(in) :: by_columns
+    type(sparse_rows), intent(out) :: rows
+    integer, intent(out) :: stat
     integer :: j
 
-    rows = rows_of_columns(t)
+    call find_rows(1.0_dp, t, by_columns, rows, stat)
+    if (stat /= 0) return
     if (size(rows%weight) < full_share*size(t)) return
-    allocate (rows%full(lanes, size(t, 1), (rows%n - 1)/lanes + 1), source=0.0_dp)
+    allocate (rows%full(lanes, size(t)/rows%n, (rows%n - 1)/lanes + 1), stat=stat)
+    if (stat /= 0) return
+    rows%full = 0.0_dp
     do j = 1, rows%n
-      rows%full(mod(j - 1, lanes) + 1, :, (j - 1)/lanes + 1) = t(:, j)
+      if (by_columns) then
+        rows%full(mod(j - 1, lanes) + 1, :, (j - 1)/lanes + 1) = t(:, j)
+      else
+        rows%full(mod(j - 1, lanes) + 1, :, (j - 1)/lanes + 1) = t(j, :)
+      end if
     end do
-  end function weights_of_columns
+  end subroutine find_weights
 
   subroutine transform_block(self, kernels, first, n_lines, space, line_info, rcond)
     class(transformation), intent(in) :: self

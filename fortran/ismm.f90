@@ -2,8 +2,8 @@
 module jointfrf_ismm
   use jointfrf_caller_memory, only: caller_memory
   use jointfrf_kinds, only: dp, ip
-  use jointfrf_lanes, only: element_space, in_memory, lane_kernels, lanes, largest_in_lanes, padded, real_lines, &
-    row_starts, rows_in_memory, worse_of
+  use jointfrf_lanes, only: element_matrix, element_space, lane_kernels, lanes, largest_in_lanes, padded, real_lines, &
+    rows_in_memory, worse_of
   use jointfrf_line_layout, only: all_finite, load, store, subtract, take_block
   use jointfrf_lines_lapack, only: product_line, room_to_solve, solve_line
   use jointfrf_status, only: line_good, line_not_finite, line_overflow
@@ -23,7 +23,7 @@ module jointfrf_ismm
     integer, allocatable :: difference(:)          !< alpha - gamma
     integer, allocatable :: joint(:)               !< K0, then K*
     integer, allocatable :: unit(:)                !< right-hand sides E_k, row by row
-    complex(dp), allocatable :: unit_value(:)      !< E_k, or zeros
+    complex(dp), allocatable :: unit_value(:), zero(:)    !< E_k, and zeros
     integer, allocatable :: difference_row(:), w_row(:)   !< the element before each row
     integer, allocatable :: joint_row(:)           !< where alpha and gamma are inverted as a whole
     integer, allocatable :: columns_k(:), columns_k_row(:)   !< columns k of gamma^-1 then, row by row
@@ -97,9 +97,9 @@ contains
 
   subroutine plan_identification(operation)
     type(identification), intent(inout) :: operation
-    integer :: of_alpha(2*operation%n, 3*operation%n), of_gamma(2*operation%n, 3*operation%n)
-    integer :: difference(2*operation%n, 2*operation%n), joint(operation%n, operation%n), n, m
+    type(element_matrix) :: alpha, w, gamma, unit, difference, joint
     type(element_space) :: room
+    integer :: n, m
 
     n = operation%n
     m = 2*n
@@ -118,56 +118,57 @@ contains
       call plan_inversions(operation)
       return
     end if
-    of_gamma = room%system(m, n, operation%plan%gamma_before)
-    of_alpha = room%system(m, n, operation%plan%alpha_before)
+    call room%system(m, n, operation%plan%gamma_before, gamma, unit)
+    call room%system(m, n, operation%plan%alpha_before, alpha, w)
+    alpha%turn = n
     difference = room%matrix(m, m)
     joint = room%matrix(n, n)
-    operation%n_element = room%taken
     operation%n_hint = 2*padded(m)
     associate (plan => operation%plan)
-      plan%gamma_place = in_memory(operation%transposed, of_gamma(:, :m))
-      plan%alpha_place = in_memory(operation%transposed, of_alpha(:, cshift(row_numbers(m), n)))
-      plan%difference = in_memory(operation%transposed, difference)
-      plan%joint = in_memory(operation%transposed, joint)
-      plan%unit = in_memory(.true., of_gamma(:, m + 1:))
-      plan%unit_value = unit_block(m, n)
-      plan%w = in_memory(.true., of_alpha(:, m + 1:))
-      plan%difference_row = row_starts(difference)
-      plan%w_row = row_starts(of_alpha(:, m + 1:))
+      call room%in_memory(operation%transposed, gamma, plan%gamma_place)
+      call room%in_memory(operation%transposed, alpha, plan%alpha_place)
+      call room%in_memory(operation%transposed, difference, plan%difference)
+      call room%in_memory(operation%transposed, joint, plan%joint)
+      call room%in_memory(.true., unit, plan%unit)
+      call unit_block(1.0_dp, m, n, room, plan%unit_value)
+      call room%new_values(m*n, plan%zero)
+      call room%in_memory(.true., w, plan%w)
+      call room%row_starts(difference, plan%difference_row)
+      call room%row_starts(w, plan%w_row)
     end associate
+    call operation%lies_in(room, 2*m + n*n)
   end subroutine plan_identification
 
   !> Small matrices are inverted as a whole.
   subroutine plan_inversions(operation)
     type(identification), intent(inout) :: operation
-    integer :: gamma(2*operation%n, 2*operation%n), alpha(2*operation%n, 2*operation%n)
-    integer :: difference(2*operation%n, 2*operation%n), columns_k(2*operation%n, operation%n)
-    integer :: w(2*operation%n, operation%n), joint(operation%n, operation%n), n, m
+    type(element_matrix) :: gamma, alpha, difference, columns_k, w, joint
     type(element_space) :: room
+    integer :: n, m
 
     n = operation%n
     m = 2*n
-    gamma = room%system(m, 0, operation%plan%gamma_before)
-    alpha = room%system(m, 0, operation%plan%alpha_before)
+    call room%system(m, 0, operation%plan%gamma_before, gamma)
+    call room%system(m, 0, operation%plan%alpha_before, alpha)
     difference = room%matrix(m, m)
     columns_k = room%matrix(m, n)
     w = room%matrix(m, n)
     joint = room%matrix(n, n)
-    operation%n_element = room%taken
     operation%n_hint = 2*m
     associate (plan => operation%plan)
-      plan%gamma_place = in_memory(operation%transposed, gamma)
-      plan%alpha_place = in_memory(operation%transposed, alpha)
-      plan%difference = in_memory(operation%transposed, difference)
-      plan%joint = in_memory(operation%transposed, joint)
-      plan%columns_k = in_memory(.true., columns_k)
-      plan%w = in_memory(.true., w)
-      allocate (plan%unit_value(m*n), source=(0.0_dp, 0.0_dp))
-      plan%difference_row = row_starts(difference)
-      plan%columns_k_row = row_starts(columns_k)
-      plan%w_row = row_starts(w)
-      plan%joint_row = row_starts(joint)
+      call room%in_memory(operation%transposed, gamma, plan%gamma_place)
+      call room%in_memory(operation%transposed, alpha, plan%alpha_place)
+      call room%in_memory(operation%transposed, difference, plan%difference)
+      call room%in_memory(operation%transposed, joint, plan%joint)
+      call room%in_memory(.true., columns_k, plan%columns_k)
+      call room%in_memory(.true., w, plan%w)
+      call room%new_values(m*n, plan%zero)
+      call room%row_starts(difference, plan%difference_row)
+      call room%row_starts(columns_k, plan%columns_k_row)
+      call room%row_starts(w, plan%w_row)
+      call room%row_starts(joint, plan%joint_row)
     end associate
+    call operation%lies_in(room, 0)
   end subroutine plan_inversions
 
   !> `identify_block` for two and three joint DOFs.
@@ -179,8 +180,8 @@ contains
     integer(ip), intent(out) :: line_info(n_lines)
     real(dp), intent(out) :: rcond(n_lines)
     real(dp) :: rcond_alpha(lanes), rcond_gamma(lanes), total(lanes)
-    integer :: gamma_inverse(2*self%n, 2*self%n), alpha_inverse(2*self%n, 2*self%n)   ! where (column, row) lies
-    integer :: columns_k(2*self%n**2), row(self%n), w_row(2*self%n), n, m
+    integer, dimension(2*self%n, 2*self%n) :: gamma_inverse, alpha_inverse            ! where (column, row) lies; small
+    integer :: columns_k(2*self%n**2), row(self%n), w_row(2*self%n), n, m, i
 
     n = self%n
     m = 2*n
@@ -191,9 +192,11 @@ contains
       call kernels%combine(m*m, 1.0_dp, plan%alpha_place, -1.0_dp, plan%gamma_place, plan%difference, x)
       call kernels%invert(m, plan%gamma_before, x, space%hint(:m), gamma_inverse, rcond_gamma, space%ahead)
       call kernels%invert(m, plan%alpha_before, x, space%hint(m + 1:), alpha_inverse, rcond_alpha)
-      columns_k = reshape(gamma_inverse(n + 1:, :), [m*n])
+      do i = 1, m
+        columns_k((i - 1)*n + 1:i*n) = gamma_inverse(n + 1:, i)
+      end do
       call kernels%copy(m*n, 1.0_dp, columns_k, plan%columns_k, x)
-      call kernels%fill(m*n, plan%unit_value, plan%w, x)
+      call kernels%fill(m*n, plan%zero, plan%w, x)
       call kernels%product(m, n, m, 1.0_dp, plan%difference_row, plan%columns_k_row, plan%w_row, x)
       call rows_as_they_lie(alpha_inverse, plan%w_row, row, w_row)
       call kernels%product(n, n, m, -1.0_dp, row, w_row, plan%joint_row, x)   ! (2.47), (2.48)
@@ -231,7 +234,7 @@ contains
     integer(ip), intent(out) :: line_info(n_lines)
     real(dp), intent(out) :: rcond(n_lines)
     real(dp) :: rcond_alpha(lanes), rcond_gamma(lanes), total(lanes)
-    integer :: x_row(2*self%n), y_row(2*self%n), y(self%n**2), n, m
+    integer :: n, m
 
     if (self%n == 1) then
       call kernels%identify_lines(self%transposed, first, n_lines, self%plan%alpha, self%plan%gamma, &
@@ -244,14 +247,15 @@ contains
     end if
     n = self%n
     m = 2*n
-    associate (plan => self%plan, x => space%x)
+    associate (plan => self%plan, x => space%x, x_row => space%list(:m), y_row => space%list(m + 1:2*m), &
+               y => space%list(2*m + 1:))
       call kernels%load(m*m, plan%gamma_place, first, n_lines, plan%gamma, x)
       call kernels%load(m*m, plan%alpha_place, first, n_lines, plan%alpha, x)
       call kernels%load(n*n, plan%joint, first, n_lines, plan%k_initial, x)
       call kernels%combine(m*m, 1.0_dp, plan%alpha_place, -1.0_dp, plan%gamma_place, plan%difference, x)
       call kernels%fill(m*n, plan%unit_value, plan%unit, x)
       call kernels%solve(m, n, m, plan%gamma_before, x, space%hint(:padded(m)), x_row, rcond_gamma, space%ahead)
-      call kernels%fill(m*n, 0*plan%unit_value, plan%w, x)
+      call kernels%fill(m*n, plan%zero, plan%w, x)
       call kernels%product(m, n, m, 1.0_dp, plan%difference_row, x_row, plan%w_row, x)
       call kernels%solve(m, n, n, plan%alpha_before, x, space%hint(padded(m) + 1:), y_row, rcond_alpha)
       call rows_in_memory(self%transposed, y_row(n + 1:), n, y)
@@ -263,24 +267,20 @@ contains
     end associate
   end subroutine identify_block
 
-  !> E_k row by row: zeros above the unit matrix.
-  pure function unit_block(m, n) result(values)
+  !> A factor times E_k row by row: zeros above the unit matrix.
+  subroutine unit_block(factor, m, n, room, values)
+    real(dp), intent(in) :: factor
     integer, intent(in) :: m, n
-    complex(dp) :: values(m*n)
+    type(element_space), intent(inout) :: room
+    complex(dp), allocatable, intent(out) :: values(:)
     integer :: i
 
-    values = 0
+    call room%new_values(m*n, values)
+    if (room%no_memory) return
     do i = 1, n
-      values((m - n + i - 1)*n + i) = 1
+      values((m - n + i - 1)*n + i) = factor
     end do
-  end function unit_block
-
-  pure function row_numbers(n) result(numbers)
-    integer, intent(in) :: n
-    integer :: numbers(n), i
-
-    numbers = [(i, i=1, n)]
-  end function row_numbers
+  end subroutine unit_block
 
   subroutine identify_one(self, i, space, line_info, rcond)
     class(identification), intent(in) :: self
@@ -357,8 +357,9 @@ contains
 
   subroutine plan_short_identification(operation)
     type(short_identification), intent(inout) :: operation
-    integer :: element(2*operation%n, 3*operation%n), joint(operation%n, operation%n), n, m
+    type(element_matrix) :: gamma, unit
     type(element_space) :: room
+    integer :: n, m
 
     n = operation%n
     m = 2*n
@@ -371,19 +372,20 @@ contains
       operation%n_element = 1
       return
     else if (m <= largest_inverted) then
-      operation%plan%gamma_place = in_memory(operation%transposed, room%system(m, 0, operation%plan%gamma_before))
-      joint = room%matrix(n, n)
-      operation%plan%joint = in_memory(operation%transposed, joint)
-      operation%n_element = room%taken
+      call room%system(m, 0, operation%plan%gamma_before, gamma)
+      call room%in_memory(operation%transposed, gamma, operation%plan%gamma_place)
+      call room%in_memory(operation%transposed, room%matrix(n, n), operation%plan%joint)
+      call operation%lies_in(room, 0)
       return
     end if
-    element = room%system(m, n, operation%plan%gamma_before)
-    operation%n_element = room%taken
+    call room%system(m, n, operation%plan%gamma_before, gamma, unit)
+    gamma%turn = n
     associate (plan => operation%plan)
-      plan%gamma_place = in_memory(operation%transposed, element(:, cshift(row_numbers(m), n)))
-      plan%unit = in_memory(.true., element(:, m + 1:))
-      plan%unit_value = -unit_block(m, n)
+      call room%in_memory(operation%transposed, gamma, plan%gamma_place)
+      call room%in_memory(.true., unit, plan%unit)
+      call unit_block(-1.0_dp, m, n, room, plan%unit_value)
     end associate
+    call operation%lies_in(room, m + n*n)
   end subroutine plan_short_identification
 
   !> gamma X = -E_k with the columns k before j, so that the wanted rows j of X are found first.
@@ -395,7 +397,7 @@ contains
     integer(ip), intent(out) :: line_info(n_lines)
     real(dp), intent(out) :: rcond(n_lines)
     real(dp) :: rcond_lanes(lanes), total(lanes)
-    integer :: row(2*self%n), joint(self%n**2), inverse(2*self%n, 2*self%n), n, m
+    integer :: inverse(largest_inverted**2), of_joint(largest_inverted**2/4), n, m, i, j
 
     n = self%n
     m = 2*n
@@ -408,20 +410,27 @@ contains
       call kernels%load(m*m, plan%gamma_place, first, n_lines, plan%gamma, x)
       if (m <= largest_inverted) then
         call kernels%invert(m, plan%gamma_before, x, space%hint, inverse, rcond_lanes, space%ahead)
-        call kernels%copy(n*n, -1.0_dp, in_memory(self%transposed, transpose(inverse(n + 1:, :n))), plan%joint, x)
+        do j = 1, n
+          do i = 1, n
+            of_joint((j - 1)*n + i) = inverse(merge((j - 1)*m + n + i, (i - 1)*m + n + j, self%transposed))
+          end do
+        end do
+        call kernels%copy(n*n, -1.0_dp, of_joint, plan%joint, x)
         call kernels%store(n*n, plan%joint, first, n_lines, x, self%plan%k_joint)
         call kernels%total(n*n, plan%joint, x, total)
         rcond = rcond_lanes(:n_lines)
         call kernels%judge(n_lines, total, line_info, rcond)
         return
       end if
-      call kernels%fill(m*n, plan%unit_value, plan%unit, x)
-      call kernels%solve(m, n, n, plan%gamma_before, x, space%hint, row, rcond_lanes, space%ahead)
-      call rows_in_memory(self%transposed, row(n + 1:), n, joint)
-      call kernels%store(n*n, joint, first, n_lines, x, self%plan%k_joint)
-      call kernels%total(n*n, joint, x, total)
-      rcond = rcond_lanes(:n_lines)
-      call kernels%judge(n_lines, total, line_info, rcond)
+      associate (row => space%list(:m), joint => space%list(m + 1:))
+        call kernels%fill(m*n, plan%unit_value, plan%unit, x)
+        call kernels%solve(m, n, n, plan%gamma_before, x, space%hint, row, rcond_lanes, space%ahead)
+        call rows_in_memory(self%transposed, row(n + 1:), n, joint)
+        call kernels%store(n*n, joint, first, n_lines, x, self%plan%k_joint)
+        call kernels%total(n*n, joint, x, total)
+        rcond = rcond_lanes(:n_lines)
+        call kernels%judge(n_lines, total, line_info, rcond)
+      end associate
     end associate
   end subroutine invert_block
 

@@ -16,8 +16,8 @@ module jointfrf_lanes
   use jointfrf_manifold_plan, only: manifold_plan
   implicit none
   private
-  public :: lane_kernels, element_space, sparse_rows, padded, to_register, real_lines, flat, in_memory, row_starts, &
-    rows_in_memory, rows_of_columns, has_weight, worse_of
+  public :: lane_kernels, element_matrix, element_space, sparse_rows, padded, to_register, real_lines, rows_in_memory, &
+    find_rows, has_weight, worse_of
 
   !> Lines side by side. One register of AVX-512, two of AVX2, four of SSE2.
   integer, parameter, public :: lanes = 8
@@ -494,13 +494,37 @@ module jointfrf_lanes
     procedure(diagonal_form_routine), pointer, nopass :: diagonal_form => null()
   end type lane_kernels
 
-  !> The elements of a block, given out one after the other. What was taken in the end is what the block needs.
+  !> Where a matrix lies: entry (i, j) is element before + (i - 1)*width + j, unless the parts below say otherwise.
+  type :: element_matrix
+    integer :: n_rows = 0, n_columns = 0
+    integer :: before = 0, width = 0
+    integer :: panel = 0, panel_before = 0   !< so many first columns lie apart, row by row behind that element
+    integer :: turn = 0                      !< of a square matrix: the column that is counted as the last one
+    logical :: transposed = .false.          !< whether rows and columns are exchanged
+  contains
+    procedure :: at
+    procedure :: block => block_of
+    procedure :: transpose => transpose_of
+  end type element_matrix
+
+  !> The elements of a block, given out one after the other, and the lists that say where numbers lie in it. What was
+  !> taken in the end is what the block needs. Where there is no memory for a list, it and those that follow are not
+  !> allocated, and `no_memory` says so in the end.
   type :: element_space
     integer :: taken = 0
+    logical :: no_memory = .false.
   contains
+    procedure :: run
     procedure :: matrix
     procedure :: system
-    procedure :: run
+    procedure :: new_list
+    procedure :: new_values
+    procedure :: add
+    procedure :: pick
+    procedure :: row_starts
+    procedure :: matrix_in_memory
+    procedure :: blocks_in_memory
+    generic :: in_memory => matrix_in_memory, blocks_in_memory
   end type element_space
 
 contains
@@ -523,27 +547,6 @@ contains
     if (n <= largest_constant .and. n_rhs == 0) elements = n**2
   end function system_size
 
-  !> The element of a system [A, B] that holds entry (i, j) of A, or of B where j > n.
-  !>
-  !> The first two columns, which are eliminated next, lie apart from the others: both parts have rows of a fixed length
-  !> then, which is what lets the compiler run all lanes at once. A matrix that is to be inverted lies row by row
-  !> up to order `largest_constant`.
-  pure function system_position(n, n_rhs, i, j) result(element)
-    integer, intent(in) :: n, n_rhs, i, j
-    integer :: element, even, column, width
-
-    even = padded(n)
-    width = even - 2 + merge(n_rhs + 1, 0, n_rhs > 0)
-    column = merge(j, even + j - n, j <= n)
-    if (n <= largest_constant .and. n_rhs == 0) then
-      element = n*(i - 1) + j
-    else if (column <= 2) then
-      element = 2*(i - 1) + column
-    else
-      element = 2*even + width*(i - 1) + column - 2
-    end if
-  end function system_position
-
   !> n elements in a row: the element before them.
   function run(self, n) result(before)
     class(element_space), intent(inout) :: self
@@ -555,56 +558,242 @@ contains
   end function run
 
   !> The elements of a matrix that lies row by row.
-  function matrix(self, n_rows, n_columns) result(element)
+  function matrix(self, n_rows, n_columns) result(elements)
     class(element_space), intent(inout) :: self
     integer, intent(in) :: n_rows, n_columns
-    integer :: element(n_rows, n_columns), before, i, j
+    type(element_matrix) :: elements
 
-    before = self%run(n_rows*n_columns)
-    do j = 1, n_columns
-      do i = 1, n_rows
-        element(i, j) = before + (i - 1)*n_columns + j
-      end do
-    end do
+    elements%n_rows = n_rows
+    elements%n_columns = n_columns
+    elements%width = n_columns
+    elements%before = self%run(n_rows*n_columns)
   end function matrix
 
   !> The elements of a system [A, B], n_rhs = 0 for a matrix that is to be inverted.
+  !>
+  !> The first two columns, which are eliminated next, lie apart from the others: both parts have rows of a fixed length
+  !> then, which is what lets the compiler run all lanes at once. A matrix that is to be inverted lies row by row
+  !> up to order `largest_constant`.
   !> before   the element before the system
-  function system(self, n, n_rhs, before) result(element)
+  subroutine system(self, n, n_rhs, before, a, b)
     class(element_space), intent(inout) :: self
     integer, intent(in) :: n, n_rhs
-    integer, intent(out), optional :: before
-    integer :: element(n, n + n_rhs), start, i, j
+    integer, intent(out) :: before
+    type(element_matrix), intent(out) :: a
+    type(element_matrix), intent(out), optional :: b
+    integer :: even
 
-    start = self%run(system_size(n, n_rhs))
-    do j = 1, n + n_rhs
-      do i = 1, n
-        element(i, j) = start + system_position(n, n_rhs, i, j)
-      end do
+    before = self%run(system_size(n, n_rhs))
+    even = padded(n)
+    a%n_rows = n
+    a%n_columns = n
+    if (n <= largest_constant .and. n_rhs == 0) then
+      a%before = before
+      a%width = n
+    else
+      a%panel = 2
+      a%panel_before = before
+      a%before = before + 2*even - 2
+      a%width = even - 2 + merge(n_rhs + 1, 0, n_rhs > 0)
+    end if
+    if (.not. present(b)) return
+    b%n_rows = n
+    b%n_columns = n_rhs
+    b%before = a%before + even
+    b%width = a%width
+  end subroutine system
+
+  !> The element that is entry (i, j).
+  pure function at(self, i, j) result(element)
+    class(element_matrix), intent(in) :: self
+    integer, intent(in) :: i, j
+    integer :: element, row, column
+
+    row = merge(j, i, self%transposed)
+    column = merge(i, j, self%transposed)
+    if (self%turn > 0) column = 1 + mod(column - 1 + self%turn, self%n_columns)
+    if (column <= self%panel) then
+      element = self%panel_before + (row - 1)*self%panel + column
+    else
+      element = self%before + (row - 1)*self%width + column
+    end if
+  end function at
+
+  !> n_rows by n_columns entries that follow row i and column j of a matrix without panel.
+  pure function block_of(self, i, n_rows, j, n_columns) result(part)
+    class(element_matrix), intent(in) :: self
+    integer, intent(in) :: i, n_rows, j, n_columns
+    type(element_matrix) :: part
+
+    part%n_rows = n_rows
+    part%n_columns = n_columns
+    part%width = self%width
+    part%before = self%before + i*self%width + j
+  end function block_of
+
+  pure function transpose_of(self) result(other)
+    class(element_matrix), intent(in) :: self
+    type(element_matrix) :: other
+
+    other%n_rows = self%n_columns
+    other%n_columns = self%n_rows
+    other%before = self%before
+    other%width = self%width
+    other%panel = self%panel
+    other%panel_before = self%panel_before
+    other%turn = self%turn
+    other%transposed = .not. self%transposed
+  end function transpose_of
+
+  !> Memory for a list of n elements.
+  subroutine new_list(self, n, list)
+    class(element_space), intent(inout) :: self
+    integer, intent(in) :: n
+    integer, allocatable, intent(out) :: list(:)
+    integer :: stat
+
+    stat = 0
+    if (.not. self%no_memory) allocate (list(n), stat=stat)
+    if (stat /= 0) self%no_memory = .true.
+  end subroutine new_list
+
+  !> n zeros.
+  subroutine new_values(self, n, values)
+    class(element_space), intent(inout) :: self
+    integer, intent(in) :: n
+    complex(dp), allocatable, intent(out) :: values(:)
+    integer :: stat
+
+    stat = 0
+    if (.not. self%no_memory) allocate (values(n), stat=stat)
+    if (stat /= 0) self%no_memory = .true.
+    if (.not. self%no_memory) values = 0
+  end subroutine new_values
+
+  !> Add the elements of a matrix column by column to a list of which `used` items are used.
+  !> rows, columns   which, all where they are not given
+  subroutine add(self, matrix, list, used, rows, columns)
+    class(element_space), intent(in) :: self
+    type(element_matrix), intent(in) :: matrix
+    integer, allocatable, intent(inout) :: list(:)
+    integer, intent(inout) :: used
+    integer(ip), intent(in), optional :: rows(:), columns(:)
+    integer :: i, j, column, first, step, n_rows, n_columns
+
+    if (self%no_memory) return
+    n_rows = matrix%n_rows
+    n_columns = matrix%n_columns
+    if (present(rows)) n_rows = size(rows)
+    if (present(columns)) n_columns = size(columns)
+    do j = 1, n_columns
+      column = j
+      if (present(columns)) column = int(columns(j))
+      if (present(rows)) then
+        do i = 1, n_rows
+          list(used + i) = matrix%at(int(rows(i)), column)
+        end do
+      else if (matrix%turn > 0) then
+        do i = 1, n_rows
+          list(used + i) = matrix%at(i, column)
+        end do
+      else if (matrix%transposed) then
+        do i = 1, n_rows
+          list(used + i) = matrix%before + (column - 1)*matrix%width + i
+        end do
+        do i = 1, min(matrix%panel, n_rows)
+          list(used + i) = matrix%at(i, column)
+        end do
+      else
+        first = matrix%at(1, column)
+        step = merge(matrix%panel, matrix%width, column <= matrix%panel)
+        do i = 1, n_rows
+          list(used + i) = first + (i - 1)*step
+        end do
+      end if
+      used = used + n_rows
     end do
-    if (present(before)) before = start
-  end function system
+  end subroutine add
 
   !> The elements of a matrix column by column.
-  pure function flat(element) result(list)
-    integer, intent(in) :: element(:, :)
-    integer :: list(size(element))
+  subroutine pick(self, matrix, list, rows, columns)
+    class(element_space), intent(inout) :: self
+    type(element_matrix), intent(in) :: matrix
+    integer, allocatable, intent(out) :: list(:)
+    integer(ip), intent(in), optional :: rows(:), columns(:)
+    integer :: n_rows, n_columns, used
 
-    list = reshape(element, [size(element)])
-  end function flat
+    n_rows = matrix%n_rows
+    n_columns = matrix%n_columns
+    if (present(rows)) n_rows = size(rows)
+    if (present(columns)) n_columns = size(columns)
+    call self%new_list(n_rows*n_columns, list)
+    used = 0
+    call self%add(matrix, list, used, rows, columns)
+  end subroutine pick
 
   !> The elements of a matrix in the order in which the caller stores it.
-  pure function in_memory(transposed, element) result(list)
+  subroutine matrix_in_memory(self, transposed, matrix, list)
+    class(element_space), intent(inout) :: self
     logical, intent(in) :: transposed
-    integer, intent(in) :: element(:, :)
-    integer :: list(size(element))
+    type(element_matrix), intent(in) :: matrix
+    integer, allocatable, intent(out) :: list(:)
 
     if (transposed) then
-      list = reshape(transpose(element), [size(element)])
+      call self%pick(matrix%transpose(), list)
     else
-      list = flat(element)
+      call self%pick(matrix, list)
     end if
-  end function in_memory
+  end subroutine matrix_in_memory
+
+  !> The same of a matrix that consists of four square blocks of one size.
+  subroutine blocks_in_memory(self, transposed, a11, a12, a21, a22, list)
+    class(element_space), intent(inout) :: self
+    logical, intent(in) :: transposed
+    type(element_matrix), intent(in) :: a11, a12, a21, a22
+    integer, allocatable, intent(out) :: list(:)
+    integer :: n
+
+    n = a11%n_rows
+    call self%new_list(4*n*n, list)
+    if (self%no_memory) return
+    call put(a11, 0, 0)
+    call put(a21, n, 0)
+    call put(a12, 0, n)
+    call put(a22, n, n)
+
+  contains
+
+    !> A block that follows so many rows and columns.
+    subroutine put(a, row, column)
+      type(element_matrix), intent(in) :: a
+      integer, intent(in) :: row, column
+      integer :: i, j
+
+      do j = 1, n
+        do i = 1, n
+          if (transposed) then
+            list((row + i - 1)*2*n + column + j) = a%at(i, j)
+          else
+            list((column + j - 1)*2*n + row + i) = a%at(i, j)
+          end if
+        end do
+      end do
+    end subroutine put
+  end subroutine blocks_in_memory
+
+  !> The element before each row of a matrix whose rows lie in one piece.
+  subroutine row_starts(self, matrix, list)
+    class(element_space), intent(inout) :: self
+    type(element_matrix), intent(in) :: matrix
+    integer, allocatable, intent(out) :: list(:)
+    integer :: i
+
+    call self%new_list(matrix%n_rows, list)
+    if (self%no_memory) return
+    do i = 1, matrix%n_rows
+      list(i) = matrix%at(i, 1) - 1
+    end do
+  end subroutine row_starts
 
   !> The elements of a matrix with n_columns columns in the caller's order, from the element before each of its rows.
   pure subroutine rows_in_memory(transposed, before, n_columns, list)
@@ -624,36 +813,45 @@ contains
     end do
   end subroutine rows_in_memory
 
-  !> The element before each row of a matrix whose rows lie in one piece.
-  pure function row_starts(element) result(before)
-    integer, intent(in) :: element(:, :)
-    integer :: before(size(element, 1))
+  !> The entries of each row of a matrix that are not zero, times a factor.
+  !> by_columns   of each column instead, as rows of the transpose
+  subroutine find_rows(factor, t, by_columns, rows, stat)
+    real(dp), intent(in) :: factor, t(:, :)
+    logical, intent(in) :: by_columns
+    type(sparse_rows), intent(out) :: rows
+    integer, intent(out) :: stat
+    integer :: i, j, k, n_columns
+    real(dp) :: weight
 
-    before = element(:, 1) - 1
-  end function row_starts
-
-  !> The entries of each column of a matrix that are not zero: of each row of its transpose.
-  pure function rows_of_columns(t) result(rows)
-    real(dp), intent(in) :: t(:, :)
-    type(sparse_rows) :: rows
-    integer :: i, j, k
-
-    rows%n = size(t, 2)
+    rows%n = size(t, merge(2, 1, by_columns))
+    n_columns = size(t, merge(1, 2, by_columns))
     k = count(has_weight(t))
-    allocate (rows%start(rows%n + 1), rows%from(k), rows%weight(k))
+    allocate (rows%start(rows%n + 1), rows%from(k), rows%weight(k), stat=stat)
+    if (stat /= 0) return
     k = 1
     do j = 1, rows%n
       rows%start(j) = k
-      do i = 1, size(t, 1)
-        if (.not. has_weight(t(i, j))) cycle
+      do i = 1, n_columns
+        if (by_columns) then
+          weight = t(i, j)
+        else
+          weight = t(j, i)
+        end if
+        if (.not. has_weight(weight)) cycle
         rows%from(k) = i
-        rows%weight(k) = t(i, j)
+        rows%weight(k) = factor*weight
         k = k + 1
       end do
     end do
     rows%start(rows%n + 1) = k
-    rows%unused = any(count(has_weight(t), dim=2) == 0)
-  end function rows_of_columns
+    do i = 1, n_columns
+      if (by_columns) then
+        rows%unused = rows%unused .or. .not. any(has_weight(t(i, :)))
+      else
+        rows%unused = rows%unused .or. .not. any(has_weight(t(:, i)))
+      end if
+    end do
+  end subroutine find_rows
 
   !> Whether a weight is not zero; NaN is not.
   elemental function has_weight(weight) result(yes)

@@ -2,7 +2,7 @@
 module jointfrf_linear_algebra
   use jointfrf_caller_memory, only: caller_memory
   use jointfrf_kinds, only: dp, ip
-  use jointfrf_lanes, only: element_space, in_memory, lane_kernels, lanes, largest_in_lanes, largest_product, &
+  use jointfrf_lanes, only: element_matrix, element_space, lane_kernels, lanes, largest_in_lanes, largest_product, &
     largest_solved, padded, real_lines, rows_in_memory
   use jointfrf_line_layout, only: all_finite, load, store
   use jointfrf_lines_lapack, only: invert_line, room_to_invert, room_to_solve, solve_line
@@ -59,9 +59,12 @@ contains
   subroutine plan_inversion(operation)
     type(inversion), intent(inout) :: operation
     type(element_space) :: room
+    type(element_matrix) :: matrix
+    integer :: before
 
-    operation%place = in_memory(.true., room%system(operation%n, 0))
-    operation%n_element = room%taken
+    call room%system(operation%n, 0, before, matrix)
+    call room%in_memory(.true., matrix, operation%place)
+    call operation%lies_in(room, operation%n**2)
     operation%n_hint = padded(operation%n)
     if (operation%n <= 2) operation%block_lines = long_block
     operation%a_pairs => real_lines(operation%a)
@@ -78,7 +81,6 @@ contains
     integer(ip), intent(out) :: line_info(n_lines)
     real(dp), intent(out) :: rcond(n_lines)
     real(dp) :: rcond_lanes(lanes)
-    integer :: place(self%n**2)
 
     if (self%n <= 2) then
       call kernels%invert_lines(self%n, first, n_lines, self%a_pairs, self%result_pairs, rcond)
@@ -86,8 +88,8 @@ contains
       return
     end if
     call kernels%load(self%n**2, self%place, first, n_lines, self%a_pairs, space%x)
-    call kernels%invert(self%n, 0, space%x, space%hint, place, rcond_lanes, space%ahead)
-    call kernels%store(self%n**2, place, first, n_lines, space%x, self%result_pairs)
+    call kernels%invert(self%n, 0, space%x, space%hint, space%list, rcond_lanes, space%ahead)
+    call kernels%store(self%n**2, space%list, first, n_lines, space%x, self%result_pairs)
     rcond = rcond_lanes(:n_lines)
     call kernels%judge(n_lines, rcond_lanes, line_info, rcond)
   end subroutine invert_block
@@ -139,15 +141,16 @@ contains
   subroutine plan_solution(operation)
     type(solution), intent(inout) :: operation
     type(element_space) :: room
-    integer :: element(operation%n, operation%n + operation%n_rhs)
+    type(element_matrix) :: a, b
+    integer :: before
 
     associate (n => operation%n, n_rhs => operation%n_rhs)
-      element = room%system(n, n_rhs)
-      operation%n_element = room%taken
+      call room%system(n, n_rhs, before, a, b)
       if (divides(operation)) operation%block_lines = long_block
       operation%n_hint = padded(n)
-      operation%a_place = in_memory(operation%transposed, element(:, :n))
-      operation%b_place = in_memory(operation%transposed, element(:, n + 1:))
+      call room%in_memory(operation%transposed, a, operation%a_place)
+      call room%in_memory(operation%transposed, b, operation%b_place)
+      call operation%lies_in(room, n + n*n_rhs)
       operation%a_pairs => real_lines(operation%a)
       operation%b_pairs => real_lines(operation%b)
       operation%result_pairs => real_lines(operation%result)
@@ -172,7 +175,7 @@ contains
     integer(ip), intent(out) :: line_info(n_lines)
     real(dp), intent(out) :: rcond(n_lines)
     real(dp) :: rcond_lanes(lanes), total(lanes)
-    integer :: row(self%n), place(self%n*self%n_rhs), n_x
+    integer :: n_x
 
     if (divides(self)) then
       call kernels%divide_lines(first, n_lines, self%a_pairs, self%b_pairs, self%result_pairs, rcond)
@@ -180,14 +183,16 @@ contains
       return
     end if
     n_x = self%n*self%n_rhs
-    call kernels%load(self%n**2, self%a_place, first, n_lines, self%a_pairs, space%x)
-    call kernels%load(n_x, self%b_place, first, n_lines, self%b_pairs, space%x)
-    call kernels%solve(self%n, self%n_rhs, self%n, 0, space%x, space%hint, row, rcond_lanes, space%ahead)
-    call rows_in_memory(self%transposed, row, self%n_rhs, place)
-    call kernels%store(n_x, place, first, n_lines, space%x, self%result_pairs)
-    call kernels%total(n_x, place, space%x, total)
-    rcond = rcond_lanes(:n_lines)
-    call kernels%judge(n_lines, total, line_info, rcond)
+    associate (row => space%list(:self%n), place => space%list(self%n + 1:))
+      call kernels%load(self%n**2, self%a_place, first, n_lines, self%a_pairs, space%x)
+      call kernels%load(n_x, self%b_place, first, n_lines, self%b_pairs, space%x)
+      call kernels%solve(self%n, self%n_rhs, self%n, 0, space%x, space%hint, row, rcond_lanes, space%ahead)
+      call rows_in_memory(self%transposed, row, self%n_rhs, place)
+      call kernels%store(n_x, place, first, n_lines, space%x, self%result_pairs)
+      call kernels%total(n_x, place, space%x, total)
+      rcond = rcond_lanes(:n_lines)
+      call kernels%judge(n_lines, total, line_info, rcond)
+    end associate
   end subroutine solve_block
 
   subroutine solve_one(self, i, space, line_info, rcond)

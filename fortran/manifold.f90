@@ -13,7 +13,7 @@ module jointfrf_manifold
   use, intrinsic :: iso_c_binding, only: c_f_pointer, c_loc
   use jointfrf_engine, only: find_kernels
   use jointfrf_kinds, only: dp, ip, long
-  use jointfrf_lanes, only: in_memory, lane_kernels, lanes, real_lines, to_register
+  use jointfrf_lanes, only: lane_kernels, lanes, real_lines, to_register
   use jointfrf_line_layout, only: store_nan
   use jointfrf_manifold_plan, only: make_manifold_plan, manifold_plan
   use jointfrf_sharing, only: serial_flops_lanes, share, shared_work, threads_for
@@ -31,13 +31,17 @@ module jointfrf_manifold
     real(dp), allocatable :: squares(:, :)
   end type block_space
 
+  !> Square matrices of a line, in the order of their lists.
+  integer, parameter :: at_c = 1, at_h = 2, at_m = 3, at_best_h = 4, at_best_m = 5
+
   !> Lines as work to be shared: an item is a block of them.
   type, abstract, extends(shared_work) :: manifold_work
     type(manifold_plan) :: plan
     type(lane_kernels) :: kernels
     logical :: transposed = .false.
     integer :: n_target = 0                                !< FRFs of the caller
-    integer, allocatable :: target(:, :), square(:)        !< where gamma and square matrices go, in the caller's order
+    integer, allocatable :: target(:, :), square(:, :)     !< where gamma and square matrices go, in the caller's order
+    integer, allocatable :: of_targets(:)                  !< all entries of gamma
     integer, allocatable :: weight(:)                      !< where the caller has the weight of each entry
     real(dp), pointer, contiguous :: gamma(:, :, :, :) => null()         !< pairs, numbers, lines, targets
     real(dp), pointer, contiguous :: c(:, :, :) => null(), h(:, :, :) => null(), m(:, :, :) => null()
@@ -59,7 +63,7 @@ module jointfrf_manifold
   end type projection
 
   type, extends(manifold_work) :: form_finding
-    integer, allocatable :: result(:)
+    integer, allocatable :: result(:), gradient_place(:, :)
     complex(dp), pointer, contiguous :: information(:, :, :) => null(), gradient(:, :, :) => null()
     real(dp), pointer, contiguous :: information_pairs(:, :, :) => null(), gradient_pairs(:, :, :, :) => null()
     real(dp), pointer, contiguous :: squares(:, :) => null()
@@ -112,6 +116,7 @@ contains
     integer(ip), intent(out) :: info
     type(projection) :: work
     complex(dp), pointer, contiguous :: one_target(:, :, :, :)
+    integer :: stat
 
     work%steps = int(steps)
     work%least_gain = least_gain
@@ -119,9 +124,9 @@ contains
     work%free_m => m
     work%squares => squares
     one_target(1:size(gamma, 1), 1:size(gamma, 2), 1:size(gamma, 3), 1:1) => gamma
-    call make_manifold_plan(reciprocal, size(c_joint, 1), .false., 1, size(whitening) > 0, work%plan)
-    call set_data(work, transposed, one_target, inverse_std, whitening, c_joint, h, m, line_info)
-    call run(work, 30.0_dp*steps, info)
+    call make_manifold_plan(reciprocal, size(c_joint, 1), .false., 1, size(whitening) > 0, work%plan, stat)
+    if (stat == 0) call set_data(work, transposed, one_target, inverse_std, whitening, c_joint, h, m, line_info, stat)
+    call run(work, 30.0_dp*steps, stat, info)
   end subroutine project_on_joint
 
   !> The expected FRFs about ones that fit a joint, where entries of M are normal about 0 with deviations known before,
@@ -139,17 +144,23 @@ contains
     integer(ip), intent(out) :: info
     type(expectation) :: work
     complex(dp), target :: no_target(2*size(c_joint, 1), 2*size(c_joint, 1), size(line_info), 0)
+    integer :: stat, k
 
     work%share = share_of_noise
     work%free_h => h
     work%free_m => m
     work%spread_m(1:size(c_joint, 1)**2, 1:size(line_info)) => spread_m
-    call make_manifold_plan(reciprocal, size(c_joint, 1), .false., 1, size(whitening) > 0, work%plan)
-    call set_data(work, transposed, no_target, inverse_std, whitening, c_joint, h, m, line_info)
-    associate (plan => work%plan)
-      work%free = merge(plan%column + (plan%row - 1)*plan%n, plan%row + (plan%column - 1)*plan%n, transposed)
-    end associate
-    call run(work, 30.0_dp, info)
+    call make_manifold_plan(reciprocal, size(c_joint, 1), .false., 1, size(whitening) > 0, work%plan, stat)
+    if (stat == 0) call set_data(work, transposed, no_target, inverse_std, whitening, c_joint, h, m, line_info, stat)
+    if (stat == 0) allocate (work%free(work%plan%n_free), stat=stat)
+    if (stat == 0) then
+      do k = 1, work%plan%n_free
+        associate (n => work%plan%n, row => work%plan%row(k), column => work%plan%column(k))
+          work%free(k) = merge(column + (row - 1)*n, row + (column - 1)*n, transposed)
+        end associate
+      end do
+    end if
+    call run(work, 30.0_dp, stat, info)
   end subroutine expect_on_joint
 
   !> Information that FRFs give on a joint about a point of the manifold, H and M eliminated: with d the change of the
@@ -170,44 +181,74 @@ contains
     integer(ip), contiguous, target, intent(out) :: line_info(:)
     integer(ip), intent(out) :: info
     type(form_finding) :: work
-    integer :: i
+    integer :: stat, i, t
 
-    call make_manifold_plan(reciprocal, size(c_joint, 1), .true., size(gamma, 4), size(whitening) > 0, work%plan)
-    call set_data(work, transposed, gamma, inverse_std, whitening, c_joint, h, m, line_info)
+    call make_manifold_plan(reciprocal, size(c_joint, 1), .true., size(gamma, 4), size(whitening) > 0, work%plan, stat)
+    if (stat == 0) call set_data(work, transposed, gamma, inverse_std, whitening, c_joint, h, m, line_info, stat)
     associate (plan => work%plan)
-      work%result = in_memory(.not. transposed, reshape([(plan%result + i, i=1, plan%n_free**2)], &
-                                                        [plan%n_free, plan%n_free]))
+      if (stat == 0) allocate (work%result(plan%n_free**2), work%gradient_place(plan%n_free, plan%n_target), stat=stat)
+      if (stat == 0) then
+        call list_square(transposed, plan%n_free, plan%result, work%result)
+        do t = 1, plan%n_target
+          do i = 1, plan%n_free
+            work%gradient_place(i, t) = plan%normal + (plan%n_free + t - 1)*(plan%n_column - 2*plan%n_free) + i
+          end do
+        end do
+      end if
     end associate
     work%information => information
     work%information_pairs => real_lines(information)
     work%gradient => gradient
     call c_f_pointer(c_loc(gradient), work%gradient_pairs, [2, size(gradient, 1), size(gradient, 2), size(gradient, 3)])
     work%squares => squares
-    call run(work, 60.0_dp, info)
+    call run(work, 60.0_dp, stat, info)
   end subroutine joint_forms
 
-  subroutine set_data(work, transposed, gamma, inverse_std, whitening, c_joint, h, m, line_info)
+  !> The elements of a square matrix of order n that lies row by row behind `before`, in the caller's order.
+  pure subroutine list_square(transposed, n, before, list)
+    logical, intent(in) :: transposed
+    integer, intent(in) :: n, before
+    integer, intent(out) :: list(:)
+    integer :: i, j
+
+    do j = 1, n
+      do i = 1, n
+        list((j - 1)*n + i) = before + merge((j - 1)*n + i, (i - 1)*n + j, transposed)
+      end do
+    end do
+  end subroutine list_square
+
+  subroutine set_data(work, transposed, gamma, inverse_std, whitening, c_joint, h, m, line_info, stat)
     class(manifold_work), intent(inout) :: work
     logical, intent(in) :: transposed
     complex(dp), contiguous, target, intent(in) :: gamma(:, :, :, :), c_joint(:, :, :), h(:, :, :), m(:, :, :)
     real(dp), contiguous, target, intent(in) :: inverse_std(:, :, :), whitening(:, :, :)
     integer(ip), contiguous, target, intent(inout) :: line_info(:)
-    integer :: element(2*work%plan%n, 2*work%plan%n), n, e, i, t
+    integer, intent(out) :: stat
+    integer :: n, e, t
 
     n = work%plan%n
     work%transposed = transposed
-    allocate (work%weight(work%plan%n_entry), work%target(4*n*n, work%plan%n_target))
-    element = work%plan%unused + 4
-    do t = 1, work%plan%n_target
-      do e = 1, work%plan%n_entry
-        associate (row => work%plan%gamma_row(e), column => work%plan%gamma_column(e))
-          element(row, column) = work%plan%target + (t - 1)*work%plan%n_entry + e
-          work%weight(e) = merge(column + (row - 1)*2*n, row + (column - 1)*2*n, transposed)
-        end associate
+    allocate (work%weight(work%plan%n_entry), work%target(4*n*n, work%plan%n_target), work%square(n*n, 5), &
+              work%of_targets(work%plan%n_entry*size(gamma, 4)), stat=stat)
+    if (stat /= 0) return
+    work%target = work%plan%unused + 4
+    do e = 1, work%plan%n_entry
+      associate (row => work%plan%gamma_row(e), column => work%plan%gamma_column(e))
+        work%weight(e) = merge(column + (row - 1)*2*n, row + (column - 1)*2*n, transposed)
+      end associate
+      do t = 1, work%plan%n_target
+        work%target(work%weight(e), t) = work%plan%target + (t - 1)*work%plan%n_entry + e
       end do
-      work%target(:, t) = in_memory(transposed, element)
     end do
-    work%square = in_memory(.not. transposed, reshape([(i, i=1, n*n)], [n, n]))
+    do e = 1, size(work%of_targets)
+      work%of_targets(e) = work%plan%target + e
+    end do
+    call list_square(transposed, n, work%plan%c, work%square(:, at_c))
+    call list_square(transposed, n, work%plan%h, work%square(:, at_h))
+    call list_square(transposed, n, work%plan%m, work%square(:, at_m))
+    call list_square(transposed, n, work%plan%best_h, work%square(:, at_best_h))
+    call list_square(transposed, n, work%plan%best_m, work%square(:, at_best_m))
     work%n_target = size(gamma, 4)
     if (work%n_target > 0) call c_f_pointer(c_loc(gamma), work%gamma, [2, 4*n*n, size(gamma, 3), size(gamma, 4)])
     work%c => real_lines(c_joint)
@@ -219,39 +260,37 @@ contains
   end subroutine set_data
 
   !> Share the blocks of lines.
+  !> stat       not 0 where there was no memory for the plan
   !> products   of two numbers of all columns, in squares of their number
-  subroutine run(work, products, info)
+  subroutine run(work, products, stat, info)
     class(manifold_work), intent(inout) :: work
     real(dp), intent(in) :: products
+    integer, intent(inout) :: stat
     integer(ip), intent(out) :: info
+    type(block_space), allocatable, target :: space(:)
     integer(long) :: n_blocks
-    integer :: threads, t, stat
+    integer :: threads, t
     logical :: found
     real(dp) :: flops
 
     call find_kernels(work%kernels, found, info)
-    if (info /= info_good .or. size(work%line_info) == 0) return
+    if (info == info_good .and. stat /= 0) info = info_no_memory
+    if (info /= info_good) return
+    if (size(work%line_info) == 0) return
     flops = products*real(work%plan%n_entry, dp)*real(work%plan%n_free, dp)**2*size(work%line_info)
     n_blocks = (size(work%line_info, kind=long) - 1)/lanes + 1
     threads = threads_for(flops, n_blocks, serial_flops_lanes)
-    allocate (work%space(threads), stat=stat)
+    allocate (space(threads), stat=stat)
+    do t = 1, threads
+      if (stat == 0) call prepare(work%plan, space(t), stat)
+    end do
     if (stat /= 0) then
       info = info_no_memory
       return
     end if
-    do t = 1, threads
-      if (stat == 0) call prepare(work%plan, work%space(t), stat)
-    end do
-    if (stat == 0) then
-      call share(work, n_blocks, threads, even=.false.)
-      info = count(work%line_info /= line_good, kind=ip)
-    else
-      info = info_no_memory
-    end if
-    do t = 1, threads
-      if (allocated(work%space(t)%room)) deallocate (work%space(t)%room, work%space(t)%squares)
-    end do
-    deallocate (work%space)
+    work%space => space
+    call share(work, n_blocks, threads, even=.false.)
+    info = count(work%line_info /= line_good, kind=ip)
   end subroutine run
 
   !> Workspace of one thread. Elements begin where a register does.
@@ -322,9 +361,9 @@ contains
       end do
       total = total + sum(abs(space%whitening), dim=2)
     end if
-    call load_square(self%c, self%plan%c)
-    call load_square(self%h, self%plan%h)
-    call load_square(self%m, self%plan%m)
+    call load_square(self%c, self%square(:, at_c))
+    call load_square(self%h, self%square(:, at_h))
+    call load_square(self%m, self%square(:, at_m))
     do t = 1, self%n_target
       call self%kernels%load(4*n2, self%target(:, t), first, n_lines, self%gamma(:, :, :, t), space%x)
       associate (data => space%x(:, :, self%plan%target + (t - 1)*q + 1:self%plan%target + t*q))
@@ -336,19 +375,19 @@ contains
         end do
       end associate
     end do
-    call self%kernels%total(q*self%n_target, [(self%plan%target + i, i=1, q*self%n_target)], space%x, of_targets)
+    call self%kernels%total(q*self%n_target, self%of_targets, space%x, of_targets)
     total = total + of_targets
     line_info = merge(line_good, line_not_finite, total(:n_lines) <= huge(1.0_dp) .and. .not. least(:n_lines) < 0.0_dp)
 
   contains
 
-    subroutine load_square(lines, before)
+    subroutine load_square(lines, place)
       real(dp), contiguous, intent(in) :: lines(:, :, :)
-      integer, intent(in) :: before
+      integer, contiguous, intent(in) :: place(:)
       real(dp) :: here(lanes)
 
-      call self%kernels%load(n2, before + self%square, first, n_lines, lines, space%x)
-      call self%kernels%total(n2, before + self%square, space%x, here)
+      call self%kernels%load(n2, place, first, n_lines, lines, space%x)
+      call self%kernels%total(n2, place, space%x, here)
       total = total + here
     end subroutine load_square
   end subroutine load_block
@@ -364,8 +403,8 @@ contains
       x(:, :, plan%best_h + 1:plan%best_h + n2) = x(:, :, plan%h + 1:plan%h + n2)
       x(:, :, plan%best_m + 1:plan%best_m + n2) = x(:, :, plan%m + 1:plan%m + n2)
       call self%kernels%project(plan, self%steps, self%least_gain, space%w, space%whitening, x, space%squares(:, 1))
-      call self%kernels%store(n2, plan%best_h + self%square, first, n_lines, x, self%h)
-      call self%kernels%store(n2, plan%best_m + self%square, first, n_lines, x, self%m)
+      call self%kernels%store(n2, self%square(:, at_best_h), first, n_lines, x, self%h)
+      call self%kernels%store(n2, self%square(:, at_best_m), first, n_lines, x, self%m)
     end associate
     do l = 1, n_lines
       line = first + l - 1
@@ -395,10 +434,10 @@ contains
         end do
       end do
       call self%kernels%expect(plan, self%share, space%w, space%whitening, x)
-      call self%kernels%total(n2, plan%h + self%square, x, of_h)
-      call self%kernels%total(n2, plan%m + self%square, x, of_m)
-      call self%kernels%store(n2, plan%h + self%square, first, n_lines, x, self%h)
-      call self%kernels%store(n2, plan%m + self%square, first, n_lines, x, self%m)
+      call self%kernels%total(n2, self%square(:, at_h), x, of_h)
+      call self%kernels%total(n2, self%square(:, at_m), x, of_m)
+      call self%kernels%store(n2, self%square(:, at_h), first, n_lines, x, self%h)
+      call self%kernels%store(n2, self%square(:, at_m), first, n_lines, x, self%m)
     end associate
     do l = 1, n_lines
       line = first + l - 1
@@ -414,18 +453,15 @@ contains
     integer, intent(in) :: first, n_lines
     type(block_space), intent(inout) :: space
     real(dp) :: total(lanes), of_gradient(lanes)
-    integer :: u, m, t, i, l, line
-    integer :: place(self%plan%n_free)
+    integer :: u, t, l, line
 
     u = self%plan%n_free
-    m = self%plan%n_column - 2*u
     call self%kernels%joint_form(self%plan, space%w, space%whitening, space%x, space%squares)
     call self%kernels%store(u*u, self%result, first, n_lines, space%x, self%information_pairs)
     call self%kernels%total(u*u, self%result, space%x, total)
     do t = 1, self%plan%n_target
-      place = [(self%plan%normal + (u + t - 1)*m + i, i=1, u)]
-      call self%kernels%store(u, place, first, n_lines, space%x, self%gradient_pairs(:, :, :, t))
-      call self%kernels%total(u, place, space%x, of_gradient)
+      call self%kernels%store(u, self%gradient_place(:, t), first, n_lines, space%x, self%gradient_pairs(:, :, :, t))
+      call self%kernels%total(u, self%gradient_place(:, t), space%x, of_gradient)
       total = total + of_gradient + space%squares(:, t)
     end do
     do l = 1, n_lines

@@ -55,11 +55,11 @@ contains
   !> by_c        whether columns by C are wanted
   !> n_target    FRFs whose residuals are wanted
   !> correlated  whether columns are whitened by a triangular factor
-  subroutine make_manifold_plan(reciprocal, n, by_c, n_target, correlated, plan)
+  subroutine make_manifold_plan(reciprocal, n, by_c, n_target, correlated, plan, stat)
     logical, intent(in) :: reciprocal, by_c, correlated
     integer, intent(in) :: n, n_target
     type(manifold_plan), intent(out) :: plan
-    integer :: i
+    integer, intent(out) :: stat
 
     plan%reciprocal = reciprocal
     plan%n = n
@@ -68,12 +68,16 @@ contains
     plan%n_free = merge((n*(n + 1))/2, n*n, reciprocal)
     plan%n_entry = merge(n*(2*n + 1), 4*n*n, reciprocal)
     plan%n_column = 2*plan%n_free + merge(plan%n_free, 0, by_c) + n_target
-    allocate (plan%row(plan%n_free), plan%column(plan%n_free))
+    allocate (plan%row(plan%n_free), plan%column(plan%n_free), plan%gamma_row(plan%n_entry), &
+              plan%gamma_column(plan%n_entry), plan%gamma(plan%n_entry), plan%in_rows(plan%n_entry), plan%kk_first(n), &
+              plan%groups(number_of_groups(plan)), stat=stat)
+    if (stat /= 0) return
     call list_triangle(reciprocal, n, plan%row, plan%column)
     call place_elements(plan, by_c)
-    call list_entries(plan)
-    call list_groups(plan)
-    plan%joint_groups(1) = entry_group(0, plan%n_entry, [(i, i=2*plan%n_free + 1, plan%n_column)])
+    call list_entries(plan, stat)
+    if (stat == 0) call list_groups(plan, stat)
+    if (stat == 0) call set_group(0, plan%n_entry, plan%n_column - 2*plan%n_free, plan%joint_groups(1), stat)
+    if (stat == 0) call count_up(2*plan%n_free + 1, plan%joint_groups(1)%column)
   end subroutine make_manifold_plan
 
   !> Rows and columns of the upper triangle row by row, or of all entries.
@@ -136,15 +140,17 @@ contains
   end subroutine place_elements
 
   !> The entries of gamma in their order.
-  subroutine list_entries(plan)
+  subroutine list_entries(plan, stat)
     type(manifold_plan), intent(inout) :: plan
-    integer :: number(2*plan%n, 2*plan%n), n, i, j, e
+    integer, intent(out) :: stat
+    integer, allocatable :: number(:, :)
+    integer :: n, i, j, e
 
     n = plan%n
     e = 0
+    allocate (number(2*n, 2*n), stat=stat)
+    if (stat /= 0) return
     number = 0
-    allocate (plan%gamma_row(plan%n_entry), plan%gamma_column(plan%n_entry), plan%gamma(plan%n_entry), &
-              plan%in_rows(plan%n_entry), plan%kk_first(n))
     do i = 1, n
       do j = 1, n
         call add(i, n + j, plan%jk + (i - 1)*n + j)
@@ -190,39 +196,86 @@ contains
     end subroutine add
   end subroutine list_entries
 
+  !> Groups of the columns by H and M and one residual.
+  pure function number_of_groups(plan) result(groups)
+    type(manifold_plan), intent(in) :: plan
+    integer :: groups
+
+    groups = 1
+    if (.not. plan%correlated) groups = plan%n + merge(0, plan%n, plan%reciprocal) + 1 + plan%n_free
+  end function number_of_groups
+
   !> Columns by H are zero in most rows of jk, in most columns of kj, and but for one entry in jj; those by M in jj.
-  subroutine list_groups(plan)
+  subroutine list_groups(plan, stat)
     type(manifold_plan), intent(inout) :: plan
-    integer :: n, u, k, i, g, by_m(plan%n_free + 1)
-    integer :: every(2*plan%n_free + 1)
+    integer, intent(out) :: stat
+    integer :: n, u, k, i, g
 
     n = plan%n
     u = plan%n_free
-    by_m = [(u + k, k=1, u + 1)]
-    every = [(k, k=1, 2*u + 1)]
     if (plan%correlated) then
-      allocate (plan%groups(1))
-      plan%groups(1) = entry_group(0, plan%n_entry, every)
+      call set_group(0, plan%n_entry, 2*u + 1, plan%groups(1), stat)
+      if (stat == 0) call count_up(1, plan%groups(1)%column)
       return
     end if
-    g = 0
-    allocate (plan%groups(n + merge(0, n, plan%reciprocal) + 1 + u))
+    stat = 0
     do i = 1, n
-      g = g + 1
-      plan%groups(g) = entry_group((i - 1)*n, n, [pack([(k, k=1, u)], plan%row == i .or. &
-                                                       (plan%reciprocal .and. plan%column == i)), by_m])
+      call add_group((i - 1)*n, plan%row == i .or. (plan%reciprocal .and. plan%column == i), plan%groups(i))
     end do
+    g = n
     if (.not. plan%reciprocal) then
       do i = 1, n
-        g = g + 1
-        plan%groups(g) = entry_group(n*n + (i - 1)*n, n, [pack([(k, k=1, u)], plan%column == i), by_m])
+        call add_group(n*n + (i - 1)*n, plan%column == i, plan%groups(n + i))
       end do
+      g = 2*n
     end if
     g = g + 1
-    plan%groups(g) = entry_group(plan%kk_first(1), u, every)
+    if (stat == 0) call set_group(plan%kk_first(1), u, 2*u + 1, plan%groups(g), stat)
+    if (stat == 0) call count_up(1, plan%groups(g)%column)
     do k = 1, u
-      g = g + 1
-      plan%groups(g) = entry_group(plan%n_entry - u + k - 1, 1, [k, 2*u + 1])
+      if (stat == 0) call set_group(plan%n_entry - u + k - 1, 1, 2, plan%groups(g + k), stat)
+      if (stat == 0) plan%groups(g + k)%column(:) = [k, 2*u + 1]
     end do
+
+  contains
+
+    !> n entries with some columns by H, and those by M.
+    subroutine add_group(first, by_h, group)
+      integer, intent(in) :: first
+      logical, intent(in) :: by_h(:)
+      type(entry_group), intent(inout) :: group
+      integer :: at
+
+      if (stat == 0) call set_group(first, n, count(by_h) + u + 1, group, stat)
+      if (stat /= 0) return
+      at = 0
+      do k = 1, u
+        if (.not. by_h(k)) cycle
+        at = at + 1
+        group%column(at) = k
+      end do
+      call count_up(u + 1, group%column(at + 1:))
+    end subroutine add_group
   end subroutine list_groups
+
+  !> A group with room for its columns.
+  subroutine set_group(first, n, n_column, group, stat)
+    integer, intent(in) :: first, n, n_column
+    type(entry_group), intent(inout) :: group
+    integer, intent(out) :: stat
+
+    group%first = first
+    group%n = n
+    allocate (group%column(n_column), stat=stat)
+  end subroutine set_group
+
+  pure subroutine count_up(first, list)
+    integer, intent(in) :: first
+    integer, intent(out) :: list(:)
+    integer :: i
+
+    do i = 1, size(list)
+      list(i) = first + i - 1
+    end do
+  end subroutine count_up
 end module jointfrf_manifold_plan

@@ -70,17 +70,20 @@ contains
     class(superposition), intent(inout) :: operation
     type(element_space) :: room
     logical :: symmetric
-    integer :: o, i, e, entries, mode, before
+    integer :: o, i, e, entries, mode, before, stat
 
     symmetric = operation%n_out == operation%n_in
     if (symmetric) symmetric = all(abs(operation%shapes_out - operation%shapes_in) <= 0.0_dp)
     entries = operation%n_out*operation%n_in
     if (symmetric) entries = (operation%n_out*(operation%n_out + 1))/2
-    allocate (operation%residue(4, operation%n_modes, (entries + 3)/4), source=0.0_dp)
-    allocate (operation%place(operation%n_out*operation%n_in))
+    call room%new_list(operation%n_out*operation%n_in, operation%place)
+    allocate (operation%residue(4, operation%n_modes, (entries + 3)/4), operation%loss(operation%n_modes), stat=stat)
+    room%no_memory = room%no_memory .or. stat /= 0
     before = room%run(operation%n_modes)                              ! what the kernel works in
-    before = room%run(4*size(operation%residue, 3))
-    operation%n_element = room%taken
+    before = room%run(4*((entries + 3)/4))
+    call operation%lies_in(room, 0)
+    if (room%no_memory) return
+    operation%residue = 0.0_dp
     e = 0
     do i = 1, operation%n_in
       do o = merge(i, 1, symmetric), operation%n_out
@@ -94,7 +97,7 @@ contains
         if (symmetric) operation%place(in_memory(i, o)) = before + e
       end do
     end do
-    operation%loss = operation%loss_factor*operation%stiffness
+    operation%loss(:) = operation%loss_factor*operation%stiffness
     operation%result_pairs => real_lines(operation%result)
 
   contains

@@ -3,8 +3,8 @@
 module jointfrf_modification
   use jointfrf_caller_memory, only: caller_memory
   use jointfrf_kinds, only: dp, ip
-  use jointfrf_lanes, only: element_space, flat, in_memory, lane_kernels, lanes, largest_solved, largest_product, &
-    padded, real_lines, row_starts
+  use jointfrf_lanes, only: element_matrix, element_space, lane_kernels, lanes, largest_solved, largest_product, padded, &
+    real_lines
   use jointfrf_line_layout, only: all_finite, load, store, subtract
   use jointfrf_lines_lapack, only: product_line, room_to_solve, solve_line
   use jointfrf_lookahead, only: lookahead
@@ -32,11 +32,12 @@ module jointfrf_modification
   !> [I + D H_mm, D rows].
   type :: forces_in_lanes
     integer :: n, n_m
-    integer, allocatable :: d(:, :), h_mm(:, :), rows(:, :)
+    type(element_matrix) :: d, h_mm, rows
     integer :: right_before                        !< the element before [H_mm, rows], free when the forces are found
     integer, allocatable :: constant(:)            !< what the system begins with, [I, 0], and numbers without meaning
     complex(dp), allocatable :: constant_value(:)
-    integer, allocatable :: d_row(:), right_row(:), panel_row(:), rest_row(:)
+    integer, allocatable :: d_row(:), right_row(:), panel_row(:)
+    integer, allocatable :: right_rest_row(:), rest_row(:)     !< behind the first two columns
     integer :: n_rest                              !< columns of the system beside its first two
     integer :: system_before                       !< the element before the system
   end type forces_in_lanes
@@ -44,8 +45,8 @@ module jointfrf_modification
   !> The same, H, and columns.
   type :: modification_in_lanes
     type(forces_in_lanes) :: forces
-    integer :: n_element
-    integer, allocatable :: h(:, :), columns(:, :), columns_row(:), h_row(:)
+    type(element_matrix) :: h, columns
+    integer, allocatable :: columns_row(:), h_row(:)
   end type modification_in_lanes
 
   type, extends(line_operation) :: modification
@@ -105,21 +106,33 @@ contains
 
   subroutine plan_block(operation)
     type(modification), intent(inout) :: operation
+    type(element_space) :: room
+    integer :: n, n_m, used
 
-    call plan_modification(operation%n, operation%n_m, operation%plan)
-    operation%n_element = operation%plan%n_element
-    operation%n_hint = padded(operation%n_m)
+    n = operation%n
+    n_m = operation%n_m
+    call plan_modification(n, n_m, room, operation%plan)
+    operation%n_hint = padded(n_m)
     operation%alpha_pairs => real_lines(operation%alpha)
     operation%d_pairs => real_lines(operation%d)
     operation%result_pairs => real_lines(operation%result)
     call operation%reads(operation%alpha_pairs)
     call operation%reads(operation%d_pairs)
     associate (plan => operation%plan, dofs => operation%dofs)
-      operation%h_place = in_memory(operation%transposed, plan%h)
-      operation%d_place = in_memory(operation%transposed, plan%forces%d)
-      operation%taken = [flat(plan%columns), flat(plan%forces%rows), flat(plan%forces%h_mm)]
-      operation%taken_from = [flat(plan%h(:, dofs)), flat(plan%h(dofs, :)), flat(plan%h(dofs, dofs))]
+      call room%in_memory(operation%transposed, plan%h, operation%h_place)
+      call room%in_memory(operation%transposed, plan%forces%d, operation%d_place)
+      call room%new_list(n_m*(2*n + n_m), operation%taken)
+      used = 0
+      call room%add(plan%columns, operation%taken, used)
+      call room%add(plan%forces%rows, operation%taken, used)
+      call room%add(plan%forces%h_mm, operation%taken, used)
+      call room%new_list(n_m*(2*n + n_m), operation%taken_from)
+      used = 0
+      call room%add(plan%h, operation%taken_from, used, columns=dofs)
+      call room%add(plan%h, operation%taken_from, used, rows=dofs)
+      call room%add(plan%h, operation%taken_from, used, dofs, dofs)
     end associate
+    call operation%lies_in(room, n_m)
   end subroutine plan_block
 
   subroutine modify_block(self, kernels, first, n_lines, space, line_info, rcond)
@@ -135,7 +148,7 @@ contains
       call kernels%load(size(self%h_place), self%h_place, first, n_lines, self%alpha_pairs, x)
       call kernels%load(size(self%d_place), self%d_place, first, n_lines, self%d_pairs, x)
       call kernels%copy(size(self%taken), 1.0_dp, self%taken_from, self%taken, x)
-      call apply_in_lanes(self%plan, kernels, x, space%hint, rcond_lanes, space%ahead)
+      call apply_in_lanes(self%plan, kernels, x, space%hint, space%list, rcond_lanes, space%ahead)
       call kernels%store(size(self%h_place), self%h_place, first, n_lines, x, self%result_pairs)
       call kernels%total(size(self%h_place), self%h_place, x, total)
       rcond = rcond_lanes(:n_lines)
@@ -143,17 +156,16 @@ contains
     end associate
   end subroutine modify_block
 
-  subroutine plan_modification(n, n_m, plan)
+  subroutine plan_modification(n, n_m, room, plan)
     integer, intent(in) :: n, n_m
+    type(element_space), intent(inout) :: room
     type(modification_in_lanes), intent(out) :: plan
-    type(element_space) :: room
 
     plan%h = room%matrix(n, n)
     plan%columns = room%matrix(n, n_m)
-    plan%h_row = row_starts(plan%h)
-    plan%columns_row = row_starts(plan%columns)
+    call room%row_starts(plan%h, plan%h_row)
+    call room%row_starts(plan%columns, plan%columns_row)
     call plan_forces(n, n_m, room, plan%forces)
-    plan%n_element = room%taken
   end subroutine plan_modification
 
   !> The product of D and [H_mm, rows] is added up where the system lies, whose columns are in two pieces, with one more
@@ -162,25 +174,37 @@ contains
     integer, intent(in) :: n, n_m
     type(element_space), intent(inout) :: room
     type(forces_in_lanes), intent(out) :: plan
-    integer :: right(n_m, padded(n_m) + n), system(n_m, n_m + n), i
+    type(element_matrix) :: right, a, b
+    integer :: even, used, i
 
+    even = padded(n_m)
     plan%n = n
     plan%n_m = n_m
     plan%d = room%matrix(n_m, n_m)
-    right = room%matrix(n_m, padded(n_m) + n)
-    plan%right_before = right(1, 1) - 1
-    allocate (plan%h_mm, source=right(:, :n_m))
-    allocate (plan%rows, source=right(:, padded(n_m) + 1:))
-    system = room%system(n_m, n, plan%system_before)
-    plan%n_rest = padded(n_m) - 2 + n
-    plan%d_row = row_starts(plan%d)
-    plan%right_row = row_starts(right)
-    allocate (plan%panel_row(n_m), plan%rest_row(n_m))
-    plan%panel_row = system(:, 1) - 1
-    plan%rest_row = system(:, n_m + 1) - 1 - (padded(n_m) - 2)
-    plan%constant = [(plan%panel_row + i, i=1, 2), (plan%rest_row + i, i=1, plan%n_rest), &
-                     flat(right(:, n_m + 1:padded(n_m)))]
-    allocate (plan%constant_value(size(plan%constant)), source=(0.0_dp, 0.0_dp))
+    right = room%matrix(n_m, even + n)
+    plan%right_before = right%before
+    plan%h_mm = right%block(0, n_m, 0, n_m)
+    plan%rows = right%block(0, n_m, even, n)
+    call room%system(n_m, n, plan%system_before, a, b)
+    plan%n_rest = even - 2 + n
+    call room%row_starts(plan%d, plan%d_row)
+    call room%row_starts(right, plan%right_row)
+    call room%row_starts(right%block(0, n_m, 2, plan%n_rest), plan%right_rest_row)
+    call room%row_starts(a, plan%panel_row)
+    call room%row_starts(b%block(0, n_m, 2 - even, plan%n_rest), plan%rest_row)
+    call room%new_list(n_m*(2 + plan%n_rest + even - n_m), plan%constant)
+    call room%new_values(n_m*(2 + plan%n_rest + even - n_m), plan%constant_value)
+    if (room%no_memory) return
+    used = 0
+    do i = 1, 2
+      plan%constant(used + 1:used + n_m) = plan%panel_row + i
+      used = used + n_m
+    end do
+    do i = 1, plan%n_rest
+      plan%constant(used + 1:used + n_m) = plan%rest_row + i
+      used = used + n_m
+    end do
+    call room%add(right%block(0, n_m, n_m, even - n_m), plan%constant, used)
     do i = 1, n_m
       plan%constant_value((i - 1)*n_m + i) = 1
     end do
@@ -201,19 +225,20 @@ contains
     n_m = plan%n_m
     call kernels%fill(size(plan%constant), plan%constant_value, plan%constant, x)
     call kernels%product(n_m, 2, n_m, 1.0_dp, plan%d_row, plan%right_row, plan%panel_row, x)
-    call kernels%product(n_m, plan%n_rest, n_m, 1.0_dp, plan%d_row, plan%right_row + 2, plan%rest_row, x)
+    call kernels%product(n_m, plan%n_rest, n_m, 1.0_dp, plan%d_row, plan%right_rest_row, plan%rest_row, x)
     call kernels%solve(n_m, plan%n, n_m, plan%system_before, x, hint, force_row, rcond, ahead)
   end subroutine find_forces
 
   !> `apply_modification` in lanes, once H, D, H_mm, rows and columns are there.
-  subroutine apply_in_lanes(plan, kernels, x, hint, rcond, ahead)
+  !> force_row   workspace
+  subroutine apply_in_lanes(plan, kernels, x, hint, force_row, rcond, ahead)
     type(modification_in_lanes), intent(in) :: plan
     type(lane_kernels), intent(in) :: kernels
     real(dp), contiguous, intent(inout) :: x(:, :, :)
-    integer, contiguous, intent(inout) :: hint(:)
+    integer, contiguous, intent(inout) :: hint(:), force_row(:)
     real(dp), intent(out) :: rcond(lanes)
     type(lookahead), intent(inout) :: ahead
-    integer :: force_row(plan%forces%n_m), n, n_m
+    integer :: n, n_m
 
     n = plan%forces%n
     n_m = plan%forces%n_m

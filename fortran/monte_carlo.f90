@@ -11,8 +11,8 @@ module jointfrf_monte_carlo
   use jointfrf_engine, only: find_kernels
   use jointfrf_ismm, only: inverse_substructuring
   use jointfrf_kinds, only: dp, ip, long
-  use jointfrf_lanes, only: element_space, in_memory, lane_kernels, lanes, largest_solved, padded, real_lines, &
-    row_starts, rows_in_memory, to_register
+  use jointfrf_lanes, only: element_matrix, element_space, lane_kernels, lanes, largest_solved, padded, real_lines, &
+    rows_in_memory, to_register
   use jointfrf_line_layout, only: all_finite, load, store, take_block
   use jointfrf_lines_lapack, only: product_line, room_to_solve, solve_line
   use jointfrf_noise, only: draw, entry_counters, find_scale, line_counter, noise_model, spectrum_peak, &
@@ -60,7 +60,7 @@ module jointfrf_monte_carlo
     real(dp), pointer, contiguous :: mean(:, :, :) => null(), square(:, :, :) => null()
     integer(int64), pointer, contiguous :: low(:, :) => null()
     real(dp), allocatable :: scale(:, :)
-    integer, allocatable :: hint(:)
+    integer, allocatable :: hint(:), from(:)     !< where results lie
     complex(dp), allocatable :: gamma(:, :), found(:, :)
   end type study_space
 
@@ -125,6 +125,15 @@ contains
     n_freq = size(mean, 3)
     call find_kernels(work%kernels, work%blocks, info)
     if (info /= info_good .or. n_freq == 0) return
+    call make_plan(transposed, upper(method) == 'C', size(mean, 1), noise, work%plan, stat)
+    work%slices = max(1, min((most_slices + n_freq - 1)/n_freq, int(count)/fewest_realisations))
+    threads = threads_for(16.0_dp*real(work%plan%m, dp)**3*count*n_freq, int(work%slices, long)*n_freq, &
+                          serial_flops_lanes)
+    if (stat == 0) call allocate_study(work%plan, threads, work%slices*n_freq, space, part, stat)
+    if (stat /= 0) then
+      info = info_no_memory
+      return
+    end if
     if (upper(method) == 'I') then
       call inverse_substructuring(transposed, alpha, mean, line_info, rcond, info)
       if (info < 0) return
@@ -138,23 +147,14 @@ contains
       rcond = 1.0_dp
     end if
 
-    work%plan = make_plan(transposed, upper(method) == 'C', size(mean, 1), noise)
     work%noise = noise
     work%blocks = work%blocks .and. work%plan%m <= largest_solved
     work%first = int(first)
     work%count = int(count)
-    work%slices = max(1, min((most_slices + n_freq - 1)/n_freq, work%count/fewest_realisations))
     work%slice = ((work%count - 1)/work%slices + lanes)/lanes*lanes
     work%gamma => gamma
     work%gamma_pairs => real_lines(gamma)
     work%peak = spectrum_peak(noise, work%kernels, work%gamma_pairs)
-    threads = threads_for(16.0_dp*real(work%plan%m, dp)**3*work%count*n_freq, int(work%slices, long)*n_freq, &
-                          serial_flops_lanes)
-    call allocate_study(work%plan, threads, work%slices*n_freq, space, part, stat)
-    if (stat /= 0) then
-      info = info_no_memory
-      return
-    end if
     work%space => space
     work%part => part
     work%line_info => line_info
@@ -229,45 +229,47 @@ contains
 
   !> Where everything lies in lanes. For K*: the columns of gamma in the order k, j, so that only the last unknowns,
   !> rows j of the solution, must be found.
-  function make_plan(transposed, compliance, n, noise) result(plan)
+  subroutine make_plan(transposed, compliance, n, noise, plan, stat)
     logical, intent(in) :: transposed, compliance
     integer, intent(in) :: n
     type(noise_model), intent(in) :: noise
-    type(study_plan) :: plan
-    integer :: gamma(2*n, 2*n), whole(2*n, 3*n), part(n, 2*n), i, j
+    type(study_plan), intent(out) :: plan
+    integer, intent(out) :: stat
+    type(element_matrix) :: jk, jj, kk, kj, gamma, unit
     type(element_space) :: room
+    integer :: i
 
     plan%transposed = transposed
     plan%compliance = compliance
     plan%n = n
     plan%m = 2*n
     if (compliance) then
-      part = room%system(n, n, plan%system_before)
-      gamma(:n, n + 1:) = part(:, :n)                      ! jk, the matrix
-      gamma(:n, :n) = part(:, n + 1:)                      ! jj, the right-hand sides
-      gamma(n + 1:, n + 1:) = room%matrix(n, n)            ! kk
-      gamma(n + 1:, :n) = room%matrix(n, n)                ! kj, where C will be
-      plan%kk_row = row_starts(gamma(n + 1:, n + 1:))
-      plan%c_row = row_starts(gamma(n + 1:, :n))
-      plan%result = in_memory(transposed, gamma(n + 1:, :n))
+      call room%system(n, n, plan%system_before, jk, jj)   ! jk is the matrix, jj the right-hand sides
+      kk = room%matrix(n, n)
+      kj = room%matrix(n, n)                               ! where C will be
+      call room%row_starts(kk, plan%kk_row)
+      call room%row_starts(kj, plan%c_row)
+      call room%in_memory(transposed, kj, plan%result)
+      call room%in_memory(transposed, jj, jk, kj, kk, plan%gamma)
     else
-      whole = room%system(2*n, n, plan%system_before)
-      gamma(:, n + 1:) = whole(:, :n)
-      gamma(:, :n) = whole(:, n + 1:2*n)
-      plan%unit = in_memory(.true., whole(:, 2*n + 1:))
-      allocate (plan%unit_value(2*n*n))
-      do i = 1, 2*n
-        do j = 1, n
-          plan%unit_value((i - 1)*n + j) = merge(-1, 0, i == n + j)
+      call room%system(2*n, n, plan%system_before, gamma, unit)
+      gamma%turn = n
+      call room%in_memory(.true., unit, plan%unit)
+      call room%new_values(2*n*n, plan%unit_value)
+      if (.not. room%no_memory) then
+        do i = 1, n
+          plan%unit_value((n + i - 1)*n + i) = -1
         end do
-      end do
-      plan%result = in_memory(transposed, gamma(:n, :n))
+      end if
+      call room%in_memory(transposed, unit%block(0, n, 0, n), plan%result)
+      call room%in_memory(transposed, gamma, plan%gamma)
     end if
-    plan%gamma = in_memory(transposed, gamma)
-    plan%again = in_memory(.true., room%matrix(2*n, 2*n))
+    call room%in_memory(.true., room%matrix(2*n, 2*n), plan%again)
     plan%n_element = room%taken
-    plan%counters = entry_counters(noise, transposed, 2*n, 2*n)
-  end function make_plan
+    stat = merge(1, 0, room%no_memory)
+    if (stat == 0) allocate (plan%counters(4*n*n), stat=stat)
+    if (stat == 0) call entry_counters(noise, transposed, 2*n, 2*n, plan%counters)
+  end subroutine make_plan
 
   subroutine prepare(plan, space, stat)
     type(study_plan), intent(in) :: plan
@@ -280,7 +282,7 @@ contains
     n = plan%n
     m = plan%m
     allocate (space%room(lanes*(2*plan%n_element + 2*m + 5*n*n + 1)), space%low_room(lanes*(m*m + 1)), &
-              space%scale(2, m*m), space%hint(padded(m)), space%gamma(m, m), space%found(n, n), stat=stat)
+              space%scale(2, m*m), space%hint(padded(m)), space%from(n*n), space%gamma(m, m), space%found(n, n), stat=stat)
     if (stat /= 0) return
     call identify_one(plan, space%gamma, space%lapack, space%found, no_code, no_rcond)     ! counts what it takes
     call space%lapack%set_up(stat)
@@ -319,7 +321,7 @@ contains
     integer(int64) :: high(lanes)
     real(dp) :: taken(lanes), number(lanes), rcond(lanes)
     integer(ip) :: code(lanes)
-    integer :: from(plan%n**2), done, here, l
+    integer :: done, here, l
 
     call clear(part)
     call find_scale(noise, kernels, plan%m**2, gamma, peak, space%scale)
@@ -334,10 +336,10 @@ contains
       here = min(lanes, count - done)
       high = [(first + done + l, l=0, lanes - 1)]
       code = not(line_good)
-      from = plan%result
-      if (blocks) call identify_lanes(plan, noise, kernels, high, gamma, space, from, code, rcond)
+      space%from(:) = plan%result
+      if (blocks) call identify_lanes(plan, noise, kernels, high, gamma, space, code, rcond)
       if (any(code(:here) /= line_good)) &
-        call repeat_lanes(plan, noise, kernels, high, here, gamma, space, from, code, rcond)
+        call repeat_lanes(plan, noise, kernels, high, here, gamma, space, code, rcond)
       taken = 0.0_dp
       do l = 1, here
         if (code(l) == line_good) then
@@ -348,7 +350,7 @@ contains
         end if
       end do
       number = number + taken
-      call kernels%moments(plan%n**2, from, space%x, taken, number, space%mean, space%square)
+      call kernels%moments(plan%n**2, space%from, space%x, taken, number, space%mean, space%square)
     end do
     do l = 1, lanes
       call add(number(l), space%mean(l, :, :), space%square(l, :, :), part)
@@ -356,15 +358,13 @@ contains
   end subroutine run_slice
 
   !> One realisation a lane. A lane whose code is not good is in doubt.
-  !> from    where the results lie
-  subroutine identify_lanes(plan, noise, kernels, high, gamma, space, from, code, rcond)
+  subroutine identify_lanes(plan, noise, kernels, high, gamma, space, code, rcond)
     type(study_plan), intent(in) :: plan
     type(noise_model), intent(in) :: noise
     type(lane_kernels), intent(in) :: kernels
     integer(int64), intent(in) :: high(lanes)
     real(dp), contiguous, intent(in) :: gamma(:, :)
     type(study_space), target, intent(inout) :: space
-    integer, intent(inout) :: from(:)
     integer(ip), intent(out) :: code(lanes)
     real(dp), intent(out) :: rcond(lanes)
     integer :: row(plan%m), n, m
@@ -375,14 +375,14 @@ contains
     call pollute_in_lanes(plan, noise, kernels, high, gamma, plan%gamma, space)
     if (plan%compliance) then
       call kernels%solve(n, n, n, plan%system_before, space%x, space%hint, row, rcond)   ! gamma_jk^-1 gamma_jj
-      call kernels%copy(n*n, -1.0_dp, from, from, space%x)
+      call kernels%copy(n*n, -1.0_dp, space%from, space%from, space%x)
       call kernels%product(n, n, n, 1.0_dp, plan%kk_row, row, plan%c_row, space%x)
     else
       call kernels%fill(m*n, plan%unit_value, plan%unit, space%x)
       call kernels%solve(m, n, n, plan%system_before, space%x, space%hint, row, rcond)   ! rows j of -gamma^-1 E_k
-      call rows_in_memory(plan%transposed, row(n + 1:), n, from)
+      call rows_in_memory(plan%transposed, row(n + 1:), n, space%from)
     end if
-    call kernels%total(n*n, from, space%x, total)
+    call kernels%total(n*n, space%from, space%x, total)
     call kernels%judge(lanes, total, code, rcond)
   end subroutine identify_lanes
 
@@ -406,12 +406,12 @@ contains
   end subroutine pollute_in_lanes
 
   !> Lanes in doubt once more by the reference engine.
-  subroutine repeat_lanes(plan, noise, kernels, high, here, gamma, space, from, code, rcond)
+  subroutine repeat_lanes(plan, noise, kernels, high, here, gamma, space, code, rcond)
     type(study_plan), intent(in) :: plan
     type(noise_model), intent(in) :: noise
     type(lane_kernels), intent(in) :: kernels
     integer(int64), intent(in) :: high(lanes)
-    integer, intent(in) :: here, from(:)
+    integer, intent(in) :: here
     real(dp), contiguous, intent(in) :: gamma(:, :)
     type(study_space), target, intent(inout) :: space
     integer(ip), intent(inout) :: code(lanes)
@@ -430,7 +430,7 @@ contains
       call identify_one(plan, space%gamma, space%lapack, space%found, code(l), rcond(l))
       do j = 1, plan%n
         do i = 1, plan%n
-          p = from((j - 1)*plan%n + i)
+          p = space%from((j - 1)*plan%n + i)
           space%x(l, 1, p) = real(space%found(i, j), dp)
           space%x(l, 2, p) = aimag(space%found(i, j))
         end do

@@ -129,8 +129,7 @@ contains
       return
     end if
     work%space => space
-    work%counters = reshape(spread(entry_counters(noise, transposed, size(h, 1), size(h, 2)), 2, lanes) &
-                            + spread([(line_counter(t), t=1, lanes)], 1, n), [lanes, n])
+    call list_counters(noise, transposed, size(h, 1), size(h, 2), work%counters)
     work%from => real_lines(h)
     work%to => real_lines(polluted)
     work%peak = spectrum_peak(noise, work%kernels, work%from)
@@ -179,14 +178,29 @@ contains
     call kernels%pollute_flat(n*n_lines, h, space%scale, space%e, polluted)
   end subroutine pollute_lines
 
-  !> What every entry contributes to its counter, in the order in which the caller stores a line, shape
-  !> (n_first*n_second). Entries with the same noise have the same counter.
-  !> n_first, n_second   size of a stored line
-  pure function entry_counters(noise, transposed, n_first, n_second) result(counters)
+  !> Counters of all entries of lines 1 .. lanes, in this order.
+  subroutine list_counters(noise, transposed, n_first, n_second, counters)
     type(noise_model), intent(in) :: noise
     logical, intent(in) :: transposed
     integer, intent(in) :: n_first, n_second
-    integer(int64) :: counters(n_first*n_second)
+    integer(int64), intent(out) :: counters(n_first*n_second, lanes)
+    integer :: line
+
+    call entry_counters(noise, transposed, n_first, n_second, counters(:, 1))
+    do line = 2, lanes
+      counters(:, line) = counters(:, 1) + line_counter(line)
+    end do
+    counters(:, 1) = counters(:, 1) + line_counter(1)
+  end subroutine list_counters
+
+  !> What every entry contributes to its counter, in the order in which the caller stores a line, shape
+  !> (n_first*n_second). Entries with the same noise have the same counter.
+  !> n_first, n_second   size of a stored line
+  pure subroutine entry_counters(noise, transposed, n_first, n_second, counters)
+    type(noise_model), intent(in) :: noise
+    logical, intent(in) :: transposed
+    integer, intent(in) :: n_first, n_second
+    integer(int64), intent(out) :: counters(n_first*n_second)
     integer :: i, j, row, column, columns
 
     columns = merge(n_first, n_second, transposed)/noise%block
@@ -201,7 +215,7 @@ contains
         end if
       end do
     end do
-  end function entry_counters
+  end subroutine entry_counters
 
   !> What a line contributes to the counters of its entries; lines count from 1.
   pure function line_counter(line) result(counter)

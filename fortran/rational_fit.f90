@@ -36,24 +36,38 @@ module jointfrf_rational_fit
     real(dp), allocatable :: re(:, :), im(:, :)                !< psi, (n_freq, n)
     real(dp), pointer, contiguous :: products(:, :, :) => null()   !< (piece_lines, 2 piece_pairs, threads)
     real(dp), pointer, contiguous :: sums(:, :, :) => null()   !< (number of sums, 2, n_pairs): of Re, of Im
+    real(dp), allocatable :: own_products(:, :, :), own_sums(:, :, :)   !< where they lie
   contains
     procedure :: do_items => sum_pairs
   end type pair_sums
 
   !> The quadratic form of sigma of each entry, its numerator eliminated; an item is an entry.
   type, extends(shared_work) :: elimination
-    integer :: n, n_entries
+    integer :: n, n_entries, threads
     type(pair_sums), pointer :: gram => null()
     complex(dp), pointer, contiguous :: forms(:, :, :) => null()   !< (n, n, n_entries)
+    complex(dp), pointer, contiguous :: work(:, :, :, :) => null() !< (n, n, 3, threads)
+    integer(blas_ip), pointer, contiguous :: pivot(:, :) => null() !< (n, threads)
     integer, pointer, contiguous :: failed(:) => null()        !< (n_entries), 0 good
+    complex(dp), allocatable :: own_forms(:, :, :), own_work(:, :, :, :)   !< where they lie
+    integer(blas_ip), allocatable :: own_pivot(:, :)
+    integer, allocatable :: own_failed(:)
   contains
     procedure :: do_items => eliminate_numerators
   end type elimination
 
-  !> psi and R.
+  !> psi and R, and what finding them takes: projections, the root of the mean weight.
   type :: orthonormal_basis
-    complex(dp), allocatable :: psi(:, :), triangle(:, :)
+    complex(dp), allocatable :: psi(:, :), triangle(:, :), numbers(:)
+    real(dp), allocatable :: mean_weight(:)
   end type orthonormal_basis
+
+  !> What finding the zeros of sigma takes.
+  type :: zero_space
+    complex(dp), allocatable :: sigma(:, :), found(:, :), back(:, :), matrix(:, :), moved(:), work(:)
+    real(dp), allocatable :: real_work(:)
+    integer(blas_ip), allocatable :: pivot(:)
+  end type zero_space
 
 contains
 
@@ -79,47 +93,49 @@ contains
     real(dp), intent(out) :: squares
     integer(ip), intent(out) :: info
     type(pair_sums), target :: gram
-    type(elimination) :: entries
+    type(elimination), target :: entries
     type(orthonormal_basis) :: basis
-    complex(dp), allocatable :: moved(:), form(:, :)
+    type(zero_space) :: space
+    complex(dp), allocatable :: moved(:), form(:, :), of_form(:, :)
     real(dp) :: before, now
     integer :: n, k, stat
 
-    squares = 0.0_dp
     info = info_good
-    if (size(h) == 0) return
-    n = size(poles) + 1
-    call prepare_sums(4*size(h, 2), n, size(s), gram, info)
-    if (info == info_good) then
-      allocate (moved(n - 1), form(n, n), basis%psi(size(s), n), basis%triangle(n, n), &
-                entries%forms(n, n, size(h, 2)), entries%failed(size(h, 2)), stat=stat)
-      if (stat /= 0) info = info_no_memory
+    if (size(h) == 0) then
+      squares = 0.0_dp
+      return
     end if
-    if (info /= info_good) return
+    n = size(poles) + 1
+    call prepare_sums(4*size(h, 2), n, size(s), gram, stat)
+    if (stat == 0) call prepare_basis(n, size(s), basis, stat)
+    if (stat == 0) call prepare_entries(n, size(h, 2), gram, entries, stat)
+    if (stat == 0) call prepare_zeros(n, space, stat)
+    if (stat == 0) allocate (moved(n - 1), form(n, n), of_form(n, 1), stat=stat)
+    if (stat /= 0) then
+      info = info_no_memory
+      return
+    end if
     call set_weights(h, weight, gram%weights)
-    entries%n = n
-    entries%n_entries = size(h, 2)
-    entries%gram => gram
     squares = huge(squares)
     before = huge(before)
-    moved = poles
+    moved(:) = poles
     call hold_blas_threads()
     do k = 0, iterations
       call make_basis(s, weight, moved, basis)
       call form_of_sigma(basis, gram, entries, form, info)
       if (info /= info_good) exit
-      now = max(real(dot_product(basis%triangle(:, 1), matmul(form, basis%triangle(:, 1))), dp), 0.0_dp)
+      call multiply('N', form, basis%triangle(:, 1:1), of_form)
+      now = max(real(dot_product(basis%triangle(:, 1), of_form(:, 1)), dp), 0.0_dp)
       if (now < squares) then
         squares = now
         poles = moved
       end if
       if (abs(before - now) <= still*now .or. k == iterations) exit
       before = now
-      call zeros_of_sigma(basis, form, s, moved, info)
+      call zeros_of_sigma(basis, form, s, space, moved, info)
       if (info /= info_good) exit
     end do
     call release_blas_threads()
-    deallocate (gram%products, gram%sums, entries%forms, entries%failed)
   end subroutine relocate_poles
 
   !> Least-squares fit with given poles: normal equations in psi, corrected once by their residual.
@@ -136,58 +152,66 @@ contains
     integer(ip), intent(out) :: info
     type(pair_sums), target :: gram
     type(orthonormal_basis) :: basis
-    complex(dp), allocatable :: back(:, :), pulled(:, :), inverse(:, :, :), coefficients(:, :), pull(:, :)
-    logical :: good(size(h, 2))
+    complex(dp), allocatable :: back(:, :), pulled(:, :), inverse(:, :, :), coefficients(:, :), pull(:, :), work(:, :)
+    complex(dp), allocatable :: change(:, :)
+    integer(blas_ip), allocatable :: pivot(:)
+    logical, allocatable :: good(:)
     integer :: n, m, e, turn, stat
 
+    info = info_good
+    n = size(poles) + 1
+    m = size(h, 2)
+    stat = 0
+    if (size(h) > 0) then
+      call prepare_sums(m, n, size(s), gram, stat)
+      if (stat == 0) call prepare_basis(n, size(s), basis, stat)
+      if (stat == 0) allocate (back(n, n), pulled(size(s), m), inverse(n, n, m), coefficients(n, m), pull(n, m), &
+                               work(n, n), change(n, 1), pivot(n), good(m), stat=stat)
+    end if
+    if (stat /= 0) then
+      info = info_no_memory
+      return
+    end if
     smooth = 0.0_dp
     squares = 0.0_dp
     loss = 0.0_dp
-    info = info_good
     if (size(h) == 0) return
-    n = size(poles) + 1
-    m = size(h, 2)
-    call prepare_sums(m, n, size(s), gram, info)
-    if (info == info_good) then
-      allocate (basis%psi(size(s), n), basis%triangle(n, n), back(n, n), pulled(size(s), m), inverse(n, n, m), &
-                coefficients(n, m), pull(n, m), stat=stat)
-      if (stat /= 0) info = info_no_memory
-    end if
-    if (info /= info_good) return
-    gram%weights = weight**2
+    gram%weights(:, :) = weight**2
     call hold_blas_threads()
     call make_basis(s, weight, poles, basis)
     call invert_triangle(basis%triangle, back)
     call sum_all(basis, gram)
     do e = 1, m
-      call invert_gram(gram, e, inverse(:, :, e), good(e))
+      call invert_gram(gram, e, work, pivot, inverse(:, :, e), good(e))
     end do
     coefficients = 0.0_dp
     do turn = 1, 2
-      pulled = gram%weights*(h - smooth)
+      pulled(:, :) = gram%weights*(h - smooth)
       call multiply('C', basis%psi, pulled, pull)
       do e = 1, m
-        if (good(e)) coefficients(:, e) = coefficients(:, e) + matmul(inverse(:, :, e), pull(:, e))
+        if (.not. good(e)) cycle
+        call multiply('N', inverse(:, :, e), pull(:, e:e), change)
+        coefficients(:, e) = coefficients(:, e) + change(:, 1)
       end do
       call multiply('N', basis%psi, coefficients, smooth)
     end do
     do e = 1, m
-      if (good(e)) call add_loss(back, inverse(:, :, e), coefficients(:, e), loss)
+      if (good(e)) call add_loss(back, inverse(:, :, e), coefficients(:, e), work, loss)
       squares = squares + sum((weight(:, e)*abs(h(:, e) - smooth(:, e)))**2)
     end do
     info = count(.not. good, kind=ip)
     call release_blas_threads()
-    deallocate (gram%products, gram%sums)
   end subroutine rational_fit
 
   !> Inverse of the Gram matrix of an entry.
-  subroutine invert_gram(gram, entry, inverse, good)
+  !> normal, pivot   workspace
+  subroutine invert_gram(gram, entry, normal, pivot, inverse, good)
     type(pair_sums), intent(in) :: gram
     integer, intent(in) :: entry
-    complex(dp), contiguous, intent(out) :: inverse(:, :)
+    complex(dp), contiguous, intent(out) :: normal(:, :), inverse(:, :)
+    integer(blas_ip), contiguous, intent(out) :: pivot(:)
     logical, intent(out) :: good
-    complex(dp) :: normal(gram%n, gram%n)
-    integer(blas_ip) :: pivot(gram%n), n, stat
+    integer(blas_ip) :: n, stat
     integer :: j
 
     call own_gram(gram, entry, normal)
@@ -201,13 +225,18 @@ contains
   end subroutine invert_gram
 
   !> What each pole takes off the sum of squares of an entry: |residue|^2 over its variance.
-  pure subroutine add_loss(back, inverse, coefficients, loss)
-    complex(dp), intent(in) :: back(:, :), inverse(:, :), coefficients(:)
+  !> right   workspace: the inverse times B^H
+  subroutine add_loss(back, inverse, coefficients, right, loss)
+    complex(dp), contiguous, intent(in) :: back(:, :), inverse(:, :), coefficients(:)
+    complex(dp), contiguous, intent(out) :: right(:, :)
     real(dp), intent(inout) :: loss(:)
-    complex(dp) :: right(size(back, 1), size(back, 1)), residue
+    complex(dp) :: residue
+    integer(blas_ip) :: n
     integer :: j
 
-    right = matmul(inverse, transpose(conjg(back)))
+    n = size(back, 1, kind=blas_ip)
+    call zgemm('N', 'C', n, n, n, (1.0_dp, 0.0_dp), inverse, n, back, n, (0.0_dp, 0.0_dp), right, n, 1_c_size_t, &
+               1_c_size_t)
     do j = 2, size(back, 1)
       residue = sum(back(j, :)*coefficients)
       loss(j - 1) = loss(j - 1) + abs(residue)**2/real(sum(back(j, :)*right(:, j)), dp)
@@ -227,24 +256,64 @@ contains
                size(y, 1, kind=blas_ip), 1_c_size_t, 1_c_size_t)
   end subroutine multiply
 
-  subroutine prepare_sums(n_sums, n, n_freq, gram, info)
-    integer, intent(in) :: n_sums, n, n_freq
-    type(pair_sums), intent(out) :: gram
-    integer(ip), intent(out) :: info
-    integer :: i, j, stat
+  subroutine prepare_basis(n, n_freq, basis, stat)
+    integer, intent(in) :: n, n_freq
+    type(orthonormal_basis), intent(inout) :: basis
+    integer, intent(out) :: stat
 
-    info = info_good
+    allocate (basis%psi(n_freq, n), basis%triangle(n, n), basis%numbers(n), basis%mean_weight(n_freq), stat=stat)
+  end subroutine prepare_basis
+
+  subroutine prepare_zeros(n, space, stat)
+    integer, intent(in) :: n
+    type(zero_space), intent(inout) :: space
+    integer, intent(out) :: stat
+
+    allocate (space%sigma(n, 1), space%found(n, 1), space%back(n, n), space%matrix(n - 1, n - 1), space%moved(n - 1), &
+              space%work(4*n), space%real_work(2*n), space%pivot(n), stat=stat)
+  end subroutine prepare_zeros
+
+  subroutine prepare_entries(n, n_entries, gram, entries, stat)
+    integer, intent(in) :: n, n_entries
+    type(pair_sums), target, intent(in) :: gram
+    type(elimination), target, intent(inout) :: entries
+    integer, intent(out) :: stat
+
+    entries%n = n
+    entries%n_entries = n_entries
+    entries%gram => gram
+    entries%threads = threads_for(24.0_dp*n_entries*real(n, dp)**3, int(n_entries, long), serial_flops_products)
+    allocate (entries%own_forms(n, n, n_entries), entries%own_failed(n_entries), &
+              entries%own_work(n, n, 3, entries%threads), entries%own_pivot(n, entries%threads), stat=stat)
+    if (stat /= 0) return
+    entries%forms => entries%own_forms
+    entries%failed => entries%own_failed
+    entries%work => entries%own_work
+    entries%pivot => entries%own_pivot
+  end subroutine prepare_entries
+
+  subroutine prepare_sums(n_sums, n, n_freq, gram, stat)
+    integer, intent(in) :: n_sums, n, n_freq
+    type(pair_sums), target, intent(inout) :: gram
+    integer, intent(out) :: stat
+    integer :: i, j, pair
+
     gram%n = n
     gram%n_pairs = n*(n + 1)/2
     allocate (gram%first(gram%n_pairs), gram%second(gram%n_pairs), gram%weights(n_freq, n_sums), gram%re(n_freq, n), &
-              gram%im(n_freq, n), gram%sums(n_sums, 2, gram%n_pairs), &
-              gram%products(piece_lines, 2*piece_pairs, threads_of(n_sums, gram%n_pairs, n_freq)), stat=stat)
-    if (stat /= 0) then
-      info = info_no_memory
-      return
-    end if
-    gram%first = [((i, i=1, j), j=1, n)]
-    gram%second = [((j, i=1, j), j=1, n)]
+              gram%im(n_freq, n), gram%own_sums(n_sums, 2, gram%n_pairs), &
+              gram%own_products(piece_lines, 2*piece_pairs, threads_of(n_sums, gram%n_pairs, n_freq)), stat=stat)
+    if (stat /= 0) return
+    gram%sums => gram%own_sums
+    gram%products => gram%own_products
+    pair = 0
+    do j = 1, n
+      do i = 1, j
+        pair = pair + 1
+        gram%first(pair) = i
+        gram%second(pair) = j
+      end do
+    end do
   end subroutine prepare_sums
 
   function threads_of(n_sums, n_pairs, n_freq) result(threads)
@@ -272,14 +341,17 @@ contains
   subroutine make_basis(s, weight, poles, basis)
     complex(dp), contiguous, intent(in) :: s(:), poles(:)
     real(dp), contiguous, intent(in) :: weight(:, :)
-    type(orthonormal_basis), intent(inout) :: basis
-    complex(dp), target :: numbers(size(poles) + 1)
+    type(orthonormal_basis), target, intent(inout) :: basis
     complex(dp), pointer, contiguous :: part(:, :)
-    real(dp) :: mean_weight(size(s)), length
+    real(dp) :: length
     integer :: j, turn
 
-    mean_weight = sqrt(sum(weight**2, dim=2)/size(weight, 2))
-    associate (psi => basis%psi, triangle => basis%triangle)
+    associate (psi => basis%psi, triangle => basis%triangle, numbers => basis%numbers, mean_weight => basis%mean_weight)
+      mean_weight = 0.0_dp
+      do j = 1, size(weight, 2)
+        mean_weight = mean_weight + weight(:, j)**2
+      end do
+      mean_weight = sqrt(mean_weight/size(weight, 2))
       triangle = 0.0_dp
       psi(:, 1) = mean_weight
       do j = 1, size(poles)
@@ -287,7 +359,7 @@ contains
       end do
       do j = 1, size(psi, 2)
         do turn = 1, merge(0, 2, j == 1)
-          part(1:j - 1, 1:1) => numbers(:j - 1)
+          part(1:j - 1, 1:1) => basis%numbers(:j - 1)
           call multiply('C', psi(:, :j - 1), psi(:, j:j), part)
           call take_off(psi(:, :j - 1), numbers(:j - 1), psi(:, j))
           triangle(:j - 1, j) = triangle(:j - 1, j) + numbers(:j - 1)
@@ -332,8 +404,8 @@ contains
     type(orthonormal_basis), intent(in) :: basis
     type(pair_sums), intent(inout) :: gram
 
-    gram%re = real(basis%psi)
-    gram%im = aimag(basis%psi)
+    gram%re(:, :) = real(basis%psi)
+    gram%im(:, :) = aimag(basis%psi)
     call share(gram, int((gram%n_pairs - 1)/piece_pairs + 1, long), size(gram%products, 3), even=.true.)
   end subroutine sum_all
 
@@ -391,14 +463,15 @@ contains
     type(elimination), intent(in) :: entries
     complex(dp), contiguous, intent(out) :: form(:, :)
     integer(ip), intent(out) :: info
-    integer :: threads, i, j
+    integer :: e, i, j
 
     call sum_all(basis, gram)
-    threads = threads_for(24.0_dp*entries%n_entries*real(entries%n, dp)**3, int(entries%n_entries, long), &
-                          serial_flops_products)
-    call share(entries, int(entries%n_entries, long), threads, even=.true.)
+    call share(entries, int(entries%n_entries, long), entries%threads, even=.true.)
     info = count(entries%failed /= 0, kind=ip)
-    form = sum(entries%forms, dim=3)
+    form = 0.0_dp
+    do e = 1, entries%n_entries
+      form = form + entries%forms(:, :, e)
+    end do
     do j = 1, size(form, 2)                                   ! Hermitian but for rounding
       do i = 1, j
         form(i, j) = (form(i, j) + conjg(form(j, i)))/2
@@ -412,16 +485,15 @@ contains
     class(elimination), intent(in) :: self
     integer(long), intent(in) :: first, last
     integer, intent(in) :: thread
-    complex(dp) :: own(self%n, self%n), mixed(self%n, self%n), solved(self%n, self%n)
-    integer(blas_ip) :: pivot(self%n), n, stat
+    integer(blas_ip) :: n, stat
     integer :: e, k, m
 
-    if (thread < 1) return                 ! workspace lies on the stack of the thread
     n = int(self%n, blas_ip)
     m = self%n_entries
     do e = int(first), int(last)
-      call own_gram(self%gram, e, own)
-      associate (form => self%forms(:, :, e), sums => self%gram%sums)
+      associate (form => self%forms(:, :, e), sums => self%gram%sums, own => self%work(:, :, 1, thread), &
+                 mixed => self%work(:, :, 2, thread), solved => self%work(:, :, 3, thread), pivot => self%pivot(:, thread))
+        call own_gram(self%gram, e, own)
         do k = 1, self%gram%n_pairs
           associate (i => self%gram%first(k), j => self%gram%second(k), right => sums(m + e, :, k), &
                      re => sums(2*m + e, :, k), im => sums(3*m + e, :, k))          ! w^2 |h|^2, w^2 Re h, w^2 Im h
@@ -442,46 +514,51 @@ contains
   end subroutine eliminate_numerators
 
   !> Zeros of the sigma that minimises its form, its mean held.
-  subroutine zeros_of_sigma(basis, form, s, poles, info)
+  subroutine zeros_of_sigma(basis, form, s, space, poles, info)
     type(orthonormal_basis), intent(in) :: basis
     complex(dp), contiguous, intent(inout) :: form(:, :)
     complex(dp), contiguous, intent(in) :: s(:)
+    type(zero_space), intent(inout) :: space
     complex(dp), contiguous, intent(inout) :: poles(:)
     integer(ip), intent(out) :: info
-    complex(dp) :: sigma(size(form, 1)), back(size(form, 1), size(form, 1)), no_left(1), no_right(1)
-    complex(dp) :: matrix(size(poles), size(poles)), moved(size(poles)), work(4*size(poles) + 1)
-    real(dp) :: trace, real_work(2*size(poles) + 1), least
-    integer(blas_ip) :: pivot(size(form, 1)), n, m, stat
+    complex(dp) :: no_left(1), no_right(1)
+    real(dp) :: trace, least
+    integer(blas_ip) :: n, m, stat
     integer :: k
 
     info = info_good
     n = size(form, 1, kind=blas_ip)
     m = n - 1_blas_ip
-    trace = sum([(real(form(k, k), dp), k=1, size(form, 1))])
+    trace = 0.0_dp
     do k = 1, size(form, 1)
-      form(k, k) = form(k, k) + rounding*trace/size(form, 1)
-      sigma(k) = sum(conjg(basis%psi(:, k)))
+      trace = trace + real(form(k, k), dp)
     end do
-    call zgesv(n, 1_blas_ip, form, n, pivot, sigma, n, stat)
-    call invert_triangle(basis%triangle, back)
-    sigma = matmul(back, sigma)
-    if (stat /= 0 .or. .not. abs(sigma(1)) > 0.0_dp) info = 1
-    if (info /= info_good .or. m == 0) return
-    do k = 1, size(poles)
-      matrix(:, k) = -sigma(k + 1)/sigma(1)
-      matrix(k, k) = matrix(k, k) + poles(k)
-    end do
-    if (.not. all_finite(matrix)) then
-      info = 1
-      return
-    end if
-    call zgeev('N', 'N', m, matrix, m, moved, no_left, 1_blas_ip, no_right, 1_blas_ip, work, &
-               size(work, kind=blas_ip), real_work, stat, 1_c_size_t, 1_c_size_t)
-    if (stat /= 0) then
-      info = 1
-      return
-    end if
-    least = nearest*(maxval(aimag(s)) - minval(aimag(s)))/size(s)
-    poles = cmplx(-max(abs(real(moved)), least), aimag(moved), dp)
+    associate (sigma => space%found, matrix => space%matrix, moved => space%moved)
+      do k = 1, size(form, 1)
+        form(k, k) = form(k, k) + rounding*trace/size(form, 1)
+        space%sigma(k, 1) = sum(conjg(basis%psi(:, k)))
+      end do
+      call zgesv(n, 1_blas_ip, form, n, space%pivot, space%sigma, n, stat)
+      call invert_triangle(basis%triangle, space%back)
+      call multiply('N', space%back, space%sigma, sigma)
+      if (stat /= 0 .or. .not. abs(sigma(1, 1)) > 0.0_dp) info = 1
+      if (info /= info_good .or. m == 0) return
+      do k = 1, size(poles)
+        matrix(:, k) = -sigma(k + 1, 1)/sigma(1, 1)
+        matrix(k, k) = matrix(k, k) + poles(k)
+      end do
+      if (.not. all_finite(matrix)) then
+        info = 1
+        return
+      end if
+      call zgeev('N', 'N', m, matrix, m, moved, no_left, 1_blas_ip, no_right, 1_blas_ip, space%work, &
+                 size(space%work, kind=blas_ip), space%real_work, stat, 1_c_size_t, 1_c_size_t)
+      if (stat /= 0) then
+        info = 1
+        return
+      end if
+      least = nearest*(maxval(aimag(s)) - minval(aimag(s)))/size(s)
+      poles = cmplx(-max(abs(real(moved)), least), aimag(moved), dp)
+    end associate
   end subroutine zeros_of_sigma
 end module jointfrf_rational_fit

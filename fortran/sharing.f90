@@ -5,7 +5,7 @@
 module jointfrf_sharing
   !$ use omp_lib, only: omp_get_max_threads, omp_get_thread_num, omp_in_parallel
   use jointfrf_blas_threads, only: blas_takes_threads
-  use jointfrf_forks, only: has_its_threads, watch_forks
+  use jointfrf_forks, only: can_start, has_its_threads, watch_forks
   use jointfrf_kinds, only: dp, long
   use jointfrf_traps, only: hold_traps, host_state, release_traps
   implicit none
@@ -87,7 +87,7 @@ contains
   end function first_of
 
   !> One thread for little work, inside somebody else's parallel region, in a forked process whose threads are in its
-  !> parent, or where the BLAS takes one only; else what OpenMP would take.
+  !> parent, where the system starts no more threads, or where the BLAS takes one only; else what OpenMP would take.
   !> flops     floating-point operations of all items
   !> serial    so many are not worth a second thread
   function threads_for(flops, n_items, serial) result(threads)
@@ -100,5 +100,8 @@ contains
     !$ if (omp_in_parallel()) return
     if (.not. has_its_threads()) return
     !$ if (blas_takes_threads()) threads = int(min(int(omp_get_max_threads(), long), n_items))
+    if (threads > 1) then
+      if (.not. can_start(threads)) threads = 1
+    end if
   end function threads_for
 end module jointfrf_sharing

@@ -16,7 +16,7 @@ module jointfrf_sweep
   use jointfrf_caller_memory, only: caller_memory, take_memory
   use jointfrf_engine, only: find_kernels
   use jointfrf_kinds, only: blas_ip, dp, ip, long
-  use jointfrf_lanes, only: in_doubt, lane_kernels, lanes, to_register
+  use jointfrf_lanes, only: element_space, in_doubt, lane_kernels, lanes, to_register
   use jointfrf_line_layout, only: store_nan
   use jointfrf_lookahead, only: add_range, lookahead, most_ranges
   use jointfrf_sharing, only: serial_flops, serial_flops_lanes, share, shared_work, threads_for
@@ -59,6 +59,7 @@ module jointfrf_sweep
     integer(blas_ip), pointer, contiguous :: pivot(:) => null()
     real(dp), pointer, contiguous :: x(:, :, :) => null()   !< elements of a block, shape (lanes, 2, n_element)
     integer, allocatable :: hint(:)          !< pivot rows of the block before
+    integer, allocatable :: list(:)          !< what a block needs to say where its numbers lie
     type(lookahead) :: ahead                 !< memory of the next block
     type(own_memory) :: own                  !< where the others lie, unless in the caller's memory
   contains
@@ -78,6 +79,8 @@ module jointfrf_sweep
     real(dp) :: flops = 0.0_dp     !< estimated work of one line
     integer :: n_element = 0       !< elements that a block takes, see jointfrf_lanes; 0: no block form
     integer :: n_hint = 0          !< pivot rows that a block remembers
+    integer :: n_list = 0          !< places that it lists
+    logical :: no_memory = .false. !< whether there was none for the plan of the blocks
     integer :: block_lines = lanes !< lines of a block
     integer :: n_stream = 0        !< the caller's large arrays that a block reads
     type(stream) :: streams(most_ranges - 1)
@@ -87,6 +90,7 @@ module jointfrf_sweep
     procedure(line_routine), deferred :: line
     procedure :: line_block => no_block
     procedure :: reads
+    procedure :: lies_in
   end type line_operation
 
   !> The lines of an operation as work to be shared: an item is a share of lines.
@@ -131,6 +135,18 @@ contains
     self%streams(self%n_stream)%address = transfer(c_loc(lines), 0_c_intptr_t)
     self%streams(self%n_stream)%line_bytes = 16_c_intptr_t*size(lines, 2)
   end subroutine reads
+
+  !> A block lies in this space.
+  !> n_list   places that a block lists while it is computed
+  subroutine lies_in(self, room, n_list)
+    class(line_operation), intent(inout) :: self
+    type(element_space), intent(in) :: room
+    integer, intent(in) :: n_list
+
+    self%n_element = room%taken
+    self%n_list = n_list
+    self%no_memory = room%no_memory
+  end subroutine lies_in
 
   !> What to bring near while the block of lines from first to last is computed: what the next block reads, and where
   !> this one writes.
@@ -320,8 +336,9 @@ contains
     n_shares = (n_freq - 1)/work%lines + 1
     threads = threads_for(operation%flops*n_freq, n_shares, merge(serial_flops_lanes, serial_flops, work%blocks))
     work%far = sum(operation%streams(:operation%n_stream)%line_bytes)*n_freq > near_bytes
-    call prepare(operation, work%blocks, threads, space, stat)
-    if (stat /= 0) then
+    stat = 0
+    if (.not. operation%no_memory) call prepare(operation, work%blocks, threads, space, stat)
+    if (operation%no_memory .or. stat /= 0) then
       info = info_no_memory
       return
     end if
@@ -398,7 +415,7 @@ contains
     integer :: skip, n
 
     n = lanes*2*operation%n_element
-    allocate (space%own%x(n + lanes), space%hint(operation%n_hint), stat=stat)
+    allocate (space%own%x(n + lanes), space%hint(operation%n_hint), space%list(operation%n_list), stat=stat)
     if (stat /= 0) return
     skip = to_register(c_loc(space%own%x))
     space%x(1:lanes, 1:2, 1:operation%n_element) => space%own%x(skip + 1:skip + n)

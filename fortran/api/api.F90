@@ -40,8 +40,9 @@
 !> single large line by jf_NAME may take threads of the BLAS, and round otherwise. Lengths do not depend on n_freq, so
 !> one query serves a whole loop.
 !>
-!> Floating-point traps of the program are held off during a call, so that a bad line gets its code instead of a signal;
-!> afterwards traps, flags and rounding are what they were.
+!> Floating-point traps of the program are held off during a call, so that a bad line gets its code instead of a signal,
+!> and numbers are rounded to the nearest, whatever the program does; afterwards traps, flags and rounding are what they
+!> were.
 module jointfrf
   use, intrinsic :: iso_c_binding, only: c_char, c_double, c_double_complex
   use jointfrf_api_work       ! generated from this file; what is public of it is named below
@@ -743,16 +744,31 @@ contains
     real(c_double), intent(inout) :: x(n_par)
     real(c_double), intent(out) :: normal(n_par, n_par), descent(n_par), cost
     integer(ip), intent(out) :: info
+    type(diagonal_joint) :: joint
+    type(line_forms) :: forms
+    type(search_limits) :: limits
     type(host_state) :: host
+    integer :: stat
 
     call hold_traps(host)
     info = check_fit_diagonal_joint(trans, by_rate, n, n_par, n_freq, steps, held, least_gain, dofs, kinds, lower, &
                                     upper)
     if (info == info_good) then
-      call fit_diagonal_joint(diagonal_joint(int(n), by_rate == 1, int(dofs), int(kinds)), &
-                              line_forms(is_transposed(trans), omega, c_joint, information, gradient, squares), &
-                              search_limits(int(steps), int(held), least_gain, lower, upper), &
-                              x, normal, descent, cost, info)
+      allocate (joint%dof(n_par), joint%kind(n_par), limits%lower(n_par), limits%upper(n_par), stat=stat)
+      if (stat /= 0) info = info_no_memory
+    end if
+    if (info == info_good) then
+      joint%n = int(n)
+      joint%by_rate = by_rate == 1
+      joint%dof(:) = int(dofs)
+      joint%kind(:) = int(kinds)
+      forms = line_forms(is_transposed(trans), omega, c_joint, information, gradient, squares)
+      limits%steps = int(steps)
+      limits%held = int(held)
+      limits%least_gain = least_gain
+      limits%lower(:) = lower
+      limits%upper(:) = upper
+      call fit_diagonal_joint(joint, forms, limits, x, normal, descent, cost, info)
     end if
     call release_traps(host)
   end subroutine jf_fit_diagonal_joint

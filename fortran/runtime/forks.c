@@ -1,5 +1,6 @@
-/* Whether this process is the child of a fork() after its parent had used several threads: the threads of OpenMP are not
-   there in it, and a parallel region would wait for them for ever. */
+/* Whether a parallel region would get its threads. In the child of a fork() after its parent had used several, the threads
+   of OpenMP are not there, and the region would wait for them for ever. Where no more threads can be started, the run-time
+   library of OpenMP ends the program. */
 #if defined(_WIN32)
 int jointfrf_was_forked(void)
 {
@@ -8,6 +9,11 @@ int jointfrf_was_forked(void)
 
 void jointfrf_watch_forks(void)
 {
+}
+
+int jointfrf_can_start(int threads)
+{
+  return threads > 0;
 }
 #else
 #include <pthread.h>
@@ -34,5 +40,42 @@ int jointfrf_was_forked(void)
 void jointfrf_watch_forks(void)
 {
   pthread_once(&once, watch);
+}
+
+/* Not allocated when it is first used: where there is no memory for that, the program would be ended. */
+#if defined(__GNUC__) && defined(__ELF__)
+#define AT_HAND __attribute__((tls_model("initial-exec")))
+#else
+#define AT_HAND
+#endif
+static _Thread_local AT_HAND int team = 1;     /* threads of this thread's last region, which OpenMP keeps for it */
+
+static void *wait_for(void *gate)
+{
+  pthread_mutex_lock(gate);
+  pthread_mutex_unlock(gate);
+  return 0;
+}
+
+/* Whether so many threads, this one among them, can run at a time: those that OpenMP does not have yet are started, all
+   together, and ended again. To be called before the region, outside of which nobody asks. */
+int jointfrf_can_start(int threads)
+{
+  enum { most = 256 };     /* beyond that nobody is asked */
+  pthread_mutex_t gate = PTHREAD_MUTEX_INITIALIZER;
+  pthread_t trial[most];
+  const int wanted = threads - team < most ? threads - team : most;
+  int started = 0, i;
+
+  pthread_mutex_lock(&gate);
+  while (started < wanted && pthread_create(&trial[started], 0, wait_for, &gate) == 0)
+    started++;
+  pthread_mutex_unlock(&gate);
+  for (i = 0; i < started; i++)
+    pthread_join(trial[i], 0);
+  if (started < wanted)
+    return 0;
+  team = threads;
+  return 1;
 }
 #endif

@@ -1,5 +1,6 @@
 !> The floating-point state of the program that calls: its traps are held off while the kernel computes, because a bad
-!> line gets its code from NaN and Inf; afterwards traps, flags and rounding are as they were.
+!> line gets its code from NaN and Inf, and it rounds to the nearest, because directed rounding overflows to the largest
+!> number instead. Afterwards traps, flags and rounding are as they were.
 module jointfrf_traps
   use, intrinsic :: iso_c_binding, only: c_int64_t
   implicit none
@@ -12,7 +13,7 @@ module jointfrf_traps
   end type host_state
 
   interface
-    !> From here to the release no exception stops this thread. Rounding stays.
+    !> From here to the release no exception stops this thread, and it rounds to the nearest.
     subroutine hold_traps(host) bind(C, name='jointfrf_hold_traps')
       import :: host_state
       implicit none

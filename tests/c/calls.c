@@ -11,7 +11,7 @@ const char *const routine_name[ROUTINES] = {
     "invert", "solve", "receptance", "receptance_banded", "receptance_modal", "couple", "modify", "find_modification",
     "ismm", "inverse_substructuring", "decouple", "joint_compliance", "compliance_factors", "compliance_covariance",
     "transform", "central_difference", "project_on_joint", "joint_forms", "pollute", "monte_carlo", "brick_matrices",
-    "brick_quality", "difference_weights",
+    "brick_quality", "difference_weights", "expect_on_joint", "fit_diagonal_joint", "rational_fit", "relocate_poles",
 };
 /* The number of LWORK among the arguments; that of LIWORK is two more. */
 const int lwork_argument[WORK_ROUTINES] = {8, 11, 20, 22, 16, 15, 12, 10, 11, 9, 18, 9, 11, 13, 14};
@@ -88,9 +88,23 @@ int same(const outcome *a, const outcome *b)
             jf_##name(__VA_ARGS__, line_info, rcond, &info);                                                         \
     } while (0)
 
+void begin(const problem *p, double *out)
+{
+    const size_t lines = p->n_freq > 0 ? (size_t)p->n_freq : 0, numbers = 2 * (size_t)(p->size[0] * p->size[0]) * lines;
+
+    switch (p->routine) {
+    case PROJECT_ON_JOINT: case EXPECT_ON_JOINT:
+        memcpy(out, p->in[4], numbers * sizeof *out);
+        memcpy(out + numbers, p->in[5], numbers * sizeof *out);
+        break;
+    case FIT_DIAGONAL_JOINT: memcpy(out, p->in[3] + 2 * (p->in_all[3] / 3), p->in_all[3] / 3 * sizeof *out); break;
+    case RELOCATE_POLES: memcpy(out, p->in[3], p->in_all[3] * sizeof *out);
+    }
+}
+
 jf_int call(const problem *p, const workspace *w, double *out, jf_int *line_info, double *rcond)
 {
-    static const jf_int seed[2] = {17, 4}, one = 1, first = 5, count = REALISATIONS;
+    static const jf_int seed[2] = {17, 4}, none = 0, one = 1, first = 5, count = REALISATIONS;
     const char *t = &p->trans, *letters = p->letters;
     const jf_int *s = p->size, *n_freq = &p->n_freq;
     const size_t lines = p->n_freq > 0 ? (size_t)p->n_freq : 0, square = (size_t)(s[0] * s[0]);
@@ -98,8 +112,10 @@ jf_int call(const problem *p, const workspace *w, double *out, jf_int *line_info
     const jf_complex *c = (const jf_complex *)p->in[2];
     double *const *in = p->in;
     jf_complex *h = (jf_complex *)out;
+    const size_t part = p->in_all[3] / 3;
     jf_int info = 12345;
 
+    begin(p, out);
     switch (p->routine) {
     case INVERT: CALL(invert, s, n_freq, a, h); break;
     case SOLVE: CALL(solve, t, s, s + 1, n_freq, a, b, h); break;
@@ -129,8 +145,6 @@ jf_int call(const problem *p, const workspace *w, double *out, jf_int *line_info
     case CENTRAL_DIFFERENCE: jf_central_difference(t, s + 1, n_freq, in[1], a, h, line_info, rcond, &info); break;
     case DIFFERENCE_WEIGHTS: jf_difference_weights(s + 1, in[1], out, &info); break;
     case PROJECT_ON_JOINT:
-        memcpy(out, in[4], 2 * square * lines * sizeof *out);
-        memcpy(out + 2 * square * lines, in[5], 2 * square * lines * sizeof *out);
         jf_project_on_joint(t, &p->flag, s, s + 2, n_freq, s + 3, &p->number, a, in[1], in[2], (jf_complex *)in[3], h,
                             h + square * lines, rcond, line_info, &info);
         break;
@@ -151,7 +165,22 @@ jf_int call(const problem *p, const workspace *w, double *out, jf_int *line_info
         jf_brick_matrices(letters, n_freq, in[0], in[1], in[2], in[3], &p->number, &p->flag, out, out + 576 * lines,
                           line_info, &info);
         break;
-    case BRICK_QUALITY: jf_brick_quality(n_freq, in[0], out, out + lines, &info);
+    case BRICK_QUALITY: jf_brick_quality(n_freq, in[0], out, out + lines, &info); break;
+    case EXPECT_ON_JOINT:
+        jf_expect_on_joint(t, &p->flag, s, s + 2, n_freq, &p->number, in[3], in[1], in[2], a, h, h + square * lines,
+                           line_info, &info);
+        break;
+    case FIT_DIAGONAL_JOINT:
+        jf_fit_diagonal_joint(t, &p->flag, s, s + 1, n_freq, s + 3, &none, &p->number, p->dofs[0], p->dofs[1], in[3],
+                              in[3] + part, in[0], b, c, (jf_complex *)in[4], in[5], out, out + part,
+                              out + part + part * part, out + 2 * part + part * part, &info);
+        break;
+    case RATIONAL_FIT:
+        jf_rational_fit(s, s + 1, n_freq, a, b, in[2], (jf_complex *)in[3], h, out + p->out_line * lines,
+                        out + p->out_line * lines + 1, &info);
+        break;
+    case RELOCATE_POLES:
+        jf_relocate_poles(s, s + 1, n_freq, s + 3, &p->number, a, b, in[2], h, out + p->in_all[3], &info);
     }
     return info;
 }

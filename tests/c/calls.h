@@ -31,6 +31,10 @@ enum {
     BRICK_MATRICES,
     BRICK_QUALITY,
     DIFFERENCE_WEIGHTS,
+    EXPECT_ON_JOINT,
+    FIT_DIAGONAL_JOINT,
+    RATIONAL_FIT,
+    RELOCATE_POLES,
     ROUTINES
 };
 
@@ -89,6 +93,8 @@ int guards_stay(const outcome *o);
 int untouched(const outcome *o);
 int same(const outcome *a, const outcome *b);
 
+/* Results that are arguments as well, as they are before the call. */
+void begin(const problem *p, double *out);
 /* Without a workspace the routine itself, with one its form in memory of the caller. */
 jf_int call(const problem *p, const workspace *w, double *out, jf_int *line_info, double *rcond);
 void call_into(const problem *p, const workspace *w, outcome *o);

@@ -8,8 +8,9 @@
 int variants(int routine)
 {
     switch (routine) {
-    case RECEPTANCE: case RECEPTANCE_BANDED: case DECOUPLE: case PROJECT_ON_JOINT: case JOINT_FORMS: return 4;
-    case COMPLIANCE_COVARIANCE: return 2;
+    case RECEPTANCE: case RECEPTANCE_BANDED: case DECOUPLE: case PROJECT_ON_JOINT: case JOINT_FORMS:
+    case EXPECT_ON_JOINT: return 4;
+    case COMPLIANCE_COVARIANCE: case FIT_DIAGONAL_JOINT: return 2;
     case POLLUTE: return 5;
     case MONTE_CARLO: case BRICK_MATRICES: return 3;
     default: return 1;
@@ -115,7 +116,7 @@ problem new_problem(int routine, char trans, int n, int n_freq, int variant)
     problem p = {.routine = routine, .trans = trans, .letters = "rr", .n_freq = n_freq, .number = 0.1};
     uint64_t state = 88172645463325252ULL + 1000003ULL * (uint64_t)(routine + 40 * n + 4000 * n_freq + 7 * variant);
     const int m = n + 1, joint = 2 * n;
-    int i;
+    int i, k;
 
     for (i = 0; i < MOST_DOFS; i++) {
         p.dofs[0][i] = i + 1;
@@ -244,6 +245,57 @@ problem new_problem(int routine, char trans, int n, int n_freq, int variant)
         p.letters[0] = "RIF"[variant];
         elements(&p, &state);
         p.out_line = routine == BRICK_MATRICES ? 2 * 576 : 2;
+        break;
+    case EXPECT_ON_JOINT:
+        p.size[2] = variant & 2 ? p.flag ? n * (joint + 1) : joint * joint : 0;
+        lines(&p, 0, n, n, &state);
+        numbers(&p, 1, (size_t)joint * (size_t)joint, 0, &state);
+        numbers(&p, 2, (size_t)p.size[2] * (size_t)p.size[2], 0, &state);
+        numbers(&p, 3, (size_t)n * (size_t)n, 0, &state);
+        for (k = 1; k <= 3; k += 2)
+            for (i = 0; i < (int)p.in_all[k]; i++)
+                p.in[k][i] = 2.0 + p.in[k][i];
+        for (i = 4; i <= 5; i++)
+            lines(&p, i, n, n, &state);
+        p.out_line = 4 * (size_t)(n * n);
+        break;
+    case FIT_DIAGONAL_JOINT:
+        p.size[1] = joint;
+        p.size[3] = 5;
+        for (i = 0; i < joint; i++) {
+            p.dofs[0][i] = 1 + i % (n > 0 ? n : 1);
+            p.dofs[1][i] = i / (n > 0 ? n : 1);
+        }
+        frequencies(&p, &state);
+        lines(&p, 1, n, 1, &state);
+        regular(&p, 2, n, &state);
+        numbers(&p, 3, 0, 3 * (size_t)joint, &state);
+        for (i = 0; i < joint; i++) {
+            p.in[3][i] = -4.0;
+            p.in[3][joint + i] = 4.0;
+        }
+        lines(&p, 4, n, 1, &state);
+        numbers(&p, 5, 1, 0, &state);
+        p.out_line = (size_t)(joint * joint + 2 * joint + 1);
+        break;
+    case RATIONAL_FIT: case RELOCATE_POLES:
+        p.size[1] = 3;
+        p.size[3] = 3;
+        lines(&p, 0, 1, 1, &state);
+        for (i = 0; i < n_freq; i++) {
+            p.in[0][2 * i] = 0.0;
+            p.in[0][2 * i + 1] = 1.0 + (double)i / n_freq;
+        }
+        lines(&p, 1, 3, 1, &state);
+        numbers(&p, 2, 3, 0, &state);
+        for (i = 0; i < (int)p.in_all[2]; i++)
+            p.in[2][i] = 2.0 + p.in[2][i];
+        numbers(&p, 3, 0, joint, &state);
+        for (i = 0; i < n; i++) {
+            p.in[3][2 * i] = -0.05;
+            p.in[3][2 * i + 1] = 1.0 + (i + 0.5) / n;
+        }
+        p.out_line = 6;
     }
     return p;
 }

@@ -21,7 +21,7 @@ contains
     real(dp) :: a(n, n)
     logical :: coupled(reach, n), retained(n)
     type(elimination_plan) :: plan
-    integer :: i, j
+    integer :: i, j, stat
 
     a = random_real(n, n)
     if (symmetric) a = a + transpose(a)
@@ -35,7 +35,8 @@ contains
     end do
     retained = .false.
     retained(wanted) = .true.
-    call make_plan(n, coupled, retained, wanted, symmetric, plan)
+    call make_plan(n, coupled, retained, wanted, symmetric, plan, stat)
+    call check(stat == 0, 'memory for the plan')
     call check(count(retained) == 4 .and. all(retained([11, 12, 31, 32])), 'chain: separators')
     call check(plan%n_retained == 4 .and. plan%n_steps == n - 4, 'chain: all others are eliminated')
     call check(all(plan%unknown(3:4) == wanted), 'chain: wanted unknowns last')
@@ -52,7 +53,7 @@ contains
     real(dp) :: a(n, n)
     logical :: coupled(1, n), retained(n)
     type(elimination_plan) :: plan
-    integer :: i, j
+    integer :: i, j, stat
 
     a = random_real(n, n)
     if (symmetric) a = a + transpose(a)
@@ -65,7 +66,8 @@ contains
     coupled = .true.
     retained = .false.
     retained(wanted) = .true.
-    call make_plan(n, coupled, retained, wanted, symmetric, plan)
+    call make_plan(n, coupled, retained, wanted, symmetric, plan, stat)
+    call check(stat == 0, 'memory for the plan')
     call check(plan%n_retained == 2 .and. plan%n_steps == n - 2, 'both ends: all others are eliminated')
     call check(plan%last_near(plan%n_steps + 1) > n, 'both ends: more neighbours than couplings')
     call check_inverse(plan, a, 'both ends')
@@ -76,11 +78,12 @@ contains
     real(dp) :: a(n, n)
     logical :: coupled(2, n), retained(n)
     type(elimination_plan) :: plan
+    integer :: stat
 
     a = random_real(n, n)
     coupled = .true.
     retained = .true.
-    call make_plan(n, coupled, retained, [2], .false., plan)
+    call make_plan(n, coupled, retained, [2], .false., plan, stat)
     call check(plan%n_steps == 0 .and. plan%products == 0 .and. plan%unknown(n) == 2, 'nothing is eliminated')
     call check_inverse(plan, a, 'nothing is eliminated')
   end subroutine everything_retained
