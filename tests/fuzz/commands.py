@@ -26,7 +26,7 @@ __all__ = ["Commands"]
 _WORDS = ["", "x", "y,rz", "101", "101,102", "101:116", "-1", "0", "1e999", "nan", "nowhere.uff", ",", "jk", "auto",
           "--", "10,50", "50,10", "nastran:1,2", "compliance", "a=b", "ü", "101:+x"]  # fmt: skip
 #: Commands that compute for minutes, write many files, or ask a terminal.
-_UNTRIED = {"run", "readings"}
+_UNTRIED = {"run"}
 #: Commands that take tenths of a second, and how many of their cases are theirs.
 _SLOW = {"study": 0.3, "cases": 0.1}
 #: What a line ends with in any case, so that it starts no processes and takes no minutes.

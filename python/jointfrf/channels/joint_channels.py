@@ -13,15 +13,16 @@ from jointfrf.channels.consistency import impact_consistency, sensor_consistency
 from jointfrf.channels.left_out_dofs import LeftOutDof, left_out_dofs
 from jointfrf.channels.point_lines import Interface
 from jointfrf.channels.virtual_point import VirtualPoint, virtual_interface, virtual_point
-from jointfrf.dofs import DIRECTIONS
+from jointfrf.dofs import DIRECTIONS, direction_names, direction_places
 from jointfrf.frf.channel_place import ChannelPlace, JointSide
 from jointfrf.frf.frf_set import Channel, FrfSet
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_real, check_type
 
-__all__ = ["ChannelAgreement", "JointChannels", "SideAgreement", "joint_channels"]
+__all__ = ["ChannelAgreement", "JointChannels", "SideAgreement", "joint_channels", "node_dofs"]
 
 _Kind = Literal["response", "excitation"]
 _SIDES: tuple[JointSide, JointSide] = ("j", "k")
+_CHANNELS = ("x", "y", "z", "rx", "ry", "rz")
 
 
 @dataclass(frozen=True)
@@ -298,3 +299,44 @@ def _weighted(point: VirtualPoint, power: FloatArray) -> VirtualPoint:
     root = np.sqrt(point.weights / power)
     inverse = np.linalg.pinv(root[:, None] * point.modes) * root
     return point._replace(transform=inverse.astype(np.float64), weights=root**2)
+
+
+def node_dofs(node_j: int, node_k: int, dofs: Sequence[str], coordinates: Mapping[int, ArrayLike]) -> Interface:
+    """Take translations and rotations of two nodes as the DOFs of a joint, as a model or a coupled assembly gives them.
+
+    Parameters
+    ----------
+    node_j, node_k : int
+        Nodes on side j (on A) and on side k (on B).
+    dofs : sequence of str
+        Joint DOFs.
+    coordinates : mapping of int to array_like, shape (3,)
+        Positions of the nodes, m; a node that is missing is taken to lie where the other one is.
+
+    Returns
+    -------
+    Interface
+        Channels ``node:x`` ... ``node:rz`` of j, then of k; the transform is a unit matrix.
+
+    Raises
+    ------
+    ValueError
+        An unknown DOF, or both nodes are the same.
+
+    Examples
+    --------
+    >>> from jointfrf.channels.joint_channels import node_dofs
+    >>> [str(channel) for channel in node_dofs(3, 4, ["y", "theta_z"], {}).channels]
+    ['3:+y', '3:+rz', '4:+y', '4:+rz']
+    """
+    if node_j == node_k:
+        raise ValueError(f"node {node_j} is named on both sides of the joint")
+    places = direction_places(dofs)
+    n = places.size
+    channels = tuple(Channel(node, _CHANNELS[place]) for node in (node_j, node_k) for place in places)
+    given = [np.asarray(coordinates[node], float) for node in (node_j, node_k) if node in coordinates]
+    ends = given if len(given) == 2 else [np.zeros(3)] * 2
+    motion = np.zeros((2 * n, 12))
+    motion[np.arange(n), places] = 1
+    motion[n + np.arange(n), 6 + places] = 1
+    return Interface(channels, np.eye(2 * n), (ends[0], ends[1]), direction_names(dofs), motion)

@@ -10,9 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from jointfrf.channels.joint_channels import JointChannels, SideAgreement, joint_channels
+from jointfrf.channels.joint_channels import JointChannels, SideAgreement, joint_channels, node_dofs
 from jointfrf.channels.left_out_dofs import LeftOutDof, OffsetCoupling, left_out_dofs, offset_couplings
-from jointfrf.channels.node_dofs import node_dofs
 from jointfrf.channels.point_lines import Interface, interface
 from jointfrf.cli.measured_file import Nodes, file_names, in_some_band, shown_nodes
 from jointfrf.cli.usage import UsageError

@@ -25,7 +25,6 @@ COMMANDS = {
     "run": "run cases: tables, figures and a report each",
     "cases": "list the cases that come with jointfrf",
     "study": "many realisations of a case over a design of factors: error, bias and coverage beside the bound",
-    "readings": "compare printed values with every reading of the noise",
     "completion": "a script that completes commands and options in bash, zsh or fish",
 }
 #: A value that begins like an option: -0.06,0,0

@@ -7,21 +7,21 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 
 from jointfrf.dofs import DIRECTIONS
 from jointfrf.kernel.arguments import FloatArray, as_number, check_type
-from jointfrf.solids.bolted_lap import BoltedLap
+from jointfrf.solids.bolted_lap import INTERFACES, BoltedLap
 from jointfrf.solids.brick import Formulation, assemble_bricks
 from jointfrf.solids.brick_beam import PRESETS
 from jointfrf.solids.contact import ContactLaw, InterfaceState, Iteration, solve_contact
 from jointfrf.solids.contact_pairs import Pairs, tie
-from jointfrf.solids.pressure_map import PressureMap, pressure_maps
 from jointfrf.solids.solid import SolidModel, solid_model
 
-__all__ = ["PreloadedLap", "preload"]
+__all__ = ["PreloadedLap", "PressureMap", "preload"]
 
-#: Nodes within this share of the height of the mesh lie at the cut.
+#: Nodes within this share of the height of the mesh lie in a face, or at the cut.
 _NEAR: Final = 1e-6
 
 
@@ -192,3 +192,63 @@ def _cut(lap: BoltedLap, formulation: Formulation) -> tuple[FloatArray, float]:
     k, _ = assemble_bricks(nodes, below, lap.materials[2], formulation)
     coupling: FloatArray = k @ drawn
     return coupling, float(drawn @ coupling)
+
+
+@dataclass(frozen=True)
+class PressureMap:
+    """Pressure on the two faces of an interface, which is the same on both.
+
+    Attributes
+    ----------
+    points : ndarray, shape (n, 2)
+        z and x before loading, m.
+    quads : ndarray of int, shape (n_quads, 4)
+        Corners, counted in `points`.
+    pressure : ndarray, shape (n,)
+        Pa; 0 where nothing touches.
+    closed, slipping : ndarray of bool, shape (n,)
+    nodes : ndarray of int, shape (n,)
+        Of the mesh, on the upper body, counted from 0.
+    """
+
+    points: FloatArray
+    quads: NDArray[np.int32]
+    pressure: FloatArray
+    closed: NDArray[np.bool_]
+    slipping: NDArray[np.bool_]
+    nodes: NDArray[np.int32]
+
+
+def pressure_maps(lap: BoltedLap, states: Mapping[str, InterfaceState]) -> dict[str, PressureMap]:
+    """Return the contact pressure on all interfaces.
+
+    Parameters
+    ----------
+    lap : BoltedLap
+    states : mapping of str to InterfaceState
+
+    Returns
+    -------
+    dict of str to PressureMap
+        "head": upper face of A and the head; "lap": lower face of A and upper face of B; "nut": lower face of B and the
+        nut.
+    """
+    return {name: _map(lap, name, states[name]) for name in INTERFACES}
+
+
+def _map(lap: BoltedLap, name: str, state: InterfaceState) -> PressureMap:
+    nodes = lap.interfaces[name].upper
+    height = lap.mesh.nodes[:, 1]
+    number = np.full(len(height), -1)
+    number[nodes] = np.arange(len(nodes))
+    faces, _ = lap.mesh.faces()
+    flat = np.ptp(height[faces], axis=1) < _NEAR * np.ptp(height)
+    quads = number[faces[flat]]
+    return PressureMap(
+        points=lap.mesh.nodes[nodes][:, [2, 0]],
+        quads=quads[(quads >= 0).all(axis=1)].astype(np.int32),
+        pressure=state.pressure,
+        closed=state.closed,
+        slipping=state.slipping,
+        nodes=nodes,
+    )

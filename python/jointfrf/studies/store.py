@@ -77,11 +77,6 @@ class StudyRecord:
     identity: Mapping[str, Any]
     groups: tuple[GroupRecord, ...]
 
-    @property
-    def is_about(self) -> str:
-        """Identity as a text, to be compared."""
-        return as_text_of(self.identity)
-
 
 @dataclass(frozen=True)
 class StudyStore:

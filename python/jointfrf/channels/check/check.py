@@ -10,26 +10,28 @@ from typing import Literal, cast, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from jointfrf.channels.check.channel_ratios import ChannelRatios, channel_ratios
-from jointfrf.channels.check.correction import Correction, corrected
-from jointfrf.channels.check.driving_points import circles, mean_exponent, sectors
-from jointfrf.channels.check.exchange import Cause, cause_of_broken_pairs, cause_of_gains, hidden_exchange
-from jointfrf.channels.check.exchange_findings import broken_findings
-from jointfrf.channels.check.finding import FindingLevel, FrfCheck, FrfFinding
-from jointfrf.channels.check.lines import find_bad_lines
-from jointfrf.channels.check.measurement import Measurement, as_channel_names, as_measurement
-from jointfrf.channels.check.pair_ratios import PairRatios, pair_ratios
-from jointfrf.channels.check.passivity import passivity_findings
-from jointfrf.channels.check.quantities import quantities
-from jointfrf.channels.check.quantity_findings import convention_finding, quantity_findings, sign_findings
-from jointfrf.channels.check.ratio_findings import (
+from jointfrf.channels.check.channel_ratios import (
     LEAST_GAIN,
     LEAST_PHASE,
+    ChannelRatios,
+    channel_ratios,
     delay_findings,
     gain_findings,
     unexplained_gains,
 )
-from jointfrf.channels.check.signals import check_signals
+from jointfrf.channels.check.driving_points import circles, mean_exponent, passivity_findings, sectors
+from jointfrf.channels.check.exchange import (
+    Cause,
+    broken_findings,
+    cause_of_broken_pairs,
+    cause_of_gains,
+    hidden_exchange,
+)
+from jointfrf.channels.check.finding import Correction, FindingLevel, FrfCheck, FrfFinding, corrected
+from jointfrf.channels.check.measurement import Measurement, as_channel_names, as_measurement
+from jointfrf.channels.check.pair_ratios import PairRatios, pair_ratios
+from jointfrf.channels.check.quantities import convention_finding, quantities, quantity_findings, sign_findings
+from jointfrf.channels.check.signals import check_signals, find_bad_lines
 from jointfrf.errors import FrfCheckWarning
 from jointfrf.frf.frf_set import Channel
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_frequency, as_lines, as_names, as_real, check_choice

@@ -1,4 +1,4 @@
-"""What the phases of driving-point FRFs say: time convention, quantity, sign, power that comes out of a structure."""
+"""What the phases of driving-point FRFs show: time convention, quantity, sign, power that leaves the structure."""
 
 from __future__ import annotations
 
@@ -7,15 +7,21 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from jointfrf.channels.check.measurement import modulus
+from jointfrf.channels.check.finding import FrfFinding
+from jointfrf.channels.check.measurement import Measurement, modulus
+from jointfrf.channels.check.ratio_line import block_medians
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
-__all__ = ["Circles", "Sectors", "circles", "mean_exponent", "one_sidedness", "sectors"]
+__all__ = ["Circles", "Sectors", "circles", "mean_exponent", "one_sidedness", "passivity_findings", "sectors"]
 
 #: Im (or Re) of a driving-point FRF has one sign to this share, (sum of values) / (sum of their sizes).
 _ONE_SIDED = 0.3
 #: FRFs whose phase agrees better than this from line to line show circles.
 _CIRCLES_SEEN = 0.5
+#: Lines taken together.
+_BLOCK = 30
+#: Standard errors by which Im h / |h| of a block must exceed zero, and its least value.
+_SIGNIFICANT, _LEAST = 8.0, 0.05
 
 
 @dataclass(frozen=True)
@@ -49,13 +55,10 @@ class Sectors:
         3: Re < 0, a mobility of the wrong sign; -1: not told.
     negative : ndarray, shape (n,)
         Share of the lines with Im < 0.
-    balance : ndarray, shape (n,)
-        Sum of Im h / |h| over the sum of sizes: -1 where all are negative.
     """
 
     quarter: NDArray[np.intp]
     negative: FloatArray
-    balance: FloatArray
 
 
 def circles(omega: FloatArray, h: ComplexArray, smooth: FloatArray) -> Circles:
@@ -91,7 +94,7 @@ def sectors(driving: ComplexArray) -> Sectors:
     # Much damped: not near either axis, and on one side of the real one.
     damped = (abs((u**2).real.mean(axis=0)) < 0.2) & (abs(imaginary) > 0.9)
     quarter = np.where(damped, np.where(imaginary < 0, 0, 2), quarter)
-    return Sectors(quarter.astype(np.intp), (driving.imag < 0).mean(axis=0), imaginary)
+    return Sectors(quarter.astype(np.intp), (driving.imag < 0).mean(axis=0))
 
 
 def one_sidedness(driving: ComplexArray) -> FloatArray:
@@ -114,3 +117,45 @@ def _on_real_axis(u: ComplexArray) -> NDArray[np.bool_]:
     """Between resonances a receptance is nearly real and a mobility nearly imaginary."""
     on: NDArray[np.bool_] = (u**2).real.mean(axis=0) > 0
     return on
+
+
+def passivity_findings(
+    measurement: Measurement, driving: ComplexArray, noise: FloatArray, inflation: float
+) -> list[FrfFinding]:
+    """Find driving points, shape (n_freq, n), whose Im is positive over a band.
+
+    `noise` is the standard deviation of Im h / |h| on a line, shape (n,); NaN where it is not known.
+    """
+    length = min(_BLOCK, driving.shape[0])
+    size = modulus(driving)
+    part = np.where(size > 0, driving.imag / np.where(size > 0, size, 1), 0)
+    real = np.where(size > 0, driving.real / np.where(size > 0, size, 1), 0)
+    middle = block_medians(part, length)
+    # Scatter within a block: of noise, or of the resonances that it holds.
+    own = middle[np.minimum(np.arange(part.shape[0]) // length, middle.shape[0] - 1)]
+    spread = 1.4826 * block_medians(abs(part - own), length)
+    spread = np.fmax(spread, noise)
+    error = 1.2533 * spread * np.sqrt(min(inflation, length) / length)
+    active = middle > np.maximum(_LEAST, _SIGNIFICANT * error)
+    freq = block_medians(measurement.freq_hz[:, None], length)[:, 0]
+    findings = []
+    for i in np.flatnonzero(active.any(axis=0)):
+        where = np.flatnonzero(active[:, i])
+        worst = int(where[np.argmax(middle[where, i])])
+        side = block_medians(real[:, i : i + 1], length)[where, 0]
+        cause = (
+            "between resonances where the mass governs (Re < 0): a delay of this FRF or of all"
+            if (side < -0.5).all()
+            else "where the stiffness governs (Re > 0): this FRF, or all, are too early in time"
+            if (side > 0.5).all()
+            else "at resonances: damping that gives out energy, or another sign of this FRF there"
+        )
+        findings.append(
+            FrfFinding(
+                "passivity", "warning", (measurement.dofs[i],), float(middle[worst, i]), _LEAST,
+                f"power comes out of the structure at {measurement.dofs[i]} near {freq[worst]:.4g} Hz: Im h / |h| is "
+                f"{middle[worst, i]:.2g} +- {error[worst, i]:.1g} in {where.size} of {middle.shape[0]} bands, {cause}",
+                "look at the phase of sensor and hammer; leave these bands out",
+            )
+        )  # fmt: skip
+    return findings

@@ -12,8 +12,7 @@ from jointfrf.kernel.status import RCOND_LIMIT, LineStatus, OnSingular, check_li
 from jointfrf.models.matrices import ModelMatrices
 from jointfrf.models.ports import Ports
 from jointfrf.models.receptance.direct import SINGULAR
-from jointfrf.models.receptance.lapack import eigh
-from jointfrf.models.receptance.rigid_modes import RigidModes, find_rigid_modes, mode_condition, resistance
+from jointfrf.models.receptance.rigid_modes import RigidModes, eigh, find_rigid_modes, mode_condition, resistance
 
 __all__ = ["Modes", "all_modes"]
 

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import lapack
 
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.models.matrices import ModelMatrices, Operand
 from jointfrf.models.receptance.factors import SingularMatrixError, SparseSolver, factor
-from jointfrf.models.receptance.lapack import eigh, orthonormal
 
-__all__ = ["RigidModes", "find_rigid_modes", "held", "mode_condition", "resistance"]
+__all__ = ["RigidModes", "eigh", "find_rigid_modes", "held", "mode_condition", "orthonormal", "resistance"]
 
 _EPS = float(np.finfo(np.float64).eps)
 #: r^T K r counts as zero within this many roundings of its terms: an entry of K is a sum of some tens of rounded terms.
@@ -23,6 +23,8 @@ _SOFT, _GAP = _EPS**0.5, 100
 #: Modes looked for at first; the shift of the inverse iteration in roundings, so that the factors of K + shift M keep
 #: two digits of a free structure; most iterations, and the change of w^2 at which they end.
 _BLOCK, _SHIFT, _ITERATIONS, _SETTLED = 8, 100, 20, 0.1
+#: LAPACK's columns a block: with less work space it may take fewer.
+_LAPACK_BLOCK = 64
 
 
 @dataclass(frozen=True)
@@ -193,3 +195,39 @@ def _terms(magnitudes: Operand, shapes: FloatArray) -> FloatArray:
     lengths = abs(shapes)
     found: FloatArray = np.einsum("ij,ij->j", lengths, magnitudes @ lengths)
     return found
+
+
+def eigh(k: FloatArray, m: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return w^2, ascending, and shapes of unit modal mass of K x = w^2 M x; the lower triangles are read.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        M is not positive definite, an entry is not finite, or there is no convergence.
+    """
+    _check_finite(k, m)
+    squared, shapes, info = lapack.dsygvd(k, m, uplo="L")
+    if info:
+        raise np.linalg.LinAlgError(f"dsygvd: info {info}")
+    return squared, shapes
+
+
+def orthonormal(a: FloatArray) -> FloatArray:
+    """Return an orthonormal basis of the columns, shape (n, k), k <= n.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        An entry is not finite.
+    """
+    _check_finite(a)
+    n_work = _LAPACK_BLOCK * a.shape[1]
+    reflectors, scales, _, _ = lapack.dgeqrf(a, lwork=n_work)
+    basis: FloatArray = lapack.dorgqr(reflectors, scales, lwork=n_work)[0]
+    return basis
+
+
+def _check_finite(*arrays: FloatArray) -> None:
+    for array in arrays:
+        if np.count_nonzero(np.isfinite(array)) != array.size:
+            raise np.linalg.LinAlgError("an entry is NaN or Inf")

@@ -9,8 +9,6 @@ import numpy as np
 from jointfrf.kernel.arguments import FloatArray
 from jointfrf.report.axes import percentiles
 
-__all__ = ["Score", "score"]
-
 
 class Score(NamedTuple):
     """A printed value beside realisations.
@@ -59,15 +57,6 @@ def score(values: FloatArray, printed: float, unit: float, resolution: float) ->
     the interquartile range over 1.34), not narrower than the resolution. To the r realisations one more is added that
     may lie anywhere: density 1/(pi (1 + z^2)). So a value far from all realisations costs about ln(5 r), not infinity:
     r realisations cannot say more. Units cancel between readings of the same value.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from jointfrf.cases.known_joint.readings.score import score
-    >>> values = np.linspace(0.9, 1.1, 101)
-    >>> near, far = score(values, 1.0, 1.0, 0.0), score(values, 50.0, 1.0, 0.0)
-    >>> near.inside, far.inside, near.log_density > far.log_density > -9
-    (True, False, True)
     """
     good = values[np.isfinite(values)]
     z, at = np.arcsinh(good / unit), np.arcsinh(printed / unit)

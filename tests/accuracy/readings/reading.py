@@ -12,8 +12,6 @@ import numpy as np
 from jointfrf.frf.noise import NoiseKind, realisations
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
-__all__ = ["Draw", "NoiseScale", "Reading", "Reference", "every_reading", "noise_numbers", "reference_moduli"]
-
 Parts = Literal["real", "complex", "Re and Im apart"]
 Law = Literal["normal", "uniform"]
 LevelMeaning = Literal["deviation", "bound", "deviation of modulus"]
@@ -160,14 +158,7 @@ class Reading:
 
 
 def every_reading() -> Iterator[Reading]:
-    """All readings; Re and Im apart make sense only relative to themselves.
-
-    Examples
-    --------
-    >>> from jointfrf.cases.known_joint.readings.reading import every_reading
-    >>> print(next(every_reading()))
-    real normal, deviation, each FRF, of value
-    """
+    """All readings; Re and Im apart make sense only relative to themselves."""
     for distribution, sharing, reference in product(_DISTRIBUTIONS, _SHARINGS, REFERENCES):
         if distribution[0] != "Re and Im apart" or reference == "value":
             yield Reading(*distribution, *sharing, reference)

@@ -13,8 +13,6 @@ from jointfrf.cases.known_joint.read import KnownJointCase
 from jointfrf.dofs import Parameter
 from jointfrf.substructuring.methods import STIFFNESS_METHODS
 
-__all__ = ["ErrorQuantity", "ParameterQuantity", "PrintedTable", "PrintedValue", "printed_tables"]
-
 #: Rounding of a printed parameter, as a share of its size, and of an error, percent.
 _PARAMETER_DIGITS, _ERROR_DIGITS = 1e-3, 0.005
 _ERRORS = ("amplitude", "frequency")
