@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import unicodedata
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,11 +17,37 @@ __all__ = [
     "IllConditionedWarning",
     "SingularLineError",
     "first_line",
+    "visible",
 ]
 
 
 #: Characters of what an error of another library says that are repeated.
 _LONGEST = 200
+#: Kinds of characters that a reader does not see, and that a terminal, a card or a page acts upon.
+_UNSEEN = {"Cc", "Cf", "Cs", "Zl", "Zp"}
+
+
+def visible(text: str, keep: str = "") -> str:
+    r"""Return a text of a file with the characters escaped that are not seen, such as those that move a cursor.
+
+    Parameters
+    ----------
+    text : str
+    keep : str
+        Those that stay: ``"\n"`` where lines are meant.
+
+    Examples
+    --------
+    >>> visible("bolt\x1b]0;x\x07")
+    'bolt\\x1b]0;x\\x07'
+    """
+    if text.isprintable():
+        return text
+    return "".join(
+        letter.encode("unicode_escape").decode("ascii")
+        if unicodedata.category(letter) in _UNSEEN and letter not in keep else letter
+        for letter in text
+    )  # fmt: skip
 
 
 class SingularLineError(np.linalg.LinAlgError):
@@ -47,11 +75,14 @@ class FileContentError(ValueError):
     """A file cannot be read, or lacks something that is needed; one line, whatever the file is called."""
 
     def __init__(self, message: str) -> None:
-        super().__init__(" ".join(message.splitlines()))
+        super().__init__(visible(" ".join(message.splitlines())))
 
 
 class FileContentWarning(UserWarning):
-    """Something in a file had to be assumed or left out."""
+    """Something in a file had to be assumed or left out; one line, whatever stands in the file."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(visible(" ".join(message.splitlines())))
 
 
 class FrfCheckWarning(UserWarning):
