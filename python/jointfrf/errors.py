@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import unicodedata
-
 import numpy as np
 from numpy.typing import NDArray
+
+from jointfrf.spelling import visible
 
 __all__ = [
     "ConvergenceWarning",
@@ -17,37 +17,11 @@ __all__ = [
     "IllConditionedWarning",
     "SingularLineError",
     "first_line",
-    "visible",
 ]
 
 
 #: Characters of what an error of another library says that are repeated.
 _LONGEST = 200
-#: Kinds of characters that a reader does not see, and that a terminal, a card or a page acts upon.
-_UNSEEN = {"Cc", "Cf", "Cs", "Zl", "Zp"}
-
-
-def visible(text: str, keep: str = "") -> str:
-    r"""Return a text of a file with the characters escaped that are not seen, such as those that move a cursor.
-
-    Parameters
-    ----------
-    text : str
-    keep : str
-        Those that stay: ``"\n"`` where lines are meant.
-
-    Examples
-    --------
-    >>> visible("bolt\x1b]0;x\x07")
-    'bolt\\x1b]0;x\\x07'
-    """
-    if text.isprintable():
-        return text
-    return "".join(
-        letter.encode("unicode_escape").decode("ascii")
-        if unicodedata.category(letter) in _UNSEEN and letter not in keep else letter
-        for letter in text
-    )  # fmt: skip
 
 
 class SingularLineError(np.linalg.LinAlgError):

@@ -249,7 +249,7 @@ def written_whole(path: Path) -> Iterator[Path]:
         if temporary is not None:
             temporary.unlink(missing_ok=True)
         own = (None, str(temporary), str(target))
-        if isinstance(error, OSError) and error.errno is not None and error.filename in own:
+        if isinstance(error, OSError) and error.errno is not None and (temporary is None or error.filename in own):
             raise type(error)(error.errno, error.strerror, str(path)) from error
         raise
 

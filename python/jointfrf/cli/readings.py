@@ -21,7 +21,7 @@ from jointfrf.cases.known_joint.readings.tables import altogether_table, choices
 from jointfrf.cases.workers import started_workers
 from jointfrf.cli.output import Output
 from jointfrf.cli.usage import UsageError, positive, progress
-from jointfrf.files import write_file
+from jointfrf.files import below, write_file
 from jointfrf.parallel.cores import available_cores
 from jointfrf.report.table import Table, as_text, plain_rows, table_csv
 
@@ -107,4 +107,4 @@ def _write(folder: Path, tables: list[Table]) -> None:
     """Write tables as CSV files."""
     folder.mkdir(parents=True, exist_ok=True)
     for table in tables:
-        write_file(folder / f"{table.key}.csv", table_csv(table))
+        write_file(below(folder, table.key, ".csv"), table_csv(table))
