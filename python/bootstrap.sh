@@ -217,9 +217,14 @@ up_to_date() {
     ls build/cp*/build.ninja >/dev/null 2>&1
 }
 
-# The versions of the checked-in list, so that a new release of a dependency breaks no fresh clone.
+# The versions of the checked-in list, so that a new release of a dependency breaks no fresh clone, and no files but
+# those whose hashes it has: they are compared before anything that was installed can run.
 pip_install() {
-  "$venv/bin/python" -m pip --disable-pip-version-check --no-input install -c python/constraints.txt "$@" >>"$log" 2>&1
+  "$venv/bin/python" -m pip --disable-pip-version-check --no-input install -c python/constraints.txt \
+    --report build/installed.json "$@" >>"$log" 2>&1 || return 1
+  "$venv/bin/python" -I -S python/check_hashes.py build/installed.json >>"$log" 2>&1 && return
+  rm -rf "$venv"
+  fail "a package is not the one whose hash is in python/constraints.txt; .venv was removed"
 }
 
 make_venv() {

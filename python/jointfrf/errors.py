@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from jointfrf.spelling import visible
+
 __all__ = [
     "ConvergenceWarning",
     "CopyWarning",
@@ -47,11 +49,14 @@ class FileContentError(ValueError):
     """A file cannot be read, or lacks something that is needed; one line, whatever the file is called."""
 
     def __init__(self, message: str) -> None:
-        super().__init__(" ".join(message.splitlines()))
+        super().__init__(visible(" ".join(message.splitlines())))
 
 
 class FileContentWarning(UserWarning):
-    """Something in a file had to be assumed or left out."""
+    """Something in a file had to be assumed or left out; one line, whatever stands in the file."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(visible(" ".join(message.splitlines())))
 
 
 class FrfCheckWarning(UserWarning):

@@ -1,37 +1,113 @@
-"""Files: how one begins, and writing whole or not at all."""
+"""Files: how one begins, what reading one may take, and writing whole or not at all."""
 
 from __future__ import annotations
 
 import os
+import re
+import secrets
+import shutil
+import stat
 import tempfile
+import zlib
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from jointfrf.errors import FileContentError
 
-__all__ = ["HEAD", "check_file", "head_of", "write_file", "written_whole"]
+__all__ = ["HEAD", "LIMIT_VARIABLE", "ReadLimit", "below", "check_file", "head_of", "write_file", "written_whole"]
 
 #: How much of a file shows what it is, bytes.
 HEAD = 1 << 13
-#: Files beyond this are not read, GB; the environment variable says another limit.
-_LIMIT, _LIMIT_VARIABLE = 16.0, "JOINTFRF_FILE_LIMIT_GB"
+#: Says another limit, GB.
+LIMIT_VARIABLE = "JOINTFRF_FILE_LIMIT_GB"
+#: Without one: files beyond this are not read, GB; what a file holds may take so much memory, GB, or so many times the
+#: size of the file, whichever is more.
+_LARGEST, _SMALL, _TIMES = 16.0, 1.0, 10
+#: Each array, group or cell takes at least this, bytes: there are files of nothing but names.
+_LEAST = 10_000
+#: Characters of a name that no file system, shell or page takes for anything else, and how many of them.
+_UNUSUAL, _LONGEST = re.compile(r"[^\w+,=.-]", re.ASCII), 100
+#: Where names are those of open files, which cannot be replaced.
+_OPEN_FILES = "/proc/"
+_MOST_LINKS = 40
 
 
-def check_file(path: Path) -> None:
+def _limit_gb(given: float | None) -> float | None:
+    """Return the limit that was asked for, by a keyword or by the environment."""
+    if given is not None:
+        if not isinstance(given, int | float) or not given > 0:
+            raise ValueError(f"limit_gb must be a number of GB above 0, not {given!r}")
+        return float(given)
+    word = os.environ.get(LIMIT_VARIABLE, "")
+    if not word:
+        return None
+    try:
+        limit = float(word)
+    except ValueError:
+        limit = -1.0
+    if not limit > 0:
+        raise FileContentError(f"the environment variable {LIMIT_VARIABLE} is {word!r}: it must be a number of GB")
+    return limit
+
+
+_RAISED = f"limit_gb=, --limit-gb or the environment variable {LIMIT_VARIABLE} raises this limit"
+
+
+class ReadLimit:
+    """What the content of one file may take in memory: a few kB can unfold to more than there is.
+
+    Parameters
+    ----------
+    path : Path
+        An existing file.
+    gb : float, optional
+        GB; the environment variable JOINTFRF_FILE_LIMIT_GB is used where it is not given. Without either 1 GB, or 10
+        times the size of the file where that is more.
+    """
+
+    def __init__(self, path: Path, gb: float | None = None) -> None:
+        limit = _limit_gb(gb)
+        self._path = path
+        self.bytes = max(_SMALL * 1e9, _TIMES * path.stat().st_size) if limit is None else 1e9 * limit
+        self._taken = 0
+
+    def take(self, size: int) -> None:
+        """Count what is about to be read.
+
+        Parameters
+        ----------
+        size : int
+            Bytes.
+
+        Raises
+        ------
+        FileContentError
+            With all before it, it is more than the limit.
+        """
+        self._taken += max(size, _LEAST)
+        if self._taken > self.bytes:
+            raise FileContentError(
+                f"{self._path} states content of {self._taken / 1e9:.3g} GB or more, beyond the "
+                f"{self.bytes / 1e9:.3g} GB that a file may take: {_RAISED}"
+            )
+
+
+def check_file(path: Path, limit_gb: float | None = None) -> None:
     """Check that a file can be read to its end: that it is one, and not larger than memory is likely to hold.
 
     Parameters
     ----------
     path : Path
+    limit_gb : float, optional
+        GB; see `ReadLimit`.
 
     Raises
     ------
     FileNotFoundError
         There is no such file.
     FileContentError
-        It is a folder, a pipe or a device, or larger than 16 GB. The environment variable JOINTFRF_FILE_LIMIT_GB takes
-        another limit.
+        It is a folder, a pipe or a device, or larger than 16 GB, or than another limit where one is given.
     """
     if not path.exists():
         raise FileNotFoundError("\\n".join(f"there is no file {path}".splitlines()))
@@ -40,27 +116,19 @@ def check_file(path: Path) -> None:
     if not path.is_file():
         # Whoever opens a pipe waits for a writer; a device has no end.
         raise FileContentError(f"{path} is a pipe or a device, not a file: save what it gives first")
-    word = os.environ.get(_LIMIT_VARIABLE, "")
-    try:
-        limit = float(word or _LIMIT)
-    except ValueError:
-        limit = -1.0
-    if not limit > 0:
-        raise FileContentError(f"the environment variable {_LIMIT_VARIABLE} is {word!r}: it must be a number of GB")
-    size = path.stat().st_size / 1e9
+    limit, size = _limit_gb(limit_gb) or _LARGEST, path.stat().st_size / 1e9
     if size > limit:
-        raise FileContentError(
-            f"{path} has {size:.3g} GB, more than the {limit:.3g} GB that are read: the environment variable "
-            f"{_LIMIT_VARIABLE} raises this limit"
-        )
+        raise FileContentError(f"{path} has {size:.3g} GB, more than the {limit:.3g} GB that are read: {_RAISED}")
 
 
-def head_of(path: Path) -> bytes:
+def head_of(path: Path, limit_gb: float | None = None) -> bytes:
     """Return the first bytes of a file that holds something.
 
     Parameters
     ----------
     path : Path
+    limit_gb : float, optional
+        As in `check_file`.
 
     Returns
     -------
@@ -74,7 +142,7 @@ def head_of(path: Path) -> bytes:
     FileContentError
         It is a folder, a pipe or a device, cannot be read, or is empty.
     """
-    check_file(path)
+    check_file(path, limit_gb)
     try:
         with path.open("rb") as file:
             head = file.read(HEAD)
@@ -85,13 +153,50 @@ def head_of(path: Path) -> bytes:
     return head
 
 
+def below(folder: Path, name: str, suffix: str = "") -> Path:
+    """Return the path of a file in a folder, by a name that may come from anybody.
+
+    Parameters
+    ----------
+    folder : Path
+    name : str
+        Where it has characters that are unusual in names of files (all but letters and digits of ASCII and ``_+,=.-``),
+        begins with a point or is long, these are replaced and a checksum is added, so that two names stay two.
+    suffix : str
+        Of the file, with its point.
+
+    Returns
+    -------
+    Path
+        Directly in the folder.
+
+    Raises
+    ------
+    FileContentError
+        There is a link of this name which leads out of the folder.
+
+    Examples
+    --------
+    >>> below(Path("figures"), "k-theta").as_posix(), below(Path("figures"), "../../x", ".png").as_posix()
+    ('figures/k-theta', 'figures/_._.._x-422533a8.png')
+    """
+    clean = _UNUSUAL.sub("_", name)[:_LONGEST]
+    clean = f"_{clean[1:]}" if clean[:1] in ("", ".", "-") else clean
+    if clean != name:
+        clean += f"-{zlib.crc32(name.encode('utf-8', 'surrogatepass')):08x}"
+    path = folder / f"{clean}{suffix}"
+    if path.resolve().parent != folder.resolve():
+        raise FileContentError(f"{path} is a link out of its folder: remove it, what it leads to is not written")
+    return path
+
+
 def write_file(path: Path, content: str | bytes) -> None:
     """Write a file beside its place and move it there: a reader finds the old one or the new one, never a part.
 
     Parameters
     ----------
     path : Path
-        In a folder that exists.
+        As for `written_whole`.
     content : str or bytes
         Text is written as UTF-8.
 
@@ -111,23 +216,83 @@ def written_whole(path: Path) -> Iterator[Path]:
     Parameters
     ----------
     path : Path
-        In a folder that exists.
+        In a folder that exists. Where a link is, the file is replaced that it leads to. An older file leaves its mode
+        and its owner to the new one. A device or a pipe is not replaced: all is written into it at the end.
 
     Raises
     ------
     OSError
-        The file cannot be written; nothing is left behind.
+        The file cannot be written; nothing is left behind. It names `path`.
     """
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    os.close(handle)
-    temporary = Path(name)
+    target = _followed(path)
+    older = _status(target)
+    into = older is not None and not stat.S_ISREG(older.st_mode)
+    into |= target.parent.resolve().as_posix().startswith(_OPEN_FILES)
+    if into and target.is_dir():
+        raise IsADirectoryError(21, os.strerror(21), str(path))
+    temporary: Path | None = None
     try:
+        folder = Path(tempfile.gettempdir()) if into else target.parent
+        temporary = _created(folder, target.name, private=into or older is not None)
         yield temporary
-        # As an ordinary new file: mkstemp makes private ones.
-        mask = os.umask(0)
-        os.umask(mask)
-        temporary.chmod(0o666 & ~mask)
-        temporary.replace(path)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
+        if into:
+            with temporary.open("rb") as source, target.open("wb") as sink:
+                shutil.copyfileobj(source, sink)
+            temporary.unlink()
+            return
+        if older is not None:
+            _keep(temporary, older)
+        with temporary.open("rb") as file:
+            os.fsync(file.fileno())
+        temporary.replace(target)
+    except BaseException as error:
+        if temporary is not None:
+            temporary.unlink(missing_ok=True)
+        own = (None, str(temporary), str(target))
+        if isinstance(error, OSError) and error.errno is not None and (temporary is None or error.filename in own):
+            raise type(error)(error.errno, error.strerror, str(path)) from error
         raise
+
+
+def _status(path: Path) -> os.stat_result | None:
+    try:
+        return path.stat()
+    except FileNotFoundError:
+        return None
+
+
+def _followed(path: Path) -> Path:
+    """Follow links to the file that is meant; not those of open files, which name no place."""
+    for _ in range(_MOST_LINKS):
+        if not path.is_symlink() or path.parent.resolve().as_posix().startswith(_OPEN_FILES):
+            return path
+        path = path.parent / path.readlink()
+    raise OSError(40, "too many levels of symbolic links", str(path))
+
+
+def _created(folder: Path, name: str, *, private: bool) -> Path:
+    """Create a file of a new name; the mask of the process, or what the folder says, gives its mode."""
+    try:
+        longest = os.pathconf(folder, "PC_NAME_MAX")
+    except (AttributeError, OSError, ValueError):
+        longest = 255
+    end = f".{secrets.token_hex(8)}"
+    while len(os.fsencode(name)) + len(end) + 1 > longest:
+        name = name[:-1]
+    path = folder / f".{name}{end}"
+    os.close(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600 if private else 0o666))
+    return path
+
+
+def _keep(path: Path, older: os.stat_result) -> None:
+    """Give a file the owner and the mode of an older one; without the right to, its group, or only the mode."""
+    mode = stat.S_IMODE(older.st_mode)
+    if hasattr(os, "chown"):
+        for owner in (older.st_uid, -1):
+            with suppress(PermissionError):
+                os.chown(path, owner, older.st_gid)
+                break
+    own = path.stat()
+    if (own.st_uid, own.st_gid) != (older.st_uid, older.st_gid):
+        mode &= 0o777  # what a program may do as its owner is not handed to another one
+    path.chmod(mode)

@@ -1,10 +1,13 @@
-"""Which known word a misspelt one looks like."""
+"""Words: which known one a misspelt one looks like, and texts of files made such that all of them is seen."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
-__all__ = ["did_you_mean", "look_alike"]
+__all__ = ["did_you_mean", "look_alike", "visible"]
+
+#: Kinds of characters that a reader does not see, and that a terminal, a card or a page acts upon.
+_UNSEEN = {"Cc", "Cf", "Cs", "Zl", "Zp"}
 
 
 def look_alike(word: str, known: Iterable[str]) -> str:
@@ -34,3 +37,29 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
     """
     similar = look_alike(word, known)
     return f"; did you mean {similar}?" if similar else ""
+
+
+def visible(text: str, keep: str = "") -> str:
+    r"""Return a text of a file with the characters escaped that are not seen, such as those that move a cursor.
+
+    Parameters
+    ----------
+    text : str
+    keep : str
+        Those that stay: ``"\n"`` where lines are meant.
+
+    Examples
+    --------
+    >>> from jointfrf.spelling import visible
+    >>> visible("bolt\x1b]0;x\x07")
+    'bolt\\x1b]0;x\\x07'
+    """
+    if text.isprintable():
+        return text
+    import unicodedata
+
+    return "".join(
+        letter.encode("unicode_escape").decode("ascii")
+        if unicodedata.category(letter) in _UNSEEN and letter not in keep else letter
+        for letter in text
+    )  # fmt: skip

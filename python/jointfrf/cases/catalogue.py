@@ -13,7 +13,7 @@ from jointfrf.cases.definitions import read_frequency
 from jointfrf.cases.kind import Case, CaseKind
 from jointfrf.cases.kinds import KINDS
 from jointfrf.cases.workers import Workers
-from jointfrf.files import write_file
+from jointfrf.files import below, write_file
 from jointfrf.report.draw import draw
 from jointfrf.report.figure import Figure, figure_csv
 from jointfrf.report.page import Page, make_page
@@ -239,7 +239,7 @@ def run_case(
     case, kind = read_case_and_kind(Path(folder), kinds)
     target = Path(out) / case.name
     for inner in ("tables", "figures"):
-        (target / inner).mkdir(parents=True, exist_ok=True)
+        below(target, inner).mkdir(parents=True, exist_ok=True)
     count = case.realisations if realisations is None else realisations
     result = kind.compute(case, count, at_work)
     tables, figures = kind.tables(result), numbered(case, kind.figures(result))
@@ -263,13 +263,13 @@ def run_case(
 def _write(folder: Path, page: Page, content: dict[str, Any]) -> None:
     """Write a report and, beside it, its tables, figures and numbers."""
     for figure, drawing in page.figures:
-        write_file(folder / "figures" / f"{figure.key}.png", drawing.png)
-        write_file(folder / "figures" / f"{figure.key}.svg", drawing.svg)
-        write_file(folder / "figures" / f"{figure.key}.csv", figure_csv(figure))
+        write_file(below(folder / "figures", figure.key, ".png"), drawing.png)
+        write_file(below(folder / "figures", figure.key, ".svg"), drawing.svg)
+        write_file(below(folder / "figures", figure.key, ".csv"), figure_csv(figure))
     for table in page.tables:
-        write_file(folder / "tables" / f"{table.key}.csv", table_csv(table))
-    write_file(folder / "results.json", json.dumps(content, indent=1) + "\n")
-    write_file(folder / "report.html", make_page(page))
+        write_file(below(folder / "tables", table.key, ".csv"), table_csv(table))
+    write_file(below(folder, "results.json"), json.dumps(content, indent=1) + "\n")
+    write_file(below(folder, "report.html"), make_page(page))
 
 
 def _about(case: Case, count: int) -> str:

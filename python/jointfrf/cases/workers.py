@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Executor, ProcessPoolExecutor
+from concurrent.futures import Executor
 from contextlib import contextmanager
 from dataclasses import dataclass
-from multiprocessing import get_context
 from typing import Any, TypeVar
 
-from jointfrf.parallel.processes import begin_process
+from jointfrf.parallel.processes import started_processes
 
 __all__ = ["Workers", "started_workers"]
 
@@ -58,24 +56,8 @@ def started_workers(jobs: int) -> Iterator[Workers]:
     if jobs <= 1:
         yield Workers()
         return
-    with _environment(dict.fromkeys(_THREADS, "1")):
-        pool = ProcessPoolExecutor(jobs, get_context("spawn"), initializer=begin_process)
-        try:
-            yield Workers(pool)
-        finally:
-            pool.shutdown(cancel_futures=True)
-
-
-@contextmanager
-def _environment(changes: dict[str, str]) -> Iterator[None]:
-    """Set variables of the environment, and put back what was there."""
-    before = {name: os.environ.get(name) for name in changes}
-    os.environ.update(changes)
+    pool = started_processes(jobs, dict.fromkeys(_THREADS, "1"))
     try:
-        yield
+        yield Workers(pool)
     finally:
-        for name, value in before.items():
-            if value is None:
-                os.environ.pop(name, None)
-            else:
-                os.environ[name] = value
+        pool.shutdown(cancel_futures=True)

@@ -6,14 +6,15 @@ import os
 import shlex
 import sys
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 from jointfrf.cli.configuration import with_configuration
 from jointfrf.cli.parser import COMMANDS, command_parser, top_parser
 from jointfrf.cli.usage import UsageError
 from jointfrf.extras import MissingPackageError
-from jointfrf.spelling import did_you_mean
+from jointfrf.spelling import did_you_mean, visible
 
 __all__ = ["main"]
 
@@ -47,7 +48,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = command_parser(words[0])
     given = parser.parse_words(words[1:])
     given.typed = shlex.join(["jointfrf", *words])
-    with warnings.catch_warnings():
+    with warnings.catch_warnings(), _limited(given.limit_gb):
         warnings.showwarning = _show_warning
         try:
             options = with_configuration(given, parser, words[0])
@@ -69,6 +70,24 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return _complain("interrupted", _INTERRUPTED)
 
 
+@contextmanager
+def _limited(limit_gb: float | None) -> Iterator[None]:
+    """Set the limit of what is read, for this process and those that it starts."""
+    if limit_gb is None:
+        yield
+        return
+    from jointfrf.files import LIMIT_VARIABLE
+
+    before = os.environ.pop(LIMIT_VARIABLE, None)
+    os.environ[LIMIT_VARIABLE] = repr(limit_gb)
+    try:
+        yield
+    finally:
+        del os.environ[LIMIT_VARIABLE]
+        if before is not None:
+            os.environ[LIMIT_VARIABLE] = before
+
+
 def _complain(message: object, status: int) -> int:
     print(f"jointfrf: error: {_one_line(message)}", file=sys.stderr)
     return status
@@ -79,10 +98,10 @@ def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
 
 
 def _one_line(message: object) -> str:
-    """Return a message as one line: the name of a file may hold another."""
+    """Return a message as one line that does nothing to a terminal: the name of a file may hold anything."""
     if isinstance(message, MemoryError) and not str(message):
         return "not enough memory for what was asked for: fewer nodes, a narrower band or fewer realisations need less"
-    return str(message).replace("\r", "\\r").replace("\n", "\\n")
+    return visible(str(message))
 
 
 if __name__ == "__main__":

@@ -17,6 +17,7 @@ from jointfrf.errors import FileContentError
 from jointfrf.frf.bands import in_bands
 from jointfrf.io import FrfSet, read_frfs
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.spelling import visible
 
 __all__ = [
     "Nodes",
@@ -229,7 +230,7 @@ def read_with_warnings(*paths: Path, receptance: bool = False, **options: Any) -
         frfs = read_frfs(*paths, **options)
         frfs = frfs.receptance() if receptance else frfs
     for message in caught:
-        print(f"jointfrf: warning: {message.message}", file=sys.stderr)
+        print(f"jointfrf: warning: {visible(str(message.message))}", file=sys.stderr)
     return frfs
 
 

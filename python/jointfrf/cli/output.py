@@ -8,6 +8,8 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from jointfrf.spelling import visible
+
 __all__ = ["Output", "plain"]
 
 
@@ -21,7 +23,7 @@ class Output:
     def say(self, *lines: object) -> None:
         """Print lines of text, unless JSON or nothing is wanted."""
         if self.is_text and lines:
-            print(*lines, sep="\n")
+            print(*(visible(str(line), "\n\t") for line in lines), sep="\n")
 
     def give(self, content: Mapping[str, Any]) -> None:
         """Print the result as JSON where that is wanted."""

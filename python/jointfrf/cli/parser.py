@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import argparse
 import importlib
+import math
 import re
 import sys
 from collections.abc import Iterable, Sequence
 from typing import Any, NoReturn
 
-from jointfrf.spelling import did_you_mean
+from jointfrf.spelling import did_you_mean, visible
 
 __all__ = ["COMMANDS", "CommandParser", "command_parser", "options_of", "top_parser"]
 
@@ -41,7 +42,7 @@ class CommandParser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """Print the usage of this command and what is wrong."""
         self.print_usage(sys.stderr)
-        self.exit(2, f"jointfrf: error: {message}\n")
+        self.exit(2, f"jointfrf: error: {visible(message)}\n")
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         if action.choices is None or value in action.choices:
@@ -119,6 +120,22 @@ def _add_common(parser: argparse.ArgumentParser) -> None:
         help="channels and defaults of a project (default: jointfrf.toml in the working directory, where there is one)",
     )
     group.add_argument("--no-config", action="store_true", help="do not look for jointfrf.toml")
+    group.add_argument(
+        "--limit-gb",
+        type=_gigabytes,
+        metavar="GB",
+        help="how large one file may be, and what it may take in memory (default: 16 GB; 1 GB, or 10 times the file)",
+    )
+
+
+def _gigabytes(word: str) -> float:
+    try:
+        found = float(word)
+    except ValueError:
+        found = 0.0
+    if not 0 < found < math.inf:
+        raise argparse.ArgumentTypeError(f"must be a number of GB above 0, not {word!r}")
+    return found
 
 
 def command_parser(name: str, parser: argparse.ArgumentParser | None = None) -> CommandParser:

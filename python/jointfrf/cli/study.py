@@ -14,6 +14,7 @@ from jointfrf.cli.usage import UsageError, positive, progress
 from jointfrf.extras import check_extras, import_extra
 from jointfrf.parallel.cores import available_cores
 from jointfrf.parallel.pool import AnyExecutor
+from jointfrf.parallel.processes import check_processes, safe_environment
 from jointfrf.studies.design import Arrangement, StudyDesign, parse_factor
 from jointfrf.studies.result import StudyResult
 from jointfrf.studies.run import merge_studies, study
@@ -149,7 +150,9 @@ def _started(word: str, jobs: int | None) -> Iterator[AnyExecutor | None]:
             yield pool
     elif word == "loky":
         loky = import_extra("loky")
-        yield lambda: loky.get_reusable_executor(max_workers=jobs or available_cores())
+        check_processes()
+        with safe_environment():  # it starts processes whenever one is missing
+            yield lambda: loky.get_reusable_executor(max_workers=jobs or available_cores())
     elif word == "mpi":
         futures, rank = import_extra("mpi4py.futures"), import_extra("mpi4py.MPI").COMM_WORLD.Get_rank()
         if rank:

@@ -10,6 +10,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from jointfrf.spelling import visible
+
 __all__ = ["UsageError", "check_folder", "positive", "progress", "waiting"]
 
 #: Seconds after which the speed so far says something.
@@ -54,7 +56,7 @@ def progress(name: str) -> Callable[[int, int], None]:
             print("\r\x1b[K", end="", file=sys.stderr, flush=True)
             return
         left = _time_left(time.monotonic() - start, done, total)
-        print(f"\r\x1b[K{name}: {100 * done // total} %{left}", end="", file=sys.stderr, flush=True)
+        print(f"\r\x1b[K{visible(name)}: {100 * done // total} %{left}", end="", file=sys.stderr, flush=True)
 
     return show
 
@@ -77,7 +79,7 @@ def waiting(what: str) -> Iterator[None]:
 
     def show() -> None:
         while not done.wait(_SETTLED):
-            print(f"\r\x1b[K{what}: {time.monotonic() - start:.0f} s", end="", file=sys.stderr, flush=True)
+            print(f"\r\x1b[K{visible(what)}: {time.monotonic() - start:.0f} s", end="", file=sys.stderr, flush=True)
 
     clock = threading.Thread(target=show, daemon=True)
     clock.start()

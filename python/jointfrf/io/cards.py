@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from jointfrf.dofs import DIRECTIONS, direction_places, rigid_offset
 from jointfrf.kernel.arguments import FloatArray, as_nodes, as_real, check_choice
+from jointfrf.spelling import visible
 
 __all__ = ["CardFormat", "CardOptions", "cards"]
 
@@ -181,7 +182,8 @@ def _text_lines(comments: Sequence[str]) -> list[str]:
     """Return comments in lines that every program reads."""
     if isinstance(comments, str):
         raise TypeError("comments must be a sequence of texts, not one text")
-    lines = [line for comment in comments for line in textwrap.wrap(str(comment), _COMMENT, subsequent_indent="    ")]
+    texts = [visible(" ".join(str(comment).split())) for comment in comments]
+    lines = [line for text in texts for line in textwrap.wrap(text, _COMMENT, subsequent_indent="    ")]
     return [line.encode("ascii", "replace").decode("ascii") for line in lines]
 
 

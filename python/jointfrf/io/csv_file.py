@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf.errors import FileContentError
-from jointfrf.files import write_file
+from jointfrf.files import ReadLimit, write_file
 from jointfrf.frf.frf_set import Channel, FrfSet
 from jointfrf.io.arrays import FrfArrays
 from jointfrf.io.labels import channels_of
@@ -45,7 +45,7 @@ class _Table:
     numbers: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))
 
 
-def csv_arrays(path: Path) -> FrfArrays:
+def csv_arrays(path: Path, limit: ReadLimit) -> FrfArrays:
     """Read a text table.
 
     Parameters
@@ -55,6 +55,7 @@ def csv_arrays(path: Path) -> FrfArrays:
         column is the frequency. The others name response and excitation, ``102:+y / 101:+y``, and a part: ``real`` and
         ``imag``, or ``magnitude`` and ``phase`` (degrees, or ``[rad]``), or ``coherence``; the unit stands in square
         brackets. Lines before it that begin with ``#`` may state ``quantity:``, ``unit:`` and ``averages:``.
+    limit : ReadLimit
 
     Returns
     -------
@@ -81,7 +82,7 @@ def csv_arrays(path: Path) -> FrfArrays:
         parts[pair][part] = _unit_of(name), column
     freq_hz = table.numbers[:, 0] * _HZ[hz]
     functions = [each for pair, columns in parts.items() for each in _functions(pair, columns, freq_hz, where)]
-    found = arrays_of_functions(functions, where)
+    found = arrays_of_functions(functions, where, limit)
     found.quantity = table.stated.get("quantity", "")
     found.unit = found.unit or table.stated.get("unit", "")
     if "averages" in table.stated:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import zlib
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -11,23 +12,25 @@ import numpy as np
 
 from jointfrf.errors import FileContentError, first_line
 from jointfrf.extras import import_extra
-from jointfrf.files import write_file
+from jointfrf.files import ReadLimit, write_file
 from jointfrf.frf.frf_set import FrfSet
 from jointfrf.io.arrays import FrfArrays
+from jointfrf.io.hdf5_texts import hdf5_texts
 from jointfrf.io.layout import fields_of, is_own, own_arrays
 from jointfrf.io.mapping import FrfMapping, mapped_arrays
-from jointfrf.io.trial import survives
 
 __all__ = ["hdf5_arrays", "hdf5_fields", "write_hdf5"]
 
 _UNREADABLE = (OSError, ValueError, KeyError, TypeError, RuntimeError, MemoryError, OverflowError)
 #: More than this, deflate cannot make of a byte.
 _MOST_COMPRESSED = 1100
-_DEEPEST = 20
-_TRIAL = "import h5py, sys\nwith h5py.File(sys.argv[1]) as file: [file[name][()] for name in sys.argv[2:]]"
+_DEEPEST, _MOST_LINKS = 20, 20
+_DEFLATE = 1
+#: A letter as a text takes up to so many bytes, with what is made on the way.
+_LETTER = 50
 
 
-def hdf5_arrays(path: Path, mapping: FrfMapping) -> FrfArrays:
+def hdf5_arrays(path: Path, mapping: FrfMapping, limit: ReadLimit) -> FrfArrays:
     """Read an HDF5 file in the own layout, or with arrays under the names of a mapping.
 
     Raises
@@ -37,11 +40,11 @@ def hdf5_arrays(path: Path, mapping: FrfMapping) -> FrfArrays:
     MissingPackageError
         The package h5py is not installed.
     """
-    fields = hdf5_fields(path)
+    fields = hdf5_fields(path, limit)
     return own_arrays(fields, str(path)) if is_own(fields) else mapped_arrays(fields, mapping, str(path))
 
 
-def hdf5_fields(path: Path) -> dict[str, Any]:
+def hdf5_fields(path: Path, limit: ReadLimit) -> dict[str, Any]:
     """Read all datasets; groups are mappings inside.
 
     Parameters
@@ -49,68 +52,140 @@ def hdf5_fields(path: Path) -> dict[str, Any]:
     path : Path
         An HDF5 file. What MATLAB wrote (by its attributes) comes back as MATLAB has it: axes in its order, texts as
         texts, cells as lists.
+    limit : ReadLimit
 
     Returns
     -------
     dict of str
+        None for what is neither numbers nor texts.
+
+    Raises
+    ------
+    FileContentError
+        The file is damaged, holds more than the limit, or names another file: what stands there is not read.
+    MissingPackageError
+        The package h5py is not installed.
     """
     h5py = import_extra("h5py")
     try:
         with h5py.File(path, "r") as file:
-            _check_texts(h5py, file, path)
-            return _group(h5py, file, path, 0)
+            return _Hdf5(h5py, path, limit).group(file, 0)
     except FileContentError:
         raise
-    except _UNREADABLE as error:
+    except (*_UNREADABLE, zlib.error) as error:
         raise FileContentError(f"{path} cannot be read as an HDF5 file: {first_line(error)}") from error
 
 
-def _check_texts(h5py: Any, file: Any, path: Path) -> None:
-    """Read texts of variable length in another process first: of damaged ones the HDF5 library crashes or hangs."""
-    found: list[str] = []
+class _Hdf5:
+    """Reading one file: no dataset before a look at where it is and how large."""
 
-    def note(name: str, item: Any) -> None:
-        if isinstance(item, h5py.Dataset) and item.dtype.kind == "O" and h5py.check_string_dtype(item.dtype):
-            found.append(name)
+    def __init__(self, h5py: Any, path: Path, limit: ReadLimit) -> None:
+        self.h5py, self.path, self.limit = h5py, path, limit
+        self.size = path.stat().st_size
 
-    file.visititems(note)
-    if found and not survives(_TRIAL, str(path), *found):
-        raise FileContentError(f"{path} is damaged: its texts cannot be read")
+    def elsewhere(self, name: str) -> FileContentError:
+        return FileContentError(f"{self.path} takes {name!r} from another file, which is not read: copy it there")
 
+    def group(self, group: Any, depth: int) -> dict[str, Any]:
+        if depth > _DEEPEST:
+            raise FileContentError(f"{self.path} has groups inside groups without end")
+        return {
+            name: self.value(self.opened(group, name), depth) for name in group if not name.startswith("#")
+        }  # fmt: skip
 
-def _group(h5py: Any, group: Any, path: Path, depth: int) -> dict[str, Any]:
-    if depth > _DEEPEST:
-        raise FileContentError(f"{path} has groups inside groups without end")
-    return {name: _value(h5py, item, path, depth) for name, item in group.items() if not name.startswith("#")}
+    def opened(self, group: Any, name: str, links: int = 0) -> Any:
+        """Return what a link leads to, inside the file."""
+        link = group.get(name, getlink=True)
+        if isinstance(link, self.h5py.ExternalLink):
+            raise self.elsewhere(f"{group.name.rstrip('/')}/{name}")
+        if not isinstance(link, self.h5py.SoftLink):
+            return group[name]
+        if links > _MOST_LINKS:
+            raise FileContentError(f"{self.path} has links to links without end")
+        found = group.file if link.path.startswith("/") else group
+        for part in link.path.split("/"):
+            if part in ("", "."):
+                continue
+            if not isinstance(found, self.h5py.Group) or part not in found:
+                return None
+            found = self.opened(found, part, links + 1)
+        return found
 
+    def value(self, item: Any, depth: int) -> Any:
+        self.limit.take(0)
+        if isinstance(item, self.h5py.Group):
+            return self.group(item, depth + 1)
+        if not isinstance(item, self.h5py.Dataset):
+            return None
+        settings = item.id.get_create_plist()
+        if settings.get_layout() == self.h5py.h5d.VIRTUAL or settings.get_external_count():
+            raise self.elsewhere(item.name)
+        if item.shape is None:
+            return np.zeros(0)
+        self.check_size(item, settings)
+        kind = self.matlab(item, "MATLAB_class")
+        if self.h5py.check_string_dtype(item.dtype) is not None and item.dtype.kind == "O":
+            texts = hdf5_texts(self.h5py, item, self.path, self.limit)
+            return np.array(texts) if item.shape else texts[0]
+        if self.h5py.check_ref_dtype(item.dtype) is self.h5py.Reference:
+            references = item[()].ravel(order="F" if not kind else "C") if item.shape else np.array([item[()]])
+            return [self.value(item.file[reference], depth + 1) for reference in references if reference]
+        if item.dtype.hasobject:
+            return None
+        value = item[()]
+        if item.dtype.names == ("real", "imag"):
+            value = value["real"] + 1j * value["imag"]
+        if kind:
+            if self.matlab(item, "MATLAB_empty"):
+                return "" if kind == "char" else np.zeros(0)
+            if kind == "char":
+                self.limit.take(_LETTER * item.size)
+                return _matlab_text(value)
+            return np.asarray(value).T.squeeze()  # MATLAB knows no fewer than two axes
+        return _text(value)
 
-def _value(h5py: Any, item: Any, path: Path, depth: int) -> Any:
-    if isinstance(item, h5py.Group):
-        return _group(h5py, item, path, depth + 1)
-    if not isinstance(item, h5py.Dataset):
-        return None
-    if item.shape is None:
-        return np.zeros(0)
-    if item.nbytes > _MOST_COMPRESSED * path.stat().st_size or (
-        item.compression is None and item.nbytes > path.stat().st_size
-    ):
-        size = " x ".join(map(str, item.shape))
-        raise FileContentError(f"{path} is damaged: {item.name} does not hold the {size} values that it states")
-    kind = item.attrs.get("MATLAB_class", b"")
-    kind = kind.decode("ascii", "replace") if isinstance(kind, bytes) else str(kind)
-    if h5py.check_ref_dtype(item.dtype) is not None:
-        references = item[()].ravel(order="F" if not kind else "C")
-        return [_value(h5py, item.file[reference], path, depth + 1) for reference in references if reference]
-    value = item[()]
-    if item.dtype.names == ("real", "imag"):
-        value = value["real"] + 1j * value["imag"]
-    if kind:
-        if item.attrs.get("MATLAB_empty", 0):
-            return "" if kind == "char" else np.zeros(0)
-        if kind == "char":
-            return _matlab_text(value)
-        return np.asarray(value).T.squeeze()  # MATLAB knows no fewer than two axes
-    return _text(value)
+    def check_size(self, item: Any, settings: Any) -> None:
+        """Look at whether the file can hold a dataset, and at how much that is."""
+        if item.nbytes > _MOST_COMPRESSED * self.size or (item.compression is None and item.nbytes > self.size):
+            size = " x ".join(map(str, item.shape))
+            raise FileContentError(
+                f"{self.path} is damaged: {item.name} does not hold the {size} values that it states"
+            )
+        self.limit.take(max(item.nbytes, item.size))
+        filters = [settings.get_filter(number)[0] for number in range(settings.get_nfilters())]
+        if filters and item.chunks:
+            self.check_chunks(item, filters)
+
+    def check_chunks(self, item: Any, filters: list[int]) -> None:
+        """Look at chunks that could unfold to more than their size, which the library makes room for."""
+        chunk = item.dtype.itemsize * int(np.prod(item.chunks, dtype=object))
+        self.limit.take(chunk)
+        large = (self.limit.bytes - chunk) / _MOST_COMPRESSED
+        if item.id.get_storage_size() <= large:
+            return
+        for number in range(item.id.get_num_chunks()):
+            about = item.id.get_chunk_info(number)
+            if about.size > large:
+                mask, packed = item.id.read_direct_chunk(about.chunk_offset)
+                first = filters.index(_DEFLATE) if _DEFLATE in filters else -1
+                if first < 0 or mask >> first & 1:
+                    continue
+                if len(zlib.decompressobj().decompress(packed, chunk + 5)) > chunk + 4:
+                    raise FileContentError(f"{self.path} is damaged: {item.name} unfolds to more than it states")
+
+    def matlab(self, item: Any, name: str) -> str:
+        """Return a short attribute as a text; a longer one, or of variable length, is not MATLAB's."""
+        h5a = self.h5py.h5a
+        if not h5a.exists(item.id, name.encode()):
+            return ""
+        attribute = h5a.open(item.id, name.encode())
+        is_short = attribute.shape in ((), (1,)) and attribute.dtype.itemsize <= _LETTER
+        if attribute.dtype.kind not in "Siu" or not is_short:
+            return ""
+        found = np.zeros(attribute.shape, attribute.dtype)
+        attribute.read(found)
+        value = found.ravel()[0]
+        return value.decode("ascii", "replace") if isinstance(value, bytes) else str(value or "")
 
 
 def _matlab_text(codes: Any) -> Any:

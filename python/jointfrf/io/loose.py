@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf.errors import FileContentError
+from jointfrf.files import ReadLimit
 from jointfrf.frf.frf_set import Channel
 from jointfrf.frf.merge import same_lines
 from jointfrf.io.arrays import FrfArrays
@@ -31,13 +32,14 @@ class LooseFunction(NamedTuple):
         return f"{'coherence' if self.is_coherence else 'FRF'} {self.response} / {self.excitation}"
 
 
-def arrays_of_functions(functions: Sequence[LooseFunction], where: str) -> FrfArrays:
+def arrays_of_functions(functions: Sequence[LooseFunction], where: str, limit: ReadLimit) -> FrfArrays:
     """Put functions into matrices.
 
     Raises
     ------
     FileContentError
-        There is no FRF; functions differ in frequency lines, units or quantities; one is there twice.
+        There is no FRF; functions differ in frequency lines, units or quantities; one is there twice; the matrix of
+        all channels is beyond the limit.
     """
     frfs = [each for each in functions if not each.is_coherence]
     if not frfs:
@@ -48,6 +50,7 @@ def arrays_of_functions(functions: Sequence[LooseFunction], where: str) -> FrfAr
     row_of = {channel: i for i, channel in enumerate(responses)}
     column_of = {channel: j for j, channel in enumerate(excitations)}
     shape = (first.freq_hz.size, len(responses), len(excitations))
+    limit.take(3 * 8 * shape[0] * shape[1] * shape[2])
     h, coherence = np.full(shape, np.nan + 0j), np.full(shape, np.nan)
     seen: set[tuple[Channel, Channel, bool]] = set()
     for each in functions:

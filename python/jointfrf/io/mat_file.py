@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import struct
-import zlib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -11,36 +9,34 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from jointfrf.errors import FileContentError, first_line
+from jointfrf.errors import FileContentError
+from jointfrf.files import ReadLimit
 from jointfrf.frf.frf_set import Channel
 from jointfrf.io.arrays import FrfArrays
 from jointfrf.io.hdf5_file import hdf5_fields
 from jointfrf.io.labels import channels_of
 from jointfrf.io.loose import LooseFunction, arrays_of_functions
 from jointfrf.io.mapping import FrfMapping, mapped_arrays
-from jointfrf.io.mat_check import check_variables
-from jointfrf.io.trial import survives
+from jointfrf.io.mat_fields import mat_fields
 from jointfrf.io.units import parse_unit
 
 __all__ = ["mat_arrays"]
 
-_UNREADABLE = (OSError, ValueError, TypeError, LookupError, EOFError, ArithmeticError, MemoryError,
-               NotImplementedError, AttributeError, RuntimeError, struct.error, zlib.error)  # fmt: skip
-_TRIAL = "import scipy.io, sys; scipy.io.loadmat(sys.argv[1])"
 _HDF5_FROM = b"MATLAB 7.3"
 _TOLERANCE = 1e-3
 
 
-def mat_arrays(path: Path, mapping: FrfMapping) -> FrfArrays:
+def mat_arrays(path: Path, mapping: FrfMapping, limit: ReadLimit) -> FrfArrays:
     """Read a MATLAB file.
 
     Parameters
     ----------
     path : Path
-        Of version 4 to 7 (by scipy) or 7.3 (by h5py). Structures with ``x_values``, ``y_values`` and
+        Of version 4 to 7, or 7.3 (by h5py). Structures with ``x_values``, ``y_values`` and
         ``function_record`` are read as Simcenter Testlab writes them; other files by the names of `mapping`.
     mapping : FrfMapping
         Which field is what.
+    limit : ReadLimit
 
     Returns
     -------
@@ -55,28 +51,12 @@ def mat_arrays(path: Path, mapping: FrfMapping) -> FrfArrays:
     """
     with path.open("rb") as file:
         is_hdf5 = file.read(len(_HDF5_FROM)) == _HDF5_FROM
-    content = hdf5_fields(path) if is_hdf5 else _loaded(path)
+    content = hdf5_fields(path, limit) if is_hdf5 else mat_fields(path, limit)
     records = list(_records(content))
     if records and mapping.h is None:
         functions = [function for record in records for function in _functions(record, mapping, str(path))]
-        return arrays_of_functions(functions, str(path))
+        return arrays_of_functions(functions, str(path), limit)
     return mapped_arrays(content, mapping, str(path))
-
-
-def _loaded(path: Path) -> dict[str, Any]:
-    import scipy.io
-
-    try:
-        has_checksums = check_variables(path)
-    except (ValueError, zlib.error) as error:
-        raise FileContentError(f"{path} cannot be read as a MATLAB file: {error}") from error
-    if not has_checksums and not survives(_TRIAL, str(path)):
-        raise FileContentError(f"{path} cannot be read as a MATLAB file: it is damaged")
-    try:
-        found = scipy.io.loadmat(path, simplify_cells=True)
-    except (*_UNREADABLE, scipy.io.matlab.MatReadError) as error:
-        raise FileContentError(f"{path} cannot be read as a MATLAB file: {first_line(error)}") from error
-    return {name: value for name, value in found.items() if not name.startswith("__")}
 
 
 def _records(content: Any) -> Iterator[Mapping[str, Any]]:

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import pickle
-import zipfile
-import zlib
 from pathlib import Path
 from typing import Any
 
@@ -14,18 +11,20 @@ from scipy import sparse
 
 from jointfrf.dofs import DIRECTIONS
 from jointfrf.errors import FileContentError, first_line
-from jointfrf.files import check_file
+from jointfrf.files import ReadLimit, check_file
+from jointfrf.io.npz_file import npz_fields
 
 __all__ = ["read_dof_names", "read_matrix"]
 
 #: What readers of numpy and scipy raise for a file that is not what its name says, or is damaged.
-_UNREADABLE = (
-    OSError, ValueError, TypeError, KeyError, EOFError, OverflowError, MemoryError, pickle.UnpicklingError,
-    zipfile.BadZipFile, zlib.error,
-)  # fmt: skip
+_UNREADABLE = (OSError, ValueError, TypeError, KeyError, EOFError, OverflowError, MemoryError)
+#: An entry of a Matrix Market file takes at least so many bytes there: a list of entries, and one after the other.
+_LEAST = {"coordinate": 6, "array": 2}
+#: An entry in memory with its row and column, and a row, bytes, with what is made on the way.
+_ENTRY, _ROW = 48, 32
 
 
-def read_matrix(path: Path, name: str) -> sparse.csr_array:
+def read_matrix(path: Path, name: str, limit_gb: float | None = None) -> sparse.csr_array:
     """Read a real square matrix by its entries.
 
     Parameters
@@ -34,6 +33,8 @@ def read_matrix(path: Path, name: str) -> sparse.csr_array:
         A Matrix Market file, or with the suffix ``.npz`` one of `scipy.sparse.save_npz` or `numpy.savez`.
     name : str
         The array of an NPZ file that holds several.
+    limit_gb : float, optional
+        As for `jointfrf.io.read_frfs`.
 
     Returns
     -------
@@ -45,9 +46,12 @@ def read_matrix(path: Path, name: str) -> sparse.csr_array:
         The file cannot be read, or does not hold a finite real square matrix.
     """
     if path.exists():
-        check_file(path)
+        check_file(path, limit_gb)
     try:
-        found = _read_npz(path, name) if path.suffix.lower() == ".npz" else _read_market(path)
+        limit = ReadLimit(path, limit_gb)
+        found = _read_npz(path, name, limit) if path.suffix.lower() == ".npz" else _read_market(path, limit)
+        _check_square(path, found.shape)
+        limit.take(_ROW * found.shape[0])
     except FileContentError:
         raise
     except _UNREADABLE as error:
@@ -56,23 +60,29 @@ def read_matrix(path: Path, name: str) -> sparse.csr_array:
     return _checked(path, found)
 
 
-def _read_market(path: Path) -> Any:
-    rows, columns, _, _, field, _ = scipy.io.mminfo(path)
+def _read_market(path: Path, limit: ReadLimit) -> Any:
+    if path.suffix.lower() in (".gz", ".bz2"):  # which scipy unpacks, to whatever size
+        raise FileContentError(f"{path} is compressed: unpack it")
+    rows, columns, entries, form, field, _ = scipy.io.mminfo(path)
     if field not in ("real", "integer", "double", "unsigned-integer"):
         raise FileContentError(f"{path} must hold real numbers, not {field} ones")
     _check_square(path, (rows, columns))
+    if entries * _LEAST[form] > path.stat().st_size + _LEAST[form]:
+        raise ValueError(f"it does not hold the {entries} entries that it states")
+    limit.take(_ENTRY * entries + _ROW * rows)
     return scipy.io.mmread(path)
 
 
-def _read_npz(path: Path, name: str) -> Any:
-    with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
-        if "format" in archive.files:
-            return sparse.load_npz(path)
-        chosen = name if name in archive.files else archive.files[0] if len(archive.files) == 1 else ""
-        if not chosen:
-            held = ", ".join(archive.files) or "nothing"
-            raise FileContentError(f"{path} must hold one array, or one called {name!r}; it holds {held}")
-        return archive[chosen]
+def _read_npz(path: Path, name: str, limit: ReadLimit) -> Any:
+    fields = npz_fields(path, limit)
+    if "format" in fields:
+        limit.take(_ROW * int(max(np.ravel(fields["shape"]), default=0)))
+        return sparse.load_npz(path)
+    chosen = name if name in fields else next(iter(fields)) if len(fields) == 1 else ""
+    if not chosen:
+        held = ", ".join(fields) or "nothing"
+        raise FileContentError(f"{path} must hold one array, or one called {name!r}; it holds {held}")
+    return fields[chosen]
 
 
 def _check_square(path: Path, shape: tuple[int, ...]) -> None:
@@ -82,7 +92,6 @@ def _check_square(path: Path, shape: tuple[int, ...]) -> None:
 
 def _checked(path: Path, found: Any) -> sparse.csr_array:
     """Return real finite entries of a square matrix."""
-    _check_square(path, found.shape)
     if found.dtype.kind not in "biuf":
         what = "complex" if found.dtype.kind == "c" else str(found.dtype)
         raise FileContentError(f"{path} must hold real numbers, not {what} ones")

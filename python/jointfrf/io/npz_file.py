@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf.errors import FileContentError, first_line
-from jointfrf.files import write_file
+from jointfrf.files import ReadLimit, write_file
 from jointfrf.frf.frf_set import FrfSet
 from jointfrf.io.arrays import FrfArrays
 from jointfrf.io.labels import channels_of
@@ -22,14 +22,14 @@ from jointfrf.io.layout import fields_of, is_own, own_arrays
 from jointfrf.io.loose import LooseFunction, arrays_of_functions
 from jointfrf.io.mapping import FrfMapping, mapped_arrays
 
-__all__ = ["npz_arrays", "write_npz"]
+__all__ = ["npz_arrays", "npz_fields", "write_npz"]
 
 _UNREADABLE = (OSError, ValueError, KeyError, EOFError, MemoryError, NotImplementedError, RuntimeError,
                zipfile.BadZipFile, zlib.error, tokenize.TokenError)  # fmt: skip
 _FRF = 4
 
 
-def npz_arrays(path: Path, mapping: FrfMapping) -> FrfArrays:
+def npz_arrays(path: Path, mapping: FrfMapping, limit: ReadLimit) -> FrfArrays:
     """Read an NPZ file.
 
     Parameters
@@ -39,6 +39,7 @@ def npz_arrays(path: Path, mapping: FrfMapping) -> FrfArrays:
         arrays under the names of `mapping`. Python objects are not read.
     mapping : FrfMapping
         For files that are not in the own layout.
+    limit : ReadLimit
 
     Returns
     -------
@@ -49,10 +50,28 @@ def npz_arrays(path: Path, mapping: FrfMapping) -> FrfArrays:
     FileContentError
         The file is damaged, holds Python objects, or lacks something.
     """
+    fields = {name: value.item() if value.ndim == 0 else value for name, value in npz_fields(path, limit).items()}
+    where = str(path)
+    if is_own(fields):
+        return own_arrays(fields, where)
+    data = fields.get("data")
+    if isinstance(data, np.ndarray) and set(data.dtype.names or ()) >= {"abscissa", "ordinate", "coordinate"}:
+        return _of_sdynpy(data, fields.get("function_type"), where, limit)
+    return mapped_arrays(fields, mapping, where)
+
+
+def npz_fields(path: Path, limit: ReadLimit) -> dict[str, NDArray[Any]]:
+    """Read all arrays of an NPZ file.
+
+    Raises
+    ------
+    FileContentError
+        The file is damaged, holds Python objects, or more than the limit.
+    """
     try:
         with zipfile.ZipFile(path) as archive:
-            fields = {
-                info.filename.removesuffix(".npy"): _array(archive, info, path)
+            return {
+                info.filename.removesuffix(".npy"): _array(archive, info, path, limit)
                 for info in archive.infolist()
                 if info.filename.endswith(".npy")
             }
@@ -60,18 +79,10 @@ def npz_arrays(path: Path, mapping: FrfMapping) -> FrfArrays:
         raise
     except _UNREADABLE as error:
         raise FileContentError(f"{path} cannot be read as an NPZ file: {first_line(error)}") from error
-    fields = {name: value.item() if value.ndim == 0 else value for name, value in fields.items()}
-    where = str(path)
-    if is_own(fields):
-        return own_arrays(fields, where)
-    data = fields.get("data")
-    if isinstance(data, np.ndarray) and set(data.dtype.names or ()) >= {"abscissa", "ordinate", "coordinate"}:
-        return _of_sdynpy(data, fields.get("function_type"), where)
-    return mapped_arrays(fields, mapping, where)
 
 
-def _array(archive: zipfile.ZipFile, info: zipfile.ZipInfo, path: Path) -> NDArray[Any]:
-    """Read one array after a look at whether the file holds as much as it says."""
+def _array(archive: zipfile.ZipFile, info: zipfile.ZipInfo, path: Path, limit: ReadLimit) -> NDArray[Any]:
+    """Read one array after a look at whether the file holds as much as it says, and at how much that is."""
     with archive.open(info) as member:
         version = np.lib.format.read_magic(member)
         read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
@@ -81,14 +92,16 @@ def _array(archive: zipfile.ZipFile, info: zipfile.ZipInfo, path: Path) -> NDArr
                 f"{path} holds Python objects ({info.filename}), which are not read because that can run any program: "
                 "save plain arrays"
             )
-        if info.file_size != member.tell() + dtype.itemsize * int(np.prod(shape, dtype=object)):
+        count = int(np.prod(shape, dtype=object))
+        if info.file_size != member.tell() + dtype.itemsize * count:
             size = " x ".join(map(str, shape))
             raise FileContentError(f"{path} is damaged: {info.filename} does not hold the {size} values that it states")
+        limit.take(max(dtype.itemsize, 1) * count)
     with archive.open(info) as member:
         return np.asarray(np.lib.format.read_array(member, allow_pickle=False))
 
 
-def _of_sdynpy(data: NDArray[Any], function_type: Any, where: str) -> FrfArrays:
+def _of_sdynpy(data: NDArray[Any], function_type: Any, where: str, limit: ReadLimit) -> FrfArrays:
     """Functions with response, then reference as their coordinates."""
     if function_type != _FRF:
         raise FileContentError(f"{where} holds functions of type {function_type} of sdynpy, not FRFs (type {_FRF})")
@@ -101,7 +114,7 @@ def _of_sdynpy(data: NDArray[Any], function_type: Any, where: str) -> FrfArrays:
         if len(channels) != 2:
             raise FileContentError(f"{where} has functions without one response and one reference each")
         functions.append(LooseFunction(channels[0], channels[1], np.ravel(row["abscissa"]), np.ravel(row["ordinate"])))
-    return arrays_of_functions(functions, where)
+    return arrays_of_functions(functions, where, limit)
 
 
 def _places(coordinate: Any) -> list[tuple[Any, Any]]:

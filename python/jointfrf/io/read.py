@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from jointfrf.errors import FileContentError
-from jointfrf.files import head_of
+from jointfrf.files import ReadLimit, head_of
 from jointfrf.frf.frf_set import FrfSet
 from jointfrf.frf.merge import merge_frfs
 from jointfrf.io.arrays import FrfArrays, as_frf_set
@@ -56,6 +56,7 @@ class _Wanted(NamedTuple):
     nodes: frozenset[int] | None
     mapping: FrfMapping
     is_part: bool
+    limit_gb: float | None
 
 
 def read_frfs(
@@ -65,6 +66,7 @@ def read_frfs(
     nodes: Collection[int] | None = None,
     mapping: Mapping[str, Any] | FrfMapping | None = None,
     averages: ArrayLike | None = None,
+    limit_gb: float | None = None,
 ) -> FrfSet:
     """Read measured FRFs from one file or several of one test.
 
@@ -85,6 +87,9 @@ def read_frfs(
         of fields, ``test.frf`` inside a structure; channels also as their names), ``axes`` (``out,in,freq``).
     averages : number or array_like, shape (n_responses, n_excitations), optional
         Number of averages, where the files do not say it.
+    limit_gb : float, optional
+        What one file may be large, and its content take in memory, GB. Default: the environment variable
+        JOINTFRF_FILE_LIMIT_GB, or else 16 GB of file, and 1 GB, or 10 times the size of the file, of content.
 
     Returns
     -------
@@ -118,7 +123,7 @@ def read_frfs(
     if not paths:
         raise ValueError("no file is named")
     kept = None if nodes is None else frozenset(as_nodes("nodes", nodes))
-    wanted = _Wanted(quantity, force_quantity, kept, as_mapping(mapping), len(paths) > 1)
+    wanted = _Wanted(quantity, force_quantity, kept, as_mapping(mapping), len(paths) > 1, limit_gb)
     sets = [_read(Path(path), wanted) for path in paths]
     merged = merge_frfs(sets)
     if not merged.measured.any():
@@ -128,21 +133,23 @@ def read_frfs(
 
 def _read(path: Path, wanted: _Wanted) -> FrfSet:
     """Read one file."""
-    reader = _reader(path, head_of(path))
+    reader = _reader(path, head_of(path, wanted.limit_gb))
     if reader is None:
         return read_uff_part(
             path,
             wanted.quantity,
             force_quantity=wanted.forced,
             nodes=wanted.nodes,
+            limit_gb=wanted.limit_gb,
             coherence_will_do=wanted.is_part,
             stacklevel=5,
         )
-    found = as_frf_set(reader(path, wanted.mapping), str(path), wanted.quantity, forced=wanted.forced, stacklevel=5)
+    content = reader(path, wanted.mapping, ReadLimit(path, wanted.limit_gb))
+    found = as_frf_set(content, str(path), wanted.quantity, forced=wanted.forced, stacklevel=5)
     return found if wanted.nodes is None else found.at_nodes(wanted.nodes)
 
 
-def _reader(path: Path, head: bytes) -> Callable[[Path, FrfMapping], FrfArrays] | None:
+def _reader(path: Path, head: bytes) -> Callable[[Path, FrfMapping, ReadLimit], FrfArrays] | None:
     """Reader of a file by how it begins; None for a Universal File."""
     suffix = path.suffix.lower()
     if head.startswith(b"MATLAB "):
@@ -165,8 +172,8 @@ def _reader(path: Path, head: bytes) -> Callable[[Path, FrfMapping], FrfArrays] 
     raise FileContentError(f"{path} is of an unknown format; known are {_known()}")
 
 
-def _csv(path: Path, _: FrfMapping) -> FrfArrays:
-    return csv_arrays(path)
+def _csv(path: Path, _: FrfMapping, limit: ReadLimit) -> FrfArrays:
+    return csv_arrays(path, limit)
 
 
 def _known() -> str:

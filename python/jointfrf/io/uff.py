@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf.errors import FileContentError
+from jointfrf.files import ReadLimit
 from jointfrf.frf.frf_set import POWER_OF_I_OMEGA, ROUND_OFF, Channel, FrfSet, same_frf
 from jointfrf.frf.merge import same_lines
 from jointfrf.io.labels import DIRECTION_CODES
@@ -69,6 +70,7 @@ def read_uff(
     *,
     force_quantity: bool = False,
     nodes: Collection[int] | None = None,
+    limit_gb: float | None = None,
 ) -> FrfSet:
     """Read the FRFs of a Universal File.
 
@@ -83,6 +85,8 @@ def read_uff(
         Take `quantity` also where data types and units of the file agree on another one.
     nodes : collection of int, optional
         Read only FRFs between these nodes; all by default. Headers are read first, and then only what is wanted.
+    limit_gb : float, optional
+        As for `read_frfs`.
 
     Returns
     -------
@@ -125,7 +129,9 @@ def read_uff(
     >>> frfs = jointfrf.io.read_uff("lap_joint.uff")  # doctest: +SKIP
     >>> h = frfs.receptance().matrix(["102:+y", "202:+y"], ["102:+y", "202:+y"])  # doctest: +SKIP
     """
-    return read_uff_part(path, quantity, force_quantity=force_quantity, nodes=nodes, stacklevel=4)
+    return read_uff_part(
+        path, quantity, force_quantity=force_quantity, nodes=nodes, limit_gb=limit_gb, stacklevel=4
+    )  # fmt: skip
 
 
 def read_uff_part(
@@ -134,6 +140,7 @@ def read_uff_part(
     *,
     force_quantity: bool = False,
     nodes: Collection[int] | None = None,
+    limit_gb: float | None = None,
     coherence_will_do: bool = False,
     stacklevel: int = 3,
 ) -> FrfSet:
@@ -141,7 +148,7 @@ def read_uff_part(
 
     Parameters
     ----------
-    path, quantity, force_quantity, nodes
+    path, quantity, force_quantity, nodes, limit_gb
         As for `read_uff`.
     coherence_will_do : bool
         Accept a file with coherences and no FRF: all FRFs of the set are then NaN.
@@ -155,7 +162,7 @@ def read_uff_part(
     check_quantity(quantity)
     if nodes is not None:
         nodes = frozenset(as_nodes("nodes", nodes))
-    file = UniversalFile(Path(path))
+    file = UniversalFile(Path(path), limit_gb)
     content = _describe(file, quantity, forced=force_quantity, nodes=nodes)
     only_coherence = coherence_will_do and not content.frfs and not content.unusable and content.coherences
     if not content.frfs and not only_coherence:
@@ -165,9 +172,11 @@ def read_uff_part(
     frfs = _unique(file, content.frfs)
     pairs = [frf.channels for frf in frfs] or [channels for _, channels in content.coherences]
     matrix = _Matrix(pairs)
-    freq_hz, h, common = _values(file, frfs, matrix)
-    freq_hz, coherence = _coherence(file, content, matrix, freq_hz)
+    limit = ReadLimit(file.path, limit_gb)
+    freq_hz, h, common = _values(file, frfs, matrix, limit)
+    freq_hz, coherence = _coherence(file, content, matrix, freq_hz, limit)
     if h is None:
+        limit.take(matrix.bytes(freq_hz.size))
         h = np.full((freq_hz.size, *matrix.shape), np.nan + 0j)
     freq_hz, h, coherence = _without_bad_zero_line(file, frfs, matrix, freq_hz, h, coherence)
     coordinates = node_coordinates(file, {channel.node for pair in pairs for channel in pair})
@@ -188,6 +197,10 @@ class _Matrix:
         row_of = {channel: i for i, channel in enumerate(self.responses)}
         column_of = {channel: j for j, channel in enumerate(self.excitations)}
         self.place_of = {pair: (row_of[pair[0]], column_of[pair[1]]) for pair in pairs}
+
+    def bytes(self, n_freq: int) -> int:
+        """Return what all its FRFs take."""
+        return 16 * n_freq * self.shape[0] * self.shape[1]
 
 
 def _describe(file: UniversalFile, quantity: str | None, *, forced: bool, nodes: Collection[int] | None) -> _Content:
@@ -302,7 +315,7 @@ def _unique(file: UniversalFile, frfs: list[_Frf]) -> list[_Frf]:
 
 
 def _values(
-    file: UniversalFile, frfs: list[_Frf], matrix: _Matrix
+    file: UniversalFile, frfs: list[_Frf], matrix: _Matrix, limit: ReadLimit
 ) -> tuple[NDArray[np.float64] | None, NDArray[np.complex128] | None, str]:
     """Frequency lines, the FRFs in SI units, and the one quantity they are all given as."""
     common = max((frf.quantity for frf in frfs), key=POWER_OF_I_OMEGA.__getitem__, default="receptance")
@@ -312,6 +325,7 @@ def _values(
         freq_hz, value = _read_function(file, frf.dataset, str(frf), np.complex128)
         if lines is None or h is None:
             lines = freq_hz
+            limit.take(matrix.bytes(freq_hz.size))
             h = np.full((freq_hz.size, *matrix.shape), np.nan + 0j)
         elif not same_lines(lines, freq_hz):
             held = [f"{_lines(f)} in dataset {each.dataset} ({each})" for f, each in ((lines, frfs[0]), (freq_hz, frf))]
@@ -324,7 +338,7 @@ def _values(
 
 
 def _coherence(
-    file: UniversalFile, content: _Content, matrix: _Matrix, lines: NDArray[np.float64] | None
+    file: UniversalFile, content: _Content, matrix: _Matrix, lines: NDArray[np.float64] | None, limit: ReadLimit
 ) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
     """Frequency lines, and the coherence of the FRFs; None where the file holds none of it."""
     found: NDArray[np.float64] | None = None
@@ -343,6 +357,7 @@ def _coherence(
             file.note("coherence left out: it is not from 0 to 1", number)
             continue
         if found is None:
+            limit.take(matrix.bytes(lines.size) // 2)
             found = np.full((lines.size, *matrix.shape), np.nan)
         if np.isfinite(found[0, *place]):
             file.note("a second coherence between the same channels is left out", number)

@@ -36,12 +36,12 @@ class UniversalFile:
         It is no Universal File; every method raises it where the file is damaged.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, limit_gb: float | None = None) -> None:
         pyuff = import_extra("pyuff")
         self.path = path
         self._notes: dict[str, list[int]] = {}
         self._systems: dict[int, UnitSystem] | None = None
-        head_of(path)  # what is no file, or empty, is said before anything is sought in it
+        head_of(path, limit_gb)  # what is no file, or empty, is said before anything is sought in it
         index, is_cut = index_datasets(path)
         if not index:
             raise self.error(

@@ -10,7 +10,7 @@ from queue import SimpleQueue
 from typing import Any, Generic, TypeVar
 
 from jointfrf.parallel.cores import available_cores
-from jointfrf.parallel.processes import SeparateProcesses, as_workers
+from jointfrf.parallel.processes import SeparateProcesses, as_workers, can_start_processes
 
 __all__ = ["AnyExecutor", "BrokenPoolError", "Pool", "check_progress", "opened_pool"]
 
@@ -168,7 +168,7 @@ def opened_pool(executor: AnyExecutor | None = None, jobs: int | None = None) ->
         return
     if executor is not None and not callable(executor):
         raise TypeError(f"executor must be one of concurrent.futures, or make one, not {type(executor).__name__}")
-    make = executor if executor is not None else _own(jobs or available_cores())
+    make = executor if executor is not None else _own(jobs or (available_cores() if can_start_processes() else 1))
     own = make()
     if not callable(getattr(own, "submit", None)):
         raise TypeError(f"executor must make one of concurrent.futures, not {type(own).__name__}")

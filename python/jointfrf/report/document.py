@@ -19,6 +19,7 @@ from jointfrf.report.chart import Chart, chart_view, style_rules
 from jointfrf.report.draw import Drawing
 from jointfrf.report.figure import Figure
 from jointfrf.report.table import VERDICT, Table, shown, turned, written
+from jointfrf.spelling import visible
 
 __all__ = ["Document", "HeatMap", "Listing", "Part", "Picture", "Section", "Sketch", "Words", "make_document"]
 
@@ -127,7 +128,7 @@ def make_document(document: Document) -> str:
     charts = [part for part in parts if isinstance(part, Chart)]
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(_FOLDER), autoescape=True, undefined=jinja2.StrictUndefined,
-        keep_trailing_newline=True, trim_blocks=True, lstrip_blocks=True,
+        keep_trailing_newline=True, trim_blocks=True, lstrip_blocks=True, finalize=_seen,
     )  # fmt: skip
     script = (_FOLDER / "chart.js").read_text(encoding="utf-8") if charts else ""
     return environment.get_template("page.html.jinja").render(
@@ -147,6 +148,11 @@ def make_document(document: Document) -> str:
             for section in document.sections
         ],
     )
+
+
+def _seen(value: Any) -> Any:
+    """Return what is shown: texts with the characters escaped that are not seen; markup of our own as it is."""
+    return visible(value, "\n\t") if type(value) is str else value
 
 
 def _style(parts: Sequence[Part], charts: Sequence[Chart]) -> str:

@@ -11,6 +11,7 @@ from jointfrf.extras import check_extras
 from jointfrf.report.figure import Figure, Panel, Surface
 from jointfrf.report.svg import shortened
 from jointfrf.report.ticks import format_axis
+from jointfrf.spelling import visible
 
 __all__ = ["STYLES", "Drawing", "Style", "draw", "laid_out"]
 
@@ -165,15 +166,35 @@ def _composed(figure: Figure) -> tuple[Any, list[Any]]:
         _add_legend(canvas, axes)
         if figure.heading:
             canvas.suptitle(figure.heading, fontsize=_HEADING)
+        _make_drawable(canvas)
     return canvas, axes
 
 
 def _settings(figure: Figure) -> Any:
-    """Return the settings of matplotlib for a figure, which hold inside a `with` block only."""
-    import matplotlib
+    """Return the settings of matplotlib for a figure, which hold inside a `with` block only.
 
-    settings: dict[str, Any] = {**_FONTS, **_SETTINGS, "svg.hashsalt": figure.key}
-    return matplotlib.rc_context(settings)  # type: ignore[arg-type]
+    They are all set: a `matplotlibrc` of the working directory may be anybody's, and `text.usetex` starts programs.
+    """
+    from matplotlib import style
+
+    return style.context(["default", {**_FONTS, **_SETTINGS, "svg.hashsalt": figure.key}])
+
+
+def _make_drawable(canvas: Any) -> None:
+    """Look at texts, which may come from a file: what is no formula is drawn as it stands, what is not seen escaped."""
+    from matplotlib.mathtext import MathTextParser
+    from matplotlib.text import Text
+
+    formulas = MathTextParser("path")
+    for text in canvas.findobj(Text):
+        words = visible(text.get_text(), "\n")
+        try:
+            if "$" in words:
+                formulas.parse(words)
+        except ValueError:
+            words = words.replace("$", r"\$")
+        if words != text.get_text():
+            text.set_text(words)
 
 
 def _names(panel: Panel) -> list[str]:

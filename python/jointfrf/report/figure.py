@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from jointfrf.frf.bands import Band
 from jointfrf.kernel.arguments import FloatArray
+from jointfrf.report.table import csv_cell
 
 __all__ = ["Curve", "Figure", "Interval", "Level", "NamedBands", "Panel", "Ribbon", "Surface", "figure_csv"]
 
@@ -137,7 +138,7 @@ def figure_csv(figure: Figure) -> str:
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(["panel", "curve", "x", "y", "y_high"])
     for number, panel in enumerate(figure.panels, 1):
-        writer.writerows((panel.title or str(number), *row) for row in _panel_rows(panel))
+        writer.writerows(map(csv_cell, (panel.title or str(number), *row)) for row in _panel_rows(panel))
     return text.getvalue()
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from jointfrf.dofs import Parameter, compliance_unit
 from jointfrf.errors import IllConditionedWarning
-from jointfrf.files import write_file
+from jointfrf.files import below, write_file
 from jointfrf.identification.joint_fit import JointFit
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.kernel.linear_algebra import invert
@@ -154,6 +154,7 @@ def write_fit(fits: Sequence[JointFit], folder: Path, source: str, figures: Sequ
     for figure in figures:
         contents[f"{figure.key}.png"], contents[f"{figure.key}.svg"] = draw(figure)
     folder.mkdir(parents=True, exist_ok=True)
-    for file, content in contents.items():
-        write_file(folder / file, content)
-    return [folder / file for file in contents]
+    written = {below(folder, file): content for file, content in contents.items()}
+    for path, content in written.items():
+        write_file(path, content)
+    return list(written)

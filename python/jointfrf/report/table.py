@@ -4,19 +4,37 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from jointfrf.dofs import Parameter
+from jointfrf.spelling import visible
 
-__all__ = ["VERDICT", "Cell", "Table", "as_text", "number", "plain_rows", "shown", "table_csv", "turned", "written"]
+__all__ = [
+    "VERDICT",
+    "Cell",
+    "Table",
+    "as_text",
+    "csv_cell",
+    "number",
+    "plain_rows",
+    "shown",
+    "table_csv",
+    "turned",
+    "written",
+]
 
 Cell = str | float | Parameter | None
 
 #: Heading of verdicts.
 VERDICT = "verdict"
 _DIGITS, _DIGITS_OF_PERCENT = 5, 3
+#: What a formula of a spreadsheet begins with.
+_FORMULA = ("=", "+", "-", "@")
+#: Numbers with blanks between, which are none.
+_NUMBERS = re.compile(r"([-+]?[\d.]+(e[-+]?\d+)? ?)+")
 
 
 @dataclass(frozen=True)
@@ -131,11 +149,28 @@ def plain_rows(table: Table) -> list[list[str | float | None]]:
     return [[cell.name if isinstance(cell, Parameter) else cell for cell in row] for row in table.rows]
 
 
+def csv_cell(cell: object) -> object:
+    """Return a cell of a CSV file; a text that a spreadsheet would take for a formula stands after an apostrophe.
+
+    Examples
+    --------
+    >>> from jointfrf.report.table import csv_cell
+    >>> csv_cell("=HYPERLINK(1)"), csv_cell("k_y"), csv_cell(-1.5), csv_cell(None)
+    ("'=HYPERLINK(1)", 'k_y', -1.5, '')
+    """
+    if cell is None:
+        return ""
+    if not isinstance(cell, str):
+        return cell
+    text = visible(cell)
+    return f"'{text}" if text.lstrip()[:1] in _FORMULA and not _NUMBERS.fullmatch(text) else text
+
+
 def table_csv(table: Table) -> str:
     """Write a table as CSV, numbers in full."""
     table = shown(table)
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(table.columns)
-    writer.writerows([["" if cell is None else cell for cell in row] for row in plain_rows(table)])
+    writer.writerow(map(csv_cell, table.columns))
+    writer.writerows([[csv_cell(cell) for cell in row] for row in plain_rows(table)])
     return text.getvalue()

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from jointfrf.cases.studied import Estimates
 from jointfrf.extras import check_extras, import_extra
-from jointfrf.files import write_file, written_whole
+from jointfrf.files import below, write_file, written_whole
 from jointfrf.kernel.arguments import FloatArray, as_integer
 from jointfrf.report.document import Document, Listing, Picture, Section, make_document
 from jointfrf.report.draw import draw
@@ -200,20 +200,20 @@ def write_report_of(
     check_extras("matplotlib", "jinja2")
     drawn = [(figure, draw(figure)) for figure in figures]
     for inner in ("tables", "figures"):
-        (folder / inner).mkdir(exist_ok=True)
+        below(folder, inner).mkdir(exist_ok=True)
     for figure, drawing in drawn:
-        write_file(folder / "figures" / f"{figure.key}.png", drawing.png)
-        write_file(folder / "figures" / f"{figure.key}.svg", drawing.svg)
-        write_file(folder / "figures" / f"{figure.key}.csv", figure_csv(figure))
-    write_file(folder / "tables" / "study.csv", table_csv(table))
-    write_file(folder / "results.json", json.dumps(content, indent=1) + "\n")
+        write_file(below(folder / "figures", figure.key, ".png"), drawing.png)
+        write_file(below(folder / "figures", figure.key, ".svg"), drawing.svg)
+        write_file(below(folder / "figures", figure.key, ".csv"), figure_csv(figure))
+    write_file(below(folder / "tables", "study.csv"), table_csv(table))
+    write_file(below(folder, "results.json"), json.dumps(content, indent=1) + "\n")
     sections = [
         Section("estimates", "Estimates", [table]),
         Section("figures", "Figures", [Picture(figure, drawing) for figure, drawing in drawn]),
         Section("subject", "The study", [Listing("case and design", json.dumps(record.identity, indent=1))]),
     ]
     page = make_document(Document(f"Study: {record.title}", _about(record), sections))
-    write_file(folder / "report.html", page)
+    write_file(below(folder, "report.html"), page)
     return folder / "report.html"
 
 

@@ -6,7 +6,6 @@ import io
 import json
 import re
 import shutil
-import zipfile
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -16,7 +15,8 @@ import numpy as np
 
 from jointfrf.cases.studied import Estimates, StudiedColumn
 from jointfrf.errors import FileContentError
-from jointfrf.files import check_file, write_file, written_whole
+from jointfrf.files import ReadLimit, check_file, write_file, written_whole
+from jointfrf.io.npz_file import npz_fields
 from jointfrf.studies.design import StudyPoint, as_text_of
 
 __all__ = ["GroupRecord", "Span", "StudyRecord", "StudyStore"]
@@ -201,12 +201,12 @@ class StudyStore:
 def _read_chunk(path: Path, skip: int) -> Estimates:
     try:
         check_file(path)
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as held:
-            values = held["values"][skip:]
-            if "low" not in held:
-                return Estimates.without_intervals(values)
-            return Estimates(values, held["low"][skip:], held["high"][skip:])
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+        held = npz_fields(path, ReadLimit(path))
+        values = held["values"][skip:]
+        if "low" not in held:
+            return Estimates.without_intervals(values)
+        return Estimates(values, held["low"][skip:], held["high"][skip:])
+    except (OSError, ValueError, KeyError, IndexError) as error:
         raise FileContentError(
             f"{path} is damaged ({error}): delete it, and the same study computes its realisations again"
         ) from error

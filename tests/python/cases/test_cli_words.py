@@ -1,6 +1,7 @@
 """Words of the command line: what was meant, the project's own file, JSON and quiet, completion, exit codes."""
 
 import json
+import os
 import re
 import subprocess
 import sys
@@ -112,28 +113,31 @@ k = "201:202"
 [identify]
 band = [[20, 100], [110, 150]]
 damping = "viscous"
-save = "kept.json"
 """
+#: What a file says that was named.
+NAMED = PROJECT + 'save = "kept.json"\nexport = "abaqus:1,2"\n'
 
 
-def test_a_project_has_defaults_of_its_own(tmp_path):
+def test_a_project_has_defaults_of_its_own():
     Path("jointfrf.toml").write_text(PROJECT)
-    content = json.loads(run_command("identify", BARS, "--json").stdout)
-    fit = content["fits"][0]
+    result = run_command("identify", BARS, "--json")
+    assert result.stderr.splitlines()[0] == "jointfrf: using jointfrf.toml of this folder (--no-config: without it)"
+    fit = json.loads(result.stdout)["fits"][0]
     assert fit["dofs"] == ["y", "theta_z"]
     assert fit["bands_hz"]["y"] == [[20, 100], [110, 150]]
     assert not any("damping of y" in note for note in fit["notes"])
-    assert (tmp_path / "kept.json").exists()
     assert run_command("check", BARS).returncode == 0
+    assert run_command("cases").stderr == ""  # which asks it for nothing
 
 
 def test_the_command_line_wins(tmp_path):
     (tmp_path / "deep").mkdir()
-    Path("deep/other.toml").write_text(PROJECT)
+    Path("deep/other.toml").write_text(NAMED)
     words = ["--config", "deep/other.toml", "--dofs", "y", "--band", "20:150", "--json"]
     content = json.loads(run_command("identify", BARS, *words).stdout)
     fit = content["fits"][0]
     assert (fit["dofs"], fit["bands_hz"]["y"]) == (["y"], [[20, 150]])
+    assert "*SPRING" in content["cards"]  # `export` is also the name of a command
     assert (tmp_path / "deep" / "kept.json").exists()  # files stand beside the configuration
     Path("jointfrf.toml").write_text(PROJECT)
     assert "--j, --k and --dofs are missing" in run_command("identify", BARS, "--no-config").stderr
@@ -150,7 +154,6 @@ def test_the_command_line_wins(tmp_path):
         ("[101, 102]", "[0]", "jointfrf.toml: j: '0' is no node number"),
         ('"y", "theta_z"', '"y", "theta_"', "dofs: dofs must be among"),
         ("[20, 100]", "[20]", "band: '20' is not a band like 200:550"),
-        ('quantity = "accelerance"', "quiet = 1", "quiet: must be true or false, not 1"),
         ('quantity = "accelerance"', "quantity = 2020-01-01", "quantity: must be a text, a number or a list"),
         ("[identify]", "[identify", "not a TOML file"),
         ("[identify]", "identify = 3\n[run]", "identify must be a table"),
@@ -162,6 +165,84 @@ def test_what_is_wrong_in_the_file_of_a_project(old, new, message):
     assert result.returncode == 1
     assert message in result.stderr
     assert len(result.stderr.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("said", "key"),
+    [
+        ('save = "../joint.json"', "save"),
+        ('report = "a.html"', "report"),
+        ('out = "a"', "out"),
+        ('output = "a"', "output"),
+        ('export = "abaqus:1,2"', "export"),
+        ("quiet = true", "quiet"),
+        ("limit_gb = 1e9", "limit_gb"),
+    ],
+)
+def test_a_file_that_is_found_writes_nothing(tmp_path, monkeypatch, said, key):
+    """`save = "../home/.bashrc"` in the folder of a stranger was done, and nothing said."""
+    folder = tmp_path / "stranger"
+    folder.mkdir()
+    monkeypatch.chdir(folder)
+    (folder / "jointfrf.toml").write_text(f"{PROJECT}{said}\n")
+    result = run_command("identify", BARS)
+    assert result.returncode == 1
+    assert f"[identify]: {key}: say it on the command line, or name the file by --config" in result.stderr
+    assert sorted(each.name for each in tmp_path.rglob("*")) == ["jointfrf.toml", "stranger"]
+
+
+def test_a_file_that_is_found_names_no_executor(tmp_path):
+    """Dask takes pickles from whom it is told to connect to."""
+    Path("jointfrf.toml").write_text('[study]\nexecutor = "dask:tcp://127.0.0.1:9"\n')
+    result = run_command("study", "4.2", "--realisations", "2")
+    assert result.returncode == 1
+    assert "[study]: executor: say it on the command line" in result.stderr
+    Path("jointfrf.toml").write_text("json = true\n")
+    assert "json: say it on the command line" in run_command("cases").stderr
+    Path("jointfrf.toml").write_text('export = "abaqus:1,2"\n')
+    assert "export must be a table" in run_command("cases").stderr
+
+
+@pytest.mark.parametrize("link", [False, True])
+def test_a_file_that_is_found_reads_nothing_outside_its_folder(tmp_path, monkeypatch, link):
+    folder = tmp_path / "stranger"
+    folder.mkdir()
+    monkeypatch.chdir(folder)
+    (tmp_path / "secret.csv").write_text("channel,side,x,y,z\n101:+x,j,0,0,0\n")
+    (folder / "own.csv").symlink_to(tmp_path / "secret.csv")
+    name = "own.csv" if link else "../secret.csv"
+    (folder / "jointfrf.toml").write_text(f'channels = "{name}"\nat = [0, 0, 0]\n')
+    result = run_command("check", BARS)
+    assert result.returncode == 1
+    assert f"channels: {name} is not in the folder of this file, which was found and not named" in result.stderr
+    named = run_command("check", BARS, "--config", "jointfrf.toml")
+    assert "is not in the folder" not in named.stderr
+
+
+def test_a_wrong_value_of_a_file_that_is_named():
+    Path("own.toml").write_text("quiet = 1\n")
+    result = run_command("check", BARS, "--config", "own.toml")
+    assert "quiet: must be true or false, not 1" in result.stderr
+
+
+def test_the_limit_of_what_is_read_is_an_option(tmp_path, monkeypatch):
+    monkeypatch.delenv("JOINTFRF_FILE_LIMIT_GB", raising=False)
+    result = run_command("check", BARS, "--limit-gb", "1e-6")
+    assert result.returncode == 1
+    assert "more than the 1e-06 GB that are read: limit_gb=, --limit-gb or the environment" in result.stderr
+    assert "must be a number of GB above 0, not '0'" in run_command("check", BARS, "--limit-gb", "0").stderr
+    assert main(["check", str(BARS), "--limit-gb", "1e-6", "--quiet"]) == 1
+    assert "JOINTFRF_FILE_LIMIT_GB" not in os.environ
+
+
+def test_names_do_nothing_to_a_terminal(tmp_path):
+    path = tmp_path / "a\x1b]0;owned\x07\u202e.uff"
+    path.write_bytes(BARS.read_bytes())
+    result = run_command("check", path.name)
+    assert "\x1b" not in result.stdout
+    assert r"a\x1b]0;owned\x07\u202e.uff" in result.stdout
+    for words in (["check", "\x1bx"], ["identify", path.name, "--j", "1\x1b"], ["\x1bx"]):
+        assert "\x1b" not in run_command(*words).stderr
 
 
 def test_completion_of_the_shells():

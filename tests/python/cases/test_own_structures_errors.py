@@ -102,7 +102,7 @@ NPZ = [
     (lambda path: path.write_bytes(b""), r"mass: \S+a_m\.npz cannot be read as an NPZ file: "),
     (lambda path: path.write_bytes(b"PK\3\4" + b"x" * 50), r"a_m\.npz cannot be read as an NPZ file: "),
     (lambda path: path.write_bytes(path.read_bytes()[:300]), r"a_m\.npz cannot be read as an NPZ file: "),
-    (lambda path: np.savez(path, np.array([{}], object)), r"a_m\.npz cannot be read as an NPZ file: .*allow_pickle"),
+    (lambda path: np.savez(path, np.array([{}], object)), r"a_m\.npz holds Python objects \(arr_0\.npy\), which"),
     (lambda path: np.savez(path, a=K, b=K), r"a_m\.npz must hold one array, or one called 'mass'; it holds a, b$"),
     (lambda path: np.savez(path), r"must hold one array, or one called 'mass'; it holds nothing$"),
     (lambda path: np.savez(path, K[0]), r"a_m\.npz must hold a square matrix, not one of shape \(4,\)$"),

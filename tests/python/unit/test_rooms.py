@@ -9,7 +9,8 @@ PACKAGE = Path(jointfrf.__file__).parent
 
 #: From the ground up; rooms of one floor do not know each other, a room imports what stands below its floor.
 FLOORS = (
-    {"errors", "spelling"},
+    {"spelling"},
+    {"errors"},
     {"files"},
     {"extras", "kernel", "toml"},
     {"dofs", "parallel"},

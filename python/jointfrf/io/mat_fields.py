@@ -1,0 +1,285 @@
+"""The variables of a MATLAB file of version 4 to 7, read within its bounds: nothing that it states is believed."""
+
+from __future__ import annotations
+
+import math
+import zlib
+from pathlib import Path
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointfrf.errors import FileContentError
+from jointfrf.files import ReadLimit
+
+__all__ = ["mat_fields"]
+
+_HEAD = 128
+_MATRIX, _COMPRESSED = 14, 15
+#: Types of elements, as numpy has them.
+_NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
+_TEXTS = {1: ("latin-1", 1), 2: ("latin-1", 1), 3: ("utf-16", 2), 4: ("utf-16", 2), 16: ("utf-8", 1),
+          17: ("utf-16", 2), 18: ("utf-32", 4)}  # fmt: skip
+#: Classes of arrays.
+_CELL, _STRUCT, _OBJECT, _CHAR, _OPAQUE = 1, 2, 3, 4, 17
+_CLASSES = {6: "f8", 7: "f4", 8: "i1", 9: "u1", 10: "i2", 11: "u2", 12: "i4", 13: "u4", 14: "i8", 15: "u8"}
+_COMPLEX = 0x800
+#: Types of numbers in version 4.
+_OLD_NUMBERS = {0: "f8", 1: "f4", 2: "i4", 3: "i2", 4: "u2", 5: "u1"}
+_OLD_HEAD, _OLD_MOST, _OLD_TEXT = 20, 5000, 1
+_DEEPEST = 20
+
+
+def mat_fields(path: Path, limit: ReadLimit) -> dict[str, Any]:
+    """Read all variables.
+
+    Parameters
+    ----------
+    path : Path
+        A MATLAB file that is not HDF5.
+    limit : ReadLimit
+
+    Returns
+    -------
+    dict of str
+        Arrays without axes of length 1, single values as such, texts; structures are mappings, several of them lists,
+        cells arrays of objects. None for what has no meaning here: sparse matrices, functions, tables.
+
+    Raises
+    ------
+    FileContentError
+        The file is damaged, or holds more than the limit.
+    """
+    try:
+        content = path.read_bytes()
+        if content[126:_HEAD] in (b"IM", b"MI") and 0 not in content[:4]:
+            return _variables(content, limit)
+        if content.startswith(b"MATLAB"):
+            raise ValueError("it ends inside its header, or the header is damaged")
+        return _old_variables(content, limit)
+    except FileContentError:
+        raise
+    except (OSError, ValueError, OverflowError, MemoryError, zlib.error) as error:
+        raise FileContentError(f"{path} cannot be read as a MATLAB file: {error}") from error
+
+
+def _variables(content: bytes, limit: ReadLimit) -> dict[str, Any]:
+    """Read version 5 to 7."""
+    order: Literal["little", "big"] = "little" if content[126:_HEAD] == b"IM" else "big"
+    place, found = _HEAD, dict[str, Any]()
+    while place < len(content):
+        kind, size = (int.from_bytes(content[at : at + 4], order) for at in (place, place + 4))
+        start, place = place + 8, place + 8 + size
+        if place > len(content) or kind not in (_MATRIX, _COMPRESSED):
+            raise ValueError("it ends inside a variable, or one is damaged")
+        whole = memoryview(content)[start:place]
+        if kind == _COMPRESSED:
+            whole = _unpacked(whole, order, limit)
+        name, value = _Arrays(order, limit).array(whole, 0)
+        if name:
+            found[name] = value
+    return found
+
+
+def _unpacked(packed: memoryview, order: Literal["little", "big"], limit: ReadLimit) -> memoryview:
+    """Unpack a variable, of which not more is made than it states; its checksum is compared at the end."""
+    unpacker = zlib.decompressobj()
+    tag = unpacker.decompress(packed, 8)
+    kind, size = (int.from_bytes(tag[at : at + 4], order) for at in (0, 4))
+    if len(tag) < 8 or kind != _MATRIX:
+        raise ValueError("a compressed variable is damaged")
+    limit.take(size)
+    content = unpacker.decompress(unpacker.unconsumed_tail, size) if size else b""
+    rest = b"" if unpacker.eof else unpacker.decompress(unpacker.unconsumed_tail, 8)
+    if len(content) != size or len(rest) == 8 or not unpacker.eof:
+        raise ValueError("it ends inside a compressed variable")
+    return memoryview(content)
+
+
+class _Element(NamedTuple):
+    """A part of a variable: its type, its bytes."""
+
+    kind: int
+    data: memoryview
+
+
+class _Arrays:
+    """Arrays of one variable."""
+
+    def __init__(self, order: Literal["little", "big"], limit: ReadLimit) -> None:
+        self.order, self.limit = order, limit
+        self.sign = "<" if order == "little" else ">"
+
+    def elements(self, whole: memoryview) -> list[_Element]:
+        """Return the elements that make up an array, none beyond its end."""
+        found, place = [], 0
+        while place + 8 <= len(whole):
+            kind = int.from_bytes(whole[place : place + 4], self.order)
+            size = int.from_bytes(whole[place + 4 : place + 8], self.order)
+            start, end = place + 8, place + 8 + size
+            place = end + -size % 8
+            if kind >> 16:  # a short one: its size in the upper half, its bytes in the place of the size
+                kind, size = kind & 0xFFFF, kind >> 16
+                start, end, place = start - 4, start - 4 + size, start
+            if end > len(whole) or (place == start and size > 4):
+                raise ValueError("a variable is damaged: a part of it reaches beyond its end")
+            found.append(_Element(kind, whole[start:end]))
+        return found
+
+    def array(self, whole: memoryview, depth: int) -> tuple[str, Any]:
+        """Return the name and the value of an array."""
+        if depth > _DEEPEST:
+            raise ValueError("it has cells inside cells without end")
+        self.limit.take(0)
+        if not len(whole):
+            return "", np.zeros(0)
+        parts = self.elements(whole)
+        if len(parts) < 2 or parts[0].kind != 6 or len(parts[0].data) != 8:
+            raise ValueError("a variable is damaged: it does not say what it is")
+        flags = int.from_bytes(parts[0].data[:4], self.order)
+        kind = flags & 0xFF
+        if kind == _OPAQUE or len(parts) < 3:
+            return _name(parts[1]), None
+        shape, name, rest = self.shape(parts[1]), _name(parts[2]), parts[3:]
+        if kind == _CELL:
+            return name, self.cells(rest, shape, depth)
+        if kind in (_STRUCT, _OBJECT):
+            return name, self.structures(rest[kind == _OBJECT :], shape, depth)
+        if kind == _CHAR:
+            return name, self.text(rest, shape)
+        return name, self.numbers(rest, shape, _CLASSES[kind], bool(flags & _COMPLEX)) if kind in _CLASSES else None
+
+    def shape(self, part: _Element) -> tuple[int, ...]:
+        found = self.values(part).tolist() if part.kind == 5 else []
+        if len(found) < 2 or len(found) > 32 or min(found) < 0:
+            raise ValueError("a variable is damaged: it has no sizes")
+        return tuple(found)
+
+    def values(self, part: _Element) -> NDArray[Any]:
+        """Return the numbers of an element as they stand there."""
+        if part.kind not in _NUMBERS:
+            raise ValueError(f"a variable is damaged: there is no type {part.kind} of numbers")
+        kind = np.dtype(self.sign + _NUMBERS[part.kind])
+        if len(part.data) % kind.itemsize:
+            raise ValueError("a variable is damaged: it ends inside a number")
+        return np.frombuffer(part.data, kind)
+
+    def numbers(self, parts: list[_Element], shape: tuple[int, ...], kind: str, is_complex: bool) -> Any:
+        count = math.prod(shape)
+        found = [self.values(part) for part in parts[: 1 + is_complex]]
+        if len(found) < 1 + is_complex or any(each.size != count for each in found):
+            raise ValueError(f"a variable is damaged: it does not hold the {_by(shape)} values that it states")
+        self.limit.take(count * np.dtype(kind).itemsize * (1 + is_complex))
+        real = found[0].astype(kind)
+        return _squeezed(_complex(real, found[1].astype(kind)) if is_complex else real, shape)
+
+    def text(self, parts: list[_Element], shape: tuple[int, ...]) -> Any:
+        """Return a text, or rows of texts, which stand column by column."""
+        count = math.prod(shape)
+        if not parts or parts[0].kind not in _TEXTS:
+            raise ValueError("a variable is damaged: a text of no known type")
+        codec, unit = _TEXTS[parts[0].kind]
+        ending = "" if unit == 1 else "-le" if self.order == "little" else "-be"
+        self.limit.take(4 * len(parts[0].data))
+        letters = bytes(parts[0].data).decode(codec + ending, "replace")
+        if shape[0] == 1 and len(shape) == 2 and unit * count == len(parts[0].data):
+            return letters if count else np.array([], "U1")
+        if len(letters) != count:
+            raise ValueError(f"a variable is damaged: it does not hold the {_by(shape)} letters that it states")
+        if not count:
+            return np.array([], "U1")
+        rows = ["".join(letters[row :: shape[0]]) for row in range(shape[0])]
+        return rows[0] if len(rows) == 1 else np.array(rows)
+
+    def cells(self, parts: list[_Element], shape: tuple[int, ...], depth: int) -> Any:
+        values = self.inner(parts, math.prod(shape), depth)
+        found = np.empty(len(values), object)
+        for place, value in enumerate(values):
+            found[place] = value
+        cells = _squeezed(found, shape)
+        return list(values) if isinstance(cells, np.ndarray) and cells.ndim == 1 and _is_mapping(values) else cells
+
+    def structures(self, parts: list[_Element], shape: tuple[int, ...], depth: int) -> Any:
+        if len(parts) < 2 or parts[0].kind != 5 or len(parts[0].data) != 4:
+            raise ValueError("a variable is damaged: a structure without names")
+        length, held = int(self.values(parts[0])[0]), bytes(parts[1].data)
+        if length < 1 or len(held) % length:
+            raise ValueError("a variable is damaged: the names of a structure do not fit their length")
+        names = [_word(held[at : at + length]) for at in range(0, len(held), length)]
+        count = math.prod(shape)
+        values = self.inner(parts[2:], count * len(names), depth)
+        found = [dict(zip(names, values[i * len(names) :], strict=False)) for i in range(count if names else 0)]
+        return found[0] if count == 1 and found else found
+
+    def inner(self, parts: list[_Element], count: int, depth: int) -> list[Any]:
+        """Return arrays inside an array."""
+        if len(parts) != count or any(part.kind != _MATRIX for part in parts):
+            raise ValueError(f"a variable is damaged: it does not hold the {count} parts that it states")
+        return [self.array(part.data, depth + 1)[1] for part in parts]
+
+
+def _old_variables(content: bytes, limit: ReadLimit) -> dict[str, Any]:
+    """Read version 4, which has no mark."""
+    place, found = 0, dict[str, Any]()
+    while place < len(content):
+        if place + _OLD_HEAD > len(content):
+            raise ValueError("it ends inside a variable, or one is damaged")
+        sign = "<" if int.from_bytes(content[place : place + 4], "little") < _OLD_MOST else ">"
+        kind, rows, columns, is_complex, length = np.frombuffer(content, f"{sign}i4", 5, place).tolist()
+        type_, form = kind // 10 % 10, kind % 10
+        shape = (rows, columns)
+        is_sound = 0 <= kind < _OLD_MOST and type_ in _OLD_NUMBERS and is_complex in (0, 1)
+        if not is_sound or min(rows, columns, length) < 0:
+            raise ValueError("it ends inside a variable, or one is damaged")
+        number = np.dtype(sign + _OLD_NUMBERS[type_])
+        start = place + _OLD_HEAD + length
+        end = start + number.itemsize * rows * columns * (1 + is_complex)
+        if end > len(content):
+            raise ValueError("it ends inside a variable, or one is damaged")
+        limit.take(2 * (end - start))
+        name = _word(content[place + _OLD_HEAD : start])
+        values = np.frombuffer(content, number, rows * columns * (1 + is_complex), start).astype(_OLD_NUMBERS[type_])
+        if form == _OLD_TEXT:
+            letters = "".join(map(chr, np.clip(np.nan_to_num(values), 0, 0xFF).astype(int).tolist()))
+            texts = ["".join(letters[row::rows]) for row in range(rows)]
+            found[name] = texts[0] if len(texts) == 1 else np.array(texts)
+        elif form == 0:
+            half = rows * columns
+            found[name] = _squeezed(_complex(values[:half], values[half:]) if is_complex else values, shape)
+        else:
+            found[name] = None
+        place = end
+    return found
+
+
+def _name(part: _Element) -> str:
+    return _word(bytes(part.data))
+
+
+def _word(held: bytes) -> str:
+    return held.partition(b"\0")[0].decode("latin-1")
+
+
+def _complex(real: NDArray[Any], imaginary: NDArray[Any]) -> NDArray[Any]:
+    found = np.empty(real.size, np.result_type(real.dtype, np.complex64))
+    found.real, found.imag = real, imaginary
+    return found
+
+
+def _squeezed(values: NDArray[Any], shape: tuple[int, ...]) -> Any:
+    """Return an array that stands column by column without axes of length 1; a single value as such."""
+    if values.size != math.prod(shape):
+        raise ValueError(f"a variable is damaged: it does not hold the {_by(shape)} values that it states")
+    if not values.size:
+        return values
+    found = values.reshape(shape, order="F").squeeze()
+    return found if found.ndim else found.item()
+
+
+def _is_mapping(values: list[Any]) -> bool:
+    return bool(values) and isinstance(values[0], dict)
+
+
+def _by(shape: tuple[int, ...]) -> str:
+    return " x ".join(map(str, shape))

@@ -1,0 +1,106 @@
+"""Every place of the package that starts a process, reads pickles, opens a socket or runs a text is known, with why."""
+
+import ast
+from pathlib import Path
+
+import jointfrf
+
+PACKAGE = Path(jointfrf.__file__).parent
+
+#: Modules that start processes, read pickles, connect to other machines, run texts, or call libraries by address.
+MODULES = {
+    "asyncio", "code", "codeop", "concurrent.futures", "ctypes", "cffi", "dbm", "dill", "cloudpickle", "distributed",
+    "ftplib", "http", "imaplib", "joblib", "loky", "marshal", "mpi4py", "multiprocessing", "pickle", "poplib", "pty",
+    "requests", "runpy", "shelve", "smtplib", "socket", "socketserver", "ssl", "subprocess", "telnetlib", "urllib",
+    "webbrowser", "xmlrpc", "yaml",
+}  # fmt: skip
+#: Functions by their last name: what runs a text, reads a pickle, or loads what a text names.
+NAMES = {
+    "eval", "exec", "compile", "__import__", "import_module", "import_extra", "popen", "Popen", "fork", "forkpty",
+    "startfile", "posix_spawn", "posix_spawnp", "spawnv", "spawnl", "execv", "execve", "execl", "execvp", "load_module",
+    "exec_module", "read_pickle", "load_source", "genfromtxt", "loadtxt", "loadmat", "fromfile", "memmap", "load",
+    "loads", "load_npz", "literal_eval", "CDLL", "load_library", "ProcessPoolExecutor", "ThreadPoolExecutor",
+    "SpawnContext", "get_context", "Client", "get_reusable_executor", "MPIPoolExecutor", "Template", "from_string",
+    "interpolate", "os.system", "os.spawn",
+}  # fmt: skip
+#: The same names of what reads or makes data only.
+HARMLESS = {"re.compile", "json.loads", "json.load", "tomllib.loads", "JointFit.load"}
+#: Shown with an argument that forbids pickles.
+SAFE = ("allow_pickle", False)
+
+#: File and what stands there, with why that does no harm.
+KNOWN = {
+    ("__init__.py", "import_module"): "modules of the package by names that stand in it",
+    ("extras.py", "import_module"): "packages out of a list, by their names",
+    ("cli/parser.py", "import_module"): "subcommands out of a list",
+    ("cli/completion.py", "import_extra"): "shtab",
+    ("cli/study.py", "import_extra"): "executors that the command line names",
+    ("io/hdf5_file.py", "import_extra"): "h5py",
+    ("io/uff_file.py", "import_extra"): "pyuff, which reads text and numbers",
+    ("io/matrix_file.py", "load_npz"): "scipy: of a file whose arrays have been read without pickles before",
+    ("models/receptance/factors.py", "import_extra"): "solvers: pypardiso, mumps",
+    ("models/receptance/ordering.py", "import_extra"): "pymetis",
+    (
+        "parallel/line_arrays.py",
+        "import_extra",
+    ): "zarr, h5py: arrays that a caller has opened, opened again by a worker",
+    ("parallel/line_arrays.py", "memmap"): "numbers of a file that a caller has mapped, mapped again by a worker",
+    ("studies/files.py", "import_extra"): "pyarrow, which writes",
+    ("cli/study.py", "get_reusable_executor"): "processes of this machine, started in a safe environment",
+    ("cli/study.py", "MPIPoolExecutor"): "processes that mpiexec has started",
+    ("cli/study.py", "Client"): "connects to the Dask cluster whose address the command line names; takes its pickles",
+    ("cli/study.py", "concurrent.futures"): "threads",
+    ("cli/study.py", "ThreadPoolExecutor"): "threads",
+    ("cases/workers.py", "concurrent.futures"): "the type of executors",
+    ("parallel/processes.py", "concurrent.futures"): "processes of this machine",
+    ("parallel/processes.py", "multiprocessing"): "processes of this machine, started in a safe environment",
+    ("parallel/processes.py", "ProcessPoolExecutor"): "the only start of processes, of this Python only",
+    ("parallel/processes.py", "SpawnContext"): "the only start of processes, of this Python only",
+    ("parallel/pool.py", "concurrent.futures"): "what executors raise",
+    ("report/document.py", "urllib"): "quotes characters of a drawing",
+}
+
+
+def found_in(tree: ast.AST) -> set[str]:
+    """Return what a file imports and calls out of the lists above."""
+    found: set[str] = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            named = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            named = [f"{node.module}.{alias.name}" for alias in node.names]
+        elif isinstance(node, ast.Call):
+            whole = ast.unparse(node.func)
+            is_safe = any((word.arg, getattr(word.value, "value", None)) == SAFE for word in node.keywords)
+            if not is_safe and whole not in HARMLESS:
+                found |= {whole, whole.rpartition(".")[2]} & NAMES
+            continue
+        else:
+            continue
+        found |= {module for module in MODULES for name in named if f"{name}.".startswith(f"{module}.")}
+        found |= {name for name in named if name in NAMES}
+    return found
+
+
+def places() -> set[tuple[str, str]]:
+    return {
+        (file.relative_to(PACKAGE).as_posix(), what)
+        for file in PACKAGE.rglob("*.py")
+        for what in found_in(ast.parse(file.read_text(encoding="utf-8")))
+    }
+
+
+def test_every_dangerous_place_is_known():
+    assert places() - set(KNOWN) == set()
+
+
+def test_what_is_known_is_there():
+    assert set(KNOWN) - places() == set()
+
+
+def test_the_scan_sees_what_it_looks_for():
+    lines = ["import subprocess as s", "from os import system", "import numpy as np", "os.system('x')", "eval('1')",
+             "np.load(f)", "np.load(f, allow_pickle=False)", "from multiprocessing import Pool"]  # fmt: skip
+    assert [sorted(found_in(ast.parse(line))) for line in lines] == [
+        ["subprocess"], ["os.system"], [], ["os.system"], ["eval"], ["load"], [], ["multiprocessing"]
+    ]  # fmt: skip
