@@ -239,8 +239,11 @@ print(*asked, sep="\n")' "$1" >"build/requirements-$1.txt"
 
 # What the package needs when it runs; for a subshell beside the compiler.
 install_packages() {
-  (exec_pip_install -r "build/requirements-$extras.txt") || return 1
-  "$venv/bin/python" -m compileall -q -x "$not_compiled" "$venv"/lib*/python*/site-packages
+  (exec_pip_install -r "build/requirements-$extras.txt") &
+  trap 'kill $! 2>/dev/null; exit 1' TERM
+  wait $! || return 1
+  # A file that cannot be compiled is not for this version of Python, and is not imported.
+  "$venv/bin/python" -m compileall -q -x "$not_compiled" "$venv"/lib*/python*/site-packages || :
 }
 
 make_venv() {
