@@ -1,27 +1,28 @@
 !> Which engine a sweep uses: LAPACK line by line (the reference), or lanes with one of the instruction sets.
 !>
 !> The choice is one number for the whole process: that of the environment variable JOINTFRF_ENGINE when the kernel is
-!> first used, until `set_engine` is called. JF_X86 is set by the build where the lane kernels of x86-64 exist.
+!> first used, until `set_engine` is called. The build defines JF_X86_V2, JF_X86_V3 and JF_X86_V4 where it has the
+!> lane kernels of that level.
 module jointfrf_engine
   use, intrinsic :: iso_c_binding, only: c_char, c_int
   use jointfrf_kinds, only: ip
   use jointfrf_lanes, only: lane_kernels
   use jointfrf_lane_kernels_plain, only: set_plain => set_kernels
-#ifdef JF_X86
-  use jointfrf_lane_kernels_v2, only: set_v2 => set_kernels
-  use jointfrf_lane_kernels_v3, only: set_v3 => set_kernels
-  use jointfrf_lane_kernels_v4, only: set_v4 => set_kernels
-#endif
   use jointfrf_manifold_kernels_plain, only: set_manifold_plain => set_manifold_kernels
-#ifdef JF_X86
-  use jointfrf_manifold_kernels_v2, only: set_manifold_v2 => set_manifold_kernels
-  use jointfrf_manifold_kernels_v3, only: set_manifold_v3 => set_manifold_kernels
-  use jointfrf_manifold_kernels_v4, only: set_manifold_v4 => set_manifold_kernels
-#endif
   use jointfrf_noise_kernels_plain, only: set_noise_plain => set_noise_kernels
-#ifdef JF_X86
+#ifdef JF_X86_V2
+  use jointfrf_lane_kernels_v2, only: set_v2 => set_kernels
+  use jointfrf_manifold_kernels_v2, only: set_manifold_v2 => set_manifold_kernels
   use jointfrf_noise_kernels_v2, only: set_noise_v2 => set_noise_kernels
+#endif
+#ifdef JF_X86_V3
+  use jointfrf_lane_kernels_v3, only: set_v3 => set_kernels
+  use jointfrf_manifold_kernels_v3, only: set_manifold_v3 => set_manifold_kernels
   use jointfrf_noise_kernels_v3, only: set_noise_v3 => set_noise_kernels
+#endif
+#ifdef JF_X86_V4
+  use jointfrf_lane_kernels_v4, only: set_v4 => set_kernels
+  use jointfrf_manifold_kernels_v4, only: set_manifold_v4 => set_manifold_kernels
   use jointfrf_noise_kernels_v4, only: set_noise_v4 => set_noise_kernels
 #endif
   use jointfrf_status, only: info_good, info_no_engine
@@ -101,15 +102,19 @@ contains
       call set_plain(kernels)
       call set_noise_plain(kernels)
       call set_manifold_plain(kernels)
-#ifdef JF_X86
+#ifdef JF_X86_V2
     case (engine_v2)
       call set_v2(kernels)
       call set_noise_v2(kernels)
       call set_manifold_v2(kernels)
+#endif
+#ifdef JF_X86_V3
     case (engine_v3)
       call set_v3(kernels)
       call set_noise_v3(kernels)
       call set_manifold_v3(kernels)
+#endif
+#ifdef JF_X86_V4
     case (engine_v4)
       call set_v4(kernels)
       call set_noise_v4(kernels)
@@ -134,8 +139,14 @@ contains
     logical :: yes
 
     yes = engine >= engine_automatic .and. engine <= engine_plain
-#ifdef JF_X86
-    if (engine >= engine_v2 .and. engine <= engine_v4) yes = engine - engine_v2 + 2 <= cpu_level()
+#ifdef JF_X86_V2
+    if (engine == engine_v2) yes = cpu_level() >= 2
+#endif
+#ifdef JF_X86_V3
+    if (engine == engine_v3) yes = cpu_level() >= 3
+#endif
+#ifdef JF_X86_V4
+    if (engine == engine_v4) yes = cpu_level() >= 4
 #endif
   end function available
 

@@ -10,8 +10,9 @@
 set -eu
 
 case ${1-} in
-  run) extras=all ;;
-  test) extras=all,test ;;
+  # Kernels for other processors than this one are compiled where they are tested.
+  run) extras=all instruction_sets=own ;;
+  test) extras=all,test instruction_sets=all ;;
   *) echo "usage: $0 run|test" >&2; exit 2 ;;
 esac
 root=$(CDPATH='' cd -- "$(dirname -- "$0")/.." && pwd -P)
@@ -20,6 +21,8 @@ venv=$root/.venv
 log=$root/build/set-up.log
 lock=$root/build/set-up.lock
 stamp=$venv/set-up
+# Folders of packages that cases and commands do not import.
+not_compiled='/(tests|fontTools|mesonbuild|pip|setuptools|pkg_resources)/'
 
 say() { echo "jointfrf: $*" >&2; }
 
@@ -204,7 +207,8 @@ take_lock() {
       rm -f "$lock"
     fi
   done
-  trap 'rm -f "$lock"' EXIT
+  beside=
+  trap '[ -z "$beside" ] || kill "$beside" 2>/dev/null; rm -f "$lock"' EXIT
   trap 'exit 1' HUP INT TERM
 }
 
@@ -217,14 +221,42 @@ up_to_date() {
     ls build/cp*/build.ninja >/dev/null 2>&1
 }
 
-# The versions of the checked-in list, so that a new release of a dependency breaks no fresh clone, and no files but
-# those whose hashes it has: they are compared before anything that was installed can run.
-pip_install() {
-  "$venv/bin/python" -m pip --disable-pip-version-check --no-input install -c python/constraints.txt \
-    --report build/installed.json "$@" >>"$log" 2>&1 || return 1
-  "$venv/bin/python" -I -S python/check_hashes.py build/installed.json >>"$log" 2>&1 && return
+# The versions of the checked-in list, so that a new release of a dependency breaks no fresh clone. What pip compiles, a
+# good half of it tests, would take as long as all else that it does. To be called in a subshell.
+# exec_pip_install REPORT ARGUMENT...
+exec_pip_install() {
+  report=$1
+  shift
+  exec "$venv/bin/python" -m pip --disable-pip-version-check --no-input install --no-compile -c python/constraints.txt \
+    --report "$report" "$@"
+}
+
+# No files but those whose hashes the list has: they are compared before anything that was installed can run.
+# check_installed REPORT
+check_installed() {
+  "$venv/bin/python" -I -S python/check_hashes.py "$1" >>"$log" 2>&1 && return
   rm -rf "$venv"
   fail "a package is not the one whose hash is in python/constraints.txt; .venv was removed"
+}
+
+# What pyproject.toml asks for, to build the package or to use it -> a file of requirements.
+requirements() {
+  "$venv/bin/python" -c 'import sys, tomllib
+content = tomllib.load(open("pyproject.toml", "rb"))
+project, extras = content["project"], sys.argv[1].split(",")
+asked = content["build-system"]["requires"] if extras == ["build"] else project["dependencies"]
+asked += [each for extra in extras if extra != "build" for each in project["optional-dependencies"][extra]]
+print(*asked, sep="\n")' "$1" >"build/requirements-$1.txt"
+}
+
+# What the package needs when it runs; for a subshell beside the compiler.
+install_packages() {
+  (exec_pip_install build/installed-run.json -r "build/requirements-$extras.txt") &
+  trap 'kill $! 2>/dev/null; exit 1' TERM
+  wait $! || return 1
+  check_installed build/installed-run.json
+  # A file that cannot be compiled is not for this version of Python, and is not imported.
+  "$venv/bin/python" -m compileall -q -x "$not_compiled" "$venv"/lib*/python*/site-packages || :
 }
 
 make_venv() {
@@ -237,10 +269,21 @@ make_venv() {
   # The build runs meson and ninja by name.
   PATH=$venv/bin:$PATH
   export PATH
-  "$venv/bin/python" -c 'import tomllib
-print(*tomllib.load(open("pyproject.toml", "rb"))["build-system"]["requires"], sep="\n")' >build/requirements.txt
-  pip_install -r build/requirements.txt || fail "could not install what the build needs"
-  pip_install --no-build-isolation -e ".[$extras]" || fail "could not build the package"
+  requirements build
+  requirements "$extras"
+  (exec_pip_install build/installed.json -r build/requirements-build.txt) >>"$log" 2>&1 ||
+    fail "could not install what the build needs"
+  check_installed build/installed.json
+  # What the package only needs when it runs comes while the kernel is compiled.
+  install_packages >build/packages.log 2>&1 &
+  beside=$!
+  (exec_pip_install build/installed-own.json --no-build-isolation --no-deps "--config-settings=setup-args=-Dinstruction_sets=$instruction_sets" -e .) \
+    >>"$log" 2>&1 || fail "could not build the package"
+  status=0
+  wait "$beside" || status=1
+  beside=
+  cat build/packages.log >>"$log"
+  [ $status = 0 ] || fail "could not install what the package needs"
   state >"$stamp.run"
   if [ "$1" = test ]; then state >"$stamp.test"; fi
 }

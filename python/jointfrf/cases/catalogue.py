@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -205,6 +205,7 @@ def run_case(
     realisations: int | None = None,
     workers: Workers | None = None,
     kinds: Mapping[str, CaseKind[Any, Any]] = KINDS,
+    tell: Callable[[Case, list[Table]], None] = lambda case, tables: None,
 ) -> CaseOutput:
     """Run a case and write its report, tables and figures.
 
@@ -221,6 +222,8 @@ def run_case(
         Processes that share the work, see `jointfrf.cases.workers.started_workers`; this process by default.
     kinds : mapping of str to CaseKind
         As in `read_case`.
+    tell : callable, optional
+        Called with the case and its tables that are worth printing, the summary first, before figures are drawn.
 
     Returns
     -------
@@ -242,21 +245,24 @@ def run_case(
         below(target, inner).mkdir(parents=True, exist_ok=True)
     count = case.realisations if realisations is None else realisations
     result = kind.compute(case, count, at_work)
-    tables, figures = kind.tables(result), numbered(case, kind.figures(result))
+    tables = kind.tables(result)
     summary = kind.summary(result, tables)
+    printed = [table for table in tables if table.key not in kind.not_printed]
+    tell(case, [*summary, *printed])
+    figures = numbered(case, kind.figures(result))
+    drawn = at_work.map(draw, figures)
     content = _common_numbers(case, count, tables) | kind.numbers(result)
     page = Page(
         title=case.title,
         about=_about(case, count),
         summary=summary,
         tables=tables,
-        figures=list(zip(figures, at_work.map(draw, figures), strict=True)),
+        figures=list(zip(figures, drawn, strict=True)),
         subject="The case",
         text=_text(case.folder / "README.md"),
         sources=[("case.toml", _text(case.folder / "case.toml"))],
     )
     _write(target, page, content)
-    printed = [table for table in tables if table.key not in kind.not_printed]
     return CaseOutput(case, result, tables, figures, summary, target / "report.html", printed)
 
 

@@ -6,19 +6,26 @@ import argparse
 import json
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
+from queue import SimpleQueue
+from threading import Event, Lock
 
-from jointfrf.cases.catalogue import CaseOutput, UnknownCaseError, find_case, list_cases, run_case
-from jointfrf.cases.workers import started_workers
+from jointfrf.cases.catalogue import UnknownCaseError, find_case, list_cases, run_case
+from jointfrf.cases.kind import Case
+from jointfrf.cases.workers import Workers, started_workers
 from jointfrf.cli.output import Output
 from jointfrf.cli.usage import UsageError, positive, progress
 from jointfrf.extras import check_extras
 from jointfrf.parallel.cores import available_cores
-from jointfrf.report.table import as_text
+from jointfrf.report.table import Table, as_text
 
 __all__ = ["add_arguments", "run"]
+
+#: Cases under way at the same time, where processes share the work.
+_TOGETHER = 3
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -43,16 +50,14 @@ def run(options: argparse.Namespace) -> int:
     twice = {folder.name for folder in folders if [f.name for f in folders].count(folder.name) > 1}
     if twice:
         raise UsageError(f"two cases are called {min(twice)}: their results would overwrite each other")
-    out, reports = Output(options), []
-    with started_workers(options.jobs) as workers:
-        for folder in folders:
-            start = time.perf_counter()
-            at_work = replace(workers, progress=progress(folder.name))
-            output = run_case(folder, options.out, realisations=options.realisations, workers=at_work)
-            out.say(*_shown(output), f"{time.perf_counter() - start:.1f} s, report: {output.report}\n")
-            sys.stdout.flush()
-            reports.append(output.report)
-            del output  # before the next case needs the memory
+    out = Output(options)
+
+    def say(text: str) -> None:
+        out.say(text)
+        sys.stdout.flush()
+
+    with ThreadPoolExecutor(_TOGETHER) as threads, started_workers(options.jobs) as workers:
+        reports = _run_all(folders, options, workers, threads, say)
     if len(reports) > 1:
         out.say("Reports:", *(f"  {report}" for report in reports))
     out.give({"cases": [json.loads((path.parent / "results.json").read_text("utf-8")) for path in reports],
@@ -60,9 +65,80 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _shown(output: CaseOutput) -> Iterator[str]:
+def _run_all(
+    folders: list[Path],
+    options: argparse.Namespace,
+    workers: Workers,
+    threads: ThreadPoolExecutor,
+    say: Callable[[str], None],
+) -> list[Path]:
+    """Run cases and say what they yield, in their order; the next ones begin where processes would have nothing to do.
+
+    Returns
+    -------
+    list of Path
+        Their reports.
+    """
+    if workers.pool is None:
+        return [_run_one(folder, options, replace(workers, progress=progress(folder.name)), say) for folder in folders]
+    turn, begun, reports = Lock(), [], []
+    for rank, folder in enumerate(folders):
+        case = _Begun(folder.name)
+        at_work = replace(workers, rank=rank, turn=turn, progress=case.show)
+        begun.append((case, threads.submit(case.run, folder, options, at_work)))
+    try:
+        for case, done in begun:
+            for text in case.read():
+                say(text)
+            reports.append(done.result())
+    finally:
+        threads.shutdown(wait=False, cancel_futures=True)
+    return reports
+
+
+class _Begun:
+    """A case that is computed while an earlier one may still be read."""
+
+    def __init__(self, name: str) -> None:
+        self.said: SimpleQueue[str | None] = SimpleQueue()
+        self._progress = progress(name)
+        self._is_read = Event()
+
+    def show(self, done: int, total: int) -> None:
+        """Show the progress: the one line of a terminal is for the case that is read."""
+        if self._is_read.is_set():
+            self._progress(done, total)
+
+    def read(self) -> Iterator[str]:
+        """Give what the case says, until it ends."""
+        self._is_read.set()
+        while (text := self.said.get()) is not None:
+            yield text
+
+    def run(self, folder: Path, options: argparse.Namespace, workers: Workers) -> Path:
+        """Run it in its turn."""
+        assert workers.turn is not None
+        try:
+            with workers.turn:
+                return _run_one(folder, options, workers, self.said.put)
+        finally:
+            self.said.put(None)
+
+
+def _run_one(folder: Path, options: argparse.Namespace, workers: Workers, say: Callable[[str], None]) -> Path:
+    """Run a case: its tables are said before its figures are drawn."""
+    start = time.perf_counter()
+    output = run_case(
+        folder, options.out, realisations=options.realisations, workers=workers,
+        tell=lambda case, tables: say("\n".join(_shown(case, tables))),
+    )  # fmt: skip
+    say(f"{time.perf_counter() - start:.1f} s, report: {output.report}\n")
+    return output.report
+
+
+def _shown(case: Case, tables: list[Table]) -> Iterator[str]:
     """Give the summary and the tables of a case."""
-    heading = f"{output.case.name}: {output.case.title}"
+    heading = f"{case.name}: {case.title}"
     yield f"{heading}\n{'=' * len(heading)}\n"
-    for table in (*output.summary, *output.printed):
+    for table in tables:
         yield as_text(table) + "\n"

@@ -99,7 +99,6 @@ def draw(figure: Figure) -> Drawing:
         A PNG and an SVG file; the same data give the same files.
     """
     check_extras("matplotlib")
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.backends.backend_svg import FigureCanvasSVG
 
     canvas, axes = _composed(figure)
@@ -107,8 +106,8 @@ def draw(figure: Figure) -> Drawing:
         png, svg = io.BytesIO(), io.BytesIO()
         canvas.set_dpi(_RESOLUTION)
         _keep_layout(canvas, axes)
-        # No version and no date inside.
-        FigureCanvasAgg(canvas).print_png(png, metadata={"Software": None})
+        # No version and no date inside. The renderer that found the layout has measured the texts.
+        canvas.canvas.print_png(png, metadata={"Software": None})
         canvas.set_dpi(_RESOLUTION_INSIDE)
         FigureCanvasSVG(canvas).print_svg(svg, metadata={"Date": None, "Creator": None})
     return Drawing(png.getvalue(), shortened(svg.getvalue().decode()).encode())
@@ -139,8 +138,6 @@ def _keep_layout(canvas: Any, axes: list[Any]) -> None:
             places[axis] = (min(places[one][0] for one in column), places[axis][1])
     for axis, place in places.items():
         axis.set_label_coords(*axis.axes.transAxes.inverted().transform(place))
-    for ax in canvas.axes:
-        ax.set_title(ax.get_title(), y=1.0)
 
 
 def _composed(figure: Figure) -> tuple[Any, list[Any]]:
@@ -223,7 +220,7 @@ def _draw_panel(ax: Any, panel: Panel, beside: int) -> None:
         format_axis(ax.xaxis, panel.x_label, log=panel.log_x, beside=beside)
         format_axis(ax.yaxis, panel.y_label, log=panel.log_y, step=panel.y_step)
         ax.tick_params(labelbottom=bool(panel.x_label))
-    ax.set_title(panel.title)
+    ax.set_title(panel.title, y=1.0)  # no numbers above the panel make way for it
 
 
 def _in_space(panel: Panel) -> bool:

@@ -321,8 +321,9 @@ def _tasks(group: SameStructure, exact: Exact, plan: ReadingsPlan) -> dict[tuple
         for reading in plan.readings:
             drawn = scales.setdefault(_draw(reading, method, group.n), {})
             drawn.update(dict.fromkeys(reading.scale(level) for level in levels))
+        short = SHORT_FORM.get(method, method)
         common = DrawTask(
-            needed_frfs(exact, method), SHORT_FORM.get(method, method), measured(exact, method), next(iter(scales)), (),
+            needed_frfs(exact, short), short, measured(exact, method), next(iter(scales)), (),
             tuple(band_sets.values()), tuple(find_window(exact, one, group.observed(one)) for one in errors),
             plan.seed + noise_stream(method), plan.count,
         )  # fmt: skip

@@ -159,6 +159,34 @@ def test_command_runs_a_case_in_processes(outputs, tmp_path):
     assert parallel == (outputs["chain"].report.parent / table).read_text()
 
 
+def test_cases_of_one_command_are_told_in_their_order(tmp_path):
+    """They are under way at the same time; one that fails does so where its turn comes."""
+    (tmp_path / "case.toml").write_text("title = 1\n")
+    words = ("3.2", "3.1", str(tmp_path), "3.3", "--realisations", "2", "--jobs", "2", "--out", str(tmp_path / "out"))
+    done = call("run", *words)
+    assert done.returncode == 1
+    assert done.stderr == f"jointfrf: error: {tmp_path / 'case.toml'}: title must be a text, not 1\n"
+    said = [line for line in done.stdout.splitlines() if line.startswith(("3.", "What fits")) or "report: " in line]
+    reports = [tmp_path / "out" / name / "report.html" for name in ("3.2-fe-beams", "3.1-discrete")]
+    assert [line.split(": ")[-1] for line in (said[2], said[5])] == [str(report) for report in reports]
+    assert [line.split(":")[0] for line in said[::3]] == ["3.2-fe-beams", "3.1-discrete"]
+    assert len(said) == 6
+    assert all(report.is_file() for report in reports)
+
+
+def test_tables_are_told_before_figures_are_drawn(tmp_path, monkeypatch):
+    told = []
+
+    def stopped(figure):
+        raise RuntimeError(f"{len(told)} told")
+
+    monkeypatch.setattr("jointfrf.cases.catalogue.draw", stopped)
+    with pytest.raises(RuntimeError, match="1 told"):
+        run_case(find_case("3.1"), tmp_path, realisations=2, tell=lambda case, tables: told.append(tables))
+    assert told[0][0].title == "What fits"
+    assert "Natural frequencies of the assembly" in [table.title for table in told[0]]
+
+
 def test_command_lists_cases(capsys):
     assert main(["cases"]) == 0
     lines = capsys.readouterr().out.splitlines()

@@ -28,7 +28,7 @@ def command(
     BUILD.parent.mkdir(exist_ok=True)
     with FileLock(BUILD.with_suffix(".lock")):  # processes that test at once take turns
         if not (BUILD / "build.ninja").exists():
-            quick = ["-Dbuildtype=plain", "-Dinstruction_sets=false", "-Dlapack=scipy-openblas32"]
+            quick = ["-Dbuildtype=plain", "-Dinstruction_sets=plain", "-Dlapack=scipy-openblas32"]
             run(["meson", "setup", BUILD, TESTS.parent, *quick])
         path = os.pathsep.join([str(TESTS), *filter(None, [os.environ.get("PYTHONPATH")])])
         return subprocess.run(

@@ -38,7 +38,7 @@ def project(tmp_path_factory):
     (folder / "subprojects").mkdir()
     (folder / "subprojects" / "jointfrf").symlink_to(ROOT)
     quick = ["-Dbuildtype=plain", "-Djointfrf:buildtype=plain", "-Djointfrf:lapack=scipy-openblas32"]
-    quick.append("-Djointfrf:instruction_sets=false")
+    quick.append("-Djointfrf:instruction_sets=plain")
     quick += [f"-Djointfrf:lapack_python={sys.executable}", f"--prefix={folder / 'prefix'}", "-Dlibdir=lib"]
     environment = os.environ | {"PATH": f"{pathlib.Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
     run("meson", "setup", "build", "-Dpkgconfig.relocatable=true", *quick, cwd=folder, env=environment)

@@ -67,7 +67,7 @@ class HostLibrary:
             options += [
                 "-Dlapack=host",
                 "-Dbuildtype=plain",
-                "-Dinstruction_sets=false",
+                "-Dinstruction_sets=plain",
                 "-Dprefix=/prefix",
                 "-Dlibdir=lib",
             ]

@@ -28,7 +28,7 @@ class Build:
 #: As a user builds it.
 OPTIMISED = Build("installed", ("-Dtests=false",))
 #: Those whose test programs `tests/run` runs: alike but for the length of integers, in bytes.
-_CHECKED = ("-Dbuildtype=debug", "-Doptimization=1", "-Dchecks=true", "-Dinstruction_sets=false")
+_CHECKED = ("-Dbuildtype=debug", "-Doptimization=1", "-Dchecks=true", "-Dinstruction_sets=plain")
 CHECKED = {4: Build("tests", _CHECKED), 8: Build("tests64", (*_CHECKED, "-Dilp64=true"), "jointfrf64")}
 #: Where meson and ninja lie, too, if the environment of this Python is not activated.
 PATH = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])

@@ -5,12 +5,16 @@ import signal
 import subprocess
 import sys
 import time
+from concurrent.futures import CancelledError, wait
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import replace
+from threading import Event, Lock, Thread
 
 import numpy as np
 import pytest
 
 import jointfrf as jf
-from jointfrf.cases.workers import started_workers
+from jointfrf.cases.workers import RankedProcesses, started_workers
 from jointfrf.parallel.pool import opened_pool
 from jointfrf.parallel.processes import SeparateProcesses, can_start_processes
 
@@ -132,3 +136,79 @@ def test_python_m_jointfrf_runs_no_module_of_the_working_directory(tmp_path):
     )
     assert done.returncode == 0, done.stderr
     assert not (tmp_path / "ran").exists()
+
+
+def until(path):
+    """Words of a call that ends when there is such a file."""
+    return subprocess.call, ["sh", "-c", 'until [ -e "$0" ]; do sleep 0.05; done', str(path)]
+
+
+def test_tasks_of_the_lowest_rank_are_done_first(tmp_path):
+    processes, done = RankedProcesses(1), []
+    try:
+        futures = [processes.submit(5, *until(tmp_path / "go")), *(processes.submit(5, abs, -i) for i in (1, 2, 3))]
+        futures += [processes.submit(0, abs, -4), processes.submit(7, abs, -6), processes.submit(5, abs, -5)]
+        for future in futures:
+            future.add_done_callback(lambda one: done.append(one.result()))
+        (tmp_path / "go").touch()
+        wait(futures)
+    finally:
+        processes.shutdown()
+    assert done == [0, 1, 4, 2, 3, 5, 6]  # two were handed out when the others came
+
+
+def test_errors_of_tasks_and_lost_processes_are_raised_where_results_are_read():
+    processes = RankedProcesses(1)
+    try:
+        with pytest.raises(ValueError, match="invalid literal"):
+            processes.submit(0, int, "x").result()
+        assert processes.submit(0, int, "7").result() == 7
+        lost = [processes.submit(0, os._exit, 1), *(processes.submit(0, abs, -1) for _ in range(5))]
+        for future in lost:
+            assert isinstance(future.exception(), BrokenProcessPool)
+    finally:
+        processes.shutdown()
+    assert isinstance(processes.submit(0, abs, -1).exception(), RuntimeError)
+
+
+def test_tasks_that_wait_are_cancelled_where_the_processes_are_shut_down(tmp_path):
+    processes = RankedProcesses(1)
+    at_work = processes.submit(0, *until(tmp_path / "go"))
+    waiting = [processes.submit(0, abs, -1) for _ in range(6)]
+    ending = Thread(target=processes.shutdown)
+    ending.start()
+    with pytest.raises(CancelledError):
+        waiting[-1].result()
+    (tmp_path / "go").touch()
+    ending.join()
+    assert at_work.result() == 0
+    assert wait(waiting).not_done == set()
+
+
+def test_a_thread_that_waits_for_processes_lets_another_compute(tmp_path):
+    turn, found = Lock(), []
+    with started_workers(2) as workers:
+        at_work = replace(workers, turn=turn)
+        has_begun = Event()
+
+        def compute():
+            with turn:
+                results = at_work.map(*([one] if i else one for i, one in enumerate(until(tmp_path / "go"))))
+                has_begun.set()
+                found.append(next(results))
+
+        thread = Thread(target=compute)
+        thread.start()
+        has_begun.wait()
+        with turn:  # while the thread waits
+            assert found == []
+            (tmp_path / "go").touch()
+        thread.join()
+        assert found == [0]
+        assert not turn.locked()
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_what_is_begun_is_there_when_it_is_asked_for(jobs):
+    with started_workers(jobs) as workers:
+        assert [one() for one in [workers.begin(divmod, i, 3) for i in range(4)]] == [(0, 0), (0, 1), (0, 2), (1, 0)]

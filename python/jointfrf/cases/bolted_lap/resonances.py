@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import find_peaks
 
 from jointfrf.cases.bolted_lap.frfs import TIP_DIRECTIONS
 from jointfrf.frf.bands import Band
@@ -51,6 +50,8 @@ class ResonanceErrors(NamedTuple):
 
 def resonances(freq_hz: FloatArray, tip: ComplexArray) -> list[Resonance]:
     """Resonances of the FRFs of the tip, shape (n_freq, 2); each band ends at the valleys on either side."""
+    from scipy.signal import find_peaks  # takes as long to import as all else together
+
     found = []
     for d, direction in enumerate(TIP_DIRECTIONS):
         size = np.log(abs(tip[:, d]))

@@ -73,19 +73,25 @@ def compute(case: KnownJointCase, n_realisations: int, workers: Workers | None =
     KnownJointResult
     """
     at_work = workers or Workers()
-    exact = exact_frfs(case)
-    actual = sensitive_bands(case, exact, case.joint, exact.h_c)
+    exact = at_work.begin(exact_frfs, case)()
+    # Processes do all this at the same time.
+    actual = at_work.begin(sensitive_bands, case, exact, case.joint, exact.h_c)
+    from_initial = at_work.begin(sensitive_bands, case, exact, case.initial, exact.h_initial)
+    modes = at_work.begin(modes_of_case, case)
+    printed = at_work.begin(printed_errors, case)
+    noise_free = at_work.begin(noise_free_errors, exact, case.joint.dynamic_stiffness(case.freq_hz))
     identified = run_study(case, exact, n_realisations, at_work)
+    known = actual()
     return KnownJointResult(
         case=case,
         exact=exact,
         n_realisations=n_realisations,
-        modes=modes_of_case(case),
-        sensitivities=actual.sensitivities,
-        proposals=actual.proposals,
-        from_initial=sensitive_bands(case, exact, case.initial, exact.h_initial),
+        modes=modes(),
+        sensitivities=known.sensitivities,
+        proposals=known.proposals,
+        from_initial=from_initial(),
         identified=identified,
         regenerated=regenerate_all(exact, identified, case.observed, at_work),
-        printed=printed_errors(case),
-        noise_free=noise_free_errors(exact, case.joint.dynamic_stiffness(case.freq_hz)),
+        printed=printed(),
+        noise_free=noise_free(),
     )

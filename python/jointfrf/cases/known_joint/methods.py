@@ -7,6 +7,7 @@ from typing import cast
 
 import numpy as np
 
+from jointfrf.cases.fitting import FITTED
 from jointfrf.cases.known_joint.exact import Exact
 from jointfrf.kernel.arguments import ComplexArray
 from jointfrf.kernel.status import OnSingular
@@ -17,6 +18,8 @@ __all__ = ["SHORT_FORM", "joint_lines", "measured", "needed_frfs", "noise_stream
 #: Equal up to rounding, and without the model: (2.47) and its short form.
 SHORT_FORM = {"ismm": "inverse-substructuring"}
 
+#: What fits take from a model.
+_OF_FITS: dict[str, tuple[str, ...]] = {"compliance": (), "decoupling-fit": ("h_a", "h_b")}
 _DECOUPLING = tuple(name for name, method in STIFFNESS_METHODS.items() if method.measured == "h_c")
 
 
@@ -44,7 +47,7 @@ def measured(exact: Exact, method: str) -> ComplexArray:
 
 def needed_frfs(exact: Exact, method: str) -> Exact:
     """Leave out the FRFs that a method does not take from a model: a task goes to another process."""
-    needed = STIFFNESS_METHODS[cast(StiffnessMethod, SHORT_FORM.get(method, method))].model
+    needed = _OF_FITS[method] if method in FITTED else STIFFNESS_METHODS[cast(StiffnessMethod, method)].model
     slim = exact if "alpha" in needed else replace(exact, h_initial=exact.h_initial[:0])
     slim = replace(slim, h_c=exact.h_c[:0])
     return slim if "h_a" in needed else replace(slim, h_a=exact.h_a[:0], h_b=exact.h_b[:0])

@@ -115,9 +115,8 @@ def _coupled(h_a: ComplexArray, h_b: ComplexArray, k_joint: ComplexArray, at: in
     return h_c[:, at, at].reshape(count, n_freq)
 
 
-def _with_errors(exact: Exact, identified: Identified, observed: Observed) -> RegeneratedFrf:
+def _with_errors(exact: Exact, h_exact: ComplexArray, identified: Identified, observed: Observed) -> RegeneratedFrf:
     h = regenerate(exact, identified.theta[:_REGENERATED], observed.point, observed.dof)
-    h_exact = exact.h_c[:, exact.at(observed), exact.at(observed)]
     bands = observed.bands or (None,)
     amplitude, frequency = (
         np.array([[_error(error, h_exact, one, exact.freq_hz, band) for one in h] for band in bands], np.float64)
@@ -142,5 +141,7 @@ def regenerate_all(
     # Without the lines, which are large and not needed there.
     without_lines = [replace(found, k_lines=np.empty((0, *found.k_lines.shape[1:]), complex)) for found in identified]
     pairs = [(found, one) for found in without_lines for one in observed]
-    each = [exact] * len(pairs)
-    return list(workers.map(_with_errors, each, *zip(*pairs, strict=True)))
+    h_exact = [exact.h_c[:, at, at] for at in (exact.at(one) for _, one in pairs)]
+    # Nor FRFs of the assembly between all points.
+    uncoupled = replace(exact, h_c=exact.h_c[:0], h_initial=exact.h_initial[:0])
+    return list(workers.map(_with_errors, [uncoupled] * len(pairs), h_exact, *zip(*pairs, strict=True)))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import warnings
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -223,10 +223,10 @@ def _group(
     elif method == "compliance":
         source = ComplianceSource(exact.freq_hz, exact.dofs, frfs)
     elif method in FITTED:
-        source = DecouplingFitSource(replace(exact, h_initial=exact.h_initial[:0], h_c=exact.h_c[:0]), frfs)
+        source = DecouplingFitSource(needed_frfs(exact, method), frfs)
     else:
         short = SHORT_FORM.get(method, method)
-        source = BandMeanSource(needed_frfs(exact, method), short, frfs, case.band_sets)
+        source = BandMeanSource(needed_frfs(exact, short), short, frfs, case.band_sets)
         side_by_side = source.side_by_side
         labels = [f"{method}, {one.name}" if len(case.band_sets) > 1 else method for one in case.band_sets]
     bound = _bound(exact, drawn) if at_joint else np.full(len(case.parameters), np.nan)

@@ -11,7 +11,7 @@ import numpy as np
 from jointfrf.cases.definitions import BandSet, Noise
 from jointfrf.cases.fitting import FITTED, fit_decoupling, fit_viscous
 from jointfrf.cases.known_joint.exact import Exact
-from jointfrf.cases.known_joint.methods import joint_lines, measured, noise_stream
+from jointfrf.cases.known_joint.methods import joint_lines, measured, needed_frfs, noise_stream
 from jointfrf.cases.known_joint.read import KnownJointCase
 from jointfrf.cases.workers import Workers
 from jointfrf.dofs import joint_parameters
@@ -55,9 +55,10 @@ class Identified:
 
 @dataclass(frozen=True)
 class _Chunk:
-    """One method on some realisations of one noise."""
+    """One method on some realisations of one noise; `exact` without the FRFs that the method does not take."""
 
     exact: Exact
+    measured: ComplexArray
     noise: Noise
     method: str
     band_sets: tuple[BandSet, ...]
@@ -82,7 +83,7 @@ class _ChunkResult(NamedTuple):
 def _identify(chunk: _Chunk) -> _ChunkResult:
     exact, method = chunk.exact, chunk.method
     seed = chunk.seed + noise_stream(method)
-    h = chunk.noise.realisations(measured(exact, method), seed, chunk.first, chunk.count)
+    h = chunk.noise.realisations(chunk.measured, seed, chunk.first, chunk.count)
     with warnings.catch_warnings():
         # Noise makes any line ill-conditioned now and then.
         warnings.simplefilter("ignore", IllConditionedWarning)
@@ -151,10 +152,11 @@ def run_study(
     """
     at_work = workers or Workers()
     groups = [(noise, method) for noise in case.noises for method in noise.methods]
+    taken = {method: (needed_frfs(exact, method), measured(exact, method)) for _, method in groups}
     size = chunk_size(case.freq_hz.size, (2 * exact.n) ** 2)
     spans = [(first, min(size, n_realisations - first)) for first in range(0, n_realisations, size)]
     chunks = [
-        _Chunk(exact, noise, method, case.band_sets, case.seed, first, count)
+        _Chunk(*taken[method], noise, method, case.band_sets, case.seed, first, count)
         for noise, method in groups
         for first, count in spans
     ]

@@ -78,15 +78,14 @@ def moving_stiffness(joint: LawJoint, freq_hz: FloatArray) -> ComplexArray:
 def compute_modelled(case: ModelledJointCase, n_realisations: int, workers: Workers) -> ModelledJointResult:
     """Simulate measurements and fit each."""
     exact = case.truth.receptance(case.freq_hz, case.responses, case.forces)
+    measured = pollute(exact, case.noise, seed=case.seed)
+    bound = workers.begin(fit_of_exact, case, exact)
+    first = workers.begin(_fit, case, case.believed, measured)
+    constant = workers.begin(_fit, case, replace(case.believed, joint=_constant(case.believed.joint)), measured)
     draws = tuple(
         workers.counted(workers.map(partial(fitted_draw, case, exact), range(n_realisations)), n_realisations)
     )
-    measured = pollute(exact, case.noise, seed=case.seed)
-    bound = fit_of_exact(case, exact).std_error
-    constant = replace(case.believed, joint=_constant(case.believed.joint))
-    return ModelledJointResult(
-        case, draws, bound, _fit(case, case.believed, measured), measured, _fit(case, constant, measured)
-    )
+    return ModelledJointResult(case, draws, bound().std_error, first(), measured, constant())
 
 
 def fit_of_exact(case: ModelledJointCase, exact: ComplexArray) -> ModelFit:
