@@ -37,6 +37,7 @@ __all__ = [
     "ComplianceFit",
     "FittedJoint",
     "at_level_of_residual",
+    "estimated_joint",
     "fit_compliance",
     "fitted_joint",
     "stiffness_of_lines",
@@ -124,15 +125,30 @@ class FittedJoint(NamedTuple):
         return covariance
 
 
-def fitted_joint(problem: FitProblem) -> FittedJoint:
-    """Fit the joint by maximum likelihood, linearised on the manifold of FRFs that fit it; find its uncertainty."""
+def estimated_joint(problem: FitProblem) -> tuple[FitProblem, JointEstimate, tuple[DofDamping, ...]]:
+    """Fit the joint by maximum likelihood, linearised on the manifold of FRFs that fit it.
+
+    Returns
+    -------
+    problem : FitProblem
+        With the noise level that was used.
+    estimate : JointEstimate
+    choices : tuple of DofDamping
+        Empty where the damping terms were given.
+    """
     span = _span(problem.freq_hz)
     try:
         problem, result, choices = _fitted(problem)
     except np.linalg.LinAlgError as error:
         raise ValueError(f"no joint was found that fits gamma ({span}): {error}") from error
+    check_estimate(result, problem.noise.level, span, is_level_known=not problem.noise.is_assumed)
+    return problem, result, choices
+
+
+def fitted_joint(problem: FitProblem) -> FittedJoint:
+    """Fit the joint as `estimated_joint` does, and find its uncertainty."""
+    problem, result, choices = estimated_joint(problem)
     noise = problem.noise
-    check_estimate(result, noise.level, span, is_level_known=not noise.is_assumed)
     spread = spread_of(result, noise.inflation, is_level_known=not noise.is_assumed)
     channels = channel_spread(result, problem.frfs, problem.added_compliance)
     return FittedJoint(problem, result, spread, channels, _band_parts(problem, result, spread, choices), choices)
