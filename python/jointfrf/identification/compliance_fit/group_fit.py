@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
@@ -42,6 +43,8 @@ _BARELY = 0.05
 _REVERSED, _SHRUNK = -0.8, 0.5
 #: Part of such a step that is gone at least; a fit for which that is too much ends where it is.
 _LEAST_SHARE = 0.1
+#: Targets whose gradients are found together.
+_AT_ONCE = 8
 #: Of a compliance with this relative error, damping is not known: its rate is taken below 1 where it is linearised.
 _HARDLY = 0.3
 
@@ -216,14 +219,14 @@ def gradients_of(problem: GroupProblem, fit: GroupFit, changes: Iterable[Complex
     on = _rescued(data, c, _first_points(data, c))
     adjoint = problem.joint.slope(fit.minimum.x, problem.joint.compliance(fit.minimum.x)).conj()
 
-    def gradient(target: ComplexArray) -> ComplexArray:
-        (forms,) = normal_forms(data, c, on, (target,))
-        return _used(problem, forms, forms, c)[0].gradient
+    def gradients(targets: tuple[ComplexArray, ...]) -> list[FloatArray]:
+        found = (_used(problem, forms, forms, c)[0].gradient for forms in normal_forms(data, c, on, targets))
+        return [np.einsum("lqp,lq,l->p", adjoint, one, trusted).real for one in found]
 
-    base = gradient(data.smooth)
-    found = [
-        np.einsum("lqp,lq,l->p", adjoint, gradient(data.smooth + change) - base, trusted).real for change in changes
-    ]
+    # Side by side, they share what is linearised: as many at once as take no more memory than the lines do.
+    (base,), found, more = gradients((data.smooth,)), [], iter(changes)
+    while some := tuple(data.smooth + change for change in itertools.islice(more, _AT_ONCE)):
+        found += [one - base for one in gradients(some)]
     return np.array(found)
 
 
