@@ -9,7 +9,7 @@ module jointfrf_rational_fit
   use, intrinsic :: iso_c_binding, only: c_size_t
   use jointfrf_blas_threads, only: hold_blas_threads, release_blas_threads
   use jointfrf_kinds, only: blas_ip, dp, ip, long
-  use jointfrf_lapack, only: dgemm, zgeev, zgemm, zgesv
+  use jointfrf_lapack, only: dgemm, zgeev, zgemm, zgemv, zgesv
   use jointfrf_line_layout, only: all_finite
   use jointfrf_sharing, only: share, shared_work, threads_for
   use jointfrf_status, only: info_good, info_no_memory
@@ -197,7 +197,7 @@ contains
     end do
     do e = 1, m
       if (good(e)) call add_loss(back, inverse(:, :, e), coefficients(:, e), work, loss)
-      squares = squares + sum((weight(:, e)*abs(h(:, e) - smooth(:, e)))**2)
+      squares = squares + sum(gram%weights(:, e)*(real(h(:, e) - smooth(:, e))**2 + aimag(h(:, e) - smooth(:, e))**2))
     end do
     info = count(.not. good, kind=ip)
     call release_blas_threads()
@@ -341,8 +341,7 @@ contains
   subroutine make_basis(s, weight, poles, basis)
     complex(dp), contiguous, intent(in) :: s(:), poles(:)
     real(dp), contiguous, intent(in) :: weight(:, :)
-    type(orthonormal_basis), target, intent(inout) :: basis
-    complex(dp), pointer, contiguous :: part(:, :)
+    type(orthonormal_basis), intent(inout) :: basis
     real(dp) :: length
     integer :: j, turn
 
@@ -359,8 +358,7 @@ contains
       end do
       do j = 1, size(psi, 2)
         do turn = 1, merge(0, 2, j == 1)
-          part(1:j - 1, 1:1) => basis%numbers(:j - 1)
-          call multiply('C', psi(:, :j - 1), psi(:, j:j), part)
+          call project(psi(:, :j - 1), psi(:, j), numbers(:j - 1))
           call take_off(psi(:, :j - 1), numbers(:j - 1), psi(:, j))
           triangle(:j - 1, j) = triangle(:j - 1, j) + numbers(:j - 1)
         end do
@@ -374,14 +372,26 @@ contains
     end associate
   end subroutine make_basis
 
+  !> x = A^H y.
+  subroutine project(a, y, x)
+    complex(dp), contiguous, intent(in) :: a(:, :), y(:)
+    complex(dp), contiguous, intent(out) :: x(:)
+    integer(blas_ip) :: rows
+
+    rows = size(y, kind=blas_ip)
+    call zgemv('C', rows, size(x, kind=blas_ip), (1.0_dp, 0.0_dp), a, rows, y, 1_blas_ip, (0.0_dp, 0.0_dp), x, &
+               1_blas_ip, 1_c_size_t)
+  end subroutine project
+
   !> y = y - A x.
   subroutine take_off(a, x, y)
     complex(dp), contiguous, intent(in) :: a(:, :), x(:)
     complex(dp), contiguous, intent(inout) :: y(:)
+    integer(blas_ip) :: rows
 
-    call zgemm('N', 'N', size(y, kind=blas_ip), 1_blas_ip, size(x, kind=blas_ip), (-1.0_dp, 0.0_dp), a, &
-               size(y, kind=blas_ip), x, size(x, kind=blas_ip), (1.0_dp, 0.0_dp), y, size(y, kind=blas_ip), &
-               1_c_size_t, 1_c_size_t)
+    rows = size(y, kind=blas_ip)
+    call zgemv('N', rows, size(x, kind=blas_ip), (-1.0_dp, 0.0_dp), a, rows, x, 1_blas_ip, (1.0_dp, 0.0_dp), y, &
+               1_blas_ip, 1_c_size_t)
   end subroutine take_off
 
   !> Inverse of an upper triangle; a zero on the diagonal gives a row of zeros.

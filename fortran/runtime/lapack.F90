@@ -10,7 +10,7 @@ module jointfrf_lapack
   use jointfrf_kinds, only: blas_ip, dp
   implicit none
   private
-  public :: dgemm, dposv, zgeev, zgesv, zgetrf, zgetri, zgecon, zgbtrf, zgbtrs, zgbcon, zgemm
+  public :: dgemm, dposv, zgeev, zgesv, zgetrf, zgetri, zgecon, zgbtrf, zgbtrs, zgbcon, zgemm, zgemv
 
   interface
     !> Solve A X = B of a positive definite A by Cholesky's factors.
@@ -141,5 +141,17 @@ module jointfrf_lapack
       complex(dp), intent(inout) :: c(ldc, *)
       integer(c_size_t), value :: transa_len, transb_len
     end subroutine zgemm
+
+    !> y = alpha op(A) x + beta y.
+    subroutine zgemv(trans, m, n, alpha, a, lda, x, incx, beta, y, incy, trans_len) &
+      bind(C, name=JF_BLAS_PREFIX//"zgemv_")
+      import :: dp, blas_ip, c_char, c_size_t
+      implicit none
+      character(kind=c_char), intent(in) :: trans
+      integer(blas_ip), intent(in) :: m, n, lda, incx, incy
+      complex(dp), intent(in) :: alpha, beta, a(lda, *), x(*)
+      complex(dp), intent(inout) :: y(*)
+      integer(c_size_t), value :: trans_len
+    end subroutine zgemv
   end interface
 end module jointfrf_lapack

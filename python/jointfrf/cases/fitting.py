@@ -18,7 +18,7 @@ from jointfrf.identification.model_fit.prepare import Channels
 from jointfrf.identification.model_fit.realisations import joints_of_realisations
 from jointfrf.identification.model_fit.substructure import Substructure
 from jointfrf.identification.model_fit.unknowns import parameter_vector
-from jointfrf.identification.realisations import identify_realisations
+from jointfrf.identification.realisations import viscous_joints
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.laws.law_joint import LawJoint
 from jointfrf.laws.springs import SpringLaw
@@ -51,8 +51,7 @@ def fit_viscous(freq_hz: FloatArray, dofs: tuple[str, ...], gammas: ComplexArray
     ndarray, shape (r, 2 n)
         Stiffness of all DOFs, then damping.
     """
-    fits = identify_realisations(freq_hz, gammas, dofs, damping="viscous")
-    return np.array([[*fit.stiffness, *fit.damping] for fit in fits])
+    return viscous_joints(freq_hz, gammas, dofs)
 
 
 def fit_decoupling(

@@ -13,14 +13,14 @@ from jointfrf.frf.noise_model import NoiseModel
 from jointfrf.identification.compliance_fit.channel_noise import NoiseOptions
 from jointfrf.identification.compliance_fit.describe import describe_compliance
 from jointfrf.identification.compliance_fit.estimator import GroupStart, JointEstimate
-from jointfrf.identification.compliance_fit.fit import fit_compliance, fitted_joint
+from jointfrf.identification.compliance_fit.fit import estimated_joint, fit_compliance, fitted_joint
 from jointfrf.identification.compliance_fit.joint_terms import CrossTerms, DampingTerms
-from jointfrf.identification.compliance_fit.prepare import FitOptions, prepare_compliance
+from jointfrf.identification.compliance_fit.prepare import FitOptions, FitProblem, prepare_compliance
 from jointfrf.identification.joint_fit import JointFit
 from jointfrf.identification.prepare import BandsOfDofs, as_measured
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, check_type
 
-__all__ = ["FitStart", "identify_realisations", "viscous_estimate"]
+__all__ = ["FitStart", "identify_realisations", "viscous_estimate", "viscous_joints"]
 
 
 class FitStart(NamedTuple):
@@ -157,6 +157,39 @@ def identify_realisations(
         yield describe_compliance(found, problem).fit
 
 
+def viscous_joints(freq_hz: FloatArray, gammas: Iterable[ComplexArray], dofs: Sequence[str]) -> FloatArray:
+    """Return stiffness and viscous damping of several sets as `identify_realisations` gives them, and nothing else.
+
+    Parameters
+    ----------
+    freq_hz : ndarray, shape (n_freq,)
+        Hz.
+    gammas : iterable of ndarray, shape (n_freq, 2 n, 2 n)
+        Measured receptances of the same structure, m/N.
+    dofs : sequence of str
+        Names of the n joint DOFs.
+
+    Returns
+    -------
+    ndarray, shape (r, 2 n)
+        Stiffness of all DOFs, then damping.
+
+    Raises
+    ------
+    ValueError
+        As `identify`.
+    """
+    start: FitStart | None = None
+    values = []
+    for gamma in gammas:
+        problem = _viscous_problem(freq_hz, gamma, dofs, start)
+        _, found, _ = estimated_joint(problem)
+        if start is None:
+            start = FitStart(found, problem.noise.model)
+        values.append(found.theta)
+    return np.array(values)
+
+
 def viscous_estimate(
     freq_hz: FloatArray, gamma: ComplexArray, dofs: Sequence[str], start: FitStart | None
 ) -> tuple[FloatArray, FloatArray]:
@@ -184,8 +217,15 @@ def viscous_estimate(
     ValueError
         As `identify`.
     """
+    found = fitted_joint(_viscous_problem(freq_hz, gamma, dofs, start))
+    return found.estimate.theta, np.array(list(found.intervals()(0.95).values())).T
+
+
+def _viscous_problem(
+    freq_hz: FloatArray, gamma: ComplexArray, dofs: Sequence[str], start: FitStart | None
+) -> FitProblem:
+    """Return the fit of springs and dashpots without cross terms, begun at `start`."""
     noise = NoiseOptions(None, like=None if start is None else start.noise)
     options = FitOptions("viscous", "zero", reciprocal=True)
     problem = prepare_compliance(as_measured(freq_hz, gamma, square=False), dofs, None, None, noise, options)
-    found = fitted_joint(replace(problem, near=() if start is None else start.estimate.starts))
-    return found.estimate.theta, np.array(list(found.intervals()(0.95).values())).T
+    return problem if start is None else replace(problem, near=start.estimate.starts)

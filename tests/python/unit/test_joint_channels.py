@@ -1,5 +1,6 @@
 """The DOFs of a joint from sensors and impacts around it, and what each channel has to do with rigid motion."""
 
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -102,3 +103,17 @@ def test_what_is_wrong_is_said():
         jf.places_of_nodes(frfs, [101], [101])
     with pytest.raises(ValueError, match="node 5 has no channel"):
         jf.places_of_nodes(frfs, [5], [101])
+
+
+def test_a_coupled_joint_of_few_lines_is_fitted_without_going_to_and_fro():
+    """Linearised where it ended last, the fit of 42 terms to 123 lines jumped between two points."""
+    frfs = noisy(hammer_test()).receptance()
+    found = sides(frfs)
+    transforms = (found.responses, found.forces)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", jf.IdentificationWarning)
+        warnings.simplefilter("ignore", jf.ConvergenceWarning)
+        fit = jf.identify(FREQ_HZ, found.gamma(frfs), transform=transforms, damping="viscous", cross="fit")
+    assert not any("did not converge" in warning for warning in fit.warnings)
+    error = np.array([fit.parameters[f"k_{dof}"] for dof in DOFS]) / JOINT.stiffness.diagonal() - 1
+    assert abs(error).max() < 0.02

@@ -6,10 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from jointfrf.identification.compliance_fit.estimator import FittedGroup, GroupStart
+from jointfrf.identification.compliance_fit.estimator import FittedGroup, GroupStart, coordinates_of
 from jointfrf.identification.compliance_fit.joint_terms import (
     DampingTerms,
-    DiagonalJoint,
     JointTerms,
     joint_terms,
     terms_of,
@@ -75,12 +74,13 @@ def choose_damping(group: FittedGroup, dofs: tuple[str, ...], factor: float) -> 
 
 
 def with_terms(group: FittedGroup, terms: JointTerms) -> GroupStart:
-    """Return where a fit with fewer terms may begin: at the minimum of the quadratic forms with these."""
+    """Return where a fit with other terms may begin: at the minimum of the quadratic forms with these."""
     return GroupStart.of(group, _minimum(group, terms))
 
 
 def _minimum(group: FittedGroup, terms: JointTerms) -> FormMinimum:
-    """Minimise the forms of a group with fewer terms, from the joint found with all."""
-    own, joint = terms_of(group.joint), DiagonalJoint(terms)
-    kept = [own.parameters.index(one) for one in terms.parameters]
-    return minimise_forms(group.fit.forms, joint, joint.coordinates(group.joint.theta(group.fit.minimum.x)[kept]))
+    """Minimise the forms of a group with other terms, from the joint found; terms that it has not begin at zero."""
+    joint = coordinates_of(terms)
+    found = dict(zip(terms_of(group.joint).parameters, group.joint.theta(group.fit.minimum.x).tolist(), strict=True))
+    theta = np.array([found.get(one, 0.0) for one in terms.parameters])
+    return minimise_forms(group.fit.forms, joint, joint.coordinates(theta))

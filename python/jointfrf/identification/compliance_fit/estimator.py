@@ -87,12 +87,15 @@ class GroupStart(NamedTuple):
         Coordinates of the joint.
     on : OnManifold, optional
         FRFs that nearly fit it.
+    is_last : bool
+        Whether the fit ends there, be its residual noise or not: as where one with more terms fits.
     """
 
     dofs: NDArray[np.intp]
     parameters: tuple[Parameter, ...]
     x: FloatArray
     on: OnManifold | None
+    is_last: bool = False
 
     @classmethod
     def of(cls, group: FittedGroup, minimum: FormMinimum) -> GroupStart:
@@ -169,12 +172,12 @@ def estimate_joint(
         What `grouped` returns, where it is known.
     """
     groups = []
-    known = {tuple(start.dofs.tolist()): start for start in near}
+    known = {(tuple(start.dofs.tolist()), start.parameters): start for start in near}
     for dofs, lines in grouped(frfs) if data is None else data:
         own, which = terms.of_dofs(dofs)
         joint = coordinates_of(own)
         problem = GroupProblem(lines, joint, unknown_entries(dofs, cross, used, len(lines.measured)))
-        fit = _fitted(problem, cross, known.get(tuple(dofs.tolist())))
+        fit = _fitted(problem, cross, known.get((tuple(dofs.tolist()), own.parameters)))
         groups.append(FittedGroup(dofs, which, joint, problem, fit))
     return assembled(terms, groups)
 
@@ -187,9 +190,9 @@ def grouped(frfs: InterfaceFrfs) -> Iterator[GroupData]:
 
 def _fitted(problem: GroupProblem, cross: CrossTerms, near: GroupStart | None) -> GroupFit:
     """Fit a group: on the manifold, or to the diagonal of C where its cross terms are unknown or deny every joint."""
-    if near is not None and cross != "ignore" and near.parameters == terms_of(problem.joint).parameters:
+    if near is not None and cross != "ignore":
         found = fit_dofs(problem, [near.x], LITTLE_PATIENCE, near.on)
-        if found.is_good:
+        if found.is_noise or near.is_last:
             return found
     # Some lines, evenly spread, start as well as all.
     some = spread_lines(len(problem.data.measured))

@@ -15,7 +15,7 @@ from jointfrf.frf.bands import in_pieces
 from jointfrf.identification.compliance_fit.band_parts import BandParts, fit_band_parts, left_out_share
 from jointfrf.identification.compliance_fit.channel_jackknife import ChannelSpread, channel_spread
 from jointfrf.identification.compliance_fit.damping_choice import DofDamping, choose_damping, with_terms
-from jointfrf.identification.compliance_fit.estimator import GroupData, JointEstimate, estimate_joint
+from jointfrf.identification.compliance_fit.estimator import GroupData, GroupStart, JointEstimate, estimate_joint
 from jointfrf.identification.compliance_fit.from_nothing import check_estimate
 from jointfrf.identification.compliance_fit.interface_frfs import InterfaceFrfs
 from jointfrf.identification.compliance_fit.intervals import LikelihoodIntervals, Spread, spread_of
@@ -37,6 +37,7 @@ __all__ = [
     "ComplianceFit",
     "FittedJoint",
     "at_level_of_residual",
+    "estimated_joint",
     "fit_compliance",
     "fitted_joint",
     "stiffness_of_lines",
@@ -124,15 +125,30 @@ class FittedJoint(NamedTuple):
         return covariance
 
 
-def fitted_joint(problem: FitProblem) -> FittedJoint:
-    """Fit the joint by maximum likelihood, linearised on the manifold of FRFs that fit it; find its uncertainty."""
+def estimated_joint(problem: FitProblem) -> tuple[FitProblem, JointEstimate, tuple[DofDamping, ...]]:
+    """Fit the joint by maximum likelihood, linearised on the manifold of FRFs that fit it.
+
+    Returns
+    -------
+    problem : FitProblem
+        With the noise level that was used.
+    estimate : JointEstimate
+    choices : tuple of DofDamping
+        Empty where the damping terms were given.
+    """
     span = _span(problem.freq_hz)
     try:
         problem, result, choices = _fitted(problem)
     except np.linalg.LinAlgError as error:
         raise ValueError(f"no joint was found that fits gamma ({span}): {error}") from error
+    check_estimate(result, problem.noise.level, span, is_level_known=not problem.noise.is_assumed)
+    return problem, result, choices
+
+
+def fitted_joint(problem: FitProblem) -> FittedJoint:
+    """Fit the joint as `estimated_joint` does, and find its uncertainty."""
+    problem, result, choices = estimated_joint(problem)
     noise = problem.noise
-    check_estimate(result, noise.level, span, is_level_known=not noise.is_assumed)
     spread = spread_of(result, noise.inflation, is_level_known=not noise.is_assumed)
     channels = channel_spread(result, problem.frfs, problem.added_compliance)
     return FittedJoint(problem, result, spread, channels, _band_parts(problem, result, spread, choices), choices)
@@ -268,9 +284,7 @@ def _with_damping(problem: FitProblem) -> tuple[JointEstimate, tuple[DofDamping,
     if all(kind == "both" for kind in chosen):
         return both, choices
     if problem.freq_hz.size >= _FEW and left_out_share(both) == 0:
-        terms = _terms(problem, chosen, problem.options.cross)
-        near = [with_terms(group, terms.of_dofs(group.dofs)[0]) for group in both.groups if group.fit.converged]
-        problem = replace(problem, near=tuple(near))
+        problem = replace(problem, near=_starts(problem, both, chosen))
     data = both.data
     # Its quadratic forms, of which a long sweep has many, are not needed any more.
     del both, group
@@ -279,9 +293,13 @@ def _with_damping(problem: FitProblem) -> tuple[JointEstimate, tuple[DofDamping,
 
 def _with_common_damping(problem: FitProblem) -> tuple[JointEstimate, tuple[DofDamping, ...]]:
     """Choose the damping terms of a joint with cross terms: the same for all DOFs."""
-    kinds: tuple[DampingTerms, ...] = ("viscous", "hysteretic", "both")
-    first = _estimate(problem, kinds[0])
-    results = {kinds[0]: first} | {kind: _estimate(problem, kind, data=first.data) for kind in kinds[1:]}
+    results: dict[DampingTerms, JointEstimate] = {"viscous": _estimate(problem, "viscous")}
+    before = results["viscous"]
+    for kind in ("both", "hysteretic"):
+        # Where both terms together fit, one of them needs no other start to show that it does not.
+        is_last = kind == "hysteretic" and all(group.fit.is_noise for group in before.groups)
+        near = tuple(start._replace(is_last=is_last) for start in _starts(problem, before, kind))
+        before = results[kind] = _estimate(replace(problem, near=(*near, *problem.near)), kind, data=before.data)
     factor = problem.noise.inflation * max(results["both"].excess, _LEAST_EXCESS)
     scores = {}
     for kind, result in results.items():
@@ -290,6 +308,18 @@ def _with_common_damping(problem: FitProblem) -> tuple[JointEstimate, tuple[DofD
     best, second = sorted(scores, key=lambda kind: scores[kind])[:2]
     margin = scores[second] - scores[best]
     return results[best], tuple(DofDamping(dof, best, second, margin) for dof in problem.dofs)
+
+
+def _starts(
+    problem: FitProblem, found: JointEstimate, damping: DampingTerms | Sequence[DampingTerms]
+) -> tuple[GroupStart, ...]:
+    """Return where fits with these terms begin: at what others have found; not where these did not converge."""
+    terms = _terms(problem, damping, problem.options.cross)
+    return tuple(
+        with_terms(group, terms.of_dofs(group.dofs)[0])
+        for group in found.groups
+        if group.fit.converged or group.fit.is_noise
+    )
 
 
 def _terms(problem: FitProblem, damping: DampingTerms | Sequence[DampingTerms], cross: CrossTerms) -> JointTerms:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
@@ -32,10 +33,18 @@ _FAR = 3.0
 PATIENCE, LITTLE_PATIENCE = 8, 4
 #: A fit is far from the data when the squares exceed their number by this factor.
 _LOST = 9.0
+#: Fits whose squares differ by less have ended at the same place.
+_SAME = 1.0
 #: A residual may be noise up to this mean square, for what is not known of the noise, and so many standard deviations.
 _NOISE, _SIGMA = 1.03, 5.0
 #: A compliance is barely seen when its standard error exceeds this share of it: the FRFs may then hardly show M.
 _BARELY = 0.05
+#: Steps that reverse, to this cosine, and shrink by less than this factor go to and fro between two points.
+_REVERSED, _SHRUNK = -0.8, 0.5
+#: Part of such a step that is gone at least; a fit for which that is too much ends where it is.
+_LEAST_SHARE = 0.1
+#: Targets whose gradients are found together.
+_AT_ONCE = 8
 #: Of a compliance with this relative error, damping is not known: its rate is taken below 1 where it is linearised.
 _HARDLY = 0.3
 
@@ -165,6 +174,8 @@ def fit_dofs(
 ) -> GroupFit:
     """Fit from one start after the other until the residual is that of the noise; else keep the lowest.
 
+    A fit may go to and fro without end at a residual that is noise; where two starts lead there, others do, too.
+
     Parameters
     ----------
     problem : GroupProblem
@@ -180,9 +191,10 @@ def fit_dofs(
         if not np.isfinite(start).all():
             continue
         found = _iterate(problem, start, patience if best is None else LITTLE_PATIENCE, on)
+        again = best is not None and found.is_noise and abs(found.squares - best.squares) < _SAME
         if best is None or found.squares < best.squares:
             best = found
-        if best.is_good:
+        if best.is_good or again:
             break
     if best is None:
         raise np.linalg.LinAlgError("no start of the fit is finite")
@@ -207,14 +219,14 @@ def gradients_of(problem: GroupProblem, fit: GroupFit, changes: Iterable[Complex
     on = _rescued(data, c, _first_points(data, c))
     adjoint = problem.joint.slope(fit.minimum.x, problem.joint.compliance(fit.minimum.x)).conj()
 
-    def gradient(target: ComplexArray) -> ComplexArray:
-        (forms,) = normal_forms(data, c, on, (target,))
-        return _used(problem, forms, forms, c)[0].gradient
+    def gradients(targets: tuple[ComplexArray, ...]) -> list[FloatArray]:
+        found = (_used(problem, forms, forms, c)[0].gradient for forms in normal_forms(data, c, on, targets))
+        return [np.einsum("lqp,lq,l->p", adjoint, one, trusted).real for one in found]
 
-    base = gradient(data.smooth)
-    found = [
-        np.einsum("lqp,lq,l->p", adjoint, gradient(data.smooth + change) - base, trusted).real for change in changes
-    ]
+    # Side by side, they share what is linearised: as many at once as take no more memory than the lines do.
+    (base,), found, more = gradients((data.smooth,)), [], iter(changes)
+    while some := tuple(data.smooth + change for change in itertools.islice(more, _AT_ONCE)):
+        found += [one - base for one in gradients(some)]
     return np.array(found)
 
 
@@ -256,7 +268,7 @@ def _iterate(
     trusted = np.ones(len(data.measured), np.bool_)
     prior: PriorOfM | None = prior_of_m(data) if problem.is_diagonal else None
     hidden = problem.is_diagonal
-    step = 0
+    step, share, last = 0, 1.0, np.zeros_like(start)
     while True:
         step += 1
         c = problem.of_joint(joint.compliance(linearised_at))
@@ -274,19 +286,37 @@ def _iterate(
         # In standard errors along the direction of the step: what the data do not see may go anywhere.
         change = minimum.x - x
         moved = float(np.sqrt(abs(2 * (change @ minimum.information @ change))))
-        x = minimum.x
         equations = float(free[trusted].sum())
         converged = bool(moved < _MOVED * np.sqrt(x.size)) and step > 1
-        barely = problem.is_diagonal and bool((error > _BARELY * abs(x))[: terms_of(joint).n].any())
+        barely = problem.is_diagonal and bool((error > _BARELY * abs(minimum.x))[: terms_of(joint).n].any())
         converged = converged and (hidden or not barely)
         # The first step tells, with M that cannot feign it; a joint barely seen once is treated so to the end.
         hidden = barely or (hidden and step > 1)
-        if converged or step == _MOST or (step > patience and minimum.cost > _LOST * equations):
+        is_endless = step == _MOST or share <= _LEAST_SHARE
+        if converged or is_endless or (step > patience and minimum.cost > _LOST * equations):
             kept = None if is_long(len(data.measured)) else on
             return GroupFit(minimum, forms, trusted, equations, float(free.sum()), step, converged, on=kept)
+        share = 1.0 if minimum.cost > _LOST * equations else _next_share(share, change, last, minimum.information)
+        x, last = x + share * change, change
         linearised_at = _within_sight(forms, problem.joint, x, error) if problem.is_diagonal else x
         # Of a long sweep the forms of one step take as much memory as those of the next.
         del forms, minimum
+
+
+def _next_share(share: float, step: FloatArray, last: FloatArray, information: FloatArray) -> float:
+    """Return which part of a step is gone, `share` having been gone of the last one.
+
+    All of it, unless steps lead to and fro and hardly shrink: where all of the last one would have made the next step
+    -r times as long, 1/(1 + r) of it would have ended at the fixed point. From then on shares do not grow: of two
+    minima that are nearly as low, now the one is taken and now the other.
+    """
+    own, before = float(step @ information @ step), float(last @ information @ last)
+    if not (own > 0 and before > 0):
+        return share
+    along = float(step @ information @ last) / before
+    if share == 1 and (own < _SHRUNK**2 * before or along > _REVERSED * np.sqrt(own / before)):
+        return 1.0
+    return max(share / max(1 - along, 1.0), _LEAST_SHARE)
 
 
 def _first_points(data: LineData, c: ComplexArray) -> OnManifold:

@@ -91,11 +91,11 @@ class JointTerms(NamedTuple):
 
     def stiffness(self, theta: FloatArray) -> ComplexArray:
         """Return K*(w) of parameters, shape (n_freq, n, n), N/m."""
-        k, factors = np.zeros((self.omega.size, self.n, self.n), np.complex128), self.factors
-        for value, kind, (a, b) in zip(theta, self.kinds, self.pairs, strict=True):
-            k[:, a, b] += value * factors[kind]
-            if a != b:
-                k[:, b, a] += value * factors[kind]
+        n, (a, b) = self.n, self.pairs.T
+        of_kinds = np.zeros((3, n, n))
+        of_kinds[self.kinds, a, b] = of_kinds[self.kinds, b, a] = theta
+        k: ComplexArray = np.empty((self.omega.size, n, n), np.complex128)
+        k.real, k.imag = of_kinds[0], of_kinds[1] + self.omega[:, None, None] * of_kinds[2]
         return k
 
 
@@ -255,6 +255,13 @@ class CoupledJoint:
         self.rows, self.columns = np.triu_indices(terms.n)
         self.pairs, place = np.unique(terms.pairs, axis=0, return_inverse=True)
         self.pair_of = place.ravel()
+        # Places of C in (C E C)_rc = C_ra C_cb + C_rb C_ca of the upper triangle by pairs a, b; once where a = b.
+        n, r, c = terms.n, self.rows[:, None], self.columns[:, None]
+        a, b = self.pairs.T
+        self._left, self._right = r * n + a, c * n + b
+        self._crossed = np.flatnonzero(a != b)
+        a, b = self.pairs[self._crossed].T
+        self._other_left, self._other_right = r * n + b, c * n + a
         self.lower = np.full(len(terms.parameters), -np.inf)
         self.upper = -self.lower
 
@@ -272,10 +279,12 @@ class CoupledJoint:
         n = self.terms.n
         c = np.empty((len(entries), n, n), np.complex128)
         c[:, self.rows, self.columns] = c[:, self.columns, self.rows] = entries
-        a, b = self.pairs.T
-        left, right = c[:, :, a], c[:, :, b]
-        by_pair: ComplexArray = left[:, self.rows] * right[:, self.columns]
-        by_pair += np.where(a != b, left[:, self.columns] * right[:, self.rows], 0)
+        flat = c.reshape(len(c), n * n)
+        by_pair: ComplexArray = flat.take(self._left, axis=1)
+        by_pair *= flat.take(self._right, axis=1)
+        other = flat.take(self._other_left, axis=1)
+        other *= flat.take(self._other_right, axis=1)
+        by_pair[:, :, self._crossed] += other
         return by_pair
 
     def slope(self, x: FloatArray, entries: ComplexArray) -> ComplexArray:

@@ -20,6 +20,9 @@ _SEEN = 1e-15
 _STEPS = 100
 #: Levenberg's parameter: first value, factor where a step fails, largest value.
 _FIRST, _RAISED, _LARGEST = 1e-4, 6.0, 1e10
+#: From this value on damped equations are far from singular; below, directions of a smaller share than the second are
+#: left alone.
+_REGULAR, _NOT_SOLVED = 1e-9, 1e-13
 #: A minimum is found when two steps gain less than this of the squares of one residual.
 LEAST_GAIN = 1e-6
 _TINY = float(np.finfo(float).tiny)
@@ -219,6 +222,13 @@ def _normal_equations(
     return (adjoint @ (forms.weight @ slope)).real.sum(axis=0), (adjoint @ residual[..., None])[..., 0].real.sum(axis=0)
 
 
+def _solution(damped: FloatArray, gradient: FloatArray, damping: float) -> FloatArray:
+    """Return the step of damped equations; where they may be singular but for rounding, the shortest."""
+    if damping > _REGULAR:
+        return np.asarray(np.linalg.solve(damped, gradient), np.float64)
+    return np.asarray(np.linalg.lstsq(damped, gradient, rcond=_NOT_SOLVED)[0], np.float64)
+
+
 def _minimise_general(
     forms: LineForms, joint: JointCoordinates, start: FloatArray, held: int | None, least_gain: float
 ) -> FormMinimum:
@@ -234,7 +244,7 @@ def _minimise_general(
         done = not (np.isfinite(scaled).all() and moving.any())
         while not done and damping <= _LARGEST:
             damped, step = scaled + damping * np.eye(len(scaled)), np.zeros(x.size)
-            step[moving] = np.linalg.lstsq(damped, (gradient / size)[moving], rcond=1e-13)[0] / size[moving]
+            step[moving] = _solution(damped, (gradient / size)[moving], damping) / size[moving]
             there = np.where(free, np.clip(x + step, joint.lower, joint.upper), x)
             new_cost, new_entries, new_residual = _at(forms, joint, there)
             if new_cost <= cost + 1e-13 * abs(cost):

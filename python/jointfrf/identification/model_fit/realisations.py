@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +15,9 @@ from jointfrf.identification.model_fit.fit import FoundModel, fit_assembly
 from jointfrf.identification.model_fit.likelihood import Likelihood
 from jointfrf.identification.model_fit.minimum import minimise
 from jointfrf.identification.model_fit.noise_about import noise_about
+from jointfrf.identification.model_fit.prediction import Prediction
 from jointfrf.identification.model_fit.prepare import ChannelNoise, Channels, prepare_model_fit
+from jointfrf.identification.model_fit.unknowns import ParameterVector
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.laws.law_joint import LawJoint
 
@@ -32,6 +35,27 @@ class _Noise(NamedTuple):
 
     variance: FloatArray
     level: float
+
+
+class _Remembering(Prediction):
+    """A prediction that keeps what it found at the first values, where each set begins, and at the last ones."""
+
+    def __init__(self, of: Prediction) -> None:
+        vars(self).update(vars(of))
+        self._known: list[tuple[FloatArray, ComplexArray, ComplexArray]] = []
+        self._lent: ComplexArray | None = None
+
+    def linearised(self, vector: ParameterVector, values: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+        """Return what a prediction does; the derivatives are the caller's until the next call."""
+        found = next((known for known in self._known if np.array_equal(known[0], values)), None)
+        if found is None:
+            found = (values.copy(), *super().linearised(vector, values))
+            self._known[1:] = [found]
+        _, y, slopes = found
+        if self._lent is None:
+            self._lent = np.empty_like(slopes)
+        np.copyto(self._lent, slopes)
+        return y, self._lent
 
 
 def joints_of_realisations(
@@ -65,7 +89,9 @@ def joints_of_realisations(
         found = fit_assembly(prepare_model_fit(freq_hz, h, whole, channels, ChannelNoise(), ()))
         yield _joint_of(found, found.values)
         if first is None and found.minimum.converged and found.test.is_noise and not found.problem.is_assumed:
-            first, level = found, _noise(found, h, found.predicted).level
+            prediction = _Remembering(found.problem.prediction)
+            first = found._replace(problem=replace(found.problem, prediction=prediction))
+            level = _noise(first, h, first.predicted).level
 
 
 def _joint_of(found: FoundModel, values: FloatArray) -> LawJoint:
