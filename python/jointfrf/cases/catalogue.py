@@ -13,7 +13,7 @@ from jointfrf.cases.definitions import read_frequency
 from jointfrf.cases.kind import Case, CaseKind
 from jointfrf.cases.kinds import KINDS
 from jointfrf.cases.workers import Workers
-from jointfrf.files import below, write_file
+from jointfrf.files import below, check_file, write_file
 from jointfrf.report.draw import draw
 from jointfrf.report.figure import Figure, figure_csv
 from jointfrf.report.page import Page, make_page
@@ -259,8 +259,8 @@ def run_case(
         tables=tables,
         figures=list(zip(figures, drawn, strict=True)),
         subject="The case",
-        text=_text(case.folder / "README.md"),
-        sources=[("case.toml", _text(case.folder / "case.toml"))],
+        text=_text(case.folder, "README.md"),
+        sources=[("case.toml", _text(case.folder, "case.toml"))],
     )
     _write(target, page, content)
     return CaseOutput(case, result, tables, figures, summary, target / "report.html", printed)
@@ -286,8 +286,13 @@ def _about(case: Case, count: int) -> str:
     )
 
 
-def _text(path: Path) -> str:
-    return path.read_text(encoding="utf-8") if path.is_file() else ""
+def _text(folder: Path, name: str) -> str:
+    """Return a text of the folder of a case, for its page; not that of another folder, by a link."""
+    path = folder / name
+    if not path.is_file() or path.resolve().parent != folder.resolve():
+        return ""
+    check_file(path)
+    return path.read_text(encoding="utf-8", errors="replace")
 
 
 def _common_numbers(case: Case, count: int, tables: list[Table]) -> dict[str, Any]:

@@ -79,6 +79,19 @@ def test_a_link_in_the_folder_of_results_is_not_followed(tmp_path, monkeypatch):
     assert not list((tmp_path / "home").iterdir())
 
 
+def test_a_page_shows_no_text_of_another_folder(tmp_path):
+    """A README.md that is a link put any file of its reader on the page, which is then sent around."""
+    (tmp_path / "key").write_text("secret of the reader")
+    case = tmp_path / "case"
+    case.mkdir()
+    text = (find_case("3.1") / "case.toml").read_text(encoding="utf-8")
+    (case / "case.toml").write_text(text.replace("step = 0.01", "step = 0.1"), encoding="utf-8")
+    (case / "README.md").symlink_to(tmp_path / "key")
+    page = run_case(case, tmp_path / "results", realisations=2).report.read_text(encoding="utf-8")
+    assert "secret of the reader" not in page
+    assert "Two masses and two masses" in page
+
+
 FORMULAS = ("=1+1", "+1+a", "-1+a", "@SUM(A1)", "\t=1", " =1")
 
 
