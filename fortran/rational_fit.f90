@@ -261,6 +261,7 @@ contains
     type(orthonormal_basis), intent(inout) :: basis
     integer, intent(out) :: stat
 
+    ! allow(C181): the caller looks at it
     allocate (basis%psi(n_freq, n), basis%triangle(n, n), basis%numbers(n), basis%mean_weight(n_freq), stat=stat)
   end subroutine prepare_basis
 
@@ -269,6 +270,7 @@ contains
     type(zero_space), intent(inout) :: space
     integer, intent(out) :: stat
 
+    ! allow(C181): the caller looks at it
     allocate (space%sigma(n, 1), space%found(n, 1), space%back(n, n), space%matrix(n - 1, n - 1), space%moved(n - 1), &
               space%work(4*n), space%real_work(2*n), space%pivot(n), stat=stat)
   end subroutine prepare_zeros
@@ -491,8 +493,9 @@ contains
     n = int(self%n, blas_ip)
     m = self%n_entries
     do e = int(first), int(last)
-      associate (form => self%forms(:, :, e), sums => self%gram%sums, own => self%work(:, :, 1, thread), &
-                 mixed => self%work(:, :, 2, thread), solved => self%work(:, :, 3, thread), pivot => self%pivot(:, thread))
+      associate (form => self%forms(:, :, e), sums => self%gram%sums, pivot => self%pivot(:, thread), &
+                 own => self%work(:, :, 1, thread), mixed => self%work(:, :, 2, thread), &
+                 solved => self%work(:, :, 3, thread))
         call own_gram(self%gram, e, own)
         do k = 1, self%gram%n_pairs
           associate (i => self%gram%first(k), j => self%gram%second(k), right => sums(m + e, :, k), &
