@@ -293,6 +293,10 @@ contains
     else
       info = info_no_memory
     end if
+    do t = 1, threads
+      if (allocated(work%space(t)%room)) deallocate (work%space(t)%room)
+      if (allocated(work%space(t)%squares)) deallocate (work%space(t)%squares)
+    end do
     deallocate (work%space)
   end subroutine run
 

@@ -13,6 +13,7 @@ module jointfrf_rational_fit
   use jointfrf_line_layout, only: all_finite
   use jointfrf_sharing, only: share, shared_work, threads_for
   use jointfrf_status, only: info_good, info_no_memory
+  use jointfrf_traps, only: hold_all_traps, host_state, release_all_traps
   implicit none
   private
   public :: rational_fit, relocate_poles
@@ -524,6 +525,7 @@ contains
     type(zero_space), intent(inout) :: space
     complex(dp), contiguous, intent(inout) :: poles(:)
     integer(ip), intent(out) :: info
+    type(host_state) :: host
     complex(dp) :: no_left(1), no_right(1)
     real(dp) :: trace, least
     integer(blas_ip) :: n, m, stat
@@ -554,8 +556,10 @@ contains
         info = 1
         return
       end if
+      call hold_all_traps(host)
       call zgeev('N', 'N', m, matrix, m, moved, no_left, 1_blas_ip, no_right, 1_blas_ip, space%work, &
                  size(space%work, kind=blas_ip), space%real_work, stat, 1_c_size_t, 1_c_size_t)
+      call release_all_traps(host)
       if (stat /= 0) then
         info = 1
         return

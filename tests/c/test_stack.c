@@ -16,7 +16,7 @@
 
 #include "calls.h"
 
-#define LEAST 512       /* kilobytes that docs/embedding.md names */
+#define LEAST 384       /* kilobytes that docs/embedding.md names */
 
 static void stopped(int number)
 {
@@ -52,7 +52,6 @@ static int too_large(int routine, int n)
     case COMPLIANCE_COVARIANCE: return n > 8;
     case MONTE_CARLO: return n > 33;
     case FIT_DIAGONAL_JOINT: case RATIONAL_FIT: case RELOCATE_POLES: return n > 64;
-    case TRANSFORM: return 0;
     default: return 0;
     }
 }
