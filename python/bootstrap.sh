@@ -195,7 +195,7 @@ fail() {
 # A process of another user cannot be sent a signal, and is alive.
 is_alive() {
   said=$(LC_ALL=C kill -0 "$1" 2>&1) && return
-  case $said in *ermitted*) return ;; esac
+  case $said in *ermitted*) return 0 ;; esac
   ps -p "$1" >/dev/null 2>&1
 }
 
