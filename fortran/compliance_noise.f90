@@ -3,8 +3,8 @@ module jointfrf_compliance_noise
   use, intrinsic :: ieee_arithmetic, only: ieee_positive_inf, ieee_value
   use jointfrf_caller_memory, only: caller_memory
   use jointfrf_kinds, only: dp, ip
-  use jointfrf_lanes, only: element_matrix, element_space, find_rows, lane_kernels, lanes, largest_solved, padded, real_lines, &
-    rows_in_memory, sparse_rows, worse_of
+  use jointfrf_lanes, only: element_matrix, element_space, find_rows, lane_kernels, lanes, largest_solved, padded, &
+    real_lines, rows_in_memory, sparse_rows, worse_of
   use jointfrf_line_layout, only: all_finite, load, load_real, store, take_block
   use jointfrf_lines_lapack, only: product_line, room_to_solve, solve_line
   use jointfrf_status, only: line_good, line_not_finite, line_overflow

@@ -4,8 +4,8 @@ module jointfrf_coupling
   use jointfrf_caller_memory, only: caller_memory
   use jointfrf_engine, only: engine_v4, get_engine
   use jointfrf_kinds, only: dp, ip
-  use jointfrf_lanes, only: element_matrix, element_space, lane_kernels, lanes, largest_solved, largest_product, padded, &
-    real_lines, rows_in_memory
+  use jointfrf_lanes, only: element_matrix, element_space, lane_kernels, lanes, largest_solved, largest_product, &
+    padded, real_lines, rows_in_memory
   use jointfrf_line_layout, only: all_finite, load, store
   use jointfrf_lines_lapack, only: product_block
   use jointfrf_modification, only: apply_in_lanes, apply_modification, find_forces, forces_in_lanes, &

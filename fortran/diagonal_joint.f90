@@ -67,7 +67,8 @@ module jointfrf_diagonal_joint
     real(dp), pointer, contiguous :: x(:, :, :, :) => null()       !< of the kernel, (lanes, 2, elements, n_blocks)
     real(dp), allocatable :: joint(:, :)                           !< of the kernel, (3, n)
     real(dp), allocatable :: total(:)                              !< of all lines
-    real(dp), allocatable :: partial_room(:)                       !< where the next lies
+    real(dp), allocatable :: partial_room(:), work_room(:)         !< where the next lie
+    real(dp), pointer, contiguous :: work(:, :) => null()          !< of the kernel, one column a thread
     real(dp), pointer, contiguous :: partial(:, :, :) => null()    !< cost, descent, normal: (lanes, sums, shares)
   contains
     procedure :: do_items => sum_shares
@@ -292,8 +293,9 @@ contains
     sums%n_blocks = (n_freq + lanes - 1)/lanes
     n_shares = (sums%n_blocks + share_blocks - 1)/share_blocks
     length = int(2*lanes, long)*n_element*sums%n_blocks
-    allocate (sums%room(length + lanes), sums%omega(lanes, sums%n_blocks), sums%squares(lanes, sums%n_blocks), &
-              sums%joint(3, n), sums%total(n_sum), sums%place(2*n + n*n), &
+    sums%threads = threads_for((30.0_dp*n + 20.0_dp*n*(n + 1))*n_freq, int(n_shares, long), serial_flops_lanes)
+    allocate (sums%room(length + lanes), sums%work_room(8*lanes*n*sums%threads), sums%omega(lanes, sums%n_blocks), &
+              sums%squares(lanes, sums%n_blocks), sums%joint(3, n), sums%total(n_sum), sums%place(2*n + n*n), &
               sums%partial_room(int(lanes*n_sum, long)*n_shares), stat=stat)
     if (stat /= 0) then
       info = info_no_memory
@@ -302,7 +304,7 @@ contains
     sums%partial(1:lanes, 1:n_sum, 1:n_shares) => sums%partial_room
     at = to_register(c_loc(sums%room))
     sums%x(1:lanes, 1:2, 1:n_element, 1:sums%n_blocks) => sums%room(at + 1:at + length)
-    sums%threads = threads_for((30.0_dp*n + 20.0_dp*n*(n + 1))*n_freq, int(n_shares, long), serial_flops_lanes)
+    sums%work(1:8*lanes*n, 1:sums%threads) => sums%work_room
     if (n_freq > 0) call load_forms(forms, n, n_element, sums)
   end subroutine prepare
 
@@ -351,14 +353,14 @@ contains
     integer(long) :: item
     integer :: b, before
 
-    if (thread < 1) return                    ! each share has its own sums, each call its own stack
     before = 1 + 3*self%n
     do item = first, last
       self%partial(:, :, item) = 0.0_dp
       do b = int(item - 1)*share_blocks + 1, min(int(item)*share_blocks, self%n_blocks)
         call self%kernels%diagonal_form(self%n, self%by_rate, self%damped, self%joint, self%omega(:, b), &
-                                        self%squares(:, b), self%x(:, :, :, b), self%partial(:, 1, item), &
-                                        self%partial(:, 2:before, item), self%partial(:, before + 1:, item))
+                                        self%squares(:, b), self%x(:, :, :, b), self%work(:, thread), &
+                                        self%partial(:, 1, item), self%partial(:, 2:before, item), &
+                                        self%partial(:, before + 1:, item))
       end do
     end do
   end subroutine sum_shares

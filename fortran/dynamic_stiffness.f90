@@ -401,7 +401,7 @@ contains
     n_out = size(self%outputs)
     associate (row => space%list(:n_left), wanted => space%list(n_left + 1:n_left + n_out), &
                place => space%list(n_left + n_out + 1:))
-      call kernels%solve(n_left, n_in, self%n_wanted, self%system_before, space%x, space%hint, row, rcond_lanes)  ! (2.28)
+      call kernels%solve(n_left, n_in, self%n_wanted, self%system_before, space%x, space%hint, row, rcond_lanes)  ! 2.28
       do l = 1, n_out
         wanted(l) = row(self%row_of(self%outputs(l)))
       end do

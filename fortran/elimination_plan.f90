@@ -72,8 +72,8 @@ contains
     if (stat == 0) call set_slots(wanted, retained, slot_of, plan, stat)
     if (stat /= 0) return
     call find_order(n, coupled, retained, part, work, order, plan%n_steps)
-    call find_structure(n, coupled, order(:plan%n_steps), work(:n), work(n + 1:2*n), work(2*n + 1:3*n), work(3*n + 1:), &
-                        structure, stat)
+    call find_structure(n, coupled, order(:plan%n_steps), work(:n), work(n + 1:2*n), work(2*n + 1:3*n), &
+                        work(3*n + 1:), structure, stat)
     if (stat == 0) call assign_slots(order(:plan%n_steps), structure, slot_of, work(:n), work(n + 1:2*n), plan, stat)
     if (stat == 0) call list_elements(coupled, order(:plan%n_steps), structure, slot_of, plan, stat)
     if (stat == 0) allocate (plan%coefficient(4, plan%last_entry(plan%n_steps + 2)), stat=stat)
@@ -206,8 +206,8 @@ contains
     integer :: s, i, j
 
     allocate (begun(plan%n_slots, plan%n_slots), plan%last_zero(plan%n_steps + 2), plan%last_entry(plan%n_steps + 2), &
-              plan%zero(size(coupled)), plan%entry(size(coupled)), plan%row(size(coupled)), plan%column(size(coupled)), &
-              stat=stat)
+              plan%zero(size(coupled)), plan%entry(size(coupled)), plan%row(size(coupled)), &
+              plan%column(size(coupled)), stat=stat)
     if (stat /= 0) return
     begun = .false.
     plan%last_zero = 0

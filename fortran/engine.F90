@@ -50,7 +50,7 @@ module jointfrf_engine
       import :: c_char, c_int
       implicit none
       integer(c_int), value :: length
-      character(kind=c_char), intent(out) :: word(*)
+      character(kind=c_char), intent(out) :: word(length)
     end subroutine read_engine
   end interface
 

@@ -136,7 +136,10 @@ contains
     end if
     operation%no_memory = stat /= 0
     operation%block_lines = long_block
-    operation%n_element = 1
+    associate (m_slow => size(operation%h, 2), m_fast => size(operation%h, 1), slow => operation%slow, &
+               fast => operation%fast)
+      operation%n_element = max(m_fast*max(1, slow%n), fast%n*m_slow)/lanes + m_slow + 1
+    end associate
   end subroutine plan_transformation
 
   !> The entries of a line made of those of the line before, in one step.
@@ -185,7 +188,7 @@ contains
     end subroutine add_product
   end subroutine multiply
 
-  !> The rows of a matrix, or its columns, as the kernels take them: what is not zero, and where that is much of it, all.
+  !> The rows of a matrix, or its columns, as the kernels take them: what is not zero, and where that is much, all.
   subroutine find_weights(t, by_columns, rows, stat)
     real(dp), intent(in) :: t(:, :)
     logical, intent(in) :: by_columns
@@ -217,13 +220,11 @@ contains
     real(dp), intent(out) :: rcond(n_lines)
     real(dp) :: total(n_lines)
 
-    associate (unused => space%used)
-    end associate
     if (self%both%n > 0) then
       call kernels%weigh_lines(size(self%h_pairs, 2), self%both, first, n_lines, self%h_pairs, self%new_pairs, total)
     else
       call kernels%transform_lines(self%transposed, size(self%h, 2), size(self%h, 1), self%slow, self%fast, first, &
-                                   n_lines, self%h_pairs, self%new_pairs, total)            ! (2.57)
+                                   n_lines, self%h_pairs, space%x, self%new_pairs, total)   ! (2.57)
     end if
     rcond = 1.0_dp
     call kernels%judge(n_lines, total, line_info, rcond)

@@ -317,18 +317,20 @@ module jointfrf_lanes
       real(dp), intent(out) :: rcond(n_lines)
     end subroutine identify_lines_routine
 
-    !> Real transformations of both sides of a line, without workspace.
+    !> Real transformations of both sides of a line.
     !> slow_first       which side is transformed first: results are the same in either order of storage
     !> m_slow, m_fast   size of a line h as it is stored: columns, and rows, which lie side by side
     !> slow, fast       what entries of the new line are made of, along either
+    !> work             workspace, 2 max(m_fast max(1, slow%n), fast%n m_slow) + 2 lanes m_slow numbers
     !> total            shape (n_lines): sums in which NaN, Inf and overflow show
-    subroutine transform_lines_routine(slow_first, m_slow, m_fast, slow, fast, first, n_lines, h, h_new, total)
+    subroutine transform_lines_routine(slow_first, m_slow, m_fast, slow, fast, first, n_lines, h, work, h_new, total)
       import :: dp, sparse_rows
       implicit none
       logical, intent(in) :: slow_first
       integer, intent(in) :: m_slow, m_fast, first, n_lines
       type(sparse_rows), intent(in) :: slow, fast
       real(dp), intent(in) :: h(2, m_fast, m_slow, *)
+      real(dp), intent(inout) :: work(*)
       real(dp), intent(inout) :: h_new(2, fast%n, slow%n, *)
       real(dp), intent(out) :: total(n_lines)
     end subroutine transform_lines_routine
@@ -447,12 +449,13 @@ module jointfrf_lanes
     !> descent   Re(J^H r), r = p - W d, by a, by eta and by tau of each DOF, shape (lanes, 3, n)
     !> normal    Re(J^H W J) of each entry of that triangle, u the derivative by a and v that by eta: uu, uv, w uv, vu,
     !>           w vu, vv, w vv, w^2 vv, the first for the row; shape (lanes, 8, n (n + 1)/2)
-    subroutine diagonal_form_routine(n, by_rate, damped, joint, omega, squares, x, cost, descent, normal)
+    subroutine diagonal_form_routine(n, by_rate, damped, joint, omega, squares, x, work, cost, descent, normal)
       import :: dp, lanes
       implicit none
       integer, intent(in) :: n
       logical, intent(in) :: by_rate, damped
       real(dp), intent(in) :: joint(3, n), omega(lanes), squares(lanes), x(lanes, 2, *)
+      real(dp), intent(inout) :: work(lanes, 2, n, 4)
       real(dp), intent(inout) :: cost(lanes), descent(lanes, 3, n), normal(lanes, 8, (n*(n + 1))/2)
     end subroutine diagonal_form_routine
   end interface

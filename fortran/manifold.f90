@@ -267,7 +267,6 @@ contains
     real(dp), intent(in) :: products
     integer, intent(inout) :: stat
     integer(ip), intent(out) :: info
-    type(block_space), allocatable, target :: space(:)
     integer(long) :: n_blocks
     integer :: threads, t
     logical :: found
@@ -280,17 +279,25 @@ contains
     flops = products*real(work%plan%n_entry, dp)*real(work%plan%n_free, dp)**2*size(work%line_info)
     n_blocks = (size(work%line_info, kind=long) - 1)/lanes + 1
     threads = threads_for(flops, n_blocks, serial_flops_lanes)
-    allocate (space(threads), stat=stat)
-    do t = 1, threads
-      if (stat == 0) call prepare(work%plan, space(t), stat)
-    end do
+    allocate (work%space(threads), stat=stat)
     if (stat /= 0) then
       info = info_no_memory
       return
     end if
-    work%space => space
-    call share(work, n_blocks, threads, even=.false.)
-    info = count(work%line_info /= line_good, kind=ip)
+    do t = 1, threads
+      if (stat == 0) call prepare(work%plan, work%space(t), stat)
+    end do
+    if (stat == 0) then
+      call share(work, n_blocks, threads, even=.false.)
+      info = count(work%line_info /= line_good, kind=ip)
+    else
+      info = info_no_memory
+    end if
+    do t = 1, threads
+      if (allocated(work%space(t)%room)) deallocate (work%space(t)%room)
+      if (allocated(work%space(t)%squares)) deallocate (work%space(t)%squares)
+    end do
+    deallocate (work%space)
   end subroutine run
 
   !> Workspace of one thread. Elements begin where a register does.

@@ -266,6 +266,7 @@ contains
 
     group%first = first
     group%n = n
+    ! allow(C181): the caller looks at it
     allocate (group%column(n_column), stat=stat)
   end subroutine set_group
 

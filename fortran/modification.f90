@@ -3,8 +3,8 @@
 module jointfrf_modification
   use jointfrf_caller_memory, only: caller_memory
   use jointfrf_kinds, only: dp, ip
-  use jointfrf_lanes, only: element_matrix, element_space, lane_kernels, lanes, largest_solved, largest_product, padded, &
-    real_lines
+  use jointfrf_lanes, only: element_matrix, element_space, lane_kernels, lanes, largest_solved, largest_product, &
+    padded, real_lines
   use jointfrf_line_layout, only: all_finite, load, store, subtract
   use jointfrf_lines_lapack, only: product_line, room_to_solve, solve_line
   use jointfrf_lookahead, only: lookahead

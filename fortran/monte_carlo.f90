@@ -282,7 +282,8 @@ contains
     n = plan%n
     m = plan%m
     allocate (space%room(lanes*(2*plan%n_element + 2*m + 5*n*n + 1)), space%low_room(lanes*(m*m + 1)), &
-              space%scale(2, m*m), space%hint(padded(m)), space%from(n*n), space%gamma(m, m), space%found(n, n), stat=stat)
+              space%scale(2, m*m), space%hint(padded(m)), space%from(n*n), space%gamma(m, m), space%found(n, n), &
+              stat=stat)
     if (stat /= 0) return
     call identify_one(plan, space%gamma, space%lapack, space%found, no_code, no_rcond)     ! counts what it takes
     call space%lapack%set_up(stat)

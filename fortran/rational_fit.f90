@@ -13,6 +13,7 @@ module jointfrf_rational_fit
   use jointfrf_line_layout, only: all_finite
   use jointfrf_sharing, only: share, shared_work, threads_for
   use jointfrf_status, only: info_good, info_no_memory
+  use jointfrf_traps, only: hold_all_traps, host_state, release_all_traps
   implicit none
   private
   public :: rational_fit, relocate_poles
@@ -261,6 +262,7 @@ contains
     type(orthonormal_basis), intent(inout) :: basis
     integer, intent(out) :: stat
 
+    ! allow(C181): the caller looks at it
     allocate (basis%psi(n_freq, n), basis%triangle(n, n), basis%numbers(n), basis%mean_weight(n_freq), stat=stat)
   end subroutine prepare_basis
 
@@ -269,6 +271,7 @@ contains
     type(zero_space), intent(inout) :: space
     integer, intent(out) :: stat
 
+    ! allow(C181): the caller looks at it
     allocate (space%sigma(n, 1), space%found(n, 1), space%back(n, n), space%matrix(n - 1, n - 1), space%moved(n - 1), &
               space%work(4*n), space%real_work(2*n), space%pivot(n), stat=stat)
   end subroutine prepare_zeros
@@ -501,8 +504,9 @@ contains
     n = int(self%n, blas_ip)
     m = self%n_entries
     do e = int(first), int(last)
-      associate (form => self%forms(:, :, e), sums => self%gram%sums, own => self%work(:, :, 1, thread), &
-                 mixed => self%work(:, :, 2, thread), solved => self%work(:, :, 3, thread), pivot => self%pivot(:, thread))
+      associate (form => self%forms(:, :, e), sums => self%gram%sums, pivot => self%pivot(:, thread), &
+                 own => self%work(:, :, 1, thread), mixed => self%work(:, :, 2, thread), &
+                 solved => self%work(:, :, 3, thread))
         call own_gram(self%gram, e, own)
         do k = 1, self%gram%n_pairs
           associate (i => self%gram%first(k), j => self%gram%second(k), right => sums(m + e, :, k), &
@@ -531,6 +535,7 @@ contains
     type(zero_space), intent(inout) :: space
     complex(dp), contiguous, intent(inout) :: poles(:)
     integer(ip), intent(out) :: info
+    type(host_state) :: host
     complex(dp) :: no_left(1), no_right(1)
     real(dp) :: trace, least
     integer(blas_ip) :: n, m, stat
@@ -561,8 +566,10 @@ contains
         info = 1
         return
       end if
+      call hold_all_traps(host)
       call zgeev('N', 'N', m, matrix, m, moved, no_left, 1_blas_ip, no_right, 1_blas_ip, space%work, &
                  size(space%work, kind=blas_ip), space%real_work, stat, 1_c_size_t, 1_c_size_t)
+      call release_all_traps(host)
       if (stat /= 0) then
         info = 1
         return

@@ -195,17 +195,33 @@ fail() {
   exit 1
 }
 
+# A process of another user cannot be sent a signal, and is alive.
+is_alive() {
+  said=$(LC_ALL=C kill -0 "$1" 2>&1) && return
+  case $said in *ermitted*) return 0 ;; esac
+  ps -p "$1" >/dev/null 2>&1
+}
+
+# Takes away the lock of a dead holder, which of several waiters may be done by one only: by who holds the lock of that
+# name, which may have been left by a dead waiter itself.
+# break_lock LOCK HOLDER
+break_lock() {
+  if ln -s $$ "$1.$2" 2>/dev/null; then
+    [ "$(readlink "$1" 2>/dev/null)" != "$2" ] || rm -f "$1"
+    rm -f "$1.$2"
+  else
+    set -- "$1.$2" "$(readlink "$1.$2" 2>/dev/null)"
+    if [ "$2" ] && ! is_alive "$2"; then break_lock "$@"; fi
+  fi
+}
+
 # The lock is a link to the number of the process that holds it: made in one step, and a dead holder is seen.
 take_lock() {
   holder=
   until ln -s $$ "$lock" 2>/dev/null; do
     [ "$holder" ] || say "another set-up is running, waiting for it"
     holder=$(readlink "$lock" 2>/dev/null) || continue
-    if kill -0 "$holder" 2>/dev/null; then
-      sleep 1
-    else
-      rm -f "$lock"
-    fi
+    if is_alive "$holder"; then sleep 1; else break_lock "$lock" "$holder"; fi
   done
   beside=
   trap '[ -z "$beside" ] || kill "$beside" 2>/dev/null; rm -f "$lock"' EXIT

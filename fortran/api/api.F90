@@ -13,8 +13,8 @@
 !> rcond       shape (n_freq), reciprocal condition number of the worst matrix inverted in the line; 0 in a bad line, 1
 !>             where nothing is inverted. In the 1-norm with |re| + |im| for the modulus, within a factor 2 of the true
 !>             one; an estimate where the fast engines solve, and for large or banded matrices
-!> info        0 good; -i argument i is wrong and nothing was done; > 0 number of bad lines; -1000 no memory; -1001 the
-!>             environment variable JOINTFRF_ENGINE names an engine that is not there, and nothing was done
+!> info        0 good; -i argument i is wrong and nothing was done; > 0 number of bad lines; -1000 no memory and nothing
+!>             was done; -1001 the environment variable JOINTFRF_ENGINE names an engine that is not there, likewise
 !> work        of jf_NAME_work: workspace, shape (max(1, lwork)); after a query work(1) is the least lwork that will do,
 !>             otherwise what the lines took of it
 !> lwork       length of work; -1 here or in liwork is a query: the arguments are checked, both least lengths are given

@@ -5,7 +5,7 @@ module jointfrf_traps
   use, intrinsic :: iso_c_binding, only: c_int64_t
   implicit none
   private
-  public :: host_state, hold_traps, release_traps
+  public :: host_state, hold_all_traps, hold_traps, release_all_traps, release_traps
 
   type, bind(C) :: host_state
     private
@@ -19,6 +19,20 @@ module jointfrf_traps
       implicit none
       type(host_state), intent(out) :: host
     end subroutine hold_traps
+
+    !> The same where LAPACK computes eigenvalues, in units of the processor that nothing else uses.
+    subroutine hold_all_traps(host) bind(C, name='jointfrf_hold_all_traps')
+      import :: host_state
+      implicit none
+      type(host_state), intent(out) :: host
+    end subroutine hold_all_traps
+
+    !> The state of this thread is that of `host` again, as it was before `hold_all_traps`.
+    subroutine release_all_traps(host) bind(C, name='jointfrf_release_all_traps')
+      import :: host_state
+      implicit none
+      type(host_state), intent(in) :: host
+    end subroutine release_all_traps
 
     !> The state of this thread is that of `host` again.
     subroutine release_traps(host) bind(C, name='jointfrf_release_traps')

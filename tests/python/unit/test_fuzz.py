@@ -1,6 +1,10 @@
 """The attack of tests/fuzz in its short form: a few seconds of each part."""
 
+import os
+import shutil
+import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -117,6 +121,54 @@ def test_two_set_ups_at_an_odd_place_take_turns(tmp_path, name):
         assert process.returncode == 1
         assert "PYTHON=/nowhere/python is not Python 3.11 or newer" in text
     assert [path.name for path in (clone / "build").iterdir()] == ["set-up.log"]
+
+
+def lock_functions() -> str:
+    """What the script says of its lock."""
+    script = (drills.ROOT / "python" / "bootstrap.sh").read_text()
+    start = script.index("# A process of another user")
+    return "set -eu\nsay() { :; }\n" + script[start : script.index("# -----", start)]
+
+
+@linux
+def test_of_several_that_wait_for_a_dead_one_one_goes_on(tmp_path):
+    """All have seen that the holder is dead before the first of them takes the lock away."""
+    gone = subprocess.Popen(["true"])
+    gone.wait()
+    slow = tmp_path / "bin" / "readlink"
+    slow.parent.mkdir()
+    slow.write_text(f'#!/bin/sh\n{shutil.which("readlink")} "$@"; status=$?; sleep 0.3; exit $status\n')
+    slow.chmod(0o755)
+    lock = tmp_path / "lock"
+    work = f"""{lock_functions()}
+lock={lock}
+take_lock
+mkdir {tmp_path}/busy || echo "two at a time"
+sleep 0.5
+rmdir {tmp_path}/busy
+"""
+    environment = os.environ | {"PATH": f"{slow.parent}:{os.environ['PATH']}"}
+    for left in ([], [tmp_path / f"lock.{gone.pid}"]):  # another waiter died when it was about to take it away
+        for link in [lock, *left]:
+            link.symlink_to(str(gone.pid))
+        waiters = []
+        for _ in range(3):
+            waiters.append(subprocess.Popen(["sh", "-c", work], stdout=subprocess.PIPE, text=True, env=environment))
+            time.sleep(0.1)
+        for process in waiters:
+            assert (process.communicate(timeout=60)[0], process.returncode) == ("", 0)
+        assert not [path.name for path in tmp_path.iterdir() if path.name.startswith("lock")]
+
+
+@linux
+def test_a_set_up_of_another_user_is_alive():
+    """No signal may be sent to it: process 1 is that of root, for root of nobody else."""
+    gone = subprocess.Popen(["true"])
+    gone.wait()
+    work = f"{lock_functions()}\nif is_alive 1; then echo alive; fi\nif is_alive {gone.pid}; then echo undead; fi\n"
+    other = {"user": 65534, "group": 65534, "extra_groups": []} if os.getuid() == 0 else {}
+    done = subprocess.run(["sh", "-c", work], capture_output=True, text=True, timeout=60, check=True, cwd="/", **other)
+    assert done.stdout.split() == ["alive"]
 
 
 @linux
