@@ -14,12 +14,14 @@ from jointfrf.toml.table import TomlTable
 
 __all__ = ["LAW_VALUES", "LAW_WORDS", "law_line", "read_law", "takes_in_words"]
 
+#: Word of a file to its law.
 _MAKERS: Mapping[str, Callable[..., JointLaw]] = {
     "spring": SpringLaw,
     "standard-linear-solid": StandardLinearSolid,
     "fractional-zener": FractionalZener,
     "power": PowerLaw,
 }
+#: Word to the parameters that the law takes.
 _TAKES: Mapping[str, tuple[str, ...]] = {
     "spring": ("k", "c", "h"),
     "standard-linear-solid": ("k", "k_m", "tau"),
@@ -84,7 +86,7 @@ def law_line(law: JointLaw) -> str:
     Raises
     ------
     ValueError
-        A law of one's own: a file cannot hold a function.
+        A user-defined law: a file cannot hold a function.
     """
     word = next((word for word, maker in _MAKERS.items() if type(law) is maker), None)
     if word is None:

@@ -45,7 +45,7 @@ def interpolation(
     elements : array_like of int, optional
         Bricks that are searched, counted from 0: a body, where two of them touch. All by default.
     tolerance : float
-        How far a point may lie off the bricks, m; the nearest point of a brick stands for it.
+        How far a point may lie off the bricks, m; the nearest point of a brick is taken for it.
 
     Returns
     -------
@@ -55,12 +55,12 @@ def interpolation(
     Raises
     ------
     ValueError
-        A point that lies off the bricks, a direction that is none.
+        A point that lies off the bricks, an invalid direction.
 
     Notes
     -----
     Trilinear functions of the eight nodes; the inner functions of "incompatible" bricks vanish there and are left out.
-    Facets stand for round faces: between their nodes a hole is a little narrower than its circle.
+    Facets replace round faces: between their nodes a hole is a little narrower than its circle.
 
     Examples
     --------

@@ -261,12 +261,12 @@ def _as_kind(value: Any, kind: Any, pa: Any) -> Any:
 def _tidy(group: GroupRecord, first: int, estimates: Estimates) -> dict[str, Any]:
     """Return a chunk as columns of the same length: realisation after realisation."""
     count = len(estimates.values)
-    told = {
+    texts = {
         name: [getattr(column, name) for column in group.columns] * count for name in ("estimator", "parameter", "unit")
     }
     return {
         "noise": [group.noise] * (count * len(group.columns)),
-        **told,
+        **texts,
         "realisation": np.repeat(np.arange(first, first + count), len(group.columns)),
         "actual": np.tile([column.actual for column in group.columns], count),
         "value": estimates.values.ravel(),
@@ -286,14 +286,14 @@ class _Member(NamedTuple):
 
 def write_npz_of(store: StudyStore, record: StudyRecord, path: Path) -> Path:
     """Write the realisations of each group as arrays, a chunk at a time."""
-    told = [
+    groups = [
         {"point": dict(group.point), "noise": group.noise, "in_words": in_words(group.point),
          "columns": [[column.estimator, column.parameter, column.unit] for column in group.columns]}
         for group in record.groups
     ]  # fmt: skip
     with written_whole(path) as temporary, zipfile.ZipFile(temporary, "w") as archive:
         with archive.open("groups.npy", "w") as file:
-            np.lib.format.write_array(file, np.array(json.dumps(told)))
+            np.lib.format.write_array(file, np.array(json.dumps(groups)))
         for number, group in enumerate(record.groups):
             rows = sum(len(estimates.values) for _, estimates in store.chunks(number))
             for member in _members(number, rows, len(group.columns)):

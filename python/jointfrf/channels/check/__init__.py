@@ -1,1 +1,1 @@
-"""A look at measured FRFs before a fit: bad lines, bad channels, quantity, sign, gain, delay."""
+"""Checks of measured FRFs before a fit: bad lines, bad channels, quantity, sign, gain, delay."""
