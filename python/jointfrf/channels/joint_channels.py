@@ -21,6 +21,7 @@ from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_real, check_t
 __all__ = ["ChannelAgreement", "JointChannels", "SideAgreement", "joint_channels", "node_dofs"]
 
 _Kind = Literal["response", "excitation"]
+#: Sides of the joint, on A and on B.
 _SIDES: tuple[JointSide, JointSide] = ("j", "k")
 #: Directions of channels in the order of `DIRECTIONS`.
 _CHANNELS = ("x", "y", "z", "rx", "ry", "rz")

@@ -12,7 +12,6 @@ from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
 __all__ = ["LeftOutDof", "OffsetCoupling", "left_out_dofs", "offset_couplings"]
 
-_SIDES = "jk"
 #: Geometry below this share of the reach of the channels is rounding.
 _NOTHING = 1e-6
 #: The channels show a DOF when it is known to this part of a unit.
@@ -169,7 +168,7 @@ def left_out_dofs(h: ComplexArray, interface: Interface) -> tuple[LeftOutDof, ..
             shares = abs(weight) * size[d] / np.maximum(of_kept, np.finfo(float).tiny)
             most = int((shares if shown[d] else relative).argmax())
             share = float(shares[most]) if shown[d] else np.nan
-            found.append(LeftOutDof(_SIDES[side], dof, interface.dofs[most], float(weight[most]), share))
+            found.append(LeftOutDof("jk"[side], dof, interface.dofs[most], float(weight[most]), share))
     return tuple(found)
 
 

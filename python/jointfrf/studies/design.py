@@ -34,6 +34,7 @@ __all__ = [
 ]
 
 Arrangement = Literal["full", "one-at-a-time"]
+#: What a factor may be set to: the kinds of a TOML value.
 FactorValue = float | int | str | bool
 #: A point of a design: factor to value.
 StudyPoint = Mapping[str, FactorValue]

@@ -38,6 +38,7 @@ def study_figures(record: StudyRecord, summary: Sequence[ParameterSummary]) -> l
     return [figure for figure in figures if not all(panel.is_blank for panel in figure.panels)]
 
 
+#: Captions, of the factor named.
 _RMSE = "Root-mean-square error over {}"
 _BOUND = ", and least standard deviation of an unbiased estimate (Cramér-Rao bound)"
 _COVERAGE = (

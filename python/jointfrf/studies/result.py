@@ -133,7 +133,7 @@ class StudyResult:
         MissingPackageError
             matplotlib or jinja2 is not installed.
         """
-        return write_report_of(self.folder, self.record, self.table, self.figures, self.to_dict())
+        return _write_report(self.folder, self.record, self.table, self.figures, self.to_dict())
 
     def save_parquet(self, path: str | Path) -> Path:
         """Write single realisations as a Parquet file, a row for each estimate; memory does not depend on their number.
@@ -151,7 +151,7 @@ class StudyResult:
         MissingPackageError
             pyarrow is not installed.
         """
-        return write_parquet_of(self._store, self.record, Path(path))
+        return _write_parquet(self._store, self.record, Path(path))
 
     def save_npz(self, path: str | Path) -> Path:
         """Write single realisations as an NPZ file; memory does not depend on their number.
@@ -166,7 +166,7 @@ class StudyResult:
         -------
         Path
         """
-        return write_npz_of(self._store, self.record, Path(path))
+        return _write_npz(self._store, self.record, Path(path))
 
     def __str__(self) -> str:
         """Return the summary as text."""
@@ -193,7 +193,7 @@ def read_study(folder: str | Path) -> StudyResult:
     return StudyResult(Path(folder))
 
 
-def write_report_of(
+def _write_report(
     folder: Path, record: StudyRecord, table: Table, figures: Sequence[Figure], content: Mapping[str, Any]
 ) -> Path:
     """Write the page of a study and, beside it, its numbers, table and figures."""
@@ -228,7 +228,7 @@ def _about(record: StudyRecord) -> str:
     )
 
 
-def write_parquet_of(store: StudyStore, record: StudyRecord, path: Path) -> Path:
+def _write_parquet(store: StudyStore, record: StudyRecord, path: Path) -> Path:
     """Write a row for each realisation and column, a chunk at a time."""
     pa, parquet = import_extra("pyarrow"), import_extra("pyarrow.parquet")
     factors = list(dict.fromkeys(name for group in record.groups for name in group.point))
@@ -284,7 +284,7 @@ class _Member(NamedTuple):
     part: Callable[[int, Estimates], NDArray[Any]]
 
 
-def write_npz_of(store: StudyStore, record: StudyRecord, path: Path) -> Path:
+def _write_npz(store: StudyStore, record: StudyRecord, path: Path) -> Path:
     """Write the realisations of each group as arrays, a chunk at a time."""
     groups = [
         {"point": dict(group.point), "noise": group.noise, "in_words": in_words(group.point),

@@ -219,4 +219,5 @@ def _by_mumps(matrix: Any) -> Factors:
     return Factors(solve, np.iscomplexobj(matrix), "MUMPS")
 
 
+#: Libraries beside SuperLU, which serves where they do not.
 _MAKERS: Final[dict[Library, Callable[[Any], Factors]]] = {"PARDISO": _by_pardiso, "MUMPS": _by_mumps}
