@@ -17,7 +17,7 @@ from jointfrf.solids.contact_pairs import NORMAL, TANGENTIAL, BoolArray, Contact
 
 __all__ = ["ContactInterface", "ContactLaw", "ContactSolution", "InterfaceState", "Iteration", "solve_contact"]
 
-#: A tension or penetration is none below this share of the largest normal force or relative displacement.
+#: Tension and penetration count as zero below this share of the largest normal force or relative displacement.
 _ROUNDING: Final = 1e-9
 #: Friction forces of slipping pairs must repeat to this share of the largest normal force.
 _REPEAT: Final = 1e-6
