@@ -30,6 +30,7 @@ __all__ = [
 #: The six directions of a point: displacements, then rotations, right-handed.
 DIRECTIONS = ("x", "y", "z", "theta_x", "theta_y", "theta_z")
 
+#: How names of directions begin, before the axis, in small letters; u, f and m as in files and in the thesis.
 _AXES = "xyz"
 _TRANSLATIONS = ("", "u", "u_", "f")
 _ROTATIONS = ("theta_", "theta", "r", "rot_", "rot", "m", "mtheta_", "mtheta")
@@ -37,7 +38,7 @@ _ROTATIONS = ("theta_", "theta", "r", "rot_", "rot", "m", "mtheta_", "mtheta")
 _PLACES = {prefix + axis: i for prefix in _TRANSLATIONS for i, axis in enumerate(_AXES)} | {
     prefix + axis: 3 + i for prefix in _ROTATIONS for i, axis in enumerate(_AXES)
 }
-#: A rotation whose axis the name need not tell, as in a plane: theta, Mtheta, rot1.
+#: A rotation whose axis the name may leave out, as in a plane: theta, Mtheta, rot1.
 _ROTATION = re.compile(r"m?(theta|phi|rot|r[xyz])", re.IGNORECASE)
 
 #: Stiffness k, hysteretic stiffness h = eta k, viscous damping c of K*(w) = k + i h + i w c.
@@ -151,7 +152,7 @@ def direction_names(dofs: Sequence[str]) -> tuple[str, ...]:
 
 
 def direction_places(dofs: Sequence[str]) -> NDArray[np.intp]:
-    """Return where each DOF stands among `DIRECTIONS`, counted from 0, shape (n,).
+    """Return the place of each DOF among `DIRECTIONS`, counted from 0, shape (n,).
 
     Small or capital letters; x, ux, u_x and the thesis' Fx are displacements; theta_x, thetax, rx, rot_x, Mx and the
     thesis' Mtheta_x rotations.

@@ -38,7 +38,7 @@ class Joint:
     loss_factor : float or array_like, shape (n,)
         Hysteretic loss factor eta of each DOF; eta_ab = sqrt(eta_a eta_b) for a full matrix.
     structural_damping : array_like, shape (n,) or (n, n), optional
-        Hysteretic damping H where loss factors cannot say it; N/m, rotational N m/rad.
+        Hysteretic damping H where loss factors cannot express it; N/m, rotational N m/rad.
 
     Raises
     ------
@@ -148,7 +148,7 @@ class Joint:
         Raises
         ------
         ValueError
-            DOFs whose names do not tell a direction, a wrong shape, NaN or Inf.
+            DOFs whose names do not name a direction, a wrong shape, NaN or Inf.
 
         Notes
         -----
@@ -200,9 +200,9 @@ class Joint:
         Raises
         ------
         ValueError
-            DOFs whose names do not tell a direction; matrices that are not symmetric; numbers out of range; what
-            the program has no word for: damping in CalculiX, hysteretic damping in Ansys, rotations of CalculiX without
-            `rotation_nodes`.
+            DOFs whose names do not name a direction; matrices that are not symmetric; numbers out of range; what
+            the program does not support: damping in CalculiX, hysteretic damping in Ansys, rotations of CalculiX
+            without `rotation_nodes`.
 
         Notes
         -----

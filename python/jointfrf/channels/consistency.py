@@ -107,8 +107,9 @@ def sensor_consistency(h: ArrayLike, point: VirtualPoint) -> Consistency:
     left = _power(weight * _square(residual), 2)
     explained[:, checked] = left[:, checked] / redundancy[checked]
     whole = left.sum(axis=1, keepdims=True)
-    told = whole > _ROUND_OFF**2 * _power(weight * _square(measured), (1, 2))[:, None]
-    blame = np.divide(explained, whole, out=np.zeros_like(explained), where=np.broadcast_to(told, explained.shape))
+    above_rounding = whole > _ROUND_OFF**2 * _power(weight * _square(measured), (1, 2))[:, None]
+    where = np.broadcast_to(above_rounding, explained.shape)
+    blame = np.divide(explained, whole, out=np.zeros_like(explained), where=where)
     return Consistency(overall, specific, blame)
 
 

@@ -21,7 +21,9 @@ from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_real, check_t
 __all__ = ["ChannelAgreement", "JointChannels", "SideAgreement", "joint_channels", "node_dofs"]
 
 _Kind = Literal["response", "excitation"]
+#: Sides of the joint, on A and on B.
 _SIDES: tuple[JointSide, JointSide] = ("j", "k")
+#: Directions of channels in the order of `DIRECTIONS`.
 _CHANNELS = ("x", "y", "z", "rx", "ry", "rz")
 
 
@@ -33,7 +35,7 @@ class ChannelAgreement:
     ----------
     channel : Channel
     consistency : float
-        Median over lines of the specific consistency, 0 to 1; 1: the channel moves as the others say.
+        Median over lines of the specific consistency, 0 to 1; 1: the channel moves as the others predict.
     blame : float
         Mean over lines of the share of the inconsistency of its side that is gone without it, 0 to 1; NaN where the
         other channels cannot check it.
@@ -105,7 +107,7 @@ class JointChannels:
         return frfs.matrix(self.responses.channels, self.forces.channels)
 
     def agreement(self, h: ComplexArray) -> tuple[SideAgreement, ...]:
-        """Sensor and impact consistency of both sides, and what each channel has to do with it.
+        """Sensor and impact consistency of both sides, and the part of each channel in it.
 
         Parameters
         ----------
@@ -218,7 +220,7 @@ def _counts(place: ChannelPlace, kind: str, known: Sequence[Channel]) -> bool:
 
 
 def _check_known(frfs: FrfSet, places: Sequence[ChannelPlace]) -> None:
-    """Check that each channel has a side, is a translation, stands once, and is in the set."""
+    """Check that each channel has a side, is a translation, is listed once, and is in the set."""
     check_type("frfs", frfs, FrfSet)
     seen: dict[tuple[int, str, str], ChannelPlace] = {}
     for place in places:
@@ -231,7 +233,7 @@ def _check_known(frfs: FrfSet, places: Sequence[ChannelPlace]) -> None:
         for kind in ("response", "excitation") if place.role == "both" else (place.role,):
             key = place.channel.node, place.channel.axis, kind
             if key in seen:
-                raise ValueError(f"{where}channel {place.channel} stands there twice as {kind}")
+                raise ValueError(f"{where}channel {place.channel} is listed twice as {kind}")
             seen[key] = place
         known = {
             "response": frfs.responses,

@@ -1,4 +1,4 @@
-"""DOFs of an interface that are not asked for, but whose motion the channels take for one that is."""
+"""DOFs left out of an interface whose motion the channels attribute to a DOF that is kept."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
 __all__ = ["LeftOutDof", "OffsetCoupling", "left_out_dofs", "offset_couplings"]
 
-_SIDES = "jk"
 #: Geometry below this share of the reach of the channels is rounding.
 _NOTHING = 1e-6
 #: The channels show a DOF when it is known to this part of a unit.
@@ -30,7 +29,7 @@ class LeftOutDof(NamedTuple):
     ----------
     side : {"j", "k"}
     dof, into : str
-        The DOF left out, and the one that its motion is taken for.
+        The DOF left out, and the one that its motion is attributed to.
     weight : float
         Of its motion there: 1, m, 1/m.
     share : float
@@ -89,7 +88,7 @@ class OffsetCoupling(NamedTuple):
 
 
 def offset_couplings(interface: Interface) -> tuple[OffsetCoupling, ...]:
-    """Find the rotations that reference points which are apart turn into displacements of the joint.
+    """Find the rotations that an offset of the reference points turns into displacements of the joint.
 
     Parameters
     ----------
@@ -128,7 +127,7 @@ def offset_couplings(interface: Interface) -> tuple[OffsetCoupling, ...]:
 
 
 def left_out_dofs(h: ComplexArray, interface: Interface) -> tuple[LeftOutDof, ...]:
-    """Find the DOFs whose motion goes into others.
+    """Find the DOFs left out whose motion enters DOFs that are kept.
 
     Parameters
     ----------
@@ -169,7 +168,7 @@ def left_out_dofs(h: ComplexArray, interface: Interface) -> tuple[LeftOutDof, ..
             shares = abs(weight) * size[d] / np.maximum(of_kept, np.finfo(float).tiny)
             most = int((shares if shown[d] else relative).argmax())
             share = float(shares[most]) if shown[d] else np.nan
-            found.append(LeftOutDof(_SIDES[side], dof, interface.dofs[most], float(weight[most]), share))
+            found.append(LeftOutDof("jk"[side], dof, interface.dofs[most], float(weight[most]), share))
     return tuple(found)
 
 

@@ -15,6 +15,7 @@ from jointfrf.kernel.arguments import FloatArray, as_names, as_nodes, as_real
 
 __all__ = ["Interface", "interface"]
 
+#: Axes of translations; the place of a rotation's axis is less by their number.
 _AXES = DIRECTIONS[:3]
 #: Points count as lying on a line along an axis when they stray from it by less than this share of its length.
 _STRAY = 1e-3

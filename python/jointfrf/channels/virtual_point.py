@@ -24,7 +24,7 @@ __all__ = [
     "virtual_points",
 ]
 
-#: A motion that the channels show this many times more weakly than the best one is not seen.
+#: A motion whose singular value is below this share of the largest counts as not observed.
 _UNSEEN = 1e-6
 #: Directions may be rounded: their length may differ from one by this.
 _UNIT = 1e-2
@@ -115,14 +115,14 @@ def virtual_point(
     ------
     ValueError
         Wrong shapes, names, directions or weights; fewer channels than DOFs; DOFs that the channels do not show, or
-        cannot tell apart: they are named.
+        cannot distinguish: they are named.
 
     Notes
     -----
     A channel at r from the point with direction e shows e . (t + theta x r), so that its row of R is [e, r x e]. Its
     transpose takes forces at the channels to force and moment at the point, R^T f = m, and T^T distributes them back
     with least squares. The receptance of the point is T_u H T_f^T (`jointfrf.transform`); T_u and T_f may come from
-    different channels. What is not rigid motion is averaged out: `sensor_consistency` tells how much that is.
+    different channels. What is not rigid motion is averaged out: `sensor_consistency` measures how much that is.
 
     References
     ----------
@@ -367,5 +367,5 @@ def _check_seen(names: tuple[str, ...], size: FloatArray, right: FloatArray) -> 
     unseen = [name for name, part in zip(names, share, strict=True) if part > 1 - _UNSEEN]
     mixed = [name for name, part in zip(names, share, strict=True) if _UNSEEN < part <= 1 - _UNSEEN]
     faults = [f"do not show {', '.join(unseen)}"] if unseen else []
-    faults += [f"cannot tell {', '.join(mixed)} apart"] if mixed else []
+    faults += [f"cannot distinguish {', '.join(mixed)}"] if mixed else []
     raise ValueError(f"dofs: the channels {' and '.join(faults)}")

@@ -1,4 +1,4 @@
-"""A law of one's own: a function with its derivatives."""
+"""A user-defined law: a function with its derivatives."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _PLACES = 2 * np.pi * np.array([3.0, 30.0, 300.0])
 
 @dataclass(frozen=True, init=False)
 class FunctionLaw(JointLaw):
-    """K*(w) as a function of one's own.
+    """K*(w) as a user-defined function.
 
     Parameters
     ----------

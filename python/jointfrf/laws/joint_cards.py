@@ -10,6 +10,7 @@ from jointfrf.joint import Joint
 
 __all__ = ["joint_cards"]
 
+#: Ansys' names of `DIRECTIONS`.
 _ANSYS = ("UX", "UY", "UZ", "ROTX", "ROTY", "ROTZ")
 
 
@@ -27,7 +28,7 @@ def joint_cards(
     comment = {"abaqus": "**", "calculix": "**", "nastran": "$", "ansys": "!"}.get(program, "")
     number = options.get("number", 1)
     if (rigid or mass) and options.get("positions") is not None:
-        raise ValueError("equations of rigid DOFs and masses stand at the nodes: leave positions out")
+        raise ValueError("equations of rigid DOFs and point masses are written at the nodes: leave positions out")
     parts = [f"{comment} {note}: stiffness and hysteretic damping of that frequency hold there only\n"] if note else []
     last = options.get("element", 1)
     if springs is not None:

@@ -17,7 +17,9 @@ from jointfrf.toml.table import TomlTable
 
 __all__ = ["JOINT_KEYS", "LAW_JOINT_KEYS", "joint_text", "read_joint_table"]
 
+#: Reference point, which `read_joint_table` leaves to its caller.
 _AT = Key("at", "list of three numbers", "Reference point.", "m", "not known")
+#: Keys of a joint by constants.
 JOINT_KEYS = KeyTable(
     "joint.toml",
     "A joint by its constants; matrices are lists of lists.",
@@ -31,6 +33,7 @@ JOINT_KEYS = KeyTable(
         _AT,
     ),
 )  # fmt: skip
+#: Keys of one law.
 _LAW = KeyTable(
     "[[law]], in joint.toml",
     "The law of a joint DOF, or of a pair of DOFs.",
@@ -46,6 +49,7 @@ _LAW = KeyTable(
             "kg, kg m^2", "0"),
     ),
 )  # fmt: skip
+#: Keys of a joint of laws.
 LAW_JOINT_KEYS = KeyTable(
     "joint.toml of laws",
     "A joint by a law for each DOF, in the order of its DOFs.",
@@ -105,7 +109,7 @@ def joint_text(joint: Joint | LawJoint) -> str:
     Raises
     ------
     ValueError
-        A law of one's own: a file cannot hold a function.
+        A user-defined law: a file cannot hold a function.
     """
     return _text_of_laws(joint) if isinstance(joint, LawJoint) else _text_of_constants(joint)
 

@@ -1,4 +1,4 @@
-"""A law of a joint DOF: K*(w) from a few parameters, its derivatives, and values to start a fit from."""
+"""A law of a joint DOF: K*(w) from a few parameters, its derivatives, and initial values for a fit."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_real, one_lin
 
 __all__ = ["FieldKind", "JointLaw", "LawField"]
 
-#: What a parameter of a law is; it sets the unit.
+#: Kind of a parameter of a law; it sets the unit.
 FieldKind = Literal["stiffness", "damping", "time", "number"]
 
-#: By how much a value that starts a fit stays inside its bounds, as a share of it.
+#: By how much an initial value of a fit stays inside its bounds, as a share of it.
 _INSIDE = 1e-6
 
 
@@ -49,7 +49,7 @@ class LawField(NamedTuple):
 
     @property
     def is_factor(self) -> bool:
-        """Whether K*(w) is proportional to it, the others but its like being zero."""
+        """Whether K*(w) is proportional to it where all other factors are zero."""
         return self.kind in ("stiffness", "damping")
 
 
@@ -101,7 +101,7 @@ class JointLaw(ABC):
         return choices
 
     def started(self, omega: FloatArray, k_lines: ComplexArray, weight: FloatArray | None = None) -> Self:
-        """Return the law with values that come near to K*(w) of single lines.
+        """Return the law with initial values from K*(w) of single lines.
 
         Parameters
         ----------
@@ -127,7 +127,7 @@ class JointLaw(ABC):
         for numbers in itertools.product(*self.trial_numbers(own_omega)):
             values = np.zeros(len(fields))
             values[others] = numbers
-            basis = np.array([self._of_one(values, i).stiffness(own_omega) for i in factors]).T * root[:, None]
+            basis = np.array([self._unit_factor(values, i).stiffness(own_omega) for i in factors]).T * root[:, None]
             solved = _least_squares(basis, target * root)
             values[factors] = [
                 _within(value, fields[i], float(np.median(abs(target))))
@@ -139,7 +139,7 @@ class JointLaw(ABC):
                 best, least = trial, misfit
         return best
 
-    def _of_one(self, values: FloatArray, i: int) -> Self:
+    def _unit_factor(self, values: FloatArray, i: int) -> Self:
         """Return the law with one factor of 1, the others as small as they may be."""
         own = values.copy()
         for place, field in enumerate(self.fields):

@@ -333,7 +333,7 @@ class LawJoint:
         ------
         ValueError
             What the program cannot represent: a law that depends on frequency without `freq_hz`; masses that differ by
-            direction or turn; what `Joint.export` refuses.
+            direction, or rotary inertia; what `Joint.export` rejects.
 
         Examples
         --------

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from dataclasses import fields
 from typing import Any
 
 from jointfrf.laws.law import JointLaw
@@ -14,19 +15,17 @@ from jointfrf.toml.table import TomlTable
 
 __all__ = ["LAW_VALUES", "LAW_WORDS", "law_line", "read_law", "takes_in_words"]
 
-_MAKERS: Mapping[str, Callable[..., JointLaw]] = {
+#: Word of a file to its law.
+_LAWS: Mapping[str, type[SpringLaw | StandardLinearSolid | FractionalZener | PowerLaw]] = {
     "spring": SpringLaw,
     "standard-linear-solid": StandardLinearSolid,
     "fractional-zener": FractionalZener,
     "power": PowerLaw,
 }
+#: Word to the parameters that the law takes: the numbers that make it.
 _TAKES: Mapping[str, tuple[str, ...]] = {
-    "spring": ("k", "c", "h"),
-    "standard-linear-solid": ("k", "k_m", "tau"),
-    "fractional-zener": ("k", "k_m", "tau", "alpha"),
-    "power": ("k", "k_a", "alpha", "reference_hz"),
-    "rigid": (),
-}
+    word: tuple(field.name for field in fields(law) if field.type == "float") for word, law in _LAWS.items()
+} | {"rigid": ()}
 #: Words of laws; a rigid DOF has none.
 LAW_WORDS = tuple(_TAKES)
 #: Keys of their parameters.
@@ -75,7 +74,7 @@ def read_law(table: TomlTable, word: str, *, is_cross: bool = False) -> JointLaw
     table.close()
     if word == "spring":
         return table.build(lambda: SpringLaw(**values, is_cross=is_cross))
-    return table.build(lambda: _MAKERS[word](**values))
+    return table.build(lambda: _LAWS[word](**values))
 
 
 def law_line(law: JointLaw) -> str:
@@ -84,9 +83,9 @@ def law_line(law: JointLaw) -> str:
     Raises
     ------
     ValueError
-        A law of one's own: a file cannot hold a function.
+        A user-defined law: a file cannot hold a function.
     """
-    word = next((word for word, maker in _MAKERS.items() if type(law) is maker), None)
+    word = next((word for word, kind in _LAWS.items() if type(law) is kind), None)
     if word is None:
         raise ValueError(f"a {type(law).__name__} cannot be written to a file: it is a function")
     named = {name: float(getattr(law, name)) for name in _TAKES[word]}

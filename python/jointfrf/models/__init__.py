@@ -1,1 +1,1 @@
-"""Models of substructures: lumped chains, beams, matrices of one's own; how they become receptances."""
+"""Models of substructures: lumped chains, beams, matrices of the user; how they become receptances."""

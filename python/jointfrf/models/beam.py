@@ -72,7 +72,7 @@ def beam(
     Raises
     ------
     ValueError
-        A dimension that is not positive, or a word that is not known.
+        A dimension that is not positive, or an unknown option.
 
     Examples
     --------

@@ -21,7 +21,7 @@ __all__ = ["Model", "assemble"]
 
 #: Up to this size all modes are computed, beyond it only those asked for.
 _DENSE_LIMIT = 50
-#: -(2 pi 1 Hz)^2
+#: -(2 pi 1 Hz)^2, (rad/s)^2: below zero, so that K - shift M is regular for a free structure, too.
 _SHIFT = -((2 * np.pi) ** 2)
 
 

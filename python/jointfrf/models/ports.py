@@ -52,7 +52,7 @@ class Ports:
         return found.astype(np.int32) + np.int32(1)
 
     def of(self, shapes: NDArray[Any]) -> NDArray[Any]:
-        """Return what the ports see of displacements, shape (n, k) to (m, k)."""
+        """Return the displacements at the ports from those of all DOFs, shape (n, k) to (m, k)."""
         found: NDArray[Any] = self.weights @ shapes if self.picked is None else shapes[self.picked - 1]
         return found
 

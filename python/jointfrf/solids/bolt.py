@@ -10,6 +10,7 @@ from jointfrf.solids.brick import Material
 
 __all__ = ["PROOF_STRENGTH", "STEEL", "STRESS_AREA", "Bolt", "preload_force"]
 
+#: Usual values of steel.
 STEEL: Final = Material(youngs_modulus=210e9, poisson=0.3, density=7850.0, loss_factor=0.01)
 
 #: Proof strength of a property class, Pa: ISO 898-1, Table 3, diameters up to 16 mm.

@@ -19,6 +19,7 @@ from jointfrf.solids.mesh import Mesh, Plan, disc, extrude, join_plans, rectangl
 
 __all__ = ["ALUMINIUM", "BODIES", "INTERFACES", "BoltedLap", "LapDivisions", "bolted_lap"]
 
+#: Material of the beams of case study 2.
 ALUMINIUM: Final = Material(youngs_modulus=70e9, poisson=0.33, density=2700.0, loss_factor=0.01)
 
 Body = Literal["A", "B", "bolt"]
@@ -34,7 +35,7 @@ INTERFACES: Final[dict[str, tuple[Body, Body]]] = {
 _PER_HEIGHT: Final = 1.14
 #: Circles around the head reach this share of the way to the nearest edge.
 _CIRCLES_REACH: Final = 0.6
-#: The worst scaled Jacobian that is let through.
+#: The smallest scaled Jacobian that is accepted.
 _POOR: Final = 0.2
 #: Nodes within this share of the height of a beam are at the same place.
 _NEAR: Final = 1e-6

@@ -18,9 +18,11 @@ __all__ = ["Formulation", "Mass", "Material", "assemble_bricks", "brick_quality"
 Formulation = Literal["reduced", "incompatible", "full"]
 Mass = Literal["consistent", "lumped"]
 
-#: The letters of the kernel.
+#: Letters by which the kernel knows the formulations.
 _LETTERS: Final[dict[Formulation, str]] = {"reduced": "R", "incompatible": "I", "full": "F"}
+#: Status of the kernel for an element whose matrices overflow.
 _OVERFLOW = -2
+#: Nodes and DOFs of a brick.
 _NODES, _DOFS = 8, 24
 
 
@@ -182,7 +184,7 @@ def assemble_bricks(
     Raises
     ------
     ValueError, OverflowError
-        As in `element_matrices`; a node that does not exist, or stands twice in an element.
+        As in `element_matrices`; a node that does not exist, or is named twice by an element.
 
     Notes
     -----
@@ -225,7 +227,7 @@ def brick_quality(nodes: ArrayLike, elements: ArrayLike) -> tuple[FloatArray, Fl
     Raises
     ------
     ValueError
-        NaN or Inf among the nodes; a node that does not exist, or stands twice in an element.
+        NaN or Inf among the nodes; a node that does not exist, or is named twice by an element.
 
     Examples
     --------
@@ -313,7 +315,7 @@ def _checked_mesh(nodes: ArrayLike, elements: ArrayLike) -> tuple[FloatArray, ND
 
 
 class _Pairs:
-    """The pairs of nodes that share an element, and where they stand among the 64 pairs of each element."""
+    """The pairs of nodes that share an element, and their places among the 64 pairs of each element."""
 
     def __init__(self, mesh: NDArray[np.int64], n_nodes: int) -> None:
         pair = (mesh[:, :, None] * n_nodes + mesh[:, None, :]).ravel()

@@ -17,7 +17,7 @@ from jointfrf.solids.contact_pairs import NORMAL, TANGENTIAL, BoolArray, Contact
 
 __all__ = ["ContactInterface", "ContactLaw", "ContactSolution", "InterfaceState", "Iteration", "solve_contact"]
 
-#: A tension or penetration is none below this share of the largest normal force or relative displacement.
+#: Tension and penetration count as zero below this share of the largest normal force or relative displacement.
 _ROUNDING: Final = 1e-9
 #: Friction forces of slipping pairs must repeat to this share of the largest normal force.
 _REPEAT: Final = 1e-6
@@ -73,15 +73,12 @@ class Iteration:
         Pairs whose state the solution contradicts; none in the last iteration.
     residual : float
         Forces out of balance over the largest load.
-    penetration : float
-        Deepest overlap over the largest relative displacement. Rigid contact has none in the last iteration.
     """
 
     closed: int
     slipping: int
     changed: int
     residual: float
-    penetration: float
 
 
 @dataclass(frozen=True)
@@ -215,7 +212,7 @@ class _Problem:
             force = (self.k @ u - self.f)[self.pairs.up]
             relative = u[self.pairs.up] - u[self.pairs.low]
             after = self.judged(contacts, force, relative)
-            history.append(self.record(contacts, after, force, relative, residual))
+            history.append(self.record(contacts, after, force, residual))
             if history[-1].changed == 0:
                 return ContactSolution(u, self.states(contacts, force, relative), tuple(history))
             contacts = after
@@ -311,9 +308,7 @@ class _Problem:
             np.where(slipping & goes_on, limit / length, 0.0),
         )
 
-    def record(
-        self, before: _Contacts, after: _Contacts, force: FloatArray, relative: FloatArray, residual: float
-    ) -> Iteration:
+    def record(self, before: _Contacts, after: _Contacts, force: FloatArray, residual: float) -> Iteration:
         normal = np.maximum(force[:, NORMAL], 0)
         turned = self.law.friction * normal * np.linalg.norm(after.direction - before.direction, axis=1)
         changed = (
@@ -321,13 +316,11 @@ class _Problem:
             | (after.closed & (before.slipping != after.slipping))
             | (turned > _REPEAT * normal.max())
         )
-        overlap = -(self.pairs.gap + relative[:, NORMAL]).min()
         return Iteration(
             closed=int(before.closed.sum()),
             slipping=int((before.closed & before.slipping).sum()),
             changed=int(changed.sum()),
             residual=residual,
-            penetration=float(max(overlap, 0.0) / max(abs(relative).max(), np.finfo(float).tiny)),
         )
 
     def states(self, contacts: _Contacts, force: FloatArray, relative: FloatArray) -> dict[str, InterfaceState]:

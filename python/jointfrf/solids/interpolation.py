@@ -21,7 +21,6 @@ _CORNERS: Final = np.array([[x, y, z] for z in (-1, 1) for x, y in ((-1, -1), (1
 _STEPS: Final = 12
 #: Elements tried for each point, nearest centres first, before all are.
 _FIRST: Final = 16
-_AXES: Final = "xyz"
 
 
 def interpolation(
@@ -45,7 +44,7 @@ def interpolation(
     elements : array_like of int, optional
         Bricks that are searched, counted from 0: a body, where two of them touch. All by default.
     tolerance : float
-        How far a point may lie off the bricks, m; the nearest point of a brick stands for it.
+        How far a point may lie off the bricks, m; the nearest point of a brick is taken for it.
 
     Returns
     -------
@@ -55,12 +54,12 @@ def interpolation(
     Raises
     ------
     ValueError
-        A point that lies off the bricks, a direction that is none.
+        A point that lies off the bricks, an invalid direction.
 
     Notes
     -----
     Trilinear functions of the eight nodes; the inner functions of "incompatible" bricks vanish there and are left out.
-    Facets stand for round faces: between their nodes a hole is a little narrower than its circle.
+    Facets replace round faces: between their nodes a hole is a little narrower than its circle.
 
     Examples
     --------
@@ -94,15 +93,15 @@ def interpolation(
 def _rows(count: int, directions: str | Sequence[str] | ArrayLike) -> tuple[NDArray[np.intp], FloatArray]:
     """Return the point and the unit vector of every row."""
     if isinstance(directions, str):
-        if not directions or any(axis not in _AXES for axis in directions):
+        if not directions or any(axis not in "xyz" for axis in directions):
             raise ValueError(f"directions must be made of x, y and z, not {directions!r}")
-        every = np.eye(3)[[_AXES.index(axis) for axis in directions]]
+        every = np.eye(3)[["xyz".index(axis) for axis in directions]]
         return np.repeat(np.arange(count), len(every)), np.tile(every, (count, 1))
     given = list(directions) if isinstance(directions, Sequence) else directions
     if isinstance(given, list) and any(isinstance(one, str) for one in given):
         if len(given) != count or any(one not in ("x", "y", "z") for one in given):
             raise ValueError(f"directions must name x, y or z for each of the {count} points")
-        return np.arange(count), np.eye(3)[[_AXES.index(one) for one in given]]
+        return np.arange(count), np.eye(3)[["xyz".index(one) for one in given]]
     vectors = as_real("directions", given, (count, 3))
     length = np.linalg.norm(vectors, axis=1)
     if not length.all():

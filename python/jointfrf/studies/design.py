@@ -34,6 +34,7 @@ __all__ = [
 ]
 
 Arrangement = Literal["full", "one-at-a-time"]
+#: What a factor may be set to: the kinds of a TOML value.
 FactorValue = float | int | str | bool
 #: A point of a design: factor to value.
 StudyPoint = Mapping[str, FactorValue]
@@ -47,6 +48,7 @@ _NAMED = {
 }
 #: Units of factors, for tables and axes.
 _UNITS = {"spacing": "Hz", "frequency.step": "Hz", "frequency.first": "Hz", "frequency.last": "Hz"}
+#: One step of a key of a case file: a name, and a number in brackets.
 _STEP = re.compile(r"([^.\[\]]+)((?:\[\d+\])?)")
 
 
@@ -77,7 +79,7 @@ class StudyDesign:
     ValueError
         A factor without values, the same value twice, an unknown arrangement.
     TypeError
-        No mapping of names to values, names that are none, an estimator or a noise that is no function.
+        Not a mapping of names to values, invalid names, an estimator or a noise that is not a function.
 
     Examples
     --------
@@ -140,7 +142,7 @@ class StudyDesign:
             yield point, *read_case_of(folder, table, TomlTable({}, ""))
 
     def identity(self, folder: Path) -> dict[str, Any]:
-        """Return what tells this study from others: the case as its file says it, and the design."""
+        """Return the fields that identify this study: the case as its file has it, and the design."""
         choice = self.choice
         return {
             "case": read_toml(folder / "case.toml").content,
@@ -270,5 +272,5 @@ def _scaled(table: dict[str, Any], name: str, value: FactorValue, where: str) ->
 
 
 def as_text_of(identity: Mapping[str, Any]) -> str:
-    """Write what tells a study from others in one way, whatever the order of its keys."""
+    """Write the fields that identify a study as text, whatever the order of its keys."""
     return json.dumps(identity, sort_keys=True, default=str)

@@ -18,7 +18,7 @@ __all__ = ["study_figures"]
 
 #: Intervals that a panel holds, and panels that a figure holds.
 _MOST_INTERVALS, _MOST_PANELS = 24, 24
-#: Styles of estimators in their order, told apart when printed grey; the last one is that of the bound.
+#: Styles of estimators in their order, distinguishable in grey print; the last one is that of the bound.
 _STYLES = ("ismm-points", "compliance-points", "third-points", "fourth-points", "fifth-points")
 #: Values of a factor that span more than this ratio are drawn over a logarithmic axis.
 _WIDE = 5.0
@@ -38,6 +38,7 @@ def study_figures(record: StudyRecord, summary: Sequence[ParameterSummary]) -> l
     return [figure for figure in figures if not all(panel.is_blank for panel in figure.panels)]
 
 
+#: Captions, of the factor named.
 _RMSE = "Root-mean-square error over {}"
 _BOUND = ", and least standard deviation of an unbiased estimate (Cramér-Rao bound)"
 _COVERAGE = (
@@ -114,8 +115,8 @@ def _over(
         suffix = f"-{number}" if len(others) > 1 else ""
         clean = "".join(c if c.isalnum() else "-" for c in name).strip("-")
         what = factor_label(name).partition(",")[0]
-        told = caption.format(f"the {what}")
-        yield Figure(f"{key}-{clean}{suffix}", told + (f": {heading}" if heading else ""),
+        text = caption.format(f"the {what}")
+        yield Figure(f"{key}-{clean}{suffix}", text + (f": {heading}" if heading else ""),
                      panels, columns=1 if len(panels) < 2 else 2, heading=heading)  # fmt: skip
 
 
@@ -172,7 +173,7 @@ def _coverage_panel(rows: list[ParameterSummary], name: str) -> Panel:
 
 
 def _limits(rows: Sequence[ParameterSummary], name: str) -> tuple[float, float]:
-    """Return limits of the axis of a factor, so that the outer points stand inside."""
+    """Return limits of the axis of a factor, so that the outer points lie inside."""
     values = [float(row.point[name]) for row in rows]
     low, high = min(values), max(values)
     if _is_wide(rows, name):

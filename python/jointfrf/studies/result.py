@@ -133,7 +133,7 @@ class StudyResult:
         MissingPackageError
             matplotlib or jinja2 is not installed.
         """
-        return write_report_of(self.folder, self.record, self.table, self.figures, self.to_dict())
+        return _write_report(self.folder, self.record, self.table, self.figures, self.to_dict())
 
     def save_parquet(self, path: str | Path) -> Path:
         """Write single realisations as a Parquet file, a row for each estimate; memory does not depend on their number.
@@ -151,7 +151,7 @@ class StudyResult:
         MissingPackageError
             pyarrow is not installed.
         """
-        return write_parquet_of(self._store, self.record, Path(path))
+        return _write_parquet(self._store, self.record, Path(path))
 
     def save_npz(self, path: str | Path) -> Path:
         """Write single realisations as an NPZ file; memory does not depend on their number.
@@ -166,7 +166,7 @@ class StudyResult:
         -------
         Path
         """
-        return write_npz_of(self._store, self.record, Path(path))
+        return _write_npz(self._store, self.record, Path(path))
 
     def __str__(self) -> str:
         """Return the summary as text."""
@@ -193,7 +193,7 @@ def read_study(folder: str | Path) -> StudyResult:
     return StudyResult(Path(folder))
 
 
-def write_report_of(
+def _write_report(
     folder: Path, record: StudyRecord, table: Table, figures: Sequence[Figure], content: Mapping[str, Any]
 ) -> Path:
     """Write the page of a study and, beside it, its numbers, table and figures."""
@@ -228,7 +228,7 @@ def _about(record: StudyRecord) -> str:
     )
 
 
-def write_parquet_of(store: StudyStore, record: StudyRecord, path: Path) -> Path:
+def _write_parquet(store: StudyStore, record: StudyRecord, path: Path) -> Path:
     """Write a row for each realisation and column, a chunk at a time."""
     pa, parquet = import_extra("pyarrow"), import_extra("pyarrow.parquet")
     factors = list(dict.fromkeys(name for group in record.groups for name in group.point))
@@ -261,12 +261,12 @@ def _as_kind(value: Any, kind: Any, pa: Any) -> Any:
 def _tidy(group: GroupRecord, first: int, estimates: Estimates) -> dict[str, Any]:
     """Return a chunk as columns of the same length: realisation after realisation."""
     count = len(estimates.values)
-    told = {
+    texts = {
         name: [getattr(column, name) for column in group.columns] * count for name in ("estimator", "parameter", "unit")
     }
     return {
         "noise": [group.noise] * (count * len(group.columns)),
-        **told,
+        **texts,
         "realisation": np.repeat(np.arange(first, first + count), len(group.columns)),
         "actual": np.tile([column.actual for column in group.columns], count),
         "value": estimates.values.ravel(),
@@ -284,16 +284,16 @@ class _Member(NamedTuple):
     part: Callable[[int, Estimates], NDArray[Any]]
 
 
-def write_npz_of(store: StudyStore, record: StudyRecord, path: Path) -> Path:
+def _write_npz(store: StudyStore, record: StudyRecord, path: Path) -> Path:
     """Write the realisations of each group as arrays, a chunk at a time."""
-    told = [
+    groups = [
         {"point": dict(group.point), "noise": group.noise, "in_words": in_words(group.point),
          "columns": [[column.estimator, column.parameter, column.unit] for column in group.columns]}
         for group in record.groups
     ]  # fmt: skip
     with written_whole(path) as temporary, zipfile.ZipFile(temporary, "w") as archive:
         with archive.open("groups.npy", "w") as file:
-            np.lib.format.write_array(file, np.array(json.dumps(told)))
+            np.lib.format.write_array(file, np.array(json.dumps(groups)))
         for number, group in enumerate(record.groups):
             rows = sum(len(estimates.values) for _, estimates in store.chunks(number))
             for member in _members(number, rows, len(group.columns)):

@@ -73,7 +73,7 @@ def study(
     ValueError
         The case knows no such noise or estimator; `part` does not fit.
     TypeError
-        An argument is of another kind: a case that is neither a name nor a folder, a design that is none.
+        An argument is of another kind: a case that is neither a name nor a folder, not a `StudyDesign`.
 
     Notes
     -----

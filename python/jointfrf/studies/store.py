@@ -21,7 +21,9 @@ from jointfrf.studies.design import StudyPoint, as_text_of
 
 __all__ = ["GroupRecord", "Span", "StudyRecord", "StudyStore"]
 
+#: Version of `study.json`.
 _FORMAT = 1
+#: Name of a chunk: group, first realisation, how many.
 _NAME = re.compile(r"(\d+)-(\d+)-(\d+)\.npz")
 
 
@@ -66,7 +68,7 @@ class StudyRecord:
     seed, realisations : int
         Realisations of each group.
     identity : mapping
-        What tells it from other studies, see `StudyDesign.identity`.
+        Fields that identify it, see `StudyDesign.identity`.
     groups : tuple of GroupRecord
     """
 

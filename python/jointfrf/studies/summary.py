@@ -16,9 +16,10 @@ __all__ = ["ParameterSummary", "study_table", "summarise"]
 
 #: Numbers of a group that are in memory at once for percentiles.
 _SAMPLE = 4_000_000
+#: Columns of the table: in percent of the actual value, and all numbers.
 _PERCENT = ("bias, %", "RMSE, %", "bound, %", "coverage, %")
 _NUMBERS = ("actual", "median", "2.5 %", "97.5 %", *_PERCENT)
-#: What columns mean that need a word.
+#: Explanations of columns, for the note of the table.
 _MEANING = {
     "RMSE, %": "RMSE: root-mean-square error, of the actual value.",
     "bound, %": "Bound: least standard deviation of an unbiased estimate (Cramér-Rao) when nothing is known around the "
@@ -75,7 +76,7 @@ class _Sums:
     def __init__(self, actual: FloatArray) -> None:
         self.actual = actual
         self.count = 0
-        self.good, self.inside, self.told = (np.zeros(actual.size, np.int64) for _ in range(3))
+        self.good, self.inside, self.intervals = (np.zeros(actual.size, np.int64) for _ in range(3))
         self.mean, self.squares, self.errors = (np.zeros(actual.size) for _ in range(3))
 
     def add(self, values: FloatArray, low: FloatArray, high: FloatArray) -> None:
@@ -93,7 +94,7 @@ class _Sums:
         self.good += number
         self.errors += np.where(is_good, (values - self.actual) ** 2, 0.0).sum(axis=0)
         has_interval = is_good & ~np.isnan(low) & ~np.isnan(high)
-        self.told += has_interval.sum(axis=0)
+        self.intervals += has_interval.sum(axis=0)
         self.inside += (has_interval & (low <= self.actual) & (self.actual <= high)).sum(axis=0)
 
 
@@ -127,7 +128,7 @@ def summarise(store: StudyStore) -> list[ParameterSummary]:
             sums.add(*estimates)
         sample = sample_of(store, number, len(group.columns))
         for c, column in enumerate(group.columns):
-            good, told = int(sums.good[c]), int(sums.told[c])
+            good, intervals = int(sums.good[c]), int(sums.intervals[c])
             values = sample[np.isfinite(sample[:, c]), c]
             low, median, high = np.percentile(values, (2.5, 50, 97.5)) if values.size else [np.nan] * 3
             is_known = not np.isnan(column.actual)
@@ -139,7 +140,7 @@ def summarise(store: StudyStore) -> list[ParameterSummary]:
                 median=float(median), low=float(low), high=float(high),
                 bias=float(sums.mean[c]) - column.actual if good else np.nan,
                 rmse=float(np.sqrt(sums.errors[c] / good)) if good else np.nan,
-                bound=column.bound, coverage=int(sums.inside[c]) / told if told and is_known else np.nan,
+                bound=column.bound, coverage=int(sums.inside[c]) / intervals if intervals and is_known else np.nan,
             ))  # fmt: skip
     return found
 
@@ -147,15 +148,15 @@ def summarise(store: StudyStore) -> list[ParameterSummary]:
 def study_table(record: StudyRecord, summary: Sequence[ParameterSummary], missing: int) -> Table:
     """Return the summary as a table, columns that hold nothing left out."""
     factors = list(dict.fromkeys(name for row in summary for name in row.point))
-    told = [_numbers(row) for row in summary]
-    kept = [c for c, name in enumerate(_NUMBERS) if any(row[c] is not None for row in told)]
+    values = [_numbers(row) for row in summary]
+    kept = [c for c, name in enumerate(_NUMBERS) if any(row[c] is not None for row in values)]
     has_failed = any(row.failed for row in summary)
     rows: list[tuple[Cell, ...]] = [
         (
             *(_cell(row.point.get(name)) for name in factors), row.noise, row.estimator, row.parameter, row.unit,
             *(numbers[c] for c in kept), *([str(row.failed)] if has_failed else []),
         )
-        for row, numbers in zip(summary, told, strict=True)
+        for row, numbers in zip(summary, values, strict=True)
     ]  # fmt: skip
     columns = (*map(factor_label, factors), "noise", "estimator", "parameter", "unit", *(_NUMBERS[c] for c in kept))
     left = f" {missing} realisations of {record.realisations * len(record.groups)} are missing." if missing else ""

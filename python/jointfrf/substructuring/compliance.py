@@ -130,7 +130,7 @@ def compliance_covariance(
     transform : array_like, shape (2 n, m), optional
         T of gamma = T h T^T; by default gamma itself was measured.
     reciprocal : bool
-        Whether h was made reciprocal, (h + h^T)/2, before.
+        Whether h was symmetrised, (h + h^T)/2, before.
     freq_hz, on_singular
         As in `couple`.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,12 +15,11 @@ __all__ = ["Block", "inverse_substructuring", "ismm"]
 
 #: Off-diagonal block of (2.48) that K* is taken from: rows of side j, or of side k.
 Block = Literal["jk", "kj"]
-_BLOCKS: tuple[Block, ...] = ("jk", "kj")
 
 
 def _with_block_first(lines: ComplexArray, n: int, block: Block) -> ComplexArray:
     """Return FRFs in the order of sides that a block names: as they are, or a copy with sides j and k exchanged."""
-    check_choice("block", block, _BLOCKS)
+    check_choice("block", block, get_args(Block))
     if block == "jk":
         return lines
     order = np.roll(np.arange(2 * n), n)

@@ -73,8 +73,10 @@ class LineMethod(NamedTuple):
     model: tuple[str, ...] = ()
 
 
+#: What all decoupling equations need of the substructures.
 _SUBSTRUCTURES = ("h_a", "h_b", "dofs_j", "dofs_k")
 
+#: The methods by name.
 STIFFNESS_METHODS: Mapping[StiffnessMethod, LineMethod] = {
     "ismm": LineMethod(ismm, "gamma", ("alpha", "k_initial")),
     "ismm-kj": LineMethod(partial(ismm, block="kj"), "gamma", ("alpha", "k_initial")),

@@ -30,7 +30,9 @@ def numbers(words: str) -> tuple[float, ...]:
 
 def main(words: Sequence[str] | None = None) -> None:
     """Compare the printed values of cases with every reading, and print and write the tables."""
-    parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        "tests/accuracy/run readings", description=description, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("cases", nargs="*", help="name, number, or folder with a case.toml; all by default")
     parser.add_argument("--spacing", type=numbers, default=(0.15, 1.0, 2.0, 3.0, 5.0), metavar="HZ,...",
                         help="spacings of the lines; a finer one of a case stays")  # fmt: skip

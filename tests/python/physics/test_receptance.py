@@ -306,7 +306,7 @@ def test_krylov_and_sparse_agree_on_a_beam_that_is_held():
     assert info.method == "krylov"
     spots = [0, 14, 62, 87, 200, 299]
     exact, direct = jf.receptance(freq[spots], method="sparse", full_output=True, **given)
-    assert (direct.method, direct.reason, direct.error_estimate) == ("sparse", "as asked for", None)
+    assert (direct.method, direct.reason, direct.error_estimate) == ("sparse", "as requested", None)
     assert relative_error(h[spots], exact) < 1e-9
 
 

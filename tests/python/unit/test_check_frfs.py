@@ -143,7 +143,7 @@ def test_a_force_may_be_blamed_instead():
     np.testing.assert_allclose(check.h, exact, rtol=0.01)
     (finding,) = check.findings
     assert finding.value == pytest.approx(1 / 0.8, rel=0.01)
-    assert "cannot tell" in finding.remedy
+    assert "does not show which" in finding.remedy
 
 
 def test_bad_lines_can_be_left_out():

@@ -90,7 +90,7 @@ def test_what_is_wrong_is_said():
         jf.joint_channels(
             frfs, [*places, replace(places[0], channel=Channel(999, "x"), role="response", where="table")], POINT
         )
-    with pytest.raises(ValueError, match="stands there twice as response"):
+    with pytest.raises(ValueError, match="is listed twice as response"):
         jf.joint_channels(frfs, [*places, places[0]], POINT)
     with pytest.raises(ValueError, match="node 101 has no coordinates"):
         jf.joint_channels(replace(frfs, coordinates={}), places, POINT)

@@ -16,8 +16,9 @@ from jointfrf.kernel.arguments import FloatArray
 
 __all__ = ["LEAST_GAIN", "LEAST_PHASE", "channel_ratios", "delay_findings", "gain_findings", "unexplained_gains"]
 
+#: Standard gravity, m/s^2; inch, m; pound-force, N.
 _GRAVITY, _INCH, _POUND = 9.80665, 0.0254, 4.4482216
-#: Factor of h, response over force, and what brings it; of displacements and forces, of rotations and moments.
+#: Factor of h, response over force, and the unit that causes it; of displacements and forces, of rotations and moments.
 _KNOWN: Final[tuple[tuple[tuple[float, str], ...], ...]] = (
     (
         (1e3, "millimetres instead of metres"),
@@ -40,7 +41,7 @@ LEAST_GAIN, LEAST_PHASE = 0.01, 0.01
 _SIGNIFICANT = 5.0
 #: A factor within this share of that of a unit is taken for it.
 _UNIT_TOLERANCE = 0.03
-#: Factors below this are gains, not units, unless a unit brings them.
+#: A gain within this factor is a warning, beyond it an error.
 _GAIN_LIMIT = 2.0
 
 
@@ -53,7 +54,7 @@ class Offsets:
     value, error : ndarray, shape (n,)
         NaN for a channel that is compared to no other.
     undecided : ndarray of bool, shape (n,)
-        As many channels say the opposite: which ones are wrong cannot be told.
+        Equally many channels differ the other way: which of them are wrong is not decided.
     """
 
     value: FloatArray
@@ -215,7 +216,7 @@ def unexplained_gains(measurement: Measurement, ratios: ChannelRatios) -> FloatA
 def gain_findings(
     measurement: Measurement, ratios: ChannelRatios, side: int
 ) -> tuple[list[FrfFinding], list[Correction]]:
-    """Say which channels have another gain than the others, or other units."""
+    """Report which channels have another gain than the others, or other units."""
     findings, corrections = [], []
     offsets = ratios.gain
     left = _is_significant(offsets, LEAST_GAIN)
@@ -267,8 +268,8 @@ def _gain_finding(
     which = f"the response of {', '.join(names)} is too {size}, or the force there too {opposite}"
     level: FindingLevel = "warning" if 1 / _GAIN_LIMIT < factor < _GAIN_LIMIT else "error"
     remedy = (
-        "calibrate sensor and hammer of this DOF; reciprocity cannot tell which of the two it is, and the driving point"
-        " carries the error either way"
+        "calibrate sensor and hammer of this DOF; reciprocity does not show which of the two it is, and the driving "
+        "point carries the error either way"
     )
     threshold = math.exp(max(LEAST_GAIN, _SIGNIFICANT * error))
     return FrfFinding("gain", level, names, factor, threshold, f"{shown}: {which}{doubt}", remedy), places, factor
@@ -277,7 +278,7 @@ def _gain_finding(
 def delay_findings(
     measurement: Measurement, ratios: ChannelRatios, side: int
 ) -> tuple[list[FrfFinding], list[Correction]]:
-    """Say which channels lag behind the others."""
+    """Report which channels lag behind the others."""
     findings, corrections = [], []
     offsets = ratios.delay
     least = LEAST_PHASE / measurement.omega[-1]
@@ -294,7 +295,7 @@ def delay_findings(
         findings.append(
             FrfFinding(
                 "delay", "warning", (name,), delay, max(least, _SIGNIFICANT * error), shown,
-                "look at the channel's filter, cable and trigger; reciprocity cannot tell sensor from hammer",
+                "look at the channel's filter, cable and trigger; reciprocity does not distinguish sensor from hammer",
             )
         )  # fmt: skip
         place = int((measurement.rows if side == 1 else measurement.columns)[i])
@@ -309,7 +310,7 @@ def _times(factor: float, error: float) -> str:
 
 
 def _doubt(measurement: Measurement, ratios: ChannelRatios, offsets: Offsets, places: list[int]) -> str:
-    """Say which channels may be wrong instead: where as many agree among each other."""
+    """Name the channels that may be wrong instead: where as many agree among each other."""
     if not offsets.undecided[places].any():
         return ""
     group = ratios.group == ratios.group[places[0]]

@@ -1,4 +1,4 @@
-"""The look at measured FRFs before a fit."""
+"""The check of measured FRFs before a fit."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_frequency, as
 __all__ = ["FrfFix", "check_frfs", "warn_of_frfs"]
 
 FrfFix = Literal["lines", "time-convention", "exchanged", "quantity", "sign", "units", "gain", "delay"]
-#: Fewer lines say nothing of noise.
+#: From fewer lines the noise cannot be estimated.
 _LEAST_LINES = 20
 #: Share of FRFs that run backwards from which all are conjugated.
 _BACKWARDS = 0.8
@@ -59,7 +59,7 @@ def check_frfs(
     fix: Sequence[FrfFix] = (),
     blame: Literal["responses", "forces"] = "responses",
 ) -> FrfCheck:
-    """Look at measured FRFs before a joint is identified from them: what is wrong, in which channel, and what to do.
+    """Check measured FRFs before a joint is identified from them: what is wrong, in which channel, and what to do.
 
     Parameters
     ----------
@@ -75,14 +75,14 @@ def check_frfs(
         ``102:-y`` is the opposite of ``102:+y``.
     transform : (array_like, array_like), shapes (2 n, n_responses), (2 n, n_forces), optional
         From responses and from forces to joint DOFs j, then k. Where the channels share fewer than two DOFs, the FRFs
-        of the joint DOFs are looked at instead; nothing is corrected there.
+        of the joint DOFs are checked instead; nothing is corrected there.
     dofs : sequence of str, optional
         Names of the n joint DOFs, with `transform`.
     fix : sequence of str
         What to correct: "lines" (leave bad ones out), "time-convention", "exchanged", "quantity", "sign", "units",
         "gain", "delay". Nothing by default.
     blame : {"responses", "forces"}
-        Which of the two is corrected where they cannot be told apart: sign, units, gain, delay, exchange.
+        Which of the two is corrected where they cannot be distinguished: sign, units, gain, delay, exchange.
 
     Returns
     -------
@@ -92,7 +92,7 @@ def check_frfs(
     Raises
     ------
     ValueError
-        Wrong shapes, names that do not fit, an unknown word.
+        Wrong shapes, names that do not fit, an unknown option.
 
     Notes
     -----
@@ -128,13 +128,13 @@ def check_frfs(
     check_choice("blame", blame, ("responses", "forces"))
     found, good = find_bad_lines(freq, lines, tuple(map(str, rows)), tuple(map(str, columns)))
     measurement = as_measurement(freq[good], lines[good], rows, columns)
-    look = _Look(measurement, 1 if blame == "responses" else 2)
-    look.findings.extend(found)
+    state = _Progress(measurement, 1 if blame == "responses" else 2)
+    state.findings.extend(found)
     if measurement.freq_hz.size >= _LEAST_LINES and measurement.h.size:
-        _look_at_channels(look)
-        if transform is not None and look.measurement.rows.size < 2:
-            look.findings.extend(_findings_at_joint(look, transform, dofs))
-    return _result(look, freq, lines, good, fix)
+        _check_channels(state)
+        if transform is not None and state.measurement.rows.size < 2:
+            state.findings.extend(_findings_at_joint(state, transform, dofs))
+    return _result(state, freq, lines, good, fix)
 
 
 def warn_of_frfs(check: FrfCheck, stacklevel: int = 2) -> None:
@@ -145,8 +145,8 @@ def warn_of_frfs(check: FrfCheck, stacklevel: int = 2) -> None:
 
 
 @dataclass
-class _Look:
-    """What is collected on the way."""
+class _Progress:
+    """The FRFs still to be checked, and what has been found so far."""
 
     measurement: Measurement
     side: int
@@ -164,12 +164,12 @@ class _Look:
 
 
 def _findings_at_joint(
-    look: _Look, transform: tuple[ArrayLike, ArrayLike], dofs: Sequence[str] | None
+    state: _Progress, transform: tuple[ArrayLike, ArrayLike], dofs: Sequence[str] | None
 ) -> list[FrfFinding]:
-    """Return what the FRFs of the joint DOFs show, besides what the channels have shown already."""
+    """Return findings at the joint DOFs, of kinds that the channels have not shown."""
     if not isinstance(transform, tuple | list) or len(transform) != 2:
         raise TypeError(f"transform must be a pair, for responses and forces, not {type(transform).__name__}")
-    m = look.corrected()
+    m = state.corrected()
     t_out = as_real("transform[0]", transform[0], (None, m.h.shape[1]))
     t_in = as_real("transform[1]", transform[1], (t_out.shape[0], m.h.shape[2]))
     names = [str(i) for i in range(t_out.shape[0] // 2)] if dofs is None else as_names("dofs", dofs)
@@ -180,9 +180,9 @@ def _findings_at_joint(
     labels = [f"{side}:{name}" for side in "jk" for name in names]
     h = t_out @ m.h @ t_in.T
     hidden = np.median(abs(h), axis=0) < _HIDING * np.median(_propagated(m.h, t_out, t_in), axis=0)
-    joint = _Look(replace(as_measurement(m.freq_hz, h, labels, labels), hidden=hidden), look.side)
-    _look_at_channels(joint)
-    known = {finding.kind for finding in look.findings}
+    joint = _Progress(replace(as_measurement(m.freq_hz, h, labels, labels), hidden=hidden), state.side)
+    _check_channels(joint)
+    known = {finding.kind for finding in state.findings}
     return [finding for finding in joint.findings if finding.kind not in known]
 
 
@@ -192,37 +192,37 @@ def _propagated(h: ComplexArray, t_out: FloatArray, t_in: FloatArray) -> FloatAr
     return deviation
 
 
-def _look_at_channels(look: _Look) -> None:
-    """Judge signals, time convention, reciprocity, driving points, in this order: the first cause is told once."""
-    signals = check_signals(look.measurement)
-    look.findings.extend(signals.findings)
-    m = look.measurement = look.measurement.without(signals.rows, signals.columns)
+def _check_channels(state: _Progress) -> None:
+    """Judge signals, time convention, reciprocity, driving points, in this order: each cause is reported once."""
+    signals = check_signals(state.measurement)
+    state.findings.extend(signals.findings)
+    m = state.measurement = state.measurement.without(signals.rows, signals.columns)
     smooth = m.smoothness.copy()
     smooth[signals.rows], smooth[:, signals.columns] = 0, 0
     around = circles(m.omega, m.h, smooth)
     if around.seen and around.value > 0 and around.share >= _BACKWARDS:
         driving = sectors(_driving(m.square))
-        look.findings.append(convention_finding(around, driving))
-        look.corrections.append(Correction("time-convention", "all FRFs conjugated", conjugate=True))
+        state.findings.append(convention_finding(around, driving))
+        state.corrections.append(Correction("time-convention", "all FRFs conjugated", conjugate=True))
     if not m.rows.size:
         return
-    m = look.corrected()
+    m = state.corrected()
     pairs = pair_ratios(m.omega, m.square, m.square_smoothness)
     if pairs.broken.any():
         cause = cause_of_broken_pairs(m.square, m.square_smoothness, _matrix(pairs.broken, pairs, m.rows.size))
-        m, pairs = _told(look, m, pairs, cause)
+        m, pairs = _explained(state, m, pairs, cause)
         if not m.rows.size:
             return
-    _look_at_ratios(look, m, pairs)
+    _check_ratios(state, m, pairs)
 
 
-def _told(look: _Look, m: Measurement, pairs: PairRatios, cause: Cause) -> tuple[Measurement, PairRatios]:
+def _explained(state: _Progress, m: Measurement, pairs: PairRatios, cause: Cause) -> tuple[Measurement, PairRatios]:
     """Add what explains FRFs that are not reciprocal; return the measurement without it."""
-    look.add(broken_findings(m, pairs, cause, look.side))
+    state.add(broken_findings(m, pairs, cause, state.side))
     if cause.kind != "exchanged" and cause.channels:
         at = list(cause.channels[-1:])
-        look.measurement = look.measurement.without(m.rows[at].tolist(), m.columns[at].tolist())
-    m = look.corrected()
+        state.measurement = state.measurement.without(m.rows[at].tolist(), m.columns[at].tolist())
+    m = state.corrected()
     return m, pair_ratios(m.omega, m.square, m.square_smoothness)
 
 
@@ -230,12 +230,12 @@ def _ratios(m: Measurement, pairs: PairRatios) -> ChannelRatios:
     return channel_ratios(pairs, m.rows.size, least_gain=LEAST_GAIN, least_delay=LEAST_PHASE / m.omega[-1])
 
 
-def _look_at_ratios(look: _Look, m: Measurement, pairs: PairRatios) -> None:
+def _check_ratios(state: _Progress, m: Measurement, pairs: PairRatios) -> None:
     ratios = _ratios(m, pairs)
     directions = [name.rpartition(":")[2] for name in m.dofs]
     cause = hidden_exchange(m.square, directions) or cause_of_gains(m.square, unexplained_gains(m, ratios), directions)
     if cause is not None:
-        m, pairs = _told(look, m, pairs, cause)
+        m, pairs = _explained(state, m, pairs, cause)
         if not m.rows.size:
             return
         ratios = _ratios(m, pairs)
@@ -244,20 +244,20 @@ def _look_at_ratios(look: _Look, m: Measurement, pairs: PairRatios) -> None:
     exponent = mean_exponent(m.omega, driving * m.omega[:, None] ** -ratios.power.astype(float))
     span = float(m.freq_hz[-1] / m.freq_hz[0])
     found = quantities(ratios.group, ratios.power, ratios.sign, sector, exponent, span)
-    look.add(quantity_findings(m, found, sector))
-    look.add(sign_findings(m, found, sector, look.side))
-    look.add(gain_findings(m, ratios, look.side))
-    look.add(delay_findings(m, ratios, look.side))
-    if not any(finding.kind == "passivity" for finding in look.findings):
-        left = look.corrected()
+    state.add(quantity_findings(m, found, sector))
+    state.add(sign_findings(m, found, sector, state.side))
+    state.add(gain_findings(m, ratios, state.side))
+    state.add(delay_findings(m, ratios, state.side))
+    if not any(finding.kind == "passivity" for finding in state.findings):
+        left = state.corrected()
         noise = _noise(pairs, m.rows.size)
-        delayed = {name for finding in look.findings if finding.kind == "delay" for name in finding.channels}
+        delayed = {name for finding in state.findings if finding.kind == "delay" for name in finding.channels}
         # Where a channel that is left out took all pairs along, nothing is known of the correlation between lines.
-        is_lost = not pairs.usable.any() and any(finding.kind == "doubled" for finding in look.findings)
+        is_lost = not pairs.usable.any() and any(finding.kind == "doubled" for finding in state.findings)
         inflation = np.inf if is_lost else pairs.inflation
         active = passivity_findings(left, _driving(left.square), noise, inflation)
         # A delay of a force turns its driving point the other way than one of the response that was taken out.
-        look.findings.extend(finding for finding in active if not delayed.issuperset(finding.channels))
+        state.findings.extend(finding for finding in active if not delayed.issuperset(finding.channels))
 
 
 def _driving(h: ComplexArray) -> ComplexArray:
@@ -279,18 +279,18 @@ def _noise(pairs: PairRatios, n: int) -> FloatArray:
     return deviation
 
 
-def _result(look: _Look, freq: FloatArray, h: ComplexArray, good: np.ndarray, fix: Sequence[FrfFix]) -> FrfCheck:
+def _result(state: _Progress, freq: FloatArray, h: ComplexArray, good: np.ndarray, fix: Sequence[FrfFix]) -> FrfCheck:
     changes = []
     if "lines" in fix and not good.all():
         freq, h = freq[good], np.ascontiguousarray(h[good])
         changes.append(f"{(~good).sum()} lines left out")
-    for correction in look.corrections:
+    for correction in state.corrections:
         if correction.kind in fix:
             h = correction.apply(2 * np.pi * freq, h)
             changes.append(correction.text)
     levels: tuple[FindingLevel, ...] = get_args(FindingLevel)
-    findings = sorted(look.findings, key=lambda finding: levels.index(finding.level))
-    return FrfCheck(tuple(findings), freq, h, tuple(changes), _unseen(look.measurement))
+    findings = sorted(state.findings, key=lambda finding: levels.index(finding.level))
+    return FrfCheck(tuple(findings), freq, h, tuple(changes), _unseen(state.measurement))
 
 
 def _unseen(measurement: Measurement) -> str:

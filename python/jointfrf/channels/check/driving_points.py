@@ -52,7 +52,7 @@ class Sectors:
     ----------
     quarter : ndarray of int, shape (n,)
         0: Im < 0, a receptance; 1: Re > 0, a mobility; 2: Im > 0, an accelerance or a receptance of the wrong sign;
-        3: Re < 0, a mobility of the wrong sign; -1: not told.
+        3: Re < 0, a mobility of the wrong sign; -1: undecided.
     negative : ndarray, shape (n,)
         Share of the lines with Im < 0.
     """
@@ -62,7 +62,7 @@ class Sectors:
 
 
 def circles(omega: FloatArray, h: ComplexArray, smooth: FloatArray) -> Circles:
-    """Tell the direction of all FRFs, shape (n_freq, rows, columns), as the mean arrival time of their energy."""
+    """Find the direction of all FRFs, shape (n_freq, rows, columns), as the mean arrival time of their energy."""
     use = smooth > max(_CIRCLES_SEEN, 6 / np.sqrt(h.shape[0]))
     if not use.any():
         return Circles(0.0, 0.0, 0)
@@ -84,7 +84,7 @@ def mean_exponent(omega: FloatArray, h: ComplexArray) -> float:
 
 
 def sectors(driving: ComplexArray) -> Sectors:
-    """Tell the half plane of driving-point FRFs, shape (n_freq, n)."""
+    """Find the half plane of driving-point FRFs, shape (n_freq, n)."""
     u, real, imaginary = _balances(driving)
     quarter = np.where(
         _on_real_axis(u),
@@ -98,7 +98,7 @@ def sectors(driving: ComplexArray) -> Sectors:
 
 
 def one_sidedness(driving: ComplexArray) -> FloatArray:
-    """Tell how far each driving-point FRF, shape (n_freq, n), lies in one half plane: 1 on all lines, 0 on half."""
+    """Measure how far each driving-point FRF, shape (n_freq, n), lies in one half plane: 1 on all lines, 0 on half."""
     u, real, imaginary = _balances(driving)
     share: FloatArray = np.where(_on_real_axis(u), abs(imaginary), abs(real))
     return share
@@ -148,7 +148,7 @@ def passivity_findings(
             if (side < -0.5).all()
             else "where the stiffness governs (Re > 0): this FRF, or all, are too early in time"
             if (side > 0.5).all()
-            else "at resonances: damping that gives out energy, or another sign of this FRF there"
+            else "at resonances: negative damping, or the wrong sign of this FRF there"
         )
         findings.append(
             FrfFinding(

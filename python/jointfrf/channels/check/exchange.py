@@ -21,14 +21,15 @@ __all__ = ["Cause", "broken_findings", "cause_of_broken_pairs", "cause_of_gains"
 
 #: A search takes no more lines than these, evenly spread.
 _MOST_LINES = 200
-#: Gains above this factor may come from exchanged channels; logarithms of two that agree so well are one.
+#: Gains above this factor may come from exchanged channels; logarithms of the two then cancel to within this.
 _MUCH, _ALIKE = 2.0, 0.1
-#: Two channels of one direction are exchanged if this divides the scatter of their ratios by so much.
+#: Two channels of one direction count as exchanged if that divides the scatter of their ratios by this; rounding.
 _LESS, _ROUND_OFF = 1.4, 1e-6
 #: A copy whose scatter is not larger than the least by more than this is as good.
 _AS_GOOD = 1.01
 #: A cause explains if it leaves at most this share of the broken pairs.
 _LEFT = 0.25
+#: Pairs that a finding names, the worst first.
 _SHOWN = 4
 
 
@@ -141,7 +142,7 @@ def hidden_exchange(h: ComplexArray, directions: Sequence[str]) -> Cause | None:
             continue
         # Rows of the two responses beside the columns of their forces, as they are and exchanged.
         both = [_off(scatter_of(h[:, rows], across[:, [i, j]]), (i, j)) for rows in ([i, j], [j, i])]
-        # h_ij against h_ji, or, exchanged, h_jj against h_ii, stands in neither.
+        # h_ij against h_ji, or, exchanged, h_jj against h_ii, is in neither.
         before, after = (float(np.mean(scatter)) if scatter.size else 0.0 for scatter in both)
         own = [float(scatter_of(h[:, a, b], h[:, c, d])) for a, b, c, d in ((i, j, j, i), (j, j, i, i))]
         before, after = (before * both[0].size + 2 * own[0], after * both[0].size + 2 * own[1])
@@ -218,7 +219,7 @@ def _doubled(evidence: _Evidence, before: float) -> Cause | None:
 def broken_findings(
     measurement: Measurement, pairs: PairRatios, cause: Cause, side: int
 ) -> tuple[list[FrfFinding], list[Correction]]:
-    """Say what explains that FRFs are not reciprocal, and how to correct it where that is possible."""
+    """Report what explains that FRFs are not reciprocal, and how to correct it where that is possible."""
     names = measurement.dofs
     number = f"{pairs.broken.sum()} of {pairs.p.size} pairs h_pq, h_qp are not the same FRF (scatter of their ratio "
     if not pairs.broken.any():

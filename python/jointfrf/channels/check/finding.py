@@ -40,7 +40,7 @@ class FrfFinding:
         One of "lines", "zero-frequency", "dead", "doubled", "time-convention", "exchanged", "quantity", "sign",
         "units", "gain", "delay", "reciprocity", "passivity".
     level : {"error", "warning", "note"}
-        A fit is meaningless; it is wrong by about what is found; worth to know.
+        A fit is meaningless; it is wrong by about the size found; for information.
     channels : tuple of str
         Names of the channels; empty where it concerns all.
     value, threshold : float
@@ -84,7 +84,7 @@ class FrfCheck:
     changes : tuple of str
         What was corrected.
     unseen : str
-        What no check of these FRFs can see.
+        Errors that no check of these FRFs can detect.
     """
 
     findings: tuple[FrfFinding, ...]

@@ -21,7 +21,7 @@ LEAST_SMOOTHNESS = 0.3
 
 @dataclass(frozen=True, eq=False)
 class Measurement:
-    """FRFs on the lines that can be judged.
+    """FRFs on the usable lines.
 
     Attributes
     ----------
@@ -35,7 +35,7 @@ class Measurement:
     signs : ndarray, shape (n,)
         -1 where they point in opposite directions.
     hidden : ndarray of bool, shape (n_responses, n_forces), or None
-        FRFs that noise of the channels they come from may hide: they tell nothing.
+        FRFs that noise of the channels they come from may hide: they are not used.
     """
 
     freq_hz: FloatArray
@@ -85,7 +85,7 @@ class Measurement:
         return replace(self, h=h)
 
     def without(self, rows: Sequence[int], columns: Sequence[int]) -> Measurement:
-        """Return the same with these responses and forces paired with nothing."""
+        """Return the same without the pairs of these responses and forces."""
         if not rows and not columns:
             return self
         kept = ~(np.isin(self.rows, rows) | np.isin(self.columns, columns))

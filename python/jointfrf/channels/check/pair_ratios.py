@@ -22,7 +22,7 @@ __all__ = [
     "scatter_of",
 ]
 
-#: An FRF below this share of sqrt|h_pp h_qq| is zero by symmetry, or as good as that: its reciprocity tells nothing.
+#: An FRF below this share of sqrt|h_pp h_qq| is zero by symmetry, or nearly: it is not checked for reciprocity.
 _SMALL = 1e-2
 #: Scatter of log(h_pq / h_qp) above which h_pq and h_qp are not the same FRF; noise of 10 % gives 0.14.
 BROKEN = 0.5
@@ -71,7 +71,7 @@ class PairRatios:
 
 
 def pair_ratios(omega: FloatArray, h: ComplexArray, smooth: FloatArray) -> PairRatios:
-    """Look at the reciprocity of FRFs between n DOFs.
+    """Estimate the ratios of all pairs of FRFs between n DOFs.
 
     Parameters
     ----------

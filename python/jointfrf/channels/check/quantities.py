@@ -17,6 +17,7 @@ __all__ = ["convention_finding", "quantities", "quantity_findings", "sign_findin
 _RECEPTANCE, _ACCELERANCE = -0.2, 0.6
 #: A band that spans less than this factor in frequency does not show the exponent.
 _LEAST_SPAN = 3.0
+#: Names of the quantities, by the power of i w.
 _NAMES = ("receptances", "mobilities", "accelerances")
 
 
@@ -35,7 +36,7 @@ class Quantities:
     exponent : float
         Mean exponent of w in |h|.
     certain : bool
-        Whether accelerances can be told from receptances of the other sign by it.
+        Whether it distinguishes accelerances from receptances of the opposite sign.
     """
 
     power: NDArray[np.intp]
@@ -95,7 +96,7 @@ def quantities(
 
 
 def convention_finding(around: Circles, driving: Sectors) -> FrfFinding:
-    """Say that FRFs are conjugated."""
+    """Report that FRFs are conjugated."""
     turned = (
         f"; Im of driving points is positive on {100 * float(np.median(1 - driving.negative)):.0f} % of lines"
         if driving.negative.size
@@ -112,7 +113,7 @@ def convention_finding(around: Circles, driving: Sectors) -> FrfFinding:
 def quantity_findings(
     measurement: Measurement, found: Quantities, driving: Sectors
 ) -> tuple[list[FrfFinding], list[Correction]]:
-    """Say which responses are velocities or accelerations."""
+    """Report which responses are velocities or accelerations."""
     findings, corrections = [], []
     for power in (1, 2):
         places = np.flatnonzero(found.power == power)
@@ -149,7 +150,7 @@ def _doubt(found: Quantities) -> str:
 def sign_findings(
     measurement: Measurement, found: Quantities, driving: Sectors, side: int
 ) -> tuple[list[FrfFinding], list[Correction]]:
-    """Say which responses point against the force of the same DOF."""
+    """Report which responses point against the force of the same DOF."""
     findings, corrections = [], []
     places = np.flatnonzero(found.sign < 0)
     if places.size:
@@ -160,12 +161,12 @@ def sign_findings(
         if not every and measurement.dofs:
             seen += " and h_pq = -h_qp with the others"
         who = "all responses point" if every else f"the response of {', '.join(names)} points"
-        doubt = "" if found.certain or not every else " (or the FRFs are accelerances: the band is too narrow to tell)"
+        doubt = "" if found.certain or not every else " (or the FRFs are accelerances: the band is too narrow)"
         findings.append(
             FrfFinding(
                 "sign", "error", names, share / 100, 0.5,
                 f"{who} against the force of the same name: {seen}{doubt}",
-                "turn the sign of the response, or of the force: reciprocity cannot tell which of the two",
+                "turn the sign of the response, or of the force: reciprocity does not show which of the two",
             )
         )  # fmt: skip
         dofs = measurement.rows if side == 1 else measurement.columns

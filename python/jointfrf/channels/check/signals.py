@@ -23,7 +23,7 @@ _ALIKE, _SOME = 0.999, 60
 
 @dataclass(frozen=True)
 class BadSignals:
-    """Findings, and responses and forces that nothing else can be said of."""
+    """Findings, and the responses and forces that no other check can use."""
 
     findings: list[FrfFinding]
     rows: list[int]

@@ -18,7 +18,7 @@ from jointfrf.models.receptance.factors import Factors, SingularMatrixError, Spa
 
 __all__ = ["SINGULAR", "solve_banded", "solve_dense", "solve_sparse"]
 
-#: A fine mesh in mixed units has rcond 1e-13 and still gives nine digits: only singular to working precision is told.
+#: A fine mesh in mixed units has rcond 1e-13 and still gives nine digits: only below this is a line singular.
 SINGULAR = float(np.finfo(np.float64).eps)
 
 
@@ -37,7 +37,7 @@ def solve_dense(
     h : ndarray, shape (n_freq, n_out, n_in)
         m/N.
     status : LineStatus
-        With the reciprocal condition of each line; no line is announced as ill-conditioned yet.
+        With the reciprocal condition of each line; lines that are ill-conditioned give no warning yet.
     """
     n, shape, omega = matrices.n, (freq_hz.size, outputs.size, inputs.size), 2 * np.pi * freq_hz
     args: list[Any] = [n, N_FREQ, *shape[1:], omega, matrices.dense("stiffness"), matrices.dense("mass")]
@@ -63,7 +63,7 @@ def solve_banded(
     h : ndarray, shape (n_freq, n_out, n_in)
         m/N.
     status : LineStatus
-        With the reciprocal condition of each line; no line is announced as ill-conditioned yet.
+        With the reciprocal condition of each line; lines that are ill-conditioned give no warning yet.
     """
     n, shape, omega = matrices.n, (freq_hz.size, outputs.size, inputs.size), 2 * np.pi * freq_hz
     kl, ku = matrices.widths
@@ -101,7 +101,7 @@ def solve_sparse(
     h : ndarray, shape (n_freq, n_out, n_in)
         m/N.
     status : LineStatus
-        With the reciprocal condition of each line; no line is announced as ill-conditioned yet.
+        With the reciprocal condition of each line; lines that are ill-conditioned give no warning yet.
     solver : str
         Library and order of elimination.
     """

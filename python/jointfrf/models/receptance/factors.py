@@ -1,4 +1,4 @@
-"""Factors of matrices: the one door to SuperLU, PARDISO and MUMPS, and to LAPACK for those of few DOFs."""
+"""Factors of matrices: the only interface to SuperLU, PARDISO and MUMPS, and to LAPACK for those of few DOFs."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ SYMMETRIC: Final[dict[str, Any]] = {
 }
 #: From this many DOFs on an order by dissection has smaller factors than one by minimum degree.
 _DISSECTED: Final = 4_000
-#: From this many DOFs on another library, where it is installed, is worth its start.
+#: From this many DOFs on another library, where it is installed, repays its start-up.
 _LARGE: Final = 20_000
 
 
@@ -72,13 +72,13 @@ class SparseSolver:
     Parameters
     ----------
     library : {"SuperLU", "PARDISO", "MUMPS"}, optional
-        By default the fastest that is installed and can do it: for symmetric matrices of 20 000 DOFs or more PARDISO
+        By default the fastest one installed that is able: for symmetric matrices of 20 000 DOFs or more PARDISO
         (package pypardiso; real ones only) or MUMPS (package python-mumps), else SuperLU.
     """
 
     def __init__(self, library: Library | None = None) -> None:
         self.library = library
-        #: What did it in the end, the last time.
+        #: Library and order of elimination of the last factorisation.
         self.used = ""
         self._order: tuple[NDArray[np.intp], str] | None = None
 
@@ -90,7 +90,7 @@ class SparseSolver:
         matrix : sparse array, shape (n, n)
             Real or complex; of the pattern of those before.
         is_symmetric : bool
-            A = A^T; PARDISO and MUMPS, which take half of it, are asked for nothing else.
+            A = A^T; PARDISO and MUMPS, which take one triangle, are used for nothing else.
 
         Raises
         ------
@@ -145,7 +145,7 @@ def factor(matrix: Any, is_symmetric: bool = True) -> Factors:
 
 
 class _NotFactoredError(RuntimeError):
-    """A library could not do it, for want of memory or because of the matrix: SuperLU is asked."""
+    """A library failed, for want of memory or because of the matrix: SuperLU is used."""
 
 
 def _superlu(matrix: sparse.csc_matrix, **options: Any) -> sparse_linalg.SuperLU:
@@ -219,4 +219,5 @@ def _by_mumps(matrix: Any) -> Factors:
     return Factors(solve, np.iscomplexobj(matrix), "MUMPS")
 
 
+#: Libraries beside SuperLU, which serves where they do not.
 _MAKERS: Final[dict[Library, Callable[[Any], Factors]]] = {"PARDISO": _by_pardiso, "MUMPS": _by_mumps}

@@ -26,10 +26,10 @@ _MOST_SHIFTS, _MOST_VECTORS = 40, 0.5
 _NEAR = 1e-4
 #: Directions smaller than this share of their vector are not new.
 _NEW_DIRECTION = 1e-12
-#: Lines whose residual is looked at, and those of them that are solved directly.
+#: Lines whose residual is computed, and those of them that are solved directly.
 _CANDIDATES, _SPOTS = 40, 4
 #: From this many DOFs on solutions of the whole model at these lines are found by iteration, not by factors of a line;
-#: from this many on they still cost as much as the rest: the worst line is looked at only.
+#: from this many on they still cost as much as the rest: only the worst line is compared.
 _ITERATED, _LARGE, _FEW_SPOTS = 2_000, 10_000, 1
 
 
@@ -64,7 +64,7 @@ class Reduction:
 def reduce_model(
     freq_hz: FloatArray, matrices: ModelMatrices, outputs: Ports, inputs: Ports, tolerance: float
 ) -> Reduction:
-    """Project a model on solutions at a few frequencies, more of them until the tolerance is met or no longer nearer.
+    """Project a model on solutions at a few frequencies, more until the error meets the tolerance or falls no more.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ def reduce_model(
 
 
 class _Reducer:
-    """A model, what is asked of it, and the space found so far: orthonormal, without rigid-body modes."""
+    """A model, its ports, and the space found so far: orthonormal, without rigid-body modes."""
 
     def __init__(
         self, freq_hz: FloatArray, matrices: ModelMatrices, outputs: Ports, inputs: Ports, tolerance: float

@@ -35,7 +35,7 @@ class Modes:
     shapes_out, shapes_in : ndarray, shape (n_out, n_modes), (n_in, n_modes)
         Shapes at responses and forces, 1/sqrt(kg).
     uncertainty : ndarray, shape (n_modes,)
-        What rounding of K leaves open of w_r^2, (rad/s)^2, of modes that it may hide, see `RigidModes`; else 0.
+        Uncertainty of w_r^2 by rounding of K, (rad/s)^2, of modes that it may hide, see `RigidModes`; else 0.
     """
 
     stiffness: FloatArray
@@ -60,7 +60,7 @@ class Modes:
     def lines(
         self, freq_hz: FloatArray, on_singular: OnSingular, out: ComplexArray | None = None
     ) -> tuple[ComplexArray, LineStatus]:
-        """Return the sum and how each line went, without a word on lines that are ill-conditioned.
+        """Return the sum and the status of each line; lines that are ill-conditioned give no warning yet.
 
         Their reciprocal condition is that of all modes where it is below the machine's precision, and otherwise such
         that eps / rcond is the relative change of a mode by its uncertainty.

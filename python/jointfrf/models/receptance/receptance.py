@@ -25,17 +25,16 @@ __all__ = ["ReceptanceInfo", "ReceptanceMethod", "receptance"]
 
 Direct = Literal["dense", "banded", "sparse"]
 ReceptanceMethod = Literal["auto", "dense", "banded", "sparse", "modal", "krylov"]
-_METHODS = get_args(ReceptanceMethod)
 
 #: A matrix with a wider band than this share of its size is solved as a dense one.
 _BAND_LIMIT = 0.25
-#: Up to this size nothing about a model is looked at but its numbers.
+#: Up to this size a model is solved as a dense one, whatever its structure.
 _TINY = 8
 #: Up to this band, or this size, a direct solution of many lines side by side is as fast as any reduction.
 _NARROW, _SMALL = 64, 64
 #: Beyond this size all modes cost more than a reduced model.
 _ALL_MODES = 600
-#: A reduction pays for itself from this number of lines on, and up to this number of DOFs that are asked for.
+#: A reduction pays for itself from this number of lines on, and up to this number of DOFs requested.
 _MANY_LINES, _FEW_DOFS = 32, 64
 #: Larger models with fewer entries than this share of a full matrix are factored by their entries.
 _SPARSE = 0.1
@@ -50,9 +49,9 @@ class ReceptanceInfo:
     Parameters
     ----------
     method : {"dense", "banded", "sparse", "modal", "krylov"}
-        What was done in the end.
+        The method used.
     reason : str
-        Why, in a sentence.
+        Why it was chosen, in a sentence.
     error_estimate : float or None
         Of "modal" and "krylov": largest difference to a direct solution at a few lines, relative to the largest entry
         of the line. None for a direct solution.
@@ -73,7 +72,7 @@ class ReceptanceInfo:
 
 
 class _Made(TypedDict, total=False):
-    """The fields of a `ReceptanceInfo`, which is made only for those who ask for it."""
+    """The fields of a `ReceptanceInfo`, which is made on request only."""
 
     method: Literal["dense", "banded", "sparse", "modal", "krylov"]
     reason: str
@@ -84,7 +83,7 @@ class _Made(TypedDict, total=False):
 
 
 class _Task(NamedTuple):
-    """What was asked for."""
+    """A request whose arguments are checked."""
 
     freq_hz: FloatArray
     matrices: ModelMatrices
@@ -240,7 +239,7 @@ def receptance(
     >>> info.method, info.reason
     ('banded', 'narrow band: 3 diagonals below and 3 above the main one')
     """
-    check_choice("method", method, _METHODS)
+    check_choice("method", method, get_args(ReceptanceMethod))
     freq = as_frequency(freq_hz)
     matrices = ModelMatrices(stiffness, mass, damping, structural_damping, as_number("loss_factor", loss_factor))
     n = matrices.n
@@ -251,13 +250,13 @@ def receptance(
         raise ValueError(f"tolerance must be positive, not {wanted}")
     task = _Task(freq, matrices, to, into, on_singular, wanted, out)
     if method in ("dense", "banded", "sparse"):
-        result, made = _solved(task, cast(Direct, method), "as asked for")
+        result, made = _solved(task, cast(Direct, method), "as requested")
     elif method == "modal":
         modes, _ = all_modes(matrices, to, into)
         result = modes.receptance(freq, on_singular, out)
-        made = _Made(method="modal", reason="as asked for", n_vectors=modes.stiffness.size)
+        made = _Made(method="modal", reason="as requested", n_vectors=modes.stiffness.size)
     elif method == "krylov":
-        result, made = _reduced(task, "as asked for")
+        result, made = _reduced(task, "as requested")
         if made["method"] != "krylov" and not task.is_empty:
             warnings.warn(f"receptance: {made['reason']}", ConvergenceWarning, stacklevel=2)
     else:
@@ -298,7 +297,7 @@ def _automatic(task: _Task) -> tuple[ComplexArray, _Made]:
         return _summed(task, f"{task.freq_hz.size} lines of {n} DOFs whose modes the damping does not couple")
     n_ports = directions(task.outputs, task.inputs).shape[1]
     if n_ports > _FEW_DOFS:
-        return _solved(task, direct, f"many DOFs are asked for: {n_ports}")
+        return _solved(task, direct, f"many DOFs are requested: {n_ports}")
     return _reduced(task, f"{task.freq_hz.size} lines of {n} DOFs whose modes the damping does not couple")
 
 
@@ -318,15 +317,15 @@ def _solved(task: _Task, how: Direct, reason: str) -> tuple[ComplexArray, _Made]
             t_out, t_in = (ports.weights[:, ports.needed - 1].toarray() for ports in (to, into))
             result = transform(h, t_out, t_in, freq_hz=freq, on_singular=on_singular, out=task.out)
     if status.lowest_rcond < RCOND_LIMIT:
-        check_lines("receptance", _in_doubt(matrices, freq, status), {}, freq, "nan", RCOND_LIMIT)
+        check_lines("receptance", _unreliable_lines(matrices, freq, status), {}, freq, "nan", RCOND_LIMIT)
     return result, _Made(method=how, reason=reason, solver=solver)
 
 
-def _in_doubt(matrices: ModelMatrices, freq: FloatArray, status: LineStatus) -> LineStatus:
-    """Return how lines went, with a small reciprocal condition only where a direct solution is in doubt.
+def _unreliable_lines(matrices: ModelMatrices, freq: FloatArray, status: LineStatus) -> LineStatus:
+    """Return the status of lines, with a small reciprocal condition only where a direct solution is unreliable.
 
-    A fine mesh in mixed units has rcond 1e-13 and still gives nine digits: such a line is in doubt if it is singular to
-    working precision, or if rounding of K hides what holds the structure as a whole.
+    A fine mesh in mixed units has rcond 1e-13 and still gives nine digits: such a line is unreliable if it is singular
+    to working precision, or if rounding of K hides what holds the structure as a whole.
     """
     rcond = np.where(status.rcond < SINGULAR, status.rcond, 1.0)
     poor = (status.rcond < RCOND_LIMIT) & (status.rcond >= SINGULAR)
@@ -349,8 +348,8 @@ def _summed(task: _Task, reason: str) -> tuple[ComplexArray, _Made]:
     """All modes, where they meet the tolerance."""
     try:
         modes, rigid = all_modes(task.matrices, task.outputs, task.inputs)
-    except ValueError as refusal:
-        return _solved(task, _direct(task.matrices), str(refusal).split(":")[0])
+    except ValueError as cause:
+        return _solved(task, _direct(task.matrices), str(cause).split(":")[0])
     order = np.argsort(task.freq_hz)
     lines = order[np.linspace(0, order.size - 1, _SPOTS).astype(int)]
     error, attainable = spot_error(task.freq_hz[lines], task.matrices, modes, task.outputs, task.inputs, rigid)

@@ -15,6 +15,7 @@ from jointfrf.models.receptance.factors import SingularMatrixError, SparseSolver
 
 __all__ = ["RigidModes", "eigh", "find_rigid_modes", "held", "mode_condition", "orthonormal", "resistance"]
 
+#: Rounding unit of the sums below.
 _EPS = float(np.finfo(np.float64).eps)
 #: r^T K r counts as zero within this many roundings of its terms: an entry of K is a sum of some tens of rounded terms.
 _ROUNDINGS = 32

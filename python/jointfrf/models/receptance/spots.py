@@ -19,7 +19,7 @@ from jointfrf.models.receptance.rigid_modes import RigidModes, held
 __all__ = ["TwoLevels", "spot_error"]
 
 #: Rounding may move the modes of a reduced model by this many times what it moves a direct solution by, but no more
-#: than what rounding leaves of a solution with the smallest reciprocal condition that is not announced: four digits.
+#: than what rounding leaves of a solution with the smallest reciprocal condition that gives no warning: four digits.
 _LOSS: Final = 30
 _MOST_ROUNDING: Final = float(np.finfo(np.float64).eps) / RCOND_LIMIT
 #: Steps of the iteration; a step that is longer than this share of the one before has reached rounding, if it is
@@ -51,7 +51,7 @@ class TwoLevels:
     With Z = alpha K - beta M, and P = K - s M, a step adds P^-1 r / alpha of the residual r, which leaves
     (beta/alpha - s) / (w_r^2 - s) of an error in mode r: little in the modes above the band. Then it adds what
     the modes of the reduced model take of the residual, which leaves nothing in the modes that it holds. The fixed
-    point is the solution with the whole model, whatever the reduced model is worth: that says only how fast it is
+    point is the solution with the whole model, whatever the reduced model: its quality only sets how fast it is
     reached [1]_. A complex factorisation takes four times as long as that of P and twice its memory.
 
     References
@@ -77,7 +77,7 @@ class TwoLevels:
         step : ndarray, shape (n_out, n_forces)
             Last step at the responses: rounding; zeros where the tolerance was met before.
         None
-            The iteration does not get there.
+            The iteration does not converge.
         """
         assert matrices.proportional is not None
         _, b, eta = matrices.proportional
@@ -131,17 +131,17 @@ def spot_error(
     rigid : RigidModes, optional
         What is solved by its mass alone.
     near : TwoLevels, optional
-        How a large model is solved; where it does not get there, and by default, by complex factors of each line.
+        How a large model is solved; where it does not converge, and by default, by complex factors of each line.
     solver : SparseSolver, optional
-        One that knows the order of elimination.
+        One that holds the order of elimination.
 
     Returns
     -------
     error : float
         Relative to the largest entry of the line; inf where there is no solution.
     attainable : float
-        Some times the last step of a refinement of the solutions, which is all rounding; no more than the
-        rounding of a solution that is just not announced as ill-conditioned.
+        A multiple of the last step of a refinement of the solutions, which is all rounding; no more than the
+        rounding of the worst conditioned line that gives no warning.
     """
     found = modes.lines(freq_hz, "nan")[0]
     parts = held(matrices.n) if rigid is None else rigid
