@@ -40,7 +40,7 @@ module jointfrf_rational_fit
     procedure :: do_items => sum_pairs
   end type pair_sums
 
-  !> The quadratic form of sigma of each entry, its numerator eliminated; an item is an entry.
+  !> What the numerator of each entry takes off the quadratic form of sigma; an item is an entry.
   type, extends(shared_work) :: elimination
     integer :: n, n_entries
     type(pair_sums), pointer :: gram => null()
@@ -89,7 +89,7 @@ contains
     info = info_good
     if (size(h) == 0) return
     n = size(poles) + 1
-    call prepare_sums(4*size(h, 2), n, size(s), gram, info)
+    call prepare_sums(3*size(h, 2) + 1, n, size(s), gram, info)
     if (info == info_good) then
       allocate (moved(n - 1), form(n, n), basis%psi(size(s), n), basis%triangle(n, n), &
                 entries%forms(n, n, size(h, 2)), entries%failed(size(h, 2)), stat=stat)
@@ -254,7 +254,7 @@ contains
     threads = threads_for(4.0_dp*n_sums*n_pairs*n_freq, int((n_pairs - 1)/piece_pairs + 1, long), serial_flops_products)
   end function threads_of
 
-  !> w^2, w^2 |h|^2, w^2 Re h, w^2 Im h of each entry.
+  !> w^2 of each entry, the sum of w^2 |h|^2 of all, w^2 Re h and w^2 Im h of each.
   pure subroutine set_weights(h, weight, weights)
     complex(dp), intent(in) :: h(:, :)
     real(dp), intent(in) :: weight(:, :)
@@ -263,9 +263,9 @@ contains
 
     m = size(h, 2)
     weights(:, :m) = weight**2
-    weights(:, m + 1:2*m) = weights(:, :m)*(real(h)**2 + aimag(h)**2)
-    weights(:, 2*m + 1:3*m) = weights(:, :m)*real(h)
-    weights(:, 3*m + 1:) = weights(:, :m)*aimag(h)
+    weights(:, m + 1) = sum(weights(:, :m)*(real(h)**2 + aimag(h)**2), dim=2)
+    weights(:, m + 2:2*m + 1) = weights(:, :m)*real(h)
+    weights(:, 2*m + 2:) = weights(:, :m)*aimag(h)
   end subroutine set_weights
 
   !> [1, 1/(s - p)] made orthonormal under the mean weight, by Gram and Schmidt, twice.
@@ -274,6 +274,7 @@ contains
     real(dp), contiguous, intent(in) :: weight(:, :)
     type(orthonormal_basis), intent(inout) :: basis
     complex(dp) :: numbers(size(poles) + 1)
+    complex(dp) :: distance(size(s))
     real(dp) :: mean_weight(size(s)), length
     integer :: j, turn
 
@@ -282,7 +283,8 @@ contains
       triangle = 0.0_dp
       psi(:, 1) = mean_weight
       do j = 1, size(poles)
-        psi(:, j + 1) = mean_weight/(s - poles(j))
+        distance = s - poles(j)
+        psi(:, j + 1) = conjg(distance)*(mean_weight/(real(distance)**2 + aimag(distance)**2))
       end do
       do j = 1, size(psi, 2)
         do turn = 1, merge(0, 2, j == 1)
@@ -294,8 +296,9 @@ contains
         triangle(j, j) = length
         if (length > 0.0_dp) psi(:, j) = psi(:, j)/length
       end do
+      mean_weight = 1/mean_weight
       do j = 1, size(psi, 2)
-        psi(:, j) = psi(:, j)/mean_weight
+        psi(:, j) = psi(:, j)*mean_weight
       end do
     end associate
   end subroutine make_basis
@@ -401,7 +404,7 @@ contains
     type(elimination), intent(in) :: entries
     complex(dp), contiguous, intent(out) :: form(:, :)
     integer(ip), intent(out) :: info
-    integer :: threads, i, j
+    integer :: threads, i, j, k
 
     call sum_all(basis, gram)
     threads = threads_for(24.0_dp*entries%n_entries*real(entries%n, dp)**3, int(entries%n_entries, long), &
@@ -409,6 +412,13 @@ contains
     call share(entries, int(entries%n_entries, long), threads, even=.true.)
     info = count(entries%failed /= 0, kind=ip)
     form = sum(entries%forms, dim=3)
+    do k = 1, gram%n_pairs                                    ! and w^2 |h|^2 of all entries
+      associate (right => gram%sums(entries%n_entries + 1, :, k))
+        form(gram%first(k), gram%second(k)) = form(gram%first(k), gram%second(k)) + cmplx(right(1), right(2), dp)
+        if (gram%first(k) /= gram%second(k)) &
+          form(gram%second(k), gram%first(k)) = form(gram%second(k), gram%first(k)) + cmplx(right(1), -right(2), dp)
+      end associate
+    end do
     do j = 1, size(form, 2)                                   ! Hermitian but for rounding
       do i = 1, j
         form(i, j) = (form(i, j) + conjg(form(j, i)))/2
@@ -433,10 +443,8 @@ contains
       call own_gram(self%gram, e, own)
       associate (form => self%forms(:, :, e), sums => self%gram%sums)
         do k = 1, self%gram%n_pairs
-          associate (i => self%gram%first(k), j => self%gram%second(k), right => sums(m + e, :, k), &
-                     re => sums(2*m + e, :, k), im => sums(3*m + e, :, k))          ! w^2 |h|^2, w^2 Re h, w^2 Im h
-            form(i, j) = cmplx(right(1), right(2), dp)
-            form(j, i) = conjg(form(i, j))
+          associate (i => self%gram%first(k), j => self%gram%second(k), &
+                     re => sums(m + 1 + e, :, k), im => sums(2*m + 1 + e, :, k))    ! w^2 Re h, w^2 Im h
             mixed(i, j) = cmplx(re(1) - im(2), re(2) + im(1), dp)
             mixed(j, i) = cmplx(re(1) + im(2), im(1) - re(2), dp)
           end associate
@@ -444,8 +452,11 @@ contains
         solved = mixed
         call zgesv(n, n, own, n, pivot, solved, n, stat)
         self%failed(e) = int(stat)
-        if (stat /= 0) cycle
-        call zgemm('C', 'N', n, n, n, (-1.0_dp, 0.0_dp), mixed, n, solved, n, (1.0_dp, 0.0_dp), form, n, 1_c_size_t, &
+        if (stat /= 0) then
+          form = 0.0_dp
+          cycle
+        end if
+        call zgemm('C', 'N', n, n, n, (-1.0_dp, 0.0_dp), mixed, n, solved, n, (0.0_dp, 0.0_dp), form, n, 1_c_size_t, &
                    1_c_size_t)
       end associate
     end do
