@@ -42,7 +42,7 @@ module jointfrf_rational_fit
     procedure :: do_items => sum_pairs
   end type pair_sums
 
-  !> The quadratic form of sigma of each entry, its numerator eliminated; an item is an entry.
+  !> What the numerator of each entry takes off the quadratic form of sigma; an item is an entry.
   type, extends(shared_work) :: elimination
     integer :: n, n_entries, threads
     type(pair_sums), pointer :: gram => null()
@@ -107,7 +107,7 @@ contains
       return
     end if
     n = size(poles) + 1
-    call prepare_sums(4*size(h, 2), n, size(s), gram, stat)
+    call prepare_sums(3*size(h, 2) + 1, n, size(s), gram, stat)
     if (stat == 0) call prepare_basis(n, size(s), basis, stat)
     if (stat == 0) call prepare_entries(n, size(h, 2), gram, entries, stat)
     if (stat == 0) call prepare_zeros(n, space, stat)
@@ -326,18 +326,21 @@ contains
     threads = threads_for(4.0_dp*n_sums*n_pairs*n_freq, int((n_pairs - 1)/piece_pairs + 1, long), serial_flops_products)
   end function threads_of
 
-  !> w^2, w^2 |h|^2, w^2 Re h, w^2 Im h of each entry.
+  !> w^2 of each entry, the sum of w^2 |h|^2 of all, w^2 Re h and w^2 Im h of each.
   pure subroutine set_weights(h, weight, weights)
     complex(dp), intent(in) :: h(:, :)
     real(dp), intent(in) :: weight(:, :)
     real(dp), intent(out) :: weights(:, :)
-    integer :: m
+    integer :: m, e
 
     m = size(h, 2)
     weights(:, :m) = weight**2
-    weights(:, m + 1:2*m) = weights(:, :m)*(real(h)**2 + aimag(h)**2)
-    weights(:, 2*m + 1:3*m) = weights(:, :m)*real(h)
-    weights(:, 3*m + 1:) = weights(:, :m)*aimag(h)
+    weights(:, m + 1) = 0.0_dp
+    do e = 1, m
+      weights(:, m + 1) = weights(:, m + 1) + weights(:, e)*(real(h(:, e))**2 + aimag(h(:, e))**2)
+    end do
+    weights(:, m + 2:2*m + 1) = weights(:, :m)*real(h)
+    weights(:, 2*m + 2:) = weights(:, :m)*aimag(h)
   end subroutine set_weights
 
   !> [1, 1/(s - p)] made orthonormal under the mean weight, by Gram and Schmidt, twice.
@@ -345,8 +348,9 @@ contains
     complex(dp), contiguous, intent(in) :: s(:), poles(:)
     real(dp), contiguous, intent(in) :: weight(:, :)
     type(orthonormal_basis), intent(inout) :: basis
+    complex(dp) :: distance
     real(dp) :: length
-    integer :: j, turn
+    integer :: j, line, turn
 
     associate (psi => basis%psi, triangle => basis%triangle, numbers => basis%numbers, mean_weight => basis%mean_weight)
       mean_weight = 0.0_dp
@@ -357,7 +361,10 @@ contains
       triangle = 0.0_dp
       psi(:, 1) = mean_weight
       do j = 1, size(poles)
-        psi(:, j + 1) = mean_weight/(s - poles(j))
+        do line = 1, size(s)
+          distance = s(line) - poles(j)
+          psi(line, j + 1) = conjg(distance)*(mean_weight(line)/(real(distance)**2 + aimag(distance)**2))
+        end do
       end do
       do j = 1, size(psi, 2)
         do turn = 1, merge(0, 2, j == 1)
@@ -369,8 +376,9 @@ contains
         triangle(j, j) = length
         if (length > 0.0_dp) psi(:, j) = psi(:, j)/length
       end do
+      mean_weight = 1/mean_weight
       do j = 1, size(psi, 2)
-        psi(:, j) = psi(:, j)/mean_weight
+        psi(:, j) = psi(:, j)*mean_weight
       end do
     end associate
   end subroutine make_basis
@@ -476,7 +484,7 @@ contains
     type(elimination), intent(in) :: entries
     complex(dp), contiguous, intent(out) :: form(:, :)
     integer(ip), intent(out) :: info
-    integer :: e, i, j
+    integer :: e, i, j, k
 
     call sum_all(basis, gram)
     call share(entries, int(entries%n_entries, long), entries%threads, even=.true.)
@@ -484,6 +492,13 @@ contains
     form = 0.0_dp
     do e = 1, entries%n_entries
       form = form + entries%forms(:, :, e)
+    end do
+    do k = 1, gram%n_pairs                                    ! and w^2 |h|^2 of all entries
+      associate (right => gram%sums(entries%n_entries + 1, :, k))
+        form(gram%first(k), gram%second(k)) = form(gram%first(k), gram%second(k)) + cmplx(right(1), right(2), dp)
+        if (gram%first(k) /= gram%second(k)) &
+          form(gram%second(k), gram%first(k)) = form(gram%second(k), gram%first(k)) + cmplx(right(1), -right(2), dp)
+      end associate
     end do
     do j = 1, size(form, 2)                                   ! Hermitian but for rounding
       do i = 1, j
@@ -509,10 +524,8 @@ contains
                  solved => self%work(:, :, 3, thread))
         call own_gram(self%gram, e, own)
         do k = 1, self%gram%n_pairs
-          associate (i => self%gram%first(k), j => self%gram%second(k), right => sums(m + e, :, k), &
-                     re => sums(2*m + e, :, k), im => sums(3*m + e, :, k))          ! w^2 |h|^2, w^2 Re h, w^2 Im h
-            form(i, j) = cmplx(right(1), right(2), dp)
-            form(j, i) = conjg(form(i, j))
+          associate (i => self%gram%first(k), j => self%gram%second(k), &
+                     re => sums(m + 1 + e, :, k), im => sums(2*m + 1 + e, :, k))    ! w^2 Re h, w^2 Im h
             mixed(i, j) = cmplx(re(1) - im(2), re(2) + im(1), dp)
             mixed(j, i) = cmplx(re(1) + im(2), im(1) - re(2), dp)
           end associate
@@ -520,8 +533,11 @@ contains
         solved = mixed
         call zgesv(n, n, own, n, pivot, solved, n, stat)
         self%failed(e) = int(stat)
-        if (stat /= 0) cycle
-        call zgemm('C', 'N', n, n, n, (-1.0_dp, 0.0_dp), mixed, n, solved, n, (1.0_dp, 0.0_dp), form, n, 1_c_size_t, &
+        if (stat /= 0) then
+          form = 0.0_dp
+          cycle
+        end if
+        call zgemm('C', 'N', n, n, n, (-1.0_dp, 0.0_dp), mixed, n, solved, n, (0.0_dp, 0.0_dp), form, n, 1_c_size_t, &
                    1_c_size_t)
       end associate
     end do

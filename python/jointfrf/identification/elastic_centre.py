@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from jointfrf.dofs import is_rotation
+from jointfrf.dofs import is_rotation, rigid_offset
 from jointfrf.identification.joint_fit import JointFit
 from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import FloatArray, check_type
@@ -119,6 +119,8 @@ class _Coupling:
         turns = np.array([is_rotation(dof) for dof in joint.dofs])
         k = np.diagonal(joint.stiffness)
         self.length = float(np.sqrt(np.median(k[turns]) / np.median(k[~turns])))
+        # A rigid offset is the unit matrix and a linear function of the offset.
+        self.turned = np.array([rigid_offset(joint.dofs, unit) for unit in np.eye(3)]) - np.eye(len(joint.dofs))
         self.weight = np.ones(self.rows.size)
         if covariance is not None:
             slope = self._by_stiffness(np.zeros(3))
@@ -128,7 +130,8 @@ class _Coupling:
     def at(self, offset: FloatArray, stiffness: FloatArray | None = None) -> FloatArray:
         """Return the coupling of all pairs, not weighted."""
         k = self.joint.stiffness if stiffness is None else stiffness
-        moved = Joint(k, dofs=self.joint.dofs).moved(offset).stiffness
+        back = np.eye(len(k)) - np.tensordot(offset, self.turned, 1)
+        moved = back.T @ k @ back
         root = np.sqrt(abs(np.diagonal(moved)))
         coupling: FloatArray = (moved / np.outer(root, root))[self.rows, self.columns]
         return coupling

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from jointfrf.channels.check.measurement import LEAST_SMOOTHNESS, modulus
 from jointfrf.channels.check.ratio_line import block_medians, ratio_line
 from jointfrf.frf.noise_estimate import ZERO
+from jointfrf.frf.quantiles import medians
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
 __all__ = [
@@ -90,10 +91,10 @@ def pair_ratios(omega: FloatArray, h: ComplexArray, smooth: FloatArray) -> PairR
     direction = _unit(turned.sum(axis=0))
     power = _powers(omega, amplitude)
     amplitude = amplitude - power * np.log(omega)[:, None]
-    middle = np.median(amplitude, axis=0)
+    middle = medians(amplitude.T).T
     rest: ComplexArray = (amplitude - middle) + 1j * np.angle(turned * direction.conj())
-    scatter = np.median(modulus(rest), axis=0)
-    typical = np.median(modulus(h), axis=0)
+    scatter = medians(modulus(rest).T).T
+    typical = medians(modulus(h).T).T
     judged = are_signals(typical, smooth, h.shape[0])[p, q]
     usable, broken = judged & (scatter < BROKEN), judged & (scatter >= BROKEN)
     alone = are_one_sided(typical, smooth)[p, q]
@@ -134,9 +135,9 @@ def are_one_sided(size: FloatArray, smooth: FloatArray) -> NDArray[np.bool_]:
 def scatter_of(above: ComplexArray, below: ComplexArray) -> FloatArray:
     """Median over lines of |log(above / below) - constant|: below `BROKEN` where they are one FRF up to a factor."""
     amplitude, phasor = _parts(above, below)
-    rest = amplitude - np.median(amplitude, axis=0)
+    rest = amplitude - medians(amplitude.T).T
     turn = np.angle(phasor * _unit(phasor.sum(axis=0)).conj())
-    scatter: FloatArray = np.median(np.hypot(rest, turn), axis=0)
+    scatter: FloatArray = medians(np.hypot(rest, turn).T).T
     one_is_zero = ((above == 0) != (below == 0)).mean(axis=0) > 0.5
     return np.where(one_is_zero, ONE_SIDED, scatter)
 

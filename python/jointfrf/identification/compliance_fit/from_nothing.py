@@ -24,6 +24,7 @@ _HIDDEN = 1.0
 _SEEN = 0.02
 #: A residual of this share of the FRFs, and so many times the noise, is that of no joint.
 _NO_FIT, _FAR = 0.5, 2.0
+_TINY = float(np.finfo(float).tiny)
 
 
 def check_transform(name: str, transform: FloatArray, labels: list[str]) -> None:
@@ -45,12 +46,13 @@ def check_channels(gamma: ComplexArray, labels: list[str]) -> None:
     half = len(labels) // 2
     some = gamma[:: -(-len(gamma) // _MOST_LINES)]
     measured = _is_measured(some)
-    for what, h in (("responses", some), ("forces", some.swapaxes(1, 2))):
-        size = np.sqrt((abs(h) ** 2).mean(axis=(0, 2)))
+    squares = some.real**2 + some.imag**2
+    for what, h, of_h in (("responses", some, squares), ("forces", some.swapaxes(1, 2), squares.swapaxes(1, 2))):
+        size = np.sqrt(of_h.mean(axis=(0, 2)))
         if not size.all():
             dead = [labels[i] for i in np.flatnonzero(size == 0)]
             raise ValueError(f"gamma: the {what} {', '.join(dead)} are zero: nothing was measured there")
-        flat = _normalised(h)
+        flat = _normalised(h, of_h)
         product = flat @ flat.conj().T
         sides = slice(0, half), slice(half, 2 * half)
         values, vectors = np.linalg.eigh(np.array([product[side, side] for side in sides]))
@@ -71,11 +73,11 @@ def check_channels(gamma: ComplexArray, labels: list[str]) -> None:
                     )
 
 
-def _normalised(h: ComplexArray) -> ComplexArray:
+def _normalised(h: ComplexArray, squares: FloatArray) -> ComplexArray:
     """Return rows of norm 1, shape (rows, n_freq columns), to which every line and column adds alike."""
-    h = h / np.maximum(np.sqrt((h.real**2 + h.imag**2).mean(axis=(0, 1))), np.finfo(float).tiny)
-    h /= np.maximum(np.sqrt((h.real**2 + h.imag**2).mean(axis=(1, 2), keepdims=True)), np.finfo(float).tiny)
-    flat = h.swapaxes(0, 1).reshape(h.shape[1], -1)
+    of_columns = np.maximum(np.sqrt(squares.mean(axis=(0, 1))), _TINY)
+    of_lines = np.maximum(np.sqrt((squares / of_columns / of_columns).mean(axis=(1, 2), keepdims=True)), _TINY)
+    flat = (h / of_columns / of_lines).swapaxes(0, 1).reshape(h.shape[1], -1)
     rows: ComplexArray = flat / np.linalg.norm(flat, axis=1, keepdims=True)
     return rows
 

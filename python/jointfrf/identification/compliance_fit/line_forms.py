@@ -134,8 +134,15 @@ class FormMinimum:
         joint, forms = (self.joint, self.forms) if whole else (self.joint.on_lines(lines), self.forms.on_slice(lines))
         entries = joint.compliance(self.x)
         slope = joint.slope(self.x, entries)
-        adjoint = slope.conj().swapaxes(1, 2)
         residual = forms.at(entries)[1]
+        if isinstance(joint, DiagonalJoint):
+            # Each coordinate moves one entry.
+            dofs = joint.dofs
+            own = slope[:, dofs, np.arange(dofs.size)]
+            adjoint = own.conj()
+            weighted = adjoint[:, :, None] * forms.weight[:, dofs[:, None], dofs] * own[:, None, :]
+            return LineParts((adjoint * residual[:, dofs]).real, weighted.real)
+        adjoint = slope.conj().swapaxes(1, 2)
         return LineParts((adjoint @ residual[..., None])[..., 0].real, (adjoint @ (forms.weight @ slope)).real)
 
     @property
