@@ -22,16 +22,16 @@ pytestmark = [
 
 
 def test_the_lanes_of_one_level_and_the_plain_ones(tmp_path):
-    build = tmp_path / "build"
+    folder = tmp_path / "build"
     environment = os.environ | {"PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
     options = ["-Dinstruction_sets=own", "-Dbuildtype=plain", "-Dtests=false", "-Dlapack=scipy-openblas32"]
     for command in (
-        ["meson", "setup", build, ROOT, *options, f"-Dlapack_python={sys.executable}"],
-        ["ninja", "-C", build],
+        ["meson", "setup", *options, folder, ROOT, f"-Dlapack_python={sys.executable}"],
+        ["ninja", "-C", folder],
     ):
         done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=environment)
         assert done.returncode == 0, done.stdout
-    library = ctypes.CDLL(str(build / "fortran" / "libjointfrf.so"))
+    library = ctypes.CDLL(str(folder / "fortran" / "libjointfrf.so"))
     info, chosen = ctypes.c_int(), ctypes.c_int()
     there = []
     for number, word in enumerate(WORDS):

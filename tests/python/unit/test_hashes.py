@@ -54,6 +54,12 @@ def test_a_package_of_another_hash_is_told(tmp_path, content, wrong):
 
 def test_the_set_up_compares_before_it_goes_on():
     text = (ROOT / "python" / "bootstrap.sh").read_text(encoding="utf-8")
-    (install,) = re.findall(r"^pip_install\(\) \{\n(.*?)^\}", text, re.MULTILINE | re.DOTALL)
-    assert install.index("--report build/installed.json") < install.index("-I -S python/check_hashes.py")
     assert text.count("pip --disable-pip-version-check --no-input install") == 1
+    reports = re.findall(r"\(exec_pip_install (build/\S+) ", text)
+    checked = [report for report in reports if f"check_installed {report}\n" in text]
+    # The package itself, whose dependencies are there, comes from no archive.
+    assert len(reports) == 3
+    assert [report for report in reports if report not in checked] == ["build/installed-own.json"]
+    assert re.search(r"build/installed-own.json \S*--no-build-isolation --no-deps ", text)
+    for report in checked:
+        assert text.index(f"exec_pip_install {report} ") < text.index(f"check_installed {report}\n")
