@@ -5,13 +5,16 @@ import io
 import re
 import subprocess
 import sys
+from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 from PIL import Image
 
 import jointfrf as jf
-from jointfrf.cases.catalogue import find_case, list_cases, numbered, run_case
+from command import Finished, run_command
+from jointfrf.cases.catalogue import CaseOutput, find_case, list_cases, numbered, run_case
 from jointfrf.cases.known_joint.figures import known_joint_figures
 from jointfrf.cli.main import main
 from jointfrf.dofs import Parameter
@@ -23,12 +26,22 @@ from jointfrf.report.table import Table, as_text, number
 COMMAND = [sys.executable, "-m", "jointfrf"]
 
 
+class Ran(NamedTuple):
+    """What a command gave, and the cases that it ran to their ends, by name."""
+
+    folder: Path
+    done: Finished
+    outputs: dict[str, CaseOutput]
+
+
 @pytest.fixture(scope="module")
-def outputs(tmp_path_factory):
-    """Two cases: one parameter a kind, and several methods on beams."""
+def ran(tmp_path_factory):
+    """One command, two processes: one parameter a kind, several methods on beams, a case that fails, one behind it."""
     folder = tmp_path_factory.mktemp("results")
-    beams = tmp_path_factory.mktemp("cases") / "beams"
+    beams, wrong = (tmp_path_factory.mktemp("cases") / name for name in ("beams", "wrong"))
     beams.mkdir()
+    wrong.mkdir()
+    (wrong / "case.toml").write_text("title = 1\n")
     for name in ("case.toml", "expected.toml", "README.md"):
         text = (find_case("3.3.1") / name).read_text()
         text = text.replace("elements = 300", "elements = 30").replace("elements = 225", "elements = 20")
@@ -39,10 +52,22 @@ def outputs(tmp_path_factory):
             .replace("step = 1.0", "step = 5.0")
         )
         (beams / name).write_text(text)
-    return {
-        "chain": run_case(find_case("3.1"), folder, realisations=30),
-        "beams": run_case(beams, folder, realisations=4),
-    }
+    outputs = {}
+
+    def kept(case, *arguments, **options):
+        outputs[case.name] = run_case(case, *arguments, **options)
+        return outputs[case.name]
+
+    words = ("3.1", beams, wrong, "3.3", "--realisations", "4", "--jobs", "2", "--out", folder)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("jointfrf.cli.run.run_case", kept)
+        done = run_command("run", *words)
+    return Ran(folder, done, outputs)
+
+
+@pytest.fixture
+def outputs(ran):
+    return {"chain": ran.outputs["3.1-discrete"], "beams": ran.outputs["beams"]}
 
 
 FIGURES = {
@@ -147,29 +172,27 @@ def call(*words, cwd=None):
     return subprocess.run([*COMMAND, *words], capture_output=True, text=True, cwd=cwd)
 
 
-def test_command_runs_a_case_in_processes(outputs, tmp_path):
-    done = call("run", "3.1", "--realisations", "30", "--jobs", "2", "--out", str(tmp_path / "out"))
-    assert done.returncode == 0, done.stderr
-    assert done.stderr == ""
+def test_processes_give_what_one_gives(ran, tmp_path, without_pictures):
+    alone = run_case(find_case("3.1"), tmp_path, realisations=4).report.parent
+    table = "tables/identified.csv"
+    assert (ran.folder / "3.1-discrete" / table).read_text() == (alone / table).read_text()
+
+
+def test_cases_of_one_command_are_told_in_their_order(ran):
+    """They are under way at the same time; one that fails does so where its turn comes."""
+    done = ran.done
+    assert done.returncode == 1
+    assert re.fullmatch(r"jointfrf: error: \S*case.toml: title must be a text, not 1\n", done.stderr)
     assert "2010.9" in done.stdout
     assert "Natural frequencies of the assembly" in done.stdout
-    assert str(tmp_path / "out" / "3.1-discrete" / "report.html") in done.stdout
-    table = "tables/identified.csv"
-    parallel = (tmp_path / "out" / "3.1-discrete" / table).read_text()
-    assert parallel == (outputs["chain"].report.parent / table).read_text()
-
-
-def test_cases_of_one_command_are_told_in_their_order(tmp_path):
-    """They are under way at the same time; one that fails does so where its turn comes."""
-    (tmp_path / "case.toml").write_text("title = 1\n")
-    words = ("3.2", "3.1", str(tmp_path), "3.3", "--realisations", "2", "--jobs", "2", "--out", str(tmp_path / "out"))
-    done = call("run", *words)
-    assert done.returncode == 1
-    assert done.stderr == f"jointfrf: error: {tmp_path / 'case.toml'}: title must be a text, not 1\n"
-    said = [line for line in done.stdout.splitlines() if line.startswith(("3.", "What fits")) or "report: " in line]
-    reports = [tmp_path / "out" / name / "report.html" for name in ("3.2-fe-beams", "3.1-discrete")]
+    said = [
+        line
+        for line in done.stdout.splitlines()
+        if line.startswith(("3.1", "beams", "What fits")) or "report: " in line
+    ]
+    reports = [ran.folder / name / "report.html" for name in ("3.1-discrete", "beams")]
     assert [line.split(": ")[-1] for line in (said[2], said[5])] == [str(report) for report in reports]
-    assert [line.split(":")[0] for line in said[::3]] == ["3.2-fe-beams", "3.1-discrete"]
+    assert [line.split(":")[0] for line in said[::3]] == ["3.1-discrete", "beams"]
     assert len(said) == 6
     assert all(report.is_file() for report in reports)
 
