@@ -62,6 +62,8 @@ def as_array(name: str, value: ArrayLike) -> NDArray[Any]:
         return np.asarray(value)
     except ValueError as error:  # lists of lists that make no rectangle
         raise ValueError(f"{name} must be an array of numbers: its rows differ in length or kind") from error
+    except (RuntimeError, TypeError) as error:  # such as tensors with a gradient, or in another memory
+        raise TypeError(f"{name} does not become a numpy array: {' '.join(str(error).split())}") from error
 
 
 def _converted(name: str, value: ArrayLike, dtype: np.dtype[Any], *, later: bool = False) -> NDArray[Any]:

@@ -1,5 +1,7 @@
 """Objects of another class than the one that is needed get one sentence, not an AttributeError."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -171,3 +173,26 @@ def test_one_text_is_no_sequence_of_names():
     """Its letters would be names of DOFs."""
     with pytest.raises(TypeError, match="dofs must be a sequence of names, not 'xy'"):
         jf.Model(np.eye(2), np.eye(2), dofs="xy")
+
+
+class Tensor:
+    """An array of another library, as torch has them: it becomes a numpy array, or says why not."""
+
+    def __init__(self, values, refusal=None):
+        self.values, self.refusal = values, refusal
+
+    def __array__(self, dtype=None, copy=None):
+        if self.refusal:
+            raise self.refusal
+        return self.values if dtype is None else self.values.astype(dtype)
+
+
+def test_arrays_of_other_libraries():
+    a = np.array([[[2.0 + 1j]]] * 5)
+    np.testing.assert_array_equal(jf.invert(Tensor(a)), jf.invert(a))
+    for refusal in (RuntimeError("Can't call numpy() on Tensor that requires grad."), TypeError("can't convert\ncuda")):
+        message = f"does not become a numpy array: {' '.join(str(refusal).split())}"
+        with pytest.raises(TypeError, match=re.escape(f"a {message}")):
+            jf.invert(Tensor(a, refusal))
+        with pytest.raises(TypeError, match=re.escape(f"gamma {message}")):
+            jf.identify(np.arange(1.0, 6.0), Tensor(a, refusal), ["x"])
