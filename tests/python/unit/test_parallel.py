@@ -131,6 +131,15 @@ def test_what_dask_says_of_lost_workers_is_said_alike(name):
         assert sorted(pool.completed(abs, iter(range(3)))) == [(0, 0), (1, 1), (2, 2)]
 
 
+def test_what_an_executor_refuses_is_said_as_it_is():
+    class Closed(Fragile):
+        def submit(self, fn, /, *args, **kwargs):
+            raise PermissionError("the queue is closed to you")
+
+    with pytest.raises(PermissionError, match="the queue is closed to you"), opened_pool(Closed()) as pool:
+        list(pool.completed(abs, iter(range(3))))
+
+
 def test_an_executor_that_breaks_at_once_is_not_made_forever():
     class Dead(Fragile):
         def submit(self, fn, /, *args, **kwargs):
