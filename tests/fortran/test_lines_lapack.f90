@@ -6,7 +6,7 @@ program test_lines_lapack
   use jointfrf_sweep, only: line_space
   implicit none
   real(dp), parameter :: tolerance = 1.0e-13_dp
-  integer, parameter :: sizes(6) = [1, 2, 3, 7, 33, 70]
+  integer, parameter :: sizes(7) = [1, 2, 3, 7, 32, 33, 70]
   type(line_space), allocatable, target :: space
   integer(long) :: declared(3)
   integer :: i

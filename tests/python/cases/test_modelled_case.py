@@ -56,6 +56,14 @@ def test_laws_of_all_kinds_are_read(tmp_path):
         assert [name for name in case.truth.joint.names if name.endswith("theta")] == list(names)
 
 
+def test_any_positive_number_of_a_beam_may_be_unknown(tmp_path):
+    old = 'substructure = "A"\nname = "youngs_modulus"\nvalue = 67e9\nstd_percent = 2.0'
+    new = 'substructure = "A"\nname = "loss_factor"\nvalue = 0.01\nstd_percent = 20.0'
+    case = read_case(small_case(tmp_path, (old, new)))
+    unknown = case.believed.a.unknowns["loss_factor"]
+    assert (unknown.value, unknown.std, unknown.lower) == (0.01, pytest.approx(0.002), 0)
+
+
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [

@@ -163,6 +163,14 @@ def test_large_matrices_are_reduced_or_factored_by_their_entries(by_matrices):
     same_frfs(case.a.receptance(BEAMS.freq_hz[:40], ["3:z", "99:z", "6400:z", "5:z"]), h)
 
 
+def test_some_modes_of_a_large_model_are_those_of_all_and_the_same_each_time():
+    model = jf.beam(0.3, 40, ends=("clamped", "free"), density=2700.0, width=0.025, height=0.006, youngs_modulus=67e9)
+    (first, shapes), (again, same_shapes) = model.modes(6), model.modes(6)
+    np.testing.assert_allclose(first, model.modes()[0][:6], rtol=1e-6)
+    np.testing.assert_array_equal(again, first)
+    np.testing.assert_array_equal(same_shapes, shapes)
+
+
 def test_dofs_without_mass_have_no_modes():
     """Two springs in a row with nothing between them: one mode, of half the stiffness."""
     k = np.array([[2.0, -1.0], [-1.0, 1.0]])

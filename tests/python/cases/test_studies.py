@@ -189,6 +189,17 @@ def test_a_realisation_without_a_joint_counts_as_failed(tmp_path):
     assert "failed" in str(found)
 
 
+def test_the_bound_is_that_of_the_variance_of_the_noise(tmp_path):
+    """Noise of a standard deviation in each part is sqrt 2 times noise of that standard deviation in all."""
+    kinds = ["complex", "complex-per-part", "real-normal"]
+    design = jf.StudyDesign({"lines": [50], "noise.kind": kinds}, noises=["5 %"], estimators=["ismm"])
+    found = jf.study(CASE, tmp_path, 1, design=design, jobs=1)
+    whole, per_part, of_modulus = np.reshape([row.bound for row in found.summary], (3, -1))
+    assert (whole > 0).all()
+    np.testing.assert_allclose(per_part, np.sqrt(2) * whole)
+    assert np.isnan(of_modulus).all()
+
+
 def test_a_modelled_joint(tmp_path):
     found = jf.study("rubber-mount", tmp_path, 1, design=jf.StudyDesign({"noise": [0.005]}), jobs=1)
     rows = {row.parameter: row for row in found.summary}
@@ -225,6 +236,7 @@ def test_command_says_what_the_study_holds(reference, tmp_path):
         (["3.1", "--factor", "nois=0.1"], 1, "no key for the factor 'nois'; did you mean noise?"),
         (["3.1", "--first", "3"], 2, "--first and --count belong together"),
         (["3.1", "--realisations", "5", "--first", "3", "--count", "3"], 1, "from 0 to 4, not 3 to 5"),
+        (["3.1", "--realisations", "0"], 1, "realisations must be from 1 to 2147483647, not 0"),
         (["3.1", "3.2"], 2, "one case at a time, not 3.1 and 3.2"),
         (["3.11"], 2, "there is no case '3.11'"),
         (["merge", "somewhere"], 2, "merge needs the folders of parts, and --out DIR"),

@@ -194,6 +194,9 @@ def test_virtual_points_from_different_sensors_and_impacts():
     channels = dict(responses=[f"{i}:y" for i in range(1, 7)], forces=[f"{i}:y" for i in range(11, 17)])
     transform = np.linalg.pinv(sensors), np.linalg.pinv(impacts)
     assert jf.check_frfs(S.freq, h, **channels, transform=transform, dofs=["y", "theta"]).ok
+    (finding,) = jf.check_frfs(S.freq, -h, **channels, transform=transform).findings
+    assert finding.kind == "sign"
+    assert {name.partition(":")[2] for name in finding.channels} <= {"0", "1"}
     wrong = jf.check_frfs(S.freq, -h, **channels, transform=transform, dofs=["y", "theta"])
     assert [finding.kind for finding in wrong.findings] == ["sign"]
     degrees = np.diag([1, 180 / np.pi, 1, 1]) @ transform[0]

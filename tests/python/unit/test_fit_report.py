@@ -13,12 +13,13 @@ from jointfrf.dofs import DIRECTIONS, joint_parameters
 from jointfrf.identification.fit_data import FitData
 from jointfrf.identification.joint_fit import JointFit
 from jointfrf.report.chart import Chart, chart_view
+from jointfrf.report.document import Document, HeatMap, Section, make_document
 from jointfrf.report.draw import STYLES
 from jointfrf.report.figure import Curve, Figure, Panel
 from jointfrf.report.fit import fit_figures
 from jointfrf.report.fit_frfs import compare_frfs
 from jointfrf.report.fit_page import ReportOptions, fit_document
-from jointfrf.report.fit_words import finding_sentences, quality_sentences
+from jointfrf.report.fit_words import finding_sentences, parameter_table, quality_sentences
 from jointfrf.report.sketch import interface_points
 from jointfrf.report.thinning import thinned_dots, thinned_line
 
@@ -188,6 +189,21 @@ def test_a_rigid_dof_is_drawn_by_its_bound(fits):
     assert [curve.label for curve in stiffness.curves] == ["each line", "lower bound of k, 95 %"]
     assert stiffness.curves[1].y.tolist() == [low, low]
     assert [curve.label for curve in loss.curves] == ["each line"]
+
+
+def test_loss_factors_stand_below_the_parameters_where_there_are_any(fits, beams):
+    assert "loss factors" not in parameter_table(fits["plain"]).note
+    h = jf.pollute(beams.gamma(jf.Joint([6e5, 5e3], [20, 0], structural_damping=[0, 400])), 0.01, seed=3)
+    fit = jf.identify(beams.freq, h, ["y", "theta_z"], damping=["viscous", "hysteretic"])
+    assert f"; loss factors h/k: theta_z {fit.loss_factor[1]:.3g}." in parameter_table(fit).note
+
+
+def test_a_cell_of_a_map_without_a_number_is_empty():
+    values = np.array([[np.nan, 1.0], [0.5, 12.345]])
+    heat = HeatMap("map", "A map", "row \\ column", ["a", "b"], ["c", "d"], values, 1, 3)
+    page = make_document(Document("Page", "", [Section("one", "One", [heat])]))
+    cells = re.findall(r"<td[^>]*>([^<]*)</td>", page)
+    assert cells == ["", "1.00", "0.50", "12.35"]
 
 
 def test_lines_left_out_are_drawn_apart(fits):

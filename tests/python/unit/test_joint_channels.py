@@ -92,8 +92,11 @@ def test_what_is_wrong_is_said():
         )
     with pytest.raises(ValueError, match="is listed twice as response"):
         jf.joint_channels(frfs, [*places, places[0]], POINT)
-    with pytest.raises(ValueError, match="node 101 has no coordinates"):
-        jf.joint_channels(replace(frfs, coordinates={}), places, POINT)
+    bare = replace(frfs, coordinates={})
+    with pytest.raises(ValueError, match=r"^node 101 has no coordinates, neither in "):
+        jf.joint_channels(bare, places, POINT)
+    with pytest.raises(ValueError, match=r"^channels\.csv, line 2: node 101 has no coordinates, neither in "):
+        jf.joint_channels(bare, [replace(place, where="channels.csv, line 2") for place in places], POINT)
     few = [place for place in places if place.channel.node not in (101, 102, 103)]
     with pytest.raises(ValueError, match=r"responses of side j .*too few for 6 DOFs"):
         jf.joint_channels(frfs, few, POINT)

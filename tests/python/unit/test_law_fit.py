@@ -1,12 +1,14 @@
 """Joints of laws from FRFs between all joint DOFs, without models: `identify(..., joint=...)`."""
 
 import warnings
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import jointfrf as jf
 from jointfrf.identification.law_fit.law_coordinates import LawCoordinates
+from jointfrf.identification.parameter_table import parameter_warnings
 
 FREQ = np.linspace(12, 620, 153)
 SECTION = {"density": 2700.0, "width": 0.025, "height": 0.006, "loss_factor": 0.01, "youngs_modulus": 67e9}
@@ -30,6 +32,20 @@ JOINTS = {
         }),
     ),
 }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("limits", "text"),
+    [
+        ((1e5, 4e5), "k_y: poorly determined by the data, 95 % interval 1e+05 .. 4e+05 N/m"),
+        ((1.1e5, 2.9e5), ""),
+        ((1e5, np.inf), "k_y: cannot be distinguished from rigid; at least 1e+05 N/m (95 %)"),
+        ((0.0, 4e5), "k_y: cannot be distinguished from zero; at most 4e+05 N/m (95 %)"),
+    ],
+)
+def test_parameters_that_the_data_do_not_determine(limits, text):
+    one = SimpleNamespace(name="k_y", unit="N/m", is_log=True)
+    assert parameter_warnings([(one, 2e5, 5e4)], lambda name: limits) == ([text] if text else [])
 
 
 @pytest.fixture(scope="module")

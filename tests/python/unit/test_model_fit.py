@@ -421,6 +421,20 @@ def test_realisations_of_a_decoupling_fit_are_those_of_single_fits():
             assert abs(value - fit.parameters[name]) < 0.2 * fit.std_error[name]
 
 
+def test_realisations_of_noise_of_two_parts_are_those_of_single_fits():
+    """A share of each FRF, and the same at all lines, which is larger between resonances."""
+    freq, sides, k_joint, exact, measured = decoupling_data(0.03, 4)
+    measured = measured + (
+        jf.realisations(np.ascontiguousarray(exact), 0.01, seed=7, count=4, relative_to="spectrum") - exact
+    )
+    many = fit_decoupling(freq, ("x",), sides, 0.2 * k_joint, measured)
+    for found, h in zip(many, measured, strict=True):
+        parts = [jf.Substructure.of_frfs(freq, own, ["j", "i"], ["j"]) for own in sides]
+        fit = fit_of(freq, h, jf.Assembly(*parts, jf.Joint([500.0], [1.0], ["x"])), ["A/i", "B/i"], ["A/i", "B/i"])
+        for value, name in zip(found, ("k_x", "c_x"), strict=True):
+            assert abs(value - fit.parameters[name]) < 0.03 * fit.std_error[name]
+
+
 def test_a_realisation_unlike_the_first_is_fitted_by_itself():
     """Noise three times that of the first set, then the first once more."""
     freq, sides, k_joint, exact, measured = decoupling_data(0.02, 2)

@@ -2,14 +2,16 @@
 
 import signal
 import threading
-from concurrent.futures import BrokenExecutor, Future, ThreadPoolExecutor
+from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from types import SimpleNamespace
 
 import pytest
 from threadpoolctl import threadpool_info
 
 import jointfrf as jf
 from deadly_tasks import kill_this_process, note
+from jointfrf.parallel.cores import available_cores
 from jointfrf.parallel.one_thread import one_thread
 from jointfrf.parallel.pool import Pool, opened_pool
 
@@ -76,6 +78,21 @@ def test_a_process_that_dies_costs_its_task_only(tmp_path):
         pool.submit(abs, 1)
 
 
+def test_workers_are_counted_as_each_package_calls_them():
+    def workers_of(**attributes):
+        executor = Executor()
+        vars(executor).update(attributes)
+        with opened_pool(executor) as pool:
+            return pool.workers
+
+    assert workers_of(_max_workers=3) == 3
+    assert workers_of(num_workers=5) == 5
+    dask = SimpleNamespace(ncores=lambda: {"tcp://a": 300, "tcp://b": 400})
+    assert workers_of(_client=dask) == 700
+    assert workers_of(_client=SimpleNamespace(ncores=dict)) == 1  # none has come yet
+    assert workers_of() == workers_of(_client=object()) == available_cores()
+
+
 class Fragile(ThreadPoolExecutor):
     """Breaks at its third task, and with it those that wait."""
 
@@ -129,6 +146,15 @@ def test_what_dask_says_of_lost_workers_is_said_alike(name):
         list(pool.completed(abs, iter(range(3))))
     with opened_pool(Lost) as pool:
         assert sorted(pool.completed(abs, iter(range(3)))) == [(0, 0), (1, 1), (2, 2)]
+
+
+def test_what_an_executor_refuses_is_said_as_it_is():
+    class Closed(Fragile):
+        def submit(self, fn, /, *args, **kwargs):
+            raise PermissionError("the queue is closed to you")
+
+    with pytest.raises(PermissionError, match="the queue is closed to you"), opened_pool(Closed()) as pool:
+        list(pool.completed(abs, iter(range(3))))
 
 
 def test_an_executor_that_breaks_at_once_is_not_made_forever():
