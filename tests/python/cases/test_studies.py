@@ -103,6 +103,7 @@ def test_two_processes_of_mpi_give_the_same_numbers(reference, tmp_path):
     assert same(jf.read_study(tmp_path), reference)
 
 
+@pytest.mark.long
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 def test_a_killed_study_goes_on_without_loss(tmp_path):
     """Killed as soon as some chunks are there, and once more; what is there then is not computed again."""

@@ -194,7 +194,15 @@ def bomb_csv(path):
 
 @pytest.mark.parametrize(
     ("name", "make"),
-    [("a.npz", bomb_npz), ("a.mat", bomb_mat), ("a.h5", bomb_hdf5), ("b.h5", bomb_links), ("a.csv", bomb_csv)],
+    [
+        ("a.npz", bomb_npz),
+        ("a.csv", bomb_csv),
+        # To make them takes seconds; files that state too much are above.
+        *(
+            pytest.param(*each, marks=pytest.mark.long)
+            for each in (("a.mat", bomb_mat), ("a.h5", bomb_hdf5), ("b.h5", bomb_links))
+        ),
+    ],
 )
 def test_what_unfolds_to_more_than_the_limit_is_not_read(tmp_path, name, make):
     path = tmp_path / name

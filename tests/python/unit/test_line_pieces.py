@@ -91,7 +91,7 @@ def test_a_fit_of_noisy_pieces(beams, cut):
         assert abs(fit.parameters[name] - value) < 0.7 * whole.std_error[name]
 
 
-@pytest.mark.parametrize("noise", [None, 0.03])
+@pytest.mark.parametrize("noise", [None, pytest.param(0.03, marks=pytest.mark.long)])
 def test_memory_of_a_fit_is_a_few_times_that_of_its_frfs(monkeypatch, noise):
     """Beside the FRFs: smooth ones and variances, once each, and less; pieces are as small as of a long sweep."""
     freq = np.linspace(1, 600, 5000)
