@@ -240,10 +240,10 @@ def written_whole(path: Path) -> Iterator[Path]:
                 shutil.copyfileobj(source, sink)
             temporary.unlink()
             return
-        if older is not None:
-            _keep(temporary, older)
-        with temporary.open("rb") as file:
+        with temporary.open("r+b") as file:
             os.fsync(file.fileno())
+        if older is not None:
+            _keep(temporary, older)  # in the end: it may be a file that its owner cannot open
         temporary.replace(target)
     except BaseException as error:
         if temporary is not None:
