@@ -126,3 +126,14 @@ def write_sdynpy(path, frfs, function_type=4):
                 data["coordinate"][i, j, k] = channel.node, channel.sign * codes[channel.axis]
     np.savez(path, data=data, function_type=function_type)
     return path
+
+
+GIVEN = frf_set()
+#: The same as named arrays, as other programs save them.
+FIELDS = {
+    "f": FREQ_HZ,
+    "H": GIVEN.h,
+    "responses": names(GIVEN.responses),
+    "excitations": names(GIVEN.excitations),
+    "unit": "m/s^2/N",
+}

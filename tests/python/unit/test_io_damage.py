@@ -13,7 +13,16 @@ import numpy as np
 import pytest
 
 import jointfrf as jf
-from frf_files import FREQ_HZ, frf_set, full_set, names, structure_of_testlab, write_mat, write_mat73, write_sdynpy
+from frf_files import (
+    FIELDS,
+    FREQ_HZ,
+    GIVEN,
+    full_set,
+    structure_of_testlab,
+    write_mat,
+    write_mat73,
+    write_sdynpy,
+)
 from jointfrf.errors import FileContentError, FileContentWarning
 from jointfrf.io import read_frfs, read_uff, write_csv, write_hdf5, write_npz, write_uff
 from uff_writer import VALUES, dataset, function
@@ -21,14 +30,6 @@ from uff_writer import VALUES, dataset, function
 pytest.importorskip("pyuff")
 h5py = pytest.importorskip("h5py")
 
-GIVEN = frf_set()
-FIELDS = {
-    "f": FREQ_HZ,
-    "H": GIVEN.h,
-    "responses": names(GIVEN.responses),
-    "excitations": names(GIVEN.excitations),
-    "unit": "m/s^2/N",
-}
 MAKERS = {
     "text.uff": lambda path: write_uff(path, full_set(), binary=False),
     "binary.uff": lambda path: write_uff(path, full_set()),

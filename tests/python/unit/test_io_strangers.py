@@ -13,22 +13,13 @@ import pytest
 import scipy.io
 from scipy import sparse
 
-from frf_files import FREQ_HZ, frf_set, full_set, names, structure_of_testlab, write_mat
+from frf_files import FIELDS, FREQ_HZ, GIVEN, full_set, structure_of_testlab, write_mat
 from jointfrf.errors import FileContentError
 from jointfrf.files import ReadLimit
 from jointfrf.io import read_frfs, write_hdf5, write_npz
 from jointfrf.io.mat_fields import mat_fields
 from jointfrf.io.matrix_file import read_matrix
 from uff_writer import function
-
-GIVEN = frf_set()
-FIELDS = {
-    "f": FREQ_HZ,
-    "H": GIVEN.h,
-    "responses": names(GIVEN.responses),
-    "excitations": names(GIVEN.excitations),
-    "unit": "m/s^2/N",
-}
 
 
 @pytest.fixture
