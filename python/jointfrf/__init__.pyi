@@ -46,19 +46,22 @@ from jointfrf.frf.metrics import amplitude_error, frequency_error, has_peak, pea
 from jointfrf.frf.noise import pollute, realisations
 from jointfrf.frf.noise_model import NoiseModel, estimate_noise
 from jointfrf.frf.smoothing import SmoothFrfs, smooth_frfs
+from jointfrf.identification.band_means import identify_band_mean
+from jointfrf.identification.derived import Derived
 from jointfrf.identification.elastic_centre import ElasticCentre, elastic_centre
+from jointfrf.identification.findings import Finding
+from jointfrf.identification.fit_cards import cards
 from jointfrf.identification.identify import identify
+from jointfrf.identification.identify_model import identify_model
 from jointfrf.identification.joint_file import read_joint, write_joint
-from jointfrf.identification.joint_fit import JointFit
-from jointfrf.identification.law_fit.law_fit import LawFit
 from jointfrf.identification.model_fit.assembly import Assembly
 from jointfrf.identification.model_fit.attachments import AddedMass, GroundSpring
-from jointfrf.identification.model_fit.identify_model import identify_model
-from jointfrf.identification.model_fit.model_fit import ModelFit
 from jointfrf.identification.model_fit.substructure import Substructure
 from jointfrf.identification.model_fit.unknown import Unknown
 from jointfrf.identification.monte_carlo import BandStatistics, MonteCarlo, monte_carlo
 from jointfrf.identification.realisations import FitStart, identify_realisations
+from jointfrf.identification.record import fit_from_dict, fit_to_dict, load, save
+from jointfrf.identification.result import Fit, FittedParameter
 from jointfrf.identification.sensitivity import propose_bands, sensitivity
 from jointfrf.joint import Joint
 from jointfrf.kernel.engine import get_engine, set_engine, use_engine
@@ -78,6 +81,8 @@ from jointfrf.parallel.pool import BrokenPoolError
 from jointfrf.parallel.processes import SeparateProcesses
 from jointfrf.parallel.sweep import plan_sweep, sweep
 from jointfrf.parallel.sweep_plan import SweepPlan
+from jointfrf.report.fit_page import write_report
+from jointfrf.report.fit_plot import plot
 from jointfrf.solids.bolt import PROOF_STRENGTH, STRESS_AREA, Bolt, preload_force
 from jointfrf.solids.bolted_lap import BoltedLap, LapDivisions, bolted_lap
 from jointfrf.solids.brick import Material, assemble_bricks, brick_quality, element_matrices
@@ -115,12 +120,16 @@ __all__ = [
     "ContactLaw",
     "ConvergenceWarning",
     "CopyWarning",
+    "Derived",
     "DifferenceError",
     "DrivingPointCheck",
     "ElasticCentre",
     "FileContentError",
     "FileContentWarning",
+    "Finding",
+    "Fit",
     "FitStart",
+    "FittedParameter",
     "FractionalZener",
     "FrfCheck",
     "FrfCheckWarning",
@@ -133,17 +142,14 @@ __all__ = [
     "Interface",
     "Joint",
     "JointChannels",
-    "JointFit",
     "JointLaw",
     "LapDivisions",
     "LawField",
-    "LawFit",
     "LawJoint",
     "Material",
     "Mesh",
     "MissingPackageError",
     "Model",
-    "ModelFit",
     "MonteCarlo",
     "MultiPointJoint",
     "NoiseModel",
@@ -175,6 +181,7 @@ __all__ = [
     "bolted_lap",
     "brick_beam",
     "brick_quality",
+    "cards",
     "central_difference",
     "chain",
     "channel_geometry",
@@ -190,11 +197,14 @@ __all__ = [
     "element_matrices",
     "estimate_noise",
     "find_modification",
+    "fit_from_dict",
+    "fit_to_dict",
     "frequency_error",
     "from_triangle",
     "get_engine",
     "has_peak",
     "identify",
+    "identify_band_mean",
     "identify_model",
     "identify_realisations",
     "impact_consistency",
@@ -206,6 +216,7 @@ __all__ = [
     "ismm",
     "joint_channels",
     "joint_compliance",
+    "load",
     "merge_studies",
     "modify",
     "monte_carlo",
@@ -214,6 +225,7 @@ __all__ = [
     "peak",
     "places_of_nodes",
     "plan_sweep",
+    "plot",
     "pollute",
     "preload",
     "preload_force",
@@ -224,6 +236,7 @@ __all__ = [
     "receptance",
     "reciprocal_condition",
     "rigid_offset",
+    "save",
     "semm",
     "sensitivity",
     "sensor_consistency",
@@ -239,4 +252,5 @@ __all__ = [
     "virtual_point",
     "virtual_points",
     "write_joint",
+    "write_report",
 ]

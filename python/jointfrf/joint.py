@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from jointfrf.dofs import rigid_offset
-from jointfrf.io.cards import CardFormat, CardOptions, cards
+from jointfrf.io.cards import CardFormat, CardOptions, spring_cards
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_array, as_frequency, as_names, as_real
 
 __all__ = ["Joint"]
@@ -230,4 +230,4 @@ class Joint:
         <BLANKLINE>
         """
         matrices = self.stiffness, self.damping, self.hysteretic_stiffness
-        return cards(program, self.dofs, matrices, nodes, **options)
+        return spring_cards(program, self.dofs, matrices, nodes, **options)

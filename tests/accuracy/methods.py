@@ -83,7 +83,7 @@ def of_bands(case, exact, gamma):
 
 def values_of(fit, dofs):
     """Stiffness of all DOFs, then damping."""
-    return np.array([fit.parameters[f"{kind}_{dof}"] for kind in "kc" for dof in dofs])
+    return np.array([fit.value[f"{kind}_{dof}"] for kind in "kc" for dof in dofs])
 
 
 def one_draw(name, seed):

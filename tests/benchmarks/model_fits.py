@@ -35,7 +35,7 @@ def main() -> int:
     return 0
 
 
-def _time(name: str, fit: Callable[[int], jf.ModelFit], truth: dict[str, float], repetitions: int) -> None:
+def _time(name: str, fit: Callable[[int], jf.Fit], truth: dict[str, float], repetitions: int) -> None:
     seconds, processor, errors = [], [], []
     for seed in range(repetitions):
         wall, cpu = time.perf_counter(), time.process_time()
@@ -44,11 +44,11 @@ def _time(name: str, fit: Callable[[int], jf.ModelFit], truth: dict[str, float],
             found = fit(seed)
         seconds.append(time.perf_counter() - wall)
         processor.append(time.process_time() - cpu)
-        errors += [abs(found.parameters[key] - true) / found.std_error[key] for key, true in truth.items()]
+        errors += [abs(found.value[key] - true) / found.std_error[key] for key, true in truth.items()]
     print(f"{name:44} {statistics.median(seconds):8.2f} {statistics.median(processor):7.2f}   {max(errors):.1f}")
 
 
-def _beams(channels: tuple[str, ...]) -> tuple[Callable[[int], jf.ModelFit], dict[str, float]]:
+def _beams(channels: tuple[str, ...]) -> tuple[Callable[[int], jf.Fit], dict[str, float]]:
     """Case 3.3 with exact models."""
     freq = np.arange(15.0, 801.0)
     parts = (
@@ -59,7 +59,7 @@ def _beams(channels: tuple[str, ...]) -> tuple[Callable[[int], jf.ModelFit], dic
     exact = truth.receptance(freq, channels, channels)
     believed = jf.Assembly(*parts, jf.Joint([1e5, 1e3], [5, 0.5], ["y", "theta"]))
 
-    def fit(seed: int) -> jf.ModelFit:
+    def fit(seed: int) -> jf.Fit:
         return jf.identify_model(freq, jf.pollute(exact, 0.05, seed=seed), believed, channels, channels)
 
     return fit, {"k_y": 6e5, "k_theta": 5e3, "c_y": 20.0, "c_theta": 1.5}
@@ -74,7 +74,7 @@ def _bar(length: float, clamped: bool, material: jf.Material) -> jf.Model:
     )  # fmt: skip
 
 
-def _bricks() -> tuple[Callable[[int], jf.ModelFit], dict[str, float]]:
+def _bricks() -> tuple[Callable[[int], jf.Fit], dict[str, float]]:
     """Two brick beams, six joint DOFs; moduli, densities, loss factors and two sensors unknown."""
     freq, ports = np.linspace(5.0, 900.0, 600), [f"joint:{dof}" for dof in _DOFS]
     outputs, forces = ["A/p4:x", "A/p4:y", "B/p5:x", "B/p5:y", "B/p5:z"], ["A/p3:x", "A/p3:y", "B/p5:x", "B/p5:z"]
@@ -94,7 +94,7 @@ def _bricks() -> tuple[Callable[[int], jf.ModelFit], dict[str, float]]:
     masses = [jf.AddedMass(at, jf.Unknown(0.002, 0.002)) for at in ("A/p4:y", "B/p5:y")]
     believed = jf.Assembly(*beams(67e9, 0.008, unknown), jf.Joint(*_GUESS, list(_DOFS)), masses)
 
-    def fit(seed: int) -> jf.ModelFit:
+    def fit(seed: int) -> jf.Fit:
         return jf.identify_model(freq, jf.pollute(exact, 0.02, seed=seed), believed, outputs, forces)
 
     return fit, dict(zip([f"k_{dof}" for dof in _DOFS], _TRUE[0], strict=True))

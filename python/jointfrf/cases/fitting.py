@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import warnings
-from typing import get_args
 
 import numpy as np
 
 from jointfrf.errors import ConvergenceWarning, FrfCheckWarning, IdentificationWarning, IllConditionedWarning
 from jointfrf.identification.compliance_fit.line_forms import inverse_information
-from jointfrf.identification.identify import IdentificationMethod, identify
-from jointfrf.identification.joint_fit import JointFit
+from jointfrf.identification.identify import identify
 from jointfrf.identification.model_fit.assembly import Assembly
 from jointfrf.identification.model_fit.likelihood import Likelihood
 from jointfrf.identification.model_fit.prediction import Prediction
@@ -19,13 +17,15 @@ from jointfrf.identification.model_fit.realisations import joints_of_realisation
 from jointfrf.identification.model_fit.substructure import Substructure
 from jointfrf.identification.model_fit.unknowns import parameter_vector
 from jointfrf.identification.realisations import viscous_joints
+from jointfrf.identification.result import Fit
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.laws.law_joint import LawJoint
 from jointfrf.laws.springs import SpringLaw
+from jointfrf.substructuring.methods import STIFFNESS_METHODS
 
 __all__ = ["FITTED", "METHODS", "decoupling_bound", "fit_decoupling", "fit_measured", "fit_viscous"]
 
-METHODS: tuple[str, ...] = (*get_args(IdentificationMethod), "decoupling-fit")
+METHODS: tuple[str, ...] = ("compliance", *STIFFNESS_METHODS, "decoupling-fit")
 #: Methods that take all lines, not means over bands.
 FITTED = ("compliance", "decoupling-fit")
 #: Relative noise for the weights of a fit to data whose noise is not asked for.
@@ -133,7 +133,7 @@ def decoupling_bound(
     return np.concatenate([relative[::2], relative[1::2]])
 
 
-def fit_measured(freq_hz: FloatArray, dofs: tuple[str, ...], h: ComplexArray, transform: FloatArray) -> JointFit:
+def fit_measured(freq_hz: FloatArray, dofs: tuple[str, ...], h: ComplexArray, transform: FloatArray) -> Fit:
     """Fit a joint to FRFs between measured channels; its warnings stand in the result.
 
     Parameters
@@ -149,7 +149,7 @@ def fit_measured(freq_hz: FloatArray, dofs: tuple[str, ...], h: ComplexArray, tr
 
     Returns
     -------
-    JointFit
+    Fit
     """
     gamma = transform @ h @ transform.T
     # Of each FRF between joint DOFs by itself: the covariance of all of many channels takes ten times as long.

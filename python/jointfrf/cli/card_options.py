@@ -12,7 +12,8 @@ import numpy as np
 from jointfrf.cli.measured_file import nodes, numbers, point, words
 from jointfrf.cli.usage import UsageError, check_folder, positive
 from jointfrf.files import write_file
-from jointfrf.identification.joint_fit import JointFit
+from jointfrf.identification.fit_cards import cards
+from jointfrf.identification.result import Fit
 from jointfrf.io.cards import CardFormat, CardOptions
 from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import FloatArray
@@ -146,10 +147,10 @@ def _refusal(why: str, damping: str) -> str:
     return why.replace("full_matrix", "--full-matrix")
 
 
-def written_cards(fit: JointFit, request: CardRequest, about: Sequence[str]) -> str:
+def written_cards(fit: Fit, request: CardRequest, about: Sequence[str]) -> str:
     """Return the cards of a fit, and write them where that is wanted."""
-    text = fit.export(
-        request.program, request.nodes, about=about, all_damping=request.all_damping, **request.options
+    text = cards(
+        fit, request.program, request.nodes, about=about, all_damping=request.all_damping, **request.options
     )  # fmt: skip
     if request.output is not None:
         write_file(request.output, text)

@@ -24,14 +24,16 @@ from jointfrf.cli.structure_file import own_matrix, read_structures
 from jointfrf.cli.usage import UsageError, check_folder, waiting
 from jointfrf.errors import FileContentError, IdentificationWarning
 from jointfrf.files import write_file
-from jointfrf.identification.identify import IdentificationMethod, identify
-from jointfrf.identification.joint_fit import JointFit
+from jointfrf.identification.band_means import identify_band_mean
+from jointfrf.identification.record import fit_to_dict, save
+from jointfrf.identification.result import Fit
 from jointfrf.io import Channel, FrfSet
 from jointfrf.kernel.arguments import ComplexArray
+from jointfrf.substructuring.methods import StiffnessMethod
 
 __all__ = ["add_arguments", "run"]
 
-_METHODS: dict[str, IdentificationMethod] = {
+_METHODS: dict[str, StiffnessMethod] = {
     "rr": "decoupling-rr",
     "rs": "decoupling-rs",
     "sr": "decoupling-sr",
@@ -109,20 +111,20 @@ def run(args: argparse.Namespace) -> int:
     measured = assembly.matrix(at[args.equation[0]], at[args.equation[1]])
     with warnings.catch_warnings(), waiting("decoupling"):
         warnings.simplefilter("ignore", IdentificationWarning)  # they stand in the table
-        fit = identify(
-            a.freq_hz, measured, args.dofs, _METHODS[args.equation], args.band,
+        fit = identify_band_mean(
+            a.freq_hz, measured, _METHODS[args.equation], args.dofs, args.band,
             h_a=side_a.h, h_b=side_b.h, dofs_j=side_a.joint, dofs_k=side_b.joint,
             dofs_r=side_a.internal, dofs_s=side_b.internal,
         )  # fmt: skip
     written = []
     if args.save is not None:
-        fit.save(args.save)
+        save(fit, args.save)
         written.append(args.save)
     if args.output is not None:
         write_file(args.output, _line_table(fit))
         written.append(args.output)
     out.say(fit, *([""] if written else []), *(f"wrote {path}" for path in written))
-    fits = [fit.to_dict(lines=False)]
+    fits = [fit_to_dict(fit, lines=False)]
     out.give({"equation": args.equation, "fits": fits, "written": [str(path) for path in written]})
     return 0
 
@@ -160,11 +162,12 @@ def _found(frfs: FrfSet, names: tuple[Channel, ...], wanted: list[Channel]) -> l
     return [names.index(channel) for channel in wanted]
 
 
-def _line_table(fit: JointFit) -> str:
+def _line_table(fit: Fit) -> str:
     """Write K* of each line, N/m and its like, as a CSV table."""
     pairs = [(p, q) for p in range(len(fit.dofs)) for q in range(len(fit.dofs))]
     names = [f"{part} K_{fit.dofs[p]},{fit.dofs[q]}" for p, q in pairs for part in ("Re", "Im")]
     rows = [",".join(["frequency [Hz]", *(f'"{name}"' for name in names)])]
+    assert fit.k_lines is not None
     for freq, k in zip(fit.freq_hz, fit.k_lines, strict=True):
         values = [number for p, q in pairs for number in (k[p, q].real, k[p, q].imag)]
         rows.append(",".join(f"{number:.12g}" for number in (freq, *np.asarray(values))))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
@@ -30,12 +29,14 @@ from jointfrf.cli.usage import UsageError, check_folder, waiting
 from jointfrf.dofs import is_rotation
 from jointfrf.errors import ConvergenceWarning, FrfCheckWarning, IdentificationWarning
 from jointfrf.extras import check_extras
-from jointfrf.files import write_file
 from jointfrf.frf.noise_model import estimate_noise
+from jointfrf.identification.band_means import identify_band_mean
 from jointfrf.identification.compliance_fit.joint_terms import CrossTerms, DampingTerms
 from jointfrf.identification.identify import identify
-from jointfrf.identification.joint_fit import JointFit
+from jointfrf.identification.record import fit_to_dict, write_record
+from jointfrf.identification.result import Fit
 from jointfrf.io import FrfSet
+from jointfrf.report.fit_page import write_report
 from jointfrf.spelling import did_you_mean
 
 __all__ = ["add_arguments", "run"]
@@ -148,7 +149,7 @@ def run(args: argparse.Namespace) -> int:
         fit = fits[args.method.index("compliance")]
         ends = (1, 2) if args.export is None else args.export[1]
         args.report.parent.mkdir(parents=True, exist_ok=True)
-        written.append(fit.report(args.report, source=file_names(args), command=args.typed, nodes=ends))
+        written.append(write_report(fit, args.report, source=file_names(args), command=args.typed, nodes=ends))
     if args.out is not None:
         written += _write_figures(args, frfs, joint, fits)
     out.say(*([""] if written else []), *(f"wrote {path}" for path in written))
@@ -160,7 +161,7 @@ def _content(
     args: argparse.Namespace,
     joint: MeasuredJoint,
     check: FrfCheck,
-    fits: list[JointFit],
+    fits: list[Fit],
     text: str,
     written: list[Path],
 ) -> dict[str, Any]:
@@ -169,7 +170,7 @@ def _content(
         "joint": joint.to_dict(),
         "checks": check.to_dict(),
         "warnings": [*joint.warnings()],
-        "fits": [fit.to_dict(lines=False) for fit in fits],
+        "fits": [fit_to_dict(fit, lines=False) for fit in fits],
         "cards": text or None,
         "written": [str(path) for path in written],
     }
@@ -202,24 +203,24 @@ def _differences(args: argparse.Namespace, joint: MeasuredJoint) -> Iterator[str
         )
 
 
-def _fit(args: argparse.Namespace, method: str, frfs: FrfSet, joint: MeasuredJoint) -> JointFit:
-    more = _of_compliance(args, frfs, joint) if method == "compliance" else {"transform": _one_transform(joint)}
+def _fit(args: argparse.Namespace, method: str, frfs: FrfSet, joint: MeasuredJoint) -> Fit:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", IdentificationWarning)  # they stand in the table
         warnings.simplefilter("ignore", ConvergenceWarning)
         warnings.simplefilter("ignore", FrfCheckWarning)  # told with the names of the channels
-        return identify(frfs.freq_hz, _measured(method, joint), joint.dofs, method, args.band, **more)  # type: ignore[call-overload, no-any-return]
+        if method == "compliance":
+            return identify(frfs.freq_hz, joint.h, joint.dofs, args.band, **_of_compliance(args, frfs, joint))
+        transform = joint.responses if joint.is_square else None
+        return identify_band_mean(
+            frfs.freq_hz, _square(joint), "inverse-substructuring", joint.dofs, args.band, transform=transform
+        )
 
 
-def _measured(method: str, joint: MeasuredJoint) -> np.ndarray:
-    """FRFs as the method takes them: band means know one transform only."""
-    if method == "compliance" or joint.is_square:
+def _square(joint: MeasuredJoint) -> np.ndarray:
+    """FRFs as means over bands take them, which know one transform only."""
+    if joint.is_square:
         return joint.h
     return np.ascontiguousarray(joint.responses.transform @ joint.h @ joint.forces.transform.T)
-
-
-def _one_transform(joint: MeasuredJoint) -> Any:
-    return joint.responses if joint.is_square else None
 
 
 def _of_compliance(args: argparse.Namespace, frfs: FrfSet, joint: MeasuredJoint) -> dict[str, Any]:
@@ -245,12 +246,12 @@ def _places(joint: MeasuredJoint) -> list[str]:
     return [f"reference points x, y, z = {both[0]} m (j) and {both[1]} m (k)"]
 
 
-def _save(path: Path, fit: JointFit, source: str, joint: MeasuredJoint) -> None:
+def _save(path: Path, fit: Fit, source: str, joint: MeasuredJoint) -> None:
     about = {"source": source, "reference_points_m": plain(dict(zip("jk", joint.responses.references, strict=True)))}
-    write_file(path, json.dumps(fit.to_dict() | about, indent=1, allow_nan=False) + "\n")
+    write_record(path, fit_to_dict(fit) | about)
 
 
-def _write_figures(args: argparse.Namespace, frfs: FrfSet, joint: MeasuredJoint, fits: list[JointFit]) -> list[Path]:
+def _write_figures(args: argparse.Namespace, frfs: FrfSet, joint: MeasuredJoint, fits: list[Fit]) -> list[Path]:
     from jointfrf.report.fit import write_fit
     from jointfrf.report.noise import noise_figure
 

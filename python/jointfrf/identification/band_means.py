@@ -3,96 +3,129 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from jointfrf.channels.point_lines import Interface
 from jointfrf.dofs import joint_parameters
 from jointfrf.frf.bands import Band, as_bands, band_mean, in_bands
-from jointfrf.identification.joint_fit import JointFit
-from jointfrf.identification.prepare import BandsOfDofs, MeasuredFrfs, as_dof_names, as_transform
-from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.identification.findings import note
+from jointfrf.identification.prepare import BandsOfDofs, as_dof_names, as_measured, as_transform
+from jointfrf.identification.result import Fit
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, check_choice
 from jointfrf.substructuring.methods import STIFFNESS_METHODS, JointFrfs, StiffnessMethod, joint_stiffness
 
-__all__ = ["BandMeanProblem", "fit_band_mean", "prepare_band_mean"]
+__all__ = ["identify_band_mean"]
 
 _NOTE = "the standard error of a band mean is the scatter of its lines; its bias by noise is not included"
 
 
-@dataclass(frozen=True)
-class BandMeanProblem:
-    """K*(w) of all lines, to be averaged over bands.
-
-    Attributes
-    ----------
-    method : str
-        How K*(w) was computed.
-    dofs : tuple of str
-        Names of the n joint DOFs.
-    freq_hz : ndarray, shape (n_freq,)
-    k_lines : ndarray, shape (n_freq, n, n)
-        N/m.
-    bands : tuple
-        For each DOF its bands, (low, high) in Hz.
-    """
-
-    method: StiffnessMethod
-    dofs: tuple[str, ...]
-    freq_hz: FloatArray
-    k_lines: ComplexArray
-    bands: tuple[tuple[Band, ...], ...]
-
-
-def prepare_band_mean(
+def identify_band_mean(
+    freq_hz: ArrayLike,
+    measured: ArrayLike,
     method: StiffnessMethod,
-    measured: MeasuredFrfs,
-    frfs: JointFrfs,
-    dofs: Sequence[str] | None,
-    bands: BandsOfDofs,
-    transform: ArrayLike | None,
-) -> BandMeanProblem:
-    """Compute K*(w) and check the rest; `frfs` holds all but what is measured, other arguments as in `identify`."""
-    freq, h = measured.freq_hz, measured.h
+    dofs: Sequence[str] | None = None,
+    bands: BandsOfDofs = None,
+    *,
+    transform: ArrayLike | Interface | None = None,
+    alpha: ArrayLike | None = None,
+    k_initial: ArrayLike | None = None,
+    h_a: ArrayLike | None = None,
+    h_b: ArrayLike | None = None,
+    dofs_j: ArrayLike | None = None,
+    dofs_k: ArrayLike | None = None,
+    dofs_r: ArrayLike | None = None,
+    dofs_s: ArrayLike | None = None,
+) -> Fit:
+    """Identify a joint by a method of the thesis: K*(w) of each line by itself, averaged over sensitive bands.
+
+    `identify` needs no bands and no models, and has the error bars of its noise; this is what the thesis does.
+
+    Parameters
+    ----------
+    freq_hz : array_like, shape (n_freq,)
+        Hz.
+    measured : array_like, shape (n_freq, 2 n, 2 n), (n_freq, m, m) with `transform`, or (n_freq, n, n) for decoupling
+        Receptances, m/N: at joint DOFs j, then k; or at the points that `transform` takes there; or, for decoupling,
+        between the internal points that the equation names.
+    method : str
+        "ismm", "ismm-kj": inverse structural modification (2.47) with D_jk or D_kj, need `alpha` and `k_initial`.
+        "inverse-substructuring": -(gamma^-1)_jk, which ISMM reduces to. "decoupling-rr", "-rs", "-sr", "-ss":
+        (2.53)-(2.56), need `h_a`, `h_b` and the DOF lists.
+    dofs, bands
+        As in `identify`.
+    transform : array_like, shape (2 n, m), or Interface, optional
+        From channels to joint DOFs j, then k.
+    alpha : array_like, shape (n_freq, 2 n, 2 n), optional
+        Calculated receptance of the assembly with the first estimate, for ISMM.
+    k_initial : array_like, shape (n_freq, n, n) or (n, n), optional
+        First estimate K0, for ISMM.
+    h_a, h_b, dofs_j, dofs_k, dofs_r, dofs_s : optional
+        As in `decouple`.
+
+    Returns
+    -------
+    Fit
+        Stiffness and viscous damping. Standard errors: the scatter of the lines over the root of their number; the bias
+        of a mean by noise is not included.
+
+    Raises
+    ------
+    ValueError
+        Wrong shapes, names, bands; NaN or Inf in a line; an argument that the method needs is missing.
+    SingularLineError
+        A line cannot be inverted.
+
+    Examples
+    --------
+    >>> import numpy as np, jointfrf as jf
+    >>> freq = np.linspace(0.5, 10, 400)
+    >>> h = jf.chain([5, 3], [2500, 3500], [3, 4], ground="start").receptance(freq)[:, 1:, 1:]
+    >>> gamma = jf.couple(h, h, jf.Joint([2000.0], [3.0]).dynamic_stiffness(freq), [0], [0])
+    >>> fit = jf.identify_band_mean(freq, gamma, "inverse-substructuring", ["x"], (2, 8))
+    >>> fit.stiffness.round(6).tolist(), fit.damping.round(6).tolist()
+    ([2000.0], [3.0])
+    """
+    check_choice("method", method, tuple(STIFFNESS_METHODS))
+    if isinstance(transform, Interface):
+        transform = transform.transform
+    if isinstance(transform, tuple):
+        raise ValueError("a pair of transforms, for responses and for forces, is for identify")
+    lines = as_measured(freq_hz, measured)
+    freq, h = lines.freq_hz, lines.h
+    known = JointFrfs(
+        alpha=alpha, k_initial=k_initial, h_a=h_a, h_b=h_b,
+        dofs_j=dofs_j, dofs_k=dofs_k, dofs_r=dofs_r, dofs_s=dofs_s,
+    )  # fmt: skip
     if STIFFNESS_METHODS[method].measured == "h_c":
-        frfs = replace(frfs, h_c=h)
+        known = replace(known, h_c=h)
     elif transform is None:
-        frfs = replace(frfs, gamma=h)
+        known = replace(known, gamma=h)
     else:
         t = as_transform(transform, h.shape[1])
-        frfs = replace(frfs, gamma=t @ h @ t.T)
-    k_lines = joint_stiffness(method, frfs, freq_hz=freq)
+        known = replace(known, gamma=t @ h @ t.T)
+    k_lines = joint_stiffness(method, known, freq_hz=freq)
     names = as_dof_names(dofs, k_lines.shape[1])
-    return BandMeanProblem(method, names, freq, k_lines, tuple(map(tuple, as_bands(bands, names, freq))))
+    of_dofs = tuple(map(tuple, as_bands(bands, names, freq)))
+    mean = band_mean(freq, k_lines, dict(zip(names, of_dofs, strict=True)), names)
+    parameters = [one.name for one in joint_parameters(names)]
+    values = dict(zip(parameters, [*mean.stiffness.tolist(), *mean.damping.tolist()], strict=True))
+    covariance = np.diag(np.square(_scatter(freq, k_lines, of_dofs)))
+    kept = np.any([in_bands(freq, bands) for bands in of_dofs], axis=0)
+    return Fit.of_springs(
+        method, names, values, covariance, np.nan, np.nan, freq[kept],
+        findings=(note("averages", _NOTE),), k_lines=k_lines[kept], bands=of_dofs,
+    )  # fmt: skip
 
 
-def fit_band_mean(problem: BandMeanProblem) -> JointFit:
-    """Average K*(w) over the bands of each DOF, as the thesis does; standard errors from the scatter of the lines."""
-    freq, names = problem.freq_hz, problem.dofs
-    mean = band_mean(freq, problem.k_lines, dict(zip(names, problem.bands, strict=True)), names)
-    values = np.concatenate([mean.stiffness, mean.damping]).tolist()
-    kept = np.any([in_bands(freq, bands) for bands in problem.bands], axis=0)
-    return JointFit(
-        method=problem.method,
-        dofs=names,
-        parameters=dict(zip([one.name for one in joint_parameters(names)], values, strict=True)),
-        covariance=np.diag(np.square(_scatter(problem))),
-        noise_level=np.nan,
-        residual_level=np.nan,
-        freq_hz=freq[kept],
-        k_lines=problem.k_lines[kept],
-        bands=problem.bands,
-        notes=(_NOTE,),
-    )
-
-
-def _scatter(problem: BandMeanProblem) -> FloatArray:
+def _scatter(freq: FloatArray, k: ComplexArray, bands_of_dofs: tuple[tuple[Band, ...], ...]) -> FloatArray:
     """Return standard errors of the means: the scatter of the lines over the root of their number."""
-    freq, k = problem.freq_hz, problem.k_lines
     omega = np.where(freq > 0, 2 * np.pi * freq, np.nan)[:, None, None]
     errors = []
     for part in (k.real, k.imag / omega):
-        for d, bands in enumerate(problem.bands):
+        for d, bands in enumerate(bands_of_dofs):
             values = part[in_bands(freq, bands), d, d]
             errors.append(values.std(ddof=1) / np.sqrt(values.size) if values.size > 1 else np.nan)
     return np.array(errors)

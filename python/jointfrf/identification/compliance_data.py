@@ -38,7 +38,9 @@ def compliance_data(
     for group in found.estimate.groups:
         fitted[:, group.dofs] &= group.fit.trusted[:, None]
     # A level that was assumed has been replaced by that of the residual.
-    scale = (found.joint.noise_level / problem.noise.level) ** 2 if problem.noise.is_assumed else 1.0
+    noise = found.problem.noise
+    level = noise.level * np.sqrt(found.estimate.excess) if noise.is_assumed else noise.level
+    scale = (level / problem.noise.level) ** 2 if problem.noise.is_assumed else 1.0
     # An `Interface` is a tuple, too.
     pair = transform if isinstance(transform, tuple) and not isinstance(transform, Interface) else (transform,) * 2
     names = channel_names(frfs, problem.dofs, (pair[0], pair[1]))

@@ -7,9 +7,10 @@ from typing import NamedTuple
 import numpy as np
 
 from jointfrf.dofs import is_rotation, rigid_offset
-from jointfrf.identification.joint_fit import JointFit
+from jointfrf.identification.result import Fit
 from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import FloatArray, check_type
+from jointfrf.laws.law_joint import LawJoint
 
 __all__ = ["ElasticCentre", "elastic_centre"]
 
@@ -44,12 +45,12 @@ class ElasticCentre(NamedTuple):
     joint: Joint
 
 
-def elastic_centre(joint: Joint | JointFit) -> ElasticCentre:
+def elastic_centre(joint: Joint | Fit) -> ElasticCentre:
     """Find the reference point at which the stiffness of a joint is most nearly diagonal.
 
     Parameters
     ----------
-    joint : Joint or JointFit
+    joint : Joint or Fit
         With its full stiffness: a fit with ``cross="fit"``. Of a fit, coupling that is poorly known counts less, and
         the offset has a standard error.
 
@@ -81,9 +82,10 @@ def elastic_centre(joint: Joint | JointFit) -> ElasticCentre:
     >>> (-jf.elastic_centre(joint.moved([0, 0.006, 0])).offset).round(9).tolist()
     [-0.0, 0.006, -0.0]
     """
-    covariance = _stiffness_covariance(joint) if isinstance(joint, JointFit) else None
-    if isinstance(joint, JointFit):
-        joint = joint.joint
+    covariance = _stiffness_covariance(joint) if isinstance(joint, Fit) else None
+    if isinstance(joint, Fit):
+        found = joint.joint
+        joint = found.constant_joint() if isinstance(found, LawJoint) else found
     check_type("joint", joint, Joint)
     turns = [is_rotation(dof) for dof in joint.dofs]
     if all(turns) or not any(turns):
@@ -97,12 +99,12 @@ def elastic_centre(joint: Joint | JointFit) -> ElasticCentre:
     return _found(_Coupling(joint, covariance))
 
 
-def _stiffness_covariance(fit: JointFit) -> FloatArray:
+def _stiffness_covariance(fit: Fit) -> FloatArray:
     """Return the covariance of the entries of the stiffness, shape (n, n, n, n)."""
     n = len(fit.dofs)
-    place = np.zeros((n, n, len(fit.terms)))
-    for i, term in enumerate(fit.terms):
-        if term.kind == "k":
+    place = np.zeros((n, n, len(fit.parameters)))
+    for i, term in enumerate(fit.parameters):
+        if term.kind == "k" and term.origin == "joint":
             a, b = fit.dofs.index(term.row), fit.dofs.index(term.column)
             place[a, b, i] = place[b, a, i] = 1
     covariance: FloatArray = np.einsum("abi,ij,cdj->abcd", place, fit.covariance, place)

@@ -1,68 +1,95 @@
-"""The joint found as input of a finite-element program, with what each number is worth."""
+"""A joint found as input of a finite-element program, with what each number is worth."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Unpack
+from typing import Unpack
 
 import numpy as np
 
-from jointfrf.dofs import Parameter
+from jointfrf.identification.result import Fit, FittedParameter, joint_of
 from jointfrf.io.cards import CardFormat, CardOptions
 from jointfrf.joint import Joint
-from jointfrf.kernel.arguments import FloatArray
+from jointfrf.kernel.arguments import check_type
 
-if TYPE_CHECKING:
-    from jointfrf.identification.joint_fit import JointFit
-
-__all__ = ["fit_cards"]
+__all__ = ["cards"]
 
 #: Rounding of an eigenvalue of a matrix with a unit diagonal.
 _ROUNDING = 1e-9
 
 
-def fit_cards(
-    fit: JointFit,
+def cards(
+    fit: Fit,
     program: CardFormat,
     nodes: Sequence[int],
-    about: Sequence[str],
     *,
-    all_damping: bool,
+    about: Sequence[str] = (),
+    all_damping: bool = False,
+    freq_hz: float | None = None,
     **options: Unpack[CardOptions],
 ) -> str:
-    """Write a fit as input of a finite-element program; `JointFit.export` describes arguments and errors."""
+    """Write the joint found as input of a finite-element program, with comments on what each number is worth.
+
+    Parameters
+    ----------
+    fit : Fit
+    program, nodes, **options
+        As in `Joint.export`.
+    about : sequence of str
+        Where the fit comes from: first lines of comment.
+    all_damping : bool
+        Of springs and dampers also damping that is negative or not significantly above zero (95 %), which is left out
+        otherwise, with the cross terms of its DOF.
+    freq_hz : float, optional
+        Where laws are taken that depend on frequency, as in `LawJoint.export`.
+
+    Returns
+    -------
+    str
+        Lines of input.
+
+    Raises
+    ------
+    ValueError
+        As `Joint.export` and `LawJoint.export`; or a stiffness is infinite.
+    """
+    check_type("fit", fit, Fit)
     intervals = fit.confidence_interval(0.95)
-    dropped = set() if all_damping else _worthless(fit, intervals)
+    dropped = _worthless(fit, intervals) if fit.laws is None and not all_damping else set()
     _check_finite(fit)
     comments = [
         *about,
         f"method {fit.method}, {fit.freq_hz.min():g} to {fit.freq_hz.max():g} Hz, {fit.freq_hz.size} lines; value, "
         "95 % interval, unit:",
-        *(_worth(fit, term, intervals[term.name], term in dropped) for term in fit.terms),
+        *(_worth(fit, one, intervals[one.name], one in dropped) for one in fit.parameters if one.origin == "joint"),
         *(f"warning: {warning}" for warning in fit.warnings),
     ]
-    joint = _without(fit, dropped)
+    if fit.laws is not None:
+        options["comments"] = [*options.get("comments", ()), *comments]
+        return fit.laws.export(program, nodes, freq_hz=freq_hz, **options)
+    if freq_hz is not None:
+        raise ValueError("freq_hz is for laws that depend on frequency, and this joint has springs and dampers")
+    kept = np.array([0.0 if one in dropped else value for one, value in zip(fit.parameters, fit.estimate, strict=True)])
+    joint = joint_of(fit.dofs, fit.parameters, kept)
     if options.get("damping", True):
         comments += _active(joint)
     options["comments"] = [*options.get("comments", ()), *comments]
     return joint.export(program, nodes, **options)
 
 
-def _worthless(fit: JointFit, intervals: dict[str, tuple[float, float]]) -> set[Parameter]:
+def _worthless(fit: Fit, intervals: dict[str, tuple[float, float]]) -> set[FittedParameter]:
     """Return the damping of DOFs that is not significantly above zero, with the cross terms of these DOFs."""
     bad = {
         term
-        for term in fit.terms
-        if term.kind != "k"
-        and not term.is_cross
-        and not (intervals[term.name][0] > 0 and fit.parameters[term.name] > 0)
+        for term in fit.parameters
+        if term.kind != "k" and not term.is_cross and not (intervals[term.name][0] > 0 and fit.value[term.name] > 0)
     }
     lost = {(term.kind, term.row) for term in bad}
-    return {term for term in fit.terms if {(term.kind, term.row), (term.kind, term.column)} & lost}
+    return {term for term in fit.parameters if {(term.kind, term.row), (term.kind, term.column)} & lost}
 
 
-def _check_finite(fit: JointFit) -> None:
-    for name, value in fit.parameters.items():
+def _check_finite(fit: Fit) -> None:
+    for name, value in fit.value.items():
         if not np.isfinite(value):
             raise ValueError(
                 f"{name} cannot be distinguished from a rigid connection and has no value: connect this DOF rigidly, "
@@ -70,38 +97,28 @@ def _check_finite(fit: JointFit) -> None:
             )
 
 
-def _worth(fit: JointFit, term: Parameter, interval: tuple[float, float], is_dropped: bool) -> str:
+def _worth(fit: Fit, term: FittedParameter, interval: tuple[float, float], is_dropped: bool) -> str:
     """Say in one line what a parameter is worth."""
     low, high = interval
-    text = f"{term.name} = {fit.parameters[term.name]:.5g}, {low:.4g} .. {high:.4g} {term.unit}"
+    text = f"{term.name} = {fit.value[term.name]:.5g}, {low:.4g} .. {high:.4g} {term.unit}"
     if term.kind == "k" and not term.is_cross and not np.isfinite(high):
         text += ": only the lower end is known, a rigid connection fits the data as well"
     elif is_dropped and term.is_cross:
         text += ": left out with the damping of its DOFs"
     elif is_dropped:
-        negative = fit.parameters[term.name] < 0
+        negative = fit.value[term.name] < 0
         text += f": {'negative' if negative else 'not significantly above zero'}, left out"
     elif not low > 0 and not (term.is_cross or low < high < 0):
         text += ": not significantly different from zero"
     return text
 
 
-def _without(fit: JointFit, dropped: set[Parameter]) -> Joint:
-    """Return the joint without some parameters."""
-    matrices: dict[str, FloatArray] = {kind: np.zeros((len(fit.dofs),) * 2) for kind in "khc"}
-    for term in fit.terms:
-        if term not in dropped:
-            a, b = fit.dofs.index(term.row), fit.dofs.index(term.column)
-            matrices[term.kind][a, b] = matrices[term.kind][b, a] = fit.parameters[term.name]
-    return Joint(matrices["k"], matrices["c"], fit.dofs, structural_damping=matrices["h"])
-
-
 def _active(joint: Joint) -> list[str]:
     """Warn of damping that puts power into the model in some motion."""
-    told = []
+    found = []
     for what, matrix in (("viscous", joint.damping), ("hysteretic", joint.structural_damping)):
         root = np.sqrt(abs(matrix.diagonal()))
         scale = np.where(root > 0, root, 1)
         if np.linalg.eigvalsh(matrix / np.outer(scale, scale)).min(initial=0) < -_ROUNDING:
-            told.append(f"warning: the {what} damping puts power into the model in some motion")
-    return told
+            found.append(f"warning: the {what} damping puts power into the model in some motion")
+    return found

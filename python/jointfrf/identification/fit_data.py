@@ -10,14 +10,16 @@ from numpy.typing import NDArray
 
 from jointfrf.channels.point_lines import Interface
 from jointfrf.frf.noise_model import NoiseModel
+from jointfrf.identification.model_fit.assembly import Assembly
+from jointfrf.identification.model_fit.directions import OpenDirection
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
-__all__ = ["FitData"]
+__all__ = ["FitData", "ModelData"]
 
 
 @dataclass(frozen=True, eq=False)
 class FitData:
-    """Measured FRFs behind a `JointFit`, on its lines and in their order; nothing is copied.
+    """Measured FRFs behind a fit to FRFs between all joint DOFs, on its lines and in their order; nothing is copied.
 
     Attributes
     ----------
@@ -76,3 +78,31 @@ class FitData:
             with np.errstate(invalid="ignore"):
                 own = np.where(np.isfinite(own), own - self.deformation[lines], np.inf)
         return own * self.variance_scale
+
+
+@dataclass(frozen=True, eq=False)
+class ModelData:
+    """Measured FRFs behind a fit of an assembly, and what the models make of them; nothing is copied.
+
+    Attributes
+    ----------
+    assembly : Assembly
+        What was fitted.
+    measured : ndarray, shape (n_freq, n_o, n_i)
+        m/N; NaN where nothing was measured.
+    variance : ndarray, shape (n_freq, n_o, n_i)
+        E|e|^2 of the noise, (m/N)^2; inf where nothing was measured.
+    predicted : ndarray, shape (n_freq, n_o, n_i)
+        FRFs of the assembly found, m/N.
+    residual : ndarray, shape (n_freq, n_o, n_i)
+        Measured minus predicted over the standard deviation of the noise; NaN where nothing was measured.
+    open_directions : tuple of OpenDirection
+        Combinations of parameters that the FRFs do not determine.
+    """
+
+    assembly: Assembly
+    measured: ComplexArray
+    variance: FloatArray
+    predicted: ComplexArray
+    residual: ComplexArray
+    open_directions: tuple[OpenDirection, ...]

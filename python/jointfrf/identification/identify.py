@@ -1,188 +1,113 @@
-"""From measured FRFs of an assembly to the parameters of its joint: the one door to every method."""
+"""From measured FRFs between all joint DOFs to the parameters of the joint: checks, fit, findings."""
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Literal, get_args, overload
+from typing import Literal
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from jointfrf.channels.check.check import check_frfs, warn_of_frfs
 from jointfrf.channels.check.finding import FrfCheck
-from jointfrf.channels.point_lines import Interface
 from jointfrf.frf.bands import spread_lines
-from jointfrf.identification.band_means import fit_band_mean, prepare_band_mean
 from jointfrf.identification.compliance_data import compliance_data
 from jointfrf.identification.compliance_fit.channel_noise import NoiseOptions
-from jointfrf.identification.compliance_fit.describe import describe_compliance
 from jointfrf.identification.compliance_fit.fit import fit_compliance
 from jointfrf.identification.compliance_fit.joint_terms import CrossTerms, DampingTerms
 from jointfrf.identification.compliance_fit.prepare import FitOptions, FitProblem, prepare_compliance
 from jointfrf.identification.compliance_fit.transforms import Transform
-from jointfrf.identification.joint_fit import JointFit
-from jointfrf.identification.law_fit.identify_laws import check_law_joint, identify_laws
-from jointfrf.identification.law_fit.law_fit import LawFit
+from jointfrf.identification.describe import describe_laws, describe_springs
+from jointfrf.identification.law_fit.fit import fit_laws
 from jointfrf.identification.prepare import BandsOfDofs, MeasuredFrfs, as_measured
-from jointfrf.kernel.arguments import FloatArray, check_choice
+from jointfrf.identification.result import Fit
+from jointfrf.kernel.arguments import FloatArray, as_names, check_type
 from jointfrf.laws.law_joint import LawJoint
-from jointfrf.substructuring.methods import JointFrfs, StiffnessMethod
 
-__all__ = ["IdentificationMethod", "identify"]
-
-IdentificationMethod = Literal["compliance", StiffnessMethod]
-_METHODS: tuple[IdentificationMethod, ...] = get_args(IdentificationMethod)
-
-
-@overload
-def identify(
-    freq_hz: ArrayLike,
-    gamma: ArrayLike,
-    dofs: Sequence[str] | None = None,
-    method: IdentificationMethod = "compliance",
-    bands: BandsOfDofs = None,
-    *,
-    transform: Transform | tuple[Transform, Transform] | None = None,
-    damping: DampingTerms | Literal["auto"] | Sequence[DampingTerms] = "auto",
-    cross: CrossTerms = "zero",
-    noise: float | ArrayLike | None = None,
-    coherence: ArrayLike | None = None,
-    averages: float | None = None,
-    reciprocal: bool = True,
-    alpha: ArrayLike | None = None,
-    k_initial: ArrayLike | None = None,
-    h_a: ArrayLike | None = None,
-    h_b: ArrayLike | None = None,
-    dofs_j: ArrayLike | None = None,
-    dofs_k: ArrayLike | None = None,
-    dofs_r: ArrayLike | None = None,
-    dofs_s: ArrayLike | None = None,
-    joint: None = None,
-) -> JointFit: ...
-
-
-@overload
-def identify(
-    freq_hz: ArrayLike,
-    gamma: ArrayLike,
-    dofs: Sequence[str] | None = None,
-    method: Literal["compliance"] = "compliance",
-    bands: BandsOfDofs = None,
-    *,
-    transform: Transform | tuple[Transform, Transform] | None = None,
-    noise: float | ArrayLike | None = None,
-    coherence: ArrayLike | None = None,
-    averages: float | None = None,
-    reciprocal: bool = True,
-    joint: LawJoint,
-) -> LawFit: ...
+__all__ = ["identify"]
 
 
 def identify(
     freq_hz: ArrayLike,
     gamma: ArrayLike,
     dofs: Sequence[str] | None = None,
-    method: IdentificationMethod = "compliance",
     bands: BandsOfDofs = None,
     *,
     transform: Transform | tuple[Transform, Transform] | None = None,
-    damping: DampingTerms | Literal["auto"] | Sequence[DampingTerms] = "auto",
-    cross: CrossTerms = "zero",
-    noise: float | ArrayLike | None = None,
-    coherence: ArrayLike | None = None,
-    averages: float | None = None,
-    reciprocal: bool = True,
-    alpha: ArrayLike | None = None,
-    k_initial: ArrayLike | None = None,
-    h_a: ArrayLike | None = None,
-    h_b: ArrayLike | None = None,
-    dofs_j: ArrayLike | None = None,
-    dofs_k: ArrayLike | None = None,
-    dofs_r: ArrayLike | None = None,
-    dofs_s: ArrayLike | None = None,
     joint: LawJoint | None = None,
-) -> JointFit | LawFit:
-    """Identify a joint from measured FRFs of the assembly.
+    damping: DampingTerms | Literal["auto"] | Sequence[DampingTerms] | None = None,
+    cross: CrossTerms | None = None,
+    noise: float | ArrayLike | None = None,
+    coherence: ArrayLike | None = None,
+    averages: float | None = None,
+    reciprocal: bool = True,
+) -> Fit:
+    """Identify a joint from measured FRFs of the assembly between all its joint DOFs, without models.
 
     Parameters
     ----------
     freq_hz : array_like, shape (n_freq,)
         Hz.
-    gamma : array_like, shape (n_freq, 2 n, 2 n), (n_freq, m_r, m_f) with `transform`, or (n_freq, n, n) for decoupling
-        Measured receptances, m/N: at joint DOFs j, then k; or at the points that `transform` takes there; or, for
-        decoupling, between the internal points that the equation names.
+    gamma : array_like, shape (n_freq, 2 n, 2 n), or (n_freq, m_r, m_f) with `transform`
+        Measured receptances, m/N: at joint DOFs j, then k; or at the points that `transform` takes there.
     dofs : sequence of str, optional
         Names of the n joint DOFs; names beginning with theta, rx, ry, rz are rotations. ``"0"``, ``"1"``, ... by
         default.
-    method : str
-        "compliance": maximum likelihood, with error bars; needs no model of the substructures. "ismm", "ismm-kj":
-        inverse structural modification (2.47) with D_jk or D_kj, need `alpha` and `k_initial`.
-        "inverse-substructuring": -(gamma^-1)_jk, which ISMM reduces to. "decoupling-rr", "-rs", "-sr", "-ss":
-        (2.53)-(2.56), need `h_a`, `h_b` and the DOF lists. All but the first take the mean over bands, as the thesis
-        does.
     bands : None, (low, high), sequence of these, or mapping of DOF name to these, optional
-        Sensitive bands in Hz; all lines by default. "compliance" weights each line by its information and needs none.
+        Sensitive bands in Hz; all lines by default: each is weighted by its information, so that none are needed.
     transform : array_like, shape (2 n, m), or Interface, or a pair of these, optional
         From channels to joint DOFs j, then k: finite differences, virtual points. Noise is then taken as independent
         between the channels, not between the transformed FRFs. A pair, for responses and for forces, of shapes
-        (2 n, m_r) and (2 n, m_f), with "compliance". An `Interface`, as `interface` and `virtual_interface` make it,
-        has the geometry of the channels: "compliance" then names DOFs left out that enter those sought, and widens
-        intervals by what is not rigid between the channels; of a plain matrix it does the latter where the channels
-        move as those of which it is the least-squares inverse.
+        (2 n, m_r) and (2 n, m_f). An `Interface`, as `interface` and `virtual_interface` make it, has the geometry of
+        the channels: DOFs left out that enter those sought are then named, and intervals widened by what is not rigid
+        between the channels; of a plain matrix the latter where the channels move as those of which it is the
+        least-squares inverse.
+    joint : LawJoint, optional
+        Laws to fit, with rigid DOFs and cross terms; its values are where the fit may start. Masses need models:
+        `identify_model`. By default springs and dampers, as `damping` and `cross` say, short forms of a joint of
+        `SpringLaw`.
     damping : {"auto", "viscous", "hysteretic", "both", "none"}, or a sequence of these, one for each DOF
         Terms of K* = k (1 + i eta) + i w c to fit. "auto" chooses for each DOF by the Bayesian information criterion,
-        with `cross` "fit" for all DOFs together. Not for band means, which give viscous damping.
+        with `cross` "fit" for all DOFs together; the default.
     cross : {"zero", "ignore", "fit"}
-        Terms that couple the DOFs of the joint: none, and this is used; unknown and not fitted; fitted, symmetric.
-        Where they are unknown, k is 1/C_dd of the compliance. Not for band means.
+        Terms that couple the DOFs of the joint: none (the default), and this is used; unknown and not fitted; fitted,
+        symmetric. Where they are unknown, k is 1/C_dd of the compliance.
     noise : float or array_like, shape (n_freq, m_r, m_f), optional
         Relative noise level of each entry, 0.01 for 1 %, sqrt(E|e|^2) of real and imaginary part together; or the
         variance E|e|^2 of each, (m/N)^2. By default it is found by entry and frequency, as
-        `estimate_noise` does. Not for band means.
+        `estimate_noise` does.
     coherence, averages : optional
-        As in `estimate_noise`, where `noise` is not given. Not for band means.
+        As in `estimate_noise`, where `noise` is not given.
     reciprocal : bool
-        Whether the structure is reciprocal, so that gamma_pq and gamma_qp may be averaged. Not for band means.
-    alpha : array_like, shape (n_freq, 2 n, 2 n), optional
-        Calculated receptance of the assembly with the first estimate, for ISMM.
-    k_initial : array_like, shape (n_freq, n, n) or (n, n), optional
-        First estimate K0, for ISMM.
-    h_a, h_b, dofs_j, dofs_k, dofs_r, dofs_s : optional
-        As in `decouple`.
-    joint : LawJoint, optional
-        Laws to fit in place of k (1 + i eta) + i w c, with rigid DOFs and cross terms, for "compliance"; it says what
-        `damping` and `cross` do for springs. Masses need models: `identify_model`.
+        Whether the structure is reciprocal, so that gamma_pq and gamma_qp may be averaged.
 
     Returns
     -------
-    JointFit, or LawFit with `joint`
+    Fit
 
     Raises
     ------
     ValueError
-        Wrong shapes, names, bands; NaN or Inf in a line; an argument that the method needs is missing.
-    SingularLineError
-        A line cannot be inverted.
+        Wrong shapes, names, bands; NaN or Inf in a line; FRFs that no joint fits.
 
     Warns
     -----
     IdentificationWarning
-        The data determine a parameter poorly, or the residual exceeds the noise: also in `JointFit.warnings`.
+        The data determine a parameter poorly, or the residual exceeds the noise: also in `Fit.findings`.
     ConvergenceWarning
         The fit did not converge.
     FrfCheckWarning
-        The FRFs look wrong (`check_frfs`): sign, quantity, gain, delay, a dead or doubled channel. Not for
-        band means, nor where the structure is not reciprocal.
+        The FRFs look wrong (`check_frfs`): sign, quantity, gain, delay, a dead or doubled channel. Not
+        where the structure is not reciprocal.
 
     Notes
     -----
-    "compliance" is linearised at the smooth FRFs, on the manifold of FRFs that fit a joint: regular for stiff joints
-    and on lines where gamma_jk is singular. Its standard errors: inverse information of the noise, times the
+    Maximum likelihood, linearised at the smooth FRFs, on the manifold of FRFs that fit a joint: regular for stiff
+    joints and on lines where gamma_jk is singular. Standard errors: inverse information of the noise, times the
     correlation between lines, times the residual over the noise where it is above 1; the scatter between lines, or
     between ten parts of the band, replaces that where it exceeds it by more than chance. Intervals by the profile of
-    the likelihood where they are not symmetric. Standard errors of a band mean: scatter of its lines over the root of
-    their number; its bias is not included.
+    the likelihood where they are not symmetric.
 
     Examples
     --------
@@ -207,56 +132,35 @@ def identify(
     >>> [bool(low < true < high) for true, (low, high) in zip(mount.values, found.confidence_interval().values())]
     [True, True, True]
     """
-    check_choice("method", method, _METHODS)
     if joint is not None:
-        is_free = isinstance(damping, str) and isinstance(cross, str) and (damping, cross) == ("auto", "zero")
-        if method != "compliance" or not is_free:
-            raise ValueError("joint says which laws are fitted, by method 'compliance': leave damping and cross out")
-        own = check_law_joint(joint, dofs)
-        problem = prepare_compliance(
-            as_measured(freq_hz, gamma, square=False), own.dofs, bands, transform,
-            NoiseOptions(noise, coherence, averages), FitOptions("viscous", "zero", reciprocal),
-        )  # fmt: skip
-        if reciprocal:
-            _look_at(problem, transform)
-        laws = identify_laws(problem, own)
-        _warn(laws.warnings)
-        return laws.fit
-    if method == "compliance":
-        problem = prepare_compliance(
-            as_measured(freq_hz, gamma, square=False), dofs, bands, transform,
-            NoiseOptions(noise, coherence, averages), FitOptions(damping, cross, reciprocal),
-        )  # fmt: skip
-        if reciprocal:
-            _look_at(problem, transform)
-        found = fit_compliance(problem)
-        described = describe_compliance(found, problem)
-        _warn(described.warnings)
-        return replace(described.fit, data=compliance_data(found, problem, transform))
-    if coherence is not None or averages is not None:
-        raise ValueError("coherence and averages are for method 'compliance'")
-    if isinstance(transform, Interface):
-        transform = transform.transform
-    if isinstance(transform, tuple):
-        raise ValueError("a pair of transforms, for responses and for forces, is for method 'compliance'")
-    known = JointFrfs(
-        alpha=alpha, k_initial=k_initial, h_a=h_a, h_b=h_b,
-        dofs_j=dofs_j, dofs_k=dofs_k, dofs_r=dofs_r, dofs_s=dofs_s,
+        if damping is not None or cross is not None:
+            raise ValueError("joint says which laws are fitted: leave damping and cross out")
+        joint = _check_law_joint(joint, dofs)
+        dofs = joint.dofs
+        damping = "viscous"
+    options = FitOptions(damping or "auto", cross or "zero", reciprocal)
+    problem = prepare_compliance(
+        as_measured(freq_hz, gamma, square=False), dofs, bands, transform,
+        NoiseOptions(noise, coherence, averages), options,
     )  # fmt: skip
-    means = prepare_band_mean(method, as_measured(freq_hz, gamma), known, dofs, bands, transform)
-    return fit_band_mean(means)
+    if reciprocal:
+        _look_at(problem, transform)
+    if joint is None:
+        found = fit_compliance(problem)
+        fit = replace(describe_springs(found, problem), data=compliance_data(found, problem, transform))
+    else:
+        count = 2 * np.count_nonzero(np.isfinite(problem.frfs.variance))
+        if count < len(joint.names):
+            raise ValueError(f"{count} numbers measured cannot give {len(joint.names)} parameters of laws")
+        fit = describe_laws(fit_laws(problem, joint))
+    fit.issue_warnings()
+    return fit
 
 
 def _look_at(problem: FitProblem, transform: Transform | tuple[Transform, Transform] | None) -> None:
     """Warn of FRFs that look wrong."""
     transforms = None if transform is None else (problem.frfs.responses, problem.frfs.forces)
     warn_of_frfs(_checked(MeasuredFrfs(problem.freq_hz, problem.frfs.measured), problem.dofs, transforms), 3)
-
-
-def _warn(told: Sequence[Warning]) -> None:
-    """Issue the warnings of a fit."""
-    for warning in told:
-        warnings.warn(warning, stacklevel=3)
 
 
 def _checked(
@@ -275,3 +179,19 @@ def _checked(
         [f"{what} {i}" for i in range(count)] for what, count in zip(("response", "force"), h.shape[1:], strict=True)
     )
     return check_frfs(freq, h, responses=rows, forces=columns, transform=transforms, dofs=dofs)
+
+
+def _check_law_joint(joint: LawJoint, dofs: Sequence[str] | None) -> LawJoint:
+    """Check a joint that is to be fitted without models; return it with its DOFs in the order of the FRFs."""
+    check_type("joint", joint, LawJoint)
+    names = joint.dofs if dofs is None else as_names("dofs", dofs)
+    if sorted(names) != sorted(joint.dofs):
+        raise ValueError(f"dofs must name those of joint, {', '.join(joint.dofs)}, not {', '.join(names)}")
+    if joint.mass:
+        raise ValueError(
+            f"joint has a mass in {', '.join(joint.mass)}: FRFs at the joint cannot part it from the structures that "
+            "it moves with; leave it out, or give models of these to identify_model"
+        )
+    if not joint.laws:
+        raise ValueError("joint has no law to fit: all DOFs are rigid")
+    return LawJoint(joint.laws, joint.rigid, None, names)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import NamedTuple
 
@@ -10,7 +9,8 @@ import numpy as np
 
 from jointfrf.errors import FileContentError
 from jointfrf.files import check_file, write_file
-from jointfrf.identification.joint_fit import JointFit
+from jointfrf.identification.record import read_record
+from jointfrf.identification.result import Fit
 from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import FloatArray, as_real
 from jointfrf.laws.joint_toml import joint_text, read_joint_table
@@ -26,7 +26,7 @@ class JointFile(NamedTuple):
     Attributes
     ----------
     joint : Joint or LawJoint
-    fit : JointFit or None
+    fit : Fit or None
         Where the file was saved by an identification.
     points : ndarray, shape (2, 3), or None
         Reference points of both sides, m.
@@ -35,7 +35,7 @@ class JointFile(NamedTuple):
     """
 
     joint: Joint | LawJoint
-    fit: JointFit | None
+    fit: Fit | None
     points: FloatArray | None
     about: tuple[str, ...]
 
@@ -55,8 +55,7 @@ def read_joint_file(path: Path) -> JointFile:
 
 
 def _saved(path: Path) -> JointFile:
-    fit = JointFit.load(path)
-    content = json.loads(path.read_text(encoding="utf-8"))
+    fit, content = read_record(path)
     source, given = content.get("source"), content.get("reference_points_m")
     points = None
     if given is not None:
@@ -81,7 +80,7 @@ def read_joint(path: Path | str) -> Joint | LawJoint:
     ----------
     path : Path or str
         A TOML file of constants (`dofs`, `stiffness`, ...) or of laws (tables `[[law]]`), as `write_joint` writes; or a
-        JSON file of `JointFit.save`.
+        JSON file of `save`.
 
     Returns
     -------

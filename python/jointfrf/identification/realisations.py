@@ -11,13 +11,13 @@ from numpy.typing import ArrayLike
 
 from jointfrf.frf.noise_model import NoiseModel
 from jointfrf.identification.compliance_fit.channel_noise import NoiseOptions
-from jointfrf.identification.compliance_fit.describe import describe_compliance
 from jointfrf.identification.compliance_fit.estimator import GroupStart, JointEstimate
 from jointfrf.identification.compliance_fit.fit import estimated_joint, fit_compliance, fitted_joint
 from jointfrf.identification.compliance_fit.joint_terms import CrossTerms, DampingTerms
 from jointfrf.identification.compliance_fit.prepare import FitOptions, FitProblem, prepare_compliance
-from jointfrf.identification.joint_fit import JointFit
+from jointfrf.identification.describe import describe_springs
 from jointfrf.identification.prepare import BandsOfDofs, as_measured
+from jointfrf.identification.result import Fit
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, check_type
 
 __all__ = ["FitStart", "identify_realisations", "viscous_estimate", "viscous_joints"]
@@ -96,7 +96,7 @@ def identify_realisations(
     noise: float | ArrayLike | None = None,
     reciprocal: bool = True,
     start: FitStart | None = None,
-) -> Iterator[JointFit]:
+) -> Iterator[Fit]:
     """Identify a joint from each of several sets of FRFs of the same structure.
 
     Parameters
@@ -113,7 +113,7 @@ def identify_realisations(
 
     Yields
     ------
-    JointFit
+    Fit
         One for each set, as it is asked for. Warnings are in its `warnings` and are not issued; the FRFs are not looked
         at as `check_frfs` does.
 
@@ -154,7 +154,7 @@ def identify_realisations(
         found = fit_compliance(problem)
         if near is None:
             near, known = found.estimate.starts, replace(known, like=problem.noise.model)
-        yield describe_compliance(found, problem).fit
+        yield describe_springs(found, problem)
 
 
 def viscous_joints(freq_hz: FloatArray, gammas: Iterable[ComplexArray], dofs: Sequence[str]) -> FloatArray:

@@ -14,7 +14,7 @@ from jointfrf.dofs import DIRECTIONS, direction_places, rigid_offset
 from jointfrf.kernel.arguments import FloatArray, as_nodes, as_real, check_choice
 from jointfrf.spelling import visible
 
-__all__ = ["CardFormat", "CardOptions", "cards"]
+__all__ = ["CardFormat", "CardOptions", "spring_cards"]
 
 CardFormat = Literal["abaqus", "calculix", "nastran", "ansys"]
 
@@ -90,7 +90,7 @@ class _Link(NamedTuple):
         return [f"{mark} {note}" for note in self.notes]
 
 
-def cards(
+def spring_cards(
     program: CardFormat,
     dofs: Sequence[str],
     matrices: tuple[FloatArray, FloatArray, FloatArray],

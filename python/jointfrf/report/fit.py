@@ -14,7 +14,9 @@ from numpy.typing import NDArray
 from jointfrf.dofs import Parameter, compliance_unit
 from jointfrf.errors import IllConditionedWarning
 from jointfrf.files import below, write_file
-from jointfrf.identification.joint_fit import JointFit
+from jointfrf.identification.fit_data import FitData
+from jointfrf.identification.record import fit_to_dict
+from jointfrf.identification.result import Fit
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.kernel.linear_algebra import invert
 from jointfrf.report.axes import FREQUENCY, bulk_limits
@@ -24,12 +26,12 @@ from jointfrf.report.figure import Curve, Figure, Panel, Ribbon
 __all__ = ["fit_figures", "write_fit"]
 
 
-def fit_figures(fit: JointFit) -> list[Figure]:
+def fit_figures(fit: Fit) -> list[Figure]:
     """Figures of the identified joint: K* and compliance of each DOF, line by line and as fitted.
 
     Parameters
     ----------
-    fit : JointFit
+    fit : Fit
         What `identify` found.
 
     Returns
@@ -38,14 +40,15 @@ def fit_figures(fit: JointFit) -> list[Figure]:
         ``"joint_<dof>"`` for each DOF.
     """
     up = np.argsort(fit.freq_hz, kind="stable")
-    freq, lines = fit.freq_hz[up], fit.k_lines[up]
+    freq, n = fit.freq_hz[up], len(fit.dofs)
+    lines = np.full((freq.size, n, n), np.nan + 0j) if fit.k_lines is None else fit.k_lines[up]
     fitted = fit.k_joint(freq)
     with warnings.catch_warnings():
         # Displacements and rotations differ by orders of magnitude.
         warnings.simplefilter("ignore", IllConditionedWarning)
         compliance = invert(fitted, on_singular="nan")
-        each_compliance = _inverted(lines) if fit.data is None else fit.data.line_compliance()[up]
-    used = np.ones(lines.shape[:2], np.bool_) if fit.data is None else fit.data.fitted[up]
+        each_compliance = fit.data.line_compliance()[up] if isinstance(fit.data, FitData) else _inverted(lines)
+    used = fit.data.fitted[up] if isinstance(fit.data, FitData) else np.ones(lines.shape[:2], np.bool_)
     figures = []
     for d, dof in enumerate(fit.dofs):
         stiffness = Parameter.of_dof("k", dof)
@@ -80,7 +83,7 @@ class _EntryLines(NamedTuple):
     bound: float | None = None
 
 
-def _interval(fit: JointFit, stiffness: Parameter) -> tuple[Ribbon, ...]:
+def _interval(fit: Fit, stiffness: Parameter) -> tuple[Ribbon, ...]:
     """Confidence interval of a stiffness, where it is not open."""
     low, high = fit.confidence_interval(0.95)[stiffness.name]
     if not (np.isfinite(low) and np.isfinite(high)):
@@ -89,7 +92,7 @@ def _interval(fit: JointFit, stiffness: Parameter) -> tuple[Ribbon, ...]:
     return (Ribbon("95 % interval of k", ends, np.full(2, low), np.full(2, high), "low"),)
 
 
-def _as_open(lines: _EntryLines, fit: JointFit, stiffness: Parameter) -> _EntryLines:
+def _as_open(lines: _EntryLines, fit: Fit, stiffness: Parameter) -> _EntryLines:
     """Put the lower bound in place of a stiffness that cannot be distinguished from a rigid one."""
     low, high = fit.confidence_interval(0.95)[stiffness.name]
     return lines if np.isfinite(high) else lines._replace(bound=max(low, 0.0))
@@ -119,12 +122,12 @@ def _panels(lines: _EntryLines) -> list[Panel]:
     return panels
 
 
-def write_fit(fits: Sequence[JointFit], folder: Path, source: str, figures: Sequence[Figure] = ()) -> list[Path]:
+def write_fit(fits: Sequence[Fit], folder: Path, source: str, figures: Sequence[Figure] = ()) -> list[Path]:
     """Write ``identification.json`` and a PNG and an SVG file a DOF for each fit; nothing is left half-written.
 
     Parameters
     ----------
-    fits : sequence of JointFit
+    fits : sequence of Fit
         Results on the same data; the figures of the second and later ones carry their method in the name.
     folder : Path
         Made if it is missing.
@@ -145,7 +148,7 @@ def write_fit(fits: Sequence[JointFit], folder: Path, source: str, figures: Sequ
     OSError
         The files cannot be written.
     """
-    text = json.dumps({"source": source, "fits": [fit.to_dict(lines=False) for fit in fits]}, indent=2)
+    text = json.dumps({"source": source, "fits": [fit_to_dict(fit, lines=False) for fit in fits]}, indent=2)
     contents: dict[str, str | bytes] = {"identification.json": text + "\n"}
     for i, fit in enumerate(fits):
         for figure in fit_figures(fit):

@@ -13,8 +13,9 @@ from typing import get_args
 import numpy as np
 
 from jointfrf.files import write_file
+from jointfrf.identification.fit_cards import cards
 from jointfrf.identification.fit_data import FitData
-from jointfrf.identification.joint_fit import JointFit
+from jointfrf.identification.result import Fit
 from jointfrf.io.cards import CardFormat
 from jointfrf.kernel.arguments import FloatArray
 from jointfrf.kernel.engine import get_engine
@@ -49,13 +50,42 @@ class ReportOptions:
     nodes: Sequence[int] = (1, 2)
 
 
-def write_report(fit: JointFit, path: Path, options: ReportOptions) -> Path:
-    """Write the report of a fit, whole or not at all; as `JointFit.report`."""
-    write_file(path, make_document(fit_document(fit, options)))
-    return path
+def write_report(
+    fit: Fit, path: Path | str, *, source: str = "", command: str = "", nodes: Sequence[int] = (1, 2)
+) -> Path:
+    """Write a page on a fit: one HTML file with all that is needed to judge and to quote the joint, no link to another.
+
+    Parameters
+    ----------
+    fit : Fit
+    path : Path or str
+        In a folder that exists.
+    source : str
+        Name of the file that was measured.
+    command : str
+        How the fit was made, as typed.
+    nodes : sequence of two or four int
+        Nodes j and k of the finite-element cards; then ROT NODEs of CalculiX.
+
+    Returns
+    -------
+    Path
+        The file written.
+
+    Raises
+    ------
+    ValueError
+        The fit does not hold the measured FRFs: it was loaded, or is a mean over bands.
+    MissingPackageError
+        jinja2 is missing.
+    OSError
+        The file cannot be written.
+    """
+    write_file(Path(path), make_document(fit_document(fit, ReportOptions(source, command, nodes))))
+    return Path(path)
 
 
-def fit_document(fit: JointFit, options: ReportOptions) -> Document:
+def fit_document(fit: Fit, options: ReportOptions) -> Document:
     """Return the report of a fit as sections and their parts.
 
     Raises
@@ -64,7 +94,7 @@ def fit_document(fit: JointFit, options: ReportOptions) -> Document:
         The fit does not hold the measured FRFs.
     """
     data = fit.data
-    if data is None:
+    if not isinstance(data, FitData):
         raise ValueError(
             "a report shows the measured FRFs, and this fit holds none, as fits that were loaded, means over bands and "
             "those of many realisations: call identify with the FRFs and method 'compliance', and report that"
@@ -122,12 +152,12 @@ def _most_points(figures: Iterable[Figure]) -> int:
     return int(counts[-1])
 
 
-def _charts(figures: Iterable[Figure], most: int, fit: JointFit, what: str) -> list[Chart]:
+def _charts(figures: Iterable[Figure], most: int, fit: Fit, what: str) -> list[Chart]:
     span = f"{fit.freq_hz.min():g} to {fit.freq_hz.max():g} Hz"
     return [Chart(replace(figure, heading=""), f"{figure.caption}: {what}, {span}", most) for figure in figures]
 
 
-def _summary(fit: JointFit) -> Section:
+def _summary(fit: Fit) -> Section:
     return Section(
         "summary",
         "Summary",
@@ -135,7 +165,7 @@ def _summary(fit: JointFit) -> Section:
     )
 
 
-def _doubts(fit: JointFit) -> Section:
+def _doubts(fit: Fit) -> Section:
     parts: list[Part] = []
     if fit.warnings:
         parts.append(Words([f"{text}." for text in fit.warnings], "warnings"))
@@ -144,7 +174,7 @@ def _doubts(fit: JointFit) -> Section:
     return Section("doubts", "Warnings and notes" if fit.warnings else "Notes", parts)
 
 
-def _geometry(fit: JointFit, data: FitData) -> list[Part]:
+def _geometry(fit: Fit, data: FitData) -> list[Part]:
     if data.interface is None:
         names = ", ".join(data.response_names)
         known = f"Responses {names}" + (
@@ -156,7 +186,7 @@ def _geometry(fit: JointFit, data: FitData) -> list[Part]:
     return [sketch, point_table(points)]
 
 
-def _how_joint(fit: JointFit) -> str:
+def _how_joint(fit: Fit) -> str:
     return (
         "Lines: the joint found, from all frequency lines together; the shaded band is the 95 % interval of k. Dots of "
         "K*: each line inverted by itself, which scatters, and is biased towards zero where noise hides the joint. "
@@ -165,7 +195,7 @@ def _how_joint(fit: JointFit) -> str:
     )
 
 
-def _frf_section(fit: JointFit, compared: ComparedFrfs, figures: Sequence[Figure], most: int) -> Section:
+def _frf_section(fit: Fit, compared: ComparedFrfs, figures: Sequence[Figure], most: int) -> Section:
     total = len(compared.rows) * len(compared.columns)
     where = "channels" if compared.of_channels else "joint DOFs"
     told = [
@@ -197,20 +227,20 @@ def _maps(compared: ComparedFrfs) -> list[Part]:
     return [residual_map(compared), *([reciprocity] if reciprocity else [])]
 
 
-def _noise_figure(fit: JointFit, data: FitData) -> Figure | None:
+def _noise_figure(fit: Fit, data: FitData) -> Figure | None:
     if data.noise is None:
         return None
     return noise_figure(fit.freq_hz, data.measured, data.noise, data.response_names, data.force_names)
 
 
-def _noise_parts(fit: JointFit, figure: Figure | None, most: int) -> list[Part]:
+def _noise_parts(fit: Fit, figure: Figure | None, most: int) -> list[Part]:
     if figure is None:
         told = f"Noise of {100 * fit.noise_level:.2g} % of the FRFs (median) was used; how it varies is not kept."
         return [Words([told])]
     return list(_charts([figure], most, fit, "measured and smooth FRFs and the noise found in them"))
 
 
-def _cards(fit: JointFit, nodes: Sequence[int]) -> list[Part]:
+def _cards(fit: Fit, nodes: Sequence[int]) -> list[Part]:
     """Return the joint as input of each program, or why there is none."""
     j, k = nodes[:2]
     listings, refused = [], []
@@ -219,7 +249,7 @@ def _cards(fit: JointFit, nodes: Sequence[int]) -> list[Part]:
         rotation = (tuple(nodes[2:4]) or (max(j, k) + 1, max(j, k) + 2)) if is_calculix else None
         name = _PROGRAMS[program] + (" (stiffness only)" if is_calculix else "")
         try:
-            text = fit.export(program, (j, k), damping=not is_calculix, rotation_nodes=rotation)
+            text = cards(fit, program, (j, k), damping=not is_calculix, rotation_nodes=rotation)
         except ValueError as error:
             refused.append(f"{_PROGRAMS[program]}: {error}.")
         else:
@@ -230,7 +260,7 @@ def _cards(fit: JointFit, nodes: Sequence[int]) -> list[Part]:
     return [Words([told]), *listings, *([Words(refused, "notes")] if refused else [])]
 
 
-def _made(fit: JointFit, options: ReportOptions) -> Table:
+def _made(fit: Fit, options: ReportOptions) -> Table:
     """Return what is needed to get the same again."""
     import scipy
 

@@ -7,25 +7,26 @@ from typing import Any
 
 import numpy as np
 
-from jointfrf.identification.joint_fit import JointFit
+from jointfrf.identification.fit_data import FitData
+from jointfrf.identification.result import Fit
 from jointfrf.report.draw import laid_out
 from jointfrf.report.figure import Figure, Panel
 from jointfrf.report.fit import fit_figures
 from jointfrf.report.fit_frfs import compare_frfs, frf_figures
 
-__all__ = ["fit_overview", "plot_fit"]
+__all__ = ["fit_overview", "plot"]
 
 #: FRFs that are drawn, two beside each other.
 _FRFS = 4
 
 
-def fit_overview(fit: JointFit) -> Figure:
+def fit_overview(fit: Fit) -> Figure:
     """Return K* and compliance of each DOF, and the first FRFs where the fit holds them, as one figure."""
     panels: list[Panel] = []
     for dof, figure in zip(fit.dofs, fit_figures(fit), strict=True):
         titles = (f"DOF {dof}: joint stiffness", "", f"DOF {dof}: joint compliance", "")
         panels += [replace(panel, title=title) for panel, title in zip(figure.panels, titles, strict=True)]
-    if fit.data is not None:
+    if isinstance(fit.data, FitData):
         up = np.argsort(fit.freq_hz, kind="stable")
         frfs = frf_figures(compare_frfs(fit.data, fit.dofs), fit.freq_hz, up)[:_FRFS]
         for first in range(0, len(frfs), 2):
@@ -39,6 +40,22 @@ def fit_overview(fit: JointFit) -> Figure:
     return Figure("joint", "Joint found", tuple(panels), 2)
 
 
-def plot_fit(fit: JointFit) -> Any:
-    """Draw a fit; as `JointFit.plot`."""
+def plot(fit: Fit) -> Any:
+    """Draw the joint over frequency, K* and compliance of each DOF, and measured against regenerated FRFs.
+
+    Parameters
+    ----------
+    fit : Fit
+        A fit that was loaded shows no FRFs.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        ``jf.plot(fit).savefig("joint.png")`` writes it.
+
+    Raises
+    ------
+    MissingPackageError
+        matplotlib is missing.
+    """
     return laid_out(fit_overview(fit))

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from typing import cast, get_args
+
 import numpy as np
 
-from jointfrf.dofs import Parameter, is_rotation
-from jointfrf.identification.joint_fit import JointFit
+from jointfrf.dofs import Parameter, ParameterKind, is_rotation
+from jointfrf.identification.fit_data import FitData
+from jointfrf.identification.result import Fit, FittedParameter
 from jointfrf.report.table import Cell, Table
 from jointfrf.report.ticks import prefixed_unit
 
-__all__ = ["finding_sentences", "parameter_table", "quality_sentences", "with_unit"]
+__all__ = ["finding_sentences", "parameter_table", "quality_sentences", "shown_name", "with_unit"]
 
 #: A residual up to this many times the noise is called that of the noise.
 _NOISE = 1.1
@@ -38,7 +41,13 @@ def _rounded(value: float, uncertainty: float | None) -> str:
     return f"{round(value, places):.{max(places, 0)}f}"
 
 
-def _named(term: Parameter) -> str:
+def shown_name(one: FittedParameter) -> Cell:
+    """Return a parameter as a cell of a table."""
+    is_spring = one.origin == "joint" and one.kind in get_args(ParameterKind)
+    return Parameter(cast(ParameterKind, one.kind), one.row, one.column) if is_spring else one.name
+
+
+def _named(term: FittedParameter) -> str:
     """Name a parameter of one DOF in words."""
     kind = {"k": "stiffness", "h": "hysteretic stiffness", "c": "viscous damping"}[term.kind]
     axis = term.row.rpartition("_")[2].lstrip("r")
@@ -47,16 +56,16 @@ def _named(term: Parameter) -> str:
     return f"{kind} of {term.row}" if is_rotation(term.row) else f"{kind} along {term.row}"
 
 
-def finding_sentences(fit: JointFit) -> list[str]:
+def finding_sentences(fit: Fit) -> list[str]:
     """Return one sentence a parameter, its value and where it lies with 95 % probability; one for all cross terms."""
     intervals = fit.confidence_interval(_PROBABILITY)
     told = []
-    for term, value in zip(fit.terms, fit.parameters.values(), strict=True):
+    for term, value in zip(fit.parameters, fit.value.values(), strict=True):
         low, high = intervals[term.name]
         name = _named(term)
         if not term.is_cross:
             told.append(f"{name[0].upper()}{name[1:]} ({term.name}): {_value_sentence(term, value, low, high)}")
-    cross = [term.name for term in fit.terms if term.is_cross]
+    cross = [term.name for term in fit.parameters if term.is_cross]
     if cross:
         clear = [name for name in cross if not intervals[name][0] <= 0 <= intervals[name][1]]
         which = f"{len(clear)} of {len(cross)}: {', '.join(clear)}" if clear else f"none of {len(cross)}"
@@ -64,7 +73,7 @@ def finding_sentences(fit: JointFit) -> list[str]:
     return told
 
 
-def _value_sentence(term: Parameter, value: float, low: float, high: float) -> str:
+def _value_sentence(term: FittedParameter, value: float, low: float, high: float) -> str:
     if term.kind == "k":
         if not np.isfinite(high):
             bound = f"at least {with_unit(low, term.unit)} (95 %)" if low > 0 else "the data give no bound"
@@ -81,7 +90,7 @@ def _value_sentence(term: Parameter, value: float, low: float, high: float) -> s
     return f"{_rounded(value / size, reach / size)} {shown}, with 95 % probability between {ends} {shown}{share}{zero}."
 
 
-def quality_sentences(fit: JointFit) -> list[str]:
+def quality_sentences(fit: Fit) -> list[str]:
     """Return sentences on noise and residual, and on lines that were left out."""
     told = []
     if np.isfinite(fit.noise_level) and fit.noise_level > 0:
@@ -95,7 +104,7 @@ def quality_sentences(fit: JointFit) -> list[str]:
             f"The noise of the FRFs is {100 * fit.noise_level:.2g} % (median); what the fit leaves unexplained is "
             f"{100 * fit.residual_level:.2g} %, {ratio:.2f} times the noise: {verdict}"
         )
-    if fit.data is not None:
+    if isinstance(fit.data, FitData):
         out = np.count_nonzero(~fit.data.fitted, axis=0)
         total = len(fit.data.fitted)
         names = [f"{n} of {total} for {dof}" for dof, n in zip(fit.dofs, out, strict=True) if n]
@@ -108,15 +117,15 @@ def quality_sentences(fit: JointFit) -> list[str]:
     return told
 
 
-def parameter_table(fit: JointFit) -> Table:
+def parameter_table(fit: Fit) -> Table:
     """Return the parameters with standard errors and intervals."""
     intervals, errors = fit.confidence_interval(_PROBABILITY), fit.std_error
     rows: list[tuple[Cell, ...]] = []
-    for term, value in zip(fit.terms, fit.parameters.values(), strict=True):
+    for term, value in zip(fit.parameters, fit.value.values(), strict=True):
         low, high = intervals[term.name]
         is_open = term.kind == "k" and not term.is_cross and not np.isfinite(high)
         ends: tuple[Cell, ...] = (low, "open") if is_open else (low, high)
-        rows.append((term, "open" if is_open else value, errors[term.name], *ends, term.unit))
+        rows.append((shown_name(term), "open" if is_open else value, errors[term.name], *ends, term.unit))
     etas = [
         f"{dof} {eta:.3g}" for dof, eta in zip(fit.dofs, fit.loss_factor, strict=True) if np.isfinite(eta) and eta != 0
     ]

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from jointfrf.dofs import Parameter
-from jointfrf.identification.joint_fit import JointFit
+from jointfrf.identification.result import Fit, FittedParameter
 from jointfrf.kernel.arguments import FloatArray
 from jointfrf.report.axes import FREQUENCY
 from jointfrf.report.figure import Curve, Figure, Panel
+from jointfrf.report.fit_words import shown_name
 from jointfrf.report.table import Cell, Table
 
 __all__ = ["information_figure", "information_table"]
@@ -20,12 +20,12 @@ _QUANTILES = (0.1, 0.5, 0.9)
 _STYLES = {"k": "ismm", "h": "stiffness", "c": "high"}
 
 
-def information_table(fit: JointFit, freq_hz: FloatArray, shares: FloatArray) -> Table:
+def information_table(fit: Fit, freq_hz: FloatArray, shares: FloatArray) -> Table:
     """Return for each parameter below which frequency a tenth, half and nine tenths of the information lie.
 
     Parameters
     ----------
-    fit : JointFit
+    fit : Fit
     freq_hz : ndarray, shape (n_freq,)
         Rising, Hz.
     shares : ndarray, shape (n_freq, p)
@@ -33,15 +33,15 @@ def information_table(fit: JointFit, freq_hz: FloatArray, shares: FloatArray) ->
     """
     total = np.cumsum(shares, axis=0)
     rows: list[tuple[Cell, ...]] = []
-    for i, term in enumerate(fit.terms):
+    for i, term in enumerate(fit.parameters):
         at = [min(int(np.searchsorted(total[:, i], q * total[-1, i])), freq_hz.size - 1) for q in _QUANTILES]
-        rows.append((term, *(float(freq_hz[a]) for a in at)))
+        rows.append((shown_name(term), *(float(freq_hz[a]) for a in at)))
     columns = ("parameter", *(f"{100 * q:.0f} % below, Hz" for q in _QUANTILES))
     note = "Eight tenths of what the data say of a parameter lie between the first and the last frequency."
     return Table("information-table", "Where the information lies", columns, tuple(rows), note=note)
 
 
-def information_figure(fit: JointFit, freq_hz: FloatArray, shares: FloatArray) -> Figure | None:
+def information_figure(fit: Fit, freq_hz: FloatArray, shares: FloatArray) -> Figure | None:
     """Draw the share of each part of the band in what is known of the parameters of each DOF; None for few lines."""
     parts = min(_PARTS, freq_hz.size // _LEAST)
     if parts < 3 or freq_hz[-1] == freq_hz[0]:
@@ -50,7 +50,7 @@ def information_figure(fit: JointFit, freq_hz: FloatArray, shares: FloatArray) -
     at = np.clip(np.searchsorted(edges, freq_hz, side="right") - 1, 0, parts - 1)
     panels = []
     for dof in fit.dofs:
-        terms = [(i, term) for i, term in enumerate(fit.terms) if term.row == term.column == dof]
+        terms = [(i, term) for i, term in enumerate(fit.parameters) if term.row == term.column == dof]
         curves = tuple(
             _steps(edges, np.bincount(at, shares[:, i], parts).astype(np.float64), term) for i, term in terms
         )
@@ -59,7 +59,7 @@ def information_figure(fit: JointFit, freq_hz: FloatArray, shares: FloatArray) -
     return Figure("information", caption, tuple(panels), 2 if len(panels) > 1 else 1)
 
 
-def _steps(edges: FloatArray, share: FloatArray, term: Parameter) -> Curve:
+def _steps(edges: FloatArray, share: FloatArray, term: FittedParameter) -> Curve:
     """Draw shares as steps."""
     label = {"k": "stiffness k", "h": "hysteretic damping h", "c": "viscous damping c"}[term.kind]
     return Curve(label, np.repeat(edges, 2)[1:-1], np.repeat(100 * share, 2), _STYLES[term.kind])

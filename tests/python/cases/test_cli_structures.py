@@ -117,7 +117,7 @@ def test_the_joint_comes_back_by_decoupling(equation, tmp_path):
     np.testing.assert_allclose(table[:, 0], FREQ_HZ)
     np.testing.assert_allclose(table[:, 1], 6e5, rtol=1e-3)
     np.testing.assert_allclose(table[:, 2], 2 * np.pi * FREQ_HZ * 20, rtol=0.1, atol=60)
-    assert jf.JointFit.load(saved).stiffness == pytest.approx([6e5, 5e3], rel=1e-3)
+    assert jf.load(saved).stiffness == pytest.approx([6e5, 5e3], rel=1e-3)
 
 
 def test_a_virtual_point_couples_channels_around_the_joint(tmp_path):

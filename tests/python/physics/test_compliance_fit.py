@@ -71,7 +71,7 @@ def test_reaches_the_bound_and_covers_the_truth(beams):
         for h in jf.realisations(gamma, 0.02, seed=5, count=80)
     ]
     bound = np.sqrt(np.diag(cramer_rao(gamma, beams.joint.dynamic_stiffness(beams.freq), terms_of(beams)))) * 0.02
-    theta = np.array([list(fit.parameters.values()) for fit in fits])
+    theta = np.array([list(fit.value.values()) for fit in fits])
     intervals = np.array([list(fit.confidence_interval(0.95).values()) for fit in fits])
     rmse = np.sqrt(((theta - TRUTH) ** 2).mean(axis=0))
     assert (rmse / bound < 1.3).all()
@@ -85,7 +85,7 @@ def test_the_band_mean_is_far_from_it(beams):
     """Why the fit exists: on the same data the mean of K* is several times worse."""
     h = jf.realisations(beams.gamma(beams.joint), 0.05, seed=5, count=40)
     fits = [identified(beams.freq, one, beams.joint.dofs, damping="viscous") for one in h]
-    fitted = np.array([list(fit.parameters.values()) for fit in fits]) / TRUTH - 1
+    fitted = np.array([list(fit.value.values()) for fit in fits]) / TRUTH - 1
     lines = jf.inverse_substructuring(h.reshape(-1, 4, 4)).reshape(len(h), -1, 2, 2)
     means = [jf.band_mean(beams.freq, k, {"y": (200, 800), "theta": (650, 800)}, ["y", "theta"]) for k in lines]
     averaged = np.array([[*m.stiffness, *m.damping] for m in means]) / TRUTH - 1
@@ -180,7 +180,7 @@ def test_damping_is_chosen_for_each_dof(beams):
     """Viscous at one DOF, hysteretic at the other."""
     joint = jf.Joint([6e5, 5e3], [20, 0], beams.joint.dofs, loss_factor=[0, 0.2])
     fit = identified(beams.freq, jf.pollute(beams.gamma(joint), 0.01, seed=4), joint.dofs, damping="auto")
-    assert list(fit.parameters) == ["k_y", "k_theta", "h_theta", "c_y"]
+    assert list(fit.value) == ["k_y", "k_theta", "h_theta", "c_y"]
     for name, truth in (("c_y", 20), ("h_theta", 1e3)):
         low, high = fit.confidence_interval(0.999)[name]
         assert low < truth < high

@@ -48,8 +48,8 @@ def test_geometry_and_its_matrix_give_the_same_fit():
     h, sides, _ = measured(freq, 0.02)
     noisy = jf.pollute(h, 0.01, seed=2)
     fits = [identified(freq, noisy, transform=t) for t in (jf.virtual_points(*sides), jf.virtual_interface(*sides))]
-    for name, value in fits[0].parameters.items():
-        assert fits[1].parameters[name] == pytest.approx(value, rel=1e-6)
+    for name, value in fits[0].value.items():
+        assert fits[1].value[name] == pytest.approx(value, rel=1e-6)
         assert fits[1].std_error[name] == pytest.approx(fits[0].std_error[name], rel=1e-6)
 
 
@@ -97,11 +97,11 @@ def test_exactly_as_many_channels_as_dofs_are_said_not_to_be_checked():
         warnings.simplefilter("ignore", jf.IdentificationWarning)
         wide = jf.identify(freq, noisy, transform=known)
     grown = {
-        d: np.sqrt(wide.std_error[f"k_{d}"] ** 2 - fit.std_error[f"k_{d}"] ** 2) / fit.parameters[f"k_{d}"] ** 2
+        d: np.sqrt(wide.std_error[f"k_{d}"] ** 2 - fit.std_error[f"k_{d}"] ** 2) / fit.value[f"k_{d}"] ** 2
         for d in fit.dofs
     }
     assert grown["theta_z"] == pytest.approx(known.compliance[1], rel=0.05)
-    assert grown["y"] < 1e-3 / fit.parameters["k_y"]
+    assert grown["y"] < 1e-3 / fit.value["k_y"]
 
 
 @pytest.mark.long

@@ -151,8 +151,8 @@ def test_any_order_by_name():
         fit = jf.identify(FREQ, h, DOFS)
         other = jf.identify(FREQ, h[:, place[:, None], place], names)
     assert other.dofs == tuple(names)
-    for name, value in fit.parameters.items():
-        assert other.parameters[name] == pytest.approx(value, rel=1e-6)
+    for name, value in fit.value.items():
+        assert other.value[name] == pytest.approx(value, rel=1e-6)
         assert other.std_error[name] == pytest.approx(fit.std_error[name], rel=1e-6)
         assert other.unit(name) == fit.unit(name)
     assert [fit.unit(f"k_{d}") for d in DOFS] == ["N/m", "N m/rad"] * 2 + ["N/m", "N m/rad"]
@@ -165,16 +165,18 @@ def test_any_order_by_name():
 
 
 def test_units_know_every_way_to_write_a_rotation():
-    fit = jf.identify(
-        SHORT, assembly(freq=SHORT), ["ux", "ry", "uy", "rx", "uz", "rot_z"], "inverse-substructuring", (10, 600)
+    fit = jf.identify_band_mean(
+        SHORT, assembly(freq=SHORT), "inverse-substructuring", ["ux", "ry", "uy", "rx", "uz", "rot_z"], (10, 600)
     )
     assert [fit.unit(f"c_{d}") for d in fit.dofs] == ["N s/m", "N m s/rad"] * 3
     assert fit.unit("k_ux,ry") == "N"
     assert fit.unit("k_Mtheta_x") == "N m/rad"
     assert fit.unit("h_Fx,Mtheta_x") == "N"
-    assert [term.name for term in fit.terms] == list(fit.parameters)
-    assert [term.unit for term in fit.terms] == [entry["unit"] for entry in fit.to_dict()["parameters"].values()]
-    with pytest.raises(ValueError, match="a parameter must be named k_<dof>, h_<dof> or c_<dof>, not 'stiffness'"):
+    assert [term.name for term in fit.parameters] == list(fit.value)
+    assert [term.unit for term in fit.parameters] == [
+        entry["unit"] for entry in jf.fit_to_dict(fit)["parameters"].values()
+    ]
+    with pytest.raises(ValueError, match="there is no parameter 'stiffness', only k_"):
         fit.unit("stiffness")
 
 
@@ -236,7 +238,7 @@ def test_a_full_joint_with_noise(bound):
             for name in fit.parameters
         ]
     )
-    off = np.array([*fit.parameters.values()]) - truth
+    off = np.array([*fit.value.values()]) - truth
     assert off.size == 42
     pull = off / np.array([*fit.std_error.values()])
     assert (abs(pull) < 4).all(), pull
@@ -276,7 +278,7 @@ def test_bands_of_some_dofs(gamma):
         warnings.simplefilter("ignore", jf.IdentificationWarning)
         fit = jf.identify(FREQ, h, DOFS, bands=bands, damping="viscous")
     for name, value in zip(fit.parameters, TRUTH, strict=True):
-        assert abs(fit.parameters[name] - value) < 4 * fit.std_error[name]
+        assert abs(fit.value[name] - value) < 4 * fit.std_error[name]
 
 
 def test_a_moved_joint_is_the_same_joint():

@@ -254,7 +254,7 @@ def test_a_fit_is_exported_as_its_joint():
     b = jf.chain([4, 2], [2000, 2500], [2, 1], ground="end").receptance(freq)
     h = jf.couple(a, b, jf.Joint([2000.0], [3.0]).dynamic_stiffness(freq), [1], [0])[:, 1:3, 1:3]
     fit = jf.identify(freq, jf.pollute(h, 0.01, seed=3), ["x"], damping="viscous")
-    found = read_springs(fit.export("abaqus", NODES, element=5))
+    found = read_springs(jf.cards(fit, "abaqus", NODES, element=5))
     assert found[0, 0, 6] == pytest.approx(-fit.stiffness[0], rel=1e-12)
     assert found[1, 0, 0] == pytest.approx(fit.damping[0], rel=1e-12)
 

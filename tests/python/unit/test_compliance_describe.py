@@ -9,10 +9,11 @@ import pytest
 import jointfrf as jf
 from jointfrf.identification.compliance_fit.channel_noise import NoiseOptions
 from jointfrf.identification.compliance_fit.damping_choice import DofDamping
-from jointfrf.identification.compliance_fit.describe import describe_compliance
 from jointfrf.identification.compliance_fit.fit import fit_compliance
 from jointfrf.identification.compliance_fit.misfit import Misfit, Trend
 from jointfrf.identification.compliance_fit.prepare import FitOptions, prepare_compliance
+from jointfrf.identification.describe import describe_springs
+from jointfrf.identification.findings import as_warning
 from jointfrf.identification.prepare import as_measured
 
 LEVEL = 0.01
@@ -29,7 +30,7 @@ def told(freq, h, dofs, *, noise=LEVEL, damping="viscous", cross="zero"):
     """Return the fit described."""
     options = FitOptions(damping, cross, True)
     problem = prepare_compliance(as_measured(freq, h, square=False), dofs, None, None, NoiseOptions(noise), options)
-    return describe_compliance(fit_compliance(problem), problem).fit
+    return describe_springs(fit_compliance(problem), problem)
 
 
 class Found:
@@ -39,7 +40,7 @@ class Found:
         self.fit, self.problem = fit, problem
 
     def described(self):
-        return describe_compliance(self.fit, self.problem)
+        return describe_springs(self.fit, self.problem)
 
     def with_(self, **change):
         return Found(self.fit._replace(**change), self.problem)
@@ -53,8 +54,8 @@ class Found:
 
     def of_intervals(self, **limits):
         """Other intervals of some parameters."""
-        known = self.fit.joint.confidence_interval(0.95)
-        return self.with_(joint=replace(self.fit.joint, intervals=lambda probability: known | limits))
+        known = self.fit.intervals(0.95)
+        return self.with_(intervals=lambda probability: known | limits)
 
 
 @pytest.fixture(scope="module")
@@ -68,20 +69,20 @@ def found(beams):
 
 def test_nothing_to_tell(found):
     described = found.described()
-    assert described.fit.notes == described.fit.warnings == described.warnings == ()
-    assert described.fit.parameters == found.fit.joint.parameters
+    assert described.findings == ()
+    np.testing.assert_array_equal(described.estimate, found.fit.estimate.theta)
 
 
 def test_a_fit_that_did_not_converge_warns_of_its_own_kind(found):
     described = found.of_groups(converged=False, iterations=17).described()
-    assert [type(warning) for warning in described.warnings] == [jf.ConvergenceWarning]
-    assert described.fit.warnings == ("the fit did not converge in 17 iterations",)
+    assert [type(as_warning(one)) for one in described.findings] == [jf.ConvergenceWarning]
+    assert described.warnings == ("the fit did not converge in 17 iterations",)
 
 
 @pytest.mark.parametrize(("margin", "strength"), [(11.0, "clearly"), (3.0, "weakly"), (1.0, "hardly")])
 def test_how_the_damping_of_each_dof_was_chosen(found, margin, strength):
     choices = (DofDamping("y", "viscous", "both", margin), DofDamping("theta", "hysteretic", "none", 50.0))
-    assert found.with_(choices=choices).described().fit.notes == (
+    assert found.with_(choices=choices).described().notes == (
         f"damping of y: viscous, {strength} preferred to both (difference of BIC {margin:.1f})",
         "damping of theta: hysteretic, clearly preferred to none (difference of BIC 50.0)",
     )
@@ -91,19 +92,19 @@ def test_damping_chosen_by_the_data_is_told_by_dof(beams):
     joint = jf.Joint([6e5, 5e3], [20, 0], ["y", "theta"], structural_damping=[0, 400])
     fit = told(beams.freq, jf.pollute(beams.gamma(joint), LEVEL, seed=3), ["y", "theta"], damping="auto")
     assert [note.split(",")[0] for note in fit.notes] == ["damping of y: viscous", "damping of theta: hysteretic"]
-    assert list(fit.parameters) == ["k_y", "k_theta", "h_theta", "c_y"]
+    assert list(fit.value) == ["k_y", "k_theta", "h_theta", "c_y"]
 
 
 def test_a_level_from_the_residual_is_noted(found, chains):
-    (note,) = found.of_noise(is_assumed=True).described().fit.notes
+    (note,) = found.of_noise(is_assumed=True).described().notes
     assert note == "the noise level is taken from the residual: the FRFs do not show it otherwise"
     h = chains.gamma(chains.joint)
     assert told(chains.freq, (h + h.swapaxes(1, 2)) / 2, ["x"], noise=None).notes == (note,)
 
 
 def test_correlated_noise_is_noted_by_the_number_of_independent_lines(found, beams):
-    assert not found.of_noise(inflation=1.1).described().fit.notes
-    assert found.of_noise(inflation=4.0).described().fit.notes == (
+    assert not found.of_noise(inflation=1.1).described().notes
+    assert found.of_noise(inflation=4.0).described().notes == (
         "the noise of neighbouring lines is correlated: 158 lines say as much as 40 independent ones",
     )
     e = np.random.default_rng(2).standard_normal((beams.freq.size + 3, 4, 4, 2)) @ [1, 1j]
@@ -115,7 +116,7 @@ def test_correlated_noise_is_noted_by_the_number_of_independent_lines(found, bea
 
 def test_outlying_lines_are_listed(found, beams):
     start = "lines with far more noise than their neighbours weigh less: "
-    (note,) = found.of_noise(outlying=np.arange(9)).described().fit.notes
+    (note,) = found.of_noise(outlying=np.arange(9)).described().notes
     assert note == start + "15, 20, 25, 30, 35, 40, 45, 50 and 1 more Hz"
     exact, hum = beams.gamma(beams.joint), [20, 90]
     h = jf.pollute(exact, LEVEL, seed=3)
@@ -125,7 +126,7 @@ def test_outlying_lines_are_listed(found, beams):
 
 def test_damping_that_may_be_zero_is_noted_but_not_a_stiffness(found):
     described = found.of_intervals(c_y=(-1.0, 2.0)).described()
-    assert described.fit.notes == ("c_y: not significantly different from zero (95 % interval)",)
+    assert described.notes == ("c_y: not significantly different from zero (95 % interval)",)
     assert not described.warnings
 
 
@@ -142,11 +143,11 @@ def test_damping_that_may_be_zero_is_noted_but_not_a_stiffness(found):
     ],
 )
 def test_stiffnesses_that_the_data_do_not_determine(found, limits, text):
-    assert found.of_intervals(k_theta=limits).described().fit.warnings == (text,)
+    assert found.of_intervals(k_theta=limits).described().warnings == (text,)
 
 
 def test_an_interval_as_wide_as_the_value_is_not_yet_poor(found):
-    k = found.fit.joint.parameters["k_theta"]
+    k = found.described().value["k_theta"]
     assert not found.of_intervals(k_theta=(0.51 * k, 1.49 * k)).described().warnings
 
 
@@ -183,7 +184,7 @@ def test_a_residual_above_the_noise_is_told(beams):
 
 def test_no_residual_is_compared_with_a_level_that_it_gave(found):
     far = Misfit(2.0, 0.05, (), ())
-    assert "2.00 times the noise" in found.with_(misfit=far).described().fit.warnings[0]
+    assert "2.00 times the noise" in found.with_(misfit=far).described().warnings[0]
     assert not found.with_(misfit=far).of_noise(is_assumed=True).described().warnings
 
 
@@ -219,13 +220,13 @@ def test_the_residual_of_large_noise_is_that_said(chains, seed):
 
 def test_a_local_misfit_names_the_lines(found):
     local = Misfit(2.0, 0.05, ((300.0, 350.0, 0.8), (100.0, 105.0, 0.2)), ())
-    (text,) = found.with_(misfit=local).described().fit.warnings
+    (text,) = found.with_(misfit=local).described().warnings
     assert "; the excess is local: 300-350 Hz (80 %), 100-105 Hz (20 %): bad lines, or local modes" in text
 
 
 def test_a_trend_names_the_parameter_and_where_it_is_least_and_largest(found):
     trend = Trend("k_y", np.array([50.0, 200.0, 600.0]), np.array([6e5, 5e5, 7e5]), 1e-6)
-    assert found.with_(misfit=Misfit(1.0, 0.05, (), (trend,))).described().fit.warnings == (
+    assert found.with_(misfit=Misfit(1.0, 0.05, (), (trend,))).described().warnings == (
         "k_y is not one constant over frequency: parts of the band give 5e+05 .. 7e+05 (near 200 and 600 Hz)",
     )
 
@@ -263,7 +264,7 @@ def test_lines_that_do_not_fit_are_counted_unless_cross_terms_explain_them(found
     trusted = np.arange(158) >= 10
     out = found.of_groups(trusted=trusted)
     text = "10 of 158 lines do not fit the joint found within their noise and are left out"
-    assert out.described().fit.warnings == (text,)
+    assert out.described().warnings == (text,)
     assert not out.with_(cross_fits=True).described().warnings
     assert not found.of_groups(trusted=np.arange(158) >= 3).described().warnings
 
@@ -281,10 +282,10 @@ def test_random_phases_on_ten_lines_are_left_out(beams):
 def test_intervals_widened_by_scatter_are_told(found):
     spread = found.fit.spread
     wide = found.with_(spread=spread._replace(chance=np.array([0.5, 1e-6, 1e-3, 1e-5])))
-    assert wide.described().fit.warnings == (
+    assert wide.described().warnings == (
         "k_theta, c_theta: parts of the band scatter more than the noise explains; the intervals are widened by that",
     )
-    exact = wide.with_(joint=replace(found.fit.joint, noise_level=1e-12))
+    exact = wide.with_(problem=replace(wide.fit.problem, noise=replace(wide.fit.problem.noise, level=1e-12)))
     assert not exact.described().warnings
 
 
@@ -301,7 +302,7 @@ def test_groups_are_named(chains):
     assert told(chains.freq, two_chains(chains), ["x", "y"]).notes == (text,)
     coupled = told(chains.freq, two_chains(chains), ["x", "y"], cross="fit")
     assert coupled.notes == (text + ", and cross terms between them cannot be identified",)
-    assert list(coupled.parameters) == ["k_x", "k_y", "c_x", "c_y"]
+    assert list(coupled.value) == ["k_x", "k_y", "c_x", "c_y"]
 
 
 def test_lines_left_out_of_a_group_name_its_dofs(chains):

@@ -24,7 +24,7 @@ NAMES = {
     "interpolate", "os.system", "os.spawn",
 }  # fmt: skip
 #: The same names of what reads or makes data only.
-HARMLESS = {"re.compile", "json.loads", "json.load", "tomllib.loads", "JointFit.load"}
+HARMLESS = {"re.compile", "json.loads", "json.load", "tomllib.loads", "load"}
 #: Shown with an argument that forbids pickles.
 SAFE = ("allow_pickle", False)
 

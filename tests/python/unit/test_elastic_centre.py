@@ -5,7 +5,7 @@ import pytest
 
 import jointfrf as jf
 from jointfrf.dofs import DIRECTIONS
-from jointfrf.identification.joint_fit import JointFit
+from jointfrf.identification.result import Fit
 
 STIFFNESS = np.array([2e7, 5e7, 1e8, 4e3, 9e3, 2e3])
 
@@ -47,10 +47,10 @@ def fit_of(stiffness, error):
     pairs = [(a, a) for a in range(6)] + [(a, b) for a in range(6) for b in range(a + 1, 6)]
     names = ["k_" + (DIRECTIONS[a] if a == b else f"{DIRECTIONS[a]},{DIRECTIONS[b]}") for a, b in pairs]
     size = np.sqrt(np.diagonal(stiffness))
-    return JointFit(
+    return Fit.of_springs(
         "compliance", DIRECTIONS, {name: stiffness[a, b] for name, (a, b) in zip(names, pairs, strict=True)},
         np.diag([(error * size[a] * size[b]) ** 2 for a, b in pairs]), 0.01, 0.01, np.array([1.0, 2.0]),
-        np.zeros((2, 6, 6), complex), (((1.0, 2.0),),) * 6,
+        k_lines=np.zeros((2, 6, 6), complex), bands=(((1.0, 2.0),),) * 6,
     )  # fmt: skip
 
 

@@ -138,7 +138,7 @@ def test_intervals_where_there_is_little(beams, what):
         assert low < true < high, name
     variance = np.diagonal(fit.covariance)
     assert (variance > 0).all()
-    assert all(np.isfinite(value) for value in fit.parameters.values())
+    assert all(np.isfinite(value) for value in fit.value.values())
 
 
 def test_both_sides_of_a_rigid_joint_are_the_same_where_frfs_are_calculated(beams):

@@ -407,13 +407,12 @@ def test_a_name_with_a_line_end_does_not_split_the_message(tmp_path):
 
 def test_no_file_of_any_kind_is_waited_for(tmp_path):
     """Tables of channels, matrices, DOF names, joints and TOML files, too."""
-    from jointfrf import JointFit
     from jointfrf.io import read_channel_table
     from jointfrf.io.matrix_file import read_dof_names, read_matrix
     from jointfrf.toml.table import read_toml
 
     for suffix, read in ((".csv", read_channel_table), (".toml", read_channel_table), (".toml", read_toml),
-                         (".mtx", read_matrix), (".txt", read_dof_names), (".json", JointFit.load)):  # fmt: skip
+                         (".mtx", read_matrix), (".txt", read_dof_names), (".json", jf.load)):  # fmt: skip
         pipe = tmp_path / f"{read.__name__}{suffix}"
         os.mkfifo(pipe)
         with pytest.raises(FileContentError, match="is a pipe or a device, not a file"):

@@ -118,5 +118,5 @@ def test_a_coupled_joint_of_few_lines_is_fitted_without_going_to_and_fro():
         warnings.simplefilter("ignore", jf.ConvergenceWarning)
         fit = jf.identify(FREQ_HZ, found.gamma(frfs), transform=transforms, damping="viscous", cross="fit")
     assert not any("did not converge" in warning for warning in fit.warnings)
-    error = np.array([fit.parameters[f"k_{dof}"] for dof in DOFS]) / JOINT.stiffness.diagonal() - 1
+    error = np.array([fit.value[f"k_{dof}"] for dof in DOFS]) / JOINT.stiffness.diagonal() - 1
     assert abs(error).max() < 0.02

@@ -37,7 +37,7 @@ def test_a_saved_fit_gives_its_joint(tmp_path):
     b = jf.chain([4], [2000], [2], ground="end").receptance(freq)
     gamma = jf.couple(a, b, jf.Joint([2000.0], [3.0]).dynamic_stiffness(freq), [0], [0])
     fit = jf.identify(freq, jf.pollute(gamma, 0.02, seed=1), ["x"])
-    assert np.array_equal(jf.read_joint(fit.save(tmp_path / "fit.json")).stiffness, fit.joint.stiffness)
+    assert np.array_equal(jf.read_joint(jf.save(fit, tmp_path / "fit.json")).stiffness, fit.joint.stiffness)
 
 
 @pytest.mark.parametrize(

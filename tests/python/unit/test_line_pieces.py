@@ -76,9 +76,9 @@ def test_a_fit_of_pieces_is_that_of_all_lines(beams, cut, cross):
     cut()
     fit = fit_compliance(problem).joint
     np.testing.assert_allclose(fit.k_lines, whole.k_lines, rtol=1e-9)
-    for name, value in whole.parameters.items():
+    for name, value in whole.value.items():
         # Starts see some lines only: both end where steps are far below a standard error.
-        assert abs(fit.parameters[name] - value) < 0.01 * whole.std_error[name]
+        assert abs(fit.value[name] - value) < 0.01 * whole.std_error[name]
     np.testing.assert_allclose(fit.covariance, whole.covariance, rtol=1e-3)
 
 
@@ -87,8 +87,8 @@ def test_a_fit_of_noisy_pieces(beams, cut):
     whole = jf.identify(beams.freq, x, beams.joint.dofs)
     cut()
     fit = jf.identify(beams.freq, x, beams.joint.dofs)
-    for name, value in whole.parameters.items():
-        assert abs(fit.parameters[name] - value) < 0.7 * whole.std_error[name]
+    for name, value in whole.value.items():
+        assert abs(fit.value[name] - value) < 0.7 * whole.std_error[name]
 
 
 @pytest.mark.parametrize("noise", [None, pytest.param(0.03, marks=pytest.mark.long)])

@@ -16,9 +16,9 @@ def test_each_fit_is_that_of_identify(beams, drawn):
     fits = list(jf.identify_realisations(beams.freq, drawn, ["y", "theta"], damping="viscous"))
     for fit, gamma in zip(fits, drawn, strict=True):
         alone = jf.identify(beams.freq, gamma, ["y", "theta"], damping="viscous")
-        for name, value in alone.parameters.items():
+        for name, value in alone.value.items():
             # The smooth FRFs of both differ by a small part of the noise.
-            assert abs(fit.parameters[name] - value) < 0.1 * alone.std_error[name]
+            assert abs(fit.value[name] - value) < 0.1 * alone.std_error[name]
             assert fit.std_error[name] == pytest.approx(alone.std_error[name], rel=0.5)
         assert fit.noise_level == pytest.approx(alone.noise_level, rel=0.05)
 
@@ -29,8 +29,8 @@ def test_a_set_of_another_structure_is_searched_anew(beams, chains, drawn):
     _, fit = jf.identify_realisations(beams.freq, sets, ["y", "theta"], damping="viscous")
     alone = jf.identify(beams.freq, sets[1], ["y", "theta"], damping="viscous")
     assert fit.noise_level == pytest.approx(alone.noise_level, rel=0.05)
-    for name, value in alone.parameters.items():
-        assert abs(fit.parameters[name] - value) < 0.1 * alone.std_error[name]
+    for name, value in alone.value.items():
+        assert abs(fit.value[name] - value) < 0.1 * alone.std_error[name]
 
 
 def test_sets_are_taken_one_at_a_time_and_checked(beams, drawn):
@@ -75,5 +75,5 @@ def test_a_start_at_other_lines_is_where_the_joint_begins_only(beams, drawn):
     for own in (slice(half), slice(None, None, 2)):
         (fit,) = jf.identify_realisations(beams.freq[own], [drawn[1][own]], dofs, damping="viscous", start=start)
         alone = jf.identify(beams.freq[own], drawn[1][own], dofs, damping="viscous")
-        for name, value in alone.parameters.items():
-            assert abs(fit.parameters[name] - value) < 0.1 * alone.std_error[name]
+        for name, value in alone.value.items():
+            assert abs(fit.value[name] - value) < 0.1 * alone.std_error[name]

@@ -27,8 +27,6 @@ FLOORS = (
     {"cli"},
     {"__main__"},
 )
-#: Methods that hand a result to a room above, which is imported when they are called and not before.
-HANDED_UP = {"identification/joint_fit.py": {"jointfrf.report.fit_page", "jointfrf.report.fit_plot"}}
 FLOOR = {room: floor for floor, rooms in enumerate(FLOORS) for room in rooms}
 
 
@@ -71,23 +69,8 @@ def test_a_room_imports_only_rooms_below_it():
         for file, room in files().items()
         for module in imported_modules(file)
         if module != "jointfrf._kernel" and room_of(module) != room and FLOOR[room_of(module)] >= FLOOR[room]
-        if module not in HANDED_UP.get(file.relative_to(PACKAGE).as_posix(), ())
     ]
     assert not wrong
-
-
-def test_a_result_is_handed_up_inside_a_method_only():
-    for name, above in HANDED_UP.items():
-        tree = ast.parse((PACKAGE / name).read_text(encoding="utf-8"))
-        everywhere = [node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
-        inside = [
-            node.module
-            for function in ast.walk(tree)
-            if isinstance(function, ast.FunctionDef)
-            for node in ast.walk(function)
-            if isinstance(node, ast.ImportFrom)
-        ]
-        assert sorted(set(everywhere) & above) == sorted(inside) == sorted(above)
 
 
 def test_only_the_room_kernel_imports_the_compiled_kernel():

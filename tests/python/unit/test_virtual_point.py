@@ -208,7 +208,7 @@ def test_a_fully_coupled_joint_is_identified(six_dof_joint):
     noisy = jf.identify(freq, jf.pollute(gamma, 0.003, seed=3), DOFS, transform=t, cross="fit")
     assert not noisy.warnings
     off = []
-    for name, value in noisy.parameters.items():
+    for name, value in noisy.value.items():
         pair = name[2:].split(",")
         a, b = DOFS.index(pair[0]), DOFS.index(pair[-1])
         exact = (joint.stiffness if name[0] == "k" else joint.damping)[a, b]

@@ -11,9 +11,9 @@ import numpy as np
 from jointfrf.cases.modelled_joint.read import ModelledJointCase
 from jointfrf.cases.workers import Workers
 from jointfrf.frf.noise import pollute
+from jointfrf.identification.identify_model import identify_model
 from jointfrf.identification.model_fit.assembly import Assembly
-from jointfrf.identification.model_fit.identify_model import identify_model
-from jointfrf.identification.model_fit.model_fit import ModelFit
+from jointfrf.identification.result import Fit
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.laws.law import JointLaw
 from jointfrf.laws.law_joint import LawJoint
@@ -53,20 +53,20 @@ class ModelledJointResult:
     draws : tuple of FittedDraw
     bound : dict of str to float
         Standard deviations at the Cramer-Rao bound.
-    first : ModelFit
+    first : Fit
         The first realisation.
     measured : ndarray
         Its FRFs.
-    constant : ModelFit
+    constant : Fit
         The same fitted by springs and dashpots in place of laws that depend on frequency.
     """
 
     case: ModelledJointCase
     draws: tuple[FittedDraw, ...]
     bound: dict[str, float]
-    first: ModelFit
+    first: Fit
     measured: ComplexArray
-    constant: ModelFit
+    constant: Fit
 
 
 def moving_stiffness(joint: LawJoint, freq_hz: FloatArray) -> ComplexArray:
@@ -88,13 +88,13 @@ def compute_modelled(case: ModelledJointCase, n_realisations: int, workers: Work
     return ModelledJointResult(case, draws, bound().std_error, first(), measured, constant())
 
 
-def fit_of_exact(case: ModelledJointCase, exact: ComplexArray) -> ModelFit:
+def fit_of_exact(case: ModelledJointCase, exact: ComplexArray) -> Fit:
     """Fit exact FRFs from the actual joint, with the noise known: standard errors are at the Cramer-Rao bound."""
     at_truth = replace(case.believed, joint=case.truth.joint)
     return _fit(case, at_truth, exact, np.asarray((case.noise * abs(exact)) ** 2, float))
 
 
-def _fit(case: ModelledJointCase, whole: Assembly, h: ComplexArray, noise: FloatArray | None = None) -> ModelFit:
+def _fit(case: ModelledJointCase, whole: Assembly, h: ComplexArray, noise: FloatArray | None = None) -> Fit:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         return identify_model(case.freq_hz, h, whole, case.responses, case.forces, noise=noise)
@@ -104,7 +104,7 @@ def fitted_draw(case: ModelledJointCase, exact: ComplexArray, number: int) -> Fi
     """Fit one realisation: that of seed + number."""
     fit = _fit(case, case.believed, pollute(exact, case.noise, seed=case.seed + number))
     stiffness = moving_stiffness(fit.joint, case.freq_hz)
-    return FittedDraw(fit.parameters, fit.confidence_interval(0.95), fit.test.is_noise, stiffness)
+    return FittedDraw(fit.value, fit.confidence_interval(0.95), fit.test.is_noise, stiffness)
 
 
 def _constant(joint: LawJoint) -> LawJoint:

@@ -6,6 +6,7 @@ import numpy as np
 
 from jointfrf.cases.modelled_joint.compute import ModelledJointResult, moving_stiffness
 from jointfrf.dofs import is_rotation
+from jointfrf.identification.fit_data import ModelData
 from jointfrf.report.figure import Curve, Figure, Panel, Ribbon
 
 __all__ = ["modelled_figures"]
@@ -45,17 +46,20 @@ def _stiffness(result: ModelledJointResult) -> Figure:
 
 def _frfs(result: ModelledJointResult) -> Figure:
     case, panels = result.case, []
+    first, constant = result.first.data, result.constant.data
+    assert isinstance(first, ModelData)
+    assert isinstance(constant, ModelData)
     for row, response in enumerate(case.responses):
         for column, force in enumerate(case.forces):
             title, freq = f"{response} by {force}", case.freq_hz
             curves = (
-                Curve("fitted", freq, np.abs(result.first.predicted[:, row, column]), "actual"),
+                Curve("fitted", freq, np.abs(first.predicted[:, row, column]), "actual"),
                 Curve("measured", freq, np.abs(result.measured[:, row, column]), "measured"),
             )
             panels.append(Panel(title, "frequency, Hz", "|H|, m/N", curves=curves, log_y=True))
             residuals = (
-                Curve("springs and dashpots", freq, np.abs(result.constant.residual[:, row, column]), "low"),
-                Curve("laws of the case", freq, np.abs(result.first.residual[:, row, column]), "measured"),
+                Curve("springs and dashpots", freq, np.abs(constant.residual[:, row, column]), "low"),
+                Curve("laws of the case", freq, np.abs(first.residual[:, row, column]), "measured"),
             )
             panels.append(Panel(title, "frequency, Hz", "|residual| over noise", curves=residuals, log_y=True))
     return Figure(

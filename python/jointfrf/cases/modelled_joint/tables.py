@@ -8,6 +8,7 @@ import numpy as np
 
 from jointfrf.cases.modelled_joint.compute import ModelledJointResult, moving_stiffness
 from jointfrf.dofs import is_rotation
+from jointfrf.identification.record import fit_to_dict
 from jointfrf.report.table import Cell, Table, number
 
 __all__ = ["modelled_numbers", "modelled_summary", "modelled_tables"]
@@ -27,7 +28,7 @@ def _parameters(result: ModelledJointResult) -> Table:
 
     rows: list[tuple[Cell, ...]] = []
     failing = []
-    for one in result.first.fitted:
+    for one in result.first.parameters:
         actual = result.case.actual[one.name]
         values = np.array([draw.values[one.name] for draw in result.draws])
         low, high = np.array([draw.intervals[one.name] for draw in result.draws]).T
@@ -114,8 +115,8 @@ def modelled_summary(result: ModelledJointResult, tables: list[Table]) -> list[T
 
 def modelled_numbers(result: ModelledJointResult) -> dict[str, Any]:
     """Return what `results.json` holds beside tables: the first realisation, and all values."""
-    names = list(result.first.parameters)
+    names = list(result.first.value)
     return {
-        "first": result.first.to_dict(),
+        "first": fit_to_dict(result.first, lines=False),
         "values": {name: [draw.values[name] for draw in result.draws] for name in names},
     }

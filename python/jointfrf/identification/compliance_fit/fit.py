@@ -29,7 +29,6 @@ from jointfrf.identification.compliance_fit.joint_terms import (
 )
 from jointfrf.identification.compliance_fit.misfit import Misfit, diagnose
 from jointfrf.identification.compliance_fit.prepare import FitProblem
-from jointfrf.identification.joint_fit import JointFit
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.substructuring.ismm import inverse_substructuring
 
@@ -63,10 +62,11 @@ class ComplianceFit(NamedTuple):
 
     Attributes
     ----------
-    joint : JointFit
-        Parameters, covariance and levels, without notes and warnings.
+    problem : FitProblem
+        With the noise that was used.
     estimate : JointEstimate
-        What they come from.
+    covariance : ndarray, shape (p, p)
+    intervals : LikelihoodIntervals
     spread : Spread
         By how much variances exceed those from independent noise.
     channels : ChannelSpread or None
@@ -81,8 +81,10 @@ class ComplianceFit(NamedTuple):
         Empty where the damping terms were given.
     """
 
-    joint: JointFit
+    problem: FitProblem
     estimate: JointEstimate
+    covariance: FloatArray
+    intervals: LikelihoodIntervals
     spread: Spread
     channels: ChannelSpread | None
     parts: BandParts | None
@@ -158,23 +160,12 @@ def fit_compliance(problem: FitProblem) -> ComplianceFit:
     """Fit the joint as `fitted_joint` does, and compare its residual with the noise."""
     found = fitted_joint(problem)
     problem, result, noise = found.problem, found.estimate, found.problem.noise
-    scale = float(np.sqrt(result.excess))
-    names = [one.name for one in result.parameters]
-    joint = JointFit(
-        method="compliance",
-        dofs=problem.dofs,
-        parameters=dict(zip(names, result.theta.tolist(), strict=True)),
-        covariance=found.covariance(),
-        noise_level=scale * noise.level if noise.is_assumed else noise.level,
-        residual_level=scale * noise.level,
-        freq_hz=problem.freq_hz,
-        k_lines=stiffness_of_lines(problem.frfs),
-        bands=problem.bands,
-        intervals=found.intervals(),
-    )
     misfit = diagnose(result, problem.freq_hz, noise.inflation, found.spread)
     cross_fits = _cross_fits(problem, result, misfit, found.choices)
-    return ComplianceFit(joint, result, found.spread, found.channels, found.parts, misfit, cross_fits, found.choices)
+    return ComplianceFit(
+        problem, result, found.covariance(), found.intervals(), found.spread, found.channels, found.parts, misfit,
+        cross_fits, found.choices,
+    )  # fmt: skip
 
 
 def _span(freq: FloatArray) -> str:

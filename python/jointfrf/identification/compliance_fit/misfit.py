@@ -70,6 +70,11 @@ class Misfit(NamedTuple):
         return self.ratio > 1 + _SIGMA * self.sigma
 
     @property
+    def is_noise(self) -> bool:
+        """Whether the residual is no more than noise, and no parameter changes over the band."""
+        return not (self.is_large or self.trends)
+
+    @property
     def is_small(self) -> bool:
         """Whether the residual is below the noise by more than chance: the noise is taken too large."""
         return self.ratio < 1 - _SIGMA * self.sigma

@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from jointfrf.frf.entry_groups import entry_groups
 from jointfrf.frf.noise_model import NoiseModel, estimate_noise
-from jointfrf.identification.identify import identify
 from jointfrf.identification.model_fit.assembly import Assembly
 from jointfrf.identification.model_fit.fit import ModelProblem
 from jointfrf.identification.model_fit.prediction import Prediction
@@ -205,13 +204,15 @@ def _of_compliance_fit(
     """Return values of a joint of springs from the compliance fit; None for other joints, or where it finds none."""
     if joint.rigid or not all(isinstance(law, SpringLaw) for law in joint.laws.values()):
         return None
+    from jointfrf.identification.identify import identify
+
     gamma = np.ascontiguousarray(lines[:, at[0]][:, :, at[1]])
     cross = "fit" if any(a != b for a, b in joint.laws) else "zero"
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
             own = variance[:, at[0]][:, :, at[1]]
-            found = identify(freq, gamma, joint.dofs, damping="viscous", cross=cross, noise=own)  # type: ignore[call-overload]
+            found = identify(freq, gamma, joint.dofs, damping="viscous", cross=cross, noise=own)
         except (ValueError, np.linalg.LinAlgError):
             return None
     k, c = found.stiffness_matrix, found.damping_matrix

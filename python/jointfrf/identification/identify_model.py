@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping, Sequence
 
 from numpy.typing import ArrayLike
 
+from jointfrf.identification.describe import describe_model
 from jointfrf.identification.model_fit.assembly import Assembly
-from jointfrf.identification.model_fit.describe import describe_model
 from jointfrf.identification.model_fit.fit import fit_assembly
-from jointfrf.identification.model_fit.model_fit import ModelFit
 from jointfrf.identification.model_fit.prepare import ChannelNoise, Channels, prepare_model_fit
 from jointfrf.identification.model_fit.unknown import Unknown
+from jointfrf.identification.result import Fit
 from jointfrf.kernel.arguments import as_names, check_type
 
 __all__ = ["identify_model"]
@@ -31,7 +30,7 @@ def identify_model(
     noise: float | ArrayLike | None = None,
     coherence: ArrayLike | None = None,
     averages: float | None = None,
-) -> ModelFit:
+) -> Fit:
     """Identify a joint from any measured FRFs of the assembly, given its substructures as models or FRFs.
 
     `identify` needs all FRFs between the joint DOFs, and no model; this needs models, and any FRFs: remote points,
@@ -58,7 +57,7 @@ def identify_model(
 
     Returns
     -------
-    ModelFit
+    Fit
         Parameters of the joint and the unknowns, their intervals, correlations, and whether the residual is noise.
 
     Raises
@@ -112,9 +111,8 @@ def identify_model(
             raise TypeError(f"{name} must be a mapping of channels to Unknown, not {type(gains).__name__}")
     named = as_names("responses", responses), as_names("forces", forces)
     channels = Channels(*named, dict(response_gains or {}), dict(force_gains or {}))
-    told = ChannelNoise(noise, coherence, averages)
-    problem = prepare_model_fit(freq_hz, h, assembly, channels, told, fixed)
-    described = describe_model(fit_assembly(problem), channels)
-    for warning in described.warnings:
-        warnings.warn(warning, stacklevel=2)
-    return described.fit
+    known = ChannelNoise(noise, coherence, averages)
+    problem = prepare_model_fit(freq_hz, h, assembly, channels, known, fixed)
+    fit = describe_model(fit_assembly(problem), channels)
+    fit.issue_warnings()
+    return fit

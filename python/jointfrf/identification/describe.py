@@ -1,0 +1,635 @@
+"""What a reader must know of a fit: findings of every likelihood, and the result that holds them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointfrf.dofs import compliance_unit
+from jointfrf.identification.compliance_fit.damping_choice import DofDamping
+from jointfrf.identification.compliance_fit.estimator import JointEstimate
+from jointfrf.identification.compliance_fit.fit import ComplianceFit, stiffness_of_lines
+from jointfrf.identification.compliance_fit.intervals import Spread
+from jointfrf.identification.compliance_fit.joint_terms import CrossTerms
+from jointfrf.identification.compliance_fit.misfit import Misfit
+from jointfrf.identification.compliance_fit.prepare import FitProblem
+from jointfrf.identification.compliance_fit.transforms import Transforms
+from jointfrf.identification.elastic_centre import elastic_centre
+from jointfrf.identification.findings import Finding, note, warn
+from jointfrf.identification.fit_data import ModelData
+from jointfrf.identification.law_fit.fit import FoundLaws
+from jointfrf.identification.law_fit.law_coordinates import LawCoordinates
+from jointfrf.identification.model_fit.directions import OpenDirection
+from jointfrf.identification.model_fit.fit import FoundModel
+from jointfrf.identification.model_fit.prepare import Channels
+from jointfrf.identification.result import Fit, FittedParameter, law_parameters
+from jointfrf.kernel.arguments import FloatArray
+
+__all__ = ["describe_laws", "describe_model", "describe_springs", "poor_laws"]
+
+#: A parameter is called poorly determined when its interval is wider than this share of it on either side.
+_UNCERTAIN = 0.5
+#: One whose standard error is below this share is not: its interval need not be found.
+_WELL = 0.1
+#: Correlations beyond this are named: an error of one is then mostly that of the other.
+_CORRELATED = 0.95
+#: Names shown of pairs, bands and channels.
+_SHOWN = 4
+#: Probability by chance below which a scatter of parts of the band is named; above, it widens intervals only.
+_BY_CHANCE = 1e-3
+#: Relative noise below this is rounding.
+_ROUNDING = 1e-7
+#: Variances that exceed those from noise by this factor are mostly due to something else.
+_MOSTLY = 5.0
+#: Relative standard errors above this are named where they are due to sides that are not rigid.
+_FLEXIBLE = 0.02
+#: A reference point is proposed where it lowers the largest coupling to this share.
+_LESS = 0.5
+#: Share of lines that cannot fit the joint from which on a warning says so.
+_UNTRUSTED = 0.02
+#: Share of a compliance by which it varies between lines from which on a warning says so.
+_VARIES = 0.05
+#: A residual so near to sqrt(2) times the noise given is that of noise given for each part.
+_BY_PART = 0.03
+#: Correlation of neighbouring lines from which on they say noticeably less than independent ones.
+_INFLATED = 1.2
+#: A prior that the FRFs narrow by less than this is named: they say little of it.
+_UNCHANGED = 0.9
+#: Another minimum whose -2 log likelihood is higher by less than this is named: odds of 1 to 150.
+_OTHER = 10.0
+_PER_PART = (
+    ", or the noise was said for real and imaginary parts each: its level is sqrt(E|e|^2) of both together, 1.41 times "
+    "that"
+)
+_MEAN_OF_TWO = ", or h_pq and h_qp were replaced by their mean, whose noise is smaller"
+_COUPLED = (
+    "; with cross terms it does: the DOFs of the joint are coupled, so ignore or fit the cross terms (cross), or move "
+    "the reference point"
+)
+
+
+# ---------------------------------------------------------------- springs and dampers, FRFs between all joint DOFs
+
+
+def describe_springs(found: ComplianceFit, problem: FitProblem) -> Fit:
+    """Make the result of a fit of springs and dampers."""
+    result, noise = found.estimate, found.problem.noise
+    scale = float(np.sqrt(result.excess))
+    fit = Fit.of_springs(
+        "compliance",
+        problem.dofs,
+        dict(zip([one.name for one in result.parameters], result.theta.tolist(), strict=True)),
+        found.covariance,
+        scale * noise.level if noise.is_assumed else noise.level,
+        scale * noise.level,
+        problem.freq_hz,
+        k_lines=stiffness_of_lines(problem.frfs),
+        bands=problem.bands,
+        residual_is_noise=found.misfit.is_noise,
+        test=found.misfit,
+        is_converged=result.converged,
+        intervals=found.intervals,
+    )
+    intervals = fit.confidence_interval(0.95)
+    findings = [
+        *([] if found.cross_fits else _left_out_lines(result, fit.dofs)),
+        *_left_out_dofs(problem),
+        *_band_parts(found),
+        *_poor_springs(fit, intervals),
+        *_mostly_sides(found, fit),
+        *_misfit(found, problem),
+        *_unknown_cross(result, fit.dofs, problem.options.cross),
+        *_scattering(fit, found.spread),
+        *_negative_damping(fit, intervals),
+        *_choices(found.choices),
+        *_noise(problem.noise.is_assumed, problem.noise.inflation, problem.freq_hz),
+        *_outlying_lines(problem),
+        *_small_residual(found, problem),
+        *_sides(found, problem),
+        *_groups([group.dofs for group in result.groups], fit.dofs, problem.options.cross),
+        *_hidden_lines(result, fit.dofs),
+        *_insignificant(fit, intervals),
+        *_reference_point(fit),
+    ]
+    if not result.converged:
+        most = max(group.fit.iterations for group in result.groups)
+        findings.append(warn("convergence", f"the fit did not converge in {most} iterations"))
+    return fit.with_findings(findings)
+
+
+def _poor_springs(fit: Fit, intervals: dict[str, tuple[float, float]]) -> list[Finding]:
+    """Name stiffnesses that the data determine poorly or not at all."""
+    found = []
+    for one in fit.parameters:
+        low, high = intervals[one.name]
+        if one.kind != "k" or one.is_cross:
+            continue
+        value, about = fit.value[one.name], (one.name,)
+        if not np.isfinite(high):
+            bound = f"at least {low:.3g} {one.unit} (95 %)" if low > 0 else "the data give no bound"
+            found.append(warn("open", f"{one}: this DOF cannot be distinguished from a rigid one; {bound}", about))
+        elif not low > 0:
+            bound = f"at most {high:.3g} {one.unit} (95 %)"
+            found.append(warn("open", f"{one}: cannot be distinguished from no joint; {bound}", about))
+        elif high - low > 2 * _UNCERTAIN * abs(value):
+            found.append(_poor(one, low, high))
+    return found
+
+
+def _poor(one: FittedParameter, low: float, high: float) -> Finding:
+    limits = f"95 % interval {low:.3g} .. {high:.3g} {one.unit}"
+    return warn("poor", f"{one}: poorly determined by the data, {limits}", (one.name,))
+
+
+def _negative_damping(fit: Fit, intervals: dict[str, tuple[float, float]]) -> list[Finding]:
+    """Name damping that is significantly negative: a joint supplies no energy."""
+    return [
+        warn(
+            "sign",
+            f"{one}: significantly negative, {fit.value[one.name]:.3g} {one.unit}; a joint supplies no energy: check "
+            "the sign of phases (time convention), delays between channels, and the damping terms asked for",
+            (one.name,),
+        )
+        for one in fit.parameters
+        if one.kind != "k" and not one.is_cross and intervals[one.name][1] < 0
+    ]
+
+
+def _insignificant(fit: Fit, intervals: dict[str, tuple[float, float]]) -> list[Finding]:
+    """Name damping and cross terms whose sign is not known."""
+    names = tuple(
+        one.name for one in fit.parameters if one.kind != "k" and intervals[one.name][0] < 0 < intervals[one.name][1]
+    )
+    text = f"{', '.join(names)}: not significantly different from zero (95 % interval)"
+    return [note("sign", text, names)] if names else []
+
+
+def _groups(groups: Sequence[NDArray[np.intp]], dofs: tuple[str, ...], cross: CrossTerms) -> list[Finding]:
+    """Name groups of DOFs between which the FRFs are zero."""
+    if len(groups) < 2:
+        return []
+    names = " and ".join(f"({_named(group, dofs)})" for group in groups)
+    text = f"the FRFs between {names} are zero: each group is fitted separately"
+    text += ", and cross terms between them cannot be identified" if cross == "fit" else ""
+    return [note("groups", text, dofs)]
+
+
+def _named(group: NDArray[np.intp], dofs: tuple[str, ...]) -> str:
+    return ", ".join(dofs[d] for d in group)
+
+
+def _choices(choices: Sequence[DofDamping]) -> list[Finding]:
+    """Say which damping terms were chosen for each DOF, and how clearly."""
+    found = []
+    for one in choices:
+        strength = "clearly" if one.margin > 10 else "weakly" if one.margin > 2 else "hardly"
+        text = (
+            f"damping of {one.dof}: {one.best}, {strength} preferred to {one.second} "
+            f"(difference of BIC {one.margin:.1f})"
+        )
+        found.append(note("choice", text, (one.dof,)))
+    return found
+
+
+def _reference_point(fit: Fit) -> list[Finding]:
+    """Propose the reference point at which the stiffness is most nearly diagonal."""
+    try:
+        centre = elastic_centre(fit) if any(one.is_cross for one in fit.parameters) else None
+    except ValueError:
+        # Names that give no direction, or a stiffness that is not positive: there is nothing to propose.
+        centre = None
+    if centre is None or centre.coupling > _LESS * centre.coupling_before:
+        return []
+    where = ", ".join(
+        f"{axis} {1e3 * r:+.3g} +- {1e3 * error:.2g} mm"
+        for axis, r, error in zip("xyz", centre.offset, centre.std_error, strict=True)
+        if np.isfinite(error)
+    )
+    text = (
+        f"the stiffness is most nearly diagonal with the reference points moved by {where} (standard error): the "
+        f"largest coupling falls from {centre.coupling_before:.2g} to {centre.coupling:.2g} (elastic_centre)"
+    )
+    return [note("reference point", text)]
+
+
+def _sides(found: ComplianceFit, problem: FitProblem) -> list[Finding]:
+    """Say what is known of the flexibility between channels."""
+    frfs, added = problem.frfs, problem.added_compliance
+    if Transforms(frfs.responses, frfs.forces).are_units:
+        return []
+    if found.channels is None:
+        text = (
+            "the channels cannot check that the sides of the joint are rigid between them: what their flexibility does "
+            "is not in the intervals"
+        )
+        return [note("sides", text)]
+    if added is None or not added.any():
+        return []
+    known = [(dof, value) for dof, value in zip(problem.dofs, added, strict=True) if value > 0]
+    values = ", ".join(f"{value:.2g} {compliance_unit(dof, dof)} for {dof}" for dof, value in known)
+    text = f"the sides have about this compliance between the channels, and intervals allow for it: {values}"
+    return [note("sides", text, tuple(dof for dof, _ in known))]
+
+
+def _mostly_sides(found: ComplianceFit, fit: Fit) -> list[Finding]:
+    """Name stiffnesses whose uncertainty is mostly that of sides that are not rigid."""
+    if found.channels is None:
+        return []
+    wide = tuple(
+        one.name
+        for one, added, noise in zip(fit.parameters, found.channels.factor, found.spread.factor, strict=True)
+        if one.kind == "k" and not one.is_cross and added > _MOSTLY * noise
+        if fit.std_error[one.name] > _FLEXIBLE * abs(fit.value[one.name])
+    )
+    text = (
+        f"{', '.join(wide)}: between the channels the sides deform so much that the intervals are mostly due to that, "
+        "not to noise: channels nearer to the joint, or more of them, would narrow them"
+    )
+    return [warn("sides", text, wide)] if wide else []
+
+
+def _hidden_lines(result: JointEstimate, dofs: tuple[str, ...]) -> list[Finding]:
+    """Count the lines on which noise hides the transmission of the joint, where its cross terms are unknown."""
+    found = []
+    for group in result.groups:
+        beside, total = group.fit.beside, group.fit.trusted.size
+        if beside is not None and beside.hidden > _UNTRUSTED * total:
+            text = (
+                f"on {beside.hidden} of {total} lines noise hides gamma_jk of {_named(group.dofs, dofs)} "
+                "(nearly singular): they count less"
+            )
+            found.append(note("left out", text, tuple(dofs[d] for d in group.dofs)))
+    return found
+
+
+def _unknown_cross(result: JointEstimate, dofs: tuple[str, ...], cross: CrossTerms) -> list[Finding]:
+    """Say what contradicts a joint where only the diagonal of its compliance was fitted."""
+    found = []
+    for group in result.groups:
+        beside = group.fit.beside
+        if beside is None:
+            continue
+        whose, about = _named(group.dofs, dofs), tuple(dofs[d] for d in group.dofs)
+        if cross != "ignore":
+            text = f"no joint without cross terms is near the data of {whose}: its cross terms were ignored"
+            found.append(warn("cross terms", text, about))
+        if not beside.is_symmetric:
+            text = (
+                f"the compliance between {whose} is not symmetric: the DOFs of both sides are not those of one point, "
+                "or more than a joint connects them; its symmetry was not used"
+            )
+            found.append(warn("cross terms", text, about))
+        if beside.scatter is not None:
+            share = beside.scatter / np.maximum(group.fit.minimum.x[: len(group.dofs)], np.finfo(float).tiny)
+            varying = [f"{dofs[d]} by {100 * s:.0f} %" for d, s in zip(group.dofs, share, strict=True) if s > _VARIES]
+            text = (
+                f"the compliance varies from line to line beyond its noise: {', '.join(varying)}; "
+                "its mean was fitted, weighted by what the lines show"
+            )
+            found += [warn("residual", text, about)] if varying else []
+    return found
+
+
+def _band_parts(found: ComplianceFit) -> list[Finding]:
+    """Name parameters on which parts of the band do not agree, each fitted by itself."""
+    parts, warnings = found.parts, []
+    if parts is None or found.cross_fits:
+        return []
+    names = [one.name for one in found.estimate.parameters]
+    for name, values, disagree in zip(names, parts.values.T, parts.disagree, strict=True):
+        if disagree:
+            seen = ", ".join(
+                f"{value:.3g} at {low:g}-{high:g} Hz"
+                for value, (low, high) in zip(values, parts.spans, strict=True)
+                if np.isfinite(value)
+            )
+            text = (
+                f"{name}: parts of the band, fitted by themselves, do not agree: {seen}; the interval allows "
+                "for that, but the joint as described does not fit the data"
+            )
+            warnings.append(warn("trend", text, (name,), parts.spans))
+    return warnings
+
+
+def _scattering(fit: Fit, spread: Spread) -> list[Finding]:
+    """Name parameters whose interval comes from the scatter between parts of the band."""
+    if fit.noise_level < _ROUNDING:
+        return []
+    clear = _BY_CHANCE / len(fit.parameters)
+    wide = tuple(one.name for one, chance in zip(fit.parameters, spread.chance, strict=True) if chance < clear)
+    text = (
+        f"{', '.join(wide)}: parts of the band scatter more than the noise explains; the intervals are widened by that"
+    )
+    return [warn("trend", text, wide)] if wide else []
+
+
+def _misfit(found: ComplianceFit, problem: FitProblem) -> list[Finding]:
+    """Say whether the residual differs from the noise, and how."""
+    misfit, noise = found.misfit, problem.noise
+    by_part = noise.is_told and abs(misfit.ratio / np.sqrt(2) - 1) < _BY_PART
+    why = _COUPLED if found.cross_fits else _PER_PART if by_part else None
+    findings = _too_large(misfit, "the joint does not fit the data", why) if not noise.is_assumed else []
+    for trend in () if found.cross_fits else misfit.trends:
+        low, high = trend.values.argmin(), trend.values.argmax()
+        text = (
+            f"{trend.name} is not one constant over frequency: parts of the band give {trend.values[low]:.3g} .. "
+            f"{trend.values[high]:.3g} (near {trend.centres[low]:.4g} and {trend.centres[high]:.4g} Hz)"
+        )
+        findings.append(warn("trend", text, (trend.name,)))
+    return findings
+
+
+def _small_residual(found: ComplianceFit, problem: FitProblem) -> list[Finding]:
+    """Say that the residual is below the noise: intervals are then wider than they need be."""
+    misfit, noise = found.misfit, problem.noise
+    # What is not rigid in the channels weighs as noise, and averages out of a residual of joint DOFs.
+    if noise.is_assumed or found.channels is not None or not misfit.is_small:
+        return []
+    why = "said" if noise.is_told else "their reciprocity shows"
+    mean = _MEAN_OF_TWO if problem.frfs.symmetrised and noise.is_told else ""
+    text = (
+        f"the residual is {misfit.ratio:.2g} times the noise: the FRFs have less noise than {why}, or were smoothed"
+        f"{mean}; the intervals are wider than they need be"
+    )
+    return [note("residual", text)]
+
+
+# ---------------------------------------------------------------- laws, FRFs between all joint DOFs
+
+
+def describe_laws(found: FoundLaws) -> Fit:
+    """Make the result of a fit of laws to FRFs between all joint DOFs."""
+    problem, result = found.problem, found.estimate
+    scale = float(np.sqrt(result.excess))
+    fit = Fit(
+        method="compliance",
+        dofs=problem.dofs,
+        parameters=law_parameters(found.joint),
+        estimate=result.theta,
+        covariance=found.covariance,
+        noise_level=problem.noise.level * (scale if problem.noise.is_assumed else 1.0),
+        residual_level=scale * problem.noise.level,
+        freq_hz=problem.freq_hz,
+        laws=found.joint,
+        k_lines=stiffness_of_lines(problem.frfs),
+        bands=problem.bands,
+        residual_is_noise=found.misfit.is_noise,
+        test=found.misfit,
+        is_converged=result.converged,
+        intervals=found.intervals,
+    )
+    is_log = {}
+    for group in result.groups:
+        assert isinstance(group.joint, LawCoordinates)
+        is_log |= {one.name: one.is_log for one in group.joint.vector.all}
+    findings = [
+        *_left_out_lines(result, problem.dofs),
+        *_left_out_dofs(problem),
+        *poor_laws(fit, is_log, lambda name: found.intervals.of(name, 0.95)),
+        *([] if problem.noise.is_assumed else _too_large(found.misfit, "these laws do not fit the data")),
+        *_law_trends(found.misfit),
+        *_noise(problem.noise.is_assumed, problem.noise.inflation, problem.freq_hz),
+        *_outlying_lines(problem),
+        *_correlated(fit),
+    ]
+    if problem.added_compliance is not None:
+        text = "the intervals do not allow for what is not rigid between the channels of a side"
+        findings.append(note("sides", text))
+    if not result.converged:
+        findings.append(warn("convergence", "the fit did not converge"))
+    return fit.with_findings(findings)
+
+
+def _law_trends(misfit: Misfit) -> list[Finding]:
+    """Name parameters of laws that are not constant over frequency."""
+    found = []
+    for trend in misfit.trends:
+        low, high = trend.values.min(), trend.values.max()
+        text = (
+            f"{trend.name} is not one constant over frequency: parts of the band give {low:.3g} .. {high:.3g}: another "
+            "law may fit"
+        )
+        found.append(warn("trend", text, (trend.name,)))
+    return found
+
+
+# ---------------------------------------------------------------- an assembly, any FRFs
+
+
+def describe_model(found: FoundModel, channels: Channels) -> Fit:
+    """Make the result of a fit of an assembly."""
+    problem, vector, test = found.problem, found.problem.vector, found.test
+    whole = problem.prediction.whole
+    shown = np.isfinite(problem.variance)
+    size = abs(np.where(shown, found.predicted, 1))
+    level = float(np.median((np.sqrt(np.where(shown, problem.variance, 0)) / np.maximum(size, 1e-300))[shown]))
+    joint = whole.joint.with_values(found.values[vector.places_of("joint")])
+    of_joint = dict(zip(joint.names, law_parameters(joint), strict=True))
+    parameters = tuple(
+        of_joint[one.name]
+        if one.origin == "joint"
+        else FittedParameter(
+            one.name, one.unit, origin=one.origin, prior=None if one.std is None else (one.value, one.std)
+        )
+        for one in vector.fitted
+    )
+    fit = Fit(
+        method="model",
+        dofs=joint.dofs,
+        parameters=parameters,
+        estimate=found.values[vector.free],
+        covariance=found.covariance,
+        noise_level=level,
+        residual_level=level * test.ratio,
+        freq_hz=problem.freq_hz,
+        laws=joint,
+        responses=channels.responses,
+        forces=channels.forces,
+        residual_is_noise=test.is_noise,
+        test=test,
+        is_converged=found.minimum.converged,
+        intervals=found.intervals,
+        data=ModelData(
+            whole, problem.measured, problem.variance, found.predicted, found.residual, found.directions
+        ),
+    )  # fmt: skip
+    is_log = {one.name: one.is_log for one in vector.fitted}
+    places = {one.name: i for i, one in enumerate(vector.fitted)}
+    findings = [
+        *_model_residual(fit, found, channels),
+        *poor_laws(fit, is_log, lambda name: found.intervals.of(places[name], 0.95)),
+        *_directions(found.directions),
+        *_other_minimum(found.other),
+        *_noise(problem.is_assumed, problem.inflation, problem.freq_hz),
+        *_priors(fit, found.directions),
+        *_correlated(fit),
+    ]
+    if not found.minimum.converged:
+        findings.append(warn("convergence", "the fit did not converge"))
+    return fit.with_findings(findings)
+
+
+def _model_residual(fit: Fit, found: FoundModel, channels: Channels) -> list[Finding]:
+    """Say that the model does not fit, and where."""
+    test, findings = found.test, []
+    if test.is_noise:
+        return []
+    bands = tuple((low, high) for low, high, _ in test.bands)
+    parts, about = [f"residual {test.ratio:.3g} times the noise"], []
+    if test.bands:
+        where = (f"{low:g}-{high:g} Hz ({ratio:.3g})" for low, high, ratio in test.bands[:_SHOWN])
+        parts.append("most at " + ", ".join(where))
+    for names, own, what in (
+        (channels.responses, test.responses, "responses"), (channels.forces, test.forces, "forces"),
+    ):  # fmt: skip
+        if own:
+            parts.append(f"in the {what} " + ", ".join(f"{names[i]} ({ratio:.3g})" for i, ratio in own[:_SHOWN]))
+            about += [names[i] for i, _ in own]
+    if np.isfinite(test.neighbours) and test.neighbours > 5:
+        parts.append("smooth over frequency, as no noise is")
+    if test.ratio > 1 + 3 * test.sigma or test.bands or test.responses or test.forces or test.neighbours > 4:
+        text = (
+            f"the models and the joint do not fit the FRFs: {'; '.join(parts)}; the parameters carry that error, which "
+            "the intervals do not allow for"
+        )
+        findings.append(warn("residual", text, tuple(about), bands))
+    if test.pulls:
+        names = [fit.parameters[i].name for i, _ in test.pulls]
+        pulled = ", ".join(
+            f"{name} by {pull:+.1f}" for name, (_, pull) in zip(names[:_SHOWN], test.pulls, strict=False)
+        )
+        text = f"the FRFs deny what was believed, in standard deviations of the prior: {pulled}"
+        findings.append(warn("prior", text, tuple(names)))
+    return findings
+
+
+def _directions(directions: Sequence[OpenDirection]) -> list[Finding]:
+    """Say what the FRFs do not determine, by its direction, unless a prior does."""
+    return [
+        warn(
+            "direction", f"the FRFs do not hold {_direction(one)}: moved along it, they stay within their noise",
+            tuple(name for name, _ in one.parts),
+        )
+        for one in directions
+        if not one.is_held_by_prior
+    ]  # fmt: skip
+
+
+def _direction(one: OpenDirection) -> str:
+    parts = ", ".join(f"{name} {100 * change:+.2g} %" for name, change in one.parts[:_SHOWN])
+    return one.parts[0][0] if len(one.parts) == 1 else f"the direction {parts}"
+
+
+def _other_minimum(other: float) -> list[Finding]:
+    text = (
+        f"another joint fits nearly as well (-2 log likelihood higher by {other:.1f}): give values of the "
+        "joint that are nearer, or more FRFs"
+    )
+    return [warn("convergence", text)] if other < _OTHER else []
+
+
+def _priors(fit: Fit, directions: Sequence[OpenDirection]) -> list[Finding]:
+    """Name unknowns of which the FRFs say no more than the prior, and directions that priors hold."""
+    errors = fit.std_error
+    same = tuple(
+        one.name for one in fit.parameters if one.prior is not None and errors[one.name] > _UNCHANGED * one.prior[1]
+    )
+    found = [note("prior", f"{', '.join(same)}: known from the prior, hardly from the FRFs", same)] if same else []
+    held = [one for one in directions if one.is_held_by_prior and len(one.parts) > 1]
+    return found + [
+        note("prior", f"priors hold what the FRFs do not: {_direction(one)}", tuple(name for name, _ in one.parts))
+        for one in held[:_SHOWN]
+    ]
+
+
+# ---------------------------------------------------------------- of several likelihoods
+
+
+def poor_laws(fit: Fit, is_log: dict[str, bool], limits: Callable[[str], tuple[float, float]]) -> list[Finding]:
+    """Name positive parameters of laws that the data determine poorly or not at all; `limits` are those of 95 %."""
+    found, errors = [], fit.std_error
+    for one in fit.parameters:
+        value = fit.value[one.name]
+        if one.origin != "joint" or not is_log[one.name] or one.unit == "s" or errors[one.name] < _WELL * value:
+            continue
+        low, high = limits(one.name)
+        if not high < float("inf") and low > 0:
+            text = f"{one}: cannot be distinguished from rigid; at least {low:.3g} {one.unit} (95 %)"
+            found.append(warn("open", text, (one.name,)))
+        elif not low > 0:
+            text = f"{one}: cannot be distinguished from zero; at most {high:.3g} {one.unit} (95 %)"
+            found.append(warn("open", text, (one.name,)))
+        elif high - low > 2 * _UNCERTAIN * abs(value):
+            found.append(_poor(one, low, high))
+    return found
+
+
+def _correlated(fit: Fit) -> list[Finding]:
+    """Name pairs of parameters whose errors are nearly one."""
+    rho, parameters = fit.correlation, fit.parameters
+    pairs = sorted(
+        ((abs(rho[i, j]), i, j) for j in range(len(parameters)) for i in range(j) if abs(rho[i, j]) > _CORRELATED),
+        reverse=True,
+    )[:_SHOWN]
+    texts = ", ".join(f"{parameters[i]} and {parameters[j]} ({rho[i, j]:+.3f})" for _, i, j in pairs)
+    about = tuple(dict.fromkeys(parameters[k].name for _, i, j in pairs for k in (i, j)))
+    return [note("correlation", f"correlated errors: {texts}", about)] if pairs else []
+
+
+def _noise(is_assumed: bool, inflation: float, freq_hz: FloatArray) -> list[Finding]:
+    """Say how the noise was found, and whether lines share it."""
+    found = []
+    if is_assumed:
+        text = "the noise level is taken from the residual: the FRFs do not show it otherwise"
+        found.append(note("noise", text))
+    if inflation > _INFLATED:
+        text = (
+            f"the noise of neighbouring lines is correlated: {freq_hz.size} lines say as much as "
+            f"{freq_hz.size / inflation:.0f} independent ones"
+        )
+        found.append(note("correlation", text))
+    return found
+
+
+def _outlying_lines(problem: FitProblem) -> list[Finding]:
+    """Name lines with far more noise than others."""
+    lines = problem.noise.outlying
+    if not lines.size:
+        return []
+    shown = ", ".join(f"{problem.freq_hz[i]:g}" for i in lines[:8])
+    rest = f" and {lines.size - 8} more" if lines.size > 8 else ""
+    return [note("noise", f"lines with far more noise than their neighbours weigh less: {shown}{rest} Hz")]
+
+
+def _left_out_dofs(problem: FitProblem) -> list[Finding]:
+    """Name DOFs that are not sought, but enter those that are."""
+    return [warn("left out", str(one)) for one in problem.left_out if one.matters]
+
+
+def _left_out_lines(result: JointEstimate, dofs: tuple[str, ...]) -> list[Finding]:
+    """Count the lines that no joint near the one found fits."""
+    found = []
+    for group in result.groups:
+        if group.fit.beside is not None:
+            continue
+        out, total = int(np.count_nonzero(~group.fit.trusted)), group.fit.trusted.size
+        if out > _UNTRUSTED * total:
+            whose = f" of {_named(group.dofs, dofs)}" if len(result.groups) > 1 else ""
+            text = f"{out} of {total} lines{whose} do not fit the joint found within their noise and are left out"
+            found.append(warn("left out", text, tuple(dofs[d] for d in group.dofs)))
+    return found
+
+
+def _too_large(misfit: Misfit, what: str, why: str | None = None) -> list[Finding]:
+    """Say that the residual is more than noise, and by default where."""
+    if not misfit.is_large:
+        return []
+    apart = f"{abs(misfit.ratio - 1) / misfit.sigma:.0f} sigma"
+    text = f"the residual is {misfit.ratio:.2f} times the noise, {apart} above it: {what}"
+    bands = tuple((low, high) for low, high, _ in misfit.local)
+    if why is None and misfit.local:
+        places = ", ".join(f"{low:g}-{high:g} Hz ({100 * share:.0f} %)" for low, high, share in misfit.local)
+        why = f"; the excess is local: {places}: bad lines, or local modes that the joint DOFs do not describe"
+    return [warn("residual", text + (why or ""), bands=bands)]

@@ -1,0 +1,77 @@
+"""What a reader must know of a fit before its numbers are used, as objects: the sentences are their text."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from jointfrf.errors import ConvergenceWarning, IdentificationWarning
+
+__all__ = ["Finding", "FitFindingKind", "as_warning", "note", "warn"]
+
+#: What a finding is about.
+FitFindingKind = Literal[
+    "averages",  # how a mean over bands is to be read
+    "choice",  # damping terms that were chosen
+    "convergence",
+    "correlation",  # parameters, or lines, that are not independent
+    "cross terms",
+    "direction",  # a combination of parameters that the FRFs do not determine
+    "groups",  # DOFs between which FRFs are zero
+    "left out",  # lines, or DOFs, that were not used
+    "noise",
+    "open",  # a parameter that may be infinite or zero
+    "poor",  # a parameter with a wide interval
+    "prior",
+    "reference point",
+    "residual",  # it is not the noise
+    "sides",  # bodies that deform between the channels
+    "sign",  # damping that is negative, or may be
+    "trend",  # a parameter that changes over the band
+    "other",  # read from a file that does not say
+]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something to know of a fit.
+
+    Attributes
+    ----------
+    kind : str
+        What it is about: "residual", "open", "sides", ... (`FitFindingKind`).
+    severity : {"warning", "note"}
+        Whether it puts numbers in doubt, or says how they came about.
+    text : str
+        The sentence.
+    about : tuple of str
+        Names of the parameters, DOFs or channels concerned; empty where it is the whole fit.
+    bands : tuple of (low, high)
+        Parts of the band concerned, Hz.
+    """
+
+    kind: FitFindingKind
+    severity: Literal["warning", "note"]
+    text: str
+    about: tuple[str, ...] = ()
+    bands: tuple[tuple[float, float], ...] = ()
+
+    def __str__(self) -> str:
+        return self.text
+
+
+def warn(
+    kind: FitFindingKind, text: str, about: tuple[str, ...] = (), bands: tuple[tuple[float, float], ...] = ()
+) -> Finding:
+    """Return a finding that puts numbers in doubt."""
+    return Finding(kind, "warning", text, about, bands)
+
+
+def note(kind: FitFindingKind, text: str, about: tuple[str, ...] = ()) -> Finding:
+    """Return a finding that says how numbers came about."""
+    return Finding(kind, "note", text, about)
+
+
+def as_warning(finding: Finding) -> Warning:
+    """Return the warning that Python issues for a finding."""
+    return (ConvergenceWarning if finding.kind == "convergence" else IdentificationWarning)(finding.text)

@@ -1,0 +1,404 @@
+"""What an identification found, with its uncertainty: one kind of result for every method."""
+
+from __future__ import annotations
+
+import textwrap
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.special import ndtri
+
+from jointfrf.dofs import Parameter, ParameterKind
+from jointfrf.frf.bands import Band
+from jointfrf.identification.derived import Derived, DerivedFunction, derived_quantity
+from jointfrf.identification.findings import Finding, as_warning
+from jointfrf.identification.fit_data import FitData, ModelData
+from jointfrf.identification.model_fit.residual_check import ResidualTest
+from jointfrf.joint import Joint
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, one_line
+from jointfrf.laws.law_joint import LawJoint
+
+__all__ = ["Fit", "FittedParameter", "Intervals", "columns_of", "joint_of", "law_parameters"]
+
+#: From a probability to the interval of each parameter.
+Intervals = Callable[[float], dict[str, tuple[float, float]]]
+#: Columns of a printed fit: those of a terminal.
+_WIDTH = 80
+
+
+@dataclass(frozen=True)
+class FittedParameter:
+    """A number that was fitted.
+
+    Attributes
+    ----------
+    name : str
+        ``"k_<dof>"`` stiffness, ``"h_<dof>"`` hysteretic stiffness eta k, ``"c_<dof>"`` viscous damping,
+        ``"k_<dof>,<dof>"`` a cross term; ``"tau_<dof>"`` and the like of other laws; ``"A/youngs_modulus"``,
+        ``"mass A/151:y"``, ``"gain of response B/226:y"`` of models and channels.
+    unit : str
+    kind, row, column : str
+        Of the joint: ``"k"``, ``"tau"``, ..., and its DOFs, the same twice but for a cross term. Empty elsewhere.
+    origin : str
+        What it belongs to: "joint", "A", "B", "attachment", "response", "force".
+    prior : (float, float) or None
+        Mean and standard deviation of what was believed before.
+    """
+
+    name: str
+    unit: str
+    kind: str = ""
+    row: str = ""
+    column: str = ""
+    origin: str = "joint"
+    prior: tuple[float, float] | None = None
+
+    @property
+    def is_cross(self) -> bool:
+        """Whether it couples two DOFs of the joint."""
+        return self.row != self.column
+
+    def __str__(self) -> str:
+        return self.name
+
+
+def law_parameters(joint: LawJoint) -> tuple[FittedParameter, ...]:
+    """Return the parameters of a joint of laws, in its order."""
+    places = [(field.name, *pair) for pair, law in joint.laws.items() for field in law.fields]
+    places += [("m", dof, dof) for dof in joint.mass]
+    named = zip(joint.quantities, places, strict=True)
+    return tuple(FittedParameter(one.name, one.unit, *place) for one, place in named)
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Parameters of a joint, and what else was unknown, with their uncertainty.
+
+    It is data: `plot`, `write_report`, `save`, `cards` do something with it.
+
+    Attributes
+    ----------
+    method : str
+        How they were found: "compliance" (FRFs between all joint DOFs), "model" (an assembly and any FRFs), or a method
+        of the thesis, averaged over bands.
+    dofs : tuple of str
+        Names of the joint DOFs.
+    parameters : tuple of FittedParameter
+        In the order of the covariance.
+    estimate : ndarray, shape (p,)
+        Their values: `value` has them by name.
+    covariance : ndarray, shape (p, p)
+        Priors included.
+    noise_level : float
+        Median of the noise relative to the FRFs, as estimated or given; NaN where the method has none.
+    residual_level : float
+        What the residual of the fit shows of it; well above `noise_level`, the model of the joint is wrong.
+    freq_hz : ndarray, shape (n_freq,)
+        Lines used, Hz.
+    laws : LawJoint or None
+        The joint found, where it is one of laws; `joint` is the joint of any fit.
+    findings : tuple of Finding
+        What a reader must know: `warnings` before using the numbers, `notes` on how they came about.
+    k_lines : ndarray, shape (n_freq, n, n), or None
+        K*(w) of each line by itself, N/m; NaN where a line does not give it, None where the method has none.
+    bands : tuple
+        For each DOF the bands used, (low, high) in Hz.
+    responses, forces : tuple of str
+        Channels of a fit of an assembly.
+    residual_is_noise : bool or None
+        None where the method has no noise.
+    test : ResidualTest or None
+        Whether the residual is noise, and if not, where; a fit that was loaded has none.
+    is_converged : bool
+    intervals : callable or None
+        From a probability to the interval of each parameter; None where it follows from the covariance. A fit that was
+        loaded has those of some probabilities.
+    data : FitData, ModelData or None
+        What it was made from, for figures and pages; a fit that was loaded has none.
+    """
+
+    method: str
+    dofs: tuple[str, ...]
+    parameters: tuple[FittedParameter, ...]
+    estimate: FloatArray
+    covariance: FloatArray
+    noise_level: float
+    residual_level: float
+    freq_hz: FloatArray
+    laws: LawJoint | None = None
+    findings: tuple[Finding, ...] = ()
+    k_lines: ComplexArray | None = field(default=None, repr=False)
+    bands: tuple[tuple[Band, ...], ...] = ()
+    responses: tuple[str, ...] = ()
+    forces: tuple[str, ...] = ()
+    residual_is_noise: bool | None = None
+    test: ResidualTest | None = field(default=None, repr=False)
+    is_converged: bool = True
+    intervals: Intervals | None = field(default=None, repr=False, compare=False)
+    data: FitData | ModelData | None = field(default=None, repr=False, compare=False)
+
+    @classmethod
+    def of_springs(
+        cls,
+        method: str,
+        dofs: tuple[str, ...],
+        values: Mapping[str, float],
+        covariance: FloatArray,
+        noise_level: float,
+        residual_level: float,
+        freq_hz: FloatArray,
+        **more: Any,
+    ) -> Fit:
+        """Return a fit of springs and dampers; `values` by the names ``"k_y"``, ``"c_y,theta"``."""
+        terms, estimate = [Parameter.parse(name) for name in values], np.array(list(values.values()), np.float64)
+        parameters = tuple(FittedParameter(one.name, one.unit, one.kind, one.row, one.column) for one in terms)
+        return cls(method, dofs, parameters, estimate, covariance, noise_level, residual_level, freq_hz, **more)
+
+    @cached_property
+    def value(self) -> dict[str, float]:
+        """Value of each parameter, in its unit."""
+        return dict(zip(self._names, self.estimate.tolist(), strict=True))
+
+    @property
+    def _names(self) -> tuple[str, ...]:
+        return tuple(one.name for one in self.parameters)
+
+    @property
+    def std_error(self) -> dict[str, float]:
+        """Standard error of each parameter, in its unit."""
+        errors = np.sqrt(np.maximum(np.diagonal(self.covariance), 0))
+        return dict(zip(self._names, errors.tolist(), strict=True))
+
+    @property
+    def correlation(self) -> FloatArray:
+        """Correlation of the errors of all parameters, shape (p, p)."""
+        size = np.sqrt(np.maximum(np.diagonal(self.covariance), np.finfo(float).tiny))
+        return np.asarray(self.covariance / np.outer(size, size))
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What a reader must know before using the numbers."""
+        return tuple(one.text for one in self.findings if one.severity == "warning")
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """How the numbers came about."""
+        return tuple(one.text for one in self.findings if one.severity == "note")
+
+    def _matrix(self, kind: ParameterKind) -> FloatArray:
+        return _matrix(self.dofs, self.parameters, self.estimate, kind)
+
+    @property
+    def joint(self) -> Joint | LawJoint:
+        """The joint found, to be coupled, moved, reordered or written; DOFs in the order of `dofs`.
+
+        Raises
+        ------
+        ValueError
+            A stiffness of springs is infinite: the FRFs do not distinguish it from a rigid connection.
+        """
+        return joint_of(self.dofs, self.parameters, self.estimate) if self.laws is None else self.laws
+
+    @property
+    def stiffness_matrix(self) -> FloatArray:
+        """Stiffness with its cross terms, shape (n, n), N/m, N, N m/rad."""
+        return self._matrix("k")
+
+    @property
+    def damping_matrix(self) -> FloatArray:
+        """Viscous damping with its cross terms, shape (n, n), N s/m, N s, N m s/rad."""
+        return self._matrix("c")
+
+    @property
+    def stiffness(self) -> FloatArray:
+        """Stiffness k of each DOF, shape (n,), N/m or N m/rad."""
+        return self._matrix("k").diagonal()
+
+    @property
+    def damping(self) -> FloatArray:
+        """Viscous damping c of each DOF, shape (n,), N s/m or N m s/rad."""
+        return self._matrix("c").diagonal()
+
+    @property
+    def loss_factor(self) -> FloatArray:
+        """Hysteretic loss factor eta = h/k of each DOF, shape (n,); `derived` gives its interval."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            found: FloatArray = self._matrix("h").diagonal() / self.stiffness
+        return found
+
+    @cached_property
+    def loss_factors(self) -> dict[str, Derived]:
+        """Loss factor eta = h/k, with its uncertainty, of each DOF whose hysteretic damping was fitted."""
+        known = {one.row for one in self.parameters if one.kind == "h" and not one.is_cross}
+        return {f"eta_{dof}": self.derived(f"h_{dof} / k_{dof}") for dof in self.dofs if dof in known}
+
+    def with_findings(self, findings: Sequence[Finding]) -> Fit:
+        """Return the same fit with other findings."""
+        return replace(self, findings=tuple(findings))
+
+    def issue_warnings(self) -> None:
+        """Issue what is in doubt as warnings of Python, at the caller of the public function that fitted."""
+        for one in self.findings:
+            if one.severity == "warning":
+                warnings.warn(as_warning(one), stacklevel=3)
+
+    def confidence_interval(self, probability: float = 0.95) -> dict[str, tuple[float, float]]:
+        """Interval that contains the true parameter with the given probability.
+
+        Parameters
+        ----------
+        probability : float
+            Between 0 and 1.
+
+        Returns
+        -------
+        dict of str to (low, high)
+            By profile likelihood where it is not symmetric: a stiffness is open above, up to inf, where the joint
+            cannot be distinguished from a rigid one.
+
+        Raises
+        ------
+        ValueError
+            The probability is not between 0 and 1; or the fit was loaded and does not keep the interval of this one,
+            see `save`.
+        """
+        if not 0 < probability < 1:
+            raise ValueError(f"probability must lie between 0 and 1, not {probability}")
+        if self.intervals is not None:
+            return self.intervals(probability)
+        reach = float(ndtri((1 + probability) / 2))
+        limits = {}
+        for name, value, error in zip(self._names, self.estimate.tolist(), self.std_error.values(), strict=True):
+            limits[name] = (value - reach * error, value + reach * error)
+        return limits
+
+    def derived(self, function: str | DerivedFunction, probability: float = 0.95) -> Derived:
+        """Return a function of the parameters, with standard error and interval.
+
+        Parameters
+        ----------
+        function : str or callable
+            Arithmetic of names of parameters, ``"h_y / k_y"``, ``"sqrt(k_y / 2.5) / (2 * pi)"``, with sqrt, exp, log,
+            abs, pi; or a function from a dict of values by name to a number. Names with other characters than letters,
+            digits and _ stand in braces: ``"{k_y,theta} / k_y"``.
+        probability : float
+            Of the interval, between 0 and 1.
+
+        Returns
+        -------
+        Derived
+
+        Raises
+        ------
+        ValueError
+            What is no such arithmetic, or names no parameter; a probability as in `confidence_interval`.
+
+        Notes
+        -----
+        Of one parameter the interval is that of the parameter, carried over. Of several it follows from the profile of
+        the likelihood, minimised over all parameters with the function held, where the fit still has its likelihood;
+        else, and for the standard error, from the covariance and the derivatives of the function.
+
+        Examples
+        --------
+        >>> import numpy as np, jointfrf as jf
+        >>> freq = np.linspace(0.5, 10, 400)
+        >>> a = jf.chain([5, 3], [2500, 3500], [3, 4], ground="start").receptance(freq)
+        >>> b = jf.chain([4, 2], [2000, 2500], [2, 1], ground="end").receptance(freq)
+        >>> h = jf.couple(a, b, jf.Joint([2000.0], dofs=["x"], loss_factor=0.1), [1], [0], freq_hz=freq)[:, 1:3, 1:3]
+        >>> fit = jf.identify(freq, jf.pollute(h, 0.02, seed=2), ["x"], damping="hysteretic")
+        >>> eta = fit.derived("h_x / k_x")
+        >>> bool(eta.low < 0.1 < eta.high), bool(abs(eta.value / 0.1 - 1) < 0.05)
+        (True, True)
+        """
+        intervals = self.confidence_interval if self.intervals is None else self.intervals
+        if not 0 < probability < 1:
+            raise ValueError(f"probability must lie between 0 and 1, not {probability}")
+        return derived_quantity(function, self._names, self.estimate, self.covariance, intervals, probability)
+
+    def k_joint(self, freq_hz: ArrayLike) -> ComplexArray:
+        """Complex joint stiffness from the parameters.
+
+        Parameters
+        ----------
+        freq_hz : array_like, shape (n_freq,)
+            Hz.
+
+        Returns
+        -------
+        ndarray, shape (n_freq, n, n)
+            N/m, rotational N m/rad.
+
+        Raises
+        ------
+        ValueError
+            A DOF is rigid: `joint.compliance` has it.
+        """
+        return self.joint.dynamic_stiffness(freq_hz)
+
+    def unit(self, parameter: str) -> str:
+        """Return the unit of a parameter; ValueError where the fit has none of this name."""
+        for one in self.parameters:
+            if one.name == parameter:
+                return one.unit
+        raise ValueError(f"there is no parameter {one_line(parameter)}, only {', '.join(self._names)}")
+
+    def __str__(self) -> str:
+        """Return a table of the parameters with their intervals, and the findings."""
+        intervals, errors = self.confidence_interval(0.95), self.std_error
+        has_prior = any(one.prior for one in self.parameters)
+        rows = [("parameter", "value", "std error", "95 % interval", *(["prior"] if has_prior else []), "unit")]
+        for one in self.parameters:
+            low, high = intervals[one.name]
+            is_open = one.kind == "k" and not one.is_cross and not np.isfinite(high)
+            shown = "open" if is_open else f"{self.value[one.name]:.5g}"
+            prior = "" if one.prior is None else f"{one.prior[0]:.4g} +- {one.prior[1]:.2g}"
+            limits = f"{low:.4g} .. {high:.4g}"
+            rows.append((one.name, shown, f"{errors[one.name]:.2g}", limits, *([prior] if has_prior else []), one.unit))
+        for name, eta in self.loss_factors.items():
+            limits = f"{eta.low:.4g} .. {eta.high:.4g}"
+            rows.append((name, f"{eta.value:.5g}", f"{eta.std_error:.2g}", limits, *([""] if has_prior else []), "1"))
+        channels = f", {len(self.responses)} responses x {len(self.forces)} forces" if self.responses else ""
+        span = f"{self.freq_hz.min():g} to {self.freq_hz.max():g} Hz, {self.freq_hz.size} lines"
+        head = [f"method {self.method}, {span}{channels}"]
+        if np.isfinite(self.noise_level):
+            head.append(f"noise {100 * self.noise_level:.2g} %, residual {100 * self.residual_level:.2g} % of the FRFs")
+        if self.laws is not None and self.laws.rigid:
+            head.append(f"rigid: {', '.join(self.laws.rigid)}")
+        tail = [_wrapped(f"note: {text}") for text in self.notes]
+        tail += [_wrapped(f"warning: {text}") for text in self.warnings]
+        return "\n".join([*head, "", *columns_of(rows), *([""] if tail else []), *tail])
+
+
+def _matrix(dofs: tuple[str, ...], parameters: Sequence[FittedParameter], values: FloatArray, kind: str) -> FloatArray:
+    """Return the parameters of one kind as a symmetric matrix, shape (n, n)."""
+    matrix = np.zeros((len(dofs), len(dofs)))
+    for one, value in zip(parameters, values, strict=True):
+        if one.kind == kind and one.origin == "joint":
+            a, b = dofs.index(one.row), dofs.index(one.column)
+            matrix[a, b] = matrix[b, a] = value
+    return matrix
+
+
+def joint_of(dofs: tuple[str, ...], parameters: Sequence[FittedParameter], values: FloatArray) -> Joint:
+    """Return the joint of springs and dampers with these parameters."""
+    k, h, c = (_matrix(dofs, parameters, values, kind) for kind in "khc")
+    return Joint(k, c, dofs, structural_damping=h)
+
+
+def _wrapped(text: str) -> str:
+    """Return a finding in lines of a printed fit."""
+    return textwrap.fill(text, _WIDTH, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False)
+
+
+def columns_of(rows: Sequence[tuple[str, ...]]) -> list[str]:
+    """Return rows in columns, the first one above a rule."""
+    widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
+    lines = ["  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in rows]
+    lines.insert(1, "-" * max(map(len, lines)))
+    return lines
