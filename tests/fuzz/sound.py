@@ -173,16 +173,25 @@ def _identification(arrays: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
         jf.LawJoint({"x": jf.SpringLaw(1900.0, 3.0)}),
     )  # fmt: skip
     fit = {"freq_hz": freq, "gamma": gamma, "dofs": ["x"], "bands": (1.0, 9.0)}
+    mean = {"freq_hz": freq, "measured": gamma, "dofs": ["x"], "bands": (1.0, 9.0)}
     first = c["first"].dynamic_stiffness(freq)
+    found = jf.identify(freq, gamma, ["x"], noise=0.01)
     cross = jf.Joint([[6e5, 5e3], [5e3, 5e3]], dofs=["y", "rz"])
     return {
         "identify": fit,
-        "identify (ismm)": {**fit, "method": "ismm", "alpha": c["alpha"], "k_initial": first},
-        "identify (decoupling)": {
-            **fit, "gamma": c["whole"][:, :1, 3:], "method": "decoupling-rs", "h_a": c["h_a"], "h_b": c["h_b"],
+        "identify_band_mean": {**mean, "method": "ismm", "alpha": c["alpha"], "k_initial": first},
+        "identify_band_mean (decoupling)": {
+            **mean, "measured": c["whole"][:, :1, 3:], "method": "decoupling-rs", "h_a": c["h_a"], "h_b": c["h_b"],
             "dofs_j": [1], "dofs_k": [0], "dofs_r": [0], "dofs_s": [1],
         },
         "identify (laws)": {**fit, "joint": jf.LawJoint({"x": jf.SpringLaw(1500.0, 2.0)}), "noise": 0.01},
+        "fit_to_dict": {"fit": found},
+        "fit_from_dict": {"content": jf.fit_to_dict(found)},
+        "save": {"fit": found, "path": "fit.json"},
+        "load": {"path": str(jf.save(found, Path("sound_fit.json").absolute()))},
+        "cards": {"fit": found, "program": "nastran", "nodes": [1, 2]},
+        "plot": {"fit": found},
+        "write_report": {"fit": found, "path": "fit.html"},
         "identify_realisations": {"freq_hz": freq, "gammas": [gamma, gamma], "dofs": ["x"]},
         "identify_model": {
             "freq_hz": freq, "h": jf.pollute(c["whole"], 0.01, seed=2)[:, [0, 3]][:, :, [0, 3]], "assembly": assembly,

@@ -380,7 +380,7 @@ def describe_laws(found: FoundLaws) -> Fit:
         is_converged=result.converged,
         intervals=found.intervals,
     )
-    is_log = {}
+    is_log: dict[str, bool] = {}
     for group in result.groups:
         assert isinstance(group.joint, LawCoordinates)
         is_log |= {one.name: one.is_log for one in group.joint.vector.all}
@@ -496,12 +496,10 @@ def _model_residual(fit: Fit, found: FoundModel, channels: Channels) -> list[Fin
         )
         findings.append(warn("residual", text, tuple(about), bands))
     if test.pulls:
-        names = [fit.parameters[i].name for i, _ in test.pulls]
-        pulled = ", ".join(
-            f"{name} by {pull:+.1f}" for name, (_, pull) in zip(names[:_SHOWN], test.pulls, strict=False)
-        )
+        denied = [(fit.parameters[i].name, pull) for i, pull in test.pulls]
+        pulled = ", ".join(f"{name} by {pull:+.1f}" for name, pull in denied[:_SHOWN])
         text = f"the FRFs deny what was believed, in standard deviations of the prior: {pulled}"
-        findings.append(warn("prior", text, tuple(names)))
+        findings.append(warn("prior", text, tuple(name for name, _ in denied)))
     return findings
 
 

@@ -18,7 +18,7 @@ from jointfrf.files import check_file, write_file
 from jointfrf.identification.derived import Derived
 from jointfrf.identification.findings import Finding, FitFindingKind
 from jointfrf.identification.result import Fit, FittedParameter
-from jointfrf.kernel.arguments import ComplexArray, FloatArray, check_type
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_real, check_type
 from jointfrf.kernel.call import VERSION
 from jointfrf.laws.joint_toml import joint_text, read_joint_table
 from jointfrf.laws.law_joint import LawJoint
@@ -167,7 +167,7 @@ def _plain_intervals(fit: Fit, probabilities: Sequence[float] | None) -> dict[st
     if isinstance(fit.intervals, _KnownIntervals) and probabilities is None:
         levels = list(fit.intervals.by_probability)
     else:
-        levels = sorted({*_PROBABILITIES, *(probabilities or ())})
+        levels = sorted({*_PROBABILITIES, *as_real("probabilities", probabilities or (), (None,)).tolist()})
     return {
         repr(float(level)): {
             name: [_plain(limit) for limit in limits] for name, limits in fit.confidence_interval(level).items()
@@ -340,17 +340,18 @@ def _parameters_of(content: Any, read: dict[str, Any]) -> tuple[tuple[FittedPara
         terms = [Parameter.parse(name) for name in content]
         parameters = tuple(FittedParameter(one.name, one.unit, one.kind, one.row, one.column) for one in terms)
     else:
-        parameters = tuple(
-            FittedParameter(
-                name, _text_of(own["unit"], read), _text_of(own["kind"], read), *_texts_of(own["between"], read),
-                _text_of(own["origin"], read), None if own["prior"] is None else _pair_of(own["prior"]),
-            )
-            for name, own in content.items()
-        )  # fmt: skip
+        parameters = tuple(_parameter_of(name, own, read) for name, own in content.items())
     ends = {dof for one in parameters if one.origin == "joint" for dof in (one.row, one.column)}
     if not parameters or not ends <= set(read["dofs"]):
         raise ValueError
     return parameters, values
+
+
+def _parameter_of(name: str, content: Any, read: dict[str, Any]) -> FittedParameter:
+    row, column = _texts_of(content["between"], read)
+    unit, kind, origin = (_text_of(content[key], read) for key in ("unit", "kind", "origin"))
+    prior = None if content["prior"] is None else _pair_of(content["prior"])
+    return FittedParameter(name, unit, kind, row, column, origin, prior)
 
 
 def _pair_of(content: Any) -> tuple[float, float]:

@@ -15,6 +15,7 @@ from scipy.special import ndtri
 
 from jointfrf.dofs import Parameter, ParameterKind
 from jointfrf.frf.bands import Band
+from jointfrf.identification.compliance_fit.misfit import Misfit
 from jointfrf.identification.derived import Derived, DerivedFunction, derived_quantity
 from jointfrf.identification.findings import Finding, as_warning
 from jointfrf.identification.fit_data import FitData, ModelData
@@ -112,7 +113,7 @@ class Fit:
         Channels of a fit of an assembly.
     residual_is_noise : bool or None
         None where the method has no noise.
-    test : ResidualTest or None
+    test : ResidualTest, Misfit or None
         Whether the residual is noise, and if not, where; a fit that was loaded has none.
     is_converged : bool
     intervals : callable or None
@@ -137,7 +138,7 @@ class Fit:
     responses: tuple[str, ...] = ()
     forces: tuple[str, ...] = ()
     residual_is_noise: bool | None = None
-    test: ResidualTest | None = field(default=None, repr=False)
+    test: ResidualTest | Misfit | None = field(default=None, repr=False)
     is_converged: bool = True
     intervals: Intervals | None = field(default=None, repr=False, compare=False)
     data: FitData | ModelData | None = field(default=None, repr=False, compare=False)

@@ -17,7 +17,7 @@ from jointfrf.identification.fit_cards import cards
 from jointfrf.identification.fit_data import FitData
 from jointfrf.identification.result import Fit
 from jointfrf.io.cards import CardFormat
-from jointfrf.kernel.arguments import FloatArray
+from jointfrf.kernel.arguments import FloatArray, check_type
 from jointfrf.kernel.engine import get_engine
 from jointfrf.report.chart import Chart, count_points
 from jointfrf.report.document import Document, Listing, Part, Section, Sketch, Words, make_document
@@ -81,6 +81,7 @@ def write_report(
     OSError
         The file cannot be written.
     """
+    check_type("fit", fit, Fit)
     write_file(Path(path), make_document(fit_document(fit, ReportOptions(source, command, nodes))))
     return Path(path)
 

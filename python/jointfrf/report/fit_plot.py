@@ -9,6 +9,7 @@ import numpy as np
 
 from jointfrf.identification.fit_data import FitData
 from jointfrf.identification.result import Fit
+from jointfrf.kernel.arguments import check_type
 from jointfrf.report.draw import laid_out
 from jointfrf.report.figure import Figure, Panel
 from jointfrf.report.fit import fit_figures
@@ -58,4 +59,5 @@ def plot(fit: Fit) -> Any:
     MissingPackageError
         matplotlib is missing.
     """
+    check_type("fit", fit, Fit)
     return laid_out(fit_overview(fit))

@@ -46,7 +46,7 @@ def test_a_joint_from_test_files(identified):
     for name in ("101:+x", "204:+z", "111:-x", "222:+z"):
         assert name in said
     saved = json.loads((folder / "joint.json").read_text())
-    assert (saved["format"], saved["format_version"], saved["source"]) == ("jointfrf joint", 1, "test.uff")
+    assert (saved["format"], saved["format_version"], saved["source"]) == ("jointfrf joint", 2, "test.uff")
     assert saved["reference_points_m"]["k"] == pytest.approx(list(POINT))
     exact = dict(zip([f"k_{dof}" for dof in DOFS], np.diagonal(JOINT.stiffness), strict=True))
     for name, value in exact.items():

@@ -12,6 +12,7 @@ from jointfrf.frf.bands import in_pieces, line_slices
 from jointfrf.identification.compliance_fit.channel_noise import NoiseOptions
 from jointfrf.identification.compliance_fit.fit import fit_compliance
 from jointfrf.identification.compliance_fit.prepare import FitOptions, prepare_compliance
+from jointfrf.identification.describe import describe_springs
 from jointfrf.identification.prepare import as_measured
 
 
@@ -72,9 +73,9 @@ def test_a_fit_of_pieces_is_that_of_all_lines(beams, cut, cross):
     own = {"y": (100, 400), "theta": (300, 800)} if cross == "ignore" else None
     options = FitOptions("viscous", cross, True)
     problem = prepare_compliance(x, ["y", "theta"], own, None, NoiseOptions(), options)
-    whole = fit_compliance(problem).joint
+    whole = describe_springs(fit_compliance(problem), problem)
     cut()
-    fit = fit_compliance(problem).joint
+    fit = describe_springs(fit_compliance(problem), problem)
     np.testing.assert_allclose(fit.k_lines, whole.k_lines, rtol=1e-9)
     for name, value in whole.value.items():
         # Starts see some lines only: both end where steps are far below a standard error.

@@ -14,6 +14,7 @@ from jointfrf.frf.noise import pollute
 from jointfrf.identification.identify_model import identify_model
 from jointfrf.identification.model_fit.assembly import Assembly
 from jointfrf.identification.result import Fit
+from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.laws.law import JointLaw
 from jointfrf.laws.law_joint import LawJoint
@@ -69,8 +70,9 @@ class ModelledJointResult:
     constant: Fit
 
 
-def moving_stiffness(joint: LawJoint, freq_hz: FloatArray) -> ComplexArray:
+def moving_stiffness(joint: Joint | LawJoint, freq_hz: FloatArray) -> ComplexArray:
     """Return K*(w) of the DOFs that have a law, shape (n_freq, n), N/m."""
+    assert isinstance(joint, LawJoint)
     laws = {pair: law for pair, law in joint.laws.items() if pair[0] == pair[1]}
     return np.array([law.stiffness(2 * np.pi * freq_hz) for law in laws.values()]).T
 
@@ -104,7 +106,7 @@ def fitted_draw(case: ModelledJointCase, exact: ComplexArray, number: int) -> Fi
     """Fit one realisation: that of seed + number."""
     fit = _fit(case, case.believed, pollute(exact, case.noise, seed=case.seed + number))
     stiffness = moving_stiffness(fit.joint, case.freq_hz)
-    return FittedDraw(fit.value, fit.confidence_interval(0.95), fit.test.is_noise, stiffness)
+    return FittedDraw(fit.value, fit.confidence_interval(0.95), bool(fit.residual_is_noise), stiffness)
 
 
 def _constant(joint: LawJoint) -> LawJoint:

@@ -8,7 +8,9 @@ import numpy as np
 
 from jointfrf.cases.modelled_joint.compute import ModelledJointResult, moving_stiffness
 from jointfrf.dofs import is_rotation
+from jointfrf.identification.model_fit.residual_check import ResidualTest
 from jointfrf.identification.record import fit_to_dict
+from jointfrf.identification.result import Fit
 from jointfrf.report.table import Cell, Table, number
 
 __all__ = ["modelled_numbers", "modelled_summary", "modelled_tables"]
@@ -78,19 +80,26 @@ def _stiffness(result: ModelledJointResult) -> Table:
 
 def _residuals(result: ModelledJointResult) -> Table:
     """Whether the residual is noise: of the laws of the case, and of springs and dashpots."""
+    first, constant = result.first.test, result.constant.test
+    assert isinstance(first, ResidualTest)
+    assert isinstance(constant, ResidualTest)
     count = len(result.draws)
     alarms = sum(not draw.is_noise for draw in result.draws)
     rows: list[tuple[Cell, ...]] = [
-        ("laws of the case", f"{count - alarms} of {count}", result.first.test.ratio, _where(result.first.test.bands)),
+        ("laws of the case", f"{count - alarms} of {count}", first.ratio, _where(first.bands)),
         (
             "springs and dashpots",
-            "yes" if result.constant.test.is_noise else "no",
-            result.constant.test.ratio,
-            _where(result.constant.test.bands),
+            "yes" if constant.is_noise else "no",
+            constant.ratio,
+            _where(constant.bands),
         ),
     ]
     columns = ("joint", "residual is noise", "residual over noise", "most at")
     return Table("residual", "Is the residual noise?", columns, tuple(rows), note="Ratio and bands: first realisation.")
+
+
+def _ratio(fit: Fit) -> float:
+    return fit.residual_level / fit.noise_level
 
 
 def _where(bands: tuple[tuple[float, float, float], ...]) -> str:
@@ -107,8 +116,11 @@ def modelled_summary(result: ModelledJointResult, tables: list[Table]) -> list[T
     cells: tuple[tuple[Cell, ...], ...] = (
         ("RMSE over bound, worst", f"{worst[0]:.2f} ({worst[1]})"),
         ("coverage of 95 % intervals", f"{min(held):.0f} to {max(held):.0f} %"),
-        ("residual over noise, laws of the case", number(result.first.test.ratio, 3)),
-        ("residual over noise, springs and dashpots", number(result.constant.test.ratio, 3)),
+        ("residual over noise, laws of the case", number(_ratio(result.first), 3)),
+        (
+            "residual over noise, springs and dashpots",
+            number(result.constant.residual_level / result.constant.noise_level, 3),
+        ),
     )
     return [Table("outcome", "What came out", ("quantity", "value"), cells)]
 

@@ -204,10 +204,11 @@ def _of_compliance_fit(
     """Return values of a joint of springs from the compliance fit; None for other joints, or where it finds none."""
     if joint.rigid or not all(isinstance(law, SpringLaw) for law in joint.laws.values()):
         return None
+    from jointfrf.identification.compliance_fit.joint_terms import CrossTerms
     from jointfrf.identification.identify import identify
 
     gamma = np.ascontiguousarray(lines[:, at[0]][:, :, at[1]])
-    cross = "fit" if any(a != b for a, b in joint.laws) else "zero"
+    cross: CrossTerms = "fit" if any(a != b for a, b in joint.laws) else "zero"
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
