@@ -32,9 +32,9 @@ from jointfrf.errors import ConvergenceWarning, FrfCheckWarning, IdentificationW
 from jointfrf.extras import check_extras
 from jointfrf.files import write_file
 from jointfrf.frf.noise_model import estimate_noise
-from jointfrf.identification.compliance_fit.joint_terms import CrossTerms, DampingTerms
 from jointfrf.identification.identify import identify
 from jointfrf.identification.joint_fit import JointFit
+from jointfrf.identification.manifold.coordinates import CrossTerms, DampingTerms
 from jointfrf.io import FrfSet
 from jointfrf.spelling import did_you_mean
 

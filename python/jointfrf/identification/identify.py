@@ -15,15 +15,15 @@ from jointfrf.channels.point_lines import Interface
 from jointfrf.frf.bands import spread_lines
 from jointfrf.identification.band_means import fit_band_mean, prepare_band_mean
 from jointfrf.identification.compliance_data import compliance_data
-from jointfrf.identification.compliance_fit.channel_noise import NoiseOptions
 from jointfrf.identification.compliance_fit.describe import describe_compliance
-from jointfrf.identification.compliance_fit.fit import fit_compliance
-from jointfrf.identification.compliance_fit.joint_terms import CrossTerms, DampingTerms
-from jointfrf.identification.compliance_fit.prepare import FitOptions, FitProblem, prepare_compliance
-from jointfrf.identification.compliance_fit.transforms import Transform
 from jointfrf.identification.joint_fit import JointFit
 from jointfrf.identification.law_fit.identify_laws import check_law_joint, identify_laws
 from jointfrf.identification.law_fit.law_fit import LawFit
+from jointfrf.identification.manifold.coordinates import CrossTerms, DampingTerms
+from jointfrf.identification.manifold.fit import fit_compliance
+from jointfrf.identification.manifold.prepare import FitOptions, FitProblem, prepare_compliance
+from jointfrf.identification.manifold.transforms import Transform
+from jointfrf.identification.noise import NoiseOptions
 from jointfrf.identification.prepare import BandsOfDofs, MeasuredFrfs, as_measured
 from jointfrf.kernel.arguments import FloatArray, check_choice
 from jointfrf.laws.law_joint import LawJoint

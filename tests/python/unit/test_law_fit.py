@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import jointfrf as jf
-from jointfrf.identification.law_fit.law_coordinates import LawCoordinates
+from jointfrf.identification.manifold.coordinates import LawCoordinates
 from jointfrf.identification.parameter_table import parameter_warnings
 
 FREQ = np.linspace(12, 620, 153)

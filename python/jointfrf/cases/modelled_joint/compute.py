@@ -11,7 +11,7 @@ import numpy as np
 from jointfrf.cases.modelled_joint.read import ModelledJointCase
 from jointfrf.cases.workers import Workers
 from jointfrf.frf.noise import pollute
-from jointfrf.identification.model_fit.assembly import Assembly
+from jointfrf.identification.model.assembly import Assembly
 from jointfrf.identification.model_fit.identify_model import identify_model
 from jointfrf.identification.model_fit.model_fit import ModelFit
 from jointfrf.kernel.arguments import ComplexArray, FloatArray

@@ -11,16 +11,15 @@ from numpy.typing import NDArray
 
 from jointfrf.dofs import compliance_unit
 from jointfrf.errors import ConvergenceWarning, IdentificationWarning
-from jointfrf.identification.compliance_fit.damping_choice import DofDamping
-from jointfrf.identification.compliance_fit.estimator import JointEstimate
-from jointfrf.identification.compliance_fit.fit import ComplianceFit
-from jointfrf.identification.compliance_fit.intervals import Spread
-from jointfrf.identification.compliance_fit.joint_terms import CrossTerms
-from jointfrf.identification.compliance_fit.misfit import Misfit
-from jointfrf.identification.compliance_fit.prepare import FitProblem
-from jointfrf.identification.compliance_fit.transforms import Transforms
 from jointfrf.identification.elastic_centre import elastic_centre
 from jointfrf.identification.joint_fit import JointFit
+from jointfrf.identification.manifold.coordinates import CrossTerms
+from jointfrf.identification.manifold.estimate import JointEstimate
+from jointfrf.identification.manifold.fit import ComplianceFit, DofDamping
+from jointfrf.identification.manifold.prepare import FitProblem
+from jointfrf.identification.manifold.scatter import Spread
+from jointfrf.identification.manifold.transforms import Transforms
+from jointfrf.identification.residual_test import Misfit
 
 __all__ = [
     "Described",

@@ -13,10 +13,10 @@ from jointfrf.identification.compliance_fit.describe import (
     places_of_excess,
     untrusted_warnings,
 )
-from jointfrf.identification.compliance_fit.fit import stiffness_of_lines
-from jointfrf.identification.law_fit.fit import FoundLaws
-from jointfrf.identification.law_fit.law_coordinates import LawCoordinates
 from jointfrf.identification.law_fit.law_fit import LawFit
+from jointfrf.identification.manifold.coordinates import LawCoordinates
+from jointfrf.identification.manifold.fit import stiffness_of_lines
+from jointfrf.identification.manifold.law_fit import FoundLaws
 from jointfrf.identification.parameter_table import correlation_notes, parameter_warnings
 
 __all__ = ["DescribedLaws", "describe_laws"]

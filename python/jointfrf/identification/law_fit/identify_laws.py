@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from jointfrf.identification.compliance_fit.prepare import FitProblem
 from jointfrf.identification.law_fit.describe import DescribedLaws, describe_laws
-from jointfrf.identification.law_fit.fit import fit_laws
+from jointfrf.identification.manifold.law_fit import fit_laws
+from jointfrf.identification.manifold.prepare import FitProblem
 from jointfrf.kernel.arguments import as_names, check_type
 from jointfrf.laws.law_joint import LawJoint
 

@@ -8,12 +8,11 @@ from typing import NamedTuple
 import numpy as np
 
 from jointfrf.errors import ConvergenceWarning, IdentificationWarning
-from jointfrf.identification.model_fit.directions import OpenDirection
-from jointfrf.identification.model_fit.fit import FoundModel
+from jointfrf.identification.model.fit import FoundModel, OpenDirection
+from jointfrf.identification.model.prepare import Channels
 from jointfrf.identification.model_fit.model_fit import ModelFit
-from jointfrf.identification.model_fit.prepare import Channels
-from jointfrf.identification.model_fit.profile import ProfileIntervals
 from jointfrf.identification.parameter_table import correlation_notes, parameter_warnings
+from jointfrf.identification.profile import ProfileIntervals
 
 __all__ = ["DescribedModel", "describe_model"]
 

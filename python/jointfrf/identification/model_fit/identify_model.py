@@ -7,12 +7,12 @@ from collections.abc import Mapping, Sequence
 
 from numpy.typing import ArrayLike
 
-from jointfrf.identification.model_fit.assembly import Assembly
+from jointfrf.identification.model.assembly import Assembly
+from jointfrf.identification.model.fit import fit_assembly
+from jointfrf.identification.model.prepare import ChannelNoise, Channels, prepare_model_fit
+from jointfrf.identification.model.substructure import Unknown
 from jointfrf.identification.model_fit.describe import describe_model
-from jointfrf.identification.model_fit.fit import fit_assembly
 from jointfrf.identification.model_fit.model_fit import ModelFit
-from jointfrf.identification.model_fit.prepare import ChannelNoise, Channels, prepare_model_fit
-from jointfrf.identification.model_fit.unknown import Unknown
 from jointfrf.kernel.arguments import as_names, check_type
 
 __all__ = ["identify_model"]

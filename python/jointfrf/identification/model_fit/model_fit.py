@@ -9,11 +9,11 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from jointfrf.identification.fitted_parameters import FittedParameters
-from jointfrf.identification.model_fit.assembly import Assembly
-from jointfrf.identification.model_fit.directions import OpenDirection
-from jointfrf.identification.model_fit.residual_check import ResidualTest
-from jointfrf.identification.model_fit.unknowns import FitParameter
+from jointfrf.identification.model.assembly import Assembly
+from jointfrf.identification.model.fit import OpenDirection
 from jointfrf.identification.parameter_table import unit_of
+from jointfrf.identification.parameters import FitParameter
+from jointfrf.identification.residual_test import ResidualTest
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.laws.law_joint import LawJoint
 
