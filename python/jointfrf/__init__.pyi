@@ -54,10 +54,8 @@ from jointfrf.identification.fit_cards import cards
 from jointfrf.identification.identify import identify
 from jointfrf.identification.identify_model import identify_model
 from jointfrf.identification.joint_file import read_joint, write_joint
-from jointfrf.identification.model_fit.assembly import Assembly
-from jointfrf.identification.model_fit.attachments import AddedMass, GroundSpring
-from jointfrf.identification.model_fit.substructure import Substructure
-from jointfrf.identification.model_fit.unknown import Unknown
+from jointfrf.identification.model.assembly import AddedMass, Assembly, GroundSpring
+from jointfrf.identification.model.substructure import Substructure, Unknown
 from jointfrf.identification.monte_carlo import BandStatistics, MonteCarlo, monte_carlo
 from jointfrf.identification.realisations import FitStart, identify_realisations
 from jointfrf.identification.record import fit_from_dict, fit_to_dict, load, save

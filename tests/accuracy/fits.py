@@ -26,7 +26,7 @@ from trials import TRIALS, Trial, system
 
 import jointfrf as jf
 from cramer_rao import cramer_rao
-from jointfrf.identification.compliance_fit.joint_terms import joint_terms
+from jointfrf.identification.manifold.coordinates import joint_terms
 
 #: A parameter so many times away from the truth, while its interval says otherwise, has run off.
 _RUN_OFF = 3.0

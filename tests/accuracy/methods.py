@@ -26,7 +26,7 @@ from cramer_rao import cramer_rao
 from jointfrf.cases.catalogue import find_case, read_case
 from jointfrf.cases.known_joint.exact import exact_frfs
 from jointfrf.cases.known_joint.study import means_over_bands
-from jointfrf.identification.compliance_fit.joint_terms import joint_terms
+from jointfrf.identification.manifold.coordinates import joint_terms
 from model_bound import model_bound
 
 CASES = ("3.1", "3.2", "3.3", "4.3.1")

@@ -7,15 +7,14 @@ import warnings
 import numpy as np
 
 from jointfrf.errors import ConvergenceWarning, FrfCheckWarning, IdentificationWarning, IllConditionedWarning
-from jointfrf.identification.compliance_fit.line_forms import inverse_information
 from jointfrf.identification.identify import identify
-from jointfrf.identification.model_fit.assembly import Assembly
-from jointfrf.identification.model_fit.likelihood import Likelihood
-from jointfrf.identification.model_fit.prediction import Prediction
-from jointfrf.identification.model_fit.prepare import Channels
-from jointfrf.identification.model_fit.realisations import joints_of_realisations
-from jointfrf.identification.model_fit.substructure import Substructure
-from jointfrf.identification.model_fit.unknowns import parameter_vector
+from jointfrf.identification.minimise import inverse_information
+from jointfrf.identification.model.assembly import Assembly
+from jointfrf.identification.model.likelihood import Likelihood
+from jointfrf.identification.model.prediction import Prediction, parameter_vector
+from jointfrf.identification.model.prepare import Channels
+from jointfrf.identification.model.realisations import joints_of_realisations
+from jointfrf.identification.model.substructure import Substructure
 from jointfrf.identification.realisations import viscous_joints
 from jointfrf.identification.result import Fit
 from jointfrf.kernel.arguments import ComplexArray, FloatArray

@@ -31,8 +31,8 @@ from jointfrf.errors import ConvergenceWarning, FrfCheckWarning, IdentificationW
 from jointfrf.extras import check_extras
 from jointfrf.frf.noise_model import estimate_noise
 from jointfrf.identification.band_means import identify_band_mean
-from jointfrf.identification.compliance_fit.joint_terms import CrossTerms, DampingTerms
 from jointfrf.identification.identify import identify
+from jointfrf.identification.manifold.coordinates import CrossTerms, DampingTerms
 from jointfrf.identification.record import fit_to_dict, write_record
 from jointfrf.identification.result import Fit
 from jointfrf.io import FrfSet

@@ -9,16 +9,15 @@ import numpy as np
 
 from jointfrf.channels.point_lines import Interface
 from jointfrf.errors import IllConditionedWarning
-from jointfrf.identification.compliance_fit.estimator import FittedGroup, JointEstimate
-from jointfrf.identification.compliance_fit.fit import ComplianceFit
-from jointfrf.identification.compliance_fit.interface_frfs import InterfaceFrfs
-from jointfrf.identification.compliance_fit.joint_terms import terms_of
-from jointfrf.identification.compliance_fit.line_forms import inverse_information
-from jointfrf.identification.compliance_fit.manifold import frfs_of_joint, project
-from jointfrf.identification.compliance_fit.prepare import FitProblem
-from jointfrf.identification.compliance_fit.starts import smooth_compliance, starts_on_manifold
-from jointfrf.identification.compliance_fit.transforms import Transform, Transforms
 from jointfrf.identification.fit_data import FitData
+from jointfrf.identification.manifold.coordinates import terms_of
+from jointfrf.identification.manifold.estimate import FittedGroup, JointEstimate
+from jointfrf.identification.manifold.fit import ComplianceFit
+from jointfrf.identification.manifold.interface_frfs import InterfaceFrfs
+from jointfrf.identification.manifold.on_manifold import frfs_of_joint, project, smooth_compliance, starts_on_manifold
+from jointfrf.identification.manifold.prepare import FitProblem
+from jointfrf.identification.manifold.transforms import Transform, Transforms
+from jointfrf.identification.minimise import inverse_information
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
 __all__ = ["channel_names", "compliance_data", "information_shares", "line_compliance", "regenerated_frfs"]

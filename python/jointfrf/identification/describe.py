@@ -8,22 +8,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf.dofs import compliance_unit
-from jointfrf.identification.compliance_fit.damping_choice import DofDamping
-from jointfrf.identification.compliance_fit.estimator import JointEstimate
-from jointfrf.identification.compliance_fit.fit import ComplianceFit, stiffness_of_lines
-from jointfrf.identification.compliance_fit.intervals import Spread
-from jointfrf.identification.compliance_fit.joint_terms import CrossTerms
-from jointfrf.identification.compliance_fit.misfit import Misfit
-from jointfrf.identification.compliance_fit.prepare import FitProblem
-from jointfrf.identification.compliance_fit.transforms import Transforms
 from jointfrf.identification.elastic_centre import elastic_centre
 from jointfrf.identification.findings import Finding, note, warn
 from jointfrf.identification.fit_data import ModelData
-from jointfrf.identification.law_fit.fit import FoundLaws
-from jointfrf.identification.law_fit.law_coordinates import LawCoordinates
-from jointfrf.identification.model_fit.directions import OpenDirection
-from jointfrf.identification.model_fit.fit import FoundModel
-from jointfrf.identification.model_fit.prepare import Channels
+from jointfrf.identification.manifold.coordinates import CrossTerms, LawCoordinates
+from jointfrf.identification.manifold.estimate import JointEstimate
+from jointfrf.identification.manifold.fit import ComplianceFit, DofDamping, stiffness_of_lines
+from jointfrf.identification.manifold.law_fit import FoundLaws
+from jointfrf.identification.manifold.prepare import FitProblem
+from jointfrf.identification.manifold.scatter import Spread
+from jointfrf.identification.manifold.transforms import Transforms
+from jointfrf.identification.model.fit import FoundModel, OpenDirection
+from jointfrf.identification.model.prepare import Channels
+from jointfrf.identification.residual_test import Misfit
 from jointfrf.identification.result import Fit, FittedParameter, law_parameters
 from jointfrf.kernel.arguments import FloatArray
 

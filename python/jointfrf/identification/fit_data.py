@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from jointfrf.channels.point_lines import Interface
 from jointfrf.frf.noise_model import NoiseModel
-from jointfrf.identification.model_fit.assembly import Assembly
-from jointfrf.identification.model_fit.directions import OpenDirection
+from jointfrf.identification.model.assembly import Assembly
+from jointfrf.identification.model.fit import OpenDirection
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
 __all__ = ["FitData", "ModelData"]

@@ -13,13 +13,13 @@ from jointfrf.channels.check.check import check_frfs, warn_of_frfs
 from jointfrf.channels.check.finding import FrfCheck
 from jointfrf.frf.bands import spread_lines
 from jointfrf.identification.compliance_data import compliance_data
-from jointfrf.identification.compliance_fit.channel_noise import NoiseOptions
-from jointfrf.identification.compliance_fit.fit import fit_compliance
-from jointfrf.identification.compliance_fit.joint_terms import CrossTerms, DampingTerms
-from jointfrf.identification.compliance_fit.prepare import FitOptions, FitProblem, prepare_compliance
-from jointfrf.identification.compliance_fit.transforms import Transform
 from jointfrf.identification.describe import describe_laws, describe_springs
-from jointfrf.identification.law_fit.fit import fit_laws
+from jointfrf.identification.manifold.coordinates import CrossTerms, DampingTerms
+from jointfrf.identification.manifold.fit import fit_compliance
+from jointfrf.identification.manifold.law_fit import fit_laws
+from jointfrf.identification.manifold.prepare import FitOptions, FitProblem, prepare_compliance
+from jointfrf.identification.manifold.transforms import Transform
+from jointfrf.identification.noise import NoiseOptions
 from jointfrf.identification.prepare import BandsOfDofs, MeasuredFrfs, as_measured
 from jointfrf.identification.result import Fit
 from jointfrf.kernel.arguments import FloatArray, as_names, check_type

@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from jointfrf.identification.describe import describe_model
-from jointfrf.identification.model_fit.assembly import Assembly
-from jointfrf.identification.model_fit.fit import fit_assembly
-from jointfrf.identification.model_fit.prepare import ChannelNoise, Channels, prepare_model_fit
-from jointfrf.identification.model_fit.unknown import Unknown
+from jointfrf.identification.identify import identify
+from jointfrf.identification.manifold.coordinates import CrossTerms
+from jointfrf.identification.model.assembly import Assembly
+from jointfrf.identification.model.fit import fit_assembly
+from jointfrf.identification.model.prepare import ChannelNoise, Channels, prepare_model_fit
+from jointfrf.identification.model.substructure import Unknown
 from jointfrf.identification.result import Fit
-from jointfrf.kernel.arguments import as_names, check_type
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_names, check_type
+from jointfrf.laws.law_joint import LawJoint
+from jointfrf.laws.springs import SpringLaw
 
 __all__ = ["identify_model"]
 
@@ -112,7 +118,33 @@ def identify_model(
     named = as_names("responses", responses), as_names("forces", forces)
     channels = Channels(*named, dict(response_gains or {}), dict(force_gains or {}))
     known = ChannelNoise(noise, coherence, averages)
-    problem = prepare_model_fit(freq_hz, h, assembly, channels, known, fixed)
+    problem = prepare_model_fit(freq_hz, h, assembly, channels, known, fixed, _springs_at_joint)
     fit = describe_model(fit_assembly(problem), channels)
     fit.issue_warnings()
     return fit
+
+
+def _springs_at_joint(
+    joint: LawJoint, freq: FloatArray, lines: ComplexArray, variance: FloatArray, at: tuple[list[int], list[int]]
+) -> FloatArray | None:
+    """Return values of a joint of springs from FRFs between all its DOFs; None for others, or where there is none."""
+    if joint.rigid or not all(isinstance(law, SpringLaw) for law in joint.laws.values()):
+        return None
+    gamma = np.ascontiguousarray(lines[:, at[0]][:, :, at[1]])
+    cross: CrossTerms = "fit" if any(a != b for a, b in joint.laws) else "zero"
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        try:
+            own = variance[:, at[0]][:, :, at[1]]
+            found = identify(freq, gamma, joint.dofs, damping="viscous", cross=cross, noise=own)
+        except (ValueError, np.linalg.LinAlgError):
+            return None
+    k, c = found.stiffness_matrix, found.damping_matrix
+    values: list[float] = []
+    for (a, b), law in joint.laws.items():
+        i, j = joint.dofs.index(a), joint.dofs.index(b)
+        named = {"k": k[i, j], "c": c[i, j], "h": 0.0}
+        if not np.isfinite(named["k"]):
+            return None
+        values += [max(named[one.name], one.lower) for one in law.fields]
+    return np.array([*values, *joint.mass.values()])

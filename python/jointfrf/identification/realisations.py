@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from jointfrf.frf.noise_model import NoiseModel
-from jointfrf.identification.compliance_fit.channel_noise import NoiseOptions
-from jointfrf.identification.compliance_fit.estimator import GroupStart, JointEstimate
-from jointfrf.identification.compliance_fit.fit import estimated_joint, fit_compliance, fitted_joint
-from jointfrf.identification.compliance_fit.joint_terms import CrossTerms, DampingTerms
-from jointfrf.identification.compliance_fit.prepare import FitOptions, FitProblem, prepare_compliance
 from jointfrf.identification.describe import describe_springs
+from jointfrf.identification.manifold.coordinates import CrossTerms, DampingTerms
+from jointfrf.identification.manifold.estimate import GroupStart, JointEstimate
+from jointfrf.identification.manifold.fit import estimated_joint, fit_compliance, fitted_joint
+from jointfrf.identification.manifold.prepare import FitOptions, FitProblem, prepare_compliance
+from jointfrf.identification.noise import NoiseOptions
 from jointfrf.identification.prepare import BandsOfDofs, as_measured
 from jointfrf.identification.result import Fit
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, check_type

@@ -15,11 +15,10 @@ from scipy.special import ndtri
 
 from jointfrf.dofs import Parameter, ParameterKind
 from jointfrf.frf.bands import Band
-from jointfrf.identification.compliance_fit.misfit import Misfit
 from jointfrf.identification.derived import Derived, DerivedFunction, derived_quantity
 from jointfrf.identification.findings import Finding, as_warning
 from jointfrf.identification.fit_data import FitData, ModelData
-from jointfrf.identification.model_fit.residual_check import ResidualTest
+from jointfrf.identification.residual_test import Misfit, ResidualTest
 from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, one_line
 from jointfrf.laws.law_joint import LawJoint

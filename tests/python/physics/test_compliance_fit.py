@@ -8,11 +8,11 @@ import pytest
 
 import jointfrf as jf
 from cramer_rao import cramer_rao, term_matrices
-from jointfrf.identification.compliance_fit.estimator import estimate_joint
-from jointfrf.identification.compliance_fit.interface_frfs import InterfaceFrfs
-from jointfrf.identification.compliance_fit.intervals import block_scatter
-from jointfrf.identification.compliance_fit.joint_terms import joint_terms
-from jointfrf.identification.compliance_fit.line_forms import inverse_information
+from jointfrf.identification.manifold.coordinates import joint_terms
+from jointfrf.identification.manifold.estimate import estimate_joint
+from jointfrf.identification.manifold.interface_frfs import InterfaceFrfs
+from jointfrf.identification.manifold.scatter import block_scatter
+from jointfrf.identification.minimise import inverse_information
 
 TRUTH = np.array([6e5, 5e3, 20, 1.5])
 

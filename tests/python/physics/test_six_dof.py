@@ -8,9 +8,9 @@ import pytest
 import jointfrf as jf
 from cramer_rao import cramer_rao
 from jointfrf.frf.noise_estimate import reciprocity_noise
-from jointfrf.identification.compliance_fit.estimator import estimate_joint
-from jointfrf.identification.compliance_fit.interface_frfs import InterfaceFrfs
-from jointfrf.identification.compliance_fit.joint_terms import joint_terms
+from jointfrf.identification.manifold.coordinates import joint_terms
+from jointfrf.identification.manifold.estimate import estimate_joint
+from jointfrf.identification.manifold.interface_frfs import InterfaceFrfs
 from six_dof_beams import DOFS, FREQ, GROUPS, JOINT, assembly, side, sides
 
 TRUTH = np.concatenate([JOINT.stiffness.diagonal(), JOINT.damping.diagonal()])

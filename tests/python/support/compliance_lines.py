@@ -4,9 +4,9 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from jointfrf.identification.compliance_fit.estimator import FittedGroup, JointEstimate, assembled, coordinates_of
-from jointfrf.identification.compliance_fit.group_fit import GroupFit
-from jointfrf.identification.compliance_fit.line_forms import LineForms, minimise_forms
+from jointfrf.identification.manifold.estimate import FittedGroup, JointEstimate, assembled, coordinates_of
+from jointfrf.identification.manifold.group_fit import GroupFit
+from jointfrf.identification.manifold.line_forms import LineForms, minimise_forms
 
 
 def white(shape, seed):

@@ -1,12 +1,12 @@
 """Projection on the manifold of FRFs that fit a joint, and quadratic forms of the joint, by plain linear algebra.
 
-The formulas of `jointfrf.identification.compliance_fit.manifold` with matrices of derivatives written out in full,
+The formulas of `jointfrf.identification.manifold.on_manifold` with matrices of derivatives written out in full,
 line by line, numpy's solver, and a basis by singular values.
 """
 
 import numpy as np
 
-from jointfrf.identification.compliance_fit.manifold import OnManifold, frfs_of_joint
+from jointfrf.identification.manifold.on_manifold import OnManifold, frfs_of_joint
 
 FIRST, SMALLEST, LARGEST = 1e-2, 1e-10, 1e8
 GAIN = 1e-5

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from compliance_lines import exact_compliance, fitted, white
-from jointfrf.identification.compliance_fit.band_parts import fit_band_parts, left_out_share
-from jointfrf.identification.compliance_fit.joint_terms import joint_terms
+from jointfrf.identification.manifold.beyond_noise import fit_band_parts, left_out_share
+from jointfrf.identification.manifold.coordinates import joint_terms
 
 FREQ = np.linspace(20.0, 500.0, 200)
 TERMS = joint_terms(2 * np.pi * FREQ, ["x", "y"], "viscous", "zero")

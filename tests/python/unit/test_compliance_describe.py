@@ -7,14 +7,13 @@ import numpy as np
 import pytest
 
 import jointfrf as jf
-from jointfrf.identification.compliance_fit.channel_noise import NoiseOptions
-from jointfrf.identification.compliance_fit.damping_choice import DofDamping
-from jointfrf.identification.compliance_fit.fit import fit_compliance
-from jointfrf.identification.compliance_fit.misfit import Misfit, Trend
-from jointfrf.identification.compliance_fit.prepare import FitOptions, prepare_compliance
 from jointfrf.identification.describe import describe_springs
 from jointfrf.identification.findings import as_warning
+from jointfrf.identification.manifold.fit import DofDamping, fit_compliance
+from jointfrf.identification.manifold.prepare import FitOptions, prepare_compliance
+from jointfrf.identification.noise import NoiseOptions
 from jointfrf.identification.prepare import as_measured
+from jointfrf.identification.residual_test import Misfit, Trend
 
 LEVEL = 0.01
 

@@ -5,11 +5,11 @@ import pytest
 
 import jointfrf as jf
 from cramer_rao import cramer_rao
-from jointfrf.identification.compliance_fit.compliance_lines import compliance_lines
-from jointfrf.identification.compliance_fit.estimator import estimate_joint
-from jointfrf.identification.compliance_fit.interface_frfs import InterfaceFrfs
-from jointfrf.identification.compliance_fit.joint_terms import joint_terms
-from jointfrf.identification.compliance_fit.manifold import FrfEntries, LineData
+from jointfrf.identification.manifold.coordinates import joint_terms
+from jointfrf.identification.manifold.estimate import estimate_joint
+from jointfrf.identification.manifold.interface_frfs import InterfaceFrfs
+from jointfrf.identification.manifold.on_manifold import FrfEntries, LineData
+from jointfrf.identification.manifold.unknown_cross import compliance_lines
 
 LEVEL = 1e-6
 

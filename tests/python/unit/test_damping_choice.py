@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from compliance_lines import fitted_group, white
-from jointfrf.identification.compliance_fit.damping_choice import choose_damping
-from jointfrf.identification.compliance_fit.joint_terms import DiagonalJoint, joint_terms
-from jointfrf.identification.compliance_fit.line_forms import minimise_forms
+from jointfrf.identification.manifold.coordinates import DiagonalJoint, joint_terms
+from jointfrf.identification.manifold.fit import choose_damping
+from jointfrf.identification.manifold.line_forms import minimise_forms
 
 DOFS = ("x", "y")
 FREQ = np.linspace(20.0, 500.0, 150)

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from jointfrf.identification.compliance_fit.diagonal_minimum import lowest_minimum, within_reach
-from jointfrf.identification.compliance_fit.joint_terms import DiagonalJoint, joint_terms
-from jointfrf.identification.compliance_fit.line_forms import LineForms, minimise_forms
+from jointfrf.identification.manifold.coordinates import DiagonalJoint, joint_terms
+from jointfrf.identification.manifold.line_forms import LineForms, lowest_minimum, minimise_forms, within_reach
 
 OMEGA = 2 * np.pi * np.linspace(10, 500, 40)
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import jointfrf as jf
-from jointfrf.identification.compliance_fit.fit import fit_compliance
+from jointfrf.identification.manifold.fit import fit_compliance
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import jointfrf as jf
-from jointfrf.identification.compliance_fit.from_nothing import check_channels, check_transform
+from jointfrf.identification.manifold.prepare import check_channels, check_transform
 
 DOFS = ["y", "theta"]
 #: Two points 20 mm apart on each side, to y and theta; and the same point twice.

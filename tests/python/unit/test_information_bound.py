@@ -3,8 +3,8 @@
 import numpy as np
 
 from cramer_rao import cramer_rao
-from jointfrf.identification.compliance_fit.joint_terms import joint_terms
 from jointfrf.identification.information_bound import least_std_errors
+from jointfrf.identification.manifold.coordinates import joint_terms
 
 
 def test_bound_is_that_by_differences(assembly):

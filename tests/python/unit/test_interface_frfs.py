@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from jointfrf.identification.compliance_fit.interface_frfs import InterfaceFrfs, between
-from jointfrf.identification.compliance_fit.manifold import FrfEntries
+from jointfrf.identification.manifold.interface_frfs import InterfaceFrfs, between
+from jointfrf.identification.manifold.on_manifold import FrfEntries
 
 N_FREQ = 3
 

@@ -5,15 +5,9 @@ import pytest
 from scipy import stats
 
 from compliance_lines import exact_compliance, fitted, fitted_group, white
-from jointfrf.identification.compliance_fit.intervals import (
-    BLOCKS,
-    LikelihoodIntervals,
-    block_scatter,
-    line_scatter,
-    profile_interval,
-    spread_of,
-)
-from jointfrf.identification.compliance_fit.joint_terms import joint_terms
+from jointfrf.identification.manifold.coordinates import joint_terms
+from jointfrf.identification.manifold.scatter import BLOCKS, block_scatter, line_scatter, spread_of
+from jointfrf.identification.manifold.spring_intervals import LikelihoodIntervals, profile_interval
 
 FREQ = np.linspace(20.0, 500.0, 100)
 OMEGA = 2 * np.pi * FREQ

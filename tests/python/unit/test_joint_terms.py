@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from jointfrf.identification.compliance_fit.joint_terms import CoupledJoint, DiagonalJoint, joint_terms
+from jointfrf.identification.manifold.coordinates import CoupledJoint, DiagonalJoint, joint_terms
 
 OMEGA = 2 * np.pi * np.array([10.0, 80.0, 300.0])
 DOFS = ["x", "y", "theta"]

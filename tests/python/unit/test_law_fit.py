@@ -7,7 +7,7 @@ import pytest
 
 import jointfrf as jf
 from jointfrf.identification.describe import poor_laws
-from jointfrf.identification.law_fit.law_coordinates import LawCoordinates
+from jointfrf.identification.manifold.coordinates import LawCoordinates
 
 FREQ = np.linspace(12, 620, 153)
 SECTION = {"density": 2700.0, "width": 0.025, "height": 0.006, "loss_factor": 0.01, "youngs_modulus": 67e9}

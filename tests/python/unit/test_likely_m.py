@@ -4,8 +4,15 @@ import numpy as np
 import pytest
 
 import manifold_numpy as plain
-from jointfrf.identification.compliance_fit.likely_m import PriorOfM, expected_m, prior_of_m
-from jointfrf.identification.compliance_fit.manifold import FrfEntries, LineData, OnManifold, frfs_of_joint
+from jointfrf.identification.manifold.on_manifold import (
+    FrfEntries,
+    LineData,
+    OnManifold,
+    PriorOfM,
+    expected_m,
+    frfs_of_joint,
+    prior_of_m,
+)
 
 N_FREQ, NOISE = 9, 1e-2
 

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from scipy import optimize
 
-from jointfrf.identification.compliance_fit.joint_terms import CoupledJoint, DiagonalJoint, joint_terms
-from jointfrf.identification.compliance_fit.line_forms import LineForms, inverse_information, minimise_forms
+from jointfrf.identification.manifold.coordinates import CoupledJoint, DiagonalJoint, joint_terms
+from jointfrf.identification.manifold.line_forms import LineForms, minimise_forms
+from jointfrf.identification.minimise import inverse_information
 
 OMEGA = 2 * np.pi * np.linspace(20, 400, 12)
 

@@ -9,10 +9,10 @@ import jointfrf as jf
 import six_dof_beams
 from jointfrf.frf import bands
 from jointfrf.frf.bands import in_pieces, line_slices
-from jointfrf.identification.compliance_fit.channel_noise import NoiseOptions
-from jointfrf.identification.compliance_fit.fit import fit_compliance
-from jointfrf.identification.compliance_fit.prepare import FitOptions, prepare_compliance
 from jointfrf.identification.describe import describe_springs
+from jointfrf.identification.manifold.fit import fit_compliance
+from jointfrf.identification.manifold.prepare import FitOptions, prepare_compliance
+from jointfrf.identification.noise import NoiseOptions
 from jointfrf.identification.prepare import as_measured
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import manifold_numpy as plain
-from jointfrf.identification.compliance_fit.manifold import (
+from jointfrf.identification.manifold.on_manifold import (
     FrfEntries,
     LineData,
     OnManifold,

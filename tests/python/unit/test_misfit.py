@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from compliance_lines import exact_compliance, fitted, white
-from jointfrf.identification.compliance_fit.intervals import spread_of
-from jointfrf.identification.compliance_fit.joint_terms import joint_terms
-from jointfrf.identification.compliance_fit.misfit import Misfit, diagnose
+from jointfrf.identification.manifold.coordinates import joint_terms
+from jointfrf.identification.manifold.scatter import spread_of
+from jointfrf.identification.residual_test import Misfit, diagnose
 
 FREQ = np.linspace(20.0, 500.0, 200)
 OMEGA = 2 * np.pi * FREQ

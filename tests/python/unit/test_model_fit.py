@@ -7,11 +7,10 @@ import pytest
 
 import jointfrf as jf
 from jointfrf.cases.fitting import decoupling_bound, fit_decoupling
-from jointfrf.identification.model_fit.matrix_polynomial import MatrixPolynomial
-from jointfrf.identification.model_fit.prediction import Prediction
-from jointfrf.identification.model_fit.prepare import ChannelNoise, Channels, prepare_model_fit
-from jointfrf.identification.model_fit.starts import from_lines
-from jointfrf.identification.model_fit.unknowns import parameter_vector
+from jointfrf.identification.line_starts import from_lines
+from jointfrf.identification.model.prediction import Prediction, parameter_vector
+from jointfrf.identification.model.prepare import ChannelNoise, Channels, prepare_model_fit
+from jointfrf.identification.model.reduced import MatrixPolynomial
 from model_bound import model_bound
 
 FREQ = np.linspace(12, 620, 77)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import jointfrf as jf
-from jointfrf.identification.compliance_fit.channel_noise import NoiseOptions
-from jointfrf.identification.compliance_fit.prepare import FitOptions, prepare_compliance
+from jointfrf.identification.manifold.prepare import FitOptions, prepare_compliance
+from jointfrf.identification.noise import NoiseOptions
 from jointfrf.identification.prepare import as_measured
 
 OPTIONS = FitOptions("viscous", "zero", True)

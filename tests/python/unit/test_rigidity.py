@@ -5,7 +5,7 @@ import pytest
 
 import jointfrf as jf
 from jointfrf.channels.left_out_dofs import left_out_dofs
-from jointfrf.identification.compliance_fit.rigidity import (
+from jointfrf.identification.manifold.transforms import (
     ChannelModes,
     deformation_compliance,
     deformation_variance,

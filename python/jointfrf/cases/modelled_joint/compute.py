@@ -12,7 +12,7 @@ from jointfrf.cases.modelled_joint.read import ModelledJointCase
 from jointfrf.cases.workers import Workers
 from jointfrf.frf.noise import pollute
 from jointfrf.identification.identify_model import identify_model
-from jointfrf.identification.model_fit.assembly import Assembly
+from jointfrf.identification.model.assembly import Assembly
 from jointfrf.identification.result import Fit
 from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import ComplexArray, FloatArray

@@ -10,10 +10,8 @@ import numpy as np
 from jointfrf.cases.kind import Case
 from jointfrf.cases.known_joint.structure import ModelStructure
 from jointfrf.cases.known_joint.substructures import read_substructure
-from jointfrf.identification.model_fit.assembly import Assembly
-from jointfrf.identification.model_fit.attachments import AddedMass
-from jointfrf.identification.model_fit.substructure import Substructure
-from jointfrf.identification.model_fit.unknown import Unknown
+from jointfrf.identification.model.assembly import AddedMass, Assembly
+from jointfrf.identification.model.substructure import Substructure, Unknown
 from jointfrf.laws.law import JointLaw
 from jointfrf.laws.law_joint import LawJoint
 from jointfrf.laws.law_table import LAW_WORDS, read_law

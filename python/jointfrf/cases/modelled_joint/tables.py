@@ -8,8 +8,8 @@ import numpy as np
 
 from jointfrf.cases.modelled_joint.compute import ModelledJointResult, moving_stiffness
 from jointfrf.dofs import is_rotation
-from jointfrf.identification.model_fit.residual_check import ResidualTest
 from jointfrf.identification.record import fit_to_dict
+from jointfrf.identification.residual_test import ResidualTest
 from jointfrf.identification.result import Fit
 from jointfrf.report.table import Cell, Table, number
 

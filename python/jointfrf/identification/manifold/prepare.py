@@ -1,0 +1,327 @@
+"""What `identify` is given for a compliance fit, checked and put into a problem."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointfrf.channels.left_out_dofs import LeftOutDof, left_out_dofs
+from jointfrf.frf.bands import Band, as_bands, in_bands, line_slices, spread_lines
+from jointfrf.frf.noise_estimate import ZERO
+from jointfrf.frf.quantiles import medians
+from jointfrf.identification.manifold.coordinates import CrossTerms, DampingTerms
+from jointfrf.identification.manifold.estimate import GroupStart, JointEstimate
+from jointfrf.identification.manifold.interface_frfs import InterfaceFrfs
+from jointfrf.identification.manifold.transforms import Transform, Transforms, as_transforms
+from jointfrf.identification.noise import KnownNoise, NoiseOptions, known_noise
+from jointfrf.identification.prepare import BandsOfDofs, MeasuredFrfs, as_dof_names
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_names, as_real, check_choice
+
+__all__ = [
+    "FitOptions",
+    "FitProblem",
+    "check_channels",
+    "check_estimate",
+    "check_joint_seen",
+    "check_transform",
+    "prepare_compliance",
+]
+
+#: FRFs that differ less than this from their transpose were made reciprocal.
+_RECIPROCAL = 1e-9
+
+
+@dataclass(frozen=True)
+class FitOptions:
+    """Choices of a fit on the manifold, as in `identify`."""
+
+    damping: DampingTerms | Literal["auto"] | Sequence[DampingTerms]
+    cross: CrossTerms
+    reciprocal: bool
+
+    def __post_init__(self) -> None:
+        """Check the words."""
+        if isinstance(self.damping, str):
+            check_choice("damping", self.damping, (*get_args(DampingTerms), "auto"))
+        else:
+            for word in as_names("damping", self.damping):
+                check_choice("damping", word, get_args(DampingTerms))
+        check_choice("cross", self.cross, get_args(CrossTerms))
+
+
+@dataclass(frozen=True)
+class FitProblem:
+    """A fit on the manifold, ready to be computed: lines inside the bands only.
+
+    Attributes
+    ----------
+    dofs : tuple of str
+        Names of the n joint DOFs.
+    freq_hz : ndarray, shape (n_freq,)
+    frfs : InterfaceFrfs
+        Measured and smooth FRFs, their variance, and the way to the joint DOFs.
+    noise : KnownNoise
+    used : ndarray of bool, shape (n_freq, n)
+        Lines used for each DOF.
+    bands : tuple
+        For each DOF its bands, (low, high) in Hz.
+    options : FitOptions
+    near : tuple of GroupStart
+        Of other FRFs of the same structure: where the fit starts first.
+    deformation : ndarray, shape (n_freq, m_r, m_f), optional
+        Part of the variance that is not noise: squares of what is not rigid in the channels, (m/N)^2.
+    added_compliance : ndarray, shape (n,), optional
+        What the sides between the channels add to the compliance of each joint DOF, m/N or rad/(N m).
+    left_out : tuple of LeftOutDof
+        DOFs that are not sought, but whose motion the channels take for one that is.
+    """
+
+    dofs: tuple[str, ...]
+    freq_hz: FloatArray
+    frfs: InterfaceFrfs
+    noise: KnownNoise
+    used: NDArray[np.bool_]
+    bands: tuple[tuple[Band, ...], ...]
+    options: FitOptions
+    near: tuple[GroupStart, ...] = ()
+    deformation: FloatArray | None = None
+    added_compliance: FloatArray | None = None
+    left_out: tuple[LeftOutDof, ...] = ()
+
+    def with_noise(self, scale: float) -> FitProblem:
+        """Return the same with another noise level."""
+        noise = replace(self.noise, level=scale * self.noise.level)
+        flexible = 0.0 if self.deformation is None else self.deformation
+        variance = (self.frfs.variance - flexible) * scale**2 + flexible
+        return replace(self, noise=noise, frfs=self.frfs._replace(variance=variance))
+
+
+def prepare_compliance(
+    measured: MeasuredFrfs,
+    dofs: Sequence[str] | None,
+    bands: BandsOfDofs,
+    transform: Transform | tuple[Transform, Transform] | None,
+    noise: NoiseOptions,
+    options: FitOptions,
+) -> FitProblem:
+    """Check the arguments of the fit, find the noise, and keep the lines in the bands; as in `identify`."""
+    freq, h = measured.freq_hz, measured.h
+    transforms = as_transforms(transform, h)
+    responses, forces = transforms[:2]
+    if dofs is None and transforms.geometry is not None:
+        dofs = transforms.geometry.dofs
+    names = as_dof_names(dofs, responses.shape[0] // 2)
+    if not isinstance(options.damping, str) and len(options.damping) != len(names):
+        raise ValueError(f"damping must hold one word for each of {len(names)} DOFs, not {len(options.damping)}")
+    own = as_bands(bands, names, freq)
+    used = np.stack([in_bands(freq, b) for b in own], axis=1)
+    kept = np.asarray(used.any(axis=1))
+    if not kept.all():  # no copy of long sweeps otherwise
+        freq, h = freq[kept], h[kept]
+    if noise.coherence is not None:
+        noise = replace(noise, coherence=as_real("coherence", noise.coherence, measured.h.shape)[kept])
+    if noise.noise is not None and np.ndim(noise.noise) > 0:
+        noise = replace(noise, noise=as_real("noise", noise.noise, measured.h.shape)[kept])
+    # Whether channels are the same points is known where both transforms are one.
+    square = h.shape[1] == h.shape[2] and np.array_equal(responses, forces)
+    _check_joint_dofs(transforms, h, names)
+    found = known_noise(freq, h, noise, transforms, reciprocal=options.reciprocal and square)
+    check_joint_seen(freq, found.smooth, transforms.variance(found.variance))
+    return FitProblem(
+        dofs=names,
+        freq_hz=freq,
+        frfs=InterfaceFrfs.of(
+            h,
+            found.smooth,
+            found.variance if found.deformation is None else found.variance + found.deformation,
+            responses,
+            forces,
+            options.reciprocal,
+            symmetrised=square and _is_symmetrised(h),
+            response_modes=found.transforms.response_modes,
+            force_modes=found.transforms.force_modes,
+        ),
+        noise=found.noise,
+        used=used[kept],
+        bands=tuple(map(tuple, own)),
+        options=options,
+        deformation=found.deformation,
+        added_compliance=found.compliance,
+        left_out=() if transforms.geometry is None else left_out_dofs(h, transforms.geometry),
+    )
+
+
+def _check_joint_dofs(transforms: Transforms, h: ComplexArray, names: tuple[str, ...]) -> None:
+    """Refuse channels that do not show every joint DOF, once on each side."""
+    labels = [f"{side}:{name}" for side in "jk" for name in names]
+    if not transforms.are_units:
+        both = np.array_equal(transforms.responses, transforms.forces)
+        check_transform("transform" if both else "transform[0]", transforms.responses, labels)
+        check_transform("transform[1]", transforms.forces, labels)
+    check_channels(transforms.gamma(h), labels)
+
+
+def _is_symmetrised(h: ComplexArray) -> bool:
+    """Whether FRFs were made reciprocal: both directions are then one measurement, with one noise."""
+    # Mostly the first line tells that they were not.
+    return all(
+        bool((abs(part - part.swapaxes(1, 2)) <= _RECIPROCAL * abs(part)).all())
+        for part in (h[own] for own in (slice(1), *line_slices(len(h))))
+    )
+
+
+#: Rows whose normalised products leave an eigenvalue below this are the same to rounding, or a sum of others.
+_DEPENDENT = 1e-13
+#: Lines that are looked at for that, evenly spread.
+_MOST_LINES = 500
+#: Rows of a transform that are a sum of others to this share.
+_RANK = 1e-9
+#: Noise of driving points from this share of them on hides what they are.
+_HIDDEN = 1.0
+#: FRFs that are above their noise on so small a share of lines are not seen.
+_SEEN = 0.02
+#: A residual of this share of the FRFs, and so many times the noise, is that of no joint.
+_NO_FIT, _FAR = 0.5, 2.0
+_TINY = float(np.finfo(float).tiny)
+
+
+def check_transform(name: str, transform: FloatArray, labels: list[str]) -> None:
+    """Refuse a transform that makes one joint DOF of the others: some channels are the same, or stand in one line."""
+    size = np.linalg.norm(transform, axis=1, keepdims=True)
+    rank = int(np.linalg.matrix_rank(transform / size, tol=_RANK))
+    if rank < len(transform):
+        raise ValueError(
+            f"{name}: {len(transform)} joint DOFs ({', '.join(labels)}) come from channels that show {rank} only: "
+            "channels are the same, or do not see one of the DOFs"
+        )
+
+
+def check_channels(gamma: ComplexArray, labels: list[str]) -> None:
+    """Refuse measured FRFs between joint DOFs j, then k, that hold no signal, or one DOF twice.
+
+    On the two sides of a rigid joint calculated FRFs are the same; measured ones differ by their noise.
+    """
+    half = len(labels) // 2
+    some = gamma[:: -(-len(gamma) // _MOST_LINES)]
+    measured = _is_measured(some)
+    squares = some.real**2 + some.imag**2
+    for what, h, of_h in (("responses", some, squares), ("forces", some.swapaxes(1, 2), squares.swapaxes(1, 2))):
+        size = np.sqrt(of_h.mean(axis=(0, 2)))
+        if not size.all():
+            dead = [labels[i] for i in np.flatnonzero(size == 0)]
+            raise ValueError(f"gamma: the {what} {', '.join(dead)} are zero: nothing was measured there")
+        flat = _normalised(h, of_h)
+        product = flat @ flat.conj().T
+        sides = slice(0, half), slice(half, 2 * half)
+        values, vectors = np.linalg.eigh(np.array([product[side, side] for side in sides]))
+        for side, least, vector in zip(sides, values[:, 0], vectors[:, :, 0], strict=True):
+            if least < _DEPENDENT:
+                own = np.array(labels[side])[abs(vector) > 1e-3].tolist()
+                raise ValueError(
+                    f"gamma: the {what} {', '.join(own)} are not independent: one of these DOFs is the others measured "
+                    "again, or their sum"
+                )
+        if measured:
+            for i in range(half):
+                # The lower eigenvalue of the products of two rows of norm 1.
+                if 1 - abs(product[i, i + half]) < _DEPENDENT:
+                    raise ValueError(
+                        f"gamma: the {what} {labels[i]} and {labels[i + half]} are the same numbers, noise included: "
+                        "measure both sides of the joint"
+                    )
+
+
+def _normalised(h: ComplexArray, squares: FloatArray) -> ComplexArray:
+    """Return rows of norm 1, shape (rows, n_freq columns), to which every line and column adds alike."""
+    of_columns = np.maximum(np.sqrt(squares.mean(axis=(0, 1))), _TINY)
+    of_lines = np.maximum(np.sqrt((squares / of_columns / of_columns).mean(axis=(1, 2), keepdims=True)), _TINY)
+    flat = (h / of_columns / of_lines).swapaxes(0, 1).reshape(h.shape[1], -1)
+    rows: ComplexArray = flat / np.linalg.norm(flat, axis=1, keepdims=True)
+    return rows
+
+
+def _is_measured(gamma: ComplexArray) -> bool:
+    """Whether there is noise between h_pq and h_qp."""
+    return bool(abs(gamma - gamma.swapaxes(1, 2)).max() > 1e-9 * abs(gamma).max())
+
+
+def check_joint_seen(freq: FloatArray, smooth: ComplexArray, variance: FloatArray) -> None:
+    """Refuse FRFs that are noise only, or that say nothing across the joint.
+
+    Parameters
+    ----------
+    freq : ndarray, shape (n_freq,)
+    smooth : ndarray, shape (n_freq, 2 n, 2 n)
+        Smooth FRFs between joint DOFs j, then k.
+    variance : ndarray, shape (n_freq, 2 n, 2 n)
+        E|e|^2 of the measured ones.
+    """
+    span = f"{freq.min():g} to {freq.max():g} Hz"
+    some = spread_lines(len(freq))
+    smooth, variance = smooth[some], variance[some]
+    n = smooth.shape[1] // 2
+    driving = np.einsum("lpp->lp", smooth)
+    tiny = np.finfo(float).tiny
+    noise = np.sqrt(np.einsum("lpp->lp", variance)) / np.maximum(abs(driving), tiny)
+    level = float(medians(noise.ravel()))
+    if level >= _HIDDEN:
+        raise ValueError(
+            f"gamma consists of noise ({span}: the noise of driving points is {_percent(level)} of what is smooth in "
+            "them): nothing can be identified from it"
+        )
+    size = np.sqrt(abs(driving))
+    across = abs(smooth) / np.maximum(size[:, :, None] * size[:, None, :], tiny)
+    if not (across[:, :n, n:] > ZERO).any() and not (across[:, n:, :n] > ZERO).any():
+        raise ValueError(
+            f"gamma is zero between sides j and k of the joint ({span}): no joint connects them, or DOFs j and k are "
+            "not where they are said to be"
+        )
+    seen = (abs(smooth) ** 2 > _HIDDEN**2 * variance).mean(axis=0) > _SEEN
+    if not seen[:n, n:].any() and not seen[n:, :n].any():
+        raise ValueError(
+            f"gamma between sides j and k of the joint consists of noise ({span}): no joint is seen, or the noise "
+            "hides it"
+        )
+
+
+def check_estimate(found: JointEstimate, level: float, span: str, *, is_level_known: bool) -> None:
+    """Refuse a result that fits nothing, or that fewer equations than parameters give.
+
+    Parameters
+    ----------
+    found : JointEstimate
+    level : float
+        Noise relative to the FRFs.
+    span : str
+        The lines, in words.
+    is_level_known : bool
+        Whether that is known from elsewhere than from the residual.
+    """
+    for group in found.groups:
+        equations, unknowns = 2 * group.fit.equations, group.fit.minimum.x.size
+        if equations < unknowns:
+            raise ValueError(
+                f"gamma gives {equations:.0f} real equations ({span}, without those that no joint fits) for {unknowns} "
+                "parameters of the joint: more lines are needed, or fewer parameters"
+            )
+    ratio = float(np.sqrt(max(found.excess, 0.0)))
+    left = ratio * level
+    if left > _NO_FIT and (ratio > _FAR or not is_level_known):
+        raise ValueError(
+            f"no joint was found that fits gamma ({span}): {_percent(left)} of the FRFs is left: look at the order and "
+            "places of channels (check_frfs), at transform, and at the noise that was said"
+        )
+    variance = np.diagonal(found.covariance)
+    names = [
+        one.name for one, v, x in zip(found.parameters, variance, found.theta, strict=True) if not (v > 0 and x == x)
+    ]
+    if names:
+        raise ValueError(f"gamma does not determine {', '.join(names)} ({span}): no standard error can be given")
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.0f} %" if share < 10 else "far more than 100 %"

@@ -1,0 +1,164 @@
+"""First coordinates of a joint from the compliance of smooth FRFs."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointfrf.frf.bands import in_pieces
+from jointfrf.identification.manifold.coordinates import CoupledJoint, DiagonalJoint, JointCoordinates, terms_of
+from jointfrf.identification.manifold.line_forms import LineForms, minimise_forms
+from jointfrf.identification.manifold.on_manifold import LineData
+from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.kernel.linear_algebra import invert
+from jointfrf.substructuring.compliance import compliance_covariance, joint_compliance
+
+__all__ = ["first_joints", "hidden_share"]
+
+#: Smooth FRFs have about this share of the noise.
+_SMOOTH = 0.2
+#: Lines whose covariance of all entries of C is there at once: n^4 numbers a line.
+_PIECE = 1024
+#: Squares of a start are minimised to this.
+_ROUGH = 0.1
+#: Lines count less from this relative noise of gamma_jk on.
+_HIDDEN = 0.1
+
+
+def first_joints(data: LineData, joint: JointCoordinates) -> list[FloatArray]:
+    """Return coordinates of the joint from the compliance of the smooth FRFs, the likeliest first.
+
+    C = gamma_kk gamma_jk^-1 gamma_jj - gamma_kj of the smooth FRFs on every line, with the covariance that a share of
+    the noise gives it; lines on which noise hides gamma_jk count little.
+    """
+    n, is_diagonal = data.entries.n, isinstance(joint, DiagonalJoint)
+    a = range(n)
+
+    def of_lines(own: slice) -> list[NDArray[Any]]:
+        part = data.on_slice(own)
+        gamma, spread = part.entries.matrix(part.smooth), part.entries.matrix(_variance(part))
+        compliance = joint_compliance(gamma, on_singular="nan")
+        covariance = _SMOOTH**2 * compliance_covariance(gamma, spread, np.eye(2 * n), on_singular="nan")
+        ratio = _hidden(gamma, spread)
+        good = np.isfinite(compliance).all(axis=(1, 2)) & np.isfinite(covariance).all(axis=(1, 2)) & np.isfinite(ratio)
+        variance = covariance.reshape(-1, n, n, n, n)[:, a, a, a, a].real
+        return [good, compliance, variance, ratio] if is_diagonal else [good, compliance, variance, ratio, covariance]
+
+    good, *found = in_pieces(len(data.smooth), of_lines, _PIECE)
+    if not good.any():
+        return []
+    compliance, own, ratio, *covariance = (x[good] for x in found)
+    here = type(joint)(terms_of(joint).on_lines(np.flatnonzero(good)))  # type: ignore[call-arg]
+    threshold = _HIDDEN if np.count_nonzero(ratio < _HIDDEN) > 2 * joint.lower.size else float(np.median(ratio))
+    line_weight = 1 / (1 + (ratio / threshold) ** 8)
+    if isinstance(here, DiagonalJoint):
+        return _diagonal_starts(compliance[:, a, a], own, line_weight, here)
+    assert isinstance(here, CoupledJoint)
+    return _coupled_starts(compliance, covariance[0], own, line_weight, here)
+
+
+def _variance(data: LineData) -> FloatArray:
+    """Return the variance of the entries, 0 where one is not used, shape (n_freq, q)."""
+    w = data.inverse_std
+    return np.where(w > 0, 1 / np.where(w > 0, w, 1) ** 2, 0)
+
+
+def hidden_share(data: LineData) -> FloatArray:
+    """Return the largest relative noise of gamma_jk, of the smooth FRFs, on each line, shape (n_freq,)."""
+    matrix = data.entries.matrix
+
+    def of_lines(own: slice) -> list[FloatArray]:
+        part = data.on_slice(own)
+        return [_hidden(matrix(part.smooth), matrix(_variance(part)))]
+
+    (share,) = in_pieces(len(data.smooth), of_lines)
+    return share
+
+
+def _hidden(gamma: ComplexArray, spread: FloatArray) -> FloatArray:
+    """Return the largest relative noise of gamma_jk on the diagonal of gamma_jk^-1 dgamma_jk, shape (n_freq,)."""
+    n = gamma.shape[-1] // 2
+    inverse = invert(gamma[:, :n, n:], on_singular="nan")
+    squares = abs(inverse) ** 2 @ spread[:, :n, n:]
+    ratio: FloatArray = np.sqrt(np.diagonal(squares, axis1=1, axis2=2).max(axis=1))
+    return ratio
+
+
+def _diagonal_starts(
+    value: ComplexArray, variance: FloatArray, line_weight: FloatArray, joint: DiagonalJoint
+) -> list[FloatArray]:
+    """Fit each DOF's compliance by itself."""
+    n, p = terms_of(joint).n, joint.lower.size
+    information = line_weight[:, None] / np.maximum(variance, np.finfo(float).tiny)
+    mean = (information * value.real).sum(axis=0) / information.sum(axis=0)
+    error = 1 / np.sqrt(information.sum(axis=0))
+    weight = np.zeros((len(value), n, n), np.complex128)
+    weight[:, range(n), range(n)] = information
+    forms = LineForms(value, weight, np.zeros_like(value), np.zeros(len(value)))
+    start = np.zeros(p)
+    start[:n] = np.maximum(mean, error)
+    found = minimise_forms(forms, joint, start).x
+    found[:n] = np.maximum(found[:n], 1e-3 * error)
+    return [found, start]
+
+
+def _coupled_starts(
+    value: ComplexArray, covariance: ComplexArray, own: FloatArray, line_weight: FloatArray, joint: CoupledJoint
+) -> list[FloatArray]:
+    """Fit all entries of C; first values from K* C = 1 by linear least squares, and from the mean of C."""
+    n = terms_of(joint).n
+    a, b = joint.rows, joint.columns
+    size = np.sqrt(np.maximum(np.einsum("lqq->lq", covariance).real, np.finfo(float).tiny))
+    scaled = covariance / (size[:, :, None] * size[:, None, :])
+    q = n * n
+    weight = np.linalg.pinv(scaled + 1e-10 * np.eye(q), hermitian=True) / (size[:, :, None] * size[:, None, :])
+    fold = np.zeros((q, a.size))
+    fold[a * n + b, np.arange(a.size)] = 1
+    fold[b * n + a, np.arange(a.size)] = 1
+    weight = (fold.T @ weight @ fold) * line_weight[:, None, None]
+    mean = ((value + value.swapaxes(1, 2)) / 2)[:, a, b]
+    forms = LineForms(mean, weight, np.zeros_like(mean), np.zeros(len(mean)))
+    starts = [_linear_start(value, own, line_weight, joint), _mean_start(value, own, line_weight, joint)]
+    starts = [start for start in starts if np.isfinite(start).all()]
+    found = (minimise_forms(forms, joint, start, least_gain=_ROUGH) for start in starts)
+    minima = sorted(found, key=lambda one: one.cost)
+    return [found.x for found in minima] + starts
+
+
+def _mean_start(value: ComplexArray, own: FloatArray, line_weight: FloatArray, joint: CoupledJoint) -> FloatArray:
+    """Return the stiffness whose compliance is the weighted mean of Re C, no damping."""
+    w = line_weight / own.max(axis=1)
+    size = np.sqrt(np.median(abs(np.einsum("laa->la", value)), axis=0))
+    scaled = value.real / np.outer(size, size)
+    w = line_weight / (own / size**4).max(axis=1)
+    mean = np.tensordot(w, scaled, 1) / w.sum()
+    k = np.linalg.pinv((mean + mean.T) / 2, hermitian=True) / np.outer(size, size)
+    start = np.zeros(len(terms_of(joint).parameters))
+    of_stiffness = terms_of(joint).kinds == 0
+    start[of_stiffness] = k[terms_of(joint).pairs[of_stiffness, 0], terms_of(joint).pairs[of_stiffness, 1]]
+    return start
+
+
+def _linear_start(value: ComplexArray, own: FloatArray, line_weight: FloatArray, joint: CoupledJoint) -> FloatArray:
+    """Solve K*(theta) C = 1 by weighted linear least squares in units of each DOF: exact without noise."""
+    terms, n = terms_of(joint), terms_of(joint).n
+    size = np.sqrt(np.median(abs(np.einsum("laa->la", value)), axis=0))
+    c = value / np.outer(size, size)
+    root = np.sqrt(line_weight / (own / size**4).max(axis=1))
+    scale = abs(terms.factors).max(axis=1)
+    factors = terms.factors / scale[:, None]
+    columns = []
+    for kind, (a, b) in zip(terms.kinds, terms.pairs, strict=True):
+        column = np.zeros_like(c)
+        column[:, a] = c[:, b]
+        if a != b:
+            column[:, b] = c[:, a]
+        columns.append((column * (root * factors[kind])[:, None, None]).ravel())
+    right = (root[:, None, None] * np.eye(n)).astype(np.complex128).ravel()
+    matrix = np.array(columns).T
+    theta = np.linalg.lstsq(np.r_[matrix.real, matrix.imag], np.r_[right.real, right.imag], rcond=1e-12)[0]
+    units = size[terms.pairs[:, 0]] * size[terms.pairs[:, 1]]
+    start: FloatArray = theta / scale[terms.kinds] / units
+    return start

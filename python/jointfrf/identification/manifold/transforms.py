@@ -1,0 +1,262 @@
+"""From channels to joint DOFs, and what in the channels is not rigid motion."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from jointfrf.channels.point_lines import Interface
+from jointfrf.frf.smoothing import near_squares
+from jointfrf.identification.prepare import as_transform
+from jointfrf.kernel.arguments import ComplexArray, FloatArray
+
+__all__ = [
+    "ChannelModes",
+    "LeftOut",
+    "Transform",
+    "Transforms",
+    "as_transforms",
+    "deformation_compliance",
+    "deformation_variance",
+    "left_out",
+    "modes_of",
+]
+
+#: What a transform may be given as.
+Transform = ArrayLike | Interface
+
+
+class Transforms(NamedTuple):
+    """From channels to joint DOFs j, then k.
+
+    Attributes
+    ----------
+    responses, forces : ndarray, shapes (2 n, m_r), (2 n, m_f)
+    response_modes, force_modes : ndarray, shapes (m_r, 2 n), (m_f, 2 n), or None
+        Rigid motion of the channels, where it is known.
+    geometry : Interface or None
+        Of the responses, where it is known.
+    compliance : ndarray, shape (n,), or None
+        What the sides add to the compliance of the joint DOFs, where that was said.
+    """
+
+    responses: FloatArray
+    forces: FloatArray
+    response_modes: FloatArray | None = None
+    force_modes: FloatArray | None = None
+    geometry: Interface | None = None
+    compliance: FloatArray | None = None
+
+    @property
+    def are_units(self) -> bool:
+        """Whether the channels are the joint DOFs."""
+        return all(
+            t.shape[0] == t.shape[1] == np.count_nonzero(t) and (t.diagonal() == 1).all()
+            for t in (self.responses, self.forces)
+        )
+
+    def gamma(self, h: ComplexArray) -> ComplexArray:
+        """Return FRFs between the joint DOFs, m/N."""
+        return h if self.are_units else self.responses @ h @ self.forces.T
+
+    def variance(self, variance: FloatArray) -> FloatArray:
+        """Return their variance where that of the channels is independent, (m/N)^2."""
+        return variance if self.are_units else self.responses**2 @ variance @ (self.forces**2).T
+
+    def with_modes(self, smooth: ComplexArray) -> Transforms:
+        """Return the same with the rigid modes of plain matrices, as far as smooth FRFs bear them out."""
+        if self.are_units:
+            return self
+        responses, forces = self.response_modes, self.force_modes
+        if responses is None:
+            responses = modes_of(self.responses, smooth)
+        if forces is None:
+            forces = modes_of(self.forces, smooth.swapaxes(1, 2))
+        return self._replace(response_modes=responses, force_modes=forces)
+
+    @property
+    def channels(self) -> tuple[ChannelModes, ChannelModes] | None:
+        """Rigid motion of responses and of forces, where both are known."""
+        if self.response_modes is None or self.force_modes is None:
+            return None
+        return ChannelModes(self.responses, self.response_modes), ChannelModes(self.forces, self.force_modes)
+
+
+def as_transforms(transform: Transform | tuple[Transform, Transform] | None, h: ComplexArray) -> Transforms:
+    """Check the transforms of responses and of forces; one for both, or a pair."""
+    m_r, m_f = h.shape[1:]
+    if transform is None or isinstance(transform, Interface) or not isinstance(transform, tuple):
+        if m_r != m_f:
+            raise ValueError(
+                f"gamma has {m_r} responses and {m_f} forces: transform must be a pair, for responses and for forces"
+            )
+        pair = (transform, transform)
+    elif len(transform) != 2:
+        raise ValueError(f"transform must be one matrix or a pair for responses and forces, not {len(transform)}")
+    else:
+        pair = transform
+    one = pair[0] is pair[1]
+    names = ("transform", "transform") if one else ("transform[0]", "transform[1]")
+    matrices = [
+        as_transform(given.transform if isinstance(given, Interface) else given, m, name)
+        for given, m, name in zip(pair, (m_r, m_f), names, strict=True)
+    ]
+    if one:
+        matrices[1] = matrices[0]
+    if matrices[0].shape[0] != matrices[1].shape[0]:
+        raise ValueError(
+            f"transform must lead to the same DOFs from responses and forces, not to {matrices[0].shape[0]} and "
+            f"{matrices[1].shape[0]}"
+        )
+    known = [given if isinstance(given, Interface) else None for given in pair]
+    compliances = [given.compliance for given in known if given is not None and given.compliance is not None]
+    return Transforms(
+        responses=matrices[0],
+        forces=matrices[1],
+        response_modes=None if known[0] is None else known[0].modes,
+        force_modes=None if known[1] is None else known[1].modes,
+        geometry=known[0],
+        compliance=np.max(compliances, axis=0) if compliances else None,
+    )
+
+
+#: A channel is checked by the others when at least this share of its error stays in its residual.
+_CHECKED = 0.02
+#: Modes found from a matrix alone hold where rigid motion is at least this share of the motion of the channels.
+_RIGID = 0.9
+
+
+class ChannelModes(NamedTuple):
+    """Rigid motion of channels.
+
+    Attributes
+    ----------
+    transform : ndarray, shape (2 n, m)
+        From channels to joint DOFs j, then k.
+    modes : ndarray, shape (m, 2 n)
+        Motion of each channel for a unit of each joint DOF; transform times modes is the unit matrix.
+    """
+
+    transform: FloatArray
+    modes: FloatArray
+
+    @property
+    def residual(self) -> FloatArray:
+        """From the channels to what is not rigid in them, shape (m, m)."""
+        left: FloatArray = np.eye(len(self.modes)) - self.modes @ self.transform
+        return left
+
+    @property
+    def redundancy(self) -> FloatArray:
+        """Share of an error in each channel that stays in its residual, shape (m,); 0 below what can be used."""
+        own = np.diagonal(self.residual)
+        share: FloatArray = np.where(own > _CHECKED, own, 0.0)
+        return share
+
+    def of_side(self, side: int) -> NDArray[np.intp]:
+        """Return the channels that the DOFs of side 0 (j) or 1 (k) are made of."""
+        n = len(self.transform) // 2
+        return np.flatnonzero(self.transform[side * n : (side + 1) * n].any(axis=0))
+
+
+class LeftOut(NamedTuple):
+    """A channel left out.
+
+    Attributes
+    ----------
+    redundancy : float
+        Share of an error of the channel that stays in its residual.
+    change : ndarray, shape (2 n, m)
+        By how much the transform changes.
+    """
+
+    redundancy: float
+    change: FloatArray
+
+
+def left_out(channels: ChannelModes) -> Iterator[LeftOut]:
+    """Leave out one channel after the other that the rest can replace.
+
+    T_(i) = T - t_i (e_i - r_i T) / (1 - r_i t_i), with t_i column i of T and r_i row i of the modes R: least squares
+    without channel i where T is that of all, and T_(i) R = 1 for any T.
+    """
+    share = channels.redundancy
+    for i in np.flatnonzero(share):
+        change = -np.outer(channels.transform[:, i], channels.residual[i]) / share[i]
+        yield LeftOut(float(share[i]), change)
+
+
+def deformation_variance(smooth: ComplexArray, responses: ChannelModes, forces: ChannelModes) -> FloatArray:
+    """Squares of what is not rigid in smooth FRFs of the channels, shape (n_freq, m_r, m_f), (m/N)^2.
+
+    Of responses and of forces, each divided by the redundancy of its channel, so that the mean is that of the errors
+    themselves; the mean over a line and its neighbours. A channel that the others do not check has none.
+    """
+    total = np.zeros(smooth.shape)
+    for residual, share in (
+        (responses.residual @ smooth, responses.redundancy[:, None]),
+        (smooth @ forces.residual.T, forces.redundancy[None, :]),
+    ):
+        total += np.where(share > 0, near_squares(residual) / np.where(share > 0, share, 1), 0)
+    return total
+
+
+def deformation_compliance(
+    h: ComplexArray, noise: FloatArray, responses: ChannelModes, forces: ChannelModes
+) -> FloatArray | None:
+    """Compliance that the sides have between the channels, for forces and motion of each joint DOF.
+
+    Parameters
+    ----------
+    h, noise : ndarray, shape (n_freq, m_r, m_f)
+        FRFs of the channels, m/N, and their variance.
+    responses, forces : ChannelModes
+
+    Returns
+    -------
+    ndarray, shape (n,), or None
+        m/N or rad/(N m), both sides together; None where the channels of a side do not check each other.
+
+    Notes
+    -----
+    FRFs between the channels of one side, less what is rigid in responses and in forces, are a compliance
+    F = (1 - R T) h (1 - R T)^T, averaged over the lines by their noise. Its mean singular value delta is what one
+    channel deforms, noise included: less than that cannot be excluded. Weights t_r and t_f of a DOF give it
+    |t_r| |t_f| delta.
+    """
+    n = len(responses.transform) // 2
+    total = np.zeros(n)
+    for side in (0, 1):
+        rows, columns = responses.of_side(side), forces.of_side(side)
+        count = min(rows.size, columns.size) - n
+        if count < 1:
+            return None
+        left = responses.residual[rows] @ h.real @ forces.residual[columns].T
+        spread = noise[:, rows[:, None], columns]
+        weight = 1 / np.where(np.isfinite(spread), spread, 0).mean(axis=(1, 2))
+        mean = np.tensordot(weight, left, 1) / weight.sum()
+        own = slice(side * n, (side + 1) * n)
+        gains = [np.linalg.norm(channels.transform[own], axis=1) for channels in (responses, forces)]
+        total += gains[0] * gains[1] * np.linalg.svd(mean, compute_uv=False).sum() / count
+    return total
+
+
+def modes_of(transform: FloatArray, smooth: ComplexArray) -> FloatArray | None:
+    """Rigid modes behind a matrix: those of which it is the least-squares inverse, if the channels move like that.
+
+    Parameters
+    ----------
+    transform : ndarray, shape (2 n, m)
+    smooth : ndarray, shape (n_freq, m, k)
+        FRFs of its channels.
+    """
+    if np.linalg.matrix_rank(transform) < len(transform):
+        return None
+    modes: FloatArray = np.asarray(np.linalg.pinv(transform), np.float64)
+    rigid = np.linalg.norm(modes @ (transform @ smooth), axis=(1, 2))
+    whole = np.linalg.norm(smooth, axis=(1, 2))
+    share = np.median(rigid / np.maximum(whole, np.finfo(float).tiny))
+    return modes if abs(share - 1) < 1 - _RIGID else None

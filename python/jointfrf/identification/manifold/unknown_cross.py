@@ -1,0 +1,391 @@
+"""The fit where cross terms of C are unknown: of the joint to the diagonal of C on every line.
+
+On a line the FRFs of a reciprocal structure hold n (2 n + 1) numbers; H, M and the cross terms of C take n (n + 1) and
+n (n - 1)/2 of them. What is left are n equations for the diagonal of C, and n (n - 1)/2 that say that C is symmetric.
+Both follow from C = gamma_kk gamma_jk^-1 gamma_jj - gamma_kj, linearised at the smooth FRFs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
+
+from jointfrf.frf.bands import in_pieces
+from jointfrf.identification.manifold.coordinates import JointCoordinates, terms_of
+from jointfrf.identification.manifold.group_fit import GroupFit, GroupProblem, Misfitting
+from jointfrf.identification.manifold.line_forms import (
+    FormMinimum,
+    LineForms,
+    minimise_forms,
+)
+from jointfrf.identification.manifold.on_manifold import FrfEntries, LineData
+from jointfrf.identification.manifold.starts import hidden_share
+from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.kernel.linear_algebra import invert, solve
+
+__all__ = ["ComplianceLines", "compliance_lines", "fit_unknown_cross"]
+
+#: Lines that are done at once.
+_PIECE = 256
+#: Relative standard deviation that stands for an entry that is not used.
+_UNUSED = 1e4
+#: Part of its variance that a condition keeps when all others are known.
+_OWN_NOISE = 1e-10
+
+
+class ComplianceLines(NamedTuple):
+    """The diagonal of C on every line.
+
+    Attributes
+    ----------
+    value : ndarray, shape (n_freq, n)
+        m/N.
+    covariance : ndarray, shape (n_freq, n, n)
+        E[e e^H] of its noise.
+    squares : ndarray, shape (n_freq,)
+        Squares of the conditions that were used, in units of their noise.
+    apart : ndarray, shape (n_freq, m)
+        The conditions: differences of elements of C that are the same where it is symmetric, m/N.
+    variance : ndarray, shape (n_freq, m)
+        Of their noise.
+    """
+
+    value: ComplexArray
+    covariance: ComplexArray
+    squares: FloatArray
+    apart: ComplexArray
+    variance: FloatArray
+
+
+def compliance_lines(data: LineData) -> tuple[ComplianceLines, ComplianceLines]:
+    """Return the diagonal of C and its covariance, linearised at the smooth FRFs.
+
+    Parameters
+    ----------
+    data : LineData
+
+    Returns
+    -------
+    symmetric, plain : ComplianceLines
+        If C is that of a joint: symmetric where the structure is reciprocal, else the same from gamma_jk and from
+        gamma_kj; and if each cross term is unknown for itself. NaN on a line where gamma_jk of the smooth FRFs is
+        singular.
+
+    Notes
+    -----
+    Noise of C = C(S) + L (gamma - S) R with L = (gamma_kk gamma_jk^-1, -1), R = (1, -gamma_jk^-1 gamma_jj) of the
+    smooth FRFs S; by the best linear estimate where conditions are correlated with the diagonal.
+    """
+
+    def of_lines(own: slice) -> tuple[NDArray[Any], ...]:
+        symmetric, plain = _of_piece(data.on_slice(own))
+        return *symmetric, *plain
+
+    with np.errstate(all="ignore"):
+        both = in_pieces(len(data.measured), of_lines, _PIECE)
+    each = len(ComplianceLines._fields)
+    return ComplianceLines(*both[:each]), ComplianceLines(*both[each:])
+
+
+def _of_piece(data: LineData) -> tuple[ComplianceLines, ComplianceLines]:
+    """Return both for some lines."""
+    n, reciprocal = data.entries.n, data.entries.reciprocal
+    value, slope = _linear(data)
+    # The second C is the transpose of the first where the structure is reciprocal.
+    a, b = np.triu_indices(n, 1) if reciprocal else np.nonzero(~np.eye(n, dtype=bool))
+    d = np.arange(n)
+    diagonal, first = d * (n + 1), a * n + b
+    second = b * n + a if reciprocal else n * n + first
+    if reciprocal:
+        rows = [(diagonal, None), (first, second)]
+    else:
+        rows = [(diagonal, None), (diagonal, n * n + diagonal), (first, second)]
+    values = [value[:, i] - (0 if j is None else value[:, j]) for i, j in rows]
+    slopes = [slope[:, i] - (0 if j is None else slope[:, j]) for i, j in rows]
+    noise = _coloured(np.concatenate(slopes, axis=1), data)
+    apart, always = np.concatenate(values[1:], axis=1), 0 if reciprocal else n
+    return (
+        _conditioned(values[0], noise[:, :n], apart, noise[:, n:]),
+        _conditioned(values[0], noise[:, :n], apart[:, :always], noise[:, n : n + always]),
+    )
+
+
+def _conditioned(
+    value: ComplexArray, noise: ComplexArray, apart: ComplexArray, noise_apart: ComplexArray
+) -> ComplianceLines:
+    """Return the best linear estimate of values, given others that are zero but for their noise."""
+    covariance = noise @ noise.conj().swapaxes(1, 2)
+    size = np.linalg.norm(noise_apart, axis=2)
+    if apart.shape[1] == 0:
+        return ComplianceLines(value, covariance, np.zeros(len(value)), apart, size**2)
+    scaled, noise_apart = apart / size, noise_apart / size[:, :, None]
+    adjoint = noise_apart.conj().swapaxes(1, 2)
+    across = noise @ adjoint
+    inner = noise_apart @ adjoint + _OWN_NOISE * np.eye(apart.shape[1])
+    right = np.concatenate([scaled[:, :, None], across.conj().swapaxes(1, 2)], axis=2)
+    solved = solve(inner, right, on_singular="nan")
+    correction = across @ solved
+    squares = (scaled.conj() * solved[:, :, 0]).real.sum(axis=1)
+    return ComplianceLines(value - correction[:, :, 0], covariance - correction[:, :, 1:], squares, apart, size**2)
+
+
+def _linear(data: LineData) -> tuple[ComplexArray, ComplexArray]:
+    """Return C of the measured FRFs to first order, and its derivatives by their entries: all its entries.
+
+    Shapes (n_freq, n^2) and (n_freq, n^2, q); without reciprocity those of C from gamma_kj follow.
+    """
+    n = data.entries.n
+    gamma = data.entries.matrix(data.smooth)
+    change = data.entries.matrix(data.measured) - gamma
+    value, slope = _compliance(gamma, change, data.entries)
+    if data.entries.reciprocal:
+        return value, slope
+    # With sides exchanged gamma_jk and gamma_kj are, and C is the same.
+    turned = np.r_[n : 2 * n, 0:n]
+    entries = data.entries._replace(rows=turned[data.entries.rows], columns=turned[data.entries.columns])
+    other = _compliance(gamma[:, turned[:, None], turned], change[:, turned[:, None], turned], entries)
+    return np.concatenate([value, other[0]], axis=1), np.concatenate([slope, other[1]], axis=1)
+
+
+def _compliance(gamma: ComplexArray, change: ComplexArray, entries: FrfEntries) -> tuple[ComplexArray, ComplexArray]:
+    """Return C to first order in a change of the FRFs, and its derivatives by their entries."""
+    n, n_freq = entries.n, len(gamma)
+    jj, jk, kj, kk = gamma[:, :n, :n], gamma[:, :n, n:], gamma[:, n:, :n], gamma[:, n:, n:]
+    inverse = invert(jk, on_singular="nan")
+    one = np.broadcast_to(np.eye(n), jk.shape)
+    left = np.concatenate([kk @ inverse, -one], axis=2)
+    right = np.concatenate([one, -inverse @ jj], axis=1)
+    value = left[:, :, :n] @ jj - kj + left @ change @ right
+    p, q = entries.rows, entries.columns
+    by_entry = left[:, :, None, p] * right[:, q].swapaxes(1, 2)[:, None]
+    if entries.reciprocal:
+        by_entry += np.where(p != q, left[:, :, None, q] * right[:, p].swapaxes(1, 2)[:, None], 0)
+    return value.reshape(n_freq, n * n), by_entry.reshape(n_freq, n * n, -1)
+
+
+def _coloured(slope: ComplexArray, data: LineData) -> ComplexArray:
+    """Return derivatives by independent noise of unit variance from those by entries."""
+    std = np.where(data.used, 1 / np.where(data.used, data.inverse_std, 1), _UNUSED * abs(data.smooth))
+    slope = slope * std[:, None, :]
+    if data.correlation is None:
+        return slope
+    # Entries over their deviation are L^-1 times independent noise.
+    for line, triangle in enumerate(data.correlation):
+        slope[line] = solve_triangular(triangle, slope[line].T, trans="T", lower=True, check_finite=False).T
+    return slope
+
+
+#: Lines count less from this relative noise of gamma_jk on.
+_HIDDEN = 0.3
+#: A residual larger than this is not noise: C varies between lines, or is not symmetric.
+_MISFIT = 1.15
+#: A mean square is told from 1 at this many standard deviations.
+_SIGMA = 4.0
+#: Squares of the mean over lines, in units of its noise, above which it is not zero.
+_CERTAIN = 16.0
+#: Steps for the scatter between lines at most; they end when the coordinates move by less than this many standard
+#: errors.
+_STEPS, _SETTLED = 30, 0.02
+#: Halvings of the range of a variance.
+_HALVINGS = 50
+
+
+class _Lines(NamedTuple):
+    """What lines say of the diagonal of C.
+
+    Attributes
+    ----------
+    of : ComplianceLines
+    known : ndarray of bool, shape (n_freq, n)
+        DOFs inside their bands.
+    weight : ndarray, shape (n_freq,)
+        Near 1; near 0 where noise hides gamma_jk.
+    """
+
+    of: ComplianceLines
+    known: NDArray[np.bool_]
+    weight: FloatArray
+
+    def forms(self, variance: FloatArray) -> LineForms:
+        """Return the quadratic forms where C varies between lines with this variance, shape (n,), beside its noise."""
+        n = self.known.shape[1]
+        diagonal = np.arange(n)
+        both = self.known[:, :, None] & self.known[:, None, :]
+        covariance: ComplexArray = np.where(both, self.of.covariance, 0)
+        covariance[:, diagonal, diagonal] += np.where(self.known, variance, 1)
+        size = np.sqrt(np.einsum("laa->la", covariance).real)
+        outer = size[:, :, None] * size[:, None, :]
+        inverse = invert(covariance / outer, on_singular="nan") / outer
+        information = np.where(both, self.weight[:, None, None] * inverse, 0).astype(np.complex128)
+        value = self.of.value
+        return LineForms(value, information, np.zeros_like(value), np.zeros(len(value)))
+
+
+class _Weighted(NamedTuple):
+    """The minimum, with the forms and the standard deviation between lines, m/N, that belong to it."""
+
+    minimum: FormMinimum
+    forms: LineForms
+    scatter: FloatArray | None
+    steps: int
+    converged: bool
+
+
+def fit_unknown_cross(problem: GroupProblem, starts: Iterable[FloatArray]) -> GroupFit:
+    """Fit the diagonal of C by weighted least squares; lines that vary by more than their noise count more alike.
+
+    Parameters
+    ----------
+    problem : GroupProblem
+        Its joint has no cross terms, and all cross terms of C are unknown.
+    starts : iterable of ndarray, shape (p,)
+        Coordinates of the joint.
+
+    Notes
+    -----
+    The symmetry of C is used unless the FRFs contradict it. Where the residual exceeds the noise, C is taken to vary
+    from line to line beside its noise, by as much as the median of the residuals shows: otherwise the lines of least
+    noise, often those of an antiresonance, would decide alone what the constant is. It is a mean of C_dd: where no
+    joint fits, it need not regenerate the FRFs.
+    """
+    joint = problem.joint
+    lines, is_symmetric = _lines(problem)
+    by_noise = lines.forms(np.zeros(terms_of(joint).n))
+    best = _best_of([minimise_forms(by_noise, joint, start) for start in [*starts, _middle(lines, joint)]])
+    equations = float((lines.weight[:, None] * lines.known).sum())
+    possible = float(lines.known.sum())
+    found = _Weighted(best, by_noise, None, 1, True)
+    degrees = max(equations - best.x.size / 2, 1.0)
+    if best.cost / degrees > max(_MISFIT**2, 1 + _SIGMA / np.sqrt(degrees)):
+        found = _with_scatter(lines, joint, best.x)
+    told = Misfitting(best.cost, is_symmetric, found.scatter, int(np.count_nonzero(lines.weight < 0.5)))
+    return GroupFit(
+        found.minimum, found.forms, lines.weight > 0, equations, possible, found.steps, found.converged, told
+    )
+
+
+def _lines(problem: GroupProblem) -> tuple[_Lines, bool]:
+    """Return the lines, and whether C is symmetric."""
+    data = problem.data
+    n = data.entries.n
+    known = ~problem.unknown.reshape(-1, n, n)[:, range(n), range(n)]
+    found, plain = compliance_lines(data)
+    weight = _weight(hidden_share(data), found, 2 * problem.joint.lower.size)
+    found = _finite(found)
+    if _are_zero(found, weight):
+        return _Lines(found, known, weight), True
+    return _Lines(_finite(plain), known, weight), False
+
+
+def _are_zero(found: ComplianceLines, weight: FloatArray) -> bool:
+    """Whether the conditions are zero but for noise, on lines and in their means over all lines."""
+    count = float(weight.sum()) * found.apart.shape[1]
+    if count == 0:
+        return True
+    mean_square = float((weight * found.squares).sum()) / count
+    by_line = mean_square > max(_MISFIT**2, 1 + _SIGMA / np.sqrt(count))
+    return not by_line and bool(_mean_squares(found, weight).max() < _CERTAIN)
+
+
+def _mean_squares(found: ComplianceLines, weight: FloatArray) -> FloatArray:
+    """Return squares of the mean of each condition over all lines, in units of its noise."""
+    w = weight[:, None] / np.maximum(found.variance, np.finfo(float).tiny)
+    squares: FloatArray = abs((w * found.apart).sum(axis=0)) ** 2 / np.maximum(w.sum(axis=0), np.finfo(float).tiny)
+    return squares
+
+
+def _weight(hidden: FloatArray, found: ComplianceLines, least: int) -> FloatArray:
+    """Return weights of lines that fall off where noise hides gamma_jk; half the lines count where it does on most."""
+    good = np.isfinite(found.value).all(axis=1) & np.isfinite(found.covariance).all(axis=(1, 2))
+    good &= np.isfinite(found.squares) & np.isfinite(hidden) & np.isfinite(found.variance).all(axis=1)
+    if not good.any():
+        raise np.linalg.LinAlgError("gamma_jk is singular on all lines")
+    few = np.count_nonzero(hidden[good] < _HIDDEN) < least
+    threshold = float(np.median(hidden[good])) if few else _HIDDEN
+    with np.errstate(over="ignore"):
+        weight: FloatArray = np.where(good, 1 / (1 + (np.where(good, hidden, 0) / threshold) ** 8), 0)
+    return weight
+
+
+def _finite(found: ComplianceLines) -> ComplianceLines:
+    """Return the lines with numbers in those that are not finite: they weigh nothing."""
+    value, covariance, squares, apart = (np.where(np.isfinite(x), x, 0) for x in found[:4])
+    return ComplianceLines(value, covariance, squares, apart, np.where(np.isfinite(found.variance), found.variance, 1))
+
+
+def _middle(lines: _Lines, joint: JointCoordinates) -> FloatArray:
+    """Return the stiffness of the median of C, no damping."""
+    n = terms_of(joint).n
+    start = np.zeros(joint.lower.size)
+    for d in range(n):
+        seen = lines.known[:, d] & (lines.weight > 0.5)
+        start[d] = np.median(lines.of.value[seen if seen.any() else slice(None), d].real)
+    return start
+
+
+def _best_of(minima: list[FormMinimum]) -> FormMinimum:
+    return min(minima, key=lambda one: one.cost)
+
+
+def _with_scatter(lines: _Lines, joint: JointCoordinates, start: FloatArray) -> _Weighted:
+    """Fit with the scatter between lines in their weights, and find it anew, until nothing moves."""
+    x = start
+    variance = _variance_between_lines(lines, joint, x)
+    for step in range(1, _STEPS + 1):
+        forms = lines.forms(variance)
+        best = _best_of([minimise_forms(forms, joint, one) for one in (x, _middle(lines, joint))])
+        change, x = best.x - x, best.x
+        converged = bool(np.sqrt(abs(2 * (change @ best.information @ change))) < _SETTLED * np.sqrt(x.size))
+        if converged and step > 1:
+            break
+        # The mean of both: by itself a scatter that is too large is followed by one that is too small.
+        variance = (variance + _variance_between_lines(lines, joint, x)) / 2
+    return _Weighted(best, forms, np.sqrt(variance), step, converged)
+
+
+def _variance_between_lines(lines: _Lines, joint: JointCoordinates, x: FloatArray) -> FloatArray:
+    """Return the variance of the diagonal of C between lines, beside its noise, shape (n,).
+
+    With it the squares of the residual are those of noise in the median over lines, each by its weight: it takes no
+    account of lines that say little, nor of the size of the largest residuals.
+    """
+    squares = abs(_residual(lines, joint, x)) ** 2
+    noise = np.einsum("laa->la", lines.of.covariance).real
+    return np.array(
+        [
+            _beside_noise(squares[own, d], noise[own, d], lines.weight[own])
+            for d, own in enumerate((lines.known & (lines.weight > 0)[:, None]).T)
+        ]
+    )
+
+
+def _beside_noise(squares: FloatArray, noise: FloatArray, weight: FloatArray) -> float:
+    """Return the variance beside that of the noise that explains the weighted median of squares."""
+    if squares.size == 0:
+        return 0.0
+    # Squares of circular noise are exponential: their median is ln 2 of their mean.
+    low, high = 0.0, float(squares.max()) / np.log(2)
+    for _ in range(_HALVINGS):
+        middle = (low + high) / 2
+        variance = noise + middle
+        if _weighted_median(squares / variance, weight / variance) > np.log(2):
+            low = middle
+        else:
+            high = middle
+    return 0.0 if low == 0 else high
+
+
+def _weighted_median(values: FloatArray, weight: FloatArray) -> float:
+    """Return the value below which half of the weight lies."""
+    order = np.argsort(values)
+    share = np.cumsum(weight[order])
+    return float(values[order][np.searchsorted(share, share[-1] / 2)])
+
+
+def _residual(lines: _Lines, joint: JointCoordinates, x: FloatArray) -> ComplexArray:
+    residual: ComplexArray = np.where(lines.known, lines.of.value - joint.compliance(x), 0)
+    return residual

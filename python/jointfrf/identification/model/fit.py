@@ -1,0 +1,309 @@
+"""From a prepared problem to numbers: starts, minimum, noise once more, covariance, tests."""
+
+from __future__ import annotations
+
+import itertools
+import warnings
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from jointfrf.errors import IllConditionedWarning
+from jointfrf.frf.noise_model import NoiseModel
+from jointfrf.frf.smoothing import pieces
+from jointfrf.identification.line_starts import LineCompliance, from_lines, interface_compliance
+from jointfrf.identification.minimise import Minimum, inverse_information, minimise
+from jointfrf.identification.model.likelihood import Likelihood
+from jointfrf.identification.model.prediction import Prediction
+from jointfrf.identification.model.starts import ranked_trials, refined
+from jointfrf.identification.noise import noise_about
+from jointfrf.identification.parameters import ParameterVector
+from jointfrf.identification.profile import ProfileIntervals
+from jointfrf.identification.residual_test import ResidualTest, check_residual
+from jointfrf.kernel.arguments import ComplexArray, FloatArray
+
+__all__ = ["FoundModel", "ModelProblem", "OpenDirection", "fit_assembly", "open_directions"]
+
+#: A start is good whose minimum leaves a residual below this many times the noise.
+_GOOD = 1.1
+#: Starts that are followed to their minimum at most.
+_FOLLOWED = 4
+#: Reductions of the models are extended at most so many times.
+_REFINED = 3
+
+
+@dataclass(frozen=True)
+class ModelProblem:
+    """A fit, ready to be computed.
+
+    Attributes
+    ----------
+    prediction : Prediction
+    vector : ParameterVector
+    freq_hz : ndarray, shape (n_freq,)
+    measured : ndarray, shape (n_freq, n_o, n_i)
+        m/N; NaN where nothing is measured.
+    variance : ndarray, shape (n_freq, n_o, n_i)
+        E|e|^2, inf where nothing is measured.
+    smooth : ndarray, shape (n_freq, n_o, n_i)
+        Smooth FRFs.
+    inflation : float
+        Lines that carry the noise of one independent line.
+    noise : NoiseModel or None
+        None where the noise was told.
+    is_assumed : bool
+        Whether the level of the noise follows from the residual.
+    joint_channels : pair of list of int, or None
+        Responses and forces at the joint DOFs j, then k, where all are measured.
+    compliance_start : callable or None
+        Returns values of the joint from the compliance fit, or None.
+    tested : ndarray, shape (n_freq, n_o, n_i), optional
+        E|e|^2 found without the models, which the residual is compared with; `variance` by default.
+    """
+
+    prediction: Prediction
+    vector: ParameterVector
+    freq_hz: FloatArray
+    measured: ComplexArray
+    variance: FloatArray
+    smooth: ComplexArray
+    inflation: float
+    noise: NoiseModel | None
+    is_assumed: bool
+    joint_channels: tuple[list[int], list[int]] | None
+    compliance_start: Callable[[], FloatArray | None]
+    tested: FloatArray | None = None
+
+    @property
+    def likelihood(self) -> Likelihood:
+        """The likelihood for this variance."""
+        return Likelihood.of_variance(self.prediction, self.vector, self.measured, self.variance, self.inflation)
+
+
+class FoundModel(NamedTuple):
+    """Result of `fit_assembly`.
+
+    Attributes
+    ----------
+    problem : ModelProblem
+        With the noise used in the end.
+    minimum : Minimum
+    values : ndarray
+        Of all parameters.
+    covariance : ndarray, shape (p, p)
+        Of the values of the free parameters.
+    intervals : ProfileIntervals
+    predicted : ndarray, shape (n_freq, n_o, n_i)
+    residual : ndarray, shape (n_freq, n_o, n_i)
+        Over the standard deviation of the noise; NaN where nothing is measured.
+    test : ResidualTest
+    directions : tuple of OpenDirection
+    other : float
+        Squares by which the next lowest minimum of another start is higher; inf where none was followed.
+    """
+
+    problem: ModelProblem
+    minimum: Minimum
+    values: FloatArray
+    covariance: FloatArray
+    intervals: ProfileIntervals
+    predicted: ComplexArray
+    residual: ComplexArray
+    test: ResidualTest
+    directions: tuple[OpenDirection, ...]
+    other: float
+
+
+def fit_assembly(problem: ModelProblem) -> FoundModel:
+    """Fit all free parameters by maximum likelihood."""
+    with warnings.catch_warnings(), np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+        warnings.simplefilter("ignore", IllConditionedWarning)
+        minimum, other = _lowest(problem)
+        for _ in range(_REFINED):
+            if not problem.prediction.refine(problem.vector, problem.vector.to_values(minimum.x)):
+                break
+            minimum = minimise(problem.likelihood, minimum.x)
+        for _ in range(2 if problem.is_assumed else 1):
+            changed = _with_noise_of_model(problem, minimum)
+            if changed is None:
+                break
+            problem = changed
+            minimum = minimise(problem.likelihood, minimum.x)
+        return _judged(problem, minimum, other)
+
+
+def _ratio(likelihood: Likelihood, minimum: Minimum, inflation: float) -> float:
+    """Return the residual over the noise."""
+    squares = minimum.cost - float((likelihood.vector.pulls(minimum.x) ** 2).sum())
+    count = float(likelihood.used.sum())
+    return float(np.sqrt(squares * inflation / max(2 * count - minimum.x.size, 1.0)))
+
+
+def _lowest(problem: ModelProblem) -> tuple[Minimum, float]:
+    """Return the lowest minimum of several starts, and by how much the next one is higher."""
+    likelihood, vector = problem.likelihood, problem.vector
+    given: list[FloatArray] = []
+    found: list[Minimum] = []
+    for values in itertools.chain(_values_of_lines(problem), [vector.values]):
+        given.append(values)
+        found.append(minimise(likelihood, vector.to_coordinates(values)))
+        if _ratio(likelihood, found[-1], problem.inflation) < _GOOD:
+            return found[-1], np.inf
+    trials = ranked_trials(likelihood, given)
+    for x in itertools.islice(refined(likelihood, trials), _FOLLOWED):
+        found.append(minimise(likelihood, x))
+        if _ratio(likelihood, found[-1], problem.inflation) < _GOOD and not problem.is_assumed:
+            break
+    best = min(found, key=lambda one: one.cost)
+    apart = [one.cost - best.cost for one in found if abs(one.x - best.x).max(initial=0) > 0.1 and one.cost > best.cost]
+    return best, min(apart, default=np.inf)
+
+
+def _values_of_lines(problem: ModelProblem) -> Iterator[FloatArray]:
+    """Yield values of all parameters by the joint of single lines, without and with the models; by the compliance fit.
+
+    The first and the last where the FRFs between all joint DOFs were measured.
+    """
+    vector, prediction = problem.vector, problem.prediction
+    joint, omega = prediction.whole.joint, prediction.omega
+    own, at = vector.places_of("joint"), problem.joint_channels
+    lines: list[Callable[[], LineCompliance | None]] = []
+    if at is not None:
+        lines.append(lambda: interface_compliance(problem.smooth, problem.variance, at))
+    if np.isfinite(problem.measured).all():
+        lines.append(lambda: prediction.joint_compliance(vector, problem.smooth, problem.variance))
+
+    def of_lines(found: LineCompliance | None) -> FloatArray | None:
+        return None if found is None else from_lines(joint, omega, found)
+
+    for values_of in (*(lambda one=one: of_lines(one()) for one in lines), problem.compliance_start):
+        values = values_of()
+        if values is not None:
+            free = np.array([vector.all[i].is_free for i in own])
+            whole = vector.values.copy()
+            whole[own] = np.where(free, values, whole[own])
+            yield whole
+
+
+def _with_noise_of_model(problem: ModelProblem, minimum: Minimum) -> ModelProblem | None:
+    """Return the problem with noise about fitted FRFs where these fit, or of the level of the residual."""
+    likelihood = problem.likelihood
+    ratio = _ratio(likelihood, minimum, problem.inflation)
+    if problem.is_assumed:
+        return None if abs(ratio - 1) < 1e-3 else replace(problem, variance=problem.variance * ratio**2)
+    noise = problem.noise
+    if noise is None or noise.source != "residual" or ratio > _GOOD or noise.coherence_factor.any():
+        return None
+    predicted = problem.prediction.frfs(problem.vector, problem.vector.to_values(minimum.x))
+    parts = [noise.relative**2 * abs(h) ** 2 + noise.floor**2 for h in (predicted, problem.smooth)]
+    usable = np.isfinite(problem.variance) & (parts[0] > 0) & (parts[1] > 0)
+    share = np.where(usable, parts[0] / np.where(usable, parts[1], 1), 1)
+    tested = problem.variance * share
+    in_pieces = len(pieces(np.argsort(problem.freq_hz))) > 1
+    variance = tested if in_pieces else _about(problem, noise, predicted)
+    return replace(problem, variance=variance, tested=tested, smooth=predicted)
+
+
+def _about(problem: ModelProblem, noise: NoiseModel, predicted: ComplexArray) -> FloatArray:
+    """Return E|e|^2 by what measured FRFs differ from fitted ones, relative part and floor by entry.
+
+    Smooth FRFs are off at antiresonances, which looks like a floor and hides what small FRFs say.
+    """
+    used = np.isfinite(problem.variance).all(axis=0)
+    usual, outlying = noise.line_level, noise.line_factor
+    squares = np.asarray(abs((problem.measured - predicted)[:, used].T) ** 2 / usual, float)
+    size, good = np.asarray(abs(predicted[:, used].T) ** 2, float), outlying == 1
+    relative, floor = noise_about(squares[:, good], size[:, good])
+    variance = np.full(predicted.shape, np.inf)
+    variance[:, used] = ((relative[:, None] * size + floor[:, None]) * usual * outlying).T
+    return variance
+
+
+def _judged(problem: ModelProblem, minimum: Minimum, other: float) -> FoundModel:
+    """Return covariance, intervals and tests at a minimum."""
+    likelihood, vector = problem.likelihood, problem.vector
+    values = vector.to_values(minimum.x)
+    predicted = problem.prediction.frfs(vector, values)
+    tested = problem.variance if problem.tested is None else problem.tested
+    std = np.sqrt(np.where(likelihood.used, tested, np.nan))
+    residual = (likelihood.measured - predicted) / std
+    test = check_residual(
+        residual, problem.freq_hz, vector.pulls(minimum.x),
+        parameters=minimum.x.size, inflation=problem.inflation, is_told=problem.noise is None,
+    )  # fmt: skip
+    factor = max(1.0, test.ratio**2) if test.ratio > 1 + 3 * test.sigma else 1.0
+    own = inverse_information(minimum.information)
+    slope = vector.slope(minimum.x)
+    covariance = own * factor * np.outer(slope, slope)
+    return FoundModel(
+        problem, minimum, values, covariance, ProfileIntervals(likelihood, minimum, own, factor), predicted, residual,
+        test, open_directions(vector, minimum.x, minimum.information), other,
+    )  # fmt: skip
+
+
+#: A direction is open where moving its parameters by this share, or by a standard deviation of their prior, changes
+#: -2 log likelihood by less than 1.
+_SHARE = 0.3
+#: Components below this part of the largest are not named.
+_NAMED = 0.2
+
+
+class OpenDirection(NamedTuple):
+    """A combination of parameters that the FRFs hardly change with.
+
+    Attributes
+    ----------
+    parts : tuple of (str, float)
+        Name of each parameter, and by how much of its value it changes, the largest first.
+    std : float
+        Standard deviation of the combination from the FRFs alone, in units of `parts`; inf where they say nothing.
+    is_held_by_prior : bool
+        Whether priors hold it.
+    """
+
+    parts: tuple[tuple[str, float], ...]
+    std: float
+    is_held_by_prior: bool
+
+
+def open_directions(vector: ParameterVector, x: FloatArray, information: FloatArray) -> tuple[OpenDirection, ...]:
+    """Return the directions that the FRFs do not hold.
+
+    Parameters
+    ----------
+    vector : ParameterVector
+    x : ndarray, shape (p,)
+        Coordinates found.
+    information : ndarray, shape (p, p)
+        Half of the second derivatives of -2 log likelihood with priors, in coordinates.
+
+    Notes
+    -----
+    Eigenvectors of the information of the FRFs alone, in units of a share of each value, or of its prior.
+    """
+    values, slope = vector.to_values(x)[vector.free], vector.slope(x)
+    of_priors = vector.pull_slopes(x)
+    of_frfs = information - np.diag(of_priors**2)
+    std = np.array([one.std or np.inf for one in vector.fitted])
+    unit = np.minimum(np.where(values == 0, np.inf, _SHARE * abs(values)), std)
+    unit = np.where(np.isfinite(unit), unit, 1.0) / np.maximum(slope, np.finfo(float).tiny)
+    value, turned = np.linalg.eigh(of_frfs * np.outer(unit, unit))
+    told = []
+    for size, direction in zip(value, turned.T, strict=True):
+        if size >= 1:
+            continue
+        largest = abs(direction).max()
+        change = direction * unit * slope / np.where(values == 0, 1, abs(values))
+        change = change * np.sign(direction[abs(direction).argmax()])
+        named = [i for i in np.argsort(-abs(direction)) if abs(direction[i]) > _NAMED * largest]
+        by_prior = float(((direction * unit * of_priors) ** 2).sum())
+        told.append(
+            OpenDirection(
+                tuple((vector.fitted[i].name, float(change[i])) for i in named),
+                float(1 / np.sqrt(size)) if size > 0 else float("inf"),
+                by_prior + max(size, 0) > 1 / 9,
+            )
+        )
+    return tuple(told)

@@ -1,0 +1,387 @@
+"""FRFs of an assembly between its channels, and their derivatives by every parameter."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointfrf.identification.line_starts import LineCompliance
+from jointfrf.identification.model.assembly import (
+    Assembly,
+    Attachment,
+    assembly_connection,
+    attachment_factors,
+    places_of,
+)
+from jointfrf.identification.model.reduced import ReducedSlope, ReducedSubstructure, SubstructureState, range_of
+from jointfrf.identification.model.substructure import Substructure, Unknown
+from jointfrf.identification.parameters import FitParameter, ParameterOrigin, ParameterVector, joint_vector
+from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.kernel.linear_algebra import invert
+from jointfrf.laws.law_joint import Connection
+from jointfrf.substructuring.connection import connect, connection_forces
+
+__all__ = ["Prediction", "parameter_vector"]
+
+
+class _Open(NamedTuple):
+    """FRFs before the substructures are connected: they change with the models only.
+
+    Attributes
+    ----------
+    h : ndarray, shape (n_freq, m, m)
+        Of all DOFs that matter, m/N.
+    free : ndarray, shape (n_freq, n_o, n_i)
+        Of the channels.
+    to_out, to_in : ndarray, shapes (n_freq, n_o, q), (n_freq, q, n_i)
+        From connections to responses, from forces to connections.
+    between : ndarray, shape (n_freq, q, q)
+        Across the connections.
+    """
+
+    h: ComplexArray
+    free: ComplexArray
+    to_out: ComplexArray
+    to_in: ComplexArray
+    between: ComplexArray
+
+
+class _Coupled(NamedTuple):
+    """FRFs, and what their derivatives are made of.
+
+    Attributes
+    ----------
+    y : ndarray, shape (n_freq, n_o, n_i)
+        Without gains, m/N.
+    w : ndarray, shape (n_freq, q, q)
+        Forces of the connections by the motions across them.
+    across_out, across_in : ndarray, shapes (n_freq, n_o, q), (n_freq, q, n_i)
+        dY = -across_out dT across_in.
+    """
+
+    y: ComplexArray
+    w: ComplexArray
+    across_out: ComplexArray
+    across_in: ComplexArray
+
+
+class Prediction:
+    """The FRFs of an assembly as a function of all its parameters.
+
+    Parameters
+    ----------
+    whole : Assembly
+    freq_hz : ndarray, shape (n_freq,)
+    responses, forces : sequence of str
+        DOFs ``"A/..."``, ``"B/..."`` of the channels.
+    """
+
+    def __init__(self, whole: Assembly, freq_hz: FloatArray, responses: Sequence[str], forces: Sequence[str]) -> None:
+        self.whole, self.freq_hz, self.omega = whole, freq_hz, 2 * np.pi * freq_hz
+        self.places = places_of(whole, responses, forces)
+        self.responses, self.forces = self.places.at(responses), self.places.at(forces)
+        self._last: tuple[tuple[SubstructureState, ...], _Open] | None = None
+        self.sides = (
+            ReducedSubstructure("A", whole.a, freq_hz, self.places.a),
+            ReducedSubstructure("B", whole.b, freq_hz, self.places.b),
+        )
+
+    def joint_stiffness(self) -> FloatArray:
+        """Return the median over the lines of |(H_jj + H_kk)_dd|^-1, the size of stiffness that FRFs can show."""
+        n = len(self.whole.joint.dofs)
+        size = [abs(side.at(side.part.nominal).h[:, range(n), range(n)]) for side in self.sides]
+        found: FloatArray = np.median(1 / (size[0] + size[1]), axis=0)
+        return found
+
+    def joint_compliance(
+        self, vector: ParameterVector, smooth: ComplexArray, variance: FloatArray
+    ) -> LineCompliance | None:
+        """Return the compliance of the joint on each line by itself, all else being as believed.
+
+        Parameters
+        ----------
+        vector : ParameterVector
+        smooth, variance : ndarray, shape (n_freq, n_o, n_i)
+            Smooth FRFs, and E|e|^2 of the measured ones; inf for those that are zero by symmetry.
+
+        Returns
+        -------
+        LineCompliance or None
+            None where there are fewer responses or forces than joint DOFs.
+
+        Notes
+        -----
+        Y = H_oi - H_oj W H_ji with W = (C + H_jj)^-1, j being the motions across the joint: by least squares, rows and
+        columns weighted by their noise.
+        """
+        n = len(self.whole.joint.dofs)
+        if min(smooth.shape[1:]) < n:
+            return None
+        link, states = self._parts(vector, vector.values)
+        h, e, rest = self._open(link, states).h, link.pattern[:, :n], slice(n, None)
+        if link.pattern.shape[1] > n:  # masses and attachments
+            h = connect(h, Connection(link.pattern[:, rest], link.s[:, rest, rest], link.t[:, rest, rest]), None, "nan")
+        gains, noise = self._gains(vector, vector.values), np.where(np.isfinite(variance), variance, 0)
+        taken = (h[:, self.responses][:, :, self.forces] - smooth / gains) * np.isfinite(variance)
+        row, column = (_weights(noise, axis) for axis in (2, 1))
+        with np.errstate(all="ignore"):
+            good = np.asarray(np.isfinite(h).all(axis=(1, 2)))[:, None, None]
+            left = np.linalg.pinv(np.where(good, h[:, self.responses] @ e * row, 0)) * row.swapaxes(1, 2)
+            right = column.swapaxes(1, 2) * np.linalg.pinv(np.where(good, e.T @ h[:, :, self.forces] * column, 0))
+            back = invert(left @ taken @ right, on_singular="nan")
+            of_rows, of_columns = back @ left, right @ back
+            spread = np.einsum("ldp,lpq,lqd->ld", abs(of_rows) ** 2, noise, abs(of_columns) ** 2, optimize=True)
+        return LineCompliance(back - e.T @ h @ e, np.asarray(spread, float))
+
+    def of_joint(
+        self, vector: ParameterVector, values: FloatArray, lines: NDArray[np.intp]
+    ) -> Callable[[FloatArray], ComplexArray]:
+        """Return the FRFs of some lines as a function of values of which only those of the joint change."""
+        link, states = self._parts(vector, values)
+        free, to_out, to_in, between = (part[lines] for part in self._open(link, states)[1:])
+        omega, own, gains = self.omega[lines], vector.places_of("joint"), self._gains(vector, values)
+        s, t = link.s[lines], link.t[lines]
+        q = self.whole.joint.connection(omega[:1]).pattern.shape[1]
+
+        def frfs(changed: FloatArray) -> ComplexArray:
+            joint = self.whole.joint.with_values(changed[own]).connection(omega)
+            t[:, :q, :q] = joint.t
+            with np.errstate(all="ignore"):
+                w = np.linalg.solve(s + t @ between, t)
+            return (free - to_out @ w @ to_in) * gains
+
+        return frfs
+
+    def frfs(self, vector: ParameterVector, values: FloatArray) -> ComplexArray:
+        """Return the FRFs for values of all parameters, shape (n_freq, n_o, n_i), m/N."""
+        link, states = self._parts(vector, values)
+        opened = self._open(link, states)
+        w = connection_forces(opened.between, link, self.freq_hz, "nan")
+        return (opened.free - opened.to_out @ (w @ opened.to_in)) * self._gains(vector, values)
+
+    def linearised(self, vector: ParameterVector, values: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+        """Return the FRFs and their derivatives by the free values, shape (p, n_freq, n_o, n_i)."""
+        link, states = self._parts(vector, values)
+        coupled = self._coupled(link, states)
+        gains = self._gains(vector, values)
+        slopes = np.zeros((len(vector.all), *coupled.y.shape), np.complex128)
+        self._joint_slopes(vector, values, coupled, slopes)
+        self._model_slopes(vector, values, coupled, (link, states), slopes)
+        if (gains != 1).any():
+            slopes *= gains
+        for i in vector.places_of("response"):
+            row = int(vector.all[i].place[0])
+            slopes[i, :, row] = (coupled.y * gains)[:, row] / values[i]
+        for i in vector.places_of("force"):
+            column = int(vector.all[i].place[0])
+            slopes[i, :, :, column] = (coupled.y * gains)[:, :, column] / values[i]
+        return coupled.y * gains, slopes if len(slopes) == vector.free.size else slopes[vector.free]
+
+    def refine(self, vector: ParameterVector, values: FloatArray) -> bool:
+        """Return whether a basis had to be extended to be good for these values."""
+        done = [side.refine(self._of_side(vector, values, name)) for side, name in zip(self.sides, "AB", strict=True)]
+        return any(done)
+
+    def _of_side(self, vector: ParameterVector, values: FloatArray, name: str) -> dict[str, float]:
+        origin = "A" if name == "A" else "B"
+        return {str(vector.all[i].place[0]): float(values[i]) for i in vector.places_of(origin)}  # type: ignore[arg-type]
+
+    def _parts(self, vector: ParameterVector, values: FloatArray) -> tuple[Connection, tuple[SubstructureState, ...]]:
+        """Return connections and substructures for values of all parameters."""
+        joint = self.whole.joint.with_values(values[vector.places_of("joint")])
+        numbers: list[list[float]] = [[] for _ in self.whole.attachments]
+        for i in vector.places_of("attachment"):
+            numbers[int(vector.all[i].place[0])].append(float(values[i]))
+        link = assembly_connection(self.whole, self.places, self.omega, joint, numbers)
+        states = [side.at(self._of_side(vector, values, name)) for side, name in zip(self.sides, "AB", strict=True)]
+        return link, tuple(states)
+
+    def _open(self, link: Connection, states: tuple[SubstructureState, ...]) -> _Open:
+        """Return the FRFs before the substructures are connected; those of the same states are kept."""
+        if self._last is None or any(one is not other for one, other in zip(self._last[0], states, strict=True)):
+            h, e = _together(states), link.pattern
+            to_out, to_in = h[:, self.responses] @ e, e.T @ h[:, :, self.forces]
+            free = np.ascontiguousarray(h[:, self.responses][:, :, self.forces])
+            self._last = states, _Open(h, free, to_out, to_in, e.T @ h @ e)
+        return self._last[1]
+
+    def _coupled(self, link: Connection, states: tuple[SubstructureState, ...]) -> _Coupled:
+        opened = self._open(link, states)
+        w = connection_forces(opened.between, link, self.freq_hz, "nan")
+        out_w, w_in = opened.to_out @ w, w @ opened.to_in
+        across_out, across_in = opened.to_out - out_w @ opened.between, opened.to_in - opened.between @ w_in
+        return _Coupled(opened.free - opened.to_out @ w_in, w, across_out, across_in)
+
+    def _gains(self, vector: ParameterVector, values: FloatArray) -> FloatArray:
+        rows, columns = np.ones(len(self.responses)), np.ones(len(self.forces))
+        for i in vector.places_of("response"):
+            rows[int(vector.all[i].place[0])] = values[i]
+        for i in vector.places_of("force"):
+            columns[int(vector.all[i].place[0])] = values[i]
+        return np.outer(rows, columns)
+
+    def _joint_slopes(
+        self, vector: ParameterVector, values: FloatArray, coupled: _Coupled, slopes: ComplexArray
+    ) -> None:
+        """Put the derivatives by joint and attachments into their places."""
+        own = vector.places_of("joint")
+        joint = self.whole.joint.with_values(values[own])
+        changes = dict(zip(own, joint.connection_slopes(self.omega), strict=True))
+        first = joint.connection(self.omega[:1]).pattern.shape[1]
+        starts = first + np.concatenate([[0], np.cumsum([len(one.places) for one in self.whole.attachments])])
+        for i in vector.places_of("attachment"):
+            at, number = (int(place) for place in vector.all[i].place)
+            one = self.whole.attachments[at]
+            entries = [(int(starts[at]) + n, int(starts[at]) + n) for n in range(len(one.places))]
+            changes[i] = (entries, attachment_factors(one, self.omega)[number])
+        last: list[tuple[int, int]] = []
+        for i, (entries, slope) in changes.items():
+            if not vector.all[i].is_free:
+                continue
+            if entries != last:  # parameters of one law change the same entries
+                last = entries
+                moved = sum(
+                    coupled.across_out[:, :, row, None] * coupled.across_in[:, column, None, :]
+                    for row, column in entries
+                )
+            np.multiply(moved, -slope[:, None, None], out=slopes[i])
+
+    def _model_slopes(
+        self,
+        vector: ParameterVector,
+        values: FloatArray,
+        coupled: _Coupled,
+        parts: tuple[Connection, tuple[SubstructureState, ...]],
+        slopes: ComplexArray,
+    ) -> None:
+        """Put the derivatives by unknowns of the models into their places."""
+        link, states = parts
+        first, opened = 0, self._open(link, states)
+        for side, state, name in zip(self.sides, states, "AB", strict=True):
+            own = slice(first, first + len(side.dofs))
+            first = own.stop
+            places = [i for i in vector.places_of("A" if name == "A" else "B") if vector.all[i].is_free]
+            if not places:
+                continue
+            names = [str(vector.all[i].place[0]) for i in places]
+            of_side = side.slopes(self._of_side(vector, values, name), names)
+            # dY = out dH into
+            unit, e = np.eye(opened.h.shape[1])[own], link.pattern[own]
+            out = unit[:, self.responses].T - (opened.to_out @ coupled.w) @ e.T
+            into = unit[:, self.forces] - e @ (coupled.w @ opened.to_in)
+            left = out @ state.x
+            right = state.x.swapaxes(1, 2) @ into
+            assert state.matrices is not None
+            for i, slope in zip(places, of_side, strict=True):
+                slopes[i] = _by_slope(slope, state.matrices.eta, self.omega, left, right)
+                if slope.ports is not None:
+                    slopes[i] += out @ (slope.ports @ right)
+                    slopes[i] += (left @ slope.ports.T) @ into
+
+
+def _together(states: tuple[SubstructureState, ...]) -> ComplexArray:
+    a, b = (state.h for state in states)
+    n_a, n = a.shape[1], a.shape[1] + b.shape[1]
+    h = np.zeros((len(a), n, n), np.complex128)
+    h[:, :n_a, :n_a], h[:, n_a:, n_a:] = a, b
+    return h
+
+
+def _weights(variance: FloatArray, axis: int) -> FloatArray:
+    """Return 1 over the standard deviation of rows or columns, 0 where all is zero; the mean's axis is kept."""
+    mean = variance.mean(axis=axis, keepdims=True)
+    found: FloatArray = np.where(mean > 0, 1 / np.sqrt(np.where(mean > 0, mean, 1)), 0)
+    return found
+
+
+def _by_slope(
+    slope: ReducedSlope, eta: float, omega: FloatArray, left: ComplexArray, right: ComplexArray
+) -> ComplexArray:
+    """Return -left dZ right, dZ = (1 + i eta) dK + i K d(eta) - w^2 dM + i w dC + i dH, shape (n_freq, n_o, n_i)."""
+    parts = (
+        (slope.k, np.full(omega.size, 1 + 1j * eta)),
+        (slope.eta, np.full(omega.size, 1j)),
+        (slope.m, -(omega**2) + 0j),
+        (slope.c, 1j * omega),
+        (slope.h, np.full(omega.size, 1j)),
+    )
+    total = np.zeros((omega.size, left.shape[1], right.shape[2]), np.complex128)
+    for matrix, factor in parts:
+        if matrix is not None:
+            middle = left * matrix if matrix.ndim == 1 else _times(left, matrix)
+            total -= factor[:, None, None] * (middle @ right)
+    return total
+
+
+def _times(left: ComplexArray, matrix: FloatArray) -> ComplexArray:
+    """Return left @ matrix as one product of all lines."""
+    found: ComplexArray = left.reshape(-1, left.shape[2]) @ matrix.astype(complex)
+    return found.reshape(left.shape)
+
+
+#: Units of unknowns of models by their usual names.
+_UNITS = {
+    "youngs_modulus": "N/m^2", "density": "kg/m^3", "loss_factor": "1", "length": "m", "width": "m", "height": "m",
+    "poisson": "1",
+}  # fmt: skip
+
+
+def parameter_vector(
+    whole: Assembly,
+    gains: tuple[Mapping[int, tuple[str, Unknown]], Mapping[int, tuple[str, Unknown]]],
+    fixed: Sequence[str],
+    joint_stiffness: FloatArray,
+) -> ParameterVector:
+    """Put all parameters of an assembly and its channels together.
+
+    Parameters
+    ----------
+    whole : Assembly
+    gains : pair of mappings of int to (str, Unknown)
+        Factors of responses and of forces, by the number of the channel: its name and factor.
+    fixed : sequence of str
+        Parameters of the joint that keep their value.
+    joint_stiffness : ndarray, shape (n,)
+        Dynamic stiffness that the substructures have at the joint DOFs: stiffnesses of the joint are sought around it.
+
+    Raises
+    ------
+    ValueError
+        `fixed` names what is no parameter of the joint.
+    """
+    found = list(joint_vector(whole.joint, fixed, joint_stiffness).all)
+    sides: tuple[tuple[ParameterOrigin, Substructure], ...] = (("A", whole.a), ("B", whole.b))
+    for side, part in sides:
+        for name, unknown in part.unknowns.items():
+            lower, upper = range_of(part, unknown)
+            own = _of_unknown(f"{side}/{name}", _UNITS.get(name, ""), side, (name,), unknown)
+            found.append(own._replace(lower=lower, upper=upper))
+    for i, one in enumerate(whole.attachments):
+        found += _of_attachment(one, i)
+    words: tuple[ParameterOrigin, ParameterOrigin] = ("response", "force")
+    for origin, of_channels in zip(words, gains, strict=True):
+        for place, (channel, unknown) in of_channels.items():
+            found.append(_of_unknown(f"gain of {origin} {channel}", "1", origin, (place,), unknown))
+    return ParameterVector(tuple(found))
+
+
+def _of_unknown(
+    name: str, unit: str, origin: ParameterOrigin, place: tuple[int | str, ...], unknown: Unknown
+) -> FitParameter:
+    return FitParameter(
+        name, unit, origin, place, unknown.value, unknown.std, unknown.lower, unknown.upper, False, True
+    )
+
+
+def _of_attachment(one: Attachment, place: int) -> list[FitParameter]:
+    found = []
+    for i, (name, unit, number) in enumerate(zip(one.names, one.units, one.numbers, strict=True)):
+        if isinstance(number, Unknown):
+            found.append(_of_unknown(name, unit, "attachment", (place, i), number))
+        else:
+            fixed = FitParameter(name, unit, "attachment", (place, i), number, None, -np.inf, np.inf, False, False)
+            found.append(fixed)
+    return found

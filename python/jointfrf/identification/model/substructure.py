@@ -1,0 +1,242 @@
+"""A substructure as a fit takes it: a model, a function that builds one, or FRFs; with what is unknown of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from jointfrf.kernel.arguments import (
+    ComplexArray,
+    FloatArray,
+    as_frequency,
+    as_limits,
+    as_names,
+    as_number,
+    as_square,
+    check_finite_lines,
+    one_line,
+)
+from jointfrf.models.model import Model
+
+__all__ = ["FrfSource", "Substructure", "Unknown"]
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """A number of a model that is not known exactly: it is fitted with the joint.
+
+    Parameters
+    ----------
+    value : float
+        What is believed before the measurement, in the unit of the number.
+    std : float, optional
+        Standard deviation of that belief, a normal prior; none by default: only the FRFs tell.
+    lower, upper : float
+        Limits.
+
+    Raises
+    ------
+    ValueError
+        A standard deviation that is not positive, a value outside its limits, NaN or Inf.
+
+    Examples
+    --------
+    Young's modulus of aluminium, known to 2 %:
+
+    >>> import jointfrf as jf
+    >>> jf.Unknown(67e9, 0.02 * 67e9).std
+    1340000000.0
+    """
+
+    value: float
+    std: float | None = None
+    lower: float = -np.inf
+    upper: float = np.inf
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "value", as_number("value", self.value))
+        if self.std is not None:
+            object.__setattr__(self, "std", as_number("std", self.std))
+            if self.std <= 0:
+                raise ValueError(f"std must be positive, not {self.std:g}")
+        as_limits("bounds", self.lower, self.upper)
+        if not self.lower <= self.value <= self.upper:
+            raise ValueError(f"value must lie in {self.lower:g} to {self.upper:g}, not {self.value:g}")
+
+
+#: What a model's own matrices may be scaled by, and its loss factor.
+SCALES = ("youngs_modulus", "density", "loss_factor")
+
+
+@dataclass(frozen=True)
+class FrfSource:
+    """FRFs of a substructure between named DOFs, taken as exact.
+
+    Attributes
+    ----------
+    freq_hz : ndarray, shape (n_freq,)
+    h : ndarray, shape (n_freq, m, m)
+        m/N.
+    dofs : tuple of str, length m
+    """
+
+    freq_hz: FloatArray
+    h: ComplexArray
+    dofs: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Substructure:
+    """A substructure: a model with what is not known of it, or FRFs.
+
+    Parameters
+    ----------
+    source : Model, or callable, or FrfSource
+        A model; a function that builds one from the values of `unknowns` by name, ``build(length=0.3)``; or FRFs, see
+        `of_frfs`.
+    joint : sequence of str
+        Names of its joint DOFs, in the order of the joint.
+    unknowns : mapping of str to Unknown
+        Of a `Model`: ``"youngs_modulus"`` scales K and H, ``"density"`` scales M, ``"loss_factor"`` is its eta. Of a
+        function: its arguments.
+
+    Raises
+    ------
+    ValueError
+        An unknown that the source does not have; unknowns of FRFs.
+
+    Examples
+    --------
+    >>> import jointfrf as jf
+    >>> def arm(length, youngs_modulus):
+    ...     return jf.beam(length, 12, youngs_modulus=youngs_modulus, density=2700.0, width=0.025, height=0.006,
+    ...                    ends=("clamped", "free"), loss_factor=0.01)
+    >>> a = jf.Substructure(arm, ["13:y", "13:theta"],
+    ...                     {"length": jf.Unknown(0.3, 0.006), "youngs_modulus": jf.Unknown(67e9, 1.3e9)})
+    >>> a.model().index("13:y")
+    22
+    """
+
+    source: Model | Callable[..., Model] | FrfSource
+    joint: tuple[str, ...]
+    unknowns: Mapping[str, Unknown] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "joint", as_names("joint", self.joint))
+        if not isinstance(self.unknowns, Mapping):
+            raise TypeError(f"unknowns must be a mapping of names to Unknown, not {type(self.unknowns).__name__}")
+        for name, unknown in self.unknowns.items():
+            if not isinstance(unknown, Unknown):
+                raise TypeError(f"unknowns: {name} must be an Unknown, not {type(unknown).__name__}")
+            if isinstance(self.source, FrfSource):
+                raise ValueError(f"FRFs have no unknowns such as {name!r}: give the substructure as a model")
+            if isinstance(self.source, Model) and name not in SCALES:
+                raise ValueError(
+                    f"a model takes the unknowns {', '.join(SCALES)}, not {name!r}: give a function that builds it"
+                )
+        if isinstance(self.source, Model):
+            for name in ("youngs_modulus", "density"):
+                if name in self.unknowns and self.unknowns[name].value <= 0:
+                    raise ValueError(f"{name} must be positive, not {self.unknowns[name].value:g}")
+        if not isinstance(self.source, Model | FrfSource) and not callable(self.source):
+            raise TypeError(f"source must be a Model, a function or FRFs, not {type(self.source).__name__}")
+
+    @classmethod
+    def of_frfs(cls, freq_hz: ArrayLike, h: ArrayLike, dofs: Sequence[str], joint: Sequence[str]) -> Substructure:
+        """Return a substructure given by FRFs.
+
+        Parameters
+        ----------
+        freq_hz : array_like, shape (n_freq,)
+            The lines of the measurement of the assembly, Hz.
+        h : array_like, shape (n_freq, m, m)
+            Receptances between its joint DOFs and the points measured, m/N; taken as exact.
+        dofs : sequence of str, length m
+            Their names.
+        joint : sequence of str
+            Which of them are the joint DOFs.
+
+        Raises
+        ------
+        ValueError
+            Wrong shapes or names, NaN or Inf.
+        """
+        lines = as_square("h", h)
+        freq = as_frequency(freq_hz, len(lines))
+        check_finite_lines("h", lines, freq)
+        names = as_names("dofs", dofs)
+        if len(names) != lines.shape[1] or len(set(names)) != len(names):
+            raise ValueError(f"dofs must name {lines.shape[1]} different DOFs, not {one_line(names)}")
+        return cls(FrfSource(freq, lines, names), as_names("joint", joint))
+
+    @property
+    def nominal(self) -> dict[str, float]:
+        """Values of the unknowns as believed."""
+        return {name: unknown.value for name, unknown in self.unknowns.items()}
+
+    @cached_property
+    def nominal_model(self) -> Model:
+        """The model for the values believed."""
+        return self.model()
+
+    def model(self, values: Mapping[str, float] | None = None) -> Model:
+        """Return the model for values of its unknowns, those believed by default.
+
+        Raises
+        ------
+        TypeError
+            It is given by FRFs, or the function returns no model.
+        """
+        if not isinstance(values, Mapping | None):
+            raise TypeError(f"values must be a mapping of names to numbers, not {type(values).__name__}")
+        named = self.nominal | dict(values or {})
+        if isinstance(self.source, FrfSource):
+            raise TypeError("a substructure given by FRFs has no model")
+        if not isinstance(self.source, Model):
+            built = self.source(**named)
+            if not isinstance(built, Model):
+                raise TypeError(f"the function of a substructure must return a Model, not {type(built).__name__}")
+            return built
+        changed: dict[str, Any] = {}
+        if "youngs_modulus" in named:
+            factor = named["youngs_modulus"] / self.unknowns["youngs_modulus"].value
+            changed["stiffness"] = self.source.stiffness * factor
+            if self.source.structural_damping is not None:
+                changed["structural_damping"] = self.source.structural_damping * factor
+        if "density" in named:
+            changed["mass"] = self.source.mass * (named["density"] / self.unknowns["density"].value)
+        if "loss_factor" in named:
+            changed["loss_factor"] = named["loss_factor"]
+        return replace(self.source, **changed)
+
+    def has(self, dof: str) -> bool:
+        """Whether there is a DOF of this name."""
+        if isinstance(self.source, FrfSource):
+            return dof in self.source.dofs
+        try:
+            self.nominal_model.ports(dof)
+        except ValueError:
+            return False
+        return True
+
+    def receptance(self, freq_hz: FloatArray, dofs: Sequence[str]) -> ComplexArray:
+        """Return the receptances between DOFs as believed, shape (n_freq, m, m), m/N."""
+        if isinstance(self.source, FrfSource):
+            at = [self.source.dofs.index(dof) for dof in dofs]
+            return self.source.h[:, at][:, :, at]
+        model = self.nominal_model
+        return model.receptance(freq_hz, model.ports(*dofs))
+
+
+def check_same_lines(name: str, source: FrfSource, freq_hz: FloatArray) -> None:
+    """Raise an error if FRFs of a substructure are not on the lines of the measurement."""
+    if source.freq_hz.shape != freq_hz.shape or not np.allclose(source.freq_hz, freq_hz, rtol=1e-9, atol=0):
+        raise ValueError(
+            f"the FRFs of {name} must be on the lines of the measurement, {freq_hz.size} from {freq_hz[0]:g} to "
+            f"{freq_hz[-1]:g} Hz, not {source.freq_hz.size} from {source.freq_hz[0]:g} to {source.freq_hz[-1]:g} Hz"
+        )

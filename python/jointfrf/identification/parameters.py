@@ -1,0 +1,186 @@
+"""All parameters of a fit in one vector, and the coordinates in which they are sought."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointfrf.kernel.arguments import FloatArray
+from jointfrf.laws.law_joint import JointQuantity, LawJoint
+
+__all__ = ["FitParameter", "ParameterOrigin", "ParameterVector", "joint_vector"]
+
+#: What a parameter belongs to.
+ParameterOrigin = Literal["joint", "A", "B", "attachment", "response", "force"]
+
+
+#: Stiffnesses of the joint are sought within this factor of the stiffness that the substructures have there.
+_WIDEST = 1e6
+
+
+class FitParameter(NamedTuple):
+    """One parameter of a fit.
+
+    Attributes
+    ----------
+    name, unit : str
+    origin : str
+        What it belongs to.
+    place : tuple
+        Where it stands there: its number in the joint; number of the attachment and of its number; name of an unknown;
+        number of a channel.
+    value : float
+        Where the fit may start, and the mean of the prior.
+    std : float or None
+        Standard deviation of the prior.
+    lower, upper : float
+    is_log : bool
+        Whether it is sought as its logarithm.
+    is_free : bool
+        Whether it is fitted.
+    """
+
+    name: str
+    unit: str
+    origin: ParameterOrigin
+    place: tuple[int | str, ...]
+    value: float
+    std: float | None
+    lower: float
+    upper: float
+    is_log: bool
+    is_free: bool
+
+
+@dataclass(frozen=True)
+class ParameterVector:
+    """The parameters of a fit; vectors hold the values of all, coordinates those of the free ones.
+
+    Attributes
+    ----------
+    all : tuple of FitParameter
+    """
+
+    all: tuple[FitParameter, ...]
+
+    @cached_property
+    def free(self) -> NDArray[np.intp]:
+        """Places of the free parameters among all."""
+        return np.array([i for i, one in enumerate(self.all) if one.is_free], np.intp)
+
+    @property
+    def fitted(self) -> tuple[FitParameter, ...]:
+        """The free parameters."""
+        return tuple(self.all[i] for i in self.free)
+
+    @cached_property
+    def values(self) -> FloatArray:
+        """Values of all to begin with."""
+        return np.array([one.value for one in self.all])
+
+    @cached_property
+    def is_log(self) -> NDArray[np.bool_]:
+        """Which of the free ones are sought as logarithms."""
+        return np.array([one.is_log for one in self.fitted], bool)
+
+    @cached_property
+    def scale(self) -> FloatArray:
+        """Unit of the coordinate of each free one that is not a logarithm."""
+        return np.array([one.std or abs(one.value) or 1.0 for one in self.fitted])
+
+    def to_coordinates(self, values: FloatArray) -> FloatArray:
+        """Return the coordinates of values of all."""
+        own = values[self.free]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            logs = np.log(np.where(self.is_log, own, 1))
+        return np.asarray(np.clip(np.where(self.is_log, logs, own / self.scale), *self.bounds))
+
+    def to_values(self, x: FloatArray) -> FloatArray:
+        """Return the values of all from coordinates."""
+        values = self.values.copy()
+        values[self.free] = self._own(x)
+        return values
+
+    def _own(self, x: FloatArray) -> FloatArray:
+        found: FloatArray = np.where(self.is_log, np.exp(np.where(self.is_log, x, 0)), x * self.scale)
+        return np.asarray(np.clip(found, self.limits[0], self.limits[1]))
+
+    def slope(self, x: FloatArray) -> FloatArray:
+        """Return the derivatives of the free values by their coordinates."""
+        found: FloatArray = np.where(self.is_log, self._own(x), self.scale)
+        return found
+
+    @cached_property
+    def limits(self) -> tuple[FloatArray, FloatArray]:
+        """Smallest and largest values of the free ones."""
+        return np.array([one.lower for one in self.fitted]), np.array([one.upper for one in self.fitted])
+
+    @cached_property
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        """The same in coordinates."""
+        lower, upper = self.limits
+        with np.errstate(divide="ignore"):
+            logs = [np.log(np.where(self.is_log, np.maximum(limit, 0), 1)) for limit in (lower, upper)]
+        return np.where(self.is_log, logs[0], lower / self.scale), np.where(self.is_log, logs[1], upper / self.scale)
+
+    @cached_property
+    def has_prior(self) -> NDArray[np.bool_]:
+        """Which of the free ones have a prior."""
+        return np.array([one.std is not None for one in self.fitted], bool)
+
+    def pulls(self, x: FloatArray) -> FloatArray:
+        """Return by how many standard deviations of its prior each free value is off; 0 without one."""
+        std = np.array([one.std or np.inf for one in self.fitted])
+        found: FloatArray = (self._own(x) - self.values[self.free]) / std
+        return found
+
+    def pull_slopes(self, x: FloatArray) -> FloatArray:
+        """Return their derivatives by the coordinates."""
+        std = np.array([one.std or np.inf for one in self.fitted])
+        return np.asarray(self.slope(x) / std)
+
+    def places_of(self, origin: ParameterOrigin) -> list[int]:
+        """Return the places, among all, of the parameters of an origin."""
+        return [i for i, one in enumerate(self.all) if one.origin == origin]
+
+    def of_joint(self) -> ParameterVector:
+        """Return the same with the parameters of the joint free only."""
+        return ParameterVector(tuple(one._replace(is_free=one.is_free and one.origin == "joint") for one in self.all))
+
+
+def joint_vector(joint: LawJoint, fixed: Sequence[str], joint_stiffness: FloatArray) -> ParameterVector:
+    """Put the parameters of a joint together.
+
+    Parameters
+    ----------
+    joint : LawJoint
+    fixed, joint_stiffness
+        As in `parameter_vector`.
+    """
+    names = joint.names
+    for name in fixed:
+        if name not in names:
+            raise ValueError(f"fixed names {name!r}, which is no parameter of the joint: {', '.join(names)}")
+    size = dict(zip(joint.dofs, joint_stiffness.tolist(), strict=True))
+    return ParameterVector(
+        tuple(_of_joint(one, i, one.name not in fixed, size) for i, one in enumerate(joint.quantities))
+    )
+
+
+def _of_joint(one: JointQuantity, place: int, is_free: bool, size: Mapping[str, float]) -> FitParameter:
+    """Return a parameter of the joint; a stiffness or a time that cannot be negative is sought as its logarithm."""
+    kind, lower, upper = one.field.kind, one.field.lower, one.field.upper
+    is_log = kind in ("stiffness", "time") and lower >= 0
+    if is_log and kind == "stiffness":
+        dof = one.name.partition("_")[2]
+        known = next((value for name, value in size.items() if dof == name or dof.endswith(f"_{name}")), one.value)
+        lower, upper = max(lower, min(known, one.value or known) / _WIDEST), min(upper, max(known, one.value) * _WIDEST)
+    if is_log and kind == "time":
+        upper = min(upper, max(1e3, 10 * one.value))
+    value = float(np.clip(one.value, lower, upper))
+    return FitParameter(one.name, one.unit, "joint", (place,), value, None, lower, upper, is_log, is_free)
