@@ -1,0 +1,93 @@
+"""Functions of the parameters of a fit: what is read, and what their uncertainty is."""
+
+import numpy as np
+import pytest
+
+import jointfrf as jf
+
+VALUES = {"k_y": 2e5, "k_theta": 5e3, "h_y": 1e4, "k_y,theta": 300.0}
+ROOT = np.array([[2e3, 0, 0, 0], [10.0, 40, 0, 0], [50.0, 0, 300, 0], [0, 1.0, 0, 20]])
+
+
+@pytest.fixture
+def fit():
+    """Springs with a known covariance."""
+    return jf.Fit.of_springs("compliance", ("y", "theta"), VALUES, ROOT @ ROOT.T, 0.01, 0.01, np.array([1.0, 2.0]))
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("h_y / k_y", 0.05),
+        ("-k_theta + 2 * k_y", 395e3),
+        ("sqrt(k_y / 2.5) / (2 * pi)", np.sqrt(2e5 / 2.5) / (2 * np.pi)),
+        ("{k_y,theta} / k_y", 300 / 2e5),
+        ("exp(log(k_y)) ** 2 - abs(-1)", 4e10 - 1),
+        ("1e3", 1e3),
+    ],
+)
+def test_arithmetic_of_names_is_read(fit, text, value):
+    assert fit.derived(text).value == pytest.approx(value)
+
+
+def test_the_error_is_that_of_many_draws(fit):
+    draws = fit.estimate + np.random.default_rng(1).standard_normal((200_000, 4)) @ ROOT.T
+    for function in ("h_y / k_y", lambda v: v["k_y"] * v["k_theta"] / v["k_y,theta"]):
+        of = fit.derived(function)
+        columns = dict(zip(VALUES, draws.T, strict=True))
+        scatter = columns["h_y"] / columns["k_y"] if isinstance(function, str) else function(columns)
+        assert of.std_error == pytest.approx(scatter.std(), rel=0.02)
+        assert of.high - of.low == pytest.approx(2 * 1.959964 * of.std_error)
+
+
+def test_of_one_parameter_the_interval_is_carried_over():
+    limits = {"k_y": (1e5, np.inf)}
+    fit = jf.Fit.of_springs("compliance", ("y",), {"k_y": 2e5}, np.array([[1e8]]), 0.01, 0.01, np.ones(1),
+                            intervals=lambda probability: limits)  # fmt: skip
+    compliance = fit.derived("1 / k_y")
+    assert (compliance.low, compliance.high) == (0.0, 1e-5)
+    assert fit.derived(lambda value: 7.0) == (7.0, 0.0, 7.0, 7.0)
+
+
+@pytest.mark.parametrize(
+    ("function", "message"),
+    [
+        ("k_z / k_y", "there is no parameter 'k_z', only k_y, k_theta"),
+        ("{k_z,y}", "there is no parameter 'k_z,y'"),
+        ("k_y +", "is no arithmetic of parameters"),
+        ("__import__('os').getcwd()", "is no arithmetic|there is no parameter"),
+        ("k_y.real", "is no arithmetic"),
+        ("(lambda: 1)()", "is no arithmetic"),
+        ("k_y if 1 else 2", "is no arithmetic"),
+        ("'a'", "is no arithmetic"),
+        ("True", "is no arithmetic|there is no parameter"),
+        ("sqrt(k_y, 2)", "is no arithmetic"),
+        ("", "is no arithmetic"),
+        (3.0, "function must be an arithmetic expression or a callable"),
+    ],
+)
+def test_what_is_no_arithmetic_is_one_sentence(fit, function, message):
+    with pytest.raises(ValueError, match=message):
+        fit.derived(function)
+
+
+def test_probabilities_are_checked(fit):
+    assert fit.derived("h_y / k_y", 0.5).low > fit.derived("h_y / k_y", 0.99).low
+    with pytest.raises(ValueError, match="probability must lie between"):
+        fit.derived("h_y / k_y", 1.0)
+
+
+def test_loss_factors_hold_the_truth_with_their_intervals(beams):
+    joint = jf.Joint([6e5, 5e3], dofs=["y", "theta"], loss_factor=[0.05, 0.1])
+    inside, errors = 0, []
+    for seed in range(20):
+        fit = jf.identify(beams.freq, jf.pollute(beams.gamma(joint), 0.01, seed=seed), ["y", "theta"],
+                          damping="hysteretic", noise=0.01)  # fmt: skip
+        assert list(fit.loss_factors) == ["eta_y", "eta_theta"]
+        for eta, true in zip(fit.loss_factors.values(), (0.05, 0.1), strict=True):
+            inside += eta.low < true < eta.high
+            errors.append((eta.value - true) / eta.std_error)
+        np.testing.assert_allclose(fit.loss_factor, [one.value for one in fit.loss_factors.values()])
+    assert inside >= 34  # 38 of 40 expected, fewer than 34 by chance in 2 of 100
+    assert 0.7 < np.std(errors) < 1.35
+    assert "eta_theta" in str(fit)
