@@ -61,7 +61,7 @@ from jointfrf.identification.monte_carlo import BandStatistics, MonteCarlo, mont
 from jointfrf.identification.realisations import FitStart, identify_realisations
 from jointfrf.identification.sensitivity import propose_bands, sensitivity
 from jointfrf.joint import Joint
-from jointfrf.kernel.engine import get_engine, set_engine, use_engine
+from jointfrf.kernel.call import get_engine, set_engine, use_engine
 from jointfrf.kernel.linear_algebra import invert, reciprocal_condition, solve
 from jointfrf.kernel.status import RCOND_LIMIT
 from jointfrf.laws.function_law import FunctionLaw
@@ -73,7 +73,7 @@ from jointfrf.models.beam import beam
 from jointfrf.models.chain import chain
 from jointfrf.models.matrices import from_triangle
 from jointfrf.models.model import Model, assemble
-from jointfrf.models.receptance.receptance import ReceptanceInfo, receptance
+from jointfrf.models.receptance import ReceptanceInfo, receptance
 from jointfrf.parallel.pool import BrokenPoolError
 from jointfrf.parallel.processes import SeparateProcesses
 from jointfrf.parallel.sweep import plan_sweep, sweep

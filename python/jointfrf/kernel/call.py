@@ -1,4 +1,4 @@
-"""Calling a routine of the kernel.
+"""Calling a routine of the kernel, and the engine that computes: LAPACK line by line, or several lines side by side.
 
 A C-order array (n_freq, out, in) enters as its transposed view, so nothing is copied; results come back in C order.
 """
@@ -7,18 +7,29 @@ from __future__ import annotations
 
 import os
 import reprlib
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any, get_args
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 import jointfrf._kernel as _kernel
-from jointfrf.kernel.arguments import ComplexArray, FloatArray, check_choice, checked_out
-from jointfrf.kernel.memory_maps import chunks, in_one_piece, release
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, check_choice, checked_out, chunks, in_one_piece, release
 from jointfrf.kernel.status import RCOND_LIMIT, LineStatus, OnSingular, check_status
 
-__all__ = ["N_FREQ", "VERSION", "call", "call_for_number", "info_of", "kernel_engine", "run", "set_kernel_engine"]
+__all__ = [
+    "N_FREQ",
+    "VERSION",
+    "Engine",
+    "call",
+    "call_for_number",
+    "get_engine",
+    "info_of",
+    "run",
+    "set_engine",
+    "use_engine",
+]
 
 #: Version of the kernel, and so of the package.
 VERSION = ".".join(str(int(number)) for number in _kernel.jf_version())
@@ -29,18 +40,6 @@ _COMPLEX, _INTEGER = np.dtype(np.complex128), np.dtype(np.int32)
 
 #: Stands for the number of lines among the arguments of a kernel routine.
 N_FREQ = object()
-
-
-def set_kernel_engine(code: int) -> bool:
-    """Choose an engine by its number in the kernel; return whether this machine has it."""
-    return bool(_kernel.jf_set_engine(code) == 0)
-
-
-def kernel_engine() -> int:
-    """Return the number of the engine in use."""
-    code, info = _kernel.jf_get_engine()
-    _check_info("engine", info)
-    return int(code)
 
 
 def _check_info(routine: str, info: int) -> None:
@@ -160,3 +159,96 @@ def info_of(routine: str, args: Sequence[Any]) -> int:
     """Call a kernel routine as `call` does and return its `info` for the caller to judge."""
     views = [a.T if isinstance(a, np.ndarray) else a for a in args]
     return int(getattr(_kernel, "jf_" + routine)(*views))
+
+
+Engine = Literal["auto", "lapack", "plain", "x86-64-v2", "x86-64-v3", "x86-64-v4"]
+
+
+def set_engine(engine: Engine) -> None:
+    """Choose the engine of all calls that follow, in every thread of this process.
+
+    Parameters
+    ----------
+    engine : {"auto", "lapack", "plain", "x86-64-v2", "x86-64-v3", "x86-64-v4"}
+        "auto": the widest vector registers this machine has. "lapack": line by line, the reference. The others:
+        eight lines side by side, with the instructions of any processor or of a level of x86-64 (v3 has AVX2, v4
+        AVX-512).
+
+    Raises
+    ------
+    ValueError
+        The word is not known, or this machine does not have the engine; the choice stays as it was.
+
+    Notes
+    -----
+    Without a call the environment variable `JOINTFRF_ENGINE` chooses, by the same words; it is read when a sweep is
+    first computed. Results of two engines agree within the rounding that the condition of a line allows, and so do
+    those of one line among different neighbours; the number of threads changes nothing.
+
+    Examples
+    --------
+    >>> import jointfrf as jf
+    >>> jf.set_engine("lapack")
+    >>> jf.get_engine()
+    'lapack'
+    >>> jf.set_engine("auto")
+    """
+    check_choice("engine", engine, get_args(Engine))
+    if _kernel.jf_set_engine(get_args(Engine).index(engine)) != 0:
+        raise ValueError(f"engine {engine!r} is not available on this machine")
+
+
+def get_engine() -> Engine:
+    """Return the engine in use; where the choice is automatic, the one that was chosen.
+
+    Returns
+    -------
+    str
+        One of the words of `set_engine`, never "auto".
+
+    Raises
+    ------
+    ValueError
+        The environment variable `JOINTFRF_ENGINE` holds a word that is not known, or names an engine that this machine
+        does not have.
+
+    Examples
+    --------
+    >>> import jointfrf as jf
+    >>> with jf.use_engine("plain"):
+    ...     jf.get_engine()
+    'plain'
+    """
+    code, info = _kernel.jf_get_engine()
+    _check_info("engine", info)
+    engine: Engine = get_args(Engine)[int(code)]
+    return engine
+
+
+@contextmanager
+def use_engine(engine: Engine) -> Iterator[None]:
+    """Choose an engine inside a `with` block, in every thread of this process; then return to the one before.
+
+    Parameters
+    ----------
+    engine : str
+        As in `set_engine`.
+
+    Raises
+    ------
+    ValueError
+        As in `set_engine` and `get_engine`.
+
+    Examples
+    --------
+    >>> import jointfrf as jf
+    >>> with jf.use_engine("lapack"):
+    ...     jf.invert([[[2.0]]]).tolist()
+    [[[(0.5-0j)]]]
+    """
+    before = get_engine()
+    set_engine(engine)
+    try:
+        yield
+    finally:
+        set_engine(before)

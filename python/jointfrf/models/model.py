@@ -15,7 +15,7 @@ from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_dofs, as_names, check_type
 from jointfrf.laws.law_joint import LawJoint
 from jointfrf.models.matrices import Matrix, ModelMatrices
-from jointfrf.models.receptance.receptance import ReceptanceMethod, receptance
+from jointfrf.models.receptance import ReceptanceMethod, receptance
 
 __all__ = ["Model", "assemble"]
 

@@ -12,7 +12,7 @@ from scipy import sparse
 from scipy.sparse import linalg as sparse_linalg
 
 from jointfrf.kernel.arguments import FloatArray, as_integer, as_real
-from jointfrf.models.receptance.factors import SYMMETRIC
+from jointfrf.models.factors import SYMMETRIC
 from jointfrf.solids.contact_pairs import NORMAL, TANGENTIAL, BoolArray, ContactInterface, ContactLaw, Pairs, tie
 
 __all__ = ["ContactInterface", "ContactLaw", "ContactSolution", "InterfaceState", "Iteration", "solve_contact"]
