@@ -14,9 +14,9 @@ from jointfrf.identification.model_fit.assembly import Assembly
 from jointfrf.identification.model_fit.attachments import AddedMass
 from jointfrf.identification.model_fit.substructure import Substructure
 from jointfrf.identification.model_fit.unknown import Unknown
+from jointfrf.laws.joint_toml import LAW_WORDS, read_law
 from jointfrf.laws.law import JointLaw
 from jointfrf.laws.law_joint import LawJoint
-from jointfrf.laws.law_table import LAW_WORDS, read_law
 from jointfrf.models.model import Model
 from jointfrf.toml.table import TomlTable
 
