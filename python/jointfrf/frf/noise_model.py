@@ -11,12 +11,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from jointfrf.frf.bands import line_slices
-from jointfrf.frf.entry_groups import EntryGroup, entry_groups
-from jointfrf.frf.noise_estimate import reciprocity_noise
-from jointfrf.frf.noise_parts import NoiseTerms, line_correlation, line_levels
-from jointfrf.frf.order_search import OrderSearch
+from jointfrf.frf.entry_groups import EntryGroup, entry_groups, reciprocity_noise
+from jointfrf.frf.noise_parts import (
+    NoiseTerms,
+    ReciprocityDifferences,
+    line_correlation,
+    line_levels,
+    reciprocity_differences,
+)
 from jointfrf.frf.quantiles import medians
-from jointfrf.frf.reciprocity_differences import ReciprocityDifferences, reciprocity_differences
+from jointfrf.frf.rational_fit import OrderSearch
 from jointfrf.frf.smoothing import (
     SmoothFrfs,
     checked_frfs,

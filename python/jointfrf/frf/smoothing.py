@@ -10,9 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from jointfrf.frf.bands import line_slices
 from jointfrf.frf.entry_groups import EntryGroup, entry_groups
-from jointfrf.frf.order_search import OrderSearch, search_order
 from jointfrf.frf.quantiles import medians
-from jointfrf.frf.rational_fit import Entries, RationalFit
+from jointfrf.frf.rational_fit import Entries, OrderSearch, RationalFit, search_order
 from jointfrf.kernel.arguments import (
     ComplexArray,
     FloatArray,

@@ -14,8 +14,8 @@ from jointfrf.dofs import DIRECTIONS, direction_places, is_rotation
 from jointfrf.io.cards import CardFormat, CardOptions
 from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_frequency, as_names, as_number, as_real, check_type
+from jointfrf.kernel.call import OnSingular
 from jointfrf.kernel.linear_algebra import invert
-from jointfrf.kernel.status import OnSingular
 from jointfrf.laws.law import JointLaw, LawField
 from jointfrf.laws.springs import SpringLaw
 

@@ -1,8 +1,8 @@
 """Models of substructures and their receptances.
 
-chain, beam   models by a few numbers
 matrices      the matrices of a model as given, and where it is driven and observed
-model         matrices with names of DOFs, assemblies
+model         matrices with names of DOFs, assemblies, chains
+beam          plane beams
 receptance    the choice of a method, and direct solutions
 modal         sums of modes; rigid-body modes apart
 krylov        reduction to solutions at a few frequencies

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
-from jointfrf.kernel.status import RCOND_LIMIT
+from jointfrf.kernel.call import RCOND_LIMIT
 from jointfrf.models.factors import Factors, SingularMatrixError, SparseSolver
 from jointfrf.models.matrices import ModelMatrices, Ports, directions
 from jointfrf.models.modal import Modes, RigidModes, find_rigid_modes, held

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from scipy.linalg import lapack
 
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
-from jointfrf.kernel.call import N_FREQ, run
-from jointfrf.kernel.status import RCOND_LIMIT, LineStatus, OnSingular, check_lines
+from jointfrf.kernel.call import N_FREQ, RCOND_LIMIT, LineStatus, OnSingular, check_lines, run
 from jointfrf.models.factors import SingularMatrixError, SparseSolver, factor
 from jointfrf.models.matrices import ModelMatrices, Operand, Ports
 

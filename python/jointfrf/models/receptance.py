@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 from scipy.sparse import linalg as sparse_linalg
 
-from jointfrf.channels.finite_differences import transform
+from jointfrf.channels.point_lines import transform
 from jointfrf.errors import ConvergenceWarning
 from jointfrf.kernel.arguments import (
     ComplexArray,
@@ -21,8 +21,7 @@ from jointfrf.kernel.arguments import (
     check_choice,
     checked_out,
 )
-from jointfrf.kernel.call import N_FREQ, run
-from jointfrf.kernel.status import RCOND_LIMIT, LineStatus, OnSingular, check_lines
+from jointfrf.kernel.call import N_FREQ, RCOND_LIMIT, LineStatus, OnSingular, check_lines, run
 from jointfrf.models.factors import Factors, SingularMatrixError, SparseSolver
 from jointfrf.models.krylov import reduce_model, spot_error
 from jointfrf.models.matrices import Matrix, ModelMatrices, Ports, as_ports, directions

@@ -15,8 +15,7 @@ from jointfrf.kernel.arguments import FloatArray, as_number, check_type
 from jointfrf.solids.bolted_lap import INTERFACES, BoltedLap
 from jointfrf.solids.brick import Formulation, assemble_bricks
 from jointfrf.solids.brick_beam import PRESETS
-from jointfrf.solids.contact import ContactLaw, InterfaceState, Iteration, solve_contact
-from jointfrf.solids.contact_pairs import Pairs, tie
+from jointfrf.solids.contact import ContactLaw, InterfaceState, Iteration, Pairs, solve_contact, tie
 from jointfrf.solids.solid import SolidModel, solid_model
 
 __all__ = ["PreloadedLap", "PressureMap", "preload"]

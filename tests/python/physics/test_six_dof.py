@@ -7,7 +7,7 @@ import pytest
 
 import jointfrf as jf
 from cramer_rao import cramer_rao
-from jointfrf.frf.noise_estimate import reciprocity_noise
+from jointfrf.frf.entry_groups import reciprocity_noise
 from jointfrf.identification.compliance_fit.estimator import estimate_joint
 from jointfrf.identification.compliance_fit.interface_frfs import InterfaceFrfs
 from jointfrf.identification.compliance_fit.joint_terms import joint_terms

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import jointfrf as jf
-from jointfrf.channels.left_out_dofs import left_out_dofs
+from jointfrf.channels.joint_channels import left_out_dofs
 from jointfrf.identification.compliance_fit.rigidity import (
     ChannelModes,
     deformation_compliance,

@@ -19,7 +19,16 @@ from jointfrf.channels.check.channel_ratios import (
     gain_findings,
     unexplained_gains,
 )
-from jointfrf.channels.check.driving_points import circles, mean_exponent, passivity_findings, sectors
+from jointfrf.channels.check.driving_points import (
+    circles,
+    convention_finding,
+    mean_exponent,
+    passivity_findings,
+    quantities,
+    quantity_findings,
+    sectors,
+    sign_findings,
+)
 from jointfrf.channels.check.exchange import (
     Cause,
     broken_findings,
@@ -28,10 +37,8 @@ from jointfrf.channels.check.exchange import (
     hidden_exchange,
 )
 from jointfrf.channels.check.finding import Correction, FindingLevel, FrfCheck, FrfFinding, corrected
-from jointfrf.channels.check.measurement import Measurement, as_channel_names, as_measurement
 from jointfrf.channels.check.pair_ratios import PairRatios, pair_ratios
-from jointfrf.channels.check.quantities import convention_finding, quantities, quantity_findings, sign_findings
-from jointfrf.channels.check.signals import check_signals, find_bad_lines
+from jointfrf.channels.check.signals import Measurement, as_channel_names, as_measurement, check_signals, find_bad_lines
 from jointfrf.errors import FrfCheckWarning
 from jointfrf.frf.frf_set import Channel
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_frequency, as_lines, as_names, as_real, check_choice

@@ -31,7 +31,7 @@ from jointfrf.identification.compliance_fit.misfit import Misfit, diagnose
 from jointfrf.identification.compliance_fit.prepare import FitProblem
 from jointfrf.identification.joint_fit import JointFit
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
-from jointfrf.substructuring.ismm import inverse_substructuring
+from jointfrf.substructuring.modification import inverse_substructuring
 
 __all__ = [
     "ComplianceFit",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from jointfrf.frf.bands import spread_lines
-from jointfrf.frf.noise_estimate import ZERO
+from jointfrf.frf.entry_groups import ZERO
 from jointfrf.frf.quantiles import medians
 from jointfrf.identification.compliance_fit.estimator import JointEstimate
 from jointfrf.kernel.arguments import ComplexArray, FloatArray

@@ -9,7 +9,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from jointfrf.channels.left_out_dofs import LeftOutDof, left_out_dofs
+from jointfrf.channels.joint_channels import LeftOutDof, left_out_dofs
 from jointfrf.frf.bands import Band, as_bands, in_bands, line_slices
 from jointfrf.identification.compliance_fit.channel_noise import KnownNoise, NoiseOptions, known_noise
 from jointfrf.identification.compliance_fit.estimator import GroupStart

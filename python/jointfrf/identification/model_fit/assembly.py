@@ -15,7 +15,7 @@ from jointfrf.identification.model_fit.unknown import Unknown
 from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_frequency, as_names, check_type, one_line
 from jointfrf.laws.law_joint import Connection, LawJoint
-from jointfrf.substructuring.connection import connect
+from jointfrf.substructuring.coupling import connect
 
 __all__ = ["Assembly", "Places", "assembly_connection", "places_of"]
 

@@ -14,7 +14,7 @@ from jointfrf.identification.model_fit.unknowns import ParameterVector
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.kernel.linear_algebra import invert
 from jointfrf.laws.law_joint import Connection
-from jointfrf.substructuring.connection import connect, connection_forces
+from jointfrf.substructuring.coupling import connect, connection_forces
 
 __all__ = ["LineCompliance", "Prediction"]
 
