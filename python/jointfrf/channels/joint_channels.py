@@ -195,8 +195,7 @@ def left_out_dofs(h: ComplexArray, interface: Interface) -> tuple[LeftOutDof, ..
 
 def _rms(q: ComplexArray) -> FloatArray:
     """Return the root mean square of each row over its columns, and its median over lines."""
-    size: FloatArray = np.median(np.sqrt((abs(q) ** 2).mean(axis=2)), axis=0)
-    return size
+    return np.asarray(np.median(np.sqrt((abs(q) ** 2).mean(axis=2)), axis=0))
 
 
 _Kind = Literal["response", "excitation"]

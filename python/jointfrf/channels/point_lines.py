@@ -17,6 +17,7 @@ from jointfrf.kernel.arguments import (
     as_names,
     as_nodes,
     as_number,
+    as_positive,
     as_real,
     optional_frequency,
 )
@@ -61,9 +62,7 @@ def difference_weights(spacing: float | ArrayLike) -> FloatArray:
     [[0.5, 0.5], [-50.0, 50.0]]
     """
     if np.ndim(spacing) == 0:
-        step = as_number("spacing", spacing)
-        if step <= 0:
-            raise ValueError(f"spacing must be positive, not {step:g} m")
+        step = as_positive("spacing", spacing, "m")
         spacing = np.array([-step, 0.0, step])
     offset = as_real("spacing", spacing, (None,))
     if offset.size < 2:
@@ -224,10 +223,8 @@ def difference_error(spacing: float | ArrayLike, bending_stiffness: float, joint
     >>> round(error.bias, 3), round(error.compliance * 1e5, 2)
     (0.276, 5.53)
     """
-    if not (
-        as_number("bending_stiffness", bending_stiffness) > 0 and as_number("joint_stiffness", joint_stiffness) > 0
-    ):
-        raise ValueError("bending_stiffness and joint_stiffness must be positive")
+    as_positive("bending_stiffness", bending_stiffness, "N m^2")
+    as_positive("joint_stiffness", joint_stiffness, "N m/rad")
     t = difference_weights(spacing)
     reach = float(spacing) if np.ndim(spacing) == 0 else float(np.ptp(np.asarray(spacing))) / 2  # type: ignore[arg-type]
     compliance = reach / (3 * bending_stiffness)
@@ -272,8 +269,7 @@ class Interface(NamedTuple):
     def modes(self) -> FloatArray:
         """Motion of each channel for a unit of each joint DOF, j then k, shape (m, 2 n)."""
         at = direction_places(self.dofs)
-        modes: FloatArray = self.motion[:, np.concatenate([at, at + len(DIRECTIONS)])]
-        return modes
+        return self.motion[:, np.concatenate([at, at + len(DIRECTIONS)])]
 
 
 def interface(
@@ -357,8 +353,7 @@ def _motion(
 ) -> FloatArray:
     """Return the motion of channels for unit motions of a reference point, shape (m, 6)."""
     at = np.array([np.asarray(coordinates[channel.node], dtype=float) for channel in channels])
-    motion: FloatArray = rigid_motion(at, about)[np.arange(len(at)), [_AXES.index(c.axis) for c in channels]]
-    return motion
+    return rigid_motion(at, about)[np.arange(len(at)), [_AXES.index(c.axis) for c in channels]]
 
 
 def _one_side(

@@ -82,8 +82,7 @@ class VirtualPoint(NamedTuple):
 
         The root of the diagonal of T T^T, which is (R^T R)^-1 for equal weights: 1, or rad/m for rotations.
         """
-        gain: FloatArray = np.sqrt((self.transform**2).sum(axis=1))
-        return gain
+        return np.asarray(np.sqrt((self.transform**2).sum(axis=1)))
 
     @property
     def redundancy(self) -> FloatArray:
@@ -92,8 +91,7 @@ class VirtualPoint(NamedTuple):
         0: the other channels cannot check this one, its error goes into q unseen. The sum over all channels with
         weight is their number less n.
         """
-        left: FloatArray = 1 - np.einsum("mn,nm->m", self.modes, self.transform)
-        return left
+        return np.asarray(1 - np.einsum("mn,nm->m", self.modes, self.transform))
 
 
 def virtual_point(
@@ -360,8 +358,7 @@ def _as_directions(directions: ArrayLike, m: int) -> FloatArray:
     wrong = np.flatnonzero(abs(length - 1) > _UNIT)
     if wrong.size:
         raise ValueError(f"directions must be unit vectors: that of channel {wrong[0]} has length {length[wrong[0]]:g}")
-    unit: FloatArray = direction / length[:, None]
-    return unit
+    return np.asarray(direction / length[:, None])
 
 
 def _as_names(dofs: Sequence[str]) -> tuple[str, ...]:
@@ -598,10 +595,8 @@ def driving_point_check(h: ArrayLike) -> DrivingPointCheck:
 
 
 def _square(values: ComplexArray) -> FloatArray:
-    square: FloatArray = values.real**2 + values.imag**2
-    return square
+    return values.real**2 + values.imag**2
 
 
 def _power(squares: FloatArray, axis: int | tuple[int, ...]) -> FloatArray:
-    power: FloatArray = squares.sum(axis=axis)
-    return power
+    return np.asarray(squares.sum(axis=axis))

@@ -18,8 +18,7 @@ ZERO = 1e-8
 def own_size(h: ComplexArray) -> FloatArray:
     """Return |h_pp h_qq|, the size against which an FRF h_pq is zero or not; shape of h."""
     diagonal = abs(np.diagonal(h, axis1=-2, axis2=-1))
-    size: FloatArray = diagonal[..., :, None] * diagonal[..., None, :]
-    return size
+    return diagonal[..., :, None] * diagonal[..., None, :]
 
 
 def reciprocity_noise(h: ComplexArray) -> FloatArray:
@@ -47,8 +46,7 @@ def reciprocity_noise(h: ComplexArray) -> FloatArray:
     counts = size > 2 * ZERO**2 * own_size(h)[..., p, q]
     ratio = np.divide(abs(above - below) ** 2, size, out=np.zeros_like(size), where=counts)
     medians = [np.median(own[some]) if some.any() else 0.0 for own, some in zip(ratio, counts, strict=True)]
-    level: FloatArray = np.sqrt(np.array(medians) / np.log(2))
-    return level
+    return np.asarray(np.sqrt(np.array(medians) / np.log(2)))
 
 
 #: A pair that differs less than this, relatively, was made reciprocal: it holds one measurement.
@@ -168,5 +166,4 @@ def _counting(h: ComplexArray) -> NDArray[np.bool_]:
         for axis in (0, 1):
             largest = size.max(axis=axis, keepdims=True)
             size = size / np.where(largest > 0, largest, 1)
-    counts: NDArray[np.bool_] = size > ZERO
-    return counts
+    return np.asarray(size > ZERO)

@@ -29,11 +29,7 @@ __all__ = [
 POWER_OF_I_OMEGA = {"receptance": 0, "mobility": 1, "accelerance": 2}
 """How often a receptance is differentiated in time to give the quantity."""
 
-_PLURALS = {
-    "receptance": "receptances m/N",
-    "mobility": "mobilities (m/s)/N",
-    "accelerance": "accelerances (m/s^2)/N",
-}
+_PLURALS = {"receptance": "receptances m/N", "mobility": "mobilities (m/s)/N", "accelerance": "accelerances (m/s^2)/N"}
 _DIRECTION = re.compile(r"([+-]?)(r?[xyz])")
 _CHANNEL = re.compile(r"(\d+)\s*:?\s*([+-]?r?[xyz])")
 _NAMES_SHOWN = 10
@@ -571,8 +567,7 @@ class ChannelPlace:
         """Direction of the channel, shape (3,)."""
         if self.direction is not None:
             return self.direction
-        own: NDArray[np.float64] = self.channel.sign * np.eye(3)["xyz".index(self.channel.axis)] + 0.0
-        return own
+        return np.asarray(self.channel.sign * np.eye(3)["xyz".index(self.channel.axis)] + 0.0)
 
 
 def places_of_nodes(frfs: FrfSet, nodes_j: Sequence[int], nodes_k: Sequence[int]) -> tuple[ChannelPlace, ...]:

@@ -114,10 +114,19 @@ def pollute(
     >>> round(float(np.sqrt((abs(polluted - h) ** 2).mean())), 3)
     0.05
     """
-    polluted: ComplexArray = realisations(
-        h, level, kind, seed, relative_to=relative_to, reciprocal=reciprocal, block=block, first=realisation, count=1
-    )[0]
-    return polluted
+    return np.asarray(
+        realisations(
+            h,
+            level,
+            kind,
+            seed,
+            relative_to=relative_to,
+            reciprocal=reciprocal,
+            block=block,
+            first=realisation,
+            count=1,
+        )[0]
+    )
 
 
 def realisations(

@@ -21,15 +21,7 @@ from jointfrf.frf.noise_parts import (
 )
 from jointfrf.frf.quantiles import medians
 from jointfrf.frf.rational_fit import OrderSearch
-from jointfrf.frf.smoothing import (
-    SmoothFrfs,
-    checked_frfs,
-    first_variance,
-    joined,
-    near_squares,
-    pieces,
-    smoothed,
-)
+from jointfrf.frf.smoothing import SmoothFrfs, checked_frfs, first_variance, joined, near_squares, pieces, smoothed
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_integer, as_number, as_real, check_type
 
 __all__ = ["NoiseModel", "NoiseSource", "estimate_noise"]
@@ -259,8 +251,7 @@ class _NoisyLines:
 
     @cached_property
     def _least(self) -> FloatArray:
-        least: FloatArray = np.maximum(_ROUNDING**2 * first_variance(self.h), _TINY)
-        return least
+        return np.maximum(_ROUNDING**2 * first_variance(self.h), _TINY)
 
 
 def _estimated(
@@ -351,8 +342,7 @@ def _coherence_variance(h: ComplexArray, coherence: ArrayLike | None, averages: 
     count = 1.0 if averages is None else as_number("averages", averages)
     if count < 1:
         raise ValueError(f"averages must be 1 or more, not {averages}")
-    variance: FloatArray = (1 - squared) / (count * squared) * abs(h) ** 2
-    return variance
+    return (1 - squared) / (count * squared) * abs(h) ** 2
 
 
 def _found_inflation(

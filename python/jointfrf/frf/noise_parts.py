@@ -287,8 +287,7 @@ def _autocorrelation(x: ComplexArray | FloatArray, n_lags: int) -> FloatArray:
     """Return sums over entries and lines of Re x_l conj(x_(l+lag)), lag 0 to n_lags - 1."""
     length = 1 << int(np.ceil(np.log2(x.shape[1] + n_lags)))
     power = (abs(np.fft.fft(x, length, axis=1)) ** 2).sum(axis=0)
-    sums: FloatArray = np.fft.ifft(power).real[:n_lags]
-    return sums
+    return np.fft.ifft(power).real[:n_lags]
 
 
 @dataclass(frozen=True)
@@ -335,8 +334,7 @@ class ReciprocityDifferences:
         by_row[:, number == 0] = parts.mean(axis=1, keepdims=True)
         rest = ~means.any(axis=0)
         means[:, rest] = ((by_row[:, :, None] + by_row[:, None, :]) / 2)[:, rest]
-        variance: FloatArray = means[0] * near + means[1] * size
-        return variance
+        return np.asarray(means[0] * near + means[1] * size)
 
     def line_levels(self, variance: FloatArray, inflation: float = 1.0) -> LineLevels:
         """Return slow variation and outlying lines of the noise of FRFs of this variance (n_freq, m, m)."""

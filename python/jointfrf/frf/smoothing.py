@@ -249,8 +249,7 @@ def _smooth_group(
 def first_variance(h: ComplexArray) -> FloatArray:
     """Variance before anything is known of the noise: |h|^2 over neighbouring lines, not below a part of its median."""
     near = near_squares(h)
-    variance: FloatArray = np.maximum(near + _FIRST_FLOOR * medians(near.T).T, np.finfo(float).tiny)
-    return variance
+    return np.maximum(near + _FIRST_FLOOR * medians(near.T).T, np.finfo(float).tiny)
 
 
 def near_squares(h: ComplexArray) -> FloatArray:

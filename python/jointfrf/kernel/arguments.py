@@ -25,6 +25,7 @@ __all__ = [
     "ComplexArray",
     "FloatArray",
     "as_array",
+    "as_count",
     "as_dofs",
     "as_frequency",
     "as_integer",
@@ -35,6 +36,7 @@ __all__ = [
     "as_names",
     "as_nodes",
     "as_number",
+    "as_positive",
     "as_real",
     "as_square",
     "as_values",
@@ -259,6 +261,22 @@ def as_number(name: str, value: object) -> float:
     if not np.isfinite(number):
         raise ValueError(f"{name} must be finite, not {number}")
     return number
+
+
+def as_positive(name: str, value: object, unit: str = "") -> float:
+    """Return one number above zero."""
+    number = as_number(name, value)
+    if number <= 0:
+        raise ValueError(f"{name} must be positive, not {number:g}{unit and ' '}{unit}")
+    return number
+
+
+def as_count(name: str, value: object, least: int = 1) -> int:
+    """Return a whole number that is not too small; floats without a fraction serve, too."""
+    number = as_number(name, value)
+    if number < least or number != int(number):
+        raise ValueError(f"{name} must be a whole number, at least {least}, not {value}")
+    return int(number)
 
 
 def as_values(name: str, value: ArrayLike, n: int) -> ComplexArray:

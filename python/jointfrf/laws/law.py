@@ -206,8 +206,7 @@ def _least_squares(basis: ComplexArray, target: ComplexArray) -> FloatArray:
     """Return real factors of complex columns."""
     both = np.concatenate([basis.real, basis.imag]), np.concatenate([target.real, target.imag])
     size = np.maximum(np.linalg.norm(both[0], axis=0), np.finfo(float).tiny)
-    found: FloatArray = np.linalg.lstsq(both[0] / size, both[1], rcond=None)[0] / size
-    return found
+    return np.asarray(np.linalg.lstsq(both[0] / size, both[1], rcond=None)[0] / size)
 
 
 def _within(value: float, field: LawField, size: float) -> float:

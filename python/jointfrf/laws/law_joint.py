@@ -302,12 +302,7 @@ class LawJoint:
         return Joint(k, c, self.dofs, structural_damping=h)
 
     def export(
-        self,
-        program: CardFormat,
-        nodes: Sequence[int],
-        *,
-        freq_hz: float | None = None,
-        **options: Unpack[CardOptions],
+        self, program: CardFormat, nodes: Sequence[int], *, freq_hz: float | None = None, **options: Unpack[CardOptions]
     ) -> str:
         """Write the joint as input of a finite-element program, in SI units.
 

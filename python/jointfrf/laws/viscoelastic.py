@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_positive
 from jointfrf.laws.law import JointLaw, LawField
 
 __all__ = ["FractionalZener", "PowerLaw", "StandardLinearSolid"]
@@ -167,8 +167,7 @@ class PowerLaw(JointLaw):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.reference_hz <= 0:
-            raise ValueError(f"reference_hz must be positive, not {self.reference_hz:g}")
+        as_positive("reference_hz", self.reference_hz)
 
     def stiffness(self, omega: FloatArray) -> ComplexArray:
         """Return K*(w), shape (n_freq,)."""

@@ -320,5 +320,4 @@ def _cut(part: sparse.csr_array) -> tuple[Vertices, Vertices, Vertices] | None:
 
 def _distances(part: sparse.csr_array, start: int) -> NDArray[np.float64]:
     """Return the number of edges from one vertex to each; inf where there is no way."""
-    found: NDArray[np.float64] = csgraph.dijkstra(part, unweighted=True, indices=start)
-    return found
+    return np.asarray(csgraph.dijkstra(part, unweighted=True, indices=start))

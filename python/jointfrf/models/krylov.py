@@ -107,8 +107,7 @@ class TwoLevels:
         stiffness = modes.stiffness[elastic] * (1 + 1j * modes.loss_factor[elastic])
         denominator = stiffness - omega**2 + 1j * omega * modes.damping[elastic]
         taken = np.divide(1, denominator, out=np.zeros_like(denominator), where=denominator != 0)
-        found: ComplexArray = shapes @ (taken[:, None] * (shapes.T @ forces))
-        return found
+        return shapes @ (taken[:, None] * (shapes.T @ forces))
 
 
 def spot_error(
@@ -170,12 +169,7 @@ def spot_error(
 
 
 def _by_factors(
-    solver: SparseSolver,
-    matrices: ModelMatrices,
-    omega: float,
-    forces: ComplexArray,
-    outputs: Ports,
-    parts: RigidModes,
+    solver: SparseSolver, matrices: ModelMatrices, omega: float, forces: ComplexArray, outputs: Ports, parts: RigidModes
 ) -> tuple[NDArray[Any], ComplexArray]:
     """Return the refined solution by complex factors of a line, and its last step at the responses."""
     z = matrices.dynamic_stiffness(omega)

@@ -287,13 +287,11 @@ class Ports:
 
     def of(self, shapes: NDArray[Any]) -> NDArray[Any]:
         """Return the displacements at the ports from those of all DOFs, shape (n, k) to (m, k)."""
-        found: NDArray[Any] = self.weights @ shapes if self.picked is None else shapes[self.picked - 1]
-        return found
+        return self.weights @ shapes if self.picked is None else shapes[self.picked - 1]
 
     def forces(self) -> FloatArray:
         """Return unit forces at the ports, shape (n, m)."""
-        found: FloatArray = self.weights.T.toarray()
-        return found
+        return np.asarray(self.weights.T.toarray())
 
 
 def as_ports(name: str, value: Any, n: int) -> Ports:
@@ -323,5 +321,4 @@ def directions(*ports: Ports) -> FloatArray:
         forces[dofs, np.arange(dofs.size)] = 1
         return forces
     rows = {row.tobytes(): i for i, row in enumerate(weights.toarray()) if row.any()}
-    found: FloatArray = weights[list(rows.values())].T.toarray()
-    return found
+    return np.asarray(weights[list(rows.values())].T.toarray())

@@ -75,13 +75,11 @@ class RigidModes:
 
     def straining_forces(self, forces: FloatArray) -> FloatArray:
         """Return forces that do not accelerate these modes, b - M r r^T b."""
-        left: FloatArray = forces - self.momenta @ (self.shapes.T @ forces)
-        return left
+        return forces - self.momenta @ (self.shapes.T @ forces)
 
     def strains(self, motion: NDArray[Any]) -> NDArray[Any]:
         """Return motion without its part in these modes, x - r r^T M x."""
-        left: NDArray[Any] = motion - self.shapes @ (self.momenta.T @ motion)
-        return left
+        return np.asarray(motion - self.shapes @ (self.momenta.T @ motion))
 
 
 def held(n: int) -> RigidModes:
@@ -105,8 +103,7 @@ def mode_condition(dynamic_stiffness: ComplexArray, uncertainty: FloatArray) -> 
     """
     left = abs(dynamic_stiffness)
     rcond = np.divide(_EPS * left, uncertainty, out=np.ones_like(left), where=uncertainty > 0)
-    found: FloatArray = np.where(left > 0, rcond, 0).min(axis=1, initial=1.0)
-    return found
+    return np.asarray(np.where(left > 0, rcond, 0).min(axis=1, initial=1.0))
 
 
 def find_rigid_modes(k: Operand, m: Operand, solver: SparseSolver | None = None) -> RigidModes:
@@ -208,8 +205,7 @@ def _ritz(k: Operand, magnitudes: Operand, m: Operand, basis: FloatArray) -> tup
 def _terms(magnitudes: Operand, shapes: FloatArray) -> FloatArray:
     """Return |r|^T |A| |r| of each shape, shape (k,), from |A|."""
     lengths = abs(shapes)
-    found: FloatArray = np.einsum("ij,ij->j", lengths, magnitudes @ lengths)
-    return found
+    return np.asarray(np.einsum("ij,ij->j", lengths, magnitudes @ lengths))
 
 
 def eigh(k: FloatArray, m: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -238,8 +234,7 @@ def orthonormal(a: FloatArray) -> FloatArray:
     _check_finite(a)
     n_work = _LAPACK_BLOCK * a.shape[1]
     reflectors, scales, _, _ = lapack.dgeqrf(a, lwork=n_work)
-    basis: FloatArray = lapack.dorgqr(reflectors, scales, lwork=n_work)[0]
-    return basis
+    return np.asarray(lapack.dorgqr(reflectors, scales, lwork=n_work)[0])
 
 
 def _check_finite(*arrays: FloatArray) -> None:

@@ -17,6 +17,7 @@ from jointfrf.kernel.arguments import (
     FloatArray,
     as_frequency,
     as_number,
+    as_positive,
     as_real,
     check_choice,
     checked_out,
@@ -240,10 +241,7 @@ def receptance(
     n = matrices.n
     to = as_ports("outputs", outputs, n)
     into = to if inputs is outputs else as_ports("inputs", inputs, n)
-    wanted = as_number("tolerance", tolerance)
-    if not wanted > 0:
-        raise ValueError(f"tolerance must be positive, not {wanted}")
-    task = _Task(freq, matrices, to, into, on_singular, wanted, out)
+    task = _Task(freq, matrices, to, into, on_singular, as_positive("tolerance", tolerance), out)
     if method in ("dense", "banded", "sparse"):
         result, made = _solved(task, cast(Direct, method), "as requested")
     elif method == "modal":

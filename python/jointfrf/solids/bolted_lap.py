@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from jointfrf.kernel.arguments import FloatArray, as_number, check_choice, check_type, one_line
-from jointfrf.models.beam import End
+from jointfrf.kernel.arguments import FloatArray, as_count, as_positive, check_choice, check_type, one_line
+from jointfrf.models.beam import End, check_ends
 from jointfrf.solids.brick import Material, brick_quality
 from jointfrf.solids.brick_beam import Preset, holed_plan
 from jointfrf.solids.contact import ContactInterface
@@ -84,8 +84,7 @@ class Bolt:
 
     def __post_init__(self) -> None:
         for name in ("shank_radius", "head_radius", "head_height", "nut_radius", "nut_height"):
-            if as_number(name, getattr(self, name)) <= 0:
-                raise ValueError(f"{name} must be positive, not {getattr(self, name):g} m")
+            as_positive(name, getattr(self, name), "m")
         for name in ("head_radius", "nut_radius"):
             if getattr(self, name) <= self.shank_radius:
                 radius, shank = 1e3 * getattr(self, name), 1e3 * self.shank_radius
@@ -123,8 +122,7 @@ def preload_force(tensile_area: float, proof_strength: float, share: float = 0.7
     22783.5
     """
     for name, value in (("tensile_area", tensile_area), ("proof_strength", proof_strength), ("share", share)):
-        if as_number(name, value) <= 0:
-            raise ValueError(f"{name} must be positive, not {value:g}")
+        as_positive(name, value)
     if share > 1:
         raise ValueError(f"share must not exceed 1, the proof load itself, not {share:g}")
     return share * tensile_area * proof_strength  # (4.3), (4.4)
@@ -137,11 +135,7 @@ Body = Literal["A", "B", "bolt"]
 #: The bodies in the order of their elements.
 BODIES: Final[tuple[Body, ...]] = get_args(Body)
 #: Lower and upper body of each interface.
-INTERFACES: Final[dict[str, tuple[Body, Body]]] = {
-    "head": ("A", "bolt"),
-    "lap": ("B", "A"),
-    "nut": ("bolt", "B"),
-}
+INTERFACES: Final[dict[str, tuple[Body, Body]]] = {"head": ("A", "bolt"), "lap": ("B", "A"), "nut": ("bolt", "B")}
 #: Bricks along a beam for each height of length, away from the overlap.
 _PER_HEIGHT: Final = 1.14
 #: Circles around the head reach this share of the way to the nearest edge.
@@ -188,9 +182,8 @@ class LapDivisions:
     def __post_init__(self) -> None:
         for field in fields(self):
             value = getattr(self, field.name)
-            least = 0 if field.name == "circles" else 1
-            if value is not None and (int(value) != value or value < least):
-                raise ValueError(f"{field.name} must be a whole number, at least {least}, not {value}")
+            if value is not None:
+                as_count(field.name, value, 0 if field.name == "circles" else 1)
 
 
 @dataclass(frozen=True)
@@ -229,8 +222,7 @@ class BoltedLap:
 
     def held(self) -> NDArray[np.int64]:
         """Return the DOFs of the clamped nodes, x, y, z of each."""
-        held: NDArray[np.int64] = (3 * self.clamped[:, None].astype(np.int64) + np.arange(3)).ravel()
-        return held
+        return (3 * self.clamped[:, None].astype(np.int64) + np.arange(3)).ravel()
 
     def element_materials(self) -> list[Material]:
         """Return the material of every element."""
@@ -300,8 +292,7 @@ def bolted_lap(
         check_type("materials", material, Material)
     _check_dimensions(lengths, heights, width, overlap, hole_radius, fastener)
     check_choice("preset", preset, get_args(Preset))
-    for end in ends:
-        check_choice("ends", end, get_args(End))
+    check_ends(ends)
     start = lengths[0] - overlap
     radii = _radii(hole_radius, fastener, min(width, overlap) / 2, bricks)
     shared = _shared_plan(overlap, width, heights, radii, bricks, start)
@@ -345,8 +336,7 @@ def _check_dimensions(
     named = {"lengths": lengths, "heights": heights, "width": (width,), "overlap": (overlap,)}
     for name, values in {**named, "hole_radius": (hole_radius,)}.items():
         for value in values:
-            if as_number(name, value) <= 0:
-                raise ValueError(f"{name} must be positive, not {value:g} m")
+            as_positive(name, value, "m")
     if overlap > min(lengths):
         raise ValueError(f"overlap ({1e3 * overlap:g} mm) must not exceed the lengths of the beams")
     if hole_radius <= bolt.shank_radius:
@@ -445,9 +435,7 @@ def _interfaces(mesh: Mesh, body: NDArray[np.str_], heights: tuple[float, float]
         # A corner of a quad that is no neighbour of a touching one belongs to no pair.
         kept = touching & np.isin(partner, quads)
         found[name] = ContactInterface(
-            lower=nodes[nearest[kept]],
-            upper=partner[kept],
-            area=_node_areas(mesh.nodes, quads, partner[kept]),
+            lower=nodes[nearest[kept]], upper=partner[kept], area=_node_areas(mesh.nodes, quads, partner[kept])
         )
     return found
 

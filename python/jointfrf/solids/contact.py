@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 from scipy.sparse import linalg as sparse_linalg
 
-from jointfrf.kernel.arguments import FloatArray, as_integer, as_number, as_real
+from jointfrf.kernel.arguments import FloatArray, as_count, as_number, as_positive, as_real
 from jointfrf.models.factors import SYMMETRIC
 
 __all__ = [
@@ -69,8 +69,8 @@ class ContactLaw:
             raise ValueError(f"friction must not be negative, not {self.friction:g}")
         for name in ("normal_stiffness", "tangential_stiffness"):
             value = getattr(self, name)
-            if value is not None and as_number(name, value) <= 0:
-                raise ValueError(f"{name} must be positive, or None for rigid, not {value:g} N/m^3")
+            if value is not None:
+                as_positive(name, value, "N/m^3 (None: rigid)")
 
 
 @dataclass(frozen=True)
@@ -343,8 +343,7 @@ def solve_contact(
     """
     k = sparse.csr_array(stiffness)
     f = as_real("load", load, (k.shape[0],))
-    if as_integer("max_iterations", max_iterations) < 1:
-        raise ValueError(f"max_iterations must be a whole number, at least 1, not {max_iterations}")
+    max_iterations = as_count("max_iterations", max_iterations)
     if not f.any():
         raise ValueError("load must not be zero everywhere")
     problem = _Problem(k, f, Pairs(interfaces, k.shape[0]), law or ContactLaw(), np.asarray(fixed, np.int64))
@@ -465,9 +464,7 @@ class _Problem:
         normal, shear, slide = force[:, NORMAL], force[:, TANGENTIAL], relative[:, TANGENTIAL]
         separation = self.pairs.gap + relative[:, NORMAL]
         closed = np.where(
-            contacts.closed,
-            normal > -_ROUNDING * abs(normal).max(),
-            separation < -_ROUNDING * abs(relative).max(),
+            contacts.closed, normal > -_ROUNDING * abs(normal).max(), separation < -_ROUNDING * abs(relative).max()
         )
         if self.law.friction == 0:
             return _Contacts(closed, contacts.slipping, contacts.direction, contacts.turning)

@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 from scipy.spatial import cKDTree
 
-from jointfrf.kernel.arguments import FloatArray, as_array, as_number, as_real, check_type
+from jointfrf.kernel.arguments import FloatArray, as_array, as_count, as_number, as_real, check_type
 
-__all__ = ["Mesh", "Plan", "as_count", "disc", "extrude", "holed_rectangle", "interpolation", "join_plans", "rectangle"]
+__all__ = ["Mesh", "Plan", "disc", "extrude", "holed_rectangle", "interpolation", "join_plans", "rectangle"]
 
 #: Points nearer than this share of the extent of a mesh are one node.
 _SAME = 1e-7
@@ -88,14 +88,6 @@ class Mesh:
 
 #: Faces of a brick, counter-clockwise from outside.
 _FACES = np.array([[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]])
-
-
-def as_count(name: str, value: object) -> int:
-    """Return a whole number of at least 1."""
-    number = as_number(name, value)
-    if number < 1 or number != int(number):
-        raise ValueError(f"{name} must be a whole number, at least 1, not {value}")
-    return int(number)
 
 
 def rectangle(z: ArrayLike, x: ArrayLike) -> Plan:

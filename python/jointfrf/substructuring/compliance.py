@@ -15,7 +15,7 @@ from jointfrf.kernel.arguments import (
     FloatArray,
     as_integer,
     as_interface,
-    as_number,
+    as_positive,
     as_real,
     as_square,
     check_finite_lines,
@@ -397,10 +397,7 @@ def _variance(noise: float | ArrayLike | None, lines: ComplexArray) -> FloatArra
     if noise is None:
         return None
     if np.ndim(noise) == 0:
-        level = as_number("noise", noise)
-        if level <= 0:
-            raise ValueError(f"noise must be positive, not {level:g}")
-        return level**2 * (lines.real**2 + lines.imag**2)
+        return as_positive("noise", noise) ** 2 * (lines.real**2 + lines.imag**2)
     variance = as_real("noise", noise, lines.shape)
     if (variance < 0).any():
         raise ValueError("noise must not hold negative variances")
@@ -441,8 +438,7 @@ def _truncated_inverse(
 def _noise_threshold(variance: FloatArray) -> FloatArray:
     """Return the expected largest singular value of independent noise, shape (n_freq,)."""
     by_rows, by_columns = variance.sum(axis=2), variance.sum(axis=1)
-    threshold: FloatArray = np.sqrt(by_rows.max(axis=1)) + np.sqrt(by_columns.max(axis=1))
-    return threshold
+    return np.asarray(np.sqrt(by_rows.max(axis=1)) + np.sqrt(by_columns.max(axis=1)))
 
 
 def _check_regular(size: FloatArray, name: str) -> None:

@@ -177,11 +177,7 @@ STIFFNESS_METHODS: Mapping[StiffnessMethod, LineMethod] = {
 
 
 def joint_stiffness(
-    method: StiffnessMethod,
-    frfs: JointFrfs,
-    *,
-    freq_hz: ArrayLike | None = None,
-    on_singular: OnSingular = "raise",
+    method: StiffnessMethod, frfs: JointFrfs, *, freq_hz: ArrayLike | None = None, on_singular: OnSingular = "raise"
 ) -> ComplexArray:
     """Joint stiffness by one of the methods.
 

@@ -195,8 +195,7 @@ def _findings_at_joint(
 
 def _propagated(h: ComplexArray, t_out: FloatArray, t_in: FloatArray) -> FloatArray:
     """Return the deviation of transformed FRFs where that of each channel is its size."""
-    deviation: FloatArray = np.sqrt(t_out**2 @ abs(h) ** 2 @ (t_in**2).T)
-    return deviation
+    return np.sqrt(t_out**2 @ abs(h) ** 2 @ (t_in**2).T)
 
 
 def _check_channels(state: _Progress) -> None:
@@ -268,8 +267,7 @@ def _check_ratios(state: _Progress, m: Measurement, pairs: PairRatios) -> None:
 
 
 def _driving(h: ComplexArray) -> ComplexArray:
-    diagonal: ComplexArray = np.einsum("faa->fa", h)
-    return diagonal
+    return np.asarray(np.einsum("faa->fa", h))
 
 
 def _matrix(values: np.ndarray, pairs: PairRatios, n: int) -> np.ndarray:
@@ -282,8 +280,7 @@ def _noise(pairs: PairRatios, n: int) -> FloatArray:
     """Return the deviation of the phase of an FRF of each channel, from the scatter of its ratios; 0 if unknown."""
     scatter = _matrix(np.where(pairs.usable, pairs.scatter, 0.0), pairs, n)
     count = (scatter > 0).sum(axis=1)
-    deviation: FloatArray = scatter.sum(axis=1) / np.maximum(count, 1) / np.sqrt(4 * np.log(2))
-    return deviation
+    return np.asarray(scatter.sum(axis=1) / np.maximum(count, 1) / np.sqrt(4 * np.log(2)))
 
 
 def _result(state: _Progress, freq: FloatArray, h: ComplexArray, good: np.ndarray, fix: Sequence[FrfFix]) -> FrfCheck:

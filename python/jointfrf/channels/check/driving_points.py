@@ -112,8 +112,7 @@ def sectors(driving: ComplexArray) -> Sectors:
 def one_sidedness(driving: ComplexArray) -> FloatArray:
     """Measure how far each driving-point FRF, shape (n_freq, n), lies in one half plane: 1 on all lines, 0 on half."""
     u, real, imaginary = _balances(driving)
-    share: FloatArray = np.where(_on_real_axis(u), abs(imaginary), abs(real))
-    return share
+    return np.where(_on_real_axis(u), abs(imaginary), abs(real))
 
 
 def _balances(driving: ComplexArray) -> tuple[ComplexArray, FloatArray, FloatArray]:
@@ -127,8 +126,7 @@ def _balances(driving: ComplexArray) -> tuple[ComplexArray, FloatArray, FloatArr
 
 def _on_real_axis(u: ComplexArray) -> NDArray[np.bool_]:
     """Between resonances a receptance is nearly real and a mobility nearly imaginary."""
-    on: NDArray[np.bool_] = (u**2).real.mean(axis=0) > 0
-    return on
+    return np.asarray((u**2).real.mean(axis=0) > 0)
 
 
 def passivity_findings(

@@ -163,8 +163,7 @@ def _from_one(first: ComplexArray, second: ComplexArray) -> FloatArray:
     with np.errstate(invalid="ignore"):
         distance = abs(np.log(np.where(known, first, 1) / np.where(known, second, 1)))
     distance = np.where((first != 0) != (second != 0), ONE_SIDED, distance)
-    median: FloatArray = np.median(distance, axis=0)
-    return median
+    return np.asarray(np.median(distance, axis=0))
 
 
 def _scatter(h: ComplexArray) -> FloatArray:

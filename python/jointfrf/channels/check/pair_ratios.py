@@ -63,8 +63,7 @@ class RatioLine(NamedTuple):
 
     def phase_at_zero(self) -> FloatArray:
         """Return the phase at 0 Hz, rad."""
-        phase: FloatArray = self.mean.imag - self.at * self.slope
-        return phase
+        return self.mean.imag - self.at * self.slope
 
 
 def ratio_line(omega: FloatArray, values: ComplexArray, turn: FloatArray, usable: NDArray[np.bool_]) -> RatioLine:
@@ -156,8 +155,7 @@ def _block_deviation(rest: ComplexArray, length: int) -> FloatArray:
     squares = block_medians(rest.real**2 + rest.imag**2, length) / np.log(2)
     squares = np.maximum(squares, 0.01 * np.median(squares, axis=0) + LEAST_ERROR**2)
     place = np.minimum(np.arange(rest.shape[0]) // length, squares.shape[0] - 1)
-    deviation: FloatArray = np.sqrt(squares)[place]
-    return deviation
+    return np.asarray(np.sqrt(squares)[place])
 
 
 def _clipped(rest: ComplexArray, deviation: FloatArray) -> ComplexArray:
@@ -286,8 +284,7 @@ def are_signals(size: FloatArray, smooth: FloatArray, n_freq: int) -> NDArray[np
     across = size * size.T
     own = size.diagonal()
     large = (across > _SMALL**2 * np.outer(own, own)) & (across > 0)
-    signals: NDArray[np.bool_] = large & (np.minimum(smooth, smooth.T) > max(LEAST_SMOOTHNESS, 4 / np.sqrt(n_freq)))
-    return signals
+    return np.asarray(large & (np.minimum(smooth, smooth.T) > max(LEAST_SMOOTHNESS, 4 / np.sqrt(n_freq))))
 
 
 def are_one_sided(size: FloatArray, smooth: FloatArray) -> NDArray[np.bool_]:
@@ -316,8 +313,7 @@ def _parts(above: ComplexArray, below: ComplexArray) -> tuple[FloatArray, Comple
 
 def _unit(values: ComplexArray) -> ComplexArray:
     size = abs(values)
-    unit: ComplexArray = np.where(size > 0, values / np.where(size > 0, size, 1), 1)
-    return unit
+    return np.where(size > 0, values / np.where(size > 0, size, 1), 1)
 
 
 def _delays(omega: FloatArray) -> tuple[FloatArray, ComplexArray]:

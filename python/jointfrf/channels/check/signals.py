@@ -71,14 +71,12 @@ class Measurement:
     @cached_property
     def square(self) -> ComplexArray:
         """FRFs between the DOFs that responses and forces share, shape (n_freq, n, n)."""
-        at: ComplexArray = self.h[:, self.rows[:, None], self.columns] * self.signs
-        return at
+        return self.h[:, self.rows[:, None], self.columns] * self.signs
 
     @property
     def square_smoothness(self) -> FloatArray:
         """Smoothness of `square`, shape (n, n)."""
-        at: FloatArray = self.smoothness[self.rows[:, None], self.columns]
-        return at
+        return self.smoothness[self.rows[:, None], self.columns]
 
     @property
     def dofs(self) -> tuple[str, ...]:
@@ -104,16 +102,14 @@ class Measurement:
 
 def modulus(h: ComplexArray) -> FloatArray:
     """Return |h| of numbers whose squares do not overflow, faster than abs."""
-    size: FloatArray = np.sqrt(h.real**2 + h.imag**2)
-    return size
+    return np.sqrt(h.real**2 + h.imag**2)
 
 
 def smoothness(h: ComplexArray) -> FloatArray:
     """Agreement of the phase of each FRF from line to line: 1 for a smooth one, 1/sqrt(n_freq) for noise, 0 for 0."""
     turned = h[:-1].conj() * h[1:]
     size = modulus(turned)
-    together: FloatArray = abs((turned / np.where(size > 0, size, 1)).mean(axis=0))
-    return together
+    return abs((turned / np.where(size > 0, size, 1)).mean(axis=0))
 
 
 def as_measurement(
@@ -252,8 +248,7 @@ def _products(h: ComplexArray) -> FloatArray:
     size = np.sqrt((abs(h) ** 2).mean(axis=(0, 1), keepdims=True))
     flat = (h / np.where(size > 0, size, 1)).swapaxes(0, 1).reshape(h.shape[1], -1)
     flat = flat / np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), np.finfo(float).tiny)
-    products: FloatArray = (flat.conj() @ flat.T).real
-    return products
+    return np.asarray((flat.conj() @ flat.T).real)
 
 
 def _copy_finding(word: str, first: str, second: str, value: float) -> FrfFinding:
