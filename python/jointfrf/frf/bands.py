@@ -12,9 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from jointfrf.kernel.arguments import FloatArray, as_frequency, as_names, as_square, as_values, one_line
 
 __all__ = [
-    "PIECE",
     "Band",
-    "BandMean",
     "amplitude_error",
     "as_bands",
     "band_mean",

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from jointfrf.kernel.arguments import ComplexArray, as_integer, as_lines, as_number, check_choice
 from jointfrf.kernel.call import call
 
-__all__ = ["NOISE_KINDS", "NoiseKind", "NoiseNumbers", "NoiseReference", "noise_arguments", "pollute", "realisations"]
+__all__ = ["NOISE_KINDS", "NoiseKind", "NoiseReference", "noise_arguments", "pollute", "realisations"]
 
 NoiseKind = Literal["complex", "complex-per-part", "real-normal", "real-uniform", "real-uniform-std"]
 NoiseReference = Literal["entry", "line", "spectrum"]

@@ -24,7 +24,7 @@ from jointfrf.frf.rational_fit import OrderSearch
 from jointfrf.frf.smoothing import SmoothFrfs, checked_frfs, first_variance, joined, near_squares, pieces, smoothed
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_integer, as_number, as_real, check_type
 
-__all__ = ["NoiseModel", "NoiseSource", "estimate_noise"]
+__all__ = ["NoiseModel", "estimate_noise"]
 
 #: What the variance was found from.
 NoiseSource = Literal["residual", "reciprocity", "none"]

@@ -15,7 +15,6 @@ from jointfrf.frf.quantiles import medians, quantiles
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
 __all__ = [
-    "LineLevels",
     "NoiseTerms",
     "ReciprocityDifferences",
     "line_correlation",

@@ -21,7 +21,6 @@ from jointfrf.errors import CopyWarning
 
 __all__ = [
     "CHUNK_BYTES",
-    "LARGE_COPY",
     "ComplexArray",
     "FloatArray",
     "as_array",
@@ -46,7 +45,6 @@ __all__ = [
     "checked_out",
     "chunks",
     "in_one_piece",
-    "is_mapped",
     "one_line",
     "optional_frequency",
     "release",

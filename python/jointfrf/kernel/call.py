@@ -29,7 +29,6 @@ __all__ = [
     "call",
     "call_for_number",
     "check_lines",
-    "check_status",
     "get_engine",
     "info_of",
     "run",

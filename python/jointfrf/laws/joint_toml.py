@@ -17,17 +17,7 @@ from jointfrf.laws.viscoelastic import FractionalZener, PowerLaw, StandardLinear
 from jointfrf.toml.keys import Key, KeyTable
 from jointfrf.toml.table import TomlTable
 
-__all__ = [
-    "JOINT_KEYS",
-    "LAWS",
-    "LAW_JOINT_KEYS",
-    "LAW_VALUES",
-    "LAW_WORDS",
-    "joint_text",
-    "read_joint_table",
-    "read_law",
-    "takes_in_words",
-]
+__all__ = ["LAW_VALUES", "LAW_WORDS", "joint_text", "read_joint_table", "read_law", "takes_in_words"]
 
 #: The laws that files can hold: a new law is a file with its class, and its name here.
 LAWS: tuple[type[JointLaw], ...] = (SpringLaw, StandardLinearSolid, FractionalZener, PowerLaw)

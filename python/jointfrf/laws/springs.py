@@ -12,7 +12,7 @@ import numpy as np
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, check_choice
 from jointfrf.laws.law import JointLaw, LawField
 
-__all__ = ["SpringDamping", "SpringLaw"]
+__all__ = ["SpringLaw"]
 
 SpringDamping = Literal["none", "viscous", "hysteretic", "both"]
 

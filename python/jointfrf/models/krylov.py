@@ -15,7 +15,7 @@ from jointfrf.models.factors import Factors, SingularMatrixError, SparseSolver
 from jointfrf.models.matrices import ModelMatrices, Ports, directions
 from jointfrf.models.modal import Modes, RigidModes, find_rigid_modes, held
 
-__all__ = ["Reduction", "TwoLevels", "reduce_model", "spot_error"]
+__all__ = ["reduce_model", "spot_error"]
 
 #: Rounding may move the modes of a reduced model by this many times what it moves a direct solution by, but no more
 #: than what rounding leaves of a solution with the smallest reciprocal condition that gives no warning: four digits.

@@ -14,18 +14,7 @@ from jointfrf.kernel.call import N_FREQ, RCOND_LIMIT, LineStatus, OnSingular, ch
 from jointfrf.models.factors import SingularMatrixError, SparseSolver, factor
 from jointfrf.models.matrices import ModelMatrices, Operand, Ports
 
-__all__ = [
-    "SINGULAR",
-    "Modes",
-    "RigidModes",
-    "all_modes",
-    "eigh",
-    "find_rigid_modes",
-    "held",
-    "mode_condition",
-    "orthonormal",
-    "resistance",
-]
+__all__ = ["SINGULAR", "Modes", "RigidModes", "all_modes", "find_rigid_modes", "held", "mode_condition"]
 
 #: A fine mesh in mixed units has rcond 1e-13 and still gives nine digits: only below this is a line singular.
 SINGULAR = float(np.finfo(np.float64).eps)

@@ -21,7 +21,6 @@ __all__ = [
     "BODIES",
     "INTERFACES",
     "PROOF_STRENGTH",
-    "STEEL",
     "STRESS_AREA",
     "Bolt",
     "BoltedLap",

@@ -14,19 +14,7 @@ from scipy.sparse import linalg as sparse_linalg
 from jointfrf.kernel.arguments import FloatArray, as_count, as_number, as_positive, as_real
 from jointfrf.models.factors import SYMMETRIC
 
-__all__ = [
-    "NORMAL",
-    "TANGENTIAL",
-    "BoolArray",
-    "ContactInterface",
-    "ContactLaw",
-    "ContactSolution",
-    "InterfaceState",
-    "Iteration",
-    "Pairs",
-    "solve_contact",
-    "tie",
-]
+__all__ = ["ContactInterface", "ContactLaw", "InterfaceState", "Iteration", "Pairs", "solve_contact", "tie"]
 
 BoolArray = NDArray[np.bool_]
 

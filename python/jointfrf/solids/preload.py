@@ -18,7 +18,7 @@ from jointfrf.solids.brick_beam import PRESETS
 from jointfrf.solids.contact import ContactLaw, InterfaceState, Iteration, Pairs, solve_contact, tie
 from jointfrf.solids.solid import SolidModel, solid_model
 
-__all__ = ["PreloadedLap", "PressureMap", "preload"]
+__all__ = ["PreloadedLap", "preload"]
 
 #: Nodes within this share of the height of the mesh lie in a face, or at the cut.
 _NEAR: Final = 1e-6

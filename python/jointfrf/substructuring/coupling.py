@@ -26,7 +26,7 @@ from jointfrf.kernel.call import N_FREQ, OnSingular, run
 from jointfrf.kernel.linear_algebra import solve
 from jointfrf.laws.law_joint import Connection, LawJoint
 
-__all__ = ["SemmMethod", "connect", "connection_forces", "connection_matrix", "couple", "semm"]
+__all__ = ["connect", "connection_forces", "couple", "semm"]
 
 
 def connection_matrix(

@@ -14,7 +14,7 @@ from jointfrf.kernel.arguments import ComplexArray, as_dofs, as_lines, as_square
 from jointfrf.kernel.call import N_FREQ, OnSingular, run
 from jointfrf.substructuring.modification import inverse_substructuring, ismm
 
-__all__ = ["STIFFNESS_METHODS", "Equation", "JointFrfs", "LineMethod", "StiffnessMethod", "decouple", "joint_stiffness"]
+__all__ = ["STIFFNESS_METHODS", "JointFrfs", "StiffnessMethod", "decouple", "joint_stiffness"]
 
 Equation = Literal["rr", "rs", "sr", "ss"]
 

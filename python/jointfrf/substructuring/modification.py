@@ -18,7 +18,7 @@ from jointfrf.kernel.arguments import (
 )
 from jointfrf.kernel.call import N_FREQ, OnSingular, run
 
-__all__ = ["Block", "find_modification", "inverse_substructuring", "ismm", "modify"]
+__all__ = ["find_modification", "inverse_substructuring", "ismm", "modify"]
 
 
 def modify(

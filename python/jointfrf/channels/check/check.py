@@ -43,7 +43,7 @@ from jointfrf.errors import FrfCheckWarning
 from jointfrf.frf.frf_set import Channel
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_frequency, as_lines, as_names, as_real, check_choice
 
-__all__ = ["FrfFix", "check_frfs", "warn_of_frfs"]
+__all__ = ["check_frfs", "warn_of_frfs"]
 
 FrfFix = Literal["lines", "time-convention", "exchanged", "quantity", "sign", "units", "gain", "delay"]
 #: From fewer lines the noise cannot be estimated.

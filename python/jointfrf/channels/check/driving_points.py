@@ -13,8 +13,6 @@ from jointfrf.channels.check.signals import Measurement, modulus
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
 __all__ = [
-    "Circles",
-    "Sectors",
     "circles",
     "convention_finding",
     "mean_exponent",

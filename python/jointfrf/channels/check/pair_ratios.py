@@ -15,10 +15,8 @@ from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
 __all__ = [
     "BROKEN",
-    "LEAST_ERROR",
     "ONE_SIDED",
     "PairRatios",
-    "RatioLine",
     "are_one_sided",
     "are_signals",
     "block_medians",

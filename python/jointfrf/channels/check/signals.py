@@ -22,7 +22,6 @@ __all__ = [
     "check_signals",
     "find_bad_lines",
     "modulus",
-    "smoothness",
 ]
 
 #: Below this agreement of the phase from line to line an FRF is noise.
