@@ -4,26 +4,25 @@ from jointfrf import report as report
 from jointfrf import solids as solids
 from jointfrf.channels.check.check import check_frfs
 from jointfrf.channels.check.finding import FrfCheck, FrfFinding
-from jointfrf.channels.consistency import (
-    Consistency,
-    DrivingPointCheck,
-    driving_point_check,
-    impact_consistency,
-    sensor_consistency,
-)
-from jointfrf.channels.finite_differences import (
+from jointfrf.channels.joint_channels import ChannelAgreement, JointChannels, SideAgreement, joint_channels
+from jointfrf.channels.point_lines import (
     DifferenceError,
+    Interface,
     central_difference,
     difference_error,
     difference_weights,
+    interface,
     transform,
 )
-from jointfrf.channels.joint_channels import ChannelAgreement, JointChannels, SideAgreement, joint_channels
-from jointfrf.channels.point_lines import Interface, interface
 from jointfrf.channels.virtual_point import (
+    Consistency,
+    DrivingPointCheck,
     VirtualPoint,
     append_virtual_point,
     channel_geometry,
+    driving_point_check,
+    impact_consistency,
+    sensor_consistency,
     virtual_interface,
     virtual_point,
     virtual_points,
@@ -40,9 +39,8 @@ from jointfrf.errors import (
     SingularLineError,
 )
 from jointfrf.extras import MissingPackageError
-from jointfrf.frf.bands import as_bands, band_mean, in_bands
-from jointfrf.frf.channel_place import ChannelPlace, places_of_nodes
-from jointfrf.frf.metrics import amplitude_error, frequency_error, has_peak, peak
+from jointfrf.frf.bands import amplitude_error, as_bands, band_mean, frequency_error, has_peak, in_bands, peak
+from jointfrf.frf.frf_set import ChannelPlace, places_of_nodes
 from jointfrf.frf.noise import pollute, realisations
 from jointfrf.frf.noise_model import NoiseModel, estimate_noise
 from jointfrf.frf.smoothing import SmoothFrfs, smooth_frfs
@@ -62,45 +60,53 @@ from jointfrf.identification.record import fit_from_dict, fit_to_dict, load, sav
 from jointfrf.identification.result import Fit, FittedParameter
 from jointfrf.identification.sensitivity import propose_bands, sensitivity
 from jointfrf.joint import Joint
-from jointfrf.kernel.engine import get_engine, set_engine, use_engine
+from jointfrf.kernel.call import RCOND_LIMIT, get_engine, set_engine, use_engine
 from jointfrf.kernel.linear_algebra import invert, reciprocal_condition, solve
-from jointfrf.kernel.status import RCOND_LIMIT
 from jointfrf.laws.function_law import FunctionLaw
 from jointfrf.laws.law import JointLaw, LawField
 from jointfrf.laws.law_joint import LawJoint
 from jointfrf.laws.springs import SpringLaw
 from jointfrf.laws.viscoelastic import FractionalZener, PowerLaw, StandardLinearSolid
 from jointfrf.models.beam import beam
-from jointfrf.models.chain import chain
 from jointfrf.models.matrices import from_triangle
-from jointfrf.models.model import Model, assemble
-from jointfrf.models.receptance.receptance import ReceptanceInfo, receptance
+from jointfrf.models.model import Model, assemble, chain
+from jointfrf.models.receptance import ReceptanceInfo, receptance
 from jointfrf.parallel.pool import BrokenPoolError
 from jointfrf.parallel.processes import SeparateProcesses
 from jointfrf.parallel.sweep import plan_sweep, sweep
 from jointfrf.parallel.sweep_plan import SweepPlan
 from jointfrf.report.fit_page import write_report
 from jointfrf.report.fit_plot import plot
-from jointfrf.solids.bolt import PROOF_STRENGTH, STRESS_AREA, Bolt, preload_force
-from jointfrf.solids.bolted_lap import BoltedLap, LapDivisions, bolted_lap
+from jointfrf.solids.bolted_lap import (
+    PROOF_STRENGTH,
+    STRESS_AREA,
+    Bolt,
+    BoltedLap,
+    LapDivisions,
+    bolted_lap,
+    preload_force,
+)
 from jointfrf.solids.brick import Material, assemble_bricks, brick_quality, element_matrices
 from jointfrf.solids.brick_beam import Hole, brick_beam
-from jointfrf.solids.contact_pairs import ContactLaw
-from jointfrf.solids.interpolation import interpolation
-from jointfrf.solids.mesh import Mesh
+from jointfrf.solids.contact import ContactLaw
+from jointfrf.solids.mesh import Mesh, interpolation
 from jointfrf.solids.preload import PreloadedLap, preload
 from jointfrf.solids.solid import Patch, SolidModel, solid_model
 from jointfrf.studies.design import StudyDesign
 from jointfrf.studies.result import StudyResult, read_study
 from jointfrf.studies.run import merge_studies, study
 from jointfrf.studies.summary import ParameterSummary
-from jointfrf.substructuring.compliance import compliance_covariance, compliance_factors, joint_compliance
-from jointfrf.substructuring.coupling import couple
-from jointfrf.substructuring.decoupling import decouple
-from jointfrf.substructuring.ismm import inverse_substructuring, ismm
-from jointfrf.substructuring.modification import find_modification, modify
-from jointfrf.substructuring.multi_point import MultiPointJoint, multi_point_compliance, multi_point_stiffness
-from jointfrf.substructuring.semm import semm
+from jointfrf.substructuring.compliance import (
+    MultiPointJoint,
+    compliance_covariance,
+    compliance_factors,
+    joint_compliance,
+    multi_point_compliance,
+    multi_point_stiffness,
+)
+from jointfrf.substructuring.coupling import couple, semm
+from jointfrf.substructuring.methods import decouple
+from jointfrf.substructuring.modification import find_modification, inverse_substructuring, ismm, modify
 
 __all__ = [
     "PROOF_STRENGTH",

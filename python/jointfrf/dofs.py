@@ -16,6 +16,7 @@ from jointfrf.spelling import did_you_mean
 
 __all__ = [
     "DIRECTIONS",
+    "UNITS",
     "Parameter",
     "ParameterKind",
     "compliance_unit",
@@ -40,6 +41,15 @@ _PLACES = {prefix + axis: i for prefix in _TRANSLATIONS for i, axis in enumerate
 }
 #: A rotation whose axis the name may leave out, as in a plane: theta, Mtheta, rot1.
 _ROTATION = re.compile(r"m?(theta|phi|rot|r[xyz])", re.IGNORECASE)
+
+#: Units of numbers of a joint between two DOFs of which 0, 1 or 2 are rotations.
+UNITS = {
+    "stiffness": ("N/m", "N", "N m/rad"),
+    "damping": ("N s/m", "N s", "N m s/rad"),
+    "time": ("s",) * 3,
+    "frequency": ("Hz",) * 3,
+    "number": ("1",) * 3,
+}
 
 #: Stiffness k, hysteretic stiffness h = eta k, viscous damping c of K*(w) = k + i h + i w c.
 ParameterKind = Literal["k", "h", "c"]
@@ -120,7 +130,7 @@ class Parameter:
     def unit(self) -> str:
         """Unit: N/m, between a displacement and a rotation N, N m/rad; the same times seconds for damping."""
         rotations = is_rotation(self.row) + is_rotation(self.column)
-        return (("N/m", "N", "N m/rad"), ("N s/m", "N s", "N m s/rad"))[self.kind == "c"][rotations]
+        return UNITS["damping" if self.kind == "c" else "stiffness"][rotations]
 
 
 def joint_parameters(

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 import jointfrf as jf
-from jointfrf.kernel.engine import Engine
+from jointfrf.kernel.call import Engine
 
 from . import report
 from .data import Data

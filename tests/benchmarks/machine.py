@@ -18,7 +18,7 @@ from typing import Any, get_args
 import numpy as np
 from threadpoolctl import threadpool_info
 
-from jointfrf.kernel.engine import Engine
+from jointfrf.kernel.call import Engine
 
 ROOT = Path(__file__).resolve().parents[2]
 #: JOINTFRF_BENCHMARK_BUILD names another folder, in which meson was set up with other options.

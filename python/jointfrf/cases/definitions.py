@@ -14,7 +14,7 @@ from jointfrf.dofs import Parameter, is_rotation, joint_parameters
 from jointfrf.errors import FileContentWarning
 from jointfrf.frf.bands import Band, in_bands
 from jointfrf.frf.frf_set import FrfSet
-from jointfrf.frf.noise import NoiseKind, NoiseReference, pollute, realisations
+from jointfrf.frf.noise import NOISE_KINDS, NoiseKind, NoiseReference, pollute, realisations
 from jointfrf.io.read import read_frfs
 from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
@@ -40,10 +40,6 @@ _MOTIONS = ("translation", "rotation")
 _MOST_LINES = 1_000_000
 #: A higher level of noise is more often 5 % written as 5 than meant.
 _HIGH_LEVEL = 0.5
-#: E|e|^2 of a noise number of level 1.
-_SQUARES: dict[NoiseKind, float] = {
-    "complex": 1.0, "complex-per-part": 2.0, "real-normal": 1.0, "real-uniform": 1 / 3, "real-uniform-std": 1.0,
-}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -108,7 +104,7 @@ class Noise:
         if self.relative_to != "entry":
             own = (1, 2) if self.relative_to == "line" else (0, 1, 2)
             size = np.broadcast_to(size.max(axis=own, keepdims=True), h.shape)
-        return np.asarray(_SQUARES[self.kind] * (self.level * size) ** 2)
+        return np.asarray(NOISE_KINDS[self.kind].power * (self.level * size) ** 2)
 
 
 def actual_values(joint: Joint) -> FloatArray:

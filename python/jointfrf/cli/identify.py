@@ -12,7 +12,7 @@ import numpy as np
 
 from jointfrf.channels.check.check import warn_of_frfs
 from jointfrf.channels.check.finding import FrfCheck
-from jointfrf.channels.finite_differences import difference_error
+from jointfrf.channels.point_lines import difference_error
 from jointfrf.cli.card_options import add_card_arguments, card_request, parse_export, written_cards
 from jointfrf.cli.check import check_joint
 from jointfrf.cli.measured_file import (

@@ -10,15 +10,22 @@ from typing import Any
 
 import numpy as np
 
-from jointfrf.channels.joint_channels import JointChannels, SideAgreement, joint_channels, node_dofs
-from jointfrf.channels.left_out_dofs import LeftOutDof, OffsetCoupling, left_out_dofs, offset_couplings
+from jointfrf.channels.joint_channels import (
+    JointChannels,
+    LeftOutDof,
+    OffsetCoupling,
+    SideAgreement,
+    joint_channels,
+    left_out_dofs,
+    node_dofs,
+    offset_couplings,
+)
 from jointfrf.channels.point_lines import Interface, interface
 from jointfrf.cli.measured_file import Nodes, file_names, in_some_band, shown_nodes
 from jointfrf.cli.usage import UsageError
 from jointfrf.dofs import is_rotation
 from jointfrf.errors import FileContentError
-from jointfrf.frf.channel_place import ChannelPlace, JointSide, places_of_nodes
-from jointfrf.frf.frf_set import Channel
+from jointfrf.frf.frf_set import Channel, ChannelPlace, JointSide, places_of_nodes
 from jointfrf.io import FrfSet, read_channel_table
 from jointfrf.io.channel_table import places_of_table
 from jointfrf.kernel.arguments import ComplexArray, FloatArray

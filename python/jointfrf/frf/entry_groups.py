@@ -1,4 +1,4 @@
-"""Which entries of a matrix of FRFs are measured twice, which are zero, and which have their poles in common."""
+"""Which entries of a matrix of FRFs are measured twice, are zero, or have their poles in common."""
 
 from __future__ import annotations
 
@@ -9,10 +9,46 @@ from numpy.typing import NDArray
 
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
-__all__ = ["EntryGroup", "connected", "entry_groups"]
+__all__ = ["ZERO", "EntryGroup", "connected", "entry_groups", "own_size", "reciprocity_noise"]
 
-#: An FRF below this share of what is usual in its row and column is zero to rounding.
-_ZERO = 1e-8
+#: An FRF below this share of sqrt|h_pp h_qq|, or of what is usual in its row and column, is zero to rounding.
+ZERO = 1e-8
+
+
+def own_size(h: ComplexArray) -> FloatArray:
+    """Return |h_pp h_qq|, the size against which an FRF h_pq is zero or not; shape of h."""
+    diagonal = abs(np.diagonal(h, axis1=-2, axis2=-1))
+    return diagonal[..., :, None] * diagonal[..., None, :]
+
+
+def reciprocity_noise(h: ComplexArray) -> FloatArray:
+    """Relative noise level from the differences h_pq - h_qp, robustly.
+
+    Parameters
+    ----------
+    h : ndarray, shape (r, n_freq, m, m)
+        FRFs of a reciprocal structure, measured in both directions.
+
+    Returns
+    -------
+    ndarray, shape (r,)
+        0 where h is symmetric.
+
+    Notes
+    -----
+    For circular noise of level s, |h_pq - h_qp|^2 / (|h_pq|^2 + |h_qp|^2) is s^2 times an exponential variable, whose
+    median is log 2. A few wrong FRFs do not change a median. FRFs that are zero to rounding are left out.
+    """
+    m = h.shape[-1]
+    p, q = np.triu_indices(m, 1)
+    above, below = h[..., p, q], h[..., q, p]
+    size = abs(above) ** 2 + abs(below) ** 2
+    counts = size > 2 * ZERO**2 * own_size(h)[..., p, q]
+    ratio = np.divide(abs(above - below) ** 2, size, out=np.zeros_like(size), where=counts)
+    medians = [np.median(own[some]) if some.any() else 0.0 for own, some in zip(ratio, counts, strict=True)]
+    return np.asarray(np.sqrt(np.array(medians) / np.log(2)))
+
+
 #: A pair that differs less than this, relatively, was made reciprocal: it holds one measurement.
 _RECIPROCAL = 1e-9
 #: Rows and columns are scaled in turn so many times, until each has a largest entry near 1.
@@ -130,5 +166,4 @@ def _counting(h: ComplexArray) -> NDArray[np.bool_]:
         for axis in (0, 1):
             largest = size.max(axis=axis, keepdims=True)
             size = size / np.where(largest > 0, largest, 1)
-    counts: NDArray[np.bool_] = size > _ZERO
-    return counts
+    return np.asarray(size > ZERO)

@@ -1,4 +1,4 @@
-"""A set of measured FRFs whose rows and columns carry names."""
+"""A set of measured FRFs whose rows and columns have names; where its channels are about a joint."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import re
 import warnings
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,16 +14,22 @@ from numpy.typing import ArrayLike, NDArray
 from jointfrf.errors import FileContentError, FileContentWarning
 from jointfrf.kernel.arguments import as_array, as_integer, as_nodes, as_real, check_type
 
-__all__ = ["POWER_OF_I_OMEGA", "ROUND_OFF", "Channel", "FrfSet", "same_frf"]
+__all__ = [
+    "POWER_OF_I_OMEGA",
+    "ROUND_OFF",
+    "Channel",
+    "ChannelPlace",
+    "ChannelRole",
+    "FrfSet",
+    "JointSide",
+    "places_of_nodes",
+    "same_frf",
+]
 
 POWER_OF_I_OMEGA = {"receptance": 0, "mobility": 1, "accelerance": 2}
 """How often a receptance is differentiated in time to give the quantity."""
 
-_PLURALS = {
-    "receptance": "receptances m/N",
-    "mobility": "mobilities (m/s)/N",
-    "accelerance": "accelerances (m/s^2)/N",
-}
+_PLURALS = {"receptance": "receptances m/N", "mobility": "mobilities (m/s)/N", "accelerance": "accelerances (m/s^2)/N"}
 _DIRECTION = re.compile(r"([+-]?)(r?[xyz])")
 _CHANNEL = re.compile(r"(\d+)\s*:?\s*([+-]?r?[xyz])")
 _NAMES_SHOWN = 10
@@ -514,3 +520,98 @@ def _by_node(channels: Iterable[Channel]) -> str:
     for channel in channels:
         directions[channel.node] = directions.get(channel.node, "") + channel.direction
     return " ".join(f"{node}:{direction}" for node, direction in directions.items())
+
+
+ChannelRole = Literal["response", "excitation", "both"]
+JointSide = Literal["j", "k"]
+
+
+@dataclass(frozen=True, eq=False)
+class ChannelPlace:
+    """What is known of one translational channel beside its FRFs.
+
+    Attributes
+    ----------
+    channel : Channel
+        Its name in the file of FRFs.
+    side : {"j", "k"} or None
+        Side of the joint; None where it is not said.
+    role : {"response", "excitation", "both"}
+        As what it counts; "both": as what the file has.
+    position : ndarray, shape (3,), or None
+        m; None: as the file says.
+    direction : ndarray, shape (3,), or None
+        Unit vector of the motion or force that the channel of this name stands for; None: as its name says.
+    weight : float
+        In the virtual point, 0 to leave the channel out.
+    optional : bool
+        Whether the file need not have it: one of three directions of a sensor.
+    where : str
+        Where this is said, for messages.
+    """
+
+    channel: Channel
+    side: JointSide | None = None
+    role: ChannelRole = "both"
+    position: NDArray[np.float64] | None = None
+    direction: NDArray[np.float64] | None = None
+    weight: float = 1.0
+    optional: bool = False
+    where: str = ""
+
+    def __post_init__(self) -> None:
+        check_type("channel", self.channel, Channel)
+
+    @property
+    def unit(self) -> NDArray[np.float64]:
+        """Direction of the channel, shape (3,)."""
+        if self.direction is not None:
+            return self.direction
+        return np.asarray(self.channel.sign * np.eye(3)["xyz".index(self.channel.axis)] + 0.0)
+
+
+def places_of_nodes(frfs: FrfSet, nodes_j: Sequence[int], nodes_k: Sequence[int]) -> tuple[ChannelPlace, ...]:
+    """List the translational channels of a set at nodes on both sides of a joint.
+
+    Parameters
+    ----------
+    frfs : FrfSet
+        With coordinates of the nodes.
+    nodes_j, nodes_k : sequence of int
+        Nodes on side j (on A) and on side k (on B).
+
+    Returns
+    -------
+    tuple of ChannelPlace
+        In the order of the nodes; position and direction as the set says.
+
+    Raises
+    ------
+    ValueError
+        A node is on both sides, or the set has no translational channel there.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from jointfrf.frf.frf_set import places_of_nodes
+    >>> from jointfrf.io import Channel, FrfSet
+    >>> ends = (Channel(1, "+y"), Channel(2, "-z"))
+    >>> frfs = FrfSet(np.array([10.0]), ends, ends, np.ones((1, 2, 2)))
+    >>> [(str(place.channel), place.side) for place in places_of_nodes(frfs, [1], [2])]
+    [('1:+y', 'j'), ('2:-z', 'k')]
+    """
+    check_type("frfs", frfs, FrfSet)
+    nodes_j, nodes_k = as_nodes("nodes_j", nodes_j), as_nodes("nodes_k", nodes_k)
+    shared = set(nodes_j) & set(nodes_k)
+    if shared:
+        raise ValueError(f"node {min(shared)} is named on both sides of the joint")
+    # A sensor along +y and a hammer along -y are the same channel: FRFs are found with their signs.
+    known = {(c.node, c.axis): c for c in (*frfs.excitations, *frfs.responses) if not c.is_rotation}
+    found = []
+    for side, nodes in (("j", nodes_j), ("k", nodes_k)):
+        for node in dict.fromkeys(nodes):
+            own = [channel for (at, _), channel in sorted(known.items()) if at == node]
+            if not own:
+                raise ValueError(f"node {node} has no channel of a translation")
+            found += [ChannelPlace(channel, side) for channel in own]  # type: ignore[arg-type]
+    return tuple(found)

@@ -106,12 +106,7 @@ class _Merged:
         self.row_of = {channel: i for i, channel in enumerate(responses)}
         self.column_of = {channel: j for j, channel in enumerate(excitations)}
 
-    def fill(
-        self,
-        target: _Values,
-        values_of: Callable[[FrfSet], _Values | None],
-        what: str,
-    ) -> None:
+    def fill(self, target: _Values, values_of: Callable[[FrfSet], _Values | None], what: str) -> None:
         """Copy what each set holds into place, after a look at what is there already."""
         origin = np.full(target.shape[1:], -1)
         for number, each in enumerate(self.sets):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Final, Literal, get_args
+from typing import Final, Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -10,15 +10,38 @@ from numpy.typing import ArrayLike, NDArray
 from jointfrf.kernel.arguments import ComplexArray, as_integer, as_lines, as_number, check_choice
 from jointfrf.kernel.call import call
 
-__all__ = ["NoiseKind", "NoiseReference", "noise_arguments", "pollute", "realisations"]
+__all__ = ["NOISE_KINDS", "NoiseKind", "NoiseReference", "noise_arguments", "pollute", "realisations"]
 
 NoiseKind = Literal["complex", "complex-per-part", "real-normal", "real-uniform", "real-uniform-std"]
 NoiseReference = Literal["entry", "line", "spectrum"]
 
-#: The letters of the kernel.
-_KINDS: Final[dict[str, str]] = {
-    "complex": "C", "complex-per-part": "P", "real-normal": "N", "real-uniform": "U", "real-uniform-std": "S",
-}  # fmt: skip
+
+class NoiseNumbers(NamedTuple):
+    """Numbers of a kind of noise.
+
+    Attributes
+    ----------
+    letter : str
+        By which the kernel knows the kind.
+    power : float
+        Mean square modulus at level 1.
+    is_circular : bool
+        Whether all phases are equally likely.
+    """
+
+    letter: str
+    power: float
+    is_circular: bool
+
+
+#: The kinds of noise. A new kind: its word above, its line here, a letter in `noise.f90` of the kernel.
+NOISE_KINDS: Final[dict[NoiseKind, NoiseNumbers]] = {
+    "complex": NoiseNumbers("C", 1.0, True),
+    "complex-per-part": NoiseNumbers("P", 2.0, True),
+    "real-normal": NoiseNumbers("N", 1.0, False),
+    "real-uniform": NoiseNumbers("U", 1 / 3, False),
+    "real-uniform-std": NoiseNumbers("S", 1.0, False),
+}
 #: Realisations are counted in 31 bits.
 _MOST: Final = 2**31 - 1
 
@@ -91,10 +114,19 @@ def pollute(
     >>> round(float(np.sqrt((abs(polluted - h) ** 2).mean())), 3)
     0.05
     """
-    polluted: ComplexArray = realisations(
-        h, level, kind, seed, relative_to=relative_to, reciprocal=reciprocal, block=block, first=realisation, count=1
-    )[0]
-    return polluted
+    return np.asarray(
+        realisations(
+            h,
+            level,
+            kind,
+            seed,
+            relative_to=relative_to,
+            reciprocal=reciprocal,
+            block=block,
+            first=realisation,
+            count=1,
+        )[0]
+    )
 
 
 def realisations(
@@ -162,7 +194,7 @@ def noise_arguments(
     shape: tuple[int, ...],
 ) -> tuple[str, str, int, int, float, NDArray[np.int32]]:
     """Return the arguments that say the noise as the kernel takes them, checked; matrices of `shape`."""
-    check_choice("kind", kind, get_args(NoiseKind))
+    check_choice("kind", kind, tuple(NOISE_KINDS))
     check_choice("relative_to", relative_to, get_args(NoiseReference))
     number = as_number("level", level)
     if number < 0:
@@ -178,4 +210,4 @@ def noise_arguments(
     if not 0 <= as_integer("seed", seed) < 2**64:
         raise ValueError(f"seed must lie between 0 and 2**64 - 1, not {seed}")
     words = np.array([seed & 0xFFFFFFFF, seed >> 32], np.uint32).view(np.int32)
-    return _KINDS[kind], relative_to[0].upper(), int(reciprocal), size, number, words
+    return NOISE_KINDS[kind].letter, relative_to[0].upper(), int(reciprocal), size, number, words

@@ -11,24 +11,20 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from jointfrf.frf.bands import line_slices
-from jointfrf.frf.entry_groups import EntryGroup, entry_groups
-from jointfrf.frf.noise_estimate import reciprocity_noise
-from jointfrf.frf.noise_parts import NoiseTerms, line_correlation, line_levels
-from jointfrf.frf.order_search import OrderSearch
-from jointfrf.frf.quantiles import medians
-from jointfrf.frf.reciprocity_differences import ReciprocityDifferences, reciprocity_differences
-from jointfrf.frf.smoothing import (
-    SmoothFrfs,
-    checked_frfs,
-    first_variance,
-    joined,
-    near_squares,
-    pieces,
-    smoothed,
+from jointfrf.frf.entry_groups import EntryGroup, entry_groups, reciprocity_noise
+from jointfrf.frf.noise_parts import (
+    NoiseTerms,
+    ReciprocityDifferences,
+    line_correlation,
+    line_levels,
+    reciprocity_differences,
 )
+from jointfrf.frf.quantiles import medians
+from jointfrf.frf.rational_fit import OrderSearch
+from jointfrf.frf.smoothing import SmoothFrfs, checked_frfs, first_variance, joined, near_squares, pieces, smoothed
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_integer, as_number, as_real, check_type
 
-__all__ = ["NoiseModel", "NoiseSource", "estimate_noise"]
+__all__ = ["NoiseModel", "estimate_noise"]
 
 #: What the variance was found from.
 NoiseSource = Literal["residual", "reciprocity", "none"]
@@ -255,8 +251,7 @@ class _NoisyLines:
 
     @cached_property
     def _least(self) -> FloatArray:
-        least: FloatArray = np.maximum(_ROUNDING**2 * first_variance(self.h), _TINY)
-        return least
+        return np.maximum(_ROUNDING**2 * first_variance(self.h), _TINY)
 
 
 def _estimated(
@@ -347,8 +342,7 @@ def _coherence_variance(h: ComplexArray, coherence: ArrayLike | None, averages: 
     count = 1.0 if averages is None else as_number("averages", averages)
     if count < 1:
         raise ValueError(f"averages must be 1 or more, not {averages}")
-    variance: FloatArray = (1 - squared) / (count * squared) * abs(h) ** 2
-    return variance
+    return (1 - squared) / (count * squared) * abs(h) ** 2
 
 
 def _found_inflation(

@@ -10,9 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from jointfrf.frf.bands import line_slices
 from jointfrf.frf.entry_groups import EntryGroup, entry_groups
-from jointfrf.frf.order_search import OrderSearch, search_order
 from jointfrf.frf.quantiles import medians
-from jointfrf.frf.rational_fit import Entries, RationalFit
+from jointfrf.frf.rational_fit import Entries, OrderSearch, RationalFit, search_order
 from jointfrf.kernel.arguments import (
     ComplexArray,
     FloatArray,
@@ -250,8 +249,7 @@ def _smooth_group(
 def first_variance(h: ComplexArray) -> FloatArray:
     """Variance before anything is known of the noise: |h|^2 over neighbouring lines, not below a part of its median."""
     near = near_squares(h)
-    variance: FloatArray = np.maximum(near + _FIRST_FLOOR * medians(near.T).T, np.finfo(float).tiny)
-    return variance
+    return np.maximum(near + _FIRST_FLOOR * medians(near.T).T, np.finfo(float).tiny)
 
 
 def near_squares(h: ComplexArray) -> FloatArray:

@@ -22,8 +22,7 @@ from jointfrf.kernel.arguments import (
     one_line,
     optional_frequency,
 )
-from jointfrf.kernel.call import call
-from jointfrf.kernel.status import LineStatus, OnSingular, check_lines
+from jointfrf.kernel.call import LineStatus, OnSingular, call, check_lines
 from jointfrf.substructuring.methods import STIFFNESS_METHODS
 
 __all__ = ["BandStatistics", "MonteCarlo", "MonteCarloMethod", "monte_carlo"]

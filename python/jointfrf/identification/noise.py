@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from jointfrf.frf.bands import is_long, line_slices, spread_lines
-from jointfrf.frf.noise_estimate import ZERO
+from jointfrf.frf.entry_groups import ZERO
 from jointfrf.frf.noise_model import NoiseModel, estimate_noise
 from jointfrf.frf.noise_parts import noise_parts
 from jointfrf.frf.quantiles import medians

@@ -1,25 +1,30 @@
-"""What the kernel takes: arrays, DOFs, frequencies and words of a caller, checked once and brought into its form."""
+"""What the kernel takes: arrays, DOFs, frequencies and words of a caller, checked once and converted to its form.
+
+Arrays in files (`numpy.memmap`) are processed in chunks of lines, so that they never lie in memory as a whole.
+"""
 
 from __future__ import annotations
 
+import mmap
 import operator
 import reprlib
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from math import isfinite
 from typing import Any
 
 import numpy as np
+from numpy.lib.array_utils import byte_bounds
 from numpy.typing import ArrayLike, NDArray
 
 from jointfrf.errors import CopyWarning
-from jointfrf.kernel.memory_maps import is_mapped
 
 __all__ = [
-    "LARGE_COPY",
+    "CHUNK_BYTES",
     "ComplexArray",
     "FloatArray",
     "as_array",
+    "as_count",
     "as_dofs",
     "as_frequency",
     "as_integer",
@@ -30,6 +35,7 @@ __all__ = [
     "as_names",
     "as_nodes",
     "as_number",
+    "as_positive",
     "as_real",
     "as_square",
     "as_values",
@@ -37,8 +43,11 @@ __all__ = [
     "check_finite_lines",
     "check_type",
     "checked_out",
+    "chunks",
+    "in_one_piece",
     "one_line",
     "optional_frequency",
+    "release",
 ]
 
 ComplexArray = NDArray[np.complex128]
@@ -252,6 +261,22 @@ def as_number(name: str, value: object) -> float:
     return number
 
 
+def as_positive(name: str, value: object, unit: str = "") -> float:
+    """Return one number above zero."""
+    number = as_number(name, value)
+    if number <= 0:
+        raise ValueError(f"{name} must be positive, not {number:g}{unit and ' '}{unit}")
+    return number
+
+
+def as_count(name: str, value: object, least: int = 1) -> int:
+    """Return a whole number that is not too small; floats without a fraction serve, too."""
+    number = as_number(name, value)
+    if number < least or number != int(number):
+        raise ValueError(f"{name} must be a whole number, at least {least}, not {value}")
+    return int(number)
+
+
 def as_values(name: str, value: ArrayLike, n: int) -> ComplexArray:
     """Return n complex numbers."""
     array: ComplexArray = _converted(name, value, _COMPLEX)
@@ -295,3 +320,55 @@ def checked_out(
             names = [name for name, sweep in sweeps.items() if sweep is array]
             raise ValueError(f"out must not share memory with {names[0] if names else 'an argument'}")
     return out
+
+
+#: Arrays in files are processed in chunks of lines; inputs and result of one chunk take about this many bytes.
+CHUNK_BYTES = 64 * 2**20
+#: Lines that the kernel takes as one share, of large matrices and of small ones; chunks are multiples of it, so that
+#: they change no bit of a result.
+_SHARE, _LONG_SHARE = 64, 512
+
+
+def is_mapped(array: NDArray[Any]) -> bool:
+    """Whether an array lies in a file."""
+    base: Any = array
+    while isinstance(base, np.ndarray):
+        base = base.base
+    return isinstance(base, mmap.mmap)
+
+
+def in_one_piece(result: NDArray[np.complex128], sweeps: Mapping[str, NDArray[Any]]) -> bool:
+    """Whether a sweep is so small that it is never processed in chunks."""
+    size = result.nbytes
+    for sweep in sweeps.values():
+        size += 16 * sweep.size
+    return size <= CHUNK_BYTES
+
+
+def chunks(result: NDArray[np.complex128], sweeps: Mapping[str, NDArray[Any]]) -> Iterator[slice]:
+    """Return ranges of lines: one, unless an array lies in a file or one matrix stands for all lines."""
+    step = n_freq = result.shape[0]
+    size = result.nbytes + sum(16 * sweep.size for sweep in sweeps.values())
+    if size > CHUNK_BYTES and any(a.strides[0] == 0 or is_mapped(a) for a in (result, *sweeps.values())):
+        step = CHUNK_BYTES * n_freq // size
+        step = max(_SHARE, step - step % (_LONG_SHARE if step >= _LONG_SHARE else _SHARE))
+    # fewer lines than a share are left to the chunk before
+    firsts = range(0, max(1, n_freq - _SHARE + 1), step)
+    for first in firsts:
+        yield slice(first, n_freq if first == firsts[-1] else first + step)
+
+
+def release(lines: NDArray[Any]) -> None:
+    """Tell the system that pages of a file are not needed in memory any more; what was written stays in the file."""
+    base: Any = lines
+    while isinstance(base.base, np.ndarray):
+        base = base.base
+    # In mode "c" what was written would be lost; otherwise mapped memory is no more than a view of the file.
+    pages = base.base
+    if not (isinstance(base, np.memmap) and base.mode != "c" and isinstance(pages, mmap.mmap)):
+        return
+    if hasattr(mmap, "MADV_DONTNEED"):
+        first = base.ctypes.data - base.offset % mmap.ALLOCATIONGRANULARITY
+        start, stop = ((end - first) // mmap.PAGESIZE * mmap.PAGESIZE for end in byte_bounds(lines))
+        if stop > start:
+            pages.madvise(mmap.MADV_DONTNEED, start, stop - start)

@@ -1,4 +1,4 @@
-"""Calling a routine of the kernel.
+"""Calling a routine of the kernel, how each line went, and the engine that computes.
 
 A C-order array (n_freq, out, in) enters as its transposed view, so nothing is copied; results come back in C order.
 """
@@ -7,18 +7,126 @@ from __future__ import annotations
 
 import os
 import reprlib
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any, get_args
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 import jointfrf._kernel as _kernel
-from jointfrf.kernel.arguments import ComplexArray, FloatArray, check_choice, checked_out
-from jointfrf.kernel.memory_maps import chunks, in_one_piece, release
-from jointfrf.kernel.status import RCOND_LIMIT, LineStatus, OnSingular, check_status
+from jointfrf.errors import IllConditionedWarning, SingularLineError
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, check_choice, checked_out, chunks, in_one_piece, release
 
-__all__ = ["N_FREQ", "VERSION", "call", "call_for_number", "info_of", "kernel_engine", "run", "set_kernel_engine"]
+__all__ = [
+    "N_FREQ",
+    "RCOND_LIMIT",
+    "VERSION",
+    "Engine",
+    "LineStatus",
+    "OnSingular",
+    "call",
+    "call_for_number",
+    "check_lines",
+    "get_engine",
+    "info_of",
+    "run",
+    "set_engine",
+    "use_engine",
+]
+
+OnSingular = Literal["raise", "nan"]
+
+#: Below this reciprocal condition number (1-norm) a result is called ill-conditioned: fewer than four digits may be
+#: left.
+RCOND_LIMIT = 1e-12
+
+_LINE_NOT_FINITE = -1
+_LINE_OVERFLOW = -2
+
+
+class LineStatus(NamedTuple):
+    """How each line of a sweep went.
+
+    Attributes
+    ----------
+    line_info : ndarray of int32, shape (n_freq,)
+        0 good; > 0 singular (LAPACK's INFO); -1 NaN or Inf in the line; -2 its result overflows.
+    rcond : ndarray, shape (n_freq,)
+        Reciprocal condition number of the worst matrix inverted; 0 in a bad line. In the 1-norm of the stored matrix
+        with |re| + |im| for the modulus, within a factor 2; an estimate where the fast engines solve.
+    """
+
+    line_info: NDArray[np.int32]
+    rcond: FloatArray
+
+    @property
+    def lowest_rcond(self) -> float:
+        """The lowest reciprocal condition number; 1 where there are no lines."""
+        return self.rcond.item(self.rcond.argmin()) if self.rcond.size else 1.0
+
+
+def _line_names(lines: NDArray[np.intp], freq_hz: FloatArray | None) -> str:
+    """Return the first few lines in words."""
+    some = [f"line {i}" + (f" ({freq_hz[i]:g} Hz)" if freq_hz is not None else "") for i in lines[:3]]
+    more = f" and {lines.size - 3} more" if lines.size > 3 else ""
+    return ", ".join(some) + more
+
+
+def check_status(
+    routine: str,
+    status: LineStatus,
+    n_bad: int,
+    sweeps: Mapping[str, NDArray[Any]],
+    freq_hz: FloatArray | None,
+    on_singular: OnSingular,
+    rcond_limit: float,
+) -> None:
+    """Turn bad lines into exceptions and poor conditions into a warning."""
+    info = status.line_info
+    if n_bad and on_singular == "raise":
+        broken = np.flatnonzero(info == _LINE_NOT_FINITE)
+        if broken.size:
+            line = broken[0]
+            names = [name for name, sweep in sweeps.items() if not np.isfinite(sweep[line]).all()]
+            raise ValueError(f"{' and '.join(names) or routine}: NaN or Inf in {_line_names(broken, freq_hz)}")
+        overflow = np.flatnonzero(info == _LINE_OVERFLOW)
+        if overflow.size:
+            raise OverflowError(f"{routine}: the result overflows in {_line_names(overflow, freq_hz)}")
+        singular = np.flatnonzero(info > 0)
+        raise SingularLineError(
+            f"{routine}: singular matrix in {_line_names(singular, freq_hz)}",
+            singular,
+            None if freq_hz is None else freq_hz[singular],
+        )
+    if not n_bad and (rcond_limit <= 0 or status.lowest_rcond >= rcond_limit):
+        return
+    poor = np.flatnonzero((status.rcond < rcond_limit) & (info == 0))
+    if poor.size:
+        worst = poor[np.argmin(status.rcond[poor])]
+        warnings.warn(
+            f"{routine}: {poor.size} of {info.size} lines are ill-conditioned, worst "
+            f"{_line_names(np.array([worst]), freq_hz)} with rcond {status.rcond[worst]:.1e}",
+            IllConditionedWarning,
+            stacklevel=4,
+        )
+
+
+def check_lines(
+    routine: str,
+    status: LineStatus,
+    sweeps: Mapping[str, NDArray[Any]],
+    freq_hz: FloatArray | None,
+    on_singular: OnSingular,
+    rcond_limit: float = 0.0,
+) -> None:
+    """Turn bad lines into exceptions and, below a limit, poor conditions into a warning."""
+    check_choice("on_singular", on_singular, get_args(OnSingular))
+    if status.line_info.size:
+        n_bad = int((status.line_info != 0).sum())
+        check_status(routine, status, n_bad, sweeps, freq_hz, on_singular, rcond_limit)
+
 
 #: Version of the kernel, and so of the package.
 VERSION = ".".join(str(int(number)) for number in _kernel.jf_version())
@@ -29,18 +137,6 @@ _COMPLEX, _INTEGER = np.dtype(np.complex128), np.dtype(np.int32)
 
 #: Stands for the number of lines among the arguments of a kernel routine.
 N_FREQ = object()
-
-
-def set_kernel_engine(code: int) -> bool:
-    """Choose an engine by its number in the kernel; return whether this machine has it."""
-    return bool(_kernel.jf_set_engine(code) == 0)
-
-
-def kernel_engine() -> int:
-    """Return the number of the engine in use."""
-    code, info = _kernel.jf_get_engine()
-    _check_info("engine", info)
-    return int(code)
 
 
 def _check_info(routine: str, info: int) -> None:
@@ -160,3 +256,96 @@ def info_of(routine: str, args: Sequence[Any]) -> int:
     """Call a kernel routine as `call` does and return its `info` for the caller to judge."""
     views = [a.T if isinstance(a, np.ndarray) else a for a in args]
     return int(getattr(_kernel, "jf_" + routine)(*views))
+
+
+Engine = Literal["auto", "lapack", "plain", "x86-64-v2", "x86-64-v3", "x86-64-v4"]
+
+
+def set_engine(engine: Engine) -> None:
+    """Choose the engine of all calls that follow, in every thread of this process.
+
+    Parameters
+    ----------
+    engine : {"auto", "lapack", "plain", "x86-64-v2", "x86-64-v3", "x86-64-v4"}
+        "auto": the widest vector registers this machine has. "lapack": line by line, the reference. The others:
+        eight lines side by side, with the instructions of any processor or of a level of x86-64 (v3 has AVX2, v4
+        AVX-512).
+
+    Raises
+    ------
+    ValueError
+        The word is not known, or this machine does not have the engine; the choice stays as it was.
+
+    Notes
+    -----
+    Without a call the environment variable `JOINTFRF_ENGINE` chooses, by the same words; it is read when a sweep is
+    first computed. Results of two engines agree within the rounding that the condition of a line allows, and so do
+    those of one line among different neighbours; the number of threads changes nothing.
+
+    Examples
+    --------
+    >>> import jointfrf as jf
+    >>> jf.set_engine("lapack")
+    >>> jf.get_engine()
+    'lapack'
+    >>> jf.set_engine("auto")
+    """
+    check_choice("engine", engine, get_args(Engine))
+    if _kernel.jf_set_engine(get_args(Engine).index(engine)) != 0:
+        raise ValueError(f"engine {engine!r} is not available on this machine")
+
+
+def get_engine() -> Engine:
+    """Return the engine in use; where the choice is automatic, the one that was chosen.
+
+    Returns
+    -------
+    str
+        One of the words of `set_engine`, never "auto".
+
+    Raises
+    ------
+    ValueError
+        The environment variable `JOINTFRF_ENGINE` holds a word that is not known, or names an engine that this machine
+        does not have.
+
+    Examples
+    --------
+    >>> import jointfrf as jf
+    >>> with jf.use_engine("plain"):
+    ...     jf.get_engine()
+    'plain'
+    """
+    code, info = _kernel.jf_get_engine()
+    _check_info("engine", info)
+    engine: Engine = get_args(Engine)[int(code)]
+    return engine
+
+
+@contextmanager
+def use_engine(engine: Engine) -> Iterator[None]:
+    """Choose an engine inside a `with` block, in every thread of this process; then return to the one before.
+
+    Parameters
+    ----------
+    engine : str
+        As in `set_engine`.
+
+    Raises
+    ------
+    ValueError
+        As in `set_engine` and `get_engine`.
+
+    Examples
+    --------
+    >>> import jointfrf as jf
+    >>> with jf.use_engine("lapack"):
+    ...     jf.invert([[[2.0]]]).tolist()
+    [[[(0.5-0j)]]]
+    """
+    before = get_engine()
+    set_engine(engine)
+    try:
+        yield
+    finally:
+        set_engine(before)

@@ -5,8 +5,7 @@ from __future__ import annotations
 from numpy.typing import ArrayLike
 
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_lines, as_square, optional_frequency
-from jointfrf.kernel.call import N_FREQ, run
-from jointfrf.kernel.status import OnSingular
+from jointfrf.kernel.call import N_FREQ, OnSingular, run
 
 __all__ = ["invert", "reciprocal_condition", "solve"]
 

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from copy import copy
 from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_limits, check_type
-from jointfrf.laws.law import JointLaw, LawField, checked_values
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_limits, check_choice, check_type
+from jointfrf.laws.law import JointLaw, LawField
 
 __all__ = ["FunctionLaw"]
 
+#: Kinds of its parameters.
+_KINDS = ("stiffness", "damping", "time", "number")
 #: Relative step of the differences that derivatives are compared with, and how far they may lie apart.
 _STEP, _APART = 1e-5, 1e-4
 #: Where derivatives are compared, rad/s.
@@ -78,11 +81,12 @@ class FunctionLaw(JointLaw):
             raise TypeError("fields must hold name, kind and bounds of each parameter, as LawField has them") from error
         for field in named:
             check_type("name of a parameter", field.name, str)
+            check_choice("kind of a parameter", field.kind, _KINDS)
             as_limits(field.name, field.lower, field.upper)
-        found = checked_values("the law", named, values)
         object.__setattr__(self, "function", function)
         object.__setattr__(self, "derivatives", derivatives)
         object.__setattr__(self, "_fields", named)
+        found = self.checked(values)
         object.__setattr__(self, "_values", tuple(found.tolist()))
         self._check_derivatives(found)
 
@@ -112,10 +116,8 @@ class FunctionLaw(JointLaw):
 
     def with_values(self, values: ArrayLike) -> Self:
         """Return the same law with other values."""
-        found = checked_values("the law", self._fields, values)
-        other = object.__new__(type(self))
-        for name in ("function", "derivatives", "_fields"):
-            object.__setattr__(other, name, getattr(self, name))
+        found = self.checked(values)
+        other = copy(self)
         object.__setattr__(other, "_values", tuple(found.tolist()))
         return other
 

@@ -7,15 +7,49 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from jointfrf.dofs import UNITS
 from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import FloatArray
-from jointfrf.laws.law import JointLaw
+from jointfrf.laws.law import JointLaw, LawField
 from jointfrf.laws.law_joint import LawJoint
-from jointfrf.laws.law_table import LAW_VALUES, LAW_WORDS, law_line, read_law, takes_in_words
+from jointfrf.laws.springs import SpringLaw
+from jointfrf.laws.viscoelastic import FractionalZener, PowerLaw, StandardLinearSolid
 from jointfrf.toml.keys import Key, KeyTable
 from jointfrf.toml.table import TomlTable
 
-__all__ = ["JOINT_KEYS", "LAW_JOINT_KEYS", "joint_text", "read_joint_table"]
+__all__ = ["LAW_VALUES", "LAW_WORDS", "joint_text", "read_joint_table", "read_law", "takes_in_words"]
+
+#: The laws that files can hold: a new law is a file with its class, and its name here.
+LAWS: tuple[type[JointLaw], ...] = (SpringLaw, StandardLinearSolid, FractionalZener, PowerLaw)
+_BY_WORD = {law.word: law for law in LAWS}
+#: Words of laws; a rigid DOF has none.
+LAW_WORDS = (*_BY_WORD, "rigid")
+
+
+def _numbers(law: type[JointLaw]) -> tuple[LawField, ...]:
+    return (*law.parameters, *law.settings)
+
+
+def _as_key(number: LawField) -> Key:
+    """Describe a number of a law as a key of files."""
+    limits = f", {number.lower:.1g} to {number.upper:g}" if np.isfinite(number.upper) else ""
+    if not limits and np.isfinite(number.lower):
+        limits = ", above 0" if number.lower > 0 else ", at least 0"
+    units = UNITS[number.kind] if number.kind != "number" else ("",)
+    return Key(number.name, f"number{limits}", number.meaning, ", ".join(dict.fromkeys(units[::2])), "0")
+
+
+#: Keys of the numbers of all laws; the first law that has a number describes it.
+LAW_VALUES = tuple(
+    {number.name: _as_key(number) for law in LAWS[::-1] for number in _numbers(law)}[name]
+    for name in dict.fromkeys(number.name for law in LAWS for number in _numbers(law))
+)
+
+
+def takes_in_words() -> str:
+    """Return which parameters each law takes, for the reference of keys."""
+    return "; ".join(f"`{law.word}` {', '.join(f'`{one.name}`' for one in _numbers(law))}" for law in LAWS)
+
 
 #: Reference point, which `read_joint_table` leaves to its caller.
 _AT = Key("at", "list of three numbers", "Reference point.", "m", "not known")
@@ -134,9 +168,43 @@ def _text_of_laws(joint: LawJoint) -> str:
     parts = []
     for dof in joint.dofs:
         text = f"[[law]]\ndof = {json.dumps(dof)}\n"
-        text += 'law = "rigid"\n' if dof in joint.rigid else law_line(joint.laws[dof, dof])
+        text += 'law = "rigid"\n' if dof in joint.rigid else _law_line(joint.laws[dof, dof])
         parts.append(text + (f"mass = {masses[dof]!r}  # kg, kg m^2\n" if dof in masses else ""))
     for (a, b), law in joint.laws.items():
         if a != b:
-            parts.append(f"[[law]]\nbetween = {json.dumps([a, b])}\n{law_line(law)}")
+            parts.append(f"[[law]]\nbetween = {json.dumps([a, b])}\n{_law_line(law)}")
     return "\n".join(parts)
+
+
+def read_law(table: TomlTable, word: str, *, is_cross: bool = False) -> JointLaw:
+    """Read the parameters of a law from a table that holds them alone.
+
+    Parameters
+    ----------
+    table : TomlTable
+    word : str
+        Out of `LAW_WORDS`, not "rigid".
+    is_cross : bool
+        Whether it couples two DOFs, so that a stiffness may be negative.
+
+    Raises
+    ------
+    FileContentError
+        A parameter that the law does not take, one that is missing, or a value outside its bounds.
+    """
+    law = _BY_WORD[word]
+    takes = [number.name for number in _numbers(law)]
+    for key in LAW_VALUES:
+        if key.name in table and key.name not in takes:
+            raise table.wrong(key.name, f"the law {word!r} takes {', '.join(takes)}")
+    numbers = {name: table.number(name) for name in takes if name in table or name not in law.optional}
+    table.close()
+    return table.build(lambda: law.from_numbers(numbers, is_cross=is_cross))
+
+
+def _law_line(law: JointLaw) -> str:
+    """Return word and values of a law as lines of TOML."""
+    if type(law) not in LAWS:
+        raise ValueError(f"a {type(law).__name__} cannot be written to a file")
+    values = ", ".join(f"{name} = {value!r}" for name, value in law.numbers().items())
+    return f"law = {json.dumps(law.word)}\nvalues = {{ {values} }}\n"

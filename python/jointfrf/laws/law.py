@@ -1,51 +1,55 @@
-"""A law of a joint DOF: K*(w) from a few parameters, its derivatives, and initial values for a fit."""
+"""A law of a joint DOF: K*(w) from a few parameters, its derivatives, initial values for a fit, its form in files."""
 
 from __future__ import annotations
 
 import itertools
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
-from typing import Literal, NamedTuple, Self
+from collections.abc import Mapping
+from copy import copy
+from typing import Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_real, one_line
+from jointfrf.dofs import UNITS
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_number, as_real, one_line
 
-__all__ = ["FieldKind", "JointLaw", "LawField"]
+__all__ = ["JointLaw", "LawField"]
 
-#: Kind of a parameter of a law; it sets the unit.
-FieldKind = Literal["stiffness", "damping", "time", "number"]
+#: Kind of a number of a law; it sets the unit.
+FieldKind = Literal["stiffness", "damping", "time", "number", "frequency"]
 
 #: By how much an initial value of a fit stays inside its bounds, as a share of it.
 _INSIDE = 1e-6
 
 
 class LawField(NamedTuple):
-    """A parameter of a law.
+    """A parameter of a law, or another number that it is made of.
 
     Attributes
     ----------
     name : str
         Such as ``"k"`` or ``"tau"``.
     kind : {"stiffness", "damping", "time", "number"}
-        In K*(w) a stiffness and a damping are factors; a time and a number are not.
+        In K*(w) a stiffness and a damping are factors; a time and a number are not. Also "frequency", of a number that
+        is no parameter of a fit.
     lower, upper : float
         Smallest and largest value.
+    meaning : str
+        A sentence for the reference of files.
     """
 
     name: str
     kind: FieldKind
     lower: float = -np.inf
     upper: float = np.inf
+    meaning: str = ""
 
     def unit(self, rotations: int) -> str:
         """Return the unit between two DOFs of which so many (0, 1, 2) are rotations."""
-        if self.kind in ("time", "number"):
-            return "s" if self.kind == "time" else "1"
         if rotations not in (0, 1, 2):
             raise ValueError(f"rotations must be 0, 1 or 2, not {one_line(rotations)}")
-        return (("N/m", "N", "N m/rad"), ("N s/m", "N s", "N m s/rad"))[self.kind == "damping"][rotations]
+        return UNITS[self.kind][rotations]
 
     @property
     def is_factor(self) -> bool:
@@ -56,23 +60,73 @@ class LawField(NamedTuple):
 class JointLaw(ABC):
     """K*(w) between one DOF of A and one of B, from a few parameters.
 
-    A law has `fields`, their `values`, and computes K*(w) and its derivatives; laws do not change, `with_values` makes
-    another one.
+    A law computes K*(w) and its derivatives by its parameters. Laws do not change, `with_values` makes another one. A
+    frozen dataclass says the rest in class attributes; a law of another form defines `fields`, `values` and
+    `with_values` itself.
+
+    Attributes
+    ----------
+    word : str
+        Its name in files; empty where files cannot hold it.
+    parameters : tuple of LawField
+        The fields of the dataclass that are parameters of a fit.
+    settings : tuple of LawField
+        Further numbers that make it.
+    optional : tuple of str
+        Names of those that a file may omit.
     """
 
+    word: ClassVar[str] = ""
+    parameters: ClassVar[tuple[LawField, ...]] = ()
+    settings: ClassVar[tuple[LawField, ...]] = ()
+    optional: ClassVar[tuple[str, ...]] = ()
+
+    def __post_init__(self) -> None:
+        for field in (*self.parameters, *self.settings):
+            object.__setattr__(self, field.name, as_number(field.name, getattr(self, field.name)))
+        self.checked(self.values)
+
     @property
-    @abstractmethod
     def fields(self) -> tuple[LawField, ...]:
         """The parameters: names, kinds and bounds."""
+        return self.parameters
 
     @property
-    @abstractmethod
     def values(self) -> FloatArray:
         """Values of the parameters, shape (p,)."""
+        return np.array([getattr(self, field.name) for field in self.fields])
 
-    @abstractmethod
     def with_values(self, values: ArrayLike) -> Self:
         """Return the same law with other values of its parameters, shape (p,)."""
+        found = self.checked(values)
+        other = copy(self)
+        for field, value in zip(self.fields, found.tolist(), strict=True):
+            object.__setattr__(other, field.name, value)
+        return other
+
+    def checked(self, values: ArrayLike) -> FloatArray:
+        """Return values of the parameters.
+
+        Raises
+        ------
+        ValueError
+            A wrong number of them, NaN or Inf, or a value outside its bounds.
+        """
+        found = as_real("values", values, (len(self.fields),))
+        for field, value in zip(self.fields, found, strict=True):
+            if not field.lower <= value <= field.upper:
+                bounds = f"{field.lower:g} to {field.upper:g}"
+                raise ValueError(f"{field.name} of {type(self).__name__} must lie in {bounds}, not {value:g}")
+        return found
+
+    @classmethod
+    def from_numbers(cls, numbers: Mapping[str, Any], *, is_cross: bool) -> Self:
+        """Return the law that a file describes; `is_cross`: it couples two DOFs."""
+        return cls(**numbers)
+
+    def numbers(self) -> dict[str, float]:
+        """Return what `from_numbers` takes."""
+        return {field.name: float(getattr(self, field.name)) for field in (*self.fields, *self.settings)}
 
     @abstractmethod
     def stiffness(self, omega: FloatArray) -> ComplexArray:
@@ -152,8 +206,7 @@ def _least_squares(basis: ComplexArray, target: ComplexArray) -> FloatArray:
     """Return real factors of complex columns."""
     both = np.concatenate([basis.real, basis.imag]), np.concatenate([target.real, target.imag])
     size = np.maximum(np.linalg.norm(both[0], axis=0), np.finfo(float).tiny)
-    found: FloatArray = np.linalg.lstsq(both[0] / size, both[1], rcond=None)[0] / size
-    return found
+    return np.asarray(np.linalg.lstsq(both[0] / size, both[1], rcond=None)[0] / size)
 
 
 def _within(value: float, field: LawField, size: float) -> float:
@@ -162,18 +215,3 @@ def _within(value: float, field: LawField, size: float) -> float:
     if np.isfinite(low):
         low += 1e-3 * size if field.kind == "stiffness" else _INSIDE * abs(low)
     return float(np.clip(value, low, field.upper - _INSIDE * abs(field.upper) if np.isfinite(field.upper) else np.inf))
-
-
-def checked_values(law: str, fields: Sequence[LawField], values: ArrayLike) -> FloatArray:
-    """Check values of the parameters of a law.
-
-    Raises
-    ------
-    ValueError
-        A wrong number of them, NaN or Inf, or a value outside its bounds.
-    """
-    found = as_real("values", values, (len(fields),))
-    for field, value in zip(fields, found, strict=True):
-        if not field.lower <= value <= field.upper:
-            raise ValueError(f"{field.name} of {law} must lie in {field.lower:g} to {field.upper:g}, not {value:g}")
-    return found

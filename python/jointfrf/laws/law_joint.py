@@ -1,4 +1,4 @@
-"""A joint of laws: one for each DOF, cross terms, masses, DOFs that are rigid."""
+"""A joint of laws: one for each DOF, cross terms, masses, DOFs that are rigid; as input of finite-element programs."""
 
 from __future__ import annotations
 
@@ -10,13 +10,12 @@ from typing import Any, NamedTuple, Self, Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
-from jointfrf.dofs import is_rotation
+from jointfrf.dofs import DIRECTIONS, direction_places, is_rotation
 from jointfrf.io.cards import CardFormat, CardOptions
 from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_frequency, as_names, as_number, as_real, check_type
+from jointfrf.kernel.call import OnSingular
 from jointfrf.kernel.linear_algebra import invert
-from jointfrf.kernel.status import OnSingular
-from jointfrf.laws.joint_cards import joint_cards
 from jointfrf.laws.law import JointLaw, LawField
 from jointfrf.laws.springs import SpringLaw
 
@@ -303,12 +302,7 @@ class LawJoint:
         return Joint(k, c, self.dofs, structural_damping=h)
 
     def export(
-        self,
-        program: CardFormat,
-        nodes: Sequence[int],
-        *,
-        freq_hz: float | None = None,
-        **options: Unpack[CardOptions],
+        self, program: CardFormat, nodes: Sequence[int], *, freq_hz: float | None = None, **options: Unpack[CardOptions]
     ) -> str:
         """Write the joint as input of a finite-element program, in SI units.
 
@@ -351,8 +345,67 @@ class LawJoint:
             for pair, law in self.laws.items()
             if law.constant_terms is None
         ]
-        return joint_cards(
-            program, springs, self.rigid, self.mass, nodes,
-            note=f"{', '.join(varying)} at {freq_hz:g} Hz" if varying else "",
-            options=options,
-        )  # fmt: skip
+        comment = {"abaqus": "**", "calculix": "**", "nastran": "$", "ansys": "!"}.get(program, "")
+        if (self.rigid or self.mass) and options.get("positions") is not None:
+            raise ValueError("equations of rigid DOFs and point masses are written at the nodes: leave positions out")
+        note = f"{comment} {', '.join(varying)} at {freq_hz:g} Hz" if varying else ""
+        text = f"{note}: stiffness and hysteretic damping of that frequency hold there only\n" if note else ""
+        number, element = options.get("number", 1), options.get("element", 1)
+        if springs is not None:
+            cards = springs.export(program, nodes, **options)
+            text += cards
+            element += len(cards.splitlines())  # beyond every element that these lines name
+        if self.rigid:
+            text += _equations(program, comment, self.rigid, nodes, number)
+        if self.mass:
+            text += _masses(program, comment, self.mass, nodes, (element, number))
+        return text
+
+
+#: Ansys' names of `DIRECTIONS`.
+_ANSYS = ("UX", "UY", "UZ", "ROTX", "ROTY", "ROTZ")
+
+
+def _equations(program: CardFormat, comment: str, rigid: Sequence[str], nodes: Sequence[int], number: int) -> str:
+    """Return u_j - u_k = 0 of each rigid DOF."""
+    places = [int(place) for place in direction_places(rigid)]
+    if program == "calculix" and max(places) > 2:
+        raise ValueError("calculix has no rotations at nodes: rigid rotations cannot be written")
+    j, k = nodes
+    names = ", ".join(DIRECTIONS[place] for place in places)
+    lines = [f"{comment} rigid DOFs {names}: one equation each, written by jointfrf"]
+    if program == "nastran":
+        lines.append(f"$ case control: MPC = {number}")
+    for place in places:
+        if program in ("abaqus", "calculix"):
+            lines += ["*EQUATION", "2", f"{j}, {place + 1}, 1., {k}, {place + 1}, -1."]
+        elif program == "nastran":
+            lines.append(f"MPC     {number:8d}{k:8d}{place + 1:8d}{-1.0:8.1f}{j:8d}{place + 1:8d}{1.0:8.1f}")
+        else:
+            lines.append(f"CE,NEXT,0,{j},{_ANSYS[place]},1,{k},{_ANSYS[place]},-1")
+    return "\n".join(lines) + "\n"
+
+
+def _masses(
+    program: CardFormat, comment: str, mass: Mapping[str, float], nodes: Sequence[int], numbers: tuple[int, int]
+) -> str:
+    """Return half of the mass of the joint on either node, alike in all directions."""
+    if any(int(place) > 2 for place in direction_places(list(mass))):
+        raise ValueError("rotary inertia of a joint cannot be written: a point mass has none")
+    values = set(mass.values())
+    if len(values) > 1:
+        raise ValueError(f"a point mass is the same in all directions: those of {', '.join(mass)} differ")
+    half = values.pop() / 2
+    element, number = numbers
+    lines = [f"{comment} half of the mass of the joint on each node, in all directions, written by jointfrf"]
+    for i, node in enumerate(nodes):
+        own = element + i
+        if program in ("abaqus", "calculix"):
+            name = f"JOINT{number}_M{i + 1}"
+            lines += [f"*ELEMENT, TYPE=MASS, ELSET={name}", f"{own}, {node}", f"*MASS, ELSET={name}", f"{half:.13E}"]
+        elif program == "nastran":
+            lines += [f"CONM2*  {own:16d}{node:16d}{0:16d}{half:16.9E}", "*"]
+        else:
+            lines += [f"ET,{number + 50 + i},MASS21,,,2", f"R,{number + 50 + i},{half:.13E}",
+                      f"TYPE,{number + 50 + i}", f"REAL,{number + 50 + i}", f"E,{node}"]  # fmt: skip
+    return "\n".join(lines) + "\n"

@@ -2,30 +2,19 @@
 
 from __future__ import annotations
 
-from copy import copy
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
-from typing import Literal, Self, get_args
+from typing import Any, Literal, Self, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_number, check_choice
-from jointfrf.laws.law import JointLaw, LawField, checked_values
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, check_choice
+from jointfrf.laws.law import JointLaw, LawField
 
-__all__ = ["SpringDamping", "SpringLaw"]
+__all__ = ["SpringLaw"]
 
 SpringDamping = Literal["none", "viscous", "hysteretic", "both"]
-
-
-@cache
-def _fields(damping: SpringDamping, is_cross: bool) -> tuple[LawField, ...]:
-    found = [LawField("k", "stiffness", -np.inf if is_cross else 0.0)]
-    if damping in ("hysteretic", "both"):
-        found.append(LawField("h", "stiffness"))
-    if damping in ("viscous", "both"):
-        found.append(LawField("c", "damping"))
-    return tuple(found)
 
 
 @dataclass(frozen=True)
@@ -64,18 +53,23 @@ class SpringLaw(JointLaw):
     damping: SpringDamping | None = None
     is_cross: bool = False
 
+    word = "spring"
+    parameters = (
+        LawField("k", "stiffness", 0.0, meaning="Stiffness, at rest; of a cross term of any sign."),
+        LawField("h", "stiffness", meaning="Hysteretic damping."),
+        LawField("c", "damping", meaning="Viscous damping."),
+    )
+    optional = ("h", "c")
+
     def __post_init__(self) -> None:
-        for name in ("k", "c", "h"):
-            object.__setattr__(self, name, as_number(name, getattr(self, name)))
         if self.damping is None:
             found: SpringDamping = ("hysteretic" if self.c == 0 else "both") if self.h != 0 else "viscous"
             object.__setattr__(self, "damping", found)
         check_choice("damping", self.damping, get_args(SpringDamping))
-        shown = {field.name for field in self.fields}
-        for name in ("c", "h"):
-            if name not in shown and getattr(self, name) != 0:
+        super().__post_init__()
+        for name in {"c", "h"}.difference(field.name for field in self.fields):
+            if getattr(self, name) != 0:
                 raise ValueError(f"{name} is {getattr(self, name):g}, but damping is {self.damping!r}")
-        checked_values("a spring", self.fields, self.values)
 
     @property
     def fields(self) -> tuple[LawField, ...]:
@@ -83,18 +77,10 @@ class SpringLaw(JointLaw):
         assert self.damping is not None
         return _fields(self.damping, self.is_cross)
 
-    @property
-    def values(self) -> FloatArray:
-        """Values of the parameters, shape (p,)."""
-        return np.array([getattr(self, field.name) for field in self.fields])
-
-    def with_values(self, values: ArrayLike) -> Self:
-        """Return the same law with other values."""
-        found = checked_values("a spring", self.fields, values)
-        other = copy(self)
-        for field, value in zip(self.fields, found.tolist(), strict=True):
-            object.__setattr__(other, field.name, value)
-        return other
+    @classmethod
+    def from_numbers(cls, numbers: Mapping[str, Any], *, is_cross: bool) -> Self:
+        """Return the spring that a file describes; `is_cross`: it couples two DOFs."""
+        return cls(**numbers, is_cross=is_cross)
 
     def stiffness(self, omega: FloatArray) -> ComplexArray:
         """Return k + i h + i w c, shape (n_freq,)."""
@@ -109,3 +95,11 @@ class SpringLaw(JointLaw):
     def constant_terms(self) -> tuple[float, float, float] | None:
         """(k, c, h)."""
         return self.k, self.c, self.h
+
+
+@cache
+def _fields(damping: SpringDamping, is_cross: bool) -> tuple[LawField, ...]:
+    k, h, c = SpringLaw.parameters
+    found = [k._replace(lower=-np.inf) if is_cross else k]
+    found += [h] if damping in ("hysteretic", "both") else []
+    return (*found, c) if damping in ("viscous", "both") else tuple(found)

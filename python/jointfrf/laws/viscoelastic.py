@@ -2,49 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import astuple, dataclass
-from typing import ClassVar, Self
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_number
-from jointfrf.laws.law import JointLaw, LawField, checked_values
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_positive
+from jointfrf.laws.law import JointLaw, LawField
 
 __all__ = ["FractionalZener", "PowerLaw", "StandardLinearSolid"]
 
-#: Smallest exponent and time: K*(w) would not depend on the others below.
-_LEAST_ALPHA, _LEAST_TIME = 1e-3, 1e-12
-
-
-class _Viscoelastic(JointLaw):
-    """A law whose parameters are the first fields of its dataclass."""
-
-    FIELDS: ClassVar[tuple[LawField, ...]]
-
-    def __post_init__(self) -> None:
-        for field in self.FIELDS:
-            object.__setattr__(self, field.name, as_number(field.name, getattr(self, field.name)))
-        checked_values(type(self).__name__, self.FIELDS, self.values)
-
-    @property
-    def fields(self) -> tuple[LawField, ...]:
-        """The parameters: names, kinds and bounds."""
-        return self.FIELDS
-
-    @property
-    def values(self) -> FloatArray:
-        """Values of the parameters, shape (p,)."""
-        return np.array(astuple(self)[: len(self.FIELDS)])  # type: ignore[call-overload]
-
-    def with_values(self, values: ArrayLike) -> Self:
-        """Return the same law with other values."""
-        found = checked_values(type(self).__name__, self.FIELDS, values).tolist()
-        return type(self)(*found, *astuple(self)[len(self.FIELDS) :])  # type: ignore[call-overload]
+#: Smallest exponent and time: below, K*(w) would not depend on the other parameters; frequencies are only positive.
+_LEAST_ALPHA, _LEAST_TIME, _LEAST_HZ = 1e-3, 1e-12, float(np.finfo(float).tiny)
+#: Numbers of several laws.
+_K = LawField("k", "stiffness", 0.0, meaning="Stiffness, at rest.")
+_ALPHA = LawField("alpha", "number", _LEAST_ALPHA, 1.0, meaning="Order of the derivative.")
 
 
 @dataclass(frozen=True)
-class StandardLinearSolid(_Viscoelastic):
+class StandardLinearSolid(JointLaw):
     """Spring beside a spring and a dashpot in series, K*(w) = k + k_m i w tau / (1 + i w tau).
 
     Parameters
@@ -72,10 +47,11 @@ class StandardLinearSolid(_Viscoelastic):
     k_m: float
     tau: float
 
-    FIELDS: ClassVar[tuple[LawField, ...]] = (
-        LawField("k", "stiffness", 0.0),
-        LawField("k_m", "stiffness", 0.0),
-        LawField("tau", "time", _LEAST_TIME),
+    word = "standard-linear-solid"
+    parameters = (
+        _K,
+        LawField("k_m", "stiffness", 0.0, meaning="What is added at high frequencies."),
+        LawField("tau", "time", _LEAST_TIME, meaning="Relaxation time."),
     )
 
     def stiffness(self, omega: FloatArray) -> ComplexArray:
@@ -90,7 +66,7 @@ class StandardLinearSolid(_Viscoelastic):
 
 
 @dataclass(frozen=True)
-class FractionalZener(_Viscoelastic):
+class FractionalZener(JointLaw):
     """Standard linear solid with a fractional derivative, K*(w) = k + k_m (i w tau)^alpha / (1 + (i w tau)^alpha).
 
     Parameters
@@ -127,10 +103,8 @@ class FractionalZener(_Viscoelastic):
     tau: float
     alpha: float
 
-    FIELDS: ClassVar[tuple[LawField, ...]] = (
-        *StandardLinearSolid.FIELDS,
-        LawField("alpha", "number", _LEAST_ALPHA, 1.0),
-    )
+    word = "fractional-zener"
+    parameters = (*StandardLinearSolid.parameters, _ALPHA)
 
     def stiffness(self, omega: FloatArray) -> ComplexArray:
         """Return K*(w), shape (n_freq,)."""
@@ -150,7 +124,7 @@ class FractionalZener(_Viscoelastic):
 
 
 @dataclass(frozen=True)
-class PowerLaw(_Viscoelastic):
+class PowerLaw(JointLaw):
     """Spring beside a spring-pot, K*(w) = k + k_a (i w / w_0)^alpha, w_0 = 2 pi reference_hz.
 
     Parameters
@@ -183,17 +157,17 @@ class PowerLaw(_Viscoelastic):
     alpha: float
     reference_hz: float = 100.0
 
-    FIELDS: ClassVar[tuple[LawField, ...]] = (
-        LawField("k", "stiffness", 0.0),
-        LawField("k_a", "stiffness", 0.0),
-        LawField("alpha", "number", _LEAST_ALPHA, 1.0),
+    word = "power"
+    parameters = (
+        _K,
+        LawField("k_a", "stiffness", 0.0, meaning="Modulus of the spring-pot at the reference frequency."),
+        _ALPHA,
     )
+    settings = (LawField("reference_hz", "frequency", _LEAST_HZ, meaning="Reference frequency of the power law."),)
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        object.__setattr__(self, "reference_hz", as_number("reference_hz", self.reference_hz))
-        if self.reference_hz <= 0:
-            raise ValueError(f"reference_hz must be positive, not {self.reference_hz:g}")
+        as_positive("reference_hz", self.reference_hz)
 
     def stiffness(self, omega: FloatArray) -> ComplexArray:
         """Return K*(w), shape (n_freq,)."""

@@ -1,1 +1,10 @@
-"""Models of substructures: lumped chains, beams, matrices of the user; how they become receptances."""
+"""Models of substructures and their receptances.
+
+matrices      the matrices of a model as given, and where it is driven and observed
+model         matrices with names of DOFs, assemblies, chains
+beam          plane beams
+receptance    the choice of a method, and direct solutions
+modal         sums of modes; rigid-body modes apart
+krylov        reduction to solutions at a few frequencies
+factors       factors of matrices and the order of elimination
+"""

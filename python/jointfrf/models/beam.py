@@ -8,10 +8,10 @@ from typing import Literal, get_args
 import numpy as np
 from scipy import sparse
 
-from jointfrf.kernel.arguments import FloatArray, as_number, as_real, check_choice
+from jointfrf.kernel.arguments import FloatArray, as_count, as_number, as_positive, as_real, check_choice
 from jointfrf.models.model import Model
 
-__all__ = ["BeamElement", "End", "beam"]
+__all__ = ["BeamElement", "End", "beam", "check_ends"]
 
 BeamElement = Literal["euler-bernoulli", "shear-flexible"]
 End = Literal["free", "clamped"]
@@ -85,16 +85,11 @@ def beam(
     53.65
     """
     check_choice("element", element, get_args(BeamElement))
-    if not isinstance(ends, tuple | list) or len(ends) != 2:
-        raise ValueError(f"ends must be two of {', '.join(get_args(End))}, not {reprlib.repr(ends)}")
-    for end in ends:
-        check_choice("ends", end, get_args(End))
+    check_ends(ends)
     sizes = {"length": length, "youngs_modulus": youngs_modulus, "density": density, "width": width, "height": height}
     for name, value in sizes.items():
-        if as_number(name, value) <= 0:
-            raise ValueError(f"{name} must be positive, not {value}")
-    if as_number("n_elements", n_elements) < 1 or int(n_elements) != n_elements:
-        raise ValueError(f"n_elements must be a whole number, at least 1, not {n_elements}")
+        as_positive(name, value)
+    n_elements = as_count("n_elements", n_elements)
     if not -1 < as_number("poisson", poisson) < 0.5:
         raise ValueError(f"poisson must lie between -1 and 0.5, not {poisson}")
     viscous = tuple(as_real("viscous", viscous, (2,)).tolist())
@@ -131,6 +126,14 @@ def beam(
         dofs=tuple(names[first:last]),
         loss_factor=loss_factor,
     )
+
+
+def check_ends(ends: object) -> None:
+    """Raise unless these are two words for the ends of a beam."""
+    if not isinstance(ends, tuple | list) or len(ends) != 2:
+        raise ValueError(f"ends must be two of {', '.join(get_args(End))}, not {reprlib.repr(ends)}")
+    for end in ends:
+        check_choice("ends", end, get_args(End))
 
 
 def _euler_bernoulli(step: float, bending: float, line_mass: float) -> tuple[FloatArray, FloatArray]:

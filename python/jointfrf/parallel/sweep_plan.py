@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from jointfrf.kernel.memory_maps import CHUNK_BYTES
+from jointfrf.kernel.arguments import CHUNK_BYTES
 
 __all__ = ["SHARE", "SweepCost", "SweepPlan", "planned_sweep"]
 

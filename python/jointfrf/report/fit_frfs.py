@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from jointfrf.dofs import compliance_unit
 from jointfrf.frf.bands import line_slices
-from jointfrf.frf.noise_estimate import ZERO, own_size
+from jointfrf.frf.entry_groups import ZERO, own_size
 from jointfrf.identification.fit_data import FitData
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.report.document import HeatMap

@@ -18,7 +18,7 @@ from jointfrf.identification.fit_data import FitData
 from jointfrf.identification.result import Fit
 from jointfrf.io.cards import CardFormat
 from jointfrf.kernel.arguments import FloatArray, check_type
-from jointfrf.kernel.engine import get_engine
+from jointfrf.kernel.call import get_engine
 from jointfrf.report.chart import Chart, count_points
 from jointfrf.report.document import Document, Listing, Part, Section, Sketch, Words, make_document
 from jointfrf.report.figure import Figure

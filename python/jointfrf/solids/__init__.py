@@ -1,7 +1,6 @@
 """Solid bodies of eight-node bricks.
 
-In reading order: `brick` (elements and their assembly), `mesh` (structured meshes), `solid` (a model: supports and
-reference points), `brick_beam`, `interpolation` (points between nodes); and for the bolted joint `bolt`, `bolted_lap`
-(its mesh), `contact_pairs`, `contact` (one-sided, with friction), `preload` (the tightened state, its contact
-pressure, the linear model about it).
+In reading order: `brick` (elements and their assembly), `mesh` (structured meshes, points between nodes), `solid` (a
+model: supports and reference points), `brick_beam`; and for the bolted joint `bolted_lap` (the bolt, the mesh),
+`contact` (one-sided, with friction), `preload` (the tightened state, its contact pressure, the linear model about it).
 """

@@ -1,4 +1,4 @@
-"""Mesh of two beams in a lap joint with a bolt of solid elements, and the faces that touch."""
+"""Mesh of two beams in a lap joint with a bolt of solid elements: the bolt and its preload, the faces that touch."""
 
 from __future__ import annotations
 
@@ -9,15 +9,123 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from jointfrf.kernel.arguments import FloatArray, as_number, check_choice, check_type, one_line
-from jointfrf.models.beam import End
-from jointfrf.solids.bolt import Bolt
+from jointfrf.kernel.arguments import FloatArray, as_count, as_positive, check_choice, check_type, one_line
+from jointfrf.models.beam import End, check_ends
 from jointfrf.solids.brick import Material, brick_quality
 from jointfrf.solids.brick_beam import Preset, holed_plan
-from jointfrf.solids.contact_pairs import ContactInterface
+from jointfrf.solids.contact import ContactInterface
 from jointfrf.solids.mesh import Mesh, Plan, disc, extrude, join_plans, rectangle
 
-__all__ = ["ALUMINIUM", "BODIES", "INTERFACES", "BoltedLap", "LapDivisions", "bolted_lap"]
+__all__ = [
+    "ALUMINIUM",
+    "BODIES",
+    "INTERFACES",
+    "PROOF_STRENGTH",
+    "STRESS_AREA",
+    "Bolt",
+    "BoltedLap",
+    "LapDivisions",
+    "bolted_lap",
+    "preload_force",
+]
+
+#: Usual values of steel.
+STEEL: Final = Material(youngs_modulus=210e9, poisson=0.3, density=7850.0, loss_factor=0.01)
+
+#: Proof strength of a property class, Pa: ISO 898-1, Table 3, diameters up to 16 mm.
+PROOF_STRENGTH: Final[dict[str, float]] = {
+    "4.6": 225e6,
+    "4.8": 310e6,
+    "5.6": 280e6,
+    "5.8": 380e6,
+    "6.8": 440e6,
+    "8.8": 580e6,
+    "9.8": 650e6,
+    "10.9": 830e6,
+    "12.9": 970e6,
+}
+#: Tensile stress area of coarse metric threads, m^2: ISO 898-1, Table 4.
+STRESS_AREA: Final[dict[str, float]] = {"M5": 14.2e-6, "M6": 20.1e-6, "M8": 36.6e-6, "M10": 58.0e-6, "M12": 84.3e-6}
+
+
+@dataclass(frozen=True)
+class Bolt:
+    """Shank, head and nut as one body; the thread is left out.
+
+    Parameters
+    ----------
+    shank_radius, head_radius, nut_radius : float
+        m. Head and nut are round.
+    head_height, nut_height : float
+        m.
+    material : Material
+
+    Raises
+    ------
+    ValueError
+        A dimension that is not positive; a head or nut that is not wider than the shank.
+
+    Examples
+    --------
+    The default is an M8 bolt:
+
+    >>> from jointfrf.solids.bolted_lap import Bolt
+    >>> Bolt().shank_radius, Bolt().head_height
+    (0.004, 0.0053)
+    """
+
+    shank_radius: float = 0.004
+    head_radius: float = 0.0065
+    head_height: float = 0.0053
+    nut_radius: float = 0.0065
+    nut_height: float = 0.0068
+    material: Material = STEEL
+
+    def __post_init__(self) -> None:
+        for name in ("shank_radius", "head_radius", "head_height", "nut_radius", "nut_height"):
+            as_positive(name, getattr(self, name), "m")
+        for name in ("head_radius", "nut_radius"):
+            if getattr(self, name) <= self.shank_radius:
+                radius, shank = 1e3 * getattr(self, name), 1e3 * self.shank_radius
+                raise ValueError(f"{name} ({radius:g} mm) must exceed shank_radius ({shank:g} mm)")
+
+
+def preload_force(tensile_area: float, proof_strength: float, share: float = 0.75) -> float:
+    """Preload of a bolt, F_i = share A_t S_p (4.3)-(4.4).
+
+    Parameters
+    ----------
+    tensile_area : float
+        Tensile stress area A_t of the thread, m^2; see `STRESS_AREA`.
+    proof_strength : float
+        S_p, Pa; see `PROOF_STRENGTH`.
+    share : float
+        Of the proof load: 0.75 for connections that are taken apart again, 0.9 for permanent ones.
+
+    Returns
+    -------
+    float
+        N.
+
+    Raises
+    ------
+    ValueError
+        A value that is not positive; a share above 1.
+
+    Examples
+    --------
+    An M8 bolt of class 10.9:
+
+    >>> from jointfrf.solids.bolted_lap import PROOF_STRENGTH, STRESS_AREA, preload_force
+    >>> round(preload_force(STRESS_AREA["M8"], PROOF_STRENGTH["10.9"]), 1)
+    22783.5
+    """
+    for name, value in (("tensile_area", tensile_area), ("proof_strength", proof_strength), ("share", share)):
+        as_positive(name, value)
+    if share > 1:
+        raise ValueError(f"share must not exceed 1, the proof load itself, not {share:g}")
+    return share * tensile_area * proof_strength  # (4.3), (4.4)
+
 
 #: Material of the beams of case study 2.
 ALUMINIUM: Final = Material(youngs_modulus=70e9, poisson=0.33, density=2700.0, loss_factor=0.01)
@@ -26,11 +134,7 @@ Body = Literal["A", "B", "bolt"]
 #: The bodies in the order of their elements.
 BODIES: Final[tuple[Body, ...]] = get_args(Body)
 #: Lower and upper body of each interface.
-INTERFACES: Final[dict[str, tuple[Body, Body]]] = {
-    "head": ("A", "bolt"),
-    "lap": ("B", "A"),
-    "nut": ("bolt", "B"),
-}
+INTERFACES: Final[dict[str, tuple[Body, Body]]] = {"head": ("A", "bolt"), "lap": ("B", "A"), "nut": ("bolt", "B")}
 #: Bricks along a beam for each height of length, away from the overlap.
 _PER_HEIGHT: Final = 1.14
 #: Circles around the head reach this share of the way to the nearest edge.
@@ -77,9 +181,8 @@ class LapDivisions:
     def __post_init__(self) -> None:
         for field in fields(self):
             value = getattr(self, field.name)
-            least = 0 if field.name == "circles" else 1
-            if value is not None and (int(value) != value or value < least):
-                raise ValueError(f"{field.name} must be a whole number, at least {least}, not {value}")
+            if value is not None:
+                as_count(field.name, value, 0 if field.name == "circles" else 1)
 
 
 @dataclass(frozen=True)
@@ -118,8 +221,7 @@ class BoltedLap:
 
     def held(self) -> NDArray[np.int64]:
         """Return the DOFs of the clamped nodes, x, y, z of each."""
-        held: NDArray[np.int64] = (3 * self.clamped[:, None].astype(np.int64) + np.arange(3)).ravel()
-        return held
+        return (3 * self.clamped[:, None].astype(np.int64) + np.arange(3)).ravel()
 
     def element_materials(self) -> list[Material]:
         """Return the material of every element."""
@@ -189,8 +291,7 @@ def bolted_lap(
         check_type("materials", material, Material)
     _check_dimensions(lengths, heights, width, overlap, hole_radius, fastener)
     check_choice("preset", preset, get_args(Preset))
-    for end in ends:
-        check_choice("ends", end, get_args(End))
+    check_ends(ends)
     start = lengths[0] - overlap
     radii = _radii(hole_radius, fastener, min(width, overlap) / 2, bricks)
     shared = _shared_plan(overlap, width, heights, radii, bricks, start)
@@ -234,8 +335,7 @@ def _check_dimensions(
     named = {"lengths": lengths, "heights": heights, "width": (width,), "overlap": (overlap,)}
     for name, values in {**named, "hole_radius": (hole_radius,)}.items():
         for value in values:
-            if as_number(name, value) <= 0:
-                raise ValueError(f"{name} must be positive, not {value:g} m")
+            as_positive(name, value, "m")
     if overlap > min(lengths):
         raise ValueError(f"overlap ({1e3 * overlap:g} mm) must not exceed the lengths of the beams")
     if hole_radius <= bolt.shank_radius:
@@ -334,9 +434,7 @@ def _interfaces(mesh: Mesh, body: NDArray[np.str_], heights: tuple[float, float]
         # A corner of a quad that is no neighbour of a touching one belongs to no pair.
         kept = touching & np.isin(partner, quads)
         found[name] = ContactInterface(
-            lower=nodes[nearest[kept]],
-            upper=partner[kept],
-            area=_node_areas(mesh.nodes, quads, partner[kept]),
+            lower=nodes[nearest[kept]], upper=partner[kept], area=_node_areas(mesh.nodes, quads, partner[kept])
         )
     return found
 

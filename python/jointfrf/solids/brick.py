@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
-from jointfrf.kernel.arguments import FloatArray, as_number, as_real, check_choice, one_line
+from jointfrf.kernel.arguments import FloatArray, as_number, as_positive, as_real, check_choice, one_line
 from jointfrf.kernel.call import call
 
 __all__ = ["Formulation", "Mass", "Material", "assemble_bricks", "brick_quality", "element_matrices"]
@@ -60,8 +60,7 @@ class Material:
 
     def __post_init__(self) -> None:
         for name in ("youngs_modulus", "density"):
-            if not as_number(name, getattr(self, name)) > 0:
-                raise ValueError(f"{name} must be positive, not {getattr(self, name)}")
+            as_positive(name, getattr(self, name))
         if not -1 < as_number("poisson", self.poisson) < 0.5:
             raise ValueError(f"poisson must lie between -1 and 0.5, not {self.poisson}")
         if as_number("loss_factor", self.loss_factor) < 0:

@@ -9,10 +9,10 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from jointfrf.kernel.arguments import FloatArray, as_number, as_real, check_choice
-from jointfrf.models.beam import End
+from jointfrf.kernel.arguments import FloatArray, as_count, as_number, as_positive, as_real, check_choice
+from jointfrf.models.beam import End, check_ends
 from jointfrf.solids.brick import Formulation, Material
-from jointfrf.solids.mesh import Mesh, Plan, as_count, extrude, holed_rectangle, join_plans, rectangle
+from jointfrf.solids.mesh import Mesh, Plan, extrude, holed_rectangle, join_plans, rectangle
 from jointfrf.solids.solid import Patch, SolidModel, solid_model
 
 __all__ = ["PRESETS", "Face", "Hole", "Preset", "brick_beam", "holed_plan"]
@@ -124,13 +124,9 @@ def brick_beam(
     (1030, 'tip:theta_z')
     """
     for name, value in (("length", length), ("width", width), ("height", height)):
-        if as_number(name, value) <= 0:
-            raise ValueError(f"{name} must be positive, not {value:g} m")
+        as_positive(name, value, "m")
     check_choice("preset", preset, get_args(Preset))
-    if not isinstance(ends, tuple | list) or len(ends) != 2:
-        raise ValueError(f"ends must be two of {', '.join(get_args(End))}, not {reprlib.repr(ends)}")
-    for end in ends:
-        check_choice("ends", end, get_args(End))
+    check_ends(ends)
     if not isinstance(hole, Hole | None):
         raise TypeError(f"hole must be a Hole, not {type(hole).__name__}")
     for what, places in (("sections", sections), ("observed", observed)):

@@ -11,15 +11,14 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from jointfrf.dofs import DIRECTIONS
-from jointfrf.kernel.arguments import FloatArray, as_number, check_type
+from jointfrf.kernel.arguments import FloatArray, as_positive, check_type
 from jointfrf.solids.bolted_lap import INTERFACES, BoltedLap
 from jointfrf.solids.brick import Formulation, assemble_bricks
 from jointfrf.solids.brick_beam import PRESETS
-from jointfrf.solids.contact import ContactLaw, InterfaceState, Iteration, solve_contact
-from jointfrf.solids.contact_pairs import Pairs, tie
+from jointfrf.solids.contact import ContactLaw, InterfaceState, Iteration, Pairs, solve_contact, tie
 from jointfrf.solids.solid import SolidModel, solid_model
 
-__all__ = ["PreloadedLap", "PressureMap", "preload"]
+__all__ = ["PreloadedLap", "preload"]
 
 #: Nodes within this share of the height of the mesh lie in a face, or at the cut.
 _NEAR: Final = 1e-6
@@ -81,10 +80,7 @@ class PreloadedLap:
         """
         formulation = PRESETS[self.lap.preset]
         bodies = solid_model(
-            self.lap.mesh,
-            self.lap.element_materials(),
-            formulation=formulation,
-            clamped=self.lap.clamped,
+            self.lap.mesh, self.lap.element_materials(), formulation=formulation, clamped=self.lap.clamped
         )
         pairs = Pairs(self.lap.interfaces, 3 * len(self.lap.mesh.nodes))
         closed, slipping = (
@@ -159,8 +155,7 @@ def preload(lap: BoltedLap, force: float, law: ContactLaw | None = None, *, max_
     check_type("lap", lap, BoltedLap)
     used = ContactLaw() if law is None else law
     check_type("law", used, ContactLaw)
-    if as_number("force", force) <= 0:
-        raise ValueError(f"force must be positive, not {force:g} N")
+    as_positive("force", force, "N")
     if lap.clamped.size == 0:
         raise ValueError("lap is not supported: one of its ends must be clamped")
     formulation = PRESETS[lap.preset]

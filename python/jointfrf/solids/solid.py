@@ -74,8 +74,7 @@ class SolidModel(Model):
 
     def displacements(self, shape: ArrayLike) -> FloatArray:
         """Return the displacements of all nodes in a motion of the DOFs, shape (n_nodes, 3)."""
-        found: FloatArray = (self.expansion @ np.asarray(shape)).reshape(-1, 3)
-        return found
+        return np.asarray((self.expansion @ np.asarray(shape)).reshape(-1, 3))
 
 
 def solid_model(

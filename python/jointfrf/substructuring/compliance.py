@@ -1,15 +1,36 @@
-"""Joint compliance K*^-1 from interface FRFs, and its derivative and covariance for noisy FRFs."""
+"""Joint compliance K*^-1 from interface FRFs with its covariance; joints between many channels without rotations."""
 
 from __future__ import annotations
 
+import warnings
+from typing import NamedTuple
+
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from jointfrf.kernel.arguments import ComplexArray, as_interface, as_real, optional_frequency
-from jointfrf.kernel.call import N_FREQ, run
-from jointfrf.kernel.status import OnSingular
+from jointfrf.channels.virtual_point import VirtualPoint, check_sides
+from jointfrf.errors import IdentificationWarning, SingularLineError
+from jointfrf.kernel.arguments import (
+    ComplexArray,
+    FloatArray,
+    as_integer,
+    as_interface,
+    as_positive,
+    as_real,
+    as_square,
+    check_finite_lines,
+    optional_frequency,
+)
+from jointfrf.kernel.call import N_FREQ, OnSingular, run
 
-__all__ = ["compliance_covariance", "compliance_factors", "joint_compliance"]
+__all__ = [
+    "MultiPointJoint",
+    "compliance_covariance",
+    "compliance_factors",
+    "joint_compliance",
+    "multi_point_compliance",
+    "multi_point_stiffness",
+]
 
 
 def joint_compliance(
@@ -166,3 +187,277 @@ def compliance_covariance(
     args = (int(reciprocal), n, m, N_FREQ, mean, t, spread)
     sweeps = {"gamma": mean, "variance": spread}
     return run("compliance_covariance", args, (n_freq, n * n, n * n), sweeps, freq, on_singular)[0]
+
+
+#: Without truncation a matrix counts as singular when its smallest singular value is below this share of the largest.
+_SINGULAR = 1e-14
+
+
+class MultiPointJoint(NamedTuple):
+    """A joint between the channels of both sides, and its equivalent at the virtual points.
+
+    Attributes
+    ----------
+    lines : ndarray, shape (n_freq, m_j, m_k) or (n_freq, m_k, m_j)
+        Stiffness, N/m, or compliance, m/N, between channels.
+    equivalent : ndarray, shape (n_freq, n, n)
+        The same at the virtual points, rotational rows and columns included.
+    rank : ndarray of int, shape (n_freq,)
+        Number of singular values used in the inverse of each line.
+    singular_values : ndarray, shape (n_freq, q)
+        Of the matrix that was inverted, m/N, in decreasing order.
+    threshold : ndarray, shape (n_freq,)
+        Size below which a singular value is taken for noise, m/N; 0 where no noise was given.
+    """
+
+    lines: ComplexArray
+    equivalent: ComplexArray
+    rank: NDArray[np.intp]
+    singular_values: FloatArray
+    threshold: FloatArray
+
+
+def multi_point_stiffness(
+    gamma: ArrayLike,
+    side_j: VirtualPoint,
+    side_k: VirtualPoint,
+    *,
+    rank: int | None = None,
+    noise: float | ArrayLike | None = None,
+) -> MultiPointJoint:
+    """Stiffness of a joint between all channels of both sides, and of the joint between their virtual points.
+
+    Parameters
+    ----------
+    gamma : array_like, shape (n_freq, m_j + m_k, m_j + m_k)
+        Receptance of the assembly at the channels of side j, then k, m/N: translations only.
+    side_j, side_k : VirtualPoint
+        Of the m_j and m_k channels, with the same n DOFs in the same order.
+    rank : int, optional
+        Number of singular values of every line to use.
+    noise : float or array_like, shape (n_freq, m_j + m_k, m_j + m_k), optional
+        Instead of `rank`: relative noise level of each entry, 0.01 for 1 %, or the variance E|e|^2 of each, (m/N)^2.
+        Singular values that this noise can make by itself are not used. With neither, all are.
+
+    Returns
+    -------
+    MultiPointJoint
+        With `lines` K_m = -(gamma^+)_jk, N/m, and `equivalent` R_j^T K_m R_k, N/m, N, N m/rad.
+
+    Raises
+    ------
+    SingularLineError
+        A line is singular to working precision, and neither `rank` nor `noise` was given.
+    ValueError
+        Wrong shapes, rank or noise; different DOFs of the sides; NaN or Inf in a line.
+
+    Warns
+    -----
+    IdentificationWarning
+        On some lines fewer than 2 n singular values are used, so that a part of the equivalent joint is missing.
+
+    Notes
+    -----
+    A massless joint puts forces -S [u_j; u_k] on the channels, and gamma^-1 = diag(Z_A, Z_B) + S. Hence K_m = -S_jk is
+    the force on each channel of j per displacement of each of k. When side k moves as a rigid body, the resultants on
+    the point of j are R_j^T K_m R_k: the equivalent, a property of the joint alone. Its rotations need no rotational
+    FRFs. This is exact in two cases:
+
+    - The joint acts through the channels only, springs between them for instance, and gamma is regular: patches that
+      deform. A virtual point transformation would count the deformation as part of the joint here.
+    - The patches are rigid. Then gamma has rank 2 n: ``rank=2 * n`` gives the joint of the virtual points, with
+      K_m = T_j^T K T_k, of minimum norm: how the channels of a rigid patch share the forces cannot be identified.
+
+    In between, nearly rigid patches with noise, the small singular values are the deformation of the patches and the
+    inverse amplifies their noise; `rank` and `noise` leave them out, and `rank` of the result says how many were used.
+    Truncation is a bias: the stiffer a joint, the smaller its relative motion, which is truncated first. For stiff
+    joints use `multi_point_compliance`, or `identify` with `virtual_points`.
+
+    Threshold of noise: the largest root of a row sum of the variances plus that of a column sum, the expected largest
+    singular value of independent noise (exactly so for equal variances and large matrices).
+
+    To regenerate the assembly: ``couple(h_a, h_b, lines, ...)`` where the channels lie opposite one another, or
+    `append_virtual_point` and the equivalent where they do not.
+
+    References
+    ----------
+    D. de Klerk, D. J. Rixen, S. N. Voormeeren, F. Pasteuning, Solving the RDoF problem in experimental dynamic
+    substructuring, IMAC 2008.
+
+    Examples
+    --------
+    Springs of 1 and 3 N/m between two free, rigid bars of 1 kg and 1 kg m^2, 1 m to the left and right of the middle.
+    The resultant stiffnesses are 4 N/m and 4 N m/rad, coupled by 2 N.
+
+    >>> import numpy as np, jointfrf as jf
+    >>> from jointfrf import multi_point_stiffness
+    >>> from jointfrf import virtual_point
+    >>> side = virtual_point([[-1, 0, 0], [1, 0, 0]], [[0, 1, 0]] * 2, [0, 0, 0], ["y", "theta_z"])
+    >>> x = np.array([-1.0, 1.0])
+    >>> bar = -(1 + np.outer(x, x))[None]  # 1 rad/s
+    >>> gamma = jf.couple(bar, bar, np.diag([1.0, 3.0]), [0, 1], [0, 1])
+    >>> found = multi_point_stiffness(gamma, side, side)
+    >>> (found.lines.real.round(9) + 0.0).tolist()
+    [[[1.0, 0.0], [0.0, 3.0]]]
+    >>> found.equivalent.real.round(9).tolist()
+    [[[4.0, 2.0], [2.0, 4.0]]]
+    """
+    lines, m_j = _as_sides(gamma, side_j, side_k)
+    by = _truncated_inverse(lines, rank, _variance(noise, lines), "gamma")
+    _warn_if_truncated(by.used, 2 * len(side_j.dofs))
+    stiffness = -by.inverse[:, :m_j, m_j:]
+    equivalent = side_j.modes.T @ stiffness @ side_k.modes
+    return MultiPointJoint(stiffness, equivalent, by.used, by.singular_values, by.threshold)
+
+
+def multi_point_compliance(
+    gamma: ArrayLike,
+    side_j: VirtualPoint,
+    side_k: VirtualPoint,
+    *,
+    rank: int | None = None,
+    noise: float | ArrayLike | None = None,
+) -> MultiPointJoint:
+    """Compliance of a joint between all channels of both sides, and of the joint between their virtual points.
+
+    Parameters
+    ----------
+    gamma, side_j, side_k
+        As in `multi_point_stiffness`.
+    rank : int, optional
+        Number of singular values of gamma_jk to use: the number of forces that the joint passes, n for a joint between
+        virtual points.
+    noise : float or array_like, optional
+        As in `multi_point_stiffness`, for gamma_jk.
+
+    Returns
+    -------
+    MultiPointJoint
+        With `lines` C_m = gamma_kk gamma_jk^+ gamma_jj - gamma_kj, m/N, rows k and columns j, and `equivalent`
+        T_k C_m T_j^T, m/N, 1/N, rad/(N m).
+
+    Raises
+    ------
+    SingularLineError, ValueError
+        As in `multi_point_stiffness`.
+
+    Warns
+    -----
+    IdentificationWarning
+        On some lines fewer than n singular values are used, so that a part of the equivalent joint is missing.
+
+    Notes
+    -----
+    Noise enters almost linearly, and only gamma_jk is inverted, which has one singular value above the noise for each
+    force that the joint passes; their number shows what kind of joint it is. A soft joint above its resonances passes
+    hardly any force, and gamma_jk is lost in noise: `multi_point_stiffness` is more accurate there.
+
+    For a joint between virtual points, which acts on the patches as T^T g, the equivalent with ``rank=n`` is K*^-1
+    whether the patches deform or not; so is `joint_compliance` of the transformed receptances. For a joint of
+    independent springs between opposite channels C_m is the inverse of their stiffness when all singular values are
+    used. The equivalents of `multi_point_stiffness` and of this function are inverses of one another where the patches
+    are rigid; where they are not, their difference shows how much the patches deform.
+
+    Examples
+    --------
+    >>> import numpy as np, jointfrf as jf
+    >>> from jointfrf import multi_point_compliance
+    >>> from jointfrf import virtual_point
+    >>> side = virtual_point([[-1, 0, 0], [1, 0, 0]], [[0, 1, 0]] * 2, [0, 0, 0], ["y", "theta_z"])
+    >>> x = np.array([-1.0, 1.0])
+    >>> bar = -(1 + np.outer(x, x))[None]
+    >>> gamma = jf.couple(bar, bar, np.diag([1.0, 3.0]), [0, 1], [0, 1])
+    >>> np.linalg.inv(multi_point_compliance(gamma, side, side).equivalent).real.round(9).tolist()
+    [[[4.0, 2.0], [2.0, 4.0]]]
+    """
+    lines, m_j = _as_sides(gamma, side_j, side_k)
+    variance = _variance(noise, lines)
+    across = None if variance is None else variance[:, :m_j, m_j:]
+    by = _truncated_inverse(lines[:, :m_j, m_j:], rank, across, "gamma_jk")
+    _warn_if_truncated(by.used, len(side_j.dofs))
+    compliance = lines[:, m_j:, m_j:] @ by.inverse @ lines[:, :m_j, :m_j] - lines[:, m_j:, :m_j]
+    equivalent = side_k.transform @ compliance @ side_j.transform.T
+    return MultiPointJoint(compliance, equivalent, by.used, by.singular_values, by.threshold)
+
+
+def _as_sides(gamma: ArrayLike, side_j: VirtualPoint, side_k: VirtualPoint) -> tuple[ComplexArray, int]:
+    """Return the lines and the number of channels of side j."""
+    check_sides(side_j, side_k)
+    lines = as_square("gamma", gamma)
+    m_j, m_k = side_j.modes.shape[0], side_k.modes.shape[0]
+    if lines.shape[1] != m_j + m_k:
+        raise ValueError(
+            f"gamma must hold the {m_j} channels of side_j, then the {m_k} of side_k, not {lines.shape[1]}"
+        )
+    check_finite_lines("gamma", lines)
+    return lines, m_j
+
+
+def _variance(noise: float | ArrayLike | None, lines: ComplexArray) -> FloatArray | None:
+    if noise is None:
+        return None
+    if np.ndim(noise) == 0:
+        return as_positive("noise", noise) ** 2 * (lines.real**2 + lines.imag**2)
+    variance = as_real("noise", noise, lines.shape)
+    if (variance < 0).any():
+        raise ValueError("noise must not hold negative variances")
+    return variance
+
+
+class _TruncatedInverse(NamedTuple):
+    """Pseudo-inverse of every line, the singular values, how many of them it uses, and the threshold of noise."""
+
+    inverse: ComplexArray
+    used: NDArray[np.intp]
+    singular_values: FloatArray
+    threshold: FloatArray
+
+
+def _truncated_inverse(
+    lines: ComplexArray, rank: int | None, variance: FloatArray | None, name: str
+) -> _TruncatedInverse:
+    """Invert by the singular values asked for: `rank` of them, those above the noise, or all."""
+    n_freq, most = lines.shape[0], min(lines.shape[1:])
+    if rank is not None and variance is not None:
+        raise ValueError("rank and noise exclude one another: give one of them")
+    if rank is not None and not 1 <= as_integer("rank", rank) <= most:
+        raise ValueError(f"rank must lie between 1 and {most}, the singular values of {name}, not {rank}")
+    left, size, right = np.linalg.svd(lines, full_matrices=False)
+    threshold, used = np.zeros(n_freq), np.full(n_freq, most if rank is None else int(rank))
+    if variance is not None:
+        threshold = _noise_threshold(variance)
+        used = np.count_nonzero(size > threshold[:, None], axis=1)
+    elif rank is None:
+        _check_regular(size, name)
+    keep = np.arange(most) < used[:, None]
+    reciprocal = np.divide(1, size, out=np.zeros_like(size), where=keep & (size > 0))
+    inverse = (right.conj().swapaxes(1, 2) * reciprocal[:, None, :]) @ left.conj().swapaxes(1, 2)
+    return _TruncatedInverse(inverse, used, size, threshold)
+
+
+def _noise_threshold(variance: FloatArray) -> FloatArray:
+    """Return the expected largest singular value of independent noise, shape (n_freq,)."""
+    by_rows, by_columns = variance.sum(axis=2), variance.sum(axis=1)
+    return np.asarray(np.sqrt(by_rows.max(axis=1)) + np.sqrt(by_columns.max(axis=1)))
+
+
+def _check_regular(size: FloatArray, name: str) -> None:
+    """Raise if the smallest singular value of a line is zero to working precision."""
+    singular = np.flatnonzero(~(size[:, -1] > _SINGULAR * size[:, 0]))
+    if singular.size:
+        raise SingularLineError(
+            f"{name} is singular in line {singular[0]}: rigid patches have no more singular values than rigid "
+            "motions; give rank or noise",
+            singular,
+        )
+
+
+def _warn_if_truncated(used: NDArray[np.intp], needed: int) -> None:
+    lost = np.flatnonzero(used < needed)
+    if lost.size:
+        warnings.warn(
+            f"on {lost.size} of {used.size} lines fewer than the {needed} singular values of the equivalent joint "
+            f"are used, down to {used[lost].min()}: a part of it is missing there",
+            IdentificationWarning,
+            stacklevel=3,
+        )

@@ -1,14 +1,24 @@
-"""Receptances of a locally modified structure (2.31)-(2.36) and the inverse problem (2.40)."""
+"""Receptances of a modified structure (2.31)-(2.36); the joint by inverse structural modification (2.40)-(2.48)."""
 
 from __future__ import annotations
 
+from typing import Literal, get_args
+
+import numpy as np
 from numpy.typing import ArrayLike
 
-from jointfrf.kernel.arguments import ComplexArray, as_dofs, as_joint_lines, as_square, optional_frequency
-from jointfrf.kernel.call import N_FREQ, run
-from jointfrf.kernel.status import OnSingular
+from jointfrf.kernel.arguments import (
+    ComplexArray,
+    as_dofs,
+    as_interface,
+    as_joint_lines,
+    as_square,
+    check_choice,
+    optional_frequency,
+)
+from jointfrf.kernel.call import N_FREQ, OnSingular, run
 
-__all__ = ["find_modification", "modify"]
+__all__ = ["find_modification", "inverse_substructuring", "ismm", "modify"]
 
 
 def modify(
@@ -112,3 +122,129 @@ def find_modification(
     freq = optional_frequency(freq_hz, n_freq)
     sweeps = {"alpha": before, "gamma": after}
     return run("find_modification", (n, N_FREQ, before, after), before.shape, sweeps, freq, on_singular, out=out)[0]
+
+
+#: Off-diagonal block of (2.48) that K* is taken from: rows of side j, or of side k.
+Block = Literal["jk", "kj"]
+
+
+def _with_block_first(lines: ComplexArray, n: int, block: Block) -> ComplexArray:
+    """Return FRFs in the order of sides that a block names: as they are, or a copy with sides j and k exchanged."""
+    check_choice("block", block, get_args(Block))
+    if block == "jk":
+        return lines
+    order = np.roll(np.arange(2 * n), n)
+    return np.ascontiguousarray(lines[:, order[:, None], order])
+
+
+def ismm(
+    alpha: ArrayLike,
+    gamma: ArrayLike,
+    k_initial: ArrayLike,
+    *,
+    block: Block = "jk",
+    freq_hz: ArrayLike | None = None,
+    on_singular: OnSingular = "raise",
+    out: ComplexArray | None = None,
+) -> ComplexArray:
+    """Joint stiffness K* = K0 + Delta by the inverse structural modification method.
+
+    Parameters
+    ----------
+    alpha : array_like, shape (n_freq, 2 n, 2 n)
+        Calculated receptance of the assembly with K0 at joint DOFs j, then k, m/N.
+    gamma : array_like, shape (n_freq, 2 n, 2 n)
+        Measured receptance of the assembly at the same DOFs.
+    k_initial : array_like, shape (n_freq, n, n) or (n, n)
+        First estimate K0, N/m.
+    block : {"jk", "kj"}
+        Off-diagonal block that K* is taken from. Both hold the same joint; with measured FRFs, where gamma_jk and
+        gamma_kj have noise of their own, they are two estimates. They agree where gamma is symmetric. "kj" copies the
+        FRFs, sides exchanged.
+    freq_hz, on_singular, out
+        As in `couple`.
+
+    Returns
+    -------
+    ndarray, shape (n_freq, n, n)
+        K*, N/m.
+
+    Raises
+    ------
+    SingularLineError, ValueError
+        As in `couple`.
+
+    Notes
+    -----
+    Eqs. (2.47), (2.48): D = alpha^-1 (alpha - gamma) gamma^-1 contains -Delta twice off its diagonal, so that
+    K* = K0 - D_jk, and K* = K0 - D_kj. Only the block asked for is formed. Where alpha was assembled through K0,
+    substructures and first estimate cancel and the result is that of `inverse_substructuring`; with any other alpha (a
+    truncated modal model, say) it is not.
+
+    Examples
+    --------
+    >>> import numpy as np, jointfrf as jf
+    >>> h = np.full((1, 1, 1), 0.5)
+    >>> alpha, gamma = (jf.couple(h, h, [[k]], [0], [0]) for k in (1.0, 3.0))
+    >>> jf.ismm(alpha, gamma, [[1.0]]).real.round(12).tolist()
+    [[[3.0]]]
+    """
+    calculated, n = as_interface("alpha", alpha)
+    n_freq = calculated.shape[0]
+    measured, m = as_interface("gamma", gamma, n_freq)
+    if m != n:
+        raise ValueError(f"gamma must have the shape of alpha, {calculated.shape}, not {measured.shape}")
+    first = as_joint_lines("k_initial", k_initial, n, n_freq)
+    calculated, measured = (_with_block_first(lines, n, block) for lines in (calculated, measured))
+    freq = optional_frequency(freq_hz, n_freq)
+    sweeps = {"alpha": calculated, "gamma": measured, "k_initial": first}
+    args = (n, N_FREQ, calculated, measured, first)
+    return run("ismm", args, first.shape, sweeps, freq, on_singular, out=out)[0]
+
+
+def inverse_substructuring(
+    gamma: ArrayLike,
+    *,
+    block: Block = "jk",
+    freq_hz: ArrayLike | None = None,
+    on_singular: OnSingular = "raise",
+    out: ComplexArray | None = None,
+) -> ComplexArray:
+    """Joint stiffness K* = -(gamma^-1)_jk: what ISMM reduces to, without model and first estimate.
+
+    Parameters
+    ----------
+    gamma : array_like, shape (n_freq, 2 n, 2 n)
+        Measured receptance of the assembly at joint DOFs j, then k, m/N.
+    block
+        As in `ismm`.
+    freq_hz, on_singular, out
+        As in `couple`.
+
+    Returns
+    -------
+    ndarray, shape (n_freq, n, n)
+        K*, N/m.
+
+    Raises
+    ------
+    SingularLineError, ValueError
+        As in `couple`.
+
+    Notes
+    -----
+    gamma^-1 = [[Z_A + K*, -K*], [-K*, Z_B + K*]]: the off-diagonal blocks contain the joint only.
+
+    Examples
+    --------
+    >>> import numpy as np, jointfrf as jf
+    >>> h = np.full((1, 1, 1), 0.5)
+    >>> jf.inverse_substructuring(jf.couple(h, h, [[3.0]], [0], [0])).real.round(12).tolist()
+    [[[3.0]]]
+    """
+    measured, n = as_interface("gamma", gamma)
+    n_freq = measured.shape[0]
+    measured = _with_block_first(measured, n, block)
+    freq = optional_frequency(freq_hz, n_freq)
+    shape, sweeps = (n_freq, n, n), {"gamma": measured}
+    return run("inverse_substructuring", (n, N_FREQ, measured), shape, sweeps, freq, on_singular, out=out)[0]

@@ -5,8 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from jointfrf.solids.bolt import PROOF_STRENGTH, STRESS_AREA, Bolt, preload_force
-from jointfrf.solids.bolted_lap import ALUMINIUM, LapDivisions, bolted_lap
+from jointfrf.solids.bolted_lap import (
+    ALUMINIUM,
+    PROOF_STRENGTH,
+    STRESS_AREA,
+    Bolt,
+    LapDivisions,
+    bolted_lap,
+    preload_force,
+)
 from jointfrf.solids.contact import ContactLaw
 from jointfrf.solids.preload import preload
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import jointfrf as jf
-from jointfrf.kernel.engine import Engine
+from jointfrf.kernel.call import Engine
 
 EPS = np.finfo(float).eps
 

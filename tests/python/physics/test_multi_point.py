@@ -5,7 +5,7 @@ import pytest
 
 import jointfrf as jf
 from jointfrf.channels.virtual_point import append_virtual_point, virtual_point, virtual_points
-from jointfrf.substructuring.multi_point import multi_point_compliance, multi_point_stiffness
+from jointfrf.substructuring.compliance import multi_point_compliance, multi_point_stiffness
 from rigid_bodies import AROUND, BODY_A, BODY_B, DOFS, POINT, along, rigid_shapes, six, triaxial
 
 

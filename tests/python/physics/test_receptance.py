@@ -5,9 +5,9 @@ import pytest
 from scipy import linalg, sparse
 
 import jointfrf as jf
-from jointfrf.models.receptance import spots
-from jointfrf.models.receptance.direct import _reciprocal_condition
-from jointfrf.models.receptance.factors import factor
+from jointfrf.models import krylov
+from jointfrf.models.factors import factor
+from jointfrf.models.receptance import _reciprocal_condition
 
 
 def model(n=12, seed=0):
@@ -176,7 +176,7 @@ def test_krylov_refuses_damping_that_couples_the_modes():
 
 
 def test_a_tolerance_that_cannot_be_met_leads_to_a_direct_solution_and_is_told(monkeypatch):
-    monkeypatch.setattr(spots, "_LOSS", 0)  # rounding is no excuse
+    monkeypatch.setattr(krylov, "_LOSS", 0)  # rounding is no excuse
     k, m = plate(9)
     arguments = dict(loss_factor=0.02, outputs=[0], inputs=[0], tolerance=1e-18, full_output=True)
     with pytest.warns(jf.ConvergenceWarning, match=r"above the tolerance 1\.0e-18"):

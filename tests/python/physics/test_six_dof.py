@@ -7,7 +7,7 @@ import pytest
 
 import jointfrf as jf
 from cramer_rao import cramer_rao
-from jointfrf.frf.noise_estimate import reciprocity_noise
+from jointfrf.frf.entry_groups import reciprocity_noise
 from jointfrf.identification.manifold.coordinates import joint_terms
 from jointfrf.identification.manifold.estimate import estimate_joint
 from jointfrf.identification.manifold.interface_frfs import InterfaceFrfs

@@ -16,8 +16,8 @@ from scipy import sparse
 
 import jointfrf as jf
 import supported_structures
-from jointfrf.models.receptance import krylov
-from jointfrf.models.receptance.rigid_modes import find_rigid_modes, held
+from jointfrf.models import krylov
+from jointfrf.models.modal import find_rigid_modes, held
 from supported_structures import EPS, FREE, HELD, calculated, exact, relative_error
 
 METHODS = ["auto", "dense", "banded", "sparse", "modal", "krylov"]

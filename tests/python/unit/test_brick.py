@@ -409,8 +409,8 @@ def test_the_first_bad_element_is_named():
 @pytest.mark.parametrize(
     ("arguments", "error", "message"),
     [
-        ({"youngs_modulus": 0.0}, ValueError, "youngs_modulus must be positive, not 0.0"),
-        ({"density": -1.0}, ValueError, "density must be positive, not -1.0"),
+        ({"youngs_modulus": 0.0}, ValueError, "youngs_modulus must be positive, not 0"),
+        ({"density": -1.0}, ValueError, "density must be positive, not -1"),
         ({"density": np.nan}, ValueError, "density must be finite"),
         ({"poisson": 0.5}, ValueError, "poisson must lie between -1 and 0.5, not 0.5"),
         ({"poisson": -1.0}, ValueError, "poisson must lie between"),

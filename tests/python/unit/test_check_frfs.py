@@ -8,7 +8,7 @@ import pytest
 
 import jointfrf as jf
 from jointfrf.channels.check.check import warn_of_frfs
-from jointfrf.channels.check.ratio_line import ratio_line
+from jointfrf.channels.check.pair_ratios import ratio_line
 from measurement_errors import ERRORS, KINDS_OF_NOISE, check_with_error, measured, names, structure
 
 S = structure("3.3")

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 import jointfrf as jf
-from jointfrf.channels.consistency import driving_point_check, impact_consistency, sensor_consistency
-from jointfrf.channels.virtual_point import virtual_point
+from jointfrf.channels.virtual_point import driving_point_check, impact_consistency, sensor_consistency, virtual_point
 from rigid_bodies import AROUND, BODY_A, POINT, UNIT_MOTIONS, along, motion, rigid_shapes, scattered, six, triaxial
 
 FREQ = np.array([20.0, 45.0, 110.0])

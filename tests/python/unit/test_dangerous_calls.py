@@ -38,8 +38,7 @@ KNOWN = {
     ("io/hdf5_file.py", "import_extra"): "h5py",
     ("io/uff_file.py", "import_extra"): "pyuff, which reads text and numbers",
     ("io/matrix_file.py", "load_npz"): "scipy: of a file whose arrays have been read without pickles before",
-    ("models/receptance/factors.py", "import_extra"): "solvers: pypardiso, mumps",
-    ("models/receptance/ordering.py", "import_extra"): "pymetis",
+    ("models/factors.py", "import_extra"): "solvers: pypardiso, mumps; orders: pymetis",
     (
         "parallel/line_arrays.py",
         "import_extra",

@@ -19,7 +19,7 @@ import pytest
 
 import jointfrf as jf
 from jointfrf.kernel import call
-from jointfrf.kernel.engine import Engine
+from jointfrf.kernel.call import Engine
 
 EPS = np.finfo(float).eps
 #: As many times the change by the last bit of the inputs may two engines be apart.
@@ -515,7 +515,7 @@ def test_the_choice_is_kept_and_returned_to():
 
 def test_an_engine_of_another_machine_is_refused(monkeypatch):
     monkeypatch.setattr(call._kernel, "jf_set_engine", lambda code: -1)
-    with pytest.raises(ValueError, match="engine 'x86-64-v4' is not there on this machine"):
+    with pytest.raises(ValueError, match="engine 'x86-64-v4' is not available on this machine"):
         jf.set_engine("x86-64-v4")
 
 

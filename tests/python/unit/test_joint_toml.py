@@ -52,7 +52,7 @@ def test_a_saved_fit_gives_its_joint(tmp_path):
         ('[[law]]\ndof = "y"\nlaw = "rigid"\nstiff = 2\n', "stiff"),
         ('[[law]]\ndof = "y"\nlaw = "rigid"\n[[law]]\ndof = "y"\nlaw = "rigid"\n', "y has two laws"),
         ('[[law]]\nbetween = ["y"]\nlaw = "spring"\nvalues = { k = 1.0 }\n', "the names of two DOFs"),
-        ('[[law]]\ndof = "y"\nlaw = "spring"\nvalues = { k = -1.0 }\n', "k of a spring must lie in 0"),
+        ('[[law]]\ndof = "y"\nlaw = "spring"\nvalues = { k = -1.0 }\n', "k of SpringLaw must lie in 0"),
         ('dofs = ["y"]\n', "stiffness"),
     ],
 )

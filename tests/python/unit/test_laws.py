@@ -61,7 +61,7 @@ def test_stiffness_and_loss_factor_of_rubber_rise_with_frequency():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: jf.SpringLaw(-1.0), "k of a spring must lie in 0 to inf, not -1"),
+        (lambda: jf.SpringLaw(-1.0), "k of SpringLaw must lie in 0 to inf, not -1"),
         (lambda: jf.SpringLaw(1.0, c=2.0, damping="none"), "c is 2, but damping is 'none'"),
         (lambda: jf.FractionalZener(1, 1, 1, 1.5), "alpha of FractionalZener must lie in 0.001 to 1, not 1.5"),
         (lambda: jf.PowerLaw(1, 1, 0.5, 0.0), "reference_hz must be positive"),

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import jointfrf as jf
-from jointfrf.frf.noise_estimate import reciprocity_noise
+from jointfrf.frf.entry_groups import reciprocity_noise
 
 
 def test_noise_from_reciprocity_is_robust():

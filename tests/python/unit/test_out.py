@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import jointfrf as jf
-from jointfrf.kernel import arguments, call, memory_maps
+from jointfrf.kernel import arguments, call
 
 
 def calls(g):
@@ -53,7 +53,7 @@ def in_file(tmp_path):
 
 @pytest.fixture
 def small_pieces(monkeypatch):
-    monkeypatch.setattr(memory_maps, "CHUNK_BYTES", 2**15)
+    monkeypatch.setattr(arguments, "CHUNK_BYTES", 2**15)
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
@@ -89,7 +89,7 @@ def test_arrays_in_files_give_the_same_bits_piece_by_piece(name, random_lines, i
 def test_pieces_of_any_number_of_lines(n, n_freq, random_lines, in_file, monkeypatch):
     a = random_lines(n_freq, n)
     for piece in (1, 32 * n * n * 600):
-        monkeypatch.setattr(memory_maps, "CHUNK_BYTES", piece)
+        monkeypatch.setattr(arguments, "CHUNK_BYTES", piece)
         assert jf.invert(in_file(a)).tobytes() == jf.invert(a).tobytes()
 
 
@@ -109,7 +109,7 @@ def test_other_types_and_orders_in_files_are_converted_piece_by_piece(
 def test_one_joint_matrix_is_not_copied_for_every_line(random_lines, monkeypatch):
     """Its lines are made piece by piece, and nothing is announced as a large copy."""
     monkeypatch.setattr(arguments, "LARGE_COPY", 1000)
-    monkeypatch.setattr(memory_maps, "CHUNK_BYTES", 2**15)
+    monkeypatch.setattr(arguments, "CHUNK_BYTES", 2**15)
     g, k = random_lines(900, 4), np.array([[2.0, 0.5j], [1.0, 3.0]])
     many = np.ascontiguousarray(np.broadcast_to(k, (900, 2, 2)))
     assert jf.modify(g, k, [0, 2]).tobytes() == jf.modify(g, many, [0, 2]).tobytes()
@@ -204,8 +204,8 @@ MEMORY = """
 import resource, sys
 import numpy as np
 import jointfrf as jf
-from jointfrf.kernel import memory_maps
-memory_maps.CHUNK_BYTES = 4 * 2**20
+from jointfrf.kernel import arguments
+arguments.CHUNK_BYTES = 4 * 2**20
 n_freq = 200_000
 a = np.memmap(sys.argv[1], complex, "r", shape=(n_freq, 4, 4))
 out = np.memmap(sys.argv[2], complex, "w+", shape=a.shape)

@@ -8,12 +8,10 @@ from scipy import sparse
 
 import jointfrf as jf
 from jointfrf.extras import MissingPackageError
-from jointfrf.models.matrices import ModelMatrices
-from jointfrf.models.ports import as_ports
-from jointfrf.models.receptance import factors as factors_module
-from jointfrf.models.receptance.factors import SingularMatrixError, SparseSolver
-from jointfrf.models.receptance.krylov import reduce_model
-from jointfrf.models.receptance.ordering import elimination_order
+from jointfrf.models import factors as factors_module
+from jointfrf.models.factors import SingularMatrixError, SparseSolver, elimination_order
+from jointfrf.models.krylov import reduce_model
+from jointfrf.models.matrices import ModelMatrices, as_ports
 
 PACKAGES = {"PARDISO": "pypardiso", "MUMPS": "mumps"}
 RNG = np.random.default_rng(0)
@@ -152,9 +150,9 @@ def test_two_levels_find_the_error_that_complex_factors_find(tolerance, monkeypa
     assert matrices.n > 2000
     errors = []
     for limit in (0, 10**9):
-        monkeypatch.setattr("jointfrf.models.receptance.krylov._ITERATED", limit)
-        monkeypatch.setattr("jointfrf.models.receptance.krylov._MOST_SHIFTS", 1)  # the first space, as good as it is
-        monkeypatch.setattr("jointfrf.models.receptance.krylov._VECTORS", 6)
+        monkeypatch.setattr("jointfrf.models.krylov._ITERATED", limit)
+        monkeypatch.setattr("jointfrf.models.krylov._MOST_SHIFTS", 1)  # the first space, as good as it is
+        monkeypatch.setattr("jointfrf.models.krylov._VECTORS", 6)
         errors.append(reduce_model(freq, matrices, ports, ports, tolerance).error_estimate)
     assert errors[1] > 1e-9
     assert errors[0] == pytest.approx(errors[1], rel=0.02)
@@ -162,7 +160,7 @@ def test_two_levels_find_the_error_that_complex_factors_find(tolerance, monkeypa
 
 def test_an_iteration_that_does_not_get_there_leaves_it_to_factors(monkeypatch):
     model, freq = beam(), np.array([100.0, 5000.0])
-    monkeypatch.setattr("jointfrf.models.receptance.spots._STEPS", 1)
+    monkeypatch.setattr("jointfrf.models.krylov._STEPS", 1)
     ports = model.ports("tip:x", "tip:y")
     h, info = jf.receptance(
         freq, model.stiffness, model.mass, loss_factor=model.loss_factor, outputs=ports, inputs=ports, method="krylov",

@@ -8,8 +8,14 @@ import numpy as np
 import pytest
 
 import jointfrf as jf
-from jointfrf.channels.consistency import impact_consistency, sensor_consistency
-from jointfrf.channels.virtual_point import append_virtual_point, channel_geometry, virtual_point, virtual_points
+from jointfrf.channels.virtual_point import (
+    append_virtual_point,
+    channel_geometry,
+    impact_consistency,
+    sensor_consistency,
+    virtual_point,
+    virtual_points,
+)
 from jointfrf.io import read_uff
 from rigid_bodies import (
     AROUND,

@@ -16,9 +16,8 @@ from jointfrf.errors import IllConditionedWarning
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.solids.bolted_lap import BoltedLap, bolted_lap
 from jointfrf.solids.brick_beam import Hole, brick_beam
-from jointfrf.solids.contact_pairs import ContactLaw
-from jointfrf.solids.interpolation import interpolation
-from jointfrf.solids.mesh import Mesh
+from jointfrf.solids.contact import ContactLaw
+from jointfrf.solids.mesh import Mesh, interpolation
 from jointfrf.solids.preload import PreloadedLap, preload
 from jointfrf.solids.solid import Patch, SolidModel, mean_motion
 from jointfrf.substructuring.coupling import couple

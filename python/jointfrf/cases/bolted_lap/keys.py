@@ -13,7 +13,7 @@ from jointfrf.cases.common_keys import (
     PRESET,
     one_of,
 )
-from jointfrf.solids.bolt import PROOF_STRENGTH, STRESS_AREA
+from jointfrf.solids.bolted_lap import PROOF_STRENGTH, STRESS_AREA
 from jointfrf.toml.keys import Key, KeyTable
 
 __all__ = ["BOLTED_LAP_KEYS", "EXPECTED_BOLTED_KEYS"]

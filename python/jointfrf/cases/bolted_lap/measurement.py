@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from jointfrf.channels.finite_differences import difference_weights
+from jointfrf.channels.point_lines import difference_weights
 from jointfrf.channels.virtual_point import VirtualPoint, virtual_point, virtual_points
 from jointfrf.kernel.arguments import FloatArray
 

@@ -21,7 +21,7 @@ from jointfrf.dofs import Parameter, joint_parameters
 from jointfrf.frf.bands import Band
 from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import FloatArray
-from jointfrf.solids.bolt import PROOF_STRENGTH, STRESS_AREA, Bolt, preload_force
+from jointfrf.solids.bolted_lap import PROOF_STRENGTH, STRESS_AREA, Bolt, preload_force
 from jointfrf.solids.brick import Material
 from jointfrf.solids.brick_beam import Preset
 from jointfrf.toml.table import TomlTable

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf.cases.bolted_lap.frfs import TIP_DIRECTIONS
-from jointfrf.frf.bands import Band
-from jointfrf.frf.metrics import has_peak, peak
+from jointfrf.frf.bands import Band, has_peak, peak
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
 __all__ = ["Resonance", "ResonanceErrors", "resonance_errors", "resonances"]

@@ -15,8 +15,8 @@ from jointfrf.errors import IdentificationWarning, IllConditionedWarning
 from jointfrf.frf.bands import band_mean
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.kernel.linear_algebra import invert
-from jointfrf.substructuring.ismm import inverse_substructuring
-from jointfrf.substructuring.multi_point import multi_point_compliance
+from jointfrf.substructuring.compliance import multi_point_compliance
+from jointfrf.substructuring.modification import inverse_substructuring
 
 __all__ = [
     "Found",

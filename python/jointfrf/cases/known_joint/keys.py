@@ -16,7 +16,7 @@ from jointfrf.cases.common_keys import (
 from jointfrf.cases.fitting import METHODS
 from jointfrf.frf.frf_set import POWER_OF_I_OMEGA
 from jointfrf.models.beam import BeamElement, End
-from jointfrf.models.chain import Ground
+from jointfrf.models.model import Ground
 from jointfrf.solids.brick_beam import Face
 from jointfrf.toml.keys import Key, KeyTable
 

@@ -10,7 +10,7 @@ import numpy as np
 from jointfrf.cases.fitting import FITTED
 from jointfrf.cases.known_joint.exact import Exact
 from jointfrf.kernel.arguments import ComplexArray
-from jointfrf.kernel.status import OnSingular
+from jointfrf.kernel.call import OnSingular
 from jointfrf.substructuring.methods import STIFFNESS_METHODS, JointFrfs, StiffnessMethod, joint_stiffness
 
 __all__ = ["SHORT_FORM", "joint_lines", "measured", "needed_frfs", "noise_stream"]

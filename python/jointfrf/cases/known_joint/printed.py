@@ -10,7 +10,7 @@ from jointfrf.cases.known_joint.exact import Exact, exact_frfs
 from jointfrf.cases.known_joint.expected import ExpectedErrors, ExpectedParameters, PrintedLines
 from jointfrf.cases.known_joint.read import KnownJointCase
 from jointfrf.cases.known_joint.regenerate import regenerate
-from jointfrf.frf.metrics import amplitude_error, frequency_error, has_peak, peak
+from jointfrf.frf.bands import amplitude_error, frequency_error, has_peak, peak
 from jointfrf.kernel.arguments import FloatArray
 
 __all__ = ["PrintedErrors", "printed_errors"]

@@ -14,8 +14,7 @@ from jointfrf.cases.known_joint.study import Identified, chunk_size
 from jointfrf.cases.workers import Workers
 from jointfrf.dofs import rigid_offset
 from jointfrf.errors import IllConditionedWarning
-from jointfrf.frf.bands import Band
-from jointfrf.frf.metrics import amplitude_error, frequency_error, has_peak
+from jointfrf.frf.bands import Band, amplitude_error, frequency_error, has_peak
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.report.axes import percentile_lines
 from jointfrf.substructuring.coupling import couple

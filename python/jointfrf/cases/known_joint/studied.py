@@ -27,6 +27,7 @@ from jointfrf.cases.studied import (
     chosen_noises,
 )
 from jointfrf.errors import IllConditionedWarning
+from jointfrf.frf.noise import NOISE_KINDS
 from jointfrf.identification.information_bound import least_std_errors
 from jointfrf.identification.realisations import FitStart, viscous_estimate
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
@@ -34,9 +35,6 @@ from jointfrf.spelling import did_you_mean
 
 __all__ = ["known_joint_studied"]
 
-#: Standard deviation of the noise number over the level, of kinds whose Re and Im are alike: the bound is that of
-#: circular noise.
-_CIRCULAR = {"complex": 1.0, "complex-per-part": 2**0.5}
 #: Starts of fits that a process keeps.
 _STARTS = 32
 
@@ -241,7 +239,7 @@ def _group(
 def _bound(exact: Exact, noise: Noise | Pollution) -> FloatArray:
     """Return least standard deviations without a model of the sides; NaN where noise is shared, or not circular."""
     missing = np.full(2 * exact.n, np.nan)
-    if not isinstance(noise, Noise) or noise.kind not in _CIRCULAR or noise.reciprocal or noise.block > 1:
+    if not isinstance(noise, Noise) or not NOISE_KINDS[noise.kind].is_circular or noise.reciprocal or noise.block > 1:
         return missing
     gamma = exact.interface(exact.h_c)
     size: FloatArray = np.abs(gamma)
@@ -249,7 +247,7 @@ def _bound(exact: Exact, noise: Noise | Pollution) -> FloatArray:
         size = np.broadcast_to(size.max(axis=(1, 2), keepdims=True), size.shape)
     elif noise.relative_to == "spectrum":
         size = np.full(size.shape, size.max())
-    variance: FloatArray = (_CIRCULAR[noise.kind] * noise.level * size) ** 2
+    variance: FloatArray = NOISE_KINDS[noise.kind].power * (noise.level * size) ** 2
     if not variance.all():
         return missing
     return least_std_errors(exact.freq_hz, gamma, variance)

@@ -12,7 +12,7 @@ from jointfrf.cases.known_joint.from_files import read_matrices, read_receptance
 from jointfrf.cases.known_joint.structure import ModelStructure, Structure
 from jointfrf.kernel.arguments import FloatArray
 from jointfrf.models.beam import BeamElement, End, beam
-from jointfrf.models.chain import Ground, chain
+from jointfrf.models.model import Ground, chain
 from jointfrf.solids.brick_beam import Face, Hole, Preset, brick_beam
 from jointfrf.toml.table import TomlTable
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from jointfrf.cases.common_keys import COMMON_KEYS, FIGURES, one_of
 from jointfrf.cases.known_joint.keys import SUBSTRUCTURE
-from jointfrf.laws.law_table import LAW_VALUES, LAW_WORDS, takes_in_words
+from jointfrf.laws.joint_toml import LAW_VALUES, LAW_WORDS, takes_in_words
 from jointfrf.toml.keys import Key, KeyTable
 
 __all__ = ["MODELLED_EXPECTED_KEYS", "MODELLED_JOINT_KEYS"]

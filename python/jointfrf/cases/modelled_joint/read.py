@@ -12,9 +12,9 @@ from jointfrf.cases.known_joint.structure import ModelStructure
 from jointfrf.cases.known_joint.substructures import read_substructure
 from jointfrf.identification.model.assembly import AddedMass, Assembly
 from jointfrf.identification.model.substructure import Substructure, Unknown
+from jointfrf.laws.joint_toml import LAW_WORDS, read_law
 from jointfrf.laws.law import JointLaw
 from jointfrf.laws.law_joint import LawJoint
-from jointfrf.laws.law_table import LAW_WORDS, read_law
 from jointfrf.models.model import Model
 from jointfrf.toml.table import TomlTable
 

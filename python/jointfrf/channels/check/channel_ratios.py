@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf.channels.check.finding import Correction, FindingLevel, FrfFinding
-from jointfrf.channels.check.measurement import Measurement
 from jointfrf.channels.check.pair_ratios import PairRatios
+from jointfrf.channels.check.signals import Measurement
 from jointfrf.kernel.arguments import FloatArray
 
 __all__ = ["LEAST_GAIN", "LEAST_PHASE", "channel_ratios", "delay_findings", "gain_findings", "unexplained_gains"]

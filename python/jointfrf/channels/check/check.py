@@ -19,7 +19,16 @@ from jointfrf.channels.check.channel_ratios import (
     gain_findings,
     unexplained_gains,
 )
-from jointfrf.channels.check.driving_points import circles, mean_exponent, passivity_findings, sectors
+from jointfrf.channels.check.driving_points import (
+    circles,
+    convention_finding,
+    mean_exponent,
+    passivity_findings,
+    quantities,
+    quantity_findings,
+    sectors,
+    sign_findings,
+)
 from jointfrf.channels.check.exchange import (
     Cause,
     broken_findings,
@@ -28,15 +37,13 @@ from jointfrf.channels.check.exchange import (
     hidden_exchange,
 )
 from jointfrf.channels.check.finding import Correction, FindingLevel, FrfCheck, FrfFinding, corrected
-from jointfrf.channels.check.measurement import Measurement, as_channel_names, as_measurement
 from jointfrf.channels.check.pair_ratios import PairRatios, pair_ratios
-from jointfrf.channels.check.quantities import convention_finding, quantities, quantity_findings, sign_findings
-from jointfrf.channels.check.signals import check_signals, find_bad_lines
+from jointfrf.channels.check.signals import Measurement, as_channel_names, as_measurement, check_signals, find_bad_lines
 from jointfrf.errors import FrfCheckWarning
 from jointfrf.frf.frf_set import Channel
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_frequency, as_lines, as_names, as_real, check_choice
 
-__all__ = ["FrfFix", "check_frfs", "warn_of_frfs"]
+__all__ = ["check_frfs", "warn_of_frfs"]
 
 FrfFix = Literal["lines", "time-convention", "exchanged", "quantity", "sign", "units", "gain", "delay"]
 #: From fewer lines the noise cannot be estimated.
@@ -188,8 +195,7 @@ def _findings_at_joint(
 
 def _propagated(h: ComplexArray, t_out: FloatArray, t_in: FloatArray) -> FloatArray:
     """Return the deviation of transformed FRFs where that of each channel is its size."""
-    deviation: FloatArray = np.sqrt(t_out**2 @ abs(h) ** 2 @ (t_in**2).T)
-    return deviation
+    return np.sqrt(t_out**2 @ abs(h) ** 2 @ (t_in**2).T)
 
 
 def _check_channels(state: _Progress) -> None:
@@ -261,8 +267,7 @@ def _check_ratios(state: _Progress, m: Measurement, pairs: PairRatios) -> None:
 
 
 def _driving(h: ComplexArray) -> ComplexArray:
-    diagonal: ComplexArray = np.einsum("faa->fa", h)
-    return diagonal
+    return np.asarray(np.einsum("faa->fa", h))
 
 
 def _matrix(values: np.ndarray, pairs: PairRatios, n: int) -> np.ndarray:
@@ -275,8 +280,7 @@ def _noise(pairs: PairRatios, n: int) -> FloatArray:
     """Return the deviation of the phase of an FRF of each channel, from the scatter of its ratios; 0 if unknown."""
     scatter = _matrix(np.where(pairs.usable, pairs.scatter, 0.0), pairs, n)
     count = (scatter > 0).sum(axis=1)
-    deviation: FloatArray = scatter.sum(axis=1) / np.maximum(count, 1) / np.sqrt(4 * np.log(2))
-    return deviation
+    return np.asarray(scatter.sum(axis=1) / np.maximum(count, 1) / np.sqrt(4 * np.log(2)))
 
 
 def _result(state: _Progress, freq: FloatArray, h: ComplexArray, good: np.ndarray, fix: Sequence[FrfFix]) -> FrfCheck:

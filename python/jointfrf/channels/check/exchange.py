@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from jointfrf.channels.check.driving_points import one_sidedness
 from jointfrf.channels.check.finding import Correction, FrfFinding
-from jointfrf.channels.check.measurement import Measurement
 from jointfrf.channels.check.pair_ratios import BROKEN, ONE_SIDED, PairRatios, are_one_sided, are_signals, scatter_of
+from jointfrf.channels.check.signals import Measurement
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
 __all__ = ["Cause", "broken_findings", "cause_of_broken_pairs", "cause_of_gains", "hidden_exchange"]
@@ -163,8 +163,7 @@ def _from_one(first: ComplexArray, second: ComplexArray) -> FloatArray:
     with np.errstate(invalid="ignore"):
         distance = abs(np.log(np.where(known, first, 1) / np.where(known, second, 1)))
     distance = np.where((first != 0) != (second != 0), ONE_SIDED, distance)
-    median: FloatArray = np.median(distance, axis=0)
-    return median
+    return np.asarray(np.median(distance, axis=0))
 
 
 def _scatter(h: ComplexArray) -> FloatArray:

@@ -10,7 +10,7 @@ import numpy as np
 
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
-__all__ = ["Correction", "FindingKind", "FindingLevel", "FrfCheck", "FrfFinding", "corrected"]
+__all__ = ["Correction", "FindingLevel", "FrfCheck", "FrfFinding", "corrected"]
 
 FindingLevel = Literal["error", "warning", "note"]
 FindingKind = Literal[

@@ -42,7 +42,7 @@ from jointfrf.identification.manifold.scatter import Spread, spread_of
 from jointfrf.identification.manifold.spring_intervals import LikelihoodIntervals
 from jointfrf.identification.residual_test import Misfit, diagnose
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
-from jointfrf.substructuring.ismm import inverse_substructuring
+from jointfrf.substructuring.modification import inverse_substructuring
 
 __all__ = [
     "ComplianceFit",

@@ -9,9 +9,9 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from jointfrf.channels.left_out_dofs import LeftOutDof, left_out_dofs
+from jointfrf.channels.joint_channels import LeftOutDof, left_out_dofs
 from jointfrf.frf.bands import Band, as_bands, in_bands, line_slices, spread_lines
-from jointfrf.frf.noise_estimate import ZERO
+from jointfrf.frf.entry_groups import ZERO
 from jointfrf.frf.quantiles import medians
 from jointfrf.identification.manifold.coordinates import CrossTerms, DampingTerms
 from jointfrf.identification.manifold.estimate import GroupStart, JointEstimate

@@ -14,7 +14,7 @@ from jointfrf.identification.model.substructure import FrfSource, Substructure, 
 from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_frequency, as_names, check_type, one_line
 from jointfrf.laws.law_joint import Connection, LawJoint
-from jointfrf.substructuring.connection import connect
+from jointfrf.substructuring.coupling import connect
 
 __all__ = ["AddedMass", "Assembly", "Attachment", "GroundSpring", "Places", "assembly_connection", "places_of"]
 

@@ -22,7 +22,7 @@ from jointfrf.identification.parameters import FitParameter, ParameterOrigin, Pa
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.kernel.linear_algebra import invert
 from jointfrf.laws.law_joint import Connection
-from jointfrf.substructuring.connection import connect, connection_forces
+from jointfrf.substructuring.coupling import connect, connection_forces
 
 __all__ = ["Prediction", "parameter_vector"]
 

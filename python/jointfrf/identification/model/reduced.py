@@ -13,11 +13,10 @@ from scipy import linalg
 from jointfrf.identification.model.substructure import FrfSource, Substructure, Unknown, check_same_lines
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.kernel.linear_algebra import solve
-from jointfrf.models.matrices import ModelMatrices
+from jointfrf.models.factors import SparseSolver
+from jointfrf.models.krylov import reduce_model
+from jointfrf.models.matrices import ModelMatrices, as_ports
 from jointfrf.models.model import Model
-from jointfrf.models.ports import as_ports
-from jointfrf.models.receptance.factors import SparseSolver
-from jointfrf.models.receptance.krylov import reduce_model
 
 __all__ = ["MatrixPolynomial", "ReducedSlope", "ReducedSubstructure", "SubstructureState", "range_of"]
 

@@ -3,25 +3,33 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
-from typing import Literal, NamedTuple, TypedDict, cast, get_args, overload
+from typing import Any, Literal, NamedTuple, cast, get_args, overload
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
+from scipy import sparse
+from scipy.sparse import linalg as sparse_linalg
 
-from jointfrf.channels.finite_differences import transform
+from jointfrf.channels.point_lines import transform
 from jointfrf.errors import ConvergenceWarning
-from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_frequency, as_number, check_choice
-from jointfrf.kernel.status import RCOND_LIMIT, LineStatus, OnSingular, check_lines
-from jointfrf.models.matrices import Matrix, ModelMatrices
-from jointfrf.models.ports import Ports, as_ports, directions
-from jointfrf.models.receptance.direct import SINGULAR, solve_banded, solve_dense, solve_sparse
-from jointfrf.models.receptance.krylov import reduce_model
-from jointfrf.models.receptance.modal import Modes, all_modes
-from jointfrf.models.receptance.rigid_modes import find_rigid_modes, mode_condition
-from jointfrf.models.receptance.spots import spot_error
+from jointfrf.kernel.arguments import (
+    ComplexArray,
+    FloatArray,
+    as_frequency,
+    as_number,
+    as_positive,
+    as_real,
+    check_choice,
+    checked_out,
+)
+from jointfrf.kernel.call import N_FREQ, RCOND_LIMIT, LineStatus, OnSingular, check_lines, run
+from jointfrf.models.factors import Factors, SingularMatrixError, SparseSolver
+from jointfrf.models.krylov import reduce_model, spot_error
+from jointfrf.models.matrices import Matrix, ModelMatrices, Ports, as_ports, directions
+from jointfrf.models.modal import SINGULAR, Modes, all_modes, find_rigid_modes, mode_condition
 
 __all__ = ["ReceptanceInfo", "ReceptanceMethod", "receptance"]
+
 
 Direct = Literal["dense", "banded", "sparse"]
 ReceptanceMethod = Literal["auto", "dense", "banded", "sparse", "modal", "krylov"]
@@ -42,8 +50,7 @@ _SPARSE = 0.1
 _SPOTS = 3
 
 
-@dataclass(frozen=True)
-class ReceptanceInfo:
+class ReceptanceInfo(NamedTuple):
     """How receptances were calculated.
 
     Parameters
@@ -69,17 +76,6 @@ class ReceptanceInfo:
     tolerance: float | None = None
     n_vectors: int | None = None
     solver: str | None = None
-
-
-class _Made(TypedDict, total=False):
-    """The fields of a `ReceptanceInfo`, which is made on request only."""
-
-    method: Literal["dense", "banded", "sparse", "modal", "krylov"]
-    reason: str
-    error_estimate: float
-    tolerance: float
-    n_vectors: int
-    solver: str | None
 
 
 class _Task(NamedTuple):
@@ -245,23 +241,20 @@ def receptance(
     n = matrices.n
     to = as_ports("outputs", outputs, n)
     into = to if inputs is outputs else as_ports("inputs", inputs, n)
-    wanted = as_number("tolerance", tolerance)
-    if not wanted > 0:
-        raise ValueError(f"tolerance must be positive, not {wanted}")
-    task = _Task(freq, matrices, to, into, on_singular, wanted, out)
+    task = _Task(freq, matrices, to, into, on_singular, as_positive("tolerance", tolerance), out)
     if method in ("dense", "banded", "sparse"):
         result, made = _solved(task, cast(Direct, method), "as requested")
     elif method == "modal":
         modes, _ = all_modes(matrices, to, into)
         result = modes.receptance(freq, on_singular, out)
-        made = _Made(method="modal", reason="as requested", n_vectors=modes.stiffness.size)
+        made = ReceptanceInfo(method="modal", reason="as requested", n_vectors=modes.stiffness.size)
     elif method == "krylov":
         result, made = _reduced(task, "as requested")
-        if made["method"] != "krylov" and not task.is_empty:
-            warnings.warn(f"receptance: {made['reason']}", ConvergenceWarning, stacklevel=2)
+        if made.method != "krylov" and not task.is_empty:
+            warnings.warn(f"receptance: {made.reason}", ConvergenceWarning, stacklevel=2)
     else:
         result, made = _automatic(task)
-    return (result, ReceptanceInfo(**made)) if full_output else result
+    return (result, made) if full_output else result
 
 
 def _direct(matrices: ModelMatrices) -> Direct:
@@ -276,7 +269,7 @@ def _direct(matrices: ModelMatrices) -> Direct:
     return "banded" if sum(widths) < _BAND_LIMIT * n else "dense"
 
 
-def _automatic(task: _Task) -> tuple[ComplexArray, _Made]:
+def _automatic(task: _Task) -> tuple[ComplexArray, ReceptanceInfo]:
     """Choose by size, band, damping and number of lines."""
     matrices, n = task.matrices, task.matrices.n
     if n <= _TINY:
@@ -301,24 +294,88 @@ def _automatic(task: _Task) -> tuple[ComplexArray, _Made]:
     return _reduced(task, f"{task.freq_hz.size} lines of {n} DOFs whose modes the damping does not couple")
 
 
-def _solved(task: _Task, how: Direct, reason: str) -> tuple[ComplexArray, _Made]:
+def _solved(task: _Task, how: Direct, reason: str) -> tuple[ComplexArray, ReceptanceInfo]:
     """Direct solution."""
-    freq, matrices, on_singular = task.freq_hz, task.matrices, task.on_singular
-    to, into = task.outputs, task.inputs
+    freq, to, into = task.freq_hz, task.outputs, task.inputs
     solver = None
     if how == "sparse":
-        result, status, solver = solve_sparse(freq, matrices, to, into, on_singular, task.out)
+        result, status, solver = _solve_sparse(task)
+    elif to.picked is not None and into.picked is not None:
+        result, status = _solve_stored(task, to.picked, into.picked, how, task.out)
     else:
-        solve = solve_banded if how == "banded" else solve_dense
-        if to.picked is not None and into.picked is not None:
-            result, status = solve(freq, matrices, to.picked, into.picked, on_singular, task.out)
-        else:
-            h, status = solve(freq, matrices, to.needed, into.needed, on_singular)
-            t_out, t_in = (ports.weights[:, ports.needed - 1].toarray() for ports in (to, into))
-            result = transform(h, t_out, t_in, freq_hz=freq, on_singular=on_singular, out=task.out)
+        h, status = _solve_stored(task, to.needed, into.needed, how)
+        t_out, t_in = (ports.weights[:, ports.needed - 1].toarray() for ports in (to, into))
+        result = transform(h, t_out, t_in, freq_hz=freq, on_singular=task.on_singular, out=task.out)
     if status.lowest_rcond < RCOND_LIMIT:
-        check_lines("receptance", _unreliable_lines(matrices, freq, status), {}, freq, "nan", RCOND_LIMIT)
-    return result, _Made(method=how, reason=reason, solver=solver)
+        check_lines("receptance", _unreliable_lines(task.matrices, freq, status), {}, freq, "nan", RCOND_LIMIT)
+    return result, ReceptanceInfo(method=how, reason=reason, solver=solver)
+
+
+def _solve_stored(
+    task: _Task, outputs: NDArray[np.int32], inputs: NDArray[np.int32], how: Direct, out: ComplexArray | None = None
+) -> tuple[ComplexArray, LineStatus]:
+    """Solve full matrices by zgesv, or bands by zgbsv or an elimination of many lines side by side.
+
+    DOFs count from 1. The status has the reciprocal condition of each line; ill-conditioned lines give no warning yet.
+    """
+    matrices, omega = task.matrices, 2 * np.pi * task.freq_hz
+    n, shape = matrices.n, (omega.size, outputs.size, inputs.size)
+    kl, ku = matrices.widths if how == "banded" else (0, 0)
+
+    def stored(name: str) -> FloatArray | None:
+        """Return a matrix, or its band as LAPACK stores it, transposed: row j holds column j."""
+        if how == "dense" or matrices.named[name] is None:
+            return matrices.dense(name)
+        entries = sparse.coo_array(matrices.named[name])
+        band = np.zeros((n, kl + ku + 1))
+        np.add.at(band, (entries.col, ku + entries.row - entries.col), as_real(name, entries.data, (None,)))
+        return band
+
+    width = n if how == "dense" else kl + ku + 1
+    args: list[Any] = [n, N_FREQ] if how == "dense" else [n, kl, ku, N_FREQ]
+    args += [*shape[1:], omega, stored("stiffness"), stored("mass")]
+    for name in ("damping", "structural_damping"):
+        matrix = stored(name)
+        args += [0, np.zeros((1, width))] if matrix is None else [n, matrix]
+    args += [matrices.loss_factor, outputs, inputs]
+    routine = "receptance" if how == "dense" else "receptance_banded"
+    return run(routine, args, shape, {"omega": omega}, task.freq_hz, task.on_singular, 0.0, out)
+
+
+def _solve_sparse(task: _Task) -> tuple[ComplexArray, LineStatus, str]:
+    """Solve by a sparse factorisation of every line; the library and the order of elimination come last."""
+    freq_hz, matrices, outputs = task.freq_hz, task.matrices, task.outputs
+    shape = (freq_hz.size, len(outputs), len(task.inputs))
+    result = np.empty(shape, np.complex128) if task.out is None else checked_out(task.out, shape, (), {})
+    solver, is_symmetric = SparseSolver(), matrices.are_symmetric
+    status = LineStatus(np.zeros(freq_hz.size, np.int32), np.ones(freq_hz.size))
+    forces = task.inputs.forces().astype(np.complex128)
+    for i, omega in enumerate(2 * np.pi * freq_hz):
+        z = matrices.dynamic_stiffness(omega)
+        try:
+            factors = solver.factor(z, is_symmetric)
+        except SingularMatrixError:
+            result[i], status.line_info[i], status.rcond[i] = np.nan, 1, 0
+            continue
+        result[i] = outputs.of(factors.solve(forces))
+        status.rcond[i] = _reciprocal_condition(z, factors)
+        if not np.isfinite(result[i]).all():
+            result[i], status.line_info[i], status.rcond[i] = np.nan, -2, 0
+    check_lines("receptance", status, {}, freq_hz, task.on_singular)
+    return result, status, solver.used
+
+
+def _reciprocal_condition(z: sparse.csc_matrix, factors: Factors) -> float:
+    """Estimate 1 / (||Z|| ||Z^-1||) in the 1-norm by a few solutions."""
+
+    def adjoint(b: ComplexArray) -> ComplexArray:
+        return factors.solve(b, "H")
+
+    inverse = sparse_linalg.LinearOperator(
+        z.shape, matvec=factors.solve, rmatvec=adjoint, matmat=factors.solve, rmatmat=adjoint, dtype=np.complex128
+    )
+    size = float(sparse_linalg.onenormest(inverse, t=1) * abs(z).sum(axis=0).max())
+    return 1 / size if size > 0 else 0.0
 
 
 def _unreliable_lines(matrices: ModelMatrices, freq: FloatArray, status: LineStatus) -> LineStatus:
@@ -336,7 +393,7 @@ def _unreliable_lines(matrices: ModelMatrices, freq: FloatArray, status: LineSta
     return LineStatus(status.line_info, rcond)
 
 
-def _fallen_back(task: _Task, error: float, n_vectors: int, what: str) -> tuple[ComplexArray, _Made]:
+def _fallen_back(task: _Task, error: float, n_vectors: int, what: str) -> tuple[ComplexArray, ReceptanceInfo]:
     """Direct solution after a sum of modes that was not good enough."""
     reason = (
         f"{what} of {n_vectors} vectors has the error estimate {error:.1e}, above the tolerance {task.tolerance:.1e}"
@@ -344,7 +401,7 @@ def _fallen_back(task: _Task, error: float, n_vectors: int, what: str) -> tuple[
     return _solved(task, _direct(task.matrices), reason)
 
 
-def _summed(task: _Task, reason: str) -> tuple[ComplexArray, _Made]:
+def _summed(task: _Task, reason: str) -> tuple[ComplexArray, ReceptanceInfo]:
     """All modes, where they meet the tolerance."""
     try:
         modes, rigid = all_modes(task.matrices, task.outputs, task.inputs)
@@ -356,25 +413,23 @@ def _summed(task: _Task, reason: str) -> tuple[ComplexArray, _Made]:
     return _finished(task, modes, error, attainable, "modal", reason)
 
 
-def _reduced(task: _Task, reason: str) -> tuple[ComplexArray, _Made]:
+def _reduced(task: _Task, reason: str) -> tuple[ComplexArray, ReceptanceInfo]:
     """Reduced model, where it meets the tolerance."""
     if task.is_empty:
         return _solved(task, _direct(task.matrices), "no lines, or no DOFs with a weight")
     found = reduce_model(task.freq_hz, task.matrices, task.outputs, task.inputs, task.tolerance)
     result, made = _finished(task, found.modes, found.error_estimate, found.attainable, "krylov", reason)
-    if made["method"] == "krylov":
-        made["solver"] = found.solver
-    return result, made
+    return result, made._replace(solver=found.solver) if made.method == "krylov" else made
 
 
 def _finished(
     task: _Task, modes: Modes, error: float, attainable: float, method: Literal["modal", "krylov"], reason: str
-) -> tuple[ComplexArray, _Made]:
+) -> tuple[ComplexArray, ReceptanceInfo]:
     """Sum of modes, or a direct solution where its error is too large."""
     n_vectors = modes.stiffness.size
     if not error <= max(task.tolerance, attainable):
         return _fallen_back(task, error, n_vectors, "a sum of modes" if method == "modal" else "a reduced model")
     result = modes.receptance(task.freq_hz, task.on_singular, task.out)
-    return result, _Made(
+    return result, ReceptanceInfo(
         method=method, reason=reason, error_estimate=error, tolerance=task.tolerance, n_vectors=n_vectors
     )

@@ -1,1 +1,0 @@
-"""Receptance of a model: direct solution, superposition of modes, reduction by rational Krylov vectors."""
