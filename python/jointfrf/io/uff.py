@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from contextlib import suppress
 from dataclasses import dataclass, field
 from os import PathLike
@@ -14,21 +14,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf.errors import FileContentError
-from jointfrf.files import ReadLimit
+from jointfrf.files import ReadLimit, head_of
 from jointfrf.frf.frf_set import POWER_OF_I_OMEGA, ROUND_OFF, Channel, FrfSet, same_frf
 from jointfrf.frf.merge import same_lines
+from jointfrf.io.arrays import contradiction
+from jointfrf.io.file_format import FileFormat, Reading
 from jointfrf.io.labels import DIRECTION_CODES
-from jointfrf.io.quantity import check_quantity, contradiction, state
 from jointfrf.io.uff_contents import contents_without_frf
 from jointfrf.io.uff_file import UniversalFile, name_some
 from jointfrf.io.uff_nodes import node_coordinates
 from jointfrf.io.uff_ordinate import DATA_TYPES, Axis, kind_of_frf, ordinate_factor, ordinate_quantity
-from jointfrf.kernel.arguments import as_nodes
+from jointfrf.io.uff_write import write_uff
 
-__all__ = ["read_uff", "read_uff_part"]
+__all__ = ["UNIVERSAL_FILE", "read_uff"]
 
 _FRF, _COHERENCE = 4, 6
-_MOST_DECADES = 60
+_MOST_DECADES, _SHOWN = 60, 3
 _HZ = {"": 1.0, "hz": 1.0, "khz": 1e3, "rad/s": 0.5 / np.pi, "rad/sec": 0.5 / np.pi, "rpm": 1.0 / 60.0}
 
 
@@ -129,42 +130,20 @@ def read_uff(
     >>> frfs = jointfrf.io.read_uff("lap_joint.uff")  # doctest: +SKIP
     >>> h = frfs.receptance().matrix(["102:+y", "202:+y"], ["102:+y", "202:+y"])  # doctest: +SKIP
     """
-    return read_uff_part(
-        path, quantity, force_quantity=force_quantity, nodes=nodes, limit_gb=limit_gb, stacklevel=4
-    )  # fmt: skip
+    reading = Reading.checked(quantity, force_quantity, nodes)
+    file = Path(path)
+    head_of(file, limit_gb)
+    found = _read(file, ReadLimit(file, limit_gb), reading)
+    reading.warn()
+    return found
 
 
-def read_uff_part(
-    path: str | PathLike[str],
-    quantity: str | None = None,
-    *,
-    force_quantity: bool = False,
-    nodes: Collection[int] | None = None,
-    limit_gb: float | None = None,
-    coherence_will_do: bool = False,
-    stacklevel: int = 3,
-) -> FrfSet:
-    """Read a Universal File as `read_uff` does, or one of several that make a set.
-
-    Parameters
-    ----------
-    path, quantity, force_quantity, nodes, limit_gb
-        As for `read_uff`.
-    coherence_will_do : bool
-        Accept a file with coherences and no FRF: all FRFs of the set are then NaN.
-    stacklevel : int
-        Of warnings.
-
-    Returns
-    -------
-    FrfSet
-    """
-    check_quantity(quantity)
-    if nodes is not None:
-        nodes = frozenset(as_nodes("nodes", nodes))
-    file = UniversalFile(Path(path), limit_gb)
-    content = _describe(file, quantity, forced=force_quantity, nodes=nodes)
-    only_coherence = coherence_will_do and not content.frfs and not content.unusable and content.coherences
+def _read(path: Path, limit: ReadLimit, reading: Reading) -> FrfSet:
+    """Read the FRFs of a file; where it is one of several, coherences alone are enough, and FRFs are then NaN."""
+    quantity, nodes = reading.quantity, reading.nodes
+    file = UniversalFile(path)
+    content = _describe(file, quantity, forced=reading.forced, nodes=nodes)
+    only_coherence = reading.is_part and not content.frfs and not content.unusable and content.coherences
     if not content.frfs and not only_coherence:
         raise _no_frf(file, content, nodes)
     for reason, numbers in content.unusable.items():
@@ -172,7 +151,6 @@ def read_uff_part(
     frfs = _unique(file, content.frfs)
     pairs = [frf.channels for frf in frfs] or [channels for _, channels in content.coherences]
     matrix = _Matrix(pairs)
-    limit = ReadLimit(file.path, limit_gb)
     freq_hz, h, common = _values(file, frfs, matrix, limit)
     freq_hz, coherence = _coherence(file, content, matrix, freq_hz, limit)
     if h is None:
@@ -180,8 +158,8 @@ def read_uff_part(
         h = np.full((freq_hz.size, *matrix.shape), np.nan + 0j)
     freq_hz, h, coherence = _without_bad_zero_line(file, frfs, matrix, freq_hz, h, coherence)
     coordinates = node_coordinates(file, {channel.node for pair in pairs for channel in pair})
-    file.warn(stacklevel=stacklevel)
-    stated = state(frf.stated for frf in frfs)
+    reading.notes.extend(file.notes())
+    stated = _some(frf.stated for frf in frfs)
     return FrfSet(
         freq_hz, matrix.responses, matrix.excitations, h, common, coordinates, str(path), coherence, None, stated
     )
@@ -429,3 +407,26 @@ def _without_bad_zero_line(
 
 def _lines(freq_hz: NDArray[np.float64]) -> str:
     return f"{freq_hz.size} lines {freq_hz[0]:.6g} to {freq_hz[-1]:.6g} Hz"
+
+
+def _some(texts: Iterable[str]) -> str:
+    """Join the first few different texts."""
+    different = list(dict.fromkeys(texts))
+    more = f"; and {len(different) - _SHOWN} more" if len(different) > _SHOWN else ""
+    return "; ".join(different[:_SHOWN]) + more
+
+
+def _begins_dataset(head: bytes) -> bool:
+    return next((line for line in head.splitlines() if line.strip()), b"").strip() == b"-1"
+
+
+UNIVERSAL_FILE = FileFormat(
+    name="Universal File",
+    suffixes=(".uff", ".unv"),
+    content="datasets 58 and 58b (FRFs, coherence), 15, 2411 (nodes), 164 (units), 18, 2420 (axes)",
+    has_mark=_begins_dataset,
+    looks_alike=lambda path, _: path.suffix.lower() in (".uff", ".unv"),
+    read=_read,
+    write=write_uff,
+    needs="`jointfrf[uff]`",
+)

@@ -11,9 +11,9 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from jointfrf.errors import FileContentError, FileContentWarning
+from jointfrf.errors import FileContentError
 from jointfrf.extras import import_extra
-from jointfrf.files import HEAD, head_of
+from jointfrf.files import HEAD
 from jointfrf.io.uff_index import Dataset, index_datasets
 from jointfrf.io.units import UnitSystem
 
@@ -36,12 +36,11 @@ class UniversalFile:
         It is no Universal File; every method raises it where the file is damaged.
     """
 
-    def __init__(self, path: Path, limit_gb: float | None = None) -> None:
+    def __init__(self, path: Path) -> None:
         pyuff = import_extra("pyuff")
         self.path = path
         self._notes: dict[str, list[int]] = {}
         self._systems: dict[int, UnitSystem] | None = None
-        head_of(path, limit_gb)  # what is no file, or empty, is said before anything is sought in it
         index, is_cut = index_datasets(path)
         if not index:
             raise self.error(
@@ -64,11 +63,9 @@ class UniversalFile:
         """Keep something for the user to know about some datasets."""
         self._notes.setdefault(sentence, []).extend(datasets)
 
-    def warn(self, stacklevel: int) -> None:
-        """Say every note once."""
-        for sentence, datasets in self._notes.items():
-            message = f"{self.path}: {sentence} ({name_some('dataset', datasets)})"
-            warnings.warn(message, FileContentWarning, stacklevel=stacklevel)
+    def notes(self) -> list[str]:
+        """Every note once, with the datasets it is about."""
+        return [f"{self.path}: {text} ({name_some('dataset', datasets)})" for text, datasets in self._notes.items()]
 
     def datasets(self, *kinds: int) -> list[int]:
         """Numbers of the datasets of some types."""
