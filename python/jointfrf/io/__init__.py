@@ -9,8 +9,7 @@ from jointfrf.io.file_format import FrfMapping
 from jointfrf.io.formats import read_frfs, write_frfs
 from jointfrf.io.hdf5_file import write_hdf5
 from jointfrf.io.npz_file import write_npz
-from jointfrf.io.uff import read_uff
-from jointfrf.io.uff_write import write_uff
+from jointfrf.io.uff import read_uff, write_uff
 
 __all__ = [
     "Channel",

@@ -206,7 +206,6 @@ def test_what_unfolds_to_more_than_the_limit_is_not_read(tmp_path, name, make):
 
 @pytest.mark.filterwarnings("ignore::jointfrf.FileContentWarning")
 def test_a_universal_file_of_many_channels(tmp_path):
-    pytest.importorskip("pyuff")
     path = tmp_path / "a.uff"
     path.write_bytes(b"".join(function(response=(n, 2), reference=(n, 2)) for n in range(1, 91)))
     assert read_frfs(path).h.shape == (3, 90, 90)
