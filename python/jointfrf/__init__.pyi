@@ -75,9 +75,7 @@ from jointfrf.models.matrices import from_triangle
 from jointfrf.models.model import Model, assemble
 from jointfrf.models.receptance.receptance import ReceptanceInfo, receptance
 from jointfrf.parallel.pool import BrokenPoolError
-from jointfrf.parallel.processes import SeparateProcesses
-from jointfrf.parallel.sweep import plan_sweep, sweep
-from jointfrf.parallel.sweep_plan import SweepPlan
+from jointfrf.parallel.sweep import SweepPlan, plan_sweep, sweep
 from jointfrf.solids.bolt import PROOF_STRENGTH, STRESS_AREA, Bolt, preload_force
 from jointfrf.solids.bolted_lap import BoltedLap, LapDivisions, bolted_lap
 from jointfrf.solids.brick import Material, assemble_bricks, brick_quality, element_matrices
@@ -152,7 +150,6 @@ __all__ = [
     "PowerLaw",
     "PreloadedLap",
     "ReceptanceInfo",
-    "SeparateProcesses",
     "SideAgreement",
     "SingularLineError",
     "SmoothFrfs",
