@@ -72,8 +72,7 @@ from jointfrf.models.matrices import from_triangle
 from jointfrf.models.model import Model, assemble, chain
 from jointfrf.models.receptance import ReceptanceInfo, receptance
 from jointfrf.parallel.pool import BrokenPoolError
-from jointfrf.parallel.processes import SeparateProcesses
-from jointfrf.parallel.sweep import plan_sweep, sweep
+from jointfrf.parallel.sweep import SweepPlan, plan_sweep, sweep
 from jointfrf.parallel.sweep_plan import SweepPlan
 from jointfrf.report.fit_page import write_report
 from jointfrf.report.fit_plot import plot
@@ -162,7 +161,6 @@ __all__ = [
     "PowerLaw",
     "PreloadedLap",
     "ReceptanceInfo",
-    "SeparateProcesses",
     "SideAgreement",
     "SingularLineError",
     "SmoothFrfs",

@@ -16,7 +16,6 @@ _EXTRAS = {
     "mumps": ("factors by MUMPS", "mumps"),
     "pymetis": ("orders of elimination by METIS", "metis"),
     "pypardiso": ("factors by PARDISO", "pardiso"),
-    "pyuff": ("Universal Files", "uff"),
     "pyarrow": ("Parquet files", "parquet"),
     "zarr": ("Zarr arrays", "zarr"),
     "loky": ("processes of loky", "loky"),

@@ -13,9 +13,20 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from jointfrf.errors import FileContentError
+from jointfrf.errors import FileContentError, first_line
 
-__all__ = ["HEAD", "LIMIT_VARIABLE", "ReadLimit", "below", "check_file", "head_of", "write_file", "written_whole"]
+__all__ = [
+    "HEAD",
+    "LIMIT_VARIABLE",
+    "ReadLimit",
+    "below",
+    "check_file",
+    "damage_named",
+    "head_of",
+    "text_of",
+    "write_file",
+    "written_whole",
+]
 
 #: How much of a file shows what it is, bytes.
 HEAD = 1 << 13
@@ -30,6 +41,8 @@ _LEAST = 10_000
 _UNUSUAL, _LONGEST = re.compile(r"[^\w+,=.-]", re.ASCII), 100
 #: Where names are those of open files, which cannot be replaced.
 _OPEN_FILES = "/proc/"
+#: What readers of numpy, scipy and h5py raise for a damaged file.
+_DAMAGE = (OSError, ValueError, KeyError, TypeError, EOFError, RuntimeError, OverflowError, MemoryError)
 _MOST_LINKS = 40
 
 
@@ -151,6 +164,53 @@ def head_of(path: Path, limit_gb: float | None = None) -> bytes:
     if not head.strip() and path.stat().st_size <= HEAD:
         raise FileContentError(f"{path} is empty")
     return head
+
+
+@contextmanager
+def damage_named(path: Path, kind: str, *others: type[Exception]) -> Iterator[None]:
+    """Turn what libraries raise for a damaged file into one sentence that names the file.
+
+    Parameters
+    ----------
+    path : Path
+    kind : str
+        With its article: ``an NPZ file``.
+    *others : type
+        Errors of this kind of file, beside those that readers of any kind raise.
+
+    Raises
+    ------
+    FileContentError
+    """
+    try:
+        yield
+    except FileContentError:
+        raise
+    except _DAMAGE + others as error:
+        raise FileContentError(f"{path} cannot be read as {kind}: {first_line(error)}") from error
+
+
+def text_of(path: Path) -> str:
+    """Return the text of a file: UTF-16 where it begins so, else UTF-8, else Latin-1, as older programs write units.
+
+    Raises
+    ------
+    FileContentError
+        There is no such file, it cannot be read, or it is not a text file.
+    """
+    if path.exists():
+        check_file(path)
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise FileContentError(f"{path} cannot be read: {error.strerror}") from error
+    is_wide = content.startswith((b"\xff\xfe", b"\xfe\xff"))
+    try:
+        return content.decode("utf-16" if is_wide else "utf-8-sig")
+    except UnicodeDecodeError as error:
+        if is_wide or b"\0" in content:
+            raise FileContentError(f"{path} is not a text file") from error
+        return content.decode("latin-1")
 
 
 def below(folder: Path, name: str, suffix: str = "") -> Path:

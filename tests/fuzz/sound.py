@@ -75,7 +75,6 @@ def _arrays() -> dict[str, dict[str, Any]]:
         "pollute": {"h": lines, "level": 0.05, "seed": 1},
         "realisations": {"h": lines, "level": 0.05, "seed": 1, "count": 2},
         "sweep": {"operation": jf.invert, "arrays": {"a": lines}, "out": np.empty((6, 4, 4), complex), "jobs": 1},
-        "SeparateProcesses": {"workers": 1},
         "plan_sweep": {"operation": jf.invert, "arrays": {"a": lines}, "out": np.empty((6, 4, 4), complex), "jobs": 1},
         "semm": {"h_model": lines, "h_measured": lines[:, :2, :2], "outputs": [0, 1], "inputs": [0, 1], **out},
         "band_mean": {"freq_hz": c["freq"], "k_joint": k0, "bands": (1.0, 9.0), "dofs": ["x"]},

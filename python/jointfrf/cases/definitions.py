@@ -15,7 +15,7 @@ from jointfrf.errors import FileContentWarning
 from jointfrf.frf.bands import Band, in_bands
 from jointfrf.frf.frf_set import FrfSet
 from jointfrf.frf.noise import NOISE_KINDS, NoiseKind, NoiseReference, pollute, realisations
-from jointfrf.io.read import read_frfs
+from jointfrf.io.formats import read_frfs
 from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.solids.brick import Material

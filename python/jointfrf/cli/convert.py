@@ -7,9 +7,11 @@ from pathlib import Path
 
 from jointfrf.cli.measured_file import add_quantity_arguments, nodes, parse_band, read_with_warnings
 from jointfrf.cli.output import Output
-from jointfrf.cli.structure_file import check_target, write_frfs
+from jointfrf.cli.structure_file import check_target
 from jointfrf.cli.usage import UsageError
 from jointfrf.frf.frf_set import FrfSet
+from jointfrf.io import write_frfs
+from jointfrf.io.formats import format_names
 
 __all__ = ["add_arguments", "run"]
 
@@ -19,9 +21,9 @@ _FIELDS = ("freq_hz", "h", "responses", "excitations", "axes", "quantity", "unit
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the arguments of the command."""
     parser.description = (
-        "Read measured FRFs (Universal File, MATLAB, NPZ, HDF5, CSV; what a file is, is told by its content) and write "
-        "them, in SI units, as a Universal File (.uff), NPZ (.npz), HDF5 (.h5) or text table (.csv). Several files of "
-        "one test become one. Options stand before or after all files."
+        f"Read measured FRFs, {format_names()}, whose format is detected from their content, and write them, in SI "
+        f"units, as {format_names(written=True)}. Several files of one test become one. Options stand before or after "
+        "all files."
     )
     parser.add_argument("files", nargs="+", type=Path, metavar="IN", help="files to read, and last the one to write")
     add_quantity_arguments(parser)

@@ -18,13 +18,13 @@ from jointfrf.cli.structure_file import (
     lines_of,
     own_matrix,
     read_structures,
-    write_frfs,
 )
 from jointfrf.cli.usage import UsageError, waiting
 from jointfrf.dofs import direction_places
 from jointfrf.errors import FileContentError
 from jointfrf.identification.joint_file import read_joint_file
-from jointfrf.io import Channel, FrfSet
+from jointfrf.io import Channel, FrfSet, write_frfs
+from jointfrf.io.formats import format_names
 from jointfrf.joint import Joint
 from jointfrf.laws.law_joint import LawJoint
 from jointfrf.substructuring.coupling import couple
@@ -54,7 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--shift-b", type=point, default=(0.0, 0.0, 0.0), metavar="X,Y,Z", help="add this to the coordinates of B, m"
     )
-    parser.add_argument("--output", type=Path, metavar="FILE", help="file to write: .uff, .npz, .h5 or .csv")
+    parser.add_argument("--output", type=Path, metavar="FILE", help=f"file to write: {format_names(written=True)}")
     add_line_arguments(parser)
     add_quantity_arguments(parser)
 

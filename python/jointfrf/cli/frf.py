@@ -15,10 +15,10 @@ from jointfrf.cli.structure_file import (
     is_model,
     lines_of,
     model_of_table,
-    write_frfs,
 )
 from jointfrf.cli.usage import UsageError, waiting
-from jointfrf.io import read_frfs
+from jointfrf.io import read_frfs, write_frfs
+from jointfrf.io.formats import format_names
 from jointfrf.toml.table import TomlTable, read_toml
 
 __all__ = ["add_arguments", "run"]
@@ -29,12 +29,11 @@ _MATRICES = ("stiffness", "mass", "damping", "structural_damping")
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the arguments of the command."""
     parser.description = (
-        "Compute receptances of a model and write them as a Universal File (.uff), NPZ, HDF5 or CSV. The model is "
-        "a TOML file with the keys of a substructure of a case (chain, beam, brick-beam, matrices), or "
-        "matrices named by options."
+        f"Compute receptances of a model and write them as {format_names(written=True)}. The model is a TOML file with "
+        "the keys of a substructure of a case (chain, beam, brick-beam, matrices), or matrices named by options."
     )
     parser.add_argument("model", nargs="?", type=Path, help="TOML file of a model; or --stiffness and --mass")
-    parser.add_argument("--output", type=Path, metavar="FILE", help="file to write: .uff, .npz, .h5 or .csv")
+    parser.add_argument("--output", type=Path, metavar="FILE", help=f"file to write: {format_names(written=True)}")
     add_line_arguments(parser)
     parser.add_argument("--lines-of", type=Path, metavar="FILE", help="instead: the lines of this file of FRFs")
     parser.add_argument(

@@ -16,6 +16,7 @@ from jointfrf.dofs import direction_names
 from jointfrf.errors import FileContentError
 from jointfrf.frf.bands import in_bands
 from jointfrf.io import FrfSet, read_frfs
+from jointfrf.io.formats import format_names
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.spelling import visible
 
@@ -154,8 +155,7 @@ def add_file_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         type=Path,
         metavar="FILE",
-        help="FRFs of the points around the joint: Universal File, MATLAB, NPZ, HDF5 or CSV; several files of one test "
-        "become one",
+        help=f"FRFs of the points around the joint: {format_names()}; several files of one test become one",
     )
     add_joint_arguments(parser)
 

@@ -19,12 +19,12 @@ from jointfrf.cli.usage import UsageError
 from jointfrf.dofs import DIRECTIONS, direction_places
 from jointfrf.errors import FileContentError
 from jointfrf.frf.merge import same_lines
-from jointfrf.io import Channel, FrfSet, write_csv, write_hdf5, write_npz, write_uff
+from jointfrf.io import Channel, FrfSet
+from jointfrf.io.formats import check_suffix
 from jointfrf.kernel.arguments import FloatArray
 from jointfrf.toml.table import TomlTable, read_toml
 
 __all__ = [
-    "WRITERS",
     "add_line_arguments",
     "check_target",
     "frfs_of_model",
@@ -33,18 +33,8 @@ __all__ = [
     "model_of_table",
     "own_matrix",
     "read_structures",
-    "write_frfs",
 ]
 
-#: By the suffix of the file that is written.
-WRITERS = {
-    ".uff": write_uff,
-    ".unv": write_uff,
-    ".npz": write_npz,
-    ".h5": write_hdf5,
-    ".hdf5": write_hdf5,
-    ".csv": write_csv,
-}
 #: FRFs between more DOFs are hardly meant.
 _MOST_DOFS = 240
 _MOST_LINES = 1_000_000
@@ -60,15 +50,12 @@ def check_target(target: Path) -> None:
     UsageError
         Its suffix is that of no format, or there is no such folder.
     """
-    if target.suffix.lower() not in WRITERS:
-        raise UsageError(f"{target} has no suffix of a format that is written: {', '.join(WRITERS)}")
+    try:
+        check_suffix(target)
+    except ValueError as error:
+        raise UsageError(error) from error
     if not target.parent.is_dir():
         raise UsageError(f"there is no folder {target.parent}")
-
-
-def write_frfs(target: Path, frfs: FrfSet) -> None:
-    """Write FRFs in the format of the suffix."""
-    WRITERS[target.suffix.lower()](target, frfs)
 
 
 def add_line_arguments(parser: argparse._ActionsContainer) -> None:

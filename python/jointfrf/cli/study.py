@@ -12,9 +12,8 @@ from jointfrf.cases.catalogue import UnknownCaseError
 from jointfrf.cli.output import Output
 from jointfrf.cli.usage import UsageError, positive, progress
 from jointfrf.extras import check_extras, import_extra
-from jointfrf.parallel.cores import available_cores
 from jointfrf.parallel.pool import AnyExecutor
-from jointfrf.parallel.processes import check_processes, safe_environment
+from jointfrf.parallel.processes import available_cores, check_processes, safe_environment
 from jointfrf.studies.design import Arrangement, StudyDesign, parse_factor
 from jointfrf.studies.result import StudyResult
 from jointfrf.studies.run import merge_studies, study

@@ -5,12 +5,11 @@ from jointfrf.frf.merge import merge_frfs
 from jointfrf.io.arrays import frfs_of_arrays
 from jointfrf.io.channel_table import read_channel_table
 from jointfrf.io.csv_file import write_csv
+from jointfrf.io.file_format import FrfMapping
+from jointfrf.io.formats import read_frfs, write_frfs
 from jointfrf.io.hdf5_file import write_hdf5
-from jointfrf.io.mapping import FrfMapping
 from jointfrf.io.npz_file import write_npz
-from jointfrf.io.read import read_frfs
-from jointfrf.io.uff import read_uff
-from jointfrf.io.uff_write import write_uff
+from jointfrf.io.uff import read_uff, write_uff
 
 __all__ = [
     "Channel",
@@ -22,6 +21,7 @@ __all__ = [
     "read_frfs",
     "read_uff",
     "write_csv",
+    "write_frfs",
     "write_hdf5",
     "write_npz",
     "write_uff",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -10,14 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from jointfrf.errors import FileContentError, FileContentWarning
+from jointfrf.errors import FileContentError
 from jointfrf.frf.frf_set import POWER_OF_I_OMEGA, Channel, FrfSet
+from jointfrf.io.file_format import Reading
 from jointfrf.io.labels import channels_of, channels_of_table, is_table
-from jointfrf.io.quantity import check_quantity, contradiction
 from jointfrf.io.units import Unit, parse_unit
 from jointfrf.kernel.arguments import as_array, check_type
 
-__all__ = ["FrfArrays", "as_frf_set", "frfs_of_arrays"]
+__all__ = ["FrfArrays", "as_frf_set", "contradiction", "frfs_of_arrays"]
 
 _AXES = ("freq", "out", "in")
 
@@ -95,45 +94,39 @@ def frfs_of_arrays(
     """
     for name, value in (("unit", unit), ("axes", axes), ("source", source)):
         check_type(name, value, str)
+    reading = Reading.checked(quantity)
     coordinates: Mapping[int, NDArray[np.float64]] = {}
     if is_table(responses) or is_table(excitations):
         responses, excitations, coordinates = channels_of_table(responses, excitations)
     content = FrfArrays(freq_hz, h, axes, responses, excitations, "", unit, coherence, averages, coordinates)
-    return as_frf_set(content, source, quantity, stacklevel=3)
+    found = as_frf_set(content, source, reading)
+    reading.warn()
+    return found
 
 
-def as_frf_set(
-    content: FrfArrays, where: str, quantity: str | None = None, *, forced: bool = False, stacklevel: int = 2
-) -> FrfSet:
+def as_frf_set(content: FrfArrays, where: str, reading: Reading) -> FrfSet:
     """Make a set of what a file holds.
 
     Parameters
     ----------
     content : FrfArrays
-        What stands in the file.
+        As it is in the file.
     where : str
         Its name, with which messages begin.
-    quantity, forced
-        What the user says the FRFs are, and whether against the file.
-    stacklevel : int
-        Of warnings.
-
-    Returns
-    -------
-    FrfSet
+    reading : Reading
+        What the user says; takes a note where the unit is assumed.
 
     Raises
     ------
     FileContentError
         Something does not fit; the message is one sentence.
     """
-    check_quantity(quantity)
     try:
         freq_hz = _frequencies(content.freq_hz)
         responses, excitations = _channels(content)
         shape = (freq_hz.size, len(responses), len(excitations))
         h = _in_order("FRFs", content.h, content.axes, shape).astype(np.complex128)
-        used, factor, note = _quantity(content, (*responses, *excitations), quantity, forced=forced)
+        used, factor, note = _quantity(content, (*responses, *excitations), reading)
         coherence = None
         if content.coherence is not None:
             coherence = _in_order("coherence", content.coherence, content.axes, shape).astype(np.float64)
@@ -150,8 +143,13 @@ def as_frf_set(
     except (ValueError, TypeError, OverflowError) as error:
         raise FileContentError(f"{where}: {error}") from error
     if note:
-        warnings.warn(f"{where}: {note}", FileContentWarning, stacklevel=stacklevel)
+        reading.notes.append(f"{where}: {note}")
     return found
+
+
+def contradiction(said: str, wanted: str, where: str) -> str:
+    """Say that a file and its user contradict each other, as the end of a sentence that begins with the file."""
+    return f"says that it holds {said} ({where}), not {wanted}: leave the quantity out, or force it"
 
 
 def _numbers(what: str, values: Any) -> NDArray[Any]:
@@ -229,10 +227,9 @@ def _by_sizes(what: str, array: NDArray[Any], shape: tuple[int, int, int]) -> ND
     return fitting[0]
 
 
-def _quantity(
-    content: FrfArrays, channels: tuple[Channel, ...], quantity: str | None, *, forced: bool
-) -> tuple[str, float, str]:
+def _quantity(content: FrfArrays, channels: tuple[Channel, ...], reading: Reading) -> tuple[str, float, str]:
     """Quantity, factor to SI, and what had to be assumed."""
+    quantity = reading.quantity
     unit = parse_unit(content.unit)
     said = content.quantity.strip().lower()
     if said == "inertance":
@@ -243,7 +240,7 @@ def _quantity(
     if said and by_unit and said != by_unit and not quantity:
         raise ValueError(f"the unit '{content.unit}' does not fit {said}; give quantity=")
     agreed = {said, by_unit} - {""}
-    if quantity and len(agreed) == 1 and agreed != {quantity} and not forced:
+    if quantity and len(agreed) == 1 and agreed != {quantity} and not reading.forced:
         raise ValueError(f"the file {contradiction(agreed.pop(), quantity, content.unit or 'no unit')}")
     used = quantity or said or by_unit
     if not used:

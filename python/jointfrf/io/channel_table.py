@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import re
 from collections.abc import Iterator, Mapping
 from os import PathLike
@@ -13,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf.errors import FileContentError
-from jointfrf.files import check_file
 from jointfrf.frf.frf_set import Channel, ChannelPlace, ChannelRole, JointSide
+from jointfrf.io.text_table import TextTable, read_text_table
 from jointfrf.spelling import did_you_mean
 from jointfrf.toml.keys import Key, KeyTable
 from jointfrf.toml.table import TomlTable, read_toml
@@ -133,30 +132,14 @@ def _axes(row: TomlTable) -> NDArray[np.float64]:
 
 
 def _csv_rows(file: Path) -> Iterator[list[ChannelPlace]]:
-    if file.exists():
-        check_file(file)
-    try:
-        text = file.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise FileContentError(f"{file} cannot be read: {error.strerror}") from error
-    except UnicodeDecodeError as error:
-        raise FileContentError(f"{file} is no text file: {error}") from error
-    lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip()]
-    lines = [(number, line) for number, line in lines if not line.lstrip().startswith("#")]
-    if not lines:
-        raise FileContentError(f"{file} is empty")
-    mark = next((mark for mark in ("\t", ";") if mark in lines[0][1]), ",")
-    rows = list(csv.reader((line for _, line in lines), delimiter=mark))
-    columns = [_column(file, word) for word in rows[0]]
+    table = read_text_table(file)
+    columns = [_column(file, word) for word in table.heading]
     names = [name for name, _ in columns]
     if len(set(names)) < len(names):
         raise FileContentError(f"{file}: a column stands there twice: {', '.join(names)}")
-    for (number, _), cells in zip(lines[1:], rows[1:], strict=True):
-        where = f"{file}: line {number}"
-        if len(cells) != len(columns):
-            raise FileContentError(f"{where} has {len(cells)} columns, the heading has {len(columns)}")
-        given = {name: cell.strip() for (name, _), cell in zip(columns, cells, strict=True) if cell.strip()}
-        yield _places(_csv_values(where, given, dict(columns), decimal_comma=mark != ","), where)
+    for where, cells in table.rows:
+        given = {name: cell for name, cell in zip(names, cells, strict=True) if cell}
+        yield _places(_csv_values(table, where, given, dict(columns)), where)
 
 
 def _column(file: Path, word: str) -> tuple[str, float]:
@@ -172,15 +155,12 @@ def _column(file: Path, word: str) -> tuple[str, float]:
     return name, _UNITS.get(unit, 1.0)
 
 
-def _csv_values(
-    where: str, given: Mapping[str, str], scales: Mapping[str, float], *, decimal_comma: bool
-) -> dict[str, Any]:
+def _csv_values(table: TextTable, where: str, given: Mapping[str, str], scales: Mapping[str, float]) -> dict[str, Any]:
     """Return the cells of a row as a TOML table would have them."""
 
     def number(name: str) -> float:
-        text = given[name].replace(",", ".") if decimal_comma else given[name]
         try:
-            value = float(text)
+            value = table.number(given[name])
         except ValueError:
             value = float("nan")
         if not np.isfinite(value):

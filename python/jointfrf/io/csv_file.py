@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
+from contextlib import suppress
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -15,11 +15,13 @@ from jointfrf.errors import FileContentError
 from jointfrf.files import ReadLimit, write_file
 from jointfrf.frf.frf_set import Channel, FrfSet
 from jointfrf.io.arrays import FrfArrays
+from jointfrf.io.file_format import FileFormat, Reading
+from jointfrf.io.functions import LooseFunction, arrays_of_functions
 from jointfrf.io.labels import channels_of
-from jointfrf.io.layout import fields_of
-from jointfrf.io.loose import LooseFunction, arrays_of_functions
+from jointfrf.io.named_arrays import fields_of
+from jointfrf.io.text_table import TextTable, read_text_table
 
-__all__ = ["csv_arrays", "write_csv"]
+__all__ = ["CSV", "write_csv"]
 
 _PARTS = {
     "real": "real", "re": "real", "imag": "imag", "imaginary": "imag", "im": "imag",
@@ -33,54 +35,27 @@ _UNIT = re.compile(r"\[([^\]]*)\]")
 _FREQUENCY = re.compile(r"(f|freq|frequency|freq_hz|hz)\b", re.IGNORECASE)
 _HZ = {"": 1.0, "hz": 1.0, "khz": 1e3, "rad/s": 0.5 / np.pi}
 _RADIANS = {"": np.pi / 180, "deg": np.pi / 180, "°": np.pi / 180, "rad": 1.0}
-_ENCODINGS = ((b"\xff\xfe", "utf-16"), (b"\xfe\xff", "utf-16"), (b"\xef\xbb\xbf", "utf-8-sig"))
 
 
-@dataclass
-class _Table:
-    """Comments with a colon, the words of the heading, and the numbers below it."""
-
-    stated: dict[str, str] = field(default_factory=dict)
-    heading: list[str] = field(default_factory=list)
-    numbers: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))
-
-
-def csv_arrays(path: Path, limit: ReadLimit) -> FrfArrays:
-    """Read a text table.
-
-    Parameters
-    ----------
-    path : Path
-        Columns between commas, semicolons or tabs (decimal commas between semicolons or tabs), one heading. The first
-        column is the frequency. The others name response and excitation, ``102:+y / 101:+y``, and a part: ``real`` and
-        ``imag``, or ``magnitude`` and ``phase`` (degrees, or ``[rad]``), or ``coherence``; the unit stands in square
-        brackets. Lines before it that begin with ``#`` may state ``quantity:``, ``unit:`` and ``averages:``.
-    limit : ReadLimit
-
-    Returns
-    -------
-    FrfArrays
-
-    Raises
-    ------
-    FileContentError
-        Something is missing or no number; the message names line and column.
-    """
-    table = _table(path)
-    where = str(path)
+def _read(path: Path, limit: ReadLimit, _: Reading) -> FrfArrays:
+    """Read columns whose names say response, excitation, part and unit, after one of frequencies."""
+    table = read_text_table(path)
+    if not table.rows or len(table.heading) < 2:
+        raise FileContentError(f"{path} holds no table of numbers below a heading")
+    where, first = str(path), table.heading[0]
     parts: dict[tuple[Channel, Channel], dict[str, tuple[str, NDArray[np.float64]]]] = {}
-    first = table.heading[0]
     if not _FREQUENCY.match(first):
         raise FileContentError(f"{where}: the first column must be the frequency, not {first[:40]!r}")
     hz = _unit_of(first).lower()
     if hz not in _HZ:
         raise FileContentError(f"{where}: the unit '{hz}' of the frequency is none of Hz, kHz, rad/s")
-    for name, column in zip(table.heading[1:], table.numbers.T[1:], strict=True):
+    numbers = np.array([_numbers(table, place, cells) for place, cells in table.rows])
+    for name, column in zip(table.heading[1:], numbers.T[1:], strict=True):
         pair, part = _column(name, where)
         if part in parts.setdefault(pair, {}):
             raise FileContentError(f"{where} has two columns {name!r}")
         parts[pair][part] = _unit_of(name), column
-    freq_hz = table.numbers[:, 0] * _HZ[hz]
+    freq_hz = numbers[:, 0] * _HZ[hz]
     functions = [each for pair, columns in parts.items() for each in _functions(pair, columns, freq_hz, where)]
     found = arrays_of_functions(functions, where, limit)
     found.quantity = table.stated.get("quantity", "")
@@ -91,6 +66,18 @@ def csv_arrays(path: Path, limit: ReadLimit) -> FrfArrays:
         except ValueError as error:
             raise FileContentError(f"{where}: averages {table.stated['averages']!r} is no number") from error
     return found
+
+
+def _numbers(table: TextTable, place: str, cells: list[str]) -> list[float]:
+    try:
+        return [table.number(cell) for cell in cells]
+    except ValueError:
+        for i, cell in enumerate(cells, start=1):
+            with suppress(ValueError):
+                table.number(cell)
+                continue
+            raise FileContentError(f"{place}, column {i}: {cell[:30]!r} is no number") from None
+        raise
 
 
 def _column(name: str, where: str) -> tuple[tuple[Channel, Channel], str]:
@@ -148,56 +135,6 @@ def _functions(
     return found
 
 
-def _table(path: Path) -> _Table:
-    """Words and numbers of the file."""
-    lines = list(enumerate(_decoded(path).splitlines(), start=1))
-    table, separator = _Table(), ""
-    rows: list[list[float]] = []
-    for number, line in lines:
-        text = line.strip().strip("\x1a")
-        if not text.strip(",;\t "):
-            continue
-        if text.startswith("#") and not table.heading:
-            key, colon, value = text.lstrip("# ").partition(":")
-            if colon:
-                table.stated[key.strip().lower()] = value.strip(" ,;\t")
-        elif not table.heading:
-            separator = next((each for each in ("\t", ";", ",") if each in text), "")
-            if not separator:
-                raise FileContentError(f"{path}: line {number} is no heading of columns: {text[:40]!r}")
-            table.heading = [word.strip().strip('"').strip() for word in text.split(separator)]
-        else:
-            rows.append(_row(path, number, line.strip("\r\n"), separator, len(table.heading)))
-    if not table.heading or not rows:
-        raise FileContentError(f"{path} holds no table of numbers below a heading")
-    table.numbers = np.array(rows)
-    return table
-
-
-def _row(path: Path, number: int, line: str, separator: str, n: int) -> list[float]:
-    words = [word.strip().strip('"') for word in line.split(separator)]
-    if len(words) != n:
-        raise FileContentError(f"{path}: line {number} has {len(words)} columns, the heading has {n}")
-    row = []
-    for i, word in enumerate(words, start=1):
-        try:
-            row.append(float(word.replace(",", ".") if separator != "," else word))
-        except ValueError as error:
-            raise FileContentError(f"{path}: line {number}, column {i}: {word[:30]!r} is no number") from error
-    return row
-
-
-def _decoded(path: Path) -> str:
-    content = path.read_bytes()
-    encoding = next((name for mark, name in _ENCODINGS if content.startswith(mark)), "utf-8")
-    try:
-        return content.decode(encoding)
-    except UnicodeDecodeError as error:
-        if encoding != "utf-8" or b"\0" in content:
-            raise FileContentError(f"{path} is not a text file") from error
-        return content.decode("latin-1")  # as older test systems write m/s²
-
-
 def write_csv(path: str | PathLike[str], frfs: FrfSet) -> None:
     """Write measured FRFs as a text table, real and imaginary part and where it is known coherence.
 
@@ -230,3 +167,20 @@ def write_csv(path: str | PathLike[str], frfs: FrfSet) -> None:
             columns.append(frfs.coherence[:, i, j])
     rows = [",".join(map(repr, row)) for row in np.stack(columns, axis=1).tolist()]
     write_file(Path(path), "\n".join([*head, ",".join(names), *rows, ""]))
+
+
+def _looks_alike(_: Path, head: bytes) -> bool:
+    """Whether the first line of a text has separators, or is a comment."""
+    first = next((line for line in head.splitlines() if line.strip()), b"")
+    is_text = head.startswith((b"\xff\xfe", b"\xfe\xff")) or b"\0" not in head
+    return is_text and any(mark in first for mark in (b",", b";", b"\t", b"#"))
+
+
+CSV = FileFormat(
+    name="CSV",
+    suffixes=(".csv", ".txt"),
+    content="text table",
+    looks_alike=_looks_alike,
+    read=_read,
+    write=write_csv,
+)

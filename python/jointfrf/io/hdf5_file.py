@@ -1,4 +1,4 @@
-"""FRFs in HDF5 files: the own layout, arrays of scripts, and MATLAB files of version 7.3."""
+"""HDF5 files, MATLAB files of version 7.3 among them."""
 
 from __future__ import annotations
 
@@ -10,38 +10,23 @@ from typing import Any
 
 import numpy as np
 
-from jointfrf.errors import FileContentError, first_line
+from jointfrf.errors import FileContentError
 from jointfrf.extras import import_extra
-from jointfrf.files import ReadLimit, write_file
+from jointfrf.files import ReadLimit, damage_named, write_file
 from jointfrf.frf.frf_set import FrfSet
 from jointfrf.io.arrays import FrfArrays
+from jointfrf.io.file_format import FileFormat, Reading
 from jointfrf.io.hdf5_texts import hdf5_texts
-from jointfrf.io.layout import fields_of, is_own, own_arrays
-from jointfrf.io.mapping import FrfMapping, mapped_arrays
+from jointfrf.io.named_arrays import arrays_of_fields, fields_of
 
-__all__ = ["hdf5_arrays", "hdf5_fields", "write_hdf5"]
+__all__ = ["HDF5", "hdf5_fields", "write_hdf5"]
 
-_UNREADABLE = (OSError, ValueError, KeyError, TypeError, RuntimeError, MemoryError, OverflowError)
 #: More than this, deflate cannot make of a byte.
 _MOST_COMPRESSED = 1100
 _DEEPEST, _MOST_LINKS = 20, 20
 _DEFLATE = 1
 #: A letter as a text takes up to so many bytes, with what is made on the way.
 _LETTER = 50
-
-
-def hdf5_arrays(path: Path, mapping: FrfMapping, limit: ReadLimit) -> FrfArrays:
-    """Read an HDF5 file in the own layout, or with arrays under the names of a mapping.
-
-    Raises
-    ------
-    FileContentError
-        The file is damaged or lacks something.
-    MissingPackageError
-        The package h5py is not installed.
-    """
-    fields = hdf5_fields(path, limit)
-    return own_arrays(fields, str(path)) if is_own(fields) else mapped_arrays(fields, mapping, str(path))
 
 
 def hdf5_fields(path: Path, limit: ReadLimit) -> dict[str, Any]:
@@ -67,13 +52,8 @@ def hdf5_fields(path: Path, limit: ReadLimit) -> dict[str, Any]:
         The package h5py is not installed.
     """
     h5py = import_extra("h5py")
-    try:
-        with h5py.File(path, "r") as file:
-            return _Hdf5(h5py, path, limit).group(file, 0)
-    except FileContentError:
-        raise
-    except (*_UNREADABLE, zlib.error) as error:
-        raise FileContentError(f"{path} cannot be read as an HDF5 file: {first_line(error)}") from error
+    with damage_named(path, "an HDF5 file", zlib.error), h5py.File(path, "r") as file:
+        return _Hdf5(h5py, path, limit).group(file, 0)
 
 
 class _Hdf5:
@@ -234,3 +214,20 @@ def write_hdf5(path: str | PathLike[str], frfs: FrfSet) -> None:
             fixed = np.char.encode(value, "ascii") if value.dtype.kind == "U" else value
             file.create_dataset(name, data=fixed, compression="gzip" if value.dtype.kind in "fc" else None)
     write_file(Path(path), content.getvalue())
+
+
+def _read(path: Path, limit: ReadLimit, reading: Reading) -> FrfArrays:
+    return arrays_of_fields(hdf5_fields(path, limit), reading.mapping, str(path), limit)
+
+
+#: First bytes of a file, or of what stands after a block of the user.
+_SIGN, _PLACES = b"\x89HDF\r\n\x1a\n", (0, 512, 1024, 2048, 4096)
+HDF5 = FileFormat(
+    name="HDF5",
+    suffixes=(".h5", ".hdf5"),
+    content="own layout; arrays of scripts",
+    has_mark=lambda head: any(head[place:].startswith(_SIGN) for place in _PLACES),
+    read=_read,
+    write=write_hdf5,
+    needs="`jointfrf[hdf5]`",
+)

@@ -1,187 +1,302 @@
-"""FRFs in MATLAB files: structures of Simcenter Testlab, and arrays of scripts."""
+"""MATLAB files. Versions 4 to 7 are read here, and no size that such a file states is trusted; 7.3 is HDF5."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import math
+import zlib
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from jointfrf.errors import FileContentError
-from jointfrf.files import ReadLimit
-from jointfrf.frf.frf_set import Channel
+from jointfrf.files import ReadLimit, damage_named
 from jointfrf.io.arrays import FrfArrays
+from jointfrf.io.file_format import FileFormat, Reading
 from jointfrf.io.hdf5_file import hdf5_fields
-from jointfrf.io.labels import channels_of
-from jointfrf.io.loose import LooseFunction, arrays_of_functions
-from jointfrf.io.mapping import FrfMapping, mapped_arrays
-from jointfrf.io.mat_fields import mat_fields
-from jointfrf.io.units import parse_unit
+from jointfrf.io.named_arrays import arrays_of_fields
 
-__all__ = ["mat_arrays"]
+__all__ = ["MATLAB", "mat_fields"]
 
-_HDF5_FROM = b"MATLAB 7.3"
-_TOLERANCE = 1e-3
+_HEAD, _MARK, _MARK_HDF5 = 128, b"MATLAB ", b"MATLAB 7.3"
+_MATRIX, _COMPRESSED = 14, 15
+#: Types of elements, as numpy has them.
+_NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
+_TEXTS = {1: ("latin-1", 1), 2: ("latin-1", 1), 3: ("utf-16", 2), 4: ("utf-16", 2), 16: ("utf-8", 1),
+          17: ("utf-16", 2), 18: ("utf-32", 4)}  # fmt: skip
+#: Classes of arrays.
+_CELL, _STRUCT, _OBJECT, _CHAR, _OPAQUE = 1, 2, 3, 4, 17
+_CLASSES = {6: "f8", 7: "f4", 8: "i1", 9: "u1", 10: "i2", 11: "u2", 12: "i4", 13: "u4", 14: "i8", 15: "u8"}
+_COMPLEX = 0x800
+#: Types of numbers in version 4.
+_OLD_NUMBERS = {0: "f8", 1: "f4", 2: "i4", 3: "i2", 4: "u2", 5: "u1"}
+_OLD_HEAD, _OLD_MOST, _OLD_TEXT = 20, 5000, 1
+_DEEPEST = 20
 
 
-def mat_arrays(path: Path, mapping: FrfMapping, limit: ReadLimit) -> FrfArrays:
-    """Read a MATLAB file.
+def mat_fields(path: Path, limit: ReadLimit) -> dict[str, Any]:
+    """Read all variables.
 
     Parameters
     ----------
     path : Path
-        Of version 4 to 7, or 7.3 (by h5py). Structures with ``x_values``, ``y_values`` and
-        ``function_record`` are read as Simcenter Testlab writes them; other files by the names of `mapping`.
-    mapping : FrfMapping
-        Which field is what.
+        A MATLAB file that is not HDF5.
     limit : ReadLimit
 
     Returns
     -------
-    FrfArrays
+    dict of str
+        Arrays without axes of length 1, single values as such, texts; structures are mappings, several of them lists,
+        cells arrays of objects. None for what has no meaning here: sparse matrices, functions, tables.
 
     Raises
     ------
     FileContentError
-        The file is damaged or lacks something.
-    MissingPackageError
-        The file is of version 7.3 and the package h5py is not installed.
+        The file is damaged, or holds more than the limit.
     """
+    with damage_named(path, "a MATLAB file", zlib.error):
+        content = path.read_bytes()
+        if content[126:_HEAD] in (b"IM", b"MI") and 0 not in content[:4]:
+            return _variables(content, limit)
+        if content.startswith(_MARK):
+            raise ValueError("it ends inside its header, or the header is damaged")
+        return _old_variables(content, limit)
+
+
+def _variables(content: bytes, limit: ReadLimit) -> dict[str, Any]:
+    """Read version 5 to 7."""
+    order: Literal["little", "big"] = "little" if content[126:_HEAD] == b"IM" else "big"
+    place, found = _HEAD, dict[str, Any]()
+    while place < len(content):
+        kind, size = (int.from_bytes(content[at : at + 4], order) for at in (place, place + 4))
+        start, place = place + 8, place + 8 + size
+        if place > len(content) or kind not in (_MATRIX, _COMPRESSED):
+            raise ValueError("it ends inside a variable, or one is damaged")
+        whole = memoryview(content)[start:place]
+        if kind == _COMPRESSED:
+            whole = _unpacked(whole, order, limit)
+        name, value = _Arrays(order, limit).array(whole, 0)
+        if name:
+            found[name] = value
+    return found
+
+
+def _unpacked(packed: memoryview, order: Literal["little", "big"], limit: ReadLimit) -> memoryview:
+    """Unpack a variable, of which not more is made than it states; its checksum is compared at the end."""
+    unpacker = zlib.decompressobj()
+    tag = unpacker.decompress(packed, 8)
+    kind, size = (int.from_bytes(tag[at : at + 4], order) for at in (0, 4))
+    if len(tag) < 8 or kind != _MATRIX:
+        raise ValueError("a compressed variable is damaged")
+    limit.take(size)
+    content = unpacker.decompress(unpacker.unconsumed_tail, size) if size else b""
+    rest = b"" if unpacker.eof else unpacker.decompress(unpacker.unconsumed_tail, 8)
+    if len(content) != size or len(rest) == 8 or not unpacker.eof:
+        raise ValueError("it ends inside a compressed variable")
+    return memoryview(content)
+
+
+class _Element(NamedTuple):
+    """A part of a variable: its type, its bytes."""
+
+    kind: int
+    data: memoryview
+
+
+class _Arrays:
+    """Arrays of one variable."""
+
+    def __init__(self, order: Literal["little", "big"], limit: ReadLimit) -> None:
+        self.order, self.limit = order, limit
+        self.sign = "<" if order == "little" else ">"
+
+    def elements(self, whole: memoryview) -> list[_Element]:
+        """Return the elements that make up an array, none beyond its end."""
+        found, place = [], 0
+        while place + 8 <= len(whole):
+            kind = int.from_bytes(whole[place : place + 4], self.order)
+            size = int.from_bytes(whole[place + 4 : place + 8], self.order)
+            start, end = place + 8, place + 8 + size
+            place = end + -size % 8
+            if kind >> 16:  # a short one: its size in the upper half, its bytes in the place of the size
+                kind, size = kind & 0xFFFF, kind >> 16
+                start, end, place = start - 4, start - 4 + size, start
+            if end > len(whole) or (place == start and size > 4):
+                raise ValueError("a variable is damaged: a part of it reaches beyond its end")
+            found.append(_Element(kind, whole[start:end]))
+        return found
+
+    def array(self, whole: memoryview, depth: int) -> tuple[str, Any]:
+        """Return the name and the value of an array."""
+        if depth > _DEEPEST:
+            raise ValueError("it has cells inside cells without end")
+        self.limit.take(0)
+        if not len(whole):
+            return "", np.zeros(0)
+        parts = self.elements(whole)
+        if len(parts) < 2 or parts[0].kind != 6 or len(parts[0].data) != 8:
+            raise ValueError("a variable is damaged: it does not say what it is")
+        flags = int.from_bytes(parts[0].data[:4], self.order)
+        kind = flags & 0xFF
+        if kind == _OPAQUE or len(parts) < 3:
+            return _name(parts[1]), None
+        shape, name, rest = self.shape(parts[1]), _name(parts[2]), parts[3:]
+        if kind == _CELL:
+            return name, self.cells(rest, shape, depth)
+        if kind in (_STRUCT, _OBJECT):
+            return name, self.structures(rest[kind == _OBJECT :], shape, depth)
+        if kind == _CHAR:
+            return name, self.text(rest, shape)
+        return name, self.numbers(rest, shape, _CLASSES[kind], bool(flags & _COMPLEX)) if kind in _CLASSES else None
+
+    def shape(self, part: _Element) -> tuple[int, ...]:
+        found = self.values(part).tolist() if part.kind == 5 else []
+        if len(found) < 2 or len(found) > 32 or min(found) < 0:
+            raise ValueError("a variable is damaged: it has no sizes")
+        return tuple(found)
+
+    def values(self, part: _Element) -> NDArray[Any]:
+        """Return the numbers of an element as they stand there."""
+        if part.kind not in _NUMBERS:
+            raise ValueError(f"a variable is damaged: there is no type {part.kind} of numbers")
+        kind = np.dtype(self.sign + _NUMBERS[part.kind])
+        if len(part.data) % kind.itemsize:
+            raise ValueError("a variable is damaged: it ends inside a number")
+        return np.frombuffer(part.data, kind)
+
+    def numbers(self, parts: list[_Element], shape: tuple[int, ...], kind: str, is_complex: bool) -> Any:
+        count = math.prod(shape)
+        found = [self.values(part) for part in parts[: 1 + is_complex]]
+        if len(found) < 1 + is_complex or any(each.size != count for each in found):
+            raise ValueError(f"a variable is damaged: it does not hold the {_by(shape)} values that it states")
+        self.limit.take(count * np.dtype(kind).itemsize * (1 + is_complex))
+        real = found[0].astype(kind)
+        return _squeezed(_complex(real, found[1].astype(kind)) if is_complex else real, shape)
+
+    def text(self, parts: list[_Element], shape: tuple[int, ...]) -> Any:
+        """Return a text, or rows of texts, which stand column by column."""
+        count = math.prod(shape)
+        if not parts or parts[0].kind not in _TEXTS:
+            raise ValueError("a variable is damaged: a text of no known type")
+        codec, unit = _TEXTS[parts[0].kind]
+        ending = "" if unit == 1 else "-le" if self.order == "little" else "-be"
+        self.limit.take(4 * len(parts[0].data))
+        letters = bytes(parts[0].data).decode(codec + ending, "replace")
+        if shape[0] == 1 and len(shape) == 2 and unit * count == len(parts[0].data):
+            return letters if count else np.array([], "U1")
+        if len(letters) != count:
+            raise ValueError(f"a variable is damaged: it does not hold the {_by(shape)} letters that it states")
+        if not count:
+            return np.array([], "U1")
+        rows = ["".join(letters[row :: shape[0]]) for row in range(shape[0])]
+        return rows[0] if len(rows) == 1 else np.array(rows)
+
+    def cells(self, parts: list[_Element], shape: tuple[int, ...], depth: int) -> Any:
+        values = self.inner(parts, math.prod(shape), depth)
+        found = np.empty(len(values), object)
+        for place, value in enumerate(values):
+            found[place] = value
+        cells = _squeezed(found, shape)
+        return list(values) if isinstance(cells, np.ndarray) and cells.ndim == 1 and _is_mapping(values) else cells
+
+    def structures(self, parts: list[_Element], shape: tuple[int, ...], depth: int) -> Any:
+        if len(parts) < 2 or parts[0].kind != 5 or len(parts[0].data) != 4:
+            raise ValueError("a variable is damaged: a structure without names")
+        length, held = int(self.values(parts[0])[0]), bytes(parts[1].data)
+        if length < 1 or len(held) % length:
+            raise ValueError("a variable is damaged: the names of a structure do not fit their length")
+        names = [_word(held[at : at + length]) for at in range(0, len(held), length)]
+        count = math.prod(shape)
+        values = self.inner(parts[2:], count * len(names), depth)
+        found = [dict(zip(names, values[i * len(names) :], strict=False)) for i in range(count if names else 0)]
+        return found[0] if count == 1 and found else found
+
+    def inner(self, parts: list[_Element], count: int, depth: int) -> list[Any]:
+        """Return arrays inside an array."""
+        if len(parts) != count or any(part.kind != _MATRIX for part in parts):
+            raise ValueError(f"a variable is damaged: it does not hold the {count} parts that it states")
+        return [self.array(part.data, depth + 1)[1] for part in parts]
+
+
+def _old_variables(content: bytes, limit: ReadLimit) -> dict[str, Any]:
+    """Read version 4, which has no mark."""
+    place, found = 0, dict[str, Any]()
+    while place < len(content):
+        if place + _OLD_HEAD > len(content):
+            raise ValueError("it ends inside a variable, or one is damaged")
+        sign = "<" if int.from_bytes(content[place : place + 4], "little") < _OLD_MOST else ">"
+        kind, rows, columns, is_complex, length = np.frombuffer(content, f"{sign}i4", 5, place).tolist()
+        type_, form = kind // 10 % 10, kind % 10
+        shape = (rows, columns)
+        is_sound = 0 <= kind < _OLD_MOST and type_ in _OLD_NUMBERS and is_complex in (0, 1)
+        if not is_sound or min(rows, columns, length) < 0:
+            raise ValueError("it ends inside a variable, or one is damaged")
+        number = np.dtype(sign + _OLD_NUMBERS[type_])
+        start = place + _OLD_HEAD + length
+        end = start + number.itemsize * rows * columns * (1 + is_complex)
+        if end > len(content):
+            raise ValueError("it ends inside a variable, or one is damaged")
+        limit.take(2 * (end - start))
+        name = _word(content[place + _OLD_HEAD : start])
+        values = np.frombuffer(content, number, rows * columns * (1 + is_complex), start).astype(_OLD_NUMBERS[type_])
+        if form == _OLD_TEXT:
+            letters = "".join(map(chr, np.clip(np.nan_to_num(values), 0, 0xFF).astype(int).tolist()))
+            texts = ["".join(letters[row::rows]) for row in range(rows)]
+            found[name] = texts[0] if len(texts) == 1 else np.array(texts)
+        elif form == 0:
+            half = rows * columns
+            found[name] = _squeezed(_complex(values[:half], values[half:]) if is_complex else values, shape)
+        else:
+            found[name] = None
+        place = end
+    return found
+
+
+def _name(part: _Element) -> str:
+    return _word(bytes(part.data))
+
+
+def _word(held: bytes) -> str:
+    return held.partition(b"\0")[0].decode("latin-1")
+
+
+def _complex(real: NDArray[Any], imaginary: NDArray[Any]) -> NDArray[Any]:
+    found = np.empty(real.size, np.result_type(real.dtype, np.complex64))
+    found.real, found.imag = real, imaginary
+    return found
+
+
+def _squeezed(values: NDArray[Any], shape: tuple[int, ...]) -> Any:
+    """Return an array that stands column by column without axes of length 1; a single value as such."""
+    if values.size != math.prod(shape):
+        raise ValueError(f"a variable is damaged: it does not hold the {_by(shape)} values that it states")
+    if not values.size:
+        return values
+    found = values.reshape(shape, order="F").squeeze()
+    return found if found.ndim else found.item()
+
+
+def _is_mapping(values: list[Any]) -> bool:
+    return bool(values) and isinstance(values[0], dict)
+
+
+def _by(shape: tuple[int, ...]) -> str:
+    return " x ".join(map(str, shape))
+
+
+def _read(path: Path, limit: ReadLimit, reading: Reading) -> FrfArrays:
     with path.open("rb") as file:
-        is_hdf5 = file.read(len(_HDF5_FROM)) == _HDF5_FROM
-    content = hdf5_fields(path, limit) if is_hdf5 else mat_fields(path, limit)
-    records = list(_records(content))
-    if records and mapping.h is None:
-        functions = [function for record in records for function in _functions(record, mapping, str(path))]
-        return arrays_of_functions(functions, str(path), limit)
-    return mapped_arrays(content, mapping, str(path))
+        is_hdf5 = file.read(len(_MARK_HDF5)) == _MARK_HDF5
+    fields = hdf5_fields(path, limit) if is_hdf5 else mat_fields(path, limit)
+    return arrays_of_fields(fields, reading.mapping, str(path), limit, keeps_shapes=False)
 
 
-def _records(content: Any) -> Iterator[Mapping[str, Any]]:
-    """Structures of Testlab, wherever they stand."""
-    if isinstance(content, Mapping):
-        if {"x_values", "y_values"} <= set(content):
-            yield content
-        else:
-            for value in content.values():
-                yield from _records(value)
-    elif isinstance(content, list) or (isinstance(content, np.ndarray) and content.dtype == object):
-        for value in content:
-            yield from _records(value)
-
-
-def _functions(record: Mapping[str, Any], mapping: FrfMapping, where: str) -> Iterator[LooseFunction]:
-    """FRFs and coherences of one structure, which holds a column for each."""
-    about = record.get("function_record")
-    about = about if isinstance(about, Mapping) else {}
-    kind = " ".join(_texts(about.get("type"))).lower()
-    is_coherence = "coherence" in kind
-    x_values, y_values = _part(record, "x_values", where), _part(record, "y_values", where)
-    values = np.asarray(_needed(y_values, "values", where))
-    freq_hz = _lines(x_values, values, where)
-    columns = values.reshape(freq_hz.size, -1)
-    if values.ndim == 2 and values.shape[0] != freq_hz.size:
-        columns = values.T
-    if not (is_coherence or columns.dtype.kind == "c"):
-        return  # spectra and time histories of the same export
-    unit = "" if is_coherence else _unit(y_values, mapping, where)
-    pairs = _pairs(about, columns.shape[1], mapping, where)
-    for (response, excitation), column in zip(pairs, columns.T, strict=True):
-        yield LooseFunction(response, excitation, freq_hz, column, is_coherence, unit)
-
-
-def _part(record: Mapping[str, Any], name: str, where: str) -> Mapping[str, Any]:
-    part = record.get(name)
-    if not isinstance(part, Mapping):
-        raise FileContentError(f"{where} is damaged: {name} of a function is no structure")
-    return part
-
-
-def _needed(part: Mapping[str, Any], name: str, where: str) -> Any:
-    if name not in part:
-        raise FileContentError(f"{where} is damaged: a function has no {name}")
-    return part[name]
-
-
-def _lines(x_values: Mapping[str, Any], values: NDArray[Any], where: str) -> NDArray[np.float64]:
-    """Frequencies by start, increment and number, or one by one; as many as one axis of the values has."""
-    if values.dtype.kind not in "biufc" or values.ndim not in (1, 2):
-        raise FileContentError(f"{where} is damaged: the values of a function are no columns of numbers")
-    try:
-        if "increment" in x_values:
-            start, step, n = (
-                float(np.ravel(x_values[name])[0]) for name in ("start_value", "increment", "number_of_values")
-            )
-            size = int(n)
-        else:
-            given = np.asarray(x_values["values"], dtype=np.float64).reshape(-1)
-            start, step, size = 0.0, 0.0, given.size
-    except (ValueError, TypeError, LookupError, OverflowError) as error:
-        raise FileContentError(f"{where} is damaged: the frequencies of a function cannot be read") from error
-    if size < 1 or size not in values.shape:
-        raise FileContentError(f"{where} is damaged: {values.size} values at {size:.6g} frequency lines")
-    return np.asarray(start + step * np.arange(size)) if "increment" in x_values else given
-
-
-def _unit(y_values: Mapping[str, Any], mapping: FrfMapping, where: str) -> str:
-    """Return the unit of the values: the label, unless the file gives a factor that says otherwise."""
-    if mapping.unit is not None:
-        return mapping.unit
-    quantity = y_values.get("quantity")
-    quantity = quantity if isinstance(quantity, Mapping) else {}
-    label = (_texts(quantity.get("label")) or [""])[0].strip()
-    transformation = quantity.get("unit_transformation")
-    factor = transformation.get("factor", 1.0) if isinstance(transformation, Mapping) else 1.0
-    unit = parse_unit(label)
-    to_si = float(np.ravel(factor)[0])
-    if unit is not None and not any(abs(to_si / sound - 1) < _TOLERANCE for sound in (1.0, unit.to_si)):
-        raise FileContentError(
-            f"{where} gives the unit '{label}' with the factor {to_si:g}: whether the values are in that unit or in SI "
-            "units is not clear; say unit= by mapping, the unit of the values"
-        )
-    return label
-
-
-def _pairs(about: Mapping[str, Any], n: int, mapping: FrfMapping, where: str) -> list[tuple[Channel, Channel]]:
-    """Response and excitation of each column."""
-    sides = []
-    for what, given, key in (
-        ("responses", mapping.responses, "primary_channel"),
-        ("excitations", mapping.excitations, "reference_channel"),
-    ):
-        labels = given if given is not None else _point_names(about.get(key), n)
-        labels = labels.split(",") if isinstance(labels, str) else labels
-        if labels is None or len(labels) not in (1, n):
-            raise FileContentError(
-                f"{where} does not name the {what} of its functions ({key}): say {what}= by mapping, such as 102:+y"
-            )
-        try:
-            channels = [channels_of(what, [label])[0] for label in labels]
-        except ValueError as error:
-            raise FileContentError(f"{where} {error}; say {what}= by mapping") from error
-        sides.append(channels * n if len(channels) == 1 else channels)
-    return list(zip(*sides, strict=True))
-
-
-def _point_names(channel: Any, n: int) -> list[str] | None:
-    """Names of points with their directions, from fields that exports have under several names."""
-    if isinstance(channel, Mapping):
-        points = next((_texts(channel[key]) for key in ("point_id", "label", "name", "point") if key in channel), [])
-        ways = next((_texts(channel[key]) for key in ("direction", "point_direction") if key in channel), [])
-        if len(points) != len(ways) or not ways:
-            return points or None
-        return [f"{point}:{way}" for point, way in zip(points, ways, strict=True)]
-    if isinstance(channel, list | np.ndarray) and n == len(channel):
-        names = [_point_names(each, 1) for each in channel]
-        return None if any(each is None for each in names) else [each[0] for each in names if each]
-    return None
-
-
-def _texts(value: Any) -> list[str]:
-    if value is None:
-        return []
-    if isinstance(value, str):
-        return [value]
-    return [str(each) for each in np.ravel(np.asarray(value, dtype=object))]
+MATLAB = FileFormat(
+    name="MATLAB",
+    suffixes=(".mat",),
+    content="versions 4 to 7.3: structures of Simcenter Testlab; arrays of scripts",
+    has_mark=lambda head: head.startswith(_MARK),
+    looks_alike=lambda path, _: path.suffix.lower() == ".mat",  # version 4 has no mark
+    read=_read,
+    needs="`jointfrf[hdf5]` for version 7.3",
+)

@@ -10,14 +10,12 @@ import scipy.io
 from scipy import sparse
 
 from jointfrf.dofs import DIRECTIONS
-from jointfrf.errors import FileContentError, first_line
-from jointfrf.files import ReadLimit, check_file
+from jointfrf.errors import FileContentError
+from jointfrf.files import ReadLimit, check_file, damage_named, text_of
 from jointfrf.io.npz_file import npz_fields
 
 __all__ = ["read_dof_names", "read_matrix"]
 
-#: What readers of numpy and scipy raise for a file that is not what its name says, or is damaged.
-_UNREADABLE = (OSError, ValueError, TypeError, KeyError, EOFError, OverflowError, MemoryError)
 #: An entry of a Matrix Market file takes at least so many bytes there: a list of entries, and one after the other.
 _LEAST = {"coordinate": 6, "array": 2}
 #: An entry in memory with its row and column, and a row, bytes, with what is made on the way.
@@ -45,18 +43,14 @@ def read_matrix(path: Path, name: str, limit_gb: float | None = None) -> sparse.
     FileContentError
         The file cannot be read, or does not hold a finite real square matrix.
     """
-    if path.exists():
-        check_file(path, limit_gb)
-    try:
+    is_npz = path.suffix.lower() == ".npz"
+    with damage_named(path, "an NPZ file" if is_npz else "a Matrix Market file"):
+        if path.exists():
+            check_file(path, limit_gb)
         limit = ReadLimit(path, limit_gb)
-        found = _read_npz(path, name, limit) if path.suffix.lower() == ".npz" else _read_market(path, limit)
+        found = _read_npz(path, name, limit) if is_npz else _read_market(path, limit)
         _check_square(path, found.shape)
         limit.take(_ROW * found.shape[0])
-    except FileContentError:
-        raise
-    except _UNREADABLE as error:
-        kind = "an NPZ" if path.suffix.lower() == ".npz" else "a Matrix Market"
-        raise FileContentError(f"{path} cannot be read as {kind} file: {first_line(error)}") from error
     return _checked(path, found)
 
 
@@ -138,14 +132,8 @@ def read_dof_names(path: Path) -> tuple[str, ...]:
     ...     read_dof_names(path)
     ('1:y', '1:theta_z', '2:y')
     """
-    if path.exists():
-        check_file(path)
-    try:
-        lines = path.read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise FileContentError(f"{path} cannot be read as a text file: {error}") from error
     names = []
-    for number, line in enumerate(lines, 1):
+    for number, line in enumerate(text_of(path).splitlines(), 1):
         words = line.partition("#")[0].split()
         if not words:
             continue

@@ -1,4 +1,4 @@
-"""FRFs in NPZ files: the own layout, arrays of scripts, and functions of sdynpy."""
+"""NPZ files."""
 
 from __future__ import annotations
 
@@ -13,51 +13,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from jointfrf.errors import FileContentError, first_line
-from jointfrf.files import ReadLimit, write_file
+from jointfrf.errors import FileContentError
+from jointfrf.files import ReadLimit, damage_named, write_file
 from jointfrf.frf.frf_set import FrfSet
 from jointfrf.io.arrays import FrfArrays
-from jointfrf.io.labels import channels_of
-from jointfrf.io.layout import fields_of, is_own, own_arrays
-from jointfrf.io.loose import LooseFunction, arrays_of_functions
-from jointfrf.io.mapping import FrfMapping, mapped_arrays
+from jointfrf.io.file_format import FileFormat, Reading
+from jointfrf.io.named_arrays import arrays_of_fields, fields_of
 
-__all__ = ["npz_arrays", "npz_fields", "write_npz"]
-
-_UNREADABLE = (OSError, ValueError, KeyError, EOFError, MemoryError, NotImplementedError, RuntimeError,
-               zipfile.BadZipFile, zlib.error, tokenize.TokenError)  # fmt: skip
-_FRF = 4
-
-
-def npz_arrays(path: Path, mapping: FrfMapping, limit: ReadLimit) -> FrfArrays:
-    """Read an NPZ file.
-
-    Parameters
-    ----------
-    path : Path
-        In the own layout; of sdynpy (`NDDataArray.save`: structured array ``data``, ``function_type`` 4); or with
-        arrays under the names of `mapping`. Python objects are not read.
-    mapping : FrfMapping
-        For files that are not in the own layout.
-    limit : ReadLimit
-
-    Returns
-    -------
-    FrfArrays
-
-    Raises
-    ------
-    FileContentError
-        The file is damaged, holds Python objects, or lacks something.
-    """
-    fields = {name: value.item() if value.ndim == 0 else value for name, value in npz_fields(path, limit).items()}
-    where = str(path)
-    if is_own(fields):
-        return own_arrays(fields, where)
-    data = fields.get("data")
-    if isinstance(data, np.ndarray) and set(data.dtype.names or ()) >= {"abscissa", "ordinate", "coordinate"}:
-        return _of_sdynpy(data, fields.get("function_type"), where, limit)
-    return mapped_arrays(fields, mapping, where)
+__all__ = ["NPZ", "npz_fields", "write_npz"]
 
 
 def npz_fields(path: Path, limit: ReadLimit) -> dict[str, NDArray[Any]]:
@@ -68,17 +31,15 @@ def npz_fields(path: Path, limit: ReadLimit) -> dict[str, NDArray[Any]]:
     FileContentError
         The file is damaged, holds Python objects, or more than the limit.
     """
-    try:
-        with zipfile.ZipFile(path) as archive:
-            return {
-                info.filename.removesuffix(".npy"): _array(archive, info, path, limit)
-                for info in archive.infolist()
-                if info.filename.endswith(".npy")
-            }
-    except FileContentError:
-        raise
-    except _UNREADABLE as error:
-        raise FileContentError(f"{path} cannot be read as an NPZ file: {first_line(error)}") from error
+    with (
+        damage_named(path, "an NPZ file", zipfile.BadZipFile, zlib.error, tokenize.TokenError),
+        zipfile.ZipFile(path) as archive,
+    ):
+        return {
+            info.filename.removesuffix(".npy"): _array(archive, info, path, limit)
+            for info in archive.infolist()
+            if info.filename.endswith(".npy")
+        }
 
 
 def _array(archive: zipfile.ZipFile, info: zipfile.ZipInfo, path: Path, limit: ReadLimit) -> NDArray[Any]:
@@ -99,26 +60,6 @@ def _array(archive: zipfile.ZipFile, info: zipfile.ZipInfo, path: Path, limit: R
         limit.take(max(dtype.itemsize, 1) * count)
     with archive.open(info) as member:
         return np.asarray(np.lib.format.read_array(member, allow_pickle=False))
-
-
-def _of_sdynpy(data: NDArray[Any], function_type: Any, where: str, limit: ReadLimit) -> FrfArrays:
-    """Functions with response, then reference as their coordinates."""
-    if function_type != _FRF:
-        raise FileContentError(f"{where} holds functions of type {function_type} of sdynpy, not FRFs (type {_FRF})")
-    functions = []
-    for row in data.ravel():
-        try:
-            channels = [channels_of("coordinates", [place])[0] for place in _places(row["coordinate"])]
-        except (ValueError, TypeError) as error:
-            raise FileContentError(f"{where} {error}") from error
-        if len(channels) != 2:
-            raise FileContentError(f"{where} has functions without one response and one reference each")
-        functions.append(LooseFunction(channels[0], channels[1], np.ravel(row["abscissa"]), np.ravel(row["ordinate"])))
-    return arrays_of_functions(functions, where, limit)
-
-
-def _places(coordinate: Any) -> list[tuple[Any, Any]]:
-    return [(each["node"], each["direction"]) for each in np.ravel(coordinate)]
 
 
 def write_npz(path: str | PathLike[str], frfs: FrfSet) -> None:
@@ -163,3 +104,18 @@ def write_npz(path: str | PathLike[str], frfs: FrfSet) -> None:
     content = io.BytesIO()
     np.savez_compressed(content, **fields_of(frfs))  # type: ignore[arg-type]
     write_file(Path(path), content.getvalue())
+
+
+def _read(path: Path, limit: ReadLimit, reading: Reading) -> FrfArrays:
+    fields = {name: value.item() if value.ndim == 0 else value for name, value in npz_fields(path, limit).items()}
+    return arrays_of_fields(fields, reading.mapping, str(path), limit)
+
+
+NPZ = FileFormat(
+    name="NPZ",
+    suffixes=(".npz",),
+    content="own layout; arrays of scripts; `NDDataArray.save` of sdynpy",
+    has_mark=lambda head: head.startswith(b"PK"),
+    read=_read,
+    write=write_npz,
+)

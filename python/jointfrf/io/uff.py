@@ -1,9 +1,9 @@
-"""FRFs of a Universal File (dataset 58)."""
+"""FRFs of Universal Files, read and written (datasets 58, 151, 164, 2411)."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from contextlib import suppress
 from dataclasses import dataclass, field
 from os import PathLike
@@ -14,21 +14,36 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf.errors import FileContentError
-from jointfrf.files import ReadLimit
+from jointfrf.files import HEAD, ReadLimit, head_of, write_file
 from jointfrf.frf.frf_set import POWER_OF_I_OMEGA, ROUND_OFF, Channel, FrfSet, same_frf
 from jointfrf.frf.merge import same_lines
+from jointfrf.io.arrays import contradiction
+from jointfrf.io.file_format import FileFormat, Reading
 from jointfrf.io.labels import DIRECTION_CODES
-from jointfrf.io.quantity import check_quantity, contradiction, state
-from jointfrf.io.uff_contents import contents_without_frf
 from jointfrf.io.uff_file import UniversalFile, name_some
+from jointfrf.io.uff_function import (
+    DELIMITER,
+    FunctionHeader,
+    axis_record,
+    function_dataset,
+    function_values,
+    place_fields,
+    read_header,
+)
 from jointfrf.io.uff_nodes import node_coordinates
-from jointfrf.io.uff_ordinate import DATA_TYPES, Axis, kind_of_frf, ordinate_factor, ordinate_quantity
-from jointfrf.kernel.arguments import as_nodes
+from jointfrf.io.uff_ordinate import kind_of_frf, ordinate_factor, ordinate_quantity
+from jointfrf.kernel.arguments import check_type
 
-__all__ = ["read_uff", "read_uff_part"]
+__all__ = ["UNIVERSAL_FILE", "read_uff", "write_uff"]
 
 _FRF, _COHERENCE = 4, 6
+#: A measurement reaches over fewer decades: numbers in the wrong byte order over more.
 _MOST_DECADES = 60
+_SHOWN = 3
+#: Columns of a line of text.
+_WIDTH = 80
+_CODES = {direction: code for code, direction in DIRECTION_CODES.items()}
+_COHERENCE_AXES = [axis_record(0, "Coherence", "NONE"), axis_record(0, "NONE", "NONE")]
 _HZ = {"": 1.0, "hz": 1.0, "khz": 1e3, "rad/s": 0.5 / np.pi, "rad/sec": 0.5 / np.pi, "rpm": 1.0 / 60.0}
 
 
@@ -37,11 +52,11 @@ _Number = TypeVar("_Number", np.float64, np.complex128)
 
 @dataclass(frozen=True, slots=True)
 class _Frf:
-    """Where an FRF stands in the file, and what it means."""
+    """Where an FRF is in the file, and what it means."""
 
     dataset: int
+    header: FunctionHeader
     channels: tuple[Channel, Channel]
-    entities: tuple[str, str]
     quantity: str
     factor: float
     stated: str
@@ -55,7 +70,7 @@ class _Content:
     """What the headers of the file say."""
 
     frfs: list[_Frf] = field(default_factory=list)
-    coherences: list[tuple[int, tuple[Channel, Channel]]] = field(default_factory=list)
+    coherences: list[tuple[int, FunctionHeader, tuple[Channel, Channel]]] = field(default_factory=list)
     functions: Counter[int] = field(default_factory=Counter)
     unusable: dict[str, list[int]] = field(default_factory=dict)
 
@@ -102,8 +117,6 @@ def read_uff(
     FileContentError
         The file cannot be read, lacks something, or contradicts `quantity`; the message says what, and in which
         dataset, counted from 1.
-    MissingPackageError
-        The package pyuff is not installed.
 
     Warns
     -----
@@ -129,50 +142,27 @@ def read_uff(
     >>> frfs = jointfrf.io.read_uff("lap_joint.uff")  # doctest: +SKIP
     >>> h = frfs.receptance().matrix(["102:+y", "202:+y"], ["102:+y", "202:+y"])  # doctest: +SKIP
     """
-    return read_uff_part(
-        path, quantity, force_quantity=force_quantity, nodes=nodes, limit_gb=limit_gb, stacklevel=4
-    )  # fmt: skip
+    reading = Reading.checked(quantity, force_quantity, nodes)
+    file = Path(path)
+    head_of(file, limit_gb)
+    found = _read(file, ReadLimit(file, limit_gb), reading)
+    reading.warn()
+    return found
 
 
-def read_uff_part(
-    path: str | PathLike[str],
-    quantity: str | None = None,
-    *,
-    force_quantity: bool = False,
-    nodes: Collection[int] | None = None,
-    limit_gb: float | None = None,
-    coherence_will_do: bool = False,
-    stacklevel: int = 3,
-) -> FrfSet:
-    """Read a Universal File as `read_uff` does, or one of several that make a set.
-
-    Parameters
-    ----------
-    path, quantity, force_quantity, nodes, limit_gb
-        As for `read_uff`.
-    coherence_will_do : bool
-        Accept a file with coherences and no FRF: all FRFs of the set are then NaN.
-    stacklevel : int
-        Of warnings.
-
-    Returns
-    -------
-    FrfSet
-    """
-    check_quantity(quantity)
-    if nodes is not None:
-        nodes = frozenset(as_nodes("nodes", nodes))
-    file = UniversalFile(Path(path), limit_gb)
-    content = _describe(file, quantity, forced=force_quantity, nodes=nodes)
-    only_coherence = coherence_will_do and not content.frfs and not content.unusable and content.coherences
+def _read(path: Path, limit: ReadLimit, reading: Reading) -> FrfSet:
+    """Read the FRFs of a file; where it is one of several, coherences alone are enough, and FRFs are then NaN."""
+    quantity, nodes = reading.quantity, reading.nodes
+    file = UniversalFile(path)
+    content = _describe(file, quantity, forced=reading.forced, nodes=nodes)
+    only_coherence = reading.is_part and not content.frfs and not content.unusable and content.coherences
     if not content.frfs and not only_coherence:
         raise _no_frf(file, content, nodes)
     for reason, numbers in content.unusable.items():
         file.note(f"FRF left out: {reason}", *numbers)
     frfs = _unique(file, content.frfs)
-    pairs = [frf.channels for frf in frfs] or [channels for _, channels in content.coherences]
+    pairs = [frf.channels for frf in frfs] or [channels for *_, channels in content.coherences]
     matrix = _Matrix(pairs)
-    limit = ReadLimit(file.path, limit_gb)
     freq_hz, h, common = _values(file, frfs, matrix, limit)
     freq_hz, coherence = _coherence(file, content, matrix, freq_hz, limit)
     if h is None:
@@ -180,8 +170,8 @@ def read_uff_part(
         h = np.full((freq_hz.size, *matrix.shape), np.nan + 0j)
     freq_hz, h, coherence = _without_bad_zero_line(file, frfs, matrix, freq_hz, h, coherence)
     coordinates = node_coordinates(file, {channel.node for pair in pairs for channel in pair})
-    file.warn(stacklevel=stacklevel)
-    stated = state(frf.stated for frf in frfs)
+    reading.notes.extend(file.notes())
+    stated = _some(frf.stated for frf in frfs)
     return FrfSet(
         freq_hz, matrix.responses, matrix.excitations, h, common, coordinates, str(path), coherence, None, stated
     )
@@ -207,20 +197,19 @@ def _describe(file: UniversalFile, quantity: str | None, *, forced: bool, nodes:
     """Find the FRFs that can be used and are wanted, and what their headers say."""
     content = _Content()
     for number in file.datasets(58):
-        header = file.read(number, header_only=True)
-        kind = header["func_type"]
-        content.functions[kind] += 1
-        is_wanted = nodes is None or {header["rsp_node"], header["ref_node"]} <= set(nodes)
-        if kind not in (_FRF, _COHERENCE) or not is_wanted:
+        with file.damage_named(number):
+            header = read_header(file.content(number, HEAD))
+        content.functions[header.kind] += 1
+        is_wanted = nodes is None or {header.response[1], header.reference[1]} <= set(nodes)
+        if header.kind not in (_FRF, _COHERENCE) or not is_wanted:
             continue
         try:
-            if kind == _FRF:
+            if header.kind == _FRF:
                 content.frfs.append(_describe_frf(file, number, header, quantity, forced=forced))
             else:
-                channels = _channel(header, "rsp", "response"), _channel(header, "ref", "reference")
-                content.coherences.append((number, channels))
+                content.coherences.append((number, header, _channels(header)))
         except _UnusableFrfError as error:
-            if kind == _FRF:
+            if header.kind == _FRF:
                 content.unusable.setdefault(str(error), []).append(number)
             else:
                 file.note(f"coherence left out: {error}", number)
@@ -234,19 +223,19 @@ def _no_frf(file: UniversalFile, content: _Content, nodes: Collection[int] | Non
         return file.error(f"holds no FRF that can be used: {why}")
     if content.functions[_FRF] and nodes is not None:
         return file.error(f"holds no FRF between {name_some('node', sorted(nodes))}")
-    return file.error(f"holds {contents_without_frf(file.types, content.functions)}")
+    return file.error(f"holds {file.held_without_frf(content.functions)}")
 
 
 def _describe_frf(
-    file: UniversalFile, number: int, header: dict[str, Any], quantity: str | None, *, forced: bool
+    file: UniversalFile, number: int, header: FunctionHeader, quantity: str | None, *, forced: bool
 ) -> _Frf:
     """Channels, quantity and factor to SI of one FRF."""
     _check_form(file, number, header)
-    numerator, denominator = Axis.of(header, "ordinate"), Axis.of(header, "orddenom")
+    numerator, denominator = header.numerator, header.denominator
     other = kind_of_frf(numerator, denominator)
     if other is not None:
         raise _UnusableFrfError(f"it is {other}, not motion per force")
-    channels = _channel(header, "rsp", "response"), _channel(header, "ref", "reference")
+    channels = _channels(header)
     system = file.unit_system(number)
     said = ordinate_quantity(numerator, denominator, channels)
     if quantity and said and said != quantity and not forced:
@@ -275,22 +264,26 @@ def _describe_frf(
     if not 0.0 < factor < np.inf:
         raise file.error(f"has a unit in dataset {number} that cannot be converted to SI")
     stated = f"{numerator.words} per {denominator.words}"
-    return _Frf(number, channels, (header["rsp_ent_name"], header["ref_ent_name"]), found, factor, stated)
+    return _Frf(number, header, channels, found, factor, stated)
 
 
-def _check_form(file: UniversalFile, number: int, header: dict[str, Any]) -> None:
+def _check_form(file: UniversalFile, number: int, header: FunctionHeader) -> None:
     """Refuse forms of dataset 58 that would be read wrongly."""
-    if header["ord_data_type"] in (2, 4):
+    if header.number_type in (2, 4):
         raise _UnusableFrfError("its values are real numbers, without phase")
-    if header["ord_data_type"] not in (5, 6):
-        raise file.error(f"is damaged: ordinate data type {header['ord_data_type']} in dataset {number}")
-    form = header.get("byte_ordering", 1), header.get("fp_format", 2), header.get("n_ascii_lines", 11)
-    if header["binary"] and (form[0] not in (1, 2) or form[1:] != (2, 11)):
+    if header.number_type not in (5, 6):
+        raise file.error(f"is damaged: ordinate data type {header.number_type} in dataset {number}")
+    if not header.is_supported:
         raise file.error(f"holds binary numbers in dataset {number} that are not IEEE 754 after 11 lines of text")
 
 
-def _channel(header: dict[str, Any], prefix: str, role: str) -> Channel:
-    node, direction = header[f"{prefix}_node"], header[f"{prefix}_dir"]
+def _channels(header: FunctionHeader) -> tuple[Channel, Channel]:
+    """Return response and reference."""
+    return _channel(header.response, "response"), _channel(header.reference, "reference")
+
+
+def _channel(place: tuple[str, int, int], role: str) -> Channel:
+    _, node, direction = place
     if node < 1:
         raise _UnusableFrfError(f"it names no {role} node (node {node})")
     if direction not in DIRECTION_CODES:
@@ -303,8 +296,8 @@ def _unique(file: UniversalFile, frfs: list[_Frf]) -> list[_Frf]:
     first: dict[tuple[Channel, Channel], _Frf] = {}
     for frf in frfs:
         kept = first.setdefault(frf.channels, frf)
-        if kept.entities != frf.entities:
-            names = ["'{}' / '{}'".format(*each.entities) for each in (kept, frf)]
+        names = [f"'{each.header.response[0]}' / '{each.header.reference[0]}'" for each in (kept, frf)]
+        if names[0] != names[1]:
             raise file.error(
                 f"holds FRF {frf} for the entities {names[0]} (dataset {kept.dataset}) and {names[1]} (dataset "
                 f"{frf.dataset}): node numbers must be unique in the file"
@@ -322,7 +315,7 @@ def _values(
     lines: NDArray[np.float64] | None = None
     h: NDArray[np.complex128] | None = None
     for frf in frfs:
-        freq_hz, value = _read_function(file, frf.dataset, str(frf), np.complex128)
+        freq_hz, value = _read_function(file, frf.dataset, frf.header, str(frf), np.complex128)
         if lines is None or h is None:
             lines = freq_hz
             limit.take(matrix.bytes(freq_hz.size))
@@ -342,11 +335,11 @@ def _coherence(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
     """Frequency lines, and the coherence of the FRFs; None where the file holds none of it."""
     found: NDArray[np.float64] | None = None
-    for number, channels in content.coherences:
+    for number, header, channels in content.coherences:
         place = next((matrix.place_of[pair] for pair in same_frf(*channels) if pair in matrix.place_of), None)
         if place is None:
             continue
-        freq_hz, value = _read_function(file, number, f"coherence {channels[0]} / {channels[1]}", np.float64)
+        freq_hz, value = _read_function(file, number, header, f"coherence {channels[0]} / {channels[1]}", np.float64)
         lines = freq_hz if lines is None else lines
         if not same_lines(lines, freq_hz):
             file.note("coherence left out: its frequency lines are not those of the FRFs", number)
@@ -369,28 +362,27 @@ def _coherence(
 
 
 def _read_function(
-    file: UniversalFile, dataset: int, name: str, dtype: type[_Number]
+    file: UniversalFile, dataset: int, header: FunctionHeader, name: str, dtype: type[_Number]
 ) -> tuple[NDArray[np.float64], NDArray[_Number]]:
     """Frequencies in Hz and values in the file's units of one function."""
-    content = file.read(dataset)
-    if "data" not in content:
-        raise file.error(f"is damaged: ordinate data type {content.get('ord_data_type')} in dataset {dataset} ({name})")
-    n, value = content["num_pts"], np.asarray(content["data"])
+    if header.number_type not in (2, 4, 5, 6):
+        raise file.error(f"is damaged: ordinate data type {header.number_type} in dataset {dataset} ({name})")
+    with file.damage_named(dataset):
+        lines, value = function_values(file.content(dataset), header)
+    n = header.n_values
     if np.iscomplexobj(value) and dtype is np.float64:
         value = value.real
     if n < 1 or not n <= value.size <= n + 1:
         raise file.error(f"is damaged: dataset {dataset} ({name}) holds {value.size} of {n} values")
-    if content["binary"] and _is_scrambled(value):
+    if header.is_binary and _is_scrambled(value):
         raise file.error(f"is damaged: in dataset {dataset} ({name}) the byte order is not the one that is stated")
-    kind = content["abscissa_spec_data_type"]
+    kind, label = header.abscissa.data_type, header.abscissa.label.lower()
     if kind not in (0, 1, 18):
-        raise file.error(f"gives dataset {dataset} ({name}) over {DATA_TYPES.get(kind, kind)}, not frequency")
-    label = content["abscissa_axis_units_lab"].strip().lower()
-    label = "" if label == "none" else label
+        raise file.error(f"gives dataset {dataset} ({name}) over {header.abscissa.name}, not frequency")
     if label not in _HZ or (not label and kind != 18):
         file.note(f"the unit '{label}' of the frequencies is not known: Hz is assumed", dataset)
-    freq_hz = np.asarray(content["x"], dtype=np.float64)[:n] * _HZ.get(label, 1.0)
-    if freq_hz.size != n or not np.isfinite(freq_hz).all() or freq_hz[0] < 0.0 or (np.diff(freq_hz) <= 0.0).any():
+    freq_hz = lines[:n] * _HZ.get(label, 1.0)
+    if not np.isfinite(freq_hz).all() or freq_hz[0] < 0.0 or (np.diff(freq_hz) <= 0.0).any():
         raise file.error(f"is damaged: the frequencies of dataset {dataset} ({name}) do not increase from 0 Hz or more")
     return freq_hz, np.array(value[:n], dtype=dtype)
 
@@ -429,3 +421,135 @@ def _without_bad_zero_line(
 
 def _lines(freq_hz: NDArray[np.float64]) -> str:
     return f"{freq_hz.size} lines {freq_hz[0]:.6g} to {freq_hz[-1]:.6g} Hz"
+
+
+def _some(texts: Iterable[str]) -> str:
+    """Join the first few different texts."""
+    different = list(dict.fromkeys(texts))
+    more = f"; and {len(different) - _SHOWN} more" if len(different) > _SHOWN else ""
+    return "; ".join(different[:_SHOWN]) + more
+
+
+def write_uff(
+    path: str | PathLike[str], frfs: FrfSet, *, title: str = "", binary: bool = True, single: bool = False
+) -> None:
+    """Write measured FRFs as a Universal File.
+
+    Parameters
+    ----------
+    path : path-like
+        In a folder that exists; an older file is replaced as a whole or not at all.
+    frfs : FrfSet
+        The FRFs, in the quantity that they have; those that are not there (NaN on all lines) are left out. Coordinates
+        and coherence are written where they are known. The format has no place for numbers of averages.
+    title : str
+        One line of ASCII, at most 80 characters, for the header and for every FRF.
+    binary : bool
+        Dataset 58b: the values as IEEE numbers, little-endian. Unevenly spaced lines are written as text all the
+        same, because programs differ in how they read them from 58b.
+    single : bool
+        Values in single precision, as most test systems write them, not in double.
+
+    Raises
+    ------
+    ValueError
+        The title cannot be written, an FRF is NaN or infinite on some lines, or there is no FRF.
+    OSError
+        The file cannot be written; nothing is left behind.
+
+    See Also
+    --------
+    jointfrf.io.read_uff : The way back.
+
+    Notes
+    -----
+    Units are SI and stated twice, by dataset 164 and by the labels of each FRF. The definition of the datasets [1]_ has
+    13 columns for a frequency: frequencies of 1 Hz and more come back to 1e-9 of themselves. Values come back to 12
+    digits from text (6 where `single`), exactly from binary. No date is written: the same FRFs give the same bytes.
+
+    References
+    ----------
+    .. [1] Structural Dynamics Research Laboratory, University of Cincinnati, Universal File Formats, datasets 58, 151,
+       164 and 2411. https://www.ceas3.uc.edu/sdrluff/
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import numpy as np
+    >>> from jointfrf.io import Channel, FrfSet, read_uff, write_uff
+    >>> point = (Channel(1, "+y"),)
+    >>> frfs = FrfSet(np.array([10.0, 20.0]), point, point, np.array([[[1.0 + 2.0j]], [[3.0]]]), "mobility")
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = pathlib.Path(folder) / "point.uff"
+    ...     write_uff(path, frfs)
+    ...     again = read_uff(path)
+    >>> again.quantity, again.h[:, 0, 0].tolist()
+    ('mobility', [(1+2j), (3+0j)])
+    """
+    check_type("frfs", frfs, FrfSet)
+    check_type("title", title, str)
+    if not (title.isascii() and title.isprintable() and len(title) <= _WIDTH):
+        raise ValueError(f"title {title!r} is not one line of at most {_WIDTH} ASCII characters")
+    frfs.check_whole()
+    parts = [_dataset(*records) for records in (_title_records(title), _unit_records(), _node_records(frfs)) if records]
+    for i, j in np.argwhere(frfs.measured):
+        channels = frfs.responses[i], frfs.excitations[j]
+        places = " ".join(place_fields(each.node, each.sign * _CODES["+" + each.axis]) for each in channels)
+        functions: list[tuple[str, int, list[str], NDArray[Any]]] = [("FRF", _FRF, _ordinate(frfs, *channels), frfs.h)]
+        if frfs.coherence is not None and np.isfinite(frfs.coherence[:, i, j]).all():
+            functions.append(("coherence", _COHERENCE, _COHERENCE_AXES, frfs.coherence))
+        for name, kind, axes, values in functions:
+            texts = f"{name} {channels[0]} / {channels[1]}", title
+            parts.append(
+                function_dataset(texts, kind, places, axes, frfs.freq_hz, values[:, i, j], binary=binary, single=single)
+            )
+    write_file(Path(path), b"".join(parts))
+
+
+def _dataset(*records: str) -> bytes:
+    return "\n".join([DELIMITER, *records, DELIMITER, ""]).encode("ascii")
+
+
+def _title_records(title: str) -> list[str]:
+    none = f"{'NONE':<10}{'NONE':<10}"
+    return ["   151", "NONE", title or "NONE", "jointfrf", f"{none}{0:10d}{0:10d}{0:10d}", none, "jointfrf", none]
+
+
+def _unit_records() -> list[str]:
+    factors = "".join(_double(1.0, 17) for _ in range(3))
+    return ["   164", f"{1:10d}{'SI: m, N':<20}{2:10d}", factors, _double(273.15, 17)]
+
+
+def _node_records(frfs: FrfSet) -> list[str]:
+    records = []
+    for node, place in sorted(frfs.coordinates.items()):
+        records += [f"{node:10d}{0:10d}{0:10d}{1:10d}", "".join(_double(x, 16) for x in place)]
+    return ["  2411", *records] if records else []
+
+
+def _ordinate(frfs: FrfSet, response: Channel, excitation: Channel) -> list[str]:
+    """Write records 9 and 10 of an FRF: displacement, velocity or acceleration per force."""
+    power = POWER_OF_I_OMEGA[frfs.quantity]
+    motion = ("rad" if response.is_rotation else "m") + ("", "/s", "/s^2")[power]
+    force = "N m" if excitation.is_rotation else "N"
+    return [axis_record((8, 11, 12)[power], "Response", motion), axis_record(13, "Excitation", force)]
+
+
+def _double(value: float, digits: int) -> str:
+    """Write a number in 25 columns with the exponent letter of Fortran's double precision."""
+    return f"{value:25.{digits - 1}E}".replace("E", "D")
+
+
+def _begins_dataset(head: bytes) -> bool:
+    return next((line for line in head.splitlines() if line.strip()), b"").strip() == b"-1"
+
+
+UNIVERSAL_FILE = FileFormat(
+    name="Universal File",
+    suffixes=(".uff", ".unv"),
+    content="datasets 58 and 58b (FRFs, coherence), 15, 2411 (nodes), 164 (units), 18, 2420 (axes)",
+    has_mark=_begins_dataset,
+    looks_alike=lambda path, _: path.suffix.lower() in (".uff", ".unv"),
+    read=_read,
+    write=write_uff,
+)

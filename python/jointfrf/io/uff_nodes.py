@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from jointfrf.errors import FileContentError
 from jointfrf.io.uff_file import UniversalFile, name_some
 
 __all__ = ["node_coordinates"]
 
-_FIELDS = ("node_nums", "def_cs", "disp_cs", "x", "y", "z")
 _TOLERANCE = 1e-5
 
 
@@ -50,8 +47,8 @@ def node_coordinates(file: UniversalFile, nodes: Collection[int]) -> dict[int, N
     axes = _coordinate_systems(file)
     for number in file.datasets(15, 2411):
         try:
-            rows = _node_rows(file.read(number))
-        except (FileContentError, ValueError):
+            rows = _node_rows(file.records(number))
+        except ValueError:
             file.note("the coordinates of nodes cannot be read and are left out", number)
             continue
         rows = rows[np.isin(rows[:, 0], list(nodes))]
@@ -73,12 +70,12 @@ def node_coordinates(file: UniversalFile, nodes: Collection[int]) -> dict[int, N
     return coordinates
 
 
-def _node_rows(content: Mapping[str, Any]) -> NDArray[np.float64]:
+def _node_rows(records: list[str]) -> NDArray[np.float64]:
     """Node, definition system, displacement system and coordinates of every node, shape (n, 6)."""
-    rows = np.array([content[name] for name in _FIELDS], dtype=np.float64).T
-    if rows.ndim != 2 or not np.isfinite(rows).all():
+    rows = np.array(" ".join(records).split(), dtype=np.float64).reshape(-1, 7)
+    if not np.isfinite(rows).all():
         raise ValueError("not a table of finite numbers")
-    return rows
+    return np.delete(rows, 3, axis=1)  # the colour
 
 
 def _coordinate_systems(file: UniversalFile) -> dict[int, _Axes]:
@@ -86,32 +83,34 @@ def _coordinate_systems(file: UniversalFile) -> dict[int, _Axes]:
     systems: dict[int, _Axes] = {}
     for number in file.datasets(18, 2420):
         try:
-            content = file.read(number)
-            systems |= _axes_by_points(content) if content["type"] == 18 else _axes_by_matrix(content)
-        except (FileContentError, ValueError, LookupError):
+            records = file.records(number)
+            systems |= _axes_by_points(records) if file.types[number - 1] == 18 else _axes_by_matrix(records)
+        except (ValueError, LookupError, OverflowError):
             file.note("the coordinate systems cannot be read and are taken as global", number)
     return systems
 
 
-def _axes_by_points(content: Mapping[str, Any]) -> dict[int, _Axes]:
+def _axes_by_points(records: list[str]) -> dict[int, _Axes]:
     """Dataset 18: origin, a point on the x axis and one in the xz plane, in a reference system."""
     systems = {}
-    for i, label in enumerate(content["cs_num"]):
-        origin = content["ref_o"][i]
-        x, in_xz = content["x_point"][i] - origin, content["xz_point"][i] - origin
-        y = np.cross(in_xz, x)
-        is_global = content["cs_type"][i] == 0 and content["ref_cs_num"][i] == 0
+    for first in range(0, len(records), 4):
+        label, kind, reference, *_ = (int(float(word)) for word in records[first].split())
+        line = f"{records[first + 2]:<78}{records[first + 3]}"
+        origin, on_x, in_xz = np.array([float(line[13 * i : 13 * i + 13]) for i in range(9)]).reshape(3, 3)
+        x, y = on_x - origin, np.cross(in_xz - origin, on_x - origin)
         is_aligned = x[0] > 0.0 and y[1] > 0.0 and _is_zero(x[1:], x) and _is_zero(y[::2], y)
-        systems[int(label)] = _Axes(not (is_global and is_aligned), not _is_zero(origin, x))
+        systems[label] = _Axes(not (kind == 0 and reference == 0 and is_aligned), not _is_zero(origin, x))
     return systems
 
 
-def _axes_by_matrix(content: Mapping[str, Any]) -> dict[int, _Axes]:
-    """Dataset 2420: three rows of rotation and one of translation."""
+def _axes_by_matrix(records: list[str]) -> dict[int, _Axes]:
+    """Dataset 2420: after part and name, of each system three rows of rotation and one of translation."""
     systems = {}
-    for label, kind, matrix in zip(content["CS_sys_labels"], content["CS_types"], content["CS_matrices"], strict=True):
+    for first in range(2, len(records), 6):
+        label, kind, *_ = (int(word) for word in records[first].split())
+        matrix = np.array(" ".join(records[first + 2 : first + 6]).split(), dtype=np.float64).reshape(4, 3)
         turned = kind != 0 or not np.allclose(matrix[:3], np.eye(3), atol=_TOLERANCE)
-        systems[int(label)] = _Axes(turned, not _is_zero(matrix[3], matrix[0]))
+        systems[label] = _Axes(turned, not _is_zero(matrix[3], matrix[0]))
     return systems
 
 

@@ -3,67 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Callable
 
 from jointfrf.frf.frf_set import POWER_OF_I_OMEGA, Channel
-from jointfrf.io.units import Exponents, Unit, UnitSystem, parse_unit
+from jointfrf.io.uff_function import Axis
+from jointfrf.io.units import Exponents, Unit, UnitSystem
 
-__all__ = ["DATA_TYPES", "Axis", "kind_of_frf", "ordinate_factor", "ordinate_quantity"]
+__all__ = ["kind_of_frf", "ordinate_factor", "ordinate_quantity"]
 
-DATA_TYPES = {
-    0: "unknown",
-    1: "general",
-    2: "stress",
-    3: "strain",
-    5: "temperature",
-    6: "heat flux",
-    8: "displacement",
-    9: "reaction force",
-    11: "velocity",
-    12: "acceleration",
-    13: "excitation force",
-    15: "pressure",
-    16: "mass",
-    17: "time",
-    18: "frequency",
-    19: "rpm",
-    20: "order",
-}
 _UNSAID = (0, 1)
 _FORCES = (9, 13)
 _QUANTITY = {8: "receptance", 11: "mobility", 12: "accelerance"}
 _TOLERANCE = 1e-3
-
-
-@dataclass(frozen=True)
-class Axis:
-    """Data type and unit label of the ordinate's numerator or denominator (records 9 and 10)."""
-
-    data_type: int
-    label: str
-    unit: Unit | None
-
-    @classmethod
-    def of(cls, header: Mapping[str, Any], prefix: str) -> Axis:
-        """Take the axis from a header as pyuff gives it, prefix ``ordinate`` or ``orddenom``."""
-        label = str(header.get(f"{prefix}_axis_units_lab", "")).strip()
-        label = "" if label.upper() == "NONE" else label
-        return cls(int(header.get(f"{prefix}_spec_data_type", 0)), label, parse_unit(label))
-
-    @property
-    def name(self) -> str:
-        """The data type in words."""
-        return DATA_TYPES.get(self.data_type, f"data type {self.data_type}")
-
-    @property
-    def words(self) -> str:
-        """The data type and the unit, as they are shown."""
-        return f"{self.name} [{self.label or 'no unit'}]"
-
-    def __str__(self) -> str:
-        return f"{self.data_type} ({self.name}, unit '{self.label or 'NONE'}')"
 
 
 def kind_of_frf(numerator: Axis, denominator: Axis) -> str | None:

@@ -17,37 +17,28 @@ from jointfrf.kernel.arguments import as_array
 __all__ = ["Lines", "lines_of"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Lines(ABC):
-    """An array whose first axis is that of the lines, as a task is told of it.
+    """An array whose first axis is that of the lines, as a task is sent it.
 
     Attributes
     ----------
     shape : tuple of int
+    step : int
+        Lines that must be written together.
+    place : Path or None
+        The file or folder that holds it; None in memory.
     """
 
     shape: tuple[int, ...]
+    step: int = 1
+    place: Path | None = None
     #: Whether tasks write their results themselves; otherwise they are sent back.
     is_written_by_tasks: ClassVar[bool] = False
 
-    @property
-    def step(self) -> int:
-        """Lines that must be written together."""
-        return 1
-
-    @property
-    def line_bytes(self) -> int:
-        """Bytes of a line as complex numbers."""
-        return 16 * math.prod(self.shape[1:])
-
-    @property
-    def place(self) -> Path | None:
-        """The file or folder that holds it; None in memory."""
-        return None
-
-    @abstractmethod
     def of(self, lines: slice) -> Lines:
-        """Return what a task that needs these lines is told."""
+        """Return what a task that needs these lines is sent."""
+        return self
 
     @abstractmethod
     def read(self, lines: slice) -> NDArray[Any]:
@@ -58,7 +49,7 @@ class Lines(ABC):
         raise NotImplementedError
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class MemoryLines(Lines):
     """An array in memory: the lines of a task are sent to it, and its results back."""
 
@@ -67,7 +58,7 @@ class MemoryLines(Lines):
 
     def of(self, lines: slice) -> Lines:
         """Return the lines themselves."""
-        return MemoryLines(self.shape, np.asarray(self.array[lines]), lines.start)
+        return MemoryLines(shape=self.shape, array=np.asarray(self.array[lines]), first=lines.start)
 
     def read(self, lines: slice) -> NDArray[Any]:
         """Return lines that the task was sent."""
@@ -79,23 +70,14 @@ class MemoryLines(Lines):
         self.array[lines] = values
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class MappedLines(Lines):
     """An array in a file, `numpy.memmap`: each task maps the lines it needs."""
 
-    path: Path
+    place: Path
     dtype: str
     offset: int
     is_written_by_tasks: ClassVar[bool] = True
-
-    @property
-    def place(self) -> Path:
-        """The file."""
-        return self.path
-
-    def of(self, lines: slice) -> Lines:
-        """Return the place of the file."""
-        return self
 
     def _start(self, lines: slice) -> int:
         """Return where lines begin in the file, bytes."""
@@ -104,37 +86,22 @@ class MappedLines(Lines):
     def read(self, lines: slice) -> NDArray[Any]:
         """Map lines."""
         shape = (lines.stop - lines.start, *self.shape[1:])
-        return np.memmap(self.path, self.dtype, "r", self._start(lines), shape)
+        return np.memmap(self.place, self.dtype, "r", self._start(lines), shape)
 
     def write(self, lines: slice, values: NDArray[Any]) -> None:
         """Write lines into the file and close it: then other machines see them, unlike what is written into a map."""
-        with self.path.open("r+b") as file:
+        with self.place.open("r+b") as file:
             file.seek(self._start(lines))
             np.ascontiguousarray(values, self.dtype).tofile(file)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class ZarrLines(Lines):
     """A Zarr array in a folder: each task opens it."""
 
     root: Path
     path: str
-    together: int
     is_written_by_tasks: ClassVar[bool] = True
-
-    @property
-    def step(self) -> int:
-        """Lines of a chunk, or of a shard: two tasks must not write the same file."""
-        return self.together
-
-    @property
-    def place(self) -> Path:
-        """The folder of the array."""
-        return self.root / self.path
-
-    def of(self, lines: slice) -> Lines:
-        """Return the place of the folder."""
-        return self
 
     def _open(self, mode: str) -> Any:
         return import_extra("zarr").open_array(str(self.root), path=self.path, mode=mode)
@@ -148,25 +115,16 @@ class ZarrLines(Lines):
         self._open("r+")[lines] = values
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Hdf5Lines(Lines):
     """A dataset of an HDF5 file that is only read: each task opens the file."""
 
-    path: Path
+    place: Path
     dataset: str
-
-    @property
-    def place(self) -> Path:
-        """The file."""
-        return self.path
-
-    def of(self, lines: slice) -> Lines:
-        """Return the place of the file."""
-        return self
 
     def read(self, lines: slice) -> NDArray[Any]:
         """Read lines."""
-        with import_extra("h5py").File(self.path, "r") as file:
+        with import_extra("h5py").File(self.place, "r") as file:
             return np.asarray(file[self.dataset][lines])
 
 
@@ -206,20 +164,27 @@ def _numpy(name: str, array: ArrayLike) -> Lines:
         while isinstance(root.base, np.ndarray):
             root = root.base
         offset = int(root.offset) + array.ctypes.data - root.ctypes.data
-        return MappedLines(array.shape, Path(array.filename).resolve(), array.dtype.str, offset)
+        return MappedLines(
+            shape=array.shape, place=Path(array.filename).resolve(), dtype=array.dtype.str, offset=offset
+        )
     values = as_array(name, array)
-    return MemoryLines(values.shape, values)
+    return MemoryLines(shape=values.shape, array=values)
 
 
 def _zarr(array: Any) -> Lines:
     root = getattr(array.store, "root", None)
     if root is None or not Path(root).is_dir():
-        return MemoryLines(array.shape, array)  # in memory, or on the network: this process reads and writes it
-    together = int((getattr(array, "shards", None) or array.chunks)[0])
-    return ZarrLines(tuple(array.shape), Path(root).resolve(), str(array.path), together)
+        return MemoryLines(
+            shape=array.shape, array=array
+        )  # in memory, or on the network: this process reads and writes it
+    # Two tasks must not write the same file, that of a chunk or of a shard.
+    step = int((getattr(array, "shards", None) or array.chunks)[0])
+    root, path = Path(root).resolve(), str(array.path)
+    return ZarrLines(shape=tuple(array.shape), step=step, place=root / path, root=root, path=path)
 
 
 def _hdf5(array: Any, is_result: bool) -> Lines:
     if is_result or array.file.mode != "r":
-        return MemoryLines(array.shape, array)  # HDF5 files have one writer and, with it, no readers
-    return Hdf5Lines(tuple(array.shape), Path(array.file.filename).resolve(), str(array.name))
+        return MemoryLines(shape=array.shape, array=array)  # HDF5 files have one writer and, with it, no readers
+    place = Path(array.file.filename).resolve()
+    return Hdf5Lines(shape=tuple(array.shape), place=place, dataset=str(array.name))

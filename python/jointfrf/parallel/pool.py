@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from queue import SimpleQueue
 from typing import Any, Generic, TypeVar
 
-from jointfrf.parallel.cores import available_cores
-from jointfrf.parallel.processes import SeparateProcesses, as_workers, can_start_processes
+from jointfrf.kernel.arguments import as_integer
+from jointfrf.parallel.processes import available_cores, can_start_processes, started_processes
 
 __all__ = ["AnyExecutor", "BrokenPoolError", "Pool", "check_progress", "opened_pool"]
 
@@ -22,19 +24,17 @@ AnyExecutor = Executor | Callable[[], Executor]
 _WAITING = 2
 #: Executors made in the place of broken ones, one after the other, without a task done in between.
 _MADE_AGAIN = 3
-#: What Dask raises where workers die again and again, or its cluster ends, beside cancelling tasks.
-_DASK_ERRORS = {"KilledWorker", "ClosedClientError"}
 
 
 class BrokenPoolError(RuntimeError):
     """An executor has lost its workers."""
 
 
-def _has_lost_workers(error: BaseException) -> bool:
-    """Whether an error says that there was nobody to do a task, rather than what the task itself raised."""
-    kind = type(error)
-    is_of_dask = kind.__module__.startswith("distributed.") and kind.__name__ in _DASK_ERRORS
-    return is_of_dask or isinstance(error, (BrokenExecutor, CancelledError))
+def _lost() -> tuple[type[BaseException], ...]:
+    """Return what executors raise where there is no worker left to do a task, rather than what the task raised."""
+    dask = sys.modules.get("distributed")  # whose errors are not those of concurrent.futures
+    own = () if dask is None else (dask.scheduler.KilledWorker, dask.client.ClosedClientError)
+    return (BrokenExecutor, CancelledError, *own)
 
 
 class _InThisThread(Executor):
@@ -94,10 +94,8 @@ class Pool(Generic[_T]):
         def submit(task: _T) -> None:
             try:
                 future = self.executor.submit(function, task)
-            except Exception as error:
-                if not _has_lost_workers(error):
-                    raise
-                self._replace(self.executor, error)
+            except _lost() as error:
+                self._replace(error)
                 future = self.executor.submit(function, task)
             at_work[future] = task
             future.add_done_callback(done.put)
@@ -117,15 +115,13 @@ class Pool(Generic[_T]):
                 task = at_work.pop(future)
                 try:
                     result = future.result()
-                except Exception as error:
-                    if not _has_lost_workers(error):
-                        raise
-                    # The others break with it, or are given up: they are done again on the new one.
+                except _lost() as error:
+                    # The others are lost with it, or are given up: they are done again on the new one.
                     again += [task, *at_work.values()]
                     for other in at_work:
                         other.cancel()
                     at_work.clear()
-                    self._replace(self.executor, error)
+                    self._replace(error)
                     continue
                 self._lost = 0
                 yield task, result
@@ -133,14 +129,14 @@ class Pool(Generic[_T]):
             for future in at_work:
                 future.cancel()
 
-    def _replace(self, broken: Executor, error: BaseException | None = None) -> None:
+    def _replace(self, error: BaseException) -> None:
         self._lost += 1
         if self.make is None or self._lost > _MADE_AGAIN:
             raise BrokenPoolError(
                 "the workers of the executor have ended unexpectedly; what they had finished is kept: the same call "
                 "continues with it"
             ) from error
-        broken.shutdown(wait=False)
+        self.executor.shutdown(wait=False)
         self.executor = self.make()
 
 
@@ -162,13 +158,20 @@ def opened_pool(executor: AnyExecutor | None = None, jobs: int | None = None) ->
     TypeError, ValueError
         An executor that is none, a number of workers that is not a whole number from 1.
     """
-    jobs = None if jobs is None else as_workers("jobs", jobs)
+    if jobs is not None and as_integer("jobs", jobs) < 1:
+        raise ValueError(f"jobs must be at least 1, not {jobs}")
     if isinstance(executor, Executor):
         yield Pool(executor, jobs or _workers_of(executor))
         return
     if executor is not None and not callable(executor):
         raise TypeError(f"executor must be one of concurrent.futures, or make one, not {type(executor).__name__}")
-    make = executor if executor is not None else _own(jobs or (available_cores() if can_start_processes() else 1))
+    make: Callable[[], Executor]
+    if executor is not None:
+        make = executor
+    elif (count := jobs or (available_cores() if can_start_processes() else 1)) > 1:
+        make = partial(started_processes, count)
+    else:
+        make = _InThisThread
     own = make()
     if not callable(getattr(own, "submit", None)):
         raise TypeError(f"executor must make one of concurrent.futures, not {type(own).__name__}")
@@ -180,14 +183,9 @@ def opened_pool(executor: AnyExecutor | None = None, jobs: int | None = None) ->
 
 
 def check_progress(progress: object) -> None:
-    """Raise unless what is told of the progress can be called."""
+    """Raise a TypeError unless progress is None or callable."""
     if progress is not None and not callable(progress):
         raise TypeError(f"progress must be a function, not {type(progress).__name__}")
-
-
-def _own(jobs: int) -> Callable[[], Executor]:
-    """Return what makes processes; one job is done in this thread."""
-    return _InThisThread if jobs <= 1 else lambda: SeparateProcesses(jobs)
 
 
 def _workers_of(executor: Executor) -> int:

@@ -1,48 +1,41 @@
-"""Processes of which each is on its own: one that dies costs its task only, which another one does again."""
+"""What tasks run on: processors, processes of this machine, and one thread each for the libraries that they call."""
 
 from __future__ import annotations
 
 import os
 import signal
 import sys
-from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import Executor, Future, ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
+from collections.abc import Iterator, Mapping
+from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from functools import partial
 from multiprocessing import connection, context, parent_process, spawn
 from pathlib import Path
-from queue import Empty, SimpleQueue
 from threading import Lock, RLock, Thread
-from typing import Any, ParamSpec, TypeVar
-
-from jointfrf.kernel.arguments import as_integer
+from typing import Any
 
 __all__ = [
-    "SeparateProcesses",
-    "as_workers",
+    "available_cores",
     "can_start_processes",
     "check_processes",
+    "one_thread",
     "safe_environment",
     "started_processes",
 ]
 
-_P = ParamSpec("_P")
-_T = TypeVar("_T")
-#: A task that ends so many processes ends every one.
-_ATTEMPTS = 3
 #: With it Python does not look for modules in the working directory.
 _SAFE = "PYTHONSAFEPATH"
-#: One at a time changes the environment.
+#: Held by the thread that changes the environment.
 _CHANGING = RLock()
+#: Held by the thread that changes the numbers of threads; tasks of this process at work, and the numbers before them.
+_lock = Lock()
+_at_work = 0
+_before: list[tuple[Any, int]] = []
 
 
-def as_workers(name: str, value: object) -> int:
-    """Return a number of workers."""
-    count = as_integer(name, value)
-    if count < 1:
-        raise ValueError(f"{name} must be at least 1, not {count}")
-    return count
+def available_cores() -> int:
+    """Return the number of processors that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def can_start_processes() -> bool:
@@ -94,7 +87,7 @@ def safe_environment(more: Mapping[str, str] | None = None) -> Iterator[None]:
 
 
 class _SafeProcess(context.SpawnProcess):
-    """A process that is started with the environment above, and other variables."""
+    """A process that is started with the environment above, and other variables, whenever the pool needs it."""
 
     def __init__(self, more: Mapping[str, str], **options: Any) -> None:
         super().__init__(**options)
@@ -122,7 +115,6 @@ def started_processes(workers: int, more: Mapping[str, str] | None = None) -> Pr
         No other Python can be started from this program.
     """
     check_processes()
-
     own = context.SpawnContext()
     setattr(own, "Process", partial(_SafeProcess, dict(more or {})))  # noqa: B010
     with safe_environment(more):  # locks are kept by a process of their own
@@ -143,94 +135,55 @@ def _end_with(sentinel: int) -> None:
     os._exit(1)
 
 
-class SeparateProcesses(Executor):
-    """Processes as an executor.
-
-    Parameters
-    ----------
-    workers : int
-        How many.
-
-    Attributes
-    ----------
-    workers : int
-
-    Raises
-    ------
-    TypeError, ValueError
-        `workers` is no whole number from 1, or no other Python can be started.
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Limit BLAS and OpenMP to one thread inside a `with` block; then return to what was there.
 
     Notes
     -----
-    `concurrent.futures.ProcessPoolExecutor` ends all of its processes when one of them dies. Here another process is
-    started in its place and given its task; a task whose process dies three times raises `BrokenProcessPool`.
+    A BLAS has one number of threads for the whole process: the first of several tasks at the same time sets it, and the
+    last one sets it back. OpenMP has one for each thread that calls it.
     """
+    from threadpoolctl import ThreadpoolController
 
-    def __init__(self, workers: int) -> None:
-        self.workers = as_workers("workers", workers)
-        check_processes()
-        self._tasks: SimpleQueue[tuple[Future[Any], Callable[[ProcessPoolExecutor], Any]] | None] = SimpleQueue()
-        self._lock, self._is_open = Lock(), True
-        self._threads = [Thread(target=self._serve, daemon=True) for _ in range(self.workers)]
-        for thread in self._threads:
-            thread.start()
+    import jointfrf.kernel.call  # noqa: F401  # its libraries are loaded before they are looked for
 
-    def submit(self, fn: Callable[_P, _T], /, *args: _P.args, **kwargs: _P.kwargs) -> Future[_T]:
-        """Call a function in one of the processes."""
-        future: Future[_T] = Future()
-        with self._lock:
-            if not self._is_open:
-                raise RuntimeError("the processes have been shut down")
-            self._tasks.put((future, lambda pool: pool.submit(fn, *args, **kwargs).result()))
-        return future
-
-    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """End the processes when what has been submitted is done, or at once when the tasks at work are done."""
-        with self._lock:
-            if self._is_open:
-                self._is_open = False
-                if cancel_futures:
-                    self._cancel()
-                for _ in self._threads:
-                    self._tasks.put(None)
-        if wait:
-            for thread in self._threads:
-                thread.join()
-
-    def _cancel(self) -> None:
-        while True:
-            try:
-                task = self._tasks.get_nowait()
-            except Empty:
-                return
-            if task is not None:
-                task[0].cancel()
-
-    def _serve(self) -> None:
-        """Hand tasks to one process, and start another where it has died."""
-        pool = started_processes(1)
-        try:
-            while (task := self._tasks.get()) is not None:
-                future, call = task
-                if future.set_running_or_notify_cancel():
-                    pool = _done(future, call, pool)
-                del future, call, task
-        finally:
-            pool.shutdown()
+    libraries = ThreadpoolController().lib_controllers
+    own = [(one, int(one.get_num_threads())) for one in libraries if one.user_api == "openmp"]
+    for library, _ in own:
+        library.set_num_threads(1)
+    _enter([one for one in libraries if one.user_api != "openmp"])
+    try:
+        yield
+    finally:
+        _leave()
+        for library, threads in own:
+            library.set_num_threads(threads)
 
 
-def _done(future: Future[Any], call: Callable[..., Any], pool: ProcessPoolExecutor) -> ProcessPoolExecutor:
-    """Do a task and return the pool that is alive afterwards."""
-    for attempt in range(1, _ATTEMPTS + 1):
-        try:
-            future.set_result(call(pool))
-            return pool
-        except BrokenProcessPool as error:
-            pool.shutdown()
-            pool = started_processes(1)
-            if attempt == _ATTEMPTS:
-                future.set_exception(error)
-        except BaseException as error:
-            future.set_exception(error)
-            return pool
-    return pool
+def _enter(libraries: list[Any]) -> None:
+    global _at_work
+    with _lock:
+        if _at_work == 0:
+            _before[:] = [(one, int(one.get_num_threads())) for one in libraries]
+        _at_work += 1
+        for library in libraries:
+            _set(library, 1)
+
+
+def _leave() -> None:
+    global _at_work
+    with _lock:
+        _at_work -= 1
+        if _at_work == 0:
+            for library, threads in _before:
+                _set(library, threads)
+            _before.clear()
+
+
+def _set(library: Any, threads: int) -> None:
+    """Set the number of threads of a BLAS: threadpoolctl takes it from the thread that did so first, and no other."""
+    release = getattr(library, "clear_controlling_thread", lambda force: None)
+    release(force=True)
+    library.set_num_threads(threads)
+    release(force=True)

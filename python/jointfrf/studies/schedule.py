@@ -8,7 +8,7 @@ from time import perf_counter
 from typing import NamedTuple
 
 from jointfrf.cases.studied import Estimates, RealisationSource, StudiedGroup
-from jointfrf.parallel.one_thread import one_thread
+from jointfrf.parallel.processes import one_thread
 from jointfrf.studies.store import Span
 
 __all__ = ["Chunk", "ChunkResult", "Schedule", "compute_chunk"]

@@ -11,7 +11,6 @@ from hammer_test import JOINT, hammer_test, noisy
 from jointfrf.io import Channel, write_npz, write_uff
 from rigid_bodies import DOFS, POINT
 
-pytest.importorskip("pyuff")
 AT = ",".join(f"{value:g}" for value in POINT)
 #: As in the README: nodes of sensors and impacts together.
 JOINT_WORDS = ["--at", AT, "--j", "101:199", "--k", "201:299", "--dofs", "x,y,z,rx,ry,rz"]

@@ -10,7 +10,6 @@ from command import run_command
 from frf_files import FREQ_HZ, frf_set, full_set, names, write_mat
 from jointfrf.io import read_frfs, write_npz
 
-pytest.importorskip("pyuff")
 BARS = Path(__file__).resolve().parents[3] / "cases" / "hammer-test" / "two_bars.uff"
 
 

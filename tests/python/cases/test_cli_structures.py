@@ -12,7 +12,6 @@ import jointfrf as jf
 from command import run_command
 from jointfrf.io import read_frfs
 
-pytest.importorskip("pyuff")
 SECTION = dict(youngs_modulus=67e9, density=2700.0, width=0.025, height=0.006, loss_factor=0.01)
 A = jf.beam(0.3, 4, ends=("clamped", "free"), **SECTION)
 B = jf.beam(0.225, 3, **SECTION)

@@ -13,7 +13,6 @@ from command import run_command
 from jointfrf.cli.main import main
 from jointfrf.cli.parser import COMMANDS, command_parser, options_of
 
-pytest.importorskip("pyuff")
 ROOT = Path(__file__).resolve().parents[3]
 BARS = ROOT / "cases" / "hammer-test" / "two_bars.uff"
 JOINT = ["--j", "101,102", "--k", "201,202", "--dofs", "y,rz", "--band", "20:150"]

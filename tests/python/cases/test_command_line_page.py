@@ -4,8 +4,6 @@ import re
 import shlex
 from pathlib import Path
 
-import pytest
-
 from command import run_command
 from jointfrf.cli.configuration import with_configuration
 from jointfrf.cli.parser import COMMANDS, command_parser
@@ -51,7 +49,6 @@ def test_commands_shown_are_understood():
 
 
 def test_check_prints_what_is_shown(monkeypatch):
-    pytest.importorskip("pyuff")
     monkeypatch.chdir(ROOT)
     (shown,) = (text for text in re.findall(r"```text\n(.*?)```", PAGE, re.DOTALL) if "$ jointfrf check" in text)
     command, expected = shown.removeprefix("$ ").split("\n", 1)

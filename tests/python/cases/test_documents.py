@@ -51,7 +51,6 @@ def test_python_of_the_page_on_fits_with_models_prints_what_it_shows(capsys):
 
 
 def test_python_of_the_page_on_files_prints_what_it_shows(capsys, monkeypatch):
-    pytest.importorskip("pyuff")
     monkeypatch.chdir(ROOT)
     (example,) = blocks("python", DOCUMENTS["docs/files.md"])
     exec(example, {})
@@ -59,7 +58,6 @@ def test_python_of_the_page_on_files_prints_what_it_shows(capsys, monkeypatch):
 
 
 def test_convert_prints_what_is_shown(capsys, tmp_path, monkeypatch):
-    pytest.importorskip("pyuff")
     (shown,) = (block for block in blocks("text", DOCUMENTS["docs/command-line.md"]) if "$ jointfrf convert" in block)
     command, expected = shown.removeprefix("$ ").split("\n", 1)
     _, *arguments, file, target = shlex.split(command)

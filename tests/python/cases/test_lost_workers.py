@@ -10,7 +10,7 @@ import pytest
 
 import jointfrf as jf
 from deadly_tasks import MARKS, deadly_estimator, deadly_inverse
-from jointfrf.parallel.sweep_plan import SweepCost
+from jointfrf.parallel.sweep import SweepCost
 from studied_case import same
 
 pytestmark = [

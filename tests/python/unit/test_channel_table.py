@@ -120,5 +120,5 @@ def test_files_that_are_no_tables(tmp_path):
     with pytest.raises(FileContentError, match="holds no channels"):
         read_channel_table(written(tmp_path, "channel\n", "a.csv"))
     (tmp_path / "b.csv").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(FileContentError, match="is no text file"):
+    with pytest.raises(FileContentError, match="is not a text file"):
         read_channel_table(tmp_path / "b.csv")

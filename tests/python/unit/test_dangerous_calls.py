@@ -35,8 +35,8 @@ KNOWN = {
     ("cli/parser.py", "import_module"): "subcommands out of a list",
     ("cli/completion.py", "import_extra"): "shtab",
     ("cli/study.py", "import_extra"): "executors that the command line names",
+    ("io/formats.py", "import_module"): "modules of formats out of a list",
     ("io/hdf5_file.py", "import_extra"): "h5py",
-    ("io/uff_file.py", "import_extra"): "pyuff, which reads text and numbers",
     ("io/matrix_file.py", "load_npz"): "scipy: of a file whose arrays have been read without pickles before",
     ("models/factors.py", "import_extra"): "solvers: pypardiso, mumps; orders: pymetis",
     (

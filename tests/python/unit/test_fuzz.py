@@ -13,7 +13,6 @@ import pytest
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 pytest.importorskip("h5py")
-pytest.importorskip("pyuff")
 
 from fuzz import drills
 from fuzz.part import BrokenError, random_of

@@ -27,7 +27,6 @@ from jointfrf.errors import FileContentError, FileContentWarning
 from jointfrf.io import read_frfs, read_uff, write_csv, write_hdf5, write_npz, write_uff
 from uff_writer import VALUES, dataset, function
 
-pytest.importorskip("pyuff")
 h5py = pytest.importorskip("h5py")
 
 MAKERS = {

@@ -7,7 +7,6 @@ from frf_files import FREQ_HZ, frf_set, full_set, names, structure_of_testlab, w
 from jointfrf.errors import FileContentError, FileContentWarning
 from jointfrf.io import FrfMapping, frfs_of_arrays, read_frfs, write_csv, write_hdf5, write_npz, write_uff
 
-pytest.importorskip("pyuff")
 pytest.importorskip("h5py")
 
 WRITERS = {"a.uff": write_uff, "a.npz": write_npz, "a.h5": write_hdf5, "a.csv": write_csv}

@@ -121,7 +121,6 @@ def test_estimate_noise_takes_coherence_and_averages_of_a_set():
 @pytest.mark.parametrize("form", [{}, {"binary": False}, {"single": True}, {"binary": False, "single": True}])
 @pytest.mark.parametrize("freq_hz", [[10.0, 12.0, 14.0, 16.0, 18.0], [1.0, 2.0, 4.0, 8.0, 16.0]])
 def test_coherence_comes_back_from_a_universal_file(tmp_path, form, freq_hz):
-    pytest.importorskip("pyuff")
     points = (Channel(1, "x"), Channel(2, "-y"))
     coherence = np.random.default_rng(1).uniform(size=(5, 2, 2))
     coherence[:, 1, 1] = np.nan
@@ -134,7 +133,6 @@ def test_coherence_comes_back_from_a_universal_file(tmp_path, form, freq_hz):
 
 @pytest.fixture
 def write(tmp_path):
-    pytest.importorskip("pyuff")
 
     def write(*datasets):
         path = tmp_path / "test.uff"

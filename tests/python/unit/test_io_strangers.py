@@ -17,7 +17,7 @@ from frf_files import FIELDS, FREQ_HZ, GIVEN, full_set, structure_of_testlab, wr
 from jointfrf.errors import FileContentError
 from jointfrf.files import ReadLimit
 from jointfrf.io import read_frfs, write_hdf5, write_npz
-from jointfrf.io.mat_fields import mat_fields
+from jointfrf.io.mat_file import mat_fields
 from jointfrf.io.matrix_file import read_matrix
 from uff_writer import function
 
@@ -206,7 +206,6 @@ def test_what_unfolds_to_more_than_the_limit_is_not_read(tmp_path, name, make):
 
 @pytest.mark.filterwarnings("ignore::jointfrf.FileContentWarning")
 def test_a_universal_file_of_many_channels(tmp_path):
-    pytest.importorskip("pyuff")
     path = tmp_path / "a.uff"
     path.write_bytes(b"".join(function(response=(n, 2), reference=(n, 2)) for n in range(1, 91)))
     assert read_frfs(path).h.shape == (3, 90, 90)

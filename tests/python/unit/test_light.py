@@ -13,9 +13,9 @@ from command import run_command
 from jointfrf.extras import check_extras, import_extra
 
 #: Packages of single tasks; those in ALL come with the extra `all`.
-ALL = ("h5py", "jinja2", "matplotlib", "pyuff", "shtab")
+ALL = ("h5py", "jinja2", "matplotlib", "shtab")
 EXTRAS = (*ALL, "pyarrow", "zarr", "loky", "distributed", "mpi4py")
-HEAVY = {"numpy", "scipy", "matplotlib", "jinja2", "pyuff", "h5py", "shtab", "importlib.metadata", "jointfrf._kernel"}
+HEAVY = {"numpy", "scipy", "matplotlib", "jinja2", "h5py", "shtab", "importlib.metadata", "jointfrf._kernel"}
 
 
 def modules_after(code: str) -> set[str]:
@@ -97,9 +97,11 @@ def test_extras_are_those_of_the_project():
             assert any(each.startswith(package + ">=") for each in bringing)
 
 
-def test_the_command_line_says_it_in_one_sentence(monkeypatch):
-    monkeypatch.setitem(sys.modules, "pyuff", None)
-    bars = Path(__file__).resolve().parents[3] / "cases" / "hammer-test" / "two_bars.uff"
-    result = run_command("identify", bars)
+def test_the_command_line_says_it_in_one_sentence(monkeypatch, tmp_path):
+    monkeypatch.setitem(sys.modules, "h5py", None)
+    path = tmp_path / "bars.h5"
+    path.write_bytes(b"\x89HDF\r\n\x1a\n")
+    result = run_command("identify", path)
     assert result.returncode == 1
-    assert result.stderr == "jointfrf: error: Universal Files need the package pyuff: pip install 'jointfrf[uff]'\n"
+    missing = "HDF5 files (MATLAB 7.3 among them) need the package h5py: pip install 'jointfrf[hdf5]'"
+    assert result.stderr == f"jointfrf: error: {missing}\n"

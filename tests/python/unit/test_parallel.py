@@ -1,19 +1,17 @@
-"""Tasks on executors: one thread each, a dead process costs its task only, a broken executor is made again."""
+"""Tasks on executors: one thread each, a dead process costs no result, a broken executor is made again."""
 
 import signal
 import threading
 from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
 from types import SimpleNamespace
 
 import pytest
 from threadpoolctl import threadpool_info
 
 import jointfrf as jf
-from deadly_tasks import kill_this_process, note
-from jointfrf.parallel.cores import available_cores
-from jointfrf.parallel.one_thread import one_thread
+from deadly_tasks import kill_this_process, note_each
 from jointfrf.parallel.pool import Pool, opened_pool
+from jointfrf.parallel.processes import available_cores, one_thread
 
 
 def numbers_of_threads() -> dict[str, int]:
@@ -62,20 +60,26 @@ def test_tasks_that_overlap_in_threads_stay_on_one_thread():
 
 @pytest.mark.long
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="signals of POSIX")
-def test_a_process_that_dies_costs_its_task_only(tmp_path):
-    with jf.SeparateProcesses(2) as pool:
-        futures = [pool.submit(note, tmp_path, task, task == 2) for task in range(6)]
-        found = [future.result() for future in futures]
-        assert len(set(found)) in (2, 3)
-        begun = [len(list(tmp_path.glob(f"{task}-*"))) for task in range(6)]
-        assert begun == [1, 1, 2, 1, 1, 1]
-        with pytest.raises(BrokenProcessPool):
-            pool.submit(kill_this_process).result()
-        assert pool.submit(abs, -3).result() == 3
+def test_a_process_that_dies_costs_no_result(tmp_path):
+    """What was at work with it is done again, what was finished is not."""
+    with opened_pool(jobs=2) as pool:
+        first = pool.executor
+        found = dict(pool.completed(note_each, ((tmp_path, task, task == 9) for task in range(20))))
+        assert pool.executor is not first
+        assert {task for _, task, _ in found} == set(range(20))
+        begun = [len(list(tmp_path.glob(f"{task}-*"))) for task in range(20)]
+        assert begun[9] == 2
+        assert sum(begun) <= 20 + pool.at_once
+        assert [result for _, result in pool.completed(abs, iter([-3]))] == [3]
         with pytest.raises(ZeroDivisionError):
-            pool.submit(divmod, 1, 0).result()
-    with pytest.raises(RuntimeError, match="shut down"):
-        pool.submit(abs, 1)
+            list(pool.completed((1).__truediv__, iter([0])))
+
+
+@pytest.mark.long
+@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="signals of POSIX")
+def test_a_task_that_kills_every_process_is_said():
+    with opened_pool(jobs=2) as pool, pytest.raises(jf.BrokenPoolError, match="have ended unexpectedly"):
+        list(pool.completed(kill_this_process, iter(range(3))))
 
 
 def test_workers_are_counted_as_each_package_calls_them():
@@ -131,15 +135,23 @@ def test_a_broken_executor_of_the_caller_is_said():
     assert set(done) <= {0, 1}
 
 
-@pytest.mark.parametrize("name", ["KilledWorker", "ClosedClientError"])
-def test_what_dask_says_of_lost_workers_is_said_alike(name):
-    error = type(name, (Exception,), {"__module__": "distributed.scheduler"})
+def errors_of_dask():
+    distributed = pytest.importorskip("distributed")
+    return [
+        distributed.scheduler.KilledWorker("task", None, 3),
+        distributed.client.ClosedClientError("First. Second."),
+    ]
+
+
+@pytest.mark.parametrize("number", [0, 1])
+def test_what_dask_says_of_lost_workers_is_said_alike(number):
+    error = errors_of_dask()[number]
 
     class Lost(Fragile):
         def submit(self, fn, /, *args, **kwargs):
             future = super().submit(fn, *args, **kwargs)
             if self.begun == 2:
-                raise error("first sentence. Second.")
+                raise error
             return future
 
     with opened_pool(Lost()) as pool, pytest.raises(jf.BrokenPoolError, match="the same call continues"):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import jointfrf as jf
-from jointfrf.parallel.sweep_plan import SweepCost, planned_sweep
+from jointfrf.parallel.sweep import SweepCost, planned_sweep
 
 N = 2600
 COST = SweepCost(1e-6, 1e-7, 1e-3)

@@ -7,8 +7,8 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from jointfrf.io import read_uff, uff_index
-from jointfrf.io.uff_index import index_datasets
+from jointfrf.io import read_uff, uff_file
+from jointfrf.io.uff_file import index_datasets
 from uff_writer import VALUES, dataset, function, units
 
 DELIMITER = b"    -1"
@@ -22,8 +22,8 @@ def whole(content: bytes) -> tuple[list[tuple[int, int]], bool]:
 
 @pytest.mark.parametrize("chunk", [300, 301, 307, 1000, 1 << 20])
 def test_windows_of_any_size_find_the_same(tmp_path, monkeypatch, chunk):
-    monkeypatch.setattr(uff_index, "_CHUNK", chunk)
-    monkeypatch.setattr(uff_index, "_HEAD", 200)
+    monkeypatch.setattr(uff_file, "_CHUNK", chunk)
+    monkeypatch.setattr(uff_file, "HEAD", 200)
     chance = random.Random(chunk)
     for _ in range(60):
         lines = [

@@ -8,7 +8,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[3]
 AGE = ["DeprecationWarning", "PendingDeprecationWarning"]
 OURS = ["jointfrf", "jointfrf.io.uff", "tests.python.test_frf", "test_frf", "benchmarks.machine"]
-OTHERS = ["matplotlib.text", "numpy", "pyuff.datasets.dataset_58"]
+OTHERS = ["matplotlib.text", "numpy", "h5py._hl.files"]
 TESTS = f"""
 import builtins, pytest, warnings
 

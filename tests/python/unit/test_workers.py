@@ -5,7 +5,7 @@ import signal
 import subprocess
 import sys
 import time
-from concurrent.futures import CancelledError, wait
+from concurrent.futures import CancelledError, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
 from threading import Event, Lock, Thread
@@ -16,7 +16,7 @@ import pytest
 import jointfrf as jf
 from jointfrf.cases.workers import RankedProcesses, started_workers
 from jointfrf.parallel.pool import opened_pool
-from jointfrf.parallel.processes import SeparateProcesses, can_start_processes
+from jointfrf.parallel.processes import can_start_processes, started_processes
 
 _PARENT = """
 import os, sys, time
@@ -67,13 +67,13 @@ def test_a_killed_parent_leaves_no_process(tmp_path):
 _IN_A_FOLDER = """
 import sys
 from jointfrf.cases.workers import started_workers
-from jointfrf.parallel.processes import SeparateProcesses
+from jointfrf.parallel.pool import opened_pool
 
 if __name__ == "__main__":
     with started_workers(2) as workers:
         assert list(workers.map(abs, range(-5, 0))) == [5, 4, 3, 2, 1]
-    with SeparateProcesses(1) as pool:
-        assert pool.submit(abs, -3).result() == 3
+    with opened_pool(jobs=2) as pool:
+        assert list(pool.completed(abs, iter([-3]))) == [(-3, 3)]
 """
 
 
@@ -112,11 +112,11 @@ def test_a_program_of_which_python_is_a_part_is_not_started_again(monkeypatch, n
     with pytest.raises(
         ValueError, match=r"no other process can be started: .* say jobs=1, give an executor of threads"
     ):
-        SeparateProcesses(2)
+        started_processes(2)
     with pytest.raises(ValueError, match="no other process can be started"), started_workers(2):
         pass
     with opened_pool(None, None) as pool:
-        assert not isinstance(pool.executor, SeparateProcesses)
+        assert not isinstance(pool.executor, ProcessPoolExecutor)
     a = np.arange(1.0, 4.0).reshape(-1, 1, 1)
     found = np.empty(a.shape, complex)
     jf.sweep(jf.invert, {"a": a}, found)

@@ -145,7 +145,6 @@ def realised(**options):
         (lambda: jf.merge_studies(2, "all"), "parts must be a list of folders, not 2"),
         (lambda: jf.joint_channels(None, 3.0, [0, 0, 0]), "places must be a list of ChannelPlace, not float"),
         (lambda: jf.virtual_point(np.eye(3), np.eye(3), [0, 0, 0], dofs=3), "dofs must be a sequence of names, not 3"),
-        (lambda: jf.SeparateProcesses(0), "workers must be at least 1, not 0"),
         (lambda: jf.bolted_lap((0.1, 0.1, 0.1)), "lengths must be a pair, of A and of B, not"),
         (lambda: jf.bolted_lap(ends=["free"]), "ends must be a pair, of A and of B, not"),
         (lambda: jf.bolted_lap(materials=(STEEL, None)), "materials must be a Material, not NoneType"),

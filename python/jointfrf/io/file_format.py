@@ -1,0 +1,150 @@
+"""What a format of files of FRFs consists of, and what a user says of the files that are read."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from jointfrf.errors import FileContentWarning
+from jointfrf.files import ReadLimit
+from jointfrf.frf.frf_set import POWER_OF_I_OMEGA, FrfSet
+from jointfrf.kernel.arguments import as_nodes
+from jointfrf.spelling import did_you_mean
+
+if TYPE_CHECKING:
+    from jointfrf.io.arrays import FrfArrays
+
+__all__ = ["FileFormat", "FrfMapping", "Reading"]
+
+
+@dataclass(frozen=True)
+class FrfMapping:
+    """Which field of a file is what; None: by the names that scripts use.
+
+    Parameters
+    ----------
+    freq_hz, h, coherence, averages, quantity, unit : str, optional
+        Names of fields; inside structures or groups with points between, ``test.frf``.
+    responses, excitations : str or sequence of str, optional
+        The field that holds the names of the channels, or these names.
+    axes : str, optional
+        Order of the axes: ``freq,out,in``, ``out,in,freq``, ...; by the sizes where they say it.
+    """
+
+    freq_hz: str | None = None
+    h: str | None = None
+    responses: Any = None
+    excitations: Any = None
+    axes: str | None = None
+    quantity: str | None = None
+    unit: str | None = None
+    coherence: str | None = None
+    averages: str | None = None
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What the user says of files, and what the user is warned of.
+
+    Attributes
+    ----------
+    quantity : str or None
+        What the FRFs are.
+    forced : bool
+        Whether a file may contradict that.
+    nodes : frozenset of int or None
+        Only FRFs between these.
+    mapping : FrfMapping
+        Which field is what.
+    is_part : bool
+        Whether a file is one of several: coherence without FRFs is enough then.
+    notes : list of str
+        What readers assumed or left out, one sentence each.
+    """
+
+    quantity: str | None = None
+    forced: bool = False
+    nodes: frozenset[int] | None = None
+    mapping: FrfMapping = FrfMapping()
+    is_part: bool = False
+    notes: list[str] = field(default_factory=list)
+
+    @classmethod
+    def checked(
+        cls,
+        quantity: str | None,
+        forced: bool = False,
+        nodes: Collection[int] | None = None,
+        mapping: Mapping[str, Any] | FrfMapping | None = None,
+        is_part: bool = False,
+    ) -> Reading:
+        """Check the arguments of a reader.
+
+        Raises
+        ------
+        ValueError, TypeError
+            One is wrong.
+        """
+        if quantity is not None and quantity not in POWER_OF_I_OMEGA:
+            raise ValueError(f"quantity {quantity!r} is none of {', '.join(POWER_OF_I_OMEGA)}")
+        wanted = None if nodes is None else frozenset(as_nodes("nodes", nodes))
+        return cls(quantity, forced, wanted, _as_mapping(mapping), is_part)
+
+    def warn(self) -> None:
+        """Warn of every note; to be called by a public function."""
+        for note in self.notes:
+            warnings.warn(note, FileContentWarning, stacklevel=3)
+
+
+def _as_mapping(given: Mapping[str, Any] | FrfMapping | None) -> FrfMapping:
+    if isinstance(given, FrfMapping):
+        return given
+    if not isinstance(given, Mapping | None):
+        raise TypeError(f"mapping must be a mapping or an FrfMapping, not {type(given).__name__}")
+    names = [each.name for each in fields(FrfMapping)]
+    for name in given or {}:
+        if name not in names:
+            hint = did_you_mean(str(name), names)
+            raise ValueError(f"mapping names {name!r}, which is none of {', '.join(names)}{hint}")
+    return FrfMapping(**(given or {}))
+
+
+def _never(*_: object) -> bool:
+    return False
+
+
+@dataclass(frozen=True, kw_only=True)
+class FileFormat:
+    """A format of files of FRFs.
+
+    Attributes
+    ----------
+    name : str
+    suffixes : tuple of str
+        The usual ones; the first is the one to recommend.
+    content : str
+        What is read of such a file, for the documentation.
+    read : callable
+        Called with the path, the limit of memory and the `Reading`; returns the arrays as they are in the file, or a
+        set in SI units.
+    has_mark : callable
+        Whether the first bytes of a file can be those of no other format.
+    looks_alike : callable
+        Whether a path and the first bytes suggest the format, where no format has its mark there.
+    write : callable, optional
+        Called with the path and a set.
+    needs : str
+        What must be installed, for the documentation.
+    """
+
+    name: str
+    suffixes: tuple[str, ...]
+    content: str
+    read: Callable[[Path, ReadLimit, Reading], FrfArrays | FrfSet]
+    has_mark: Callable[[bytes], bool] = _never
+    looks_alike: Callable[[Path, bytes], bool] = _never
+    write: Callable[[Path, FrfSet], None] | None = None
+    needs: str = ""

@@ -1,0 +1,188 @@
+"""The formats of files of FRFs; `read_frfs` and `write_frfs`, which find the format of a file."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import replace
+from importlib import import_module
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from jointfrf.errors import FileContentError
+from jointfrf.files import ReadLimit, head_of
+from jointfrf.frf.frf_set import FrfSet
+from jointfrf.frf.merge import merge_frfs
+from jointfrf.io.arrays import FrfArrays, as_frf_set
+from jointfrf.io.file_format import FileFormat, FrfMapping, Reading
+
+__all__ = ["FORMATS", "check_suffix", "format_names", "read_frfs", "write_frfs"]
+
+#: The modules of the formats. The order counts where a file has no mark, and for MATLAB 7.3, which is HDF5 inside.
+_MODULES = (
+    "uff",
+    "mat_file",
+    "npz_file",
+    "hdf5_file",
+    "csv_file",
+)
+
+
+def _format_of(module: str) -> FileFormat:
+    """Return the format that a module defines."""
+    values = vars(import_module(f"jointfrf.io.{module}")).values()
+    return next(value for value in values if isinstance(value, FileFormat))
+
+
+FORMATS = tuple(map(_format_of, _MODULES))
+_PICKLE = "is a pickle, which is not read because that can run any program: save an NPZ file"
+#: First bytes of files that are not read, and what the user can do.
+_OTHERS = (
+    (b"\x93NUMPY", "is an NPY file, one array without frequencies: save an NPZ file, or use frfs_of_arrays"),
+    *((b"\x80" + bytes([protocol]), _PICKLE) for protocol in (2, 3, 4, 5)),
+    (b"\x1f\x8b", "is compressed by gzip: unpack it"),
+    (b"TDSm", "is a TDMS file: export a Universal File"),
+)
+
+
+def format_names(*, written: bool = False) -> str:
+    """Return the names of all formats with their suffixes, or of those that are written, as part of a sentence."""
+    chosen = [each for each in FORMATS if each.write is not None or not written]
+    names = [f"{each.name} ({' '.join(each.suffixes)})" for each in chosen]
+    return f"{', '.join(names[:-1])} {'or' if written else 'and'} {names[-1]}"
+
+
+def check_suffix(path: str | PathLike[str]) -> FileFormat:
+    """Return the format in which a file of this name is written.
+
+    Raises
+    ------
+    ValueError
+        The suffix is that of no format that is written.
+    """
+    written = {suffix: each for each in FORMATS if each.write is not None for suffix in each.suffixes}
+    found = written.get(Path(path).suffix.lower())
+    if found is None:
+        raise ValueError(f"{path} has no suffix of a format that is written: {', '.join(written)}")
+    return found
+
+
+def write_frfs(path: str | PathLike[str], frfs: FrfSet) -> None:
+    """Write measured FRFs in the format of the suffix: ``.uff``, ``.npz``, ``.h5``, ``.csv``, ...
+
+    Parameters
+    ----------
+    path : path-like
+        In a folder that exists; an older file is replaced as a whole or not at all.
+    frfs : FrfSet
+        The FRFs, with what the format holds beside them.
+
+    Raises
+    ------
+    ValueError
+        The suffix is that of no format that is written; there is no FRF, or one is NaN or infinite on some lines only.
+    MissingPackageError
+        A package for the format is not installed.
+    OSError
+        The file cannot be written; nothing is left behind.
+    """
+    write = check_suffix(path).write
+    assert write is not None
+    write(Path(path), frfs)
+
+
+def read_frfs(
+    *paths: str | PathLike[str],
+    quantity: str | None = None,
+    force_quantity: bool = False,
+    nodes: Collection[int] | None = None,
+    mapping: Mapping[str, Any] | FrfMapping | None = None,
+    averages: ArrayLike | None = None,
+    limit_gb: float | None = None,
+) -> FrfSet:
+    """Read measured FRFs from one file or several of one test.
+
+    Parameters
+    ----------
+    *paths : path-like
+        Universal Files, MATLAB files (version 4 to 7; 7.3 needs h5py), NPZ files (own layout, scripts, sdynpy), HDF5
+        files (own layout, scripts), text tables. The format is detected from the content, not from the name.
+    quantity : {"receptance", "mobility", "accelerance"}, optional
+        What the FRFs are, where the files do not say it.
+    force_quantity : bool
+        Take `quantity` also where a file says something else.
+    nodes : collection of int, optional
+        Only FRFs between these nodes.
+    mapping : mapping, optional
+        Which field of a MATLAB, NPZ or HDF5 file is what, where it has other names than the usual ones: keys
+        ``freq_hz``, ``h``, ``responses``, ``excitations``, ``quantity``, ``unit``, ``coherence``, ``averages`` (names
+        of fields, ``test.frf`` inside a structure; channels also as their names), ``axes`` (``out,in,freq``).
+    averages : number or array_like, shape (n_responses, n_excitations), optional
+        Number of averages, where the files do not say it.
+    limit_gb : float, optional
+        Largest size of one file, and of its content in memory, GB. Default: the environment variable
+        JOINTFRF_FILE_LIMIT_GB, or else 16 GB of file, and 1 GB, or 10 times the size of the file, of content.
+
+    Returns
+    -------
+    FrfSet
+        In SI units, with coherence, number of averages and coordinates where a file holds them; of several files,
+        `merge_frfs`.
+
+    Raises
+    ------
+    FileNotFoundError
+        There is no such file.
+    FileContentError
+        A file is of an unknown format, damaged, lacks something, or contradicts `quantity` or another file.
+    MissingPackageError
+        A package for the format is not installed.
+    ValueError
+        An argument is wrong.
+
+    Warns
+    -----
+    FileContentWarning
+        Something had to be assumed or left out.
+
+    Examples
+    --------
+    >>> import jointfrf.io
+    >>> frfs = jointfrf.io.read_frfs("hammer.mat", mapping={"h": "FRF", "axes": "out,in,freq"})  # doctest: +SKIP
+    >>> print(frfs)  # doctest: +SKIP
+    """
+    reading = Reading.checked(quantity, force_quantity, nodes, mapping, len(paths) > 1)
+    if not paths:
+        raise ValueError("no file is named")
+    sets = [_read(Path(path), reading, limit_gb) for path in paths]
+    reading.warn()
+    merged = merge_frfs(sets)
+    if not merged.measured.any():
+        raise FileContentError(f"{merged.source}: there is no FRF")
+    return merged if averages is None else replace(merged, averages=np.asarray(averages))
+
+
+def _read(path: Path, reading: Reading, limit_gb: float | None) -> FrfSet:
+    """Read one file."""
+    found = _detected(path, head_of(path, limit_gb)).read(path, ReadLimit(path, limit_gb), reading)
+    if isinstance(found, FrfArrays):
+        found = as_frf_set(found, str(path), reading)
+        found = found if reading.nodes is None else found.at_nodes(reading.nodes)
+    return found
+
+
+def _detected(path: Path, head: bytes) -> FileFormat:
+    """Return the format of a file: by a mark in its first bytes; else by its suffix and what it looks like."""
+    marked = next((each for each in FORMATS if each.has_mark(head)), None)
+    if marked is not None:
+        return marked
+    for beginning, sentence in _OTHERS:
+        if head.startswith(beginning):
+            raise FileContentError(f"{path} {sentence}")
+    similar = next((each for each in FORMATS if each.looks_alike(path, head)), None)
+    if similar is None:
+        raise FileContentError(f"{path} is of an unknown format; known are {format_names()}")
+    return similar

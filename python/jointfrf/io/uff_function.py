@@ -1,0 +1,284 @@
+"""Dataset 58 of Universal Files, one function: read, and written as text or (58b) with binary numbers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointfrf.files import HEAD
+from jointfrf.io.units import Unit, parse_unit
+
+__all__ = [
+    "DELIMITER",
+    "Axis",
+    "FunctionHeader",
+    "axis_record",
+    "function_dataset",
+    "function_values",
+    "place_fields",
+    "read_header",
+]
+
+DELIMITER = "    -1"
+#: Lines before the numbers: delimiter, type, five of text, records 6 to 11; a 58b states those after the type.
+_N_LINES, _N_TEXT_LINES = 13, 11
+#: Columns of the type line of 58b, of record 6, of record 7, and of records 8 to 11.
+_BINARY, _PLACE = (6, 1, 6, 6, 12, 12), (5, 10, 5, 10, 11, 10, 4, 11, 10, 4)
+_FORM, _AXIS = (10, 10, 10, 13, 13, 13), (10, 5, 5, 5, 21, 21)
+#: By the ordinate data type of record 7: bytes of a number, and numbers of a value.
+_NUMBERS = {2: (4, 1), 4: (8, 1), 5: (4, 2), 6: (8, 2)}
+#: By the data types of records 8 to 11.
+_DATA_TYPES = {
+    0: "unknown", 1: "general", 2: "stress", 3: "strain", 5: "temperature", 6: "heat flux", 8: "displacement",
+    9: "reaction force", 11: "velocity", 12: "acceleration", 13: "excitation force", 15: "pressure", 16: "mass",
+    17: "time", 18: "frequency", 19: "rpm", 20: "order",
+}  # fmt: skip
+#: How far, relative to it, a line may lie from where an even spacing puts it: 13 columns hold as many digits.
+_EVEN = 1e-9
+
+
+@dataclass(frozen=True)
+class Axis:
+    """Data type and unit label of the abscissa, or of the ordinate's numerator or denominator (records 8 to 10)."""
+
+    data_type: int
+    label: str
+    unit: Unit | None
+
+    @classmethod
+    def parsed(cls, record: str) -> Axis:
+        """Take the axis from its record."""
+        words = _columns(record, _AXIS)
+        label = "" if words[5].upper() == "NONE" else words[5]
+        data_type, *_ = map(int, words[:4])  # and three exponents, which are not used
+        return cls(data_type, label, parse_unit(label))
+
+    @property
+    def name(self) -> str:
+        """The data type in words."""
+        return _DATA_TYPES.get(self.data_type, f"data type {self.data_type}")
+
+    @property
+    def words(self) -> str:
+        """The data type and the unit, as they are shown."""
+        return f"{self.name} [{self.label or 'no unit'}]"
+
+    def __str__(self) -> str:
+        return f"{self.data_type} ({self.name}, unit '{self.label or 'NONE'}')"
+
+
+class FunctionHeader(NamedTuple):
+    """What the records before the numbers say; of response and reference: entity, node and direction code."""
+
+    kind: int
+    response: tuple[str, int, int]
+    reference: tuple[str, int, int]
+    number_type: int
+    n_values: int
+    is_even: bool
+    start: float
+    step: float
+    abscissa: Axis
+    numerator: Axis
+    denominator: Axis
+    is_binary: bool
+    is_big_endian: bool
+    is_supported: bool
+    length: int
+
+
+def read_header(content: bytes) -> FunctionHeader:
+    """Read the records before the numbers.
+
+    Parameters
+    ----------
+    content : bytes
+        The dataset from its delimiter on, or the beginning of it.
+
+    Raises
+    ------
+    ValueError, LookupError
+        The dataset is damaged.
+    """
+    lines = content[:HEAD].splitlines(keepends=True)[:_N_LINES]
+    records = [line.decode("utf-8", "replace").rstrip("\r\n") for line in lines]
+    place, form = _columns(records[7], _PLACE), _columns(records[8], _FORM)
+    is_binary = records[1][6:7].lower() == "b"
+    order, floating_point, n_lines, _ = map(int, _columns(records[1], _BINARY)[2:]) if is_binary else (1, 2, 11, 0)
+    start, step, _ = (float(word.replace("D", "E").replace("d", "e")) for word in form[3:])
+    abscissa, numerator, denominator, _ = (Axis.parsed(record) for record in records[9:13])
+    return FunctionHeader(
+        int(place[0]),
+        (place[4], _whole(place[5]), _whole(place[6])),
+        (place[7], _whole(place[8]), _whole(place[9])),
+        int(form[0]),
+        int(form[1]),
+        int(form[2]) != 0,
+        start,
+        step,
+        abscissa,
+        numerator,
+        denominator,
+        is_binary,
+        order == 2,
+        order in (1, 2) and (floating_point, n_lines) == (2, _N_TEXT_LINES),  # IEEE 754 after 11 lines of text
+        sum(map(len, lines)),
+    )
+
+
+def function_values(content: bytes, header: FunctionHeader) -> tuple[NDArray[np.float64], NDArray[Any]]:
+    """Read the numbers.
+
+    Parameters
+    ----------
+    content : bytes
+        The dataset from its delimiter on.
+    header : FunctionHeader
+
+    Returns
+    -------
+    abscissa, ordinate : ndarray, shape (n,)
+        As many as there are, whatever the header says.
+
+    Raises
+    ------
+    ValueError
+        There is no number where one should be.
+    """
+    size, parts = _NUMBERS[header.number_type]
+    data = content[header.length :]
+    rows = _binary_rows(data, header, size, parts) if header.is_binary else _text_rows(data, header, size, parts)
+    abscissa = rows[:, 0] if not header.is_even else header.start + header.step * np.arange(float(len(rows)))
+    values = np.ascontiguousarray(rows[:, rows.shape[1] - parts :])
+    return abscissa, (values if parts == 1 else values.view(np.complex128))[:, 0]
+
+
+def _binary_rows(data: bytes, header: FunctionHeader, size: int, parts: int) -> NDArray[np.float64]:
+    """Return what belongs to each value; some programs put line ends after the numbers."""
+    order = ">" if header.is_big_endian else "<"
+    kinds: list[Any] = [("y", f"{order}f{size}", (parts,))]
+    if not header.is_even:  # of four bytes by the definition, but pyuff writes eight beside double precision
+        is_long = len(data) >= header.n_values * size * (parts + 1)
+        kinds.insert(0, ("x", f"{order}f{size if is_long else 4}"))
+    kind = np.dtype(kinds)
+    rows = np.frombuffer(data, kind, len(data) // kind.itemsize)
+    values = rows["y"].astype(np.float64)
+    return values if header.is_even else np.column_stack([rows["x"].astype(np.float64), values])
+
+
+def _text_rows(data: bytes, header: FunctionHeader, size: int, parts: int) -> NDArray[np.float64]:
+    """Return what belongs to each value: 6E13.5 in single precision, else 4E20.12, with an abscissa E13.5 before."""
+    width = 13 if size == 4 else 20
+    widths = [width] * parts if header.is_even else [13, *[width] * parts]
+    lines = data.decode("ascii", "replace").replace("D", "E").replace("d", "e").splitlines(keepends=True)
+    ends = np.cumsum(widths * (max(map(len, lines), default=0) // sum(widths) + 1)).tolist()
+    cuts = list(zip([0, *ends], ends, strict=False))
+    words = (line[start:end] for line in lines for start, end in cuts if end <= len(line))
+    numbers = [float(word) for word in words if not word.isspace()]
+    count = len(numbers) // len(widths)
+    return np.array(numbers[: count * len(widths)], np.float64).reshape(count, len(widths))
+
+
+def _columns(record: str, widths: tuple[int, ...]) -> list[str]:
+    """Cut a record into its fields."""
+    ends = np.cumsum(widths).tolist()
+    return [record[start:end].strip() for start, end in zip([0, *ends], ends, strict=False)]
+
+
+def _whole(word: str) -> int:
+    """Return a number that programs leave out."""
+    try:
+        return int(word)
+    except ValueError:
+        return 0
+
+
+def function_dataset(
+    texts: tuple[str, str],
+    kind: int,
+    places: str,
+    axes: list[str],
+    freq_hz: NDArray[np.float64],
+    values: NDArray[np.complex128] | NDArray[np.float64],
+    *,
+    binary: bool,
+    single: bool,
+) -> bytes:
+    """Write a function.
+
+    Parameters
+    ----------
+    texts : tuple of str
+        Name and title.
+    kind : int
+        Function type.
+    places : str
+        Response and reference, by `place_fields`.
+    axes : list of str
+        Records 9 and 10, by `axis_record`.
+    freq_hz, values : ndarray, shape (n_freq,)
+    binary, single : bool
+        As for `write_uff`.
+    """
+    start, step = _spacing(freq_hz)
+    is_even, is_complex = step is not None, np.iscomplexobj(values)
+    number_type = (5 if single else 6) if is_complex else (2 if single else 4)
+    records = [
+        texts[0],
+        texts[1] or "NONE",
+        *["NONE"] * 3,
+        f"{kind:5d}{0:10d}{0:5d}{0:10d} {places}",
+        f"{number_type:10d}{values.size:10d}{int(is_even):10d}{start}{step or _short(0.0)}{_short(0.0)}",
+        axis_record(18, "Frequency", "Hz"),
+        *axes,
+        axis_record(0, "NONE", "NONE"),
+    ]
+    if not (binary and is_even):
+        numbers = _text_lines(freq_hz, values, is_even, single)
+        return "\n".join([DELIMITER, "    58", *records, *numbers, DELIMITER, ""]).encode("ascii")
+    data = values.astype(("<c8" if single else "<c16") if is_complex else ("<f4" if single else "<f8")).tobytes()
+    first = f"    58b{1:6d}{2:6d}{_N_TEXT_LINES:12d}{len(data):12d}{0:6d}{0:6d}{0:12d}{0:12d}"
+    text = "\n".join([DELIMITER, first, *records, ""]).encode("ascii")
+    return text + data + f"\n{DELIMITER}\n".encode("ascii")
+
+
+def place_fields(node: int, direction_code: int) -> str:
+    """Write the fields of record 6 that name a response or a reference."""
+    return f"{'NONE':<10}{node:10d}{direction_code:4d}"
+
+
+def axis_record(data_type: int, label: str, unit: str) -> str:
+    """Write one of the records 8 to 11."""
+    return f"{data_type:10d}{0:5d}{0:5d}{0:5d} {label:<20} {unit:<20}"
+
+
+def _spacing(freq_hz: NDArray[np.float64]) -> tuple[str, str | None]:
+    """First line and spacing as they are written; no spacing where it is uneven."""
+    step = (freq_hz[-1] - freq_hz[0]) / max(freq_hz.size - 1, 1)
+    texts = _short(freq_hz[0]), _short(step)
+    written = float(texts[0]) + float(texts[1]) * np.arange(freq_hz.size)
+    is_even = np.allclose(written, freq_hz, rtol=_EVEN, atol=0.0)
+    return texts if is_even else (_short(0.0), None)
+
+
+def _text_lines(
+    freq_hz: NDArray[np.float64], values: NDArray[np.complex128] | NDArray[np.float64], is_even: bool, single: bool
+) -> list[str]:
+    """Record 12: four or six numbers a line; with an uneven spacing, each value after its frequency."""
+    numbers = [f"{x:13.5E}" if single else f"{x:20.11E}" for x in np.ascontiguousarray(values).view(np.float64)]
+    if is_even:
+        a_line = 6 if single else 4
+        return ["".join(numbers[i : i + a_line]) for i in range(0, len(numbers), a_line)]
+    of_each = 2 if np.iscomplexobj(values) else 1
+    parts = [(_short(f), *numbers[of_each * i : of_each * (i + 1)]) for i, f in enumerate(freq_hz)]
+    a_line = (6 if single else 4) // (1 + of_each) if single or of_each == 1 else 1
+    return ["".join(x for part in parts[i : i + a_line] for x in part) for i in range(0, len(parts), a_line)]
+
+
+def _short(value: float) -> str:
+    """Write a number in 13 columns, with its point and as many digits as they hold."""
+    texts = (f"{value:#.{digits}g}" for digits in range(12, 4, -1))
+    return f"{next(text for text in texts if len(text) < 13):>13}"
