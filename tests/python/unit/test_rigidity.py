@@ -5,7 +5,13 @@ import pytest
 
 import jointfrf as jf
 from jointfrf.channels.joint_channels import left_out_dofs
-from jointfrf.identification.manifold.transforms import deformation_compliance, deformation_variance, left_out, modes_of
+from jointfrf.identification.manifold.transforms import (
+    ChannelModes,
+    deformation_compliance,
+    deformation_variance,
+    left_out,
+    modes_of,
+)
 from rigid_bodies import AROUND, BODY_A, BODY_B, DOFS, POINT, along, triaxial
 
 FREQ = np.linspace(20.0, 200.0, 30)
