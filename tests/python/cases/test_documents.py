@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+import jointfrf as jf
 from jointfrf.cli.main import main
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -48,6 +49,21 @@ def test_python_of_the_page_on_fits_with_models_prints_what_it_shows(capsys):
     for example, text in zip(blocks("python", DOCUMENTS["docs/model-fit.md"]), shown, strict=True):
         exec(example, {})
         agree(capsys.readouterr().out, text)
+
+
+def test_python_of_the_page_on_the_engine_runs(capsys, monkeypatch, tmp_path, beams):
+    monkeypatch.chdir(tmp_path)
+    (example,) = blocks("python", DOCUMENTS["docs/engine.md"])
+    joint = jf.Joint([6e5, 5e3], dofs=["y", "theta"], loss_factor=[0.05, 0.1])
+    gamma = jf.pollute(beams.gamma(joint), 0.01, seed=1)
+    named = {"jf": jf, "freq": beams.freq, "gamma": gamma}
+    exec(example, named)
+    assert named["eta"].low < 0.05 < named["eta"].high
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["joint.html", "joint.json"]
+    printed = capsys.readouterr().out
+    assert "h_theta_z" in printed
+    assert "note choice ('y',) damping of y: hysteretic" in printed
+    assert "CBUSH" in printed
 
 
 def test_python_of_the_page_on_files_prints_what_it_shows(capsys, monkeypatch):
