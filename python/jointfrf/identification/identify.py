@@ -20,7 +20,7 @@ from jointfrf.identification.joint_fit import JointFit
 from jointfrf.identification.law_fit.identify_laws import check_law_joint, identify_laws
 from jointfrf.identification.law_fit.law_fit import LawFit
 from jointfrf.identification.manifold.coordinates import CrossTerms, DampingTerms
-from jointfrf.identification.manifold.fit import fit_compliance
+from jointfrf.identification.manifold.fit import fit_springs
 from jointfrf.identification.manifold.prepare import FitOptions, FitProblem, prepare_compliance
 from jointfrf.identification.manifold.transforms import Transform
 from jointfrf.identification.noise import NoiseOptions
@@ -229,7 +229,7 @@ def identify(
         )  # fmt: skip
         if reciprocal:
             _look_at(problem, transform)
-        found = fit_compliance(problem)
+        found = fit_springs(problem)
         described = describe_compliance(found, problem)
         _warn(described.warnings)
         return replace(described.fit, data=compliance_data(found, problem, transform))

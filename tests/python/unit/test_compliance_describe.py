@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 import jointfrf as jf
-from jointfrf.identification.compliance_fit.describe import describe_compliance
-from jointfrf.identification.manifold.fit import DofDamping, fit_compliance
+from jointfrf.identification.compliance_fit.describe import describe_compliance, joint_fit
+from jointfrf.identification.manifold.fit import DofDamping, fit_springs
 from jointfrf.identification.manifold.prepare import FitOptions, prepare_compliance
 from jointfrf.identification.noise import NoiseOptions
 from jointfrf.identification.prepare import as_measured
-from jointfrf.identification.residual_test import Misfit, Trend
+from jointfrf.identification.residual_test import ResidualTest, Trend
 
 LEVEL = 0.01
 
@@ -28,7 +28,7 @@ def told(freq, h, dofs, *, noise=LEVEL, damping="viscous", cross="zero"):
     """Return the fit described."""
     options = FitOptions(damping, cross, True)
     problem = prepare_compliance(as_measured(freq, h, square=False), dofs, None, None, NoiseOptions(noise), options)
-    return describe_compliance(fit_compliance(problem), problem).fit
+    return describe_compliance(fit_springs(problem), problem).fit
 
 
 class Found:
@@ -47,13 +47,13 @@ class Found:
         return Found(self.fit, replace(self.problem, noise=replace(self.problem.noise, **change)))
 
     def of_groups(self, **change):
-        groups = tuple(one._replace(fit=one.fit._replace(**change)) for one in self.fit.estimate.groups)
+        groups = tuple(replace(one, **change) for one in self.fit.estimate.groups)
         return self.with_(estimate=self.fit.estimate._replace(groups=groups))
 
     def of_intervals(self, **limits):
         """Other intervals of some parameters."""
-        known = self.fit.joint.confidence_interval(0.95)
-        return self.with_(joint=replace(self.fit.joint, intervals=lambda probability: known | limits))
+        known = self.fit.intervals(0.95)
+        return self.with_(intervals=lambda probability: known | limits)
 
 
 @pytest.fixture(scope="module")
@@ -62,13 +62,13 @@ def found(beams):
     gamma = as_measured(beams.freq, jf.pollute(beams.gamma(beams.joint), LEVEL, seed=3), square=False)
     options = FitOptions("viscous", "zero", True)
     problem = prepare_compliance(gamma, ["y", "theta"], None, None, NoiseOptions(LEVEL), options)
-    return Found(fit_compliance(problem), problem)
+    return Found(fit_springs(problem), problem)
 
 
 def test_nothing_to_tell(found):
     described = found.described()
     assert described.fit.notes == described.fit.warnings == described.warnings == ()
-    assert described.fit.parameters == found.fit.joint.parameters
+    assert described.fit.parameters == joint_fit(found.fit).parameters
 
 
 def test_a_fit_that_did_not_converge_warns_of_its_own_kind(found):
@@ -145,7 +145,7 @@ def test_stiffnesses_that_the_data_do_not_determine(found, limits, text):
 
 
 def test_an_interval_as_wide_as_the_value_is_not_yet_poor(found):
-    k = found.fit.joint.parameters["k_theta"]
+    k = joint_fit(found.fit).parameters["k_theta"]
     assert not found.of_intervals(k_theta=(0.51 * k, 1.49 * k)).described().warnings
 
 
@@ -181,9 +181,9 @@ def test_a_residual_above_the_noise_is_told(beams):
 
 
 def test_no_residual_is_compared_with_a_level_that_it_gave(found):
-    far = Misfit(2.0, 0.05, (), ())
-    assert "2.00 times the noise" in found.with_(misfit=far).described().fit.warnings[0]
-    assert not found.with_(misfit=far).of_noise(is_assumed=True).described().warnings
+    far = ResidualTest(2.0, 0.05)
+    assert "2.00 times the noise" in found.with_(test=far).described().fit.warnings[0]
+    assert not found.with_(test=far).of_noise(is_assumed=True).described().warnings
 
 
 def test_exact_frfs_made_reciprocal_show_no_noise(beams):
@@ -217,14 +217,14 @@ def test_the_residual_of_large_noise_is_that_said(chains, seed):
 
 
 def test_a_local_misfit_names_the_lines(found):
-    local = Misfit(2.0, 0.05, ((300.0, 350.0, 0.8), (100.0, 105.0, 0.2)), ())
-    (text,) = found.with_(misfit=local).described().fit.warnings
+    local = ResidualTest(2.0, 0.05, local=((300.0, 350.0, 0.8), (100.0, 105.0, 0.2)))
+    (text,) = found.with_(test=local).described().fit.warnings
     assert "; the excess is local: 300-350 Hz (80 %), 100-105 Hz (20 %): bad lines, or local modes" in text
 
 
 def test_a_trend_names_the_parameter_and_where_it_is_least_and_largest(found):
     trend = Trend("k_y", np.array([50.0, 200.0, 600.0]), np.array([6e5, 5e5, 7e5]), 1e-6)
-    assert found.with_(misfit=Misfit(1.0, 0.05, (), (trend,))).described().fit.warnings == (
+    assert found.with_(test=ResidualTest(1.0, 0.05, trends=(trend,))).described().fit.warnings == (
         "k_y is not one constant over frequency: parts of the band give 5e+05 .. 7e+05 (near 200 and 600 Hz)",
     )
 
@@ -259,12 +259,12 @@ def test_cross_terms_ignored_cost_no_lines(beams):
 
 
 def test_lines_that_do_not_fit_are_counted_unless_cross_terms_explain_them(found):
-    trusted = np.arange(158) >= 10
-    out = found.of_groups(trusted=trusted)
+    used = np.arange(158) >= 10
+    out = found.of_groups(used=used)
     text = "10 of 158 lines do not fit the joint found within their noise and are left out"
     assert out.described().fit.warnings == (text,)
     assert not out.with_(cross_fits=True).described().warnings
-    assert not found.of_groups(trusted=np.arange(158) >= 3).described().warnings
+    assert not found.of_groups(used=np.arange(158) >= 3).described().warnings
 
 
 def test_random_phases_on_ten_lines_are_left_out(beams):
@@ -283,7 +283,7 @@ def test_intervals_widened_by_scatter_are_told(found):
     assert wide.described().fit.warnings == (
         "k_theta, c_theta: parts of the band scatter more than the noise explains; the intervals are widened by that",
     )
-    exact = wide.with_(joint=replace(found.fit.joint, noise_level=1e-12))
+    exact = wide.with_(problem=replace(wide.problem, noise=replace(wide.problem.noise, level=1e-12)))
     assert not exact.described().warnings
 
 

@@ -15,15 +15,16 @@ from jointfrf.identification.elastic_centre import elastic_centre
 from jointfrf.identification.joint_fit import JointFit
 from jointfrf.identification.manifold.coordinates import CrossTerms
 from jointfrf.identification.manifold.estimate import JointEstimate
-from jointfrf.identification.manifold.fit import ComplianceFit, DofDamping
+from jointfrf.identification.manifold.fit import DofDamping, ManifoldFit
 from jointfrf.identification.manifold.prepare import FitProblem
-from jointfrf.identification.manifold.scatter import Spread
 from jointfrf.identification.manifold.transforms import Transforms
-from jointfrf.identification.residual_test import Misfit
+from jointfrf.identification.manifold.uncertainty import Spread
+from jointfrf.identification.residual_test import ResidualTest
 
 __all__ = [
     "Described",
     "describe_compliance",
+    "joint_fit",
     "left_out_warnings",
     "noise_notes",
     "places_of_excess",
@@ -66,9 +67,9 @@ class Described(NamedTuple):
     warnings: tuple[Warning, ...] = ()
 
 
-def describe_compliance(found: ComplianceFit, problem: FitProblem) -> Described:
+def describe_compliance(found: ManifoldFit, problem: FitProblem) -> Described:
     """Add the notes and warnings of a fit on the manifold."""
-    fit, result = found.joint, found.estimate
+    fit, result = joint_fit(found), found.estimate
     intervals = fit.confidence_interval(0.95)
     notes = [
         *_choice_notes(found.choices),
@@ -85,7 +86,7 @@ def describe_compliance(found: ComplianceFit, problem: FitProblem) -> Described:
         *left_out_warnings(problem),
         *_band_part_warnings(found),
         *_parameter_warnings(fit, intervals),
-        *_rigidity_warnings(found),
+        *_rigidity_warnings(found, fit),
         *_misfit_warnings(found, problem),
         *_diagonal_warnings(result, fit.dofs, problem.options.cross),
         *_scatter_warnings(fit, found.spread),
@@ -93,10 +94,27 @@ def describe_compliance(found: ComplianceFit, problem: FitProblem) -> Described:
     ]
     told: list[Warning] = [IdentificationWarning(text) for text in doubts]
     if not result.converged:
-        most = max(group.fit.iterations for group in result.groups)
+        most = max(group.iterations for group in result.groups)
         told.append(ConvergenceWarning(f"the fit did not converge in {most} iterations"))
     described = replace(fit, notes=tuple(notes), warnings=tuple(str(warning) for warning in told))
     return Described(described, tuple(told))
+
+
+def joint_fit(found: ManifoldFit) -> JointFit:
+    """Make the result, without notes and warnings."""
+    problem, result = found.problem, found.estimate
+    return JointFit(
+        method="compliance",
+        dofs=problem.dofs,
+        parameters={one.name: float(value) for one, value in zip(result.parameters, result.theta, strict=True)},
+        covariance=found.covariance,
+        noise_level=found.noise_level,
+        residual_level=found.residual_level,
+        freq_hz=problem.freq_hz,
+        k_lines=problem.frfs.line_stiffness(),
+        bands=problem.bands,
+        intervals=found.intervals,
+    )
 
 
 def _listed(names: Sequence[str]) -> str:
@@ -150,9 +168,9 @@ def noise_notes(problem: FitProblem) -> list[str]:
     return told
 
 
-def _small_residual_notes(found: ComplianceFit, problem: FitProblem) -> list[str]:
+def _small_residual_notes(found: ManifoldFit, problem: FitProblem) -> list[str]:
     """Say that the residual is below the noise: intervals are then wider than they need be."""
-    misfit, noise = found.misfit, problem.noise
+    misfit, noise = found.test, problem.noise
     # What is not rigid in the channels weighs as noise, and averages out of a residual of joint DOFs.
     if noise.is_assumed or found.channels is not None or not misfit.is_small:
         return []
@@ -164,7 +182,7 @@ def _small_residual_notes(found: ComplianceFit, problem: FitProblem) -> list[str
     ]
 
 
-def _channel_notes(found: ComplianceFit, problem: FitProblem) -> list[str]:
+def _channel_notes(found: ManifoldFit, problem: FitProblem) -> list[str]:
     """Say what is known of the flexibility between channels."""
     frfs = problem.frfs
     if Transforms(frfs.responses, frfs.forces).are_units:
@@ -214,11 +232,10 @@ def left_out_warnings(problem: FitProblem) -> list[str]:
     return [str(one) for one in problem.left_out if one.matters]
 
 
-def _rigidity_warnings(found: ComplianceFit) -> list[str]:
+def _rigidity_warnings(found: ManifoldFit, fit: JointFit) -> list[str]:
     """Name stiffnesses whose uncertainty is mostly that of sides that are not rigid."""
     if found.channels is None:
         return []
-    fit = found.joint
     wide = [
         one.name
         for one, added, noise in zip(fit.terms, found.channels.factor, found.spread.factor, strict=True)
@@ -238,9 +255,9 @@ def untrusted_warnings(result: JointEstimate, dofs: tuple[str, ...]) -> list[str
     several = len(result.groups) > 1
     told = []
     for group in result.groups:
-        if group.fit.beside is not None:
+        if group.unknown_cross is not None:
             continue
-        out, total = int(np.count_nonzero(~group.fit.trusted)), group.fit.trusted.size
+        out, total = int(np.count_nonzero(~group.used)), group.used.size
         if out > _UNTRUSTED * total:
             whose = f" of {_listed([dofs[d] for d in group.dofs])}" if several else ""
             told.append(f"{out} of {total} lines{whose} do not fit the joint found within their noise and are left out")
@@ -251,7 +268,7 @@ def _hidden_notes(result: JointEstimate, dofs: tuple[str, ...]) -> list[str]:
     """Count the lines on which noise hides the transmission of the joint, where its cross terms are unknown."""
     told = []
     for group in result.groups:
-        beside, total = group.fit.beside, group.fit.trusted.size
+        beside, total = group.unknown_cross, group.used.size
         if beside is not None and beside.hidden > _UNTRUSTED * total:
             told.append(
                 f"on {beside.hidden} of {total} lines noise hides gamma_jk of {_listed([dofs[d] for d in group.dofs])} "
@@ -264,7 +281,7 @@ def _diagonal_warnings(result: JointEstimate, dofs: tuple[str, ...], cross: Cros
     """Say what denies a joint where only the diagonal of its compliance was fitted."""
     told = []
     for group in result.groups:
-        beside = group.fit.beside
+        beside = group.unknown_cross
         if beside is None:
             continue
         whose = _listed([dofs[d] for d in group.dofs])
@@ -276,7 +293,7 @@ def _diagonal_warnings(result: JointEstimate, dofs: tuple[str, ...], cross: Cros
                 "or more than a joint connects them; its symmetry was not used"
             )
         if beside.scatter is not None:
-            share = beside.scatter / np.maximum(group.fit.minimum.x[: len(group.dofs)], np.finfo(float).tiny)
+            share = beside.scatter / np.maximum(group.x[: len(group.dofs)], np.finfo(float).tiny)
             varying = [f"{dofs[d]} by {100 * s:.0f} %" for d, s in zip(group.dofs, share, strict=True) if s > _VARIES]
             if varying:
                 told.append(
@@ -286,13 +303,13 @@ def _diagonal_warnings(result: JointEstimate, dofs: tuple[str, ...], cross: Cros
     return told
 
 
-def _band_part_warnings(found: ComplianceFit) -> list[str]:
+def _band_part_warnings(found: ManifoldFit) -> list[str]:
     """Name parameters on which parts of the band do not agree, each fitted by itself."""
     parts = found.parts
     if parts is None or found.cross_fits:
         return []
     told = []
-    for name, values, disagree in zip(found.joint.parameters, parts.values.T, parts.disagree, strict=True):
+    for one, values, disagree in zip(found.estimate.parameters, parts.values.T, parts.disagree, strict=True):
         if disagree:
             seen = [
                 f"{value:.3g} at {low:g}-{high:g} Hz"
@@ -300,8 +317,8 @@ def _band_part_warnings(found: ComplianceFit) -> list[str]:
                 if np.isfinite(value)
             ]
             told.append(
-                f"{name}: parts of the band, fitted by themselves, do not agree: {_listed(seen)}; the interval allows "
-                "for that, but the joint as described does not fit the data"
+                f"{one.name}: parts of the band, fitted by themselves, do not agree: {_listed(seen)}; the interval "
+                "allows for that, but the joint as described does not fit the data"
             )
     return told
 
@@ -334,9 +351,9 @@ def _sign_warnings(fit: JointFit, intervals: dict[str, tuple[float, float]]) -> 
     ]
 
 
-def _misfit_warnings(found: ComplianceFit, problem: FitProblem) -> list[str]:
+def _misfit_warnings(found: ManifoldFit, problem: FitProblem) -> list[str]:
     """Say whether the residual differs from the noise, and how."""
-    misfit, told = found.misfit, []
+    misfit, told = found.test, []
     apart = f"{abs(misfit.ratio - 1) / misfit.sigma:.0f} sigma"
     if not problem.noise.is_assumed and misfit.is_large:
         text = f"the residual is {misfit.ratio:.2f} times the noise, {apart} above it: the joint does not fit the data"
@@ -353,7 +370,7 @@ def _misfit_warnings(found: ComplianceFit, problem: FitProblem) -> list[str]:
     return told
 
 
-def places_of_excess(misfit: Misfit) -> str:
+def places_of_excess(misfit: ResidualTest) -> str:
     """Say where a residual that is too large is; nothing where it is everywhere."""
     if not misfit.local:
         return ""

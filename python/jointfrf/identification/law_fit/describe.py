@@ -15,9 +15,9 @@ from jointfrf.identification.compliance_fit.describe import (
 )
 from jointfrf.identification.law_fit.law_fit import LawFit
 from jointfrf.identification.manifold.coordinates import LawCoordinates
-from jointfrf.identification.manifold.fit import stiffness_of_lines
-from jointfrf.identification.manifold.law_fit import FoundLaws
+from jointfrf.identification.manifold.fit import ManifoldFit
 from jointfrf.identification.parameter_table import correlation_notes, parameter_warnings
+from jointfrf.laws.law_joint import LawJoint
 
 __all__ = ["DescribedLaws", "describe_laws"]
 
@@ -29,7 +29,7 @@ class DescribedLaws(NamedTuple):
     warnings: tuple[Warning, ...]
 
 
-def describe_laws(found: FoundLaws) -> DescribedLaws:
+def describe_laws(found: ManifoldFit, joint: LawJoint) -> DescribedLaws:
     """Make the result, with its notes and warnings."""
     problem, result = found.problem, found.estimate
     names = [one.name for one in result.parameters]
@@ -48,13 +48,13 @@ def describe_laws(found: FoundLaws) -> DescribedLaws:
         told.append(ConvergenceWarning("the fit did not converge"))
     scale = float(np.sqrt(result.excess))
     fit = LawFit(
-        joint=found.joint,
+        joint=joint.with_values(result.theta),
         parameters=dict(zip(names, result.theta.tolist(), strict=True)),
         covariance=found.covariance,
         noise_level=problem.noise.level * (scale if problem.noise.is_assumed else 1.0),
         residual_level=scale * problem.noise.level,
         freq_hz=problem.freq_hz,
-        k_lines=stiffness_of_lines(problem.frfs),
+        k_lines=problem.frfs.line_stiffness(),
         is_converged=result.converged,
         intervals=found.intervals,
         warnings=tuple(str(one) for one in told),
@@ -63,7 +63,7 @@ def describe_laws(found: FoundLaws) -> DescribedLaws:
     return DescribedLaws(fit, tuple(told))
 
 
-def _parameter_warnings(found: FoundLaws) -> list[str]:
+def _parameter_warnings(found: ManifoldFit) -> list[str]:
     """Name parameters that the data determine poorly or not at all."""
     shown = []
     for group in found.estimate.groups:
@@ -74,9 +74,9 @@ def _parameter_warnings(found: FoundLaws) -> list[str]:
     return parameter_warnings(shown, lambda name: found.intervals.of(name, 0.95))
 
 
-def _misfit_warnings(found: FoundLaws) -> list[str]:
+def _misfit_warnings(found: ManifoldFit) -> list[str]:
     """Say whether the residual differs from the noise, and how."""
-    misfit, told = found.misfit, []
+    misfit, told = found.test, []
     if not found.problem.noise.is_assumed and misfit.is_large:
         apart = f"{abs(misfit.ratio - 1) / misfit.sigma:.0f} sigma"
         told.append(

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from jointfrf.identification.law_fit.describe import DescribedLaws, describe_laws
-from jointfrf.identification.manifold.law_fit import fit_laws
+from jointfrf.identification.manifold.fit import fit_laws
 from jointfrf.identification.manifold.prepare import FitProblem
 from jointfrf.kernel.arguments import as_names, check_type
 from jointfrf.laws.law_joint import LawJoint
@@ -57,4 +57,4 @@ def identify_laws(problem: FitProblem, joint: LawJoint) -> DescribedLaws:
     count = 2 * np.count_nonzero(np.isfinite(problem.frfs.variance))
     if count < len(joint.names):
         raise ValueError(f"{count} numbers measured cannot give {len(joint.names)} parameters of laws")
-    return describe_laws(fit_laws(problem, joint))
+    return describe_laws(fit_laws(problem, joint), joint)

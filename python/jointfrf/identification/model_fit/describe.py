@@ -12,7 +12,7 @@ from jointfrf.identification.model.fit import FoundModel, OpenDirection
 from jointfrf.identification.model.prepare import Channels
 from jointfrf.identification.model_fit.model_fit import ModelFit
 from jointfrf.identification.parameter_table import correlation_notes, parameter_warnings
-from jointfrf.identification.profile import ProfileIntervals
+from jointfrf.identification.profile import Intervals
 
 __all__ = ["DescribedModel", "describe_model"]
 
@@ -85,7 +85,7 @@ def _residual_warnings(fit: ModelFit) -> list[str]:
             found.append(f"in the {what} " + ", ".join(f"{names[i]} ({ratio:.3g})" for i, ratio in channels[:_SHOWN]))
     if np.isfinite(test.neighbours) and test.neighbours > 5:
         found.append("smooth over frequency, as no noise is")
-    if test.ratio > 1 + 3 * test.sigma or test.bands or test.responses or test.forces or test.neighbours > 4:
+    if test.is_large or test.bands or test.responses or test.forces or test.neighbours > 4:
         told.append(
             f"the models and the joint do not fit the FRFs: {'; '.join(found)}; the parameters carry that error, which "
             "the intervals do not allow for"
@@ -96,11 +96,11 @@ def _residual_warnings(fit: ModelFit) -> list[str]:
     return told
 
 
-def _parameter_warnings(fit: ModelFit, intervals: ProfileIntervals) -> list[str]:
+def _parameter_warnings(fit: ModelFit, intervals: Intervals) -> list[str]:
     """Name parameters of the joint that the data determine poorly or not at all."""
-    errors, places = fit.std_error, {one.name: i for i, one in enumerate(fit.fitted)}
+    errors = fit.std_error
     shown = [(one, fit.parameters[one.name], errors[one.name]) for one in fit.fitted if one.origin == "joint"]
-    return parameter_warnings(shown, lambda name: intervals.of(places[name], 0.95))
+    return parameter_warnings(shown, lambda name: intervals.of(name, 0.95))
 
 
 def _direction_warnings(fit: ModelFit) -> list[str]:
