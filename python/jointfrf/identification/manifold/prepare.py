@@ -302,7 +302,7 @@ def check_estimate(found: JointEstimate, level: float, span: str, *, is_level_kn
         Whether that is known from elsewhere than from the residual.
     """
     for group in found.groups:
-        equations, unknowns = 2 * group.fit.equations, group.fit.minimum.x.size
+        equations, unknowns = 2 * group.equations, group.x.size
         if equations < unknowns:
             raise ValueError(
                 f"gamma gives {equations:.0f} real equations ({span}, without those that no joint fits) for {unknowns} "

@@ -15,12 +15,11 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
 from jointfrf.frf.bands import in_pieces
-from jointfrf.identification.manifold.coordinates import JointCoordinates, terms_of
-from jointfrf.identification.manifold.group_fit import GroupFit, GroupProblem, Misfitting
+from jointfrf.identification.manifold.coordinates import JointCoordinates
+from jointfrf.identification.manifold.group_fit import GroupFit, GroupProblem, UnknownCrossTerms
 from jointfrf.identification.manifold.line_forms import (
     FormMinimum,
     LineForms,
-    minimise_forms,
 )
 from jointfrf.identification.manifold.on_manifold import FrfEntries, LineData
 from jointfrf.identification.manifold.starts import hidden_share
@@ -226,10 +225,9 @@ class _Lines(NamedTuple):
 
 
 class _Weighted(NamedTuple):
-    """The minimum, with the forms and the standard deviation between lines, m/N, that belong to it."""
+    """The minimum, with the standard deviation between lines, m/N, that belongs to it."""
 
     minimum: FormMinimum
-    forms: LineForms
     scatter: FloatArray | None
     steps: int
     converged: bool
@@ -254,18 +252,20 @@ def fit_unknown_cross(problem: GroupProblem, starts: Iterable[FloatArray]) -> Gr
     """
     joint = problem.joint
     lines, is_symmetric = _lines(problem)
-    by_noise = lines.forms(np.zeros(terms_of(joint).n))
-    best = _best_of([minimise_forms(by_noise, joint, start) for start in [*starts, _middle(lines, joint)]])
+    by_noise = lines.forms(np.zeros(joint.n))
+    best = _best_of([joint.minimise(by_noise, start) for start in [*starts, _middle(lines, joint)]])
     equations = float((lines.weight[:, None] * lines.known).sum())
     possible = float(lines.known.sum())
-    found = _Weighted(best, by_noise, None, 1, True)
+    found = _Weighted(best, None, 1, True)
     degrees = max(equations - best.x.size / 2, 1.0)
     if best.cost / degrees > max(_MISFIT**2, 1 + _SIGMA / np.sqrt(degrees)):
         found = _with_scatter(lines, joint, best.x)
-    told = Misfitting(best.cost, is_symmetric, found.scatter, int(np.count_nonzero(lines.weight < 0.5)))
-    return GroupFit(
-        found.minimum, found.forms, lines.weight > 0, equations, possible, found.steps, found.converged, told
-    )
+    hidden = int(np.count_nonzero(lines.weight < 0.5))
+    return GroupFit.of(
+        found.minimum, problem=problem, used=lines.weight > 0, equations=equations, possible=possible,
+        iterations=found.steps, converged=found.converged,
+        unknown_cross=UnknownCrossTerms(best.cost, is_symmetric, found.scatter, hidden),
+    )  # fmt: skip
 
 
 def _lines(problem: GroupProblem) -> tuple[_Lines, bool]:
@@ -319,7 +319,7 @@ def _finite(found: ComplianceLines) -> ComplianceLines:
 
 def _middle(lines: _Lines, joint: JointCoordinates) -> FloatArray:
     """Return the stiffness of the median of C, no damping."""
-    n = terms_of(joint).n
+    n = joint.n
     start = np.zeros(joint.lower.size)
     for d in range(n):
         seen = lines.known[:, d] & (lines.weight > 0.5)
@@ -337,14 +337,14 @@ def _with_scatter(lines: _Lines, joint: JointCoordinates, start: FloatArray) -> 
     variance = _variance_between_lines(lines, joint, x)
     for step in range(1, _STEPS + 1):
         forms = lines.forms(variance)
-        best = _best_of([minimise_forms(forms, joint, one) for one in (x, _middle(lines, joint))])
+        best = _best_of([joint.minimise(forms, one) for one in (x, _middle(lines, joint))])
         change, x = best.x - x, best.x
         converged = bool(np.sqrt(abs(2 * (change @ best.information @ change))) < _SETTLED * np.sqrt(x.size))
         if converged and step > 1:
             break
         # The mean of both: by itself a scatter that is too large is followed by one that is too small.
         variance = (variance + _variance_between_lines(lines, joint, x)) / 2
-    return _Weighted(best, forms, np.sqrt(variance), step, converged)
+    return _Weighted(best, np.sqrt(variance), step, converged)
 
 
 def _variance_between_lines(lines: _Lines, joint: JointCoordinates, x: FloatArray) -> FloatArray:

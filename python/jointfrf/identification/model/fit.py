@@ -20,7 +20,7 @@ from jointfrf.identification.model.prediction import Prediction
 from jointfrf.identification.model.starts import ranked_trials, refined
 from jointfrf.identification.noise import noise_about
 from jointfrf.identification.parameters import ParameterVector
-from jointfrf.identification.profile import ProfileIntervals
+from jointfrf.identification.profile import Intervals, ProfileIntervals
 from jointfrf.identification.residual_test import ResidualTest, check_residual
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
@@ -94,7 +94,7 @@ class FoundModel(NamedTuple):
         Of all parameters.
     covariance : ndarray, shape (p, p)
         Of the values of the free parameters.
-    intervals : ProfileIntervals
+    intervals : Intervals
     predicted : ndarray, shape (n_freq, n_o, n_i)
     residual : ndarray, shape (n_freq, n_o, n_i)
         Over the standard deviation of the noise; NaN where nothing is measured.
@@ -108,7 +108,7 @@ class FoundModel(NamedTuple):
     minimum: Minimum
     values: FloatArray
     covariance: FloatArray
-    intervals: ProfileIntervals
+    intervals: Intervals
     predicted: ComplexArray
     residual: ComplexArray
     test: ResidualTest
@@ -231,15 +231,16 @@ def _judged(problem: ModelProblem, minimum: Minimum, other: float) -> FoundModel
     residual = (likelihood.measured - predicted) / std
     test = check_residual(
         residual, problem.freq_hz, vector.pulls(minimum.x),
-        parameters=minimum.x.size, inflation=problem.inflation, is_told=problem.noise is None,
+        parameters=minimum.x.size, inflation=problem.inflation, is_given=problem.noise is None,
     )  # fmt: skip
-    factor = max(1.0, test.ratio**2) if test.ratio > 1 + 3 * test.sigma else 1.0
+    factor = max(1.0, test.ratio**2) if test.is_large else 1.0
     own = inverse_information(minimum.information)
     slope = vector.slope(minimum.x)
     covariance = own * factor * np.outer(slope, slope)
+    profile = ProfileIntervals(likelihood, vector, minimum.x, minimum.cost, own, factor)
     return FoundModel(
-        problem, minimum, values, covariance, ProfileIntervals(likelihood, minimum, own, factor), predicted, residual,
-        test, open_directions(vector, minimum.x, minimum.information), other,
+        problem, minimum, values, covariance, Intervals([one.name for one in vector.fitted], profile.of), predicted,
+        residual, test, open_directions(vector, minimum.x, minimum.information), other,
     )  # fmt: skip
 
 
