@@ -6,12 +6,13 @@ from collections.abc import Callable, Sequence
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import special
 
-from jointfrf.identification.minimise import Squares, minimise
+from jointfrf.identification.minimise import Linearised, Squares, minimise
 from jointfrf.kernel.arguments import FloatArray
 
-__all__ = ["Intervals", "ProfileIntervals", "ProfiledCoordinates"]
+__all__ = ["FunctionIntervals", "Intervals", "ProfileIntervals", "ProfiledCoordinates"]
 
 #: Squares on the way of the linear prediction that differ less than this from those of a parabola need no profile, and
 #: how near to a limit squares must come, relative to it; the latter where squares cost little.
@@ -20,8 +21,14 @@ _PARABOLA, _NEAR, _PRECISE = 0.1, 0.03, 2e-4
 _STEPS = 30
 #: Linearisations at a value of the parameter that is held, and what a step promises at the last one.
 _HELD_STEPS, _HELD_LEAST = 6, 1e-2
+#: Step of a difference, in standard errors, and how far from its value a function may be that is held, likewise.
+_SLOPE, _HELD = 1e-3, 1e-2
 #: A limit is sought between these shares of what brackets it.
 _INSIDE = np.array([0.1, 0.9])
+
+
+#: From a function of the values of all parameters, the numbers of those that it depends on, and a probability.
+FunctionIntervals = Callable[[Callable[[FloatArray], float], NDArray[np.intp], float], tuple[float, float] | None]
 
 
 class ProfiledCoordinates(Protocol):
@@ -120,6 +127,42 @@ class ProfileIntervals:
                 return end
         return self._value(i, sign * reach)
 
+    def of_function(self, function: Callable[[FloatArray], float], probability: float) -> tuple[float, float] | None:
+        """Return the interval of a function of the coordinates: the squares are minimised with the function held.
+
+        None where it does not change with the coordinates, or has no derivative.
+        """
+        best, x = function(self.x), self.x
+        steps = _SLOPE * np.sqrt(np.maximum(np.diagonal(self.covariance), 0)) * np.eye(x.size)
+        size = np.maximum(np.diagonal(steps), np.finfo(float).tiny)
+        slope = np.array([function(x + step) - function(x - step) for step in steps]) / (2 * size)
+        variance = float(slope @ self.covariance @ slope)
+        if not (np.isfinite(variance) and variance > 0):
+            return None
+        unit, along = self.squares.unit, self.covariance @ slope / variance
+        limit = float(special.ndtri((1 + probability) / 2)) ** 2 * self.factor * unit
+        ends = []
+        for sign in (-1, 1):
+            reach, low, high = float(np.sqrt(limit * variance / unit)), 0.0, np.inf
+            there = self._there(sign * reach * along)
+            excess = self._excess(self.squares.cost(there))
+            if abs(excess / limit - 1) < self.parabola:
+                ends.append(function(self._there(sign * reach * np.sqrt(limit / excess) * along)))
+                continue
+            for _ in range(_STEPS):
+                held = _HeldFunction(self.squares, function, best + sign * reach, variance)
+                there = minimise(held, there, None, _HELD_STEPS, _HELD_LEAST).x
+                excess = self._excess(self.squares.cost(there))
+                if abs(excess / limit - 1) < self.near:
+                    break
+                low, high = (reach, high) if excess < limit else (low, reach)
+                guess = reach * float(np.sqrt(limit / max(excess, 1e-6 * limit)))
+                reach = (
+                    min(guess, 4 * reach) if high == np.inf else float(np.clip(guess, *(low + (high - low) * _INSIDE)))
+                )
+            ends.append(best + sign * reach if high < np.inf or excess > (1 - 2 * self.near) * limit else sign * np.inf)
+        return ends[0], ends[1]
+
     def _minimised(self, start: FloatArray, i: int) -> float:
         return minimise(self.squares, start, i, _HELD_STEPS, _HELD_LEAST).cost
 
@@ -135,6 +178,34 @@ class ProfileIntervals:
         return self.coordinates.value(i, np.asarray(np.clip(x, *self.squares.bounds)))
 
 
+class _HeldFunction:
+    """Squares with a function of the coordinates held at a value, by squares that rise fast with its distance."""
+
+    def __init__(
+        self, squares: Squares, function: Callable[[FloatArray], float], value: float, variance: float
+    ) -> None:
+        self.squares, self.function, self.value = squares, function, value
+        self.unit, self.bounds, self.longest = squares.unit, squares.bounds, squares.longest
+        self.weight = squares.unit / (_HELD**2 * variance)
+
+    def cost(self, x: FloatArray) -> float:
+        """Return the sum of the squares."""
+        return self.squares.cost(x) + self.weight * (self.function(x) - self.value) ** 2
+
+    def linearised(self, x: FloatArray) -> Linearised:
+        """Return it with its derivatives; the function's by differences."""
+        at = self.squares.linearised(x)
+        steps = _SLOPE / np.sqrt(np.maximum(np.diagonal(at.information) / self.unit, np.finfo(float).tiny))
+        ends = [(self.function(x + step), self.function(x - step)) for step in steps * np.eye(x.size)]
+        slope = np.array([one - other for one, other in ends]) / (2 * steps)
+        apart = self.value - self.function(x)
+        return Linearised(
+            at.cost + self.weight * apart**2,
+            at.information + self.weight * np.outer(slope, slope),
+            at.gradient + self.weight * apart * slope,
+        )
+
+
 class Intervals:
     """Intervals of all parameters of a fit, by their probability.
 
@@ -143,10 +214,15 @@ class Intervals:
     names : sequence of str
     limits : callable
         ``limits(i, probability)`` returns the interval of parameter i.
+    of_function : callable
+        ``of_function(function, used, probability)`` returns that of a function of the values of all, which depends on
+        those with the numbers `used`; None where it follows from the covariance.
     """
 
-    def __init__(self, names: Sequence[str], limits: Callable[[int, float], tuple[float, float]]) -> None:
-        self.names, self._limits = tuple(names), limits
+    def __init__(
+        self, names: Sequence[str], limits: Callable[[int, float], tuple[float, float]], of_function: FunctionIntervals
+    ) -> None:
+        self.names, self._limits, self.of_function = tuple(names), limits, of_function
         self._known: dict[tuple[str, float], tuple[float, float]] = {}
 
     def of(self, name: str, probability: float) -> tuple[float, float]:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import special
 
 from jointfrf.frf.bands import in_pieces, line_slices
@@ -235,7 +236,26 @@ def joint_intervals(found: JointEstimate, factor: FloatArray, added: FloatArray 
                 return -np.inf, np.inf
         return _widened(group, i, own, reach)
 
-    return Intervals([one.name for one in found.parameters], limits)
+    def of_function(
+        function: Callable[[FloatArray], float], used: NDArray[np.intp], probability: float
+    ) -> tuple[float, float] | None:
+        group = place[int(used[0])][0]
+        if not np.isin(used, group.which).all() or more[used].any():
+            return None
+        if not np.isfinite([limits(which, probability) for which in used.tolist()]).all():
+            return -np.inf, np.inf
+
+        def of_coordinates(x: FloatArray) -> float:
+            values = found.theta.copy()
+            values[group.which] = group.joint.theta(x)
+            return function(values)
+
+        squares = FormSquares(group.forms, group.joint)
+        own = float(factor[used].max())
+        profile = ProfileIntervals(squares, group.joint, group.x, group.cost, group.covariance, own)
+        return profile.of_function(of_coordinates, probability)
+
+    return Intervals([one.name for one in found.parameters], limits, of_function)
 
 
 def _limits(group: GroupFit, i: int, factor: float, probability: float) -> tuple[float, float]:

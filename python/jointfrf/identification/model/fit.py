@@ -238,8 +238,15 @@ def _judged(problem: ModelProblem, minimum: Minimum, other: float) -> FoundModel
     slope = vector.slope(minimum.x)
     covariance = own * factor * np.outer(slope, slope)
     profile = ProfileIntervals(likelihood, vector, minimum.x, minimum.cost, own, factor)
+    intervals = Intervals(
+        [one.name for one in vector.fitted],
+        profile.of,
+        lambda function, _, probability: profile.of_function(
+            lambda x: function(vector.to_values(x)[vector.free]), probability
+        ),
+    )
     return FoundModel(
-        problem, minimum, values, covariance, Intervals([one.name for one in vector.fitted], profile.of), predicted,
+        problem, minimum, values, covariance, intervals, predicted,
         residual, test, open_directions(vector, minimum.x, minimum.information), other,
     )  # fmt: skip
 
