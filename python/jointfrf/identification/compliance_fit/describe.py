@@ -174,8 +174,8 @@ def _small_residual_notes(found: ManifoldFit, problem: FitProblem) -> list[str]:
     # What is not rigid in the channels weighs as noise, and averages out of a residual of joint DOFs.
     if noise.is_assumed or found.channels is not None or not misfit.is_small:
         return []
-    why = "said" if noise.is_told else "their reciprocity shows"
-    mean = _MEAN_OF_TWO if problem.frfs.symmetrised and noise.is_told else ""
+    why = "said" if noise.is_given else "their reciprocity shows"
+    mean = _MEAN_OF_TWO if problem.frfs.symmetrised and noise.is_given else ""
     return [
         f"the residual is {misfit.ratio:.2g} times the noise: the FRFs have less noise than {why}, or were smoothed"
         f"{mean}; the intervals are wider than they need be"
@@ -357,7 +357,7 @@ def _misfit_warnings(found: ManifoldFit, problem: FitProblem) -> list[str]:
     apart = f"{abs(misfit.ratio - 1) / misfit.sigma:.0f} sigma"
     if not problem.noise.is_assumed and misfit.is_large:
         text = f"the residual is {misfit.ratio:.2f} times the noise, {apart} above it: the joint does not fit the data"
-        by_part = problem.noise.is_told and abs(misfit.ratio / np.sqrt(2) - 1) < _BY_PART
+        by_part = problem.noise.is_given and abs(misfit.ratio / np.sqrt(2) - 1) < _BY_PART
         told.append(text + (_COUPLED if found.cross_fits else _PER_PART if by_part else places_of_excess(misfit)))
     if found.cross_fits:
         return told

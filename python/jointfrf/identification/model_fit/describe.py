@@ -130,12 +130,12 @@ def _other_warnings(found: FoundModel) -> list[str]:
 
 def _noise_notes(found: FoundModel) -> list[str]:
     problem, told = found.problem, []
-    if problem.is_assumed:
+    if problem.noise.is_assumed:
         told.append("the noise level is taken from the residual: the FRFs do not show it otherwise")
-    if problem.inflation > 1.2:
+    if problem.noise.inflation > 1.2:
         told.append(
             f"the noise of neighbouring lines is correlated: {problem.freq_hz.size} lines say as much as "
-            f"{problem.freq_hz.size / problem.inflation:.0f} independent ones"
+            f"{problem.freq_hz.size / problem.noise.inflation:.0f} independent ones"
         )
     return told
 

@@ -7,12 +7,14 @@ from collections.abc import Mapping, Sequence
 
 from numpy.typing import ArrayLike
 
+from jointfrf.identification.compliance_start import compliance_start
 from jointfrf.identification.model.assembly import Assembly
 from jointfrf.identification.model.fit import fit_assembly
-from jointfrf.identification.model.prepare import ChannelNoise, Channels, prepare_model_fit
+from jointfrf.identification.model.prepare import Channels, prepare_model_fit
 from jointfrf.identification.model.substructure import Unknown
 from jointfrf.identification.model_fit.describe import describe_model
 from jointfrf.identification.model_fit.model_fit import ModelFit
+from jointfrf.identification.noise import NoiseOptions
 from jointfrf.kernel.arguments import as_names, check_type
 
 __all__ = ["identify_model"]
@@ -112,8 +114,8 @@ def identify_model(
             raise TypeError(f"{name} must be a mapping of channels to Unknown, not {type(gains).__name__}")
     named = as_names("responses", responses), as_names("forces", forces)
     channels = Channels(*named, dict(response_gains or {}), dict(force_gains or {}))
-    told = ChannelNoise(noise, coherence, averages)
-    problem = prepare_model_fit(freq_hz, h, assembly, channels, told, fixed)
+    told = NoiseOptions(noise, coherence, averages)
+    problem = prepare_model_fit(freq_hz, h, assembly, channels, told, fixed, compliance_start)
     described = describe_model(fit_assembly(problem), channels)
     for warning in described.warnings:
         warnings.warn(warning, stacklevel=2)
