@@ -324,7 +324,7 @@ def _scattering(fit: Fit, spread: Spread) -> list[Finding]:
 def _misfit(found: ManifoldFit, problem: FitProblem) -> list[Finding]:
     """Say whether the residual differs from the noise, and how."""
     misfit, noise = found.test, problem.noise
-    by_part = noise.is_told and abs(misfit.ratio / np.sqrt(2) - 1) < _BY_PART
+    by_part = noise.is_given and abs(misfit.ratio / np.sqrt(2) - 1) < _BY_PART
     why = _COUPLED if found.cross_fits else _PER_PART if by_part else None
     findings = _too_large(misfit, "the joint does not fit the data", why) if not noise.is_assumed else []
     for trend in () if found.cross_fits else misfit.trends:
@@ -343,8 +343,8 @@ def _small_residual(found: ManifoldFit, problem: FitProblem) -> list[Finding]:
     # What is not rigid in the channels weighs as noise, and averages out of a residual of joint DOFs.
     if noise.is_assumed or found.channels is not None or not misfit.is_small:
         return []
-    why = "said" if noise.is_told else "their reciprocity shows"
-    mean = _MEAN_OF_TWO if problem.frfs.symmetrised and noise.is_told else ""
+    why = "said" if noise.is_given else "their reciprocity shows"
+    mean = _MEAN_OF_TWO if problem.frfs.symmetrised and noise.is_given else ""
     text = (
         f"the residual is {misfit.ratio:.2g} times the noise: the FRFs have less noise than {why}, or were smoothed"
         f"{mean}; the intervals are wider than they need be"
@@ -456,7 +456,7 @@ def describe_model(found: FoundModel, channels: Channels) -> Fit:
         *poor_laws(fit, is_log, lambda name: found.intervals.of(name, 0.95)),
         *_directions(found.directions),
         *_other_minimum(found.other),
-        *_noise(problem.is_assumed, problem.inflation, problem.freq_hz),
+        *_noise(problem.noise.is_assumed, problem.noise.inflation, problem.freq_hz),
         *_priors(fit, found.directions),
         *_correlated(fit),
     ]

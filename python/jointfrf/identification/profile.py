@@ -17,8 +17,8 @@ __all__ = ["FunctionIntervals", "Intervals", "ProfileIntervals", "ProfiledCoordi
 #: Squares on the way of the linear prediction that differ less than this from those of a parabola need no profile, and
 #: how near to a limit squares must come, relative to it; the latter where squares cost little.
 _PARABOLA, _NEAR, _PRECISE = 0.1, 0.03, 2e-4
-#: Steps in search of a limit.
-_STEPS = 30
+#: Steps in search of a limit, and where squares cost little.
+_STEPS, _MANY_STEPS = 12, 30
 #: Linearisations at a value of the parameter that is held, and what a step promises at the last one.
 _HELD_STEPS, _HELD_LEAST = 6, 1e-2
 #: Step of a difference, in standard errors, and how far from its value a function may be that is held, likewise.
@@ -81,6 +81,7 @@ class ProfileIntervals:
         self.squares, self.coordinates, self.x, self.cost = squares, coordinates, x, cost
         self.covariance, self.factor = covariance, factor
         self.least = self._minimised if least is None else least
+        self.steps = _STEPS if least is None else _MANY_STEPS
         self.parabola, self.near = (_PARABOLA, _NEAR) if least is None else (_PRECISE, _PRECISE)
 
     def of(self, i: int, probability: float) -> tuple[float, float]:
@@ -102,7 +103,7 @@ class ProfileIntervals:
         reach = min(float(np.sqrt(limit * variance)), self.coordinates.longest_reach(i))
         low, high = 0.0, np.inf
         quadratic = reach**2 / variance
-        for step in range(_STEPS):
+        for step in range(self.steps):
             at_bound = sign * (self.x[i] + sign * reach - bound) >= 0
             if at_bound:
                 reach = sign * (bound - self.x[i])

@@ -16,8 +16,14 @@ from jointfrf.frf.quantiles import medians
 from jointfrf.identification.manifold.coordinates import CrossTerms, DampingTerms
 from jointfrf.identification.manifold.estimate import GroupStart, JointEstimate
 from jointfrf.identification.manifold.interface_frfs import InterfaceFrfs
-from jointfrf.identification.manifold.transforms import Transform, Transforms, as_transforms
-from jointfrf.identification.noise import KnownNoise, NoiseOptions, known_noise
+from jointfrf.identification.manifold.transforms import (
+    Transform,
+    Transforms,
+    as_transforms,
+    deformation_compliance,
+    deformation_variance,
+)
+from jointfrf.identification.noise import KnownNoise, NoiseOptions, noise_of_matrix
 from jointfrf.identification.prepare import BandsOfDofs, MeasuredFrfs, as_dof_names
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_names, as_real, check_choice
 
@@ -129,28 +135,37 @@ def prepare_compliance(
     # Whether channels are the same points is known where both transforms are one.
     square = h.shape[1] == h.shape[2] and np.array_equal(responses, forces)
     _check_joint_dofs(transforms, h, names)
-    found = known_noise(freq, h, noise, transforms, reciprocal=options.reciprocal and square)
-    check_joint_seen(freq, found.smooth, transforms.variance(found.variance))
+    found = noise_of_matrix(freq, h, noise, reciprocal=options.reciprocal and square)
+    smooth, variance = transforms.gamma(found.smooth), found.variance
+    check_joint_seen(freq, smooth, transforms.variance(variance))
+    transforms = transforms.with_modes(found.smooth)
+    deformation, compliance = None, transforms.compliance
+    if transforms.channels is not None:
+        deformation = deformation_variance(found.smooth, *transforms.channels)
+        of_sides = deformation_compliance(h, variance, *transforms.channels)
+        compliance = of_sides if compliance is None else np.maximum(compliance, 0.0 if of_sides is None else of_sides)
+    elif compliance is not None:
+        compliance = np.maximum(compliance, 0.0)
     return FitProblem(
         dofs=names,
         freq_hz=freq,
         frfs=InterfaceFrfs.of(
             h,
-            found.smooth,
-            found.variance if found.deformation is None else found.variance + found.deformation,
+            smooth,
+            variance if deformation is None else variance + deformation,
             responses,
             forces,
             options.reciprocal,
             symmetrised=square and _is_symmetrised(h),
-            response_modes=found.transforms.response_modes,
-            force_modes=found.transforms.force_modes,
+            response_modes=transforms.response_modes,
+            force_modes=transforms.force_modes,
         ),
         noise=found.noise,
         used=used[kept],
         bands=tuple(map(tuple, own)),
         options=options,
-        deformation=found.deformation,
-        added_compliance=found.compliance,
+        deformation=deformation,
+        added_compliance=compliance,
         left_out=() if transforms.geometry is None else left_out_dofs(h, transforms.geometry),
     )
 

@@ -18,7 +18,7 @@ from jointfrf.identification.minimise import Minimum, inverse_information, minim
 from jointfrf.identification.model.likelihood import Likelihood
 from jointfrf.identification.model.prediction import Prediction
 from jointfrf.identification.model.starts import ranked_trials, refined
-from jointfrf.identification.noise import noise_about
+from jointfrf.identification.noise import KnownNoise, noise_about
 from jointfrf.identification.parameters import ParameterVector
 from jointfrf.identification.profile import Intervals, ProfileIntervals
 from jointfrf.identification.residual_test import ResidualTest, check_residual
@@ -49,12 +49,7 @@ class ModelProblem:
         E|e|^2, inf where nothing is measured.
     smooth : ndarray, shape (n_freq, n_o, n_i)
         Smooth FRFs.
-    inflation : float
-        Lines that carry the noise of one independent line.
-    noise : NoiseModel or None
-        None where the noise was told.
-    is_assumed : bool
-        Whether the level of the noise follows from the residual.
+    noise : KnownNoise
     joint_channels : pair of list of int, or None
         Responses and forces at the joint DOFs j, then k, where all are measured.
     compliance_start : callable or None
@@ -69,9 +64,7 @@ class ModelProblem:
     measured: ComplexArray
     variance: FloatArray
     smooth: ComplexArray
-    inflation: float
-    noise: NoiseModel | None
-    is_assumed: bool
+    noise: KnownNoise
     joint_channels: tuple[list[int], list[int]] | None
     compliance_start: Callable[[], FloatArray | None]
     tested: FloatArray | None = None
@@ -79,7 +72,7 @@ class ModelProblem:
     @property
     def likelihood(self) -> Likelihood:
         """The likelihood for this variance."""
-        return Likelihood.of_variance(self.prediction, self.vector, self.measured, self.variance, self.inflation)
+        return Likelihood.of_variance(self.prediction, self.vector, self.measured, self.variance, self.noise.inflation)
 
 
 class FoundModel(NamedTuple):
@@ -125,7 +118,7 @@ def fit_assembly(problem: ModelProblem) -> FoundModel:
             if not problem.prediction.refine(problem.vector, problem.vector.to_values(minimum.x)):
                 break
             minimum = minimise(problem.likelihood, minimum.x)
-        for _ in range(2 if problem.is_assumed else 1):
+        for _ in range(2 if problem.noise.is_assumed else 1):
             changed = _with_noise_of_model(problem, minimum)
             if changed is None:
                 break
@@ -149,12 +142,12 @@ def _lowest(problem: ModelProblem) -> tuple[Minimum, float]:
     for values in itertools.chain(_values_of_lines(problem), [vector.values]):
         given.append(values)
         found.append(minimise(likelihood, vector.to_coordinates(values)))
-        if _ratio(likelihood, found[-1], problem.inflation) < _GOOD:
+        if _ratio(likelihood, found[-1], problem.noise.inflation) < _GOOD:
             return found[-1], np.inf
     trials = ranked_trials(likelihood, given)
     for x in itertools.islice(refined(likelihood, trials), _FOLLOWED):
         found.append(minimise(likelihood, x))
-        if _ratio(likelihood, found[-1], problem.inflation) < _GOOD and not problem.is_assumed:
+        if _ratio(likelihood, found[-1], problem.noise.inflation) < _GOOD and not problem.noise.is_assumed:
             break
     best = min(found, key=lambda one: one.cost)
     apart = [one.cost - best.cost for one in found if abs(one.x - best.x).max(initial=0) > 0.1 and one.cost > best.cost]
@@ -190,10 +183,10 @@ def _values_of_lines(problem: ModelProblem) -> Iterator[FloatArray]:
 def _with_noise_of_model(problem: ModelProblem, minimum: Minimum) -> ModelProblem | None:
     """Return the problem with noise about fitted FRFs where these fit, or of the level of the residual."""
     likelihood = problem.likelihood
-    ratio = _ratio(likelihood, minimum, problem.inflation)
-    if problem.is_assumed:
+    ratio = _ratio(likelihood, minimum, problem.noise.inflation)
+    if problem.noise.is_assumed:
         return None if abs(ratio - 1) < 1e-3 else replace(problem, variance=problem.variance * ratio**2)
-    noise = problem.noise
+    noise = problem.noise.model
     if noise is None or noise.source != "residual" or ratio > _GOOD or noise.coherence_factor.any():
         return None
     predicted = problem.prediction.frfs(problem.vector, problem.vector.to_values(minimum.x))
@@ -231,7 +224,7 @@ def _judged(problem: ModelProblem, minimum: Minimum, other: float) -> FoundModel
     residual = (likelihood.measured - predicted) / std
     test = check_residual(
         residual, problem.freq_hz, vector.pulls(minimum.x),
-        parameters=minimum.x.size, inflation=problem.inflation, is_given=problem.noise is None,
+        parameters=minimum.x.size, inflation=problem.noise.inflation, is_given=problem.noise.is_given,
     )  # fmt: skip
     factor = max(1.0, test.ratio**2) if test.is_large else 1.0
     own = inverse_information(minimum.information)
