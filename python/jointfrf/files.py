@@ -1,4 +1,4 @@
-"""Files: how one begins, what reading one may take, and writing whole or not at all."""
+"""Files: their first bytes, limits of reading, and writing as a whole or not at all."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from jointfrf.errors import FileContentError
 
 __all__ = ["HEAD", "LIMIT_VARIABLE", "ReadLimit", "below", "check_file", "head_of", "write_file", "written_whole"]
 
-#: How much of a file shows what it is, bytes.
+#: First bytes of a file, from which its format is detected.
 HEAD = 1 << 13
-#: Says another limit, GB.
+#: Environment variable with another limit, GB.
 LIMIT_VARIABLE = "JOINTFRF_FILE_LIMIT_GB"
 #: Without one: files beyond this are not read, GB; what a file holds may take so much memory, GB, or so many times the
 #: size of the file, whichever is more.
@@ -30,6 +30,7 @@ _LEAST = 10_000
 _UNUSUAL, _LONGEST = re.compile(r"[^\w+,=.-]", re.ASCII), 100
 #: Where names are those of open files, which cannot be replaced.
 _OPEN_FILES = "/proc/"
+#: Most links that are followed, as Linux does.
 _MOST_LINKS = 40
 
 
@@ -191,7 +192,7 @@ def below(folder: Path, name: str, suffix: str = "") -> Path:
 
 
 def write_file(path: Path, content: str | bytes) -> None:
-    """Write a file beside its place and move it there: a reader finds the old one or the new one, never a part.
+    """Write a file under a temporary name and rename it: a reader finds the old file or the new one, never a part.
 
     Parameters
     ----------
@@ -211,13 +212,13 @@ def write_file(path: Path, content: str | bytes) -> None:
 
 @contextmanager
 def written_whole(path: Path) -> Iterator[Path]:
-    """Give a place beside a file for what is written piece by piece, and move it there at the end.
+    """Yield a temporary file beside a path, and move it there at the end.
 
     Parameters
     ----------
     path : Path
-        In a folder that exists. Where a link is, the file is replaced that it leads to. An older file leaves its mode
-        and its owner to the new one. A device or a pipe is not replaced: all is written into it at the end.
+        In a folder that exists. Where a link is, the file is replaced that it leads to. The new file gets mode and
+        owner of an older one. A device or a pipe is not replaced: all is written into it at the end.
 
     Raises
     ------

@@ -172,7 +172,7 @@ def transform(
 
 
 class DifferenceError(NamedTuple):
-    """What finite differences will do to a rotational joint stiffness.
+    """Errors of a rotational joint stiffness by finite differences.
 
     Attributes
     ----------

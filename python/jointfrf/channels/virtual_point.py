@@ -60,7 +60,7 @@ class VirtualPoint(NamedTuple):
     condition : float
         Condition number of W^(1/2) R with rotations times the reach of the channels (root mean square distance to the
         point), so that it does not depend on units. 1 is best; above some hundreds the point lies far from the
-        channels, or they hardly show some DOF.
+        channels, or some DOF is poorly observed.
     point : ndarray, shape (3,)
         Where it is, m.
     motion : ndarray, shape (m, 6)
@@ -382,7 +382,7 @@ def _check_seen(names: tuple[str, ...], size: FloatArray, right: FloatArray) -> 
     raise ValueError(f"dofs: the channels {' and '.join(faults)}")
 
 
-#: Residuals below this share of the motion are round-off: no channel is to blame.
+#: Residuals below this share of the motion are round-off: no channel is faulty.
 _ROUND_OFF = 1e-10
 
 

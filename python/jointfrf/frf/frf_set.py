@@ -26,12 +26,14 @@ __all__ = [
     "same_frf",
 ]
 
+#: How often a receptance is differentiated in time to give the quantity.
 POWER_OF_I_OMEGA = {"receptance": 0, "mobility": 1, "accelerance": 2}
-"""How often a receptance is differentiated in time to give the quantity."""
 
 _PLURALS = {"receptance": "receptances m/N", "mobility": "mobilities (m/s)/N", "accelerance": "accelerances (m/s^2)/N"}
+#: Names of directions, and of channels.
 _DIRECTION = re.compile(r"([+-]?)(r?[xyz])")
 _CHANNEL = re.compile(r"(\d+)\s*:?\s*([+-]?r?[xyz])")
+#: Names of missing FRFs that a message lists.
 _NAMES_SHOWN = 10
 #: How far above 1 single precision may leave a coherence.
 ROUND_OFF = 1e-5

@@ -1,4 +1,4 @@
-"""Noise of measured FRFs from the FRFs themselves: variance by entry and frequency, correlation, outlying lines."""
+"""Noise of measured FRFs from the FRFs alone: variance by entry and frequency, correlation, outlying lines."""
 
 from __future__ import annotations
 
@@ -29,18 +29,18 @@ __all__ = ["NoiseModel", "estimate_noise"]
 #: What the variance was found from.
 NoiseSource = Literal["residual", "reciprocity", "none"]
 
-#: Smoothing never takes up more of the noise power than this, as far as residuals are corrected for it.
+#: Most of the noise power that residuals are corrected for: beyond, the correction would exceed a factor of five.
 _MOST_TAKEN = 0.8
 #: Smooth FRFs and noise model are found in turn so often at most, until variances change by less than a factor on
-#: nearly all lines.
+#: nearly all lines: weights that are wrong by 1.5 on half of the lines cost 4 % of the efficiency.
 _MOST_TURNS = 4
 _SETTLED = 1.5
 _SETTLED_SHARE = 0.97
 #: The residual about smooth FRFs with the poles of others is this many times their noise at most.
 _LIKE = 1.2
-#: Differences that are so many times smaller than measured minus smooth do not see the noise of driving points.
+#: Differences that are so many times smaller than measured minus smooth do not contain the noise of driving points.
 _UNSEEN = 3.0
-#: Relative noise that weights are not taken below.
+#: Least relative noise for weights: systematic errors of measured FRFs are larger.
 _ROUNDING = 1e-4
 _TINY = float(np.finfo(float).tiny)
 
@@ -49,8 +49,8 @@ _TINY = float(np.finfo(float).tiny)
 class NoiseModel:
     """Noise of measured FRFs.
 
-    E|e|^2 = line_level line_factor (relative^2 |h|^2 + floor^2 + coherence_factor^2 v), v the variance that coherence
-    tells.
+    E|e|^2 = line_level line_factor (relative^2 |h|^2 + floor^2 + coherence_factor^2 v), v the variance by
+    coherence.
 
     Attributes
     ----------
@@ -273,8 +273,8 @@ def _estimated(
         before, variance = variance, lines.weighing(model.variance)
         shown = (smooth.h != 0).any(axis=0)
         settled = _alike(before[:, shown], variance[:, shown])
-        told = None if differences is None else inflation
-        smooth = lines.smoothed(variance, told, 0 if settled else patience, smooth.poles)
+        known = None if differences is None else inflation
+        smooth = lines.smoothed(variance, known, 0 if settled else patience, smooth.poles)
         if settled:
             break
     model = _model(lines.h, smooth, given, inflation or 1.0, differences, robust=False)
@@ -331,7 +331,7 @@ def _alike(before: FloatArray, variance: FloatArray) -> bool:
 
 
 def _coherence_variance(h: ComplexArray, coherence: ArrayLike | None, averages: float | None) -> FloatArray | None:
-    """E|e|^2 that the coherence says."""
+    """E|e|^2 by the coherence."""
     if coherence is None:
         if averages is not None:
             raise ValueError("averages are used with coherence only: give coherence, too")
@@ -370,7 +370,7 @@ def _model(
     """Noise model from measured minus smooth.
 
     The robust one is for weights: the error of smooth FRFs that are not the last, at peaks and antiresonances, must not
-    be taken for noise, nor for outlying lines where differences tell these.
+    be taken for noise, nor for outlying lines where differences show these.
     """
     n_freq, n_out, n_in = h.shape
     shown = (smooth.h != 0).any(axis=0)

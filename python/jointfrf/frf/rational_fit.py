@@ -16,7 +16,7 @@ __all__ = ["Entries", "OrderSearch", "RationalFit", "rational_fit", "relocated",
 
 @dataclass(frozen=True)
 class Entries:
-    """FRFs that have their poles in common, one a row, and what one needs to weight them.
+    """FRFs that have their poles in common, one a row, and their weights.
 
     Attributes
     ----------
@@ -125,12 +125,12 @@ def rational_fit(entries: Entries, poles: ComplexArray) -> RationalFit:
     return RationalFit(poles, smooth, squares, loss)
 
 
-#: Relocations after new poles, and at the end; fewer where the sum of squares no longer changes.
+#: Most relocations after new poles, and at the end; they end where the sum of squares no longer changes.
 _RELOCATIONS = 3
 _LAST_RELOCATIONS = 8
 #: Relocation ends when it gains less than this share of what a pole must gain.
 _STILL = 0.1
-#: A fit that leaves this share of the data is exact but for rounding.
+#: A fit that leaves this share of the data is exact but for rounding of the normal equations.
 _EXACT = 3e-5
 #: Peaks are the largest lines within this share of all lines on either side, twice what lies between them.
 _PEAK_WINDOW = 0.02
@@ -142,13 +142,13 @@ _LEFT_OUT = 1e-4
 _ROUNDS = 6
 #: An inflation found from a residual counts up to this while poles may be missing.
 _MOST_INFLATION = 4.0
-#: Damping of new poles relative to their frequency.
+#: Damping of new poles relative to their frequency, usual in structures; relocation changes it.
 _DAMPING = 0.01
 
 
 @dataclass(frozen=True)
 class OrderSearch:
-    """What a search is told.
+    """Options of a search.
 
     Attributes
     ----------
@@ -168,7 +168,7 @@ class OrderSearch:
         return max(1, min(self.max_poles, int(n_freq / (self.inflation or 1) / 3) - 1))
 
     def found_inflation(self, entries: Entries, fit: RationalFit) -> float:
-        """Return the inflation that was told, or that of the residual, in which poles that are missing show as well."""
+        """Return the given inflation, or that of the residual, which missing poles increase."""
         if self.inflation is not None:
             return self.inflation
         share = entries.n_parameters(len(fit.poles)) / entries.n_data

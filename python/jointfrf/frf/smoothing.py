@@ -34,11 +34,11 @@ __all__ = [
     "smoothed",
 ]
 
-#: Fewer lines are returned as they were measured.
+#: Fewer lines are returned as measured: a pole and its residues take three of them.
 _FEWEST_LINES = 16
-#: A residual below this share of the FRFs is not noise that smoothing could remove.
+#: A residual below this share of the FRFs is an error of the rational functions rather than noise.
 _EXACT = 1e-4
-#: Share of the median of |h|^2 that first weights add to |h|^2 itself.
+#: Share of the median of |h|^2 that first weights add to |h|^2: a floor of 30 % of the median of |h|.
 _FIRST_FLOOR = 0.09
 
 
@@ -157,7 +157,7 @@ def smooth_frfs(
 
 
 def pieces(order: NDArray[np.intp]) -> list[NDArray[np.intp]]:
-    """Cut lines in rising order into pieces that are smoothed each by itself: memory does not grow with the lines."""
+    """Cut lines in rising order into chunks that are smoothed separately: memory does not grow with the lines."""
     return [order[own] for own in line_slices(len(order))]
 
 

@@ -62,7 +62,7 @@ LARGE_COPY = 16 * 2**20
 
 
 def as_array(name: str, value: ArrayLike) -> NDArray[Any]:
-    """Return an array of any type; masked entries, which `numpy.asarray` would uncover, are refused."""
+    """Return an array of any type; masked entries raise an error, as `numpy.asarray` would ignore the mask."""
     if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
         mask = np.ma.getmaskarray(value)
         first = tuple(int(i) for i in np.unravel_index(int(np.argmax(mask)), mask.shape))
@@ -116,7 +116,7 @@ def as_lines(
 ) -> ComplexArray:
     """Return a sweep (n_freq, rows, columns) as contiguous complex128; sizes that are None are free.
 
-    With `later`, an array in a file is returned as it is: `run` converts it chunk by chunk.
+    With `later`, an array in a file is returned as it is: `run` converts it in chunks.
     """
     if _fits(value, rows, columns, n_freq):
         return value  # type: ignore[return-value]
@@ -204,7 +204,7 @@ def check_type(name: str, value: object, kind: type) -> None:
 
 
 def as_names(name: str, value: object) -> tuple[str, ...]:
-    """Return a sequence of names, each in one line; one text is none, though its letters are."""
+    """Return a sequence of names, each in one line; a single text is not one."""
     if isinstance(value, Iterable) and not isinstance(value, str):
         listed = list(value)
         if all(isinstance(each, str) for each in listed):
@@ -352,14 +352,14 @@ def chunks(result: NDArray[np.complex128], sweeps: Mapping[str, NDArray[Any]]) -
     if size > CHUNK_BYTES and any(a.strides[0] == 0 or is_mapped(a) for a in (result, *sweeps.values())):
         step = CHUNK_BYTES * n_freq // size
         step = max(_SHARE, step - step % (_LONG_SHARE if step >= _LONG_SHARE else _SHARE))
-    # fewer lines than a share are left to the chunk before
+    # fewer lines than a share belong to the chunk before
     firsts = range(0, max(1, n_freq - _SHARE + 1), step)
     for first in firsts:
         yield slice(first, n_freq if first == firsts[-1] else first + step)
 
 
 def release(lines: NDArray[Any]) -> None:
-    """Tell the system that pages of a file are not needed in memory any more; what was written stays in the file."""
+    """Release the pages of a file in memory; what was written stays in the file."""
     base: Any = lines
     while isinstance(base.base, np.ndarray):
         base = base.base

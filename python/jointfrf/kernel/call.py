@@ -42,12 +42,13 @@ OnSingular = Literal["raise", "nan"]
 #: left.
 RCOND_LIMIT = 1e-12
 
+#: Values of `LineStatus.line_info`, and of `info`, as in `status.f90`.
 _LINE_NOT_FINITE = -1
 _LINE_OVERFLOW = -2
 
 
 class LineStatus(NamedTuple):
-    """How each line of a sweep went.
+    """Status of each line of a sweep.
 
     Attributes
     ----------
@@ -174,7 +175,7 @@ def run(
         Shape of the result in C order, (n_freq, out, in).
     sweeps : mapping of str to ndarray
         Arguments that have a line axis, by the name the caller knows, to name a bad one. They may lie in a file or be
-        one matrix broadcast to all lines; they are then converted chunk by chunk.
+        one matrix broadcast to all lines; they are then converted in chunks.
     freq_hz : ndarray or None
         Frequencies in Hz for messages.
     on_singular : {"raise", "nan"}
@@ -216,7 +217,7 @@ def _run_in_chunks(
     status: LineStatus,
     sweeps: Mapping[str, NDArray[Any]],
 ) -> int:
-    """Call a kernel routine chunk by chunk of lines and return the number of bad ones."""
+    """Call a kernel routine in chunks of lines and return the number of bad ones."""
     n_bad = 0
     for lines in chunks(result, sweeps):
         chunk = [_argument(a, lines, sweeps) for a in args]

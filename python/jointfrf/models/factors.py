@@ -30,7 +30,7 @@ SYMMETRIC: Final[dict[str, Any]] = {
 }
 #: From this many DOFs on an order by dissection has smaller factors than one by minimum degree.
 _DISSECTED: Final = 4_000
-#: From this many DOFs on another library, where it is installed, repays its start-up.
+#: From this many DOFs on another library, where it is installed, is faster including its start-up.
 _LARGE: Final = 20_000
 
 
@@ -145,7 +145,7 @@ def factor(matrix: Any, is_symmetric: bool = True) -> Factors:
 
 
 class _NotFactoredError(RuntimeError):
-    """A library failed, for want of memory or because of the matrix: SuperLU is used."""
+    """A library failed, because of memory or of the matrix: SuperLU is used."""
 
 
 def _superlu(matrix: sparse.csc_matrix, **options: Any) -> sparse_linalg.SuperLU:
@@ -219,7 +219,7 @@ def _by_mumps(matrix: Any) -> Factors:
     return Factors(solve, np.iscomplexobj(matrix), "MUMPS")
 
 
-#: Libraries beside SuperLU, which serves where they do not.
+#: Libraries that are tried before SuperLU.
 _MAKERS: Final[dict[Library, Callable[[Any], Factors]]] = {"PARDISO": _by_pardiso, "MUMPS": _by_mumps}
 
 

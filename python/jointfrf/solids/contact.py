@@ -361,7 +361,7 @@ class _Contacts:
 
 
 class _Problem:
-    """The loop over sets of contacts."""
+    """Iteration over sets of contacts."""
 
     def __init__(
         self, k: sparse.csr_array, f: FloatArray, pairs: Pairs, law: ContactLaw, fixed: NDArray[np.int64]

@@ -350,7 +350,7 @@ def multi_point_compliance(
     -----
     Noise enters almost linearly, and only gamma_jk is inverted, which has one singular value above the noise for each
     force that the joint passes; their number shows what kind of joint it is. A soft joint above its resonances passes
-    hardly any force, and gamma_jk is lost in noise: `multi_point_stiffness` is more accurate there.
+    little force, and gamma_jk lies below the noise: `multi_point_stiffness` is more accurate there.
 
     For a joint between virtual points, which acts on the patches as T^T g, the equivalent with ``rank=n`` is K*^-1
     whether the patches deform or not; so is `joint_compliance` of the transformed receptances. For a joint of

@@ -29,15 +29,15 @@ from jointfrf.laws.law_joint import Connection, LawJoint
 __all__ = ["connect", "connection_forces", "couple", "semm"]
 
 
-def connection_matrix(
-    h: ComplexArray, link: Connection, freq_hz: FloatArray | None = None, on_singular: OnSingular = "raise"
+def connection_forces(
+    between: ComplexArray, link: Connection, freq_hz: FloatArray | None = None, on_singular: OnSingular = "raise"
 ) -> ComplexArray:
     """Return W of Y = H - H E W E^T H: forces of connections by the free motions across them.
 
     Parameters
     ----------
-    h : ndarray, shape (n_freq, m, m)
-        Receptances of the structures before they are connected, m/N.
+    between : ndarray, shape (n_freq, q, q)
+        E^T H E: receptances of the structures across the connections before they are connected, m/N.
     link : Connection
         S f = T u with q motions u = E^T x.
 
@@ -46,14 +46,6 @@ def connection_matrix(
     ndarray, shape (n_freq, q, q)
         (S + T E^T H E)^-1 T, N/m; S = 0 leaves the dual form of a constraint, S = 1 the form of a modification (2.35).
     """
-    e = link.pattern
-    return connection_forces(e.T @ h @ e, link, freq_hz, on_singular)
-
-
-def connection_forces(
-    between: ComplexArray, link: Connection, freq_hz: FloatArray | None = None, on_singular: OnSingular = "raise"
-) -> ComplexArray:
-    """Return W of `connection_matrix` from the receptances E^T H E across the connections, shape (n_freq, q, q)."""
     left = link.s + link.t @ between
     # A constraint and a stiffness have rows of very different size.
     size = abs(left).max(axis=2, keepdims=True)
@@ -66,9 +58,8 @@ def connect(
 ) -> ComplexArray:
     """Return the receptances with the connections, shape (n_freq, m, m)."""
     e = link.pattern
-    w = connection_matrix(h, link, freq_hz, on_singular)
-    connected: ComplexArray = h - (h @ e) @ w @ (e.T @ h)
-    return np.ascontiguousarray(connected)
+    w = connection_forces(e.T @ h @ e, link, freq_hz, on_singular)
+    return np.ascontiguousarray(h - (h @ e) @ w @ (e.T @ h))
 
 
 def couple(

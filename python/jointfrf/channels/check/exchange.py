@@ -152,7 +152,7 @@ def hidden_exchange(h: ComplexArray, directions: Sequence[str]) -> Cause | None:
 
 
 def _off(scatter: FloatArray, places: tuple[int, int]) -> FloatArray:
-    """Leave the two columns out."""
+    """Return positive values without the two columns."""
     kept = np.delete(scatter, places, axis=1)
     return kept[kept > 0]
 

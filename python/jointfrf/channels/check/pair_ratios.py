@@ -25,9 +25,9 @@ __all__ = [
     "scatter_of",
 ]
 
-#: Lines whose scatter is taken together: so many, and so many times those that correlate.
+#: Lines over which the scatter is averaged: so many, and so many times those that correlate.
 _BLOCK, _APART = 15, 8
-#: Values beyond this number of standard deviations are clipped.
+#: Real and imaginary parts beyond this number of standard deviations, 1 % of normal ones, are clipped.
 _CLIP = 2.5
 #: Standard errors are never taken smaller: round-off, and small errors that every sensor has.
 LEAST_ERROR = 1e-4
@@ -82,8 +82,8 @@ def ratio_line(omega: FloatArray, values: ComplexArray, turn: FloatArray, usable
     The phase at 0 Hz is that of a sign and of powers of i w. Where the data agree with that it is not fitted, which
     halves the error of the slope or better.
 
-    Blocks of lines whose scatter is taken together are longer than the noise is correlated: else its chance in each
-    would be taken for its level.
+    Blocks of lines over which the scatter is averaged are longer than the noise is correlated: otherwise chance in a
+    block would be taken for its noise level.
     """
     fit = _fitted(omega, values, usable, _BLOCK)
     longer = int(_APART * fit.inflation)
@@ -131,7 +131,7 @@ def _fitted(omega: FloatArray, values: ComplexArray, usable: NDArray[np.bool_], 
     inertia = (weight * lever**2).sum(axis=0)
     slope = (weight * lever * clipped.imag).sum(axis=0) / inertia
     left = clipped - mean - 1j * lever * slope
-    # What a delay leaves in the phase is not noise: taken out before.
+    # The phase left by a delay is not noise: it was removed before.
     inflation = _inflation((left / deviation)[:, usable])
     lost = _lost(inflation, len(omega))
     real, imaginary = ((weight * part**2).mean(axis=0) * inflation / lost for part in (left.real, left.imag))
