@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import block_diag
 
 from jointfrf.dofs import DIRECTIONS, direction_names, direction_places, rigid_motion
 from jointfrf.frf.frf_set import Channel
@@ -331,20 +332,15 @@ def interface(
     if shared:
         raise ValueError(f"node {min(shared)} is named on both sides of the joint")
     sides = [_one_side(points, places, coordinates) for points in (points_j, points_k)]
-    n = len(dofs)
     (channels_j, rows_j, at_j), (channels_k, rows_k, at_k) = sides
-    transform = np.zeros((2 * n, len(channels_j) + len(channels_k)))
-    transform[:n, : len(channels_j)] = rows_j
-    transform[n:, len(channels_j) :] = rows_k
-    motion = np.zeros((transform.shape[1], 12))
-    motion[: len(channels_j), :6] = _motion(channels_j, coordinates, at_j)
-    motion[len(channels_j) :, 6:] = _motion(channels_k, coordinates, at_k)
+    motion = block_diag(_motion(channels_j, coordinates, at_j), _motion(channels_k, coordinates, at_k))
     compliance = None
     if bending_stiffness is not None:
         reach = [np.ptp([coordinates[node] for node in points], axis=0).max() / 2 for points in (points_j, points_k)]
         # Half of what both sides together add is that of each.
         own = sum(difference_error([-r, r], bending_stiffness, 1.0).compliance / 2 for r in reach if r > 0)
         compliance = np.where(np.array(places) < len(_AXES), 0.0, own)
+    transform = block_diag(rows_j, rows_k)
     return Interface((*channels_j, *channels_k), transform, (at_j, at_k), direction_names(dofs), motion, compliance)
 
 

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.linalg import block_diag
 
 from jointfrf.channels.point_lines import Interface, transform
 from jointfrf.dofs import DIRECTIONS, direction_names, direction_places, is_rotation, rigid_motion
@@ -221,11 +222,7 @@ def virtual_points(side_j: VirtualPoint, side_k: VirtualPoint) -> FloatArray:
     [-50.0, 50.0, 0.0, 0.0]
     """
     check_sides(side_j, side_k)
-    (n, m_j), m_k = side_j.transform.shape, side_k.transform.shape[1]
-    both_sides = np.zeros((2 * n, m_j + m_k))
-    both_sides[:n, :m_j] = side_j.transform
-    both_sides[n:, m_j:] = side_k.transform
-    return both_sides
+    return np.asarray(block_diag(side_j.transform, side_k.transform))
 
 
 def virtual_interface(side_j: VirtualPoint, side_k: VirtualPoint) -> Interface:
@@ -253,11 +250,8 @@ def virtual_interface(side_j: VirtualPoint, side_k: VirtualPoint) -> Interface:
     >>> jf.virtual_interface(side, side).modes[:2].tolist()
     [[1.0, -0.01, 0.0, 0.0], [1.0, 0.01, 0.0, 0.0]]
     """
-    transform = virtual_points(side_j, side_k)
-    motion = np.zeros((transform.shape[1], 12))
-    motion[: len(side_j.motion), :6] = side_j.motion
-    motion[len(side_j.motion) :, 6:] = side_k.motion
-    return Interface((), transform, (side_j.point, side_k.point), direction_names(side_j.dofs), motion)
+    both, motion = virtual_points(side_j, side_k), block_diag(side_j.motion, side_k.motion)
+    return Interface((), both, (side_j.point, side_k.point), direction_names(side_j.dofs), motion)
 
 
 def append_virtual_point(h: ArrayLike, channels: ArrayLike, point: VirtualPoint) -> ComplexArray:

@@ -272,7 +272,8 @@ def _estimated(
         inflation, _ = _found_inflation(lines.h, differences, model)
         before, variance = variance, lines.weighing(model.variance)
         shown = (smooth.h != 0).any(axis=0)
-        settled = _alike(before[:, shown], variance[:, shown])
+        steps = abs(np.log(variance[:, shown] / before[:, shown]))
+        settled = bool((steps < np.log(_SETTLED)).mean() > _SETTLED_SHARE)
         known = None if differences is None else inflation
         smooth = lines.smoothed(variance, known, 0 if settled else patience, smooth.poles)
         if settled:
@@ -323,11 +324,6 @@ def _first_smooth(
 
 def _patience(differences: ReciprocityDifferences | None) -> int:
     return 2 if differences is None else 1  # a worse start
-
-
-def _alike(before: FloatArray, variance: FloatArray) -> bool:
-    """Whether weights have settled."""
-    return bool((abs(np.log(variance / before)) < np.log(_SETTLED)).mean() > _SETTLED_SHARE)
 
 
 def _coherence_variance(h: ComplexArray, coherence: ArrayLike | None, averages: float | None) -> FloatArray | None:

@@ -286,7 +286,9 @@ def bolted_lap(
     bricks = LapDivisions() if divisions is None else divisions
     check_type("bolt", fastener, Bolt)
     check_type("divisions", bricks, LapDivisions)
-    _check_pairs(lengths=lengths, heights=heights, materials=materials, ends=ends)
+    for name, pair in (("lengths", lengths), ("heights", heights), ("materials", materials), ("ends", ends)):
+        if not isinstance(pair, list | tuple | np.ndarray) or len(pair) != 2:
+            raise TypeError(f"{name} must be a pair, of A and of B, not {one_line(pair)}")
     for material in materials:
         check_type("materials", material, Material)
     _check_dimensions(lengths, heights, width, overlap, hole_radius, fastener)
@@ -316,12 +318,6 @@ def bolted_lap(
         axis=np.array([0.0, 0.0, start + overlap / 2]),
         preset=preset,
     )
-
-
-def _check_pairs(**pairs: object) -> None:
-    for name, pair in pairs.items():
-        if not isinstance(pair, list | tuple | np.ndarray) or len(pair) != 2:
-            raise TypeError(f"{name} must be a pair, of A and of B, not {one_line(pair)}")
 
 
 def _check_dimensions(

@@ -425,7 +425,9 @@ def _truncated_inverse(
     left, size, right = np.linalg.svd(lines, full_matrices=False)
     threshold, used = np.zeros(n_freq), np.full(n_freq, most if rank is None else int(rank))
     if variance is not None:
-        threshold = _noise_threshold(variance)
+        # the expected largest singular value of independent noise
+        by_rows, by_columns = variance.sum(axis=2), variance.sum(axis=1)
+        threshold = np.sqrt(by_rows.max(axis=1)) + np.sqrt(by_columns.max(axis=1))
         used = np.count_nonzero(size > threshold[:, None], axis=1)
     elif rank is None:
         _check_regular(size, name)
@@ -433,12 +435,6 @@ def _truncated_inverse(
     reciprocal = np.divide(1, size, out=np.zeros_like(size), where=keep & (size > 0))
     inverse = (right.conj().swapaxes(1, 2) * reciprocal[:, None, :]) @ left.conj().swapaxes(1, 2)
     return _TruncatedInverse(inverse, used, size, threshold)
-
-
-def _noise_threshold(variance: FloatArray) -> FloatArray:
-    """Return the expected largest singular value of independent noise, shape (n_freq,)."""
-    by_rows, by_columns = variance.sum(axis=2), variance.sum(axis=1)
-    return np.asarray(np.sqrt(by_rows.max(axis=1)) + np.sqrt(by_columns.max(axis=1)))
 
 
 def _check_regular(size: FloatArray, name: str) -> None:

@@ -260,7 +260,7 @@ def _gain_finding(
         shown = f"h_pq / h_qp is {_times(factor, error)} for p = {', '.join(names)} and every q but these"
     doubt = _doubt(measurement, ratios, offsets, places)
     if unit is not None:
-        remedy = f"convert {_plural('this channel', names)} to SI units"
+        remedy = f"convert {'this channel' if len(names) == 1 else 'these channels'} to SI units"
         return FrfFinding(
             "units", "error", names, factor, 1 + _UNIT_TOLERANCE, f"{shown}: {unit}{doubt}", remedy
         ), places, factor  # fmt: skip
@@ -316,10 +316,6 @@ def _doubt(measurement: Measurement, ratios: ChannelRatios, offsets: Offsets, pl
     group = ratios.group == ratios.group[places[0]]
     others = [measurement.dofs[i] for i in np.flatnonzero(group) if i not in places]
     return f" (or {', '.join(others)} the other way: as many channels agree with each side)"
-
-
-def _plural(words: str, names: tuple[str, ...]) -> str:
-    return words if len(names) == 1 else words.replace("this channel", "these channels")
 
 
 def _of(measurement: Measurement, places: list[int], side: int) -> str:

@@ -141,7 +141,8 @@ def hidden_exchange(h: ComplexArray, directions: Sequence[str]) -> Cause | None:
         if directions[i] != directions[j]:
             continue
         # Rows of the two responses beside the columns of their forces, as they are and exchanged.
-        both = [_off(scatter_of(h[:, rows], across[:, [i, j]]), (i, j)) for rows in ([i, j], [j, i])]
+        scatters = (scatter_of(h[:, rows], across[:, [i, j]]) for rows in ([i, j], [j, i]))
+        both = [kept[kept > 0] for kept in (np.delete(scatter, (i, j), axis=1) for scatter in scatters)]
         # h_ij against h_ji, or, exchanged, h_jj against h_ii, is in neither.
         before, after = (float(np.mean(scatter)) if scatter.size else 0.0 for scatter in both)
         own = [float(scatter_of(h[:, a, b], h[:, c, d])) for a, b, c, d in ((i, j, j, i), (j, j, i, i))]
@@ -149,12 +150,6 @@ def hidden_exchange(h: ComplexArray, directions: Sequence[str]) -> Cause | None:
         if before > _LESS * after + _ROUND_OFF and (best is None or after / before < best.after / best.before):
             best = Cause("exchanged", (i, j), before / (both[0].size + 2), after / (both[0].size + 2))
     return best
-
-
-def _off(scatter: FloatArray, places: tuple[int, int]) -> FloatArray:
-    """Return positive values without the two columns."""
-    kept = np.delete(scatter, places, axis=1)
-    return kept[kept > 0]
 
 
 def _from_one(first: ComplexArray, second: ComplexArray) -> FloatArray:

@@ -87,10 +87,6 @@ class Measurement:
         """Which of these are rotations."""
         return np.array([is_rotation(name.rpartition(":")[2].lstrip("+-")) for name in self.dofs], bool)
 
-    def with_frfs(self, h: ComplexArray) -> Measurement:
-        """Return the same channels with other FRFs."""
-        return replace(self, h=h)
-
     def without(self, rows: Sequence[int], columns: Sequence[int]) -> Measurement:
         """Return the same without the pairs of these responses and forces."""
         if not rows and not columns:
@@ -115,10 +111,11 @@ def as_measurement(
     freq_hz: FloatArray, h: ComplexArray, responses: Sequence[str | Channel], forces: Sequence[str | Channel]
 ) -> Measurement:
     """Pair responses with forces by name; a name like 102:-y is the opposite of 102:+y."""
-    of_responses, of_forces = (tuple(_unified(name) for name in some) for some in (responses, forces))
+    of_responses = tuple(_both_ways(name)[0] for name in responses)
+    of_forces, opposite = zip(*map(_both_ways, forces), strict=True) if forces else ((), ())
     place = {name: (i, 1) for i, name in enumerate(of_forces)}
-    for i, name in enumerate(of_forces):
-        place.setdefault(_opposite(name), (i, -1))
+    for i, name in enumerate(opposite):
+        place.setdefault(name, (i, -1))
     pairs = np.array([(row, *place[name]) for row, name in enumerate(of_responses) if name in place], np.intp)
     rows, columns, signs = pairs.reshape(-1, 3).T
     return Measurement(freq_hz, h, of_responses, of_forces, rows, columns, signs.astype(float))
@@ -151,18 +148,13 @@ def as_channel_names(
     return found[0], found[1]
 
 
-def _unified(name: str | Channel) -> str:
+def _both_ways(name: str | Channel) -> tuple[str, str]:
+    """Return the name of a channel, and that of the channel that points the other way."""
     try:
-        return str(Channel.parse(name))
+        channel = Channel.parse(name)
     except ValueError:
-        return str(name)
-
-
-def _opposite(name: str) -> str:
-    try:
-        return str(Channel.parse(name).opposite())
-    except ValueError:
-        return name
+        return str(name), str(name)
+    return str(channel), str(channel.opposite())
 
 
 #: FRFs that agree to this share are copies: two measurements differ by their noise.
@@ -187,48 +179,39 @@ def check_signals(measurement: Measurement) -> BadSignals:
     findings: list[FrfFinding] = []
     bad: list[list[int]] = []
     across = measurement.h.swapaxes(1, 2)
-    smooth = measurement.smoothness
+    smooth, square = measurement.smoothness, measurement.square
+    # Reciprocal to rounding: calculated, or made so; equal channels are then no copies of noise.
+    is_exact = bool(square.size and abs(square - square.swapaxes(1, 2)).max() <= _EXACT * abs(square).max())
     for word, names, h, own in (
         ("response", measurement.responses, measurement.h, smooth),
         ("force", measurement.forces, across, smooth.T),
     ):
-        dead = _dead(own, h.shape[0])
+        # zero or noise in all columns
+        dead = np.flatnonzero(own.max(axis=1) < max(LEAST_SMOOTHNESS, 4 / np.sqrt(h.shape[0]))).tolist()
         findings += [_dead_finding(word, names[i], float(own[i].max())) for i in dead]
-        copies = [] if _is_exact(measurement) else _copies(h, dead)
+        copies = [] if is_exact else _copies(h, dead)
         findings += [_copy_finding(word, names[i], names[j], value) for i, j, value in copies]
         bad.append([*dead, *(place for i, j, _ in copies for place in (i, j))])
     return BadSignals(findings, *bad)
 
 
-def _is_exact(measurement: Measurement) -> bool:
-    """Whether FRFs are reciprocal to rounding: calculated, or made so; equal channels are then no copies of noise."""
-    square = measurement.square
-    return bool(square.size and abs(square - square.swapaxes(1, 2)).max() <= _EXACT * abs(square).max())
-
-
-def _dead(smooth: FloatArray, n_freq: int) -> list[int]:
-    """Rows that are zero or noise in all columns."""
-    dead: list[int] = np.flatnonzero(smooth.max(axis=1) < max(LEAST_SMOOTHNESS, 4 / np.sqrt(n_freq))).tolist()
-    return dead
-
-
 def _dead_finding(word: str, name: str, value: float) -> FrfFinding:
     what = "is zero" if value == 0 else f"is noise: its phase agrees by {value:.2f} from line to line"
     remedy = "connect or replace the sensor" if word == "response" else "repeat the impacts"
+    message = f"{word} {name} {what}"
     return FrfFinding(
-        "dead",
-        "error",
-        (f"{word} {name}",),
-        float(value),
-        LEAST_SMOOTHNESS,
-        f"{word} {name} {what}",
-        f"{remedy}, or leave it out",
+        "dead", "error", (f"{word} {name}",), value, LEAST_SMOOTHNESS, message, f"{remedy}, or leave it out"
     )
 
 
 def _copies(h: ComplexArray, dead: list[int]) -> list[tuple[int, int, float]]:
     """Pairs of rows that are equal to rounding up to a real factor, and by how much they differ."""
-    product = _products(h[:: -(-h.shape[0] // _SOME)])
+    some = h[:: -(-h.shape[0] // _SOME)]
+    size = np.sqrt((abs(some) ** 2).mean(axis=(0, 1), keepdims=True))
+    # products of rows over lines and columns, every column with the same weight
+    flat = (some / np.where(size > 0, size, 1)).swapaxes(0, 1).reshape(h.shape[1], -1)
+    flat = flat / np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), np.finfo(float).tiny)
+    product = (flat.conj() @ flat.T).real
     found: list[tuple[int, int, float]] = []
     for i, j in zip(*np.nonzero(np.triu(abs(product) > _ALIKE, 1)), strict=True):
         if i in dead or j in dead or any(j == other for _, other, _ in found):
@@ -240,14 +223,6 @@ def _copies(h: ComplexArray, dead: list[int]) -> list[tuple[int, int, float]]:
         if differs < _SAME:
             found.append((int(i), int(j), differs))
     return found
-
-
-def _products(h: ComplexArray) -> FloatArray:
-    """Normalised products of rows over lines and columns, every column with the same weight."""
-    size = np.sqrt((abs(h) ** 2).mean(axis=(0, 1), keepdims=True))
-    flat = (h / np.where(size > 0, size, 1)).swapaxes(0, 1).reshape(h.shape[1], -1)
-    flat = flat / np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), np.finfo(float).tiny)
-    return np.asarray((flat.conj() @ flat.T).real)
 
 
 def _copy_finding(word: str, first: str, second: str, value: float) -> FrfFinding:
