@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal, cast, get_args
 
@@ -160,9 +160,12 @@ class _Progress:
     findings: list[FrfFinding] = field(default_factory=list)
     corrections: list[Correction] = field(default_factory=list)
 
-    def add(self, found: tuple[list[FrfFinding], list[Correction]]) -> None:
-        self.findings.extend(found[0])
-        self.corrections.extend(found[1])
+    def add(self, found: Iterable[FrfFinding | Correction]) -> None:
+        for one in found:
+            if isinstance(one, FrfFinding):
+                self.findings.append(one)
+            else:
+                self.corrections.append(one)
 
     def corrected(self) -> Measurement:
         """Return the measurement with all corrections found so far."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -129,7 +130,7 @@ def _on_real_axis(u: ComplexArray) -> NDArray[np.bool_]:
 
 def passivity_findings(
     measurement: Measurement, driving: ComplexArray, noise: FloatArray, inflation: float
-) -> list[FrfFinding]:
+) -> Iterator[FrfFinding]:
     """Find driving points, shape (n_freq, n), whose Im is positive over a band.
 
     `noise` is the standard deviation of Im h / |h| on a line, shape (n,); NaN where it is not known.
@@ -146,7 +147,6 @@ def passivity_findings(
     error = 1.2533 * spread * np.sqrt(min(inflation, length) / length)
     active = middle > np.maximum(_LEAST, _SIGNIFICANT * error)
     freq = block_medians(measurement.freq_hz[:, None], length)[:, 0]
-    findings = []
     for i in np.flatnonzero(active.any(axis=0)):
         where = np.flatnonzero(active[:, i])
         worst = int(where[np.argmax(middle[where, i])])
@@ -158,15 +158,12 @@ def passivity_findings(
             if (side > 0.5).all()
             else "at resonances: negative damping, or the wrong sign of this FRF there"
         )
-        findings.append(
-            FrfFinding(
-                "passivity", "warning", (measurement.dofs[i],), float(middle[worst, i]), _LEAST,
-                f"power comes out of the structure at {measurement.dofs[i]} near {freq[worst]:.4g} Hz: Im h / |h| is "
-                f"{middle[worst, i]:.2g} +- {error[worst, i]:.1g} in {where.size} of {middle.shape[0]} bands, {cause}",
-                "look at the phase of sensor and hammer; leave these bands out",
-            )
+        yield FrfFinding(
+            "passivity", "warning", (measurement.dofs[i],), float(middle[worst, i]), _LEAST,
+            f"power comes out of the structure at {measurement.dofs[i]} near {freq[worst]:.4g} Hz: Im h / |h| is "
+            f"{middle[worst, i]:.2g} +- {error[worst, i]:.1g} in {where.size} of {middle.shape[0]} bands, {cause}",
+            "look at the phase of sensor and hammer; leave these bands out",
         )  # fmt: skip
-    return findings
 
 
 #: Mean exponents of w in |h| of driving points: below the first it is a receptance, above the second an accelerance.
@@ -268,9 +265,8 @@ def convention_finding(around: Circles, driving: Sectors) -> FrfFinding:
 
 def quantity_findings(
     measurement: Measurement, found: Quantities, driving: Sectors
-) -> tuple[list[FrfFinding], list[Correction]]:
+) -> Iterator[FrfFinding | Correction]:
     """Report which responses are velocities or accelerations."""
-    findings, corrections = [], []
     for power in (1, 2):
         places = np.flatnonzero(found.power == power)
         if not places.size:
@@ -286,28 +282,22 @@ def quantity_findings(
             seen += f", |h| goes with w^{found.exponent + power:.1f}"
         else:
             seen += f", h_pq / h_qp goes with w^{power} against the other responses"
-        doubt = "" if found.certain or power == 1 or not every else _doubt(found)
-        findings.append(
-            FrfFinding(
-                "quantity", "error", names, float(found.exponent + power), 0.0,
-                f"{what} {_NAMES[power]}, not receptances: {seen}{doubt}",
-                f"divide by {('i w', '(i w)^2')[power - 1]}, or state the quantity when the file is read",
-            )
+        doubt = f" (or receptances of the wrong sign: |h| goes with w^{found.exponent + 2:.1f} on this band)"
+        doubt = "" if found.certain or power == 1 or not every else doubt
+        divisor = ("i w", "(i w)^2")[power - 1]
+        yield FrfFinding(
+            "quantity", "error", names, float(found.exponent + power), 0.0,
+            f"{what} {_NAMES[power]}, not receptances: {seen}{doubt}",
+            f"divide by {divisor}, or state the quantity when the file is read",
         )  # fmt: skip
-        text = f"{'all FRFs' if every else 'responses ' + ', '.join(names)} divided by {('i w', '(i w)^2')[power - 1]}"
-        corrections.append(Correction("quantity", text, 1, rows, power=power))
-    return findings, corrections
-
-
-def _doubt(found: Quantities) -> str:
-    return f" (or receptances of the wrong sign: |h| goes with w^{found.exponent + 2:.1f} on this band)"
+        text = f"{'all FRFs' if every else 'responses ' + ', '.join(names)} divided by {divisor}"
+        yield Correction("quantity", text, 1, rows, power=power)
 
 
 def sign_findings(
     measurement: Measurement, found: Quantities, driving: Sectors, side: int
-) -> tuple[list[FrfFinding], list[Correction]]:
+) -> Iterator[FrfFinding | Correction]:
     """Report which responses point against the force of the same DOF."""
-    findings, corrections = [], []
     places = np.flatnonzero(found.sign < 0)
     if places.size:
         names = tuple(measurement.dofs[i] for i in places)
@@ -318,25 +308,16 @@ def sign_findings(
             seen += " and h_pq = -h_qp with the others"
         who = "all responses point" if every else f"the response of {', '.join(names)} points"
         doubt = "" if found.certain or not every else " (or the FRFs are accelerances: the band is too narrow)"
-        findings.append(
-            FrfFinding(
-                "sign", "error", names, share / 100, 0.5,
-                f"{who} against the force of the same name: {seen}{doubt}",
-                "turn the sign of the response, or of the force: reciprocity does not show which of the two",
-            )
+        yield FrfFinding(
+            "sign", "error", names, share / 100, 0.5, f"{who} against the force of the same name: {seen}{doubt}",
+            "turn the sign of the response, or of the force: reciprocity does not show which of the two",
         )  # fmt: skip
-        dofs = measurement.rows if side == 1 else measurement.columns
-        own = tuple(map(int, dofs[places]))
-        labels = measurement.responses if side == 1 else measurement.forces
-        text = f"sign of {'response' if side == 1 else 'force'} {', '.join(labels[i] for i in own)} turned"
-        corrections.append(Correction("sign", text, side, own, -1.0))
+        name, own = measurement.of_side(side, places)
+        yield Correction("sign", f"sign of {name} turned", side, own, -1.0)
     for i in np.flatnonzero(found.contradiction):
-        findings.append(
-            FrfFinding(
-                "passivity", "error", (measurement.dofs[i],), float(1 - driving.negative[i]), 0.5,
-                f"the driving point of {measurement.dofs[i]} has Im > 0 on {100 * (1 - driving.negative[i]):.0f} % of "
-                "lines, although its channel is reciprocal to the others: power comes out of the structure",
-                "look at this FRF: its sign, or where it was measured",
-            )
+        yield FrfFinding(
+            "passivity", "error", (measurement.dofs[i],), float(1 - driving.negative[i]), 0.5,
+            f"the driving point of {measurement.dofs[i]} has Im > 0 on {100 * (1 - driving.negative[i]):.0f} % of "
+            "lines, although its channel is reciprocal to the others: power comes out of the structure",
+            "look at this FRF: its sign, or where it was measured",
         )  # fmt: skip
-    return findings, corrections

@@ -87,6 +87,14 @@ class Measurement:
         """Which of these are rotations."""
         return np.array([is_rotation(name.rpartition(":")[2].lstrip("+-")) for name in self.dofs], bool)
 
+    def of_side(self, side: int, places: Iterable[int]) -> tuple[str, tuple[int, ...]]:
+        """Return the name and the numbers of the responses (1) or forces (2) of some of these DOFs."""
+        word, names, every = ("response", self.responses, self.rows)
+        if side == 2:
+            word, names, every = ("force", self.forces, self.columns)
+        own = tuple(int(every[i]) for i in places)
+        return f"{word} {', '.join(names[i] for i in own)}", own
+
     def without(self, rows: Sequence[int], columns: Sequence[int]) -> Measurement:
         """Return the same without the pairs of these responses and forces."""
         if not rows and not columns:
