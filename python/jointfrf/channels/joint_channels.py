@@ -41,6 +41,11 @@ _SHOWN = 1e-6
 _ENTERS = 0.05
 #: Arms below this are rounding, m.
 _NO_ARM = 1e-6
+_Kind = Literal["response", "excitation"]
+#: Sides of the joint, on A and on B.
+_SIDES: tuple[JointSide, JointSide] = ("j", "k")
+#: Directions of channels in the order of `DIRECTIONS`.
+_CHANNELS = ("x", "y", "z", "rx", "ry", "rz")
 
 
 class LeftOutDof(NamedTuple):
@@ -196,13 +201,6 @@ def left_out_dofs(h: ComplexArray, interface: Interface) -> tuple[LeftOutDof, ..
 def _rms(q: ComplexArray) -> FloatArray:
     """Return the root mean square of each row over its columns, and its median over lines."""
     return np.asarray(np.median(np.sqrt((abs(q) ** 2).mean(axis=2)), axis=0))
-
-
-_Kind = Literal["response", "excitation"]
-#: Sides of the joint, on A and on B.
-_SIDES: tuple[JointSide, JointSide] = ("j", "k")
-#: Directions of channels in the order of `DIRECTIONS`.
-_CHANNELS = ("x", "y", "z", "rx", "ry", "rz")
 
 
 @dataclass(frozen=True)

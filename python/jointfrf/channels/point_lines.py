@@ -34,6 +34,11 @@ __all__ = [
     "transform",
 ]
 
+#: Axes of translations; the place of a rotation's axis is less by their number.
+_AXES = DIRECTIONS[:3]
+#: Points count as lying on a line along an axis when they stray from it by less than this share of its length.
+_STRAY = 1e-3
+
 
 def difference_weights(spacing: float | ArrayLike) -> FloatArray:
     """Weights of the displacements of points along a line for displacement and slope at the reference.
@@ -230,12 +235,6 @@ def difference_error(spacing: float | ArrayLike, bending_stiffness: float, joint
     reach = float(spacing) if np.ndim(spacing) == 0 else float(np.ptp(np.asarray(spacing))) / 2  # type: ignore[arg-type]
     compliance = reach / (3 * bending_stiffness)
     return DifferenceError(compliance, compliance * joint_stiffness, float((t[1] ** 2).sum() ** 2))
-
-
-#: Axes of translations; the place of a rotation's axis is less by their number.
-_AXES = DIRECTIONS[:3]
-#: Points count as lying on a line along an axis when they stray from it by less than this share of its length.
-_STRAY = 1e-3
 
 
 class Interface(NamedTuple):

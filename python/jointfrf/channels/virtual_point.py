@@ -43,6 +43,8 @@ __all__ = [
 _UNSEEN = 1e-6
 #: Directions may be rounded: their length may differ from one by this.
 _UNIT = 1e-2
+#: Residuals below this share of the motion are round-off: no channel is faulty.
+_ROUND_OFF = 1e-10
 
 
 class VirtualPoint(NamedTuple):
@@ -374,10 +376,6 @@ def _check_seen(names: tuple[str, ...], size: FloatArray, right: FloatArray) -> 
     faults = [f"do not show {', '.join(unseen)}"] if unseen else []
     faults += [f"cannot distinguish {', '.join(mixed)}"] if mixed else []
     raise ValueError(f"dofs: the channels {' and '.join(faults)}")
-
-
-#: Residuals below this share of the motion are round-off: no channel is faulty.
-_ROUND_OFF = 1e-10
 
 
 class Consistency(NamedTuple):

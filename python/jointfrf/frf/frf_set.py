@@ -37,6 +37,8 @@ _CHANNEL = re.compile(r"(\d+)\s*:?\s*([+-]?r?[xyz])")
 _NAMES_SHOWN = 10
 #: How far above 1 single precision may leave a coherence.
 ROUND_OFF = 1e-5
+ChannelRole = Literal["response", "excitation", "both"]
+JointSide = Literal["j", "k"]
 
 
 @dataclass(frozen=True, order=True)
@@ -522,10 +524,6 @@ def _by_node(channels: Iterable[Channel]) -> str:
     for channel in channels:
         directions[channel.node] = directions.get(channel.node, "") + channel.direction
     return " ".join(f"{node}:{direction}" for node, direction in directions.items())
-
-
-ChannelRole = Literal["response", "excitation", "both"]
-JointSide = Literal["j", "k"]
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,6 +13,26 @@ from jointfrf.kernel.call import call_for_number
 
 __all__ = ["Entries", "OrderSearch", "RationalFit", "rational_fit", "relocated", "search_order"]
 
+#: Most relocations after new poles, and at the end; they end where the sum of squares no longer changes.
+_RELOCATIONS = 3
+_LAST_RELOCATIONS = 8
+#: Relocation ends when it gains less than this share of what a pole must gain.
+_STILL = 0.1
+#: A fit that leaves this share of the data is exact but for rounding of the normal equations.
+_EXACT = 3e-5
+#: Peaks are the largest lines within this share of all lines on either side, twice what lies between them.
+_PEAK_WINDOW = 0.02
+_PEAK_RISE = 2.0
+#: Poles with less damping than this part of the distance of lines may follow one line only: it is left out to see.
+_NARROW = 0.5
+_LEFT_OUT = 1e-4
+#: Rounds of finding such lines.
+_ROUNDS = 6
+#: An inflation found from a residual counts up to this while poles may be missing.
+_MOST_INFLATION = 4.0
+#: Damping of new poles relative to their frequency, usual in structures; relocation changes it.
+_DAMPING = 0.01
+
 
 @dataclass(frozen=True)
 class Entries:
@@ -123,27 +143,6 @@ def rational_fit(entries: Entries, poles: ComplexArray) -> RationalFit:
     fitted = (entries.s, entries.h, entries.weight)
     squares, _ = call_for_number("rational_fit", (*sizes, *fitted, poles, smooth, loss))
     return RationalFit(poles, smooth, squares, loss)
-
-
-#: Most relocations after new poles, and at the end; they end where the sum of squares no longer changes.
-_RELOCATIONS = 3
-_LAST_RELOCATIONS = 8
-#: Relocation ends when it gains less than this share of what a pole must gain.
-_STILL = 0.1
-#: A fit that leaves this share of the data is exact but for rounding of the normal equations.
-_EXACT = 3e-5
-#: Peaks are the largest lines within this share of all lines on either side, twice what lies between them.
-_PEAK_WINDOW = 0.02
-_PEAK_RISE = 2.0
-#: Poles with less damping than this part of the distance of lines may follow one line only: it is left out to see.
-_NARROW = 0.5
-_LEFT_OUT = 1e-4
-#: Rounds of finding such lines.
-_ROUNDS = 6
-#: An inflation found from a residual counts up to this while poles may be missing.
-_MOST_INFLATION = 4.0
-#: Damping of new poles relative to their frequency, usual in structures; relocation changes it.
-_DAMPING = 0.01
 
 
 @dataclass(frozen=True)

@@ -59,6 +59,11 @@ _COMPLEX, _REAL = np.dtype(np.complex128), np.dtype(np.float64)
 
 #: A conversion that copies more than this many bytes is announced by a `CopyWarning`.
 LARGE_COPY = 16 * 2**20
+#: Arrays in files are processed in chunks of lines; inputs and result of one chunk take about this many bytes.
+CHUNK_BYTES = 64 * 2**20
+#: Lines that the kernel takes as one share, of large matrices and of small ones; chunks are multiples of it, so that
+#: they change no bit of a result.
+_SHARE, _LONG_SHARE = 64, 512
 
 
 def as_array(name: str, value: ArrayLike) -> NDArray[Any]:
@@ -320,13 +325,6 @@ def checked_out(
             names = [name for name, sweep in sweeps.items() if sweep is array]
             raise ValueError(f"out must not share memory with {names[0] if names else 'an argument'}")
     return out
-
-
-#: Arrays in files are processed in chunks of lines; inputs and result of one chunk take about this many bytes.
-CHUNK_BYTES = 64 * 2**20
-#: Lines that the kernel takes as one share, of large matrices and of small ones; chunks are multiples of it, so that
-#: they change no bit of a result.
-_SHARE, _LONG_SHARE = 64, 512
 
 
 def is_mapped(array: NDArray[Any]) -> bool:

@@ -45,6 +45,14 @@ RCOND_LIMIT = 1e-12
 #: Values of `LineStatus.line_info`, and of `info`, as in `status.f90`.
 _LINE_NOT_FINITE = -1
 _LINE_OVERFLOW = -2
+#: Version of the kernel, and so of the package.
+VERSION = ".".join(str(int(number)) for number in _kernel.jf_version())
+_NO_ENGINE = -1001
+_ON_SINGULAR = get_args(OnSingular)
+_COMPLEX, _INTEGER = np.dtype(np.complex128), np.dtype(np.int32)
+#: Stands for the number of lines among the arguments of a kernel routine.
+N_FREQ = object()
+Engine = Literal["auto", "lapack", "plain", "x86-64-v2", "x86-64-v3", "x86-64-v4"]
 
 
 class LineStatus(NamedTuple):
@@ -127,17 +135,6 @@ def check_lines(
     if status.line_info.size:
         n_bad = int((status.line_info != 0).sum())
         check_status(routine, status, n_bad, sweeps, freq_hz, on_singular, rcond_limit)
-
-
-#: Version of the kernel, and so of the package.
-VERSION = ".".join(str(int(number)) for number in _kernel.jf_version())
-
-_NO_ENGINE = -1001
-_ON_SINGULAR = get_args(OnSingular)
-_COMPLEX, _INTEGER = np.dtype(np.complex128), np.dtype(np.int32)
-
-#: Stands for the number of lines among the arguments of a kernel routine.
-N_FREQ = object()
 
 
 def _check_info(routine: str, info: int) -> None:
@@ -257,9 +254,6 @@ def info_of(routine: str, args: Sequence[Any]) -> int:
     """Call a kernel routine as `call` does and return its `info` for the caller to judge."""
     views = [a.T if isinstance(a, np.ndarray) else a for a in args]
     return int(getattr(_kernel, "jf_" + routine)(*views))
-
-
-Engine = Literal["auto", "lapack", "plain", "x86-64-v2", "x86-64-v3", "x86-64-v4"]
 
 
 def set_engine(engine: Engine) -> None:

@@ -32,6 +32,11 @@ SYMMETRIC: Final[dict[str, Any]] = {
 _DISSECTED: Final = 4_000
 #: From this many DOFs on another library, where it is installed, is faster including its start-up.
 _LARGE: Final = 20_000
+#: Parts of this many vertices are not cut any more.
+_SMALL: Final = 64
+#: A cut leaves at least this share of the vertices on either side.
+_SHARE: Final = 0.3
+Vertices = NDArray[np.intp]
 
 
 class SingularMatrixError(ArithmeticError):
@@ -221,14 +226,6 @@ def _by_mumps(matrix: Any) -> Factors:
 
 #: Libraries that are tried before SuperLU.
 _MAKERS: Final[dict[Library, Callable[[Any], Factors]]] = {"PARDISO": _by_pardiso, "MUMPS": _by_mumps}
-
-
-#: Parts of this many vertices are not cut any more.
-_SMALL: Final = 64
-#: A cut leaves at least this share of the vertices on either side.
-_SHARE: Final = 0.3
-
-Vertices = NDArray[np.intp]
 
 
 def elimination_order(matrix: sparse.sparray | sparse.spmatrix) -> tuple[Vertices, str]:

@@ -24,6 +24,19 @@ _MOST_ROUNDING: Final = float(np.finfo(np.float64).eps) / RCOND_LIMIT
 #: Steps of the iteration; a step that is longer than this share of the one before has reached rounding, if it is
 #: shorter than this share of the solution.
 _STEPS, _SHRINKS, _ROUNDED = 12, 0.5, 1e-6
+#: Shifts to begin with; solutions at each for every force, and in all: few forces need more of them.
+_FIRST_SHIFTS, _MOMENTS, _VECTORS = 1, 4, 40
+#: Shifts are added up to this number, and vectors up to this share of the DOFs.
+_MOST_SHIFTS, _MOST_VECTORS = 40, 0.5
+#: Below this error a refinement that gains less than a factor of three has reached the round-off of the model.
+_NEAR = 1e-4
+#: Directions smaller than this share of their vector are not new.
+_NEW_DIRECTION = 1e-12
+#: Lines whose residual is computed, and those of them that are solved directly.
+_CANDIDATES, _SPOTS = 40, 4
+#: From this many DOFs on solutions of the whole model at these lines are found by iteration, not by factors of a line;
+#: from this many on they still cost as much as the rest: only the worst line is compared.
+_ITERATED, _LARGE, _FEW_SPOTS = 2_000, 10_000, 1
 
 
 @dataclass(frozen=True)
@@ -177,21 +190,6 @@ def _by_factors(
     x = factors.solve(forces)
     step = factors.solve(forces - z @ x)
     return x + step, outputs.of(parts.strains(step))
-
-
-#: Shifts to begin with; solutions at each for every force, and in all: few forces need more of them.
-_FIRST_SHIFTS, _MOMENTS, _VECTORS = 1, 4, 40
-#: Shifts are added up to this number, and vectors up to this share of the DOFs.
-_MOST_SHIFTS, _MOST_VECTORS = 40, 0.5
-#: Below this error a refinement that gains less than a factor of three has reached the round-off of the model.
-_NEAR = 1e-4
-#: Directions smaller than this share of their vector are not new.
-_NEW_DIRECTION = 1e-12
-#: Lines whose residual is computed, and those of them that are solved directly.
-_CANDIDATES, _SPOTS = 40, 4
-#: From this many DOFs on solutions of the whole model at these lines are found by iteration, not by factors of a line;
-#: from this many on they still cost as much as the rest: only the worst line is compared.
-_ITERATED, _LARGE, _FEW_SPOTS = 2_000, 10_000, 1
 
 
 @dataclass(frozen=True)

@@ -29,6 +29,8 @@ _SOFT, _GAP = _EPS**0.5, 100
 _BLOCK, _SHIFT, _ITERATIONS, _SETTLED = 8, 100, 20, 0.1
 #: LAPACK's columns a block: with less work space it may take fewer.
 _LAPACK_BLOCK = 64
+#: A modal damping matrix is diagonal if nothing beside its diagonal exceeds this share of it.
+_DIAGONAL = 1e-8
 
 
 @dataclass(frozen=True)
@@ -230,10 +232,6 @@ def _check_finite(*arrays: FloatArray) -> None:
     for array in arrays:
         if np.count_nonzero(np.isfinite(array)) != array.size:
             raise np.linalg.LinAlgError("an entry is NaN or Inf")
-
-
-#: A modal damping matrix is diagonal if nothing beside its diagonal exceeds this share of it.
-_DIAGONAL = 1e-8
 
 
 @dataclass(frozen=True)

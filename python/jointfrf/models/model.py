@@ -23,6 +23,7 @@ __all__ = ["Ground", "Model", "assemble", "chain"]
 _DENSE_LIMIT = 50
 #: -(2 pi 1 Hz)^2, (rad/s)^2: below zero, so that K - shift M is regular for a free structure, too.
 _SHIFT = -((2 * np.pi) ** 2)
+Ground = Literal["none", "start", "end", "both"]
 
 
 @dataclass(frozen=True)
@@ -271,9 +272,6 @@ def _constants(joint: Joint | LawJoint) -> tuple[Joint, FloatArray]:
         raise ValueError(f"joint: a {varying[0]} depends on frequency, which matrices do not: use couple")
     springs = LawJoint(joint.laws, dofs=joint.dofs).constant_joint()
     return springs, np.array([joint.mass.get(dof, 0.0) for dof in joint.dofs])
-
-
-Ground = Literal["none", "start", "end", "both"]
 
 
 def chain(

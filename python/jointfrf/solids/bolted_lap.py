@@ -46,6 +46,21 @@ PROOF_STRENGTH: Final[dict[str, float]] = {
 }
 #: Tensile stress area of coarse metric threads, m^2: ISO 898-1, Table 4.
 STRESS_AREA: Final[dict[str, float]] = {"M5": 14.2e-6, "M6": 20.1e-6, "M8": 36.6e-6, "M10": 58.0e-6, "M12": 84.3e-6}
+#: Material of the beams of case study 2.
+ALUMINIUM: Final = Material(youngs_modulus=70e9, poisson=0.33, density=2700.0, loss_factor=0.01)
+Body = Literal["A", "B", "bolt"]
+#: The bodies in the order of their elements.
+BODIES: Final[tuple[Body, ...]] = get_args(Body)
+#: Lower and upper body of each interface.
+INTERFACES: Final[dict[str, tuple[Body, Body]]] = {"head": ("A", "bolt"), "lap": ("B", "A"), "nut": ("bolt", "B")}
+#: Bricks along a beam for each height of length, away from the overlap.
+_PER_HEIGHT: Final = 1.14
+#: Circles around the head reach this share of the way to the nearest edge.
+_CIRCLES_REACH: Final = 0.6
+#: The smallest scaled Jacobian that is accepted.
+_POOR: Final = 0.2
+#: Nodes within this share of the height of a beam are at the same place.
+_NEAR: Final = 1e-6
 
 
 @dataclass(frozen=True)
@@ -125,24 +140,6 @@ def preload_force(tensile_area: float, proof_strength: float, share: float = 0.7
     if share > 1:
         raise ValueError(f"share must not exceed 1, the proof load itself, not {share:g}")
     return share * tensile_area * proof_strength  # (4.3), (4.4)
-
-
-#: Material of the beams of case study 2.
-ALUMINIUM: Final = Material(youngs_modulus=70e9, poisson=0.33, density=2700.0, loss_factor=0.01)
-
-Body = Literal["A", "B", "bolt"]
-#: The bodies in the order of their elements.
-BODIES: Final[tuple[Body, ...]] = get_args(Body)
-#: Lower and upper body of each interface.
-INTERFACES: Final[dict[str, tuple[Body, Body]]] = {"head": ("A", "bolt"), "lap": ("B", "A"), "nut": ("bolt", "B")}
-#: Bricks along a beam for each height of length, away from the overlap.
-_PER_HEIGHT: Final = 1.14
-#: Circles around the head reach this share of the way to the nearest edge.
-_CIRCLES_REACH: Final = 0.6
-#: The smallest scaled Jacobian that is accepted.
-_POOR: Final = 0.2
-#: Nodes within this share of the height of a beam are at the same place.
-_NEAR: Final = 1e-6
 
 
 @dataclass(frozen=True)

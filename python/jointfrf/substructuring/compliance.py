@@ -32,6 +32,9 @@ __all__ = [
     "multi_point_stiffness",
 ]
 
+#: Without truncation a matrix counts as singular when its smallest singular value is below this share of the largest.
+_SINGULAR = 1e-14
+
 
 def joint_compliance(
     gamma: ArrayLike,
@@ -187,10 +190,6 @@ def compliance_covariance(
     args = (int(reciprocal), n, m, N_FREQ, mean, t, spread)
     sweeps = {"gamma": mean, "variance": spread}
     return run("compliance_covariance", args, (n_freq, n * n, n * n), sweeps, freq, on_singular)[0]
-
-
-#: Without truncation a matrix counts as singular when its smallest singular value is below this share of the largest.
-_SINGULAR = 1e-14
 
 
 class MultiPointJoint(NamedTuple):

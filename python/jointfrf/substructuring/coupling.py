@@ -28,6 +28,8 @@ from jointfrf.laws.law_joint import Connection, LawJoint
 
 __all__ = ["connect", "connection_forces", "couple", "semm"]
 
+SemmMethod = Literal["original", "extended"]
+
 
 def connection_forces(
     between: ComplexArray, link: Connection, freq_hz: FloatArray | None = None, on_singular: OnSingular = "raise"
@@ -164,9 +166,6 @@ def _coupled(
         return found
     checked_out(out, found.shape, (a, b), {})[...] = found
     return out
-
-
-SemmMethod = Literal["original", "extended"]
 
 
 def semm(

@@ -17,6 +17,11 @@ from jointfrf.substructuring.modification import inverse_substructuring, ismm
 __all__ = ["STIFFNESS_METHODS", "JointFrfs", "StiffnessMethod", "decouple", "joint_stiffness"]
 
 Equation = Literal["rr", "rs", "sr", "ss"]
+StiffnessMethod = Literal[
+    "ismm", "ismm-kj", "inverse-substructuring", "decoupling-rr", "decoupling-rs", "decoupling-sr", "decoupling-ss"
+]
+#: What all decoupling equations need of the substructures.
+_SUBSTRUCTURES = ("h_a", "h_b", "dofs_j", "dofs_k")
 
 
 def decouple(
@@ -104,11 +109,6 @@ def decouple(
     return run("decouple", args, (n_freq, n, n), sweeps, freq, on_singular, out=out)[0]
 
 
-StiffnessMethod = Literal[
-    "ismm", "ismm-kj", "inverse-substructuring", "decoupling-rr", "decoupling-rs", "decoupling-sr", "decoupling-ss"
-]
-
-
 @dataclass(frozen=True, kw_only=True)
 class JointFrfs:
     """What is known of a joint and its substructures; each method needs some of it.
@@ -160,9 +160,6 @@ class LineMethod(NamedTuple):
     measured: Literal["gamma", "h_c"]
     model: tuple[str, ...] = ()
 
-
-#: What all decoupling equations need of the substructures.
-_SUBSTRUCTURES = ("h_a", "h_b", "dofs_j", "dofs_k")
 
 #: The methods by name.
 STIFFNESS_METHODS: Mapping[StiffnessMethod, LineMethod] = {

@@ -33,6 +33,12 @@ _CIRCLES_SEEN = 0.5
 _BLOCK = 30
 #: Standard errors by which Im h / |h| of a block must exceed zero, and its least value.
 _SIGNIFICANT, _LEAST = 8.0, 0.05
+#: Mean exponents of w in |h| of driving points: below the first it is a receptance, above the second an accelerance.
+_RECEPTANCE, _ACCELERANCE = -0.2, 0.6
+#: A band that spans less than this factor in frequency does not show the exponent.
+_LEAST_SPAN = 3.0
+#: Names of the quantities, by the power of i w.
+_NAMES = ("receptances", "mobilities", "accelerances")
 
 
 @dataclass(frozen=True)
@@ -164,14 +170,6 @@ def passivity_findings(
             f"{middle[worst, i]:.2g} +- {error[worst, i]:.1g} in {where.size} of {middle.shape[0]} bands, {cause}",
             "look at the phase of sensor and hammer; leave these bands out",
         )  # fmt: skip
-
-
-#: Mean exponents of w in |h| of driving points: below the first it is a receptance, above the second an accelerance.
-_RECEPTANCE, _ACCELERANCE = -0.2, 0.6
-#: A band that spans less than this factor in frequency does not show the exponent.
-_LEAST_SPAN = 3.0
-#: Names of the quantities, by the power of i w.
-_NAMES = ("receptances", "mobilities", "accelerances")
 
 
 @dataclass(frozen=True, eq=False)

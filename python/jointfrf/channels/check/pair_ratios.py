@@ -33,6 +33,14 @@ _CLIP = 2.5
 LEAST_ERROR = 1e-4
 #: A phase at 0 Hz that is within so many standard errors of 0, 90, ... degrees is that.
 _SAME = 3.0
+#: An FRF below this share of sqrt|h_pp h_qq| is zero by symmetry, or nearly: it is not checked for reciprocity.
+_SMALL = 1e-2
+#: Scatter of log(h_pq / h_qp) above which h_pq and h_qp are not the same FRF; noise of 10 % gives 0.14.
+BROKEN = 0.5
+#: Scatter of a pair of which one is zero.
+ONE_SIDED = 3.0
+#: Delays that are tried first: this many steps of half a period of the whole band, either way.
+_STEPS = 16
 
 
 class RatioLine(NamedTuple):
@@ -181,16 +189,6 @@ def _inflation(standard: ComplexArray) -> float:
 def _lost(inflation: float, n_freq: int) -> float:
     """Return the share of the noise that a mean and a slope leave."""
     return max(1 - 2 * inflation / n_freq, 0.5)
-
-
-#: An FRF below this share of sqrt|h_pp h_qq| is zero by symmetry, or nearly: it is not checked for reciprocity.
-_SMALL = 1e-2
-#: Scatter of log(h_pq / h_qp) above which h_pq and h_qp are not the same FRF; noise of 10 % gives 0.14.
-BROKEN = 0.5
-#: Scatter of a pair of which one is zero.
-ONE_SIDED = 3.0
-#: Delays that are tried first: this many steps of half a period of the whole band, either way.
-_STEPS = 16
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,6 +26,12 @@ __all__ = [
 
 #: Below this agreement of the phase from line to line an FRF is noise.
 LEAST_SMOOTHNESS = 0.3
+#: FRFs that agree to this share are copies: two measurements differ by their noise.
+_SAME = 1e-6
+#: FRFs that are reciprocal to this share hold no noise, or were made so.
+_EXACT = 1e-9
+#: Rows that are less alike than this on some lines are not compared on all; how many lines.
+_ALIKE, _SOME = 0.999, 60
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,14 +169,6 @@ def _both_ways(name: str | Channel) -> tuple[str, str]:
     except ValueError:
         return str(name), str(name)
     return str(channel), str(channel.opposite())
-
-
-#: FRFs that agree to this share are copies: two measurements differ by their noise.
-_SAME = 1e-6
-#: FRFs that are reciprocal to this share hold no noise, or were made so.
-_EXACT = 1e-9
-#: Rows that are less alike than this on some lines are not compared on all; how many lines.
-_ALIKE, _SOME = 0.999, 60
 
 
 @dataclass(frozen=True)
