@@ -18,7 +18,7 @@ from jointfrf.channels.virtual_point import (
     virtual_point,
 )
 from jointfrf.dofs import DIRECTIONS, direction_names, direction_places, is_rotation
-from jointfrf.frf.frf_set import Channel, ChannelPlace, FrfSet, JointSide
+from jointfrf.frf.frf_set import Channel, ChannelPlace, FrfSet, JointSide, check_apart
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_real, check_type
 
 __all__ = [
@@ -507,8 +507,7 @@ def node_dofs(node_j: int, node_k: int, dofs: Sequence[str], coordinates: Mappin
     >>> [str(channel) for channel in node_dofs(3, 4, ["y", "theta_z"], {}).channels]
     ['3:+y', '3:+rz', '4:+y', '4:+rz']
     """
-    if node_j == node_k:
-        raise ValueError(f"node {node_j} is named on both sides of the joint")
+    check_apart([node_j], [node_k])
     places = direction_places(dofs)
     n = places.size
     channels = tuple(Channel(node, _CHANNELS[place]) for node in (node_j, node_k) for place in places)

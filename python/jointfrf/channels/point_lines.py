@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import block_diag
 
 from jointfrf.dofs import DIRECTIONS, direction_names, direction_places, rigid_motion
-from jointfrf.frf.frf_set import Channel
+from jointfrf.frf.frf_set import Channel, check_apart
 from jointfrf.kernel.arguments import (
     ComplexArray,
     FloatArray,
@@ -327,9 +327,7 @@ def interface(
     if not dofs:
         raise ValueError("dofs must name at least one joint DOF")
     places = direction_places(dofs).tolist()
-    shared = set(points_j) & set(points_k)
-    if shared:
-        raise ValueError(f"node {min(shared)} is named on both sides of the joint")
+    check_apart(points_j, points_k)
     sides = [_one_side(points, places, coordinates) for points in (points_j, points_k)]
     (channels_j, rows_j, at_j), (channels_k, rows_k, at_k) = sides
     motion = block_diag(_motion(channels_j, coordinates, at_j), _motion(channels_k, coordinates, at_k))

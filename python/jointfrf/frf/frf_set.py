@@ -22,6 +22,7 @@ __all__ = [
     "ChannelRole",
     "FrfSet",
     "JointSide",
+    "check_apart",
     "places_of_nodes",
     "same_frf",
 ]
@@ -570,6 +571,13 @@ class ChannelPlace:
         return np.asarray(self.channel.sign * np.eye(3)["xyz".index(self.channel.axis)] + 0.0)
 
 
+def check_apart(nodes_j: Sequence[int], nodes_k: Sequence[int]) -> None:
+    """Raise if a node is on both sides of a joint."""
+    shared = set(nodes_j) & set(nodes_k)
+    if shared:
+        raise ValueError(f"node {min(shared)} is named on both sides of the joint")
+
+
 def places_of_nodes(frfs: FrfSet, nodes_j: Sequence[int], nodes_k: Sequence[int]) -> tuple[ChannelPlace, ...]:
     """List the translational channels of a set at nodes on both sides of a joint.
 
@@ -602,9 +610,7 @@ def places_of_nodes(frfs: FrfSet, nodes_j: Sequence[int], nodes_k: Sequence[int]
     """
     check_type("frfs", frfs, FrfSet)
     nodes_j, nodes_k = as_nodes("nodes_j", nodes_j), as_nodes("nodes_k", nodes_k)
-    shared = set(nodes_j) & set(nodes_k)
-    if shared:
-        raise ValueError(f"node {min(shared)} is named on both sides of the joint")
+    check_apart(nodes_j, nodes_k)
     # A sensor along +y and a hammer along -y are the same channel: FRFs are found with their signs.
     known = {(c.node, c.axis): c for c in (*frfs.excitations, *frfs.responses) if not c.is_rotation}
     found = []

@@ -25,6 +25,7 @@ __all__ = [
     "FloatArray",
     "as_array",
     "as_count",
+    "as_dof_pairs",
     "as_dofs",
     "as_frequency",
     "as_integer",
@@ -302,6 +303,18 @@ def as_dofs(name: str, dofs: ArrayLike, n: int, *, unique: bool = True) -> NDArr
     if unique and len(set(numbers)) != len(numbers):
         raise ValueError(f"{name} names a DOF twice: {numbers}")
     return np.array([number + 1 for number in numbers], np.int32)
+
+
+def as_dof_pairs(
+    of_a: tuple[str, ArrayLike, int], of_b: tuple[str, ArrayLike, int]
+) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Return the joint DOFs of two structures as `as_dofs` does, each by name, DOFs and how many there are."""
+    a, b = as_dofs(*of_a), as_dofs(*of_b)
+    if a.size != b.size or a.size == 0:
+        raise ValueError(
+            f"{of_a[0]} and {of_b[0]} must name the same number of DOFs, at least one: {a.size} and {b.size}"
+        )
+    return a, b
 
 
 def checked_out(

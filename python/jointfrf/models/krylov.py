@@ -266,9 +266,7 @@ def reduce_model(
     .. [1] Z. Bai, Y. Su, Dimension reduction of large-scale second-order dynamical systems via a second-order Arnoldi
        method, SIAM J. Sci. Comput. 26 (2005) 1692-1709.
     """
-    for name in ("stiffness", "mass"):
-        if not matrices.is_symmetric(name):
-            raise ValueError(f"{name} is not symmetric: method 'krylov' cannot be used, 'sparse' or 'dense' can")
+    matrices.check_symmetric("method 'krylov' cannot be used, 'sparse' or 'dense' can")
     if matrices.proportional is None:
         raise ValueError("damping couples the modes: method 'krylov' cannot be used, 'sparse' or 'dense' can")
     task = _Reducer(freq_hz, matrices, outputs, inputs, tolerance)

@@ -147,6 +147,17 @@ class ModelMatrices:
         """Whether K or M is symmetric."""
         return is_symmetric(self.operand(name))
 
+    def check_symmetric(self, otherwise: str) -> None:
+        """Raise unless K and M are symmetric; `otherwise` says what follows."""
+        for name in ("stiffness", "mass"):
+            if not self.is_symmetric(name):
+                raise ValueError(f"{name} is not symmetric: {otherwise}")
+
+    @property
+    def have_real_modes(self) -> bool:
+        """Whether K and M are symmetric."""
+        return self.is_symmetric("stiffness") and self.is_symmetric("mass")
+
     @cached_property
     def are_symmetric(self) -> bool:
         """Whether all matrices are symmetric."""

@@ -314,9 +314,7 @@ def all_modes(matrices: ModelMatrices, outputs: Ports, inputs: Ports) -> tuple[M
     An eigenvalue solver knows every w^2 within rounding of the largest one; rigid-body modes, and those of a soft
     suspension, are found apart, see `find_rigid_modes`.
     """
-    for name in ("stiffness", "mass"):
-        if not matrices.is_symmetric(name):
-            raise ValueError(f"{name} is not symmetric: method 'modal' cannot be used, 'dense' or 'sparse' can")
+    matrices.check_symmetric("method 'modal' cannot be used, 'dense' or 'sparse' can")
     k, m = matrices.dense("stiffness"), matrices.dense("mass")
     assert k is not None
     assert m is not None

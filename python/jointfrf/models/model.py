@@ -162,9 +162,7 @@ class Model:
         """
         n = len(self.dofs)
         matrices = ModelMatrices(self.stiffness, self.mass, None, None, 0.0)
-        for name in ("stiffness", "mass"):
-            if not matrices.is_symmetric(name):  # half of it would be read
-                raise ValueError(f"{name} is not symmetric: the model has no real modes")
+        matrices.check_symmetric("the model has no real modes")  # half of it would be read
         k, m = matrices.sparse("stiffness"), matrices.sparse("mass")
         try:
             if count is None or count > n - 2 or n <= _DENSE_LIMIT:

@@ -284,7 +284,7 @@ def _automatic(task: _Task) -> tuple[ComplexArray, ReceptanceInfo]:
         return _solved(task, direct, f"few lines: {task.freq_hz.size}")
     if matrices.proportional is None:
         return _solved(task, direct, "damping couples the modes")
-    if not (matrices.is_symmetric("stiffness") and matrices.is_symmetric("mass")):
+    if not matrices.have_real_modes:
         return _solved(task, direct, "stiffness or mass is not symmetric")
     if n <= _ALL_MODES:
         return _summed(task, f"{task.freq_hz.size} lines of {n} DOFs whose modes the damping does not couple")
@@ -386,7 +386,7 @@ def _unreliable_lines(matrices: ModelMatrices, freq: FloatArray, status: LineSta
     """
     rcond = np.where(status.rcond < SINGULAR, status.rcond, 1.0)
     poor = (status.rcond < RCOND_LIMIT) & (status.rcond >= SINGULAR)
-    if poor.any() and matrices.is_symmetric("stiffness") and matrices.is_symmetric("mass"):
+    if poor.any() and matrices.have_real_modes:
         rigid = find_rigid_modes(matrices.operand("stiffness"), matrices.operand("mass"))
         left = rigid.dynamic_stiffness(matrices, 2 * np.pi * freq[poor])
         rcond[poor] = mode_condition(left, rigid.uncertainty)

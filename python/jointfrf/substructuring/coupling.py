@@ -11,6 +11,7 @@ from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import (
     ComplexArray,
     FloatArray,
+    as_dof_pairs,
     as_dofs,
     as_frequency,
     as_joint_lines,
@@ -124,10 +125,7 @@ def couple(
     n_freq, n_a, _ = a.shape
     b = as_square("h_b", h_b, n_freq, later=True)
     n_b = b.shape[1]
-    j = as_dofs("dofs_a", dofs_a, n_a)
-    k = as_dofs("dofs_b", dofs_b, n_b)
-    if j.size != k.size or j.size == 0:
-        raise ValueError(f"dofs_a and dofs_b must name the same number of DOFs, at least one: {j.size} and {k.size}")
+    j, k = as_dof_pairs(("dofs_a", dofs_a, n_a), ("dofs_b", dofs_b, n_b))
     if isinstance(k_joint, Joint | LawJoint):
         if freq_hz is None:
             raise ValueError("freq_hz is needed: the stiffness of a joint depends on frequency")

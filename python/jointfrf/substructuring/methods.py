@@ -10,7 +10,15 @@ from typing import Literal, NamedTuple, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from jointfrf.kernel.arguments import ComplexArray, as_dofs, as_lines, as_square, check_choice, optional_frequency
+from jointfrf.kernel.arguments import (
+    ComplexArray,
+    as_dof_pairs,
+    as_dofs,
+    as_lines,
+    as_square,
+    check_choice,
+    optional_frequency,
+)
 from jointfrf.kernel.call import N_FREQ, OnSingular, run
 from jointfrf.substructuring.modification import inverse_substructuring, ismm
 
@@ -86,11 +94,8 @@ def decouple(
     n_freq, n_a, _ = a.shape
     b = as_square("h_b", h_b, n_freq, later=True)
     n_b = b.shape[1]
-    j = as_dofs("dofs_j", dofs_j, n_a)
-    k = as_dofs("dofs_k", dofs_k, n_b)
+    j, k = as_dof_pairs(("dofs_j", dofs_j, n_a), ("dofs_k", dofs_k, n_b))
     n = j.size
-    if k.size != n or n == 0:
-        raise ValueError(f"dofs_j and dofs_k must name the same number of DOFs, at least one: {n} and {k.size}")
     internal = []
     for point, dofs, total in (("r", dofs_r, n_a), ("s", dofs_s, n_b)):
         if point not in equation:
