@@ -141,7 +141,7 @@ class FrfSet:
     averages : number or ndarray, shape (n_responses, n_excitations), optional
         How many measurements each FRF is the average of; NaN where it is not known.
     stated : str
-        What the file says of quantity and unit, in its own words.
+        Quantity and unit in the words of the file.
 
     Examples
     --------
@@ -404,7 +404,7 @@ class FrfSet:
         )
 
     def summary(self) -> str:
-        """Say what the set holds."""
+        """Describe the set in a few lines."""
         measured = self.measured
         n_missing = measured.size - int(measured.sum())
         nodes = {channel.node for channel in (*self.responses, *self.excitations)}
@@ -434,16 +434,16 @@ class FrfSet:
         return replace(self, freq_hz=self.freq_hz[kept], h=self.h[kept], coherence=coherence)
 
     def _quality(self) -> list[str]:
-        """Say what is known about coherence and averages."""
-        said = []
+        """Describe coherence and averages, as far as known."""
+        parts = []
         measured = self.measured
         if self.coherence is not None and measured.any():
             known = np.logical_not(np.isnan(self.coherence).all(axis=0)) & measured
-            said.append(f"coherence of {known.sum()} of {measured.sum()} FRFs")
+            parts.append(f"coherence of {known.sum()} of {measured.sum()} FRFs")
         if self.averages is not None and np.isfinite(self.averages[measured]).any():
             low, high = np.nanmin(self.averages[measured]), np.nanmax(self.averages[measured])
-            said.append(f"{low:g} averages" if low == high else f"{low:g} to {high:g} averages")
-        return [", ".join(said)] if said else []
+            parts.append(f"{low:g} averages" if low == high else f"{low:g} to {high:g} averages")
+        return [", ".join(parts)] if parts else []
 
     def _locate(
         self, outputs: Iterable[ChannelLike], inputs: Iterable[ChannelLike]
@@ -529,26 +529,26 @@ def _by_node(channels: Iterable[Channel]) -> str:
 
 @dataclass(frozen=True, eq=False)
 class ChannelPlace:
-    """What is known of one translational channel beside its FRFs.
+    """A translational channel: place, direction, side of the joint, use.
 
     Attributes
     ----------
     channel : Channel
         Its name in the file of FRFs.
     side : {"j", "k"} or None
-        Side of the joint; None where it is not said.
+        Side of the joint; None where it is not known.
     role : {"response", "excitation", "both"}
-        As what it counts; "both": as what the file has.
+        Use of the channel; "both": whatever the file has.
     position : ndarray, shape (3,), or None
-        m; None: as the file says.
+        m; None: that of the file.
     direction : ndarray, shape (3,), or None
-        Unit vector of the motion or force that the channel of this name stands for; None: as its name says.
+        Unit vector of the motion or force that the channel of this name stands for; None: that of its name.
     weight : float
         In the virtual point, 0 to leave the channel out.
     optional : bool
         Whether the file need not have it: one of three directions of a sensor.
     where : str
-        Where this is said, for messages.
+        Where the entry comes from, for messages.
     """
 
     channel: Channel

@@ -37,7 +37,7 @@ _ITERATIONS = 60
 _BESIDE = 1e-3
 #: Probability of calling one line of a sweep without outliers outlying.
 _FALSE_ALARM = 1e-2
-#: More outlying lines in a row than this may be a mode that smooth FRFs miss: they are not, where neighbours correlate.
+#: More outlying lines in a row than this may be a mode that smooth FRFs miss: it is one where neighbours correlate.
 _SHORT_RUN = 3
 _ALIKE = 0.5
 #: Lines of a running median: so many, for a standard error of 22 % with one entry, and so many times those that

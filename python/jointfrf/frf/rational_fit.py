@@ -23,7 +23,8 @@ _EXACT = 3e-5
 #: Peaks are the largest lines within this share of all lines on either side, twice what lies between them.
 _PEAK_WINDOW = 0.02
 _PEAK_RISE = 2.0
-#: Poles with less damping than this part of the distance of lines may follow one line only: it is left out to see.
+#: Poles with less damping than this part of the distance of lines may follow one line only: the fit is repeated
+#: without it.
 _NARROW = 0.5
 _LEFT_OUT = 1e-4
 #: Rounds of finding such lines.

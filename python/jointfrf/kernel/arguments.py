@@ -58,7 +58,7 @@ FloatArray = NDArray[np.float64]
 _SHOWN = 80
 _COMPLEX, _REAL = np.dtype(np.complex128), np.dtype(np.float64)
 
-#: A conversion that copies more than this many bytes is announced by a `CopyWarning`.
+#: A conversion that copies more than this many bytes causes a `CopyWarning`.
 LARGE_COPY = 16 * 2**20
 #: Arrays in files are processed in chunks of lines; inputs and result of one chunk take about this many bytes.
 CHUNK_BYTES = 64 * 2**20

@@ -176,9 +176,9 @@ def run(
     freq_hz : ndarray or None
         Frequencies in Hz for messages.
     on_singular : {"raise", "nan"}
-        What becomes of bad lines (singular, NaN or Inf inside, overflow).
+        Whether bad lines (singular, NaN or Inf inside, overflow) raise an error or become NaN.
     rcond_limit : float
-        Below this reciprocal condition number a line is announced by an `IllConditionedWarning`.
+        Below this reciprocal condition number a line causes an `IllConditionedWarning`.
     out : ndarray or None
         Where the result goes. All lines are done before a bad one raises: `out` then holds the good lines, and NaN in
         the bad ones.

@@ -110,8 +110,8 @@ def find_rigid_modes(k: Operand, m: Operand, solver: SparseSolver | None = None)
     Returns
     -------
     RigidModes
-        None where the structure is held; none, too, where M has no mass in a motion that K does not resist, and where
-        no gap separates them from the modes above.
+        Empty where the structure is held, where M has no mass in a motion that K does not resist, and where no gap
+        separates them from the modes above.
 
     Notes
     -----

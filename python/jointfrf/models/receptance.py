@@ -180,7 +180,7 @@ def receptance(
     tolerance : float
         What the error estimate of "krylov", and of "modal" where "auto" chose it, must meet: the largest error of a
         line relative to its largest entry. Where rounding limits a direct solution, too, 30 times its rounding
-        will do, up to 2.2e-4: what rounding leaves at the reciprocal condition `jointfrf.RCOND_LIMIT`.
+        suffices, up to 2.2e-4: what rounding leaves at the reciprocal condition `jointfrf.RCOND_LIMIT`.
     full_output : bool
         Whether a `ReceptanceInfo` is returned too: what was done, why, and the error estimate.
 
@@ -223,7 +223,7 @@ def receptance(
     Sparse matrices are factored by SuperLU, from 4 000 DOFs on in an order by nested dissection: that of METIS where
     the package pymetis is installed. From 20 000 DOFs on symmetric ones are factored by PARDISO (package pypardiso,
     real matrices, which is what a reduction needs) or MUMPS (package python-mumps) where they are installed.
-    `ReceptanceInfo.solver` says what did it.
+    `ReceptanceInfo.solver` names library and order.
 
     Examples
     --------

@@ -446,7 +446,7 @@ class _Problem:
         return sparse.csr_array((values, (rows, np.tile(normal, 4))), shape=(n, n))
 
     def judged(self, contacts: _Contacts, force: FloatArray, relative: FloatArray) -> _Contacts:
-        """Return the contacts that the solution calls for."""
+        """Return the contacts that follow from the solution."""
         normal, shear, slide = force[:, NORMAL], force[:, TANGENTIAL], relative[:, TANGENTIAL]
         separation = self.pairs.gap + relative[:, NORMAL]
         closed = np.where(
