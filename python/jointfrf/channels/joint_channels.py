@@ -19,7 +19,7 @@ from jointfrf.channels.virtual_point import (
 )
 from jointfrf.dofs import DIRECTIONS, direction_names, direction_places, is_rotation
 from jointfrf.frf.frf_set import Channel, ChannelPlace, FrfSet, JointSide, check_apart
-from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_real, check_type
+from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray, as_real, check_type
 
 __all__ = [
     "ChannelAgreement",
@@ -191,7 +191,7 @@ def left_out_dofs(h: ComplexArray, interface: Interface) -> tuple[LeftOutDof, ..
             if relative.max() < _NOTHING:
                 continue
             weight = np.where(relative < _NOTHING, 0, weights[:, d])
-            shares = abs(weight) * size[d] / np.maximum(of_kept, np.finfo(float).tiny)
+            shares = abs(weight) * size[d] / np.maximum(of_kept, TINY)
             most = int((shares if shown[d] else relative).argmax())
             share = float(shares[most]) if shown[d] else np.nan
             found.append(LeftOutDof("jk"[side], dof, interface.dofs[most], float(weight[most]), share))

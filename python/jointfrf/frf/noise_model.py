@@ -22,7 +22,7 @@ from jointfrf.frf.noise_parts import (
 from jointfrf.frf.quantiles import medians
 from jointfrf.frf.rational_fit import OrderSearch
 from jointfrf.frf.smoothing import SmoothFrfs, checked_frfs, first_variance, joined, near_squares, pieces, smoothed
-from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_integer, as_number, as_real, check_type
+from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray, as_integer, as_number, as_real, check_type
 
 __all__ = ["NoiseModel", "estimate_noise"]
 
@@ -42,7 +42,6 @@ _LIKE = 1.2
 _UNSEEN = 3.0
 #: Least relative noise for weights: systematic errors of measured FRFs are larger.
 _ROUNDING = 1e-4
-_TINY = float(np.finfo(float).tiny)
 
 
 @dataclass(frozen=True)
@@ -102,7 +101,7 @@ class NoiseModel:
             return 0.0
         ratio = np.empty((len(self.variance), np.count_nonzero(counts)))
         for own in line_slices(len(ratio)):
-            size = np.maximum(abs(self.smooth.h[own][:, counts]), _TINY)
+            size = np.maximum(abs(self.smooth.h[own][:, counts]), TINY)
             ratio[own] = np.sqrt(self.variance[own][:, counts]) / size
         return float(medians(ratio.ravel()))
 
@@ -251,7 +250,7 @@ class _NoisyLines:
 
     @cached_property
     def _least(self) -> FloatArray:
-        return np.maximum(_ROUNDING**2 * first_variance(self.h), _TINY)
+        return np.maximum(_ROUNDING**2 * first_variance(self.h), TINY)
 
 
 def _estimated(
@@ -385,7 +384,7 @@ def _model(
             terms = NoiseTerms(stacked[:, :, good])
         parts = terms.parts((squares / usual)[:, good], robust=robust or turn == 0)
         terms = terms if good.all() else None
-        described = np.maximum(_described(parts, stacked) * usual, _TINY)
+        described = np.maximum(_described(parts, stacked) * usual, TINY)
         variance = np.zeros(h.shape)
         variance[:, shown] = described.T
         levels = []

@@ -12,7 +12,7 @@ from scipy import special
 
 from jointfrf.frf.entry_groups import EntryGroup
 from jointfrf.frf.quantiles import medians, quantiles
-from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray
 
 __all__ = [
     "NoiseTerms",
@@ -53,7 +53,6 @@ _VARIES_LEAST = 0.15
 _SIGNIFICANT = 2.5
 #: Residuals beyond so many medians are cut to that, for correlations: 0.2 % of circular normal ones.
 _CUT = 3.0
-_TINY = float(np.finfo(float).tiny)
 
 
 def noise_parts(squares: FloatArray, terms: FloatArray, *, robust: bool = False) -> FloatArray:
@@ -103,7 +102,7 @@ class NoiseTerms:
             binned = np.stack([self._means(np.take_along_axis(term, self._order, axis=1)) for term in terms])
         else:
             self._count, binned = np.ones(n_freq), terms
-        self._size = np.maximum(binned @ self._count, _TINY) / self._count.sum()
+        self._size = np.maximum(binned @ self._count, TINY) / self._count.sum()
         self._terms = binned / self._size[:, :, None]
 
     def parts(self, squares: FloatArray, *, robust: bool = False) -> FloatArray:
@@ -130,9 +129,9 @@ def _two_parts(y: FloatArray, a: FloatArray, count: FloatArray) -> FloatArray:
         share = np.stack([1 / (1 + odds), odds / (1 + odds)])  # (2, grid, n_entries)
         v = share[0][:, :, None] * a[0]
         v += share[1][:, :, None] * a[1]
-        np.maximum(v, _TINY, out=v)
+        np.maximum(v, TINY, out=v)
         level = (weighted / v).sum(axis=2) / total
-        loss = np.log(v, out=v) @ count + total * np.log(np.maximum(level, _TINY))
+        loss = np.log(v, out=v) @ count + total * np.log(np.maximum(level, TINY))
         best = loss.argmin(axis=0)
         centre, reach = np.log(odds[best, entries]), 2 * reach / (_GRID - 1)
     return np.asarray(share[:, best, entries] * level[best, entries])
@@ -144,11 +143,11 @@ def _several_parts(y: FloatArray, a: FloatArray, count: FloatArray) -> FloatArra
     starts = np.concatenate([np.eye(n_terms) + _BESIDE, np.ones((1, n_terms)) / n_terms])
     parts = starts[:, :, None] * ((y * count).sum(axis=1) / count.sum())
     for _ in range(_ITERATIONS):
-        v = np.maximum(np.einsum("ste,teb->seb", parts, a), _TINY)
+        v = np.maximum(np.einsum("ste,teb->seb", parts, a), TINY)
         up = np.einsum("teb,seb->ste", a, count * y / v**2)
         down = np.einsum("teb,seb->ste", a, count / v)
-        parts *= np.sqrt(up / np.maximum(down, _TINY))
-    v = np.maximum(np.einsum("ste,teb->seb", parts, a), _TINY)
+        parts *= np.sqrt(up / np.maximum(down, TINY))
+    v = np.maximum(np.einsum("ste,teb->seb", parts, a), TINY)
     best = (count * (np.log(v) + y / v)).sum(axis=2).argmin(axis=0)
     return np.asarray(parts[best, :, np.arange(parts.shape[2])].T)
 
@@ -206,9 +205,9 @@ def line_levels(noise: ComplexArray, inflation: float = 1.0, *, is_residual: boo
     line = (noise.real**2 + noise.imag**2).mean(axis=0)
     n_freq = len(line)
     reach = int(min(max(_USUAL, _USUAL_CORRELATED * inflation), n_freq)) // 2
-    usual = np.maximum(_running_median(line, reach), _TINY)
+    usual = np.maximum(_running_median(line, reach), TINY)
     factor: FloatArray = line / usual
-    quarter, three_quarters = quantiles(np.log(np.maximum(factor, _TINY)), (0.25, 0.75))
+    quarter, three_quarters = quantiles(np.log(np.maximum(factor, TINY)), (0.25, 0.75))
     shape = (1.349 / max(three_quarters - quarter, 1e-3)) ** 2
     limit = special.gammainccinv(shape, _FALSE_ALARM / n_freq) / special.gammaincinv(shape, 0.5)
     by_chance = np.sqrt(inflation / (shape * (2 * reach + 1)))
@@ -308,7 +307,7 @@ class ReciprocityDifferences:
 
     def _variance(self, variance: FloatArray) -> FloatArray:
         total: FloatArray = (variance[:, self.rows, self.columns] + variance[:, self.columns, self.rows]).T
-        return np.maximum(total, np.finfo(float).tiny)
+        return np.maximum(total, TINY)
 
     def variance_of_parts(self, near: FloatArray) -> FloatArray:
         """Return the variance of all entries from relative and floor parts of the differences.

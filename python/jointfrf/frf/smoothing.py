@@ -13,6 +13,7 @@ from jointfrf.frf.entry_groups import EntryGroup, entry_groups
 from jointfrf.frf.quantiles import medians
 from jointfrf.frf.rational_fit import Entries, OrderSearch, RationalFit, search_order
 from jointfrf.kernel.arguments import (
+    TINY,
     ComplexArray,
     FloatArray,
     as_frequency,
@@ -221,7 +222,7 @@ def smoothed(
 
 def _relative(entries: Entries, fit: RationalFit) -> float:
     """Median of |h - smooth| / |smooth|."""
-    return float(medians((abs(entries.h - fit.smooth) / np.maximum(abs(fit.smooth), np.finfo(float).tiny)).ravel()))
+    return float(medians((abs(entries.h - fit.smooth) / np.maximum(abs(fit.smooth), TINY)).ravel()))
 
 
 def _smooth_group(
@@ -249,7 +250,7 @@ def _smooth_group(
 def first_variance(h: ComplexArray) -> FloatArray:
     """Variance before anything is known of the noise: |h|^2 over neighbouring lines, not below a part of its median."""
     near = near_squares(h)
-    return np.maximum(near + _FIRST_FLOOR * medians(near.T).T, np.finfo(float).tiny)
+    return np.maximum(near + _FIRST_FLOOR * medians(near.T).T, TINY)
 
 
 def near_squares(h: ComplexArray) -> FloatArray:

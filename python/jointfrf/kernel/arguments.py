@@ -21,6 +21,7 @@ from jointfrf.errors import CopyWarning
 
 __all__ = [
     "CHUNK_BYTES",
+    "TINY",
     "ComplexArray",
     "FloatArray",
     "as_array",
@@ -54,6 +55,8 @@ __all__ = [
 ComplexArray = NDArray[np.complex128]
 FloatArray = NDArray[np.float64]
 
+#: Divisors are not taken below the smallest normal number.
+TINY = float(np.finfo(np.float64).tiny)
 #: Characters of a value that a message shows.
 _SHOWN = 80
 _COMPLEX, _REAL = np.dtype(np.complex128), np.dtype(np.float64)

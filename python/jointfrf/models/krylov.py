@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray
 from jointfrf.kernel.call import RCOND_LIMIT
 from jointfrf.models.factors import Factors, SingularMatrixError, SparseSolver
 from jointfrf.models.matrices import ModelMatrices, Ports, directions
@@ -174,7 +174,7 @@ def spot_error(
                 continue
         x, step = solved
         exact = outputs.of(parts.strains(x)) + seen @ (driven / own[i][:, None])
-        size = max(abs(exact).max(initial=0), np.finfo(float).tiny)
+        size = max(abs(exact).max(initial=0), TINY)
         error = abs(found[i] - exact).max(initial=0) / size
         errors[i] = error if np.isfinite(error) else np.inf
         rounding = max(rounding, float(abs(step).max(initial=0) / size))
@@ -389,5 +389,5 @@ class _Reducer:
             x = inverse[:, None] * modes.shapes_in.T
             elastic = (1 + 1j * self.eta + 1j * omega * self.b) * (by_k @ x)
             left = elastic + (1j * omega * self.a - omega**2) * (by_m @ x) - forces
-            residual[i] = np.linalg.norm(left) / max(np.linalg.norm(elastic), np.finfo(float).tiny)
+            residual[i] = np.linalg.norm(left) / max(float(np.linalg.norm(elastic)), TINY)
         return np.take(spread, np.argsort(residual)[::-1])

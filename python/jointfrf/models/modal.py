@@ -17,9 +17,7 @@ from jointfrf.models.matrices import ModelMatrices, Operand, Ports
 __all__ = ["SINGULAR", "Modes", "RigidModes", "all_modes", "find_rigid_modes", "held", "mode_condition"]
 
 #: A fine mesh in mixed units has rcond 1e-13 and still gives nine digits: only below this is a line singular.
-SINGULAR = float(np.finfo(np.float64).eps)
-#: Rounding unit of the sums below.
-_EPS = float(np.finfo(np.float64).eps)
+SINGULAR = _EPS = float(np.finfo(np.float64).eps)
 #: r^T K r counts as zero within this many roundings of its terms: an entry of K is a sum of some tens of rounded terms.
 _ROUNDINGS = 32
 #: Modes are treated apart where K r loses half of all digits, and w^2 of the next mode is this many times higher.

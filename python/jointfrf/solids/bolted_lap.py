@@ -14,7 +14,7 @@ from jointfrf.models.beam import End, check_ends
 from jointfrf.solids.brick import Material, brick_quality
 from jointfrf.solids.brick_beam import Preset, holed_plan
 from jointfrf.solids.contact import ContactInterface
-from jointfrf.solids.mesh import Mesh, Plan, disc, extrude, join_plans, rectangle
+from jointfrf.solids.mesh import NEAR, Mesh, Plan, disc, extrude, join_plans, rectangle
 
 __all__ = [
     "ALUMINIUM",
@@ -59,8 +59,6 @@ _PER_HEIGHT: Final = 1.14
 _CIRCLES_REACH: Final = 0.6
 #: The smallest scaled Jacobian that is accepted.
 _POOR: Final = 0.2
-#: Nodes within this share of the height of a beam are at the same place.
-_NEAR: Final = 1e-6
 
 
 @dataclass(frozen=True)
@@ -305,7 +303,7 @@ def bolted_lap(
         _check_quality(name, solid)
     mesh, body = _joined(solids)
     faces = [(0.0, ends[0]), (start + lengths[1], ends[1])]
-    held = [abs(mesh.nodes[:, 2] - z) < _NEAR * min(heights) for z, end in faces if end == "clamped"]
+    held = [abs(mesh.nodes[:, 2] - z) < NEAR * min(heights) for z, end in faces if end == "clamped"]
     return BoltedLap(
         mesh=mesh,
         body=body,
@@ -367,7 +365,7 @@ def _shared_plan(
 def _beam(shared: Plan, span: tuple[float, float], width: float, height: float, bricks: LapDivisions) -> Plan:
     """Return the plan of a beam: the overlap and the strip outside it."""
     length = span[1] - span[0]
-    if length < _NEAR * height:
+    if length < NEAR * height:
         return shared
     along = max(1, round(length / height * _PER_HEIGHT)) if bricks.along is None else bricks.along
     across = np.linspace(-width / 2, width / 2, bricks.across + 1)
@@ -414,7 +412,7 @@ def _joined(solids: dict[str, Mesh]) -> tuple[Mesh, NDArray[np.str_]]:
 def _interfaces(mesh: Mesh, body: NDArray[np.str_], heights: tuple[float, float]) -> dict[str, ContactInterface]:
     """Return the faces that touch, found by their planes."""
     faces, elements = mesh.faces()
-    near = _NEAR * min(heights)
+    near = NEAR * min(heights)
     planes: dict[str, float] = {"head": heights[0], "lap": 0.0, "nut": -heights[1]}
     found: dict[str, ContactInterface] = {}
     for name, (lower, upper) in INTERFACES.items():

@@ -14,8 +14,10 @@ from scipy.spatial import cKDTree
 
 from jointfrf.kernel.arguments import FloatArray, as_array, as_count, as_number, as_real, check_type
 
-__all__ = ["Mesh", "Plan", "disc", "extrude", "holed_rectangle", "interpolation", "join_plans", "rectangle"]
+__all__ = ["NEAR", "Mesh", "Plan", "disc", "extrude", "holed_rectangle", "interpolation", "join_plans", "rectangle"]
 
+#: Nodes within this share of the height, or length, of a body lie in a plane.
+NEAR = 1e-6
 #: Points nearer than this share of the extent of a mesh are one node.
 _SAME = 1e-7
 #: Half the side of the square in the middle of a disc, as a share of the radius.

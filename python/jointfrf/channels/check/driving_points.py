@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from jointfrf.channels.check.finding import Correction, FrfFinding
 from jointfrf.channels.check.pair_ratios import block_medians
 from jointfrf.channels.check.signals import Measurement, modulus
-from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray
 
 __all__ = [
     "circles",
@@ -95,7 +95,7 @@ def mean_exponent(omega: FloatArray, h: ComplexArray) -> float:
     """Median over FRFs, shape (n_freq, m), of the exponent of w in |h|, by least squares."""
     x = np.log(omega)
     x = x - x.mean()
-    y = np.log(np.maximum(modulus(h), np.finfo(float).tiny))
+    y = np.log(np.maximum(modulus(h), TINY))
     spread = (x**2).sum()
     return float(np.median(x @ y) / spread) if spread > 0 else 0.0
 
@@ -124,8 +124,8 @@ def _balances(driving: ComplexArray) -> tuple[ComplexArray, FloatArray, FloatArr
     """Return h / |h|, and sums of its real and imaginary parts over the sums of their sizes."""
     size = modulus(driving)
     u: ComplexArray = np.where(size > 0, driving / np.where(size > 0, size, 1), 0)
-    imaginary = u.imag.sum(axis=0) / np.maximum(abs(u.imag).sum(axis=0), np.finfo(float).tiny)
-    real = u.real.sum(axis=0) / np.maximum(abs(u.real).sum(axis=0), np.finfo(float).tiny)
+    imaginary = u.imag.sum(axis=0) / np.maximum(abs(u.imag).sum(axis=0), TINY)
+    real = u.real.sum(axis=0) / np.maximum(abs(u.real).sum(axis=0), TINY)
     return u, real, imaginary
 
 

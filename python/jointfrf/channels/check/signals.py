@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from jointfrf.channels.check.finding import FrfFinding
 from jointfrf.dofs import is_rotation
 from jointfrf.frf.frf_set import Channel
-from jointfrf.kernel.arguments import ComplexArray, FloatArray, one_line
+from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray, one_line
 
 __all__ = [
     "LEAST_SMOOTHNESS",
@@ -216,13 +216,13 @@ def _copies(h: ComplexArray, dead: list[int]) -> list[tuple[int, int, float]]:
     size = np.sqrt((abs(some) ** 2).mean(axis=(0, 1), keepdims=True))
     # products of rows over lines and columns, every column with the same weight
     flat = (some / np.where(size > 0, size, 1)).swapaxes(0, 1).reshape(h.shape[1], -1)
-    flat = flat / np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), np.finfo(float).tiny)
+    flat = flat / np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), TINY)
     product = (flat.conj() @ flat.T).real
     found: list[tuple[int, int, float]] = []
     for i, j in zip(*np.nonzero(np.triu(abs(product) > _ALIKE, 1)), strict=True):
         if i in dead or j in dead or any(j == other for _, other, _ in found):
             continue
-        size = np.maximum(np.sqrt((abs(h[:, [i, j]]) ** 2).mean(axis=(0, 1))), np.finfo(float).tiny)
+        size = np.maximum(np.sqrt((abs(h[:, [i, j]]) ** 2).mean(axis=(0, 1))), TINY)
         first, second = (h[:, k] / size for k in (i, j))
         factor = np.vdot(first, second).real / np.vdot(first, first).real
         differs = float(np.linalg.norm(second - factor * first) / np.linalg.norm(second))
