@@ -82,9 +82,13 @@ class JointLaw(ABC):
     optional: ClassVar[tuple[str, ...]] = ()
 
     def __post_init__(self) -> None:
+        self._convert()
+        self.checked(self.values)
+
+    def _convert(self) -> None:
+        """Convert all numbers of a dataclass to floats."""
         for field in (*self.parameters, *self.settings):
             object.__setattr__(self, field.name, as_number(field.name, getattr(self, field.name)))
-        self.checked(self.values)
 
     @property
     def fields(self) -> tuple[LawField, ...]:
