@@ -53,7 +53,7 @@ class FileContentError(ValueError):
 
 
 class FileContentWarning(UserWarning):
-    """Something in a file had to be assumed or left out; one line, whatever stands in the file."""
+    """Something in a file had to be assumed or left out; one line, whatever the file contains."""
 
     def __init__(self, message: str) -> None:
         super().__init__(visible(" ".join(message.splitlines())))

@@ -21,7 +21,7 @@ __all__ = ["HEAD", "LIMIT_VARIABLE", "ReadLimit", "below", "check_file", "head_o
 HEAD = 1 << 13
 #: Environment variable with another limit, GB.
 LIMIT_VARIABLE = "JOINTFRF_FILE_LIMIT_GB"
-#: Without one: files beyond this are not read, GB; what a file holds may take so much memory, GB, or so many times the
+#: Without one: larger files are not read, GB; the content of a file may take so much memory, GB, or so many times the
 #: size of the file, whichever is more.
 _LARGEST, _SMALL, _TIMES = 16.0, 1.0, 10
 #: Each array, group or cell takes at least this, bytes: there are files of nothing but names.
@@ -272,7 +272,7 @@ def _followed(path: Path) -> Path:
 
 
 def _created(folder: Path, name: str, *, private: bool) -> Path:
-    """Create a file of a new name; the mask of the process, or what the folder says, gives its mode."""
+    """Create a file of a new name; the mask of the process, or of the folder, gives its mode."""
     try:
         longest = os.pathconf(folder, "PC_NAME_MAX")
     except (AttributeError, OSError, ValueError):

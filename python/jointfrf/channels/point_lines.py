@@ -196,7 +196,7 @@ class DifferenceError(NamedTuple):
 
 
 def difference_error(spacing: float | ArrayLike, bending_stiffness: float, joint_stiffness: float) -> DifferenceError:
-    """Estimate, before a test, what a spacing does to the rotational stiffness of a joint between beams.
+    """Estimate, before a test, the error of the rotational stiffness of a joint between beams by the spacing.
 
     Parameters
     ----------

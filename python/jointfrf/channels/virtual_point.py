@@ -450,7 +450,7 @@ def sensor_consistency(h: ArrayLike, point: VirtualPoint) -> Consistency:
     >>> wrong.overall.round(3).tolist(), wrong.blame.round(3).tolist()
     ([0.756], [[1.0, 1.0, 1.0]])
 
-    Three channels less two DOFs leave one residual: it cannot say which of them is wrong.
+    Three channels less two DOFs leave one residual, which does not show which of them is wrong.
     """
     check_type("point", point, VirtualPoint)
     measured = as_lines("h", h, point.modes.shape[0])

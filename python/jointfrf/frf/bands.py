@@ -147,7 +147,7 @@ def _pairs(bands: object) -> list[Band]:
 def as_bands(
     bands: Band | Sequence[Band] | Mapping[str, Band | Sequence[Band]] | None, dofs: Sequence[str], freq_hz: FloatArray
 ) -> list[list[Band]]:
-    """Bands of each DOF from what a user writes: nothing (all lines), one band, several, or one of these for each DOF.
+    """Bands of each DOF from an argument: nothing (all lines), one band, several, or one of these for each DOF.
 
     Parameters
     ----------

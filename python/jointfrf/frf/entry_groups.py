@@ -11,7 +11,7 @@ from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
 __all__ = ["ZERO", "EntryGroup", "connected", "entry_groups", "own_size", "reciprocity_noise"]
 
-#: An FRF below this share of sqrt|h_pp h_qq|, or of what is usual in its row and column, is zero to rounding.
+#: An FRF below this share of sqrt|h_pp h_qq|, or of the usual size in its row and column, is zero to rounding.
 ZERO = 1e-8
 #: A pair that differs less than this, relatively, was made reciprocal: it holds one measurement.
 _RECIPROCAL = 1e-9

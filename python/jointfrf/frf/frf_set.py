@@ -591,7 +591,7 @@ def places_of_nodes(frfs: FrfSet, nodes_j: Sequence[int], nodes_k: Sequence[int]
     Returns
     -------
     tuple of ChannelPlace
-        In the order of the nodes; position and direction as the set says.
+        In the order of the nodes; position and direction of the set.
 
     Raises
     ------

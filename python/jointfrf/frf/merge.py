@@ -99,7 +99,7 @@ def merge_frfs(sets: Sequence[FrfSet]) -> FrfSet:
 
 
 class _Merged:
-    """Where the FRFs of several sets stand in the one that they make."""
+    """Places of the FRFs of several sets in the merged one."""
 
     def __init__(self, responses: Sequence[Channel], excitations: Sequence[Channel], sets: Sequence[FrfSet]) -> None:
         self.responses, self.excitations, self.sets = responses, excitations, sets

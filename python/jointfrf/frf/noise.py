@@ -193,7 +193,7 @@ def noise_arguments(
     count: int,
     shape: tuple[int, ...],
 ) -> tuple[str, str, int, int, float, NDArray[np.int32]]:
-    """Return the arguments that say the noise as the kernel takes them, checked; matrices of `shape`."""
+    """Check the arguments of noise for matrices of `shape`, and return them as the kernel takes them."""
     check_choice("kind", kind, tuple(NOISE_KINDS))
     check_choice("relative_to", relative_to, get_args(NoiseReference))
     number = as_number("level", level)

@@ -58,7 +58,7 @@ class NoiseModel:
     floor : ndarray, shape (n_out, n_in)
         Part that is the same at all lines, in the unit of the FRF.
     coherence_factor : ndarray, shape (n_out, n_in)
-        Noise over what the coherence says; 0 without coherence. Near 1 where it explains the noise alone.
+        Noise over that by the coherence; 0 without coherence. Near 1 where it explains the noise alone.
     variance : ndarray, shape (n_freq, n_out, n_in)
         E|e|^2.
     inflation : float
@@ -424,7 +424,7 @@ def _without_smoothing(
     for group in lines.groups:
         group.put(np.full((len(group.rows), 1), level), relative)
     variance, factor = relative**2 * abs(h) ** 2, np.ones(n_freq)
-    if differences is not None and smooth.poles:  # enough lines to say which of them are outlying
+    if differences is not None and smooth.poles:  # enough lines to find outlying ones
         factor = differences.line_levels(lines.weighing(variance)).factor
     return NoiseModel(
         relative=relative[0],

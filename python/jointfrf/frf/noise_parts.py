@@ -221,7 +221,7 @@ def line_levels(noise: ComplexArray, inflation: float = 1.0, *, is_residual: boo
 
 
 def _missed(residual: ComplexArray, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Which of the chosen lines are in long runs through which the residual goes smoothly."""
+    """Which of the chosen lines are in long runs with a smooth residual."""
     missed = np.zeros_like(chosen)
     if np.count_nonzero(chosen) <= _SHORT_RUN:
         return missed

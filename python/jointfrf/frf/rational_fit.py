@@ -16,7 +16,7 @@ __all__ = ["Entries", "OrderSearch", "RationalFit", "rational_fit", "relocated",
 #: Most relocations after new poles, and at the end; they end where the sum of squares no longer changes.
 _RELOCATIONS = 3
 _LAST_RELOCATIONS = 8
-#: Relocation ends when it gains less than this share of what a pole must gain.
+#: Relocation ends when it gains less than this share of the price of a pole.
 _STILL = 0.1
 #: A fit that leaves this share of the data is exact but for rounding of the normal equations.
 _EXACT = 3e-5
@@ -176,7 +176,7 @@ class OrderSearch:
 
 
 def _price(entries: Entries, inflation: float) -> float:
-    """Return what a pole must take off the sum of squares of noise of variance 1 to be worth its parameters.
+    """Return by how much a pole must reduce the sum of squares of noise of variance 1 to be worth its parameters.
 
     Twice its parameters, as in generalised cross-validation, and the logarithm of the number of lines among which its
     place was chosen.
@@ -313,7 +313,7 @@ def _median_of_three(values: FloatArray) -> FloatArray:
 
 
 def _peaks(values: FloatArray) -> np.ndarray:
-    """Lines that stand out from those on both sides."""
+    """Lines that are larger than those on both sides."""
     n = len(values)
     reach = max(2, round(_PEAK_WINDOW * n))
     windows = np.lib.stride_tricks.sliding_window_view(np.pad(values, reach, mode="edge"), 2 * reach + 1)
@@ -325,9 +325,9 @@ def _peaks(values: FloatArray) -> np.ndarray:
 def _poles_for_residual(entries: Entries, fit: RationalFit, inflation: float, count: int) -> ComplexArray:
     """Poles where the residual does not vanish in the mean over neighbouring lines, at most `count`.
 
-    For windows of some widths the sum over the entries of |sum of residuals|^2 / width is about what a pole there can
-    take off the sum of squares; a window counts if that is the price of a pole. The pole takes its middle for frequency
-    and its half-width for damping. Lines far above their neighbours are cut down to these: they are no modes.
+    For windows of some widths the sum over the entries of |sum of residuals|^2 / width is about the reduction of the
+    sum of squares by a pole there; a window counts if that is the price of a pole. The pole takes its middle for
+    frequency and its half-width for damping. Lines far above their neighbours are cut down to these: they are no modes.
     """
     f = entries.s.imag
     residual = entries.weight * (entries.h - fit.smooth)

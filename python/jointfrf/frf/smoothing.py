@@ -52,7 +52,7 @@ class SmoothFrfs:
     freq_hz : ndarray, shape (n_freq,)
         Hz.
     h : ndarray, shape (n_freq, n_out, n_in)
-        Smooth FRFs in the unit of the measured ones; reciprocal where that was said.
+        Smooth FRFs in the unit of the measured ones; reciprocal where the structure is.
     is_smooth : bool
         False where there are too few lines, or no noise that could be removed: `h` is then what was measured.
     poles : tuple of ndarray

@@ -138,7 +138,7 @@ def check_lines(
 
 
 def _check_info(routine: str, info: int) -> None:
-    """Raise what a negative `info` means."""
+    """Raise the error of a negative `info`."""
     if info == _NO_ENGINE:
         word = reprlib.repr(os.environ.get("JOINTFRF_ENGINE"))
         raise ValueError(

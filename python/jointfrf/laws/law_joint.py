@@ -239,7 +239,7 @@ class LawJoint:
         return c
 
     def connection(self, omega: FloatArray) -> Connection:
-        """Return how the joint connects its DOFs j of A, then k of B; its masses stand last, on j, then on k."""
+        """Return how the joint connects its DOFs j of A, then k of B; its masses come last, on j, then on k."""
         n, masses = len(self.dofs), list(self.mass)
         q = n + 2 * len(masses)
         pattern = np.zeros((2 * n, q))

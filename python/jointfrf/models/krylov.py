@@ -17,7 +17,7 @@ from jointfrf.models.modal import Modes, RigidModes, find_rigid_modes, held
 
 __all__ = ["reduce_model", "spot_error"]
 
-#: Rounding may move the modes of a reduced model by this many times what it moves a direct solution by, but no more
+#: Rounding may move the modes of a reduced model this many times as far as a direct solution, but no further
 #: than what rounding leaves of a solution with the smallest reciprocal condition that gives no warning: four digits.
 _LOSS: Final = 30
 _MOST_ROUNDING: Final = float(np.finfo(np.float64).eps) / RCOND_LIMIT
@@ -54,7 +54,7 @@ class TwoLevels:
     shapes : ndarray, shape (n, n_modes)
         Their shapes, 1/sqrt(kg).
     n_rigid : int
-        How many of the modes, the first ones, are those of a rigid body: what is solved for has no part in them.
+        How many of the modes, the first ones, are those of a rigid body: solutions are without them.
     tolerance : float
         The iteration ends where the difference to the reduced model is sure to be below this share of the solution.
 
@@ -114,7 +114,7 @@ class TwoLevels:
         return None
 
     def _coarse(self, omega: float, forces: ComplexArray) -> ComplexArray:
-        """Return what the elastic modes of the reduced model take of forces."""
+        """Return the motion of the elastic modes of the reduced model under forces."""
         elastic = slice(self.n_rigid, None)
         modes, shapes = self.modes, self.shapes[:, elastic]
         stiffness = modes.stiffness[elastic] * (1 + 1j * modes.loss_factor[elastic])

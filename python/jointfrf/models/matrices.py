@@ -148,7 +148,7 @@ class ModelMatrices:
         return is_symmetric(self.operand(name))
 
     def check_symmetric(self, otherwise: str) -> None:
-        """Raise unless K and M are symmetric; `otherwise` says what follows."""
+        """Raise unless K and M are symmetric; `otherwise` is the consequence in the message."""
         for name in ("stiffness", "mass"):
             if not self.is_symmetric(name):
                 raise ValueError(f"{name} is not symmetric: {otherwise}")

@@ -147,7 +147,7 @@ def _fitted(omega: FloatArray, values: ComplexArray, usable: NDArray[np.bool_], 
 
 
 def block_medians(values: FloatArray, length: int = _BLOCK) -> FloatArray:
-    """Return the median over blocks of lines, shape (n_blocks, ...); the last block takes what is left."""
+    """Return the median over blocks of lines, shape (n_blocks, ...); the last block has the remaining lines."""
     n = max(values.shape[0] // length, 1)
     whole = min(n * length, values.shape[0])
     medians = np.median(values[:whole].reshape(n, whole // n, *values.shape[1:]), axis=1)

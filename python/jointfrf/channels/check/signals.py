@@ -243,7 +243,7 @@ def _copy_finding(word: str, first: str, second: str, value: float) -> FrfFindin
 def find_bad_lines(
     freq_hz: FloatArray, h: ComplexArray, responses: tuple[str, ...], forces: tuple[str, ...]
 ) -> tuple[list[FrfFinding], NDArray[np.bool_]]:
-    """Return what is wrong with lines, and which lines are good."""
+    """Return findings about lines, and which lines are good."""
     findings = []
     finite = np.isfinite(h)
     good = np.asarray(finite.all(axis=(1, 2)))
