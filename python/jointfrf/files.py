@@ -1,4 +1,4 @@
-"""Files: how one begins, what reading one may take, and writing whole or not at all."""
+"""Files: their first bytes, limits of reading, and writing as a whole or not at all."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ __all__ = [
     "written_whole",
 ]
 
-#: How much of a file shows what it is, bytes.
+#: First bytes of a file, from which its format is detected.
 HEAD = 1 << 13
-#: Says another limit, GB.
+#: Environment variable with another limit, GB.
 LIMIT_VARIABLE = "JOINTFRF_FILE_LIMIT_GB"
-#: Without one: files beyond this are not read, GB; what a file holds may take so much memory, GB, or so many times the
+#: Without one: larger files are not read, GB; the content of a file may take so much memory, GB, or so many times the
 #: size of the file, whichever is more.
 _LARGEST, _SMALL, _TIMES = 16.0, 1.0, 10
 #: Each array, group or cell takes at least this, bytes: there are files of nothing but names.
@@ -43,6 +43,7 @@ _UNUSUAL, _LONGEST = re.compile(r"[^\w+,=.-]", re.ASCII), 100
 _OPEN_FILES = "/proc/"
 #: What readers of numpy, scipy and h5py raise for a damaged file.
 _DAMAGE = (OSError, ValueError, KeyError, TypeError, EOFError, RuntimeError, OverflowError, MemoryError)
+#: Most links that are followed, as Linux does.
 _MOST_LINKS = 40
 
 
@@ -251,7 +252,7 @@ def below(folder: Path, name: str, suffix: str = "") -> Path:
 
 
 def write_file(path: Path, content: str | bytes) -> None:
-    """Write a file beside its place and move it there: a reader finds the old one or the new one, never a part.
+    """Write a file under a temporary name and rename it: a reader finds the old file or the new one, never a part.
 
     Parameters
     ----------
@@ -271,13 +272,13 @@ def write_file(path: Path, content: str | bytes) -> None:
 
 @contextmanager
 def written_whole(path: Path) -> Iterator[Path]:
-    """Give a place beside a file for what is written piece by piece, and move it there at the end.
+    """Yield a temporary file beside a path, and move it there at the end.
 
     Parameters
     ----------
     path : Path
-        In a folder that exists. Where a link is, the file is replaced that it leads to. An older file leaves its mode
-        and its owner to the new one. A device or a pipe is not replaced: all is written into it at the end.
+        In a folder that exists. Where a link is, the file is replaced that it leads to. The new file gets mode and
+        owner of an older one. A device or a pipe is not replaced: all is written into it at the end.
 
     Raises
     ------
@@ -331,7 +332,7 @@ def _followed(path: Path) -> Path:
 
 
 def _created(folder: Path, name: str, *, private: bool) -> Path:
-    """Create a file of a new name; the mask of the process, or what the folder says, gives its mode."""
+    """Create a file of a new name; the mask of the process, or of the folder, gives its mode."""
     try:
         longest = os.pathconf(folder, "PC_NAME_MAX")
     except (AttributeError, OSError, ValueError):

@@ -24,6 +24,22 @@ LAWS: tuple[type[JointLaw], ...] = (SpringLaw, StandardLinearSolid, FractionalZe
 _BY_WORD = {law.word: law for law in LAWS}
 #: Words of laws; a rigid DOF has none.
 LAW_WORDS = (*_BY_WORD, "rigid")
+#: Reference point, which `read_joint_table` leaves to its caller.
+_AT = Key("at", "list of three numbers", "Reference point.", "m", "not known")
+#: Keys of a joint by constants.
+JOINT_KEYS = KeyTable(
+    "joint.toml",
+    "A joint by its constants; matrices are lists of lists.",
+    (
+        Key("dofs", "list of texts", "Names of the joint DOFs: `y`, `theta_z`."),
+        Key("stiffness", "list of numbers, or of lists", "Stiffness of each DOF, or the matrix.", "N/m, N m/rad"),
+        Key("damping", "list of numbers, or of lists", "Viscous damping.", "N s/m, N m s/rad", "none"),
+        Key("loss_factor", "list of numbers", "Hysteretic loss factor of each DOF.", "", "0"),
+        Key("structural_damping", "list of numbers, or of lists", "Hysteretic damping, beside that of loss factors.",
+            "N/m, N m/rad", "none"),
+        _AT,
+    ),
+)  # fmt: skip
 
 
 def _numbers(law: type[JointLaw]) -> tuple[LawField, ...]:
@@ -51,22 +67,6 @@ def takes_in_words() -> str:
     return "; ".join(f"`{law.word}` {', '.join(f'`{one.name}`' for one in _numbers(law))}" for law in LAWS)
 
 
-#: Reference point, which `read_joint_table` leaves to its caller.
-_AT = Key("at", "list of three numbers", "Reference point.", "m", "not known")
-#: Keys of a joint by constants.
-JOINT_KEYS = KeyTable(
-    "joint.toml",
-    "A joint by its constants; matrices are lists of lists.",
-    (
-        Key("dofs", "list of texts", "Names of the joint DOFs: `y`, `theta_z`."),
-        Key("stiffness", "list of numbers, or of lists", "Stiffness of each DOF, or the matrix.", "N/m, N m/rad"),
-        Key("damping", "list of numbers, or of lists", "Viscous damping.", "N s/m, N m s/rad", "none"),
-        Key("loss_factor", "list of numbers", "Hysteretic loss factor of each DOF.", "", "0"),
-        Key("structural_damping", "list of numbers, or of lists", "Hysteretic damping, beside that of loss factors.",
-            "N/m, N m/rad", "none"),
-        _AT,
-    ),
-)  # fmt: skip
 #: Keys of one law.
 _LAW = KeyTable(
     "[[law]], in joint.toml",
