@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from jointfrf.errors import FileContentError
 from jointfrf.frf.channel_place import ChannelPlace, ChannelRole, JointSide
 from jointfrf.frf.frf_set import Channel
-from jointfrf.io.text_table import TextTable, read_text_table
+from jointfrf.io.csv_file import TextTable, read_text_table
 from jointfrf.spelling import did_you_mean
 from jointfrf.toml.keys import Key, KeyTable
 from jointfrf.toml.table import TomlTable, read_toml

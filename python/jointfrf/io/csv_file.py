@@ -1,27 +1,27 @@
-"""FRFs in text tables: a column of frequencies, and two columns for each FRF."""
+"""Text tables: rows of cells, and FRFs in them: a column of frequencies, and two columns for each FRF."""
 
 from __future__ import annotations
 
+import csv
 import re
 from contextlib import suppress
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf.errors import FileContentError
-from jointfrf.files import ReadLimit, write_file
+from jointfrf.files import ReadLimit, text_of, write_file
 from jointfrf.frf.frf_set import Channel, FrfSet
 from jointfrf.io.arrays import FrfArrays
 from jointfrf.io.file_format import FileFormat, Reading
 from jointfrf.io.functions import LooseFunction, arrays_of_functions
 from jointfrf.io.labels import channels_of
 from jointfrf.io.named_arrays import fields_of
-from jointfrf.io.text_table import TextTable, read_text_table
 
-__all__ = ["CSV", "write_csv"]
+__all__ = ["CSV", "TextTable", "read_text_table", "write_csv"]
 
 _PARTS = {
     "real": "real", "re": "real", "imag": "imag", "imaginary": "imag", "im": "imag",
@@ -35,6 +35,75 @@ _UNIT = re.compile(r"\[([^\]]*)\]")
 _FREQUENCY = re.compile(r"(f|freq|frequency|freq_hz|hz)\b", re.IGNORECASE)
 _HZ = {"": 1.0, "hz": 1.0, "khz": 1e3, "rad/s": 0.5 / np.pi}
 _RADIANS = {"": np.pi / 180, "deg": np.pi / 180, "°": np.pi / 180, "rad": 1.0}
+
+
+class TextTable(NamedTuple):
+    """A table as it is in a file.
+
+    Attributes
+    ----------
+    stated : dict of str
+        What comments such as ``# unit: m/N`` say, by their word in small letters.
+    heading : list of str
+        Names of the columns.
+    rows : list of (str, list of str)
+        File and line, with which messages begin, and the cells; as many as the heading has.
+    decimal_comma : bool
+        Whether numbers may have one: not where commas are between the cells.
+    """
+
+    stated: dict[str, str]
+    heading: list[str]
+    rows: list[tuple[str, list[str]]]
+    decimal_comma: bool
+
+    def number(self, cell: str) -> float:
+        """Return the number in a cell.
+
+        Raises
+        ------
+        ValueError
+            It is none.
+        """
+        return float(cell.replace(",", ".") if self.decimal_comma else cell)
+
+
+def read_text_table(path: Path) -> TextTable:
+    """Read a table; blank lines and lines that begin with ``#`` are no rows.
+
+    Raises
+    ------
+    FileContentError
+        It cannot be read, it is not a text file, it is empty, or a row has not as many cells as the heading.
+    """
+    stated: dict[str, str] = {}
+    heading: list[str] = []
+    rows: list[tuple[str, list[str]]] = []
+    mark = ","
+    for number, line in enumerate(text_of(path).splitlines(), start=1):
+        text = line.strip("\x1a")  # the end of a file of DOS
+        if not text.strip(",;\t "):
+            continue
+        if text.lstrip().startswith("#"):
+            key, colon, value = text.lstrip("# ").partition(":")
+            if colon:
+                stated[key.strip().lower()] = value.strip(" ,;\t")
+            continue
+        mark = mark if heading else next((each for each in "\t;," if each in text), ",")
+        try:
+            (cells,) = csv.reader([text], delimiter=mark, skipinitialspace=True)
+        except csv.Error as error:
+            raise FileContentError(f"{path}: line {number} cannot be read: {error}") from error
+        cells = [cell.strip() for cell in cells]
+        if not heading:
+            heading = cells
+            continue
+        if len(cells) != len(heading):
+            raise FileContentError(f"{path}: line {number} has {len(cells)} columns, the heading has {len(heading)}")
+        rows.append((f"{path}: line {number}", cells))
+    if not heading:
+        raise FileContentError(f"{path} is empty")
+    return TextTable(stated, heading, rows, mark != ",")
 
 
 def _read(path: Path, limit: ReadLimit, _: Reading) -> FrfArrays:

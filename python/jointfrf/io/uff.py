@@ -20,18 +20,19 @@ from jointfrf.frf.merge import same_lines
 from jointfrf.io.arrays import contradiction
 from jointfrf.io.file_format import FileFormat, Reading
 from jointfrf.io.labels import DIRECTION_CODES
-from jointfrf.io.uff_file import UniversalFile, name_some
+from jointfrf.io.uff_file import UniversalFile, name_some, node_coordinates
 from jointfrf.io.uff_function import (
     DELIMITER,
     FunctionHeader,
     axis_record,
     function_dataset,
     function_values,
+    kind_of_frf,
+    ordinate_factor,
+    ordinate_quantity,
     place_fields,
     read_header,
 )
-from jointfrf.io.uff_nodes import node_coordinates
-from jointfrf.io.uff_ordinate import kind_of_frf, ordinate_factor, ordinate_quantity
 from jointfrf.kernel.arguments import check_type
 
 __all__ = ["UNIVERSAL_FILE", "read_uff", "write_uff"]

@@ -351,7 +351,7 @@ TEXTS = ["102:+y", "", "Träger", "x" * 5000, "y"]
     [{}, {"chunks": (2,)}, {"chunks": (2,), "compression": "gzip", "shuffle": True}],
 )
 def test_texts_of_variable_length(tmp_path, h5py, alone, options, block):
-    from jointfrf.io.hdf5_texts import hdf5_texts
+    from jointfrf.io.hdf5_file import hdf5_texts
 
     path = tmp_path / "a.h5"
     with h5py.File(path, "w", userblock_size=block) as file:
