@@ -157,7 +157,7 @@ def contradiction(said: str, wanted: str, where: str) -> str:
 def _numbers(what: str, values: Any) -> NDArray[Any]:
     found = as_array(f"the {what}", values)
     if found.dtype.kind not in "biufc":
-        raise ValueError(f"the {what} are no numbers")
+        raise ValueError(f"the {what} are not numbers")
     return found
 
 

@@ -23,16 +23,19 @@ from jointfrf.io.named_arrays import fields_of
 
 __all__ = ["CSV", "TextTable", "read_text_table", "write_csv"]
 
+#: Words of a heading, and the part of an FRF that they name.
 _PARTS = {
     "real": "real", "re": "real", "imag": "imag", "imaginary": "imag", "im": "imag",
     "mag": "magnitude", "magnitude": "magnitude", "abs": "magnitude", "amplitude": "magnitude", "amp": "magnitude",
     "phase": "phase", "arg": "phase", "angle": "phase",
     "coherence": "coherence", "coh": "coherence",
 }  # fmt: skip
+#: A channel as in ``102:+y`` or ``bar:102 -Z``, and response / excitation; a unit in brackets; the first column.
 _CHANNEL = r"[^\s/,;()\[\]]*?\d+[\s:._]*[+-]?r?[xyz][+-]?"
 _PAIR = re.compile(rf"({_CHANNEL})\s*/\s*({_CHANNEL})(?![a-z])", re.IGNORECASE)
 _UNIT = re.compile(r"\[([^\]]*)\]")
 _FREQUENCY = re.compile(r"(f|freq|frequency|freq_hz|hz)\b", re.IGNORECASE)
+#: Factors to Hz and to radians by the unit in brackets; Hz and degrees where there is none.
 _HZ = {"": 1.0, "hz": 1.0, "khz": 1e3, "rad/s": 0.5 / np.pi}
 _RADIANS = {"": np.pi / 180, "deg": np.pi / 180, "°": np.pi / 180, "rad": 1.0}
 
@@ -43,7 +46,7 @@ class TextTable(NamedTuple):
     Attributes
     ----------
     stated : dict of str
-        What comments such as ``# unit: m/N`` say, by their word in small letters.
+        What comments such as ``# unit: m/N`` say, by the word before the colon in lower case.
     heading : list of str
         Names of the columns.
     rows : list of (str, list of str)
@@ -63,7 +66,7 @@ class TextTable(NamedTuple):
         Raises
         ------
         ValueError
-            It is none.
+            The cell holds something else.
         """
         return float(cell.replace(",", ".") if self.decimal_comma else cell)
 
@@ -133,7 +136,7 @@ def _read(path: Path, limit: ReadLimit, _: Reading) -> FrfArrays:
         try:
             found.averages = float(table.stated["averages"])
         except ValueError as error:
-            raise FileContentError(f"{where}: averages {table.stated['averages']!r} is no number") from error
+            raise FileContentError(f"{where}: averages {table.stated['averages']!r} is not a number") from error
     return found
 
 
@@ -145,7 +148,7 @@ def _numbers(table: TextTable, place: str, cells: list[str]) -> list[float]:
             with suppress(ValueError):
                 table.number(cell)
                 continue
-            raise FileContentError(f"{place}, column {i}: {cell[:30]!r} is no number") from None
+            raise FileContentError(f"{place}, column {i}: {cell[:30]!r} is not a number") from None
         raise
 
 

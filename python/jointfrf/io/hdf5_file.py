@@ -22,16 +22,19 @@ from jointfrf.io.named_arrays import arrays_of_fields, fields_of
 
 __all__ = ["HDF5", "hdf5_fields", "hdf5_texts", "write_hdf5"]
 
-#: More than this, deflate cannot make of a byte.
+#: Bytes that deflate makes of one, at most: 1032 by its definition, and a margin.
 _MOST_COMPRESSED = 1100
+#: Groups inside groups, and links to links: more than a sound file has, few enough for the stack.
 _DEEPEST, _MOST_LINKS = 20, 20
 #: Filters that are undone here, by their numbers in the format.
 _DEFLATE, _SHUFFLE = 1, 2
-#: A letter as a text takes up to so many bytes, with what is made on the way.
+#: Bytes of memory of a letter of MATLAB, at most, intermediate results included.
 _LETTER = 50
-#: A text as a dataset holds it: its length, and where it stands: in which heap, as which of its objects.
+#: A text in a dataset: its length, the place of its heap, and its number in the heap.
 _PLACE = np.dtype([("length", "<u4"), ("heap", "<u8"), ("index", "<u4")])
+#: The signature of a heap; bytes before its objects and before each of them.
 _HEAP, _HEAP_HEAD, _OBJECT_HEAD = b"GCOL", 16, 16
+#: The place of the heap of an empty text.
 _NOWHERE = 2**64 - 1
 
 
@@ -53,7 +56,7 @@ def hdf5_fields(path: Path, limit: ReadLimit) -> dict[str, Any]:
     Raises
     ------
     FileContentError
-        The file is damaged, holds more than the limit, or names another file: what stands there is not read.
+        The file is damaged, holds more than the limit, or refers to another file, which is not read.
     MissingPackageError
         The package h5py is not installed.
     """
@@ -63,7 +66,7 @@ def hdf5_fields(path: Path, limit: ReadLimit) -> dict[str, Any]:
 
 
 class _Hdf5:
-    """Reading one file: no dataset before a look at where it is and how large."""
+    """Reads one file; place and size of each dataset are checked before it is read."""
 
     def __init__(self, h5py: Any, path: Path, limit: ReadLimit) -> None:
         self.h5py, self.path, self.limit = h5py, path, limit
@@ -131,7 +134,7 @@ class _Hdf5:
         return _text(value)
 
     def check_size(self, item: Any, settings: Any) -> None:
-        """Look at whether the file can hold a dataset, and at how much that is."""
+        """Check the size that a dataset states against the size of the file and the limit."""
         if item.nbytes > _MOST_COMPRESSED * self.size or (item.compression is None and item.nbytes > self.size):
             size = " x ".join(map(str, item.shape))
             raise FileContentError(
@@ -143,7 +146,7 @@ class _Hdf5:
             self.check_chunks(item, filters)
 
     def check_chunks(self, item: Any, filters: list[int]) -> None:
-        """Look at chunks that could unfold to more than their size, which the library makes room for."""
+        """Check chunks that decompress to more than their size, for which the library would allocate memory."""
         chunk = item.dtype.itemsize * int(np.prod(item.chunks, dtype=object))
         self.limit.take(chunk)
         large = (self.limit.bytes - chunk) / _MOST_COMPRESSED
@@ -157,7 +160,7 @@ class _Hdf5:
                 if first < 0 or mask >> first & 1:
                     continue
                 if len(zlib.decompressobj().decompress(packed, chunk + 5)) > chunk + 4:
-                    raise FileContentError(f"{self.path} is damaged: {item.name} unfolds to more than it states")
+                    raise FileContentError(f"{self.path} is damaged: {item.name} decompresses to more than it states")
 
     def matlab(self, item: Any, name: str) -> str:
         """Return a short attribute as a text; a longer one, or of variable length, is not MATLAB's."""
@@ -191,7 +194,7 @@ def _text(value: Any) -> Any:
 
 
 def hdf5_texts(h5py: Any, item: Any, path: Path, limit: ReadLimit) -> list[str]:
-    """Read the texts of a dataset by hand: of damaged ones the HDF5 library crashes or hangs.
+    """Read the texts of variable length of a dataset without the HDF5 library, which damaged ones crash or hang.
 
     Parameters
     ----------
@@ -282,7 +285,7 @@ class _Heaps:
         if heap not in self._read:
             self._read[heap] = self._objects(self.base + heap)
         if index not in self._read[heap]:
-            raise ValueError("its texts are damaged: one is not where it is said to be")
+            raise ValueError("its texts are damaged: one is not at the place that is stated")
         return self._read[heap][index]
 
     def _objects(self, start: int) -> dict[int, bytes]:
@@ -291,7 +294,7 @@ class _Heaps:
         head = self.file.read(_HEAP_HEAD)
         size = int.from_bytes(head[8:], "little")
         if len(head) < _HEAP_HEAD or not head.startswith(_HEAP) or not _HEAP_HEAD <= size <= whole - start:
-            raise ValueError("its texts are damaged: there is no heap where one is said to be")
+            raise ValueError("its texts are damaged: there is no heap at the place that is stated")
         self.limit.take(size)
         held, place, found = head + self.file.read(size - _HEAP_HEAD), _HEAP_HEAD, dict[int, bytes]()
         while place + _OBJECT_HEAD <= size:
@@ -343,7 +346,7 @@ def _read(path: Path, limit: ReadLimit, reading: Reading) -> FrfArrays:
     return arrays_of_fields(hdf5_fields(path, limit), reading.mapping, str(path), limit)
 
 
-#: First bytes of a file, or of what stands after a block of the user.
+#: The signature of the format, and where it may be: at the beginning, or after a block of the user.
 _SIGN, _PLACES = b"\x89HDF\r\n\x1a\n", (0, 512, 1024, 2048, 4096)
 HDF5 = FileFormat(
     name="HDF5",

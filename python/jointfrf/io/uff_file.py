@@ -19,10 +19,13 @@ from jointfrf.io.units import UnitSystem
 
 __all__ = ["UniversalFile", "index_datasets", "name_some", "node_coordinates"]
 
+#: A line of -1 in columns 5 and 6, which some programs fill with blanks to column 80.
 _DELIMITER = re.compile(rb"(?<![^\r\n])    -1(?=[\r\n]|\Z| {74})")
 #: After binary numbers no line need end.
 _AFTER_NUMBERS = re.compile(rb"\s{0,4}?    -1(?=[\r\n]|\Z| {74})")
+#: Bytes that decide whether a place is a delimiter: four blanks, six columns, 74 blanks, line ends.
 _REACH = 96
+#: Bytes of the file in memory: fewer take longer, more do not take less time.
 _CHUNK = 1 << 22
 #: Bytes of a value by the data type of record 7, and of the abscissa before it where the spacing is uneven.
 _VALUE_BYTES = {2: 4, 4: 8, 5: 8, 6: 16}
@@ -149,8 +152,9 @@ def _kind(head: bytes) -> int:
         return 0
 
 
-#: How far, relative to its length, an axis may be from one of the global ones: dataset 18 gives six digits.
+#: How far, relative to its length, an axis may differ from one of the global ones: dataset 18 gives six digits.
 _TOLERANCE = 1e-5
+#: Numbers of datasets or nodes that a sentence names.
 _NUMBERS_SHOWN = 5
 _DATASETS = {
     15: "nodes", 18: "coordinate systems", 55: "data at nodes", 82: "trace lines", 151: "header", 164: "units",

@@ -42,9 +42,11 @@ _DATA_TYPES = {
     9: "reaction force", 11: "velocity", 12: "acceleration", 13: "excitation force", 15: "pressure", 16: "mass",
     17: "time", 18: "frequency", 19: "rpm", 20: "order",
 }  # fmt: skip
+#: Data types that name no quantity; those of forces; those of motions.
 _UNSAID = (0, 1)
 _FORCES = (9, 13)
 _QUANTITY = {8: "receptance", 11: "mobility", 12: "accelerance"}
+#: How far factors of labels and of dataset 164 may differ: programs write four digits or more.
 _TOLERANCE = 1e-3
 #: How far, relative to it, a line may lie from where an even spacing puts it: 13 columns hold as many digits.
 _EVEN = 1e-9
