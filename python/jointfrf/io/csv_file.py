@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
+from collections.abc import Iterator
 from contextlib import suppress
 from os import PathLike
 from pathlib import Path
@@ -46,18 +47,19 @@ class TextTable(NamedTuple):
     Attributes
     ----------
     stated : dict of str
-        What comments such as ``# unit: m/N`` say, by the word before the colon in lower case.
+        What comments before the heading such as ``# unit: m/N`` say, by the word before the colon in lower case.
     heading : list of str
         Names of the columns.
-    rows : list of (str, list of str)
-        File and line, with which messages begin, and the cells; as many as the heading has.
+    rows : iterator of (str, list of str)
+        File and line, with which messages begin, and the cells; as many as the heading has. Each is read when it is
+        asked for.
     decimal_comma : bool
         Whether numbers may have one: not where commas are between the cells.
     """
 
     stated: dict[str, str]
     heading: list[str]
-    rows: list[tuple[str, list[str]]]
+    rows: Iterator[tuple[str, list[str]]]
     decimal_comma: bool
 
     def number(self, cell: str) -> float:
@@ -77,43 +79,47 @@ def read_text_table(path: Path) -> TextTable:
     Raises
     ------
     FileContentError
-        It cannot be read, it is not a text file, it is empty, or a row has not as many cells as the heading.
+        It cannot be read, it is not a text file, it is empty, or, when the rows are read, one has not as many cells as
+        the heading.
     """
+    lines = (
+        (f"{path}: line {number}", line.strip("\x1a"))  # the end of a file of DOS
+        for number, line in enumerate(text_of(path).splitlines(), start=1)
+        if line.strip(",;\t \x1a")
+    )
     stated: dict[str, str] = {}
-    heading: list[str] = []
-    rows: list[tuple[str, list[str]]] = []
-    mark = ","
-    for number, line in enumerate(text_of(path).splitlines(), start=1):
-        text = line.strip("\x1a")  # the end of a file of DOS
-        if not text.strip(",;\t "):
+    for where, line in lines:
+        if not line.lstrip().startswith("#"):
+            mark = next((each for each in "\t;," if each in line), ",")
+            heading = _cells(where, line, mark)
+            return TextTable(stated, heading, _rows(lines, mark, len(heading)), mark != ",")
+        key, colon, value = line.lstrip("# ").partition(":")
+        if colon:
+            stated[key.strip().lower()] = value.strip(" ,;\t")
+    raise FileContentError(f"{path} is empty")
+
+
+def _rows(lines: Iterator[tuple[str, str]], mark: str, count: int) -> Iterator[tuple[str, list[str]]]:
+    for where, line in lines:
+        if line.lstrip().startswith("#"):
             continue
-        if text.lstrip().startswith("#"):
-            key, colon, value = text.lstrip("# ").partition(":")
-            if colon:
-                stated[key.strip().lower()] = value.strip(" ,;\t")
-            continue
-        mark = mark if heading else next((each for each in "\t;," if each in text), ",")
-        try:
-            (cells,) = csv.reader([text], delimiter=mark, skipinitialspace=True)
-        except csv.Error as error:
-            raise FileContentError(f"{path}: line {number} cannot be read: {error}") from error
-        cells = [cell.strip() for cell in cells]
-        if not heading:
-            heading = cells
-            continue
-        if len(cells) != len(heading):
-            raise FileContentError(f"{path}: line {number} has {len(cells)} columns, the heading has {len(heading)}")
-        rows.append((f"{path}: line {number}", cells))
-    if not heading:
-        raise FileContentError(f"{path} is empty")
-    return TextTable(stated, heading, rows, mark != ",")
+        cells = _cells(where, line, mark)
+        if len(cells) != count:
+            raise FileContentError(f"{where} has {len(cells)} columns, the heading has {count}")
+        yield where, cells
+
+
+def _cells(where: str, line: str, mark: str) -> list[str]:
+    try:
+        (cells,) = csv.reader([line], delimiter=mark, skipinitialspace=True)
+    except csv.Error as error:
+        raise FileContentError(f"{where} cannot be read: {error}") from error
+    return [cell.strip() for cell in cells]
 
 
 def _read(path: Path, limit: ReadLimit, _: Reading) -> FrfArrays:
     """Read columns whose names say response, excitation, part and unit, after one of frequencies."""
     table = read_text_table(path)
-    if not table.rows or len(table.heading) < 2:
-        raise FileContentError(f"{path} holds no table of numbers below a heading")
     where, first = str(path), table.heading[0]
     parts: dict[tuple[Channel, Channel], dict[str, tuple[str, NDArray[np.float64]]]] = {}
     if not _FREQUENCY.match(first):
@@ -122,6 +128,8 @@ def _read(path: Path, limit: ReadLimit, _: Reading) -> FrfArrays:
     if hz not in _HZ:
         raise FileContentError(f"{where}: the unit '{hz}' of the frequency is none of Hz, kHz, rad/s")
     numbers = np.array([_numbers(table, place, cells) for place, cells in table.rows])
+    if not numbers.size or len(table.heading) < 2:
+        raise FileContentError(f"{path} holds no table of numbers below a heading")
     for name, column in zip(table.heading[1:], numbers.T[1:], strict=True):
         pair, part = _column(name, where)
         if part in parts.setdefault(pair, {}):
