@@ -157,7 +157,7 @@ def test_a_wrong_key_of_matrices(by_matrices, old, new, message):
         ("1 2\n1 0\n", r"a_dofs\.txt: line 2: a DOF has a number from 1 to 6, not 0$"),
         ("1 2 3\n", r"a_dofs\.txt: line 1 must be like '12:y' or '12 2', not '1 2 3'$"),
         ("1 2\n1 2\n1 3\n1 4\n", r"a_dofs\.txt names '1:y' twice$"),
-        ("\xff\xfe", r"a_dofs\.txt cannot be read as a text file"),
+        ("\xff\xfe\x00", r"a_dofs\.txt is not a text file"),
     ],
 )
 def test_a_bad_file_of_dofs(by_matrices, text, message):
