@@ -142,22 +142,23 @@ def as_channel_names(
     forces: Sequence[str | Channel] | None,
 ) -> tuple[Sequence[str | Channel], Sequence[str | Channel]]:
     """Return the names of responses and forces, each different, by default their numbers."""
-    if names is not None and (responses is not None or forces is not None):
-        raise ValueError("names goes without responses and forces")
-    if names is None and responses is None and forces is None and shape[0] != shape[1]:
+    words = ("responses", "forces")
+    if names is not None:
+        if responses is not None or forces is not None:
+            raise ValueError("names goes without responses and forces")
+        responses = forces = names
+        words = ("names", "names")
+    elif (responses is None) != (forces is None):
+        raise ValueError("responses and forces go together")
+    elif responses is None and shape[0] != shape[1]:
         raise ValueError(f"h holds {shape[0]} responses and {shape[1]} forces: name them by responses and forces")
     found = []
-    for word, own, n in (("responses", responses, shape[0]), ("forces", forces, shape[1])):
-        if own is None:
-            own = names if names is not None else None
-        if own is None and (responses is not None or forces is not None):
-            raise ValueError("responses and forces go together")
-        asked = word if names is None else "names"
+    for word, own, n in zip(words, (responses, forces), shape, strict=True):
         if own is not None and (isinstance(own, str) or not isinstance(own, Iterable)):
-            raise TypeError(f"{asked} must be a sequence of names, not {one_line(own)}")
+            raise TypeError(f"{word} must be a sequence of names, not {one_line(own)}")
         labels = [str(i) for i in range(n)] if own is None else list(own)
         if len(labels) != n or len(set(map(str, labels))) != n:
-            raise ValueError(f"{asked} must name {n} different channels")
+            raise ValueError(f"{word} must name {n} different channels")
         found.append(labels)
     return found[0], found[1]
 
