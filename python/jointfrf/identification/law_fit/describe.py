@@ -14,9 +14,9 @@ from jointfrf.identification.compliance_fit.describe import (
     untrusted_warnings,
 )
 from jointfrf.identification.law_fit.law_fit import LawFit
-from jointfrf.identification.manifold.coordinates import LawCoordinates
 from jointfrf.identification.manifold.fit import ManifoldFit
 from jointfrf.identification.parameter_table import correlation_notes, parameter_warnings
+from jointfrf.identification.parameters import joint_vector
 from jointfrf.laws.law_joint import LawJoint
 
 __all__ = ["DescribedLaws", "describe_laws"]
@@ -37,7 +37,7 @@ def describe_laws(found: ManifoldFit, joint: LawJoint) -> DescribedLaws:
     doubts = [
         *untrusted_warnings(result, problem.dofs),
         *left_out_warnings(problem),
-        *_parameter_warnings(found),
+        *_parameter_warnings(found, joint),
         *_misfit_warnings(found),
     ]
     notes = [*noise_notes(problem), *correlation_notes(names, found.covariance / np.outer(size, size))]
@@ -63,14 +63,11 @@ def describe_laws(found: ManifoldFit, joint: LawJoint) -> DescribedLaws:
     return DescribedLaws(fit, tuple(told))
 
 
-def _parameter_warnings(found: ManifoldFit) -> list[str]:
+def _parameter_warnings(found: ManifoldFit, joint: LawJoint) -> list[str]:
     """Name parameters that the data determine poorly or not at all."""
-    shown = []
-    for group in found.estimate.groups:
-        assert isinstance(group.joint, LawCoordinates)
-        for one, place in zip(group.joint.vector.all, group.which, strict=True):
-            error = float(np.sqrt(max(found.covariance[place, place], 0)))
-            shown.append((one, float(found.estimate.theta[place]), error))
+    errors = np.sqrt(np.maximum(np.diagonal(found.covariance), 0))
+    parameters = joint_vector(joint, (), np.ones(len(joint.dofs))).all
+    shown = list(zip(parameters, found.estimate.theta.tolist(), errors.tolist(), strict=True))
     return parameter_warnings(shown, lambda name: found.intervals.of(name, 0.95))
 
 
