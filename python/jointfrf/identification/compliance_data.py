@@ -113,7 +113,7 @@ def regenerated_frfs(found: JointEstimate, n: int, lines: slice) -> ComplexArray
 
 def _of_group(group: GroupFit, lines: slice) -> ComplexArray:
     """Return the regenerated FRFs of one group of DOFs."""
-    data, joint = group.problem.data.on_slice(lines), group.joint
+    data, joint = group.problem.data.on_lines(lines), group.joint
     c = joint.matrix(joint.on_lines(lines).compliance(group.x))
     unknown = group.problem.unknown[lines].reshape(c.shape)
     with warnings.catch_warnings(), np.errstate(all="ignore"):

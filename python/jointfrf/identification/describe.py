@@ -11,7 +11,7 @@ from jointfrf.dofs import compliance_unit
 from jointfrf.identification.elastic_centre import elastic_centre
 from jointfrf.identification.findings import Finding, note, warn
 from jointfrf.identification.fit_data import ModelData
-from jointfrf.identification.manifold.coordinates import CrossTerms, LawCoordinates
+from jointfrf.identification.manifold.coordinates import CrossTerms
 from jointfrf.identification.manifold.estimate import JointEstimate
 from jointfrf.identification.manifold.fit import DofDamping, ManifoldFit
 from jointfrf.identification.manifold.prepare import FitProblem
@@ -19,6 +19,7 @@ from jointfrf.identification.manifold.transforms import Transforms
 from jointfrf.identification.manifold.uncertainty import Spread
 from jointfrf.identification.model.fit import FoundModel, OpenDirection
 from jointfrf.identification.model.prepare import Channels
+from jointfrf.identification.parameters import joint_vector
 from jointfrf.identification.residual_test import ResidualTest
 from jointfrf.identification.result import Fit, FittedParameter, law_parameters
 from jointfrf.kernel.arguments import FloatArray
@@ -375,10 +376,7 @@ def describe_laws(found: ManifoldFit, joint: LawJoint) -> Fit:
         is_converged=result.converged,
         intervals=found.intervals,
     )
-    is_log: dict[str, bool] = {}
-    for group in result.groups:
-        assert isinstance(group.joint, LawCoordinates)
-        is_log |= {one.name: one.is_log for one in group.joint.vector.all}
+    is_log = {one.name: one.is_log for one in joint_vector(joint, (), np.ones(len(joint.dofs))).all}
     findings = [
         *_left_out_lines(result, problem.dofs),
         *_left_out_dofs(problem),

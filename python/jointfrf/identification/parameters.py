@@ -35,7 +35,7 @@ class FitParameter(NamedTuple):
     origin : str
         What it belongs to.
     place : tuple
-        Where it stands there: its number in the joint; number of the attachment and of its number; name of an unknown;
+        Its place there: its number in the joint; number of the attachment and of its number; name of an unknown;
         number of a channel.
     value : float
         Where the fit may start, and the mean of the prior.

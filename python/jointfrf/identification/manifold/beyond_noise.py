@@ -141,14 +141,14 @@ def _without_channels(frfs: InterfaceFrfs) -> _Changes | None:
     return _Changes(gamma, np.array([one.redundancy for one in (*responses, *forces)]))
 
 
-#: Parts of the band that are fitted each by itself.
+#: Parts of the band that are fitted separately.
 _PARTS = 4
-#: Probability at which parts are said to disagree.
+#: Probability at which parts disagree.
 _DISAGREE = 1e-3
 
 
 class BandParts(NamedTuple):
-    """What fits of parts of the band, each by itself, say of the fit of all of it.
+    """Separate fits of parts of the band, compared with the fit of all of it.
 
     Attributes
     ----------
@@ -193,7 +193,7 @@ def fit_band_parts(
 
     Notes
     -----
-    Lines that do not fit the joint found are left out of a fit, and with them what would deny it: the residual stays
+    Lines that do not fit the joint found are left out of a fit, and with them what contradicts it: the residual stays
     that of the noise, and no scatter shows. Parts of the band find joints of their own. They disagree where the squares
     of their differences from the weighted mean, over their variances, are improbable for noise.
     """

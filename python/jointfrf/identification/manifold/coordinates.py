@@ -37,7 +37,7 @@ __all__ = [
     "joint_terms",
 ]
 
-#: Terms of K* beside its stiffness.
+#: Terms of K* in addition to its stiffness.
 DampingTerms = Literal["none", "viscous", "hysteretic", "both"]
 #: Terms that couple the DOFs of a joint: none, and this is used; perhaps, but not sought; fitted.
 CrossTerms = Literal["zero", "ignore", "fit"]
@@ -166,7 +166,7 @@ class JointCoordinates(ABC):
     Attributes
     ----------
     parameters : sequence, length p
-        What the coordinates stand for; each has a name.
+        Parameters of the joint in the order of the coordinates.
     omega : ndarray, shape (n_freq,)
         rad/s.
     n : int

@@ -36,7 +36,7 @@ _RIGID, _ROUNDING = 1e-3, 1e-12
 _FAR_BETTER = 4.0
 _TINY = float(np.finfo(float).tiny)
 
-#: A group of DOFs that is fitted by itself, and its FRFs.
+#: A group of DOFs that is fitted separately, and its FRFs.
 GroupData = tuple[NDArray[np.intp], LineData]
 
 
@@ -134,7 +134,7 @@ def estimate_joint(
     data : iterable of (dofs, LineData), optional
         Groups of DOFs and their FRFs, where they are known.
     is_explained : bool
-        Whether a joint with more terms explains the FRFs: `near` then shows by itself that this one does not.
+        Whether a joint with more terms explains the FRFs: then `near` alone suffices to show that this one does not.
     """
     groups = []
     known = {(tuple(start.dofs.tolist()), start.parameters): start for start in near}
@@ -146,7 +146,7 @@ def estimate_joint(
         some = spread_lines(len(lines.measured))
 
         def starts(lines: LineData = lines, terms: JointTerms = own, some: slice = some) -> list[FloatArray]:
-            return first_joints(lines.on_slice(some), coordinates_of(terms.on_lines(some)))
+            return first_joints(lines.on_lines(some), coordinates_of(terms.on_lines(some)))
 
         start = known.get((tuple(dofs.tolist()), own.parameters))
         groups.append(_fitted(_Search(problem, starts, cross, start, is_explained)))
@@ -200,7 +200,7 @@ def estimate_laws(
 
 
 def _grouped(frfs: InterfaceFrfs) -> Iterator[GroupData]:
-    """Return groups of DOFs that are fitted each by itself, and their FRFs."""
+    """Return groups of DOFs that are fitted separately, and their FRFs."""
     for dofs in frfs.on_lines(spread_lines(len(frfs.measured))).groups():
         yield dofs, frfs.of_dofs(dofs)
 

@@ -50,7 +50,7 @@ _NOISE, _SIGMA = 1.03, 5.0
 _POORLY = 0.05
 #: Steps that reverse, to this cosine, and shrink by less than this factor go to and fro between two points.
 _REVERSED, _SHRUNK = -0.8, 0.5
-#: Least part of such a step that is gone; a fit for which that is too much ends where it is.
+#: Least part of such a step that is taken; a fit for which that is too much ends where it is.
 _LEAST_SHARE = 0.1
 #: Targets whose gradients are found together.
 _AT_ONCE = 8
@@ -357,7 +357,7 @@ class _ChoiceOfM:
 
 
 class _StepLength:
-    """Which part of a step is gone.
+    """Which part of a step is taken.
 
     All of it, unless steps lead to and fro and hardly shrink: where all of the last one would have made the next step
     -r times as long, 1/(1 + r) of it would have ended at the fixed point. From then on parts do not grow: of two minima
@@ -388,7 +388,7 @@ class _StepLength:
 
 def _first_points(data: LineData, c: ComplexArray) -> OnManifold:
     """Start on every line, in chunks of lines."""
-    return OnManifold(*in_pieces(len(c), lambda own: starts_on_manifold(data.on_slice(own), c[own], _FIRST_STEPS)))
+    return OnManifold(*in_pieces(len(c), lambda own: starts_on_manifold(data.on_lines(own), c[own], _FIRST_STEPS)))
 
 
 def _linearised(
@@ -398,7 +398,7 @@ def _linearised(
     found = np.zeros_like(c) if problem.unknown.any() else None
 
     def of_lines(own: slice) -> Sequence[NDArray[Any]]:
-        here = problem._replace(data=problem.data.on_slice(own), unknown=problem.unknown[own])
+        here = problem._replace(data=problem.data.on_lines(own), unknown=problem.unknown[own])
         point = OnManifold(on.h[own], on.m[own], on.squares[own])
         if prior is not None:
             point = expected_m(here.data, c[own], point, prior.on_lines(own))
@@ -434,7 +434,7 @@ def _within_sight(minimum: FormMinimum, x: FloatArray) -> FloatArray:
 
 
 def _unit_places(data: LineData) -> NDArray[np.intp]:
-    """Return where the free entries of C stand among all, row by row."""
+    """Return the numbers of the free entries of C among all, row by row."""
     a, b = data.entries.free
     return a * data.entries.n + b
 

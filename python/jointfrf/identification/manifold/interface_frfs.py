@@ -89,7 +89,7 @@ class InterfaceFrfs(NamedTuple):
         return between(self.responses, h, self.forces)
 
     def line_stiffness(self) -> ComplexArray:
-        """Return K*(w) of each line by itself, shape (n_freq, n, n), N/m; NaN where it cannot be inverted."""
+        """Return K*(w) of each line alone, shape (n_freq, n, n), N/m; NaN where it cannot be inverted."""
         h = self.measured
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", IllConditionedWarning)
@@ -101,9 +101,9 @@ class InterfaceFrfs(NamedTuple):
         return self._replace(measured=self.measured[lines], smooth=self.smooth[lines], variance=self.variance[lines])
 
     def groups(self) -> list[NDArray[np.intp]]:
-        """Joint DOFs between which FRFs are zero, to rounding or beside their noise, on all lines.
+        """Joint DOFs between which FRFs are zero, to rounding or within their noise, on all lines.
 
-        Each group is a problem of its own: where a structure is symmetric, the FRFs between some DOFs vanish.
+        Each group is a separate problem: where a structure is symmetric, the FRFs between some DOFs vanish.
         """
         n, smooth = self.n, abs(self.smooth_gamma)
         size = np.sqrt(np.einsum("lpp->lp", smooth))

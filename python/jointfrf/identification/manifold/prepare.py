@@ -171,7 +171,7 @@ def prepare_compliance(
 
 
 def _check_joint_dofs(transforms: Transforms, h: ComplexArray, names: tuple[str, ...]) -> None:
-    """Refuse channels that do not show every joint DOF, once on each side."""
+    """Raise an error for channels that do not show every joint DOF, once on each side."""
     labels = [f"{side}:{name}" for side in "jk" for name in names]
     if not transforms.are_units:
         both = np.array_equal(transforms.responses, transforms.forces)
@@ -182,7 +182,7 @@ def _check_joint_dofs(transforms: Transforms, h: ComplexArray, names: tuple[str,
 
 def _is_symmetrised(h: ComplexArray) -> bool:
     """Whether FRFs were made reciprocal: both directions are then one measurement, with one noise."""
-    # Mostly the first line tells that they were not.
+    # Mostly the first line shows that they were not.
     return all(
         bool((abs(part - part.swapaxes(1, 2)) <= _RECIPROCAL * abs(part)).all())
         for part in (h[own] for own in (slice(1), *line_slices(len(h))))
@@ -205,7 +205,7 @@ _TINY = float(np.finfo(float).tiny)
 
 
 def check_transform(name: str, transform: FloatArray, labels: list[str]) -> None:
-    """Refuse a transform that makes one joint DOF of the others: some channels are the same, or stand in one line."""
+    """Raise an error for a transform whose joint DOFs are not independent."""
     size = np.linalg.norm(transform, axis=1, keepdims=True)
     rank = int(np.linalg.matrix_rank(transform / size, tol=_RANK))
     if rank < len(transform):
@@ -216,7 +216,7 @@ def check_transform(name: str, transform: FloatArray, labels: list[str]) -> None
 
 
 def check_channels(gamma: ComplexArray, labels: list[str]) -> None:
-    """Refuse measured FRFs between joint DOFs j, then k, that hold no signal, or one DOF twice.
+    """Raise an error for measured FRFs between joint DOFs j, then k, that hold no signal, or one DOF twice.
 
     On the two sides of a rigid joint calculated FRFs are the same; measured ones differ by their noise.
     """
@@ -265,7 +265,7 @@ def _is_measured(gamma: ComplexArray) -> bool:
 
 
 def check_joint_seen(freq: FloatArray, smooth: ComplexArray, variance: FloatArray) -> None:
-    """Refuse FRFs that are noise only, or that say nothing across the joint.
+    """Raise an error for FRFs that are noise only, or that show nothing across the joint.
 
     Parameters
     ----------
@@ -304,7 +304,7 @@ def check_joint_seen(freq: FloatArray, smooth: ComplexArray, variance: FloatArra
 
 
 def check_estimate(found: JointEstimate, level: float, span: str, *, is_level_known: bool) -> None:
-    """Refuse a result that fits nothing, or that fewer equations than parameters give.
+    """Raise an error for a result that fits nothing, or with fewer equations than parameters.
 
     Parameters
     ----------

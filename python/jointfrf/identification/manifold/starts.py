@@ -37,7 +37,7 @@ def first_joints(data: LineData, joint: SpringJoint) -> list[FloatArray]:
     a = range(n)
 
     def of_lines(own: slice) -> list[NDArray[Any]]:
-        part = data.on_slice(own)
+        part = data.on_lines(own)
         gamma, spread = part.entries.matrix(part.smooth), part.entries.matrix(_variance(part))
         compliance = joint_compliance(gamma, on_singular="nan")
         covariance = _SMOOTH**2 * compliance_covariance(gamma, spread, np.eye(2 * n), on_singular="nan")
@@ -69,7 +69,7 @@ def hidden_share(data: LineData) -> FloatArray:
     matrix = data.entries.matrix
 
     def of_lines(own: slice) -> list[FloatArray]:
-        part = data.on_slice(own)
+        part = data.on_lines(own)
         return [_hidden(matrix(part.smooth), matrix(_variance(part)))]
 
     (share,) = in_pieces(len(data.smooth), of_lines)
@@ -88,7 +88,7 @@ def _hidden(gamma: ComplexArray, spread: FloatArray) -> FloatArray:
 def _diagonal_starts(
     value: ComplexArray, variance: FloatArray, line_weight: FloatArray, joint: SpringJoint
 ) -> list[FloatArray]:
-    """Fit each DOF's compliance by itself."""
+    """Fit the compliance of each DOF separately."""
     n, p = joint.n, joint.lower.size
     information = line_weight[:, None] / np.maximum(variance, np.finfo(float).tiny)
     mean = (information * value.real).sum(axis=0) / information.sum(axis=0)

@@ -291,7 +291,7 @@ def open_directions(vector: ParameterVector, x: FloatArray, information: FloatAr
     unit = np.minimum(np.where(values == 0, np.inf, _SHARE * abs(values)), std)
     unit = np.where(np.isfinite(unit), unit, 1.0) / np.maximum(slope, np.finfo(float).tiny)
     value, turned = np.linalg.eigh(of_frfs * np.outer(unit, unit))
-    told = []
+    found = []
     for size, direction in zip(value, turned.T, strict=True):
         if size >= 1:
             continue
@@ -300,11 +300,11 @@ def open_directions(vector: ParameterVector, x: FloatArray, information: FloatAr
         change = change * np.sign(direction[abs(direction).argmax()])
         named = [i for i in np.argsort(-abs(direction)) if abs(direction[i]) > _NAMED * largest]
         by_prior = float(((direction * unit * of_priors) ** 2).sum())
-        told.append(
+        found.append(
             OpenDirection(
                 tuple((vector.fitted[i].name, float(change[i])) for i in named),
                 float(1 / np.sqrt(size)) if size > 0 else float("inf"),
                 by_prior + max(size, 0) > 1 / 9,
             )
         )
-    return tuple(told)
+    return tuple(found)
