@@ -353,7 +353,7 @@ def _axes_by_points(records: list[str]) -> dict[int, _Axes]:
     """Dataset 18: origin, a point on the x axis and one in the xz plane, in a reference system."""
     systems = {}
     for first in range(0, len(records), 4):
-        label, kind, reference, *_ = (int(float(word)) for word in records[first].split())
+        label, kind, reference, _, _ = (int(float(word)) for word in records[first].split())
         line = f"{records[first + 2]:<78}{records[first + 3]}"
         origin, on_x, in_xz = np.array([float(line[13 * i : 13 * i + 13]) for i in range(9)]).reshape(3, 3)
         x, y = on_x - origin, np.cross(in_xz - origin, on_x - origin)
@@ -366,7 +366,7 @@ def _axes_by_matrix(records: list[str]) -> dict[int, _Axes]:
     """Dataset 2420: after part and name, of each system three rows of rotation and one of translation."""
     systems = {}
     for first in range(2, len(records), 6):
-        label, kind, *_ = (int(word) for word in records[first].split())
+        label, kind, _ = (int(word) for word in records[first].split())
         matrix = np.array(" ".join(records[first + 2 : first + 6]).split(), dtype=np.float64).reshape(4, 3)
         turned = kind != 0 or not np.allclose(matrix[:3], np.eye(3), atol=_TOLERANCE)
         systems[label] = _Axes(turned, not _is_zero(matrix[3], matrix[0]))

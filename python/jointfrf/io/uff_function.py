@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
+from itertools import accumulate
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -31,9 +33,17 @@ __all__ = [
 DELIMITER = "    -1"
 #: Lines before the numbers: delimiter, type, five of text, records 6 to 11; a 58b states those after the type.
 _N_LINES, _N_TEXT_LINES = 13, 11
+
+
+def _cuts(*widths: int) -> list[slice]:
+    """Return the columns of fields of these widths."""
+    ends = list(accumulate(widths))
+    return [slice(start, end) for start, end in zip([0, *ends], ends, strict=False)]
+
+
 #: Columns of the type line of 58b, of record 6, of record 7, and of records 8 to 11.
-_BINARY, _PLACE = (6, 1, 6, 6, 12, 12), (5, 10, 5, 10, 11, 10, 4, 11, 10, 4)
-_FORM, _AXIS = (10, 10, 10, 13, 13, 13), (10, 5, 5, 5, 21, 21)
+_BINARY, _PLACE = _cuts(6, 1, 6, 6, 12, 12), _cuts(5, 10, 5, 10, 11, 10, 4, 11, 10, 4)
+_FORM, _AXIS = _cuts(10, 10, 10, 13, 13, 13), _cuts(10, 5, 5, 5, 21, 21)
 #: By the ordinate data type of record 7: bytes of a number, and numbers of a value.
 _NUMBERS = {2: (4, 1), 4: (8, 1), 5: (4, 2), 6: (8, 2)}
 #: By the data types of records 8 to 11.
@@ -60,14 +70,6 @@ class Axis:
     label: str
     unit: Unit | None
 
-    @classmethod
-    def parsed(cls, record: str) -> Axis:
-        """Take the axis from its record."""
-        words = _columns(record, _AXIS)
-        label = "" if words[5].upper() == "NONE" else words[5]
-        data_type, *_ = map(int, words[:4])  # and three exponents, which are not used
-        return cls(data_type, label, parse_unit(label))
-
     @property
     def name(self) -> str:
         """The data type in words."""
@@ -80,6 +82,15 @@ class Axis:
 
     def __str__(self) -> str:
         return f"{self.data_type} ({self.name}, unit '{self.label or 'NONE'}')"
+
+
+@lru_cache(256)  # a file repeats few of them in thousands of functions
+def _axis(record: str) -> Axis:
+    """Take an axis from its record."""
+    words = _columns(record, _AXIS)
+    label = "" if words[5].upper() == "NONE" else words[5]
+    data_type, *_ = map(int, words[:4])  # and three exponents, which are not used
+    return Axis(data_type, label, parse_unit(label))
 
 
 class FunctionHeader(NamedTuple):
@@ -121,7 +132,7 @@ def read_header(content: bytes) -> FunctionHeader:
     is_binary = records[1][6:7].lower() == "b"
     order, floating_point, n_lines, _ = map(int, _columns(records[1], _BINARY)[2:]) if is_binary else (1, 2, 11, 0)
     start, step, _ = (float(word.replace("D", "E").replace("d", "e")) for word in form[3:])
-    abscissa, numerator, denominator, _ = (Axis.parsed(record) for record in records[9:13])
+    abscissa, numerator, denominator, _ = (_axis(record) for record in records[9:13])
     return FunctionHeader(
         int(place[0]),
         (place[4], _whole(place[5]), _whole(place[6])),
@@ -186,18 +197,16 @@ def _text_rows(data: bytes, header: FunctionHeader, size: int, parts: int) -> ND
     width = 13 if size == 4 else 20
     widths = [width] * parts if header.is_even else [13, *[width] * parts]
     lines = data.decode("ascii", "replace").replace("D", "E").replace("d", "e").splitlines(keepends=True)
-    ends = np.cumsum(widths * (max(map(len, lines), default=0) // sum(widths) + 1)).tolist()
-    cuts = list(zip([0, *ends], ends, strict=False))
-    words = (line[start:end] for line in lines for start, end in cuts if end <= len(line))
+    cuts = _cuts(*widths * (max(map(len, lines), default=0) // sum(widths) + 1))
+    words = (line[cut] for line in lines for cut in cuts if cut.stop <= len(line))
     numbers = [float(word) for word in words if not word.isspace()]
     count = len(numbers) // len(widths)
     return np.array(numbers[: count * len(widths)], np.float64).reshape(count, len(widths))
 
 
-def _columns(record: str, widths: tuple[int, ...]) -> list[str]:
+def _columns(record: str, cuts: list[slice]) -> list[str]:
     """Cut a record into its fields."""
-    ends = np.cumsum(widths).tolist()
-    return [record[start:end].strip() for start, end in zip([0, *ends], ends, strict=False)]
+    return [record[cut].strip() for cut in cuts]
 
 
 def _whole(word: str) -> int:
