@@ -297,5 +297,4 @@ def _files(folder: Path) -> dict[str, dict[str, Any]]:
         "FrfMapping": {"freq_hz": "f", "h": "H"},
         "write_frfs": {"path": folder / "by_suffix.npz", "frfs": frfs},
         **{f"write_{name}": arguments for name, arguments in written.items()},
-        "write_frfs": {"path": folder / "any.csv", "frfs": frfs},
     }
