@@ -6,17 +6,16 @@ import argparse
 
 from jointfrf.cases.catalogue import list_cases, read_case
 from jointfrf.cases.key_page import key_page
-from jointfrf.cli.output import Output
+from jointfrf.cli.parser import CommandParser
+from jointfrf.cli.usage import Output
 
 __all__ = ["add_arguments", "run"]
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: CommandParser) -> None:
     """Describe the arguments of the command."""
     parser.description = "List the cases that come with jointfrf."
-    parser.add_argument(
-        "--keys", action="store_true", help="instead: print all keys of case.toml and expected.toml (Markdown)"
-    )
+    parser.option("--keys", "instead: print all keys of case.toml and expected.toml (Markdown)")
 
 
 def run(options: argparse.Namespace) -> int:

@@ -16,8 +16,8 @@ from threading import Event, Lock
 from jointfrf.cases.catalogue import UnknownCaseError, find_case, list_cases, run_case
 from jointfrf.cases.kind import Case
 from jointfrf.cases.workers import Workers, started_workers
-from jointfrf.cli.output import Output
-from jointfrf.cli.usage import UsageError, positive, progress
+from jointfrf.cli.parser import CommandParser
+from jointfrf.cli.usage import Output, UsageError, positive, progress
 from jointfrf.extras import check_extras
 from jointfrf.parallel.processes import available_cores
 from jointfrf.report.table import Table, as_text
@@ -28,13 +28,13 @@ __all__ = ["add_arguments", "run"]
 _TOGETHER = 3
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: CommandParser) -> None:
     """Describe the arguments of the command."""
     parser.description = "Run cases by name, number or folder; without any, all that come with jointfrf."
     parser.add_argument("cases", nargs="*", metavar="CASE", help="name, number, or folder with a case.toml")
-    parser.add_argument("--out", type=Path, default=Path("results"), metavar="DIR", help="where results go (results)")
-    parser.add_argument("--realisations", type=positive, metavar="N", help="instead of the number the case names")
-    parser.add_argument("--jobs", type=positive, metavar="N", default=available_cores(), help="processes (all cores)")
+    parser.option("--out DIR", "where results go (results)", Path, Path("results"))
+    parser.option("--realisations N", "instead of the number the case names", positive)
+    parser.option("--jobs N", "processes (all cores)", positive, available_cores())
 
 
 def run(options: argparse.Namespace) -> int:
