@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,8 +52,6 @@ __all__ = [
     "fit_springs",
     "uncertainty_of",
 ]
-
-FoundT = TypeVar("FoundT")
 
 #: An assumed noise level is replaced by that of the residual until both agree to this factor.
 _AGREE = 1.3
@@ -216,8 +214,8 @@ def uncertainty_of(problem: FitProblem, found: JointEstimate, choices: tuple[Dof
 
 
 def _estimated(
-    problem: FitProblem, fit: Callable[[FitProblem], tuple[JointEstimate, FoundT]]
-) -> tuple[FitProblem, JointEstimate, FoundT]:
+    problem: FitProblem, fit: Callable[[FitProblem], tuple[JointEstimate, tuple[DofDamping, ...]]]
+) -> tuple[FitProblem, JointEstimate, tuple[DofDamping, ...]]:
     """Fit; where the noise level is assumed, again with that of the residual until both agree."""
     freq = problem.freq_hz
     span = f"one line, {freq[0]:g} Hz" if freq.size == 1 else f"{freq.size} lines, {freq.min():g} to {freq.max():g} Hz"
