@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from jointfrf.cases.substructures import read_model
 from jointfrf.cli.measured_file import words
 from jointfrf.cli.output import Output
 from jointfrf.cli.structure_file import (
@@ -14,7 +15,6 @@ from jointfrf.cli.structure_file import (
     frfs_of_model,
     is_model,
     lines_of,
-    model_of_table,
     write_frfs,
 )
 from jointfrf.cli.usage import UsageError, waiting
@@ -53,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
     if args.output is None:
         raise UsageError("--output is missing: the file to write, such as --output model.uff")
     check_target(args.output)
-    structure = model_of_table(_table(args))
+    structure = read_model(_table(args))
     freq_hz = lines_of(args)
     if args.lines_of is not None:
         if freq_hz is not None:

@@ -11,9 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from jointfrf.cases.known_joint.keys import SUBSTRUCTURE
-from jointfrf.cases.known_joint.structure import ModelStructure
-from jointfrf.cases.known_joint.substructures import read_substructure
+from jointfrf.cases.substructures import ModelStructure, read_model
 from jointfrf.cli.measured_file import parse_band, read_with_warnings
 from jointfrf.cli.usage import UsageError
 from jointfrf.dofs import DIRECTIONS, direction_places
@@ -21,7 +19,7 @@ from jointfrf.errors import FileContentError
 from jointfrf.frf.merge import same_lines
 from jointfrf.io import Channel, FrfSet, write_csv, write_hdf5, write_npz, write_uff
 from jointfrf.kernel.arguments import FloatArray
-from jointfrf.toml.table import TomlTable, read_toml
+from jointfrf.toml.table import read_toml
 
 __all__ = [
     "WRITERS",
@@ -30,7 +28,6 @@ __all__ = [
     "frfs_of_model",
     "is_model",
     "lines_of",
-    "model_of_table",
     "own_matrix",
     "read_structures",
     "write_frfs",
@@ -96,22 +93,6 @@ def lines_of(args: argparse.Namespace) -> FloatArray | None:
 def is_model(path: Path) -> bool:
     """Whether a file is that of a model."""
     return path.suffix.lower() == ".toml"
-
-
-def model_of_table(table: TomlTable) -> ModelStructure:
-    """Read a model from a TOML table.
-
-    Raises
-    ------
-    FileContentError
-        A key is missing or wrong; FRFs are named instead of a model.
-    """
-    if table.text("model", tuple(SUBSTRUCTURE.variants)) == "receptances":
-        raise table.wrong("model", "a file of FRFs is named by itself, not by a TOML file")
-    table.expect(SUBSTRUCTURE)
-    found = read_substructure(table, np.ones(1))
-    assert isinstance(found, ModelStructure)
-    return found
 
 
 def frfs_of_model(
@@ -197,7 +178,7 @@ def read_structures(paths: Sequence[Path], freq_hz: FloatArray | None, **options
         if path in measured:
             found.append(measured[path])
             continue
-        frfs, _ = frfs_of_model(model_of_table(read_toml(path)), freq_hz, None, str(path))
+        frfs, _ = frfs_of_model(read_model(read_toml(path)), freq_hz, None, str(path))
         found.append(replace(frfs, coordinates={}))  # which count from an end of the model
     return found
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import jointfrf as jf
-from jointfrf.cases.fitting import decoupling_bound, fit_decoupling
+from jointfrf.cases.known_joint.decoupling import decoupling_bound, fit_decoupling
 from jointfrf.identification.model_fit.matrix_polynomial import MatrixPolynomial
 from jointfrf.identification.model_fit.prediction import Prediction
 from jointfrf.identification.model_fit.prepare import ChannelNoise, Channels, prepare_model_fit

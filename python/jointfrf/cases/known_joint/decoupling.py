@@ -1,16 +1,13 @@
-"""Methods of identification as cases call them: their names, and the fit in the compliance domain."""
+"""The fit to all FRFs between internal points, given those of the substructures, and its Cramer-Rao bound."""
 
 from __future__ import annotations
 
-import warnings
-from typing import get_args
-
 import numpy as np
 
-from jointfrf.errors import ConvergenceWarning, FrfCheckWarning, IdentificationWarning, IllConditionedWarning
+from jointfrf.cases.known_joint.exact import Exact, measured
+from jointfrf.cases.known_joint.keys import KnownJointCase
+from jointfrf.frf.entry_groups import entry_groups
 from jointfrf.identification.compliance_fit.line_forms import inverse_information
-from jointfrf.identification.identify import IdentificationMethod, identify
-from jointfrf.identification.joint_fit import JointFit
 from jointfrf.identification.model_fit.assembly import Assembly
 from jointfrf.identification.model_fit.likelihood import Likelihood
 from jointfrf.identification.model_fit.prediction import Prediction
@@ -18,40 +15,11 @@ from jointfrf.identification.model_fit.prepare import Channels
 from jointfrf.identification.model_fit.realisations import joints_of_realisations
 from jointfrf.identification.model_fit.substructure import Substructure
 from jointfrf.identification.model_fit.unknowns import parameter_vector
-from jointfrf.identification.realisations import viscous_joints
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.laws.law_joint import LawJoint
 from jointfrf.laws.springs import SpringLaw
 
-__all__ = ["FITTED", "METHODS", "decoupling_bound", "fit_decoupling", "fit_measured", "fit_viscous"]
-
-METHODS: tuple[str, ...] = (*get_args(IdentificationMethod), "decoupling-fit")
-#: Methods that take all lines, not means over bands.
-FITTED = ("compliance", "decoupling-fit")
-#: Relative noise for the weights of a fit to data whose noise is not asked for.
-_ASSUMED = 0.01
-#: Least variance of an FRF as a share of that of its driving points: entries that are zero have no noise of their own.
-_ROUNDING = 1e-20
-
-
-def fit_viscous(freq_hz: FloatArray, dofs: tuple[str, ...], gammas: ComplexArray) -> FloatArray:
-    """Fit stiffness and viscous damping without cross terms to each of several sets of FRFs.
-
-    Parameters
-    ----------
-    freq_hz : ndarray, shape (n_freq,)
-        Hz.
-    dofs : tuple of str
-        Names of the n joint DOFs.
-    gammas : ndarray, shape (r, n_freq, 2 n, 2 n)
-        Receptances of the assembly at joint DOFs j, then k, m/N.
-
-    Returns
-    -------
-    ndarray, shape (r, 2 n)
-        Stiffness of all DOFs, then damping.
-    """
-    return viscous_joints(freq_hz, gammas, dofs)
+__all__ = ["decoupling_bound", "decoupling_bounds", "fit_decoupling"]
 
 
 def fit_decoupling(
@@ -133,30 +101,21 @@ def decoupling_bound(
     return np.concatenate([relative[::2], relative[1::2]])
 
 
-def fit_measured(freq_hz: FloatArray, dofs: tuple[str, ...], h: ComplexArray, transform: FloatArray) -> JointFit:
-    """Fit a joint to FRFs between measured channels; its warnings stand in the result.
+def decoupling_bounds(case: KnownJointCase, exact: Exact) -> dict[str, FloatArray]:
+    """Return relative standard deviations of all parameters, shape (2 n,), by the name of the noise.
 
-    Parameters
-    ----------
-    freq_hz : ndarray, shape (n_freq,)
-        Hz.
-    dofs : tuple of str
-        Names of the n joint DOFs.
-    h : ndarray, shape (n_freq, m, m)
-        Receptances between the channels, m/N.
-    transform : ndarray, shape (2 n, m)
-        From the channels to joint DOFs j, then k.
-
-    Returns
-    -------
-    JointFit
+    Noise of which FRFs share numbers, in blocks or by reciprocity, has another bound, and is left out. FRFs that are
+    zero by symmetry say nothing.
     """
-    gamma = transform @ h @ transform.T
-    # Of each FRF between joint DOFs by itself: the covariance of all of many channels takes ten times as long.
-    variance = transform**2 @ (_ASSUMED * abs(h)) ** 2 @ (transform**2).T
-    largest = np.sqrt(np.diagonal(variance.max(axis=0)))
-    variance = np.maximum(variance, _ROUNDING * np.outer(largest, largest))
-    with warnings.catch_warnings():
-        for category in (IdentificationWarning, IllConditionedWarning, ConvergenceWarning, FrfCheckWarning):
-            warnings.simplefilter("ignore", category)
-        return identify(freq_hz, gamma, dofs, damping="viscous", cross="ignore", noise=variance)
+    h = measured(exact, "decoupling-fit")
+    shown = np.zeros(h.shape[1:], bool)
+    for group in entry_groups(h, reciprocal=False):
+        shown[group.rows, group.columns] = True
+    k_joint = case.joint.dynamic_stiffness(case.freq_hz)
+    return {
+        noise.name: decoupling_bound(
+            exact.freq_hz, exact.dofs, (exact.h_a, exact.h_b), k_joint, np.where(shown, noise.variance(h), 0)
+        )
+        for noise in case.noises
+        if "decoupling-fit" in noise.methods and noise.block == 1 and not noise.reciprocal
+    }  # fmt: skip
