@@ -4,27 +4,32 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from jointfrf.cases.definitions import read_frequency
-from jointfrf.cases.kind import Case, CaseKind
-from jointfrf.cases.kinds import KINDS
+from jointfrf.cases.keys import Case, CaseKeys, ExpectedKeys
+from jointfrf.cases.kind import CaseKind
 from jointfrf.cases.workers import Workers
 from jointfrf.files import below, check_file, write_file
 from jointfrf.report.draw import draw
 from jointfrf.report.figure import Figure, figure_csv
 from jointfrf.report.page import Page, make_page
 from jointfrf.report.table import Table, plain_rows, shown, table_csv
+from jointfrf.toml.declared import read_keys
+from jointfrf.toml.documents import key_reference
 from jointfrf.toml.table import TomlTable, read_toml
 
 __all__ = [
+    "KINDS",
     "CaseOutput",
     "UnknownCaseError",
+    "case_title",
     "cases_folder",
     "find_case",
+    "key_page",
     "list_cases",
     "numbered",
     "read_case",
@@ -34,8 +39,31 @@ __all__ = [
 ]
 
 
-#: Methods that take FRFs at other points add to the seed, which has 64 bits.
-_HIGHEST_SEED = 2**63 - 1
+class _Kinds(Mapping[str, CaseKind[Any, Any]]):
+    """Kinds of cases by name, each the `KIND` of the package of this name, which is imported when it is asked for."""
+
+    def __init__(self, *names: str) -> None:
+        self._names = names
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        return len(self._names)
+
+    def __getitem__(self, name: str) -> CaseKind[Any, Any]:
+        if name not in self._names:
+            raise KeyError(name)
+        kind: CaseKind[Any, Any] = import_module(f"jointfrf.cases.{name.replace('-', '_')}").KIND
+        return kind
+
+
+#: The kinds of cases, by the value of `kind` in `case.toml`; the first is that of a case that names none.
+KINDS: Mapping[str, CaseKind[Any, Any]] = _Kinds(
+    "known-joint",
+    "bolted-lap",
+    "modelled-joint",
+)
 
 
 class UnknownCaseError(ValueError):
@@ -92,6 +120,11 @@ def list_cases() -> list[Path]:
         return not numbers, numbers, path.name
 
     return sorted(found, key=place)
+
+
+def case_title(folder: Path) -> str:
+    """Return the title of a case without reading the rest of it."""
+    return str(read_toml(folder / "case.toml").content.get("title", ""))
 
 
 def find_case(word: str) -> Path:
@@ -159,32 +192,46 @@ def read_case_of(
     folder: Path, table: TomlTable, expected: TomlTable, kinds: Mapping[str, CaseKind[Any, Any]] = KINDS
 ) -> tuple[Case, CaseKind[Any, Any]]:
     """Read a case from tables: of its `case.toml`, and of what is known about it."""
-    kind = kinds[table.text("kind", tuple(kinds))] if "kind" in table else next(iter(kinds.values()))
-    for one, known in ((table, kind.keys), (expected, kind.expected_keys)):
-        if known is not None:
-            one.expect(known)
-    case: Case = kind.read(_common(folder, table, expected), table, expected)
-    table.close()
-    expected.close()
+    name = table.content.get("kind", next(iter(kinds)))
+    if not isinstance(name, str) or name not in kinds:
+        raise table.error("kind", f"one of {', '.join(kinds)}")
+    kind = kinds[name]
+    keys, known = read_keys(table, kind.keys), read_keys(expected, kind.expected_keys)
+    case: Case = kind.read(_common(folder, keys, known), keys, known)
     return case, kind
 
 
-def _common(folder: Path, table: TomlTable, expected: TomlTable) -> Case:
-    """Read what every case says."""
-    title, section = table.text("title"), table.text("section")
-    freq_hz = read_frequency(table.table("frequency"))
-    study = table.table("study")
-    realisations, seed = study.whole("realisations", 1), study.whole("seed", highest=_HIGHEST_SEED)
-    study.close()
+def _common(folder: Path, keys: CaseKeys, expected: ExpectedKeys) -> Case:
+    """Return what every case says."""
     return Case(
         folder=folder.resolve(),
-        title=title,
-        section=section,
-        freq_hz=freq_hz,
-        realisations=realisations,
-        seed=seed,
-        figure_numbers=expected.table("figures").words() if "figures" in expected else {},
+        title=keys.title,
+        section=keys.section,
+        freq_hz=keys.frequency.lines(),
+        realisations=keys.study.realisations,
+        seed=keys.study.seed,
+        figure_numbers=expected.figures,
     )
+
+
+_KEYS_HEAD = """# Keys of case files
+
+<!-- jointfrf cases --keys > docs/case-keys.md -->
+
+A case is a folder with a `case.toml` and, where something is known about it beforehand, an `expected.toml`;
+[cases](cases.md) says how one is run, `jointfrf new KIND FOLDER` writes one to begin with. SI units. Files that a key
+names are relative to the folder. A key that is not in this list is an error that lists those that are. `DOF` in a key
+stands for the name of a joint DOF (`k_theta_z`).
+
+"""
+
+
+def key_page(kinds: Mapping[str, CaseKind[Any, Any]] = KINDS) -> str:
+    """Return the reference of all keys of kinds of cases, as Markdown."""
+    tops = {f"case.toml of kind {name}": kind.keys for name, kind in kinds.items()}
+    known = {f"expected.toml of kind {name}": kind.expected_keys for name, kind in kinds.items()}
+    return _KEYS_HEAD + key_reference({name: top for each in zip(tops.items(), known.items(), strict=True)
+                                       for name, top in each})  # fmt: skip
 
 
 def numbered(case: Case, figures: Sequence[Figure]) -> list[Figure]:

@@ -11,9 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from jointfrf.cases.known_joint.keys import SUBSTRUCTURE
-from jointfrf.cases.known_joint.structure import ModelStructure
-from jointfrf.cases.known_joint.substructures import read_substructure
+from jointfrf.cases.substructures import ModelStructure, read_model
 from jointfrf.cli.measured_file import parse_band, words
 from jointfrf.cli.parser import CommandParser
 from jointfrf.cli.usage import Output, UsageError, complain, waiting
@@ -32,7 +30,6 @@ __all__ = [
     "frfs_of_model",
     "is_model",
     "lines_of",
-    "model_of_table",
     "own_matrix",
     "read_structures",
     "run",
@@ -65,7 +62,7 @@ def run(args: argparse.Namespace) -> int:
     if args.output is None:
         raise UsageError("--output is missing: the file to write, such as --output model.uff")
     check_target(args.output)
-    structure = model_of_table(_table(args))
+    structure = read_model(_table(args))
     freq_hz = lines_of(args)
     if args.lines_of is not None:
         if freq_hz is not None:
@@ -162,22 +159,6 @@ def is_model(path: Path) -> bool:
     return path.suffix.lower() == ".toml"
 
 
-def model_of_table(table: TomlTable) -> ModelStructure:
-    """Read a model from a TOML table.
-
-    Raises
-    ------
-    FileContentError
-        A key is missing or wrong; FRFs are named instead of a model.
-    """
-    if table.text("model", tuple(SUBSTRUCTURE.variants)) == "receptances":
-        raise table.wrong("model", "a file of FRFs is named by itself, not by a TOML file")
-    table.expect(SUBSTRUCTURE)
-    found = read_substructure(table, np.ones(1))
-    assert isinstance(found, ModelStructure)
-    return found
-
-
 def frfs_of_model(
     structure: ModelStructure, freq_hz: FloatArray, points: Sequence[str] | None, source: str
 ) -> tuple[FrfSet, dict[str, int]]:
@@ -263,7 +244,7 @@ def read_structures(paths: Sequence[Path], freq_hz: FloatArray | None, **options
         if path in measured:
             found.append(measured[path])
             continue
-        frfs, _ = frfs_of_model(model_of_table(read_toml(path)), freq_hz, None, str(path))
+        frfs, _ = frfs_of_model(read_model(read_toml(path)), freq_hz, None, str(path))
         found.append(replace(frfs, coordinates={}))  # which count from an end of the model
     return found
 

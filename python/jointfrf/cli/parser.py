@@ -25,6 +25,7 @@ COMMANDS = {
     "frf": "receptances of a model",
     "run": "run cases: tables, figures and a report each",
     "cases": "list the cases that come with jointfrf",
+    "new": "the files of a new case, with a comment beside each key",
     "study": "many realisations of a case over a design of factors: error, bias and coverage beside the bound",
     "completion": "a script that completes commands and options in bash, zsh or fish",
 }

@@ -14,7 +14,7 @@ from queue import SimpleQueue
 from threading import Event, Lock
 
 from jointfrf.cases.catalogue import UnknownCaseError, find_case, list_cases, run_case
-from jointfrf.cases.kind import Case
+from jointfrf.cases.keys import Case
 from jointfrf.cases.workers import Workers, started_workers
 from jointfrf.cli.parser import CommandParser
 from jointfrf.cli.usage import Output, UsageError, positive, progress

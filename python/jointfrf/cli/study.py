@@ -108,7 +108,8 @@ def _studied(options: argparse.Namespace, is_part: bool) -> StudyResult:
     (case,) = options.words
     factors = _factors(options.factor)
     try:
-        design = StudyDesign(factors, options.arrangement, options.noise, options.estimator)
+        is_stated = factors or options.noise or options.estimator
+        design = StudyDesign(factors, options.arrangement, options.noise, options.estimator) if is_stated else None
         name = Path(case).resolve().name if (Path(case) / "case.toml").is_file() else case
         with _started(options.executor, options.jobs) as executor:
             return study(

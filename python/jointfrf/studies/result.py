@@ -14,7 +14,7 @@ import numpy as np
 from numpy.lib.format import write_array_header_1_0
 from numpy.typing import NDArray
 
-from jointfrf.cases.studied import Estimates
+from jointfrf.cases.kind import Estimates
 from jointfrf.extras import check_extras, import_extra
 from jointfrf.files import below, write_file, written_whole
 from jointfrf.kernel.arguments import FloatArray, as_integer

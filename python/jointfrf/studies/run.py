@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from jointfrf.cases.catalogue import find_case
-from jointfrf.cases.studied import StudiedGroup
+from jointfrf.cases.kind import StudiedGroup
 from jointfrf.errors import FileContentError
 from jointfrf.kernel.arguments import as_integer, check_type, one_line
 from jointfrf.parallel.pool import AnyExecutor, Pool, check_progress, opened_pool
@@ -44,7 +44,7 @@ def study(
     realisations : int, optional
         Of each noise at each point of the design; the number in the case by default.
     design : StudyDesign, optional
-        Factors, noises and estimators; by default the case as it is.
+        Factors, noises and estimators; by default what the case states in ``[study]``, or the case as it is.
     part : range, optional
         Compute these realisations only, for a job of many: ``range(200, 300)``. See `merge_studies`.
     executor : Executor or callable, optional
@@ -95,12 +95,13 @@ def study(
     >>> [(row.point["noise"], row.parameter, abs(row.bias / row.actual) < 0.05) for row in rows][::2]
     [(0.02, 'k_x', True), (0.05, 'k_x', True)]
     """
-    plan = StudyDesign() if design is None else design
-    check_type("design", plan, StudyDesign)
+    if design is not None:
+        check_type("design", design, StudyDesign)
     check_progress(progress)
     if not isinstance(case, str | Path):
         raise TypeError(f"case must be the name or the folder of a case, not {one_line(case)}")
     folder = find_case(str(case)).resolve()
+    plan = StudyDesign.of_case(folder) if design is None else design
     store, identity = StudyStore(Path(out)), plan.identity(folder)
     held = store.check(identity) if store.exists else None
     groups: list[StudiedGroup] = []

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from time import perf_counter
 from typing import NamedTuple
 
-from jointfrf.cases.studied import Estimates, RealisationSource, StudiedGroup
+from jointfrf.cases.kind import Estimates, RealisationSource, StudiedGroup
 from jointfrf.parallel.processes import one_thread
 from jointfrf.studies.store import Span
 

@@ -8,9 +8,8 @@ import pytest
 
 from jointfrf.cases.catalogue import list_cases, numbered, read_case
 from jointfrf.cases.known_joint.figures import known_joint_figures
-from jointfrf.cases.known_joint.read import KnownJointCase
-from jointfrf.cases.known_joint.summary import known_joint_summary
-from jointfrf.cases.known_joint.tables import known_joint_tables
+from jointfrf.cases.known_joint.keys import KnownJointCase
+from jointfrf.cases.known_joint.tables import known_joint_summary, known_joint_tables
 from jointfrf.report.draw import STYLES, draw
 from jointfrf.report.figure import Curve, Figure, Interval, Panel
 from jointfrf.report.page import Page, make_page

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import jointfrf as jf
-from jointfrf.cases.fitting import decoupling_bound, fit_decoupling
+from jointfrf.cases.known_joint.decoupling import decoupling_bound, fit_decoupling
 from jointfrf.identification.line_starts import from_lines
 from jointfrf.identification.model.prediction import Prediction, parameter_vector
 from jointfrf.identification.model.prepare import Channels, prepare_model_fit
