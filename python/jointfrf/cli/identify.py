@@ -239,7 +239,7 @@ def _save(path: Path, fit: JointFit, source: str, joint: MeasuredJoint) -> None:
 
 def _write_figures(args: argparse.Namespace, frfs: FrfSet, joint: MeasuredJoint, fits: list[JointFit]) -> list[Path]:
     from jointfrf.report.fit import write_fit
-    from jointfrf.report.noise import noise_figure
+    from jointfrf.report.receptance import noise_figure
 
     figures = []
     if "compliance" in args.method and args.noise is None:

@@ -229,7 +229,7 @@ class JointFit:
         MissingPackageError
             matplotlib is missing.
         """
-        from jointfrf.report.fit_plot import plot_fit
+        from jointfrf.report.fit import plot_fit
 
         return plot_fit(self)
 

@@ -19,7 +19,7 @@ from jointfrf.cases.known_joint.summary import known_joint_summary
 from jointfrf.cases.known_joint.tables import identified_rows, known_joint_numbers, known_joint_tables
 from jointfrf.cases.workers import Workers
 from jointfrf.dofs import Parameter
-from jointfrf.report.page import Page, make_page
+from jointfrf.report.document import Page, make_page
 from jointfrf.substructuring.methods import STIFFNESS_METHODS
 from thinned_cases import PLANE, SOLID
 

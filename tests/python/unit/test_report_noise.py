@@ -5,7 +5,7 @@ import pytest
 
 import jointfrf as jf
 from jointfrf.report.draw import draw
-from jointfrf.report.noise import noise_figure, noise_panel
+from jointfrf.report.receptance import noise_figure, noise_panel
 
 NAMES = ["j:y", "j:theta", "k:y", "k:theta"]
 HUM = 40

@@ -28,7 +28,7 @@ FLOORS = (
     {"__main__"},
 )
 #: Methods that hand a result to a room above, which is imported when they are called and not before.
-HANDED_UP = {"identification/joint_fit.py": {"jointfrf.report.fit_page", "jointfrf.report.fit_plot"}}
+HANDED_UP = {"identification/joint_fit.py": {"jointfrf.report.fit", "jointfrf.report.fit_page"}}
 FLOOR = {room: floor for floor, rooms in enumerate(FLOORS) for room in rooms}
 
 
