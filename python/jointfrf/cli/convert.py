@@ -19,9 +19,9 @@ _FIELDS = ("freq_hz", "h", "responses", "excitations", "axes", "quantity", "unit
 def add_arguments(parser: CommandParser) -> None:
     """Describe the arguments of the command."""
     parser.description = (
-        "Read measured FRFs (Universal File, MATLAB, NPZ, HDF5, CSV; what a file is, is told by its content) and write "
+        "Read measured FRFs (Universal File, MATLAB, NPZ, HDF5, CSV; the format is detected from content) and write "
         "them, in SI units, as a Universal File (.uff), NPZ (.npz), HDF5 (.h5) or text table (.csv). Several files of "
-        "one test become one. Options stand before or after all files."
+        "one test become one. Options go before or after all files."
     )
     parser.add_argument("files", nargs="+", type=Path, metavar="IN", help="files to read, and last the one to write")
     add_quantity_arguments(parser)

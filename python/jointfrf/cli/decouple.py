@@ -102,7 +102,7 @@ def run(args: argparse.Namespace) -> int:
     side_b = _side(b, k, args.dofs, s)
     measured = assembly.matrix(at[args.equation[0]], at[args.equation[1]])
     with warnings.catch_warnings(), waiting("decoupling"):
-        warnings.simplefilter("ignore", IdentificationWarning)  # they stand in the table
+        warnings.simplefilter("ignore", IdentificationWarning)  # they are in the table
         fit = identify(
             a.freq_hz, measured, args.dofs, _METHODS[args.equation], args.band,
             h_a=side_a.h, h_b=side_b.h, dofs_j=side_a.joint, dofs_k=side_b.joint,

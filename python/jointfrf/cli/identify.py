@@ -76,7 +76,7 @@ def add_arguments(parser: CommandParser) -> None:
     parser.option("--noise LEVEL", "relative noise of the FRFs, 0.01 for 1 %% (default: from their reciprocity)", float)
     parser.option(
         "--bending-stiffness EI",
-        "E I of the thinner part in N m^2: tells how much compliance the differences along a line add",
+        "E I of the thinner part in N m^2: says how much compliance the differences along a line add",
         float,
     )
     parser.heading("results")
@@ -192,9 +192,9 @@ def _differences(args: argparse.Namespace, joint: MeasuredJoint) -> Iterator[str
 def _fit(args: argparse.Namespace, method: str, frfs: FrfSet, joint: MeasuredJoint) -> JointFit:
     more = _of_compliance(args, frfs, joint) if method == "compliance" else {"transform": _one_transform(joint)}
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", IdentificationWarning)  # they stand in the table
+        warnings.simplefilter("ignore", IdentificationWarning)  # they are in the table
         warnings.simplefilter("ignore", ConvergenceWarning)
-        warnings.simplefilter("ignore", FrfCheckWarning)  # told with the names of the channels
+        warnings.simplefilter("ignore", FrfCheckWarning)  # issued before, with the names of the channels
         return identify(frfs.freq_hz, _measured(method, joint), joint.dofs, method, args.band, **more)  # type: ignore[call-overload, no-any-return]
 
 

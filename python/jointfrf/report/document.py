@@ -60,7 +60,7 @@ class Picture:
 
 @dataclass(frozen=True)
 class Sketch:
-    """A drawing of our own: SVG whose colours follow the page, what stands below it, and the same in words."""
+    """A drawing of our own: SVG whose colours follow the page, its caption, and the same in words."""
 
     key: str
     svg: str
@@ -98,7 +98,7 @@ Part = Table | Words | Picture | Chart | Sketch | HeatMap | Listing
 
 @dataclass(frozen=True)
 class Section:
-    """A heading and what stands below it; `more` are parts shown when the reader asks for them, under a name."""
+    """A heading and what follows it; `more` are parts shown when the reader asks for them, under a name."""
 
     key: str
     heading: str

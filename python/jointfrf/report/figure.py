@@ -130,13 +130,13 @@ class Figure:
     key : str
         Name of its files.
     caption : str
-        What stands below it on a page.
+        Its caption on a page.
     panels : tuple of Panel
     columns : int
     number : str
         Its number in the source, or empty.
     heading : str
-        What stands above the panels, where the figure stands alone.
+        Title above the panels, where the figure is a file of its own.
     """
 
     key: str

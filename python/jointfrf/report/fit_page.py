@@ -158,7 +158,7 @@ def _geometry(fit: JointFit, data: FitData) -> list[Part]:
         known = f"Responses {names}" + (
             "" if names == ", ".join(data.force_names) else f"; forces {', '.join(data.force_names)}"
         )
-        return [Words([f"Where the channels lie was not said, so there is no sketch. {known}."])]
+        return [Words([f"The positions of the channels are not known, so there is no sketch. {known}."])]
     points = interface_points(data.interface)
     sketch: Sketch = interface_sketch(data.interface, points, fit.dofs)
     return [sketch, point_table(points)]
@@ -176,27 +176,27 @@ def _how_joint(fit: JointFit) -> str:
 def _frf_section(fit: JointFit, compared: ComparedFrfs, figures: Sequence[Figure], most: int) -> Section:
     total = len(compared.rows) * len(compared.columns)
     where = "channels" if compared.of_channels else "joint DOFs"
-    told = [
+    sentences = [
         "Regenerated FRFs are those nearest to the measured ones that any two structures with the joint found between "
         "them can have: where they leave the measured ones by more than noise, the joint does not explain the data."
     ]
-    told.append(
+    sentences.append(
         f"All {total} FRFs between the {where} are on this page."
         if len(figures) == total
         else f"{len(figures)} of {total} FRFs between the {where} are on this page, first those with response and "
         "force at one place, then those across the joint; the maps below are of all."
     )
     if len(figures) > _AT_ONCE:
-        told[-1] += f" On paper there are the first {_AT_ONCE}."
+        sentences[-1] += f" On paper there are the first {_AT_ONCE}."
     if fit.freq_hz.size > most:
-        told.append(
+        sentences.append(
             f"Curves of more than {most} lines are drawn through the smallest and the largest value of each of "
             f"{most // 2} parts of the band, so that no peak is lost; all numbers are from all lines."
         )
     charts = _charts(figures, most, fit, "measured and regenerated, modulus and phase")
     more = f"{len(charts) - _AT_ONCE} more FRFs"
     return Section(
-        "frfs", "Measured and regenerated FRFs", [Words(told), *charts[:_AT_ONCE]], (more, charts[_AT_ONCE:])
+        "frfs", "Measured and regenerated FRFs", [Words(sentences), *charts[:_AT_ONCE]], (more, charts[_AT_ONCE:])
     )
 
 
@@ -213,8 +213,8 @@ def _noise_figure(fit: JointFit, data: FitData) -> Figure | None:
 
 def _noise_parts(fit: JointFit, figure: Figure | None, most: int) -> list[Part]:
     if figure is None:
-        told = f"Noise of {100 * fit.noise_level:.2g} % of the FRFs (median) was used; how it varies is not kept."
-        return [Words([told])]
+        known = f"Noise of {100 * fit.noise_level:.2g} % of the FRFs (median) was used; how it varies is not kept."
+        return [Words([known])]
     return list(_charts([figure], most, fit, "measured and smooth FRFs and the noise found in them"))
 
 
@@ -232,10 +232,10 @@ def _cards(fit: JointFit, nodes: Sequence[int]) -> list[Part]:
             refused.append(f"{_PROGRAMS[program]}: {error}.")
         else:
             listings.append(Listing(name, text, printed=text.count("\n") <= _PRINTED))
-    told = f"In SI units, between node {j} on side j and node {k} on side k, along the global axes."
+    where = f"In SI units, between node {j} on side j and node {k} on side k, along the global axes."
     if not all(listing.printed for listing in listings):
-        told += f" Those of more than {_PRINTED} lines are on the screen only, not on paper."
-    return [Words([told]), *listings, *([Words(refused, "notes")] if refused else [])]
+        where += f" Those of more than {_PRINTED} lines are on the screen only, not on paper."
+    return [Words([where]), *listings, *([Words(refused, "notes")] if refused else [])]
 
 
 def _made(fit: JointFit, options: ReportOptions) -> Table:
@@ -298,18 +298,18 @@ def _named(term: Parameter) -> str:
 def finding_sentences(fit: JointFit) -> list[str]:
     """Return one sentence a parameter, its value and where it lies with 95 % probability; one for all cross terms."""
     intervals = fit.confidence_interval(_PROBABILITY)
-    told = []
+    sentences = []
     for term, value in zip(fit.terms, fit.parameters.values(), strict=True):
         low, high = intervals[term.name]
         name = _named(term)
         if not term.is_cross:
-            told.append(f"{name[0].upper()}{name[1:]} ({term.name}): {_value_sentence(term, value, low, high)}")
+            sentences.append(f"{name[0].upper()}{name[1:]} ({term.name}): {_value_sentence(term, value, low, high)}")
     cross = [term.name for term in fit.terms if term.is_cross]
     if cross:
         clear = [name for name in cross if not intervals[name][0] <= 0 <= intervals[name][1]]
         which = f"{len(clear)} of {len(cross)}: {', '.join(clear)}" if clear else f"none of {len(cross)}"
-        told.append(f"Cross terms significantly different from zero (values in the table): {which}.")
-    return told
+        sentences.append(f"Cross terms significantly different from zero (values in the table): {which}.")
+    return sentences
 
 
 def _value_sentence(term: Parameter, value: float, low: float, high: float) -> str:
@@ -331,7 +331,7 @@ def _value_sentence(term: Parameter, value: float, low: float, high: float) -> s
 
 def quality_sentences(fit: JointFit) -> list[str]:
     """Return sentences on noise and residual, and on lines that were left out."""
-    told = []
+    sentences = []
     if np.isfinite(fit.noise_level) and fit.noise_level > 0:
         ratio = fit.residual_level / fit.noise_level
         verdict = (
@@ -339,7 +339,7 @@ def quality_sentences(fit: JointFit) -> list[str]:
             if ratio < _NOISE
             else "the joint as described does not explain all that the FRFs show."
         )
-        told.append(
+        sentences.append(
             f"The noise of the FRFs is {100 * fit.noise_level:.2g} % (median); what the fit leaves unexplained is "
             f"{100 * fit.residual_level:.2g} %, {ratio:.2f} times the noise: {verdict}"
         )
@@ -348,12 +348,12 @@ def quality_sentences(fit: JointFit) -> list[str]:
         total = len(fit.data.fitted)
         names = [f"{n} of {total} for {dof}" for dof, n in zip(fit.dofs, out, strict=True) if n]
         if names:
-            told.append(
+            sentences.append(
                 f"Lines left out, outside the bands or because they do not fit the joint found: {', '.join(names)}."
             )
     if fit.warnings:
-        told.append("Read the warnings below before quoting these numbers.")
-    return told
+        sentences.append("Read the warnings below before quoting these numbers.")
+    return sentences
 
 
 def parameter_table(fit: JointFit) -> Table:

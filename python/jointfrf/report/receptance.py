@@ -28,7 +28,7 @@ PHASE = "phase, deg"
 #: Between these lie the phases of a passive structure where response and force are at the same DOF; else the others.
 _DRIVING, _ALL = (-200.0, 20.0), (-280.0, 100.0)
 _QUARTER = 90.0
-#: Heights of modulus and phase, and how far they shrink where more than so many stand below each other.
+#: Heights of modulus and phase, and how far they shrink where more than so many are below each other.
 _HEIGHTS, _SHRUNK, _MOST = (0.85, 0.5), 0.8, 2
 
 
@@ -125,7 +125,7 @@ def noise_figure(
     noise : NoiseModel
         What `estimate_noise` found in them.
     responses, forces : sequence of str
-        Names of the channels; those of rotations tell the units.
+        Names of the channels; their directions give the units.
     entries : sequence of (int, int)
         Which FRFs to draw; by default the first in each row whose noise is known, six at most.
 
@@ -187,7 +187,7 @@ def noise_panel(
     ]
     if noise.coherence_factor[entry] > 0:
         rest = level**2 - sum(part**2 for _, part, _ in parts)
-        parts.append(("part that coherence tells", np.asarray(np.sqrt(np.maximum(rest, 0))), "stiffness-initial"))
+        parts.append(("part from coherence", np.asarray(np.sqrt(np.maximum(rest, 0))), "stiffness-initial"))
     curves = [Curve("measured", freq, np.asarray(abs(h)[up], np.float64), "dots")]
     if noise.smooth.is_smooth:
         curves.append(Curve("smooth", freq, smooth, "actual"))
