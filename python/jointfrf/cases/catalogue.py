@@ -14,9 +14,9 @@ from jointfrf.cases.keys import Case, CaseKeys, ExpectedKeys
 from jointfrf.cases.kind import CaseKind
 from jointfrf.cases.workers import Workers
 from jointfrf.files import below, check_file, write_file
+from jointfrf.report.document import Page, make_page
 from jointfrf.report.draw import draw
 from jointfrf.report.figure import Figure, figure_csv
-from jointfrf.report.page import Page, make_page
 from jointfrf.report.table import Table, plain_rows, shown, table_csv
 from jointfrf.toml.declared import read_keys
 from jointfrf.toml.documents import key_reference

@@ -109,7 +109,7 @@ def _shared() -> dict[str, argparse.Action]:
 def _check_keys(
     table: TomlTable, own: TomlTable | None, shared: dict[str, argparse.Action], options: dict[str, argparse.Action]
 ) -> None:
-    """Refuse what is neither the table of a command nor an option: of several commands, or in its table of this one."""
+    """Raise for a key that is no table of a command, no shared option, and in the table of this command no option."""
     names = [name.removeprefix("--") for name in (*shared, "--json", "--quiet")]
     for key in table.keys():  # noqa: SIM118
         if key in COMMANDS:

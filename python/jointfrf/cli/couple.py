@@ -130,7 +130,7 @@ def _coupled(
             f"node {min(shared)} is in {a.source} and in {b.source}: --renumber-b N adds a number to those of B"
         )
     h = couple(matrices[0], matrices[1], joint, ends[0], ends[1], freq_hz=a.freq_hz)
-    # Virtual points stand behind the channels of their side, and are not measured.
+    # Virtual points follow the channels of their side, and are not measured.
     n_a, own_a, own_b = matrices[0].shape[1], len(channels[0]), len(channels[1])
     kept = [*range(own_a), *range(n_a, n_a + own_b)]
     names = (*channels[0], *channels[1])

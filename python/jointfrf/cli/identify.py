@@ -77,7 +77,7 @@ def add_arguments(parser: CommandParser) -> None:
     parser.option("--noise LEVEL", "relative noise of the FRFs, 0.01 for 1 %% (default: from their reciprocity)", float)
     parser.option(
         "--bending-stiffness EI",
-        "E I of the thinner part in N m^2: tells how much compliance the differences along a line add",
+        "E I of the thinner part in N m^2: says how much compliance the differences along a line add",
         float,
     )
     parser.heading("results")
@@ -192,7 +192,7 @@ def _differences(args: argparse.Namespace, joint: MeasuredJoint) -> Iterator[str
 
 def _fit(args: argparse.Namespace, method: str, frfs: FrfSet, joint: MeasuredJoint) -> Fit:
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", IdentificationWarning)  # they stand in the table
+        warnings.simplefilter("ignore", IdentificationWarning)  # they are in the table
         warnings.simplefilter("ignore", ConvergenceWarning)
         warnings.simplefilter("ignore", FrfCheckWarning)  # told with the names of the channels
         if method == "compliance":
@@ -240,7 +240,7 @@ def _save(path: Path, fit: Fit, source: str, joint: MeasuredJoint) -> None:
 
 def _write_figures(args: argparse.Namespace, frfs: FrfSet, joint: MeasuredJoint, fits: list[Fit]) -> list[Path]:
     from jointfrf.report.fit import write_fit
-    from jointfrf.report.noise import noise_figure
+    from jointfrf.report.receptance import noise_figure
 
     figures = []
     if "compliance" in args.method and args.noise is None:

@@ -189,7 +189,7 @@ def add_joint_arguments(parser: CommandParser) -> None:
 
 
 def add_quantity_arguments(parser: CommandParser) -> None:
-    """Describe what a user says of the FRFs of a file."""
+    """Describe the options that say what the FRFs of a file are."""
     parser.option(
         "--quantity", "what the FRFs are, where the file does not say", ("receptance", "mobility", "accelerance")
     )

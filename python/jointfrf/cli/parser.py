@@ -143,7 +143,7 @@ def _name(word: str) -> str:
 
 
 def one_of(known: Collection[str]) -> Callable[[str], str]:
-    """Return what takes one of some words."""
+    """Return a type of words that accepts only known ones."""
 
     def taken(word: str) -> str:
         if word not in known:

@@ -23,7 +23,7 @@ from jointfrf.cases.known_joint.tables import (
 from jointfrf.cases.workers import Workers
 from jointfrf.dofs import Parameter
 from jointfrf.identification.realisations import viscous_joints
-from jointfrf.report.page import Page, make_page
+from jointfrf.report.document import Page, make_page
 from jointfrf.substructuring.methods import STIFFNESS_METHODS
 from thinned_cases import PLANE, SOLID
 

@@ -10,11 +10,10 @@ from jointfrf.cases.catalogue import list_cases, numbered, read_case
 from jointfrf.cases.known_joint.figures import known_joint_figures
 from jointfrf.cases.known_joint.keys import KnownJointCase
 from jointfrf.cases.known_joint.tables import known_joint_summary, known_joint_tables
-from jointfrf.report.draw import STYLES, draw
+from jointfrf.report.document import Page, make_page
+from jointfrf.report.draw import STYLES, draw, shortened
 from jointfrf.report.figure import Curve, Figure, Interval, Panel
-from jointfrf.report.page import Page, make_page
 from jointfrf.report.receptance import PHASE, phase_degrees
-from jointfrf.report.svg import shortened
 from jointfrf.report.table import Table, as_text, shown, table_csv, turned
 
 X = np.linspace(0, 10, 50)

@@ -10,10 +10,9 @@ import pytest
 
 import jointfrf as jf
 from browser import started_browser
-from jointfrf.report.document import Document, HeatMap, Section, make_document
+from jointfrf.report.document import Document, HeatMap, Page, Section, make_document, make_page
 from jointfrf.report.draw import draw
 from jointfrf.report.figure import Curve, Figure, Panel
-from jointfrf.report.page import Page, make_page
 from jointfrf.report.table import Table
 
 BARS = Path(__file__).resolve().parents[3] / "cases" / "hammer-test" / "two_bars.uff"

@@ -11,10 +11,10 @@ import jointfrf as jf
 import jointfrf.report
 from jointfrf.dofs import Parameter
 from jointfrf.report.axes import bulk_limits, modulus_label, parameter_label, parameter_lines
+from jointfrf.report.document import Page, make_page
 from jointfrf.report.draw import draw
 from jointfrf.report.figure import Curve, Figure, Panel
 from jointfrf.report.fit import fit_figures
-from jointfrf.report.page import Page, make_page
 from jointfrf.report.table import Table, as_text, plain_rows, table_csv
 
 

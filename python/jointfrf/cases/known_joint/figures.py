@@ -29,8 +29,7 @@ from jointfrf.report.axes import (
     symbol,
 )
 from jointfrf.report.figure import Curve, Figure, Interval, Level, NamedBands, Panel, Ribbon
-from jointfrf.report.noise import noise_figure
-from jointfrf.report.receptance import ReceptanceCurve, receptance_panels, side_by_side
+from jointfrf.report.receptance import ReceptanceCurve, noise_figure, receptance_panels, side_by_side
 
 __all__ = ["known_joint_figures"]
 

@@ -10,8 +10,7 @@ from scipy.interpolate import CubicHermiteSpline
 from jointfrf.cases.known_joint.keys import KnownJointCase
 from jointfrf.kernel.arguments import FloatArray
 from jointfrf.models.model import Model, assemble
-from jointfrf.report.figure import Curve, Panel
-from jointfrf.report.solid_modes import MovingBody, deformed_surface
+from jointfrf.report.figure import Curve, MovingBody, Panel, deformed_surface
 from jointfrf.solids.solid import SolidModel
 
 __all__ = ["ModeShapes", "find_modes", "mode_panels", "modes_of_case"]
