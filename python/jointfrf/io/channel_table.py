@@ -17,8 +17,7 @@ from jointfrf.files import check_file
 from jointfrf.frf.channel_place import ChannelPlace, ChannelRole, JointSide
 from jointfrf.frf.frf_set import Channel
 from jointfrf.spelling import did_you_mean
-from jointfrf.toml.keys import Key, KeyTable
-from jointfrf.toml.table import TomlTable, read_toml
+from jointfrf.toml.table import Key, KeyTable, TomlTable, read_toml
 
 __all__ = ["CHANNEL_KEYS", "places_of_table", "read_channel_table"]
 

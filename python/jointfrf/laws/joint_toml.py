@@ -12,8 +12,7 @@ from jointfrf.kernel.arguments import FloatArray
 from jointfrf.laws.law import JointLaw
 from jointfrf.laws.law_joint import LawJoint
 from jointfrf.laws.law_table import LAW_VALUES, LAW_WORDS, law_line, read_law, takes_in_words
-from jointfrf.toml.keys import Key, KeyTable
-from jointfrf.toml.table import TomlTable
+from jointfrf.toml.table import Key, KeyTable, TomlTable
 
 __all__ = ["JOINT_KEYS", "LAW_JOINT_KEYS", "joint_text", "read_joint_table"]
 

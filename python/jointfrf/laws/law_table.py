@@ -10,8 +10,7 @@ from typing import Any
 from jointfrf.laws.law import JointLaw
 from jointfrf.laws.springs import SpringLaw
 from jointfrf.laws.viscoelastic import FractionalZener, PowerLaw, StandardLinearSolid
-from jointfrf.toml.keys import Key
-from jointfrf.toml.table import TomlTable
+from jointfrf.toml.table import Key, TomlTable
 
 __all__ = ["LAW_VALUES", "LAW_WORDS", "law_line", "read_law", "takes_in_words"]
 
