@@ -14,8 +14,8 @@ from jointfrf.cases.keys import Case, CaseKeys, ExpectedKeys
 from jointfrf.cases.kind import CaseKind
 from jointfrf.cases.workers import Workers
 from jointfrf.files import below, check_file, write_file
-from jointfrf.report.document import Page, make_page
-from jointfrf.report.draw import draw
+from jointfrf.report.document import Document, Page, make_document
+from jointfrf.report.draw import Drawing, draw
 from jointfrf.report.figure import Figure, figure_csv
 from jointfrf.report.table import Table, plain_rows, shown, table_csv
 from jointfrf.toml.declared import read_keys
@@ -36,11 +36,12 @@ __all__ = [
     "read_case_and_kind",
     "read_case_of",
     "run_case",
+    "write_results",
 ]
 
 
 class _Kinds(Mapping[str, CaseKind[Any, Any]]):
-    """Kinds of cases by name, each the `KIND` of the package of this name, which is imported when it is asked for."""
+    """Kinds of cases by name, each the `KIND` of the package of this name, imported when it is needed."""
 
     def __init__(self, *names: str) -> None:
         self._names = names
@@ -67,7 +68,7 @@ KINDS: Mapping[str, CaseKind[Any, Any]] = _Kinds(
 
 
 class UnknownCaseError(ValueError):
-    """There is no such case; one line, whatever was asked for."""
+    """There is no such case; one line, whatever word was given."""
 
     def __init__(self, message: str) -> None:
         super().__init__("\\n".join(message.splitlines()))
@@ -87,7 +88,7 @@ class CaseOutput:
     summary : list of Table
         What came out, in short.
     report : Path
-        The HTML report; CSV, PNG, SVG and JSON files stand beside it.
+        The HTML report; CSV, PNG, SVG and JSON files are beside it.
     printed : list of Table
         The tables that are worth printing.
     """
@@ -241,7 +242,7 @@ def numbered(case: Case, figures: Sequence[Figure]) -> list[Figure]:
 
 
 def _number_key(number: str) -> list[tuple[int, str]]:
-    """Order "3-9a", "3-9b", "3-10", "4-32 and 4-33" as they stand in the source."""
+    """Order "3-9a", "3-9b", "3-10", "4-32 and 4-33" in the order of the source."""
     return [(int(digits), letter) for digits, letter in re.findall(r"(\d+)([a-z]?)", number)]
 
 
@@ -252,7 +253,7 @@ def run_case(
     realisations: int | None = None,
     workers: Workers | None = None,
     kinds: Mapping[str, CaseKind[Any, Any]] = KINDS,
-    tell: Callable[[Case, list[Table]], None] = lambda case, tables: None,
+    show: Callable[[Case, list[Table]], None] = lambda case, tables: None,
 ) -> CaseOutput:
     """Run a case and write its report, tables and figures.
 
@@ -269,7 +270,7 @@ def run_case(
         Processes that share the work, see `jointfrf.cases.workers.started_workers`; this process by default.
     kinds : mapping of str to CaseKind
         As in `read_case`.
-    tell : callable, optional
+    show : callable, optional
         Called with the case and its tables that are worth printing, the summary first, before figures are drawn.
 
     Returns
@@ -295,7 +296,7 @@ def run_case(
     tables = kind.tables(result)
     summary = kind.summary(result, tables)
     printed = [table for table in tables if table.key not in kind.not_printed]
-    tell(case, [*summary, *printed])
+    show(case, [*summary, *printed])
     figures = numbered(case, kind.figures(result))
     drawn = at_work.map(draw, figures)
     content = _common_numbers(case, count, tables) | kind.numbers(result)
@@ -309,20 +310,29 @@ def run_case(
         text=_text(case.folder, "README.md"),
         sources=[("case.toml", _text(case.folder, "case.toml"))],
     )
-    _write(target, page, content)
+    write_results(target, page.document, tables, page.figures, content)
     return CaseOutput(case, result, tables, figures, summary, target / "report.html", printed)
 
 
-def _write(folder: Path, page: Page, content: dict[str, Any]) -> None:
-    """Write a report and, beside it, its tables, figures and numbers."""
-    for figure, drawing in page.figures:
+def write_results(
+    folder: Path,
+    document: Document,
+    tables: Sequence[Table],
+    figures: Sequence[tuple[Figure, Drawing]],
+    content: Mapping[str, Any],
+) -> Path:
+    """Write a page and, beside it, its tables, figures and numbers; return the path of the page."""
+    for inner in ("tables", "figures"):
+        below(folder, inner).mkdir(parents=True, exist_ok=True)
+    for figure, drawing in figures:
         write_file(below(folder / "figures", figure.key, ".png"), drawing.png)
         write_file(below(folder / "figures", figure.key, ".svg"), drawing.svg)
         write_file(below(folder / "figures", figure.key, ".csv"), figure_csv(figure))
-    for table in page.tables:
+    for table in tables:
         write_file(below(folder / "tables", table.key, ".csv"), table_csv(table))
     write_file(below(folder, "results.json"), json.dumps(content, indent=1) + "\n")
-    write_file(below(folder, "report.html"), make_page(page))
+    write_file(below(folder, "report.html"), make_document(document))
+    return folder / "report.html"
 
 
 def _about(case: Case, count: int) -> str:

@@ -166,7 +166,7 @@ class Case:
     Attributes
     ----------
     folder : Path
-        Where the case stands.
+        Folder of the case.
     title, section : str
         What it is, and where the source treats it.
     freq_hz : ndarray, shape (n_freq,)

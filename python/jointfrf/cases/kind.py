@@ -50,11 +50,11 @@ class Estimates(NamedTuple):
         return cls(values, missing, missing)
 
 
-#: Called with the number of the first realisation and how many. Realisation k is the same whatever is asked for with
-#: it; the object can be sent to another process.
+#: Called with the number of the first realisation and how many. Realisation k does not depend on the others of a
+#: call; the object can be sent to another process.
 RealisationSource = Callable[[int, int], Estimates]
 
-#: An estimator of one's own: lines, Hz, FRFs at the joint DOFs j, then k, and names of the joint DOFs to stiffness of
+#: An estimator of the user: lines, Hz, FRFs at the joint DOFs j, then k, and names of the joint DOFs to stiffness of
 #: all DOFs, then damping.
 Estimator = Callable[[FloatArray, ComplexArray, tuple[str, ...]], FloatArray]
 
@@ -100,7 +100,7 @@ class StudiedGroup:
     side_by_side: int = 1
 
 
-#: Noise of one's own: exact FRFs, seed and number of the realisation to FRFs with noise.
+#: Noise of the user: exact FRFs, seed and number of the realisation to FRFs with noise.
 Pollution = Callable[[ComplexArray, int, int], ComplexArray]
 
 

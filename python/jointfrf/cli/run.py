@@ -130,7 +130,7 @@ def _run_one(folder: Path, options: argparse.Namespace, workers: Workers, say: C
     start = time.perf_counter()
     output = run_case(
         folder, options.out, realisations=options.realisations, workers=workers,
-        tell=lambda case, tables: say("\n".join(_shown(case, tables))),
+        show=lambda case, tables: say("\n".join(_shown(case, tables))),
     )  # fmt: skip
     say(f"{time.perf_counter() - start:.1f} s, report: {output.report}\n")
     return output.report

@@ -15,8 +15,7 @@ from jointfrf.errors import FileContentError
 from jointfrf.frf.frf_set import Channel, ChannelPlace, ChannelRole, JointSide
 from jointfrf.io.csv_file import TextTable, read_text_table
 from jointfrf.spelling import did_you_mean
-from jointfrf.toml.keys import Key, KeyTable
-from jointfrf.toml.table import TomlTable, read_toml
+from jointfrf.toml.table import Key, KeyTable, TomlTable, read_toml
 
 __all__ = ["CHANNEL_KEYS", "places_of_table", "read_channel_table"]
 

@@ -14,8 +14,7 @@ from jointfrf.laws.law import JointLaw, LawField
 from jointfrf.laws.law_joint import LawJoint
 from jointfrf.laws.springs import SpringLaw
 from jointfrf.laws.viscoelastic import FractionalZener, PowerLaw, StandardLinearSolid
-from jointfrf.toml.keys import Key, KeyTable
-from jointfrf.toml.table import TomlTable
+from jointfrf.toml.table import Key, KeyTable, TomlTable
 
 __all__ = ["LAW_VALUES", "LAW_WORDS", "joint_text", "read_joint_table", "read_law", "takes_in_words"]
 
@@ -63,8 +62,13 @@ LAW_VALUES = tuple(
 
 
 def takes_in_words() -> str:
-    """Return which parameters each law takes, for the reference of keys."""
-    return "; ".join(f"`{law.word}` {', '.join(f'`{one.name}`' for one in _numbers(law))}" for law in LAWS)
+    """Return which parameters each law takes, and what these are, for the reference of keys."""
+    takes = "; ".join(f"`{law.word}` {', '.join(f'`{one.name}`' for one in _numbers(law))}" for law in LAWS)
+    known = "; ".join(
+        f"`{one.name}` ({', '.join(filter(None, (one.value, one.unit)))}) {one.meaning.rstrip('.')}"
+        for one in LAW_VALUES
+    )
+    return f"{takes}. {known}"
 
 
 #: Keys of one law.

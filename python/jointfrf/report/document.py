@@ -32,7 +32,6 @@ __all__ = [
     "Sketch",
     "Words",
     "make_document",
-    "make_page",
 ]
 
 #: Up to so many columns fit on any screen; more than so many are written smaller; more than so many become rows.
@@ -277,23 +276,3 @@ class Page:
             texts = ([Listing("", self.text)] if self.text else []) + [Listing(*own) for own in self.sources]
             sections.append(Section("subject", self.subject, texts))
         return Document(self.title, self.about, sections)
-
-
-def make_page(page: Page) -> str:
-    """Write a page.
-
-    Parameters
-    ----------
-    page : Page
-
-    Returns
-    -------
-    str
-        HTML without any link to another file.
-
-    Raises
-    ------
-    MissingPackageError
-        jinja2 is missing.
-    """
-    return make_document(page.document)

@@ -71,7 +71,7 @@ class StudyDesign:
     estimators : sequence of str, or mapping of str to callable
         Methods that the kind of case knows; by default those that the case names. Own ones take lines in Hz, FRFs at
         the joint DOFs j, then k, in m/N, and names of the joint DOFs, and return stiffness of all DOFs, then damping;
-        they can stand beside words (``{"ismm": None, "mine": function}``).
+        they can be mixed with words (``{"ismm": None, "mine": function}``).
     own_noises : mapping of str to callable
         In the place of the noises of the case: exact FRFs, seed and number of the realisation to FRFs with noise.
 

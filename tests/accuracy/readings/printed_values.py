@@ -125,7 +125,7 @@ def _parameters(case: KnownJointCase, known: ExpectedParameters) -> PrintedTable
         quantity = ParameterQuantity(known.method, bands, index)
         return PrintedValue(parameter.name, known.values[parameter.name], quantity, abs(actual) or 1.0)
 
-    values = [value(index, one) for index, one in enumerate(case.parameters) if one in known.values]
+    values = [value(index, one) for index, one in enumerate(case.parameters) if one.name in known.values]
     return PrintedTable(known.source, f"{known.method}, {bands.name}", _level(case, known.noise), tuple(values))
 
 

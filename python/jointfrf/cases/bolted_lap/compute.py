@@ -264,7 +264,7 @@ def _unmeasured(case: BoltedLapCase, beams: BeamFrfs) -> list[Unmeasured]:
 
 
 def _shift(case: BoltedLapCase, beams: BeamFrfs, theta: FloatArray) -> FloatArray:
-    """Largest errors of the resonances in x and in y where constants stand for the known joint."""
+    """Largest errors of the resonances in x and in y where constants replace the known joint."""
     exact, tip = (beams.tip(constant_joint(one, beams.freq_hz)) for one in (case.actual, theta))
     peaks = resonances(beams.freq_hz, exact)
     errors = resonance_errors(beams.freq_hz, peaks, tip).frequency
@@ -353,7 +353,7 @@ def bolted_lap_studied(case: BoltedLapCase, choice: StudyChoice) -> list[Studied
     The joint that the solid model has is not known: there are no actual values.
     """
     if choice.own_estimators or choice.own_noises:
-        raise ValueError("estimators and noises of one's own need a case of kind known-joint")
+        raise ValueError("own estimators and own noises need a case of kind known-joint")
     for word in choice.estimators:
         if word not in _ESTIMATORS:
             hint = did_you_mean(word, _ESTIMATORS) or f": {', '.join(_ESTIMATORS)}"

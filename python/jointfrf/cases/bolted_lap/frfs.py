@@ -62,7 +62,7 @@ class SolidFrfs:
     points : tuple of FivePoints
         Measured points on sides j and k.
     channels : ndarray, shape (n_freq, 30, 30)
-        Between the measured channels, m/N; empty where only the tip was asked for.
+        Between the measured channels, m/N; empty where only the tip is computed.
     reference : ndarray, shape (n_freq, 12, 12)
         Between reference points with six DOFs on both sides; empty as above.
     natural_frequencies : ndarray, shape (12,)
@@ -182,7 +182,7 @@ def _tip(mesh: Mesh) -> sparse.csr_array:
 
 
 def _mean(mesh: Mesh, nodes: NDArray[np.int32], point: FloatArray, dofs: tuple[str, ...]) -> sparse.csr_array:
-    """Weights of all nodes for the mean rigid motion of some about a point, DOFs in the order asked for."""
+    """Weights of all nodes for the mean rigid motion of some about a point, DOFs in the given order."""
     return mean_motion(mesh, Patch(point, nodes))[[DIRECTIONS.index(dof) for dof in dofs]]
 
 
@@ -204,7 +204,7 @@ def beam_frfs(case: BoltedLapCase, length_b: float) -> BeamFrfs:
 
 #: A regenerated resonance is sought within this share of the actual one.
 _REACH = 0.15
-#: Peaks count when they stand out from their surroundings by this factor.
+#: Peaks count when they exceed their surroundings by this factor.
 _PROMINENCE = 1.5
 
 

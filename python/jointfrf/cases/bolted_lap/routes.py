@@ -192,14 +192,14 @@ def by_compliance_fit(case: BoltedLapCase, points: tuple[FivePoints, FivePoints]
     return found
 
 
-#: Relative noise for the weights of a fit to data whose noise is not asked for.
+#: Relative noise for the weights of a fit whose noise level is not of interest.
 _ASSUMED = 0.01
 #: Least variance of an FRF as a share of that of its driving points: entries that are zero have no noise of their own.
 _ROUNDING = 1e-20
 
 
 def fit_measured(freq_hz: FloatArray, dofs: tuple[str, ...], h: ComplexArray, transform: FloatArray) -> Fit:
-    """Fit a joint to FRFs between measured channels; its warnings stand in the result.
+    """Fit a joint to FRFs between measured channels; its warnings are part of the result.
 
     Parameters
     ----------

@@ -96,7 +96,7 @@ def _resonances(result: BoltedLapResult, key: str, title: str, *, transferred: b
         columns += [f"{peak.direction} {peak.freq_hz:.3g} Hz: {error}, %" for error in ("frequency", "amplitude")]
     note = (
         "Errors (4.12) and (4.11), on lines as close as the loss factor asks for. A resonance is sought "
-        "within 15 % of the actual one, and not beyond the valleys beside it: 'above' stands where there is no peak "
+        "within 15 % of the actual one, and not beyond the valleys beside it: 'above' means that there is no peak "
         "up to that limit of the search. "
         f"'reference points, {LINES}' couples the beams by the full 6 x 6 K*(w). What remains there comes "
         "neither from noise nor from rotations: a joint between two points has no mass, and the beams also press on "

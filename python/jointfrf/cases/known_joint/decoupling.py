@@ -50,8 +50,8 @@ def fit_decoupling(
 
     Notes
     -----
-    What (2.53)-(2.56) take one block each is one maximum-likelihood fit of all four. The first set is fitted with
-    nothing told, the others start there.
+    What (2.53)-(2.56) take one block each is one maximum-likelihood fit of all four. The first set is fitted without
+    initial values, the others start from its result.
     """
     whole, channels = _decoupled(freq_hz, dofs, substructures, k_initial)
     found = [one.constant_joint() for one in joints_of_realisations(freq_hz, measured, whole, channels)]
