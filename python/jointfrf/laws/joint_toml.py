@@ -16,7 +16,15 @@ from jointfrf.laws.springs import SpringLaw
 from jointfrf.laws.viscoelastic import FractionalZener, PowerLaw, StandardLinearSolid
 from jointfrf.toml.table import Key, KeyTable, TomlTable
 
-__all__ = ["LAW_VALUES", "LAW_WORDS", "joint_text", "read_joint_table", "read_law", "takes_in_words"]
+__all__ = [
+    "LAW_VALUES",
+    "LAW_WORDS",
+    "joint_text",
+    "parameters_in_words",
+    "read_joint_table",
+    "read_law",
+    "takes_in_words",
+]
 
 #: The laws that files can hold: a new law is a file with its class, and its name here.
 LAWS: tuple[type[JointLaw], ...] = (SpringLaw, StandardLinearSolid, FractionalZener, PowerLaw)
@@ -62,13 +70,17 @@ LAW_VALUES = tuple(
 
 
 def takes_in_words() -> str:
-    """Return which parameters each law takes, and what these are, for the reference of keys."""
-    takes = "; ".join(f"`{law.word}` {', '.join(f'`{one.name}`' for one in _numbers(law))}" for law in LAWS)
-    known = "; ".join(
-        f"`{one.name}` ({', '.join(filter(None, (one.value, one.unit)))}) {one.meaning.rstrip('.')}"
+    """Return which parameters each law takes, for the reference of keys."""
+    return "; ".join(f"`{law.word}` {', '.join(f'`{one.name}`' for one in _numbers(law))}" for law in LAWS)
+
+
+def parameters_in_words() -> str:
+    """Return what the parameters of all laws are, for the reference of keys."""
+    return "; ".join(
+        f"`{one.name}` {one.meaning[0].lower()}{one.meaning[1:].rstrip('.')} "
+        f"({', '.join(part for part in (one.takes, one.unit) if part)})"
         for one in LAW_VALUES
     )
-    return f"{takes}. {known}"
 
 
 #: Keys of one law.

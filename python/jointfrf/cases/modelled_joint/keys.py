@@ -12,7 +12,7 @@ from jointfrf.cases.keys import Case, CaseKeys, ExpectedKeys
 from jointfrf.cases.substructures import BeamKeys, BrickBeamKeys, ChainKeys, MatricesKeys, ModelStructure
 from jointfrf.identification.model.assembly import AddedMass, Assembly
 from jointfrf.identification.model.substructure import Substructure, Unknown
-from jointfrf.laws.joint_toml import LAW_WORDS, read_law, takes_in_words
+from jointfrf.laws.joint_toml import LAW_WORDS, parameters_in_words, read_law, takes_in_words
 from jointfrf.laws.law import JointLaw
 from jointfrf.laws.law_joint import LawJoint
 from jointfrf.models.model import Model
@@ -39,7 +39,7 @@ class LawKeys(Keys):
     law: Annotated[str, key("The law; `rigid`: both sides move alike.", choice=LAW_WORDS, example="spring")]
     actual: Annotated[
         dict[str, float],
-        key(f"Actual parameters, those that the law takes: {takes_in_words()}. With N, m, s, rad.",
+        key(f"Actual parameters, those that the law takes: {takes_in_words()}; {parameters_in_words()}.",
             absent="required but for `rigid`", example={"k": 6e4, "c": 5.0}),
     ] = field(default_factory=dict)  # fmt: skip
     start: Annotated[
