@@ -10,10 +10,11 @@ import numpy as np
 from jointfrf.channels.point_lines import Interface
 from jointfrf.errors import IllConditionedWarning
 from jointfrf.identification.fit_data import FitData
-from jointfrf.identification.manifold.coordinates import terms_of
+from jointfrf.identification.manifold.coordinates import LawCoordinates, terms_of
 from jointfrf.identification.manifold.estimate import FittedGroup, JointEstimate
 from jointfrf.identification.manifold.fit import ComplianceFit
 from jointfrf.identification.manifold.interface_frfs import InterfaceFrfs
+from jointfrf.identification.manifold.law_fit import FoundLaws
 from jointfrf.identification.manifold.on_manifold import frfs_of_joint, project, smooth_compliance, starts_on_manifold
 from jointfrf.identification.manifold.prepare import FitProblem
 from jointfrf.identification.manifold.transforms import Transform, Transforms
@@ -29,7 +30,7 @@ _SEEN = 1e-10
 
 
 def compliance_data(
-    found: ComplianceFit, problem: FitProblem, transform: Transform | tuple[Transform, Transform] | None
+    found: ComplianceFit | FoundLaws, problem: FitProblem, transform: Transform | tuple[Transform, Transform] | None
 ) -> FitData:
     """Gather what a fit was made from; `transform` as in `identify`."""
     frfs = problem.frfs
@@ -116,7 +117,10 @@ def regenerated_frfs(found: JointEstimate, n: int, lines: slice) -> ComplexArray
 def _of_group(group: FittedGroup, lines: slice) -> ComplexArray:
     """Return the regenerated FRFs of one group of DOFs."""
     data, joint = group.problem.data.on_slice(lines), group.joint
-    entries = type(joint)(terms_of(joint).on_lines(lines)).compliance(group.fit.minimum.x)  # type: ignore[call-arg]
+    if isinstance(joint, LawCoordinates):
+        entries = joint.on_lines(lines).compliance(group.fit.minimum.x)
+    else:
+        entries = type(joint)(terms_of(joint).on_lines(lines)).compliance(group.fit.minimum.x)  # type: ignore[call-arg]
     c = group.problem.of_joint(entries)
     unknown = group.problem.unknown[lines].reshape(c.shape)
     with warnings.catch_warnings(), np.errstate(all="ignore"):

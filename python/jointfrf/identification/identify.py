@@ -152,7 +152,8 @@ def identify(
         count = 2 * np.count_nonzero(np.isfinite(problem.frfs.variance))
         if count < len(joint.names):
             raise ValueError(f"{count} numbers measured cannot give {len(joint.names)} parameters of laws")
-        fit = describe_laws(fit_laws(problem, joint))
+        laws = fit_laws(problem, joint)
+        fit = replace(describe_laws(laws), data=compliance_data(laws, problem, transform))
     fit.issue_warnings()
     return fit
 

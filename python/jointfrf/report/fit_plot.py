@@ -13,7 +13,7 @@ from jointfrf.kernel.arguments import check_type
 from jointfrf.report.draw import laid_out
 from jointfrf.report.figure import Figure, Panel
 from jointfrf.report.fit import fit_figures
-from jointfrf.report.fit_frfs import compare_frfs, frf_figures
+from jointfrf.report.fit_frfs import compare_frfs, compare_model, frf_figures
 
 __all__ = ["fit_overview", "plot"]
 
@@ -24,12 +24,14 @@ _FRFS = 4
 def fit_overview(fit: Fit) -> Figure:
     """Return K* and compliance of each DOF, and the first FRFs where the fit holds them, as one figure."""
     panels: list[Panel] = []
-    for dof, figure in zip(fit.dofs, fit_figures(fit), strict=True):
+    for figure in fit_figures(fit):
+        dof = figure.key.removeprefix("joint_")
         titles = (f"DOF {dof}: joint stiffness", "", f"DOF {dof}: joint compliance", "")
         panels += [replace(panel, title=title) for panel, title in zip(figure.panels, titles, strict=True)]
-    if isinstance(fit.data, FitData):
+    if fit.data is not None:
         up = np.argsort(fit.freq_hz, kind="stable")
-        frfs = frf_figures(compare_frfs(fit.data, fit.dofs), fit.freq_hz, up)[:_FRFS]
+        compared = compare_frfs(fit.data, fit.dofs) if isinstance(fit.data, FitData) else compare_model(fit)
+        frfs = frf_figures(compared, fit.freq_hz, up)[:_FRFS]
         for first in range(0, len(frfs), 2):
             beside = frfs[first : first + 2]
             for part in zip(*(figure.panels for figure in beside), strict=True):

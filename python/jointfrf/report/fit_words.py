@@ -7,7 +7,7 @@ from typing import cast, get_args
 import numpy as np
 
 from jointfrf.dofs import Parameter, ParameterKind, is_rotation
-from jointfrf.identification.fit_data import FitData
+from jointfrf.identification.fit_data import FitData, ModelData
 from jointfrf.identification.result import Fit, FittedParameter
 from jointfrf.report.table import Cell, Table
 from jointfrf.report.ticks import prefixed_unit
@@ -49,7 +49,9 @@ def shown_name(one: FittedParameter) -> Cell:
 
 def _named(term: FittedParameter) -> str:
     """Name a parameter of one DOF in words."""
-    kind = {"k": "stiffness", "h": "hysteretic stiffness", "c": "viscous damping"}[term.kind]
+    kind = {"k": "stiffness", "h": "hysteretic stiffness", "c": "viscous damping"}.get(term.kind)
+    if kind is None:
+        return f"parameter {term.kind} of {term.row}"
     axis = term.row.rpartition("_")[2].lstrip("r")
     if is_rotation(term.row) and axis in ("x", "y", "z"):
         return f"{'rotational ' if term.kind != 'c' else ''}{kind} about {axis}"
@@ -59,13 +61,21 @@ def _named(term: FittedParameter) -> str:
 def finding_sentences(fit: Fit) -> list[str]:
     """Return one sentence a parameter, its value and where it lies with 95 % probability; one for all cross terms."""
     intervals = fit.confidence_interval(_PROBABILITY)
-    told = []
+    told = [] if fit.laws is None or not fit.laws.rigid else [f"Rigid: {', '.join(fit.laws.rigid)}."]
     for term, value in zip(fit.parameters, fit.value.values(), strict=True):
+        if term.origin != "joint":
+            continue
         low, high = intervals[term.name]
         name = _named(term)
         if not term.is_cross:
             told.append(f"{name[0].upper()}{name[1:]} ({term.name}): {_value_sentence(term, value, low, high)}")
-    cross = [term.name for term in fit.parameters if term.is_cross]
+    for name, eta in fit.loss_factors.items():
+        of = FittedParameter(name, "", "eta", name.removeprefix("eta_"), name.removeprefix("eta_"))
+        told.append(f"Loss factor of {of.row} ({name}): {_value_sentence(of, eta.value, eta.low, eta.high)}")
+    rest = [term.name for term in fit.parameters if term.origin != "joint"]
+    if rest:
+        told.append(f"Fitted with it, values in the table: {', '.join(rest)}.")
+    cross = [term.name for term in fit.parameters if term.is_cross and term.origin == "joint"]
     if cross:
         clear = [name for name in cross if not intervals[name][0] <= 0 <= intervals[name][1]]
         which = f"{len(clear)} of {len(cross)}: {', '.join(clear)}" if clear else f"none of {len(cross)}"
@@ -95,10 +105,13 @@ def quality_sentences(fit: Fit) -> list[str]:
     told = []
     if np.isfinite(fit.noise_level) and fit.noise_level > 0:
         ratio = fit.residual_level / fit.noise_level
+        explains, explain = ("joint explains", "joint as described does")
+        if isinstance(fit.data, ModelData):
+            explains, explain = ("models and the joint explain", "models and the joint as described do")
         verdict = (
-            "the joint explains the FRFs of the lines used to within their noise."
+            f"the {explains} the FRFs of the lines used to within their noise."
             if ratio < _NOISE
-            else "the joint as described does not explain all that the FRFs show."
+            else f"the {explain} not explain all that the FRFs show."
         )
         told.append(
             f"The noise of the FRFs is {100 * fit.noise_level:.2g} % (median); what the fit leaves unexplained is "
@@ -120,16 +133,21 @@ def quality_sentences(fit: Fit) -> list[str]:
 def parameter_table(fit: Fit) -> Table:
     """Return the parameters with standard errors and intervals."""
     intervals, errors = fit.confidence_interval(_PROBABILITY), fit.std_error
+    has_prior = any(one.prior for one in fit.parameters)
     rows: list[tuple[Cell, ...]] = []
     for term, value in zip(fit.parameters, fit.value.values(), strict=True):
         low, high = intervals[term.name]
         is_open = term.kind == "k" and not term.is_cross and not np.isfinite(high)
         ends: tuple[Cell, ...] = (low, "open") if is_open else (low, high)
-        rows.append((shown_name(term), "open" if is_open else value, errors[term.name], *ends, term.unit))
-    etas = [
-        f"{dof} {eta:.3g}" for dof, eta in zip(fit.dofs, fit.loss_factor, strict=True) if np.isfinite(eta) and eta != 0
-    ]
+        prior = "" if term.prior is None else f"{term.prior[0]:.4g} ± {term.prior[1]:.2g}"
+        believed = (prior,) if has_prior else ()
+        rows.append((shown_name(term), "open" if is_open else value, errors[term.name], *ends, *believed, term.unit))
+    for name, eta in fit.loss_factors.items():
+        rows.append((name, eta.value, eta.std_error, eta.low, eta.high, *([""] if has_prior else []), "1"))
     note = "K*(ω) = k + i h + i ω c, time convention exp(+iωt)"
-    note += f"; loss factors h/k: {', '.join(etas)}" if etas else ""
-    columns = ("parameter", "value", "standard error", "95 % from", "95 % to", "unit")
+    note += "; η = h/k" if fit.loss_factors else ""
+    if any(term.origin == "joint" and term.kind not in get_args(ParameterKind) for term in fit.parameters):
+        note = "Laws: docs/model-fit.md; time convention exp(+iωt)"
+    prior_column = ("prior",) if has_prior else ()
+    columns = ("parameter", "value", "standard error", "95 % from", "95 % to", *prior_column, "unit")
     return Table("parameters", "Parameters of the joint", columns, tuple(rows), note=note + ".")

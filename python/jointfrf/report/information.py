@@ -18,6 +18,9 @@ _PARTS, _LEAST = 48, 4
 #: Shares of the information below the frequencies in the table.
 _QUANTILES = (0.1, 0.5, 0.9)
 _STYLES = {"k": "ismm", "h": "stiffness", "c": "high"}
+_LABELS = {"k": "stiffness k", "h": "hysteretic damping h", "c": "viscous damping c"}
+#: Styles of other parameters of laws, in their order.
+_OTHERS = ("stiffness", "high", "actual")
 
 
 def information_table(fit: Fit, freq_hz: FloatArray, shares: FloatArray) -> Table:
@@ -51,15 +54,18 @@ def information_figure(fit: Fit, freq_hz: FloatArray, shares: FloatArray) -> Fig
     panels = []
     for dof in fit.dofs:
         terms = [(i, term) for i, term in enumerate(fit.parameters) if term.row == term.column == dof]
+        if not terms:
+            continue
+        others = [term.kind for _, term in terms if term.kind not in _STYLES]
         curves = tuple(
-            _steps(edges, np.bincount(at, shares[:, i], parts).astype(np.float64), term) for i, term in terms
+            _steps(edges, np.bincount(at, shares[:, i], parts).astype(np.float64), term, others) for i, term in terms
         )
         panels.append(Panel(f"DOF {dof}", FREQUENCY, f"share of the band in {parts} parts, %", curves))
     caption = "Information density: how much each part of the band says about each parameter"
     return Figure("information", caption, tuple(panels), 2 if len(panels) > 1 else 1)
 
 
-def _steps(edges: FloatArray, share: FloatArray, term: FittedParameter) -> Curve:
-    """Draw shares as steps."""
-    label = {"k": "stiffness k", "h": "hysteretic damping h", "c": "viscous damping c"}[term.kind]
-    return Curve(label, np.repeat(edges, 2)[1:-1], np.repeat(100 * share, 2), _STYLES[term.kind])
+def _steps(edges: FloatArray, share: FloatArray, term: FittedParameter, others: list[str]) -> Curve:
+    """Draw shares as steps; `others` are the kinds of this DOF that springs and dampers do not have."""
+    style = _STYLES.get(term.kind) or _OTHERS[others.index(term.kind) % len(_OTHERS)]
+    return Curve(_LABELS.get(term.kind, term.kind), np.repeat(edges, 2)[1:-1], np.repeat(100 * share, 2), style)
