@@ -17,7 +17,7 @@ from jointfrf.laws.viscoelastic import FractionalZener, PowerLaw, StandardLinear
 from jointfrf.toml.keys import Key, KeyTable
 from jointfrf.toml.table import TomlTable
 
-__all__ = ["LAW_VALUES", "LAW_WORDS", "joint_text", "read_joint_table", "read_law", "takes_in_words"]
+__all__ = ["LAW_VALUES", "LAW_WORDS", "joint_text", "read_joint_table", "read_law", "start_values", "takes_in_words"]
 
 #: The laws that files can hold: a new law is a file with its class, and its name here.
 LAWS: tuple[type[JointLaw], ...] = (SpringLaw, StandardLinearSolid, FractionalZener, PowerLaw)
@@ -200,6 +200,16 @@ def read_law(table: TomlTable, word: str, *, is_cross: bool = False) -> JointLaw
     numbers = {name: table.number(name) for name in takes if name in table or name not in law.optional}
     table.close()
     return table.build(lambda: law.from_numbers(numbers, is_cross=is_cross))
+
+
+#: Numbers from which a fit may start anywhere: it finds its own first values.
+_STARTS = {"stiffness": 1e6, "damping": 10.0, "time": 1e-3, "number": 0.5, "frequency": 100.0}
+
+
+def start_values(word: object) -> dict[str, float]:
+    """Return numbers for a law of which none are known, where a fit may start; empty for no such law."""
+    law = _BY_WORD.get(word) if isinstance(word, str) else None
+    return {} if law is None else {one.name: _STARTS[one.kind] for one in _numbers(law) if one.name != "h"}
 
 
 def _law_line(law: JointLaw) -> str:
