@@ -2,6 +2,7 @@
 from jointfrf import io as io
 from jointfrf import report as report
 from jointfrf import solids as solids
+from jointfrf.assembly_file.measured import MeasuredAssembly, measured_assembly
 from jointfrf.channels.check.check import check_frfs
 from jointfrf.channels.check.finding import FrfCheck, FrfFinding
 from jointfrf.channels.joint_channels import ChannelAgreement, JointChannels, SideAgreement, joint_channels
@@ -149,6 +150,7 @@ __all__ = [
     "LawField",
     "LawJoint",
     "Material",
+    "MeasuredAssembly",
     "Mesh",
     "MissingPackageError",
     "Model",
@@ -218,6 +220,7 @@ __all__ = [
     "joint_channels",
     "joint_compliance",
     "load",
+    "measured_assembly",
     "merge_studies",
     "modify",
     "monte_carlo",

@@ -15,6 +15,8 @@ from jointfrf.channels.check.finding import FrfCheck
 from jointfrf.channels.point_lines import difference_error
 from jointfrf.cli.check import check_joint
 from jointfrf.cli.export import add_card_arguments, card_request, parse_export, written_cards
+from jointfrf.cli.identify_model import add_model_arguments, run_model
+from jointfrf.cli.joint_laws import add_law_arguments, joint_of_laws
 from jointfrf.cli.measured_file import (
     add_file_arguments,
     file_names,
@@ -36,6 +38,7 @@ from jointfrf.identification.manifold.coordinates import CrossTerms, DampingTerm
 from jointfrf.identification.record import fit_to_dict, write_record
 from jointfrf.identification.result import Fit
 from jointfrf.io import FrfSet
+from jointfrf.laws.law_joint import LawJoint
 from jointfrf.report.fit_page import write_report
 from jointfrf.spelling import did_you_mean
 
@@ -58,9 +61,11 @@ def add_arguments(parser: CommandParser) -> None:
     parser.description = (
         "Identify a joint from the FRFs of an assembly. Accelerances and mobilities become receptances. The DOFs of "
         "the joint are those of virtual points of all channels around it (--at), of points along a line (rotations by "
-        "central differences), or of two nodes whose rotations are in the file."
+        "central differences), or of two nodes whose rotations are in the file. With models of both parts (--model) "
+        "any FRFs will do."
     )
     add_file_arguments(parser)
+    add_model_arguments(parser)
     parser.heading("the fit")
     parser.option(
         "--method METHODS", f"one or several of {','.join(_METHODS)} (default: compliance)", _methods, ["compliance"]
@@ -74,6 +79,7 @@ def add_arguments(parser: CommandParser) -> None:
     parser.option(
         "--cross", "terms between the joint DOFs: none (default), not looked at, fitted", get_args(CrossTerms), "zero"
     )
+    add_law_arguments(parser)
     parser.option("--noise LEVEL", "relative noise of the FRFs, 0.01 for 1 %% (default: from their reciprocity)", float)
     parser.option(
         "--bending-stiffness EI",
@@ -102,11 +108,17 @@ def run(args: argparse.Namespace) -> int:
         if "compliance" not in args.method:
             raise UsageError("--report is of method compliance: name it among the methods")
     check_folder("--save", args.save)
+    if args.model is not None:
+        return run_model(args)
+    if args.each:
+        raise UsageError("--each is for tests with --model: name the file of the assembly")
     out = Output(args)
     frfs = read_receptances(args)
     joint = measured_joint(args, frfs, args.bending_stiffness)
     points = np.array(joint.responses.references)
-    request = card_request(args, joint.dofs, damping=args.damping, cross=args.cross, points=points)
+    laws = joint_of_laws(args, joint.dofs)
+    damping = args.damping if laws is None else "none"
+    request = card_request(args, joint.dofs, damping=damping, cross=args.cross, points=points)
     check = check_joint(joint)
     warn_of_frfs(check)
     for text in joint.warnings():
@@ -119,7 +131,7 @@ def run(args: argparse.Namespace) -> int:
     fits = []
     for method in args.method:
         with waiting(f"fit by {method}"):
-            fits.append(_fit(args, method, frfs, joint))
+            fits.append(_fit(args, method, frfs, joint, laws))
         out.say("", fits[-1])
         out.warn(*fits[-1].warnings)
     text, written = "", []
@@ -190,13 +202,13 @@ def _differences(args: argparse.Namespace, joint: MeasuredJoint) -> Iterator[str
         )
 
 
-def _fit(args: argparse.Namespace, method: str, frfs: FrfSet, joint: MeasuredJoint) -> Fit:
+def _fit(args: argparse.Namespace, method: str, frfs: FrfSet, joint: MeasuredJoint, laws: LawJoint | None) -> Fit:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", IdentificationWarning)  # they are in the table
         warnings.simplefilter("ignore", ConvergenceWarning)
         warnings.simplefilter("ignore", FrfCheckWarning)  # told with the names of the channels
         if method == "compliance":
-            return identify(frfs.freq_hz, joint.h, joint.dofs, args.band, **_of_compliance(args, frfs, joint))
+            return identify(frfs.freq_hz, joint.h, joint.dofs, args.band, **_of_compliance(args, frfs, joint, laws))
         transform = joint.responses if joint.is_square else None
         return identify_band_mean(
             frfs.freq_hz, _square(joint), "inverse-substructuring", joint.dofs, args.band, transform=transform
@@ -210,16 +222,18 @@ def _square(joint: MeasuredJoint) -> np.ndarray:
     return np.ascontiguousarray(joint.responses.transform @ joint.h @ joint.forces.transform.T)
 
 
-def _of_compliance(args: argparse.Namespace, frfs: FrfSet, joint: MeasuredJoint) -> dict[str, Any]:
+def _of_compliance(
+    args: argparse.Namespace, frfs: FrfSet, joint: MeasuredJoint, laws: LawJoint | None
+) -> dict[str, Any]:
     """Return the options of the compliance fit: damping, cross terms, noise, coherence where the file has it."""
+    terms = {"damping": args.damping, "cross": args.cross} if laws is None else {"joint": laws}
     names = joint.responses.channels, joint.forces.channels
     coherence = frfs.coherence_matrix(*names)
     known = {} if coherence is None else {"coherence": coherence, "averages": frfs.least_averages(*names)}
     return {
         "transform": joint.transform,
-        "damping": args.damping,
-        "cross": args.cross,
         "noise": args.noise,
+        **terms,
         **known,
     }
 

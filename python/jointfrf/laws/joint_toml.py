@@ -23,6 +23,7 @@ __all__ = [
     "parameters_in_words",
     "read_joint_table",
     "read_law",
+    "start_values",
     "takes_in_words",
 ]
 
@@ -216,6 +217,16 @@ def read_law(table: TomlTable, word: str, *, is_cross: bool = False) -> JointLaw
     numbers = {name: table.number(name) for name in takes if name in table or name not in law.optional}
     table.close()
     return table.build(lambda: law.from_numbers(numbers, is_cross=is_cross))
+
+
+#: Numbers from which a fit may start anywhere: it finds its own first values.
+_STARTS = {"stiffness": 1e6, "damping": 10.0, "time": 1e-3, "number": 0.5, "frequency": 100.0}
+
+
+def start_values(word: object) -> dict[str, float]:
+    """Return numbers for a law of which none are known, where a fit may start; empty for no such law."""
+    law = _BY_WORD.get(word) if isinstance(word, str) else None
+    return {} if law is None else {one.name: _STARTS[one.kind] for one in _numbers(law) if one.name != "h"}
 
 
 def _law_line(law: JointLaw) -> str:

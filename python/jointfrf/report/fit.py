@@ -11,6 +11,7 @@ from typing import Any, NamedTuple, cast, get_args
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtri
 
 from jointfrf.dofs import Parameter, ParameterKind, compliance_unit
 from jointfrf.errors import IllConditionedWarning
@@ -20,10 +21,11 @@ from jointfrf.identification.record import fit_to_dict
 from jointfrf.identification.result import Fit, FittedParameter
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, check_type
 from jointfrf.kernel.linear_algebra import invert
+from jointfrf.laws.law_joint import LawJoint
 from jointfrf.report.axes import FREQUENCY, bulk_limits
 from jointfrf.report.draw import draw, laid_out
 from jointfrf.report.figure import Curve, Figure, Panel, Ribbon
-from jointfrf.report.fit_frfs import compare_frfs, frf_figures
+from jointfrf.report.fit_frfs import compare_frfs, compare_model, frf_figures
 from jointfrf.report.table import Cell, Table
 
 __all__ = ["fit_figures", "fit_overview", "information_figure", "information_table", "plot", "shown_name", "write_fit"]
@@ -40,24 +42,28 @@ def fit_figures(fit: Fit) -> list[Figure]:
     Returns
     -------
     list of Figure
-        ``"joint_<dof>"`` for each DOF.
+        ``"joint_<dof>"`` for each DOF that is not rigid.
     """
     up = np.argsort(fit.freq_hz, kind="stable")
     freq, n = fit.freq_hz[up], len(fit.dofs)
     lines = np.full((freq.size, n, n), np.nan + 0j) if fit.k_lines is None else fit.k_lines[up]
-    fitted = fit.k_joint(freq)
+    fitted = _stiffness_found(fit, freq)
     with warnings.catch_warnings():
         # Displacements and rotations differ by orders of magnitude.
         warnings.simplefilter("ignore", IllConditionedWarning)
-        compliance = invert(fitted, on_singular="nan")
+        compliance = (
+            invert(fitted, on_singular="nan") if fit.laws is None else fit.laws.compliance(freq, on_singular="nan")
+        )
         each_compliance = fit.data.line_compliance()[up] if isinstance(fit.data, FitData) else _inverted(lines)
     used = fit.data.fitted[up] if isinstance(fit.data, FitData) else np.ones(lines.shape[:2], np.bool_)
     figures = []
     for d, dof in enumerate(fit.dofs):
+        if fit.laws is not None and dof in fit.laws.rigid:
+            continue
         stiffness = Parameter.of_dof("k", dof)
         panels = []
         for label, each, curve, ribbons in (
-            (f"K*, {stiffness.unit}", lines[:, d, d], fitted, _interval(fit, stiffness)),
+            (f"K*, {stiffness.unit}", lines[:, d, d], fitted, _interval(fit, stiffness, freq)),
             (f"C, {compliance_unit(dof, dof)}", each_compliance[:, d], compliance, ()),
         ):
             own = _EntryLines(fit.method, label, freq, each, curve[:, d, d], used[:, d], ribbons)
@@ -69,6 +75,8 @@ def fit_figures(fit: Fit) -> list[Figure]:
 
 def _inverted(k_lines: ComplexArray) -> ComplexArray:
     """Return the diagonal of the compliance of each line, shape (n_freq, n)."""
+    if not np.isfinite(k_lines).any():
+        return np.asarray(np.einsum("ldd->ld", k_lines))
     inverse = invert(np.where(np.isfinite(k_lines), k_lines, 0), on_singular="nan")
     return np.asarray(np.einsum("ldd->ld", inverse))
 
@@ -86,8 +94,36 @@ class _EntryLines(NamedTuple):
     bound: float | None = None
 
 
-def _interval(fit: Fit, stiffness: Parameter) -> tuple[Ribbon, ...]:
+def _stiffness_found(fit: Fit, freq_hz: FloatArray) -> ComplexArray:
+    """Return K*(w) of the joint found, shape (n_freq, n, n); NaN at rigid DOFs."""
+    if fit.laws is None or not fit.laws.rigid:
+        return fit.k_joint(freq_hz)
+    k = np.full((freq_hz.size, len(fit.dofs), len(fit.dofs)), np.nan + 0j)
+    at = [d for d, dof in enumerate(fit.dofs) if dof not in fit.laws.rigid]
+    if at:
+        moving = LawJoint(fit.laws.laws, (), None, [fit.dofs[d] for d in at])
+        k[:, np.array(at)[:, None], at] = moving.dynamic_stiffness(freq_hz)
+    return k
+
+
+def _of_law(fit: Fit, dof: str, freq_hz: FloatArray) -> tuple[Ribbon, ...]:
+    """Confidence interval of Re K* of a law at each frequency, from the covariance of its parameters."""
+    assert fit.laws is not None
+    law, names = fit.laws.laws[dof, dof], [one.name for one in fit.parameters]
+    own = [(i, names.index(f"{one.name}_{dof}")) for i, one in enumerate(law.fields) if f"{one.name}_{dof}" in names]
+    if not own:
+        return ()
+    slopes = law.slopes(2 * np.pi * freq_hz)[[i for i, _ in own]].real
+    at = [place for _, place in own]
+    error = np.sqrt(np.maximum(np.einsum("pf,pq,qf->f", slopes, fit.covariance[np.ix_(at, at)], slopes), 0))
+    middle, reach = law.stiffness(2 * np.pi * freq_hz).real, float(ndtri(0.975))
+    return (Ribbon("95 % interval of Re K*", freq_hz, middle - reach * error, middle + reach * error, "low"),)
+
+
+def _interval(fit: Fit, stiffness: Parameter, freq_hz: FloatArray) -> tuple[Ribbon, ...]:
     """Confidence interval of a stiffness, where it is not open."""
+    if fit.laws is not None:
+        return _of_law(fit, stiffness.row, freq_hz)
     low, high = fit.confidence_interval(0.95)[stiffness.name]
     if not (np.isfinite(low) and np.isfinite(high)):
         return ()
@@ -97,6 +133,8 @@ def _interval(fit: Fit, stiffness: Parameter) -> tuple[Ribbon, ...]:
 
 def _as_open(lines: _EntryLines, fit: Fit, stiffness: Parameter) -> _EntryLines:
     """Put the lower bound in place of a stiffness that cannot be distinguished from a rigid one."""
+    if fit.laws is not None:
+        return lines
     low, high = fit.confidence_interval(0.95)[stiffness.name]
     return lines if np.isfinite(high) else lines._replace(bound=max(low, 0.0))
 
@@ -109,7 +147,9 @@ def _panels(lines: _EntryLines) -> list[Panel]:
         ("Re", lines.each.real, lines.fitted.real),
         ("Im", lines.each.imag, lines.fitted.imag),
     ):
-        curves, shown = [Curve("each line", lines.freq_hz[used], values[used], "dots")], []
+        is_known = np.isfinite(lines.each[used]).any()
+        curves = [Curve("each line", lines.freq_hz[used], values[used], "dots")] if is_known else []
+        shown: list[float] = []
         if lines.bound is None:
             curves.append(Curve(f"fit ({lines.method})", lines.freq_hz, curve, "actual"))
             shown = [float(curve.min()), float(curve.max())] if np.isfinite(curve).all() else []
@@ -171,6 +211,9 @@ _PARTS, _LEAST = 48, 4
 #: Shares of the information below the frequencies in the table.
 _QUANTILES = (0.1, 0.5, 0.9)
 _STYLES = {"k": "ismm", "h": "stiffness", "c": "high"}
+_LABELS = {"k": "stiffness k", "h": "hysteretic damping h", "c": "viscous damping c"}
+#: Styles of other parameters of laws, in their order.
+_OTHERS = ("stiffness", "high", "actual")
 
 
 def shown_name(one: FittedParameter) -> Cell:
@@ -210,18 +253,21 @@ def information_figure(fit: Fit, freq_hz: FloatArray, shares: FloatArray) -> Fig
     panels = []
     for dof in fit.dofs:
         terms = [(i, term) for i, term in enumerate(fit.parameters) if term.row == term.column == dof]
+        if not terms:
+            continue
+        others = [term.kind for _, term in terms if term.kind not in _STYLES]
         curves = tuple(
-            _steps(edges, np.bincount(at, shares[:, i], parts).astype(np.float64), term) for i, term in terms
+            _steps(edges, np.bincount(at, shares[:, i], parts).astype(np.float64), term, others) for i, term in terms
         )
         panels.append(Panel(f"DOF {dof}", FREQUENCY, f"share of the band in {parts} parts, %", curves))
     caption = "Information density: how much each part of the band says about each parameter"
     return Figure("information", caption, tuple(panels), 2 if len(panels) > 1 else 1)
 
 
-def _steps(edges: FloatArray, share: FloatArray, term: FittedParameter) -> Curve:
-    """Draw shares as steps."""
-    label = {"k": "stiffness k", "h": "hysteretic damping h", "c": "viscous damping c"}[term.kind]
-    return Curve(label, np.repeat(edges, 2)[1:-1], np.repeat(100 * share, 2), _STYLES[term.kind])
+def _steps(edges: FloatArray, share: FloatArray, term: FittedParameter, others: list[str]) -> Curve:
+    """Draw shares as steps; `others` are the kinds of this DOF that springs and dampers do not have."""
+    style = _STYLES.get(term.kind) or _OTHERS[others.index(term.kind) % len(_OTHERS)]
+    return Curve(_LABELS.get(term.kind, term.kind), np.repeat(edges, 2)[1:-1], np.repeat(100 * share, 2), style)
 
 
 #: FRFs that are drawn, two beside each other.
@@ -231,12 +277,14 @@ _FRFS = 4
 def fit_overview(fit: Fit) -> Figure:
     """Return K* and compliance of each DOF, and the first FRFs where the fit holds them, as one figure."""
     panels: list[Panel] = []
-    for dof, figure in zip(fit.dofs, fit_figures(fit), strict=True):
+    for figure in fit_figures(fit):
+        dof = figure.key.removeprefix("joint_")
         titles = (f"DOF {dof}: joint stiffness", "", f"DOF {dof}: joint compliance", "")
         panels += [replace(panel, title=title) for panel, title in zip(figure.panels, titles, strict=True)]
-    if isinstance(fit.data, FitData):
+    if fit.data is not None:
         up = np.argsort(fit.freq_hz, kind="stable")
-        frfs = frf_figures(compare_frfs(fit.data, fit.dofs), fit.freq_hz, up)[:_FRFS]
+        compared = compare_frfs(fit.data, fit.dofs) if isinstance(fit.data, FitData) else compare_model(fit)
+        frfs = frf_figures(compared, fit.freq_hz, up)[:_FRFS]
         for first in range(0, len(frfs), 2):
             beside = frfs[first : first + 2]
             for part in zip(*(figure.panels for figure in beside), strict=True):

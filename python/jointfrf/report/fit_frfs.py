@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 from jointfrf.dofs import compliance_unit
 from jointfrf.frf.bands import line_slices
 from jointfrf.frf.entry_groups import ZERO, own_size
-from jointfrf.identification.fit_data import FitData
+from jointfrf.identification.fit_data import FitData, ModelData
+from jointfrf.identification.result import Fit
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.report.document import HeatMap
 from jointfrf.report.figure import Curve, Figure
 from jointfrf.report.receptance import ReceptanceCurve, receptance_panels
 
-__all__ = ["ComparedFrfs", "compare_frfs", "frf_figures", "reciprocity_map", "residual_map"]
+__all__ = ["ComparedFrfs", "compare_frfs", "compare_model", "frf_figures", "reciprocity_map", "residual_map"]
 
 #: FRFs that are drawn at most.
 _MOST = 24
@@ -47,6 +48,8 @@ class ComparedFrfs:
     reciprocity : ndarray, shape (n_rows, n_columns), or None
         The same of h_pq - h_qp; NaN on the diagonal. None where rows and columns differ, or FRFs need not be
         reciprocal.
+    predicted : str
+        What is compared with the measured FRFs.
     """
 
     rows: tuple[str, ...]
@@ -57,6 +60,7 @@ class ComparedFrfs:
     regenerated: ComplexArray
     residual: FloatArray
     reciprocity: FloatArray | None
+    predicted: str = "regenerated with the joint found"
 
 
 def compare_frfs(data: FitData, dofs: tuple[str, ...]) -> ComparedFrfs:
@@ -108,6 +112,28 @@ def compare_frfs(data: FitData, dofs: tuple[str, ...]) -> ComparedFrfs:
     )  # fmt: skip
 
 
+def compare_model(fit: Fit) -> ComparedFrfs:
+    """Compare the FRFs of a fit of an assembly with those that its models and the joint predict."""
+    data = fit.data
+    assert isinstance(data, ModelData)
+    known = np.isfinite(data.variance).any(axis=0)
+    pairs = [(int(p), int(q)) for p, q in np.argwhere(known)]
+    driving = [(p, q) for p, q in pairs if fit.responses[p] == fit.forces[q]]
+    rest = [one for one in pairs if one not in driving]
+    entries = driving[:_MOST]
+    count = min(_MOST - len(entries), len(rest))
+    entries += [rest[round(i * (len(rest) - 1) / max(count - 1, 1))] for i in range(count)]
+    p, q = np.array(entries).T
+    squares = np.where(np.isfinite(data.residual), abs(data.residual) ** 2, 0).sum(axis=0)
+    counts = np.isfinite(data.residual).sum(axis=0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        residual = np.sqrt(squares / np.where(counts > 0, counts, np.nan))
+    return ComparedFrfs(
+        fit.responses, fit.forces, True, tuple(entries), data.measured[:, p, q], data.predicted[:, p, q], residual,
+        None, "predicted by the models and the joint found",
+    )  # fmt: skip
+
+
 def _add(squares: FloatArray, counts: FloatArray, own: NDArray[np.floating], variance: FloatArray) -> None:
     """Add squares in units of their variance where both are known."""
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -146,7 +172,7 @@ def frf_figures(compared: ComparedFrfs, freq_hz: FloatArray, up: NDArray[np.intp
         ends = [name.rpartition(":")[2].lstrip("+-") for name in names]
         curves = [
             ReceptanceCurve("measured", freq_hz[up], compared.measured[up, i], "wide"),
-            ReceptanceCurve("regenerated with the joint found", freq_hz[up], compared.regenerated[up, i], "fitted"),
+            ReceptanceCurve(compared.predicted, freq_hz[up], compared.regenerated[up, i], "fitted"),
         ]
         modulus, phase = receptance_panels("", f"modulus, {compliance_unit(ends[0], ends[1])}", curves)
         left = abs(compared.measured[up, i] - compared.regenerated[up, i])
@@ -171,6 +197,16 @@ def _limits(curves: tuple[Curve, ...], difference: FloatArray) -> tuple[float, f
 def residual_map(compared: ComparedFrfs) -> HeatMap:
     """Return the map of what is left by response and force."""
     where = "channel" if compared.of_channels else "joint DOF"
+    if compared.predicted != "regenerated with the joint found":
+        note = (
+            "Root mean square of measured minus predicted over the lines used, in units of the noise of the FRF. About "
+            "1 is noise. A row or a column well above 1 is a channel that does not fit: gain, place, direction, or a "
+            "part of the model near it."
+        )
+        return HeatMap(
+            "residual-map", "Residual by channel, in units of the noise", "response \\ force", compared.rows,
+            compared.columns, compared.residual, _LIGHT, _DARK, note,
+        )  # fmt: skip
     note = (
         "Root mean square of measured minus regenerated over the lines used, in units of the noise of the FRF, or of "
         "rigid motion there if that has more. About 1 or below is noise. A row and a column well above 1 are a channel "

@@ -12,10 +12,10 @@ from typing import get_args
 
 import numpy as np
 
-from jointfrf.dofs import is_rotation
+from jointfrf.dofs import ParameterKind, is_rotation
 from jointfrf.files import write_file
 from jointfrf.identification.fit_cards import cards
-from jointfrf.identification.fit_data import FitData
+from jointfrf.identification.fit_data import FitData, ModelData
 from jointfrf.identification.result import Fit, FittedParameter
 from jointfrf.io.cards import CardFormat
 from jointfrf.kernel.arguments import FloatArray, check_type
@@ -24,7 +24,14 @@ from jointfrf.report.chart import Chart, count_points
 from jointfrf.report.document import Document, Listing, Part, Section, Sketch, Words, make_document
 from jointfrf.report.figure import Figure
 from jointfrf.report.fit import fit_figures, information_figure, information_table, shown_name
-from jointfrf.report.fit_frfs import ComparedFrfs, compare_frfs, frf_figures, reciprocity_map, residual_map
+from jointfrf.report.fit_frfs import (
+    ComparedFrfs,
+    compare_frfs,
+    compare_model,
+    frf_figures,
+    reciprocity_map,
+    residual_map,
+)
 from jointfrf.report.receptance import noise_figure
 from jointfrf.report.sketch import interface_points, interface_sketch, point_table
 from jointfrf.report.table import Cell, Table
@@ -46,6 +53,10 @@ _POINTS, _LEAST = 130_000, 240
 _AT_ONCE = 6
 #: Lines of cards that are printed at most.
 _PRINTED = 40
+_HOW_MODEL = (
+    "The joint found, from all frequency lines together; the shaded band is the 95 % interval of the real part. Drag "
+    "across a chart to zoom in, double-click for the whole band."
+)
 _PROGRAMS = {"abaqus": "Abaqus", "calculix": "CalculiX", "nastran": "Nastran", "ansys": "Ansys"}
 
 
@@ -103,11 +114,68 @@ def fit_document(fit: Fit, options: ReportOptions) -> Document:
         The fit does not hold the measured FRFs.
     """
     data = fit.data
-    if not isinstance(data, FitData):
+    if data is None:
         raise ValueError(
             "a report shows the measured FRFs, and this fit holds none, as fits that were loaded, means over bands and "
             "those of many realisations: call identify with the FRFs and method 'compliance', and report that"
         )
+    sections = _joint_sections(fit, data, options) if isinstance(data, FitData) else _model_sections(fit, options)
+    title = f"Joint identified from {options.source}" if options.source else "Joint identified from FRFs"
+    responses, forces = (
+        (data.response_names, data.force_names) if isinstance(data, FitData) else (fit.responses, fit.forces)
+    )
+    about = (
+        f"Joint DOFs {', '.join(fit.dofs)}; {len(responses)} response{_plural(responses)}, {len(forces)} "
+        f"force{_plural(forces)}; {_span(fit.freq_hz)}; method {fit.method}."
+    )
+    return Document(title, about, [section for section in sections if section.parts])
+
+
+def _plural(names: Sequence[str]) -> str:
+    return "" if len(names) == 1 else "s"
+
+
+def _model_sections(fit: Fit, options: ReportOptions) -> list[Section]:
+    """Return the sections of a fit of an assembly."""
+    up = np.argsort(fit.freq_hz, kind="stable")
+    compared = compare_model(fit)
+    frfs, joint = frf_figures(compared, fit.freq_hz, up), fit_figures(fit)
+    most = _most_points([*frfs, *joint])
+    what = "real and imaginary part of joint stiffness K* and compliance C"
+    return [
+        _summary(fit),
+        _doubts(fit),
+        Section("joint", "Channels", [_channels(fit)]),
+        Section(
+            "stiffness",
+            "Stiffness and compliance over frequency",
+            [Words([_HOW_MODEL]), *_charts(joint, most, fit, what)],
+        ),
+        _frf_section(fit, compared, frfs, most),
+        Section("maps", "Residual by channel", [residual_map(compared)]),
+        Section("noise", "Noise", _noise_parts(fit, None, most)),
+        Section("cards", "Input of finite-element programs", _cards(fit, options.nodes)),
+        Section("made", "How this was made", [_made(fit, options)]),
+    ]
+
+
+def _channels(fit: Fit) -> Table:
+    """Return where was measured and driven, with what is attached."""
+    assert isinstance(fit.data, ModelData)
+    whole = fit.data.assembly
+    attached = [name for one in whole.attachments for name in one.names[:1]]
+    rows: list[tuple[Cell, ...]] = [
+        ("responses", ", ".join(fit.responses)),
+        ("forces", ", ".join(fit.forces)),
+        ("joint between", f"{', '.join(f'A/{dof}' for dof in whole.a.joint)} and "
+                          f"{', '.join(f'B/{dof}' for dof in whole.b.joint)}"),
+        *([("attached", ", ".join(attached))] if attached else []),
+    ]  # fmt: skip
+    return Table("channels", "DOFs of the assembly", ("what", "which"), tuple(rows))
+
+
+def _joint_sections(fit: Fit, data: FitData, options: ReportOptions) -> list[Section]:
+    """Return the sections of a fit of FRFs between all joint DOFs."""
     up = np.argsort(fit.freq_hz, kind="stable")
     compared = compare_frfs(data, fit.dofs)
     frfs = frf_figures(compared, fit.freq_hz, up)
@@ -116,7 +184,7 @@ def fit_document(fit: Fit, options: ReportOptions) -> Document:
     information = information_figure(fit, fit.freq_hz[up], shares)
     noise = _noise_figure(fit, data)
     most = _most_points([*frfs, *joint, *(one for one in (information, noise) if one is not None)])
-    sections = [
+    return [
         _summary(fit),
         _doubts(fit),
         Section("joint", "The joint and its channels", _geometry(fit, data)),
@@ -136,13 +204,6 @@ def fit_document(fit: Fit, options: ReportOptions) -> Document:
         Section("cards", "Input of finite-element programs", _cards(fit, options.nodes)),
         Section("made", "How this was made", [_made(fit, options)]),
     ]
-    title = f"Joint identified from {options.source}" if options.source else "Joint identified from FRFs"
-    freq = fit.freq_hz
-    about = (
-        f"Joint DOFs {', '.join(fit.dofs)}; {len(data.response_names)} responses, {len(data.force_names)} forces; "
-        f"{_span(freq)}; method {fit.method}."
-    )
-    return Document(title, about, [section for section in sections if section.parts])
 
 
 def _span(freq_hz: FloatArray) -> str:
@@ -205,11 +266,16 @@ def _how_joint(fit: Fit) -> str:
 
 
 def _frf_section(fit: Fit, compared: ComparedFrfs, figures: Sequence[Figure], most: int) -> Section:
-    total = len(compared.rows) * len(compared.columns)
+    is_model = isinstance(fit.data, ModelData)
+    total = int(np.isfinite(compared.residual).sum()) if is_model else len(compared.rows) * len(compared.columns)
     where = "channels" if compared.of_channels else "joint DOFs"
     sentences = [
-        "Regenerated FRFs are those nearest to the measured ones that any two structures with the joint found between "
-        "them can have: where they leave the measured ones by more than noise, the joint does not explain the data."
+        "Predicted FRFs follow from the models, the joint and all other numbers found: where they leave the measured "
+        "ones by more than noise, these do not explain the data."
+        if is_model
+        else "Regenerated FRFs are those nearest to the measured ones that any two structures with the joint found "
+        "between them can have: where they leave the measured ones by more than noise, the joint does not explain the "
+        "data."
     ]
     sentences.append(
         f"All {total} FRFs between the {where} are on this page."
@@ -224,10 +290,11 @@ def _frf_section(fit: Fit, compared: ComparedFrfs, figures: Sequence[Figure], mo
             f"Curves of more than {most} lines are drawn through the smallest and the largest value of each of "
             f"{most // 2} parts of the band, so that no peak is lost; all numbers are from all lines."
         )
-    charts = _charts(figures, most, fit, "measured and regenerated, modulus and phase")
+    word = "predicted" if is_model else "regenerated"
+    charts = _charts(figures, most, fit, f"measured and {word}, modulus and phase")
     more = f"{len(charts) - _AT_ONCE} more FRFs"
     return Section(
-        "frfs", "Measured and regenerated FRFs", [Words(sentences), *charts[:_AT_ONCE]], (more, charts[_AT_ONCE:])
+        "frfs", f"Measured and {word} FRFs", [Words(sentences), *charts[:_AT_ONCE]], (more, charts[_AT_ONCE:])
     )
 
 
@@ -253,17 +320,21 @@ def _cards(fit: Fit, nodes: Sequence[int]) -> list[Part]:
     """Return the joint as input of each program, or why there is none."""
     j, k = nodes[:2]
     listings, refused = [], []
+    changes = fit.laws is not None and any(law.constant_terms is None for law in fit.laws.laws.values())
+    freq_hz = float(f"{np.sqrt(fit.freq_hz.min() * fit.freq_hz.max()):.3g}") if changes else None
     for program in get_args(CardFormat):
         is_calculix = program == "calculix"
         rotation = (tuple(nodes[2:4]) or (max(j, k) + 1, max(j, k) + 2)) if is_calculix else None
         name = _PROGRAMS[program] + (" (stiffness only)" if is_calculix else "")
         try:
-            text = cards(fit, program, (j, k), damping=not is_calculix, rotation_nodes=rotation)
+            text = cards(fit, program, (j, k), damping=not is_calculix, rotation_nodes=rotation, freq_hz=freq_hz)
         except ValueError as error:
             refused.append(f"{_PROGRAMS[program]}: {error}.")
         else:
             listings.append(Listing(name, text, printed=text.count("\n") <= _PRINTED))
     where = f"In SI units, between node {j} on side j and node {k} on side k, along the global axes."
+    if freq_hz is not None:
+        where += f" The laws are taken at {freq_hz:g} Hz: cards hold constants."
     if not all(listing.printed for listing in listings):
         where += f" Those of more than {_PRINTED} lines are on the screen only, not on paper."
     return [Words([where]), *listings, *([Words(refused, "notes")] if refused else [])]
@@ -279,7 +350,11 @@ def _made(fit: Fit, options: ReportOptions) -> Table:
     rows: list[tuple[Cell, ...]] = [
         *([("file", options.source)] if options.source else []),
         *([("command", options.command)] if options.command else []),
-        ("bands", "; ".join(f"{dof} {_bands(own)} Hz" for dof, own in zip(fit.dofs, fit.bands, strict=True))),
+        *(
+            [("bands", "; ".join(f"{dof} {_bands(own)} Hz" for dof, own in zip(fit.dofs, fit.bands, strict=True)))]
+            if fit.bands
+            else []
+        ),
         ("versions", f"{versions}, engine {get_engine()}, {platform.system()} {platform.machine()}"),
         ("written on", f"{when:%Y-%m-%d}"),
     ]
@@ -319,7 +394,9 @@ def _rounded(value: float, uncertainty: float | None) -> str:
 
 def _named(term: FittedParameter) -> str:
     """Name a parameter of one DOF in words."""
-    kind = {"k": "stiffness", "h": "hysteretic stiffness", "c": "viscous damping"}[term.kind]
+    kind = {"k": "stiffness", "h": "hysteretic stiffness", "c": "viscous damping"}.get(term.kind)
+    if kind is None:
+        return f"parameter {term.kind} of {term.row}"
     axis = term.row.rpartition("_")[2].lstrip("r")
     if is_rotation(term.row) and axis in ("x", "y", "z"):
         return f"{'rotational ' if term.kind != 'c' else ''}{kind} about {axis}"
@@ -329,13 +406,21 @@ def _named(term: FittedParameter) -> str:
 def finding_sentences(fit: Fit) -> list[str]:
     """Return one sentence a parameter, its value and where it lies with 95 % probability; one for all cross terms."""
     intervals = fit.confidence_interval(_PROBABILITY)
-    sentences = []
+    sentences = [] if fit.laws is None or not fit.laws.rigid else [f"Rigid: {', '.join(fit.laws.rigid)}."]
     for term, value in zip(fit.parameters, fit.value.values(), strict=True):
+        if term.origin != "joint":
+            continue
         low, high = intervals[term.name]
         name = _named(term)
         if not term.is_cross:
             sentences.append(f"{name[0].upper()}{name[1:]} ({term.name}): {_value_sentence(term, value, low, high)}")
-    cross = [term.name for term in fit.parameters if term.is_cross]
+    for name, eta in fit.loss_factors.items():
+        of = FittedParameter(name, "", "eta", name.removeprefix("eta_"), name.removeprefix("eta_"))
+        sentences.append(f"Loss factor of {of.row} ({name}): {_value_sentence(of, eta.value, eta.low, eta.high)}")
+    rest = [term.name for term in fit.parameters if term.origin != "joint"]
+    if rest:
+        sentences.append(f"Fitted with it, values in the table: {', '.join(rest)}.")
+    cross = [term.name for term in fit.parameters if term.is_cross and term.origin == "joint"]
     if cross:
         clear = [name for name in cross if not intervals[name][0] <= 0 <= intervals[name][1]]
         which = f"{len(clear)} of {len(cross)}: {', '.join(clear)}" if clear else f"none of {len(cross)}"
@@ -365,10 +450,13 @@ def quality_sentences(fit: Fit) -> list[str]:
     sentences = []
     if np.isfinite(fit.noise_level) and fit.noise_level > 0:
         ratio = fit.residual_level / fit.noise_level
+        explains, explain = ("joint explains", "joint as described does")
+        if isinstance(fit.data, ModelData):
+            explains, explain = ("models and the joint explain", "models and the joint as described do")
         verdict = (
-            "the joint explains the FRFs of the lines used to within their noise."
+            f"the {explains} the FRFs of the lines used to within their noise."
             if ratio < _NOISE
-            else "the joint as described does not explain all that the FRFs show."
+            else f"the {explain} not explain all that the FRFs show."
         )
         sentences.append(
             f"The noise of the FRFs is {100 * fit.noise_level:.2g} % (median); what the fit leaves unexplained is "
@@ -390,16 +478,21 @@ def quality_sentences(fit: Fit) -> list[str]:
 def parameter_table(fit: Fit) -> Table:
     """Return the parameters with standard errors and intervals."""
     intervals, errors = fit.confidence_interval(_PROBABILITY), fit.std_error
+    has_prior = any(one.prior for one in fit.parameters)
     rows: list[tuple[Cell, ...]] = []
     for term, value in zip(fit.parameters, fit.value.values(), strict=True):
         low, high = intervals[term.name]
         is_open = term.kind == "k" and not term.is_cross and not np.isfinite(high)
         ends: tuple[Cell, ...] = (low, "open") if is_open else (low, high)
-        rows.append((shown_name(term), "open" if is_open else value, errors[term.name], *ends, term.unit))
-    etas = [
-        f"{dof} {eta:.3g}" for dof, eta in zip(fit.dofs, fit.loss_factor, strict=True) if np.isfinite(eta) and eta != 0
-    ]
+        prior = "" if term.prior is None else f"{term.prior[0]:.4g} ± {term.prior[1]:.2g}"
+        believed = (prior,) if has_prior else ()
+        rows.append((shown_name(term), "open" if is_open else value, errors[term.name], *ends, *believed, term.unit))
+    for name, eta in fit.loss_factors.items():
+        rows.append((name, eta.value, eta.std_error, eta.low, eta.high, *([""] if has_prior else []), "1"))
     note = "K*(ω) = k + i h + i ω c, time convention exp(+iωt)"
-    note += f"; loss factors h/k: {', '.join(etas)}" if etas else ""
-    columns = ("parameter", "value", "standard error", "95 % from", "95 % to", "unit")
+    note += "; η = h/k" if fit.loss_factors else ""
+    if any(term.origin == "joint" and term.kind not in get_args(ParameterKind) for term in fit.parameters):
+        note = "Laws: docs/model-fit.md; time convention exp(+iωt)"
+    prior_column = ("prior",) if has_prior else ()
+    columns = ("parameter", "value", "standard error", "95 % from", "95 % to", *prior_column, "unit")
     return Table("parameters", "Parameters of the joint", columns, tuple(rows), note=note + ".")

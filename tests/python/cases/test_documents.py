@@ -5,12 +5,18 @@ import shlex
 import shutil
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
 
 import jointfrf as jf
+from assembly_keys import assembly_page
+from command import run_command
+from jointfrf.assembly_file.keys import AssemblyKeys
 from jointfrf.cli.main import main
+from jointfrf.toml.declared import read_keys
+from jointfrf.toml.table import TomlTable
 
 ROOT = Path(__file__).resolve().parents[3]
 DOCUMENTS = {
@@ -64,6 +70,27 @@ def test_python_of_the_page_on_the_engine_runs(capsys, monkeypatch, tmp_path, be
     assert "h_theta_z" in printed
     assert "note choice ('y',) damping of y: hysteretic" in printed
     assert "CBUSH" in printed
+
+
+def test_assembly_of_the_page_on_fits_with_models_is_read():
+    (content,) = [text for text in blocks("toml", DOCUMENTS["docs/model-fit.md"]) if "[A]" in text]
+    keys = read_keys(TomlTable(tomllib.loads(content), "assembly.toml"), AssemblyKeys)
+    assert (keys.A.joint, keys.B.joint) == (("25:y", "25:theta"), ("601:y", "601:theta"))
+    assert keys.A.unknown["loss_factor"].std == 0.0005
+
+
+def test_the_page_of_the_keys_of_an_assembly_is_what_they_declare():
+    assert DOCUMENTS["docs/assembly-keys.md"] == assembly_page()
+
+
+def test_the_table_of_the_shipped_beam_is_what_the_command_prints():
+    readme = DOCUMENTS["cases/lap-beam/README.md"]
+    (command,), (shown,) = blocks("sh", readme), blocks("text", readme)
+    words = command.replace("cases/lap-beam/level_*.uff", " ".join(map(str, sorted(ROOT.glob("cases/lap-beam/*.uff")))))
+    words = words.replace("cases/lap-beam/assembly.toml", str(ROOT / "cases" / "lap-beam" / "assembly.toml")).split()
+    result = run_command(*words[1:])
+    assert result.returncode == 0
+    agree(result.stdout.strip().split("\n\n")[0], shown)
 
 
 def test_python_of_the_page_on_files_prints_what_it_shows(capsys, monkeypatch):

@@ -193,7 +193,11 @@ def test_loss_factors_stand_below_the_parameters_where_there_are_any(fits, beams
     assert "loss factors" not in parameter_table(fits["plain"]).note
     h = jf.pollute(beams.gamma(jf.Joint([6e5, 5e3], [20, 0], structural_damping=[0, 400])), 0.01, seed=3)
     fit = jf.identify(beams.freq, h, ["y", "theta_z"], damping=["viscous", "hysteretic"])
-    assert f"; loss factors h/k: theta_z {fit.loss_factor[1]:.3g}." in parameter_table(fit).note
+    row = parameter_table(fit).rows[-1]
+    eta = fit.loss_factors["eta_theta_z"]
+    assert row == ("eta_theta_z", eta.value, eta.std_error, eta.low, eta.high, "1")
+    assert eta.low < 0.08 < eta.high
+    assert any(text.startswith("Loss factor of theta_z (eta_theta_z): 0.08") for text in finding_sentences(fit))
 
 
 def test_a_cell_of_a_map_without_a_number_is_empty():

@@ -23,7 +23,7 @@ FLOORS = (
     {"solids"},
     {"report"},
     {"cases"},
-    {"studies"},
+    {"studies", "assembly_file"},
     {"cli"},
     {"__main__"},
 )

@@ -1,0 +1,142 @@
+"""Keys of `assembly.toml`."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from msgspec import field
+
+from jointfrf.cases.substructures import BeamKeys, BrickBeamKeys, ChainKeys, MatricesKeys, ReceptancesKeys
+from jointfrf.toml.declared import Keys, NotNegative, Positive, key
+
+__all__ = ["AssemblyKeys", "GroundKeys", "MassKeys", "PartKeys", "Prior", "PriorKeys"]
+
+
+class PriorKeys(Keys):
+    """What is believed of an unknown number; without `std` only the FRFs tell."""
+
+    mean: Annotated[float | None, key("What is believed.", absent="the number given beside it")] = None
+    std: Annotated[Positive | None, key("Standard deviation of that belief.", absent="no prior")] = None
+    lower: Annotated[float | None, key("Smallest value.", absent="0; none of a Poisson's ratio")] = None
+    upper: Annotated[float | None, key("Largest value.", absent="none")] = None
+
+
+#: What is believed of an unknown number.
+Prior = Positive | PriorKeys
+_TAKES = "relative standard deviation, or a table { mean, std, lower, upper }"
+_Prior = Annotated[Prior, key("An unknown number.", takes=_TAKES)]
+_JointDofs = Annotated[
+    tuple[str, ...],
+    key("Its DOFs at the joint, in the order of those of the joint.", min_length=1, example=["7:y", "7:theta"]),
+]
+_SCALED = "youngs_modulus and density are factors of the matrices here, about 1."
+
+
+def _unknown(which: str) -> Any:
+    return key(
+        f"Numbers that are fitted with the joint: {which} Each is a relative standard deviation, 0.02 for 2 %, or a "
+        "table `{ mean, std, lower, upper }`.", takes="table of relative standard deviations, or of tables",
+    )  # fmt: skip
+
+
+_OfFactors = Annotated[dict[str, _Prior], _unknown(f"`youngs_modulus`, `density`, `loss_factor`; {_SCALED}")]
+_OfNumbers = Annotated[dict[str, _Prior], _unknown("any of the numbers of this table.")]
+
+
+class ChainPart(ChainKeys, tag="chain"):
+    """Lumped masses in a line; DOFs `"1:x"`, `"2:x"`, ..."""
+
+    joint: _JointDofs
+    unknown: _OfFactors = field(default_factory=dict)
+
+
+class BeamPart(BeamKeys, tag="beam"):
+    """Beam elements in a line, bending in one plane; DOFs `"1:y"`, `"1:theta"`, ... without those that are held."""
+
+    joint: _JointDofs
+    unknown: _OfNumbers = field(default_factory=dict)
+
+
+class BrickBeamPart(BrickBeamKeys, tag="brick-beam"):
+    """A beam of brick elements along z; DOFs `"hole:x"`, and six of each section that is observed."""
+
+    joint: _JointDofs
+    unknown: _OfNumbers = field(default_factory=dict)
+
+
+class MatricesPart(MatricesKeys, tag="matrices"):
+    """Matrices of your own: Matrix Market (`.mtx`), or NPZ of `scipy.sparse.save_npz` or `numpy.savez`.
+
+    An NPZ file holds one array, or arrays named like the keys here. Files are relative to the file that names them.
+    """
+
+    joint: _JointDofs
+    unknown: _OfFactors = field(default_factory=dict)
+
+
+class ReceptancesPart(ReceptancesKeys, tag="receptances"):
+    """FRFs of the part, measured or computed elsewhere, in any format that `jointfrf.io.read_frfs` reads.
+
+    They are taken as exact, and must be there on the lines of the measurement, between all DOFs that are used.
+    """
+
+    joint: _JointDofs
+
+
+PartKeys = ChainPart | BeamPart | BrickBeamPart | MatricesPart | ReceptancesPart
+
+
+class MassKeys(Keys):
+    """A mass that the models do not have: a sensor, a shaker's head."""
+
+    header = "[[mass]]"
+    dofs: Annotated[
+        tuple[str, ...],
+        key("All directions in which it moves.", min_length=1, example=["A/7:y"]),
+    ]
+    mass: Annotated[NotNegative, key("Mass.", "kg", example=0.01)]
+    unknown: Annotated[_Prior | None, key("How far it is known.", takes=_TAKES, absent="known")] = None
+
+
+class GroundKeys(Keys):
+    """A spring to the ground: a suspension, a clamp that gives way, the stinger of a shaker."""
+
+    header = "[[ground]]"
+    dof: Annotated[str, key("Where it holds: `A/1:theta`.", example="A/1:theta")]
+    stiffness: Annotated[NotNegative, key("Stiffness.", "N/m, N m/rad", example=1e5)]
+    damping: Annotated[NotNegative, key("Viscous damping.", "N s/m, N m s/rad")] = 0.0
+    unknown: Annotated[dict[str, _Prior], _unknown("`stiffness`, `damping`.")] = field(default_factory=dict)
+
+
+class AssemblyKeys(Keys):
+    """Two parts A and B, the joint between them, what is unknown, and which channel of a measurement is which DOF.
+
+    DOFs are named by their part: `A/7:y`, `B/1:theta`.
+    """
+
+    header = "assembly.toml"
+    A: Annotated[PartKeys, key("Side j of the joint.")]
+    B: Annotated[PartKeys, key("Side k of the joint.")]
+    joint: Annotated[
+        dict[str, Any] | str,
+        key("The joint: `[[joint.law]]` tables with `dof`, `law` and, if wanted, `values` where the fit starts; or "
+            "`dofs`, `stiffness`, ... as in `joint.toml`; or the name of such a file, or of a saved joint.",
+            takes="table, or name of a file"),
+    ]  # fmt: skip
+    fixed: Annotated[tuple[str, ...], key("Parameters of the joint that keep their value: `c_y`.")] = ()
+    mass: Annotated[tuple[MassKeys, ...], key("Masses of sensors and shakers.")] = ()
+    ground: Annotated[tuple[GroundKeys, ...], key("Springs to the ground.")] = ()
+    channels: Annotated[
+        dict[str, str],
+        key('Which channel of the file is which DOF: `"3:+y" = "A/151:y"`; `-y` where it points the other way. Others '
+            "are not used.", absent="channels that are named like one DOF of A or of B, `151:y`"),
+    ] = field(default_factory=dict)  # fmt: skip
+    response_gains: Annotated[
+        dict[str, _Prior],
+        key('Responses whose calibration is not exactly known: `"A/151:y" = 0.02`; measured = gain times true.',
+            takes="table of relative standard deviations, or of tables"),
+    ] = field(default_factory=dict)  # fmt: skip
+    force_gains: Annotated[
+        dict[str, _Prior],
+        key("The same of forces.", takes="table of relative standard deviations, or of tables"),
+    ] = field(default_factory=dict)

@@ -1,0 +1,209 @@
+"""FRFs of a test with the assembly of a file: which channel is which DOF, and the fit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from jointfrf.assembly_file.read import AssemblyFile, AssemblyPart, check_dofs, read_assembly_file, unknown_of
+from jointfrf.dofs import direction_names
+from jointfrf.errors import FileContentError
+from jointfrf.frf.bands import in_bands
+from jointfrf.frf.frf_set import Channel, FrfSet
+from jointfrf.identification.identify_model import identify_model
+from jointfrf.identification.model.assembly import Assembly
+from jointfrf.identification.model.substructure import Unknown
+from jointfrf.identification.result import Fit
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, check_type
+from jointfrf.spelling import did_you_mean
+
+__all__ = ["MeasuredAssembly", "measured_assembly"]
+
+
+@dataclass(frozen=True)
+class MeasuredAssembly:
+    """FRFs of a test, and the assembly that they were measured on.
+
+    Attributes
+    ----------
+    freq_hz : ndarray, shape (n_freq,)
+        Hz.
+    h : ndarray, shape (n_freq, n_o, n_i)
+        Receptances, m/N; NaN for an FRF that was not measured.
+    assembly : Assembly
+    responses, forces : tuple of str
+        DOFs ``"A/..."``, ``"B/..."`` of its rows and columns.
+    response_gains, force_gains : dict of str to Unknown
+    fixed : tuple of str
+        Parameters of the joint that keep their value.
+    channels : tuple of two dicts of str to str
+        Channels of the file by DOF, of responses and of forces.
+    unused : tuple of str
+        Channels of the file that are not used.
+    coherence : ndarray, shape (n_freq, n_o, n_i), or None
+    averages : float or None
+    """
+
+    freq_hz: FloatArray
+    h: ComplexArray
+    assembly: Assembly
+    responses: tuple[str, ...]
+    forces: tuple[str, ...]
+    response_gains: dict[str, Unknown]
+    force_gains: dict[str, Unknown]
+    fixed: tuple[str, ...]
+    channels: tuple[dict[str, str], dict[str, str]]
+    unused: tuple[str, ...]
+    coherence: FloatArray | None
+    averages: float | None
+
+    def fit(self, *, noise: float | None = None) -> Fit:
+        """Identify the joint, as `identify_model` does.
+
+        Parameters
+        ----------
+        noise : float, optional
+            Relative noise of the FRFs; found from them by default.
+        """
+        coherence, averages = (None, None) if noise is not None else (self.coherence, self.averages)
+        return identify_model(
+            self.freq_hz, self.h, self.assembly, self.responses, self.forces, response_gains=self.response_gains,
+            force_gains=self.force_gains, fixed=self.fixed, noise=noise,
+            coherence=coherence, averages=averages,
+        )  # fmt: skip
+
+
+def measured_assembly(
+    path: Path | str, frfs: FrfSet, *, bands: list[tuple[float, float]] | None = None
+) -> MeasuredAssembly:
+    """Read `assembly.toml` for the FRFs of a test.
+
+    Parameters
+    ----------
+    path : Path or str
+        The file: parts, joint, what is unknown, channels.
+    frfs : FrfSet
+        As `jointfrf.io.read_frfs` returns them; mobilities and accelerances become receptances.
+    bands : list of (low, high), optional
+        Hz; all lines by default.
+
+    Returns
+    -------
+    MeasuredAssembly
+        `MeasuredAssembly.fit` identifies the joint.
+
+    Raises
+    ------
+    FileContentError
+        Something in the file is missing or wrong, all missing keys at once; or it does not fit the FRFs.
+
+    Examples
+    --------
+    >>> import jointfrf as jf
+    >>> frfs = jf.io.read_frfs("test.uff")  # doctest: +SKIP
+    >>> print(jf.measured_assembly("assembly.toml", frfs).fit())  # doctest: +SKIP
+    """
+    check_type("frfs", frfs, FrfSet)
+    file, frfs = read_assembly_file(Path(path)), frfs.receptance()
+    kept = in_bands(frfs.freq_hz, bands) if bands else np.ones(frfs.freq_hz.size, bool)
+    kept = kept & (frfs.freq_hz > 0)
+    if not kept.any():
+        raise FileContentError(f"{frfs.source} has no line above 0 Hz in the bands")
+    freq = frfs.freq_hz[kept]
+    parts = file.parts(freq)
+    rows, columns = (_dofs(file, parts, frfs, own) for own in (frfs.responses, frfs.excitations))
+    _check_named(file, frfs)
+    for own, what in ((rows, "response"), (columns, "excitation")):
+        if not own:
+            raise FileContentError(
+                f"{file.path}: no {what} of {frfs.source} is a DOF of A or B: name them under [channels], such as "
+                f'"{(frfs.responses if what == "response" else frfs.excitations)[0]}" = "A/{file.keys.A.joint[0]}"'
+            )
+    names = tuple(dict.fromkeys([*rows, *columns]))
+    signs = np.array([[a[1] * b[1] for b in columns.values()] for a in rows.values()])
+    at = np.ix_(np.flatnonzero(kept), *(np.array([i for i, _ in own.values()]) for own in (rows, columns)))
+    gains = [_gains(file, name, own) for name, own in (("response_gains", rows), ("force_gains", columns))]
+    named = tuple({dof: str(all_[i]) for dof, (i, _) in own.items()}
+                  for all_, own in ((frfs.responses, rows), (frfs.excitations, columns)))  # fmt: skip
+    coherence, averages = _quality(frfs, at)
+    return MeasuredAssembly(
+        freq, np.ascontiguousarray(frfs.h[at] * signs), file.assembly(freq, parts, names), tuple(rows), tuple(columns),
+        gains[0], gains[1], file.keys.fixed, (named[0], named[1]), _unused(frfs, named), coherence, averages,
+    )  # fmt: skip
+
+
+def _quality(frfs: FrfSet, at: tuple[np.ndarray, ...]) -> tuple[FloatArray | None, float | None]:
+    """Return coherence and number of averages where they are known of all FRFs used."""
+    if frfs.coherence is None:
+        return None, None
+    coherence = np.ascontiguousarray(frfs.coherence[at])
+    if np.isnan(coherence).any():
+        return None, None
+    averages = None if frfs.averages is None else float(np.min(frfs.averages[np.ix_(at[1].ravel(), at[2].ravel())]))
+    return coherence, averages if averages is not None and np.isfinite(averages) else None
+
+
+def _unused(frfs: FrfSet, named: tuple[dict[str, str], ...]) -> tuple[str, ...]:
+    pairs = zip((frfs.responses, frfs.excitations), named, strict=True)
+    return tuple(dict.fromkeys(str(one) for all_, own in pairs for one in all_ if str(one) not in own.values()))
+
+
+def _dofs(
+    file: AssemblyFile, parts: tuple[AssemblyPart, AssemblyPart], frfs: FrfSet, channels: tuple[Channel, ...]
+) -> dict[str, tuple[int, int]]:
+    """Return for each DOF the number of its channel and its sign, in the order of the file of FRFs."""
+    given = file.keys.channels
+    found: dict[str, tuple[int, int]] = {}
+    if given:
+        check_dofs(parts, file.keys, "channels", list(given.values()))
+        table = file.keys.table.table("channels")
+        mapping = {}
+        for name, dof in given.items():
+            channel = table.build(lambda name=name: Channel.parse(name))  # type: ignore[misc]
+            mapping[channel], mapping[channel.opposite()] = (dof, 1), (dof, -1)
+    for i, channel in enumerate(channels):
+        dof, sign = mapping.get(channel, ("", 1)) if given else _named_alike(parts, file, channel)
+        if dof and dof in found:
+            both = f"{channels[found[dof][0]]} and {channel}"
+            raise FileContentError(f"{file.path}: {both} of {frfs.source} are one DOF: {dof}")
+        if dof:
+            found[dof] = (i, sign)
+    return found
+
+
+def _named_alike(parts: tuple[AssemblyPart, AssemblyPart], file: AssemblyFile, channel: Channel) -> tuple[str, int]:
+    """Return the DOF of A or B that is named like a channel; empty if there is none."""
+    words = [f"{channel.node}:{channel.axis}", f"{channel.node}:{direction_names([channel.axis])[0]}"]
+    words += [f"{channel.node}:theta"] if channel.is_rotation else []
+    found = []
+    for side, part in zip("AB", parts, strict=True):
+        found += [f"{side}/{word}" for word in words if part.has(word)][:1]
+    if len(found) > 1:
+        raise FileContentError(
+            f"{file.path}: channel {channel} may be {' or '.join(found)}: name it under [channels], such as "
+            f'"{channel}" = "{found[0]}"'
+        )
+    return (found[0], channel.sign) if found else ("", 1)
+
+
+def _check_named(file: AssemblyFile, frfs: FrfSet) -> None:
+    """Raise an error for a channel that the FRFs do not have."""
+    known = {one for own in (frfs.responses, frfs.excitations) for each in own for one in (each, each.opposite())}
+    for name in file.keys.channels:
+        if Channel.parse(name) not in known:
+            shown = [str(one) for one in dict.fromkeys((*frfs.responses, *frfs.excitations))]
+            raise file.keys.table.table("channels").wrong(
+                name, f"{frfs.source} has no such channel, only {', '.join(shown[:12])}{did_you_mean(name, shown)}"
+            )
+
+
+def _gains(file: AssemblyFile, name: str, dofs: dict[str, tuple[int, int]]) -> dict[str, Unknown]:
+    found = {}
+    for dof, prior in getattr(file.keys, name).items():
+        table = file.keys.table.table(name)
+        if dof not in dofs:
+            raise table.wrong(dof, f"there is no such channel, only {', '.join(dofs)}{did_you_mean(dof, dofs)}")
+        found[dof] = unknown_of(prior, 1.0, table, dof, -np.inf)
+    return found

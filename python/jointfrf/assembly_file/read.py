@@ -1,0 +1,212 @@
+"""From `assembly.toml` to an assembly with what is unknown of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from jointfrf.assembly_file.keys import AssemblyKeys, PartKeys, Prior, PriorKeys, ReceptancesPart
+from jointfrf.cases.substructures import MeasuredStructure, ModelStructure, Structure
+from jointfrf.dofs import is_rotation
+from jointfrf.frf.frf_set import Channel
+from jointfrf.identification.joint_file import read_joint
+from jointfrf.identification.model.assembly import AddedMass, Assembly, Attachment, GroundSpring
+from jointfrf.identification.model.substructure import SCALES, Substructure, Unknown
+from jointfrf.joint import Joint
+from jointfrf.kernel.arguments import FloatArray
+from jointfrf.laws.joint_toml import read_joint_table, start_values
+from jointfrf.laws.law_joint import LawJoint
+from jointfrf.models.model import Model
+from jointfrf.spelling import did_you_mean
+from jointfrf.toml.declared import read_keys
+from jointfrf.toml.table import TomlTable, read_toml
+
+__all__ = ["AssemblyFile", "AssemblyPart", "check_dofs", "read_assembly_file", "unknown_of"]
+
+
+@dataclass(frozen=True)
+class AssemblyPart:
+    """A substructure as the file has it.
+
+    Attributes
+    ----------
+    keys : PartKeys
+    structure : Structure
+    """
+
+    keys: PartKeys
+    structure: Structure
+
+    def has(self, dof: str) -> bool:
+        """Whether there is a DOF of this name."""
+        try:
+            if isinstance(self.structure, ModelStructure):
+                self.structure.model.ports(dof)
+                return True
+            assert isinstance(self.structure, MeasuredStructure)
+            channel = Channel.parse(dof)
+            return self.structure.frfs.has(channel, channel)
+        except ValueError:
+            return False
+
+    def substructure(self, freq_hz: FloatArray, dofs: Sequence[str]) -> Substructure:
+        """Return the substructure with its unknowns; of FRFs, those between its joint and these DOFs."""
+        keys = self.keys
+        if isinstance(keys, ReceptancesPart):
+            named = list(dict.fromkeys([*keys.joint, *dofs]))
+            h = keys.build(lambda: self.structure.receptance(freq_hz, named), "file")
+            return keys.build(lambda: Substructure.of_frfs(freq_hz, h, named, keys.joint))
+        assert isinstance(self.structure, ModelStructure)
+        unknowns = {name: self._unknown(name, prior) for name, prior in keys.unknown.items()}
+        if set(unknowns) <= set(SCALES):
+            # Factors of the matrices are faster than models built again.
+            means = {name: one.value for name, one in unknowns.items() if hasattr(keys, name)}
+            model = self._model(means) if means != self._numbers(means) else self.structure.model
+            return keys.build(lambda: Substructure(model, keys.joint, unknowns))
+        return keys.build(lambda: Substructure(lambda **values: self._model(values), keys.joint, unknowns))
+
+    def _numbers(self, names: Mapping[str, Any]) -> dict[str, float]:
+        return {name: getattr(self.keys, name) for name in names}
+
+    def _model(self, values: Mapping[str, float]) -> Model:
+        """Return the model for other numbers of the table."""
+        changed = msgspec.structs.replace(self.keys, **values)
+        changed.__dict__["table_read"] = self.keys.table
+        structure = changed.structure(np.ones(1))
+        assert isinstance(structure, ModelStructure)
+        return structure.model
+
+    def _unknown(self, name: str, prior: Prior) -> Unknown:
+        keys = self.keys
+        numbers = {
+            one.name: value
+            for one in msgspec.structs.fields(keys)
+            if isinstance(value := getattr(keys, one.name), float)
+        }
+        table = keys.table.table("unknown")
+        if name not in numbers and name not in SCALES:
+            takes = list(dict.fromkeys([*numbers, *SCALES]))
+            raise table.wrong(name, f"this part has no such number, only {', '.join(takes)}{did_you_mean(name, takes)}")
+        if name not in numbers and isinstance(prior, PriorKeys) and prior.mean is not None:
+            raise table.wrong(name, "it is a factor of the matrices, about 1: leave mean out")
+        return unknown_of(prior, numbers.get(name, 1.0), table, name, -np.inf if name == "poisson" else 0.0)
+
+
+def unknown_of(prior: Prior, value: float, table: TomlTable, name: str, lower: float = 0.0) -> Unknown:
+    """Return what is believed of a number; raises FileContentError."""
+    if not isinstance(prior, PriorKeys):
+        if value == 0:
+            raise table.wrong(name, "it is 0, so that a relative standard deviation says nothing: give { mean, std }")
+        return table.build(lambda: Unknown(value, prior * abs(value), lower), name)
+    own = prior
+    low, high = (lower if own.lower is None else own.lower), (np.inf if own.upper is None else own.upper)
+    return table.build(lambda: Unknown(value if own.mean is None else own.mean, own.std, low, high), name)
+
+
+@dataclass(frozen=True)
+class AssemblyFile:
+    """What `assembly.toml` says.
+
+    Attributes
+    ----------
+    keys : AssemblyKeys
+    joint : LawJoint
+    path : Path
+    """
+
+    keys: AssemblyKeys
+    joint: LawJoint
+    path: Path
+
+    def parts(self, freq_hz: FloatArray) -> tuple[AssemblyPart, AssemblyPart]:
+        """Return both substructures; FRFs must be available on these lines, Hz."""
+        a, b = (AssemblyPart(keys, keys.structure(freq_hz)) for keys in (self.keys.A, self.keys.B))
+        return a, b
+
+    def attachments(self) -> tuple[Attachment, ...]:
+        """Return masses and springs to the ground."""
+        found: list[Attachment] = []
+        for mass in self.keys.mass:
+            known = mass.mass if mass.unknown is None else unknown_of(mass.unknown, mass.mass, mass.table, "unknown")
+            found.append(mass.build(lambda own=mass, known=known: AddedMass(own.dofs, known)))  # type: ignore[misc]
+        for spring in self.keys.ground:
+            numbers: dict[str, float | Unknown] = {"stiffness": spring.stiffness, "damping": spring.damping}
+            for name, prior in spring.unknown.items():
+                if name not in numbers:
+                    raise spring.table.table("unknown").unknown(name, list(numbers))
+                numbers[name] = unknown_of(prior, getattr(spring, name), spring.table.table("unknown"), name)
+            found.append(spring.build(lambda own=spring, n=numbers: GroundSpring(own.dof, **n)))  # type: ignore[misc]
+        return tuple(found)
+
+    def assembly(
+        self, freq_hz: FloatArray, parts: tuple[AssemblyPart, AssemblyPart], channels: Sequence[str]
+    ) -> Assembly:
+        """Return the assembly, of which FRFs between some DOFs are wanted; raises FileContentError."""
+        attachments = self.attachments()
+        used = [*channels, *(dof for one in attachments for dof in one.places)]
+        sides = []
+        for name, part in zip("AB", parts, strict=True):
+            own = part.keys
+            for dof in own.joint:
+                if not part.has(dof):
+                    raise own.wrong("joint", f"{name} has no DOF {dof!r}")
+            self._check_order(name, own)
+            here = [dof[2:] for dof in used if dof.startswith(f"{name}/") and part.has(dof[2:])]
+            sides.append(part.substructure(freq_hz, here))
+        return self.keys.build(lambda: Assembly(sides[0], sides[1], self.joint, attachments))
+
+    def _check_order(self, name: str, part: PartKeys) -> None:
+        """Raise an error where joint DOFs are in another order than those of the joint."""
+        directions = [dof.rpartition(":")[2].lstrip("+-") for dof in part.joint]
+        for own, direction, dof in zip(part.joint, directions, self.joint.dofs, strict=False):
+            is_other = direction != dof and direction in self.joint.dofs
+            if is_other or is_rotation(direction) != is_rotation(dof):
+                raise part.wrong("joint", f"{own} stands where the joint has {dof}: its DOFs are, in this order, "
+                                 f"{', '.join(self.joint.dofs)}")  # fmt: skip
+
+
+def read_assembly_file(path: Path) -> AssemblyFile:
+    """Read `assembly.toml`.
+
+    Raises
+    ------
+    FileContentError
+        One sentence that names the file, the table and the key; all keys that are missing.
+    """
+    keys = read_keys(read_toml(path), AssemblyKeys)
+    return AssemblyFile(keys, _joint_of(keys), path)
+
+
+def _joint_of(keys: AssemblyKeys) -> LawJoint:
+    if isinstance(keys.joint, str):
+        named = keys.file_of("joint")
+        joint = keys.build(lambda: read_joint(named), "joint")
+    else:
+        joint = read_joint_table(_with_values(keys.table.table("joint")))
+    return LawJoint.of_joint(joint) if isinstance(joint, Joint) else joint
+
+
+def _with_values(table: TomlTable) -> TomlTable:
+    """Return a table of a joint in which every law has values: the fit starts anywhere."""
+    laws = table.content.get("law")
+    if not isinstance(laws, list) or not all(isinstance(one, dict) for one in laws):
+        return table
+    filled = [{"values": start_values(one.get("law")), **one} if _is_bare(one) else one for one in laws]
+    return TomlTable({**table.content, "law": filled}, table.where, table.folder)
+
+
+def _is_bare(law: Mapping[str, Any]) -> bool:
+    return "values" not in law and start_values(law.get("law")) != {}
+
+
+def check_dofs(parts: tuple[AssemblyPart, AssemblyPart], keys: AssemblyKeys, name: str, dofs: Sequence[str]) -> None:
+    """Raise a FileContentError for a DOF that neither part has."""
+    for dof in dofs:
+        side = {"A/": parts[0], "B/": parts[1]}.get(dof[:2])
+        if side is None or not side.has(dof[2:]):
+            raise keys.wrong(name, f"neither A nor B has a DOF {dof!r}; names begin with 'A/' or 'B/'")

@@ -1,0 +1,255 @@
+"""`jointfrf identify --model assembly.toml`: a joint from any FRFs of an assembly whose parts are known."""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import io
+import sys
+import warnings
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from jointfrf.assembly_file.measured import MeasuredAssembly, measured_assembly
+from jointfrf.channels.check.check import check_frfs, warn_of_frfs
+from jointfrf.cli.export import CardRequest, card_request, written_cards
+from jointfrf.cli.measured_file import file_names
+from jointfrf.cli.parser import CommandParser
+from jointfrf.cli.usage import Output, UsageError, waiting
+from jointfrf.errors import ConvergenceWarning, FileContentError, IdentificationWarning
+from jointfrf.files import write_file
+from jointfrf.identification.record import fit_to_dict, write_record
+from jointfrf.identification.result import Fit, columns_of
+from jointfrf.io import read_frfs
+from jointfrf.report.fit_page import write_report
+from jointfrf.spelling import visible
+
+__all__ = ["add_model_arguments", "run_model"]
+
+#: What belongs to FRFs between all DOFs of the joint, and means nothing where there are models: option, attribute.
+_OF_THE_JOINT = (
+    ("--j", "j"), ("--k", "k"), ("--dofs", "dofs"), ("--at", "at"), ("--at-k", "at_k"), ("--channels", "channels"),
+    ("--spacing", "spacing"), ("--axis", "axis"), ("--law", "law"), ("--joint", "joint"),
+    ("--bending-stiffness", "bending_stiffness"),
+)  # fmt: skip
+#: Characters of a line of the table of several tests.
+_WIDTH = 100
+
+
+def add_model_arguments(parser: CommandParser) -> None:
+    """Describe the assembly, and several tests."""
+    parser.heading("an assembly whose parts are known")
+    parser.option(
+        "--model FILE",
+        "assembly.toml: both parts as models or FRFs, the joint, what else is unknown, which channel is which DOF; "
+        "then any FRFs will do, and none at the joint are needed",
+        Path,
+    )
+    parser.option(
+        "--each",
+        "with --model: every file is a test of its own (levels, assemblies); one table of all, and the name of each "
+        "file in those of --save, --report, --output and in the folder of --out",
+    )
+
+
+def run_model(args: argparse.Namespace) -> int:
+    """Carry out the command with --model; the caller turns exceptions into messages."""
+    _check_options(args)
+    out = Output(args)
+    tests = [[path] for path in args.files] if args.each else [list(args.files)]
+    stems = _stems(args.files) if args.each else [""]
+    fits: dict[str, Fit] = {}
+    contents, failed, written = [], 0, []
+    for files, stem in zip(tests, stems, strict=True):
+        own = _for_one(args, files, stem)
+        try:
+            fit, content, paths = _one(own, out)
+        except (FileContentError, OSError, ValueError) as error:
+            if not args.each:
+                raise
+            failed += 1
+            print(f"jointfrf: error: {visible(f'{files[0]}: {error}')}", file=sys.stderr)
+            continue
+        fits[stem] = fit
+        written += paths
+        contents.append(content)
+    if args.each and fits:
+        out.say(*_table(fits), *_findings(fits))
+        if args.out is not None:
+            path = args.out / "parameters.csv"
+            write_file(path, _csv(fits))
+            written.append(path)
+    out.say(*([""] if written else []), *(f"wrote {path}" for path in written))
+    content = {"tests": contents, "failed": failed} if args.each else contents[0]
+    out.give({"model": str(args.model), **content, "written": [str(path) for path in written]})
+    return 1 if failed else 0
+
+
+def _check_options(args: argparse.Namespace) -> None:
+    given = [name for name, attribute in _OF_THE_JOINT if getattr(args, attribute) is not None]
+    given += ["--method"] if args.method != ["compliance"] else []
+    given += ["--damping"] if args.damping != "auto" else []
+    given += ["--cross"] if args.cross != "zero" else []
+    if given:
+        verb = "is" if len(given) == 1 else "are"
+        raise UsageError(f"{', '.join(given)} {verb} of fits without models: with --model, {args.model} says the joint")
+    if args.each and args.export is not None and args.output is None:
+        raise UsageError("--export of several tests needs --output: the cards of each go into a file of their own")
+
+
+def _stems(files: Sequence[Path]) -> list[str]:
+    """Return a short name for each test."""
+    stems = [path.stem for path in files]
+    if len(set(stems)) < len(stems):
+        stems = [f"{path.parent.name}_{path.stem}" for path in files]
+    if len(set(stems)) < len(stems):
+        raise UsageError("two files of --each have the same name")
+    return stems
+
+
+def _for_one(args: argparse.Namespace, files: list[Path], stem: str) -> argparse.Namespace:
+    """Return the options for one test: its files, and names of what is written."""
+    own = argparse.Namespace(**vars(args))
+    own.files = files
+    if stem:
+        for name in ("save", "report", "output"):
+            path = getattr(args, name)
+            setattr(own, name, None if path is None else path.with_name(f"{path.stem}_{stem}{path.suffix}"))
+        own.out = None if args.out is None else args.out / stem
+    return own
+
+
+def _one(args: argparse.Namespace, out: Output) -> tuple[Fit, dict[str, Any], list[Path]]:
+    """Fit one test, write what is wanted; return the fit, its content for JSON, and what was written."""
+    try:
+        frfs = read_frfs(*args.files, quantity=args.quantity, force_quantity=args.force_quantity).receptance()
+    except FileContentError as error:
+        hint = "; with --each every file is a test of its own" if len(args.files) > 1 else ""
+        raise FileContentError(f"{error}{hint}") from error
+    measured = measured_assembly(args.model, frfs, bands=args.band)
+    request = _request(args, measured)
+    _look_at(measured)
+    if not args.each:
+        out.say(*_heading(args, measured))
+    with waiting(f"fit of {file_names(args)}"), warnings.catch_warnings():
+        warnings.simplefilter("ignore", IdentificationWarning)  # they stand in the table
+        warnings.simplefilter("ignore", ConvergenceWarning)
+        fit = measured.fit(noise=args.noise)
+    source, written, text = file_names(args), list[Path](), ""
+    if not args.each:
+        out.say("", fit)
+    if request is not None:
+        text = written_cards(fit, request, [f"from {source}"])
+        if args.output is None:
+            out.say("", text.rstrip("\n"))
+        else:
+            written.append(args.output)
+    if args.save is not None:
+        write_record(args.save, fit_to_dict(fit) | {"source": source})
+        written.append(args.save)
+    if args.report is not None:
+        ends = (1, 2) if args.export is None else args.export[1]
+        args.report.parent.mkdir(parents=True, exist_ok=True)
+        written.append(write_report(fit, args.report, source=source, command=args.typed, nodes=ends))
+    if args.out is not None:
+        from jointfrf.report.fit import write_fit
+
+        written += write_fit([fit], args.out, source)
+    content = {
+        "sources": [str(path) for path in args.files],
+        "channels": {"responses": measured.channels[0], "forces": measured.channels[1], "unused": measured.unused},
+        "fits": [fit_to_dict(fit, lines=False)],
+        "cards": text or None,
+    }
+    return fit, content, written
+
+
+def _request(args: argparse.Namespace, measured: MeasuredAssembly) -> CardRequest | None:
+    joint = measured.assembly.joint
+    return card_request(args, joint.dofs, damping="none", cross="zero", points=None)
+
+
+def _look_at(measured: MeasuredAssembly) -> None:
+    """Warn of FRFs that look wrong."""
+    if np.isfinite(measured.h).all():
+        check = check_frfs(measured.freq_hz, measured.h, responses=measured.responses, forces=measured.forces)
+        warn_of_frfs(check)
+
+
+def _heading(args: argparse.Namespace, measured: MeasuredAssembly) -> Iterator[str]:
+    """Say what is identified from what."""
+    yield f"{file_names(args)}: {len(measured.responses)} responses x {len(measured.forces)} forces; {args.model.name}"
+    for what, own in zip(("responses", "forces"), measured.channels, strict=True):
+        yield f"{what}: " + ", ".join(f"{channel} = {dof}" for dof, channel in own.items())
+    if measured.unused:
+        yield f"not used: {', '.join(measured.unused)}"
+
+
+def _rows(fit: Fit) -> Iterator[tuple[str, str, float, float, float, float]]:
+    """Return name, unit, value, standard error, 95 % interval of all parameters and loss factors, the joint first."""
+    intervals, errors = fit.confidence_interval(0.95), fit.std_error
+    of_fit = [(one, (one.name, one.unit, fit.value[one.name], errors[one.name], *intervals[one.name]))
+              for one in fit.parameters]  # fmt: skip
+    yield from (row for one, row in of_fit if one.origin == "joint")
+    for name, eta in fit.loss_factors.items():
+        yield name, "1", eta.value, eta.std_error, eta.low, eta.high
+    yield from (row for one, row in of_fit if one.origin != "joint")
+
+
+def _table(fits: dict[str, Fit]) -> Iterator[str]:
+    """Write a row for each test, a column for each parameter, its value and the half of its 95 % interval."""
+    names = list(dict.fromkeys((name, unit) for fit in fits.values() for name, unit, *_ in _rows(fit)))
+    columns = [[f"{name}, {unit}" if unit != "1" else name for name, unit in names]]
+    for fit in fits.values():
+        cells = {(name, unit): _cell(value, low, high) for name, unit, value, _, low, high in _rows(fit)}
+        columns.append([cells.get(one, "") for one in names])
+    heads = ["test", *fits]
+    widths = [max(map(len, column)) for column in zip(*columns, strict=True)]
+    at, first = 0, max(map(len, heads))
+    while at < len(names):
+        end, used = at, first
+        while end < len(names) and (end == at or used + 2 + widths[end] <= _WIDTH):
+            used += 2 + widths[end]
+            end += 1
+        yield ""
+        yield from columns_of([(head, *own[at:end]) for head, own in zip(heads, columns, strict=True)])
+        at = end
+    yield ""
+    yield "value +- half of the 95 % interval; noise and residual:"
+    rows = [("test", "lines", "noise", "residual", "over noise")]
+    for stem, fit in fits.items():
+        ratio = fit.residual_level / fit.noise_level
+        rows.append((stem, str(fit.freq_hz.size), f"{100 * fit.noise_level:.2g} %", f"{100 * fit.residual_level:.2g} %",
+                     f"{ratio:.2f}"))  # fmt: skip
+    yield from columns_of(rows)
+
+
+def _cell(value: float, low: float, high: float) -> str:
+    if not np.isfinite(high):
+        return f"above {low:.3g}"
+    half = (high - low) / 2
+    if not (np.isfinite(half) and half > 0 and np.isfinite(value)):
+        return f"{value:.5g}"
+    digits = int(np.floor(np.log10(abs(value)))) - int(np.floor(np.log10(half))) + 2 if value else 2
+    return f"{value:.{min(max(digits, 4), 9)}g} +- {half:.2g}"
+
+
+def _findings(fits: dict[str, Fit]) -> Iterator[str]:
+    """Name warnings of each test."""
+    for stem, fit in fits.items():
+        for text in fit.warnings:
+            yield f"warning: {stem}: {text}"
+
+
+def _csv(fits: dict[str, Fit]) -> str:
+    """Write the table for programs."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(("test", "parameter", "unit", "value", "std_error", "low_95", "high_95"))
+    for stem, fit in fits.items():
+        for name, unit, *numbers in _rows(fit):
+            writer.writerow((stem, name, unit, *(repr(float(one)) for one in numbers)))
+    return text.getvalue()

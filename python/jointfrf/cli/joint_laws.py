@@ -1,0 +1,97 @@
+"""Laws of a joint on the command line: by DOF, or a file."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from jointfrf.cli.parser import CommandParser
+from jointfrf.cli.usage import UsageError
+from jointfrf.identification.joint_file import read_joint_file
+from jointfrf.joint import Joint
+from jointfrf.laws.joint_toml import LAW_WORDS, read_joint_table, start_values
+from jointfrf.laws.law_joint import LawJoint
+from jointfrf.spelling import did_you_mean
+from jointfrf.toml.table import TomlTable
+
+__all__ = ["add_law_arguments", "joint_of_laws"]
+
+#: Damping of springs that --damping names, by what is zero in their first values.
+_SPRINGS = {
+    "viscous": {"c": 10.0}, "hysteretic": {"h": 1e4}, "both": {"c": 10.0, "h": 1e4}, "auto": {"c": 10.0},
+}  # fmt: skip
+
+
+def _law(text: str) -> tuple[str, str]:
+    dof, equals, word = text.partition("=")
+    if not (dof.strip() and equals):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a DOF and a law like y=standard-linear-solid")
+    word = word.strip()
+    if word not in LAW_WORDS:
+        hint = did_you_mean(word, LAW_WORDS)
+        raise argparse.ArgumentTypeError(f"{word!r} is not one of {', '.join(LAW_WORDS)}{hint}")
+    return dof.strip(), word
+
+
+def add_law_arguments(parser: CommandParser) -> None:
+    """Describe what says the laws of the joint."""
+    parser.option(
+        "--law DOF=LAW",
+        f"law of a joint DOF, once for each: y=standard-linear-solid, theta=rigid; {', '.join(LAW_WORDS)}, a spring "
+        "with --damping (auto: viscous); no values are needed",
+        _law,
+        repeated=True,
+    )
+    parser.option("--joint FILE", "joint of laws in a TOML file, with values where the fit may start", Path)
+
+
+def joint_of_laws(args: argparse.Namespace, dofs: Sequence[str]) -> LawJoint | None:
+    """Return the joint of laws that the options name, with its DOFs in this order; None where they name none.
+
+    Raises
+    ------
+    UsageError
+        A DOF has two laws or none, or options contradict each other.
+    """
+    if args.law is None and args.joint is None:
+        return None
+    if args.law is not None and args.joint is not None:
+        raise UsageError("--law and --joint both say the laws of the joint: name one of them")
+    if args.cross != "zero":
+        raise UsageError(f"--cross {args.cross} is for springs: cross terms of laws stand in the file of --joint")
+    if args.method != ["compliance"]:
+        raise UsageError("laws are fitted by method compliance alone")
+    joint = _of_words(args.law, args.damping) if args.joint is None else _of_file(args)
+    if not joint.laws:
+        raise UsageError("all joint DOFs are rigid: there is no law to fit")
+    if sorted(joint.dofs) != sorted(dofs):
+        given = f"{args.joint} has the DOFs" if args.law is None else "--law names the DOFs"
+        raise UsageError(f"{given} {', '.join(joint.dofs)}, and --dofs {', '.join(dofs)}: each takes one law")
+    return joint
+
+
+def _of_file(args: argparse.Namespace) -> LawJoint:
+    if args.damping != "auto":
+        raise UsageError("--damping is for springs, and --joint says the laws: leave it out")
+    joint = read_joint_file(args.joint).joint
+    return LawJoint.of_joint(joint) if isinstance(joint, Joint) else joint
+
+
+def _of_words(laws: Sequence[tuple[str, str]], damping: str) -> LawJoint:
+    named = [dof for dof, _ in laws]
+    twice = [dof for dof in named if named.count(dof) > 1]
+    if twice:
+        raise UsageError(f"--law: {twice[0]} has two laws")
+    tables: list[dict[str, Any]] = []
+    for dof, word in laws:
+        values = start_values(word)
+        if word == "spring":
+            if damping == "none":
+                raise UsageError("--damping none leaves --law spring no damping: leave --law out, springs need none")
+            values = {"k": values["k"], **_SPRINGS[damping]}
+        tables.append({"dof": dof, "law": word} | ({} if word == "rigid" else {"values": values}))
+    joint = read_joint_table(TomlTable({"law": tables}, "--law"))
+    assert isinstance(joint, LawJoint)
+    return joint

@@ -1,0 +1,158 @@
+"""`jointfrf identify --model` on the simulated beam with a lap joint, `--law`, and what they say of wrong words."""
+
+import csv
+import importlib.util
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import jointfrf as jf
+from command import run_command
+from jointfrf.io import read_frfs, write_frfs
+
+CASES = Path(__file__).resolve().parents[3] / "cases"
+LAP = CASES / "lap-beam"
+LEVELS = sorted(LAP.glob("level_*.uff"))
+MODEL = ["--model", LAP / "assembly.toml"]
+BARS = [CASES / "hammer-test" / "two_bars.uff", "--j", "101,102", "--k", "201,202", "--dofs", "y,theta_z"]
+
+
+def run(*words, expect=0):
+    result = run_command("identify", *words)
+    assert result.returncode == expect, result.stderr
+    assert "Traceback" not in result.stderr
+    return result
+
+
+@pytest.fixture(scope="module")
+def make():
+    spec = importlib.util.spec_from_file_location("make_lap_beam", LAP / "make.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_the_files_are_what_make_writes(make):
+    held = read_frfs(LEVELS[2])
+    made = make.measured(2)
+    np.testing.assert_allclose(held.h, made.h, rtol=1e-6)
+    assert sum(path.stat().st_size for path in LEVELS) < 400_000
+
+
+@pytest.fixture(scope="module")
+def table(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("lap") / "out"
+    return run(*LEVELS, "--each", *MODEL, "--out", folder), folder
+
+
+def test_intervals_hold_the_joint_at_the_levels(table, make):
+    """95 % intervals of eight files: of 16 numbers at most one or two lie outside."""
+    result, folder = table
+    rows = list(csv.DictReader((folder / "parameters.csv").read_text().splitlines()))
+    held = {"k_theta_z": [], "eta_theta_z": []}
+    for row in rows:
+        if row["parameter"] in held:
+            level = int(row["test"].removeprefix("level_")) - 1
+            true = {"k_theta_z": make.STIFFNESS, "eta_theta_z": make.LOSS_FACTOR}[row["parameter"]][level]
+            held[row["parameter"]].append(float(row["low_95"]) < true < float(row["high_95"]))
+            assert float(row["value"]) == pytest.approx(true, rel=0.003 if row["unit"] != "1" else 0.08)
+    assert {name: (sum(own), len(own)) for name, own in held.items()} == {"k_theta_z": (8, 8), "eta_theta_z": (8, 8)}
+    assert result.stderr == ""
+
+
+def test_each_test_has_files_of_its_own(table):
+    _, folder = table
+    assert {path.name for path in folder.iterdir()} == {"parameters.csv", *(path.stem for path in LEVELS)}
+    assert json.loads((folder / "level_3" / "identification.json").read_text())["source"] == "level_3.uff"
+
+
+def thinned(path, folder):
+    """Every third line of a file."""
+    frfs = read_frfs(path)
+    few = jf.io.FrfSet(frfs.freq_hz[::3], frfs.responses, frfs.excitations, frfs.h[::3], frfs.quantity)
+    target = folder / f"{path.stem}.npz"
+    write_frfs(target, few)
+    return target
+
+
+def test_one_test_in_several_files_with_all_that_is_written(tmp_path):
+    frfs = read_frfs(thinned(LEVELS[0], tmp_path))
+    halves = []
+    for i, rows in enumerate(([0, 1], [2, 3])):
+        part = jf.io.FrfSet(frfs.freq_hz, [frfs.responses[r] for r in rows], frfs.excitations, frfs.h[:, rows],
+                            frfs.quantity)  # fmt: skip
+        halves.append(tmp_path / f"half_{i}.npz")
+        write_frfs(halves[-1], part)
+    save, page, cards = tmp_path / "joint.json", tmp_path / "report.html", tmp_path / "joint.bdf"
+    words = ["--save", save, "--report", page, "--export", "nastran:1,2", "--output", cards, "--json"]
+    result = run(*halves, *MODEL, *words)
+    content = json.loads(result.stdout)
+    assert content["channels"]["responses"] == {
+        "A/1:y": "11:+y",
+        "A/15:y": "12:+y",
+        "B/9:y": "21:+y",
+        "B/25:y": "22:+y",
+    }
+    assert content["fits"][0]["derived"]["eta_theta_z"]["value"] == pytest.approx(0.006, rel=0.2)
+    assert content["written"] == [str(path) for path in (cards, save, page)]
+    loaded = jf.load(save)
+    assert loaded.value["k_theta_z"] == content["fits"][0]["parameters"]["k_theta_z"]["value"]
+    assert "PBUSH" in cards.read_text()
+    assert "predicted by the models" in page.read_text()
+    text = run(*halves, *MODEL).stdout
+    assert "responses: 11:+y = A/1:y, 12:+y = A/15:y" in text
+    assert re.search(r"eta_theta_z +0\.00", text)
+    assert run("--quiet", *halves, *MODEL).stdout == ""
+
+
+def test_a_file_that_cannot_be_read_leaves_the_others(tmp_path):
+    good, bad = thinned(LEVELS[0], tmp_path), tmp_path / "bad.npz"
+    bad.write_bytes(b"nothing")
+    result = run(good, bad, "--each", *MODEL, expect=1)
+    assert "level_1" in result.stdout
+    assert len(result.stderr.splitlines()) == 1
+    assert result.stderr.startswith(f"jointfrf: error: {bad}: ")
+
+
+@pytest.mark.parametrize(
+    ("words", "status", "sentence"),
+    [
+        ([LEVELS[0], "--each"], 2, "--each is for tests with --model"),
+        ([LEVELS[0], *MODEL, "--j", "1", "--dofs", "y"], 2, "--j, --dofs are of fits without models"),
+        ([LEVELS[0], *MODEL, "--damping", "both"], 2, "--damping is of fits without models"),
+        ([LEVELS[0], "--model", "none.toml"], 1, "none.toml: cannot be read"),
+        ([LEVELS[0], *MODEL, "--band", "5000:6000"], 1, "the band 5000 to 6000 Hz holds no frequency line"),
+        ([LEVELS[0], LEVELS[1], *MODEL], 1, "; with --each every file is a test of its own"),
+        ([LEVELS[0], LEVELS[1], "--each", *MODEL, "--export", "nastran:1,2"], 2, "needs --output"),
+        ([*BARS, "--law", "y=sprung"], 2, "'sprung' is not one of spring, standard-linear-solid"),
+        ([*BARS, "--law", "y"], 2, "'y' is not a DOF and a law like y=standard-linear-solid"),
+        ([*BARS, "--law", "y=spring"], 2, "--law names the DOFs y, and --dofs y, theta_z: each takes one law"),
+        ([*BARS, "--law", "y=spring", "--law", "y=rigid"], 2, "--law: y has two laws"),
+        ([*BARS, "--law", "y=spring", "--law", "theta_z=spring", "--cross", "fit"], 2, "--cross fit is for springs"),
+        ([*BARS, "--law", "y=spring", "--law", "theta_z=spring", "--method", "inverse-substructuring"], 2,
+         "laws are fitted by method compliance alone"),
+        ([*BARS, "--law", "y=rigid", "--law", "theta_z=rigid"], 2, "all joint DOFs are rigid: there is no law to fit"),
+        ([*BARS, "--joint", "none.toml"], 1, "there is no file none.toml"),
+    ],
+)  # fmt: skip
+def test_wrong_words(tmp_path, monkeypatch, words, status, sentence):
+    monkeypatch.chdir(tmp_path)
+    result = run(*words, expect=status)
+    assert sentence in result.stderr
+    assert result.stdout == ""
+
+
+def test_laws_by_words_and_by_a_file_are_one_fit(tmp_path):
+    words = run(*BARS, "--law", "y=spring", "--law", "theta_z=spring", "--json")
+    (tmp_path / "joint.toml").write_text('dofs = ["y", "theta_z"]\nstiffness = [2e6, 2e3]\ndamping = [50.0, 0.5]\n')
+    page = tmp_path / "report.html"
+    by_file = run(*BARS, "--joint", tmp_path / "joint.toml", "--json", "--report", page, "--out", tmp_path / "out")
+    one, other = (json.loads(each.stdout)["fits"][0]["parameters"] for each in (words, by_file))
+    for name, true in {"k_y": 1e7, "k_theta_z": 5e3, "c_y": 200.0, "c_theta_z": 1.0}.items():
+        assert one[name]["value"] == pytest.approx(other[name]["value"], rel=1e-4)
+        assert one[name]["value"] == pytest.approx(true, rel=0.05)
+    assert "regenerated with the joint found" in page.read_text()
+    assert (tmp_path / "out" / "joint_theta_z.png").exists()

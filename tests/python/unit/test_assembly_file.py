@@ -1,0 +1,336 @@
+"""`assembly.toml`: what it gives, what is wrong in it, which channel is which DOF, and pages of the fits it makes."""
+
+import json
+import re
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.io
+
+import jointfrf as jf
+from jointfrf.assembly_file.keys import AssemblyKeys
+from jointfrf.assembly_file.read import read_assembly_file
+from jointfrf.errors import FileContentError
+from jointfrf.io import Channel, FrfSet, write_frfs
+from jointfrf.report.fit_page import ReportOptions, finding_sentences, fit_document
+from jointfrf.toml.documents import schema_of
+
+FREQ = np.linspace(0.5, 10, 300)
+ASSEMBLY = """
+[A]
+model = "chain"
+masses = [5.0, 3.0]
+stiffness = [2500.0, 3500.0]
+damping = [3.0, 4.0]
+ground = "start"
+joint = ["2:x"]
+unknown = { youngs_modulus = 0.02 }
+
+[B]
+model = "chain"
+masses = [4.0, 2.0]
+stiffness = [2000.0, 2500.0]
+damping = [2.0, 1.0]
+ground = "end"
+joint = ["1:x"]
+
+[[joint.law]]
+dof = "x"
+law = "spring"
+
+[channels]
+"11:+x" = "A/1:x"
+"22:-x" = "B/2:x"
+"""
+
+
+def truth() -> jf.Assembly:
+    a = jf.Substructure(jf.chain([5, 3], [2500, 3500], [3, 4], ground="start"), ["2:x"])
+    b = jf.Substructure(jf.chain([4, 2], [2000, 2500], [2, 1], ground="end"), ["1:x"])
+    return jf.Assembly(a, b, jf.Joint([2000.0], [3.0], dofs=["x"]))
+
+
+@pytest.fixture(scope="module")
+def frfs() -> FrfSet:
+    h = jf.pollute(truth().receptance(FREQ, ["A/1:x", "B/2:x"], ["A/1:x"]), 0.03, seed=2)
+    channels = Channel(11, "+x"), Channel(22, "+x"), Channel(33, "+z")
+    # Point 22 was measured along +x, and the file says that the DOF points along -x there.
+    found = np.concatenate([h[:, :1], -h[:, 1:], h[:, 1:]], axis=1)
+    return FrfSet(FREQ, channels, channels[:1], found, source="test.uff")
+
+
+def written(folder: Path, text: str = ASSEMBLY) -> Path:
+    path = folder / "assembly.toml"
+    path.write_text(text)
+    return path
+
+
+def test_channels_signs_and_unknowns(tmp_path, frfs):
+    measured = jf.measured_assembly(written(tmp_path), frfs)
+    assert (measured.responses, measured.forces) == (("A/1:x", "B/2:x"), ("A/1:x",))
+    assert measured.channels == ({"A/1:x": "11:+x", "B/2:x": "22:+x"}, {"A/1:x": "11:+x"})
+    assert measured.unused == ("33:+z",)
+    fit = measured.fit()
+    for name, value in {"k_x": 2000.0, "c_x": 3.0, "A/youngs_modulus": 1.0}.items():
+        low, high = fit.confidence_interval(0.95)[name]
+        assert low < value < high
+    prior = {one.name: one.prior for one in fit.parameters}["A/youngs_modulus"]
+    assert prior == (1.0, 0.02)
+    assert fit.test.is_noise
+
+
+def test_values_at_the_start_do_not_matter(tmp_path, frfs):
+    values = 'law = "spring"\nvalues = { k = 3.0, c = 0.1 }'
+    one, other = (
+        jf.measured_assembly(written(tmp_path, text), frfs).fit()
+        for text in (ASSEMBLY, ASSEMBLY.replace('law = "spring"', values))
+    )
+    np.testing.assert_allclose(one.estimate, other.estimate, rtol=1e-3)
+
+
+def test_bands(tmp_path, frfs):
+    measured = jf.measured_assembly(written(tmp_path), frfs, bands=[(2, 4), (6, 8)])
+    assert measured.freq_hz.min() >= 2
+    assert measured.freq_hz.max() <= 8
+    assert not ((measured.freq_hz > 4) & (measured.freq_hz < 6)).any()
+
+
+def test_the_same_joint_by_constants_laws_and_files(tmp_path):
+    laws = read_assembly_file(written(tmp_path)).joint
+    constants = re.sub(r"\[\[joint.law\]\].*?\n\n", '[joint]\ndofs = ["x"]\nstiffness = [7.0]\ndamping = [2.0]\n\n',
+                       ASSEMBLY, flags=re.DOTALL)  # fmt: skip
+    inline = read_assembly_file(written(tmp_path, constants)).joint
+    (tmp_path / "joint.toml").write_text('[[law]]\ndof = "x"\nlaw = "spring"\nvalues = { k = 7.0, c = 2.0 }\n')
+    named = 'joint = "joint.toml"\n' + re.sub(r"\[\[joint.law\]\].*?\n\n", "", ASSEMBLY, flags=re.DOTALL)
+    assert inline == read_assembly_file(written(tmp_path, named)).joint
+    assert laws.names == inline.names == ("k_x", "c_x")
+
+
+def test_matrices_and_frfs_as_parts_give_what_chains_give(tmp_path, frfs):
+    a, b = truth().a.nominal_model, truth().b.nominal_model
+    scipy.io.mmwrite(tmp_path / "k.mtx", a.stiffness)
+    np.savez(tmp_path / "a.npz", mass=a.mass.toarray(), damping=a.damping.toarray())
+    matrices = """[A]
+model = "matrices"
+stiffness = "k.mtx"
+mass = "a.npz"
+damping = "a.npz"
+dofs = ["1:x", "2:x"]
+joint = ["2:x"]
+unknown = { youngs_modulus = 0.02 }
+
+"""
+    channels = Channel(1, "+x"), Channel(2, "+x")
+    write_frfs(tmp_path / "b.npz", FrfSet(FREQ, channels, channels, b.receptance(FREQ, [0, 1])))
+    receptances = '[B]\nmodel = "receptances"\nfile = "b.npz"\njoint = ["1:x"]\n\n'
+    text = re.sub(r"\[A\].*?\n\n", matrices, ASSEMBLY, flags=re.DOTALL)
+    text = re.sub(r"\[B\].*?\n\n", receptances, text, flags=re.DOTALL)
+    one = jf.measured_assembly(written(tmp_path), frfs).fit()
+    other = jf.measured_assembly(written(tmp_path, text), frfs).fit()
+    np.testing.assert_allclose(one.estimate, other.estimate, rtol=1e-5)
+
+
+def test_unknown_numbers_of_a_beam_have_their_means(tmp_path):
+    beam = """[A]
+model = "beam"
+length = 0.3
+elements = 4
+youngs_modulus = 67e9
+density = 2700.0
+width = 0.025
+height = 0.006
+joint = ["5:y"]
+unknown = { youngs_modulus = { mean = 70e9, std = 1e9 }, %s = 0.01, density = { std = 50.0, lower = 2600.0 } }
+
+"""
+    at_freq = np.array([30.0, 60.0])
+    for name in ("loss_factor", "height"):
+        text = re.sub(r"\[A\].*?\n\n", beam % name, ASSEMBLY, flags=re.DOTALL)
+        file = read_assembly_file(written(tmp_path, text))
+        part = file.parts(at_freq)[0]
+        if name == "loss_factor":
+            with pytest.raises(FileContentError, match="it is 0, so that a relative standard deviation says nothing"):
+                part.substructure(at_freq, [])
+            continue
+        found = part.substructure(at_freq, [])
+        assert found.unknowns["youngs_modulus"] == jf.Unknown(70e9, 1e9, 0.0)
+        assert found.unknowns["density"] == jf.Unknown(2700.0, 50.0, 2600.0)
+        assert found.unknowns["height"] == jf.Unknown(0.006, 0.006 * 0.01, 0.0)
+        section = dict(density=2700.0, width=0.025, height=0.006)
+        same = jf.beam(0.3, 4, youngs_modulus=70e9, **section)
+        stiffness = same.stiffness.toarray()
+        np.testing.assert_allclose(found.model().stiffness.toarray(), stiffness, rtol=1e-9, atol=1e-9 * stiffness.max())
+
+
+def test_masses_springs_and_gains(tmp_path, frfs):
+    more = """
+[response_gains]
+"B/2:x" = 0.05
+
+[force_gains]
+"A/1:x" = { mean = 1.0, std = 0.01 }
+
+[[mass]]
+dofs = ["A/1:x"]
+mass = 0.2
+unknown = 0.5
+
+[[ground]]
+dof = "B/2:x"
+stiffness = 10.0
+unknown = { stiffness = { std = 5.0 } }
+"""
+    text = ASSEMBLY.replace('law = "spring"', 'law = "spring"\nvalues = { k = 1e3, c = 3.0 }')
+    measured = jf.measured_assembly(written(tmp_path, 'fixed = ["c_x"]\n' + text + more), frfs)
+    assert measured.assembly.attachments == (
+        jf.AddedMass(("A/1:x",), jf.Unknown(0.2, 0.1, 0.0)),
+        jf.GroundSpring("B/2:x", jf.Unknown(10.0, 5.0, 0.0), 0.0),
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # so many unknowns are not held by three FRFs
+        names = [one.name for one in measured.fit().parameters]
+    assert names == [
+        "k_x", "A/youngs_modulus", "mass A/1:x", "ground stiffness B/2:x", "gain of response B/2:x",
+        "gain of force A/1:x",
+    ]  # fmt: skip
+
+
+def without(*lines: str) -> str:
+    return "".join(line for line in ASSEMBLY.splitlines(keepends=True) if not line.startswith(lines))
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        (without("masses", "damping"), r"\[A\]: the keys 'masses', 'damping' are missing; .*\[B\]: the keys 'masses', "
+         "'damping' are missing"),
+        ("", r"the keys 'A' \(a table \[A\] with model\), 'B' \(a table \[B\] with model\), 'joint' are missing"),
+        (ASSEMBLY.replace("masses", "mases", 1), r"\[A\]: unknown key 'mases'.*did you mean 'masses'"),
+        (ASSEMBLY.replace("[channels]", "[chanels]"), "unknown key 'chanels'.*did you mean 'channels'"),
+        (ASSEMBLY.replace('"chain"', '"chian"', 1), r"\[A\]: model must be one of chain, beam, brick-beam, matrices, "
+         "receptances, not 'chian'"),
+        (ASSEMBLY.replace("0.02", "-0.02"), r"\[unknown\]: youngs_modulus must be a relative standard deviation"),
+        (ASSEMBLY.replace("youngs_modulus", "young"), r"\[unknown\]: young: this part has no such number.*loss_factor"),
+        (ASSEMBLY.replace('["2:x"]', '["3:x"]'), r"\[A\]: joint: A has no DOF '3:x'"),
+        (ASSEMBLY.replace('["2:x"]', '["1:x", "2:x"]'), "2 joint DOFs, the joint 1"),
+        (ASSEMBLY.replace('"11:+x" =', '"12:+x" ='), r"12:\+x: test.uff has no such channel, only 11:\+x"),
+        (ASSEMBLY.replace('"B/2:x"', '"B/9:x"'), "channels: neither A nor B has a DOF 'B/9:x'"),
+        (ASSEMBLY.replace('"22:-x"', '"22-"'), r"\[channels\]: '22-' is no channel"),
+        (ASSEMBLY + '"33:+z" = "B/2:x"\n', "22:.x and 33:.z of test.uff are one DOF: B/2:x"),
+        (ASSEMBLY.split("[channels]")[0], "no response of test.uff is a DOF of A or B: name them under"),
+        (ASSEMBLY.replace('law = "spring"', 'law = "sprung"'), r"\[joint\]: \[\[law\]\] number 1: law must be one of"),
+        (ASSEMBLY.replace('dof = "x"', 'dof = "theta"'), "2:x stands where the joint has theta"),
+        (ASSEMBLY + '[response_gains]\n"A/2:x" = 0.1\n', "A/2:x: there is no such channel, only A/1:x, B/2:x"),
+        (ASSEMBLY + '[[ground]]\ndof = "A/7:x"\nstiffness = 1.0\n', "attachment 'A/7:x': neither A nor B has such"),
+        (ASSEMBLY + '[[mass]]\ndofs = ["A/1:x"]\n', r"\[\[mass\]\] number 1: the key 'mass' is missing"),
+        ('joint = "none.toml"\n' + re.sub(r"\[\[joint.law\]\].*?\n\n", "", ASSEMBLY, flags=re.DOTALL),
+         "joint must name a file: .*none.toml does not exist"),
+        ("A = 3\n" + ASSEMBLY[ASSEMBLY.index("[B]") :], "A must be a table"),
+        ("[A", "not a TOML file"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_one_sentence(tmp_path, frfs, text, sentence):
+    with pytest.raises(FileContentError, match=sentence) as caught:
+        jf.measured_assembly(written(tmp_path, text), frfs)
+    assert str(caught.value).startswith(str(tmp_path / "assembly.toml"))
+
+
+def test_joint_dofs_in_another_order_are_refused(tmp_path, frfs):
+    beam = """model = "beam"
+length = 0.3
+elements = 4
+youngs_modulus = 67e9
+density = 2700.0
+width = 0.025
+height = 0.006
+"""
+    laws = '[[joint.law]]\ndof = "{}"\nlaw = "spring"\n' * 2
+    text = f'[A]\n{beam}joint = ["5:y", "5:theta"]\n[B]\n{beam}joint = ["1:y", "1:theta"]\n' + laws.format("theta", "y")
+    with pytest.raises(FileContentError, match="5:y stands where the joint has theta: its DOFs are, in this order"):
+        jf.measured_assembly(written(tmp_path, text + '[channels]\n"11:+x" = "A/2:y"\n'), frfs)
+
+
+def test_channels_named_like_dofs_need_no_table(tmp_path, frfs):
+    text = ASSEMBLY.split("[channels]")[0]
+    names = Channel(1, "+x"), Channel(2, "-x")
+    own = FrfSet(FREQ, names, names[:1], frfs.h[:, :2], source="test.uff")
+    with pytest.raises(FileContentError, match=r"channel 1:\+x may be A/1:x or B/1:x: name it under \[channels\]"):
+        jf.measured_assembly(written(tmp_path, text), own)
+    # B by matrices whose nodes have other numbers: then names say enough.
+    b = truth().b.nominal_model
+    np.savez(tmp_path / "b.npz", stiffness=b.stiffness.toarray(), mass=b.mass.toarray(), damping=b.damping.toarray())
+    files = 'stiffness = "b.npz"\nmass = "b.npz"\ndamping = "b.npz"\ndofs = ["101:x", "102:x"]\njoint = ["101:x"]\n\n'
+    text = re.sub(r"\[B\].*?\n\n", f'[B]\nmodel = "matrices"\n{files}', text, flags=re.DOTALL)
+    own = FrfSet(FREQ, (names[0], Channel(102, "-x")), names[:1], frfs.h[:, :2], source="test.uff")
+    measured = jf.measured_assembly(written(tmp_path, text), own)
+    assert measured.responses == ("A/1:x", "B/102:x")
+    np.testing.assert_array_equal(measured.h[:, 1], -own.h[:, 1])
+
+
+def test_an_frf_that_was_not_measured(tmp_path, frfs):
+    h = frfs.h.copy()
+    h[:, 1] = np.nan
+    fit = jf.measured_assembly(written(tmp_path), FrfSet(FREQ, frfs.responses, frfs.excitations, h)).fit()
+    assert np.isnan(fit.data.residual[:, 1]).all()
+    document = fit_document(fit, ReportOptions())
+    assert "All 1 FRFs" in str([part for section in document.sections for part in section.parts])
+
+
+def test_the_page_and_the_plot_of_a_model(tmp_path, frfs):
+    fit = jf.measured_assembly(written(tmp_path), frfs).fit()
+    document = fit_document(fit, ReportOptions("test.uff"))
+    keys = [section.key for section in document.sections]
+    assert keys == ["summary", *(["doubts"] if fit.findings else []), "joint", "stiffness", "frfs", "maps", "noise",
+                    "cards", "made"]  # fmt: skip
+    table = next(part for part in document.sections[0].parts if getattr(part, "key", "") == "parameters")
+    assert "prior" in table.columns
+    assert table.rows[-1][0] == "A/youngs_modulus"
+    assert table.rows[-1][-2] == "1 ± 0.02"
+    assert "Fitted with it, values in the table: A/youngs_modulus." in finding_sentences(fit)
+    page = jf.write_report(fit, tmp_path / "report.html").read_text()
+    assert "predicted by the models and the joint found" in page
+    assert "each line" not in page
+    drawn = jf.plot(fit)
+    assert len(drawn.axes) >= 8
+    loaded = jf.load(jf.save(fit, tmp_path / "fit.json"))
+    with pytest.raises(ValueError, match="this fit holds none"):
+        jf.write_report(loaded, tmp_path / "again.html")
+    assert len(jf.plot(loaded).axes) == 4
+
+
+def test_the_page_and_the_plot_of_laws(tmp_path):
+    section = dict(youngs_modulus=67e9, density=2700.0, width=0.025, height=0.006, loss_factor=0.01)
+    a, b = jf.beam(0.3, 12, ends=("clamped", "free"), **section), jf.beam(0.225, 9, **section)
+    freq = np.arange(15.0, 801.0, 4.0)
+    h_a, h_b = (m.receptance(freq, m.ports(f"{n}:y", f"{n}:theta")) for m, n in ((a, 13), (b, 1)))
+    actual = jf.LawJoint({"y": jf.StandardLinearSolid(2e5, 6e5, tau=5e-4)}, rigid=["theta"])
+    gamma = jf.pollute(jf.couple(h_a, h_b, actual, [0, 1], [0, 1], freq_hz=freq), level=0.02, seed=2)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        fit = jf.identify(freq, gamma, joint=actual)
+    # Regenerated FRFs lie nearer to the truth than the measured ones do, and fit the joint found.
+    regenerated = fit.data.regenerated(slice(None))
+    true = jf.couple(h_a, h_b, actual, [0, 1], [0, 1], freq_hz=freq)
+    error, noise = (np.median(abs(one - true) / abs(true)) for one in (regenerated, gamma))
+    assert error < noise
+    np.testing.assert_allclose(
+        jf.joint_compliance(regenerated)[:, 0, 0], fit.joint.compliance(freq)[:, 0, 0], rtol=1e-3
+    )
+    np.testing.assert_allclose(fit.data.information().sum(axis=0), 1)
+    told = finding_sentences(fit)
+    assert told[0] == "Rigid: theta."
+    assert any(one.startswith("Parameter tau of y (tau_y): 0.0005") for one in told)
+    page = jf.write_report(fit, tmp_path / "law.html").read_text()
+    assert "95 % interval of Re K*" in page
+    assert "The laws are taken at" in page
+    assert len(jf.plot(fit).axes) >= 8
+
+
+def test_the_schema_knows_what_the_reader_knows(tmp_path):
+    schema = schema_of(AssemblyKeys)
+    defined = schema["$defs"]
+    assert set(defined["AssemblyKeys"]["required"]) == {"A", "B", "joint"}
+    assert {"masses", "joint", "unknown"} <= set(defined["ChainPart"]["properties"])
+    json.dumps(schema)
