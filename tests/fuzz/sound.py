@@ -272,6 +272,9 @@ def _files(folder: Path) -> dict[str, dict[str, Any]]:
     jf.io.write_uff(folder / "a.uff", frfs)
     jf.io.write_npz(folder / "a.npz", frfs)
     (folder / "table.csv").write_text("channel,side\n1:x,j\n2:y,k\n")
+    chain = 'model = "chain"\nmasses = [5.0]\nstiffness = [2500.0]\ndamping = [3.0]\njoint = ["1:x"]\n'
+    joint = '[[joint.law]]\ndof = "x"\nlaw = "spring"\n[channels]\n"1:x" = "A/1:x"\n"2:-y" = "B/1:x"\n'
+    (folder / "assembly.toml").write_text(f"[A]\n{chain}[B]\n{chain}{joint}")
     law = jf.LawJoint({"x": jf.SpringLaw(2000.0, 3.0)})
     jf.write_joint(folder / "joint.toml", law)
     first = jf.study("3.1", folder / "study", 2, design=jf.StudyDesign(estimators=["ismm"]), jobs=1)
@@ -280,6 +283,7 @@ def _files(folder: Path) -> dict[str, dict[str, Any]]:
         "read_uff": {"path": folder / "a.uff"},
         "read_frfs": {"paths": folder / "a.npz"},
         "read_channel_table": {"path": folder / "table.csv"},
+        "measured_assembly": {"path": folder / "assembly.toml", "frfs": frfs},
         "read_joint": {"path": folder / "joint.toml"},
         "write_joint": {"path": folder / "written.toml", "joint": law},
         "study": {"case": "3.1", "out": folder / "another", "realisations": 2, "jobs": 1},
