@@ -74,8 +74,8 @@ from jointfrf.models.model import Model, assemble, chain
 from jointfrf.models.receptance import ReceptanceInfo, receptance
 from jointfrf.parallel.pool import BrokenPoolError
 from jointfrf.parallel.sweep import SweepPlan, plan_sweep, sweep
+from jointfrf.report.fit import plot
 from jointfrf.report.fit_page import write_report
-from jointfrf.report.fit_plot import plot
 from jointfrf.solids.bolted_lap import (
     PROOF_STRENGTH,
     STRESS_AREA,

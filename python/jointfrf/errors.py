@@ -20,7 +20,7 @@ __all__ = [
 ]
 
 
-#: Characters of what an error of another library says that are repeated.
+#: Most characters of the message of another library that are repeated.
 _LONGEST = 200
 
 
@@ -41,7 +41,7 @@ class SingularLineError(np.linalg.LinAlgError):
         self.freq_hz = freq_hz
 
     def __reduce__(self) -> tuple[type[SingularLineError], tuple[object, ...]]:
-        """Return how another process makes it again."""
+        """Return how to make it again in another process."""
         return type(self), (str(self), self.lines, self.freq_hz)
 
 
@@ -53,7 +53,7 @@ class FileContentError(ValueError):
 
 
 class FileContentWarning(UserWarning):
-    """Something in a file had to be assumed or left out; one line, whatever stands in the file."""
+    """Something in a file had to be assumed or left out; one line, whatever the file contains."""
 
     def __init__(self, message: str) -> None:
         super().__init__(visible(" ".join(message.splitlines())))
@@ -72,7 +72,7 @@ class CopyWarning(UserWarning):
 
 
 class IdentificationWarning(UserWarning):
-    """The data say little about a parameter, or do not fit the model of the joint."""
+    """A parameter is poorly determined, or the data do not fit the model of the joint."""
 
 
 class ConvergenceWarning(UserWarning):
@@ -80,6 +80,6 @@ class ConvergenceWarning(UserWarning):
 
 
 def first_line(error: BaseException) -> str:
-    """Return what an error of another library says, in one line."""
+    """Return the message of an error of another library in one line."""
     line = (str(error).strip().splitlines() or [type(error).__name__])[0]
     return line if len(line) <= _LONGEST else f"{line[:_LONGEST]}..."

@@ -66,7 +66,7 @@ def check_extras(*packages: str) -> None:
     for package in packages:
         try:
             is_found = importlib.util.find_spec(package) is not None
-        except ValueError:  # what stands for it in sys.modules is no module
+        except ValueError:  # its entry of sys.modules is no module
             is_found = False
         if not is_found:
             raise _missing(package)

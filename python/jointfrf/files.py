@@ -1,4 +1,4 @@
-"""Files: how one begins, what reading one may take, and writing whole or not at all."""
+"""Files: their first bytes, limits of reading, and writing whole or not at all."""
 
 from __future__ import annotations
 
@@ -28,21 +28,22 @@ __all__ = [
     "written_whole",
 ]
 
-#: How much of a file shows what it is, bytes.
+#: Bytes of a file that show its format: the largest header is that of HDF5 after a block of 4 kB.
 HEAD = 1 << 13
 #: Says another limit, GB.
 LIMIT_VARIABLE = "JOINTFRF_FILE_LIMIT_GB"
-#: Without one: files beyond this are not read, GB; what a file holds may take so much memory, GB, or so many times the
-#: size of the file, whichever is more.
+#: Without one: the largest file, GB, about the memory of a workstation; and the memory of its content: GB that
+#: every machine has, or so many times the size of the file, as compressed FRFs may take, whichever is more.
 _LARGEST, _SMALL, _TIMES = 16.0, 1.0, 10
-#: Each array, group or cell takes at least this, bytes: there are files of nothing but names.
+#: Bytes that each array, group or cell counts at least: a file may consist of millions of empty ones.
 _LEAST = 10_000
-#: Characters of a name that no file system, shell or page takes for anything else, and how many of them.
+#: Characters that have a meaning to some file system, shell or page, and the longest name.
 _UNUSUAL, _LONGEST = re.compile(r"[^\w+,=.-]", re.ASCII), 100
 #: Where names are those of open files, which cannot be replaced.
 _OPEN_FILES = "/proc/"
 #: What readers of numpy, scipy and h5py raise for a damaged file.
 _DAMAGE = (OSError, ValueError, KeyError, TypeError, EOFError, RuntimeError, OverflowError, MemoryError)
+#: Links to links that are followed, as many as Linux does.
 _MOST_LINKS = 40
 
 
@@ -68,7 +69,7 @@ _RAISED = f"limit_gb=, --limit-gb or the environment variable {LIMIT_VARIABLE} r
 
 
 class ReadLimit:
-    """What the content of one file may take in memory: a few kB can unfold to more than there is.
+    """The memory that the content of one file may take: a few kB can decompress to more than a machine has.
 
     Parameters
     ----------
@@ -127,7 +128,7 @@ def check_file(path: Path, limit_gb: float | None = None) -> None:
     if path.is_dir():
         raise FileContentError(f"{path} is a folder, not a file")
     if not path.is_file():
-        # Whoever opens a pipe waits for a writer; a device has no end.
+        # Opening a pipe waits for a writer; a device has no end.
         raise FileContentError(f"{path} is a pipe or a device, not a file: save what it gives first")
     limit, size = _limit_gb(limit_gb) or _LARGEST, path.stat().st_size / 1e9
     if size > limit:
@@ -354,5 +355,5 @@ def _keep(path: Path, older: os.stat_result) -> None:
                 break
     own = path.stat()
     if (own.st_uid, own.st_gid) != (older.st_uid, older.st_gid):
-        mode &= 0o777  # what a program may do as its owner is not handed to another one
+        mode &= 0o777  # setuid and setgid are not passed on to another owner
     path.chmod(mode)

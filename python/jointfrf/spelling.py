@@ -1,4 +1,4 @@
-"""Words: which known one a misspelt one looks like, and texts of files made such that all of them is seen."""
+"""Misspelt words, and texts of files with invisible characters escaped."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from collections.abc import Iterable
 
 __all__ = ["did_you_mean", "look_alike", "visible"]
 
-#: Kinds of characters that a reader does not see, and that a terminal, a card or a page acts upon.
+#: Categories of invisible characters, which a terminal, a card or a page may interpret.
 _UNSEEN = {"Cc", "Cf", "Cs", "Zl", "Zp"}
 
 
 def look_alike(word: str, known: Iterable[str]) -> str:
-    """Return the known word that another one looks like; empty if there is none.
+    """Return the known word that is most similar; empty if there is none.
 
     Examples
     --------
@@ -40,7 +40,7 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
 
 
 def visible(text: str, keep: str = "") -> str:
-    r"""Return a text of a file with the characters escaped that are not seen, such as those that move a cursor.
+    r"""Return a text of a file with invisible characters escaped, such as those that move a cursor.
 
     Parameters
     ----------

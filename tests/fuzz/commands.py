@@ -16,7 +16,7 @@ from scipy.sparse import coo_array
 from frf_files import frf_set
 from jointfrf import Joint, write_joint
 from jointfrf.cli.main import main
-from jointfrf.cli.parser import COMMANDS, command_parser
+from jointfrf.cli.parser import COMMANDS, CommandParser, command_parser
 from jointfrf.io import write_csv, write_npz, write_uff
 
 from .part import BrokenError
@@ -121,15 +121,15 @@ class Commands:
                 words.append(_WORDS[random.integers(len(_WORDS))] if random.random() < 0.7 else
                              self.files[random.integers(len(self.files))])  # fmt: skip
         if random.random() < 0.3:
-            options = [each for each in self.commands[name]._actions
+            options = [each for each in self.commands[name].arguments
                        if each.option_strings and not isinstance(each, argparse._HelpAction)]  # fmt: skip
             action = options[random.integers(len(options))]
             words += [action.option_strings[-1], *([self._word(action, random)] if action.nargs != 0 else [])]
         return [*words, *_LAST.get(name, ())]
 
-    def _words(self, parser: argparse.ArgumentParser, random: np.random.Generator) -> list[str]:
+    def _words(self, parser: CommandParser, random: np.random.Generator) -> list[str]:
         words = []
-        for action in parser._actions:
+        for action in parser.arguments:
             if isinstance(action, argparse._HelpAction) or (action.option_strings and random.random() > 0.25):
                 continue
             if action.option_strings:

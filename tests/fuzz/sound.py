@@ -299,5 +299,6 @@ def _files(folder: Path) -> dict[str, dict[str, Any]]:
         },
         "StudyDesign": {"factors": {"noise": [0.01, 0.05]}, "estimators": ["ismm"]},
         "FrfMapping": {"freq_hz": "f", "h": "H"},
+        "write_frfs": {"path": folder / "by_suffix.npz", "frfs": frfs},
         **{f"write_{name}": arguments for name, arguments in written.items()},
     }

@@ -11,7 +11,7 @@ import msgspec
 import numpy as np
 
 from jointfrf.assembly_file.keys import AssemblyKeys, PartKeys, Prior, PriorKeys, ReceptancesPart
-from jointfrf.cases.known_joint.structure import MeasuredStructure, ModelStructure, Structure
+from jointfrf.cases.substructures import MeasuredStructure, ModelStructure, Structure
 from jointfrf.dofs import is_rotation
 from jointfrf.frf.frf_set import Channel
 from jointfrf.identification.joint_file import read_joint

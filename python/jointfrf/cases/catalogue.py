@@ -4,42 +4,71 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from jointfrf.cases.definitions import read_frequency
-from jointfrf.cases.kind import Case, CaseKind
-from jointfrf.cases.kinds import KINDS
+from jointfrf.cases.keys import Case, CaseKeys, ExpectedKeys
+from jointfrf.cases.kind import CaseKind
 from jointfrf.cases.workers import Workers
 from jointfrf.files import below, check_file, write_file
-from jointfrf.report.draw import draw
+from jointfrf.report.document import Document, Page, make_document
+from jointfrf.report.draw import Drawing, draw
 from jointfrf.report.figure import Figure, figure_csv
-from jointfrf.report.page import Page, make_page
 from jointfrf.report.table import Table, plain_rows, shown, table_csv
+from jointfrf.toml.declared import read_keys
+from jointfrf.toml.documents import key_reference
 from jointfrf.toml.table import TomlTable, read_toml
 
 __all__ = [
+    "KINDS",
     "CaseOutput",
     "UnknownCaseError",
+    "case_title",
     "cases_folder",
     "find_case",
+    "key_page",
     "list_cases",
     "numbered",
     "read_case",
     "read_case_and_kind",
     "read_case_of",
     "run_case",
+    "write_results",
 ]
 
 
-#: Methods that take FRFs at other points add to the seed, which has 64 bits.
-_HIGHEST_SEED = 2**63 - 1
+class _Kinds(Mapping[str, CaseKind[Any, Any]]):
+    """Kinds of cases by name, each the `KIND` of the package of this name, imported when it is needed."""
+
+    def __init__(self, *names: str) -> None:
+        self._names = names
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        return len(self._names)
+
+    def __getitem__(self, name: str) -> CaseKind[Any, Any]:
+        if name not in self._names:
+            raise KeyError(name)
+        kind: CaseKind[Any, Any] = import_module(f"jointfrf.cases.{name.replace('-', '_')}").KIND
+        return kind
+
+
+#: The kinds of cases, by the value of `kind` in `case.toml`; the first is that of a case that names none.
+KINDS: Mapping[str, CaseKind[Any, Any]] = _Kinds(
+    "known-joint",
+    "bolted-lap",
+    "modelled-joint",
+)
 
 
 class UnknownCaseError(ValueError):
-    """There is no such case; one line, whatever was asked for."""
+    """There is no such case; one line, whatever word was given."""
 
     def __init__(self, message: str) -> None:
         super().__init__("\\n".join(message.splitlines()))
@@ -59,7 +88,7 @@ class CaseOutput:
     summary : list of Table
         What came out, in short.
     report : Path
-        The HTML report; CSV, PNG, SVG and JSON files stand beside it.
+        The HTML report; CSV, PNG, SVG and JSON files are beside it.
     printed : list of Table
         The tables that are worth printing.
     """
@@ -92,6 +121,11 @@ def list_cases() -> list[Path]:
         return not numbers, numbers, path.name
 
     return sorted(found, key=place)
+
+
+def case_title(folder: Path) -> str:
+    """Return the title of a case without reading the rest of it."""
+    return str(read_toml(folder / "case.toml").content.get("title", ""))
 
 
 def find_case(word: str) -> Path:
@@ -159,32 +193,46 @@ def read_case_of(
     folder: Path, table: TomlTable, expected: TomlTable, kinds: Mapping[str, CaseKind[Any, Any]] = KINDS
 ) -> tuple[Case, CaseKind[Any, Any]]:
     """Read a case from tables: of its `case.toml`, and of what is known about it."""
-    kind = kinds[table.text("kind", tuple(kinds))] if "kind" in table else next(iter(kinds.values()))
-    for one, known in ((table, kind.keys), (expected, kind.expected_keys)):
-        if known is not None:
-            one.expect(known)
-    case: Case = kind.read(_common(folder, table, expected), table, expected)
-    table.close()
-    expected.close()
+    name = table.content.get("kind", next(iter(kinds)))
+    if not isinstance(name, str) or name not in kinds:
+        raise table.error("kind", f"one of {', '.join(kinds)}")
+    kind = kinds[name]
+    keys, known = read_keys(table, kind.keys), read_keys(expected, kind.expected_keys)
+    case: Case = kind.read(_common(folder, keys, known), keys, known)
     return case, kind
 
 
-def _common(folder: Path, table: TomlTable, expected: TomlTable) -> Case:
-    """Read what every case says."""
-    title, section = table.text("title"), table.text("section")
-    freq_hz = read_frequency(table.table("frequency"))
-    study = table.table("study")
-    realisations, seed = study.whole("realisations", 1), study.whole("seed", highest=_HIGHEST_SEED)
-    study.close()
+def _common(folder: Path, keys: CaseKeys, expected: ExpectedKeys) -> Case:
+    """Return what every case says."""
     return Case(
         folder=folder.resolve(),
-        title=title,
-        section=section,
-        freq_hz=freq_hz,
-        realisations=realisations,
-        seed=seed,
-        figure_numbers=expected.table("figures").words() if "figures" in expected else {},
+        title=keys.title,
+        section=keys.section,
+        freq_hz=keys.frequency.lines(),
+        realisations=keys.study.realisations,
+        seed=keys.study.seed,
+        figure_numbers=expected.figures,
     )
+
+
+_KEYS_HEAD = """# Keys of case files
+
+<!-- jointfrf cases --keys > docs/case-keys.md -->
+
+A case is a folder with a `case.toml` and, where something is known about it beforehand, an `expected.toml`;
+[cases](cases.md) says how one is run, `jointfrf new KIND FOLDER` writes one to begin with. SI units. Files that a key
+names are relative to the folder. A key that is not in this list is an error that lists those that are. `DOF` in a key
+stands for the name of a joint DOF (`k_theta_z`).
+
+"""
+
+
+def key_page(kinds: Mapping[str, CaseKind[Any, Any]] = KINDS) -> str:
+    """Return the reference of all keys of kinds of cases, as Markdown."""
+    tops = {f"case.toml of kind {name}": kind.keys for name, kind in kinds.items()}
+    known = {f"expected.toml of kind {name}": kind.expected_keys for name, kind in kinds.items()}
+    return _KEYS_HEAD + key_reference({name: top for each in zip(tops.items(), known.items(), strict=True)
+                                       for name, top in each})  # fmt: skip
 
 
 def numbered(case: Case, figures: Sequence[Figure]) -> list[Figure]:
@@ -194,7 +242,7 @@ def numbered(case: Case, figures: Sequence[Figure]) -> list[Figure]:
 
 
 def _number_key(number: str) -> list[tuple[int, str]]:
-    """Order "3-9a", "3-9b", "3-10", "4-32 and 4-33" as they stand in the source."""
+    """Order "3-9a", "3-9b", "3-10", "4-32 and 4-33" in the order of the source."""
     return [(int(digits), letter) for digits, letter in re.findall(r"(\d+)([a-z]?)", number)]
 
 
@@ -205,7 +253,7 @@ def run_case(
     realisations: int | None = None,
     workers: Workers | None = None,
     kinds: Mapping[str, CaseKind[Any, Any]] = KINDS,
-    tell: Callable[[Case, list[Table]], None] = lambda case, tables: None,
+    show: Callable[[Case, list[Table]], None] = lambda case, tables: None,
 ) -> CaseOutput:
     """Run a case and write its report, tables and figures.
 
@@ -222,7 +270,7 @@ def run_case(
         Processes that share the work, see `jointfrf.cases.workers.started_workers`; this process by default.
     kinds : mapping of str to CaseKind
         As in `read_case`.
-    tell : callable, optional
+    show : callable, optional
         Called with the case and its tables that are worth printing, the summary first, before figures are drawn.
 
     Returns
@@ -248,7 +296,7 @@ def run_case(
     tables = kind.tables(result)
     summary = kind.summary(result, tables)
     printed = [table for table in tables if table.key not in kind.not_printed]
-    tell(case, [*summary, *printed])
+    show(case, [*summary, *printed])
     figures = numbered(case, kind.figures(result))
     drawn = at_work.map(draw, figures)
     content = _common_numbers(case, count, tables) | kind.numbers(result)
@@ -262,20 +310,29 @@ def run_case(
         text=_text(case.folder, "README.md"),
         sources=[("case.toml", _text(case.folder, "case.toml"))],
     )
-    _write(target, page, content)
+    write_results(target, page.document, tables, page.figures, content)
     return CaseOutput(case, result, tables, figures, summary, target / "report.html", printed)
 
 
-def _write(folder: Path, page: Page, content: dict[str, Any]) -> None:
-    """Write a report and, beside it, its tables, figures and numbers."""
-    for figure, drawing in page.figures:
+def write_results(
+    folder: Path,
+    document: Document,
+    tables: Sequence[Table],
+    figures: Sequence[tuple[Figure, Drawing]],
+    content: Mapping[str, Any],
+) -> Path:
+    """Write a page and, beside it, its tables, figures and numbers; return the path of the page."""
+    for inner in ("tables", "figures"):
+        below(folder, inner).mkdir(parents=True, exist_ok=True)
+    for figure, drawing in figures:
         write_file(below(folder / "figures", figure.key, ".png"), drawing.png)
         write_file(below(folder / "figures", figure.key, ".svg"), drawing.svg)
         write_file(below(folder / "figures", figure.key, ".csv"), figure_csv(figure))
-    for table in page.tables:
+    for table in tables:
         write_file(below(folder / "tables", table.key, ".csv"), table_csv(table))
     write_file(below(folder, "results.json"), json.dumps(content, indent=1) + "\n")
-    write_file(below(folder, "report.html"), make_page(page))
+    write_file(below(folder, "report.html"), make_document(document))
+    return folder / "report.html"
 
 
 def _about(case: Case, count: int) -> str:

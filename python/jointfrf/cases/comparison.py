@@ -3,28 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
+from jointfrf.cases.keys import ExpectedFrequencies
 from jointfrf.report.table import Cell, Table
-from jointfrf.toml.table import TomlTable
 
-__all__ = ["ExpectedFrequencies", "agreement", "frequency_table", "read_expected_frequencies", "verdict"]
-
-
-@dataclass(frozen=True)
-class ExpectedFrequencies:
-    """Known natural frequencies, lowest first, Hz, and how far the computed ones may lie from them, percent."""
-
-    source: str
-    values: tuple[float, ...]
-    within: float
-
-
-def read_expected_frequencies(table: TomlTable) -> ExpectedFrequencies:
-    """Read the keys of expected frequencies from a table, and close it."""
-    found = ExpectedFrequencies(table.text("source"), tuple(table.numbers("values")), table.number("within_percent", 0))
-    table.close()
-    return found
+__all__ = ["agreement", "frequency_table", "verdict"]
 
 
 def verdict(good: bool | None) -> str:
@@ -61,7 +44,7 @@ def frequency_table(
             if expected is not None and i < len(expected.values):
                 known = expected.values[i]
                 difference = (freq / known - 1) * 100
-                good = abs(difference) <= expected.within
+                good = abs(difference) <= expected.within_percent
             if good is not None and not good:
                 failing.append(len(cells))
             cells.append((*name, freq, known, difference, verdict(good)))

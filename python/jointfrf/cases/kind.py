@@ -1,71 +1,165 @@
-"""What a kind of case consists of: reading, computing, tables, figures, summary, numbers."""
+"""What a kind of case consists of: keys, computing, tables, figures, what a study computes."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Any, Generic, TypeVar
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Generic, NamedTuple, TypeVar
 
-from jointfrf.cases.studied import StudiedGroup, StudyChoice
+import numpy as np
+
+from jointfrf.cases.keys import Case, CaseKeys, ExpectedKeys, Noise
 from jointfrf.cases.workers import Workers
-from jointfrf.kernel.arguments import FloatArray
+from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.report.figure import Figure
 from jointfrf.report.table import Table
-from jointfrf.toml.keys import KeyTable
-from jointfrf.toml.table import TomlTable
+from jointfrf.spelling import did_you_mean
 
-__all__ = ["Case", "CaseKind"]
+__all__ = [
+    "CaseKind",
+    "Estimates",
+    "Estimator",
+    "Pollution",
+    "RealisationSource",
+    "StudiedColumn",
+    "StudiedGroup",
+    "StudyChoice",
+    "chosen_noises",
+]
 
 
-@dataclass(frozen=True, kw_only=True)
-class Case:
-    """What every case says, of whatever kind.
+class Estimates(NamedTuple):
+    """What realisations gave, a row each; NaN where one gave nothing.
 
     Attributes
     ----------
-    folder : Path
-        Where the case stands.
-    title, section : str
-        What it is, and where the source treats it.
-    freq_hz : ndarray, shape (n_freq,)
-        Hz.
-    realisations, seed : int
-        Realisations of the noise, and the seed they come from.
-    figure_numbers : mapping of str to str
-        Figure to its number in the source.
+    values : ndarray, shape (count, n_columns)
+        In the units of the columns.
+    low, high : ndarray, shape (count, n_columns)
+        Limits of the intervals of 95 %; NaN where there are none.
     """
 
-    folder: Path
-    title: str
-    section: str
-    freq_hz: FloatArray
-    realisations: int
-    seed: int
-    figure_numbers: Mapping[str, str]
+    values: FloatArray
+    low: FloatArray
+    high: FloatArray
 
-    @property
-    def name(self) -> str:
-        """Name of the folder."""
-        return self.folder.name
+    @classmethod
+    def without_intervals(cls, values: FloatArray) -> Estimates:
+        """Return values of an estimator that gives no intervals."""
+        missing = np.full(values.shape, np.nan)
+        return cls(values, missing, missing)
+
+
+#: Called with the number of the first realisation and how many. Realisation k does not depend on the others of a
+#: call; the object can be sent to another process.
+RealisationSource = Callable[[int, int], Estimates]
+
+#: An estimator of the user: lines, Hz, FRFs at the joint DOFs j, then k, and names of the joint DOFs to stiffness of
+#: all DOFs, then damping.
+Estimator = Callable[[FloatArray, ComplexArray, tuple[str, ...]], FloatArray]
+
+
+@dataclass(frozen=True)
+class StudiedColumn:
+    """One parameter by one estimator.
+
+    Attributes
+    ----------
+    estimator, parameter, unit : str
+    actual : float
+        NaN where it is not known.
+    bound : float
+        Least standard deviation of an unbiased estimate (Cramer-Rao), NaN where it is not known.
+    """
+
+    estimator: str
+    parameter: str
+    unit: str
+    actual: float
+    bound: float
+
+
+@dataclass(frozen=True)
+class StudiedGroup:
+    """Estimates that come from the same FRFs by one method.
+
+    Attributes
+    ----------
+    noise : str
+        Name of the noise.
+    columns : tuple of StudiedColumn
+    source : callable
+        Gives the estimates of realisations, see `RealisationSource`.
+    side_by_side : int
+        Realisations that are best computed in one call.
+    """
+
+    noise: str
+    columns: tuple[StudiedColumn, ...]
+    source: RealisationSource
+    side_by_side: int = 1
+
+
+#: Noise of the user: exact FRFs, seed and number of the realisation to FRFs with noise.
+Pollution = Callable[[ComplexArray, int, int], ComplexArray]
+
+
+@dataclass(frozen=True)
+class StudyChoice:
+    """What of a case is studied.
+
+    Attributes
+    ----------
+    noises : tuple of str
+        Names; all noises of the case if empty.
+    estimators : tuple of str
+        Methods of the kind; those that the case names for each noise if empty.
+    own_estimators : mapping of str to callable
+        See `Estimator`.
+    own_noises : mapping of str to callable
+        See `Pollution`; in the place of the noises of the case.
+    """
+
+    noises: tuple[str, ...] = ()
+    estimators: tuple[str, ...] = ()
+    own_estimators: Mapping[str, Estimator] = field(default_factory=dict)
+    own_noises: Mapping[str, Pollution] = field(default_factory=dict)
+
+
+def chosen_noises(noises: Sequence[Noise], choice: StudyChoice) -> list[Noise]:
+    """Return the noises of a case that a study takes.
+
+    Raises
+    ------
+    ValueError
+        The case has no noise of such a name.
+    """
+    names = [noise.name for noise in noises]
+    for name in choice.noises:
+        if name not in names:
+            raise ValueError(
+                f"the case has no noise {name!r}{did_you_mean(name, names) or ': it has ' + ', '.join(names)}"
+            )
+    return [noise for noise in noises if noise.name in choice.noises or not choice.noises]
 
 
 CaseT = TypeVar("CaseT", bound=Case)
 ResultT = TypeVar("ResultT")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class CaseKind(Generic[CaseT, ResultT]):
     """A kind of case: all that is needed to read one, run it and show what it yields.
 
     Attributes
     ----------
-    name : str
-        The value of `kind` in `case.toml`.
+    keys : type
+        What `case.toml` may hold; its ``tag`` is the value of the key `kind`.
+    expected_keys : type
+        What `expected.toml` may hold.
     read : callable
-        ``read(common, table, expected)`` returns the case: `common` is what every case says, already read; `table` is
-        `case.toml` and `expected` is `expected.toml` (without keys where there is none), from which it takes the keys
-        of its kind. A key that nobody asks for is an error afterwards. It raises FileContentError.
+        ``read(common, keys, expected)`` returns the case: `common` is what every case says, `keys` and `expected` are
+        what the files say, of the classes above. It raises FileContentError.
     compute : callable
         ``compute(case, n_realisations, workers)`` returns the result, a class of the kind.
     tables : callable
@@ -77,23 +171,20 @@ class CaseKind(Generic[CaseT, ResultT]):
     numbers : callable
         ``numbers(result)`` returns what `results.json` holds beside the common part and the tables.
     studied : callable, optional
-        ``studied(case, choice)`` returns what a study of the case computes, see `jointfrf.cases.studied.StudiedGroup`.
-        It raises ValueError.
+        ``studied(case, choice)`` returns what a study of the case computes, see `StudiedGroup`. It raises ValueError.
     not_printed : tuple of str
-        Keys of tables that stand in the report but are not printed.
-    keys, expected_keys : KeyTable, optional
-        What `case.toml` and `expected.toml` may hold; then a misspelt key is found before anything else is wrong, and
-        the reference of all keys has a part about the kind.
+        Keys of tables that the report has but that are not printed.
 
     Examples
     --------
-    >>> from jointfrf.cases.kinds import KINDS
-    >>> list(KINDS)
-    ['known-joint', 'bolted-lap', 'modelled-joint']
+    >>> from jointfrf.cases.catalogue import KINDS
+    >>> KINDS["bolted-lap"].name
+    'bolted-lap'
     """
 
-    name: str
-    read: Callable[[Case, TomlTable, TomlTable], CaseT]
+    keys: type[CaseKeys]
+    expected_keys: type[ExpectedKeys] = ExpectedKeys
+    read: Callable[[Case, Any, Any], CaseT]
     compute: Callable[[CaseT, int, Workers], ResultT]
     tables: Callable[[ResultT], list[Table]]
     figures: Callable[[ResultT], list[Figure]]
@@ -101,5 +192,8 @@ class CaseKind(Generic[CaseT, ResultT]):
     numbers: Callable[[ResultT], dict[str, Any]]
     studied: Callable[[CaseT, StudyChoice], list[StudiedGroup]] | None = None
     not_printed: tuple[str, ...] = ()
-    keys: KeyTable | None = None
-    expected_keys: KeyTable | None = None
+
+    @property
+    def name(self) -> str:
+        """The value of `kind` in `case.toml`."""
+        return str(self.keys.__struct_config__.tag)

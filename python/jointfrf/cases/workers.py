@@ -56,7 +56,7 @@ class RankedProcesses:
             waiting, self._waiting = self._waiting, []
         for _, _, future, _, _ in waiting:
             if future.cancel():
-                future.set_running_or_notify_cancel()  # whoever waits is told
+                future.set_running_or_notify_cancel()  # wakes those that wait for it
         self._processes.shutdown(cancel_futures=True)
 
     def _hand_out(self) -> None:
@@ -95,7 +95,7 @@ class RankedProcesses:
 
 @dataclass(frozen=True)
 class Workers:
-    """Where the parts of a computation run, and who is told how many are done.
+    """Where the parts of a computation run, and what reports how many are done.
 
     Attributes
     ----------

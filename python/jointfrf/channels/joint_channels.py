@@ -18,8 +18,8 @@ from jointfrf.channels.virtual_point import (
     virtual_point,
 )
 from jointfrf.dofs import DIRECTIONS, direction_names, direction_places, is_rotation
-from jointfrf.frf.frf_set import Channel, ChannelPlace, FrfSet, JointSide
-from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_real, check_type
+from jointfrf.frf.frf_set import Channel, ChannelPlace, FrfSet, JointSide, check_apart
+from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray, as_real, check_type
 
 __all__ = [
     "ChannelAgreement",
@@ -41,6 +41,11 @@ _SHOWN = 1e-6
 _ENTERS = 0.05
 #: Arms below this are rounding, m.
 _NO_ARM = 1e-6
+_Kind = Literal["response", "excitation"]
+#: Sides of the joint, on A and on B.
+_SIDES: tuple[JointSide, JointSide] = ("j", "k")
+#: Directions of channels in the order of `DIRECTIONS`.
+_CHANNELS = ("x", "y", "z", "rx", "ry", "rz")
 
 
 class LeftOutDof(NamedTuple):
@@ -186,7 +191,7 @@ def left_out_dofs(h: ComplexArray, interface: Interface) -> tuple[LeftOutDof, ..
             if relative.max() < _NOTHING:
                 continue
             weight = np.where(relative < _NOTHING, 0, weights[:, d])
-            shares = abs(weight) * size[d] / np.maximum(of_kept, np.finfo(float).tiny)
+            shares = abs(weight) * size[d] / np.maximum(of_kept, TINY)
             most = int((shares if shown[d] else relative).argmax())
             share = float(shares[most]) if shown[d] else np.nan
             found.append(LeftOutDof("jk"[side], dof, interface.dofs[most], float(weight[most]), share))
@@ -196,13 +201,6 @@ def left_out_dofs(h: ComplexArray, interface: Interface) -> tuple[LeftOutDof, ..
 def _rms(q: ComplexArray) -> FloatArray:
     """Return the root mean square of each row over its columns, and its median over lines."""
     return np.asarray(np.median(np.sqrt((abs(q) ** 2).mean(axis=2)), axis=0))
-
-
-_Kind = Literal["response", "excitation"]
-#: Sides of the joint, on A and on B.
-_SIDES: tuple[JointSide, JointSide] = ("j", "k")
-#: Directions of channels in the order of `DIRECTIONS`.
-_CHANNELS = ("x", "y", "z", "rx", "ry", "rz")
 
 
 @dataclass(frozen=True)
@@ -509,8 +507,7 @@ def node_dofs(node_j: int, node_k: int, dofs: Sequence[str], coordinates: Mappin
     >>> [str(channel) for channel in node_dofs(3, 4, ["y", "theta_z"], {}).channels]
     ['3:+y', '3:+rz', '4:+y', '4:+rz']
     """
-    if node_j == node_k:
-        raise ValueError(f"node {node_j} is named on both sides of the joint")
+    check_apart([node_j], [node_k])
     places = direction_places(dofs)
     n = places.size
     channels = tuple(Channel(node, _CHANNELS[place]) for node in (node_j, node_k) for place in places)

@@ -7,9 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import block_diag
 
 from jointfrf.dofs import DIRECTIONS, direction_names, direction_places, rigid_motion
-from jointfrf.frf.frf_set import Channel
+from jointfrf.frf.frf_set import Channel, check_apart
 from jointfrf.kernel.arguments import (
     ComplexArray,
     FloatArray,
@@ -32,6 +33,11 @@ __all__ = [
     "interface",
     "transform",
 ]
+
+#: Axes of translations; the place of a rotation's axis is less by their number.
+_AXES = DIRECTIONS[:3]
+#: Points count as lying on a line along an axis when they stray from it by less than this share of its length.
+_STRAY = 1e-3
 
 
 def difference_weights(spacing: float | ArrayLike) -> FloatArray:
@@ -172,7 +178,7 @@ def transform(
 
 
 class DifferenceError(NamedTuple):
-    """What finite differences will do to a rotational joint stiffness.
+    """Errors of a rotational joint stiffness by finite differences.
 
     Attributes
     ----------
@@ -190,7 +196,7 @@ class DifferenceError(NamedTuple):
 
 
 def difference_error(spacing: float | ArrayLike, bending_stiffness: float, joint_stiffness: float) -> DifferenceError:
-    """Estimate, before a test, what a spacing does to the rotational stiffness of a joint between beams.
+    """Estimate, before a test, the error of the rotational stiffness of a joint between beams by the spacing.
 
     Parameters
     ----------
@@ -229,12 +235,6 @@ def difference_error(spacing: float | ArrayLike, bending_stiffness: float, joint
     reach = float(spacing) if np.ndim(spacing) == 0 else float(np.ptp(np.asarray(spacing))) / 2  # type: ignore[arg-type]
     compliance = reach / (3 * bending_stiffness)
     return DifferenceError(compliance, compliance * joint_stiffness, float((t[1] ** 2).sum() ** 2))
-
-
-#: Axes of translations; the place of a rotation's axis is less by their number.
-_AXES = DIRECTIONS[:3]
-#: Points count as lying on a line along an axis when they stray from it by less than this share of its length.
-_STRAY = 1e-3
 
 
 class Interface(NamedTuple):
@@ -327,24 +327,17 @@ def interface(
     if not dofs:
         raise ValueError("dofs must name at least one joint DOF")
     places = direction_places(dofs).tolist()
-    shared = set(points_j) & set(points_k)
-    if shared:
-        raise ValueError(f"node {min(shared)} is named on both sides of the joint")
+    check_apart(points_j, points_k)
     sides = [_one_side(points, places, coordinates) for points in (points_j, points_k)]
-    n = len(dofs)
     (channels_j, rows_j, at_j), (channels_k, rows_k, at_k) = sides
-    transform = np.zeros((2 * n, len(channels_j) + len(channels_k)))
-    transform[:n, : len(channels_j)] = rows_j
-    transform[n:, len(channels_j) :] = rows_k
-    motion = np.zeros((transform.shape[1], 12))
-    motion[: len(channels_j), :6] = _motion(channels_j, coordinates, at_j)
-    motion[len(channels_j) :, 6:] = _motion(channels_k, coordinates, at_k)
+    motion = block_diag(_motion(channels_j, coordinates, at_j), _motion(channels_k, coordinates, at_k))
     compliance = None
     if bending_stiffness is not None:
         reach = [np.ptp([coordinates[node] for node in points], axis=0).max() / 2 for points in (points_j, points_k)]
         # Half of what both sides together add is that of each.
         own = sum(difference_error([-r, r], bending_stiffness, 1.0).compliance / 2 for r in reach if r > 0)
         compliance = np.where(np.array(places) < len(_AXES), 0.0, own)
+    transform = block_diag(rows_j, rows_k)
     return Interface((*channels_j, *channels_k), transform, (at_j, at_k), direction_names(dofs), motion, compliance)
 
 

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.linalg import block_diag
 
 from jointfrf.channels.point_lines import Interface, transform
 from jointfrf.dofs import DIRECTIONS, direction_names, direction_places, is_rotation, rigid_motion
@@ -42,6 +43,8 @@ __all__ = [
 _UNSEEN = 1e-6
 #: Directions may be rounded: their length may differ from one by this.
 _UNIT = 1e-2
+#: Residuals below this share of the motion are round-off: no channel is faulty.
+_ROUND_OFF = 1e-10
 
 
 class VirtualPoint(NamedTuple):
@@ -60,7 +63,7 @@ class VirtualPoint(NamedTuple):
     condition : float
         Condition number of W^(1/2) R with rotations times the reach of the channels (root mean square distance to the
         point), so that it does not depend on units. 1 is best; above some hundreds the point lies far from the
-        channels, or they hardly show some DOF.
+        channels, or some DOF is poorly observed.
     point : ndarray, shape (3,)
         Where it is, m.
     motion : ndarray, shape (m, 6)
@@ -221,11 +224,7 @@ def virtual_points(side_j: VirtualPoint, side_k: VirtualPoint) -> FloatArray:
     [-50.0, 50.0, 0.0, 0.0]
     """
     check_sides(side_j, side_k)
-    (n, m_j), m_k = side_j.transform.shape, side_k.transform.shape[1]
-    both_sides = np.zeros((2 * n, m_j + m_k))
-    both_sides[:n, :m_j] = side_j.transform
-    both_sides[n:, m_j:] = side_k.transform
-    return both_sides
+    return np.asarray(block_diag(side_j.transform, side_k.transform))
 
 
 def virtual_interface(side_j: VirtualPoint, side_k: VirtualPoint) -> Interface:
@@ -253,11 +252,8 @@ def virtual_interface(side_j: VirtualPoint, side_k: VirtualPoint) -> Interface:
     >>> jf.virtual_interface(side, side).modes[:2].tolist()
     [[1.0, -0.01, 0.0, 0.0], [1.0, 0.01, 0.0, 0.0]]
     """
-    transform = virtual_points(side_j, side_k)
-    motion = np.zeros((transform.shape[1], 12))
-    motion[: len(side_j.motion), :6] = side_j.motion
-    motion[len(side_j.motion) :, 6:] = side_k.motion
-    return Interface((), transform, (side_j.point, side_k.point), direction_names(side_j.dofs), motion)
+    both, motion = virtual_points(side_j, side_k), block_diag(side_j.motion, side_k.motion)
+    return Interface((), both, (side_j.point, side_k.point), direction_names(side_j.dofs), motion)
 
 
 def append_virtual_point(h: ArrayLike, channels: ArrayLike, point: VirtualPoint) -> ComplexArray:
@@ -382,10 +378,6 @@ def _check_seen(names: tuple[str, ...], size: FloatArray, right: FloatArray) -> 
     raise ValueError(f"dofs: the channels {' and '.join(faults)}")
 
 
-#: Residuals below this share of the motion are round-off: no channel is to blame.
-_ROUND_OFF = 1e-10
-
-
 class Consistency(NamedTuple):
     """Agreement of channels with the rigid interface modes of a virtual point.
 
@@ -458,7 +450,7 @@ def sensor_consistency(h: ArrayLike, point: VirtualPoint) -> Consistency:
     >>> wrong.overall.round(3).tolist(), wrong.blame.round(3).tolist()
     ([0.756], [[1.0, 1.0, 1.0]])
 
-    Three channels less two DOFs leave one residual: it cannot say which of them is wrong.
+    Three channels less two DOFs leave one residual, which does not show which of them is wrong.
     """
     check_type("point", point, VirtualPoint)
     measured = as_lines("h", h, point.modes.shape[0])

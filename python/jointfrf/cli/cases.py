@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import argparse
 
-from jointfrf.cases.catalogue import list_cases, read_case
-from jointfrf.cases.key_page import key_page
-from jointfrf.cli.output import Output
+from jointfrf.cases.catalogue import case_title, key_page, list_cases
+from jointfrf.cli.parser import CommandParser
+from jointfrf.cli.usage import Output
 
 __all__ = ["add_arguments", "run"]
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: CommandParser) -> None:
     """Describe the arguments of the command."""
     parser.description = "List the cases that come with jointfrf."
-    parser.add_argument(
-        "--keys", action="store_true", help="instead: print all keys of case.toml and expected.toml (Markdown)"
-    )
+    parser.option("--keys", "instead: print all keys of case.toml and expected.toml (Markdown)")
 
 
 def run(options: argparse.Namespace) -> int:
@@ -25,8 +23,9 @@ def run(options: argparse.Namespace) -> int:
         print(key_page(), end="")  # a page for a file, whatever else is asked for
         return 0
     out = Output(options)
-    found = [read_case(folder) for folder in list_cases()]
-    width = max((len(case.name) for case in found), default=0)
-    out.say(*(f"{case.name.ljust(width)}  {case.title}" for case in found))
-    out.give({"cases": [{"name": case.name, "title": case.title, "folder": str(case.folder)} for case in found]})
+    found = {folder: case_title(folder) for folder in list_cases()}
+    width = max((len(folder.name) for folder in found), default=0)
+    out.say(*(f"{folder.name.ljust(width)}  {title}" for folder, title in found.items()))
+    out.give({"cases": [{"name": folder.name, "title": title, "folder": str(folder.resolve())}
+                        for folder, title in found.items()]})  # fmt: skip
     return 0

@@ -8,13 +8,14 @@ from jointfrf.channels.check.check import check_frfs
 from jointfrf.channels.check.finding import FrfCheck
 from jointfrf.cli.measured_file import add_file_arguments, file_names, in_some_band, read_receptances
 from jointfrf.cli.measured_joint import MeasuredJoint, measured_joint
-from jointfrf.cli.output import Output
+from jointfrf.cli.parser import CommandParser
+from jointfrf.cli.usage import Output
 from jointfrf.errors import FileContentError
 
 __all__ = ["add_arguments", "check_joint", "run"]
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: CommandParser) -> None:
     """Describe the arguments of the command."""
     parser.description = (
         "Look at measured FRFs: what the file holds; quantity, time convention, sign, gain, delay and units of each "
@@ -46,6 +47,7 @@ def run(args: argparse.Namespace) -> int:
         check = check_joint(joint)
         warned = [*joint.warnings()]
         out.say(*joint.text(), *(f"warning: {text}" for text in warned))
+        out.warn(*warned)
     else:
         missing = int((~frfs.measured).sum())
         if missing:
@@ -56,6 +58,7 @@ def run(args: argparse.Namespace) -> int:
         lines = in_some_band(frfs.freq_hz, frfs.h, args.band)
         check, warned = check_frfs(*lines, responses=frfs.responses, forces=frfs.excitations), []
     out.say(f"{file_names(args)}: {check}")
+    out.warn(*(finding for finding in check.findings if finding.level != "note"))
     about = {} if joint is None else {"joint": joint.to_dict(), "warnings": warned}
     out.give({"sources": [str(path) for path in args.files], "quantity": frfs.stated, **check.to_dict(), **about})
     return 0 if check.ok and not warned else 1

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 
-from jointfrf.cli.output import Output
-from jointfrf.cli.parser import COMMANDS, top_parser
+from jointfrf.cli.parser import COMMANDS, CommandParser, command_parser, one_of, top_parser
+from jointfrf.cli.usage import Output
 from jointfrf.extras import import_extra
 
 __all__ = ["add_arguments", "run"]
@@ -13,36 +14,27 @@ __all__ = ["add_arguments", "run"]
 _SHELLS = ("bash", "zsh", "fish")
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: CommandParser) -> None:
     """Describe the arguments of the command."""
     parser.description = (
         "Print a script that completes commands, options, their values and files. bash: jointfrf completion bash > "
         "~/.local/share/bash-completion/completions/jointfrf; zsh: jointfrf completion zsh > _jointfrf in a folder of "
         "$fpath; fish: jointfrf completion fish > ~/.config/fish/completions/jointfrf.fish."
     )
-    parser.add_argument("shell", choices=_SHELLS, help="the shell")
+    parser.add_argument("shell", choices=_SHELLS, type=one_of(_SHELLS), help="the shell")
 
 
 def run(args: argparse.Namespace) -> int:
     """Carry out the command."""
     shtab = import_extra("shtab")
-    parser = top_parser(whole=COMMANDS)
-    _complete_files(parser, shtab.FILE)
+    parser, commands = top_parser()
+    for name, command in commands.items():
+        for argument in command_parser(name, command).arguments:
+            if argument.type is Path or argument.metavar == "FILE":
+                argument.complete = shtab.FILE  # type: ignore[attr-defined]
+        command.description = COMMANDS[name]  # a short one
     script = shtab.complete(parser, shell=args.shell)
     out = Output(args)
     out.say(script)
     out.give({"shell": args.shell, "script": script})
     return 0
-
-
-def _complete_files(parser: argparse.ArgumentParser, files: object) -> None:
-    """Say which options and arguments take files."""
-    from pathlib import Path
-
-    for action in parser._actions:
-        if isinstance(action, argparse._SubParsersAction):
-            for name, command in action.choices.items():
-                command.description = COMMANDS[name]  # a short one
-                _complete_files(command, files)
-        elif action.type is Path or action.metavar == "FILE":
-            action.complete = files  # type: ignore[attr-defined]

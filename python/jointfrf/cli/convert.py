@@ -5,12 +5,11 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from jointfrf.cli.measured_file import add_quantity_arguments, nodes, parse_band, read_with_warnings
-from jointfrf.cli.output import Output
-from jointfrf.cli.structure_file import check_target
-from jointfrf.cli.usage import UsageError
-from jointfrf.frf.frf_set import FrfSet
-from jointfrf.io import write_frfs
+from jointfrf.cli.frf import check_target
+from jointfrf.cli.measured_file import add_quantity_arguments, nodes, parse_band
+from jointfrf.cli.parser import CommandParser
+from jointfrf.cli.usage import Output, UsageError
+from jointfrf.io import FrfSet, read_frfs, write_frfs
 from jointfrf.io.formats import format_names
 
 __all__ = ["add_arguments", "run"]
@@ -18,7 +17,7 @@ __all__ = ["add_arguments", "run"]
 _FIELDS = ("freq_hz", "h", "responses", "excitations", "axes", "quantity", "unit", "coherence", "averages")
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: CommandParser) -> None:
     """Describe the arguments of the command."""
     parser.description = (
         f"Read measured FRFs, {format_names()}, whose format is detected from their content, and write them, in SI "
@@ -27,14 +26,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("files", nargs="+", type=Path, metavar="IN", help="files to read, and last the one to write")
     add_quantity_arguments(parser)
-    parser.add_argument(
-        "--map", type=_field, action="append", default=[], metavar="FIELD=NAME",
-        help=f"which field of a MATLAB, NPZ or HDF5 file is what: {', '.join(_FIELDS)}; channels also as names "
+    parser.option(
+        "--map FIELD=NAME",
+        f"which field of a MATLAB, NPZ or HDF5 file is what: {', '.join(_FIELDS)}; channels also as names "
         "(responses=1:x,2:x), axes as freq,out,in in their order; may be repeated",
-    )  # fmt: skip
-    parser.add_argument("--nodes", type=nodes, metavar="NODES", help="only FRFs between these nodes: 102,104")
-    parser.add_argument("--band", type=parse_band, metavar="LOW:HIGH", help="only the lines in this band in Hz")
-    parser.add_argument("--averages", type=float, metavar="N", help="number of averages, where the files do not say it")
+        _field,
+        [],
+        repeated=True,
+    )
+    parser.option("--nodes NODES", "only FRFs between these nodes: 102,104", nodes)
+    parser.option("--band LOW:HIGH", "only the lines in this band in Hz", parse_band)
+    parser.option("--averages N", "number of averages, where the files do not say it", float)
 
 
 def _field(text: str) -> tuple[str, str]:
@@ -52,7 +54,7 @@ def run(args: argparse.Namespace) -> int:
     check_target(target)
     if any(target.exists() and source.exists() and target.samefile(source) for source in sources):
         raise UsageError(f"{target} is one of the files to read")
-    frfs = read_with_warnings(
+    frfs = read_frfs(
         *sources,
         quantity=args.quantity,
         force_quantity=args.force_quantity,

@@ -10,16 +10,16 @@ from pathlib import Path
 import numpy as np
 
 from jointfrf.channels.virtual_point import append_virtual_point, channel_geometry, virtual_point
-from jointfrf.cli.measured_file import Nodes, add_quantity_arguments, nodes, point
-from jointfrf.cli.output import Output
-from jointfrf.cli.structure_file import (
+from jointfrf.cli.frf import (
     add_line_arguments,
     check_target,
     lines_of,
     own_matrix,
     read_structures,
 )
-from jointfrf.cli.usage import UsageError, waiting
+from jointfrf.cli.measured_file import Nodes, add_quantity_arguments, nodes, point
+from jointfrf.cli.parser import CommandParser
+from jointfrf.cli.usage import Output, UsageError, waiting
 from jointfrf.dofs import direction_places
 from jointfrf.errors import FileContentError
 from jointfrf.identification.joint_file import read_joint_file
@@ -34,7 +34,7 @@ __all__ = ["add_arguments", "joint_channels_of", "renumbered", "run", "shifted"]
 _CHANNELS = ("x", "y", "z", "rx", "ry", "rz")
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: CommandParser) -> None:
     """Describe the arguments of the command."""
     parser.description = (
         "Couple two substructures by a joint (2.26) and write the FRFs of the assembly. A substructure is a file of "
@@ -43,18 +43,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("a", type=Path, metavar="A", help="substructure A: file of FRFs, or model (.toml)")
     parser.add_argument("b", type=Path, metavar="B", help="substructure B")
-    parser.add_argument("--joint", type=Path, metavar="FILE", help="the joint: .json or .toml")
-    parser.add_argument("--j", type=nodes, metavar="NODES", help="node of A at the joint, which has its DOFs; or, with "
-                        "--at, nodes around it")  # fmt: skip
-    parser.add_argument("--k", type=nodes, metavar="NODES", help="node or nodes of B")
-    parser.add_argument("--at", type=point, metavar="X,Y,Z", help="reference point of virtual points, m")
-    parser.add_argument(
-        "--renumber-b", type=int, default=0, metavar="N", help="add N to the nodes of B, where both have the same"
-    )
-    parser.add_argument(
-        "--shift-b", type=point, default=(0.0, 0.0, 0.0), metavar="X,Y,Z", help="add this to the coordinates of B, m"
-    )
-    parser.add_argument("--output", type=Path, metavar="FILE", help=f"file to write: {format_names(written=True)}")
+    parser.option("--joint FILE", "the joint: .json or .toml", Path)
+    parser.option("--j NODES", "node of A at the joint, which has its DOFs; or, with --at, nodes around it", nodes)
+    parser.option("--k NODES", "node or nodes of B", nodes)
+    parser.option("--at X,Y,Z", "reference point of virtual points, m", point)
+    parser.option("--renumber-b N", "add N to the nodes of B, where both have the same", int, 0)
+    parser.option("--shift-b X,Y,Z", "add this to the coordinates of B, m", point, (0.0, 0.0, 0.0))
+    parser.option("--output FILE", f"file to write: {format_names(written=True)}", Path)
     add_line_arguments(parser)
     add_quantity_arguments(parser)
 
@@ -135,7 +130,7 @@ def _coupled(
             f"node {min(shared)} is in {a.source} and in {b.source}: --renumber-b N adds a number to those of B"
         )
     h = couple(matrices[0], matrices[1], joint, ends[0], ends[1], freq_hz=a.freq_hz)
-    # Virtual points stand behind the channels of their side, and are not measured.
+    # Virtual points follow the channels of their side, and are not measured.
     n_a, own_a, own_b = matrices[0].shape[1], len(channels[0]), len(channels[1])
     kept = [*range(own_a), *range(n_a, n_a + own_b)]
     names = (*channels[0], *channels[1])

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from jointfrf.cli.couple import joint_channels_of, renumbered, shifted
+from jointfrf.cli.frf import own_matrix, read_structures
 from jointfrf.cli.measured_file import (
     Nodes,
     add_quantity_arguments,
@@ -19,9 +20,8 @@ from jointfrf.cli.measured_file import (
     shown_nodes,
     words,
 )
-from jointfrf.cli.output import Output
-from jointfrf.cli.structure_file import own_matrix, read_structures
-from jointfrf.cli.usage import UsageError, check_folder, waiting
+from jointfrf.cli.parser import CommandParser
+from jointfrf.cli.usage import Output, UsageError, check_folder, waiting
 from jointfrf.errors import FileContentError, IdentificationWarning
 from jointfrf.files import write_file
 from jointfrf.identification.band_means import identify_band_mean
@@ -48,7 +48,7 @@ def _channels(text: str) -> list[Channel]:
         raise argparse.ArgumentTypeError(str(error)) from None
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: CommandParser) -> None:
     """Describe the arguments of the command."""
     parser.description = (
         "Identify a joint by FRF decoupling, (2.53) to (2.56): from FRFs of the assembly at internal points r of A and "
@@ -58,29 +58,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("a", type=Path, metavar="A", help="substructure A: file of FRFs, or model (.toml)")
     parser.add_argument("b", type=Path, metavar="B", help="substructure B")
     parser.add_argument("assembly", type=Path, metavar="ASSEMBLY", help="file of FRFs of the assembly")
-    parser.add_argument(
+    parser.option(
         "--equation",
-        choices=tuple(_METHODS),
-        default="ss",
-        help="responding and excited point: (2.53) rr, (2.54) rs, (2.55) sr, (2.56) ss (default)",
+        "responding and excited point: (2.53) rr, (2.54) rs, (2.55) sr, (2.56) ss (default)",
+        tuple(_METHODS),
+        "ss",
     )
-    parser.add_argument("--j", type=nodes, metavar="NODE", help="node of A at the joint")
-    parser.add_argument("--k", type=nodes, metavar="NODE", help="node of B at the joint")
-    parser.add_argument("--dofs", type=joint_dofs, metavar="DOFS", help="joint DOFs, which both nodes have: y,rz")
-    parser.add_argument("--r", type=_channels, metavar="CHANNELS", help="as many channels of A: 7:y,7:rz")
-    parser.add_argument("--s", type=_channels, metavar="CHANNELS", help="as many channels of B")
-    parser.add_argument(
-        "--renumber-b",
-        type=int,
-        default=0,
-        metavar="N",
-        help="add N to the nodes of B, --k and --s, as jointfrf couple did for the assembly",
+    parser.option("--j NODE", "node of A at the joint", nodes)
+    parser.option("--k NODE", "node of B at the joint", nodes)
+    parser.option("--dofs DOFS", "joint DOFs, which both nodes have: y,rz", joint_dofs)
+    parser.option("--r CHANNELS", "as many channels of A: 7:y,7:rz", _channels)
+    parser.option("--s CHANNELS", "as many channels of B", _channels)
+    parser.option(
+        "--renumber-b N", "add N to the nodes of B, --k and --s, as jointfrf couple did for the assembly", int, 0
     )
-    parser.add_argument(
-        "--band", type=parse_band, action="append", metavar="LOW:HIGH", help="sensitive band in Hz; may be repeated"
-    )
-    parser.add_argument("--save", type=Path, metavar="FILE", help="keep the joint in a JSON file")
-    parser.add_argument("--output", type=Path, metavar="FILE", help="K* of each line as a CSV file")
+    parser.option("--band LOW:HIGH", "sensitive band in Hz; may be repeated", parse_band, repeated=True)
+    parser.option("--save FILE", "keep the joint in a JSON file", Path)
+    parser.option("--output FILE", "K* of each line as a CSV file", Path)
     add_quantity_arguments(parser)
 
 
@@ -123,6 +117,7 @@ def run(args: argparse.Namespace) -> int:
     if args.output is not None:
         write_file(args.output, _line_table(fit))
         written.append(args.output)
+    out.warn(*fit.warnings)
     out.say(fit, *([""] if written else []), *(f"wrote {path}" for path in written))
     fits = [fit_to_dict(fit, lines=False)]
     out.give({"equation": args.equation, "fits": fits, "written": [str(path) for path in written]})

@@ -1,33 +1,31 @@
-"""`jointfrf export`: a saved joint as input of a finite-element program."""
+"""`jointfrf export`: a saved joint as input of a finite-element program; and the cards of `jointfrf identify`."""
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple, cast, get_args
 
 import numpy as np
 
-from jointfrf.cli.card_options import (
-    add_card_arguments,
-    add_joint_place,
-    card_request,
-    parse_export,
-    written_cards,
-)
-from jointfrf.cli.measured_file import numbers
-from jointfrf.cli.output import Output
-from jointfrf.cli.usage import UsageError
+from jointfrf.cli.measured_file import nodes, numbers, point, words
+from jointfrf.cli.parser import CommandParser
+from jointfrf.cli.usage import Output, UsageError, check_folder, positive, warn_of_ignored
 from jointfrf.files import write_file
+from jointfrf.identification.fit_cards import cards
 from jointfrf.identification.joint_file import JointFile, read_joint_file
-from jointfrf.io.cards import CardOptions
+from jointfrf.identification.result import Fit
+from jointfrf.io.cards import CardFormat, CardOptions
 from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import FloatArray
 from jointfrf.laws.law_joint import LawJoint
+from jointfrf.spelling import did_you_mean
 
-__all__ = ["add_arguments", "run"]
+__all__ = ["CardRequest", "add_arguments", "add_card_arguments", "card_request", "parse_export", "run", "written_cards"]
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: CommandParser) -> None:
     """Describe the arguments of the command."""
     parser.description = (
         "Write a joint as input of a finite-element program: abaqus (springs and dashpots, or matrices), calculix "
@@ -40,13 +38,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="PROGRAM:J,K",
         help="program and nodes j and k of its model: nastran:9001,9002; calculix: two ROT NODEs more for rotations",
     )
-    parser.add_argument(
-        "--frequency",
-        type=_frequency,
-        metavar="HZ",
-        help="where laws that depend on frequency are taken: cards hold k, c and h only",
+    parser.option(
+        "--frequency HZ", "where laws that depend on frequency are taken: cards hold k, c and h only", _frequency
     )
-    add_joint_place(parser)
+    parser.option("--joint-at X,Y,Z", "reference point of the joint in the model, m (default: saved)", point)
     add_card_arguments(parser)
 
 
@@ -61,6 +56,10 @@ def run(args: argparse.Namespace) -> int:
     """Carry out the command; the caller turns exceptions into messages."""
     out = Output(args)
     found = read_joint_file(args.joint)
+    if isinstance(found.joint, Joint):
+        warn_of_ignored(args, ("--frequency",), "no law of this joint depends on frequency")
+    if args.nodes_at is None:
+        warn_of_ignored(args, ("--joint-at",), "without --nodes-at the nodes are taken to lie at the joint")
     damping, cross = _terms(_springs(found.joint, args.frequency))
     request = card_request(args, found.joint.dofs, damping=damping, cross=cross, points=_points(args, found))
     assert request is not None
@@ -110,3 +109,137 @@ def _points(args: argparse.Namespace, found: JointFile) -> FloatArray | None:
     if args.joint_at is not None:
         return np.tile(args.joint_at, (2, 1))
     return found.points
+
+
+class CardRequest(NamedTuple):
+    """What is to be written, and where.
+
+    Attributes
+    ----------
+    program : str
+    nodes : list of int
+        j and k.
+    options : CardOptions
+    all_damping : bool
+    output : Path or None
+        None: to be printed.
+    """
+
+    program: CardFormat
+    nodes: list[int]
+    options: CardOptions
+    all_damping: bool
+    output: Path | None
+
+
+def parse_export(text: str) -> tuple[CardFormat, list[int]]:
+    """Return program and nodes of words like abaqus:9001,9002."""
+    program, _, rest = text.partition(":")
+    known = get_args(CardFormat)
+    if program not in known:
+        raise argparse.ArgumentTypeError(f"{program!r} is none of {', '.join(known)}{did_you_mean(program, known)}")
+    ends = list(nodes(rest).numbers) if rest else []
+    if 0 < len(ends) < len(words(rest)):
+        raise argparse.ArgumentTypeError(f"{text!r} names a node twice")
+    if len(ends) not in (2, 4 if program == "calculix" else 2):
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not a program and nodes j and k like abaqus:9001,9002; calculix takes two ROT NODEs more"
+        )
+    return cast(CardFormat, program), ends
+
+
+def _positions(text: str) -> tuple[tuple[float, ...], ...]:
+    found = numbers(text, 6, "xj,yj,zj,xk,yk,zk in m")
+    return found[:3], found[3:]
+
+
+def add_card_arguments(parser: CommandParser) -> None:
+    """Describe what belongs to the cards of any program."""
+    parser.option("--output FILE", "write the cards into this file: joint.bdf", Path)
+    parser.option(
+        "--nodes-at XJ,YJ,ZJ,XK,YK,ZK",
+        "where the two nodes of the model are, m: rigid arms lead from them to the reference point of the joint "
+        "(without it the nodes are taken to lie there)",
+        _positions,
+    )
+    parser.option("--element N", "first number of new elements (1)", positive, 1)
+    parser.option("--property N", "first number of properties (1)", positive, 1)
+    parser.option("--full-matrix", "matrices where springs would do (abaqus, nastran)")
+    parser.option("--all-damping", "also dashpots that are negative or not significantly above zero")
+    parser.option("--no-damping", "no damping in the cards")
+
+
+def card_request(
+    args: argparse.Namespace, dofs: Sequence[str], *, damping: str, cross: str, points: FloatArray | None
+) -> CardRequest | None:
+    """Return what is to be written, after a look at whether the program can hold such a joint.
+
+    Parameters
+    ----------
+    args : Namespace
+    dofs : sequence of str
+        Joint DOFs.
+    damping, cross : str
+        Terms that the joint may have.
+    points : ndarray, shape (2, 3), or None
+        Reference points of the sides, m.
+
+    Raises
+    ------
+    UsageError
+        The program cannot hold it, or a number is out of range.
+    """
+    if args.export is None:
+        for name, given in (("--output", args.output), ("--nodes-at", args.nodes_at)):
+            if given is not None:
+                raise UsageError(f"{name} is for cards: say --export PROGRAM:J,K, too")
+        flags = ("--element", "--property", "--full-matrix", "--all-damping", "--no-damping")
+        warn_of_ignored(args, flags, "it is for cards, --export PROGRAM:J,K")
+        return None
+    check_folder("--output", args.output)
+    program, ends = args.export
+    options: CardOptions = {
+        "element": args.element,
+        "number": args.property,
+        "rotation_nodes": ends[2:] or None,
+        "damping": not args.no_damping and program != "calculix",  # it has none between DOFs; the text says so
+        "full_matrix": args.full_matrix,
+    }
+    if args.nodes_at is not None:
+        if points is None:
+            raise UsageError("--nodes-at needs --joint-at X,Y,Z, the reference point of the joint")
+        options["positions"], options["points"] = np.array(args.nodes_at), points
+    request = CardRequest(program, ends[:2], options, args.all_damping, args.output)
+    try:
+        _probe(len(dofs), dofs, damping, cross).export(request.program, request.nodes, **options)
+    except ValueError as error:
+        raise UsageError(_refusal(str(error), damping)) from error
+    return request
+
+
+def _probe(n: int, dofs: Sequence[str], damping: str, cross: str) -> Joint:
+    """Return a joint with every term that the one to be found may have."""
+    matrix = np.eye(n) + (0.1 if cross == "fit" else 0.0) * (1 - np.eye(n))
+    viscous = matrix if damping in ("viscous", "both", "auto") else None
+    hysteretic = matrix if damping in ("hysteretic", "both", "auto") else None
+    return Joint(matrix, viscous, dofs, structural_damping=hysteretic)
+
+
+def _refusal(why: str, damping: str) -> str:
+    """Say with the words of the command line what a program cannot hold."""
+    if "hysteretic" in why:
+        may = f"--damping {damping} may find" if damping == "auto" else f"--damping {damping} fits"
+        return f"MATRIX27 of ansys holds no hysteretic damping, which {may}: say --damping viscous, or --no-damping"
+    if "rotation_nodes must" in why:
+        return "rotations of calculix need the ROT NODEs of both rigid bodies after their nodes: calculix:J,K,ROTJ,ROTK"
+    return why.replace("full_matrix", "--full-matrix")
+
+
+def written_cards(fit: Fit, request: CardRequest, about: Sequence[str]) -> str:
+    """Return the cards of a fit, and write them where that is wanted."""
+    text = cards(
+        fit, request.program, request.nodes, about=about, all_damping=request.all_damping, **request.options
+    )  # fmt: skip
+    if request.output is not None:
+        write_file(request.output, text)
+    return text

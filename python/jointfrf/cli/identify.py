@@ -13,8 +13,8 @@ import numpy as np
 from jointfrf.channels.check.check import warn_of_frfs
 from jointfrf.channels.check.finding import FrfCheck
 from jointfrf.channels.point_lines import difference_error
-from jointfrf.cli.card_options import add_card_arguments, card_request, parse_export, written_cards
 from jointfrf.cli.check import check_joint
+from jointfrf.cli.export import add_card_arguments, card_request, parse_export, written_cards
 from jointfrf.cli.identify_model import add_model_arguments, run_model
 from jointfrf.cli.joint_laws import add_law_arguments, joint_of_laws
 from jointfrf.cli.measured_file import (
@@ -26,8 +26,8 @@ from jointfrf.cli.measured_file import (
     words,
 )
 from jointfrf.cli.measured_joint import MeasuredJoint, measured_joint
-from jointfrf.cli.output import Output, plain
-from jointfrf.cli.usage import UsageError, check_folder, waiting
+from jointfrf.cli.parser import CommandParser
+from jointfrf.cli.usage import Output, UsageError, check_folder, plain, waiting, warn_of_ignored
 from jointfrf.dofs import is_rotation
 from jointfrf.errors import ConvergenceWarning, FrfCheckWarning, IdentificationWarning
 from jointfrf.extras import check_extras
@@ -56,7 +56,7 @@ def _methods(text: str) -> list[str]:
     return found
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: CommandParser) -> None:
     """Describe the arguments of the command."""
     parser.description = (
         "Identify a joint from the FRFs of an assembly. Accelerances and mobilities become receptances. The DOFs of "
@@ -66,55 +66,37 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_file_arguments(parser)
     add_model_arguments(parser)
-    fit = parser.add_argument_group("the fit")
-    fit.add_argument(
-        "--method",
-        type=_methods,
-        default=["compliance"],
-        metavar="METHODS",
-        help=f"one or several of {','.join(_METHODS)} (default: compliance)",
+    parser.heading("the fit")
+    parser.option(
+        "--method METHODS", f"one or several of {','.join(_METHODS)} (default: compliance)", _methods, ["compliance"]
     )
-    fit.add_argument(
+    parser.option(
         "--damping",
-        choices=(*get_args(DampingTerms), "auto"),
-        default="auto",
-        help="damping terms of K* = k (1 + i eta) + i w c (default: auto, what the data support)",
+        "damping terms of K* = k (1 + i eta) + i w c (default: auto, what the data support)",
+        (*get_args(DampingTerms), "auto"),
+        "auto",
     )
-    fit.add_argument(
-        "--cross",
-        choices=get_args(CrossTerms),
-        default="zero",
-        help="terms between the joint DOFs: none (default), not looked at, fitted",
+    parser.option(
+        "--cross", "terms between the joint DOFs: none (default), not looked at, fitted", get_args(CrossTerms), "zero"
     )
-    add_law_arguments(fit)
-    fit.add_argument(
-        "--noise",
-        type=float,
-        metavar="LEVEL",
-        help="relative noise of the FRFs, 0.01 for 1 %% (default: from their reciprocity)",
+    add_law_arguments(parser)
+    parser.option("--noise LEVEL", "relative noise of the FRFs, 0.01 for 1 %% (default: from their reciprocity)", float)
+    parser.option(
+        "--bending-stiffness EI",
+        "E I of the thinner part in N m^2: says how much compliance the differences along a line add",
+        float,
     )
-    fit.add_argument(
-        "--bending-stiffness",
-        type=float,
-        metavar="EI",
-        help="E I of the thinner part in N m^2: tells how much compliance the differences along a line add",
-    )
-    results = parser.add_argument_group("results")
-    results.add_argument("--out", type=Path, metavar="DIR", help="folder for identification.json and figures")
-    results.add_argument(
-        "--report", type=Path, metavar="FILE", help="the identification by method compliance as one HTML page"
-    )
-    results.add_argument(
-        "--save", type=Path, metavar="FILE", help="keep the joint (by the first method) in a JSON file"
-    )
-    results.add_argument(
-        "--export",
-        type=parse_export,
-        metavar="PROGRAM:J,K",
-        help="the joint (by the first method) as input of abaqus, calculix (stiffness only), nastran or ansys, between "
+    parser.heading("results")
+    parser.option("--out DIR", "folder for identification.json and figures", Path)
+    parser.option("--report FILE", "the identification by method compliance as one HTML page", Path)
+    parser.option("--save FILE", "keep the joint (by the first method) in a JSON file", Path)
+    parser.option(
+        "--export PROGRAM:J,K",
+        "the joint (by the first method) as input of abaqus, calculix (stiffness only), nastran or ansys, between "
         "its nodes J and K: abaqus:9001,9002; rotations of calculix need two ROT NODEs after them",
+        parse_export,
     )
-    add_card_arguments(results)
+    add_card_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -141,12 +123,17 @@ def run(args: argparse.Namespace) -> int:
     warn_of_frfs(check)
     for text in joint.warnings():
         warnings.warn(text, FrfCheckWarning, stacklevel=2)
+    if "compliance" not in args.method:
+        warn_of_ignored(args, ("--damping", "--cross", "--noise"), f"method {args.method[0]} does not use it")
+    if joint.channels is not None or len(joint.nodes[0]) == 1:
+        warn_of_ignored(args, ("--bending-stiffness",), "no rotation is found by differences along a line")
     out.say(*_heading(args, frfs, joint))
     fits = []
     for method in args.method:
         with waiting(f"fit by {method}"):
             fits.append(_fit(args, method, frfs, joint, laws))
         out.say("", fits[-1])
+        out.warn(*fits[-1].warnings)
     text, written = "", []
     if request is not None:
         about = [f"from {file_names(args)}", *_places(joint)]
@@ -217,7 +204,7 @@ def _differences(args: argparse.Namespace, joint: MeasuredJoint) -> Iterator[str
 
 def _fit(args: argparse.Namespace, method: str, frfs: FrfSet, joint: MeasuredJoint, laws: LawJoint | None) -> Fit:
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", IdentificationWarning)  # they stand in the table
+        warnings.simplefilter("ignore", IdentificationWarning)  # they are in the table
         warnings.simplefilter("ignore", ConvergenceWarning)
         warnings.simplefilter("ignore", FrfCheckWarning)  # told with the names of the channels
         if method == "compliance":
@@ -267,7 +254,7 @@ def _save(path: Path, fit: Fit, source: str, joint: MeasuredJoint) -> None:
 
 def _write_figures(args: argparse.Namespace, frfs: FrfSet, joint: MeasuredJoint, fits: list[Fit]) -> list[Path]:
     from jointfrf.report.fit import write_fit
-    from jointfrf.report.noise import noise_figure
+    from jointfrf.report.receptance import noise_figure
 
     figures = []
     if "compliance" in args.method and args.noise is None:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from jointfrf.cli.parser import CommandParser
 from jointfrf.cli.usage import UsageError
 from jointfrf.identification.joint_file import read_joint_file
 from jointfrf.joint import Joint
@@ -34,19 +35,16 @@ def _law(text: str) -> tuple[str, str]:
     return dof.strip(), word
 
 
-def add_law_arguments(parser: argparse._ActionsContainer) -> None:
+def add_law_arguments(parser: CommandParser) -> None:
     """Describe what says the laws of the joint."""
-    parser.add_argument(
-        "--law",
-        type=_law,
-        action="append",
-        metavar="DOF=LAW",
-        help=f"law of a joint DOF, once for each: y=standard-linear-solid, theta=rigid; {', '.join(LAW_WORDS)}, a "
-        "spring with --damping (auto: viscous); no values are needed",
+    parser.option(
+        "--law DOF=LAW",
+        f"law of a joint DOF, once for each: y=standard-linear-solid, theta=rigid; {', '.join(LAW_WORDS)}, a spring "
+        "with --damping (auto: viscous); no values are needed",
+        _law,
+        repeated=True,
     )
-    parser.add_argument(
-        "--joint", type=Path, metavar="FILE", help="joint of laws in a TOML file, with values where the fit may start"
-    )
+    parser.option("--joint FILE", "joint of laws in a TOML file, with values where the fit may start", Path)
 
 
 def joint_of_laws(args: argparse.Namespace, dofs: Sequence[str]) -> LawJoint | None:

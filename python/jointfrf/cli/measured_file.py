@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import sys
-import warnings
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from jointfrf.cli.parser import CommandParser
 from jointfrf.cli.usage import UsageError
 from jointfrf.dofs import direction_names
 from jointfrf.errors import FileContentError
@@ -18,7 +17,6 @@ from jointfrf.frf.bands import in_bands
 from jointfrf.io import FrfSet, read_frfs
 from jointfrf.io.formats import format_names
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
-from jointfrf.spelling import visible
 
 __all__ = [
     "Nodes",
@@ -33,7 +31,6 @@ __all__ = [
     "parse_band",
     "point",
     "read_receptances",
-    "read_with_warnings",
     "shown_nodes",
     "words",
 ]
@@ -148,7 +145,7 @@ def parse_band(text: str) -> tuple[float, float]:
     return low, high
 
 
-def add_file_arguments(parser: argparse.ArgumentParser) -> None:
+def add_file_arguments(parser: CommandParser) -> None:
     """Describe the file, the points on both sides, the DOFs, the bands."""
     parser.add_argument(
         "files",
@@ -160,78 +157,55 @@ def add_file_arguments(parser: argparse.ArgumentParser) -> None:
     add_joint_arguments(parser)
 
 
-def add_joint_arguments(parser: argparse.ArgumentParser) -> None:
+def add_joint_arguments(parser: CommandParser) -> None:
     """Describe the points on both sides, the DOFs, the bands, the quantity: what belongs to a project."""
-    joint = parser.add_argument_group("the joint in the file")
-    joint.add_argument("--j", type=nodes, metavar="NODES", help="nodes on side j: 102,104 or 101:116")
-    joint.add_argument("--k", type=nodes, metavar="NODES", help="nodes on side k; without --at in the same order")
-    joint.add_argument(
-        "--dofs",
-        type=joint_dofs,
-        metavar="DOFS",
-        help="joint DOFs out of x,y,z,theta_x,theta_y,theta_z (or rx,ry,rz), like y,theta_x",
+    parser.heading("the joint in the file")
+    parser.option("--j NODES", "nodes on side j: 102,104 or 101:116", nodes)
+    parser.option("--k NODES", "nodes on side k; without --at in the same order", nodes)
+    parser.option(
+        "--dofs DOFS", "joint DOFs out of x,y,z,theta_x,theta_y,theta_z (or rx,ry,rz), like y,theta_x", joint_dofs
     )
-    joint.add_argument(
-        "--at",
-        type=point,
-        metavar="X,Y,Z",
-        help="reference point of the joint in m: its DOFs are then those of virtual points there, from all channels of "
+    parser.option(
+        "--at X,Y,Z",
+        "reference point of the joint in m: its DOFs are then those of virtual points there, from all channels of "
         "the nodes; without it, the nodes of each side lie along a line",
+        point,
     )
-    joint.add_argument("--at-k", type=point, metavar="X,Y,Z", help="reference point of side k, where it is another one")
-    joint.add_argument(
-        "--channels",
-        type=Path,
-        metavar="TABLE",
-        help="TOML or CSV table of sensors and impacts: side, position, direction; where the file of FRFs lacks them "
+    parser.option("--at-k X,Y,Z", "reference point of side k, where it is another one", point)
+    parser.option(
+        "--channels TABLE",
+        "TOML or CSV table of sensors and impacts: side, position, direction; where the file of FRFs lacks them "
         "(needs --at)",
+        Path,
     )
-    joint.add_argument(
-        "--spacing",
-        type=float,
-        metavar="METRES",
-        help="distance between neighbouring nodes along a line, where the file has no coordinates; needs --axis",
+    parser.option(
+        "--spacing METRES",
+        "distance between neighbouring nodes along a line, where the file has no coordinates; needs --axis",
+        float,
     )
-    joint.add_argument("--axis", choices=("x", "y", "z"), help="direction of the line of nodes, with --spacing")
-    joint.add_argument(
-        "--band", type=parse_band, action="append", metavar="LOW:HIGH", help="frequency band in Hz; may be repeated"
-    )
-    add_quantity_arguments(joint)
+    parser.option("--axis", "direction of the line of nodes, with --spacing", ("x", "y", "z"))
+    parser.option("--band LOW:HIGH", "frequency band in Hz; may be repeated", parse_band, repeated=True)
+    add_quantity_arguments(parser)
 
 
-def add_quantity_arguments(parser: argparse._ActionsContainer) -> None:
-    """Describe what a user says of the FRFs of a file."""
-    parser.add_argument(
-        "--quantity",
-        choices=("receptance", "mobility", "accelerance"),
-        help="what the FRFs are, where the file does not say",
+def add_quantity_arguments(parser: CommandParser) -> None:
+    """Describe the options that say what the FRFs of a file are."""
+    parser.option(
+        "--quantity", "what the FRFs are, where the file does not say", ("receptance", "mobility", "accelerance")
     )
-    parser.add_argument(
-        "--force-quantity", action="store_true", help="take --quantity also where the file says something else"
-    )
+    parser.option("--force-quantity", "take --quantity also where the file says something else")
 
 
 def read_receptances(args: argparse.Namespace) -> FrfSet:
-    """Read the file as receptances; what had to be assumed is told as a warning."""
+    """Read the files as receptances."""
     if args.force_quantity and args.quantity is None:
         raise UsageError("--force-quantity needs --quantity")
-    return read_with_warnings(*args.files, quantity=args.quantity, force_quantity=args.force_quantity, receptance=True)
+    return read_frfs(*args.files, quantity=args.quantity, force_quantity=args.force_quantity).receptance()
 
 
 def file_names(args: argparse.Namespace) -> str:
     """Return the names of the files without their folders."""
     return ", ".join(path.name for path in args.files)
-
-
-def read_with_warnings(*paths: Path, receptance: bool = False, **options: Any) -> FrfSet:
-    """Read files; what had to be assumed is told as a warning."""
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        frfs = read_frfs(*paths, **options)
-        frfs = frfs.receptance() if receptance else frfs
-    for message in caught:
-        print(f"jointfrf: warning: {visible(str(message.message))}", file=sys.stderr)
-    return frfs
 
 
 def in_some_band(

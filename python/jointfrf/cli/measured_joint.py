@@ -285,7 +285,7 @@ def _nodes_of(places: tuple[ChannelPlace, ...], side: str) -> list[int]:
 
 
 def _node_dofs(args: argparse.Namespace, frfs: FrfSet, nodes: tuple[list[int], list[int]]) -> Interface | None:
-    """Return the DOFs of two nodes whose rotations stand in the file, too."""
+    """Return the DOFs of two nodes whose rotations are in the file, too."""
     rotations = [dof for dof in args.dofs if is_rotation(dof)]
     if len(nodes[0]) != 1 or len(nodes[1]) != 1 or not rotations:
         return None

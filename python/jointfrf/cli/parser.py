@@ -7,12 +7,12 @@ import importlib
 import math
 import re
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import Any, NoReturn
 
 from jointfrf.spelling import did_you_mean, visible
 
-__all__ = ["COMMANDS", "CommandParser", "command_parser", "options_of", "top_parser"]
+__all__ = ["COMMANDS", "CommandParser", "command_parser", "one_of", "top_parser"]
 
 #: The commands, each the module of its name, and what they do.
 COMMANDS = {
@@ -25,6 +25,7 @@ COMMANDS = {
     "frf": "receptances of a model",
     "run": "run cases: tables, figures and a report each",
     "cases": "list the cases that come with jointfrf",
+    "new": "the files of a new case, with a comment beside each key",
     "study": "many realisations of a case over a design of factors: error, bias and coverage beside the bound",
     "completion": "a script that completes commands and options in bash, zsh or fish",
 }
@@ -33,63 +34,100 @@ _NEGATIVE = re.compile(r"-\.?\d")
 
 
 class CommandParser(argparse.ArgumentParser):
-    """A parser whose errors say what was meant; options are written in full."""
+    """A parser whose errors suggest what was meant; options are written in full.
+
+    Attributes
+    ----------
+    arguments : list of argparse.Action
+        All that were added, in their order.
+    repeated : set of str
+        Destinations of options that may be given several times.
+    """
 
     def __init__(self, **options: Any) -> None:
+        self.arguments: list[argparse.Action] = []
+        self.repeated: set[str] = set()
         super().__init__(allow_abbrev=False, **options)
-        self._given: set[str] = set()
+        self._add: Callable[..., argparse.Action] = super().add_argument
+
+    def add_argument(self, *names: str, **options: Any) -> argparse.Action:
+        """Add an argument as argparse does."""
+        self.arguments.append(super().add_argument(*names, **options))
+        return self.arguments[-1]
+
+    def heading(self, title: str) -> None:
+        """Put the options that follow under a heading of the help."""
+        self._add = self.add_argument_group(title).add_argument
+
+    def option(
+        self,
+        name: str,
+        what: str,
+        kind: Callable[[str], Any] | Collection[str] | None = None,
+        default: Any = None,
+        *,
+        repeated: bool = False,
+    ) -> None:
+        """Add an option.
+
+        Parameters
+        ----------
+        name : str
+            Such as ``"--noise LEVEL"``; without a value, ``"--json"``, it is a flag.
+        what : str
+            Its help.
+        kind : callable or tuple of str
+            What makes a value of a word; or the words there are.
+        default : optional
+        repeated : bool
+            Whether it may be given several times: its value is then a list.
+        """
+        word, _, metavar = name.partition(" ")
+        options: dict[str, Any] = {"help": what, "default": default}
+        if isinstance(kind, Collection):
+            options |= {"choices": kind, "type": one_of(kind)}
+        elif metavar:
+            options |= {"metavar": metavar, "type": kind}
+        else:
+            options |= {"action": "store_true", "default": False}
+        if repeated:
+            options["action"] = "append"
+        self.arguments.append(self._add(word, **options))
+        self.repeated |= {self.arguments[-1].dest} if repeated else set()
+
+    @property
+    def options(self) -> dict[str, argparse.Action]:
+        """The options by each of their names."""
+        return {name: action for action in self.arguments for name in action.option_strings}
 
     def error(self, message: str) -> NoReturn:
         """Print the usage of this command and what is wrong."""
         self.print_usage(sys.stderr)
         self.exit(2, f"jointfrf: error: {visible(message)}\n")
 
-    def _check_value(self, action: argparse.Action, value: Any) -> None:
-        if action.choices is None or value in action.choices:
-            return
-        choices = [str(choice) for choice in action.choices]
-        hint = did_you_mean(str(value), choices)
-        raise argparse.ArgumentError(action, f"{str(value)!r} is none of {', '.join(choices)}{hint}")
-
     def parse_words(self, words: Sequence[str]) -> argparse.Namespace:
         """Parse words; an unknown option is named with the one it looks like.
 
-        Values such as -0.06,0,0 may stand after their option.
+        Values such as -0.06,0,0 may follow their option. Destinations of the options given are in `given`.
         """
-        joined = self._joined(words)
-        self._given = {options_of(self)[name].dest for name in map(_name, joined) if name in options_of(self)}
-        return self.parse_args(joined)
-
-    def was_given(self, dest: str) -> bool:
-        """Whether the words parsed last say something of an option."""
-        return dest in self._given
-
-    def converted(self, action: argparse.Action, text: str) -> Any:
-        """Return the value of an option as if it stood on the command line.
-
-        Raises
-        ------
-        argparse.ArgumentError
-            It is not such a value.
-        """
-        value = self._get_value(action, text)
-        self._check_value(action, value)
-        return value
+        joined, options = self._joined(words), self.options
+        found = self.parse_args(joined)
+        found.given = {options[name].dest for name in map(_name, joined) if name in options}
+        return found
 
     def _joined(self, words: Sequence[str]) -> list[str]:
-        """Join options with values that begin with a minus, and refuse unknown options."""
-        options, joined = options_of(self), list[str]()
+        """Join options with values that begin with a minus; unknown options end the program with a suggestion."""
+        options, joined = self.options, list[str]()
         waiting = iter(words)
         for word in waiting:
             if word == "--":
                 return [*joined, word, *waiting]
-            name = _name(word)
+            joined.append(word)
             if not word.startswith("-") or word == "-" or _NEGATIVE.match(word):
-                joined.append(word)
                 continue
+            name = _name(word)
             if name not in options:
                 self.error(f"unknown option {name}{did_you_mean(name, options)}")
-            joined.append(word)
             if name != word or options[name].nargs == 0:
                 continue
             value = next(waiting, None)
@@ -104,27 +142,31 @@ def _name(word: str) -> str:
     return word.partition("=")[0]
 
 
-def options_of(parser: argparse.ArgumentParser) -> dict[str, argparse.Action]:
-    """Return the options of a parser by each of their names."""
-    return {name: action for action in parser._actions for name in action.option_strings}
+def one_of(known: Collection[str]) -> Callable[[str], str]:
+    """Return a type of words that accepts only known ones."""
+
+    def taken(word: str) -> str:
+        if word not in known:
+            raise argparse.ArgumentTypeError(f"{word!r} is none of {', '.join(known)}{did_you_mean(word, known)}")
+        return word
+
+    return taken
 
 
-def _add_common(parser: argparse.ArgumentParser) -> None:
+def _add_common(parser: CommandParser) -> None:
     """Describe the options that every command has."""
-    group = parser.add_argument_group("output and defaults")
-    group.add_argument("--json", action="store_true", help="print the result as JSON")
-    group.add_argument("--quiet", action="store_true", help="print nothing but warnings and errors")
-    group.add_argument(
-        "--config",
-        metavar="FILE",
-        help="channels and defaults of a project (default: jointfrf.toml in the working directory, where there is one)",
+    parser.heading("output and defaults")
+    parser.option("--json", "print the result as JSON")
+    parser.option("--quiet", "print nothing but warnings and errors")
+    parser.option(
+        "--config FILE",
+        "channels and defaults of a project (default: jointfrf.toml in the working directory, where there is one)",
     )
-    group.add_argument("--no-config", action="store_true", help="do not look for jointfrf.toml")
-    group.add_argument(
-        "--limit-gb",
-        type=_gigabytes,
-        metavar="GB",
-        help="how large one file may be, and what it may take in memory (default: 16 GB; 1 GB, or 10 times the file)",
+    parser.option("--no-config", "do not look for jointfrf.toml")
+    parser.option(
+        "--limit-gb GB",
+        "how large one file may be, and what it may take in memory (default: 16 GB; 1 GB, or 10 times the file)",
+        _gigabytes,
     )
 
 
@@ -138,15 +180,14 @@ def _gigabytes(word: str) -> float:
     return found
 
 
-def command_parser(name: str, parser: argparse.ArgumentParser | None = None) -> CommandParser:
+def command_parser(name: str, parser: CommandParser | None = None) -> CommandParser:
     """Return the parser of a command; only its module is imported."""
-    found = CommandParser(prog=f"jointfrf {name}") if parser is None else parser
-    assert isinstance(found, CommandParser)
+    parser = parser or CommandParser(prog=f"jointfrf {name}")
     module = importlib.import_module(f"jointfrf.cli.{name}")
-    module.add_arguments(found)
-    _add_common(found)
-    found.set_defaults(action=module.run)
-    return found
+    module.add_arguments(parser)
+    _add_common(parser)
+    parser.set_defaults(action=module.run)
+    return parser
 
 
 class _Version(argparse.Action):
@@ -159,8 +200,8 @@ class _Version(argparse.Action):
         parser.exit()
 
 
-def top_parser(whole: Iterable[str] = ()) -> CommandParser:
-    """Return the parser of `jointfrf` itself, with the options of the commands named in `whole`."""
+def top_parser() -> tuple[CommandParser, dict[str, CommandParser]]:
+    """Return the parser of `jointfrf` itself, and those of its commands, still without their options."""
     parser = CommandParser(
         prog="jointfrf",
         description="Stiffness and damping of joints from FRFs.",
@@ -169,8 +210,4 @@ def top_parser(whole: Iterable[str] = ()) -> CommandParser:
     )
     parser.add_argument("--version", action=_Version, nargs=0, help="print the version and stop")
     commands = parser.add_subparsers(metavar="COMMAND", required=True)
-    for name, what in COMMANDS.items():
-        command = commands.add_parser(name, help=what)
-        if name in whole:
-            command_parser(name, command)
-    return parser
+    return parser, {name: commands.add_parser(name, help=what) for name, what in COMMANDS.items()}

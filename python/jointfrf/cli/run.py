@@ -14,10 +14,10 @@ from queue import SimpleQueue
 from threading import Event, Lock
 
 from jointfrf.cases.catalogue import UnknownCaseError, find_case, list_cases, run_case
-from jointfrf.cases.kind import Case
+from jointfrf.cases.keys import Case
 from jointfrf.cases.workers import Workers, started_workers
-from jointfrf.cli.output import Output
-from jointfrf.cli.usage import UsageError, positive, progress
+from jointfrf.cli.parser import CommandParser
+from jointfrf.cli.usage import Output, UsageError, positive, progress
 from jointfrf.extras import check_extras
 from jointfrf.parallel.processes import available_cores
 from jointfrf.report.table import Table, as_text
@@ -28,13 +28,13 @@ __all__ = ["add_arguments", "run"]
 _TOGETHER = 3
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: CommandParser) -> None:
     """Describe the arguments of the command."""
     parser.description = "Run cases by name, number or folder; without any, all that come with jointfrf."
     parser.add_argument("cases", nargs="*", metavar="CASE", help="name, number, or folder with a case.toml")
-    parser.add_argument("--out", type=Path, default=Path("results"), metavar="DIR", help="where results go (results)")
-    parser.add_argument("--realisations", type=positive, metavar="N", help="instead of the number the case names")
-    parser.add_argument("--jobs", type=positive, metavar="N", default=available_cores(), help="processes (all cores)")
+    parser.option("--out DIR", "where results go (results)", Path, Path("results"))
+    parser.option("--realisations N", "instead of the number the case names", positive)
+    parser.option("--jobs N", "processes (all cores)", positive, available_cores())
 
 
 def run(options: argparse.Namespace) -> int:
@@ -130,7 +130,7 @@ def _run_one(folder: Path, options: argparse.Namespace, workers: Workers, say: C
     start = time.perf_counter()
     output = run_case(
         folder, options.out, realisations=options.realisations, workers=workers,
-        tell=lambda case, tables: say("\n".join(_shown(case, tables))),
+        show=lambda case, tables: say("\n".join(_shown(case, tables))),
     )  # fmt: skip
     say(f"{time.perf_counter() - start:.1f} s, report: {output.report}\n")
     return output.report

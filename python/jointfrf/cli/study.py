@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any, get_args
 
 from jointfrf.cases.catalogue import UnknownCaseError
-from jointfrf.cli.output import Output
-from jointfrf.cli.usage import UsageError, positive, progress
+from jointfrf.cli.parser import CommandParser
+from jointfrf.cli.usage import Output, UsageError, positive, progress
 from jointfrf.extras import check_extras, import_extra
 from jointfrf.parallel.pool import AnyExecutor
 from jointfrf.parallel.processes import available_cores, check_processes, safe_environment
@@ -23,39 +23,44 @@ __all__ = ["add_arguments", "run"]
 _EXECUTORS = ("processes", "threads", "loky", "mpi", "dask:ADDRESS")
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: CommandParser) -> None:
     """Describe the arguments of the command."""
     parser.description = (
         "Estimate the joint of a case from many realisations of the noise, over a design of factors. What is finished "
         "is kept in the folder: the same command goes on where it was stopped. `jointfrf study merge PART... --out "
         "DIR` puts parts together."
     )
-    parser.add_argument("words", nargs="+", metavar="CASE | merge PART...",
-                        help="name, number, or folder with a case.toml; or merge and folders of parts")  # fmt: skip
-    parser.add_argument("--realisations", type=_whole, metavar="N", help="instead of the number the case names")
-    parser.add_argument("--factor", action="append", default=[], metavar="NAME=V,V,...",
-                        help="vary noise, spacing, lines, stiffness, damping, or a key of case.toml such as "
-                        "frequency.last or joint.stiffness; a * before = multiplies; may be repeated")  # fmt: skip
-    parser.add_argument("--arrangement", choices=get_args(Arrangement), default="full",
-                        help="every combination of values, or one factor at a time (full)")  # fmt: skip
-    parser.add_argument("--estimator", action="append", default=[], metavar="WORD",
-                        help="a method instead of those that the case names; may be repeated")  # fmt: skip
-    parser.add_argument("--noise", action="append", default=[], metavar="NAME",
-                        help="a noise of the case, instead of all; may be repeated")  # fmt: skip
-    parser.add_argument("--first", type=_whole, metavar="N", help="compute realisations from this one on, a part only")
-    parser.add_argument("--count", type=positive, metavar="N", help="how many of them")
-    parser.add_argument("--jobs", type=positive, metavar="N", help="workers (all cores)")
-    parser.add_argument("--executor", type=_executor, default="processes", metavar="WORD",
-                        help=f"what the workers are: {', '.join(_EXECUTORS)} (processes)")  # fmt: skip
-    parser.add_argument("--out", type=Path, metavar="DIR", help="where results go (studies/NAME of the case)")
-    parser.add_argument("--values", type=_format, action="append", default=[], metavar="FORMAT",
-                        help="write single realisations, too: parquet or npz")  # fmt: skip
+    parser.add_argument(
+        "words",
+        nargs="+",
+        metavar="CASE | merge PART...",
+        help="name, number, or folder with a case.toml; or merge and folders of parts",
+    )
+    parser.option("--realisations N", "instead of the number the case names", _whole)
+    parser.option(
+        "--factor NAME=V,V,...",
+        "vary noise, spacing, lines, stiffness, damping, or a key of case.toml such as "
+        "frequency.last or joint.stiffness; a * before = multiplies; may be repeated",
+        default=[],
+        repeated=True,
+    )
+    every = "every combination of values, or one factor at a time (full)"
+    parser.option("--arrangement", every, get_args(Arrangement), "full")
+    own = "a method instead of those that the case names; may be repeated"
+    parser.option("--estimator WORD", own, default=[], repeated=True)
+    parser.option("--noise NAME", "a noise of the case, instead of all; may be repeated", default=[], repeated=True)
+    parser.option("--first N", "compute realisations from this one on, a part only", _whole)
+    parser.option("--count N", "how many of them", positive)
+    parser.option("--jobs N", "workers (all cores)", positive)
+    what = f"what the workers are: {', '.join(_EXECUTORS)} (processes)"
+    parser.option("--executor WORD", what, _executor, "processes")
+    parser.option("--out DIR", "where results go (studies/NAME of the case)", Path)
+    single = "write single realisations, too: parquet or npz"
+    parser.option("--values FORMAT", single, _format, [], repeated=True)
 
 
 def _whole(word: str) -> int:
-    if not word.isdecimal():
-        raise argparse.ArgumentTypeError(f"must be a whole number, at least 0, not {word!r}")
-    return int(word)
+    return positive(word, 0)
 
 
 def _executor(word: str) -> str:
@@ -103,7 +108,8 @@ def _studied(options: argparse.Namespace, is_part: bool) -> StudyResult:
     (case,) = options.words
     factors = _factors(options.factor)
     try:
-        design = StudyDesign(factors, options.arrangement, options.noise, options.estimator)
+        is_stated = factors or options.noise or options.estimator
+        design = StudyDesign(factors, options.arrangement, options.noise, options.estimator) if is_stated else None
         name = Path(case).resolve().name if (Path(case) / "case.toml").is_file() else case
         with _started(options.executor, options.jobs) as executor:
             return study(

@@ -1,25 +1,88 @@
-"""What commands share: what is wrong with words, their types, processes and progress."""
+"""What commands share: errors of usage, what they print, types of words, progress."""
 
 from __future__ import annotations
 
 import argparse
+import json
+import math
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from jointfrf.spelling import visible
 
-__all__ = ["UsageError", "check_folder", "positive", "progress", "waiting"]
+__all__ = [
+    "Output",
+    "UsageError",
+    "check_folder",
+    "complain",
+    "plain",
+    "positive",
+    "progress",
+    "waiting",
+    "warn_of_ignored",
+]
 
-#: Seconds after which the speed so far says something.
+#: Seconds after which the speed so far predicts the time left; a clock that ticks twice a second disturbs nobody.
 _SETTLED = 0.5
 
 
 class UsageError(Exception):
     """A wrong word on the command line."""
+
+
+def complain(kind: str, message: object) -> None:
+    """Print a warning or an error as one line that does nothing to a terminal: the name of a file may hold anything."""
+    print(f"jointfrf: {kind}: {visible(str(message))}", file=sys.stderr)
+
+
+def warn_of_ignored(args: argparse.Namespace, names: Iterable[str], why: str) -> None:
+    """Warn of options that were given and have no effect."""
+    found = [name for name in names if name.removeprefix("--").replace("-", "_") in args.given]
+    if found:
+        complain("warning", f"{' and '.join(found)} {'have' if found[1:] else 'has'} no effect: {why}")
+
+
+class Output:
+    """Where the text and the numbers of a command go, by its options `--json` and `--quiet`."""
+
+    def __init__(self, args: argparse.Namespace) -> None:
+        self._is_json: bool = args.json
+        self._is_quiet: bool = args.quiet
+
+    def say(self, *lines: object) -> None:
+        """Print lines of text, unless JSON or nothing is wanted."""
+        if lines and not (self._is_json or self._is_quiet):
+            print(*(visible(str(line), "\n\t") for line in lines), sep="\n", flush=True)
+
+    def warn(self, *texts: object) -> None:
+        """Print warnings that are part of the text and of the JSON, where neither is printed."""
+        for text in texts if self._is_quiet and not self._is_json else ():
+            complain("warning", text)
+
+    def give(self, content: Mapping[str, Any]) -> None:
+        """Print the result as JSON where that is wanted."""
+        if self._is_json:
+            print(json.dumps(plain(content), indent=2, allow_nan=False))
+
+
+def plain(value: Any) -> Any:
+    """Return a value as JSON holds it: what is not finite becomes null, a complex number a pair."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(each) for key, each in value.items()}
+    if hasattr(value, "tolist"):  # arrays and numbers of numpy
+        return plain(value.tolist())
+    if isinstance(value, list | tuple):
+        return [plain(each) for each in value]
+    if isinstance(value, complex):
+        return [plain(value.real), plain(value.imag)]
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return value if isinstance(value, str | int | None) else str(value)
 
 
 def check_folder(option: str, path: Path | None) -> None:
@@ -30,33 +93,43 @@ def check_folder(option: str, path: Path | None) -> None:
     UsageError
         There is no such folder, or the path is a folder.
     """
-    if path is None:
-        return
-    if not path.parent.is_dir():
+    if path is not None and not path.parent.is_dir():
         raise UsageError(f"{option}: there is no folder {path.parent}")
-    if path.is_dir():
+    if path is not None and path.is_dir():
         raise UsageError(f"{option}: {path} is a folder, not a file")
 
 
-def positive(word: str) -> int:
-    """Return a whole number of at least 1."""
-    if not word.isdecimal() or int(word) < 1:
-        raise argparse.ArgumentTypeError(f"must be a whole number, at least 1, not {word!r}")
+def positive(word: str, least: int = 1) -> int:
+    """Return a whole number of at least 1, or another least one."""
+    if not word.isdecimal() or int(word) < least:
+        raise argparse.ArgumentTypeError(f"must be a whole number, at least {least}, not {word!r}")
     return int(word)
 
 
+def _on_its_line(text: str) -> None:
+    """Write over the last line of the terminal."""
+    print(f"\r\x1b[K{visible(text)}", end="", file=sys.stderr, flush=True)
+
+
 def progress(name: str) -> Callable[[int, int], None]:
-    """Return a counter in one line of a terminal, with the time that is left; silent elsewhere."""
+    """Return a counter in one line of a terminal, with the time that is left; silent elsewhere.
+
+    Calls may come from several threads, in another order than their counts: what was shown is never taken back.
+    """
     if not sys.stderr.isatty():
         return lambda done, total: None
-    start = time.monotonic()
+    start, lock = time.monotonic(), threading.Lock()
+    furthest = 0.0
 
     def show(done: int, total: int) -> None:
-        if done == total:
-            print("\r\x1b[K", end="", file=sys.stderr, flush=True)
-            return
-        left = _time_left(time.monotonic() - start, done, total)
-        print(f"\r\x1b[K{visible(name)}: {100 * done // total} %{left}", end="", file=sys.stderr, flush=True)
+        nonlocal furthest
+        with lock:
+            if done == total:
+                _on_its_line("")
+                furthest = 0.0
+            elif done / total >= furthest:
+                furthest = done / total
+                _on_its_line(f"{name}: {100 * done // total} %{_time_left(time.monotonic() - start, done, total)}")
 
     return show
 
@@ -79,7 +152,7 @@ def waiting(what: str) -> Iterator[None]:
 
     def show() -> None:
         while not done.wait(_SETTLED):
-            print(f"\r\x1b[K{visible(what)}: {time.monotonic() - start:.0f} s", end="", file=sys.stderr, flush=True)
+            _on_its_line(f"{what}: {time.monotonic() - start:.0f} s")
 
     clock = threading.Thread(target=show, daemon=True)
     clock.start()
@@ -88,4 +161,4 @@ def waiting(what: str) -> Iterator[None]:
     finally:
         done.set()
         clock.join()
-        print("\r\x1b[K", end="", file=sys.stderr, flush=True)
+        _on_its_line("")

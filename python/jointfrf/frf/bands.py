@@ -27,17 +27,17 @@ __all__ = [
 ]
 
 Band = tuple[float, float]
-#: Lines of long sweeps that are taken together at most: memory for what is in between does not grow with the lines.
+#: Most lines of a chunk of a long sweep: memory for intermediate results does not grow with the lines.
 PIECE = 8192
 
 
 def is_long(n_freq: int) -> bool:
-    """Return whether a sweep is taken in pieces, and what is in between is not kept."""
+    """Return whether a sweep is processed in chunks, without keeping intermediate results."""
     return n_freq > PIECE
 
 
 def spread_lines(n_freq: int) -> slice:
-    """Return no more lines than are taken together, evenly spread.
+    """Return no more lines than one chunk has, evenly spread.
 
     Examples
     --------
@@ -49,7 +49,7 @@ def spread_lines(n_freq: int) -> slice:
 
 
 def line_slices(n_freq: int, most: int | None = None) -> list[slice]:
-    """Cut lines into pieces of about equal length, `most` at most, `PIECE` by default.
+    """Cut lines into chunks of about equal length, `most` at most, `PIECE` by default.
 
     Examples
     --------
@@ -67,7 +67,7 @@ def line_slices(n_freq: int, most: int | None = None) -> list[slice]:
 def in_pieces(
     n_freq: int, of_lines: Callable[[slice], Sequence[NDArray[Any]]], most: int | None = None
 ) -> list[NDArray[Any]]:
-    """Compute arrays of all lines a piece of the lines at a time: beside them memory is that of one piece.
+    """Compute arrays of all lines in chunks: the memory beside them is that of one chunk.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def in_pieces(
     of_lines : callable
         From a slice of the lines to arrays whose first axis is theirs.
     most : int, optional
-        Lines of a piece at most, `PIECE` by default.
+        Most lines of a chunk, `PIECE` by default.
 
     Examples
     --------
@@ -147,7 +147,7 @@ def _pairs(bands: object) -> list[Band]:
 def as_bands(
     bands: Band | Sequence[Band] | Mapping[str, Band | Sequence[Band]] | None, dofs: Sequence[str], freq_hz: FloatArray
 ) -> list[list[Band]]:
-    """Bands of each DOF from what a user writes: nothing (all lines), one band, several, or one of these for each DOF.
+    """Bands of each DOF from an argument: nothing (all lines), one band, several, or one of these for each DOF.
 
     Parameters
     ----------

@@ -11,8 +11,12 @@ from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
 __all__ = ["ZERO", "EntryGroup", "connected", "entry_groups", "own_size", "reciprocity_noise"]
 
-#: An FRF below this share of sqrt|h_pp h_qq|, or of what is usual in its row and column, is zero to rounding.
+#: An FRF below this share of sqrt|h_pp h_qq|, or of the usual size in its row and column, is zero to rounding.
 ZERO = 1e-8
+#: A pair that differs less than this, relatively, was made reciprocal: it holds one measurement.
+_RECIPROCAL = 1e-9
+#: Rows and columns are scaled in turn so many times, until each has a largest entry near 1.
+_SCALINGS = 4
 
 
 def own_size(h: ComplexArray) -> FloatArray:
@@ -47,12 +51,6 @@ def reciprocity_noise(h: ComplexArray) -> FloatArray:
     ratio = np.divide(abs(above - below) ** 2, size, out=np.zeros_like(size), where=counts)
     medians = [np.median(own[some]) if some.any() else 0.0 for own, some in zip(ratio, counts, strict=True)]
     return np.asarray(np.sqrt(np.array(medians) / np.log(2)))
-
-
-#: A pair that differs less than this, relatively, was made reciprocal: it holds one measurement.
-_RECIPROCAL = 1e-9
-#: Rows and columns are scaled in turn so many times, until each has a largest entry near 1.
-_SCALINGS = 4
 
 
 @dataclass(frozen=True)

@@ -22,19 +22,24 @@ __all__ = [
     "ChannelRole",
     "FrfSet",
     "JointSide",
+    "check_apart",
     "places_of_nodes",
     "same_frf",
 ]
 
+#: How often a receptance is differentiated in time to give the quantity.
 POWER_OF_I_OMEGA = {"receptance": 0, "mobility": 1, "accelerance": 2}
-"""How often a receptance is differentiated in time to give the quantity."""
 
 _PLURALS = {"receptance": "receptances m/N", "mobility": "mobilities (m/s)/N", "accelerance": "accelerances (m/s^2)/N"}
+#: Names of directions, and of channels.
 _DIRECTION = re.compile(r"([+-]?)(r?[xyz])")
 _CHANNEL = re.compile(r"(\d+)\s*:?\s*([+-]?r?[xyz])")
+#: Names of missing FRFs that a message lists.
 _NAMES_SHOWN = 10
 #: How far above 1 single precision may leave a coherence.
 ROUND_OFF = 1e-5
+ChannelRole = Literal["response", "excitation", "both"]
+JointSide = Literal["j", "k"]
 
 
 @dataclass(frozen=True, order=True)
@@ -136,7 +141,7 @@ class FrfSet:
     averages : number or ndarray, shape (n_responses, n_excitations), optional
         How many measurements each FRF is the average of; NaN where it is not known.
     stated : str
-        What the file says of quantity and unit, in its own words.
+        Quantity and unit in the words of the file.
 
     Examples
     --------
@@ -399,7 +404,7 @@ class FrfSet:
         )
 
     def summary(self) -> str:
-        """Say what the set holds."""
+        """Describe the set in a few lines."""
         measured = self.measured
         n_missing = measured.size - int(measured.sum())
         nodes = {channel.node for channel in (*self.responses, *self.excitations)}
@@ -429,16 +434,16 @@ class FrfSet:
         return replace(self, freq_hz=self.freq_hz[kept], h=self.h[kept], coherence=coherence)
 
     def _quality(self) -> list[str]:
-        """Say what is known about coherence and averages."""
-        said = []
+        """Describe coherence and averages, as far as known."""
+        parts = []
         measured = self.measured
         if self.coherence is not None and measured.any():
             known = np.logical_not(np.isnan(self.coherence).all(axis=0)) & measured
-            said.append(f"coherence of {known.sum()} of {measured.sum()} FRFs")
+            parts.append(f"coherence of {known.sum()} of {measured.sum()} FRFs")
         if self.averages is not None and np.isfinite(self.averages[measured]).any():
             low, high = np.nanmin(self.averages[measured]), np.nanmax(self.averages[measured])
-            said.append(f"{low:g} averages" if low == high else f"{low:g} to {high:g} averages")
-        return [", ".join(said)] if said else []
+            parts.append(f"{low:g} averages" if low == high else f"{low:g} to {high:g} averages")
+        return [", ".join(parts)] if parts else []
 
     def _locate(
         self, outputs: Iterable[ChannelLike], inputs: Iterable[ChannelLike]
@@ -522,32 +527,28 @@ def _by_node(channels: Iterable[Channel]) -> str:
     return " ".join(f"{node}:{direction}" for node, direction in directions.items())
 
 
-ChannelRole = Literal["response", "excitation", "both"]
-JointSide = Literal["j", "k"]
-
-
 @dataclass(frozen=True, eq=False)
 class ChannelPlace:
-    """What is known of one translational channel beside its FRFs.
+    """A translational channel: place, direction, side of the joint, use.
 
     Attributes
     ----------
     channel : Channel
         Its name in the file of FRFs.
     side : {"j", "k"} or None
-        Side of the joint; None where it is not said.
+        Side of the joint; None where it is not known.
     role : {"response", "excitation", "both"}
-        As what it counts; "both": as what the file has.
+        Use of the channel; "both": whatever the file has.
     position : ndarray, shape (3,), or None
-        m; None: as the file says.
+        m; None: that of the file.
     direction : ndarray, shape (3,), or None
-        Unit vector of the motion or force that the channel of this name stands for; None: as its name says.
+        Unit vector of the motion or force that the channel of this name stands for; None: that of its name.
     weight : float
         In the virtual point, 0 to leave the channel out.
     optional : bool
         Whether the file need not have it: one of three directions of a sensor.
     where : str
-        Where this is said, for messages.
+        Where the entry comes from, for messages.
     """
 
     channel: Channel
@@ -570,6 +571,13 @@ class ChannelPlace:
         return np.asarray(self.channel.sign * np.eye(3)["xyz".index(self.channel.axis)] + 0.0)
 
 
+def check_apart(nodes_j: Sequence[int], nodes_k: Sequence[int]) -> None:
+    """Raise if a node is on both sides of a joint."""
+    shared = set(nodes_j) & set(nodes_k)
+    if shared:
+        raise ValueError(f"node {min(shared)} is named on both sides of the joint")
+
+
 def places_of_nodes(frfs: FrfSet, nodes_j: Sequence[int], nodes_k: Sequence[int]) -> tuple[ChannelPlace, ...]:
     """List the translational channels of a set at nodes on both sides of a joint.
 
@@ -583,7 +591,7 @@ def places_of_nodes(frfs: FrfSet, nodes_j: Sequence[int], nodes_k: Sequence[int]
     Returns
     -------
     tuple of ChannelPlace
-        In the order of the nodes; position and direction as the set says.
+        In the order of the nodes; position and direction of the set.
 
     Raises
     ------
@@ -602,9 +610,7 @@ def places_of_nodes(frfs: FrfSet, nodes_j: Sequence[int], nodes_k: Sequence[int]
     """
     check_type("frfs", frfs, FrfSet)
     nodes_j, nodes_k = as_nodes("nodes_j", nodes_j), as_nodes("nodes_k", nodes_k)
-    shared = set(nodes_j) & set(nodes_k)
-    if shared:
-        raise ValueError(f"node {min(shared)} is named on both sides of the joint")
+    check_apart(nodes_j, nodes_k)
     # A sensor along +y and a hammer along -y are the same channel: FRFs are found with their signs.
     known = {(c.node, c.axis): c for c in (*frfs.excitations, *frfs.responses) if not c.is_rotation}
     found = []

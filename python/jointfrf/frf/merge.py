@@ -99,7 +99,7 @@ def merge_frfs(sets: Sequence[FrfSet]) -> FrfSet:
 
 
 class _Merged:
-    """Where the FRFs of several sets stand in the one that they make."""
+    """Places of the FRFs of several sets in the merged one."""
 
     def __init__(self, responses: Sequence[Channel], excitations: Sequence[Channel], sets: Sequence[FrfSet]) -> None:
         self.responses, self.excitations, self.sets = responses, excitations, sets
@@ -107,7 +107,7 @@ class _Merged:
         self.column_of = {channel: j for j, channel in enumerate(excitations)}
 
     def fill(self, target: _Values, values_of: Callable[[FrfSet], _Values | None], what: str) -> None:
-        """Copy what each set holds into place, after a look at what is there already."""
+        """Copy what each set holds into place; where something is there already, compare the two."""
         origin = np.full(target.shape[1:], -1)
         for number, each in enumerate(self.sets):
             values = values_of(each)
@@ -128,7 +128,7 @@ class _Merged:
                     origin[place] = number
 
     def _compare(self, kept: _Values, value: _Values, what: str, number: int, each: FrfSet) -> None:
-        """Refuse a second copy that is another one."""
+        """Raise an error if a second copy differs from the first."""
         scale = np.nanmax(abs(kept)) if np.isfinite(kept).any() else 0.0
         if not np.allclose(kept, value, rtol=0.0, atol=_SAME_VALUES * float(scale), equal_nan=True):
             one, two = _name(self.sets[number], self.sets), _name(each, self.sets)

@@ -14,6 +14,8 @@ __all__ = ["NOISE_KINDS", "NoiseKind", "NoiseReference", "noise_arguments", "pol
 
 NoiseKind = Literal["complex", "complex-per-part", "real-normal", "real-uniform", "real-uniform-std"]
 NoiseReference = Literal["entry", "line", "spectrum"]
+#: Realisations are counted in 31 bits.
+_MOST: Final = 2**31 - 1
 
 
 class NoiseNumbers(NamedTuple):
@@ -42,8 +44,6 @@ NOISE_KINDS: Final[dict[NoiseKind, NoiseNumbers]] = {
     "real-uniform": NoiseNumbers("U", 1 / 3, False),
     "real-uniform-std": NoiseNumbers("S", 1.0, False),
 }
-#: Realisations are counted in 31 bits.
-_MOST: Final = 2**31 - 1
 
 
 def pollute(
@@ -193,7 +193,7 @@ def noise_arguments(
     count: int,
     shape: tuple[int, ...],
 ) -> tuple[str, str, int, int, float, NDArray[np.int32]]:
-    """Return the arguments that say the noise as the kernel takes them, checked; matrices of `shape`."""
+    """Check the arguments of noise for matrices of `shape`, and return them as the kernel takes them."""
     check_choice("kind", kind, tuple(NOISE_KINDS))
     check_choice("relative_to", relative_to, get_args(NoiseReference))
     number = as_number("level", level)

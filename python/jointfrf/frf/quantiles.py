@@ -1,4 +1,4 @@
-"""Medians and quantiles of finite numbers, without what numpy spends on axes, weights and NaN."""
+"""Medians and quantiles of finite numbers, without the overhead of numpy for axes, weights and NaN."""
 
 from __future__ import annotations
 

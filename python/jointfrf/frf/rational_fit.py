@@ -13,10 +13,31 @@ from jointfrf.kernel.call import call_for_number
 
 __all__ = ["Entries", "OrderSearch", "RationalFit", "rational_fit", "relocated", "search_order"]
 
+#: Most relocations after new poles, and at the end; they end where the sum of squares no longer changes.
+_RELOCATIONS = 3
+_LAST_RELOCATIONS = 8
+#: Relocation ends when it gains less than this share of the price of a pole.
+_STILL = 0.1
+#: A fit that leaves this share of the data is exact but for rounding of the normal equations.
+_EXACT = 3e-5
+#: Peaks are the largest lines within this share of all lines on either side, twice what lies between them.
+_PEAK_WINDOW = 0.02
+_PEAK_RISE = 2.0
+#: Poles with less damping than this part of the distance of lines may follow one line only: the fit is repeated
+#: without it.
+_NARROW = 0.5
+_LEFT_OUT = 1e-4
+#: Rounds of finding such lines.
+_ROUNDS = 6
+#: An inflation found from a residual counts up to this while poles may be missing.
+_MOST_INFLATION = 4.0
+#: Damping of new poles relative to their frequency, usual in structures; relocation changes it.
+_DAMPING = 0.01
+
 
 @dataclass(frozen=True)
 class Entries:
-    """FRFs that have their poles in common, one a row, and what one needs to weight them.
+    """FRFs that have their poles in common, one a row, and their weights.
 
     Attributes
     ----------
@@ -125,30 +146,9 @@ def rational_fit(entries: Entries, poles: ComplexArray) -> RationalFit:
     return RationalFit(poles, smooth, squares, loss)
 
 
-#: Relocations after new poles, and at the end; fewer where the sum of squares no longer changes.
-_RELOCATIONS = 3
-_LAST_RELOCATIONS = 8
-#: Relocation ends when it gains less than this share of what a pole must gain.
-_STILL = 0.1
-#: A fit that leaves this share of the data is exact but for rounding.
-_EXACT = 3e-5
-#: Peaks are the largest lines within this share of all lines on either side, twice what lies between them.
-_PEAK_WINDOW = 0.02
-_PEAK_RISE = 2.0
-#: Poles with less damping than this part of the distance of lines may follow one line only: it is left out to see.
-_NARROW = 0.5
-_LEFT_OUT = 1e-4
-#: Rounds of finding such lines.
-_ROUNDS = 6
-#: An inflation found from a residual counts up to this while poles may be missing.
-_MOST_INFLATION = 4.0
-#: Damping of new poles relative to their frequency.
-_DAMPING = 0.01
-
-
 @dataclass(frozen=True)
 class OrderSearch:
-    """What a search is told.
+    """Options of a search.
 
     Attributes
     ----------
@@ -168,7 +168,7 @@ class OrderSearch:
         return max(1, min(self.max_poles, int(n_freq / (self.inflation or 1) / 3) - 1))
 
     def found_inflation(self, entries: Entries, fit: RationalFit) -> float:
-        """Return the inflation that was told, or that of the residual, in which poles that are missing show as well."""
+        """Return the given inflation, or that of the residual, which missing poles increase."""
         if self.inflation is not None:
             return self.inflation
         share = entries.n_parameters(len(fit.poles)) / entries.n_data
@@ -176,7 +176,7 @@ class OrderSearch:
 
 
 def _price(entries: Entries, inflation: float) -> float:
-    """Return what a pole must take off the sum of squares of noise of variance 1 to be worth its parameters.
+    """Return by how much a pole must reduce the sum of squares of noise of variance 1 to be worth its parameters.
 
     Twice its parameters, as in generalised cross-validation, and the logarithm of the number of lines among which its
     place was chosen.
@@ -313,7 +313,7 @@ def _median_of_three(values: FloatArray) -> FloatArray:
 
 
 def _peaks(values: FloatArray) -> np.ndarray:
-    """Lines that stand out from those on both sides."""
+    """Lines that are larger than those on both sides."""
     n = len(values)
     reach = max(2, round(_PEAK_WINDOW * n))
     windows = np.lib.stride_tricks.sliding_window_view(np.pad(values, reach, mode="edge"), 2 * reach + 1)
@@ -325,9 +325,9 @@ def _peaks(values: FloatArray) -> np.ndarray:
 def _poles_for_residual(entries: Entries, fit: RationalFit, inflation: float, count: int) -> ComplexArray:
     """Poles where the residual does not vanish in the mean over neighbouring lines, at most `count`.
 
-    For windows of some widths the sum over the entries of |sum of residuals|^2 / width is about what a pole there can
-    take off the sum of squares; a window counts if that is the price of a pole. The pole takes its middle for frequency
-    and its half-width for damping. Lines far above their neighbours are cut down to these: they are no modes.
+    For windows of some widths the sum over the entries of |sum of residuals|^2 / width is about the reduction of the
+    sum of squares by a pole there; a window counts if that is the price of a pole. The pole takes its middle for
+    frequency and its half-width for damping. Lines far above their neighbours are cut down to these: they are no modes.
     """
     f = entries.s.imag
     residual = entries.weight * (entries.h - fit.smooth)

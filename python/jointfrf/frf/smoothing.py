@@ -13,6 +13,7 @@ from jointfrf.frf.entry_groups import EntryGroup, entry_groups
 from jointfrf.frf.quantiles import medians
 from jointfrf.frf.rational_fit import Entries, OrderSearch, RationalFit, search_order
 from jointfrf.kernel.arguments import (
+    TINY,
     ComplexArray,
     FloatArray,
     as_frequency,
@@ -34,11 +35,11 @@ __all__ = [
     "smoothed",
 ]
 
-#: Fewer lines are returned as they were measured.
+#: Fewer lines are returned as measured: a pole and its residues take three of them.
 _FEWEST_LINES = 16
-#: A residual below this share of the FRFs is not noise that smoothing could remove.
+#: A residual below this share of the FRFs is an error of the rational functions rather than noise.
 _EXACT = 1e-4
-#: Share of the median of |h|^2 that first weights add to |h|^2 itself.
+#: Share of the median of |h|^2 that first weights add to |h|^2: a floor of 30 % of the median of |h|.
 _FIRST_FLOOR = 0.09
 
 
@@ -51,7 +52,7 @@ class SmoothFrfs:
     freq_hz : ndarray, shape (n_freq,)
         Hz.
     h : ndarray, shape (n_freq, n_out, n_in)
-        Smooth FRFs in the unit of the measured ones; reciprocal where that was said.
+        Smooth FRFs in the unit of the measured ones; reciprocal where the structure is.
     is_smooth : bool
         False where there are too few lines, or no noise that could be removed: `h` is then what was measured.
     poles : tuple of ndarray
@@ -157,7 +158,7 @@ def smooth_frfs(
 
 
 def pieces(order: NDArray[np.intp]) -> list[NDArray[np.intp]]:
-    """Cut lines in rising order into pieces that are smoothed each by itself: memory does not grow with the lines."""
+    """Cut lines in rising order into chunks that are smoothed separately: memory does not grow with the lines."""
     return [order[own] for own in line_slices(len(order))]
 
 
@@ -221,7 +222,7 @@ def smoothed(
 
 def _relative(entries: Entries, fit: RationalFit) -> float:
     """Median of |h - smooth| / |smooth|."""
-    return float(medians((abs(entries.h - fit.smooth) / np.maximum(abs(fit.smooth), np.finfo(float).tiny)).ravel()))
+    return float(medians((abs(entries.h - fit.smooth) / np.maximum(abs(fit.smooth), TINY)).ravel()))
 
 
 def _smooth_group(
@@ -249,7 +250,7 @@ def _smooth_group(
 def first_variance(h: ComplexArray) -> FloatArray:
     """Variance before anything is known of the noise: |h|^2 over neighbouring lines, not below a part of its median."""
     near = near_squares(h)
-    return np.maximum(near + _FIRST_FLOOR * medians(near.T).T, np.finfo(float).tiny)
+    return np.maximum(near + _FIRST_FLOOR * medians(near.T).T, TINY)
 
 
 def near_squares(h: ComplexArray) -> FloatArray:

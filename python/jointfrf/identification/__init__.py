@@ -1,6 +1,10 @@
-"""From measured FRFs to a `JointFit`.
+"""From measured FRFs to a `Fit`: one engine with two likelihoods.
 
-In reading order: `identify` (the door), `prepare` (what all methods check), `compliance_fit` (maximum likelihood) and
-`band_means` (the mean of K*(w) over bands), `joint_fit` (the result). The methods that compute K*(w) line by line are
-in `jointfrf.substructuring.methods`. Beside them `realisations` (many sets of FRFs), `sensitivity` and `monte_carlo`.
+In reading order: the doors `identify` (FRFs between all joint DOFs), `identify_model` (any FRFs of an assembly),
+`band_means` (the methods of the thesis); `prepare` and `noise` (what is checked, and the noise), `parameters`
+(coordinates), `line_starts`, `minimise`, `profile`, `residual_test` (what both likelihoods share), `manifold/` and
+`model/` (each likelihood); `findings` and `describe` (what a reader must know), `result` (the fit), `derived` (its
+functions), `fit_data` and `compliance_data` (what figures show), `record` and `fit_cards` (files and cards).
+Beside them `realisations` (many sets of FRFs), `joint_file`, `elastic_centre`, `information_bound`, `sensitivity` and
+`monte_carlo`.
 """

@@ -10,11 +10,10 @@ import numpy as np
 from jointfrf.channels.point_lines import Interface
 from jointfrf.errors import IllConditionedWarning
 from jointfrf.identification.fit_data import FitData
-from jointfrf.identification.manifold.coordinates import LawCoordinates, terms_of
-from jointfrf.identification.manifold.estimate import FittedGroup, JointEstimate
-from jointfrf.identification.manifold.fit import ComplianceFit
+from jointfrf.identification.manifold.estimate import JointEstimate
+from jointfrf.identification.manifold.fit import ManifoldFit
+from jointfrf.identification.manifold.group_fit import GroupFit
 from jointfrf.identification.manifold.interface_frfs import InterfaceFrfs
-from jointfrf.identification.manifold.law_fit import FoundLaws
 from jointfrf.identification.manifold.on_manifold import frfs_of_joint, project, smooth_compliance, starts_on_manifold
 from jointfrf.identification.manifold.prepare import FitProblem
 from jointfrf.identification.manifold.transforms import Transform, Transforms
@@ -30,17 +29,15 @@ _SEEN = 1e-10
 
 
 def compliance_data(
-    found: ComplianceFit | FoundLaws, problem: FitProblem, transform: Transform | tuple[Transform, Transform] | None
+    found: ManifoldFit, problem: FitProblem, transform: Transform | tuple[Transform, Transform] | None
 ) -> FitData:
     """Gather what a fit was made from; `transform` as in `identify`."""
     frfs = problem.frfs
     fitted = problem.used.copy()
     for group in found.estimate.groups:
-        fitted[:, group.dofs] &= group.fit.trusted[:, None]
+        fitted[:, group.dofs] &= group.used[:, None]
     # A level that was assumed has been replaced by that of the residual.
-    noise = found.problem.noise
-    level = noise.level * np.sqrt(found.estimate.excess) if noise.is_assumed else noise.level
-    scale = (level / problem.noise.level) ** 2 if problem.noise.is_assumed else 1.0
+    scale = (found.noise_level / problem.noise.level) ** 2 if problem.noise.is_assumed else 1.0
     # An `Interface` is a tuple, too.
     pair = transform if isinstance(transform, tuple) and not isinstance(transform, Interface) else (transform,) * 2
     names = channel_names(frfs, problem.dofs, (pair[0], pair[1]))
@@ -114,14 +111,10 @@ def regenerated_frfs(found: JointEstimate, n: int, lines: slice) -> ComplexArray
     return gamma
 
 
-def _of_group(group: FittedGroup, lines: slice) -> ComplexArray:
+def _of_group(group: GroupFit, lines: slice) -> ComplexArray:
     """Return the regenerated FRFs of one group of DOFs."""
-    data, joint = group.problem.data.on_slice(lines), group.joint
-    if isinstance(joint, LawCoordinates):
-        entries = joint.on_lines(lines).compliance(group.fit.minimum.x)
-    else:
-        entries = type(joint)(terms_of(joint).on_lines(lines)).compliance(group.fit.minimum.x)  # type: ignore[call-arg]
-    c = group.problem.of_joint(entries)
+    data, joint = group.problem.data.on_lines(lines), group.joint
+    c = joint.matrix(joint.on_lines(lines).compliance(group.x))
     unknown = group.problem.unknown[lines].reshape(c.shape)
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore", IllConditionedWarning)
@@ -135,9 +128,9 @@ def _of_group(group: FittedGroup, lines: slice) -> ComplexArray:
 
 def line_compliance(found: JointEstimate, n: int) -> ComplexArray:
     """Return the diagonal of C of each line by itself, shape (n_freq, n), m/N: the minimum of its quadratic form."""
-    whole = np.full((len(found.groups[0].fit.trusted), n), np.nan + 1j * np.nan)
+    whole = np.full((len(found.groups[0].used), n), np.nan + 1j * np.nan)
     for group in found.groups:
-        forms, own = group.fit.forms, group.dofs.size
+        forms, own = group.forms, group.dofs.size
         entries = forms.compliance.shape[1]
         rows, columns = np.diag_indices(own) if entries == own else np.triu_indices(own)
         size = np.sqrt(np.einsum("lqq->lq", forms.weight).real)
@@ -157,14 +150,13 @@ def information_shares(found: JointEstimate) -> FloatArray:
     With A the information on the coordinates x of all lines, A_l that of a line, and s = dtheta/dx, the variance of a
     parameter is s^T A^-1 s, and to first order a line of weight 1 + w changes it by -w s^T A^-1 A_l A^-1 s.
     """
-    n_freq = len(found.groups[0].fit.trusted)
+    n_freq = len(found.groups[0].used)
     share = np.zeros((n_freq, len(found.parameters)))
     for group in found.groups:
-        minimum = group.fit.minimum
-        slope = group.joint.theta_slope(minimum.x)
+        slope = group.joint.theta_slope(group.x)
         # Only shares count: rows of any size, also those of a rigid DOF.
         slope = np.nan_to_num(slope / np.maximum(abs(slope).max(axis=1, keepdims=True), np.finfo(float).tiny))
-        to = slope @ inverse_information(minimum.information)
-        own = np.einsum("pa,lab,pb->lp", to, minimum.line_information, to, optimize=True)
+        to = slope @ inverse_information(group.information)
+        own = np.einsum("pa,lab,pb->lp", to, group.of_lines().information, to, optimize=True)
         share[:, group.which] = np.maximum(own, 0) / np.maximum(own.sum(axis=0), np.finfo(float).tiny)
     return share

@@ -85,15 +85,16 @@ def derived_quantity(
     std_error = float(np.sqrt(own)) if own > 0 else (math.nan if math.isnan(own) else 0.0)
     limits = intervals(probability)
     if used.size == 1:
-        ends = []
+        carried = []
         for limit in limits[names[used[0]]]:
             there = values.copy()
             there[used] = limit
-            ends.append(at(there))
-        return Derived(value, std_error, min(ends), max(ends))
+            carried.append(at(there))
+        return Derived(value, std_error, min(carried), max(carried))
     profile = getattr(intervals, "of_function", None)
-    if profile is not None and used.size:
-        return Derived(value, std_error, *profile(at, slope, probability))
+    ends = profile(at, used, probability) if profile is not None and used.size else None
+    if ends is not None:
+        return Derived(value, std_error, *ends)
     reach = float(ndtri((1 + probability) / 2)) * std_error
     return Derived(value, std_error, value - reach, value + reach)
 

@@ -11,18 +11,19 @@ from jointfrf.dofs import compliance_unit
 from jointfrf.identification.elastic_centre import elastic_centre
 from jointfrf.identification.findings import Finding, note, warn
 from jointfrf.identification.fit_data import ModelData
-from jointfrf.identification.manifold.coordinates import CrossTerms, LawCoordinates
+from jointfrf.identification.manifold.coordinates import CrossTerms
 from jointfrf.identification.manifold.estimate import JointEstimate
-from jointfrf.identification.manifold.fit import ComplianceFit, DofDamping, stiffness_of_lines
-from jointfrf.identification.manifold.law_fit import FoundLaws
+from jointfrf.identification.manifold.fit import DofDamping, ManifoldFit
 from jointfrf.identification.manifold.prepare import FitProblem
-from jointfrf.identification.manifold.scatter import Spread
 from jointfrf.identification.manifold.transforms import Transforms
+from jointfrf.identification.manifold.uncertainty import Spread
 from jointfrf.identification.model.fit import FoundModel, OpenDirection
 from jointfrf.identification.model.prepare import Channels
-from jointfrf.identification.residual_test import Misfit
+from jointfrf.identification.parameters import joint_vector
+from jointfrf.identification.residual_test import ResidualTest
 from jointfrf.identification.result import Fit, FittedParameter, law_parameters
 from jointfrf.kernel.arguments import FloatArray
+from jointfrf.laws.law_joint import LawJoint
 
 __all__ = ["describe_laws", "describe_model", "describe_springs", "poor_laws"]
 
@@ -70,22 +71,21 @@ _COUPLED = (
 # ---------------------------------------------------------------- springs and dampers, FRFs between all joint DOFs
 
 
-def describe_springs(found: ComplianceFit, problem: FitProblem) -> Fit:
+def describe_springs(found: ManifoldFit, problem: FitProblem) -> Fit:
     """Make the result of a fit of springs and dampers."""
-    result, noise = found.estimate, found.problem.noise
-    scale = float(np.sqrt(result.excess))
+    result = found.estimate
     fit = Fit.of_springs(
         "compliance",
         problem.dofs,
         dict(zip([one.name for one in result.parameters], result.theta.tolist(), strict=True)),
         found.covariance,
-        scale * noise.level if noise.is_assumed else noise.level,
-        scale * noise.level,
+        found.noise_level,
+        found.residual_level,
         problem.freq_hz,
-        k_lines=stiffness_of_lines(problem.frfs),
+        k_lines=problem.frfs.line_stiffness(),
         bands=problem.bands,
-        residual_is_noise=found.misfit.is_noise,
-        test=found.misfit,
+        residual_is_noise=found.test.is_noise,
+        test=found.test,
         is_converged=result.converged,
         intervals=found.intervals,
     )
@@ -111,7 +111,7 @@ def describe_springs(found: ComplianceFit, problem: FitProblem) -> Fit:
         *_reference_point(fit),
     ]
     if not result.converged:
-        most = max(group.fit.iterations for group in result.groups)
+        most = max(group.iterations for group in result.groups)
         findings.append(warn("convergence", f"the fit did not converge in {most} iterations"))
     return fit.with_findings(findings)
 
@@ -211,7 +211,7 @@ def _reference_point(fit: Fit) -> list[Finding]:
     return [note("reference point", text)]
 
 
-def _sides(found: ComplianceFit, problem: FitProblem) -> list[Finding]:
+def _sides(found: ManifoldFit, problem: FitProblem) -> list[Finding]:
     """Say what is known of the flexibility between channels."""
     frfs, added = problem.frfs, problem.added_compliance
     if Transforms(frfs.responses, frfs.forces).are_units:
@@ -230,7 +230,7 @@ def _sides(found: ComplianceFit, problem: FitProblem) -> list[Finding]:
     return [note("sides", text, tuple(dof for dof, _ in known))]
 
 
-def _mostly_sides(found: ComplianceFit, fit: Fit) -> list[Finding]:
+def _mostly_sides(found: ManifoldFit, fit: Fit) -> list[Finding]:
     """Name stiffnesses whose uncertainty is mostly that of sides that are not rigid."""
     if found.channels is None:
         return []
@@ -251,7 +251,7 @@ def _hidden_lines(result: JointEstimate, dofs: tuple[str, ...]) -> list[Finding]
     """Count the lines on which noise hides the transmission of the joint, where its cross terms are unknown."""
     found = []
     for group in result.groups:
-        beside, total = group.fit.beside, group.fit.trusted.size
+        beside, total = group.unknown_cross, group.used.size
         if beside is not None and beside.hidden > _UNTRUSTED * total:
             text = (
                 f"on {beside.hidden} of {total} lines noise hides gamma_jk of {_named(group.dofs, dofs)} "
@@ -265,7 +265,7 @@ def _unknown_cross(result: JointEstimate, dofs: tuple[str, ...], cross: CrossTer
     """Say what contradicts a joint where only the diagonal of its compliance was fitted."""
     found = []
     for group in result.groups:
-        beside = group.fit.beside
+        beside = group.unknown_cross
         if beside is None:
             continue
         whose, about = _named(group.dofs, dofs), tuple(dofs[d] for d in group.dofs)
@@ -279,7 +279,7 @@ def _unknown_cross(result: JointEstimate, dofs: tuple[str, ...], cross: CrossTer
             )
             found.append(warn("cross terms", text, about))
         if beside.scatter is not None:
-            share = beside.scatter / np.maximum(group.fit.minimum.x[: len(group.dofs)], np.finfo(float).tiny)
+            share = beside.scatter / np.maximum(group.x[: len(group.dofs)], np.finfo(float).tiny)
             varying = [f"{dofs[d]} by {100 * s:.0f} %" for d, s in zip(group.dofs, share, strict=True) if s > _VARIES]
             text = (
                 f"the compliance varies from line to line beyond its noise: {', '.join(varying)}; "
@@ -289,7 +289,7 @@ def _unknown_cross(result: JointEstimate, dofs: tuple[str, ...], cross: CrossTer
     return found
 
 
-def _band_parts(found: ComplianceFit) -> list[Finding]:
+def _band_parts(found: ManifoldFit) -> list[Finding]:
     """Name parameters on which parts of the band do not agree, each fitted by itself."""
     parts, warnings = found.parts, []
     if parts is None or found.cross_fits:
@@ -322,10 +322,10 @@ def _scattering(fit: Fit, spread: Spread) -> list[Finding]:
     return [warn("trend", text, wide)] if wide else []
 
 
-def _misfit(found: ComplianceFit, problem: FitProblem) -> list[Finding]:
+def _misfit(found: ManifoldFit, problem: FitProblem) -> list[Finding]:
     """Say whether the residual differs from the noise, and how."""
-    misfit, noise = found.misfit, problem.noise
-    by_part = noise.is_told and abs(misfit.ratio / np.sqrt(2) - 1) < _BY_PART
+    misfit, noise = found.test, problem.noise
+    by_part = noise.is_given and abs(misfit.ratio / np.sqrt(2) - 1) < _BY_PART
     why = _COUPLED if found.cross_fits else _PER_PART if by_part else None
     findings = _too_large(misfit, "the joint does not fit the data", why) if not noise.is_assumed else []
     for trend in () if found.cross_fits else misfit.trends:
@@ -338,14 +338,14 @@ def _misfit(found: ComplianceFit, problem: FitProblem) -> list[Finding]:
     return findings
 
 
-def _small_residual(found: ComplianceFit, problem: FitProblem) -> list[Finding]:
+def _small_residual(found: ManifoldFit, problem: FitProblem) -> list[Finding]:
     """Say that the residual is below the noise: intervals are then wider than they need be."""
-    misfit, noise = found.misfit, problem.noise
+    misfit, noise = found.test, problem.noise
     # What is not rigid in the channels weighs as noise, and averages out of a residual of joint DOFs.
     if noise.is_assumed or found.channels is not None or not misfit.is_small:
         return []
-    why = "said" if noise.is_told else "their reciprocity shows"
-    mean = _MEAN_OF_TWO if problem.frfs.symmetrised and noise.is_told else ""
+    why = "said" if noise.is_given else "their reciprocity shows"
+    mean = _MEAN_OF_TWO if problem.frfs.symmetrised and noise.is_given else ""
     text = (
         f"the residual is {misfit.ratio:.2g} times the noise: the FRFs have less noise than {why}, or were smoothed"
         f"{mean}; the intervals are wider than they need be"
@@ -356,37 +356,33 @@ def _small_residual(found: ComplianceFit, problem: FitProblem) -> list[Finding]:
 # ---------------------------------------------------------------- laws, FRFs between all joint DOFs
 
 
-def describe_laws(found: FoundLaws) -> Fit:
+def describe_laws(found: ManifoldFit, joint: LawJoint) -> Fit:
     """Make the result of a fit of laws to FRFs between all joint DOFs."""
     problem, result = found.problem, found.estimate
-    scale = float(np.sqrt(result.excess))
     fit = Fit(
         method="compliance",
         dofs=problem.dofs,
-        parameters=law_parameters(found.joint),
+        parameters=law_parameters(joint),
         estimate=result.theta,
         covariance=found.covariance,
-        noise_level=problem.noise.level * (scale if problem.noise.is_assumed else 1.0),
-        residual_level=scale * problem.noise.level,
+        noise_level=found.noise_level,
+        residual_level=found.residual_level,
         freq_hz=problem.freq_hz,
-        laws=found.joint,
-        k_lines=stiffness_of_lines(problem.frfs),
+        laws=joint.with_values(result.theta),
+        k_lines=problem.frfs.line_stiffness(),
         bands=problem.bands,
-        residual_is_noise=found.misfit.is_noise,
-        test=found.misfit,
+        residual_is_noise=found.test.is_noise,
+        test=found.test,
         is_converged=result.converged,
         intervals=found.intervals,
     )
-    is_log: dict[str, bool] = {}
-    for group in result.groups:
-        assert isinstance(group.joint, LawCoordinates)
-        is_log |= {one.name: one.is_log for one in group.joint.vector.all}
+    is_log = {one.name: one.is_log for one in joint_vector(joint, (), np.ones(len(joint.dofs))).all}
     findings = [
         *_left_out_lines(result, problem.dofs),
         *_left_out_dofs(problem),
         *poor_laws(fit, is_log, lambda name: found.intervals.of(name, 0.95)),
-        *([] if problem.noise.is_assumed else _too_large(found.misfit, "these laws do not fit the data")),
-        *_law_trends(found.misfit),
+        *([] if problem.noise.is_assumed else _too_large(found.test, "these laws do not fit the data")),
+        *_law_trends(found.test),
         *_noise(problem.noise.is_assumed, problem.noise.inflation, problem.freq_hz),
         *_outlying_lines(problem),
         *_correlated(fit),
@@ -399,7 +395,7 @@ def describe_laws(found: FoundLaws) -> Fit:
     return fit.with_findings(findings)
 
 
-def _law_trends(misfit: Misfit) -> list[Finding]:
+def _law_trends(misfit: ResidualTest) -> list[Finding]:
     """Name parameters of laws that are not constant over frequency."""
     found = []
     for trend in misfit.trends:
@@ -453,13 +449,12 @@ def describe_model(found: FoundModel, channels: Channels) -> Fit:
         ),
     )  # fmt: skip
     is_log = {one.name: one.is_log for one in vector.fitted}
-    places = {one.name: i for i, one in enumerate(vector.fitted)}
     findings = [
         *_model_residual(fit, found, channels),
-        *poor_laws(fit, is_log, lambda name: found.intervals.of(places[name], 0.95)),
+        *poor_laws(fit, is_log, lambda name: found.intervals.of(name, 0.95)),
         *_directions(found.directions),
         *_other_minimum(found.other),
-        *_noise(problem.is_assumed, problem.inflation, problem.freq_hz),
+        *_noise(problem.noise.is_assumed, problem.noise.inflation, problem.freq_hz),
         *_priors(fit, found.directions),
         *_correlated(fit),
     ]
@@ -486,7 +481,7 @@ def _model_residual(fit: Fit, found: FoundModel, channels: Channels) -> list[Fin
             about += [names[i] for i, _ in own]
     if np.isfinite(test.neighbours) and test.neighbours > 5:
         parts.append("smooth over frequency, as no noise is")
-    if test.ratio > 1 + 3 * test.sigma or test.bands or test.responses or test.forces or test.neighbours > 4:
+    if test.is_large or test.bands or test.responses or test.forces or test.neighbours > 4:
         text = (
             f"the models and the joint do not fit the FRFs: {'; '.join(parts)}; the parameters carry that error, which "
             "the intervals do not allow for"
@@ -607,9 +602,9 @@ def _left_out_lines(result: JointEstimate, dofs: tuple[str, ...]) -> list[Findin
     """Count the lines that no joint near the one found fits."""
     found = []
     for group in result.groups:
-        if group.fit.beside is not None:
+        if group.unknown_cross is not None:
             continue
-        out, total = int(np.count_nonzero(~group.fit.trusted)), group.fit.trusted.size
+        out, total = int(np.count_nonzero(~group.used)), group.used.size
         if out > _UNTRUSTED * total:
             whose = f" of {_named(group.dofs, dofs)}" if len(result.groups) > 1 else ""
             text = f"{out} of {total} lines{whose} do not fit the joint found within their noise and are left out"
@@ -617,7 +612,7 @@ def _left_out_lines(result: JointEstimate, dofs: tuple[str, ...]) -> list[Findin
     return found
 
 
-def _too_large(misfit: Misfit, what: str, why: str | None = None) -> list[Finding]:
+def _too_large(misfit: ResidualTest, what: str, why: str | None = None) -> list[Finding]:
     """Say that the residual is more than noise, and by default where."""
     if not misfit.is_large:
         return []

@@ -15,8 +15,7 @@ from jointfrf.frf.bands import spread_lines
 from jointfrf.identification.compliance_data import compliance_data
 from jointfrf.identification.describe import describe_laws, describe_springs
 from jointfrf.identification.manifold.coordinates import CrossTerms, DampingTerms
-from jointfrf.identification.manifold.fit import fit_compliance
-from jointfrf.identification.manifold.law_fit import fit_laws
+from jointfrf.identification.manifold.fit import fit_laws, fit_springs
 from jointfrf.identification.manifold.prepare import FitOptions, FitProblem, prepare_compliance
 from jointfrf.identification.manifold.transforms import Transform
 from jointfrf.identification.noise import NoiseOptions
@@ -146,14 +145,15 @@ def identify(
     if reciprocal:
         _look_at(problem, transform)
     if joint is None:
-        found = fit_compliance(problem)
-        fit = replace(describe_springs(found, problem), data=compliance_data(found, problem, transform))
+        found = fit_springs(problem)
+        fit = describe_springs(found, problem)
     else:
         count = 2 * np.count_nonzero(np.isfinite(problem.frfs.variance))
         if count < len(joint.names):
             raise ValueError(f"{count} numbers measured cannot give {len(joint.names)} parameters of laws")
-        laws = fit_laws(problem, joint)
-        fit = replace(describe_laws(laws), data=compliance_data(laws, problem, transform))
+        found = fit_laws(problem, joint)
+        fit = describe_laws(found, joint)
+    fit = replace(fit, data=compliance_data(found, problem, transform))
     fit.issue_warnings()
     return fit
 

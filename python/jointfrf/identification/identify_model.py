@@ -13,8 +13,9 @@ from jointfrf.identification.identify import identify
 from jointfrf.identification.manifold.coordinates import CrossTerms
 from jointfrf.identification.model.assembly import Assembly
 from jointfrf.identification.model.fit import fit_assembly
-from jointfrf.identification.model.prepare import ChannelNoise, Channels, prepare_model_fit
+from jointfrf.identification.model.prepare import Channels, prepare_model_fit
 from jointfrf.identification.model.substructure import Unknown
+from jointfrf.identification.noise import NoiseOptions
 from jointfrf.identification.result import Fit
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_names, check_type
 from jointfrf.laws.law_joint import LawJoint
@@ -117,7 +118,7 @@ def identify_model(
             raise TypeError(f"{name} must be a mapping of channels to Unknown, not {type(gains).__name__}")
     named = as_names("responses", responses), as_names("forces", forces)
     channels = Channels(*named, dict(response_gains or {}), dict(force_gains or {}))
-    known = ChannelNoise(noise, coherence, averages)
+    known = NoiseOptions(noise, coherence, averages)
     problem = prepare_model_fit(freq_hz, h, assembly, channels, known, fixed, _springs_at_joint)
     fit = describe_model(fit_assembly(problem), channels)
     fit.issue_warnings()
@@ -125,18 +126,25 @@ def identify_model(
 
 
 def _springs_at_joint(
-    joint: LawJoint, freq: FloatArray, lines: ComplexArray, variance: FloatArray, at: tuple[list[int], list[int]]
+    joint: LawJoint, freq_hz: FloatArray, gamma: ComplexArray, variance: FloatArray
 ) -> FloatArray | None:
-    """Return values of a joint of springs from FRFs between all its DOFs; None for others, or where there is none."""
+    """Return values of a joint of springs from the compliance fit; None for other joints, or where it finds none.
+
+    Parameters
+    ----------
+    joint : LawJoint
+    freq_hz : ndarray, shape (n_freq,)
+        Hz.
+    gamma, variance : ndarray, shape (n_freq, 2 n, 2 n)
+        FRFs between all joint DOFs j, then k, m/N, and E|e|^2.
+    """
     if joint.rigid or not all(isinstance(law, SpringLaw) for law in joint.laws.values()):
         return None
-    gamma = np.ascontiguousarray(lines[:, at[0]][:, :, at[1]])
     cross: CrossTerms = "fit" if any(a != b for a, b in joint.laws) else "zero"
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
-            own = variance[:, at[0]][:, :, at[1]]
-            found = identify(freq, gamma, joint.dofs, damping="viscous", cross=cross, noise=own)
+            found = identify(freq_hz, gamma, joint.dofs, damping="viscous", cross=cross, noise=variance)
         except (ValueError, np.linalg.LinAlgError):
             return None
     k, c = found.stiffness_matrix, found.damping_matrix

@@ -1,4 +1,4 @@
-"""Values of a joint from its compliance on each line by itself: where a fit may start."""
+"""Values of a joint from its compliance on single lines: where a fit may start."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ def _of_compliance(law: JointLaw, omega: FloatArray, c: ComplexArray, variance: 
 
 
 class LineCompliance(NamedTuple):
-    """Compliance of the joint on each line by itself.
+    """Compliance of the joint on each line alone.
 
     Attributes
     ----------

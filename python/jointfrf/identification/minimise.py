@@ -7,10 +7,19 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from jointfrf.identification.parameters import ParameterVector
 from jointfrf.kernel.arguments import FloatArray
 
 __all__ = ["Linearised", "Minimum", "Squares", "inverse_information", "minimise"]
+
+#: Levenberg's parameter: first value, factors where a step succeeds and fails, smallest and largest value.
+_FIRST, _LOWERED, _RAISED, _SMALLEST, _LARGEST = 1e-3, 0.1, 8.0, 1e-9, 1e9
+#: A minimum is found when a step promises less than this of -2 log likelihood, or when two steps in a row gain less.
+_LEAST, _SMALL = 1e-4, 1e-3
+#: Rounding of a sum of squares: a gain of this share of it is none.
+_ROUNDING = 1e-12
+#: Directions of less information than this share of the largest are rounding: of a step, and of an inverse.
+_NOT_SOLVED, _SEEN = 1e-13, 1e-15
+_TINY = float(np.finfo(float).tiny)
 
 
 class Linearised(NamedTuple):
@@ -29,33 +38,25 @@ class Linearised(NamedTuple):
 
 
 class Squares(Protocol):
-    """A sum of squares of the coordinates of the free parameters."""
+    """A sum of squares as a function of coordinates, shape (p,)."""
 
     @property
-    def vector(self) -> ParameterVector:
-        """The parameters."""
+    def unit(self) -> float:
+        """What the sum has to be divided by to be -2 log likelihood."""
+
+    @property
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        """Smallest and largest values of the coordinates."""
+
+    @property
+    def longest(self) -> FloatArray:
+        """Largest step of each coordinate."""
 
     def cost(self, x: FloatArray) -> float:
-        """Return the sum."""
+        """Return the sum; inf where there is none."""
 
     def linearised(self, x: FloatArray) -> Linearised:
         """Return it with its derivatives."""
-
-
-#: Levenberg's parameter: first value, factors where a step succeeds and fails, largest value.
-_FIRST, _LOWERED, _RAISED, _LARGEST = 1e-3, 0.1, 8.0, 1e9
-
-
-#: A minimum is found when a step promises less than this of squares that are 1 for one residual.
-_LEAST = 1e-4
-
-
-#: Or when two steps in a row gain less than this.
-_SMALL = 1e-3
-
-
-#: No step changes a logarithm, or standard deviations of a prior, by more than this; damping may be anything.
-_LONGEST = 4.0
 
 
 class Minimum(NamedTuple):
@@ -68,6 +69,8 @@ class Minimum(NamedTuple):
     cost : float
     information : ndarray, shape (p, p)
         Half of the second derivatives.
+    gradient : ndarray, shape (p,)
+        Minus half of the first: zero but for coordinates at their bound.
     converged : bool
     at_bound : ndarray of bool, shape (p,)
     """
@@ -75,12 +78,18 @@ class Minimum(NamedTuple):
     x: FloatArray
     cost: float
     information: FloatArray
+    gradient: FloatArray
     converged: bool
     at_bound: NDArray[np.bool_]
 
 
 def minimise(
-    squares: Squares, start: FloatArray, held: int | None = None, steps: int = 40, least: float = _LEAST
+    squares: Squares,
+    start: FloatArray,
+    held: int | None = None,
+    steps: int = 40,
+    least: float = _LEAST,
+    small: float = _SMALL,
 ) -> Minimum:
     """Minimise squares from a start.
 
@@ -93,24 +102,27 @@ def minimise(
         A coordinate that keeps its value.
     steps : int
         At most so many linearisations.
-    least : float
-        The iteration ends when the next step promises to lower the squares by less.
+    least, small : float
+        The iteration ends when the next step promises to lower -2 log likelihood by less than the first, or when two
+        steps in a row lowered it by less than the second: where squares hardly determine a direction, steps promise
+        more than they gain.
     """
-    lower, upper = squares.vector.bounds
-    longest = np.where(squares.vector.is_log | squares.vector.has_prior, _LONGEST, np.inf)
+    (lower, upper), longest = squares.bounds, squares.longest
+    least, small = least * squares.unit, small * squares.unit
     free = np.arange(start.size) != (-1 if held is None else held)
     x = np.where(free, np.clip(start, lower, upper), start)
-    damping, at, converged, small = _FIRST, squares.linearised(x), False, 0
+    damping, at, converged, count = _FIRST, squares.linearised(x), False, 0
     for _ in range(steps):
         if not np.isfinite(at.information).all():
             break
-        moving = free & ~_pressed(x, at, lower, upper)
-        step, promised = _step(at, moving, 0.0)
+        pressed = ((x <= lower) & (at.gradient < 0)) | ((x >= upper) & (at.gradient > 0))
+        way = _Steps(at, np.flatnonzero(free & ~pressed))
+        promised = way.step(0.0)[1]
         if promised < least:
             converged = True
             break
         while damping <= _LARGEST:
-            step, left = _step(at, moving, damping)
+            step, left = way.step(damping)
             if left < 0.1 * least:
                 damping = 2 * _LARGEST
                 break
@@ -124,36 +136,33 @@ def minimise(
             converged = promised < max(10 * least, 1e-6 * at.cost)
             break
         gain = at.cost - cost
-        damping = max(damping * _LOWERED, 1e-9)
+        damping = max(damping * _LOWERED, _SMALLEST)
         x, at = there, squares.linearised(there)
-        small = small + 1 if gain < _SMALL + 1e-12 * cost else 0
-        if small == 2:
-            # In a direction that the squares hardly hold, steps promise more than they gain.
+        count = count + 1 if gain < small + _ROUNDING * cost else 0
+        if count == 2:
             converged = True
             break
-    return Minimum(x, at.cost, at.information, converged, (x <= lower) | (x >= upper))
+    return Minimum(x, at.cost, at.information, at.gradient, converged, (x <= lower) | (x >= upper))
 
 
-def _pressed(x: FloatArray, at: Linearised, lower: FloatArray, upper: FloatArray) -> NDArray[np.bool_]:
-    """Return which coordinates are pressed against their bound."""
-    return ((x <= lower) & (at.gradient < 0)) | ((x >= upper) & (at.gradient > 0))
+class _Steps:
+    """Steps from a point for any damping, by the eigenvectors of the information in units of each coordinate."""
 
+    def __init__(self, at: Linearised, moving: NDArray[np.intp]) -> None:
+        self.moving, self.p = moving, at.gradient.size
+        self.size = np.sqrt(np.maximum(np.diagonal(at.information), _TINY))[moving]
+        scaled = at.information[np.ix_(moving, moving)] / np.outer(self.size, self.size)
+        self.value, self.vector = np.linalg.eigh(scaled)
+        self.along = self.vector.T @ (at.gradient[moving] / self.size)
 
-def _step(at: Linearised, moving: NDArray[np.bool_], damping: float) -> tuple[FloatArray, float]:
-    """Return the step, and by how much it promises to lower the squares."""
-    step, places = np.zeros(moving.size), np.flatnonzero(moving)
-    if not places.size:
-        return step, 0.0
-    size = np.sqrt(np.maximum(np.diagonal(at.information), np.finfo(float).tiny))
-    scaled = (at.information / np.outer(size, size))[np.ix_(places, places)]
-    gradient = (at.gradient / size)[places]
-    found = np.linalg.lstsq(scaled + damping * np.eye(places.size), gradient, rcond=1e-13)[0]
-    step[places] = found / size[places]
-    return step, float(found @ gradient)
-
-
-#: Directions of less information than this share of the largest are not seen.
-_SEEN = 1e-15
+    def step(self, damping: float) -> tuple[FloatArray, float]:
+        """Return the step, and by how much it promises to lower the squares."""
+        step, value = np.zeros(self.p), self.value + damping
+        length = abs(value)
+        seen = length > _NOT_SOLVED * length.max(initial=0)
+        part = np.where(seen, self.along / np.where(seen, value, 1), 0)
+        step[self.moving] = (self.vector @ part) / self.size
+        return step, float(part @ self.along)
 
 
 def inverse_information(information: FloatArray) -> FloatArray:
@@ -163,7 +172,7 @@ def inverse_information(information: FloatArray) -> FloatArray:
     ----------
     information : ndarray, shape (..., p, p)
     """
-    size = np.sqrt(np.maximum(np.einsum("...aa->...a", information), np.finfo(float).tiny))
+    size = np.sqrt(np.maximum(np.einsum("...aa->...a", information), _TINY))
     value, vector = np.linalg.eigh(information / (size[..., :, None] * size[..., None, :]))
     length = abs(value)
     seen = length > _SEEN * length.max(axis=-1, keepdims=True)

@@ -2,39 +2,62 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from jointfrf.frf.bands import is_long, line_slices, spread_lines
-from jointfrf.frf.entry_groups import ZERO
+from jointfrf.frf.entry_groups import ZERO, entry_groups
 from jointfrf.frf.noise_model import NoiseModel, estimate_noise
 from jointfrf.frf.noise_parts import noise_parts
 from jointfrf.frf.quantiles import medians
 from jointfrf.frf.smoothing import near_squares, smooth_frfs
-from jointfrf.identification.manifold.transforms import Transforms, deformation_compliance, deformation_variance
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_number, as_real
 
-__all__ = ["KnownNoise", "NoiseOptions", "PreparedFrfs", "known_noise", "noise_about"]
+__all__ = ["KnownNoise", "NoiseOptions", "SmoothedFrfs", "noise_about", "noise_of_channels", "noise_of_matrix"]
 
-#: Relative noise where neither the data nor the user say one: the residual then tells.
+#: Relative noise where neither the data nor the user give one: it is replaced by that of the residual.
 _ASSUMED_LEVEL = 0.01
 #: Smooth FRFs that lie so many standard deviations of the noise off the measured ones are none of a line.
 _MISSED = 3.0
 #: Relative noise below this is rounding.
 _LEAST_LEVEL = 1e-7
+#: FRFs of single channels count as no smaller than this share of their largest line: their noise is then not zero.
+_LEAST_SIZE = 1e-6
+#: A floor counts where it raises the logarithm of the likelihood by more than this.
+_SIGNIFICANT = 4.0
+_TINY = float(np.finfo(float).tiny)
 
 
 @dataclass(frozen=True)
 class NoiseOptions:
-    """What is known of the noise, as in `identify` and `estimate_noise`."""
+    """What is known of the noise, as in `identify`, `identify_model` and `estimate_noise`."""
 
     noise: float | ArrayLike | None = None
     coherence: ArrayLike | None = None
     averages: float | None = None
     like: NoiseModel | None = None
+
+    def level(self) -> float | None:
+        """Return the relative level where one is given; check that nothing else is."""
+        if self.noise is not None and (self.coherence is not None or self.averages is not None):
+            raise ValueError("coherence and averages are used where noise is not given: leave one of them out")
+        if self.noise is None or np.ndim(self.noise) > 0:
+            return None
+        level = as_number("noise", self.noise)
+        if level <= 0:
+            raise ValueError(f"noise must be positive, not {level:g}")
+        return level
+
+    def variance(self, shape: tuple[int, ...], shown: NDArray[np.bool_]) -> FloatArray:
+        """Return the variances given; positive for the FRFs that were measured, shape (n_o, n_i)."""
+        assert self.noise is not None
+        variance = as_real("noise", self.noise, shape)
+        if not (variance[:, shown] > 0).all():
+            raise ValueError("noise must hold positive variances: E|e|^2 of each FRF that was measured")
+        return variance
 
 
 @dataclass(frozen=True)
@@ -52,9 +75,9 @@ class KnownNoise:
     outlying : ndarray of int
         Lines whose noise is far above that of the others.
     model : NoiseModel, optional
-        Noise of the channels, where it was found from their FRFs.
-    is_told : bool
-        Whether the user said the noise.
+        Noise of the channels, where it was found from their FRFs; not of long sweeps.
+    is_given : bool
+        Whether the user gave the noise.
     """
 
     level: float
@@ -62,101 +85,127 @@ class KnownNoise:
     is_assumed: bool
     outlying: NDArray[np.intp]
     model: NoiseModel | None = None
-    is_told: bool = False
+    is_given: bool = False
+
+    @classmethod
+    def given(cls, level: float) -> KnownNoise:
+        """Return noise of a level that the user gave."""
+        return cls(level, 1.0, False, np.empty(0, np.intp), is_given=True)
+
+    @classmethod
+    def found(cls, model: NoiseModel) -> KnownNoise:
+        """Return noise found from the FRFs; assumed where they do not show it, or where it is rounding."""
+        is_assumed = model.source == "none" or model.level < _LEAST_LEVEL
+        return cls(_ASSUMED_LEVEL if is_assumed else model.level, model.inflation, is_assumed, model.outlying, model)
 
 
-class PreparedFrfs(NamedTuple):
-    """What smoothing of the channels gives.
+class SmoothedFrfs(NamedTuple):
+    """Smooth FRFs, and the noise of the measured ones.
 
     Attributes
     ----------
-    smooth : ndarray, shape (n_freq, 2 n, 2 n)
-        Smooth FRFs of the joint DOFs, m/N.
-    variance : ndarray, shape (n_freq, m_r, m_f)
-        Noise of the measured FRFs, (m/N)^2.
-    deformation : ndarray, shape (n_freq, m_r, m_f), or None
-        Squares of what is not rigid in them, (m/N)^2; None where that is not known.
-    compliance : ndarray, shape (n,), or None
-        What the sides between the channels add to the compliance of each joint DOF, m/N or rad/(N m).
-    transforms : Transforms
-        With rigid modes where these are known.
+    smooth : ndarray, shape (n_freq, n_o, n_i)
+        m/N.
+    variance : ndarray, shape (n_freq, n_o, n_i)
+        E|e|^2 of the measured FRFs, (m/N)^2; inf where nothing was measured.
     noise : KnownNoise
     """
 
     smooth: ComplexArray
     variance: FloatArray
-    deformation: FloatArray | None
-    compliance: FloatArray | None
-    transforms: Transforms
     noise: KnownNoise
 
 
-def known_noise(
-    freq: FloatArray, h: ComplexArray, options: NoiseOptions, transforms: Transforms, *, reciprocal: bool
-) -> PreparedFrfs:
-    """Return smooth FRFs of the joint DOFs, the variance of the measured ones, and what else is known of the noise."""
-    if options.noise is None:
-        return _estimated_noise(freq, h, options, transforms, reciprocal=reciprocal)
-    if options.coherence is not None or options.averages is not None:
-        raise ValueError("coherence and averages are used where noise is not given: leave one of them out")
-    is_level = np.ndim(options.noise) == 0
-    if is_level:
-        level = as_number("noise", options.noise)
-        if level <= 0:
-            raise ValueError(f"noise must be positive, not {level:g}")
+def noise_of_matrix(freq: FloatArray, h: ComplexArray, options: NoiseOptions, *, reciprocal: bool) -> SmoothedFrfs:
+    """Return smooth FRFs and noise of a matrix of FRFs, all measured; a level is relative to the smooth FRFs."""
+    level = options.level()
+    if level is not None:
         variance = _relative_variance(np.sqrt(near_squares(h)), level)
         # Measured FRFs as weights favour lines that noise has made small.
         variance = _relative_variance(smooth_frfs(freq, h, variance, reciprocal=reciprocal).h, level)
-    else:
-        variance = as_real("noise", options.noise, h.shape)
-        if (variance <= 0).any():
-            raise ValueError("noise must hold positive variances")
-        of_entry = np.median(np.sqrt(variance) / np.maximum(abs(h), np.finfo(float).tiny), axis=0)
+        smooth = smooth_frfs(freq, h, variance, reciprocal=reciprocal).h
+        variance, known = _relative_variance(smooth, level), KnownNoise.given(level)
+    elif options.noise is not None:
+        variance = options.variance(h.shape, np.ones(h.shape[1:], bool))
+        of_entry = np.median(np.sqrt(variance) / np.maximum(abs(h), _TINY), axis=0)
         # Entries that are zero by symmetry have noise, but no relative noise.
-        level = float(np.median(of_entry[of_entry < 1] if (of_entry < 1).any() else of_entry))
-    smooth = smooth_frfs(freq, h, variance, reciprocal=reciprocal).h
-    if is_level:
-        variance = _relative_variance(smooth, level)
-    known = KnownNoise(level, 1.0, False, np.empty(0, np.intp), is_told=True)
-    return _prepared(h, _near(smooth, h, variance), variance, transforms, known)
+        known = KnownNoise.given(float(np.median(of_entry[of_entry < 1] if (of_entry < 1).any() else of_entry)))
+        smooth = smooth_frfs(freq, h, variance, reciprocal=reciprocal).h
+    else:
+        model = estimate_noise(
+            freq, h, reciprocal=reciprocal, coherence=options.coherence, averages=options.averages, like=options.like
+        )
+        known = KnownNoise.found(model)
+        if model.source == "residual" and not model.smooth.is_smooth:
+            # What a rational function leaves of FRFs that it meets but for so little is no noise, either.
+            known = replace(known, level=_ASSUMED_LEVEL, is_assumed=True)
+        variance = _relative_variance(model.smooth.h, _ASSUMED_LEVEL if known.is_assumed else _LEAST_LEVEL)
+        if not known.is_assumed:
+            np.maximum(model.variance, variance, out=variance)
+        # Other realisations start from the model; of a long sweep it would take too much memory.
+        if is_long(len(freq)):
+            known, smooth = replace(known, model=None), model.smooth.h
+        else:
+            smooth = model.smooth.h.copy()
+        del model
+    return SmoothedFrfs(_near(smooth, h, variance), variance, known)
 
 
-def _prepared(
-    h: ComplexArray, smooth: ComplexArray, variance: FloatArray, transforms: Transforms, known: KnownNoise
-) -> PreparedFrfs:
-    """Take smooth FRFs of the channels to the joint DOFs, and see what is not rigid in them."""
-    transforms = transforms.with_modes(smooth)
-    deformation, compliance = None, None
-    if transforms.channels is not None:
-        deformation = deformation_variance(smooth, *transforms.channels)
-        compliance = deformation_compliance(h, variance, *transforms.channels)
-    if transforms.compliance is not None:
-        compliance = np.maximum(transforms.compliance, 0.0 if compliance is None else compliance)
-    return PreparedFrfs(transforms.gamma(smooth), variance, deformation, compliance, transforms, known)
+def noise_of_channels(
+    freq: FloatArray, h: ComplexArray, shown: NDArray[np.bool_], options: NoiseOptions, *, reciprocal: bool
+) -> SmoothedFrfs:
+    """Return smooth FRFs and noise of any FRFs, of which some may be missing; a level is relative to measured FRFs.
 
+    Parameters
+    ----------
+    freq : ndarray, shape (n_freq,)
+    h : ndarray, shape (n_freq, n_o, n_i)
+    shown : ndarray of bool, shape (n_o, n_i)
+        FRFs that were measured.
+    options : NoiseOptions
+    reciprocal : bool
+        Whether responses and forces are the same channels, all measured.
+    """
+    measured, level = np.where(shown, h, 0), options.level()
+    kept = np.zeros(shown.shape, bool)
+    for group in entry_groups(measured, reciprocal=False):
+        kept[group.rows, group.columns] = True
+    kept &= shown  # without FRFs that are zero, by symmetry
+    size = abs(measured)
+    size = np.maximum(size, np.maximum(_LEAST_SIZE * size.max(axis=0), _TINY))
+    if options.noise is not None:
+        variance = options.variance(h.shape, shown) if level is None else (level * size) ** 2
+        return SmoothedFrfs(
+            measured, np.where(kept, variance, np.inf), KnownNoise.given(np.nan if level is None else level)
+        )
+    # Of a square matrix FRFs that are zero by symmetry may stay: reciprocity says more of the noise.
+    taken = shown if reciprocal else kept
+    rows, columns = np.flatnonzero(taken.any(axis=1)), np.flatnonzero(taken.any(axis=0))
+    is_block = bool(taken[np.ix_(rows, columns)].all())
 
-def _estimated_noise(
-    freq: FloatArray, h: ComplexArray, options: NoiseOptions, transforms: Transforms, *, reciprocal: bool
-) -> PreparedFrfs:
-    """Find smooth FRFs and noise of the channels from the FRFs themselves."""
-    model = estimate_noise(
-        freq, h, reciprocal=reciprocal, coherence=options.coherence, averages=options.averages, like=options.like
+    def parts(values: ArrayLike) -> ComplexArray | FloatArray:
+        of = np.asarray(values)
+        return np.ascontiguousarray(of[:, rows][:, :, columns] if is_block else of[:, taken][:, None])
+
+    def placed(values: ComplexArray | FloatArray) -> ComplexArray:
+        whole = np.zeros((len(values), *shown.shape), np.complex128)
+        whole[:, taken] = values.reshape(len(values), -1)
+        return whole
+
+    coherence = None if options.coherence is None else parts(as_real("coherence", options.coherence, h.shape))
+    found = estimate_noise(
+        freq, np.asarray(parts(h), np.complex128), reciprocal=reciprocal and is_block, coherence=coherence,
+        averages=options.averages,
+    )  # fmt: skip
+    variance, smooth = placed(found.variance).real, placed(found.smooth.h)
+    relative, floor, of_coherence = (
+        placed(part[None])[0].real for part in (found.relative, found.floor, found.coherence_factor)
     )
-    # Below this, what looks like noise is rounding.
-    level = model.level
-    is_assumed = model.source == "none" or level < _LEAST_LEVEL
-    # What a rational function leaves of FRFs that it meets but for so little is no noise, either.
-    is_assumed |= model.source == "residual" and not model.smooth.is_smooth
-    least = _ASSUMED_LEVEL if is_assumed else _LEAST_LEVEL
-    variance = _relative_variance(model.smooth.h, least)
-    if not is_assumed:
-        np.maximum(model.variance, variance, out=variance)
-    # Other realisations start from the model; of a long sweep it would take too much memory.
-    kept = None if is_long(len(freq)) else model
-    known = KnownNoise(least if is_assumed else level, model.inflation, is_assumed, model.outlying, kept)
-    smooth = model.smooth.h.copy() if kept else model.smooth.h
-    del model
-    return _prepared(h, _near(smooth, h, variance), variance, transforms, known)
+    model = replace(found, relative=relative, floor=floor, coherence_factor=of_coherence, variance=variance)
+    known = replace(KnownNoise.found(found), model=model)
+    if known.is_assumed:
+        variance, smooth = (_ASSUMED_LEVEL * size) ** 2, measured
+    return SmoothedFrfs(smooth, np.where(kept, variance, np.inf), known)
 
 
 def _near(smooth: ComplexArray, h: ComplexArray, variance: FloatArray) -> ComplexArray:
@@ -179,11 +228,6 @@ def _relative_variance(h: ComplexArray | FloatArray, level: float) -> FloatArray
     np.maximum(variance, least, out=variance)
     variance *= level**2
     return variance
-
-
-#: A floor counts where it raises the logarithm of the likelihood by more than this.
-_SIGNIFICANT = 4.0
-_TINY = float(np.finfo(float).tiny)
 
 
 def noise_about(squares: FloatArray, size: FloatArray) -> tuple[FloatArray, FloatArray]:

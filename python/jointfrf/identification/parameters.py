@@ -21,6 +21,9 @@ ParameterOrigin = Literal["joint", "A", "B", "attachment", "response", "force"]
 
 #: Stiffnesses of the joint are sought within this factor of the stiffness that the substructures have there.
 _WIDEST = 1e6
+#: No step changes a logarithm, or standard deviations of a prior, by more than this; nor does the first of a profile a
+#: logarithm.
+_LONGEST, _LONGEST_REACH = 4.0, 1.5
 
 
 class FitParameter(NamedTuple):
@@ -32,7 +35,7 @@ class FitParameter(NamedTuple):
     origin : str
         What it belongs to.
     place : tuple
-        Where it stands there: its number in the joint; number of the attachment and of its number; name of an unknown;
+        Its place there: its number in the joint; number of the attachment and of its number; name of an unknown;
         number of a channel.
     value : float
         Where the fit may start, and the mean of the prior.
@@ -127,6 +130,25 @@ class ParameterVector:
         with np.errstate(divide="ignore"):
             logs = [np.log(np.where(self.is_log, np.maximum(limit, 0), 1)) for limit in (lower, upper)]
         return np.where(self.is_log, logs[0], lower / self.scale), np.where(self.is_log, logs[1], upper / self.scale)
+
+    @cached_property
+    def longest(self) -> FloatArray:
+        """Largest steps of a minimiser: of logarithms and of what has a prior; damping may be anything."""
+        return np.where(self.is_log | self.has_prior, _LONGEST, np.inf)
+
+    def value(self, i: int, x: FloatArray) -> float:
+        """Return the value of one of the free parameters."""
+        return float(self._own(x)[i])
+
+    def end(self, i: int, sign: int) -> float:
+        """Return what one of them runs to where it has no limit below (-1) or above (1)."""
+        if self.is_log[i]:
+            return np.inf if sign > 0 else 0.0
+        return float(self.limits[sign > 0][i])
+
+    def longest_reach(self, i: int) -> float:
+        """Return how far from a minimum the limit of one of them is sought first at most."""
+        return _LONGEST_REACH if self.is_log[i] else np.inf
 
     @cached_property
     def has_prior(self) -> NDArray[np.bool_]:

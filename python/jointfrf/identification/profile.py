@@ -2,33 +2,64 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from typing import Protocol
+
 import numpy as np
+from numpy.typing import NDArray
 from scipy import special
 
-from jointfrf.identification.minimise import Minimum, Squares, minimise
+from jointfrf.identification.minimise import Linearised, Squares, minimise
 from jointfrf.kernel.arguments import FloatArray
 
-__all__ = ["ProfileIntervals"]
+__all__ = ["FunctionIntervals", "Intervals", "ProfileIntervals", "ProfiledCoordinates"]
 
-#: Squares on the way of the linear prediction that differ less than this from those of a parabola need no profile.
-_PARABOLA = 0.1
-#: Steps in search of a limit, and how near to it squares must come.
-_STEPS, _NEAR = 12, 0.03
-#: Linearisations at a value of the parameter that is held.
-_HELD_STEPS = 6
+#: Squares on the way of the linear prediction that differ less than this from those of a parabola need no profile, and
+#: how near to a limit squares must come, relative to it; the latter where squares cost little.
+_PARABOLA, _NEAR, _PRECISE = 0.1, 0.03, 2e-4
+#: Steps in search of a limit, and where squares cost little.
+_STEPS, _MANY_STEPS = 12, 30
+#: Linearisations at a value of the parameter that is held, and what a step promises at the last one.
+_HELD_STEPS, _HELD_LEAST = 6, 1e-2
+#: Step of a difference, in standard errors, and how far from its value a function may be that is held, likewise.
+_SLOPE, _HELD = 1e-3, 1e-2
+#: A limit is sought between these shares of what brackets it.
+_INSIDE = np.array([0.1, 0.9])
+
+
+#: From a function of the values of all parameters, the numbers of those that it depends on, and a probability.
+FunctionIntervals = Callable[[Callable[[FloatArray], float], NDArray[np.intp], float], tuple[float, float] | None]
+
+
+class ProfiledCoordinates(Protocol):
+    """Coordinates of parameters, each with a profile of its own."""
+
+    def value(self, i: int, x: FloatArray) -> float:
+        """Return one parameter of all coordinates."""
+
+    def end(self, i: int, sign: int) -> float:
+        """Return what a parameter runs to where its coordinate has no limit below (-1) or above (1)."""
+
+    def longest_reach(self, i: int) -> float:
+        """Return how far from the minimum a limit is sought first at most."""
 
 
 class ProfileIntervals:
-    """Intervals of all free parameters, by their probability.
+    """Intervals of parameters by the profile of their likelihood.
 
     Parameters
     ----------
-    likelihood : Squares
-    minimum : Minimum
+    squares : Squares
+    coordinates : ProfiledCoordinates
+    x, cost
+        The minimum.
     covariance : ndarray, shape (p, p)
-        Of the coordinates, for independent noise as told.
+        Of the coordinates, for independent noise as known.
     factor : float
         By how much variances exceed that.
+    least : callable, optional
+        ``least(start, i)`` returns the squares minimised over all coordinates but number i, where that costs little:
+        limits are then found precisely.
 
     Notes
     -----
@@ -37,74 +68,170 @@ class ProfileIntervals:
     limit follows from it without a minimisation.
     """
 
-    def __init__(self, likelihood: Squares, minimum: Minimum, covariance: FloatArray, factor: float) -> None:
-        self.likelihood, self.minimum, self.covariance, self.factor = likelihood, minimum, covariance, factor
-        self._known: dict[tuple[int, float], tuple[float, float]] = {}
-
-    def __call__(self, probability: float) -> dict[str, tuple[float, float]]:
-        """Return the interval of every free parameter that contains the true one with the given probability."""
-        return {one.name: self.of(i, probability) for i, one in enumerate(self.likelihood.vector.fitted)}
+    def __init__(
+        self,
+        squares: Squares,
+        coordinates: ProfiledCoordinates,
+        x: FloatArray,
+        cost: float,
+        covariance: FloatArray,
+        factor: float,
+        least: Callable[[FloatArray, int], float] | None = None,
+    ) -> None:
+        self.squares, self.coordinates, self.x, self.cost = squares, coordinates, x, cost
+        self.covariance, self.factor = covariance, factor
+        self.least = self._minimised if least is None else least
+        self.steps = _STEPS if least is None else _MANY_STEPS
+        self.parabola, self.near = (_PARABOLA, _NEAR) if least is None else (_PRECISE, _PRECISE)
 
     def of(self, i: int, probability: float) -> tuple[float, float]:
-        """Return the interval of one free parameter, by its number."""
-        if (i, probability) not in self._known:
-            limit = float(special.ndtri((1 + probability) / 2)) ** 2 * self.factor
-            self._known[i, probability] = self._limit(i, -1, limit), self._limit(i, 1, limit)
-        return self._known[i, probability]
+        """Return the interval of one parameter, by its number, that contains the true one with this probability."""
+        low, high = sorted((self.limit(i, -1, probability), self.limit(i, 1, probability)))
+        return low, high
+
+    def limit(self, i: int, sign: int, probability: float) -> float:
+        """Return the limit of one parameter below (-1) or above (1) in its coordinate, or its end without one."""
+        return self._limit(i, sign, float(special.ndtri((1 + probability) / 2)) ** 2 * self.factor * self.squares.unit)
 
     def _limit(self, i: int, sign: int, limit: float) -> float:
-        """Return the limit of one parameter on one side, in its unit; its bound, or infinity, where there is none."""
-        vector, best = self.likelihood.vector, self.minimum
-        one, bound = vector.fitted[i], vector.bounds[sign > 0][i]
-        open_end = np.inf if sign > 0 and one.is_log else (0.0 if one.is_log else vector.limits[sign > 0][i])
+        """Return where the squares exceed their minimum by a limit."""
+        bound, end = self.squares.bounds[sign > 0][i], self.coordinates.end(i, sign)
         own = float(self.covariance[i, i])
         if not (np.isfinite(own) and own > 0):
-            return float(open_end)
-        along = self.covariance[:, i] / own
-        reach, low, low_excess, high = float(np.sqrt(limit)) * np.sqrt(own), 0.0, 0.0, np.inf
-        if one.is_log:
-            reach = min(reach, 1.5)
-        quadratic = limit * (reach**2 / (limit * own))
-        for step in range(_STEPS):
-            at_bound = sign * (best.x[i] + sign * reach - bound) >= 0
+            return end
+        along, variance = self.covariance[:, i] / own, own / self.squares.unit
+        reach = min(float(np.sqrt(limit * variance)), self.coordinates.longest_reach(i))
+        low, high = 0.0, np.inf
+        quadratic = reach**2 / variance
+        for step in range(self.steps):
+            at_bound = sign * (self.x[i] + sign * reach - bound) >= 0
             if at_bound:
-                reach = sign * (bound - best.x[i])
-            excess = self._excess(i, sign * reach * along, minimised=step > 0)
+                reach = sign * (bound - self.x[i])
             if step == 0:
-                if abs(excess / quadratic - 1) < _PARABOLA:
+                excess = self._excess(self.squares.cost(self._there(sign * reach * along)))
+                if abs(excess / quadratic - 1) < self.parabola:
                     return self._value(i, sign * reach * np.sqrt(limit / excess))
-                excess = self._excess(i, sign * reach * along, minimised=True)
-            if abs(excess / limit - 1) < _NEAR:
+            excess = self._excess(self.least(self._there(sign * reach * along), i))
+            if abs(excess / limit - 1) < self.near:
                 break
             if excess < limit:
                 if at_bound:
-                    return float(open_end)
-                low, low_excess = reach, excess
+                    return end
+                low = reach
             else:
                 high = reach
-            reach = _next(low, low_excess, reach, excess, high, limit)
+            # By the parabola from the last point, inside what is known.
+            guess = reach * float(np.sqrt(limit / max(excess, 1e-6 * limit)))
+            reach = min(guess, 4 * reach) if high == np.inf else float(np.clip(guess, *(low + (high - low) * _INSIDE)))
+        else:
+            if high == np.inf:
+                return end
         return self._value(i, sign * reach)
 
-    def _excess(self, i: int, step: FloatArray, *, minimised: bool) -> float:
-        """Return the squares beyond their minimum at a value of one parameter, on the linear way or minimised."""
-        lower, upper = self.likelihood.vector.bounds
-        there = np.clip(self.minimum.x + step, lower, upper)
-        likelihood = self.likelihood
-        cost = minimise(likelihood, there, i, _HELD_STEPS, 1e-2).cost if minimised else likelihood.cost(there)
-        return max(cost - self.minimum.cost, 1e-12)
+    def of_function(self, function: Callable[[FloatArray], float], probability: float) -> tuple[float, float] | None:
+        """Return the interval of a function of the coordinates: the squares are minimised with the function held.
+
+        None where it does not change with the coordinates, or has no derivative.
+        """
+        best, x = function(self.x), self.x
+        steps = _SLOPE * np.sqrt(np.maximum(np.diagonal(self.covariance), 0)) * np.eye(x.size)
+        size = np.maximum(np.diagonal(steps), np.finfo(float).tiny)
+        slope = np.array([function(x + step) - function(x - step) for step in steps]) / (2 * size)
+        variance = float(slope @ self.covariance @ slope)
+        if not (np.isfinite(variance) and variance > 0):
+            return None
+        unit, along = self.squares.unit, self.covariance @ slope / variance
+        limit = float(special.ndtri((1 + probability) / 2)) ** 2 * self.factor * unit
+        ends = []
+        for sign in (-1, 1):
+            reach, low, high = float(np.sqrt(limit * variance / unit)), 0.0, np.inf
+            there = self._there(sign * reach * along)
+            excess = self._excess(self.squares.cost(there))
+            if abs(excess / limit - 1) < self.parabola:
+                ends.append(function(self._there(sign * reach * np.sqrt(limit / excess) * along)))
+                continue
+            for _ in range(_STEPS):
+                held = _HeldFunction(self.squares, function, best + sign * reach, variance)
+                there = minimise(held, there, None, _HELD_STEPS, _HELD_LEAST).x
+                excess = self._excess(self.squares.cost(there))
+                if abs(excess / limit - 1) < self.near:
+                    break
+                low, high = (reach, high) if excess < limit else (low, reach)
+                guess = reach * float(np.sqrt(limit / max(excess, 1e-6 * limit)))
+                reach = (
+                    min(guess, 4 * reach) if high == np.inf else float(np.clip(guess, *(low + (high - low) * _INSIDE)))
+                )
+            ends.append(best + sign * reach if high < np.inf or excess > (1 - 2 * self.near) * limit else sign * np.inf)
+        return ends[0], ends[1]
+
+    def _minimised(self, start: FloatArray, i: int) -> float:
+        return minimise(self.squares, start, i, _HELD_STEPS, _HELD_LEAST).cost
+
+    def _there(self, step: FloatArray) -> FloatArray:
+        return np.asarray(np.clip(self.x + step, *self.squares.bounds))
+
+    def _excess(self, cost: float) -> float:
+        return max(cost - self.cost, 1e-12)
 
     def _value(self, i: int, step: float) -> float:
-        vector = self.likelihood.vector
-        x = self.minimum.x.copy()
+        x = self.x.copy()
         x[i] += step
-        lower, upper = vector.bounds
-        return float(vector.to_values(np.clip(x, lower, upper))[vector.free[i]])
+        return self.coordinates.value(i, np.asarray(np.clip(x, *self.squares.bounds)))
 
 
-def _next(low: float, low_excess: float, reach: float, excess: float, high: float, limit: float) -> float:
-    """Return where to look next: by the parabola from the last point, inside what is known."""
-    guess = reach * float(np.sqrt(limit / max(excess, 1e-6 * limit)))
-    if np.isfinite(high):
-        inner = low + (high - low) * np.array([0.1, 0.9])
-        return float(np.clip(guess, *inner))
-    return float(min(guess, 4 * reach)) if guess > reach else 1.5 * reach
+class _HeldFunction:
+    """Squares with a function of the coordinates held at a value, by squares that rise fast with its distance."""
+
+    def __init__(
+        self, squares: Squares, function: Callable[[FloatArray], float], value: float, variance: float
+    ) -> None:
+        self.squares, self.function, self.value = squares, function, value
+        self.unit, self.bounds, self.longest = squares.unit, squares.bounds, squares.longest
+        self.weight = squares.unit / (_HELD**2 * variance)
+
+    def cost(self, x: FloatArray) -> float:
+        """Return the sum of the squares."""
+        return self.squares.cost(x) + self.weight * (self.function(x) - self.value) ** 2
+
+    def linearised(self, x: FloatArray) -> Linearised:
+        """Return it with its derivatives; the function's by differences."""
+        at = self.squares.linearised(x)
+        steps = _SLOPE / np.sqrt(np.maximum(np.diagonal(at.information) / self.unit, np.finfo(float).tiny))
+        ends = [(self.function(x + step), self.function(x - step)) for step in steps * np.eye(x.size)]
+        slope = np.array([one - other for one, other in ends]) / (2 * steps)
+        apart = self.value - self.function(x)
+        return Linearised(
+            at.cost + self.weight * apart**2,
+            at.information + self.weight * np.outer(slope, slope),
+            at.gradient + self.weight * apart * slope,
+        )
+
+
+class Intervals:
+    """Intervals of all parameters of a fit, by their probability.
+
+    Parameters
+    ----------
+    names : sequence of str
+    limits : callable
+        ``limits(i, probability)`` returns the interval of parameter i.
+    of_function : callable
+        ``of_function(function, used, probability)`` returns that of a function of the values of all, which depends on
+        those with the numbers `used`; None where it follows from the covariance.
+    """
+
+    def __init__(
+        self, names: Sequence[str], limits: Callable[[int, float], tuple[float, float]], of_function: FunctionIntervals
+    ) -> None:
+        self.names, self._limits, self.of_function = tuple(names), limits, of_function
+        self._known: dict[tuple[str, float], tuple[float, float]] = {}
+
+    def of(self, name: str, probability: float) -> tuple[float, float]:
+        """Return the interval of one parameter that contains the true one with the given probability."""
+        if (name, probability) not in self._known:
+            self._known[name, probability] = self._limits(self.names.index(name), probability)
+        return self._known[name, probability]
+
+    def __call__(self, probability: float) -> dict[str, tuple[float, float]]:
+        """Return the interval of every parameter."""
+        return {name: self.of(name, probability) for name in self.names}

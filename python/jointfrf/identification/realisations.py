@@ -13,7 +13,7 @@ from jointfrf.frf.noise_model import NoiseModel
 from jointfrf.identification.describe import describe_springs
 from jointfrf.identification.manifold.coordinates import CrossTerms, DampingTerms
 from jointfrf.identification.manifold.estimate import GroupStart, JointEstimate
-from jointfrf.identification.manifold.fit import estimated_joint, fit_compliance, fitted_joint
+from jointfrf.identification.manifold.fit import estimated_joint, fit_springs, uncertainty_of
 from jointfrf.identification.manifold.prepare import FitOptions, FitProblem, prepare_compliance
 from jointfrf.identification.noise import NoiseOptions
 from jointfrf.identification.prepare import BandsOfDofs, as_measured
@@ -81,7 +81,7 @@ class FitStart(NamedTuple):
         options = FitOptions(damping, cross, reciprocal=True)
         measured = as_measured(freq_hz, gamma, square=False)
         problem = prepare_compliance(measured, dofs, None, None, NoiseOptions(None), options)
-        return cls(fit_compliance(problem).estimate, problem.noise.model)
+        return cls(fit_springs(problem).estimate, problem.noise.model)
 
 
 def identify_realisations(
@@ -151,7 +151,7 @@ def identify_realisations(
     for gamma in gammas:
         measured = as_measured(freq_hz, gamma, square=False)
         problem = replace(prepare_compliance(measured, dofs, bands, transform, known, options), near=near or ())
-        found = fit_compliance(problem)
+        found = fit_springs(problem)
         if near is None:
             near, known = found.estimate.starts, replace(known, like=problem.noise.model)
         yield describe_springs(found, problem)
@@ -217,8 +217,8 @@ def viscous_estimate(
     ValueError
         As `identify`.
     """
-    found = fitted_joint(_viscous_problem(freq_hz, gamma, dofs, start))
-    return found.estimate.theta, np.array(list(found.intervals()(0.95).values())).T
+    problem, found, _ = estimated_joint(_viscous_problem(freq_hz, gamma, dofs, start))
+    return found.theta, np.array(list(uncertainty_of(problem, found).intervals(0.95).values())).T
 
 
 def _viscous_problem(

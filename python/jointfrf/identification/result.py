@@ -18,15 +18,15 @@ from jointfrf.frf.bands import Band
 from jointfrf.identification.derived import Derived, DerivedFunction, derived_quantity
 from jointfrf.identification.findings import Finding, as_warning
 from jointfrf.identification.fit_data import FitData, ModelData
-from jointfrf.identification.residual_test import Misfit, ResidualTest
+from jointfrf.identification.residual_test import ResidualTest
 from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, one_line
 from jointfrf.laws.law_joint import LawJoint
 
-__all__ = ["Fit", "FittedParameter", "Intervals", "columns_of", "joint_of", "law_parameters"]
+__all__ = ["Fit", "FittedParameter", "IntervalsByProbability", "columns_of", "joint_of", "law_parameters"]
 
 #: From a probability to the interval of each parameter.
-Intervals = Callable[[float], dict[str, tuple[float, float]]]
+IntervalsByProbability = Callable[[float], dict[str, tuple[float, float]]]
 #: Columns of a printed fit: those of a terminal.
 _WIDTH = 80
 
@@ -112,7 +112,7 @@ class Fit:
         Channels of a fit of an assembly.
     residual_is_noise : bool or None
         None where the method has no noise.
-    test : ResidualTest, Misfit or None
+    test : ResidualTest or None
         Whether the residual is noise, and if not, where; a fit that was loaded has none.
     is_converged : bool
     intervals : callable or None
@@ -137,9 +137,9 @@ class Fit:
     responses: tuple[str, ...] = ()
     forces: tuple[str, ...] = ()
     residual_is_noise: bool | None = None
-    test: ResidualTest | Misfit | None = field(default=None, repr=False)
+    test: ResidualTest | None = field(default=None, repr=False)
     is_converged: bool = True
-    intervals: Intervals | None = field(default=None, repr=False, compare=False)
+    intervals: IntervalsByProbability | None = field(default=None, repr=False, compare=False)
     data: FitData | ModelData | None = field(default=None, repr=False, compare=False)
 
     @classmethod

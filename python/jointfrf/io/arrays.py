@@ -19,11 +19,13 @@ from jointfrf.kernel.arguments import as_array, check_type
 __all__ = ["FrfArrays", "as_frf_set", "contradiction", "frfs_of_arrays"]
 
 _AXES = ("freq", "out", "in")
+#: Orders that the sizes of an array may show, where responses are before excitations.
+_ORDERS = ([0, 1, 2], [1, 2, 0], [1, 0, 2])
 
 
 @dataclass
 class FrfArrays:
-    """What a file holds, as it stands there."""
+    """The content of a file, in its own units and order."""
 
     freq_hz: Any
     h: Any
@@ -155,7 +157,7 @@ def contradiction(said: str, wanted: str, where: str) -> str:
 def _numbers(what: str, values: Any) -> NDArray[Any]:
     found = as_array(f"the {what}", values)
     if found.dtype.kind not in "biufc":
-        raise ValueError(f"the {what} are no numbers")
+        raise ValueError(f"the {what} are not numbers")
     return found
 
 
@@ -177,54 +179,34 @@ def _channels(content: FrfArrays) -> tuple[tuple[Channel, ...], tuple[Channel, .
 
 
 def _in_order(what: str, values: Any, axes: str, shape: tuple[int, int, int]) -> NDArray[Any]:
-    """Values with axes frequency, response, excitation."""
+    """Values with axes frequency, response, excitation; programs may have dropped axes of length 1."""
     array = _numbers(what, values)
-    if axes:
-        names = [name.strip() for name in str(axes).split(",")]
-        if sorted(names) != sorted(_AXES):
-            raise ValueError(f"axes {axes!r} are not freq, out and in, in their order, such as out,in,freq")
-        array = _with_single_axes(what, array, shape, names)
-        array = array.transpose([names.index(name) for name in _AXES])
-    else:
-        array = _by_sizes(what, array, shape)
-    if array.shape != shape:
-        held = " x ".join(map(str, array.shape))
-        wanted = "{} lines, {} responses, {} excitations".format(*shape)
-        raise ValueError(f"the {what} have the sizes {held}, which do not fit {wanted}")
-    return np.ascontiguousarray(array)
-
-
-def _with_single_axes(what: str, array: NDArray[Any], shape: tuple[int, int, int], names: list[str]) -> NDArray[Any]:
-    """Axes of length 1 that a program has dropped."""
-    ordered = tuple(shape[_AXES.index(name)] for name in names)
-    if array.ndim != 3 and array.size == np.prod(ordered) and _squeezed(array.shape) == _squeezed(ordered):
-        return array.reshape(ordered)
-    if array.ndim != 3:
-        raise ValueError(f"the {what} have {array.ndim} axes, not the three of {','.join(names)}")
-    return array
-
-
-def _squeezed(shape: tuple[int, ...]) -> tuple[int, ...]:
-    return tuple(n for n in shape if n != 1)
-
-
-def _by_sizes(what: str, array: NDArray[Any], shape: tuple[int, int, int]) -> NDArray[Any]:
-    """Find which axis is which by the sizes: responses stand before excitations."""
-    orders = [(0, 1, 2), (1, 2, 0), (1, 0, 2)]  # freq,out,in; out,in,freq; out,freq,in
     fitting = []
-    for order in orders:
+    for order in [_order(axes)] if axes else _ORDERS:
         ordered = tuple(shape[axis] for axis in order)
-        if array.size == np.prod(ordered) and _squeezed(array.shape) == _squeezed(ordered):
+        if _without_ones(array.shape) == _without_ones(ordered):
             fitting.append(np.moveaxis(array.reshape(ordered), [0, 1, 2], order))
     if not fitting:
         held = " x ".join(map(str, array.shape))
         wanted = "{} lines, {} responses, {} excitations".format(*shape)
-        raise ValueError(f"the {what} have the sizes {held}, which do not fit {wanted}; give axes=")
+        hint = f" in the order {axes}" if axes else "; give axes="
+        raise ValueError(f"the {what} have the sizes {held}, which do not fit {wanted}{hint}")
     if any(not np.array_equal(fitting[0], other, equal_nan=True) for other in fitting[1:]):
         raise ValueError(
             f"which axis of the {what} is frequency is not clear from the sizes: give axes=, such as freq,out,in"
         )
-    return fitting[0]
+    return np.ascontiguousarray(fitting[0])
+
+
+def _order(axes: str) -> list[int]:
+    names = [name.strip() for name in str(axes).split(",")]
+    if sorted(names) != sorted(_AXES):
+        raise ValueError(f"axes {axes!r} are not freq, out and in, in their order, such as out,in,freq")
+    return [_AXES.index(name) for name in names]
+
+
+def _without_ones(shape: tuple[int, ...]) -> tuple[int, ...]:
+    return tuple(n for n in shape if n != 1)
 
 
 def _quantity(content: FrfArrays, channels: tuple[Channel, ...], reading: Reading) -> tuple[str, float, str]:

@@ -20,11 +20,11 @@ CardFormat = Literal["abaqus", "calculix", "nastran", "ansys"]
 
 #: Largest number of a node, an element or a property: eight columns.
 _LARGEST = 99_999_999
-#: How far from symmetric, relative to the largest entry, round-off may leave a matrix.
+#: How far from symmetric, relative to the largest entry, rounding may leave a matrix.
 _ROUND_OFF = 1e-10
-#: Shorter arms are rounding, m.
+#: Arms shorter than this are rounding, m.
 _NO_ARM = 1e-9
-#: How far, relative to their distance, a point may lie from the line between two nodes.
+#: How far, relative to their distance, rounding may put a point off the line between two nodes.
 _ON_LINE = 1e-9
 #: Characters of a line of comment: Nastran reads 72 columns.
 _COMMENT = 68

@@ -1,4 +1,4 @@
-"""Tables of channels: where each sensor and each impact is, which way it points, on which side of a joint."""
+"""Tables of channels: position and direction of each sensor and impact, and its side of the joint."""
 
 from __future__ import annotations
 
@@ -13,16 +13,17 @@ from numpy.typing import NDArray
 
 from jointfrf.errors import FileContentError
 from jointfrf.frf.frf_set import Channel, ChannelPlace, ChannelRole, JointSide
-from jointfrf.io.text_table import TextTable, read_text_table
+from jointfrf.io.csv_file import TextTable, read_text_table
 from jointfrf.spelling import did_you_mean
-from jointfrf.toml.keys import Key, KeyTable
-from jointfrf.toml.table import TomlTable, read_toml
+from jointfrf.toml.table import Key, KeyTable, TomlTable, read_toml
 
 __all__ = ["CHANNEL_KEYS", "places_of_table", "read_channel_table"]
 
+#: Units of positions, in m.
 _UNITS = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "in": 0.0254}
+#: Directions of a sensor along the axes.
 _TRIAXIAL = np.eye(3)
-#: How far from one the length of a direction may be by rounding; the virtual point brings it to one.
+#: How far from 1 the length of a direction may be: that of two digits, as in (0.71, 0, -0.71); it is normalised.
 _UNIT = 1e-2
 CHANNEL_KEYS = KeyTable(
     "[[channel]]",
@@ -136,7 +137,7 @@ def _csv_rows(file: Path) -> Iterator[list[ChannelPlace]]:
     columns = [_column(file, word) for word in table.heading]
     names = [name for name, _ in columns]
     if len(set(names)) < len(names):
-        raise FileContentError(f"{file}: a column stands there twice: {', '.join(names)}")
+        raise FileContentError(f"{file}: a column is named twice: {', '.join(names)}")
     for where, cells in table.rows:
         given = {name: cell for name, cell in zip(names, cells, strict=True) if cell}
         yield _places(_csv_values(table, where, given, dict(columns)), where)
@@ -172,7 +173,7 @@ def _csv_values(table: TextTable, where: str, given: Mapping[str, str], scales: 
         there = [name for name in names if name in given]
         if there and len(there) < 3:
             missing = next(name for name in names if name not in given)
-            raise FileContentError(f"{where}: {there[0]} is there, {missing} is not")
+            raise FileContentError(f"{where}: {there[0]} is given, {missing} is not")
         if there:
             values[key] = np.array([number(name) * scales[name] for name in names])
     if "node" in given:

@@ -1,47 +1,125 @@
-"""FRFs in text tables: a column of frequencies, and two columns for each FRF."""
+"""Text tables: rows of cells, and FRFs in them: a column of frequencies, and two columns for each FRF."""
 
 from __future__ import annotations
 
+import csv
 import re
+from collections.abc import Iterator
 from contextlib import suppress
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf.errors import FileContentError
-from jointfrf.files import ReadLimit, write_file
+from jointfrf.files import ReadLimit, text_of, write_file
 from jointfrf.frf.frf_set import Channel, FrfSet
 from jointfrf.io.arrays import FrfArrays
 from jointfrf.io.file_format import FileFormat, Reading
 from jointfrf.io.functions import LooseFunction, arrays_of_functions
 from jointfrf.io.labels import channels_of
 from jointfrf.io.named_arrays import fields_of
-from jointfrf.io.text_table import TextTable, read_text_table
 
-__all__ = ["CSV", "write_csv"]
+__all__ = ["CSV", "TextTable", "read_text_table", "write_csv"]
 
+#: Words of a heading, and the part of an FRF that they name.
 _PARTS = {
     "real": "real", "re": "real", "imag": "imag", "imaginary": "imag", "im": "imag",
     "mag": "magnitude", "magnitude": "magnitude", "abs": "magnitude", "amplitude": "magnitude", "amp": "magnitude",
     "phase": "phase", "arg": "phase", "angle": "phase",
     "coherence": "coherence", "coh": "coherence",
 }  # fmt: skip
+#: A channel as in ``102:+y`` or ``bar:102 -Z``, and response / excitation; a unit in brackets; the first column.
 _CHANNEL = r"[^\s/,;()\[\]]*?\d+[\s:._]*[+-]?r?[xyz][+-]?"
 _PAIR = re.compile(rf"({_CHANNEL})\s*/\s*({_CHANNEL})(?![a-z])", re.IGNORECASE)
 _UNIT = re.compile(r"\[([^\]]*)\]")
 _FREQUENCY = re.compile(r"(f|freq|frequency|freq_hz|hz)\b", re.IGNORECASE)
+#: Factors to Hz and to radians by the unit in brackets; Hz and degrees where there is none.
 _HZ = {"": 1.0, "hz": 1.0, "khz": 1e3, "rad/s": 0.5 / np.pi}
 _RADIANS = {"": np.pi / 180, "deg": np.pi / 180, "°": np.pi / 180, "rad": 1.0}
+
+
+class TextTable(NamedTuple):
+    """A table as it is in a file.
+
+    Attributes
+    ----------
+    stated : dict of str
+        What comments before the heading such as ``# unit: m/N`` say, by the word before the colon in lower case.
+    heading : list of str
+        Names of the columns.
+    rows : iterator of (str, list of str)
+        File and line, with which messages begin, and the cells; as many as the heading has. Each is read when it is
+        asked for.
+    decimal_comma : bool
+        Whether numbers may have one: not where commas are between the cells.
+    """
+
+    stated: dict[str, str]
+    heading: list[str]
+    rows: Iterator[tuple[str, list[str]]]
+    decimal_comma: bool
+
+    def number(self, cell: str) -> float:
+        """Return the number in a cell.
+
+        Raises
+        ------
+        ValueError
+            The cell holds something else.
+        """
+        return float(cell.replace(",", ".") if self.decimal_comma else cell)
+
+
+def read_text_table(path: Path) -> TextTable:
+    """Read a table; blank lines and lines that begin with ``#`` are no rows.
+
+    Raises
+    ------
+    FileContentError
+        It cannot be read, it is not a text file, it is empty, or, when the rows are read, one has not as many cells as
+        the heading.
+    """
+    lines = (
+        (f"{path}: line {number}", line.strip("\x1a"))  # the end of a file of DOS
+        for number, line in enumerate(text_of(path).splitlines(), start=1)
+        if line.strip(",;\t \x1a")
+    )
+    stated: dict[str, str] = {}
+    for where, line in lines:
+        if not line.lstrip().startswith("#"):
+            mark = next((each for each in "\t;," if each in line), ",")
+            heading = _cells(where, line, mark)
+            return TextTable(stated, heading, _rows(lines, mark, len(heading)), mark != ",")
+        key, colon, value = line.lstrip("# ").partition(":")
+        if colon:
+            stated[key.strip().lower()] = value.strip(" ,;\t")
+    raise FileContentError(f"{path} is empty")
+
+
+def _rows(lines: Iterator[tuple[str, str]], mark: str, count: int) -> Iterator[tuple[str, list[str]]]:
+    for where, line in lines:
+        if line.lstrip().startswith("#"):
+            continue
+        cells = _cells(where, line, mark)
+        if len(cells) != count:
+            raise FileContentError(f"{where} has {len(cells)} columns, the heading has {count}")
+        yield where, cells
+
+
+def _cells(where: str, line: str, mark: str) -> list[str]:
+    try:
+        (cells,) = csv.reader([line], delimiter=mark, skipinitialspace=True)
+    except csv.Error as error:
+        raise FileContentError(f"{where} cannot be read: {error}") from error
+    return [cell.strip() for cell in cells]
 
 
 def _read(path: Path, limit: ReadLimit, _: Reading) -> FrfArrays:
     """Read columns whose names say response, excitation, part and unit, after one of frequencies."""
     table = read_text_table(path)
-    if not table.rows or len(table.heading) < 2:
-        raise FileContentError(f"{path} holds no table of numbers below a heading")
     where, first = str(path), table.heading[0]
     parts: dict[tuple[Channel, Channel], dict[str, tuple[str, NDArray[np.float64]]]] = {}
     if not _FREQUENCY.match(first):
@@ -50,6 +128,8 @@ def _read(path: Path, limit: ReadLimit, _: Reading) -> FrfArrays:
     if hz not in _HZ:
         raise FileContentError(f"{where}: the unit '{hz}' of the frequency is none of Hz, kHz, rad/s")
     numbers = np.array([_numbers(table, place, cells) for place, cells in table.rows])
+    if not numbers.size or len(table.heading) < 2:
+        raise FileContentError(f"{path} holds no table of numbers below a heading")
     for name, column in zip(table.heading[1:], numbers.T[1:], strict=True):
         pair, part = _column(name, where)
         if part in parts.setdefault(pair, {}):
@@ -64,7 +144,7 @@ def _read(path: Path, limit: ReadLimit, _: Reading) -> FrfArrays:
         try:
             found.averages = float(table.stated["averages"])
         except ValueError as error:
-            raise FileContentError(f"{where}: averages {table.stated['averages']!r} is no number") from error
+            raise FileContentError(f"{where}: averages {table.stated['averages']!r} is not a number") from error
     return found
 
 
@@ -76,7 +156,7 @@ def _numbers(table: TextTable, place: str, cells: list[str]) -> list[float]:
             with suppress(ValueError):
                 table.number(cell)
                 continue
-            raise FileContentError(f"{place}, column {i}: {cell[:30]!r} is no number") from None
+            raise FileContentError(f"{place}, column {i}: {cell[:30]!r} is not a number") from None
         raise
 
 

@@ -19,7 +19,7 @@ from jointfrf.io.units import parse_unit
 
 __all__ = ["LooseFunction", "arrays_of_functions", "functions_of_sdynpy", "functions_of_testlab"]
 
-#: How far the factor to SI of a file may be from that of its unit: files give four digits or more.
+#: How far the factor to SI of a file may be from that of its unit, relative to it: files give four digits or more.
 _SAME_FACTOR = 1e-3
 #: The function type of FRFs in sdynpy, as in Universal Files.
 _FRF = 4
@@ -46,7 +46,7 @@ def arrays_of_functions(functions: Sequence[LooseFunction], where: str, limit: R
     Raises
     ------
     FileContentError
-        There is no FRF; functions differ in frequency lines, units or quantities; one is there twice; the matrix of
+        There is no FRF; functions differ in frequency lines, units or quantities; one occurs twice; the matrix of
         all channels is beyond the limit.
     """
     frfs = [each for each in functions if not each.is_coherence]
@@ -154,7 +154,7 @@ def _functions(record: Mapping[str, Any], mapping: FrfMapping, where: str) -> It
 def _part(record: Mapping[str, Any], name: str, where: str) -> Mapping[str, Any]:
     part = record.get(name)
     if not isinstance(part, Mapping):
-        raise FileContentError(f"{where} is damaged: {name} of a function is no structure")
+        raise FileContentError(f"{where} is damaged: {name} of a function is not a structure")
     return part
 
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import io
+import os
 import zlib
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
+from numpy.typing import NDArray
 
 from jointfrf.errors import FileContentError
 from jointfrf.extras import import_extra
@@ -16,17 +18,24 @@ from jointfrf.files import ReadLimit, damage_named, write_file
 from jointfrf.frf.frf_set import FrfSet
 from jointfrf.io.arrays import FrfArrays
 from jointfrf.io.file_format import FileFormat, Reading
-from jointfrf.io.hdf5_texts import hdf5_texts
 from jointfrf.io.named_arrays import arrays_of_fields, fields_of
 
-__all__ = ["HDF5", "hdf5_fields", "write_hdf5"]
+__all__ = ["HDF5", "hdf5_fields", "hdf5_texts", "write_hdf5"]
 
-#: More than this, deflate cannot make of a byte.
+#: Bytes that deflate makes of one, at most: 1032 by its definition, and a margin.
 _MOST_COMPRESSED = 1100
+#: Groups inside groups, and links to links: more than a sound file has, few enough for the stack.
 _DEEPEST, _MOST_LINKS = 20, 20
-_DEFLATE = 1
-#: A letter as a text takes up to so many bytes, with what is made on the way.
+#: Filters that are undone here, by their numbers in the format.
+_DEFLATE, _SHUFFLE = 1, 2
+#: Bytes of memory of a letter of MATLAB, at most, intermediate results included.
 _LETTER = 50
+#: A text in a dataset: its length, the place of its heap, and its number in the heap.
+_PLACE = np.dtype([("length", "<u4"), ("heap", "<u8"), ("index", "<u4")])
+#: The signature of a heap; bytes before its objects and before each of them.
+_HEAP, _HEAP_HEAD, _OBJECT_HEAD = b"GCOL", 16, 16
+#: The place of the heap of an empty text.
+_NOWHERE = 2**64 - 1
 
 
 def hdf5_fields(path: Path, limit: ReadLimit) -> dict[str, Any]:
@@ -47,7 +56,7 @@ def hdf5_fields(path: Path, limit: ReadLimit) -> dict[str, Any]:
     Raises
     ------
     FileContentError
-        The file is damaged, holds more than the limit, or names another file: what stands there is not read.
+        The file is damaged, holds more than the limit, or refers to another file, which is not read.
     MissingPackageError
         The package h5py is not installed.
     """
@@ -57,7 +66,7 @@ def hdf5_fields(path: Path, limit: ReadLimit) -> dict[str, Any]:
 
 
 class _Hdf5:
-    """Reading one file: no dataset before a look at where it is and how large."""
+    """Reads one file; place and size of each dataset are checked before it is read."""
 
     def __init__(self, h5py: Any, path: Path, limit: ReadLimit) -> None:
         self.h5py, self.path, self.limit = h5py, path, limit
@@ -125,7 +134,7 @@ class _Hdf5:
         return _text(value)
 
     def check_size(self, item: Any, settings: Any) -> None:
-        """Look at whether the file can hold a dataset, and at how much that is."""
+        """Check the size that a dataset states against the size of the file and the limit."""
         if item.nbytes > _MOST_COMPRESSED * self.size or (item.compression is None and item.nbytes > self.size):
             size = " x ".join(map(str, item.shape))
             raise FileContentError(
@@ -137,7 +146,7 @@ class _Hdf5:
             self.check_chunks(item, filters)
 
     def check_chunks(self, item: Any, filters: list[int]) -> None:
-        """Look at chunks that could unfold to more than their size, which the library makes room for."""
+        """Check chunks that decompress to more than their size, for which the library would allocate memory."""
         chunk = item.dtype.itemsize * int(np.prod(item.chunks, dtype=object))
         self.limit.take(chunk)
         large = (self.limit.bytes - chunk) / _MOST_COMPRESSED
@@ -151,7 +160,7 @@ class _Hdf5:
                 if first < 0 or mask >> first & 1:
                     continue
                 if len(zlib.decompressobj().decompress(packed, chunk + 5)) > chunk + 4:
-                    raise FileContentError(f"{self.path} is damaged: {item.name} unfolds to more than it states")
+                    raise FileContentError(f"{self.path} is damaged: {item.name} decompresses to more than it states")
 
     def matlab(self, item: Any, name: str) -> str:
         """Return a short attribute as a text; a longer one, or of variable length, is not MATLAB's."""
@@ -182,6 +191,123 @@ def _text(value: Any) -> Any:
             [each.decode("utf-8", "replace") if isinstance(each, bytes) else str(each) for each in value.ravel()]
         )
     return value
+
+
+def hdf5_texts(h5py: Any, item: Any, path: Path, limit: ReadLimit) -> list[str]:
+    """Read the texts of variable length of a dataset without the HDF5 library, which damaged ones crash or hang.
+
+    Parameters
+    ----------
+    h5py : module
+    item : h5py.Dataset
+        Of texts of variable length.
+    path : Path
+        Its file.
+    limit : ReadLimit
+
+    Returns
+    -------
+    list of str
+        In C order.
+
+    Raises
+    ------
+    ValueError
+        They are damaged, or stored in a way that is not read.
+    FileContentError
+        They take more than the limit.
+    """
+    if item.file.id.get_create_plist().get_sizes() != (8, 8):
+        raise ValueError("its texts are stored in an unusual way: save texts of a fixed length")
+    limit.take(100 * item.size)
+    found, taken = [], 0
+    with path.open("rb") as file:
+        heaps = _Heaps(file, item.file.userblock_size, limit)
+        for length, heap, index in _places(h5py, item, file).ravel().tolist():
+            text = heaps.text(heap, index)[:length] if length and heap != _NOWHERE else b""
+            found.append(text.decode("utf-8", "replace"))
+            taken += len(text)
+            if taken > limit.bytes:
+                limit.take(taken)
+    return found
+
+
+def _places(h5py: Any, item: Any, file: BinaryIO) -> NDArray[Any]:
+    """Return where the texts stand."""
+    settings = item.id.get_create_plist()
+    layout, places = settings.get_layout(), np.zeros(item.shape, _PLACE)
+    if not item.id.get_storage_size():
+        return places
+    if layout == h5py.h5d.CONTIGUOUS:
+        file.seek(item.id.get_offset())
+        held = file.read(places.nbytes)
+        if len(held) < places.nbytes:
+            raise ValueError("its texts lie beyond its end")
+        return np.frombuffer(held, _PLACE).reshape(places.shape)
+    if layout != h5py.h5d.CHUNKED:
+        raise ValueError("its texts are stored in an unusual way: save texts of a fixed length")
+    filters = [settings.get_filter(number)[0] for number in range(settings.get_nfilters())]
+    for number in range(item.id.get_num_chunks()):
+        corner = item.id.get_chunk_info(number).chunk_offset
+        mask, packed = item.id.read_direct_chunk(corner)
+        size = _PLACE.itemsize * int(np.prod(item.chunks, dtype=object))
+        block = np.frombuffer(_unfiltered(packed, mask, filters, size), _PLACE).reshape(item.chunks)
+        inside = tuple(slice(0, n - at) for at, n in zip(corner, item.shape, strict=True))
+        here = tuple(slice(at, at + n) for at, n in zip(corner, item.chunks, strict=True))
+        places[here] = block[inside]
+    return places
+
+
+def _unfiltered(packed: bytes, mask: int, filters: list[int], size: int) -> bytes:
+    """Undo the filters of a chunk of a known size, the last first."""
+    for number in reversed(range(len(filters))):
+        if mask >> number & 1:
+            continue
+        if filters[number] == _DEFLATE:
+            packed = zlib.decompressobj().decompress(packed, size + 1)
+        elif filters[number] == _SHUFFLE:
+            packed = np.frombuffer(packed, "u1").reshape(_PLACE.itemsize, -1).T.tobytes()
+        else:
+            raise ValueError("its texts are compressed in an unusual way: save texts of a fixed length")
+    if len(packed) != size:
+        raise ValueError("its texts are damaged")
+    return packed
+
+
+class _Heaps:
+    """Heaps of a file, each read once."""
+
+    def __init__(self, file: BinaryIO, base: int, limit: ReadLimit) -> None:
+        self.file, self.base, self.limit = file, base, limit
+        self._read: dict[int, dict[int, bytes]] = {}
+
+    def text(self, heap: int, index: int) -> bytes:
+        if heap not in self._read:
+            self._read[heap] = self._objects(self.base + heap)
+        if index not in self._read[heap]:
+            raise ValueError("its texts are damaged: one is not at the place that is stated")
+        return self._read[heap][index]
+
+    def _objects(self, start: int) -> dict[int, bytes]:
+        whole = os.fstat(self.file.fileno()).st_size
+        self.file.seek(min(start, whole))
+        head = self.file.read(_HEAP_HEAD)
+        size = int.from_bytes(head[8:], "little")
+        if len(head) < _HEAP_HEAD or not head.startswith(_HEAP) or not _HEAP_HEAD <= size <= whole - start:
+            raise ValueError("its texts are damaged: there is no heap at the place that is stated")
+        self.limit.take(size)
+        held, place, found = head + self.file.read(size - _HEAP_HEAD), _HEAP_HEAD, dict[int, bytes]()
+        while place + _OBJECT_HEAD <= size:
+            index = int.from_bytes(held[place : place + 2], "little")
+            length = int.from_bytes(held[place + 8 : place + 16], "little")
+            place += _OBJECT_HEAD
+            if index == 0:  # free space, up to the end
+                break
+            if place + length > size:
+                raise ValueError("its texts are damaged: one reaches beyond its heap")
+            found[index] = held[place : place + length]
+            place += length + -length % 8
+        return found
 
 
 def write_hdf5(path: str | PathLike[str], frfs: FrfSet) -> None:
@@ -220,7 +346,7 @@ def _read(path: Path, limit: ReadLimit, reading: Reading) -> FrfArrays:
     return arrays_of_fields(hdf5_fields(path, limit), reading.mapping, str(path), limit)
 
 
-#: First bytes of a file, or of what stands after a block of the user.
+#: The signature of the format, and where it may be: at the beginning, or after a block of the user.
 _SIGN, _PLACES = b"\x89HDF\r\n\x1a\n", (0, 512, 1024, 2048, 4096)
 HDF5 = FileFormat(
     name="HDF5",

@@ -18,7 +18,9 @@ from jointfrf.io.named_arrays import arrays_of_fields
 
 __all__ = ["MATLAB", "mat_fields"]
 
+#: Bytes of the header; how it begins, and how that of a file of version 7.3.
 _HEAD, _MARK, _MARK_HDF5 = 128, b"MATLAB ", b"MATLAB 7.3"
+#: Types of variables.
 _MATRIX, _COMPRESSED = 14, 15
 #: Types of elements, as numpy has them.
 _NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
@@ -27,10 +29,13 @@ _TEXTS = {1: ("latin-1", 1), 2: ("latin-1", 1), 3: ("utf-16", 2), 4: ("utf-16", 
 #: Classes of arrays.
 _CELL, _STRUCT, _OBJECT, _CHAR, _OPAQUE = 1, 2, 3, 4, 17
 _CLASSES = {6: "f8", 7: "f4", 8: "i1", 9: "u1", 10: "i2", 11: "u2", 12: "i4", 13: "u4", 14: "i8", 15: "u8"}
+#: The flag of complex numbers.
 _COMPLEX = 0x800
 #: Types of numbers in version 4.
 _OLD_NUMBERS = {0: "f8", 1: "f4", 2: "i4", 3: "i2", 4: "u2", 5: "u1"}
+#: Its header in bytes, above which number the byte order is the other one, and the form of texts.
 _OLD_HEAD, _OLD_MOST, _OLD_TEXT = 20, 5000, 1
+#: Cells inside cells: more than a sound file has, few enough for the stack.
 _DEEPEST = 20
 
 
@@ -156,7 +161,7 @@ class _Arrays:
         return tuple(found)
 
     def values(self, part: _Element) -> NDArray[Any]:
-        """Return the numbers of an element as they stand there."""
+        """Return the numbers of an element in their own type."""
         if part.kind not in _NUMBERS:
             raise ValueError(f"a variable is damaged: there is no type {part.kind} of numbers")
         kind = np.dtype(self.sign + _NUMBERS[part.kind])
@@ -174,7 +179,7 @@ class _Arrays:
         return _squeezed(_complex(real, found[1].astype(kind)) if is_complex else real, shape)
 
     def text(self, parts: list[_Element], shape: tuple[int, ...]) -> Any:
-        """Return a text, or rows of texts, which stand column by column."""
+        """Return a text, or rows of texts, which are stored column by column."""
         count = math.prod(shape)
         if not parts or parts[0].kind not in _TEXTS:
             raise ValueError("a variable is damaged: a text of no known type")
@@ -267,7 +272,7 @@ def _complex(real: NDArray[Any], imaginary: NDArray[Any]) -> NDArray[Any]:
 
 
 def _squeezed(values: NDArray[Any], shape: tuple[int, ...]) -> Any:
-    """Return an array that stands column by column without axes of length 1; a single value as such."""
+    """Return an array, stored column by column, without axes of length 1; a single value as such."""
     if values.size != math.prod(shape):
         raise ValueError(f"a variable is damaged: it does not hold the {_by(shape)} values that it states")
     if not values.size:

@@ -16,9 +16,9 @@ from jointfrf.io.npz_file import npz_fields
 
 __all__ = ["read_dof_names", "read_matrix"]
 
-#: An entry of a Matrix Market file takes at least so many bytes there: a list of entries, and one after the other.
+#: Bytes of an entry in a Matrix Market file, at least: with row and column (``1 1 1``), or by itself.
 _LEAST = {"coordinate": 6, "array": 2}
-#: An entry in memory with its row and column, and a row, bytes, with what is made on the way.
+#: Bytes of memory of an entry with row and column, and of a row, intermediate results included.
 _ENTRY, _ROW = 48, 32
 
 

@@ -21,10 +21,11 @@ __all__ = ["arrays_of_fields", "fields_of"]
 
 #: The field that says whose layout it is; its value is the number of the layout.
 _MARK = "jointfrf_frfs"
-#: The layout that is written, and the one without a checksum, which is read, too.
+#: The layout that is written, and the one without a checksum, which is read as well.
 _LAYOUT, _UNCHECKED = 2, 1
 #: The field with a checksum of all others, which layout 1 lacks; who edits a file writes layout 1 without it.
 _CHECKSUM = "sha256"
+#: Fields of every file in the own layout; units by how often a receptance is differentiated.
 _REQUIRED = ("freq_hz", "h", "responses", "excitations", "quantity")
 _UNITS = ("m/N", "m/s/N", "m/s^2/N")
 
@@ -43,6 +44,7 @@ _KNOWN = {
     "coherence": ("coherence", "coh", "gamma2", "coherences"),
     "averages": ("averages", "n_averages", "navg", "n_avg", "number_of_averages"),
 }  # fmt: skip
+#: Names of FRFs that say their quantity, and of frequencies in rad/s.
 _QUANTITIES = ("accelerance", "inertance", "mobility", "receptance")
 _RADIANS = ("omega", "w")
 

@@ -43,7 +43,7 @@ def npz_fields(path: Path, limit: ReadLimit) -> dict[str, NDArray[Any]]:
 
 
 def _array(archive: zipfile.ZipFile, info: zipfile.ZipInfo, path: Path, limit: ReadLimit) -> NDArray[Any]:
-    """Read one array after a look at whether the file holds as much as it says, and at how much that is."""
+    """Read one array after the size that it states is checked against that of the file and the limit."""
     with archive.open(info) as member:
         version = np.lib.format.read_magic(member)
         read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0

@@ -20,30 +20,34 @@ from jointfrf.frf.merge import same_lines
 from jointfrf.io.arrays import contradiction
 from jointfrf.io.file_format import FileFormat, Reading
 from jointfrf.io.labels import DIRECTION_CODES
-from jointfrf.io.uff_file import UniversalFile, name_some
+from jointfrf.io.uff_file import UniversalFile, name_some, node_coordinates
 from jointfrf.io.uff_function import (
     DELIMITER,
     FunctionHeader,
     axis_record,
     function_dataset,
     function_values,
+    kind_of_frf,
+    ordinate_factor,
+    ordinate_quantity,
     place_fields,
     read_header,
 )
-from jointfrf.io.uff_nodes import node_coordinates
-from jointfrf.io.uff_ordinate import kind_of_frf, ordinate_factor, ordinate_quantity
 from jointfrf.kernel.arguments import check_type
 
 __all__ = ["UNIVERSAL_FILE", "read_uff", "write_uff"]
 
+#: Function types of dataset 58.
 _FRF, _COHERENCE = 4, 6
-#: A measurement reaches over fewer decades: numbers in the wrong byte order over more.
+#: Values of a measurement span fewer decades; with their bytes in the wrong order they span hundreds.
 _MOST_DECADES = 60
+#: Different kinds of ordinates that a set names.
 _SHOWN = 3
 #: Columns of a line of text.
 _WIDTH = 80
 _CODES = {direction: code for code, direction in DIRECTION_CODES.items()}
 _COHERENCE_AXES = [axis_record(0, "Coherence", "NONE"), axis_record(0, "NONE", "NONE")]
+#: Factors to Hz of units of the abscissa.
 _HZ = {"": 1.0, "hz": 1.0, "khz": 1e3, "rad/s": 0.5 / np.pi, "rad/sec": 0.5 / np.pi, "rpm": 1.0 / 60.0}
 
 
@@ -388,7 +392,7 @@ def _read_function(
 
 
 def _is_scrambled(value: NDArray[Any]) -> bool:
-    """Whether values reach over more decades than any measurement, as numbers with their bytes turned round do."""
+    """Whether values reach over more decades than any measurement, as numbers in the wrong byte order do."""
     parts = abs(np.ascontiguousarray(value).view(np.float64))
     parts = parts[np.isfinite(parts) & (parts > 0.0)]
     return bool(parts.size and np.log10(parts.max()) - np.log10(parts.min()) > _MOST_DECADES)

@@ -1,15 +1,20 @@
-"""Dataset 58 of Universal Files, one function: read, and written as text or (58b) with binary numbers."""
+"""Dataset 58 of Universal Files, one function: its records and numbers, read and written; quantity and factor to SI."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
+from itertools import accumulate
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf.files import HEAD
-from jointfrf.io.units import Unit, parse_unit
+from jointfrf.frf.frf_set import POWER_OF_I_OMEGA, Channel
+from jointfrf.io.units import Exponents, Unit, UnitSystem, parse_unit
 
 __all__ = [
     "DELIMITER",
@@ -18,6 +23,9 @@ __all__ = [
     "axis_record",
     "function_dataset",
     "function_values",
+    "kind_of_frf",
+    "ordinate_factor",
+    "ordinate_quantity",
     "place_fields",
     "read_header",
 ]
@@ -25,9 +33,17 @@ __all__ = [
 DELIMITER = "    -1"
 #: Lines before the numbers: delimiter, type, five of text, records 6 to 11; a 58b states those after the type.
 _N_LINES, _N_TEXT_LINES = 13, 11
+
+
+def _cuts(*widths: int) -> list[slice]:
+    """Return the columns of fields of these widths."""
+    ends = list(accumulate(widths))
+    return [slice(start, end) for start, end in zip([0, *ends], ends, strict=False)]
+
+
 #: Columns of the type line of 58b, of record 6, of record 7, and of records 8 to 11.
-_BINARY, _PLACE = (6, 1, 6, 6, 12, 12), (5, 10, 5, 10, 11, 10, 4, 11, 10, 4)
-_FORM, _AXIS = (10, 10, 10, 13, 13, 13), (10, 5, 5, 5, 21, 21)
+_BINARY, _PLACE = _cuts(6, 1, 6, 6, 12, 12), _cuts(5, 10, 5, 10, 11, 10, 4, 11, 10, 4)
+_FORM, _AXIS = _cuts(10, 10, 10, 13, 13, 13), _cuts(10, 5, 5, 5, 21, 21)
 #: By the ordinate data type of record 7: bytes of a number, and numbers of a value.
 _NUMBERS = {2: (4, 1), 4: (8, 1), 5: (4, 2), 6: (8, 2)}
 #: By the data types of records 8 to 11.
@@ -36,6 +52,12 @@ _DATA_TYPES = {
     9: "reaction force", 11: "velocity", 12: "acceleration", 13: "excitation force", 15: "pressure", 16: "mass",
     17: "time", 18: "frequency", 19: "rpm", 20: "order",
 }  # fmt: skip
+#: Data types that name no quantity; those of forces; those of motions.
+_UNSAID = (0, 1)
+_FORCES = (9, 13)
+_QUANTITY = {8: "receptance", 11: "mobility", 12: "accelerance"}
+#: How far factors of labels and of dataset 164 may differ: programs write four digits or more.
+_TOLERANCE = 1e-3
 #: How far, relative to it, a line may lie from where an even spacing puts it: 13 columns hold as many digits.
 _EVEN = 1e-9
 
@@ -47,14 +69,6 @@ class Axis:
     data_type: int
     label: str
     unit: Unit | None
-
-    @classmethod
-    def parsed(cls, record: str) -> Axis:
-        """Take the axis from its record."""
-        words = _columns(record, _AXIS)
-        label = "" if words[5].upper() == "NONE" else words[5]
-        data_type, *_ = map(int, words[:4])  # and three exponents, which are not used
-        return cls(data_type, label, parse_unit(label))
 
     @property
     def name(self) -> str:
@@ -68,6 +82,15 @@ class Axis:
 
     def __str__(self) -> str:
         return f"{self.data_type} ({self.name}, unit '{self.label or 'NONE'}')"
+
+
+@lru_cache(256)  # a file repeats few of them in thousands of functions
+def _axis(record: str) -> Axis:
+    """Take an axis from its record."""
+    words = _columns(record, _AXIS)
+    label = "" if words[5].upper() == "NONE" else words[5]
+    data_type, *_ = map(int, words[:4])  # and three exponents, which are not used
+    return Axis(data_type, label, parse_unit(label))
 
 
 class FunctionHeader(NamedTuple):
@@ -109,7 +132,7 @@ def read_header(content: bytes) -> FunctionHeader:
     is_binary = records[1][6:7].lower() == "b"
     order, floating_point, n_lines, _ = map(int, _columns(records[1], _BINARY)[2:]) if is_binary else (1, 2, 11, 0)
     start, step, _ = (float(word.replace("D", "E").replace("d", "e")) for word in form[3:])
-    abscissa, numerator, denominator, _ = (Axis.parsed(record) for record in records[9:13])
+    abscissa, numerator, denominator, _ = (_axis(record) for record in records[9:13])
     return FunctionHeader(
         int(place[0]),
         (place[4], _whole(place[5]), _whole(place[6])),
@@ -174,18 +197,16 @@ def _text_rows(data: bytes, header: FunctionHeader, size: int, parts: int) -> ND
     width = 13 if size == 4 else 20
     widths = [width] * parts if header.is_even else [13, *[width] * parts]
     lines = data.decode("ascii", "replace").replace("D", "E").replace("d", "e").splitlines(keepends=True)
-    ends = np.cumsum(widths * (max(map(len, lines), default=0) // sum(widths) + 1)).tolist()
-    cuts = list(zip([0, *ends], ends, strict=False))
-    words = (line[start:end] for line in lines for start, end in cuts if end <= len(line))
+    cuts = _cuts(*widths * (max(map(len, lines), default=0) // sum(widths) + 1))
+    words = (line[cut] for line in lines for cut in cuts if cut.stop <= len(line))
     numbers = [float(word) for word in words if not word.isspace()]
     count = len(numbers) // len(widths)
     return np.array(numbers[: count * len(widths)], np.float64).reshape(count, len(widths))
 
 
-def _columns(record: str, widths: tuple[int, ...]) -> list[str]:
+def _columns(record: str, cuts: list[slice]) -> list[str]:
     """Cut a record into its fields."""
-    ends = np.cumsum(widths).tolist()
-    return [record[start:end].strip() for start, end in zip([0, *ends], ends, strict=False)]
+    return [record[cut].strip() for cut in cuts]
 
 
 def _whole(word: str) -> int:
@@ -194,6 +215,81 @@ def _whole(word: str) -> int:
         return int(word)
     except ValueError:
         return 0
+
+
+def kind_of_frf(numerator: Axis, denominator: Axis) -> str | None:
+    """None for motion per force as far as the data types say, else what it is instead."""
+    is_motion = numerator.data_type in (*_QUANTITY, *_UNSAID)
+    is_force = denominator.data_type in (*_FORCES, *_UNSAID)
+    return None if is_motion and is_force else f"{numerator.name} per {denominator.name}"
+
+
+def ordinate_quantity(numerator: Axis, denominator: Axis, channels: tuple[Channel, Channel]) -> str | None:
+    """Quantity by the data types, by the unit labels where these say nothing; None where neither does."""
+    said = numerator.unit.exponents if numerator.unit else None
+    said_below = denominator.unit.exponents if denominator.unit else None
+    for name, power in POWER_OF_I_OMEGA.items():
+        motion, force, ratio = _exponents(*channels, power)
+        is_silent = numerator.data_type in _UNSAID
+        is_named = _QUANTITY.get(numerator.data_type) == name
+        is_force = denominator.data_type in _FORCES or said_below == force
+        if (is_named or is_silent) and said == ratio:
+            return name
+        if (is_named or (is_silent and said == motion)) and is_force:
+            return name
+    return None
+
+
+def ordinate_factor(
+    numerator: Axis,
+    denominator: Axis,
+    channels: tuple[Channel, Channel],
+    quantity: str,
+    system: UnitSystem | None,
+    trust_labels: bool,
+    note: Callable[[str], None],
+) -> float:
+    """Factor that turns the ordinate into SI units: by the labels, else by dataset 164, else 1 with a note.
+
+    Raises
+    ------
+    ValueError
+        A label contradicts the quantity and `trust_labels` is set.
+    """
+    motion, force, ratio = _exponents(*channels, POWER_OF_I_OMEGA[quantity])
+    if numerator.unit is not None and numerator.unit.exponents == ratio:
+        return _checked(numerator, numerator.unit, system, note)
+    factors = []
+    for axis, exponents, what in ((numerator, motion, "response"), (denominator, force, "excitation")):
+        if axis.unit is not None and axis.unit.exponents == exponents:
+            factors.append(_checked(axis, axis.unit, system, note))
+            continue
+        if axis.unit is not None and trust_labels:
+            raise ValueError(
+                f"the unit '{axis.label}' does not fit the {what} of {quantity} {channels[0]} / {channels[1]}"
+            )
+        why = f"the unit '{axis.label}' of the {what} is not used" if axis.label else f"the {what} has no unit"
+        if system is None:
+            note(f"{why} and there is no dataset 164: SI units are assumed")
+        elif axis.label:
+            note(f"{why}: dataset 164 gives the units")
+        factors.append(1.0 if system is None else system.to_si(exponents))
+    return factors[0] / factors[1]
+
+
+def _exponents(response: Channel, excitation: Channel, power: int) -> tuple[Exponents, Exponents, Exponents]:
+    """Exponents of length, force, time of the motion, of the force or moment, and of their ratio."""
+    motion = (0 if response.is_rotation else 1, 0, -power)
+    force = (1 if excitation.is_rotation else 0, 1, 0)
+    return motion, force, (motion[0] - force[0], -1, -power)
+
+
+def _checked(axis: Axis, unit: Unit, system: UnitSystem | None, note: Callable[[str], None]) -> float:
+    """Factor of a label; a note where dataset 164 contradicts it (no system of 164 has g, so g is none)."""
+    by_system = unit.to_si if system is None else system.to_si(unit.exponents)
+    if not math.isclose(unit.to_si, by_system, rel_tol=_TOLERANCE) and not axis.label.lower().startswith("g"):
+        note(f"the unit '{axis.label}' contradicts dataset 164: the unit is used")
+    return unit.to_si
 
 
 def function_dataset(

@@ -36,41 +36,21 @@ class UnitSystem:
         return self.length ** -exponents[0] * self.force ** -exponents[1]
 
 
-_LENGTH, _FORCE, _TIME, _MOMENT = (1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 0)
 _POUND, _GRAVITY, _INCH = 4.4482216152605, 9.80665, 0.0254
-_SYMBOLS = {
-    "m": Unit(1.0, _LENGTH),
-    "cm": Unit(1e-2, _LENGTH),
-    "mm": Unit(1e-3, _LENGTH),
-    "um": Unit(1e-6, _LENGTH),
-    "nm": Unit(1e-9, _LENGTH),
-    "mil": Unit(1e-3 * _INCH, _LENGTH),
-    "in": Unit(_INCH, _LENGTH),
-    "inch": Unit(_INCH, _LENGTH),
-    "ft": Unit(12 * _INCH, _LENGTH),
-    "s": Unit(1.0, _TIME),
-    "sec": Unit(1.0, _TIME),
-    "ips": Unit(_INCH, (1, 0, -1)),
-    "g": Unit(_GRAVITY, (1, 0, -2)),
-    "gn": Unit(_GRAVITY, (1, 0, -2)),
-    "N": Unit(1.0, _FORCE),
-    "mN": Unit(1e-3, _FORCE),
-    "kN": Unit(1e3, _FORCE),
-    "MN": Unit(1e6, _FORCE),
-    "dyn": Unit(1e-5, _FORCE),
-    "kgf": Unit(_GRAVITY, _FORCE),
-    "kp": Unit(_GRAVITY, _FORCE),
-    "lbf": Unit(_POUND, _FORCE),
-    "lb": Unit(_POUND, _FORCE),
-    "lbs": Unit(_POUND, _FORCE),
-    "Nm": Unit(1.0, _MOMENT),
-    "kNm": Unit(1e3, _MOMENT),
-    "Nmm": Unit(1e-3, _MOMENT),
-    "kg": Unit(1.0, (-1, 1, 2)),
-    "rad": Unit(1.0),
-    "mrad": Unit(1e-3),
-    "deg": Unit(math.pi / 180.0),
-}
+#: By their exponents, what one is in SI units.
+_UNITS: dict[Exponents, dict[str, float]] = {
+    (1, 0, 0): {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "mil": 1e-3 * _INCH, "in": _INCH,
+                "inch": _INCH, "ft": 12 * _INCH},
+    (0, 0, 1): {"s": 1.0, "sec": 1.0},
+    (1, 0, -1): {"ips": _INCH},
+    (1, 0, -2): {"g": _GRAVITY, "gn": _GRAVITY},
+    (0, 1, 0): {"N": 1.0, "mN": 1e-3, "kN": 1e3, "MN": 1e6, "dyn": 1e-5, "kgf": _GRAVITY, "kp": _GRAVITY,
+                "lbf": _POUND, "lb": _POUND, "lbs": _POUND},
+    (1, 1, 0): {"Nm": 1.0, "kNm": 1e3, "Nmm": 1e-3},
+    (-1, 1, 2): {"kg": 1.0},
+    (0, 0, 0): {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180.0},
+}  # fmt: skip
+_SYMBOLS = {name: Unit(to_si, exponents) for exponents, units in _UNITS.items() for name, to_si in units.items()}
 # U+FFFD is what is left of a superscript 2 in Latin-1.
 _SPELLINGS = {"²": "^2", "\ufffd": "^2", "**": "^", "·": "*", ".": "*", "µ": "u", "μ": "u", "°": "deg"}
 _TOKEN = re.compile(r"\s*([A-Za-z]+|\d+|[-^*/()])")

@@ -21,10 +21,12 @@ from jointfrf.errors import CopyWarning
 
 __all__ = [
     "CHUNK_BYTES",
+    "TINY",
     "ComplexArray",
     "FloatArray",
     "as_array",
     "as_count",
+    "as_dof_pairs",
     "as_dofs",
     "as_frequency",
     "as_integer",
@@ -53,16 +55,23 @@ __all__ = [
 ComplexArray = NDArray[np.complex128]
 FloatArray = NDArray[np.float64]
 
+#: Divisors are not taken below the smallest normal number.
+TINY = float(np.finfo(np.float64).tiny)
 #: Characters of a value that a message shows.
 _SHOWN = 80
 _COMPLEX, _REAL = np.dtype(np.complex128), np.dtype(np.float64)
 
-#: A conversion that copies more than this many bytes is announced by a `CopyWarning`.
+#: A conversion that copies more than this many bytes causes a `CopyWarning`.
 LARGE_COPY = 16 * 2**20
+#: Arrays in files are processed in chunks of lines; inputs and result of one chunk take about this many bytes.
+CHUNK_BYTES = 64 * 2**20
+#: Lines that the kernel takes as one share, of large matrices and of small ones; chunks are multiples of it, so that
+#: they change no bit of a result.
+_SHARE, _LONG_SHARE = 64, 512
 
 
 def as_array(name: str, value: ArrayLike) -> NDArray[Any]:
-    """Return an array of any type; masked entries, which `numpy.asarray` would uncover, are refused."""
+    """Return an array of any type; masked entries raise an error, as `numpy.asarray` would ignore the mask."""
     if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
         mask = np.ma.getmaskarray(value)
         first = tuple(int(i) for i in np.unravel_index(int(np.argmax(mask)), mask.shape))
@@ -116,7 +125,7 @@ def as_lines(
 ) -> ComplexArray:
     """Return a sweep (n_freq, rows, columns) as contiguous complex128; sizes that are None are free.
 
-    With `later`, an array in a file is returned as it is: `run` converts it chunk by chunk.
+    With `later`, an array in a file is returned as it is: `run` converts it in chunks.
     """
     if _fits(value, rows, columns, n_freq):
         return value  # type: ignore[return-value]
@@ -204,7 +213,7 @@ def check_type(name: str, value: object, kind: type) -> None:
 
 
 def as_names(name: str, value: object) -> tuple[str, ...]:
-    """Return a sequence of names, each in one line; one text is none, though its letters are."""
+    """Return a sequence of names, each in one line; a single text is not one."""
     if isinstance(value, Iterable) and not isinstance(value, str):
         listed = list(value)
         if all(isinstance(each, str) for each in listed):
@@ -299,6 +308,18 @@ def as_dofs(name: str, dofs: ArrayLike, n: int, *, unique: bool = True) -> NDArr
     return np.array([number + 1 for number in numbers], np.int32)
 
 
+def as_dof_pairs(
+    of_a: tuple[str, ArrayLike, int], of_b: tuple[str, ArrayLike, int]
+) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Return the joint DOFs of two structures as `as_dofs` does, each by name, DOFs and how many there are."""
+    a, b = as_dofs(*of_a), as_dofs(*of_b)
+    if a.size != b.size or a.size == 0:
+        raise ValueError(
+            f"{of_a[0]} and {of_b[0]} must name the same number of DOFs, at least one: {a.size} and {b.size}"
+        )
+    return a, b
+
+
 def checked_out(
     out: ComplexArray, shape: tuple[int, ...], args: Sequence[Any], sweeps: Mapping[str, NDArray[Any]]
 ) -> ComplexArray:
@@ -320,13 +341,6 @@ def checked_out(
             names = [name for name, sweep in sweeps.items() if sweep is array]
             raise ValueError(f"out must not share memory with {names[0] if names else 'an argument'}")
     return out
-
-
-#: Arrays in files are processed in chunks of lines; inputs and result of one chunk take about this many bytes.
-CHUNK_BYTES = 64 * 2**20
-#: Lines that the kernel takes as one share, of large matrices and of small ones; chunks are multiples of it, so that
-#: they change no bit of a result.
-_SHARE, _LONG_SHARE = 64, 512
 
 
 def is_mapped(array: NDArray[Any]) -> bool:
@@ -352,14 +366,14 @@ def chunks(result: NDArray[np.complex128], sweeps: Mapping[str, NDArray[Any]]) -
     if size > CHUNK_BYTES and any(a.strides[0] == 0 or is_mapped(a) for a in (result, *sweeps.values())):
         step = CHUNK_BYTES * n_freq // size
         step = max(_SHARE, step - step % (_LONG_SHARE if step >= _LONG_SHARE else _SHARE))
-    # fewer lines than a share are left to the chunk before
+    # fewer lines than a share belong to the chunk before
     firsts = range(0, max(1, n_freq - _SHARE + 1), step)
     for first in firsts:
         yield slice(first, n_freq if first == firsts[-1] else first + step)
 
 
 def release(lines: NDArray[Any]) -> None:
-    """Tell the system that pages of a file are not needed in memory any more; what was written stays in the file."""
+    """Release the pages of a file in memory; what was written stays in the file."""
     base: Any = lines
     while isinstance(base.base, np.ndarray):
         base = base.base

@@ -42,12 +42,21 @@ OnSingular = Literal["raise", "nan"]
 #: left.
 RCOND_LIMIT = 1e-12
 
+#: Values of `LineStatus.line_info`, and of `info`, as in `status.f90`.
 _LINE_NOT_FINITE = -1
 _LINE_OVERFLOW = -2
+#: Version of the kernel, and so of the package.
+VERSION = ".".join(str(int(number)) for number in _kernel.jf_version())
+_NO_ENGINE = -1001
+_ON_SINGULAR = get_args(OnSingular)
+_COMPLEX, _INTEGER = np.dtype(np.complex128), np.dtype(np.int32)
+#: Stands for the number of lines among the arguments of a kernel routine.
+N_FREQ = object()
+Engine = Literal["auto", "lapack", "plain", "x86-64-v2", "x86-64-v3", "x86-64-v4"]
 
 
 class LineStatus(NamedTuple):
-    """How each line of a sweep went.
+    """Status of each line of a sweep.
 
     Attributes
     ----------
@@ -128,19 +137,8 @@ def check_lines(
         check_status(routine, status, n_bad, sweeps, freq_hz, on_singular, rcond_limit)
 
 
-#: Version of the kernel, and so of the package.
-VERSION = ".".join(str(int(number)) for number in _kernel.jf_version())
-
-_NO_ENGINE = -1001
-_ON_SINGULAR = get_args(OnSingular)
-_COMPLEX, _INTEGER = np.dtype(np.complex128), np.dtype(np.int32)
-
-#: Stands for the number of lines among the arguments of a kernel routine.
-N_FREQ = object()
-
-
 def _check_info(routine: str, info: int) -> None:
-    """Raise what a negative `info` means."""
+    """Raise the error of a negative `info`."""
     if info == _NO_ENGINE:
         word = reprlib.repr(os.environ.get("JOINTFRF_ENGINE"))
         raise ValueError(
@@ -174,13 +172,13 @@ def run(
         Shape of the result in C order, (n_freq, out, in).
     sweeps : mapping of str to ndarray
         Arguments that have a line axis, by the name the caller knows, to name a bad one. They may lie in a file or be
-        one matrix broadcast to all lines; they are then converted chunk by chunk.
+        one matrix broadcast to all lines; they are then converted in chunks.
     freq_hz : ndarray or None
         Frequencies in Hz for messages.
     on_singular : {"raise", "nan"}
-        What becomes of bad lines (singular, NaN or Inf inside, overflow).
+        Whether bad lines (singular, NaN or Inf inside, overflow) raise an error or become NaN.
     rcond_limit : float
-        Below this reciprocal condition number a line is announced by an `IllConditionedWarning`.
+        Below this reciprocal condition number a line causes an `IllConditionedWarning`.
     out : ndarray or None
         Where the result goes. All lines are done before a bad one raises: `out` then holds the good lines, and NaN in
         the bad ones.
@@ -216,7 +214,7 @@ def _run_in_chunks(
     status: LineStatus,
     sweeps: Mapping[str, NDArray[Any]],
 ) -> int:
-    """Call a kernel routine chunk by chunk of lines and return the number of bad ones."""
+    """Call a kernel routine in chunks of lines and return the number of bad ones."""
     n_bad = 0
     for lines in chunks(result, sweeps):
         chunk = [_argument(a, lines, sweeps) for a in args]
@@ -256,9 +254,6 @@ def info_of(routine: str, args: Sequence[Any]) -> int:
     """Call a kernel routine as `call` does and return its `info` for the caller to judge."""
     views = [a.T if isinstance(a, np.ndarray) else a for a in args]
     return int(getattr(_kernel, "jf_" + routine)(*views))
-
-
-Engine = Literal["auto", "lapack", "plain", "x86-64-v2", "x86-64-v3", "x86-64-v4"]
 
 
 def set_engine(engine: Engine) -> None:

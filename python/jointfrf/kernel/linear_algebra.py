@@ -51,8 +51,8 @@ def invert(
 
     Notes
     -----
-    Input and `out` may be `numpy.memmap` larger than memory: they go through in pieces of lines, with the same bits as
-    in one. What the lines are inverted with says `set_engine`.
+    Input and `out` may be `numpy.memmap` larger than memory: they are processed in chunks of lines, with
+    bit-identical results. `set_engine` chooses what inverts the lines.
 
     Examples
     --------

@@ -14,16 +14,40 @@ from jointfrf.laws.law import JointLaw, LawField
 from jointfrf.laws.law_joint import LawJoint
 from jointfrf.laws.springs import SpringLaw
 from jointfrf.laws.viscoelastic import FractionalZener, PowerLaw, StandardLinearSolid
-from jointfrf.toml.keys import Key, KeyTable
-from jointfrf.toml.table import TomlTable
+from jointfrf.toml.table import Key, KeyTable, TomlTable
 
-__all__ = ["LAW_VALUES", "LAW_WORDS", "joint_text", "read_joint_table", "read_law", "start_values", "takes_in_words"]
+__all__ = [
+    "LAW_VALUES",
+    "LAW_WORDS",
+    "joint_text",
+    "parameters_in_words",
+    "read_joint_table",
+    "read_law",
+    "start_values",
+    "takes_in_words",
+]
 
 #: The laws that files can hold: a new law is a file with its class, and its name here.
 LAWS: tuple[type[JointLaw], ...] = (SpringLaw, StandardLinearSolid, FractionalZener, PowerLaw)
 _BY_WORD = {law.word: law for law in LAWS}
 #: Words of laws; a rigid DOF has none.
 LAW_WORDS = (*_BY_WORD, "rigid")
+#: Reference point, which `read_joint_table` leaves to its caller.
+_AT = Key("at", "list of three numbers", "Reference point.", "m", "not known")
+#: Keys of a joint by constants.
+JOINT_KEYS = KeyTable(
+    "joint.toml",
+    "A joint by its constants; matrices are lists of lists.",
+    (
+        Key("dofs", "list of texts", "Names of the joint DOFs: `y`, `theta_z`."),
+        Key("stiffness", "list of numbers, or of lists", "Stiffness of each DOF, or the matrix.", "N/m, N m/rad"),
+        Key("damping", "list of numbers, or of lists", "Viscous damping.", "N s/m, N m s/rad", "none"),
+        Key("loss_factor", "list of numbers", "Hysteretic loss factor of each DOF.", "", "0"),
+        Key("structural_damping", "list of numbers, or of lists", "Hysteretic damping, beside that of loss factors.",
+            "N/m, N m/rad", "none"),
+        _AT,
+    ),
+)  # fmt: skip
 
 
 def _numbers(law: type[JointLaw]) -> tuple[LawField, ...]:
@@ -51,22 +75,15 @@ def takes_in_words() -> str:
     return "; ".join(f"`{law.word}` {', '.join(f'`{one.name}`' for one in _numbers(law))}" for law in LAWS)
 
 
-#: Reference point, which `read_joint_table` leaves to its caller.
-_AT = Key("at", "list of three numbers", "Reference point.", "m", "not known")
-#: Keys of a joint by constants.
-JOINT_KEYS = KeyTable(
-    "joint.toml",
-    "A joint by its constants; matrices are lists of lists.",
-    (
-        Key("dofs", "list of texts", "Names of the joint DOFs: `y`, `theta_z`."),
-        Key("stiffness", "list of numbers, or of lists", "Stiffness of each DOF, or the matrix.", "N/m, N m/rad"),
-        Key("damping", "list of numbers, or of lists", "Viscous damping.", "N s/m, N m s/rad", "none"),
-        Key("loss_factor", "list of numbers", "Hysteretic loss factor of each DOF.", "", "0"),
-        Key("structural_damping", "list of numbers, or of lists", "Hysteretic damping, beside that of loss factors.",
-            "N/m, N m/rad", "none"),
-        _AT,
-    ),
-)  # fmt: skip
+def parameters_in_words() -> str:
+    """Return what the parameters of all laws are, for the reference of keys."""
+    return "; ".join(
+        f"`{one.name}` {one.meaning[0].lower()}{one.meaning[1:].rstrip('.')} "
+        f"({', '.join(part for part in (one.takes, one.unit) if part)})"
+        for one in LAW_VALUES
+    )
+
+
 #: Keys of one law.
 _LAW = KeyTable(
     "[[law]], in joint.toml",

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from jointfrf.dofs import UNITS
-from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_number, as_real, one_line
+from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray, as_number, as_real, one_line
 
 __all__ = ["JointLaw", "LawField"]
 
@@ -82,9 +82,13 @@ class JointLaw(ABC):
     optional: ClassVar[tuple[str, ...]] = ()
 
     def __post_init__(self) -> None:
+        self._convert()
+        self.checked(self.values)
+
+    def _convert(self) -> None:
+        """Convert all numbers of a dataclass to floats."""
         for field in (*self.parameters, *self.settings):
             object.__setattr__(self, field.name, as_number(field.name, getattr(self, field.name)))
-        self.checked(self.values)
 
     @property
     def fields(self) -> tuple[LawField, ...]:
@@ -205,7 +209,7 @@ class JointLaw(ABC):
 def _least_squares(basis: ComplexArray, target: ComplexArray) -> FloatArray:
     """Return real factors of complex columns."""
     both = np.concatenate([basis.real, basis.imag]), np.concatenate([target.real, target.imag])
-    size = np.maximum(np.linalg.norm(both[0], axis=0), np.finfo(float).tiny)
+    size = np.maximum(np.linalg.norm(both[0], axis=0), TINY)
     return np.asarray(np.linalg.lstsq(both[0] / size, both[1], rcond=None)[0] / size)
 
 

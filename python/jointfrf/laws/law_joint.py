@@ -23,6 +23,8 @@ __all__ = ["Connection", "JointQuantity", "LawJoint"]
 
 #: The mass of a joint DOF, half of it on either side.
 _MASS = LawField("m", "number", 0.0)
+#: Ansys' names of `DIRECTIONS`.
+_ANSYS = ("UX", "UY", "UZ", "ROTX", "ROTY", "ROTZ")
 
 
 class JointQuantity(NamedTuple):
@@ -237,7 +239,7 @@ class LawJoint:
         return c
 
     def connection(self, omega: FloatArray) -> Connection:
-        """Return how the joint connects its DOFs j of A, then k of B; its masses stand last, on j, then on k."""
+        """Return how the joint connects its DOFs j of A, then k of B; its masses come last, on j, then on k."""
         n, masses = len(self.dofs), list(self.mass)
         q = n + 2 * len(masses)
         pattern = np.zeros((2 * n, q))
@@ -360,10 +362,6 @@ class LawJoint:
         if self.mass:
             text += _masses(program, comment, self.mass, nodes, (element, number))
         return text
-
-
-#: Ansys' names of `DIRECTIONS`.
-_ANSYS = ("UX", "UY", "UZ", "ROTX", "ROTY", "ROTZ")
 
 
 def _equations(program: CardFormat, comment: str, rigid: Sequence[str], nodes: Sequence[int], number: int) -> str:

@@ -62,6 +62,7 @@ class SpringLaw(JointLaw):
     optional = ("h", "c")
 
     def __post_init__(self) -> None:
+        self._convert()
         if self.damping is None:
             found: SpringDamping = ("hysteretic" if self.c == 0 else "both") if self.h != 0 else "viscous"
             object.__setattr__(self, "damping", found)

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_positive
+from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray, as_positive
 from jointfrf.laws.law import JointLaw, LawField
 
 __all__ = ["FractionalZener", "PowerLaw", "StandardLinearSolid"]
 
 #: Smallest exponent and time: below, K*(w) would not depend on the other parameters; frequencies are only positive.
-_LEAST_ALPHA, _LEAST_TIME, _LEAST_HZ = 1e-3, 1e-12, float(np.finfo(float).tiny)
+_LEAST_ALPHA, _LEAST_TIME, _LEAST_HZ = 1e-3, 1e-12, TINY
 #: Numbers of several laws.
 _K = LawField("k", "stiffness", 0.0, meaning="Stiffness, at rest.")
 _ALPHA = LawField("alpha", "number", _LEAST_ALPHA, 1.0, meaning="Order of the derivative.")

@@ -30,8 +30,13 @@ SYMMETRIC: Final[dict[str, Any]] = {
 }
 #: From this many DOFs on an order by dissection has smaller factors than one by minimum degree.
 _DISSECTED: Final = 4_000
-#: From this many DOFs on another library, where it is installed, repays its start-up.
+#: From this many DOFs on another library, where it is installed, is faster including its start-up.
 _LARGE: Final = 20_000
+#: Parts of this many vertices are not cut any more.
+_SMALL: Final = 64
+#: A cut leaves at least this share of the vertices on either side.
+_SHARE: Final = 0.3
+Vertices = NDArray[np.intp]
 
 
 class SingularMatrixError(ArithmeticError):
@@ -145,7 +150,7 @@ def factor(matrix: Any, is_symmetric: bool = True) -> Factors:
 
 
 class _NotFactoredError(RuntimeError):
-    """A library failed, for want of memory or because of the matrix: SuperLU is used."""
+    """A library failed, because of memory or of the matrix: SuperLU is used."""
 
 
 def _superlu(matrix: sparse.csc_matrix, **options: Any) -> sparse_linalg.SuperLU:
@@ -219,16 +224,8 @@ def _by_mumps(matrix: Any) -> Factors:
     return Factors(solve, np.iscomplexobj(matrix), "MUMPS")
 
 
-#: Libraries beside SuperLU, which serves where they do not.
+#: Libraries that are tried before SuperLU.
 _MAKERS: Final[dict[Library, Callable[[Any], Factors]]] = {"PARDISO": _by_pardiso, "MUMPS": _by_mumps}
-
-
-#: Parts of this many vertices are not cut any more.
-_SMALL: Final = 64
-#: A cut leaves at least this share of the vertices on either side.
-_SHARE: Final = 0.3
-
-Vertices = NDArray[np.intp]
 
 
 def elimination_order(matrix: sparse.sparray | sparse.spmatrix) -> tuple[Vertices, str]:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray
 from jointfrf.kernel.call import RCOND_LIMIT
 from jointfrf.models.factors import Factors, SingularMatrixError, SparseSolver
 from jointfrf.models.matrices import ModelMatrices, Ports, directions
@@ -17,13 +17,26 @@ from jointfrf.models.modal import Modes, RigidModes, find_rigid_modes, held
 
 __all__ = ["reduce_model", "spot_error"]
 
-#: Rounding may move the modes of a reduced model by this many times what it moves a direct solution by, but no more
+#: Rounding may move the modes of a reduced model this many times as far as a direct solution, but no further
 #: than what rounding leaves of a solution with the smallest reciprocal condition that gives no warning: four digits.
 _LOSS: Final = 30
 _MOST_ROUNDING: Final = float(np.finfo(np.float64).eps) / RCOND_LIMIT
 #: Steps of the iteration; a step that is longer than this share of the one before has reached rounding, if it is
 #: shorter than this share of the solution.
 _STEPS, _SHRINKS, _ROUNDED = 12, 0.5, 1e-6
+#: Shifts to begin with; solutions at each for every force, and in all: few forces need more of them.
+_FIRST_SHIFTS, _MOMENTS, _VECTORS = 1, 4, 40
+#: Shifts are added up to this number, and vectors up to this share of the DOFs.
+_MOST_SHIFTS, _MOST_VECTORS = 40, 0.5
+#: Below this error a refinement that gains less than a factor of three has reached the round-off of the model.
+_NEAR = 1e-4
+#: Directions smaller than this share of their vector are not new.
+_NEW_DIRECTION = 1e-12
+#: Lines whose residual is computed, and those of them that are solved directly.
+_CANDIDATES, _SPOTS = 40, 4
+#: From this many DOFs on solutions of the whole model at these lines are found by iteration, not by factors of a line;
+#: from this many on they still cost as much as the rest: only the worst line is compared.
+_ITERATED, _LARGE, _FEW_SPOTS = 2_000, 10_000, 1
 
 
 @dataclass(frozen=True)
@@ -41,7 +54,7 @@ class TwoLevels:
     shapes : ndarray, shape (n, n_modes)
         Their shapes, 1/sqrt(kg).
     n_rigid : int
-        How many of the modes, the first ones, are those of a rigid body: what is solved for has no part in them.
+        How many of the modes, the first ones, are those of a rigid body: solutions are without them.
     tolerance : float
         The iteration ends where the difference to the reduced model is sure to be below this share of the solution.
 
@@ -101,7 +114,7 @@ class TwoLevels:
         return None
 
     def _coarse(self, omega: float, forces: ComplexArray) -> ComplexArray:
-        """Return what the elastic modes of the reduced model take of forces."""
+        """Return the motion of the elastic modes of the reduced model under forces."""
         elastic = slice(self.n_rigid, None)
         modes, shapes = self.modes, self.shapes[:, elastic]
         stiffness = modes.stiffness[elastic] * (1 + 1j * modes.loss_factor[elastic])
@@ -161,7 +174,7 @@ def spot_error(
                 continue
         x, step = solved
         exact = outputs.of(parts.strains(x)) + seen @ (driven / own[i][:, None])
-        size = max(abs(exact).max(initial=0), np.finfo(float).tiny)
+        size = max(abs(exact).max(initial=0), TINY)
         error = abs(found[i] - exact).max(initial=0) / size
         errors[i] = error if np.isfinite(error) else np.inf
         rounding = max(rounding, float(abs(step).max(initial=0) / size))
@@ -177,21 +190,6 @@ def _by_factors(
     x = factors.solve(forces)
     step = factors.solve(forces - z @ x)
     return x + step, outputs.of(parts.strains(step))
-
-
-#: Shifts to begin with; solutions at each for every force, and in all: few forces need more of them.
-_FIRST_SHIFTS, _MOMENTS, _VECTORS = 1, 4, 40
-#: Shifts are added up to this number, and vectors up to this share of the DOFs.
-_MOST_SHIFTS, _MOST_VECTORS = 40, 0.5
-#: Below this error a refinement that gains less than a factor of three has reached the round-off of the model.
-_NEAR = 1e-4
-#: Directions smaller than this share of their vector are not new.
-_NEW_DIRECTION = 1e-12
-#: Lines whose residual is computed, and those of them that are solved directly.
-_CANDIDATES, _SPOTS = 40, 4
-#: From this many DOFs on solutions of the whole model at these lines are found by iteration, not by factors of a line;
-#: from this many on they still cost as much as the rest: only the worst line is compared.
-_ITERATED, _LARGE, _FEW_SPOTS = 2_000, 10_000, 1
 
 
 @dataclass(frozen=True)
@@ -268,9 +266,7 @@ def reduce_model(
     .. [1] Z. Bai, Y. Su, Dimension reduction of large-scale second-order dynamical systems via a second-order Arnoldi
        method, SIAM J. Sci. Comput. 26 (2005) 1692-1709.
     """
-    for name in ("stiffness", "mass"):
-        if not matrices.is_symmetric(name):
-            raise ValueError(f"{name} is not symmetric: method 'krylov' cannot be used, 'sparse' or 'dense' can")
+    matrices.check_symmetric("method 'krylov' cannot be used, 'sparse' or 'dense' can")
     if matrices.proportional is None:
         raise ValueError("damping couples the modes: method 'krylov' cannot be used, 'sparse' or 'dense' can")
     task = _Reducer(freq_hz, matrices, outputs, inputs, tolerance)
@@ -393,5 +389,5 @@ class _Reducer:
             x = inverse[:, None] * modes.shapes_in.T
             elastic = (1 + 1j * self.eta + 1j * omega * self.b) * (by_k @ x)
             left = elastic + (1j * omega * self.a - omega**2) * (by_m @ x) - forces
-            residual[i] = np.linalg.norm(left) / max(np.linalg.norm(elastic), np.finfo(float).tiny)
+            residual[i] = np.linalg.norm(left) / max(float(np.linalg.norm(elastic)), TINY)
         return np.take(spread, np.argsort(residual)[::-1])

@@ -20,8 +20,8 @@ Operand = Any  # ndarray or scipy sparse array
 
 #: Two entries differ by no more than this share of the largest where a matrix is called symmetric.
 _SYMMETRIC = 1e-10
-#: Up to this size sparse matrices are turned into arrays: what scipy does with their entries would take longer than
-#: all that is computed.
+#: Up to this size sparse matrices are turned into arrays: the overhead of scipy for their entries would exceed the
+#: time of the computation.
 _SMALL = 64
 #: Up to this size products, sums and factors of arrays take no longer than those of sparse matrices.
 _FULL = 200
@@ -147,6 +147,17 @@ class ModelMatrices:
         """Whether K or M is symmetric."""
         return is_symmetric(self.operand(name))
 
+    def check_symmetric(self, otherwise: str) -> None:
+        """Raise unless K and M are symmetric; `otherwise` is the consequence in the message."""
+        for name in ("stiffness", "mass"):
+            if not self.is_symmetric(name):
+                raise ValueError(f"{name} is not symmetric: {otherwise}")
+
+    @property
+    def have_real_modes(self) -> bool:
+        """Whether K and M are symmetric."""
+        return self.is_symmetric("stiffness") and self.is_symmetric("mass")
+
     @cached_property
     def are_symmetric(self) -> bool:
         """Whether all matrices are symmetric."""
@@ -203,7 +214,7 @@ def from_triangle(matrix: Matrix) -> Matrix:
 
 
 def _is_own_transpose(matrix: Matrix) -> bool:
-    """Whether a matrix is an array that is symmetric to the last digit, which is found at once."""
+    """Whether a matrix is an array that is bit-identical to its transpose, which is found quickly."""
     if not isinstance(matrix, np.ndarray):
         return False
     if len(matrix) <= _SMALL and matrix.tobytes() == matrix.tobytes("F"):  # all but zeros of two signs

@@ -17,9 +17,7 @@ from jointfrf.models.matrices import ModelMatrices, Operand, Ports
 __all__ = ["SINGULAR", "Modes", "RigidModes", "all_modes", "find_rigid_modes", "held", "mode_condition"]
 
 #: A fine mesh in mixed units has rcond 1e-13 and still gives nine digits: only below this is a line singular.
-SINGULAR = float(np.finfo(np.float64).eps)
-#: Rounding unit of the sums below.
-_EPS = float(np.finfo(np.float64).eps)
+SINGULAR = _EPS = float(np.finfo(np.float64).eps)
 #: r^T K r counts as zero within this many roundings of its terms: an entry of K is a sum of some tens of rounded terms.
 _ROUNDINGS = 32
 #: Modes are treated apart where K r loses half of all digits, and w^2 of the next mode is this many times higher.
@@ -29,6 +27,8 @@ _SOFT, _GAP = _EPS**0.5, 100
 _BLOCK, _SHIFT, _ITERATIONS, _SETTLED = 8, 100, 20, 0.1
 #: LAPACK's columns a block: with less work space it may take fewer.
 _LAPACK_BLOCK = 64
+#: A modal damping matrix is diagonal if nothing beside its diagonal exceeds this share of it.
+_DIAGONAL = 1e-8
 
 
 @dataclass(frozen=True)
@@ -108,8 +108,8 @@ def find_rigid_modes(k: Operand, m: Operand, solver: SparseSolver | None = None)
     Returns
     -------
     RigidModes
-        None where the structure is held; none, too, where M has no mass in a motion that K does not resist, and where
-        no gap separates them from the modes above.
+        Empty where the structure is held, where M has no mass in a motion that K does not resist, and where no gap
+        separates them from the modes above.
 
     Notes
     -----
@@ -232,10 +232,6 @@ def _check_finite(*arrays: FloatArray) -> None:
             raise np.linalg.LinAlgError("an entry is NaN or Inf")
 
 
-#: A modal damping matrix is diagonal if nothing beside its diagonal exceeds this share of it.
-_DIAGONAL = 1e-8
-
-
 @dataclass(frozen=True)
 class Modes:
     """Modes with unit modal masses.
@@ -316,9 +312,7 @@ def all_modes(matrices: ModelMatrices, outputs: Ports, inputs: Ports) -> tuple[M
     An eigenvalue solver knows every w^2 within rounding of the largest one; rigid-body modes, and those of a soft
     suspension, are found apart, see `find_rigid_modes`.
     """
-    for name in ("stiffness", "mass"):
-        if not matrices.is_symmetric(name):
-            raise ValueError(f"{name} is not symmetric: method 'modal' cannot be used, 'dense' or 'sparse' can")
+    matrices.check_symmetric("method 'modal' cannot be used, 'dense' or 'sparse' can")
     k, m = matrices.dense("stiffness"), matrices.dense("mass")
     assert k is not None
     assert m is not None

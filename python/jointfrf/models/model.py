@@ -23,6 +23,7 @@ __all__ = ["Ground", "Model", "assemble", "chain"]
 _DENSE_LIMIT = 50
 #: -(2 pi 1 Hz)^2, (rad/s)^2: below zero, so that K - shift M is regular for a free structure, too.
 _SHIFT = -((2 * np.pi) ** 2)
+Ground = Literal["none", "start", "end", "both"]
 
 
 @dataclass(frozen=True)
@@ -161,9 +162,7 @@ class Model:
         """
         n = len(self.dofs)
         matrices = ModelMatrices(self.stiffness, self.mass, None, None, 0.0)
-        for name in ("stiffness", "mass"):
-            if not matrices.is_symmetric(name):  # half of it would be read
-                raise ValueError(f"{name} is not symmetric: the model has no real modes")
+        matrices.check_symmetric("the model has no real modes")  # half of it would be read
         k, m = matrices.sparse("stiffness"), matrices.sparse("mass")
         try:
             if count is None or count > n - 2 or n <= _DENSE_LIMIT:
@@ -271,9 +270,6 @@ def _constants(joint: Joint | LawJoint) -> tuple[Joint, FloatArray]:
         raise ValueError(f"joint: a {varying[0]} depends on frequency, which matrices do not: use couple")
     springs = LawJoint(joint.laws, dofs=joint.dofs).constant_joint()
     return springs, np.array([joint.mass.get(dof, 0.0) for dof in joint.dofs])
-
-
-Ground = Literal["none", "start", "end", "both"]
 
 
 def chain(

@@ -180,7 +180,7 @@ def receptance(
     tolerance : float
         What the error estimate of "krylov", and of "modal" where "auto" chose it, must meet: the largest error of a
         line relative to its largest entry. Where rounding limits a direct solution, too, 30 times its rounding
-        will do, up to 2.2e-4: what rounding leaves at the reciprocal condition `jointfrf.RCOND_LIMIT`.
+        suffices, up to 2.2e-4: what rounding leaves at the reciprocal condition `jointfrf.RCOND_LIMIT`.
     full_output : bool
         Whether a `ReceptanceInfo` is returned too: what was done, why, and the error estimate.
 
@@ -223,7 +223,7 @@ def receptance(
     Sparse matrices are factored by SuperLU, from 4 000 DOFs on in an order by nested dissection: that of METIS where
     the package pymetis is installed. From 20 000 DOFs on symmetric ones are factored by PARDISO (package pypardiso,
     real matrices, which is what a reduction needs) or MUMPS (package python-mumps) where they are installed.
-    `ReceptanceInfo.solver` says what did it.
+    `ReceptanceInfo.solver` names library and order.
 
     Examples
     --------
@@ -284,7 +284,7 @@ def _automatic(task: _Task) -> tuple[ComplexArray, ReceptanceInfo]:
         return _solved(task, direct, f"few lines: {task.freq_hz.size}")
     if matrices.proportional is None:
         return _solved(task, direct, "damping couples the modes")
-    if not (matrices.is_symmetric("stiffness") and matrices.is_symmetric("mass")):
+    if not matrices.have_real_modes:
         return _solved(task, direct, "stiffness or mass is not symmetric")
     if n <= _ALL_MODES:
         return _summed(task, f"{task.freq_hz.size} lines of {n} DOFs whose modes the damping does not couple")
@@ -386,7 +386,7 @@ def _unreliable_lines(matrices: ModelMatrices, freq: FloatArray, status: LineSta
     """
     rcond = np.where(status.rcond < SINGULAR, status.rcond, 1.0)
     poor = (status.rcond < RCOND_LIMIT) & (status.rcond >= SINGULAR)
-    if poor.any() and matrices.is_symmetric("stiffness") and matrices.is_symmetric("mass"):
+    if poor.any() and matrices.have_real_modes:
         rigid = find_rigid_modes(matrices.operand("stiffness"), matrices.operand("mass"))
         left = rigid.dynamic_stiffness(matrices, 2 * np.pi * freq[poor])
         rcond[poor] = mode_condition(left, rigid.uncertainty)

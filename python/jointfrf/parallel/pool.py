@@ -20,9 +20,9 @@ _T = TypeVar("_T")
 _R = TypeVar("_R")
 #: An executor, or what makes one: that is called again where the executor breaks.
 AnyExecutor = Executor | Callable[[], Executor]
-#: Tasks submitted and not done, for each worker: none of them waits for the next.
+#: Tasks submitted and not done, for each worker: one at work, and one so that it need not wait for the next.
 _WAITING = 2
-#: Executors made in the place of broken ones, one after the other, without a task done in between.
+#: Times in a row, without a task done in between, that a broken executor is replaced.
 _MADE_AGAIN = 3
 
 
@@ -31,7 +31,7 @@ class BrokenPoolError(RuntimeError):
 
 
 def _lost() -> tuple[type[BaseException], ...]:
-    """Return what executors raise where there is no worker left to do a task, rather than what the task raised."""
+    """Return the errors that mean lost workers, not an error of the task."""
     dask = sys.modules.get("distributed")  # whose errors are not those of concurrent.futures
     own = () if dask is None else (dask.scheduler.KilledWorker, dask.client.ClosedClientError)
     return (BrokenExecutor, CancelledError, *own)
@@ -73,7 +73,7 @@ class Pool(Generic[_T]):
         return 1 if isinstance(self.executor, _InThisThread) else _WAITING * self.workers
 
     def completed(self, function: Callable[[_T], _R], tasks: Iterator[_T]) -> Iterator[tuple[_T, _R]]:
-        """Do tasks, and give each with its result as soon as it is there.
+        """Do tasks, and yield each with its result as soon as that is available.
 
         Parameters
         ----------

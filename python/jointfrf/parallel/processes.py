@@ -130,7 +130,7 @@ def _begin_process() -> None:
 
 
 def _end_with(sentinel: int) -> None:
-    """Wait for the end of another process, and end this one: whoever is killed cannot tell its processes."""
+    """Wait for the end of another process, and end this one: a process that is killed cannot end those it started."""
     connection.wait([sentinel])
     os._exit(1)
 

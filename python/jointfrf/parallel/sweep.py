@@ -25,15 +25,15 @@ __all__ = ["SweepCost", "SweepPlan", "plan_sweep", "planned_sweep", "sweep"]
 
 #: Lines that the kernel takes as one share: chunks are multiples of it, so that they change no bit of a result.
 _SHARE = 512
-#: Share of its time that a task may lose to being sent.
+#: Share of its time that a task may lose to being sent: too little to be seen.
 _OVERHEAD = 0.02
-#: Memory of a task, unless it must be larger for the time it takes.
+#: Bytes of a task where its time allows: larger ones are not faster.
 _USUAL_BYTES = 8 * 2**20
-#: Tasks for each worker at least, so that all end together.
+#: Tasks for each worker, at least: workers then end within a quarter of their time.
 _TASKS = 4
-#: Lines on which the cost of a line is measured, few and many: the difference is that of the lines.
+#: Lines of two measurements: their difference in time is that of the lines, without what a call costs.
 _SAMPLES = (512, 8192)
-#: Tasks that do nothing, for each worker, and places where lines are measured.
+#: Empty tasks for each worker, and places of which the median is taken: one disturbance changes nothing.
 _EMPTY, _REPEATED = 4, 3
 #: An operation, line by line: takes arrays by name, returns the result.
 LineFunction = Callable[..., NDArray[Any]]
@@ -142,7 +142,7 @@ def planned_sweep(
     Notes
     -----
     A task takes at least 50 times what it costs to send it, unless it would then take more memory than 64 MiB or leave
-    workers without one. Tasks are multiples of 512 lines, which the kernel computes alike whatever stands around them.
+    workers without one. Tasks are multiples of 512 lines, whose results do not depend on the lines beside them.
     """
     line_bytes = sum(16 * math.prod(shape[1:]) for shape in shapes.values())
     lines = cost.task / _OVERHEAD / max(cost.line + cost.write, 1e-12)
@@ -186,8 +186,8 @@ def _do(task: _SweepTask) -> _Done:
         if task.result is not None:
             task.result.write(task.lines, values)
         seconds = perf_counter() - start
-    told = [str(one.message) for one in caught if issubclass(one.category, IllConditionedWarning)]
-    return _Done(None if task.result is not None else values, told[0] if told else "", seconds)
+    texts = [str(one.message) for one in caught if issubclass(one.category, IllConditionedWarning)]
+    return _Done(None if task.result is not None else values, texts[0] if texts else "", seconds)
 
 
 def _nothing(_: int) -> None:
@@ -328,7 +328,7 @@ def sweep(
     unit = math.lcm(_SHARE, whole.out.step)
     if not 0 <= as_integer("first", first) < whole.n_lines or first % unit:
         raise ValueError(f"first must be a multiple of {unit} from 0 to {whole.n_lines - 1}, not {first}")
-    told: list[tuple[int, str]] = []
+    poor: list[tuple[int, str]] = []
     finished = _Finished(first)
     try:
         with opened_pool(executor, jobs) as pool:
@@ -339,7 +339,7 @@ def sweep(
                 if result.values is not None:
                     whole.out.write(task.lines, result.values)
                 if result.warning:
-                    told.append((task.lines.start, result.warning))
+                    poor.append((task.lines.start, result.warning))
                 finished.add(task.lines)
                 if progress is not None:
                     progress(finished.count, whole.n_lines)
@@ -348,9 +348,9 @@ def sweep(
             f"the workers of the executor have ended unexpectedly; {finished}: sweep(..., first={finished.end}) "
             "computes the rest"
         ) from error
-    if told:
-        start, text = min(told)
-        more = f"; so are lines of {len(told) - 1} other chunks" if len(told) > 1 else ""
+    if poor:
+        start, text = min(poor)
+        more = f"; so are lines of {len(poor) - 1} other chunks" if len(poor) > 1 else ""
         warnings.warn(f"{text}, counted from line {start}{more}", IllConditionedWarning, stacklevel=2)
     return used
 

@@ -21,7 +21,18 @@ from jointfrf.report.figure import Figure
 from jointfrf.report.table import VERDICT, Table, shown, turned, written
 from jointfrf.spelling import visible
 
-__all__ = ["Document", "HeatMap", "Listing", "Part", "Picture", "Section", "Sketch", "Words", "make_document"]
+__all__ = [
+    "Document",
+    "HeatMap",
+    "Listing",
+    "Page",
+    "Part",
+    "Picture",
+    "Section",
+    "Sketch",
+    "Words",
+    "make_document",
+]
 
 #: Up to so many columns fit on any screen; more than so many are written smaller; more than so many become rows.
 _NARROW, _WIDE, _WIDEST = 4, 9, 12
@@ -48,7 +59,7 @@ class Picture:
 
 @dataclass(frozen=True)
 class Sketch:
-    """A drawing of our own: SVG whose colours follow the page, what stands below it, and the same in words."""
+    """A drawing of our own: SVG whose colours follow the page, its caption, and the same in words."""
 
     key: str
     svg: str
@@ -86,7 +97,7 @@ Part = Table | Words | Picture | Chart | Sketch | HeatMap | Listing
 
 @dataclass(frozen=True)
 class Section:
-    """A heading and what stands below it; `more` are parts shown when the reader asks for them, under a name."""
+    """A heading and what follows it; `more` are parts shown when the reader asks for them, under a name."""
 
     key: str
     heading: str
@@ -220,3 +231,48 @@ def _marked(parameter: Parameter) -> str:
 
     index = parameter.name.partition("_")[2].replace("theta_", "θ").replace("theta", "θ")
     return Markup("<i>{}</i><sub>{}</sub>").format(parameter.kind, index)
+
+
+@dataclass(frozen=True)
+class Page:
+    """What a page holds.
+
+    Attributes
+    ----------
+    title : str
+    about : str
+        A sentence or two below it: what was computed from what.
+    summary : sequence of Table
+        Short tables.
+    tables : sequence of Table
+    figures : sequence of (Figure, Drawing)
+        Figures as they are drawn: the SVG files become part of the page.
+    subject : str
+        Heading of the texts that follow.
+    text : str
+        Shown as it is written; left out if empty.
+    sources : sequence of (name, text)
+        Shown when the reader asks for them.
+    """
+
+    title: str
+    about: str
+    summary: Sequence[Table]
+    tables: Sequence[Table]
+    figures: Sequence[tuple[Figure, Drawing]]
+    subject: str = ""
+    text: str = ""
+    sources: Sequence[tuple[str, str]] = ()
+
+    @property
+    def document(self) -> Document:
+        """The page as sections and their parts."""
+        sections = [
+            Section("summary", "Summary", self.summary),
+            Section("tables", "Tables", self.tables),
+            Section("figures", "Figures", [Picture(figure, drawing) for figure, drawing in self.figures]),
+        ]
+        if self.subject:
+            texts = ([Listing("", self.text)] if self.text else []) + [Listing(*own) for own in self.sources]
+            sections.append(Section("subject", self.subject, texts))
+        return Document(self.title, self.about, sections)

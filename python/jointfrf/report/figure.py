@@ -4,14 +4,29 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
 
 from jointfrf.frf.bands import Band
 from jointfrf.kernel.arguments import FloatArray
 from jointfrf.report.table import csv_cell
 
-__all__ = ["Curve", "Figure", "Interval", "Level", "NamedBands", "Panel", "Ribbon", "Surface", "figure_csv"]
+__all__ = [
+    "Curve",
+    "Figure",
+    "Interval",
+    "Level",
+    "MovingBody",
+    "NamedBands",
+    "Panel",
+    "Ribbon",
+    "Surface",
+    "deformed_surface",
+    "figure_csv",
+]
 
 #: Names of bands and their limits, Hz.
 NamedBands = tuple[tuple[str, tuple[Band, ...]], ...]
@@ -115,13 +130,13 @@ class Figure:
     key : str
         Name of its files.
     caption : str
-        What stands below it on a page.
+        Its caption on a page.
     panels : tuple of Panel
     columns : int
     number : str
         Its number in the source, or empty.
     heading : str
-        What stands above the panels, where the figure stands alone.
+        Title above the panels, where the figure is a file of its own.
     """
 
     key: str
@@ -162,3 +177,47 @@ def _panel_rows(panel: Panel) -> Iterator[tuple[object, ...]]:
             yield panel.surface.label, " ".join(f"{x:.9g}" for x in middle), value, ""
     for label, bands in (*panel.shades, *panel.strips):
         yield from ((label, f"{low:g}-{high:g}", "", "") for low, high in bands)
+
+
+#: Largest displacement drawn, as a share of the length of the structure.
+_DEFLECTION = 0.12
+
+
+@dataclass(frozen=True)
+class MovingBody:
+    """The outside of a body and how its nodes move.
+
+    Attributes
+    ----------
+    nodes : ndarray, shape (n_nodes, 3)
+        Positions, m.
+    faces : ndarray of int, shape (n_faces, 4)
+        Nodes of the quadrilaterals on the outside, counted from 0.
+    motion : ndarray, shape (n_nodes, 3)
+        Displacements, of any size.
+    """
+
+    nodes: FloatArray
+    faces: NDArray[np.integer]
+    motion: FloatArray
+
+
+def deformed_surface(bodies: Sequence[MovingBody]) -> Surface:
+    """Draw bodies in a common motion: deformed true to scale, darker where they move more, outlines at rest.
+
+    Parameters
+    ----------
+    bodies : sequence of MovingBody
+
+    Returns
+    -------
+    Surface
+        Values are displacements, as shares of the largest.
+    """
+    reach = _DEFLECTION * np.ptp(np.concatenate([body.nodes for body in bodies]), axis=0).max()
+    sizes = [np.linalg.norm(body.motion, axis=1) for body in bodies]
+    largest = max(float(size.max()) for size in sizes)
+    drawn = [(body.nodes + reach / largest * body.motion)[body.faces] for body in bodies]
+    values = [(size / largest)[body.faces].mean(axis=1) for body, size in zip(bodies, sizes, strict=True)]
+    at_rest = [body.nodes[body.faces] for body in bodies]
+    return Surface(np.concatenate(drawn), np.concatenate(values), edges=np.concatenate(at_rest))

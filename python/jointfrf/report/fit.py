@@ -1,31 +1,34 @@
-"""Files of one identification: parameters as JSON, figures of the joint over frequency."""
+"""Figures of one identification: the joint over frequency, which frequencies determine it; their files."""
 
 from __future__ import annotations
 
 import json
 import warnings
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple, cast, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
-from jointfrf.dofs import Parameter, compliance_unit
+from jointfrf.dofs import Parameter, ParameterKind, compliance_unit
 from jointfrf.errors import IllConditionedWarning
 from jointfrf.files import below, write_file
 from jointfrf.identification.fit_data import FitData
 from jointfrf.identification.record import fit_to_dict
-from jointfrf.identification.result import Fit
-from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.identification.result import Fit, FittedParameter
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, check_type
 from jointfrf.kernel.linear_algebra import invert
 from jointfrf.laws.law_joint import LawJoint
 from jointfrf.report.axes import FREQUENCY, bulk_limits
-from jointfrf.report.draw import draw
+from jointfrf.report.draw import draw, laid_out
 from jointfrf.report.figure import Curve, Figure, Panel, Ribbon
+from jointfrf.report.fit_frfs import compare_frfs, compare_model, frf_figures
+from jointfrf.report.table import Cell, Table
 
-__all__ = ["fit_figures", "write_fit"]
+__all__ = ["fit_figures", "fit_overview", "information_figure", "information_table", "plot", "shown_name", "write_fit"]
 
 
 def fit_figures(fit: Fit) -> list[Figure]:
@@ -201,3 +204,115 @@ def write_fit(fits: Sequence[Fit], folder: Path, source: str, figures: Sequence[
     for path, content in written.items():
         write_file(path, content)
     return list(written)
+
+
+#: Parts of the band over which shares are summed, and lines a part at least.
+_PARTS, _LEAST = 48, 4
+#: Shares of the information below the frequencies in the table.
+_QUANTILES = (0.1, 0.5, 0.9)
+_STYLES = {"k": "ismm", "h": "stiffness", "c": "high"}
+_LABELS = {"k": "stiffness k", "h": "hysteretic damping h", "c": "viscous damping c"}
+#: Styles of other parameters of laws, in their order.
+_OTHERS = ("stiffness", "high", "actual")
+
+
+def shown_name(one: FittedParameter) -> Cell:
+    """Return a parameter as a cell of a table."""
+    is_spring = one.origin == "joint" and one.kind in get_args(ParameterKind)
+    return Parameter(cast(ParameterKind, one.kind), one.row, one.column) if is_spring else one.name
+
+
+def information_table(fit: Fit, freq_hz: FloatArray, shares: FloatArray) -> Table:
+    """Return for each parameter below which frequency a tenth, half and nine tenths of the information lie.
+
+    Parameters
+    ----------
+    fit : Fit
+    freq_hz : ndarray, shape (n_freq,)
+        Rising, Hz.
+    shares : ndarray, shape (n_freq, p)
+        Share of each line.
+    """
+    total = np.cumsum(shares, axis=0)
+    rows: list[tuple[Cell, ...]] = []
+    for i, term in enumerate(fit.parameters):
+        at = [min(int(np.searchsorted(total[:, i], q * total[-1, i])), freq_hz.size - 1) for q in _QUANTILES]
+        rows.append((shown_name(term), *(float(freq_hz[a]) for a in at)))
+    columns = ("parameter", *(f"{100 * q:.0f} % below, Hz" for q in _QUANTILES))
+    note = "Eight tenths of what the data say of a parameter lie between the first and the last frequency."
+    return Table("information-table", "Where the information lies", columns, tuple(rows), note=note)
+
+
+def information_figure(fit: Fit, freq_hz: FloatArray, shares: FloatArray) -> Figure | None:
+    """Draw the share of each part of the band in what is known of the parameters of each DOF; None for few lines."""
+    parts = min(_PARTS, freq_hz.size // _LEAST)
+    if parts < 3 or freq_hz[-1] == freq_hz[0]:
+        return None
+    edges = np.linspace(freq_hz[0], freq_hz[-1], parts + 1)
+    at = np.clip(np.searchsorted(edges, freq_hz, side="right") - 1, 0, parts - 1)
+    panels = []
+    for dof in fit.dofs:
+        terms = [(i, term) for i, term in enumerate(fit.parameters) if term.row == term.column == dof]
+        if not terms:
+            continue
+        others = [term.kind for _, term in terms if term.kind not in _STYLES]
+        curves = tuple(
+            _steps(edges, np.bincount(at, shares[:, i], parts).astype(np.float64), term, others) for i, term in terms
+        )
+        panels.append(Panel(f"DOF {dof}", FREQUENCY, f"share of the band in {parts} parts, %", curves))
+    caption = "Information density: how much each part of the band says about each parameter"
+    return Figure("information", caption, tuple(panels), 2 if len(panels) > 1 else 1)
+
+
+def _steps(edges: FloatArray, share: FloatArray, term: FittedParameter, others: list[str]) -> Curve:
+    """Draw shares as steps; `others` are the kinds of this DOF that springs and dampers do not have."""
+    style = _STYLES.get(term.kind) or _OTHERS[others.index(term.kind) % len(_OTHERS)]
+    return Curve(_LABELS.get(term.kind, term.kind), np.repeat(edges, 2)[1:-1], np.repeat(100 * share, 2), style)
+
+
+#: FRFs that are drawn, two beside each other.
+_FRFS = 4
+
+
+def fit_overview(fit: Fit) -> Figure:
+    """Return K* and compliance of each DOF, and the first FRFs where the fit holds them, as one figure."""
+    panels: list[Panel] = []
+    for figure in fit_figures(fit):
+        dof = figure.key.removeprefix("joint_")
+        titles = (f"DOF {dof}: joint stiffness", "", f"DOF {dof}: joint compliance", "")
+        panels += [replace(panel, title=title) for panel, title in zip(figure.panels, titles, strict=True)]
+    if fit.data is not None:
+        up = np.argsort(fit.freq_hz, kind="stable")
+        compared = compare_frfs(fit.data, fit.dofs) if isinstance(fit.data, FitData) else compare_model(fit)
+        frfs = frf_figures(compared, fit.freq_hz, up)[:_FRFS]
+        for first in range(0, len(frfs), 2):
+            beside = frfs[first : first + 2]
+            for part in zip(*(figure.panels for figure in beside), strict=True):
+                own = [
+                    replace(panel, title=figure.caption if panel.log_y else "")
+                    for panel, figure in zip(part, beside, strict=True)
+                ]
+                panels += [*own, *([Panel("", "", "")] * (2 - len(own)))]
+    return Figure("joint", "Joint found", tuple(panels), 2)
+
+
+def plot(fit: Fit) -> Any:
+    """Draw the joint over frequency, K* and compliance of each DOF, and measured against regenerated FRFs.
+
+    Parameters
+    ----------
+    fit : Fit
+        A fit that was loaded shows no FRFs.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        ``jf.plot(fit).savefig("joint.png")`` writes it.
+
+    Raises
+    ------
+    MissingPackageError
+        matplotlib is missing.
+    """
+    check_type("fit", fit, Fit)
+    return laid_out(fit_overview(fit))

@@ -20,9 +20,19 @@ __all__ = ["InterfacePoint", "interface_points", "interface_sketch", "point_tabl
 _VIEW = np.array([[0.87, -0.32], [0.0, 0.95], [0.5, 0.42]]).T
 #: Size of the drawing, its margin, and of arrows.
 _WIDTH, _HEIGHT, _MARGIN, _ARROW = 520.0, 260.0, 62.0, 34.0
+#: Where the axes of space begin.
+_CORNER = (30.0, _HEIGHT - 32.0)
+#: A spring from (0, 0) to (1, 0), six turns high.
+_SPRING = "M0 0H.25L.29 6 .38-6 .46 6 .54-6 .63 6 .71-6 .75 0H1"
+#: Heads of arrows, in the colours of the sides and of the axes.
+_HEADS = "".join(
+    f'<marker id="head-{style}" orient="auto" markerUnits="userSpaceOnUse" markerWidth="8" markerHeight="8" refX="7" '
+    f'refY="3.2" stroke="none"><path class="{style}" stroke="none" d="M0 0L8 3.2 0 6.4z"/></marker>'
+    for style in ("j", "k", "axis")
+)
 #: Points nearer than this share of the extent count as one place.
 _SAME = 1e-6
-#: Directions whose triple product is above this tell a place.
+#: Directions whose triple product is above this determine a place.
 _INDEPENDENT = 0.1
 #: Sides whose points are nearer on the page are drawn so far apart, each way.
 _APART = 30.0
@@ -45,7 +55,7 @@ def interface_points(interface: Interface) -> list[InterfacePoint]:
 
     Notes
     -----
-    A channel along d at r from the reference point moves by r x d for a unit rotation: of one direction that tells all
+    A channel along d at r from the reference point moves by r x d for a unit rotation: one direction determines all
     of r but its part along d, which is taken as zero. Channels without names are points of their own, by their
     numbers; three in a row that can be at one place, as those of a sensor of three axes, are one.
     """
@@ -133,7 +143,9 @@ def interface_sketch(interface: Interface, points: list[InterfacePoint], dofs: t
     parts += [_point(p, at) for p in points]
     parts.append(_spring(*ends))
     parts.append(_axes())
-    svg = f'<svg viewBox="0 0 {_WIDTH:g} {_HEIGHT:g}" aria-hidden="true">' + "".join(parts) + "</svg>"
+    drawn = f"<defs>{_HEADS}</defs>" + "".join(parts)
+    # Arrows of sides that are drawn apart reach a little above the margin.
+    svg = f'<svg viewBox="0 -6 {_WIDTH:g} {_HEIGHT + 6:g}" aria-hidden="true">{drawn}</svg>'
     sides = [", ".join(p.name for p in points if p.side == side) for side in (0, 1)]
     apart = 1e3 * float(np.linalg.norm(interface.references[1] - interface.references[0]))
     where = "at one place" if apart < 1e-6 else f"{apart:.3g} mm apart"
@@ -175,38 +187,25 @@ def _point(point: InterfacePoint, at: _OnPage) -> str:
 
 
 def _arrow(style: str, x: float, y: float, step: FloatArray) -> str:
-    length = float(np.hypot(*step)) or 1.0
-    along, across = step / length, np.array([-step[1], step[0]]) / length
-    tip = np.array([x, y]) + step
-    left, right = tip - 8 * along + 3.2 * across, tip - 8 * along - 3.2 * across
-    head = " ".join(f"{a:.1f},{b:.1f}" for a, b in (tip, left, right))
-    shaft = tip - 6 * along
-    return (
-        f'<path class="{style} link" stroke-width="1.6" d="M{x:.1f} {y:.1f}L{shaft[0]:.1f} {shaft[1]:.1f}"/>'
-        f'<polygon class="{style}" points="{head}"/>'
-    )
+    shaft = f"M{x:.1f} {y:.1f}l{step[0]:.1f} {step[1]:.1f}"
+    return f'<path class="{style} link" stroke-width="1.6" marker-end="url(#head-{style})" d="{shaft}"/>'
 
 
 def _spring(first: FloatArray, last: FloatArray) -> str:
     """Draw a spring between two places."""
     step = last - first
-    length = float(np.hypot(*step)) or 1.0
-    along, across = step / length, np.array([-step[1], step[0]]) / length
-    turns = [(0.0, 0.0), (0.25, 0.0)]
-    turns += [(0.25 + 0.5 * (i + 0.5) / 6, 6.0 * (-1) ** i) for i in range(6)]
-    turns += [(0.75, 0.0), (1.0, 0.0)]
-    places = [first + share * length * along + off * across for share, off in turns]
-    path = "L".join(f"{a:.1f} {b:.1f}" for a, b in places)
-    return f'<path class="joint open" stroke-width="1.6" stroke-linejoin="round" d="M{path}"/>'
+    length = max(float(np.hypot(*step)), 1.0)
+    place = ", ".join(f"{x:.3f}" for x in (*step, -step[1] / length, step[0] / length, *first))
+    look = 'stroke-width="1.6" stroke-linejoin="round" vector-effect="non-scaling-stroke"'
+    return f'<path class="joint open" {look} transform="matrix({place})" d="{_SPRING}"/>'
 
 
 def _axes() -> str:
     """Draw the axes of space in the corner."""
-    x, y = 30.0, _HEIGHT - 32.0
     drawn = []
     for letter, direction in zip("xyz", _VIEW.T, strict=True):
         step = direction * (1, -1) * 26
-        drawn.append(_arrow("axis", x, y, step))
-        a, b = np.array([x, y]) + 1.38 * step
+        a, b = np.array(_CORNER) + 1.38 * step
+        drawn.append(_arrow("axis", *_CORNER, step))
         drawn.append(f'<text x="{a:.1f}" y="{b + 4:.1f}" text-anchor="middle" font-style="italic">{letter}</text>')
     return "".join(drawn)

@@ -150,7 +150,7 @@ def plain_rows(table: Table) -> list[list[str | float | None]]:
 
 
 def csv_cell(cell: object) -> object:
-    """Return a cell of a CSV file; a text that a spreadsheet would take for a formula stands after an apostrophe.
+    """Return a cell of a CSV file; a text that a spreadsheet would take for a formula follows an apostrophe.
 
     Examples
     --------

@@ -34,7 +34,7 @@ def prefixed_unit(unit: str, largest: float) -> tuple[str, float]:
     unit : str
         With its prefix; as it is where none is needed or usual.
     size : float
-        What it stands for: values are divided by it.
+        Its size: values are divided by it.
 
     Examples
     --------

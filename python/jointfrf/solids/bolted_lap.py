@@ -14,7 +14,7 @@ from jointfrf.models.beam import End, check_ends
 from jointfrf.solids.brick import Material, brick_quality
 from jointfrf.solids.brick_beam import Preset, holed_plan
 from jointfrf.solids.contact import ContactInterface
-from jointfrf.solids.mesh import Mesh, Plan, disc, extrude, join_plans, rectangle
+from jointfrf.solids.mesh import NEAR, Mesh, Plan, disc, extrude, join_plans, rectangle
 
 __all__ = [
     "ALUMINIUM",
@@ -46,6 +46,19 @@ PROOF_STRENGTH: Final[dict[str, float]] = {
 }
 #: Tensile stress area of coarse metric threads, m^2: ISO 898-1, Table 4.
 STRESS_AREA: Final[dict[str, float]] = {"M5": 14.2e-6, "M6": 20.1e-6, "M8": 36.6e-6, "M10": 58.0e-6, "M12": 84.3e-6}
+#: Material of the beams of case study 2.
+ALUMINIUM: Final = Material(youngs_modulus=70e9, poisson=0.33, density=2700.0, loss_factor=0.01)
+Body = Literal["A", "B", "bolt"]
+#: The bodies in the order of their elements.
+BODIES: Final[tuple[Body, ...]] = get_args(Body)
+#: Lower and upper body of each interface.
+INTERFACES: Final[dict[str, tuple[Body, Body]]] = {"head": ("A", "bolt"), "lap": ("B", "A"), "nut": ("bolt", "B")}
+#: Bricks along a beam for each height of length, away from the overlap.
+_PER_HEIGHT: Final = 1.14
+#: Circles around the head reach this share of the way to the nearest edge.
+_CIRCLES_REACH: Final = 0.6
+#: The smallest scaled Jacobian that is accepted.
+_POOR: Final = 0.2
 
 
 @dataclass(frozen=True)
@@ -125,24 +138,6 @@ def preload_force(tensile_area: float, proof_strength: float, share: float = 0.7
     if share > 1:
         raise ValueError(f"share must not exceed 1, the proof load itself, not {share:g}")
     return share * tensile_area * proof_strength  # (4.3), (4.4)
-
-
-#: Material of the beams of case study 2.
-ALUMINIUM: Final = Material(youngs_modulus=70e9, poisson=0.33, density=2700.0, loss_factor=0.01)
-
-Body = Literal["A", "B", "bolt"]
-#: The bodies in the order of their elements.
-BODIES: Final[tuple[Body, ...]] = get_args(Body)
-#: Lower and upper body of each interface.
-INTERFACES: Final[dict[str, tuple[Body, Body]]] = {"head": ("A", "bolt"), "lap": ("B", "A"), "nut": ("bolt", "B")}
-#: Bricks along a beam for each height of length, away from the overlap.
-_PER_HEIGHT: Final = 1.14
-#: Circles around the head reach this share of the way to the nearest edge.
-_CIRCLES_REACH: Final = 0.6
-#: The smallest scaled Jacobian that is accepted.
-_POOR: Final = 0.2
-#: Nodes within this share of the height of a beam are at the same place.
-_NEAR: Final = 1e-6
 
 
 @dataclass(frozen=True)
@@ -286,7 +281,9 @@ def bolted_lap(
     bricks = LapDivisions() if divisions is None else divisions
     check_type("bolt", fastener, Bolt)
     check_type("divisions", bricks, LapDivisions)
-    _check_pairs(lengths=lengths, heights=heights, materials=materials, ends=ends)
+    for name, pair in (("lengths", lengths), ("heights", heights), ("materials", materials), ("ends", ends)):
+        if not isinstance(pair, list | tuple | np.ndarray) or len(pair) != 2:
+            raise TypeError(f"{name} must be a pair, of A and of B, not {one_line(pair)}")
     for material in materials:
         check_type("materials", material, Material)
     _check_dimensions(lengths, heights, width, overlap, hole_radius, fastener)
@@ -306,7 +303,7 @@ def bolted_lap(
         _check_quality(name, solid)
     mesh, body = _joined(solids)
     faces = [(0.0, ends[0]), (start + lengths[1], ends[1])]
-    held = [abs(mesh.nodes[:, 2] - z) < _NEAR * min(heights) for z, end in faces if end == "clamped"]
+    held = [abs(mesh.nodes[:, 2] - z) < NEAR * min(heights) for z, end in faces if end == "clamped"]
     return BoltedLap(
         mesh=mesh,
         body=body,
@@ -316,12 +313,6 @@ def bolted_lap(
         axis=np.array([0.0, 0.0, start + overlap / 2]),
         preset=preset,
     )
-
-
-def _check_pairs(**pairs: object) -> None:
-    for name, pair in pairs.items():
-        if not isinstance(pair, list | tuple | np.ndarray) or len(pair) != 2:
-            raise TypeError(f"{name} must be a pair, of A and of B, not {one_line(pair)}")
 
 
 def _check_dimensions(
@@ -374,7 +365,7 @@ def _shared_plan(
 def _beam(shared: Plan, span: tuple[float, float], width: float, height: float, bricks: LapDivisions) -> Plan:
     """Return the plan of a beam: the overlap and the strip outside it."""
     length = span[1] - span[0]
-    if length < _NEAR * height:
+    if length < NEAR * height:
         return shared
     along = max(1, round(length / height * _PER_HEIGHT)) if bricks.along is None else bricks.along
     across = np.linspace(-width / 2, width / 2, bricks.across + 1)
@@ -421,7 +412,7 @@ def _joined(solids: dict[str, Mesh]) -> tuple[Mesh, NDArray[np.str_]]:
 def _interfaces(mesh: Mesh, body: NDArray[np.str_], heights: tuple[float, float]) -> dict[str, ContactInterface]:
     """Return the faces that touch, found by their planes."""
     faces, elements = mesh.faces()
-    near = _NEAR * min(heights)
+    near = NEAR * min(heights)
     planes: dict[str, float] = {"head": heights[0], "lap": 0.0, "nut": -heights[1]}
     found: dict[str, ContactInterface] = {}
     for name, (lower, upper) in INTERFACES.items():

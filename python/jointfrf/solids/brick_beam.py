@@ -12,7 +12,7 @@ import numpy as np
 from jointfrf.kernel.arguments import FloatArray, as_count, as_number, as_positive, as_real, check_choice
 from jointfrf.models.beam import End, check_ends
 from jointfrf.solids.brick import Formulation, Material
-from jointfrf.solids.mesh import Mesh, Plan, extrude, holed_rectangle, join_plans, rectangle
+from jointfrf.solids.mesh import NEAR, Mesh, Plan, extrude, holed_rectangle, join_plans, rectangle
 from jointfrf.solids.solid import Patch, SolidModel, solid_model
 
 __all__ = ["PRESETS", "Face", "Hole", "Preset", "brick_beam", "holed_plan"]
@@ -27,8 +27,6 @@ PRESETS: dict[Preset, Formulation] = {"seed": "reduced", "accurate": "incompatib
 _PLAIN, _HOLED = (5, 2, 2.06), (8, 2, 1.14)
 #: Layers of bricks from the circle under the head to the square around the hole.
 _OUTER_LAYERS = 2
-#: Nodes belong to a section or circle within this share of the height.
-_NEAR = 1e-6
 
 
 @dataclass(frozen=True)
@@ -141,7 +139,7 @@ def brick_beam(
     start = as_real("origin", origin, (3,))
     mesh = _mesh(length, width, height, hole, (nx, ny, nz))
     local, mesh = mesh.nodes, Mesh(mesh.nodes + start, mesh.elements)
-    near = _NEAR * height
+    near = NEAR * height
     clamped = [np.flatnonzero(abs(local[:, 2] - at) < near) for at, e in zip((0, length), ends, strict=True)
                if e == "clamped"]  # fmt: skip
     patches: dict[str, Patch] = {}
@@ -208,7 +206,7 @@ def holed_plan(
     plans = [holed_rectangle((position, 0.0), reach, radii, nx, _OUTER_LAYERS)]
     across = np.linspace(-width / 2, width / 2, nx + 1)
     for start, stop in ((0.0, position - reach[0]), (position + reach[1], length)):
-        if stop - start > _NEAR * length:
+        if stop - start > NEAR * length:
             count = max(1, round((stop - start) / length * nz))
             plans.append(rectangle(np.linspace(start, stop, count + 1), across))
     return join_plans(*plans)

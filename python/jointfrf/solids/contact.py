@@ -21,6 +21,14 @@ BoolArray = NDArray[np.bool_]
 #: Contact acts along y; x and z are tangential.
 NORMAL: Final = 1
 TANGENTIAL: Final = np.array([0, 2])
+#: Tension and penetration count as zero below this share of the largest normal force or relative displacement.
+_ROUNDING: Final = 1e-9
+#: Friction forces of slipping pairs must repeat to this share of the largest normal force.
+_REPEAT: Final = 1e-6
+#: Stiffness of the springs that hold slipping pairs, as a share of that of a node.
+_SOFT: Final = 1e-8
+#: A pivot below this share of the largest means a body that can move freely.
+_SINGULAR: Final = 1e-13
 
 
 @dataclass(frozen=True)
@@ -183,16 +191,6 @@ def tie(pairs: Pairs, tied: BoolArray, fixed: ArrayLike = ()) -> tuple[sparse.cs
     column = np.cumsum(independent) - 1
     entries = (np.ones(rows.size), (rows, column[stands_for[rows]]))
     return sparse.csr_array(entries, shape=(n, int(independent.sum()))), np.flatnonzero(independent)
-
-
-#: Tension and penetration count as zero below this share of the largest normal force or relative displacement.
-_ROUNDING: Final = 1e-9
-#: Friction forces of slipping pairs must repeat to this share of the largest normal force.
-_REPEAT: Final = 1e-6
-#: Stiffness of the springs that hold slipping pairs, as a share of that of a node.
-_SOFT: Final = 1e-8
-#: A pivot below this share of the largest means a body that can move freely.
-_SINGULAR: Final = 1e-13
 
 
 @dataclass(frozen=True)
@@ -361,7 +359,7 @@ class _Contacts:
 
 
 class _Problem:
-    """The loop over sets of contacts."""
+    """Iteration over sets of contacts."""
 
     def __init__(
         self, k: sparse.csr_array, f: FloatArray, pairs: Pairs, law: ContactLaw, fixed: NDArray[np.int64]
@@ -448,7 +446,7 @@ class _Problem:
         return sparse.csr_array((values, (rows, np.tile(normal, 4))), shape=(n, n))
 
     def judged(self, contacts: _Contacts, force: FloatArray, relative: FloatArray) -> _Contacts:
-        """Return the contacts that the solution calls for."""
+        """Return the contacts that follow from the solution."""
         normal, shear, slide = force[:, NORMAL], force[:, TANGENTIAL], relative[:, TANGENTIAL]
         separation = self.pairs.gap + relative[:, NORMAL]
         closed = np.where(

@@ -14,12 +14,22 @@ from scipy.spatial import cKDTree
 
 from jointfrf.kernel.arguments import FloatArray, as_array, as_count, as_number, as_real, check_type
 
-__all__ = ["Mesh", "Plan", "disc", "extrude", "holed_rectangle", "interpolation", "join_plans", "rectangle"]
+__all__ = ["NEAR", "Mesh", "Plan", "disc", "extrude", "holed_rectangle", "interpolation", "join_plans", "rectangle"]
 
+#: Nodes within this share of the height, or length, of a body lie in a plane.
+NEAR = 1e-6
 #: Points nearer than this share of the extent of a mesh are one node.
 _SAME = 1e-7
 #: Half the side of the square in the middle of a disc, as a share of the radius.
 _CORE = 0.55
+#: Faces of a brick, counter-clockwise from outside.
+_FACES = np.array([[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]])
+#: Corners of a brick in its own coordinates, in the order of its nodes.
+_CORNERS: Final = np.array([[x, y, z] for z in (-1, 1) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))], float)
+#: Steps of Newton's method in a brick; distorted ones need five.
+_STEPS: Final = 12
+#: Elements tried for each point, nearest centres first, before all are.
+_FIRST: Final = 16
 
 
 @dataclass(frozen=True)
@@ -84,10 +94,6 @@ class Mesh:
         _, first, count = np.unique(np.sort(every, axis=1), axis=0, return_index=True, return_counts=True)
         outer = np.sort(first[count == 1])
         return every[outer], (outer // len(_FACES)).astype(np.int32)
-
-
-#: Faces of a brick, counter-clockwise from outside.
-_FACES = np.array([[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]])
 
 
 def rectangle(z: ArrayLike, x: ArrayLike) -> Plan:
@@ -263,14 +269,6 @@ def _merged(points: FloatArray) -> tuple[NDArray[np.int32], NDArray[np.intp]]:
     number = np.full(len(points), -1, np.int32)
     number[kept] = np.arange(kept.size)
     return number[first], kept
-
-
-#: Corners of a brick in its own coordinates, in the order of its nodes.
-_CORNERS: Final = np.array([[x, y, z] for z in (-1, 1) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))], float)
-#: Steps of Newton's method in a brick; distorted ones need five.
-_STEPS: Final = 12
-#: Elements tried for each point, nearest centres first, before all are.
-_FIRST: Final = 16
 
 
 def interpolation(

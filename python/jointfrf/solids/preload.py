@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,12 +15,10 @@ from jointfrf.solids.bolted_lap import INTERFACES, BoltedLap
 from jointfrf.solids.brick import Formulation, assemble_bricks
 from jointfrf.solids.brick_beam import PRESETS
 from jointfrf.solids.contact import ContactLaw, InterfaceState, Iteration, Pairs, solve_contact, tie
+from jointfrf.solids.mesh import NEAR
 from jointfrf.solids.solid import SolidModel, solid_model
 
 __all__ = ["PreloadedLap", "preload"]
-
-#: Nodes within this share of the height of the mesh lie in a face, or at the cut.
-_NEAR: Final = 1e-6
 
 
 @dataclass(frozen=True)
@@ -180,7 +177,7 @@ def _cut(lap: BoltedLap, formulation: Formulation) -> tuple[FloatArray, float]:
     """Return the forces on all DOFs, and along itself, of drawing the lower half of the shank up by 1 m at the cut."""
     nodes, elements = lap.mesh.nodes, lap.mesh.elements[lap.elements("bolt")]
     height = nodes[:, 1] - lap.axis[1]
-    near = _NEAR * np.ptp(height)
+    near = NEAR * np.ptp(height)
     below = elements[(height[elements] < near).all(axis=1)]
     drawn = np.zeros(nodes.size)
     drawn[3 * np.unique(below[height[below] > -near]) + 1] = 1
@@ -237,7 +234,7 @@ def _map(lap: BoltedLap, name: str, state: InterfaceState) -> PressureMap:
     number = np.full(len(height), -1)
     number[nodes] = np.arange(len(nodes))
     faces, _ = lap.mesh.faces()
-    flat = np.ptp(height[faces], axis=1) < _NEAR * np.ptp(height)
+    flat = np.ptp(height[faces], axis=1) < NEAR * np.ptp(height)
     quads = number[faces[flat]]
     return PressureMap(
         points=lap.mesh.nodes[nodes][:, [2, 0]],

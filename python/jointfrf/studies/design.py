@@ -15,11 +15,12 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from jointfrf.cases.catalogue import read_case_of
-from jointfrf.cases.kind import Case, CaseKind
-from jointfrf.cases.studied import Estimator, Pollution, StudyChoice
+from jointfrf.cases.keys import Case, StudyKeys
+from jointfrf.cases.kind import CaseKind, Estimator, Pollution, StudyChoice
 from jointfrf.errors import FileContentError
 from jointfrf.kernel.arguments import as_names, check_choice, check_type, one_line
 from jointfrf.spelling import did_you_mean
+from jointfrf.toml.declared import read_keys
 from jointfrf.toml.table import TomlTable, read_toml
 
 __all__ = [
@@ -70,7 +71,7 @@ class StudyDesign:
     estimators : sequence of str, or mapping of str to callable
         Methods that the kind of case knows; by default those that the case names. Own ones take lines in Hz, FRFs at
         the joint DOFs j, then k, in m/N, and names of the joint DOFs, and return stiffness of all DOFs, then damping;
-        they can stand beside words (``{"ismm": None, "mine": function}``).
+        they can be mixed with words (``{"ismm": None, "mine": function}``).
     own_noises : mapping of str to callable
         In the place of the noises of the case: exact FRFs, seed and number of the realisation to FRFs with noise.
 
@@ -108,6 +109,12 @@ class StudyDesign:
         check_type("own_noises", self.own_noises, Mapping)
         as_names("own_noises", self.own_noises)
         _check_functions("own_noises", self.own_noises)
+
+    @classmethod
+    def of_case(cls, folder: Path) -> StudyDesign:
+        """Return the design that the file of a case states, which may be the case as it is."""
+        keys = read_keys(read_toml(folder / "case.toml").table("study"), StudyKeys)
+        return keys.build(lambda: cls(keys.factors, keys.arrangement, keys.noises, keys.estimators))
 
     @property
     def points(self) -> list[StudyPoint]:

@@ -14,25 +14,25 @@ import numpy as np
 from numpy.lib.format import write_array_header_1_0
 from numpy.typing import NDArray
 
-from jointfrf.cases.studied import Estimates
+from jointfrf.cases.catalogue import write_results
+from jointfrf.cases.kind import Estimates
 from jointfrf.extras import check_extras, import_extra
-from jointfrf.files import below, write_file, written_whole
+from jointfrf.files import written_whole
 from jointfrf.kernel.arguments import FloatArray, as_integer
-from jointfrf.report.document import Document, Listing, Picture, Section, make_document
+from jointfrf.report.document import Document, Listing, Picture, Section
 from jointfrf.report.draw import draw
-from jointfrf.report.figure import Figure, figure_csv
-from jointfrf.report.table import Table, as_text, table_csv
+from jointfrf.report.figure import Figure
+from jointfrf.report.table import Table, as_text
 from jointfrf.studies.design import in_words
-from jointfrf.studies.figures import study_figures
 from jointfrf.studies.store import GroupRecord, Span, StudyRecord, StudyStore
-from jointfrf.studies.summary import ParameterSummary, study_table, summarise
+from jointfrf.studies.summary import ParameterSummary, study_figures, study_table, summarise
 
 __all__ = ["StudyResult", "read_study"]
 
 
 @dataclass(frozen=True)
 class StudyResult:
-    """Results of a study, read from its folder as they are asked for.
+    """Results of a study, read from its folder when they are needed.
 
     Attributes
     ----------
@@ -199,22 +199,13 @@ def _write_report(
     """Write the page of a study and, beside it, its numbers, table and figures."""
     check_extras("matplotlib", "jinja2")
     drawn = [(figure, draw(figure)) for figure in figures]
-    for inner in ("tables", "figures"):
-        below(folder, inner).mkdir(exist_ok=True)
-    for figure, drawing in drawn:
-        write_file(below(folder / "figures", figure.key, ".png"), drawing.png)
-        write_file(below(folder / "figures", figure.key, ".svg"), drawing.svg)
-        write_file(below(folder / "figures", figure.key, ".csv"), figure_csv(figure))
-    write_file(below(folder / "tables", "study.csv"), table_csv(table))
-    write_file(below(folder, "results.json"), json.dumps(content, indent=1) + "\n")
     sections = [
         Section("estimates", "Estimates", [table]),
         Section("figures", "Figures", [Picture(figure, drawing) for figure, drawing in drawn]),
         Section("subject", "The study", [Listing("case and design", json.dumps(record.identity, indent=1))]),
     ]
-    page = make_document(Document(f"Study: {record.title}", _about(record), sections))
-    write_file(below(folder, "report.html"), page)
-    return folder / "report.html"
+    document = Document(f"Study: {record.title}", _about(record), sections)
+    return write_results(folder, document, [table], drawn, content)
 
 
 def _about(record: StudyRecord) -> str:

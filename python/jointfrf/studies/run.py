@@ -2,21 +2,134 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from time import perf_counter
+from typing import NamedTuple
 
 from jointfrf.cases.catalogue import find_case
-from jointfrf.cases.studied import StudiedGroup
+from jointfrf.cases.kind import Estimates, RealisationSource, StudiedGroup
 from jointfrf.errors import FileContentError
 from jointfrf.kernel.arguments import as_integer, check_type, one_line
 from jointfrf.parallel.pool import AnyExecutor, Pool, check_progress, opened_pool
+from jointfrf.parallel.processes import one_thread
 from jointfrf.studies.design import StudyDesign, in_words
 from jointfrf.studies.result import StudyResult
-from jointfrf.studies.schedule import Schedule, compute_chunk
 from jointfrf.studies.store import GroupRecord, Span, StudyRecord, StudyStore
 
-__all__ = ["merge_studies", "study"]
+__all__ = ["Chunk", "ChunkResult", "Schedule", "compute_chunk", "merge_studies", "study"]
+
+#: Seconds that a chunk is to take: what a killed worker costs, and long against sending it.
+_CHUNK_SECONDS = 2.0
+#: Chunks for each worker at least, so that all end together.
+_SHARES = 4
+
+
+@dataclass(frozen=True)
+class Chunk:
+    """Some realisations of one group."""
+
+    group: int
+    first: int
+    count: int
+    source: RealisationSource
+
+
+class ChunkResult(NamedTuple):
+    """What a chunk gave, and the seconds that it took."""
+
+    estimates: Estimates
+    seconds: float
+
+
+def compute_chunk(chunk: Chunk) -> ChunkResult:
+    """Compute a chunk on one thread."""
+    with one_thread():
+        start = perf_counter()
+        estimates = chunk.source(chunk.first, chunk.count)
+        return ChunkResult(estimates, perf_counter() - start)
+
+
+@dataclass
+class _Queue:
+    """What is left to do of a group, and the seconds that a realisation takes, None before the first is done."""
+
+    group: StudiedGroup
+    spans: list[Span]
+    seconds: float | None = None
+    at_work: int = 0
+
+    @property
+    def left(self) -> int:
+        return sum(span.count for span in self.spans)
+
+
+@dataclass
+class Schedule:
+    """Chunks of groups, the first of each group small.
+
+    Attributes
+    ----------
+    groups : sequence of StudiedGroup
+    missing : sequence of list of Span
+        For each group.
+    workers : int
+    """
+
+    groups: Sequence[StudiedGroup]
+    missing: Sequence[list[Span]]
+    workers: int
+    _queues: list[_Queue] = field(init=False)
+    _spent: float = field(init=False, default=0.0)
+
+    def __post_init__(self) -> None:
+        """Begin with all that is missing."""
+        self._queues = [_Queue(group, list(spans)) for group, spans in zip(self.groups, self.missing, strict=True)]
+
+    def __iter__(self) -> Iterator[Chunk]:
+        """Give chunks one by one."""
+        for number, queue in enumerate(self._queues):
+            if queue.spans:
+                yield self._take(number, queue.group.side_by_side)
+        for number, queue in enumerate(self._queues):
+            while queue.spans:
+                yield self._take(number, self._size(queue))
+
+    def learn(self, chunk: Chunk, seconds: float) -> None:
+        """Take note of the time that a chunk took."""
+        queue = self._queues[chunk.group]
+        queue.at_work -= chunk.count
+        queue.seconds = seconds / chunk.count
+        self._spent += seconds
+
+    @property
+    def done(self) -> tuple[int, int]:
+        """Work done and in all, in milliseconds of one worker as far as is known."""
+        known = [queue.seconds for queue in self._queues if queue.seconds is not None]
+        usual = sum(known) / len(known) if known else 1.0
+        ahead = sum((queue.left + queue.at_work) * (usual if queue.seconds is None else queue.seconds)
+                    for queue in self._queues)  # fmt: skip
+        spent = round(1000 * self._spent)
+        return spent, spent + (round(1000 * ahead) or (1 if ahead else 0))
+
+    def _size(self, queue: _Queue) -> int:
+        if queue.seconds is None:
+            return queue.group.side_by_side
+        by_time = int(_CHUNK_SECONDS / max(queue.seconds, 1e-9))
+        return max(1, min(by_time, -(-queue.left // (_SHARES * self.workers))))
+
+    def _take(self, number: int, size: int) -> Chunk:
+        """Take the next realisations of a group, up to the end of those that are computed side by side."""
+        queue = self._queues[number]
+        span, together = queue.spans[0], queue.group.side_by_side
+        first_end = (span.first // together + 1) * together
+        end = min(span.end, max(first_end, (span.first + size) // together * together))
+        count = end - span.first
+        queue.spans[:1] = [Span(end, span.end - end)] if end < span.end else []
+        queue.at_work += count
+        return Chunk(number, span.first, count, queue.group.source)
+
 
 #: Realisations are counted in 31 bits.
 _MOST = 2**31 - 1
@@ -44,7 +157,7 @@ def study(
     realisations : int, optional
         Of each noise at each point of the design; the number in the case by default.
     design : StudyDesign, optional
-        Factors, noises and estimators; by default the case as it is.
+        Factors, noises and estimators; by default what the case states in ``[study]``, or the case as it is.
     part : range, optional
         Compute these realisations only, for a job of many: ``range(200, 300)``. See `merge_studies`.
     executor : Executor or callable, optional
@@ -81,7 +194,7 @@ def study(
     machines with the same processor and engine (`set_engine`); others differ by rounding. All points of the design have
     the same noise numbers. Each task computes on one thread. Memory does not depend on `realisations`.
 
-    Whatever ends the process, what chunks have given is kept: the same call goes on. A chunk takes about 2 s.
+    Finished chunks are kept whatever ends the process: the same call continues. A chunk takes about 2 s.
 
     Scripts that start processes need ``if __name__ == "__main__":`` around what they do.
 
@@ -95,12 +208,13 @@ def study(
     >>> [(row.point["noise"], row.parameter, abs(row.bias / row.actual) < 0.05) for row in rows][::2]
     [(0.02, 'k_x', True), (0.05, 'k_x', True)]
     """
-    plan = StudyDesign() if design is None else design
-    check_type("design", plan, StudyDesign)
+    if design is not None:
+        check_type("design", design, StudyDesign)
     check_progress(progress)
     if not isinstance(case, str | Path):
         raise TypeError(f"case must be the name or the folder of a case, not {one_line(case)}")
     folder = find_case(str(case)).resolve()
+    plan = StudyDesign.of_case(folder) if design is None else design
     store, identity = StudyStore(Path(out)), plan.identity(folder)
     held = store.check(identity) if store.exists else None
     groups: list[StudiedGroup] = []

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from jointfrf.cases.studied import Estimates, StudiedColumn
+from jointfrf.cases.kind import Estimates, StudiedColumn
 from jointfrf.errors import FileContentError
 from jointfrf.files import ReadLimit, check_file, write_file, written_whole
 from jointfrf.io.npz_file import npz_fields

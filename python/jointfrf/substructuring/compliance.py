@@ -32,6 +32,9 @@ __all__ = [
     "multi_point_stiffness",
 ]
 
+#: Without truncation a matrix counts as singular when its smallest singular value is below this share of the largest.
+_SINGULAR = 1e-14
+
 
 def joint_compliance(
     gamma: ArrayLike,
@@ -187,10 +190,6 @@ def compliance_covariance(
     args = (int(reciprocal), n, m, N_FREQ, mean, t, spread)
     sweeps = {"gamma": mean, "variance": spread}
     return run("compliance_covariance", args, (n_freq, n * n, n * n), sweeps, freq, on_singular)[0]
-
-
-#: Without truncation a matrix counts as singular when its smallest singular value is below this share of the largest.
-_SINGULAR = 1e-14
 
 
 class MultiPointJoint(NamedTuple):
@@ -350,7 +349,7 @@ def multi_point_compliance(
     -----
     Noise enters almost linearly, and only gamma_jk is inverted, which has one singular value above the noise for each
     force that the joint passes; their number shows what kind of joint it is. A soft joint above its resonances passes
-    hardly any force, and gamma_jk is lost in noise: `multi_point_stiffness` is more accurate there.
+    little force, and gamma_jk lies below the noise: `multi_point_stiffness` is more accurate there.
 
     For a joint between virtual points, which acts on the patches as T^T g, the equivalent with ``rank=n`` is K*^-1
     whether the patches deform or not; so is `joint_compliance` of the transformed receptances. For a joint of
@@ -425,7 +424,9 @@ def _truncated_inverse(
     left, size, right = np.linalg.svd(lines, full_matrices=False)
     threshold, used = np.zeros(n_freq), np.full(n_freq, most if rank is None else int(rank))
     if variance is not None:
-        threshold = _noise_threshold(variance)
+        # the expected largest singular value of independent noise
+        by_rows, by_columns = variance.sum(axis=2), variance.sum(axis=1)
+        threshold = np.sqrt(by_rows.max(axis=1)) + np.sqrt(by_columns.max(axis=1))
         used = np.count_nonzero(size > threshold[:, None], axis=1)
     elif rank is None:
         _check_regular(size, name)
@@ -433,12 +434,6 @@ def _truncated_inverse(
     reciprocal = np.divide(1, size, out=np.zeros_like(size), where=keep & (size > 0))
     inverse = (right.conj().swapaxes(1, 2) * reciprocal[:, None, :]) @ left.conj().swapaxes(1, 2)
     return _TruncatedInverse(inverse, used, size, threshold)
-
-
-def _noise_threshold(variance: FloatArray) -> FloatArray:
-    """Return the expected largest singular value of independent noise, shape (n_freq,)."""
-    by_rows, by_columns = variance.sum(axis=2), variance.sum(axis=1)
-    return np.asarray(np.sqrt(by_rows.max(axis=1)) + np.sqrt(by_columns.max(axis=1)))
 
 
 def _check_regular(size: FloatArray, name: str) -> None:

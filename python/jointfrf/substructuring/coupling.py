@@ -11,6 +11,7 @@ from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import (
     ComplexArray,
     FloatArray,
+    as_dof_pairs,
     as_dofs,
     as_frequency,
     as_joint_lines,
@@ -28,16 +29,18 @@ from jointfrf.laws.law_joint import Connection, LawJoint
 
 __all__ = ["connect", "connection_forces", "couple", "semm"]
 
+SemmMethod = Literal["original", "extended"]
 
-def connection_matrix(
-    h: ComplexArray, link: Connection, freq_hz: FloatArray | None = None, on_singular: OnSingular = "raise"
+
+def connection_forces(
+    between: ComplexArray, link: Connection, freq_hz: FloatArray | None = None, on_singular: OnSingular = "raise"
 ) -> ComplexArray:
     """Return W of Y = H - H E W E^T H: forces of connections by the free motions across them.
 
     Parameters
     ----------
-    h : ndarray, shape (n_freq, m, m)
-        Receptances of the structures before they are connected, m/N.
+    between : ndarray, shape (n_freq, q, q)
+        E^T H E: receptances of the structures across the connections before they are connected, m/N.
     link : Connection
         S f = T u with q motions u = E^T x.
 
@@ -46,14 +49,6 @@ def connection_matrix(
     ndarray, shape (n_freq, q, q)
         (S + T E^T H E)^-1 T, N/m; S = 0 leaves the dual form of a constraint, S = 1 the form of a modification (2.35).
     """
-    e = link.pattern
-    return connection_forces(e.T @ h @ e, link, freq_hz, on_singular)
-
-
-def connection_forces(
-    between: ComplexArray, link: Connection, freq_hz: FloatArray | None = None, on_singular: OnSingular = "raise"
-) -> ComplexArray:
-    """Return W of `connection_matrix` from the receptances E^T H E across the connections, shape (n_freq, q, q)."""
     left = link.s + link.t @ between
     # A constraint and a stiffness have rows of very different size.
     size = abs(left).max(axis=2, keepdims=True)
@@ -66,9 +61,8 @@ def connect(
 ) -> ComplexArray:
     """Return the receptances with the connections, shape (n_freq, m, m)."""
     e = link.pattern
-    w = connection_matrix(h, link, freq_hz, on_singular)
-    connected: ComplexArray = h - (h @ e) @ w @ (e.T @ h)
-    return np.ascontiguousarray(connected)
+    w = connection_forces(e.T @ h @ e, link, freq_hz, on_singular)
+    return np.ascontiguousarray(h - (h @ e) @ w @ (e.T @ h))
 
 
 def couple(
@@ -131,10 +125,7 @@ def couple(
     n_freq, n_a, _ = a.shape
     b = as_square("h_b", h_b, n_freq, later=True)
     n_b = b.shape[1]
-    j = as_dofs("dofs_a", dofs_a, n_a)
-    k = as_dofs("dofs_b", dofs_b, n_b)
-    if j.size != k.size or j.size == 0:
-        raise ValueError(f"dofs_a and dofs_b must name the same number of DOFs, at least one: {j.size} and {k.size}")
+    j, k = as_dof_pairs(("dofs_a", dofs_a, n_a), ("dofs_b", dofs_b, n_b))
     if isinstance(k_joint, Joint | LawJoint):
         if freq_hz is None:
             raise ValueError("freq_hz is needed: the stiffness of a joint depends on frequency")
@@ -173,9 +164,6 @@ def _coupled(
         return found
     checked_out(out, found.shape, (a, b), {})[...] = found
     return out
-
-
-SemmMethod = Literal["original", "extended"]
 
 
 def semm(

@@ -10,13 +10,26 @@ from typing import Literal, NamedTuple, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from jointfrf.kernel.arguments import ComplexArray, as_dofs, as_lines, as_square, check_choice, optional_frequency
+from jointfrf.kernel.arguments import (
+    ComplexArray,
+    as_dof_pairs,
+    as_dofs,
+    as_lines,
+    as_square,
+    check_choice,
+    optional_frequency,
+)
 from jointfrf.kernel.call import N_FREQ, OnSingular, run
 from jointfrf.substructuring.modification import inverse_substructuring, ismm
 
 __all__ = ["STIFFNESS_METHODS", "JointFrfs", "StiffnessMethod", "decouple", "joint_stiffness"]
 
 Equation = Literal["rr", "rs", "sr", "ss"]
+StiffnessMethod = Literal[
+    "ismm", "ismm-kj", "inverse-substructuring", "decoupling-rr", "decoupling-rs", "decoupling-sr", "decoupling-ss"
+]
+#: What all decoupling equations need of the substructures.
+_SUBSTRUCTURES = ("h_a", "h_b", "dofs_j", "dofs_k")
 
 
 def decouple(
@@ -81,11 +94,8 @@ def decouple(
     n_freq, n_a, _ = a.shape
     b = as_square("h_b", h_b, n_freq, later=True)
     n_b = b.shape[1]
-    j = as_dofs("dofs_j", dofs_j, n_a)
-    k = as_dofs("dofs_k", dofs_k, n_b)
+    j, k = as_dof_pairs(("dofs_j", dofs_j, n_a), ("dofs_k", dofs_k, n_b))
     n = j.size
-    if k.size != n or n == 0:
-        raise ValueError(f"dofs_j and dofs_k must name the same number of DOFs, at least one: {n} and {k.size}")
     internal = []
     for point, dofs, total in (("r", dofs_r, n_a), ("s", dofs_s, n_b)):
         if point not in equation:
@@ -102,11 +112,6 @@ def decouple(
     args = (equation, n_a, n_b, n, N_FREQ, a, b, c, j, k, *internal)
     sweeps = {"h_a": a, "h_b": b, "h_c": c}
     return run("decouple", args, (n_freq, n, n), sweeps, freq, on_singular, out=out)[0]
-
-
-StiffnessMethod = Literal[
-    "ismm", "ismm-kj", "inverse-substructuring", "decoupling-rr", "decoupling-rs", "decoupling-sr", "decoupling-ss"
-]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -160,9 +165,6 @@ class LineMethod(NamedTuple):
     measured: Literal["gamma", "h_c"]
     model: tuple[str, ...] = ()
 
-
-#: What all decoupling equations need of the substructures.
-_SUBSTRUCTURES = ("h_a", "h_b", "dofs_j", "dofs_k")
 
 #: The methods by name.
 STIFFNESS_METHODS: Mapping[StiffnessMethod, LineMethod] = {

@@ -20,6 +20,9 @@ from jointfrf.kernel.call import N_FREQ, OnSingular, run
 
 __all__ = ["find_modification", "inverse_substructuring", "ismm", "modify"]
 
+#: Off-diagonal block of (2.48) that K* is taken from: rows of side j, or of side k.
+Block = Literal["jk", "kj"]
+
 
 def modify(
     alpha: ArrayLike,
@@ -122,10 +125,6 @@ def find_modification(
     freq = optional_frequency(freq_hz, n_freq)
     sweeps = {"alpha": before, "gamma": after}
     return run("find_modification", (n, N_FREQ, before, after), before.shape, sweeps, freq, on_singular, out=out)[0]
-
-
-#: Off-diagonal block of (2.48) that K* is taken from: rows of side j, or of side k.
-Block = Literal["jk", "kj"]
 
 
 def _with_block_first(lines: ComplexArray, n: int, block: Block) -> ComplexArray:

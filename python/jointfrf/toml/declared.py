@@ -62,7 +62,7 @@ def key(
     choice : collection of str
         The texts that it takes, or that a list of it takes, where the type does not say them.
     pattern : str
-        Of a mapping: it holds all keys of the table that no other one names, of this form. ``DOF`` stands for any text.
+        Of a mapping: it holds all keys of the table that no other one names, of this form. ``DOF`` is any text.
     holds : callable, optional
         What must be true of the value beyond its type; `takes` says it.
     example : object
@@ -99,7 +99,7 @@ class _KeysType(msgspec.StructMeta):
 class Keys(msgspec.Struct, metaclass=_KeysType, frozen=True, forbid_unknown_fields=True, dict=True):
     """The keys of a table; the docstring of a subclass says what the table is for."""
 
-    #: As the table stands in a file, where its name does not say it.
+    #: Its heading in the reference, where its name does not say it.
     header: ClassVar[str] = ""
     #: What holds where the key is absent that distinguishes tables; empty if it is required.
     tag_absent: ClassVar[str] = ""

@@ -37,7 +37,7 @@ def key_reference(tops: Mapping[str, type[Keys]]) -> str:
 
 
 def _inner_tables(top: type[Keys], inside: str = "") -> Iterator[tuple[str, type[Keys]]]:
-    """Give all tables inside another, each once, with their names as they stand in a file."""
+    """Give all tables inside another, each once, with their names in a file."""
     found: dict[type[Keys], list[str]] = {}
     for one in keys_of(top).keys:
         name = one.name if inside else f"[[{one.name}]]" if one.is_array else f"[{one.name}]"

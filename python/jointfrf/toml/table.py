@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
 import reprlib
 import sys
 import tomllib
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -14,9 +16,8 @@ import numpy as np
 from jointfrf.errors import FileContentError
 from jointfrf.files import check_file
 from jointfrf.spelling import look_alike
-from jointfrf.toml.keys import KeyTable
 
-__all__ = ["TomlTable", "read_toml"]
+__all__ = ["Key", "KeyTable", "TomlTable", "read_toml"]
 
 _T = TypeVar("_T")
 _HERE = Path()
@@ -24,8 +25,65 @@ _HERE = Path()
 _LONG = 1000
 
 
+@dataclass(frozen=True)
+class Key:
+    """A key of a table.
+
+    Attributes
+    ----------
+    name : str
+        ``DOF`` in it stands for the name of a joint DOF: ``k_DOF``.
+    takes : str
+        Type of the value, and what it must be: "number", "list of texts", "one of a, b".
+    meaning : str
+        What it is, in a few words.
+    unit : str
+        Empty for pure numbers and texts.
+    default : str or None
+        What holds where the key is absent; None if it must be there.
+    inner : KeyTable or None
+        Keys of the table that the key names; None for a value, and for a table with free names.
+    """
+
+    name: str
+    takes: str
+    meaning: str
+    unit: str = ""
+    default: str | None = None
+    inner: KeyTable | None = None
+
+    def matches(self, word: str) -> bool:
+        """Whether a word in a file may be this key."""
+        return re.fullmatch(re.escape(self.name).replace("DOF", ".+"), word) is not None
+
+
+@dataclass(frozen=True)
+class KeyTable:
+    """The keys of a table.
+
+    Attributes
+    ----------
+    header : str
+        Its heading in a file: ``[frequency]``.
+    about : str
+        What the table is for; a sentence.
+    keys : tuple of Key
+    """
+
+    header: str
+    about: str
+    keys: tuple[Key, ...]
+
+    def __contains__(self, word: str) -> bool:
+        return any(key.matches(word) for key in self.keys)
+
+    def inner(self, word: str) -> KeyTable | None:
+        """Return the keys of the table that a key names."""
+        return next((key.inner for key in self.keys if key.matches(word)), None)
+
+
 def read_toml(path: Path) -> TomlTable:
-    """Read a TOML file; files that it names stand beside it.
+    """Read a TOML file; files that it names are relative to its folder.
 
     Raises
     ------
@@ -52,7 +110,7 @@ class TomlTable:
     where : str
         File and table, for messages.
     folder : Path
-        Where files stand that the table names.
+        Folder to which file names of the table are relative.
     known : KeyTable, optional
         The keys that the table takes.
 
@@ -81,7 +139,7 @@ class TomlTable:
         FileContentError
             There is another key.
         """
-        self.known = known.variant(self._content)
+        self.known = known
         if self.known is not None:
             names = [key.name for key in self.known.keys]
             for key in self._content:
@@ -106,7 +164,7 @@ class TomlTable:
 
     @property
     def content(self) -> dict[str, Any]:
-        """The keys and values as they stand in the file."""
+        """The keys and values of the file."""
         return self._content
 
     def keys(self) -> list[str]:
@@ -136,19 +194,14 @@ class TomlTable:
             why = "a number is too large or too small" if isinstance(error, ArithmeticError) else error
             raise FileContentError(f"{where}: {why}") from error
 
-    def check_different(self, key: str, names: Sequence[str], what: str = "have the same name") -> None:
-        """Raise an error where two tables of an array say the same."""
-        if len(set(names)) < len(names):
-            raise FileContentError(f"{self.where}: two tables [[{key}]] {what}")
-
     def close(self) -> None:
-        """Raise an error if there is a key that nobody asked for."""
+        """Raise an error if there is a key that was not read."""
         unknown = [key for key in self._content if key not in self._asked]
         if unknown:
             raise self.unknown(unknown[0], self._asked)
 
     def value(self, key: str) -> Any:
-        """Return the value of a key as it stands in the file."""
+        """Return the value of a key as the file has it."""
         self._ask(key)
         if key not in self._content:
             similar = look_alike(key, [other for other in self._content if other not in self._asked])
@@ -188,10 +241,6 @@ class TomlTable:
             why = f"cannot be found: {error.strerror}"
         raise FileContentError(f"{self.where}: {key} must name a file: {path} {why}")
 
-    def texts_or_file(self, key: str) -> tuple[str, ...] | Path:
-        """Return a list of at least one string, or the path of a file."""
-        return self.file(key) if isinstance(self._content.get(key), str) else self.texts(key)
-
     def number(self, key: str, lowest: float = -np.inf) -> float:
         """Return a finite number, not below `lowest`."""
         value = self.value(key)
@@ -214,25 +263,6 @@ class TomlTable:
         if value > highest:
             raise self.error(key, f"a whole number, at most {highest}")
         return value
-
-    def truth(self, key: str) -> bool:
-        """Return true or false."""
-        value = self.value(key)
-        if not isinstance(value, bool):
-            raise self.error(key, "true or false")
-        return value
-
-    def bands(self, key: str) -> list[tuple[float, float]]:
-        """Return bands [[low, high], ...] in Hz."""
-        value = self.value(key)
-        pairs = isinstance(value, list) and value and all(isinstance(v, list) and len(v) == 2 for v in value)
-        if not pairs or not all(_is_number(a) and _is_number(b) and 0 <= a <= b for a, b in value):
-            raise self.error(key, "a list of bands [low, high] in Hz")
-        return [(float(low), float(high)) for low, high in value]
-
-    def words(self) -> dict[str, str]:
-        """Return all keys with their texts."""
-        return {key: self.text(key) for key in self._content}
 
     def table(self, key: str) -> TomlTable:
         """Return a table inside this one."""

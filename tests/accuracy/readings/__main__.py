@@ -8,7 +8,7 @@ from multiprocessing import get_context
 from pathlib import Path
 
 from jointfrf.cases.catalogue import UnknownCaseError, find_case, list_cases, read_case
-from jointfrf.cases.known_joint.read import KnownJointCase
+from jointfrf.cases.known_joint.keys import KnownJointCase
 from jointfrf.cli.usage import positive
 from jointfrf.report.table import as_text, table_csv
 

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from jointfrf.cases.definitions import BandSet
-from jointfrf.cases.known_joint.expected import ExpectedErrors, ExpectedParameters
-from jointfrf.cases.known_joint.read import KnownJointCase
+from jointfrf.cases.keys import BandSet
+from jointfrf.cases.known_joint.keys import ExpectedErrors, ExpectedParameters, KnownJointCase
 from jointfrf.dofs import Parameter
 from jointfrf.substructuring.methods import STIFFNESS_METHODS
 
@@ -101,9 +100,9 @@ def printed_tables(cases: Iterable[KnownJointCase]) -> list[PrintedTable]:
     """
     found: dict[tuple[tuple[tuple[str, float], ...], str], PrintedTable] = {}
     for case in cases:
-        tables = [_parameters(case, known) for known in case.expected.tables if _is_band_mean(known)]
-        for source in dict.fromkeys(known.source for known in case.expected.errors):
-            tables.append(_errors(case, [known for known in case.expected.errors if known.source == source]))
+        tables = [_parameters(case, known) for known in case.expected.identified if _is_band_mean(known)]
+        for source in dict.fromkeys(known.source for known in case.expected.regenerated):
+            tables.append(_errors(case, [known for known in case.expected.regenerated if known.source == source]))
         for table in tables:
             if table.values:
                 found.setdefault((table.content, table.way), table)
@@ -124,9 +123,9 @@ def _parameters(case: KnownJointCase, known: ExpectedParameters) -> PrintedTable
     def value(index: int, parameter: Parameter) -> PrintedValue:
         actual = float(case.actual[index])
         quantity = ParameterQuantity(known.method, bands, index)
-        return PrintedValue(parameter.name, known.values[parameter], quantity, abs(actual) or 1.0)
+        return PrintedValue(parameter.name, known.values[parameter.name], quantity, abs(actual) or 1.0)
 
-    values = [value(index, one) for index, one in enumerate(case.parameters) if one in known.values]
+    values = [value(index, one) for index, one in enumerate(case.parameters) if one.name in known.values]
     return PrintedTable(known.source, f"{known.method}, {bands.name}", _level(case, known.noise), tuple(values))
 
 

@@ -9,11 +9,17 @@ from itertools import product
 
 import numpy as np
 
-from jointfrf.cases.definitions import BandSet, Observed
-from jointfrf.cases.known_joint.exact import Exact, exact_frfs
-from jointfrf.cases.known_joint.expected import ExpectedErrors
-from jointfrf.cases.known_joint.methods import SHORT_FORM, joint_lines, measured, needed_frfs, noise_stream
-from jointfrf.cases.known_joint.read import KnownJointCase
+from jointfrf.cases.keys import BandSet, Observed
+from jointfrf.cases.known_joint.exact import (
+    SHORT_FORM,
+    Exact,
+    exact_frfs,
+    joint_lines,
+    measured,
+    needed_frfs,
+    noise_stream,
+)
+from jointfrf.cases.known_joint.keys import ExpectedErrors, KnownJointCase
 from jointfrf.cases.known_joint.regenerate import regenerate
 from jointfrf.cases.known_joint.study import chunk_size, means_over_bands
 from jointfrf.dofs import rigid_offset

@@ -1,41 +1,27 @@
-"""The declared keys are those that the readers ask for; the reference of all keys is printed from them."""
+"""Declared keys: what is required, which values they take, and what is written from them."""
 
+import json
 import tomllib
-from collections import defaultdict
 from functools import partial
 from pathlib import Path
 
 import pytest
 
 from jointfrf.cases import catalogue
-from jointfrf.cases.catalogue import find_case, list_cases, read_case
-from jointfrf.cases.key_page import key_page
-from jointfrf.cases.kinds import KINDS
+from jointfrf.cases.catalogue import KINDS, find_case, key_page, list_cases, read_case
 from jointfrf.cli.main import main
 from jointfrf.errors import FileContentError
 from jointfrf.spelling import look_alike
+from jointfrf.toml.declared import keys_of
+from jointfrf.toml.documents import schema_of
 from jointfrf.toml.table import TomlTable, read_toml
 from own_case import write_by_matrices, write_by_receptances
 
 #: Cases that are read without a mesh.
-QUICK = tuple(find_case(number) for number in ("3.1", "3.2", "4.3.3"))
+QUICK = (*(find_case(number) for number in ("3.1", "3.2", "4.3.3")), list_cases()[-1])
 ROOT = Path(__file__).resolve().parents[3]
-DECLARED = [table for kind in KINDS.values() for top in (kind.keys, kind.expected_keys) for table in top.all_tables()]
-
-
-@pytest.fixture
-def asked(monkeypatch):
-    """Keys that readers ask for, by the identity of the declared table."""
-    found = defaultdict(set)
-    ask = TomlTable._ask
-
-    def recorded(self, key):
-        ask(self, key)
-        if self.known is not None:
-            found[id(self.known)] |= {one.name for one in self.known.keys if one.matches(key)}
-
-    monkeypatch.setattr(TomlTable, "_ask", recorded)
-    return found
+#: Keys that a case needs for the methods that it names, or instead of others: they are not required by themselves.
+BY_METHODS = {"initial_stiffness", "initial_damping", "bands", "actual", "start", "first", "last", "step"}
 
 
 @pytest.fixture
@@ -43,35 +29,20 @@ def own(tmp_path):
     return write_by_matrices(tmp_path / "matrices"), write_by_receptances(tmp_path / "receptances")
 
 
-def test_readers_ask_for_every_key_that_is_declared(asked, own, tmp_path):
-    for folder in (*list_cases(), *own):
-        read_case(folder)
-    shear = tmp_path / "shear"
-    shear.mkdir()
-    text = (list_cases()[1] / "case.toml").read_text()
-    assert 'element = "euler-bernoulli"' in text
-    (shear / "case.toml").write_text(text.replace('"euler-bernoulli"', '"shear-flexible"\npoisson = 0.3'))
-    read_case(shear)
-    # `kind` and what every case says are read before the kind is known.
-    common = {"kind", "title", "section", "frequency", "study"}
-    for table in DECLARED:
-        names = [key.name for key in table.keys]
-        assert len(names) == len(set(names)), table.header
-        early = {"case.toml": common, "expected.toml": {"figures"}}.get(table.header.split()[0], set())
-        assert set(names) - asked[id(table)] <= early, table.header
-
-
-def places(content, known, where=()):
-    """Go through all keys of a file and of the tables inside: path to the table, and the declared key."""
-    table = known.variant(content)
+def places(content, kinds, where=()):
+    """Go through all keys of a file and of the tables inside: path to the key, and its declaration."""
+    declared = [keys_of(kind) for kind in kinds]
+    table = next((one for one in declared if content.get(one.tag_name) == one.tag), declared[0])
     for word, value in content.items():
-        key = next(key for key in table.keys if key.matches(word))
-        yield (*where, word), key
+        one = next((one for one in table.keys if one.name == word), table.rest if word != table.tag_name else None)
+        if one is None:
+            continue
+        yield (*where, word), one
         inner = [value] if isinstance(value, dict) else value if isinstance(value, list) else []
         for number, each in enumerate(inner):
-            if isinstance(each, dict) and key.inner is not None:
+            if isinstance(each, dict) and one.tables:
                 step = (word,) if each is value else (word, number)
-                yield from places(each, key.inner, (*where, *step))
+                yield from places(each, one.tables, (*where, *step))
 
 
 def read_changed(changed, path):
@@ -88,7 +59,7 @@ def variations(folders, values):
     for folder in folders:
         text = (folder / "case.toml").read_text()
         kind = KINDS[tomllib.loads(text).get("kind", "known-joint")]
-        for (*where, word), key in list(places(tomllib.loads(text), kind.keys)):
+        for (*where, word), key in list(places(tomllib.loads(text), (kind.keys,))):
             if id(key) in seen:
                 continue
             seen.add(id(key))
@@ -115,17 +86,56 @@ def read_instead(monkeypatch):
 
 
 def test_a_key_may_be_absent_where_the_reference_says_so(own, read_instead):
-    count = 0
+    required = optional = 0
     for folder, content, key, word, _ in variations(QUICK + own, lambda key: [None]):
-        count += 1
-        if word == "kind":
-            continue  # another kind takes other keys
-        if key.default is None or key.default.startswith("required"):
-            with pytest.raises(FileContentError, match=f"the key '{word}' is missing"):
+        if key.is_required or key.absent.startswith("required") or key.name in BY_METHODS:
+            required += 1
+            with pytest.raises(FileContentError, match=rf"the keys? .*'{word}'.* (is|are) missing"):
                 read_instead(folder, content)
         else:
+            optional += 1
             read_instead(folder, content)
-    assert count > 80
+    assert required > 60
+    assert optional > 15
+
+
+def test_all_missing_keys_are_named_at_once(tmp_path):
+    text = (find_case("3.1") / "case.toml").read_text()
+    for line in ("seed = 31\n", "realisations = 1000\n", 'title = "Two masses and two masses', 'dof = "x"\n'):
+        assert line in text
+        text = text.replace(line, "#" if line.startswith("title") else "", 1)
+    (tmp_path / "case.toml").write_text(text)
+    with pytest.raises(FileContentError) as error:
+        read_case(tmp_path)
+    assert set(str(error.value).partition("case.toml: ")[2].split("; ")) == {
+        "the key 'title' is missing",
+        "[[joint]] number 1: the key 'dof' is missing",
+        "[study]: the keys 'realisations', 'seed' are missing",
+    }
+
+
+def without(text, *names):
+    """Leave out lines that set keys."""
+    return "\n".join(line for line in text.splitlines() if line.partition(" = ")[0] not in names)
+
+
+def test_keys_that_no_method_needs_may_be_absent(tmp_path):
+    text = (find_case("3.1") / "case.toml").read_text()
+    start, end = text.index("[[bands]]"), text.index("[[noise]]")
+    lean = without(text[:start] + text[end:], "r", "s", "initial_stiffness", "initial_damping", "motion", "section")
+    fit_only = lean.replace('["ismm", "compliance"]', '["compliance"]').replace('["ismm"]', '["compliance"]')
+    (tmp_path / "case.toml").write_text(fit_only)
+    case = read_case(tmp_path)
+    assert case.points["r"] == case.points["j"]
+    assert case.initial.stiffness == case.joint.stiffness
+    for method, lacking in (
+        ("ismm", "'initial_stiffness', 'initial_damping' are missing: ismm begins with a first estimate"),
+        ("inverse-substructuring", "the key 'bands' is missing: inverse-substructuring takes means over bands"),
+        ("decoupling-rr", "the keys 'r', 's' are missing: decoupling-rr takes FRFs of internal points"),
+    ):
+        (tmp_path / "case.toml").write_text(fit_only.replace('["compliance"]', f'["{method}"]', 1))
+        with pytest.raises(FileContentError, match=lacking):
+            read_case(tmp_path)
 
 
 #: How a value begins in the reference, to values that are something else.
@@ -142,7 +152,7 @@ WRONG = {
     "list of": [1, [], {}],
     "list of numbers": [["1"]],
     "list of texts": [[1]],
-    "list of `[low, high]`": [[[2.0, 1.0]], [[1.0]], [1.0, 2.0]],
+    "list of bands": [[[2.0, 1.0]], [[1.0]], [1.0, 2.0]],
     "table": [1, []],
     "tables": [1, [], [1]],
 }
@@ -168,18 +178,74 @@ def test_the_reference_is_printed_from_the_declared_keys(capsys):
     assert main(["cases", "--keys"]) == 0
     page = capsys.readouterr().out
     assert page == (ROOT / "docs/case-keys.md").read_text(encoding="utf-8") == key_page()
-    for table in DECLARED:
-        assert page.count(f"# {table.header}\n") == 1
-        for key in table.keys:
-            assert f"| `{key.name}` | {key.takes} |" in page
+    headings = [line for line in page.splitlines() if line.startswith("#")]
+    assert len(headings) == len(set(headings))
+    for _, key in places(tomllib.loads((find_case("4.3.1") / "case.toml").read_text()), (KINDS["known-joint"].keys,)):
+        assert f"`{key.shown.split(', ')[0]}`" in page
+        assert f"| {key.takes} |" in page
     assert all(row.count("|") == 6 for row in page.splitlines() if row.startswith("|"))
 
 
-def test_kinds_of_the_reference_are_those_of_the_registry():
-    for kind in KINDS.values():
-        (key,) = (key for key in kind.keys.keys if key.name == "kind")
-        assert key.takes == "one of " + ", ".join(f"`{name}`" for name in KINDS)
-        assert key.default == f"`{next(iter(KINDS))}`"
+@pytest.mark.parametrize("kind", [*KINDS, "study"])
+def test_a_template_runs_as_it_stands(kind, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["new", kind, "own"]) == 0
+    text = (tmp_path / "own" / "case.toml").read_text()
+    assert text.startswith("#:schema ./case.schema.json\n")
+    schema = json.loads((tmp_path / "own" / "case.schema.json").read_text())
+    assert set(tomllib.loads(text)) <= set(schema["$defs"][schema["$ref"].rpartition("/")[2]]["properties"])
+    assert read_case(tmp_path / "own").realisations <= 100
+    if kind == "study":
+        assert main(["study", "own", "--jobs", "1", "--realisations", "2"]) == 0
+        assert "noise level" in capsys.readouterr().out
+    elif kind != "bolted-lap":  # a mesh: run by the test below
+        assert main(["run", "own", "--jobs", "1", "--realisations", "2"]) == 0
+    capsys.readouterr()
+    assert main(["new", kind, "own"]) == 2
+    assert "own/case.toml exists: name another folder" in capsys.readouterr().err
+    assert (tmp_path / "own" / "case.toml").read_text() == text
+
+
+@pytest.mark.long
+def test_the_template_of_a_bolted_lap_runs_as_it_stands(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["new", "bolted-lap"]) == 0
+    path = tmp_path / "my-bolted-lap" / "case.toml"
+    path.write_text(path.read_text().replace("step = 2.0", "step = 20.0"))
+    assert main(["run", "my-bolted-lap", "--jobs", "1", "--realisations", "1"]) == 0
+    assert "Preloaded contact" in capsys.readouterr().out
+
+
+def test_commented_keys_of_a_template_are_known(tmp_path, monkeypatch, capsys):
+    """Every optional key of a template is one that the schema has."""
+    monkeypatch.chdir(tmp_path)
+    for kind in KINDS:
+        assert main(["new", kind, kind]) == 0
+        schema = schema_of(KINDS[kind].keys)
+        known = {name for one in schema["$defs"].values() for name in one["properties"]}
+        commented = [
+            line.removeprefix("# ").partition(" = ")[0]
+            for line in (tmp_path / kind / "case.toml").read_text().splitlines()
+            if line.startswith("# ") and " = " in line
+        ]
+        assert len(commented) > 10
+        assert {name for name in commented if not name.endswith("_DOF")} <= known
+
+
+def test_the_schema_says_what_the_reader_checks(capsys):
+    assert main(["new", "known-joint", "--schema"]) == 0
+    schema = json.loads(capsys.readouterr().out)
+    assert "null" not in json.dumps(schema)
+    bands, noise = schema["$defs"]["BandKeys"], schema["$defs"]["Noise"]
+    assert list(bands["patternProperties"]) == ["^(k_|c_).+$"]
+    assert bands["required"] == ["name"]
+    assert not bands["additionalProperties"]
+    assert "compliance" in noise["properties"]["methods"]["items"]["enum"]
+    assert noise["properties"]["level"]["minimum"] == 0
+    assert "Unit: Hz." in schema["$defs"]["FrequencyKeys"]["properties"]["first"]["description"]
+    top = schema["$defs"]["KnownJointKeys"]
+    assert {"title", "frequency", "joint"} <= set(top["required"])
+    assert "kind" not in top["required"]
 
 
 @pytest.mark.parametrize(

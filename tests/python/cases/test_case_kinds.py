@@ -1,15 +1,20 @@
 """What a kind of case is: the registry, a kind of one's own, and what a run keeps in memory."""
 
 import json
+import shutil
+import subprocess
+import sys
 from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 import pytest
 
 import jointfrf as jf
-from jointfrf.cases.catalogue import find_case, list_cases, read_case, read_case_and_kind, run_case
-from jointfrf.cases.kind import Case, CaseKind
-from jointfrf.cases.kinds import KINDS
+from jointfrf.cases.catalogue import KINDS, find_case, list_cases, read_case, read_case_and_kind, run_case
+from jointfrf.cases.keys import Case, CaseKeys, ExpectedKeys
+from jointfrf.cases.kind import CaseKind
 from jointfrf.cases.known_joint.exact import exact_frfs
 from jointfrf.cases.known_joint.regenerate import regenerate, regenerate_all
 from jointfrf.cases.known_joint.study import run_study
@@ -18,6 +23,7 @@ from jointfrf.dofs import Parameter
 from jointfrf.errors import FileContentError
 from jointfrf.report.figure import Curve, Figure, Panel
 from jointfrf.report.table import Table
+from jointfrf.toml.declared import NotNegative, Positive, key
 
 
 def test_every_case_names_a_kind_of_the_registry_or_none():
@@ -52,13 +58,21 @@ class Weighed:
     h: np.ndarray
 
 
-def read(common, table, expected):
-    return Oscillator(
-        **vars(common),
-        mass=table.number("mass", 0),
-        stiffness=table.number("stiffness", 0),
-        expected=expected.number("stiffness") if "stiffness" in expected else None,
-    )
+class OscillatorKeys(CaseKeys, tag="oscillator"):
+    """A mass on a spring."""
+
+    mass: Annotated[Positive, key("Mass.", "kg", example=2.0)]
+    stiffness: Annotated[NotNegative, key("Stiffness.", "N/m", example=500.0)]
+
+
+class OscillatorExpected(ExpectedKeys):
+    """What is known of it."""
+
+    stiffness: Annotated[float | None, key("Stiffness.", "N/m")] = None
+
+
+def read(common, keys, expected):
+    return Oscillator(**vars(common), mass=keys.mass, stiffness=keys.stiffness, expected=expected.stiffness)
 
 
 def compute(case, n_realisations, workers):
@@ -81,7 +95,8 @@ def figures(result):
 
 
 OSCILLATOR = CaseKind(
-    name="oscillator",
+    keys=OscillatorKeys,
+    expected_keys=OscillatorExpected,
     read=read,
     compute=compute,
     tables=tables,
@@ -193,3 +208,64 @@ def test_realisations_in_chunks_are_those_at_once(identified, monkeypatch):
     whole = regenerate(exact, found[0].theta, "r")
     monkeypatch.setattr("jointfrf.cases.known_joint.regenerate.chunk_size", lambda n_freq, entries: 2)
     np.testing.assert_allclose(regenerate(exact, found[0].theta, "r"), whole, rtol=1e-13)
+
+
+ADDED = '''
+"""A kind of case that does nothing."""
+
+from pathlib import Path
+from typing import Annotated
+
+from jointfrf.cases.keys import CaseKeys
+from jointfrf.cases.kind import CaseKind
+from jointfrf.report.table import Table
+from jointfrf.toml.declared import Positive, key
+
+
+class PendulumKeys(CaseKeys, tag="pendulum"):
+    """A pendulum."""
+
+    arm: Annotated[Positive, key("Length of its arm.", "m", example=1.5)]
+
+
+KIND = CaseKind(
+    keys=PendulumKeys,
+    read=lambda common, keys, expected: common,
+    compute=lambda case, count, workers: case,
+    tables=lambda result: [Table("arm", "Arm", ("quantity",), (("seen",),))],
+    figures=lambda result: [],
+    summary=lambda result, tables: [],
+    numbers=lambda result: {},
+)
+'''
+
+
+def test_a_kind_is_added_by_a_folder_and_a_line(tmp_path):
+    """In a copy of the package: the help, the template, the schema, the reference and the reader know it."""
+    package = shutil.copytree(Path(jf.__file__).parent, tmp_path / "jointfrf", ignore=shutil.ignore_patterns("*.pyc"))
+    (package / "cases" / "pendulum").mkdir()
+    (package / "cases" / "pendulum" / "__init__.py").write_text(ADDED)
+    catalogue = package / "cases" / "catalogue.py"
+    line = '    "modelled-joint",\n'
+    text = catalogue.read_text()
+    assert text.count(line) == 1
+    catalogue.write_text(text.replace(line, f'{line}    "pendulum",\n'))
+    program = (
+        "import importlib.util, sys; sys.path.insert(0, sys.argv.pop(1)); "
+        "sys.meta_path = [one for one in sys.meta_path if 'editable' not in type(one).__module__]; "
+        "spec = importlib.util.spec_from_file_location('jointfrf._kernel', sys.argv.pop(1)); "
+        "kernel = importlib.util.module_from_spec(spec); sys.modules['jointfrf._kernel'] = kernel; "
+        "spec.loader.exec_module(kernel); from jointfrf.cli.main import main; sys.exit(main(sys.argv[1:]))"
+    )
+
+    def said(*words):
+        command = [sys.executable, "-c", program, str(tmp_path), sys.modules["jointfrf._kernel"].__file__, *words]
+        done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, check=True)
+        return done.stdout
+
+    assert "pendulum" in said("new", "--help")
+    said("new", "pendulum", "own")
+    assert "arm = 1.5" in (tmp_path / "own" / "case.toml").read_text()
+    assert "Length of its arm." in (tmp_path / "own" / "case.schema.json").read_text()
+    assert "## case.toml of kind pendulum" in said("cases", "--keys")
+    assert "seen" in said("run", "own", "--jobs", "1")

@@ -16,7 +16,7 @@ CHANGES = [
     (
         "seed = 31",
         "seed = 31\nsede = 1",
-        r"\[study\]: unknown key 'sede'; it takes realisations, seed; did you mean 'seed'\?$",
+        r"\[study\]: unknown key 'sede'; it takes realisations, seed, .*; did you mean 'seed'\?$",
     ),
     ("seed = 31", "", r"\[study\]: the key 'seed' is missing"),
     ("seed = 31", 'seed = "x"', r"\[study\]: seed must be a whole number, at least 0, not 'x'"),
@@ -83,7 +83,7 @@ CHANGES = [
 #: Of bricks, with six DOFs and observed FRFs.
 SOLID_CHANGES = [
     ('preset = "seed"', 'preset = "fine"', r"\[substructure_a\]: preset must be one of seed, accurate, not 'fine'"),
-    ("origin = [0.0, 0.0, 0.0]", "origin = [0.0, 0.0]", r"\[substructure_a\]: origin must be x, y, z in m"),
+    ("origin = [0.0, 0.0, 0.0]", "origin = [0.0, 0.0]", r"\[substructure_a\]: origin must be a list of 3 numbers, not"),
     ("poisson = 0.33", "poisson = 0.5", r"\[substructure_a\]: poisson must"),
     ("position = 0.2875", "position = 0.3", r"\[substructure_a\]: the hole at 300 mm.* does not lie within the beam"),
     ("patch_radius", "patchradius", r"\[hole\]: unknown key 'patchradius'; it takes .*did you mean 'patch_radius'\?"),
@@ -105,17 +105,25 @@ SOLID_CHANGES = [
 
 #: Of a bolted lap joint.
 BOLTED_CHANGES = [
-    ("spacing_x = 0.010", "spacing_x = -0.010", r"\[measurement\]: spacing_x must be a number, at least 0, not -0.01"),
-    ("spacing_z = 0.010", "spacing_z = 0", r"\[measurement\]: spacing_z must be positive, in m, not 0"),
+    ("spacing_x = 0.010", "spacing_x = -0.010", r"\[measurement\]: spacing_x must be a number, above 0, not -0.01"),
+    ("spacing_z = 0.010", "spacing_z = 0", r"\[measurement\]: spacing_z must be a number, above 0, not 0"),
     ("spacing_z = 0.010", "", r"\[measurement\]: the key 'spacing_z' is missing"),
     ("spacing_z = 0.010", "spacing_z = 0.010\nspacing_y = 1", r"\[measurement\]: unknown key 'spacing_y'"),
     ("[measurement]", "[measurements]", r"unknown key 'measurements'; .*did you mean 'measurement'\?"),
-    ("[contact]\nfriction = 0.3", "", r"case\.toml: the key 'contact' is missing"),
+    (
+        "[contact]\nfriction = 0.3",
+        "",
+        r"case\.toml: the key 'contact' \(a table \[contact\] with friction\) is missing",
+    ),
     ("friction = 0.3", "friction = -0.3", r"\[contact\]: friction must be a number, at least 0"),
     ('size = "M8"', 'size = "M7"', r"\[bolt\]: size must be one of M5, M6, M8, M10, M12, not 'M7'"),
     ('"10.9"', '"11.9"', r"\[bolt\]: strength_class must be one of .*10\.9, 12\.9, not '11\.9'"),
-    ("preload_share = 0.75", "preload_share = 0", r"\[bolt\]: share must be positive, not 0"),
-    ("preload_share = 0.75", "preload_share = 75", r"\[bolt\]: share must not exceed 1"),
+    (
+        "preload_share = 0.75",
+        "preload_share = 0",
+        r"\[bolt\]: preload_share must be a number, above 0, at most 1, not 0",
+    ),
+    ("preload_share = 0.75", "preload_share = 75", r"\[bolt\]: preload_share must be .*, at most 1, not 75"),
     ("head_radius = 0.0065", "head_radius = 0.004", r"\[bolt\]: head_radius \(4 mm\) must exceed shank_radius"),
     ("poisson = 0.33", "poisson = 0.5", r"\[beams\]: poisson must"),
     ('preset = "seed"', 'preset = "fine"', r"\[beams\]: preset must be one of seed, accurate, not 'fine'"),
@@ -189,14 +197,14 @@ def test_dofs_of_a_bolted_joint_in_another_order(tmp_path):
             r"number 2: method must be one of",
         ),
         ('bands = "region 1"', 'bands = "region 1"\ncentral_percent = 95', r"number 1: unknown key 'central_percent'"),
-        ("step = 0.15", "step = 0", r"\[printed\]: step must be positive, in Hz, not 0"),
+        ("step = 0.15", "step = 0", r"\[printed\]: step must be a number, above 0, not 0"),
         ("lines_within = 1", "", r"\[printed\]: the key 'lines_within' is missing"),
         (
             "lines_within = 1",
             "lines = 1",
             r"\[printed\]: unknown key 'lines'; it takes step, amplitude_within_percent, lines_within",
         ),
-        ("offset = [0.0, -0.003, 0.0]", "offset = [0.0, -0.003]", r"number 3: offset must be x, y, z in m"),
+        ("offset = [0.0, -0.003, 0.0]", "offset = [0.0, -0.003]", r"number 3: offset must be a list of 3 numbers, not"),
         ('modes = "4-32', 'modes = 4 # "', r"\[figures\]: modes must be a text, not 4"),
     ],
 )

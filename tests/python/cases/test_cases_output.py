@@ -182,7 +182,7 @@ def test_cases_of_one_command_are_told_in_their_order(ran):
     """They are under way at the same time; one that fails does so where its turn comes."""
     done = ran.done
     assert done.returncode == 1
-    assert re.fullmatch(r"jointfrf: error: \S*case.toml: title must be a text, not 1\n", done.stderr)
+    assert re.fullmatch(r"jointfrf: error: \S*case.toml: the keys 'frequency' .* are missing\n", done.stderr)
     assert "2010.9" in done.stdout
     assert "Natural frequencies of the assembly" in done.stdout
     said = [
@@ -205,7 +205,7 @@ def test_tables_are_told_before_figures_are_drawn(tmp_path, monkeypatch):
 
     monkeypatch.setattr("jointfrf.cases.catalogue.draw", stopped)
     with pytest.raises(RuntimeError, match="1 told"):
-        run_case(find_case("3.1"), tmp_path, realisations=2, tell=lambda case, tables: told.append(tables))
+        run_case(find_case("3.1"), tmp_path, realisations=2, show=lambda case, tables: told.append(tables))
     assert told[0][0].title == "What fits"
     assert "Natural frequencies of the assembly" in [table.title for table in told[0]]
 
@@ -246,7 +246,12 @@ def test_unknown_case_is_one_sentence_and_status_2(capsys):
 def test_wrong_case_file_is_one_sentence_and_status_1(tmp_path, capsys):
     (tmp_path / "case.toml").write_text("title = 1\n")
     assert main(["run", str(tmp_path), "--jobs", "1"]) == 1
-    assert capsys.readouterr().err == f"jointfrf: error: {tmp_path / 'case.toml'}: title must be a text, not 1\n"
+    error = capsys.readouterr().err
+    assert error.startswith(
+        f"jointfrf: error: {tmp_path / 'case.toml'}: the keys 'frequency' (a table [frequency]), 'study' "
+    )
+    assert error.endswith("'noise' (a table [[noise]] with name, level, methods) are missing\n")
+    assert error.count("\n") == 1
 
 
 def test_results_that_cannot_be_written_are_one_sentence(tmp_path, capsys):

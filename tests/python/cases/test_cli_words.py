@@ -3,15 +3,17 @@
 import json
 import os
 import re
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
 
 from command import run_command
 from jointfrf.cli.main import main
-from jointfrf.cli.parser import COMMANDS, command_parser, options_of
+from jointfrf.cli.parser import COMMANDS, command_parser
 
 ROOT = Path(__file__).resolve().parents[3]
 BARS = ROOT / "cases" / "hammer-test" / "two_bars.uff"
@@ -77,7 +79,7 @@ def test_help_names_every_command_and_ends_well(capsys):
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_every_command_has_the_common_options(command):
-    options = options_of(command_parser(command))
+    options = command_parser(command).options
     assert {"--help", "--json", "--quiet", "--config", "--no-config"} <= set(options)
     result = run_command(command, "--help")
     assert (result.returncode, result.stderr) == (0, "")
@@ -101,6 +103,51 @@ def test_quiet_prints_nothing(tmp_path):
     assert (result.returncode, result.stdout) == (0, "")
     assert json.loads((tmp_path / "joint.json").read_text())["format"] == "jointfrf joint"
     assert run_command("cases", "--quiet") == (0, "", "")
+
+
+def test_quiet_prints_warnings(monkeypatch):
+    monkeypatch.chdir(ROOT)
+    words = ["identify", BARS, *JOINT[:-2]]
+    warned = json.loads(run_command(*words, "--json").stdout)["fits"][0]["warnings"]
+    assert warned
+    result = run_command(*words, "--quiet")
+    assert (result.returncode, result.stdout) == (0, "")
+    for text in warned:
+        assert f"jointfrf: warning: {text}\n" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "warning"),
+    [
+        (["--method", "inverse-substructuring", "--noise", "0.01"], "--noise has no effect: method inverse-"),
+        (
+            ["--method", "inverse-substructuring", "--damping=both", "--cross=fit"],
+            "--damping and --cross have no effect",
+        ),
+        (["--at", "0.5,0,0", "--bending-stiffness", "1"], "--bending-stiffness has no effect: no rotation is found"),
+        (["--element", "7"], "--element has no effect: it is for cards"),
+    ],
+)
+def test_options_without_effect_are_named(words, warning):
+    result = run_command("identify", BARS, *JOINT, *words)
+    assert result.returncode == 0
+    assert f"jointfrf: warning: {warning}" in result.stderr
+    assert "no effect" not in run_command("identify", BARS, *JOINT).stderr
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no such signal")
+def test_an_interrupted_command_ends_with_one_sentence(tmp_path):
+    words = ["study", "3.1", "--estimator", "ismm", "--realisations", "1000000", "--jobs", "1", "--out", "study"]
+    with subprocess.Popen([sys.executable, "-m", "jointfrf", *words], stdout=-1, stderr=-1, text=True,
+                          start_new_session=True) as process:  # fmt: skip
+        deadline = time.monotonic() + 60
+        while not (tmp_path / "study").exists() and time.monotonic() < deadline:
+            time.sleep(0.05)
+        time.sleep(1)
+        os.killpg(process.pid, signal.SIGINT)  # as Ctrl-C on a terminal
+        _, complained = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert complained == "jointfrf: error: interrupted\n"
 
 
 PROJECT = """
@@ -275,8 +322,10 @@ def test_time_left_on_a_terminal(monkeypatch, capsys):
     show(1, 4)
     show(2, 4)
     show(3, 6)
+    show(1, 6)  # of another thread, later
     show(4, 4)
     said = capsys.readouterr().err
+    assert said.count("%") == 3
     assert "case: 25 %, about 30 s left" in said
     assert "case: 50 %, about 20 s left" in said
     assert "about 17 min left" in said

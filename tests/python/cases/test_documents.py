@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+import jointfrf as jf
 from assembly_keys import assembly_page
 from command import run_command
 from jointfrf.assembly_file.keys import AssemblyKeys
@@ -75,6 +76,21 @@ def test_the_table_of_the_shipped_beam_is_what_the_command_prints():
     result = run_command(*words[1:])
     assert result.returncode == 0
     agree(result.stdout.strip().split("\n\n")[0], shown)
+
+
+def test_python_of_the_page_on_the_engine_runs(capsys, monkeypatch, tmp_path, beams):
+    monkeypatch.chdir(tmp_path)
+    (example,) = blocks("python", DOCUMENTS["docs/engine.md"])
+    joint = jf.Joint([6e5, 5e3], dofs=["y", "theta"], loss_factor=[0.05, 0.1])
+    gamma = jf.pollute(beams.gamma(joint), 0.01, seed=1)
+    named = {"jf": jf, "freq": beams.freq, "gamma": gamma}
+    exec(example, named)
+    assert named["eta"].low < 0.05 < named["eta"].high
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["joint.html", "joint.json"]
+    printed = capsys.readouterr().out
+    assert "h_theta_z" in printed
+    assert "note choice ('y',) damping of y: hysteretic" in printed
+    assert "CBUSH" in printed
 
 
 def test_python_of_the_page_on_files_prints_what_it_shows(capsys, monkeypatch):

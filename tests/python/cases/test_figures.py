@@ -8,14 +8,12 @@ import pytest
 
 from jointfrf.cases.catalogue import list_cases, numbered, read_case
 from jointfrf.cases.known_joint.figures import known_joint_figures
-from jointfrf.cases.known_joint.read import KnownJointCase
-from jointfrf.cases.known_joint.summary import known_joint_summary
-from jointfrf.cases.known_joint.tables import known_joint_tables
-from jointfrf.report.draw import STYLES, draw
+from jointfrf.cases.known_joint.keys import KnownJointCase
+from jointfrf.cases.known_joint.tables import known_joint_summary, known_joint_tables
+from jointfrf.report.document import Page, make_document
+from jointfrf.report.draw import STYLES, draw, shortened
 from jointfrf.report.figure import Curve, Figure, Interval, Panel
-from jointfrf.report.page import Page, make_page
 from jointfrf.report.receptance import PHASE, phase_degrees
-from jointfrf.report.svg import shortened
 from jointfrf.report.table import Table, as_text, shown, table_csv, turned
 
 X = np.linspace(0, 10, 50)
@@ -164,7 +162,7 @@ def test_a_short_drawing_has_the_same_lines():
 def test_the_verdict_is_the_first_column_wherever_a_table_is_shown(result):
     tables = known_joint_tables(result)
     summary = known_joint_summary(result, tables)
-    text = make_page(Page("", "", summary, tables, []))
+    text = make_document(Page("", "", summary, tables, []).document)
     judged = [table for table in (*summary, *tables) if "" in table.columns]
     regions = "section-3-2-figures-3-11-and-3-12"
     assert [table.key for table in judged] == ["agreement", "table-3-2", regions, "natural-frequencies", "noise-free"]
@@ -192,7 +190,7 @@ def test_the_summary_counts_verdicts(result):
 def test_a_page_fits_on_any_screen(result, figures):
     tables = known_joint_tables(result)
     some = [(figure, draw(figure)) for figure in figures[:1]]
-    text = make_page(Page("", "", known_joint_summary(result, tables), tables, some))
+    text = make_document(Page("", "", known_joint_summary(result, tables), tables, some).document)
     style = text.split("<style>")[1].split("</style>")[0]
     assert not re.search(r"overflow(-x)?:\s*(auto|scroll)|[^-]width:\s*\d+(px|pt|cm)", style)
     assert text.count('src="data:image/svg+xml,') == 1
@@ -209,5 +207,5 @@ def test_a_table_of_many_columns_is_turned_on_a_page():
     assert turned(wide).columns == ("by, from", "A, x", "B, x")
     assert turned(wide).rows == tuple((name, float(i), float(i)) for i, name in enumerate(names))
     assert turned(wide).percentages == ("A, x", "B, x")
-    body = make_page(Page("", "", [], [wide], [])).split("<tbody>")[1]
+    body = make_document(Page("", "", [], [wide], []).document).split("<tbody>")[1]
     assert body.count("<tr") == 14

@@ -69,7 +69,7 @@ def test_any_positive_number_of_a_beam_may_be_unknown(tmp_path):
     [
         ('law = "power"', 'law = "glue"', r"law must be one of spring, .* not 'glue'"),
         ('"A/5:y", ', '"A/99:y", ', r"responses: responses 'A/99:y': neither A nor B has such a DOF"),
-        ("noise = 0.02", "noise = 0.0", r"noise must be above 0"),
+        ("noise = 0.02", "noise = 0.0", r"noise must be a number, above 0"),
         ("alpha = 0.5", "alpha = 1.5", r"alpha of PowerLaw must lie in 0.001 to 1, not 1.5"),
         (
             "alpha = 0.5, reference_hz",
@@ -77,7 +77,11 @@ def test_any_positive_number_of_a_beam_may_be_unknown(tmp_path):
             r"tau: the law 'power' takes k, k_a, alpha, reference_hz",
         ),
         ("std_percent = 2.0", "std_percent = 0.0", r"std must be positive"),
-        ('model = "beam"', 'model = "receptances"\nfile = "x.uff"', r"unknown key 'length'"),
+        (
+            'model = "beam"',
+            'model = "receptances"\nfile = "x.uff"',
+            r"model must be one of chain, beam, brick-beam, matrices, not .receptances.",
+        ),
     ],
 )
 def test_what_is_wrong_is_one_sentence(tmp_path, old, new, message):

@@ -159,7 +159,7 @@ def test_bands_of_the_first_estimate_are_nearer_to_the_regions_of_section_3_3(re
 def test_published_errors_are_ranked_among_the_realisations(results, name):
     result = results[name]
     ranks = {}
-    for one in result.case.expected.errors:
+    for one in result.case.expected.regenerated:
         found = next(
             frf for frf in result.regenerated
             if (frf.observed.key, frf.identified.noise, frf.identified.method) == (one.observed, one.noise, one.method)

@@ -11,10 +11,10 @@ import jointfrf as jf
 import jointfrf.report
 from jointfrf.dofs import Parameter
 from jointfrf.report.axes import bulk_limits, modulus_label, parameter_label, parameter_lines
+from jointfrf.report.document import Page, make_document
 from jointfrf.report.draw import draw
 from jointfrf.report.figure import Curve, Figure, Panel
 from jointfrf.report.fit import fit_figures
-from jointfrf.report.page import Page, make_page
 from jointfrf.report.table import Table, as_text, plain_rows, table_csv
 
 
@@ -76,13 +76,13 @@ def test_a_page_of_neutral_parts():
     x = np.arange(1.0, 5.0)
     figure = Figure("f", "A <caption>", (Panel("", "x", "y", (Curve("a", x, x, "actual"),)),), number="9-9")
     page = Page("A & B", "About.", [SUMMARY], [TABLE], [(figure, draw(figure))], "The data", "text", [("file", "<x>")])
-    text = make_page(page)
+    text = make_document(page.document)
     for part in ("A &amp; B", '<h3 id="short">What fits</h3>', "<i>k</i><sub>θx</sub>",
                  "<b>Figure 9-9.</b> A &lt;caption&gt;.",
                  '<h2 id="subject">The data</h2>', "<summary>file</summary><pre>&lt;x&gt;</pre>", "note"):  # fmt: skip
         assert part in text
     assert text.count('class="failing"') == 2
-    assert "subject" not in make_page(Page("t", "", [], [], []))
+    assert "subject" not in make_document(Page("t", "", [], [], []).document)
     assert not re.search(r'(?:src|href)="(?!data:|#)', text)
 
 

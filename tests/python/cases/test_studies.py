@@ -17,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 import jointfrf as jf
 from command import run_command
@@ -40,7 +41,7 @@ def test_estimates_are_those_of_the_case(reference):
     """Those that `jointfrf run` computes from the same noise numbers, the fits begun elsewhere."""
     case = read_case(find_case(CASE))
     lines = np.round(0.01 + (9.99 / 99) * np.arange(100), 9)
-    case = replace(case, freq_hz=lines, noises=(replace(case.noises[0], methods=("ismm", "compliance")),))
+    case = replace(case, freq_hz=lines, noises=(structs.replace(case.noises[0], methods=("ismm", "compliance")),))
     for group, one in enumerate(run_study(case, exact_frfs(case), N)):
         assert one.method == reference.groups[group].columns[0].estimator
         _, values, low, high = reference.estimates(group)

@@ -7,6 +7,7 @@ import pytest
 
 import jointfrf as jf
 from cramer_rao import cramer_rao
+from jointfrf.dofs import Parameter
 from jointfrf.frf.entry_groups import reciprocity_noise
 from jointfrf.identification.manifold.coordinates import joint_terms
 from jointfrf.identification.manifold.estimate import estimate_joint
@@ -58,7 +59,7 @@ def fitted(h):
     value, error, interval = (
         np.array([list(values.values()) for values in of_fits])
         for of_fits in (
-            [fit.parameters for fit in fits],
+            [fit.value for fit in fits],
             [fit.std_error for fit in fits],
             [fit.confidence_interval(0.95) for fit in fits],
         )
@@ -169,9 +170,8 @@ def test_units_know_every_way_to_write_a_rotation():
         SHORT, assembly(freq=SHORT), "inverse-substructuring", ["ux", "ry", "uy", "rx", "uz", "rot_z"], (10, 600)
     )
     assert [fit.unit(f"c_{d}") for d in fit.dofs] == ["N s/m", "N m s/rad"] * 3
-    assert fit.unit("k_ux,ry") == "N"
-    assert fit.unit("k_Mtheta_x") == "N m/rad"
-    assert fit.unit("h_Fx,Mtheta_x") == "N"
+    names = ("k_ux,ry", "k_Mtheta_x", "h_Fx,Mtheta_x")
+    assert [Parameter.parse(name).unit for name in names] == ["N", "N m/rad", "N"]
     assert [term.name for term in fit.parameters] == list(fit.value)
     assert [term.unit for term in fit.parameters] == [
         entry["unit"] for entry in jf.fit_to_dict(fit)["parameters"].values()
@@ -277,7 +277,7 @@ def test_bands_of_some_dofs(gamma):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", jf.IdentificationWarning)
         fit = jf.identify(FREQ, h, DOFS, bands=bands, damping="viscous")
-    for name, value in zip(fit.parameters, TRUTH, strict=True):
+    for name, value in zip(fit.value, TRUTH, strict=True):
         assert abs(fit.value[name] - value) < 4 * fit.std_error[name]
 
 

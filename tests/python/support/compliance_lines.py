@@ -4,9 +4,10 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from jointfrf.identification.manifold.estimate import FittedGroup, JointEstimate, assembled, coordinates_of
-from jointfrf.identification.manifold.group_fit import GroupFit
-from jointfrf.identification.manifold.line_forms import LineForms, minimise_forms
+from jointfrf.identification.manifold.coordinates import coordinates_of
+from jointfrf.identification.manifold.estimate import JointEstimate, assembled
+from jointfrf.identification.manifold.group_fit import GroupFit, GroupProblem
+from jointfrf.identification.manifold.line_forms import LineForms
 
 
 def white(shape, seed):
@@ -29,14 +30,21 @@ def fitted_group(terms, measured, std, start):
     forms = LineForms(
         about, weight[:, :, None] * np.eye(measured.shape[1]), weight * measured, (weight * abs(measured) ** 2).sum(1)
     )
-    found = minimise_forms(forms, joint, joint.coordinates(start))
-    trusted = np.ones(len(measured), bool)
-    fit = GroupFit(found, forms, trusted, float(measured.size), float(measured.size), 1, True)
+    found = joint.minimise(forms, joint.coordinates(start))
     # There are no FRFs; their size, below which a compliance is rounding, is taken as zero.
-    problem = SimpleNamespace(data=SimpleNamespace(own_size=np.zeros(terms.n)))
-    return FittedGroup(np.arange(terms.n), np.arange(len(terms.parameters)), joint, problem, fit)
+    data = SimpleNamespace(own_size=np.zeros(terms.n))
+    problem = GroupProblem(np.arange(terms.n), np.arange(len(terms.parameters)), data, joint, None)
+    return GroupFit.of(
+        found,
+        problem=problem,
+        used=np.ones(len(measured), bool),
+        equations=float(measured.size),
+        possible=float(measured.size),
+        iterations=1,
+        converged=True,
+    )
 
 
 def fitted(terms, measured, std, start) -> JointEstimate:
     """Return the same as an estimate of one group."""
-    return assembled(terms, [fitted_group(terms, measured, std, start)])
+    return assembled(terms.parameters, [fitted_group(terms, measured, std, start)])

@@ -31,13 +31,14 @@ def _row(action: argparse.Action) -> str:
 
 def option_table(command: str) -> str:
     """Return the table of the arguments of a command, those that all have left out."""
-    rows = [_row(action) for action in command_parser(command)._actions if not set(action.option_strings) & set(COMMON)]
+    arguments = command_parser(command).arguments
+    rows = [_row(action) for action in arguments if not set(action.option_strings) & set(COMMON)]
     return "\n".join(["| argument | what |", "|---|---|", *rows]) + "\n"
 
 
 def common_table() -> str:
     """Return the table of the options that all commands have."""
-    rows = [_row(action) for action in command_parser("cases")._actions if set(action.option_strings) & set(COMMON)]
+    rows = [_row(action) for action in command_parser("cases").arguments if set(action.option_strings) & set(COMMON)]
     return "\n".join(["| option | what |", "|---|---|", *rows]) + "\n"
 
 

@@ -14,8 +14,7 @@ from jointfrf.assembly_file.keys import AssemblyKeys
 from jointfrf.assembly_file.read import read_assembly_file
 from jointfrf.errors import FileContentError
 from jointfrf.io import Channel, FrfSet, write_frfs
-from jointfrf.report.fit_page import ReportOptions, fit_document
-from jointfrf.report.fit_words import finding_sentences
+from jointfrf.report.fit_page import ReportOptions, finding_sentences, fit_document
 from jointfrf.toml.documents import schema_of
 
 FREQ = np.linspace(0.5, 10, 300)

@@ -57,5 +57,5 @@ def test_lines_left_out_are_counted_by_group():
     whole = fitted(TERMS, exact_compliance(TERMS, THETA), 1e-8, THETA)
     (group,) = whole.groups
     assert left_out_share(whole) == 0
-    group.fit.trusted[:10] = False
+    group.used[:10] = False
     assert left_out_share(whole) == pytest.approx(0.05)

@@ -98,10 +98,10 @@ def test_what_is_wrong_in_toml(tmp_path, old, new, message):
     [
         ("weight\n", "wait\n", "unknown column 'wait'.*did you mean weight"),
         ("x [mm]", "x [yd]", "only x, y, z have a unit"),
-        ("role;x", "node;x", "a column stands there twice"),
+        ("role;x", "node;x", "a column is named twice"),
         ("0,6", "a", "line 4: direction_y must be a number, not 'a'"),
         ("0,6;-0,8;2", "0,6;-0,8", "line 4 has 10 columns, the heading has 11"),
-        ("10;20;30", "10;;30", "line 4: x is there, y is not"),
+        ("10;20;30", "10;;30", "line 4: x is given, y is not"),
         (";101;", ";1.5;", "line 3: node must be a whole number"),
         ("-0,8;2", "-0,8;-2", "line 4: weight must not be negative"),
     ],

@@ -9,11 +9,11 @@ import pytest
 import jointfrf as jf
 from jointfrf.identification.describe import describe_springs
 from jointfrf.identification.findings import as_warning
-from jointfrf.identification.manifold.fit import DofDamping, fit_compliance
+from jointfrf.identification.manifold.fit import DofDamping, fit_springs
 from jointfrf.identification.manifold.prepare import FitOptions, prepare_compliance
 from jointfrf.identification.noise import NoiseOptions
 from jointfrf.identification.prepare import as_measured
-from jointfrf.identification.residual_test import Misfit, Trend
+from jointfrf.identification.residual_test import ResidualTest, Trend
 
 LEVEL = 0.01
 
@@ -29,7 +29,7 @@ def told(freq, h, dofs, *, noise=LEVEL, damping="viscous", cross="zero"):
     """Return the fit described."""
     options = FitOptions(damping, cross, True)
     problem = prepare_compliance(as_measured(freq, h, square=False), dofs, None, None, NoiseOptions(noise), options)
-    return describe_springs(fit_compliance(problem), problem)
+    return describe_springs(fit_springs(problem), problem)
 
 
 class Found:
@@ -48,7 +48,7 @@ class Found:
         return Found(self.fit, replace(self.problem, noise=replace(self.problem.noise, **change)))
 
     def of_groups(self, **change):
-        groups = tuple(one._replace(fit=one.fit._replace(**change)) for one in self.fit.estimate.groups)
+        groups = tuple(replace(one, **change) for one in self.fit.estimate.groups)
         return self.with_(estimate=self.fit.estimate._replace(groups=groups))
 
     def of_intervals(self, **limits):
@@ -63,7 +63,7 @@ def found(beams):
     gamma = as_measured(beams.freq, jf.pollute(beams.gamma(beams.joint), LEVEL, seed=3), square=False)
     options = FitOptions("viscous", "zero", True)
     problem = prepare_compliance(gamma, ["y", "theta"], None, None, NoiseOptions(LEVEL), options)
-    return Found(fit_compliance(problem), problem)
+    return Found(fit_springs(problem), problem)
 
 
 def test_nothing_to_tell(found):
@@ -182,9 +182,9 @@ def test_a_residual_above_the_noise_is_told(beams):
 
 
 def test_no_residual_is_compared_with_a_level_that_it_gave(found):
-    far = Misfit(2.0, 0.05, (), ())
-    assert "2.00 times the noise" in found.with_(misfit=far).described().warnings[0]
-    assert not found.with_(misfit=far).of_noise(is_assumed=True).described().warnings
+    far = ResidualTest(2.0, 0.05)
+    assert "2.00 times the noise" in found.with_(test=far).described().warnings[0]
+    assert not found.with_(test=far).of_noise(is_assumed=True).described().warnings
 
 
 def test_exact_frfs_made_reciprocal_show_no_noise(beams):
@@ -218,14 +218,14 @@ def test_the_residual_of_large_noise_is_that_said(chains, seed):
 
 
 def test_a_local_misfit_names_the_lines(found):
-    local = Misfit(2.0, 0.05, ((300.0, 350.0, 0.8), (100.0, 105.0, 0.2)), ())
-    (text,) = found.with_(misfit=local).described().warnings
+    local = ResidualTest(2.0, 0.05, local=((300.0, 350.0, 0.8), (100.0, 105.0, 0.2)))
+    (text,) = found.with_(test=local).described().warnings
     assert "; the excess is local: 300-350 Hz (80 %), 100-105 Hz (20 %): bad lines, or local modes" in text
 
 
 def test_a_trend_names_the_parameter_and_where_it_is_least_and_largest(found):
     trend = Trend("k_y", np.array([50.0, 200.0, 600.0]), np.array([6e5, 5e5, 7e5]), 1e-6)
-    assert found.with_(misfit=Misfit(1.0, 0.05, (), (trend,))).described().warnings == (
+    assert found.with_(test=ResidualTest(1.0, 0.05, trends=(trend,))).described().warnings == (
         "k_y is not one constant over frequency: parts of the band give 5e+05 .. 7e+05 (near 200 and 600 Hz)",
     )
 
@@ -260,12 +260,12 @@ def test_cross_terms_ignored_cost_no_lines(beams):
 
 
 def test_lines_that_do_not_fit_are_counted_unless_cross_terms_explain_them(found):
-    trusted = np.arange(158) >= 10
-    out = found.of_groups(trusted=trusted)
+    used = np.arange(158) >= 10
+    out = found.of_groups(used=used)
     text = "10 of 158 lines do not fit the joint found within their noise and are left out"
     assert out.described().warnings == (text,)
     assert not out.with_(cross_fits=True).described().warnings
-    assert not found.of_groups(trusted=np.arange(158) >= 3).described().warnings
+    assert not found.of_groups(used=np.arange(158) >= 3).described().warnings
 
 
 def test_random_phases_on_ten_lines_are_left_out(beams):

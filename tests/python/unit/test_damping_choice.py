@@ -6,7 +6,6 @@ import pytest
 from compliance_lines import fitted_group, white
 from jointfrf.identification.manifold.coordinates import DiagonalJoint, joint_terms
 from jointfrf.identification.manifold.fit import choose_damping
-from jointfrf.identification.manifold.line_forms import minimise_forms
 
 DOFS = ("x", "y")
 FREQ = np.linspace(20.0, 500.0, 150)
@@ -48,7 +47,7 @@ def test_terms_that_are_not_there_are_seldom_chosen():
 
 def test_the_margin_is_a_difference_of_the_criterion():
     """Of the whole problem, minimised for each kind of x with both terms of y: BIC = 2 squares + p ln(2 N)."""
-    seed = next(s for s in range(20) if fitted("viscous", "hysteretic", seed=s).fit.minimum.x[2] > 0)
+    seed = next(s for s in range(20) if fitted("viscous", "hysteretic", seed=s).x[2] > 0)
     group = fitted("viscous", "hysteretic", seed=seed)  # both terms of x positive
     scores = {}
     for kind in DAMPING:
@@ -56,7 +55,7 @@ def test_the_margin_is_a_difference_of_the_criterion():
         size = {"k_x": 6e5, "k_y": 2e5, "c_x": 120.0, "h_y": 4e4}
         start = joint.coordinates(np.array([size.get(one.name, 0.0) for one in joint.terms.parameters]))
         p = start.size
-        scores[kind] = 2 * minimise_forms(group.fit.forms, joint, start).cost + p * np.log(2 * 2 * FREQ.size)
+        scores[kind] = 2 * joint.minimise(group.forms, start).cost + p * np.log(2 * 2 * FREQ.size)
     x = choose_damping(group, DOFS, 1.0)[0]
     best, second = sorted(scores, key=scores.__getitem__)[:2]
     assert (x.best, x.second) == (best, second)
@@ -77,5 +76,5 @@ def test_terms_of_opposite_sign_are_not_both():
     std = 0.003 * abs(exact)
     theta = np.concatenate([k, -0.05 * k, 1.5e-4 * k])
     group = fitted_group(BOTH, exact + std * white(exact.shape, 0), std, theta)
-    np.testing.assert_allclose(group.joint.theta(group.fit.minimum.x), theta, rtol=0.05)
+    np.testing.assert_allclose(group.joint.theta(group.x), theta, rtol=0.05)
     assert all(one.best != "both" for one in choose_damping(group, DOFS, 1.0))

@@ -33,6 +33,7 @@ KNOWN = {
     ("__init__.py", "import_module"): "modules of the package by names that stand in it",
     ("extras.py", "import_module"): "packages out of a list, by their names",
     ("cli/parser.py", "import_module"): "subcommands out of a list",
+    ("cases/catalogue.py", "import_module"): "kinds of cases out of a list",
     ("cli/completion.py", "import_extra"): "shtab",
     ("cli/study.py", "import_extra"): "executors that the command line names",
     ("io/formats.py", "import_module"): "modules of formats out of a list",

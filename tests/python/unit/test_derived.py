@@ -77,6 +77,28 @@ def test_probabilities_are_checked(fit):
         fit.derived("h_y / k_y", 1.0)
 
 
+def test_the_interval_of_a_function_is_a_profile_of_the_likelihood():
+    """Brute force: the other parameter minimised on a grid, at both ends of k c of a chain with 20 % noise."""
+    freq = np.linspace(0.5, 10, 60)
+    a = jf.Substructure(jf.chain([5, 3], [2500, 3500], [3, 4], ground="start"), ["2:x"])
+    b = jf.Substructure(jf.chain([4, 2], [2000, 2500], [2, 1], ground="end"), ["1:x"])
+    whole = jf.Assembly(a, b, jf.Joint([2000.0], [3.0], dofs=["x"]))
+    h = jf.pollute(whole.receptance(freq, ["A/1:x"], ["B/2:x"]), 0.2, seed=8)
+    fit = jf.identify_model(freq, h, whole, ["A/1:x"], ["B/2:x"], noise=0.2)
+    variance = (0.2 * abs(h)) ** 2
+
+    def cost(k, c):
+        other = jf.Assembly(a, b, jf.Joint([k], [c], dofs=["x"]))
+        return 2 * (abs(other.receptance(freq, ["A/1:x"], ["B/2:x"]) - h) ** 2 / variance).sum()
+
+    k, error = fit.value["k_x"], fit.std_error["k_x"]
+    least = cost(k, fit.value["c_x"])
+    product = fit.derived(lambda v: v["k_x"] * v["c_x"])
+    for limit in (product.low, product.high):
+        profile = min(cost(one, limit / one) for one in k + error * np.linspace(-3, 3, 121))
+        assert profile - least == pytest.approx(1.959964**2, rel=0.12)
+
+
 def test_loss_factors_hold_the_truth_with_their_intervals(beams):
     joint = jf.Joint([6e5, 5e3], dofs=["y", "theta"], loss_factor=[0.05, 0.1])
     inside, errors = 0, []
@@ -90,4 +112,7 @@ def test_loss_factors_hold_the_truth_with_their_intervals(beams):
         np.testing.assert_allclose(fit.loss_factor, [one.value for one in fit.loss_factors.values()])
     assert inside >= 34  # 38 of 40 expected, fewer than 34 by chance in 2 of 100
     assert 0.7 < np.std(errors) < 1.35
+    wide = jf.identify(beams.freq, jf.pollute(beams.gamma(joint), 0.3, seed=1), ["y", "theta"], damping="hysteretic")
+    eta = wide.loss_factors["eta_y"]
+    assert eta.low < 0.05 < eta.high
     assert "eta_theta" in str(fit)

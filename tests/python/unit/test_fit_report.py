@@ -12,16 +12,14 @@ import jointfrf as jf
 from jointfrf.dofs import DIRECTIONS, joint_parameters
 from jointfrf.identification.fit_data import FitData
 from jointfrf.identification.result import Fit
-from jointfrf.report.chart import Chart, chart_view
+from jointfrf.report.chart import Chart, chart_view, thinned_dots, thinned_line
 from jointfrf.report.document import Document, HeatMap, Section, make_document
 from jointfrf.report.draw import STYLES
 from jointfrf.report.figure import Curve, Figure, Panel
 from jointfrf.report.fit import fit_figures
 from jointfrf.report.fit_frfs import compare_frfs
-from jointfrf.report.fit_page import ReportOptions, fit_document
-from jointfrf.report.fit_words import finding_sentences, parameter_table, quality_sentences
+from jointfrf.report.fit_page import ReportOptions, finding_sentences, fit_document, parameter_table, quality_sentences
 from jointfrf.report.sketch import interface_points
-from jointfrf.report.thinning import thinned_dots, thinned_line
 
 
 def points_of(path: str) -> np.ndarray:

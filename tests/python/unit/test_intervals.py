@@ -6,8 +6,14 @@ from scipy import stats
 
 from compliance_lines import exact_compliance, fitted, fitted_group, white
 from jointfrf.identification.manifold.coordinates import joint_terms
-from jointfrf.identification.manifold.scatter import BLOCKS, block_scatter, line_scatter, spread_of
-from jointfrf.identification.manifold.spring_intervals import LikelihoodIntervals, profile_interval
+from jointfrf.identification.manifold.uncertainty import (
+    BLOCKS,
+    block_scatter,
+    joint_intervals,
+    line_scatter,
+    profile_interval,
+    spread_of,
+)
 
 FREQ = np.linspace(20.0, 500.0, 100)
 OMEGA = 2 * np.pi * FREQ
@@ -41,9 +47,9 @@ def spring(mean, std=1e-7, seed=0):
 def test_the_profile_of_a_nearly_linear_problem_is_normal(index, factor):
     group = group_of(0.01)
     low, high = profile_interval(group, index, factor)
-    x = group.fit.minimum.x
+    x = group.x
     slope = group.joint.theta_slope(x)
-    error = np.sqrt(factor * (slope @ np.linalg.inv(2 * group.fit.minimum.information) @ slope.T)[index, index])
+    error = np.sqrt(factor * (slope @ np.linalg.inv(2 * group.information) @ slope.T)[index, index])
     value = group.joint.theta(x)[index]
     np.testing.assert_allclose([value - low, high - value], REACH * error, rtol=0.02)
 
@@ -66,7 +72,7 @@ def test_a_spring_too_stiff_to_be_seen_is_open_above():
 def test_a_compliance_measured_below_zero_is_that_of_a_rigid_joint():
     """The best is a = 0; the squares there are e^2/2 above those of the mean -e, and grow on."""
     group, error = spring(-1e-7 / np.sqrt(200))
-    assert group.fit.minimum.x[0] == 0
+    assert group.x[0] == 0
     low, high = profile_interval(group, 0, 1.0)
     assert high == np.inf
     # (a + e)^2 - e^2 = REACH^2 e^2.
@@ -101,11 +107,11 @@ def test_the_profile_contains_the_true_parameter_as_often_as_said(index):
 
 def test_intervals_of_a_well_determined_joint_are_symmetric_in_the_compliance():
     found = fitted(VISCOUS, *noisy(0.05), THETA)
-    intervals = LikelihoodIntervals(found, np.array([1.0, 4.0, 1.0, 4.0]))
+    intervals = joint_intervals(found, np.array([1.0, 4.0, 1.0, 4.0]))
     limits = intervals(0.95)
     assert list(limits) == ["k_x", "k_y", "c_x", "c_y"]
-    a = found.groups[0].fit.minimum.x
-    error = np.sqrt(np.diagonal(np.linalg.inv(2 * found.groups[0].fit.minimum.information)))
+    a = found.groups[0].x
+    error = np.sqrt(np.diagonal(np.linalg.inv(2 * found.groups[0].information)))
     for i, (name, widened) in enumerate((("k_x", 1), ("k_y", 2))):
         reach = REACH * widened * error[i]
         np.testing.assert_allclose(limits[name], [1 / (a[i] + reach), 1 / (a[i] - reach)], rtol=1e-6)
@@ -114,13 +120,13 @@ def test_intervals_of_a_well_determined_joint_are_symmetric_in_the_compliance():
         REACH * np.sqrt(np.diagonal(found.covariance)[2:]) * [1, 2],
         rtol=1e-6,
     )
-    assert intervals(0.95) is limits
+    assert intervals.of("k_x", 0.95) is limits["k_x"]
     assert intervals(0.5)["k_x"][0] > limits["k_x"][0]
 
 
 def test_intervals_of_a_poorly_determined_joint_are_those_of_the_profile():
     found = fitted(VISCOUS, *noisy(3.0), THETA)
-    limits = LikelihoodIntervals(found, np.ones(4))(0.95)
+    limits = joint_intervals(found, np.ones(4))(0.95)
     for i, name in enumerate(limits):
         assert limits[name] == profile_interval(found.groups[0], i, 1.0)
 
@@ -128,7 +134,7 @@ def test_intervals_of_a_poorly_determined_joint_are_those_of_the_profile():
 def test_both_kinds_of_interval_meet_where_one_follows_the_other():
     """Relative errors of 9 %, still symmetric in the compliance, against the profile."""
     found = fitted(VISCOUS, *noisy(0.9), THETA)
-    limits = LikelihoodIntervals(found, np.ones(4))(0.95)
+    limits = joint_intervals(found, np.ones(4))(0.95)
     for i, name in enumerate(limits):
         np.testing.assert_allclose(limits[name], profile_interval(found.groups[0], i, 1.0), rtol=0.04)
 
@@ -149,9 +155,7 @@ def test_a_block_with_all_the_information_leaves_no_degrees_of_freedom():
     group = fitted_group(SPRING, 1e-6 + std * white(std.shape, 1), std, np.array([1e6]))
     assert block_scatter(group)[1] < 0.1
     assert line_scatter(group)[1] < 0.1
-    assert np.isfinite(
-        spread_of(fitted(SPRING, group.fit.forms.gradient * std**2, std, np.array([1e6])), 1.0).factor
-    ).all()
+    assert np.isfinite(spread_of(fitted(SPRING, group.forms.gradient * std**2, std, np.array([1e6])), 1.0).factor).all()
 
 
 @pytest.mark.parametrize(("scatter", "known_to"), [(block_scatter, 0.2), (line_scatter, 0.08)])
@@ -159,7 +163,7 @@ def test_the_scatter_of_white_noise_is_on_average_that_of_the_noise(scatter, kno
     ratios = []
     for seed in range(150):
         group = group_of(0.05, seed)
-        by_noise = np.diagonal(np.linalg.inv(2 * group.fit.minimum.information))
+        by_noise = np.diagonal(np.linalg.inv(2 * group.information))
         ratios.append(scatter(group)[0] / by_noise)
     # Of a variance of nine degrees of freedom one is known to 47 %, the mean of 150 to 4 %.
     np.testing.assert_allclose(np.mean(ratios, axis=0), 1, atol=known_to)
@@ -172,7 +176,7 @@ def test_noise_of_one_direction_is_seen_between_lines():
     for seed in range(60):
         noise = np.random.default_rng(seed).standard_normal((FREQ.size, 1))
         found = fitted(terms, 1e-6 + 1e-7 * noise, 1e-7, np.array([1e6, 0.0]))
-        by_noise = np.diagonal(np.linalg.inv(2 * found.groups[0].fit.minimum.information))
+        by_noise = np.diagonal(np.linalg.inv(2 * found.groups[0].information))
         ratios.append(line_scatter(found.groups[0])[0] / by_noise)
         factors.append(spread_of(found, 1.0).factor)
     np.testing.assert_allclose(np.mean(factors, axis=0), [2, 1], atol=0.15)

@@ -236,7 +236,7 @@ def test_a_chunk_that_unfolds_to_more_than_it_states(tmp_path, h5py):
     with h5py.File(path, "w") as file:
         data = file.create_dataset("h", shape=(300_000,), dtype="f8", chunks=(300_000,), compression="gzip")
         data.id.write_direct_chunk((0,), packed)
-    with pytest.raises(FileContentError, match="/h unfolds to more than it states"):
+    with pytest.raises(FileContentError, match="/h decompresses to more than it states"):
         read_frfs(path)
 
 
@@ -351,7 +351,7 @@ TEXTS = ["102:+y", "", "Träger", "x" * 5000, "y"]
     [{}, {"chunks": (2,)}, {"chunks": (2,), "compression": "gzip", "shuffle": True}],
 )
 def test_texts_of_variable_length(tmp_path, h5py, alone, options, block):
-    from jointfrf.io.hdf5_texts import hdf5_texts
+    from jointfrf.io.hdf5_file import hdf5_texts
 
     path = tmp_path / "a.h5"
     with h5py.File(path, "w", userblock_size=block) as file:

@@ -5,7 +5,7 @@ import pytest
 from scipy import optimize
 
 from jointfrf.identification.manifold.coordinates import CoupledJoint, DiagonalJoint, joint_terms
-from jointfrf.identification.manifold.line_forms import LineForms, minimise_forms
+from jointfrf.identification.manifold.line_forms import LineForms
 from jointfrf.identification.minimise import inverse_information
 
 OMEGA = 2 * np.pi * np.linspace(20, 400, 12)
@@ -98,7 +98,7 @@ def test_a_line_of_weight_two_counts_twice(problem):
 def test_the_minimum_is_that_of_a_general_minimiser(kind, factor):
     joint, theta = coupled() if kind == "coupled" else (diagonal(by_rate=kind == "rates"), THETA)
     p = Problem(joint, theta)
-    found = minimise_forms(p.forms, joint, joint.coordinates(factor * theta))
+    found = joint.minimise(p.forms, joint.coordinates(factor * theta))
     x, cost = p.reference(p.true)
     error = np.sqrt(np.diagonal(np.linalg.inv(2 * found.information)))
     assert found.cost == pytest.approx(cost, abs=1e-5)
@@ -107,13 +107,14 @@ def test_the_minimum_is_that_of_a_general_minimiser(kind, factor):
 
 
 def test_information_and_gradient_are_sums_of_the_lines(problem):
-    found = minimise_forms(problem.forms, problem.joint, problem.true)
-    np.testing.assert_allclose(found.information, found.line_information.sum(axis=0), rtol=1e-12)
+    found = problem.joint.minimise(problem.forms, problem.true)
+    parts = found.of_lines()
+    np.testing.assert_allclose(found.information, parts.information.sum(axis=0), rtol=1e-12)
     # At a minimum the parts of the lines cancel: what is left differs by rounding of the parts.
-    rounding = 1e-13 * abs(found.line_gradient).sum(axis=0)
-    assert (abs(found.gradient - found.line_gradient.sum(axis=0)) <= rounding).all()
+    rounding = 1e-13 * abs(parts.gradient).sum(axis=0)
+    assert (abs(found.gradient - parts.gradient.sum(axis=0)) <= rounding).all()
     slope = np.einsum("lab,lbp->lap", problem.a, problem.joint.slope(found.x, problem.joint.compliance(found.x)))
-    np.testing.assert_allclose(found.line_information, np.einsum("lap,laq->lpq", slope.conj(), slope).real, rtol=1e-9)
+    np.testing.assert_allclose(parts.information, np.einsum("lap,laq->lpq", slope.conj(), slope).real, rtol=1e-9)
     assert (abs(found.gradient) < 1e-2 * np.sqrt(np.diagonal(found.information))).all()
 
 
@@ -124,7 +125,7 @@ def test_a_compliance_does_not_fall_below_zero():
     residual = np.einsum("lab,lb->la", p.a, p.measured - p.about)
     gradient = np.einsum("lab,la->lb", p.a.conj(), residual)
     forms = p.forms._replace(gradient=gradient, squares=(abs(residual) ** 2).sum(axis=1))
-    found = minimise_forms(forms, p.joint, p.true)
+    found = p.joint.minimise(forms, p.true)
     assert found.x[0] == 0
     assert found.gradient[0] < 0
     x, cost = p.reference(p.true, bounds=(0, np.inf))
@@ -139,7 +140,7 @@ def test_a_rate_does_not_pass_its_limit():
     residual = np.einsum("lab,lb->la", p.a, -1j * abs(p.measured) - p.about)
     gradient = np.einsum("lab,la->lb", p.a.conj(), residual)
     forms = p.forms._replace(gradient=gradient, squares=(abs(residual) ** 2).sum(axis=1))
-    found = minimise_forms(forms, joint, joint.coordinates(np.array([1e3, 5e4])))
+    found = joint.minimise(forms, joint.coordinates(np.array([1e3, 5e4])))
     assert found.x[1] == joint.upper[1] == 100
     assert found.gradient[1] > 0
 
@@ -148,7 +149,7 @@ def test_a_rate_does_not_pass_its_limit():
 def test_a_held_coordinate_keeps_its_value_and_the_others_are_best_for_it(problem, held):
     start = problem.true.copy()
     start[held] *= 1.2
-    found = minimise_forms(problem.forms, problem.joint, start, held)
+    found = problem.joint.minimise(problem.forms, start, held)
     assert found.x[held] == start[held]
     x, cost = problem.reference(start, np.flatnonzero(np.arange(4) != held))
     assert found.cost == pytest.approx(cost, abs=1e-5)
@@ -159,12 +160,12 @@ def test_a_coordinate_that_may_not_be_there_is_held_beyond_its_bound(problem):
     """The profile of a likelihood may ask for it: held means held."""
     start = problem.true.copy()
     start[0] = -start[0]
-    assert minimise_forms(problem.forms, problem.joint, start, 0).x[0] == start[0]
+    assert problem.joint.minimise(problem.forms, start, 0).x[0] == start[0]
 
 
 def test_a_joint_of_no_finite_cost_has_an_infinite_one(problem):
     bad = problem.forms._replace(squares=np.full(OMEGA.size, np.nan))
-    assert minimise_forms(bad, problem.joint, problem.true).cost == np.inf
+    assert problem.joint.minimise(bad, problem.true).cost == np.inf
 
 
 def test_inverse_of_an_information_of_very_different_sizes():

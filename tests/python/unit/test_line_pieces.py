@@ -10,7 +10,7 @@ import six_dof_beams
 from jointfrf.frf import bands
 from jointfrf.frf.bands import in_pieces, line_slices
 from jointfrf.identification.describe import describe_springs
-from jointfrf.identification.manifold.fit import fit_compliance
+from jointfrf.identification.manifold.fit import fit_springs
 from jointfrf.identification.manifold.prepare import FitOptions, prepare_compliance
 from jointfrf.identification.noise import NoiseOptions
 from jointfrf.identification.prepare import as_measured
@@ -73,9 +73,9 @@ def test_a_fit_of_pieces_is_that_of_all_lines(beams, cut, cross):
     own = {"y": (100, 400), "theta": (300, 800)} if cross == "ignore" else None
     options = FitOptions("viscous", cross, True)
     problem = prepare_compliance(x, ["y", "theta"], own, None, NoiseOptions(), options)
-    whole = describe_springs(fit_compliance(problem), problem)
+    whole = describe_springs(fit_springs(problem), problem)
     cut()
-    fit = describe_springs(fit_compliance(problem), problem)
+    fit = describe_springs(fit_springs(problem), problem)
     np.testing.assert_allclose(fit.k_lines, whole.k_lines, rtol=1e-9)
     for name, value in whole.value.items():
         # Starts see some lines only: both end where steps are far below a standard error.

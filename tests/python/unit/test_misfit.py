@@ -5,8 +5,8 @@ import pytest
 
 from compliance_lines import exact_compliance, fitted, white
 from jointfrf.identification.manifold.coordinates import joint_terms
-from jointfrf.identification.manifold.scatter import spread_of
-from jointfrf.identification.residual_test import Misfit, diagnose
+from jointfrf.identification.manifold.uncertainty import residual_test_of, spread_of
+from jointfrf.identification.residual_test import ResidualTest
 
 FREQ = np.linspace(20.0, 500.0, 200)
 OMEGA = 2 * np.pi * FREQ
@@ -23,7 +23,7 @@ def found(stiffness=None, offset=0.0, noise=NOISE, seed=0):
 
 
 def diagnosed(estimate, inflation, freq=FREQ):
-    return diagnose(estimate, freq, inflation, spread_of(estimate, inflation))
+    return residual_test_of(estimate, freq, inflation, spread_of(estimate, inflation))
 
 
 def of_joint(k_x=THETA[0], c_x=THETA[2]):
@@ -64,8 +64,8 @@ def test_noise_that_is_not_what_it_was_said_to_be(noise, large):
 
 
 def test_large_and_small_begin_at_three_sigma():
-    assert [Misfit(r, 0.1, (), ()).is_large for r in (1.29, 1.31)] == [False, True]
-    assert [Misfit(r, 0.1, (), ()).is_small for r in (0.71, 0.69)] == [False, True]
+    assert [ResidualTest(r, 0.1).is_large for r in (1.29, 1.31)] == [False, True]
+    assert [ResidualTest(r, 0.1).is_small for r in (0.71, 0.69)] == [False, True]
 
 
 def test_bad_lines_are_found_where_they_are():

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 import jointfrf as jf
-from jointfrf.cases.fitting import decoupling_bound, fit_decoupling
+from jointfrf.cases.known_joint.decoupling import decoupling_bound, fit_decoupling
 from jointfrf.identification.line_starts import from_lines
 from jointfrf.identification.model.prediction import Prediction, parameter_vector
-from jointfrf.identification.model.prepare import ChannelNoise, Channels, prepare_model_fit
+from jointfrf.identification.model.prepare import Channels, prepare_model_fit
 from jointfrf.identification.model.reduced import MatrixPolynomial
+from jointfrf.identification.noise import NoiseOptions
 from model_bound import model_bound
 
 FREQ = np.linspace(12, 620, 77)
@@ -354,7 +355,7 @@ def test_polynomials_of_matrices_and_their_derivatives():
         ({"fixed": ["k_x"]}, "fixed names 'k_x', which is no parameter of the joint"),
         ({"fixed": list(PLAIN_NAMES)}, "there is nothing to fit"),
         ({"noise": -1.0}, "noise must be positive"),
-        ({"noise": 0.1, "averages": 4}, "noise is told: leave coherence and averages out"),
+        ({"noise": 0.1, "averages": 4}, "coherence and averages are used where noise is not given"),
         ({"force_gains": {"A/4:y": jf.Unknown(1.0)}}, "force_gains names 'A/4:y', which is no force"),
         ({"bad": np.nan}, r"h\[3, 0, 0\] at 36 Hz is not finite"),
     ],
@@ -393,7 +394,7 @@ def test_frfs_of_a_substructure_must_be_on_the_lines_of_the_measurement():
     part = jf.Substructure.of_frfs(FREQ[1:], a.receptance(FREQ[1:], a.index("7:y", "7:theta")), ["y", "t"], ["y", "t"])
     whole = jf.Assembly(part, jf.Substructure(free_beam(), ["1:y", "1:theta"]), PLAIN)
     with pytest.raises(ValueError, match="the FRFs of A must be on the lines of the measurement"):
-        prepare_model_fit(FREQ, np.ones((77, 1, 1)), whole, Channels(("A/y",), ("A/y",)), ChannelNoise(), ())
+        prepare_model_fit(FREQ, np.ones((77, 1, 1)), whole, Channels(("A/y",), ("A/y",)), NoiseOptions(), ())
 
 
 def decoupling_data(level, count):

@@ -63,7 +63,7 @@ assert jf.read_joint(jf.write_joint(folder / "again.toml", joint)) == joint
 with contextlib.redirect_stdout(io.StringIO()) as shown:
     main(["cases", "--keys"])
 assert "`inertial-spring` `k`, `inertance`" in shown.getvalue()
-assert "| `inertance` | number, 0 to 10 |  | 0 | Force per relative acceleration. |" in shown.getvalue()
+assert "`inertance` force per relative acceleration (number, 0 to 10)" in shown.getvalue()
 freq = np.linspace(0.5, 10, 200)
 a = jf.chain([5], [2500], [3], ground="start").receptance(freq)
 b = jf.chain([4], [2000], [2], ground="end").receptance(freq)

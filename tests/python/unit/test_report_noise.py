@@ -5,7 +5,7 @@ import pytest
 
 import jointfrf as jf
 from jointfrf.report.draw import draw
-from jointfrf.report.noise import noise_figure, noise_panel
+from jointfrf.report.receptance import noise_figure, noise_panel
 
 NAMES = ["j:y", "j:theta", "k:y", "k:theta"]
 HUM = 40
@@ -70,7 +70,7 @@ def test_what_coherence_tells_is_a_part(found):
     x = h + np.sqrt((1 - squared) / (10 * squared)) * abs(h) * e
     noise = jf.estimate_noise(freq, x, coherence=squared, averages=10)
     shown = curves(noise_panel(freq, x[:, 0, 0], noise, (0, 0), ("j:y", "j:y")))
-    told = shown["part that coherence tells"].y
+    told = shown["part from coherence"].y
     expected = noise.coherence_factor[0, 0] * np.sqrt((1 - squared) / (10 * squared))[::-1, 0, 0] * abs(x[::-1, 0, 0])
     expected = expected * np.sqrt(noise.line_level[::-1])
     np.testing.assert_allclose(told, expected, rtol=1e-6)

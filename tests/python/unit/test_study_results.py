@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import jointfrf as jf
-from jointfrf.cases.studied import Estimates, StudiedColumn, StudiedGroup
-from jointfrf.studies.schedule import Schedule
+from jointfrf.cases.kind import Estimates, StudiedColumn, StudiedGroup
+from jointfrf.studies.run import Schedule
 from jointfrf.studies.store import GroupRecord, Span, StudyRecord, StudyStore
 from jointfrf.studies.summary import summarise
 

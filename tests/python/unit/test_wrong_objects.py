@@ -73,6 +73,7 @@ def realised(**options):
         (lambda: jf.LawJoint.of_joint([1.0]), "joint must be a Joint, not list"),
         (lambda: jf.LawField("k", "stiffness").unit(10**20), "rotations must be 0, 1 or 2, not 1000"),
         (lambda: jf.FunctionLaw(1, 2, 3, [1.0]), "fields must be a sequence of LawField, not int"),
+        (lambda: jf.SpringLaw(1.0, c=np.ones(2)), "c must be one real number, not array"),
         (lambda: jf.AddedMass((), 0.1), "dofs must name at least one DOF"),
         (lambda: jf.GroundSpring(3, 1.0), "dof must be a str, not int"),
         (lambda: jf.Unknown(1.0, lower=[0.0]), "bounds must be real numbers, not"),

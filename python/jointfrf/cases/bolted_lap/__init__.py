@@ -1,14 +1,31 @@
 """A lap joint with a preloaded bolt of solid elements: measured, identified, and used again with another beam.
 
-keys         what the keys of its files mean
-read         the case as data
+keys         the keys of its files, and the case as data
 measurement  the measured points, and how the six DOFs of both sides follow
 frfs         FRFs: of the preloaded solid model, of the beams by themselves
 routes       from measured FRFs to K*(w) by several routes, and to constants by two estimators
 resonances   resonances of the tip, and errors of regenerated ones
-compute      all of these, without noise and with it
+compute      all of these, without noise and with it, for cases and for studies
 tables       the tables
-summary      a few sentences
 figures      the figures
-kind         the six parts of the kind, for the registry
 """
+
+from jointfrf.cases.bolted_lap.compute import BoltedLapResult, bolted_lap_studied, compute_bolted_lap
+from jointfrf.cases.bolted_lap.figures import bolted_lap_figures
+from jointfrf.cases.bolted_lap.keys import BoltedLapCase, BoltedLapExpected, BoltedLapKeys, read_bolted_lap
+from jointfrf.cases.bolted_lap.tables import bolted_lap_numbers, bolted_lap_summary, bolted_lap_tables
+from jointfrf.cases.kind import CaseKind
+
+__all__ = ["KIND"]
+
+KIND: CaseKind[BoltedLapCase, BoltedLapResult] = CaseKind(
+    keys=BoltedLapKeys,
+    expected_keys=BoltedLapExpected,
+    read=read_bolted_lap,
+    compute=compute_bolted_lap,
+    tables=bolted_lap_tables,
+    figures=bolted_lap_figures,
+    summary=bolted_lap_summary,
+    numbers=bolted_lap_numbers,
+    studied=bolted_lap_studied,
+)

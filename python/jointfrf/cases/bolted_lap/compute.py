@@ -6,26 +6,40 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from msgspec import structs
 from numpy.typing import NDArray
 from scipy.interpolate import interp1d
 
-from jointfrf.cases.bolted_lap.frfs import TIP_DIRECTIONS, BeamFrfs, SolidFrfs, beam_frfs, solid_frfs
-from jointfrf.cases.bolted_lap.measurement import DOFS, FivePoints, measured_entries
-from jointfrf.cases.bolted_lap.read import BoltedLapCase
-from jointfrf.cases.bolted_lap.resonances import Resonance, ResonanceErrors, resonance_errors, resonances
+from jointfrf.cases.bolted_lap.frfs import (
+    TIP_DIRECTIONS,
+    BeamFrfs,
+    Resonance,
+    ResonanceErrors,
+    SolidFrfs,
+    beam_frfs,
+    resonance_errors,
+    resonances,
+    solid_frfs,
+)
+from jointfrf.cases.bolted_lap.keys import BoltedLapCase
 from jointfrf.cases.bolted_lap.routes import (
+    DOFS,
+    FivePoints,
     Found,
     band_means,
     by_band_means,
     by_compliance_fit,
+    fit_measured,
     joint_stiffness_lines,
+    measured_entries,
     route_lines,
 )
-from jointfrf.cases.definitions import Noise, constant_joint
-from jointfrf.cases.fitting import fit_measured
+from jointfrf.cases.keys import Noise, constant_joint
+from jointfrf.cases.kind import Estimates, StudiedColumn, StudiedGroup, StudyChoice, chosen_noises
 from jointfrf.cases.workers import Workers
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.solids.preload import PreloadedLap
+from jointfrf.spelling import did_you_mean
 
 __all__ = [
     "LINES",
@@ -34,6 +48,7 @@ __all__ = [
     "NoisyLap",
     "RegeneratedTip",
     "Unmeasured",
+    "bolted_lap_studied",
     "compute_bolted_lap",
     "identify_noisy",
 ]
@@ -249,7 +264,7 @@ def _unmeasured(case: BoltedLapCase, beams: BeamFrfs) -> list[Unmeasured]:
 
 
 def _shift(case: BoltedLapCase, beams: BeamFrfs, theta: FloatArray) -> FloatArray:
-    """Largest errors of the resonances in x and in y where constants stand for the known joint."""
+    """Largest errors of the resonances in x and in y where constants replace the known joint."""
     exact, tip = (beams.tip(constant_joint(one, beams.freq_hz)) for one in (case.actual, theta))
     peaks = resonances(beams.freq_hz, exact)
     errors = resonance_errors(beams.freq_hz, peaks, tip).frequency
@@ -304,3 +319,54 @@ def _noise_studies(noise: Noise, beams: BeamFrfs, peaks: list[Resonance], parts:
         shift, inside = (np.array([getattr(one, what) for one in errors]) for what in ("frequency", "found"))
         studies.append(NoiseStudy(noise.name, same[0].route, same[0].estimator, theta, shift, inside))
     return studies
+
+
+_ESTIMATORS = ("ismm", "compliance")
+#: Half of the central 95 % of a normal distribution, in standard deviations.
+_REACH = 1.959963984540054
+
+
+@dataclass(frozen=True)
+class LapSource:
+    """Realisations of the measurement at five points a side."""
+
+    measured: NoisyLap
+
+    def __call__(self, first: int, count: int) -> Estimates:
+        """Identify the joint from each realisation."""
+        numbers = range(first, first + count)
+        return Estimates(
+            *np.array([_row(identify_noisy(self.measured._replace(number=i))) for i in numbers]).swapaxes(0, 1)
+        )
+
+
+def _row(found: list[Found]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    theta = np.concatenate([one.theta for one in found])
+    missing = np.full(len(found[0].theta), np.nan)
+    errors = np.concatenate([missing if one.std_error is None else one.std_error for one in found])
+    return theta, theta - _REACH * errors, theta + _REACH * errors
+
+
+def bolted_lap_studied(case: BoltedLapCase, choice: StudyChoice) -> list[StudiedGroup]:
+    """Return what a study computes: every noise with every estimator, each by all of its routes.
+
+    The joint that the solid model has is not known: there are no actual values.
+    """
+    if choice.own_estimators or choice.own_noises:
+        raise ValueError("own estimators and own noises need a case of kind known-joint")
+    for word in choice.estimators:
+        if word not in _ESTIMATORS:
+            hint = did_you_mean(word, _ESTIMATORS) or f": {', '.join(_ESTIMATORS)}"
+            raise ValueError(f"a bolted lap joint has no estimator {word!r}{hint}")
+    solid = solid_frfs(case, case.beams.lengths[1], True)
+    groups = []
+    for noise in chosen_noises(case.noises, choice):
+        for method in choice.estimators or noise.methods:
+            own = NoisyLap(case, structs.replace(noise, methods=(method,)), solid.points, solid.channels, 0)
+            columns = [
+                StudiedColumn(f"{one.estimator}, {one.route}", parameter.name, parameter.unit, np.nan, np.nan)
+                for one in identify_noisy(own)
+                for parameter in case.parameters
+            ]
+            groups.append(StudiedGroup(noise.name, tuple(columns), LapSource(own)))
+    return groups

@@ -1,18 +1,20 @@
-"""FRFs of a bolted lap joint: of the preloaded solid model, and of the beams by themselves."""
+"""FRFs of a bolted lap joint: of the preloaded solid model, of the beams by themselves; resonances of the tip."""
 
 from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from jointfrf.cases.bolted_lap.measurement import DOFS, FivePoints
-from jointfrf.cases.bolted_lap.read import BoltedLapCase
+from jointfrf.cases.bolted_lap.keys import BoltedLapCase
+from jointfrf.cases.bolted_lap.routes import DOFS, FivePoints
 from jointfrf.dofs import DIRECTIONS
 from jointfrf.errors import IllConditionedWarning
+from jointfrf.frf.bands import Band, has_peak, peak
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.solids.bolted_lap import BoltedLap, bolted_lap
 from jointfrf.solids.brick_beam import Hole, brick_beam
@@ -22,7 +24,18 @@ from jointfrf.solids.preload import PreloadedLap, preload
 from jointfrf.solids.solid import Patch, SolidModel, mean_motion
 from jointfrf.substructuring.coupling import couple
 
-__all__ = ["JOINT_DOFS", "TIP_DIRECTIONS", "BeamFrfs", "SolidFrfs", "beam_frfs", "solid_frfs"]
+__all__ = [
+    "JOINT_DOFS",
+    "TIP_DIRECTIONS",
+    "BeamFrfs",
+    "Resonance",
+    "ResonanceErrors",
+    "SolidFrfs",
+    "beam_frfs",
+    "resonance_errors",
+    "resonances",
+    "solid_frfs",
+]
 
 #: Natural frequencies of the solid model that are sought.
 _MODES = 12
@@ -49,7 +62,7 @@ class SolidFrfs:
     points : tuple of FivePoints
         Measured points on sides j and k.
     channels : ndarray, shape (n_freq, 30, 30)
-        Between the measured channels, m/N; empty where only the tip was asked for.
+        Between the measured channels, m/N; empty where only the tip is computed.
     reference : ndarray, shape (n_freq, 12, 12)
         Between reference points with six DOFs on both sides; empty as above.
     natural_frequencies : ndarray, shape (12,)
@@ -169,7 +182,7 @@ def _tip(mesh: Mesh) -> sparse.csr_array:
 
 
 def _mean(mesh: Mesh, nodes: NDArray[np.int32], point: FloatArray, dofs: tuple[str, ...]) -> sparse.csr_array:
-    """Weights of all nodes for the mean rigid motion of some about a point, DOFs in the order asked for."""
+    """Weights of all nodes for the mean rigid motion of some about a point, DOFs in the given order."""
     return mean_motion(mesh, Patch(point, nodes))[[DIRECTIONS.index(dof) for dof in dofs]]
 
 
@@ -187,3 +200,68 @@ def beam_frfs(case: BoltedLapCase, length_b: float) -> BeamFrfs:
     tip = [f"tip:{axis}" for axis in TIP_DIRECTIONS]
     h_a, h_b = (model.receptance(freq, model.ports(*names)) for model, names in ((a, joint), (b, joint + tip)))
     return BeamFrfs(freq, h_a, h_b)
+
+
+#: A regenerated resonance is sought within this share of the actual one.
+_REACH = 0.15
+#: Peaks count when they exceed their surroundings by this factor.
+_PROMINENCE = 1.5
+
+
+@dataclass(frozen=True)
+class Resonance:
+    """A resonance of the actual FRF: direction, Hz, m/N, and the band in which it is sought again."""
+
+    direction: str
+    freq_hz: float
+    amplitude: float
+    band: Band
+
+
+class ResonanceErrors(NamedTuple):
+    """Errors of a regenerated FRF at every resonance.
+
+    Attributes
+    ----------
+    amplitude, frequency : ndarray, shape (n_peaks,)
+        (4.11) and (4.12), percent.
+    found : ndarray of bool, shape (n_peaks,)
+        Whether the regenerated FRF has a peak in the band. Where it has none, its largest value lies at an end of the
+        band: the frequency error is the limit of the search, not a result, and the amplitude error is NaN.
+    """
+
+    amplitude: FloatArray
+    frequency: FloatArray
+    found: NDArray[np.bool_]
+
+
+def resonances(freq_hz: FloatArray, tip: ComplexArray) -> list[Resonance]:
+    """Resonances of the FRFs of the tip, shape (n_freq, 2); each band ends at the valleys on either side."""
+    from scipy.signal import find_peaks  # takes as long to import as all else together
+
+    found = []
+    for d, direction in enumerate(TIP_DIRECTIONS):
+        size = np.log(abs(tip[:, d]))
+        tops = find_peaks(size, prominence=np.log(_PROMINENCE))[0]
+        parts = np.split(np.arange(freq_hz.size), tops)
+        valleys = [part[np.argmin(size[part])] for part in parts]
+        for at, left, right in zip(tops, valleys, valleys[1:], strict=False):
+            low = max(freq_hz[left], freq_hz[at] * (1 - _REACH))
+            high = min(freq_hz[right], freq_hz[at] * (1 + _REACH))
+            band = (float(low), float(high))
+            amplitude, freq = peak(tip[:, d], freq_hz, band, refine=True)
+            found.append(Resonance(direction, freq, amplitude, band))
+    return found
+
+
+def resonance_errors(freq_hz: FloatArray, peaks: list[Resonance], h: ComplexArray) -> ResonanceErrors:
+    """Errors of the regenerated FRFs of the tip, shape (n_freq, 2), at every resonance; peaks between the lines."""
+    errors = []
+    for one in peaks:
+        own = h[:, TIP_DIRECTIONS.index(one.direction)]
+        amplitude, freq = peak(own, freq_hz, one.band, refine=True)
+        found = has_peak(own, freq_hz, one.band)
+        in_amplitude = abs(amplitude / one.amplitude - 1) * 100 if found else np.nan  # (4.11)
+        errors.append((in_amplitude, abs(freq / one.freq_hz - 1) * 100, found))  # (4.12)
+    amplitudes, frequencies, which = np.array(errors, np.float64).reshape(-1, 3).T
+    return ResonanceErrors(amplitudes, frequencies, which.astype(bool))

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 
 from jointfrf.cases.bolted_lap.compute import LINES, BoltedLapResult
-from jointfrf.cases.comparison import frequency_table
+from jointfrf.cases.comparison import agreement, frequency_table
 from jointfrf.report.axes import percentiles
 from jointfrf.report.table import Cell, Table, number
 
-__all__ = ["above_limit", "bolted_lap_numbers", "bolted_lap_tables"]
+__all__ = ["above_limit", "bolted_lap_numbers", "bolted_lap_summary", "bolted_lap_tables"]
 
 
 def bolted_lap_tables(result: BoltedLapResult) -> list[Table]:
@@ -96,7 +96,7 @@ def _resonances(result: BoltedLapResult, key: str, title: str, *, transferred: b
         columns += [f"{peak.direction} {peak.freq_hz:.3g} Hz: {error}, %" for error in ("frequency", "amplitude")]
     note = (
         "Errors (4.12) and (4.11), on lines as close as the loss factor asks for. A resonance is sought "
-        "within 15 % of the actual one, and not beyond the valleys beside it: 'above' stands where there is no peak "
+        "within 15 % of the actual one, and not beyond the valleys beside it: 'above' means that there is no peak "
         "up to that limit of the search. "
         f"'reference points, {LINES}' couples the beams by the full 6 x 6 K*(w). What remains there comes "
         "neither from noise nor from rotations: a joint between two points has no mass, and the beams also press on "
@@ -161,3 +161,43 @@ def bolted_lap_numbers(result: BoltedLapResult) -> dict[str, Any]:
         "elongation_m": result.state.elongation,
         "natural_frequencies_hz": result.natural_frequencies.tolist(),
     }
+
+
+def bolted_lap_summary(result: BoltedLapResult, tables: list[Table]) -> list[Table]:
+    """Return short tables: how much fits, the preload, and the largest errors of the resonances."""
+    fits = agreement(tables)
+    return [*([fits] if fits.rows else []), _preload(result), _worst_errors(result)]
+
+
+def _preload(result: BoltedLapResult) -> Table:
+    state = result.state
+    slipping = sum(int(np.count_nonzero(one.slipping)) for one in state.interfaces.values())
+    cells: tuple[tuple[Cell, ...], ...] = (
+        ("preload", number(state.force), "N"),
+        ("elongation of the bolt", f"{1e6 * state.elongation:.1f}", "µm"),
+        ("iterations of the contact", str(len(state.history)), ""),
+        ("slipping pairs", str(slipping), ""),
+        ("lap closed up to this distance from the axis", f"{1e3 * state.contact_radius:.1f}", "mm"),
+    )
+    return Table("preload", "Preload", ("quantity", "value", "unit"), cells)
+
+
+def _worst_errors(result: BoltedLapResult) -> Table:
+    cells: tuple[tuple[Cell, ...], ...] = tuple(
+        (*named, *(_worst(result, named, d, transferred) for transferred in (False, True) for d in "yx"))
+        for named in dict.fromkeys(one.found[:2] for one in result.regenerated)
+    )
+    beams = (f"{beams}: {direction}, %" for beams in ("same beams", "other beam B") for direction in "yx")
+    columns = ("joint DOFs by", "estimator", *beams)
+    title = "Largest error (4.12) of a resonance of the tip"
+    return Table("worst", title, columns, cells, percentages=columns)
+
+
+def _worst(result: BoltedLapResult, named: tuple[str, str], direction: str, transferred: bool) -> str:
+    """Write the largest error (4.12) of a resonance in a direction, percent."""
+    peaks = result.transferred_peaks if transferred else result.peaks
+    one = next(r for r in result.regenerated if r.found[:2] == named)
+    errors = one.transferred_errors if transferred else one.errors
+    own = [i for i, peak in enumerate(peaks) if peak.direction == direction]
+    worst = max((float(errors.frequency[i]) for i in own), default=0.0)
+    return number(worst, 2) if errors.found[own].all() else above_limit(worst)

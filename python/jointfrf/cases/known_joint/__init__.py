@@ -1,22 +1,36 @@
-"""Two simulated substructures and a joint of known parameters: identified from noisy FRFs, many times over.
+"""Two simulated substructures and a joint of known parameters, identified from noisy FRFs, many times over.
 
-read           the case as data
-keys           what the keys of its files mean
-structure      a structure as the case needs it: by a model, or by its FRFs
-substructures  the two structures: chain, beam, beam of bricks
-from_files     the two structures: matrices and receptances in files
-expected       what the source says about the case: tables, errors of regenerated FRFs
-exact          FRFs without noise
-methods        K*(w) line by line, by each method
-study          many realisations of the noise: identified parameters
-bounds         the bound of the decoupling fit
-regenerate     FRFs of the assembly from identified parameters, and their errors
-printed        FRFs from published parameters as they are printed, and their errors
-noise_free     how exact the equations are without noise
-modes          mode shapes of the assembly, and drawings of them
-compute        all of these, one after the other
-tables         numbers beside those of the source
-summary        a few sentences
-figures        the figures
-kind           the six parts of the kind, for the registry
+keys        the keys of its files, and the case as data
+exact       FRFs without noise
+methods     K*(w) line by line, by each method; how exact the equations are without noise
+study       many realisations of the noise: identified parameters, for cases and for studies
+sensitive   where the observed FRFs depend on the joint
+regenerate  FRFs of the assembly from identified and from printed parameters, and their errors
+modes       mode shapes of the assembly, and drawings of them
+compute     all of these, one after the other
+tables      numbers beside those of the source
+published   tables of what a source prints and what follows from it exactly
+figures     the figures
 """
+
+from jointfrf.cases.kind import CaseKind
+from jointfrf.cases.known_joint.compute import KnownJointResult, compute
+from jointfrf.cases.known_joint.figures import known_joint_figures
+from jointfrf.cases.known_joint.keys import KnownJointCase, KnownJointExpected, KnownJointKeys, read_known_joint
+from jointfrf.cases.known_joint.study import known_joint_studied
+from jointfrf.cases.known_joint.tables import known_joint_numbers, known_joint_summary, known_joint_tables
+
+__all__ = ["KIND"]
+
+KIND: CaseKind[KnownJointCase, KnownJointResult] = CaseKind(
+    keys=KnownJointKeys,
+    expected_keys=KnownJointExpected,
+    read=read_known_joint,
+    compute=compute,
+    tables=known_joint_tables,
+    figures=known_joint_figures,
+    summary=known_joint_summary,
+    numbers=known_joint_numbers,
+    studied=known_joint_studied,
+    not_printed=("bands", "blocks", "regenerated"),
+)

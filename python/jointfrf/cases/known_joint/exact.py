@@ -1,17 +1,32 @@
-"""FRFs of a case without noise: of the substructures, and of the assembly."""
+"""FRFs of a case without noise, those that each method takes, and K*(w) by it."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import warnings
+from dataclasses import dataclass, replace
+from typing import NamedTuple, cast
 
 import numpy as np
 
-from jointfrf.cases.definitions import Observed
-from jointfrf.cases.known_joint.read import KnownJointCase
+from jointfrf.cases.keys import FITTED, Observed
+from jointfrf.cases.known_joint.keys import KnownJointCase
+from jointfrf.errors import IllConditionedWarning
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.kernel.call import OnSingular
 from jointfrf.substructuring.coupling import couple
+from jointfrf.substructuring.methods import STIFFNESS_METHODS, JointFrfs, StiffnessMethod, joint_stiffness
 
-__all__ = ["Exact", "exact_frfs"]
+__all__ = [
+    "SHORT_FORM",
+    "Exact",
+    "NoiseFree",
+    "exact_frfs",
+    "joint_lines",
+    "measured",
+    "needed_frfs",
+    "noise_free_errors",
+    "noise_stream",
+]
 
 _POINTS = "jrks"
 
@@ -75,3 +90,126 @@ def exact_frfs(case: KnownJointCase) -> Exact:
     h_initial = couple(h_a, h_b, initial, first, first, freq_hz=freq)
     h_c = couple(h_a, h_b, case.joint.dynamic_stiffness(freq), first, first, freq_hz=freq)
     return Exact(freq, case.joint.dofs, h_a, h_b, h_initial, h_c, initial)
+
+
+#: Equal up to rounding, and without the model: (2.47) and its short form.
+SHORT_FORM = {"ismm": "inverse-substructuring"}
+
+#: What fits take from a model.
+_OF_FITS: dict[str, tuple[str, ...]] = {"compliance": (), "decoupling-fit": ("h_a", "h_b")}
+_DECOUPLING = tuple(name for name, method in STIFFNESS_METHODS.items() if method.measured == "h_c")
+
+
+def measured(exact: Exact, method: str) -> ComplexArray:
+    """FRFs of the assembly that a method takes.
+
+    Parameters
+    ----------
+    exact : Exact
+    method : str
+
+    Returns
+    -------
+    ndarray, shape (n_freq, n, n) for decoupling by an equation, else (n_freq, 2 n, 2 n)
+        Between the internal points that the equation names; at r, then s; at joint DOFs j, then k. m/N.
+    """
+    if method == "decoupling-fit":
+        at = np.r_[exact.where("r"), exact.where("s")]
+        return np.ascontiguousarray(exact.h_c[:, at[:, None], at])
+    if method not in _DECOUPLING:
+        return exact.interface(exact.h_c)
+    points = method.removeprefix("decoupling-")
+    return np.ascontiguousarray(exact.h_c[:, exact.where(points[0]), exact.where(points[1])])
+
+
+def needed_frfs(exact: Exact, method: str) -> Exact:
+    """Leave out the FRFs that a method does not take from a model: a task goes to another process."""
+    needed = _OF_FITS[method] if method in FITTED else STIFFNESS_METHODS[cast(StiffnessMethod, method)].model
+    slim = exact if "alpha" in needed else replace(exact, h_initial=exact.h_initial[:0])
+    slim = replace(slim, h_c=exact.h_c[:0])
+    return slim if "h_a" in needed else replace(slim, h_a=exact.h_a[:0], h_b=exact.h_b[:0])
+
+
+def noise_stream(method: str) -> int:
+    """Return what a method adds to the seed: FRFs at other points have noise of their own."""
+    names = [*(str(name) for name in _DECOUPLING), "decoupling-fit"]
+    return 1 + names.index(method) if method in names else 0
+
+
+def joint_lines(exact: Exact, method: str, h: ComplexArray, on_singular: OnSingular = "raise") -> ComplexArray:
+    """K* by a method, for several sets of measured FRFs.
+
+    Parameters
+    ----------
+    exact : Exact
+        What the method knows of the substructures, or of the assembly with the first estimate.
+    method : str
+        A key of `STIFFNESS_METHODS`.
+    h : ndarray, shape (r, n_freq, m, m)
+        FRFs as `measured` returns them, with noise or without.
+    on_singular : {"raise", "nan"}
+
+    Returns
+    -------
+    ndarray, shape (r, n_freq, n, n)
+        N/m.
+    """
+    count, n_freq, n = len(h), exact.freq_hz.size, exact.n
+    joint, inner = range(n), range(n, 2 * n)
+    known = {
+        "alpha": exact.interface(exact.h_initial),
+        "k_initial": exact.k_initial,
+        "h_a": exact.h_a,
+        "h_b": exact.h_b,
+    }
+    name = cast(StiffnessMethod, method)
+    needed = STIFFNESS_METHODS[name]
+    frfs = JointFrfs(
+        **{needed.measured: h.reshape(count * n_freq, *h.shape[2:])},
+        **{field: np.tile(lines, (count, 1, 1)) for field, lines in known.items() if field in needed.model},
+        dofs_j=joint, dofs_k=joint, dofs_r=inner, dofs_s=inner,
+    )  # fmt: skip
+    return joint_stiffness(name, frfs, on_singular=on_singular).reshape(count, n_freq, n, n)
+
+
+class NoiseFree(NamedTuple):
+    """Largest relative error of K* without noise, and how much K* changes when the last bits of the FRFs do."""
+
+    error: float
+    rounding: float
+
+
+def noise_free_errors(exact: Exact, k_actual: ComplexArray) -> dict[str, NoiseFree]:
+    """Find the largest relative error of K* of every method without noise.
+
+    "short form" is the difference between (2.47) and -(gamma^-1)_jk; the others are errors against the actual K*.
+    """
+    with warnings.catch_warnings():
+        # What a poor condition does is what is shown.
+        warnings.simplefilter("ignore", IllConditionedWarning)
+        found, changed = _all_methods(exact), _all_methods(_rounded(exact))
+    size = np.sqrt(abs(np.diagonal(k_actual, axis1=1, axis2=2)))
+    scale = size[:, :, None] * size[:, None, :]
+
+    def difference(a: ComplexArray, b: ComplexArray) -> float:
+        return float((abs(a - b) / scale).max())
+
+    rounding = {method: difference(k, changed[method]) for method, k in found.items()}
+    errors = {method: NoiseFree(difference(k, k_actual), rounding[method]) for method, k in found.items()}
+    short = NoiseFree(difference(found["ismm"], found["inverse-substructuring"]), rounding["ismm"])
+    return {"short form": short, **errors}
+
+
+def _rounded(exact: Exact) -> Exact:
+    """Change every FRF by a rounding, up or down, always the same."""
+    rng = np.random.default_rng(1)
+    h_a, h_b, h_initial, h_c = (
+        h * (1 + np.finfo(float).eps * rng.choice((-1.0, 1.0), h.shape))
+        for h in (exact.h_a, exact.h_b, exact.h_initial, exact.h_c)
+    )
+    return replace(exact, h_a=h_a, h_b=h_b, h_initial=h_initial, h_c=h_c)
+
+
+def _all_methods(exact: Exact) -> dict[str, ComplexArray]:
+    """K* on every line by every method."""
+    return {method: joint_lines(exact, method, measured(exact, method)[None])[0] for method in STIFFNESS_METHODS}

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from jointfrf.cases.definitions import Observed
+from jointfrf.cases.keys import Observed
 from jointfrf.cases.known_joint.compute import KnownJointResult
 from jointfrf.cases.known_joint.modes import mode_panels
 from jointfrf.cases.known_joint.regenerate import RegeneratedFrf, regenerate
@@ -29,8 +29,7 @@ from jointfrf.report.axes import (
     symbol,
 )
 from jointfrf.report.figure import Curve, Figure, Interval, Level, NamedBands, Panel, Ribbon
-from jointfrf.report.noise import noise_figure
-from jointfrf.report.receptance import ReceptanceCurve, receptance_panels, side_by_side
+from jointfrf.report.receptance import ReceptanceCurve, noise_figure, receptance_panels, side_by_side
 
 __all__ = ["known_joint_figures"]
 
@@ -289,6 +288,8 @@ def _noise(result: KnownJointResult) -> Iterator[Figure]:
 
 def _methods(result: KnownJointResult) -> Iterator[Figure]:
     """Compare methods line by line, where there are several that work line by line."""
+    if not result.case.band_sets:
+        return
     first_noise, first_set = result.case.noises[0].name, result.case.band_sets[0]
     found = [f for f in result.identified if f.noise == first_noise and f.bands == first_set.name]
     if len(found) < 2:
@@ -322,7 +323,8 @@ def _method_panels(
 
 
 def _regenerated(result: KnownJointResult) -> Iterator[Figure]:
-    first_noise, names = result.case.noises[0].name, (result.case.band_sets[0].name, ALL_LINES)
+    first_noise = result.case.noises[0].name
+    names = (*(one.name for one in result.case.band_sets[:1]), ALL_LINES)
     for one in result.case.observed:
         pairs = [
             _regenerated_panels(result, r)

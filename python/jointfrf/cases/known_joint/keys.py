@@ -1,228 +1,336 @@
-"""Keys of `case.toml` and `expected.toml` of a case of a known joint."""
+"""A case of a known joint: the keys of its files, and the case that they give."""
 
 from __future__ import annotations
 
-from jointfrf.cases.common_keys import (
-    COMMON_KEYS,
-    DOF_BANDS,
-    EXPECTED_FREQUENCIES,
-    FIGURES,
-    JOINT,
-    MATERIAL_KEYS,
-    NOISE,
-    PRESET,
-    one_of,
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Annotated, Literal, cast
+
+from msgspec import field
+
+from jointfrf.cases.keys import (
+    FITTED,
+    METHODS,
+    BandKeys,
+    BandSet,
+    Case,
+    CaseKeys,
+    ExpectedFrequencies,
+    ExpectedKeys,
+    JointDofKeys,
+    Noise,
+    Observed,
+    actual_values,
+    check_bands,
+    check_different,
+    check_noises,
+    joints_of,
 )
-from jointfrf.cases.fitting import METHODS
-from jointfrf.frf.frf_set import POWER_OF_I_OMEGA
-from jointfrf.models.beam import BeamElement, End
-from jointfrf.models.model import Ground
-from jointfrf.solids.brick_beam import Face
-from jointfrf.toml.keys import Key, KeyTable
+from jointfrf.cases.substructures import (
+    BeamKeys,
+    BrickBeamKeys,
+    ChainKeys,
+    MatricesKeys,
+    ModelStructure,
+    ReceptancesKeys,
+    Structure,
+)
+from jointfrf.dofs import Parameter, joint_parameters
+from jointfrf.errors import FileContentError
+from jointfrf.frf.bands import Band
+from jointfrf.joint import Joint
+from jointfrf.kernel.arguments import FloatArray
+from jointfrf.substructuring.methods import STIFFNESS_METHODS, StiffnessMethod
+from jointfrf.toml.declared import Bands, Keys, NotNegative, Positive, key
 
-__all__ = ["EXPECTED_KEYS", "KNOWN_JOINT_KEYS", "SUBSTRUCTURE"]
+__all__ = [
+    "ExpectedErrors",
+    "ExpectedParameters",
+    "ExpectedRegions",
+    "KnownJointCase",
+    "KnownJointExpected",
+    "KnownJointKeys",
+    "PrintedLines",
+    "read_known_joint",
+]
+
+_LIKE_DOFS = "list of texts, as many as joint DOFs"
 
 
-def _of(model: str, about: str, *keys: Key) -> KeyTable:
-    choice = "`chain`, `beam`, `brick-beam`, `matrices` or `receptances`"
-    return KeyTable(
-        f'[substructure_a], [substructure_b] with model = "{model}"', about, (Key("model", choice, "Which."), *keys)
+class PointKeys(Keys):
+    """DOFs of the substructures, in the order of the tables `[[joint]]`.
+
+    Of FRFs, node and direction: `"102:+y"`, `"102:rz"`; a channel measured the other way serves with the opposite sign.
+    """
+
+    j: Annotated[tuple[str, ...], key("Joint DOFs of A.", takes=_LIKE_DOFS, min_length=1, example=["2:x"])]
+    k: Annotated[tuple[str, ...], key("Joint DOFs of B.", takes=_LIKE_DOFS, min_length=1, example=["1:x"])]
+    r: Annotated[
+        tuple[str, ...],
+        key("Internal DOFs of A.", takes=_LIKE_DOFS, absent="`j`; required by decoupling", min_length=1,
+            example=["1:x"]),
+    ] = ()  # fmt: skip
+    s: Annotated[
+        tuple[str, ...],
+        key("Internal DOFs of B.", takes=_LIKE_DOFS, absent="`k`; required by decoupling", min_length=1,
+            example=["2:x"]),
+    ] = ()  # fmt: skip
+
+
+class ObservedKeys(Keys):
+    """FRFs of the assembly that are looked at; without any, the first DOF of r and of s."""
+
+    point: Annotated[Literal["r", "s"], key("Response and force at this point.")]
+    dof: Annotated[str, key("Joint DOF whose direction it is.")]
+    bands: Annotated[Bands, key("Where errors of regenerated FRFs are counted.", "Hz", absent="all lines")] = ()
+
+
+class KnownJointKeys(CaseKeys, tag="known-joint"):
+    """Two substructures and a joint of known parameters, identified from simulated measurements."""
+
+    tag_absent = "`known-joint`"
+    examples = {"frequency": {"first": 0.05, "last": 10.0, "step": 0.05}}  # noqa: RUF012
+    substructure_a: Annotated[
+        ChainKeys | BeamKeys | BrickBeamKeys | MatricesKeys | ReceptancesKeys, key("Side j of the joint.")
+    ]
+    substructure_b: Annotated[
+        ChainKeys | BeamKeys | BrickBeamKeys | MatricesKeys | ReceptancesKeys,
+        key("Side k of the joint.", example={"masses": [4.0, 2.0], "stiffness": [2000.0, 2500.0],
+                                            "damping": [2.0, 1.0], "ground": "end"}),
+    ]  # fmt: skip
+    points: Annotated[PointKeys, key("DOFs of the joint, and internal ones.")]
+    joint: Annotated[tuple[JointDofKeys, ...], key("The joint.")]
+    observed: Annotated[
+        tuple[ObservedKeys, ...], key("FRFs that are looked at.", absent="first DOF of r and of s")
+    ] = ()
+    bands: Annotated[
+        tuple[BandKeys, ...],
+        key("Sensitive bands; the first set is that of the figures.",
+            absent="required by methods that take means over bands"),
+    ] = ()  # fmt: skip
+    noise: Annotated[tuple[Noise, ...], key("Noise and methods.")]
+
+
+class _Applied(Keys):
+    """A number of a source, by the noise and the method to which it belongs."""
+
+    source: Annotated[str, key("Where the numbers come from: title of the table.")]
+    noise: Annotated[str, key("Name of a noise of the case.")]
+    method: Annotated[str, key("One that the case applies to this noise.", choice=METHODS)]
+
+
+class ExpectedParameters(_Applied):
+    """Published parameters of one identification, and the largest errors allowed."""
+
+    bands: Annotated[
+        str, key("Name of a set of bands of the case.", absent="required but for `compliance` and `decoupling-fit`")
+    ] = ""
+    values: Annotated[
+        dict[str, float], key("Published values, by the parameter: `k_DOF`, `c_DOF`.", "as the parameters")
+    ] = field(default_factory=dict)
+    rmse_below: Annotated[dict[str, float], key("Largest root-mean-square error allowed, by the parameter.", "%")] = (
+        field(default_factory=dict)
     )
 
 
-_LOSS_FACTOR = MATERIAL_KEYS[-1]
-_ENDS = Key("ends", f"two, each {one_of(End)}", "How the ends are held.")
-_CHAIN = _of(
-    "chain",
-    'Lumped masses in a line; DOFs `"1:x"`, `"2:x"`, ...',
-    Key("masses", "list of numbers", "Masses, from one end to the other.", "kg"),
-    Key("stiffness", "list of numbers", "Springs in their order, that to the ground included.", "N/m"),
-    Key("damping", "list of numbers", "Dashpots beside the springs.", "N s/m"),
-    Key("ground", one_of(Ground), "Which ends are held by a spring."),
-    _LOSS_FACTOR,
-)
-_BEAM = _of(
-    "beam",
-    'Beam elements in a line, bending in one plane; DOFs `"1:y"`, `"1:theta"`, ... without those that are held.',
-    Key("length", "number, above 0", "Length.", "m"),
-    Key("elements", "whole number, at least 1", "Number of elements."),
-    Key("element", one_of(BeamElement), "Theory of the elements."),
-    Key("axial", "true or false", "Whether nodes move along the beam, too (`x`)."),
-    _ENDS,
-    Key("youngs_modulus", "number, above 0", "Young's modulus.", "N/m^2"),
-    Key("density", "number, above 0", "Density.", "kg/m^3"),
-    Key("width", "number, above 0", "Width of the section.", "m"),
-    Key("height", "number, above 0", "Height of the section, in the plane of bending.", "m"),
-    Key("poisson", "number", "Poisson's ratio; only of `shear-flexible` elements.", "", "required for these"),
-    _LOSS_FACTOR,
-)
-_HOLE = KeyTable(
-    "hole, in a brick-beam",
-    "A bolt hole whose ring follows a reference point with six DOFs, `hole:x` to `hole:theta_z`.",
-    (
-        Key("position", "number, at least 0", "Distance from the first end.", "m"),
-        Key("radius", "number, at least 0", "Radius of the hole.", "m"),
-        Key("patch_radius", "number, at least 0", "Outer radius of the ring.", "m"),
-        Key("face", one_of(Face), "Side of the beam where the ring lies."),
-    ),
-)
-_BRICK_BEAM = _of(
-    "brick-beam",
-    'A beam of brick elements along z; DOFs `"hole:x"`, and six of each section that is observed.',
-    Key("length", "number, above 0", "Length along z.", "m"),
-    Key("width", "number, above 0", "Width along x.", "m"),
-    Key("height", "number, above 0", "Height along y.", "m"),
-    *MATERIAL_KEYS,
-    _ENDS,
-    PRESET,
-    Key("origin", "list of 3 numbers", "Middle of the lower edge of the first end; the beam lies above it.", "m"),
-    Key("hole", "table", "A bolt hole.", "", "none", _HOLE),
-    Key("observed", "table of numbers", "Sections whose mean motion is observed: name, and distance from the first "
-        "end; `r` gives `\"r:x\"` to `\"r:theta_z\"`.", "m", "none"),
-)  # fmt: skip
-_FILE = "name of a file"
-_MATRICES = _of(
-    "matrices",
-    "Matrices of your own: Matrix Market (`.mtx`), or NPZ of `scipy.sparse.save_npz` or `numpy.savez` with one array, "
-    "or with arrays named like the keys here. Files stand relative to `case.toml`.",
-    Key("stiffness", _FILE, "K, symmetric, real.", "N/m"),
-    Key("mass", _FILE, "M, symmetric, real.", "kg"),
-    Key("damping", _FILE, "Viscous damping C.", "N s/m", "none"),
-    Key("structural_damping", _FILE, "Structural damping H, i H added to K.", "N/m", "none"),
-    Key("loss_factor", "number, at least 0", "Loss factor eta of the stiffness, K (1 + i eta).", "", "0"),
-    Key("dofs", "list of texts, or name of a text file", 'Names of the DOFs in the order of the rows: `"12:y"`. In a '
-        "file, one a line: `12:y`, or node and number of the DOF (1 to 6): `12 2`; `#` begins a comment."),
-)  # fmt: skip
-_RECEPTANCES = _of(
-    "receptances",
-    "FRFs of the substructure, measured or computed elsewhere, in any format that `jointfrf.io.read_frfs` reads. "
-    "They must be there between all DOFs of `[points]` on "
-    "this side, on the lines of `[frequency]`. Natural frequencies and mode shapes are left out of the report.",
-    Key("file", "name of a file of FRFs", "Mobilities and accelerances become receptances."),
-    Key("quantity", one_of(POWER_OF_I_OMEGA), "What the FRFs are, where the file does not say.", "", "by the file"),
-    Key(
-        "force_quantity",
-        "true or false",
-        "`true`: `quantity` holds also where the file says something else.",
-        "",
-        "`false`",
-    ),
-)
-SUBSTRUCTURE = KeyTable(
-    "[substructure_a], [substructure_b]",
-    "The two structures that the joint connects.",
-    (),
-    {"chain": _CHAIN, "beam": _BEAM, "brick-beam": _BRICK_BEAM, "matrices": _MATRICES, "receptances": _RECEPTANCES},
-    "model",
-)
-_DOFS_OF = "list of texts, as many as joint DOFs"
-_POINTS = KeyTable(
-    "[points]",
-    'DOFs of the substructures, in the order of the tables `[[joint]]`. Of FRFs, node and direction: `"102:+y"`, '
-    '`"102:rz"`; a channel measured the other way serves with the opposite sign.',
-    (
-        Key("j", _DOFS_OF, "Joint DOFs of A."),
-        Key("k", _DOFS_OF, "Joint DOFs of B."),
-        Key("r", _DOFS_OF, "Internal DOFs of A."),
-        Key("s", _DOFS_OF, "Internal DOFs of B."),
-    ),
-)
-_OBSERVED = KeyTable(
-    "[[observed]]",
-    "FRFs of the assembly that are looked at; without any, the first DOF of r and of s.",
-    (
-        Key("point", one_of(("r", "s")), "Response and force at this point."),
-        Key("dof", "text", "Joint DOF whose direction it is."),
-        Key("bands", "list of `[low, high]`", "Where errors of regenerated FRFs are counted.", "Hz", "all lines"),
-    ),
-)
-_BANDS = KeyTable(
-    "[[bands]]",
-    "Sensitive bands over which K\\* is averaged; one or several sets, the first is that of the figures.",
-    DOF_BANDS,
-)
-KNOWN_JOINT_KEYS = KeyTable(
-    "case.toml of kind known-joint",
-    "Two substructures and a joint of known parameters, identified from simulated measurements.",
-    (
-        *COMMON_KEYS,
-        Key("substructure_a", "table", "Side j of the joint.", inner=SUBSTRUCTURE),
-        Key("substructure_b", "table", "Side k of the joint.", inner=SUBSTRUCTURE),
-        Key("points", "table", "DOFs of the joint, and internal ones.", inner=_POINTS),
-        Key("joint", "tables", "The joint.", inner=JOINT),
-        Key("observed", "tables", "FRFs that are looked at.", "", "first DOF of r and of s", _OBSERVED),
-        Key("bands", "tables", "Sensitive bands.", inner=_BANDS),
-        Key("noise", "tables", "Noise and methods.", inner=NOISE),
-    ),
-)
-_BY_PARAMETER = (
-    Key("k_DOF", "number", "Of the stiffness of a joint DOF.", "", "none"),
-    Key("c_DOF", "number", "Of its damping.", "", "none"),
-)
-_APPLIED = (
-    Key("source", "text", "Where the numbers come from: title of the table."),
-    Key("noise", "text", "Name of a noise of the case."),
-    Key("method", one_of(METHODS), "One that the case applies to this noise."),
-)
-_IDENTIFIED = KeyTable(
-    "[[identified]]",
-    "Published parameters of one identification.",
-    (
-        *_APPLIED,
-        Key("bands", "text", "Name of a set of bands of the case.", "",
-            "required but for `compliance` and `decoupling-fit`"),
-        Key("values", "table", "Published values.", "as the parameters", "none",
-            KeyTable("values, in [[identified]]", "Published values of the parameters.", _BY_PARAMETER)),
-        Key("rmse_below", "table", "Largest root-mean-square error allowed.", "%", "none",
-            KeyTable("rmse_below, in [[identified]]", "Largest errors of the parameters, %.", _BY_PARAMETER)),
-    ),
-)  # fmt: skip
-_REGENERATED = KeyTable(
-    "[[regenerated]]",
-    "Published errors of a regenerated FRF.",
-    (
-        *_APPLIED,
-        Key("observed", "text", "An FRF that the case looks at: `s`, `s-Fx`."),
-        Key("band", "list of one `[low, high]`", "One of its bands.", "Hz"),
-        Key("amplitude", "number", "Error (4.11).", "%", "not published"),
-        Key("frequency", "number", "Error (4.12).", "%", "not published"),
-        Key("offset", "list of 3 numbers", "Where the FRF is seen, from its reference point.", "m", "at the point"),
-    ),
-)
-_REGIONS = KeyTable(
-    "[[regions]]",
-    "Where the source finds an FRF sensitive to a parameter.",
-    (
-        Key("source", "text", "Where the regions come from: title of the table."),
-        Key("parameter", "`k_DOF` or `c_DOF`", "Parameter of the joint."),
-        Key("observed", "text", "An FRF that the case looks at: `s`, `s-Fx`."),
-        Key("bands", "list of `[low, high]`", "The regions.", "Hz"),
-    ),
-)
-_PRINTED = KeyTable(
-    "[printed]",
-    "How errors of FRFs regenerated from published parameters are compared with the published errors.",
-    (
-        Key("step", "number, above 0", "Spacing of the lines.", "Hz"),
-        Key("amplitude_within_percent", "number, at least 0", "How far error (4.11) may be off, of itself.", "%"),
-        Key("lines_within", "number, at least 0", "How many lines error (4.12) may be off."),
-    ),
-)
-_FREQUENCIES = KeyTable(
-    "[[frequencies]]",
-    "Natural frequencies of the assembly; both substructures must be models.",
-    (Key("joint", one_of(("actual", "initial")), "With which joint."), *EXPECTED_FREQUENCIES),
-)
-EXPECTED_KEYS = KeyTable(
-    "expected.toml of kind known-joint",
-    "What is known about a case beforehand; the file may be missing.",
-    (
-        Key("frequencies", "tables", "Natural frequencies.", "", "none", _FREQUENCIES),
-        Key("identified", "tables", "Published parameters.", "", "none", _IDENTIFIED),
-        Key("regenerated", "tables", "Published errors of regenerated FRFs.", "", "none", _REGENERATED),
-        Key("regions", "tables", "Published sensitive regions.", "", "none", _REGIONS),
-        Key("printed", "table", "FRFs regenerated from published parameters; both substructures must be models.", "",
-            "not compared", _PRINTED),
-        FIGURES,
-    ),
-)  # fmt: skip
+class ExpectedErrors(_Applied, rename={"bands": "band"}):
+    """Published errors (4.11), (4.12) of a regenerated FRF in a band."""
+
+    observed: Annotated[str, key("An FRF that the case looks at: `s`, `s-Fx`.")]
+    bands: Annotated[Bands, key("One of its bands.", "Hz", takes="list of one `[low, high]`")]
+    amplitude: Annotated[float | None, key("Error (4.11).", "%", absent="not published")] = None
+    frequency: Annotated[float | None, key("Error (4.12).", "%", absent="not published")] = None
+    offset: Annotated[
+        tuple[float, float, float] | None,
+        key("Where the FRF is seen, from its reference point: x, y, z.", "m", absent="at the point"),
+    ] = None
+
+    @property
+    def band(self) -> Band:
+        """The band."""
+        return self.bands[0]
+
+
+class ExpectedRegions(Keys, rename={"name": "parameter"}):
+    """Where the source finds an FRF sensitive to a parameter."""
+
+    source: Annotated[str, key("Where the regions come from: title of the table.")]
+    name: Annotated[str, key("Parameter of the joint.", takes="`k_DOF` or `c_DOF`")]
+    observed: Annotated[str, key("An FRF that the case looks at: `s`, `s-Fx`.")]
+    bands: Annotated[Bands, key("The regions.", "Hz")]
+
+    @property
+    def parameter(self) -> Parameter:
+        """The parameter."""
+        return Parameter.parse(self.name)
+
+
+class PrintedLines(Keys):
+    """How errors of FRFs regenerated from published parameters are compared with the published errors."""
+
+    step: Annotated[Positive, key("Spacing of the lines.", "Hz")]
+    amplitude_within_percent: Annotated[NotNegative, key("How far error (4.11) may be off, of itself.", "%")]
+    lines_within: Annotated[NotNegative, key("How many lines error (4.12) may be off.")]
+
+
+class JointFrequencies(ExpectedFrequencies):
+    """Natural frequencies of the assembly; both substructures must be models."""
+
+    joint: Annotated[Literal["actual", "initial"], key("With which joint.")]
+
+
+class KnownJointExpected(ExpectedKeys):
+    """What is known about a case beforehand; the file may be missing."""
+
+    frequencies: Annotated[tuple[JointFrequencies, ...], key("Natural frequencies.")] = ()
+    identified: Annotated[tuple[ExpectedParameters, ...], key("Published parameters.")] = ()
+    regenerated: Annotated[tuple[ExpectedErrors, ...], key("Published errors of regenerated FRFs.")] = ()
+    regions: Annotated[tuple[ExpectedRegions, ...], key("Published sensitive regions.")] = ()
+    printed: Annotated[
+        PrintedLines | None,
+        key("FRFs regenerated from published parameters; both substructures must be models.", absent="not compared"),
+    ] = None
+
+    def frequencies_with(self, joint: str) -> ExpectedFrequencies | None:
+        """Return the natural frequencies with the "actual" or the "initial" joint."""
+        return next((one for one in self.frequencies if one.joint == joint), None)
+
+
+@dataclass(frozen=True, kw_only=True)
+class KnownJointCase(Case):
+    """A simulated identification.
+
+    Attributes
+    ----------
+    a, b : Structure
+    points : mapping of str to tuple of str
+        Names of the joint DOFs, "j" in A and "k" in B, and of internal ones, "r" in A and "s" in B.
+    joint, initial : Joint
+        The actual joint and its first estimate.
+    observed : tuple of Observed
+        FRFs of the assembly that are looked at.
+    band_sets : tuple of BandSet
+        The first is that of the tables.
+    noises : tuple of Noise
+    expected : KnownJointExpected
+    """
+
+    a: Structure
+    b: Structure
+    points: Mapping[str, tuple[str, ...]]
+    joint: Joint
+    initial: Joint
+    observed: tuple[Observed, ...]
+    band_sets: tuple[BandSet, ...]
+    noises: tuple[Noise, ...]
+    expected: KnownJointExpected
+
+    @property
+    def models(self) -> tuple[ModelStructure, ModelStructure] | None:
+        """Both substructures where both are known by their models, else None."""
+        a, b = self.a, self.b
+        return (a, b) if isinstance(a, ModelStructure) and isinstance(b, ModelStructure) else None
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Stiffness of every DOF, then damping."""
+        return joint_parameters(self.joint.dofs)
+
+    @property
+    def actual(self) -> FloatArray:
+        """Values of the parameters of the actual joint."""
+        return actual_values(self.joint)
+
+
+def read_known_joint(common: Case, keys: KnownJointKeys, expected: KnownJointExpected) -> KnownJointCase:
+    """Return the case that its files give; raises FileContentError."""
+    a, b = (one.structure(common.freq_hz) for one in (keys.substructure_a, keys.substructure_b))
+    methods = list(dict.fromkeys(method for noise in keys.noise for method in noise.methods))
+    joint, initial = joints_of(keys.joint, next(filter(_begins_with_estimate, methods), ""))
+    points = _points(keys.points, a, b, len(joint.dofs), methods)
+    check_noises(keys, keys.noise, len(joint.dofs))
+    if (averaged := [method for method in methods if method not in FITTED]) and not keys.bands:
+        raise keys.missing(["'bands'"], f"{averaged[0]} takes means over bands")
+    check_different(keys, "bands", [one.name for one in keys.bands])
+    case = KnownJointCase(
+        **vars(common),
+        a=a,
+        b=b,
+        points=points,
+        joint=joint,
+        initial=initial,
+        observed=_observed(keys, joint.dofs, common.freq_hz),
+        band_sets=tuple(one.band_set(joint.dofs, common.freq_hz) for one in keys.bands),
+        noises=keys.noise,
+        expected=expected,
+    )
+    _check_expected(case)
+    return case
+
+
+def _begins_with_estimate(method: str) -> bool:
+    if method in FITTED:
+        return method == "decoupling-fit"
+    return not {"alpha", "k_initial"}.isdisjoint(STIFFNESS_METHODS[cast(StiffnessMethod, method)].model)
+
+
+def _points(keys: PointKeys, a: Structure, b: Structure, n: int, methods: Sequence[str]) -> dict[str, tuple[str, ...]]:
+    decoupling = [method for method in methods if method.startswith("decoupling")]
+    if decoupling and (lacking := [repr(point) for point in "rs" if not getattr(keys, point)]):
+        raise keys.missing(lacking, f"{decoupling[0]} takes FRFs of internal points")
+    points = {"j": keys.j, "k": keys.k, "r": keys.r or keys.j, "s": keys.s or keys.k}
+    for point, names in points.items():
+        if len(names) != n:
+            raise keys.error(point, f"a list of {n} DOFs, as many as the joint has")
+    for structure, joint, internal in ((a, "j", "r"), (b, "k", "s")):
+        keys.build(partial(structure.check_points, points[joint], points[internal]))
+    return points
+
+
+def _observed(keys: KnownJointKeys, dofs: tuple[str, ...], freq_hz: FloatArray) -> tuple[Observed, ...]:
+    found = []
+    for one in keys.observed:
+        if one.dof not in dofs:
+            raise one.error("dof", f"one of {', '.join(dofs)}")
+        check_bands(one, "bands", one.bands, freq_hz)
+        found.append(Observed(f"{one.point}-{one.dof}", one.point, dofs.index(one.dof), one.bands))
+    check_different(keys, "observed", [one.key for one in found], "name the same FRF")
+    return tuple(found) or (Observed("r", "r", 0), Observed("s", "s", 0))
+
+
+def _check_expected(case: KnownJointCase) -> None:
+    """Check that what is expected belongs to the case."""
+    expected, methods = case.expected, {noise.name: noise.methods for noise in case.noises}
+    parameters, observed = [one.name for one in case.parameters], {one.key: one.bands for one in case.observed}
+    for name in ("frequencies", "printed"):
+        if case.models is None and getattr(expected, name):
+            why = f"{name} needs models, not receptances, of both substructures"
+            raise FileContentError(f"{expected.table.where}: {why}")
+    check_different(expected, "frequencies", [one.joint for one in expected.frequencies], "name the same joint")
+    for one in (*expected.identified, *expected.regenerated):
+        _check_choice(one, "noise", list(methods))
+        if one.method not in methods[one.noise]:
+            raise one.error("method", f"one of the methods that case.toml applies to {one.noise!r}")
+    for table in expected.identified:
+        if table.method not in FITTED:
+            if not table.bands:
+                raise table.missing(["'bands'"], f"{table.method} takes means over bands")
+            _check_choice(table, "bands", [own.name for own in case.band_sets])
+        for values in ("values", "rmse_below"):
+            for name in getattr(table, values):
+                if name not in parameters:
+                    raise table.wrong(values, f"unknown parameter {name!r}; the joint has {', '.join(parameters)}")
+    for error in expected.regenerated:
+        _check_choice(error, "observed", list(observed))
+        if len(error.bands) != 1 or error.band not in observed[error.observed]:
+            raise error.error("band", f"one of the bands that case.toml names for {error.observed}")
+    for region in expected.regions:
+        _check_choice(region, "parameter", parameters)
+        _check_choice(region, "observed", list(observed))
+        check_bands(region, "bands", region.bands, case.freq_hz)
+
+
+def _check_choice(keys: Keys, name: str, choice: list[str]) -> None:
+    if keys.table.content[name] not in choice:
+        raise keys.error(name, f"one of {', '.join(choice)}")

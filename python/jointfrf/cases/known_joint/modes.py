@@ -7,11 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
-from jointfrf.cases.known_joint.read import KnownJointCase
+from jointfrf.cases.known_joint.keys import KnownJointCase
 from jointfrf.kernel.arguments import FloatArray
 from jointfrf.models.model import Model, assemble
-from jointfrf.report.figure import Curve, Panel
-from jointfrf.report.solid_modes import MovingBody, deformed_surface
+from jointfrf.report.figure import Curve, MovingBody, Panel, deformed_surface
 from jointfrf.solids.solid import SolidModel
 
 __all__ = ["ModeShapes", "find_modes", "mode_panels", "modes_of_case"]
@@ -56,7 +55,7 @@ def modes_of_case(case: KnownJointCase) -> dict[str, ModeShapes]:
         return {}
     a, b = case.models
     at = a.dofs(case.points["j"]), b.dofs(case.points["k"])
-    wanted = max([_SHOWN, *(len(known.values) for known in case.expected.frequencies.values())])
+    wanted = max([_SHOWN, *(len(known.values) for known in case.expected.frequencies)])
     found = {
         name: find_modes(assemble(a.model, b.model, joint, *at), wanted)
         for name, joint in (("initial", case.initial), ("actual", case.joint))

@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from jointfrf.cases.comparison import frequency_table, verdict
-from jointfrf.cases.known_joint.bounds import decoupling_bounds
+from jointfrf.cases.comparison import agreement, frequency_table, verdict
+from jointfrf.cases.keys import FITTED
 from jointfrf.cases.known_joint.compute import KnownJointResult
-from jointfrf.cases.known_joint.expected import ExpectedErrors, ExpectedParameters
-from jointfrf.cases.known_joint.published_tables import (
+from jointfrf.cases.known_joint.decoupling import decoupling_bounds
+from jointfrf.cases.known_joint.keys import ExpectedErrors, ExpectedParameters
+from jointfrf.cases.known_joint.published import (
     JOINT_NAMES,
     NO_PEAK,
     band_table,
@@ -28,7 +29,7 @@ from jointfrf.kernel.arguments import FloatArray
 from jointfrf.report.axes import bands_in_words, percentiles
 from jointfrf.report.table import Cell, Table
 
-__all__ = ["Row", "identified_rows", "known_joint_numbers", "known_joint_tables"]
+__all__ = ["Row", "identified_rows", "known_joint_numbers", "known_joint_summary", "known_joint_tables"]
 
 _NOISE_FREE_LIMIT, _SHORT_FORM_LIMIT = 1e-6, 1e-10
 #: An equation is exact up to this many roundings of the FRFs it takes.
@@ -73,12 +74,12 @@ def identified_rows(result: KnownJointResult) -> list[Row]:
     for found in result.identified:
         published = [
             table
-            for table in result.case.expected.tables
+            for table in result.case.expected.identified
             if table.values and (table.noise, table.method) == (found.noise, found.method)
             and table.bands in ("", found.bands)
         ]  # fmt: skip
         for p, parameter in enumerate(result.case.parameters):
-            beside = [table for table in published if parameter in table.values]
+            beside = [table for table in published if parameter.name in table.values]
             for table in beside or (None,):
                 rows.append(_row(found, parameter, found.theta[:, p], float(result.case.actual[p]), table))
     return rows
@@ -90,7 +91,7 @@ def _row(found: Identified, parameter: Parameter, values: Any, actual: float, ta
     error = float(np.sqrt(((values - actual) ** 2).mean()) / abs(actual) * 100) if actual else float("nan")
     if table is None:
         return Row(*named, None, None, median, low, high, error, None, None)
-    published = table.values[parameter]
+    published = table.values[parameter.name]
     share = float((values < published).mean() * 100)
     return Row(*named, table.source, published, median, low, high, error, share, low <= published <= high)
 
@@ -137,14 +138,14 @@ def _frequencies(result: KnownJointResult) -> list[Table]:
     if not result.modes:
         return []
     directed = any(modes.directions for modes in result.modes.values())
-    expected = result.case.expected.frequencies
+    expected = result.case.expected
     groups = []
     for joint, modes in result.modes.items():
         named = JOINT_NAMES[joint]
         names = [(named, str(i + 1), *((modes.directions[i],) if directed else ())) for i in range(modes.freq_hz.size)]
-        groups.append((names, modes.freq_hz.tolist(), expected.get(joint)))
+        groups.append((names, modes.freq_hz.tolist(), expected.frequencies_with(joint)))
     columns = ("joint", "mode", *(("mostly in",) if directed else ()))
-    note = "; ".join(f"{JOINT_NAMES[joint]}: {known.source}" for joint, known in expected.items())
+    note = "; ".join(f"{JOINT_NAMES[one.joint]}: {one.source}" for one in expected.frequencies)
     return [frequency_table("Natural frequencies of the assembly", columns, groups, note)]
 
 
@@ -204,14 +205,14 @@ def _blocks(result: KnownJointResult) -> list[Table]:
 
 def _limits(result: KnownJointResult, rows: list[Row]) -> list[Table]:
     cells: list[tuple[Cell, ...]] = []
-    for table in result.case.expected.tables:
-        for parameter, limit in table.rmse_below.items():
+    for table in result.case.expected.identified:
+        for name, limit in table.rmse_below.items():
             row = next(
-                r for r in rows if (r.noise, r.method, r.parameter) == (table.noise, table.method, parameter)
+                r for r in rows if (r.noise, r.method, r.parameter.name) == (table.noise, table.method, name)
                 and table.bands in ("", r.bands)
             )  # fmt: skip
             good = verdict(row.rmse_percent < limit)
-            cells.append((row.noise, row.method, row.bands, parameter, row.rmse_percent, limit, good))
+            cells.append((row.noise, row.method, row.bands, row.parameter, row.rmse_percent, limit, good))
     if not cells:
         return []
     failing = tuple(i for i, cell in enumerate(cells) if cell[-1] != "fits")
@@ -248,7 +249,7 @@ def _published_errors(result: KnownJointResult) -> list[Table]:
     """Tables of the source with errors of regenerated FRFs, beside the distributions; with the first set of bands."""
     columns = ("FRF", "band, Hz", "method", "error", "thesis, %", *_SPREAD_OF_ERRORS, "percentile", "")
     rows: dict[str, list[tuple[Cell, ...]]] = {}
-    for known in result.case.expected.errors:
+    for known in result.case.expected.regenerated:
         found = next(
             r for r in result.regenerated if r.observed.key == known.observed
             and (r.identified.noise, r.identified.method) == (known.noise, known.method)
@@ -315,3 +316,26 @@ def known_joint_numbers(result: KnownJointResult) -> dict[str, Any]:
             for one in case.observed for parameter in case.parameters
         },
     }  # fmt: skip
+
+
+def known_joint_summary(result: KnownJointResult, tables: list[Table]) -> list[Table]:
+    """Return short tables: how much fits, and how far the methods are from the actual joint."""
+    return [agreement(tables), *_methods(identified_rows(result))]
+
+
+def _methods(rows: list[Row]) -> list[Table]:
+    """Root-mean-square errors of all methods at noise levels where there are several."""
+    tables = []
+    for count, noise in enumerate(dict.fromkeys(row.noise for row in rows), 1):
+        errors: dict[str, dict[Cell, float]] = {}
+        for row in rows:
+            if row.noise == noise:
+                name = row.method if row.method in FITTED else f"{row.method} ({row.bands})"
+                errors.setdefault(name, {})[row.parameter] = row.rmse_percent
+        if len(errors) > 1:
+            parameters = next(iter(errors.values()))
+            cells = tuple((parameter, *(own[parameter] for own in errors.values())) for parameter in parameters)
+            title = f"Root-mean-square errors by method, noise {noise}"
+            columns = ("parameter", *(f"{name}, %" for name in errors))
+            tables.append(Table(f"methods-{count}", title, columns, cells, percentages=columns))
+    return tables

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
@@ -213,11 +214,8 @@ def unexplained_gains(measurement: Measurement, ratios: ChannelRatios) -> FloatA
     return gain
 
 
-def gain_findings(
-    measurement: Measurement, ratios: ChannelRatios, side: int
-) -> tuple[list[FrfFinding], list[Correction]]:
+def gain_findings(measurement: Measurement, ratios: ChannelRatios, side: int) -> Iterator[FrfFinding | Correction]:
     """Report which channels have another gain than the others, or other units."""
-    findings, corrections = [], []
     offsets = ratios.gain
     left = _is_significant(offsets, LEAST_GAIN)
     while left.any():
@@ -230,12 +228,10 @@ def gain_findings(
         alike = left & near & kind_of & (ratios.group == ratios.group[first])
         left &= ~alike
         finding, places, factor = _gain_finding(measurement, ratios, alike)
-        findings.append(finding)
-        dofs = measurement.rows if side == 1 else measurement.columns
-        text = f"{_of(measurement, places, side)} divided by {factor if side == 1 else 1 / factor:.5g}"
-        own = tuple(int(dofs[i]) for i in places)
-        corrections.append(Correction(finding.kind, text, side, own, factor if side == 1 else 1 / factor))
-    return findings, corrections
+        yield finding
+        name, own = measurement.of_side(side, places)
+        divisor = factor if side == 1 else 1 / factor
+        yield Correction(finding.kind, f"{name} divided by {divisor:.5g}", side, own, divisor)
 
 
 def _gain_finding(
@@ -260,7 +256,7 @@ def _gain_finding(
         shown = f"h_pq / h_qp is {_times(factor, error)} for p = {', '.join(names)} and every q but these"
     doubt = _doubt(measurement, ratios, offsets, places)
     if unit is not None:
-        remedy = f"convert {_plural('this channel', names)} to SI units"
+        remedy = f"convert {'this channel' if len(names) == 1 else 'these channels'} to SI units"
         return FrfFinding(
             "units", "error", names, factor, 1 + _UNIT_TOLERANCE, f"{shown}: {unit}{doubt}", remedy
         ), places, factor  # fmt: skip
@@ -275,11 +271,8 @@ def _gain_finding(
     return FrfFinding("gain", level, names, factor, threshold, f"{shown}: {which}{doubt}", remedy), places, factor
 
 
-def delay_findings(
-    measurement: Measurement, ratios: ChannelRatios, side: int
-) -> tuple[list[FrfFinding], list[Correction]]:
+def delay_findings(measurement: Measurement, ratios: ChannelRatios, side: int) -> Iterator[FrfFinding | Correction]:
     """Report which channels lag behind the others."""
-    findings, corrections = [], []
     offsets = ratios.delay
     least = LEAST_PHASE / measurement.omega[-1]
     for i in np.flatnonzero(_is_significant(offsets, least)).tolist():
@@ -292,17 +285,13 @@ def delay_findings(
             f"{1e6 * error:.2g} us, {degrees:.3g} degrees at {measurement.freq_hz[-1]:g} Hz: the response of {name} is "
             f"{word}, or the force there {opposite}{_doubt(measurement, ratios, offsets, [i])}"
         )
-        findings.append(
-            FrfFinding(
-                "delay", "warning", (name,), delay, max(least, _SIGNIFICANT * error), shown,
-                "look at the channel's filter, cable and trigger; reciprocity does not distinguish sensor from hammer",
-            )
+        yield FrfFinding(
+            "delay", "warning", (name,), delay, max(least, _SIGNIFICANT * error), shown,
+            "look at the channel's filter, cable and trigger; reciprocity does not distinguish sensor from hammer",
         )  # fmt: skip
-        place = int((measurement.rows if side == 1 else measurement.columns)[i])
+        label, places = measurement.of_side(side, [i])
         own = delay if side == 1 else -delay
-        text = f"{_of(measurement, [i], side)} advanced by {1e6 * own:.4g} us"
-        corrections.append(Correction("delay", text, side, (place,), delay=own))
-    return findings, corrections
+        yield Correction("delay", f"{label} advanced by {1e6 * own:.4g} us", side, places, delay=own)
 
 
 def _times(factor: float, error: float) -> str:
@@ -316,13 +305,3 @@ def _doubt(measurement: Measurement, ratios: ChannelRatios, offsets: Offsets, pl
     group = ratios.group == ratios.group[places[0]]
     others = [measurement.dofs[i] for i in np.flatnonzero(group) if i not in places]
     return f" (or {', '.join(others)} the other way: as many channels agree with each side)"
-
-
-def _plural(words: str, names: tuple[str, ...]) -> str:
-    return words if len(names) == 1 else words.replace("this channel", "these channels")
-
-
-def _of(measurement: Measurement, places: list[int], side: int) -> str:
-    labels = measurement.responses if side == 1 else measurement.forces
-    at = (measurement.rows if side == 1 else measurement.columns)[places]
-    return ("response " if side == 1 else "force ") + ", ".join(labels[i] for i in at)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal, cast, get_args
 
@@ -160,14 +160,17 @@ class _Progress:
     findings: list[FrfFinding] = field(default_factory=list)
     corrections: list[Correction] = field(default_factory=list)
 
-    def add(self, found: tuple[list[FrfFinding], list[Correction]]) -> None:
-        self.findings.extend(found[0])
-        self.corrections.extend(found[1])
+    def add(self, found: Iterable[FrfFinding | Correction]) -> None:
+        for one in found:
+            if isinstance(one, FrfFinding):
+                self.findings.append(one)
+            else:
+                self.corrections.append(one)
 
     def corrected(self) -> Measurement:
         """Return the measurement with all corrections found so far."""
         one = self.measurement
-        return one.with_frfs(corrected(one.omega, one.h, self.corrections)) if self.corrections else one
+        return replace(one, h=corrected(one.omega, one.h, self.corrections)) if self.corrections else one
 
 
 def _findings_at_joint(
@@ -186,16 +189,13 @@ def _findings_at_joint(
         )
     labels = [f"{side}:{name}" for side in "jk" for name in names]
     h = t_out @ m.h @ t_in.T
-    hidden = np.median(abs(h), axis=0) < _HIDING * np.median(_propagated(m.h, t_out, t_in), axis=0)
+    # the deviation of transformed FRFs where that of each channel is its size
+    deviation = np.sqrt(t_out**2 @ abs(m.h) ** 2 @ (t_in**2).T)
+    hidden = np.median(abs(h), axis=0) < _HIDING * np.median(deviation, axis=0)
     joint = _Progress(replace(as_measurement(m.freq_hz, h, labels, labels), hidden=hidden), state.side)
     _check_channels(joint)
     known = {finding.kind for finding in state.findings}
     return [finding for finding in joint.findings if finding.kind not in known]
-
-
-def _propagated(h: ComplexArray, t_out: FloatArray, t_in: FloatArray) -> FloatArray:
-    """Return the deviation of transformed FRFs where that of each channel is its size."""
-    return np.sqrt(t_out**2 @ abs(h) ** 2 @ (t_in**2).T)
 
 
 def _check_channels(state: _Progress) -> None:

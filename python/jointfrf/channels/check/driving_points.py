@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 from jointfrf.channels.check.finding import Correction, FrfFinding
 from jointfrf.channels.check.pair_ratios import block_medians
 from jointfrf.channels.check.signals import Measurement, modulus
-from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray
 
 __all__ = [
     "circles",
@@ -32,6 +33,12 @@ _CIRCLES_SEEN = 0.5
 _BLOCK = 30
 #: Standard errors by which Im h / |h| of a block must exceed zero, and its least value.
 _SIGNIFICANT, _LEAST = 8.0, 0.05
+#: Mean exponents of w in |h| of driving points: below the first it is a receptance, above the second an accelerance.
+_RECEPTANCE, _ACCELERANCE = -0.2, 0.6
+#: A band that spans less than this factor in frequency does not show the exponent.
+_LEAST_SPAN = 3.0
+#: Names of the quantities, by the power of i w.
+_NAMES = ("receptances", "mobilities", "accelerances")
 
 
 @dataclass(frozen=True)
@@ -88,7 +95,7 @@ def mean_exponent(omega: FloatArray, h: ComplexArray) -> float:
     """Median over FRFs, shape (n_freq, m), of the exponent of w in |h|, by least squares."""
     x = np.log(omega)
     x = x - x.mean()
-    y = np.log(np.maximum(modulus(h), np.finfo(float).tiny))
+    y = np.log(np.maximum(modulus(h), TINY))
     spread = (x**2).sum()
     return float(np.median(x @ y) / spread) if spread > 0 else 0.0
 
@@ -117,8 +124,8 @@ def _balances(driving: ComplexArray) -> tuple[ComplexArray, FloatArray, FloatArr
     """Return h / |h|, and sums of its real and imaginary parts over the sums of their sizes."""
     size = modulus(driving)
     u: ComplexArray = np.where(size > 0, driving / np.where(size > 0, size, 1), 0)
-    imaginary = u.imag.sum(axis=0) / np.maximum(abs(u.imag).sum(axis=0), np.finfo(float).tiny)
-    real = u.real.sum(axis=0) / np.maximum(abs(u.real).sum(axis=0), np.finfo(float).tiny)
+    imaginary = u.imag.sum(axis=0) / np.maximum(abs(u.imag).sum(axis=0), TINY)
+    real = u.real.sum(axis=0) / np.maximum(abs(u.real).sum(axis=0), TINY)
     return u, real, imaginary
 
 
@@ -129,7 +136,7 @@ def _on_real_axis(u: ComplexArray) -> NDArray[np.bool_]:
 
 def passivity_findings(
     measurement: Measurement, driving: ComplexArray, noise: FloatArray, inflation: float
-) -> list[FrfFinding]:
+) -> Iterator[FrfFinding]:
     """Find driving points, shape (n_freq, n), whose Im is positive over a band.
 
     `noise` is the standard deviation of Im h / |h| on a line, shape (n,); NaN where it is not known.
@@ -146,7 +153,6 @@ def passivity_findings(
     error = 1.2533 * spread * np.sqrt(min(inflation, length) / length)
     active = middle > np.maximum(_LEAST, _SIGNIFICANT * error)
     freq = block_medians(measurement.freq_hz[:, None], length)[:, 0]
-    findings = []
     for i in np.flatnonzero(active.any(axis=0)):
         where = np.flatnonzero(active[:, i])
         worst = int(where[np.argmax(middle[where, i])])
@@ -158,23 +164,12 @@ def passivity_findings(
             if (side > 0.5).all()
             else "at resonances: negative damping, or the wrong sign of this FRF there"
         )
-        findings.append(
-            FrfFinding(
-                "passivity", "warning", (measurement.dofs[i],), float(middle[worst, i]), _LEAST,
-                f"power comes out of the structure at {measurement.dofs[i]} near {freq[worst]:.4g} Hz: Im h / |h| is "
-                f"{middle[worst, i]:.2g} +- {error[worst, i]:.1g} in {where.size} of {middle.shape[0]} bands, {cause}",
-                "look at the phase of sensor and hammer; leave these bands out",
-            )
+        yield FrfFinding(
+            "passivity", "warning", (measurement.dofs[i],), float(middle[worst, i]), _LEAST,
+            f"power comes out of the structure at {measurement.dofs[i]} near {freq[worst]:.4g} Hz: Im h / |h| is "
+            f"{middle[worst, i]:.2g} +- {error[worst, i]:.1g} in {where.size} of {middle.shape[0]} bands, {cause}",
+            "look at the phase of sensor and hammer; leave these bands out",
         )  # fmt: skip
-    return findings
-
-
-#: Mean exponents of w in |h| of driving points: below the first it is a receptance, above the second an accelerance.
-_RECEPTANCE, _ACCELERANCE = -0.2, 0.6
-#: A band that spans less than this factor in frequency does not show the exponent.
-_LEAST_SPAN = 3.0
-#: Names of the quantities, by the power of i w.
-_NAMES = ("receptances", "mobilities", "accelerances")
 
 
 @dataclass(frozen=True, eq=False)
@@ -268,9 +263,8 @@ def convention_finding(around: Circles, driving: Sectors) -> FrfFinding:
 
 def quantity_findings(
     measurement: Measurement, found: Quantities, driving: Sectors
-) -> tuple[list[FrfFinding], list[Correction]]:
+) -> Iterator[FrfFinding | Correction]:
     """Report which responses are velocities or accelerations."""
-    findings, corrections = [], []
     for power in (1, 2):
         places = np.flatnonzero(found.power == power)
         if not places.size:
@@ -286,28 +280,22 @@ def quantity_findings(
             seen += f", |h| goes with w^{found.exponent + power:.1f}"
         else:
             seen += f", h_pq / h_qp goes with w^{power} against the other responses"
-        doubt = "" if found.certain or power == 1 or not every else _doubt(found)
-        findings.append(
-            FrfFinding(
-                "quantity", "error", names, float(found.exponent + power), 0.0,
-                f"{what} {_NAMES[power]}, not receptances: {seen}{doubt}",
-                f"divide by {('i w', '(i w)^2')[power - 1]}, or state the quantity when the file is read",
-            )
+        doubt = f" (or receptances of the wrong sign: |h| goes with w^{found.exponent + 2:.1f} on this band)"
+        doubt = "" if found.certain or power == 1 or not every else doubt
+        divisor = ("i w", "(i w)^2")[power - 1]
+        yield FrfFinding(
+            "quantity", "error", names, float(found.exponent + power), 0.0,
+            f"{what} {_NAMES[power]}, not receptances: {seen}{doubt}",
+            f"divide by {divisor}, or state the quantity when the file is read",
         )  # fmt: skip
-        text = f"{'all FRFs' if every else 'responses ' + ', '.join(names)} divided by {('i w', '(i w)^2')[power - 1]}"
-        corrections.append(Correction("quantity", text, 1, rows, power=power))
-    return findings, corrections
-
-
-def _doubt(found: Quantities) -> str:
-    return f" (or receptances of the wrong sign: |h| goes with w^{found.exponent + 2:.1f} on this band)"
+        text = f"{'all FRFs' if every else 'responses ' + ', '.join(names)} divided by {divisor}"
+        yield Correction("quantity", text, 1, rows, power=power)
 
 
 def sign_findings(
     measurement: Measurement, found: Quantities, driving: Sectors, side: int
-) -> tuple[list[FrfFinding], list[Correction]]:
+) -> Iterator[FrfFinding | Correction]:
     """Report which responses point against the force of the same DOF."""
-    findings, corrections = [], []
     places = np.flatnonzero(found.sign < 0)
     if places.size:
         names = tuple(measurement.dofs[i] for i in places)
@@ -318,25 +306,16 @@ def sign_findings(
             seen += " and h_pq = -h_qp with the others"
         who = "all responses point" if every else f"the response of {', '.join(names)} points"
         doubt = "" if found.certain or not every else " (or the FRFs are accelerances: the band is too narrow)"
-        findings.append(
-            FrfFinding(
-                "sign", "error", names, share / 100, 0.5,
-                f"{who} against the force of the same name: {seen}{doubt}",
-                "turn the sign of the response, or of the force: reciprocity does not show which of the two",
-            )
+        yield FrfFinding(
+            "sign", "error", names, share / 100, 0.5, f"{who} against the force of the same name: {seen}{doubt}",
+            "turn the sign of the response, or of the force: reciprocity does not show which of the two",
         )  # fmt: skip
-        dofs = measurement.rows if side == 1 else measurement.columns
-        own = tuple(map(int, dofs[places]))
-        labels = measurement.responses if side == 1 else measurement.forces
-        text = f"sign of {'response' if side == 1 else 'force'} {', '.join(labels[i] for i in own)} turned"
-        corrections.append(Correction("sign", text, side, own, -1.0))
+        name, own = measurement.of_side(side, places)
+        yield Correction("sign", f"sign of {name} turned", side, own, -1.0)
     for i in np.flatnonzero(found.contradiction):
-        findings.append(
-            FrfFinding(
-                "passivity", "error", (measurement.dofs[i],), float(1 - driving.negative[i]), 0.5,
-                f"the driving point of {measurement.dofs[i]} has Im > 0 on {100 * (1 - driving.negative[i]):.0f} % of "
-                "lines, although its channel is reciprocal to the others: power comes out of the structure",
-                "look at this FRF: its sign, or where it was measured",
-            )
+        yield FrfFinding(
+            "passivity", "error", (measurement.dofs[i],), float(1 - driving.negative[i]), 0.5,
+            f"the driving point of {measurement.dofs[i]} has Im > 0 on {100 * (1 - driving.negative[i]):.0f} % of "
+            "lines, although its channel is reciprocal to the others: power comes out of the structure",
+            "look at this FRF: its sign, or where it was measured",
         )  # fmt: skip
-    return findings, corrections

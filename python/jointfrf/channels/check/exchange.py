@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Literal
@@ -141,7 +141,8 @@ def hidden_exchange(h: ComplexArray, directions: Sequence[str]) -> Cause | None:
         if directions[i] != directions[j]:
             continue
         # Rows of the two responses beside the columns of their forces, as they are and exchanged.
-        both = [_off(scatter_of(h[:, rows], across[:, [i, j]]), (i, j)) for rows in ([i, j], [j, i])]
+        scatters = (scatter_of(h[:, rows], across[:, [i, j]]) for rows in ([i, j], [j, i]))
+        both = [kept[kept > 0] for kept in (np.delete(scatter, (i, j), axis=1) for scatter in scatters)]
         # h_ij against h_ji, or, exchanged, h_jj against h_ii, is in neither.
         before, after = (float(np.mean(scatter)) if scatter.size else 0.0 for scatter in both)
         own = [float(scatter_of(h[:, a, b], h[:, c, d])) for a, b, c, d in ((i, j, j, i), (j, j, i, i))]
@@ -149,12 +150,6 @@ def hidden_exchange(h: ComplexArray, directions: Sequence[str]) -> Cause | None:
         if before > _LESS * after + _ROUND_OFF and (best is None or after / before < best.after / best.before):
             best = Cause("exchanged", (i, j), before / (both[0].size + 2), after / (both[0].size + 2))
     return best
-
-
-def _off(scatter: FloatArray, places: tuple[int, int]) -> FloatArray:
-    """Leave the two columns out."""
-    kept = np.delete(scatter, places, axis=1)
-    return kept[kept > 0]
 
 
 def _from_one(first: ComplexArray, second: ComplexArray) -> FloatArray:
@@ -217,7 +212,7 @@ def _doubled(evidence: _Evidence, before: float) -> Cause | None:
 
 def broken_findings(
     measurement: Measurement, pairs: PairRatios, cause: Cause, side: int
-) -> tuple[list[FrfFinding], list[Correction]]:
+) -> Iterator[FrfFinding | Correction]:
     """Report what explains that FRFs are not reciprocal, and how to correct it where that is possible."""
     names = measurement.dofs
     number = f"{pairs.broken.sum()} of {pairs.p.size} pairs h_pq, h_qp are not the same FRF (scatter of their ratio "
@@ -230,40 +225,37 @@ def broken_findings(
     if cause.kind == "exchanged":
         a, b = (names[i] for i in cause.channels)
         others = "".join(f", or {names[i]} and {names[j]}" for i, j in cause.alternatives)
-        finding = FrfFinding(
+        yield FrfFinding(
             "exchanged", "error", (a, b), cause.before, BROKEN,
             f"the responses {a} and {b} are exchanged, or the forces there{others}: {number}{cause.before:.2g}), with "
             f"{a} and {b} exchanged all are (scatter {cause.after:.2g})",
             "exchange the two responses, or the two forces: both make the FRFs reciprocal, look at the test set-up",
         )  # fmt: skip
-        dofs = measurement.rows if side == 1 else measurement.columns
-        own = tuple(int(dofs[i]) for i in cause.channels)
+        _, own = measurement.of_side(side, cause.channels)
         text = f"{'responses' if side == 1 else 'forces'} {a} and {b} exchanged"
-        return [finding], [Correction("exchanged", text, side, own, exchange=True)]
-    if cause.kind in ("doubled response", "doubled force"):
+        yield Correction("exchanged", text, side, own, exchange=True)
+    elif cause.kind in ("doubled response", "doubled force"):
         first, second = (names[i] for i in cause.channels)
         word = cause.kind.removeprefix("doubled ")
-        finding = FrfFinding(
+        yield FrfFinding(
             "doubled", "error", (f"{word} {first}", f"{word} {second}"), cause.after, BROKEN / 2,
             f"{word} {second} shows what {word} {first} shows (scatter of their ratio {cause.after:.2g}), and "
             f"{number}{cause.before:.2g}), all with {second}",
             f"measure {second} again: its channel was connected to, or struck at, {first}",
         )  # fmt: skip
-        return [finding], []
-    if cause.kind == "channel":
+    elif cause.kind == "channel":
         name = names[cause.channels[0]]
-        finding = FrfFinding(
+        yield FrfFinding(
             "reciprocity", "error", (name,), cause.before, BROKEN,
             f"{number}{cause.before:.2g}), all with {name}: its response or force was measured elsewhere, or is noise",
             "look at place, direction and name of sensor and impacts of this DOF, or leave it out",
         )  # fmt: skip
-        return [finding], []
-    worst = np.argsort(-np.where(pairs.broken, pairs.scatter, -1))[: min(_SHOWN, int(pairs.broken.sum()))]
-    some = ", ".join(f"{names[pairs.p[i]]} / {names[pairs.q[i]]}" for i in worst)
-    finding = FrfFinding(
-        "reciprocity", "error", tuple(dict.fromkeys(names[x] for i in worst for x in (pairs.p[i], pairs.q[i]))),
-        cause.before, BROKEN,
-        f"{number}{cause.before:.2g}): {some}{' and more' if pairs.broken.sum() > _SHOWN else ''}",
-        "look at the order of rows and columns, and at places and directions of sensors and impacts",
-    )  # fmt: skip
-    return [finding], []
+    else:
+        worst = np.argsort(-np.where(pairs.broken, pairs.scatter, -1))[: min(_SHOWN, int(pairs.broken.sum()))]
+        some = ", ".join(f"{names[pairs.p[i]]} / {names[pairs.q[i]]}" for i in worst)
+        yield FrfFinding(
+            "reciprocity", "error", tuple(dict.fromkeys(names[x] for i in worst for x in (pairs.p[i], pairs.q[i]))),
+            cause.before, BROKEN,
+            f"{number}{cause.before:.2g}): {some}{' and more' if pairs.broken.sum() > _SHOWN else ''}",
+            "look at the order of rows and columns, and at places and directions of sensors and impacts",
+        )  # fmt: skip

@@ -25,14 +25,22 @@ __all__ = [
     "scatter_of",
 ]
 
-#: Lines whose scatter is taken together: so many, and so many times those that correlate.
+#: Lines over which the scatter is averaged: so many, and so many times those that correlate.
 _BLOCK, _APART = 15, 8
-#: Values beyond this number of standard deviations are clipped.
+#: Real and imaginary parts beyond this number of standard deviations, 1 % of normal ones, are clipped.
 _CLIP = 2.5
 #: Standard errors are never taken smaller: round-off, and small errors that every sensor has.
 LEAST_ERROR = 1e-4
 #: A phase at 0 Hz that is within so many standard errors of 0, 90, ... degrees is that.
 _SAME = 3.0
+#: An FRF below this share of sqrt|h_pp h_qq| is zero by symmetry, or nearly: it is not checked for reciprocity.
+_SMALL = 1e-2
+#: Scatter of log(h_pq / h_qp) above which h_pq and h_qp are not the same FRF; noise of 10 % gives 0.14.
+BROKEN = 0.5
+#: Scatter of a pair of which one is zero.
+ONE_SIDED = 3.0
+#: Delays that are tried first: this many steps of half a period of the whole band, either way.
+_STEPS = 16
 
 
 class RatioLine(NamedTuple):
@@ -82,8 +90,8 @@ def ratio_line(omega: FloatArray, values: ComplexArray, turn: FloatArray, usable
     The phase at 0 Hz is that of a sign and of powers of i w. Where the data agree with that it is not fitted, which
     halves the error of the slope or better.
 
-    Blocks of lines whose scatter is taken together are longer than the noise is correlated: else its chance in each
-    would be taken for its level.
+    Blocks of lines over which the scatter is averaged are longer than the noise is correlated: otherwise chance in a
+    block would be taken for its noise level.
     """
     fit = _fitted(omega, values, usable, _BLOCK)
     longer = int(_APART * fit.inflation)
@@ -131,7 +139,7 @@ def _fitted(omega: FloatArray, values: ComplexArray, usable: NDArray[np.bool_], 
     inertia = (weight * lever**2).sum(axis=0)
     slope = (weight * lever * clipped.imag).sum(axis=0) / inertia
     left = clipped - mean - 1j * lever * slope
-    # What a delay leaves in the phase is not noise: taken out before.
+    # The phase left by a delay is not noise: it was removed before.
     inflation = _inflation((left / deviation)[:, usable])
     lost = _lost(inflation, len(omega))
     real, imaginary = ((weight * part**2).mean(axis=0) * inflation / lost for part in (left.real, left.imag))
@@ -139,7 +147,7 @@ def _fitted(omega: FloatArray, values: ComplexArray, usable: NDArray[np.bool_], 
 
 
 def block_medians(values: FloatArray, length: int = _BLOCK) -> FloatArray:
-    """Return the median over blocks of lines, shape (n_blocks, ...); the last block takes what is left."""
+    """Return the median over blocks of lines, shape (n_blocks, ...); the last block has the remaining lines."""
     n = max(values.shape[0] // length, 1)
     whole = min(n * length, values.shape[0])
     medians = np.median(values[:whole].reshape(n, whole // n, *values.shape[1:]), axis=1)
@@ -181,16 +189,6 @@ def _inflation(standard: ComplexArray) -> float:
 def _lost(inflation: float, n_freq: int) -> float:
     """Return the share of the noise that a mean and a slope leave."""
     return max(1 - 2 * inflation / n_freq, 0.5)
-
-
-#: An FRF below this share of sqrt|h_pp h_qq| is zero by symmetry, or nearly: it is not checked for reciprocity.
-_SMALL = 1e-2
-#: Scatter of log(h_pq / h_qp) above which h_pq and h_qp are not the same FRF; noise of 10 % gives 0.14.
-BROKEN = 0.5
-#: Scatter of a pair of which one is zero.
-ONE_SIDED = 3.0
-#: Delays that are tried first: this many steps of half a period of the whole band, either way.
-_STEPS = 16
 
 
 @dataclass(frozen=True, eq=False)

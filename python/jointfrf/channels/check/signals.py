@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from jointfrf.channels.check.finding import FrfFinding
 from jointfrf.dofs import is_rotation
 from jointfrf.frf.frf_set import Channel
-from jointfrf.kernel.arguments import ComplexArray, FloatArray, one_line
+from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray, one_line
 
 __all__ = [
     "LEAST_SMOOTHNESS",
@@ -26,6 +26,12 @@ __all__ = [
 
 #: Below this agreement of the phase from line to line an FRF is noise.
 LEAST_SMOOTHNESS = 0.3
+#: FRFs that agree to this share are copies: two measurements differ by their noise.
+_SAME = 1e-6
+#: FRFs that are reciprocal to this share hold no noise, or were made so.
+_EXACT = 1e-9
+#: Rows that are less alike than this on some lines are not compared on all; how many lines.
+_ALIKE, _SOME = 0.999, 60
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,9 +93,13 @@ class Measurement:
         """Which of these are rotations."""
         return np.array([is_rotation(name.rpartition(":")[2].lstrip("+-")) for name in self.dofs], bool)
 
-    def with_frfs(self, h: ComplexArray) -> Measurement:
-        """Return the same channels with other FRFs."""
-        return replace(self, h=h)
+    def of_side(self, side: int, places: Iterable[int]) -> tuple[str, tuple[int, ...]]:
+        """Return the name and the numbers of the responses (1) or forces (2) of some of these DOFs."""
+        word, names, every = ("response", self.responses, self.rows)
+        if side == 2:
+            word, names, every = ("force", self.forces, self.columns)
+        own = tuple(int(every[i]) for i in places)
+        return f"{word} {', '.join(names[i] for i in own)}", own
 
     def without(self, rows: Sequence[int], columns: Sequence[int]) -> Measurement:
         """Return the same without the pairs of these responses and forces."""
@@ -115,10 +125,11 @@ def as_measurement(
     freq_hz: FloatArray, h: ComplexArray, responses: Sequence[str | Channel], forces: Sequence[str | Channel]
 ) -> Measurement:
     """Pair responses with forces by name; a name like 102:-y is the opposite of 102:+y."""
-    of_responses, of_forces = (tuple(_unified(name) for name in some) for some in (responses, forces))
+    of_responses = tuple(_both_ways(name)[0] for name in responses)
+    of_forces, opposite = zip(*map(_both_ways, forces), strict=True) if forces else ((), ())
     place = {name: (i, 1) for i, name in enumerate(of_forces)}
-    for i, name in enumerate(of_forces):
-        place.setdefault(_opposite(name), (i, -1))
+    for i, name in enumerate(opposite):
+        place.setdefault(name, (i, -1))
     pairs = np.array([(row, *place[name]) for row, name in enumerate(of_responses) if name in place], np.intp)
     rows, columns, signs = pairs.reshape(-1, 3).T
     return Measurement(freq_hz, h, of_responses, of_forces, rows, columns, signs.astype(float))
@@ -131,46 +142,34 @@ def as_channel_names(
     forces: Sequence[str | Channel] | None,
 ) -> tuple[Sequence[str | Channel], Sequence[str | Channel]]:
     """Return the names of responses and forces, each different, by default their numbers."""
-    if names is not None and (responses is not None or forces is not None):
-        raise ValueError("names goes without responses and forces")
-    if names is None and responses is None and forces is None and shape[0] != shape[1]:
+    words = ("responses", "forces")
+    if names is not None:
+        if responses is not None or forces is not None:
+            raise ValueError("names goes without responses and forces")
+        responses = forces = names
+        words = ("names", "names")
+    elif (responses is None) != (forces is None):
+        raise ValueError("responses and forces go together")
+    elif responses is None and shape[0] != shape[1]:
         raise ValueError(f"h holds {shape[0]} responses and {shape[1]} forces: name them by responses and forces")
     found = []
-    for word, own, n in (("responses", responses, shape[0]), ("forces", forces, shape[1])):
-        if own is None:
-            own = names if names is not None else None
-        if own is None and (responses is not None or forces is not None):
-            raise ValueError("responses and forces go together")
-        asked = word if names is None else "names"
+    for word, own, n in zip(words, (responses, forces), shape, strict=True):
         if own is not None and (isinstance(own, str) or not isinstance(own, Iterable)):
-            raise TypeError(f"{asked} must be a sequence of names, not {one_line(own)}")
+            raise TypeError(f"{word} must be a sequence of names, not {one_line(own)}")
         labels = [str(i) for i in range(n)] if own is None else list(own)
         if len(labels) != n or len(set(map(str, labels))) != n:
-            raise ValueError(f"{asked} must name {n} different channels")
+            raise ValueError(f"{word} must name {n} different channels")
         found.append(labels)
     return found[0], found[1]
 
 
-def _unified(name: str | Channel) -> str:
+def _both_ways(name: str | Channel) -> tuple[str, str]:
+    """Return the name of a channel, and that of the channel that points the other way."""
     try:
-        return str(Channel.parse(name))
+        channel = Channel.parse(name)
     except ValueError:
-        return str(name)
-
-
-def _opposite(name: str) -> str:
-    try:
-        return str(Channel.parse(name).opposite())
-    except ValueError:
-        return name
-
-
-#: FRFs that agree to this share are copies: two measurements differ by their noise.
-_SAME = 1e-6
-#: FRFs that are reciprocal to this share hold no noise, or were made so.
-_EXACT = 1e-9
-#: Rows that are less alike than this on some lines are not compared on all; how many lines.
-_ALIKE, _SOME = 0.999, 60
+        return str(name), str(name)
+    return str(channel), str(channel.opposite())
 
 
 @dataclass(frozen=True)
@@ -187,67 +186,50 @@ def check_signals(measurement: Measurement) -> BadSignals:
     findings: list[FrfFinding] = []
     bad: list[list[int]] = []
     across = measurement.h.swapaxes(1, 2)
-    smooth = measurement.smoothness
+    smooth, square = measurement.smoothness, measurement.square
+    # Reciprocal to rounding: calculated, or made so; equal channels are then no copies of noise.
+    is_exact = bool(square.size and abs(square - square.swapaxes(1, 2)).max() <= _EXACT * abs(square).max())
     for word, names, h, own in (
         ("response", measurement.responses, measurement.h, smooth),
         ("force", measurement.forces, across, smooth.T),
     ):
-        dead = _dead(own, h.shape[0])
+        # zero or noise in all columns
+        dead = np.flatnonzero(own.max(axis=1) < max(LEAST_SMOOTHNESS, 4 / np.sqrt(h.shape[0]))).tolist()
         findings += [_dead_finding(word, names[i], float(own[i].max())) for i in dead]
-        copies = [] if _is_exact(measurement) else _copies(h, dead)
+        copies = [] if is_exact else _copies(h, dead)
         findings += [_copy_finding(word, names[i], names[j], value) for i, j, value in copies]
         bad.append([*dead, *(place for i, j, _ in copies for place in (i, j))])
     return BadSignals(findings, *bad)
 
 
-def _is_exact(measurement: Measurement) -> bool:
-    """Whether FRFs are reciprocal to rounding: calculated, or made so; equal channels are then no copies of noise."""
-    square = measurement.square
-    return bool(square.size and abs(square - square.swapaxes(1, 2)).max() <= _EXACT * abs(square).max())
-
-
-def _dead(smooth: FloatArray, n_freq: int) -> list[int]:
-    """Rows that are zero or noise in all columns."""
-    dead: list[int] = np.flatnonzero(smooth.max(axis=1) < max(LEAST_SMOOTHNESS, 4 / np.sqrt(n_freq))).tolist()
-    return dead
-
-
 def _dead_finding(word: str, name: str, value: float) -> FrfFinding:
     what = "is zero" if value == 0 else f"is noise: its phase agrees by {value:.2f} from line to line"
     remedy = "connect or replace the sensor" if word == "response" else "repeat the impacts"
+    message = f"{word} {name} {what}"
     return FrfFinding(
-        "dead",
-        "error",
-        (f"{word} {name}",),
-        float(value),
-        LEAST_SMOOTHNESS,
-        f"{word} {name} {what}",
-        f"{remedy}, or leave it out",
+        "dead", "error", (f"{word} {name}",), value, LEAST_SMOOTHNESS, message, f"{remedy}, or leave it out"
     )
 
 
 def _copies(h: ComplexArray, dead: list[int]) -> list[tuple[int, int, float]]:
     """Pairs of rows that are equal to rounding up to a real factor, and by how much they differ."""
-    product = _products(h[:: -(-h.shape[0] // _SOME)])
+    some = h[:: -(-h.shape[0] // _SOME)]
+    size = np.sqrt((abs(some) ** 2).mean(axis=(0, 1), keepdims=True))
+    # products of rows over lines and columns, every column with the same weight
+    flat = (some / np.where(size > 0, size, 1)).swapaxes(0, 1).reshape(h.shape[1], -1)
+    flat = flat / np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), TINY)
+    product = (flat.conj() @ flat.T).real
     found: list[tuple[int, int, float]] = []
     for i, j in zip(*np.nonzero(np.triu(abs(product) > _ALIKE, 1)), strict=True):
         if i in dead or j in dead or any(j == other for _, other, _ in found):
             continue
-        size = np.maximum(np.sqrt((abs(h[:, [i, j]]) ** 2).mean(axis=(0, 1))), np.finfo(float).tiny)
+        size = np.maximum(np.sqrt((abs(h[:, [i, j]]) ** 2).mean(axis=(0, 1))), TINY)
         first, second = (h[:, k] / size for k in (i, j))
         factor = np.vdot(first, second).real / np.vdot(first, first).real
         differs = float(np.linalg.norm(second - factor * first) / np.linalg.norm(second))
         if differs < _SAME:
             found.append((int(i), int(j), differs))
     return found
-
-
-def _products(h: ComplexArray) -> FloatArray:
-    """Normalised products of rows over lines and columns, every column with the same weight."""
-    size = np.sqrt((abs(h) ** 2).mean(axis=(0, 1), keepdims=True))
-    flat = (h / np.where(size > 0, size, 1)).swapaxes(0, 1).reshape(h.shape[1], -1)
-    flat = flat / np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), np.finfo(float).tiny)
-    return np.asarray((flat.conj() @ flat.T).real)
 
 
 def _copy_finding(word: str, first: str, second: str, value: float) -> FrfFinding:
@@ -262,7 +244,7 @@ def _copy_finding(word: str, first: str, second: str, value: float) -> FrfFindin
 def find_bad_lines(
     freq_hz: FloatArray, h: ComplexArray, responses: tuple[str, ...], forces: tuple[str, ...]
 ) -> tuple[list[FrfFinding], NDArray[np.bool_]]:
-    """Return what is wrong with lines, and which lines are good."""
+    """Return findings about lines, and which lines are good."""
     findings = []
     finite = np.isfinite(h)
     good = np.asarray(finite.all(axis=(1, 2)))

@@ -1,1 +1,21 @@
-"""The likelihood of FRFs between all joint DOFs, linearised on the manifold of FRFs that fit a joint."""
+"""The likelihood of FRFs between all joint DOFs, linearised on the manifold of FRFs that fit a joint.
+
+In reading order:
+
+line_forms      quadratic forms of the compliance on every line: the squares to be minimised
+coordinates     K*(w) of a joint, its compliance as a function of coordinates: springs, with cross terms, laws
+transforms      from channels to joint DOFs, and what is not rigid in them
+interface_frfs  FRFs of channels taken to the joint DOFs, with the covariance of their noise
+prepare         arguments into a problem; errors for FRFs from which no joint can be found
+on_manifold     FRFs that fit a joint: projection, forms, expected M of a stiff joint
+starts          first coordinates from the compliance of single lines
+group_fit       the iteration: linearise, minimise, judge
+unknown_cross   the fit where cross terms of C are unknown
+estimate        strategies tried in order for every group of DOFs, put together
+uncertainty     scatter between lines and parts of the band, intervals, test of the residual
+beyond_noise    sides that are not rigid, parts of the band that disagree
+fit             all of it: noise level, choice of damping, uncertainty
+
+What it shares with the likelihood of models is in `jointfrf.identification`: parameters, minimise, profile,
+residual_test, noise, line_starts. Smooth FRFs and the noise model come from `jointfrf.frf`.
+"""

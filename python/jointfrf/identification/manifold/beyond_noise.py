@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from jointfrf.identification.manifold.coordinates import DiagonalJoint, terms_of
-from jointfrf.identification.manifold.estimate import FittedGroup, JointEstimate
-from jointfrf.identification.manifold.group_fit import gradients_of
+from jointfrf.identification.manifold.estimate import JointEstimate
+from jointfrf.identification.manifold.group_fit import GroupFit, gradients_of
 from jointfrf.identification.manifold.interface_frfs import InterfaceFrfs
 from jointfrf.identification.manifold.transforms import ChannelModes, left_out
 from jointfrf.identification.minimise import inverse_information
@@ -72,33 +71,32 @@ def channel_spread(found: JointEstimate, frfs: InterfaceFrfs, compliance: FloatA
         few = (special.stdtrit(degrees, 0.975) / special.ndtri(0.975)) ** 2
     std_error, factor = np.zeros((2, len(found.parameters)))
     for group in found.groups:
-        minimum = group.fit.minimum
-        inverse = inverse_information(minimum.information)
-        changes, weights, of_noise = np.zeros((0, minimum.x.size)), np.zeros(0), 0.0
+        inverse = inverse_information(group.information)
+        changes, weights, of_noise = np.zeros((0, group.x.size)), np.zeros(0), 0.0
         if without is not None:
             entries = (frfs.entries_of(group.dofs, one) for one in without.gamma)
-            changes = gradients_of(group.problem, group.fit, entries) @ inverse
+            changes = gradients_of(group, entries) @ inverse
             weights, of_noise = without.redundancy, few * _TIMES
         if compliance is not None:
             softer = _softer(group, compliance[group.dofs]) @ inverse
-            if isinstance(group.joint, DiagonalJoint):
+            if group.joint.in_compliance:
                 # Whatever the damping takes up of it.
-                softer[:, : group.dofs.size] = np.diag(compliance[group.dofs])
+                softer[:, group.joint.is_compliance] = np.diag(compliance[group.dofs])
         else:
-            softer = np.zeros((0, minimum.x.size))
+            softer = np.zeros((0, group.x.size))
         scatters = (few * weights, changes), (np.full(len(softer), few), softer)
         std_error[group.which], factor[group.which] = _spread(group, scatters, of_noise, inverse / 2)
     return ChannelSpread(std_error, factor)
 
 
 def _spread(
-    group: FittedGroup, scatters: tuple[tuple[FloatArray, FloatArray], ...], of_noise: float, noise: FloatArray
+    group: GroupFit, scatters: tuple[tuple[FloatArray, FloatArray], ...], of_noise: float, noise: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return standard errors, and variances over those from noise, of weighted changes of the coordinates.
 
     The first changes are those of channels left out, of which noise makes up `of_noise` of its variance.
     """
-    slope = group.joint.theta_slope(group.fit.minimum.x)
+    slope = group.joint.theta_slope(group.x)
     found = []
     for to_parameters in (np.eye(len(slope)), slope):
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -109,20 +107,15 @@ def _spread(
     (of_coordinate, of_coordinates), (of_parameter, ratio) = found
     # A rigid DOF has no finite slope.
     ratio = np.where(np.isfinite(ratio), ratio, of_coordinates)
-    in_compliance = isinstance(group.joint, DiagonalJoint) & (terms_of(group.joint).kinds == 0)
-    return np.where(in_compliance, of_coordinate, of_parameter), np.nan_to_num(ratio)
+    return np.where(group.joint.is_compliance, of_coordinate, of_parameter), np.nan_to_num(ratio)
 
 
-def _softer(group: FittedGroup, compliance: FloatArray) -> FloatArray:
+def _softer(group: GroupFit, compliance: FloatArray) -> FloatArray:
     """Return by how much the gradient changes when the compliance of each DOF is larger, shape (n, p)."""
-    minimum, joint, forms = group.fit.minimum, group.joint, group.fit.forms
-    n = group.dofs.size
-    entries = forms.compliance.shape[1]
-    rows, columns = np.diag_indices(n) if entries == n else np.triu_indices(n)
-    adjoint = joint.slope(minimum.x, joint.compliance(minimum.x)).conj()
-    change = np.zeros((n, entries))
-    for d in range(n):
-        change[d, (rows == d) & (columns == d)] = compliance[d]
+    joint, forms = group.joint, group.forms
+    adjoint = joint.slope(group.x, joint.compliance(group.x)).conj()
+    own = (joint.rows == joint.columns) & (joint.rows == np.arange(joint.n)[:, None])
+    change = own * compliance[:, None]
     weighted = np.einsum("lqr,dr->ldq", forms.weight, change)
     found: FloatArray = np.einsum("lqp,ldq->dp", adjoint, weighted).real
     return found
@@ -148,14 +141,14 @@ def _without_channels(frfs: InterfaceFrfs) -> _Changes | None:
     return _Changes(gamma, np.array([one.redundancy for one in (*responses, *forces)]))
 
 
-#: Parts of the band that are fitted each by itself.
+#: Parts of the band that are fitted separately.
 _PARTS = 4
-#: Probability at which parts are said to disagree.
+#: Probability at which parts disagree.
 _DISAGREE = 1e-3
 
 
 class BandParts(NamedTuple):
-    """What fits of parts of the band, each by itself, say of the fit of all of it.
+    """Separate fits of parts of the band, compared with the fit of all of it.
 
     Attributes
     ----------
@@ -178,7 +171,7 @@ class BandParts(NamedTuple):
 
 def left_out_share(found: JointEstimate) -> float:
     """Return the largest share of lines that do not fit the joint found, over the groups fitted on the manifold."""
-    shares = [float(np.mean(~group.fit.trusted)) for group in found.groups if group.fit.beside is None]
+    shares = [float(np.mean(~group.used)) for group in found.groups if group.unknown_cross is None]
     return max(shares, default=0.0)
 
 
@@ -200,14 +193,13 @@ def fit_band_parts(
 
     Notes
     -----
-    Lines that do not fit the joint found are left out of a fit, and with them what would deny it: the residual stays
+    Lines that do not fit the joint found are left out of a fit, and with them what contradicts it: the residual stays
     that of the noise, and no scatter shows. Parts of the band find joints of their own. They disagree where the squares
     of their differences from the weighted mean, over their variances, are improbable for noise.
     """
     in_compliance = np.zeros(factor.size, bool)
     for group in found.groups:
-        if isinstance(group.joint, DiagonalJoint):
-            in_compliance[group.which] = terms_of(group.joint).kinds == 0
+        in_compliance[group.which] = group.joint.is_compliance
     parts = [np.sort(own) for own in np.array_split(np.argsort(freq_hz), _PARTS)]
     theta, variance = (np.full((_PARTS, factor.size), np.nan) for _ in range(2))
     for b, own in enumerate(parts):

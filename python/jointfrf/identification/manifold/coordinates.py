@@ -7,6 +7,7 @@ of laws in their parameters.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import Literal, NamedTuple, Protocol
 
@@ -14,8 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf.dofs import Parameter, ParameterKind, joint_parameters
+from jointfrf.identification.manifold.line_forms import FormMinimum, FormSquares, LineForms
+from jointfrf.identification.minimise import minimise
 from jointfrf.identification.parameters import ParameterVector, joint_vector
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.kernel.call import call_for_number
 from jointfrf.kernel.linear_algebra import invert
 from jointfrf.laws.law_joint import LawJoint
 
@@ -27,11 +31,13 @@ __all__ = [
     "JointCoordinates",
     "JointTerms",
     "LawCoordinates",
+    "NamedParameter",
+    "SpringJoint",
+    "coordinates_of",
     "joint_terms",
-    "terms_of",
 ]
 
-#: Terms of K* beside its stiffness.
+#: Terms of K* in addition to its stiffness.
 DampingTerms = Literal["none", "viscous", "hysteretic", "both"]
 #: Terms that couple the DOFs of a joint: none, and this is used; perhaps, but not sought; fitted.
 CrossTerms = Literal["zero", "ignore", "fit"]
@@ -44,6 +50,26 @@ _KINDS: Mapping[DampingTerms, tuple[ParameterKind, ...]] = {
 }
 #: Rates eta and w tau are limited: K* is then damping only.
 _LARGEST_RATE = 100.0
+#: Steps of a minimiser at most.
+_STEPS = 100
+#: A minimum is found when two steps gain less than this of the squares of one residual, or one step promises less than
+#: a share of that.
+_LEAST_GAIN, _PROMISED = 1e-6, 1e-3
+#: Share of the largest rate beyond which a DOF is all damping.
+_ALL_DAMPING = 0.1
+#: Other starts are followed until a step gains less than this of the squares of one residual.
+_COARSE = 1e-2
+#: Relative standard error of a compliance from which on intervals come from the profile of the likelihood.
+_CURVED = 0.1
+_TINY = float(np.finfo(float).tiny)
+
+
+class NamedParameter(Protocol):
+    """A parameter of a joint, of springs or of any law."""
+
+    @property
+    def name(self) -> str:
+        """Its name."""
 
 
 class JointTerms(NamedTuple):
@@ -134,64 +160,184 @@ def joint_terms(
     )
 
 
-class JointCoordinates(Protocol):
+class JointCoordinates(ABC):
     """The compliance C = K*^-1 of a joint as a function of coordinates x of length p, one for each parameter.
 
     Attributes
     ----------
+    parameters : sequence, length p
+        Parameters of the joint in the order of the coordinates.
+    omega : ndarray, shape (n_freq,)
+        rad/s.
+    n : int
+        Joint DOFs.
+    rows, columns : ndarray of int, shape (q,)
+        Entries of C that the coordinates change, on and above its diagonal.
     lower, upper : ndarray, shape (p,)
         Smallest and largest value of each coordinate.
+    dofs : ndarray of int, shape (p,)
+        DOF of each parameter, of a cross term that of its row.
+    is_stiffness : ndarray of bool, shape (p,)
+        Parameters that are the stiffness of one DOF.
+    in_compliance : bool
+        Whether the coordinates of stiffnesses are compliances, 0 for a rigid DOF, and those of damping their rates: the
+        n compliances first.
+    rate_of_one : ndarray
+        Rates at which damping is as large as stiffness on the highest line; of those coordinates only.
     """
 
+    parameters: Sequence[NamedParameter]
+    omega: FloatArray
+    n: int
+    rows: NDArray[np.intp]
+    columns: NDArray[np.intp]
     lower: FloatArray
     upper: FloatArray
+    dofs: NDArray[np.intp]
+    is_stiffness: NDArray[np.bool_]
+    in_compliance = False
+    rate_of_one: FloatArray = np.zeros(0)
 
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the parameters."""
+        return tuple(one.name for one in self.parameters)
 
+    @property
+    def is_compliance(self) -> NDArray[np.bool_]:
+        """Which coordinates are compliances, shape (p,)."""
+        return self.is_stiffness & self.in_compliance
+
+    @abstractmethod
+    def on_lines(self, lines: slice | NDArray[np.intp]) -> JointCoordinates:
+        """Return the same on some of the lines."""
+
+    @abstractmethod
     def compliance(self, x: FloatArray) -> ComplexArray:
-        """Return the entries of C that the coordinates change, shape (n_freq, q)."""
+        """Return the entries of C that the coordinates change, shape (n_freq, q); NaN where K* is singular."""
 
+    @abstractmethod
     def slope(self, x: FloatArray, entries: ComplexArray) -> ComplexArray:
         """Return their derivatives by the coordinates, shape (n_freq, q, p)."""
 
-    def on_lines(self, lines: slice) -> JointCoordinates:
-        """Return the same on some of the lines."""
-
+    @abstractmethod
     def theta(self, x: FloatArray) -> FloatArray:
         """Return the parameters, shape (p,)."""
 
+    @abstractmethod
     def coordinates(self, theta: FloatArray) -> FloatArray:
         """Return the coordinates of parameters."""
 
+    @abstractmethod
     def theta_slope(self, x: FloatArray) -> FloatArray:
         """Return the derivatives of the parameters by the coordinates, shape (p, p)."""
 
+    def matrix(self, entries: ComplexArray) -> ComplexArray:
+        """Return C of its entries, shape (n_freq, n, n); zero where the coordinates change nothing."""
+        c = np.zeros((len(entries), self.n, self.n), np.complex128)
+        c[:, self.rows, self.columns] = c[:, self.columns, self.rows] = entries
+        return c
 
-class DiagonalJoint:
+    def line_parts(
+        self, x: FloatArray, entries: ComplexArray, weight: ComplexArray, residual: ComplexArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return Re(J^H r), shape (n_freq, p), and Re(J^H W J), shape (n_freq, p, p), of each line; J is the slope."""
+        slope = self.slope(x, entries)
+        adjoint = slope.conj().swapaxes(1, 2)
+        return (adjoint @ residual[..., None])[..., 0].real, (adjoint @ (weight @ slope)).real
+
+    def normal_equations(
+        self, x: FloatArray, entries: ComplexArray, weight: ComplexArray, residual: ComplexArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return Re(J^H W J), shape (p, p), and Re(J^H r), shape (p,), of all lines."""
+        gradient, information = self.line_parts(x, entries, weight, residual)
+        return information.sum(axis=0), gradient.sum(axis=0)
+
+    def minimise(
+        self, forms: LineForms, start: FloatArray, held: int | None = None, least_gain: float = _LEAST_GAIN
+    ) -> FormMinimum:
+        """Minimise quadratic forms by Levenberg-Marquardt steps inside the bounds.
+
+        Parameters
+        ----------
+        forms : LineForms
+        start : ndarray, shape (p,)
+        held : int, optional
+            A coordinate that keeps its value.
+        least_gain : float
+            The iteration ends when two steps in a row lower the squares by less; a residual has mean square 1.
+        """
+        squares = FormSquares(forms, self)
+        small = least_gain / squares.unit
+        found = minimise(squares, start, held, _STEPS, _PROMISED * small, small)
+        return FormMinimum(found.x, found.cost, found.information, found.gradient, forms, self)
+
+    def lowest(
+        self, forms: LineForms, start: FloatArray, held: int | None = None, least_gain: float = _LEAST_GAIN
+    ) -> FormMinimum:
+        """Minimise as `minimise` does, from other starts, too, where a minimum may not be the lowest."""
+        return self.minimise(forms, start, held, least_gain)
+
+    def has_profile(self, i: int, x: FloatArray, covariance: FloatArray) -> bool:
+        """Whether noise is so far from normal in a coordinate that the interval of its parameter needs a profile."""
+        return False
+
+    def of_profile(self, i: int) -> JointCoordinates:
+        """Return the coordinates in which the likelihood of one parameter has its profile."""
+        return self
+
+    def value(self, i: int, x: FloatArray) -> float:
+        """Return one of the parameters."""
+        return float(self.theta(x)[i])
+
+    def end(self, i: int, sign: int) -> float:
+        """Return what a parameter runs to where its coordinate has no limit below (-1) or above (1)."""
+        return sign * np.inf
+
+    def longest_reach(self, i: int) -> float:
+        """Return how far from a minimum the limit of a parameter is sought first at most."""
+        return np.inf
+
+
+class SpringJoint(JointCoordinates):
+    """A joint of springs and dampers.
+
+    Parameters
+    ----------
+    terms : JointTerms
+    """
+
+    def __init__(self, terms: JointTerms) -> None:
+        self.terms, self.parameters, self.omega, self.n = terms, terms.parameters, terms.omega, terms.n
+        self.dofs = terms.pairs[:, 0]
+        self.is_stiffness = (terms.kinds == 0) & (terms.pairs[:, 0] == terms.pairs[:, 1])
+
+    def on_lines(self, lines: slice | NDArray[np.intp]) -> SpringJoint:
+        """Return the same on some of the lines."""
+        return type(self)(self.terms.on_lines(lines))
+
+
+class DiagonalJoint(SpringJoint):
     """A joint without cross terms: C_dd = a_d / (1 + i eta_d + i w tau_d); entries of C are its diagonal.
 
     With `by_rate` false the coordinates of damping are h and c themselves, C_dd = a_d / (1 + i a_d h_d + i w a_d
     c_d): for the profile of their likelihood.
     """
 
+    in_compliance = True
+
     def __init__(self, terms: JointTerms, *, by_rate: bool = True) -> None:
-        self.terms = terms
+        super().__init__(terms)
         self.by_rate = by_rate
-        self.dofs = terms.pairs[:, 0]
+        self.rows, self.columns = np.diag_indices(terms.n)
         self.rates = np.flatnonzero(terms.kinds > 0)
-        p, fastest = len(terms.parameters), max(float(terms.omega.max()), np.finfo(float).tiny)
+        p, fastest = len(terms.parameters), max(float(terms.omega.max()), _TINY)
+        self.rate_of_one = np.where(terms.kinds[self.rates] == 1, 1.0, 1 / fastest)
         self.largest_rate = np.where(terms.kinds[self.rates] == 1, _LARGEST_RATE, _LARGEST_RATE / fastest)
         self.upper = np.full(p, np.inf)
         if by_rate:
             self.upper[self.rates] = self.largest_rate
         self.lower = np.where(terms.kinds > 0, -self.upper, 0.0)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the parameters."""
-        return tuple(one.name for one in self.terms.parameters)
 
     def _turn(self, x: FloatArray) -> ComplexArray:
         """Return 1/(1 + i eta + i w tau) of each DOF, shape (n_freq, n)."""
@@ -218,7 +364,7 @@ class DiagonalJoint:
             slope[:, own, i] = -factors[self.terms.kinds[i]] * entries[:, own] * last
         return slope
 
-    def on_lines(self, lines: slice) -> DiagonalJoint:
+    def on_lines(self, lines: slice | NDArray[np.intp]) -> DiagonalJoint:
         """Return the same on some of the lines."""
         return DiagonalJoint(self.terms.on_lines(lines), by_rate=self.by_rate)
 
@@ -250,12 +396,78 @@ class DiagonalJoint:
             slope[self.rates] = np.eye(p)[self.rates]
         return slope
 
+    def line_parts(
+        self, x: FloatArray, entries: ComplexArray, weight: ComplexArray, residual: ComplexArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return Re(J^H r) and Re(J^H W J) of each line: each coordinate moves one entry."""
+        own = self.slope(x, entries)[:, self.dofs, np.arange(self.dofs.size)]
+        adjoint = own.conj()
+        weighted = adjoint[:, :, None] * weight[:, self.dofs[:, None], self.dofs] * own[:, None, :]
+        return (adjoint * residual[:, self.dofs]).real, weighted.real
 
-class CoupledJoint:
+    def minimise(
+        self, forms: LineForms, start: FloatArray, held: int | None = None, least_gain: float = _LEAST_GAIN
+    ) -> FormMinimum:
+        """Minimise quadratic forms in the kernel."""
+        p, n_freq = start.size, len(forms.squares)
+        sizes = (int(self.by_rate), self.n, p, n_freq, _STEPS, 0 if held is None else held + 1)
+        x, information, gradient = np.array(start, np.float64), np.empty((p, p)), np.empty(p)
+        which = (self.dofs + 1).astype(np.int32), self.terms.kinds.astype(np.int32)
+        lines = (self.omega, *map(np.ascontiguousarray, forms))
+        args = (*sizes, least_gain, *which, self.lower, self.upper, *lines, x, information, gradient)
+        cost, _ = call_for_number("fit_diagonal_joint", args)
+        return FormMinimum(x, cost, information, gradient, forms, self)
+
+    def lowest(
+        self, forms: LineForms, start: FloatArray, held: int | None = None, least_gain: float = _LEAST_GAIN
+    ) -> FormMinimum:
+        """Minimise; where a DOF ends rigid or all damping, also from no damping and from some.
+
+        A compliance and its rate are a vector in polar coordinates: at a = 0 nothing moves the rate any more, not even
+        from the wrong sign of damping.
+        """
+        found = self.minimise(forms, start, held, least_gain)
+        if self.rates.size == 0:
+            return found
+        n, of_rate = self.n, self.dofs[self.rates]
+        rate = abs(found.x[self.rates]) * (1.0 if self.by_rate else found.x[of_rate])
+        caught = found.x[:n] <= 0
+        np.logical_or.at(caught, of_rate, rate > _ALL_DAMPING * self.largest_rate)
+        if not caught.any():
+            return found
+        size = abs(forms.compliance).mean(axis=0)
+        for share in (0.0, 1.0):
+            x = found.x.copy()
+            x[:n] = np.where(caught, size, x[:n])
+            if held is not None:
+                x[held] = start[held]
+            other = share * self.rate_of_one / (1.0 if self.by_rate else np.maximum(x[of_rate], _TINY))
+            moved = caught[of_rate] & (self.rates != held)
+            x[self.rates] = np.where(moved, other, x[self.rates])
+            there = self.minimise(forms, x, held, max(least_gain, _COARSE))
+            if there.cost < found.cost - _COARSE:
+                found = self.minimise(forms, there.x, held, least_gain)
+        return found
+
+    def has_profile(self, i: int, x: FloatArray, covariance: FloatArray) -> bool:
+        """Whether the compliance of the DOF of a parameter has a large error."""
+        a = self.dofs[i]
+        return bool(np.sqrt(max(covariance[a, a], 0)) > _CURVED * x[a])
+
+    def of_profile(self, i: int) -> DiagonalJoint:
+        """Return the coordinates of a profile: damping itself where its own is asked for."""
+        return self if self.is_stiffness[i] == self.by_rate else DiagonalJoint(self.terms, by_rate=not self.by_rate)
+
+    def end(self, i: int, sign: int) -> float:
+        """Return what a parameter runs to: a stiffness is infinite where its compliance may be zero."""
+        return sign * np.inf if not self.is_stiffness[i] else (np.inf if sign < 0 else 0.0)
+
+
+class CoupledJoint(SpringJoint):
     """A joint with cross terms: its coordinates are the parameters themselves; entries are the upper triangle of C."""
 
     def __init__(self, terms: JointTerms) -> None:
-        self.terms = terms
+        super().__init__(terms)
         self.rows, self.columns = np.triu_indices(terms.n)
         self.pairs, place = np.unique(terms.pairs, axis=0, return_inverse=True)
         self.pair_of = place.ravel()
@@ -269,21 +481,13 @@ class CoupledJoint:
         self.lower = np.full(len(terms.parameters), -np.inf)
         self.upper = -self.lower
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the parameters."""
-        return tuple(one.name for one in self.terms.parameters)
-
     def compliance(self, x: FloatArray) -> ComplexArray:
         """Return the upper triangle of C, shape (n_freq, n (n + 1)/2); NaN where K* is singular."""
         return invert(self.terms.stiffness(x), on_singular="nan")[:, self.rows, self.columns]
 
     def _by_pair(self, entries: ComplexArray) -> ComplexArray:
         """Return C E C of each pair of DOFs, upper triangle, shape (n_freq, n (n + 1)/2, m)."""
-        n = self.terms.n
-        c = np.empty((len(entries), n, n), np.complex128)
-        c[:, self.rows, self.columns] = c[:, self.columns, self.rows] = entries
-        flat = c.reshape(len(c), n * n)
+        flat = self.matrix(entries).reshape(len(entries), -1)
         by_pair: ComplexArray = flat.take(self._left, axis=1)
         by_pair *= flat.take(self._right, axis=1)
         other = flat.take(self._other_left, axis=1)
@@ -297,14 +501,10 @@ class CoupledJoint:
         slope *= -self.terms.factors[self.terms.kinds].T[:, None, :]
         return slope
 
-    def on_lines(self, lines: slice) -> CoupledJoint:
-        """Return the same on some of the lines."""
-        return CoupledJoint(self.terms.on_lines(lines))
-
     def normal_equations(
         self, x: FloatArray, entries: ComplexArray, weight: ComplexArray, residual: ComplexArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Return Re(J^H W J), shape (p, p), and Re(J^H r), shape (p,), of all lines; J is the slope.
+        """Return Re(J^H W J) and Re(J^H r) of all lines.
 
         Terms of the same pair differ by a function of frequency only: products are of pairs.
         """
@@ -331,13 +531,12 @@ class CoupledJoint:
         return np.eye(x.size)
 
 
-def terms_of(joint: JointCoordinates) -> JointTerms:
-    """Return the terms of a joint of springs and dampers."""
-    assert isinstance(joint, DiagonalJoint | CoupledJoint)
-    return joint.terms
+def coordinates_of(terms: JointTerms) -> SpringJoint:
+    """Return the coordinates in which a joint of springs is fitted."""
+    return CoupledJoint(terms) if terms.has_cross_terms else DiagonalJoint(terms)
 
 
-class LawCoordinates:
+class LawCoordinates(JointCoordinates):
     """The compliance of a joint of laws as a function of the coordinates of its parameters.
 
     Parameters
@@ -356,14 +555,11 @@ class LawCoordinates:
 
     def __init__(self, joint: LawJoint, omega: FloatArray, size: FloatArray) -> None:
         self.joint, self.omega, self.size = joint, omega, size
+        self.parameters, self.n = joint.quantities, len(joint.dofs)
         self.vector: ParameterVector = joint_vector(joint, (), size)
         self.lower, self.upper = self.vector.bounds
-        self.rows, self.columns = np.triu_indices(len(joint.dofs))
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the parameters."""
-        return self.joint.names
+        self.rows, self.columns = np.triu_indices(self.n)
+        self.dofs, self.is_stiffness = np.zeros(self.lower.size, np.intp), np.zeros(self.lower.size, bool)
 
     def _at(self, x: FloatArray) -> LawJoint:
         return self.joint.with_values(self.vector.to_values(x))
@@ -375,9 +571,7 @@ class LawCoordinates:
 
     def slope(self, x: FloatArray, entries: ComplexArray) -> ComplexArray:
         """Return its derivatives by the coordinates, -C dK C, shape (n_freq, n (n + 1)/2, p)."""
-        n = len(self.joint.dofs)
-        c = np.empty((len(entries), n, n), np.complex128)
-        c[:, self.rows, self.columns] = c[:, self.columns, self.rows] = entries
+        c = self.matrix(entries)
         slope = np.zeros((*entries.shape, x.size), np.complex128)
         for i, (places, by_value) in enumerate(self._at(x).connection_slopes(self.omega)):
             for a, b in places:
@@ -385,7 +579,7 @@ class LawCoordinates:
         slope *= self.vector.slope(x)
         return slope
 
-    def on_lines(self, lines: slice) -> LawCoordinates:
+    def on_lines(self, lines: slice | NDArray[np.intp]) -> LawCoordinates:
         """Return the same on some of the lines."""
         return LawCoordinates(self.joint, self.omega[lines], self.size)
 
@@ -400,3 +594,19 @@ class LawCoordinates:
     def theta_slope(self, x: FloatArray) -> FloatArray:
         """Return the derivatives of the parameters by the coordinates, shape (p, p)."""
         return np.diag(self.vector.slope(x))
+
+    def has_profile(self, i: int, x: FloatArray, covariance: FloatArray) -> bool:
+        """Whether its interval needs a profile: that of any parameter of a law."""
+        return True
+
+    def value(self, i: int, x: FloatArray) -> float:
+        """Return one of the parameters."""
+        return self.vector.value(i, x)
+
+    def end(self, i: int, sign: int) -> float:
+        """Return what a parameter runs to where its coordinate has no limit below (-1) or above (1)."""
+        return self.vector.end(i, sign)
+
+    def longest_reach(self, i: int) -> float:
+        """Return how far from a minimum the limit of a parameter is sought first at most."""
+        return self.vector.longest_reach(i)

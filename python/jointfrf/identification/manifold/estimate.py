@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from typing import NamedTuple, Protocol
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from jointfrf.dofs import Parameter
 from jointfrf.frf.bands import spread_lines
+from jointfrf.identification.line_starts import from_lines, interface_compliance
 from jointfrf.identification.manifold.coordinates import (
-    CoupledJoint,
     CrossTerms,
-    DiagonalJoint,
-    JointCoordinates,
     JointTerms,
-    terms_of,
+    LawCoordinates,
+    NamedParameter,
+    coordinates_of,
 )
 from jointfrf.identification.manifold.group_fit import LITTLE_PATIENCE, GroupFit, GroupProblem, fit_dofs
 from jointfrf.identification.manifold.interface_frfs import InterfaceFrfs
@@ -24,55 +25,19 @@ from jointfrf.identification.manifold.line_forms import FormMinimum
 from jointfrf.identification.manifold.on_manifold import LineData, OnManifold
 from jointfrf.identification.manifold.starts import first_joints
 from jointfrf.identification.manifold.unknown_cross import fit_unknown_cross
-from jointfrf.kernel.arguments import FloatArray
+from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.laws.law_joint import LawJoint
 
-__all__ = [
-    "FittedGroup",
-    "GroupData",
-    "GroupStart",
-    "JointEstimate",
-    "NamedParameter",
-    "estimate_joint",
-    "grouped",
-    "unknown_entries",
-]
+__all__ = ["GroupData", "GroupStart", "JointEstimate", "assembled", "estimate_joint", "estimate_laws"]
 
 #: A compliance is not taken below this share of its standard error, nor of the receptances around it.
 _RIGID, _ROUNDING = 1e-3, 1e-12
 #: A fit that leaves cross terms unknown fits far better from this ratio of the mean squares on.
 _FAR_BETTER = 4.0
+_TINY = float(np.finfo(float).tiny)
 
-
-#: A group of DOFs that is fitted by itself, and its FRFs.
+#: A group of DOFs that is fitted separately, and its FRFs.
 GroupData = tuple[NDArray[np.intp], LineData]
-
-
-class NamedParameter(Protocol):
-    """A parameter of a joint, of springs or of any law."""
-
-    @property
-    def name(self) -> str:
-        """Its name."""
-
-
-class FittedGroup(NamedTuple):
-    """The fit of one group of DOFs.
-
-    Attributes
-    ----------
-    dofs : ndarray of int
-    which : ndarray of int
-        Its parameters among all.
-    joint : JointCoordinates
-    problem : GroupProblem
-    fit : GroupFit
-    """
-
-    dofs: NDArray[np.intp]
-    which: NDArray[np.intp]
-    joint: JointCoordinates
-    problem: GroupProblem
-    fit: GroupFit
 
 
 class GroupStart(NamedTuple):
@@ -81,29 +46,26 @@ class GroupStart(NamedTuple):
     Attributes
     ----------
     dofs : ndarray of int
-    parameters : tuple of Parameter, length p
+    parameters : tuple of parameters, length p
     x : ndarray, shape (p,)
         Coordinates of the joint.
     on : OnManifold, optional
         FRFs that nearly fit it.
-    is_last : bool
-        Whether the fit ends there, be its residual noise or not: as where one with more terms fits.
     """
 
     dofs: NDArray[np.intp]
-    parameters: tuple[Parameter, ...]
+    parameters: tuple[NamedParameter, ...]
     x: FloatArray
     on: OnManifold | None
-    is_last: bool = False
 
     @classmethod
-    def of(cls, group: FittedGroup, minimum: FormMinimum) -> GroupStart:
+    def of(cls, group: GroupFit, minimum: FormMinimum) -> GroupStart:
         """Return the start at a minimum of the quadratic forms of a fit."""
-        return cls(group.dofs, terms_of(minimum.joint).parameters, minimum.x, group.fit.on)
+        return cls(group.dofs, tuple(minimum.joint.parameters), minimum.x, group.on)
 
 
 class JointEstimate(NamedTuple):
-    """Result of `estimate`.
+    """Result of `estimate_joint`.
 
     Attributes
     ----------
@@ -113,7 +75,7 @@ class JointEstimate(NamedTuple):
         Their values.
     covariance : ndarray, shape (p, p)
         From the noise of the FRFs, as if lines were independent.
-    groups : tuple of FittedGroup
+    groups : tuple of GroupFit
     excess : float
         Mean square of the residual in units of the noise.
     scale : float
@@ -125,7 +87,7 @@ class JointEstimate(NamedTuple):
     parameters: Sequence[NamedParameter]
     theta: FloatArray
     covariance: FloatArray
-    groups: tuple[FittedGroup, ...]
+    groups: tuple[GroupFit, ...]
     excess: float
     scale: float
     equations: float
@@ -133,7 +95,7 @@ class JointEstimate(NamedTuple):
     @property
     def converged(self) -> bool:
         """Whether the fits of all groups did."""
-        return all(group.fit.converged for group in self.groups)
+        return all(group.converged for group in self.groups)
 
     @property
     def data(self) -> tuple[GroupData, ...]:
@@ -143,7 +105,7 @@ class JointEstimate(NamedTuple):
     @property
     def starts(self) -> tuple[GroupStart, ...]:
         """Where fits of other FRFs of the same structure begin; groups that did not converge have none."""
-        return tuple(GroupStart.of(group, group.fit.minimum) for group in self.groups if group.fit.converged)
+        return tuple(GroupStart.of(group, group) for group in self.groups if group.converged)
 
 
 def estimate_joint(
@@ -153,8 +115,10 @@ def estimate_joint(
     used: NDArray[np.bool_] | None = None,
     near: Sequence[GroupStart] = (),
     data: Iterable[GroupData] | None = None,
+    *,
+    is_explained: bool = False,
 ) -> JointEstimate:
-    """Fit a joint to FRFs whose noise is known.
+    """Fit a joint of springs to FRFs whose noise is known.
 
     Parameters
     ----------
@@ -168,106 +132,224 @@ def estimate_joint(
     near : sequence of GroupStart
         Of other FRFs of the same structure, or of other terms: where the fits start first.
     data : iterable of (dofs, LineData), optional
-        What `grouped` returns, where it is known.
+        Groups of DOFs and their FRFs, where they are known.
+    is_explained : bool
+        Whether a joint with more terms explains the FRFs: then `near` alone suffices to show that this one does not.
     """
     groups = []
     known = {(tuple(start.dofs.tolist()), start.parameters): start for start in near}
-    for dofs, lines in grouped(frfs) if data is None else data:
+    for dofs, lines in _grouped(frfs) if data is None else data:
         own, which = terms.of_dofs(dofs)
         joint = coordinates_of(own)
-        problem = GroupProblem(lines, joint, unknown_entries(dofs, cross, used, len(lines.measured)))
-        fit = _fitted(problem, cross, known.get((tuple(dofs.tolist()), own.parameters)))
-        groups.append(FittedGroup(dofs, which, joint, problem, fit))
-    return assembled(terms, groups)
+        problem = GroupProblem(dofs, which, lines, joint, _unknown_entries(dofs, cross, used, len(lines.measured)))
+        # Some lines, evenly spread, start as well as all.
+        some = spread_lines(len(lines.measured))
+
+        def starts(lines: LineData = lines, terms: JointTerms = own, some: slice = some) -> list[FloatArray]:
+            return first_joints(lines.on_lines(some), coordinates_of(terms.on_lines(some)))
+
+        start = known.get((tuple(dofs.tolist()), own.parameters))
+        groups.append(_fitted(_Search(problem, starts, cross, start, is_explained)))
+    return assembled(terms.parameters, groups)
 
 
-def grouped(frfs: InterfaceFrfs) -> Iterator[GroupData]:
-    """Return groups of DOFs that are fitted each by itself, and their FRFs."""
+def estimate_laws(
+    frfs: InterfaceFrfs, joint: LawJoint, omega: FloatArray, used: NDArray[np.bool_] | None = None
+) -> JointEstimate:
+    """Fit a joint of laws to FRFs whose noise is known.
+
+    Parameters
+    ----------
+    frfs : InterfaceFrfs
+    joint : LawJoint
+        Its DOFs in the order of the FRFs, without masses; its values are tried as a start.
+    omega : ndarray, shape (n_freq,)
+        rad/s.
+    used : ndarray of bool, shape (n_freq, n), optional
+        Lines used for each DOF; all by default.
+    """
+    groups, names = [], list(joint.names)
+    left = set(joint.laws)
+    for dofs, lines in _grouped(frfs):
+        inside = [joint.dofs[d] for d in dofs]
+        laws = {pair: law for pair, law in joint.laws.items() if set(pair) <= set(inside)}
+        if not laws:
+            continue
+        left -= set(laws)
+        own = LawJoint(laws, [dof for dof in joint.rigid if dof in inside], None, inside)
+        gamma, variance = _between(frfs, dofs)
+        driving = abs(np.einsum("lpp->lp", gamma))
+        # 1/(|gamma_jj| + |gamma_kk|) is a size of stiffness that FRFs can show.
+        size = np.median(1 / np.maximum(driving[:, : dofs.size] + driving[:, dofs.size :], 1e-300), axis=0)
+        coordinates = LawCoordinates(own, omega, size)
+        rigid = len(own.rigid)
+        problem = GroupProblem(
+            dofs, np.array([names.index(name) for name in own.names], np.intp), lines, coordinates,
+            _unknown_entries(dofs, "zero", used, len(lines.measured)),
+            rigid * (rigid + 1) // 2 if frfs.reciprocal else rigid**2,
+        )  # fmt: skip
+        both = list(range(2 * dofs.size))
+        values = from_lines(own, omega, interface_compliance(gamma, variance, (both, both)))
+        given = [own.values] if values is None else [values, own.values]
+        starts = [coordinates.coordinates(one) for one in given]
+        groups.append(_fitted(_Search(problem, lambda starts=starts: starts, "zero")))  # type: ignore[misc]
+    if left:
+        a, b = next(iter(left))
+        raise ValueError(f"the FRFs between {a} and {b} are zero: they say nothing of the cross term {a},{b}")
+    return assembled(joint.quantities, groups)
+
+
+def _grouped(frfs: InterfaceFrfs) -> Iterator[GroupData]:
+    """Return groups of DOFs that are fitted separately, and their FRFs."""
     for dofs in frfs.on_lines(spread_lines(len(frfs.measured))).groups():
         yield dofs, frfs.of_dofs(dofs)
 
 
-def _fitted(problem: GroupProblem, cross: CrossTerms, near: GroupStart | None) -> GroupFit:
-    """Fit a group: on the manifold, or to the diagonal of C where its cross terms are unknown or deny every joint."""
-    if near is not None and cross != "ignore":
-        found = fit_dofs(problem, [near.x], LITTLE_PATIENCE, near.on)
-        if found.is_noise or near.is_last:
+def _between(frfs: InterfaceFrfs, dofs: NDArray[np.intp]) -> tuple[ComplexArray, FloatArray]:
+    """Return smooth FRFs between some joint DOFs j, then k, and E|e|^2 of the measured ones."""
+    at = np.concatenate([dofs, dofs + frfs.n])
+    variance = np.where(np.isfinite(frfs.variance), frfs.variance, 0)
+    return frfs.smooth_gamma[:, at[:, None], at], frfs.responses[at] ** 2 @ variance @ (frfs.forces[at] ** 2).T
+
+
+@dataclass(frozen=True)
+class _Search:
+    """The search for the joint of a group, with the fits that several strategies look at.
+
+    Attributes
+    ----------
+    problem : GroupProblem
+    starts_of_lines : callable
+        Returns coordinates of the joint from the compliance of single lines, the likeliest first.
+    cross : {"zero", "ignore", "fit"}
+    near : GroupStart, optional
+        What a fit to other FRFs of the same structure, or with other terms, has found.
+    is_explained : bool
+        As in `estimate_joint`.
+    """
+
+    problem: GroupProblem
+    starts_of_lines: Callable[[], list[FloatArray]]
+    cross: CrossTerms
+    near: GroupStart | None = None
+    is_explained: bool = False
+
+    @cached_property
+    def starts(self) -> list[FloatArray]:
+        """Coordinates from the compliance of single lines."""
+        return self.starts_of_lines()
+
+    @cached_property
+    def diagonal(self) -> GroupFit:
+        """The fit to the diagonal of C, whatever its cross terms are."""
+        return fit_unknown_cross(self.problem, self.starts)
+
+    @cached_property
+    def on_manifold(self) -> GroupFit:
+        """The fit without cross terms, from the diagonal of C, and where that is not good enough from the lines."""
+        found = fit_dofs(self.problem, [self.diagonal.x], LITTLE_PATIENCE)
+        # Where the diagonal of C fits far better, other starts do not help: cross terms are not zero.
+        if found.is_good or (found.is_lost and found.excess > _FAR_BETTER * self.diagonal.excess):
             return found
-    # Some lines, evenly spread, start as well as all.
-    some = spread_lines(len(problem.data.measured))
-    starts = first_joints(problem.data.on_slice(some), coordinates_of(terms_of(problem.joint).on_lines(some)))
-    if not problem.is_diagonal or problem.data.entries.n == 1:
-        return fit_dofs(problem, starts)
-    diagonal = fit_unknown_cross(problem, starts)
-    if cross == "ignore":
-        return diagonal
-    found = fit_dofs(problem, [diagonal.minimum.x], LITTLE_PATIENCE)
-    # Where the diagonal of C fits far better, other starts do not help: cross terms are not zero.
-    if not found.is_good and not (found.is_lost and found.excess > _FAR_BETTER * diagonal.excess):
-        found = min(found, fit_dofs(problem, starts), key=lambda one: one.squares)
-    if not found.is_lost:
-        return found
-    assert diagonal.beside is not None
-    return diagonal._replace(beside=diagonal.beside._replace(noise_squares=found.excess * diagonal.equations))
+        return min(found, fit_dofs(self.problem, self.starts), key=lambda one: one.squares)
 
 
-def coordinates_of(terms: JointTerms) -> JointCoordinates:
-    """Return the coordinates in which a joint is fitted."""
-    return CoupledJoint(terms) if terms.has_cross_terms else DiagonalJoint(terms)
+def _from_another_fit(search: _Search) -> GroupFit | None:
+    """Take the joint near another fit if its residual is noise, or if that is all that is asked."""
+    if search.near is None or search.cross == "ignore":
+        return None
+    found = fit_dofs(search.problem, [search.near.x], LITTLE_PATIENCE, search.near.on)
+    return found if found.is_noise or search.is_explained else None
 
 
-def assembled(terms: JointTerms, groups: list[FittedGroup]) -> JointEstimate:
+def _from_lines(search: _Search) -> GroupFit | None:
+    """Start from single lines where no cross term of C is assumed to be zero: nothing simpler is near."""
+    is_simple = search.problem.joint.in_compliance and search.problem.joint.n > 1
+    return None if is_simple else fit_dofs(search.problem, search.starts)
+
+
+def _with_cross_terms_ignored(search: _Search) -> GroupFit | None:
+    """Fit the diagonal of C alone if that was asked for."""
+    return search.diagonal if search.cross == "ignore" else None
+
+
+def _without_cross_terms(search: _Search) -> GroupFit | None:
+    """Fit with cross terms of zero, unless that stays far from the data."""
+    return None if search.on_manifold.is_lost else search.on_manifold
+
+
+def _with_cross_terms_unknown(search: _Search) -> GroupFit | None:
+    """Fit the diagonal of C: no joint without cross terms is near the data."""
+    statistics = search.diagonal.unknown_cross
+    assert statistics is not None
+    squares = search.on_manifold.excess * search.diagonal.equations
+    return replace(search.diagonal, unknown_cross=statistics._replace(noise_squares=squares))
+
+
+#: Ways to find the joint of a group, tried in this order until one applies.
+_STRATEGIES: tuple[Callable[[_Search], GroupFit | None], ...] = (
+    _from_another_fit,
+    _from_lines,
+    _with_cross_terms_ignored,
+    _without_cross_terms,
+    _with_cross_terms_unknown,
+)
+
+
+def _fitted(search: _Search) -> GroupFit:
+    return next(found for strategy in _STRATEGIES if (found := strategy(search)) is not None)
+
+
+def assembled(parameters: Sequence[NamedParameter], groups: Sequence[GroupFit]) -> JointEstimate:
     """Put the fits of all groups together."""
-    p = len(terms.parameters)
+    p = len(parameters)
     theta, covariance = np.full(p, np.nan), np.zeros((p, p))
     for group in groups:
-        own = group.fit.minimum.covariance
-        x = group.fit.minimum.x.copy()
-        if isinstance(group.joint, DiagonalJoint):
-            # A stiffness beyond what the data can tell stays a number; its interval says that it is open.
-            a = slice(0, len(group.dofs))
-            error = np.sqrt(np.maximum(np.diagonal(own)[a], 0))
-            own = _with_hidden_rates(own, group, error)
-            x[a] = np.maximum(x[a], np.maximum(_RIGID * error, _ROUNDING * group.problem.data.own_size))
+        x, own = _reported(group)
         theta[group.which] = group.joint.theta(x)
         slope = group.joint.theta_slope(x)
         covariance[group.which[:, None], group.which] = slope @ own @ slope.T
     kept = np.sort(np.concatenate([group.which for group in groups]))
     place = np.full(p, -1)
     place[kept] = np.arange(kept.size)
-    equations = sum(group.fit.equations for group in groups)
+    equations = sum(group.equations for group in groups)
     degrees = max(equations - kept.size / 2, 1)
     return JointEstimate(
-        tuple(terms.parameters[i] for i in kept),
+        tuple(parameters[i] for i in kept),
         theta[kept],
         covariance[kept[:, None], kept],
-        tuple(group._replace(which=place[group.which]) for group in groups),
-        sum(group.fit.noise_squares for group in groups) / degrees,
-        sum(group.fit.minimum.cost for group in groups) / degrees,
+        tuple(replace(group, problem=group.problem._replace(which=place[group.which])) for group in groups),
+        sum(group.noise_squares for group in groups) / degrees,
+        sum(group.cost for group in groups) / degrees,
         equations,
     )
 
 
-def _with_hidden_rates(covariance: FloatArray, group: FittedGroup, error: FloatArray) -> FloatArray:
-    """Return the covariance with that of rates which nothing shows because their DOF was found rigid.
+def _reported(group: GroupFit) -> tuple[FloatArray, FloatArray]:
+    """Return coordinates that give finite parameters, and the covariance with that of rates of rigid DOFs.
 
-    A pseudo-inverse has zero there. They get the variance that they would have if the compliance were as large as its
-    standard error.
+    A stiffness beyond what the data can tell stays a number; its interval says that it is open. Rates that nothing
+    shows because their DOF was found rigid have a variance of zero by a pseudo-inverse. They get the variance that they
+    would have if the compliance were as large as its standard error.
     """
-    joint, minimum = group.joint, group.fit.minimum
-    hidden = np.flatnonzero((minimum.x[terms_of(joint).pairs[:, 0]] == 0) & (terms_of(joint).kinds > 0))
-    if hidden.size == 0:
-        return covariance
-    at = minimum.x.copy()
-    at[: error.size] = np.maximum(at[: error.size], error)
-    slope = joint.slope(at, joint.compliance(at))[:, :, hidden]
-    information = np.einsum("lqh,lqr,lrh->h", slope.conj(), group.fit.forms.weight, slope).real
-    known = covariance.copy()
-    known[hidden, hidden] = 1 / np.maximum(2 * information, np.finfo(float).tiny)
-    return known
+    joint, x, covariance = group.joint, group.x.copy(), group.covariance
+    if not joint.in_compliance:
+        return x, covariance
+    a = joint.is_compliance
+    error = np.sqrt(np.maximum(np.diagonal(covariance)[a], 0))
+    hidden = np.flatnonzero((x[joint.dofs] == 0) & ~a)
+    if hidden.size:
+        at = x.copy()
+        at[a] = np.maximum(at[a], error)
+        slope = joint.slope(at, joint.compliance(at))[:, :, hidden]
+        information = np.einsum("lqh,lqr,lrh->h", slope.conj(), group.forms.weight, slope).real
+        covariance = covariance.copy()
+        covariance[hidden, hidden] = 1 / np.maximum(2 * information, _TINY)
+    x[a] = np.maximum(x[a], np.maximum(_RIGID * error, _ROUNDING * group.problem.data.own_size))
+    return x, covariance
 
 
-def unknown_entries(
+def _unknown_entries(
     dofs: NDArray[np.intp], cross: CrossTerms, used: NDArray[np.bool_] | None, n_freq: int
 ) -> NDArray[np.bool_]:
     """Return which entries of C are unknown, shape (n_freq, n * n)."""

@@ -1,17 +1,17 @@
-"""From a prepared problem to numbers: the fit on the manifold with its choice of damping."""
+"""From a prepared problem to numbers: the fit on the manifold, of springs with a choice of damping, or of laws."""
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf.errors import IllConditionedWarning
-from jointfrf.frf.bands import in_pieces
 from jointfrf.identification.manifold.beyond_noise import (
     BandParts,
     ChannelSpread,
@@ -22,42 +22,36 @@ from jointfrf.identification.manifold.beyond_noise import (
 from jointfrf.identification.manifold.coordinates import (
     CrossTerms,
     DampingTerms,
-    DiagonalJoint,
     JointTerms,
+    coordinates_of,
     joint_terms,
-    terms_of,
 )
 from jointfrf.identification.manifold.estimate import (
-    FittedGroup,
     GroupData,
     GroupStart,
     JointEstimate,
-    coordinates_of,
     estimate_joint,
+    estimate_laws,
 )
-from jointfrf.identification.manifold.interface_frfs import InterfaceFrfs
-from jointfrf.identification.manifold.line_forms import FormMinimum, minimise_forms
+from jointfrf.identification.manifold.group_fit import GroupFit
+from jointfrf.identification.manifold.line_forms import FormMinimum
 from jointfrf.identification.manifold.prepare import FitProblem, check_estimate
-from jointfrf.identification.manifold.scatter import Spread, spread_of
-from jointfrf.identification.manifold.spring_intervals import LikelihoodIntervals
-from jointfrf.identification.residual_test import Misfit, diagnose
-from jointfrf.kernel.arguments import ComplexArray, FloatArray
-from jointfrf.substructuring.modification import inverse_substructuring
+from jointfrf.identification.manifold.uncertainty import Spread, joint_intervals, residual_test_of, spread_of
+from jointfrf.identification.profile import Intervals
+from jointfrf.identification.residual_test import ResidualTest
+from jointfrf.kernel.arguments import FloatArray
+from jointfrf.laws.law_joint import LawJoint
 
 __all__ = [
-    "ComplianceFit",
     "DofDamping",
-    "FittedJoint",
-    "at_level_of_residual",
+    "ManifoldFit",
+    "Uncertainty",
     "choose_damping",
     "estimated_joint",
-    "fit_compliance",
-    "fitted_joint",
-    "stiffness_of_lines",
-    "with_terms",
+    "fit_laws",
+    "fit_springs",
+    "uncertainty_of",
 ]
-
-FoundT = TypeVar("FoundT")
 
 #: An assumed noise level is replaced by that of the residual until both agree to this factor.
 _AGREE = 1.3
@@ -72,23 +66,60 @@ _FEW = 40
 _NO_NOISE = 1e-3
 
 
-class ComplianceFit(NamedTuple):
-    """Result of `fit_compliance`.
+#: Damping terms that are compared.
+_KINDS: tuple[DampingTerms, ...] = ("none", "viscous", "hysteretic", "both")
+
+
+class DofDamping(NamedTuple):
+    """Damping terms of one DOF, chosen by the Bayesian information criterion (BIC).
+
+    Attributes
+    ----------
+    dof : str
+    best, second : str
+    margin : float
+        Difference of their BIC: above 10 the choice is clear, below 2 the data hardly prefer one.
+    """
+
+    dof: str
+    best: DampingTerms
+    second: DampingTerms
+    margin: float
+
+
+class Uncertainty(NamedTuple):
+    """How well the parameters of a joint are known.
+
+    Attributes
+    ----------
+    spread : Spread
+        By how much variances exceed those from independent noise.
+    channels : ChannelSpread or None
+        What sides that are not rigid add to that; None where the channels do not show it.
+    parts : BandParts or None
+        Where lines that do not fit the joint were left out: whether parts of the band give it.
+    covariance : ndarray, shape (p, p)
+    intervals : Intervals
+    """
+
+    spread: Spread
+    channels: ChannelSpread | None
+    parts: BandParts | None
+    covariance: FloatArray
+    intervals: Intervals
+
+
+class ManifoldFit(NamedTuple):
+    """Result of a fit on the manifold.
 
     Attributes
     ----------
     problem : FitProblem
-        With the noise that was used.
+        With the noise level that was used.
     estimate : JointEstimate
-    covariance : ndarray, shape (p, p)
-    intervals : LikelihoodIntervals
-    spread : Spread
-        By how much variances exceed those from independent noise.
-    channels : ChannelSpread or None
-        What sides that are not rigid add to that; None where the channels do not tell.
-    parts : BandParts, optional
-        Where lines that do not fit the joint were left out: whether parts of the band give it.
-    misfit : Misfit
+    spread, channels, parts, covariance, intervals
+        As in `Uncertainty`.
+    test : ResidualTest
         The residual against the noise.
     cross_fits : bool
         Whether cross terms would remove a misfit.
@@ -98,52 +129,59 @@ class ComplianceFit(NamedTuple):
 
     problem: FitProblem
     estimate: JointEstimate
-    covariance: FloatArray
-    intervals: LikelihoodIntervals
     spread: Spread
     channels: ChannelSpread | None
     parts: BandParts | None
-    misfit: Misfit
-    cross_fits: bool
-    choices: tuple[DofDamping, ...]
+    covariance: FloatArray
+    intervals: Intervals
+    test: ResidualTest
+    cross_fits: bool = False
+    choices: tuple[DofDamping, ...] = ()
+
+    @property
+    def residual_level(self) -> float:
+        """Residual relative to the FRFs."""
+        return float(np.sqrt(self.estimate.excess)) * self.problem.noise.level
+
+    @property
+    def noise_level(self) -> float:
+        """Noise relative to the FRFs: that of the residual where no other is known."""
+        return self.residual_level if self.problem.noise.is_assumed else self.problem.noise.level
 
 
-class FittedJoint(NamedTuple):
-    """A joint with its uncertainty, before its residual is looked at.
+def fit_springs(problem: FitProblem) -> ManifoldFit:
+    """Fit a joint of springs and dampers, find its uncertainty, and compare its residual with the noise."""
+    problem, found, choices = estimated_joint(problem)
+    known = uncertainty_of(problem, found, choices)
+    test = residual_test_of(found, problem.freq_hz, problem.noise.inflation, known.spread)
+    return ManifoldFit(problem, found, *known, test, _cross_fits(problem, found, test, choices), choices)
 
-    Attributes
+
+def fit_laws(problem: FitProblem, joint: LawJoint) -> ManifoldFit:
+    """Fit the parameters of all laws of a joint, as `fit_springs` those of springs.
+
+    Parameters
     ----------
     problem : FitProblem
-        With the noise level that was used.
-    estimate, spread, channels, parts, choices
-        As in `ComplianceFit`.
+    joint : LawJoint
+        Its DOFs in the order of the problem, without masses.
     """
 
-    problem: FitProblem
-    estimate: JointEstimate
-    spread: Spread
-    channels: ChannelSpread | None
-    parts: BandParts | None
-    choices: tuple[DofDamping, ...]
+    def fit(own: FitProblem) -> tuple[JointEstimate, tuple[DofDamping, ...]]:
+        return estimate_laws(own.frfs, joint, 2 * np.pi * own.freq_hz, own.used), ()
 
-    def intervals(self) -> LikelihoodIntervals:
-        """Return the intervals of the parameters."""
-        added = [one.std_error for one in (self.channels, self.parts) if one is not None]
-        reach = np.sqrt(np.square(added).sum(axis=0)) if added else None
-        return LikelihoodIntervals(self.estimate, self.spread.factor, reach)
-
-    def covariance(self) -> FloatArray:
-        """Return the covariance of the parameters, shape (p, p)."""
-        factor = self.spread.factor if self.channels is None else self.spread.factor + self.channels.factor
-        root = np.sqrt(factor)
-        with np.errstate(invalid="ignore"):
-            covariance: FloatArray = self.estimate.covariance * np.outer(root, root)
-            covariance += np.diag(_of_parameters(self.estimate, self.parts))
-        return covariance
+    with _quiet():
+        problem, found, _ = _estimated(problem, fit)
+        inflation = problem.noise.inflation
+        spread = spread_of(found, inflation, is_level_known=not problem.noise.is_assumed)
+        test = residual_test_of(found, problem.freq_hz, inflation, spread)
+    root = np.sqrt(spread.factor)
+    intervals = joint_intervals(found, spread.factor)
+    return ManifoldFit(problem, found, spread, None, None, found.covariance * np.outer(root, root), intervals, test)
 
 
 def estimated_joint(problem: FitProblem) -> tuple[FitProblem, JointEstimate, tuple[DofDamping, ...]]:
-    """Fit the joint by maximum likelihood, linearised on the manifold of FRFs that fit it.
+    """Fit a joint of springs by maximum likelihood, linearised on the manifold of FRFs that fit it.
 
     Returns
     -------
@@ -153,48 +191,54 @@ def estimated_joint(problem: FitProblem) -> tuple[FitProblem, JointEstimate, tup
     choices : tuple of DofDamping
         Empty where the damping terms were given.
     """
-    span = _span(problem.freq_hz)
+    return _estimated(problem, _with_damping)
+
+
+def uncertainty_of(problem: FitProblem, found: JointEstimate, choices: tuple[DofDamping, ...] = ()) -> Uncertainty:
+    """Return how well the parameters of a joint of springs are known."""
+    noise = problem.noise
+    spread = spread_of(found, noise.inflation, is_level_known=not noise.is_assumed)
+    channels = channel_spread(found, problem.frfs, problem.added_compliance)
+    parts = _band_parts(problem, found, spread, choices)
+    added = [one.std_error for one in (channels, parts) if one is not None]
+    reach = np.sqrt(np.square(added).sum(axis=0)) if added else None
+    root = np.sqrt(spread.factor if channels is None else spread.factor + channels.factor)
+    with np.errstate(invalid="ignore"):
+        covariance: FloatArray = found.covariance * np.outer(root, root)
+        if parts is not None:
+            slope = np.ones(found.theta.size)
+            for group in found.groups:
+                slope[group.which] = np.where(group.joint.is_compliance, found.theta[group.which] ** 2, 1.0)
+            covariance += np.diag(np.square(slope * parts.std_error))
+    return Uncertainty(spread, channels, parts, covariance, joint_intervals(found, spread.factor, reach))
+
+
+def _estimated(
+    problem: FitProblem, fit: Callable[[FitProblem], tuple[JointEstimate, tuple[DofDamping, ...]]]
+) -> tuple[FitProblem, JointEstimate, tuple[DofDamping, ...]]:
+    """Fit; where the noise level is assumed, again with that of the residual until both agree."""
+    freq = problem.freq_hz
+    span = f"one line, {freq[0]:g} Hz" if freq.size == 1 else f"{freq.size} lines, {freq.min():g} to {freq.max():g} Hz"
     try:
-        problem, result, choices = _fitted(problem)
+        found, more = fit(problem)
+        for _ in range(_MOST_LEVELS if problem.noise.is_assumed else 0):
+            scale = float(np.sqrt(found.excess))
+            if scale < _NO_NOISE or 1 / _AGREE < scale < _AGREE:
+                break
+            problem = problem.with_noise(scale)
+            found, more = fit(problem)
     except np.linalg.LinAlgError as error:
         raise ValueError(f"no joint was found that fits gamma ({span}): {error}") from error
-    check_estimate(result, problem.noise.level, span, is_level_known=not problem.noise.is_assumed)
-    return problem, result, choices
+    check_estimate(found, problem.noise.level, span, is_level_known=not problem.noise.is_assumed)
+    return problem, found, more
 
 
-def fitted_joint(problem: FitProblem) -> FittedJoint:
-    """Fit the joint as `estimated_joint` does, and find its uncertainty."""
-    problem, result, choices = estimated_joint(problem)
-    noise = problem.noise
-    spread = spread_of(result, noise.inflation, is_level_known=not noise.is_assumed)
-    channels = channel_spread(result, problem.frfs, problem.added_compliance)
-    return FittedJoint(problem, result, spread, channels, _band_parts(problem, result, spread, choices), choices)
-
-
-def fit_compliance(problem: FitProblem) -> ComplianceFit:
-    """Fit the joint as `fitted_joint` does, and compare its residual with the noise."""
-    found = fitted_joint(problem)
-    problem, result, noise = found.problem, found.estimate, found.problem.noise
-    misfit = diagnose(result, problem.freq_hz, noise.inflation, found.spread)
-    cross_fits = _cross_fits(problem, result, misfit, found.choices)
-    return ComplianceFit(
-        problem, result, found.covariance(), found.intervals(), found.spread, found.channels, found.parts, misfit,
-        cross_fits, found.choices,
-    )  # fmt: skip
-
-
-def _span(freq: FloatArray) -> str:
-    """Return the lines in words."""
-    return f"{freq.size} lines, {freq.min():g} to {freq.max():g} Hz" if freq.size > 1 else f"one line, {freq[0]:g} Hz"
-
-
-def stiffness_of_lines(frfs: InterfaceFrfs) -> ComplexArray:
-    """Return K*(w) of each line by itself, NaN where it cannot be inverted; a piece of the lines at a time."""
-    h = frfs.measured
-    with warnings.catch_warnings():
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Issue no warnings: lines on which noise hides the joint are ill-conditioned, and a start may lead to infinity."""
+    with warnings.catch_warnings(), np.errstate(over="ignore", divide="ignore", invalid="ignore"):
         warnings.simplefilter("ignore", IllConditionedWarning)
-        (found,) = in_pieces(len(h), lambda own: [inverse_substructuring(frfs.gamma(h[own]), on_singular="nan")])
-    return found
+        yield
 
 
 def _band_parts(
@@ -203,26 +247,13 @@ def _band_parts(
     """Fit parts of the band where lines were left out of the fit of all of it."""
     if left_out_share(result) < _LEFT_OUT or problem.freq_hz.size < _FEW:
         return None
-    words = _chosen(problem, choices)
 
     def fit(lines: NDArray[np.intp]) -> JointEstimate:
         frfs = problem.frfs.on_lines(lines)
         part = replace(problem, freq_hz=problem.freq_hz[lines], frfs=frfs, used=problem.used[lines], near=())
-        return _estimate(part, words)
+        return _estimate(part, _chosen(problem, choices))
 
     return fit_band_parts(result, problem.freq_hz, spread.information, fit)
-
-
-def _of_parameters(result: JointEstimate, parts: BandParts | None) -> FloatArray:
-    """Return the variance that disagreeing parts of the band add to each parameter."""
-    if parts is None:
-        return np.zeros(result.theta.size)
-    slope = np.ones(result.theta.size)
-    for group in result.groups:
-        if isinstance(group.joint, DiagonalJoint):
-            slope[group.which] = np.where(terms_of(group.joint).kinds == 0, result.theta[group.which] ** 2, 1.0)
-    variance: FloatArray = np.square(slope * parts.std_error)
-    return variance
 
 
 def _chosen(problem: FitProblem, choices: tuple[DofDamping, ...]) -> DampingTerms | Sequence[DampingTerms]:
@@ -234,43 +265,15 @@ def _chosen(problem: FitProblem, choices: tuple[DofDamping, ...]) -> DampingTerm
 def _cross_fits(
     problem: FitProblem,
     result: JointEstimate,
-    misfit: Misfit,
+    test: ResidualTest,
     choices: tuple[DofDamping, ...],
 ) -> bool:
     """Whether a fit with cross terms leaves a residual that is noise, where that without does not."""
     coupled = any(len(group.dofs) > 1 for group in result.groups)
-    if problem.noise.is_assumed or problem.options.cross != "zero" or not (misfit.is_large and coupled):
+    if problem.noise.is_assumed or problem.options.cross != "zero" or not (test.is_large and coupled):
         return False
     other = _estimate(problem, _chosen(problem, choices), "fit", result.data)
-    return bool(np.sqrt(other.excess) - 1 < (misfit.ratio - 1) / 4)
-
-
-def _fitted(problem: FitProblem) -> tuple[FitProblem, JointEstimate, tuple[DofDamping, ...]]:
-    """Fit with the damping terms asked for; where no noise level is known, at that of the residual."""
-    problem, (result, choices) = at_level_of_residual(problem, _with_damping, lambda found: found[0].excess)
-    return problem, result, choices
-
-
-def at_level_of_residual(
-    problem: FitProblem, fit: Callable[[FitProblem], FoundT], excess: Callable[[FoundT], float]
-) -> tuple[FitProblem, FoundT]:
-    """Fit; where the noise level is assumed, again with that of the residual until both agree.
-
-    Parameters
-    ----------
-    problem : FitProblem
-    fit : callable
-    excess : callable
-        Returns, of what `fit` does, the mean square of the residual in units of the noise.
-    """
-    found = fit(problem)
-    for _ in range(_MOST_LEVELS if problem.noise.is_assumed else 0):
-        scale = float(np.sqrt(excess(found)))
-        if scale < _NO_NOISE or 1 / _AGREE < scale < _AGREE:
-            break
-        problem = problem.with_noise(scale)
-        found = fit(problem)
-    return problem, found
+    return bool(np.sqrt(other.excess) - 1 < (test.ratio - 1) / 4)
 
 
 def _with_damping(problem: FitProblem) -> tuple[JointEstimate, tuple[DofDamping, ...]]:
@@ -303,13 +306,14 @@ def _with_common_damping(problem: FitProblem) -> tuple[JointEstimate, tuple[DofD
     before = results["viscous"]
     for kind in ("both", "hysteretic"):
         # Where both terms together fit, one of them needs no other start to show that it does not.
-        is_last = kind == "hysteretic" and all(group.fit.is_noise for group in before.groups)
-        near = tuple(start._replace(is_last=is_last) for start in _starts(problem, before, kind))
-        before = results[kind] = _estimate(replace(problem, near=(*near, *problem.near)), kind, data=before.data)
+        is_explained = kind == "hysteretic" and not problem.near and all(group.is_noise for group in before.groups)
+        near = (*_starts(problem, before, kind), *problem.near)
+        own = replace(problem, near=near)
+        before = results[kind] = _estimate(own, kind, data=before.data, is_explained=is_explained)
     factor = problem.noise.inflation * max(results["both"].excess, _LEAST_EXCESS)
     scores = {}
     for kind, result in results.items():
-        squares = sum(group.fit.squares for group in result.groups)
+        squares = sum(group.squares for group in result.groups)
         scores[kind] = 2 * squares / factor + len(result.parameters) * np.log(max(2 * result.equations / factor, 2.0))
     best, second = sorted(scores, key=lambda kind: scores[kind])[:2]
     margin = scores[second] - scores[best]
@@ -322,9 +326,9 @@ def _starts(
     """Return where fits with these terms begin: at what others have found; not where these did not converge."""
     terms = _terms(problem, damping, problem.options.cross)
     return tuple(
-        with_terms(group, terms.of_dofs(group.dofs)[0])
+        GroupStart.of(group, _minimum(group, terms.of_dofs(group.dofs)[0]))
         for group in found.groups
-        if group.fit.converged or group.fit.is_noise
+        if group.converged or group.is_noise
     )
 
 
@@ -337,42 +341,22 @@ def _estimate(
     damping: DampingTerms | Sequence[DampingTerms],
     cross: CrossTerms | None = None,
     data: Iterable[GroupData] | None = None,
+    *,
+    is_explained: bool = False,
 ) -> JointEstimate:
-    """Fit with these terms; `data` as in `estimate_joint`."""
+    """Fit with these terms; `data` and `is_explained` as in `estimate_joint`."""
     cross = problem.options.cross if cross is None else cross
     terms = _terms(problem, damping, cross)
-    with warnings.catch_warnings(), np.errstate(over="ignore", divide="ignore", invalid="ignore"):
-        # Lines on which noise hides the joint are ill-conditioned; they weigh little. A start may lead to infinity.
-        warnings.simplefilter("ignore", IllConditionedWarning)
-        return estimate_joint(problem.frfs, terms, cross, problem.used, problem.near, data)
+    with _quiet():
+        return estimate_joint(problem.frfs, terms, cross, problem.used, problem.near, data, is_explained=is_explained)
 
 
-_KINDS: tuple[DampingTerms, ...] = ("none", "viscous", "hysteretic", "both")
-
-
-class DofDamping(NamedTuple):
-    """Damping terms of one DOF, chosen by the Bayesian information criterion (BIC).
-
-    Attributes
-    ----------
-    dof : str
-    best, second : str
-    margin : float
-        Difference of their BIC: above 10 the choice is clear, below 2 the data hardly prefer one.
-    """
-
-    dof: str
-    best: DampingTerms
-    second: DampingTerms
-    margin: float
-
-
-def choose_damping(group: FittedGroup, dofs: tuple[str, ...], factor: float) -> list[DofDamping]:
+def choose_damping(group: GroupFit, dofs: tuple[str, ...], factor: float) -> list[DofDamping]:
     """Choose the damping terms of each DOF of a group that was fitted with both.
 
     Parameters
     ----------
-    group : FittedGroup
+    group : GroupFit
         A joint without cross terms; its quadratic forms are minimised again with fewer terms of one DOF at a time.
     dofs : tuple of str
         Names of the DOFs of the group.
@@ -384,15 +368,14 @@ def choose_damping(group: FittedGroup, dofs: tuple[str, ...], factor: float) -> 
     BIC = 2 squares / factor + p ln(2 equations / factor). A joint supplies no energy: terms of opposite sign that
     nearly cancel each other are noise, so "both" needs two terms that are positive.
     """
-    fit, own = group.fit, terms_of(group.joint)
-    price = np.log(max(2 * fit.equations / factor, 2.0))
+    price = np.log(max(2 * group.equations / factor, 2.0))
     choices = []
     for d, dof in enumerate(dofs):
         scores: dict[DampingTerms, float] = {}
         for kind in _KINDS:
             kinds: list[DampingTerms] = ["both"] * len(dofs)
             kinds[d] = kind
-            terms = joint_terms(own.omega, dofs, kinds, "zero")
+            terms = joint_terms(group.joint.omega, dofs, kinds, "zero")
             found = _minimum(group, terms)
             damping = found.x[(terms.pairs[:, 0] == d) & (terms.kinds > 0)]
             scores[kind] = 2 * found.cost / factor + len(terms.parameters) * price
@@ -403,14 +386,9 @@ def choose_damping(group: FittedGroup, dofs: tuple[str, ...], factor: float) -> 
     return choices
 
 
-def with_terms(group: FittedGroup, terms: JointTerms) -> GroupStart:
-    """Return where a fit with other terms may begin: at the minimum of the quadratic forms with these."""
-    return GroupStart.of(group, _minimum(group, terms))
-
-
-def _minimum(group: FittedGroup, terms: JointTerms) -> FormMinimum:
+def _minimum(group: GroupFit, terms: JointTerms) -> FormMinimum:
     """Minimise the forms of a group with other terms, from the joint found; terms that it has not begin at zero."""
     joint = coordinates_of(terms)
-    found = dict(zip(terms_of(group.joint).parameters, group.joint.theta(group.fit.minimum.x).tolist(), strict=True))
-    theta = np.array([found.get(one, 0.0) for one in terms.parameters])
-    return minimise_forms(group.fit.forms, joint, joint.coordinates(theta))
+    found = dict(zip(group.joint.names, group.joint.theta(group.x).tolist(), strict=True))
+    theta = np.array([found.get(one.name, 0.0) for one in terms.parameters])
+    return joint.minimise(group.forms, joint.coordinates(theta))

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, fields
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf.frf.bands import in_pieces, is_long
-from jointfrf.identification.manifold.coordinates import DiagonalJoint, JointCoordinates, terms_of
-from jointfrf.identification.manifold.line_forms import FormMinimum, LineForms, lowest_minimum, within_reach
+from jointfrf.identification.manifold.coordinates import JointCoordinates
+from jointfrf.identification.manifold.line_forms import FormMinimum, LineForms
 from jointfrf.identification.manifold.on_manifold import (
     LineData,
     OnManifold,
@@ -26,18 +27,18 @@ from jointfrf.identification.manifold.on_manifold import (
 from jointfrf.identification.minimise import inverse_information
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
-__all__ = ["LITTLE_PATIENCE", "GroupFit", "GroupProblem", "Misfitting", "fit_dofs", "gradients_of"]
+__all__ = ["LITTLE_PATIENCE", "GroupFit", "GroupProblem", "UnknownCrossTerms", "fit_dofs", "gradients_of"]
 
 #: Linearisations at most.
 _MOST = 25
 #: The fit has converged when the coordinates move by less than this many standard errors, root mean square.
 _MOVED = 0.02
-#: Steps of the projection: of the first one, and of those that follow a small change of the joint.
-_FIRST_STEPS, _NEXT_STEPS = 30, 8
-#: A line that stays farther from the manifold than this, in squares per unknown and of the noise, is not trusted.
+#: Steps of the projection: of the first one, of those that follow a small change of the joint, of lines started again.
+_FIRST_STEPS, _NEXT_STEPS, _OTHER_STEPS = 30, 8, 25
+#: A line that stays farther from the manifold than this, in squares per unknown and of the noise, is not used.
 _FAR = 3.0
 #: Linearisations of a fit that stays far from the data, from the first start and from others; after twice the first
-#: number lines that are not trusted do not come back.
+#: number lines that are not used do not come back.
 PATIENCE, LITTLE_PATIENCE = 8, 4
 #: A fit is far from the data when the squares exceed their number by this factor.
 _LOST = 9.0
@@ -45,16 +46,19 @@ _LOST = 9.0
 _SAME = 1.0
 #: A residual may be noise up to this mean square, for what is not known of the noise, and so many standard deviations.
 _NOISE, _SIGMA = 1.03, 5.0
-#: A compliance is barely seen when its standard error exceeds this share of it: the FRFs may then hardly show M.
-_BARELY = 0.05
+#: A compliance is poorly determined when its standard error exceeds this share of it: the FRFs may then hardly show M.
+_POORLY = 0.05
 #: Steps that reverse, to this cosine, and shrink by less than this factor go to and fro between two points.
 _REVERSED, _SHRUNK = -0.8, 0.5
-#: Part of such a step that is gone at least; a fit for which that is too much ends where it is.
+#: Least part of such a step that is taken; a fit for which that is too much ends where it is.
 _LEAST_SHARE = 0.1
 #: Targets whose gradients are found together.
 _AT_ONCE = 8
 #: Of a compliance with this relative error, damping is not known: its rate is taken below 1 where it is linearised.
 _HARDLY = 0.3
+#: Factors by which poorly determined DOFs are made softer: at first, and where that led nowhere.
+_SOFTER, _SOFTER_STILL = 3.0, 4.0
+_TINY = float(np.finfo(float).tiny)
 
 
 class GroupProblem(NamedTuple):
@@ -62,6 +66,10 @@ class GroupProblem(NamedTuple):
 
     Attributes
     ----------
+    dofs : ndarray of int
+        Its DOFs among all.
+    which : ndarray of int
+        Its parameters among all.
     data : LineData
         Its noise is known: a weighted residual has mean square 1.
     joint : JointCoordinates
@@ -72,27 +80,24 @@ class GroupProblem(NamedTuple):
         Entries of M that no FRF shows: those between rigid DOFs.
     """
 
+    dofs: NDArray[np.intp]
+    which: NDArray[np.intp]
     data: LineData
     joint: JointCoordinates
     unknown: NDArray[np.bool_]
     hidden: int = 0
 
-    @property
-    def is_diagonal(self) -> bool:
-        """Whether C is diagonal."""
-        return isinstance(self.joint, DiagonalJoint)
-
-    def of_joint(self, entries: ComplexArray) -> ComplexArray:
-        """Return C, shape (n_freq, n, n), of the entries that the coordinates change."""
-        n = self.data.entries.n
-        c = np.zeros((len(entries), n, n), np.complex128)
-        rows, columns = np.diag_indices(n) if self.is_diagonal else np.triu_indices(n)
-        c[:, rows, columns] = c[:, columns, rows] = entries
-        return c
+    def equations(self) -> FloatArray:
+        """Return the complex equations of each line: entries used, less what is free and what is unknown."""
+        places = _unit_places(self.data)
+        unknown = np.count_nonzero(self.unknown[:, places], axis=1)
+        used = np.count_nonzero(self.data.used, axis=1)
+        equations: FloatArray = np.maximum(used - 2 * len(places) + self.hidden - unknown, 0).astype(float)
+        return equations
 
 
-class Misfitting(NamedTuple):
-    """What lines say beside the joint where cross terms of C are unknown.
+class UnknownCrossTerms(NamedTuple):
+    """Residual statistics of a fit that leaves cross terms of C unknown.
 
     Attributes
     ----------
@@ -101,7 +106,7 @@ class Misfitting(NamedTuple):
     is_symmetric : bool
         Whether C is symmetric to noise; otherwise its symmetry was not used.
     scatter : ndarray, shape (n,), optional
-        Standard deviation of the diagonal of C between lines, beside its noise, m/N; where it is more than noise.
+        Standard deviation of the diagonal of C between lines in excess of its noise, m/N; where there is such excess.
     hidden : int
         Lines that count less than half because noise hides gamma_jk.
     """
@@ -112,48 +117,60 @@ class Misfitting(NamedTuple):
     hidden: int
 
 
-class GroupFit(NamedTuple):
-    """Result of the fit of one group.
+@dataclass(frozen=True)
+class GroupFit(FormMinimum):
+    """The fit of one group: the minimum of the quadratic forms of the last linearisation.
 
     Attributes
     ----------
-    minimum : FormMinimum
-        Coordinates, squares, information, and what each line adds to them.
-    forms : LineForms
-        Quadratic forms of the last linearisation; lines that are not trusted weigh nothing.
-    trusted : ndarray of bool, shape (n_freq,)
-        Lines on which the FRFs can fit a joint near the one found.
+    problem : GroupProblem
+    used : ndarray of bool, shape (n_freq,)
+        Lines on which the FRFs can fit a joint near the one found; others weigh nothing in the forms.
     equations : float
         Complex equations used.
     possible : float
         Complex equations of all lines.
     iterations : int
     converged : bool
-    beside : Misfitting, optional
+    unknown_cross : UnknownCrossTerms, optional
         Where cross terms of C are unknown.
     on : OnManifold, optional
         Point of the last linearisation, from which other FRFs of the same structure are near; not of long sweeps.
     """
 
-    minimum: FormMinimum
-    forms: LineForms
-    trusted: NDArray[np.bool_]
+    problem: GroupProblem
+    used: NDArray[np.bool_]
     equations: float
     possible: float
     iterations: int
     converged: bool
-    beside: Misfitting | None = None
+    unknown_cross: UnknownCrossTerms | None = None
     on: OnManifold | None = None
+
+    @classmethod
+    def of(cls, minimum: FormMinimum, **more: Any) -> GroupFit:
+        """Return a minimum with what belongs to it."""
+        return cls(**{one.name: getattr(minimum, one.name) for one in fields(FormMinimum)}, **more)
+
+    @property
+    def dofs(self) -> NDArray[np.intp]:
+        """DOFs of the group among all."""
+        return self.problem.dofs
+
+    @property
+    def which(self) -> NDArray[np.intp]:
+        """Parameters of the group among all."""
+        return self.problem.which
 
     @property
     def noise_squares(self) -> float:
         """Squares of the residual in units of the noise."""
-        return self.beside.noise_squares if self.beside else self.minimum.cost
+        return self.unknown_cross.noise_squares if self.unknown_cross else self.cost
 
     @property
     def squares(self) -> float:
-        """Squares of the residual; a line that is not trusted counts as one that just is not."""
-        return self.minimum.cost + _FAR * (self.possible - self.equations)
+        """Squares of the residual; a line that is not used counts as one that just is not."""
+        return self.cost + _FAR * (self.possible - self.equations)
 
     @property
     def is_lost(self) -> bool:
@@ -162,7 +179,7 @@ class GroupFit(NamedTuple):
 
     @property
     def is_noise(self) -> bool:
-        """Whether the residual is no larger than the noise, and hardly a line is not trusted."""
+        """Whether the residual is no larger than the noise, and hardly a line is not used."""
         possible = max(self.possible, 1.0)
         return bool(self.squares < (_NOISE + _SIGMA / np.sqrt(possible)) * possible)
 
@@ -174,7 +191,7 @@ class GroupFit(NamedTuple):
     @property
     def excess(self) -> float:
         """Mean square of the residual in units of the noise."""
-        return self.noise_squares / max(self.equations - self.minimum.x.size / 2, 1)
+        return self.noise_squares / max(self.equations - self.x.size / 2, 1)
 
 
 def fit_dofs(
@@ -182,7 +199,8 @@ def fit_dofs(
 ) -> GroupFit:
     """Fit from one start after the other until the residual is that of the noise; else keep the lowest.
 
-    A fit may go to and fro without end at a residual that is noise; where two starts lead there, others do, too.
+    A fit may go to and fro without end at a residual that is noise; where two starts lead there, others do, too. Where
+    none leads to noise, poorly determined DOFs are made softer.
 
     Parameters
     ----------
@@ -198,7 +216,7 @@ def fit_dofs(
     for start in starts:
         if not np.isfinite(start).all():
             continue
-        found = _iterate(problem, start, patience if best is None else LITTLE_PATIENCE, on)
+        found = _iterated(problem, start, patience if best is None else LITTLE_PATIENCE, on)
         again = best is not None and found.is_noise and abs(found.squares - best.squares) < _SAME
         if best is None or found.squares < best.squares:
             best = found
@@ -206,158 +224,200 @@ def fit_dofs(
             break
     if best is None:
         raise np.linalg.LinAlgError("no start of the fit is finite")
-    return _from_softer(problem, best) if problem.is_diagonal and not (best.is_noise or best.is_lost) else best
+    return best if best.is_noise or best.is_lost or not problem.joint.in_compliance else _from_softer(best)
 
 
-def gradients_of(problem: GroupProblem, fit: GroupFit, changes: Iterable[ComplexArray]) -> FloatArray:
+def gradients_of(fit: GroupFit, changes: Iterable[ComplexArray]) -> FloatArray:
     """Return by how much changes of the measured FRFs change the gradient at the minimum, shape (number, p).
 
     Parameters
     ----------
-    problem : GroupProblem
     fit : GroupFit
     changes : iterable of ndarray, shape (n_freq, q)
         Of the entries of gamma, m/N.
     """
-    data, trusted = problem.data, fit.trusted.astype(float)
+    problem, data, used = fit.problem, fit.problem.data, fit.used.astype(float)
     if problem.unknown.any():
         # Where cross terms are unknown there is no point of the manifold.
-        return np.zeros((len(list(changes)), fit.minimum.x.size))
-    c = problem.of_joint(fit.forms.compliance)
+        return np.zeros((len(list(changes)), fit.x.size))
+    c = fit.joint.matrix(fit.forms.compliance)
     on = _rescued(data, c, _first_points(data, c))
-    adjoint = problem.joint.slope(fit.minimum.x, problem.joint.compliance(fit.minimum.x)).conj()
+    adjoint = fit.joint.slope(fit.x, fit.joint.compliance(fit.x)).conj()
 
     def gradients(targets: tuple[ComplexArray, ...]) -> list[FloatArray]:
-        found = (_used(problem, forms, forms, c)[0].gradient for forms in normal_forms(data, c, on, targets))
-        return [np.einsum("lqp,lq,l->p", adjoint, one, trusted).real for one in found]
+        found = (_of_coordinates(problem, forms, forms, c)[0].gradient for forms in normal_forms(data, c, on, targets))
+        return [np.einsum("lqp,lq,l->p", adjoint, one, used).real for one in found]
 
-    # Side by side, they share what is linearised: as many at once as take no more memory than the lines do.
+    # Together they share what is linearised: as many at once as take no more memory than the lines do.
     (base,), found, more = gradients((data.smooth,)), [], iter(changes)
     while some := tuple(data.smooth + change for change in itertools.islice(more, _AT_ONCE)):
         found += [one - base for one in gradients(some)]
     return np.array(found)
 
 
-def _from_softer(problem: GroupProblem, best: GroupFit) -> GroupFit:
-    """Start again from softer values of the DOFs that are barely seen: far too stiff, a fit may be caught.
+def _from_softer(best: GroupFit) -> GroupFit:
+    """Start again from softer values of poorly determined DOFs: far too stiff, a fit may be caught.
 
     From a few times the compliance that the data can tell, up to that of the structure around the joint.
     """
-    n = problem.data.entries.n
-    softest = problem.data.own_size
-    factor = 3.0
+    joint, softest = best.joint, best.problem.data.own_size
+    n, of_rate = joint.n, joint.dofs[joint.n :]
+    factor = _SOFTER
     while not best.is_noise:
-        a = best.minimum.x[:n]
-        error = np.sqrt(np.diagonal(best.minimum.covariance)[:n])
+        a = best.x[:n]
+        error = np.sqrt(np.diagonal(best.covariance)[:n])
         softer = factor * np.maximum(a, error)
-        barely = (error > _BARELY * a) & (softer < softest)
-        if not barely.any():
+        poorly = (error > _POORLY * a) & (softer < softest)
+        if not poorly.any():
             break
-        start = best.minimum.x.copy()
-        start[:n] = np.where(barely, softer, a)
         # A rate that belongs to another compliance says nothing here.
-        start[n:] = np.where(barely[terms_of(problem.joint).pairs[n:, 0]], 0.0, start[n:])
-        found = _iterate(problem, start)
-        best, factor = (found, 3.0) if found.squares < best.squares else (best, 4 * factor)
+        start = np.r_[np.where(poorly, softer, a), np.where(poorly[of_rate], 0.0, best.x[n:])]
+        found = _iterated(best.problem, start)
+        best, factor = (found, _SOFTER) if found.squares < best.squares else (best, _SOFTER_STILL * factor)
     return best
 
 
-def _iterate(
+def _iterated(
     problem: GroupProblem, start: FloatArray, patience: int = PATIENCE, on: OnManifold | None = None
 ) -> GroupFit:
-    data, joint = problem.data, problem.joint
-    free = _equations(problem)
-    x: FloatArray = start
-    linearised_at: FloatArray = start
-    steps = _FIRST_STEPS
-    if on is not None and on.h.shape != (len(data.measured), data.entries.n, data.entries.n):
-        on = None
+    """Linearise, minimise and judge until nothing moves, or no end is in sight."""
+    data, joint, equations = problem.data, problem.joint, problem.equations()
+    lines, choice_of_m, length = _LinesUsed(problem), _ChoiceOfM(problem), _StepLength(start.size)
     unknown = smooth_compliance(data) if problem.unknown.any() else None
-    trusted = np.ones(len(data.measured), np.bool_)
-    prior: PriorOfM | None = prior_of_m(data) if problem.is_diagonal else None
-    hidden = problem.is_diagonal
-    step, share, last = 0, 1.0, np.zeros_like(start)
-    while True:
-        step += 1
-        c = problem.of_joint(joint.compliance(linearised_at))
+    if on is not None and on.h.shape != (len(data.measured), joint.n, joint.n):
+        on = None
+    x = linearised_at = start
+    for step in itertools.count(1):
+        c = joint.matrix(joint.compliance(linearised_at))
         if unknown is not None:
             c = np.where(problem.unknown.reshape(c.shape), unknown, c)
-        on = project(data.smooth, data, c, on, steps) if on else _first_points(data, c)
-        steps = _NEXT_STEPS
+        on = (
+            project(data.smooth, data, c, on, _FIRST_STEPS if step == 1 else _NEXT_STEPS)
+            if on
+            else _first_points(data, c)
+        )
         on = _rescued(data, c, on)
-        near = _trusted(on, data.entries.n, joint)
-        trusted = near & trusted if step > 2 * PATIENCE and (near & trusted).any() else near
-        # Unknown entries of C move on all lines: they may bring a line back to where it is trusted.
-        forms, unknown = _linearised(problem, c, on, trusted, prior if hidden else None)
-        minimum = lowest_minimum(forms, joint, x)
-        error = np.sqrt(np.maximum(np.diagonal(minimum.covariance), 1e-300))
+        used = lines.near(on, step)
+        # Unknown entries of C move on all lines: they may bring a line back to where it is used.
+        forms, unknown = _linearised(problem, c, on, used, choice_of_m.prior)
+        minimum = joint.lowest(forms, x)
+        change, count = minimum.x - x, float(equations[used].sum())
         # In standard errors along the direction of the step: what the data do not see may go anywhere.
-        change = minimum.x - x
         moved = float(np.sqrt(abs(2 * (change @ minimum.information @ change))))
-        equations = float(free[trusted].sum())
-        converged = bool(moved < _MOVED * np.sqrt(x.size)) and step > 1
-        barely = problem.is_diagonal and bool((error > _BARELY * abs(minimum.x))[: terms_of(joint).n].any())
-        converged = converged and (hidden or not barely)
-        # The first step tells, with M that cannot feign it; a joint barely seen once is treated so to the end.
-        hidden = barely or (hidden and step > 1)
-        is_endless = step == _MOST or share <= _LEAST_SHARE
-        if converged or is_endless or (step > patience and minimum.cost > _LOST * equations):
+        is_lost = minimum.cost > _LOST * count
+        converged = choice_of_m.holds_for(minimum, step) and bool(moved < _MOVED * np.sqrt(x.size)) and step > 1
+        if converged or step == _MOST or length.is_spent or (is_lost and step > patience):
             kept = None if is_long(len(data.measured)) else on
-            return GroupFit(minimum, forms, trusted, equations, float(free.sum()), step, converged, on=kept)
-        share = 1.0 if minimum.cost > _LOST * equations else _next_share(share, change, last, minimum.information)
-        x, last = x + share * change, change
-        linearised_at = _within_sight(forms, problem.joint, x, error) if problem.is_diagonal else x
+            return GroupFit.of(
+                minimum, problem=problem, used=used, equations=count, possible=float(equations.sum()),
+                iterations=step, converged=converged, on=kept,
+            )  # fmt: skip
+        x = x + length.of(change, minimum.information, is_lost=is_lost) * change
+        linearised_at = _within_sight(minimum, x) if joint.in_compliance else x
         # Of a long sweep the forms of one step take as much memory as those of the next.
         del forms, minimum
+    raise AssertionError
 
 
-def _next_share(share: float, step: FloatArray, last: FloatArray, information: FloatArray) -> float:
-    """Return which part of a step is gone, `share` having been gone of the last one.
+class _LinesUsed:
+    """Which lines are near enough to the manifold; half of them where few are. In a long search none comes back."""
+
+    def __init__(self, problem: GroupProblem) -> None:
+        self.farthest, self.least = _FAR * problem.joint.n**2, problem.joint.lower.size
+        self.last = np.ones(len(problem.data.measured), np.bool_)
+
+    def near(self, on: OnManifold, step: int) -> NDArray[np.bool_]:
+        """Return the lines used in a step of the search."""
+        near = np.asarray(on.squares <= self.farthest)
+        if np.count_nonzero(near) < max(self.least, len(near) // 4):
+            near = on.squares <= np.quantile(on.squares, 0.5)
+        both = near & self.last
+        self.last = both if step > 2 * PATIENCE and both.any() else near
+        return self.last
+
+
+class _ChoiceOfM:
+    """Whether M is taken as expected, or as that of the nearest FRFs, which overstates what is known of a stiff joint.
+
+    The first step takes M as expected. It shows whether a compliance is poorly determined, and in which case that
+    remains so to the end; a fit with M of the nearest FRFs that finds one is not the last.
+    """
+
+    def __init__(self, problem: GroupProblem) -> None:
+        self._prior = prior_of_m(problem.data) if problem.joint.in_compliance else None
+        self.prior = self._prior
+
+    def holds_for(self, minimum: FormMinimum, step: int) -> bool:
+        """Return whether a minimum agrees with the choice made for its step; make that for the next."""
+        error = np.sqrt(np.maximum(np.diagonal(minimum.covariance), 1e-300))
+        poorly = bool((error > _POORLY * abs(minimum.x))[minimum.joint.is_compliance].any())
+        holds = self.prior is not None or not poorly
+        self.prior = self._prior if poorly or (self.prior is not None and step > 1) else None
+        return holds
+
+
+class _StepLength:
+    """Which part of a step is taken.
 
     All of it, unless steps lead to and fro and hardly shrink: where all of the last one would have made the next step
-    -r times as long, 1/(1 + r) of it would have ended at the fixed point. From then on shares do not grow: of two
-    minima that are nearly as low, now the one is taken and now the other.
+    -r times as long, 1/(1 + r) of it would have ended at the fixed point. From then on parts do not grow: of two minima
+    that are nearly as low, now the one is taken and now the other.
     """
-    own, before = float(step @ information @ step), float(last @ information @ last)
-    if not (own > 0 and before > 0):
-        return share
-    along = float(step @ information @ last) / before
-    if share == 1 and (own < _SHRUNK**2 * before or along > _REVERSED * np.sqrt(own / before)):
-        return 1.0
-    return max(share / max(1 - along, 1.0), _LEAST_SHARE)
+
+    def __init__(self, p: int) -> None:
+        self.share, self.last = 1.0, np.zeros(p)
+
+    @property
+    def is_spent(self) -> bool:
+        """Whether the least part is still too much."""
+        return self.share <= _LEAST_SHARE
+
+    def of(self, step: FloatArray, information: FloatArray, *, is_lost: bool) -> float:
+        """Return the part of a step; all of it far from the data."""
+        last, self.last = self.last, step
+        own, before = float(step @ information @ step), float(last @ information @ last)
+        if is_lost:
+            self.share = 1.0
+        elif own > 0 and before > 0:
+            along = float(step @ information @ last) / before
+            shrinks = own < _SHRUNK**2 * before or along > _REVERSED * np.sqrt(own / before)
+            if self.share < 1 or not shrinks:
+                self.share = max(self.share / max(1 - along, 1.0), _LEAST_SHARE)
+        return self.share
 
 
 def _first_points(data: LineData, c: ComplexArray) -> OnManifold:
-    """Start on every line, a piece of the lines at a time."""
-    return OnManifold(*in_pieces(len(c), lambda own: starts_on_manifold(data.on_slice(own), c[own], _FIRST_STEPS)))
+    """Start on every line, in chunks of lines."""
+    return OnManifold(*in_pieces(len(c), lambda own: starts_on_manifold(data.on_lines(own), c[own], _FIRST_STEPS)))
 
 
 def _linearised(
-    problem: GroupProblem, c: ComplexArray, on: OnManifold, trusted: NDArray[np.bool_], prior: PriorOfM | None
+    problem: GroupProblem, c: ComplexArray, on: OnManifold, used: NDArray[np.bool_], prior: PriorOfM | None
 ) -> tuple[LineForms, ComplexArray | None]:
-    """Return what `_used` does, lines that are not trusted weighing nothing, a piece of the lines at a time."""
+    """Return what `_of_coordinates` does, lines that are not used weighing nothing; in chunks of lines."""
     found = np.zeros_like(c) if problem.unknown.any() else None
 
     def of_lines(own: slice) -> Sequence[NDArray[Any]]:
-        here = problem._replace(data=problem.data.on_slice(own), unknown=problem.unknown[own])
+        here = problem._replace(data=problem.data.on_lines(own), unknown=problem.unknown[own])
         point = OnManifold(on.h[own], on.m[own], on.squares[own])
         if prior is not None:
             point = expected_m(here.data, c[own], point, prior.on_lines(own))
         targets = (here.data.measured, here.data.smooth) if here.unknown.any() else (here.data.measured,)
         found_forms = normal_forms(here.data, c[own], point, targets)
-        forms, some = _used(here, found_forms[0], found_forms[-1], c[own])
+        forms, some = _of_coordinates(here, found_forms[0], found_forms[-1], c[own])
         if found is not None and some is not None:
             found[own] = some
-        return forms.scaled(trusted[own].astype(float))
+        return forms.scaled(used[own].astype(float))
 
     return LineForms(*in_pieces(len(c), of_lines)), found
 
 
-def _within_sight(forms: LineForms, joint: JointCoordinates, x: FloatArray, error: FloatArray) -> FloatArray:
+def _within_sight(minimum: FormMinimum, x: FloatArray) -> FloatArray:
     """Return where to linearise: not nearer to a rigid joint, nor at a larger rate of one, than the data can tell."""
-    terms, n = terms_of(joint), terms_of(joint).n
+    joint, n = minimum.joint, minimum.joint.n
+    error = np.sqrt(np.maximum(np.diagonal(minimum.covariance), 1e-300))
     hardly = ~(error[:n] <= _HARDLY * x[:n])
-    of_rate = hardly[terms.pairs[n:, 0]]
+    of_rate = hardly[joint.dofs[n:]]
     at = x.copy()
     if hardly.any():
         # The size of C itself: of a DOF that is mostly damping, the compliance alone may be anything.
@@ -365,23 +425,18 @@ def _within_sight(forms: LineForms, joint: JointCoordinates, x: FloatArray, erro
         at[n:][of_rate] = 0.0
         slope = joint.slope(at, joint.compliance(at))
         known = np.r_[np.ones(n, bool), ~of_rate]
-        information = (slope.conj().swapaxes(1, 2) @ forms.weight @ slope).real.sum(axis=0)[np.ix_(known, known)]
-        error = np.sqrt(np.maximum(np.diagonal(inverse_information(2 * information)), 0))
+        information = (slope.conj().swapaxes(1, 2) @ minimum.forms.weight @ slope).real.sum(axis=0)
+        error = np.sqrt(np.maximum(np.diagonal(inverse_information(2 * information[np.ix_(known, known)])), 0))
         at[:n] = np.where(hardly, np.maximum(size, error[:n]), x[:n])
     at[:n] = np.maximum(at[:n], np.where(np.isfinite(error[:n]), error[:n], 0))
-    reach = within_reach(joint)
-    at[n:] = np.where(of_rate, np.clip(x[n:], -reach, reach), x[n:])
+    at[n:] = np.where(of_rate, np.clip(x[n:], -joint.rate_of_one, joint.rate_of_one), x[n:])
     return at
 
 
-def _equations(problem: GroupProblem) -> FloatArray:
-    """Return the complex equations of each line: entries used, less what is free and what is unknown."""
-    entries = problem.data.entries
-    places = np.array([np.flatnonzero(one.ravel())[0] for one in entries.units])
-    unknown = np.count_nonzero(problem.unknown[:, places], axis=1)
-    used = np.count_nonzero(problem.data.used, axis=1)
-    equations: FloatArray = np.maximum(used - 2 * len(places) + problem.hidden - unknown, 0).astype(float)
-    return equations
+def _unit_places(data: LineData) -> NDArray[np.intp]:
+    """Return the numbers of the free entries of C among all, row by row."""
+    a, b = data.entries.free
+    return a * data.entries.n + b
 
 
 def _rescued(data: LineData, c: ComplexArray, on: OnManifold) -> OnManifold:
@@ -389,7 +444,7 @@ def _rescued(data: LineData, c: ComplexArray, on: OnManifold) -> OnManifold:
     far = np.flatnonzero(~(on.squares <= _FAR * data.entries.n**2))
     if far.size == 0 or far.size == len(c):
         return on
-    other = starts_on_manifold(data.on_lines(far), c[far], 25)
+    other = starts_on_manifold(data.on_lines(far), c[far], _OTHER_STEPS)
     squares = on.squares.copy()
     h, m = on.h.copy(), on.m.copy()
     nearer = other.squares < squares[far]
@@ -397,15 +452,7 @@ def _rescued(data: LineData, c: ComplexArray, on: OnManifold) -> OnManifold:
     return OnManifold(h, m, squares)
 
 
-def _trusted(on: OnManifold, n: int, joint: JointCoordinates) -> NDArray[np.bool_]:
-    """Return which lines are near enough to the manifold; half of them where few are."""
-    trusted = np.asarray(on.squares <= _FAR * n**2)
-    if np.count_nonzero(trusted) < max(joint.lower.size, len(trusted) // 4):
-        trusted = on.squares <= np.quantile(on.squares, 0.5)
-    return trusted
-
-
-def _used(
+def _of_coordinates(
     problem: GroupProblem, forms: LineForms, of_smooth: LineForms, c: ComplexArray
 ) -> tuple[LineForms, ComplexArray | None]:
     """Return the forms of the entries of C that the coordinates change, and the unknown ones of the smooth FRFs.
@@ -413,26 +460,30 @@ def _used(
     Entries of C that are unknown on a line are eliminated from its form; all others that the coordinates do not change
     are zero.
     """
-    n, unit = problem.data.entries.n, problem.data.entries.units
-    places = np.array([np.flatnonzero(one.ravel())[0] for one in unit])
-    unknown = problem.unknown[:, places]
-    found = None
+    n, places, joint = problem.data.entries.n, _unit_places(problem.data), problem.joint
+    unknown, found = problem.unknown[:, places], None
     if unknown.any():
         forms, step = _eliminated(forms, of_smooth, unknown)
-        found = np.where(problem.unknown, c.reshape(len(c), -1), 0).reshape(c.shape) + np.tensordot(step, unit, 1)
-    if problem.is_diagonal:
-        kept = np.flatnonzero(places % (n + 1) == 0)
+        found = np.where(problem.unknown, c.reshape(len(c), -1), 0).reshape(c.shape)
+        found += np.tensordot(step, problem.data.entries.units, 1)
+    upper, lower = joint.rows * n + joint.columns, joint.columns * n + joint.rows
+    if places.size == n * n > len(upper) > n:
+        # C is symmetric, and all its entries are there.
+        fold = (places[:, None] == upper).astype(float) + ((places[:, None] == lower) & (upper != lower))
+        return LineForms(
+            forms.compliance[:, upper], fold.T @ forms.weight @ fold, forms.gradient @ fold, forms.squares
+        ), found
+    if len(upper) < places.size:
+        kept = np.flatnonzero(np.isin(places, upper))
         weight = forms.weight[:, kept[:, None], kept]
         forms = LineForms(forms.compliance[:, kept], weight, forms.gradient[:, kept], forms.squares)
-    elif len(unit) > n * (n + 1) // 2:
-        forms = _symmetric(forms, n)
     return forms, found
 
 
 def _eliminated(forms: LineForms, of_smooth: LineForms, unknown: NDArray[np.bool_]) -> tuple[LineForms, ComplexArray]:
     """Minimise each form over its unknown entries; return the forms left, and the step there of the smooth FRFs."""
     w, p = forms.weight, forms.gradient
-    size = np.sqrt(np.maximum(np.einsum("lqq->lq", w).real, np.finfo(float).tiny))
+    size = np.sqrt(np.maximum(np.einsum("lqq->lq", w).real, _TINY))
     outer = size[:, :, None] * size[:, None, :]
     both = unknown[:, :, None] & unknown[:, None, :]
     masked = np.where(both, w / outer, 0) + (~unknown)[:, :, None] * np.eye(w.shape[1])
@@ -444,12 +495,3 @@ def _eliminated(forms: LineForms, of_smooth: LineForms, unknown: NDArray[np.bool
     squares = forms.squares - (p.conj() * (inverse @ p[..., None])[..., 0]).real.sum(axis=1)
     step = (inverse @ of_smooth.gradient[..., None])[..., 0]
     return LineForms(forms.compliance, weight, gradient, squares), step
-
-
-def _symmetric(forms: LineForms, n: int) -> LineForms:
-    """Return the forms of the upper triangle of a symmetric C from those of all its entries."""
-    a, b = np.triu_indices(n)
-    fold = np.zeros((n * n, a.size))
-    fold[a * n + b, np.arange(a.size)] = 1
-    fold[b * n + a, np.arange(a.size)] = 1
-    return LineForms(forms.compliance[:, a * n + b], fold.T @ forms.weight @ fold, forms.gradient @ fold, forms.squares)

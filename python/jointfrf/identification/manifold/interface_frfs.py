@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from jointfrf.errors import IllConditionedWarning
 from jointfrf.frf.bands import in_pieces
 from jointfrf.frf.entry_groups import connected
 from jointfrf.identification.manifold.on_manifold import FrfEntries, LineData
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.substructuring.modification import inverse_substructuring
 
 __all__ = ["InterfaceFrfs"]
 
@@ -85,14 +88,22 @@ class InterfaceFrfs(NamedTuple):
         """Return FRFs between joint DOFs, shape (n_freq, 2 n, 2 n), m/N."""
         return between(self.responses, h, self.forces)
 
+    def line_stiffness(self) -> ComplexArray:
+        """Return K*(w) of each line alone, shape (n_freq, n, n), N/m; NaN where it cannot be inverted."""
+        h = self.measured
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", IllConditionedWarning)
+            (found,) = in_pieces(len(h), lambda own: [inverse_substructuring(self.gamma(h[own]), on_singular="nan")])
+        return found
+
     def on_lines(self, lines: NDArray[np.intp] | slice) -> InterfaceFrfs:
         """Return some of the lines."""
         return self._replace(measured=self.measured[lines], smooth=self.smooth[lines], variance=self.variance[lines])
 
     def groups(self) -> list[NDArray[np.intp]]:
-        """Joint DOFs between which FRFs are zero, to rounding or beside their noise, on all lines.
+        """Joint DOFs between which FRFs are zero, to rounding or within their noise, on all lines.
 
-        Each group is a problem of its own: where a structure is symmetric, the FRFs between some DOFs vanish.
+        Each group is a separate problem: where a structure is symmetric, the FRFs between some DOFs vanish.
         """
         n, smooth = self.n, abs(self.smooth_gamma)
         size = np.sqrt(np.einsum("lpp->lp", smooth))

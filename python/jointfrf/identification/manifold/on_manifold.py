@@ -5,7 +5,7 @@ with two matrices H and M that are free (symmetric where the structure is recipr
 
     gamma_jj = H,   gamma_jk = H T,   gamma_kj = T' H,   gamma_kk = T' H T + C T,   T = 1 - M C,   T' = 1 - C M.
 
-M is (Y_B + C)^-1 with Y_B the receptance of side k by itself. No inverse is needed: the form is regular where gamma_jk
+M is (Y_B + C)^-1 with Y_B the receptance of side k alone. No inverse is needed: the form is regular where gamma_jk
 is singular and for a rigid joint, C = 0.
 """
 
@@ -31,7 +31,6 @@ __all__ = [
     "LineData",
     "OnManifold",
     "PriorOfM",
-    "correlated",
     "expected_m",
     "frfs_of_joint",
     "normal_forms",
@@ -39,10 +38,11 @@ __all__ = [
     "project",
     "smooth_compliance",
     "starts_on_manifold",
-    "weighing",
 ]
 
 _Numbers = TypeVar("_Numbers", ComplexArray, FloatArray)
+#: Lines whose squares exceed the median by this factor are started again.
+_FAR_OFF = 4
 #: A line has arrived when a step gains less than this of the squares, in units of the noise.
 _GAIN = 1e-5
 
@@ -93,7 +93,7 @@ class FrfEntries(NamedTuple):
 
     @property
     def places(self) -> NDArray[np.intp]:
-        """The entry that stands at each place of gamma, shape (2 n, 2 n)."""
+        """Number of the entry at each place of gamma, shape (2 n, 2 n)."""
         return _places(self.n, self.reciprocal)
 
 
@@ -117,7 +117,7 @@ def _entries_of(n: int, reciprocal: bool) -> FrfEntries:
 
 @lru_cache(maxsize=64)
 def _places(n: int, reciprocal: bool) -> NDArray[np.intp]:
-    """Return the entry that stands at each place of gamma."""
+    """Return the number of the entry at each place of gamma."""
     entries, place = _entries_of(n, reciprocal), np.empty((2 * n, 2 * n), np.intp)
     place[entries.columns, entries.rows] = place[entries.rows, entries.columns] = np.arange(entries.rows.size)
     place.flags.writeable = False
@@ -162,13 +162,22 @@ class LineData(NamedTuple):
         size: FloatArray = medians(own.T).reshape(2, self.entries.n).max(axis=0)
         return size
 
-    def on_lines(self, lines: NDArray[np.intp]) -> LineData:
-        """Return some of the lines."""
+    def on_lines(self, lines: NDArray[np.intp] | slice) -> LineData:
+        """Return some of the lines; neighbouring ones without a copy."""
         return LineData(self.entries, *(array[lines] for array in self.arrays))
 
-    def on_slice(self, lines: slice) -> LineData:
-        """Return neighbouring lines, without a copy."""
-        return LineData(self.entries, *(array[lines] for array in self.arrays))
+    @property
+    def whitening_order(self) -> int:
+        """Order of the whitening matrices, 0 where there are none."""
+        return 0 if self.correlation is None else self.correlation.shape[1]
+
+    @property
+    def weighing(self) -> tuple[FloatArray, FloatArray]:
+        """Weights and whitening as the kernel takes them."""
+        weights = self.entries.matrix(self.inverse_std)
+        if self.correlation is None:
+            return weights, np.zeros((len(weights), 1, 1))
+        return weights, np.ascontiguousarray(self.correlation)
 
 
 class OnManifold(NamedTuple):
@@ -185,16 +194,6 @@ class OnManifold(NamedTuple):
     h: ComplexArray
     m: ComplexArray
     squares: FloatArray
-
-    def better_of(self, other: OnManifold) -> OnManifold:
-        """Return on each line the nearer one."""
-        nearer = ~(other.squares >= self.squares)
-        pick = nearer[:, None, None]
-        return OnManifold(
-            np.where(pick, other.h, self.h),
-            np.where(pick, other.m, self.m),
-            np.where(nearer, other.squares, self.squares),
-        )
 
 
 def frfs_of_joint(h: ComplexArray, m: ComplexArray, c: ComplexArray) -> ComplexArray:
@@ -230,8 +229,8 @@ def project(target: ComplexArray, data: LineData, c: ComplexArray, start: OnMani
     h, m = (np.array(x, np.complex128, order="C") for x in (start.h, start.m))
     squares, line_info = np.empty(n_freq), np.empty(n_freq, np.int32)
     for own in line_slices(n_freq) if n_freq else []:
-        part = data.on_slice(own)
-        sizes = (int(data.entries.reciprocal), data.entries.n, correlated(data), len(part.measured))
+        part = data.on_lines(own)
+        sizes = (int(data.entries.reciprocal), data.entries.n, data.whitening_order, len(part.measured))
         lines = _lines(part, data.entries.matrix(target[own]), c[own])
         call("project_on_joint", [*sizes, steps, _GAIN, *lines, h[own], m[own], squares[own], line_info[own]])
     bad = line_info != 0
@@ -264,9 +263,9 @@ def normal_forms(data: LineData, c: ComplexArray, on: OnManifold, targets: tuple
     gradient = np.empty((len(targets), n_freq, u), np.complex128)
     squares = np.empty((len(targets), n_freq))
     for own in line_slices(n_freq) if n_freq else []:
-        part = data.on_slice(own)
+        part = data.on_lines(own)
         n_own = len(part.measured)
-        sizes = (int(entries.reciprocal), entries.n, u, correlated(data), n_own, len(targets))
+        sizes = (int(entries.reciprocal), entries.n, u, data.whitening_order, n_own, len(targets))
         lines = _lines(part, np.array([entries.matrix(target[own]) for target in targets]), c[own])
         point = [np.ascontiguousarray(x[own]) for x in (on.h, on.m)]
         found = np.empty((len(targets), n_own, u), np.complex128), np.empty((len(targets), n_own))
@@ -278,20 +277,7 @@ def normal_forms(data: LineData, c: ComplexArray, on: OnManifold, targets: tuple
 
 def _lines(data: LineData, gamma: ComplexArray, c: ComplexArray) -> tuple[NDArray[Any], ...]:
     """Return FRFs, weights, whitening and C as the kernel takes them."""
-    return gamma, *weighing(data), np.ascontiguousarray(c, np.complex128)
-
-
-def weighing(data: LineData) -> tuple[FloatArray, FloatArray]:
-    """Return weights and whitening as the kernel takes them."""
-    weights = data.entries.matrix(data.inverse_std)
-    if data.correlation is None:
-        return weights, np.zeros((len(weights), 1, 1))
-    return weights, np.ascontiguousarray(data.correlation)
-
-
-def correlated(data: LineData) -> int:
-    """Return the order of the whitening matrices, 0 where there are none."""
-    return 0 if data.correlation is None else data.correlation.shape[1]
+    return gamma, *data.weighing, np.ascontiguousarray(c, np.complex128)
 
 
 def starts_on_manifold(data: LineData, c: ComplexArray, steps: int) -> OnManifold:
@@ -305,59 +291,56 @@ def starts_on_manifold(data: LineData, c: ComplexArray, steps: int) -> OnManifol
     steps : int
         Steps of the projection at most.
     """
-    n = data.entries.n
-    gamma = data.entries.matrix(data.smooth)
+    gamma, n = data.entries.matrix(data.smooth), data.entries.n
+    # A view: what was found replaces gamma_jj where the next starts are sought.
     h = gamma[:, :n, :n]
-    nothing = np.full(len(c), np.inf)
-    best = OnManifold(h, np.zeros_like(h), nothing)
-    for start in _first_m(gamma, c):
-        m = start()
-        if data.entries.reciprocal:
-            m = (m + m.swapaxes(1, 2)) / 2
-        m = np.where(np.isfinite(m).all(axis=(1, 2), keepdims=True), m, 0)
-        far = np.flatnonzero(~(best.squares <= 4 * np.median(best.squares)) | ~np.isfinite(best.squares))
+    best = OnManifold(h, np.zeros_like(h), np.full(len(c), np.inf))
+    for first_m in _FIRST_M:
+        far = np.flatnonzero(~(best.squares <= _FAR_OFF * np.median(best.squares)) | ~np.isfinite(best.squares))
         if far.size == 0:
             break
         own = data.on_lines(far)
-        found = project(own.smooth, own, c[far], OnManifold(h[far], m[far], nothing[far]), steps)
-        old = OnManifold(best.h[far], best.m[far], best.squares[far])
-        new = old.better_of(found)
-        for whole, part in zip(best, new, strict=True):
-            whole[far] = part
+        with np.errstate(all="ignore"):
+            m = first_m(gamma[far], c[far])
+        if data.entries.reciprocal:
+            m = (m + m.swapaxes(1, 2)) / 2
+        m = np.where(np.isfinite(m).all(axis=(1, 2), keepdims=True), m, 0)
+        found = project(own.smooth, own, c[far], OnManifold(h[far], m, best.squares[far]), steps)
+        nearer = ~(found.squares >= best.squares[far])
+        for whole, part in zip(best, found, strict=True):
+            whole[far[nearer]] = part[nearer]
     return best
 
 
-def _first_m(gamma: ComplexArray, c: ComplexArray) -> list[Callable[[], ComplexArray]]:
-    """Return algebraic first values of M, exact without noise: two blocks of gamma give T, and M = (1 - T) K*."""
+def _from_jj(gamma: ComplexArray, c: ComplexArray) -> ComplexArray:
+    """Return M = (1 - T) K* with T of gamma_jk = gamma_jj T."""
     n = c.shape[-1]
-    jj, jk, kj, kk = gamma[:, :n, :n], gamma[:, :n, n:], gamma[:, n:, :n], gamma[:, n:, n:]
-    one = np.eye(n)
+    return (np.eye(n) - solve(gamma[:, :n, :n], gamma[:, :n, n:], on_singular="nan")) @ _inverse(c)
 
-    def quiet(f: Callable[[], ComplexArray]) -> Callable[[], ComplexArray]:
-        def run() -> ComplexArray:
-            with np.errstate(all="ignore"):
-                return f()
 
-        return run
+def _from_kj(gamma: ComplexArray, c: ComplexArray) -> ComplexArray:
+    """Return M = (1 - T) K* with T of gamma_kk = (gamma_kj + C) T."""
+    n = c.shape[-1]
+    return (np.eye(n) - solve(gamma[:, n:, :n] + c, gamma[:, n:, n:], on_singular="nan")) @ _inverse(c)
 
-    def divided(a: ComplexArray, b: ComplexArray) -> ComplexArray:
-        return solve(a, b, on_singular="nan")
 
-    def by_c(x: ComplexArray) -> ComplexArray:
-        return x @ invert(c, on_singular="nan")
+def _from_inverse(gamma: ComplexArray, c: ComplexArray) -> ComplexArray:
+    """Return M = (C + Y_B)^-1 with Y_B of the inverse of gamma."""
+    n = c.shape[-1]
+    return _inverse(c + _inverse(_inverse(gamma)[:, n:, n:] - _inverse(c)))
 
-    return [
-        quiet(lambda: by_c(one - divided(jj, jk))),
-        quiet(lambda: by_c(one - divided(kj + c, kk))),
-        quiet(
-            lambda: invert(
-                c
-                + invert(invert(gamma, on_singular="nan")[:, n:, n:] - invert(c, on_singular="nan"), on_singular="nan"),
-                on_singular="nan",
-            )
-        ),
-        quiet(lambda: np.zeros_like(c)),
-    ]
+
+def _inverse(a: ComplexArray) -> ComplexArray:
+    return invert(a, on_singular="nan")
+
+
+#: Algebraic first values of M, exact without noise; none last.
+_FIRST_M: tuple[Callable[[ComplexArray, ComplexArray], ComplexArray], ...] = (
+    _from_jj,
+    _from_kj,
+    _from_inverse,
+    lambda gamma, c: np.zeros_like(c),
+)
 
 
 def smooth_compliance(data: LineData) -> ComplexArray:
@@ -398,7 +381,7 @@ def prior_of_m(data: LineData) -> PriorOfM:
     n = data.entries.n
 
     def of_lines(own: slice) -> tuple[FloatArray, FloatArray]:
-        part = data.on_slice(own)
+        part = data.on_lines(own)
         size = np.abs(invert(part.entries.matrix(part.smooth)[:, :n, :n], on_singular="nan"))
         squares = abs((part.measured - part.smooth) * part.inverse_std) ** 2
         return np.where(np.isfinite(size), size, 0), squares.sum(axis=1)
@@ -430,9 +413,9 @@ def expected_m(data: LineData, c: ComplexArray, on: OnManifold, prior: PriorOfM)
     """
     h, m = (np.array(x, np.complex128, order="C") for x in (on.h, on.m))
     line_info = np.empty(len(c), np.int32)
-    sizes = (int(data.entries.reciprocal), data.entries.n, correlated(data), len(c))
+    sizes = (int(data.entries.reciprocal), data.entries.n, data.whitening_order, len(c))
     spread = np.ascontiguousarray(prior.size)
-    call("expect_on_joint", [*sizes, prior.share, spread, *weighing(data), np.ascontiguousarray(c), h, m, line_info])
+    call("expect_on_joint", [*sizes, prior.share, spread, *data.weighing, np.ascontiguousarray(c), h, m, line_info])
     bad = line_info != 0
     h[bad], m[bad] = on.h[bad], on.m[bad]
     return on._replace(h=h, m=m)

@@ -16,8 +16,14 @@ from jointfrf.frf.quantiles import medians
 from jointfrf.identification.manifold.coordinates import CrossTerms, DampingTerms
 from jointfrf.identification.manifold.estimate import GroupStart, JointEstimate
 from jointfrf.identification.manifold.interface_frfs import InterfaceFrfs
-from jointfrf.identification.manifold.transforms import Transform, Transforms, as_transforms
-from jointfrf.identification.noise import KnownNoise, NoiseOptions, known_noise
+from jointfrf.identification.manifold.transforms import (
+    Transform,
+    Transforms,
+    as_transforms,
+    deformation_compliance,
+    deformation_variance,
+)
+from jointfrf.identification.noise import KnownNoise, NoiseOptions, noise_of_matrix
 from jointfrf.identification.prepare import BandsOfDofs, MeasuredFrfs, as_dof_names
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_names, as_real, check_choice
 
@@ -129,34 +135,43 @@ def prepare_compliance(
     # Whether channels are the same points is known where both transforms are one.
     square = h.shape[1] == h.shape[2] and np.array_equal(responses, forces)
     _check_joint_dofs(transforms, h, names)
-    found = known_noise(freq, h, noise, transforms, reciprocal=options.reciprocal and square)
-    check_joint_seen(freq, found.smooth, transforms.variance(found.variance))
+    found = noise_of_matrix(freq, h, noise, reciprocal=options.reciprocal and square)
+    smooth, variance = transforms.gamma(found.smooth), found.variance
+    check_joint_seen(freq, smooth, transforms.variance(variance))
+    transforms = transforms.with_modes(found.smooth)
+    deformation, compliance = None, transforms.compliance
+    if transforms.channels is not None:
+        deformation = deformation_variance(found.smooth, *transforms.channels)
+        of_sides = deformation_compliance(h, variance, *transforms.channels)
+        compliance = of_sides if compliance is None else np.maximum(compliance, 0.0 if of_sides is None else of_sides)
+    elif compliance is not None:
+        compliance = np.maximum(compliance, 0.0)
     return FitProblem(
         dofs=names,
         freq_hz=freq,
         frfs=InterfaceFrfs.of(
             h,
-            found.smooth,
-            found.variance if found.deformation is None else found.variance + found.deformation,
+            smooth,
+            variance if deformation is None else variance + deformation,
             responses,
             forces,
             options.reciprocal,
             symmetrised=square and _is_symmetrised(h),
-            response_modes=found.transforms.response_modes,
-            force_modes=found.transforms.force_modes,
+            response_modes=transforms.response_modes,
+            force_modes=transforms.force_modes,
         ),
         noise=found.noise,
         used=used[kept],
         bands=tuple(map(tuple, own)),
         options=options,
-        deformation=found.deformation,
-        added_compliance=found.compliance,
+        deformation=deformation,
+        added_compliance=compliance,
         left_out=() if transforms.geometry is None else left_out_dofs(h, transforms.geometry),
     )
 
 
 def _check_joint_dofs(transforms: Transforms, h: ComplexArray, names: tuple[str, ...]) -> None:
-    """Refuse channels that do not show every joint DOF, once on each side."""
+    """Raise an error for channels that do not show every joint DOF, once on each side."""
     labels = [f"{side}:{name}" for side in "jk" for name in names]
     if not transforms.are_units:
         both = np.array_equal(transforms.responses, transforms.forces)
@@ -167,7 +182,7 @@ def _check_joint_dofs(transforms: Transforms, h: ComplexArray, names: tuple[str,
 
 def _is_symmetrised(h: ComplexArray) -> bool:
     """Whether FRFs were made reciprocal: both directions are then one measurement, with one noise."""
-    # Mostly the first line tells that they were not.
+    # Mostly the first line shows that they were not.
     return all(
         bool((abs(part - part.swapaxes(1, 2)) <= _RECIPROCAL * abs(part)).all())
         for part in (h[own] for own in (slice(1), *line_slices(len(h))))
@@ -190,7 +205,7 @@ _TINY = float(np.finfo(float).tiny)
 
 
 def check_transform(name: str, transform: FloatArray, labels: list[str]) -> None:
-    """Refuse a transform that makes one joint DOF of the others: some channels are the same, or stand in one line."""
+    """Raise an error for a transform whose joint DOFs are not independent."""
     size = np.linalg.norm(transform, axis=1, keepdims=True)
     rank = int(np.linalg.matrix_rank(transform / size, tol=_RANK))
     if rank < len(transform):
@@ -201,7 +216,7 @@ def check_transform(name: str, transform: FloatArray, labels: list[str]) -> None
 
 
 def check_channels(gamma: ComplexArray, labels: list[str]) -> None:
-    """Refuse measured FRFs between joint DOFs j, then k, that hold no signal, or one DOF twice.
+    """Raise an error for measured FRFs between joint DOFs j, then k, that hold no signal, or one DOF twice.
 
     On the two sides of a rigid joint calculated FRFs are the same; measured ones differ by their noise.
     """
@@ -250,7 +265,7 @@ def _is_measured(gamma: ComplexArray) -> bool:
 
 
 def check_joint_seen(freq: FloatArray, smooth: ComplexArray, variance: FloatArray) -> None:
-    """Refuse FRFs that are noise only, or that say nothing across the joint.
+    """Raise an error for FRFs that are noise only, or that show nothing across the joint.
 
     Parameters
     ----------
@@ -289,7 +304,7 @@ def check_joint_seen(freq: FloatArray, smooth: ComplexArray, variance: FloatArra
 
 
 def check_estimate(found: JointEstimate, level: float, span: str, *, is_level_known: bool) -> None:
-    """Refuse a result that fits nothing, or that fewer equations than parameters give.
+    """Raise an error for a result that fits nothing, or with fewer equations than parameters.
 
     Parameters
     ----------
@@ -302,7 +317,7 @@ def check_estimate(found: JointEstimate, level: float, span: str, *, is_level_kn
         Whether that is known from elsewhere than from the residual.
     """
     for group in found.groups:
-        equations, unknowns = 2 * group.fit.equations, group.fit.minimum.x.size
+        equations, unknowns = 2 * group.equations, group.x.size
         if equations < unknowns:
             raise ValueError(
                 f"gamma gives {equations:.0f} real equations ({span}, without those that no joint fits) for {unknowns} "

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf.frf.bands import in_pieces
-from jointfrf.identification.manifold.coordinates import CoupledJoint, DiagonalJoint, JointCoordinates, terms_of
-from jointfrf.identification.manifold.line_forms import LineForms, minimise_forms
+from jointfrf.identification.manifold.coordinates import SpringJoint
+from jointfrf.identification.manifold.line_forms import LineForms
 from jointfrf.identification.manifold.on_manifold import LineData
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.kernel.linear_algebra import invert
@@ -27,17 +27,17 @@ _ROUGH = 0.1
 _HIDDEN = 0.1
 
 
-def first_joints(data: LineData, joint: JointCoordinates) -> list[FloatArray]:
+def first_joints(data: LineData, joint: SpringJoint) -> list[FloatArray]:
     """Return coordinates of the joint from the compliance of the smooth FRFs, the likeliest first.
 
     C = gamma_kk gamma_jk^-1 gamma_jj - gamma_kj of the smooth FRFs on every line, with the covariance that a share of
     the noise gives it; lines on which noise hides gamma_jk count little.
     """
-    n, is_diagonal = data.entries.n, isinstance(joint, DiagonalJoint)
+    n, is_diagonal = data.entries.n, joint.in_compliance
     a = range(n)
 
     def of_lines(own: slice) -> list[NDArray[Any]]:
-        part = data.on_slice(own)
+        part = data.on_lines(own)
         gamma, spread = part.entries.matrix(part.smooth), part.entries.matrix(_variance(part))
         compliance = joint_compliance(gamma, on_singular="nan")
         covariance = _SMOOTH**2 * compliance_covariance(gamma, spread, np.eye(2 * n), on_singular="nan")
@@ -50,12 +50,11 @@ def first_joints(data: LineData, joint: JointCoordinates) -> list[FloatArray]:
     if not good.any():
         return []
     compliance, own, ratio, *covariance = (x[good] for x in found)
-    here = type(joint)(terms_of(joint).on_lines(np.flatnonzero(good)))  # type: ignore[call-arg]
+    here = joint.on_lines(np.flatnonzero(good))
     threshold = _HIDDEN if np.count_nonzero(ratio < _HIDDEN) > 2 * joint.lower.size else float(np.median(ratio))
     line_weight = 1 / (1 + (ratio / threshold) ** 8)
-    if isinstance(here, DiagonalJoint):
+    if is_diagonal:
         return _diagonal_starts(compliance[:, a, a], own, line_weight, here)
-    assert isinstance(here, CoupledJoint)
     return _coupled_starts(compliance, covariance[0], own, line_weight, here)
 
 
@@ -70,7 +69,7 @@ def hidden_share(data: LineData) -> FloatArray:
     matrix = data.entries.matrix
 
     def of_lines(own: slice) -> list[FloatArray]:
-        part = data.on_slice(own)
+        part = data.on_lines(own)
         return [_hidden(matrix(part.smooth), matrix(_variance(part)))]
 
     (share,) = in_pieces(len(data.smooth), of_lines)
@@ -87,10 +86,10 @@ def _hidden(gamma: ComplexArray, spread: FloatArray) -> FloatArray:
 
 
 def _diagonal_starts(
-    value: ComplexArray, variance: FloatArray, line_weight: FloatArray, joint: DiagonalJoint
+    value: ComplexArray, variance: FloatArray, line_weight: FloatArray, joint: SpringJoint
 ) -> list[FloatArray]:
-    """Fit each DOF's compliance by itself."""
-    n, p = terms_of(joint).n, joint.lower.size
+    """Fit the compliance of each DOF separately."""
+    n, p = joint.n, joint.lower.size
     information = line_weight[:, None] / np.maximum(variance, np.finfo(float).tiny)
     mean = (information * value.real).sum(axis=0) / information.sum(axis=0)
     error = 1 / np.sqrt(information.sum(axis=0))
@@ -99,16 +98,16 @@ def _diagonal_starts(
     forms = LineForms(value, weight, np.zeros_like(value), np.zeros(len(value)))
     start = np.zeros(p)
     start[:n] = np.maximum(mean, error)
-    found = minimise_forms(forms, joint, start).x
+    found = joint.minimise(forms, start).x
     found[:n] = np.maximum(found[:n], 1e-3 * error)
     return [found, start]
 
 
 def _coupled_starts(
-    value: ComplexArray, covariance: ComplexArray, own: FloatArray, line_weight: FloatArray, joint: CoupledJoint
+    value: ComplexArray, covariance: ComplexArray, own: FloatArray, line_weight: FloatArray, joint: SpringJoint
 ) -> list[FloatArray]:
     """Fit all entries of C; first values from K* C = 1 by linear least squares, and from the mean of C."""
-    n = terms_of(joint).n
+    n = joint.n
     a, b = joint.rows, joint.columns
     size = np.sqrt(np.maximum(np.einsum("lqq->lq", covariance).real, np.finfo(float).tiny))
     scaled = covariance / (size[:, :, None] * size[:, None, :])
@@ -122,12 +121,12 @@ def _coupled_starts(
     forms = LineForms(mean, weight, np.zeros_like(mean), np.zeros(len(mean)))
     starts = [_linear_start(value, own, line_weight, joint), _mean_start(value, own, line_weight, joint)]
     starts = [start for start in starts if np.isfinite(start).all()]
-    found = (minimise_forms(forms, joint, start, least_gain=_ROUGH) for start in starts)
+    found = (joint.minimise(forms, start, least_gain=_ROUGH) for start in starts)
     minima = sorted(found, key=lambda one: one.cost)
     return [found.x for found in minima] + starts
 
 
-def _mean_start(value: ComplexArray, own: FloatArray, line_weight: FloatArray, joint: CoupledJoint) -> FloatArray:
+def _mean_start(value: ComplexArray, own: FloatArray, line_weight: FloatArray, joint: SpringJoint) -> FloatArray:
     """Return the stiffness whose compliance is the weighted mean of Re C, no damping."""
     w = line_weight / own.max(axis=1)
     size = np.sqrt(np.median(abs(np.einsum("laa->la", value)), axis=0))
@@ -135,15 +134,14 @@ def _mean_start(value: ComplexArray, own: FloatArray, line_weight: FloatArray, j
     w = line_weight / (own / size**4).max(axis=1)
     mean = np.tensordot(w, scaled, 1) / w.sum()
     k = np.linalg.pinv((mean + mean.T) / 2, hermitian=True) / np.outer(size, size)
-    start = np.zeros(len(terms_of(joint).parameters))
-    of_stiffness = terms_of(joint).kinds == 0
-    start[of_stiffness] = k[terms_of(joint).pairs[of_stiffness, 0], terms_of(joint).pairs[of_stiffness, 1]]
+    start, of_stiffness = np.zeros(joint.lower.size), joint.terms.kinds == 0
+    start[of_stiffness] = k[tuple(joint.terms.pairs[of_stiffness].T)]
     return start
 
 
-def _linear_start(value: ComplexArray, own: FloatArray, line_weight: FloatArray, joint: CoupledJoint) -> FloatArray:
+def _linear_start(value: ComplexArray, own: FloatArray, line_weight: FloatArray, joint: SpringJoint) -> FloatArray:
     """Solve K*(theta) C = 1 by weighted linear least squares in units of each DOF: exact without noise."""
-    terms, n = terms_of(joint), terms_of(joint).n
+    terms, n = joint.terms, joint.n
     size = np.sqrt(np.median(abs(np.einsum("laa->la", value)), axis=0))
     c = value / np.outer(size, size)
     root = np.sqrt(line_weight / (own / size**4).max(axis=1))

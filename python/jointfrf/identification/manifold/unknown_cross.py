@@ -15,12 +15,11 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
 from jointfrf.frf.bands import in_pieces
-from jointfrf.identification.manifold.coordinates import JointCoordinates, terms_of
-from jointfrf.identification.manifold.group_fit import GroupFit, GroupProblem, Misfitting
+from jointfrf.identification.manifold.coordinates import JointCoordinates
+from jointfrf.identification.manifold.group_fit import GroupFit, GroupProblem, UnknownCrossTerms
 from jointfrf.identification.manifold.line_forms import (
     FormMinimum,
     LineForms,
-    minimise_forms,
 )
 from jointfrf.identification.manifold.on_manifold import FrfEntries, LineData
 from jointfrf.identification.manifold.starts import hidden_share
@@ -31,7 +30,7 @@ __all__ = ["ComplianceLines", "compliance_lines", "fit_unknown_cross"]
 
 #: Lines that are done at once.
 _PIECE = 256
-#: Relative standard deviation that stands for an entry that is not used.
+#: Relative standard deviation in place of that of an entry that is not used.
 _UNUSED = 1e4
 #: Part of its variance that a condition keeps when all others are known.
 _OWN_NOISE = 1e-10
@@ -82,7 +81,7 @@ def compliance_lines(data: LineData) -> tuple[ComplianceLines, ComplianceLines]:
     """
 
     def of_lines(own: slice) -> tuple[NDArray[Any], ...]:
-        symmetric, plain = _of_piece(data.on_slice(own))
+        symmetric, plain = _of_piece(data.on_lines(own))
         return *symmetric, *plain
 
     with np.errstate(all="ignore"):
@@ -183,7 +182,7 @@ def _coloured(slope: ComplexArray, data: LineData) -> ComplexArray:
 _HIDDEN = 0.3
 #: A residual larger than this is not noise: C varies between lines, or is not symmetric.
 _MISFIT = 1.15
-#: A mean square is told from 1 at this many standard deviations.
+#: A mean square differs from 1 at this many standard deviations.
 _SIGMA = 4.0
 #: Squares of the mean over lines, in units of its noise, above which it is not zero.
 _CERTAIN = 16.0
@@ -195,7 +194,7 @@ _HALVINGS = 50
 
 
 class _Lines(NamedTuple):
-    """What lines say of the diagonal of C.
+    """The diagonal of C on all lines, with what weighs them.
 
     Attributes
     ----------
@@ -211,7 +210,7 @@ class _Lines(NamedTuple):
     weight: FloatArray
 
     def forms(self, variance: FloatArray) -> LineForms:
-        """Return the quadratic forms where C varies between lines with this variance, shape (n,), beside its noise."""
+        """Return the quadratic forms where C varies between lines by this variance, shape (n,), beyond its noise."""
         n = self.known.shape[1]
         diagonal = np.arange(n)
         both = self.known[:, :, None] & self.known[:, None, :]
@@ -226,10 +225,9 @@ class _Lines(NamedTuple):
 
 
 class _Weighted(NamedTuple):
-    """The minimum, with the forms and the standard deviation between lines, m/N, that belong to it."""
+    """The minimum, with the standard deviation between lines, m/N, that belongs to it."""
 
     minimum: FormMinimum
-    forms: LineForms
     scatter: FloatArray | None
     steps: int
     converged: bool
@@ -248,24 +246,26 @@ def fit_unknown_cross(problem: GroupProblem, starts: Iterable[FloatArray]) -> Gr
     Notes
     -----
     The symmetry of C is used unless the FRFs contradict it. Where the residual exceeds the noise, C is taken to vary
-    from line to line beside its noise, by as much as the median of the residuals shows: otherwise the lines of least
-    noise, often those of an antiresonance, would decide alone what the constant is. It is a mean of C_dd: where no
-    joint fits, it need not regenerate the FRFs.
+    from line to line in excess of its noise, by as much as the median of the residuals shows: otherwise the lines of
+    least noise, often those of an antiresonance, would decide alone what the constant is. It is a mean of C_dd: where
+    no joint fits, it need not regenerate the FRFs.
     """
     joint = problem.joint
     lines, is_symmetric = _lines(problem)
-    by_noise = lines.forms(np.zeros(terms_of(joint).n))
-    best = _best_of([minimise_forms(by_noise, joint, start) for start in [*starts, _middle(lines, joint)]])
+    by_noise = lines.forms(np.zeros(joint.n))
+    best = _best_of([joint.minimise(by_noise, start) for start in [*starts, _middle(lines, joint)]])
     equations = float((lines.weight[:, None] * lines.known).sum())
     possible = float(lines.known.sum())
-    found = _Weighted(best, by_noise, None, 1, True)
+    found = _Weighted(best, None, 1, True)
     degrees = max(equations - best.x.size / 2, 1.0)
     if best.cost / degrees > max(_MISFIT**2, 1 + _SIGMA / np.sqrt(degrees)):
         found = _with_scatter(lines, joint, best.x)
-    told = Misfitting(best.cost, is_symmetric, found.scatter, int(np.count_nonzero(lines.weight < 0.5)))
-    return GroupFit(
-        found.minimum, found.forms, lines.weight > 0, equations, possible, found.steps, found.converged, told
-    )
+    hidden = int(np.count_nonzero(lines.weight < 0.5))
+    return GroupFit.of(
+        found.minimum, problem=problem, used=lines.weight > 0, equations=equations, possible=possible,
+        iterations=found.steps, converged=found.converged,
+        unknown_cross=UnknownCrossTerms(best.cost, is_symmetric, found.scatter, hidden),
+    )  # fmt: skip
 
 
 def _lines(problem: GroupProblem) -> tuple[_Lines, bool]:
@@ -319,7 +319,7 @@ def _finite(found: ComplianceLines) -> ComplianceLines:
 
 def _middle(lines: _Lines, joint: JointCoordinates) -> FloatArray:
     """Return the stiffness of the median of C, no damping."""
-    n = terms_of(joint).n
+    n = joint.n
     start = np.zeros(joint.lower.size)
     for d in range(n):
         seen = lines.known[:, d] & (lines.weight > 0.5)
@@ -337,18 +337,18 @@ def _with_scatter(lines: _Lines, joint: JointCoordinates, start: FloatArray) -> 
     variance = _variance_between_lines(lines, joint, x)
     for step in range(1, _STEPS + 1):
         forms = lines.forms(variance)
-        best = _best_of([minimise_forms(forms, joint, one) for one in (x, _middle(lines, joint))])
+        best = _best_of([joint.minimise(forms, one) for one in (x, _middle(lines, joint))])
         change, x = best.x - x, best.x
         converged = bool(np.sqrt(abs(2 * (change @ best.information @ change))) < _SETTLED * np.sqrt(x.size))
         if converged and step > 1:
             break
-        # The mean of both: by itself a scatter that is too large is followed by one that is too small.
+        # The mean of both: alone, a scatter that is too large is followed by one that is too small.
         variance = (variance + _variance_between_lines(lines, joint, x)) / 2
-    return _Weighted(best, forms, np.sqrt(variance), step, converged)
+    return _Weighted(best, np.sqrt(variance), step, converged)
 
 
 def _variance_between_lines(lines: _Lines, joint: JointCoordinates, x: FloatArray) -> FloatArray:
-    """Return the variance of the diagonal of C between lines, beside its noise, shape (n,).
+    """Return the variance of the diagonal of C between lines in excess of its noise, shape (n,).
 
     With it the squares of the residual are those of noise in the median over lines, each by its weight: it takes no
     account of lines that say little, nor of the size of the largest residuals.
@@ -357,14 +357,14 @@ def _variance_between_lines(lines: _Lines, joint: JointCoordinates, x: FloatArra
     noise = np.einsum("laa->la", lines.of.covariance).real
     return np.array(
         [
-            _beside_noise(squares[own, d], noise[own, d], lines.weight[own])
+            _in_excess(squares[own, d], noise[own, d], lines.weight[own])
             for d, own in enumerate((lines.known & (lines.weight > 0)[:, None]).T)
         ]
     )
 
 
-def _beside_noise(squares: FloatArray, noise: FloatArray, weight: FloatArray) -> float:
-    """Return the variance beside that of the noise that explains the weighted median of squares."""
+def _in_excess(squares: FloatArray, noise: FloatArray, weight: FloatArray) -> float:
+    """Return the variance in excess of that of the noise that explains the weighted median of squares."""
     if squares.size == 0:
         return 0.0
     # Squares of circular noise are exponential: their median is ln 2 of their mean.

@@ -21,7 +21,7 @@ __all__ = ["AddedMass", "Assembly", "Attachment", "GroundSpring", "Places", "ass
 
 @dataclass(frozen=True)
 class Places:
-    """DOFs of both substructures that matter: joint, attachments, channels; those of A stand first.
+    """DOFs of both substructures that matter: joint, attachments, channels; those of A first.
 
     Attributes
     ----------
@@ -33,7 +33,7 @@ class Places:
     b: tuple[str, ...]
 
     def at(self, names: Sequence[str]) -> list[int]:
-        """Return where DOFs ``"A/..."``, ``"B/..."`` stand among all."""
+        """Return the numbers of DOFs ``"A/..."``, ``"B/..."`` among all."""
         return [
             self.a.index(name[2:]) if name.startswith("A/") else len(self.a) + self.b.index(name[2:]) for name in names
         ]

@@ -18,9 +18,9 @@ from jointfrf.identification.minimise import Minimum, inverse_information, minim
 from jointfrf.identification.model.likelihood import Likelihood
 from jointfrf.identification.model.prediction import Prediction
 from jointfrf.identification.model.starts import ranked_trials, refined
-from jointfrf.identification.noise import noise_about
+from jointfrf.identification.noise import KnownNoise, noise_about
 from jointfrf.identification.parameters import ParameterVector
-from jointfrf.identification.profile import ProfileIntervals
+from jointfrf.identification.profile import Intervals, ProfileIntervals
 from jointfrf.identification.residual_test import ResidualTest, check_residual
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
@@ -49,12 +49,7 @@ class ModelProblem:
         E|e|^2, inf where nothing is measured.
     smooth : ndarray, shape (n_freq, n_o, n_i)
         Smooth FRFs.
-    inflation : float
-        Lines that carry the noise of one independent line.
-    noise : NoiseModel or None
-        None where the noise was told.
-    is_assumed : bool
-        Whether the level of the noise follows from the residual.
+    noise : KnownNoise
     joint_channels : pair of list of int, or None
         Responses and forces at the joint DOFs j, then k, where all are measured.
     compliance_start : callable or None
@@ -69,9 +64,7 @@ class ModelProblem:
     measured: ComplexArray
     variance: FloatArray
     smooth: ComplexArray
-    inflation: float
-    noise: NoiseModel | None
-    is_assumed: bool
+    noise: KnownNoise
     joint_channels: tuple[list[int], list[int]] | None
     compliance_start: Callable[[], FloatArray | None]
     tested: FloatArray | None = None
@@ -79,7 +72,7 @@ class ModelProblem:
     @property
     def likelihood(self) -> Likelihood:
         """The likelihood for this variance."""
-        return Likelihood.of_variance(self.prediction, self.vector, self.measured, self.variance, self.inflation)
+        return Likelihood.of_variance(self.prediction, self.vector, self.measured, self.variance, self.noise.inflation)
 
 
 class FoundModel(NamedTuple):
@@ -94,7 +87,7 @@ class FoundModel(NamedTuple):
         Of all parameters.
     covariance : ndarray, shape (p, p)
         Of the values of the free parameters.
-    intervals : ProfileIntervals
+    intervals : Intervals
     predicted : ndarray, shape (n_freq, n_o, n_i)
     residual : ndarray, shape (n_freq, n_o, n_i)
         Over the standard deviation of the noise; NaN where nothing is measured.
@@ -108,7 +101,7 @@ class FoundModel(NamedTuple):
     minimum: Minimum
     values: FloatArray
     covariance: FloatArray
-    intervals: ProfileIntervals
+    intervals: Intervals
     predicted: ComplexArray
     residual: ComplexArray
     test: ResidualTest
@@ -125,7 +118,7 @@ def fit_assembly(problem: ModelProblem) -> FoundModel:
             if not problem.prediction.refine(problem.vector, problem.vector.to_values(minimum.x)):
                 break
             minimum = minimise(problem.likelihood, minimum.x)
-        for _ in range(2 if problem.is_assumed else 1):
+        for _ in range(2 if problem.noise.is_assumed else 1):
             changed = _with_noise_of_model(problem, minimum)
             if changed is None:
                 break
@@ -149,12 +142,12 @@ def _lowest(problem: ModelProblem) -> tuple[Minimum, float]:
     for values in itertools.chain(_values_of_lines(problem), [vector.values]):
         given.append(values)
         found.append(minimise(likelihood, vector.to_coordinates(values)))
-        if _ratio(likelihood, found[-1], problem.inflation) < _GOOD:
+        if _ratio(likelihood, found[-1], problem.noise.inflation) < _GOOD:
             return found[-1], np.inf
     trials = ranked_trials(likelihood, given)
     for x in itertools.islice(refined(likelihood, trials), _FOLLOWED):
         found.append(minimise(likelihood, x))
-        if _ratio(likelihood, found[-1], problem.inflation) < _GOOD and not problem.is_assumed:
+        if _ratio(likelihood, found[-1], problem.noise.inflation) < _GOOD and not problem.noise.is_assumed:
             break
     best = min(found, key=lambda one: one.cost)
     apart = [one.cost - best.cost for one in found if abs(one.x - best.x).max(initial=0) > 0.1 and one.cost > best.cost]
@@ -190,10 +183,10 @@ def _values_of_lines(problem: ModelProblem) -> Iterator[FloatArray]:
 def _with_noise_of_model(problem: ModelProblem, minimum: Minimum) -> ModelProblem | None:
     """Return the problem with noise about fitted FRFs where these fit, or of the level of the residual."""
     likelihood = problem.likelihood
-    ratio = _ratio(likelihood, minimum, problem.inflation)
-    if problem.is_assumed:
+    ratio = _ratio(likelihood, minimum, problem.noise.inflation)
+    if problem.noise.is_assumed:
         return None if abs(ratio - 1) < 1e-3 else replace(problem, variance=problem.variance * ratio**2)
-    noise = problem.noise
+    noise = problem.noise.model
     if noise is None or noise.source != "residual" or ratio > _GOOD or noise.coherence_factor.any():
         return None
     predicted = problem.prediction.frfs(problem.vector, problem.vector.to_values(minimum.x))
@@ -231,15 +224,23 @@ def _judged(problem: ModelProblem, minimum: Minimum, other: float) -> FoundModel
     residual = (likelihood.measured - predicted) / std
     test = check_residual(
         residual, problem.freq_hz, vector.pulls(minimum.x),
-        parameters=minimum.x.size, inflation=problem.inflation, is_told=problem.noise is None,
+        parameters=minimum.x.size, inflation=problem.noise.inflation, is_given=problem.noise.is_given,
     )  # fmt: skip
-    factor = max(1.0, test.ratio**2) if test.ratio > 1 + 3 * test.sigma else 1.0
+    factor = max(1.0, test.ratio**2) if test.is_large else 1.0
     own = inverse_information(minimum.information)
     slope = vector.slope(minimum.x)
     covariance = own * factor * np.outer(slope, slope)
+    profile = ProfileIntervals(likelihood, vector, minimum.x, minimum.cost, own, factor)
+    intervals = Intervals(
+        [one.name for one in vector.fitted],
+        profile.of,
+        lambda function, _, probability: profile.of_function(
+            lambda x: function(vector.to_values(x)[vector.free]), probability
+        ),
+    )
     return FoundModel(
-        problem, minimum, values, covariance, ProfileIntervals(likelihood, minimum, own, factor), predicted, residual,
-        test, open_directions(vector, minimum.x, minimum.information), other,
+        problem, minimum, values, covariance, intervals, predicted,
+        residual, test, open_directions(vector, minimum.x, minimum.information), other,
     )  # fmt: skip
 
 
@@ -290,7 +291,7 @@ def open_directions(vector: ParameterVector, x: FloatArray, information: FloatAr
     unit = np.minimum(np.where(values == 0, np.inf, _SHARE * abs(values)), std)
     unit = np.where(np.isfinite(unit), unit, 1.0) / np.maximum(slope, np.finfo(float).tiny)
     value, turned = np.linalg.eigh(of_frfs * np.outer(unit, unit))
-    told = []
+    found = []
     for size, direction in zip(value, turned.T, strict=True):
         if size >= 1:
             continue
@@ -299,11 +300,11 @@ def open_directions(vector: ParameterVector, x: FloatArray, information: FloatAr
         change = change * np.sign(direction[abs(direction).argmax()])
         named = [i for i in np.argsort(-abs(direction)) if abs(direction[i]) > _NAMED * largest]
         by_prior = float(((direction * unit * of_priors) ** 2).sum())
-        told.append(
+        found.append(
             OpenDirection(
                 tuple((vector.fitted[i].name, float(change[i])) for i in named),
                 float(1 / np.sqrt(size)) if size > 0 else float("inf"),
                 by_prior + max(size, 0) > 1 / 9,
             )
         )
-    return tuple(told)
+    return tuple(found)

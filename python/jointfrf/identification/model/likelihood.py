@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,12 +13,12 @@ from jointfrf.identification.model.prediction import Prediction
 from jointfrf.identification.parameters import ParameterVector
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
-__all__ = ["Likelihood", "LogLikelihood"]
+__all__ = ["Likelihood", "LogLikelihood", "WeightedResiduals"]
 
 
 @dataclass(frozen=True)
-class Likelihood:
-    """-2 log likelihood of measured FRFs with circular noise, and of priors, but for a constant.
+class WeightedResiduals(ABC):
+    """Squares of weighted differences between measured and predicted FRFs, and of priors.
 
     Attributes
     ----------
@@ -25,14 +26,65 @@ class Likelihood:
     vector : ParameterVector
     measured : ndarray, shape (n_freq, n_o, n_i)
         m/N.
-    inverse_std : ndarray, shape (n_freq, n_o, n_i)
-        sqrt(2 / E|e|^2) over the root of the inflation; 0 for what is not measured.
+    weight : ndarray, shape (n_freq, n_o, n_i)
+        1 over the standard deviation of real and imaginary part; 0 for what is not measured.
     """
 
     prediction: Prediction
     vector: ParameterVector
     measured: ComplexArray
-    inverse_std: FloatArray
+    weight: FloatArray
+
+    @property
+    def unit(self) -> float:
+        """The squares are those of real numbers over their standard deviation."""
+        return 1.0
+
+    @property
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        """Smallest and largest values of the coordinates."""
+        return self.vector.bounds
+
+    @property
+    def longest(self) -> FloatArray:
+        """Largest step of each coordinate."""
+        return self.vector.longest
+
+    @property
+    def used(self) -> NDArray[np.bool_]:
+        """What is measured, shape (n_freq, n_o, n_i)."""
+        return self.weight > 0
+
+    @abstractmethod
+    def difference(self, y: ComplexArray) -> ComplexArray:
+        """Return the difference between measured and predicted FRFs."""
+
+    @abstractmethod
+    def scale(self, y: ComplexArray) -> ComplexArray | FloatArray:
+        """Return minus the derivative of the weighted difference by the predicted FRFs."""
+
+    def cost(self, x: FloatArray) -> float:
+        """Return the sum of the squares; inf where a line is singular."""
+        y = self.prediction.frfs(self.vector, self.vector.to_values(x))
+        squares = _squares(self.difference(y) * self.weight) + float((self.vector.pulls(x) ** 2).sum())
+        return squares if np.isfinite(squares) else np.inf
+
+    def linearised(self, x: FloatArray) -> Linearised:
+        """Return the squares with information and gradient."""
+        vector = self.vector
+        y, slopes = self.prediction.linearised(vector, vector.to_values(x))
+        residual = np.ascontiguousarray((self.difference(y) * self.weight).ravel())
+        slopes *= self.scale(y)
+        pulls, of_pulls, by_x = vector.pulls(x), vector.pull_slopes(x), vector.slope(x)
+        real = slopes.reshape(len(slopes), -1).view(np.float64)
+        information = (real @ real.T) * np.outer(by_x, by_x) + np.diag(of_pulls**2)
+        gradient = (real @ residual.view(np.float64)) * by_x - of_pulls * pulls
+        cost = _squares(residual) + float((pulls**2).sum())
+        return Linearised(cost if np.isfinite(cost) else np.inf, information, gradient)
+
+
+class Likelihood(WeightedResiduals):
+    """-2 log likelihood of measured FRFs with circular noise, and of priors, but for a constant."""
 
     @classmethod
     def of_variance(
@@ -48,75 +100,28 @@ class Likelihood:
         inverse = np.sqrt(2 / (inflation * np.where(usable, variance, 1)))
         return cls(prediction, vector, np.where(usable, measured, 0), np.where(usable, inverse, 0))
 
-    @property
-    def used(self) -> NDArray[np.bool_]:
-        """What is measured, shape (n_freq, n_o, n_i)."""
-        return self.inverse_std > 0
+    def difference(self, y: ComplexArray) -> ComplexArray:
+        """Return measured minus predicted FRFs, m/N."""
+        return self.measured - y
 
-    def residual(self, x: FloatArray) -> ComplexArray:
-        """Return measured minus predicted over sqrt(E|e|^2 / 2 inflation), shape (n_freq, n_o, n_i)."""
-        y = self.prediction.frfs(self.vector, self.vector.to_values(x))
-        return (self.measured - y) * self.inverse_std
-
-    def cost(self, x: FloatArray) -> float:
-        """Return the sum of the squares; inf where a line is singular."""
-        squares = _squares(self.residual(x)) + float((self.vector.pulls(x) ** 2).sum())
-        return squares if np.isfinite(squares) else np.inf
-
-    def linearised(self, x: FloatArray) -> Linearised:
-        """Return the squares with information and gradient."""
-        y, slopes = self.prediction.linearised(self.vector, self.vector.to_values(x))
-        residual = ((self.measured - y) * self.inverse_std).ravel()
-        slopes *= self.inverse_std
-        return _with_priors(self.vector, x, residual, slopes.reshape(len(slopes), -1))
+    def scale(self, y: ComplexArray) -> FloatArray:
+        """Return the weight."""
+        return self.weight
 
 
-@dataclass(frozen=True)
-class LogLikelihood:
-    """Squares of ln(measured / predicted), with a common level: broad minima, for FRFs whose resonances are far off.
+class LogLikelihood(WeightedResiduals):
+    """Squares of ln(measured / predicted): broad minima, for FRFs whose resonances are far off."""
 
-    Attributes
-    ----------
-    prediction, vector, measured
-        As of `Likelihood`.
-    weight : ndarray, shape (n_freq, n_o, n_i)
-        1 over the standard deviation taken; 0 for what is not measured.
-    """
-
-    prediction: Prediction
-    vector: ParameterVector
-    measured: ComplexArray
-    weight: FloatArray
-
-    def cost(self, x: FloatArray) -> float:
-        """Return the sum of the squares."""
-        y = self.prediction.frfs(self.vector, self.vector.to_values(x))
-        squares = _squares(self.log_ratio(y) * self.weight) + float((self.vector.pulls(x) ** 2).sum())
-        return squares if np.isfinite(squares) else np.inf
-
-    def log_ratio(self, y: ComplexArray) -> ComplexArray:
+    def difference(self, y: ComplexArray) -> ComplexArray:
         """Return ln(measured / predicted), 0 where there is no FRF."""
         known = (self.weight > 0) & (self.measured != 0) & (y != 0)
         return np.log(np.where(known, self.measured, 1) / np.where(known, y, 1))
 
-    def linearised(self, x: FloatArray) -> Linearised:
-        """Return the squares with information and gradient."""
-        y, slopes = self.prediction.linearised(self.vector, self.vector.to_values(x))
-        residual = (self.log_ratio(y) * self.weight).ravel()
-        slopes *= self.weight / np.where(y == 0, 1, y)
-        return _with_priors(self.vector, x, residual, slopes.reshape(len(slopes), -1))
+    def scale(self, y: ComplexArray) -> ComplexArray:
+        """Return the weight over the predicted FRFs."""
+        return np.asarray(self.weight / np.where(y == 0, 1, y))
 
 
 def _squares(residual: ComplexArray) -> float:
     with np.errstate(all="ignore"):
         return float((residual.real**2 + residual.imag**2).sum())
-
-
-def _with_priors(vector: ParameterVector, x: FloatArray, residual: ComplexArray, flat: ComplexArray) -> Linearised:
-    """Return the squares of FRFs and priors; `flat`, (p, n), holds derivatives by the values, over noise."""
-    pulls, slopes, by_x = vector.pulls(x), vector.pull_slopes(x), vector.slope(x)
-    real = flat.view(np.float64)
-    information = (real @ real.T) * np.outer(by_x, by_x) + np.diag(slopes**2)
-    gradient = (real @ np.ascontiguousarray(residual).view(np.float64)) * by_x - slopes * pulls
-    cost = _squares(residual) + float((pulls**2).sum())
-    return Linearised(cost if np.isfinite(cost) else np.inf, information, gradient)

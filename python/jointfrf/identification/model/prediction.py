@@ -99,7 +99,7 @@ class Prediction:
     def joint_compliance(
         self, vector: ParameterVector, smooth: ComplexArray, variance: FloatArray
     ) -> LineCompliance | None:
-        """Return the compliance of the joint on each line by itself, all else being as believed.
+        """Return the compliance of the joint on each line alone, all else being as believed.
 
         Parameters
         ----------

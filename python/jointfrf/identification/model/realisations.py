@@ -15,8 +15,8 @@ from jointfrf.identification.model.assembly import Assembly
 from jointfrf.identification.model.fit import FoundModel, fit_assembly
 from jointfrf.identification.model.likelihood import Likelihood
 from jointfrf.identification.model.prediction import Prediction
-from jointfrf.identification.model.prepare import ChannelNoise, Channels, prepare_model_fit
-from jointfrf.identification.noise import noise_about
+from jointfrf.identification.model.prepare import Channels, prepare_model_fit
+from jointfrf.identification.noise import NoiseOptions, noise_about
 from jointfrf.identification.parameters import ParameterVector
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.laws.law_joint import LawJoint
@@ -59,7 +59,10 @@ class _Remembering(Prediction):
 
 
 def joints_of_realisations(
-    freq_hz: FloatArray, measured: Iterable[ComplexArray], whole: Assembly, channels: Channels
+    freq_hz: FloatArray,
+    measured: Iterable[ComplexArray],
+    whole: Assembly,
+    channels: Channels,
 ) -> Iterator[LawJoint]:
     """Yield the joint of each of several sets of FRFs of the same assembly.
 
@@ -86,9 +89,9 @@ def joints_of_realisations(
             if near is not None:
                 yield near
                 continue
-        found = fit_assembly(prepare_model_fit(freq_hz, h, whole, channels, ChannelNoise(), ()))
+        found = fit_assembly(prepare_model_fit(freq_hz, h, whole, channels, NoiseOptions(), ()))
         yield _joint_of(found, found.values)
-        if first is None and found.minimum.converged and found.test.is_noise and not found.problem.is_assumed:
+        if first is None and found.minimum.converged and found.test.is_noise and not found.problem.noise.is_assumed:
             prediction = _Remembering(found.problem.prediction)
             first = found._replace(problem=replace(found.problem, prediction=prediction))
             level = _noise(first, h, first.predicted).level
@@ -110,7 +113,7 @@ def _near(first: FoundModel, h: ComplexArray, level: float) -> LawJoint | None:
             noise = _noise(first, h, predicted)
             if turn and not noise.level < _LIKE * level:
                 return None
-            squares = Likelihood.of_variance(prediction, vector, h, noise.variance, problem.inflation)
+            squares = Likelihood.of_variance(prediction, vector, h, noise.variance, problem.noise.inflation)
             minimum = minimise(squares, x, least=_LEAST[turn])
             x = minimum.x
     return _joint_of(first, vector.to_values(x)) if minimum.converged else None

@@ -29,7 +29,7 @@ _NEW = 1e-9
 #: Unknowns of a function vary by so many standard deviations for the basis and for the polynomials of the matrices, by
 #: this share of their value where there is no prior; and may be found within a larger range.
 _REACH, _SHARE, _RANGE = 2.5, 0.06, 2.0
-#: A modal damping matrix is diagonal if nothing beside its diagonal exceeds this share of it.
+#: A modal damping matrix is diagonal if no other entry exceeds this share of it.
 _DIAGONAL = 1e-10
 #: Lines at which a reduced model is compared with the model.
 _SPOTS = 2
@@ -97,7 +97,7 @@ def reach_of(unknown: Unknown) -> float:
 
 
 def _box(unknown: Unknown, centre: float, share: float = 1.0) -> tuple[float, float]:
-    """Return the limits of an argument about a value, within its own: a function may refuse what is beyond them."""
+    """Return the limits of an argument about a value, within its own: a function may raise an error beyond them."""
     reach = share * reach_of(unknown)
     return max(unknown.lower, centre - reach), min(unknown.upper, centre + reach)
 
@@ -217,8 +217,8 @@ class ReducedSubstructure:
             if matrix is None:
                 continue
             modal = shapes.T @ matrix @ shapes
-            beside = abs(modal - np.diag(np.diagonal(modal))).max(initial=0)
-            if beside <= _DIAGONAL * abs(np.diagonal(modal)).max(initial=0):
+            other = abs(modal - np.diag(np.diagonal(modal))).max(initial=0)
+            if other <= _DIAGONAL * abs(np.diagonal(modal)).max(initial=0):
                 diagonal = diagonal + factor[:, None] * np.diagonal(modal)
             else:
                 full.append((factor, modal))

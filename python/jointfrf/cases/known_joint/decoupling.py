@@ -1,13 +1,12 @@
-"""Methods of identification as cases call them: their names, and the fit in the compliance domain."""
+"""The fit to all FRFs between internal points, given those of the substructures, and its Cramer-Rao bound."""
 
 from __future__ import annotations
 
-import warnings
-
 import numpy as np
 
-from jointfrf.errors import ConvergenceWarning, FrfCheckWarning, IdentificationWarning, IllConditionedWarning
-from jointfrf.identification.identify import identify
+from jointfrf.cases.known_joint.exact import Exact, measured
+from jointfrf.cases.known_joint.keys import KnownJointCase
+from jointfrf.frf.entry_groups import entry_groups
 from jointfrf.identification.minimise import inverse_information
 from jointfrf.identification.model.assembly import Assembly
 from jointfrf.identification.model.likelihood import Likelihood
@@ -15,42 +14,11 @@ from jointfrf.identification.model.prediction import Prediction, parameter_vecto
 from jointfrf.identification.model.prepare import Channels
 from jointfrf.identification.model.realisations import joints_of_realisations
 from jointfrf.identification.model.substructure import Substructure
-from jointfrf.identification.realisations import viscous_joints
-from jointfrf.identification.result import Fit
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.laws.law_joint import LawJoint
 from jointfrf.laws.springs import SpringLaw
-from jointfrf.substructuring.methods import STIFFNESS_METHODS
 
-__all__ = ["FITTED", "METHODS", "decoupling_bound", "fit_decoupling", "fit_measured", "fit_viscous"]
-
-METHODS: tuple[str, ...] = ("compliance", *STIFFNESS_METHODS, "decoupling-fit")
-#: Methods that take all lines, not means over bands.
-FITTED = ("compliance", "decoupling-fit")
-#: Relative noise for the weights of a fit to data whose noise is not asked for.
-_ASSUMED = 0.01
-#: Least variance of an FRF as a share of that of its driving points: entries that are zero have no noise of their own.
-_ROUNDING = 1e-20
-
-
-def fit_viscous(freq_hz: FloatArray, dofs: tuple[str, ...], gammas: ComplexArray) -> FloatArray:
-    """Fit stiffness and viscous damping without cross terms to each of several sets of FRFs.
-
-    Parameters
-    ----------
-    freq_hz : ndarray, shape (n_freq,)
-        Hz.
-    dofs : tuple of str
-        Names of the n joint DOFs.
-    gammas : ndarray, shape (r, n_freq, 2 n, 2 n)
-        Receptances of the assembly at joint DOFs j, then k, m/N.
-
-    Returns
-    -------
-    ndarray, shape (r, 2 n)
-        Stiffness of all DOFs, then damping.
-    """
-    return viscous_joints(freq_hz, gammas, dofs)
+__all__ = ["decoupling_bound", "decoupling_bounds", "fit_decoupling"]
 
 
 def fit_decoupling(
@@ -82,8 +50,8 @@ def fit_decoupling(
 
     Notes
     -----
-    What (2.53)-(2.56) take one block each is one maximum-likelihood fit of all four. The first set is fitted with
-    nothing told, the others start there.
+    What (2.53)-(2.56) take one block each is one maximum-likelihood fit of all four. The first set is fitted without
+    initial values, the others start from its result.
     """
     whole, channels = _decoupled(freq_hz, dofs, substructures, k_initial)
     found = [one.constant_joint() for one in joints_of_realisations(freq_hz, measured, whole, channels)]
@@ -132,30 +100,21 @@ def decoupling_bound(
     return np.concatenate([relative[::2], relative[1::2]])
 
 
-def fit_measured(freq_hz: FloatArray, dofs: tuple[str, ...], h: ComplexArray, transform: FloatArray) -> Fit:
-    """Fit a joint to FRFs between measured channels; its warnings stand in the result.
+def decoupling_bounds(case: KnownJointCase, exact: Exact) -> dict[str, FloatArray]:
+    """Return relative standard deviations of all parameters, shape (2 n,), by the name of the noise.
 
-    Parameters
-    ----------
-    freq_hz : ndarray, shape (n_freq,)
-        Hz.
-    dofs : tuple of str
-        Names of the n joint DOFs.
-    h : ndarray, shape (n_freq, m, m)
-        Receptances between the channels, m/N.
-    transform : ndarray, shape (2 n, m)
-        From the channels to joint DOFs j, then k.
-
-    Returns
-    -------
-    Fit
+    Noise of which FRFs share numbers, in blocks or by reciprocity, has another bound, and is left out. FRFs that are
+    zero by symmetry say nothing.
     """
-    gamma = transform @ h @ transform.T
-    # Of each FRF between joint DOFs by itself: the covariance of all of many channels takes ten times as long.
-    variance = transform**2 @ (_ASSUMED * abs(h)) ** 2 @ (transform**2).T
-    largest = np.sqrt(np.diagonal(variance.max(axis=0)))
-    variance = np.maximum(variance, _ROUNDING * np.outer(largest, largest))
-    with warnings.catch_warnings():
-        for category in (IdentificationWarning, IllConditionedWarning, ConvergenceWarning, FrfCheckWarning):
-            warnings.simplefilter("ignore", category)
-        return identify(freq_hz, gamma, dofs, damping="viscous", cross="ignore", noise=variance)
+    h = measured(exact, "decoupling-fit")
+    shown = np.zeros(h.shape[1:], bool)
+    for group in entry_groups(h, reciprocal=False):
+        shown[group.rows, group.columns] = True
+    k_joint = case.joint.dynamic_stiffness(case.freq_hz)
+    return {
+        noise.name: decoupling_bound(
+            exact.freq_hz, exact.dofs, (exact.h_a, exact.h_b), k_joint, np.where(shown, noise.variance(h), 0)
+        )
+        for noise in case.noises
+        if "decoupling-fit" in noise.methods and noise.block == 1 and not noise.reciprocal
+    }  # fmt: skip

@@ -1,4 +1,4 @@
-"""Tables and numbers of a case of a modelled joint."""
+"""Tables, figures and numbers of a case of a modelled joint."""
 
 from __future__ import annotations
 
@@ -8,12 +8,14 @@ import numpy as np
 
 from jointfrf.cases.modelled_joint.compute import ModelledJointResult, moving_stiffness
 from jointfrf.dofs import is_rotation
+from jointfrf.identification.fit_data import ModelData
 from jointfrf.identification.record import fit_to_dict
 from jointfrf.identification.residual_test import ResidualTest
 from jointfrf.identification.result import Fit
+from jointfrf.report.figure import Curve, Figure, Panel, Ribbon
 from jointfrf.report.table import Cell, Table, number
 
-__all__ = ["modelled_numbers", "modelled_summary", "modelled_tables"]
+__all__ = ["modelled_figures", "modelled_numbers", "modelled_summary", "modelled_tables"]
 
 #: Chance of a coverage as low as that of a row that is said not to fit.
 _CHANCE = 0.005
@@ -117,10 +119,7 @@ def modelled_summary(result: ModelledJointResult, tables: list[Table]) -> list[T
         ("RMSE over bound, worst", f"{worst[0]:.2f} ({worst[1]})"),
         ("coverage of 95 % intervals", f"{min(held):.0f} to {max(held):.0f} %"),
         ("residual over noise, laws of the case", number(_ratio(result.first), 3)),
-        (
-            "residual over noise, springs and dashpots",
-            number(result.constant.residual_level / result.constant.noise_level, 3),
-        ),
+        ("residual over noise, springs and dashpots", number(_ratio(result.constant), 3)),
     )
     return [Table("outcome", "What came out", ("quantity", "value"), cells)]
 
@@ -132,3 +131,61 @@ def modelled_numbers(result: ModelledJointResult) -> dict[str, Any]:
         "first": fit_to_dict(result.first, lines=False),
         "values": {name: [draw.values[name] for draw in result.draws] for name in names},
     }
+
+
+def modelled_figures(result: ModelledJointResult) -> list[Figure]:
+    """Return stiffness and loss factor over frequency, and the FRFs of the first realisation."""
+    return [_stiffness_figure(result), _frf_figure(result)]
+
+
+def _stiffness_figure(result: ModelledJointResult) -> Figure:
+    case = result.case
+    exact, constant = (moving_stiffness(j, case.freq_hz) for j in (case.truth.joint, result.constant.joint))
+    found = np.array([draw.stiffness for draw in result.draws])
+    panels = []
+    for d, dof in enumerate(a for a, b in case.truth.joint.laws if a == b):
+        unit = "N m/rad" if is_rotation(dof) else "N/m"
+        for part, label in ((lambda k: k.real, f"Re K*, {unit}"), (lambda k: k.imag / k.real, "loss factor")):
+            low, high = np.percentile(part(found[:, :, d]), [2.5, 97.5], axis=0)
+            panels.append(
+                Panel(
+                    dof,
+                    "frequency, Hz",
+                    label,
+                    curves=(
+                        Curve("actual", case.freq_hz, part(exact[:, d]), "actual"),
+                        Curve("springs and dashpots", case.freq_hz, part(constant[:, d]), "mean"),
+                    ),
+                    ribbons=(Ribbon("95 % of the realisations", case.freq_hz, low, high, "ismm"),),
+                )
+            )
+    return Figure(
+        "stiffness", "Stiffness and loss factor of the joint: actual, found, and by springs and dashpots.",
+        tuple(panels), columns=2,
+    )  # fmt: skip
+
+
+def _frf_figure(result: ModelledJointResult) -> Figure:
+    case, panels = result.case, []
+    first, constant = result.first.data, result.constant.data
+    assert isinstance(first, ModelData)
+    assert isinstance(constant, ModelData)
+    for row, response in enumerate(case.responses):
+        for column, force in enumerate(case.forces):
+            title, freq = f"{response} by {force}", case.freq_hz
+            curves = (
+                Curve("fitted", freq, np.abs(first.predicted[:, row, column]), "actual"),
+                Curve("measured", freq, np.abs(result.measured[:, row, column]), "measured"),
+            )
+            panels.append(Panel(title, "frequency, Hz", "|H|, m/N", curves=curves, log_y=True))
+            residuals = (
+                Curve("springs and dashpots", freq, np.abs(constant.residual[:, row, column]), "low"),
+                Curve("laws of the case", freq, np.abs(first.residual[:, row, column]), "measured"),
+            )
+            panels.append(Panel(title, "frequency, Hz", "|residual| over noise", curves=residuals, log_y=True))
+    return Figure(
+        "frfs",
+        "FRFs of the first realisation, measured and fitted; and their residual beside that of springs and dashpots.",
+        tuple(panels),
+        columns=2,
+    )

@@ -7,10 +7,9 @@ import re
 import numpy as np
 
 from jointfrf.cases.comparison import verdict
-from jointfrf.cases.definitions import Observed
-from jointfrf.cases.known_joint.compute import KnownJointResult
-from jointfrf.cases.known_joint.expected import ExpectedRegions
-from jointfrf.cases.known_joint.sensitive import SensitiveBands, contrast
+from jointfrf.cases.keys import Observed
+from jointfrf.cases.known_joint.compute import KnownJointResult, SensitiveBands, contrast
+from jointfrf.cases.known_joint.keys import ExpectedRegions
 from jointfrf.dofs import Parameter
 from jointfrf.frf.bands import Band
 from jointfrf.report.axes import bands_in_words
@@ -71,7 +70,7 @@ def printed_parameter_tables(result: KnownJointResult) -> list[Table]:
     columns = ("source", "FRF", "band, Hz", "method", "error", "thesis, %", "from the printed parameters, %", "")
     note = (
         f"On lines {lines.step:g} Hz apart, without noise: what differs is the model, the lines or the printed"
-        f" digits. It fits within {lines.amplitude_within:g} % of the printed amplitude error, and within "
+        f" digits. It fits within {lines.amplitude_within_percent:g} % of the printed amplitude error, and within "
         f"{lines.lines_within:g} lines of the printed frequency error; an empty cell fits where there is no peak."
     )
     title = "Errors of FRFs regenerated from the printed parameters"

@@ -1,0 +1,406 @@
+"""Uncertainty of the parameters: scatter between lines and parts of the band, and intervals."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special
+
+from jointfrf.frf.bands import in_pieces, line_slices
+from jointfrf.frf.quantiles import medians
+from jointfrf.identification.manifold.estimate import JointEstimate
+from jointfrf.identification.manifold.group_fit import GroupFit
+from jointfrf.identification.manifold.line_forms import FormSquares, LineParts
+from jointfrf.identification.minimise import inverse_information
+from jointfrf.identification.profile import Intervals, ProfileIntervals
+from jointfrf.identification.residual_test import ResidualTest, Trend, local_excess
+from jointfrf.kernel.arguments import FloatArray
+
+__all__ = [
+    "BLOCKS",
+    "Spread",
+    "block_scatter",
+    "joint_intervals",
+    "line_scatter",
+    "profile_interval",
+    "residual_test_of",
+    "spread_of",
+]
+
+#: Parts of the band that the jackknife leaves out in turn.
+BLOCKS = 10
+#: Directions of less information than this share of the largest are not seen.
+_SEEN = 1e-12
+#: Probability at which a scatter that exceeds the noise is taken for chance.
+_CHANCE = 0.95
+#: Probability at which parts of the band disagree on a parameter, and how many must show it.
+_DISAGREE, _LEAST_PARTS = 1e-3, 3
+#: A part whose information has a larger condition does not show all parameters.
+_SINGULAR = 1e8
+#: Squares of profiles are minimised to this.
+_PRECISE = 1e-3
+_TINY = float(np.finfo(float).tiny)
+
+
+class Spread(NamedTuple):
+    """Factors by which the variance of parameters exceeds that from independent noise, shape (p,) each.
+
+    Attributes
+    ----------
+    information : ndarray
+        From the correlation between lines, and from a residual larger than the noise.
+    lines : ndarray
+        From the scatter between lines, which noise that is not circular makes larger; NaN where there are too few.
+    blocks : ndarray
+        From the scatter between parts of the band; NaN where there are too few lines.
+    factor : ndarray
+        The one used.
+    chance : ndarray
+        Probability that parts of the band scatter so much by noise alone; 1 where there are too few lines.
+    """
+
+    information: FloatArray
+    lines: FloatArray
+    blocks: FloatArray
+    factor: FloatArray
+    chance: FloatArray
+
+
+def line_scatter(group: GroupFit) -> tuple[FloatArray, FloatArray]:
+    """Variance of the coordinates of a group from the scatter between single lines, and its degrees of freedom.
+
+    Returns
+    -------
+    variance, degrees : ndarray, shape (p,)
+
+    Notes
+    -----
+    It takes noise as independent between lines, but neither its size nor its direction in the complex plane from the
+    weights. The gradient g_l of a line, of information A_l out of A, moves the coordinates by A^-1 g_l. Where noise is
+    as the weights say, g_l g_l^T is in the mean half of A_l - A_l A^-1 A_l, the second term being what the fit has
+    taken up: the sum of the squares is scaled by that.
+    """
+    pieces = line_slices(len(group.forms.squares))
+    return _scatter(group.information, (group.of_lines(own) for own in pieces))
+
+
+def block_scatter(group: GroupFit, blocks: int = BLOCKS) -> tuple[FloatArray, FloatArray]:
+    """Variance of the coordinates of a group from the scatter between parts of the band, and its degrees of freedom.
+
+    Returns
+    -------
+    variance, degrees : ndarray, shape (p,)
+        NaN and 0 where there are fewer than two lines a block.
+
+    Notes
+    -----
+    It needs no noise model, and includes what the model of the joint cannot follow over frequency. As `line_scatter`
+    with parts of the band for lines; with equal parts that is the block jackknife to first order. A part that holds
+    most of the information on a parameter leaves few degrees of freedom.
+    """
+    p, n_freq = group.x.size, len(group.forms.squares)
+    (diagonal,) = in_pieces(n_freq, lambda own: [np.einsum("lpp->lp", group.of_lines(own).information)])
+    lines = np.flatnonzero(group.used & diagonal.any(axis=1))
+    if lines.size < 2 * blocks:
+        return np.full(p, np.nan), np.zeros(p)
+    # Blocks of equal information, so that each says about as much as the others.
+    size = np.maximum(np.diagonal(group.information), _TINY)
+    share = (diagonal[lines] / size).sum(axis=1)
+    share = share / share.sum() + 1 / lines.size
+    member = np.zeros((blocks, len(diagonal)))
+    member[((np.cumsum(share) - share / 2) / share.sum() * blocks).astype(int), lines] = 1
+    found = group.of_groups(member)
+    return _scatter(found.information.sum(axis=0), [found])
+
+
+def _scatter(whole: FloatArray, pieces: Iterable[LineParts]) -> tuple[FloatArray, FloatArray]:
+    """Return the variance that the gradients of parts show, and its degrees of freedom, shape (p,) each.
+
+    Parameters
+    ----------
+    whole : ndarray, shape (p, p)
+        Sum of the information of all parts.
+    pieces : iterable of LineParts
+    """
+    size = np.sqrt(np.maximum(np.diagonal(whole), _TINY))
+    value, vector = np.linalg.eigh(whole / np.outer(size, size))
+    # Coordinates in which the whole information is 1; directions that the data do not see are left out.
+    seen = value > _SEEN * value[-1]
+    root = vector[:, seen] / np.sqrt(value[seen]) / size[:, None]
+    variance, (p, k) = (root**2).sum(axis=1), root.shape
+    to_root = (root[:, None, :, None] * root[None, :, None, :]).reshape(p * p, k * k)
+    to_steps, to_variance = root @ root.T, (root[:, :, None] * root[:, None, :]).reshape(p, k * k).T
+    taken, of_expected, of_steps = np.zeros((3, p))
+    for piece in pieces:
+        # Information in those coordinates; with the root on one side, and on both.
+        within = piece.information.reshape(-1, p * p) @ to_root
+        squared = within.reshape(-1, k).T @ within.reshape(-1, k)
+        taken += np.einsum("ar,rs,as->a", root, squared, root)
+        of_expected += ((within @ to_variance) ** 2).sum(axis=0)
+        of_steps += ((piece.gradient @ to_steps) ** 2).sum(axis=0)
+    left = np.maximum(variance - taken, 0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        scatter = of_steps * variance / left
+        degrees = variance**2 / of_expected * left / variance
+    return scatter, np.nan_to_num(degrees)
+
+
+def spread_of(found: JointEstimate, inflation: float, *, is_level_known: bool = True) -> Spread:
+    """Return by how much the variance of each parameter exceeds that from independent noise of the level known.
+
+    Parameters
+    ----------
+    found : JointEstimate
+    inflation : float
+        By how much correlation between lines makes the variance of a mean larger, at least 1.
+    is_level_known : bool
+        Whether the noise is known; otherwise its level is that of the residual.
+
+    Notes
+    -----
+    The largest of information, scatter between lines and scatter between blocks; the latter two only where they exceed
+    the former by more than chance, for one parameter or for all together.
+    """
+    scale = max(found.scale, 1.0) if is_level_known else found.scale
+    by_noise = np.full(len(found.parameters), inflation * scale)
+    by_lines, by_blocks, of_lines, of_blocks = (np.full_like(by_noise, np.nan) for _ in range(4))
+    for group in found.groups:
+        own = np.diagonal(group.covariance)
+        scatter, of_lines[group.which] = line_scatter(group)
+        blocks, of_blocks[group.which] = block_scatter(group)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            by_lines[group.which] = np.where(own > 0, inflation * scatter / own, np.nan)
+            by_blocks[group.which] = np.where(own > 0, blocks / own, np.nan)
+    factor = _larger_than_chance(by_noise, by_lines, of_lines / inflation)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        chance = np.nan_to_num(special.chdtrc(of_blocks, of_blocks * by_blocks / factor), nan=1.0)
+    factor = _larger_than_chance(factor, by_blocks, of_blocks)
+    return Spread(by_noise, by_lines, by_blocks, factor, chance)
+
+
+def _larger_than_chance(factor: FloatArray, other: FloatArray, degrees: FloatArray) -> FloatArray:
+    """Return variance factors, raised to others of few degrees of freedom where these are larger by more than chance.
+
+    By the mean over the parameters where this is; each by Student's t for its few degrees.
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = other / factor
+    known = np.isfinite(ratio) & (degrees >= 2)
+    if not known.any():
+        return factor
+    raised = factor.copy()
+    count, few = int(known.sum()), float(medians(degrees[known]))
+    if (mean := float(ratio[known].mean())) > _chi_squared(_CHANCE, few * count) / (few * count):
+        raised *= mean
+    single = _chi_squared(1 - (1 - _CHANCE) / count, degrees[known]) / degrees[known]
+    student = (special.stdtrit(degrees[known], 0.975) / special.ndtri(0.975)) ** 2
+    larger = np.where(ratio[known] > single, student * other[known], 0)
+    raised[known] = np.maximum(raised[known], larger)
+    return raised
+
+
+def _chi_squared(probability: float, degrees: float | FloatArray) -> Any:
+    """Quantile of chi-squared, without the time that scipy.stats takes to import."""
+    return 2 * special.gammaincinv(np.asarray(degrees) / 2, probability)
+
+
+def joint_intervals(found: JointEstimate, factor: FloatArray, added: FloatArray | None = None) -> Intervals:
+    """Return the intervals of all parameters.
+
+    Symmetric in the coordinate of a parameter in which noise is nearly normal; by profile likelihood where it is not.
+
+    Parameters
+    ----------
+    found : JointEstimate
+    factor : ndarray, shape (p,)
+        By how much the variance of each parameter exceeds that from independent noise.
+    added : ndarray, shape (p,), optional
+        Standard error of each parameter that is not in this; of the compliance where that is its coordinate.
+    """
+    more = np.zeros_like(factor) if added is None else added
+    place = {which: (group, i) for group in found.groups for i, which in enumerate(group.which.tolist())}
+
+    def limits(which: int, probability: float) -> tuple[float, float]:
+        group, i = place[which]
+        own = _limits(group, i, float(factor[which]), probability)
+        if not more[group.which].any():
+            return own
+        reach = float(special.ndtri((1 + probability) / 2)) * float(more[which])
+        if group.joint.in_compliance and not group.joint.is_stiffness[i]:
+            stiffness = int(group.which[group.joint.dofs[i]])
+            if not np.isfinite(limits(stiffness, probability)[1]):
+                # A rigid DOF shows no damping.
+                return -np.inf, np.inf
+        return _widened(group, i, own, reach)
+
+    def of_function(
+        function: Callable[[FloatArray], float], used: NDArray[np.intp], probability: float
+    ) -> tuple[float, float] | None:
+        group = place[int(used[0])][0]
+        if not np.isin(used, group.which).all() or more[used].any():
+            return None
+        if not np.isfinite([limits(which, probability) for which in used.tolist()]).all():
+            return -np.inf, np.inf
+
+        def of_coordinates(x: FloatArray) -> float:
+            values = found.theta.copy()
+            values[group.which] = group.joint.theta(x)
+            return function(values)
+
+        squares = FormSquares(group.forms, group.joint)
+        own = float(factor[used].max())
+        profile = ProfileIntervals(squares, group.joint, group.x, group.cost, group.covariance, own)
+        return profile.of_function(of_coordinates, probability)
+
+    return Intervals([one.name for one in found.parameters], limits, of_function)
+
+
+def _limits(group: GroupFit, i: int, factor: float, probability: float) -> tuple[float, float]:
+    """Return the limits of one parameter of a group."""
+    joint, x, covariance = group.joint, group.x, group.covariance * factor
+    if joint.has_profile(i, x, covariance):
+        return profile_interval(group, i, factor, probability)
+    reach = float(special.ndtri((1 + probability) / 2))
+    if joint.is_compliance[i]:
+        own = reach * float(np.sqrt(max(covariance[i, i], 0)))
+        return float(1 / (x[i] + own)), float(1 / (x[i] - own))
+    slope = joint.theta_slope(x)[i]
+    value, own = float(joint.theta(x)[i]), reach * float(np.sqrt(max(slope @ covariance @ slope, 0)))
+    return value - own, value + own
+
+
+def _widened(group: GroupFit, i: int, limits: tuple[float, float], reach: float) -> tuple[float, float]:
+    """Return the limits of a parameter with another, independent error of this reach.
+
+    Of a stiffness it is one of the compliance, as it comes from compliance between the channels.
+    """
+    (low, high), joint = limits, group.joint
+    theta = float(joint.theta(group.x)[i])
+    if joint.is_compliance[i]:
+        compliance = float(group.x[i])
+    elif joint.is_stiffness[i] and theta > 0 and low > 0:
+        compliance, reach = 1 / theta, reach / theta**2
+    else:
+        return float(theta - np.hypot(theta - low, reach)), float(theta + np.hypot(high - theta, reach))
+    softest = compliance + np.hypot((1 / low if low > 0 else np.inf) - compliance, reach)
+    stiffest = compliance - np.hypot(compliance - 1 / high, reach)
+    return float(1 / softest), float(1 / stiffest) if stiffest > 0 else np.inf
+
+
+def profile_interval(group: GroupFit, i: int, factor: float, probability: float = 0.95) -> tuple[float, float]:
+    """Interval of one parameter of a group by profile likelihood.
+
+    Parameters
+    ----------
+    group : GroupFit
+    i : int
+        Parameter among those of the group.
+    factor : float
+        By how much the variance exceeds that from independent noise.
+    probability : float
+
+    Returns
+    -------
+    low, high : float
+        In units of the parameter; inf where the data give no limit.
+
+    Notes
+    -----
+    The squares are the quadratic forms of the last linearisation. Of springs without cross terms they are those of
+    values of the compliance a = 1/k >= 0, or of the damping.
+    """
+    joint = group.joint.of_profile(i)
+    best = group if joint is group.joint else joint.lowest(group.forms, joint.coordinates(group.joint.theta(group.x)))
+    profile = ProfileIntervals(
+        FormSquares(group.forms, joint), joint, best.x, best.cost, best.covariance, factor,
+        (lambda x, held: joint.lowest(group.forms, x, held, _PRECISE).cost) if joint.in_compliance else None,
+    )  # fmt: skip
+    if not (joint.in_compliance and _may_be_rigid(group, int(joint.dofs[i]), factor, probability)):
+        return profile.of(i, probability)
+    # A rigid DOF shows no damping.
+    return (profile.limit(i, 1, probability), np.inf) if joint.is_stiffness[i] else (-np.inf, np.inf)
+
+
+def _may_be_rigid(group: GroupFit, dof: int, factor: float, probability: float) -> bool:
+    """Whether the squares of a rigid DOF, which has none of its parameters, exceed their minimum by chance."""
+    start = group.x.copy()
+    start[dof] = 0.0
+    rigid = group.joint.lowest(group.forms, start, dof, _PRECISE)
+    parameters = int(np.count_nonzero(group.joint.dofs == dof))
+    return bool(rigid.cost - group.cost < _chi_squared(probability, parameters) * factor / 2)
+
+
+def residual_test_of(found: JointEstimate, freq_hz: FloatArray, inflation: float, spread: Spread) -> ResidualTest:
+    """Compare the residual with the noise.
+
+    Parameters
+    ----------
+    found : JointEstimate
+    freq_hz : ndarray, shape (n_freq,)
+        Hz.
+    inflation : float
+        By how much correlation between lines makes the variance of a mean larger.
+    spread : Spread
+        Variance factors of the parameters.
+
+    Notes
+    -----
+    A mean square of N complex residuals has the standard deviation 1/sqrt(N), its root half of that; the noise level,
+    found from as many data, has the same. Parts of the band agree on a parameter where the squares of their differences
+    from the whole, over their variance, are those of chi^2.
+    """
+    sigma = float(np.sqrt(2 * inflation / max(found.equations, 1.0)) / 2)
+    factor = np.fmax(np.maximum(spread.information, inflation), spread.lines)
+    trends = tuple(t for group in found.groups for t in _trends(group, freq_hz, factor[group.which]))
+    test = ResidualTest(float(np.sqrt(found.excess)), sigma, trends=trends)
+    if not test.is_large:
+        return test
+    squares, expected = np.zeros((2, freq_hz.size))
+    for group in found.groups:
+        squares += group.forms.at(group.joint.compliance(group.x))[0]
+        expected += group.used * (group.equations / max(float(np.count_nonzero(group.used)), 1.0))
+    return test._replace(local=local_excess(squares, expected, freq_hz))
+
+
+def _trends(group: GroupFit, freq_hz: FloatArray, factor: FloatArray) -> list[Trend]:
+    """Return the parameters that parts of the band disagree on."""
+    lines = np.flatnonzero(group.used)
+    p = group.x.size
+    if lines.size < BLOCKS * (p + 2):
+        return []
+    whole = group.covariance
+    # In parameters, not in coordinates: where only k drifts, c/k does, and c does not.
+    theta, slope = group.joint.theta(group.x), group.joint.theta_slope(group.x)
+    parts = np.array_split(lines, BLOCKS)
+    member = np.zeros((BLOCKS, freq_hz.size))
+    for of_part, own in zip(member, parts, strict=True):
+        of_part[own] = 1
+    gradient, information = group.of_groups(member)
+    size = np.sqrt(np.maximum(np.einsum("bpp->bp", information), _TINY))
+    seen = np.linalg.cond(information / (size[:, :, None] * size[:, None, :])) <= _SINGULAR
+    if not seen.any():
+        return []
+    values, changes, errors = (np.full((BLOCKS, p), np.nan) for _ in range(3))
+    covariance = inverse_information(2 * information[seen])
+    step = 2 * (covariance @ gradient[seen, :, None])[..., 0]
+    values[seen] = [group.joint.theta(group.x + one) for one in step]
+    with np.errstate(invalid="ignore"):
+        changes[seen] = step @ slope.T
+        variance = np.einsum("ij,bjk,ik->bi", slope, covariance - whole, slope)
+        errors[seen] = np.sqrt(np.maximum(variance, 0) * factor)
+    found = []
+    for i, name in enumerate(group.joint.names):
+        known = np.isfinite(changes[:, i]) & (errors[:, i] > 0)
+        # A part that does not see the parameter says nothing about it.
+        known &= errors[:, i] < abs(theta[i])
+        if np.count_nonzero(known) < _LEAST_PARTS:
+            continue
+        squares = ((changes[known, i] / errors[known, i]) ** 2).sum()
+        probability = float(special.chdtrc(np.count_nonzero(known) - 1, squares))
+        if probability < _DISAGREE / p:
+            centres = np.array([freq_hz[own].mean() for own in parts])
+            found.append(Trend(name, centres[known], values[known, i], probability))
+    return found
