@@ -64,7 +64,8 @@ def run(args: argparse.Namespace) -> int:
     request = card_request(args, found.joint.dofs, damping=damping, cross=cross, points=_points(args, found))
     assert request is not None
     if found.fit is not None:
-        text = written_cards(found.fit, request, found.about)
+        at = args.frequency if found.fit.laws is not None else None
+        text = written_cards(found.fit, request, found.about, at)
     else:
         options: CardOptions = {**request.options, "comments": found.about}
         if isinstance(found.joint, LawJoint):
@@ -235,10 +236,11 @@ def _refusal(why: str, damping: str) -> str:
     return why.replace("full_matrix", "--full-matrix")
 
 
-def written_cards(fit: Fit, request: CardRequest, about: Sequence[str]) -> str:
-    """Return the cards of a fit, and write them where that is wanted."""
+def written_cards(fit: Fit, request: CardRequest, about: Sequence[str], freq_hz: float | None = None) -> str:
+    """Return the cards of a fit, laws at a frequency, and write them where that is wanted."""
     text = cards(
-        fit, request.program, request.nodes, about=about, all_damping=request.all_damping, **request.options
+        fit, request.program, request.nodes, about=about, all_damping=request.all_damping, freq_hz=freq_hz,
+        **request.options,
     )  # fmt: skip
     if request.output is not None:
         write_file(request.output, text)

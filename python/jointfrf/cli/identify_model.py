@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import csv
 import io
-import sys
 import warnings
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -16,16 +15,14 @@ import numpy as np
 from jointfrf.assembly_file.measured import MeasuredAssembly, measured_assembly
 from jointfrf.channels.check.check import check_frfs, warn_of_frfs
 from jointfrf.cli.export import CardRequest, card_request, written_cards
-from jointfrf.cli.measured_file import file_names
+from jointfrf.cli.measured_file import file_names, read_receptances
 from jointfrf.cli.parser import CommandParser
-from jointfrf.cli.usage import Output, UsageError, waiting
+from jointfrf.cli.usage import Output, UsageError, complain, waiting
 from jointfrf.errors import ConvergenceWarning, FileContentError, IdentificationWarning
 from jointfrf.files import write_file
 from jointfrf.identification.record import fit_to_dict, write_record
 from jointfrf.identification.result import Fit, columns_of
-from jointfrf.io import read_frfs
 from jointfrf.report.fit_page import write_report
-from jointfrf.spelling import visible
 
 __all__ = ["add_model_arguments", "run_model"]
 
@@ -71,7 +68,7 @@ def run_model(args: argparse.Namespace) -> int:
             if not args.each:
                 raise
             failed += 1
-            print(f"jointfrf: error: {visible(f'{files[0]}: {error}')}", file=sys.stderr)
+            complain("error", f"{files[0]}: {error}")
             continue
         fits[stem] = fit
         written += paths
@@ -125,7 +122,7 @@ def _for_one(args: argparse.Namespace, files: list[Path], stem: str) -> argparse
 def _one(args: argparse.Namespace, out: Output) -> tuple[Fit, dict[str, Any], list[Path]]:
     """Fit one test, write what is wanted; return the fit, its content for JSON, and what was written."""
     try:
-        frfs = read_frfs(*args.files, quantity=args.quantity, force_quantity=args.force_quantity).receptance()
+        frfs = read_receptances(args)
     except FileContentError as error:
         hint = "; with --each every file is a test of its own" if len(args.files) > 1 else ""
         raise FileContentError(f"{error}{hint}") from error
@@ -141,6 +138,7 @@ def _one(args: argparse.Namespace, out: Output) -> tuple[Fit, dict[str, Any], li
     source, written, text = file_names(args), list[Path](), ""
     if not args.each:
         out.say("", fit)
+        out.warn(*fit.warnings)
     if request is not None:
         text = written_cards(fit, request, [f"from {source}"])
         if args.output is None:

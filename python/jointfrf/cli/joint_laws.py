@@ -64,6 +64,10 @@ def joint_of_laws(args: argparse.Namespace, dofs: Sequence[str]) -> LawJoint | N
     if args.method != ["compliance"]:
         raise UsageError("laws are fitted by method compliance alone")
     joint = _of_words(args.law, args.damping) if args.joint is None else _of_file(args)
+    if args.export is not None and any(law.constant_terms is None for law in joint.laws.values()):
+        raise UsageError(
+            "--export: cards hold no law that depends on frequency: say --save, then jointfrf export --frequency HZ"
+        )
     if not joint.laws:
         raise UsageError("all joint DOFs are rigid: there is no law to fit")
     if sorted(joint.dofs) != sorted(dofs):

@@ -266,9 +266,10 @@ def _how_joint(fit: Fit) -> str:
 
 
 def _frf_section(fit: Fit, compared: ComparedFrfs, figures: Sequence[Figure], most: int) -> Section:
-    is_model = isinstance(fit.data, ModelData)
-    total = int(np.isfinite(compared.residual).sum()) if is_model else len(compared.rows) * len(compared.columns)
+    total = len(compared.rows) * len(compared.columns)
+    total = int(np.isfinite(compared.residual).sum()) if isinstance(fit.data, ModelData) else total
     where = "channels" if compared.of_channels else "joint DOFs"
+    is_model = isinstance(fit.data, ModelData)
     sentences = [
         "Predicted FRFs follow from the models, the joint and all other numbers found: where they leave the measured "
         "ones by more than noise, these do not explain the data."

@@ -135,6 +135,8 @@ def test_a_file_that_cannot_be_read_leaves_the_others(tmp_path):
         ([*BARS, "--law", "y=spring", "--law", "theta_z=spring", "--method", "inverse-substructuring"], 2,
          "laws are fitted by method compliance alone"),
         ([*BARS, "--law", "y=rigid", "--law", "theta_z=rigid"], 2, "all joint DOFs are rigid: there is no law to fit"),
+        ([*BARS, "--law", "y=power", "--law", "theta_z=spring", "--export", "nastran:1,2"], 2,
+         "say --save, then jointfrf export --frequency HZ"),
         ([*BARS, "--joint", "none.toml"], 1, "there is no file none.toml"),
     ],
 )  # fmt: skip
@@ -156,3 +158,15 @@ def test_laws_by_words_and_by_a_file_are_one_fit(tmp_path):
         assert one[name]["value"] == pytest.approx(true, rel=0.05)
     assert "regenerated with the joint found" in page.read_text()
     assert (tmp_path / "out" / "joint_theta_z.png").exists()
+
+
+def test_saved_laws_are_exported_at_a_frequency(tmp_path):
+    save = tmp_path / "joint.json"
+    run(*BARS, "--law", "y=spring", "--law", "theta_z=fractional-zener", "--save", save, "--quiet")
+    refused = run_command("export", save, "nastran:1,2")
+    assert refused.returncode == 2
+    assert "by --frequency HZ" in refused.stderr
+    cards = run_command("export", save, "nastran:1,2", "--frequency", "200").stdout
+    k = jf.load(save).joint.dynamic_stiffness([200.0])[0, 1, 1].real
+    (line,) = (line for line in cards.splitlines() if line.startswith("*") and line.endswith("+3"))
+    assert float(line[-16:].replace("+3", "e3")) == pytest.approx(k, rel=1e-9)

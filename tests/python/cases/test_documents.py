@@ -57,21 +57,6 @@ def test_python_of_the_page_on_fits_with_models_prints_what_it_shows(capsys):
         agree(capsys.readouterr().out, text)
 
 
-def test_python_of_the_page_on_the_engine_runs(capsys, monkeypatch, tmp_path, beams):
-    monkeypatch.chdir(tmp_path)
-    (example,) = blocks("python", DOCUMENTS["docs/engine.md"])
-    joint = jf.Joint([6e5, 5e3], dofs=["y", "theta"], loss_factor=[0.05, 0.1])
-    gamma = jf.pollute(beams.gamma(joint), 0.01, seed=1)
-    named = {"jf": jf, "freq": beams.freq, "gamma": gamma}
-    exec(example, named)
-    assert named["eta"].low < 0.05 < named["eta"].high
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["joint.html", "joint.json"]
-    printed = capsys.readouterr().out
-    assert "h_theta_z" in printed
-    assert "note choice ('y',) damping of y: hysteretic" in printed
-    assert "CBUSH" in printed
-
-
 def test_assembly_of_the_page_on_fits_with_models_is_read():
     (content,) = [text for text in blocks("toml", DOCUMENTS["docs/model-fit.md"]) if "[A]" in text]
     keys = read_keys(TomlTable(tomllib.loads(content), "assembly.toml"), AssemblyKeys)
@@ -91,6 +76,21 @@ def test_the_table_of_the_shipped_beam_is_what_the_command_prints():
     result = run_command(*words[1:])
     assert result.returncode == 0
     agree(result.stdout.strip().split("\n\n")[0], shown)
+
+
+def test_python_of_the_page_on_the_engine_runs(capsys, monkeypatch, tmp_path, beams):
+    monkeypatch.chdir(tmp_path)
+    (example,) = blocks("python", DOCUMENTS["docs/engine.md"])
+    joint = jf.Joint([6e5, 5e3], dofs=["y", "theta"], loss_factor=[0.05, 0.1])
+    gamma = jf.pollute(beams.gamma(joint), 0.01, seed=1)
+    named = {"jf": jf, "freq": beams.freq, "gamma": gamma}
+    exec(example, named)
+    assert named["eta"].low < 0.05 < named["eta"].high
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["joint.html", "joint.json"]
+    printed = capsys.readouterr().out
+    assert "h_theta_z" in printed
+    assert "note choice ('y',) damping of y: hysteretic" in printed
+    assert "CBUSH" in printed
 
 
 def test_python_of_the_page_on_files_prints_what_it_shows(capsys, monkeypatch):
