@@ -29,7 +29,7 @@ def test_metadata():
     assert about["Version"] == jointfrf.__version__
     assert about["License-Expression"] == "BSD-3-Clause"
     needed = [text for text in about.get_all("Requires-Dist") if "extra ==" not in text]
-    assert {text.split(">")[0] for text in needed} == {"numpy", "scipy", "scipy-openblas32", "threadpoolctl"}
+    assert {text.split(">")[0] for text in needed} == {"msgspec", "numpy", "scipy", "scipy-openblas32", "threadpoolctl"}
 
 
 def test_kernel_has_the_version_of_the_package():

@@ -235,7 +235,7 @@ def test_a_full_joint_with_noise(bound):
             (FULL.stiffness if name[0] == "k" else FULL.damping)[
                 tuple(DOFS.index(d) for d in (2 * name[2:].split(","))[:2])
             ]
-            for name in fit.parameters
+            for name in fit.value
         ]
     )
     off = np.array([*fit.value.values()]) - truth
@@ -258,15 +258,15 @@ def test_cross_terms_between_groups_are_not_seen_and_this_is_said(gamma):
         plain = jf.identify(FREQ, h, DOFS)
         chosen = jf.identify(FREQ[::3], h[::3], DOFS, damping="auto", cross="fit")
     assert len(fit.parameters) == 2 * (6 + 3 + 3)
-    assert "k_x,y" not in fit.parameters
-    assert "k_x,theta_y" in fit.parameters
+    assert "k_x,y" not in fit.value
+    assert "k_x,theta_y" in fit.value
     told = "the FRFs between (x, theta_y, theta_z) and (y, theta_x, z) are zero: each group is fitted separately"
     assert any(note == told + ", and cross terms between them cannot be identified" for note in fit.notes)
     assert told in plain.notes
     assert fit.stiffness_matrix[0, 2] == 0
     assert np.isfinite(list(fit.std_error.values())).all()
     assert plain.noise_level == pytest.approx(0.01, rel=0.1)
-    assert "k_x,y" not in chosen.parameters
+    assert "k_x,y" not in chosen.value
 
 
 def test_bands_of_some_dofs(gamma):
