@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -11,32 +10,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from jointfrf.errors import FileContentError
 from jointfrf.frf.frf_set import POWER_OF_I_OMEGA, Channel, FrfSet
-from jointfrf.io.file_format import Reading
+from jointfrf.io.file_format import FrfArrays, Reading
 from jointfrf.io.labels import channels_of, channels_of_table, is_table
 from jointfrf.io.units import Unit, parse_unit
 from jointfrf.kernel.arguments import as_array, check_type
 
-__all__ = ["FrfArrays", "as_frf_set", "contradiction", "frfs_of_arrays"]
+__all__ = ["as_frf_set", "contradiction", "frfs_of_arrays"]
 
 _AXES = ("freq", "out", "in")
 #: Orders that the sizes of an array may show, where responses are before excitations.
 _ORDERS = ([0, 1, 2], [1, 2, 0], [1, 0, 2])
-
-
-@dataclass
-class FrfArrays:
-    """The content of a file, in its own units and order."""
-
-    freq_hz: Any
-    h: Any
-    axes: str = ""
-    responses: Any = None
-    excitations: Any = None
-    quantity: str = ""
-    unit: str = ""
-    coherence: Any = None
-    averages: Any = None
-    coordinates: Mapping[int, NDArray[np.float64]] = field(default_factory=dict)
 
 
 def frfs_of_arrays(

@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from jointfrf.errors import FileContentError
 from jointfrf.files import ReadLimit, text_of, write_file
 from jointfrf.frf.frf_set import Channel, FrfSet
-from jointfrf.io.arrays import FrfArrays
-from jointfrf.io.file_format import FileFormat, Reading
+from jointfrf.io.file_format import FileFormat, FrfArrays, Reading
 from jointfrf.io.functions import LooseFunction, arrays_of_functions
 from jointfrf.io.labels import channels_of
 from jointfrf.io.named_arrays import fields_of

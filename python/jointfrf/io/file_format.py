@@ -6,7 +6,10 @@ import warnings
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from jointfrf.errors import FileContentWarning
 from jointfrf.files import ReadLimit
@@ -14,10 +17,7 @@ from jointfrf.frf.frf_set import POWER_OF_I_OMEGA, FrfSet
 from jointfrf.kernel.arguments import as_nodes
 from jointfrf.spelling import did_you_mean
 
-if TYPE_CHECKING:
-    from jointfrf.io.arrays import FrfArrays
-
-__all__ = ["FileFormat", "FrfMapping", "Reading"]
+__all__ = ["FileFormat", "FrfArrays", "FrfMapping", "Reading"]
 
 
 @dataclass(frozen=True)
@@ -110,6 +110,22 @@ def _as_mapping(given: Mapping[str, Any] | FrfMapping | None) -> FrfMapping:
             hint = did_you_mean(str(name), names)
             raise ValueError(f"mapping names {name!r}, which is none of {', '.join(names)}{hint}")
     return FrfMapping(**(given or {}))
+
+
+@dataclass
+class FrfArrays:
+    """The content of a file, in its own units and order."""
+
+    freq_hz: Any
+    h: Any
+    axes: str = ""
+    responses: Any = None
+    excitations: Any = None
+    quantity: str = ""
+    unit: str = ""
+    coherence: Any = None
+    averages: Any = None
+    coordinates: Mapping[int, NDArray[np.float64]] = field(default_factory=dict)
 
 
 def _never(*_: object) -> bool:

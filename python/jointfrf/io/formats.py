@@ -16,8 +16,8 @@ from jointfrf.errors import FileContentError
 from jointfrf.files import ReadLimit, head_of
 from jointfrf.frf.frf_set import FrfSet
 from jointfrf.frf.merge import merge_frfs
-from jointfrf.io.arrays import FrfArrays, as_frf_set
-from jointfrf.io.file_format import FileFormat, FrfMapping, Reading
+from jointfrf.io.arrays import as_frf_set
+from jointfrf.io.file_format import FileFormat, FrfArrays, FrfMapping, Reading
 
 __all__ = ["FORMATS", "check_suffix", "format_names", "read_frfs", "write_frfs"]
 

@@ -12,8 +12,7 @@ from jointfrf.errors import FileContentError
 from jointfrf.files import ReadLimit
 from jointfrf.frf.frf_set import Channel
 from jointfrf.frf.merge import same_lines
-from jointfrf.io.arrays import FrfArrays
-from jointfrf.io.file_format import FrfMapping
+from jointfrf.io.file_format import FrfArrays, FrfMapping
 from jointfrf.io.labels import channels_of
 from jointfrf.io.units import parse_unit
 

@@ -16,8 +16,7 @@ from jointfrf.errors import FileContentError
 from jointfrf.extras import import_extra
 from jointfrf.files import ReadLimit, damage_named, write_file
 from jointfrf.frf.frf_set import FrfSet
-from jointfrf.io.arrays import FrfArrays
-from jointfrf.io.file_format import FileFormat, Reading
+from jointfrf.io.file_format import FileFormat, FrfArrays, Reading
 from jointfrf.io.named_arrays import arrays_of_fields, fields_of
 
 __all__ = ["HDF5", "hdf5_fields", "hdf5_texts", "write_hdf5"]

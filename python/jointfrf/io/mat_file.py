@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf.files import ReadLimit, damage_named
-from jointfrf.io.arrays import FrfArrays
-from jointfrf.io.file_format import FileFormat, Reading
+from jointfrf.io.file_format import FileFormat, FrfArrays, Reading
 from jointfrf.io.hdf5_file import hdf5_fields
 from jointfrf.io.named_arrays import arrays_of_fields
 

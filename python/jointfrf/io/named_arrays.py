@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from jointfrf.errors import FileContentError
 from jointfrf.files import ReadLimit
 from jointfrf.frf.frf_set import POWER_OF_I_OMEGA, FrfSet
-from jointfrf.io.arrays import FrfArrays
-from jointfrf.io.file_format import FrfMapping
+from jointfrf.io.file_format import FrfArrays, FrfMapping
 from jointfrf.io.functions import arrays_of_functions, functions_of_sdynpy, functions_of_testlab
 from jointfrf.kernel.arguments import check_type
 

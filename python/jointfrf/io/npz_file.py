@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from jointfrf.errors import FileContentError
 from jointfrf.files import ReadLimit, damage_named, write_file
 from jointfrf.frf.frf_set import FrfSet
-from jointfrf.io.arrays import FrfArrays
-from jointfrf.io.file_format import FileFormat, Reading
+from jointfrf.io.file_format import FileFormat, FrfArrays, Reading
 from jointfrf.io.named_arrays import arrays_of_fields, fields_of
 
 __all__ = ["NPZ", "npz_fields", "write_npz"]

@@ -16,8 +16,7 @@ ROOT = Path(__file__).resolve().parents[3]
 FORMAT = """
 import numpy as np
 from jointfrf.files import write_file
-from jointfrf.io.arrays import FrfArrays
-from jointfrf.io.file_format import FileFormat
+from jointfrf.io.file_format import FileFormat, FrfArrays
 
 def read(path, limit, reading):
     freq_hz, h = np.loadtxt(path, skiprows=1, unpack=True)

@@ -1,7 +1,10 @@
 """The rooms of the package: which may import which, and one way into the compiled kernel."""
 
 import ast
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
+
+import pytest
 
 import jointfrf
 
@@ -49,6 +52,11 @@ def imported_modules(file: Path) -> set[str]:
     return found
 
 
+def module_name(file: Path) -> str:
+    parts = file.relative_to(PACKAGE.parent).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
 def files() -> dict[Path, str]:
     """Every file of the package below its front door, and its room."""
     found = {}
@@ -71,6 +79,13 @@ def test_a_room_imports_only_rooms_below_it():
         if module != "jointfrf._kernel" and room_of(module) != room and FLOOR[room_of(module)] >= FLOOR[room]
     ]
     assert not wrong
+
+
+def test_no_modules_import_each_other_in_a_circle():
+    graph = {module_name(file): imported_modules(file) for file in files()}
+    assert len(list(TopologicalSorter(graph).static_order())) >= len(graph)
+    with pytest.raises(CycleError):
+        TopologicalSorter(graph | {"jointfrf.errors": {"jointfrf.files"}}).prepare()
 
 
 def test_only_the_room_kernel_imports_the_compiled_kernel():

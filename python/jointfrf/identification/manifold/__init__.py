@@ -2,7 +2,7 @@
 
 In reading order:
 
-line_forms      quadratic forms of the compliance on every line: the squares to be minimised
+line_forms      quadratic forms of the compliance on every line, and their minimum in coordinates of a joint
 coordinates     K*(w) of a joint, its compliance as a function of coordinates: springs, with cross terms, laws
 transforms      from channels to joint DOFs, and what is not rigid in them
 interface_frfs  FRFs of channels taken to the joint DOFs, with the covariance of their noise

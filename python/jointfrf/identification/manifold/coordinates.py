@@ -7,16 +7,14 @@ of laws in their parameters.
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from typing import Literal, NamedTuple, Protocol
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf.dofs import Parameter, ParameterKind, joint_parameters
-from jointfrf.identification.manifold.line_forms import FormMinimum, FormSquares, LineForms
-from jointfrf.identification.minimise import minimise
+from jointfrf.identification.manifold.line_forms import LEAST_GAIN, STEPS, FormMinimum, JointCoordinates, LineForms
 from jointfrf.identification.parameters import ParameterVector, joint_vector
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.kernel.call import call_for_number
@@ -28,10 +26,8 @@ __all__ = [
     "CrossTerms",
     "DampingTerms",
     "DiagonalJoint",
-    "JointCoordinates",
     "JointTerms",
     "LawCoordinates",
-    "NamedParameter",
     "SpringJoint",
     "coordinates_of",
     "joint_terms",
@@ -50,11 +46,6 @@ _KINDS: Mapping[DampingTerms, tuple[ParameterKind, ...]] = {
 }
 #: Rates eta and w tau are limited: K* is then damping only.
 _LARGEST_RATE = 100.0
-#: Steps of a minimiser at most.
-_STEPS = 100
-#: A minimum is found when two steps gain less than this of the squares of one residual, or one step promises less than
-#: a share of that.
-_LEAST_GAIN, _PROMISED = 1e-6, 1e-3
 #: Share of the largest rate beyond which a DOF is all damping.
 _ALL_DAMPING = 0.1
 #: Other starts are followed until a step gains less than this of the squares of one residual.
@@ -62,14 +53,6 @@ _COARSE = 1e-2
 #: Relative standard error of a compliance from which on intervals come from the profile of the likelihood.
 _CURVED = 0.1
 _TINY = float(np.finfo(float).tiny)
-
-
-class NamedParameter(Protocol):
-    """A parameter of a joint, of springs or of any law."""
-
-    @property
-    def name(self) -> str:
-        """Its name."""
 
 
 class JointTerms(NamedTuple):
@@ -158,145 +141,6 @@ def joint_terms(
         np.array(["khc".index(one.kind) for one in kept], np.intp),
         np.array([(place[one.row], place[one.column]) for one in kept], np.intp),
     )
-
-
-class JointCoordinates(ABC):
-    """The compliance C = K*^-1 of a joint as a function of coordinates x of length p, one for each parameter.
-
-    Attributes
-    ----------
-    parameters : sequence, length p
-        Parameters of the joint in the order of the coordinates.
-    omega : ndarray, shape (n_freq,)
-        rad/s.
-    n : int
-        Joint DOFs.
-    rows, columns : ndarray of int, shape (q,)
-        Entries of C that the coordinates change, on and above its diagonal.
-    lower, upper : ndarray, shape (p,)
-        Smallest and largest value of each coordinate.
-    dofs : ndarray of int, shape (p,)
-        DOF of each parameter, of a cross term that of its row.
-    is_stiffness : ndarray of bool, shape (p,)
-        Parameters that are the stiffness of one DOF.
-    in_compliance : bool
-        Whether the coordinates of stiffnesses are compliances, 0 for a rigid DOF, and those of damping their rates: the
-        n compliances first.
-    rate_of_one : ndarray
-        Rates at which damping is as large as stiffness on the highest line; of those coordinates only.
-    """
-
-    parameters: Sequence[NamedParameter]
-    omega: FloatArray
-    n: int
-    rows: NDArray[np.intp]
-    columns: NDArray[np.intp]
-    lower: FloatArray
-    upper: FloatArray
-    dofs: NDArray[np.intp]
-    is_stiffness: NDArray[np.bool_]
-    in_compliance = False
-    rate_of_one: FloatArray = np.zeros(0)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the parameters."""
-        return tuple(one.name for one in self.parameters)
-
-    @property
-    def is_compliance(self) -> NDArray[np.bool_]:
-        """Which coordinates are compliances, shape (p,)."""
-        return self.is_stiffness & self.in_compliance
-
-    @abstractmethod
-    def on_lines(self, lines: slice | NDArray[np.intp]) -> JointCoordinates:
-        """Return the same on some of the lines."""
-
-    @abstractmethod
-    def compliance(self, x: FloatArray) -> ComplexArray:
-        """Return the entries of C that the coordinates change, shape (n_freq, q); NaN where K* is singular."""
-
-    @abstractmethod
-    def slope(self, x: FloatArray, entries: ComplexArray) -> ComplexArray:
-        """Return their derivatives by the coordinates, shape (n_freq, q, p)."""
-
-    @abstractmethod
-    def theta(self, x: FloatArray) -> FloatArray:
-        """Return the parameters, shape (p,)."""
-
-    @abstractmethod
-    def coordinates(self, theta: FloatArray) -> FloatArray:
-        """Return the coordinates of parameters."""
-
-    @abstractmethod
-    def theta_slope(self, x: FloatArray) -> FloatArray:
-        """Return the derivatives of the parameters by the coordinates, shape (p, p)."""
-
-    def matrix(self, entries: ComplexArray) -> ComplexArray:
-        """Return C of its entries, shape (n_freq, n, n); zero where the coordinates change nothing."""
-        c = np.zeros((len(entries), self.n, self.n), np.complex128)
-        c[:, self.rows, self.columns] = c[:, self.columns, self.rows] = entries
-        return c
-
-    def line_parts(
-        self, x: FloatArray, entries: ComplexArray, weight: ComplexArray, residual: ComplexArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return Re(J^H r), shape (n_freq, p), and Re(J^H W J), shape (n_freq, p, p), of each line; J is the slope."""
-        slope = self.slope(x, entries)
-        adjoint = slope.conj().swapaxes(1, 2)
-        return (adjoint @ residual[..., None])[..., 0].real, (adjoint @ (weight @ slope)).real
-
-    def normal_equations(
-        self, x: FloatArray, entries: ComplexArray, weight: ComplexArray, residual: ComplexArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return Re(J^H W J), shape (p, p), and Re(J^H r), shape (p,), of all lines."""
-        gradient, information = self.line_parts(x, entries, weight, residual)
-        return information.sum(axis=0), gradient.sum(axis=0)
-
-    def minimise(
-        self, forms: LineForms, start: FloatArray, held: int | None = None, least_gain: float = _LEAST_GAIN
-    ) -> FormMinimum:
-        """Minimise quadratic forms by Levenberg-Marquardt steps inside the bounds.
-
-        Parameters
-        ----------
-        forms : LineForms
-        start : ndarray, shape (p,)
-        held : int, optional
-            A coordinate that keeps its value.
-        least_gain : float
-            The iteration ends when two steps in a row lower the squares by less; a residual has mean square 1.
-        """
-        squares = FormSquares(forms, self)
-        small = least_gain / squares.unit
-        found = minimise(squares, start, held, _STEPS, _PROMISED * small, small)
-        return FormMinimum(found.x, found.cost, found.information, found.gradient, forms, self)
-
-    def lowest(
-        self, forms: LineForms, start: FloatArray, held: int | None = None, least_gain: float = _LEAST_GAIN
-    ) -> FormMinimum:
-        """Minimise as `minimise` does, from other starts, too, where a minimum may not be the lowest."""
-        return self.minimise(forms, start, held, least_gain)
-
-    def has_profile(self, i: int, x: FloatArray, covariance: FloatArray) -> bool:
-        """Whether noise is so far from normal in a coordinate that the interval of its parameter needs a profile."""
-        return False
-
-    def of_profile(self, i: int) -> JointCoordinates:
-        """Return the coordinates in which the likelihood of one parameter has its profile."""
-        return self
-
-    def value(self, i: int, x: FloatArray) -> float:
-        """Return one of the parameters."""
-        return float(self.theta(x)[i])
-
-    def end(self, i: int, sign: int) -> float:
-        """Return what a parameter runs to where its coordinate has no limit below (-1) or above (1)."""
-        return sign * np.inf
-
-    def longest_reach(self, i: int) -> float:
-        """Return how far from a minimum the limit of a parameter is sought first at most."""
-        return np.inf
 
 
 class SpringJoint(JointCoordinates):
@@ -406,11 +250,11 @@ class DiagonalJoint(SpringJoint):
         return (adjoint * residual[:, self.dofs]).real, weighted.real
 
     def minimise(
-        self, forms: LineForms, start: FloatArray, held: int | None = None, least_gain: float = _LEAST_GAIN
+        self, forms: LineForms, start: FloatArray, held: int | None = None, least_gain: float = LEAST_GAIN
     ) -> FormMinimum:
         """Minimise quadratic forms in the kernel."""
         p, n_freq = start.size, len(forms.squares)
-        sizes = (int(self.by_rate), self.n, p, n_freq, _STEPS, 0 if held is None else held + 1)
+        sizes = (int(self.by_rate), self.n, p, n_freq, STEPS, 0 if held is None else held + 1)
         x, information, gradient = np.array(start, np.float64), np.empty((p, p)), np.empty(p)
         which = (self.dofs + 1).astype(np.int32), self.terms.kinds.astype(np.int32)
         lines = (self.omega, *map(np.ascontiguousarray, forms))
@@ -419,7 +263,7 @@ class DiagonalJoint(SpringJoint):
         return FormMinimum(x, cost, information, gradient, forms, self)
 
     def lowest(
-        self, forms: LineForms, start: FloatArray, held: int | None = None, least_gain: float = _LEAST_GAIN
+        self, forms: LineForms, start: FloatArray, held: int | None = None, least_gain: float = LEAST_GAIN
     ) -> FormMinimum:
         """Minimise; where a DOF ends rigid or all damping, also from no damping and from some.
 

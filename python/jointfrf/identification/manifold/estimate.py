@@ -12,16 +12,10 @@ from numpy.typing import NDArray
 
 from jointfrf.frf.bands import spread_lines
 from jointfrf.identification.line_starts import from_lines, interface_compliance
-from jointfrf.identification.manifold.coordinates import (
-    CrossTerms,
-    JointTerms,
-    LawCoordinates,
-    NamedParameter,
-    coordinates_of,
-)
+from jointfrf.identification.manifold.coordinates import CrossTerms, JointTerms, LawCoordinates, coordinates_of
 from jointfrf.identification.manifold.group_fit import LITTLE_PATIENCE, GroupFit, GroupProblem, fit_dofs
 from jointfrf.identification.manifold.interface_frfs import InterfaceFrfs
-from jointfrf.identification.manifold.line_forms import FormMinimum
+from jointfrf.identification.manifold.line_forms import FormMinimum, NamedParameter
 from jointfrf.identification.manifold.on_manifold import LineData, OnManifold
 from jointfrf.identification.manifold.starts import first_joints
 from jointfrf.identification.manifold.unknown_cross import fit_unknown_cross

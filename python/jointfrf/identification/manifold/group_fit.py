@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf.frf.bands import in_pieces, is_long
-from jointfrf.identification.manifold.coordinates import JointCoordinates
-from jointfrf.identification.manifold.line_forms import FormMinimum, LineForms
+from jointfrf.identification.manifold.line_forms import FormMinimum, JointCoordinates, LineForms
 from jointfrf.identification.manifold.on_manifold import (
     LineData,
     OnManifold,

@@ -1,21 +1,36 @@
-"""Quadratic forms of the compliance of a joint, one on every line: the squares of a fit, and a minimum of them."""
+"""Quadratic forms of the compliance of a joint, one on every line; coordinates of a joint that minimise them."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from jointfrf.frf.bands import is_long, line_slices
-from jointfrf.identification.minimise import Linearised, inverse_information
+from jointfrf.identification.minimise import Linearised, inverse_information, minimise
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
-if TYPE_CHECKING:
-    from jointfrf.identification.manifold.coordinates import JointCoordinates
+__all__ = [
+    "LEAST_GAIN",
+    "STEPS",
+    "FormMinimum",
+    "FormSquares",
+    "JointCoordinates",
+    "LineForms",
+    "LineParts",
+    "NamedParameter",
+]
 
-__all__ = ["FormMinimum", "FormSquares", "LineForms", "LineParts"]
+#: Steps of a minimiser at most.
+STEPS = 100
+#: A minimum is found when two steps gain less than this of the squares of one residual, or one step promises less than
+#: a share of that.
+LEAST_GAIN, _PROMISED = 1e-6, 1e-3
 
 
 class LineForms(NamedTuple):
@@ -162,3 +177,150 @@ class FormMinimum:
         joint, forms = (self.joint, self.forms) if whole else (self.joint.on_lines(lines), self.forms.on_slice(lines))
         entries = joint.compliance(self.x)
         return LineParts(*joint.line_parts(self.x, entries, forms.weight, forms.at(entries)[1]))
+
+
+class NamedParameter(Protocol):
+    """A parameter of a joint, of springs or of any law."""
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+
+
+class JointCoordinates(ABC):
+    """The compliance C = K*^-1 of a joint as a function of coordinates x of length p, one for each parameter.
+
+    Attributes
+    ----------
+    parameters : sequence, length p
+        Parameters of the joint in the order of the coordinates.
+    omega : ndarray, shape (n_freq,)
+        rad/s.
+    n : int
+        Joint DOFs.
+    rows, columns : ndarray of int, shape (q,)
+        Entries of C that the coordinates change, on and above its diagonal.
+    lower, upper : ndarray, shape (p,)
+        Smallest and largest value of each coordinate.
+    dofs : ndarray of int, shape (p,)
+        DOF of each parameter, of a cross term that of its row.
+    is_stiffness : ndarray of bool, shape (p,)
+        Parameters that are the stiffness of one DOF.
+    in_compliance : bool
+        Whether the coordinates of stiffnesses are compliances, 0 for a rigid DOF, and those of damping their rates: the
+        n compliances first.
+    rate_of_one : ndarray
+        Rates at which damping is as large as stiffness on the highest line; of those coordinates only.
+    """
+
+    parameters: Sequence[NamedParameter]
+    omega: FloatArray
+    n: int
+    rows: NDArray[np.intp]
+    columns: NDArray[np.intp]
+    lower: FloatArray
+    upper: FloatArray
+    dofs: NDArray[np.intp]
+    is_stiffness: NDArray[np.bool_]
+    in_compliance = False
+    rate_of_one: FloatArray = np.zeros(0)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the parameters."""
+        return tuple(one.name for one in self.parameters)
+
+    @property
+    def is_compliance(self) -> NDArray[np.bool_]:
+        """Which coordinates are compliances, shape (p,)."""
+        return self.is_stiffness & self.in_compliance
+
+    @abstractmethod
+    def on_lines(self, lines: slice | NDArray[np.intp]) -> JointCoordinates:
+        """Return the same on some of the lines."""
+
+    @abstractmethod
+    def compliance(self, x: FloatArray) -> ComplexArray:
+        """Return the entries of C that the coordinates change, shape (n_freq, q); NaN where K* is singular."""
+
+    @abstractmethod
+    def slope(self, x: FloatArray, entries: ComplexArray) -> ComplexArray:
+        """Return their derivatives by the coordinates, shape (n_freq, q, p)."""
+
+    @abstractmethod
+    def theta(self, x: FloatArray) -> FloatArray:
+        """Return the parameters, shape (p,)."""
+
+    @abstractmethod
+    def coordinates(self, theta: FloatArray) -> FloatArray:
+        """Return the coordinates of parameters."""
+
+    @abstractmethod
+    def theta_slope(self, x: FloatArray) -> FloatArray:
+        """Return the derivatives of the parameters by the coordinates, shape (p, p)."""
+
+    def matrix(self, entries: ComplexArray) -> ComplexArray:
+        """Return C of its entries, shape (n_freq, n, n); zero where the coordinates change nothing."""
+        c = np.zeros((len(entries), self.n, self.n), np.complex128)
+        c[:, self.rows, self.columns] = c[:, self.columns, self.rows] = entries
+        return c
+
+    def line_parts(
+        self, x: FloatArray, entries: ComplexArray, weight: ComplexArray, residual: ComplexArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return Re(J^H r), shape (n_freq, p), and Re(J^H W J), shape (n_freq, p, p), of each line; J is the slope."""
+        slope = self.slope(x, entries)
+        adjoint = slope.conj().swapaxes(1, 2)
+        return (adjoint @ residual[..., None])[..., 0].real, (adjoint @ (weight @ slope)).real
+
+    def normal_equations(
+        self, x: FloatArray, entries: ComplexArray, weight: ComplexArray, residual: ComplexArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return Re(J^H W J), shape (p, p), and Re(J^H r), shape (p,), of all lines."""
+        gradient, information = self.line_parts(x, entries, weight, residual)
+        return information.sum(axis=0), gradient.sum(axis=0)
+
+    def minimise(
+        self, forms: LineForms, start: FloatArray, held: int | None = None, least_gain: float = LEAST_GAIN
+    ) -> FormMinimum:
+        """Minimise quadratic forms by Levenberg-Marquardt steps inside the bounds.
+
+        Parameters
+        ----------
+        forms : LineForms
+        start : ndarray, shape (p,)
+        held : int, optional
+            A coordinate that keeps its value.
+        least_gain : float
+            The iteration ends when two steps in a row lower the squares by less; a residual has mean square 1.
+        """
+        squares = FormSquares(forms, self)
+        small = least_gain / squares.unit
+        found = minimise(squares, start, held, STEPS, _PROMISED * small, small)
+        return FormMinimum(found.x, found.cost, found.information, found.gradient, forms, self)
+
+    def lowest(
+        self, forms: LineForms, start: FloatArray, held: int | None = None, least_gain: float = LEAST_GAIN
+    ) -> FormMinimum:
+        """Minimise as `minimise` does, from other starts, too, where a minimum may not be the lowest."""
+        return self.minimise(forms, start, held, least_gain)
+
+    def has_profile(self, i: int, x: FloatArray, covariance: FloatArray) -> bool:
+        """Whether noise is so far from normal in a coordinate that the interval of its parameter needs a profile."""
+        return False
+
+    def of_profile(self, i: int) -> JointCoordinates:
+        """Return the coordinates in which the likelihood of one parameter has its profile."""
+        return self
+
+    def value(self, i: int, x: FloatArray) -> float:
+        """Return one of the parameters."""
+        return float(self.theta(x)[i])
+
+    def end(self, i: int, sign: int) -> float:
+        """Return what a parameter runs to where its coordinate has no limit below (-1) or above (1)."""
+        return sign * np.inf
+
+    def longest_reach(self, i: int) -> float:
+        """Return how far from a minimum the limit of a parameter is sought first at most."""
+        return np.inf

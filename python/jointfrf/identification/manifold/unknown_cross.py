@@ -15,12 +15,8 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
 from jointfrf.frf.bands import in_pieces
-from jointfrf.identification.manifold.coordinates import JointCoordinates
 from jointfrf.identification.manifold.group_fit import GroupFit, GroupProblem, UnknownCrossTerms
-from jointfrf.identification.manifold.line_forms import (
-    FormMinimum,
-    LineForms,
-)
+from jointfrf.identification.manifold.line_forms import FormMinimum, JointCoordinates, LineForms
 from jointfrf.identification.manifold.on_manifold import FrfEntries, LineData
 from jointfrf.identification.manifold.starts import hidden_share
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
