@@ -82,7 +82,7 @@ class FrequencyKeys(Keys):
         if self.from_file is not None:
             return self._lines_of_file()
         if lacking := [name for name in ("first", "last", "step") if getattr(self, name) is None]:
-            raise self.missing(list(map(repr, lacking)))
+            raise self.missing(lacking)
         first, last, step = (float(one or 0) for one in (self.first, self.last, self.step))
         if step == 0:
             raise self.error("step", "positive, in Hz")
@@ -238,7 +238,7 @@ class BandKeys(Keys):
             if name not in names:
                 raise self.table.unknown(name, ["name", *names])
         if lacking := [name for name in names if name not in self.by_parameter]:
-            raise self.missing(list(map(repr, lacking)))
+            raise self.missing(lacking)
         for name, bands in self.by_parameter.items():
             check_bands(self, name, bands, freq_hz)
         return BandSet(self.name, {one: list(self.by_parameter[one.name]) for one in joint_parameters(dofs)})
@@ -377,7 +377,7 @@ def joints_of(dofs: Sequence[JointDofKeys], needed_by: str = "") -> tuple[Joint,
             )
         lacking = [name for name in ("initial_stiffness", "initial_damping") if getattr(one, name) is None]
         if needed_by and lacking:
-            raise one.missing(list(map(repr, lacking)), f"{needed_by} begins with a first estimate")
+            raise one.missing(lacking, f"{needed_by} begins with a first estimate")
     names = [one.dof for one in dofs]
     actual = dofs[-1].build(lambda: Joint([one.stiffness for one in dofs], [one.damping for one in dofs], names))
     stiffness, damping = (

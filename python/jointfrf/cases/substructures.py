@@ -179,7 +179,7 @@ class BeamKeys(SubstructureKeys, tag="beam"):
         """Return the structure."""
         is_flexible = self.element == "shear-flexible"
         if is_flexible and self.poisson is None:
-            raise self.missing(["'poisson'"], "shear-flexible elements have one")
+            raise self.missing(["poisson"], "shear-flexible elements have one")
         model = self.build(lambda: beam(
             self.length, self.elements, youngs_modulus=self.youngs_modulus, density=self.density, width=self.width,
             height=self.height, ends=self.ends, element=self.element, axial=self.axial,

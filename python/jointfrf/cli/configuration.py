@@ -54,11 +54,11 @@ def with_configuration(args: argparse.Namespace, parser: CommandParser, command:
 
     table, is_found = read_toml(path), args.config is None
     options, shared = _options(parser), _shared()
-    own = table.table(command) if command in table else None
+    own = table.table(command) if command in table.content else None
     _check_keys(table, own, shared, options)
-    typed, is_used = set(args.given), "channel" in table and "--channels" in options
-    everywhere = [(table, key) for key in table.keys() if key not in (*COMMANDS, *_CHANNELS)]  # noqa: SIM118
-    for source, key in everywhere + ([(own, key) for key in own.keys()] if own else []):  # noqa: SIM118
+    typed, is_used = set(args.given), "channel" in table.content and "--channels" in options
+    everywhere = [(table, key) for key in table.content if key not in (*COMMANDS, *_CHANNELS)]
+    for source, key in everywhere + ([(own, key) for key in own.content] if own else []):
         if is_found and _option(key) not in (*shared, *_OF_THE_FIT):
             raise source.wrong(
                 key, f"say it on the command line, or name the file by --config: a {CONFIGURATION} that is found "
@@ -111,12 +111,12 @@ def _check_keys(
 ) -> None:
     """Raise for a key that is no table of a command, no shared option, and in the table of this command no option."""
     names = [name.removeprefix("--") for name in (*shared, "--json", "--quiet")]
-    for key in table.keys():  # noqa: SIM118
+    for key in table.content:
         if key in COMMANDS:
             table.table(key)
         elif key not in _CHANNELS and _option(key).removeprefix("--") not in names:
             raise table.unknown(key, [*names, *_CHANNELS, *COMMANDS])
-    for key in own.keys() if own else ():
+    for key in own.content if own else ():
         if own and _option(key) not in options:
             raise own.unknown(key, [name.removeprefix("--") for name in options])
 
@@ -125,7 +125,7 @@ def _value(source: TomlTable, key: str, action: argparse.Action, folder: Path, *
     """Return a value of the file as the option takes it."""
     from jointfrf.errors import FileContentError
 
-    value = source.value(key)
+    value = source.content[key]
     try:
         if action.nargs == 0:
             if not isinstance(value, bool):

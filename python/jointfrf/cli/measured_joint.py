@@ -231,7 +231,7 @@ def _table(args: argparse.Namespace) -> tuple[ChannelPlace, ...] | None:
     if args.configuration is None:
         return None
     table = read_toml(args.configuration)
-    return places_of_table(table) if "channel" in table else None
+    return places_of_table(table) if "channel" in table.content else None
 
 
 def _check_options(args: argparse.Namespace, frfs: FrfSet, table: object) -> None:

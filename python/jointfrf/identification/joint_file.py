@@ -69,7 +69,7 @@ def _saved(path: Path) -> JointFile:
 
 def _written(table: TomlTable) -> JointFile:
     joint = read_joint_table(table)
-    points = np.tile(as_real("at", table.numbers("at"), (3,)), (2, 1)) if "at" in table else None
+    points = np.tile(np.array(table.content["at"], np.float64), (2, 1)) if "at" in table.content else None
     return JointFile(joint, None, points, (f"from {Path(table.where).name}",))
 
 

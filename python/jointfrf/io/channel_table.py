@@ -4,20 +4,23 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
-from typing import Any, cast, get_args
+from typing import Annotated, Any, Literal, cast, get_args
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import NDArray
 
 from jointfrf.errors import FileContentError
 from jointfrf.frf.frf_set import Channel, ChannelPlace, ChannelRole, JointSide
 from jointfrf.io.csv_file import TextTable, read_text_table
 from jointfrf.spelling import did_you_mean
-from jointfrf.toml.table import Key, KeyTable, TomlTable, read_toml
+from jointfrf.toml.declared import Keys, NotNegative, key, keys_of, read_keys
+from jointfrf.toml.table import TomlTable, read_toml
 
-__all__ = ["CHANNEL_KEYS", "places_of_table", "read_channel_table"]
+__all__ = ["ChannelKeys", "places_of_table", "read_channel_table"]
 
 #: Units of positions, in m.
 _UNITS = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "in": 0.0254}
@@ -25,22 +28,38 @@ _UNITS = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "in": 0.0254}
 _TRIAXIAL = np.eye(3)
 #: How far from 1 the length of a direction may be: that of two digits, as in (0.71, 0, -0.71); it is normalised.
 _UNIT = 1e-2
-CHANNEL_KEYS = KeyTable(
-    "[[channel]]",
-    "One table for each channel, or for each node with several.",
-    (
-        Key("channel", "text", "Name of the channel in the file of FRFs: `101:+x`.", "", "`node`"),
-        Key("node", "whole number, at least 1", "Instead: all channels along x, y, z of this node in the file."),
-        Key("side", "`j` or `k`", "Side of the joint.", "", "by `--j` and `--k`"),
-        Key(
-            "role", "`response`, `excitation` or `both`", "As what the channel counts.", "", "`both`: what the file has"
-        ),
-        Key("at", "list of three numbers", "Position.", "`unit`", "coordinates of the file"),
-        Key("direction", "list of three numbers", "Direction of the channel; with `channel`.", "", "by its name"),
-        Key("axes", "three lists of three numbers", "Directions of the sensor's x, y, z; with `node`.", "", "x, y, z"),
-        Key("weight", "number, at least 0", "In the virtual point; 0 leaves the channel out.", "", "1"),
-    ),
-)
+_Three = tuple[float, float, float]
+_Node = Annotated[int, Meta(ge=1)]
+
+
+class ChannelKeys(Keys):
+    """One table for each channel, or for each node with several."""
+
+    channel: Annotated[str | None, key("Name of the channel in the file of FRFs: `101:+x`.", absent="`node`")] = None
+    node: Annotated[_Node | None, key("Instead: all channels along x, y, z of this node in the file.")] = None
+    side: Annotated[JointSide | None, key("Side of the joint.", absent="by `--j` and `--k`")] = None
+    role: Annotated[ChannelRole, key("As what the channel counts; `both`: what the file has.")] = "both"
+    at: Annotated[
+        _Three | None, key("Position.", "`unit`", takes="three numbers", absent="coordinates of the file")
+    ] = None
+    direction: Annotated[
+        _Three | None, key("Direction of a `channel`.", takes="three numbers", absent="by its name")
+    ] = None
+    axes: Annotated[
+        tuple[_Three, _Three, _Three] | None,
+        key("Directions of x, y, z of a `node`'s sensor.", takes="three lists of three numbers", absent="x, y, z"),
+    ] = None
+    weight: Annotated[NotNegative, key("In the virtual point; 0 leaves the channel out.")] = 1.0
+
+
+class ChannelTableKeys(Keys):
+    """Channels around a joint."""
+
+    unit: Annotated[Literal["m", "mm", "cm", "in"], key("Unit of positions.")] = "m"
+    channel: Annotated[tuple[ChannelKeys, ...], key("The channels.")]
+
+
+#: Columns of a CSV file.
 _COLUMNS = ("channel", "node", "side", "role", "x", "y", "z", "direction_x", "direction_y", "direction_z", "weight")
 
 
@@ -50,7 +69,7 @@ def read_channel_table(path: str | PathLike[str]) -> tuple[ChannelPlace, ...]:
     Parameters
     ----------
     path : path-like
-        ``.toml``: tables ``[[channel]]`` with the keys of `CHANNEL_KEYS`, and ``unit`` of positions (``"m"``, ``"mm"``,
+        ``.toml``: tables ``[[channel]]`` with the keys of `ChannelKeys`, and ``unit`` of positions (``"m"``, ``"mm"``,
         ``"cm"``, ``"in"``; m by default). Any other name: one row for each channel under a heading out of channel,
         node, side, role, x, y, z, direction_x, direction_y, direction_z, weight, between commas, semicolons or tabs;
         units of positions in the heading as in ``x [mm]``.
@@ -78,10 +97,7 @@ def read_channel_table(path: str | PathLike[str]) -> tuple[ChannelPlace, ...]:
     """
     file = Path(path)
     if file.suffix.lower() == ".toml":
-        table = read_toml(file)
-        places = places_of_table(table)
-        table.close()
-        return places
+        return _places_of(read_keys(read_toml(file), ChannelTableKeys))
     found = tuple(place for row in _csv_rows(file) for place in row)
     if not found:
         raise FileContentError(f"{file} holds no channels")
@@ -89,47 +105,19 @@ def read_channel_table(path: str | PathLike[str]) -> tuple[ChannelPlace, ...]:
 
 
 def places_of_table(table: TomlTable) -> tuple[ChannelPlace, ...]:
-    """Take the keys ``unit`` and ``[[channel]]`` of a TOML file; as `read_channel_table`."""
-    if "channel" not in table:
-        hint = did_you_mean("channel", table.keys())
-        raise FileContentError(f"{table.where}: has no tables [[channel]]{hint}")
-    return tuple(place for row in _toml_rows(table) for place in row)
+    """Take the keys ``unit`` and ``[[channel]]`` of a TOML file that may have others; as `read_channel_table`."""
+    own = {name: value for name, value in table.content.items() if name in keys_of(ChannelTableKeys).names}
+    return _places_of(read_keys(replace(table, content=own), ChannelTableKeys))
 
 
-def _toml_rows(table: TomlTable) -> Iterator[list[ChannelPlace]]:
-    scale = _UNITS[table.text("unit", tuple(_UNITS))] if "unit" in table else 1.0
-    for row in table.tables("channel"):
-        row.expect(CHANNEL_KEYS)
-        values: dict[str, Any] = {key: row.value(key) for key in row.keys()}  # noqa: SIM118
-        if "at" in values:
-            values["at"] = scale * np.array(_three(row, "at"))
-        if "direction" in values:
-            values["direction"] = np.array(_three(row, "direction"))
-        if "axes" in values:
-            values["axes"] = _axes(row)
-        if "weight" in values:
-            values["weight"] = row.number("weight", 0)
-        if "node" in values:
-            values["node"] = row.whole("node", 1)
-        for key in ("channel", "side", "role"):
-            if key in values:
-                values[key] = row.text(key)
-        yield _places(values, row.where)
+def _places_of(keys: ChannelTableKeys) -> tuple[ChannelPlace, ...]:
+    rows = ((row, {name: getattr(row, name) for name in row.table.content}) for row in keys.channel)
+    return tuple(place for row, values in rows for place in _places(_as_arrays(values, keys.unit), row.table.where))
 
 
-def _three(row: TomlTable, key: str) -> list[float]:
-    values = row.numbers(key)
-    if len(values) != 3:
-        raise row.error(key, "three numbers")
-    return values
-
-
-def _axes(row: TomlTable) -> NDArray[np.float64]:
-    given = row.value("axes")
-    inner = [TomlTable({"axes": each}, row.where) for each in given] if isinstance(given, list) else []
-    if len(inner) != 3:
-        raise row.error("axes", "three lists of three numbers")
-    return np.array([_three(each, "axes") for each in inner])
+def _as_arrays(values: dict[str, Any], unit: str) -> dict[str, Any]:
+    scales = {"at": _UNITS[unit], "direction": 1.0, "axes": 1.0}
+    return values | {name: scale * np.array(values[name]) for name, scale in scales.items() if name in values}
 
 
 def _csv_rows(file: Path) -> Iterator[list[ChannelPlace]]:
@@ -168,14 +156,14 @@ def _csv_values(table: TextTable, where: str, given: Mapping[str, str], scales: 
             raise FileContentError(f"{where}: {name} must be a number, not {given[name]!r}")
         return value
 
-    values: dict[str, Any] = {key: given[key] for key in ("channel", "side", "role") if key in given}
-    for key, names in (("at", ("x", "y", "z")), ("direction", ("direction_x", "direction_y", "direction_z"))):
+    values: dict[str, Any] = {name: given[name] for name in ("channel", "side", "role") if name in given}
+    for vector, names in (("at", ("x", "y", "z")), ("direction", ("direction_x", "direction_y", "direction_z"))):
         there = [name for name in names if name in given]
         if there and len(there) < 3:
             missing = next(name for name in names if name not in given)
             raise FileContentError(f"{where}: {there[0]} is given, {missing} is not")
         if there:
-            values[key] = np.array([number(name) * scales[name] for name in names])
+            values[vector] = np.array([number(name) * scales[name] for name in names])
     if "node" in given:
         if not given["node"].isdecimal() or int(given["node"]) < 1:
             raise FileContentError(f"{where}: node must be a whole number, at least 1, not {given['node']!r}")
@@ -215,11 +203,11 @@ def _check_words(values: Mapping[str, Any], where: str) -> None:
         raise FileContentError(f"{where}: direction goes with channel; the directions of a node are axes")
     if "axes" in values and "channel" in values:
         raise FileContentError(f"{where}: axes go with node; the direction of a channel is direction")
-    for key, choice in (("side", get_args(JointSide)), ("role", get_args(ChannelRole))):
-        if key in values and values[key] not in choice:
+    for word, choice in (("side", get_args(JointSide)), ("role", get_args(ChannelRole))):
+        if word in values and values[word] not in choice:
             raise FileContentError(
-                f"{where}: {key} must be one of {', '.join(choice)}, not {values[key]!r}"
-                f"{did_you_mean(str(values[key]), choice)}"
+                f"{where}: {word} must be one of {', '.join(choice)}, not {values[word]!r}"
+                f"{did_you_mean(str(values[word]), choice)}"
             )
 
 

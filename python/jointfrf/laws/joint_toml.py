@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from typing import Annotated, Any
 
 import numpy as np
+from msgspec import field
 
 from jointfrf.dofs import UNITS
 from jointfrf.joint import Joint
@@ -14,10 +16,11 @@ from jointfrf.laws.law import JointLaw, LawField
 from jointfrf.laws.law_joint import LawJoint
 from jointfrf.laws.springs import SpringLaw
 from jointfrf.laws.viscoelastic import FractionalZener, PowerLaw, StandardLinearSolid
-from jointfrf.toml.table import Key, KeyTable, TomlTable
+from jointfrf.spelling import did_you_mean
+from jointfrf.toml.declared import Keys, NotNegative, key, read_keys
+from jointfrf.toml.table import TomlTable
 
 __all__ = [
-    "LAW_VALUES",
     "LAW_WORDS",
     "joint_text",
     "parameters_in_words",
@@ -32,42 +35,10 @@ LAWS: tuple[type[JointLaw], ...] = (SpringLaw, StandardLinearSolid, FractionalZe
 _BY_WORD = {law.word: law for law in LAWS}
 #: Words of laws; a rigid DOF has none.
 LAW_WORDS = (*_BY_WORD, "rigid")
-#: Reference point, which `read_joint_table` leaves to its caller.
-_AT = Key("at", "list of three numbers", "Reference point.", "m", "not known")
-#: Keys of a joint by constants.
-JOINT_KEYS = KeyTable(
-    "joint.toml",
-    "A joint by its constants; matrices are lists of lists.",
-    (
-        Key("dofs", "list of texts", "Names of the joint DOFs: `y`, `theta_z`."),
-        Key("stiffness", "list of numbers, or of lists", "Stiffness of each DOF, or the matrix.", "N/m, N m/rad"),
-        Key("damping", "list of numbers, or of lists", "Viscous damping.", "N s/m, N m s/rad", "none"),
-        Key("loss_factor", "list of numbers", "Hysteretic loss factor of each DOF.", "", "0"),
-        Key("structural_damping", "list of numbers, or of lists", "Hysteretic damping, beside that of loss factors.",
-            "N/m, N m/rad", "none"),
-        _AT,
-    ),
-)  # fmt: skip
 
 
 def _numbers(law: type[JointLaw]) -> tuple[LawField, ...]:
     return (*law.parameters, *law.settings)
-
-
-def _as_key(number: LawField) -> Key:
-    """Describe a number of a law as a key of files."""
-    limits = f", {number.lower:.1g} to {number.upper:g}" if np.isfinite(number.upper) else ""
-    if not limits and np.isfinite(number.lower):
-        limits = ", above 0" if number.lower > 0 else ", at least 0"
-    units = UNITS[number.kind] if number.kind != "number" else ("",)
-    return Key(number.name, f"number{limits}", number.meaning, ", ".join(dict.fromkeys(units[::2])), "0")
-
-
-#: Keys of the numbers of all laws; the first law that has a number describes it.
-LAW_VALUES = tuple(
-    {number.name: _as_key(number) for law in LAWS[::-1] for number in _numbers(law)}[name]
-    for name in dict.fromkeys(number.name for law in LAWS for number in _numbers(law))
-)
 
 
 def takes_in_words() -> str:
@@ -76,82 +47,109 @@ def takes_in_words() -> str:
 
 
 def parameters_in_words() -> str:
-    """Return what the parameters of all laws are, for the reference of keys."""
-    return "; ".join(
-        f"`{one.name}` {one.meaning[0].lower()}{one.meaning[1:].rstrip('.')} "
-        f"({', '.join(part for part in (one.takes, one.unit) if part)})"
-        for one in LAW_VALUES
-    )
+    """Return what the parameters of all laws are, each as the first law that has it describes it."""
+    by_name: dict[str, LawField] = {}
+    for law in LAWS:
+        for number in _numbers(law):
+            by_name.setdefault(number.name, number)
+    return "; ".join(map(_in_words, by_name.values()))
 
 
-#: Keys of one law.
-_LAW = KeyTable(
-    "[[law]], in joint.toml",
-    "The law of a joint DOF, or of a pair of DOFs.",
-    (
-        Key("dof", "text", "Name of the DOF.", "", "required but for a cross term"),
-        Key("between", "list of two texts", "Names of two DOFs: a symmetric cross term.", "", "none"),
-        Key("law", f"one of {', '.join(f'`{word}`' for word in LAW_WORDS)}",
-            "The law; `rigid`: both sides move alike."),
-        Key("values", "table", "Its parameters.", "", "required but for `rigid`",
-            KeyTable("values, in [[law]]", f"Parameters of the law, those that it takes: {takes_in_words()}.",
-                     LAW_VALUES)),
-        Key("mass", "number, at least 0", "Mass of the joint in this direction, half of it on either side.",
-            "kg, kg m^2", "0"),
-    ),
-)  # fmt: skip
-#: Keys of a joint of laws.
-LAW_JOINT_KEYS = KeyTable(
-    "joint.toml of laws",
-    "A joint by a law for each DOF, in the order of its DOFs.",
-    (Key("law", "tables", "The laws.", inner=_LAW), _AT),
-)
+def _in_words(number: LawField) -> str:
+    limits = f", {number.lower:.1g} to {number.upper:g}" if np.isfinite(number.upper) else ""
+    if not limits and np.isfinite(number.lower):
+        limits = ", above 0" if number.lower > 0 else ", at least 0"
+    units = UNITS[number.kind][::2] if number.kind != "number" else ()
+    about = ", ".join(dict.fromkeys((f"number{limits}", *units)))
+    return f"`{number.name}` {number.meaning[0].lower()}{number.meaning[1:].rstrip('.')} ({about})"
+
+
+_At = Annotated[tuple[float, float, float] | None, key("Reference point.", "m", takes="three numbers")]
+_ByDof = "list of numbers, or of lists"
+
+
+class ConstantsKeys(Keys):
+    """A joint by its constants; matrices are lists of lists."""
+
+    dofs: Annotated[tuple[str, ...], key("Names of the joint DOFs: `y`, `theta_z`.", min_length=1)]
+    stiffness: Annotated[Any, key("Stiffness of each DOF, or the matrix.", "N/m, N m/rad", takes=_ByDof)]
+    damping: Annotated[Any, key("Viscous damping.", "N s/m, N m s/rad", takes=_ByDof)] = None
+    loss_factor: Annotated[Any, key("Hysteretic loss factor of each DOF.", takes="list of numbers")] = None
+    structural_damping: Annotated[
+        Any, key("Hysteretic damping, beside that of loss factors.", "N/m, N m/rad", takes=_ByDof)
+    ] = None
+    at: _At = None
+
+
+class LawKeys(Keys):
+    """The law of a joint DOF, or of a pair of DOFs."""
+
+    dof: Annotated[str | None, key("Name of the DOF.", absent="required but for a cross term")] = None
+    between: Annotated[
+        tuple[str, str] | None, key("Two DOFs: a symmetric cross term.", takes="the names of two DOFs")
+    ] = None
+    law: Annotated[str, key("The law; `rigid`: both sides move alike.", choice=LAW_WORDS)]
+    values: Annotated[
+        dict[str, float],
+        key(f"Its parameters, those that it takes: {takes_in_words()}.", absent="required but for `rigid`"),
+    ] = field(default_factory=dict)
+    mass: Annotated[
+        NotNegative | None, key("Mass of the joint in this direction, half of it on either side.", "kg, kg m^2")
+    ] = None
+
+
+class LawJointKeys(Keys):
+    """A joint by a law for each DOF, in the order of its DOFs."""
+
+    law: Annotated[tuple[LawKeys, ...], key("The laws.")]
+    at: _At = None
 
 
 def read_joint_table(table: TomlTable) -> Joint | LawJoint:
-    """Read a joint from a TOML file: laws where it has tables [[law]], else constants; the key "at" stays.
+    """Read a joint from a TOML file: laws where it has tables [[law]], else constants; "at" is left to the caller.
 
     Raises
     ------
     FileContentError
         One sentence that names the file and the key.
     """
-    return _laws(table) if "law" in table else _constants(table)
+    return _laws(table) if "law" in table.content else _constants(table)
 
 
 def _constants(table: TomlTable) -> Joint:
-    table.expect(JOINT_KEYS)
-    dofs = table.texts("dofs")
-    names = ("damping", "loss_factor", "structural_damping")
-    values = {key: table.value(key) for key in names if key in table}
-    stiffness = table.value("stiffness")
-    return table.build(lambda: Joint(stiffness, dofs=dofs, **values))
+    keys = read_keys(table, ConstantsKeys)
+    given = {name: getattr(keys, name) for name in ("damping", "loss_factor", "structural_damping")}
+    values = {name: value for name, value in given.items() if value is not None}
+    return table.build(lambda: Joint(keys.stiffness, dofs=keys.dofs, **values))
 
 
 def _laws(table: TomlTable) -> LawJoint:
-    table.expect(LAW_JOINT_KEYS)
     laws: dict[str | tuple[str, str], JointLaw] = {}
     rigid, dofs, mass = [], [], {}
-    for own in table.tables("law"):
-        word = own.text("law", LAW_WORDS)
-        if "between" in own:
-            pair = own.texts("between")
-            if len(pair) != 2 or word == "rigid":
-                raise own.error("between", "the names of two DOFs with a law that is not rigid")
-            key: str | tuple[str, str] = (pair[0], pair[1])
+    for own in read_keys(table, LawJointKeys).law:
+        _check_law(own)
+        about: str | tuple[str, str] = own.between or own.dof or ""
+        if about in laws or about in rigid:
+            raise own.wrong("dof", f"{about} has two laws")
+        if own.dof is not None:
+            dofs.append(own.dof)
+            if own.mass is not None:
+                mass[own.dof] = own.mass
+        if own.law == "rigid":
+            rigid.append(str(about))
         else:
-            key = own.text("dof")
-            dofs.append(key)
-            if "mass" in own:
-                mass[key] = own.number("mass", 0)
-        if key in laws or key in rigid:
-            raise own.wrong("dof", f"{key} has two laws")
-        if word == "rigid":
-            rigid.append(str(key))
-        else:
-            laws[key] = read_law(own.table("values"), word, is_cross="between" in own)
-        own.close()
+            laws[about] = read_law(own.table.table("values"), own.law, is_cross=own.between is not None)
     return table.build(lambda: LawJoint(laws, rigid, mass, dofs), "law")
+
+
+def _check_law(own: LawKeys) -> None:
+    """Raise a FileContentError unless the keys of a law go together."""
+    if own.between is None and own.dof is None:
+        raise own.missing(["dof"])
+    if own.between is not None and (own.law == "rigid" or own.dof is not None or own.mass is not None):
+        raise own.wrong("between", "a cross term has a law that is not rigid, no dof and no mass")
+    if own.law == "rigid" and own.values:
+        raise own.wrong("values", "a rigid DOF takes none")
 
 
 def joint_text(joint: Joint | LawJoint) -> str:
@@ -199,6 +197,7 @@ def read_law(table: TomlTable, word: str, *, is_cross: bool = False) -> JointLaw
     Parameters
     ----------
     table : TomlTable
+        Its values are numbers.
     word : str
         Out of `LAW_WORDS`, not "rigid".
     is_cross : bool
@@ -209,13 +208,14 @@ def read_law(table: TomlTable, word: str, *, is_cross: bool = False) -> JointLaw
     FileContentError
         A parameter that the law does not take, one that is missing, or a value outside its bounds.
     """
-    law = _BY_WORD[word]
+    law, given = _BY_WORD[word], table.content
     takes = [number.name for number in _numbers(law)]
-    for key in LAW_VALUES:
-        if key.name in table and key.name not in takes:
-            raise table.wrong(key.name, f"the law {word!r} takes {', '.join(takes)}")
-    numbers = {name: table.number(name) for name in takes if name in table or name not in law.optional}
-    table.close()
+    for name in given:
+        if name not in takes:
+            raise table.wrong(name, f"the law {word!r} takes {', '.join(takes)}{did_you_mean(name, takes)}")
+    if lacking := [name for name in takes if name not in given and name not in law.optional]:
+        raise table.missing(lacking)
+    numbers = {name: float(given[name]) for name in takes if name in given}
     return table.build(lambda: law.from_numbers(numbers, is_cross=is_cross))
 
 

@@ -24,13 +24,16 @@ from typing import (
 import msgspec
 
 from jointfrf.errors import FileContentError
-from jointfrf.toml.table import TomlTable
+from jointfrf.spelling import did_you_mean
+from jointfrf.toml.table import TomlTable, missing_in_words
 
 __all__ = ["Bands", "Declared", "DeclaredKey", "Keys", "NotNegative", "Positive", "key", "keys_of", "read_keys"]
 
 _T = TypeVar("_T")
 _K = TypeVar("_K", bound="Keys")
 
+#: How the sentence goes on that says what a value must be: "must be three numbers", "must be a number".
+_NO_ARTICLE = ("one", "true", "the", "three")
 Positive = Annotated[float, msgspec.Meta(gt=0)]
 NotNegative = Annotated[float, msgspec.Meta(ge=0)]
 
@@ -121,7 +124,7 @@ class Keys(msgspec.Struct, metaclass=_KeysType, frozen=True, forbid_unknown_fiel
 
     def missing(self, names: Collection[str], why: str = "") -> FileContentError:
         """Return the exception that says that keys are missing, and what needs them."""
-        return FileContentError(f"{self.table.where}: {_missing(list(names))}" + (f": {why}" if why else ""))
+        return self.table.missing(list(names), why)
 
     def build(self, builder: Callable[[], _T], name: str = "") -> _T:
         """Call a builder; if it raises an error, the message names the table and, if given, the key."""
@@ -301,16 +304,11 @@ class _Findings:
         if self.unknown:
             raise self.unknown[0]
         if self.missing:
-            parts = [f"{place.removeprefix(where)}: {_missing(names)}" for place, names in self.missing.items()]
+            parts = [f"{place.removeprefix(where)}: {missing_in_words(names)}" for place, names in self.missing.items()]
             raise FileContentError(where + "; ".join(part.removeprefix(": ") if i else part
                                                      for i, part in enumerate(parts)))  # fmt: skip
         if self.wrong:
             raise self.wrong[0]
-
-
-def _missing(names: list[str]) -> str:
-    one = len(names) == 1
-    return f"the key{'' if one else 's'} {', '.join(names)} {'is' if one else 'are'} missing"
 
 
 def read_keys(table: TomlTable, *kinds: type[_K]) -> _K:
@@ -335,7 +333,7 @@ def _read(table: TomlTable, kinds: tuple[type[_K], ...], findings: _Findings) ->
     known, rest = {one.name: one for one in declared.keys if not one.pattern}, declared.rest
     values: dict[str, Any] = {}
     others: dict[str, Any] = {}
-    for name in table.keys():  # noqa: SIM118
+    for name in table.content:
         if name in known:
             values[known[name].attribute] = _value(table, known[name], name, findings)
         elif rest is not None and _matches(rest.pattern, name):
@@ -388,15 +386,18 @@ def _matches(pattern: str, name: str) -> bool:
 def _value(table: TomlTable, one: DeclaredKey, name: str, findings: _Findings) -> Any:
     value = table.content[name]
     if one.is_array:
-        if not isinstance(value, list) or not value or not all(isinstance(each, dict) for each in value):
-            findings.wrong.append(table.error(name, f"at least one table [[{name}]]"))
+        try:
+            inners = table.tables(name)
+        except FileContentError as error:
+            findings.wrong.append(error)
             return None
-        return tuple(_read(inner, one.tables, findings) for inner in table.tables(name))
+        return tuple(_read(inner, one.tables, findings) for inner in inners)
     if one.tables or get_origin(_plain(one.kind, {}, {})) is dict:
-        if not isinstance(value, dict):
-            findings.wrong.append(table.error(name, "a table"))
+        try:
+            inner = table.table(name)
+        except FileContentError as error:
+            findings.wrong.append(error)
             return None
-        inner = table.table(name)
         if one.tables:
             return _read(inner, one.tables, findings)
         hint = get_args(_plain(one.kind, {}, {}))[1]
@@ -420,8 +421,10 @@ def _leaf(table: TomlTable, one: DeclaredKey, hint: Any, name: str, findings: _F
             raise ValueError
         return found
     except ValueError:  # that of msgspec is one
-        article = {"one": "", "true": "", "name": "the "}.get(one.takes.partition(" ")[0], "a ")
-        findings.wrong.append(table.error(name, article + one.takes.replace("`", "")))
+        article = {"name": "the "}.get(first := one.takes.partition(" ")[0], "" if first in _NO_ARTICLE else "a ")
+        words = one.choice or tuple(word for word in get_args(_plain(hint, {}, {})) if isinstance(word, str))
+        similar = did_you_mean(value, words) if isinstance(value, str) else ""
+        findings.wrong.append(table.error(name, article + one.takes.replace("`", ""), similar))
         return None
 
 

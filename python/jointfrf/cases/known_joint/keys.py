@@ -251,7 +251,7 @@ def read_known_joint(common: Case, keys: KnownJointKeys, expected: KnownJointExp
     points = _points(keys.points, a, b, len(joint.dofs), methods)
     check_noises(keys, keys.noise, len(joint.dofs))
     if (averaged := [method for method in methods if method not in FITTED]) and not keys.bands:
-        raise keys.missing(["'bands'"], f"{averaged[0]} takes means over bands")
+        raise keys.missing(["bands"], f"{averaged[0]} takes means over bands")
     check_different(keys, "bands", [one.name for one in keys.bands])
     case = KnownJointCase(
         **vars(common),
@@ -277,7 +277,7 @@ def _begins_with_estimate(method: str) -> bool:
 
 def _points(keys: PointKeys, a: Structure, b: Structure, n: int, methods: Sequence[str]) -> dict[str, tuple[str, ...]]:
     decoupling = [method for method in methods if method.startswith("decoupling")]
-    if decoupling and (lacking := [repr(point) for point in "rs" if not getattr(keys, point)]):
+    if decoupling and (lacking := [point for point in "rs" if not getattr(keys, point)]):
         raise keys.missing(lacking, f"{decoupling[0]} takes FRFs of internal points")
     points = {"j": keys.j, "k": keys.k, "r": keys.r or keys.j, "s": keys.s or keys.k}
     for point, names in points.items():
@@ -315,7 +315,7 @@ def _check_expected(case: KnownJointCase) -> None:
     for table in expected.identified:
         if table.method not in FITTED:
             if not table.bands:
-                raise table.missing(["'bands'"], f"{table.method} takes means over bands")
+                raise table.missing(["bands"], f"{table.method} takes means over bands")
             _check_choice(table, "bands", [own.name for own in case.band_sets])
         for values in ("values", "rmse_below"):
             for name in getattr(table, values):

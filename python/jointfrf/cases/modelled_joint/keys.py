@@ -17,7 +17,6 @@ from jointfrf.laws.law import JointLaw
 from jointfrf.laws.law_joint import LawJoint
 from jointfrf.models.model import Model
 from jointfrf.toml.declared import Keys, NotNegative, Positive, key
-from jointfrf.toml.table import TomlTable
 
 __all__ = ["ModelledJointCase", "ModelledJointKeys", "read_modelled_joint"]
 
@@ -188,10 +187,9 @@ def _joints(keys: ModelledJointKeys) -> tuple[LawJoint, LawJoint]:
         if own.law == "rigid":
             continue
         if lacking := [name for name in laws if name not in own.table.content]:
-            raise own.missing(list(map(repr, lacking)), f"the law {own.law!r} takes parameters")
+            raise own.missing(lacking, f"the law {own.law!r} takes parameters")
         for name, by_dof in laws.items():
-            table: TomlTable = own.table.table(name)
-            by_dof[own.dof] = read_law(table, own.law)
+            by_dof[own.dof] = read_law(own.table.table(name), own.law)
     rigid = [own.dof for own in keys.law if own.law == "rigid"]
     mass = {own.dof: own.mass for own in keys.law if own.mass is not None}
     dofs = [own.dof for own in keys.law]
