@@ -65,6 +65,7 @@ def _limit_gb(given: float | None) -> float | None:
     return limit
 
 
+#: How a message about the limit ends.
 _RAISED = f"limit_gb=, --limit-gb or the environment variable {LIMIT_VARIABLE} raises this limit"
 
 
@@ -272,7 +273,7 @@ def write_file(path: Path, content: str | bytes) -> None:
 
 @contextmanager
 def written_whole(path: Path) -> Iterator[Path]:
-    """Give a place beside a file for what is written piece by piece, and move it there at the end.
+    """Give a place beside a file for what is written in chunks, and move it there at the end.
 
     Parameters
     ----------

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Unpack
+from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from jointfrf.dofs import rigid_offset
-from jointfrf.io.cards import CardFormat, CardOptions, spring_cards
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_array, as_frequency, as_names, as_real
+
+if TYPE_CHECKING:
+    from jointfrf.io.cards import CardFormat, CardOptions
 
 __all__ = ["Joint"]
 
@@ -230,4 +232,6 @@ class Joint:
         <BLANKLINE>
         """
         matrices = self.stiffness, self.damping, self.hysteretic_stiffness
+        from jointfrf.io.cards import spring_cards  # readers of files take their time to import
+
         return spring_cards(program, self.dofs, matrices, nodes, **options)

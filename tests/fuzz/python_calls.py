@@ -26,6 +26,7 @@ import numpy as np
 from scipy import sparse
 
 import jointfrf as jf
+from jointfrf.io.cards import CardFormat, CardOptions
 
 from .part import BrokenError
 from .sound import sound_arguments
@@ -33,6 +34,8 @@ from .values import choices_of, spoiled
 
 __all__ = ["PythonCalls", "public_callables"]
 
+#: Types of arguments that their modules import for type checkers only.
+_FOR_TYPE_CHECKERS = {"CardFormat": CardFormat, "CardOptions": CardOptions}
 #: Errors that a caller has to expect. IndexError, KeyError, AttributeError, ZeroDivisionError ... are foreign.
 _EXPECTED = (ValueError, TypeError, OverflowError, np.linalg.LinAlgError, OSError, jf.MissingPackageError)
 #: Words of messages that were not written for the caller of this package.
@@ -88,7 +91,7 @@ class _Callable:
     @classmethod
     def of(cls, name: str, call: Callable[..., Any]) -> _Callable:
         try:
-            hints = typing.get_type_hints(call.__init__ if inspect.isclass(call) else call)
+            hints = typing.get_type_hints(call.__init__ if inspect.isclass(call) else call, localns=_FOR_TYPE_CHECKERS)
         except (NameError, TypeError, AttributeError):  # names for type checkers only
             hints = {}
         signature = inspect.signature(call)

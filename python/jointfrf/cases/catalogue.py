@@ -215,6 +215,7 @@ def _common(folder: Path, keys: CaseKeys, expected: ExpectedKeys) -> Case:
     )
 
 
+#: What the reference of keys begins with.
 _KEYS_HEAD = """# Keys of case files
 
 <!-- jointfrf cases --keys > docs/case-keys.md -->

@@ -47,9 +47,11 @@ __all__ = [
     "read_frf_file",
 ]
 
+#: All methods that a case can name.
 METHODS: tuple[str, ...] = ("compliance", *STIFFNESS_METHODS, "decoupling-fit")
 #: Methods that take all lines, not means over bands.
 FITTED = ("compliance", "decoupling-fit")
+#: More lines are a step that is a slip.
 _MOST_LINES = 1_000_000
 #: A higher level of noise is more often 5 % written as 5 than meant.
 _HIGH_LEVEL = 0.5

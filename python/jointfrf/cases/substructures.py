@@ -37,6 +37,7 @@ __all__ = [
 
 #: Two frequencies are the same line if they differ by less than this share: Universal Files hold six digits.
 _SAME_LINE = 1e-5
+#: A key of all models of bricks.
 PRESET = key("Elements: `seed` as in the thesis (C3D8R), `accurate` with incompatible modes (C3D8I).", example="seed")
 
 

@@ -11,6 +11,7 @@ from jointfrf.extras import import_extra
 
 __all__ = ["add_arguments", "run"]
 
+#: Shells that argcomplete writes for.
 _SHELLS = ("bash", "zsh", "fish")
 
 

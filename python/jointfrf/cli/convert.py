@@ -14,6 +14,7 @@ from jointfrf.io.formats import format_names
 
 __all__ = ["add_arguments", "run"]
 
+#: Options that say which field of a file is what.
 _FIELDS = ("freq_hz", "h", "responses", "excitations", "axes", "quantity", "unit", "coherence", "averages")
 
 

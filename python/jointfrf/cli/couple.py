@@ -11,6 +11,7 @@ import numpy as np
 
 from jointfrf.channels.virtual_point import append_virtual_point, channel_geometry, virtual_point
 from jointfrf.cli.frf import (
+    CHANNEL_DIRECTIONS,
     add_line_arguments,
     check_target,
     lines_of,
@@ -30,8 +31,6 @@ from jointfrf.laws.law_joint import LawJoint
 from jointfrf.substructuring.coupling import couple
 
 __all__ = ["add_arguments", "joint_channels_of", "renumbered", "run", "shifted"]
-
-_CHANNELS = ("x", "y", "z", "rx", "ry", "rz")
 
 
 def add_arguments(parser: CommandParser) -> None:
@@ -71,7 +70,7 @@ def shifted(named: Nodes, add: int) -> Nodes:
 
 def joint_channels_of(node: int, dofs: Sequence[str]) -> list[Channel]:
     """Return the channels of a node in the directions of a joint."""
-    return [Channel(node, _CHANNELS[place]) for place in direction_places(dofs)]
+    return [Channel(node, CHANNEL_DIRECTIONS[place]) for place in direction_places(dofs)]
 
 
 def run(args: argparse.Namespace) -> int:

@@ -33,6 +33,7 @@ from jointfrf.substructuring.methods import StiffnessMethod
 
 __all__ = ["add_arguments", "run"]
 
+#: Methods by what the command line calls them.
 _METHODS: dict[str, StiffnessMethod] = {
     "rr": "decoupling-rr",
     "rs": "decoupling-rs",

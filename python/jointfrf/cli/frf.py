@@ -24,6 +24,7 @@ from jointfrf.kernel.arguments import FloatArray
 from jointfrf.toml.table import TomlTable, read_toml
 
 __all__ = [
+    "CHANNEL_DIRECTIONS",
     "add_arguments",
     "add_line_arguments",
     "check_target",
@@ -35,6 +36,7 @@ __all__ = [
     "run",
 ]
 
+#: Options that name files of matrices.
 _MATRICES = ("stiffness", "mass", "damping", "structural_damping")
 
 
@@ -111,8 +113,10 @@ def _table(args: argparse.Namespace) -> TomlTable:
 
 #: FRFs between more DOFs are hardly meant.
 _MOST_DOFS = 240
+#: More lines are a step that is a slip.
 _MOST_LINES = 1_000_000
-_CHANNELS = ("x", "y", "z", "rx", "ry", "rz")
+#: Directions of channels, and how names of other DOFs that are rotations begin.
+CHANNEL_DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 _TURNS = re.compile(r"m?theta|phi|rot")
 
 
@@ -203,7 +207,7 @@ def _channels(dofs: Sequence[str]) -> tuple[tuple[Channel, ...], dict[str, int]]
             ) from None
         if not node.isdecimal() and node not in named:
             named[node] = max([*numbers, *named.values(), 0]) + 1
-        channels.append(Channel(int(node) if node.isdecimal() else named[node], _CHANNELS[place]))
+        channels.append(Channel(int(node) if node.isdecimal() else named[node], CHANNEL_DIRECTIONS[place]))
     if len(set(channels)) < len(channels):
         raise ValueError("a DOF is named twice")
     return tuple(channels), named

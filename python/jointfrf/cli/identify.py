@@ -44,6 +44,7 @@ from jointfrf.spelling import did_you_mean
 
 __all__ = ["add_arguments", "run"]
 
+#: Methods that need no model.
 _METHODS = ("compliance", "inverse-substructuring")
 
 
@@ -206,7 +207,7 @@ def _fit(args: argparse.Namespace, method: str, frfs: FrfSet, joint: MeasuredJoi
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", IdentificationWarning)  # they are in the table
         warnings.simplefilter("ignore", ConvergenceWarning)
-        warnings.simplefilter("ignore", FrfCheckWarning)  # told with the names of the channels
+        warnings.simplefilter("ignore", FrfCheckWarning)  # printed with the names of the channels
         if method == "compliance":
             return identify(frfs.freq_hz, joint.h, joint.dofs, args.band, **_of_compliance(args, frfs, joint, laws))
         transform = joint.responses if joint.is_square else None

@@ -18,6 +18,7 @@ from jointfrf.spelling import did_you_mean
 
 __all__ = ["main"]
 
+#: Exit statuses: as argparse has it, any other error, and as shells have it after Ctrl-C.
 _USAGE_ERROR, _FAILURE, _INTERRUPTED = 2, 1, 130
 
 

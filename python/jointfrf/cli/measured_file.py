@@ -37,6 +37,7 @@ __all__ = [
 
 #: Longer ranges of nodes are slips.
 _MOST_NODES = 100_000
+#: Nodes that a message lists.
 _NODES_SHOWN = 40
 
 

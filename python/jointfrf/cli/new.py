@@ -13,6 +13,7 @@ from jointfrf.toml.documents import key_template, schema_of
 
 __all__ = ["add_arguments", "run"]
 
+#: Name of the schema beside a new case.
 _SCHEMA = "case.schema.json"
 #: A case whose file has a design of factors.
 _STUDY = "study"

@@ -20,6 +20,7 @@ from jointfrf.studies.run import merge_studies, study
 
 __all__ = ["add_arguments", "run"]
 
+#: What --executor takes.
 _EXECUTORS = ("processes", "threads", "loky", "mpi", "dask:ADDRESS")
 
 

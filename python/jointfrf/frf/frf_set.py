@@ -30,6 +30,7 @@ __all__ = [
 #: How often a receptance is differentiated in time to give the quantity.
 POWER_OF_I_OMEGA = {"receptance": 0, "mobility": 1, "accelerance": 2}
 
+#: Quantities with their SI units, in messages.
 _PLURALS = {"receptance": "receptances m/N", "mobility": "mobilities (m/s)/N", "accelerance": "accelerances (m/s^2)/N"}
 #: Names of directions, and of channels.
 _DIRECTION = re.compile(r"([+-]?)(r?[xyz])")

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Unpack
+from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
 
 from jointfrf.identification.result import Fit, FittedParameter, joint_of
-from jointfrf.io.cards import CardFormat, CardOptions
 from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import check_type
+
+if TYPE_CHECKING:
+    from jointfrf.io.cards import CardFormat, CardOptions
 
 __all__ = ["cards"]
 

@@ -17,6 +17,7 @@ from jointfrf.kernel.arguments import as_array, check_type
 
 __all__ = ["as_frf_set", "contradiction", "frfs_of_arrays"]
 
+#: Names of the axes of an array of FRFs.
 _AXES = ("freq", "out", "in")
 #: Orders that the sizes of an array may show, where responses are before excitations.
 _ORDERS = ([0, 1, 2], [1, 2, 0], [1, 0, 2])

@@ -37,7 +37,9 @@ def _format_of(module: str) -> FileFormat:
     return next(value for value in values if isinstance(value, FileFormat))
 
 
+#: All formats, in the order in which their marks are looked for.
 FORMATS = tuple(map(_format_of, _MODULES))
+#: Why a pickle is an error.
 _PICKLE = "is a pickle, which is not read because that can run any program: save an NPZ file"
 #: First bytes of files that are not read, and what the user can do.
 _OTHERS = (

@@ -19,6 +19,7 @@ DIRECTION_CODES = {1: "+x", 2: "+y", 3: "+z", 4: "+rx", 5: "+ry", 6: "+rz"}
 DIRECTION_CODES |= {-code: "-" + direction[1:] for code, direction in DIRECTION_CODES.items()}
 #: ``102:+y``, ``bar:102:+Y``, ``Point102 -Z``, ``102RX``, and sdynpy's ``102Y+``.
 _LABEL = re.compile(r"(?:.*\D)?(\d+)[\s:._]*([+-]?)(r?[xyz])([+-]?)", re.IGNORECASE)
+#: Columns of the tables of channels of pyFBS.
 _POSITION, _DIRECTION = ("Position_1", "Position_2", "Position_3"), ("Direction_1", "Direction_2", "Direction_3")
 #: How far a direction may be off its axis, relative to its length, and channels of one node apart, m: rounding.
 _ALONG, _SAME_PLACE = 1e-6, 1e-9

@@ -1,4 +1,4 @@
-"""MATLAB files. Versions 4 to 7 are read here, and no size that such a file states is trusted; 7.3 is HDF5."""
+"""MATLAB files. Versions 4 to 7 are read here, every stated size is compared with the file first; 7.3 is HDF5."""
 
 from __future__ import annotations
 
@@ -23,10 +23,12 @@ _HEAD, _MARK, _MARK_HDF5 = 128, b"MATLAB ", b"MATLAB 7.3"
 _MATRIX, _COMPRESSED = 14, 15
 #: Types of elements, as numpy has them.
 _NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
+#: Types of texts: their encoding, and bytes of a character.
 _TEXTS = {1: ("latin-1", 1), 2: ("latin-1", 1), 3: ("utf-16", 2), 4: ("utf-16", 2), 16: ("utf-8", 1),
           17: ("utf-16", 2), 18: ("utf-32", 4)}  # fmt: skip
 #: Classes of arrays.
 _CELL, _STRUCT, _OBJECT, _CHAR, _OPAQUE = 1, 2, 3, 4, 17
+#: Classes of arrays of numbers, as numpy has them.
 _CLASSES = {6: "f8", 7: "f4", 8: "i1", 9: "u1", 10: "i2", 11: "u2", 12: "i4", 13: "u4", 14: "i8", 15: "u8"}
 #: The flag of complex numbers.
 _COMPLEX = 0x800

@@ -45,7 +45,9 @@ _MOST_DECADES = 60
 _SHOWN = 3
 #: Columns of a line of text.
 _WIDTH = 80
+#: Codes of Universal Files by directions.
 _CODES = {direction: code for code, direction in DIRECTION_CODES.items()}
+#: Records of the axes of a coherence, which has no unit.
 _COHERENCE_AXES = [axis_record(0, "Coherence", "NONE"), axis_record(0, "NONE", "NONE")]
 #: Factors to Hz of units of the abscissa.
 _HZ = {"": 1.0, "hz": 1.0, "khz": 1e3, "rad/s": 0.5 / np.pi, "rad/sec": 0.5 / np.pi, "rpm": 1.0 / 60.0}
@@ -245,7 +247,7 @@ def _describe_frf(
     if quantity and said and said != quantity and not forced:
         contradicts = False
         with suppress(ValueError):  # where the file contradicts itself, the caller decides
-            ordinate_factor(numerator, denominator, channels, said, system, trust_labels=True, note=lambda _: None)
+            ordinate_factor(numerator, denominator, channels, said, system, uses_labels=True, note=lambda _: None)
             contradicts = True
         if contradicts:
             words = f"{numerator.words} per {denominator.words} in dataset {number}"
@@ -260,7 +262,7 @@ def _describe_frf(
             channels,
             found,
             system,
-            trust_labels=quantity is None,
+            uses_labels=quantity is None,
             note=lambda sentence: file.note(sentence, number),
         )
     except ValueError as error:
@@ -272,7 +274,7 @@ def _describe_frf(
 
 
 def _check_form(file: UniversalFile, number: int, header: FunctionHeader) -> None:
-    """Refuse forms of dataset 58 that would be read wrongly."""
+    """Raise for forms of dataset 58 that would be read wrongly."""
     if header.number_type in (2, 4):
         raise _UnusableFrfError("its values are real numbers, without phase")
     if header.number_type not in (5, 6):
@@ -296,7 +298,7 @@ def _channel(place: tuple[str, int, int], role: str) -> Channel:
 
 
 def _unique(file: UniversalFile, frfs: list[_Frf]) -> list[_Frf]:
-    """Keep the first of FRFs between the same channels; refuse two structures that share their numbers."""
+    """Keep the first of FRFs between the same channels; raise for two structures that share their numbers."""
     first: dict[tuple[Channel, Channel], _Frf] = {}
     for frf in frfs:
         kept = first.setdefault(frf.channels, frf)
@@ -406,7 +408,7 @@ def _without_bad_zero_line(
     h: NDArray[np.complex128],
     coherence: NDArray[np.float64] | None,
 ) -> tuple[NDArray[np.float64], NDArray[np.complex128], NDArray[np.float64] | None]:
-    """Drop a line at 0 Hz with NaN or Inf, as division by a zero spectrum leaves it; refuse them elsewhere."""
+    """Drop a line at 0 Hz with NaN or Inf, as division by a zero spectrum leaves it; raise for one elsewhere."""
     drop = False
     for frf in frfs:
         bad = freq_hz[~np.isfinite(h[:, *matrix.place_of[frf.channels]])]

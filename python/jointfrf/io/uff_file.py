@@ -156,11 +156,13 @@ def _kind(head: bytes) -> int:
 _TOLERANCE = 1e-5
 #: Numbers of datasets or nodes that a sentence names.
 _NUMBERS_SHOWN = 5
+#: What datasets hold that are not read, for messages.
 _DATASETS = {
     15: "nodes", 18: "coordinate systems", 55: "data at nodes", 82: "trace lines", 151: "header", 164: "units",
     1858: "qualifiers of dataset 58", 2400: "model header", 2411: "nodes", 2412: "elements", 2414: "analysis data",
     2420: "coordinate systems", 2429: "groups", 2467: "groups",
 }  # fmt: skip
+#: Types of functions in dataset 58 that are no FRFs, for messages.
 _FUNCTIONS = {
     1: "time history", 2: "auto spectrum", 3: "cross spectrum", 5: "transmissibility", 6: "coherence",
     7: "auto correlation", 8: "cross correlation", 9: "power spectral density", 12: "spectrum", 25: "impulse response",

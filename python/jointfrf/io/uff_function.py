@@ -30,6 +30,7 @@ __all__ = [
     "read_header",
 ]
 
+#: The line before and after a dataset.
 DELIMITER = "    -1"
 #: Lines before the numbers: delimiter, type, five of text, records 6 to 11; a 58b states those after the type.
 _N_LINES, _N_TEXT_LINES = 13, 11
@@ -246,7 +247,7 @@ def ordinate_factor(
     channels: tuple[Channel, Channel],
     quantity: str,
     system: UnitSystem | None,
-    trust_labels: bool,
+    uses_labels: bool,
     note: Callable[[str], None],
 ) -> float:
     """Factor that turns the ordinate into SI units: by the labels, else by dataset 164, else 1 with a note.
@@ -254,7 +255,7 @@ def ordinate_factor(
     Raises
     ------
     ValueError
-        A label contradicts the quantity and `trust_labels` is set.
+        A label contradicts the quantity and `uses_labels` is set.
     """
     motion, force, ratio = _exponents(*channels, POWER_OF_I_OMEGA[quantity])
     if numerator.unit is not None and numerator.unit.exponents == ratio:
@@ -264,7 +265,7 @@ def ordinate_factor(
         if axis.unit is not None and axis.unit.exponents == exponents:
             factors.append(_checked(axis, axis.unit, system, note))
             continue
-        if axis.unit is not None and trust_labels:
+        if axis.unit is not None and uses_labels:
             raise ValueError(
                 f"the unit '{axis.label}' does not fit the {what} of {quantity} {channels[0]} / {channels[1]}"
             )

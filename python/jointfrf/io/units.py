@@ -36,6 +36,7 @@ class UnitSystem:
         return self.length ** -exponents[0] * self.force ** -exponents[1]
 
 
+#: Pound-force in N, gravity in m/s^2, inch in m: exact by definition.
 _POUND, _GRAVITY, _INCH = 4.4482216152605, 9.80665, 0.0254
 #: By their exponents, what one is in SI units.
 _UNITS: dict[Exponents, dict[str, float]] = {
@@ -50,9 +51,11 @@ _UNITS: dict[Exponents, dict[str, float]] = {
     (-1, 1, 2): {"kg": 1.0},
     (0, 0, 0): {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180.0},
 }  # fmt: skip
+#: All units by their names.
 _SYMBOLS = {name: Unit(to_si, exponents) for exponents, units in _UNITS.items() for name, to_si in units.items()}
 # U+FFFD is what is left of a superscript 2 in Latin-1.
 _SPELLINGS = {"²": "^2", "\ufffd": "^2", "**": "^", "·": "*", ".": "*", "µ": "u", "μ": "u", "°": "deg"}
+#: A name, a number or a sign of a unit.
 _TOKEN = re.compile(r"\s*([A-Za-z]+|\d+|[-^*/()])")
 
 

@@ -59,6 +59,7 @@ FloatArray = NDArray[np.float64]
 TINY = float(np.finfo(np.float64).tiny)
 #: Characters of a value that a message shows.
 _SHOWN = 80
+#: Types of the arrays that the kernel takes.
 _COMPLEX, _REAL = np.dtype(np.complex128), np.dtype(np.float64)
 
 #: A conversion that copies more than this many bytes causes a `CopyWarning`.

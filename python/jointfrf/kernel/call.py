@@ -47,8 +47,11 @@ _LINE_NOT_FINITE = -1
 _LINE_OVERFLOW = -2
 #: Version of the kernel, and so of the package.
 VERSION = ".".join(str(int(number)) for number in _kernel.jf_version())
+#: Value of `info` where this processor cannot run the engine, as in `status.f90`.
 _NO_ENGINE = -1001
+#: What callers may say.
 _ON_SINGULAR = get_args(OnSingular)
+#: Types of the arrays that the kernel takes.
 _COMPLEX, _INTEGER = np.dtype(np.complex128), np.dtype(np.int32)
 #: Stands for the number of lines among the arguments of a kernel routine.
 N_FREQ = object()

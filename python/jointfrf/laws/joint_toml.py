@@ -32,6 +32,7 @@ __all__ = [
 
 #: The laws that files can hold: a new law is a file with its class, and its name here.
 LAWS: tuple[type[JointLaw], ...] = (SpringLaw, StandardLinearSolid, FractionalZener, PowerLaw)
+#: Laws by their words.
 _BY_WORD = {law.word: law for law in LAWS}
 #: Words of laws; a rigid DOF has none.
 LAW_WORDS = (*_BY_WORD, "rigid")

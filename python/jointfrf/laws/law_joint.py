@@ -5,19 +5,21 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Self, Unpack
+from typing import TYPE_CHECKING, Any, NamedTuple, Self, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from jointfrf.dofs import DIRECTIONS, direction_places, is_rotation
-from jointfrf.io.cards import CardFormat, CardOptions
 from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_frequency, as_names, as_number, as_real, check_type
 from jointfrf.kernel.call import OnSingular
 from jointfrf.kernel.linear_algebra import invert
 from jointfrf.laws.law import JointLaw, LawField
 from jointfrf.laws.springs import SpringLaw
+
+if TYPE_CHECKING:
+    from jointfrf.io.cards import CardFormat, CardOptions
 
 __all__ = ["Connection", "JointQuantity", "LawJoint"]
 

@@ -15,6 +15,7 @@ __all__ = ["FractionalZener", "PowerLaw", "StandardLinearSolid"]
 _LEAST_ALPHA, _LEAST_TIME, _LEAST_HZ = 1e-3, 1e-12, TINY
 #: Numbers of several laws.
 _K = LawField("k", "stiffness", 0.0, meaning="Stiffness, at rest.")
+#: The number that both fractional laws have.
 _ALPHA = LawField("alpha", "number", _LEAST_ALPHA, 1.0, meaning="Order of the derivative.")
 
 

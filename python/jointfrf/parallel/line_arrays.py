@@ -129,7 +129,7 @@ class Hdf5Lines(Lines):
 
 
 def lines_of(name: str, array: ArrayLike, *, is_result: bool = False) -> Lines:
-    """Find out what an array is, and how tasks come to its lines.
+    """Find out what an array is, and how tasks read its lines.
 
     Parameters
     ----------

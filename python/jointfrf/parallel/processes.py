@@ -50,7 +50,7 @@ def can_start_processes() -> bool:
         return True
     try:
         return os.path.samefile("/proc/self/exe", named)
-    except OSError:  # a system that does not tell
+    except OSError:  # a system without /proc
         return Path(named).name.lower().startswith(("python", "pypy"))
 
 

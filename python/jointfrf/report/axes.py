@@ -22,6 +22,7 @@ __all__ = [
     "symbol",
 ]
 
+#: Label of the axis of all FRFs.
 FREQUENCY = "frequency, Hz"
 #: What is shown of a distribution.
 _SPREAD = (2.5, 50, 97.5)

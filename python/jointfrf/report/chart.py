@@ -22,6 +22,7 @@ __all__ = ["Chart", "chart_view", "count_points", "style_rules", "thinned_dots",
 _WIDE, _HIGH = 20000, 8000
 #: How far off the panel a curve is drawn, in heights of it.
 _OFF = 3
+#: Numbers along x and along y that fit beside each other on a narrow screen.
 _MOST_X, _MOST_Y = 6, 5
 #: A step along x so many times longer than those beside it parts a curve.
 _GAP = 6.0

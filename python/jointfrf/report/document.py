@@ -36,6 +36,7 @@ __all__ = [
 
 #: Up to so many columns fit on any screen; more than so many are written smaller; more than so many become rows.
 _NARROW, _WIDE, _WIDEST = 4, 9, 12
+#: Where templates and styles are.
 _FOLDER = Path(__file__).parent
 #: A map with more columns is written smaller.
 _DENSE = 8

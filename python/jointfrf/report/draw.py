@@ -33,7 +33,7 @@ class Style(NamedTuple):
     marker: str = ""
 
 
-#: Told apart by lightness and dashes when printed grey.
+#: Curves differ by lightness and dashes, too, for prints in grey.
 STYLES = {
     "actual": Style("#000000", "-", 1.5),
     "initial": Style("#8c8c8c", "--", 1.2),
@@ -64,8 +64,9 @@ STYLES = {
     "fourth-points": Style("#9b72b0", (0, (3, 1, 1, 1)), 1.1, "^"),
     "fifth-points": Style("#c0392b", ":", 1.5, "v"),
 }
+#: Bands of several names, light to dark.
 _SHADES = ("#ececec", "#d2d2d2", "#bdbdbd")
-#: Dots an inch of a PNG file, and of images inside an SVG file.
+#: Dots an inch of a PNG file, and of images inside an SVG file; size of markers, points.
 _RESOLUTION, _RESOLUTION_INSIDE, _MARKER = 130, 96, 2.5
 #: Width of thin curves, as a share of that of others.
 _THIN = 0.55
@@ -73,6 +74,7 @@ _THIN = 0.55
 _DENSE = ("faint", "dots")
 #: The middle of a distribution is seen through what lies around it.
 _ON_TOP, _HALO = ("ismm", "compliance"), 1.2
+#: Size of a heading, points.
 _HEADING = 10
 #: Size of a figure, inches: fits the text width of A4.
 _WIDTH, _PANEL_HEIGHT, _SPACE_HEIGHT = 7.0, 2.75, 1.5
@@ -82,7 +84,9 @@ _INTERVALS = (0.7, 0.36)
 _VIEW = np.array([[-0.419, 0.0, 0.908], [0.410, 0.893, 0.189], [-0.810, 0.451, -0.374]])
 #: Arrows that show the axes of space: their length as a share of the height of what is drawn, and place of the letters.
 _ARROW, _LETTER = 0.28, 1.45
+#: Texts stay texts; points that lie within 0.2 pixels of a line are left out.
 _SETTINGS = {"svg.fonttype": "none", "path.simplify_threshold": 0.2}
+#: Sizes that are read in a page of text width, and grids that stay behind the curves.
 _FONTS = {"font.size": 8.5, "axes.titlesize": 9, "legend.fontsize": 7.5, "axes.grid": True, "grid.alpha": 0.3,
           "grid.linewidth": 0.5, "axes.axisbelow": True, "lines.solid_capstyle": "round"}  # fmt: skip
 
@@ -353,6 +357,7 @@ def _draw_intervals(ax: Any, panel: Panel) -> None:
     ax.set_ylabel(panel.y_label)
 
 
+#: What `shortened` looks for: lines of straight pieces, styles, numbers.
 _LINE = re.compile(r' d="M ([\d.\sL-]+?)\s*(z?)\s*"')
 _STYLE = re.compile(r' style="([^"]*)"')
 _DECIMALS = re.compile(r"\d+\.\d{3,}")

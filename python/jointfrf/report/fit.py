@@ -210,6 +210,7 @@ def write_fit(fits: Sequence[Fit], folder: Path, source: str, figures: Sequence[
 _PARTS, _LEAST = 48, 4
 #: Shares of the information below the frequencies in the table.
 _QUANTILES = (0.1, 0.5, 0.9)
+#: Styles and names of parameters of springs, by their kinds.
 _STYLES = {"k": "ismm", "h": "stiffness", "c": "high"}
 _LABELS = {"k": "stiffness k", "h": "hysteretic damping h", "c": "viscous damping c"}
 #: Styles of other parameters of laws, in their order.

@@ -53,10 +53,12 @@ _POINTS, _LEAST = 130_000, 240
 _AT_ONCE = 6
 #: Lines of cards that are printed at most.
 _PRINTED = 40
+#: What is said above the charts of a fit with models.
 _HOW_MODEL = (
     "The joint found, from all frequency lines together; the shaded band is the 95 % interval of the real part. Drag "
     "across a chart to zoom in, double-click for the whole band."
 )
+#: Programs of cards as they call themselves.
 _PROGRAMS = {"abaqus": "Abaqus", "calculix": "CalculiX", "nastran": "Nastran", "ansys": "Ansys"}
 
 
@@ -320,7 +322,7 @@ def _noise_parts(fit: Fit, figure: Figure | None, most: int) -> list[Part]:
 def _cards(fit: Fit, nodes: Sequence[int]) -> list[Part]:
     """Return the joint as input of each program, or why there is none."""
     j, k = nodes[:2]
-    listings, refused = [], []
+    listings, unsupported = [], []
     changes = fit.laws is not None and any(law.constant_terms is None for law in fit.laws.laws.values())
     freq_hz = float(f"{np.sqrt(fit.freq_hz.min() * fit.freq_hz.max()):.3g}") if changes else None
     for program in get_args(CardFormat):
@@ -330,7 +332,7 @@ def _cards(fit: Fit, nodes: Sequence[int]) -> list[Part]:
         try:
             text = cards(fit, program, (j, k), damping=not is_calculix, rotation_nodes=rotation, freq_hz=freq_hz)
         except ValueError as error:
-            refused.append(f"{_PROGRAMS[program]}: {error}.")
+            unsupported.append(f"{_PROGRAMS[program]}: {error}.")
         else:
             listings.append(Listing(name, text, printed=text.count("\n") <= _PRINTED))
     where = f"In SI units, between node {j} on side j and node {k} on side k, along the global axes."
@@ -338,7 +340,7 @@ def _cards(fit: Fit, nodes: Sequence[int]) -> list[Part]:
         where += f" The laws are taken at {freq_hz:g} Hz: cards hold constants."
     if not all(listing.printed for listing in listings):
         where += f" Those of more than {_PRINTED} lines are on the screen only, not on paper."
-    return [Words([where]), *listings, *([Words(refused, "notes")] if refused else [])]
+    return [Words([where]), *listings, *([Words(unsupported, "notes")] if unsupported else [])]
 
 
 def _made(fit: Fit, options: ReportOptions) -> Table:
@@ -370,6 +372,7 @@ def _bands(bands: Sequence[tuple[float, float]]) -> str:
 _NOISE = 1.1
 #: Significant digits of an uncertainty.
 _DIGITS = 2
+#: Of all intervals of the page.
 _PROBABILITY = 0.95
 
 

@@ -24,9 +24,11 @@ __all__ = [
     "side_by_side",
 ]
 
+#: Label of the axis.
 PHASE = "phase, deg"
 #: Between these lie the phases of a passive structure where response and force are at the same DOF; else the others.
 _DRIVING, _ALL = (-200.0, 20.0), (-280.0, 100.0)
+#: Distance of the numbers along a phase.
 _QUARTER = 90.0
 #: Heights of modulus and phase, and how far they shrink where more than so many are below each other.
 _HEIGHTS, _SHRUNK, _MOST = (0.85, 0.5), 0.8, 2

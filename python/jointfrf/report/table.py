@@ -30,6 +30,7 @@ Cell = str | float | Parameter | None
 
 #: Heading of verdicts.
 VERDICT = "verdict"
+#: Significant digits of values and of percentages.
 _DIGITS, _DIGITS_OF_PERCENT = 5, 3
 #: What a formula of a spreadsheet begins with.
 _FORMULA = ("=", "+", "-", "@")

@@ -9,6 +9,7 @@ import numpy as np
 
 __all__ = ["axis_values", "format_axis", "prefixed_unit", "tick_texts", "value_text"]
 
+#: SI prefixes by powers of ten.
 _PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"}
 #: Units that a prefix may precede, by how they begin; hertz, percent, decibel and lengths are shown as they are.
 _TAKE_PREFIX = ("N", "m/N", "rad/")
@@ -16,7 +17,9 @@ _TAKE_PREFIX = ("N", "m/N", "rad/")
 _SHORT = (0.1, 1e4)
 #: Decades of a logarithmic axis: below the first, numbers at equal distances; below the second at 1, 2, 5; else at 1.
 _NARROW, _WIDE = 0.7, 2.0
+#: Digits of exponents.
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+#: Numbers along an axis at most, and where panels stand beside each other.
 _MOST_TICKS, _MOST_BESIDE = 10, 5
 
 

@@ -321,6 +321,7 @@ def _noise_studies(noise: Noise, beams: BeamFrfs, peaks: list[Resonance], parts:
     return studies
 
 
+#: What finds K* from the FRFs of a route: the method of the thesis, and the fit.
 _ESTIMATORS = ("ismm", "compliance")
 #: Half of the central 95 % of a normal distribution, in standard deviations.
 _REACH = 1.959963984540054

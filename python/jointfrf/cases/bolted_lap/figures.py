@@ -21,6 +21,7 @@ _DRAWN = (
     (("virtual points", "compliance fit"), "compliance"),
     (("reference points", LINES), "low"),
 )
+#: Styles of the lines of each route.
 _LINE_STYLES = {
     "Measurements 1-4": "ismm",
     "central differences": "decoupling-rs",
@@ -30,6 +31,7 @@ _LINE_STYLES = {
 }
 #: Figures of contact pressure, and the interfaces on them.
 _PRESSED = {"a": ("head", "lap"), "b": ("lap", "nut"), "bolt": ("head", "nut")}
+#: Interfaces in words.
 _FACES = {"head": "under the head", "lap": "between the beams", "nut": "under the nut"}
 
 

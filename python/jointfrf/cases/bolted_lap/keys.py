@@ -36,6 +36,7 @@ DOFS = ("x", "theta_y", "y", "theta_x", "z", "theta_z")
 _METHODS = ("ismm", "compliance")
 #: For templates: the known joint of table 4-1, and bands of all parameters.
 _STIFFNESS = {"x": 1e6, "theta_y": 1e4, "y": 1e6, "theta_x": 1e3, "z": 1e7, "theta_z": 1e3}
+#: Bands of a template: where the thesis identifies every parameter.
 _EXAMPLE_BANDS = {f"{kind}_{dof}": [[20.0, 600.0]] for kind in "kc" for dof in DOFS}
 
 

@@ -36,6 +36,7 @@ __all__ = [
     "route_lines",
 ]
 
+#: Directions x, y, z.
 _AXES = np.eye(3)
 
 

@@ -28,6 +28,7 @@ __all__ = [
     "noise_stream",
 ]
 
+#: Joint points of A and B, j and k, and internal ones, r and s, as the thesis names them.
 _POINTS = "jrks"
 
 
@@ -97,6 +98,7 @@ SHORT_FORM = {"ismm": "inverse-substructuring"}
 
 #: What fits take from a model.
 _OF_FITS: dict[str, tuple[str, ...]] = {"compliance": (), "decoupling-fit": ("h_a", "h_b")}
+#: Methods that take FRFs of the coupled structure at internal points.
 _DECOUPLING = tuple(name for name, method in STIFFNESS_METHODS.items() if method.measured == "h_c")
 
 

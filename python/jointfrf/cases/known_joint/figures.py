@@ -33,6 +33,7 @@ from jointfrf.report.receptance import ReceptanceCurve, noise_figure, receptance
 
 __all__ = ["known_joint_figures"]
 
+#: Methods as legends name them, with the equations of the thesis.
 _METHOD_NAMES = {
     "ismm": "ISMM",
     "ismm-kj": "ISMM, D_kj",

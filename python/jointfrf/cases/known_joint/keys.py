@@ -55,6 +55,7 @@ __all__ = [
     "read_known_joint",
 ]
 
+#: What lists of points take.
 _LIKE_DOFS = "list of texts, as many as joint DOFs"
 
 

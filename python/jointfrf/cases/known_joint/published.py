@@ -26,6 +26,7 @@ __all__ = [
     "title_of",
 ]
 
+#: Stands for the frequency of a peak that is not there.
 NO_PEAK = "no peak in the band"
 #: Joints by their names in tables.
 JOINT_NAMES = {"initial": "first estimate", "actual": "actual"}

@@ -31,6 +31,7 @@ from jointfrf.report.table import Cell, Table
 
 __all__ = ["Row", "identified_rows", "known_joint_numbers", "known_joint_summary", "known_joint_tables"]
 
+#: Relative errors without noise, and between ISMM and its short form, up to which "fits" is said: rounding is below.
 _NOISE_FREE_LIMIT, _SHORT_FORM_LIMIT = 1e-6, 1e-10
 #: An equation is exact up to this many roundings of the FRFs it takes.
 _ROUNDINGS = 100

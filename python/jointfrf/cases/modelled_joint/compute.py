@@ -126,6 +126,7 @@ def _constant(joint: LawJoint) -> LawJoint:
     return LawJoint(laws, joint.rigid, joint.mass, joint.dofs)
 
 
+#: The name of its only estimator in studies.
 _ESTIMATOR = "model-fit"
 
 

@@ -20,6 +20,7 @@ from jointfrf.toml.declared import Keys, NotNegative, Positive, key
 
 __all__ = ["ModelledJointCase", "ModelledJointKeys", "read_modelled_joint"]
 
+#: What lists of points take.
 _LIKE_DOFS = "list of texts, as many as joint DOFs"
 
 
