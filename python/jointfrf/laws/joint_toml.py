@@ -82,7 +82,7 @@ class ConstantsKeys(Keys):
     at: _At = None
 
 
-class LawKeys(Keys):
+class DofLawKeys(Keys):
     """The law of a joint DOF, or of a pair of DOFs."""
 
     dof: Annotated[str | None, key("Name of the DOF.", absent="required but for a cross term")] = None
@@ -102,7 +102,7 @@ class LawKeys(Keys):
 class LawJointKeys(Keys):
     """A joint by a law for each DOF, in the order of its DOFs."""
 
-    law: Annotated[tuple[LawKeys, ...], key("The laws.")]
+    law: Annotated[tuple[DofLawKeys, ...], key("The laws.")]
     at: _At = None
 
 
@@ -143,7 +143,7 @@ def _laws(table: TomlTable) -> LawJoint:
     return table.build(lambda: LawJoint(laws, rigid, mass, dofs), "law")
 
 
-def _check_law(own: LawKeys) -> None:
+def _check_law(own: DofLawKeys) -> None:
     """Raise a FileContentError unless the keys of a law go together."""
     if own.between is None and own.dof is None:
         raise own.missing(["dof"])
