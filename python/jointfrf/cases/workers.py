@@ -12,7 +12,7 @@ from itertools import count
 from threading import Lock
 from typing import Any, TypeVar
 
-from jointfrf.parallel.processes import started_processes
+from jointfrf.parallel.pool import started_processes
 
 __all__ = ["RankedProcesses", "Workers", "started_workers"]
 

@@ -19,7 +19,7 @@ from jointfrf.cases.workers import Workers, started_workers
 from jointfrf.cli.parser import CommandParser
 from jointfrf.cli.usage import Output, UsageError, positive, progress
 from jointfrf.extras import check_extras
-from jointfrf.parallel.processes import available_cores
+from jointfrf.parallel.pool import available_cores
 from jointfrf.report.table import Table, as_text
 
 __all__ = ["add_arguments", "run"]

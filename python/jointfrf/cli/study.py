@@ -12,8 +12,7 @@ from jointfrf.cases.catalogue import UnknownCaseError
 from jointfrf.cli.parser import CommandParser
 from jointfrf.cli.usage import Output, UsageError, positive, progress
 from jointfrf.extras import check_extras, import_extra
-from jointfrf.parallel.pool import AnyExecutor
-from jointfrf.parallel.processes import available_cores, check_processes, safe_environment
+from jointfrf.parallel.pool import AnyExecutor, available_cores, check_processes, safe_environment
 from jointfrf.studies.design import Arrangement, StudyDesign, parse_factor
 from jointfrf.studies.result import StudyResult
 from jointfrf.studies.run import merge_studies, study

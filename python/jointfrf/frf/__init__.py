@@ -1,10 +1,14 @@
 """FRFs as data.
 
-frf_set       sets of measured FRFs with names of channels; merge puts several together
-bands         bands, means over them, errors of peaks in them; lines in pieces
+frf_set       sets of measured FRFs with names of channels
+merge         several sets as one
+bands         bands, means over them, errors of peaks in them; lines in chunks
 noise         pollution
-noise_model   noise of measured FRFs, from residuals and differences of reciprocal entries: noise_parts, entry_groups
-smoothing     rational functions through measured FRFs: rational_fit
+rational_fit  rational functions with common poles: how many, and where
+smoothing     smooth FRFs by them, many lines in pieces
+entry_groups  which entries are measured twice, are zero, or have their poles in common
+noise_parts   relative and constant part of the noise, its correlation, outlying lines
+noise_model   noise of measured FRFs, from residuals and differences of reciprocal entries
 quantiles     medians and quantiles of small arrays
 
 Numbers without a derivation beside them are judged by what they recover: levels, floors, hum and correlation in

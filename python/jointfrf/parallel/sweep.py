@@ -18,8 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from jointfrf.errors import IllConditionedWarning, SingularLineError
 from jointfrf.kernel.arguments import CHUNK_BYTES, as_integer, check_type
 from jointfrf.parallel.line_arrays import Lines, lines_of
-from jointfrf.parallel.pool import AnyExecutor, BrokenPoolError, Pool, check_progress, opened_pool
-from jointfrf.parallel.processes import one_thread
+from jointfrf.parallel.pool import AnyExecutor, BrokenPoolError, Pool, check_progress, one_thread, opened_pool
 
 __all__ = ["SweepCost", "SweepPlan", "plan_sweep", "planned_sweep", "sweep"]
 

@@ -2,8 +2,7 @@
 
 table        a table as data; as aligned text, as CSV, and its cells as a reader wants them
 figure       a figure as data: curves, areas, levels, intervals, shaded surfaces on panels; as CSV
-ticks        numbers along axes: SI prefixes, and few enough not to collide
-axes         what several figures share: labels with units, limits of axes, percentiles
+axes         what several figures share: labels with units, limits of axes and numbers along them, percentiles
 receptance   receptances: modulus and phase below each other; the noise found in them
 draw         a figure drawn by matplotlib to a PNG and an SVG file
 chart        a figure as part of a page, which a script zooms

@@ -11,7 +11,7 @@ for (const chart of document.querySelectorAll("figure.chart")) {
   const readout = chart.querySelector(".readout");
   tools.hidden = false;
 
-  // ---- axes, as jointfrf.report.ticks chooses them
+  // ---- axes, as jointfrf.report.axes chooses them
   const niceValues = (low, high, most, whole) => {
     const rough = (high - low) / most, size = 10 ** Math.floor(Math.log10(rough));
     const step = whole ? Math.max(1, Math.ceil(rough)) : size * [1, 2, 2.5, 5, 10].find((n) => n * size >= rough * (1 - 1e-9));

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf.kernel.arguments import FloatArray
+from jointfrf.report.axes import axis_values, prefixed_unit, tick_texts, value_text
 from jointfrf.report.draw import STYLES, Style
 from jointfrf.report.figure import Curve, Figure, Panel, Ribbon
-from jointfrf.report.ticks import axis_values, prefixed_unit, tick_texts, value_text
 
 __all__ = ["Chart", "chart_view", "count_points", "style_rules", "thinned_dots", "thinned_line"]
 

@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jointfrf.extras import check_extras
+from jointfrf.report.axes import format_axis
 from jointfrf.report.figure import Figure, Panel, Surface
-from jointfrf.report.ticks import format_axis
 from jointfrf.spelling import visible
 
 __all__ = ["STYLES", "Drawing", "Style", "draw", "laid_out", "shortened"]

@@ -20,6 +20,7 @@ from jointfrf.identification.result import Fit, FittedParameter
 from jointfrf.io.cards import CardFormat
 from jointfrf.kernel.arguments import FloatArray, check_type
 from jointfrf.kernel.call import get_engine
+from jointfrf.report.axes import prefixed_unit
 from jointfrf.report.chart import Chart, count_points
 from jointfrf.report.document import Document, Listing, Part, Section, Sketch, Words, make_document
 from jointfrf.report.figure import Figure
@@ -35,7 +36,6 @@ from jointfrf.report.fit_frfs import (
 from jointfrf.report.receptance import noise_figure
 from jointfrf.report.sketch import interface_points, interface_sketch, point_table
 from jointfrf.report.table import Cell, Table
-from jointfrf.report.ticks import prefixed_unit
 
 __all__ = [
     "ReportOptions",

@@ -12,8 +12,7 @@ from jointfrf.cases.catalogue import find_case
 from jointfrf.cases.kind import Estimates, RealisationSource, StudiedGroup
 from jointfrf.errors import FileContentError
 from jointfrf.kernel.arguments import as_integer, check_type, one_line
-from jointfrf.parallel.pool import AnyExecutor, Pool, check_progress, opened_pool
-from jointfrf.parallel.processes import one_thread
+from jointfrf.parallel.pool import AnyExecutor, Pool, check_progress, one_thread, opened_pool
 from jointfrf.studies.design import StudyDesign, in_words
 from jointfrf.studies.result import StudyResult
 from jointfrf.studies.store import GroupRecord, Span, StudyRecord, StudyStore

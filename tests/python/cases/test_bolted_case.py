@@ -17,8 +17,8 @@ from msgspec import structs
 import jointfrf as jf
 from jointfrf.cases.bolted_lap import frfs
 from jointfrf.cases.bolted_lap.frfs import resonance_errors, resonances
+from jointfrf.cases.bolted_lap.results import bolted_lap_summary, bolted_lap_tables
 from jointfrf.cases.bolted_lap.routes import DOFS, FivePoints, both_sides, measured_entries
-from jointfrf.cases.bolted_lap.tables import bolted_lap_summary, bolted_lap_tables
 from jointfrf.cases.catalogue import CaseOutput, find_case, read_case, run_case
 from jointfrf.cli import run
 from jointfrf.cli.main import main

@@ -54,11 +54,10 @@ KNOWN = {
     ("cases/workers.py", "concurrent.futures"): "the type of futures, and errors of processes",
     ("cli/run.py", "concurrent.futures"): "threads, one for each case under way",
     ("cli/run.py", "ThreadPoolExecutor"): "threads, one for each case under way",
-    ("parallel/processes.py", "concurrent.futures"): "processes of this machine",
-    ("parallel/processes.py", "multiprocessing"): "processes of this machine, started in a safe environment",
-    ("parallel/processes.py", "ProcessPoolExecutor"): "the only start of processes, of this Python only",
-    ("parallel/processes.py", "SpawnContext"): "the only start of processes, of this Python only",
-    ("parallel/pool.py", "concurrent.futures"): "what executors raise",
+    ("parallel/pool.py", "concurrent.futures"): "what executors are and raise; processes of this machine",
+    ("parallel/pool.py", "multiprocessing"): "processes of this machine, started in a safe environment",
+    ("parallel/pool.py", "ProcessPoolExecutor"): "the only start of processes, of this Python only",
+    ("parallel/pool.py", "SpawnContext"): "the only start of processes, of this Python only",
     ("report/document.py", "urllib"): "quotes characters of a drawing",
 }
 

@@ -10,8 +10,7 @@ from threadpoolctl import threadpool_info
 
 import jointfrf as jf
 from deadly_tasks import kill_this_process, note_each
-from jointfrf.parallel.pool import Pool, opened_pool
-from jointfrf.parallel.processes import available_cores, one_thread
+from jointfrf.parallel.pool import Pool, available_cores, one_thread, opened_pool
 
 
 def numbers_of_threads() -> dict[str, int]:

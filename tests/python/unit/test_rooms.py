@@ -1,6 +1,7 @@
 """The rooms of the package: which may import which, and one way into the compiled kernel."""
 
 import ast
+import re
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -86,6 +87,17 @@ def test_no_modules_import_each_other_in_a_circle():
     assert len(list(TopologicalSorter(graph).static_order())) >= len(graph)
     with pytest.raises(CycleError):
         TopologicalSorter(graph | {"jointfrf.errors": {"jointfrf.files"}}).prepare()
+
+
+def test_a_list_of_modules_names_what_a_room_has():
+    listed = 0
+    for front in PACKAGE.rglob("__init__.py"):
+        named = set(re.findall(r"^(\w+)/? {2,}\S", ast.get_docstring(ast.parse(front.read_text("utf-8"))) or "", re.M))
+        there = {one.stem for one in front.parent.iterdir() if one.suffix == ".py" or one.is_dir()}
+        there -= {"__init__", "__pycache__"}
+        assert not named or named == there, front
+        listed += len(named)
+    assert listed > 60
 
 
 def test_only_the_room_kernel_imports_the_compiled_kernel():

@@ -15,8 +15,7 @@ import pytest
 
 import jointfrf as jf
 from jointfrf.cases.workers import RankedProcesses, started_workers
-from jointfrf.parallel.pool import opened_pool
-from jointfrf.parallel.processes import can_start_processes, started_processes
+from jointfrf.parallel.pool import can_start_processes, opened_pool, started_processes
 
 _PARENT = """
 import os, sys, time

@@ -1,19 +1,20 @@
 """A lap joint with a preloaded bolt of solid elements: measured, identified, and used again with another beam.
 
 keys         the keys of its files, and the case as data
-measurement  the measured points, and how the six DOFs of both sides follow
-frfs         FRFs: of the preloaded solid model, of the beams by themselves
+frfs         FRFs: of the preloaded solid model, of the beams by themselves; resonances of the tip
 routes       from measured FRFs to K*(w) by several routes, and to constants by two estimators
-resonances   resonances of the tip, and errors of regenerated ones
 compute      all of these, without noise and with it, for cases and for studies
-tables       the tables
-figures      the figures
+results      tables, numbers and figures
 """
 
 from jointfrf.cases.bolted_lap.compute import BoltedLapResult, bolted_lap_studied, compute_bolted_lap
-from jointfrf.cases.bolted_lap.figures import bolted_lap_figures
 from jointfrf.cases.bolted_lap.keys import BoltedLapCase, BoltedLapExpected, BoltedLapKeys, read_bolted_lap
-from jointfrf.cases.bolted_lap.tables import bolted_lap_numbers, bolted_lap_summary, bolted_lap_tables
+from jointfrf.cases.bolted_lap.results import (
+    bolted_lap_figures,
+    bolted_lap_numbers,
+    bolted_lap_summary,
+    bolted_lap_tables,
+)
 from jointfrf.cases.kind import CaseKind
 
 __all__ = ["KIND"]

@@ -1,15 +1,13 @@
 """Two simulated substructures and a joint of known parameters, identified from noisy FRFs, many times over.
 
 keys        the keys of its files, and the case as data
-exact       FRFs without noise
-methods     K*(w) line by line, by each method; how exact the equations are without noise
+exact       FRFs without noise, K*(w) line by line by each method, and how exact the equations are
+decoupling  the fit to all FRFs between internal points, and its bound
 study       many realisations of the noise: identified parameters, for cases and for studies
-sensitive   where the observed FRFs depend on the joint
 regenerate  FRFs of the assembly from identified and from printed parameters, and their errors
 modes       mode shapes of the assembly, and drawings of them
-compute     all of these, one after the other
-tables      numbers beside those of the source
-published   tables of what a source prints and what follows from it exactly
+compute     all of these, one after the other; where the observed FRFs depend on the joint
+tables      numbers beside those of the source, and what follows exactly from what it prints
 figures     the figures
 """
 

@@ -2,8 +2,7 @@
 
 keys      the keys of its files, and the case as data
 compute   realisations of the measurement, each fitted, for cases and for studies
-tables    parameters beside their bound, the stiffness over frequency, the residual test
-figures   stiffness and loss factor over frequency, FRFs measured and fitted
+results   parameters beside their bound, residual test; stiffness over frequency, FRFs measured and fitted
 """
 
 from jointfrf.cases.kind import CaseKind
