@@ -155,6 +155,48 @@ def test_an_added_argument_appears_in_all_outputs(files, tmp_path):
     assert changed == {"jointfrf.h", "_kernel.pyf", "api_work.F90", "jf_modify.3", "jf_modify_work.3", "jointfrf.md"}
 
 
+ROUTINE = """
+  !> Inverse of every line, scaled.
+  !> n           order of the matrices
+  !> scale       factor of the inverse
+  !> a           shape (n, n, n_freq)
+  !> a_inverse   shape (n, n, n_freq)
+  subroutine jf_scaled_inverse(n, n_freq, scale, a, a_inverse, line_info, rcond, info) &
+    bind(C, name='jf_scaled_inverse_')
+    integer(ip), intent(in) :: n, n_freq
+    real(c_double), intent(in) :: scale
+    complex(c_double_complex), target, intent(in) :: a(n, n, n_freq)
+    complex(c_double_complex), target, intent(out) :: a_inverse(n, n, n_freq)
+    integer(ip), intent(out) :: line_info(n_freq)
+    real(c_double), intent(out) :: rcond(n_freq)
+    integer(ip), intent(out) :: info
+
+    call invert(a, a_inverse, line_info, rcond, info)
+    a_inverse = scale * a_inverse
+  end subroutine jf_scaled_inverse
+"""
+
+
+def test_an_added_routine_appears_in_all_outputs(files, tmp_path):
+    names, end = "  public :: jf_invert, jf_solve\n", "  end subroutine jf_invert\n"
+    public = f"{names}  public :: jf_scaled_inverse, jf_scaled_inverse_work\n"
+    new = generate(tmp_path, replaced((names, public), (end, end + ROUTINE)))
+    calls = prototypes(new["jointfrf.h"])
+    for form in ("", "work_"):
+        arguments = list(calls[f"jf_invert_{form}"])
+        arguments.insert(2, "const double *scale")
+        assert calls[f"jf_scaled_inverse_{form}"] == arguments
+    signature = new["_kernel.pyf"].split("subroutine jf_scaled_inverse(")[1].split("end subroutine")[0]
+    assert "real*8, intent(in) :: scale" in signature
+    form = new["api_work.F90"].split("subroutine jf_scaled_inverse_work(")[1]
+    assert form.startswith("n, n_freq, scale, a, ")
+    assert ".BR scale" in new["jf_scaled_inverse.3"]
+    assert "- `scale` (in, DOUBLE PRECISION): factor of the inverse" in new["jointfrf.md"]
+    assert {name for name in new if name not in files} == {"jf_scaled_inverse.3", "jf_scaled_inverse_work.3"}
+    changed = {name for name in files if new[name] != files[name]}
+    assert changed == {"jointfrf.h", "_kernel.pyf", "api_work.F90", "jointfrf.3", "jointfrf.md"}
+
+
 def test_an_added_constant_appears_in_header_and_include_file(files, tmp_path):
     line = "  integer(ip), parameter, public :: jf_line_overflow = line_overflow\n"
     new = generate(tmp_path, replaced((line, line + line.replace("jf_line_overflow", "jf_line_other"))))
