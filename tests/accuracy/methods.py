@@ -25,7 +25,7 @@ import jointfrf as jf
 from cramer_rao import cramer_rao
 from jointfrf.cases.catalogue import find_case, read_case
 from jointfrf.cases.known_joint.exact import exact_frfs
-from jointfrf.cases.known_joint.study import means_over_bands
+from jointfrf.cases.known_joint.realisations import means_over_bands
 from jointfrf.identification.manifold.coordinates import joint_terms
 from model_bound import model_bound
 

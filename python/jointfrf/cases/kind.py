@@ -17,12 +17,12 @@ from jointfrf.spelling import did_you_mean
 
 __all__ = [
     "CaseKind",
+    "EstimateColumn",
+    "EstimateGroup",
     "Estimates",
     "Estimator",
     "Pollution",
     "RealisationSource",
-    "StudiedColumn",
-    "StudiedGroup",
     "StudyChoice",
     "chosen_noises",
 ]
@@ -60,7 +60,7 @@ Estimator = Callable[[FloatArray, ComplexArray, tuple[str, ...]], FloatArray]
 
 
 @dataclass(frozen=True)
-class StudiedColumn:
+class EstimateColumn:
     """One parameter by one estimator.
 
     Attributes
@@ -80,14 +80,14 @@ class StudiedColumn:
 
 
 @dataclass(frozen=True)
-class StudiedGroup:
+class EstimateGroup:
     """Estimates that come from the same FRFs by one method.
 
     Attributes
     ----------
     noise : str
         Name of the noise.
-    columns : tuple of StudiedColumn
+    columns : tuple of EstimateColumn
     source : callable
         Gives the estimates of realisations, see `RealisationSource`.
     side_by_side : int
@@ -95,7 +95,7 @@ class StudiedGroup:
     """
 
     noise: str
-    columns: tuple[StudiedColumn, ...]
+    columns: tuple[EstimateColumn, ...]
     source: RealisationSource
     side_by_side: int = 1
 
@@ -170,8 +170,8 @@ class CaseKind(Generic[CaseT, ResultT]):
         ``summary(result, tables)`` returns short tables that say what came out.
     numbers : callable
         ``numbers(result)`` returns what `results.json` holds beside the common part and the tables.
-    studied : callable, optional
-        ``studied(case, choice)`` returns what a study of the case computes, see `StudiedGroup`. It raises ValueError.
+    groups : callable, optional
+        ``groups(case, choice)`` returns what a study of the case computes, see `EstimateGroup`. It raises ValueError.
     not_printed : tuple of str
         Keys of tables that the report has but that are not printed.
 
@@ -190,7 +190,7 @@ class CaseKind(Generic[CaseT, ResultT]):
     figures: Callable[[ResultT], list[Figure]]
     summary: Callable[[ResultT, list[Table]], list[Table]]
     numbers: Callable[[ResultT], dict[str, Any]]
-    studied: Callable[[CaseT, StudyChoice], list[StudiedGroup]] | None = None
+    groups: Callable[[CaseT, StudyChoice], list[EstimateGroup]] | None = None
     not_printed: tuple[str, ...] = ()
 
     @property

@@ -9,7 +9,7 @@ from time import perf_counter
 from typing import NamedTuple
 
 from jointfrf.cases.catalogue import find_case
-from jointfrf.cases.kind import Estimates, RealisationSource, StudiedGroup
+from jointfrf.cases.kind import EstimateGroup, Estimates, RealisationSource
 from jointfrf.errors import FileContentError
 from jointfrf.kernel.arguments import as_integer, check_type, one_line
 from jointfrf.parallel.pool import AnyExecutor, Pool, check_progress, one_thread, opened_pool
@@ -54,7 +54,7 @@ def compute_chunk(chunk: Chunk) -> ChunkResult:
 class _Queue:
     """What is left to do of a group, and the seconds that a realisation takes, None before the first is done."""
 
-    group: StudiedGroup
+    group: EstimateGroup
     spans: list[Span]
     seconds: float | None = None
     at_work: int = 0
@@ -70,13 +70,13 @@ class Schedule:
 
     Attributes
     ----------
-    groups : sequence of StudiedGroup
+    groups : sequence of EstimateGroup
     missing : sequence of list of Span
         For each group.
     workers : int
     """
 
-    groups: Sequence[StudiedGroup]
+    groups: Sequence[EstimateGroup]
     missing: Sequence[list[Span]]
     workers: int
     _queues: list[_Queue] = field(init=False)
@@ -216,7 +216,7 @@ def study(
     plan = StudyDesign.of_case(folder) if design is None else design
     store, identity = StudyStore(Path(out)), plan.identity(folder)
     held = store.check(identity) if store.exists else None
-    groups: list[StudiedGroup] = []
+    groups: list[EstimateGroup] = []
     if held is None:
         groups, record = _prepared(folder, plan, realisations)
     else:
@@ -241,16 +241,16 @@ def _compute(store: StudyStore, schedule: Schedule, pool: Pool, progress: Callab
         progress(*schedule.done)
 
 
-def _prepared(folder: Path, design: StudyDesign, realisations: int | None) -> tuple[list[StudiedGroup], StudyRecord]:
+def _prepared(folder: Path, design: StudyDesign, realisations: int | None) -> tuple[list[EstimateGroup], StudyRecord]:
     """Return what is computed at all points, and what the study is."""
-    groups: list[StudiedGroup] = []
+    groups: list[EstimateGroup] = []
     records: list[GroupRecord] = []
     seen = None
     for point, case, kind in design.cases(folder):
-        if kind.studied is None:
+        if kind.groups is None:
             raise ValueError(f"cases of kind {kind.name} cannot be studied")
         try:
-            own = kind.studied(case, design.choice)
+            own = kind.groups(case, design.choice)
         except ValueError as error:
             raise ValueError(f"{in_words(point)}: {error}" if point else str(error)) from error
         groups += own

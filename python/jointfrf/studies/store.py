@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from jointfrf.cases.kind import Estimates, StudiedColumn
+from jointfrf.cases.kind import EstimateColumn, Estimates
 from jointfrf.errors import FileContentError
 from jointfrf.files import ReadLimit, check_file, write_file, written_whole
 from jointfrf.io.npz_file import npz_fields
@@ -49,12 +49,12 @@ class GroupRecord:
     point : mapping
         Factor to value.
     noise : str
-    columns : tuple of StudiedColumn
+    columns : tuple of EstimateColumn
     """
 
     point: StudyPoint
     noise: str
-    columns: tuple[StudiedColumn, ...]
+    columns: tuple[EstimateColumn, ...]
 
 
 @dataclass(frozen=True)
@@ -228,10 +228,10 @@ def _gaps(there: Sequence[Span], wanted: Span) -> list[Span]:
     return found
 
 
-def _plain(column: StudiedColumn) -> dict[str, Any]:
+def _plain(column: EstimateColumn) -> dict[str, Any]:
     return {key: None if value != value else value for key, value in asdict(column).items()}
 
 
-def _column(held: Mapping[str, Any]) -> StudiedColumn:
+def _column(held: Mapping[str, Any]) -> EstimateColumn:
     actual, bound = (np.nan if held[key] is None else float(held[key]) for key in ("actual", "bound"))
-    return StudiedColumn(held["estimator"], held["parameter"], held["unit"], actual, bound)
+    return EstimateColumn(held["estimator"], held["parameter"], held["unit"], actual, bound)

@@ -20,8 +20,8 @@ from jointfrf.cases.known_joint.exact import (
     noise_stream,
 )
 from jointfrf.cases.known_joint.keys import ExpectedErrors, KnownJointCase
+from jointfrf.cases.known_joint.realisations import chunk_size, means_over_bands
 from jointfrf.cases.known_joint.regenerate import regenerate
-from jointfrf.cases.known_joint.study import chunk_size, means_over_bands
 from jointfrf.dofs import rigid_offset
 from jointfrf.errors import IllConditionedWarning
 from jointfrf.frf.bands import in_bands

@@ -17,7 +17,7 @@ from msgspec import structs
 import jointfrf as jf
 from jointfrf.cases.bolted_lap import frfs
 from jointfrf.cases.bolted_lap.frfs import resonance_errors, resonances
-from jointfrf.cases.bolted_lap.results import bolted_lap_summary, bolted_lap_tables
+from jointfrf.cases.bolted_lap.results import build_summary, build_tables
 from jointfrf.cases.bolted_lap.routes import DOFS, FivePoints, both_sides, measured_entries
 from jointfrf.cases.catalogue import CaseOutput, find_case, read_case, run_case
 from jointfrf.cli import run
@@ -394,9 +394,9 @@ def test_natural_frequencies_beside_the_expected(ran):
 
     def table(expected):
         changed = dataclasses.replace(result, case=dataclasses.replace(case, expected=expected))
-        tables = bolted_lap_tables(changed)
+        tables = build_tables(changed)
         found = next(t for t in tables if t.key == "natural-frequencies")
-        return found, bolted_lap_summary(changed, tables)
+        return found, build_summary(changed, tables)
 
     own = result.natural_frequencies
     true = structs.replace(case.expected, values=(*own[:2], 1.006 * own[2], 1.004 * own[3]))

@@ -16,8 +16,8 @@ from jointfrf.cases.catalogue import KINDS, find_case, list_cases, read_case, re
 from jointfrf.cases.keys import Case, CaseKeys, ExpectedKeys
 from jointfrf.cases.kind import CaseKind
 from jointfrf.cases.known_joint.exact import exact_frfs
+from jointfrf.cases.known_joint.realisations import estimate_realisations
 from jointfrf.cases.known_joint.regenerate import regenerate, regenerate_all
-from jointfrf.cases.known_joint.study import run_study
 from jointfrf.cases.workers import Workers
 from jointfrf.dofs import Parameter
 from jointfrf.errors import FileContentError
@@ -178,7 +178,7 @@ def identified():
     case = read_case(find_case("3.2"))
     case = replace(case, freq_hz=case.freq_hz[::4], noises=case.noises[1:])
     exact = exact_frfs(case)
-    return case, exact, run_study(case, exact, 5)
+    return case, exact, estimate_realisations(case, exact, 5)
 
 
 def owner(array):

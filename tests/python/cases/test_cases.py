@@ -12,13 +12,13 @@ from msgspec import structs
 import jointfrf as jf
 from jointfrf.cases.catalogue import UnknownCaseError, find_case, list_cases, numbered, read_case, run_case
 from jointfrf.cases.known_joint.exact import exact_frfs, noise_free_errors
-from jointfrf.cases.known_joint.figures import known_joint_figures
-from jointfrf.cases.known_joint.study import run_study
+from jointfrf.cases.known_joint.figures import build_figures
+from jointfrf.cases.known_joint.realisations import estimate_realisations
 from jointfrf.cases.known_joint.tables import (
+    build_numbers,
+    build_summary,
+    build_tables,
     identified_rows,
-    known_joint_numbers,
-    known_joint_summary,
-    known_joint_tables,
 )
 from jointfrf.cases.workers import Workers
 from jointfrf.dofs import Parameter
@@ -50,11 +50,11 @@ def six_dofs():
     case = read_case(find_case("4.3.1"))
     case = dataclasses.replace(case, noises=tuple(structs.replace(n, methods=("ismm",)) for n in case.noises))
     exact = exact_frfs(case)
-    return case, exact, run_study(case, exact, MANY)
+    return case, exact, estimate_realisations(case, exact, MANY)
 
 
 def make_figures(result):
-    return numbered(result.case, known_joint_figures(result))
+    return numbered(result.case, build_figures(result))
 
 
 def rmse(result, noise, method, bands=None):
@@ -229,7 +229,7 @@ def test_the_equations_are_exact_up_to_roundings_in_six_dofs(solids, name):
         error, rounding = errors[f"decoupling-{equation}"]
         assert error < 100 * rounding
         assert rounding > 1e-7
-    table = next(table for table in known_joint_tables(result) if table.key == "noise-free")
+    table = next(table for table in build_tables(result) if table.key == "noise-free")
     assert table.failing == ()
     assert {row[-1] for row in table.rows} == {"exact"}
 
@@ -239,7 +239,7 @@ def test_an_error_beyond_the_roundings_is_told(solids):
     exact = dataclasses.replace(result.exact, h_c=result.exact.h_c * (1 + 1e-5j))
     wrong = noise_free_errors(exact, result.case.joint.dynamic_stiffness(exact.freq_hz))
     assert wrong["ismm"].error > 1e-6
-    table = next(t for t in known_joint_tables(dataclasses.replace(result, noise_free=wrong)) if t.key == "noise-free")
+    table = next(t for t in build_tables(dataclasses.replace(result, noise_free=wrong)) if t.key == "noise-free")
     assert "ismm against K*" in {table.rows[i][0] for i in table.failing}
 
 
@@ -287,7 +287,7 @@ def test_regenerated_frfs_of_an_observed_direction(solids):
 
 
 def test_published_errors_of_regenerated_frfs(solids):
-    tables = {table.key: table for table in known_joint_tables(solids["4.3.2-six-dof-decoupling"])}
+    tables = {table.key: table for table in build_tables(solids["4.3.2-six-dof-decoupling"])}
     rows = {key: [row[:5] for row in tables[key].rows] for key in ("table-4-7", "table-4-8")}
     assert [row[4] for row in rows["table-4-7"]] == [6.66, 0.25, 29.7, 1.24, None, None, 34.16, 0.62]
     assert [row[4] for row in rows["table-4-8"]] == [1.89, 0.0, 14.76, 0.0, 1.97, 0.06, 6.65, 0.32]
@@ -312,7 +312,7 @@ def test_tables_4_5_and_4_6_hold_with_one_factor_a_line():
     case = read_case(find_case("4.3.2"))
     common = next(noise for noise in case.noises if noise.block == 6)
     case = dataclasses.replace(case, freq_hz=case.freq_hz[1::2], noises=(common,))
-    found = {one.method: one for one in run_study(case, exact_frfs(case), 150, Workers())}
+    found = {one.method: one for one in estimate_realisations(case, exact_frfs(case), 150, Workers())}
     inside = {}
     for table in case.expected.identified:
         if table.noise == common.name or table.method == "decoupling-ss":
@@ -365,7 +365,7 @@ def test_printed_parameters_give_the_printed_errors(solids, name, count):
         apart = abs(freq[tops[1]] - freq[tops[0]]) / freq[tops[0]] * 100
         verdicts.append(abs(amplitude - known.amplitude) <= 0.15 * known.amplitude + 0.005)
         verdicts.append(abs(apart - known.frequency) <= 15 / freq[tops[0]] + 0.005)
-    table = next(table for table in known_joint_tables(result) if table.key == "printed-parameters")
+    table = next(table for table in build_tables(result) if table.key == "printed-parameters")
     assert len(table.rows) == 2 * count == len(verdicts)
     assert [row[-1] == "fits" for row in table.rows] == verdicts
     assert [i for i, good in enumerate(verdicts) if not good] == list(table.failing)
@@ -392,7 +392,7 @@ def test_sensitivities_are_drawn_where_a_parameter_moves_the_frf(solids):
     moved = {"s-Fx": ["Fx", "Mtheta_y", "Mtheta_z"], "s-Fy": ["Fy", "Mtheta_x", "Fz"]}
     moved |= {"s-Fz": ["Fy", "Mtheta_x", "Fz"], "r-Fy": ["Fy", "Mtheta_x", "Fz"]}
     drawn = [f"sensitivity-{key}-{dof}" for key, dofs in moved.items() for dof in dofs]
-    assert [f.key for f in known_joint_figures(result) if f.key.startswith("sens")] == drawn
+    assert [f.key for f in build_figures(result) if f.key.startswith("sens")] == drawn
     # Those of the source come first, in its order.
     numbers = {f.key: f.number for f in make_figures(result) if f.key.startswith("sens")}
     expected = sorted(drawn, key=lambda key: numbers[key] or "last")
@@ -434,11 +434,11 @@ def test_figures_4_17_to_4_38_are_there(solids):
 
 def test_numbers_and_report_of_six_dofs(solids):
     for result in solids.values():
-        tables = known_joint_tables(result)
-        content = json.loads(json.dumps(known_joint_numbers(result)))
+        tables = build_tables(result)
+        content = json.loads(json.dumps(build_numbers(result)))
         assert len(content["natural_frequencies_hz"]["initial"]) >= 5
         assert "H_ss Fx k_Fx" in content["proposed_bands_hz"]
-        summary = known_joint_summary(result, tables)
+        summary = build_summary(result, tables)
         assert [one.key for one in summary] == ["agreement", *(f"methods-{i + 1}" for i in range(len(summary) - 1))]
         counted = {row[0]: row[3] for row in summary[0].rows}
         known = sum(len(one.values) for one in result.case.expected.frequencies)
@@ -453,8 +453,8 @@ def test_numbers_and_report_of_six_dofs(solids):
 def test_headings_stand_once_and_say_the_unit(results, solids, name):
     """A column is found by its name, in CSV too; percent stands in the heading of a column, not over all of them."""
     result = (results | solids)[name]
-    tables = known_joint_tables(result)
-    for table in (*known_joint_summary(result, tables), *tables):
+    tables = build_tables(result)
+    for table in (*build_summary(result, tables), *tables):
         assert len(set(table.columns)) == len(table.columns), table.key
         assert "percent" not in table.title
         if {"error", "thesis, %"} <= set(table.columns):
@@ -478,7 +478,7 @@ def test_every_method_of_the_table_has_a_name_and_a_style_in_figures(tmp_path, w
 def test_a_realisation_depends_on_its_number_only():
     case = read_case(find_case("3.2"))
     exact = exact_frfs(case)
-    few, more = run_study(case, exact, 3), run_study(case, exact, 5)
+    few, more = estimate_realisations(case, exact, 3), estimate_realisations(case, exact, 5)
     for a, b in zip(few, more, strict=True):
         np.testing.assert_array_equal(a.theta, b.theta[:3])
         assert len(np.unique(b.theta[:, 0])) == 5
@@ -497,7 +497,7 @@ def test_files_of_a_case(tmp_path, without_pictures):
     output = run_case(find_case("3.1"), tmp_path / "deep" / "out", realisations=5)
     folder = tmp_path / "deep" / "out" / "3.1-discrete"
     assert output.report == folder / "report.html"
-    tables = {table.key: table for table in known_joint_tables(output.result)}
+    tables = {table.key: table for table in build_tables(output.result)}
     assert {path.stem for path in (folder / "tables").iterdir()} == set(tables)
     with (folder / "tables" / "identified.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))

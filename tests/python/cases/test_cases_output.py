@@ -15,7 +15,7 @@ from PIL import Image
 import jointfrf as jf
 from command import Finished, run_command
 from jointfrf.cases.catalogue import CaseOutput, find_case, list_cases, numbered, run_case
-from jointfrf.cases.known_joint.figures import known_joint_figures
+from jointfrf.cases.known_joint.figures import build_figures
 from jointfrf.cli.main import main
 from jointfrf.dofs import Parameter
 from jointfrf.report.axes import symbol
@@ -98,7 +98,7 @@ def test_figures_of_the_source_are_drawn(outputs, which):
 
 def test_case_3_3_has_all_figures_of_the_source(thinned):
     result = thinned("3.3-beams-1mm")
-    numbers = {figure.number for figure in numbered(result.case, known_joint_figures(result))} - {""}
+    numbers = {figure.number for figure in numbered(result.case, build_figures(result))} - {""}
     assert numbers == {f"3-{i}" for i in range(16, 28)}
 
 

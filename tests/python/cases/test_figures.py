@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from jointfrf.cases.catalogue import list_cases, numbered, read_case
-from jointfrf.cases.known_joint.figures import known_joint_figures
+from jointfrf.cases.known_joint.figures import build_figures
 from jointfrf.cases.known_joint.keys import KnownJointCase
-from jointfrf.cases.known_joint.tables import known_joint_summary, known_joint_tables
+from jointfrf.cases.known_joint.tables import build_summary, build_tables
 from jointfrf.report.document import Page, make_document
 from jointfrf.report.draw import STYLES, draw, shortened
 from jointfrf.report.figure import Curve, Figure, Interval, Panel
@@ -26,7 +26,7 @@ def result(thinned):
 
 @pytest.fixture(scope="module")
 def figures(result):
-    return numbered(result.case, known_joint_figures(result))
+    return numbered(result.case, build_figures(result))
 
 
 def texts(svg):
@@ -160,8 +160,8 @@ def test_a_short_drawing_has_the_same_lines():
 
 
 def test_the_verdict_is_the_first_column_wherever_a_table_is_shown(result):
-    tables = known_joint_tables(result)
-    summary = known_joint_summary(result, tables)
+    tables = build_tables(result)
+    summary = build_summary(result, tables)
     text = make_document(Page("", "", summary, tables, []).document)
     judged = [table for table in (*summary, *tables) if "" in table.columns]
     regions = "section-3-2-figures-3-11-and-3-12"
@@ -176,8 +176,8 @@ def test_the_verdict_is_the_first_column_wherever_a_table_is_shown(result):
 
 
 def test_the_summary_counts_verdicts(result):
-    tables = known_joint_tables(result)
-    agreement = known_joint_summary(result, tables)[0]
+    tables = build_tables(result)
+    agreement = build_summary(result, tables)[0]
     table = next(table for table in tables if table.key == "table-3-2")
     own = [row for row in agreement.rows if row[0] == "Table 3-2"]
     assert [row[1] for row in own] == [noise.name for noise in result.case.noises]
@@ -188,9 +188,9 @@ def test_the_summary_counts_verdicts(result):
 
 
 def test_a_page_fits_on_any_screen(result, figures):
-    tables = known_joint_tables(result)
+    tables = build_tables(result)
     some = [(figure, draw(figure)) for figure in figures[:1]]
-    text = make_document(Page("", "", known_joint_summary(result, tables), tables, some).document)
+    text = make_document(Page("", "", build_summary(result, tables), tables, some).document)
     style = text.split("<style>")[1].split("</style>")[0]
     assert not re.search(r"overflow(-x)?:\s*(auto|scroll)|[^-]width:\s*\d+(px|pt|cm)", style)
     assert text.count('src="data:image/svg+xml,') == 1

@@ -17,8 +17,8 @@ import jointfrf as jf
 from jointfrf.cases.catalogue import read_case
 from jointfrf.cases.known_joint.compute import compute
 from jointfrf.cases.known_joint.exact import exact_frfs
-from jointfrf.cases.known_joint.figures import known_joint_figures
-from jointfrf.cases.known_joint.tables import identified_rows, known_joint_numbers, known_joint_tables
+from jointfrf.cases.known_joint.figures import build_figures
+from jointfrf.cases.known_joint.tables import build_numbers, build_tables, identified_rows
 from own_case import BEAMS, RECEPTANCES, replace_tables, write_by_matrices, write_by_receptances, write_case
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -69,12 +69,12 @@ def test_receptances_give_the_case_of_the_beams(by_receptances):
 
 def test_receptances_leave_out_modes_and_nothing_else(by_receptances):
     without, with_modes = (compute(one, 3) for one in (read_case(by_receptances), BEAMS))
-    tables, all_tables = ([table.key for table in known_joint_tables(one)] for one in (without, with_modes))
+    tables, all_tables = ([table.key for table in build_tables(one)] for one in (without, with_modes))
     of_source = {"table-3-2", "section-3-2-figures-3-11-and-3-12"}  # expected.toml has been left behind
     assert set(all_tables) - set(tables) == {"natural-frequencies"} | of_source
-    figures, all_figures = ({figure.key for figure in known_joint_figures(one)} for one in (without, with_modes))
+    figures, all_figures = ({figure.key for figure in build_figures(one)} for one in (without, with_modes))
     assert all_figures - figures == {"modes"}
-    assert known_joint_numbers(without)["natural_frequencies_hz"] == {}
+    assert build_numbers(without)["natural_frequencies_hz"] == {}
 
 
 @pytest.mark.long

@@ -9,7 +9,7 @@ from scipy.sparse.linalg import eigsh
 
 import jointfrf as jf
 from jointfrf.cases.catalogue import find_case
-from jointfrf.cases.known_joint.tables import known_joint_tables
+from jointfrf.cases.known_joint.tables import build_tables
 from jointfrf.dofs import Parameter
 from thinned_cases import PLANE, SOLID
 
@@ -26,7 +26,7 @@ def expected_of(name):
 
 
 def by_key(result):
-    return {table.key: table for table in known_joint_tables(result)}
+    return {table.key: table for table in build_tables(result)}
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -15,8 +15,8 @@ from readings.study import ReadingsPlan, group_cases, study_readings
 import jointfrf as jf
 from jointfrf.cases.catalogue import find_case, read_case
 from jointfrf.cases.known_joint.exact import exact_frfs
+from jointfrf.cases.known_joint.realisations import estimate_realisations
 from jointfrf.cases.known_joint.regenerate import regenerate_all
-from jointfrf.cases.known_joint.study import run_study
 from jointfrf.cases.workers import Workers
 
 #: Readings that `jointfrf.pollute` knows: kind, relative_to.
@@ -133,7 +133,7 @@ def test_a_reading_gives_the_distribution_of_the_case(beams):
     explained = study_readings(group, ReadingsPlan((8.0,), count=40, seed=5, readings=(AS_IN_CASE,)))
     (own,) = explained
     theta = next(
-        one for one in run_study(beams, exact_frfs(beams), 40) if (one.noise, one.method) == ("5 %", "ismm")
+        one for one in estimate_realisations(beams, exact_frfs(beams), 40) if (one.noise, one.method) == ("5 %", "ismm")
     ).theta
     expected = np.percentile(theta, [50, 2.5, 97.5], axis=0).T
     np.testing.assert_allclose([(s.median, s.low, s.high) for s in own.scores], expected, rtol=1e-8)
@@ -154,7 +154,7 @@ def test_errors_of_regenerated_frfs_are_those_of_the_case(beams, tmp_path):
     explained = study_readings(group, ReadingsPlan((8.0,), count=30, seed=case.seed, readings=(AS_IN_CASE,)))
     (own,) = explained
     exact = exact_frfs(case)
-    identified = [one for one in run_study(case, exact, 30) if (one.noise, one.method) == ("5 %", "ismm")]
+    identified = [one for one in estimate_realisations(case, exact, 30) if (one.noise, one.method) == ("5 %", "ismm")]
     (frf,) = regenerate_all(exact, identified, case.observed, Workers())
     for found, expected in zip(own.scores, (frf.amplitude[0], frf.frequency[0]), strict=True):
         good = expected[np.isfinite(expected)]

@@ -23,7 +23,7 @@ import jointfrf as jf
 from command import run_command
 from jointfrf.cases.catalogue import find_case, read_case
 from jointfrf.cases.known_joint.exact import exact_frfs
-from jointfrf.cases.known_joint.study import run_study
+from jointfrf.cases.known_joint.realisations import estimate_realisations
 from jointfrf.cli.parser import command_parser
 from studied_case import CASE, DESIGN, WORDS, N, broken_off, doubled, same
 
@@ -42,7 +42,7 @@ def test_estimates_are_those_of_the_case(reference):
     case = read_case(find_case(CASE))
     lines = np.round(0.01 + (9.99 / 99) * np.arange(100), 9)
     case = replace(case, freq_hz=lines, noises=(structs.replace(case.noises[0], methods=("ismm", "compliance")),))
-    for group, one in enumerate(run_study(case, exact_frfs(case), N)):
+    for group, one in enumerate(estimate_realisations(case, exact_frfs(case), N)):
         assert one.method == reference.groups[group].columns[0].estimator
         _, values, low, high = reference.estimates(group)
         near = 1e-8 * abs(values) if np.isnan(low).all() else 0.01 * (high - low)

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 import jointfrf as jf
-from jointfrf.cases.kind import Estimates, StudiedColumn, StudiedGroup
+from jointfrf.cases.kind import EstimateColumn, EstimateGroup, Estimates
 from jointfrf.studies.run import Schedule
 from jointfrf.studies.store import GroupRecord, Span, StudyRecord, StudyStore
 from jointfrf.studies.summary import summarise
 
 COUNT = 1000
 COLUMNS = tuple(
-    StudiedColumn(estimator, name, "N/m", actual, bound)
+    EstimateColumn(estimator, name, "N/m", actual, bound)
     for estimator, name, actual, bound in (("a", "k_x", 5.0, 1.0), ("b", "k_x", 5.0, np.nan), ("a", "c_x", np.nan, 2.0))
 )
 
@@ -153,7 +153,7 @@ def test_columns_of_the_table(whole):
 
 
 def test_chunks_take_about_two_seconds_and_end_together():
-    group = StudiedGroup("noise", COLUMNS, Estimates.without_intervals, 5)
+    group = EstimateGroup("noise", COLUMNS, Estimates.without_intervals, 5)
     schedule = Schedule([group], [[Span(3, 100_000)]], workers=2)
     chunks, taken = iter(schedule), []
     for chunk in chunks:

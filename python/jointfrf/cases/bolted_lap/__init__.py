@@ -7,13 +7,13 @@ compute      all of these, without noise and with it, for cases and for studies
 results      tables, numbers and figures
 """
 
-from jointfrf.cases.bolted_lap.compute import BoltedLapResult, bolted_lap_studied, compute_bolted_lap
+from jointfrf.cases.bolted_lap.compute import BoltedLapResult, compute_bolted_lap, estimate_groups
 from jointfrf.cases.bolted_lap.keys import BoltedLapCase, BoltedLapExpected, BoltedLapKeys, read_bolted_lap
 from jointfrf.cases.bolted_lap.results import (
-    bolted_lap_figures,
-    bolted_lap_numbers,
-    bolted_lap_summary,
-    bolted_lap_tables,
+    build_figures,
+    build_numbers,
+    build_summary,
+    build_tables,
 )
 from jointfrf.cases.kind import CaseKind
 
@@ -24,9 +24,9 @@ KIND: CaseKind[BoltedLapCase, BoltedLapResult] = CaseKind(
     expected_keys=BoltedLapExpected,
     read=read_bolted_lap,
     compute=compute_bolted_lap,
-    tables=bolted_lap_tables,
-    figures=bolted_lap_figures,
-    summary=bolted_lap_summary,
-    numbers=bolted_lap_numbers,
-    studied=bolted_lap_studied,
+    tables=build_tables,
+    figures=build_figures,
+    summary=build_summary,
+    numbers=build_numbers,
+    groups=estimate_groups,
 )

@@ -35,7 +35,7 @@ from jointfrf.cases.bolted_lap.routes import (
     route_lines,
 )
 from jointfrf.cases.keys import Noise, constant_joint
-from jointfrf.cases.kind import Estimates, StudiedColumn, StudiedGroup, StudyChoice, chosen_noises
+from jointfrf.cases.kind import EstimateColumn, EstimateGroup, Estimates, StudyChoice, chosen_noises
 from jointfrf.cases.workers import Workers
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.solids.preload import PreloadedLap
@@ -44,12 +44,12 @@ from jointfrf.spelling import did_you_mean
 __all__ = [
     "LINES",
     "BoltedLapResult",
-    "NoiseStudy",
     "NoisyLap",
+    "NoisyParameters",
     "RegeneratedTip",
     "Unmeasured",
-    "bolted_lap_studied",
     "compute_bolted_lap",
+    "estimate_groups",
     "identify_noisy",
 ]
 
@@ -96,7 +96,7 @@ class Unmeasured(NamedTuple):
     shift: FloatArray
 
 
-class NoiseStudy(NamedTuple):
+class NoisyParameters(NamedTuple):
     """Parameters from noisy FRFs: one row of theta, and of errors of the resonances in percent, a realisation.
 
     Attributes
@@ -138,7 +138,7 @@ class BoltedLapResult:
         FRFs of the tip of the solid model, with B and with the other B, m/N.
     peaks, transferred_peaks : list of Resonance
     unmeasured : list of Unmeasured
-    noisy : list of NoiseStudy
+    noisy : list of NoisyParameters
     """
 
     case: BoltedLapCase
@@ -153,7 +153,7 @@ class BoltedLapResult:
     peaks: list[Resonance]
     transferred_peaks: list[Resonance]
     unmeasured: list[Unmeasured]
-    noisy: list[NoiseStudy]
+    noisy: list[NoisyParameters]
 
 
 def compute_bolted_lap(case: BoltedLapCase, n_realisations: int, workers: Workers | None = None) -> BoltedLapResult:
@@ -188,7 +188,7 @@ def compute_bolted_lap(case: BoltedLapCase, n_realisations: int, workers: Worker
     ]
     k_lines = route_lines(solid.points, solid.channels, solid.reference)
     regenerated = _regenerated(case, solid, beams, k_lines, (peaks, other_peaks))
-    noisy: list[NoiseStudy] = []
+    noisy: list[NoisyParameters] = []
     for noise, parts in repeated:
         done = list(at_work.counted(parts, n_realisations))
         noisy += _noise_studies(noise, beams[0], peaks, done)
@@ -309,7 +309,9 @@ def identify_noisy(task: NoisyLap) -> list[Found]:
     return found
 
 
-def _noise_studies(noise: Noise, beams: BeamFrfs, peaks: list[Resonance], parts: list[list[Found]]) -> list[NoiseStudy]:
+def _noise_studies(
+    noise: Noise, beams: BeamFrfs, peaks: list[Resonance], parts: list[list[Found]]
+) -> list[NoisyParameters]:
     """Put the realisations of every route and estimator together, with the resonances they regenerate."""
     studies = []
     for same in zip(*parts, strict=True):
@@ -317,7 +319,7 @@ def _noise_studies(noise: Noise, beams: BeamFrfs, peaks: list[Resonance], parts:
         tips = (beams.tip(constant_joint(one, beams.freq_hz)) for one in theta)
         errors = [resonance_errors(beams.freq_hz, peaks, tip) for tip in tips]
         shift, inside = (np.array([getattr(one, what) for one in errors]) for what in ("frequency", "found"))
-        studies.append(NoiseStudy(noise.name, same[0].route, same[0].estimator, theta, shift, inside))
+        studies.append(NoisyParameters(noise.name, same[0].route, same[0].estimator, theta, shift, inside))
     return studies
 
 
@@ -348,7 +350,7 @@ def _row(found: list[Found]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return theta, theta - _REACH * errors, theta + _REACH * errors
 
 
-def bolted_lap_studied(case: BoltedLapCase, choice: StudyChoice) -> list[StudiedGroup]:
+def estimate_groups(case: BoltedLapCase, choice: StudyChoice) -> list[EstimateGroup]:
     """Return what a study computes: every noise with every estimator, each by all of its routes.
 
     The joint that the solid model has is not known: there are no actual values.
@@ -365,9 +367,9 @@ def bolted_lap_studied(case: BoltedLapCase, choice: StudyChoice) -> list[Studied
         for method in choice.estimators or noise.methods:
             own = NoisyLap(case, structs.replace(noise, methods=(method,)), solid.points, solid.channels, 0)
             columns = [
-                StudiedColumn(f"{one.estimator}, {one.route}", parameter.name, parameter.unit, np.nan, np.nan)
+                EstimateColumn(f"{one.estimator}, {one.route}", parameter.name, parameter.unit, np.nan, np.nan)
                 for one in identify_noisy(own)
                 for parameter in case.parameters
             ]
-            groups.append(StudiedGroup(noise.name, tuple(columns), LapSource(own)))
+            groups.append(EstimateGroup(noise.name, tuple(columns), LapSource(own)))
     return groups

@@ -18,10 +18,10 @@ from jointfrf.report.figure import Curve, Figure, Interval, Level, Panel, Surfac
 from jointfrf.report.receptance import ReceptanceCurve, receptance_panels
 from jointfrf.report.table import Cell, Table, number
 
-__all__ = ["above_limit", "bolted_lap_figures", "bolted_lap_numbers", "bolted_lap_summary", "bolted_lap_tables"]
+__all__ = ["above_limit", "build_figures", "build_numbers", "build_summary", "build_tables"]
 
 
-def bolted_lap_tables(result: BoltedLapResult) -> list[Table]:
+def build_tables(result: BoltedLapResult) -> list[Table]:
     """Build all tables."""
     transfer = f"Transfer to a beam B of {result.case.beams.lengths[2]:g} m"
     return [
@@ -160,7 +160,7 @@ def _unmeasured(result: BoltedLapResult) -> Table:
     return Table("unmeasured", "Effect of entries that cannot be measured (4.3.3.1)", columns, tuple(cells), (), note)
 
 
-def bolted_lap_numbers(result: BoltedLapResult) -> dict[str, Any]:
+def build_numbers(result: BoltedLapResult) -> dict[str, Any]:
     """Return the numbers of a case for JSON, beside its tables."""
     return {
         "n_dofs": result.n_dofs,
@@ -170,7 +170,7 @@ def bolted_lap_numbers(result: BoltedLapResult) -> dict[str, Any]:
     }
 
 
-def bolted_lap_summary(result: BoltedLapResult, tables: list[Table]) -> list[Table]:
+def build_summary(result: BoltedLapResult, tables: list[Table]) -> list[Table]:
     """Return short tables: how much fits, the preload, and the largest errors of the resonances."""
     fits = agreement(tables)
     return [*([fits] if fits.rows else []), _preload(result), _worst_errors(result)]
@@ -230,7 +230,7 @@ _PRESSED = {"a": ("head", "lap"), "b": ("lap", "nut"), "bolt": ("head", "nut")}
 _FACES = {"head": "under the head", "lap": "between the beams", "nut": "under the nut"}
 
 
-def bolted_lap_figures(result: BoltedLapResult) -> list[Figure]:
+def build_figures(result: BoltedLapResult) -> list[Figure]:
     """Build all figures."""
     makers: tuple[Callable[[BoltedLapResult], Iterator[Figure]], ...] = (
         _pressure, _regenerated, _lines, _unmeasured_frfs, _noise_frfs,

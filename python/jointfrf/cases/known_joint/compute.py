@@ -10,8 +10,8 @@ import numpy as np
 from jointfrf.cases.known_joint.exact import Exact, NoiseFree, exact_frfs, noise_free_errors
 from jointfrf.cases.known_joint.keys import KnownJointCase
 from jointfrf.cases.known_joint.modes import ModeShapes, modes_of_case
+from jointfrf.cases.known_joint.realisations import Identified, estimate_realisations
 from jointfrf.cases.known_joint.regenerate import PrintedErrors, RegeneratedFrf, printed_errors, regenerate_all
-from jointfrf.cases.known_joint.study import Identified, run_study
 from jointfrf.cases.workers import Workers
 from jointfrf.dofs import Parameter
 from jointfrf.frf.bands import Band, in_bands
@@ -150,7 +150,7 @@ def compute(case: KnownJointCase, n_realisations: int, workers: Workers | None =
     modes = at_work.begin(modes_of_case, case)
     printed = at_work.begin(printed_errors, case)
     noise_free = at_work.begin(noise_free_errors, exact, case.joint.dynamic_stiffness(case.freq_hz))
-    identified = run_study(case, exact, n_realisations, at_work)
+    identified = estimate_realisations(case, exact, n_realisations, at_work)
     known = actual()
     return KnownJointResult(
         case=case,

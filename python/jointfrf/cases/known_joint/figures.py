@@ -10,8 +10,8 @@ import numpy as np
 from jointfrf.cases.keys import Observed
 from jointfrf.cases.known_joint.compute import KnownJointResult
 from jointfrf.cases.known_joint.modes import mode_panels
+from jointfrf.cases.known_joint.realisations import ALL_LINES, Identified
 from jointfrf.cases.known_joint.regenerate import RegeneratedFrf, regenerate
-from jointfrf.cases.known_joint.study import ALL_LINES, Identified
 from jointfrf.cases.known_joint.tables import identified_rows
 from jointfrf.dofs import Parameter
 from jointfrf.frf.bands import Band
@@ -31,7 +31,7 @@ from jointfrf.report.axes import (
 from jointfrf.report.figure import Curve, Figure, Interval, Level, NamedBands, Panel, Ribbon
 from jointfrf.report.receptance import ReceptanceCurve, noise_figure, receptance_panels, side_by_side
 
-__all__ = ["known_joint_figures"]
+__all__ = ["build_figures"]
 
 #: Methods as legends name them, with the equations of the thesis.
 _METHOD_NAMES = {
@@ -59,7 +59,7 @@ _MOST_LEVELS = 3
 _UNMOVED = 1e-4
 
 
-def known_joint_figures(result: KnownJointResult) -> list[Figure]:
+def build_figures(result: KnownJointResult) -> list[Figure]:
     """Build all figures of a case that its data allow.
 
     Parameters

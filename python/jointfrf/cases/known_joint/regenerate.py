@@ -11,7 +11,7 @@ import numpy as np
 from jointfrf.cases.keys import Observed, constant_joint
 from jointfrf.cases.known_joint.exact import Exact, exact_frfs
 from jointfrf.cases.known_joint.keys import ExpectedErrors, ExpectedParameters, KnownJointCase, PrintedLines
-from jointfrf.cases.known_joint.study import Identified, chunk_size
+from jointfrf.cases.known_joint.realisations import Identified, chunk_size
 from jointfrf.cases.workers import Workers
 from jointfrf.dofs import rigid_offset
 from jointfrf.errors import IllConditionedWarning

@@ -13,15 +13,15 @@ from jointfrf.cases.keys import FITTED, Observed
 from jointfrf.cases.known_joint.compute import KnownJointResult, SensitiveBands, contrast
 from jointfrf.cases.known_joint.decoupling import decoupling_bounds
 from jointfrf.cases.known_joint.keys import ExpectedErrors, ExpectedParameters, ExpectedRegions
+from jointfrf.cases.known_joint.realisations import Identified
 from jointfrf.cases.known_joint.regenerate import RegeneratedFrf
-from jointfrf.cases.known_joint.study import Identified
 from jointfrf.dofs import Parameter
 from jointfrf.frf.bands import Band
 from jointfrf.kernel.arguments import FloatArray
 from jointfrf.report.axes import bands_in_words, percentiles
 from jointfrf.report.table import Cell, Table
 
-__all__ = ["Row", "identified_rows", "known_joint_numbers", "known_joint_summary", "known_joint_tables"]
+__all__ = ["Row", "build_numbers", "build_summary", "build_tables", "identified_rows"]
 
 #: Stands for the frequency of a peak that is not there.
 NO_PEAK = "no peak in the band"
@@ -214,7 +214,7 @@ def _row(found: Identified, parameter: Parameter, values: Any, actual: float, ta
     return Row(*named, table.source, published, median, low, high, error, share, low <= published <= high)
 
 
-def known_joint_tables(result: KnownJointResult) -> list[Table]:
+def build_tables(result: KnownJointResult) -> list[Table]:
     """Build all tables of a case, the source's own first."""
     rows = identified_rows(result)
     sources = list(dict.fromkeys(row.source for row in rows if row.source is not None))
@@ -418,7 +418,7 @@ def _noise_free(result: KnownJointResult) -> Table:
     return Table("noise-free", "The equations without noise", columns, tuple(cells), tuple(failing), note)
 
 
-def known_joint_numbers(result: KnownJointResult) -> dict[str, Any]:
+def build_numbers(result: KnownJointResult) -> dict[str, Any]:
     """Return the numbers of a case for JSON, beside its tables."""
     case = result.case
     return {
@@ -436,7 +436,7 @@ def known_joint_numbers(result: KnownJointResult) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def known_joint_summary(result: KnownJointResult, tables: list[Table]) -> list[Table]:
+def build_summary(result: KnownJointResult, tables: list[Table]) -> list[Table]:
     """Return short tables: how much fits, and how far the methods are from the actual joint."""
     return [agreement(tables), *_methods(identified_rows(result))]
 

@@ -6,9 +6,9 @@ results   parameters beside their bound, residual test; stiffness over frequency
 """
 
 from jointfrf.cases.kind import CaseKind
-from jointfrf.cases.modelled_joint.compute import ModelledJointResult, compute_modelled, modelled_joint_studied
+from jointfrf.cases.modelled_joint.compute import ModelledJointResult, compute_modelled, estimate_groups
 from jointfrf.cases.modelled_joint.keys import ModelledJointCase, ModelledJointKeys, read_modelled_joint
-from jointfrf.cases.modelled_joint.results import modelled_figures, modelled_numbers, modelled_summary, modelled_tables
+from jointfrf.cases.modelled_joint.results import build_figures, build_numbers, build_summary, build_tables
 
 __all__ = ["KIND"]
 
@@ -16,9 +16,9 @@ KIND: CaseKind[ModelledJointCase, ModelledJointResult] = CaseKind(
     keys=ModelledJointKeys,
     read=read_modelled_joint,
     compute=compute_modelled,
-    tables=modelled_tables,
-    figures=modelled_figures,
-    summary=modelled_summary,
-    numbers=modelled_numbers,
-    studied=modelled_joint_studied,
+    tables=build_tables,
+    figures=build_figures,
+    summary=build_summary,
+    numbers=build_numbers,
+    groups=estimate_groups,
 )

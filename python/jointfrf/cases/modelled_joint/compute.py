@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from jointfrf.cases.kind import Estimates, StudiedColumn, StudiedGroup, StudyChoice
+from jointfrf.cases.kind import EstimateColumn, EstimateGroup, Estimates, StudyChoice
 from jointfrf.cases.modelled_joint.keys import ModelledJointCase
 from jointfrf.cases.workers import Workers
 from jointfrf.frf.noise import pollute
@@ -25,9 +25,9 @@ __all__ = [
     "FittedDraw",
     "ModelledJointResult",
     "compute_modelled",
+    "estimate_groups",
     "fit_of_exact",
     "fitted_draw",
-    "modelled_joint_studied",
 ]
 
 
@@ -151,7 +151,7 @@ class ModelFitSource:
         return Estimates(*found)
 
 
-def modelled_joint_studied(case: ModelledJointCase, choice: StudyChoice) -> list[StudiedGroup]:
+def estimate_groups(case: ModelledJointCase, choice: StudyChoice) -> list[EstimateGroup]:
     """Return what a study computes: the fit with models."""
     if choice.own_estimators or choice.own_noises or choice.noises:
         raise ValueError("a modelled joint has one noise, [measured] noise, and one estimator, model-fit")
@@ -161,6 +161,7 @@ def modelled_joint_studied(case: ModelledJointCase, choice: StudyChoice) -> list
     fit = fit_of_exact(case, exact)
     names = tuple(fit.std_error)
     columns = [
-        StudiedColumn(_ESTIMATOR, name, fit.unit(name), float(case.actual[name]), fit.std_error[name]) for name in names
+        EstimateColumn(_ESTIMATOR, name, fit.unit(name), float(case.actual[name]), fit.std_error[name])
+        for name in names
     ]
-    return [StudiedGroup(f"{100 * case.noise:g} %", tuple(columns), ModelFitSource(case, exact, names))]
+    return [EstimateGroup(f"{100 * case.noise:g} %", tuple(columns), ModelFitSource(case, exact, names))]

@@ -15,13 +15,13 @@ from jointfrf.identification.result import Fit
 from jointfrf.report.figure import Curve, Figure, Panel, Ribbon
 from jointfrf.report.table import Cell, Table, number
 
-__all__ = ["modelled_figures", "modelled_numbers", "modelled_summary", "modelled_tables"]
+__all__ = ["build_figures", "build_numbers", "build_summary", "build_tables"]
 
 #: Chance of a coverage as low as that of a row that is said not to fit.
 _CHANCE = 0.005
 
 
-def modelled_tables(result: ModelledJointResult) -> list[Table]:
+def build_tables(result: ModelledJointResult) -> list[Table]:
     """Return the tables in the order in which they are shown."""
     return [_parameters(result), _stiffness(result), _residuals(result)]
 
@@ -108,7 +108,7 @@ def _where(bands: tuple[tuple[float, float, float], ...]) -> str:
     return ", ".join(f"{low:g}-{high:g} Hz ({ratio:.2g})" for low, high, ratio in bands[:4])
 
 
-def modelled_summary(result: ModelledJointResult, tables: list[Table]) -> list[Table]:
+def build_summary(result: ModelledJointResult, tables: list[Table]) -> list[Table]:
     """Return what came out, in short."""
     worst = max(
         (float(row[6]) / float(row[7]), str(row[0]))  # type: ignore[arg-type]
@@ -124,7 +124,7 @@ def modelled_summary(result: ModelledJointResult, tables: list[Table]) -> list[T
     return [Table("outcome", "What came out", ("quantity", "value"), cells)]
 
 
-def modelled_numbers(result: ModelledJointResult) -> dict[str, Any]:
+def build_numbers(result: ModelledJointResult) -> dict[str, Any]:
     """Return what `results.json` holds beside tables: the first realisation, and all values."""
     names = list(result.first.value)
     return {
@@ -133,7 +133,7 @@ def modelled_numbers(result: ModelledJointResult) -> dict[str, Any]:
     }
 
 
-def modelled_figures(result: ModelledJointResult) -> list[Figure]:
+def build_figures(result: ModelledJointResult) -> list[Figure]:
     """Return stiffness and loss factor over frequency, and the FRFs of the first realisation."""
     return [_stiffness_figure(result), _frf_figure(result)]
 

@@ -13,12 +13,12 @@ import numpy as np
 
 from jointfrf.cases.keys import FITTED, METHODS, BandSet, Noise
 from jointfrf.cases.kind import (
+    EstimateColumn,
+    EstimateGroup,
     Estimates,
     Estimator,
     Pollution,
     RealisationSource,
-    StudiedColumn,
-    StudiedGroup,
     StudyChoice,
     chosen_noises,
 )
@@ -43,7 +43,7 @@ from jointfrf.identification.realisations import FitStart, viscous_estimate, vis
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.spelling import did_you_mean
 
-__all__ = ["ALL_LINES", "Identified", "chunk_size", "known_joint_studied", "means_over_bands", "run_study"]
+__all__ = ["ALL_LINES", "Identified", "chunk_size", "estimate_groups", "estimate_realisations", "means_over_bands"]
 
 #: Lines, and entries of their FRF matrices, treated at once, over realisations: bound the memory to some tens of MB.
 _CHUNK, _CHUNK_ENTRIES = 20_000, 1_500_000
@@ -154,7 +154,7 @@ def means_over_bands(exact: Exact, k_joint: ComplexArray, band_set: BandSet) -> 
     return found
 
 
-def run_study(
+def estimate_realisations(
     case: KnownJointCase, exact: Exact, n_realisations: int, workers: Workers | None = None
 ) -> list[Identified]:
     """Identify the joint of a case from many realisations of every noise by every method.
@@ -341,7 +341,7 @@ class OwnEstimatorSource:
         return Estimates.without_intervals(found)
 
 
-def known_joint_studied(case: KnownJointCase, choice: StudyChoice) -> list[StudiedGroup]:
+def estimate_groups(case: KnownJointCase, choice: StudyChoice) -> list[EstimateGroup]:
     """Return what a study computes: every noise with every method."""
     for word in choice.estimators:
         if word not in METHODS and word not in choice.own_estimators:
@@ -369,7 +369,7 @@ def _noises(
 
 def _group(
     case: KnownJointCase, exact: Exact, noise: Noise | tuple[str, Pollution], method: str, choice: StudyChoice
-) -> StudiedGroup:
+) -> EstimateGroup:
     at_joint = not method.startswith("decoupling")
     name, drawn = (noise.name, noise) if isinstance(noise, Noise) else noise
     h = measured(exact, "ismm" if method in choice.own_estimators else method)
@@ -389,11 +389,11 @@ def _group(
         labels = [f"{method}, {one.name}" if len(case.band_sets) > 1 else method for one in case.band_sets]
     bound = _bound(exact, drawn) if at_joint else np.full(len(case.parameters), np.nan)
     columns = [
-        StudiedColumn(label, parameter.name, parameter.unit, float(actual), float(least))
+        EstimateColumn(label, parameter.name, parameter.unit, float(actual), float(least))
         for label in labels
         for parameter, actual, least in zip(case.parameters, case.actual, bound, strict=True)
     ]
-    return StudiedGroup(name, tuple(columns), source, side_by_side)
+    return EstimateGroup(name, tuple(columns), source, side_by_side)
 
 
 def _bound(exact: Exact, noise: Noise | Pollution) -> FloatArray:
