@@ -216,7 +216,7 @@ def text_of(path: Path) -> str:
 
 
 def below(folder: Path, name: str, suffix: str = "") -> Path:
-    """Return the path of a file in a folder, by a name that may come from anybody.
+    """Return the path of a file in a folder, by a name that may come from a stranger.
 
     Parameters
     ----------

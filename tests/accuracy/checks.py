@@ -47,8 +47,12 @@ def detections(task: tuple[str, str, str, float, int]) -> tuple[int, int, int]:
     """Numbers of data sets, of those where the error is found with its channel, and where nothing else is."""
     error, name, kind, level, seeds = task
     results = [check_with_error(structure(name), ERRORS[error], kind, level, seed) for seed in range(seeds)]
-    told = [result for result in results if result is not None]
-    return len(told), sum(result.found for result in told), sum(result.found and result.alone for result in told)
+    reported = [result for result in results if result is not None]
+    return (
+        len(reported),
+        sum(result.found for result in reported),
+        sum(result.found and result.alone for result in reported),
+    )
 
 
 def main() -> None:

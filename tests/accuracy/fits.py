@@ -55,7 +55,7 @@ class Row:
 
 
 def one_draw(trial: Trial, seed: int) -> Draw:
-    """Fit one draw, nothing told of its noise."""
+    """Fit one draw, its noise unknown."""
     freq, gamma, joint = trial.draw(seed)
     start = time.perf_counter()
     with warnings.catch_warnings():

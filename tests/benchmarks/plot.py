@@ -1,4 +1,4 @@
-"""Time and ratio over n, for every operation; lines are told apart by grey, dashes and marks."""
+"""Time and ratio over n, for every operation; lines differ by grey, dashes and marks."""
 
 from __future__ import annotations
 

@@ -93,10 +93,15 @@ class Commands:
             words = [name, *self._spoiled(name, random)]
         else:
             words = [name, *self._words(self.commands[name], random)]
-        said, told = io.StringIO(), io.StringIO()
+        said, reported = io.StringIO(), io.StringIO()
         status: Any = 0
         quiet = warnings.catch_warnings()
-        with quiet, contextlib.redirect_stdout(said), contextlib.redirect_stderr(told), contextlib.chdir(self.folder):
+        with (
+            quiet,
+            contextlib.redirect_stdout(said),
+            contextlib.redirect_stderr(reported),
+            contextlib.chdir(self.folder),
+        ):
             warnings.simplefilter("ignore")
             try:
                 status = main(words)
@@ -104,9 +109,9 @@ class Commands:
                 status = end.code
             except BaseException as error:
                 raise BrokenError(f"{words}: {type(error).__name__}: {error}") from None
-        if status not in (0, 1, 2, None) or "Traceback" in told.getvalue():
-            raise BrokenError(f"{words}: status {status}: {told.getvalue()[:300]!r}")
-        if status and not told.getvalue().strip() and not said.getvalue().strip():
+        if status not in (0, 1, 2, None) or "Traceback" in reported.getvalue():
+            raise BrokenError(f"{words}: status {status}: {reported.getvalue()[:300]!r}")
+        if status and not reported.getvalue().strip() and not said.getvalue().strip():
             raise BrokenError(f"{words}: status {status} without a word")
         return f"status {status or 0}"
 

@@ -78,7 +78,7 @@ class DamagedFiles:
         content = _damaged(self.sound[name], name, random)
         path = self.folder / f"damaged {name}"
         path.write_bytes(content)
-        with warnings.catch_warnings(record=True) as told:
+        with warnings.catch_warnings(record=True) as reported:
             warnings.simplefilter("always")
             try:
                 found = read_frfs(path, quantity="accelerance", force_quantity=True)
@@ -89,14 +89,14 @@ class DamagedFiles:
                 return "refused"
             except Exception as error:
                 raise BrokenError(f"{name}: {type(error).__name__}: {str(error)[:300]}") from None
-        foreign = [each for each in told if not issubclass(each.category, jf.FileContentWarning)]
+        foreign = [each for each in reported if not issubclass(each.category, jf.FileContentWarning)]
         if foreign:
             raise BrokenError(f"{name}: {foreign[0].category.__name__}: {foreign[0].message}")
         if _same(_content(found), self.read[name]):
             return "read, the same content"
         if name in _CHECKED:
             raise BrokenError(f"{name}: other content without a word")
-        return "read with a warning" if told else "read, other content that no checksum guards"
+        return "read with a warning" if reported else "read, other content that no checksum guards"
 
 
 def _content(found: FrfSet) -> tuple[Any, ...]:

@@ -230,7 +230,7 @@ def _is_typed(parameter: inspect.Parameter) -> bool:
 
 def _guarded(name: str, call: Callable[..., Any], positional: list[Any], named: dict[str, Any]) -> tuple[str, Any]:
     """Call, and say what came of it: a result, or whose words refuse it."""
-    with warnings.catch_warnings(record=True) as told, contextlib.redirect_stdout(None):
+    with warnings.catch_warnings(record=True) as reported, contextlib.redirect_stdout(None):
         warnings.simplefilter("always")
         try:
             result = call(*positional, **named)
@@ -246,7 +246,7 @@ def _guarded(name: str, call: Callable[..., Any], positional: list[Any], named: 
             return _judged(name, error, positional, named), None
         finally:
             jf.set_engine("auto")
-    for each in told:
+    for each in reported:
         if not each.category.__module__.startswith("jointfrf") and issubclass(each.category, DeprecationWarning):
             raise BrokenError(f"{name}: {each.category.__name__}: {each.message}")
     return "result", result
@@ -261,8 +261,8 @@ def _judged(name: str, error: Exception, positional: list[Any], named: dict[str,
     is_foreign = not is_own and "." not in name and any(word in message for word in _FOREIGN)
     if not is_expected or not is_sentence or is_foreign:
         where = traceback.extract_tb(error.__traceback__)[-1]
-        told = f"{name}: {type(error).__name__}: {message[:200]!r} ({Path(where.filename).name}:{where.lineno})"
-        raise BrokenError(f"{told} from {_shown(positional, named)}")
+        reported = f"{name}: {type(error).__name__}: {message[:200]!r} ({Path(where.filename).name}:{where.lineno})"
+        raise BrokenError(f"{reported} from {_shown(positional, named)}")
     if is_own:
         return f"refused: {type(error).__name__}"
     return f"refused in the words of Python or a library: {type(error).__name__}"

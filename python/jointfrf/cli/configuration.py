@@ -21,7 +21,7 @@ CONFIGURATION = "jointfrf.toml"
 _NO_DEFAULTS = ("--help", "-h", "--config", "--no-config")
 #: Keys of a table of channels, which may be in the same file.
 _CHANNELS = ("unit", "channel")
-#: What a file that was found, not named, may set beside which joint is in the FRFs: it may be anybody's.
+#: What a file that was found, not named, may set beside which joint is in the FRFs: it may be a stranger's.
 _OF_THE_FIT = ("--method", "--damping", "--cross", "--noise", "--bending-stiffness")
 
 

@@ -56,7 +56,7 @@ class MeasuredJoint:
     nodes : tuple of two lists of int
         On sides j and k.
     bands : list of (low, high), or None
-        Hz; what is said of channels is said of these lines.
+        Hz; findings on channels are of these lines.
     """
 
     freq_hz: FloatArray

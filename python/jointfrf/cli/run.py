@@ -126,7 +126,7 @@ class _Begun:
 
 
 def _run_one(folder: Path, options: argparse.Namespace, workers: Workers, say: Callable[[str], None]) -> Path:
-    """Run a case: its tables are said before its figures are drawn."""
+    """Run a case: its tables are printed before its figures are drawn."""
     start = time.perf_counter()
     output = run_case(
         folder, options.out, realisations=options.realisations, workers=workers,

@@ -27,7 +27,7 @@ __all__ = [
     "warn_of_ignored",
 ]
 
-#: Seconds after which the speed so far predicts the time left; a clock that ticks twice a second disturbs nobody.
+#: Seconds after which the speed so far predicts the time left; a line that changes twice a second is easily read.
 _SETTLED = 0.5
 
 

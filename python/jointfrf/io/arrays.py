@@ -69,7 +69,7 @@ def frfs_of_arrays(
     Raises
     ------
     FileContentError
-        Sizes, names or units do not fit each other, or values are not finite; what, is said.
+        Sizes, names or units do not fit each other, or values are not finite; the sentence says which.
 
     Examples
     --------

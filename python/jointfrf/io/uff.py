@@ -127,7 +127,7 @@ def read_uff(
     Warns
     -----
     FileContentWarning
-        Something was assumed or left out; each is said once, with the datasets it is about. Left out are a dataset
+        Something was assumed or left out; each is reported once, with its datasets. Left out are a dataset
         that the end of the file cuts short, FRFs without node or direction, of unknown kind or not of motion per force
         (if no others remain, that is an error), further FRFs between the same channels, a line at 0 Hz that is not a
         number, local coordinates. Assumed are units.

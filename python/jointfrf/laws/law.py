@@ -61,7 +61,7 @@ class JointLaw(ABC):
     """K*(w) between one DOF of A and one of B, from a few parameters.
 
     A law computes K*(w) and its derivatives by its parameters. Laws do not change, `with_values` makes another one. A
-    frozen dataclass says the rest in class attributes; a law of another form defines `fields`, `values` and
+    frozen dataclass declares the rest in class attributes; a law of another form defines `fields`, `values` and
     `with_values` itself.
 
     Attributes

@@ -175,7 +175,7 @@ def _composed(figure: Figure) -> tuple[Any, list[Any]]:
 def _settings(figure: Figure) -> Any:
     """Return the settings of matplotlib for a figure, which hold inside a `with` block only.
 
-    They are all set: a `matplotlibrc` of the working directory may be anybody's, and `text.usetex` starts programs.
+    They are all set: a `matplotlibrc` of the working directory may be a stranger's, and `text.usetex` starts programs.
     """
     from matplotlib import style
 
@@ -183,7 +183,7 @@ def _settings(figure: Figure) -> Any:
 
 
 def _make_drawable(canvas: Any) -> None:
-    """Look at texts, which may come from a file: what is no formula is drawn as it stands, what is not seen escaped."""
+    """Check texts, which may come from a file: wrong formulas are drawn as plain text, invisible characters escaped."""
     from matplotlib.mathtext import MathTextParser
     from matplotlib.text import Text
 

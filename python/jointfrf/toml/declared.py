@@ -224,7 +224,7 @@ def _declared(name: str, attribute: str, hint: Any, default: Any) -> DeclaredKey
     facts: dict[str, Any] = {}
     limits: dict[str, float] = {}
     inner = _plain(hint, facts, limits)
-    if facts.get("pattern"):  # what is said is true of each value
+    if facts.get("pattern"):  # the facts hold for each value
         facts = {**facts, **{k: v for k, v in _facts(get_args(inner)[1]).items() if not facts.get(k)}}
     is_array = get_origin(inner) is tuple and get_args(inner)[-1] is Ellipsis and bool(_tables(get_args(inner)[0]))
     tables = _tables(get_args(inner)[0] if is_array else inner)
@@ -237,7 +237,7 @@ def _declared(name: str, attribute: str, hint: Any, default: Any) -> DeclaredKey
 
 
 def _plain(hint: Any, facts: dict[str, Any], limits: dict[str, float]) -> Any:
-    """Return a type without what is said of it, which goes into `facts`, `limits`, and without None."""
+    """Return a type without None and without its annotations, which go into `facts` and `limits`."""
     while True:
         if get_origin(hint) is Annotated:
             for meta in hint.__metadata__:

@@ -1,4 +1,4 @@
-"""What is wrong in a case file is told in one sentence with file and key."""
+"""What is wrong in a case file is one sentence with file and key."""
 
 import re
 

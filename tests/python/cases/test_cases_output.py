@@ -198,16 +198,16 @@ def test_cases_of_one_command_are_told_in_their_order(ran):
 
 
 def test_tables_are_told_before_figures_are_drawn(tmp_path, monkeypatch):
-    told = []
+    shown = []
 
     def stopped(figure):
-        raise RuntimeError(f"{len(told)} told")
+        raise RuntimeError(f"{len(shown)} shown")
 
     monkeypatch.setattr("jointfrf.cases.catalogue.draw", stopped)
-    with pytest.raises(RuntimeError, match="1 told"):
-        run_case(find_case("3.1"), tmp_path, realisations=2, show=lambda case, tables: told.append(tables))
-    assert told[0][0].title == "What fits"
-    assert "Natural frequencies of the assembly" in [table.title for table in told[0]]
+    with pytest.raises(RuntimeError, match="1 shown"):
+        run_case(find_case("3.1"), tmp_path, realisations=2, show=lambda case, tables: shown.append(tables))
+    assert shown[0][0].title == "What fits"
+    assert "Natural frequencies of the assembly" in [table.title for table in shown[0]]
 
 
 def test_command_lists_cases(capsys):

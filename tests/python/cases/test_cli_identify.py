@@ -241,5 +241,5 @@ def test_a_file_without_coordinates_and_a_spacing(tmp_path, beams):
 def test_the_noise_found_is_drawn(tmp_path):
     run(BARS, *JOINT_OF_BARS, "--method", "compliance", "--out", tmp_path)
     assert {path.name for path in tmp_path.iterdir()} >= {"noise_found.png", "noise_found.svg", "joint_y.png"}
-    run(BARS, *JOINT_OF_BARS, "--method", "compliance", "--noise", "0.01", "--out", tmp_path / "told")
-    assert not (tmp_path / "told" / "noise_found.png").exists()
+    run(BARS, *JOINT_OF_BARS, "--method", "compliance", "--noise", "0.01", "--out", tmp_path / "given")
+    assert not (tmp_path / "given" / "noise_found.png").exists()

@@ -95,10 +95,10 @@ def test_a_study_on_loky_goes_on_with_other_processes(reference, deaths, tmp_pat
 
 
 def test_a_study_on_loky_of_the_caller_stops_with_a_sentence_and_goes_on_without_loss(reference, deaths, tmp_path):
-    with loky_executor() as executor, pytest.raises(jf.BrokenPoolError, match="the same call continues") as told:
+    with loky_executor() as executor, pytest.raises(jf.BrokenPoolError, match="the same call continues") as raised:
         jf.study("3.1", tmp_path, N, design=DESIGN, executor=executor)
     assert deaths()
-    assert "\n" not in str(told.value)
+    assert "\n" not in str(raised.value)
     kept = chunks(tmp_path)
     with loky_executor() as executor:
         found = jf.study("3.1", tmp_path, N, design=DESIGN, executor=executor)
@@ -115,10 +115,10 @@ def test_a_sweep_on_loky_goes_on_with_other_processes(lines, marks, deaths, tmp_
 
 def test_a_sweep_on_loky_of_the_caller_says_where_to_go_on(lines, marks, deaths):
     result = np.zeros(lines.shape, complex)
-    with loky_executor() as executor, pytest.raises(jf.BrokenPoolError, match="computes the rest") as told:
+    with loky_executor() as executor, pytest.raises(jf.BrokenPoolError, match="computes the rest") as raised:
         sweep_of(lines, result, marks, executor=executor)
     assert deaths()
-    first = int(re.search(r"first=(\d+)", str(told.value))[1])
+    first = int(re.search(r"first=(\d+)", str(raised.value))[1])
     assert (result[:first] == jf.invert(lines)[:first]).all()
     result[first:] = 0
     sweep_of(lines, result, marks, jobs=1, first=first)
@@ -145,9 +145,9 @@ def test_a_cluster_that_is_gone_is_said_and_nothing_is_lost(client, reference, m
     distributed = pytest.importorskip("distributed")
     leaving = distributed.Client(client.cluster)
     how = {"executor": leaving.get_executor(), "progress": lambda done, total: leaving.close()}
-    with pytest.raises(jf.BrokenPoolError, match="the same call continues") as told:
+    with pytest.raises(jf.BrokenPoolError, match="the same call continues") as raised:
         jf.study("3.1", tmp_path, N, design=DESIGN, **how)
-    assert "\n" not in str(told.value)
+    assert "\n" not in str(raised.value)
     kept = chunks(tmp_path)
     found = jf.study("3.1", tmp_path, N, design=DESIGN, jobs=1)
     assert kept

@@ -1,4 +1,4 @@
-"""What is wrong in a file of matrices or of FRFs is told in one sentence that names the key and the file."""
+"""What is wrong in a file of matrices or of FRFs is one sentence that names the key and the file."""
 
 import re
 

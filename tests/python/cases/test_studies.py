@@ -216,13 +216,13 @@ def test_command_says_what_the_study_holds(reference, tmp_path):
     words = ("study", *WORDS, "--realisations", N, "--out", out, "--jobs", 1, "--values", "npz")
     done = run_command(*words, "--json")
     assert (done.returncode, done.stderr) == (0, "")
-    told = json.loads(done.stdout)
-    assert told["summary"][0]["rmse"] == reference.summary[0].rmse
-    assert told["missing"] == 0
-    page = Path(told["report"]).read_text(encoding="utf-8")
+    printed = json.loads(done.stdout)
+    assert printed["summary"][0]["rmse"] == reference.summary[0].rmse
+    assert printed["missing"] == 0
+    page = Path(printed["report"]).read_text(encoding="utf-8")
     assert "Cramér-Rao" in page
     assert "data:image/svg" in page
-    with np.load(told["npz"]) as held:
+    with np.load(printed["npz"]) as held:
         np.testing.assert_array_equal(held["values_1"], reference.estimates(1)[1])
     text = run_command(*words).stdout
     assert text.startswith(f"Estimates over {N} realisations, seed 31\n")

@@ -115,8 +115,8 @@ def test_peers_that_are_not_there_are_left_out_with_a_line(result):
 def test_a_pinned_process_has_one_thread_and_blas_chooses_its_kernels(tmp_path):
     one = {min(os.sched_getaffinity(0))}
     names = ("--operations", "noise", "--orders", "2", "--lines", "64", "--threads", "1,2", "--peers", "none")
-    told = {"OPENBLAS_CORETYPE": "Nehalem", "JOINTFRF_ENGINE": "plain"}
-    done = command("--quick", *names, "--budget", "0", "--output", str(tmp_path), environment=told, cores=one)
+    reported = {"OPENBLAS_CORETYPE": "Nehalem", "JOINTFRF_ENGINE": "plain"}
+    done = command("--quick", *names, "--budget", "0", "--output", str(tmp_path), environment=reported, cores=one)
     assert done.returncode == 0, done.stdout + done.stderr
     run = json.loads((tmp_path / "speed.json").read_text())
     assert {r["threads"] for r in run["records"]} == {1}

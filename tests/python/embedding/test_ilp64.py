@@ -108,8 +108,8 @@ def test_include_file_refuses(libraries, tmp_path, own, other, form):
     words = refusal(libraries[own], source, tmp_path / "program", *default_integer(other, source.suffix))
     (line,) = re.findall(r"jointfrf\.inc:(\d+):\d+:\s+.*Division by zero", words)
     (include_dir,) = (flag.removeprefix("-I") for flag in libraries[own].pkg_config("--cflags") if "-I" in flag)
-    told = (Path(include_dir) / "jointfrf.inc").read_text().splitlines()
-    assert f"JF_NEEDS_{own}_BYTE_INTEGERS" in told[int(line) - 1]
+    reported = (Path(include_dir) / "jointfrf.inc").read_text().splitlines()
+    assert f"JF_NEEDS_{own}_BYTE_INTEGERS" in reported[int(line) - 1]
     libraries[own].compile(source, tmp_path / "good", *default_integer(own, source.suffix), "-Wno-unused-parameter")
 
 

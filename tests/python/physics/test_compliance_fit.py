@@ -64,7 +64,7 @@ def test_exact_without_noise(beams, damping, cross):
 
 
 def test_reaches_the_bound_and_covers_the_truth(beams):
-    """80 realisations at 2 %, nothing told: RMSE near the bound and the standard errors, intervals that hold."""
+    """80 realisations at 2 %, noise unknown: RMSE near the bound and the standard errors, intervals that hold."""
     gamma = beams.gamma(beams.joint)
     fits = [
         identified(beams.freq, h, beams.joint.dofs, damping="viscous")

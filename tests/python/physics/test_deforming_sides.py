@@ -89,8 +89,8 @@ def test_exactly_as_many_channels_as_dofs_are_said_not_to_be_checked():
     )
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", jf.IdentificationWarning)
-        told = jf.identify(freq, noisy, transform=off).warnings
-    assert any("of theta_x, which is left out, enters y of side j" in warning for warning in told)
+        warned = jf.identify(freq, noisy, transform=off).warnings
+    assert any("of theta_x, which is left out, enters y of side j" in warning for warning in warned)
     # Where the bending between the points is said, rotations have it in their intervals.
     known = jf.interface([1, 2], [3, 4], ["y", "theta_z"], places, bending_stiffness=2e5)
     with warnings.catch_warnings():

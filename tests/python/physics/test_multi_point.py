@@ -157,7 +157,7 @@ def test_the_threshold_is_what_noise_can_make():
 
 
 def test_noise_leaves_the_rigid_motions_and_their_joint():
-    """1 permille of noise on 24 channels: rank 12 is found, the joint within some percent, and lost lines are told."""
+    """1 permille of noise on 24 channels: rank 12 is found, the joint within some percent, and lost lines are named."""
     freq = np.arange(60.0, 160, 2)
     k = full_stiffness(freq)
     _, sides, gamma = rigid_patches(freq, k, -0.8 * AROUND)

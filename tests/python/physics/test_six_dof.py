@@ -260,9 +260,9 @@ def test_cross_terms_between_groups_are_not_seen_and_this_is_said(gamma):
     assert len(fit.parameters) == 2 * (6 + 3 + 3)
     assert "k_x,y" not in fit.value
     assert "k_x,theta_y" in fit.value
-    told = "the FRFs between (x, theta_y, theta_z) and (y, theta_x, z) are zero: each group is fitted separately"
-    assert any(note == told + ", and cross terms between them cannot be identified" for note in fit.notes)
-    assert told in plain.notes
+    sentence = "the FRFs between (x, theta_y, theta_z) and (y, theta_x, z) are zero: each group is fitted separately"
+    assert any(note == sentence + ", and cross terms between them cannot be identified" for note in fit.notes)
+    assert sentence in plain.notes
     assert fit.stiffness_matrix[0, 2] == 0
     assert np.isfinite(list(fit.std_error.values())).all()
     assert plain.noise_level == pytest.approx(0.01, rel=0.1)

@@ -133,12 +133,12 @@ def test_rounding_excuses_no_error_beyond_what_is_announced(monkeypatch):
     structure = made("flat beam")
     lines = np.linspace(0, structure.first_elastic(), 41)
     given = dict(outputs=structure.at, inputs=structure.at, method="krylov", full_output=True)
-    with pytest.warns() as told:
+    with pytest.warns() as caught:
         _, info = jf.receptance(lines, structure.stiffness, structure.mass, **given)
     assert info.method != "krylov"
     assert "reduced model" in info.reason
-    assert {t.category for t in told} == {jf.ConvergenceWarning, jf.IllConditionedWarning}
-    assert any("line 0 (0 Hz)" in str(t.message) for t in told)
+    assert {t.category for t in caught} == {jf.ConvergenceWarning, jf.IllConditionedWarning}
+    assert any("line 0 (0 Hz)" in str(t.message) for t in caught)
 
 
 @pytest.mark.long

@@ -192,13 +192,13 @@ def exact(structure, freq_hz, loss_factor):
 def calculated(structure, freq_hz, loss_factor, method):
     """Return receptances, or None where a line is singular, and whether a warning announces one as ill-conditioned."""
     given = dict(loss_factor=loss_factor, outputs=structure.at, inputs=structure.at, method=method)
-    with warnings.catch_warnings(record=True) as told:
+    with warnings.catch_warnings(record=True) as reported:
         warnings.simplefilter("always")
         try:
             h = jf.receptance(freq_hz, structure.stiffness, structure.mass, **given)
         except jf.SingularLineError:
             return None, True
-    return h, any(issubclass(t.category, jf.IllConditionedWarning) for t in told)
+    return h, any(issubclass(t.category, jf.IllConditionedWarning) for t in reported)
 
 
 def relative_error(h, reference):

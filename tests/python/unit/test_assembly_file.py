@@ -319,9 +319,9 @@ def test_the_page_and_the_plot_of_laws(tmp_path):
         jf.joint_compliance(regenerated)[:, 0, 0], fit.joint.compliance(freq)[:, 0, 0], rtol=1e-3
     )
     np.testing.assert_allclose(fit.data.information().sum(axis=0), 1)
-    told = finding_sentences(fit)
-    assert told[0] == "Rigid: theta."
-    assert any(one.startswith("Parameter tau of y (tau_y): 0.0005") for one in told)
+    reported = finding_sentences(fit)
+    assert reported[0] == "Rigid: theta."
+    assert any(one.startswith("Parameter tau of y (tau_y): 0.0005") for one in reported)
     page = jf.write_report(fit, tmp_path / "law.html").read_text()
     assert "95 % interval of Re K*" in page
     assert "The laws are taken at" in page

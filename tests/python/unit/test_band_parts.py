@@ -26,12 +26,12 @@ def parts_of(stiffness, seed=0):
 
 
 def test_parts_of_one_joint_agree():
-    told = [parts_of(np.full(FREQ.size, THETA[0]), seed) for seed in range(40)]
-    assert sum(one.disagree.any() for one in told) <= 1
-    assert not told[0].std_error[~told[0].disagree].any()
-    np.testing.assert_allclose(told[0].values, np.broadcast_to(THETA, (4, 4)), rtol=0.1)
-    assert told[0].spans[0][0] == 20
-    assert told[0].spans[-1][1] == 500
+    reported = [parts_of(np.full(FREQ.size, THETA[0]), seed) for seed in range(40)]
+    assert sum(one.disagree.any() for one in reported) <= 1
+    assert not reported[0].std_error[~reported[0].disagree].any()
+    np.testing.assert_allclose(reported[0].values, np.broadcast_to(THETA, (4, 4)), rtol=0.1)
+    assert reported[0].spans[0][0] == 20
+    assert reported[0].spans[-1][1] == 500
 
 
 def test_parts_of_different_stiffness_disagree_by_their_scatter():

@@ -32,9 +32,9 @@ def test_noise_alone_is_no_finding(name, kind):
 @pytest.mark.parametrize("name", ["3.3", "six"])
 def test_errors_are_found_with_their_channel_and_nothing_else(name, error):
     for seed in (0, 3):
-        told = check_with_error(structure(name), ERRORS[error], "complex", 0.02, seed)
-        assert told.found, told.check
-        assert told.alone, told.check
+        reported = check_with_error(structure(name), ERRORS[error], "complex", 0.02, seed)
+        assert reported.found, reported.check
+        assert reported.alone, reported.check
 
 
 def test_without_noise_nothing_is_found():
@@ -63,9 +63,9 @@ def test_numbers_of_gain_and_delay_have_true_errors():
 def test_a_delay_is_found_in_noise_that_is_correlated_over_lines(name):
     for error in ("delay of a sensor, 20 us", "delay of a force, 20 us"):
         for seed in range(4):
-            told = check_with_error(structure(name), ERRORS[error], "correlated 25", 0.05, seed)
-            assert told.found, told.check
-            assert told.alone, told.check
+            reported = check_with_error(structure(name), ERRORS[error], "correlated 25", 0.05, seed)
+            assert reported.found, reported.check
+            assert reported.alone, reported.check
 
 
 @pytest.mark.parametrize("kind", ["complex", "correlated 25"])
@@ -100,10 +100,10 @@ def test_of_two_channels_the_copy_is_the_one_that_is_no_driving_point():
     for error in ("response doubled", "force doubled"):
         for seed in range(6):
             for kind in ("complex", "floor", "correlated 25"):
-                told = check_with_error(structure("3.1"), ERRORS[error], kind, 0.05, seed)
-                assert told.found, told.check
-                assert told.alone, told.check
-                (finding,) = told.check.findings
+                reported = check_with_error(structure("3.1"), ERRORS[error], kind, 0.05, seed)
+                assert reported.found, reported.check
+                assert reported.alone, reported.check
+                (finding,) = reported.check.findings
                 assert names(structure("3.1"))[seed % 2] in finding.channels[1]
 
 

@@ -1,4 +1,4 @@
-"""What a reader is told of a fit: each sentence for its cause, and none without."""
+"""What a fit reports: each sentence for its cause, and none without."""
 
 import re
 from dataclasses import replace
@@ -25,7 +25,7 @@ def between(s, stiffness):
     return h[:, dofs][:, :, dofs]
 
 
-def told(freq, h, dofs, *, noise=LEVEL, damping="viscous", cross="zero"):
+def fit_of(freq, h, dofs, *, noise=LEVEL, damping="viscous", cross="zero"):
     """Return the fit described."""
     options = FitOptions(damping, cross, True)
     problem = prepare_compliance(as_measured(freq, h, square=False), dofs, None, None, NoiseOptions(noise), options)
@@ -89,7 +89,7 @@ def test_how_the_damping_of_each_dof_was_chosen(found, margin, strength):
 
 def test_damping_chosen_by_the_data_is_told_by_dof(beams):
     joint = jf.Joint([6e5, 5e3], [20, 0], ["y", "theta"], structural_damping=[0, 400])
-    fit = told(beams.freq, jf.pollute(beams.gamma(joint), LEVEL, seed=3), ["y", "theta"], damping="auto")
+    fit = fit_of(beams.freq, jf.pollute(beams.gamma(joint), LEVEL, seed=3), ["y", "theta"], damping="auto")
     assert [note.split(",")[0] for note in fit.notes] == ["damping of y: viscous", "damping of theta: hysteretic"]
     assert list(fit.value) == ["k_y", "k_theta", "h_theta", "c_y"]
 
@@ -98,7 +98,7 @@ def test_a_level_from_the_residual_is_noted(found, chains):
     (note,) = found.of_noise(is_assumed=True).described().notes
     assert note == "the noise level is taken from the residual: the FRFs do not show it otherwise"
     h = chains.gamma(chains.joint)
-    assert told(chains.freq, (h + h.swapaxes(1, 2)) / 2, ["x"], noise=None).notes == (note,)
+    assert fit_of(chains.freq, (h + h.swapaxes(1, 2)) / 2, ["x"], noise=None).notes == (note,)
 
 
 def test_correlated_noise_is_noted_by_the_number_of_independent_lines(found, beams):
@@ -108,7 +108,7 @@ def test_correlated_noise_is_noted_by_the_number_of_independent_lines(found, bea
     )
     e = np.random.default_rng(2).standard_normal((beams.freq.size + 3, 4, 4, 2)) @ [1, 1j]
     mean_of_four = (e[:-3] + e[1:-2] + e[2:-1] + e[3:]) / np.sqrt(8)
-    fit = told(beams.freq, beams.gamma(beams.joint) * (1 + LEVEL * mean_of_four), ["y", "theta"], noise=None)
+    fit = fit_of(beams.freq, beams.gamma(beams.joint) * (1 + LEVEL * mean_of_four), ["y", "theta"], noise=None)
     (note,) = fit.notes
     assert 30 < float(note.split("as much as ")[1].split()[0]) < 60
 
@@ -120,7 +120,7 @@ def test_outlying_lines_are_listed(found, beams):
     exact, hum = beams.gamma(beams.joint), [20, 90]
     h = jf.pollute(exact, LEVEL, seed=3)
     h[hum] = jf.pollute(exact[hum], 0.3, seed=9)
-    assert told(beams.freq, h, ["y", "theta"], noise=None).notes == (start + "115, 465 Hz",)
+    assert fit_of(beams.freq, h, ["y", "theta"], noise=None).notes == (start + "115, 465 Hz",)
 
 
 def test_damping_that_may_be_zero_is_noted_but_not_a_stiffness(found):
@@ -153,7 +153,7 @@ def test_an_interval_as_wide_as_the_value_is_not_yet_poor(found):
 def test_a_rigid_dof_is_told_with_a_bound_below_it(beams):
     k = beams.joint.dynamic_stiffness(beams.freq)
     k[:, 0, 0] = 1e13
-    fit = told(beams.freq, jf.pollute(between(beams, k), LEVEL, seed=3), ["y", "theta"])
+    fit = fit_of(beams.freq, jf.pollute(between(beams, k), LEVEL, seed=3), ["y", "theta"])
     told_of_k = "k_y: this DOF cannot be distinguished from a rigid one; at least "
     assert any(text.startswith(told_of_k) for text in fit.warnings)
     assert "c_y: not significantly different from zero (95 % interval)" in fit.notes
@@ -161,14 +161,14 @@ def test_a_rigid_dof_is_told_with_a_bound_below_it(beams):
 
 def test_damping_of_the_other_time_convention_is_negative(beams):
     h = jf.pollute(beams.gamma(beams.joint), LEVEL, seed=4).conj()
-    fit = told(beams.freq, h, ["y", "theta"])
+    fit = fit_of(beams.freq, h, ["y", "theta"])
     for name in ("c_y", "c_theta"):
         assert any(text.startswith(f"{name}: significantly negative, -") for text in fit.warnings)
     assert fit.damping[0] == pytest.approx(-20, rel=0.03)
 
 
 def test_a_residual_below_the_noise_is_told(beams):
-    fit = told(beams.freq, jf.pollute(beams.gamma(beams.joint), LEVEL, seed=3), ["y", "theta"], noise=2 * LEVEL)
+    fit = fit_of(beams.freq, jf.pollute(beams.gamma(beams.joint), LEVEL, seed=3), ["y", "theta"], noise=2 * LEVEL)
     assert not fit.warnings
     (text,) = (note for note in fit.notes if "residual" in note)
     assert text.startswith("the residual is 0.5 times the noise: the FRFs have less noise than said, or were smoothed")
@@ -176,7 +176,7 @@ def test_a_residual_below_the_noise_is_told(beams):
 
 def test_a_residual_above_the_noise_is_told(beams):
     h = jf.pollute(beams.gamma(beams.joint), LEVEL, seed=3)
-    (text,) = told(beams.freq, h, ["y", "theta"], noise=LEVEL / 2).warnings
+    (text,) = fit_of(beams.freq, h, ["y", "theta"], noise=LEVEL / 2).warnings
     assert text.startswith("the residual is 2.01 times the noise, 36 sigma above it")
     assert text.endswith("the joint does not fit the data")
 
@@ -190,21 +190,21 @@ def test_no_residual_is_compared_with_a_level_that_it_gave(found):
 def test_exact_frfs_made_reciprocal_show_no_noise(beams):
     """What a rational function leaves of them is its own error."""
     h = beams.gamma(beams.joint)
-    fit = told(beams.freq, (h + h.swapaxes(1, 2)) / 2, ["y", "theta"], noise=None)
+    fit = fit_of(beams.freq, (h + h.swapaxes(1, 2)) / 2, ["y", "theta"], noise=None)
     assert fit.warnings == ()
     assert fit.noise_level < 1e-9
 
 
 def test_noise_said_of_a_mean_of_two(beams):
     h = jf.pollute(beams.gamma(beams.joint), LEVEL, seed=3)
-    fit = told(beams.freq, (h + h.swapaxes(1, 2)) / 2, ["y", "theta"])
+    fit = fit_of(beams.freq, (h + h.swapaxes(1, 2)) / 2, ["y", "theta"])
     (text,) = (note for note in fit.notes if "residual" in note)
     assert "or h_pq and h_qp were replaced by their mean, whose noise is smaller" in text
 
 
 def test_noise_said_by_part(beams):
     h = jf.pollute(beams.gamma(beams.joint), 0.1, "complex-per-part", seed=3)
-    (text,) = told(beams.freq, h, ["y", "theta"], noise=0.1).warnings
+    (text,) = fit_of(beams.freq, h, ["y", "theta"], noise=0.1).warnings
     assert re.match(
         r"the residual is 1\.4\d times the noise, .* or the noise was said for real and imaginary parts", text
     )
@@ -213,7 +213,7 @@ def test_noise_said_by_part(beams):
 @pytest.mark.parametrize("seed", [1, 2])
 def test_the_residual_of_large_noise_is_that_said(chains, seed):
     """Smooth FRFs by weights that noise has changed would be too small, and the residual too large for them."""
-    fit = told(chains.freq, jf.pollute(chains.gamma(chains.joint), 0.5, seed=seed), ["x"], noise=0.5)
+    fit = fit_of(chains.freq, jf.pollute(chains.gamma(chains.joint), 0.5, seed=seed), ["x"], noise=0.5)
     assert fit.residual_level == pytest.approx(0.5, rel=0.045)
 
 
@@ -233,7 +233,7 @@ def test_a_trend_names_the_parameter_and_where_it_is_least_and_largest(found):
 def test_a_stiffness_that_drifts_over_the_band_is_told(beams):
     k = beams.joint.dynamic_stiffness(beams.freq)
     k[:, 1, 1] *= np.linspace(1, 1.2, beams.freq.size)
-    texts = told(beams.freq, jf.pollute(between(beams, k), LEVEL, seed=3), ["y", "theta"]).warnings
+    texts = fit_of(beams.freq, jf.pollute(between(beams, k), LEVEL, seed=3), ["y", "theta"]).warnings
     assert any(text.startswith("k_theta is not one constant over frequency: parts of the band give") for text in texts)
     assert not any(text.startswith("k_y is not") for text in texts)
 
@@ -246,14 +246,14 @@ def coupled(beams, k_cross, seed):
 
 def test_coupled_dofs_are_told_instead_of_what_follows_from_them(beams):
     h = coupled(beams, 2e4, 3)
-    (text,) = told(beams.freq, h, ["y", "theta"]).warnings
+    (text,) = fit_of(beams.freq, h, ["y", "theta"]).warnings
     assert "with cross terms it does: the DOFs of the joint are coupled" in text
-    assert not told(beams.freq, h, ["y", "theta"], cross="fit").warnings
+    assert not fit_of(beams.freq, h, ["y", "theta"], cross="fit").warnings
 
 
 def test_cross_terms_ignored_cost_no_lines(beams):
     """What is unknown of the compliance moves with the fit on lines that do not fit yet."""
-    fit = told(beams.freq, coupled(beams, 2e3, 4), ["y", "theta"], cross="ignore")
+    fit = fit_of(beams.freq, coupled(beams, 2e3, 4), ["y", "theta"], cross="ignore")
     assert not fit.warnings
     # 1/C_dd, which is k less 0.1 %.
     np.testing.assert_allclose(fit.stiffness, [599207, 4997.3], rtol=0.01)
@@ -271,7 +271,7 @@ def test_lines_that_do_not_fit_are_counted_unless_cross_terms_explain_them(found
 def test_random_phases_on_ten_lines_are_left_out(beams):
     h = jf.pollute(beams.gamma(beams.joint), LEVEL, seed=3)
     h[60:70] = abs(h[60:70]) * np.exp(2j * np.pi * np.random.default_rng(1).random((10, 4, 4)))
-    fit = told(beams.freq, h, ["y", "theta"])
+    fit = fit_of(beams.freq, h, ["y", "theta"])
     # A neighbour may go with them: smooth FRFs see across it.
     (text,) = fit.warnings
     assert re.fullmatch(r"1[0-2] of 158 lines do not fit the joint found within their noise and are left out", text)
@@ -298,8 +298,8 @@ def two_chains(chains):
 
 def test_groups_are_named(chains):
     text = "the FRFs between (x) and (y) are zero: each group is fitted separately"
-    assert told(chains.freq, two_chains(chains), ["x", "y"]).notes == (text,)
-    coupled = told(chains.freq, two_chains(chains), ["x", "y"], cross="fit")
+    assert fit_of(chains.freq, two_chains(chains), ["x", "y"]).notes == (text,)
+    coupled = fit_of(chains.freq, two_chains(chains), ["x", "y"], cross="fit")
     assert coupled.notes == (text + ", and cross terms between them cannot be identified",)
     assert list(coupled.value) == ["k_x", "k_y", "c_x", "c_y"]
 
@@ -307,5 +307,5 @@ def test_groups_are_named(chains):
 def test_lines_left_out_of_a_group_name_its_dofs(chains):
     h = two_chains(chains)
     h[40:50, ::2, ::2] *= np.exp(2j * np.pi * np.random.default_rng(1).random((10, 2, 2)))
-    (text,) = told(chains.freq, h, ["x", "y"]).warnings
+    (text,) = fit_of(chains.freq, h, ["x", "y"]).warnings
     assert text.startswith("10 of 191 lines of x do not fit")

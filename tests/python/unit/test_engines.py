@@ -285,8 +285,8 @@ def check_parity(call: Call, leave_out: tuple[int, ...] = ()) -> None:
     """Compare every engine with the reference; the numbers of the lines left out may differ."""
     expected, info, rcond = on("lapack", call)
     limit = allowed(call, expected)
-    told = (info == 0) & (rcond > 1e-10)
-    within = 1 + TOLERANCE * EPS / rcond[told] if call.routine == "invert" else 30
+    reported = (info == 0) & (rcond > 1e-10)
+    within = 1 + TOLERANCE * EPS / rcond[reported] if call.routine == "invert" else 30
     for engine in ENGINES:
         what = f"{call.routine} {call.shape} {engine}"
         result, info_fast, rcond_fast = on(engine, call)
@@ -299,7 +299,7 @@ def check_parity(call: Call, leave_out: tuple[int, ...] = ()) -> None:
         good[list(leave_out)] = False
         apart = largest(result - expected)[good]
         assert (apart <= limit[good]).all(), f"{what}: {(apart / limit[good]).max():.1e} times as far apart as allowed"
-        ratio = rcond_fast[told] / rcond[told]
+        ratio = rcond_fast[reported] / rcond[reported]
         assert (ratio <= within).all(), f"{what}: rcond {ratio.max()} times that of the reference"
         assert (ratio >= 1 / within).all(), f"{what}: rcond {ratio.min()} times that of the reference"
         assert (rcond_fast <= 1).all(), what

@@ -22,8 +22,8 @@ def circular(shape, seed=0):
 def identified(freq, gamma, dofs=DOFS, **options):
     with warnings.catch_warnings():
         warnings.simplefilter("error", RuntimeWarning)
-        for told in (jf.FrfCheckWarning, jf.IdentificationWarning, jf.ConvergenceWarning):
-            warnings.simplefilter("ignore", told)
+        for reported in (jf.FrfCheckWarning, jf.IdentificationWarning, jf.ConvergenceWarning):
+            warnings.simplefilter("ignore", reported)
         return jf.identify(freq, gamma, dofs, **options)
 
 
@@ -103,9 +103,9 @@ NOTHING = {
 
 @pytest.mark.parametrize("what", NOTHING)
 def test_no_result_from_nothing(beams, what):
-    change, options, told = NOTHING[what]
+    change, options, reported = NOTHING[what]
     h = beams.gamma(beams.joint)
-    with pytest.raises(ValueError, match=told) as raised:
+    with pytest.raises(ValueError, match=reported) as raised:
         identified(*change(beams, h, jf.pollute(h, 0.01, seed=1)), **options)
     assert "\n" not in str(raised.value)
 

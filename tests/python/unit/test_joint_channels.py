@@ -67,16 +67,16 @@ def test_one_channel_both_ways_is_one():
 def test_dofs_left_out_are_named():
     frfs = hammer_test().receptance()
     found = sides(frfs, at=POINT + np.array([0, 0.006, 0]), dofs=["x", "y", "z"])
-    told = {(one.dof, one.into) for one in found.left_out(found.gamma(frfs)) if one.matters}
-    assert any(dof.startswith("theta") for dof, _ in told)
+    reported = {(one.dof, one.into) for one in found.left_out(found.gamma(frfs)) if one.matters}
+    assert any(dof.startswith("theta") for dof, _ in reported)
 
 
 def test_two_reference_points():
     frfs = hammer_test().receptance()
     found = sides(frfs, at_k=POINT + np.array([0, 0.01, 0]))
     np.testing.assert_allclose(found.responses.references[1] - found.responses.references[0], [0, 0.01, 0])
-    told = [str(one) for one in offset_couplings(found.responses)]
-    assert told == [
+    reported = [str(one) for one in offset_couplings(found.responses)]
+    assert reported == [
         "the offset between the reference points couples z with theta_x: 10 mm",
         "the offset between the reference points couples x with theta_z: -10 mm",
     ]

@@ -42,9 +42,9 @@ def test_nothing_is_found_where_the_model_is_right(seed):
 
 def test_findings_by_chance_are_as_rare_as_said():
     """Of a hundred right models, trends at 0.1 % each and misfits beyond three sigma."""
-    told = [diagnosed(found(seed=seed), 1.0) for seed in range(100)]
-    assert sum(bool(one.trends) for one in told) <= 1
-    assert sum(one.is_large or one.is_small for one in told) <= 1
+    reported = [diagnosed(found(seed=seed), 1.0) for seed in range(100)]
+    assert sum(bool(one.trends) for one in reported) <= 1
+    assert sum(one.is_large or one.is_small for one in reported) <= 1
 
 
 def test_sigma_is_the_scatter_of_a_ratio_to_a_level_from_as_many_data():

@@ -82,7 +82,7 @@ def test_noise_given_as_variances_keeps_the_lines_of_the_bands(beams):
 
 
 def test_coherence_brings_the_noise_of_each_line_and_averages_scale_it(beams):
-    """A band with twenty times the noise power, told by the coherence alone."""
+    """A band with twenty times the noise power, seen in the coherence alone."""
     exact, n_averages = beams.gamma(beams.joint), 16
     level = np.where((beams.freq > 300) & (beams.freq < 450), 0.09, 0.02)[:, None, None]
     rng = np.random.default_rng(5)
@@ -118,7 +118,7 @@ def test_frfs_made_reciprocal_are_told_from_measured_ones(beams):
 
 
 @pytest.mark.parametrize(
-    ("noise", "told"),
+    ("noise", "reported"),
     [
         (NoiseOptions(-0.1), "noise must be positive, not -0.1"),
         (NoiseOptions(0.0), "noise must be positive, not 0"),
@@ -134,8 +134,8 @@ def test_frfs_made_reciprocal_are_told_from_measured_ones(beams):
         (NoiseOptions(coherence=np.ones((10, 4, 4))), "coherence must have shape"),
     ],
 )
-def test_noise_that_cannot_be(beams, noise, told):
-    with pytest.raises(ValueError, match=told):
+def test_noise_that_cannot_be(beams, noise, reported):
+    with pytest.raises(ValueError, match=reported):
         prepared(beams, noise=noise)
 
 
@@ -165,7 +165,7 @@ def test_a_pair_of_transforms_takes_rectangular_frfs_to_the_joint(beams):
 
 
 @pytest.mark.parametrize(
-    ("transform", "told"),
+    ("transform", "reported"),
     [
         (np.eye(3), "transform must have shape"),
         (np.eye(4)[:3], "transform must have an even number of rows"),
@@ -174,8 +174,8 @@ def test_a_pair_of_transforms_takes_rectangular_frfs_to_the_joint(beams):
         ((np.eye(4), np.eye(4)[:2]), "transform must lead to the same DOFs from responses and forces, not to 4 and 2"),
     ],
 )
-def test_transforms_that_cannot_be(beams, transform, told):
-    with pytest.raises(ValueError, match=told):
+def test_transforms_that_cannot_be(beams, transform, reported):
+    with pytest.raises(ValueError, match=reported):
         prepared(beams, transform=transform)
 
 

@@ -70,10 +70,10 @@ def test_what_coherence_tells_is_a_part(found):
     x = h + np.sqrt((1 - squared) / (10 * squared)) * abs(h) * e
     noise = jf.estimate_noise(freq, x, coherence=squared, averages=10)
     shown = curves(noise_panel(freq, x[:, 0, 0], noise, (0, 0), ("j:y", "j:y")))
-    told = shown["part from coherence"].y
+    reported = shown["part from coherence"].y
     expected = noise.coherence_factor[0, 0] * np.sqrt((1 - squared) / (10 * squared))[::-1, 0, 0] * abs(x[::-1, 0, 0])
     expected = expected * np.sqrt(noise.line_level[::-1])
-    np.testing.assert_allclose(told, expected, rtol=1e-6)
+    np.testing.assert_allclose(reported, expected, rtol=1e-6)
 
 
 def test_frfs_without_noise_have_no_panels(beams):

@@ -127,9 +127,9 @@ def test_files_hold_every_realisation(whole, drawn, tmp_path):
 
 
 def test_json_holds_no_nan(whole):
-    told = json.loads(json.dumps(whole.to_dict(), allow_nan=False))
-    assert told["summary"][1]["bound"] is None
-    assert told["design"]["factors"] == {"noise": [0.01, 0.1]}
+    shown = json.loads(json.dumps(whole.to_dict(), allow_nan=False))
+    assert shown["summary"][1]["bound"] is None
+    assert shown["design"]["factors"] == {"noise": [0.01, 0.1]}
 
 
 def test_figures_over_a_factor(whole):

@@ -144,9 +144,11 @@ def test_a_singular_line_is_named_by_its_number_in_the_sweep(lines):
 
 def test_ill_conditioned_lines_are_told_once(lines):
     lines[600:1300] = np.diag([1.0, 1e-15, 1.0])
-    with pytest.warns(jf.IllConditionedWarning, match="counted from line 512; so are lines of 1 other chunk") as told:
+    with pytest.warns(
+        jf.IllConditionedWarning, match="counted from line 512; so are lines of 1 other chunk"
+    ) as reported:
         jf.sweep(jf.invert, {"a": lines}, np.empty_like(lines), plan=plan_of(512), jobs=1)
-    assert len(told) == 1
+    assert len(reported) == 1
 
 
 def test_what_does_not_fit_is_said_before_anything_is_computed(lines, tmp_path):

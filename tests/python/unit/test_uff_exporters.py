@@ -15,9 +15,9 @@ pyuff = pytest.importorskip("pyuff")
 
 def read(path, content):
     path.write_bytes(content)
-    with warnings.catch_warnings(record=True) as told:
+    with warnings.catch_warnings(record=True) as warned:
         warnings.simplefilter("always")
-        return read_uff(path), [str(each.message) for each in told if each.category is FileContentWarning]
+        return read_uff(path), [str(each.message) for each in warned if each.category is FileContentWarning]
 
 
 @pytest.mark.parametrize("name", EXPORTERS)
@@ -42,10 +42,10 @@ def test_what_is_told_of_each_form(tmp_path):
         "dataset 164 in mm": "",
     }
     for name, content in EXPORTERS.items():
-        _, told = read(tmp_path / "export.uff", content())
+        _, warned = read(tmp_path / "export.uff", content())
         words = expected.get(name, "")
-        assert bool(told) == bool(words), (name, told)
-        assert words in " ".join(told), (name, told)
+        assert bool(warned) == bool(words), (name, warned)
+        assert words in " ".join(warned), (name, warned)
 
 
 def test_coherence_of_averaged_frfs(tmp_path):

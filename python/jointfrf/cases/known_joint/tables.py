@@ -148,7 +148,7 @@ def _failing(cells: list[tuple[Cell, ...]]) -> tuple[int, ...]:
     return tuple(i for i, row in enumerate(cells) if row[-1] == verdict(False))
 
 
-#: Relative errors without noise, and between ISMM and its short form, up to which "fits" is said: rounding is below.
+#: Relative errors without noise, and between ISMM and its short form, that "fit": those of rounding are smaller.
 _NOISE_FREE_LIMIT, _SHORT_FORM_LIMIT = 1e-6, 1e-10
 #: An equation is exact up to this many roundings of the FRFs it takes.
 _ROUNDINGS = 100

@@ -17,7 +17,7 @@ from jointfrf.report.table import Cell, Table, number
 
 __all__ = ["build_figures", "build_numbers", "build_summary", "build_tables"]
 
-#: Chance of a coverage as low as that of a row that is said not to fit.
+#: Chance of a coverage as low as that of a row whose verdict is "does not fit".
 _CHANCE = 0.005
 
 
