@@ -3,6 +3,7 @@ from jointfrf import io as io
 from jointfrf import report as report
 from jointfrf import solids as solids
 from jointfrf.assembly_file.measured import MeasuredAssembly, measured_assembly
+from jointfrf.assembly_file.read import AssemblyPart, read_part
 from jointfrf.channels.check.check import check_frfs
 from jointfrf.channels.check.finding import FrfCheck, FrfFinding
 from jointfrf.channels.joint_channels import ChannelAgreement, JointChannels, SideAgreement, joint_channels
@@ -113,6 +114,7 @@ __all__ = [
     "STRESS_AREA",
     "AddedMass",
     "Assembly",
+    "AssemblyPart",
     "BandStatistics",
     "Bolt",
     "BoltedLap",
@@ -235,6 +237,7 @@ __all__ = [
     "preload_force",
     "propose_bands",
     "read_joint",
+    "read_part",
     "read_study",
     "realisations",
     "receptance",

@@ -6,7 +6,7 @@ import importlib
 import importlib.util
 from typing import Any
 
-__all__ = ["MissingPackageError", "check_extras", "import_extra"]
+__all__ = ["MissingPackageError", "check_extras", "extra_of", "import_extra"]
 
 #: What each package is for, and the extra of the installation that brings it.
 _EXTRAS = {
@@ -14,6 +14,8 @@ _EXTRAS = {
     "jinja2": ("reports", "report"),
     "matplotlib": ("figures", "plot"),
     "mumps": ("factors by MUMPS", "mumps"),
+    "ansys": (".full files of Ansys", "ansys"),
+    "pyyeti": ("OUTPUT2 and OUTPUT4 files of Nastran", "nastran"),
     "pymetis": ("orders of elimination by METIS", "metis"),
     "pypardiso": ("factors by PARDISO", "pardiso"),
     "pyarrow": ("Parquet files", "parquet"),
@@ -70,6 +72,11 @@ def check_extras(*packages: str) -> None:
             is_found = False
         if not is_found:
             raise _missing(package)
+
+
+def extra_of(package: str) -> str:
+    """Return the extra of the installation that brings a package."""
+    return _EXTRAS[package][1]
 
 
 def _missing(package: str) -> MissingPackageError:

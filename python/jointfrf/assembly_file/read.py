@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import msgspec
 import numpy as np
+from numpy.typing import ArrayLike
 
 from jointfrf.assembly_file.keys import AssemblyKeys, PartKeys, Prior, PriorKeys, ReceptancesPart
 from jointfrf.cases.substructures import MeasuredStructure, ModelStructure, Structure
@@ -18,15 +19,16 @@ from jointfrf.identification.joint_file import read_joint
 from jointfrf.identification.model.assembly import AddedMass, Assembly, Attachment, GroundSpring
 from jointfrf.identification.model.substructure import SCALES, Substructure, Unknown
 from jointfrf.joint import Joint
-from jointfrf.kernel.arguments import FloatArray
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_frequency
 from jointfrf.laws.joint_toml import read_joint_table, start_values
 from jointfrf.laws.law_joint import LawJoint
+from jointfrf.models.facts import model_facts
 from jointfrf.models.model import Model
 from jointfrf.spelling import did_you_mean
 from jointfrf.toml.declared import read_keys
 from jointfrf.toml.table import TomlTable, read_toml
 
-__all__ = ["AssemblyFile", "AssemblyPart", "check_dofs", "read_assembly_file", "unknown_of"]
+__all__ = ["AssemblyFile", "AssemblyPart", "check_dofs", "read_assembly_file", "read_part", "unknown_of"]
 
 
 @dataclass(frozen=True)
@@ -53,6 +55,22 @@ class AssemblyPart:
             return self.structure.frfs.has(channel, channel)
         except ValueError:
             return False
+
+    @property
+    def places(self) -> dict[str, FloatArray]:
+        """Where its nodes and reference points are, m, as far as it is known."""
+        return self.structure.places
+
+    def describe(self) -> list[str]:
+        """Say what shows that files hold the right thing, line by line; nothing of parts that are built or measured."""
+        if not isinstance(self.structure, ModelStructure) or not self.structure.about:
+            return []
+        facts = model_facts(self.structure.model)
+        return [self.structure.about, *facts.lines(), *(f"warning: {text}" for text in facts.findings)]
+
+    def receptance(self, freq_hz: ArrayLike, dofs: Sequence[str]) -> ComplexArray:
+        """Return the receptances between DOFs as believed, shape (n_freq, m, m), m/N."""
+        return self.structure.receptance(as_frequency(freq_hz), dofs)
 
     def substructure(self, freq_hz: FloatArray, dofs: Sequence[str]) -> Substructure:
         """Return the substructure with its unknowns; of FRFs, those between its joint and these DOFs."""
@@ -95,6 +113,41 @@ class AssemblyPart:
         if name not in numbers and isinstance(prior, PriorKeys) and prior.mean is not None:
             raise table.wrong(name, "it is a factor of the matrices, about 1: leave mean out")
         return unknown_of(prior, numbers.get(name, 1.0), table, name, -np.inf if name == "poisson" else 0.0)
+
+
+def read_part(path: Path | str) -> AssemblyPart:
+    r"""Read a part by itself: `part.toml` holds what `[A]` of `assembly.toml` holds.
+
+    Parameters
+    ----------
+    path : path-like
+        A TOML file with the keys of one part; files that it names are relative to its folder.
+
+    Returns
+    -------
+    AssemblyPart
+        Its DOFs by `has`, places of nodes and points by `places`, FRFs by `receptance`, for a fit `substructure`.
+
+    Raises
+    ------
+    FileContentError
+        One sentence that names the file and the key; all keys that are missing.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> import jointfrf as jf
+    >>> with TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "part.toml"
+    ...     _ = path.write_text(
+    ...         'model = "beam"\nlength = 0.3\nelements = 3\nyoungs_modulus = 70e9\ndensity = 2700.0\n'
+    ...         'width = 0.02\nheight = 0.01\nloss_factor = 0.01\njoint = ["4:y", "4:theta"]\n')
+    ...     part = jf.read_part(path)
+    >>> part.places["4"].tolist(), part.receptance([50.0, 60.0], ["4:y", "1:y"]).shape
+    ([0.3, 0.0, 0.0], (2, 2, 2))
+    """
+    keys = read_keys(read_toml(Path(path)), *get_args(PartKeys))
+    return AssemblyPart(keys, keys.structure(np.ones(1)))
 
 
 def unknown_of(prior: Prior, value: float, table: TomlTable, name: str, lower: float = 0.0) -> Unknown:

@@ -2,25 +2,18 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections import Counter
-from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import partial
-from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 from msgspec import field
-from scipy import sparse
 
 from jointfrf.cases.keys import MaterialKeys, read_frf_file
-from jointfrf.frf.frf_set import POWER_OF_I_OMEGA, Channel, FrfSet
-from jointfrf.io.matrix_file import read_dof_names, read_matrix
-from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.cases.matrices import MatricesKeys
+from jointfrf.cases.structure import MeasuredStructure, ModelStructure, Structure, SubstructureKeys
+from jointfrf.frf.frf_set import POWER_OF_I_OMEGA
+from jointfrf.kernel.arguments import FloatArray
 from jointfrf.models.beam import BeamElement, End, beam
-from jointfrf.models.matrices import is_symmetric
-from jointfrf.models.model import Ground, Model, chain
+from jointfrf.models.model import Ground, chain
 from jointfrf.solids.brick_beam import Face, Hole, Preset, brick_beam
 from jointfrf.toml.declared import Keys, NotNegative, Positive, key, read_keys
 from jointfrf.toml.table import TomlTable
@@ -28,6 +21,7 @@ from jointfrf.toml.table import TomlTable
 __all__ = [
     "PRESET",
     "SUBSTRUCTURES",
+    "MatricesKeys",
     "MeasuredStructure",
     "ModelStructure",
     "Structure",
@@ -35,110 +29,8 @@ __all__ = [
     "read_model",
 ]
 
-#: Two frequencies are the same line if they differ by less than this share: Universal Files hold six digits.
-_SAME_LINE = 1e-5
 #: A key of all models of bricks.
 PRESET = key("Elements: `seed` as in the thesis (C3D8R), `accurate` with incompatible modes (C3D8I).", example="seed")
-
-
-class Structure(ABC):
-    """One of the two structures that the joint connects."""
-
-    @abstractmethod
-    def check_points(self, joint: Sequence[str], internal: Sequence[str]) -> None:
-        """Raise a ValueError if a joint DOF or an internal one is missing, or a joint DOF is named twice."""
-
-    @abstractmethod
-    def receptance(self, freq_hz: FloatArray, points: Sequence[str]) -> ComplexArray:
-        """Return the receptance between DOFs, shape (n_freq, m, m), m/N."""
-
-
-def _check_once(names: Sequence[str]) -> None:
-    twice = [name for i, name in enumerate(names) if name in names[:i]]
-    if twice:
-        raise ValueError(f"the joint DOF {twice[0]!r} is named twice")
-
-
-@dataclass(frozen=True)
-class ModelStructure(Structure):
-    """A substructure known by its model.
-
-    Attributes
-    ----------
-    model : Model
-    x : ndarray, shape (n_nodes,), or None
-        Positions of the nodes along a beam, m.
-    """
-
-    model: Model
-    x: FloatArray | None = None
-
-    def check_points(self, joint: Sequence[str], internal: Sequence[str]) -> None:
-        """Raise an error if a DOF is missing; a joint cannot act on a mean motion."""
-        self.dofs(joint)
-        _check_once(joint)
-        self.model.ports(*joint, *internal)
-
-    def dofs(self, names: Sequence[str]) -> list[int]:
-        """Return DOFs, counted from 0."""
-        found = self.model.index(*names)
-        return [found] if isinstance(found, int) else found
-
-    def receptance(self, freq_hz: FloatArray, points: Sequence[str]) -> ComplexArray:
-        """Return the receptance of the model."""
-        return self.model.receptance(freq_hz, self.model.ports(*points))
-
-
-@dataclass(frozen=True)
-class MeasuredStructure(Structure):
-    """A substructure known by its FRFs.
-
-    Attributes
-    ----------
-    frfs : FrfSet
-        Receptances.
-    """
-
-    frfs: FrfSet
-
-    def check_points(self, joint: Sequence[str], internal: Sequence[str]) -> None:
-        """Raise an error if an FRF is missing, or a point does not move where it is driven."""
-        channels = [Channel.parse(name) for name in (*joint, *internal)]
-        _check_once([f"{channel.node}:{channel.axis}" for channel in channels[: len(joint)]])
-        h = self.frfs.matrix(channels, channels)
-        for i, channel in enumerate(channels):
-            if not h[:, i, i].any():
-                raise ValueError(f"{self.frfs.source}: the FRF {channel} / {channel} is zero on all lines")
-
-    def receptance(self, freq_hz: FloatArray, points: Sequence[str]) -> ComplexArray:
-        """Return the receptances on lines that the set holds."""
-        h: ComplexArray = self.frfs.matrix(points, points)[self.lines_at(freq_hz)]
-        return h
-
-    def lines_at(self, freq_hz: FloatArray) -> list[int]:
-        """Return the lines of the set at given frequencies; raises a ValueError where it has none there."""
-        held = self.frfs.freq_hz
-        above = np.clip(np.searchsorted(held, freq_hz), 1, max(held.size - 1, 1))
-        below = above - 1
-        above = np.minimum(above, held.size - 1)
-        nearest = np.where(abs(held[above] - freq_hz) < abs(held[below] - freq_hz), above, below)
-        missing = abs(held[nearest] - freq_hz) > _SAME_LINE * freq_hz
-        if missing.any():
-            first = int(np.argmax(missing))
-            raise ValueError(
-                f"{self.frfs.source} has no line at {freq_hz[first]:g} Hz, the nearest is {held[nearest[first]]:g} Hz "
-                f"({int(missing.sum())} of {freq_hz.size} lines are missing); [frequency] can take the lines of a file "
-                "by from_file"
-            )
-        return [int(line) for line in nearest]
-
-
-class SubstructureKeys(Keys, tag_field="model"):
-    """One of the two structures that the joint connects."""
-
-    def structure(self, freq_hz: FloatArray) -> Structure:
-        """Return the structure; FRFs must be available on all lines, Hz. Raises FileContentError."""
-        raise NotImplementedError
 
 
 class ChainKeys(SubstructureKeys, tag="chain"):
@@ -226,74 +118,6 @@ class BrickBeamKeys(SubstructureKeys, MaterialKeys, tag="brick-beam"):
             self.length, self.width, self.height, material, ends=self.ends, hole=hole, observed=self.observed,
             preset=self.preset, origin=self.origin,
         )))  # fmt: skip
-
-
-class MatricesKeys(SubstructureKeys, tag="matrices"):
-    """Matrices of your own: Matrix Market (`.mtx`), or NPZ of `scipy.sparse.save_npz` or `numpy.savez`.
-
-    An NPZ file holds one array, or arrays named like the keys here. Files are relative to `case.toml`.
-    """
-
-    stiffness: Annotated[str, key("K, symmetric, real.", "N/m", takes="name of a file")]
-    mass: Annotated[str, key("M, symmetric, real.", "kg", takes="name of a file")]
-    damping: Annotated[str | None, key("Viscous damping C.", "N s/m", takes="name of a file")] = None
-    structural_damping: Annotated[
-        str | None, key("Structural damping H, i H added to K.", "N/m", takes="name of a file")
-    ] = None
-    loss_factor: Annotated[NotNegative, key("Loss factor eta of the stiffness, K (1 + i eta).")] = 0.0
-    dofs: Annotated[
-        tuple[str, ...] | str,
-        key('Names of the DOFs in the order of the rows: `"12:y"`. In a file, one a line: `12:y`, or node and number '
-            "of the DOF (1 to 6): `12 2`; `#` begins a comment.", takes="list of texts, or name of a text file",
-            holds=lambda found: found != ()),
-    ]  # fmt: skip
-
-    def structure(self, freq_hz: FloatArray) -> Structure:
-        """Return the structure."""
-        names = ("stiffness", "mass", "damping", "structural_damping")
-        paths = {name: self.file_of(name) for name in names if getattr(self, name) is not None}
-        named = self.file_of("dofs") if isinstance(self.dofs, str) else self.dofs
-        found = {name: self.build(partial(read_matrix, path, name), name) for name, path in paths.items()}
-        n = found["stiffness"].shape[0]
-        for name, matrix in found.items():
-            if matrix.shape != (n, n):
-                raise self.wrong(name, f"{paths[name]} holds {matrix.shape[0]} DOFs, {paths['stiffness']} holds {n}")
-        for name in ("stiffness", "mass"):
-            if not is_symmetric(sparse.csc_array(found[name])):
-                raise self.wrong(name, _unsymmetric(paths[name], found[name]))
-        mass = found["mass"].diagonal()
-        if (mass < 0).any() or not mass.any():
-            why = "must have a diagonal that is not negative, and not zero as a whole"
-            raise self.wrong("mass", f"{paths['mass']} {why}")
-        dofs = self._dof_names(named, n)
-        c, h = (found.get(name) for name in names[2:])
-        return ModelStructure(Model(found["stiffness"], found["mass"], dofs, c, h, self.loss_factor))
-
-    def _dof_names(self, named: tuple[str, ...] | Path, n: int) -> tuple[str, ...]:
-        """Return the names of n DOFs, each once."""
-        given = named if isinstance(named, tuple) else self.build(partial(read_dof_names, named), "dofs")
-        where = "" if isinstance(named, tuple) else f"{named} "
-        if len(given) != n:
-            raise self.wrong("dofs", f"{where}names {len(given)} DOFs, the matrices hold {n}")
-        if not all(name.strip() for name in given):
-            raise self.wrong("dofs", f"{where}has an empty name")
-        name, count = Counter(given).most_common(1)[0]
-        if count > 1:
-            raise self.wrong("dofs", f"{where}names {name!r} twice")
-        return given
-
-
-def _unsymmetric(path: Path, matrix: sparse.csr_array) -> str:
-    """Say where a matrix is not symmetric."""
-    difference = sparse.coo_array(matrix - matrix.T)
-    worst = int(np.argmax(abs(difference.data)))
-    i, j = int(difference.row[worst]), int(difference.col[worst])
-    text = (
-        f"{path} must hold a symmetric matrix: entry ({i + 1}, {j + 1}) is {matrix[i, j]:g}, "
-        f"({j + 1}, {i + 1}) is {matrix[j, i]:g}"
-    )
-    is_triangle = sparse.triu(matrix, 1).count_nonzero() == 0 or sparse.tril(matrix, -1).count_nonzero() == 0
-    return text + ("; it holds one triangle only" if is_triangle else "")
 
 
 class ReceptancesKeys(SubstructureKeys, tag="receptances"):

@@ -11,7 +11,7 @@ from scipy import sparse
 
 from jointfrf.dofs import DIRECTIONS, rigid_motion
 from jointfrf.kernel.arguments import FloatArray, as_array, as_real
-from jointfrf.models.model import Model
+from jointfrf.models.points import PointModel
 from jointfrf.solids.brick import Formulation, Mass, Material, assemble_bricks
 from jointfrf.solids.mesh import Mesh
 
@@ -38,7 +38,7 @@ class Patch:
 
 
 @dataclass(frozen=True, kw_only=True)
-class SolidModel(Model):
+class SolidModel(PointModel):
     """A model of bricks; DOFs ``"node:x"`` with nodes counted from 1, and ``"name:theta_x"`` of reference points.
 
     Attributes
@@ -48,29 +48,11 @@ class SolidModel(Model):
         Displacements x, y, z of all nodes from the DOFs; zero rows where clamped.
     references : mapping of str to ndarray, shape (3,)
         Reference points, m, those of mean motions included.
-    means : mapping of str to sparse array, shape (6, n)
-        Mean motions of patches that are observed, from the DOFs.
     """
 
     mesh: Mesh
     expansion: sparse.csr_array
     references: Mapping[str, FloatArray]
-    means: Mapping[str, sparse.csr_array]
-
-    def ports(self, *names: str) -> list[int] | sparse.csr_array:
-        """Return DOFs, or weights where a mean motion is named, ``"tip:theta_x"``, as `jointfrf.receptance` takes them.
-
-        Raises
-        ------
-        ValueError
-            There is nothing of this name.
-        """
-        of_means = {f"{name}:{d}": rows[[i]] for name, rows in self.means.items() for i, d in enumerate(DIRECTIONS)}
-        if not any(name in of_means for name in names):
-            return super().ports(*names)
-        unit = sparse.eye_array(len(self.dofs), format="csr")
-        rows = [of_means[name] if name in of_means else unit[[self.index(name)]] for name in names]
-        return sparse.csr_array(sparse.vstack(rows))
 
     def displacements(self, shape: ArrayLike) -> FloatArray:
         """Return the displacements of all nodes in a motion of the DOFs, shape (n_nodes, 3)."""
@@ -145,7 +127,16 @@ def solid_model(
         mesh=mesh,
         expansion=expansion,
         references={name: patch.point for name, patch in (groups | shown).items()},
-        means={name: sparse.csr_array(mean_motion(mesh, patch) @ expansion) for name, patch in shown.items()},
+        places={
+            **{str(i): place for i, place in enumerate(mesh.nodes, 1)},
+            **{name: patch.point for name, patch in (groups | shown).items()},
+        },
+        shown={
+            f"{name}:{direction}": rows[[i]]
+            for name, patch in shown.items()
+            for rows in [sparse.csr_array(mean_motion(mesh, patch) @ expansion)]
+            for i, direction in enumerate(DIRECTIONS)
+        },
     )
 
 

@@ -7,7 +7,8 @@ import pytest
 from scipy.sparse import csc_array
 from scipy.sparse.linalg import splu
 
-from calculix_deck import deck, displacements, frequency_step, natural_frequencies, static_step
+import jointfrf as jf
+from calculix_deck import deck, displacements, frequency_step, natural_frequencies, static_step, stored_matrices
 from jointfrf.solids.bolted_lap import BODIES, LapDivisions, bolted_lap
 from jointfrf.solids.brick import Material
 from jointfrf.solids.brick_beam import brick_beam
@@ -69,3 +70,20 @@ def test_stiffness_of_a_preloaded_lap_joint(joint, tmp_path):
     ours = model.displacements(splu(csc_array(model.stiffness)).solve(model.expansion.T @ load))
     # Both pass the patch test on bricks that are not rectangular, by inner functions that differ a little.
     assert abs(ours - theirs).max() < 1e-3 * abs(theirs).max()
+
+
+@pytest.mark.long
+def test_matrices_that_calculix_stores_give_its_frequencies(tmp_path):
+    """Its deck, its matrices, its frequencies; mass and rigid motions are said."""
+    beam = brick_beam(0.3, 0.025, 0.006, ALUMINIUM)
+    bodies = {"A": (range(len(beam.mesh.elements)), ALUMINIUM)}
+    text = stored_matrices(CCX, deck(beam.mesh, bodies, (), ["*FREQUENCY, SOLVER=MATRIXSTORAGE", "1"]), tmp_path)
+    part = jf.read_part(text)
+    theirs = natural_frequencies(CCX, deck(beam.mesh, bodies, (), frequency_step(14)), tmp_path / "modes")
+    found = part.structure.model.natural_frequencies(14)
+    assert found[6:] == pytest.approx(theirs[6:], rel=1e-6)
+    lines = "\n".join(part.describe())
+    assert "model.sti, model.mas (CalculiX, SI); the upper triangle is stored, the other one was filled in" in lines
+    assert f"mass {0.3 * 0.025 * 0.006 * 2700:.4g} kg, centre of gravity" in lines
+    assert "6 rigid motions are free" in lines
+    assert "warning" not in lines

@@ -38,7 +38,8 @@ def deck(mesh, bodies, clamped, step, ties=(), springs=()):
         lines += [f"*SPRING, ELSET=S{i}", f"{axis + 1}, {axis + 1}", f"{stiffness:.17g}"]
     for follower, leader, axis in ties:
         lines += ["*EQUATION", "2", f"{follower + 1}, {axis + 1}, 1., {leader + 1}, {axis + 1}, -1."]
-    lines += ["*NSET, NSET=CLAMPED", _numbers(clamped), "*BOUNDARY", "CLAMPED, 1, 3"]
+    if len(clamped):
+        lines += ["*NSET, NSET=CLAMPED", _numbers(clamped), "*BOUNDARY", "CLAMPED, 1, 3"]
     return "\n".join([*lines, "*STEP", *step, "*END STEP", ""])
 
 
@@ -52,11 +53,26 @@ def static_step(node, force):
     return ["*STATIC", "*CLOAD", *loads, "*NODE PRINT, NSET=ALL", "U"]
 
 
+def run(ccx: str, text: str, folder: Path) -> str:
+    """Run CalculiX in a folder on ``model.inp``; return what it prints."""
+    folder.mkdir(exist_ok=True)
+    (folder / "model.inp").write_text(text)
+    done = subprocess.run([ccx, "model"], cwd=folder, capture_output=True, text=True, timeout=900, check=False)
+    assert "Job finished" in done.stdout, done.stdout[-2000:]
+    return done.stdout
+
+
+def stored_matrices(ccx: str, text: str, folder: Path, units: str = "SI", more: str = 'joint = ["1:x"]\n') -> Path:
+    """Let CalculiX store its matrices; return `part.toml` of them."""
+    run(ccx, text, folder)
+    keys = 'model = "matrices"\nstiffness = "model.sti"\nmass = "model.mas"\nnodes = "model.inp"\n'
+    (folder / "part.toml").write_text(f'{keys}units = "{units}"\n{more}')
+    return folder / "part.toml"
+
+
 def rows(ccx: str, text: str, folder: Path):
     """Run CalculiX and return the rows of numbers of its output."""
-    (folder / "model.inp").write_text(text)
-    run = subprocess.run([ccx, "model"], cwd=folder, capture_output=True, text=True, timeout=900, check=False)
-    assert "Job finished" in run.stdout, run.stdout[-2000:]
+    run(ccx, text, folder)
     lines = [line.split() for line in (folder / "model.dat").read_text().splitlines()]
     return [line for line in lines if len(line) > 3 and line[0].isdigit()]
 

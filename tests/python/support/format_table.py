@@ -1,4 +1,4 @@
-"""The table of the formats of files of FRFs, from the formats themselves.
+"""The tables of the formats of files of FRFs and of matrices, from the formats themselves.
 
 python tests/python/support/format_table.py docs/files.md    writes it into the page
 """
@@ -9,9 +9,11 @@ import re
 import sys
 from pathlib import Path
 
+from jointfrf.extras import extra_of
+from jointfrf.io.fe.matrix_formats import MATRIX_FORMATS
 from jointfrf.io.formats import FORMATS
 
-_PLACE = re.compile(r"(<!-- formats -->\n).*?(<!-- end -->\n)", re.DOTALL)
+_PLACE = re.compile(r"(<!-- (formats|matrices) -->\n).*?(<!-- end -->\n)", re.DOTALL)
 
 
 def format_table() -> str:
@@ -24,9 +26,20 @@ def format_table() -> str:
     return "\n".join(["| read | written by `write_frfs`, or | needs |", "|---|---|---|", *rows]) + "\n"
 
 
+def matrix_table() -> str:
+    """Return one row for each format of matrices."""
+    rows = [
+        f"| {each.name} ({', '.join(each.suffixes)}) | {each.content} | "
+        f"{f'`jointfrf[{extra_of(each.needs)}]`' if each.needs else ''} |"
+        for each in MATRIX_FORMATS
+    ]
+    return "\n".join(["| format | what is read | needs |", "|---|---|---|", *rows]) + "\n"
+
+
 def filled(page: str) -> str:
-    """Return a page with its table as it is now."""
-    return _PLACE.sub(lambda match: match[1] + format_table() + match[2], page)
+    """Return a page with its tables as they are now."""
+    tables = {"formats": format_table, "matrices": matrix_table}
+    return _PLACE.sub(lambda match: match[1] + tables[match[2]]() + match[3], page)
 
 
 if __name__ == "__main__":

@@ -38,7 +38,12 @@ KNOWN = {
     ("cli/study.py", "import_extra"): "executors that the command line names",
     ("io/formats.py", "import_module"): "modules of formats out of a list",
     ("io/hdf5_file.py", "import_extra"): "h5py",
-    ("io/matrix_file.py", "load_npz"): "scipy: of a file whose arrays have been read without pickles before",
+    ("io/fe/ansys_full.py", "import_extra"): "ansys-mapdl-reader, which reads numbers of a binary file",
+    ("io/fe/calculix.py", "loadtxt"): "numpy: numbers of a text file",
+    ("io/fe/nastran_op2.py", "import_extra"): "pyYeti, which reads numbers of a binary file",
+    ("io/fe/nastran_op4.py", "import_extra"): "pyYeti, which reads numbers of a file",
+    ("io/fe/nastran_op4.py", "load"): "pyYeti: numbers of a file",
+    ("io/fe/npz.py", "load_npz"): "scipy: of a file whose arrays have been read without pickles before",
     ("models/factors.py", "import_extra"): "solvers: pypardiso, mumps; orders: pymetis",
     (
         "parallel/line_arrays.py",

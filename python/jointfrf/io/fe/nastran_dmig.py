@@ -1,0 +1,79 @@
+"""Matrices of Nastran as DMIG cards, of a punch file or of bulk data."""
+
+from __future__ import annotations
+
+from array import array
+from pathlib import Path
+
+import numpy as np
+
+from jointfrf.errors import FileContentError
+from jointfrf.files import ReadLimit
+from jointfrf.io.fe.bulk import bulk_cards, bulk_number, is_bulk
+from jointfrf.io.fe.matrix_format import MatrixFormat, StoredMatrix, chosen_name, matrix_of_labels
+
+__all__ = ["NASTRAN_DMIG"]
+
+#: Form of a matrix: square, symmetric.
+_SQUARE, _SYMMETRIC = 1, 6
+#: Bytes of memory for a byte of text: lines, words, labels.
+_TIMES = 6
+
+
+class _Matrix:
+    """A matrix of which cards are read."""
+
+    def __init__(self, form: int, kind: int) -> None:
+        self.form, self.kind = form, kind
+        self.labels, self.values = array("q"), array("d")
+
+
+def _read(path: Path, name: str, limit: ReadLimit) -> StoredMatrix:
+    limit.take(_TIMES * path.stat().st_size)
+    found: dict[str, _Matrix] = {}
+    for _, fields in bulk_cards(path, {"DMIG"}):
+        title = fields[0].upper()
+        if _whole(fields[1], path) == 0 and title not in found:
+            found[title] = _Matrix(_whole(fields[2], path), _whole(fields[3] or "2", path))
+            continue
+        if title not in found:
+            raise FileContentError(f"{path} cannot be read as DMIG cards: {title!r} has no card that begins it")
+        _add_column(found[title], fields, path)
+    if not found:
+        raise FileContentError(f"{path} holds no DMIG cards")
+    title = chosen_name(path, name, list(found))
+    own = found[title]
+    if own.form not in (_SQUARE, _SYMMETRIC):
+        raise FileContentError(f"{path}: {title} is of form {own.form}, a square matrix is wanted (1 or 6)")
+    if own.kind > 2:
+        raise FileContentError(f"{path}: {title} must hold real numbers, not complex ones")
+    if not own.values:
+        raise FileContentError(f"{path}: {title} has no entries")
+    labels = np.array(own.labels, np.int64).reshape(-1, 4)
+    return matrix_of_labels(path, labels, np.array(own.values), limit, "Nastran")
+
+
+def _add_column(own: _Matrix, fields: list[str], path: Path) -> None:
+    """Add the entries of a card: a column, then rows with their values."""
+    column = (_whole(fields[1], path), _whole(fields[2] or "0", path))
+    rest = fields[4:]
+    for at in range(0, len(rest) - 2, 4):
+        if not rest[at]:
+            continue
+        own.labels.extend((_whole(rest[at], path), _whole(rest[at + 1] or "0", path), *column))
+        own.values.append(bulk_number(rest[at + 2], path))
+
+
+def _whole(word: str, path: Path) -> int:
+    if not word.isdecimal() or len(word) > 15:
+        raise FileContentError(f"{path} cannot be read as DMIG cards: {word[:20]!r} is no whole number")
+    return int(word)
+
+
+NASTRAN_DMIG = MatrixFormat(
+    name="Nastran DMIG",
+    suffixes=(".pch", ".bdf", ".dat"),
+    content="real square matrices, `K...`, `M...`, `B...`, `K4...`; scalar points are modal coordinates, `901:q`",
+    read=_read,
+    is_own=lambda path, head: path.suffix.lower() in (".pch", ".bdf", ".dat", ".asm", ".blk") and is_bulk(head),
+)

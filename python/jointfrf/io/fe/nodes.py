@@ -1,0 +1,230 @@
+"""Coordinates of nodes and sets of nodes: decks of Abaqus and CalculiX, bulk data of Nastran, Ansys, UFF, tables."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from jointfrf.errors import FileContentError
+from jointfrf.files import ReadLimit, check_file, damage_named, head_of, text_of
+from jointfrf.io.fe.bulk import bulk_cards, bulk_number, is_bulk
+from jointfrf.io.uff_file import UniversalFile, node_coordinates
+from jointfrf.kernel.arguments import FloatArray
+
+__all__ = ["NodeFile", "read_nodes"]
+
+#: Bytes of memory for a byte of text: lines, words, arrays of three numbers.
+_TIMES = 12
+#: Keywords of decks that make nodes in other ways than by their coordinates.
+_MAKERS = ("NGEN", "NFILL", "NCOPY", "NMAP")
+#: Nodes are read up to this number: eight columns, and more where programs write more.
+_LARGEST = 2**53
+
+
+@dataclass
+class NodeFile:
+    """Nodes of a model.
+
+    Attributes
+    ----------
+    coordinates : dict of str to ndarray, shape (3,)
+        By the number of the node as a text, in the unit of length of the file; m of a Universal File.
+    sets : dict of str to tuple of str
+        Sets of nodes by their names, capital letters.
+    turned : tuple of str
+        Nodes whose directions are not those of the basic system.
+    is_si : bool
+        Whether the file says its unit, so that coordinates are in m.
+    """
+
+    coordinates: dict[str, FloatArray] = field(default_factory=dict)
+    sets: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    turned: tuple[str, ...] = ()
+    is_si: bool = False
+
+    def add(self, path: Path, node: str, words: list[str]) -> None:
+        """Keep a node; raises FileContentError."""
+        numbers = [float(word or 0.0) for word in words] + [0.0] * (3 - len(words))
+        if not node.isdecimal() or int(node) > _LARGEST or not np.isfinite(numbers).all():
+            raise FileContentError(f"{path}: node {node[:20]} must have a number and finite coordinates")
+        self.coordinates[str(int(node))] = np.array(numbers)
+
+
+def read_nodes(path: Path, limit_gb: float | None = None) -> NodeFile:
+    """Read the coordinates of nodes.
+
+    Parameters
+    ----------
+    path : Path
+        A deck of Abaqus or CalculiX (``*NODE``, ``*NSET``), bulk data of Nastran (``GRID``), a ``.cdb`` of Ansys
+        (``NBLOCK``), a Universal File (datasets 15, 2411), or a text table of node, x, y, z.
+    limit_gb : float, optional
+        As for `jointfrf.io.read_frfs`.
+
+    Raises
+    ------
+    FileContentError
+        The file cannot be read, holds no nodes, or makes them in a way that is not read.
+    """
+    check_file(path, limit_gb)
+    head = head_of(path, limit_gb)
+    ReadLimit(path, limit_gb).take(_TIMES * path.stat().st_size)
+    reader = next(read for is_own, read in _READERS if is_own(path, head))
+    with damage_named(path, "a file of nodes", IndexError):
+        found = reader(path)
+    if not found.coordinates:
+        raise FileContentError(f"{path} holds no nodes with coordinates")
+    return found
+
+
+# ---------------------------------------------------------------- decks of Abaqus and CalculiX
+
+
+def _keyword(line: str) -> tuple[str, dict[str, str]]:
+    """Return the keyword of a line and its parameters, capital letters."""
+    word, *rest = (part.strip() for part in line[1:].split(","))
+    pairs = (part.partition("=") for part in rest if part)
+    return " ".join(word.upper().split()), {key.strip().upper(): value.strip().upper() for key, _, value in pairs}
+
+
+def _blocks(path: Path) -> Iterator[tuple[str, dict[str, str], list[list[str]]]]:
+    """Yield keyword, parameters and data lines of a deck."""
+    word, options, rows = "", dict[str, str](), list[list[str]]()
+    for line in text_of(path).splitlines():
+        text = line.strip()
+        if not text or text.startswith("**"):
+            continue
+        if text.startswith("*"):
+            yield word, options, rows
+            (word, options), rows = _keyword(text), []
+        else:
+            rows.append([part.strip() for part in text.rstrip(",").split(",")])
+    yield word, options, rows
+
+
+def _of_deck(path: Path) -> NodeFile:
+    found = NodeFile()
+    sets: dict[str, list[str]] = {}
+    turned: set[str] = set()
+    for word, options, rows in _blocks(path):
+        if word in _MAKERS or (word == "NODE" and options.get("SYSTEM", "R") != "R"):
+            raise FileContentError(f"{path}: *{word} makes nodes in a way that is not read: list them by *NODE")
+        if word in ("INSTANCE", "SYSTEM"):
+            raise FileContentError(f"{path}: *{word} moves nodes, which is not read: write a flat deck without it")
+        if word == "NODE":
+            for row in rows:
+                found.add(path, row[0], row[1:4])
+            if "NSET" in options:
+                sets.setdefault(options["NSET"], []).extend(row[0] for row in rows)
+        elif word == "NSET" and options.get("NSET"):
+            sets.setdefault(options["NSET"], []).extend(_members(path, options, rows, sets))
+        elif word == "TRANSFORM":
+            turned |= set(sets.get(options.get("NSET", ""), found.coordinates))
+    if not found.coordinates:
+        included = [options.get("INPUT", "?") for word, options, _ in _blocks(path) if word == "INCLUDE"]
+        hint = f": it includes {included[0]}: name that file" if included else ""
+        raise FileContentError(f"{path} holds no nodes with coordinates{hint}")
+    found.sets = {name: tuple(dict.fromkeys(nodes)) for name, nodes in sets.items()}
+    found.turned = tuple(sorted(turned, key=int))
+    return found
+
+
+def _members(path: Path, options: dict[str, str], rows: list[list[str]], sets: dict[str, list[str]]) -> Iterator[str]:
+    """Yield the nodes of a set: numbers, ranges, other sets."""
+    for row in rows:
+        if "GENERATE" in options:
+            first, last, *step = (int(word) for word in row if word)
+            stride = step[0] if step else 1
+            if stride < 1 or not 0 <= first <= last or (last - first) // stride > path.stat().st_size:
+                raise FileContentError(f"{path}: *NSET, GENERATE must count up in steps, not {', '.join(row)[:60]}")
+            yield from map(str, range(first, last + 1, stride))
+            continue
+        for word in row:
+            if word.isdecimal():
+                yield str(int(word))
+            elif word:
+                yield from sets.get(word.upper(), ())
+
+
+# ---------------------------------------------------------------- the others
+
+
+def _of_bulk(path: Path) -> NodeFile:
+    found = NodeFile()
+    turned, local = [], []
+    for _, fields in bulk_cards(path, {"GRID"}):
+        number, system, *rest = fields
+        if system not in ("", "0"):
+            local.append(number)
+            continue
+        found.add(path, number, [str(bulk_number(word, path)) if word else "0" for word in rest[:3]])
+        if rest[3] not in ("", "0"):
+            turned.append(number)
+    if local:
+        raise FileContentError(
+            f"{path}: the coordinates of {len(local)} GRIDs such as {local[0]} are those of a local system (CP), which "
+            "are not read: write them in the basic system"
+        )
+    found.turned = tuple(turned)
+    return found
+
+
+def _of_ansys(path: Path) -> NodeFile:
+    """Read NBLOCK: a format such as (3i9,6e21.13e3), then node, two numbers, x, y, z."""
+    found = NodeFile()
+    lines = iter(text_of(path).splitlines())
+    for line in lines:
+        if line.upper().startswith("NBLOCK"):
+            form = re.match(r"\(\s*(\d)i(\d+)\s*,\s*\d?e(\d+)", next(lines, ""), re.IGNORECASE)
+            if form is None:
+                raise FileContentError(f"{path}: the format of NBLOCK must be like (3i9,6e21.13e3)")
+            count, whole, real = (int(word) for word in form.groups())
+            start = count * whole
+            for row in lines:
+                node = row[:whole].strip()
+                if not node.isdecimal():
+                    break
+                cuts = [row[start + i * real : start + (i + 1) * real].strip() for i in range(6)]
+                found.add(path, node, cuts[:3])
+                if any(word and float(word) for word in cuts[3:]):
+                    found.turned += (str(int(node)),)
+    return found
+
+
+def _of_universal(path: Path) -> NodeFile:
+    file = UniversalFile(path)
+    numbers = [int(row.split()[0]) for number in file.datasets(15, 2411) for row in file.records(number) if row.split()
+               and row.split()[0].isdecimal()]  # fmt: skip
+    held = node_coordinates(file, set(numbers))
+    return NodeFile({str(node): place for node, place in held.items()}, is_si=True)
+
+
+def _of_table(path: Path) -> NodeFile:
+    found = NodeFile()
+    for number, line in enumerate(text_of(path).splitlines(), 1):
+        words = line.partition("#")[0].replace(",", " ").replace(";", " ").split()
+        if not words or (not found.coordinates and not words[0].isdecimal()):
+            continue  # a heading
+        if len(words) != 4:
+            raise FileContentError(f"{path}: line {number} must hold node, x, y, z, not {line.strip()[:40]!r}")
+        found.add(path, words[0], words[1:])
+    return found
+
+
+def _begins_deck(head: bytes) -> bool:
+    lines = head.decode("latin-1").upper().splitlines()
+    return any(re.match(r"\s*\*\s*(NODE|HEADING|INCLUDE|PART|NSET|ELEMENT|MODEL)\b", line) for line in lines)
+
+
+#: How the content of a file is recognised, and what reads it; a table of text is what is left.
+_READERS: tuple[tuple[Callable[[Path, bytes], bool], Callable[[Path], NodeFile]], ...] = (
+    (lambda path, head: path.suffix.lower() == ".inp" or _begins_deck(head), _of_deck),
+    (lambda path, head: re.match(rb"\s*-1\s", head) is not None, _of_universal),
+    (lambda path, head: path.suffix.lower() == ".cdb" or b"NBLOCK" in head, _of_ansys),
+    (lambda path, head: is_bulk(head), _of_bulk),
+    (lambda path, head: True, _of_table),
+)

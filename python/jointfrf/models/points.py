@@ -1,0 +1,196 @@
+"""Models whose nodes have places, and reference points that patches of nodes follow or whose mean motion they show."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
+from typing import Literal, get_args
+
+import numpy as np
+from scipy import sparse
+
+from jointfrf.dofs import DIRECTIONS, rigid_motion
+from jointfrf.kernel.arguments import FloatArray, check_choice
+from jointfrf.models.model import Model
+
+__all__ = ["Coupling", "PointModel", "PointPatch", "couple_points"]
+
+Coupling = Literal["rigid", "distributing"]
+#: A motion is not held by a patch where its nodes see less than this share of the motion that they see most of.
+_HELD = 1e-6
+
+
+@dataclass(frozen=True, kw_only=True)
+class PointModel(Model):
+    """A model some of whose motions are no DOFs but sums of them; where its nodes are.
+
+    Attributes
+    ----------
+    places : mapping of str to ndarray, shape (3,)
+        Nodes and reference points, m.
+    shown : mapping of str to sparse array, shape (1, n)
+        Motions that are no DOFs, by names like DOFs, ``"tip:theta_x"``: weights of the DOFs.
+    """
+
+    places: Mapping[str, FloatArray] = field(default_factory=dict)
+    shown: Mapping[str, sparse.csr_array] = field(default_factory=dict)
+
+    def ports(self, *names: str) -> list[int] | sparse.csr_array:
+        """Return DOFs, or weights where a motion is shown that is none, as `jointfrf.receptance` takes them.
+
+        Raises
+        ------
+        ValueError
+            There is nothing of this name.
+        """
+        if not any(name in self.shown for name in names):
+            return super().ports(*names)
+        unit = sparse.eye_array(len(self.dofs), format="csr")
+        rows = [self.shown[name] if name in self.shown else unit[[self.index(name)]] for name in names]
+        return sparse.csr_array(sparse.vstack(rows))
+
+
+@dataclass(frozen=True)
+class PointPatch:
+    """Nodes of a reference point.
+
+    Attributes
+    ----------
+    name : str
+        Of the point; its DOFs are ``"name:x"`` to ``"name:theta_z"``.
+    nodes : tuple of str
+    coupling : {"rigid", "distributing"}
+        The nodes follow the point as a rigid body (RBE2, ``*RIGID BODY``), or the point shows their mean motion and
+        spreads forces over them (RBE3, distributing ``*COUPLING``), which adds no stiffness.
+    at : ndarray, shape (3,), or None
+        The point, m; the mean place of the nodes by default.
+    """
+
+    name: str
+    nodes: tuple[str, ...]
+    coupling: Coupling = "distributing"
+    at: FloatArray | None = None
+
+
+@dataclass(frozen=True)
+class _Followers:
+    """DOFs of a patch, counted from 0, their motion for unit motions of the point, shape (m, 6), and the point."""
+
+    dofs: list[int]
+    motion: FloatArray
+    at: FloatArray
+
+
+def couple_points(model: PointModel, patches: Sequence[PointPatch]) -> PointModel:
+    """Add reference points to a model.
+
+    Parameters
+    ----------
+    model : PointModel
+        With the places of the nodes of the patches.
+    patches : sequence of PointPatch
+
+    Returns
+    -------
+    PointModel
+        DOFs of nodes that follow a rigid patch are DOFs of its point; they are still shown by their names. Points of
+        distributing patches are shown.
+
+    Raises
+    ------
+    ValueError
+        A node without place or DOFs; a node in two rigid patches; a patch that does not hold its point.
+
+    Notes
+    -----
+    Rigid: u = T q with u_i = u_R + theta x r_i. Distributing: q_R = (R^T R)^-1 R^T u, the rigid motion nearest to that
+    of the nodes; forces at the point are spread by its transpose.
+    """
+    number = {dof: i for i, dof in enumerate(model.dofs)}
+    taken = {name.partition(":")[0] for name in (*model.dofs, *model.shown)}
+    followers: dict[str, _Followers] = {}
+    owner: dict[str, str] = {}
+    for patch in patches:
+        check_choice("coupling", patch.coupling, get_args(Coupling))
+        if patch.name in taken or patch.name in followers or ":" in patch.name or not patch.name:
+            raise ValueError(f"a point cannot be named {patch.name!r}: a node or a point has this name, or it has none")
+        followers[patch.name] = _followers(model, number, patch)
+        for node in patch.nodes if patch.coupling == "rigid" else ():
+            if node in owner:
+                raise ValueError(f"node {node} follows both {owner[node]} and {patch.name}")
+            owner[node] = patch.name
+    rigid = {one.name: followers[one.name] for one in patches if one.coupling == "rigid"}
+    places = {**model.places, **{name: one.at for name, one in followers.items()}}
+    expansion, dofs = _expansion(model.dofs, rigid)
+    shown = {name: sparse.csr_array(row @ expansion) for name, row in model.shown.items()}
+    for name, one in followers.items():
+        if name in rigid:
+            shown |= {model.dofs[dof]: expansion[[dof]] for dof in one.dofs}
+        else:
+            at = (np.repeat(np.arange(6), len(one.dofs)), np.tile(one.dofs, 6))
+            weights = sparse.coo_array((np.linalg.pinv(one.motion).ravel(), at), shape=(6, len(model.dofs)))
+            rows = sparse.csr_array(sparse.csr_array(weights) @ expansion)
+            shown |= {f"{name}:{direction}": rows[[i]] for i, direction in enumerate(DIRECTIONS)}
+    if not rigid:
+        return replace(model, places=places, shown=shown)
+    changed = {
+        one.name: sparse.csr_array(expansion.T @ sparse.csr_array(matrix) @ expansion)
+        for one in fields(Model)
+        if (matrix := getattr(model, one.name)) is not None and one.name not in ("dofs", "loss_factor")
+    }
+    return replace(model, **changed, dofs=dofs, places=places, shown=shown)
+
+
+def _followers(model: PointModel, number: Mapping[str, int], patch: PointPatch) -> _Followers:
+    """Return the DOFs of the nodes of a patch, and how they move with its point."""
+    if not patch.nodes:
+        raise ValueError(f"point {patch.name}: it has no nodes")
+    missing = [node for node in patch.nodes if node not in model.places]
+    if missing:
+        raise ValueError(f"point {patch.name}: the place of node {missing[0]} is not known")
+    where = np.array([model.places[node] for node in patch.nodes])
+    at = where.mean(axis=0) if patch.at is None else np.asarray(patch.at, float)
+    motion = rigid_motion(where, at)
+    dofs: list[int] = []
+    rows: list[FloatArray] = []
+    turning = patch.coupling == "rigid" or len(patch.nodes) < 3
+    for i, node in enumerate(patch.nodes):
+        names = [f"{node}:{direction}" for direction in DIRECTIONS]
+        held = [name for name in names[:3] if name not in number]
+        if held:
+            why = "it is held or belongs to another constraint of the file"
+            raise ValueError(f"point {patch.name}: node {node} has no DOF {held[0]}: {why}")
+        dofs += [number[name] for name in names[:3]]
+        rows += list(motion[i])
+        for axis in range(3):
+            if turning and names[3 + axis] in number:
+                dofs.append(number[names[3 + axis]])
+                rows.append(np.eye(6)[3 + axis])
+    whole = np.array(rows)
+    # Rotations times the size of the patch are displacements like the others.
+    size = max(float(np.ptp(where, axis=0).max()), 1e-12)
+    seen = np.linalg.svd(whole * np.r_[np.ones(3), np.full(3, 1 / size)], compute_uv=False)
+    if len(whole) < 6 or seen[-1] <= _HELD * seen[0]:
+        raise ValueError(
+            f"point {patch.name} needs at least three nodes that are not on one line, or nodes with rotations, to hold "
+            "rotations"
+        )
+    return _Followers(dofs, whole, at)
+
+
+def _expansion(dofs: tuple[str, ...], rigid: Mapping[str, _Followers]) -> tuple[sparse.csr_array, tuple[str, ...]]:
+    """Return u = T q, and the names of q: DOFs that follow no point, then six of each point."""
+    free = np.ones(len(dofs), bool)
+    for one in rigid.values():
+        free[one.dofs] = False
+    kept = np.flatnonzero(free)
+    rows, columns, values = [kept], [np.arange(kept.size)], [np.ones(kept.size)]
+    names = [dofs[i] for i in kept]
+    for name, one in rigid.items():
+        at = np.argwhere(one.motion)
+        rows.append(np.asarray(one.dofs)[at[:, 0]])
+        columns.append(len(names) + at[:, 1])
+        values.append(one.motion[tuple(at.T)])
+        names += [f"{name}:{direction}" for direction in DIRECTIONS]
+    entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
+    return sparse.csr_array(sparse.coo_array(entries, shape=(len(dofs), len(names)))), tuple(names)
