@@ -24,10 +24,10 @@ from jointfrf.models.points import Coupling, PointModel, PointPatch, couple_poin
 from jointfrf.toml.declared import Keys, NotNegative, key
 from jointfrf.toml.table import TomlTable
 
-__all__ = ["MatricesKeys", "PointKeys"]
+__all__ = ["MatricesKeys", "PointPatchKeys"]
 
 
-class PointKeys(Keys):
+class PointPatchKeys(Keys):
     """A reference point of a patch of nodes, named by `nodes`, `set` or `box`; six DOFs, `NAME:x` to `NAME:theta_z`."""
 
     name: Annotated[str, key("Name of the point.", example="joint", holds=lambda word: word != "" and ":" not in word)]
@@ -84,7 +84,8 @@ class MatricesKeys(SubstructureKeys, tag="matrices"):
         key('Names of the DOFs in the order of the rows: `"12:y"`. In a file, one a line: `12:y`, or node and number '
             "of the DOF (1 to 6): `12 2`; `#` begins a comment; or `.dof` of CalculiX, `.mapping` of Ansys, `EXTRN` "
             "cards of Nastran.", takes="list of texts, or name of a text file",
-            absent="as the files say, or a file beside that of K", holds=lambda found: found != ()),
+            absent="required by Matrix Market and NPZ; else as the files say, or a file beside that of K",
+            holds=lambda found: found != ()),
     ] = None  # fmt: skip
     nodes: Annotated[
         str | None,
@@ -96,13 +97,14 @@ class MatricesKeys(SubstructureKeys, tag="matrices"):
         key("Units of the files, nodes included; all other numbers here are in SI units.",
             absent="SI of Matrix Market and NPZ; required by files of FE programs, which do not say them"),
     ] = None  # fmt: skip
-    point: Annotated[tuple[PointKeys, ...], key("Reference points of patches of nodes.")] = ()
+    point: Annotated[tuple[PointPatchKeys, ...], key("Reference points of patches of nodes.")] = ()
 
     def structure(self, freq_hz: FloatArray) -> Structure:
         """Return the structure."""
         names = ("stiffness", "mass", "damping", "structural_damping")
         paths = {name: self._path(name) for name in names if getattr(self, name) is not None}
         stored = {name: self.build(partial(read_matrix, path, name), name) for name, path in paths.items()}
+        self._check_sizes(paths, stored)
         units = self._units(stored)
         file = NodeFile() if self.nodes is None else self.build(partial(read_nodes, self.file_of("nodes")), "nodes")
         dofs = self._dof_names(paths["stiffness"], stored)
@@ -142,6 +144,15 @@ class MatricesKeys(SubstructureKeys, tag="matrices"):
             raise self.missing(["units"], f"no file of {program} says its units, which are SI, mm-t-s or mm-kg-ms")
         return model_units(self.units or "SI")
 
+    def _check_sizes(self, paths: Mapping[str, Path], stored: Mapping[str, StoredMatrix]) -> None:
+        """Raise an error for a matrix of another size than K, where it does not name its DOFs."""
+        n = stored["stiffness"].matrix.shape[0]
+        for name, one in stored.items():
+            if one.dofs is None and one.matrix.shape[0] != n:
+                raise self.wrong(
+                    name, f"{paths[name]} holds {one.matrix.shape[0]} DOFs, {paths['stiffness']} holds {n}"
+                )
+
     def _dof_names(self, path: Path, stored: Mapping[str, StoredMatrix]) -> tuple[str, ...]:
         """Return the names of all DOFs, each once."""
         own = stored["stiffness"].dofs
@@ -167,19 +178,14 @@ class MatricesKeys(SubstructureKeys, tag="matrices"):
 
     def _aligned(self, name: str, path: Path, stored: StoredMatrix, dofs: tuple[str, ...]) -> sparse.csr_array:
         """Return a matrix in the order of the DOFs."""
-        n, matrix = len(dofs), stored.matrix
-        if stored.dofs is None:
-            if matrix.shape != (n, n):
-                held = self.file_of("stiffness")
-                raise self.wrong(name, f"{path} holds {matrix.shape[0]} DOFs, {held} holds {n}")
-            return matrix
-        if stored.dofs == dofs:
-            return matrix
+        n = len(dofs)
+        if stored.dofs is None or stored.dofs == dofs:
+            return stored.matrix
         number = {dof: i for i, dof in enumerate(dofs)}
         at = np.array([number.get(dof, -1) for dof in stored.dofs], np.intp)
         if (at < 0).any():
             raise self.wrong(name, f"{path} holds {stored.dofs[int(np.argmin(at))]}, which the stiffness does not name")
-        entries = sparse.coo_array(matrix)
+        entries = sparse.coo_array(stored.matrix)
         return sparse.csr_array(sparse.coo_array((entries.data, (at[entries.row], at[entries.col])), shape=(n, n)))
 
 

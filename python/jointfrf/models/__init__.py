@@ -2,6 +2,8 @@
 
 matrices      the matrices of a model as given, and where it is driven and observed
 model         matrices with names of DOFs, assemblies, chains
+points        models with places of nodes and reference points
+facts         what shows that matrices are the right ones
 beam          plane beams
 receptance    the choice of a method, and direct solutions
 modal         sums of modes; rigid-body modes apart

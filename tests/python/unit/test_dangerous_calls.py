@@ -40,6 +40,7 @@ KNOWN = {
     ("io/hdf5_file.py", "import_extra"): "h5py",
     ("io/fe/ansys_full.py", "import_extra"): "ansys-mapdl-reader, which reads numbers of a binary file",
     ("io/fe/calculix.py", "loadtxt"): "numpy: numbers of a text file",
+    ("io/fe/market.py", "loadtxt"): "numpy: numbers of a text file",
     ("io/fe/nastran_op2.py", "import_extra"): "pyYeti, which reads numbers of a binary file",
     ("io/fe/nastran_op4.py", "import_extra"): "pyYeti, which reads numbers of a file",
     ("io/fe/nastran_op4.py", "load"): "pyYeti: numbers of a file",

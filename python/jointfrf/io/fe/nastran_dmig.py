@@ -20,7 +20,7 @@ _SQUARE, _SYMMETRIC = 1, 6
 _TIMES = 6
 
 
-class _Matrix:
+class _Dmig:
     """A matrix of which cards are read."""
 
     def __init__(self, form: int, kind: int) -> None:
@@ -30,11 +30,11 @@ class _Matrix:
 
 def _read(path: Path, name: str, limit: ReadLimit) -> StoredMatrix:
     limit.take(_TIMES * path.stat().st_size)
-    found: dict[str, _Matrix] = {}
+    found: dict[str, _Dmig] = {}
     for _, fields in bulk_cards(path, {"DMIG"}):
         title = fields[0].upper()
         if _whole(fields[1], path) == 0 and title not in found:
-            found[title] = _Matrix(_whole(fields[2], path), _whole(fields[3] or "2", path))
+            found[title] = _Dmig(_whole(fields[2], path), _whole(fields[3] or "2", path))
             continue
         if title not in found:
             raise FileContentError(f"{path} cannot be read as DMIG cards: {title!r} has no card that begins it")
@@ -53,7 +53,7 @@ def _read(path: Path, name: str, limit: ReadLimit) -> StoredMatrix:
     return matrix_of_labels(path, labels, np.array(own.values), limit, "Nastran")
 
 
-def _add_column(own: _Matrix, fields: list[str], path: Path) -> None:
+def _add_column(own: _Dmig, fields: list[str], path: Path) -> None:
     """Add the entries of a card: a column, then rows with their values."""
     column = (_whole(fields[1], path), _whole(fields[2] or "0", path))
     rest = fields[4:]
