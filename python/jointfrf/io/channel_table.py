@@ -5,9 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from functools import partial
 from os import PathLike
 from pathlib import Path
-from typing import Annotated, Any, Literal, cast, get_args
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from msgspec import Meta
@@ -25,7 +26,7 @@ __all__ = ["ChannelKeys", "places_of_table", "read_channel_table"]
 #: Units of positions, in m.
 _UNITS = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "in": 0.0254}
 #: Directions of a sensor along the axes.
-_TRIAXIAL = np.eye(3)
+_TRIAXIAL = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 #: How far from 1 the length of a direction may be: that of two digits, as in (0.71, 0, -0.71); it is normalised.
 _UNIT = 1e-2
 _Three = tuple[float, float, float]
@@ -98,7 +99,7 @@ def read_channel_table(path: str | PathLike[str]) -> tuple[ChannelPlace, ...]:
     file = Path(path)
     if file.suffix.lower() == ".toml":
         return _places_of(read_keys(read_toml(file), ChannelTableKeys))
-    found = tuple(place for row in _csv_rows(file) for place in row)
+    found = tuple(place for row in _csv_rows(file) for place in _places(row))
     if not found:
         raise FileContentError(f"{file} holds no channels")
     return found
@@ -111,16 +112,11 @@ def places_of_table(table: TomlTable) -> tuple[ChannelPlace, ...]:
 
 
 def _places_of(keys: ChannelTableKeys) -> tuple[ChannelPlace, ...]:
-    rows = ((row, {name: getattr(row, name) for name in row.table.content}) for row in keys.channel)
-    return tuple(place for row, values in rows for place in _places(_as_arrays(values, keys.unit), row.table.where))
+    return tuple(place for row in keys.channel for place in _places(row, _UNITS[keys.unit]))
 
 
-def _as_arrays(values: dict[str, Any], unit: str) -> dict[str, Any]:
-    scales = {"at": _UNITS[unit], "direction": 1.0, "axes": 1.0}
-    return values | {name: scale * np.array(values[name]) for name, scale in scales.items() if name in values}
-
-
-def _csv_rows(file: Path) -> Iterator[list[ChannelPlace]]:
+def _csv_rows(file: Path) -> Iterator[ChannelKeys]:
+    """Read the rows of a CSV file as tables [[channel]] with positions in m."""
     table = read_text_table(file)
     columns = [_column(file, word) for word in table.heading]
     names = [name for name, _ in columns]
@@ -128,7 +124,7 @@ def _csv_rows(file: Path) -> Iterator[list[ChannelPlace]]:
         raise FileContentError(f"{file}: a column is named twice: {', '.join(names)}")
     for where, cells in table.rows:
         given = {name: cell for name, cell in zip(names, cells, strict=True) if cell}
-        yield _places(_csv_values(table, where, given, dict(columns)), where)
+        yield read_keys(TomlTable(_csv_values(table, where, given, dict(columns)), where), ChannelKeys)
 
 
 def _column(file: Path, word: str) -> tuple[str, float]:
@@ -163,57 +159,36 @@ def _csv_values(table: TextTable, where: str, given: Mapping[str, str], scales: 
             missing = next(name for name in names if name not in given)
             raise FileContentError(f"{where}: {there[0]} is given, {missing} is not")
         if there:
-            values[vector] = np.array([number(name) * scales[name] for name in names])
+            values[vector] = [number(name) * scales[name] for name in names]
     if "node" in given:
-        if not given["node"].isdecimal() or int(given["node"]) < 1:
-            raise FileContentError(f"{where}: node must be a whole number, at least 1, not {given['node']!r}")
-        values["node"] = int(given["node"])
+        values["node"] = int(given["node"]) if given["node"].isdecimal() else given["node"]
     if "weight" in given:
         values["weight"] = number("weight")
     return values
 
 
-def _places(values: Mapping[str, Any], where: str) -> list[ChannelPlace]:
-    """Return the channels that a row or table names."""
-    _check_words(values, where)
-    weight = float(values.get("weight", 1.0))
-    if weight < 0:
-        raise FileContentError(f"{where}: weight must not be negative, it is {weight:g}")
-    side, role = cast(JointSide | None, values.get("side")), cast(ChannelRole, values.get("role", "both"))
-    if "channel" in values:
-        try:
-            channel = Channel.parse(values["channel"])
-        except ValueError as error:
-            raise FileContentError(f"{where}: {error}") from error
-        direction = None if "direction" not in values else _unit(values["direction"], "direction", where)
-        return [ChannelPlace(channel, side, role, values.get("at"), direction, weight, where=where)]
-    axes = values.get("axes", _TRIAXIAL)
+def _places(row: ChannelKeys, unit: float = 1.0) -> list[ChannelPlace]:
+    """Return the channels that a table names, whose positions are in this unit, m."""
+    where, at = row.table.where, None if row.at is None else unit * np.array(row.at)
+    if (row.channel is None) == (row.node is None):
+        raise FileContentError(f"{where}: either channel or node must be named")
+    if row.direction is not None and row.node is not None:
+        raise FileContentError(f"{where}: direction goes with channel; the directions of a node are axes")
+    if row.axes is not None and row.channel is not None:
+        raise FileContentError(f"{where}: axes go with node; the direction of a channel is direction")
+    if row.channel is not None:
+        channel = row.build(partial(Channel.parse, row.channel))
+        direction = None if row.direction is None else _unit(row, "direction", row.direction)
+        return [ChannelPlace(channel, row.side, row.role, at, direction, row.weight, where=where)]
+    assert row.node is not None
     return [
-        ChannelPlace(
-            Channel(values["node"], axis), side, role, values.get("at"), _unit(one, "axes", where), weight, True, where
-        )
-        for axis, one in zip("xyz", axes, strict=True)
+        ChannelPlace(Channel(row.node, axis), row.side, row.role, at, _unit(row, "axes", one), row.weight, True, where)
+        for axis, one in zip("xyz", row.axes or _TRIAXIAL, strict=True)
     ]
 
 
-def _check_words(values: Mapping[str, Any], where: str) -> None:
-    if ("channel" in values) == ("node" in values):
-        raise FileContentError(f"{where}: either channel or node must be named")
-    if "direction" in values and "node" in values:
-        raise FileContentError(f"{where}: direction goes with channel; the directions of a node are axes")
-    if "axes" in values and "channel" in values:
-        raise FileContentError(f"{where}: axes go with node; the direction of a channel is direction")
-    for word, choice in (("side", get_args(JointSide)), ("role", get_args(ChannelRole))):
-        if word in values and values[word] not in choice:
-            raise FileContentError(
-                f"{where}: {word} must be one of {', '.join(choice)}, not {values[word]!r}"
-                f"{did_you_mean(str(values[word]), choice)}"
-            )
-
-
-def _unit(vector: NDArray[np.float64], key: str, where: str) -> NDArray[np.float64]:
+def _unit(row: ChannelKeys, name: str, vector: _Three) -> NDArray[np.float64]:
     length = float(np.linalg.norm(vector))
     if not abs(length - 1) < _UNIT:
-        raise FileContentError(f"{where}: {key} must have length 1, not {length:g}")
-    unit: NDArray[np.float64] = vector / length
-    return unit
+        raise FileContentError(f"{row.table.where}: {name} must have length 1, not {length:g}")
+    return np.array(vector) / length

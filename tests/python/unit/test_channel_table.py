@@ -103,7 +103,7 @@ def test_what_is_wrong_in_toml(tmp_path, old, new, message):
         ("0,6;-0,8;2", "0,6;-0,8", "line 4 has 10 columns, the heading has 11"),
         ("10;20;30", "10;;30", "line 4: x is given, y is not"),
         (";101;", ";1.5;", "line 3: node must be a whole number"),
-        ("-0,8;2", "-0,8;-2", "line 4: weight must not be negative"),
+        ("-0,8;2", "-0,8;-2", "line 4: weight must be a number, at least 0"),
     ],
 )
 def test_what_is_wrong_in_csv(tmp_path, old, new, message):
