@@ -60,7 +60,11 @@ def whole(joint: jf.Joint | jf.LawJoint, attachments: Sequence = (), *, unknown:
         unknowns = {
             "length": jf.Unknown(length, 0.02 * length), "youngs_modulus": jf.Unknown(MODULUS, 0.02 * MODULUS),
         }  # fmt: skip
-        parts.append(jf.Substructure(build, dofs, unknowns) if unknown else jf.Substructure(build(), dofs))
+        parts.append(
+            jf.Substructure(build, dofs, unknowns, exact=True)
+            if unknown
+            else jf.Substructure(build(), dofs, exact=True)
+        )
     return jf.Assembly(parts[0], parts[1], joint, tuple(attachments))
 
 

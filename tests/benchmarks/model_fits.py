@@ -52,8 +52,8 @@ def _beams(channels: tuple[str, ...]) -> tuple[Callable[[int], jf.Fit], dict[str
     """Case 3.3 with exact models."""
     freq = np.arange(15.0, 801.0)
     parts = (
-        jf.Substructure(jf.beam(0.3, 300, ends=("clamped", "free"), **_SECTION), ["301:y", "301:theta"]),
-        jf.Substructure(jf.beam(0.225, 225, **_SECTION), ["1:y", "1:theta"]),
+        jf.Substructure(jf.beam(0.3, 300, ends=("clamped", "free"), **_SECTION), ["301:y", "301:theta"], exact=True),
+        jf.Substructure(jf.beam(0.225, 225, **_SECTION), ["1:y", "1:theta"], exact=True),
     )
     truth = jf.Assembly(*parts, jf.Joint([6e5, 5e3], [20, 1.5], ["y", "theta"]))
     exact = truth.receptance(freq, channels, channels)
@@ -86,7 +86,9 @@ def _bricks() -> tuple[Callable[[int], jf.Fit], dict[str, float]]:
 
     def beams(youngs_modulus: float, loss_factor: float, unknowns: dict[str, jf.Unknown]) -> list[jf.Substructure]:
         material = jf.Material(youngs_modulus, 0.33, 2700.0, loss_factor)
-        return [jf.Substructure(_bar(*own, material), ports, unknowns) for own in ((0.3, True), (0.2, False))]
+        return [
+            jf.Substructure(_bar(*own, material), ports, unknowns, exact=True) for own in ((0.3, True), (0.2, False))
+        ]
 
     sensors = [jf.AddedMass("A/p4:y", 0.003), jf.AddedMass("B/p5:y", 0.002)]
     truth = jf.Assembly(*beams(1.01 * 67e9, 0.01, {}), jf.Joint(*_TRUE, list(_DOFS)), sensors)

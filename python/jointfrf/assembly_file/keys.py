@@ -9,7 +9,7 @@ from msgspec import field
 from jointfrf.cases.substructures import BeamKeys, BrickBeamKeys, ChainKeys, MatricesKeys, ReceptancesKeys
 from jointfrf.toml.declared import Keys, NotNegative, Positive, key
 
-__all__ = ["AssemblyKeys", "GroundKeys", "MassKeys", "PartKeys", "Prior", "PriorKeys"]
+__all__ = ["AssemblyKeys", "GroundKeys", "MassKeys", "PartKeys", "Prior", "PriorKeys", "Unknowns"]
 
 
 class PriorKeys(Keys):
@@ -30,17 +30,36 @@ _JointDofs = Annotated[
     key("Its DOFs at the joint, in the order of those of the joint.", min_length=1, example=["7:y", "7:theta"]),
 ]
 _SCALED = "youngs_modulus and density are factors of the matrices here, about 1."
+_WORDS = (
+    '`["E", "density"]` takes usual ones: E 3 %, density 1 %, loss_factor 50 %, thickness, height, width 1 %, length, '
+    "length_scale 0.3 %"
+)
 
 
-def _unknown(which: str) -> Any:
+def _unknown(which: str, words: str = _WORDS) -> Any:
     return key(
         f"Numbers that are fitted with the joint: {which} Each is a relative standard deviation, 0.02 for 2 %, or a "
-        "table `{ mean, std, lower, upper }`.", takes="table of relative standard deviations, or of tables",
+        f"table `{{ mean, std, lower, upper }}`; {words}.",
+        takes="list of words, or table of positive relative standard deviations, or of tables",
     )  # fmt: skip
 
 
-_OfFactors = Annotated[dict[str, _Prior], _unknown(f"`youngs_modulus`, `density`, `loss_factor`; {_SCALED}")]
-_OfNumbers = Annotated[dict[str, _Prior], _unknown("any of the numbers of this table.")]
+#: Numbers that are unknown, with what is believed of each, or by words.
+Unknowns = dict[str, Prior] | tuple[str, ...]
+_OfFactors = Annotated[
+    dict[str, _Prior] | tuple[str, ...], _unknown(f"`youngs_modulus`, `density`, `loss_factor`; {_SCALED}")
+]
+_OfMatrices = Annotated[
+    dict[str, _Prior] | tuple[str, ...],
+    _unknown("`youngs_modulus`, `density`, `loss_factor`, `length_scale`, a factor of all lengths; "
+             "youngs_modulus and density are factors of the matrices here, about 1."),
+]  # fmt: skip
+_OfNumbers = Annotated[dict[str, _Prior] | tuple[str, ...], _unknown("any of the numbers of this table.")]
+_Exact = Annotated[
+    bool,
+    key("Whether the model is exact but for what is `unknown`. No model is: otherwise E (3 %) and density (1 %) are "
+        "unknown, too, as factors of K and M where they are not among `unknown`."),
+]  # fmt: skip
 
 
 class ChainPart(ChainKeys, tag="chain"):
@@ -48,6 +67,7 @@ class ChainPart(ChainKeys, tag="chain"):
 
     joint: _JointDofs
     unknown: _OfFactors = field(default_factory=dict)
+    exact: _Exact = False
 
 
 class BeamPart(BeamKeys, tag="beam"):
@@ -55,6 +75,7 @@ class BeamPart(BeamKeys, tag="beam"):
 
     joint: _JointDofs
     unknown: _OfNumbers = field(default_factory=dict)
+    exact: _Exact = False
 
 
 class BrickBeamPart(BrickBeamKeys, tag="brick-beam"):
@@ -62,6 +83,7 @@ class BrickBeamPart(BrickBeamKeys, tag="brick-beam"):
 
     joint: _JointDofs
     unknown: _OfNumbers = field(default_factory=dict)
+    exact: _Exact = False
 
 
 class MatricesPart(MatricesKeys, tag="matrices"):
@@ -71,7 +93,8 @@ class MatricesPart(MatricesKeys, tag="matrices"):
     """
 
     joint: _JointDofs
-    unknown: _OfFactors = field(default_factory=dict)
+    unknown: _OfMatrices = field(default_factory=dict)
+    exact: _Exact = False
 
 
 class ReceptancesPart(ReceptancesKeys, tag="receptances"):
@@ -105,7 +128,10 @@ class GroundKeys(Keys):
     dof: Annotated[str, key("Where it holds: `A/1:theta`.", example="A/1:theta")]
     stiffness: Annotated[NotNegative, key("Stiffness.", "N/m, N m/rad", example=1e5)]
     damping: Annotated[NotNegative, key("Viscous damping.", "N s/m, N m s/rad")] = 0.0
-    unknown: Annotated[dict[str, _Prior], _unknown("`stiffness`, `damping`.")] = field(default_factory=dict)
+    unknown: Annotated[
+        dict[str, _Prior] | tuple[str, ...],
+        _unknown("`stiffness`, `damping`.", '`["stiffness"]` takes 50 %, of damping 100 %'),
+    ] = field(default_factory=dict)
 
 
 class AssemblyKeys(Keys):

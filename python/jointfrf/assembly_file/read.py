@@ -3,15 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, get_args
 
 import msgspec
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import ArrayLike
 
-from jointfrf.assembly_file.keys import AssemblyKeys, PartKeys, Prior, PriorKeys, ReceptancesPart
+from jointfrf.assembly_file.keys import (
+    AssemblyKeys,
+    MatricesPart,
+    PartKeys,
+    Prior,
+    PriorKeys,
+    ReceptancesPart,
+    Unknowns,
+)
 from jointfrf.cases.substructures import MeasuredStructure, ModelStructure, Structure
 from jointfrf.dofs import is_rotation
 from jointfrf.frf.frf_set import Channel
@@ -29,6 +39,16 @@ from jointfrf.toml.declared import read_keys
 from jointfrf.toml.table import TomlTable, read_toml
 
 __all__ = ["AssemblyFile", "AssemblyPart", "check_dofs", "read_assembly_file", "read_part", "unknown_of"]
+
+#: What a word takes as relative standard deviation: coefficients of variation of structural steel (JCSS Probabilistic
+#: Model Code, parts 2.1 and 3.2); damping is guessed; sections are rolled or milled to 1 %, lengths cut to 1 mm in
+#: 0.3 m; a spring to the ground is known by its order of magnitude.
+_USUAL = {
+    "youngs_modulus": 0.03, "density": 0.01, "poisson": 0.03, "loss_factor": 0.5, "height": 0.01, "width": 0.01,
+    "length": 0.003, "length_scale": 0.003, "stiffness": 0.5, "damping": 1.0,
+}  # fmt: skip
+#: What words mean.
+_MEANT = {"E": "youngs_modulus", "rho": "density", "eta": "loss_factor", "thickness": "height", "nu": "poisson"}
 
 
 @dataclass(frozen=True)
@@ -80,13 +100,32 @@ class AssemblyPart:
             h = keys.build(lambda: self.structure.receptance(freq_hz, named), "file")
             return keys.build(lambda: Substructure.of_frfs(freq_hz, h, named, keys.joint))
         assert isinstance(self.structure, ModelStructure)
-        unknowns = {name: self._unknown(name, prior) for name, prior in keys.unknown.items()}
+        unknowns = {name: self._unknown(name, prior) for name, prior in self._priors().items()}
         if set(unknowns) <= set(SCALES):
             # Factors of the matrices are faster than models built again.
             means = {name: one.value for name, one in unknowns.items() if hasattr(keys, name)}
             model = self._model(means) if means != self._numbers(means) else self.structure.model
-            return keys.build(lambda: Substructure(model, keys.joint, unknowns))
-        return keys.build(lambda: Substructure(lambda **values: self._model(values), keys.joint, unknowns))
+            return keys.build(lambda: Substructure(model, keys.joint, unknowns, keys.exact))
+        if isinstance(keys, MatricesPart):
+            model = self.structure.model
+            return keys.build(lambda: Substructure(partial(scaled_model, model), keys.joint, unknowns, keys.exact))
+        return keys.build(lambda: Substructure(lambda **values: self._model(values), keys.joint, unknowns, keys.exact))
+
+    def _priors(self) -> Mapping[str, Prior]:
+        """Return what is unknown by the names of the numbers of this part."""
+        keys = self.keys
+        assert not isinstance(keys, ReceptancesPart)
+        takes = ["length_scale"] if isinstance(keys, MatricesPart) else []
+        takes += [one.name for one in msgspec.structs.fields(keys) if isinstance(getattr(keys, one.name), float)]
+        meant = dict(_MEANT)
+        if "length" in takes:
+            meant["length_scale"] = "length"
+        if "height" not in takes:
+            if "thickness" in keys.unknown:
+                text = "K and M do not say what of them is a thickness: name E, which a section bends with"
+                raise keys.wrong("unknown", text)
+            del meant["thickness"]
+        return _by_name(keys.unknown, list(dict.fromkeys([*takes, *SCALES])), meant, keys.table)
 
     def _numbers(self, names: Mapping[str, Any]) -> dict[str, float]:
         return {name: getattr(self.keys, name) for name in names}
@@ -106,10 +145,7 @@ class AssemblyPart:
             for one in msgspec.structs.fields(keys)
             if isinstance(value := getattr(keys, one.name), float)
         }
-        table = keys.table.table("unknown")
-        if name not in numbers and name not in SCALES:
-            takes = list(dict.fromkeys([*numbers, *SCALES]))
-            raise table.wrong(name, f"this part has no such number, only {', '.join(takes)}{did_you_mean(name, takes)}")
+        table = keys.table if isinstance(keys.table.content.get("unknown"), list) else keys.table.table("unknown")
         if name not in numbers and isinstance(prior, PriorKeys) and prior.mean is not None:
             raise table.wrong(name, "it is a factor of the matrices, about 1: leave mean out")
         return unknown_of(prior, numbers.get(name, 1.0), table, name, -np.inf if name == "poisson" else 0.0)
@@ -148,6 +184,55 @@ def read_part(path: Path | str) -> AssemblyPart:
     """
     keys = read_keys(read_toml(Path(path)), *get_args(PartKeys))
     return AssemblyPart(keys, keys.structure(np.ones(1)))
+
+
+def _by_name(own: Unknowns, takes: Sequence[str], meant: Mapping[str, str], table: TomlTable) -> dict[str, Prior]:
+    """Return priors by the name of the number; those of words are usual ones."""
+    found: dict[str, Prior] = {}
+    for word in own:
+        name = meant.get(word, word)
+        if name not in takes:
+            named = [*takes, *(short for short, long in meant.items() if long in takes)]
+            text = f"{word}: there is no such number here, only {', '.join(named)}{did_you_mean(word, named)}"
+            raise table.wrong("unknown", text)
+        if name in found:
+            raise table.wrong("unknown", f"{word}: {name} is named twice")
+        if isinstance(own, tuple) and name not in _USUAL:
+            raise table.wrong("unknown", f"{word}: it has no usual prior: write unknown = {{ {word} = 0.01 }}")
+        found[name] = own[word] if isinstance(own, Mapping) else _USUAL[name]
+    return found
+
+
+def scaled_model(model: Model, *, length_scale: float, **factors: float) -> Model:
+    """Return a model with all its lengths multiplied by a factor, and of other material.
+
+    Parameters
+    ----------
+    model : Model
+    length_scale : float
+        s: forces and displacements of a solid body, or of a beam with its section, have stiffnesses in proportion to s
+        and masses to s^3, and rotations are displacements over a length.
+    factors : float
+        ``youngs_modulus`` and ``density`` as factors, ``loss_factor``.
+    """
+    turns = np.array([is_rotation(dof.rpartition(":")[2]) for dof in model.dofs])
+    of_dof = sp.diags_array(np.where(turns, length_scale, 1.0))
+
+    def scaled(matrix: Any, factor: float) -> Any:
+        if matrix is None:
+            return None
+        found = of_dof @ sp.csr_array(matrix) @ of_dof * factor
+        return found if sp.issparse(matrix) else found.toarray()
+
+    of_k = length_scale * factors.get("youngs_modulus", 1.0)
+    return replace(
+        model,
+        stiffness=scaled(model.stiffness, of_k),
+        mass=scaled(model.mass, length_scale**3 * factors.get("density", 1.0)),
+        damping=scaled(model.damping, length_scale),
+        structural_damping=scaled(model.structural_damping, of_k),
+        loss_factor=factors.get("loss_factor", model.loss_factor),
+    )
 
 
 def unknown_of(prior: Prior, value: float, table: TomlTable, name: str, lower: float = 0.0) -> Unknown:
@@ -189,10 +274,9 @@ class AssemblyFile:
             found.append(mass.build(lambda own=mass, known=known: AddedMass(own.dofs, known)))  # type: ignore[misc]
         for spring in self.keys.ground:
             numbers: dict[str, float | Unknown] = {"stiffness": spring.stiffness, "damping": spring.damping}
-            for name, prior in spring.unknown.items():
-                if name not in numbers:
-                    raise spring.table.table("unknown").unknown(name, list(numbers))
-                numbers[name] = unknown_of(prior, getattr(spring, name), spring.table.table("unknown"), name)
+            for name, prior in _by_name(spring.unknown, list(numbers), {}, spring.table).items():
+                table = spring.table if isinstance(spring.unknown, tuple) else spring.table.table("unknown")
+                numbers[name] = unknown_of(prior, getattr(spring, name), table, name)
             found.append(spring.build(lambda own=spring, n=numbers: GroundSpring(own.dof, **n)))  # type: ignore[misc]
         return tuple(found)
 

@@ -55,6 +55,8 @@ _BY_PART = 0.03
 _INFLATED = 1.2
 #: A prior that the FRFs narrow by less than this is named: they say little of it.
 _UNCHANGED = 0.9
+#: Twice the logarithm of a Bayes factor from which on the evidence is very strong (Kass and Raftery 1995: above 10).
+_CLEAR_GAIN = 10.0
 #: Another minimum whose -2 log likelihood is higher by less than this is named: odds of 1 to 150.
 _OTHER = 10.0
 _PER_PART = (
@@ -451,6 +453,7 @@ def describe_model(found: FoundModel, channels: Channels) -> Fit:
     is_log = {one.name: one.is_log for one in vector.fitted}
     findings = [
         *_model_residual(fit, found, channels),
+        *_model_error(found),
         *poor_laws(fit, is_log, lambda name: found.intervals.of(name, 0.95)),
         *_directions(found.directions),
         *_other_minimum(found.other),
@@ -482,10 +485,9 @@ def _model_residual(fit: Fit, found: FoundModel, channels: Channels) -> list[Fin
     if np.isfinite(test.neighbours) and test.neighbours > 5:
         parts.append("smooth over frequency, as no noise is")
     if test.is_large or test.bands or test.responses or test.forces or test.neighbours > 4:
-        text = (
-            f"the models and the joint do not fit the FRFs: {'; '.join(parts)}; the parameters carry that error, which "
-            "the intervals do not allow for"
-        )
+        text = f"the models and the joint do not fit the FRFs: {'; '.join(parts)}"
+        if found.error is None or found.test_with_error.is_large:
+            text += "; the parameters carry that error, which the intervals do not allow for"
         findings.append(warn("residual", text, tuple(about), bands))
     if test.pulls:
         denied = [(fit.parameters[i].name, pull) for i, pull in test.pulls]
@@ -493,6 +495,24 @@ def _model_residual(fit: Fit, found: FoundModel, channels: Channels) -> list[Fin
         text = f"the FRFs deny what was believed, in standard deviations of the prior: {pulled}"
         findings.append(warn("prior", text, tuple(name for name, _ in denied)))
     return findings
+
+
+def _model_error(found: FoundModel) -> list[Finding]:
+    """Say which error of the models the intervals allow for."""
+    if found.error is None:
+        return []
+    level, left = 100 * found.error.level, found.test_with_error
+    text = (
+        f"beside their unknowns the models are off by {level:.2g} % of their modal stiffnesses and masses, which the "
+        "intervals allow for"
+    )
+    if left.is_large:
+        text = (
+            f"with models that are off by {level:.2g} % of their modal stiffnesses and masses beside their unknowns, "
+            f"the residual is still {left.ratio:.3g} times the noise: the intervals allow for a part of the error only"
+        )
+    is_clear = found.error.gain > _CLEAR_GAIN or not found.test.is_noise
+    return [warn("model", text) if is_clear else note("model", text)]
 
 
 def _directions(directions: Sequence[OpenDirection]) -> list[Finding]:

@@ -19,6 +19,7 @@ FitFindingKind = Literal[
     "direction",  # a combination of parameters that the FRFs do not determine
     "groups",  # DOFs between which FRFs are zero
     "left out",  # lines, or DOFs, that were not used
+    "model",  # errors of models that none of their unknowns describes
     "noise",
     "open",  # a parameter that may be infinite or zero
     "poor",  # a parameter with a wide interval

@@ -16,7 +16,7 @@ from jointfrf.laws.law_joint import JointQuantity, LawJoint
 __all__ = ["FitParameter", "ParameterOrigin", "ParameterVector", "joint_vector"]
 
 #: What a parameter belongs to.
-ParameterOrigin = Literal["joint", "A", "B", "attachment", "response", "force"]
+ParameterOrigin = Literal["joint", "A", "B", "attachment", "response", "force", "error of A", "error of B"]
 
 
 #: Stiffnesses of the joint are sought within this factor of the stiffness that the substructures have there.
@@ -59,6 +59,11 @@ class FitParameter(NamedTuple):
     is_log: bool
     is_free: bool
 
+    @property
+    def is_error(self) -> bool:
+        """Whether it is an entry of the error of a model, which nobody asked for by name."""
+        return self.origin in ("error of A", "error of B")
+
 
 @dataclass(frozen=True)
 class ParameterVector:
@@ -80,6 +85,11 @@ class ParameterVector:
     def fitted(self) -> tuple[FitParameter, ...]:
         """The free parameters."""
         return tuple(self.all[i] for i in self.free)
+
+    @cached_property
+    def n_shown(self) -> int:
+        """How many of the free ones, the first ones, are no errors of the models."""
+        return sum(not one.is_error for one in self.fitted)
 
     @cached_property
     def values(self) -> FloatArray:

@@ -113,7 +113,13 @@ class ResidualTest(NamedTuple):
 
 
 def check_residual(
-    residual: ComplexArray, freq_hz: FloatArray, pulls: FloatArray, *, parameters: int, inflation: float, is_given: bool
+    residual: ComplexArray,
+    freq_hz: FloatArray,
+    pulls: FloatArray,
+    *,
+    parameters: float,
+    inflation: float,
+    is_given: bool,
 ) -> ResidualTest:
     """Compare a residual with its noise.
 
@@ -124,8 +130,8 @@ def check_residual(
     freq_hz : ndarray, shape (n_freq,)
     pulls : ndarray, shape (p,)
         Free parameters less their prior, in its standard deviations.
-    parameters : int
-        Free parameters.
+    parameters : float
+        Free parameters; fewer where priors hold them.
     inflation : float
         Lines that carry the noise of one independent line.
     is_given : bool

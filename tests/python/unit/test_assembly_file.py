@@ -27,6 +27,7 @@ damping = [3.0, 4.0]
 ground = "start"
 joint = ["2:x"]
 unknown = { youngs_modulus = 0.02 }
+exact = true
 
 [B]
 model = "chain"
@@ -35,6 +36,7 @@ stiffness = [2000.0, 2500.0]
 damping = [2.0, 1.0]
 ground = "end"
 joint = ["1:x"]
+exact = true
 
 [[joint.law]]
 dof = "x"
@@ -120,6 +122,7 @@ damping = "a.npz"
 dofs = ["1:x", "2:x"]
 joint = ["2:x"]
 unknown = { youngs_modulus = 0.02 }
+exact = true
 
 """
     channels = Channel(1, "+x"), Channel(2, "+x")
@@ -197,6 +200,59 @@ unknown = { stiffness = { std = 5.0 } }
     ]  # fmt: skip
 
 
+def test_no_model_is_exact_unless_the_file_says_so(tmp_path, frfs):
+    fit = jf.measured_assembly(written(tmp_path, ASSEMBLY.replace("exact = true\n", "")), frfs).fit()
+    others = {one.name: (one.unit, one.prior) for one in fit.parameters if one.origin != "joint"}
+    assert others == {
+        "A/youngs_modulus": ("1", (1.0, 0.02)), "A/density": ("1", (1.0, 0.01)),
+        "B/youngs_modulus": ("1", (1.0, 0.03)), "B/density": ("1", (1.0, 0.01)),
+    }  # fmt: skip
+
+
+def test_unknowns_by_words(tmp_path):
+    more = '[[ground]]\ndof = "B/2:x"\nstiffness = 10.0\nunknown = ["stiffness"]\n'
+    text = ASSEMBLY.replace("{ youngs_modulus = 0.02 }", '["E", "density"]') + more
+    file = read_assembly_file(written(tmp_path, text))
+    found = file.parts(np.ones(1))[0].substructure(np.ones(1), [])
+    assert found.unknowns == {"youngs_modulus": jf.Unknown(1.0, 0.03, 0.0), "density": jf.Unknown(1.0, 0.01, 0.0)}
+    assert file.attachments() == (jf.GroundSpring("B/2:x", jf.Unknown(10.0, 5.0, 0.0)),)
+    for words, message in (
+        ('["E", "youngs_modulus"]', "youngs_modulus: youngs_modulus is named twice"),
+        ('["thickness"]', "K and M do not say what of them is a thickness"),
+        ('["densty"]', "densty: there is no such number here, only .*did you mean density"),
+    ):
+        file = read_assembly_file(written(tmp_path, text.replace('["E", "density"]', words)))
+        with pytest.raises(FileContentError, match=r"\[A\]: unknown: " + message):
+            file.parts(np.ones(1))[0].substructure(np.ones(1), [])
+
+
+def test_length_scale_of_matrices_is_that_of_a_beam(tmp_path):
+    def built(s):
+        return jf.beam(0.3 * s, 4, youngs_modulus=67e9, density=2700.0, width=0.025 * s, height=0.006 * s)
+
+    model = built(1.0)
+    scipy.io.mmwrite(tmp_path / "k.mtx", model.stiffness)
+    scipy.io.mmwrite(tmp_path / "m.mtx", model.mass)
+    dofs = ", ".join(f'"{dof}"' for dof in model.dofs)
+    part = f"""[A]
+model = "matrices"
+stiffness = "k.mtx"
+mass = "m.mtx"
+dofs = [{dofs}]
+joint = ["5:y"]
+unknown = ["length_scale"]
+
+"""
+    text = re.sub(r"\[A\].*?\n\n", part, ASSEMBLY, flags=re.DOTALL)
+    found = read_assembly_file(written(tmp_path, text)).parts(np.ones(1))[0].substructure(np.ones(1), [])
+    assert found.unknowns == {"length_scale": jf.Unknown(1.0, 0.003, 0.0)}
+    changed, wanted = found.model({"length_scale": 1.1, "youngs_modulus": 1.02}), built(1.1)
+    for own, expected in ((changed.stiffness, 1.02 * wanted.stiffness), (changed.mass, wanted.mass)):
+        np.testing.assert_allclose(
+            own.toarray(), expected.toarray(), rtol=1e-9, atol=1e-9 * abs(expected.toarray()).max()
+        )
+
+
 def without(*lines: str) -> str:
     return "".join(line for line in ASSEMBLY.splitlines(keepends=True) if not line.startswith(lines))
 
@@ -211,8 +267,8 @@ def without(*lines: str) -> str:
         (ASSEMBLY.replace("[channels]", "[chanels]"), "unknown key 'chanels'.*did you mean 'channels'"),
         (ASSEMBLY.replace('"chain"', '"chian"', 1), r"\[A\]: model must be one of chain, beam, brick-beam, matrices, "
          "receptances, not 'chian'"),
-        (ASSEMBLY.replace("0.02", "-0.02"), r"\[unknown\]: youngs_modulus must be a relative standard deviation"),
-        (ASSEMBLY.replace("youngs_modulus", "young"), r"\[unknown\]: young: this part has no such number.*loss_factor"),
+        (ASSEMBLY.replace("0.02", "-0.02"), r"\[A\]: unknown must be .* positive .*not {'youngs_modulus': -0.02}"),
+        (ASSEMBLY.replace("youngs_modulus", "young"), r"\[A\]: unknown: young: there is no such number.*loss_factor"),
         (ASSEMBLY.replace('["2:x"]', '["3:x"]'), r"\[A\]: joint: A has no DOF '3:x'"),
         (ASSEMBLY.replace('["2:x"]', '["1:x", "2:x"]'), "2 joint DOFs, the joint 1"),
         (ASSEMBLY.replace('"11:+x" =', '"12:+x" ='), r"12:\+x: test.uff has no such channel, only 11:\+x"),

@@ -23,8 +23,8 @@ def fits(beams):
     dofs = beams.at + [2 * beams.n + i for i in beams.at]
     lossy = jf.Joint([6e5, 5e3], dofs=["y", "theta"], loss_factor=[0.05, 0.1])
     part = jf.Substructure(jf.chain([5, 3], [2500, 3500], [3, 4], ground="start"), ["2:x"],
-                           {"youngs_modulus": jf.Unknown(1.0, 0.02)})  # fmt: skip
-    whole = jf.Assembly(part, jf.Substructure(jf.chain([4], [2000], [2], ground="end"), ["1:x"]),
+                           {"youngs_modulus": jf.Unknown(1.0, 0.02)}, exact=True)  # fmt: skip
+    whole = jf.Assembly(part, jf.Substructure(jf.chain([4], [2000], [2], ground="end"), ["1:x"], exact=True),
                         jf.LawJoint({"x": jf.SpringLaw(2000.0, h=100.0)}))  # fmt: skip
     freq = np.linspace(0.5, 10, 200)
     at = ["A/1:x"]

@@ -15,6 +15,7 @@ from jointfrf.frf.noise_model import NoiseModel
 from jointfrf.frf.smoothing import pieces
 from jointfrf.identification.line_starts import LineCompliance, from_lines, interface_compliance
 from jointfrf.identification.minimise import Minimum, inverse_information, minimise
+from jointfrf.identification.model.evidence import ModelError, with_model_error
 from jointfrf.identification.model.likelihood import Likelihood
 from jointfrf.identification.model.prediction import Prediction
 from jointfrf.identification.model.starts import ranked_trials, refined
@@ -95,6 +96,10 @@ class FoundModel(NamedTuple):
     directions : tuple of OpenDirection
     other : float
         Squares by which the next lowest minimum of another start is higher; inf where none was followed.
+    error : ModelError or None
+        Errors of the models beside their unknowns, where the FRFs show any.
+    test_with_error : ResidualTest
+        Of the residual, with these; `test` is that without them.
     """
 
     problem: ModelProblem
@@ -107,6 +112,8 @@ class FoundModel(NamedTuple):
     test: ResidualTest
     directions: tuple[OpenDirection, ...]
     other: float
+    error: ModelError | None
+    test_with_error: ResidualTest
 
 
 def fit_assembly(problem: ModelProblem) -> FoundModel:
@@ -216,31 +223,52 @@ def _about(problem: ModelProblem, noise: NoiseModel, predicted: ComplexArray) ->
 
 def _judged(problem: ModelProblem, minimum: Minimum, other: float) -> FoundModel:
     """Return covariance, intervals and tests at a minimum."""
-    likelihood, vector = problem.likelihood, problem.vector
+    likelihood = problem.likelihood
+    residual, predicted = _residual(problem, likelihood, minimum)
+    test = with_error = _test(problem, likelihood, minimum, residual)
+    found = with_model_error(likelihood, minimum)
+    if found is not None:
+        likelihood, minimum = found[:2]
+        residual, predicted = _residual(problem, likelihood, minimum)
+        with_error = _test(problem, likelihood, minimum, residual)
+    vector, n = likelihood.vector, likelihood.vector.n_shown
     values = vector.to_values(minimum.x)
-    predicted = problem.prediction.frfs(vector, values)
-    tested = problem.variance if problem.tested is None else problem.tested
-    std = np.sqrt(np.where(likelihood.used, tested, np.nan))
-    residual = (likelihood.measured - predicted) / std
-    test = check_residual(
-        residual, problem.freq_hz, vector.pulls(minimum.x),
-        parameters=minimum.x.size, inflation=problem.noise.inflation, is_given=problem.noise.is_given,
-    )  # fmt: skip
-    factor = max(1.0, test.ratio**2) if test.is_large else 1.0
+    factor = max(1.0, with_error.ratio**2) if with_error.is_large else 1.0
     own = inverse_information(minimum.information)
     slope = vector.slope(minimum.x)
-    covariance = own * factor * np.outer(slope, slope)
+    covariance = (own * factor * np.outer(slope, slope))[:n, :n]
     profile = ProfileIntervals(likelihood, vector, minimum.x, minimum.cost, own, factor)
     intervals = Intervals(
-        [one.name for one in vector.fitted],
+        [one.name for one in vector.fitted[:n]],
         profile.of,
         lambda function, _, probability: profile.of_function(
-            lambda x: function(vector.to_values(x)[vector.free]), probability
+            lambda x: function(vector.to_values(x)[vector.free[:n]]), probability
         ),
     )
     return FoundModel(
-        problem, minimum, values, covariance, intervals, predicted,
-        residual, test, open_directions(vector, minimum.x, minimum.information), other,
+        problem, minimum, values, covariance, intervals, predicted, residual, test,
+        open_directions(problem.vector, minimum.x[:n], minimum.information[:n, :n]), other,
+        None if found is None else found[2], with_error,
+    )  # fmt: skip
+
+
+def _residual(problem: ModelProblem, likelihood: Likelihood, minimum: Minimum) -> tuple[ComplexArray, ComplexArray]:
+    """Return the residual over the noise, and the FRFs fitted."""
+    vector = likelihood.vector
+    predicted = problem.prediction.frfs(vector, vector.to_values(minimum.x))
+    tested = problem.variance if problem.tested is None else problem.tested
+    std = np.sqrt(np.where(likelihood.used, tested, np.nan))
+    return (likelihood.measured - predicted) / std, predicted
+
+
+def _test(problem: ModelProblem, likelihood: Likelihood, minimum: Minimum, residual: ComplexArray) -> ResidualTest:
+    """Compare a residual with its noise; terms that their priors hold use up less of it than free ones."""
+    n = likelihood.vector.n_shown
+    of_priors = likelihood.vector.pull_slopes(minimum.x)[n:] ** 2
+    held = float(of_priors @ np.diagonal(inverse_information(minimum.information))[n:])
+    return check_residual(
+        residual, problem.freq_hz, likelihood.vector.pulls(minimum.x)[:n], parameters=minimum.x.size - held,
+        inflation=problem.noise.inflation, is_given=problem.noise.is_given,
     )  # fmt: skip
 
 

@@ -196,7 +196,10 @@ class Prediction:
         for i in vector.places_of("attachment"):
             numbers[int(vector.all[i].place[0])].append(float(values[i]))
         link = assembly_connection(self.whole, self.places, self.omega, joint, numbers)
-        states = [side.at(self._of_side(vector, values, name)) for side, name in zip(self.sides, "AB", strict=True)]
+        states = [
+            side.at(self._of_side(vector, values, name), values[vector.places_of(_error_of(name))])
+            for side, name in zip(self.sides, "AB", strict=True)
+        ]
         return link, tuple(states)
 
     def _open(self, link: Connection, states: tuple[SubstructureState, ...]) -> _Open:
@@ -264,10 +267,11 @@ class Prediction:
             own = slice(first, first + len(side.dofs))
             first = own.stop
             places = [i for i in vector.places_of("A" if name == "A" else "B") if vector.all[i].is_free]
-            if not places:
+            errors = vector.places_of(_error_of(name))
+            if not places and not errors:
                 continue
             names = [str(vector.all[i].place[0]) for i in places]
-            of_side = side.slopes(self._of_side(vector, values, name), names)
+            of_side = side.slopes(self._of_side(vector, values, name), names, state)
             # dY = out dH into
             unit, e = np.eye(opened.h.shape[1])[own], link.pattern[own]
             out = unit[:, self.responses].T - (opened.to_out @ coupled.w) @ e.T
@@ -280,6 +284,16 @@ class Prediction:
                 if slope.ports is not None:
                     slopes[i] += out @ (slope.ports @ right)
                     slopes[i] += (left @ slope.ports.T) @ into
+            if errors and side.errors is not None:
+                # Errors are changes of the matrices before these are scaled.
+                of_k, of_m = side.scales(self._of_side(vector, values, name))
+                slopes[errors] = side.errors.slopes(
+                    state.shapes, (1 + 1j * state.matrices.eta) * of_k, of_m * self.omega**2, left, right
+                )
+
+
+def _error_of(name: str) -> ParameterOrigin:
+    return "error of A" if name == "A" else "error of B"
 
 
 def _together(states: tuple[SubstructureState, ...]) -> ComplexArray:
@@ -355,9 +369,10 @@ def parameter_vector(
     found = list(joint_vector(whole.joint, fixed, joint_stiffness).all)
     sides: tuple[tuple[ParameterOrigin, Substructure], ...] = (("A", whole.a), ("B", whole.b))
     for side, part in sides:
-        for name, unknown in part.unknowns.items():
-            lower, upper = range_of(part, unknown)
-            own = _of_unknown(f"{side}/{name}", _UNITS.get(name, ""), side, (name,), unknown)
+        for name, unknown in part.fitted.items():
+            lower, upper = range_of(part, name, unknown)
+            unit = "1" if name in part.scaled and unknown.value == 1 else _UNITS.get(name, "")
+            own = _of_unknown(f"{side}/{name}", unit, side, (name,), unknown)
             found.append(own._replace(lower=lower, upper=upper))
     for i, one in enumerate(whole.attachments):
         found += _of_attachment(one, i)

@@ -91,7 +91,8 @@ def joints_of_realisations(
                 continue
         found = fit_assembly(prepare_model_fit(freq_hz, h, whole, channels, NoiseOptions(), ()))
         yield _joint_of(found, found.values)
-        if first is None and found.minimum.converged and found.test.is_noise and not found.problem.noise.is_assumed:
+        is_right = found.test.is_noise and found.error is None
+        if first is None and found.minimum.converged and is_right and not found.problem.noise.is_assumed:
             prediction = _Remembering(found.problem.prediction)
             first = found._replace(problem=replace(found.problem, prediction=prediction))
             level = _noise(first, h, first.predicted).level

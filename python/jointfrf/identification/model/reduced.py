@@ -10,6 +10,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from scipy import linalg
 
+from jointfrf.identification.model.model_error import ModalErrors
 from jointfrf.identification.model.substructure import FrfSource, Substructure, Unknown, check_same_lines
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.kernel.linear_algebra import solve
@@ -102,9 +103,9 @@ def _box(unknown: Unknown, centre: float, share: float = 1.0) -> tuple[float, fl
     return max(unknown.lower, centre - reach), min(unknown.upper, centre + reach)
 
 
-def range_of(part: Substructure, unknown: Unknown) -> tuple[float, float]:
+def range_of(part: Substructure, name: str, unknown: Unknown) -> tuple[float, float]:
     """Return the limits within which an unknown of a substructure is sought."""
-    if isinstance(part.source, Model):
+    if name in part.scaled:
         return unknown.lower, unknown.upper
     widest = _RANGE * reach_of(unknown)
     return max(unknown.lower, unknown.value - widest), min(unknown.upper, unknown.value + widest)
@@ -126,6 +127,7 @@ class ReducedSubstructure:
         self.name, self.part, self.freq_hz, self.dofs = name, part, freq_hz, tuple(dofs)
         self.omega = 2 * np.pi * freq_hz
         self.basis = np.zeros((0, 0))
+        self.errors: ModalErrors | None = None
         self._nominal: _Matrices | None = None
         self._last: tuple[tuple[float, ...], SubstructureState] | None = None
         self._polynomial: MatrixPolynomial | None = None
@@ -137,6 +139,11 @@ class ReducedSubstructure:
             self._last = ((), SubstructureState(h, np.zeros((*h.shape[:2], 0), complex), None, none, none[:, None]))
         else:
             self.basis = self._space(self._trials())
+
+    @property
+    def _arguments(self) -> list[str]:
+        """Unknowns that are arguments of a function which builds the model."""
+        return [name for name in self.part.fitted if name not in self.part.scaled]
 
     def _trials(self) -> list[dict[str, float]]:
         """Values for which the basis must be good: those believed, and where geometry changes, others around."""
@@ -183,30 +190,51 @@ class ReducedSubstructure:
             k, m, projected(model.damping), projected(model.structural_damping), model.loss_factor, np.asarray(ports)
         )
 
-    def _matrices(self, values: Mapping[str, float]) -> _Matrices:
-        """Return the reduced matrices for values of the unknowns."""
-        if not isinstance(self.part.source, Model):
-            if not values:
-                return self._reduced(self.part.model())
+    def _unscaled(self, values: Mapping[str, float]) -> _Matrices:
+        """Return the reduced matrices for those unknowns that are arguments of a function."""
+        arguments = [values[name] for name in self._arguments]
+        if arguments:
             if self._polynomial is None:
                 self._polynomial = self._polynomial_about(values)
-            return self._of_arrays(self._polynomial.at(np.array(list(values.values()))))
+            return self._of_arrays(self._polynomial.at(np.array(arguments)))
         if self._nominal is None:
-            self._nominal = self._reduced(self.part.model())
-        own, unknowns = self._nominal, self.part.unknowns
-        if "youngs_modulus" in values:
-            factor = values["youngs_modulus"] / unknowns["youngs_modulus"].value
-            own = own._replace(k=own.k * factor, h=None if own.h is None else own.h * factor)
-        if "density" in values:
-            own = own._replace(m=own.m * (values["density"] / unknowns["density"].value))
-        return own._replace(eta=values.get("loss_factor", own.eta))
+            self._nominal = self._reduced(self.part.nominal_model)
+        return self._nominal
 
-    def at(self, values: Mapping[str, float]) -> SubstructureState:
-        """Return the FRFs for values of all unknowns."""
-        key = tuple(values.values())
+    def _scaled(self, own: _Matrices, values: Mapping[str, float]) -> _Matrices:
+        """Return the matrices with those unknowns that are factors of them."""
+        for name, unknown in self.part.scaled.items():
+            factor = values.get(name, unknown.value) / unknown.value
+            if name == "youngs_modulus":
+                own = own._replace(k=own.k * factor, h=None if own.h is None else own.h * factor)
+            elif name == "density":
+                own = own._replace(m=own.m * factor)
+            elif name in values:
+                own = own._replace(eta=values[name])
+        return own
+
+    def allow_errors(self, most: int) -> None:
+        """Let the modal matrices be off by at most so many terms, from now on."""
+        if not isinstance(self.part.source, FrfSource):
+            own = self._unscaled(self.part.nominal)
+            self.errors = ModalErrors(own.k, own.m, float(self.omega.max()), most)
+
+    def at(self, values: Mapping[str, float], errors: FloatArray | None = None) -> SubstructureState:
+        """Return the FRFs for values of all unknowns, and of the terms of `errors` where there are any."""
+        key = (*values.values(), *([] if errors is None else errors.tolist()))
         if self._last is None or self._last[0] != key:
-            self._last = (key, self._state(self._matrices(values)))
+            own = self._unscaled(values)
+            if self.errors is not None and errors is not None and errors.size:
+                of_k, of_m = self.errors.changes(errors)
+                own = own._replace(k=own.k + of_k, m=own.m + of_m)
+            self._last = (key, self._state(self._scaled(own, values)))
         return self._last[1]
+
+    def scales(self, values: Mapping[str, float]) -> tuple[float, float]:
+        """Return the factors of stiffness and mass."""
+        found = [values[name] / self.part.scaled[name].value if name in self.part.scaled else 1.0
+                 for name in ("youngs_modulus", "density")]  # fmt: skip
+        return found[0], found[1]
 
     def _state(self, own: _Matrices) -> SubstructureState:
         squared, shapes = linalg.eigh(own.k, own.m)
@@ -233,15 +261,14 @@ class ReducedSubstructure:
             x = seen / diagonal[:, None, :]
         return SubstructureState(np.asarray(x @ seen.T), np.asarray(x), own, squared, shapes)
 
-    def slopes(self, values: Mapping[str, float], names: Sequence[str]) -> list[ReducedSlope]:
-        """Return the derivatives by some of the unknowns, in the modal coordinates of `at(values)`."""
-        state = self.at(values)
+    def slopes(self, values: Mapping[str, float], names: Sequence[str], state: SubstructureState) -> list[ReducedSlope]:
+        """Return the derivatives by some of the unknowns, in the modal coordinates of the state at these values."""
         return [self._slope(values, name, state) for name in names]
 
     def _slope(self, values: Mapping[str, float], name: str, state: SubstructureState) -> ReducedSlope:
         shapes, own = state.shapes, state.matrices
         assert own is not None
-        if isinstance(self.part.source, Model):
+        if name in self.part.scaled:
             if name == "loss_factor":
                 return ReducedSlope(eta=state.squared)
             if name == "density":
@@ -249,8 +276,9 @@ class ReducedSubstructure:
             h = None if own.h is None else shapes.T @ own.h @ shapes / values[name]
             return ReducedSlope(k=state.squared / values[name], h=h)
         assert self._polynomial is not None
-        arrays = self._polynomial.slope(np.array(list(values.values())), list(values).index(name))
-        by = self._of_arrays(arrays)
+        arguments = self._arguments
+        arrays = self._polynomial.slope(np.array([values[one] for one in arguments]), arguments.index(name))
+        by = self._scaled(self._of_arrays(arrays), {key: one for key, one in values.items() if key != "loss_factor"})
         k, m, c, h = (
             shapes.T @ one @ shapes if one is not None and one.any() else None for one in (by.k, by.m, by.c, by.h)
         )
@@ -259,8 +287,8 @@ class ReducedSubstructure:
 
     def _polynomial_about(self, values: Mapping[str, float], share: float = 1.0) -> MatrixPolynomial:
         """Return the reduced matrices as polynomials of the unknowns around some values."""
-        names = list(values)
-        box = np.array([_box(self.part.unknowns[name], value, share) for name, value in values.items()])
+        names = self._arguments
+        box = np.array([_box(self.part.unknowns[name], values[name], share) for name in names])
 
         def build(numbers: FloatArray) -> list[FloatArray]:
             own = self._reduced(self.part.model(dict(zip(names, numbers.tolist(), strict=True))))

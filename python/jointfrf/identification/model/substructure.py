@@ -69,6 +69,8 @@ class Unknown:
             raise ValueError(f"value must lie in {self.lower:g} to {self.upper:g}, not {self.value:g}")
 
 
+#: Relative standard deviations of what no model knows exactly: Young's modulus, density.
+_NEVER_EXACT = {"youngs_modulus": 0.03, "density": 0.01}
 #: What a model's own matrices may be scaled by, and its loss factor.
 SCALES = ("youngs_modulus", "density", "loss_factor")
 
@@ -104,6 +106,15 @@ class Substructure:
     unknowns : mapping of str to Unknown
         Of a `Model`: ``"youngs_modulus"`` scales K and H, ``"density"`` scales M, ``"loss_factor"`` is its eta. Of a
         function: its arguments.
+    exact : bool
+        Whether nothing else of a model is unknown. By default none is exact: Young's modulus and density, where they
+        are not among the unknowns, are fitted as factors of K and M under priors of 3 % and 1 %, the coefficients of
+        variation of structural steel [1]_.
+
+    References
+    ----------
+    .. [1] JCSS Probabilistic Model Code, part 2.1 (density) and part 3.2 (Young's modulus), Joint Committee on
+       Structural Safety, 2001.
 
     Raises
     ------
@@ -125,6 +136,7 @@ class Substructure:
     source: Model | Callable[..., Model] | FrfSource
     joint: tuple[str, ...]
     unknowns: Mapping[str, Unknown] = field(default_factory=dict)
+    exact: bool = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "joint", as_names("joint", self.joint))
@@ -174,10 +186,24 @@ class Substructure:
             raise ValueError(f"dofs must name {lines.shape[1]} different DOFs, not {one_line(names)}")
         return cls(FrfSource(freq, lines, names), as_names("joint", joint))
 
+    @cached_property
+    def fitted(self) -> dict[str, Unknown]:
+        """The unknowns, and those that every model has unless it is exact."""
+        if self.exact or isinstance(self.source, FrfSource):
+            return dict(self.unknowns)
+        errors = {name: Unknown(1.0, std, 0.0) for name, std in _NEVER_EXACT.items() if name not in self.unknowns}
+        return {**self.unknowns, **errors}
+
+    @cached_property
+    def scaled(self) -> dict[str, Unknown]:
+        """Those of `fitted` that are factors of the matrices, or their loss factor."""
+        is_model = isinstance(self.source, Model)
+        return {name: one for name, one in self.fitted.items() if is_model or name not in self.unknowns}
+
     @property
     def nominal(self) -> dict[str, float]:
-        """Values of the unknowns as believed."""
-        return {name: unknown.value for name, unknown in self.unknowns.items()}
+        """Values of all that is fitted, as believed."""
+        return {name: unknown.value for name, unknown in self.fitted.items()}
 
     @cached_property
     def nominal_model(self) -> Model:
@@ -197,22 +223,24 @@ class Substructure:
         named = self.nominal | dict(values or {})
         if isinstance(self.source, FrfSource):
             raise TypeError("a substructure given by FRFs has no model")
-        if not isinstance(self.source, Model):
-            built = self.source(**named)
+        model = self.source
+        if not isinstance(model, Model):
+            built = model(**{name: value for name, value in named.items() if name not in self.scaled})
             if not isinstance(built, Model):
                 raise TypeError(f"the function of a substructure must return a Model, not {type(built).__name__}")
-            return built
+            model = built
         changed: dict[str, Any] = {}
-        if "youngs_modulus" in named:
-            factor = named["youngs_modulus"] / self.unknowns["youngs_modulus"].value
-            changed["stiffness"] = self.source.stiffness * factor
-            if self.source.structural_damping is not None:
-                changed["structural_damping"] = self.source.structural_damping * factor
-        if "density" in named:
-            changed["mass"] = self.source.mass * (named["density"] / self.unknowns["density"].value)
-        if "loss_factor" in named:
-            changed["loss_factor"] = named["loss_factor"]
-        return replace(self.source, **changed)
+        for name, unknown in self.scaled.items():
+            factor = 1.0 if name == "loss_factor" else named[name] / unknown.value
+            if name == "loss_factor":
+                changed["loss_factor"] = named[name]
+            elif factor != 1 and name == "density":
+                changed["mass"] = model.mass * factor
+            elif factor != 1:
+                changed["stiffness"] = model.stiffness * factor
+                if model.structural_damping is not None:
+                    changed["structural_damping"] = model.structural_damping * factor
+        return replace(model, **changed) if changed else model
 
     def has(self, dof: str) -> bool:
         """Whether there is a DOF of this name."""

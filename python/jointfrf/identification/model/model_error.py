@@ -1,0 +1,124 @@
+"""Errors of a model that none of its unknowns describes: small symmetric changes of its modal matrices."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy import linalg
+
+from jointfrf.kernel.arguments import ComplexArray, FloatArray
+
+__all__ = ["ErrorTerm", "ModalErrors"]
+
+#: Modes up to this many times the highest frequency mix with each other; of those above only the stiffness may be off.
+_MIXED = 3.0
+#: A mode below this share of the highest frequency is one of a free body: it has no stiffness that could be off.
+_RIGID = 1e-3
+
+
+class ErrorTerm(NamedTuple):
+    """An entry of the relative error of a modal matrix.
+
+    Attributes
+    ----------
+    matrix : {"K", "M"}
+    row, column : int
+        Modes, row <= column.
+    weight : float
+        Its standard deviation for a level of 1.
+    """
+
+    matrix: str
+    row: int
+    column: int
+    weight: float
+
+
+class ModalErrors:
+    """Relative errors of the modal stiffness and mass of a part.
+
+    Parameters
+    ----------
+    k, m : ndarray, shape (r, r)
+        Reduced matrices.
+    highest : float
+        Largest angular frequency measured, rad/s.
+    most : int
+        Largest number of terms.
+
+    Notes
+    -----
+    In mass-normalised modes K = diag(w_a^2) and M = 1. The errors are symmetric matrices G with independent normal
+    entries, as of the Gaussian orthogonal ensemble: K + W G_K W, W = diag(w_a), and M + G_M; entries on the diagonal
+    have twice the variance of others. These are random matrices about a mean model as in [1]_, to first order of the
+    dispersion, so that an error of E, of a section, a mass or a clamp is one draw of them; rigid bodies stay free.
+
+    References
+    ----------
+    .. [1] C. Soize, A nonparametric model of random uncertainties for reduced matrix models in structural dynamics,
+       Probabilistic Engineering Mechanics 15 (2000) 277-294.
+    """
+
+    def __init__(self, k: FloatArray, m: FloatArray, highest: float, most: int) -> None:
+        squared, shapes = linalg.eigh(k, m)
+        w = np.sqrt(np.maximum(squared, 0))
+        self.of_mass = m @ shapes
+        self.of_stiffness = self.of_mass * w
+        elastic = [a for a in range(w.size) if w[a] > _RIGID * highest]
+        mixed = np.count_nonzero(w < _MIXED * highest)
+        pairs = sorted(((a, b) for b in range(mixed) for a in range(b + 1)), key=lambda ab: (ab[1] - ab[0], ab[1]))
+        first = [ErrorTerm("K", a, a, 1.0) for a in elastic if a < mixed]
+        first += [ErrorTerm("M", a, a, 1.0) for a in range(mixed)]
+        first += [ErrorTerm("K", a, a, 1.0) for a in elastic if a >= mixed]
+        others = [
+            ErrorTerm(matrix, a, b, float(np.sqrt(0.5)))
+            for a, b in pairs
+            if a != b
+            for matrix in "KM"
+            if matrix == "M" or a in elastic
+        ]
+        self.terms = (first + others)[:most]
+
+    def changes(self, errors: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the changes of K and M for values of all terms, shape (r, r) each."""
+        found = []
+        for matrix, own in (("K", self.of_stiffness), ("M", self.of_mass)):
+            g = np.zeros((own.shape[1],) * 2)
+            for term, value in zip(self.terms, errors, strict=True):
+                if term.matrix == matrix:
+                    g[term.row, term.column] = g[term.column, term.row] = value
+            used = g.any(axis=0)
+            found.append(own[:, used] @ g[np.ix_(used, used)] @ own[:, used].T)
+        return found[0], found[1]
+
+    def slopes(
+        self, shapes: FloatArray, of_k: complex, of_m: FloatArray, left: ComplexArray, right: ComplexArray
+    ) -> ComplexArray:
+        """Return -left dZ right for all terms, shape (q, n_freq, n_o, n_i).
+
+        Parameters
+        ----------
+        shapes : ndarray, shape (r, r)
+            Modes of which `left` and `right` are coordinates.
+        of_k : complex
+            By what a change of K enters Z: 1 + i eta times its factor.
+        of_m : ndarray, shape (n_freq,)
+            By what a change of M lowers Z: w^2 times its factor.
+        left, right : ndarray, shapes (n_freq, n_o, r), (n_freq, r, n_i)
+        """
+        found = np.empty((len(self.terms), of_m.size, left.shape[1], right.shape[2]), np.complex128)
+        factors = {"K": np.full(of_m.size, -of_k), "M": of_m + 0j}
+        for matrix, own in (("K", self.of_stiffness), ("M", self.of_mass)):
+            turned = (shapes.T @ own).astype(complex)
+            to_left = (left.reshape(-1, left.shape[2]) @ turned).reshape(*left.shape[:2], -1)
+            to_left *= factors[matrix][:, None, None]
+            to_right = turned.T @ right
+            for i, term in enumerate(self.terms):
+                if term.matrix != matrix:
+                    continue
+                a, b = term.row, term.column
+                np.multiply(to_left[:, :, a, None], to_right[:, None, b], out=found[i])
+                if a != b:
+                    found[i] += to_left[:, :, b, None] * to_right[:, None, a]
+        return found
