@@ -62,8 +62,8 @@ def test_derivatives_by_the_errors_are_differences_of_frfs():
             there = values.copy()
             there[i] += at * step
             total = total + weight * problem.prediction.frfs(vector, there)
-        # FRFs of a free body are rounded to 1e-7 far below its highest modes, and differences have that over the step.
-        allowed = 1e-4 * abs(slopes[i]).max() + 1e-7 / 1e-3 * abs(y).max()
+        # Far below the highest modes of a free body rounding is 1e-8 of its FRFs, at a resonance 1e-6: over the step.
+        allowed = 1e-4 * abs(slopes[i]).max() + 1e-6 / 1e-3 * abs(y).max()
         assert abs(slopes[i] - total / (12 * step)).max() * (1 if one.is_error else abs(one.value)) < allowed, one.name
 
 

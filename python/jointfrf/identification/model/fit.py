@@ -29,6 +29,8 @@ __all__ = ["FoundModel", "ModelProblem", "OpenDirection", "fit_assembly", "open_
 
 #: A start is good whose minimum leaves a residual below this many times the noise.
 _GOOD = 1.1
+#: Errors of models that engineers would call small: then the joint is not far off, either.
+_SMALL_ERROR = 0.02
 #: Starts that are followed to their minimum at most.
 _FOLLOWED = 4
 #: Reductions of the models are extended at most so many times.
@@ -151,6 +153,9 @@ def _lowest(problem: ModelProblem) -> tuple[Minimum, float]:
         found.append(minimise(likelihood, vector.to_coordinates(values)))
         if _ratio(likelihood, found[-1], problem.noise.inflation) < _GOOD:
             return found[-1], np.inf
+    nearest = min(found, key=lambda one: one.cost)
+    if not problem.noise.is_assumed and _is_explained(problem, nearest):
+        return nearest, np.inf
     trials = ranked_trials(likelihood, given)
     for x in itertools.islice(refined(likelihood, trials), _FOLLOWED):
         found.append(minimise(likelihood, x))
@@ -159,6 +164,12 @@ def _lowest(problem: ModelProblem) -> tuple[Minimum, float]:
     best = min(found, key=lambda one: one.cost)
     apart = [one.cost - best.cost for one in found if abs(one.x - best.x).max(initial=0) > 0.1 and one.cost > best.cost]
     return best, min(apart, default=np.inf)
+
+
+def _is_explained(problem: ModelProblem, minimum: Minimum) -> bool:
+    """Whether small errors of the models explain what the residual has beside the noise: no other start is needed."""
+    found = with_model_error(problem.likelihood, minimum)
+    return found is not None and found[2].level < _SMALL_ERROR and _ratio(*found[:2], problem.noise.inflation) < _GOOD
 
 
 def _values_of_lines(problem: ModelProblem) -> Iterator[FloatArray]:
