@@ -74,9 +74,8 @@ class Pair:
         """Channels in the numbers of nodes."""
         return tuple(f"{side}/{place // coarse + 1}:y" for side, place in POINTS[self.points][0])
 
-    @cache
-    def exact(self) -> np.ndarray:
-        """FRFs without noise."""
+    def truth(self) -> jf.Assembly:
+        """The assembly that is measured."""
         a, b, attached = beam(0), beam(1), ()
         if self.wrong.startswith("E of A"):
             a = beam(0, youngs_modulus=MODULUS * (1 + float(self.wrong.split()[3]) / 100))
@@ -90,10 +89,9 @@ class Pair:
         if self.wrong.startswith("rotary"):
             a, b = with_rotary_inertia(a, 0), with_rotary_inertia(b, 1)
         joint = jf.Joint([TRUE["k_y"], TRUE["k_theta"]], [TRUE["c_y"], TRUE["c_theta"]], ["y", "theta"])
-        whole = jf.Assembly(
+        return jf.Assembly(
             jf.Substructure(a, ["13:y", "13:theta"]), jf.Substructure(b, ["1:y", "1:theta"]), joint, attached
         )
-        return whole.receptance(FREQ, self.names(), self.names())
 
     def believed(self, *, exact: bool) -> jf.Assembly:
         """The assembly that is fitted."""
@@ -104,9 +102,15 @@ class Pair:
         return jf.Assembly(parts[0], parts[1], jf.Joint([1e5, 1e3], [5, 0.5], ["y", "theta"]))
 
 
+@cache
+def exact_frfs(pair: Pair) -> np.ndarray:
+    """FRFs of the true assembly without noise."""
+    return pair.truth().receptance(FREQ, pair.names(), pair.names())
+
+
 def one_draw(pair: Pair, way: str, seed: int) -> tuple[np.ndarray, np.ndarray, bool]:
     """Which intervals hold, half their width over the value, and whether a warning says that the models do not fit."""
-    h = jf.pollute(pair.exact(), POINTS[pair.points][1], seed=seed)
+    h = jf.pollute(exact_frfs(pair), POINTS[pair.points][1], seed=seed)
     channels = pair.names(pair.coarse)
     without = mock.patch("jointfrf.identification.model.fit.with_model_error", return_value=None)
     with warnings.catch_warnings(), without if way == "before" else nullcontext():
@@ -130,8 +134,8 @@ def cells(draws: list, clean: np.ndarray) -> str:
 
 
 HEAD = (
-    "| wrong | before: coverage, lowest / mean, % | warned, % | held or warned, % | width | default: coverage | warned | "
-    "held or warned | width | exact: coverage | warned | held or warned | width |\n" + "|---" * 13 + "|"
+    "| wrong | before: coverage, lowest / mean, % | warned, % | held or warned, % | width | default: coverage | "
+    "warned | held or warned | width | exact: coverage | warned | held or warned | width |\n" + "|---" * 13 + "|"
 )
 #: Ways to fit, and the part of the draws that each has: the first is known to fail.
 WAYS = {"before": 4, "default": 1, "exact": 4}
