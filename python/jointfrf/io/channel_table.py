@@ -21,7 +21,7 @@ from jointfrf.spelling import did_you_mean
 from jointfrf.toml.declared import Keys, NotNegative, key, keys_of, read_keys
 from jointfrf.toml.table import TomlTable, read_toml
 
-__all__ = ["ChannelKeys", "places_of_table", "read_channel_table"]
+__all__ = ["ChannelKeys", "ChannelTableKeys", "places_of_table", "read_channel_table"]
 
 #: Units of positions, in m.
 _UNITS = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "in": 0.0254}

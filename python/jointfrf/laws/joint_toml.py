@@ -22,6 +22,8 @@ from jointfrf.toml.table import TomlTable
 
 __all__ = [
     "LAW_WORDS",
+    "ConstantsKeys",
+    "LawJointKeys",
     "joint_text",
     "parameters_in_words",
     "read_joint_table",
@@ -92,8 +94,9 @@ class DofLawKeys(Keys):
     law: Annotated[str, key("The law; `rigid`: both sides move alike.", choice=LAW_WORDS)]
     values: Annotated[
         dict[str, float],
-        key(f"Its parameters, those that it takes: {takes_in_words()}.", absent="required but for `rigid`"),
-    ] = field(default_factory=dict)
+        key(f"Its parameters, those that it takes: {takes_in_words()}; {parameters_in_words()}.",
+            absent="required but for `rigid`"),
+    ] = field(default_factory=dict)  # fmt: skip
     mass: Annotated[
         NotNegative | None, key("Mass of the joint in this direction, half of it on either side.", "kg, kg m^2")
     ] = None

@@ -1,4 +1,4 @@
-"""The page of the keys of `assembly.toml`, from their declaration.
+"""The page of the keys of `assembly.toml`, of joints and of tables of channels, from their declaration.
 
 python tests/python/support/assembly_keys.py docs/assembly-keys.md    writes it
 """
@@ -9,9 +9,11 @@ import sys
 from pathlib import Path
 
 from jointfrf.assembly_file.keys import AssemblyKeys
+from jointfrf.io.channel_table import ChannelTableKeys
+from jointfrf.laws.joint_toml import ConstantsKeys, LawJointKeys
 from jointfrf.toml.documents import key_reference
 
-HEAD = """# Keys of assembly.toml
+HEAD = """# Keys of assembly.toml, joint.toml and tables of channels
 
 <!-- python tests/python/support/assembly_keys.py docs/assembly-keys.md -->
 
@@ -21,9 +23,15 @@ A key that is not in this list is an error that lists those that are.
 """
 
 
+TOPS = {
+    "assembly.toml": AssemblyKeys, "joint.toml of constants": ConstantsKeys, "joint.toml of laws": LawJointKeys,
+    "Tables of channels": ChannelTableKeys,
+}  # fmt: skip
+
+
 def assembly_page() -> str:
     """Return the page."""
-    return HEAD + key_reference({"assembly.toml": AssemblyKeys})
+    return HEAD + key_reference(TOPS)
 
 
 if __name__ == "__main__":
