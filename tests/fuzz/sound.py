@@ -275,6 +275,7 @@ def _files(folder: Path) -> dict[str, dict[str, Any]]:
     masses = 'model = "chain"\nmasses = [3.0, 2.0]\nstiffness = [2000.0, 0.0]\ndamping = [3.0, 0.0]\n'
     parts = f'[A]\n{masses}joint = ["2:x"]\n[B]\n{masses}joint = ["1:x"]\n[[joint.law]]\ndof = "x"\nlaw = "spring"\n'
     (folder / "assembly.toml").write_text(f'{parts}[channels]\n"1:+x" = "A/1:x"\n"2:-y" = "B/2:x"\n')
+    (folder / "part.toml").write_text(masses + 'joint = ["1:x"]\n')
     law = jf.LawJoint({"x": jf.SpringLaw(2000.0, 3.0)})
     jf.write_joint(folder / "joint.toml", law)
     first = jf.study("3.1", folder / "study", 2, design=jf.StudyDesign(estimators=["ismm"]), jobs=1)
@@ -285,6 +286,7 @@ def _files(folder: Path) -> dict[str, dict[str, Any]]:
         "measured_assembly": {"path": folder / "assembly.toml", "frfs": frfs},
         "read_channel_table": {"path": folder / "table.csv"},
         "read_joint": {"path": folder / "joint.toml"},
+        "read_part": {"path": folder / "part.toml"},
         "write_joint": {"path": folder / "written.toml", "joint": law},
         "study": {"case": "3.1", "out": folder / "another", "realisations": 2, "jobs": 1},
         "read_study": {"folder": first.folder},
