@@ -23,10 +23,9 @@ from jointfrf.assembly_file.keys import (
     Unknowns,
 )
 from jointfrf.cases.substructures import MeasuredStructure, ModelStructure, Structure
-from jointfrf.dofs import is_rotation
 from jointfrf.frf.frf_set import Channel
 from jointfrf.identification.joint_file import read_joint
-from jointfrf.identification.model.assembly import AddedMass, Assembly, Attachment, GroundSpring
+from jointfrf.identification.model.assembly import AddedMass, Assembly, Attachment, GroundSpring, check_joint_order
 from jointfrf.identification.model.substructure import SCALES, Substructure, Unknown
 from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_frequency
@@ -292,19 +291,11 @@ class AssemblyFile:
             for dof in own.joint:
                 if not part.has(dof):
                     raise own.wrong("joint", f"{name} has no DOF {dof!r}")
-            self._check_order(name, own)
+            if len(own.joint) == len(self.joint.dofs):  # else it is said how many there must be
+                own.build(lambda own=own: check_joint_order("", own.joint, self.joint.dofs), "joint")  # type: ignore[misc]
             here = [dof[2:] for dof in used if dof.startswith(f"{name}/") and part.has(dof[2:])]
             sides.append(part.substructure(freq_hz, here))
         return self.keys.build(lambda: Assembly(sides[0], sides[1], self.joint, attachments))
-
-    def _check_order(self, name: str, part: PartKeys) -> None:
-        """Raise an error where joint DOFs are in another order than those of the joint."""
-        directions = [dof.rpartition(":")[2].lstrip("+-") for dof in part.joint]
-        for own, direction, dof in zip(part.joint, directions, self.joint.dofs, strict=False):
-            is_other = direction != dof and direction in self.joint.dofs
-            if is_other or is_rotation(direction) != is_rotation(dof):
-                raise part.wrong("joint", f"{own} stands where the joint has {dof}: its DOFs are, in this order, "
-                                 f"{', '.join(self.joint.dofs)}")  # fmt: skip
 
 
 def read_assembly_file(path: Path) -> AssemblyFile:

@@ -499,3 +499,38 @@ def test_a_model_is_never_built_beyond_the_limits_of_its_unknowns():
     low, high = fit.confidence_interval(0.95)["A/loss_factor"]
     assert low < 0.01 < high
     assert 0.002 <= min(asked) < max(asked) <= 0.011
+
+
+@pytest.mark.parametrize(
+    ("of_part", "of_joint", "message"),
+    [
+        (["4:y", "4:theta"], ["theta", "y"], "a: 4:y stands where the joint has theta"),
+        (["4:theta", "4:y"], ["y", "theta_z"], "a: 4:theta stands where the joint has y"),
+        (["4:theta", "4:y"], ["Fy", "Mz"], "a: 4:theta stands where the joint has Fy"),
+        (["4:y", "4:theta"], ["y", "theta_z"], ""),
+        (["4:y", "4:theta"], ["Fy", "Mtheta_z"], ""),
+        (["4:y", "4:theta"], ["x", "theta_z"], ""),  # axes of its own
+        (["4:y", "4:theta"], ["0", "1"], ""),
+    ],
+)
+def test_a_joint_in_another_order_than_its_substructure_is_refused(of_part, of_joint, message):
+    """It gave 29848 +- 36 N m/rad for 2121, without a word."""
+    arm = jf.beam(0.3, 3, youngs_modulus=70e9, density=2700.0, width=0.02, height=0.01)
+    joint = jf.Joint([1e6, 2e3], dofs=of_joint)
+    a, b = jf.Substructure(arm, of_part), jf.Substructure(arm, [dof.replace("4", "1") for dof in of_part])
+    if not message:
+        jf.Assembly(a, b, joint)
+        return
+    with pytest.raises(ValueError, match=message):
+        jf.Assembly(a, b, joint)
+
+
+@pytest.mark.parametrize("way", ["x", "y"])
+def test_directions_that_are_exchanged_are_refused(way):
+    other = {"x": "y", "y": "x"}[way]
+    arm = jf.beam(0.3, 3, youngs_modulus=70e9, density=2700.0, width=0.02, height=0.01, axial=True)
+    one, swapped = [f"1:{way}", f"1:{other}"], [f"1:{other}", f"1:{way}"]
+    joint = jf.LawJoint({way: jf.SpringLaw(1e6), other: jf.SpringLaw(2e6)})
+    jf.Assembly(jf.Substructure(arm, one), jf.Substructure(arm, one), joint)
+    with pytest.raises(ValueError, match=f"b: 1:{other} stands where the joint has {way}"):
+        jf.Assembly(jf.Substructure(arm, one), jf.Substructure(arm, swapped), joint)

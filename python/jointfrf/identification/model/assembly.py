@@ -9,14 +9,23 @@ from typing import get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from jointfrf.dofs import is_rotation
+from jointfrf.dofs import direction_names, is_rotation
 from jointfrf.identification.model.substructure import FrfSource, Substructure, Unknown, check_same_lines
 from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_frequency, as_names, check_type, one_line
 from jointfrf.laws.law_joint import Connection, LawJoint
 from jointfrf.substructuring.coupling import connect
 
-__all__ = ["AddedMass", "Assembly", "Attachment", "GroundSpring", "Places", "assembly_connection", "places_of"]
+__all__ = [
+    "AddedMass",
+    "Assembly",
+    "Attachment",
+    "GroundSpring",
+    "Places",
+    "assembly_connection",
+    "check_joint_order",
+    "places_of",
+]
 
 
 @dataclass(frozen=True)
@@ -93,6 +102,7 @@ class Assembly:
                     f"{side}: the substructure has {len(part.joint)} joint DOFs, the joint {len(self.joint.dofs)}"
                 )
             self.check([f"{side.upper()}/{dof}" for dof in part.joint], "joint DOF")
+            check_joint_order(f"{side}: ", part.joint, self.joint.dofs)
         for one in self.attachments:
             self.check(one.places, "attachment")
 
@@ -134,6 +144,49 @@ class Assembly:
         link = assembly_connection(self, places, 2 * np.pi * freq, self.joint, numbers)
         connected = connect(h, link, freq)
         return np.ascontiguousarray(connected[:, places.at(responses)][:, :, places.at(forces)])
+
+
+def check_joint_order(where: str, dofs: Sequence[str], joint: Sequence[str]) -> None:
+    """Raise a ValueError where DOFs of a substructure stand in another order than those of the joint.
+
+    Parameters
+    ----------
+    where : str
+        Beginning of the message.
+    dofs : sequence of str
+        Joint DOFs of the substructure, ``"601:theta"``; without a direction the name says nothing.
+    joint : sequence of str
+        DOFs of the joint, of any names.
+
+    Notes
+    -----
+    A rotation must be a rotation. A direction must not be that of another DOF of the joint; one that the joint does not
+    have may be the same motion in other axes.
+    """
+    known = [_direction(dof) for dof in joint]
+    for dof, own, name in zip(dofs, (_direction(dof.rpartition(":")[2]) for dof in dofs), joint, strict=True):
+        if ":" not in dof or not own:
+            continue
+        meant = _direction(name)
+        is_other = own != meant and own in known and not _is_open(own, meant)
+        if is_other or (meant and is_rotation(own) != is_rotation(meant)):
+            raise ValueError(
+                f"{where}{dof} stands where the joint has {name}: its DOFs are, in this order, {', '.join(joint)}"
+            )
+
+
+def _direction(name: str) -> str:
+    """Return the name of a direction among `DIRECTIONS` where it is known, ``theta`` of a rotation without axis."""
+    bare = name.lstrip("+-")
+    try:
+        return direction_names([bare])[0]
+    except ValueError:
+        return "theta" if is_rotation(bare) else ""
+
+
+def _is_open(own: str, meant: str) -> bool:
+    """Whether one of two names is a rotation without axis, and the other any rotation."""
+    return "theta" in (own, meant) and is_rotation(own) and is_rotation(meant)
 
 
 def places_of(whole: Assembly, responses: Sequence[str], forces: Sequence[str]) -> Places:
