@@ -169,7 +169,7 @@ class Joint:
         return Joint(k, c, self.dofs, structural_damping=h)
 
     def export(self, program: CardFormat, nodes: Sequence[int], **options: Unpack[CardOptions]) -> str:
-        """Write the joint as input of a finite-element program, in the units it has (SI).
+        """Write the joint as input of a finite-element program, in the units of the model.
 
         Parameters
         ----------
@@ -188,9 +188,15 @@ class Joint:
         full_matrix : bool
             Whether matrices are written where springs would do: Abaqus, Nastran.
         positions : array_like, shape (2, 3), optional
-            Where the two nodes are in the model, m; rigid arms then lead from them to `points`.
+            Where the two nodes are in the model, in its unit of length; rigid arms then lead from them to `points`.
         points : array_like, shape (3,) or (2, 3), optional
-            Reference point of the joint, or those of its sides j and k, m; with `positions`.
+            Reference point of the joint, or those of its sides j and k, in the same unit, with `positions`; by default
+            midway between the nodes. It is stated in a comment.
+        units : {"SI", "mm-t-s", "mm-kg-ms"}
+            Units of the model: m, N, s (default); mm, N, s; mm, kN, ms. Arms of more than 10 m are an error.
+        faces : sequence of two sequences of int, optional
+            Nodes that follow the nodes j and k as rigid bodies: ``*RIGID BODY``, RBE2, CERIG. Without them, where nodes
+            are apart from the reference point, such cards are sketched in comments.
         comments : sequence of str, optional
             Lines of comment before the input.
 

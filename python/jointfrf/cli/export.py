@@ -17,6 +17,7 @@ from jointfrf.identification.fit_cards import cards
 from jointfrf.identification.joint_file import JointFile, read_joint_file
 from jointfrf.identification.result import Fit
 from jointfrf.io.cards import CardFormat, CardOptions
+from jointfrf.io.model_units import UnitSystemName, model_units
 from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import FloatArray
 from jointfrf.laws.law_joint import LawJoint
@@ -41,7 +42,7 @@ def add_arguments(parser: CommandParser) -> None:
     parser.option(
         "--frequency HZ", "where laws that depend on frequency are taken: cards hold k, c and h only", _frequency
     )
-    parser.option("--joint-at X,Y,Z", "reference point of the joint in the model, m (default: saved)", point)
+    parser.option("--joint-at X,Y,Z", "reference point of the joint in the model, in its unit of length (saved)", point)
     add_card_arguments(parser)
 
 
@@ -108,7 +109,7 @@ def _terms(joint: Joint | None) -> tuple[str, str]:
 
 def _points(args: argparse.Namespace, found: JointFile) -> FloatArray | None:
     if args.joint_at is not None:
-        return np.tile(args.joint_at, (2, 1))
+        return np.tile(args.joint_at, (2, 1)) * model_units(args.units or "SI").length
     return found.points
 
 
@@ -149,6 +150,13 @@ def parse_export(text: str) -> tuple[CardFormat, list[int]]:
     return cast(CardFormat, program), ends
 
 
+def _faces(text: str) -> tuple[list[int], list[int]]:
+    one, colon, other = text.partition(":")
+    if not colon:
+        raise argparse.ArgumentTypeError(f"{text!r} is not two lists of nodes like 11,12,13:21,22,23")
+    return list(nodes(one).numbers), list(nodes(other).numbers)
+
+
 def _positions(text: str) -> tuple[tuple[float, ...], ...]:
     found = numbers(text, 6, "xj,yj,zj,xk,yk,zk in m")
     return found[:3], found[3:]
@@ -159,9 +167,15 @@ def add_card_arguments(parser: CommandParser) -> None:
     parser.option("--output FILE", "write the cards into this file: joint.bdf", Path)
     parser.option(
         "--nodes-at XJ,YJ,ZJ,XK,YK,ZK",
-        "where the two nodes of the model are, m: rigid arms lead from them to the reference point of the joint "
-        "(without it the nodes are taken to lie there)",
+        "where the two nodes of the model are, in its unit of length: rigid arms lead from them to the reference point "
+        "of the joint (without it the nodes are taken to lie there)",
         _positions,
+    )
+    parser.option("--units SYSTEM", "units of the model: SI, mm-t-s or mm-kg-ms (SI)", get_args(UnitSystemName))
+    parser.option(
+        "--faces J1,J2,...:K1,K2,...",
+        "nodes of solid elements that follow the two nodes as rigid bodies (without it such cards are a comment)",
+        _faces,
     )
     parser.option("--element N", "first number of new elements (1)", positive, 1)
     parser.option("--property N", "first number of properties (1)", positive, 1)
@@ -191,7 +205,12 @@ def card_request(
         The program cannot hold it, or a number is out of range.
     """
     if args.export is None:
-        for name, given in (("--output", args.output), ("--nodes-at", args.nodes_at)):
+        for name, given in (
+            ("--output", args.output),
+            ("--nodes-at", args.nodes_at),
+            ("--units", args.units),
+            ("--faces", args.faces),
+        ):
             if given is not None:
                 raise UsageError(f"{name} is for cards: say --export PROGRAM:J,K, too")
         flags = ("--element", "--property", "--full-matrix", "--all-damping", "--no-damping")
@@ -205,11 +224,13 @@ def card_request(
         "rotation_nodes": ends[2:] or None,
         "damping": not args.no_damping and program != "calculix",  # it has none between DOFs; the text says so
         "full_matrix": args.full_matrix,
+        "units": args.units or "SI",
+        "faces": args.faces,
     }
     if args.nodes_at is not None:
-        if points is None:
-            raise UsageError("--nodes-at needs --joint-at X,Y,Z, the reference point of the joint")
-        options["positions"], options["points"] = np.array(args.nodes_at), points
+        options["positions"] = np.array(args.nodes_at)
+        if points is not None:
+            options["points"] = points / model_units(args.units or "SI").length
     request = CardRequest(program, ends[:2], options, args.all_damping, args.output)
     try:
         _probe(len(dofs), dofs, damping, cross).export(request.program, request.nodes, **options)

@@ -91,6 +91,7 @@ def add_arguments(parser: CommandParser) -> None:
     parser.option("--out DIR", "folder for identification.json and figures", Path)
     parser.option("--report FILE", "the identification by method compliance as one HTML page", Path)
     parser.option("--save FILE", "keep the joint (by the first method) in a JSON file", Path)
+    parser.option("--save-lines", "with --save: K* of each line, too, which makes the file many times as long")
     parser.option(
         "--export PROGRAM:J,K",
         "the joint (by the first method) as input of abaqus, calculix (stiffness only), nastran or ansys, between "
@@ -141,7 +142,7 @@ def run(args: argparse.Namespace) -> int:
         text = written_cards(fits[0], request, about)
         written += [] if args.output is None else [args.output]
     if args.save is not None:
-        _save(args.save, fits[0], file_names(args), joint)
+        _save(args.save, fits[0], file_names(args), joint, lines=args.save_lines)
         written.append(args.save)
     if text and args.output is None:
         out.say("", text.rstrip("\n"))
@@ -248,9 +249,9 @@ def _places(joint: MeasuredJoint) -> list[str]:
     return [f"reference points x, y, z = {both[0]} m (j) and {both[1]} m (k)"]
 
 
-def _save(path: Path, fit: Fit, source: str, joint: MeasuredJoint) -> None:
+def _save(path: Path, fit: Fit, source: str, joint: MeasuredJoint, *, lines: bool) -> None:
     about = {"source": source, "reference_points_m": plain(dict(zip("jk", joint.responses.references, strict=True)))}
-    write_record(path, fit_to_dict(fit) | about)
+    write_record(path, fit_to_dict(fit, lines=lines) | about)
 
 
 def _write_figures(args: argparse.Namespace, frfs: FrfSet, joint: MeasuredJoint, fits: list[Fit]) -> list[Path]:

@@ -146,7 +146,7 @@ def _one(args: argparse.Namespace, out: Output) -> tuple[Fit, dict[str, Any], li
         else:
             written.append(args.output)
     if args.save is not None:
-        write_record(args.save, fit_to_dict(fit) | {"source": source})
+        write_record(args.save, fit_to_dict(fit, lines=args.save_lines) | {"source": source})
         written.append(args.save)
     if args.report is not None:
         ends = (1, 2) if args.export is None else args.export[1]

@@ -216,7 +216,7 @@ def fit_from_dict(content: dict[str, Any]) -> Fit:
     return _fit_of(content, "the dictionary")
 
 
-def save(fit: Fit, path: Path | str, *, probabilities: Sequence[float] | None = None, lines: bool = True) -> Path:
+def save(fit: Fit, path: Path | str, *, probabilities: Sequence[float] | None = None, lines: bool = False) -> Path:
     """Write a fit to a JSON file, whole or not at all.
 
     Parameters
@@ -224,8 +224,10 @@ def save(fit: Fit, path: Path | str, *, probabilities: Sequence[float] | None = 
     fit : Fit
     path : Path or str
         In a folder that exists.
-    probabilities, lines : optional
+    probabilities : sequence of float, optional
         As in `fit_to_dict`.
+    lines : bool
+        Whether K*(w) of each line is kept, which makes the file many times as long.
 
     Returns
     -------

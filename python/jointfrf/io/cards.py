@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from jointfrf.dofs import DIRECTIONS, direction_places, rigid_offset
+from jointfrf.io.model_units import ModelUnits, UnitSystemName, model_units
 from jointfrf.kernel.arguments import FloatArray, as_nodes, as_real, check_choice
 from jointfrf.spelling import visible
 
@@ -24,6 +25,10 @@ _LARGEST = 99_999_999
 _ROUND_OFF = 1e-10
 #: Arms shorter than this are rounding, m.
 _NO_ARM = 1e-9
+#: A rigid arm is not as long, m: where one comes out longer, mm were taken for m.
+_LONGEST_ARM = 10.0
+#: Nodes in a line of a set of Abaqus and CalculiX, which take sixteen; of a continuation of Nastran.
+_IN_A_LINE = 8
 #: How far, relative to their distance, rounding may put a point off the line between two nodes.
 _ON_LINE = 1e-9
 #: Characters of a line of comment: Nastran reads 72 columns.
@@ -40,6 +45,8 @@ class CardOptions(TypedDict, total=False):
     full_matrix: bool
     positions: ArrayLike | None
     points: ArrayLike | None
+    units: UnitSystemName
+    faces: Sequence[Sequence[int]] | None
     comments: Sequence[str]
 
 
@@ -47,7 +54,7 @@ class _Link(NamedTuple):
     """A joint in all six directions: stiffness, viscous and hysteretic damping, shape (6, 6), and its numbers.
 
     `arms` (2, 3) lead from the nodes to the reference points of the joint on the two sides, m; `positions` (2, 3) are
-    those of the nodes, where they are known.
+    those of the nodes, where they are known; all in the `units` of the model. `faces` are nodes that follow the two.
     """
 
     stiffness: FloatArray
@@ -59,6 +66,8 @@ class _Link(NamedTuple):
     notes: tuple[str, ...]
     arms: FloatArray
     positions: FloatArray | None
+    units: ModelUnits
+    faces: tuple[tuple[int, ...], tuple[int, ...]] | None
 
     @property
     def matrices(self) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -126,7 +135,7 @@ def spring_cards(
         lines = _abaqus_matrices(link) if is_matrix or link.has_arms else _abaqus_springs(link)
     else:
         lines = _nastran_matrices(link) if is_matrix else _nastran_bush(link)
-    return "\n".join(lines) + "\n"
+    return "\n".join([*lines, *_bodies(program, link)]) + "\n"
 
 
 def _link(
@@ -139,13 +148,18 @@ def _link(
     """Check the arguments of `cards`."""
     places = direction_places(dofs)
     wide = []
-    for name, matrix in zip(("stiffness", "damping", "hysteretic damping"), matrices, strict=True):
+    units = model_units(options.get("units", "SI"))
+    turns = places > 2
+    rotations = turns.astype(int)[:, None] + turns
+    for name, matrix, seconds in zip(("stiffness", "damping", "hysteretic damping"), matrices, (2, 1, 2), strict=True):
         if abs(matrix - matrix.T).max() > _ROUND_OFF * abs(matrix).max():
             raise ValueError(f"the {name} of the joint must be symmetric to be exported")
         whole = np.zeros((6, 6))
-        whole[np.ix_(places, places)] = (matrix + matrix.T) / 2
+        scale = np.array([units.scale(seconds, count) for count in range(3)])
+        whole[np.ix_(places, places)] = (matrix + matrix.T) / 2 / scale[rotations]
         wide.append(whole)
-    note = f"DOFs {', '.join(DIRECTIONS[place] for place in sorted(places))}; SI units, written by jointfrf"
+    named = "SI units" if units.name == "SI" else f"units {units.words} ({units.name})"
+    note = f"DOFs {', '.join(DIRECTIONS[place] for place in sorted(places))}; {named}, written by jointfrf"
     if not options.get("damping", True):
         note += ", damping left out"
         wide[1:] = [np.zeros((6, 6)), np.zeros((6, 6))]
@@ -157,25 +171,52 @@ def _link(
     if turning and program != "calculix":
         raise ValueError(f"rotation_nodes are for calculix: the nodes of {program} have rotations of their own")
     element, number = _number("element", options.get("element", 1)), _number("number", options.get("number", 1))
-    positions, arms = _geometry(options)
-    notes = (note, *_text_lines(options.get("comments", ())), *_arm_note(arms))
-    return _Link(wide[0], wide[1], wide[2], (*numbers, *turning), element, number, notes, arms, positions)
+    positions, arms, where = _geometry(options, units)
+    faces = _faces(options.get("faces"), numbers)
+    notes = (note, *_text_lines(options.get("comments", ())), *_text_lines(where), *_arm_note(arms, units))
+    return _Link(wide[0], wide[1], wide[2], (*numbers, *turning), element, number, notes, arms, positions, units, faces)
 
 
-def _geometry(options: CardOptions) -> tuple[FloatArray | None, FloatArray]:
-    """Return the positions of the nodes, where they are known, and the arms from them to the reference points."""
+def _geometry(options: CardOptions, units: ModelUnits) -> tuple[FloatArray | None, FloatArray, list[str]]:
+    """Return the positions of the nodes, the arms from them to the reference points, and where these are."""
     given, points = options.get("positions"), options.get("points")
     if given is None:
         if points is not None:
             raise ValueError("points needs positions, those of the two nodes")
-        return None, np.zeros((2, 3))
+        return None, np.zeros((2, 3)), []
     positions = as_real("positions", given, (2, 3))
-    if points is None:
-        raise ValueError("positions needs points, the reference point of the joint or those of its two sides")
-    ends = as_real("points", np.broadcast_to(np.asarray(points, dtype=np.float64), (2, 3)), (2, 3))
+    middle = positions.mean(axis=0)
+    chosen = middle if points is None else np.asarray(points, dtype=np.float64)
+    ends = as_real("points", np.broadcast_to(chosen, (2, 3)), (2, 3))
     arms = ends - positions
-    arms[abs(arms) < _NO_ARM] = 0
-    return positions, arms
+    arms[abs(arms) < _NO_ARM / units.length] = 0
+    longest = units.length * float(np.linalg.norm(arms, axis=1).max())
+    unit = units.words.partition(",")[0]
+    if longest > _LONGEST_ARM:
+        raise ValueError(
+            f"a node lies {longest / units.length:.4g} {unit} from the reference point of the joint: positions and "
+            f"points are in {unit}, the unit of length of {units.name}"
+        )
+    same = np.allclose(ends[0], ends[1], rtol=0, atol=_NO_ARM / units.length)
+    texts = [f"({', '.join(f'{value:.6g}' for value in end + 0.0)}) {unit}" for end in ends]
+    where = texts[0] if same else f"{texts[0]} on side j, {texts[1]} on side k"
+    midway = ", midway between the nodes" if points is None and arms.any() else ""
+    return positions, arms, [f"reference point of the joint: {where}{midway}"]
+
+
+def _faces(
+    given: Sequence[Sequence[int]] | None, nodes: tuple[int, int]
+) -> tuple[tuple[int, ...], tuple[int, ...]] | None:
+    """Return the nodes that follow the two nodes of the joint."""
+    if given is None:
+        return None
+    if isinstance(given, str) or len(given) != 2:
+        raise ValueError("faces must be two lists of nodes, those that follow node j and those that follow node k")
+    first, second = (tuple(_number("faces", node) for node in as_nodes("faces", own)) for own in given)
+    twice = (set(first) & set(second)) | ({*first, *second} & set(nodes))
+    if twice:
+        raise ValueError(f"faces must hold each node once, and not the nodes of the joint, as {min(twice)}")
+    return first, second
 
 
 def _text_lines(comments: Sequence[str]) -> list[str]:
@@ -187,11 +228,55 @@ def _text_lines(comments: Sequence[str]) -> list[str]:
     return [line.encode("ascii", "replace").decode("ascii") for line in lines]
 
 
-def _arm_note(arms: FloatArray) -> list[str]:
+def _arm_note(arms: FloatArray, units: ModelUnits) -> list[str]:
     if not arms.any():
         return []
+    unit = units.words.partition(",")[0]
     both = [", ".join(f"{value:.6g}" for value in arm + 0.0) for arm in arms]
-    return [f"rigid arms from the nodes to the joint: {both[0]} m (j), {both[1]} m (k)"]
+    lengths = np.linalg.norm(arms, axis=1)
+    return [
+        f"rigid arms from the nodes to the joint: {both[0]} {unit} (j), {both[1]} {unit} (k)",
+        f"their lengths: {lengths[0]:.4g} {unit} (j), {lengths[1]:.4g} {unit} (k)",
+    ]
+
+
+def _bodies(program: CardFormat, link: _Link) -> list[str]:
+    """Make the nodes of the joint move with faces of solid elements; as a sketch in comments where nodes are apart."""
+    if link.faces is None:
+        if not link.has_arms:
+            return []
+        mark = {"nastran": "$", "ansys": "!"}.get(program, "**")
+        drawn = _body_cards(program, link, ("(nodes of the face on side j)", "(nodes of the face on side k)"))
+        hint = "solid elements have no rotations: let nodes of their faces follow j and k, as in"
+        return [f"{mark} {hint}", *(f"{mark}   {line}" for line in drawn)]
+    return _body_cards(program, link, link.faces)
+
+
+def _body_cards(program: CardFormat, link: _Link, faces: tuple[Sequence[int] | str, Sequence[int] | str]) -> list[str]:
+    lines: list[str] = []
+    for side, face, node in zip("JK", faces, link.nodes, strict=False):
+        name = f"JOINT{link.number}_{side}"
+        words = [face] if isinstance(face, str) else [str(one) for one in face]
+        rows = [", ".join(words[at : at + _IN_A_LINE]) for at in range(0, len(words), _IN_A_LINE)]
+        if program in ("abaqus", "calculix"):
+            lines += [f"*NSET, NSET={name}", *(f"{row}," if row != rows[-1] else row for row in rows)]
+        if program == "calculix":
+            turning = f", ROT NODE={link.nodes[2 + 'JK'.index(side)]}" if len(link.nodes) > 2 else ""
+            lines.append(f"*RIGID BODY, NSET={name}, REF NODE={node}{turning}")
+        elif program == "abaqus":
+            lines.append(f"*RIGID BODY, REF NODE={node}, PIN NSET={name}")
+        elif program == "nastran":
+            fields = [str(link.element + 1 + "JK".index(side)), str(node), "123", *words]
+            lines += _small("RBE2", fields)
+        else:
+            lines += [f"CERIG,{node},{word},UXYZ" for word in words]
+    return lines
+
+
+def _small(name: str, words: Sequence[str]) -> list[str]:
+    """Lines of a small-field card, eight fields of 8 columns each; texts that are longer stay as they are."""
+    rows = [words[at : at + _IN_A_LINE] for at in range(0, len(words), _IN_A_LINE)]
+    return [f"{name if i == 0 else '+':<8}" + "".join(f"{word:>8}" for word in row) for i, row in enumerate(rows)]
 
 
 def _number(name: str, value: int) -> int:
@@ -365,7 +450,7 @@ def _bush_place(link: _Link) -> tuple[list[str], list[str | int | float]] | None
     if 0 <= share <= 1 and np.linalg.norm(link.arms[0] - share * apart) <= _ON_LINE * length:
         return [], [share]
     # A coordinate system that begins at grid GA: the same place, whether S1 to S3 count from there or from the system.
-    corners = [node_j, node_j + np.array([0.0, 0.0, 1.0]), node_j + np.array([1.0, 0.0, 0.0])]
+    corners = [node_j, node_j + np.array([0.0, 0.0, 1.0]), node_j + np.array([1.0, 0.0, 0.0])]  # of any length
     fields: list[str | int | float] = [link.number, 0, *(float(x) for corner in corners for x in corner)]
     return _large("CORD2R", fields), ["", link.number, *(float(x) for x in link.arms[0])]
 

@@ -318,7 +318,7 @@ class LawJoint:
         freq_hz : float, optional
             Where laws are taken that depend on frequency, which these cards cannot represent: stiffness and hysteretic
             damping at that frequency. A comment says so.
-        element, number, rotation_nodes, damping, full_matrix, positions, points, comments
+        element, number, rotation_nodes, damping, full_matrix, positions, points, units, faces, comments
             As for `Joint.export`; `positions` of a joint of springs alone.
 
         Returns
@@ -362,7 +362,11 @@ class LawJoint:
         if self.rigid:
             text += _equations(program, comment, self.rigid, nodes, number)
         if self.mass:
-            text += _masses(program, comment, self.mass, nodes, (element, number))
+            from jointfrf.io.model_units import model_units  # readers of files take their time to import
+
+            own = model_units(options.get("units", "SI"))
+            scaled = {dof: mass / own.mass for dof, mass in self.mass.items()}
+            text += _masses(program, comment, scaled, nodes, (element, number))
         return text
 
 

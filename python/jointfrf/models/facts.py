@@ -12,7 +12,7 @@ from scipy.sparse import linalg as sparse_linalg
 from jointfrf.dofs import DIRECTIONS, rigid_motion
 from jointfrf.kernel.arguments import FloatArray, check_type
 from jointfrf.models.factors import SingularMatrixError, SparseSolver
-from jointfrf.models.model import Model
+from jointfrf.models.model import Model, shift_of
 from jointfrf.models.points import PointModel
 
 __all__ = ["ModelFacts", "model_facts"]
@@ -23,9 +23,8 @@ _FREE = 1e-6
 _SAME = 1e-3
 #: Up to this many DOFs natural frequencies are computed: a second.
 _FEW = 20_000
-#: Frequencies shown; and where K - shift M is regular for a free structure, too: below zero by this share of the w^2 of
-#: single nodes, so that its condition leaves ten digits.
-_SHOWN, _SHIFT = 10, 1e-6
+#: Frequencies shown.
+_SHOWN = 10
 #: Rigid motions come out within this share of the shift about zero.
 _ROUNDING = 1e-3
 #: An eigenvalue below minus this share of the largest of those computed is negative, not rounding.
@@ -157,7 +156,7 @@ def _frequencies(k: sparse.csr_array, m: sparse.csr_array) -> tuple[FloatArray, 
     """Return the lowest natural frequencies, rigid motions as 0 Hz, and whether one has a negative stiffness."""
     n = k.shape[0]
     count = min(_SHOWN + 6, n)
-    shift = -_SHIFT * float(abs(k.diagonal()).sum() / max(abs(m.diagonal()).sum(), 1e-300))
+    shift = shift_of(k, m)
     try:
         if n <= 4 * count:
             squared = np.linalg.eigvals(np.linalg.solve((k - shift * m).toarray(), m.toarray())).real

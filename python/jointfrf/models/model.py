@@ -17,12 +17,13 @@ from jointfrf.laws.law_joint import LawJoint
 from jointfrf.models.matrices import Matrix, ModelMatrices
 from jointfrf.models.receptance import ReceptanceMethod, receptance
 
-__all__ = ["Ground", "Model", "assemble", "chain"]
+__all__ = ["Ground", "Model", "assemble", "chain", "shift_of"]
 
 #: Up to this size all modes are computed, beyond it only those asked for.
 _DENSE_LIMIT = 50
-#: -(2 pi 1 Hz)^2, (rad/s)^2: below zero, so that K - shift M is regular for a free structure, too.
-_SHIFT = -((2 * np.pi) ** 2)
+#: Modes are those about minus this share of the mean w^2 of single DOFs: below zero, so that K - shift M is regular for
+#: a free structure, too, and so far that its condition leaves eight digits (at 1 Hz it left five).
+_SHIFT = 1e-8
 Ground = Literal["none", "start", "end", "both"]
 
 
@@ -168,8 +169,8 @@ class Model:
             if count is None or count > n - 2 or n <= _DENSE_LIMIT:
                 squared, shapes = _all_modes(k.toarray(), m.toarray())
             else:
-                # Shifted below zero, where K - shift M is regular even for a free structure; a fixed start, to repeat.
-                squared, shapes = sparse_linalg.eigsh(k, count, m, sigma=_SHIFT, v0=np.ones(n))
+                # A fixed start, to repeat.
+                squared, shapes = sparse_linalg.eigsh(k, count, m, sigma=shift_of(k, m), v0=np.ones(n))
         except (linalg.LinAlgError, RuntimeError) as error:
             raise ValueError(
                 "the model has no modes: a motion has neither stiffness nor mass, or one of them is negative"
@@ -179,16 +180,22 @@ class Model:
         return freq, shapes[:, order]
 
 
+def shift_of(k: Matrix, m: Matrix) -> float:
+    """Return where K - shift M is regular and well-conditioned for a free structure, too, (rad/s)^2."""
+    return -_SHIFT * float(abs(k.diagonal()).sum() / max(abs(m.diagonal()).sum(), 1e-300))
+
+
 def _all_modes(k: FloatArray, m: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Squared natural circular frequencies and shapes; those of DOFs without mass are infinite and left out."""
     try:
         squared, shapes = linalg.eigh(k, m)
     except linalg.LinAlgError:
         # M v = mu (K - shift M) v, where 1/mu = w^2 - shift is infinite for a motion without mass.
-        mu, shapes = linalg.eigh(m, k - _SHIFT * m)
+        shift = shift_of(k, m)
+        mu, shapes = linalg.eigh(m, k - shift * m)
         finite = mu > len(mu) * np.finfo(float).eps * mu.max()
         shapes = shapes[:, finite] / np.sqrt(mu[finite])
-        squared = 1 / mu[finite] + _SHIFT
+        squared = 1 / mu[finite] + shift
     return squared, shapes
 
 

@@ -143,8 +143,16 @@ def test_a_joint_by_hand_is_exported():
     assert result.returncode == 0
     assert "** from joint.toml" in result.stdout
     assert result.stdout.count("DASHPOT2") == 2
-    result = run_command("export", "joint.toml", "nastran:1,2", "--nodes-at", "0,0,0,0,0,0")
-    assert "--nodes-at needs --joint-at X,Y,Z" in result.stderr
+    # Nodes that are apart: the joint acts midway, rigid bodies are sketched; in mm.
+    words = ["--nodes-at", "0,0,0,0,0,20", "--units", "mm-t-s"]
+    result = run_command("export", "joint.toml", "ansys:1,2", *words)
+    assert "! reference point of the joint: (0, 0, 10) mm, midway" in result.stdout
+    assert "!   CERIG,1,(nodes of the face on side j),UXYZ" in result.stdout
+    result = run_command("export", "joint.toml", "ansys:1,2", *words, "--joint-at", "0,0,0", "--faces", "11,12:21")
+    assert "! reference point of the joint: (0, 0, 0) mm" in result.stdout
+    assert result.stdout.endswith("CERIG,1,11,UXYZ\nCERIG,1,12,UXYZ\nCERIG,2,21,UXYZ\n")
+    result = run_command("export", "joint.toml", "nastran:1,2", "--nodes-at", "0,0,0,0,0,20000")
+    assert "a node lies 1e+04 m from the reference point of the joint: positions and points are in m" in result.stderr
     assert result.returncode == 2
 
 

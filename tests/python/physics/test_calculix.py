@@ -87,3 +87,42 @@ def test_matrices_that_calculix_stores_give_its_frequencies(tmp_path):
     assert f"mass {0.3 * 0.025 * 0.006 * 2700:.4g} kg, centre of gravity" in lines
     assert "6 rigid motions are free" in lines
     assert "warning" not in lines
+
+
+def in_mm(mesh):
+    return jf.Mesh(1e3 * mesh.nodes, mesh.elements)
+
+
+@pytest.mark.long
+def test_cards_of_a_joint_between_faces_in_mm(tmp_path):
+    """Rigid faces and arms in a deck in mm, t, s give the frequencies of the parts with points and the joint."""
+    aluminium = Material(70e3, 0.33, 2.7e-9)  # N/mm^2, t/mm^3
+    arms = [brick_beam(0.12, 0.025, 0.01, ALUMINIUM, origin=(0.0, 0.0, z)) for z in (0.0, 0.13)]
+    a, b = (in_mm(arm.mesh) for arm in arms)
+    faces = [np.flatnonzero(abs(mesh.nodes[:, 2] - z) < 1e-6) + 1 for mesh, z in ((a, 120.0), (b, 130.0))]
+    where = np.array([1.0, 4.0, 126.0])  # of the joint, mm: beside the axis, between the faces
+    names = ("x", "y", "z", "theta_x", "theta_y", "theta_z")
+    joint = jf.Joint([2e6, 4e6, 3e6, 300.0, 200.0, 500.0], dofs=names)
+    # Parts by themselves, with points of their faces where the joint is.
+    parts = []
+    for name, mesh, face in (("a", a, faces[0]), ("b", b, faces[1])):
+        step = ["*FREQUENCY, SOLVER=MATRIXSTORAGE", "1"]
+        text = deck(mesh, {"E": (range(len(mesh.elements)), aluminium)}, (), step)
+        more = f'joint = ["face:x"]\n[[point]]\nname = "face"\ncoupling = "rigid"\nnodes = {face.tolist()}\n'
+        more += f"at = {(where / 1e3).tolist()}\n"
+        part = jf.read_part(stored_matrices(CCX, text, tmp_path / name, "mm-t-s", more)).structure.model
+        parts.append((part, part.index(*(f"face:{way}" for way in names))))
+    (one, at_a), (other, at_b) = parts
+    ours = jf.assemble(one, other, joint, at_a, at_b).natural_frequencies(16)
+    # The whole: nodes at the middles of the faces, rigid bodies, arms.
+    n, count = len(a.nodes), len(a.elements)
+    both = jf.Mesh(np.vstack([a.nodes, b.nodes]), np.vstack([a.elements, b.elements + n]))
+    bodies = {"A": (range(count), aluminium), "B": (range(count, len(both.elements)), aluminium)}
+    ends = np.array([a.nodes[faces[0] - 1].mean(axis=0), b.nodes[faces[1] - 1].mean(axis=0)])
+    cards = joint.export("calculix", (90001, 90002), rotation_nodes=(90003, 90004), element=90001, units="mm-t-s",
+                         positions=ends, points=where, faces=[faces[0].tolist(), (faces[1] + n).tolist()])  # fmt: skip
+    assert "reference point of the joint: (1, 4, 126) mm" in cards
+    own = [f"{90001 + i}, " + ", ".join(f"{c:.12g}" for c in ends[i % 2]) for i in range(4)]
+    text = deck(both, bodies, (), frequency_step(16)).replace("*STEP", "\n".join(["*NODE", *own, cards + "*STEP"]), 1)
+    theirs = natural_frequencies(CCX, text, tmp_path / "whole")
+    assert ours[6:] == pytest.approx(theirs[6:], rel=1e-6)

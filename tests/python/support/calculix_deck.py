@@ -31,7 +31,7 @@ def deck(mesh, bodies, clamped, step, ties=(), springs=()):
         lines.append(f"*ELEMENT, TYPE=C3D8I, ELSET=E{name}")
         lines += [f"{e + 1}, " + ", ".join(str(n + 1) for n in mesh.elements[e]) for e in elements]
         lines += [f"*MATERIAL, NAME=M{name}", "*ELASTIC", f"{material.youngs_modulus:.17g}, {material.poisson:.17g}"]
-        lines += ["*DENSITY", f"{material.density:.17g}", f"*SOLID SECTION, ELSET=E{name}, MATERIAL=M{name}"]
+        lines += ["*DENSITY", f"{material.density:.13g}", f"*SOLID SECTION, ELSET=E{name}, MATERIAL=M{name}"]
     for i, (a, b, axis, stiffness) in enumerate(springs):
         number = len(mesh.elements) + i + 1
         lines += [f"*ELEMENT, TYPE=SPRING2, ELSET=S{i}", f"{number}, {a + 1}, {b + 1}"]

@@ -1,7 +1,10 @@
 """Joints as text for finite-element programs, read back by small readers of their own, and run by CalculiX."""
 
+import json
+import os
 import re
 import shutil
+import subprocess
 
 import numpy as np
 import pytest
@@ -471,7 +474,11 @@ def test_nodes_at_the_joint_need_no_arms():
     ("options", "message"),
     [
         ({"points": AT_J}, "points needs positions"),
-        ({"positions": [AT_J, AT_K]}, "positions needs points"),
+        ({"positions": [1e3 * AT_J, 1e3 * AT_K]}, r"a node lies 45 m from the reference point of the joint"),
+        ({"units": "inch"}, "units must be"),
+        ({"faces": [[1, 2, 3]]}, "faces must be two lists of nodes"),
+        ({"faces": [[1, 2], [2, 3]]}, "faces must hold each node once, and not the nodes of the joint, as 2"),
+        ({"faces": [[1, 2], [102, 3]]}, "and not the nodes of the joint, as 102"),
         ({"positions": AT_J, "points": AT_J}, "positions must have shape"),
         ({"positions": [AT_J, AT_K], "points": [np.nan, 0, 0]}, "points"),
     ],
@@ -491,3 +498,112 @@ def test_comments_are_lines_that_programs_read():
         assert f"{mark} na?ve" in lines
     with pytest.raises(TypeError, match="comments must be a sequence"):
         DIAGONAL.export("abaqus", NODES, comments="one")
+
+
+READERS = {"abaqus": read_abaqus_matrices, "ansys": read_matrix27, "nastran": read_dmig}
+
+
+@pytest.mark.parametrize("units", ["mm-t-s", "mm-kg-ms"])
+@pytest.mark.parametrize("program", READERS)
+def test_units_of_the_model(program, units):
+    """1 N/m is 1e-3 N/mm, 1 N m/rad 1e3 N mm/rad, 1 N s/m 1e-3 N s/mm; with kN and ms 1e-6 kN/mm, 1, 1e-3 kN ms/mm."""
+    joint = jf.Joint(random_matrix(1, 6, SIZES), random_matrix(2, 6, SIZES / 100), DOFS)
+    length, force, time = {"mm-t-s": (1e3, 1.0, 1.0), "mm-kg-ms": (1e3, 1e-3, 1e3)}[units]
+    turn = np.tile([1.0, 1, 1, length, length, length], 2)  # N m to N mm
+    change = force / length * np.outer(turn, turn)
+    in_mm = {"positions": [1e3 * AT_J, 1e3 * AT_K], "points": [0, 0, 0]}
+    for at, of_si in (({}, {}), (in_mm, {"positions": [AT_J, AT_K], "points": [0, 0, 0]})):
+        text = joint.export(program, NODES, units=units, full_matrix=True, **at)
+        si = READERS[program](joint.export(program, NODES, full_matrix=True, **of_si))
+        found = READERS[program](text)
+        np.testing.assert_allclose(found[0], si[0] * change, rtol=1e-9, atol=1e-9 * abs(si[0] * change).max())
+        np.testing.assert_allclose(found[1], si[1] * change * time, rtol=1e-9, atol=1e-9 * abs(si[1] * change).max())
+    assert f"({units})" in text
+    assert "reference point of the joint: (0, 0, 0) mm" in text
+    assert "their lengths: 106.3 mm (j), 149 mm (k)" in text
+
+
+def test_a_mass_of_the_joint_in_tonnes():
+    joint = jf.LawJoint({"y": jf.SpringLaw(1e5)}, mass={"y": 0.02})
+    assert "1.0000000000000E-05" in joint.export("abaqus", NODES, units="mm-t-s")
+
+
+def test_the_point_midway_is_stated():
+    text = COUPLED.export("nastran", NODES, positions=[AT_J, AT_K], full_matrix=True)
+    assert "reference point of the joint: (0.12, 0.015, 0.01) m, midway between" in text
+    same = COUPLED.export("nastran", NODES, positions=[AT_J, AT_K], points=(AT_J + AT_K) / 2, full_matrix=True)
+    np.testing.assert_array_equal(read_dmig(text), read_dmig(same))
+
+
+@pytest.mark.parametrize(
+    ("program", "word"), [("abaqus", "PIN NSET"), ("calculix", "*RIGID BODY"), ("nastran", "RBE2"), ("ansys", "CERIG")]
+)
+def test_bodies_of_faces_are_cards_or_a_sketch(program, word):
+    spring = jf.Joint([1e6], dofs=["z"])
+    where = {"positions": [AT_J, AT_K], "rotation_nodes": (103, 203) if program == "calculix" else None}
+    mark = {"nastran": "$", "ansys": "!"}.get(program, "**")
+    sketch = spring.export(program, NODES, **where)
+    assert [line for line in sketch.splitlines() if word in line and line.startswith(mark)]
+    assert not [line for line in sketch.splitlines() if word in line and not line.startswith(mark)]
+    whole = spring.export(program, NODES, faces=[range(1, 12), [21, 22, 23]], **where)
+    assert [line for line in whole.splitlines() if word in line and not line.startswith(mark)]
+    assert word not in spring.export(program, NODES, rotation_nodes=where["rotation_nodes"])
+
+
+#: pyNastran 1.4 takes numpy below 2, which is not that of these tests: a Python that has it, named by the environment.
+PYNASTRAN = os.environ.get("PYNASTRAN_PYTHON", "")
+PARSE = """
+import json, sys
+from pyNastran.bdf.bdf import BDF
+model = BDF(debug=None)
+model.read_bdf(sys.argv[1], punch=True, xref=False)
+bush, spring = model.elements, model.properties
+found = {"bush": {n: [e.eid, e.pid, e.Ga(), e.Gb(), e.cid, e.s, e.ocid, [x for x in e.si if x is not None]]
+                  for n, e in bush.items()},
+         "spring": {n: [p.Ki, p.Bi, p.GEi] for n, p in spring.items()},
+         "systems": {n: [list(map(float, c.e1)), list(map(float, c.e2)), list(map(float, c.e3))]
+                     for n, c in model.coords.items() if n},
+         "rigid": {n: [e.gn, e.cm, list(e.Gmi)] for n, e in model.rigid_elements.items()},
+         "dmig": {n: [m.matrix_form, list(map(list, m.GCi)), list(map(list, m.GCj)), list(map(float, m.Real))]
+                  for n, m in model.dmig.items()}}
+print(json.dumps(found, default=lambda one: one.item()))
+"""
+
+
+def parsed(text, tmp_path):
+    (tmp_path / "joint.bdf").write_text(text)
+    (tmp_path / "parse.py").write_text(PARSE)
+    run = subprocess.run([PYNASTRAN, "-W", "ignore", tmp_path / "parse.py", tmp_path / "joint.bdf"],
+                         capture_output=True, text=True, check=False)  # fmt: skip
+    assert run.returncode == 0, run.stderr[-2000:]
+    return json.loads(run.stdout.splitlines()[-1])
+
+
+@pytest.mark.skipif(not PYNASTRAN, reason="PYNASTRAN_PYTHON names no Python that has pyNastran")
+def test_pynastran_reads_what_is_written(tmp_path):
+    k = np.array([2e6, 3e6, 5e6, 2e3, 3e3, 1e3])
+    joint = jf.Joint(k, [20.0] * 6, DOFS, loss_factor=[0.01] * 6)
+    where = {"positions": [1e3 * AT_J, 1e3 * AT_K], "points": [110.0, 30.0, 20.0], "units": "mm-t-s"}
+    faces = [range(1, 12), [21, 22, 23]]
+    found = parsed(joint.export("nastran", NODES, element=50, number=7, faces=faces, **where), tmp_path)
+    ((_, number, a, b, system, s, at_system, offset),) = found["bush"].values()
+    assert (number, a, b, system) == (7, *NODES, 0)
+    assert s in (0.5, None)
+    origin, z_axis, xz = (np.array(one) for one in found["systems"][str(at_system)])
+    np.testing.assert_allclose(origin + offset, where["points"], atol=1e-9)
+    np.testing.assert_allclose([z_axis - origin, xz - origin], [[0, 0, 1], [1, 0, 0]], atol=1e-9)
+    ki, bi, ge = found["spring"]["7"]
+    np.testing.assert_allclose(ki, k * np.array([1e-3] * 3 + [1e3] * 3), rtol=1e-9)
+    np.testing.assert_allclose(bi, 20.0 * np.array([1e-3] * 3 + [1e3] * 3), rtol=1e-9)
+    np.testing.assert_allclose(ge, 0.01, rtol=1e-9)
+    assert found["rigid"] == {"51": [102, "123", list(range(1, 12))], "52": [202, "123", [21, 22, 23]]}
+    text = COUPLED.export("nastran", NODES, positions=[AT_J, AT_K], points=[0.11, 0.03, 0.02], number=3)
+    matrices = parsed(text, tmp_path)["dmig"]
+    for name, expected_one in zip(("KJ3", "BJ3", "HJ3"), read_dmig(text), strict=True):
+        form, rows, columns, values = matrices[name]
+        assert form == 6
+        whole = np.zeros((12, 12))
+        for row, column, value in zip(rows, columns, values, strict=True):
+            at = PLACE[row[0], row[1]], PLACE[column[0], column[1]]
+            whole[at] = whole[at[::-1]] = value
+        np.testing.assert_allclose(whole, expected_one, rtol=1e-9)
