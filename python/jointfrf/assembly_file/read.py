@@ -23,6 +23,7 @@ from jointfrf.assembly_file.keys import (
     Unknowns,
 )
 from jointfrf.cases.substructures import MeasuredStructure, ModelStructure, Structure
+from jointfrf.dofs import is_rotation
 from jointfrf.frf.frf_set import Channel
 from jointfrf.identification.joint_file import read_joint
 from jointfrf.identification.model.assembly import AddedMass, Assembly, Attachment, GroundSpring, check_joint_order
