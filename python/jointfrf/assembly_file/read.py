@@ -34,6 +34,7 @@ from jointfrf.laws.joint_toml import read_joint_table, start_values
 from jointfrf.laws.law_joint import LawJoint
 from jointfrf.models.facts import model_facts
 from jointfrf.models.model import Model
+from jointfrf.models.points import PointModel
 from jointfrf.spelling import did_you_mean
 from jointfrf.toml.declared import read_keys
 from jointfrf.toml.table import TomlTable, read_toml
@@ -224,6 +225,13 @@ def scaled_model(model: Model, *, length_scale: float, **factors: float) -> Mode
         found = of_dof @ sp.csr_array(matrix) @ of_dof * factor
         return found if sp.issparse(matrix) else found.toarray()
 
+    if isinstance(model, PointModel):  # motions that are shown, of the DOFs and per length where they are rotations
+        of_turn = {name: 1 / length_scale if is_rotation(name.rpartition(":")[2]) else 1.0 for name in model.shown}
+        model = replace(
+            model,
+            shown={name: sp.csr_array(row @ of_dof * of_turn[name]) for name, row in model.shown.items()},
+            places={name: length_scale * np.asarray(at) for name, at in model.places.items()},
+        )
     of_k = length_scale * factors.get("youngs_modulus", 1.0)
     return replace(
         model,

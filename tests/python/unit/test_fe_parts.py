@@ -2,6 +2,7 @@
 
 import random
 from contextlib import suppress
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from scipy import sparse
 
 import jointfrf as jf
 from fe_files import NODE_FILES, WRITERS, block, dmig, in_units, part_toml
+from jointfrf.assembly_file.read import scaled_model
 from jointfrf.errors import FileContentError
 from jointfrf.io.fe.dof_names import read_dof_names
 from jointfrf.io.fe.matrix_formats import MATRIX_FORMATS, read_matrix
@@ -187,6 +189,20 @@ def test_patches_that_cannot_be(tmp_path, model, patch, message):
     more = f'joint = ["tip:x"]\n[[point]]\nname = "tip"\n{patch}\n'
     with pytest.raises(FileContentError, match=message):
         jf.read_part(part_toml(tmp_path, model, more=more))
+
+
+@pytest.mark.parametrize("coupling", ["rigid", "distributing"])
+def test_points_of_a_part_whose_lengths_are_scaled(model, coupling):
+    """As those of the part whose nodes are elsewhere: 2 % longer, wider and higher."""
+    places = {name: 1.02 * np.asarray(at) for name, at in model.places.items() if name.isdigit()}
+    patch = PointPatch("tip", end_nodes(model, 0.0), coupling)
+    larger = jf.solid_model(jf.Mesh(1.02 * model.mesh.nodes, model.mesh.elements), jf.Material(70e9, 0.33, 2700.0))
+    larger = couple_points(replace(larger, places=places), [patch])
+    scaled = scaled_model(couple_points(model, [patch]), length_scale=1.02)
+    names = ["tip:x", "tip:theta_z", "tip:theta_y", f"{end_nodes(model, 0.0)[0]}:x", "60:x"]
+    expected = larger.receptance(FREQ, names)
+    np.testing.assert_allclose(scaled.receptance(FREQ, names), expected, rtol=1e-6, atol=1e-9 * abs(expected).max())
+    np.testing.assert_allclose(scaled.places["tip"], larger.places["tip"])
 
 
 def test_a_node_in_two_rigid_points(model):
