@@ -458,6 +458,20 @@ module jointfrf_lanes
       real(dp), intent(inout) :: work(lanes, 2, n, 4)
       real(dp), intent(inout) :: cost(lanes), descent(lanes, 3, n), normal(lanes, 8, (n*(n + 1))/2)
     end subroutine diagonal_form_routine
+
+    !> Normal equations of the parameters of a joint with cross terms, added up: Re(J^H r) and Re(J^H W J), J the
+    !> derivatives -f C E C of the upper triangle of C.
+    !> m             pairs of DOFs, those of E: shapes of row and column, row <= column
+    !> pair          the pair of each parameter, shape (n_par)
+    !> x             elements of C (n n), f (n_par) and W (u u, column by column), u = n (n + 1)/2; then 2 u m of
+    !>               workspace, r (u), and m (m + 1) of workspace
+    !> sums          those of r, then the upper triangle of the others, column by column
+    subroutine joint_normal_routine(n, m, row, column, n_par, pair, x, sums)
+      import :: dp, lanes
+      implicit none
+      integer, intent(in) :: n, m, row(m), column(m), n_par, pair(n_par)
+      real(dp), intent(inout) :: x(lanes, 2, *), sums(lanes, *)
+    end subroutine joint_normal_routine
   end interface
 
   !> The kernels of one instruction set.
@@ -495,6 +509,7 @@ module jointfrf_lanes
     procedure(expect_routine), pointer, nopass :: expect => null()
     procedure(joint_form_routine), pointer, nopass :: joint_form => null()
     procedure(diagonal_form_routine), pointer, nopass :: diagonal_form => null()
+    procedure(joint_normal_routine), pointer, nopass :: joint_normal => null()
   end type lane_kernels
 
   !> Where a matrix lies: entry (i, j) is element before + (i - 1)*width + j, unless the parts below say otherwise.

@@ -51,9 +51,9 @@ module jointfrf
   use jointfrf_checks, only: check_brick_matrices, check_brick_quality, check_central_difference, &
     check_compliance_covariance, check_compliance_factors, check_couple, check_decouple, &
     check_difference_weights, check_expect_on_joint, check_fit_diagonal_joint, check_invert, check_joint_forms, &
-    check_matrices, check_modify, check_monte_carlo, check_pollute, check_project_on_joint, check_rational_fit, &
-    check_receptance, check_receptance_banded, check_receptance_modal, check_relocate_poles, check_solve, &
-    check_transform
+    check_joint_normal_equations, check_matrices, check_modify, check_monte_carlo, check_pollute, &
+    check_project_on_joint, check_rational_fit, check_receptance, check_receptance_banded, &
+    check_receptance_modal, check_relocate_poles, check_solve, check_transform
   use jointfrf_compliance, only: joint_compliance
   use jointfrf_compliance_noise, only: compliance_covariance, compliance_factors
   use jointfrf_coupling, only: couple
@@ -64,6 +64,7 @@ module jointfrf
     get_engine, set_engine
   use jointfrf_finite_difference, only: central_difference, difference_weights, transform_receptance
   use jointfrf_ismm, only: inverse_substructuring, ismm
+  use jointfrf_joint_derivatives, only: joint_normal_equations
   use jointfrf_kinds, only: ip, long
   use jointfrf_linear_algebra, only: invert, solve
   use jointfrf_manifold, only: expect_on_joint, joint_forms, project_on_joint
@@ -85,7 +86,8 @@ module jointfrf
   public :: jf_couple, jf_modify, jf_find_modification
   public :: jf_ismm, jf_inverse_substructuring, jf_decouple
   public :: jf_joint_compliance, jf_compliance_factors, jf_compliance_covariance
-  public :: jf_project_on_joint, jf_expect_on_joint, jf_joint_forms, jf_fit_diagonal_joint
+  public :: jf_project_on_joint, jf_expect_on_joint, jf_joint_forms, jf_fit_diagonal_joint, &
+    jf_joint_normal_equations
   public :: jf_difference_weights, jf_central_difference, jf_transform
   public :: jf_pollute, jf_monte_carlo
   public :: jf_brick_matrices, jf_brick_quality
@@ -772,6 +774,43 @@ contains
     end if
     call release_traps(host)
   end subroutine jf_fit_diagonal_joint
+
+  !> Normal equations of the parameters of any joint for quadratic forms of its compliance, as in jf_fit_diagonal_joint.
+  !> With C the compliance, J is its derivative by the parameters, -f C E C of its upper triangle: each parameter adds a
+  !> function of frequency f to one entry of K* = C^-1 and to its mirror image. Summed over the lines, in lanes whatever
+  !> engine is chosen.
+  !> n             number of joint DOFs, 1 to 100
+  !> n_par         number of parameters, at least 1
+  !> n_entries     n (n + 1)/2
+  !> rows          row of the entry of each parameter, counted from 1, shape (n_par)
+  !> columns       its column, shape (n_par)
+  !> slopes        f, shape (n_par, n_freq)
+  !> c_joint       C, the upper triangle row by row, shape (n_entries, n_freq), m/N
+  !> information   W, shape (n_entries, n_entries, n_freq), (N/m)^2, Hermitian
+  !> residual      weighted residual r = p - W (C - C0), shape (n_entries, n_freq), N/m
+  !> normal        Re(J^H W J) summed over the lines, shape (n_par, n_par); NaN where a number is
+  !> descent       Re(J^H r), shape (n_par)
+  !> info          0, -i, -1000 as above
+  subroutine jf_joint_normal_equations(trans, n, n_par, n_entries, n_freq, rows, columns, slopes, c_joint, &
+                                       information, residual, normal, descent, info) &
+    bind(C, name='jf_joint_normal_equations_')
+    character(kind=c_char), intent(in) :: trans
+    integer(ip), intent(in) :: n, n_par, n_entries, n_freq, rows(n_par), columns(n_par)
+    complex(c_double_complex), target, intent(in) :: slopes(n_par, n_freq), c_joint(n_entries, n_freq)
+    complex(c_double_complex), target, intent(in) :: information(n_entries, n_entries, n_freq)
+    complex(c_double_complex), target, intent(in) :: residual(n_entries, n_freq)
+    real(c_double), intent(out) :: normal(n_par, n_par), descent(n_par)
+    integer(ip), intent(out) :: info
+    type(host_state) :: host
+
+    call hold_traps(host)
+    info = check_joint_normal_equations(trans, n, n_par, n_entries, n_freq, rows, columns)
+    if (info == info_good) then
+      call joint_normal_equations(is_transposed(trans), int(n), rows, columns, slopes, c_joint, information, residual, &
+                                  normal, descent, info)
+    end if
+    call release_traps(host)
+  end subroutine jf_joint_normal_equations
 
   !> Weights for displacement and slope at a reference from points along a line. Eq. (2.59) for any spacing.
   !> m         number of points, at least 2

@@ -7,6 +7,7 @@ module jointfrf_checks
     unknown_order
   use jointfrf_brick, only: is_formulation
   use jointfrf_diagonal_joint, only: most_dofs
+  use jointfrf_joint_derivatives, only: most_coupled_dofs, most_coupled_parameters
   use jointfrf_kinds, only: ip, long
   use jointfrf_monte_carlo, only: is_method
   use jointfrf_noise, only: is_kind, is_reference
@@ -17,6 +18,7 @@ module jointfrf_checks
   public :: check_invert, check_solve, check_receptance, check_receptance_banded, check_receptance_modal
   public :: check_couple, check_modify, check_matrices, check_decouple, check_compliance_factors
   public :: check_compliance_covariance, check_expect_on_joint, check_fit_diagonal_joint, check_joint_forms
+  public :: check_joint_normal_equations
   public :: check_project_on_joint
   public :: check_difference_weights, check_central_difference, check_transform, check_pollute, check_monte_carlo
   public :: check_brick_matrices, check_brick_quality, check_rational_fit, check_relocate_poles
@@ -253,6 +255,22 @@ contains
     if (info == -9 .or. info == -10) return
     if (repeated(3*dofs + kinds)) info = -10
   end function check_fit_diagonal_joint
+
+  pure function check_joint_normal_equations(trans, n, n_par, n_entries, n_freq, rows, columns) result(info)
+    character(kind=c_char), intent(in) :: trans
+    integer(ip), intent(in) :: n, n_par, n_entries, n_freq, rows(:), columns(:)
+    integer(ip) :: info
+
+    info = info_good
+    if (bad_size(n_freq)) info = -5
+    if (n_entries /= entries_of_square(1_ip, 1_ip, n)) info = -4
+    if (n_par < 1 .or. n_par > most_coupled_parameters) info = -3
+    if (n < 1 .or. n > most_coupled_dofs) info = -2
+    if (unknown_order(trans)) info = -1
+    if (info /= info_good) return
+    if (out_of_range(columns, n)) info = -7
+    if (out_of_range(rows, n)) info = -6
+  end function check_joint_normal_equations
 
   !> The number of entries of a matrix of order blocks*n, or of its upper triangle; of an n that is refused anyway, any.
   pure function entries_of_square(reciprocal, blocks, n) result(entries)

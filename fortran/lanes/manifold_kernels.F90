@@ -20,6 +20,7 @@ contains
     kernels%expect => expect_lanes
     kernels%joint_form => joint_form_lanes
     kernels%diagonal_form => diagonal_form_lanes
+    kernels%joint_normal => joint_normal_lanes
   end subroutine set_manifold_kernels
 
 #include "product.inc"
@@ -28,4 +29,5 @@ contains
 #include "projection.inc"
 #include "joint_form.inc"
 #include "diagonal_joint.inc"
+#include "pair_products.inc"
 end module JF_MODULE

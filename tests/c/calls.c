@@ -11,7 +11,8 @@ const char *const routine_name[ROUTINES] = {
     "invert", "solve", "receptance", "receptance_banded", "receptance_modal", "couple", "modify", "find_modification",
     "ismm", "inverse_substructuring", "decouple", "joint_compliance", "compliance_factors", "compliance_covariance",
     "transform", "central_difference", "project_on_joint", "joint_forms", "pollute", "monte_carlo", "brick_matrices",
-    "brick_quality", "difference_weights", "expect_on_joint", "fit_diagonal_joint", "rational_fit", "relocate_poles",
+    "brick_quality", "difference_weights", "expect_on_joint", "fit_diagonal_joint",
+    "joint_normal_equations", "rational_fit", "relocate_poles",
 };
 /* The number of LWORK among the arguments; that of LIWORK is two more. */
 const int lwork_argument[WORK_ROUTINES] = {8, 11, 20, 22, 16, 15, 12, 10, 11, 9, 18, 9, 11, 13, 14};
@@ -174,6 +175,10 @@ jf_int call(const problem *p, const workspace *w, double *out, jf_int *line_info
         jf_fit_diagonal_joint(t, &p->flag, s, s + 1, n_freq, s + 3, &none, &p->number, p->dofs[0], p->dofs[1], in[3],
                               in[3] + part, in[0], b, c, (jf_complex *)in[4], in[5], out, out + part,
                               out + part + part * part, out + 2 * part + part * part, &info);
+        break;
+    case JOINT_NORMAL_EQUATIONS:
+        jf_joint_normal_equations(t, s, s + 1, s + 2, n_freq, p->dofs[0], p->dofs[1], a, b, c, (jf_complex *)in[3], out,
+                                  out + (size_t)s[1] * (size_t)s[1], &info);
         break;
     case RATIONAL_FIT:
         jf_rational_fit(s, s + 1, n_freq, a, b, in[2], (jf_complex *)in[3], h, out + p->out_line * lines,

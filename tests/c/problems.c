@@ -278,6 +278,19 @@ problem new_problem(int routine, char trans, int n, int n_freq, int variant)
         numbers(&p, 5, 1, 0, &state);
         p.out_line = (size_t)(joint * joint + 2 * joint + 1);
         break;
+    case JOINT_NORMAL_EQUATIONS:
+        p.size[1] = joint;
+        p.size[2] = n * (n + 1) / 2;
+        for (i = 0; i < joint; i++) {
+            p.dofs[0][i] = 1 + i % (n > 0 ? n : 1);
+            p.dofs[1][i] = 1 + (i / 2) % (n > 0 ? n : 1);
+        }
+        lines(&p, 0, joint, 1, &state);
+        lines(&p, 1, p.size[2], 1, &state);
+        lines(&p, 2, p.size[2], p.size[2], &state);
+        lines(&p, 3, p.size[2], 1, &state);
+        p.out_line = (size_t)(joint * joint + joint);
+        break;
     case RATIONAL_FIT: case RELOCATE_POLES:
         p.size[1] = 3;
         p.size[3] = 3;

@@ -115,7 +115,7 @@ static jf_int call(void)
     double *rcond = out[1];
     const jf_int part = any_part(MOST), n_damping = next(3) ? (int)next(2) * n : any_part(MOST);
     const jf_int n_structural = next(3) ? (int)next(2) * n : any_part(MOST), kl = next(40) ? flag : INT_MAX;
-    const int routine = (int)next(26);
+    const int routine = (int)next(27);
     const jf_int few = any_size(2), order = few > 0 ? few : 1;
     const jf_int n_free = next(20) ? flag == 1 ? order * (order + 1) / 2 : order * order : m;
     const jf_int n_correlated = next(3) ? 0 : next(9) ? flag == 1 ? order * (2 * order + 1) : 4 * order * order : m;
@@ -191,6 +191,13 @@ static jf_int call(void)
         jf_expect_on_joint(&t, &flag, &few, &n_correlated, &n_freq, &number, in[1], in[2], in[3], frf(0), h, second, line_info,
                            &info);
         break;
+    case 25: {
+        const jf_int n_par = next(10) ? 1 + (jf_int)next(3 * MOST) : m, entries = next(20) ? few * (few + 1) / 2 : n_free;
+
+        jf_joint_normal_equations(&t, &few, &n_par, &entries, &n_freq, dofs[0], dofs[1], frf(0), frf(1), frf(2), frf(3),
+                                  out[0], out[1], &info);
+        break;
+    }
     default: jf_brick_quality(&n_freq, in[0], out[0], out[1], &info);
     }
     return info;

@@ -7,6 +7,7 @@ of laws in their parameters.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Literal, NamedTuple
 
@@ -17,7 +18,7 @@ from jointfrf.dofs import Parameter, ParameterKind, joint_parameters
 from jointfrf.identification.manifold.line_forms import LEAST_GAIN, STEPS, FormMinimum, JointCoordinates, LineForms
 from jointfrf.identification.parameters import ParameterVector, joint_vector
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
-from jointfrf.kernel.call import call_for_number
+from jointfrf.kernel.call import call, call_for_number
 from jointfrf.kernel.linear_algebra import invert
 from jointfrf.laws.law_joint import LawJoint
 
@@ -348,19 +349,8 @@ class CoupledJoint(SpringJoint):
     def normal_equations(
         self, x: FloatArray, entries: ComplexArray, weight: ComplexArray, residual: ComplexArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Return Re(J^H W J) and Re(J^H r) of all lines.
-
-        Terms of the same pair differ by a function of frequency only: products are of pairs.
-        """
-        factors, by_pair = self.terms.factors, self._by_pair(entries)
-        adjoint = by_pair.conj().swapaxes(1, 2)
-        products = (adjoint @ (weight @ by_pair)).reshape(len(entries), -1)
-        m = len(self.pairs)
-        of_kinds = (factors.conj()[:, None] * factors).reshape(9, -1) @ products
-        i, kinds = self.pair_of, self.terms.kinds
-        information = of_kinds.real.reshape(3, 3, m, m)[kinds[:, None], kinds, i[:, None], i]
-        gradient = -(factors.conj() @ (adjoint @ residual[..., None])[..., 0]).real[kinds, i]
-        return information, gradient
+        """Return Re(J^H W J) and Re(J^H r) of all lines."""
+        return _of_triangle(self.terms.pairs, self.terms.factors[self.terms.kinds], entries, weight, residual)
 
     def theta(self, x: FloatArray) -> FloatArray:
         """Return the parameters."""
@@ -373,6 +363,28 @@ class CoupledJoint(SpringJoint):
     def theta_slope(self, x: FloatArray) -> FloatArray:
         """Return the unit matrix."""
         return np.eye(x.size)
+
+
+def _of_triangle(
+    pairs: NDArray[np.intp], slopes: ComplexArray, entries: ComplexArray, weight: ComplexArray, residual: ComplexArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return Re(J^H W J) and Re(J^H r) of all lines, J = -f C E C of the upper triangle of C.
+
+    Parameters
+    ----------
+    pairs : ndarray of int, shape (p, 2)
+        Entry of K* that each coordinate changes, with its mirror image.
+    slopes : ndarray, shape (p, n_freq)
+        f, by how much.
+    entries, weight, residual
+        Of all lines.
+    """
+    p, (n_freq, u) = len(pairs), entries.shape
+    normal, descent = np.empty((p, p)), np.empty(p)
+    rows, columns = np.ascontiguousarray(pairs.T + 1, np.int32)
+    lines = map(np.ascontiguousarray, (slopes.T, entries, weight, residual))
+    call("joint_normal_equations", (math.isqrt(2 * u), p, u, n_freq, rows, columns, *lines, normal, descent))
+    return normal, descent
 
 
 def coordinates_of(terms: JointTerms) -> SpringJoint:
@@ -422,6 +434,16 @@ class LawCoordinates(JointCoordinates):
                 slope[:, :, i] -= c[:, self.rows, a] * c[:, b, self.columns] * by_value[:, None]
         slope *= self.vector.slope(x)
         return slope
+
+    def normal_equations(
+        self, x: FloatArray, entries: ComplexArray, weight: ComplexArray, residual: ComplexArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return Re(J^H W J) and Re(J^H r) of all lines."""
+        slopes = self._at(x).connection_slopes(self.omega)
+        pairs = np.array([places[0] for places, _ in slopes], np.intp)
+        by_coordinate = np.array([by_value for _, by_value in slopes], np.complex128)
+        by_coordinate *= self.vector.slope(x)[:, None]
+        return _of_triangle(pairs, by_coordinate, entries, weight, residual)
 
     def on_lines(self, lines: slice | NDArray[np.intp]) -> LawCoordinates:
         """Return the same on some of the lines."""
