@@ -218,8 +218,10 @@ def as_names(name: str, value: object) -> tuple[str, ...]:
     if isinstance(value, Iterable) and not isinstance(value, str):
         listed = list(value)
         if all(isinstance(each, str) for each in listed):
-            split = next((each for each in listed if each and each.splitlines() != [each]), None)
-            if split is not None:
+            # Models have tens of thousands: all at once, and one by one where one is wrong.
+            together = " ".join(listed)
+            if together and together.splitlines() != [together]:
+                split = next(each for each in listed if each and each.splitlines() != [each])
                 raise ValueError(f"{name} must hold names without line breaks, not {one_line(split)}")
             return tuple(map(str, listed))
     raise TypeError(f"{name} must be a sequence of names, not {one_line(value)}")

@@ -257,9 +257,15 @@ class ReducedSubstructure:
                 z += factor[:, None, None] * modal
             force = np.broadcast_to(seen.T.astype(complex), (self.omega.size, *seen.T.shape))
             x = solve(z, np.ascontiguousarray(force), freq_hz=self.freq_hz).swapaxes(1, 2)
+            h = x @ seen.T
         else:
-            x = seen / diagonal[:, None, :]
-        return SubstructureState(np.asarray(x @ seen.T), np.asarray(x), own, squared, shapes)
+            of_modes = 1 / diagonal
+            x = of_modes[:, None, :] * seen
+            # Residues are real: two real products of all lines.
+            residues = (seen[:, None] * seen).reshape(-1, squared.size).T
+            h = np.empty((self.omega.size, len(seen), len(seen)), np.complex128)
+            h.real, h.imag = ((part @ residues).reshape(h.shape) for part in (of_modes.real, of_modes.imag))
+        return SubstructureState(np.asarray(h), np.asarray(x), own, squared, shapes)
 
     def slopes(self, values: Mapping[str, float], names: Sequence[str], state: SubstructureState) -> list[ReducedSlope]:
         """Return the derivatives by some of the unknowns, in the modal coordinates of the state at these values."""
