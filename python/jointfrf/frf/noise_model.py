@@ -93,7 +93,7 @@ class NoiseModel:
         """Numbers of the outlying lines."""
         return np.flatnonzero(self.line_factor > 1)
 
-    @property
+    @cached_property
     def level(self) -> float:
         """Median of the noise relative to the FRFs, over entries that are not zero and lines."""
         counts = (self.relative > 0) | (self.floor > 0) | (self.coherence_factor > 0)

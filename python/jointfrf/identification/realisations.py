@@ -224,8 +224,9 @@ def viscous_estimate(
 def _viscous_problem(
     freq_hz: FloatArray, gamma: ComplexArray, dofs: Sequence[str], start: FitStart | None
 ) -> FitProblem:
-    """Return the fit of springs and dashpots without cross terms, begun at `start`."""
+    """Return the fit of springs and dashpots without cross terms, begun at `start`: other noise on the same FRFs."""
     noise = NoiseOptions(None, like=None if start is None else start.noise)
     options = FitOptions("viscous", "zero", reciprocal=True)
-    problem = prepare_compliance(as_measured(freq_hz, gamma, square=False), dofs, None, None, noise, options)
+    measured = as_measured(freq_hz, gamma, square=False)
+    problem = prepare_compliance(measured, dofs, None, None, noise, options, is_checked=start is not None)
     return problem if start is None else replace(problem, near=start.estimate.starts)

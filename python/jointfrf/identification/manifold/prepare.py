@@ -113,8 +113,13 @@ def prepare_compliance(
     transform: Transform | tuple[Transform, Transform] | None,
     noise: NoiseOptions,
     options: FitOptions,
+    *,
+    is_checked: bool = False,
 ) -> FitProblem:
-    """Check the arguments of the fit, find the noise, and keep the lines in the bands; as in `identify`."""
+    """Check the arguments of the fit, find the noise, and keep the lines in the bands; as in `identify`.
+
+    `is_checked` says that the channels show the joint DOFs: those of other noise on the same FRFs did.
+    """
     freq, h = measured.freq_hz, measured.h
     transforms = as_transforms(transform, h)
     responses, forces = transforms[:2]
@@ -134,7 +139,8 @@ def prepare_compliance(
         noise = replace(noise, noise=as_real("noise", noise.noise, measured.h.shape)[kept])
     # Whether channels are the same points is known where both transforms are one.
     square = h.shape[1] == h.shape[2] and np.array_equal(responses, forces)
-    _check_joint_dofs(transforms, h, names)
+    if not is_checked:
+        _check_joint_dofs(transforms, h, names)
     found = noise_of_matrix(freq, h, noise, reciprocal=options.reciprocal and square)
     smooth, variance = transforms.gamma(found.smooth), found.variance
     check_joint_seen(freq, smooth, transforms.variance(variance))

@@ -196,9 +196,10 @@ def _larger_than_chance(factor: FloatArray, other: FloatArray, degrees: FloatArr
     if (mean := float(ratio[known].mean())) > _chi_squared(_CHANCE, few * count) / (few * count):
         raised *= mean
     single = _chi_squared(1 - (1 - _CHANCE) / count, degrees[known]) / degrees[known]
-    student = (special.stdtrit(degrees[known], 0.975) / special.ndtri(0.975)) ** 2
-    larger = np.where(ratio[known] > single, student * other[known], 0)
-    raised[known] = np.maximum(raised[known], larger)
+    larger = np.flatnonzero(known)[ratio[known] > single]
+    if larger.size:
+        student = (special.stdtrit(degrees[larger], 0.975) / special.ndtri(0.975)) ** 2
+        raised[larger] = np.maximum(raised[larger], student * other[larger])
     return raised
 
 
