@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
@@ -18,6 +19,7 @@ from jointfrf.channels.virtual_point import (
     virtual_point,
 )
 from jointfrf.dofs import DIRECTIONS, direction_names, direction_places, is_rotation
+from jointfrf.errors import FileContentError, FileContentWarning
 from jointfrf.frf.frf_set import Channel, ChannelPlace, FrfSet, JointSide, check_apart
 from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray, as_real, check_type
 
@@ -25,9 +27,11 @@ __all__ = [
     "ChannelAgreement",
     "JointChannels",
     "LeftOutDof",
+    "MissingFrfs",
     "OffsetCoupling",
     "SideAgreement",
     "joint_channels",
+    "joint_channels_of_all",
     "left_out_dofs",
     "node_dofs",
     "offset_couplings",
@@ -42,6 +46,8 @@ _ENTERS = 0.05
 #: Arms below this are rounding, m.
 _NO_ARM = 1e-6
 _Kind = Literal["response", "excitation"]
+#: Missing FRFs that a message names.
+_PAIRS_SHOWN = 4
 #: Sides of the joint, on A and on B.
 _SIDES: tuple[JointSide, JointSide] = ("j", "k")
 #: Directions of channels in the order of `DIRECTIONS`.
@@ -245,6 +251,38 @@ class SideAgreement:
 
 
 @dataclass(frozen=True)
+class MissingFrfs:
+    """A channel left out of its virtual point because FRFs of it are missing.
+
+    Attributes
+    ----------
+    kind : {"response", "excitation"}
+    side : {"j", "k"}
+    channel : Channel
+    others : int
+        How many channels its virtual point has left.
+    pairs : tuple of (Channel, Channel)
+        Responses and excitations of the missing FRFs.
+    """
+
+    kind: _Kind
+    side: JointSide
+    channel: Channel
+    others: int
+    pairs: tuple[tuple[Channel, Channel], ...]
+
+    def __str__(self) -> str:
+        names = ", ".join(f"{output} / {input_}" for output, input_ in self.pairs[:_PAIRS_SHOWN])
+        more = f" and {len(self.pairs) - _PAIRS_SHOWN} more" if len(self.pairs) > _PAIRS_SHOWN else ""
+        which = "the FRF" if len(self.pairs) == 1 else "FRFs"
+        verb = "is" if len(self.pairs) == 1 else "are"
+        return (
+            f"{which} {names}{more} (response / excitation) {verb} missing: {self.kind} {self.channel} is left out, "
+            f"the virtual point of side {self.side} has {self.others} other {self.kind}s"
+        )
+
+
+@dataclass(frozen=True)
 class JointChannels:
     """How the DOFs of a joint follow from the measured responses and excitations around it.
 
@@ -255,11 +293,14 @@ class JointChannels:
         channels at the same places.
     points : mapping of (kind, side) to VirtualPoint
         ``("response", "j")``, ...
+    positions : mapping of (kind, side) to ndarray, shape (m, 3)
+        Where the channels of each virtual point are, m.
     """
 
     responses: Interface
     forces: Interface
     points: Mapping[tuple[str, str], VirtualPoint]
+    positions: Mapping[tuple[str, str], FloatArray]
 
     @property
     def dofs(self) -> tuple[str, ...]:
@@ -281,6 +322,76 @@ class JointChannels:
         """
         check_type("frfs", frfs, FrfSet)
         return frfs.matrix(self.responses.channels, self.forces.channels)
+
+    def without(self, responses: Iterable[int], excitations: Iterable[int]) -> JointChannels:
+        """Return the same without some of its responses and excitations, by their places.
+
+        Raises
+        ------
+        ValueError
+            Those left do not show the DOFs of the joint.
+        """
+        dropped = {"response": set(responses), "excitation": set(excitations)}
+        if not any(dropped.values()):
+            return self
+        points: dict[tuple[str, str], VirtualPoint] = {}
+        positions: dict[tuple[str, str], FloatArray] = {}
+        names: dict[str, list[Channel]] = {"response": [], "excitation": []}
+        for kind, interface in (("response", self.responses), ("excitation", self.forces)):
+            first = 0
+            for side in _SIDES:
+                point, where = self.points[kind, side], self.positions[kind, side]
+                kept = np.array([i for i in range(len(where)) if first + i not in dropped[kind]], np.intp)
+                names[kind] += [interface.channels[first + i] for i in kept]
+                first += len(where)
+                positions[kind, side] = where[kept]
+                points[kind, side] = virtual_point(
+                    where[kept], point.motion[kept, :3], point.point, point.dofs, point.weights[kept]
+                )
+        return _joined(names, points, positions)
+
+    def without_missing(self, measured: NDArray[np.bool_]) -> tuple[JointChannels, tuple[MissingFrfs, ...]]:
+        """Leave out as few channels as make all FRFs known, those that their virtual points can spare first.
+
+        Parameters
+        ----------
+        measured : ndarray of bool, shape (m_r, m_f)
+            Which FRFs between the channels there are.
+
+        Raises
+        ------
+        FileContentError
+            Those left do not show the DOFs of the joint.
+        """
+        left_out: list[tuple[int, int]] = []
+        lacking = ~measured
+        while lacking.any():
+            left_out.append(_least_needed(self, lacking, left_out))
+            np.moveaxis(lacking, left_out[-1][0], 0)[left_out[-1][1]] = False
+        own = [[i for axis, i in left_out if axis == 0], [i for axis, i in left_out if axis == 1]]
+        try:
+            found = self.without(*own)
+        except ValueError as error:
+            names = ", ".join(f"{a} / {b}" for a, b in self._pairs(~measured)[:_PAIRS_SHOWN])
+            raise FileContentError(
+                f"missing FRFs (response / excitation): {names}; without these channels {error}"
+            ) from error
+        return found, tuple(self._missing(found, axis, i, measured) for axis, i in left_out)
+
+    def _pairs(self, lacking: NDArray[np.bool_]) -> list[tuple[Channel, Channel]]:
+        rows, columns = self.responses.channels, self.forces.channels
+        return [(rows[i], columns[j]) for i, j in zip(*np.nonzero(lacking), strict=True)]
+
+    def _side_of(self, axis: int, place: int) -> tuple[_Kind, JointSide]:
+        kind: _Kind = "response" if axis == 0 else "excitation"
+        return kind, "j" if place < len(self.positions[kind, "j"]) else "k"
+
+    def _missing(self, left: JointChannels, axis: int, place: int, measured: NDArray[np.bool_]) -> MissingFrfs:
+        kind, side = self._side_of(axis, place)
+        own = np.zeros_like(measured)
+        np.moveaxis(own, axis, 0)[place] = True
+        channel = (self.responses if axis == 0 else self.forces).channels[place]
+        return MissingFrfs(kind, side, channel, len(left.positions[kind, side]), tuple(self._pairs(own & ~measured)))
 
     def agreement(self, h: ComplexArray) -> tuple[SideAgreement, ...]:
         """Sensor and impact consistency of both sides, and the part of each channel in it.
@@ -340,12 +451,20 @@ def joint_channels(
     Returns
     -------
     JointChannels
+        Without channels of which FRFs are missing, where the others suffice.
 
     Raises
     ------
     ValueError
         A channel without a side, without a place or not in the set, or named twice; too few channels on a side for the
         DOFs, or channels that do not show them.
+    FileContentError
+        FRFs are missing, and the channels that have all do not suffice.
+
+    Warns
+    -----
+    FileContentWarning
+        A channel is left out because an FRF of it is missing.
 
     Notes
     -----
@@ -363,6 +482,22 @@ def joint_channels(
     >>> sides.dofs, sides.responses.transform[:2, :2].round(6).tolist()
     (('y', 'theta_z'), [[0.5, 0.5], [-50.0, 50.0]])
     """
+    every = joint_channels_of_all(frfs, places, at, dofs, at_k=at_k)
+    found, missing = every.without_missing(frfs.measured_between(every.responses.channels, every.forces.channels))
+    for one in missing:
+        warnings.warn(FileContentWarning(str(one)), stacklevel=2)
+    return found
+
+
+def joint_channels_of_all(
+    frfs: FrfSet,
+    places: Iterable[ChannelPlace],
+    at: ArrayLike,
+    dofs: Sequence[str] = DIRECTIONS,
+    *,
+    at_k: ArrayLike | None = None,
+) -> JointChannels:
+    """Build the DOFs of a joint as `joint_channels`, with all channels, whichever FRFs are missing."""
     reference = as_real("at", at, (3,))
     references = {"j": reference, "k": reference if at_k is None else as_real("at_k", at_k, (3,))}
     if not isinstance(places, Iterable):
@@ -377,14 +512,43 @@ def joint_channels(
     points: dict[tuple[str, str], VirtualPoint] = {
         (kind, side): _point(frfs, kind, side, own, references[side], dofs) for (kind, side), own in chosen.items()
     }
-    interfaces = []
-    for kind in ("response", "excitation"):
-        channels = [place.channel for side in _SIDES for place in chosen[kind, side]]
-        made = virtual_interface(points[kind, "j"], points[kind, "k"])
-        interfaces.append(made._replace(channels=tuple(channels)))
-    one, other = interfaces
+    positions: dict[tuple[str, str], FloatArray] = {
+        key: np.array([_position(frfs, place) for place in own]) for key, own in chosen.items()
+    }
+    names = {
+        kind: [place.channel for side in _SIDES for place in chosen[kind, side]] for kind in ("response", "excitation")
+    }
+    return _joined(names, points, positions)
+
+
+def _joined(
+    names: Mapping[str, Sequence[Channel]],
+    points: Mapping[tuple[str, str], VirtualPoint],
+    positions: Mapping[tuple[str, str], FloatArray],
+) -> JointChannels:
+    one, other = (
+        virtual_interface(points[kind, "j"], points[kind, "k"])._replace(channels=tuple(names[kind]))
+        for kind in ("response", "excitation")
+    )
     same = one.channels == other.channels and np.array_equal(one.transform, other.transform)
-    return JointChannels(one, one if same else other, points)
+    return JointChannels(one, one if same else other, points, positions)
+
+
+def _least_needed(
+    joint: JointChannels, lacking: NDArray[np.bool_], left_out: Sequence[tuple[int, int]]
+) -> tuple[int, int]:
+    """Return the channel, axis and place, that lacks most FRFs; of equal ones one that its virtual point can spare."""
+    best: tuple[tuple[int, int], tuple[int, int]] | None = None
+    for axis in (0, 1):
+        counts = lacking.sum(axis=1 - axis)
+        for place in np.flatnonzero(counts):
+            kind, side = joint._side_of(axis, int(place))
+            gone = sum(1 for where, other in left_out if joint._side_of(where, other) == (kind, side))
+            order = int(counts[place]), len(joint.positions[kind, side]) - gone
+            if best is None or order > best[0]:
+                best = order, (axis, int(place))
+    assert best is not None
+    return best[1]
 
 
 def _is_there(channel: Channel, known: Sequence[Channel]) -> bool:

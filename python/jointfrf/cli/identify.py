@@ -21,7 +21,7 @@ from jointfrf.cli.measured_file import (
     add_file_arguments,
     file_names,
     in_some_band,
-    read_receptances,
+    read_measured,
     shown_nodes,
     words,
 )
@@ -115,15 +115,16 @@ def run(args: argparse.Namespace) -> int:
     if args.each:
         raise UsageError("--each is for tests with --model: name the file of the assembly")
     out = Output(args)
-    frfs = read_receptances(args)
+    measured = read_measured(args)
+    frfs = measured.receptance()
     joint = measured_joint(args, frfs, args.bending_stiffness)
     points = np.array(joint.responses.references)
     laws = joint_of_laws(args, joint.dofs)
     damping = args.damping if laws is None else "none"
     request = card_request(args, joint.dofs, damping=damping, cross=args.cross, points=points)
-    check = check_joint(joint)
+    check = check_joint(joint, measured.quantity)
     warn_of_frfs(check)
-    for text in joint.warnings():
+    for text in joint.warnings(check):
         warnings.warn(text, FrfCheckWarning, stacklevel=2)
     if "compliance" not in args.method:
         warn_of_ignored(args, ("--damping", "--cross", "--noise"), f"method {args.method[0]} does not use it")
@@ -170,7 +171,7 @@ def _content(
         "sources": [str(path) for path in args.files],
         "joint": joint.to_dict(),
         "checks": check.to_dict(),
-        "warnings": [*joint.warnings()],
+        "warnings": [*joint.warnings(check), *check.serious, *(text for fit in fits for text in fit.warnings)],
         "fits": [fit_to_dict(fit, lines=False) for fit in fits],
         "cards": text or None,
         "written": [str(path) for path in written],

@@ -30,6 +30,7 @@ __all__ = [
     "numbers",
     "parse_band",
     "point",
+    "read_measured",
     "read_receptances",
     "shown_nodes",
     "words",
@@ -197,11 +198,16 @@ def add_quantity_arguments(parser: CommandParser) -> None:
     parser.option("--force-quantity", "take --quantity also where the file says something else")
 
 
-def read_receptances(args: argparse.Namespace) -> FrfSet:
-    """Read the files as receptances."""
+def read_measured(args: argparse.Namespace) -> FrfSet:
+    """Read the files as what they say, or the command line says, that they hold."""
     if args.force_quantity and args.quantity is None:
         raise UsageError("--force-quantity needs --quantity")
-    return read_frfs(*args.files, quantity=args.quantity, force_quantity=args.force_quantity).receptance()
+    return read_frfs(*args.files, quantity=args.quantity, force_quantity=args.force_quantity)
+
+
+def read_receptances(args: argparse.Namespace) -> FrfSet:
+    """Read the files as receptances."""
+    return read_measured(args).receptance()
 
 
 def file_names(args: argparse.Namespace) -> str:

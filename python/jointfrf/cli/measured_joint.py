@@ -10,12 +10,13 @@ from typing import Any
 
 import numpy as np
 
+from jointfrf.channels.check.finding import FrfCheck
 from jointfrf.channels.joint_channels import (
     JointChannels,
     LeftOutDof,
     OffsetCoupling,
     SideAgreement,
-    joint_channels,
+    joint_channels_of_all,
     left_out_dofs,
     node_dofs,
     offset_couplings,
@@ -32,11 +33,6 @@ from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.toml.table import read_toml
 
 __all__ = ["MeasuredJoint", "measured_joint"]
-
-#: A channel explains what is not rigid on its side where leaving it out removes more than this share of it,
-_MUCH = 0.7
-#: and what is not rigid is more than this share of the motion.
-_NOT_RIGID = 0.05
 
 
 @dataclass(frozen=True)
@@ -57,6 +53,9 @@ class MeasuredJoint:
         On sides j and k.
     bands : list of (low, high), or None
         Hz; findings on channels are of these lines.
+    every : (JointChannels, ndarray) or None
+        The virtual points with the channels, too, that are left out because FRFs of them are missing, and the FRFs
+        between all of them, NaN where there is none.
     """
 
     freq_hz: FloatArray
@@ -66,6 +65,7 @@ class MeasuredJoint:
     channels: JointChannels | None
     nodes: tuple[list[int], list[int]]
     bands: list[tuple[float, float]] | None
+    every: tuple[JointChannels, ComplexArray] | None = None
 
     @property
     def transform(self) -> Interface | tuple[Interface, Interface]:
@@ -94,29 +94,42 @@ class MeasuredJoint:
     @cached_property
     def left_out(self) -> tuple[LeftOutDof, ...]:
         """DOFs left out that enter those that are kept."""
+        if np.isnan(self._lines).all(axis=0).any():
+            return ()
         found = left_out_dofs(self._lines, self.responses)
         if not self.is_square:
             found += left_out_dofs(np.ascontiguousarray(self._lines.swapaxes(1, 2)), self.forces)
         return tuple({(one.side, one.dof, one.into): one for one in found if one.matters}.values())
+
+    def _without(self, check: FrfCheck) -> MeasuredJoint:
+        """Return the same without the channels in which errors were found; itself where the others do not suffice."""
+        wrong = {name for finding in check.findings if finding.level == "error" for name in finding.channels}
+        if self.channels is None or not wrong:
+            return self
+        sides = self.responses.channels, self.forces.channels
+        bad = [
+            [i for i, channel in enumerate(own) if wrong & {str(channel), f"{word} {channel}"}]
+            for word, own in zip(("response", "force"), sides, strict=True)
+        ]
+        try:
+            left = self.channels.without(*bad)
+        except ValueError:
+            return self
+        rows, columns = (np.setdiff1d(np.arange(len(own)), gone) for own, gone in zip(sides, bad, strict=True))
+        h = np.ascontiguousarray(self.h[:, rows][:, :, columns])
+        return replace(self, h=h, responses=left.responses, forces=left.forces, channels=left)
 
     @property
     def offsets(self) -> tuple[OffsetCoupling, ...]:
         """Rotations that reference points which are apart turn into displacements."""
         return offset_couplings(self.responses)
 
-    def warnings(self) -> Iterator[str]:
-        """Say what a reader must know before the fit."""
-        yield from (str(one) for one in self.left_out)
+    def warnings(self, check: FrfCheck) -> Iterator[str]:
+        """Say what a reader must know before the fit, beside what a look at the FRFs has found."""
+        if any(finding.kind == "reference" and finding.level == "error" for finding in check.findings):
+            return
+        yield from (str(one) for one in self._without(check).left_out)
         yield from (f"{one}; --at X,Y,Z gives both sides one" for one in self.offsets if one.is_left_out)
-        for group in self.agreement:
-            share = _not_rigid(group)
-            worst = max(group.channels, key=lambda channel: np.nan_to_num(channel.blame))
-            if share > _NOT_RIGID and worst.blame > _MUCH:
-                yield (
-                    f"{100 * worst.blame:.0f} % of what is not rigid in the {group.kind}s of side {group.side} "
-                    f"({100 * share:.2g} % of their motion) is gone without {worst.channel}: look at its sign, "
-                    "direction, gain and place"
-                )
 
     def text(self) -> Iterator[str]:
         """Describe reference points, and channels beside rigid motion, line by line."""
@@ -195,8 +208,10 @@ def _agreement_table(groups: tuple[SideAgreement, ...]) -> Iterator[str]:
     yield "blame: share of what is not rigid on its side that is gone without it"
 
 
-def measured_joint(args: argparse.Namespace, frfs: FrfSet, bending_stiffness: float | None = None) -> MeasuredJoint:
-    """Find the channels of a joint and the way to its DOFs.
+def measured_joint(
+    args: argparse.Namespace, frfs: FrfSet, bending_stiffness: float | None = None, *, is_look: bool = False
+) -> MeasuredJoint:
+    """Find the channels of a joint and the way to its DOFs; for a look at them FRFs may be missing.
 
     Raises
     ------
@@ -216,11 +231,15 @@ def measured_joint(args: argparse.Namespace, frfs: FrfSet, bending_stiffness: fl
         places = ()
     if args.at is not None:
         places = places or places_of_nodes(frfs, *nodes)
-        found = joint_channels(frfs, places, args.at, args.dofs, at_k=args.at_k)
-        h = found.gamma(frfs)
-        return MeasuredJoint(frfs.freq_hz, h, found.responses, found.forces, found, nodes, args.band)
+        every = joint_channels_of_all(frfs, places, args.at, args.dofs, at_k=args.at_k)
+        names = every.responses.channels, every.forces.channels
+        whole = every, frfs.matrix(*names, allow_missing=True)
+        found, _ = every.without_missing(frfs.measured_between(*names))
+        return MeasuredJoint(
+            frfs.freq_hz, found.gamma(frfs), found.responses, found.forces, found, nodes, args.band, whole
+        )
     sides = _node_dofs(args, frfs, nodes) or _point_lines(args, frfs, nodes, bending_stiffness)
-    h = frfs.matrix(sides.channels, sides.channels)
+    h = frfs.matrix(sides.channels, sides.channels, allow_missing=is_look)
     return MeasuredJoint(frfs.freq_hz, h, sides, sides, None, nodes, args.band)
 
 

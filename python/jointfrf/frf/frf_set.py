@@ -276,7 +276,17 @@ class FrfSet:
         """
         return self._locate(outputs, inputs)[2]
 
-    def matrix(self, outputs: Sequence[ChannelLike], inputs: Sequence[ChannelLike]) -> NDArray[np.complex128]:
+    def measured_between(self, outputs: Sequence[ChannelLike], inputs: Sequence[ChannelLike]) -> NDArray[np.bool_]:
+        """Tell which FRFs between named channels there are, shape (n_outputs, n_inputs)."""
+        rows, columns = list(map(Channel.parse, outputs)), list(map(Channel.parse, inputs))
+        there = np.ones((len(rows), len(columns)), bool)
+        for output, input_ in self.missing(rows, columns):
+            there[rows.index(output), columns.index(input_)] = False
+        return there
+
+    def matrix(
+        self, outputs: Sequence[ChannelLike], inputs: Sequence[ChannelLike], *, allow_missing: bool = False
+    ) -> NDArray[np.complex128]:
         """FRFs between named channels, with their signs.
 
         Parameters
@@ -284,6 +294,8 @@ class FrfSet:
         outputs, inputs : sequence of Channel or str
             Rows and columns, for example ``["102:+y", "202:+y"]``. A channel measured the other way serves with the
             opposite sign.
+        allow_missing : bool
+            Whether FRFs that are missing are NaN in the result, instead of an error.
 
         Returns
         -------
@@ -296,13 +308,15 @@ class FrfSet:
             FRFs are missing; the message names them.
         """
         places, signs, missing = self._locate(outputs, inputs)
-        if missing:
+        if missing and not allow_missing:
             pairs = [f"{output} / {input_}" for output, input_ in missing]
             more = f" and {len(pairs) - _NAMES_SHOWN} more" if len(pairs) > _NAMES_SHOWN else ""
             text = f"{', '.join(pairs[:_NAMES_SHOWN])}{more}"
             raise FileContentError(f"{self._name()}missing FRFs (response / excitation): {text}")
-        h = self.h[:, places[0], places[1]] * signs
-        return np.ascontiguousarray(h)
+        h = np.ascontiguousarray(self.h[:, places[0], places[1]] * signs)
+        if missing:
+            h[:, ~self.measured_between(outputs, inputs)] = np.nan
+        return h
 
     def coherence_matrix(
         self, outputs: Sequence[ChannelLike], inputs: Sequence[ChannelLike]

@@ -1,5 +1,6 @@
 """`jointfrf check` on the simulated hammer test, as it is and with errors."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -7,6 +8,7 @@ import numpy as np
 import pytest
 
 from command import run_command
+from hammer_test import hammer_test, noisy
 from jointfrf.io import read_uff, write_uff
 
 BARS = Path(__file__).resolve().parents[3] / "cases" / "hammer-test" / "two_bars.uff"
@@ -52,7 +54,105 @@ def test_frfs_that_are_missing(tmp_path):
     h[:, 0, 1] = np.nan
     file = tmp_path / "part.uff"
     write_uff(file, replace(frfs, h=h))
-    result = run_command("check", file)
+    result = run_command("check", file, "--quiet")
     assert result.returncode == 1
-    assert "1 FRFs are missing" in result.stderr
-    assert "--j" in result.stderr
+    (line,) = result.stderr.splitlines()
+    channels = f"{frfs.responses[0]} / {frfs.excitations[1]}"
+    assert f"1 of {h[0].size} FRFs is missing (response / force): {channels}; all others are looked at" in line
+
+
+@pytest.fixture
+def points(tmp_path):
+    """A hammer test on virtual points: its set, how it is written, and the words that name its joint."""
+    frfs = noisy(hammer_test())
+
+    def write(h=frfs.h, **more):
+        file = tmp_path / "points.uff"
+        write_uff(file, replace(frfs, h=h, **more))
+        return file
+
+    words = ["--j", "101:104,111:122", "--k", "201:204,211:222", "--dofs", "x,y,z,rx,ry,rz", "--at", "0,0,0.1"]
+    return frfs, write, words
+
+
+def errors_of(result):
+    return [line for line in result.stdout.splitlines() if line.startswith(("error", "warning"))]
+
+
+def test_good_virtual_points(points):
+    _, write, words = points
+    result = run_command("check", write(), *words)
+    assert (result.returncode, errors_of(result)) == (0, [])
+
+
+@pytest.mark.parametrize(
+    ("factor", "said"),
+    [
+        (-1.0, "sign: response 102:+y moves against what is expected"),
+        (9.81, "units: response 102:+y is 9.8"),
+    ],
+)
+def test_a_bad_sensor_is_one_error(points, factor, said):
+    frfs, write, words = points
+    h = frfs.h.copy()
+    h[:, [str(channel) for channel in frfs.responses].index("102:+y")] *= factor
+    result = run_command("check", write(h), *words)
+    assert result.returncode == 1
+    (line,) = errors_of(result)
+    assert line.startswith("error")
+    assert said in line
+    assert "nothing found" not in result.stdout
+    # and a fit of less than six DOFs warns of that, not of what follows from it
+    few = ["y" if word == "x,y,z,rx,ry,rz" else word for word in words]
+    fit = run_command("identify", write(h), *few, "--json")
+    content = json.loads(fit.stdout)
+    assert sum("102:+y" in text for text in content["warnings"]) == 1
+
+
+def test_one_missing_frf_stops_nothing(points):
+    frfs, write, words = points
+    h = frfs.h.copy()
+    h[:, 4, 7] = np.nan
+    sensor = [str(channel) for channel in frfs.responses].index("203:+z")
+    h[:, sensor] *= -1
+    result = run_command("check", write(h), *words)
+    assert result.returncode == 1
+    error, warning = errors_of(result)
+    assert "sign: response 203:+z" in error
+    assert f"{frfs.responses[4]} / {frfs.excitations[7]}" in warning
+    assert "a fit leaves out" in warning
+    h[:, sensor] *= -1
+    fit = run_command("identify", write(h), *words, "--json")
+    assert fit.returncode == 0, fit.stderr
+    assert any("1 of 576 FRFs is missing" in text for text in json.loads(fit.stdout)["warnings"])
+
+
+def test_coordinates_and_reference_point_in_different_units(points):
+    frfs, write, words = points
+    large = {node: 1e3 * np.asarray(place) for node, place in frfs.coordinates.items()}
+    result = run_command("check", write(coordinates=large), *words)
+    (line,) = errors_of(result)
+    assert result.returncode == 1
+    assert "reference: the coordinates of the channels look like millimetres" in line
+    far = run_command("check", write(), *words[:-1], "0,0,100")
+    (line,) = errors_of(far)
+    assert "reference: the reference point" in line
+    assert "its coordinates look like millimetres" in line
+
+
+@pytest.mark.parametrize("on_points", [True, False])
+def test_a_mobility_labelled_accelerance_is_cured_once(points, on_points, tmp_path):
+    if on_points:
+        frfs, write, words = points
+        file = write(frfs.h / (2j * np.pi * frfs.freq_hz[:, None, None]))
+    else:
+        frfs, words = read_uff(BARS), JOINT_OF_BARS
+        assert frfs.quantity == "accelerance"
+        file = tmp_path / "bars.uff"
+        write_uff(file, replace(frfs, h=frfs.h / (2j * np.pi * frfs.freq_hz[:, None, None])))
+    result = run_command("check", file, *words)
+    (line,) = errors_of(result)
+    assert "mobilities that were read as accelerances" in line
+    assert "read the file as mobilities, whatever it says" in line
+    cured = run_command("check", file, *words, "--quantity", "mobility", "--force-quantity")
+    assert (cured.returncode, errors_of(cured)) == (0, [])

@@ -15,7 +15,15 @@ from jointfrf.channels.check.pair_ratios import PairRatios
 from jointfrf.channels.check.signals import Measurement
 from jointfrf.kernel.arguments import FloatArray
 
-__all__ = ["LEAST_GAIN", "LEAST_PHASE", "channel_ratios", "delay_findings", "gain_findings", "unexplained_gains"]
+__all__ = [
+    "LEAST_GAIN",
+    "LEAST_PHASE",
+    "channel_ratios",
+    "delay_findings",
+    "gain_findings",
+    "unexplained_gains",
+    "unit_of_factor",
+]
 
 #: Standard gravity, m/s^2; inch, m; pound-force, N.
 _GRAVITY, _INCH, _POUND = 9.80665, 0.0254, 4.4482216
@@ -188,7 +196,7 @@ def _offsets(group: NDArray[np.intp], value: FloatArray, covariance: FloatArray,
     return Offsets(result, error, undecided)
 
 
-def _unit_of_factor(factor: float, is_rotation: bool, tolerance: float) -> str | None:
+def unit_of_factor(factor: float, is_rotation: bool, tolerance: float) -> str | None:
     """Return the units that explain a ratio of response to force; None if none does within a relative tolerance."""
     for known, what in _KNOWN[is_rotation]:
         if abs(math.log(factor / known)) < tolerance:
@@ -209,7 +217,7 @@ def unexplained_gains(measurement: Measurement, ratios: ChannelRatios) -> FloatA
     gain = np.where(_is_significant(offsets, LEAST_GAIN), offsets.value, 0.0)
     for i in np.flatnonzero(gain):
         tolerance = max(_UNIT_TOLERANCE, 4 * float(offsets.error[i]))
-        if _unit_of_factor(math.exp(gain[i]), bool(measurement.rotations[i]), tolerance) is not None:
+        if unit_of_factor(math.exp(gain[i]), bool(measurement.rotations[i]), tolerance) is not None:
             gain[i] = 0
     return gain
 
@@ -243,11 +251,11 @@ def _gain_finding(
     factor = math.exp(float(np.median(offsets.value[places])))
     error = float(offsets.error[places].max())
     rotation = bool(measurement.rotations[places[0]])
-    unit = _unit_of_factor(factor, rotation, max(_UNIT_TOLERANCE, 4 * error))
+    unit = unit_of_factor(factor, rotation, max(_UNIT_TOLERANCE, 4 * error))
     others = np.flatnonzero((ratios.group == ratios.group[places[0]]) & ~alike)
     if unit is None and others.size and (measurement.rotations[others] != rotation).all():
         # It may be the others that are in other units.
-        turned = _unit_of_factor(1 / factor, not rotation, max(_UNIT_TOLERANCE, 4 * error))
+        turned = unit_of_factor(1 / factor, not rotation, max(_UNIT_TOLERANCE, 4 * error))
         if turned is not None:
             places, factor, unit, rotation = others.tolist(), 1 / factor, turned, not rotation
     names = tuple(measurement.dofs[i] for i in places)

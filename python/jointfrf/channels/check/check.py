@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal, cast, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from jointfrf.channels.check.channel_ratios import (
     LEAST_GAIN,
@@ -38,10 +38,30 @@ from jointfrf.channels.check.exchange import (
 )
 from jointfrf.channels.check.finding import Correction, FindingLevel, FrfCheck, FrfFinding, corrected
 from jointfrf.channels.check.pair_ratios import PairRatios, pair_ratios
-from jointfrf.channels.check.signals import Measurement, as_channel_names, as_measurement, check_signals, find_bad_lines
-from jointfrf.errors import FrfCheckWarning
-from jointfrf.frf.frf_set import Channel
-from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_frequency, as_lines, as_names, as_real, check_choice
+from jointfrf.channels.check.reference_points import reference_findings
+from jointfrf.channels.check.rigid_findings import rigid_faults
+from jointfrf.channels.check.rigid_motion import ChannelGroup, not_rigid
+from jointfrf.channels.check.sides import side_findings
+from jointfrf.channels.check.signals import (
+    Measurement,
+    as_channel_names,
+    as_measurement,
+    check_signals,
+    find_bad_lines,
+)
+from jointfrf.channels.joint_channels import JointChannels
+from jointfrf.errors import FileContentError, FrfCheckWarning
+from jointfrf.frf.frf_set import POWER_OF_I_OMEGA, Channel
+from jointfrf.kernel.arguments import (
+    ComplexArray,
+    FloatArray,
+    as_frequency,
+    as_lines,
+    as_names,
+    as_real,
+    check_choice,
+    check_type,
+)
 
 __all__ = ["check_frfs", "warn_of_frfs"]
 
@@ -52,6 +72,8 @@ _LEAST_LINES = 20
 _BACKWARDS = 0.8
 #: Relative noise of channels that may hide small FRFs of joint DOFs, which are differences of large ones.
 _HIDING = 0.05
+#: Missing FRFs that are named.
+_PAIRS_SHOWN = 4
 
 
 def check_frfs(
@@ -63,6 +85,8 @@ def check_frfs(
     forces: Sequence[str | Channel] | None = None,
     transform: tuple[ArrayLike, ArrayLike] | None = None,
     dofs: Sequence[str] | None = None,
+    joint: JointChannels | None = None,
+    read_as: str | None = None,
     fix: Sequence[FrfFix] = (),
     blame: Literal["responses", "forces"] = "responses",
 ) -> FrfCheck:
@@ -73,7 +97,8 @@ def check_frfs(
     freq_hz : array_like, shape (n_freq,)
         Hz.
     h : array_like, shape (n_freq, n_responses, n_forces)
-        Measured receptances, m/N, as `identify` takes them; or at measured points, before any transformation.
+        Measured receptances, m/N, as `identify` takes them; or at measured points, before any transformation. An FRF
+        that is NaN on all lines is missing: it is named, the others are looked at.
     names : sequence of str or Channel, optional
         Names of the channels where responses and forces are the same DOFs, in one order; by default their numbers,
         where `h` is square. Rotations are known by their names, such as ``"j:theta_x"`` or ``"102:rx"``.
@@ -85,6 +110,12 @@ def check_frfs(
         of the joint DOFs are checked instead; nothing is corrected there.
     dofs : sequence of str, optional
         Names of the n joint DOFs, with `transform`.
+    joint : JointChannels, optional
+        The channels about a joint, which `joint_channels` finds, instead of names, `transform` and `dofs`: each channel
+        is then compared with the rigid motion that the others on its side show, too, and the places with the
+        reference point.
+    read_as : {"receptance", "mobility", "accelerance"}, optional
+        The quantity that the FRFs were taken for when they were made receptances, for what to do about it.
     fix : sequence of str
         What to correct: "lines" (leave bad ones out), "time-convention", "exchanged", "quantity", "sign", "units",
         "gain", "delay". Nothing by default.
@@ -109,6 +140,9 @@ def check_frfs(
     have Im h < 0 (receptance), Re h > 0 (mobility) or Im h > 0 (accelerance), and all FRFs of a causal system run
     clockwise through the complex plane.
 
+    Channels of a virtual point are judged by the lines on which all but one, or but one sensor, move most like one
+    body: an error there is that of a channel, not the deformation of the side, which grows with frequency.
+
     Standard errors come from the scatter of the ratios over frequency with their correlation from line to line; a
     difference counts from 5 standard errors and 1 %. One cause that explains many symptoms is reported once.
 
@@ -128,19 +162,36 @@ def check_frfs(
     """
     lines = as_lines("h", h)
     freq = as_frequency(freq_hz, lines.shape[0])
+    if joint is not None:
+        check_type("joint", joint, JointChannels)
+        if not all(other is None for other in (names, responses, forces, transform, dofs)):
+            raise ValueError("joint goes without names, responses, forces, transform and dofs")
+        responses, forces = joint.responses.channels, joint.forces.channels
     rows, columns = as_channel_names(lines.shape[1:], names, responses, forces)
+    if read_as is not None:
+        check_choice("read_as", read_as, tuple(POWER_OF_I_OMEGA))
     fix = cast("tuple[FrfFix, ...]", as_names("fix", fix))
     for word in fix:
         check_choice("fix", word, get_args(FrfFix))
     check_choice("blame", blame, ("responses", "forces"))
-    found, good = find_bad_lines(freq, lines, tuple(map(str, rows)), tuple(map(str, columns)))
-    measurement = as_measurement(freq[good], lines[good], rows, columns)
-    state = _Progress(measurement, 1 if blame == "responses" else 2)
-    state.findings.extend(found)
+    labels = tuple(map(str, rows)), tuple(map(str, columns))
+    missing: NDArray[np.bool_] = np.array(np.isnan(lines).all(axis=0) & (len(lines) > 0), bool)
+    found, good = find_bad_lines(freq, np.where(missing, 0, lines) if missing.any() else lines, *labels)
+    measurement = as_measurement(freq[good], lines[good], rows, columns, missing)
+    state = _Progress(measurement, 1 if blame == "responses" else 2, read_as)
+    state.findings.extend([*_missing_findings(missing, joint, *labels), *found])
     if measurement.freq_hz.size >= _LEAST_LINES and measurement.h.size:
+        _check_signals(state)
+        unspoilt = None
+        if joint is not None:
+            state.findings.extend(reference_findings(joint))
+            unspoilt = _check_rigid_motion(state, joint, missing)
         _check_channels(state)
-        if transform is not None and state.measurement.rows.size < 2:
-            state.findings.extend(_findings_at_joint(state, transform, dofs))
+        if state.measurement.rows.size < 2:
+            if joint is not None and unspoilt is not None:
+                state.findings.extend(_findings_at_channels(state, unspoilt, joint))
+            elif transform is not None:
+                state.findings.extend(_findings_at_joint(state, transform, dofs))
     return _result(state, freq, lines, good, fix)
 
 
@@ -157,6 +208,9 @@ class _Progress:
 
     measurement: Measurement
     side: int
+    read_as: str | None = None
+    bad_rows: set[int] = field(default_factory=set)
+    bad_columns: set[int] = field(default_factory=set)
     findings: list[FrfFinding] = field(default_factory=list)
     corrections: list[Correction] = field(default_factory=list)
 
@@ -171,6 +225,104 @@ class _Progress:
         """Return the measurement with all corrections found so far."""
         one = self.measurement
         return replace(one, h=corrected(one.omega, one.h, self.corrections)) if self.corrections else one
+
+
+def _missing_findings(
+    missing: NDArray[np.bool_], joint: JointChannels | None, rows: Sequence[str], columns: Sequence[str]
+) -> list[FrfFinding]:
+    """Name FRFs that are missing, and what a fit makes of it."""
+    if not missing.any():
+        return []
+    pairs = [f"{rows[i]} / {columns[j]}" for i, j in zip(*np.nonzero(missing), strict=True)]
+    more = f" and {len(pairs) - _PAIRS_SHOWN} more" if len(pairs) > _PAIRS_SHOWN else ""
+    verb = "is" if len(pairs) == 1 else "are"
+    text = (
+        f"{len(pairs)} of {missing.size} FRFs {verb} missing (response / force): "
+        f"{', '.join(pairs[:_PAIRS_SHOWN])}{more}; all others are looked at"
+    )
+    level: FindingLevel = "warning"
+    remedy = "measure them, or leave the channels out"
+    if joint is not None:
+        try:
+            left_out = joint.without_missing(~missing)[1]
+        except FileContentError as error:
+            level, text = "error", f"{text}; {error}"
+        else:
+            names = ", ".join(f"{one.kind} {one.channel} ({one.others} others on side {one.side})" for one in left_out)
+            remedy = f"a fit leaves out {names}"
+    return [FrfFinding("missing", level, tuple(pairs), len(pairs), 0, text, remedy)]
+
+
+def _check_signals(state: _Progress) -> None:
+    """Find dead and doubled channels, which nothing else is said of."""
+    signals = check_signals(state.measurement)
+    state.findings.extend(signals.findings)
+    state.bad_rows.update(signals.rows)
+    state.bad_columns.update(signals.columns)
+
+
+def _check_rigid_motion(state: _Progress, joint: JointChannels, missing: NDArray[np.bool_]) -> JointChannels | None:
+    """Compare each channel with the motion of its neighbours; return the joint of those that nothing is wrong with."""
+    for group in _groups(state, joint, missing):
+        names = state.measurement.responses if group.word == "response" else state.measurement.forces
+        bad = state.bad_rows if group.word == "response" else state.bad_columns
+        for fault in rigid_faults(group, state.measurement.freq_hz, [names[i] for i in group.places]):
+            state.findings.append(fault.finding)
+            bad.update(fault.places)
+    try:
+        good = joint.without(state.bad_rows, state.bad_columns)
+        rows, columns = _places_of(good, joint)
+        return good.without_missing(~missing[np.ix_(rows, columns)])[0]
+    except ValueError:
+        return None
+
+
+def _places_of(some: JointChannels, joint: JointChannels) -> tuple[list[int], list[int]]:
+    """Return the places of the responses and forces of a joint among those of another one."""
+    pairs = (some.responses, joint.responses), (some.forces, joint.forces)
+    rows, columns = ([every.channels.index(channel) for channel in own.channels] for own, every in pairs)
+    return rows, columns
+
+
+def _groups(state: _Progress, joint: JointChannels, missing: NDArray[np.bool_]) -> Iterator[ChannelGroup]:
+    """Yield the responses and the forces of both sides, without those that are known to be wrong."""
+    m = state.measurement
+    words: tuple[tuple[Literal["response", "force"], str], ...] = (("response", "response"), ("force", "excitation"))
+    for word, kind in words:
+        first = 0
+        for side in ("j", "k"):
+            point, positions = joint.points[kind, side], joint.positions[kind, side]
+            # a response that is found wrong is not there when the forces are looked at
+            bad, across = state.bad_rows, state.bad_columns
+            h, gone = m.h, missing
+            channels = joint.responses.channels
+            if word == "force":
+                bad, across, h, gone = across, bad, h.swapaxes(1, 2), missing.T
+                channels = joint.forces.channels
+            own = np.array([i for i in range(len(positions)) if first + i not in bad and point.weights[i] > 0], np.intp)
+            columns = np.array([i for i in range(h.shape[2]) if i not in across], np.intp)
+            at = own + first
+            first += len(positions)
+            if not own.size or not columns.size:
+                continue
+            nodes = tuple(channels[i].node for i in at)
+            group = ChannelGroup(
+                word, side, at, nodes, positions[own], point.motion[own, :3], point.point, h[:, at][:, :, columns]
+            )
+            yield group.filled(gone[np.ix_(at, columns)])
+
+
+def _findings_at_channels(state: _Progress, joint: JointChannels, every: JointChannels) -> list[FrfFinding]:
+    """Return findings at the joint DOFs, of virtual points without the channels that are wrong."""
+    rows, columns = _places_of(joint, every)
+    m = state.corrected()
+    t_out, t_in = joint.responses.transform, joint.forces.transform
+    h = m.h[:, rows][:, :, columns]
+    groups = _groups(state, every, m.hidden)
+    share = np.max([not_rigid(group) for group in groups], axis=0)
+    found = side_findings(m.freq_hz, t_out @ h @ t_in.T, share, _hidden(h, t_out, t_in), state.read_as)
+    known = {finding.kind for finding in state.findings}
+    return [finding for finding in found if finding.kind not in known]
 
 
 def _findings_at_joint(
@@ -188,23 +340,41 @@ def _findings_at_joint(
             f"dofs must name {t_out.shape[0] / 2:g} joint DOFs, half the rows of transform, not {len(names)}"
         )
     labels = [f"{side}:{name}" for side in "jk" for name in names]
-    h = t_out @ m.h @ t_in.T
+    return _judged_at_joint(state, m.freq_hz, m.h, (t_out, t_in), labels)
+
+
+def _hidden(channels: ComplexArray, t_out: FloatArray, t_in: FloatArray) -> np.ndarray:
+    """FRFs of joint DOFs that the noise of the channels may hide, which are differences of large numbers."""
     # the deviation of transformed FRFs where that of each channel is its size
-    deviation = np.sqrt(t_out**2 @ abs(m.h) ** 2 @ (t_in**2).T)
-    hidden = np.median(abs(h), axis=0) < _HIDING * np.median(deviation, axis=0)
-    joint = _Progress(replace(as_measurement(m.freq_hz, h, labels, labels), hidden=hidden), state.side)
+    deviation = np.sqrt(t_out**2 @ abs(channels) ** 2 @ (t_in**2).T)
+    hidden: np.ndarray = np.median(abs(t_out @ channels @ t_in.T), axis=0) < _HIDING * np.median(deviation, axis=0)
+    return hidden
+
+
+def _judged_at_joint(
+    state: _Progress,
+    freq_hz: FloatArray,
+    channels: ComplexArray,
+    transforms: tuple[FloatArray, FloatArray],
+    labels: Sequence[str],
+) -> list[FrfFinding]:
+    """Return findings at joint DOFs, of kinds that the channels have not shown."""
+    t_out, t_in = transforms
+    h = t_out @ channels @ t_in.T
+    hidden = _hidden(channels, t_out, t_in)
+    joint = _Progress(as_measurement(freq_hz, h, labels, labels, hidden), state.side, state.read_as)
+    _check_signals(joint)
     _check_channels(joint)
     known = {finding.kind for finding in state.findings}
     return [finding for finding in joint.findings if finding.kind not in known]
 
 
 def _check_channels(state: _Progress) -> None:
-    """Judge signals, time convention, reciprocity, driving points, in this order: each cause is reported once."""
-    signals = check_signals(state.measurement)
-    state.findings.extend(signals.findings)
-    m = state.measurement = state.measurement.without(signals.rows, signals.columns)
+    """Judge time convention, reciprocity, driving points, in this order: each cause is reported once."""
+    rows, columns = sorted(state.bad_rows), sorted(state.bad_columns)
+    m = state.measurement = state.measurement.without(rows, columns)
     smooth = m.smoothness.copy()
-    smooth[signals.rows], smooth[:, signals.columns] = 0, 0
+    smooth[rows], smooth[:, columns] = 0, 0
     around = circles(m.omega, m.h, smooth)
     if around.seen and around.value > 0 and around.share >= _BACKWARDS:
         driving = sectors(_driving(m.square))
@@ -250,7 +420,7 @@ def _check_ratios(state: _Progress, m: Measurement, pairs: PairRatios) -> None:
     exponent = mean_exponent(m.omega, driving * m.omega[:, None] ** -ratios.power.astype(float))
     span = float(m.freq_hz[-1] / m.freq_hz[0])
     found = quantities(ratios.group, ratios.power, ratios.sign, sector, exponent, span)
-    state.add(quantity_findings(m, found, sector))
+    state.add(quantity_findings(m, found, sector, state.read_as))
     state.add(sign_findings(m, found, sector, state.side))
     state.add(gain_findings(m, ratios, state.side))
     state.add(delay_findings(m, ratios, state.side))

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from jointfrf.channels.check.finding import Correction, FrfFinding
 from jointfrf.channels.check.pair_ratios import block_medians
 from jointfrf.channels.check.signals import Measurement, modulus
+from jointfrf.frf.frf_set import POWER_OF_I_OMEGA
 from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray
 
 __all__ = [
@@ -35,10 +36,17 @@ _BLOCK = 30
 _SIGNIFICANT, _LEAST = 8.0, 0.05
 #: Mean exponents of w in |h| of driving points: below the first it is a receptance, above the second an accelerance.
 _RECEPTANCE, _ACCELERANCE = -0.2, 0.6
+#: Receptances do not fall faster than those of a free mass, but for noise.
+_STEEPEST = -2.2
 #: A band that spans less than this factor in frequency does not show the exponent.
 _LEAST_SPAN = 3.0
 #: Names of the quantities, by the power of i w.
 _NAMES = ("receptances", "mobilities", "accelerances")
+#: What was divided too often, by the power that is left.
+_TAKEN_FOR = {
+    -1: ("mobilities that were taken for accelerances", "receptances that were taken for mobilities"),
+    -2: ("receptances that were taken for accelerances",),
+}
 
 
 @dataclass(frozen=True)
@@ -179,7 +187,7 @@ class Quantities:
     Attributes
     ----------
     power : ndarray of int, shape (n,)
-        0 receptance, 1 mobility, 2 accelerance.
+        0 receptance, 1 mobility, 2 accelerance; -1, -2: divided by i w once, twice too often.
     sign : ndarray of int, shape (n,)
         -1 where the response points against the force.
     contradiction : ndarray of bool, shape (n,)
@@ -223,7 +231,6 @@ def quantities(
     receptance or an accelerance of the wrong sign: |h| falls with frequency in one and rises in the other.
     """
     certain = span >= _LEAST_SPAN and not _RECEPTANCE < exponent < _ACCELERANCE
-    expected = (2 if exponent > _ACCELERANCE else 0) if certain else None
     found_power, found_sign = power.copy(), sign.copy()
     contradiction = np.zeros(group.size, bool)
     for number in np.unique(group):
@@ -232,17 +239,19 @@ def quantities(
         if (quarter < 0).all():
             continue
         choices = []
-        for shift in range(3 - int(power[some].max())):
+        for shift in range(-2, 3 - int(power[some].max())):
             for turn in (1, -1):
                 own = power[some] + shift
                 signs = turn * sign[some]
                 wrong = (quarter >= 0) & ((own + 2 * (signs < 0)) % 4 != quarter)
-                unlikely = expected is not None and shift != 1 and shift != expected
-                choices.append((int(wrong.sum()), unlikely, int((signs < 0).sum()), shift, turn, wrong))
-        best = min(choices, key=lambda choice: choice[:5])
-        found_power[some] = power[some] + best[3]
-        found_sign[some] = best[4] * sign[some]
-        contradiction[some] = best[5]
+                # what is left of the exponent is that of receptances
+                unlikely = span >= _LEAST_SPAN and not _STEEPEST <= exponent - shift <= _ACCELERANCE
+                order = int(wrong.sum()), unlikely, shift == -2, int((signs < 0).sum()), abs(shift), shift, turn
+                choices.append((order, wrong))
+        (*_, shift, turn), wrong = min(choices, key=lambda choice: choice[0])
+        found_power[some] = power[some] + shift
+        found_sign[some] = turn * sign[some]
+        contradiction[some] = wrong
     return Quantities(found_power, found_sign, contradiction, exponent, certain)
 
 
@@ -262,10 +271,13 @@ def convention_finding(around: Circles, driving: Sectors) -> FrfFinding:
 
 
 def quantity_findings(
-    measurement: Measurement, found: Quantities, driving: Sectors
+    measurement: Measurement, found: Quantities, driving: Sectors, read_as: str | None
 ) -> Iterator[FrfFinding | Correction]:
-    """Report which responses are velocities or accelerations."""
-    for power in (1, 2):
+    """Report which responses are velocities or accelerations, or were taken for them.
+
+    `read_as` is the quantity that FRFs were taken for when they were made receptances, where that is known.
+    """
+    for power in (1, 2, -1, -2):
         places = np.flatnonzero(found.power == power)
         if not places.size:
             continue
@@ -274,21 +286,34 @@ def quantity_findings(
         rows = tuple(range(len(measurement.responses))) if every else tuple(map(int, measurement.rows[places]))
         what = "the FRFs are" if every else f"the FRFs of the responses {', '.join(names)} are"
         negative = 100 * float(np.median(driving.negative[places]))
-        negative = 100 - negative if power == 2 else negative
-        seen = f"driving points have Im {'>' if power == 2 else '<'} 0 on {negative:.0f} % of lines"
+        negative = 100 - negative if abs(power) == 2 else negative
+        seen = f"driving points have Im {'>' if abs(power) == 2 else '<'} 0 on {negative:.0f} % of lines"
         if every:
             seen += f", |h| goes with w^{found.exponent + power:.1f}"
         else:
             seen += f", h_pq / h_qp goes with w^{power} against the other responses"
         doubt = f" (or receptances of the wrong sign: |h| goes with w^{found.exponent + 2:.1f} on this band)"
-        doubt = "" if found.certain or power == 1 or not every else doubt
-        divisor = ("i w", "(i w)^2")[power - 1]
+        doubt = "" if found.certain or power != 2 or not every else doubt
+        factor = ("i w", "(i w)^2")[abs(power) - 1]
+        does = f"divide by {factor}" if power > 0 else f"multiply by {factor}"
+        is_now = _NAMES[power] if power > 0 else f"receptances divided by {factor}"
+        actual = POWER_OF_I_OMEGA.get(read_as or "", -9) + power
+        if every and 0 <= actual <= 2 and read_as is not None:
+            held = _NAMES[actual]
+            was = "" if power > 0 and read_as == "receptance" else f": {held} that were read as {read_as}s"
+            was = was.replace("mobilitys", "mobilities")
+            does = f"read the file as {held}, whatever it says (quantity {tuple(POWER_OF_I_OMEGA)[actual]}, forced)"
+        elif power < 0:
+            was = f": {' or '.join(_TAKEN_FOR[power])}"
+        else:
+            was = ""
         yield FrfFinding(
             "quantity", "error", names, float(found.exponent + power), 0.0,
-            f"{what} {_NAMES[power]}, not receptances: {seen}{doubt}",
-            f"divide by {divisor}, or state the quantity when the file is read",
+            f"{what} {is_now}{', not receptances' if power > 0 else ''}{was}: {seen}{doubt}",
+            does if read_as is not None and every else f"{does}, or state the quantity when the file is read",
         )  # fmt: skip
-        text = f"{'all FRFs' if every else 'responses ' + ', '.join(names)} divided by {divisor}"
+        text = f"{'all FRFs' if every else 'responses ' + ', '.join(names)} "
+        text += f"{'divided' if power > 0 else 'multiplied'} by {factor}"
         yield Correction("quantity", text, 1, rows, power=power)
 
 

@@ -10,12 +10,14 @@ import numpy as np
 
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
-__all__ = ["Correction", "FindingLevel", "FrfCheck", "FrfFinding", "corrected"]
+__all__ = ["Correction", "FindingKind", "FindingLevel", "FrfCheck", "FrfFinding", "corrected"]
 
 FindingLevel = Literal["error", "warning", "note"]
 FindingKind = Literal[
     "lines",
+    "missing",
     "zero-frequency",
+    "reference",
     "dead",
     "doubled",
     "time-convention",
@@ -25,6 +27,8 @@ FindingKind = Literal[
     "units",
     "gain",
     "delay",
+    "direction",
+    "place",
     "reciprocity",
     "passivity",
 ]
@@ -37,8 +41,8 @@ class FrfFinding:
     Attributes
     ----------
     kind : str
-        One of "lines", "zero-frequency", "dead", "doubled", "time-convention", "exchanged", "quantity", "sign",
-        "units", "gain", "delay", "reciprocity", "passivity".
+        One of "lines", "missing", "zero-frequency", "reference", "dead", "doubled", "time-convention", "exchanged",
+        "quantity", "sign", "units", "gain", "delay", "direction", "place", "reciprocity", "passivity".
     level : {"error", "warning", "note"}
         A fit is meaningless; it is wrong by about the size found; for information.
     channels : tuple of str
@@ -97,6 +101,11 @@ class FrfCheck:
     def ok(self) -> bool:
         """Whether there is neither an error nor a warning."""
         return all(finding.level == "note" for finding in self.findings)
+
+    @property
+    def serious(self) -> list[str]:
+        """Errors and warnings, in words."""
+        return [str(finding) for finding in self.findings if finding.level != "note"]
 
     def __str__(self) -> str:
         head = f"{self.h.shape[0]} lines, {self.h.shape[1]} responses x {self.h.shape[2]} forces"

@@ -49,8 +49,8 @@ class Measurement:
         Responses and forces that share a DOF.
     signs : ndarray, shape (n,)
         -1 where they point in opposite directions.
-    hidden : ndarray of bool, shape (n_responses, n_forces), or None
-        FRFs that noise of the channels they come from may hide: they are not used.
+    hidden : ndarray of bool, shape (n_responses, n_forces)
+        FRFs that are missing, or that noise of the channels they come from may hide: they are not used.
     """
 
     freq_hz: FloatArray
@@ -60,7 +60,7 @@ class Measurement:
     rows: NDArray[np.intp]
     columns: NDArray[np.intp]
     signs: FloatArray
-    hidden: NDArray[np.bool_] | None = None
+    hidden: NDArray[np.bool_]
 
     @property
     def omega(self) -> FloatArray:
@@ -70,8 +70,7 @@ class Measurement:
     @cached_property
     def smoothness(self) -> FloatArray:
         """As `smoothness` of `h`, shape (n_responses, n_forces); 0 where it is hidden."""
-        found = smoothness(self.h)
-        return found if self.hidden is None else np.where(self.hidden, 0.0, found)
+        return np.where(self.hidden, 0.0, smoothness(self.h))
 
     @cached_property
     def square(self) -> ComplexArray:
@@ -122,7 +121,11 @@ def smoothness(h: ComplexArray) -> FloatArray:
 
 
 def as_measurement(
-    freq_hz: FloatArray, h: ComplexArray, responses: Sequence[str | Channel], forces: Sequence[str | Channel]
+    freq_hz: FloatArray,
+    h: ComplexArray,
+    responses: Sequence[str | Channel],
+    forces: Sequence[str | Channel],
+    hidden: NDArray[np.bool_],
 ) -> Measurement:
     """Pair responses with forces by name; a name like 102:-y is the opposite of 102:+y."""
     of_responses = tuple(_both_ways(name)[0] for name in responses)
@@ -132,7 +135,21 @@ def as_measurement(
         place.setdefault(name, (i, -1))
     pairs = np.array([(row, *place[name]) for row, name in enumerate(of_responses) if name in place], np.intp)
     rows, columns, signs = pairs.reshape(-1, 3).T
-    return Measurement(freq_hz, h, of_responses, of_forces, rows, columns, signs.astype(float))
+    if hidden.any():
+        h = _filled(h, rows, columns, signs)
+    return Measurement(freq_hz, h, of_responses, of_forces, rows, columns, signs.astype(float), hidden)
+
+
+def _filled(
+    h: ComplexArray, rows: NDArray[np.intp], columns: NDArray[np.intp], signs: NDArray[np.intp]
+) -> ComplexArray:
+    """Return FRFs with those that are missing taken from h_qp, where there is one, else 0: neutral for every check."""
+    gone = np.asarray(np.isnan(h).all(axis=0))
+    filled = np.where(gone, 0, h)
+    for a, b in zip(*np.nonzero(gone[rows[:, None], columns]), strict=True):
+        if not gone[rows[b], columns[a]]:
+            filled[:, rows[a], columns[b]] = h[:, rows[b], columns[a]] * signs[a] * signs[b]
+    return filled
 
 
 def as_channel_names(

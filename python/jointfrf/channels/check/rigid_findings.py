@@ -1,0 +1,335 @@
+"""What a channel shows that the others around its virtual point do not expect: sign, factor, direction, place."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from jointfrf.channels.check.channel_ratios import unit_of_factor
+from jointfrf.channels.check.finding import FindingKind, FindingLevel, FrfFinding
+from jointfrf.channels.check.rigid_motion import ChannelGroup, Suspects, expected_motion, find_suspects
+from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray
+
+__all__ = ["RigidFault", "rigid_faults"]
+
+#: Mean square that a suspect causes over that of the others, from which it is one: of bodies without a fault, whose
+#: deformation is no rigid motion either, 8 is exceeded in a third of the groups, 25 in one of 300 with four residuals
+#: or more. What is seen must thus be large, too:
+_LEAST_RATIO, _CLEAR_RATIO = 6.0, 20.0
+#: error of a channel relative to its motion that the deformation of sides does not reach (0.8 without a fault);
+_LARGE = 0.9
+#: or a factor or direction that explains the error: what is left of it, at most this share (without a fault 0.43).
+_EXPLAINED, _NOTICED = 0.3, 0.1
+#: A sensor, or an exchange, is one where it is as large relative to its motion.
+_SENSOR_ERROR = 0.25
+#: A factor and direction leave less than half of the power of what they are to explain.
+_HALF = math.sqrt(0.5)
+#: Factors and directions are known to this share: a sensor is not read off where its direction is not.
+_ALONG = 0.35
+#: A factor within this share of that of a unit is taken for it, or within what is left of the motion, to this share.
+_UNIT, _UNIT_WIDEST = 0.05, 0.25
+#: Exponent of w in the ratio of measured to expected motion, and how far it may be off for a quantity.
+_EXPONENT = 0.3
+#: Parts of the band, their coherence with the expected motion, and the span in frequency that show an exponent.
+_PARTS, _COHERENT, _SPAN = 12, 0.8, 2.0
+#: Delays that are tried: up to this number of turns of the phase over the band, either way.
+_TURNS, _STEPS = 2.0, 81
+#: Faults of a group: with more nothing can be said of any.
+_MOST_FAULTS = 3
+
+
+@dataclass(frozen=True)
+class RigidFault:
+    """One finding about channels of a group, and which rows or columns it is about."""
+
+    finding: FrfFinding
+    word: str
+    places: tuple[int, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class _Seen:
+    """What a channel shows beside what the others expect at its place.
+
+    Attributes
+    ----------
+    freq_hz : ndarray, shape (n_freq,)
+    shown : ndarray, shape (n_freq, n)
+    place : ndarray, shape (n_freq, 3, n)
+        Expected displacement of its place.
+    direction : ndarray, shape (3,)
+        Along which it is to measure.
+    """
+
+    freq_hz: FloatArray
+    shown: ComplexArray
+    place: ComplexArray
+    direction: FloatArray
+
+    @property
+    def expected(self) -> ComplexArray:
+        """What it should show, shape (n_freq, n)."""
+        return np.asarray(np.einsum("a,fan->fn", self.direction, self.place))
+
+    def error(self) -> float:
+        """Root mean square of shown less expected, over that of the expected."""
+        expected = self.expected
+        return _size(self.shown - expected) / max(_size(expected), TINY)
+
+    def fitted(self) -> tuple[FloatArray, float]:
+        """Return the direction times factor that explains most of what it shows, and the share that is left."""
+        across = self.place.swapaxes(0, 1).reshape(3, -1)
+        both = np.hstack([across.real, across.imag]).T
+        shown = np.concatenate([self.shown.real.ravel(), self.shown.imag.ravel()])
+        direction = np.linalg.lstsq(both, shown, rcond=None)[0]
+        left = float(np.linalg.norm(shown - both @ direction))
+        return direction, left / max(float(np.linalg.norm(shown)), TINY)
+
+    def share_left(self, expected: ComplexArray) -> float:
+        """Return the share of what it shows that another expected motion leaves."""
+        return _size(self.shown - expected) / max(_size(self.shown), TINY)
+
+
+def _size(values: ComplexArray) -> float:
+    return float(np.linalg.norm(values))
+
+
+def rigid_faults(group: ChannelGroup, freq_hz: FloatArray, names: Sequence[str]) -> Iterator[RigidFault]:
+    """Find the channels that do not move as the others around the point expect, one cause after the other.
+
+    Parameters
+    ----------
+    group : ChannelGroup
+    freq_hz : ndarray, shape (n_freq,)
+    names : sequence of str
+        Of its channels.
+    """
+    left = np.arange(group.size)
+    for _ in range(_MOST_FAULTS):
+        own = group.only(left)
+        suspects = find_suspects(own)
+        if suspects is None or suspects.ratio < _LEAST_RATIO:
+            return
+        finding = _finding(own, suspects, freq_hz, [names[i] for i in left.tolist()])
+        if finding is None:
+            return
+        bad = left[list(suspects.channels)]
+        yield RigidFault(finding, group.word, tuple(group.places[bad].tolist()))
+        left = np.setdiff1d(left, bad)
+
+
+def _finding(group: ChannelGroup, suspects: Suspects, freq_hz: FloatArray, names: Sequence[str]) -> FrfFinding | None:
+    others = np.setdiff1d(np.arange(group.size), suspects.channels)
+    motion = expected_motion(group, others)
+    seen = [_seen(group, i, motion, freq_hz) for i in suspects.channels]
+    some = [_on_lines(one, suspects.lines) for one in seen]
+    if suspects.kind == "channel":
+        return _channel_finding(group, suspects, seen[0], some[0], names, motion)
+    error = math.sqrt(sum(one.error() ** 2 for one in some) / len(some))
+    if suspects.ratio < _CLEAR_RATIO or error < _SENSOR_ERROR:
+        return None
+    shown = _number(group, suspects, error, "these")
+    if suspects.kind == "exchanged":
+        a, b = (names[i] for i in suspects.channels)
+        return FrfFinding(
+            "exchanged", "error", (f"{group.word} {a}", f"{group.word} {b}"), suspects.ratio, _CLEAR_RATIO,
+            f"{group.word}s {a} and {b} are exchanged: {shown}, exchanged they move as the others say",
+            "exchange the two, or their names",
+        )  # fmt: skip
+    return _sensor_finding(group, suspects, some, names, shown)
+
+
+def _seen(group: ChannelGroup, i: int, motion: ComplexArray, freq_hz: FloatArray) -> _Seen:
+    """Relate a channel to the motion of the others; every column with the same weight on every line."""
+    size = np.sqrt(np.median(abs(group.h) ** 2, axis=1))
+    size = np.where(size > 0, size, 1.0)
+    place = np.einsum("ab,fbn->fan", group.at(group.positions[i]), motion) / size[:, None]
+    return _Seen(freq_hz, group.h[:, i] / size, place, group.directions[i])
+
+
+def _on_lines(one: _Seen, lines: np.ndarray) -> _Seen:
+    return _Seen(one.freq_hz[lines], one.shown[lines], one.place[lines], one.direction)
+
+
+def _number(group: ChannelGroup, suspects: Suspects, error: float, which: str) -> str:
+    others = group.size - len(suspects.channels)
+    return (
+        f"the other {others} {group.word}s of side {group.side} move as one body to {100 * suspects.rest:.2g} %, "
+        f"{which} differ{'s' if which == 'it' else ''} from that by {100 * error:.3g} %"
+    )
+
+
+class _Cause(NamedTuple):
+    """What is wrong with a channel."""
+
+    kind: FindingKind
+    value: float
+    text: str
+    remedy: str
+    level: FindingLevel = "error"
+
+
+def _channel_finding(
+    group: ChannelGroup, suspects: Suspects, seen: _Seen, some: _Seen, names: Sequence[str], motion: ComplexArray
+) -> FrfFinding | None:
+    """Say what is wrong with one channel; None where the deformation of the side may be the reason."""
+    place = suspects.channels[0]
+    error = some.error()
+    direction, left = some.fitted()
+    other, after = _like_another(group, place, some, motion, suspects.lines)
+    # shares of what it shows, as the error is one of what is expected
+    scale = _size(some.shown) / max(_size(some.expected), TINY)
+    explained = left * scale <= _EXPLAINED * error
+    copied = after * scale <= _EXPLAINED * error and after < left
+    if error < _NOTICED or (not explained and not copied and error < _LARGE):
+        return None
+    cause = _cause_in_time(group, seen)
+    if cause is None and not copied and left < _HALF:
+        cause = _of_direction(group, some.direction, direction, left)
+    if cause is None and not copied:
+        cause = _late(seen)
+    if cause is None and (copied or after < 0.5):
+        text = f"shows what {group.word} {names[other]} should show"
+        cause = _Cause("place", error, text, "look at place, direction, cable and name of both")
+    if cause is None and error >= _LARGE and suspects.ratio >= _CLEAR_RATIO:
+        text = "does not belong to them, whatever its factor, sign and direction"
+        cause = _Cause("place", error, text, "look at its place, direction, cable and name, or leave it out")
+    if cause is None:
+        return None
+    name = f"{group.word} {names[place]}"
+    message = f"{name} {cause.text}: {_number(group, suspects, error, 'it')}"
+    return FrfFinding(cause.kind, cause.level, (name,), cause.value, _LARGE, message, cause.remedy)
+
+
+def _cause_in_time(group: ChannelGroup, seen: _Seen) -> _Cause | None:
+    """Say whether a channel is another quantity than the others."""
+    power = _power(seen)
+    if not power:
+        return None
+    word = {2: "an acceleration", 1: "a velocity", -1: "divided by i w once", -2: "divided by i w twice"}[power]
+    if group.word == "force":
+        word = f"(i w)^{power} times a force"
+    return _Cause("quantity", power, f"is {word} among others that are not", "convert it as the others are")
+
+
+def _late(seen: _Seen) -> _Cause | None:
+    """Say whether a channel is late, by more than the deformation of sides turns phases."""
+    delay, left = _delay(seen)
+    if left >= _EXPLAINED:
+        return None
+    text = f"is {'late' if delay > 0 else 'early'} by {1e3 * abs(delay):.3g} ms"
+    return _Cause("delay", delay, text, "look at its filter, cable and trigger")
+
+
+def _of_direction(group: ChannelGroup, own: FloatArray, direction: FloatArray, left: float) -> _Cause | None:
+    """Read sign, factor or another direction off the vector that explains a channel."""
+    along = float(direction @ own)
+    across = float(np.linalg.norm(direction - along * own))
+    if across <= _ALONG * abs(along):
+        if 1 / 1.25 < -along < 1.25:
+            what = "moves against what is expected" if group.word == "response" else "acts against its direction"
+            return _Cause("sign", along, f"{what} ({along:.3g} times it)", "turn its sign, or its direction")
+        unit = unit_of_factor(abs(along), is_rotation=False, tolerance=min(max(_UNIT, left), _UNIT_WIDEST))
+        what = f"is {along:.4g} times what is expected"
+        if unit is not None and along > 0:
+            return _Cause("units", along, f"{what}, {unit}", "convert this channel to SI units")
+        level: FindingLevel = "warning" if 0.5 < along < 2 else "error"
+        return _Cause("gain", along, what, "look at its calibration, range, unit and sign", level)
+    name, axis = _axis_of(direction)
+    size = float(np.linalg.norm(direction))
+    if np.linalg.norm(direction / size - axis) <= _ALONG and 0.5 < size < 2:
+        given = " ".join(f"{value:.3g}" for value in own + 0.0)
+        return _Cause(
+            "direction", size, f"shows direction {name}, not {given}", "look at its direction, cable and name"
+        )
+    return None
+
+
+def _axis_of(direction: FloatArray) -> tuple[str, FloatArray]:
+    """Return the axis that is nearest to a vector, with its name."""
+    place = int(np.argmax(abs(direction)))
+    sign = -1.0 if direction[place] < 0 else 1.0
+    return f"{'-' if sign < 0 else '+'}{'xyz'[place]}", sign * np.eye(3)[place]
+
+
+def _power(seen: _Seen) -> int:
+    """Return the power of i w by which a channel differs from the others; 0 where it is none."""
+    parts = np.array_split(np.arange(seen.freq_hz.size), min(_PARTS, seen.freq_hz.size))
+    expected = seen.expected
+    points = []
+    for part in parts:
+        e, s = expected[part].ravel(), seen.shown[part].ravel()
+        product = np.vdot(e, s)
+        if abs(product) > _COHERENT * max(_size(e) * _size(s), TINY):
+            points.append((math.log(float(seen.freq_hz[part].mean())), np.log(product / np.vdot(e, e).real)))
+    if len(points) < 3 or points[-1][0] - points[0][0] < math.log(_SPAN):
+        return 0
+    x, y = np.array([p[0] for p in points]), np.array([p[1] for p in points])
+    slope = float(np.polyfit(x, y.real, 1)[0])
+    power = round(slope)
+    if not 1 <= abs(power) <= 2 or abs(slope - power) > _EXPONENT:
+        return 0
+    turned = np.exp(1j * (y.imag - power * np.pi / 2)).mean()
+    return power if turned.real > _COHERENT else 0
+
+
+def _delay(seen: _Seen) -> tuple[float, float]:
+    """Return the delay in s that explains most of what a channel shows, and the share that is left."""
+    omega = 2 * np.pi * seen.freq_hz
+    product = (seen.expected.conj() * seen.shown).sum(axis=1)
+    tried = np.linspace(-1, 1, _STEPS) * _TURNS * 2 * np.pi / omega[-1]
+    best = float(tried[np.argmax((np.exp(1j * np.outer(tried, omega)) @ product).real)])
+    late = np.exp(-1j * omega * best)[:, None] * seen.expected
+    return best, seen.share_left(late)
+
+
+def _like_another(
+    group: ChannelGroup, place: int, some: _Seen, motion: ComplexArray, lines: np.ndarray
+) -> tuple[int, float]:
+    """Return the channel whose expected motion this one shows, and the share that is left."""
+    size = np.sqrt(np.median(abs(group.h[lines]) ** 2, axis=1))
+    size = np.where(size > 0, size, 1.0)
+    left = np.full(group.size, np.inf)
+    for other in range(group.size):
+        if other != place:
+            expected = np.einsum("a,fan->fn", group.motion[other], motion[lines]) / size
+            left[other] = some.share_left(expected)
+    best = int(np.argmin(left))
+    return best, float(left[best])
+
+
+def _sensor_finding(
+    group: ChannelGroup, suspects: Suspects, some: Sequence[_Seen], names: Sequence[str], shown: str
+) -> FrfFinding:
+    """Say whether a sensor with several channels is turned, or where it seems to be."""
+    node = group.nodes[suspects.channels[0]]
+    channels = tuple(f"{group.word} {names[i]}" for i in suspects.channels)
+    turned = _turned(some)
+    if turned is not None:
+        return FrfFinding(
+            "direction", "error", channels, suspects.ratio, _CLEAR_RATIO,
+            f"the {group.word}s of {node} show directions {turned}: {shown}", "look at how the sensor is turned",
+        )  # fmt: skip
+    return FrfFinding(
+        "place", "error", channels, suspects.ratio, _CLEAR_RATIO,
+        f"the {group.word}s of {node} do not move as their place should: {shown}",
+        f"look at the coordinates of {node}, and at how it is turned",
+    )  # fmt: skip
+
+
+def _turned(some: Sequence[_Seen]) -> str | None:
+    """Return the axes that the channels of a sensor show, where these are axes, and others than theirs."""
+    words = []
+    for one in some:
+        direction, left = one.fitted()
+        name, axis = _axis_of(direction)
+        if left > 0.5 or np.linalg.norm(direction - axis) > 2 * _ALONG:
+            return None
+        words.append((name, float(axis @ one.direction)))
+    if all(own > 1 - _ALONG for _, own in words):
+        return None
+    return ", ".join(name for name, _ in words)
