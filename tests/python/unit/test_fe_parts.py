@@ -202,7 +202,7 @@ def test_points_of_a_part_whose_lengths_are_scaled(model, coupling):
     names = ["tip:x", "tip:theta_z", "tip:theta_y", f"{end_nodes(model, 0.0)[0]}:x", "60:x"]
     expected = larger.receptance(FREQ, names)
     np.testing.assert_allclose(scaled.receptance(FREQ, names), expected, rtol=1e-6, atol=1e-9 * abs(expected).max())
-    np.testing.assert_allclose(scaled.places["tip"], larger.places["tip"])
+    np.testing.assert_allclose(scaled.places["tip"], larger.places["tip"], atol=1e-12)
 
 
 def test_a_node_in_two_rigid_points(model):
