@@ -1,4 +1,5 @@
 """`assembly.toml`: an assembly, what is unknown of it, and which channel of a measurement is which of its DOFs.
 
-In reading order: `keys` (what the file may say), `read` (from keys to an assembly), `measured` (with FRFs of a test).
+In reading order: `keys` (what the file may say), `read` (from keys to an assembly), `measured` (with FRFs of a test);
+`template` (a file to begin with).
 """

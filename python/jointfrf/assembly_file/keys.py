@@ -154,8 +154,10 @@ class AssemblyKeys(Keys):
     ground: Annotated[tuple[GroundKeys, ...], key("Springs to the ground.")] = ()
     channels: Annotated[
         dict[str, str],
-        key('Which channel of the file is which DOF: `"3:+y" = "A/151:y"`; `-y` where it points the other way. Others '
-            "are not used.", absent="channels that are named like one DOF of A or of B, `151:y`"),
+        key('Which channel of the file is which DOF: `"3:+y" = "A/151:y"`; `-y` where it points the other way. '
+            '`"A/@0.3,0.006,0:y"`, here and wherever DOFs are named, is the node nearest to a position, m. Channels '
+            "that are not named are not used.",
+            absent="channels that are named like one DOF of A or of B, `151:y`"),
     ] = field(default_factory=dict)  # fmt: skip
     response_gains: Annotated[
         dict[str, _Prior],

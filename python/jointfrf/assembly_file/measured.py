@@ -44,6 +44,9 @@ class MeasuredAssembly:
         Channels of the file that are not used.
     coherence : ndarray, shape (n_freq, n_o, n_i), or None
     averages : float or None
+    parts : tuple of two AssemblyPart
+    located : tuple of str
+        Which node each position of the file is.
     """
 
     freq_hz: FloatArray
@@ -58,6 +61,8 @@ class MeasuredAssembly:
     unused: tuple[str, ...]
     coherence: FloatArray | None
     averages: float | None
+    parts: tuple[AssemblyPart, AssemblyPart]
+    located: tuple[str, ...]
 
     def fit(self, *, noise: float | None = None) -> Fit:
         """Identify the joint, as `identify_model` does.
@@ -113,6 +118,7 @@ def measured_assembly(
         raise FileContentError(f"{frfs.source} has no line above 0 Hz in the bands")
     freq = frfs.freq_hz[kept]
     parts = file.parts(freq)
+    file, located = file.located(parts)
     rows, columns = (_dofs(file, parts, frfs, own) for own in (frfs.responses, frfs.excitations))
     _check_named(file, frfs)
     for own, what in ((rows, "response"), (columns, "excitation")):
@@ -131,6 +137,7 @@ def measured_assembly(
     return MeasuredAssembly(
         freq, np.ascontiguousarray(frfs.h[at] * signs), file.assembly(freq, parts, names), tuple(rows), tuple(columns),
         gains[0], gains[1], file.keys.fixed, (named[0], named[1]), _unused(frfs, named), coherence, averages,
+        parts, located,
     )  # fmt: skip
 
 

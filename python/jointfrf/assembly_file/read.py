@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, NamedTuple, get_args
 
 import msgspec
 import numpy as np
@@ -52,6 +52,27 @@ _USUAL = {
 _MEANT = {"E": "youngs_modulus", "rho": "density", "eta": "loss_factor", "thickness": "height", "nu": "poisson"}
 
 
+class NamedDof(NamedTuple):
+    """A DOF by the name of its node.
+
+    Attributes
+    ----------
+    dof : str
+    away : float or None
+        How far the node is from the position that was given, m.
+    """
+
+    dof: str
+    away: float | None = None
+
+
+def _changed(keys: Any, **values: Any) -> Any:
+    """Return keys with other values, of the same table."""
+    found = msgspec.structs.replace(keys, **values)
+    found.__dict__["table_read"] = keys.table
+    return found
+
+
 @dataclass(frozen=True)
 class AssemblyPart:
     """A substructure as the file has it.
@@ -64,6 +85,47 @@ class AssemblyPart:
 
     keys: PartKeys
     structure: Structure
+
+    @classmethod
+    def of_keys(cls, keys: PartKeys, freq_hz: FloatArray) -> AssemblyPart:
+        """Read the files of a part; FRFs must be available on these lines, Hz. Its joint DOFs are named by nodes."""
+        part = cls(keys, keys.structure(freq_hz))
+        joint = tuple(keys.build(lambda dof=dof: part.named(dof).dof, "joint") for dof in keys.joint)  # type: ignore[misc]
+        return part if joint == keys.joint else cls(_changed(keys, joint=joint), part.structure)
+
+    def named(self, dof: str) -> NamedDof:
+        """Return a DOF by the name of its node: ``@0.3,0.006,0:y`` is that of the nearest node which has it.
+
+        Raises
+        ------
+        ValueError
+            A position that is none, or places of nodes that are not known; a node that is far away.
+        """
+        if not dof.startswith("@"):
+            return NamedDof(dof)
+        where, _, direction = dof[1:].rpartition(":")
+        try:
+            at = np.array([float(word) for word in where.strip("() ").split(",")])
+        except ValueError:
+            at = np.zeros(0)
+        if at.shape != (3,) or not np.isfinite(at).all():
+            raise ValueError(f"{dof} must be a position and a direction, @x,y,z:y in m")
+        held = {*self.structure.model.dofs} if isinstance(self.structure, ModelStructure) else None
+        nodes = {
+            node: place
+            for node, place in self.places.items()
+            if (f"{node}:{direction}" in held if held is not None else self.has(f"{node}:{direction}"))
+        }
+        if not nodes:
+            raise ValueError(f"{dof}: no node whose place is known has a DOF {direction}")
+        places = np.array(list(nodes.values()))
+        away = np.linalg.norm(places - at, axis=1)
+        nearest, size = int(np.argmin(away)), float(np.linalg.norm(np.ptp(places, axis=0)))
+        if away[nearest] > size / 2:
+            raise ValueError(
+                f"{dof}: the nearest node is {away[nearest]:.3g} m away, and the part is {size:.3g} m long: is it in m?"
+            )
+        return NamedDof(f"{list(nodes)[nearest]}:{direction}", float(away[nearest]))
 
     def has(self, dof: str) -> bool:
         """Whether there is a DOF of this name."""
@@ -133,8 +195,7 @@ class AssemblyPart:
 
     def _model(self, values: Mapping[str, float]) -> Model:
         """Return the model for other numbers of the table."""
-        changed = msgspec.structs.replace(self.keys, **values)
-        changed.__dict__["table_read"] = self.keys.table
+        changed = _changed(self.keys, **values)
         structure = changed.structure(np.ones(1))
         assert isinstance(structure, ModelStructure)
         return structure.model
@@ -184,7 +245,7 @@ def read_part(path: Path | str) -> AssemblyPart:
     ([0.3, 0.0, 0.0], (2, 2, 2))
     """
     keys = read_keys(read_toml(Path(path)), *get_args(PartKeys))
-    return AssemblyPart(keys, keys.structure(np.ones(1)))
+    return AssemblyPart.of_keys(keys, np.ones(1))
 
 
 def _by_name(own: Unknowns, takes: Sequence[str], meant: Mapping[str, str], table: TomlTable) -> dict[str, Prior]:
@@ -271,8 +332,39 @@ class AssemblyFile:
 
     def parts(self, freq_hz: FloatArray) -> tuple[AssemblyPart, AssemblyPart]:
         """Return both substructures; FRFs must be available on these lines, Hz."""
-        a, b = (AssemblyPart(keys, keys.structure(freq_hz)) for keys in (self.keys.A, self.keys.B))
+        a, b = (AssemblyPart.of_keys(keys, freq_hz) for keys in (self.keys.A, self.keys.B))
         return a, b
+
+    def located(self, parts: tuple[AssemblyPart, AssemblyPart]) -> tuple[AssemblyFile, tuple[str, ...]]:
+        """Return the same with DOFs by nodes instead of positions, and which node each position is.
+
+        Raises
+        ------
+        FileContentError
+            No node is there.
+        """
+        said: dict[str, str] = {}
+
+        def named(keys: Any, key: str, dof: str) -> str:
+            part = {"A/@": parts[0], "B/@": parts[1]}.get(dof[:3])
+            if part is None:
+                return dof
+            found: NamedDof = keys.build(lambda: part.named(dof[2:]), key)
+            said[dof] = f"{dof} is {dof[:2]}{found.dof}, {1e3 * (found.away or 0.0):.3g} mm away"
+            return dof[:2] + found.dof
+
+        own = self.keys
+        keys = _changed(
+            own,
+            A=parts[0].keys,
+            B=parts[1].keys,
+            channels={name: named(own, "channels", dof) for name, dof in own.channels.items()},
+            mass=tuple(_changed(one, dofs=tuple(named(one, "dofs", dof) for dof in one.dofs)) for one in own.mass),
+            ground=tuple(_changed(one, dof=named(one, "dof", one.dof)) for one in own.ground),
+            response_gains={named(own, "response_gains", dof): prior for dof, prior in own.response_gains.items()},
+            force_gains={named(own, "force_gains", dof): prior for dof, prior in own.force_gains.items()},
+        )
+        return replace(self, keys=keys), tuple(said.values())
 
     def attachments(self) -> tuple[Attachment, ...]:
         """Return masses and springs to the ground."""

@@ -182,6 +182,9 @@ def _heading(args: argparse.Namespace, measured: MeasuredAssembly) -> Iterator[s
     yield f"{file_names(args)}: {len(measured.responses)} responses x {len(measured.forces)} forces; {args.model.name}"
     for what, own in zip(("responses", "forces"), measured.channels, strict=True):
         yield f"{what}: " + ", ".join(f"{channel} = {dof}" for dof, channel in own.items())
+    yield from measured.located
+    for name, part in zip("AB", measured.parts, strict=True):
+        yield from (f"{name}: {line}" for line in part.describe())
     if measured.unused:
         yield f"not used: {', '.join(measured.unused)}"
 

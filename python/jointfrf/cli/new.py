@@ -1,4 +1,4 @@
-"""`jointfrf new`: the files of a case to begin with."""
+"""`jointfrf new`: the files of a case, or of an assembly, to begin with."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import argparse
 import json
 from pathlib import Path
 
+from jointfrf.assembly_file.keys import AssemblyKeys
+from jointfrf.assembly_file.template import TEMPLATE
 from jointfrf.cases.catalogue import KINDS
 from jointfrf.cli.usage import Output, UsageError
 from jointfrf.files import write_file
@@ -17,21 +19,26 @@ __all__ = ["add_arguments", "run"]
 _SCHEMA = "case.schema.json"
 #: A case whose file has a design of factors.
 _STUDY = "study"
+#: No case: what `jointfrf identify --model` reads.
+_ASSEMBLY = "assembly"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the arguments of the command."""
     parser.description = (
         "Write the case.toml of a new case, with a comment beside each key, and a JSON Schema with which editors "
-        f"complete it. It runs as it is. KIND is {', '.join(KINDS)}, or {_STUDY}: a case with a design of factors."
+        f"complete it. It runs as it is. KIND is {', '.join(KINDS)}, or {_STUDY}: a case with a design of factors; or "
+        f"{_ASSEMBLY}: an assembly.toml for identify --model."
     )
-    parser.add_argument("kind", metavar="KIND", choices=(*KINDS, _STUDY), help="kind of the case")
+    parser.add_argument("kind", metavar="KIND", choices=(*KINDS, _STUDY, _ASSEMBLY), help="kind of the case")
     parser.add_argument("folder", nargs="?", type=Path, metavar="FOLDER", help="new folder of the case (my-KIND)")
     parser.add_argument("--schema", action="store_true", help="instead: print the JSON Schema of case.toml")
 
 
 def run(options: argparse.Namespace) -> int:
     """Carry out the command."""
+    if options.kind == _ASSEMBLY:
+        return _new_assembly(options)
     is_study = options.kind == _STUDY
     top = KINDS[next(iter(KINDS)) if is_study else options.kind].keys
     schema = json.dumps(schema_of(top), indent=1) + "\n"
@@ -51,4 +58,23 @@ def run(options: argparse.Namespace) -> int:
     out = Output(options)
     out.say(f"wrote {case} and {folder / _SCHEMA}; edit it, then: {command}")
     out.give({"case": str(case), "schema": str(folder / _SCHEMA), "command": command})
+    return 0
+
+
+def _new_assembly(options: argparse.Namespace) -> int:
+    schema = json.dumps(schema_of(AssemblyKeys), indent=1) + "\n"
+    if options.schema:
+        print(schema, end="")
+        return 0
+    folder = options.folder or Path("my-assembly")
+    path, beside = folder / "assembly.toml", folder / "assembly.schema.json"
+    if path.exists() or path.is_symlink():
+        raise UsageError(f"{path} exists: name another folder")
+    folder.mkdir(parents=True, exist_ok=True)
+    write_file(beside, schema)
+    write_file(path, TEMPLATE)
+    command = f"jointfrf identify TEST.uff --model {path}"
+    out = Output(options)
+    out.say(f"wrote {path} and {beside}; edit it, then: {command}")
+    out.give({"assembly": str(path), "schema": str(beside), "command": command})
     return 0

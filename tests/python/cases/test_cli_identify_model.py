@@ -4,6 +4,7 @@ import csv
 import importlib.util
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 
 import jointfrf as jf
 from command import run_command
+from jointfrf.assembly_file.read import read_assembly_file
 from jointfrf.io import read_frfs, write_frfs
 
 CASES = Path(__file__).resolve().parents[3] / "cases"
@@ -170,3 +172,32 @@ def test_saved_laws_are_exported_at_a_frequency(tmp_path):
     k = jf.load(save).joint.dynamic_stiffness([200.0])[0, 1, 1].real
     (line,) = (line for line in cards.splitlines() if line.startswith("*") and line.endswith("+3"))
     assert float(line[-16:].replace("+3", "e3")) == pytest.approx(k, rel=1e-9)
+
+
+def test_a_new_assembly_is_read_as_it_is(tmp_path):
+    folder = tmp_path / "joint"
+    result = run_command("new", "assembly", folder)
+    assert result.returncode == 0
+    assert "jointfrf identify TEST.uff --model" in result.stdout
+    assert "AssemblyKeys" in json.loads((folder / "assembly.schema.json").read_text())["$ref"]
+    # What stands in comments, too, is read: keys and values are known.
+    text = (folder / "assembly.toml").read_text()
+    assert read_assembly_file(folder / "assembly.toml").joint.dofs == ("y", "theta_z")
+    files = re.sub(r"(?m)^# ?", "", text[text.index("# [B]") : text.index("[[joint.law]]")])
+    own = text[: text.index("[B]   ")] + files + text[text.index("[[joint.law]]") :]
+    (folder / "files.toml").write_text(own)
+    assert read_assembly_file(folder / "files.toml").keys.B.units == "mm-t-s"
+    # A simulated test of it gives its joint.
+    truth = read_assembly_file(folder / "assembly.toml")
+    freq = np.arange(10.0, 600.0, 4.0)
+    laws = jf.LawJoint({"y": jf.SpringLaw(4e5, c=8.0), "theta_z": jf.SpringLaw(2e3, c=0.4)})
+    whole = replace(truth.assembly(freq, truth.parts(freq), ["A/7:y"]), joint=laws)
+    h = jf.pollute(whole.receptance(freq, ["A/7:y", "A/10:y", "B/10:y"], ["A/7:y"]), 0.02, seed=4)
+    channels = [jf.io.Channel(i, "+y") for i in (1, 2, 3)]
+    write_frfs(tmp_path / "test.npz", jf.io.FrfSet(freq, channels, channels[:1], h, "receptance"))
+    result = run(tmp_path / "test.npz", "--model", folder / "assembly.toml", "--json")
+    found = json.loads(result.stdout)["fits"][0]["parameters"]
+    assert found["k_y"]["value"] == pytest.approx(4e5, rel=0.03)
+    assert found["k_theta_z"]["value"] == pytest.approx(2e3, rel=0.05)
+    assert run_command("new", "assembly", folder).returncode == 2
+    assert json.loads(run_command("new", "assembly", "--schema").stdout)["$defs"]

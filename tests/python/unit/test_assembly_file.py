@@ -390,3 +390,71 @@ def test_the_schema_knows_what_the_reader_knows(tmp_path):
     assert set(defined["AssemblyKeys"]["required"]) == {"A", "B", "joint"}
     assert {"masses", "joint", "unknown"} <= set(defined["ChainPart"]["properties"])
     json.dumps(schema)
+
+
+BEAMS = """[A]
+model = "beam"
+length = 0.3
+elements = 6
+youngs_modulus = 67e9
+density = 2700.0
+width = 0.025
+height = 0.006
+joint = ["@0.3,0,0:y", "7:theta"]
+
+[B]
+model = "beam"
+length = 0.2
+elements = 4
+youngs_modulus = 67e9
+density = 2700.0
+width = 0.025
+height = 0.006
+joint = ["1:y", "1:theta"]
+
+[[joint.law]]
+dof = "y"
+law = "spring"
+
+[[joint.law]]
+dof = "theta"
+law = "spring"
+
+[channels]
+"11:+x" = "A/@0.102,0.001,0:y"
+"22:-x" = "B/@(0.2, 0, 0):y"
+
+[[mass]]
+dofs = ["B/@0.2,0,0:y"]
+mass = 0.003
+
+[[ground]]
+dof = "A/@0,0,0:theta"
+stiffness = 10.0
+
+[force_gains]
+"A/@0.1,0,0:y" = 0.02
+"""
+
+
+def test_dofs_by_position_are_the_nearest_nodes_and_said(tmp_path, frfs):
+    measured = jf.measured_assembly(written(tmp_path, BEAMS), frfs)
+    assert (measured.responses, measured.forces) == (("A/3:y", "B/5:y"), ("A/3:y",))
+    assert measured.assembly.a.joint == ("7:y", "7:theta")
+    assert [one.places for one in measured.assembly.attachments] == [("B/5:y",), ("A/1:theta",)]
+    assert list(measured.force_gains) == ["A/3:y"]
+    assert "A/@0.102,0.001,0:y is A/3:y, 2.24 mm away" in measured.located
+
+
+@pytest.mark.parametrize(
+    ("dof", "message"),
+    [
+        ("A/@102,0,0:y", r"the nearest node is 102 m away, and the part is 0.3 m long: is it in m\?"),
+        ("A/@0.1,0:y", r"must be a position and a direction, @x,y,z:y in m"),
+        ("A/@0.1,nan,0:y", r"must be a position and a direction"),
+        ("A/@0.1,0,0:z", r"no node whose place is known has a DOF z"),
+    ],
+)
+def test_positions_where_nothing_is(tmp_path, frfs, dof, message):
+    with pytest.raises(FileContentError, match=f"channels: .*{message}"):
+        jf.measured_assembly(written(tmp_path, BEAMS.replace("A/@0.102,0.001,0:y", dof)), frfs)

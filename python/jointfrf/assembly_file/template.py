@@ -1,0 +1,70 @@
+"""`assembly.toml` to begin with."""
+
+from __future__ import annotations
+
+__all__ = ["TEMPLATE"]
+
+#: Two parts of beams, a joint, a sensor; how parts of files of an FE program are written, in comments.
+TEMPLATE = """\
+#:schema ./assembly.schema.json
+# Two parts, the joint between them, what is unknown, and which channel of a test is which DOF. SI units.
+# All keys: docs/assembly-keys.md. Then: jointfrf identify TEST.uff --model assembly.toml
+
+[A]                                 # side j of the joint
+model = "beam"                      # or chain, brick-beam, matrices, receptances
+length = 0.3                        # m
+elements = 12
+ends = ["clamped", "free"]
+youngs_modulus = 70e9               # N/m^2
+density = 2700.0                    # kg/m^3
+width = 0.025                       # m
+height = 0.006                      # m, in the plane of bending
+loss_factor = 0.005
+joint = ["13:y", "13:theta"]        # its DOFs at the joint, in the order of those of the joint
+unknown = { youngs_modulus = 0.02 } # known to 2 %; fitted with the joint
+
+[B]                                 # side k
+model = "beam"
+length = 0.225
+elements = 9
+youngs_modulus = 70e9
+density = 2700.0
+width = 0.025
+height = 0.006
+loss_factor = 0.005
+joint = ["1:y", "1:theta"]
+
+# A part of a finite-element program, here of CalculiX (*FREQUENCY, SOLVER=MATRIXSTORAGE):
+#
+# [B]
+# model = "matrices"
+# stiffness = "b.sti"               # or Abaqus .mtx, Nastran .pch .op2 .op4, Ansys .full, .mtx, .npz
+# mass = "b.mas"
+# nodes = "b.inp"                   # where the nodes are
+# units = "mm-t-s"                  # of these files
+# loss_factor = 0.005
+# joint = ["bolt:y", "bolt:theta_z"]
+#
+# [[B.point]]                       # a reference point of the nodes around the bolt
+# name = "bolt"
+# set = "BOLT"                      # *NSET of b.inp; or nodes = [11, 12, 13], or box = [x, y, z, x, y, z]
+# coupling = "distributing"         # RBE3; or "rigid", RBE2
+
+[[joint.law]]
+dof = "y"
+law = "spring"                      # or standard-linear-solid, fractional-zener, power, rigid
+
+[[joint.law]]
+dof = "theta_z"
+law = "spring"
+
+[channels]                          # channel of the file = DOF; -y where it points the other way
+"1:+y" = "A/7:y"
+"2:+y" = "A/@0.225,0,0:y"           # the nearest node to a position, m
+"3:+y" = "B/10:y"
+
+[[mass]]                            # a sensor
+dofs = ["B/10:y"]
+mass = 0.003                        # kg
+unknown = 0.2                       # known to 20 %
+"""
