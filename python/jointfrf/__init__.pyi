@@ -75,8 +75,12 @@ from jointfrf.models.model import Model, assemble, chain
 from jointfrf.models.receptance import ReceptanceInfo, receptance
 from jointfrf.parallel.pool import BrokenPoolError
 from jointfrf.parallel.sweep import SweepPlan, plan_sweep, sweep
+from jointfrf.pooling.parameter import PooledParameter
+from jointfrf.pooling.pool import Pool, pool
+from jointfrf.pooling.transfer import Transfer, transfer
 from jointfrf.report.fit import plot
 from jointfrf.report.fit_page import write_report
+from jointfrf.report.pool_page import write_pool
 from jointfrf.solids.bolted_lap import (
     PROOF_STRENGTH,
     STRESS_AREA,
@@ -161,6 +165,8 @@ __all__ = [
     "NoiseModel",
     "ParameterSummary",
     "Patch",
+    "Pool",
+    "PooledParameter",
     "PowerLaw",
     "PreloadedLap",
     "ReceptanceInfo",
@@ -174,6 +180,7 @@ __all__ = [
     "StudyResult",
     "Substructure",
     "SweepPlan",
+    "Transfer",
     "Unknown",
     "VirtualPoint",
     "amplitude_error",
@@ -233,6 +240,7 @@ __all__ = [
     "plan_sweep",
     "plot",
     "pollute",
+    "pool",
     "preload",
     "preload_force",
     "propose_bands",
@@ -253,11 +261,13 @@ __all__ = [
     "solve",
     "study",
     "sweep",
+    "transfer",
     "transform",
     "use_engine",
     "virtual_interface",
     "virtual_point",
     "virtual_points",
     "write_joint",
+    "write_pool",
     "write_report",
 ]

@@ -23,6 +23,7 @@ COMMANDS = {
     "couple": "FRFs of the assembly of two substructures and a joint",
     "decouple": "a joint from FRFs of the assembly away from it and of both substructures",
     "frf": "receptances of a model",
+    "pool": "fits of one joint in several assemblies: mean, spread, the next assembly",
     "run": "run cases: tables, figures and a report each",
     "cases": "list the cases that come with jointfrf",
     "new": "the files of a new case, with a comment beside each key",

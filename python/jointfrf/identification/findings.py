@@ -17,11 +17,13 @@ FitFindingKind = Literal[
     "correlation",  # parameters, or lines, that are not independent
     "cross terms",
     "direction",  # a combination of parameters that the FRFs do not determine
+    "factor",  # what a parameter depends on from one fit to the next
     "groups",  # DOFs between which FRFs are zero
     "left out",  # lines, or DOFs, that were not used
     "model",  # errors of models that none of their unknowns describes
     "noise",
     "open",  # a parameter that may be infinite or zero
+    "outlying",  # a fit that does not belong to the others
     "poor",  # a parameter with a wide interval
     "prior",
     "reference point",

@@ -342,7 +342,8 @@ def _draw_intervals(ax: Any, panel: Panel) -> None:
     middle = np.array([i.median for i in panel.intervals])
     spread = np.array([[i.median - i.low for i in panel.intervals], [i.high - i.median for i in panel.intervals]])
     colour = STYLES["ismm"].colour
-    ax.errorbar(middle, places, xerr=spread, fmt="o", color=colour, ms=4, capsize=3, lw=1.3, label="median, 2.5-97.5 %")
+    label = ", ".join(panel.interval_names).replace(" to ", "-")
+    ax.errorbar(middle, places, xerr=spread, fmt="o", color=colour, ms=4, capsize=3, lw=1.3, label=label)
     known = [(i.published, place) for i, place in zip(panel.intervals, places, strict=True) if i.published is not None]
     if known:
         ax.plot(*zip(*known, strict=True), "D", color="#e07b00", mec="black", mew=0.6, ms=5, label="thesis")

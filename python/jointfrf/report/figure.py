@@ -94,8 +94,8 @@ class Panel:
 
     Labels are "quantity, unit". An empty `x_label` leaves out the numbers, too: the panel below shares them.
     `shades` are (label, bands) in Hz; `strips` are bands drawn as bars at the bottom. `y_step` is the distance of the
-    numbers along y, where it is not to be chosen; `height` is relative to that of other panels. A panel that holds
-    nothing is left blank.
+    numbers along y, where it is not to be chosen; `height` is relative to that of other panels; `interval_names` are
+    what the middle and the limits of intervals are. A panel that holds nothing is left blank.
     """
 
     title: str
@@ -114,6 +114,7 @@ class Panel:
     surface: Surface | None = None
     y_step: float | None = None
     height: float = 1.0
+    interval_names: tuple[str, str] = ("median", "2.5 to 97.5 %")
 
     @property
     def is_blank(self) -> bool:
@@ -167,8 +168,9 @@ def _panel_rows(panel: Panel) -> Iterator[tuple[object, ...]]:
     yield from ((level.label, "", level.value, "") for level in panel.levels)
     for interval in panel.intervals:
         label = interval.label.replace("\n", ", ")
-        yield f"{label}: median", "", interval.median, ""
-        yield f"{label}: 2.5 to 97.5 %", "", interval.low, interval.high
+        middle, limits = panel.interval_names
+        yield f"{label}: {middle}", "", interval.median, ""
+        yield f"{label}: {limits}", "", interval.low, interval.high
         if interval.published is not None:
             yield f"{label}: thesis", "", interval.published, ""
     if panel.surface is not None:

@@ -24,7 +24,7 @@ FLOORS = (
     {"laws"},
     {"substructuring", "models"},
     {"identification"},
-    {"solids"},
+    {"solids", "pooling"},
     {"report"},
     {"cases"},
     {"studies", "assembly_file"},
