@@ -76,7 +76,7 @@ from jointfrf.models.receptance import ReceptanceInfo, receptance
 from jointfrf.parallel.pool import BrokenPoolError
 from jointfrf.parallel.sweep import SweepPlan, plan_sweep, sweep
 from jointfrf.pooling.parameter import PooledParameter
-from jointfrf.pooling.pool import Pool, pool
+from jointfrf.pooling.pool import PooledFits, pool
 from jointfrf.pooling.transfer import Transfer, transfer
 from jointfrf.report.fit import plot
 from jointfrf.report.fit_page import write_report
@@ -165,7 +165,7 @@ __all__ = [
     "NoiseModel",
     "ParameterSummary",
     "Patch",
-    "Pool",
+    "PooledFits",
     "PooledParameter",
     "PowerLaw",
     "PreloadedLap",

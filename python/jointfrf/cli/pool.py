@@ -15,7 +15,7 @@ from jointfrf.files import write_file
 from jointfrf.identification.record import load
 from jointfrf.identification.result import Fit
 from jointfrf.io.csv_file import read_text_table
-from jointfrf.pooling.pool import Pool, pool
+from jointfrf.pooling.pool import PooledFits, pool
 from jointfrf.pooling.transfer import Transfer, transfer
 from jointfrf.report.pool_page import pool_csv, write_pool
 from jointfrf.spelling import did_you_mean
@@ -154,7 +154,7 @@ def _of_table(path: Path) -> tuple[list[Path], list[str], dict[str, Sequence[str
 
 def _pooled(
     args: argparse.Namespace, fits: Sequence[Fit], labels: Sequence[str], factors: Mapping[str, Sequence[str]]
-) -> Pool:
+) -> PooledFits:
     shared = dict(args.common or ())
     common: Any = shared.get("", 0.0) if set(shared) <= {""} else shared
     if isinstance(common, dict) and "" in common:

@@ -15,7 +15,7 @@ from jointfrf.identification.findings import Finding, note, warn
 from jointfrf.kernel.arguments import FloatArray, one_line
 from jointfrf.pooling.random_effects import RandomEffects
 
-__all__ = ["Estimate", "PooledParameter", "Spread", "TestPlan", "Trend", "pooled_parameter", "shown_chance"]
+__all__ = ["Estimate", "FactorSpread", "FactorTrend", "PooledParameter", "TestPlan", "pooled_parameter", "shown_chance"]
 
 #: A parameter within this many standard errors of zero in some fit has no logarithm worth averaging.
 _FROM_ZERO = 2.0
@@ -41,7 +41,7 @@ class Estimate:
 
 
 @dataclass(frozen=True)
-class Spread:
+class FactorSpread:
     """Scatter of a parameter over one factor, beyond the errors of the fits.
 
     Attributes
@@ -66,7 +66,7 @@ class Spread:
 
 
 @dataclass(frozen=True)
-class Trend:
+class FactorTrend:
     """Change of a parameter with a number such as the torque.
 
     Attributes
@@ -98,9 +98,9 @@ class PooledParameter:
         With the interval of the mean of all such assemblies.
     next_one : Estimate
         With the interval in which another assembly of the same kind lies, at the mean of each trend.
-    spreads : tuple of Spread
+    spreads : tuple of FactorSpread
         Of each factor; what no factor explains comes last.
-    trends : tuple of Trend
+    trends : tuple of FactorTrend
     labels : tuple of str
         Of the fits that have this parameter.
     estimates : tuple of Estimate
@@ -114,8 +114,8 @@ class PooledParameter:
     scale: Literal["log", "linear"]
     mean: Estimate
     next_one: Estimate
-    spreads: tuple[Spread, ...]
-    trends: tuple[Trend, ...]
+    spreads: tuple[FactorSpread, ...]
+    trends: tuple[FactorTrend, ...]
     labels: tuple[str, ...]
     estimates: tuple[Estimate, ...]
     outlying: tuple[str, ...]
@@ -232,7 +232,7 @@ def _mean_and_next(
     return tuple(Estimate(middle, *map(back, one.interval(probability))) for one in (mean, ahead))  # type: ignore[return-value]
 
 
-def _spreads(effects: RandomEffects, names: Sequence[str], probability: float) -> tuple[Spread, ...]:
+def _spreads(effects: RandomEffects, names: Sequence[str], probability: float) -> tuple[FactorSpread, ...]:
     tails = ((1 - probability) / 2, (1 + probability) / 2)
     found = []
     for component, name in enumerate((_REPEAT if ASSEMBLY in names else ASSEMBLY, *names)):
@@ -241,16 +241,16 @@ def _spreads(effects: RandomEffects, names: Sequence[str], probability: float) -
         value = math.sqrt(effects.reml[component])
         value = value if value > _NOTHING * high else 0.0
         chance = effects.chance_of_no_spread(component)
-        found.append(Spread(name, levels, value, low, high, chance))
+        found.append(FactorSpread(name, levels, value, low, high, chance))
     return (*found[1:], found[0])
 
 
-def _trends(effects: RandomEffects, names: Sequence[str], probability: float) -> tuple[Trend, ...]:
+def _trends(effects: RandomEffects, names: Sequence[str], probability: float) -> tuple[FactorTrend, ...]:
     found = []
     for column, name in enumerate(names, 1):
         slope = effects.combination(np.eye(effects.design.shape[1])[column])
         below = slope.below(0.0)
-        found.append(Trend(name, slope.quantile(0.5), *slope.interval(probability), 2 * min(below, 1 - below)))
+        found.append(FactorTrend(name, slope.quantile(0.5), *slope.interval(probability), 2 * min(below, 1 - below)))
     return tuple(found)
 
 

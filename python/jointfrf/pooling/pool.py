@@ -15,14 +15,14 @@ from jointfrf.kernel.arguments import FloatArray, check_type, one_line
 from jointfrf.pooling.parameter import ASSEMBLY, Estimate, PooledParameter, TestPlan, pooled_parameter, shown_chance
 from jointfrf.spelling import did_you_mean
 
-__all__ = ["Pool", "pool"]
+__all__ = ["PooledFits", "pool"]
 
 #: Labels, or numbers, of the group of each fit.
 Factors = Mapping[str, Sequence[str | float]]
 
 
 @dataclass(frozen=True)
-class Pool:
+class PooledFits:
     """What several fits of one joint say together; `print` shows it.
 
     Attributes
@@ -87,7 +87,7 @@ def pool(
     common: Mapping[str, float] | float = 0.0,
     parameters: Sequence[str] | None = None,
     probability: float = 0.95,
-) -> Pool:
+) -> PooledFits:
     """Pool fits of the same joint: mean, spread between assemblies, and the interval of the next assembly.
 
     Parameters
@@ -111,7 +111,7 @@ def pool(
 
     Returns
     -------
-    Pool
+    PooledFits
 
     Raises
     ------
@@ -162,7 +162,7 @@ def pool(
         if parameter is not None:
             pooled[name] = parameter
     findings.sort(key=lambda one: one.severity != "warning")
-    return Pool(plan.labels, pooled, probability, tuple(findings))
+    return PooledFits(plan.labels, pooled, probability, tuple(findings))
 
 
 def _estimates(fit: Fit) -> dict[str, tuple[str, Estimate]]:

@@ -11,4 +11,5 @@ document     one self-contained HTML page from sentences, tables, figures and te
 fit          figures of an identification and of where its information lies; its files
 fit_frfs     measured FRFs against those regenerated with the joint
 fit_page     the report of an identification
+pool_page    fits of one joint in several assemblies: forest plots, a page
 """

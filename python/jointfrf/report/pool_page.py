@@ -9,8 +9,8 @@ from pathlib import Path
 
 from jointfrf.files import write_file
 from jointfrf.kernel.arguments import check_type
-from jointfrf.pooling.parameter import Estimate, PooledParameter, Spread, Trend
-from jointfrf.pooling.pool import Pool
+from jointfrf.pooling.parameter import Estimate, FactorSpread, FactorTrend, PooledParameter
+from jointfrf.pooling.pool import PooledFits
 from jointfrf.report.document import Document, Listing, Part, Picture, Section, Words, make_document
 from jointfrf.report.draw import draw
 from jointfrf.report.figure import Figure, Interval, Level, Panel
@@ -40,12 +40,12 @@ def _row_name(label: str, one: PooledParameter) -> str:
     return f"{label} (outlying)" if label in one.outlying else label
 
 
-def write_pool(pooled: Pool, path: Path | str, *, command: str = "") -> Path:
+def write_pool(pooled: PooledFits, path: Path | str, *, command: str = "") -> Path:
     """Write a page on pooled fits: one HTML file, no link to another.
 
     Parameters
     ----------
-    pooled : Pool
+    pooled : PooledFits
     path : Path or str
         In a folder that exists.
     command : str
@@ -63,12 +63,12 @@ def write_pool(pooled: Pool, path: Path | str, *, command: str = "") -> Path:
     OSError
         The file cannot be written.
     """
-    check_type("pooled", pooled, Pool)
+    check_type("pooled", pooled, PooledFits)
     write_file(Path(path), make_document(_document(pooled, command)))
     return Path(path)
 
 
-def _document(pooled: Pool, command: str) -> Document:
+def _document(pooled: PooledFits, command: str) -> Document:
     figures = [forest_figure(one, pooled.probability) for one in pooled.parameters.values()]
     sections = [
         Section("summary", "Summary", [Words(list(_sentences(pooled))), *_said(pooled)]),
@@ -81,14 +81,14 @@ def _document(pooled: Pool, command: str) -> Document:
     return Document(f"A joint from {len(pooled.labels)} fits", about, [one for one in kept if one.parts])
 
 
-def _said(pooled: Pool) -> Iterator[Part]:
+def _said(pooled: PooledFits) -> Iterator[Part]:
     if pooled.warnings:
         yield Words(pooled.warnings, "warnings")
     if pooled.notes:
         yield Words(pooled.notes, "notes")
 
 
-def _sentences(pooled: Pool) -> Iterator[str]:
+def _sentences(pooled: PooledFits) -> Iterator[str]:
     percent = f"{100 * pooled.probability:g} %"
     for one in pooled.parameters.values():
         spread = "; ".join(f"over {own.factor} {_spread(one, own.value)}" for own in one.spreads)
@@ -103,7 +103,7 @@ def _spread(one: PooledParameter, value: float) -> str:
     return f"{100 * value:.2g} %" if one.scale == "log" else f"{value:.2g} {one.unit}"
 
 
-def _mean_table(pooled: Pool) -> Table:
+def _mean_table(pooled: PooledFits) -> Table:
     rows = tuple(
         (one.name, one.unit, one.mean.value, one.mean.low, one.mean.high, one.next_one.low, one.next_one.high,
          len(one.labels)) for one in pooled.parameters.values()
@@ -112,7 +112,7 @@ def _mean_table(pooled: Pool) -> Table:
     return Table("means", "Means, and the next assembly", columns, rows)
 
 
-def _spread_table(pooled: Pool) -> Table:
+def _spread_table(pooled: PooledFits) -> Table:
     rows = tuple(
         (one.name, own.factor, own.levels, _spread(one, own.value), _spread(one, own.low), _spread(one, own.high),
          own.p_value) for one in pooled.parameters.values() for own in one.spreads
@@ -121,7 +121,7 @@ def _spread_table(pooled: Pool) -> Table:
     return Table("spreads", "Spread beyond the errors of the fits (REML)", columns, rows)
 
 
-def _trend_table(pooled: Pool) -> Table:
+def _trend_table(pooled: PooledFits) -> Table:
     rows = tuple(
         (one.name, own.factor, "exponent" if one.scale == "log" else f"{one.unit} by unit", own.value, own.low,
          own.high, own.p_value) for one in pooled.parameters.values() for own in one.trends
@@ -129,13 +129,13 @@ def _trend_table(pooled: Pool) -> Table:
     return Table("trends", "Changes with a number", ("parameter", "factor", "as", "change", "from", "to", "p"), rows)
 
 
-def pool_csv(pooled: Pool) -> str:
+def pool_csv(pooled: PooledFits) -> str:
     """Write a line for each fit, the mean, the next assembly, spreads and trends of each parameter."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(("parameter", "unit", "what", "of", "value", "low", "high", "p"))
     for one in pooled.parameters.values():
-        lines: list[tuple[str, str, Estimate | Spread | Trend, object]] = [
+        lines: list[tuple[str, str, Estimate | FactorSpread | FactorTrend, object]] = [
             *(("fit", label, own, "") for label, own in zip(one.labels, one.estimates, strict=True)),
             ("mean", "", one.mean, ""), ("next assembly", "", one.next_one, ""),
             *(("spread", own.factor, own, own.p_value) for own in one.spreads),
