@@ -1,7 +1,7 @@
 """Simulated round robins: how often the intervals of a pool hold. Prints the table of docs/accuracy.md.
 
 Each draw has truths that scatter by the spread in logarithms, and fits with relative errors around the error stated
-(log-normally spread by a half, as fits of different tests are). Draw number i has the seed i.
+(log-normally spread by a half, as fits of different tests are). Draw i of row r has the seed [r, i], both counted from 0.
 """
 
 import argparse
@@ -34,11 +34,11 @@ def round_robins() -> Iterator[RoundRobin]:
             yield RoundRobin(assemblies, tests, between, within, 0.02)
 
 
-def coverage(one: RoundRobin, draws: int) -> tuple[list[float], list[float]]:
+def coverage(one: RoundRobin, row: int, draws: int) -> tuple[list[float], list[float]]:
     """Return coverage of mean, spread between, and next assembly in percent; median widths of the first and last."""
     inside, widths = np.zeros(3), []
-    for seed in range(draws):
-        rng = np.random.default_rng(seed)
+    for draw in range(draws):
+        rng = np.random.default_rng([row, draw])
         codes = np.repeat(np.arange(one.assemblies), one.tests)
         errors = one.error * np.exp(rng.normal(0, 0.5, codes.size))
         values = rng.normal(0, one.between, one.assemblies)[codes] + rng.normal(0, one.within, codes.size)
@@ -63,8 +63,8 @@ def main() -> None:
     columns = "assemblies x tests | spread between, within, % | mean | spread | next assembly"
     print(f"| {columns} | half widths of mean, next, % |")
     print("|---|---|---|---|---|---|")
-    for one in round_robins():
-        (mean, spread, ahead), (of_mean, of_next) = coverage(one, draws)
+    for row, one in enumerate(round_robins()):
+        (mean, spread, ahead), (of_mean, of_next) = coverage(one, row, draws)
         print(f"| {one.assemblies} x {one.tests} | {100 * one.between:g}, {100 * one.within:g} | {mean:.1f} | "
               f"{spread:.1f} | {ahead:.1f} | {of_mean:.2g}, {of_next:.2g} |", flush=True)  # fmt: skip
 
