@@ -1,7 +1,7 @@
 """Simulated round robins: how often the intervals of a pool hold. Prints the table of docs/accuracy.md.
 
 Each draw has truths that scatter by the spread in logarithms, and fits with relative errors around the error stated
-(log-normally spread by a half, as fits of different tests are). Draw i of row r has the seed [r, i], both counted from 0.
+(log-normally spread by a half, as fits of different tests are). Draw i of row r, from 0, has the seed [r, i].
 """
 
 import argparse

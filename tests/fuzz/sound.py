@@ -175,6 +175,7 @@ def _identification(arrays: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     mean = {"freq_hz": freq, "measured": gamma, "dofs": ["x"], "bands": (1.0, 9.0)}
     first = c["first"].dynamic_stiffness(freq)
     found = jf.identify(freq, gamma, ["x"], noise=0.01)
+    again = jf.identify(freq, jf.pollute(c["gamma"], 0.01, seed=2), ["x"], noise=0.01)
     cross = jf.Joint([[6e5, 5e3], [5e3, 5e3]], dofs=["y", "rz"])
     return {
         "identify": fit,
@@ -191,6 +192,9 @@ def _identification(arrays: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
         "cards": {"fit": found, "program": "nastran", "nodes": [1, 2]},
         "plot": {"fit": found},
         "write_report": {"fit": found, "path": "fit.html"},
+        "pool": {"fits": [found, again], "common": 0.01, "parameters": ["k_x"], "probability": 0.9},
+        "transfer": {"fits": [found, again], "parameters": ["k_x"], "spread": 0.05},
+        "write_pool": {"pooled": jf.pool([found, again]), "path": "pool.html"},
         "identify_realisations": {"freq_hz": freq, "gammas": [gamma, gamma], "dofs": ["x"]},
         "identify_model": {
             "freq_hz": freq, "h": jf.pollute(c["whole"], 0.01, seed=2)[:, [0, 3]][:, :, [0, 3]], "assembly": assembly,

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from jointfrf.identification.findings import Finding
 from jointfrf.identification.result import Fit, columns_of
-from jointfrf.kernel.arguments import FloatArray, check_type, one_line
+from jointfrf.kernel.arguments import FloatArray, as_names, as_number, check_type, one_line
 from jointfrf.pooling.parameter import ASSEMBLY, Estimate, PooledParameter, TestPlan, pooled_parameter, shown_chance
 from jointfrf.spelling import did_you_mean
 
@@ -146,16 +146,18 @@ def pool(
     >>> print(f"the next assembly: {k.next_one.low:.0f} to {k.next_one.high:.0f} N/m")
     the next assembly: 1521 to 2750 N/m
     """
-    if not 0 < probability < 1:
+    if not 0 < as_number("probability", probability) < 1:
         raise ValueError(f"probability must lie between 0 and 1, not {probability}")
-    plan = _plan(fits, labels, factors or {}, tuple(trends), common, probability)
-    each = [_estimates(fit) for fit in fits]
+    chosen = None if parameters is None else as_names("parameters", parameters)
+    listed = as_fits("a pool", fits)
+    plan = _plan(as_labels(labels, len(listed)), factors, as_names("trends", trends), common, probability)
+    each = [_estimates(fit) for fit in listed]
     units = {name: own[0] for found in each for name, own in found.items()}
-    for name in parameters or ():
+    for name in chosen or ():
         if name not in units:
             raise ValueError(f"no fit has a parameter {one_line(name)}{did_you_mean(name, units)}")
     pooled, findings = dict[str, PooledParameter](), list[Finding]()
-    for name in units if parameters is None else dict.fromkeys(parameters):
+    for name in units if chosen is None else dict.fromkeys(chosen):
         found = [own[name][1] if name in own else None for own in each]
         parameter, own_findings = pooled_parameter(name, units[name], found, plan)
         findings += own_findings
@@ -173,40 +175,56 @@ def _estimates(fit: Fit) -> dict[str, tuple[str, Estimate]]:
     return found | {name: ("1", Estimate(eta.value, eta.low, eta.high)) for name, eta in fit.loss_factors.items()}
 
 
+def as_fits(what: str, fits: object) -> list[Fit]:
+    """Return fits, at least two, as a list; refuse what is none."""
+    if not isinstance(fits, Iterable) or isinstance(fits, str):
+        raise TypeError(f"fits must be a sequence of Fit, not {one_line(fits)}")
+    listed = list(fits)
+    for fit in listed:
+        check_type("fits", fit, Fit)
+    if len(listed) < 2:
+        raise ValueError(f"{what} needs at least two fits, not {len(listed)}")
+    return listed
+
+
+def as_labels(labels: object, count: int) -> tuple[str, ...]:
+    """Return a different name for each fit; "1", "2", ... by default."""
+    names = tuple(map(str, range(1, count + 1))) if labels is None else as_names("labels", labels)
+    if len(set(names)) != count or len(names) != count:
+        raise ValueError(f"labels must be {count} different names, one for each fit")
+    return names
+
+
 def _plan(
-    fits: Sequence[Fit],
-    labels: Sequence[str] | None,
-    factors: Factors,
+    labels: tuple[str, ...],
+    factors: Factors | None,
     trends: tuple[str, ...],
     common: Mapping[str, float] | float,
     probability: float,
 ) -> TestPlan:
     """Check what is said of the fits."""
-    count = len(fits)
-    if count < 2:
-        raise ValueError(f"a pool needs at least two fits, not {count}")
-    for fit in fits:
-        check_type("fits", fit, Fit)
-    names = tuple(map(str, labels or range(1, count + 1)))
-    if len(set(names)) != count or len(names) != count:
-        raise ValueError(f"labels must be {count} different names, one for each fit")
-    by_factor = dict(common) if isinstance(common, Mapping) else {}
+    count = len(labels)
+    factors = {} if factors is None else factors
+    check_type("factors", factors, Mapping)
+    by_factor = common if isinstance(common, Mapping) else {}
     for name in (*trends, *by_factor):
         if name not in factors:
             raise ValueError(f"there is no factor {one_line(name)}{did_you_mean(name, factors)}")
     codes = {name: _codes(name, own, count) for name, own in factors.items()}
-    shared = [(codes[name], float(own)) for name, own in by_factor.items()]
+    shared = [(codes[name], as_number("common", own)) for name, own in by_factor.items()]
     if not isinstance(common, Mapping):
-        shared.append((np.zeros(count, dtype=np.intp), float(common)))
+        shared.append((np.zeros(count, dtype=np.intp), as_number("common", common)))
     if any(not 0 <= own < math.inf for _, own in shared):
         raise ValueError("common must be a relative standard error, zero or more")
     numbers = {name: _numbers(name, factors[name]) for name in trends}
     groups = _random_factors({name: own for name, own in codes.items() if name not in trends}, count)
-    return TestPlan(names, groups, numbers, shared, probability)
+    return TestPlan(labels, groups, numbers, shared, probability)
 
 
 def _codes(name: str, own: Sequence[str | float], count: int) -> NDArray[np.intp]:
     """Return the number of the group of each fit."""
+    if not isinstance(own, Sequence | np.ndarray) or isinstance(own, str):
+        raise TypeError(f"factor {one_line(name)} must be a sequence of groups, not {one_line(own)}")
     if len(own) != count:
         raise ValueError(f"factor {one_line(name)} has {len(own)} groups for {count} fits")
     found: NDArray[np.intp] = np.unique([str(one) for one in own], return_inverse=True)[1]
@@ -218,7 +236,7 @@ def _codes(name: str, own: Sequence[str | float], count: int) -> NDArray[np.intp
 def _numbers(name: str, own: Sequence[str | float]) -> FloatArray:
     try:
         found = np.array([float(one) for one in own])
-    except ValueError:
+    except (TypeError, ValueError):
         raise ValueError(f"the trend over {one_line(name)} needs numbers, as 12.5") from None
     if not np.isfinite(found).all():
         raise ValueError(f"the trend over {one_line(name)} needs finite numbers")

@@ -9,7 +9,8 @@ import numpy as np
 from scipy.stats import chi2, norm
 
 from jointfrf.identification.result import Fit, columns_of
-from jointfrf.kernel.arguments import FloatArray, check_type, one_line
+from jointfrf.kernel.arguments import FloatArray, as_names, as_number, one_line
+from jointfrf.pooling.pool import as_fits, as_labels
 from jointfrf.spelling import did_you_mean
 
 __all__ = ["Difference", "Transfer", "transfer"]
@@ -124,19 +125,15 @@ def transfer(
     >>> jf.transfer(fits).p_value > 0.05
     True
     """
-    if len(fits) < 2:
-        raise ValueError(f"a transfer needs at least two fits, not {len(fits)}")
-    for fit in fits:
-        check_type("fits", fit, Fit)
-    shown = tuple(map(str, labels or range(1, len(fits) + 1)))
-    if len(shown) != len(fits):
-        raise ValueError(f"labels must be {len(fits)} names, one for each fit")
-    names = _names(fits, parameters)
-    own = dict(spread) if isinstance(spread, Mapping) else dict.fromkeys(names, float(spread))
+    listed = as_fits("a transfer", fits)
+    shown = as_labels(labels, len(listed))
+    names = _names(listed, None if parameters is None else as_names("parameters", parameters))
+    given = spread if isinstance(spread, Mapping) else dict.fromkeys(names, spread)
+    own = {name: as_number("spread", one) for name, one in given.items()}
     if any(not 0 <= one < np.inf for one in own.values()):
         raise ValueError("spread must be a relative standard deviation, zero or more")
     more = np.diag([own.get(name, 0.0) ** 2 for name in names])
-    values, covariances = zip(*(_logarithms(fit, names) for fit in fits), strict=True)
+    values, covariances = zip(*(_logarithms(fit, names) for fit in listed), strict=True)
     return _compared(shown, names, np.array(values), np.array(covariances) + more)
 
 
