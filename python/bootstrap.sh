@@ -3,7 +3,8 @@
 # .venv with the package installed editable. Does nothing when all is up to date.
 #
 #   sh python/bootstrap.sh run     what the cases need
-#   sh python/bootstrap.sh test    also what the tests need; a browser where the system has one to install
+#   sh python/bootstrap.sh test    also what the tests need; a browser, CalculiX and readers of files of Nastran and
+#                                  Ansys where there are such to install: without them their tests are skipped
 #
 # PYTHON names the interpreter for a new .venv, FC and CC the compilers.
 # Exit status: 3 when system packages are missing and may not be installed from here, 1 for any other failure.
@@ -21,6 +22,7 @@ venv=$root/.venv
 log=$root/build/set-up.log
 lock=$root/build/set-up.lock
 stamp=$venv/set-up
+readers=build/installed-readers.json
 # Folders of packages that cases and commands do not import.
 not_compiled='/(tests|fontTools|mesonbuild|pip|setuptools|pkg_resources)/'
 
@@ -106,6 +108,7 @@ package() {
     apt-get/python) echo python3 ;;
     apt-get/headers) echo "python$version-dev" ;;
     apt-get/venv) echo "python$version-venv" ;;
+    apt-get/calculix) echo calculix-ccx ;;
     apt-get/browser | dnf/browser | zypper/browser | pacman/browser) echo chromium ;;
     dnf/fortran | zypper/fortran | pacman/fortran) [ $manager = dnf ] && echo gcc-gfortran || echo gcc-fortran ;;
     dnf/c | zypper/c | pacman/c | brew/fortran | brew/c) echo gcc ;;
@@ -174,17 +177,20 @@ install_missing() {
   run_installation || fail "could not install the system packages"
 }
 
-# Tests of pages are skipped without a browser: one is installed where that is possible.
-offer_browser() {
-  for name in chromium chromium-browser google-chrome google-chrome-stable; do
-    command -v $name >/dev/null 2>&1 && return
+# Tests of pages are skipped without a browser, those of FE programs without CalculiX: both are installed where possible.
+# offer WHAT TESTS PROGRAM...
+offer() {
+  what=$1 tests=$2
+  shift 2
+  for name; do
+    command -v "$name" >/dev/null 2>&1 && return
   done
-  missing=' browser'
+  missing=" $what"
   if find_manager && [ "$manager" != brew ]; then
     plan_installation
-    may_install && run_installation && return
+    [ "$packages" ] && may_install && run_installation && return
   fi
-  say "no browser (chromium): tests of pages will be skipped"
+  say "no $what ($1): tests of $tests will be skipped"
 }
 
 # ---------------------------------------------------------------- one at a time
@@ -273,6 +279,16 @@ install_packages() {
   check_installed build/installed-run.json
   # A file that cannot be compiled is not for this version of Python, and is not imported.
   "$venv/bin/python" -m compileall -q -x "$not_compiled" "$venv"/lib*/python*/site-packages || :
+  [ "$1" = run ] || install_readers
+}
+
+# Wheels of pyYeti and ansys-mapdl-reader, for a few tests: large, and not there for every system. Not compiled ahead.
+install_readers() {
+  rm -f "$readers"
+  requirements nastran,ansys
+  (exec_pip_install "$readers" --only-binary :all: -r build/requirements-nastran,ansys.txt) &
+  trap 'kill $! 2>/dev/null; exit 1' TERM
+  if wait $!; then check_installed "$readers"; else rm -f "$readers"; fi
 }
 
 make_venv() {
@@ -291,7 +307,7 @@ make_venv() {
     fail "could not install what the build needs"
   check_installed build/installed.json
   # What the package only needs when it runs comes while the kernel is compiled.
-  install_packages >build/packages.log 2>&1 &
+  install_packages "$1" >build/packages.log 2>&1 &
   beside=$!
   (exec_pip_install build/installed-own.json --no-build-isolation --no-deps "--config-settings=setup-args=-Dinstruction_sets=$instruction_sets" -e .) \
     >>"$log" 2>&1 || fail "could not build the package"
@@ -301,7 +317,9 @@ make_venv() {
   cat build/packages.log >>"$log"
   [ $status = 0 ] || fail "could not install what the package needs"
   state >"$stamp.run"
-  if [ "$1" = test ]; then state >"$stamp.test"; fi
+  [ "$1" = test ] || return 0
+  [ -f "$readers" ] || say "no wheels of pyYeti and ansys-mapdl-reader: tests of files of Nastran and Ansys will be skipped"
+  state >"$stamp.test"
 }
 
 up_to_date "$1" && exit
@@ -320,5 +338,8 @@ if [ "$missing" ]; then
   find_missing
   [ -z "$missing" ] || fail "still missing after installation:$missing"
 fi
-if [ "$1" = test ]; then offer_browser; fi
+if [ "$1" = test ]; then
+  offer browser pages chromium chromium-browser google-chrome google-chrome-stable
+  offer calculix 'FE programs' ccx
+fi
 make_venv "$1"

@@ -90,42 +90,8 @@ class AssemblyPart:
     def of_keys(cls, keys: PartKeys, freq_hz: FloatArray) -> AssemblyPart:
         """Read the files of a part; FRFs must be available on these lines, Hz. Its joint DOFs are named by nodes."""
         part = cls(keys, keys.structure(freq_hz))
-        joint = tuple(keys.build(lambda dof=dof: part.named(dof).dof, "joint") for dof in keys.joint)  # type: ignore[misc]
+        joint = tuple(keys.build(lambda dof=dof: _named_dof(part, dof).dof, "joint") for dof in keys.joint)  # type: ignore[misc]
         return part if joint == keys.joint else cls(_changed(keys, joint=joint), part.structure)
-
-    def named(self, dof: str) -> NamedDof:
-        """Return a DOF by the name of its node: ``@0.3,0.006,0:y`` is that of the nearest node which has it.
-
-        Raises
-        ------
-        ValueError
-            A position that is none, or places of nodes that are not known; a node that is far away.
-        """
-        if not dof.startswith("@"):
-            return NamedDof(dof)
-        where, _, direction = dof[1:].rpartition(":")
-        try:
-            at = np.array([float(word) for word in where.strip("() ").split(",")])
-        except ValueError:
-            at = np.zeros(0)
-        if at.shape != (3,) or not np.isfinite(at).all():
-            raise ValueError(f"{dof} must be a position and a direction, @x,y,z:y in m")
-        held = {*self.structure.model.dofs} if isinstance(self.structure, ModelStructure) else None
-        nodes = {
-            node: place
-            for node, place in self.places.items()
-            if (f"{node}:{direction}" in held if held is not None else self.has(f"{node}:{direction}"))
-        }
-        if not nodes:
-            raise ValueError(f"{dof}: no node whose place is known has a DOF {direction}")
-        places = np.array(list(nodes.values()))
-        away = np.linalg.norm(places - at, axis=1)
-        nearest, size = int(np.argmin(away)), float(np.linalg.norm(np.ptp(places, axis=0)))
-        if away[nearest] > size / 2:
-            raise ValueError(
-                f"{dof}: the nearest node is {away[nearest]:.3g} m away, and the part is {size:.3g} m long: is it in m?"
-            )
-        return NamedDof(f"{list(nodes)[nearest]}:{direction}", float(away[nearest]))
 
     def has(self, dof: str) -> bool:
         """Whether there is a DOF of this name."""
@@ -211,6 +177,41 @@ class AssemblyPart:
         if name not in numbers and isinstance(prior, PriorKeys) and prior.mean is not None:
             raise table.wrong(name, "it is a factor of the matrices, about 1: leave mean out")
         return unknown_of(prior, numbers.get(name, 1.0), table, name, -np.inf if name == "poisson" else 0.0)
+
+
+def _named_dof(part: AssemblyPart, dof: str) -> NamedDof:
+    """Return a DOF by the name of its node: ``@0.3,0.006,0:y`` is that of the nearest node which has it.
+
+    Raises
+    ------
+    ValueError
+        A position that is none, or places of nodes that are not known; a node that is far away.
+    """
+    if not dof.startswith("@"):
+        return NamedDof(dof)
+    where, _, direction = dof[1:].rpartition(":")
+    try:
+        at = np.array([float(word) for word in where.strip("() ").split(",")])
+    except ValueError:
+        at = np.zeros(0)
+    if at.shape != (3,) or not np.isfinite(at).all():
+        raise ValueError(f"{dof} must be a position and a direction, @x,y,z:y in m")
+    held = {*part.structure.model.dofs} if isinstance(part.structure, ModelStructure) else None
+    nodes = {
+        node: place
+        for node, place in part.places.items()
+        if (f"{node}:{direction}" in held if held is not None else part.has(f"{node}:{direction}"))
+    }
+    if not nodes:
+        raise ValueError(f"{dof}: no node whose place is known has a DOF {direction}")
+    places = np.array(list(nodes.values()))
+    away = np.linalg.norm(places - at, axis=1)
+    nearest, size = int(np.argmin(away)), float(np.linalg.norm(np.ptp(places, axis=0)))
+    if away[nearest] > size / 2:
+        raise ValueError(
+            f"{dof}: the nearest node is {away[nearest]:.3g} m away, and the part is {size:.3g} m long: is it in m?"
+        )
+    return NamedDof(f"{list(nodes)[nearest]}:{direction}", float(away[nearest]))
 
 
 def read_part(path: Path | str) -> AssemblyPart:
@@ -349,7 +350,7 @@ class AssemblyFile:
             part = {"A/@": parts[0], "B/@": parts[1]}.get(dof[:3])
             if part is None:
                 return dof
-            found: NamedDof = keys.build(lambda: part.named(dof[2:]), key)
+            found: NamedDof = keys.build(lambda: _named_dof(part, dof[2:]), key)
             said[dof] = f"{dof} is {dof[:2]}{found.dof}, {1e3 * (found.away or 0.0):.3g} mm away"
             return dof[:2] + found.dof
 
