@@ -78,9 +78,10 @@ def test_a_wrong_channel_is_named(tmp_path):
     write_uff(tmp_path / "wrong.uff", noisy(replace(frfs, h=h)))
     result = run_command("check", tmp_path / "wrong.uff", *JOINT_WORDS)
     assert result.returncode == 1
-    (warning,) = [line for line in result.stdout.splitlines() if "is gone without 2" in line]
-    assert "is gone without 201:+z: look at its sign, direction, gain and place" in warning
-    assert "responses of side k" in warning
+    (error,) = [line for line in result.stdout.splitlines() if line.startswith(("error", "warning"))]
+    assert error.startswith("error: sign: response 201:+z moves against what is expected")
+    assert "the other 11 responses of side k move as one body" in error
+    assert error.endswith("turn its sign, or its direction")
     content = json.loads(run_command("check", tmp_path / "wrong.uff", *JOINT_WORDS, "--json").stdout)
     (guilty,) = [g for g in content["joint"]["agreement"] if (g["kind"], g["side"]) == ("response", "k")]
     assert guilty["channels"]["201:+z"]["blame"] > 0.9
