@@ -61,6 +61,7 @@ from jointfrf.identification.realisations import FitStart, identify_realisations
 from jointfrf.identification.record import fit_from_dict, fit_to_dict, load, save
 from jointfrf.identification.result import Fit, FittedParameter
 from jointfrf.identification.sensitivity import propose_bands, sensitivity
+from jointfrf.identification.validation import Validation, validate
 from jointfrf.joint import Joint
 from jointfrf.kernel.call import RCOND_LIMIT, get_engine, set_engine, use_engine
 from jointfrf.kernel.linear_algebra import invert, reciprocal_condition, solve
@@ -182,6 +183,7 @@ __all__ = [
     "SweepPlan",
     "Transfer",
     "Unknown",
+    "Validation",
     "VirtualPoint",
     "amplitude_error",
     "append_virtual_point",
@@ -264,6 +266,7 @@ __all__ = [
     "transfer",
     "transform",
     "use_engine",
+    "validate",
     "virtual_interface",
     "virtual_point",
     "virtual_points",

@@ -52,6 +52,8 @@ def _sound_lines(folder: Path) -> dict[str, list[str]]:
                    "--renumber-b", "100", "--output", at + "whole.uff"],
         "decouple": [at + "side.uff", at + "side.uff", at + "whole.uff", "--equation", "rs", "--j", "3", "--k", "1",
                      "--dofs", "x", "--r", "1:x", "--s", "2:x", "--renumber-b", "100"],
+        "validate": [at + "side.uff", at + "side.uff", at + "whole.uff", "--joint", at + "joint.toml", "--j", "3",
+                     "--k", "1", "--renumber-b", "100", "--output", at + "made.uff"],
         "identify": [at + "whole.uff", "--j", "3", "--k", "101", "--dofs", "x", "--save", at + "fit.json"],
         "export": [at + "joint.toml", "nastran:1,2"],
         "study": ["3.1", "--estimator", "ismm", "--factor", "noise=0.01,0.05", "--out", at + "study"],

@@ -57,6 +57,11 @@ def _arrays() -> dict[str, dict[str, Any]]:
             "h_a": c["h_a"], "h_b": c["h_b"], "k_joint": jf.LawJoint({"x": jf.PowerLaw(2e3, 1e2, 0.5)}), "dofs_a": [1],
             "dofs_b": [0], "freq_hz": c["freq"],
         },
+        "validate": {
+            "freq_hz": c["freq"], "measured": c["gamma"], "h_a": c["h_a"], "h_b": c["h_b"], "joint": c["joint"],
+            "dofs_a": [1], "dofs_b": [0], "outputs": [1, 2], "inputs": [1, 2], "band": (1.0, 9.0),
+            "responses": ["a", "b"], "forces": ["a", "b"],
+        },
         "modify": {"alpha": lines, "d": lines[:, :2, :2], "dofs": [1, 2], **out},
         "find_modification": {"alpha": lines, "gamma": lines + np.eye(4), **out},
         "ismm": {"alpha": c["alpha"], "gamma": c["gamma"], "k_initial": k0, "freq_hz": c["freq"]},

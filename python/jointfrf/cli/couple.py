@@ -30,7 +30,7 @@ from jointfrf.joint import Joint
 from jointfrf.laws.law_joint import LawJoint
 from jointfrf.substructuring.coupling import couple
 
-__all__ = ["add_arguments", "joint_channels_of", "renumbered", "run", "shifted"]
+__all__ = ["add_arguments", "add_joint_arguments", "coupled", "joint_channels_of", "renumbered", "run", "shifted"]
 
 
 def add_arguments(parser: CommandParser) -> None:
@@ -42,15 +42,20 @@ def add_arguments(parser: CommandParser) -> None:
     )
     parser.add_argument("a", type=Path, metavar="A", help="substructure A: file of FRFs, or model (.toml)")
     parser.add_argument("b", type=Path, metavar="B", help="substructure B")
+    add_joint_arguments(parser)
+    parser.option("--output FILE", f"file to write: {format_names(written=True)}", Path)
+    add_line_arguments(parser)
+    add_quantity_arguments(parser)
+
+
+def add_joint_arguments(parser: CommandParser) -> None:
+    """Describe the joint, and where it is in its parts."""
     parser.option("--joint FILE", "the joint: .json or .toml", Path)
     parser.option("--j NODES", "node of A at the joint, which has its DOFs; or, with --at, nodes around it", nodes)
     parser.option("--k NODES", "node or nodes of B", nodes)
     parser.option("--at X,Y,Z", "reference point of virtual points, m", point)
     parser.option("--renumber-b N", "add N to the nodes of B, where both have the same", int, 0)
     parser.option("--shift-b X,Y,Z", "add this to the coordinates of B, m", point, (0.0, 0.0, 0.0))
-    parser.option("--output FILE", f"file to write: {format_names(written=True)}", Path)
-    add_line_arguments(parser)
-    add_quantity_arguments(parser)
 
 
 def renumbered(frfs: FrfSet, add: int, shift: Sequence[float] = (0.0, 0.0, 0.0)) -> FrfSet:
@@ -88,7 +93,7 @@ def run(args: argparse.Namespace) -> int:
     b = renumbered(b, args.renumber_b, args.shift_b)
     k_side = shifted(args.k, args.renumber_b)
     with waiting("coupling"):
-        assembly = _coupled(a, b, found.joint, (args.j, k_side), args.at)
+        assembly = coupled(a, b, found.joint, (args.j, k_side), args.at)
     write_frfs(args.output, assembly)
     out.say(assembly.summary(), f"wrote {args.output}")
     out.give(
@@ -112,7 +117,7 @@ def _numbers(joint: Joint | LawJoint) -> dict[str, object]:
     return {"parameters": {one.name: one.value for one in joint.quantities}, "rigid": list(joint.rigid)}
 
 
-def _coupled(
+def coupled(
     a: FrfSet, b: FrfSet, joint: Joint | LawJoint, sides: tuple[Nodes, Nodes], at: tuple[float, ...] | None
 ) -> FrfSet:
     """Return the FRFs of the assembly at all channels of both."""

@@ -21,6 +21,7 @@ COMMANDS = {
     "convert": "measured FRFs of one file or several into another format",
     "export": "a saved joint as input of a finite-element program",
     "couple": "FRFs of the assembly of two substructures and a joint",
+    "validate": "a joint found: the assembly that it makes of its parts, or of others, beside the measured one",
     "decouple": "a joint from FRFs of the assembly away from it and of both substructures",
     "frf": "receptances of a model",
     "pool": "fits of one joint in several assemblies: mean, spread, the next assembly",

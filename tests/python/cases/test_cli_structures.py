@@ -209,3 +209,71 @@ def test_a_joint_by_hand_that_is_wrong(tmp_path, old, new, message):
     assert result.returncode in (1, 2)
     assert message in result.stderr
     assert len(result.stderr.splitlines()) == 1
+
+
+VALIDATE = ["validate", "a.toml", "b.uff", "c.npz", *COUPLE[3:]]
+
+
+def test_the_assembly_itself_is_validated_without_error():
+    content = json.loads(run_command(*VALIDATE, "--json").stdout)
+    assert max(content["largest"].values()) < 1e-9
+    assert content["responses"] == [str(channel) for channel in read_frfs("c.npz").responses]
+
+
+def test_a_wrong_joint_shows_in_every_error(tmp_path):
+    (tmp_path / "soft.toml").write_text(JOINT_TOML.replace("5e3", "5e2"))
+    words = [word if word != "joint.toml" else tmp_path / "soft.toml" for word in VALIDATE]
+    result = run_command(*words, "--band", "40:300", "--json", "--output", tmp_path / "made.npz")
+    content = json.loads(result.stdout)
+    measured, made = read_frfs("c.npz").select((40, 300)), read_frfs(tmp_path / "made.npz")
+    other = jf.Joint([6e5, 5e2], [20.0, 1.5], ["y", "theta_z"])
+    freq = made.freq_hz
+    tip = [A.dofs.index("5:y"), A.dofs.index("5:theta")]
+    h = jf.couple(A.receptance(freq), B.receptance(freq), other, tip, [0, 1], freq_hz=freq)
+    np.testing.assert_allclose(made.h, h, rtol=1e-8, atol=1e-16)
+    expected = [
+        [jf.amplitude_error(measured.h[:, i, j], h[:, i, j], freq, refine=True) for j in range(h.shape[2])]
+        for i in range(3)
+    ]
+    np.testing.assert_allclose(content["amplitude_error"][:3], expected, rtol=1e-6)
+    assert content["median"]["difference"] > 20
+    assert content["median"]["frequency_error"] > 1
+
+
+def test_a_joint_is_transferred_to_another_part(tmp_path):
+    longer = jf.beam(0.25, 3, **SECTION)
+    tip = [A.dofs.index("5:y"), A.dofs.index("5:theta")]
+    h = jf.couple(A.receptance(FREQ_HZ), longer.receptance(FREQ_HZ), JOINT, tip, [0, 1], freq_hz=FREQ_HZ)
+    h = jf.pollute(h, 0.01, seed=1)
+    n = h.shape[1]
+    # a test at two points of A and the end of B, of which one FRF is missing, and of a point that no part has
+    some = [0, 2, n - 2]
+    names = [jf.io.Channel(node, "y") for node in (2, 3, 104, 999)]
+    own = np.concatenate([h[:, some][:, :, some], np.ones((len(h), 1, 3))], axis=1)
+    own[:, 1, 2] = np.nan
+    jf.io.write_frfs(tmp_path / "test.npz", jf.io.FrfSet(FREQ_HZ, tuple(names), tuple(names[:3]), own))
+    (tmp_path / "long.toml").write_text(MODEL.format(length=0.25, elements=3, first="free"))
+    words = ["validate", "a.toml", tmp_path / "long.toml", tmp_path / "test.npz", *COUPLE[3:]]
+    result = run_command(*words)
+    assert result.returncode == 0, result.stderr
+    assert "regenerated beside measured: 8 FRFs, 20 to 400 Hz" in result.stdout
+    assert "not in the parts, and not compared: 999:+y" in result.stdout
+    content = json.loads(run_command(*words, "--json").stdout)
+    assert content["difference"][1][2] is None
+    assert 0.8 < content["median"]["difference"] < 1.2
+    assert content["median"]["amplitude_error"] < 3
+
+
+@pytest.mark.parametrize(
+    ("words", "status", "error"),
+    [
+        (VALIDATE[:4], 2, "--joint is missing"),
+        (["validate", "a.toml", "b.uff", "c.npz", *COUPLE[3:-1], "300"], 0, ""),
+        ([*VALIDATE, "--band", "1000:2000"], 1, "no frequency line"),
+        ([*VALIDATE, "--output", "none/x.npz"], 2, "there is no folder none"),
+    ],
+)
+def test_validate_says_what_is_wrong(words, status, error):
+    result = run_command(*words)
+    assert result.returncode == status
+    assert error in result.stderr

@@ -1,0 +1,93 @@
+"""`jointfrf validate`: a joint found, put between its parts or others, beside the measured assembly."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+
+from jointfrf.cli.couple import add_joint_arguments, coupled, renumbered, shifted
+from jointfrf.cli.frf import add_line_arguments, check_target, lines_of, read_structures
+from jointfrf.cli.measured_file import add_quantity_arguments
+from jointfrf.cli.parser import CommandParser
+from jointfrf.cli.usage import Output, UsageError, waiting
+from jointfrf.errors import FileContentError
+from jointfrf.frf.merge import merge_frfs
+from jointfrf.identification.joint_file import read_joint_file
+from jointfrf.identification.validation import compare_frfs
+from jointfrf.io import FrfSet, write_frfs
+from jointfrf.io.formats import format_names
+
+__all__ = ["add_arguments", "run"]
+
+
+def add_arguments(parser: CommandParser) -> None:
+    """Describe the arguments of the command."""
+    parser.description = (
+        "Regenerate an assembly with a joint found and compare it with the measured one, by channel: amplitude (4.11) "
+        "and frequency (4.12) of the largest peak in the band, and the difference over the band. Take channels that "
+        "the joint was not identified from; or other parts than those of the identification, to which the joint is "
+        "transferred, and a test of their assembly."
+    )
+    parser.add_argument("a", type=Path, metavar="A", help="substructure A: file of FRFs, or model (.toml)")
+    parser.add_argument("b", type=Path, metavar="B", help="substructure B")
+    parser.add_argument("measured", nargs="+", type=Path, metavar="FILE", help="measured FRFs of the assembly")
+    add_joint_arguments(parser)
+    parser.option("--output FILE", f"also write the regenerated FRFs: {format_names(written=True)}", Path)
+    add_line_arguments(parser)
+    add_quantity_arguments(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Carry out the command; the caller turns exceptions into messages."""
+    out = Output(args)
+    for name, value in (("--joint", args.joint), ("--j", args.j), ("--k", args.k)):
+        if value is None:
+            raise UsageError(f"{name} is missing: jointfrf validate A B FILE --joint FILE --j NODE --k NODE")
+    if args.output is not None:
+        check_target(args.output)
+    found = read_joint_file(args.joint)
+    options = {"quantity": args.quantity, "force_quantity": args.force_quantity}
+    a, b, *parts = read_structures([args.a, args.b, *args.measured], lines_of(args), **options)
+    measured = parts[0] if len(parts) == 1 else merge_frfs(parts)
+    if args.band is not None:
+        a, b, measured = (each.select(args.band) for each in (a, b, measured))
+    b = renumbered(b, args.renumber_b, args.shift_b)
+    with waiting("coupling"):
+        assembly = coupled(a, b, found.joint, (args.j, shifted(args.k, args.renumber_b)), args.at)
+    shared, unused = _shared(measured, assembly)
+    own = shared.matrix(shared.responses, shared.excitations, allow_missing=True)
+    made = assembly.matrix(shared.responses, shared.excitations)
+    names = [[str(channel) for channel in side] for side in (shared.responses, shared.excitations)]
+    check = compare_frfs(shared.freq_hz, own, made, *names)
+    out.say(check, *([f"not in the parts, and not compared: {', '.join(unused)}"] if unused else []))
+    written = []
+    if args.output is not None:
+        write_frfs(args.output, replace(shared, h=made, coherence=None, averages=None, source="regenerated"))
+        written.append(str(args.output))
+        out.say(f"wrote {args.output}")
+    files = {"a": str(args.a), "b": str(args.b), "joint": str(args.joint), "measured": [str(f) for f in args.measured]}
+    out.give({**files, **check.to_dict(), "unused": unused, "written": written})
+    return 0
+
+
+def _shared(measured: FrfSet, assembly: FrfSet) -> tuple[FrfSet, list[str]]:
+    """Return the measured FRFs of channels that the parts have, and the names of the others."""
+    known = {(c.node, c.axis) for c in assembly.responses}
+    sides = measured.responses, measured.excitations
+    rows, columns = ([i for i, c in enumerate(side) if (c.node, c.axis) in known] for side in sides)
+    unused = list(dict.fromkeys(str(c) for side in sides for c in side if (c.node, c.axis) not in known))
+    if not rows or not columns:
+        raise FileContentError(
+            f"{measured.source} and the parts share no {'response' if not rows else 'excitation'}: nodes of B are "
+            "renumbered by --renumber-b N"
+        )
+    own = replace(
+        measured,
+        responses=tuple(measured.responses[i] for i in rows),
+        excitations=tuple(measured.excitations[i] for i in columns),
+        h=measured.h[:, rows][:, :, columns],
+        coherence=None,
+        averages=None,
+    )
+    return own, unused
