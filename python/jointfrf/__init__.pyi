@@ -76,11 +76,15 @@ from jointfrf.models.model import Model, assemble, chain
 from jointfrf.models.receptance import ReceptanceInfo, receptance
 from jointfrf.parallel.pool import BrokenPoolError
 from jointfrf.parallel.sweep import SweepPlan, plan_sweep, sweep
+from jointfrf.planning.assemblies import assemblies_needed, expected_half_width
+from jointfrf.planning.joint_frfs import JointFrfPlan, plan_joint_frfs
+from jointfrf.planning.plan import MeasurementPlan, plan
 from jointfrf.pooling.parameter import PooledParameter
 from jointfrf.pooling.pool import PooledFits, pool
 from jointfrf.pooling.transfer import Transfer, transfer
 from jointfrf.report.fit import plot
 from jointfrf.report.fit_page import write_report
+from jointfrf.report.plan_page import write_plan
 from jointfrf.report.pool_page import write_pool
 from jointfrf.solids.bolted_lap import (
     PROOF_STRENGTH,
@@ -152,12 +156,14 @@ __all__ = [
     "Interface",
     "Joint",
     "JointChannels",
+    "JointFrfPlan",
     "JointLaw",
     "LapDivisions",
     "LawField",
     "LawJoint",
     "Material",
     "MeasuredAssembly",
+    "MeasurementPlan",
     "Mesh",
     "MissingPackageError",
     "Model",
@@ -190,6 +196,7 @@ __all__ = [
     "as_bands",
     "assemble",
     "assemble_bricks",
+    "assemblies_needed",
     "band_mean",
     "beam",
     "bolted_lap",
@@ -210,6 +217,7 @@ __all__ = [
     "elastic_centre",
     "element_matrices",
     "estimate_noise",
+    "expected_half_width",
     "find_modification",
     "fit_from_dict",
     "fit_to_dict",
@@ -239,6 +247,8 @@ __all__ = [
     "multi_point_stiffness",
     "peak",
     "places_of_nodes",
+    "plan",
+    "plan_joint_frfs",
     "plan_sweep",
     "plot",
     "pollute",
@@ -271,6 +281,7 @@ __all__ = [
     "virtual_point",
     "virtual_points",
     "write_joint",
+    "write_plan",
     "write_pool",
     "write_report",
 ]

@@ -46,8 +46,9 @@ _FOREIGN = (
 #: One in so many calls is of these, so that none takes more than a few hundredths of the time.
 _SLOW = {
     "preload": 80, "identify_model": 40, "elastic_centre": 35, "identify_realisations": 25, "estimate_noise": 20,
-    "identify": 10, "study": 6, "sweep": 4, "plan_sweep": 3, "receptance": 2, "merge_frfs": 3, "write_hdf5": 3,
-    "bolted_lap": 3, "joint_channels": 2, "smooth_frfs": 2, "merge_studies": 2, "read_uff": 2, "assemble": 2,
+    "identify": 10, "plan": 10, "study": 6, "sweep": 4, "plan_sweep": 3, "receptance": 2, "merge_frfs": 3,
+    "write_hdf5": 3, "bolted_lap": 3, "joint_channels": 2, "smooth_frfs": 2, "merge_studies": 2, "read_uff": 2,
+    "assemble": 2,
 }  # fmt: skip
 #: What starts processes is made from these alone, of which none starts one.
 _WORKERS: dict[str, tuple[Any, ...]] = {

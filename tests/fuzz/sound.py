@@ -197,6 +197,20 @@ def _identification(arrays: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
         "cards": {"fit": found, "program": "nastran", "nodes": [1, 2]},
         "plot": {"fit": found},
         "write_report": {"fit": found, "path": "fit.html"},
+        "plan": {
+            "assembly": assembly, "freq_hz": freq, "responses": ["A/1:x", "B/2:x"], "forces": ["A/1:x", "B/2:x"],
+            "targets": ["k_x"], "budget": 3.0, "sensor_mass": 0.01, "hits": ["B/2:x"],
+        },
+        "plan_joint_frfs": {
+            "freq_hz": freq, "gamma": c["gamma"], "joint": jf.Joint([2000.0], [3.0], ["x"]), "floor": 1e-3,
+            "biased": 1.01 * c["gamma"],
+        },
+        "write_plan": {
+            "plan": jf.plan_joint_frfs(freq, c["gamma"], jf.Joint([2000.0], [3.0], ["x"])), "path": "plan.html",
+            "command": "",
+        },
+        "expected_half_width": {"number": 5, "spread": 0.1, "error": 0.02, "probability": 0.9},
+        "assemblies_needed": {"half_width": 0.3, "spread": 0.1, "error": 0.02, "probability": 0.9},
         "pool": {"fits": [found, again], "common": 0.01, "parameters": ["k_x"], "probability": 0.9},
         "transfer": {"fits": [found, again], "parameters": ["k_x"], "spread": 0.05},
         "write_pool": {"pooled": jf.pool([found, again]), "path": "pool.html"},

@@ -39,7 +39,7 @@ from jointfrf.spelling import did_you_mean
 from jointfrf.toml.declared import read_keys
 from jointfrf.toml.table import TomlTable, read_toml
 
-__all__ = ["AssemblyFile", "AssemblyPart", "check_dofs", "read_assembly_file", "read_part", "unknown_of"]
+__all__ = ["AssemblyFile", "AssemblyPart", "check_dofs", "named_dof", "read_assembly_file", "read_part", "unknown_of"]
 
 #: What a word takes as relative standard deviation: coefficients of variation of structural steel (JCSS Probabilistic
 #: Model Code, parts 2.1 and 3.2); damping is guessed; sections are rolled or milled to 1 %, lengths cut to 1 mm in
@@ -90,7 +90,7 @@ class AssemblyPart:
     def of_keys(cls, keys: PartKeys, freq_hz: FloatArray) -> AssemblyPart:
         """Read the files of a part; FRFs must be available on these lines, Hz. Its joint DOFs are named by nodes."""
         part = cls(keys, keys.structure(freq_hz))
-        joint = tuple(keys.build(lambda dof=dof: _named_dof(part, dof).dof, "joint") for dof in keys.joint)  # type: ignore[misc]
+        joint = tuple(keys.build(lambda dof=dof: named_dof(part, dof).dof, "joint") for dof in keys.joint)  # type: ignore[misc]
         return part if joint == keys.joint else cls(_changed(keys, joint=joint), part.structure)
 
     def has(self, dof: str) -> bool:
@@ -179,7 +179,7 @@ class AssemblyPart:
         return unknown_of(prior, numbers.get(name, 1.0), table, name, -np.inf if name == "poisson" else 0.0)
 
 
-def _named_dof(part: AssemblyPart, dof: str) -> NamedDof:
+def named_dof(part: AssemblyPart, dof: str) -> NamedDof:
     """Return a DOF by the name of its node: ``@0.3,0.006,0:y`` is that of the nearest node which has it.
 
     Raises
@@ -350,7 +350,7 @@ class AssemblyFile:
             part = {"A/@": parts[0], "B/@": parts[1]}.get(dof[:3])
             if part is None:
                 return dof
-            found: NamedDof = keys.build(lambda: _named_dof(part, dof[2:]), key)
+            found: NamedDof = keys.build(lambda: named_dof(part, dof[2:]), key)
             said[dof] = f"{dof} is {dof[:2]}{found.dof}, {1e3 * (found.away or 0.0):.3g} mm away"
             return dof[:2] + found.dof
 
@@ -366,6 +366,15 @@ class AssemblyFile:
             force_gains={named(own, "force_gains", dof): prior for dof, prior in own.force_gains.items()},
         )
         return replace(self, keys=keys), tuple(said.values())
+
+    def check_values(self) -> None:
+        """Raise a FileContentError where a law has no values: a fit starts anywhere, a plan needs what is expected."""
+        laws = None if isinstance(self.keys.joint, str) else self.keys.table.table("joint").content.get("law")
+        for law in laws if isinstance(laws, list) else ():
+            if _is_bare(law):
+                usual = ", ".join(f"{name} = ..." for name in start_values(law.get("law")))
+                text = f"the law of {law.get('dof')} needs the values that are expected: values = {{ {usual} }}"
+                raise self.keys.wrong("joint", text)
 
     def attachments(self) -> tuple[Attachment, ...]:
         """Return masses and springs to the ground."""

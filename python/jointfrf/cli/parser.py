@@ -24,6 +24,7 @@ COMMANDS = {
     "validate": "a joint found: the assembly that it makes of its parts, or of others, beside the measured one",
     "decouple": "a joint from FRFs of the assembly away from it and of both substructures",
     "frf": "receptances of a model",
+    "plan": "which sensors and hits show a joint best, before anything is measured",
     "pool": "fits of one joint in several assemblies: mean, spread, the next assembly",
     "run": "run cases: tables, figures and a report each",
     "cases": "list the cases that come with jointfrf",

@@ -12,6 +12,7 @@ __all__ = ["Finding", "FitFindingKind", "as_warning", "note", "warn"]
 #: What a finding is about.
 FitFindingKind = Literal[
     "averages",  # how a mean over bands is to be read
+    "blind",  # places where a planned sensor or hit would see nothing
     "choice",  # damping terms that were chosen
     "convergence",
     "correlation",  # parameters, or lines, that are not independent
@@ -20,6 +21,7 @@ FitFindingKind = Literal[
     "factor",  # what a parameter depends on from one fit to the next
     "groups",  # DOFs between which FRFs are zero
     "left out",  # lines, or DOFs, that were not used
+    "mass",  # what sensors weigh
     "model",  # errors of models that none of their unknowns describes
     "noise",
     "open",  # a parameter that may be infinite or zero

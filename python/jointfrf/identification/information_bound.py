@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.kernel.linear_algebra import invert
 
-__all__ = ["least_std_errors"]
+__all__ = ["information_rows", "least_std_errors"]
 
 
 def least_std_errors(freq_hz: FloatArray, gamma: ComplexArray, variance: FloatArray) -> FloatArray:
@@ -33,22 +35,34 @@ def least_std_errors(freq_hz: FloatArray, gamma: ComplexArray, variance: FloatAr
     gamma^-1 = [[Z_A + K*, -K*], [-K*, Z_B + K*]] all derivatives are -gamma dZ gamma. gamma is analytic in the unknowns
     of a line: they take a complex subspace out of what the line says of the parameters.
     """
-    n = gamma.shape[1] // 2
-    weight = 1 / np.sqrt(variance)
-    joint, sides = _units(n)
-    omega = 2 * np.pi * freq_hz[:, None]
-    slopes = _weighted(gamma, joint, weight)
-    free = np.linalg.qr(_weighted(gamma, sides, weight))[0]
-    left = slopes - free @ (free.conj().swapaxes(1, 2) @ slopes)
-    products = left.conj().swapaxes(1, 2) @ left
-    factors = np.concatenate([np.ones((freq_hz.size, n)), np.broadcast_to(1j * omega, (freq_hz.size, n))], axis=1)
-    each = np.tile(products, (1, 2, 2)) * factors.conj()[:, :, None] * factors[:, None, :]
-    information = 2 * each.real.sum(axis=0)
+    rows = information_rows(freq_hz, gamma, variance)
+    information = 2 * np.einsum("lfp,lfq->pq", rows.conj(), rows, optimize=True).real
     # Stiffness and damping differ by many orders of magnitude.
     size = 1 / np.sqrt(np.diagonal(information))
     scaled = information * np.outer(size, size)
     errors: FloatArray = size * np.sqrt(np.diagonal(invert(scaled[None])[0].real))
     return errors
+
+
+def information_rows(
+    freq_hz: FloatArray, gamma: ComplexArray, variance: FloatArray, kinds: Sequence[str] = ("k", "c")
+) -> ComplexArray:
+    """Return what each FRF of each line says of the parameters, shape (n_freq, 4 n^2, n_parameters).
+
+    Twice the real part of the products of these rows, summed over FRFs and lines, is the information. Parameters are
+    those of all DOFs of each kind: stiffness k, viscous c and hysteretic h. As the sides are eliminated by least
+    squares, the products of one row are also the derivative of the information by the weight of its FRF.
+    """
+    n = gamma.shape[1] // 2
+    weight = 1 / np.sqrt(variance)
+    joint, sides = _units(n)
+    slopes = _weighted(gamma, joint, weight)
+    free = np.linalg.qr(_weighted(gamma, sides, weight))[0]
+    left = slopes - free @ (free.conj().swapaxes(1, 2) @ slopes)
+    omega = 2 * np.pi * freq_hz[:, None, None]
+    factors = {"k": np.ones_like(omega) + 0j, "c": 1j * omega, "h": np.full_like(omega, 1j, dtype=complex)}
+    rows: ComplexArray = np.concatenate([left * factors[kind] for kind in kinds], axis=2)
+    return rows
 
 
 def _units(n: int) -> tuple[FloatArray, FloatArray]:

@@ -6,10 +6,11 @@ axes         what several figures share: labels with units, limits of axes and n
 receptance   receptances: modulus and phase below each other; the noise found in them
 draw         a figure drawn by matplotlib to a PNG and an SVG file
 chart        a figure as part of a page, which a script zooms
-sketch       the channels around a joint
+sketch       the channels around a joint; the parts of an assembly with sensors and hits
 document     one self-contained HTML page from sentences, tables, figures and texts
 fit          figures of an identification and of where its information lies; its files
 fit_frfs     measured FRFs against those regenerated with the joint
 fit_page     the report of an identification
+plan_page    a planned test: where sensors and hits go, where the knowledge lies
 pool_page    fits of one joint in several assemblies: forest plots, a page
 """

@@ -1,20 +1,20 @@
-"""A sketch of a joint: where its channels lie, which way they point, and the reference points between which it acts."""
+"""Sketches: the channels around a joint and what it acts between; the parts of an assembly, its sensors and hits."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf.channels.point_lines import Interface
-from jointfrf.dofs import rigid_motion
+from jointfrf.dofs import DIRECTIONS, direction_names, rigid_motion
 from jointfrf.kernel.arguments import FloatArray
 from jointfrf.report.document import Sketch
 from jointfrf.report.table import Cell, Table
 
-__all__ = ["InterfacePoint", "interface_points", "interface_sketch", "point_table"]
+__all__ = ["InterfacePoint", "SketchedPart", "assembly_sketch", "interface_points", "interface_sketch", "point_table"]
 
 #: Directions on the page, to the right and up, of x, y and z.
 _VIEW = np.array([[0.87, -0.32], [0.0, 0.95], [0.5, 0.42]]).T
@@ -209,3 +209,90 @@ def _axes() -> str:
         drawn.append(_arrow("axis", *_CORNER, step))
         drawn.append(f'<text x="{a:.1f}" y="{b + 4:.1f}" text-anchor="middle" font-style="italic">{letter}</text>')
     return "".join(drawn)
+
+
+class SketchedPart(NamedTuple):
+    """A part of an assembly: its letter, where its nodes are, m, in axes of its own, and its nodes at the joint."""
+
+    letter: str
+    places: Mapping[str, FloatArray]
+    joint: Sequence[str]
+
+
+#: Nodes of a part that are drawn at most: more are a grey body.
+_MOST_NODES = 400
+
+
+def assembly_sketch(parts: Sequence[SketchedPart], sensors: Sequence[str], hits: Sequence[str]) -> Sketch | None:
+    """Draw both parts of an assembly, sensors and hits; None where places of nodes are not known.
+
+    Parameters
+    ----------
+    parts : sequence of SketchedPart
+        The second is moved to where its nodes at the joint lie on those of the first.
+    sensors, hits : sequence of str
+        DOFs ``"A/7:y"``.
+    """
+    ends = [[part.places[node] for node in part.joint if node in part.places] for part in parts]
+    if not all(ends):
+        return None
+    reference = np.mean(ends[0], axis=0)
+    moved = [
+        {node: at - np.mean(end, axis=0) + reference for node, at in part.places.items()}
+        for part, end in zip(parts, ends, strict=True)
+    ]
+    flat = np.array([at for own in moved for at in own.values()]) @ _VIEW.T
+    extent, middle = np.ptp(flat, axis=0), (flat.min(axis=0) + flat.max(axis=0)) / 2
+    scale = min((size - 2 * _MARGIN) / max(e, _SAME) for size, e in zip((_WIDTH, _HEIGHT), extent, strict=True))
+
+    def at(place: FloatArray, side: int) -> FloatArray:
+        right, up = (place @ _VIEW.T - middle) * scale
+        return np.array([_WIDTH / 2 + right, _HEIGHT / 2 - up + (2 * side - 1) * _LIFT])
+
+    drawn = [f"<defs>{_HEADS}</defs>"]
+    for side, own in enumerate(moved):
+        step = max(1, len(own) // _MOST_NODES)
+        spots = (at(place, side) for place in list(own.values())[::step])
+        drawn += [f'<circle class="{"jk"[side]} node" cx="{x:.1f}" cy="{y:.1f}" r="1.6"/>' for x, y in spots]
+    letters = [part.letter for part in parts]
+    for dofs, draw in ((hits, _hit), (sensors, _sensor)):
+        for dof in dofs:
+            letter, _, rest = dof.partition("/")
+            node, _, direction = rest.rpartition(":")
+            side = letters.index(letter)
+            if node in moved[side]:
+                drawn.append(draw("jk"[side], at(moved[side][node], side), _on_page(direction)))
+    drawn += [_spring(at(reference, 0), at(reference, 1)), _axes()]
+    svg = f'<svg viewBox="0 -6 {_WIDTH:g} {_HEIGHT + 6:g}" aria-hidden="true">{"".join(drawn)}</svg>'
+    caption = (
+        f"Nodes of {letters[0]} and of {letters[1]} (below it, where they meet); squares: sensors; arrows: hits; "
+        "spring: the joint"
+    )
+    words = f"Sensors at {', '.join(sensors)}; hits at {', '.join(hits)}."
+    return Sketch("assembly", svg, caption, f"Sketch of the assembly. {words}")
+
+
+#: How far parts are drawn apart where they meet, each way.
+_LIFT = 9.0
+
+
+def _on_page(direction: str) -> FloatArray:
+    """Return the step on the page of a direction such as ``y``; up where it is none in space."""
+    try:
+        name = direction_names([direction.lstrip("+-")])[0]
+        unit = np.eye(6)[DIRECTIONS.index(name)][:3]
+    except ValueError:
+        unit = np.zeros(3)
+    step = (_VIEW @ unit) * (1, -1)
+    return np.asarray(step if unit.any() else np.array([0.0, -1.0]))
+
+
+def _sensor(style: str, spot: FloatArray, step: FloatArray) -> str:
+    x, y = spot + 5 * step
+    return f'<rect class="{style}" x="{x - 4.5:.1f}" y="{y - 4.5:.1f}" width="9" height="9"/>'
+
+
+def _hit(style: str, spot: FloatArray, step: FloatArray) -> str:
+    """Draw an arrow that ends at a place, from the side away from the sensors."""
+    x, y = spot - 4 * step
+    return _arrow(style, float(x - step[0] * _ARROW), float(y - step[1] * _ARROW), step * _ARROW)

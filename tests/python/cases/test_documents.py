@@ -57,6 +57,19 @@ def test_python_of_the_page_on_fits_with_models_prints_what_it_shows(capsys):
         agree(capsys.readouterr().out, text)
 
 
+def test_the_page_on_planning_prints_what_it_shows(capsys, monkeypatch, tmp_path):
+    page = DOCUMENTS["docs/planning.md"]
+    command, *shown = blocks("text", page)
+    words, expected = command.removeprefix("$ jointfrf ").split("\n", 1)
+    monkeypatch.chdir(ROOT)
+    assert main(words.split()) == 0
+    agree(capsys.readouterr().out, expected)
+    monkeypatch.chdir(tmp_path)
+    for example, text in zip(blocks("python", page), shown, strict=True):
+        exec(example, {})
+        agree(capsys.readouterr().out, text)
+
+
 def test_assembly_of_the_page_on_fits_with_models_is_read():
     (content,) = [text for text in blocks("toml", DOCUMENTS["docs/model-fit.md"]) if "[A]" in text]
     keys = read_keys(TomlTable(tomllib.loads(content), "assembly.toml"), AssemblyKeys)

@@ -24,7 +24,7 @@ FLOORS = (
     {"laws"},
     {"substructuring", "models"},
     {"identification"},
-    {"solids", "pooling"},
+    {"solids", "pooling", "planning"},
     {"report"},
     {"cases"},
     {"studies", "assembly_file"},

@@ -1,0 +1,231 @@
+"""`jointfrf plan`: which sensors and hits show a joint best, before anything is measured."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import asdict, replace
+from pathlib import Path
+
+import numpy as np
+
+from jointfrf.assembly_file.keys import ReceptancesPart
+from jointfrf.assembly_file.read import AssemblyPart, check_dofs, named_dof, read_assembly_file
+from jointfrf.cases.catalogue import read_case_and_kind
+from jointfrf.cases.known_joint.exact import exact_frfs
+from jointfrf.cases.known_joint.keys import KnownJointCase
+from jointfrf.cases.substructures import MeasuredStructure, ModelStructure
+from jointfrf.cli.frf import add_line_arguments, lines_of
+from jointfrf.cli.parser import CommandParser
+from jointfrf.cli.usage import Output, UsageError, check_folder, waiting
+from jointfrf.dofs import is_rotation
+from jointfrf.errors import FileContentError
+from jointfrf.kernel.arguments import FloatArray
+from jointfrf.planning.assemblies import assemblies_needed, expected_half_width
+from jointfrf.planning.joint_frfs import plan_joint_frfs
+from jointfrf.planning.plan import plan
+from jointfrf.report.plan_page import write_plan
+from jointfrf.report.sketch import SketchedPart
+
+__all__ = ["add_arguments", "run"]
+
+#: Nodes of a part that are candidates unless they are named: their information is computed for all pairs.
+_CANDIDATES = 20
+#: A file of this name is a case: FRFs between all joint DOFs.
+_CASE = "case.toml"
+#: Options of an assembly that mean nothing for a case.
+_OF_PARTS = (
+    "--sensors", "--hits", "--keep-sensors", "--keep-hits", "--candidates", "--sensor-mass", "--targets", "--criterion",
+    "--within", "--budget", "--sensor-price", "--hit-price", "--spread", "--next",
+)  # fmt: skip
+
+
+def add_arguments(parser: CommandParser) -> None:
+    """Describe the arguments of the command."""
+    parser.description = (
+        "Plan a test of an assembly whose parts are known: which sensors and hits show the joint best, what they will "
+        "know of each parameter, what the next one would add, and where in frequency the knowledge lies."
+    )
+    parser.add_argument(
+        "model", type=Path, metavar="ASSEMBLY", help="assembly.toml with the joint that is expected, or case.toml"
+    )
+    add_line_arguments(parser)
+    parser.option(
+        "--sensors DOF,...", "places where a sensor could be: A/7:y,B/@0.1,0,0:y; by default of all nodes", _dofs
+    )
+    parser.option("--hits DOF,...", "places that could be hit or shaken; by default as for sensors", _dofs)
+    parser.option("--keep-sensors DOF,...", "sensors that are there in any case", _dofs)
+    parser.option("--keep-hits DOF,...", "hits that are made in any case", _dofs)
+    parser.option("--candidates N", "nodes of each part that are looked at, far from each other", int, _CANDIDATES)
+    parser.heading("noise and sensors")
+    parser.option("--noise LEVEL", "standard deviation of an average relative to the FRF", _positive, 0.01)
+    parser.option("--floor LEVEL", "the same of the accelerance that does not depend on the FRF, m/(s^2 N)", _positive)
+    parser.option("--averages N", "averages of each FRF", _positive, 1.0)
+    parser.option(
+        "--sensor-mass KG", "mass of each sensor that the models do not have: what it moves is shown", _positive
+    )
+    parser.heading("what is wanted")
+    parser.option("--targets NAME,...", "parameters to be found: k_y,eta; all of the joint by default", _dofs)
+    parser.option(
+        "--criterion NAME", "A: mean of squared relative errors, D: volume of their ellipsoid", ("A", "D"), "A"
+    )
+    parser.option("--within ERROR", "relative error at which the plan ends: 0.02", _positive)
+    parser.option("--budget COST", "what sensors and hits may cost together", _positive)
+    parser.option("--sensor-price COST", "of one sensor", _positive, 1.0)
+    parser.option("--hit-price COST", "of one hit", _positive, 1.0)
+    parser.option("--spread S", "relative spread of assemblies: how many must be tested, with --next", _positive)
+    parser.option("--next WIDTH", "half width wanted of the interval of the next assembly, relative: 0.3", _positive)
+    parser.option("--report FILE", "write a page (HTML) with sensors, hits and where the knowledge lies", Path)
+
+
+def _positive(word: str) -> float:
+    try:
+        found = float(word)
+    except ValueError:
+        found = -1.0
+    if not 0 < found < float("inf"):
+        raise argparse.ArgumentTypeError(f"must be a number above zero, not {word!r}")
+    return found
+
+
+def _dofs(word: str) -> list[str]:
+    """Return DOFs between commas; positions hold commas themselves."""
+    found: list[str] = []
+    for part in word.split(","):
+        if found and "/@" in found[-1] and ":" not in found[-1]:
+            found[-1] += f",{part}"
+        else:
+            found.append(part.strip())
+    if not all(found):
+        raise argparse.ArgumentTypeError(f"must be DOFs between commas, A/7:y,B/3:y, not {word!r}")
+    return found
+
+
+def run(args: argparse.Namespace) -> int:
+    """Carry out the command; the caller turns exceptions into messages."""
+    out = Output(args)
+    check_folder("--report", args.report)
+    if (args.spread is None) != (args.next is None):
+        raise UsageError("--spread and --next belong together: --spread 0.1 --next 0.3")
+    freq = lines_of(args)
+    if freq is None:
+        raise UsageError("--band LOW:HIGH and --step HZ are missing: the lines that will be measured")
+    if args.model.is_dir() or args.model.name == _CASE:
+        return _of_case(args, freq, out)
+    file = read_assembly_file(args.model)
+    file.check_values()
+    parts = file.parts(freq)
+    file, _ = file.located(parts)
+    given = (args.sensors, args.hits, args.keep_sensors or [], args.keep_hits or [])
+    named = [None if one is None else _located(parts, one) for one in given]
+    chosen = [_candidates(parts, args.candidates) if one is None else one for one in named[:2]]
+    kept = [one or [] for one in named[2:]]
+    for name, dofs in (("--sensors", chosen[0] + kept[0]), ("--hits", chosen[1] + kept[1])):
+        check_dofs(parts, file.keys, name, dofs)
+    used = list(dict.fromkeys(dof for own in (*chosen, *kept) for dof in own))
+    with waiting(f"plan of {args.model.name}"):
+        found = plan(
+            file.assembly(freq, parts, used), freq, chosen[0], chosen[1], noise=args.noise, floor=args.floor or 0.0,
+            averages=args.averages, targets=args.targets, criterion=args.criterion, within=args.within,
+            budget=args.budget, sensor_price=args.sensor_price, hit_price=args.hit_price, sensors=kept[0], hits=kept[1],
+            sensor_mass=args.sensor_mass or 0.0, fixed=file.keys.fixed,
+        )  # fmt: skip
+    written = []
+    if args.report is not None:
+        sketched = [
+            SketchedPart(letter, part.places, [dof.rpartition(":")[0] for dof in part.keys.joint])
+            for letter, part in zip("AB", parts, strict=True)
+        ]
+        written.append(write_plan(found, args.report, parts=sketched, command=args.typed))
+    out.say(found)
+    needed = None
+    if args.spread is not None:
+        error = found.proposed.error
+        needed = assemblies_needed(args.next, args.spread, error)
+        out.say("", _assemblies(needed, args.next, args.spread, error))
+    out.say(*([""] if written else []), *(f"wrote {path}" for path in written))
+    out.warn(*found.warnings)
+    content = asdict(found)
+    steps = [one._asdict() for one in found.steps]
+    content |= {
+        "steps": steps,
+        "everything": found.everything._asdict(),
+        "additions": [a._asdict() for a in found.additions],
+    }
+    out.give({"model": str(args.model), **content, "assemblies": needed, "written": [str(path) for path in written]})
+    return 0
+
+
+def _of_case(args: argparse.Namespace, freq: FloatArray, out: Output) -> int:
+    """Say what FRFs between all joint DOFs of a case will know."""
+    of_parts = [name for name in _OF_PARTS if name.removeprefix("--").replace("-", "_") in args.given]
+    if of_parts:
+        raise UsageError(f"{', '.join(of_parts)}: a case has all FRFs between its joint DOFs, and nothing is chosen")
+    case, _ = read_case_and_kind(args.model if args.model.is_dir() else args.model.parent)
+    if not isinstance(case, KnownJointCase):
+        raise FileContentError(f"{args.model}: a plan takes a case of two parts and a joint (kind known-joint)")
+    exact = exact_frfs(replace(case, freq_hz=freq))
+    found = plan_joint_frfs(
+        freq, exact.interface(exact.h_c), case.joint, noise=args.noise, floor=args.floor or 0.0, averages=args.averages
+    )
+    written = [] if args.report is None else [write_plan(found, args.report, command=args.typed)]
+    out.say(found, *([""] if written else []), *(f"wrote {path}" for path in written))
+    out.give({"model": str(args.model), **asdict(found), "written": [str(path) for path in written]})
+    return 0
+
+
+def _assemblies(needed: int | None, wanted: float, spread: float, error: float) -> str:
+    if needed is None:
+        least = expected_half_width(100_000, spread, error)
+        return (
+            f"no number of assemblies gives an interval of the next one within {100 * wanted:.3g} %: with a spread of "
+            f"{100 * spread:.3g} % it is {100 * least:.3g} % at least"
+        )
+    shown = f"{100 * wanted:.3g} % (spread {100 * spread:.3g} %)"
+    return f"{needed} assemblies give an interval of the next one within {shown}"
+
+
+def _located(parts: tuple[AssemblyPart, AssemblyPart], dofs: list[str]) -> list[str]:
+    """Return DOFs by nodes instead of positions."""
+    of_side = {"A/@": parts[0], "B/@": parts[1]}
+    try:
+        return [dof[:2] + named_dof(of_side[dof[:3]], dof[2:]).dof if dof[:3] in of_side else dof for dof in dofs]
+    except ValueError as error:
+        raise UsageError(error) from error
+
+
+def _candidates(parts: tuple[AssemblyPart, AssemblyPart], most: int) -> list[str]:
+    """Return translations of nodes of both parts, far from each other."""
+    if most < 1:
+        raise UsageError(f"--candidates must be at least 1, not {most}")
+    found: list[str] = []
+    for letter, part in zip("AB", parts, strict=True):
+        if isinstance(part.keys, ReceptancesPart):
+            assert isinstance(part.structure, MeasuredStructure)
+            channels = [one for one in part.structure.frfs.responses if one in part.structure.frfs.excitations]
+            found += [f"{letter}/{one.node}:{one.axis}" for one in channels if not one.is_rotation]
+            continue
+        assert isinstance(part.structure, ModelStructure)
+        by_node: dict[str, list[str]] = {}
+        for dof in part.structure.model.dofs:
+            node, _, direction = dof.rpartition(":")
+            if direction and not is_rotation(direction):
+                by_node.setdefault(node, []).append(dof)
+        nodes = (
+            _far_apart({node: part.places[node] for node in by_node if node in part.places}, most)
+            or list(by_node)[:most]
+        )
+        found += [f"{letter}/{dof}" for node in nodes for dof in by_node[node]]
+    return found
+
+
+def _far_apart(places: dict[str, FloatArray], most: int) -> list[str]:
+    """Return nodes, each as far as can be from those before it, in the order of the model."""
+    if not places:
+        return []
+    names, at = list(places), np.array(list(places.values()))
+    chosen = [0]
+    away = np.linalg.norm(at - at[0], axis=1)
+    while len(chosen) < min(most, len(names)):
+        chosen.append(int(np.argmax(away)))
+        away = np.minimum(away, np.linalg.norm(at - at[chosen[-1]], axis=1))
+    return [names[i] for i in sorted(chosen)]

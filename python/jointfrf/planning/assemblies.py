@@ -1,0 +1,110 @@
+"""How many assemblies a wanted interval of the next one needs."""
+
+from __future__ import annotations
+
+import math
+
+from scipy.stats import chi2, norm, t
+
+from jointfrf.kernel.arguments import as_number, as_positive
+
+__all__ = ["assemblies_needed", "expected_half_width"]
+
+#: More assemblies of one joint than anybody builds for a test.
+_MOST = 100_000
+
+
+def expected_half_width(number: int, spread: float, error: float, probability: float = 0.95) -> float:
+    """Return the half width to be expected of the interval of the next assembly, relative to its middle.
+
+    Parameters
+    ----------
+    number : int
+        Assemblies that are tested, at least 2.
+    spread, error : float
+        Relative standard deviations: of the assemblies, and of one fit.
+    probability : float
+        Of the interval.
+
+    Raises
+    ------
+    ValueError
+        Fewer than two assemblies; a spread or an error below zero; a probability outside 0 to 1.
+
+    Notes
+    -----
+    On a logarithmic scale half of draws have less than
+
+        t_{n-1} sqrt( (s^2 + e^2)(1 + 1/n) m - e^2 ),   m = median of chi^2_{n-1} / (n - 1)
+
+    with the spread s and the error e of a fit, which is known and no part of the next assembly. Near a spread of zero
+    intervals of `pool` are wider.
+
+    Examples
+    --------
+    >>> import jointfrf as jf
+    >>> [round(jf.expected_half_width(n, spread=0.1, error=0.02), 2) for n in (3, 5, 10, 30)]
+    [0.5, 0.32, 0.25, 0.22]
+    """
+    spread, error = _not_negative("spread", spread), _not_negative("error", error)
+    if not 0 < as_number("probability", probability) < 1:
+        raise ValueError(f"probability must lie between 0 and 1, not {probability}")
+    if not isinstance(number, int) or number < 2:
+        raise ValueError(f"number must be a whole number, at least 2, not {number!r}")
+    free = number - 1
+    seen = float(chi2.median(free)) / free
+    variance = max((spread**2 + error**2) * (1 + 1 / number) * seen - error**2, error**2 / number)
+    return math.expm1(float(t.ppf((1 + probability) / 2, free)) * math.sqrt(variance))
+
+
+def assemblies_needed(half_width: float, spread: float, error: float, probability: float = 0.95) -> int | None:
+    """Return how many assemblies give an interval of the next one that is as narrow as wanted.
+
+    Parameters
+    ----------
+    half_width : float
+        Wanted, relative to the middle.
+    spread, error, probability : float
+        As in `expected_half_width`.
+
+    Returns
+    -------
+    int or None
+        None where none do: the assemblies themselves differ by more.
+
+    Raises
+    ------
+    ValueError
+        As `expected_half_width`; a half width that is not positive.
+
+    Examples
+    --------
+    >>> import jointfrf as jf
+    >>> jf.assemblies_needed(0.3, spread=0.1, error=0.02)
+    6
+    >>> jf.assemblies_needed(0.2, spread=0.1, error=0.02) is None
+    True
+    """
+    wanted = as_positive("half_width", half_width)
+    expected_half_width(2, spread, error, probability)  # checks what is said of the fits
+    if math.expm1(float(norm.ppf((1 + probability) / 2)) * spread) >= wanted:
+        return None
+    low, high = 1, 2
+    while expected_half_width(high, spread, error, probability) > wanted:
+        low, high = high, 2 * high
+        if high > _MOST:
+            return None
+    while high - low > 1:
+        middle = (low + high) // 2
+        if expected_half_width(middle, spread, error, probability) > wanted:
+            low = middle
+        else:
+            high = middle
+    return high
+
+
+def _not_negative(name: str, value: float) -> float:
+    number = as_number(name, value)
+    if number < 0:
+        raise ValueError(f"{name} must not be negative, not {number:g}")
+    return number

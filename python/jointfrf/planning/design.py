@@ -1,0 +1,162 @@
+"""Which sensors and hits to choose: greedily by what each adds for its price, then by exchange."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointfrf.kernel.arguments import FloatArray
+
+__all__ = ["Criterion", "Design", "Designer", "Prices", "criterion_of"]
+
+#: What is made small: the mean variance of relative errors ("A"), the volume of their ellipsoid ("D"), one variance.
+Criterion = Literal["A", "D"]
+
+#: An exchange must lower the logarithm of the criterion by more than rounding.
+_GAIN = 1e-9
+#: Exchanges that end nowhere: each lowers the criterion, so that this many are never needed.
+_EXCHANGES = 200
+
+
+class Prices(NamedTuple):
+    """What a sensor and a hit cost, in the same unit."""
+
+    sensor: float
+    hit: float
+
+
+@dataclass(frozen=True)
+class Design:
+    """Chosen sensors and hits, by their numbers among the candidates; every sensor is read at every hit."""
+
+    sensors: tuple[int, ...]
+    hits: tuple[int, ...]
+    loss: float = field(compare=False)
+
+
+def criterion_of(targets: NDArray[np.intp], kind: Criterion) -> Callable[[FloatArray], FloatArray]:
+    """Return the logarithm of the size of an error, per parameter, as a function of information, shape (..., p, p)."""
+
+    def loss(information: FloatArray) -> FloatArray:
+        with np.errstate(all="ignore"):
+            covariance = np.linalg.inv(information)[..., targets[:, None], targets]
+            if kind == "D":
+                found = np.linalg.slogdet(covariance)[1] / len(targets)
+            else:
+                found = np.log(np.trace(covariance, axis1=-2, axis2=-1) / len(targets))
+        return np.asarray(np.where(np.isfinite(found), found, np.inf))
+
+    return loss
+
+
+@dataclass(frozen=True)
+class Designer:
+    """Candidates and what they cost.
+
+    Attributes
+    ----------
+    of_frf : ndarray, shape (n_o, n_i, p, p)
+        Information of each FRF.
+    prior : ndarray, shape (p, p)
+    loss : function
+        Of information, shape (..., p, p): smaller is better.
+    prices : Prices
+    kept : Design
+        What is measured already, or stays in any case.
+    """
+
+    of_frf: FloatArray
+    prior: FloatArray
+    loss: Callable[[FloatArray], FloatArray]
+    prices: Prices
+    kept: Design
+
+    def cost(self, design: Design) -> float:
+        """Return what a design costs beside what is kept."""
+        sensors = len(design.sensors) - len(self.kept.sensors)
+        return sensors * self.prices.sensor + (len(design.hits) - len(self.kept.hits)) * self.prices.hit
+
+    def information(self, design: Design) -> FloatArray:
+        """Return the information of a design, with the prior, shape (p, p)."""
+        found: FloatArray = self.prior + self.of_frf[np.ix_(design.sensors, design.hits)].sum(axis=(0, 1))
+        return found
+
+    def designs(self) -> Iterator[Design]:
+        """Yield better and better designs, each with one sensor or hit more than the one before."""
+        design = self._first()
+        while True:
+            design = self._exchanged(design)
+            yield design
+            grown = list(self.additions(design))
+            if not grown:
+                return
+            design = max(grown, key=lambda one: (design.loss - one.loss) / self._price(design, one))
+
+    def _price(self, one: Design, more: Design) -> float:
+        return self.prices.sensor if len(more.sensors) > len(one.sensors) else self.prices.hit
+
+    def _first(self) -> Design:
+        """Return what is kept, with the best sensor and the best hit where there is none."""
+        sensors = [self.kept.sensors] if self.kept.sensors else [(o,) for o in range(self.of_frf.shape[0])]
+        hits = [self.kept.hits] if self.kept.hits else [(i,) for i in range(self.of_frf.shape[1])]
+        pairs = [(own, other) for own in sensors for other in hits]
+        return min(self._judged(pairs), key=lambda one: one.loss)
+
+    def _judged(self, pairs: list[tuple[tuple[int, ...], tuple[int, ...]]]) -> list[Design]:
+        each = np.array([self.of_frf[np.ix_(*pair)].sum(axis=(0, 1)) for pair in pairs])
+        return [Design(*pair, float(loss)) for pair, loss in zip(pairs, self.loss(self.prior + each), strict=True)]
+
+    def additions(self, design: Design) -> Iterator[Design]:
+        """Yield the design with each further sensor, and with each further hit."""
+        now = self.information(design)
+        rows = [o for o in range(self.of_frf.shape[0]) if o not in design.sensors]
+        columns = [i for i in range(self.of_frf.shape[1]) if i not in design.hits]
+        if rows:
+            losses = self.loss(now + self._of_rows(design.hits)[rows])
+            for o, loss in zip(rows, losses.tolist(), strict=True):
+                yield Design((*design.sensors, o), design.hits, loss)
+        if columns:
+            losses = self.loss(now + self._of_columns(design.sensors)[columns])
+            for i, loss in zip(columns, losses.tolist(), strict=True):
+                yield Design(design.sensors, (*design.hits, i), loss)
+
+    def _of_rows(self, hits: tuple[int, ...]) -> FloatArray:
+        found: FloatArray = self.of_frf[:, list(hits)].sum(axis=1)
+        return found
+
+    def _of_columns(self, sensors: tuple[int, ...]) -> FloatArray:
+        found: FloatArray = self.of_frf[list(sensors)].sum(axis=0)
+        return found
+
+    def _exchanged(self, design: Design) -> Design:
+        """Return a design of the same size that no exchange of one sensor or one hit makes better."""
+        for _ in range(_EXCHANGES):
+            better = min(self._swaps(design), key=lambda one: one.loss, default=design)
+            if not better.loss < design.loss - _GAIN:
+                break
+            design = better
+        return design
+
+    def _swaps(self, design: Design) -> Iterator[Design]:
+        now = self.information(design)
+        rows, columns = self._of_rows(design.hits), self._of_columns(design.sensors)
+        for out in design.sensors:
+            if out in self.kept.sensors:
+                continue
+            losses = self.loss(now - rows[out] + rows)
+            for o in set(range(len(rows))) - set(design.sensors):
+                yield Design(_replaced(design.sensors, out, o), design.hits, float(losses[o]))
+        for out in design.hits:
+            if out in self.kept.hits:
+                continue
+            losses = self.loss(now - columns[out] + columns)
+            for i in set(range(len(columns))) - set(design.hits):
+                yield Design(design.sensors, _replaced(design.hits, out, i), float(losses[i]))
+
+
+def _replaced(numbers: tuple[int, ...], out: int, by: int) -> tuple[int, ...]:
+    return tuple(by if one == out else one for one in numbers)

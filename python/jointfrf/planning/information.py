@@ -1,0 +1,194 @@
+"""Fisher information of FRFs that have not been measured, from models of the parts and an expected joint."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from jointfrf.frf.bands import Band
+from jointfrf.identification.model.assembly import Assembly
+from jointfrf.identification.model.prediction import Prediction, parameter_vector
+from jointfrf.identification.model.prepare import Channels
+from jointfrf.identification.parameters import FitParameter, ParameterVector
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_number, as_positive
+
+__all__ = ["ExpectedNoise", "FrfInformation", "PlannedTest", "expected_noise", "narrowest_band"]
+
+#: Bytes of derivatives that are in memory at once.
+_BYTES = 256 * 2**20
+#: What is believed of every parameter in the widest sense, relative to its value: a factor of a thousand. It keeps the
+#: information of a single FRF, which may not tell all parameters apart, invertible.
+_WIDEST = 1e3
+#: FRFs below this part of the largest are zero by symmetry, but for rounding: they say nothing.
+_ROUNDING = 1e-10
+#: Share of what is known that a band must hold to be all that is worth measuring.
+_BAND = 0.9
+
+
+@dataclass(frozen=True)
+class ExpectedNoise:
+    """Noise that a test will have.
+
+    Attributes
+    ----------
+    level : float
+        Standard deviation of one average relative to the FRF.
+    floor : float
+        Standard deviation of one average of the accelerance, m/(s^2 N).
+    averages : float
+    """
+
+    level: float
+    floor: float
+    averages: float
+
+    def variance(self, omega: FloatArray, h: ComplexArray) -> FloatArray:
+        """Return E|e|^2 of receptances, shape (n_freq, n_o, n_i), (m/N)^2."""
+        of_floor = (self.floor / omega**2)[:, None, None]
+        found: FloatArray = ((self.level * abs(h)) ** 2 + of_floor**2) / self.averages
+        return found
+
+
+def expected_noise(noise: float, floor: float, averages: float) -> ExpectedNoise:
+    """Return the noise of a test; raises ValueError for numbers that no noise has, as in `plan`."""
+    found = ExpectedNoise(as_number("noise", noise), as_number("floor", floor), as_positive("averages", averages))
+    for name, value in (("noise", found.level), ("floor", found.floor)):
+        if value < 0:
+            raise ValueError(f"{name} must not be negative, not {value:g}")
+    if not found.level + found.floor:
+        raise ValueError("noise and floor are both zero: without noise every test finds everything")
+    return found
+
+
+def narrowest_band(freq_hz: FloatArray, share: FloatArray) -> Band:
+    """Return the narrowest band that holds most of what all lines know."""
+    known = np.concatenate([[0.0], np.cumsum(share)])
+    wanted = _BAND * known[-1] * (1 - 1e-12)  # the whole band holds what is wanted of it
+    ends = np.searchsorted(known, known[:-1] + wanted)
+    starts = np.flatnonzero(ends < len(known))
+    at = starts[np.argmin(freq_hz[ends[starts] - 1] - freq_hz[starts])]
+    return float(freq_hz[at]), float(freq_hz[ends[at] - 1])
+
+
+@dataclass(frozen=True)
+class FrfInformation:
+    """Fisher information of relative changes of the parameters.
+
+    Attributes
+    ----------
+    parameters : tuple of FitParameter
+        All that is unknown, the joint's first.
+    of_frf : ndarray, shape (n_o, n_i, p, p)
+        Of each FRF over all lines.
+    of_line : ndarray, shape (n_freq, p, p)
+        Of all FRFs on each line.
+    prior : ndarray, shape (p, p)
+        What is believed without a test.
+    pull : ndarray, shape (n_o, n_i, p), or None
+        What a difference of FRFs between two assemblies moves, before it is divided by the information.
+    """
+
+    parameters: tuple[FitParameter, ...]
+    of_frf: FloatArray
+    of_line: FloatArray
+    prior: FloatArray
+    pull: FloatArray | None = None
+
+    @cached_property
+    def scale(self) -> FloatArray:
+        """Values of the parameters: information is that of changes relative to them."""
+        return _scale(self.parameters)
+
+    def covariance(self) -> FloatArray:
+        """Return the covariance of relative errors where all these FRFs are measured."""
+        found: FloatArray = np.linalg.inv(self.prior + self.of_frf.sum(axis=(0, 1)))
+        return found
+
+    def shares(self, each: FloatArray) -> FloatArray:
+        """Return which share of what is known of each parameter comes from each part, shape (..., p).
+
+        With V the covariance, (V J V)_ii / V_ii of the information J of a part: shares of all parts and of the prior
+        add up to 1, and 1 % more of J lowers the variance by a hundredth of its share.
+        """
+        covariance = self.covariance()
+        found: FloatArray = np.einsum("ia,...ab,bi->...i", covariance, each, covariance) / np.diagonal(covariance)
+        return found
+
+
+def _scale(parameters: tuple[FitParameter, ...]) -> FloatArray:
+    return np.array([abs(one.value) or one.std or 1.0 for one in parameters])
+
+
+@dataclass(frozen=True)
+class PlannedTest:
+    """An assembly as it is expected, and the noise of a test on it.
+
+    Attributes
+    ----------
+    assembly : Assembly
+    freq_hz : ndarray, shape (n_freq,)
+        Lines above 0 Hz.
+    noise : ExpectedNoise
+    fixed : tuple of str
+        Parameters of the joint that are known.
+    """
+
+    assembly: Assembly
+    freq_hz: FloatArray
+    noise: ExpectedNoise
+    fixed: tuple[str, ...]
+
+    def information(self, channels: Channels, measured: Assembly | None = None) -> FrfInformation:
+        """Return the information of all FRFs between these channels.
+
+        Parameters
+        ----------
+        channels : Channels
+        measured : Assembly, optional
+            What will be measured in fact, such as the assembly with the masses of the sensors: what that moves.
+
+        Raises
+        ------
+        SingularLineError
+            An undamped assembly resonates at a line.
+        """
+        vector = self.vector(channels)
+        p, per_line = vector.free.size, len(channels.responses) * len(channels.forces)
+        n = max(1, _BYTES // (16 * max(p, 1) * per_line))
+        parts = [
+            self._part(vector, channels, self.freq_hz[i : i + n], measured) for i in range(0, len(self.freq_hz), n)
+        ]
+        total = parts[0]
+        for one in parts[1:]:
+            pull = None if total.pull is None or one.pull is None else total.pull + one.pull
+            of_line = np.concatenate([total.of_line, one.of_line])
+            total = replace(total, of_frf=total.of_frf + one.of_frf, of_line=of_line, pull=pull)
+        return total
+
+    def vector(self, channels: Channels) -> ParameterVector:
+        """Return all parameters, with those of the channels."""
+        prediction = Prediction(self.assembly, self.freq_hz[:1], channels.responses[:1], channels.forces[:1])
+        return parameter_vector(self.assembly, channels.gains(), self.fixed, prediction.joint_stiffness())
+
+    def _part(
+        self, vector: ParameterVector, channels: Channels, freq_hz: FloatArray, measured: Assembly | None
+    ) -> FrfInformation:
+        prediction = Prediction(self.assembly, freq_hz, channels.responses, channels.forces)
+        y, slopes = prediction.linearised(vector, vector.values)
+        deviation = np.sqrt(self.noise.variance(2 * np.pi * freq_hz, y) / 2)  # of real and imaginary part
+        shown = abs(y).max(axis=0) > _ROUNDING * abs(y).max()
+        weight = 1 / np.where(shown & (deviation > 0), deviation, np.inf)
+        scale = _scale(vector.fitted)
+        slopes *= scale[:, None, None, None] * weight
+        real = np.moveaxis(slopes, 0, -1).copy().view(np.float64).reshape(*y.shape, -1, 2)  # lines, o, i, p, re and im
+        of_frf = np.einsum("loipr,loiqr->oipq", real, real, optimize=True)
+        of_line = np.einsum("loipr,loiqr->lpq", real, real, optimize=True)
+        pull = None
+        if measured is not None:
+            change = (measured.receptance(freq_hz, channels.responses, channels.forces) - y) * weight
+            parts = np.stack([change.real, change.imag], axis=-1)
+            pull = np.einsum("loipr,loir->oip", real, parts, optimize=True)
+        believed = [(value / one.std) ** 2 if one.std else 0.0 for one, value in zip(vector.fitted, scale, strict=True)]
+        return FrfInformation(vector.fitted, of_frf, of_line, np.diag(believed) + np.eye(len(scale)) / _WIDEST**2, pull)

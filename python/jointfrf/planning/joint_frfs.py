@@ -1,0 +1,166 @@
+"""What FRFs between all DOFs of a joint will know of it, without models of the sides."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from jointfrf.frf.bands import Band
+from jointfrf.identification.identify import identify
+from jointfrf.identification.information_bound import information_rows
+from jointfrf.identification.manifold.coordinates import DampingTerms
+from jointfrf.identification.result import columns_of
+from jointfrf.joint import Joint
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_frequency, as_square, check_type
+from jointfrf.kernel.linear_algebra import invert
+from jointfrf.planning.information import expected_noise, narrowest_band
+
+__all__ = ["JointFrfPlan", "plan_joint_frfs"]
+
+
+@dataclass(frozen=True)
+class JointFrfPlan:
+    """What FRFs between all joint DOFs will know.
+
+    Attributes
+    ----------
+    freq_hz : ndarray, shape (n_freq,)
+        Hz.
+    value, std_error : dict of str to float
+        Expected stiffness and damping of each DOF, and their standard errors; N/m, N s/m (N m/rad, N m s/rad).
+    line_share : ndarray, shape (n_parameters, n_freq)
+        Share of what is known of each parameter that comes from each line.
+    frf_share : ndarray, shape (n_parameters, 2 n, 2 n)
+        The same of each FRF, joint DOFs j, then k: 1 % more averages of an FRF lower the variance by a hundredth of it.
+    bands : dict of str to tuple of float
+        Of each parameter, the narrowest band with 90 % of what the lines know of it, Hz.
+    shift : dict of str to float
+        By how much FRFs that are wrong in a known way move each parameter.
+    """
+
+    freq_hz: FloatArray
+    value: dict[str, float]
+    std_error: dict[str, float]
+    line_share: FloatArray
+    frf_share: FloatArray
+    bands: dict[str, Band]
+    shift: dict[str, float]
+
+    def __str__(self) -> str:
+        return "\n".join(self._lines())
+
+    def _lines(self) -> Iterator[str]:
+        rows = [("", "expected", "standard error", "band, Hz", "shift")[: 5 if self.shift else 4]]
+        for name, value in self.value.items():
+            low, high = self.bands[name]
+            row = (name, f"{value:.4g}", _relative(self.std_error[name], value), f"{low:.4g} to {high:.4g}")
+            rows.append((*row, _relative(self.shift[name], value)) if self.shift else row)
+        yield from columns_of(rows)
+
+
+def _relative(error: float, value: float) -> str:
+    return f"{100 * error / abs(value):.2g} %" if value else f"{error:.2g}"
+
+
+def plan_joint_frfs(
+    freq_hz: ArrayLike,
+    gamma: ArrayLike,
+    joint: Joint,
+    *,
+    noise: float = 0.01,
+    floor: float = 0.0,
+    averages: float = 1.0,
+    biased: ArrayLike | None = None,
+) -> JointFrfPlan:
+    """Say what FRFs between all DOFs of a joint will know of it by `identify`, which lines and FRFs matter.
+
+    Parameters
+    ----------
+    freq_hz : array_like, shape (n_freq,)
+        Lines that will be measured, above 0 Hz.
+    gamma : array_like, shape (n_freq, 2 n, 2 n)
+        FRFs of the assembly as they are expected, joint DOFs j, then k, m/N: from models of the parts, `couple`.
+    joint : Joint
+        As it is expected, without cross terms.
+    noise, floor, averages : float
+        As in `plan`.
+    biased : array_like, shape of gamma, optional
+        FRFs as the test will give them without noise: rotations by finite differences at a spacing, virtual points on
+        sides that bend, sensors with their masses. What that moves is `shift`.
+
+    Returns
+    -------
+    JointFrfPlan
+
+    Raises
+    ------
+    ValueError
+        Wrong shapes; a joint with cross terms; noise that is zero; an FRF that is zero.
+    SingularMatrixError
+        The lines do not determine the parameters.
+
+    Notes
+    -----
+    The Cramer-Rao bound with unknown dynamic stiffnesses of both sides on every line: what `identify` reaches.
+
+    Examples
+    --------
+    >>> import numpy as np, jointfrf as jf
+    >>> freq = np.linspace(0.5, 10, 400)
+    >>> a = jf.chain([5, 3], [2500, 3500], [3, 4], ground="start").receptance(freq)
+    >>> b = jf.chain([4, 2], [2000, 2500], [2, 1], ground="end").receptance(freq)
+    >>> joint = jf.Joint([2000.0], [3.0], ["x"])
+    >>> gamma = jf.couple(a, b, joint.dynamic_stiffness(freq), [1], [0])[:, 1:3, 1:3]
+    >>> print(jf.plan_joint_frfs(freq, gamma, joint, noise=0.05))
+    """
+    check_type("joint", joint, Joint)
+    lines = as_square("gamma", gamma)
+    freq, n = as_frequency(freq_hz, len(lines)), len(joint.dofs)
+    if not freq.size or freq.min() <= 0:
+        raise ValueError("freq_hz must hold lines above 0 Hz")
+    if lines.shape[1] != 2 * n:
+        raise ValueError(f"gamma must have {2 * n} x {2 * n} FRFs for {n} joint DOFs, not shape {lines.shape}")
+    matrices = {"k": joint.stiffness, "c": joint.damping, "h": joint.hysteretic_stiffness}
+    if any((one - np.diag(np.diagonal(one))).any() for one in matrices.values()):
+        raise ValueError("a plan of FRFs between joint DOFs takes a joint without cross terms")
+    variance = expected_noise(noise, floor, averages).variance(2 * np.pi * freq, lines)
+    if not variance.all():
+        raise ValueError("an FRF is zero on a line, and has no noise there: give floor")
+    kinds = ["k", *(kind for kind in "ch" if matrices[kind].any())]
+    expected = {f"{kind}_{dof}": float(matrices[kind][i, i]) for kind in kinds for i, dof in enumerate(joint.dofs)}
+    rows = information_rows(freq, lines, variance, kinds)
+    size = 1 / np.sqrt(2 * np.einsum("lfp,lfp->p", rows.conj(), rows).real)  # stiffness and damping differ by much
+    rows = rows * size
+    of_line = 2 * np.einsum("lfp,lfq->lpq", rows.conj(), rows, optimize=True).real
+    of_frf = 2 * np.einsum("lfp,lfq->fpq", rows.conj(), rows, optimize=True).real
+    covariance = invert(of_line.sum(axis=0)[None])[0].real
+    own = np.diagonal(covariance)
+    line_share, frf_share = (
+        np.einsum("ia,eab,bi->ie", covariance, each, covariance, optimize=True) / own[:, None]
+        for each in (of_line, of_frf)
+    )
+    return JointFrfPlan(
+        freq,
+        expected,
+        dict(zip(expected, (size * np.sqrt(own)).tolist(), strict=True)),
+        line_share,
+        frf_share.reshape(-1, 2 * n, 2 * n),
+        {name: narrowest_band(freq, share) for name, share in zip(expected, line_share, strict=True)},
+        {} if biased is None else _shift(freq, as_square("biased", biased, freq.size), variance, joint, expected),
+    )
+
+
+def _shift(
+    freq_hz: FloatArray, biased: ComplexArray, variance: FloatArray, joint: Joint, expected: dict[str, float]
+) -> dict[str, float]:
+    """Return what the fit of FRFs without noise that are wrong finds, less what is expected."""
+    kinds = {name[0] for name in expected}
+    damping: DampingTerms = "both" if kinds == {"k", "c", "h"} else "hysteretic" if "h" in kinds else "viscous"
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        found = identify(freq_hz, biased, joint.dofs, damping=damping, noise=variance)
+    return {name: found.value[name] - value for name, value in expected.items()}

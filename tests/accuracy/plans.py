@@ -1,0 +1,130 @@
+"""What plans promise: predicted errors beside those of fits, and proposed sets beside grids of equal spacing.
+
+Structure number i is made from the seed i; draw number j of its noise has the seed [i, j], or 1000 i + j.
+"""
+
+import argparse
+import itertools
+import warnings
+
+import numpy as np
+
+import jointfrf as jf
+
+#: Noise of accelerances that does not depend on the FRF, m/(s^2 N).
+_FLOOR = 0.02
+_ALUMINIUM = {"youngs_modulus": 70e9, "density": 2700.0, "loss_factor": 0.005}
+
+
+def structure(seed: int) -> tuple[jf.Assembly, list[str], np.ndarray]:
+    """Two beams of random lengths and ends with a joint; candidates at all nodes that move; lines."""
+    rng = np.random.default_rng(seed)
+    sides, candidates = [], []
+    for side, joint_node in (("A", None), ("B", 1)):
+        n = int(rng.integers(9, 15))
+        first = ("clamped", "free")[int(rng.integers(2))] if side == "A" else "free"
+        size = {"width": 0.025, "height": float(rng.uniform(0.004, 0.01))}
+        model = jf.beam(float(rng.uniform(0.2, 0.4)), n, ends=(first, "free"), **_ALUMINIUM, **size)
+        node = joint_node or n + 1
+        unknowns = {"youngs_modulus": jf.Unknown(1.0, 0.01)}
+        sides.append(jf.Substructure(model, [f"{node}:y", f"{node}:theta"], unknowns, exact=True))
+        candidates += [f"{side}/{i}:y" for i in range(2 if first == "clamped" else 1, n + 2)]
+    size = np.exp(rng.uniform(-1, 1, 2))
+    joint = jf.Joint(np.array([1e6, 1e3]) * size, np.array([50.0, 0.05]) * size, dofs=["y", "theta"])
+    return jf.Assembly(*sides, joint), candidates, np.arange(20.0, float(rng.uniform(800, 2000)), 5.0)
+
+
+def of_draws(seeds: int, draws: int) -> None:
+    """Print predicted standard errors beside the scatter of fits."""
+    print("| structure | sensors x hits | scatter of fits / predicted, each parameter |")
+    print("|---|---|---|")
+    for seed in range(seeds):
+        whole, candidates, freq = structure(seed)
+        found = jf.plan(whole, freq, candidates, candidates, noise=0.03, floor=_FLOOR, budget=4)
+        test = found.proposed
+        exact = whole.receptance(freq, test.sensors, test.hits)
+        variance = (0.03 * abs(exact)) ** 2 + ((_FLOOR / (2 * np.pi * freq) ** 2) ** 2)[:, None, None]
+        values = []
+        for draw in range(draws):
+            rng = np.random.default_rng([seed, draw])
+            noise = rng.standard_normal((2, *exact.shape)) * np.sqrt(variance / 2)
+            h = exact + noise[0] + 1j * noise[1]
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                fit = jf.identify_model(freq, h, whole, test.sensors, test.hits, noise=variance)
+            values.append([fit.value[name] for name in found.targets])
+        ratio = np.std(values, axis=0, ddof=1) / [test.std_error[name] for name in found.targets]
+        shown = ", ".join(f"{one:.2f}" for one in ratio)
+        print(f"| {seed} | {len(test.sensors)} x {len(test.hits)} | {shown} |", flush=True)
+
+
+def of_joint_frfs(seeds: int, draws: int) -> None:
+    """Print the same for FRFs between all joint DOFs."""
+    print("| structure | scatter of fits / predicted, each parameter |")
+    print("|---|---|")
+    for seed in range(seeds):
+        whole, _, freq = structure(seed)
+        names = [*(f"A/{dof}" for dof in whole.a.joint), *(f"B/{dof}" for dof in whole.b.joint)]
+        exact = whole.receptance(freq, names, names)
+        size = dict(zip(whole.joint.names, (one.value for one in whole.joint.quantities), strict=True))
+        joint = jf.Joint([size["k_y"], size["k_theta"]], [size["c_y"], size["c_theta"]], ["y", "theta"])
+        found = jf.plan_joint_frfs(freq, exact, joint, noise=0.01)
+        values = []
+        for draw in range(draws):
+            h = jf.pollute(exact, 0.01, seed=1000 * seed + draw)
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                fit = jf.identify(freq, h, joint.dofs, damping="viscous", noise=0.01)
+            values.append([fit.value[name] for name in found.value])
+        ratio = np.std(values, axis=0, ddof=1) / list(found.std_error.values())
+        shown = ", ".join(f"{one:.2f}" for one in ratio)
+        print(f"| {seed} | {shown} |", flush=True)
+
+
+def of_grids(seeds: int) -> None:
+    """Print what a proposed set needs beside a grid of equal spacing with the same error."""
+    print("| structure | candidates | sensors + hits | FRFs | error, % | grid: sensors + hits | FRFs | of its FRFs |")
+    print("|---|---|---|---|---|---|---|---|")
+    for seed in range(seeds):
+        whole, candidates, freq = structure(seed)
+        found = jf.plan(whole, freq, candidates, candidates, noise=0.01, budget=6)
+        test = found.proposed
+        numbers = np.arange(len(candidates))
+        best = None
+        for n, m in sorted(itertools.product(numbers[1:], numbers[1:]), key=sum):
+            if best is not None and n + m >= best[0] + best[1]:
+                break
+            sensors, hits = (
+                [candidates[i] for i in np.unique(np.round(np.linspace(0, len(candidates) - 1, k)).astype(int))]
+                for k in (n, m)
+            )
+            even = jf.plan(whole, freq, sensors, hits, noise=0.01, sensors=sensors, hits=hits).proposed
+            if even.error <= test.error:
+                best = n, m
+        needed = (len(test.sensors), len(test.hits))
+        count = needed[0] * needed[1]
+        shown, frfs, ratio = "none", "", ""
+        if best is not None:
+            on_grid = best[0] * best[1]
+            shown, frfs, ratio = f"{best[0]} + {best[1]}", str(on_grid), f"{count / on_grid:.2f}"
+        print(
+            f"| {seed} | {len(candidates)} | {needed[0]} + {needed[1]} | {count} | {100 * test.error:.2g} | {shown} | "
+            f"{frfs} | {ratio} |", flush=True,
+        )  # fmt: skip
+
+
+def main() -> None:
+    """Print the tables."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--draws", type=int, default=400)
+    parser.add_argument("--structures", type=int, default=10)
+    args = parser.parse_args()
+    of_grids(args.structures)
+    print()
+    of_draws(min(args.structures, 4), args.draws)
+    print()
+    of_joint_frfs(min(args.structures, 4), args.draws)
+
+
+if __name__ == "__main__":
+    main()
