@@ -34,7 +34,7 @@ from jointfrf.laws.joint_toml import read_joint_table, start_values
 from jointfrf.laws.law_joint import LawJoint
 from jointfrf.models.facts import model_facts
 from jointfrf.models.model import Model
-from jointfrf.models.points import PointModel
+from jointfrf.models.points import PointModel, PointPatch
 from jointfrf.spelling import did_you_mean
 from jointfrf.toml.declared import read_keys
 from jointfrf.toml.table import TomlTable, read_toml
@@ -109,6 +109,13 @@ class AssemblyPart:
     def places(self) -> dict[str, FloatArray]:
         """Where its nodes and reference points are, m, as far as it is known."""
         return self.structure.places
+
+    @property
+    def joint_patch(self) -> PointPatch | None:
+        """The patch of nodes whose reference point all its joint DOFs are of; None where there is none."""
+        nodes = {dof.rpartition(":")[0] for dof in self.keys.joint}
+        patches = self.structure.patches if isinstance(self.structure, ModelStructure) else ()
+        return next((one for one in patches if nodes == {one.name}), None)
 
     def describe(self) -> list[str]:
         """Say what shows that files hold the right thing, line by line; nothing of parts that are built or measured."""

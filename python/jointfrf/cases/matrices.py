@@ -128,7 +128,8 @@ class MatricesKeys(SubstructureKeys, tag="matrices"):
         ]
         if patches:
             model = self.build(lambda: couple_points(model, patches), "point")
-        return ModelStructure(model, about=_about(paths, stored, units, held, len(file.turned)))
+        about = _about(paths, stored, units, held, len(file.turned))
+        return ModelStructure(model, about=about, patches=tuple(patches))
 
     def _path(self, name: str) -> Path:
         """Return the path of a file of matrices, with the name of one in it where that is said."""

@@ -11,7 +11,7 @@ import numpy as np
 from jointfrf.frf.frf_set import Channel, FrfSet
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.models.model import Model
-from jointfrf.models.points import PointModel
+from jointfrf.models.points import PointModel, PointPatch
 from jointfrf.toml.declared import Keys
 
 __all__ = ["MeasuredStructure", "ModelStructure", "Structure", "SubstructureKeys"]
@@ -54,11 +54,14 @@ class ModelStructure(Structure):
         Positions of the nodes along a beam, m.
     about : str
         Which files it is of; empty for models that are built.
+    patches : tuple of PointPatch
+        Nodes of its reference points.
     """
 
     model: Model
     x: FloatArray | None = None
     about: str = ""
+    patches: tuple[PointPatch, ...] = ()
 
     @property
     def places(self) -> dict[str, FloatArray]:

@@ -174,7 +174,8 @@ def add_card_arguments(parser: CommandParser) -> None:
     parser.option("--units SYSTEM", "units of the model: SI, mm-t-s or mm-kg-ms (SI)", get_args(UnitSystemName))
     parser.option(
         "--faces J1,J2,...:K1,K2,...",
-        "nodes of solid elements that follow the two nodes as rigid bodies (without it such cards are a comment)",
+        "nodes of solid elements that follow the two nodes as rigid bodies (with --model those of rigid reference "
+        "points of the joint; without any such cards are a comment)",
         _faces,
     )
     parser.option("--element N", "first number of new elements (1)", positive, 1)

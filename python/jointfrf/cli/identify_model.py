@@ -22,6 +22,8 @@ from jointfrf.errors import ConvergenceWarning, FileContentError, Identification
 from jointfrf.files import write_file
 from jointfrf.identification.record import fit_to_dict, write_record
 from jointfrf.identification.result import Fit, columns_of
+from jointfrf.io.model_units import model_units
+from jointfrf.kernel.arguments import FloatArray
 from jointfrf.report.fit_page import write_report
 
 __all__ = ["add_model_arguments", "run_model"]
@@ -140,7 +142,7 @@ def _one(args: argparse.Namespace, out: Output) -> tuple[Fit, dict[str, Any], li
         out.say("", fit)
         out.warn(*fit.warnings)
     if request is not None:
-        text = written_cards(fit, request, [f"from {source}"])
+        text = written_cards(fit, request, [f"from {source}", *_place_of_joint(measured, request)])
         if args.output is None:
             out.say("", text.rstrip("\n"))
         else:
@@ -167,7 +169,39 @@ def _one(args: argparse.Namespace, out: Output) -> tuple[Fit, dict[str, Any], li
 
 def _request(args: argparse.Namespace, measured: MeasuredAssembly) -> CardRequest | None:
     joint = measured.assembly.joint
-    return card_request(args, joint.dofs, damping="none", cross="zero", points=None)
+    if args.export is not None and args.faces is None:
+        args.faces = _rigid_faces(measured)
+    return card_request(args, joint.dofs, damping="none", cross="zero", points=_joint_places(measured))
+
+
+def _rigid_faces(measured: MeasuredAssembly) -> tuple[list[int], list[int]] | None:
+    """Return the nodes that follow the reference points of the joint as rigid bodies; None where they do not on a side.
+
+    Where a number is that of a node on both sides, the model of the assembly must have other numbers.
+    """
+    patches = [part.joint_patch for part in measured.parts]
+    nodes = [[int(n) for n in one.nodes] for one in patches if one is not None and one.coupling == "rigid"]
+    return (nodes[0], nodes[1]) if len(nodes) == 2 and not {*nodes[0]} & {*nodes[1]} else None
+
+
+def _joint_places(measured: MeasuredAssembly) -> FloatArray | None:
+    """Return where the joint is on both sides, m; None where it is not known, or at several nodes of a side."""
+    found = []
+    for part in measured.parts:
+        nodes = {dof.rpartition(":")[0] for dof in part.keys.joint}
+        found += [part.places[node] for node in nodes if len(nodes) == 1 and node in part.places]
+    return np.array(found) if len(found) == 2 else None
+
+
+def _place_of_joint(measured: MeasuredAssembly, request: CardRequest) -> list[str]:
+    """Say where the nodes of the joint must be, unless it was said where they are."""
+    places = _joint_places(measured)
+    if places is None or "positions" in request.options:
+        return []
+    own = model_units(request.options["units"])
+    words = [", ".join(f"{x:.6g}" for x in at / own.length + 0.0) for at in places]
+    j, k = request.nodes
+    return [f"node {j} lies at ({words[0]}), node {k} at ({words[1]}) {own.words.partition(',')[0]}"]
 
 
 def _look_at(measured: MeasuredAssembly) -> None:

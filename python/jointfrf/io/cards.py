@@ -15,7 +15,7 @@ from jointfrf.io.model_units import ModelUnits, UnitSystemName, model_units
 from jointfrf.kernel.arguments import FloatArray, as_nodes, as_real, check_choice
 from jointfrf.spelling import visible
 
-__all__ = ["CardFormat", "CardOptions", "spring_cards"]
+__all__ = ["CardFormat", "CardOptions", "face_cards", "spring_cards"]
 
 CardFormat = Literal["abaqus", "calculix", "nastran", "ansys"]
 
@@ -246,27 +246,45 @@ def _bodies(program: CardFormat, link: _Link) -> list[str]:
         if not link.has_arms:
             return []
         mark = {"nastran": "$", "ansys": "!"}.get(program, "**")
-        drawn = _body_cards(program, link, ("(nodes of the face on side j)", "(nodes of the face on side k)"))
+        names = ("(nodes of the face on side j)", "(nodes of the face on side k)")
+        drawn = _body_cards(program, link.nodes, names, link.element, link.number)
         hint = "solid elements have no rotations: let nodes of their faces follow j and k, as in"
         return [f"{mark} {hint}", *(f"{mark}   {line}" for line in drawn)]
-    return _body_cards(program, link, link.faces)
+    return _body_cards(program, link.nodes, link.faces, link.element, link.number)
 
 
-def _body_cards(program: CardFormat, link: _Link, faces: tuple[Sequence[int] | str, Sequence[int] | str]) -> list[str]:
+def face_cards(program: CardFormat, nodes: Sequence[int], options: CardOptions) -> str:
+    """Make the nodes of a joint move with faces of solid elements, where `faces` names these; as `spring_cards`."""
+    two = _two_nodes("nodes", nodes)
+    faces = _faces(options.get("faces"), two)
+    if faces is None:
+        return ""
+    element, number = _number("element", options.get("element", 1)), _number("number", options.get("number", 1))
+    every = (*two, *(options.get("rotation_nodes") or ()))
+    return "\n".join(_body_cards(program, every, faces, element, number)) + "\n"
+
+
+def _body_cards(
+    program: CardFormat,
+    nodes: Sequence[int],
+    faces: tuple[Sequence[int] | str, Sequence[int] | str],
+    element: int,
+    number: int,
+) -> list[str]:
     lines: list[str] = []
-    for side, face, node in zip("JK", faces, link.nodes, strict=False):
-        name = f"JOINT{link.number}_{side}"
+    for side, face, node in zip("JK", faces, nodes, strict=False):
+        name = f"JOINT{number}_{side}"
         words = [face] if isinstance(face, str) else [str(one) for one in face]
         rows = [", ".join(words[at : at + _IN_A_LINE]) for at in range(0, len(words), _IN_A_LINE)]
         if program in ("abaqus", "calculix"):
             lines += [f"*NSET, NSET={name}", *(f"{row}," if row != rows[-1] else row for row in rows)]
         if program == "calculix":
-            turning = f", ROT NODE={link.nodes[2 + 'JK'.index(side)]}" if len(link.nodes) > 2 else ""
+            turning = f", ROT NODE={nodes[2 + 'JK'.index(side)]}" if len(nodes) > 2 else ""
             lines.append(f"*RIGID BODY, NSET={name}, REF NODE={node}{turning}")
         elif program == "abaqus":
             lines.append(f"*RIGID BODY, REF NODE={node}, PIN NSET={name}")
         elif program == "nastran":
-            fields = [str(link.element + 1 + "JK".index(side)), str(node), "123", *words]
+            fields = [str(element + 1 + "JK".index(side)), str(node), "123", *words]
             lines += _small("RBE2", fields)
         else:
             lines += [f"CERIG,{node},{word},UXYZ" for word in words]

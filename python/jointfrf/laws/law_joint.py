@@ -308,7 +308,7 @@ class LawJoint:
     def export(
         self, program: CardFormat, nodes: Sequence[int], *, freq_hz: float | None = None, **options: Unpack[CardOptions]
     ) -> str:
-        """Write the joint as input of a finite-element program, in SI units.
+        """Write the joint as input of a finite-element program.
 
         Parameters
         ----------
@@ -324,8 +324,8 @@ class LawJoint:
         Returns
         -------
         str
-            Springs and dashpots as by `Joint.export`; rigid DOFs as equations between the nodes; masses as point masses
-            on both nodes.
+            Springs and dashpots as by `Joint.export`; rigid DOFs as equations between the nodes, their rotations in
+            CalculiX between the `rotation_nodes`; masses as point masses on both nodes.
 
         Raises
         ------
@@ -359,10 +359,15 @@ class LawJoint:
             cards = springs.export(program, nodes, **options)
             text += cards
             element += len(cards.splitlines())  # beyond every element that these lines name
+        else:
+            from jointfrf.io.cards import face_cards  # readers of files take their time to import
+
+            text += face_cards(program, nodes, options)
         if self.rigid:
-            text += _equations(program, comment, self.rigid, nodes, number)
+            turning = options.get("rotation_nodes")
+            text += _equations(program, comment, self.rigid, (*nodes, *(() if turning is None else turning)), number)
         if self.mass:
-            from jointfrf.io.model_units import model_units  # readers of files take their time to import
+            from jointfrf.io.model_units import model_units
 
             own = model_units(options.get("units", "SI"))
             scaled = {dof: mass / own.mass for dof, mass in self.mass.items()}
@@ -371,17 +376,21 @@ class LawJoint:
 
 
 def _equations(program: CardFormat, comment: str, rigid: Sequence[str], nodes: Sequence[int], number: int) -> str:
-    """Return u_j - u_k = 0 of each rigid DOF."""
+    """Return u_j - u_k = 0 of each rigid DOF; in CalculiX rotations are displacements of the ROT NODEs."""
     places = [int(place) for place in direction_places(rigid)]
-    if program == "calculix" and max(places) > 2:
-        raise ValueError("calculix has no rotations at nodes: rigid rotations cannot be written")
-    j, k = nodes
+    if program == "calculix" and max(places) > 2 and len(nodes) < 4:
+        raise ValueError(
+            "rotation_nodes must name the ROT NODEs of the two rigid bodies: calculix has rotations nowhere else"
+        )
+    j, k = nodes[:2]
     names = ", ".join(DIRECTIONS[place] for place in places)
     lines = [f"{comment} rigid DOFs {names}: one equation each, written by jointfrf"]
     if program == "nastran":
         lines.append(f"$ case control: MPC = {number}")
     for place in places:
-        if program in ("abaqus", "calculix"):
+        if program == "calculix" and place > 2:
+            lines += ["*EQUATION", "2", f"{nodes[2]}, {place - 2}, 1., {nodes[3]}, {place - 2}, -1."]
+        elif program in ("abaqus", "calculix"):
             lines += ["*EQUATION", "2", f"{j}, {place + 1}, 1., {k}, {place + 1}, -1."]
         elif program == "nastran":
             lines.append(f"MPC     {number:8d}{k:8d}{place + 1:8d}{-1.0:8.1f}{j:8d}{place + 1:8d}{1.0:8.1f}")

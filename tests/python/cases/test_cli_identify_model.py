@@ -6,6 +6,7 @@ import json
 import re
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,7 +14,9 @@ import pytest
 import jointfrf as jf
 from command import run_command
 from jointfrf.assembly_file.read import read_assembly_file
+from jointfrf.cli.identify_model import _rigid_faces
 from jointfrf.io import read_frfs, write_frfs
+from jointfrf.models.points import PointPatch
 
 CASES = Path(__file__).resolve().parents[3] / "cases"
 LAP = CASES / "lap-beam"
@@ -108,6 +111,17 @@ def test_one_test_in_several_files_with_all_that_is_written(tmp_path):
     assert "responses: 11:+y = A/1:y, 12:+y = A/15:y" in text
     assert re.search(r"eta_theta_z +0\.00", text)
     assert run("--quiet", *halves, *MODEL).stdout == ""
+
+
+@pytest.mark.parametrize(
+    ("k", "coupling", "expected"),
+    [(("5", "6"), "rigid", ([1, 2], [5, 6])), (("2", "6"), "rigid", None), (("5", "6"), "distributing", None)],
+)
+def test_rigid_points_of_the_joint_are_the_faces_of_cards(k, coupling, expected):
+    """Not where both parts have a node of one number, which the whole model cannot have."""
+    patches = [PointPatch("lap", ("1", "2"), "rigid"), PointPatch("lap", k, coupling)]
+    parts = tuple(SimpleNamespace(joint_patch=one) for one in patches)
+    assert _rigid_faces(SimpleNamespace(parts=parts)) == expected
 
 
 def test_a_file_that_cannot_be_read_leaves_the_others(tmp_path):

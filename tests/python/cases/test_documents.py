@@ -6,30 +6,17 @@ import shutil
 import subprocess
 import sys
 import tomllib
-from pathlib import Path
 
 import pytest
 
 import jointfrf as jf
 from assembly_keys import assembly_page
 from command import run_command
+from documents import DOCUMENTS, README, ROOT, agree, blocks
 from jointfrf.assembly_file.keys import AssemblyKeys
 from jointfrf.cli.main import main
 from jointfrf.toml.declared import read_keys
 from jointfrf.toml.table import TomlTable
-
-ROOT = Path(__file__).resolve().parents[3]
-DOCUMENTS = {
-    str(path.relative_to(ROOT)): path.read_text(encoding="utf-8")
-    for path in sorted(
-        [*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("cases/*/README.md"), ROOT / "fortran/README.md"]
-    )
-}
-README = DOCUMENTS["README.md"]
-
-
-def blocks(language: str, text: str = README) -> list[str]:
-    return re.findall(rf"```{language}\n(.*?)```", text, re.DOTALL)
 
 
 def test_python_of_the_readme_prints_what_it_shows(capsys):
@@ -122,26 +109,6 @@ def test_convert_prints_what_is_shown(capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert main([*arguments, file, target]) == 0
     assert capsys.readouterr().out == expected
-
-
-def words(text: str) -> list[float | str]:
-    """Words of a text, numbers as numbers; rules of dashes left out."""
-    found: list[float | str] = []
-    for word in text.split():
-        if set(word) == {"-"}:
-            continue
-        try:
-            found.append(float(word.rstrip(",:)")))
-        except ValueError:
-            found.append(word)
-    return found
-
-
-def agree(printed: str, expected: str) -> None:
-    """The same words, and numbers as far as the fit settles on any processor."""
-    assert len(words(printed)) == len(words(expected))
-    for found, said in zip(words(printed), words(expected), strict=True):
-        assert found == (pytest.approx(said, rel=0.05) if isinstance(said, float) else said)
 
 
 def test_measured_file_gives_the_output_shown(tmp_path):

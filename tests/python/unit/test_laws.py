@@ -158,8 +158,13 @@ def test_cards_say_what_they_cannot_represent():
         "nastran", (1, 2), freq_hz=9.0
     )
     assert "CE,NEXT,0,1,UX,1,2,UX,-1" in mount.export("ansys", (1, 2), freq_hz=9.0, damping=False)
-    with pytest.raises(ValueError, match="rigid rotations cannot be written"):
+    with pytest.raises(ValueError, match="rotation_nodes must name the ROT NODEs"):
         jf.LawJoint({}, rigid=["theta_x"]).export("calculix", (1, 2))
+    turning = jf.LawJoint({}, rigid=["y", "theta_x"]).export(
+        "calculix", (1, 2), rotation_nodes=(3, 4), faces=([5], [6])
+    )
+    assert turning.count("*EQUATION\n2\n3, 1, 1., 4, 1, -1.") == turning.count("\n1, 2, 1., 2, 2, -1.") == 1
+    assert "*NSET, NSET=JOINT1_J\n5\n*RIGID BODY, NSET=JOINT1_J, REF NODE=1, ROT NODE=3\n" in turning
     with pytest.raises(ValueError, match="a point mass is the same in all directions"):
         jf.LawJoint({}, rigid=["x", "y"], mass={"x": 1.0, "y": 2.0}).export("abaqus", (1, 2))
     with pytest.raises(ValueError, match="a mass in y"):

@@ -43,6 +43,19 @@ def problem_of(whole, level=0.02):
     return prepare_model_fit(FREQ, h, whole, Channels(CHANNELS, CHANNELS), NoiseOptions(level, None, None), ())
 
 
+def test_errors_that_make_a_mass_negative_are_no_minimum():
+    """A step of the fit may try them: it ended the fit with an error of LAPACK."""
+    problem = problem_of(assembly(TRUTH, exact=False))
+    for side in problem.prediction.sides:
+        side.allow_errors(30)
+    vector = _with_errors(problem.vector, problem.prediction, 0.01)
+    values = vector.values.copy()
+    values[[i for i, one in enumerate(vector.all) if one.is_error]] = -5.0
+    likelihood = replace(problem.likelihood, vector=vector)
+    assert likelihood.cost(vector.to_coordinates(values)) == np.inf
+    assert np.isfinite(likelihood.cost(vector.to_coordinates(vector.values)))
+
+
 def test_derivatives_by_the_errors_are_differences_of_frfs():
     problem = problem_of(assembly(TRUTH, exact=False))
     for side in problem.prediction.sides:

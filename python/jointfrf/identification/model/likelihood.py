@@ -64,8 +64,11 @@ class WeightedResiduals(ABC):
         """Return minus the derivative of the weighted difference by the predicted FRFs."""
 
     def cost(self, x: FloatArray) -> float:
-        """Return the sum of the squares; inf where a line is singular."""
-        y = self.prediction.frfs(self.vector, self.vector.to_values(x))
+        """Return the sum of the squares; inf where a line is singular, or errors of a model make its mass negative."""
+        try:
+            y = self.prediction.frfs(self.vector, self.vector.to_values(x))
+        except np.linalg.LinAlgError:
+            return np.inf
         squares = _squares(self.difference(y) * self.weight) + float((self.vector.pulls(x) ** 2).sum())
         return squares if np.isfinite(squares) else np.inf
 
