@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,11 +15,14 @@ from jointfrf.errors import FileContentError
 from jointfrf.frf.bands import in_bands
 from jointfrf.frf.frf_set import Channel, FrfSet
 from jointfrf.identification.identify_model import identify_model
-from jointfrf.identification.model.assembly import Assembly
+from jointfrf.identification.model.assembly import AddedMass, Assembly
 from jointfrf.identification.model.substructure import Unknown
-from jointfrf.identification.result import Fit
+from jointfrf.identification.result import Fit, columns_of
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, check_type
 from jointfrf.spelling import did_you_mean
+
+if TYPE_CHECKING:
+    from jointfrf.report.sketch import SketchedPart
 
 __all__ = ["MeasuredAssembly", "measured_assembly"]
 
@@ -64,6 +69,23 @@ class MeasuredAssembly:
     parts: tuple[AssemblyPart, AssemblyPart]
     located: tuple[str, ...]
 
+    @property
+    def sketched(self) -> tuple[SketchedPart, SketchedPart]:
+        """Both parts as `write_report` draws them."""
+        a, b = (part.sketched(letter) for letter, part in zip("AB", self.parts, strict=True))
+        return a, b
+
+    def describe(self) -> list[str]:
+        """Say in words what a sketch shows, and what the files of the parts hold, line by line.
+
+        Where the joint is, and what is measured, driven and attached at which node; which node each position is;
+        mass, centre of gravity, rigid motions, natural frequencies of parts from files, and what looks wrong.
+        """
+        parts = dict(zip("AB", self.parts, strict=True))
+        lines = [_joint_words(self.assembly, parts), *columns_of(_node_rows(self, parts)), *self.located]
+        lines += [f"{name}: {line}" for name, part in parts.items() for line in part.describe()]
+        return lines + ([f"not used: {', '.join(self.unused)}"] if self.unused else [])
+
     def fit(self, *, noise: float | None = None) -> Fit:
         """Identify the joint, as `identify_model` does.
 
@@ -78,6 +100,47 @@ class MeasuredAssembly:
             force_gains=self.force_gains, fixed=self.fixed, noise=noise,
             coherence=coherence, averages=averages,
         )  # fmt: skip
+
+
+def _joint_words(assembly: Assembly, parts: Mapping[str, AssemblyPart]) -> str:
+    """Say between which nodes the joint acts, where they are, and how."""
+    ends = []
+    for name, part in parts.items():
+        nodes = dict.fromkeys(dof.rpartition(":")[0] for dof in part.keys.joint)
+        ends.append(", ".join(f"{name}/{node}{_at(part, node)}" for node in nodes))
+    joint = assembly.joint
+    kinds = [f"rigid {', '.join(joint.rigid)}"] if joint.rigid else []
+    kinds += [f"{law.word} {', '.join(dict.fromkeys(pair))}" for pair, law in joint.laws.items()]
+    return f"joint between {ends[0]} and {ends[1]}: {'; '.join(kinds)}"
+
+
+def _at(part: AssemblyPart, node: str) -> str:
+    at = part.places.get(node)
+    return "" if at is None else f" at ({_numbers(at)}) m"
+
+
+def _numbers(at: FloatArray) -> str:
+    return ", ".join(f"{x:.5g}" for x in np.round(at, 9) + 0.0)
+
+
+def _node_rows(own: MeasuredAssembly, parts: Mapping[str, AssemblyPart]) -> list[tuple[str, ...]]:
+    """Return a row for each node where something is measured, driven or attached."""
+    what: dict[str, list[str]] = {}
+    for kind, channels in zip(("response", "force"), own.channels, strict=True):
+        for dof, channel in channels.items():
+            node, _, direction = dof.rpartition(":")
+            what.setdefault(node, []).append(f"{kind} {direction} ({channel})")
+    for one in own.assembly.attachments:
+        for node in dict.fromkeys(dof.rpartition(":")[0] for dof in one.places):
+            what.setdefault(node, []).append("mass" if isinstance(one, AddedMass) else "spring to the ground")
+    rows: list[tuple[str, ...]] = [("node", "place, m", "from the joint, m", "what")]
+    for name, words in what.items():
+        part, node = parts[name[0]], name[2:]
+        ends = [part.places[end] for dof in part.keys.joint if (end := dof.rpartition(":")[0]) in part.places]
+        at = part.places.get(node)
+        away = "" if at is None or not ends else f"{np.linalg.norm(at - np.mean(ends, axis=0)):.4g}"
+        rows.append((name, "" if at is None else _numbers(at), away, ", ".join(words)))
+    return rows
 
 
 def measured_assembly(

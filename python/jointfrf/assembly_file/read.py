@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple, get_args
+from typing import TYPE_CHECKING, Any, NamedTuple, get_args
 
 import msgspec
 import numpy as np
@@ -38,6 +38,9 @@ from jointfrf.models.points import PointModel, PointPatch
 from jointfrf.spelling import did_you_mean
 from jointfrf.toml.declared import read_keys
 from jointfrf.toml.table import TomlTable, read_toml
+
+if TYPE_CHECKING:
+    from jointfrf.report.sketch import SketchedPart
 
 __all__ = ["AssemblyFile", "AssemblyPart", "check_dofs", "named_dof", "read_assembly_file", "read_part", "unknown_of"]
 
@@ -116,6 +119,12 @@ class AssemblyPart:
         nodes = {dof.rpartition(":")[0] for dof in self.keys.joint}
         patches = self.structure.patches if isinstance(self.structure, ModelStructure) else ()
         return next((one for one in patches if nodes == {one.name}), None)
+
+    def sketched(self, letter: str) -> SketchedPart:
+        """Return it as a sketch draws it."""
+        from jointfrf.report.sketch import SketchedPart  # reports take their time to import
+
+        return SketchedPart(letter, self.places, [dof.rpartition(":")[0] for dof in self.keys.joint])
 
     def describe(self) -> list[str]:
         """Say what shows that files hold the right thing, line by line; nothing of parts that are built or measured."""
@@ -351,14 +360,16 @@ class AssemblyFile:
         FileContentError
             No node is there.
         """
-        said: dict[str, str] = {}
+        said: dict[str, None] = {}
 
         def named(keys: Any, key: str, dof: str) -> str:
             part = {"A/@": parts[0], "B/@": parts[1]}.get(dof[:3])
             if part is None:
                 return dof
             found: NamedDof = keys.build(lambda: named_dof(part, dof[2:]), key)
-            said[dof] = f"{dof} is {dof[:2]}{found.dof}, {1e3 * (found.away or 0.0):.3g} mm away"
+            at, node = (name.rpartition(":")[0] for name in (dof, found.dof))
+            text = f"{at} is {dof[:2]}{node}, {1e3 * (found.away or 0.0):.3g} mm away"
+            said[text] = None
             return dof[:2] + found.dof
 
         own = self.keys
@@ -372,7 +383,7 @@ class AssemblyFile:
             response_gains={named(own, "response_gains", dof): prior for dof, prior in own.response_gains.items()},
             force_gains={named(own, "force_gains", dof): prior for dof, prior in own.force_gains.items()},
         )
-        return replace(self, keys=keys), tuple(said.values())
+        return replace(self, keys=keys), tuple(said)
 
     def check_values(self) -> None:
         """Raise a FileContentError where a law has no values: a fit starts anywhere, a plan needs what is expected."""

@@ -153,7 +153,8 @@ def _one(args: argparse.Namespace, out: Output) -> tuple[Fit, dict[str, Any], li
     if args.report is not None:
         ends = (1, 2) if args.export is None else args.export[1]
         args.report.parent.mkdir(parents=True, exist_ok=True)
-        written.append(write_report(fit, args.report, source=source, command=args.typed, nodes=ends))
+        written.append(write_report(fit, args.report, source=source, command=args.typed, nodes=ends,
+                                    parts=measured.sketched))  # fmt: skip
     if args.out is not None:
         from jointfrf.report.fit import write_fit
 
@@ -214,13 +215,7 @@ def _look_at(measured: MeasuredAssembly) -> None:
 def _heading(args: argparse.Namespace, measured: MeasuredAssembly) -> Iterator[str]:
     """Say what is identified from what."""
     yield f"{file_names(args)}: {len(measured.responses)} responses x {len(measured.forces)} forces; {args.model.name}"
-    for what, own in zip(("responses", "forces"), measured.channels, strict=True):
-        yield f"{what}: " + ", ".join(f"{channel} = {dof}" for dof, channel in own.items())
-    yield from measured.located
-    for name, part in zip("AB", measured.parts, strict=True):
-        yield from (f"{name}: {line}" for line in part.describe())
-    if measured.unused:
-        yield f"not used: {', '.join(measured.unused)}"
+    yield from measured.describe()
 
 
 def _rows(fit: Fit) -> Iterator[tuple[str, str, float, float, float, float]]:

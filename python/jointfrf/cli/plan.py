@@ -24,7 +24,6 @@ from jointfrf.planning.assemblies import assemblies_needed, expected_half_width
 from jointfrf.planning.joint_frfs import plan_joint_frfs
 from jointfrf.planning.plan import plan
 from jointfrf.report.plan_page import write_plan
-from jointfrf.report.sketch import SketchedPart
 
 __all__ = ["add_arguments", "run"]
 
@@ -131,10 +130,7 @@ def run(args: argparse.Namespace) -> int:
         )  # fmt: skip
     written = []
     if args.report is not None:
-        sketched = [
-            SketchedPart(letter, part.places, [dof.rpartition(":")[0] for dof in part.keys.joint])
-            for letter, part in zip("AB", parts, strict=True)
-        ]
+        sketched = [part.sketched(letter) for letter, part in zip("AB", parts, strict=True)]
         written.append(write_plan(found, args.report, parts=sketched, command=args.typed))
     out.say(found)
     needed = None

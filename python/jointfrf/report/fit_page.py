@@ -34,7 +34,7 @@ from jointfrf.report.fit_frfs import (
     residual_map,
 )
 from jointfrf.report.receptance import noise_figure
-from jointfrf.report.sketch import interface_points, interface_sketch, point_table
+from jointfrf.report.sketch import SketchedPart, assembly_sketch, interface_points, interface_sketch, point_table
 from jointfrf.report.table import Cell, Table
 
 __all__ = [
@@ -64,15 +64,22 @@ _PROGRAMS = {"abaqus": "Abaqus", "calculix": "CalculiX", "nastran": "Nastran", "
 
 @dataclass(frozen=True)
 class ReportOptions:
-    """What a report says beside the fit: the file measured, the command typed, nodes j and k of cards."""
+    """What a report says beside the fit: the file measured, the command typed, nodes j and k of cards, parts drawn."""
 
     source: str = ""
     command: str = ""
     nodes: Sequence[int] = (1, 2)
+    parts: Sequence[SketchedPart] = ()
 
 
 def write_report(
-    fit: Fit, path: Path | str, *, source: str = "", command: str = "", nodes: Sequence[int] = (1, 2)
+    fit: Fit,
+    path: Path | str,
+    *,
+    source: str = "",
+    command: str = "",
+    nodes: Sequence[int] = (1, 2),
+    parts: Sequence[SketchedPart] = (),
 ) -> Path:
     """Write a page on a fit: one HTML file with all that is needed to judge and to quote the joint, no link to another.
 
@@ -87,6 +94,9 @@ def write_report(
         How the fit was made, as typed.
     nodes : sequence of two or four int
         Nodes j and k of the finite-element cards; then ROT NODEs of CalculiX.
+    parts : sequence of SketchedPart
+        Both parts of an assembly with the places of their nodes, as `MeasuredAssembly.sketched`: they are drawn with
+        channels and joint.
 
     Returns
     -------
@@ -103,7 +113,10 @@ def write_report(
         The file cannot be written.
     """
     check_type("fit", fit, Fit)
-    write_file(Path(path), make_document(fit_document(fit, ReportOptions(source, command, nodes))))
+    check_type("parts", parts, Sequence)
+    for part in parts:
+        check_type("parts", part, SketchedPart)
+    write_file(Path(path), make_document(fit_document(fit, ReportOptions(source, command, nodes, parts))))
     return Path(path)
 
 
@@ -147,7 +160,7 @@ def _model_sections(fit: Fit, options: ReportOptions) -> list[Section]:
     return [
         _summary(fit),
         _doubts(fit),
-        Section("joint", "Channels", [_channels(fit)]),
+        Section("joint", "Channels", [*_drawn(fit, options.parts), _channels(fit)]),
         Section(
             "stiffness",
             "Stiffness and compliance over frequency",
@@ -159,6 +172,12 @@ def _model_sections(fit: Fit, options: ReportOptions) -> list[Section]:
         Section("cards", "Input of finite-element programs", _cards(fit, options.nodes)),
         Section("made", "How this was made", [_made(fit, options)]),
     ]
+
+
+def _drawn(fit: Fit, parts: Sequence[SketchedPart]) -> list[Part]:
+    names = {dof: dof for dof in (*fit.responses, *fit.forces)}
+    sketch = assembly_sketch(parts, fit.responses, fit.forces, names) if parts else None
+    return [] if sketch is None else [sketch]
 
 
 def _channels(fit: Fit) -> Table:

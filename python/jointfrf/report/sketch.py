@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from html import escape
 from typing import NamedTuple
 
 import numpy as np
@@ -200,10 +201,10 @@ def _spring(first: FloatArray, last: FloatArray) -> str:
     return f'<path class="joint open" {look} transform="matrix({place})" d="{_SPRING}"/>'
 
 
-def _axes() -> str:
+def _axes(view: FloatArray = _VIEW) -> str:
     """Draw the axes of space in the corner."""
     drawn = []
-    for letter, direction in zip("xyz", _VIEW.T, strict=True):
+    for letter, direction in zip("xyz", view.T, strict=True):
         step = direction * (1, -1) * 26
         a, b = np.array(_CORNER) + 1.38 * step
         drawn.append(_arrow("axis", *_CORNER, step))
@@ -223,7 +224,9 @@ class SketchedPart(NamedTuple):
 _MOST_NODES = 400
 
 
-def assembly_sketch(parts: Sequence[SketchedPart], sensors: Sequence[str], hits: Sequence[str]) -> Sketch | None:
+def assembly_sketch(
+    parts: Sequence[SketchedPart], sensors: Sequence[str], hits: Sequence[str], names: Mapping[str, str] | None = None
+) -> Sketch | None:
     """Draw both parts of an assembly, sensors and hits; None where places of nodes are not known.
 
     Parameters
@@ -232,6 +235,8 @@ def assembly_sketch(parts: Sequence[SketchedPart], sensors: Sequence[str], hits:
         The second is moved to where its nodes at the joint lie on those of the first.
     sensors, hits : sequence of str
         DOFs ``"A/7:y"``.
+    names : mapping of str to str, optional
+        What is written beside DOFs.
     """
     ends = [[part.places[node] for node in part.joint if node in part.places] for part in parts]
     if not all(ends):
@@ -241,12 +246,14 @@ def assembly_sketch(parts: Sequence[SketchedPart], sensors: Sequence[str], hits:
         {node: at - np.mean(end, axis=0) + reference for node, at in part.places.items()}
         for part, end in zip(parts, ends, strict=True)
     ]
-    flat = np.array([at for own in moved for at in own.values()]) @ _VIEW.T
+    every = np.array([at for own in moved for at in own.values()])
+    view = _view_along(int(np.argmax(np.ptp(every, axis=0))))
+    flat = every @ view.T
     extent, middle = np.ptp(flat, axis=0), (flat.min(axis=0) + flat.max(axis=0)) / 2
     scale = min((size - 2 * _MARGIN) / max(e, _SAME) for size, e in zip((_WIDTH, _HEIGHT), extent, strict=True))
 
     def at(place: FloatArray, side: int) -> FloatArray:
-        right, up = (place @ _VIEW.T - middle) * scale
+        right, up = (place @ view.T - middle) * scale
         return np.array([_WIDTH / 2 + right, _HEIGHT / 2 - up + (2 * side - 1) * _LIFT])
 
     drawn = [f"<defs>{_HEADS}</defs>"]
@@ -255,17 +262,22 @@ def assembly_sketch(parts: Sequence[SketchedPart], sensors: Sequence[str], hits:
         spots = (at(place, side) for place in list(own.values())[::step])
         drawn += [f'<circle class="{"jk"[side]} node" cx="{x:.1f}" cy="{y:.1f}" r="1.6"/>' for x, y in spots]
     letters = [part.letter for part in parts]
+    labels: dict[str, tuple[float, float]] = {}
     for dofs, draw in ((hits, _hit), (sensors, _sensor)):
         for dof in dofs:
             letter, _, rest = dof.partition("/")
             node, _, direction = rest.rpartition(":")
             side = letters.index(letter)
             if node in moved[side]:
-                drawn.append(draw("jk"[side], at(moved[side][node], side), _on_page(direction)))
-    drawn += [_spring(at(reference, 0), at(reference, 1)), _axes()]
+                spot = at(moved[side][node], side)
+                drawn.append(draw("jk"[side], spot, _on_page(direction, view)))
+                if names and dof in names:
+                    labels.setdefault(names[dof], (float(spot[0]) + 9, float(spot[1]) + (20 if side else -12)))
+    drawn += [f'<text x="{x:.1f}" y="{y:.1f}">{escape(name)}</text>' for name, (x, y) in labels.items()]
+    drawn += [_spring(at(reference, 0), at(reference, 1)), _axes(view)]
     svg = f'<svg viewBox="0 -6 {_WIDTH:g} {_HEIGHT + 6:g}" aria-hidden="true">{"".join(drawn)}</svg>'
     caption = (
-        f"Nodes of {letters[0]} and of {letters[1]} (below it, where they meet); squares: sensors; arrows: hits; "
+        f"Nodes of {letters[0]} and of {letters[1]} (drawn below it, where they meet); squares: sensors; arrows: hits; "
         "spring: the joint"
     )
     words = f"Sensors at {', '.join(sensors)}; hits at {', '.join(hits)}."
@@ -276,14 +288,20 @@ def assembly_sketch(parts: Sequence[SketchedPart], sensors: Sequence[str], hits:
 _LIFT = 9.0
 
 
-def _on_page(direction: str) -> FloatArray:
+def _view_along(axis: int) -> FloatArray:
+    """Return directions on the page of x, y and z, with one of them to the right: never a mirror image."""
+    right, up, away = _VIEW.T
+    return np.array([[right, up, away], [away, right, up], [-away, up, right]][axis]).T
+
+
+def _on_page(direction: str, view: FloatArray) -> FloatArray:
     """Return the step on the page of a direction such as ``y``; up where it is none in space."""
     try:
         name = direction_names([direction.lstrip("+-")])[0]
         unit = np.eye(6)[DIRECTIONS.index(name)][:3]
     except ValueError:
         unit = np.zeros(3)
-    step = (_VIEW @ unit) * (1, -1)
+    step = (view @ unit) * (1, -1)
     return np.asarray(step if unit.any() else np.array([0.0, -1.0]))
 
 

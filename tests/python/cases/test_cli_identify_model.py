@@ -108,7 +108,9 @@ def test_one_test_in_several_files_with_all_that_is_written(tmp_path):
     assert "PBUSH" in cards.read_text()
     assert "predicted by the models" in page.read_text()
     text = run(*halves, *MODEL).stdout
-    assert "responses: 11:+y = A/1:y, 12:+y = A/15:y" in text
+    assert "joint between A/25 at (0.36, 0, 0) m and B/1 at (0, 0, 0) m: rigid y; spring theta_z" in text
+    assert re.search(r"A/15  0\.21, 0, 0  0\.15 +response y \(12:\+y\), mass", text)
+    assert 'aria-label="Sketch of the assembly' in page.read_text()
     assert re.search(r"eta_theta_z +0\.00", text)
     assert run("--quiet", *halves, *MODEL).stdout == ""
 

@@ -3,6 +3,7 @@
 import json
 import re
 import warnings
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from jointfrf.assembly_file.read import read_assembly_file
 from jointfrf.errors import FileContentError
 from jointfrf.io import Channel, FrfSet, write_frfs
 from jointfrf.report.fit_page import ReportOptions, finding_sentences, fit_document
+from jointfrf.report.sketch import _view_along, assembly_sketch
 from jointfrf.toml.documents import schema_of
 
 FREQ = np.linspace(0.5, 10, 300)
@@ -443,7 +445,41 @@ def test_dofs_by_position_are_the_nearest_nodes_and_said(tmp_path, frfs):
     assert measured.assembly.a.joint == ("7:y", "7:theta")
     assert [one.places for one in measured.assembly.attachments] == [("B/5:y",), ("A/1:theta",)]
     assert list(measured.force_gains) == ["A/3:y"]
-    assert "A/@0.102,0.001,0:y is A/3:y, 2.24 mm away" in measured.located
+    assert "A/@0.102,0.001,0 is A/3, 2.24 mm away" in measured.located
+
+
+def test_the_sketch_in_words_and_on_the_page(tmp_path, frfs):
+    measured = jf.measured_assembly(written(tmp_path, BEAMS), frfs)
+    lines = measured.describe()
+    assert lines[0] == "joint between A/7 at (0.3, 0, 0) m and B/1 at (0, 0, 0) m: spring y; spring theta"
+    rows = [re.split(r" {2,}", line.strip()) for line in lines]
+    assert ["A/3", "0.1, 0, 0", "0.2", "response y (11:+x), force y (11:+x)"] in rows
+    assert ["A/1", "0, 0, 0", "0.3", "spring to the ground"] in rows
+    sketch = assembly_sketch(measured.sketched, measured.responses, measured.forces, {"A/3:y": "<tip>"})
+    assert (sketch.svg.count("<rect"), sketch.svg.count("&lt;tip&gt;"), sketch.svg.count(" node")) == (2, 1, 7 + 5)
+    # B goes on where A ends: the sensor at its end is the farthest to the right.
+    places = [float(x) for x in re.findall(r'<rect class="[jk]" x="([\d.]+)"', sketch.svg)]
+    nodes = [float(x) for x in re.findall(r' node" cx="([\d.]+)"', sketch.svg)]
+    assert places[0] < np.median(nodes) < places[1]
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_a_sketch_is_turned_and_not_mirrored(axis):
+    plain, turned = _view_along(0), _view_along(axis)
+    turn = np.zeros((3, 3))
+    for i, j, sign in product(range(3), range(3), (1, -1)):
+        if np.allclose(turned[:, i], sign * plain[:, j]):
+            turn[j, i] = sign
+    np.testing.assert_allclose(plain @ turn, turned)
+    assert np.linalg.det(turn) == pytest.approx(1)
+    np.testing.assert_allclose(turned[:, axis], plain[:, 0])
+
+
+def test_parts_of_a_page_that_are_none(tmp_path, frfs):
+    fit = jf.measured_assembly(written(tmp_path), frfs).fit()
+    for parts in (3, ["A"]):
+        with pytest.raises(TypeError, match="parts must be a"):
+            jf.write_report(fit, tmp_path / "page.html", parts=parts)
 
 
 @pytest.mark.parametrize(
