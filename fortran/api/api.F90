@@ -47,9 +47,10 @@ module jointfrf
   use, intrinsic :: iso_c_binding, only: c_char, c_double, c_double_complex
   use jointfrf_api_work       ! generated from this file; what is public of it is named below
   use jointfrf_arguments, only: as_lines, as_matrix, is_transposed, lower, spread_text
+  use jointfrf_bodies, only: couple_bodies
   use jointfrf_brick, only: brick_matrices, brick_quality
   use jointfrf_checks, only: check_brick_matrices, check_brick_quality, check_central_difference, &
-    check_compliance_covariance, check_compliance_factors, check_couple, check_decouple, &
+    check_compliance_covariance, check_compliance_factors, check_couple, check_couple_bodies, check_decouple, &
     check_difference_weights, check_expect_on_joint, check_fit_diagonal_joint, check_invert, check_joint_forms, &
     check_joint_normal_equations, check_matrices, check_modify, check_monte_carlo, check_pollute, &
     check_project_on_joint, check_rational_fit, check_receptance, check_receptance_banded, &
@@ -83,7 +84,7 @@ module jointfrf
   public :: jf_set_engine, jf_get_engine
   public :: jf_invert, jf_solve
   public :: jf_receptance, jf_receptance_banded, jf_receptance_modal
-  public :: jf_couple, jf_modify, jf_find_modification
+  public :: jf_couple, jf_couple_bodies, jf_modify, jf_find_modification
   public :: jf_ismm, jf_inverse_substructuring, jf_decouple
   public :: jf_joint_compliance, jf_compliance_factors, jf_compliance_covariance
   public :: jf_project_on_joint, jf_expect_on_joint, jf_joint_forms, jf_fit_diagonal_joint, &
@@ -370,6 +371,51 @@ contains
     end if
     call release_traps(host)
   end subroutine jf_couple
+
+  !> Receptances of bodies connected all at once, by stiffnesses and rigidly, in loops and to the ground: dual assembly.
+  !> Row m of the connections takes the motion u = x_plus - x_minus of two DOFs, of one where the other is the ground.
+  !> Its connection has forces f with S f = T u: S = 1 and T = K* where it gives way, S = 0 and T = 1 where it is rigid.
+  !> n_body       number of bodies
+  !> n_row        number of rows of all connections
+  !> n_h, n_t     numbers of a line in h and in t
+  !> n_out, n_in  number of wanted responses and forces
+  !> sizes        number of DOFs of each body, shape (n_body); their squares have the sum n_h
+  !> ends         DOFs plus and minus of each row, shape (2, n_row), counted from 1 through all bodies; 0 for the ground
+  !> connection   number of the connection of each row, shape (n_row), from 1 on without gaps; squares of how many rows
+  !>              they have sum to n_t
+  !> rigid        1 for a row without S, 0 for the others, shape (n_row)
+  !> h            receptances of the bodies, one after the other, shape (n_h, n_freq), m/N
+  !> t            T of the connections, one after the other, shape (n_t, n_freq), N/m; 1 where they are rigid
+  !> outputs      responses that are wanted, shape (n_out): DOFs counted from 1, none twice, bodies in their order
+  !> inputs       forces that are wanted, shape (n_in), likewise
+  !> h_c          shape (n_out, n_in, n_freq), or (n_in, n_out, n_freq) with trans 'T'
+  subroutine jf_couple_bodies(trans, n_body, n_row, n_h, n_t, n_out, n_in, n_freq, sizes, ends, connection, rigid, h, &
+                              t, outputs, inputs, h_c, line_info, rcond, info) bind(C, name='jf_couple_bodies_')
+    character(kind=c_char), intent(in) :: trans
+    integer(ip), intent(in) :: n_body, n_row, n_h, n_t, n_out, n_in, n_freq
+    integer(ip), intent(in) :: sizes(n_body), ends(2, n_row), connection(n_row), rigid(n_row)
+    complex(c_double_complex), target, intent(in) :: h(n_h, n_freq), t(n_t, n_freq)
+    integer(ip), intent(in) :: outputs(n_out), inputs(n_in)
+    complex(c_double_complex), target, intent(inout) :: h_c(*)
+    integer(ip), intent(out) :: line_info(n_freq)
+    real(c_double), intent(out) :: rcond(n_freq)
+    integer(ip), intent(out) :: info
+    complex(c_double_complex), pointer, contiguous :: lines(:, :, :)
+    type(host_state) :: host
+
+    call hold_traps(host)
+    info = check_couple_bodies(trans, n_body, n_row, n_h, n_t, n_out, n_in, n_freq, sizes, ends, connection, rigid, &
+                               outputs, inputs)
+    if (info == info_good) then
+      call as_lines(trans, n_out, n_in, n_freq, h_c, lines)
+      if (is_transposed(trans)) then
+        call couple_bodies(sizes, ends, connection, rigid, h, t, inputs, outputs, lines, line_info, rcond, info)
+      else
+        call couple_bodies(sizes, ends, connection, rigid, h, t, outputs, inputs, lines, line_info, rcond, info)
+      end if
+    end if
+    call release_traps(host)
+  end subroutine jf_couple_bodies
 
   !> Receptance of a locally modified structure. Eqs. (2.34)-(2.36).
   !> n       number of DOFs

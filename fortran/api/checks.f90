@@ -16,7 +16,7 @@ module jointfrf_checks
   implicit none
   private
   public :: check_invert, check_solve, check_receptance, check_receptance_banded, check_receptance_modal
-  public :: check_couple, check_modify, check_matrices, check_decouple, check_compliance_factors
+  public :: check_couple, check_couple_bodies, check_modify, check_matrices, check_decouple, check_compliance_factors
   public :: check_compliance_covariance, check_expect_on_joint, check_fit_diagonal_joint, check_joint_forms
   public :: check_joint_normal_equations
   public :: check_project_on_joint
@@ -118,6 +118,91 @@ contains
     if (out_of_range(dofs_b, n_b) .or. repeated(dofs_b)) info = -10
     if (out_of_range(dofs_a, n_a) .or. repeated(dofs_a)) info = -9
   end function check_couple
+
+  pure function check_couple_bodies(trans, n_body, n_row, n_h, n_t, n_out, n_in, n_freq, sizes, ends, connection, &
+                                    rigid, outputs, inputs) result(info)
+    character(kind=c_char), intent(in) :: trans
+    integer(ip), intent(in) :: n_body, n_row, n_h, n_t, n_out, n_in, n_freq
+    integer(ip), intent(in) :: sizes(:), ends(:, :), connection(:), rigid(:), outputs(:), inputs(:)
+    integer(ip) :: info
+    integer(long) :: n
+
+    info = info_good
+    if (bad_size(n_freq)) info = -8
+    if (bad_size(n_in)) info = -7
+    if (bad_size(n_out)) info = -6
+    if (bad_size(n_t)) info = -5
+    if (bad_size(n_h)) info = -4
+    if (bad_size(n_row)) info = -3
+    if (bad_size(n_body) .or. n_body < 1) info = -2
+    if (unknown_order(trans)) info = -1
+    if (info /= info_good) return
+    n = sum(int(sizes, long))
+    if (bad_wanted(inputs)) info = -16
+    if (bad_wanted(outputs)) info = -15
+    if (any(rigid < 0 .or. rigid > 1)) info = -12
+    if (bad_connections()) info = -11
+    if (any(ends < 0 .or. ends > n) .or. any(ends(1, :) < 1 .or. ends(1, :) == ends(2, :))) info = -10
+    if (any(sizes < 1 .or. sizes > n_h)) info = -9
+    if (info /= info_good) return
+    if (squares(connection) /= n_t) info = -5
+    if (sum(int(sizes, long)**2) /= n_h) info = -4
+
+  contains
+
+    !> Whether wanted DOFs do not exist, are there twice, or are not in the order of the bodies.
+    pure function bad_wanted(dofs) result(bad)
+      integer(ip), intent(in) :: dofs(:)
+      logical :: bad
+      integer :: b, i
+      integer(long) :: last
+
+      bad = any(dofs < 1 .or. dofs > n)
+      if (bad) return
+      bad = repeated(dofs)
+      b = 1
+      last = sizes(1)
+      do i = 1, size(dofs)
+        do while (dofs(i) > last)
+          b = b + 1
+          last = last + sizes(b)
+        end do
+        bad = bad .or. dofs(i) <= last - sizes(b)
+      end do
+    end function bad_wanted
+
+    !> Whether connections are not numbered from 1 on, row after row.
+    pure function bad_connections() result(bad)
+      logical :: bad
+      integer :: m
+      integer(ip) :: before
+
+      bad = .false.
+      before = 0
+      do m = 1, size(connection)
+        bad = bad .or. connection(m) < before .or. connection(m) > before + 1 .or. connection(m) < 1
+        before = connection(m)
+      end do
+    end function bad_connections
+
+    !> Sum of the squares of how many rows connections have.
+    pure function squares(of) result(total)
+      integer(ip), intent(in) :: of(:)
+      integer(long) :: total, rows
+      integer :: m
+
+      total = 0
+      rows = 0
+      do m = 1, size(of)
+        rows = rows + 1
+        if (m < size(of)) then
+          if (of(m + 1) == of(m)) cycle
+        end if
+        total = total + rows**2
+        rows = 0
+      end do
+    end function squares
+  end function check_couple_bodies
 
   pure function check_modify(trans, n, n_m, n_freq, dofs) result(info)
     character(kind=c_char), intent(in) :: trans

@@ -105,6 +105,7 @@ from jointfrf.studies.design import StudyDesign
 from jointfrf.studies.result import StudyResult, read_study
 from jointfrf.studies.run import merge_studies, study
 from jointfrf.studies.summary import ParameterSummary
+from jointfrf.substructuring.bodies import BodyLink, FreeBody, couple_bodies
 from jointfrf.substructuring.compliance import (
     MultiPointJoint,
     compliance_covariance,
@@ -125,6 +126,7 @@ __all__ = [
     "Assembly",
     "AssemblyPart",
     "BandStatistics",
+    "BodyLink",
     "Bolt",
     "BoltedLap",
     "BrokenPoolError",
@@ -145,6 +147,7 @@ __all__ = [
     "FitStart",
     "FittedParameter",
     "FractionalZener",
+    "FreeBody",
     "FrfCheck",
     "FrfCheckWarning",
     "FrfFinding",
@@ -210,6 +213,7 @@ __all__ = [
     "compliance_covariance",
     "compliance_factors",
     "couple",
+    "couple_bodies",
     "decouple",
     "difference_error",
     "difference_weights",

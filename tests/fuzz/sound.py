@@ -197,6 +197,13 @@ def _identification(arrays: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
         "cards": {"fit": found, "program": "nastran", "nodes": [1, 2]},
         "plot": {"fit": found},
         "write_report": {"fit": found, "path": "fit.html"},
+        "FreeBody": {"h": np.full((3, 1, 1), 0.5), "dofs": ["x"]},
+        "BodyLink": {"joint": jf.Joint([3.0], dofs=["x"]), "first": ["A/x"], "second": ["B/x"]},
+        "couple_bodies": {
+            "freq_hz": [1.0, 2.0, 3.0], "bodies": {name: jf.FreeBody(np.full((3, 1, 1), 0.5), ["x"]) for name in "AB"},
+            "links": [jf.BodyLink(jf.Joint([3.0], dofs=["x"]), ["A/x"], ["B/x"])],
+            "responses": ["B/x"], "forces": ["A/x"],
+        },
         "plan": {
             "assembly": assembly, "freq_hz": freq, "responses": ["A/1:x", "B/2:x"], "forces": ["A/1:x", "B/2:x"],
             "targets": ["k_x"], "budget": 3.0, "sensor_mass": 0.01, "hits": ["B/2:x"],

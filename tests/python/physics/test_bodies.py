@@ -1,0 +1,151 @@
+"""Many bodies and joints coupled at once: against one model of the whole, and two at a time."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import jointfrf as jf
+
+FREQ = np.linspace(1.0, 40.0, 25)
+
+
+def chain_body(masses, springs, dampers) -> jf.FreeBody:
+    model = jf.chain(masses, springs, dampers, ground="both")
+    return jf.FreeBody(model.receptance(FREQ), model.dofs)
+
+
+def whole(m: np.ndarray, k: np.ndarray, c: np.ndarray) -> np.ndarray:
+    omega = 2 * np.pi * FREQ[:, None, None]
+    return np.linalg.inv(k + 1j * omega * c - omega**2 * m)
+
+
+@pytest.fixture
+def bodies() -> dict[str, jf.FreeBody]:
+    return {
+        "A": chain_body([2.0, 3.0], [3e3, 2e3, 1e3], [1.0, 1.0, 2.0]),
+        "B": chain_body([1.0, 4.0, 2.0], [2e3, 5e3, 1e3, 1e3], [1.0, 2.0, 1.0, 1.0]),
+        "C": chain_body([5.0], [2e3, 1e3], [3.0, 1.0]),
+    }
+
+
+def matrices() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """M, K and C of the three bodies side by side."""
+    parts = [
+        jf.chain([2.0, 3.0], [3e3, 2e3, 1e3], [1.0, 1.0, 2.0], ground="both"),
+        jf.chain([1.0, 4.0, 2.0], [2e3, 5e3, 1e3, 1e3], [1.0, 2.0, 1.0, 1.0], ground="both"),
+        jf.chain([5.0], [2e3, 1e3], [3.0, 1.0], ground="both"),
+    ]
+    found = np.zeros((3, 6, 6))
+    first = 0
+    for part in parts:
+        own = slice(first, first + len(part.dofs))
+        for target, matrix in zip(found, (part.mass, part.stiffness, part.damping), strict=True):
+            target[own, own] = matrix.toarray() if hasattr(matrix, "toarray") else matrix
+        first = own.stop
+    return found[0], found[1], found[2]
+
+
+def between(a: int, b: int | None) -> np.ndarray:
+    row = np.zeros(6)
+    row[a] = 1
+    if b is not None:
+        row[b] = -1
+    return np.outer(row, row)
+
+
+def test_a_ring_with_a_spring_to_the_ground_is_one_model(bodies):
+    m, k, c = matrices()
+    links = [
+        jf.BodyLink(jf.Joint([4e3], [2.0], ["x"]), ["A/2:x"], ["B/1:x"]),
+        jf.BodyLink(jf.Joint([1e3], [1.0], ["x"]), ["B/3:x"], ["C/1:x"]),
+        jf.BodyLink(jf.Joint([2e3], [3.0], ["x"]), ["C/1:x"], ["A/1:x"]),
+        jf.BodyLink(jf.Joint([5e2], [0.5], ["x"]), ["B/2:x"]),
+        jf.BodyLink(jf.Joint([7e2], [0.1], ["x"]), ["B/1:x"], ["B/3:x"]),  # within a body
+    ]
+    for a, b, own_k, own_c in (
+        (1, 2, 4e3, 2.0),
+        (4, 5, 1e3, 1.0),
+        (5, 0, 2e3, 3.0),
+        (3, None, 5e2, 0.5),
+        (2, 4, 7e2, 0.1),
+    ):
+        k, c = k + own_k * between(a, b), c + own_c * between(a, b)
+    assert_allclose(jf.couple_bodies(FREQ, bodies, links), whole(m, k, c), rtol=1e-9, atol=1e-16)
+
+
+def test_rigid_dofs_and_the_mass_of_a_joint(bodies):
+    m, k, c = matrices()
+    law = jf.LawJoint({"x": jf.SpringLaw(3e3, 1.0)}, mass={"x": 0.5})
+    links = [
+        jf.BodyLink(jf.LawJoint({}, rigid=["x"]), ["A/2:x"], ["B/1:x"]),
+        jf.BodyLink(law, ["B/3:x"], ["C/1:x"]),
+        jf.BodyLink(law, ["A/1:x"]),
+    ]
+    for a, b in ((4, 5), (0, None)):
+        k, c = k + 3e3 * between(a, b), c + between(a, b)
+    m[4, 4] += 0.25
+    m[5, 5] += 0.25
+    m[0, 0] += 0.25
+    join = np.eye(6)[:, [0, 1, 3, 4, 5]]
+    join[2, 1] = 1  # x of B/1 is that of A/2
+    expected = join @ whole(*(join.T @ one @ join for one in (m, k, c))) @ join.T
+    assert_allclose(jf.couple_bodies(FREQ, bodies, links), expected, rtol=1e-8, atol=1e-15)
+
+
+def test_two_bodies_are_as_couple_says_and_one_after_the_other_as_at_once(bodies):
+    first, second = jf.Joint([4e3], [2.0], ["x"]), jf.Joint([1e3], [1.0], ["x"])
+    ab = jf.couple(bodies["A"].h, bodies["B"].h, first.dynamic_stiffness(FREQ), [1], [0])
+    abc = jf.couple(ab, bodies["C"].h, second.dynamic_stiffness(FREQ), [4], [0])
+    links = [jf.BodyLink(first, ["A/2:x"], ["B/1:x"]), jf.BodyLink(second, ["B/3:x"], ["C/1:x"])]
+    found = jf.couple_bodies(FREQ, bodies, links)
+    assert_allclose(found, abc, rtol=1e-10, atol=1e-16)
+    names = ["C/1:x", "A/2:x", "B/2:x"]
+    some = jf.couple_bodies(FREQ, bodies, links, names, ["B/1:x", "A/1:x"])
+    assert_allclose(some, found[:, [5, 1, 3]][:, :, [2, 0]], rtol=1e-12)
+
+
+def test_frfs_that_are_not_symmetric_and_a_body_that_is_free(bodies):
+    rng = np.random.default_rng(2)
+    h = {name: np.asarray(body.h) * (1 + 0.1 * rng.standard_normal(np.shape(body.h))) for name, body in bodies.items()}
+    uneven = {name: jf.FreeBody(own, bodies[name].dofs) for name, own in h.items()}
+    joint = jf.Joint([[4e3, 1e3], [2e3, 3e3]], dofs=["x", "y"])
+    found = jf.couple_bodies(FREQ, uneven, [jf.BodyLink(joint, ["A/1:x", "A/2:x"], ["B/3:x", "B/1:x"])])
+    expected = jf.couple(h["A"], h["B"], joint.dynamic_stiffness(FREQ), [0, 1], [2, 0])
+    assert_allclose(found[:, :5, :5], expected, rtol=1e-10, atol=1e-16)
+    assert_allclose(found[:, 5:, 5:], h["C"])
+    assert not found[:, 5:, :5].any()
+
+
+def test_a_constraint_that_is_there_twice_is_singular(bodies):
+    rigid = jf.LawJoint({}, rigid=["x"])
+    links = [jf.BodyLink(rigid, ["A/2:x"], ["B/1:x"])] * 2
+    with pytest.raises(jf.SingularLineError):
+        jf.couple_bodies(FREQ, bodies, links)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"links": [jf.BodyLink(jf.Joint([1.0]), ["A/9:x"])]}, "links: no body has a DOF 'A/9:x'"),
+        ({"links": [jf.BodyLink(jf.Joint([1.0]), ["A/1:x"], ["A/1:x"])]}, "A/1:x is connected with itself"),
+        ({"responses": ["A/1:x", "A/1:x"]}, "responses must name each DOF once"),
+        ({"bodies": {"A/": jf.FreeBody(np.ones((25, 1, 1)), ["x"])}}, "names without '/'"),
+        ({"links": []}, "links must hold at least one BodyLink"),
+        ({"freq_hz": [1.0]}, "body A must have 1 lines as freq_hz, not 25"),
+    ],
+)
+def test_wrong_bodies_are_refused(bodies, change, message):
+    links = [jf.BodyLink(jf.Joint([1.0]), ["A/1:x"])]
+    with pytest.raises(ValueError, match=message):
+        jf.couple_bodies(**({"freq_hz": FREQ, "bodies": bodies, "links": links} | change))
+
+
+def test_wrong_parts_are_refused():
+    with pytest.raises(ValueError, match="dofs must name the 2 DOFs of h"):
+        jf.FreeBody(np.ones((1, 2, 2)), ["x"])
+    with pytest.raises(ValueError, match="second must name 1 DOFs as the joint has, not 2"):
+        jf.BodyLink(jf.Joint([1.0]), ["A/x"], ["B/x", "B/y"])
+    h = np.ones((25, 1, 1), complex)
+    h[3] = np.nan
+    with pytest.raises(ValueError, match="line"):
+        jf.couple_bodies(FREQ, {"A": jf.FreeBody(h, ["x"])}, [jf.BodyLink(jf.Joint([1.0]), ["A/x"])])
