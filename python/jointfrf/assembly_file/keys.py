@@ -6,6 +6,7 @@ from typing import Annotated, Any
 
 from msgspec import field
 
+from jointfrf.assembly_file.modes import ModesKeys
 from jointfrf.cases.substructures import BeamKeys, BrickBeamKeys, ChainKeys, MatricesKeys, ReceptancesKeys
 from jointfrf.toml.declared import Keys, NotNegative, Positive, key
 
@@ -106,7 +107,17 @@ class ReceptancesPart(ReceptancesKeys, tag="receptances"):
     joint: _JointDofs
 
 
-PartKeys = ChainPart | BeamPart | BrickBeamPart | MatricesPart | ReceptancesPart
+class ModesPart(ModesKeys, tag="modes"):
+    """Modes of the part, measured or computed: dataset 55 of Universal Files, or arrays in NPZ files.
+
+    They are taken as exact. All modes near the band must be there, and `residuals` for those beyond it: FRFs at a
+    joint depend on them.
+    """
+
+    joint: _JointDofs
+
+
+PartKeys = ChainPart | BeamPart | BrickBeamPart | MatricesPart | ReceptancesPart | ModesPart
 
 
 class MassKeys(Keys):

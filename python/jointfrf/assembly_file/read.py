@@ -16,12 +16,14 @@ from numpy.typing import ArrayLike
 from jointfrf.assembly_file.keys import (
     AssemblyKeys,
     MatricesPart,
+    ModesPart,
     PartKeys,
     Prior,
     PriorKeys,
     ReceptancesPart,
     Unknowns,
 )
+from jointfrf.assembly_file.modes import ModalStructure
 from jointfrf.cases.substructures import MeasuredStructure, ModelStructure, Structure
 from jointfrf.dofs import is_rotation
 from jointfrf.frf.frf_set import Channel
@@ -102,6 +104,8 @@ class AssemblyPart:
             if isinstance(self.structure, ModelStructure):
                 self.structure.model.ports(dof)
                 return True
+            if isinstance(self.structure, ModalStructure):
+                return dof in self.structure.modes.dofs
             assert isinstance(self.structure, MeasuredStructure)
             channel = Channel.parse(dof)
             return self.structure.frfs.has(channel, channel)
@@ -127,7 +131,9 @@ class AssemblyPart:
         return SketchedPart(letter, self.places, [dof.rpartition(":")[0] for dof in self.keys.joint])
 
     def describe(self) -> list[str]:
-        """Say what shows that files hold the right thing, line by line; nothing of parts that are built or measured."""
+        """Say what shows that files hold the right thing, line by line; nothing of parts that are built or of FRFs."""
+        if isinstance(self.structure, ModalStructure):
+            return list(self.structure.about)
         if not isinstance(self.structure, ModelStructure) or not self.structure.about:
             return []
         facts = model_facts(self.structure.model)
@@ -140,7 +146,7 @@ class AssemblyPart:
     def substructure(self, freq_hz: FloatArray, dofs: Sequence[str]) -> Substructure:
         """Return the substructure with its unknowns; of FRFs, those between its joint and these DOFs."""
         keys = self.keys
-        if isinstance(keys, ReceptancesPart):
+        if isinstance(keys, ReceptancesPart | ModesPart):
             named = list(dict.fromkeys([*keys.joint, *dofs]))
             h = keys.build(lambda: self.structure.receptance(freq_hz, named), "file")
             return keys.build(lambda: Substructure.of_frfs(freq_hz, h, named, keys.joint))
@@ -159,7 +165,7 @@ class AssemblyPart:
     def _priors(self) -> Mapping[str, Prior]:
         """Return what is unknown by the names of the numbers of this part."""
         keys = self.keys
-        assert not isinstance(keys, ReceptancesPart)
+        assert not isinstance(keys, ReceptancesPart | ModesPart)
         takes = ["length_scale"] if isinstance(keys, MatricesPart) else []
         takes += [one.name for one in msgspec.structs.fields(keys) if isinstance(getattr(keys, one.name), float)]
         meant = dict(_MEANT)
@@ -212,7 +218,9 @@ def named_dof(part: AssemblyPart, dof: str) -> NamedDof:
         at = np.zeros(0)
     if at.shape != (3,) or not np.isfinite(at).all():
         raise ValueError(f"{dof} must be a position and a direction, @x,y,z:y in m")
-    held = {*part.structure.model.dofs} if isinstance(part.structure, ModelStructure) else None
+    held = None
+    if isinstance(part.structure, ModelStructure):
+        held = {*part.structure.model.dofs, *getattr(part.structure.model, "shown", ())}
     nodes = {
         node: place
         for node, place in part.places.items()

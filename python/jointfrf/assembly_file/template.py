@@ -11,7 +11,7 @@ TEMPLATE = """\
 # All keys: docs/assembly-keys.md. Then: jointfrf identify TEST.uff --model assembly.toml
 
 [A]                                 # side j of the joint
-model = "beam"                      # or chain, brick-beam, matrices, receptances
+model = "beam"                      # or chain, brick-beam, matrices, modes, receptances
 length = 0.3                        # m
 elements = 12
 ends = ["clamped", "free"]
@@ -49,6 +49,14 @@ joint = ["1:y", "1:theta"]
 # name = "bolt"
 # set = "BOLT"                      # *NSET of b.inp; or nodes = [11, 12, 13], or box = [x, y, z, x, y, z]
 # coupling = "distributing"         # RBE3; or "rigid", RBE2
+
+# A part whose modes or FRFs were measured:
+#
+# [B]
+# model = "modes"                   # or "receptances", with file = "part.uff"
+# file = "part_modes.uff"           # dataset 55; or .npz of sdypy-EMA, pyOMA2 with modal masses, scripts
+# residuals = "part.uff"            # FRFs of the part, for the modes that are not in the file
+# joint = ["1:y", "1:theta_z"]
 
 [[joint.law]]
 dof = "y"

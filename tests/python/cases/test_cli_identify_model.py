@@ -199,10 +199,13 @@ def test_a_new_assembly_is_read_as_it_is(tmp_path):
     # What stands in comments, too, is read: keys and values are known.
     text = (folder / "assembly.toml").read_text()
     assert read_assembly_file(folder / "assembly.toml").joint.dofs == ("y", "theta_z")
-    files = re.sub(r"(?m)^# ?", "", text[text.index("# [B]") : text.index("[[joint.law]]")])
-    own = text[: text.index("[B]   ")] + files + text[text.index("[[joint.law]]") :]
-    (folder / "files.toml").write_text(own)
-    assert read_assembly_file(folder / "files.toml").keys.B.units == "mm-t-s"
+    commented = text[text.index("# [B]") : text.index("[[joint.law]]")].split("# A part whose modes")
+    read = []
+    for part in commented:
+        files = re.sub(r"(?m)^# ?", "", part[part.index("# [B]") :])
+        (folder / "files.toml").write_text(text[: text.index("[B]   ")] + files + text[text.index("[[joint.law]]") :])
+        read.append(read_assembly_file(folder / "files.toml").keys.B)
+    assert (read[0].units, read[1].residuals) == ("mm-t-s", "part.uff")
     # A simulated test of it gives its joint.
     truth = read_assembly_file(folder / "assembly.toml")
     freq = np.arange(10.0, 600.0, 4.0)

@@ -268,7 +268,7 @@ def without(*lines: str) -> str:
         (ASSEMBLY.replace("masses", "mases", 1), r"\[A\]: unknown key 'mases'.*did you mean 'masses'"),
         (ASSEMBLY.replace("[channels]", "[chanels]"), "unknown key 'chanels'.*did you mean 'channels'"),
         (ASSEMBLY.replace('"chain"', '"chian"', 1), r"\[A\]: model must be one of chain, beam, brick-beam, matrices, "
-         "receptances, not 'chian'"),
+         "receptances, modes, not 'chian'"),
         (ASSEMBLY.replace("0.02", "-0.02"), r"\[A\]: unknown must be .* positive .*not {'youngs_modulus': -0.02}"),
         (ASSEMBLY.replace("youngs_modulus", "young"), r"\[A\]: unknown: young: there is no such number.*loss_factor"),
         (ASSEMBLY.replace('["2:x"]', '["3:x"]'), r"\[A\]: joint: A has no DOF '3:x'"),

@@ -174,6 +174,13 @@ def test_patches_by_set_numbers_and_box(tmp_path, model, patch):
     assert part.places["tip"].shape == (3,)
 
 
+def test_a_node_that_follows_a_rigid_point_is_found_by_its_place(tmp_path, model):
+    """The nearest other node was taken for it."""
+    where = ",".join(f"{x:.12g}" for x in model.places["2"])
+    more = f'joint = ["@{where}:y"]\n[[point]]\nname = "tip"\ncoupling = "rigid"\nnodes = [1, 2, 79, 80]\n'
+    assert jf.read_part(part_toml(tmp_path, model, more=more)).keys.joint == ("2:y",)
+
+
 @pytest.mark.parametrize(
     ("patch", "message"),
     [
