@@ -195,14 +195,18 @@ def _joint_places(measured: MeasuredAssembly) -> FloatArray | None:
 
 
 def _place_of_joint(measured: MeasuredAssembly, request: CardRequest) -> list[str]:
-    """Say where the nodes of the joint must be, unless it was said where they are."""
+    """Say where the nodes of the joint must be, unless that was given, and what they follow."""
+    spread = [f"{name}/{patch.name}" for name, part in zip("AB", measured.parts, strict=True)
+              if (patch := part.joint_patch) is not None and patch.coupling == "distributing"]  # fmt: skip
+    said = [f"{' and '.join(spread)}: the joint acts on the mean motion of the nodes: connect its node to them by a "
+            "distributing coupling (RBE3), which adds no stiffness"] if spread else []  # fmt: skip
     places = _joint_places(measured)
     if places is None or "positions" in request.options:
-        return []
+        return said
     own = model_units(request.options["units"])
     words = [", ".join(f"{x:.6g}" for x in at / own.length + 0.0) for at in places]
     j, k = request.nodes
-    return [f"node {j} lies at ({words[0]}), node {k} at ({words[1]}) {own.words.partition(',')[0]}"]
+    return [*said, f"node {j} lies at ({words[0]}), node {k} at ({words[1]}) {own.words.partition(',')[0]}"]
 
 
 def _look_at(measured: MeasuredAssembly) -> None:

@@ -14,7 +14,8 @@ import pytest
 import jointfrf as jf
 from command import run_command
 from jointfrf.assembly_file.read import read_assembly_file
-from jointfrf.cli.identify_model import _rigid_faces
+from jointfrf.cli.export import CardRequest
+from jointfrf.cli.identify_model import _place_of_joint, _rigid_faces
 from jointfrf.io import read_frfs, write_frfs
 from jointfrf.models.points import PointPatch
 
@@ -124,6 +125,19 @@ def test_rigid_points_of_the_joint_are_the_faces_of_cards(k, coupling, expected)
     patches = [PointPatch("lap", ("1", "2"), "rigid"), PointPatch("lap", k, coupling)]
     parts = tuple(SimpleNamespace(joint_patch=one) for one in patches)
     assert _rigid_faces(SimpleNamespace(parts=parts)) == expected
+
+
+@pytest.mark.parametrize(("coupling", "said"), [("rigid", 1), ("distributing", 2)])
+def test_cards_say_where_the_nodes_of_the_joint_lie_and_what_they_follow(coupling, said):
+    parts = tuple(
+        SimpleNamespace(joint_patch=PointPatch("lap", ("1", "2"), coupling), keys=SimpleNamespace(joint=("lap:y",)),
+                        places={"lap": np.array([0.01, x, 0.0])}) for x in (0.0, -0.002)
+    )  # fmt: skip
+    options = {"units": "mm-t-s"}
+    lines = _place_of_joint(SimpleNamespace(parts=parts), CardRequest("nastran", [7, 8], options, False, None))
+    assert lines[-1] == "node 7 lies at (10, 0, 0), node 8 at (10, -2, 0) mm"
+    assert len(lines) == said
+    assert said == 1 or lines[0].startswith("A/lap and B/lap: the joint acts on the mean motion of the nodes")
 
 
 def test_a_file_that_cannot_be_read_leaves_the_others(tmp_path):

@@ -1,6 +1,8 @@
 """Statics and natural frequencies against CalculiX, where it is installed (Debian: calculix-ccx)."""
 
 import shutil
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -8,11 +10,12 @@ from scipy.sparse import csc_array
 from scipy.sparse.linalg import splu
 
 import jointfrf as jf
-from calculix_deck import deck, displacements, frequency_step, natural_frequencies, static_step, stored_matrices
+from calculix_deck import deck, displacements, frequency_step, natural_frequencies, run, static_step, stored_matrices
 from jointfrf.solids.bolted_lap import BODIES, LapDivisions, bolted_lap
 from jointfrf.solids.brick import Material
 from jointfrf.solids.brick_beam import brick_beam
 from jointfrf.solids.contact import ContactLaw
+from jointfrf.solids.mesh import extrude, rectangle
 from jointfrf.solids.preload import preload
 
 CCX = shutil.which("ccx")
@@ -87,6 +90,56 @@ def test_matrices_that_calculix_stores_give_its_frequencies(tmp_path):
     assert f"mass {0.3 * 0.025 * 0.006 * 2700:.4g} kg, centre of gravity" in lines
     assert "6 rigid motions are free" in lines
     assert "warning" not in lines
+
+
+LARGE = """
+import resource, sys, warnings
+import numpy as np
+import jointfrf as jf
+from jointfrf.io import Channel, FrfSet
+
+freq = np.arange(20.0, 420.0, 3.0)
+dofs = ["A/1:y", "A/@0.1,0.012,0.3:y", "B/@0,0,0.9:y"]
+blank = np.ones((freq.size, 3, 1), complex)
+channels = [Channel(n, "+y") for n in (1, 2, 3)]
+believed = jf.measured_assembly("assembly.toml", FrfSet(freq, channels, channels[:1], blank, "receptance"))
+joint = jf.LawJoint({"y": jf.SpringLaw(3e6, h=6e4), "theta_x": jf.SpringLaw(8e3, h=80.0)})
+truth = jf.Assembly(believed.assembly.a, believed.assembly.b, joint)
+h = jf.pollute(truth.receptance(freq, believed.responses, believed.forces), 0.02, seed=4)
+del truth
+warnings.simplefilter("ignore")
+measured = jf.measured_assembly("assembly.toml", FrfSet(freq, channels, channels[:1], h, "receptance"))
+fit = measured.fit()
+low, high = fit.confidence_interval(0.99)["k_theta_x"]
+assert low < 8e3 < high, (low, high)
+print(len(measured.parts[0].structure.model.dofs), 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+"""
+
+
+@pytest.mark.long
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="memory as Linux counts it")
+def test_a_part_of_a_hundred_thousand_dofs_within_three_gigabytes(tmp_path):
+    text = ""
+    for name, long, count, start in (("A", 0.6, (120, 70, 3), 0.0), ("B", 0.3, (12, 8, 1), 0.6)):
+        z, x, y = (np.linspace(0, size, n + 1) for size, n in zip((long, 0.2, 0.012), count, strict=True))
+        mesh = extrude((rectangle(start + z, x), y))
+        steel = {"E": (range(len(mesh.elements)), Material(210e9, 0.3, 7850.0))}
+        step = ["*FREQUENCY, SOLVER=MATRIXSTORAGE", "1"]
+        run(CCX, deck(mesh, steel, (), step).replace("C3D8I", "C3D8"), tmp_path / name)
+        ends = {"stiffness": "sti", "mass": "mas", "nodes": "inp"}
+        files = "".join(f'{key} = "{name}/model.{end}"\n' for key, end in ends.items())
+        text += f'[{name}]\nmodel = "matrices"\n{files}units = "SI"\nloss_factor = 0.002\nexact = true\n'
+        text += f'joint = ["end:y", "end:theta_x"]\n[[{name}.point]]\nname = "end"\n'
+        text += "box = [-1, -1, 0.5999, 1, 1, 0.6001]\n"
+    for dof, k in (("y", 2e6), ("theta_x", 5e3)):
+        text += f'[[joint.law]]\ndof = "{dof}"\nlaw = "spring"\nvalues = {{ k = {k}, h = {0.01 * k} }}\n'
+    text += '[channels]\n"1:+y" = "A/1:y"\n"2:+y" = "A/@0.1,0.012,0.3:y"\n"3:+y" = "B/@0,0,0.9:y"\n'
+    (tmp_path / "assembly.toml").write_text(text)
+    done = subprocess.run([sys.executable, "-c", LARGE], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr[-2000:]
+    dofs, most = map(int, done.stdout.split())
+    assert dofs == 103_092
+    assert most < 3e9
 
 
 def in_mm(mesh):
