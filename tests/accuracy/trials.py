@@ -11,7 +11,7 @@ import numpy as np
 import jointfrf as jf
 from six_dof_beams import DOFS, FREQ, JOINT, assembly
 
-__all__ = ["NOISES", "TRIALS", "System", "Trial", "system"]
+__all__ = ["NOISES", "TRIALS", "System", "Trial", "running_mean", "system"]
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,9 @@ def _circular(rng: np.random.Generator, shape: tuple[int, ...]) -> np.ndarray:
     return (rng.standard_normal(shape) + 1j * rng.standard_normal(shape)) / np.sqrt(2)
 
 
-def _running_mean(lines: int) -> Callable[[np.random.Generator, np.ndarray, float], np.ndarray]:
+def running_mean(lines: int) -> Callable[[np.random.Generator, np.ndarray, float], np.ndarray]:
+    """Noise that is the running mean of independent noise over so many lines."""
+
     def noise(rng: np.random.Generator, gamma: np.ndarray, level: float) -> np.ndarray:
         drawn = _circular(rng, (len(gamma) + lines - 1, *gamma.shape[1:]))
         sums = np.cumsum(np.concatenate([np.zeros((1, *gamma.shape[1:])), drawn]), axis=0)
@@ -112,8 +114,8 @@ NOISES: dict[str, Callable[[np.random.Generator, np.ndarray, float, np.ndarray],
     "floor": lambda rng, g, level, f: level * _floor(g) * _circular(rng, g.shape),
     "mixed": lambda rng, g, level, f: level * (g * _circular(rng, g.shape) + _floor(g) * _circular(rng, g.shape)),
     "by entry": lambda rng, g, level, f: _by_entry(rng, g, level),
-    "correlated over 5 lines": lambda rng, g, level, f: _running_mean(5)(rng, g, level),
-    "correlated over 25 lines": lambda rng, g, level, f: _running_mean(25)(rng, g, level),
+    "correlated over 5 lines": lambda rng, g, level, f: running_mean(5)(rng, g, level),
+    "correlated over 25 lines": lambda rng, g, level, f: running_mean(25)(rng, g, level),
     "hum at multiples of 50 Hz": _hum,
     "a fifth of the lines missing": lambda rng, g, level, f: level * g * _circular(rng, g.shape),
 }

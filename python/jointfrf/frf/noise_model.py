@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from jointfrf.frf.bands import line_slices
+from jointfrf.frf.calibration import CalibrationErrors, calibration_errors
 from jointfrf.frf.entry_groups import EntryGroup, entry_groups, reciprocity_noise
 from jointfrf.frf.noise_parts import (
     NoiseTerms,
@@ -75,6 +76,9 @@ class NoiseModel:
         What the variance comes from: measured minus smooth FRFs; the differences h_pq - h_qp, with too few lines or
         too little noise for smoothing; none, where neither shows noise: the variance is then 0.
     smooth : SmoothFrfs
+    calibration : CalibrationErrors or None
+        Errors that are smooth over frequency, where h_pq and h_qp differ by more than noise: they are in neither
+        variance nor inflation.
     """
 
     relative: FloatArray
@@ -87,6 +91,7 @@ class NoiseModel:
     line_factor: FloatArray
     source: NoiseSource
     smooth: SmoothFrfs
+    calibration: CalibrationErrors | None = None
 
     @property
     def outlying(self) -> NDArray[np.intp]:
@@ -151,7 +156,8 @@ def estimate_noise(
     by the part of the noise that the smooth FRFs have not taken up, give the parts of the variance by entry. From
     coherence g^2 of n averages, v = (1 - g^2)/(n g^2) |h|^2 is E|e|^2; |h| alone has half of it as its variance. v
     enters as one more part with a factor of its own, so the residual, which sees all noise, decides how far the
-    coherence is believed. More than 8192 lines are cut into pieces of equal length, each with parts of its own;
+    coherence is believed. Where h_pq and h_qp differ smoothly over frequency, by gains, delays and drifts of channels,
+    these differences are taken off first: they are `calibration`, not noise. More than 8192 lines are cut into pieces of equal length, each with parts of its own;
     `variance` is by these, `relative`, `floor` and `coherence_factor` are their root mean squares.
 
     Examples
@@ -173,20 +179,22 @@ def estimate_noise(
     if like is not None and (len(places) > 1 or like.variance.shape != lines.shape):
         like = None
 
+    calibration = calibration_errors(freq, lines) if reciprocal and lines.shape[1] == lines.shape[2] else None
+
     def estimated(own: NDArray[np.intp] | slice) -> NoiseModel:
-        h = lines[own]
+        h = lines[own] if calibration is None else calibration.without(freq[own], lines[own])
         noisy = _NoisyLines(freq[own], h, entry_groups(h, reciprocal=reciprocal), max_poles, reciprocal)
         return _estimated(
             noisy, None if given is None else given[own], None if like is None else like.variance[own], like
         )
 
     if len(places) == 1 and (np.diff(freq) > 0).all():
-        model = estimated(slice(None))
+        model = replace(estimated(slice(None)), calibration=calibration)
         # What was measured is the caller's.
         return (
             model if model.smooth.is_smooth else replace(model, smooth=replace(model.smooth, h=model.smooth.h.copy()))
         )
-    return _joined(places, (estimated(own) for own in places), lines.shape)
+    return replace(_joined(places, (estimated(own) for own in places), lines.shape), calibration=calibration)
 
 
 def _joined(places: list[NDArray[np.intp]], parts: Iterable[NoiseModel], shape: tuple[int, ...]) -> NoiseModel:

@@ -305,7 +305,8 @@ class ReciprocityDifferences:
     columns: np.ndarray
     values: ComplexArray
 
-    def _variance(self, variance: FloatArray) -> FloatArray:
+    def pair_variance(self, variance: FloatArray) -> FloatArray:
+        """Return the variance of the differences, shape (n_pairs, n_freq), by that of the FRFs."""
         total: FloatArray = (variance[:, self.rows, self.columns] + variance[:, self.columns, self.rows]).T
         return np.maximum(total, TINY)
 
@@ -339,12 +340,12 @@ class ReciprocityDifferences:
 
     def line_levels(self, variance: FloatArray, inflation: float = 1.0) -> LineLevels:
         """Return slow variation and outlying lines of the noise of FRFs of this variance (n_freq, m, m)."""
-        noise = self.values / np.sqrt(self._variance(variance))
+        noise = self.values / np.sqrt(self.pair_variance(variance))
         return line_levels(noise, inflation, is_residual=False)
 
     def inflation(self, variance: FloatArray, line_factor: FloatArray) -> float:
         """Return how many lines carry the noise of one independent line; outlying lines do not count."""
-        noise = self.values / np.sqrt(self._variance(variance))
+        noise = self.values / np.sqrt(self.pair_variance(variance))
         return line_correlation(np.where(line_factor > 1, np.nan, noise))
 
 

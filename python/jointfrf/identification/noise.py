@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from jointfrf.frf.bands import is_long, line_slices, spread_lines
+from jointfrf.frf.calibration import CalibrationErrors, calibration_errors
 from jointfrf.frf.entry_groups import ZERO, entry_groups
 from jointfrf.frf.noise_model import NoiseModel, estimate_noise
 from jointfrf.frf.noise_parts import noise_parts
@@ -78,6 +79,8 @@ class KnownNoise:
         Noise of the channels, where it was found from their FRFs; not of long sweeps.
     is_given : bool
         Whether the user gave the noise.
+    calibration : CalibrationErrors, optional
+        Errors of the FRFs that are smooth over frequency, where h_pq and h_qp show any.
     """
 
     level: float
@@ -86,17 +89,19 @@ class KnownNoise:
     outlying: NDArray[np.intp]
     model: NoiseModel | None = None
     is_given: bool = False
+    calibration: CalibrationErrors | None = None
 
     @classmethod
-    def given(cls, level: float) -> KnownNoise:
+    def given(cls, level: float, calibration: CalibrationErrors | None = None) -> KnownNoise:
         """Return noise of a level that the user gave."""
-        return cls(level, 1.0, False, np.empty(0, np.intp), is_given=True)
+        return cls(level, 1.0, False, np.empty(0, np.intp), is_given=True, calibration=calibration)
 
     @classmethod
     def found(cls, model: NoiseModel) -> KnownNoise:
         """Return noise found from the FRFs; assumed where they do not show it, or where it is rounding."""
         is_assumed = model.source == "none" or model.level < _LEAST_LEVEL
-        return cls(_ASSUMED_LEVEL if is_assumed else model.level, model.inflation, is_assumed, model.outlying, model)
+        level = _ASSUMED_LEVEL if is_assumed else model.level
+        return cls(level, model.inflation, is_assumed, model.outlying, model, calibration=model.calibration)
 
 
 class SmoothedFrfs(NamedTuple):
@@ -119,17 +124,19 @@ class SmoothedFrfs(NamedTuple):
 def noise_of_matrix(freq: FloatArray, h: ComplexArray, options: NoiseOptions, *, reciprocal: bool) -> SmoothedFrfs:
     """Return smooth FRFs and noise of a matrix of FRFs, all measured; a level is relative to the smooth FRFs."""
     level = options.level()
+    calibration = calibration_errors(freq, h) if options.noise is not None and reciprocal else None
     if level is not None:
         variance = _relative_variance(np.sqrt(near_squares(h)), level)
         # Measured FRFs as weights favour lines that noise has made small.
         variance = _relative_variance(smooth_frfs(freq, h, variance, reciprocal=reciprocal).h, level)
         smooth = smooth_frfs(freq, h, variance, reciprocal=reciprocal).h
-        variance, known = _relative_variance(smooth, level), KnownNoise.given(level)
+        variance, known = _relative_variance(smooth, level), KnownNoise.given(level, calibration)
     elif options.noise is not None:
         variance = options.variance(h.shape, np.ones(h.shape[1:], bool))
         of_entry = np.median(np.sqrt(variance) / np.maximum(abs(h), _TINY), axis=0)
         # Entries that are zero by symmetry have noise, but no relative noise.
-        known = KnownNoise.given(float(np.median(of_entry[of_entry < 1] if (of_entry < 1).any() else of_entry)))
+        usual = float(np.median(of_entry[of_entry < 1] if (of_entry < 1).any() else of_entry))
+        known = KnownNoise.given(usual, calibration)
         smooth = smooth_frfs(freq, h, variance, reciprocal=reciprocal).h
     else:
         model = estimate_noise(
@@ -175,9 +182,9 @@ def noise_of_channels(
     size = np.maximum(size, np.maximum(_LEAST_SIZE * size.max(axis=0), _TINY))
     if options.noise is not None:
         variance = options.variance(h.shape, shown) if level is None else (level * size) ** 2
-        return SmoothedFrfs(
-            measured, np.where(kept, variance, np.inf), KnownNoise.given(np.nan if level is None else level)
-        )
+        calibration = calibration_errors(freq, measured) if reciprocal else None
+        known = KnownNoise.given(np.nan if level is None else level, calibration)
+        return SmoothedFrfs(measured, np.where(kept, variance, np.inf), known)
     # Of a square matrix FRFs that are zero by symmetry may stay: reciprocity says more of the noise.
     taken = shown if reciprocal else kept
     rows, columns = np.flatnonzero(taken.any(axis=1)), np.flatnonzero(taken.any(axis=0))

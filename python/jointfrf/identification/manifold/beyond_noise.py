@@ -1,22 +1,33 @@
-"""Uncertainty that noise does not explain: sides that are not rigid, parts of the band that disagree."""
+"""Uncertainty that noise does not explain: sides that are not rigid, bands that disagree, channels a little off."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
+from jointfrf.frf.bands import line_slices
+from jointfrf.frf.calibration import CalibrationErrors
+from jointfrf.identification.calibration import CalibrationSpread, Effects, effects_by_function
 from jointfrf.identification.manifold.estimate import JointEstimate
-from jointfrf.identification.manifold.group_fit import GroupFit, gradients_of
+from jointfrf.identification.manifold.group_fit import GroupFit, effects_of, gradients_of
 from jointfrf.identification.manifold.interface_frfs import InterfaceFrfs
 from jointfrf.identification.manifold.transforms import ChannelModes, left_out
 from jointfrf.identification.minimise import inverse_information
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
-__all__ = ["BandParts", "ChannelSpread", "channel_spread", "fit_band_parts", "left_out_share"]
+__all__ = [
+    "BandParts",
+    "ChannelSpread",
+    "JointCalibration",
+    "channel_spread",
+    "fit_band_parts",
+    "joint_calibration",
+    "left_out_share",
+]
 
 #: How often the noise of an FRF is left out: with its response, and with its force.
 _TIMES = 2.0
@@ -220,3 +231,103 @@ def fit_band_parts(
         scatter = np.sqrt(np.nansum((value - mean) ** 2, axis=0) / np.maximum(degrees, 1))
     spans = tuple((float(freq_hz[own].min()), float(freq_hz[own].max())) for own in parts)
     return BandParts(spans, np.where(seen, theta, np.nan), disagree, np.where(disagree, scatter, 0.0))
+
+
+class JointCalibration(NamedTuple):
+    """What errors of channels that are smooth over frequency add to the uncertainty of a joint.
+
+    Attributes
+    ----------
+    factor : ndarray, shape (p,)
+        Variance of each parameter in units of that from independent noise.
+    degrees : ndarray, shape (p,)
+        Degrees of freedom of that.
+    covariance : ndarray, shape (p, p)
+        Of the parameters.
+    excess, excess_error : float
+        Mean square of the residual that they leave, in units of the noise, and its standard error.
+    """
+
+    factor: FloatArray
+    degrees: FloatArray
+    covariance: FloatArray
+    excess: float
+    excess_error: float
+
+
+def joint_calibration(
+    found: JointEstimate, frfs: InterfaceFrfs, freq_hz: FloatArray, errors: CalibrationErrors | None
+) -> JointCalibration | None:
+    """Return what smooth errors add to the uncertainty; None where there are none.
+
+    Parameters
+    ----------
+    found : JointEstimate
+    frfs : InterfaceFrfs
+    freq_hz : ndarray, shape (n_freq,)
+        Hz.
+    errors : CalibrationErrors, optional
+        Found from h_pq - h_qp.
+
+    Notes
+    -----
+    Cov(theta) += J Var J^T, J being the change of the parameters with each error, to first order by one Gauss-Newton
+    step. h_pq - h_qp show g_p - f_p of responses and forces only; g_p + f_p, which the mean of h_pq and h_qp carries, is
+    taken to be as large: both are independent.
+    """
+    if errors is None:
+        return None
+    p = len(found.parameters)
+    factor, degrees, covariance = np.zeros(p), np.full(p, np.inf), np.zeros((p, p))
+    excess = error = 0.0
+    for group in found.groups:
+        spread = _group_calibration(group, frfs, freq_hz, errors)
+        which, slope = group.which, group.joint.theta_slope(group.x)
+        own, of_theta = np.diagonal(group.covariance), slope @ spread.covariance @ slope.T
+        by_noise = np.einsum("ij,jk,ik->i", slope, group.covariance, slope)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            of_coordinate = np.diagonal(spread.covariance) / own
+            ratio = np.diagonal(of_theta) / by_noise
+        # A rigid DOF has no finite slope.
+        in_coordinate = group.joint.is_compliance | ~np.isfinite(ratio)
+        factor[which] = np.nan_to_num(np.where(in_coordinate, of_coordinate, ratio))
+        degrees[which] = spread.degrees
+        covariance[which[:, None], which] = np.nan_to_num(of_theta, posinf=0.0, neginf=0.0)
+        excess += spread.squares
+        error = float(np.hypot(error, spread.squares_error))
+    equations = max(found.equations - p / 2, 1.0)
+    return JointCalibration(factor, degrees, covariance, excess / equations, error / equations)
+
+
+def _group_calibration(
+    group: GroupFit, frfs: InterfaceFrfs, freq_hz: FloatArray, errors: CalibrationErrors
+) -> CalibrationSpread:
+    """Return what smooth errors do to the coordinates of a group."""
+    functions, inverse = errors.functions(freq_hz), inverse_information(group.information)
+
+    def effects(changes: Callable[[slice], Iterator[ComplexArray]]) -> Effects:
+        parts = [
+            effects_by_function(effects_of(group, changes(own), own), functions[:, :, own], inverse)
+            for own in line_slices(len(freq_hz))
+        ]
+        return Effects(sum(one.steps for one in parts), sum(one.squares for one in parts))
+
+    of_channels = effects(lambda own: _channel_errors(frfs.on_lines(own), group.dofs))
+    of_own = effects(lambda own: _own_errors(frfs.on_lines(own), group.dofs)) if errors.own.any() else None
+    return CalibrationSpread.of(errors, of_channels, of_own)
+
+
+def _channel_errors(frfs: InterfaceFrfs, dofs: NDArray[np.intp]) -> Iterator[ComplexArray]:
+    """Yield changes of the entries between some joint DOFs by a unit relative error of each response and force."""
+    from_responses, to_forces = frfs.measured @ frfs.forces.T, frfs.responses @ frfs.measured
+    for a in range(frfs.responses.shape[1]):
+        yield frfs.entries_of(dofs, frfs.responses[:, a, None] * from_responses[:, None, a])
+    for b in range(frfs.forces.shape[1]):
+        yield frfs.entries_of(dofs, to_forces[:, :, b, None] * frfs.forces[:, b])
+
+
+def _own_errors(frfs: InterfaceFrfs, dofs: NDArray[np.intp]) -> Iterator[ComplexArray]:
+    """Yield those by a unit relative error of each FRF."""
+    for a, b in np.ndindex(frfs.measured.shape[1:]):
+        place = np.outer(frfs.responses[:, a], frfs.forces[:, b])
+        yield frfs.entries_of(dofs, frfs.measured[:, a, b, None, None] * place)

@@ -12,11 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf.errors import IllConditionedWarning
+from jointfrf.identification.calibration import student_factor
 from jointfrf.identification.manifold.beyond_noise import (
     BandParts,
     ChannelSpread,
+    JointCalibration,
     channel_spread,
     fit_band_parts,
+    joint_calibration,
     left_out_share,
 )
 from jointfrf.identification.manifold.coordinates import (
@@ -98,6 +101,8 @@ class Uncertainty(NamedTuple):
         What sides that are not rigid add to that; None where the channels do not show it.
     parts : BandParts or None
         Where lines that do not fit the joint were left out: whether parts of the band give it.
+    calibration : JointCalibration or None
+        What errors of channels that are smooth over frequency add; None where the FRFs show none.
     covariance : ndarray, shape (p, p)
     intervals : Intervals
     """
@@ -105,6 +110,7 @@ class Uncertainty(NamedTuple):
     spread: Spread
     channels: ChannelSpread | None
     parts: BandParts | None
+    calibration: JointCalibration | None
     covariance: FloatArray
     intervals: Intervals
 
@@ -117,7 +123,7 @@ class ManifoldFit(NamedTuple):
     problem : FitProblem
         With the noise level that was used.
     estimate : JointEstimate
-    spread, channels, parts, covariance, intervals
+    spread, channels, parts, calibration, covariance, intervals
         As in `Uncertainty`.
     test : ResidualTest
         The residual against the noise.
@@ -132,6 +138,7 @@ class ManifoldFit(NamedTuple):
     spread: Spread
     channels: ChannelSpread | None
     parts: BandParts | None
+    calibration: JointCalibration | None
     covariance: FloatArray
     intervals: Intervals
     test: ResidualTest
@@ -153,7 +160,7 @@ def fit_springs(problem: FitProblem) -> ManifoldFit:
     """Fit a joint of springs and dampers, find its uncertainty, and compare its residual with the noise."""
     problem, found, choices = estimated_joint(problem)
     known = uncertainty_of(problem, found, choices)
-    test = residual_test_of(found, problem.freq_hz, problem.noise.inflation, known.spread)
+    test = residual_test_of(found, problem.freq_hz, problem.noise.inflation, known.spread, known.calibration)
     return ManifoldFit(problem, found, *known, test, _cross_fits(problem, found, test, choices), choices)
 
 
@@ -173,11 +180,13 @@ def fit_laws(problem: FitProblem, joint: LawJoint) -> ManifoldFit:
     with _quiet():
         problem, found, _ = _estimated(problem, fit)
         inflation = problem.noise.inflation
-        spread = spread_of(found, inflation, is_level_known=not problem.noise.is_assumed)
-        test = residual_test_of(found, problem.freq_hz, inflation, spread)
+        calibration = joint_calibration(found, problem.frfs, problem.freq_hz, problem.noise.calibration)
+        spread = spread_of(found, inflation, calibration, is_level_known=not problem.noise.is_assumed)
+        test = residual_test_of(found, problem.freq_hz, inflation, spread, calibration)
     root = np.sqrt(spread.factor)
-    intervals = joint_intervals(found, spread.factor)
-    return ManifoldFit(problem, found, spread, None, None, found.covariance * np.outer(root, root), intervals, test)
+    covariance = found.covariance * np.outer(root, root) + (0 if calibration is None else calibration.covariance)
+    intervals = joint_intervals(found, _with_calibration(spread, calibration))
+    return ManifoldFit(problem, found, spread, None, None, calibration, covariance, intervals, test)
 
 
 def estimated_joint(problem: FitProblem) -> tuple[FitProblem, JointEstimate, tuple[DofDamping, ...]]:
@@ -197,7 +206,9 @@ def estimated_joint(problem: FitProblem) -> tuple[FitProblem, JointEstimate, tup
 def uncertainty_of(problem: FitProblem, found: JointEstimate, choices: tuple[DofDamping, ...] = ()) -> Uncertainty:
     """Return how well the parameters of a joint of springs are known."""
     noise = problem.noise
-    spread = spread_of(found, noise.inflation, is_level_known=not noise.is_assumed)
+    with _quiet():
+        calibration = joint_calibration(found, problem.frfs, problem.freq_hz, noise.calibration)
+    spread = spread_of(found, noise.inflation, calibration, is_level_known=not noise.is_assumed)
     channels = channel_spread(found, problem.frfs, problem.added_compliance)
     parts = _band_parts(problem, found, spread, choices)
     added = [one.std_error for one in (channels, parts) if one is not None]
@@ -210,7 +221,18 @@ def uncertainty_of(problem: FitProblem, found: JointEstimate, choices: tuple[Dof
             for group in found.groups:
                 slope[group.which] = np.where(group.joint.is_compliance, found.theta[group.which] ** 2, 1.0)
             covariance += np.diag(np.square(slope * parts.std_error))
-    return Uncertainty(spread, channels, parts, covariance, joint_intervals(found, spread.factor, reach))
+        if calibration is not None:
+            covariance += calibration.covariance
+    intervals = joint_intervals(found, _with_calibration(spread, calibration), reach)
+    return Uncertainty(spread, channels, parts, calibration, covariance, intervals)
+
+
+def _with_calibration(spread: Spread, calibration: JointCalibration | None) -> FloatArray:
+    """Return variance factors for intervals, with smooth errors, whose variances are known from few channels."""
+    if calibration is None:
+        return spread.factor
+    few = student_factor(spread.factor, calibration.factor, calibration.degrees)
+    return (spread.factor + calibration.factor) * few
 
 
 def _estimated(

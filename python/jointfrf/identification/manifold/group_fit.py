@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields
 from typing import Any, NamedTuple
 
@@ -17,6 +17,7 @@ from jointfrf.identification.manifold.on_manifold import (
     OnManifold,
     PriorOfM,
     expected_m,
+    frfs_of_joint,
     normal_forms,
     prior_of_m,
     project,
@@ -26,7 +27,7 @@ from jointfrf.identification.manifold.on_manifold import (
 from jointfrf.identification.minimise import inverse_information
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
-__all__ = ["LITTLE_PATIENCE", "GroupFit", "GroupProblem", "UnknownCrossTerms", "fit_dofs", "gradients_of"]
+__all__ = ["LITTLE_PATIENCE", "GroupFit", "GroupProblem", "UnknownCrossTerms", "effects_of", "fit_dofs", "gradients_of"]
 
 #: Linearisations at most.
 _MOST = 25
@@ -252,6 +253,46 @@ def gradients_of(fit: GroupFit, changes: Iterable[ComplexArray]) -> FloatArray:
     while some := tuple(data.smooth + change for change in itertools.islice(more, _AT_ONCE)):
         found += [one - base for one in gradients(some)]
     return np.array(found)
+
+
+def effects_of(
+    fit: GroupFit, changes: Iterable[ComplexArray], lines: slice = slice(None)
+) -> Iterator[tuple[ComplexArray, FloatArray]]:
+    """Yield what changes of the measured FRFs do at the minimum, line by line.
+
+    Parameters
+    ----------
+    fit : GroupFit
+    changes : iterable of ndarray, shape (n_lines, q)
+        Of the entries of gamma on these lines, m/N.
+    lines : slice
+
+    Yields
+    ------
+    gradient : ndarray, shape (n_lines, p)
+        Its real part is added to the gradient; that of 1j times the change is its imaginary part, negative.
+    squares : ndarray, shape (n_lines,)
+        Of the residual that the change alone leaves, in units of the noise.
+    """
+    problem, own = fit.problem, fit.problem.data.on_lines(lines)
+    joint = fit.joint.on_lines(lines)
+    used = fit.used[lines].astype(float)
+    adjoint = joint.slope(fit.x, joint.compliance(fit.x)).conj() * used[:, None, None]
+    c = joint.matrix(fit.forms.compliance[lines])
+    unknown = problem.unknown[lines].reshape(c.shape)
+    if unknown.any():
+        c = np.where(unknown, smooth_compliance(own), c)
+    # Where cross terms are unknown there is no point of the manifold.
+    on = fit.on if fit.on is not None and not unknown.any() else None
+    point = _first_points(own, c) if on is None else OnManifold(on.h[lines], on.m[lines], on.squares[lines])
+    point = _rescued(own, c, point)
+    fitted = own.entries.take(frfs_of_joint(point.h, point.m, c))
+    here, more = problem._replace(data=own, unknown=problem.unknown[lines]), iter(changes)
+    while some := tuple(fitted + change for change in itertools.islice(more, _AT_ONCE)):
+        for forms in normal_forms(own, c, point, some):
+            left = _of_coordinates(here, forms, forms, c)[0]
+            found = np.einsum("lqp,lq->lp", adjoint, left.gradient), left.squares * used
+            yield tuple(np.where(np.isfinite(one), one, 0) for one in found)
 
 
 def _from_softer(best: GroupFit) -> GroupFit:

@@ -11,6 +11,7 @@ from scipy import special
 
 from jointfrf.frf.bands import in_pieces, line_slices
 from jointfrf.frf.quantiles import medians
+from jointfrf.identification.manifold.beyond_noise import JointCalibration
 from jointfrf.identification.manifold.estimate import JointEstimate
 from jointfrf.identification.manifold.group_fit import GroupFit
 from jointfrf.identification.manifold.line_forms import FormSquares, LineParts
@@ -148,7 +149,9 @@ def _scatter(whole: FloatArray, pieces: Iterable[LineParts]) -> tuple[FloatArray
     return scatter, np.nan_to_num(degrees)
 
 
-def spread_of(found: JointEstimate, inflation: float, *, is_level_known: bool = True) -> Spread:
+def spread_of(
+    found: JointEstimate, inflation: float, calibration: JointCalibration | None = None, *, is_level_known: bool = True
+) -> Spread:
     """Return by how much the variance of each parameter exceeds that from independent noise of the level known.
 
     Parameters
@@ -156,6 +159,8 @@ def spread_of(found: JointEstimate, inflation: float, *, is_level_known: bool = 
     found : JointEstimate
     inflation : float
         By how much correlation between lines makes the variance of a mean larger, at least 1.
+    calibration : JointCalibration, optional
+        What smooth errors add: the residual and the scatter between blocks are compared with noise and these together.
     is_level_known : bool
         Whether the noise is known; otherwise its level is that of the residual.
 
@@ -164,7 +169,8 @@ def spread_of(found: JointEstimate, inflation: float, *, is_level_known: bool = 
     The largest of information, scatter between lines and scatter between blocks; the latter two only where they exceed
     the former by more than chance, for one parameter or for all together.
     """
-    scale = max(found.scale, 1.0) if is_level_known else found.scale
+    excess, beside = (0.0, 0.0) if calibration is None else (calibration.excess, calibration.factor)
+    scale = max(found.scale / (1 + excess), 1.0) if is_level_known else found.scale
     by_noise = np.full(len(found.parameters), inflation * scale)
     by_lines, by_blocks, of_lines, of_blocks = (np.full_like(by_noise, np.nan) for _ in range(4))
     for group in found.groups:
@@ -176,8 +182,8 @@ def spread_of(found: JointEstimate, inflation: float, *, is_level_known: bool = 
             by_blocks[group.which] = np.where(own > 0, blocks / own, np.nan)
     factor = _larger_than_chance(by_noise, by_lines, of_lines / inflation)
     with np.errstate(divide="ignore", invalid="ignore"):
-        chance = np.nan_to_num(special.chdtrc(of_blocks, of_blocks * by_blocks / factor), nan=1.0)
-    factor = _larger_than_chance(factor, by_blocks, of_blocks)
+        chance = np.nan_to_num(special.chdtrc(of_blocks, of_blocks * by_blocks / (factor + beside)), nan=1.0)
+    factor = np.maximum(_larger_than_chance(factor + beside, by_blocks, of_blocks) - beside, factor)
     return Spread(by_noise, by_lines, by_blocks, factor, chance)
 
 
@@ -334,7 +340,13 @@ def _may_be_rigid(group: GroupFit, dof: int, factor: float, probability: float) 
     return bool(rigid.cost - group.cost < _chi_squared(probability, parameters) * factor / 2)
 
 
-def residual_test_of(found: JointEstimate, freq_hz: FloatArray, inflation: float, spread: Spread) -> ResidualTest:
+def residual_test_of(
+    found: JointEstimate,
+    freq_hz: FloatArray,
+    inflation: float,
+    spread: Spread,
+    calibration: JointCalibration | None = None,
+) -> ResidualTest:
     """Compare the residual with the noise.
 
     Parameters
@@ -346,6 +358,8 @@ def residual_test_of(found: JointEstimate, freq_hz: FloatArray, inflation: float
         By how much correlation between lines makes the variance of a mean larger.
     spread : Spread
         Variance factors of the parameters.
+    calibration : JointCalibration, optional
+        What smooth errors add: the residual is compared with noise and these together.
 
     Notes
     -----
@@ -354,9 +368,13 @@ def residual_test_of(found: JointEstimate, freq_hz: FloatArray, inflation: float
     from the whole, over their variance, are those of chi^2.
     """
     sigma = float(np.sqrt(2 * inflation / max(found.equations, 1.0)) / 2)
+    excess = found.excess
+    if calibration is not None:
+        excess /= 1 + calibration.excess
+        sigma = float(np.hypot(sigma, calibration.excess_error / (1 + calibration.excess) / 2))
     factor = np.fmax(np.maximum(spread.information, inflation), spread.lines)
     trends = tuple(t for group in found.groups for t in _trends(group, freq_hz, factor[group.which]))
-    test = ResidualTest(float(np.sqrt(found.excess)), sigma, trends=trends)
+    test = ResidualTest(float(np.sqrt(excess)), sigma, trends=trends)
     if not test.is_large:
         return test
     squares, expected = np.zeros((2, freq_hz.size))

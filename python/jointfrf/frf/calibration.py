@@ -1,0 +1,222 @@
+"""Errors of channels and of single FRFs that go smoothly over frequency, by the differences of h_pq and h_qp."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.polynomial import legendre
+from numpy.typing import NDArray
+from scipy import special
+
+from jointfrf.frf.bands import spread_lines
+from jointfrf.frf.entry_groups import entry_groups
+from jointfrf.frf.noise_parts import ReciprocityDifferences, reciprocity_differences
+from jointfrf.frf.smoothing import near_squares
+from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray
+
+__all__ = ["CalibrationErrors", "calibration_errors"]
+
+#: Functions of frequency that may be calibration, about as slow as an eighth of the band; as many faster ones show the
+#: noise. Lines that each needs.
+_SLOW, _LINES = 8, 20
+#: Probability at which a sum of squares that exceeds that of noise is taken for chance.
+_CHANCE = 0.01
+#: Singular values below this share of the largest are zero.
+_RANK = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class CalibrationErrors:
+    """Variances of relative errors of FRFs that are smooth over frequency.
+
+    h_pq is measured as h_pq (1 + g_p + f_q + e_pq): g_p of the response, f_q of the force, e_pq of the FRF itself. Real
+    and imaginary part, gain and phase, are sums of functions of frequency of mean square 1 (`functions`), each with an
+    independent, normal factor.
+
+    Attributes
+    ----------
+    span : (float, float)
+        Hz.
+    channel : ndarray, shape (2, n_functions)
+        Variance of g_p - f_p, of gain and of phase, the same for all channels; 0 where it is not significant.
+    own : ndarray, shape (2, n_functions)
+        Variance of e_pq, likewise.
+    channel_degrees, own_degrees : ndarray, shape (2, n_functions)
+        Degrees of freedom of these variances.
+    rows, columns : ndarray of int, shape (n_pairs,)
+    differences : ndarray, shape (n_pairs, 2, n_functions)
+        Significant factors of (h_pq - h_qp) over the mean of both.
+
+    Notes
+    -----
+    The functions of the gain are Legendre polynomials; those of the phase a delay, which is proportional to frequency,
+    and polynomials that are orthogonal to it.
+    """
+
+    span: tuple[float, float]
+    channel: FloatArray
+    own: FloatArray
+    channel_degrees: FloatArray
+    own_degrees: FloatArray
+    rows: NDArray[np.intp]
+    columns: NDArray[np.intp]
+    differences: FloatArray
+
+    def functions(self, freq_hz: FloatArray) -> FloatArray:
+        """Return the functions of gain and phase, shape (2, n_functions, n_freq)."""
+        return _functions(self.span, self.channel.shape[1], freq_hz)
+
+    def without(self, freq_hz: FloatArray, h: ComplexArray) -> ComplexArray:
+        """Return FRFs less the half of their smooth differences."""
+        gain, phase = self.functions(freq_hz)
+        relative = self.differences[:, 0] @ gain + 1j * (self.differences[:, 1] @ phase)
+        p, q = self.rows, self.columns
+        half = (relative / 4).T * (h[:, p, q] + h[:, q, p])
+        left = h.copy()
+        left[:, p, q] -= half
+        left[:, q, p] += half
+        return left
+
+    def level(self, which: str) -> tuple[float, float]:
+        """Return root mean squares over the band of gain and of phase, rad: of "channel" or "own"."""
+        gain, phase = np.sqrt(getattr(self, which).sum(axis=1)).tolist()
+        return gain, phase
+
+
+def calibration_errors(freq_hz: FloatArray, h: ComplexArray) -> CalibrationErrors | None:
+    """Find the variances of smooth errors of FRFs between the same channels of a reciprocal structure.
+
+    Parameters
+    ----------
+    freq_hz : ndarray, shape (n_freq,)
+        Hz.
+    h : ndarray, shape (n_freq, m, m)
+
+    Returns
+    -------
+    CalibrationErrors or None
+        None where differences are those of noise, or FRFs were made reciprocal, or there are few lines.
+
+    Notes
+    -----
+    Differences of each pair are fitted by least squares, weighted by their noise, and the factors split into those of
+    channels, u_p - u_q with u = g - f, and what does not close, e_pq - e_qp. Noise has the same squares in slow
+    functions as in faster ones, however far neighbouring lines correlate, unless that is over a good part of the band:
+    sums of squares of slow functions of about one speed are compared with those of the faster half, of channels with
+    channels, as noise that is common to a hit is. Those that exceed them by more than chance give the variances.
+    """
+    lines = np.argsort(freq_hz)[spread_lines(len(freq_hz))]
+    freq, some = freq_hz[lines], h[lines]
+    n_slow = min(_SLOW, freq.size // _LINES // 2)
+    differences = reciprocity_differences(some, entry_groups(some, reciprocal=True)) if n_slow else None
+    if differences is None:
+        return None
+    span = float(freq[0]), float(freq[-1])
+    factors = _factors(differences, some, _functions(span, 2 * n_slow, freq))
+    squares = _squares(factors, differences.rows, differences.columns)
+    found = np.zeros((2, 2, 2, n_slow))  # variance and degrees; channel and own; gain and phase
+    speed = np.ceil(np.log2(np.arange(n_slow) + 1)).astype(int)
+    for part in range(2):
+        reference = squares[:, part, n_slow:].sum(axis=1)
+        for one in np.unique(speed):
+            own = np.flatnonzero(speed == one)
+            found[:, :, part, own] = _variances(squares[:, part, own].sum(axis=1), reference)[:, :, None]
+    variance, degrees = found
+    if not variance.any():
+        return None
+    significant = np.where(variance.any(axis=0), factors.value[:, :, :n_slow], 0)
+    return CalibrationErrors(
+        span, variance[0], variance[1], degrees[0], degrees[1], differences.rows, differences.columns, significant
+    )
+
+
+def _functions(span: tuple[float, float], number: int, freq_hz: FloatArray) -> FloatArray:
+    """Return functions of gain and phase of mean square 1 over the band, shape (2, number, n_freq)."""
+    middle, half = (span[1] + span[0]) / 2, (span[1] - span[0]) / 2
+    orders = np.arange(number)
+    gain = legendre.legvander((freq_hz - middle) / half, number - 1).T * np.sqrt(2 * orders + 1)[:, None]
+    phase = gain.copy()
+    size = np.hypot(middle, half / np.sqrt(3))
+    phase[0] = freq_hz / size
+    if number > 1:
+        phase[1] = (1 - middle / size * phase[0]) / np.sqrt(1 - (middle / size) ** 2)
+    return np.stack([gain, phase])
+
+
+class _Factors(NamedTuple):
+    """Factors of the functions in the relative differences of each pair, and their variance if lines were independent.
+
+    Shape (n_pairs, 2, n_functions) each.
+    """
+
+    value: FloatArray
+    variance: FloatArray
+
+
+def _factors(differences: ReciprocityDifferences, h: ComplexArray, functions: FloatArray) -> _Factors:
+    p, q = differences.rows, differences.columns
+    mean = (h[:, p, q] + h[:, q, p]).T / 2
+    variance = differences.variance_of_parts(near_squares(h))
+    outlying = differences.line_levels(variance).factor > 1
+    inverse = np.where(outlying, 0, 1 / np.sqrt(differences.pair_variance(variance)))
+    size = abs(mean)
+    turned = differences.values * (mean.conj() / np.maximum(size, TINY)) * inverse
+    size = size * inverse
+    value, spread, left = [], [], np.empty_like(turned)
+    # A real factor changes the part along h, an imaginary one the part across it.
+    for part, of_turned in ((0, turned.real), (1, turned.imag)):
+        normal = np.einsum("pl,al,bl->pab", size**2, functions[part], functions[part], optimize=True)
+        inverse_normal = np.linalg.pinv(normal, hermitian=True)
+        own = np.einsum("pab,bl,pl->pa", inverse_normal, functions[part], size * of_turned, optimize=True)
+        value.append(own)
+        spread.append(np.einsum("paa->pa", inverse_normal))
+        (left.real, left.imag)[part][:] = of_turned - size * (own @ functions[part])
+    level = (abs(left) ** 2).sum(axis=1) / max(2 * np.count_nonzero(~outlying), 1)
+    return _Factors(np.stack(value, axis=1), np.maximum(np.stack(spread, axis=1) * level[:, None, None], TINY))
+
+
+def _squares(factors: _Factors, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> FloatArray:
+    """Return sums of squares over their noise with what they are in the mean, shape (7, 2, n_functions).
+
+    Of channels: sum, degrees, increase by a unit of variance of each FRF, and of each channel; of what does not close:
+    sum, degrees, increase by a unit of variance of each FRF.
+    """
+    channels, at = np.unique(np.r_[rows, columns], return_inverse=True)
+    n_pairs = len(rows)
+    incidence = np.zeros((n_pairs, channels.size))
+    incidence[np.arange(n_pairs), at[:n_pairs]] = 1
+    incidence[np.arange(n_pairs), at[n_pairs:]] = -1
+    found = np.empty((7, *factors.value.shape[1:]))
+    for place in np.ndindex(found.shape[1:]):
+        weight = 1 / factors.variance[(slice(None), *place)]
+        value = factors.value[(slice(None), *place)] * np.sqrt(weight)
+        u, size, _ = np.linalg.svd(incidence * np.sqrt(weight)[:, None], full_matrices=False)
+        basis = u[:, size > _RANK * size[0]]
+        of_channels = float(((value @ basis) ** 2).sum())
+        rank, seen = basis.shape[1], float((basis**2).sum(axis=1) @ weight)
+        found[(slice(None), *place)] = (
+            of_channels, rank, 2 * seen, 2 * weight.sum(),
+            max(float(value @ value) - of_channels, 0.0), n_pairs - rank, 2 * max(weight.sum() - seen, 0.0),
+        )  # fmt: skip
+    return found
+
+
+def _variances(squares: FloatArray, reference: FloatArray) -> FloatArray:
+    """Return variance and degrees of freedom of channels and of single FRFs, shape (2, 2), from sums of `_squares`."""
+    of_channels, degrees, by_own, by_channel, apart, degrees_apart, apart_by_own = squares
+    noise, degrees_noise = reference[0] / reference[1], reference[1]
+    own = channel = own_degrees = channel_degrees = 0.0
+    if degrees_apart > 0 and reference[4] > 0:
+        noise_apart = reference[4] / reference[5]
+        expected = degrees_apart * noise_apart
+        if special.fdtrc(degrees_apart, reference[5], apart / expected) < _CHANCE:
+            own = (apart - expected) / apart_by_own
+            own_degrees = degrees_apart * (1 - expected / apart) ** 2
+            degrees_noise = degrees_apart
+    expected = degrees * noise + own * by_own
+    if expected > 0 and special.fdtrc(degrees, degrees_noise, of_channels / expected) < _CHANCE:
+        channel = (of_channels - expected) / by_channel
+        channel_degrees = degrees * (1 - expected / of_channels) ** 2
+    return np.array([[channel, own], [channel_degrees, own_degrees]])
