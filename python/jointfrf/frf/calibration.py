@@ -68,6 +68,10 @@ class CalibrationErrors:
         """Return the functions of gain and phase, shape (2, n_functions, n_freq)."""
         return _functions(self.span, self.channel.shape[1], freq_hz)
 
+    def variance(self, freq_hz: FloatArray) -> FloatArray:
+        """Return E|g_p + f_q + e_pq|^2 of each line, shape (n_freq,)."""
+        return np.asarray(np.einsum("ab,abl->l", self.channel + self.own, self.functions(freq_hz) ** 2))
+
     def without(self, freq_hz: FloatArray, h: ComplexArray) -> ComplexArray:
         """Return FRFs less the half of their smooth differences."""
         gain, phase = self.functions(freq_hz)

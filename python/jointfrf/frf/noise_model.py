@@ -157,8 +157,9 @@ def estimate_noise(
     coherence g^2 of n averages, v = (1 - g^2)/(n g^2) |h|^2 is E|e|^2; |h| alone has half of it as its variance. v
     enters as one more part with a factor of its own, so the residual, which sees all noise, decides how far the
     coherence is believed. Where h_pq and h_qp differ smoothly over frequency, by gains, delays and drifts of channels,
-    these differences are taken off first: they are `calibration`, not noise. More than 8192 lines are cut into pieces of equal length, each with parts of its own;
-    `variance` is by these, `relative`, `floor` and `coherence_factor` are their root mean squares.
+    these differences are taken off first: they are `calibration`, not noise. More than 8192 lines are cut into pieces
+    of equal length, each with parts of its own; `variance` is by these, `relative`, `floor` and `coherence_factor` are
+    their root mean squares.
 
     Examples
     --------

@@ -108,7 +108,7 @@ class CalibrationSpread(NamedTuple):
 
 
 def student_factor(noise: FloatArray, added: FloatArray, degrees: FloatArray) -> FloatArray:
-    """Return by how much variances of noise and of what is added count more for the few degrees of freedom of the latter.
+    """Return by how much variances of noise and of what is added, of few degrees of freedom, count more in an interval.
 
     Of the sum, degrees of freedom by Satterthwaite; the square of Student's t over that of the normal distribution.
     """

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf.dofs import compliance_unit
+from jointfrf.frf.calibration import CalibrationErrors
 from jointfrf.identification.elastic_centre import elastic_centre
 from jointfrf.identification.findings import Finding, note, warn
 from jointfrf.identification.fit_data import ModelData
@@ -16,12 +17,12 @@ from jointfrf.identification.manifold.estimate import JointEstimate
 from jointfrf.identification.manifold.fit import DofDamping, ManifoldFit
 from jointfrf.identification.manifold.prepare import FitProblem
 from jointfrf.identification.manifold.transforms import Transforms
-from jointfrf.identification.manifold.uncertainty import Spread
 from jointfrf.identification.model.fit import FoundModel, OpenDirection
 from jointfrf.identification.model.prepare import Channels
 from jointfrf.identification.parameters import joint_vector
 from jointfrf.identification.residual_test import ResidualTest
 from jointfrf.identification.result import Fit, FittedParameter, law_parameters
+from jointfrf.identification.scatter import Spread
 from jointfrf.kernel.arguments import FloatArray
 from jointfrf.laws.law_joint import LawJoint
 
@@ -104,6 +105,7 @@ def describe_springs(found: ManifoldFit, problem: FitProblem) -> Fit:
         *_negative_damping(fit, intervals),
         *_choices(found.choices),
         *_noise(problem.noise.is_assumed, problem.noise.inflation, problem.freq_hz),
+        *_calibration(problem.noise.calibration),
         *_outlying_lines(problem),
         *_small_residual(found, problem),
         *_sides(found, problem),
@@ -386,6 +388,7 @@ def describe_laws(found: ManifoldFit, joint: LawJoint) -> Fit:
         *([] if problem.noise.is_assumed else _too_large(found.test, "these laws do not fit the data")),
         *_law_trends(found.test),
         *_noise(problem.noise.is_assumed, problem.noise.inflation, problem.freq_hz),
+        *_calibration(problem.noise.calibration),
         *_outlying_lines(problem),
         *_correlated(fit),
     ]
@@ -458,6 +461,7 @@ def describe_model(found: FoundModel, channels: Channels) -> Fit:
         *_directions(found.directions),
         *_other_minimum(found.other),
         *_noise(problem.noise.is_assumed, problem.noise.inflation, problem.freq_hz),
+        *_calibration(problem.noise.calibration),
         *_priors(fit, found.directions),
         *_correlated(fit),
     ]
@@ -601,6 +605,22 @@ def _noise(is_assumed: bool, inflation: float, freq_hz: FloatArray) -> list[Find
         )
         found.append(note("correlation", text))
     return found
+
+
+def _calibration(errors: CalibrationErrors | None) -> list[Finding]:
+    """Say by how much h_pq and h_qp differ smoothly, and what intervals allow for."""
+    if errors is None:
+        return []
+    parts = []
+    for level, what in ((errors.level("channel"), "of channels"), (errors.level("own"), "of single FRFs")):
+        sizes = (f"{100 * level[0]:.2g} % in gain", f"{level[1]:.2g} rad in phase")
+        shown = [size for size, value in zip(sizes, level, strict=True) if value > 0]
+        parts += [f"{what} by {' and '.join(shown)}"] if shown else []
+    text = (
+        f"h_pq and h_qp differ smoothly over frequency, {', '.join(parts)} (root mean square over the band): taken for "
+        "calibration, not noise; intervals allow for as much in what h_pq and h_qp have in common"
+    )
+    return [note("calibration", text)]
 
 
 def _outlying_lines(problem: FitProblem) -> list[Finding]:

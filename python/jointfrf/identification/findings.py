@@ -13,6 +13,7 @@ __all__ = ["Finding", "FitFindingKind", "as_warning", "note", "warn"]
 FitFindingKind = Literal[
     "averages",  # how a mean over bands is to be read
     "blind",  # places where a planned sensor or hit would see nothing
+    "calibration",  # channels whose gain or phase is a little off
     "choice",  # damping terms that were chosen
     "convergence",
     "correlation",  # parameters, or lines, that are not independent

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import special
 
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
@@ -120,6 +121,7 @@ def check_residual(
     parameters: float,
     inflation: float,
     is_given: bool,
+    smooth: FloatArray | None = None,
 ) -> ResidualTest:
     """Compare a residual with its noise.
 
@@ -136,52 +138,83 @@ def check_residual(
         Lines that carry the noise of one independent line.
     is_given : bool
         Whether the noise was given, not found from the FRFs.
+    smooth : ndarray, shape (n_freq, n_o, n_i), optional
+        Share of smooth errors of channels in the variance that the residual is divided by: one number each over the
+        band.
 
     Notes
     -----
-    The mean square of N residuals of noise has the standard deviation sqrt(inflation / N); its root half of that. Noise
-    that was found from as many FRFs has the same once more. The residual of a model that is wrong goes smoothly over
-    frequency, which shows far below the noise: Re r_l conj(r_l+1) of noise has the mean zero.
+    The mean square of N residuals of noise is that of chi^2 with 2 N degrees of freedom, less by the inflation and by
+    how many FRFs of a line share their noise. Noise that was found from as many FRFs scatters as much once more. The
+    residual of a model that is wrong goes smoothly over frequency, which shows far below the noise: Re r_l conj(r_l+1)
+    of noise has the mean zero.
     """
     squares, known = abs(residual) ** 2, np.isfinite(residual)
     squares = np.where(known, squares, 0)
     count = float(known.sum())
     of_noise = 0.0 if is_given else 1.0
+    alike = (1 + of_noise) * inflation * _shared(residual)
+    of_channels = np.zeros(residual.shape) if smooth is None else np.where(known, smooth, 0)
 
-    def judged(total: float, number: float) -> tuple[float, float]:
-        """Return the ratio, and by how many standard deviations it exceeds 1."""
-        ratio = float(np.sqrt(total / max(number, 1)))
-        sigma = np.sqrt((1 + of_noise) * inflation / max(number, 1)) / 2
-        return ratio, (ratio - 1) / float(np.hypot(sigma, of_noise * _NOISE_KNOWN))
+    def judged(which: tuple[NDArray[np.intp] | slice | int, ...], chance: float) -> tuple[float, bool]:
+        """Return the ratio, and whether it exceeds what noise gives with this probability."""
+        number = max(float(known[which].sum()), 1.0)
+        ratio = float(np.sqrt(squares[which].sum() / number))
+        share = float(of_channels[which].sum()) / number
+        degrees = max(2 * number / alike, 1.0)
+        mean_square = (1 - share) * _mean_square(chance, degrees) + share * _mean_square(chance, 1.0)
+        reach = np.hypot(np.sqrt(mean_square) - 1, of_noise * _NOISE_KNOWN * special.ndtri(1 - chance))
+        return ratio, ratio > 1 + reach
 
     n_parts = max(1, min(_PARTS, freq_hz.size // _LEAST_LINES))
     parts = np.array_split(np.argsort(freq_hz), n_parts)
-    quantile = float(special.ndtri(1 - _CHANCE / (n_parts + sum(residual.shape[1:]))))
+    chance = _CHANCE / (n_parts + sum(residual.shape[1:]))
     bands = []
     for own in parts:
-        ratio, excess = judged(squares[own].sum(), known[own].sum())
-        if excess > quantile:
+        ratio, exceeds = judged((own,), chance)
+        if exceeds:
             bands.append((float(freq_hz[own].min()), float(freq_hz[own].max()), ratio))
     channels: list[tuple[tuple[int, float], ...]] = []
-    for axis, other in ((1, 2), (2, 1)):
+    for axis in (1, 2):
         over = []
-        totals, numbers = squares.sum(axis=(0, other)), known.sum(axis=(0, other))
         for i in range(residual.shape[axis]):
-            ratio, excess = judged(totals[i], numbers[i])
-            if excess > quantile and residual.shape[axis] > 1:
+            ratio, exceeds = judged((*[slice(None)] * axis, i), chance)
+            if exceeds and residual.shape[axis] > 1:
                 over.append((i, ratio))
         channels.append(tuple(sorted(over, key=lambda one: -one[1])))
     mean = max(count - parameters / 2, 1.0)
-    sigma = float(np.hypot(np.sqrt((1 + of_noise) * inflation / mean) / 2, of_noise * _NOISE_KNOWN))
+    share = float(of_channels.sum()) / max(count, 1.0)
+    beyond = float(special.ndtr(-_LARGE))
+    far = (1 - share) * _mean_square(beyond, max(2 * mean / alike, 1.0)) + share * _mean_square(beyond, 1.0)
+    sigma = float(np.hypot((np.sqrt(far) - 1) / _LARGE, of_noise * _NOISE_KNOWN))
     return ResidualTest(
         float(np.sqrt(squares.sum() / mean)),
         sigma,
-        _neighbours(residual) if inflation < _INDEPENDENT else float("nan"),
+        _neighbours(residual) if inflation < _INDEPENDENT and smooth is None else float("nan"),
         tuple(sorted(bands, key=lambda one: -one[2])),
         channels[0],
         channels[1],
         tuple((int(i), float(pulls[i])) for i in np.argsort(-abs(pulls)) if abs(pulls[i]) > _PULLED),
     )
+
+
+def _mean_square(chance: float, degrees: float) -> float:
+    """Return the mean square that noise exceeds with this probability."""
+    return float(special.chdtri(degrees, chance)) / degrees
+
+
+def _shared(residual: ComplexArray) -> float:
+    """Return how many FRFs of a line have the noise of one, shape (n_freq, n_o, n_i): 1 where none share any."""
+    flat = residual.reshape(len(residual), -1)
+    whole = flat[:, np.isfinite(flat).all(axis=0)]
+    n_freq, number = whole.shape
+    if number < 2 or n_freq <= number:
+        return 1.0
+    product = abs(whole.conj().T @ whole) ** 2
+    size = np.sqrt(np.maximum(np.diagonal(product), np.finfo(float).tiny))
+    # Squares of correlations of noise that is independent are 1 / n_freq by chance.
+    correlation = (product / np.outer(size, size) - 1 / n_freq) / (1 - 1 / n_freq)
+    return float(max(correlation.sum() / number, 1.0))
 
 
 def _neighbours(residual: ComplexArray) -> float:
@@ -190,8 +223,10 @@ def _neighbours(residual: ComplexArray) -> float:
     known = np.isfinite(products)
     if known.sum() < _LEAST_PRODUCTS:
         return float("nan")
-    power = np.where(known, abs(residual[1:] * residual[:-1]) ** 2, 0).sum()
-    return float(np.where(known, products, 0).real.sum() / np.sqrt(power / 2)) if power > 0 else 0.0
+    # FRFs of a line may share their noise; lines do not.
+    of_lines = np.where(known, products, 0).real.sum(axis=(1, 2))
+    power = float((of_lines**2).sum())
+    return float(of_lines.sum() / np.sqrt(power)) if power > 0 else 0.0
 
 
 def local_excess(

@@ -7,13 +7,13 @@ from scipy import stats
 from compliance_lines import exact_compliance, fitted, fitted_group, white
 from jointfrf.identification.manifold.coordinates import joint_terms
 from jointfrf.identification.manifold.uncertainty import (
-    BLOCKS,
     block_scatter,
     joint_intervals,
     line_scatter,
     profile_interval,
     spread_of,
 )
+from jointfrf.identification.scatter import BLOCKS
 
 FREQ = np.linspace(20.0, 500.0, 100)
 OMEGA = 2 * np.pi * FREQ

@@ -272,8 +272,8 @@ def joint_calibration(
     Notes
     -----
     Cov(theta) += J Var J^T, J being the change of the parameters with each error, to first order by one Gauss-Newton
-    step. h_pq - h_qp show g_p - f_p of responses and forces only; g_p + f_p, which the mean of h_pq and h_qp carries, is
-    taken to be as large: both are independent.
+    step. h_pq - h_qp show g_p - f_p of responses and forces only; g_p + f_p, which the mean of h_pq and h_qp carries,
+    is taken to be as large: both are independent.
     """
     if errors is None:
         return None
@@ -310,7 +310,7 @@ def _group_calibration(
             effects_by_function(effects_of(group, changes(own), own), functions[:, :, own], inverse)
             for own in line_slices(len(freq_hz))
         ]
-        return Effects(sum(one.steps for one in parts), sum(one.squares for one in parts))
+        return Effects(np.sum([one.steps for one in parts], axis=0), np.sum([one.squares for one in parts], axis=0))
 
     of_channels = effects(lambda own: _channel_errors(frfs.on_lines(own), group.dofs))
     of_own = effects(lambda own: _own_errors(frfs.on_lines(own), group.dofs)) if errors.own.any() else None

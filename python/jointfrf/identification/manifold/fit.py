@@ -39,9 +39,10 @@ from jointfrf.identification.manifold.estimate import (
 from jointfrf.identification.manifold.group_fit import GroupFit
 from jointfrf.identification.manifold.line_forms import FormMinimum
 from jointfrf.identification.manifold.prepare import FitProblem, check_estimate
-from jointfrf.identification.manifold.uncertainty import Spread, joint_intervals, residual_test_of, spread_of
+from jointfrf.identification.manifold.uncertainty import joint_intervals, residual_test_of, spread_of
 from jointfrf.identification.profile import Intervals
 from jointfrf.identification.residual_test import ResidualTest
+from jointfrf.identification.scatter import Spread
 from jointfrf.kernel.arguments import FloatArray
 from jointfrf.laws.law_joint import LawJoint
 

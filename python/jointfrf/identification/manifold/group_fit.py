@@ -291,8 +291,8 @@ def effects_of(
     while some := tuple(fitted + change for change in itertools.islice(more, _AT_ONCE)):
         for forms in normal_forms(own, c, point, some):
             left = _of_coordinates(here, forms, forms, c)[0]
-            found = np.einsum("lqp,lq->lp", adjoint, left.gradient), left.squares * used
-            yield tuple(np.where(np.isfinite(one), one, 0) for one in found)
+            gradient, squares = np.einsum("lqp,lq->lp", adjoint, left.gradient), left.squares * used
+            yield np.where(np.isfinite(gradient), gradient, 0), np.where(np.isfinite(squares), squares, 0)
 
 
 def _from_softer(best: GroupFit) -> GroupFit:

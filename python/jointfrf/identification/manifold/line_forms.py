@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from jointfrf.frf.bands import is_long, line_slices
 from jointfrf.identification.minimise import Linearised, inverse_information, minimise
+from jointfrf.identification.scatter import LineParts
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
 __all__ = [
@@ -22,7 +23,6 @@ __all__ = [
     "FormSquares",
     "JointCoordinates",
     "LineForms",
-    "LineParts",
     "NamedParameter",
 ]
 
@@ -108,19 +108,6 @@ class FormSquares:
         """Return it with its derivatives."""
         cost, entries, residual = self._at(x)
         return Linearised(cost, *self.joint.normal_equations(x, entries, self.forms.weight, residual))
-
-
-class LineParts(NamedTuple):
-    """What each line adds to the normal equations.
-
-    Attributes
-    ----------
-    gradient : ndarray, shape (n_lines, p)
-    information : ndarray, shape (n_lines, p, p)
-    """
-
-    gradient: FloatArray
-    information: FloatArray
 
 
 @dataclass(frozen=True)

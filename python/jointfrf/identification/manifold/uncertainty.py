@@ -2,27 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from typing import Any, NamedTuple
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
 from jointfrf.frf.bands import in_pieces, line_slices
-from jointfrf.frf.quantiles import medians
 from jointfrf.identification.manifold.beyond_noise import JointCalibration
 from jointfrf.identification.manifold.estimate import JointEstimate
 from jointfrf.identification.manifold.group_fit import GroupFit
-from jointfrf.identification.manifold.line_forms import FormSquares, LineParts
+from jointfrf.identification.manifold.line_forms import FormSquares
 from jointfrf.identification.minimise import inverse_information
 from jointfrf.identification.profile import Intervals, ProfileIntervals
 from jointfrf.identification.residual_test import ResidualTest, Trend, local_excess
+from jointfrf.identification.scatter import (
+    BLOCKS,
+    Scatter,
+    Spread,
+    block_members,
+    chi_squared,
+    scatter_of,
+    spread_of_scatters,
+)
 from jointfrf.kernel.arguments import FloatArray
 
 __all__ = [
-    "BLOCKS",
-    "Spread",
     "block_scatter",
     "joint_intervals",
     "line_scatter",
@@ -31,12 +36,6 @@ __all__ = [
     "spread_of",
 ]
 
-#: Parts of the band that the jackknife leaves out in turn.
-BLOCKS = 10
-#: Directions of less information than this share of the largest are not seen.
-_SEEN = 1e-12
-#: Probability at which a scatter that exceeds the noise is taken for chance.
-_CHANCE = 0.95
 #: Probability at which parts of the band disagree on a parameter, and how many must show it.
 _DISAGREE, _LEAST_PARTS = 1e-3, 3
 #: A part whose information has a larger condition does not show all parameters.
@@ -44,30 +43,6 @@ _SINGULAR = 1e8
 #: Squares of profiles are minimised to this.
 _PRECISE = 1e-3
 _TINY = float(np.finfo(float).tiny)
-
-
-class Spread(NamedTuple):
-    """Factors by which the variance of parameters exceeds that from independent noise, shape (p,) each.
-
-    Attributes
-    ----------
-    information : ndarray
-        From the correlation between lines, and from a residual larger than the noise.
-    lines : ndarray
-        From the scatter between lines, which noise that is not circular makes larger; NaN where there are too few.
-    blocks : ndarray
-        From the scatter between parts of the band; NaN where there are too few lines.
-    factor : ndarray
-        The one used.
-    chance : ndarray
-        Probability that parts of the band scatter so much by noise alone; 1 where there are too few lines.
-    """
-
-    information: FloatArray
-    lines: FloatArray
-    blocks: FloatArray
-    factor: FloatArray
-    chance: FloatArray
 
 
 def line_scatter(group: GroupFit) -> tuple[FloatArray, FloatArray]:
@@ -79,13 +54,10 @@ def line_scatter(group: GroupFit) -> tuple[FloatArray, FloatArray]:
 
     Notes
     -----
-    It takes noise as independent between lines, but neither its size nor its direction in the complex plane from the
-    weights. The gradient g_l of a line, of information A_l out of A, moves the coordinates by A^-1 g_l. Where noise is
-    as the weights say, g_l g_l^T is in the mean half of A_l - A_l A^-1 A_l, the second term being what the fit has
-    taken up: the sum of the squares is scaled by that.
+    As `scatter_of`, each line being a part.
     """
     pieces = line_slices(len(group.forms.squares))
-    return _scatter(group.information, (group.of_lines(own) for own in pieces))
+    return scatter_of(group.information, (group.of_lines(own) for own in pieces))
 
 
 def block_scatter(group: GroupFit, blocks: int = BLOCKS) -> tuple[FloatArray, FloatArray]:
@@ -107,52 +79,16 @@ def block_scatter(group: GroupFit, blocks: int = BLOCKS) -> tuple[FloatArray, Fl
     lines = np.flatnonzero(group.used & diagonal.any(axis=1))
     if lines.size < 2 * blocks:
         return np.full(p, np.nan), np.zeros(p)
-    # Blocks of equal information, so that each says about as much as the others.
     size = np.maximum(np.diagonal(group.information), _TINY)
-    share = (diagonal[lines] / size).sum(axis=1)
-    share = share / share.sum() + 1 / lines.size
-    member = np.zeros((blocks, len(diagonal)))
-    member[((np.cumsum(share) - share / 2) / share.sum() * blocks).astype(int), lines] = 1
+    member = block_members(diagonal / size, lines, blocks)
     found = group.of_groups(member)
-    return _scatter(found.information.sum(axis=0), [found])
-
-
-def _scatter(whole: FloatArray, pieces: Iterable[LineParts]) -> tuple[FloatArray, FloatArray]:
-    """Return the variance that the gradients of parts show, and its degrees of freedom, shape (p,) each.
-
-    Parameters
-    ----------
-    whole : ndarray, shape (p, p)
-        Sum of the information of all parts.
-    pieces : iterable of LineParts
-    """
-    size = np.sqrt(np.maximum(np.diagonal(whole), _TINY))
-    value, vector = np.linalg.eigh(whole / np.outer(size, size))
-    # Coordinates in which the whole information is 1; directions that the data do not see are left out.
-    seen = value > _SEEN * value[-1]
-    root = vector[:, seen] / np.sqrt(value[seen]) / size[:, None]
-    variance, (p, k) = (root**2).sum(axis=1), root.shape
-    to_root = (root[:, None, :, None] * root[None, :, None, :]).reshape(p * p, k * k)
-    to_steps, to_variance = root @ root.T, (root[:, :, None] * root[:, None, :]).reshape(p, k * k).T
-    taken, of_expected, of_steps = np.zeros((3, p))
-    for piece in pieces:
-        # Information in those coordinates; with the root on one side, and on both.
-        within = piece.information.reshape(-1, p * p) @ to_root
-        squared = within.reshape(-1, k).T @ within.reshape(-1, k)
-        taken += np.einsum("ar,rs,as->a", root, squared, root)
-        of_expected += ((within @ to_variance) ** 2).sum(axis=0)
-        of_steps += ((piece.gradient @ to_steps) ** 2).sum(axis=0)
-    left = np.maximum(variance - taken, 0)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        scatter = of_steps * variance / left
-        degrees = variance**2 / of_expected * left / variance
-    return scatter, np.nan_to_num(degrees)
+    return scatter_of(found.information.sum(axis=0), [found])
 
 
 def spread_of(
     found: JointEstimate, inflation: float, calibration: JointCalibration | None = None, *, is_level_known: bool = True
 ) -> Spread:
-    """Return by how much the variance of each parameter exceeds that from independent noise of the level known.
+    """Return by how much the variance of each parameter exceeds that from independent noise, as `spread_of_scatters`.
 
     Parameters
     ----------
@@ -163,55 +99,20 @@ def spread_of(
         What smooth errors add: the residual and the scatter between blocks are compared with noise and these together.
     is_level_known : bool
         Whether the noise is known; otherwise its level is that of the residual.
-
-    Notes
-    -----
-    The largest of information, scatter between lines and scatter between blocks; the latter two only where they exceed
-    the former by more than chance, for one parameter or for all together.
     """
     excess, beside = (0.0, 0.0) if calibration is None else (calibration.excess, calibration.factor)
     scale = max(found.scale / (1 + excess), 1.0) if is_level_known else found.scale
     by_noise = np.full(len(found.parameters), inflation * scale)
-    by_lines, by_blocks, of_lines, of_blocks = (np.full_like(by_noise, np.nan) for _ in range(4))
+    lines, blocks = Scatter.none(by_noise.size), Scatter.none(by_noise.size)
     for group in found.groups:
         own = np.diagonal(group.covariance)
-        scatter, of_lines[group.which] = line_scatter(group)
-        blocks, of_blocks[group.which] = block_scatter(group)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            by_lines[group.which] = np.where(own > 0, inflation * scatter / own, np.nan)
-            by_blocks[group.which] = np.where(own > 0, blocks / own, np.nan)
-    factor = _larger_than_chance(by_noise, by_lines, of_lines / inflation)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        chance = np.nan_to_num(special.chdtrc(of_blocks, of_blocks * by_blocks / (factor + beside)), nan=1.0)
-    factor = np.maximum(_larger_than_chance(factor + beside, by_blocks, of_blocks) - beside, factor)
-    return Spread(by_noise, by_lines, by_blocks, factor, chance)
-
-
-def _larger_than_chance(factor: FloatArray, other: FloatArray, degrees: FloatArray) -> FloatArray:
-    """Return variance factors, raised to others of few degrees of freedom where these are larger by more than chance.
-
-    By the mean over the parameters where this is; each by Student's t for its few degrees.
-    """
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ratio = other / factor
-    known = np.isfinite(ratio) & (degrees >= 2)
-    if not known.any():
-        return factor
-    raised = factor.copy()
-    count, few = int(known.sum()), float(medians(degrees[known]))
-    if (mean := float(ratio[known].mean())) > _chi_squared(_CHANCE, few * count) / (few * count):
-        raised *= mean
-    single = _chi_squared(1 - (1 - _CHANCE) / count, degrees[known]) / degrees[known]
-    larger = np.flatnonzero(known)[ratio[known] > single]
-    if larger.size:
-        student = (special.stdtrit(degrees[larger], 0.975) / special.ndtri(0.975)) ** 2
-        raised[larger] = np.maximum(raised[larger], student * other[larger])
-    return raised
-
-
-def _chi_squared(probability: float, degrees: float | FloatArray) -> Any:
-    """Quantile of chi-squared, without the time that scipy.stats takes to import."""
-    return 2 * special.gammaincinv(np.asarray(degrees) / 2, probability)
+        for both, (variance, degrees), more in (
+            (lines, line_scatter(group), inflation), (blocks, block_scatter(group), 1.0),
+        ):  # fmt: skip
+            with np.errstate(divide="ignore", invalid="ignore"):
+                both.factor[group.which] = np.where(own > 0, more * variance / own, np.nan)
+            both.degrees[group.which] = degrees / more
+    return spread_of_scatters(by_noise, lines, blocks, beside=beside)
 
 
 def joint_intervals(found: JointEstimate, factor: FloatArray, added: FloatArray | None = None) -> Intervals:
@@ -337,7 +238,7 @@ def _may_be_rigid(group: GroupFit, dof: int, factor: float, probability: float) 
     start[dof] = 0.0
     rigid = group.joint.lowest(group.forms, start, dof, _PRECISE)
     parameters = int(np.count_nonzero(group.joint.dofs == dof))
-    return bool(rigid.cost - group.cost < _chi_squared(probability, parameters) * factor / 2)
+    return bool(rigid.cost - group.cost < chi_squared(probability, parameters) * factor / 2)
 
 
 def residual_test_of(

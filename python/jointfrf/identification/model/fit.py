@@ -13,16 +13,19 @@ import numpy as np
 from jointfrf.errors import IllConditionedWarning
 from jointfrf.frf.noise_model import NoiseModel
 from jointfrf.frf.smoothing import pieces
+from jointfrf.identification.calibration import CalibrationSpread, student_factor
 from jointfrf.identification.line_starts import LineCompliance, from_lines, interface_compliance
 from jointfrf.identification.minimise import Minimum, inverse_information, minimise
 from jointfrf.identification.model.evidence import ModelError, with_model_error
 from jointfrf.identification.model.likelihood import Likelihood
 from jointfrf.identification.model.prediction import Prediction
 from jointfrf.identification.model.starts import ranked_trials, refined
+from jointfrf.identification.model.uncertainty import ModelGradient
 from jointfrf.identification.noise import KnownNoise, noise_about
 from jointfrf.identification.parameters import ParameterVector
 from jointfrf.identification.profile import Intervals, ProfileIntervals
 from jointfrf.identification.residual_test import ResidualTest, check_residual
+from jointfrf.identification.scatter import Spread
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
 __all__ = ["FoundModel", "ModelProblem", "OpenDirection", "fit_assembly", "open_directions"]
@@ -102,6 +105,10 @@ class FoundModel(NamedTuple):
         Errors of the models beside their unknowns, where the FRFs show any.
     test_with_error : ResidualTest
         Of the residual, with these; `test` is that without them.
+    spread : Spread
+        Variance factors by what FRFs share.
+    calibration : CalibrationSpread or None
+        What smooth errors of channels add to the coordinates.
     """
 
     problem: ModelProblem
@@ -116,6 +123,8 @@ class FoundModel(NamedTuple):
     other: float
     error: ModelError | None
     test_with_error: ResidualTest
+    spread: Spread
+    calibration: CalibrationSpread | None
 
 
 def fit_assembly(problem: ModelProblem) -> FoundModel:
@@ -236,30 +245,42 @@ def _judged(problem: ModelProblem, minimum: Minimum, other: float) -> FoundModel
     """Return covariance, intervals and tests at a minimum."""
     likelihood = problem.likelihood
     residual, predicted = _residual(problem, likelihood, minimum)
-    test = with_error = _test(problem, likelihood, minimum, residual)
+    test = with_error = _test(problem, likelihood, minimum, residual, predicted)
     found = with_model_error(likelihood, minimum)
     if found is not None:
         likelihood, minimum = found[:2]
         residual, predicted = _residual(problem, likelihood, minimum)
-        with_error = _test(problem, likelihood, minimum, residual)
+        with_error = _test(problem, likelihood, minimum, residual, predicted)
     vector, n = likelihood.vector, likelihood.vector.n_shown
     values = vector.to_values(minimum.x)
-    factor = max(1.0, with_error.ratio**2) if with_error.is_large else 1.0
-    own = inverse_information(minimum.information)
-    slope = vector.slope(minimum.x)
-    covariance = (own * factor * np.outer(slope, slope))[:n, :n]
-    profile = ProfileIntervals(likelihood, vector, minimum.x, minimum.cost, own, factor)
+    gradient = ModelGradient.of(likelihood, minimum, problem.noise.inflation)
+    own, slope, errors = gradient.covariance, vector.slope(minimum.x)[:n], problem.noise.calibration
+    calibration = None if errors is None else gradient.calibration(errors, problem.freq_hz)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        beside = 0.0 if calibration is None else np.nan_to_num(np.diagonal(calibration.covariance) / np.diagonal(own))
+    spread = gradient.spread(max(1.0, with_error.ratio**2) if with_error.is_large else 1.0, beside)
+    root, factor = np.sqrt(spread.factor), spread.factor
+    covariance = own * np.outer(root, root)
+    if calibration is not None:
+        covariance += calibration.covariance
+        factor = (factor + beside) * student_factor(factor, np.asarray(beside), calibration.degrees)
+    covariance *= np.outer(slope, slope)
+    whole = inverse_information(minimum.information)
+
+    def profile(of: float) -> ProfileIntervals:
+        return ProfileIntervals(likelihood, vector, minimum.x, minimum.cost, whole, of)
+
     intervals = Intervals(
         [one.name for one in vector.fitted[:n]],
-        profile.of,
-        lambda function, _, probability: profile.of_function(
+        lambda i, probability: profile(float(factor[i])).of(i, probability),
+        lambda function, used, probability: profile(float(factor[used].max())).of_function(
             lambda x: function(vector.to_values(x)[vector.free[:n]]), probability
         ),
     )
     return FoundModel(
         problem, minimum, values, covariance, intervals, predicted, residual, test,
         open_directions(problem.vector, minimum.x[:n], minimum.information[:n, :n]), other,
-        None if found is None else found[2], with_error,
+        None if found is None else found[2], with_error, spread, calibration,
     )  # fmt: skip
 
 
@@ -267,19 +288,29 @@ def _residual(problem: ModelProblem, likelihood: Likelihood, minimum: Minimum) -
     """Return the residual over the noise, and the FRFs fitted."""
     vector = likelihood.vector
     predicted = problem.prediction.frfs(vector, vector.to_values(minimum.x))
+    return (likelihood.measured - predicted) / _tested(problem, likelihood), predicted
+
+
+def _tested(problem: ModelProblem, likelihood: Likelihood) -> FloatArray:
+    """Return the standard deviation of the noise that the residual is compared with; NaN where nothing is measured."""
     tested = problem.variance if problem.tested is None else problem.tested
-    std = np.sqrt(np.where(likelihood.used, tested, np.nan))
-    return (likelihood.measured - predicted) / std, predicted
+    return np.sqrt(np.where(likelihood.used, tested, np.nan))
 
 
-def _test(problem: ModelProblem, likelihood: Likelihood, minimum: Minimum, residual: ComplexArray) -> ResidualTest:
-    """Compare a residual with its noise; terms that their priors hold use up less of it than free ones."""
-    n = likelihood.vector.n_shown
+def _test(
+    problem: ModelProblem, likelihood: Likelihood, minimum: Minimum, residual: ComplexArray, predicted: ComplexArray
+) -> ResidualTest:
+    """Compare a residual with noise and calibration; terms that their priors hold use up less of it than free ones."""
+    n, errors = likelihood.vector.n_shown, problem.noise.calibration
     of_priors = likelihood.vector.pull_slopes(minimum.x)[n:] ** 2
     held = float(of_priors @ np.diagonal(inverse_information(minimum.information))[n:])
+    smooth = None
+    if errors is not None:
+        added = (abs(predicted) / _tested(problem, likelihood)) ** 2 * errors.variance(problem.freq_hz)[:, None, None]
+        residual, smooth = residual / np.sqrt(1 + added), added / (1 + added)
     return check_residual(
         residual, problem.freq_hz, likelihood.vector.pulls(minimum.x)[:n], parameters=minimum.x.size - held,
-        inflation=problem.noise.inflation, is_given=problem.noise.is_given,
+        inflation=problem.noise.inflation, is_given=problem.noise.is_given, smooth=smooth,
     )  # fmt: skip
 
 

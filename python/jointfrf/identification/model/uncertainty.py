@@ -1,0 +1,135 @@
+"""Uncertainty of a fit of an assembly beyond independent noise: scatter of its gradient, channels a little off."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from jointfrf.frf.calibration import CalibrationErrors
+from jointfrf.identification.calibration import CalibrationSpread, effects_by_function
+from jointfrf.identification.minimise import Minimum, inverse_information
+from jointfrf.identification.model.likelihood import Likelihood
+from jointfrf.identification.scatter import (
+    BLOCKS,
+    LineParts,
+    Scatter,
+    Spread,
+    block_members,
+    scatter_of,
+    spread_of_scatters,
+)
+from jointfrf.kernel.arguments import ComplexArray, FloatArray
+
+__all__ = ["ModelGradient"]
+
+_TINY = float(np.finfo(float).tiny)
+
+
+@dataclass(frozen=True)
+class ModelGradient:
+    """What each FRF adds to the normal equations on each line, at a minimum.
+
+    Attributes
+    ----------
+    information : ndarray, shape (p, p)
+        Of the coordinates, priors included.
+    inflation : float
+        Lines that carry the noise of one independent line: 1 over it is the mean square of a real residual.
+    slopes : ndarray, shape (p, n_freq, n_o, n_i)
+        Derivatives of the weighted FRFs by the coordinates.
+    residual, predicted : ndarray, shape (n_freq, n_o, n_i)
+        Weighted.
+    priors : LineParts
+        Of each prior.
+    """
+
+    information: FloatArray
+    inflation: float
+    slopes: ComplexArray
+    residual: ComplexArray
+    predicted: ComplexArray
+    priors: LineParts
+
+    @classmethod
+    def of(cls, likelihood: Likelihood, minimum: Minimum, inflation: float) -> ModelGradient:
+        """Return the parts at a minimum of a likelihood, of the parameters that are shown; others are eliminated."""
+        vector, x, n = likelihood.vector, minimum.x, likelihood.vector.n_shown
+        y, slopes = likelihood.prediction.linearised(vector, vector.to_values(x))
+        whole = minimum.information
+        kept = np.eye(n, x.size)
+        kept[:, n:] = -whole[:n, n:] @ inverse_information(whole[n:, n:])
+        # A prediction may lend its derivatives.
+        slopes = slopes * likelihood.weight
+        slopes = np.tensordot(kept * vector.slope(x), slopes, 1)
+        by_prior = vector.pull_slopes(x)
+        pulled = kept * by_prior
+        priors = LineParts(-(pulled * vector.pulls(x)).T, pulled.T[:, :, None] * pulled.T[:, None])
+        residual = likelihood.difference(y) * likelihood.weight
+        return cls(kept @ whole @ kept.T, inflation, slopes, residual, y * likelihood.weight, priors)
+
+    @cached_property
+    def covariance(self) -> FloatArray:
+        """Covariance of the coordinates, from noise as known, shape (p, p)."""
+        return inverse_information(self.information)
+
+    def _parts(self, axis: int) -> LineParts:
+        """Return the parts of each line (axis 1), response (2) or force (3), and of each prior."""
+        slopes = np.ascontiguousarray(np.moveaxis(self.slopes, axis, 0))
+        flat = slopes.reshape(*slopes.shape[:2], -1).view(np.float64)
+        residual = np.ascontiguousarray(np.moveaxis(self.residual, axis - 1, 0)).reshape(len(flat), -1)
+        gradient = (flat @ residual.view(np.float64)[:, :, None])[..., 0]
+        both = (gradient, self.priors.gradient), (flat @ flat.swapaxes(1, 2), self.priors.information)
+        return LineParts(*(np.concatenate(one) for one in both))
+
+    def spread(self, by_noise: float, beside: FloatArray | float = 0.0) -> Spread:
+        """Return variance factors by the scatter between lines, blocks, responses and forces.
+
+        Parameters
+        ----------
+        by_noise : float
+            Variance factor by the residual.
+        beside : ndarray, shape (p,)
+            Variance that smooth errors of channels add, likewise.
+        """
+        _, n_freq, n_o, n_i = self.slopes.shape
+        lines = self._parts(1)
+        of_lines, of_blocks = self._scatter(lines, self.inflation), Scatter.none(len(self.slopes))
+        size = np.maximum(np.diagonal(self.information), _TINY)
+        share = np.einsum("lpp->lp", lines.information[:n_freq]) / size
+        seen = np.flatnonzero(share.any(axis=1))
+        if seen.size >= 2 * BLOCKS:
+            member = block_members(share, seen)
+            whole = np.concatenate([member, np.zeros((len(member), size.size))], axis=1)
+            whole = np.concatenate([whole, np.eye(size.size, whole.shape[1], n_freq)])
+            parts = LineParts(whole @ lines.gradient, np.tensordot(whole, lines.information, 1))
+            of_blocks = self._scatter(parts)
+        hits = [self._scatter(self._parts(axis)) for axis, count in ((2, n_o), (3, n_i)) if count > 1]
+        return spread_of_scatters(np.full(size.size, by_noise), of_lines, of_blocks, hits, beside)
+
+    def _scatter(self, parts: LineParts, correlated: float = 1.0) -> Scatter:
+        variance, degrees = scatter_of(self.information, [parts])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return Scatter(correlated * variance / np.diagonal(self.covariance), degrees / correlated)
+
+    def calibration(self, errors: CalibrationErrors, freq_hz: FloatArray) -> CalibrationSpread:
+        """Return what errors of FRFs that are smooth over frequency add to the coordinates."""
+        functions = errors.functions(freq_hz)
+        gradient = self.slopes.conj() * self.predicted
+        squares: FloatArray = abs(self.predicted) ** 2 * (self.inflation / 2)
+
+        def effects(by_axis: list[int]) -> list[tuple[ComplexArray, FloatArray]]:
+            found = []
+            for axis in by_axis:
+                of_axis = np.moveaxis(gradient.sum(axis=5 - axis), 2, 0)
+                found += list(zip(of_axis.swapaxes(1, 2), squares.sum(axis=4 - axis).T, strict=True))
+            return found
+
+        of_channels = effects_by_function(effects([2, 3]), functions, self.covariance)
+        of_own = None
+        if errors.own.any():
+            p, n_freq = gradient.shape[:2]
+            each = zip(gradient.reshape(p, n_freq, -1).transpose(2, 1, 0), squares.reshape(n_freq, -1).T, strict=True)
+            of_own = effects_by_function(each, functions, self.covariance)
+        return CalibrationSpread.of(errors, of_channels, of_own)
