@@ -66,7 +66,7 @@ def one_draw(trial: Trial, seed: int) -> Draw:
             # No joint was found, and that is said.
             return Draw({}, {}, time.perf_counter() - start)
         intervals = fit.confidence_interval(0.95)
-    return Draw(fit.parameters, intervals, time.perf_counter() - start)
+    return Draw(fit.value, intervals, time.perf_counter() - start)
 
 
 def truth_of(trial: Trial) -> tuple[dict[str, float], dict[str, float]]:

@@ -125,7 +125,7 @@ def one_draw(trial: ModelTrial, seed: int) -> tuple[dict[str, float], dict[str, 
         warnings.simplefilter("ignore")
         fit = jf.identify_model(FREQ, h, whole(joint, unknown=trial.unknown), channels, channels)
         seconds = time.perf_counter() - start
-        return fit.parameters, fit.confidence_interval(0.95), fit.test.is_noise, seconds
+        return fit.value, fit.confidence_interval(0.95), fit.test.is_noise, seconds
 
 
 def row(trial: ModelTrial, draws: list) -> str:

@@ -117,7 +117,7 @@ class ModelGradient:
         """Return what errors of FRFs that are smooth over frequency add to the coordinates."""
         functions = errors.functions(freq_hz)
         gradient = self.slopes.conj() * self.predicted
-        squares: FloatArray = abs(self.predicted) ** 2 * (self.inflation / 2)
+        squares = np.asarray(abs(self.predicted) ** 2 * (self.inflation / 2), np.float64)
 
         def effects(by_axis: list[int]) -> list[tuple[ComplexArray, FloatArray]]:
             found = []
