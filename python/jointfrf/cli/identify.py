@@ -83,6 +83,9 @@ def add_arguments(parser: CommandParser) -> None:
     add_law_arguments(parser)
     parser.option("--noise LEVEL", "relative noise of the FRFs, 0.01 for 1 %% (default: from their reciprocity)", float)
     parser.option(
+        "--window-decay SIGMA", "exponential window exp(-SIGMA t) of the test, 1/s: taken off stiffnesses", float
+    )
+    parser.option(
         "--bending-stiffness EI",
         "E I of the thinner part in N m^2: says how much compliance the differences along a line add",
         float,
@@ -127,7 +130,9 @@ def run(args: argparse.Namespace) -> int:
     for text in joint.warnings(check):
         warnings.warn(text, FrfCheckWarning, stacklevel=2)
     if "compliance" not in args.method:
-        warn_of_ignored(args, ("--damping", "--cross", "--noise"), f"method {args.method[0]} does not use it")
+        warn_of_ignored(
+            args, ("--damping", "--cross", "--noise", "--window-decay"), f"method {args.method[0]} does not use it"
+        )
     if joint.channels is not None or len(joint.nodes[0]) == 1:
         warn_of_ignored(args, ("--bending-stiffness",), "no rotation is found by differences along a line")
     out.say(*_heading(args, frfs, joint))
@@ -236,6 +241,7 @@ def _of_compliance(
     return {
         "transform": joint.transform,
         "noise": args.noise,
+        **({"window_decay": args.window_decay} if args.window_decay is not None else {}),
         **terms,
         **known,
     }

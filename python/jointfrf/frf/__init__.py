@@ -8,6 +8,7 @@ rational_fit  rational functions with common poles: how many, and where
 smoothing     smooth FRFs by them, many lines in pieces
 entry_groups  which entries are measured twice, are zero, or have their poles in common
 noise_parts   relative and constant part of the noise, its correlation, outlying lines
+calibration   errors of channels that are smooth over frequency, by h_pq and h_qp
 noise_model   noise of measured FRFs, from residuals and differences of reciprocal entries
 quantiles     medians and quantiles of small arrays
 

@@ -16,7 +16,7 @@ from jointfrf.frf.noise_parts import ReciprocityDifferences, reciprocity_differe
 from jointfrf.frf.smoothing import near_squares
 from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray
 
-__all__ = ["CalibrationErrors", "calibration_errors"]
+__all__ = ["CalibrationErrors", "calibration_errors", "shows_calibration"]
 
 #: Functions of frequency that may be calibration, about as slow as an eighth of the band; as many faster ones show the
 #: noise. Lines that each needs.
@@ -119,21 +119,29 @@ def calibration_errors(freq_hz: FloatArray, h: ComplexArray) -> CalibrationError
         return None
     span = float(freq[0]), float(freq[-1])
     factors = _factors(differences, some, _functions(span, 2 * n_slow, freq))
-    squares = _squares(factors, differences.rows, differences.columns)
+    rows, columns = differences.rows, differences.columns
+    by_noise = _squares(factors, 1 / factors.variance, rows, columns)
+    # Errors far above the noise count alike, however small the noise of a pair is.
+    alike = _squares(factors, np.ones_like(factors.variance), rows, columns)
     found = np.zeros((2, 2, 2, n_slow))  # variance and degrees; channel and own; gain and phase
     speed = np.ceil(np.log2(np.arange(n_slow) + 1)).astype(int)
     for part in range(2):
-        reference = squares[:, part, n_slow:].sum(axis=1)
+        reference = by_noise[:, :, part, n_slow:].sum(axis=2)
         for one in np.unique(speed):
             own = np.flatnonzero(speed == one)
-            found[:, :, part, own] = _variances(squares[:, part, own].sum(axis=1), reference)[:, :, None]
+            tested, sized = (squares[:, :, part, own].sum(axis=2) for squares in (by_noise, alike))
+            found[:, :, part, own] = _variances(tested, sized, reference)[:, :, None]
     variance, degrees = found
     if not variance.any():
         return None
     significant = np.where(variance.any(axis=0), factors.value[:, :, :n_slow], 0)
-    return CalibrationErrors(
-        span, variance[0], variance[1], degrees[0], degrees[1], differences.rows, differences.columns, significant
-    )
+    return CalibrationErrors(span, variance[0], variance[1], degrees[0], degrees[1], rows, columns, significant)
+
+
+def shows_calibration(h: ComplexArray) -> bool:
+    """Return whether FRFs between the same channels could show smooth errors: both ways measured, on enough lines."""
+    middle = h[len(h) // 2]
+    return len(h) >= 2 * _LINES and middle.shape[0] > 1 and not np.allclose(middle, middle.T, rtol=1e-9, atol=0)
 
 
 def _functions(span: tuple[float, float], number: int, freq_hz: FloatArray) -> FloatArray:
@@ -181,46 +189,50 @@ def _factors(differences: ReciprocityDifferences, h: ComplexArray, functions: Fl
     return _Factors(np.stack(value, axis=1), np.maximum(np.stack(spread, axis=1) * level[:, None, None], TINY))
 
 
-def _squares(factors: _Factors, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> FloatArray:
-    """Return sums of squares over their noise with what they are in the mean, shape (7, 2, n_functions).
+def _squares(factors: _Factors, weight: FloatArray, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> FloatArray:
+    """Return weighted sums of squares of channels, and of what does not close, shape (2, 5, 2, n_functions).
 
-    Of channels: sum, degrees, increase by a unit of variance of each FRF, and of each channel; of what does not close:
-    sum, degrees, increase by a unit of variance of each FRF.
+    Each with its degrees of freedom, and what it is in the mean: by independent noise, by a unit of variance of each
+    FRF, and of each channel.
     """
     channels, at = np.unique(np.r_[rows, columns], return_inverse=True)
     n_pairs = len(rows)
     incidence = np.zeros((n_pairs, channels.size))
     incidence[np.arange(n_pairs), at[:n_pairs]] = 1
     incidence[np.arange(n_pairs), at[n_pairs:]] = -1
-    found = np.empty((7, *factors.value.shape[1:]))
-    for place in np.ndindex(found.shape[1:]):
-        weight = 1 / factors.variance[(slice(None), *place)]
-        value = factors.value[(slice(None), *place)] * np.sqrt(weight)
-        u, size, _ = np.linalg.svd(incidence * np.sqrt(weight)[:, None], full_matrices=False)
+    found = np.zeros((2, 5, *factors.value.shape[1:]))
+    for place in np.ndindex(found.shape[2:]):
+        at_place = (slice(None), *place)
+        w = weight[at_place]
+        value, noise = factors.value[at_place] * np.sqrt(w), factors.variance[at_place] * w
+        u, size, _ = np.linalg.svd(incidence * np.sqrt(w)[:, None], full_matrices=False)
         basis = u[:, size > _RANK * size[0]]
+        share, rank = (basis**2).sum(axis=1), basis.shape[1]
         of_channels = float(((value @ basis) ** 2).sum())
-        rank, seen = basis.shape[1], float((basis**2).sum(axis=1) @ weight)
-        found[(slice(None), *place)] = (
-            of_channels, rank, 2 * seen, 2 * weight.sum(),
-            max(float(value @ value) - of_channels, 0.0), n_pairs - rank, 2 * max(weight.sum() - seen, 0.0),
-        )  # fmt: skip
+        apart = max(float(value @ value) - of_channels, 0.0)
+        found[(0, slice(None), *place)] = of_channels, rank, share @ noise, 2 * share @ w, 2 * w.sum()
+        found[(1, slice(None), *place)] = apart, n_pairs - rank, (1 - share) @ noise, 2 * (1 - share) @ w, 0
     return found
 
 
-def _variances(squares: FloatArray, reference: FloatArray) -> FloatArray:
-    """Return variance and degrees of freedom of channels and of single FRFs, shape (2, 2), from sums of `_squares`."""
-    of_channels, degrees, by_own, by_channel, apart, degrees_apart, apart_by_own = squares
-    noise, degrees_noise = reference[0] / reference[1], reference[1]
-    own = channel = own_degrees = channel_degrees = 0.0
-    if degrees_apart > 0 and reference[4] > 0:
-        noise_apart = reference[4] / reference[5]
-        expected = degrees_apart * noise_apart
-        if special.fdtrc(degrees_apart, reference[5], apart / expected) < _CHANCE:
-            own = (apart - expected) / apart_by_own
-            own_degrees = degrees_apart * (1 - expected / apart) ** 2
-            degrees_noise = degrees_apart
-    expected = degrees * noise + own * by_own
-    if expected > 0 and special.fdtrc(degrees, degrees_noise, of_channels / expected) < _CHANCE:
-        channel = (of_channels - expected) / by_channel
-        channel_degrees = degrees * (1 - expected / of_channels) ** 2
-    return np.array([[channel, own], [channel_degrees, own_degrees]])
+def _variances(tested: FloatArray, sized: FloatArray, reference: FloatArray) -> FloatArray:
+    """Return variance and degrees of freedom of channels and of single FRFs, shape (2, 2), from sums of `_squares`.
+
+    By the first sums it is tested whether they exceed those of noise, the third; the second ones give the size.
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        noise = np.where(reference[:, 1] > 0, reference[:, 0] / reference[:, 2], 0)
+    found, degrees_noise = np.zeros((2, 2)), reference[:, 1].copy()
+    for kind in (1, 0):
+        expected = noise[kind] * tested[kind, 2] + found[0, 1] * tested[kind, 3]
+        degrees = tested[kind, 1]
+        if degrees == 0 or expected <= 0:
+            continue
+        if special.fdtrc(degrees, degrees_noise[kind], tested[kind, 0] / expected) < _CHANCE:
+            expected = noise[kind] * sized[kind, 2] + found[0, 1] * sized[kind, 3]
+            if sized[kind, 0] > expected:
+                found[0, kind] = (sized[kind, 0] - expected) / sized[kind, 3 + (kind == 0)]
+                found[1, kind] = degrees * (1 - expected / sized[kind, 0]) ** 2
+                if kind == 1:
+                    degrees_noise[0] = degrees
+    return found

@@ -34,6 +34,7 @@ FitFindingKind = Literal[
     "sides",  # bodies that deform between the channels
     "sign",  # damping that is negative, or may be
     "trend",  # a parameter that changes over the band
+    "window",  # what an exponential window adds
     "other",  # read from a file that does not say
 ]
 

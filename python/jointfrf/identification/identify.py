@@ -14,6 +14,7 @@ from jointfrf.channels.check.finding import FrfCheck
 from jointfrf.frf.bands import spread_lines
 from jointfrf.identification.compliance_data import compliance_data
 from jointfrf.identification.describe import describe_laws, describe_springs
+from jointfrf.identification.exponential_window import without_window
 from jointfrf.identification.manifold.coordinates import CrossTerms, DampingTerms
 from jointfrf.identification.manifold.fit import fit_laws, fit_springs
 from jointfrf.identification.manifold.prepare import FitOptions, FitProblem, prepare_compliance
@@ -21,7 +22,7 @@ from jointfrf.identification.manifold.transforms import Transform
 from jointfrf.identification.noise import NoiseOptions
 from jointfrf.identification.prepare import BandsOfDofs, MeasuredFrfs, as_measured
 from jointfrf.identification.result import Fit
-from jointfrf.kernel.arguments import FloatArray, as_names, check_type
+from jointfrf.kernel.arguments import FloatArray, as_names, as_number, check_type
 from jointfrf.laws.law_joint import LawJoint
 
 __all__ = ["identify"]
@@ -41,6 +42,7 @@ def identify(
     coherence: ArrayLike | None = None,
     averages: float | None = None,
     reciprocal: bool = True,
+    window_decay: float = 0.0,
 ) -> Fit:
     """Identify a joint from measured FRFs of the assembly between all its joint DOFs, without models.
 
@@ -80,6 +82,9 @@ def identify(
         As in `estimate_noise`, where `noise` is not given.
     reciprocal : bool
         Whether the structure is reciprocal, so that gamma_pq and gamma_qp may be averaged.
+    window_decay : float
+        Decay sigma of an exponential window exp(-sigma t) on the responses, 1/s. FRFs are then those at i w + sigma,
+        and stiffnesses of springs grow by sigma c, which is taken off.
 
     Returns
     -------
@@ -137,6 +142,10 @@ def identify(
         joint = _check_law_joint(joint, dofs)
         dofs = joint.dofs
         damping = "viscous"
+    if as_number("window_decay", window_decay) < 0:
+        raise ValueError(f"window_decay must not be negative, not {window_decay:g}")
+    if window_decay and joint is not None:
+        raise ValueError("window_decay is taken off springs and dampers, not of laws: leave it out")
     options = FitOptions(damping or "auto", cross or "zero", reciprocal)
     problem = prepare_compliance(
         as_measured(freq_hz, gamma, square=False), dofs, bands, transform,
@@ -147,6 +156,8 @@ def identify(
     if joint is None:
         found = fit_springs(problem)
         fit = describe_springs(found, problem)
+        if window_decay:
+            fit = without_window(fit, float(window_decay))
     else:
         count = 2 * np.count_nonzero(np.isfinite(problem.frfs.variance))
         if count < len(joint.names):

@@ -14,6 +14,7 @@ import numpy as np
 
 from jointfrf.dofs import ParameterKind, is_rotation
 from jointfrf.files import write_file
+from jointfrf.frf.calibration import shows_calibration
 from jointfrf.identification.fit_cards import cards
 from jointfrf.identification.fit_data import FitData, ModelData
 from jointfrf.identification.result import Fit, FittedParameter
@@ -169,6 +170,7 @@ def _model_sections(fit: Fit, options: ReportOptions) -> list[Section]:
         _frf_section(fit, compared, frfs, most),
         Section("maps", "Residual by channel", [residual_map(compared)]),
         Section("noise", "Noise", _noise_parts(fit, None, most)),
+        _blind_spots(fit, is_square=fit.responses == fit.forces),
         Section("cards", "Input of finite-element programs", _cards(fit, options.nodes)),
         Section("made", "How this was made", [_made(fit, options)]),
     ]
@@ -222,6 +224,7 @@ def _joint_sections(fit: Fit, data: FitData, options: ReportOptions) -> list[Sec
         _frf_section(fit, compared, frfs, most),
         Section("maps", "Residual and reciprocity by channel", _maps(compared)),
         Section("noise", "Noise", _noise_parts(fit, noise, most)),
+        _blind_spots(fit, is_square=data.reciprocal and data.response_names == data.force_names),
         Section("cards", "Input of finite-element programs", _cards(fit, options.nodes)),
         Section("made", "How this was made", [_made(fit, options)]),
     ]
@@ -336,6 +339,35 @@ def _noise_parts(fit: Fit, figure: Figure | None, most: int) -> list[Part]:
         known = f"Noise of {100 * fit.noise_level:.2g} % of the FRFs (median) was used; how it varies is not kept."
         return [Words([known])]
     return list(_charts([figure], most, fit, "measured and smooth FRFs and the noise found in them"))
+
+
+def _blind_spots(fit: Fit, *, is_square: bool) -> Section:
+    """Say which errors of a test no FRF shows: no interval holds them."""
+    assert fit.data is not None
+    if any(one.kind == "calibration" for one in fit.findings):
+        seen = (
+            "Sensors and hammers of the same DOFs differ by what the note on calibration says. What both have in "
+            "common does not show; the intervals take it to be as large as the difference."
+        )
+    elif is_square and shows_calibration(fit.data.measured):
+        seen = (
+            "h_pq and h_qp differ by no more than noise: sensors and hammers agree. An error that sensor and hammer "
+            "of a DOF have in common does not show, and is in no interval."
+        )
+    else:
+        seen = (
+            "Responses and forces are not at the same DOFs, on lines enough, each measured both ways: nothing shows "
+            "whether sensors and hammer are calibrated, and no interval allows for it."
+        )
+    others = [
+        "A gain that all FRFs share, and a delay of all hits: stiffness and damping carry them one to one; a delay "
+        "τ adds k τ to c.",
+        "Sensors that all resonate at one frequency f₀: FRFs at f are too large by (f/f₀)².",
+        "Noise of the measured force: H1 estimates are too small by its share; H2 estimates of noisy responses are "
+        "too large.",
+        "Exponential windows: with exp(-σt) a stiffness grows by c σ, unless σ was given (window_decay).",
+    ]
+    return Section("blind", "What this test cannot know", [Words([seen, *others])])
 
 
 def _cards(fit: Fit, nodes: Sequence[int]) -> list[Part]:

@@ -12,10 +12,10 @@ starts          first coordinates from the compliance of single lines
 group_fit       the iteration: linearise, minimise, judge
 unknown_cross   the fit where cross terms of C are unknown
 estimate        strategies tried in order for every group of DOFs, put together
+beyond_noise    sides that are not rigid, parts of the band that disagree, channels a little off
 uncertainty     scatter between lines and parts of the band, intervals, test of the residual
-beyond_noise    sides that are not rigid, parts of the band that disagree
 fit             all of it: noise level, choice of damping, uncertainty
 
 What it shares with the likelihood of models is in `jointfrf.identification`: parameters, minimise, profile,
-residual_test, noise, line_starts. Smooth FRFs and the noise model come from `jointfrf.frf`.
+scatter, calibration, residual_test, noise, line_starts. Smooth FRFs and the noise model come from `jointfrf.frf`.
 """

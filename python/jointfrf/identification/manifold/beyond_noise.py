@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -246,6 +247,9 @@ class JointCalibration(NamedTuple):
         Of the parameters.
     excess, excess_error : float
         Mean square of the residual that they leave, in units of the noise, and its standard error.
+    between : callable
+        ``between(group, member, inverse)`` returns the covariance, shape (n_parts, p, p), of what they make coordinates
+        of parts of the band differ from those of all lines: lines of each part, and the inverse of its information.
     """
 
     factor: FloatArray
@@ -253,6 +257,7 @@ class JointCalibration(NamedTuple):
     covariance: FloatArray
     excess: float
     excess_error: float
+    between: Callable[[GroupFit, FloatArray, FloatArray], FloatArray]
 
 
 def joint_calibration(
@@ -296,7 +301,29 @@ def joint_calibration(
         excess += spread.squares
         error = float(np.hypot(error, spread.squares_error))
     equations = max(found.equations - p / 2, 1.0)
-    return JointCalibration(factor, degrees, covariance, excess / equations, error / equations)
+    between = partial(_between_parts, frfs, errors, errors.functions(freq_hz))
+    return JointCalibration(factor, degrees, covariance, excess / equations, error / equations, between)
+
+
+def _between_parts(
+    frfs: InterfaceFrfs,
+    errors: CalibrationErrors,
+    functions: FloatArray,
+    group: GroupFit,
+    member: FloatArray,
+    inverse: FloatArray,
+) -> FloatArray:
+    whole, found = inverse_information(group.information), np.zeros_like(inverse)
+    for variance, changes in ((errors.channel / 2, _channel_errors), (errors.own, _own_errors)):
+        if not variance.any():
+            continue
+        for gradient, _ in effects_of(group, changes(frfs, group.dofs)):
+            parts = np.einsum(
+                "afl,bl,alp->abfp", functions, member, np.stack([gradient.real, -gradient.imag]), optimize=True
+            )
+            steps = parts @ inverse - (parts.sum(axis=1) @ whole)[:, None]
+            found += np.einsum("af,abfp,abfq->bpq", variance, steps, steps)
+    return found
 
 
 def _group_calibration(

@@ -274,7 +274,7 @@ def residual_test_of(
         excess /= 1 + calibration.excess
         sigma = float(np.hypot(sigma, calibration.excess_error / (1 + calibration.excess) / 2))
     factor = np.fmax(np.maximum(spread.information, inflation), spread.lines)
-    trends = tuple(t for group in found.groups for t in _trends(group, freq_hz, factor[group.which]))
+    trends = tuple(t for group in found.groups for t in _trends(group, freq_hz, factor[group.which], calibration))
     test = ResidualTest(float(np.sqrt(excess)), sigma, trends=trends)
     if not test.is_large:
         return test
@@ -285,7 +285,9 @@ def residual_test_of(
     return test._replace(local=local_excess(squares, expected, freq_hz))
 
 
-def _trends(group: GroupFit, freq_hz: FloatArray, factor: FloatArray) -> list[Trend]:
+def _trends(
+    group: GroupFit, freq_hz: FloatArray, factor: FloatArray, calibration: JointCalibration | None
+) -> list[Trend]:
     """Return the parameters that parts of the band disagree on."""
     lines = np.flatnonzero(group.used)
     p = group.x.size
@@ -310,7 +312,11 @@ def _trends(group: GroupFit, freq_hz: FloatArray, factor: FloatArray) -> list[Tr
     with np.errstate(invalid="ignore"):
         changes[seen] = step @ slope.T
         variance = np.einsum("ij,bjk,ik->bi", slope, covariance - whole, slope)
-        errors[seen] = np.sqrt(np.maximum(variance, 0) * factor)
+        variance = np.maximum(variance, 0) * factor
+        if calibration is not None:
+            more = calibration.between(group, member[seen], 2 * covariance)
+            variance += np.einsum("ij,bjk,ik->bi", slope, more, slope)
+        errors[seen] = np.sqrt(variance)
     found = []
     for i, name in enumerate(group.joint.names):
         known = np.isfinite(changes[:, i]) & (errors[:, i] > 0)

@@ -10,6 +10,7 @@ prediction    all parameters in one vector; FRFs between channels, and their der
 likelihood    residuals, priors, information
 starts        values to start from: the best of many trials
 evidence      the level of the errors of the models, by the evidence of the FRFs
+uncertainty   scatter of the gradient between lines, blocks and hits; channels a little off
 fit           the steps of a fit in their order; what the data do not determine
 prepare       arguments into a problem
 realisations  many sets of FRFs of one assembly

@@ -1,0 +1,279 @@
+"""Errors of channels that are smooth over frequency: found from h_pq and h_qp, and carried into intervals."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import stats
+
+import jointfrf as jf
+from jointfrf.frf.calibration import calibration_errors, shows_calibration
+from jointfrf.identification.calibration import CalibrationSpread, Effects, student_factor
+from jointfrf.identification.manifold.fit import fit_springs
+from jointfrf.identification.manifold.prepare import FitOptions, prepare_compliance
+from jointfrf.identification.model.fit import fit_assembly
+from jointfrf.identification.model.prepare import Channels, prepare_model_fit
+from jointfrf.identification.model.uncertainty import ModelGradient
+from jointfrf.identification.noise import NoiseOptions
+from jointfrf.identification.prepare import as_measured
+from jointfrf.identification.residual_test import check_residual
+
+FREQ = np.arange(15.0, 801.0)
+SECTION = {"youngs_modulus": 67e9, "density": 2700.0, "width": 0.025, "height": 0.006, "loss_factor": 0.01}
+TRUE = jf.Joint([6e5, 5e3], [20.0, 1.5], ["y", "theta"])
+CHANNELS = ("A/7:y", "A/13:y", "B/1:y", "B/10:y")
+NOISE = 0.002
+
+
+def assembly(joint=TRUE):
+    a = jf.Substructure(jf.beam(0.3, 12, ends=("clamped", "free"), **SECTION), ("13:y", "13:theta"))
+    return jf.Assembly(a, jf.Substructure(jf.beam(0.225, 9, **SECTION), ("1:y", "1:theta")), joint)
+
+
+@pytest.fixture(scope="module")
+def h():
+    ends = ("A/13:y", "A/13:theta", "B/1:y", "B/1:theta")
+    return assembly().receptance(FREQ, ends, ends)
+
+
+@pytest.fixture(scope="module")
+def between_points():
+    return assembly().receptance(FREQ, CHANNELS, CHANNELS)
+
+
+def circular(shape, seed):
+    rng = np.random.default_rng(seed)
+    return (rng.standard_normal(shape) + 1j * rng.standard_normal(shape)) / np.sqrt(2)
+
+
+def noisy(h, level=NOISE, seed=0):
+    return h * (1 + level * circular(h.shape, seed))
+
+
+def gains(seed, size=0.005):
+    return 1 + size * np.random.default_rng(seed).standard_normal(4)
+
+
+def test_gains_of_hits_are_found_with_their_variance(h):
+    found = [calibration_errors(FREQ, noisy(h * gains(seed), seed=seed)) for seed in range(40)]
+    gain = [one.channel[0, 0] for one in found]
+    # A mean of 40 variances of three degrees of freedom is known to 13 %.
+    assert np.mean(gain) == pytest.approx(0.005**2, rel=0.4)
+    assert all(0 < one.channel_degrees[0, 0] <= 3 for one in found)
+    assert np.mean([one.channel[1].sum() + one.own.sum() for one in found]) < 0.01 * 0.005**2
+
+
+def test_delays_are_told_from_gains(h):
+    late = np.array([0.0, 2e-6, -1e-6, 3e-6])
+    found = calibration_errors(FREQ, noisy(h * np.exp(-2j * np.pi * FREQ[:, None, None] * late)))
+    assert found.channel[0].sum() == 0
+    assert found.channel[1, 0] == pytest.approx(np.var(late, ddof=1) * (4 * np.pi**2 * (FREQ**2).mean()), rel=0.05)
+
+
+def test_a_drift_is_smooth_and_taken_off(h):
+    drift = 0.01 * np.cos(2 * np.pi * FREQ[:, None] / 800 + np.arange(4))[:, None, :]
+    measured = noisy(h * (1 + drift))
+    found = calibration_errors(FREQ, measured)
+    assert found.level("channel")[0] == pytest.approx(0.01 * np.sqrt(0.5), rel=0.5)
+    left = found.without(FREQ, measured)
+    relative = (left - left.swapaxes(1, 2))[:, 0, 1:] / h[:, 0, 1:]
+    # What is left of the differences is their noise.
+    assert np.sqrt((abs(relative) ** 2).mean()) == pytest.approx(np.sqrt(2) * NOISE, rel=0.05)
+    np.testing.assert_allclose(left + left.swapaxes(1, 2), measured + measured.swapaxes(1, 2), rtol=1e-12)
+    noise = jf.estimate_noise(FREQ, measured)
+    assert noise.calibration is not None
+    assert noise.inflation < 1.3
+    assert noise.level == pytest.approx(NOISE, rel=0.1)
+
+
+def test_own_factors_are_not_those_of_channels(h):
+    own = 1 + 0.01 * np.random.default_rng(3).standard_normal((4, 4))
+    found = calibration_errors(FREQ, noisy(h * own))
+    p, q = np.triu_indices(4, 1)
+    incidence = np.eye(4)[p] - np.eye(4)[q]
+    apart = (own - own.T)[p, q]
+    apart = apart - incidence @ np.linalg.pinv(incidence) @ apart
+    assert found.own[0, 0] == pytest.approx((apart**2).sum() / 6, rel=0.05)
+    assert found.own_degrees[0, 0] == pytest.approx(3, rel=0.01)
+    assert found.channel[0, 0] == 0
+
+
+def of_noise(kind, h, seed):
+    if kind == "complex":
+        return noisy(h, 0.01, seed)
+    if kind == "common to a hit":
+        return noisy(h * (1 + 0.03 * circular((len(h), 1, 4), seed)), 0.001, seed + 1)
+    if kind == "common to a line":
+        return noisy(h * (1 + 0.03 * circular((len(h), 1, 1), seed)), 0.001, seed + 1)
+    sums = np.cumsum(circular((len(h) + 25, 4, 4), seed), axis=0)
+    return h * (1 + 0.02 * (sums[25:] - sums[:-25]) / 5)
+
+
+@pytest.mark.parametrize("kind", ["complex", "common to a hit", "common to a line", "correlated over 25 lines"])
+def test_noise_is_rarely_taken_for_calibration(h, kind):
+    """Sixteen comparisons at 1 %: in 15 % of the draws at least one; slow functions have more of correlated noise."""
+    found = sum(calibration_errors(FREQ, of_noise(kind, h, 10 * seed)) is not None for seed in range(60))
+    assert found <= stats.binom.ppf(0.999, 60, 0.3 if "25" in kind else 0.16)
+
+
+def test_what_cannot_show_calibration(h):
+    polluted = noisy(h * gains(1))
+    assert calibration_errors(FREQ, (polluted + polluted.swapaxes(1, 2)) / 2) is None
+    assert calibration_errors(FREQ[:30], polluted[:30]) is None
+    assert shows_calibration(polluted)
+    assert not shows_calibration(polluted[:30])
+    assert not shows_calibration((polluted + polluted.swapaxes(1, 2)) / 2)
+    unsorted = np.random.default_rng(0).permutation(FREQ.size)
+    one, other = calibration_errors(FREQ, polluted), calibration_errors(FREQ[unsorted], polluted[unsorted])
+    np.testing.assert_allclose(one.channel, other.channel)
+
+
+def fit_at_joint(measured):
+    options = FitOptions("viscous", "zero", True)
+    measured = as_measured(FREQ, measured, square=False)
+    return fit_springs(prepare_compliance(measured, TRUE.dofs, None, None, NoiseOptions(), options))
+
+
+def errors_of_each(found, size):
+    """Every function of every channel, and of every FRF: its variance, and the factor of the FRFs."""
+    functions = found.functions(FREQ)
+    for part, number in np.ndindex(2, 8):
+        change = size * (1j if part else 1.0) * functions[part, number][:, None, None]
+        for unit in np.eye(4) if found.channel[part, number] else ():
+            yield found.channel[part, number] / 2, 1 + change * unit[:, None]
+            yield found.channel[part, number] / 2, 1 + change * unit
+        for p, q in np.ndindex(4, 4) if found.own[part, number] else ():
+            yield found.own[part, number], 1 + change * np.outer(np.eye(4)[p], np.eye(4)[q])
+
+
+def test_covariance_at_the_joint_is_that_of_refits(h):
+    """J Var J^T against a fit of its own for each error; differences of refits carry their curvature."""
+    own = 1 + 0.004 * np.random.default_rng(3).standard_normal((4, 4))
+    measured = noisy(h * gains(2) * own)
+    fit = fit_at_joint(measured)
+    calibration = fit.calibration
+    errors = fit.problem.noise.calibration
+    size, total = 1e-3, np.zeros((4, 4))
+    assert errors.channel.any()
+    assert errors.own.any()
+    for variance, factor in errors_of_each(errors, size):
+        other = fit_springs(replace(fit.problem, frfs=fit.problem.frfs._replace(measured=measured * factor)))
+        step = (other.estimate.theta - fit.estimate.theta) / size
+        total += variance * np.outer(step, step)
+    np.testing.assert_allclose(np.sqrt(np.diag(calibration.covariance)), np.sqrt(np.diag(total)), rtol=0.05)
+
+
+def test_covariance_with_models_is_that_of_refits(between_points):
+    measured = noisy(between_points * gains(4))
+    problem = prepare_model_fit(FREQ, measured, assembly(), Channels(CHANNELS, CHANNELS), NoiseOptions(), ())
+    found = fit_assembly(problem)
+    errors = found.problem.noise.calibration
+    gradient = ModelGradient.of(found.problem.likelihood, found.minimum, found.problem.noise.inflation)
+    slope = found.problem.vector.slope(found.minimum.x)
+    covariance = gradient.calibration(errors, FREQ).covariance * np.outer(slope, slope)
+    size, total = 1e-3, np.zeros((4, 4))
+    for variance, factor in errors_of_each(errors, size):
+        step = (fit_assembly(replace(found.problem, measured=measured * factor)).values - found.values) / size
+        total += variance * np.outer(step, step)
+    np.testing.assert_allclose(np.sqrt(np.diag(covariance)), np.sqrt(np.diag(total)), rtol=0.1)
+
+
+def test_intervals_allow_for_gains_and_say_so(h):
+    fits = {}
+    for name, factor in (("exact", 1.0), ("off", gains(5))):
+        fits[name] = jf.identify(FREQ, noisy(h * factor), TRUE.dofs, damping="viscous")
+    assert not any(one.kind == "calibration" for one in fits["exact"].findings)
+    (said,) = (one for one in fits["off"].findings if one.kind == "calibration")
+    assert said.severity == "note"
+    assert "h_pq and h_qp differ smoothly over frequency, of channels by 0." in said.text
+    low, high = fits["off"].confidence_interval()["k_y"]
+    assert low < 6e5 < high
+    assert (high - low) / 6e5 > 0.005
+    assert fits["off"].std_error["k_y"] > 20 * fits["exact"].std_error["k_y"]
+    assert fits["off"].test.is_noise
+
+
+def test_noise_that_was_given_does_not_hide_gains(h):
+    measured = noisy(h * gains(5))
+    fit = jf.identify(FREQ, measured, TRUE.dofs, damping="viscous", noise=NOISE)
+    assert any(one.kind == "calibration" for one in fit.findings)
+    low, high = fit.confidence_interval()["k_y"]
+    assert low < 6e5 < high
+
+
+def test_student_for_few_channels():
+    one = np.ones(1)
+    squares = lambda degrees: (stats.t.ppf(0.975, degrees) / stats.norm.ppf(0.975)) ** 2  # noqa: E731
+    np.testing.assert_allclose(student_factor(1e-9 * one, one, 3 * one), squares(3), rtol=1e-6)
+    np.testing.assert_allclose(student_factor(one, one, 3 * one), squares(12), rtol=1e-6)
+    np.testing.assert_allclose(student_factor(one, 0 * one, np.inf * one), 1)
+
+
+def test_variances_of_effects_add_up(h):
+    errors = calibration_errors(FREQ, noisy(h * gains(2)))
+    steps = np.random.default_rng(0).standard_normal((8, *errors.channel.shape, 3))
+    spread = CalibrationSpread.of(errors, Effects(steps, np.ones(errors.channel.shape)), None)
+    expected = np.einsum("ab,kabp,kabq->pq", errors.channel / 2, steps, steps)
+    np.testing.assert_allclose(spread.covariance, expected)
+    assert spread.squares == pytest.approx(errors.channel.sum() / 2)
+
+
+def test_scatter_between_lines_sees_noise_that_frfs_share(between_points):
+    """Noise of a line common to all FRFs: 16 FRFs say as much of it as one."""
+    shared = between_points * (1 + 0.03 * circular((FREQ.size, 1, 1), 7))
+    fit = jf.identify_model(FREQ, noisy(shared), assembly(), CHANNELS, CHANNELS)
+    apart = jf.identify_model(FREQ, noisy(between_points, 0.03), assembly(), CHANNELS, CHANNELS)
+    for name in ("k_y", "c_y", "k_theta", "c_theta"):
+        assert 1.3 < fit.std_error[name] / apart.std_error[name] < 4.5
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_residual_of_noise_that_frfs_share_is_noise(seed):
+    shared = circular((FREQ.size, 1, 1), seed) + 0.3 * circular((FREQ.size, 4, 4), seed + 50)
+    shared /= np.sqrt(1.09)
+    assert check_residual(shared, FREQ, np.zeros(4), parameters=4, inflation=1.0, is_given=False).is_noise
+    sums = np.cumsum(circular((FREQ.size + 50, 4, 1), seed), axis=0)
+    slow = (sums[50:] - sums[:-50]) / np.sqrt(50)
+    assert check_residual(slow, FREQ, np.zeros(4), parameters=4, inflation=50.0, is_given=False).is_noise
+    assert not check_residual(1.5 * shared, FREQ, np.zeros(4), parameters=4, inflation=1.0, is_given=False).is_noise
+
+
+def windowed(decay):
+    """Receptance at i w + decay of two chains with a joint, by the definition."""
+    freq = np.linspace(0.5, 10, 300)
+    a = jf.chain([5, 3], [2500, 3500], [3, 4], ground="start")
+    b = jf.chain([4, 2], [2000, 2500], [2, 1], ground="end")
+    n, s = 4, 2j * np.pi * freq + decay
+    stiffness, damping, mass = np.zeros((3, n, n))
+    for model, at in ((a, slice(0, 2)), (b, slice(2, 4))):
+        for whole, name in ((stiffness, "stiffness"), (damping, "damping"), (mass, "mass")):
+            part = getattr(model, name)
+            whole[at, at] = part.toarray() if hasattr(part, "toarray") else part
+    pair = np.array([0.0, 1.0, -1.0, 0.0])
+    stiffness += 2000.0 * np.outer(pair, pair)
+    damping += 30.0 * np.outer(pair, pair)
+    z = stiffness + s[:, None, None] * damping + (s**2)[:, None, None] * mass
+    return freq, np.linalg.inv(z)[:, 1:3, 1:3]
+
+
+def test_an_exponential_window_is_taken_off():
+    freq, h = windowed(3.0)
+    measured = jf.pollute(h, 0.01, seed=1)
+    seen = jf.identify(freq, measured, ["x"], damping="viscous")
+    fit = jf.identify(freq, measured, ["x"], damping="viscous", window_decay=3.0)
+    assert seen.value["k_x"] == pytest.approx(2000 + 3 * 30, rel=0.005)
+    assert fit.value["k_x"] == pytest.approx(seen.value["k_x"] - 3 * seen.value["c_x"], rel=1e-12)
+    assert fit.value["c_x"] == seen.value["c_x"]
+    low, high = fit.confidence_interval()["k_x"]
+    assert low < 2000 < high < 2060
+    assert fit.std_error["k_x"] == pytest.approx((high - low) / 2 / 1.96, rel=0.05)
+    assert fit.derived("k_x + 3 * c_x").value == pytest.approx(seen.value["k_x"])
+    assert any("exponential window" in text for text in fit.notes)
+
+
+def test_windows_that_cannot_be_taken_off(h):
+    with pytest.raises(ValueError, match="window_decay must not be negative, not -1"):
+        jf.identify(FREQ, h, TRUE.dofs, window_decay=-1.0)
+    laws = jf.LawJoint({"y": jf.SpringLaw(1e5), "theta": jf.SpringLaw(1e3)})
+    with pytest.raises(ValueError, match="springs and dampers, not of laws"):
+        jf.identify(FREQ, h, joint=laws, window_decay=1.0)
