@@ -59,7 +59,8 @@ class ModelGradient:
         y, slopes = likelihood.prediction.linearised(vector, vector.to_values(x))
         whole = minimum.information
         kept = np.eye(n, x.size)
-        kept[:, n:] = -whole[:n, n:] @ inverse_information(whole[n:, n:])
+        if n < x.size:
+            kept[:, n:] = -whole[:n, n:] @ inverse_information(whole[n:, n:])
         # A prediction may lend its derivatives.
         slopes = slopes * likelihood.weight
         slopes = np.tensordot(kept * vector.slope(x), slopes, 1)
@@ -101,8 +102,9 @@ class ModelGradient:
         seen = np.flatnonzero(share.any(axis=1))
         if seen.size >= 2 * BLOCKS:
             member = block_members(share, seen)
-            whole = np.concatenate([member, np.zeros((len(member), size.size))], axis=1)
-            whole = np.concatenate([whole, np.eye(size.size, whole.shape[1], n_freq)])
+            n_priors = len(self.priors.gradient)
+            whole = np.zeros((len(member) + n_priors, n_freq + n_priors))
+            whole[: len(member), :n_freq], whole[len(member) :, n_freq:] = member, np.eye(n_priors)
             parts = LineParts(whole @ lines.gradient, np.tensordot(whole, lines.information, 1))
             of_blocks = self._scatter(parts)
         hits = [self._scatter(self._parts(axis)) for axis, count in ((2, n_o), (3, n_i)) if count > 1]
