@@ -21,8 +21,9 @@ __all__ = ["CalibrationErrors", "calibration_errors", "shows_calibration"]
 #: Functions of frequency that may be calibration, about as slow as an eighth of the band; as many faster ones show the
 #: noise. Lines that each needs.
 _SLOW, _LINES = 8, 20
-#: Probability at which a sum of squares that exceeds that of noise is taken for chance.
-_CHANCE = 0.01
+#: Probability at which a sum of squares that exceeds that of noise is taken for chance: sixteen sums are looked at, so
+#: that calibration is seen where there is none in 1.6 % of the tests.
+_CHANCE = 0.001
 #: Singular values below this share of the largest are zero.
 _RANK = 1e-9
 

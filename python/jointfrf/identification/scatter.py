@@ -29,6 +29,8 @@ BLOCKS = 10
 _SEEN = 1e-12
 #: Probability at which a scatter that exceeds the noise is taken for chance.
 _CHANCE = 0.95
+#: The same between channels: they are few, so that chance would widen intervals fourfold in one test of twenty.
+_OF_CHANNELS = 0.999
 _TINY = float(np.finfo(float).tiny)
 
 
@@ -179,13 +181,16 @@ def spread_of_scatters(
         chance = special.chdtrc(blocks.degrees, blocks.degrees * blocks.factor / (factor + beside))
     of_hits = np.full_like(factor, np.nan)
     for one in (blocks, *hits):
-        factor = np.maximum(_larger_than_chance(factor + beside, *one) - beside, factor)
+        probability = _CHANCE if one is blocks else _OF_CHANNELS
+        factor = np.maximum(_larger_than_chance(factor + beside, *one, probability) - beside, factor)
         if one is not blocks:
             of_hits = np.fmax(of_hits, one.factor)
     return Spread(by_noise, lines.factor, blocks.factor, of_hits, factor, np.nan_to_num(chance, nan=1.0))
 
 
-def _larger_than_chance(factor: FloatArray, other: FloatArray, degrees: FloatArray) -> FloatArray:
+def _larger_than_chance(
+    factor: FloatArray, other: FloatArray, degrees: FloatArray, probability: float = _CHANCE
+) -> FloatArray:
     """Return variance factors, raised to others of few degrees of freedom where these are larger by more than chance.
 
     By the mean over the parameters where this is; each by Student's t for its few degrees.
@@ -197,9 +202,9 @@ def _larger_than_chance(factor: FloatArray, other: FloatArray, degrees: FloatArr
         return factor
     raised = factor.copy()
     count, few = int(known.sum()), float(medians(degrees[known]))
-    if (mean := float(ratio[known].mean())) > chi_squared(_CHANCE, few * count) / (few * count):
+    if (mean := float(ratio[known].mean())) > chi_squared(probability, few * count) / (few * count):
         raised *= mean
-    single = chi_squared(1 - (1 - _CHANCE) / count, degrees[known]) / degrees[known]
+    single = chi_squared(1 - (1 - probability) / count, degrees[known]) / degrees[known]
     larger = np.flatnonzero(known)[ratio[known] > single]
     if larger.size:
         student = (special.stdtrit(degrees[larger], 0.975) / special.ndtri(0.975)) ** 2

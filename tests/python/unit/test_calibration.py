@@ -112,9 +112,9 @@ def of_noise(kind, h, seed):
 
 @pytest.mark.parametrize("kind", ["complex", "common to a hit", "common to a line", "correlated over 25 lines"])
 def test_noise_is_rarely_taken_for_calibration(h, kind):
-    """Sixteen comparisons at 1 %: in 15 % of the draws at least one; slow functions have more of correlated noise."""
+    """Sixteen comparisons at 0.1 %: in 1.6 % of the draws at least one; slow functions have more of correlated noise."""
     found = sum(calibration_errors(FREQ, of_noise(kind, h, 10 * seed)) is not None for seed in range(60))
-    assert found <= stats.binom.ppf(0.999, 60, 0.3 if "25" in kind else 0.16)
+    assert found <= stats.binom.ppf(0.999, 60, 0.1 if "25" in kind else 0.016)
 
 
 def test_what_cannot_show_calibration(h):
