@@ -15,7 +15,7 @@ from jointfrf.io.model_units import ModelUnits, UnitSystemName, model_units
 from jointfrf.kernel.arguments import FloatArray, as_nodes, as_real, check_choice
 from jointfrf.spelling import visible
 
-__all__ = ["CardFormat", "CardOptions", "face_cards", "spring_cards"]
+__all__ = ["CardFormat", "CardOptions", "rigid_cards", "spring_cards"]
 
 CardFormat = Literal["abaqus", "calculix", "nastran", "ansys"]
 
@@ -31,6 +31,12 @@ _LONGEST_ARM = 10.0
 _IN_A_LINE = 8
 #: How far, relative to their distance, rounding may put a point off the line between two nodes.
 _ON_LINE = 1e-9
+#: How lines of comment begin.
+_MARKS = {"abaqus": "**", "calculix": "**", "nastran": "$", "ansys": "!"}
+#: Terms of an equation in a line of Abaqus and CalculiX.
+_TERMS = 4
+#: DOFs of Ansys by their numbers.
+_ANSYS_DOFS = ("UX", "UY", "UZ", "ROTX", "ROTY", "ROTZ")
 #: Characters of a line of comment: Nastran reads 72 columns.
 _COMMENT = 68
 
@@ -93,6 +99,17 @@ class _Link(NamedTuple):
         # What cancels but for rounding is nothing.
         moved[abs(moved) < _ROUND_OFF * np.sqrt(np.outer(moved.diagonal(), moved.diagonal()))] = 0
         return (moved + moved.T) / 2
+
+    def calculix_dof(self, place: int) -> tuple[int, int]:
+        """Return node and DOF of one of twelve; rotations are displacements of the ROT NODEs."""
+        side, direction = divmod(place, 6)
+        if direction < 3:
+            return self.nodes[side], direction + 1
+        if len(self.nodes) < 4:
+            raise ValueError(
+                "rotation_nodes must name the ROT NODEs of the two rigid bodies: calculix has rotations nowhere else"
+            )
+        return self.nodes[2 + side], direction - 2
 
     def comments(self, mark: str) -> list[str]:
         """Write the notes as lines of comment."""
@@ -242,26 +259,76 @@ def _arm_note(arms: FloatArray, units: ModelUnits) -> list[str]:
 
 def _bodies(program: CardFormat, link: _Link) -> list[str]:
     """Make the nodes of the joint move with faces of solid elements; as a sketch in comments where nodes are apart."""
-    if link.faces is None:
-        if not link.has_arms:
-            return []
-        mark = {"nastran": "$", "ansys": "!"}.get(program, "**")
-        names = ("(nodes of the face on side j)", "(nodes of the face on side k)")
-        drawn = _body_cards(program, link.nodes, names, link.element, link.number)
-        hint = "solid elements have no rotations: let nodes of their faces follow j and k, as in"
-        return [f"{mark} {hint}", *(f"{mark}   {line}" for line in drawn)]
-    return _body_cards(program, link.nodes, link.faces, link.element, link.number)
+    if link.faces is not None:
+        return _body_cards(program, link.nodes, link.faces, link.element, link.number)
+    if not link.has_arms:
+        return []
+    names = ("(nodes of the face on side j)", "(nodes of the face on side k)")
+    drawn = _body_cards(program, link.nodes, names, link.element, link.number)
+    hint = "solid elements have no rotations: let nodes of their faces follow j and k, as in"
+    mark = _MARKS[program]
+    return [f"{mark} {hint}", *(f"{mark}   {line}" for line in drawn)]
 
 
-def face_cards(program: CardFormat, nodes: Sequence[int], options: CardOptions) -> str:
-    """Make the nodes of a joint move with faces of solid elements, where `faces` names these; as `spring_cards`."""
-    two = _two_nodes("nodes", nodes)
-    faces = _faces(options.get("faces"), two)
-    if faces is None:
-        return ""
-    element, number = _number("element", options.get("element", 1)), _number("number", options.get("number", 1))
-    every = (*two, *(options.get("rotation_nodes") or ()))
-    return "\n".join(_body_cards(program, every, faces, element, number)) + "\n"
+def rigid_cards(
+    program: CardFormat, dofs: Sequence[str], nodes: Sequence[int], options: CardOptions, *, alone: bool
+) -> str:
+    """Write rigid DOFs of a joint as equations between the nodes, which rigid arms lead from to the joint.
+
+    Parameters
+    ----------
+    program, nodes, options
+        As for `spring_cards`.
+    dofs : sequence of str
+        Names of the rigid DOFs.
+    alone : bool
+        Whether there are no springs, whose cards else say where the joint is and what follows the nodes.
+
+    Returns
+    -------
+    str
+        u_j + theta_j x r_j - u_k - theta_k x r_k = 0 along each DOF. Rotations of CalculiX are displacements of the
+        ROT NODEs. No equation holds a rotation that another one eliminates.
+    """
+    check_choice("program", program, get_args(CardFormat))
+    link = _link(program, dofs, (np.zeros((len(dofs), len(dofs))),) * 3, nodes, options)
+    places = [int(place) for place in direction_places(dofs)]
+    mark = _MARKS[program]
+    names = ", ".join(DIRECTIONS[place] for place in places)
+    lines = link.comments(mark)[1:] if alone else []
+    lines.append(f"{mark} rigid DOFs {names}: one equation each, written by jointfrf")
+    if program == "nastran":
+        lines.append(f"$ case control: MPC = {link.number}")
+    relative = np.hstack([sign * rigid_offset(DIRECTIONS, arm) for sign, arm in zip((1, -1), link.arms, strict=True)])
+    for place in places:
+        row = relative[place].copy()
+        if place < 3:
+            for turn in (one for one in places if one > 2):  # theta_j is theta_k
+                row[6 + turn], row[turn] = row[6 + turn] + row[turn], 0.0
+        row[abs(row) < _NO_ARM / link.units.length] = 0.0
+        others = [i for i in range(12) if row[i] != 0 and i != place]
+        lines += _equation(program, link, [(i, float(row[i])) for i in (place, *others)])
+    return "\n".join([*lines, *(_bodies(program, link) if alone else [])]) + "\n"
+
+
+def _equation(program: CardFormat, link: _Link, terms: Sequence[tuple[int, float]]) -> list[str]:
+    """Return the equation of a sum of terms, (DOF among twelve, factor); the first one is eliminated."""
+    if program == "calculix":
+        ends = [(*link.calculix_dof(i), factor) for i, factor in terms]
+    else:
+        ends = [(link.nodes[i // 6], i % 6 + 1, factor) for i, factor in terms]
+    if program in ("abaqus", "calculix"):
+        words = [f"{node}, {dof}, {f'{factor:.12g}' if factor % 1 else f'{factor:.0f}.'}" for node, dof, factor in ends]
+        rows = [", ".join(words[at : at + _TERMS]) for at in range(0, len(words), _TERMS)]
+        return ["*EQUATION", str(len(ends)), *rows]
+    if program == "ansys":
+        words = [f"{node},{_ANSYS_DOFS[dof - 1]},{factor:.12g}" for node, dof, factor in ends]
+        rows = [",".join(words[at : at + 3]) for at in range(0, len(words), 3)]
+        return [f"CE,{'HIGH' if at else 'NEXT'},0,{row}" for at, row in enumerate(rows)]
+    fields: list[str | int | float] = [link.number]
+    for at, (node, dof, factor) in enumerate(ends):
+        fields += [*(("", "") if at and at % 2 == 0 else ()), node, dof, factor]
+    return _large("MPC", fields)
 
 
 def _body_cards(
@@ -370,16 +437,7 @@ def _calculix(link: _Link) -> list[str]:
     if link.damping.any() or link.hysteretic.any():
         raise ValueError("calculix has no dashpot between DOFs and no complex spring: damping=False leaves damping out")
     whole = link.both_sides(link.stiffness)
-    turns = whole[3:6].any() or whole[9:].any()
-    if turns and len(link.nodes) < 4:
-        raise ValueError(
-            "rotation_nodes must name the ROT NODEs of the two rigid bodies: calculix has rotations nowhere else"
-        )
-
-    def at(place: int) -> tuple[int, int]:
-        side, direction = divmod(place, 6)
-        return (link.nodes[side], direction + 1) if direction < 3 else (link.nodes[2 + side], direction - 2)
-
+    at = link.calculix_dof
     springs: list[tuple[list[tuple[int, int]], float]] = []
     for a in range(12):
         springs += [([at(a), at(b)], -float(whole[a, b])) for b in range(a + 1, 12) if whole[a, b] != 0]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self, Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
-from jointfrf.dofs import DIRECTIONS, direction_places, is_rotation
+from jointfrf.dofs import direction_places, is_rotation
 from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_frequency, as_names, as_number, as_real, check_type
 from jointfrf.kernel.call import OnSingular
@@ -25,8 +25,6 @@ __all__ = ["Connection", "JointQuantity", "LawJoint"]
 
 #: The mass of a joint DOF, half of it on either side.
 _MASS = LawField("m", "number", 0.0)
-#: Ansys' names of `DIRECTIONS`.
-_ANSYS = ("UX", "UY", "UZ", "ROTX", "ROTY", "ROTZ")
 
 
 class JointQuantity(NamedTuple):
@@ -319,7 +317,7 @@ class LawJoint:
             Where laws are taken that depend on frequency, which these cards cannot represent: stiffness and hysteretic
             damping at that frequency. A comment says so.
         element, number, rotation_nodes, damping, full_matrix, positions, points, units, faces, comments
-            As for `Joint.export`; `positions` of a joint of springs alone.
+            As for `Joint.export`; no `positions` of a joint with masses.
 
         Returns
         -------
@@ -350,8 +348,8 @@ class LawJoint:
             if law.constant_terms is None
         ]
         comment = {"abaqus": "**", "calculix": "**", "nastran": "$", "ansys": "!"}.get(program, "")
-        if (self.rigid or self.mass) and options.get("positions") is not None:
-            raise ValueError("equations of rigid DOFs and point masses are written at the nodes: leave positions out")
+        if self.mass and options.get("positions") is not None:
+            raise ValueError("point masses are written at the nodes: leave positions out")
         note = f"{comment} {', '.join(varying)} at {freq_hz:g} Hz" if varying else ""
         text = f"{note}: stiffness and hysteretic damping of that frequency hold there only\n" if note else ""
         number, element = options.get("number", 1), options.get("element", 1)
@@ -359,13 +357,10 @@ class LawJoint:
             cards = springs.export(program, nodes, **options)
             text += cards
             element += len(cards.splitlines())  # beyond every element that these lines name
-        else:
-            from jointfrf.io.cards import face_cards  # readers of files take their time to import
-
-            text += face_cards(program, nodes, options)
         if self.rigid:
-            turning = options.get("rotation_nodes")
-            text += _equations(program, comment, self.rigid, (*nodes, *(() if turning is None else turning)), number)
+            from jointfrf.io.cards import rigid_cards  # readers of files take their time to import
+
+            text += rigid_cards(program, self.rigid, nodes, options, alone=springs is None)
         if self.mass:
             from jointfrf.io.model_units import model_units
 
@@ -373,30 +368,6 @@ class LawJoint:
             scaled = {dof: mass / own.mass for dof, mass in self.mass.items()}
             text += _masses(program, comment, scaled, nodes, (element, number))
         return text
-
-
-def _equations(program: CardFormat, comment: str, rigid: Sequence[str], nodes: Sequence[int], number: int) -> str:
-    """Return u_j - u_k = 0 of each rigid DOF; in CalculiX rotations are displacements of the ROT NODEs."""
-    places = [int(place) for place in direction_places(rigid)]
-    if program == "calculix" and max(places) > 2 and len(nodes) < 4:
-        raise ValueError(
-            "rotation_nodes must name the ROT NODEs of the two rigid bodies: calculix has rotations nowhere else"
-        )
-    j, k = nodes[:2]
-    names = ", ".join(DIRECTIONS[place] for place in places)
-    lines = [f"{comment} rigid DOFs {names}: one equation each, written by jointfrf"]
-    if program == "nastran":
-        lines.append(f"$ case control: MPC = {number}")
-    for place in places:
-        if program == "calculix" and place > 2:
-            lines += ["*EQUATION", "2", f"{nodes[2]}, {place - 2}, 1., {nodes[3]}, {place - 2}, -1."]
-        elif program in ("abaqus", "calculix"):
-            lines += ["*EQUATION", "2", f"{j}, {place + 1}, 1., {k}, {place + 1}, -1."]
-        elif program == "nastran":
-            lines.append(f"MPC     {number:8d}{k:8d}{place + 1:8d}{-1.0:8.1f}{j:8d}{place + 1:8d}{1.0:8.1f}")
-        else:
-            lines.append(f"CE,NEXT,0,{j},{_ANSYS[place]},1,{k},{_ANSYS[place]},-1")
-    return "\n".join(lines) + "\n"
 
 
 def _masses(

@@ -175,7 +175,22 @@ def test_cards_of_a_joint_between_faces_in_mm(tmp_path):
     cards = joint.export("calculix", (90001, 90002), rotation_nodes=(90003, 90004), element=90001, units="mm-t-s",
                          positions=ends, points=where, faces=[faces[0].tolist(), (faces[1] + n).tolist()])  # fmt: skip
     assert "reference point of the joint: (1, 4, 126) mm" in cards
-    own = [f"{90001 + i}, " + ", ".join(f"{c:.12g}" for c in ends[i % 2]) for i in range(4)]
-    text = deck(both, bodies, (), frequency_step(16)).replace("*STEP", "\n".join(["*NODE", *own, cards + "*STEP"]), 1)
-    theirs = natural_frequencies(CCX, text, tmp_path / "whole")
+
+    def whole(cards, ends):
+        own = [f"{90001 + i}, " + ", ".join(f"{c:.12g}" for c in ends[i % 2]) for i in range(4)]
+        nodes = "\n".join(["*NODE", *own, cards + "*STEP"])
+        return deck(both, bodies, (), frequency_step(16)).replace("*STEP", nodes, 1)
+
+    theirs = natural_frequencies(CCX, whole(cards, ends), tmp_path / "whole")
     assert ours[6:] == pytest.approx(theirs[6:], rel=1e-6)
+    # Rigid DOFs: equations with arms from the middles of the faces hold what those between nodes at the joint hold.
+    laws = jf.LawJoint({name: jf.SpringLaw(k) for name, k in (("x", 2e6), ("z", 3e6), ("theta_x", 300.0))},
+                       rigid=["y", "theta_y", "theta_z"], dofs=names)  # fmt: skip
+    found = []
+    for name, at in (("arms", ends), ("there", np.array([where, where]))):
+        more = {"positions": ends, "points": where} if name == "arms" else {}
+        cards = laws.export("calculix", (90001, 90002), rotation_nodes=(90003, 90004), element=90001, units="mm-t-s",
+                            faces=[faces[0].tolist(), (faces[1] + n).tolist()], **more)  # fmt: skip
+        found.append(natural_frequencies(CCX, whole(cards, at), tmp_path / name))
+    assert found[0][6:] == pytest.approx(found[1][6:], rel=1e-6)
+    assert abs(found[0][6:] / theirs[6:] - 1).max() > 1e-3

@@ -11,6 +11,7 @@ import pytest
 
 import jointfrf as jf
 from calculix_deck import frequency_step, natural_frequencies
+from jointfrf.dofs import rigid_offset
 
 CCX = shutil.which("ccx")
 DOFS = ("x", "y", "z", "theta_x", "theta_y", "theta_z")
@@ -452,6 +453,61 @@ def read_springs_of_any_kind(text):
     return whole
 
 
+def equations(program, text, turning):
+    """Rows of factors of x ... theta_z of nodes j and k, and the place of the first term of each."""
+    place = dict(PLACE) | {(node, i): 6 * side + 2 + i for side, node in enumerate(turning) for i in (1, 2, 3)}
+    if program in ("abaqus", "calculix"):
+        terms = [[word for row in rows[1:] for word in row] for key, _, rows in keywords(text) if key == "*EQUATION"]
+        found = [[(int(n), int(d), float(x)) for n, d, x in batched(one, 3)] for one in terms]
+    elif program == "nastran":
+        found = []
+        for card in (one for one in nastran_fields(text) if one[0] == "MPC"):
+            own = card[2:8] + [word for at in range(9, len(card), 8) for word in card[at + 1 : at + 7]]
+            found.append([(int(n), int(d), nastran_real(x)) for n, d, x in batched(own, 3) if n])
+    else:
+        found = []
+        for line in (one for one in text.splitlines() if one.startswith("CE,")):
+            _, which, zero, *words = line.split(",")
+            assert float(zero) == 0
+            if which == "NEXT":
+                found.append([])
+            ways = ("UX", "UY", "UZ", "ROTX", "ROTY", "ROTZ")
+            found[-1] += [(int(n), ways.index(d) + 1, float(x)) for n, d, x in batched(words, 3)]
+    rows = np.zeros((len(found), 12))
+    for row, one in zip(rows, found, strict=True):
+        for node, dof, factor in one:
+            row[place[node, dof]] += factor
+    return rows, [place[one[0][:2]] for one in found]
+
+
+def batched(words, n):
+    return [words[at : at + n] for at in range(0, len(words) - n + 1, n)]
+
+
+@pytest.mark.parametrize("alone", [True, False])
+@pytest.mark.parametrize("place", PLACES_OF_JOINT)
+@pytest.mark.parametrize("program", ["abaqus", "calculix", "nastran", "ansys"])
+def test_rigid_dofs_of_nodes_that_lie_beside_the_joint(program, place, alone):
+    """The equations hold what coincides at the joint, whatever the nodes do, and eliminate each DOF once."""
+    rigid, turning = ("z", "theta_y", "x", "theta_z"), (301, 302) if program == "calculix" else ()
+    laws = {} if alone else {"y": jf.SpringLaw(1e6), "theta_x": jf.SpringLaw(1e3)}
+    points = PLACES_OF_JOINT[place]
+    joint = jf.LawJoint(laws, rigid=rigid)
+    text = joint.export(program, NODES, rotation_nodes=turning or None, positions=[AT_J, AT_K], points=points)
+    rows, firsts = equations(program, text, turning)
+    ends = np.broadcast_to(points, (2, 3))
+    sides = [rigid_offset(DOFS, end - at) for end, at in zip(ends, (AT_J, AT_K), strict=True)]
+    relative = np.hstack([sides[0], -sides[1]])[[DOFS.index(dof) for dof in rigid]]
+    left = rows - np.linalg.lstsq(relative.T, rows.T, rcond=None)[0].T @ relative
+    assert abs(left).max() < 1e-10
+    assert np.linalg.matrix_rank(rows) == len(rigid) == len(set(firsts))
+    for i, first in enumerate(firsts):
+        assert np.count_nonzero(rows[:, first]) == 1
+        assert rows[i, first] == 1
+    assert "reference point of the joint" in text
+    assert "let nodes of their faces follow" in text
+
+
 def test_arms_take_all_kinds_of_damping_along():
     joint = jf.Joint([1e6], [20.0], ["z"], loss_factor=[0.1])
     text = joint.export("nastran", NODES, positions=[AT_J, AT_K], points=[0, 0, 0], full_matrix=True)
@@ -563,6 +619,7 @@ found = {"bush": {n: [e.eid, e.pid, e.Ga(), e.Gb(), e.cid, e.s, e.ocid, [x for x
          "spring": {n: [p.Ki, p.Bi, p.GEi] for n, p in spring.items()},
          "systems": {n: [list(map(float, c.e1)), list(map(float, c.e2)), list(map(float, c.e3))]
                      for n, c in model.coords.items() if n},
+         "mpc": [[c.nodes, c.components, c.coefficients] for own in model.mpcs.values() for c in own],
          "rigid": {n: [e.gn, e.cm, list(e.Gmi)] for n, e in model.rigid_elements.items()},
          "dmig": {n: [m.matrix_form, list(map(list, m.GCi)), list(map(list, m.GCj)), list(map(float, m.Real))]
                   for n, m in model.dmig.items()}}
@@ -597,6 +654,12 @@ def test_pynastran_reads_what_is_written(tmp_path):
     np.testing.assert_allclose(bi, 20.0 * np.array([1e-3] * 3 + [1e3] * 3), rtol=1e-9)
     np.testing.assert_allclose(ge, 0.01, rtol=1e-9)
     assert found["rigid"] == {"51": [102, "123", list(range(1, 12))], "52": [202, "123", [21, 22, 23]]}
+    rigid = jf.LawJoint({}, rigid=["x", "theta_z"])
+    text = rigid.export("nastran", NODES, positions=[[0, 0, 0], [0.01, 0.02, 0]], points=[0.002, 0.01, 0.003])
+    assert parsed(text, tmp_path)["mpc"] == [
+        [[102, 102, 202, 202, 202], ["1", "5", "1", "5", "6"], [1.0, 0.003, -1.0, -0.003, -0.02]],
+        [[102, 202], ["6", "6"], [1.0, -1.0]],
+    ]
     text = COUPLED.export("nastran", NODES, positions=[AT_J, AT_K], points=[0.11, 0.03, 0.02], number=3)
     matrices = parsed(text, tmp_path)["dmig"]
     for name, expected_one in zip(("KJ3", "BJ3", "HJ3"), read_dmig(text), strict=True):
