@@ -177,16 +177,15 @@ def _factors(differences: ReciprocityDifferences, h: ComplexArray, functions: Fl
     size = abs(mean)
     turned = differences.values * (mean.conj() / np.maximum(size, TINY)) * inverse
     size = size * inverse
-    value, spread, left = [], [], np.empty_like(turned)
+    value, spread, left = [], [], []
     # A real factor changes the part along h, an imaginary one the part across it.
-    for part, of_turned in ((0, turned.real), (1, turned.imag)):
-        normal = np.einsum("pl,al,bl->pab", size**2, functions[part], functions[part], optimize=True)
-        inverse_normal = np.linalg.pinv(normal, hermitian=True)
-        own = np.einsum("pab,bl,pl->pa", inverse_normal, functions[part], size * of_turned, optimize=True)
-        value.append(own)
+    for own, of_turned in zip(functions, (turned.real, turned.imag), strict=True):
+        inverse_normal = np.linalg.pinv((size[:, None] ** 2 * own) @ own.T, hermitian=True)
+        found = (inverse_normal @ ((size * of_turned) @ own.T)[:, :, None])[:, :, 0]
+        value.append(found)
         spread.append(np.einsum("paa->pa", inverse_normal))
-        (left.real, left.imag)[part][:] = of_turned - size * (own @ functions[part])
-    level = (abs(left) ** 2).sum(axis=1) / max(2 * np.count_nonzero(~outlying), 1)
+        left.append(of_turned - size * (found @ own))
+    level = (left[0] ** 2 + left[1] ** 2).sum(axis=1) / max(2 * np.count_nonzero(~outlying), 1)
     return _Factors(np.stack(value, axis=1), np.maximum(np.stack(spread, axis=1) * level[:, None, None], TINY))
 
 
@@ -201,19 +200,19 @@ def _squares(factors: _Factors, weight: FloatArray, rows: NDArray[np.intp], colu
     incidence = np.zeros((n_pairs, channels.size))
     incidence[np.arange(n_pairs), at[:n_pairs]] = 1
     incidence[np.arange(n_pairs), at[n_pairs:]] = -1
-    found = np.zeros((2, 5, *factors.value.shape[1:]))
-    for place in np.ndindex(found.shape[2:]):
-        at_place = (slice(None), *place)
-        w = weight[at_place]
-        value, noise = factors.value[at_place] * np.sqrt(w), factors.variance[at_place] * w
-        u, size, _ = np.linalg.svd(incidence * np.sqrt(w)[:, None], full_matrices=False)
-        basis = u[:, size > _RANK * size[0]]
-        share, rank = (basis**2).sum(axis=1), basis.shape[1]
-        of_channels = float(((value @ basis) ** 2).sum())
-        apart = max(float(value @ value) - of_channels, 0.0)
-        found[(0, slice(None), *place)] = of_channels, rank, share @ noise, 2 * share @ w, 2 * w.sum()
-        found[(1, slice(None), *place)] = apart, n_pairs - rank, (1 - share) @ noise, 2 * (1 - share) @ w, 0
-    return found
+    # Pairs last.
+    w, value, noise = (np.moveaxis(one, 0, -1) for one in (weight, factors.value, factors.variance))
+    root = np.sqrt(w)
+    u, size, _ = np.linalg.svd(incidence * root[..., None], full_matrices=False)
+    basis = np.where(size[..., None, :] > _RANK * size[..., None, :1], u, 0)
+    share, rank = (basis**2).sum(axis=-1), (size > _RANK * size[..., :1]).sum(axis=-1)
+    whole, of_noise = (root * value) ** 2, noise * w
+    of_channels = (((root * value)[..., None, :] @ basis)[..., 0, :] ** 2).sum(axis=-1)
+    apart = np.maximum(whole.sum(axis=-1) - of_channels, 0)
+    of_units = 2 * w.sum(axis=-1)
+    closing = of_channels, rank, (share * of_noise).sum(axis=-1), 2 * (share * w).sum(axis=-1), of_units
+    left = apart, n_pairs - rank, ((1 - share) * of_noise).sum(axis=-1), of_units - closing[3], np.zeros_like(apart)
+    return np.array([closing, left], float)
 
 
 def _variances(tested: FloatArray, sized: FloatArray, reference: FloatArray) -> FloatArray:

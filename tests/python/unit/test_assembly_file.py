@@ -341,7 +341,7 @@ def test_the_page_and_the_plot_of_a_model(tmp_path, frfs):
     document = fit_document(fit, ReportOptions("test.uff"))
     keys = [section.key for section in document.sections]
     assert keys == ["summary", *(["doubts"] if fit.findings else []), "joint", "stiffness", "frfs", "maps", "noise",
-                        "blind", "cards", "made"]  # fmt: skip
+                    "blind", "cards", "made"]  # fmt: skip
     table = next(part for part in document.sections[0].parts if getattr(part, "key", "") == "parameters")
     assert "prior" in table.columns
     assert table.rows[-1][0] == "A/youngs_modulus"
