@@ -356,8 +356,8 @@ def _blind_spots(fit: Fit, *, is_square: bool) -> Section:
         )
     else:
         seen = (
-            "Responses and forces are not at the same DOFs, on lines enough, each measured both ways: nothing shows "
-            "whether sensors and hammer are calibrated, and no interval allows for it."
+            "No h_pq and h_qp were both measured on lines enough: nothing shows whether sensors and hammers are "
+            "calibrated, and no interval allows for it."
         )
     others = [
         "A gain that all FRFs share, and a delay of all hits: stiffness and damping carry them one to one; a delay "

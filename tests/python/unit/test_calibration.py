@@ -17,6 +17,7 @@ from jointfrf.identification.model.uncertainty import ModelGradient
 from jointfrf.identification.noise import NoiseOptions
 from jointfrf.identification.prepare import as_measured
 from jointfrf.identification.residual_test import check_residual
+from jointfrf.report.fit_page import ReportOptions, fit_document
 
 FREQ = np.arange(15.0, 801.0)
 SECTION = {"youngs_modulus": 67e9, "density": 2700.0, "width": 0.025, "height": 0.006, "loss_factor": 0.01}
@@ -112,7 +113,7 @@ def of_noise(kind, h, seed):
 
 @pytest.mark.parametrize("kind", ["complex", "common to a hit", "common to a line", "correlated over 25 lines"])
 def test_noise_is_rarely_taken_for_calibration(h, kind):
-    """Sixteen comparisons at 0.1 %: in 1.6 % of the draws at least one; slow functions have more of correlated noise."""
+    """Sixteen tests at 0.1 %: in 1.6 % of the draws at least one; slow functions have more of correlated noise."""
     found = sum(calibration_errors(FREQ, of_noise(kind, h, 10 * seed)) is not None for seed in range(60))
     assert found <= stats.binom.ppf(0.999, 60, 0.1 if "25" in kind else 0.016)
 
@@ -278,3 +279,23 @@ def test_windows_that_cannot_be_taken_off(h):
     laws = jf.LawJoint({"y": jf.SpringLaw(1e5), "theta": jf.SpringLaw(1e3)})
     with pytest.raises(ValueError, match="springs and dampers, not of laws"):
         jf.identify(FREQ, h, joint=laws, window_decay=1.0)
+
+
+def said_of_blind_spots(fit):
+    (section,) = (one for one in fit_document(fit, ReportOptions()).sections if one.key == "blind")
+    assert section.heading == "What this test cannot know"
+    return section.parts[0].sentences
+
+
+def test_the_page_says_what_the_test_cannot_know(h, between_points):
+    """By what h_pq and h_qp say: they differ, they agree, they were not both measured."""
+    off, agree = (jf.identify(FREQ, noisy(h * one), TRUE.dofs, damping="viscous") for one in (gains(5), 1.0))
+    apart = jf.identify_model(FREQ, noisy(between_points)[:, :, :2], assembly(exact=True), CHANNELS, CHANNELS[:2])
+    first = [said_of_blind_spots(fit)[0] for fit in (off, agree, apart)]
+    assert first[0].startswith("Sensors and hammers of the same DOFs differ by what the note on calibration says.")
+    assert first[1].startswith("h_pq and h_qp differ by no more than noise: sensors and hammers agree.")
+    assert first[2].startswith("No h_pq and h_qp were both measured on lines enough")
+    for fit in (off, apart):
+        rest = " ".join(said_of_blind_spots(fit)[1:])
+        for word in ("a delay of all hits", "resonate", "H1 estimates", "exp(-σt)"):
+            assert word in rest
