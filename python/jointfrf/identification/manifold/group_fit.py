@@ -54,6 +54,8 @@ _REVERSED, _SHRUNK = -0.8, 0.5
 _LEAST_SHARE = 0.1
 #: Targets whose gradients are found together.
 _AT_ONCE = 8
+#: Entries of changed FRFs held at once where more changes than that are: 64 MB.
+_MOST_ENTRIES = 2**22
 #: Of a compliance with this relative error, damping is not known: its rate is taken below 1 where it is linearised.
 _HARDLY = 0.3
 #: Factors by which poorly determined DOFs are made softer: at first, and where that led nowhere.
@@ -288,7 +290,9 @@ def effects_of(
     point = _rescued(own, c, point)
     fitted = own.entries.take(frfs_of_joint(point.h, point.m, c))
     here, more = problem._replace(data=own, unknown=problem.unknown[lines]), iter(changes)
-    while some := tuple(fitted + change for change in itertools.islice(more, _AT_ONCE)):
+    # A form is factorised once for all changes of a call.
+    at_once = max(_AT_ONCE, _MOST_ENTRIES // max(fitted.size, 1))
+    while some := tuple(fitted + change for change in itertools.islice(more, at_once)):
         for forms in normal_forms(own, c, point, some):
             left = _of_coordinates(here, forms, forms, c)[0]
             gradient, squares = np.einsum("lqp,lq->lp", adjoint, left.gradient), left.squares * used
