@@ -108,7 +108,7 @@ class ReceptancesPart(ReceptancesKeys, tag="receptances"):
 
 
 class ModesPart(ModesKeys, tag="modes"):
-    """Modes of the part, measured or computed: dataset 55 of Universal Files, or arrays in NPZ files.
+    """Modes of the part, measured or computed: datasets 55 and 2414 of Universal Files, or arrays in NPZ files.
 
     They are taken as exact. All modes near the band must be there, and `residuals` for those beyond it: FRFs at a
     joint depend on them.

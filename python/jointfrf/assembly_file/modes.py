@@ -63,7 +63,7 @@ class ModalStructure(Structure):
 
 
 class ModesKeys(SubstructureKeys, tag="modes"):
-    """Modes of the part, measured or computed: dataset 55 of Universal Files, or arrays in NPZ files.
+    """Modes of the part, measured or computed: datasets 55 and 2414 of Universal Files, or arrays in NPZ files.
 
     They are taken as exact. All modes near the band must be there, and `residuals` for those beyond it: FRFs at a
     joint depend on them.
@@ -71,8 +71,8 @@ class ModesKeys(SubstructureKeys, tag="modes"):
 
     file: Annotated[
         str,
-        key("Dataset 55: normal modes with modal masses, or complex modes with modal A. NPZ: `poles` (rad/s), or "
-            "`nat_freq` and `nat_xi`; `A` (residues, DOFs x modes) and `driving_point`, as sdypy-EMA has them, or "
+        key("Datasets 55, 2414: normal modes with modal masses, or complex modes with modal A. NPZ: `poles` (rad/s), "
+            "or `nat_freq` and `nat_xi`; `A` (residues, DOFs x modes) and `driving_point`, as sdypy-EMA has them, or "
             "`Phi` and `modal_mass`; `LR`, `UR`; `dofs`.", takes="name of a file"),
     ]  # fmt: skip
     dofs: Annotated[

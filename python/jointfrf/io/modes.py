@@ -1,4 +1,4 @@
-"""Modes of a structure: Universal Files (dataset 55), and named arrays such as sdypy-EMA and pyOMA2 results saved."""
+"""Modes of a structure: Universal Files (datasets 55, 2414), named arrays of sdypy-EMA, pyOMA2 and scripts."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _KNOWN = {
 }
 #: Modes below are rigid motions, Hz: FE programs give them as rounding of zero.
 _RIGID_HZ = 1e-2
-#: Columns of a number of a dataset 55; words of an entry of a node by the kind of data.
+#: Columns of a number; words of a value of a node by the kind of data.
 _COLUMNS, _WORDS = 13, {2: 1, 4: 1, 5: 2, 6: 2}
 #: Normal modes, complex modes by displacement.
 _NORMAL, _COMPLEX = 2, 3
@@ -94,7 +94,7 @@ def read_modes(path: Path, limit_gb: float | None = None) -> ModesFile:
     Parameters
     ----------
     path : Path
-        A Universal File with datasets 55 of modes, or an NPZ file.
+        A Universal File with datasets 55 or 2414 of modes, or an NPZ file.
     limit_gb : float, optional
         As for `jointfrf.io.read_frfs`.
 
@@ -132,10 +132,11 @@ def _check(path: Path, found: ModesFile) -> None:
 def _of_universal(file: UniversalFile) -> ModesFile:
     """Return the modes of a Universal File, in SI units."""
     modes = []
-    for number in file.datasets(55):
+    for number in file.datasets(55, 2414):
         with file.damage_named(number):
-            mode = _dataset_55(file.records(number))
-        if mode is None:
+            read = _dataset_55 if file.types[number - 1] == 55 else _dataset_2414
+            mode = read(file.records(number))
+        if mode is None or mode.get("is_conjugate"):  # conjugates are added anyway
             continue
         system = file.unit_system(number)
         if system is None:
@@ -148,7 +149,7 @@ def _of_universal(file: UniversalFile) -> ModesFile:
             mode["scale"] *= force * length
         modes.append(mode)
     if not modes:
-        raise file.error("holds no modes: no dataset 55 of normal or complex modes")
+        raise file.error("holds no modes: no dataset 55 or 2414 of normal or complex modes")
     kinds = {mode["kind"] for mode in modes}
     dofs = tuple(modes[0]["shape"])
     if len(kinds) > 1 or any(set(mode["shape"]) != set(dofs) for mode in modes):
@@ -164,21 +165,51 @@ def _of_universal(file: UniversalFile) -> ModesFile:
 
 def _dataset_55(records: list[str]) -> dict[str, Any] | None:
     """Return one mode; None where the dataset holds something else."""
-    _, kind, _, _, data, values = (int(records[5][10 * i : 10 * i + 10]) for i in range(6))
-    if kind not in (_NORMAL, _COMPLEX):
+    _, kind, _, _, data, values = _integers(records[5])
+    words = _numbers(records[7])
+    return _mode(kind, words[:4], words[:4]) | {"shape": _shape(records[8:], data, values)} if _is_mode(kind) else None
+
+
+def _dataset_2414(records: list[str]) -> dict[str, Any] | None:
+    """Return one mode; None where the dataset holds something else, or not at nodes."""
+    _, kind, _, _, data, values = _integers(records[8])
+    if not _is_mode(kind) or int(records[2][:10]) != 1:
         return None
+    _, frequency, _, *normal = _numbers(records[11])
+    return _mode(kind, [frequency, *normal], _numbers(records[12])) | {"shape": _shape(records[13:], data, values)}
+
+
+def _is_mode(kind: int) -> bool:
+    return kind in (_NORMAL, _COMPLEX)
+
+
+def _mode(kind: int, normal: list[float], complex_one: list[float]) -> dict[str, Any]:
+    """Return what a dataset says of a mode beside its shape.
+
+    Parameters
+    ----------
+    kind : int
+    normal : list of float
+        Frequency in Hz, modal mass, viscous damping ratio, hysteretic damping.
+    complex_one : list of float
+        Real and imaginary part of eigenvalue and modal A.
+    """
+    if kind == _NORMAL:
+        frequency, mass, viscous, hysteretic = normal[:4]
+        damping = viscous if viscous > 0 else hysteretic / 2 if hysteretic > 0 else np.nan
+        return {"kind": kind, "frequency": frequency, "damping": damping, "scale": mass}
+    pole, modal_a = complex(*complex_one[:2]), complex(*complex_one[2:4])
+    damping = -pole.real / abs(pole) if pole else 0.0
+    return {"kind": kind, "frequency": abs(pole) / (2 * np.pi), "damping": damping, "scale": modal_a,
+            "is_conjugate": pole.imag < 0}  # fmt: skip
+
+
+def _shape(records: list[str], data: int, values: int) -> dict[str, complex | float]:
+    """Return the motion of each DOF: records of node, then values of it."""
     if data not in _WORDS or values not in (3, 6):
         raise ValueError("not three or six values of a node")
-    words = _numbers(records[7])
-    if kind == _NORMAL:
-        frequency, mass, viscous, hysteretic = words[:4]
-        damping = viscous if viscous > 0 else hysteretic / 2 if hysteretic > 0 else np.nan
-        mode: dict[str, Any] = {"frequency": frequency, "damping": damping, "scale": mass}
-    else:
-        pole, modal_a = abs(complex(*words[:2])), complex(*words[2:4])
-        mode = {"frequency": pole / (2 * np.pi), "damping": -words[0] / pole, "scale": modal_a}
     shape: dict[str, complex | float] = {}
-    count, at = values * _WORDS[data], 8
+    count, at = values * _WORDS[data], 0
     while at < len(records):
         node, at = int(records[at][:10]), at + 1
         entry: list[float] = []
@@ -189,7 +220,11 @@ def _dataset_55(records: list[str]) -> dict[str, Any] | None:
         shape |= {f"{node}:{direction}": value for direction, value in zip(DIRECTIONS, own, strict=False)}
     if not shape:
         raise ValueError("no nodes")
-    return {"kind": kind, "shape": shape, **mode}
+    return shape
+
+
+def _integers(line: str) -> list[int]:
+    return [int(line[10 * i : 10 * i + 10]) for i in range(6)]
 
 
 def _numbers(line: str) -> list[float]:

@@ -84,11 +84,16 @@ def complex_modes(model):
     return poles, shapes, modal_a
 
 
-def complex_dataset(pole, shape, modal_a):
-    """Dataset 55 by its definition: pyuff writes three of the six values of a node."""
-    lines = ["    -1", "    55", "mode", *["NONE"] * 4, "".join(f"{i:10d}" for i in (1, 3, 3, 8, 5, 6))]
-    lines.append("".join(f"{i:10d}" for i in (2, 6, 0, 1)))
-    lines.append(numbers([pole, modal_a, -pole * modal_a]))
+def complex_dataset(pole, shape, modal_a, kind=55):
+    """Dataset 55 or 2414 by its definition: pyuff writes three of the six complex values of a node."""
+    ints = "".join(f"{i:10d}" for i in (1, 3, 3, 8, 5, 6))
+    facts = numbers([pole, modal_a, -pole * modal_a])
+    lines = ["    -1", f"{kind:6d}"]
+    if kind == 55:
+        lines += ["mode", *["NONE"] * 4, ints, "".join(f"{i:10d}" for i in (2, 6, 0, 1)), facts]
+    else:
+        lines += [f"{1:10d}", "mode", f"{1:10d}", *["NONE"] * 5, ints, f"{0:10d}" * 8, f"{0:10d}" * 2]
+        lines += [numbers([0, 0, 0]), facts]
     for node in NODES:
         own = dict.fromkeys(("x", "y", "z", "theta_x", "theta_y", "theta_z"), 0j)
         own |= {dof.split(":")[1]: v for dof, v in zip(DOFS, shape, strict=True) if dof.startswith(f"{node}:")}
@@ -108,11 +113,13 @@ def damped_beam():
     return jf.Model(k, full(BEAM.mass), BEAM.dofs, damping=c + 1e-5 * k)
 
 
-def test_complex_modes_of_a_universal_file(tmp_path):
-    """A dashpot at one end: shapes are complex, and no normal modes give these FRFs."""
+@pytest.mark.parametrize("kind", [55, 2414])
+def test_complex_modes_of_a_universal_file(tmp_path, kind):
+    """A dashpot at one end: shapes are complex, and no normal modes give these FRFs. The file has conjugates, too."""
     model = damped_beam()
     poles, shapes, modal_a = complex_modes(model)
-    (tmp_path / "modes.uff").write_text("".join(map(complex_dataset, poles, shapes.T, modal_a)))
+    both = zip([*poles, *poles.conj()], [*shapes.T, *shapes.T.conj()], [*modal_a, *modal_a.conj()], strict=True)
+    (tmp_path / "modes.uff").write_text("".join(complex_dataset(*mode, kind) for mode in both))
     found = part_of(tmp_path, "uff").receptance(FREQ, ["1:y", "5:y"])
     expected = model.receptance(FREQ, model.ports("1:y", "5:y"))
     np.testing.assert_allclose(found, expected, rtol=2e-3, atol=1e-4 * abs(expected).max())
@@ -198,6 +205,23 @@ def test_a_joint_of_a_part_of_modes(tmp_path):
     assert any(line.startswith("A: modes.npz: 8 modes") for line in measured.describe())
 
 
+def test_a_normal_mode_of_dataset_2414(tmp_path):
+    """Three real values of a node; frequency, modal mass and damping stand in the twelfth record."""
+    freq, shapes, _ = normal_modes(BEAM)
+    lines = ["    -1", "  2414", f"{1:10d}", "mode 4", f"{1:10d}", *["NONE"] * 5]
+    lines += ["".join(f"{i:10d}" for i in (1, 2, 2, 8, 2, 3)), f"{0:10d}" * 8, f"{0:10d}" * 2]
+    lines += ["".join(f"{x:13.5E}" for x in (0.0, freq[3], 0.0, 1.0, 0.02, 0.0)), numbers([0, 0, 0])]
+    for node, y in zip(NODES, shapes[::2, 3], strict=True):
+        lines += [f"{node:10d}", "".join(f"{x:13.5E}" for x in (0.0, y, 0.0))]
+    (tmp_path / "modes.uff").write_text("\n".join([*lines, "    -1", ""]))
+    (tmp_path / "part.toml").write_text('model = "modes"\nfile = "modes.uff"\njoint = ["1:y"]\n')
+    h = jf.read_part(tmp_path / "part.toml").receptance(FREQ, ["1:y", "5:y"])
+    omega, own = 2 * np.pi * FREQ[:, None, None], 2 * np.pi * freq[3]
+    phi = shapes[[0, 8], 3]
+    expected = np.outer(phi, phi) / (own**2 - omega**2 + 2j * 0.02 * own * omega)
+    np.testing.assert_allclose(h, expected, rtol=1e-4)
+
+
 SHAPES = {"frequency": [10.0, 20.0], "damping": 0.01, "phi": np.ones((2, 2)), "modal_mass": 1.0, "dofs": ["1:y", "2:y"]}
 
 
@@ -238,7 +262,7 @@ def test_arrays_that_are_no_modes(tmp_path, change, message):
 def test_universal_files_without_modes_and_cut_ones(tmp_path):
     channels = [Channel(1, "+y")]
     write_frfs(tmp_path / "modes.uff", FrfSet(FREQ, channels, channels, np.ones((FREQ.size, 1, 1)), "receptance"))
-    with pytest.raises(FileContentError, match="holds no modes: no dataset 55 of normal or complex modes"):
+    with pytest.raises(FileContentError, match="holds no modes: no dataset 55 or 2414 of normal or complex modes"):
         part_of(tmp_path, "uff")
     freq, shapes, _ = normal_modes(BEAM)
     facts = {"analysis_type": 2, "modal_m": 1.0, "modal_damp_vis": 0.01, "modal_damp_his": 0.0}
