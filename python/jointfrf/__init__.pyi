@@ -61,6 +61,7 @@ from jointfrf.identification.realisations import FitStart, identify_realisations
 from jointfrf.identification.record import fit_from_dict, fit_to_dict, load, save
 from jointfrf.identification.result import Fit, FittedParameter
 from jointfrf.identification.sensitivity import propose_bands, sensitivity
+from jointfrf.identification.side_models import SideModel
 from jointfrf.identification.validation import Validation, validate
 from jointfrf.joint import Joint
 from jointfrf.kernel.call import RCOND_LIMIT, get_engine, set_engine, use_engine
@@ -181,6 +182,7 @@ __all__ = [
     "PreloadedLap",
     "ReceptanceInfo",
     "SideAgreement",
+    "SideModel",
     "SingularLineError",
     "SmoothFrfs",
     "SolidModel",

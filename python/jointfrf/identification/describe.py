@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtr, ndtri
 
 from jointfrf.dofs import compliance_unit
 from jointfrf.frf.calibration import CalibrationErrors
 from jointfrf.identification.elastic_centre import elastic_centre
 from jointfrf.identification.findings import Finding, note, warn
 from jointfrf.identification.fit_data import ModelData
+from jointfrf.identification.joint_alone import with_joint_alone
 from jointfrf.identification.manifold.coordinates import CrossTerms
 from jointfrf.identification.manifold.estimate import JointEstimate
 from jointfrf.identification.manifold.fit import DofDamping, ManifoldFit
@@ -40,10 +43,16 @@ _SHOWN = 4
 _BY_CHANCE = 1e-3
 #: Relative noise below this is rounding.
 _ROUNDING = 1e-7
-#: Variances that exceed those from noise by this factor are mostly due to something else.
-_MOSTLY = 5.0
-#: Relative standard errors above this are named where they are due to sides that are not rigid.
-_FLEXIBLE = 0.02
+#: Intervals wider than this share of the value on either side are worth being narrowed.
+_FLEXIBLE = 0.05
+#: Compliances below so many standard errors may be zero.
+_NEARLY_OPEN = 4.0
+#: What the width of an interval is due to, and what would make it smaller.
+_CURES = (
+    ("sides", "models of the sides (--side-j, --side-k; sides=), or channels nearer to the joint"),
+    ("inertia", "models of the sides (--side-j, --side-k; sides=), or lines at lower frequencies"),
+    ("noise", "less noise: more averages, more hits, more lines"),
+)
 #: A reference point is proposed where it lowers the largest coupling to this share.
 _LESS = 0.5
 #: Share of lines that cannot fit the joint from which on a warning says so.
@@ -92,23 +101,24 @@ def describe_springs(found: ManifoldFit, problem: FitProblem) -> Fit:
         is_converged=result.converged,
         intervals=found.intervals,
     )
+    fit = _with_best_estimates(fit, result) if found.alone is None else with_joint_alone(fit, found.alone)
     intervals = fit.confidence_interval(0.95)
     findings = [
         *([] if found.cross_fits else _left_out_lines(result, fit.dofs)),
         *_left_out_dofs(problem),
         *_band_parts(found),
         *_poor_springs(fit, intervals),
-        *_mostly_sides(found, fit),
         *_misfit(found, problem),
         *_unknown_cross(result, fit.dofs, problem.options.cross),
-        *_scattering(fit, found.spread),
+        *([] if found.alone is not None else _scattering(fit, found.spread)),
         *_negative_damping(fit, intervals),
         *_choices(found.choices),
         *_noise(problem.noise.is_assumed, problem.noise.inflation, problem.freq_hz),
         *_calibration(problem.noise.calibration),
         *_outlying_lines(problem),
         *_small_residual(found, problem),
-        *_sides(found, problem),
+        *_sides(problem),
+        *_seen(fit, intervals),
         *_groups([group.dofs for group in result.groups], fit.dofs, problem.options.cross),
         *_hidden_lines(result, fit.dofs),
         *_insignificant(fit, intervals),
@@ -129,7 +139,11 @@ def _poor_springs(fit: Fit, intervals: dict[str, tuple[float, float]]) -> list[F
             continue
         value, about = fit.value[one.name], (one.name,)
         if not np.isfinite(high):
-            bound = f"at least {low:.3g} {one.unit} (95 %)" if low > 0 else "the data give no bound"
+            bound = (
+                f"at least {low:.3g} {one.unit} (95 %), best estimate {value:.2g}"
+                if low > 0
+                else "the data give no bound"
+            )
             found.append(warn("open", f"{one}: this DOF cannot be distinguished from a rigid one; {bound}", about))
         elif not low > 0:
             bound = f"at most {high:.3g} {one.unit} (95 %)"
@@ -215,40 +229,69 @@ def _reference_point(fit: Fit) -> list[Finding]:
     return [note("reference point", text)]
 
 
-def _sides(found: ManifoldFit, problem: FitProblem) -> list[Finding]:
-    """Say what is known of the flexibility between channels."""
+def _sides(problem: FitProblem) -> list[Finding]:
+    """Say what is known of sides that bend between channels and joint."""
     frfs, added = problem.frfs, problem.added_compliance
-    if Transforms(frfs.responses, frfs.forces).are_units:
+    if problem.model_errors is not None:
+        text = (
+            "the FRFs were corrected by the models of the sides, so that the joint is that between its reference "
+            f"points; intervals allow for errors of these models ({len(problem.model_errors)} that the FRFs would show)"
+        )
+        return [note("sides", text)]
+    if Transforms(frfs.responses, frfs.forces).are_units or problem.bending is not None:
         return []
-    if found.channels is None:
+    if added is None or not added.any():
         text = (
             "the channels cannot check that the sides of the joint are rigid between them: what their flexibility does "
             "is not in the intervals"
         )
         return [note("sides", text)]
-    if added is None or not added.any():
-        return []
     known = [(dof, value) for dof, value in zip(problem.dofs, added, strict=True) if value > 0]
     values = ", ".join(f"{value:.2g} {compliance_unit(dof, dof)} for {dof}" for dof, value in known)
     text = f"the sides have about this compliance between the channels, and intervals allow for it: {values}"
     return [note("sides", text, tuple(dof for dof, _ in known))]
 
 
-def _mostly_sides(found: ManifoldFit, fit: Fit) -> list[Finding]:
-    """Name stiffnesses whose uncertainty is mostly that of sides that are not rigid."""
-    if found.channels is None:
+def _seen(fit: Fit, intervals: dict[str, tuple[float, float]]) -> list[Finding]:
+    """Say what the numbers are between virtual points on sides that may bend, and what would narrow the intervals."""
+    if not fit.seen:
         return []
-    wide = tuple(
-        one.name
-        for one, added, noise in zip(fit.parameters, found.channels.factor, found.spread.factor, strict=True)
-        if one.kind == "k" and not one.is_cross and added > _MOSTLY * noise
-        if fit.std_error[one.name] > _FLEXIBLE * abs(fit.value[one.name])
-    )
     text = (
-        f"{', '.join(wide)}: between the channels the sides deform so much that the intervals are mostly due to that, "
-        "not to noise: channels nearer to the joint, or more of them, would narrow them"
+        "stiffnesses and damping are those of the joint alone, without what the sides give way between channels and "
+        "joint; as seen are both together, softer"
     )
-    return [warn("sides", text, wide)] if wide else []
+    found = [note("sides", text)]
+    for part, cure in _CURES:
+        names = tuple(
+            name
+            for name, one in fit.seen.items()
+            if getattr(one, part) == max(one.sides, one.inertia, one.noise) and _is_wide(*intervals[name])
+        )
+        if names:
+            found.append(note("sides", f"what would narrow the intervals of {', '.join(names)}: {cure}", names))
+    return found
+
+
+def _is_wide(low: float, high: float) -> bool:
+    """Whether an interval is worth being narrowed."""
+    return not high < (1 + _FLEXIBLE) / (1 - _FLEXIBLE) * low
+
+
+def _with_best_estimates(fit: Fit, result: JointEstimate) -> Fit:
+    """Return the fit with a best estimate of stiffnesses that may be infinite: the median of what 1/k >= 0 may be."""
+    estimate, intervals = fit.estimate.copy(), None
+    for group in result.groups:
+        if not group.joint.in_compliance:
+            continue
+        error = np.sqrt(np.maximum(np.diagonal(group.covariance), 0))
+        for i in np.flatnonzero(group.joint.is_compliance & (group.x < _NEARLY_OPEN * error)):
+            which = int(group.which[i])
+            intervals = fit.confidence_interval(0.95) if intervals is None else intervals
+            if np.isfinite(intervals[fit.parameters[which].name][1]) or not error[i] > 0:
+                continue
+            z = float(group.x[i] / error[i])
+            estimate[which] = 1 / (error[i] * (z + float(ndtri(1 - 0.5 * ndtr(z)))))
+    return replace(fit, estimate=estimate)
 
 
 def _hidden_lines(result: JointEstimate, dofs: tuple[str, ...]) -> list[Finding]:
@@ -332,7 +375,8 @@ def _misfit(found: ManifoldFit, problem: FitProblem) -> list[Finding]:
     by_part = noise.is_given and abs(misfit.ratio / np.sqrt(2) - 1) < _BY_PART
     why = _COUPLED if found.cross_fits else _PER_PART if by_part else None
     findings = _too_large(misfit, "the joint does not fit the data", why) if not noise.is_assumed else []
-    for trend in () if found.cross_fits else misfit.trends:
+    # What the inertia of sides changes over frequency is in the intervals of the joint alone.
+    for trend in () if found.cross_fits or found.alone is not None else misfit.trends:
         low, high = trend.values.argmin(), trend.values.argmax()
         text = (
             f"{trend.name} is not one constant over frequency: parts of the band give {trend.values[low]:.3g} .. "
@@ -346,7 +390,7 @@ def _small_residual(found: ManifoldFit, problem: FitProblem) -> list[Finding]:
     """Say that the residual is below the noise: intervals are then wider than they need be."""
     misfit, noise = found.test, problem.noise
     # What is not rigid in the channels weighs as noise, and averages out of a residual of joint DOFs.
-    if noise.is_assumed or found.channels is not None or not misfit.is_small:
+    if noise.is_assumed or problem.sides_bend or not misfit.is_small:
         return []
     why = "said" if noise.is_given else "their reciprocity shows"
     mean = _MEAN_OF_TWO if problem.frfs.symmetrised and noise.is_given else ""
@@ -392,7 +436,7 @@ def describe_laws(found: ManifoldFit, joint: LawJoint) -> Fit:
         *_outlying_lines(problem),
         *_correlated(fit),
     ]
-    if problem.added_compliance is not None:
+    if problem.added_compliance is not None or problem.bending is not None:
         text = "the intervals do not allow for what is not rigid between the channels of a side"
         findings.append(note("sides", text))
     if not result.converged:

@@ -22,6 +22,7 @@ from jointfrf.identification.manifold.transforms import Transform
 from jointfrf.identification.noise import NoiseOptions
 from jointfrf.identification.prepare import BandsOfDofs, MeasuredFrfs, as_measured
 from jointfrf.identification.result import Fit
+from jointfrf.identification.side_models import SideModel
 from jointfrf.kernel.arguments import FloatArray, as_names, as_number, check_type
 from jointfrf.laws.law_joint import LawJoint
 
@@ -43,6 +44,7 @@ def identify(
     averages: float | None = None,
     reciprocal: bool = True,
     window_decay: float = 0.0,
+    sides: tuple[SideModel, SideModel] | None = None,
 ) -> Fit:
     """Identify a joint from measured FRFs of the assembly between all its joint DOFs, without models.
 
@@ -85,6 +87,9 @@ def identify(
     window_decay : float
         Decay sigma of an exponential window exp(-sigma t) on the responses, 1/s. FRFs are then those at i w + sigma,
         and stiffnesses of springs grow by sigma c, which is taken off.
+    sides : pair of SideModel, optional
+        Models of both sides j and k, free of each other, that bend between channels and joint: the FRFs are corrected
+        by them first, and what is not known of the models is in weights and intervals.
 
     Returns
     -------
@@ -149,7 +154,7 @@ def identify(
     options = FitOptions(damping or "auto", cross or "zero", reciprocal)
     problem = prepare_compliance(
         as_measured(freq_hz, gamma, square=False), dofs, bands, transform,
-        NoiseOptions(noise, coherence, averages), options,
+        NoiseOptions(noise, coherence, averages), options, _check_sides(sides),
     )  # fmt: skip
     if reciprocal:
         _look_at(problem, transform)
@@ -167,6 +172,16 @@ def identify(
     fit = replace(fit, data=compliance_data(found, problem, transform))
     fit.issue_warnings()
     return fit
+
+
+def _check_sides(sides: tuple[SideModel, SideModel] | None) -> tuple[SideModel, SideModel] | None:
+    if sides is None:
+        return None
+    if not isinstance(sides, Sequence) or len(sides) != 2:
+        raise ValueError("sides must be the models of both sides of the joint, j and k")
+    for side in sides:
+        check_type("sides", side, SideModel)
+    return sides[0], sides[1]
 
 
 def _look_at(problem: FitProblem, transform: Transform | tuple[Transform, Transform] | None) -> None:

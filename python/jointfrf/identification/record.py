@@ -6,7 +6,7 @@ import json
 import reprlib
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any, get_args
 
@@ -17,7 +17,7 @@ from jointfrf.errors import FileContentError
 from jointfrf.files import check_file, write_file
 from jointfrf.identification.derived import Derived
 from jointfrf.identification.findings import Finding, FitFindingKind
-from jointfrf.identification.result import Fit, FittedParameter
+from jointfrf.identification.result import Fit, FittedParameter, SeenStiffness
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_real, check_type
 from jointfrf.kernel.call import VERSION
 from jointfrf.laws.joint_toml import joint_text, read_joint_table
@@ -72,7 +72,7 @@ def fit_to_dict(fit: Fit, *, probabilities: Sequence[float] | None = None, lines
     -------
     dict
         ``"format"``, ``"format_version"``, and under ``"parameters"`` value, unit, standard error and 95 % interval of
-        each, under ``"derived"`` loss factors; in an interval there, None is an open end. Elsewhere None is NaN,
+        each, under ``"derived"`` loss factors, under ``"seen"`` what virtual points see; in an interval there, None is an open end. Elsewhere None is NaN,
         ``"inf"`` infinity.
 
     Raises
@@ -93,7 +93,7 @@ def fit_to_dict(fit: Fit, *, probabilities: Sequence[float] | None = None, lines
             one.name: {
                 "value": _plain(fit.value[one.name]),
                 "unit": one.unit,
-                "std_error": _finite(errors[one.name]),
+                "std_error": _finite(errors[one.name]) if np.isfinite(intervals[one.name]).all() else None,
                 "confidence_interval_95": [_finite(limit) for limit in intervals[one.name]],
                 "kind": one.kind,
                 "between": [one.row, one.column],
@@ -114,6 +114,7 @@ def fit_to_dict(fit: Fit, *, probabilities: Sequence[float] | None = None, lines
             }
             for name, one in fit.loss_factors.items()
         },
+        "seen": {name: {key: _plain(value) for key, value in asdict(one).items()} for name, one in fit.seen.items()},
         "noise_level": _plain(fit.noise_level),
         "residual_level": _plain(fit.residual_level),
         "residual_is_noise": fit.residual_is_noise,
@@ -304,7 +305,7 @@ def _fit_of(content: object, source: str) -> Fit:
         )
     read: dict[str, Any] = {}
     for key, (reader, is_new) in _READERS.items():
-        if key not in content and key != "k_lines" and not (is_new and version == 1):
+        if key not in content and key not in ("k_lines", "seen") and not (is_new and version == 1):
             raise FileContentError(f'{source}: "{key}" is missing')
         try:
             read[key] = reader(content.get(key), read)
@@ -328,6 +329,7 @@ def _fit_of(content: object, source: str) -> Fit:
         forces=read["forces"],
         residual_is_noise=read["residual_is_noise"],
         is_converged=read["is_converged"] is not False,
+        seen=read["seen"],
         intervals=read["intervals"],
     )
     if version > 1:
@@ -454,6 +456,14 @@ def _derived_of(content: Any, _: dict[str, Any]) -> dict[str, Derived]:
     }
 
 
+def _seen_of(content: Any, _: dict[str, Any]) -> dict[str, SeenStiffness]:
+    """Read what virtual points see; files of before have none."""
+    return {
+        name: SeenStiffness(**{one.name: _number(own[one.name]) for one in fields(SeenStiffness)})
+        for name, own in ({} if content is None else content).items()
+    }
+
+
 def _findings_of(content: Any, read: dict[str, Any]) -> tuple[Finding, ...]:
     if content is None:
         return ()
@@ -492,6 +502,7 @@ _READERS: dict[str, tuple[Callable[[Any, dict[str, Any]], Any], bool]] = {
     "k_lines": (_k_lines_of, False),
     "bands_hz": (_bands_of, False),
     "derived": (_derived_of, True),
+    "seen": (_seen_of, True),
     "findings": (_findings_of, True),
     "warnings": (_warnings_of, False),
     "notes": (_notes_of, False),

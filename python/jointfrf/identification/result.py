@@ -23,7 +23,15 @@ from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, one_line
 from jointfrf.laws.law_joint import LawJoint
 
-__all__ = ["Fit", "FittedParameter", "IntervalsByProbability", "columns_of", "joint_of", "law_parameters"]
+__all__ = [
+    "Fit",
+    "FittedParameter",
+    "IntervalsByProbability",
+    "SeenStiffness",
+    "columns_of",
+    "joint_of",
+    "law_parameters",
+]
 
 #: From a probability to the interval of each parameter.
 IntervalsByProbability = Callable[[float], dict[str, tuple[float, float]]]
@@ -65,6 +73,26 @@ class FittedParameter:
 
     def __str__(self) -> str:
         return self.name
+
+
+@dataclass(frozen=True)
+class SeenStiffness:
+    """Stiffness of a DOF as seen between virtual points: of the joint and of what the sides give way together.
+
+    Attributes
+    ----------
+    value, low, high : float
+        N/m or N m/rad, static, and its 95 % interval from noise and inertia; inf where it may be rigid.
+    sides, inertia, noise : float
+        Shares in the square of the width of the interval of the joint alone, in its compliance; their sum is 1.
+    """
+
+    value: float
+    low: float
+    high: float
+    sides: float
+    inertia: float
+    noise: float
 
 
 def law_parameters(joint: LawJoint) -> tuple[FittedParameter, ...]:
@@ -118,6 +146,9 @@ class Fit:
     intervals : callable or None
         From a probability to the interval of each parameter; None where it follows from the covariance. A fit that was
         loaded has those of some probabilities.
+    seen : mapping of str to SeenStiffness
+        Where virtual points lie on sides that may bend, and no models of these were given: the stiffness ``"k_<dof>"``
+        as seen between them. The parameters are then those of the joint alone.
     data : FitData, ModelData or None
         What it was made from, for figures and pages; a fit that was loaded has none.
     """
@@ -140,6 +171,7 @@ class Fit:
     test: ResidualTest | None = field(default=None, repr=False)
     is_converged: bool = True
     intervals: IntervalsByProbability | None = field(default=None, repr=False, compare=False)
+    seen: Mapping[str, SeenStiffness] = field(default_factory=dict)
     data: FitData | ModelData | None = field(default=None, repr=False, compare=False)
 
     @classmethod
@@ -355,14 +387,14 @@ class Fit:
         rows = [("parameter", "value", "std error", "95 % interval", *(["prior"] if has_prior else []), "unit")]
         for one in self.parameters:
             low, high = intervals[one.name]
-            is_open = one.kind == "k" and not one.is_cross and not np.isfinite(high)
-            shown = "open" if is_open else f"{self.value[one.name]:.5g}"
+            shown, error = _with_error(self.value[one.name], errors[one.name], low, high)
             prior = "" if one.prior is None else f"{one.prior[0]:.4g} +- {one.prior[1]:.2g}"
             limits = f"{low:.4g} .. {high:.4g}"
-            rows.append((one.name, shown, f"{errors[one.name]:.2g}", limits, *([prior] if has_prior else []), one.unit))
+            rows.append((one.name, shown, error, limits, *([prior] if has_prior else []), one.unit))
         for name, eta in self.loss_factors.items():
             limits = f"{eta.low:.4g} .. {eta.high:.4g}"
-            rows.append((name, f"{eta.value:.5g}", f"{eta.std_error:.2g}", limits, *([""] if has_prior else []), "1"))
+            shown = _with_error(eta.value, eta.std_error, eta.low, eta.high)
+            rows.append((name, *shown, limits, *([""] if has_prior else []), "1"))
         channels = f", {len(self.responses)} responses x {len(self.forces)} forces" if self.responses else ""
         span = f"{self.freq_hz.min():g} to {self.freq_hz.max():g} Hz, {self.freq_hz.size} lines"
         head = [f"method {self.method}, {span}{channels}"]
@@ -370,9 +402,25 @@ class Fit:
             head.append(f"noise {100 * self.noise_level:.2g} %, residual {100 * self.residual_level:.2g} % of the FRFs")
         if self.laws is not None and self.laws.rigid:
             head.append(f"rigid: {', '.join(self.laws.rigid)}")
+        beside = ["", *columns_of(self._seen_rows())] if self.seen else []
         tail = [_wrapped(f"note: {text}") for text in self.notes]
         tail += [_wrapped(f"warning: {text}") for text in self.warnings]
-        return "\n".join([*head, "", *columns_of(rows), *([""] if tail else []), *tail])
+        return "\n".join([*head, "", *columns_of(rows), *beside, *([""] if tail else []), *tail])
+
+    def _seen_rows(self) -> list[tuple[str, ...]]:
+        """Return what the virtual points see, and what makes the intervals of the joint alone wide."""
+        rows = [("between virtual points", "as seen", "95 % interval", "unit", "width by sides", "inertia", "noise")]
+        for name, one in self.seen.items():
+            shares = (f"{100 * share:.0f} %" for share in (one.sides, one.inertia, one.noise))
+            limits = f"{one.low:.4g} .. {one.high:.4g}"
+            rows.append((name, f"{one.value:.5g}", limits, self.unit(name), *shares))
+        return rows
+
+
+def _with_error(value: float, error: float, low: float, high: float) -> tuple[str, str]:
+    """Return a value and its standard error as shown: an open interval has only a best estimate."""
+    is_open = not (np.isfinite(low) and np.isfinite(high))
+    return (f"~{value:.2g}", "") if is_open else (f"{value:.5g}", f"{error:.2g}")
 
 
 def _matrix(dofs: tuple[str, ...], parameters: Sequence[FittedParameter], values: FloatArray, kind: str) -> FloatArray:

@@ -133,6 +133,7 @@ def test_what_is_missing_or_damaged_is_named(fits):
         ("findings", []),
         ("is_converged", None),
         ("bands_hz", {}),
+        ("seen", None),
     ]
     fine += [(level, bad) for level in ("noise_level", "residual_level") for bad in (3, None)]
     derived = {"written_by", "frequency_hz", "n_lines"}
@@ -142,7 +143,7 @@ def test_what_is_missing_or_damaged_is_named(fits):
                 continue
             with pytest.raises(jf.FileContentError, match=key):
                 jf.fit_from_dict(content | {key: bad})
-        if key != "k_lines":
+        if key not in ("k_lines", "seen"):
             with pytest.raises(jf.FileContentError, match=f'"{key}" is missing'):
                 jf.fit_from_dict({name: value for name, value in content.items() if name != key})
     for key in derived:

@@ -1,17 +1,12 @@
-"""What is not rigid between channels: transforms without a channel, deformation found back, DOFs that are left out."""
+"""What is not rigid between channels: deformation found back, DOFs that are left out."""
 
 import numpy as np
 import pytest
 
 import jointfrf as jf
 from jointfrf.channels.joint_channels import left_out_dofs
-from jointfrf.identification.manifold.transforms import (
-    ChannelModes,
-    deformation_compliance,
-    deformation_variance,
-    left_out,
-    modes_of,
-)
+from jointfrf.identification.manifold.flexible_sides import SideBending, joint_alone, side_bending
+from jointfrf.identification.manifold.transforms import ChannelModes, deformation_variance, modes_of
 from rigid_bodies import AROUND, BODY_A, BODY_B, DOFS, POINT, along, triaxial
 
 FREQ = np.linspace(20.0, 200.0, 30)
@@ -34,31 +29,6 @@ def rigid_frfs():
     return h
 
 
-@pytest.mark.parametrize("weighted", [False, True])
-def test_a_channel_left_out_is_least_squares_without_it(weighted):
-    weights = np.linspace(0.5, 2, 12) if weighted else np.ones(12)
-    _, interface = channels_of(weights)
-    for channel, one in enumerate(left_out(ChannelModes(interface.transform, interface.modes))):
-        keep = weights.copy()
-        if channel < 12:
-            keep[channel] = 0
-            expected = jf.virtual_point(*triaxial(POINT + AROUND), POINT, weights=keep).transform
-            np.testing.assert_allclose((interface.transform + one.change)[:6, :12], expected, rtol=1e-8, atol=1e-9)
-
-
-def test_channels_that_no_other_replaces_are_not_left_out():
-    """Of three points the middle alone shows the displacement; the outer ones can be replaced."""
-    places = {i: (0.01 * i, 0, 0) for i in (1, 2, 3)} | {i + 3: (0.01 * i, 0, 0.1) for i in (1, 2, 3)}
-    sides = jf.interface([1, 2, 3], [4, 5, 6], ["y", "theta_z"], places)
-    np.testing.assert_allclose(sides.transform @ sides.modes, np.eye(4), atol=1e-12)
-    found = list(left_out(ChannelModes(sides.transform, sides.modes)))
-    assert [one.redundancy for one in found] == pytest.approx([0.5] * 4)
-    # Without the first, the slope is that of the other two.
-    np.testing.assert_allclose((sides.transform + found[0].change)[1, :3], [0, -100, 100], atol=1e-9)
-    two = jf.interface([1, 3], [4, 6], ["y", "theta_z"], places)
-    assert not list(left_out(ChannelModes(two.transform, two.modes)))
-
-
 def test_rigid_bodies_show_no_deformation():
     _, interface = channels_of()
     h, modes = rigid_frfs(), ChannelModes(interface.transform, interface.modes)
@@ -66,27 +36,88 @@ def test_rigid_bodies_show_no_deformation():
     np.testing.assert_allclose(modes_of(interface.transform, h), interface.modes, atol=1e-12)
 
 
-def test_a_compliance_of_every_channel_is_found_back():
-    """Bodies whose channels sit on springs of one compliance each, noise of lines far apart in size."""
-    sides, interface = channels_of()
-    rng = np.random.default_rng(1)
+def test_an_error_of_every_channel_is_found_back():
+    """Residual of an independent error: its mean square over the entries is that of the error, in rows and columns."""
+    _, interface = channels_of()
     modes = ChannelModes(interface.transform, interface.modes)
     springs = 3e-9
-    h = rigid_frfs() + springs * np.eye(24)
-    level = np.where(np.arange(FREQ.size) % 2, 1e-10, 1e-7)[:, None, None]
-    h = h + level * (rng.standard_normal(h.shape) + 1j * rng.standard_normal(h.shape))
-    found = deformation_compliance(h, np.broadcast_to(2 * level**2, h.shape), modes, modes)
-    expected = springs * sum((side.transform**2).sum(axis=1) for side in sides)
-    np.testing.assert_allclose(found, expected, rtol=0.02)
     exact = deformation_variance(rigid_frfs() + springs * np.eye(24), modes, modes)
-    # Residual of an independent error: its mean square over the entries is that of the error, in rows and in columns.
     assert exact[:, :12, :12].sum(axis=(1, 2)).mean() == pytest.approx(2 * 12 * springs**2, rel=1e-6)
+
+
+def joined(stiffness):
+    """FRFs of both bodies with a joint, the channels of each on springs of their own or not."""
+    sides, interface = channels_of()
+    free, points = rigid_frfs(), interface.modes
+    # Receptances of the points: of rigid bodies they give those of the channels.
+    gamma = interface.transform @ free @ interface.transform.T
+    coupled = jf.couple(gamma[:, :6, :6], gamma[:, 6:, 6:], np.tile(np.diag(stiffness), (FREQ.size, 1, 1)) + 0j,
+                        range(6), range(6))  # fmt: skip
+    return sides, ChannelModes(interface.transform, interface.modes), points @ coupled @ points.T
+
+
+STIFFNESS = np.array([2e6, 3e6, 1e6, 900.0, 700.0, 500.0])
+
+
+@pytest.mark.parametrize("springs", [0.0, 3e-9])
+def test_bending_between_channels_is_found_back_whatever_the_joint(springs):
+    """Channels on springs of one compliance s each: V is s T^T less its rigid part, 0 for T of least squares.
+
+    One channel a side on a softer spring leaves what least squares do not take up.
+    """
+    sides, modes, h = joined(STIFFNESS)
+    soft = np.zeros(24)
+    soft[[2, 14]] = springs
+    h = h + np.diag(soft)
+    found = side_bending(h, h, 1e-30 * np.ones(h.shape), modes, modes)
+    expected = np.zeros(6)
+    for side, at in zip(sides, (2, 14), strict=True):
+        t, residual = side.transform, np.eye(12) - side.modes @ side.transform
+        field = residual[:, at % 12, None] * soft[at] * t[None, :, at % 12]
+        expected += np.linalg.norm(t, axis=1) * np.sqrt(12 / 3) * np.sqrt((field**2).sum(axis=0) / 6)
+    np.testing.assert_allclose(found.low, expected, rtol=0.02, atol=1e-6 * 3e-9 * 1e3)
+    # The same of a joint a hundred times as stiff.
+    _, _, other = joined(100 * STIFFNESS)
+    again = side_bending(other + np.diag(soft), other + np.diag(soft), 1e-30 * np.ones(h.shape), modes, modes)
+    np.testing.assert_allclose(again.low, found.low, rtol=0.02, atol=1e-6 * 3e-9 * 1e3)
+
+
+def test_noise_alone_is_no_bending_but_does_not_exclude_it():
+    _, modes, h = joined(STIFFNESS)
+    seen, high = [], []
+    for seed in range(20):
+        noisy = jf.pollute(h, 0.01, seed=seed)
+        found = side_bending(noisy, h, (0.01 * abs(h)) ** 2, modes, modes)
+        seen.append(found.low)
+        high.append(found.high)
+    # Noise is taken off: half of the squares fall below zero, on each of four fields a DOF.
+    assert (np.median(seen, axis=0) < 0.7 * np.median(high, axis=0)).all()
+    assert (np.array(high) > 0).mean() > 0.9
 
 
 def test_of_channels_that_do_not_check_each_other_nothing_is_said():
     t = np.eye(4)
     modes = ChannelModes(t, t)
-    assert deformation_compliance(np.ones((3, 4, 4), complex), np.ones((3, 4, 4)), modes, modes) is None
+    h = np.ones((3, 4, 4)) + np.eye(4) + 0j
+    assert side_bending(h, h, np.ones((3, 4, 4)), modes, modes) is None
+
+
+def test_the_joint_alone_is_stiffer_than_seen_by_what_bends():
+    """C(w) = 1e-8 (1 + x + x^2) of a trend: its intercept is found; bending moves the limits by calibrated factors."""
+    omega = np.linspace(10.0, 1000.0, 200)
+    x = (omega / 1000.0) ** 2
+    rng = np.random.default_rng(1)
+    noise = 1e-11 * (rng.standard_normal((200, 2)) + 1j * rng.standard_normal((200, 2)))
+    c = 1e-8 * (1 + x + x**2)[:, None] + noise
+    bending = SideBending(*(np.full(2, v) for v in (1e-10, 2e-10)))
+    fitted = (np.full(2, 2e-8), np.full(2, 1e-12))
+    found = joint_alone(omega, c, np.full((200, 2), 2e-22), fitted, np.full(2, 1e-6), bending, np.array([False, True]))
+    np.testing.assert_allclose(found.seen, 1e-8, rtol=3e-3)
+    low, high = found.limits
+    assert (low < 1e-8).all()
+    assert (high > 1e-8).all()
+    np.testing.assert_allclose(np.array([9.0, 20.0]) * 2e-10, found.stiffer)
+    np.testing.assert_allclose(found.best, found.seen / (1 + np.array([1.7, 4.8]) * 1e-10 / found.seen), rtol=1e-12)
 
 
 def test_modes_of_a_matrix_that_channels_do_not_follow_are_not_taken():

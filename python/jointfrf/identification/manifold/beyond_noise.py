@@ -1,4 +1,4 @@
-"""Uncertainty that noise does not explain: sides that are not rigid, bands that disagree, channels a little off."""
+"""Uncertainty that noise does not explain: models of the sides, bands that disagree, channels a little off."""
 
 from __future__ import annotations
 
@@ -16,33 +16,22 @@ from jointfrf.identification.calibration import CalibrationSpread, Effects, effe
 from jointfrf.identification.manifold.estimate import JointEstimate
 from jointfrf.identification.manifold.group_fit import GroupFit, effects_of, gradients_of
 from jointfrf.identification.manifold.interface_frfs import InterfaceFrfs
-from jointfrf.identification.manifold.transforms import ChannelModes, left_out
 from jointfrf.identification.minimise import inverse_information
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
 __all__ = [
     "BandParts",
-    "ChannelSpread",
     "JointCalibration",
-    "channel_spread",
+    "SideSpread",
     "fit_band_parts",
     "joint_calibration",
     "left_out_share",
+    "side_spread",
 ]
 
-#: How often the noise of an FRF is left out: with its response, and with its force.
-_TIMES = 2.0
 
-
-class _Changes(NamedTuple):
-    """Changes of gamma without a channel, shape (n_freq, 2 n, 2 n) each, and redundancies of the channels."""
-
-    gamma: list[ComplexArray]
-    redundancy: FloatArray
-
-
-class ChannelSpread(NamedTuple):
-    """What sides that are not rigid add to the uncertainty, shape (p,) each.
+class SideSpread(NamedTuple):
+    """What is not known of sides that bend adds to the uncertainty, shape (p,) each.
 
     Attributes
     ----------
@@ -56,8 +45,8 @@ class ChannelSpread(NamedTuple):
     factor: FloatArray
 
 
-def channel_spread(found: JointEstimate, frfs: InterfaceFrfs, compliance: FloatArray | None) -> ChannelSpread | None:
-    """Return what sides that are not rigid add to the uncertainty; None where the channels do not tell.
+def side_spread(found: JointEstimate, frfs: InterfaceFrfs, compliance: FloatArray | None) -> SideSpread | None:
+    """Return what errors of models of the sides, or a compliance that was said, add; None without either.
 
     Parameters
     ----------
@@ -68,54 +57,36 @@ def channel_spread(found: JointEstimate, frfs: InterfaceFrfs, compliance: FloatA
 
     Notes
     -----
-    The jackknife variance over channels, sum of redundancy times squared change when one is left out (unbiased for
-    errors that are independent between channels) less what noise makes of it, and the square of the change for a
-    compliance of every DOF; both times Student's t for the few channels. To first order, by one Gauss-Newton step.
-    Where responses and forces are the same channels both are left out together: a body deforms alike where it is struck
-    and where it is measured.
+    Sum of squared changes of the parameters when something of the models is off by one standard deviation, or a DOF is
+    softer. To first order, by one Gauss-Newton step.
     """
-    without = _without_channels(frfs)
-    if without is None and compliance is None:
+    if frfs.errors is None and compliance is None:
         return None
-    few = 1.0
-    if without is not None:
-        degrees = max(float(without.redundancy.sum()), 1.0)
-        few = (special.stdtrit(degrees, 0.975) / special.ndtri(0.975)) ** 2
     std_error, factor = np.zeros((2, len(found.parameters)))
     for group in found.groups:
         inverse = inverse_information(group.information)
-        changes, weights, of_noise = np.zeros((0, group.x.size)), np.zeros(0), 0.0
-        if without is not None:
-            entries = (frfs.entries_of(group.dofs, one) for one in without.gamma)
-            changes = gradients_of(group, entries) @ inverse
-            weights, of_noise = without.redundancy, few * _TIMES
+        changes = [np.zeros((0, group.x.size))]
+        errors = frfs.errors_of(group.dofs)
+        if errors is not None:
+            changes.append(gradients_of(group, errors.swapaxes(0, 1)) @ inverse)
         if compliance is not None:
             softer = _softer(group, compliance[group.dofs]) @ inverse
             if group.joint.in_compliance:
                 # Whatever the damping takes up of it.
                 softer[:, group.joint.is_compliance] = np.diag(compliance[group.dofs])
-        else:
-            softer = np.zeros((0, group.x.size))
-        scatters = (few * weights, changes), (np.full(len(softer), few), softer)
-        std_error[group.which], factor[group.which] = _spread(group, scatters, of_noise, inverse / 2)
-    return ChannelSpread(std_error, factor)
+            changes.append(softer)
+        std_error[group.which], factor[group.which] = _spread(group, np.concatenate(changes), inverse / 2)
+    return SideSpread(std_error, factor)
 
 
-def _spread(
-    group: GroupFit, scatters: tuple[tuple[FloatArray, FloatArray], ...], of_noise: float, noise: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return standard errors, and variances over those from noise, of weighted changes of the coordinates.
-
-    The first changes are those of channels left out, of which noise makes up `of_noise` of its variance.
-    """
+def _spread(group: GroupFit, changes: FloatArray, noise: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return standard errors, and variances over those from noise, of changes of the coordinates."""
     slope = group.joint.theta_slope(group.x)
     found = []
     for to_parameters in (np.eye(len(slope)), slope):
         with np.errstate(divide="ignore", invalid="ignore"):
-            of_channels, of_compliance = (w @ (changes @ to_parameters.T) ** 2 for w, changes in scatters)
-            by_noise = np.einsum("ij,jk,ik->i", to_parameters, noise, to_parameters)
-            own = np.maximum(of_channels - of_noise * by_noise, 0) + of_compliance
-            found.append((np.sqrt(own), own / by_noise))
+            own = ((changes @ to_parameters.T) ** 2).sum(axis=0)
+            found.append((np.sqrt(own), own / np.einsum("ij,jk,ik->i", to_parameters, noise, to_parameters)))
     (of_coordinate, of_coordinates), (of_parameter, ratio) = found
     # A rigid DOF has no finite slope.
     ratio = np.where(np.isfinite(ratio), ratio, of_coordinates)
@@ -131,26 +102,6 @@ def _softer(group: GroupFit, compliance: FloatArray) -> FloatArray:
     weighted = np.einsum("lqr,dr->ldq", forms.weight, change)
     found: FloatArray = np.einsum("lqp,ldq->dp", adjoint, weighted).real
     return found
-
-
-def _without_channels(frfs: InterfaceFrfs) -> _Changes | None:
-    """Return what leaving out one channel after the other changes."""
-    if frfs.response_modes is None or frfs.force_modes is None:
-        return None
-    responses = list(left_out(ChannelModes(frfs.responses, frfs.response_modes)))
-    forces = list(left_out(ChannelModes(frfs.forces, frfs.force_modes)))
-    h, base, gamma = frfs.measured, frfs.gamma(frfs.measured), []
-    if frfs.responses.shape == frfs.forces.shape and np.array_equal(frfs.responses, frfs.forces):
-        for one in responses:
-            t = frfs.responses + one.change
-            gamma.append(t @ h @ t.T - base)
-        forces = []
-    else:
-        gamma += [one.change @ h @ frfs.forces.T for one in responses]
-        gamma += [frfs.responses @ h @ one.change.T for one in forces]
-    if not gamma:
-        return None
-    return _Changes(gamma, np.array([one.redundancy for one in (*responses, *forces)]))
 
 
 #: Parts of the band that are fitted separately.

@@ -111,6 +111,7 @@ def estimate_joint(
     data: Iterable[GroupData] | None = None,
     *,
     is_explained: bool = False,
+    sides_bend: bool = False,
 ) -> JointEstimate:
     """Fit a joint of springs to FRFs whose noise is known.
 
@@ -129,13 +130,16 @@ def estimate_joint(
         Groups of DOFs and their FRFs, where they are known.
     is_explained : bool
         Whether a joint with more terms explains the FRFs: then `near` alone suffices to show that this one does not.
+    sides_bend : bool
+        Whether the sides may bend between channels and joint.
     """
     groups = []
     known = {(tuple(start.dofs.tolist()), start.parameters): start for start in near}
     for dofs, lines in _grouped(frfs) if data is None else data:
         own, which = terms.of_dofs(dofs)
         joint = coordinates_of(own)
-        problem = GroupProblem(dofs, which, lines, joint, _unknown_entries(dofs, cross, used, len(lines.measured)))
+        unknown = _unknown_entries(dofs, cross, used, len(lines.measured))
+        problem = GroupProblem(dofs, which, lines, joint, unknown, sides_bend=sides_bend)
         # Some lines, evenly spread, start as well as all.
         some = spread_lines(len(lines.measured))
 
@@ -243,7 +247,11 @@ class _Search:
         """The fit without cross terms, from the diagonal of C, and where that is not good enough from the lines."""
         found = fit_dofs(self.problem, [self.diagonal.x], LITTLE_PATIENCE)
         # Where the diagonal of C fits far better, other starts do not help: cross terms are not zero.
-        if found.is_good or (found.is_lost and found.excess > _FAR_BETTER * self.diagonal.excess):
+        if (
+            found.is_good
+            or self.problem.sides_bend
+            or (found.is_lost and found.excess > _FAR_BETTER * self.diagonal.excess)
+        ):
             return found
         return min(found, fit_dofs(self.problem, self.starts), key=lambda one: one.squares)
 

@@ -11,16 +11,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from jointfrf.dofs import is_rotation
 from jointfrf.errors import IllConditionedWarning
 from jointfrf.identification.calibration import student_factor
 from jointfrf.identification.manifold.beyond_noise import (
     BandParts,
-    ChannelSpread,
     JointCalibration,
-    channel_spread,
+    SideSpread,
     fit_band_parts,
     joint_calibration,
     left_out_share,
+    side_spread,
 )
 from jointfrf.identification.manifold.coordinates import (
     CrossTerms,
@@ -36,10 +37,12 @@ from jointfrf.identification.manifold.estimate import (
     estimate_joint,
     estimate_laws,
 )
+from jointfrf.identification.manifold.flexible_sides import JointAlone, SideBending, joint_alone
 from jointfrf.identification.manifold.group_fit import GroupFit
 from jointfrf.identification.manifold.line_forms import FormMinimum
 from jointfrf.identification.manifold.prepare import FitProblem, check_estimate
 from jointfrf.identification.manifold.uncertainty import joint_intervals, residual_test_of, spread_of
+from jointfrf.identification.manifold.unknown_cross import compliance_lines
 from jointfrf.identification.profile import Intervals
 from jointfrf.identification.residual_test import ResidualTest
 from jointfrf.identification.scatter import Spread
@@ -98,8 +101,8 @@ class Uncertainty(NamedTuple):
     ----------
     spread : Spread
         By how much variances exceed those from independent noise.
-    channels : ChannelSpread or None
-        What sides that are not rigid add to that; None where the channels do not show it.
+    sides : SideSpread or None
+        What is not known of the sides adds to that; None where nothing is said of them.
     parts : BandParts or None
         Where lines that do not fit the joint were left out: whether parts of the band give it.
     calibration : JointCalibration or None
@@ -109,7 +112,7 @@ class Uncertainty(NamedTuple):
     """
 
     spread: Spread
-    channels: ChannelSpread | None
+    sides: SideSpread | None
     parts: BandParts | None
     calibration: JointCalibration | None
     covariance: FloatArray
@@ -124,10 +127,12 @@ class ManifoldFit(NamedTuple):
     problem : FitProblem
         With the noise level that was used.
     estimate : JointEstimate
-    spread, channels, parts, calibration, covariance, intervals
+    spread, sides, parts, calibration, covariance, intervals
         As in `Uncertainty`.
     test : ResidualTest
         The residual against the noise.
+    alone : JointAlone or None
+        Compliance of the joint alone, where the channels show how much the sides bend.
     cross_fits : bool
         Whether cross terms would remove a misfit.
     choices : tuple of DofDamping
@@ -137,12 +142,13 @@ class ManifoldFit(NamedTuple):
     problem: FitProblem
     estimate: JointEstimate
     spread: Spread
-    channels: ChannelSpread | None
+    sides: SideSpread | None
     parts: BandParts | None
     calibration: JointCalibration | None
     covariance: FloatArray
     intervals: Intervals
     test: ResidualTest
+    alone: JointAlone | None = None
     cross_fits: bool = False
     choices: tuple[DofDamping, ...] = ()
 
@@ -162,7 +168,39 @@ def fit_springs(problem: FitProblem) -> ManifoldFit:
     problem, found, choices = estimated_joint(problem)
     known = uncertainty_of(problem, found, choices)
     test = residual_test_of(found, problem.freq_hz, problem.noise.inflation, known.spread, known.calibration)
-    return ManifoldFit(problem, found, *known, test, _cross_fits(problem, found, test, choices), choices)
+    alone = None if problem.bending is None else _alone(problem, found, known, problem.bending)
+    return ManifoldFit(problem, found, *known, test, alone, _cross_fits(problem, found, test, choices), choices)
+
+
+def _alone(problem: FitProblem, found: JointEstimate, known: Uncertainty, bending: SideBending) -> JointAlone:
+    """Return the compliance of the joint alone, from C of each line without what was added to the noise of channels."""
+    n, freq = len(problem.dofs), problem.freq_hz
+    frfs = problem.frfs if problem.deformation is None else problem.frfs.without(problem.deformation)
+    value, spread = np.full((freq.size, n), np.nan, complex), np.full((freq.size, n), np.nan)
+    fitted, size = np.full((2, n), np.nan), np.zeros(n)
+    for group in found.groups:
+        _, lines = compliance_lines(frfs.of_dofs(group.dofs))
+        used = problem.used[:, group.dofs]
+        value[:, group.dofs] = np.where(used, lines.value, np.nan)
+        spread[:, group.dofs] = np.einsum("ldd->ld", lines.covariance).real
+        fitted[:, group.dofs] = _fitted_compliance(group, known.spread.factor[group.which])
+        size[group.dofs] = group.problem.data.own_size
+    rotations = np.array([is_rotation(dof) for dof in problem.dofs])
+    return joint_alone(2 * np.pi * freq, value, spread, (fitted[0], fitted[1]), size, bending, rotations)
+
+
+def _fitted_compliance(group: GroupFit, factor: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return C_dd at w = 0 of the joint fitted, and its standard error by noise, shape (n,) each."""
+    joint, n = group.joint, len(group.dofs)
+    if joint.in_compliance:
+        stiff = joint.is_compliance
+        error = np.sqrt(np.maximum(np.diagonal(group.covariance) * factor, 0))
+        return group.x[stiff], error[stiff]
+    diagonal = np.flatnonzero(joint.rows == joint.columns)
+    entries = joint.compliance(group.x)[:, diagonal]
+    slope = joint.slope(group.x, joint.compliance(group.x))[:, diagonal].real.mean(axis=0)
+    variance = np.einsum("dp,pq,dq->d", slope, group.covariance * np.sqrt(np.outer(factor, factor)), slope)
+    return np.asarray(entries.real.mean(axis=0))[:n], np.sqrt(np.maximum(variance, 0))[:n]
 
 
 def fit_laws(problem: FitProblem, joint: LawJoint) -> ManifoldFit:
@@ -184,10 +222,12 @@ def fit_laws(problem: FitProblem, joint: LawJoint) -> ManifoldFit:
         calibration = joint_calibration(found, problem.frfs, problem.freq_hz, problem.noise.calibration)
         spread = spread_of(found, inflation, calibration, is_level_known=not problem.noise.is_assumed)
         test = residual_test_of(found, problem.freq_hz, inflation, spread, calibration)
-    root = np.sqrt(spread.factor)
+    sides = side_spread(found, problem.frfs, None)
+    root = np.sqrt(spread.factor if sides is None else spread.factor + sides.factor)
     covariance = found.covariance * np.outer(root, root) + (0 if calibration is None else calibration.covariance)
-    intervals = joint_intervals(found, _with_calibration(spread, calibration))
-    return ManifoldFit(problem, found, spread, None, None, calibration, covariance, intervals, test)
+    reach = None if sides is None else sides.std_error
+    intervals = joint_intervals(found, _with_calibration(spread, calibration), reach)
+    return ManifoldFit(problem, found, spread, sides, None, calibration, covariance, intervals, test)
 
 
 def estimated_joint(problem: FitProblem) -> tuple[FitProblem, JointEstimate, tuple[DofDamping, ...]]:
@@ -210,11 +250,11 @@ def uncertainty_of(problem: FitProblem, found: JointEstimate, choices: tuple[Dof
     with _quiet():
         calibration = joint_calibration(found, problem.frfs, problem.freq_hz, noise.calibration)
     spread = spread_of(found, noise.inflation, calibration, is_level_known=not noise.is_assumed)
-    channels = channel_spread(found, problem.frfs, problem.added_compliance)
+    sides = side_spread(found, problem.frfs, problem.added_compliance)
     parts = _band_parts(problem, found, spread, choices)
-    added = [one.std_error for one in (channels, parts) if one is not None]
+    added = [one.std_error for one in (sides, parts) if one is not None]
     reach = np.sqrt(np.square(added).sum(axis=0)) if added else None
-    root = np.sqrt(spread.factor if channels is None else spread.factor + channels.factor)
+    root = np.sqrt(spread.factor if sides is None else spread.factor + sides.factor)
     with np.errstate(invalid="ignore"):
         covariance: FloatArray = found.covariance * np.outer(root, root)
         if parts is not None:
@@ -225,7 +265,7 @@ def uncertainty_of(problem: FitProblem, found: JointEstimate, choices: tuple[Dof
         if calibration is not None:
             covariance += calibration.covariance
     intervals = joint_intervals(found, _with_calibration(spread, calibration), reach)
-    return Uncertainty(spread, channels, parts, calibration, covariance, intervals)
+    return Uncertainty(spread, sides, parts, calibration, covariance, intervals)
 
 
 def _with_calibration(spread: Spread, calibration: JointCalibration | None) -> FloatArray:
@@ -268,7 +308,7 @@ def _band_parts(
     problem: FitProblem, result: JointEstimate, spread: Spread, choices: tuple[DofDamping, ...]
 ) -> BandParts | None:
     """Fit parts of the band where lines were left out of the fit of all of it."""
-    if left_out_share(result) < _LEFT_OUT or problem.freq_hz.size < _FEW:
+    if problem.sides_bend or left_out_share(result) < _LEFT_OUT or problem.freq_hz.size < _FEW:
         return None
 
     def fit(lines: NDArray[np.intp]) -> JointEstimate:
@@ -293,7 +333,8 @@ def _cross_fits(
 ) -> bool:
     """Whether a fit with cross terms leaves a residual that is noise, where that without does not."""
     coupled = any(len(group.dofs) > 1 for group in result.groups)
-    if problem.noise.is_assumed or problem.options.cross != "zero" or not (test.is_large and coupled):
+    is_asked = problem.options.cross == "zero" and not (problem.noise.is_assumed or problem.sides_bend)
+    if not (is_asked and test.is_large and coupled):
         return False
     other = _estimate(problem, _chosen(problem, choices), "fit", result.data)
     return bool(np.sqrt(other.excess) - 1 < (test.ratio - 1) / 4)
@@ -371,7 +412,10 @@ def _estimate(
     cross = problem.options.cross if cross is None else cross
     terms = _terms(problem, damping, cross)
     with _quiet():
-        return estimate_joint(problem.frfs, terms, cross, problem.used, problem.near, data, is_explained=is_explained)
+        return estimate_joint(
+            problem.frfs, terms, cross, problem.used, problem.near, data, is_explained=is_explained,
+            sides_bend=problem.sides_bend,
+        )  # fmt: skip
 
 
 def choose_damping(group: GroupFit, dofs: tuple[str, ...], factor: float) -> list[DofDamping]:

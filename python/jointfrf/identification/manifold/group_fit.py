@@ -52,6 +52,8 @@ _POORLY = 0.05
 _REVERSED, _SHRUNK = -0.8, 0.5
 #: Least part of such a step that is taken; a fit for which that is too much ends where it is.
 _LEAST_SHARE = 0.1
+#: Starts of a fit where the sides bend.
+_FEW_STARTS = 2
 #: Targets whose gradients are found together.
 _AT_ONCE = 8
 #: Entries of changed FRFs held at once where more changes than that are: 64 MB.
@@ -80,6 +82,8 @@ class GroupProblem(NamedTuple):
         their bands.
     hidden : int
         Entries of M that no FRF shows: those between rigid DOFs.
+    sides_bend : bool
+        Whether the sides may bend between channels and joint: no joint need be near all lines, and none is sought long.
     """
 
     dofs: NDArray[np.intp]
@@ -88,6 +92,7 @@ class GroupProblem(NamedTuple):
     joint: JointCoordinates
     unknown: NDArray[np.bool_]
     hidden: int = 0
+    sides_bend: bool = False
 
     def equations(self) -> FloatArray:
         """Return the complex equations of each line: entries used, less what is free and what is unknown."""
@@ -215,7 +220,7 @@ def fit_dofs(
         FRFs near the smooth ones that nearly fit the joint: where their projection begins.
     """
     best: GroupFit | None = None
-    for start in starts:
+    for start in itertools.islice(starts, _FEW_STARTS if problem.sides_bend else None):
         if not np.isfinite(start).all():
             continue
         found = _iterated(problem, start, patience if best is None else LITTLE_PATIENCE, on)
@@ -226,7 +231,8 @@ def fit_dofs(
             break
     if best is None:
         raise np.linalg.LinAlgError("no start of the fit is finite")
-    return best if best.is_noise or best.is_lost or not problem.joint.in_compliance else _from_softer(best)
+    is_last = best.is_noise or best.is_lost or problem.sides_bend or not problem.joint.in_compliance
+    return best if is_last else _from_softer(best)
 
 
 def gradients_of(fit: GroupFit, changes: Iterable[ComplexArray]) -> FloatArray:
@@ -240,8 +246,7 @@ def gradients_of(fit: GroupFit, changes: Iterable[ComplexArray]) -> FloatArray:
     """
     problem, data, used = fit.problem, fit.problem.data, fit.used.astype(float)
     if problem.unknown.any():
-        # Where cross terms are unknown there is no point of the manifold.
-        return np.zeros((len(list(changes)), fit.x.size))
+        return _gradients_beside(fit, changes)
     c = fit.joint.matrix(fit.forms.compliance)
     on = _rescued(data, c, _first_points(data, c))
     adjoint = fit.joint.slope(fit.x, fit.joint.compliance(fit.x)).conj()
@@ -299,6 +304,20 @@ def effects_of(
             yield np.where(np.isfinite(gradient), gradient, 0), np.where(np.isfinite(squares), squares, 0)
 
 
+def _gradients_beside(fit: GroupFit, changes: Iterable[ComplexArray]) -> FloatArray:
+    """Return the same where cross terms are unknown: there is no point of the manifold, but C of the smooth FRFs."""
+    data, n = fit.problem.data, fit.joint.n
+    diagonal = np.arange(n)
+    base = smooth_compliance(data)[:, diagonal, diagonal]
+    adjoint = fit.joint.slope(fit.x, fit.joint.compliance(fit.x)).conj()
+    found = []
+    for change in changes:
+        moved = smooth_compliance(data._replace(smooth=data.smooth + change))[:, diagonal, diagonal] - base
+        weighted = np.einsum("lqr,lr->lq", fit.forms.weight[:, :n, :n], np.nan_to_num(moved))
+        found.append(np.einsum("lqp,lq->p", adjoint[:, :n], weighted).real)
+    return np.array(found).reshape(-1, fit.x.size)
+
+
 def _from_softer(best: GroupFit) -> GroupFit:
     """Start again from softer values of poorly determined DOFs: far too stiff, a fit may be caught.
 
@@ -340,7 +359,8 @@ def _iterated(
             if on
             else _first_points(data, c)
         )
-        on = _rescued(data, c, on)
+        if step == 1 or not problem.sides_bend:
+            on = _rescued(data, c, on)
         used = lines.near(on, step)
         # Unknown entries of C move on all lines: they may bring a line back to where it is used.
         forms, unknown = _linearised(problem, c, on, used, choice_of_m.prior)

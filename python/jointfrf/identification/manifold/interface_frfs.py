@@ -21,6 +21,9 @@ NumbersT = TypeVar("NumbersT", ComplexArray, FloatArray)
 #: A smooth FRF below this share of sqrt|h_pp h_qq| and of its own noise is zero by symmetry.
 _ZERO = 1e-8
 _BELOW_NOISE = 1.0
+#: By how much the square of an error of the models counts in the variance of a line: it is the same error on all lines,
+#: and so counts for more than noise does. By trial on simulated pairs: 1 to 10 are nearly as good.
+_ERRORS = 3.0
 #: Part of its variance that an entry keeps when all others are known.
 _OWN_NOISE = 1e-9
 
@@ -44,6 +47,11 @@ class InterfaceFrfs(NamedTuple):
         Whether h_pq and h_qp are one measurement, as where FRFs were made reciprocal before.
     response_modes, force_modes : ndarray, shapes (m_r, 2 n), (m_f, 2 n), optional
         Motion of the channels for a unit of each joint DOF where the sides are rigid; None where it is not known.
+    errors : ndarray, shape (n_freq, e, q), optional
+        By how much the FRFs between the joint DOFs change when something of the models that corrected them is off by
+        one standard deviation, m/N.
+    noise_paths : pair of ndarray, shapes (n_freq, 2 n, m_r), (n_freq, 2 n, m_f), optional
+        From noise of the channels to that of FRFs which models have corrected, in place of `responses` and `forces`.
     """
 
     measured: ComplexArray
@@ -55,6 +63,8 @@ class InterfaceFrfs(NamedTuple):
     symmetrised: bool = False
     response_modes: FloatArray | None = None
     force_modes: FloatArray | None = None
+    errors: ComplexArray | None = None
+    noise_paths: tuple[ComplexArray, ComplexArray] | None = None
 
     @classmethod
     def of(
@@ -66,13 +76,16 @@ class InterfaceFrfs(NamedTuple):
         forces: FloatArray,
         reciprocal: bool,
         symmetrised: bool = False,
-        response_modes: FloatArray | None = None,
-        force_modes: FloatArray | None = None,
+        *,
+        errors: ComplexArray | None = None,
+        **more: Any,
     ) -> InterfaceFrfs:
-        """Return the same of smooth FRFs of shape (n_freq, 2 n, 2 n); their mean where two are one."""
+        """Return the same of smooth FRFs of shape (n_freq, 2 n, 2 n), and errors of (n_freq, e, 2 n, 2 n)."""
         entries = FrfEntries.of(len(responses) // 2, reciprocal=reciprocal)
         (kept,) = in_pieces(len(smooth), lambda own: [entries.take(_mean(smooth[own], reciprocal))])
-        return cls(measured, kept, variance, responses, forces, reciprocal, symmetrised, response_modes, force_modes)
+        if errors is not None:
+            errors = entries.take(_mean(errors, reciprocal))
+        return cls(measured, kept, variance, responses, forces, reciprocal, symmetrised, errors=errors, **more)
 
     @property
     def n(self) -> int:
@@ -98,7 +111,18 @@ class InterfaceFrfs(NamedTuple):
 
     def on_lines(self, lines: NDArray[np.intp] | slice) -> InterfaceFrfs:
         """Return some of the lines."""
-        return self._replace(measured=self.measured[lines], smooth=self.smooth[lines], variance=self.variance[lines])
+        found = self._replace(measured=self.measured[lines], smooth=self.smooth[lines], variance=self.variance[lines])
+        if self.errors is not None:
+            found = found._replace(errors=self.errors[lines])
+        if self.noise_paths is not None:
+            found = found._replace(noise_paths=(self.noise_paths[0][lines], self.noise_paths[1][lines]))
+        return found
+
+    def without(self, variance: FloatArray) -> InterfaceFrfs:
+        """Return the same with a part of the variance left out."""
+        with np.errstate(invalid="ignore"):
+            rest = self.variance - variance
+        return self._replace(variance=np.where(np.isfinite(self.variance), rest, np.inf))
 
     def groups(self) -> list[NDArray[np.intp]]:
         """Joint DOFs between which FRFs are zero, to rounding or within their noise, on all lines.
@@ -126,7 +150,10 @@ class InterfaceFrfs(NamedTuple):
         def of_lines(own: slice) -> list[NDArray[Any]]:
             part = self.on_lines(own)
             measured = entries.take(_mean(between(t_r, part.measured, t_f), self.reciprocal))
-            inverse_std, whitening = part._weights(entries, t_r, t_f)
+            if part.noise_paths is None:
+                inverse_std, whitening = part._weights(entries, t_r, t_f)
+            else:
+                inverse_std, whitening = part._corrected_weights(entries, at, part.errors_of(dofs))
             return [measured, inverse_std] if whitening is None else [measured, inverse_std, whitening]
 
         measured, *weights = in_pieces(len(self.measured), of_lines)
@@ -134,10 +161,18 @@ class InterfaceFrfs(NamedTuple):
 
     def smooth_of(self, dofs: NDArray[np.intp]) -> ComplexArray:
         """Return the smooth FRFs between some joint DOFs, shape (n_freq, q); what is there where these are all."""
+        entries = self._places_of(dofs)
+        return self.smooth if np.array_equal(entries, np.arange(self.smooth.shape[1])) else self.smooth.take(entries, 1)
+
+    def errors_of(self, dofs: NDArray[np.intp]) -> ComplexArray | None:
+        """Return the errors of FRFs between some joint DOFs, shape (n_freq, e, q); None where there are none."""
+        return None if self.errors is None else self.errors.take(self._places_of(dofs), 2)
+
+    def _places_of(self, dofs: NDArray[np.intp]) -> NDArray[np.intp]:
+        """Return which entries those between some joint DOFs are."""
         at = np.concatenate([dofs, dofs + self.n])
         own = FrfEntries.of(len(dofs), reciprocal=self.reciprocal)
-        entries = FrfEntries.of(self.n, reciprocal=self.reciprocal).places[at[own.rows], at[own.columns]]
-        return self.smooth if np.array_equal(entries, np.arange(self.smooth.shape[1])) else self.smooth.take(entries, 1)
+        return FrfEntries.of(self.n, reciprocal=self.reciprocal).places[at[own.rows], at[own.columns]]
 
     def entries_of(self, dofs: NDArray[np.intp], gamma: ComplexArray) -> ComplexArray:
         """Return the entries between some joint DOFs, as `of_dofs` does, of FRFs between all, shape (n_freq, q)."""
@@ -186,10 +221,45 @@ class InterfaceFrfs(NamedTuple):
             whitening[:, block[:, None], block] = _whitening(g[block], own, inverse_std[:, block], dead[:, block])
         return inverse_std, whitening
 
+    def _corrected_weights(
+        self, entries: FrfEntries, at: NDArray[np.intp], errors: ComplexArray | None
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the same of FRFs that models have corrected: noise of all channels of a side is in every entry of it."""
+        assert self.noise_paths is not None
+        known = np.isfinite(self.variance)
+        std = np.sqrt(np.where(known, self.variance, 0))
+        (t_r, t_f), n = (path[:, at] for path in self.noise_paths), entries.n
+        whitening = np.zeros((len(std), entries.rows.size, entries.rows.size))
+        inverse_std = np.zeros(whitening.shape[:2])
+        sides = entries.rows // n + entries.columns // n
+        for block in (np.flatnonzero(sides == one) for one in np.unique(sides)):
+            p, q = entries.rows[block], entries.columns[block]
+            of_channels = t_r[:, p, :, None] * t_f[:, q, None, :]
+            if self.reciprocal:
+                of_channels = (of_channels + t_r[:, q, :, None] * t_f[:, p, None, :]) / 2
+            if self.symmetrised:
+                of_channels = np.triu(of_channels + np.triu(of_channels.swapaxes(2, 3), 1))
+            weighted = of_channels * std[:, None]
+            dead = ((of_channels != 0) & ~known[:, None]).any(axis=(2, 3))
+            weighted = weighted.reshape(*weighted.shape[:2], -1)
+            weighted = np.ascontiguousarray(weighted[:, :, weighted.any(axis=(0, 1))])
+            covariance = (weighted @ weighted.conj().swapaxes(1, 2)).real
+            if errors is not None:
+                # Real and imaginary part each as a direction of its own: the covariance stays real.
+                own = np.concatenate([errors.real, errors.imag], axis=1)[:, :, block]
+                covariance += _ERRORS * own.swapaxes(1, 2) @ own
+            total = np.einsum("lqq->lq", covariance)
+            dead |= ~(total > 0)
+            inverse_std[:, block] = np.where(dead, 0, 1 / np.sqrt(np.where(dead, 1, total)))
+            size = inverse_std[:, block]
+            covariance *= size[:, :, None] * size[:, None, :]
+            whitening[:, block[:, None], block] = _triangles(covariance, dead)
+        return inverse_std, whitening
+
 
 def _mean(gamma: ComplexArray, reciprocal: bool) -> ComplexArray:
     """Return the mean of gamma_pq and gamma_qp where they are one."""
-    return (gamma + gamma.swapaxes(1, 2)) / 2 if reciprocal else gamma
+    return (gamma + gamma.swapaxes(-2, -1)) / 2 if reciprocal else gamma
 
 
 def taken(h: NumbersT, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> NumbersT:
@@ -218,8 +288,13 @@ def _whitening(g: FloatArray, variance: FloatArray, inverse_std: FloatArray, dea
     """Return the triangles that whiten entries sum_c G_ic h_c, shape (n_freq, q, q)."""
     seen = np.flatnonzero(g.any(axis=0))
     scaled_g = inverse_std[:, :, None] * g[:, seen]
-    covariance = (scaled_g * variance[:, None, seen]) @ scaled_g.swapaxes(1, 2)
+    return _triangles((scaled_g * variance[:, None, seen]) @ scaled_g.swapaxes(1, 2), dead)
+
+
+def _triangles(covariance: FloatArray, dead: NDArray[np.bool_]) -> FloatArray:
+    """Return the inverse of the triangles of covariances of unit variance, which may be overwritten."""
+    n = covariance.shape[1]
     # DOFs made of the same channels may leave an entry without noise of its own.
-    covariance[:, range(len(g)), range(len(g))] += dead + _OWN_NOISE
+    covariance[:, range(n), range(n)] += dead + _OWN_NOISE
     inverse: FloatArray = np.linalg.inv(np.linalg.cholesky(covariance))
     return inverse

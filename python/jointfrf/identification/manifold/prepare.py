@@ -15,16 +15,17 @@ from jointfrf.frf.entry_groups import ZERO
 from jointfrf.frf.quantiles import medians
 from jointfrf.identification.manifold.coordinates import CrossTerms, DampingTerms
 from jointfrf.identification.manifold.estimate import GroupStart, JointEstimate
+from jointfrf.identification.manifold.flexible_sides import SideBending, side_bending
 from jointfrf.identification.manifold.interface_frfs import InterfaceFrfs
 from jointfrf.identification.manifold.transforms import (
     Transform,
     Transforms,
     as_transforms,
-    deformation_compliance,
     deformation_variance,
 )
 from jointfrf.identification.noise import KnownNoise, NoiseOptions, noise_of_matrix
 from jointfrf.identification.prepare import BandsOfDofs, MeasuredFrfs, as_dof_names
+from jointfrf.identification.side_models import SideModel, corrected_frfs
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_names, as_real, check_choice
 
 __all__ = [
@@ -80,8 +81,12 @@ class FitProblem:
         Of other FRFs of the same structure: where the fit starts first.
     deformation : ndarray, shape (n_freq, m_r, m_f), optional
         Part of the variance that is not noise: squares of what is not rigid in the channels, (m/N)^2.
+    bending : SideBending, optional
+        How much the sides bend among the channels, where these show it and no models correct them.
     added_compliance : ndarray, shape (n,), optional
-        What the sides between the channels add to the compliance of each joint DOF, m/N or rad/(N m).
+        What the sides add to the compliance of each joint DOF where that was said, m/N or rad/(N m).
+    model_errors : tuple of str, optional
+        What of the models of the sides may be off, where models correct the FRFs.
     left_out : tuple of LeftOutDof
         DOFs that are not sought, but whose motion the channels take for one that is.
     """
@@ -95,8 +100,15 @@ class FitProblem:
     options: FitOptions
     near: tuple[GroupStart, ...] = ()
     deformation: FloatArray | None = None
+    bending: SideBending | None = None
     added_compliance: FloatArray | None = None
+    model_errors: tuple[str, ...] | None = None
     left_out: tuple[LeftOutDof, ...] = ()
+
+    @property
+    def sides_bend(self) -> bool:
+        """Whether the sides may bend between channels and joint."""
+        return self.bending is not None or self.model_errors is not None
 
     def with_noise(self, scale: float) -> FitProblem:
         """Return the same with another noise level."""
@@ -113,6 +125,7 @@ def prepare_compliance(
     transform: Transform | tuple[Transform, Transform] | None,
     noise: NoiseOptions,
     options: FitOptions,
+    sides: tuple[SideModel, SideModel] | None = None,
     *,
     is_checked: bool = False,
 ) -> FitProblem:
@@ -145,18 +158,18 @@ def prepare_compliance(
     smooth, variance = transforms.gamma(found.smooth), found.variance
     check_joint_seen(freq, smooth, transforms.variance(variance))
     transforms = transforms.with_modes(found.smooth)
-    deformation, compliance = None, transforms.compliance
-    if transforms.channels is not None:
-        deformation = deformation_variance(found.smooth, *transforms.channels)
-        of_sides = deformation_compliance(h, variance, *transforms.channels)
-        compliance = of_sides if compliance is None else np.maximum(compliance, 0.0 if of_sides is None else of_sides)
-    elif compliance is not None:
-        compliance = np.maximum(compliance, 0.0)
+    channels, deformation, bending, corrected = transforms.channels, None, None, None
+    if sides is not None:
+        corrected = corrected_frfs(freq, h, found.smooth, variance, *_for_models(transforms), sides)
+        smooth, variance = corrected.smooth_gamma, corrected.variance
+    elif channels is not None:
+        deformation = deformation_variance(found.smooth, *channels)
+        bending = side_bending(h, found.smooth, variance, *channels)
     return FitProblem(
         dofs=names,
         freq_hz=freq,
         frfs=InterfaceFrfs.of(
-            h,
+            h if corrected is None else corrected.h,
             smooth,
             variance if deformation is None else variance + deformation,
             responses,
@@ -165,15 +178,31 @@ def prepare_compliance(
             symmetrised=square and _is_symmetrised(h),
             response_modes=transforms.response_modes,
             force_modes=transforms.force_modes,
+            errors=None if corrected is None else corrected.errors,
+            noise_paths=None if corrected is None else corrected.noise_paths,
         ),
         noise=found.noise,
         used=used[kept],
         bands=tuple(map(tuple, own)),
         options=options,
         deformation=deformation,
-        added_compliance=compliance,
+        bending=bending,
+        added_compliance=transforms.compliance,
+        model_errors=None if corrected is None else corrected.error_names,
         left_out=() if transforms.geometry is None else left_out_dofs(h, transforms.geometry),
     )
+
+
+def _for_models(transforms: Transforms) -> tuple[tuple[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]:
+    """Return T and R of responses and of forces."""
+    both = transforms.responses, transforms.forces
+    if transforms.are_units:
+        return both, both
+    if transforms.response_modes is None or transforms.force_modes is None:
+        raise ValueError(
+            "sides need the rigid motion of the channels: give transform as an Interface (virtual_interface)"
+        )
+    return both, (transforms.response_modes, transforms.force_modes)
 
 
 def _check_joint_dofs(transforms: Transforms, h: ComplexArray, names: tuple[str, ...]) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -15,13 +14,10 @@ from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
 __all__ = [
     "ChannelModes",
-    "LeftOut",
     "Transform",
     "Transforms",
     "as_transforms",
-    "deformation_compliance",
     "deformation_variance",
-    "left_out",
     "modes_of",
 ]
 
@@ -162,33 +158,6 @@ class ChannelModes(NamedTuple):
         return np.flatnonzero(self.transform[side * n : (side + 1) * n].any(axis=0))
 
 
-class LeftOut(NamedTuple):
-    """A channel left out.
-
-    Attributes
-    ----------
-    redundancy : float
-        Share of an error of the channel that stays in its residual.
-    change : ndarray, shape (2 n, m)
-        By how much the transform changes.
-    """
-
-    redundancy: float
-    change: FloatArray
-
-
-def left_out(channels: ChannelModes) -> Iterator[LeftOut]:
-    """Leave out one channel after the other that the rest can replace.
-
-    T_(i) = T - t_i (e_i - r_i T) / (1 - r_i t_i), with t_i column i of T and r_i row i of the modes R: least squares
-    without channel i where T is that of all, and T_(i) R = 1 for any T.
-    """
-    share = channels.redundancy
-    for i in np.flatnonzero(share):
-        change = -np.outer(channels.transform[:, i], channels.residual[i]) / share[i]
-        yield LeftOut(float(share[i]), change)
-
-
 def deformation_variance(smooth: ComplexArray, responses: ChannelModes, forces: ChannelModes) -> FloatArray:
     """Squares of what is not rigid in smooth FRFs of the channels, shape (n_freq, m_r, m_f), (m/N)^2.
 
@@ -201,46 +170,6 @@ def deformation_variance(smooth: ComplexArray, responses: ChannelModes, forces: 
         (smooth @ forces.residual.T, forces.redundancy[None, :]),
     ):
         total += np.where(share > 0, near_squares(residual) / np.where(share > 0, share, 1), 0)
-    return total
-
-
-def deformation_compliance(
-    h: ComplexArray, noise: FloatArray, responses: ChannelModes, forces: ChannelModes
-) -> FloatArray | None:
-    """Compliance that the sides have between the channels, for forces and motion of each joint DOF.
-
-    Parameters
-    ----------
-    h, noise : ndarray, shape (n_freq, m_r, m_f)
-        FRFs of the channels, m/N, and their variance.
-    responses, forces : ChannelModes
-
-    Returns
-    -------
-    ndarray, shape (n,), or None
-        m/N or rad/(N m), both sides together; None where the channels of a side do not check each other.
-
-    Notes
-    -----
-    FRFs between the channels of one side, less what is rigid in responses and in forces, are a compliance
-    F = (1 - R T) h (1 - R T)^T, averaged over the lines by their noise. Its mean singular value delta is what one
-    channel deforms, noise included: less than that cannot be excluded. Weights t_r and t_f of a DOF give it
-    |t_r| |t_f| delta.
-    """
-    n = len(responses.transform) // 2
-    total = np.zeros(n)
-    for side in (0, 1):
-        rows, columns = responses.of_side(side), forces.of_side(side)
-        count = min(rows.size, columns.size) - n
-        if count < 1:
-            return None
-        left = responses.residual[rows] @ h.real @ forces.residual[columns].T
-        spread = noise[:, rows[:, None], columns]
-        weight = 1 / np.where(np.isfinite(spread), spread, 0).mean(axis=(1, 2))
-        mean = np.tensordot(weight, left, 1) / weight.sum()
-        own = slice(side * n, (side + 1) * n)
-        gains = [np.linalg.norm(channels.transform[own], axis=1) for channels in (responses, forces)]
-        total += gains[0] * gains[1] * np.linalg.svd(mean, compute_uv=False).sum() / count
     return total
 
 

@@ -1,0 +1,260 @@
+"""Sides that bend between channels and joint, from the FRFs alone: what they add to the compliance of the joint.
+
+Between virtual points a joint of compliance C is seen as C_seen = Q (C + D_A + D_B) P (docs/sides.md): softer at low
+frequency by what the sides give way between channels and joint, D0 = D_A(0) + D_B(0), and changing over frequency by
+their inertia. The FRFs tell C + D0, and how much the sides bend among the channels; D0 itself only within a factor.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointfrf.frf.quantiles import medians
+from jointfrf.identification.manifold.transforms import ChannelModes
+from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.kernel.linear_algebra import solve
+
+__all__ = ["JointAlone", "SideBending", "joint_alone", "side_bending"]
+
+#: A channel with far less noise than others must not be all that a mean over lines takes.
+_LEAST_VARIANCE = 1e-3
+#: One-sided 95 % of a normal distribution: bending that noise does not exclude.
+_NOT_EXCLUDED = 1.65
+#: Standard deviations of a two-sided interval of 95 %.
+_TWO_SIDED = 1.96
+#: Rounds of the robust regression, and the residual in standard deviations from which on a line weighs less.
+_ROUNDS, _HUBER = 12, 1.5
+#: Median of the square of a standard normal number.
+_MEDIAN_SQUARE = 0.455
+#: The error of the intercept over the change that the term of w^4 makes, with four times the variance of noise beside it:
+#: its 95 % quantile over simulated pairs of bodies (docs/sides.md).
+_INERTIA = 2.1
+#: D0 over what is seen of bending, of translations and of rotations: median, and 97.5 % quantile, over the same pairs;
+#: below zero it may be where impacts are not at the sensors, 2.5 % quantile.
+_MIDDLE, _LARGE, _NEGATIVE = (1.7, 4.8), (9.0, 20.0), (0.4, 0.0)
+_TINY = float(np.finfo(float).tiny)
+
+
+class SideBending(NamedTuple):
+    """How much both sides bend among their channels, per joint DOF, m/N or rad/(N m), shape (n,) each.
+
+    Attributes
+    ----------
+    low : ndarray
+        With the noise taken off; may be 0.
+    high : ndarray
+        What noise does not exclude.
+    """
+
+    low: FloatArray
+    high: FloatArray
+
+
+def side_bending(
+    measured: ComplexArray, smooth: ComplexArray, variance: FloatArray, responses: ChannelModes, forces: ChannelModes
+) -> SideBending | None:
+    """Return how much the sides bend among their channels; None where the channels of a side have none to spare.
+
+    Parameters
+    ----------
+    measured, smooth : ndarray, shape (n_freq, m_r, m_f)
+        FRFs of the channels, m/N.
+    variance : ndarray, shape (n_freq, m_r, m_f)
+        E|e|^2 of the measured ones, inf where one is not used.
+    responses, forces : ChannelModes
+
+    Notes
+    -----
+    V = h_AB T_f^T gamma_jk^-1 gamma_jj - h_AA T_f^T is the motion of the channels of A under load at the joint against
+    load on the channels, with the virtual point at rest, whatever the joint is; at the joint itself the same field is
+    D_A P. Its mean over the lines, by the noise of each entry and without rigid motion, gives for a DOF with weights
+    t_d of m channels |t_d| sqrt(m/3) (sum V_id^2 / (m - n))^(1/2); the geometric mean of that from responses and from
+    forces, summed over both sides.
+    """
+    gamma = responses.transform @ smooth @ forces.transform.T
+    own = [_of_side(measured, smooth, variance, gamma, responses, forces, side) for side in (0, 1)]
+    turned = [one.swapaxes(1, 2) for one in (measured, smooth, variance, gamma)]
+    other = [_of_side(*turned, forces, responses, side) for side in (0, 1)]
+    n, low, high = len(gamma[0]) // 2, 0.0, 0.0
+    for one, two in zip(own, other, strict=True):
+        if one is None or two is None:
+            return None
+        low, high = low + np.sqrt(one.low * two.low), high + np.sqrt(one.high * two.high)
+    return SideBending(low + np.zeros(n), high + np.zeros(n))
+
+
+def _of_side(
+    measured: ComplexArray,
+    smooth: ComplexArray,
+    variance: FloatArray,
+    gamma: ComplexArray,
+    responses: ChannelModes,
+    forces: ChannelModes,
+    side: int,
+) -> SideBending | None:
+    """Return what the responses of one side show."""
+    n = gamma.shape[1] // 2
+    here, there = slice(side * n, (side + 1) * n), slice((1 - side) * n, (2 - side) * n)
+    rows, columns, across = responses.of_side(side), forces.of_side(side), forces.of_side(1 - side)
+    spare = rows.size - n
+    if spare < 1:
+        return None
+    t_own, t_across = forces.transform[here][:, columns], forces.transform[there][:, across]
+    # A moment or force of the other virtual point that moves this one as its own does.
+    ratio = solve(np.ascontiguousarray(gamma[:, here, there]), np.ascontiguousarray(gamma[:, here, here]))
+    through = t_across.T @ ratio
+    field = measured[:, rows[:, None], across] @ through - measured[:, rows[:, None], columns] @ t_own.T
+    known = np.where(np.isfinite(variance), variance, 0)
+    spread = known[:, rows[:, None], across] @ abs(through) ** 2 + known[:, rows[:, None], columns] @ (t_own.T**2)
+    modes, transform = responses.modes[rows][:, here], responses.transform[here][:, rows]
+    residual = np.eye(rows.size) - modes @ transform
+    spread = residual**2 @ spread
+    spread = np.maximum(spread, _LEAST_VARIANCE * medians(spread.swapaxes(0, 2).reshape(n, -1))[None, None] + _TINY)
+    weight = 1 / spread
+    total = weight.sum(axis=0)
+    bent = residual @ ((weight * field.real).sum(axis=0) / total)
+    # Real parts have half of the variance.
+    noise = 1 / (2 * total)
+    square, by_noise = (bent**2).sum(axis=0), noise.sum(axis=0)
+    error = np.sqrt(2 * (noise**2).sum(axis=0) + 4 * (noise * bent**2).sum(axis=0))
+    lever = np.linalg.norm(transform, axis=1) * np.sqrt(rows.size / 3 / spare)
+    return SideBending(
+        *(lever * np.sqrt(np.maximum(square - by_noise + more, 0)) for more in (0.0, _NOT_EXCLUDED * error))
+    )
+
+
+class _StaticCompliance(NamedTuple):
+    """Compliance seen at zero frequency, C + D0, m/N or rad/(N m), shape (n,) each.
+
+    Attributes
+    ----------
+    value : ndarray
+        Intercept over w^2 and w^4.
+    std_error : ndarray
+        From noise, and from what scatters beside the trend.
+    before : ndarray
+        Intercept over w^2 alone.
+    """
+
+    value: FloatArray
+    std_error: FloatArray
+    before: FloatArray
+
+
+def _static_compliance(omega: FloatArray, compliance: ComplexArray, variance: FloatArray) -> _StaticCompliance:
+    """Return the intercept of Re C_dd over w^2 and w^4: the inertia of the sides changes it with even powers.
+
+    Parameters
+    ----------
+    omega : ndarray, shape (n_freq,)
+        rad/s.
+    compliance : ndarray, shape (n_freq, n)
+        Diagonal of C of each line, m/N; NaN where a line does not give it.
+    variance : ndarray, shape (n_freq, n)
+        E|e|^2 of its noise.
+    """
+    x = (omega / omega.max()) ** 2
+    found = [[_intercept(x, c, v, order) for c, v in zip(compliance.T, variance.T, strict=True)] for order in (1, 2)]
+    (before, _), (value, error) = (np.array(one).T for one in found)
+    return _StaticCompliance(value, error, before)
+
+
+def _intercept(x: FloatArray, compliance: ComplexArray, variance: FloatArray, order: int) -> tuple[float, float]:
+    """Return the intercept of a polynomial, robust: near resonances of the sides lines leave any trend."""
+    known = np.isfinite(compliance.real) & np.isfinite(variance) & (variance > 0)
+    y, noise = compliance.real[known], variance[known] / 2
+    order = min(order, max(int(known.sum()) - 2, 0))
+    if known.sum() <= order:
+        return np.nan, np.inf
+    terms = x[known, None] ** np.arange(order + 1)
+    weight = 1 / (noise + float(medians(noise)))
+    for _ in range(_ROUNDS):
+        root = np.sqrt(weight)
+        coefficients = np.linalg.lstsq(terms * root[:, None], y * root, rcond=None)[0]
+        squares = (y - terms @ coefficients) ** 2
+        beside = max(float(medians(np.maximum(squares / _MEDIAN_SQUARE - noise, 0))), 0.0)
+        base = noise + beside
+        weight = 1 / base / np.maximum(1, np.sqrt(squares / base) / _HUBER)
+    covariance = np.linalg.pinv((terms * weight[:, None]).T @ terms, hermitian=True)
+    return float(coefficients[0]), float(np.sqrt(max(covariance[0, 0], 0.0)))
+
+
+class JointAlone(NamedTuple):
+    """Compliance of a joint without its sides, and as seen between virtual points, m/N or rad/(N m), shape (n,) each.
+
+    Attributes
+    ----------
+    seen : ndarray
+        C + D0, static.
+    noise, inertia : ndarray
+        Half widths of its 95 % interval: from noise, and from what the inertia of the sides makes over frequency.
+    best : ndarray
+        C of the joint alone.
+    softer, stiffer : ndarray
+        What the sides may add to its 95 % interval above and below `seen`.
+    """
+
+    seen: FloatArray
+    noise: FloatArray
+    inertia: FloatArray
+    best: FloatArray
+    softer: FloatArray
+    stiffer: FloatArray
+
+    @property
+    def reach(self) -> FloatArray:
+        """Half width of the 95 % interval of `seen`."""
+        return np.asarray(np.hypot(self.noise, self.inertia))
+
+    @property
+    def limits(self) -> tuple[FloatArray, FloatArray]:
+        """95 % interval of the joint alone; 0 where it may be rigid."""
+        low = self.seen - np.hypot(self.stiffer, self.reach)
+        return np.maximum(low, 0.0), self.seen + np.hypot(self.softer, self.reach)
+
+
+def joint_alone(
+    omega: FloatArray,
+    compliance: ComplexArray,
+    variance: FloatArray,
+    fitted: tuple[FloatArray, FloatArray],
+    size: FloatArray,
+    bending: SideBending,
+    is_rotation: NDArray[np.bool_],
+) -> JointAlone:
+    """Return the compliance of the joint alone by what bends among the channels.
+
+    Parameters
+    ----------
+    omega : ndarray, shape (n_freq,)
+        rad/s.
+    compliance, variance : ndarray, shape (n_freq, n)
+        Diagonal of C seen of each line, and E|e|^2 of its noise; NaN where a line does not give it.
+    fitted : pair of ndarray, shape (n,)
+        C_dd as fitted, one number for all lines, and its standard error by noise.
+    size : ndarray, shape (n,)
+        Median size of the receptances of each joint DOF, m/N or rad/(N m).
+    bending : SideBending
+    is_rotation : ndarray of bool, shape (n,)
+
+    Notes
+    -----
+    Quantiles of D0 over bending, and of the error of the intercept, over simulated pairs of bodies. Where the sides
+    cannot bend by more than what moves the estimate within its noise, what was fitted to all lines is taken for C seen:
+    inertia changes C_seen by a share of about D/|gamma|.
+    """
+    static = _static_compliance(omega, compliance, variance)
+    middle, large, negative = (np.where(is_rotation, r, t) for t, r in (_MIDDLE, _LARGE, _NEGATIVE))
+    value, error = fitted
+    is_rigid = large * bending.high / np.maximum(size, _TINY) * abs(value) <= error
+    is_rigid |= ~np.isfinite(static.value)
+    seen = np.where(is_rigid, value, static.value)
+    noise = np.where(is_rigid, _TWO_SIDED * error, 2 * _INERTIA * static.std_error)
+    inertia = np.where(is_rigid, 0.0, _INERTIA * abs(static.value - static.before))
+    # At most as soft as noise and inertia allow, where these alone leave the sign open.
+    size_seen = np.maximum(seen, np.hypot(noise, inertia) / 2)
+    best = size_seen / (1 + middle * bending.low / np.maximum(size_seen, _TINY))
+    return JointAlone(seen, noise, inertia, best, negative * bending.high, large * bending.high)
