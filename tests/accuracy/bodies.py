@@ -310,7 +310,8 @@ def pair(index: int, seed: int = 0, lines: int = 160) -> Pair:
     channels = tuple(layout(own, rng, reach, sensors, impacts, same=same) for own in bodies)
     band = float(rng.choice([0.6, 1.0, 1.5, 2.0]))
     freq = np.linspace(0.05, band, lines) * min(own.first_hz for own in bodies)
-    sides, whole = (sum(both) for both in zip(*(_static(own, *c) for own, c in zip(bodies, channels, strict=True))))
+    both = [_static(own, *c) for own, c in zip(bodies, channels, strict=True)]
+    sides, whole = (sum(own) for own in zip(*both, strict=True))
     size = abs(np.diagonal(sides)) + 0.02 * np.diagonal(whole)
     share = 10 ** rng.uniform(-1.7, 1) * 10 ** rng.uniform(-0.3, 0.3, 6)
     compliance = size / share

@@ -122,7 +122,7 @@ class CardRequest(NamedTuple):
     nodes : list of int
         j and k.
     options : CardOptions
-    all_damping : bool
+    all_damping, bounds : bool
     output : Path or None
         None: to be printed.
     """
@@ -131,6 +131,7 @@ class CardRequest(NamedTuple):
     nodes: list[int]
     options: CardOptions
     all_damping: bool
+    bounds: bool
     output: Path | None
 
 
@@ -182,6 +183,7 @@ def add_card_arguments(parser: CommandParser) -> None:
     parser.option("--property N", "first number of properties (1)", positive, 1)
     parser.option("--full-matrix", "matrices where springs would do (abaqus, nastran)")
     parser.option("--all-damping", "also dashpots that are negative or not significantly above zero")
+    parser.option("--bounds", "also stiffnesses of which only a bound is known, by their best estimates")
     parser.option("--no-damping", "no damping in the cards")
 
 
@@ -214,7 +216,7 @@ def card_request(
         ):
             if given is not None:
                 raise UsageError(f"{name} is for cards: say --export PROGRAM:J,K, too")
-        flags = ("--element", "--property", "--full-matrix", "--all-damping", "--no-damping")
+        flags = ("--element", "--property", "--full-matrix", "--all-damping", "--bounds", "--no-damping")
         warn_of_ignored(args, flags, "it is for cards, --export PROGRAM:J,K")
         return None
     check_folder("--output", args.output)
@@ -232,7 +234,7 @@ def card_request(
         options["positions"] = np.array(args.nodes_at)
         if points is not None:
             options["points"] = points / model_units(args.units or "SI").length
-    request = CardRequest(program, ends[:2], options, args.all_damping, args.output)
+    request = CardRequest(program, ends[:2], options, args.all_damping, args.bounds, args.output)
     try:
         _probe(len(dofs), dofs, damping, cross).export(request.program, request.nodes, **options)
     except ValueError as error:
@@ -260,10 +262,13 @@ def _refusal(why: str, damping: str) -> str:
 
 def written_cards(fit: Fit, request: CardRequest, about: Sequence[str], freq_hz: float | None = None) -> str:
     """Return the cards of a fit, laws at a frequency, and write them where that is wanted."""
-    text = cards(
-        fit, request.program, request.nodes, about=about, all_damping=request.all_damping, freq_hz=freq_hz,
-        **request.options,
-    )  # fmt: skip
+    try:
+        text = cards(
+            fit, request.program, request.nodes, about=about, all_damping=request.all_damping, bounds=request.bounds,
+            freq_hz=freq_hz, **request.options,
+        )  # fmt: skip
+    except ValueError as error:
+        raise UsageError(str(error).replace("(bounds)", "(--bounds)")) from error
     if request.output is not None:
         write_file(request.output, text)
     return text

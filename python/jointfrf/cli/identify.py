@@ -10,6 +10,7 @@ from typing import Any, get_args
 
 import numpy as np
 
+from jointfrf.assembly_file.side_part import SidePart, read_side
 from jointfrf.channels.check.check import warn_of_frfs
 from jointfrf.channels.check.finding import FrfCheck
 from jointfrf.channels.point_lines import difference_error
@@ -37,6 +38,7 @@ from jointfrf.identification.identify import identify
 from jointfrf.identification.manifold.coordinates import CrossTerms, DampingTerms
 from jointfrf.identification.record import fit_to_dict, write_record
 from jointfrf.identification.result import Fit
+from jointfrf.identification.side_models import SideModel
 from jointfrf.io import FrfSet
 from jointfrf.laws.law_joint import LawJoint
 from jointfrf.report.fit_page import write_report
@@ -80,6 +82,13 @@ def add_arguments(parser: CommandParser) -> None:
     parser.option(
         "--cross", "terms between the joint DOFs: none (default), not looked at, fitted", get_args(CrossTerms), "zero"
     )
+    parser.option(
+        "--side-j PART",
+        "with --side-k: part.toml, the model of side j alone, free of the other side, as [A] of assembly.toml: "
+        "corrects the FRFs for what the side bends between channels and joint",
+        Path,
+    )
+    parser.option("--side-k PART", "the same of side k", Path)
     add_law_arguments(parser)
     parser.option("--noise LEVEL", "relative noise of the FRFs, 0.01 for 1 %% (default: from their reciprocity)", float)
     parser.option(
@@ -124,6 +133,7 @@ def run(args: argparse.Namespace) -> int:
     points = np.array(joint.responses.references)
     laws = joint_of_laws(args, joint.dofs)
     damping = args.damping if laws is None else "none"
+    sides = _sides(args, frfs, joint)
     request = card_request(args, joint.dofs, damping=damping, cross=args.cross, points=points)
     check = check_joint(joint, measured.quantity)
     warn_of_frfs(check)
@@ -135,21 +145,21 @@ def run(args: argparse.Namespace) -> int:
         )
     if joint.channels is not None or len(joint.nodes[0]) == 1:
         warn_of_ignored(args, ("--bending-stiffness",), "no rotation is found by differences along a line")
-    out.say(*_heading(args, frfs, joint))
+    out.say(*_heading(args, frfs, joint), *(line for side in sides for line in side.text))
     fits = []
     for method in args.method:
         with waiting(f"fit by {method}"):
-            fits.append(_fit(args, method, frfs, joint, laws))
+            fits.append(_fit(args, method, frfs, joint, laws, tuple(side.model for side in sides)))
         out.say("", fits[-1])
         out.warn(*fits[-1].warnings)
     text, written = "", []
+    if args.save is not None:
+        _save(args.save, fits[0], file_names(args), joint, lines=args.save_lines)
+        written.append(args.save)
     if request is not None:
         about = [f"from {file_names(args)}", *_places(joint)]
         text = written_cards(fits[0], request, about)
         written += [] if args.output is None else [args.output]
-    if args.save is not None:
-        _save(args.save, fits[0], file_names(args), joint, lines=args.save_lines)
-        written.append(args.save)
     if text and args.output is None:
         out.say("", text.rstrip("\n"))
     if args.report is not None:
@@ -210,13 +220,40 @@ def _differences(args: argparse.Namespace, joint: MeasuredJoint) -> Iterator[str
         )
 
 
-def _fit(args: argparse.Namespace, method: str, frfs: FrfSet, joint: MeasuredJoint, laws: LawJoint | None) -> Fit:
+def _sides(args: argparse.Namespace, frfs: FrfSet, joint: MeasuredJoint) -> list[SidePart]:
+    """Read the models of both sides; none where none are named."""
+    paths = [path for path in (args.side_j, args.side_k) if path is not None]
+    if not paths:
+        return []
+    if len(paths) == 1:
+        raise UsageError("--side-j and --side-k go together: both sides of the joint bend")
+    if "compliance" not in args.method:
+        raise UsageError("--side-j and --side-k are of method compliance: name it among the methods")
+    lines, _ = in_some_band(frfs.freq_hz, joint.h, args.band)
+    found = []
+    for side, path in enumerate(paths):
+        responses, forces = joint.placed(side, frfs.coordinates)
+        found.append(read_side(path, lines, responses, forces, len(joint.dofs)))
+    return found
+
+
+def _fit(
+    args: argparse.Namespace,
+    method: str,
+    frfs: FrfSet,
+    joint: MeasuredJoint,
+    laws: LawJoint | None,
+    sides: tuple[SideModel, ...],
+) -> Fit:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", IdentificationWarning)  # they are in the table
         warnings.simplefilter("ignore", ConvergenceWarning)
         warnings.simplefilter("ignore", FrfCheckWarning)  # printed with the names of the channels
         if method == "compliance":
-            return identify(frfs.freq_hz, joint.h, joint.dofs, args.band, **_of_compliance(args, frfs, joint, laws))
+            options = _of_compliance(args, frfs, joint, laws)
+            if sides:
+                options["sides"] = sides
+            return identify(frfs.freq_hz, joint.h, joint.dofs, args.band, **options)
         transform = joint.responses if joint.is_square else None
         return identify_band_mean(
             frfs.freq_hz, _square(joint), "inverse-substructuring", joint.dofs, args.band, transform=transform

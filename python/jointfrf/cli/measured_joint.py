@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from jointfrf.assembly_file.side_part import PlacedChannel
 from jointfrf.channels.check.finding import FrfCheck
 from jointfrf.channels.joint_channels import (
     JointChannels,
@@ -66,6 +67,22 @@ class MeasuredJoint:
     nodes: tuple[list[int], list[int]]
     bands: list[tuple[float, float]] | None
     every: tuple[JointChannels, ComplexArray] | None = None
+
+    def placed(self, side: int, coordinates: Mapping[int, FloatArray]) -> list[list[PlacedChannel]]:
+        """Return the responses and the excitations of side 0 (j) or 1 (k), with their places from its reference."""
+        found = []
+        for kind, own in (("response", self.responses), ("excitation", self.forces)):
+            n = len(own.dofs)
+            rows = np.flatnonzero(own.transform[side * n : (side + 1) * n].any(axis=0))
+            known = None if self.channels is None else self.channels.positions[kind, "jk"[side]]
+            named = []
+            for i, row in enumerate(rows):
+                channel = own.channels[row]
+                place = coordinates.get(channel.node) if known is None else known[i]
+                place = None if place is None else place - own.references[side]
+                named.append(PlacedChannel(channel, own.motion[row, 6 * side : 6 * side + 3], place))
+            found.append(named)
+        return found
 
     @property
     def transform(self) -> Interface | tuple[Interface, Interface]:

@@ -278,7 +278,7 @@ def _is_wide(low: float, high: float) -> bool:
 
 
 def _with_best_estimates(fit: Fit, result: JointEstimate) -> Fit:
-    """Return the fit with a best estimate of stiffnesses that may be infinite: the median of what 1/k >= 0 may be."""
+    """Return the fit with a best estimate of each stiffness that may be infinite: by the median of 1/k >= 0."""
     estimate, intervals = fit.estimate.copy(), None
     for group in result.groups:
         if not group.joint.in_compliance:

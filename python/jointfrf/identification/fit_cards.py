@@ -27,6 +27,7 @@ def cards(
     *,
     about: Sequence[str] = (),
     all_damping: bool = False,
+    bounds: bool = False,
     freq_hz: float | None = None,
     **options: Unpack[CardOptions],
 ) -> str:
@@ -42,6 +43,8 @@ def cards(
     all_damping : bool
         Of springs and dampers also damping that is negative or not significantly above zero (95 %), which is left out
         otherwise, with the cross terms of its DOF.
+    bounds : bool
+        Also stiffnesses of which only a bound is known, by their best estimate; an error otherwise.
     freq_hz : float, optional
         Where laws are taken that depend on frequency, as in `LawJoint.export`.
 
@@ -53,12 +56,14 @@ def cards(
     Raises
     ------
     ValueError
-        As `Joint.export` and `LawJoint.export`; or a stiffness is infinite.
+        As `Joint.export` and `LawJoint.export`; a stiffness is infinite, or only a bound of it is known.
     """
     check_type("fit", fit, Fit)
     intervals = fit.confidence_interval(0.95)
     dropped = _worthless(fit, intervals) if fit.laws is None and not all_damping else set()
     _check_finite(fit)
+    if not bounds:
+        _check_known(fit, intervals)
     comments = [
         *about,
         f"method {fit.method}, {fit.freq_hz.min():g} to {fit.freq_hz.max():g} Hz, {fit.freq_hz.size} lines; value, "
@@ -99,12 +104,26 @@ def _check_finite(fit: Fit) -> None:
             )
 
 
+def _check_known(fit: Fit, intervals: dict[str, tuple[float, float]]) -> None:
+    """Raise an error where only a bound of a stiffness is known."""
+    names = [
+        one.name
+        for one in fit.parameters
+        if one.origin == "joint" and one.kind == "k" and not one.is_cross and not np.isfinite(intervals[one.name][1])
+    ]
+    if names:
+        raise ValueError(
+            f"only a lower bound is known of {', '.join(names)}: a rigid connection fits the data as well; connect "
+            "these DOFs rigidly, or ask for cards with their best estimates (bounds)"
+        )
+
+
 def _worth(fit: Fit, term: FittedParameter, interval: tuple[float, float], is_dropped: bool) -> str:
     """Say in one line what a parameter is worth."""
     low, high = interval
     text = f"{term.name} = {fit.value[term.name]:.5g}, {low:.4g} .. {high:.4g} {term.unit}"
     if term.kind == "k" and not term.is_cross and not np.isfinite(high):
-        text += ": only the lower end is known, a rigid connection fits the data as well"
+        text += ": best estimate, only the lower end is known, a rigid connection fits the data as well"
     elif is_dropped and term.is_cross:
         text += ": left out with the damping of its DOFs"
     elif is_dropped:

@@ -1,4 +1,4 @@
-"""The stiffness of a joint alone, and as seen between virtual points of sides that bend; from a fit to a fit."""
+"""From a fit as seen between virtual points of sides that bend to that of the joint alone."""
 
 from __future__ import annotations
 

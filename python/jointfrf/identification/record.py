@@ -72,8 +72,8 @@ def fit_to_dict(fit: Fit, *, probabilities: Sequence[float] | None = None, lines
     -------
     dict
         ``"format"``, ``"format_version"``, and under ``"parameters"`` value, unit, standard error and 95 % interval of
-        each, under ``"derived"`` loss factors, under ``"seen"`` what virtual points see; in an interval there, None is an open end. Elsewhere None is NaN,
-        ``"inf"`` infinity.
+        each, under ``"derived"`` loss factors, under ``"seen"`` what virtual points see; in an interval there, None is
+        an open end. Elsewhere None is NaN, ``"inf"`` infinity.
 
     Raises
     ------

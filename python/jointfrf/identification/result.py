@@ -393,8 +393,8 @@ class Fit:
             rows.append((one.name, shown, error, limits, *([prior] if has_prior else []), one.unit))
         for name, eta in self.loss_factors.items():
             limits = f"{eta.low:.4g} .. {eta.high:.4g}"
-            shown = _with_error(eta.value, eta.std_error, eta.low, eta.high)
-            rows.append((name, *shown, limits, *([""] if has_prior else []), "1"))
+            shown, error = _with_error(eta.value, eta.std_error, eta.low, eta.high)
+            rows.append((name, shown, error, limits, *([""] if has_prior else []), "1"))
         channels = f", {len(self.responses)} responses x {len(self.forces)} forces" if self.responses else ""
         span = f"{self.freq_hz.min():g} to {self.freq_hz.max():g} Hz, {self.freq_hz.size} lines"
         head = [f"method {self.method}, {span}{channels}"]
@@ -409,7 +409,8 @@ class Fit:
 
     def _seen_rows(self) -> list[tuple[str, ...]]:
         """Return what the virtual points see, and what makes the intervals of the joint alone wide."""
-        rows = [("between virtual points", "as seen", "95 % interval", "unit", "width by sides", "inertia", "noise")]
+        heading = ("between virtual points", "as seen", "95 % interval", "unit", "width by sides", "inertia", "noise")
+        rows: list[tuple[str, ...]] = [heading]
         for name, one in self.seen.items():
             shares = (f"{100 * share:.0f} %" for share in (one.sides, one.inertia, one.noise))
             limits = f"{one.low:.4g} .. {one.high:.4g}"

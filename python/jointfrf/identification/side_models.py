@@ -1,7 +1,7 @@
 """Sides of a joint that bend, by their models: FRFs of channels corrected as if they were measured at the joint.
 
-The derivation is in docs/sides.md. With receptances of a free side between its virtual point c and the joint's reference
-point q, those between the virtual points, gamma, become those at the joint, gamma', whatever the joint is:
+The derivation is in docs/sides.md. With receptances of a free side between its virtual point c and the reference point
+q of the joint, those between the virtual points, gamma, become those at the joint, gamma', whatever the joint is:
 
     gamma'_jj = A_qq + L_A (gamma_jj - A_cc) R_A,   gamma'_jk = L_A gamma_jk R_B,   L = H_qq H_cq^-1,  R = H_qc^-1 H_qq.
 """
@@ -25,9 +25,9 @@ __all__ = ["CorrectedFrfs", "SideModel", "corrected_frfs"]
 
 #: Standard deviations of what is not known of a model where nothing is said: Young's modulus as between batches of a
 #: metal, density with what a mesh makes of the volume.
-YOUNGS_MODULUS, DENSITY = 0.03, 0.01
+YOUNGS_MODULUS, DENSITY = 0.03, 0.02
 #: Modes up to this many times the highest line are wrong one by one; the others are, together, as by Young's modulus.
-_NEAR_MODES = 2.5
+_NEAR_MODES = 4.0
 #: Elastic modes are those above this share of the highest one that the reduced model has.
 _ELASTIC = 1e-9
 #: An error of the models that nowhere moves an FRF by this share of its noise is left out.
@@ -46,7 +46,7 @@ class SideModel:
     part : Substructure
         Its `joint` are the DOFs of the reference point, in the order of the joint DOFs; its `unknowns` say how far it
         is known: each needs a standard deviation. Of a `Model` Young's modulus counts as known to 3 % and the density
-        to 1 % unless they are among these; FRFs are taken as exact.
+        to 2 % unless they are among these; FRFs are taken as exact.
     responses : sequence of str, or of mappings of str to float
         The responses of the side in the order of the FRFs, as DOFs of the part: ``"12:x"``; or their weighted sum, as
         ``{"12:x": -1.0}`` of a sensor that points the other way, ``{"12:x": 0.8, "12:y": 0.6}`` of an oblique one.
@@ -108,6 +108,10 @@ class SideModel:
         return tuple(channels)
 
 
+def _weighted(channels: Sequence[ModelChannel]) -> list[Mapping[str, float]]:
+    return [_weights(channel) for channel in channels]
+
+
 def _weights(channel: ModelChannel) -> Mapping[str, float]:
     if isinstance(channel, str):
         return {channel: 1.0}
@@ -117,7 +121,7 @@ def _weights(channel: ModelChannel) -> Mapping[str, float]:
 
 
 class _Receptances(NamedTuple):
-    """Receptances of a free side between its virtual point c, or that of its forces, and the joint q, (n_freq, n, n)."""
+    """Receptances of a free side between its virtual points c and the joint q, shape (n_freq, n, n) each."""
 
     cc: ComplexArray
     cq: ComplexArray
@@ -167,7 +171,7 @@ class _ReducedSide:
             priors = {"youngs_modulus": Unknown(1.0, YOUNGS_MODULUS), "density": Unknown(1.0, DENSITY)}
             part = replace(part, unknowns=priors | dict(part.unknowns))
         assert model.forces is not None
-        rows = [{dof: 1.0} for dof in part.joint], *(list(map(_weights, c)) for c in (model.responses, model.forces))
+        rows = [_weighted(own) for own in (part.joint, model.responses, model.forces)]
         names = list(dict.fromkeys(dof for own in rows for row in own for dof in row))
         weights = [np.array([[row.get(dof, 0.0) for dof in names] for row in own]) for own in rows]
         #: From the DOFs used to q, c of the responses and c of the forces.
@@ -217,6 +221,11 @@ def _of_sides(transform: FloatArray, what: str, sides: tuple[SideModel, SideMode
             raise ValueError(f"side {'jk'[side]} has {count} {what} in its model, and {own.size} in the FRFs")
         found.append(own)
     return found
+
+
+def _is_finite(gamma: ComplexArray) -> NDArray[np.bool_]:
+    """Return which lines are finite, shape (n_freq,)."""
+    return np.asarray(np.isfinite(gamma).all(axis=(1, 2)))
 
 
 def _both(a: ComplexArray, b: ComplexArray) -> ComplexArray:
@@ -305,7 +314,7 @@ def corrected_frfs(
     at_joint, smooth_at_joint = _at_joint(gamma, a, b), _at_joint(smooth_gamma, a, b)
     left, right = _both(a.left, b.left), _both(a.right, b.right)
     noise = np.sqrt(_spread_at_joint(t_u**2 @ np.where(np.isfinite(variance), variance, 0) @ (t_f**2).T, left, right))
-    bad = ~np.isfinite(at_joint).all(axis=(1, 2)) | ~np.isfinite(smooth_at_joint).all(axis=(1, 2))
+    bad = ~(_is_finite(at_joint) & _is_finite(smooth_at_joint))
     if bad.all():
         raise ValueError("the models give no FRFs between channels and joint on any line: look at their DOFs")
     at_joint[bad], smooth_at_joint[bad] = gamma[bad], smooth_gamma[bad]
@@ -316,7 +325,7 @@ def corrected_frfs(
         for name, other in one.others():
             ends = (_Ends.of(other), b) if side == 0 else (a, _Ends.of(other))
             change = np.where(bad[:, None, None], 0, _at_joint(smooth_gamma, *ends) - smooth_at_joint)
-            change[~np.isfinite(change).all(axis=(1, 2))] = 0
+            change[~_is_finite(change)] = 0
             if (abs(change) > _UNSEEN * noise).any():
                 found.append(change)
                 names.append(f"{'jk'[side]}: {name}")

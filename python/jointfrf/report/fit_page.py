@@ -44,6 +44,7 @@ __all__ = [
     "fit_document",
     "parameter_table",
     "quality_sentences",
+    "seen_table",
     "with_unit",
     "write_report",
 ]
@@ -255,7 +256,12 @@ def _summary(fit: Fit) -> Section:
     return Section(
         "summary",
         "Summary",
-        [Words(finding_sentences(fit), "findings"), Words(quality_sentences(fit)), parameter_table(fit)],
+        [
+            Words(finding_sentences(fit), "findings"),
+            Words(quality_sentences(fit)),
+            parameter_table(fit),
+            *([seen_table(fit)] if fit.seen else []),
+        ],
     )
 
 
@@ -284,7 +290,9 @@ def _how_joint(fit: Fit) -> str:
     return (
         "Lines: the joint found, from all frequency lines together; the shaded band is the 95 % interval of k. Dots of "
         "K*: each line inverted by itself, which scatters, and is biased towards zero where noise hides the joint. "
-        "Dots of C: each line as the fit sees it, without that bias. Drag across a chart to zoom in, double-click for "
+        "Dots of C: each line as the fit sees it, without that bias. "
+        + ("Dots are as seen between the virtual points, lines of the joint alone. " if fit.seen else "")
+        + "Drag across a chart to zoom in, double-click for "
         "the whole band; with the keyboard + and − zoom, arrows move, 0 shows all."
     )
 
@@ -486,8 +494,10 @@ def finding_sentences(fit: Fit) -> list[str]:
 def _value_sentence(term: FittedParameter, value: float, low: float, high: float) -> str:
     if term.kind == "k":
         if not np.isfinite(high):
-            bound = f"at least {with_unit(low, term.unit)} (95 %)" if low > 0 else "the data give no bound"
-            return f"cannot be distinguished from rigid; {bound}."
+            if not low > 0:
+                return "cannot be distinguished from rigid; the data give no bound."
+            bound, best = with_unit(low, term.unit), with_unit(float(f"{value:.2g}"), term.unit)
+            return f"cannot be distinguished from rigid; at least {bound} (95 %), best estimate {best}."
         if not low > 0:
             return f"cannot be distinguished from no joint; at most {with_unit(high, term.unit)} (95 %)."
     if not (np.isfinite(low) and np.isfinite(high)):
@@ -537,11 +547,13 @@ def parameter_table(fit: Fit) -> Table:
     rows: list[tuple[Cell, ...]] = []
     for term, value in zip(fit.parameters, fit.value.values(), strict=True):
         low, high = intervals[term.name]
-        is_open = term.kind == "k" and not term.is_cross and not np.isfinite(high)
-        ends: tuple[Cell, ...] = (low, "open") if is_open else (low, high)
+        is_open = not (np.isfinite(low) and np.isfinite(high))
+        ends: tuple[Cell, ...] = tuple(limit if np.isfinite(limit) else "open" for limit in (low, high))
+        error: Cell = "" if is_open else errors[term.name]
+        shown: Cell = f"about {value:.2g}" if is_open else value
         prior = "" if term.prior is None else f"{term.prior[0]:.4g} ± {term.prior[1]:.2g}"
         believed = (prior,) if has_prior else ()
-        rows.append((shown_name(term), "open" if is_open else value, errors[term.name], *ends, *believed, term.unit))
+        rows.append((shown_name(term), shown, error, *ends, *believed, term.unit))
     for name, eta in fit.loss_factors.items():
         rows.append((name, eta.value, eta.std_error, eta.low, eta.high, *([""] if has_prior else []), "1"))
     note = "K*(ω) = k + i h + i ω c, time convention exp(+iωt)"
@@ -550,4 +562,23 @@ def parameter_table(fit: Fit) -> Table:
         note = "Laws: docs/model-fit.md; time convention exp(+iωt)"
     prior_column = ("prior",) if has_prior else ()
     columns = ("parameter", "value", "standard error", "95 % from", "95 % to", *prior_column, "unit")
+    if fit.seen:
+        note += "; of the joint alone, without what its sides give way"
     return Table("parameters", "Parameters of the joint", columns, tuple(rows), note=note + ".")
+
+
+def seen_table(fit: Fit) -> Table:
+    """Return the stiffness as seen between virtual points, and what makes the interval of the joint alone wide."""
+    rows: list[tuple[Cell, ...]] = []
+    for term in fit.parameters:
+        one = fit.seen.get(term.name)
+        if one is not None:
+            ends = (limit if np.isfinite(limit) else "open" for limit in (one.value, one.low, one.high))
+            shares = (f"{100 * share:.0f} %" for share in (one.sides, one.inertia, one.noise))
+            rows.append((shown_name(term), *ends, term.unit, *shares))
+    columns = ("parameter", "as seen", "95 % from", "95 % to", "unit", "width by sides", "by inertia", "by noise")
+    note = (
+        "Static stiffness of the joint and its sides together, and shares of sides, inertia and noise in the squared "
+        "width of the interval of the joint alone."
+    )
+    return Table("seen", "Stiffness as seen between the virtual points", columns, tuple(rows), note=note)

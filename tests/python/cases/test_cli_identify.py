@@ -245,6 +245,9 @@ def test_a_file_without_coordinates_and_a_spacing(tmp_path, beams):
     for name, truth in (("k_y", 6e5), ("k_theta_z", 5e3), ("c_y", 20), ("c_theta_z", 1.5)):
         assert found[name]["value"] == pytest.approx(truth, rel=2e-3)
     words = words[:-2]  # without --out
+    # The points bend by as much as the joint turns: only a bound is known, unless noise alone is looked at.
+    assert "only a lower bound is known of k_theta_z" in run(*words, "--export", "nastran:9001,9002", expect=2).stderr
+    words += ["--bounds"]
     cards = run(*words, "--export", "nastran:9001,9002").stdout
     assert f"CBUSH   {1:8d}{1:8d}{9001:8d}{9002:8d}" in cards
     cards = run(*words, "--export", "calculix:9001,9002,9003,9004").stdout

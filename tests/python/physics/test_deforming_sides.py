@@ -36,10 +36,30 @@ def test_intervals_hold_the_joint_between_blocks():
     stiffness = np.diagonal(joint.stiffness)
     assert all(held(fit, stiffness))
     errors = np.array([fit.std_error[f"k_{d}"] for d in DOFS]) / stiffness
-    assert (abs(fit.stiffness / stiffness - 1) < 0.12).all()
+    assert (abs(fit.stiffness / stiffness - 1) < 0.05).all()
     assert (errors < 0.1).all()
     assert fit.noise_level == pytest.approx(0.01, rel=0.1)
-    assert any("compliance between the channels" in note for note in fit.notes)
+    assert any("those of the joint alone" in note for note in fit.notes)
+    # Softer as seen, by some percent, and most of the width is that of the sides.
+    for name, k in zip((f"k_{d}" for d in DOFS), stiffness, strict=True):
+        seen = fit.seen[name]
+        assert 0.9 * k < seen.value < fit.value[name]
+        assert seen.sides + seen.inertia + seen.noise == pytest.approx(1)
+    assert np.median([one.sides for one in fit.seen.values()]) > 0.5
+    assert any("what would narrow the intervals of" in note and "--side-j" in note for note in fit.notes)
+    assert "between virtual points  as seen" in str(fit)
+    same = jf.fit_from_dict(jf.fit_to_dict(fit))
+    assert same.seen == fit.seen
+    assert str(same) == str(fit)
+
+
+@pytest.mark.parametrize(("low", "high", "distance"), [(10, 600, 0.02), (100, 1500, 0.02), (10, 1000, 0.04)])
+def test_bands_and_distances_of_channels_do_not_narrow_intervals_onto_a_false_value(low, high, distance):
+    freq = tuple(np.arange(float(low), high + 1, 5))
+    h, sides, joint = measured(freq, distance)
+    fit = identified(freq, jf.pollute(h, 0.01, seed=5), transform=jf.virtual_interface(*sides))
+    assert all(held(fit, np.diagonal(joint.stiffness)))
+    assert (abs(fit.stiffness / np.diagonal(joint.stiffness) - 1) < 0.06).all()
 
 
 def test_geometry_and_its_matrix_give_the_same_fit():
@@ -115,10 +135,13 @@ def test_intervals_of_a_bolted_lap_joint():
     names = [[f"{side}{node:02d}:+{axis}" for node, axis in axes.items()] for side in (1, 2)]
     sides = [jf.virtual_point(*jf.channel_geometry(own, frfs.coordinates), [0, 0, 0.2875]) for own in names]
     h = frfs.matrix(names[0] + names[1], names[0] + names[1])
-    fit = identified(frfs.freq_hz, h, bands=(20, 550), transform=jf.virtual_interface(*sides), cross="fit")
-    assert all(held(fit, [1.55e8, 1.35e8, 1.44e8, 6.96e3, 1.94e4, 6.98e3]))
+    fit = identified(frfs.freq_hz, h, bands=(20, 550), transform=jf.virtual_interface(*sides))
+    known = [1.55e8, 1.35e8, 1.44e8, 6.96e3, 1.94e4, 6.98e3]
+    assert all(held(fit, known))
+    # All may be rigid, and still have a best estimate.
+    assert (abs(np.log(fit.stiffness / known)) < np.log(3.5)).all()
+    assert np.median(abs(np.log(fit.stiffness / known))) < np.log(1.7)
     assert fit.noise_level == pytest.approx(0.01, rel=0.05)
     # Entries that are zero by symmetry part the DOFs, and do not set the noise.
     assert any("(x, theta_y, theta_z) and (y, z, theta_x) are zero" in note for note in fit.notes)
-    assert any("not one constant over frequency" in warning for warning in fit.warnings)
-    assert any("between the channels the sides deform" in warning for warning in fit.warnings)
+    assert any("best estimate" in warning for warning in fit.warnings)

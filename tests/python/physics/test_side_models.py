@@ -127,9 +127,8 @@ def test_noise_and_errors_of_models_go_the_way_that_is_said():
     )
     names = list(base.error_names)
     stiffer = side_models()
-    softer = replace(
-        stiffer[0], part=jf.Substructure(replace(stiffer[0].part.source, stiffness=1.03 * stiffer[0].part.source.stiffness), at(0))
-    )  # fmt: skip
+    source = stiffer[0].part.source
+    softer = replace(stiffer[0], part=jf.Substructure(replace(source, stiffness=1.03 * source.stiffness), at(0)))
     other = corrected(h, (softer, stiffer[1]))
     difference = other.smooth_gamma - base.smooth_gamma
     own = base.errors[:, names.index("j: youngs_modulus")]
@@ -213,12 +212,6 @@ def test_weighted_channels_are_sums_of_dofs():
     one, other = interfaces()
     signs = np.diag([-1.0, 1, 1, 1, 1, 1])
     pair = (one.transform @ signs, other.transform), (signs @ one.modes, other.modes)
-    found = corrected_frfs(
-        FREQ,
-        flipped,
-        flipped,
-        np.ones(h.shape),
-        *pair,
-        (replace(sides[0], responses=turned, forces=sides[0].forces), sides[1]),
-    )
+    models = replace(sides[0], responses=turned, forces=sides[0].forces), sides[1]
+    found = corrected_frfs(FREQ, flipped, flipped, 1e-30 * np.ones(h.shape), *pair, models)
     np.testing.assert_allclose(found.smooth_gamma, corrected(h, sides).smooth_gamma, rtol=1e-9)

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import special
 
 from jointfrf.frf.quantiles import medians
 from jointfrf.identification.manifold.transforms import ChannelModes
@@ -23,18 +24,23 @@ __all__ = ["JointAlone", "SideBending", "joint_alone", "side_bending"]
 _LEAST_VARIANCE = 1e-3
 #: One-sided 95 % of a normal distribution: bending that noise does not exclude.
 _NOT_EXCLUDED = 1.65
+#: Spare channels that sides of the simulated pairs have at least; with fewer the squares of bending are those of few
+#: degrees of freedom.
+_LEAST_SPARE = 3
 #: Standard deviations of a two-sided interval of 95 %.
 _TWO_SIDED = 1.96
 #: Rounds of the robust regression, and the residual in standard deviations from which on a line weighs less.
 _ROUNDS, _HUBER = 12, 1.5
 #: Median of the square of a standard normal number.
 _MEDIAN_SQUARE = 0.455
-#: The error of the intercept over the change that the term of w^4 makes, with four times the variance of noise beside it:
-#: its 95 % quantile over simulated pairs of bodies (docs/sides.md).
-_INERTIA = 2.1
+#: The error of the intercept over the change that the term of w^4 makes, with four times the variance of noise beside
+#: it: its 95 % quantile over simulated pairs of bodies (docs/sides.md).
+_INERTIA = 2.0
 #: D0 over what is seen of bending, of translations and of rotations: median, and 97.5 % quantile, over the same pairs;
 #: below zero it may be where impacts are not at the sensors, 2.5 % quantile.
-_MIDDLE, _LARGE, _NEGATIVE = (1.7, 4.8), (9.0, 20.0), (0.4, 0.0)
+_MIDDLE, _LARGE, _NEGATIVE = (1.1, 3.6), (6.0, 16.0), (0.2, 0.0)
+#: Part of the compliance among the channels in what is seen of bending: it makes these quantiles lie closest.
+_AMONG = 0.5
 _TINY = float(np.finfo(float).tiny)
 
 
@@ -72,30 +78,45 @@ def side_bending(
     load on the channels, with the virtual point at rest, whatever the joint is; at the joint itself the same field is
     D_A P. Its mean over the lines, by the noise of each entry and without rigid motion, gives for a DOF with weights
     t_d of m channels |t_d| sqrt(m/3) (sum V_id^2 / (m - n))^(1/2); the geometric mean of that from responses and from
-    forces, summed over both sides.
+    forces, summed over both sides. Channels on a ring around the joint may not see it bend: half of the compliance
+    among the channels, |t_d,r| |t_d,f| delta, delta the mean singular value of (1 - R T) h (1 - R T)^T, is added in
+    squares, which makes the quantiles of D0 over both together half as wide as over V alone.
     """
-    gamma = responses.transform @ smooth @ forces.transform.T
-    own = [_of_side(measured, smooth, variance, gamma, responses, forces, side) for side in (0, 1)]
-    turned = [one.swapaxes(1, 2) for one in (measured, smooth, variance, gamma)]
-    other = [_of_side(*turned, forces, responses, side) for side in (0, 1)]
-    n, low, high = len(gamma[0]) // 2, 0.0, 0.0
-    for one, two in zip(own, other, strict=True):
-        if one is None or two is None:
+    channels = _Channels(measured, variance, responses.transform @ smooth @ forces.transform.T, responses, forces)
+    found = []
+    for side in (0, 1):
+        one, two = (_of_side(own, side) for own in (channels, channels.turned))
+        among = _among_channels(channels, side)
+        if one is None or two is None or among is None:
             return None
-        low, high = low + np.sqrt(one.low * two.low), high + np.sqrt(one.high * two.high)
-    return SideBending(low + np.zeros(n), high + np.zeros(n))
+        found.append(
+            (np.sqrt(one.low * two.low), np.sqrt(one.high * two.high), _AMONG * among.low, _AMONG * among.high)
+        )
+    low, high, own, more = np.sum(found, axis=0)
+    return SideBending(np.hypot(low, own), np.hypot(high, more))
 
 
-def _of_side(
-    measured: ComplexArray,
-    smooth: ComplexArray,
-    variance: FloatArray,
-    gamma: ComplexArray,
-    responses: ChannelModes,
-    forces: ChannelModes,
-    side: int,
-) -> SideBending | None:
+class _Channels(NamedTuple):
+    """FRFs of channels, E|e|^2 of their noise, smooth FRFs between the joint DOFs, and what the channels are."""
+
+    measured: ComplexArray
+    variance: FloatArray
+    gamma: ComplexArray
+    responses: ChannelModes
+    forces: ChannelModes
+
+    @property
+    def turned(self) -> _Channels:
+        """Forces for responses."""
+        return _Channels(
+            self.measured.swapaxes(1, 2), self.variance.swapaxes(1, 2), self.gamma.swapaxes(1, 2),
+            self.forces, self.responses,
+        )  # fmt: skip
+
+
+def _of_side(channels: _Channels, side: int) -> SideBending | None:
     """Return what the responses of one side show."""
+    measured, variance, gamma, responses, forces = channels
     n = gamma.shape[1] // 2
     here, there = slice(side * n, (side + 1) * n), slice((1 - side) * n, (2 - side) * n)
     rows, columns, across = responses.of_side(side), forces.of_side(side), forces.of_side(1 - side)
@@ -121,9 +142,31 @@ def _of_side(
     square, by_noise = (bent**2).sum(axis=0), noise.sum(axis=0)
     error = np.sqrt(2 * (noise**2).sum(axis=0) + 4 * (noise * bent**2).sum(axis=0))
     lever = np.linalg.norm(transform, axis=1) * np.sqrt(rows.size / 3 / spare)
-    return SideBending(
-        *(lever * np.sqrt(np.maximum(square - by_noise + more, 0)) for more in (0.0, _NOT_EXCLUDED * error))
-    )
+    low, high = (np.sqrt(np.maximum(square - by_noise + more, 0)) for more in (0.0, _NOT_EXCLUDED * error))
+    return SideBending(lever * low, _of_few(spare) * lever * high)
+
+
+def _of_few(spare: int) -> float:
+    """Return by how much more a few spare channels may have missed, by Student's t."""
+    few, least = (float(special.stdtrit(min(count, _LEAST_SPARE), 0.975)) for count in (spare, _LEAST_SPARE))
+    return few / least
+
+
+def _among_channels(channels: _Channels, side: int) -> SideBending | None:
+    """Return the compliance that the channels of a side have among them, for forces and motion of each joint DOF."""
+    measured, variance, _, responses, forces = channels
+    n = len(responses.transform) // 2
+    rows, columns, here = responses.of_side(side), forces.of_side(side), slice(side * n, (side + 1) * n)
+    count = min(rows.size, columns.size) - n
+    if count < 1:
+        return None
+    left = (responses.residual[rows] @ measured @ forces.residual[columns].T).real
+    spread = variance[:, rows[:, None], columns]
+    weight = 1 / np.maximum(np.where(np.isfinite(spread), spread, 0).mean(axis=(1, 2)), _TINY)
+    mean = np.tensordot(weight, left, 1) / weight.sum()
+    gains = [np.linalg.norm(own.transform[here], axis=1) for own in (responses, forces)]
+    found = gains[0] * gains[1] * np.linalg.svd(mean, compute_uv=False).sum() / count
+    return SideBending(found, _of_few(count) * found)
 
 
 class _StaticCompliance(NamedTuple):

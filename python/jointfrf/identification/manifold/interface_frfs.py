@@ -172,7 +172,8 @@ class InterfaceFrfs(NamedTuple):
         """Return which entries those between some joint DOFs are."""
         at = np.concatenate([dofs, dofs + self.n])
         own = FrfEntries.of(len(dofs), reciprocal=self.reciprocal)
-        return FrfEntries.of(self.n, reciprocal=self.reciprocal).places[at[own.rows], at[own.columns]]
+        places: NDArray[np.intp] = FrfEntries.of(self.n, reciprocal=self.reciprocal).places
+        return np.asarray(places[at[own.rows], at[own.columns]])
 
     def entries_of(self, dofs: NDArray[np.intp], gamma: ComplexArray) -> ComplexArray:
         """Return the entries between some joint DOFs, as `of_dofs` does, of FRFs between all, shape (n_freq, q)."""
@@ -224,7 +225,7 @@ class InterfaceFrfs(NamedTuple):
     def _corrected_weights(
         self, entries: FrfEntries, at: NDArray[np.intp], errors: ComplexArray | None
     ) -> tuple[FloatArray, FloatArray]:
-        """Return the same of FRFs that models have corrected: noise of all channels of a side is in every entry of it."""
+        """Return the same of FRFs that models have corrected: every entry has noise of all channels of a side."""
         assert self.noise_paths is not None
         known = np.isfinite(self.variance)
         std = np.sqrt(np.where(known, self.variance, 0))
