@@ -174,8 +174,11 @@ def test_sentences_say_what_the_intervals_say(fits):
     assert len(crossed) == 5
     assert crossed[-1].endswith("(values in the table): 1 of 2: k_y,theta_z.")
     low, _ = fits["open"].confidence_interval(0.95)["k_y"]
+    best = fits["open"].value["k_y"]
+    assert low < best < np.inf
     assert finding_sentences(fits["open"])[0] == (
-        f"Stiffness along y (k_y): cannot be distinguished from rigid; at least {low / 1e6:.4g} MN/m (95 %)."
+        f"Stiffness along y (k_y): cannot be distinguished from rigid; at least {low / 1e6:.4g} MN/m (95 %), best "
+        f"estimate {best / 1e6:.3g} MN/m."
     )
     assert "explains the FRFs of the lines used to within their noise" in quality_sentences(fit)[0]
     assert "does not explain all" in quality_sentences(replace(fit, residual_level=0.03))[0]
