@@ -61,7 +61,7 @@ def test_the_nearest_node_of_a_coarse_part_is_said(tmp_path):
         ({"elements": "3", "joint": '["4:y", "4:theta"]'}, "no node is at channel 101:+y, x, y, z = -20, 0, 0 mm"),
         ({"joint": '["31:y"]'}, "must name the 2 DOFs of the joint, not 1"),
         ({"joint": '["31:y", "99:theta"]'}, "99:theta"),
-        ({"unknown": "{ thickness = 0.1 }"}, "thickness"),
+        ({"unknown": "{ weight = 0.1 }"}, "weight"),
     ],
 )
 def test_a_part_that_does_not_fit_is_one_sentence(tmp_path, changes, message):

@@ -178,7 +178,7 @@ def test_sentences_say_what_the_intervals_say(fits):
     assert low < best < np.inf
     assert finding_sentences(fits["open"])[0] == (
         f"Stiffness along y (k_y): cannot be distinguished from rigid; at least {low / 1e6:.4g} MN/m (95 %), best "
-        f"estimate {best / 1e6:.3g} MN/m."
+        f"estimate {float(f'{best / 1e6:.2g}'):g} MN/m."
     )
     assert "explains the FRFs of the lines used to within their noise" in quality_sentences(fit)[0]
     assert "does not explain all" in quality_sentences(replace(fit, residual_level=0.03))[0]
