@@ -12,6 +12,7 @@ from typing import Any
 
 from jointfrf.cli.configuration import with_configuration
 from jointfrf.cli.parser import COMMANDS, command_parser, top_parser
+from jointfrf.cli.surroundings import interrupts, read_or_not
 from jointfrf.cli.usage import UsageError, complain
 from jointfrf.extras import MissingPackageError
 from jointfrf.spelling import did_you_mean
@@ -36,21 +37,25 @@ def main(arguments: Sequence[str] | None = None) -> int:
         0 good, 1 something in the data or the files is wrong, 2 wrong usage, 130 interrupted.
     """
     words = list(sys.argv[1:] if arguments is None else arguments)
+    with read_or_not():
+        return _answer(words)
+
+
+def _answer(words: list[str]) -> int:
+    """Run a command; what goes wrong is one sentence."""
     try:
         if not words:
             top_parser()[0].print_help(sys.stderr)
             return _USAGE_ERROR
         if words[0].startswith("-"):
             top_parser()[0].parse_words(words)  # prints help, version or what is wrong, and ends
-        status = _run(words)
+        with interrupts():
+            status = _run(words)
         sys.stdout.flush()
         return status
     except UsageError as error:
         complain("error", error)
         return _USAGE_ERROR
-    except BrokenPipeError:
-        # The reader went away (`jointfrf cases | head`): nothing more can be said.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except OSError as error:
         complain("error", f"{f'{error.filename}: ' if error.filename else ''}{error.strerror or error}")
     except (ValueError, TypeError, ArithmeticError, MemoryError, RuntimeError, MissingPackageError) as error:

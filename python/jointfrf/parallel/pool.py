@@ -100,12 +100,24 @@ class _SafeProcess(context.SpawnProcess):
 
     def __init__(self, more: Mapping[str, str], **options: Any) -> None:
         super().__init__(**options)
-        self.more = more
+        self._more = more
 
-    @staticmethod
-    def _Popen(process_obj: Any) -> Any:  # noqa: N802
-        with safe_environment(process_obj.more):
-            return context.SpawnProcess._Popen(process_obj)
+    def start(self) -> None:
+        with safe_environment(self._more), _uninterrupted():
+            super().start()
+
+
+@contextmanager
+def _uninterrupted() -> Iterator[None]:
+    """Start a process that no Ctrl-C reaches, not even while it still imports; the one here comes after the start."""
+    if not hasattr(signal, "pthread_sigmask"):  # Windows
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def started_processes(workers: int, more: Mapping[str, str] | None = None) -> ProcessPoolExecutor:
@@ -124,10 +136,32 @@ def started_processes(workers: int, more: Mapping[str, str] | None = None) -> Pr
         No other Python can be started from this program.
     """
     check_processes()
-    own = context.SpawnContext()
-    setattr(own, "Process", partial(_SafeProcess, dict(more or {})))  # noqa: B010
+    own, started = context.SpawnContext(), list[_SafeProcess]()
+
+    def prepared(**options: Any) -> _SafeProcess:
+        started.append(_SafeProcess(dict(more or {}), **options))
+        return started[-1]
+
+    setattr(own, "Process", prepared)  # noqa: B010
     with safe_environment(more):  # locks are kept by a process of their own
-        return ProcessPoolExecutor(workers, own, initializer=_begin_process)
+        return _StartedProcesses(workers, own, initializer=_begin_process, started=started)
+
+
+class _StartedProcesses(ProcessPoolExecutor):
+    """Processes of which none is left: one that an interrupt kept from joining the others would wait for ever."""
+
+    def __init__(self, *arguments: Any, started: list[Any], **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        self._started = started
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        try:
+            super().shutdown(wait, cancel_futures=cancel_futures)
+        finally:
+            for process in self._started if wait else ():
+                if process.is_alive():
+                    process.terminate()
+                    process.join()
 
 
 def _begin_process() -> None:

@@ -1,8 +1,10 @@
 """Words of the command line: what was meant, the project's own file, JSON and quiet, completion, exit codes."""
 
+import contextlib
 import json
 import os
 import re
+import shlex
 import signal
 import subprocess
 import sys
@@ -150,6 +152,62 @@ def test_an_interrupted_command_ends_with_one_sentence(tmp_path):
         _, complained = process.communicate(timeout=900)
     assert process.returncode == 130
     assert complained == "jointfrf: error: interrupted\n"
+
+
+def _workers(children: Path) -> list[str]:
+    """Processes of a pool out of a list of children of Linux."""
+    found = []
+    for number in children.read_text().split():
+        with contextlib.suppress(OSError):  # one that has ended meanwhile
+            found += [number] if b"spawn_main" in Path(f"/proc/{number}/cmdline").read_bytes() else []
+    return found
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="children are listed by Linux")
+@pytest.mark.parametrize("delay", [0, 0.1, 0.2, 0.4, 0.8])
+def test_an_interrupt_while_processes_start_ends_all_of_them(delay):
+    words = ["study", "3.1", "--estimator", "ismm", "--realisations", "1000000", "--jobs", "2", "--out", "study"]
+    with subprocess.Popen([sys.executable, "-m", "jointfrf", *words], stdout=-1, stderr=-1, text=True,
+                          start_new_session=True, preexec_fn=partial(signal.signal, signal.SIGINT, signal.SIG_DFL),
+                          ) as process:  # fmt: skip
+        children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
+        while process.poll() is None and not _workers(children):
+            time.sleep(0.01)
+        time.sleep(delay)
+        os.killpg(process.pid, signal.SIGINT)
+        _, complained = process.communicate(timeout=300)
+    # Python ends itself by the signal where it came inside exec(), as in dataclasses: to a shell that is 130, too
+    assert process.returncode in (130, -signal.SIGINT), complained
+    assert complained == "jointfrf: error: interrupted\n"
+
+
+def test_an_interrupt_that_an_import_calls_something_else(monkeypatch, capsys):
+    def cut_short(args):
+        try:
+            signal.raise_signal(signal.SIGINT)
+        except KeyboardInterrupt as error:
+            raise ImportError("numpy was cut short") from error
+
+    monkeypatch.setattr("jointfrf.cli.cases.run", cut_short)
+    monkeypatch.setattr(signal, "getsignal", lambda number: signal.default_int_handler)
+    assert main(["cases"]) == 130
+    assert capsys.readouterr().err == "jointfrf: error: interrupted\n"
+
+
+@pytest.mark.skipif(os.name == "nt", reason="a shell of POSIX")
+@pytest.mark.parametrize("end", [">&-", "| true", "2>&- >&-", "2>&1 | true"])
+def test_files_are_written_though_nobody_reads(end):
+    words = shlex.join([sys.executable, "-m", "jointfrf", "identify", str(BARS), *JOINT, "--save", "kept.json"])
+    line = f"set -o pipefail; {words} {end}"
+    result = subprocess.run(["bash", "-c", line], capture_output=True, text=True, timeout=300)
+    assert result.returncode == 0, result.stderr
+    assert "Traceback" not in result.stderr
+    assert json.loads(Path("kept.json").read_text())["format"] == "jointfrf joint"
+
+
+def test_an_error_has_its_status_though_nobody_reads():
+    line = f"set -o pipefail; {shlex.quote(sys.executable)} -m jointfrf identify no.uff 2>&1 | true"
+    assert subprocess.run(["bash", "-c", line], timeout=300).returncode == 1
 
 
 PROJECT = """

@@ -62,7 +62,6 @@ KNOWN = {
     ("cli/run.py", "ThreadPoolExecutor"): "threads, one for each case under way",
     ("parallel/pool.py", "concurrent.futures"): "what executors are and raise; processes of this machine",
     ("parallel/pool.py", "multiprocessing"): "processes of this machine, started in a safe environment",
-    ("parallel/pool.py", "ProcessPoolExecutor"): "the only start of processes, of this Python only",
     ("parallel/pool.py", "SpawnContext"): "the only start of processes, of this Python only",
     ("report/document.py", "urllib"): "quotes characters of a drawing",
 }
