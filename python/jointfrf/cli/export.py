@@ -72,13 +72,25 @@ def run(args: argparse.Namespace) -> int:
         if isinstance(found.joint, LawJoint):
             text = found.joint.export(request.program, request.nodes, freq_hz=args.frequency, **options)
         else:
-            text = found.joint.export(request.program, request.nodes, **options)
+            joint, left_out = (found.joint, ()) if request.all_damping else _without_negative(found.joint)
+            options["comments"] = [*found.about, *left_out]
+            text = joint.export(request.program, request.nodes, **options)
         if request.output is not None:
             write_file(request.output, text)
     written = [] if args.output is None else [str(args.output)]
     out.say(f"wrote {args.output}" if written else text.rstrip("\n"))
     out.give({"source": str(args.joint), "program": request.program, "cards": text, "written": written})
     return 0
+
+
+def _without_negative(joint: Joint) -> tuple[Joint, list[str]]:
+    """Return a joint without the dashpots that are negative, with their cross terms, and a sentence for each."""
+    left_out, kept = [], (joint.damping.copy(), joint.structural_damping.copy())
+    for letter, matrix in zip("ch", kept, strict=True):
+        for i in np.flatnonzero(matrix.diagonal() < 0):
+            left_out.append(f"{letter}_{joint.dofs[i]} = {matrix[i, i]:.5g}: negative, left out with its cross terms")
+            matrix[i], matrix[:, i] = 0, 0
+    return Joint(joint.stiffness, kept[0], joint.dofs, joint.loss_factor, kept[1]), left_out
 
 
 def _springs(joint: Joint | LawJoint, freq_hz: float | None) -> Joint | None:

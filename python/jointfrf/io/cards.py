@@ -96,8 +96,9 @@ class _Link(NamedTuple):
             own = slice(6 * side, 6 * side + 6)
             turn[own, own] = rigid_offset(DIRECTIONS, self.arms[side])
         moved = turn.T @ whole @ turn
-        # What cancels but for rounding is nothing.
-        moved[abs(moved) < _ROUND_OFF * np.sqrt(np.outer(moved.diagonal(), moved.diagonal()))] = 0
+        # What cancels but for rounding is nothing; diagonals of damping may be negative.
+        size = np.sqrt(abs(moved.diagonal()))
+        moved[abs(moved) < _ROUND_OFF * np.outer(size, size)] = 0
         return (moved + moved.T) / 2
 
     def calculix_dof(self, place: int) -> tuple[int, int]:

@@ -156,6 +156,28 @@ def test_a_joint_by_hand_is_exported():
     assert result.returncode == 2
 
 
+@pytest.mark.parametrize("program", ["nastran", "abaqus", "ansys"])
+def test_negative_dashpots_of_a_joint_by_hand_are_left_out(program, tmp_path):
+    """By the rule of fits; arms that meet a negative diagonal say nothing of a root."""
+    values = {"damping": (-3, 5), "structural_damping": (2e4, -7e3)}
+    if program == "ansys":  # which has no hysteretic damping
+        del values["structural_damping"]
+    texts = {}
+    for name, keep in (("given", 1), ("without", 0)):
+        lines = [f"{key} = {[v if v > 0 else keep * v for v in pair]}" for key, pair in values.items()]
+        (tmp_path / f"{name}.toml").write_text("\n".join(['dofs = ["x", "y"]', "stiffness = [1e6, 2e6]", *lines]))
+        words = ["export", tmp_path / f"{name}.toml", f"{program}:1,2", "--nodes-at", "0.01,0,0.1,-0.01,0,0.1"]
+        for more in ([], ["--all-damping"]):
+            result = run_command(*words, *more)
+            assert (result.returncode, result.stderr) == (0, "")
+            texts[name, bool(more)] = result.stdout.replace(f"{name}.toml", "file")
+    left_out = [line for line in texts["given", False].splitlines() if "negative, left out" in line]
+    assert [line.split()[1] for line in left_out] == ["c_x", "h_y"][: len(values)]
+    rest = [line for line in texts["given", False].splitlines() if line not in left_out]
+    assert rest == texts["without", False].splitlines()
+    assert texts["given", True] not in (texts["given", False], texts["without", True])
+
+
 WRONG = [
     (["frf", "b.toml", *LINES], 2, "--output is missing"),
     (["frf", "b.toml", "--output", "x.xls", *LINES], 2, "x.xls has no suffix of a format"),

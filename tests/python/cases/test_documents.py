@@ -145,3 +145,17 @@ def test_links_lead_to_files_and_headings(name):
         if heading:
             titles = re.findall(r"^#+ (.*)$", target.read_text(encoding="utf-8"), re.MULTILINE)
             assert heading in [re.sub(r"[^\w -]", "", title).lower().replace(" ", "-") for title in titles], link
+
+
+@pytest.mark.skipif(shutil.which("gfortran") is None, reason="gfortran is not on PATH")
+def test_calls_in_fixed_form_fit_its_lines_and_compile(tmp_path):
+    """Beyond column 72 fixed form reads nothing, and what is left of a call is none."""
+    found = blocks("fortran", DOCUMENTS["docs/embedding.md"])
+    calls = [text for text in found if text.startswith("      CALL")]
+    assert len(calls) == 2
+    for text in calls:
+        assert max(map(len, text.splitlines())) <= 72
+        (tmp_path / "call.f").write_text(f"      SUBROUTINE HOST\n{text.rstrip()}\n      END\n")
+        words = ["gfortran", "-fsyntax-only", "-Wall", "-Werror=line-truncation", "call.f"]
+        said = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, timeout=100)
+        assert said.returncode == 0, said.stderr

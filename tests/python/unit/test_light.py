@@ -13,8 +13,8 @@ from command import run_command
 from jointfrf.extras import check_extras, import_extra
 
 #: Packages of single tasks; those in ALL come with the extra `all`.
-ALL = ("h5py", "jinja2", "matplotlib", "shtab")
-EXTRAS = (*ALL, "pyarrow", "zarr", "loky", "distributed", "mpi4py")
+ALL = ("h5py", "jinja2", "matplotlib", "shtab", "pyarrow")
+EXTRAS = (*ALL, "zarr", "loky", "distributed", "mpi4py")
 HEAVY = {"numpy", "scipy", "matplotlib", "jinja2", "h5py", "shtab", "importlib.metadata", "jointfrf._kernel"}
 
 
