@@ -41,6 +41,12 @@ _SETTLED_SHARE = 0.97
 _LIKE = 1.2
 #: Differences that are so many times smaller than measured minus smooth do not contain the noise of driving points.
 _UNSEEN = 3.0
+#: Parts of the noise by entry and its variation over frequency are found in turn so often at most.
+_LEVEL_TURNS = 10
+#: Smooth FRFs that miss the measured ones by so many times the noise that differences show are refused.
+_MISSED = 2.0
+#: Of fewer lines the parts of the noise by entry are hardly known, and smooth FRFs are no nearer than measured ones.
+_COARSE = 50
 #: Least relative noise for weights: systematic errors of measured FRFs are larger.
 _ROUNDING = 1e-4
 
@@ -287,8 +293,29 @@ def _estimated(
         if settled:
             break
     model = _model(lines.h, smooth, given, inflation or 1.0, differences, robust=False)
+    level = None if differences is None else _level_of_differences(lines, model, differences)
+    if level is not None:
+        return _without_smoothing(lines, replace(smooth, h=lines.h, is_smooth=False), differences, level)
     inflation, source = _found_inflation(lines.h, differences, model)
     return replace(model, inflation=inflation, inflation_source=source)
+
+
+def _level_of_differences(lines: _NoisyLines, model: NoiseModel, differences: ReciprocityDifferences) -> float | None:
+    """Return the relative noise that differences show, where it describes the noise better than measured minus smooth.
+
+    Of few and coarse lines, which rational functions miss by as much as their noise or more: where what is left is far
+    more than differences show, and where the noise is of one relative level. Of many lines, noise that h_pq and h_qp
+    share is more likely. Differences of rounding show no noise.
+    """
+    if len(lines.h) >= _COARSE:
+        return None
+    ratio = differences.ratio(model.variance)
+    if ratio * model.level < _ROUNDING:
+        return None
+    if ratio < 1 / _MISSED:
+        return float(reciprocity_noise(lines.h[None])[0])
+    level = differences.common_level(lines.h, model.smooth.h)
+    return level if level > 0 else None
 
 
 def _begun(
@@ -386,8 +413,9 @@ def _model(
     if given is not None:
         stacked[2] = given[:, shown].T
     usual, factor, terms = np.ones(n_freq), np.ones(n_freq), None
-    # Outlying lines; with these left out, slow variation; where there is some, parts and outlying lines once more.
-    for turn in range(3):
+    # Outlying lines; with these left out, slow variation; where there is some, parts and it in turn until it stays, as
+    # parts that were found without it have taken up some of it; and outlying lines once more.
+    for turn in range(_LEVEL_TURNS + 2):
         good = factor == 1
         if terms is None or not good.all():
             terms = NoiseTerms(stacked[:, :, good])
@@ -402,10 +430,11 @@ def _model(
         if not robust or differences is None:
             levels.append(line_levels(noise / np.sqrt(described), inflation))
         factor = np.max([found.factor for found in levels], axis=0)
-        if turn == 1:
+        if turn > 0:
             if (levels[-1].usual == 1).all():
                 break
-            usual = levels[-1].usual
+            if turn <= _LEVEL_TURNS:
+                usual = usual * levels[-1].usual
     variance *= factor[:, None, None]
     by_entry = np.zeros((3, n_out, n_in))
     by_entry[: len(parts), shown] = np.sqrt(parts)
@@ -419,13 +448,13 @@ def _described(parts: FloatArray, terms: FloatArray) -> FloatArray:
 
 
 def _without_smoothing(
-    lines: _NoisyLines, smooth: SmoothFrfs, differences: ReciprocityDifferences | None
+    lines: _NoisyLines, smooth: SmoothFrfs, differences: ReciprocityDifferences | None, level: float = 0.0
 ) -> NoiseModel:
     """Relative noise alike for all entries, for few lines and for nearly exact FRFs."""
     h = lines.h
     n_freq, n_out, n_in = h.shape
-    level, source = 0.0, "none"
-    if lines.reciprocal and n_out == n_in:
+    source = "reciprocity" if level > 0 else "none"
+    if level == 0 and lines.reciprocal and n_out == n_in:
         level, source = float(reciprocity_noise(h[None])[0]), "reciprocity"
     if level == 0:
         level, source = (smooth.level, "residual") if smooth.poles else (0.0, "none")

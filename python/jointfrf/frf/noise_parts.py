@@ -25,10 +25,11 @@ __all__ = [
 
 #: Entries are binned by |h|^2 into so many bins: within one the variance is nearly the same.
 _BINS = 32
-#: Grid of the logarithm of the odds of two parts and its reach: a part below e^-16 = 1e-7 counts as none; refined
-#: twice, odds are known to 0.4 %.
-_GRID = 33
-_WIDEST = 16.0
+#: Points of the grids of the logarithm of the odds of two parts, each about the best of the last, and the reach of the
+#: first: |h|^2 of lightly damped structures spans 14 decades, e^32, and either part may count at its end of them. Odds
+#: are known to 1 % in the end.
+_GRIDS = (65, 25, 25)
+_WIDEST = 40.0
 #: A running median is taken at so many lines within its reach: neighbouring windows share most of their lines.
 _STEPS = 5
 #: Iterations of the likelihood of the parts; each lowers it, and the best of the starts is taken.
@@ -51,6 +52,8 @@ _VARIES_LEAST = 0.15
 #: An autocorrelation below so many standard deviations of that of independent lines, which these exceed with a
 #: probability of 0.6 %, ends the sum.
 _SIGNIFICANT = 2.5
+#: Both directions of a pair have noise of other size beyond so many standard deviations.
+_APART = 4.0
 #: Residuals beyond so many medians are cut to that, for correlations: 0.2 % of circular normal ones.
 _CUT = 3.0
 
@@ -122,10 +125,9 @@ class NoiseTerms:
 def _two_parts(y: FloatArray, a: FloatArray, count: FloatArray) -> FloatArray:
     """Parts of two terms of mean 1, shape (2, n_entries)."""
     centre, reach, entries = np.zeros(len(y)), _WIDEST, np.arange(len(y))
-    grid, total = np.linspace(-1, 1, _GRID)[:, None], count.sum()
-    weighted = count * y
-    for _ in range(3):
-        odds = np.exp(centre + reach * grid)
+    weighted, total = count * y, count.sum()
+    for points in _GRIDS:
+        odds = np.exp(centre + reach * np.linspace(-1, 1, points)[:, None])
         share = np.stack([1 / (1 + odds), odds / (1 + odds)])  # (2, grid, n_entries)
         v = share[0][:, :, None] * a[0]
         v += share[1][:, :, None] * a[1]
@@ -133,7 +135,7 @@ def _two_parts(y: FloatArray, a: FloatArray, count: FloatArray) -> FloatArray:
         level = (weighted / v).sum(axis=2) / total
         loss = np.log(v, out=v) @ count + total * np.log(np.maximum(level, TINY))
         best = loss.argmin(axis=0)
-        centre, reach = np.log(odds[best, entries]), 2 * reach / (_GRID - 1)
+        centre, reach = np.log(odds[best, entries]), 2 * reach / (points - 1)
     return np.asarray(share[:, best, entries] * level[best, entries])
 
 
@@ -342,6 +344,37 @@ class ReciprocityDifferences:
         """Return slow variation and outlying lines of the noise of FRFs of this variance (n_freq, m, m)."""
         noise = self.values / np.sqrt(self.pair_variance(variance))
         return line_levels(noise, inflation, is_residual=False)
+
+    def ratio(self, variance: FloatArray) -> float:
+        """Return the differences over what FRFs of this variance (n_freq, m, m) have, robustly."""
+        squares = abs(self.values) ** 2 / self.pair_variance(variance)
+        return float(np.sqrt(medians(squares.ravel()) / np.log(2)))
+
+    def common_level(self, h: ComplexArray, smooth: ComplexArray) -> float:
+        """Return the relative level of the noise where one is enough: for all pairs, no floor, both directions; else 0.
+
+        Parameters
+        ----------
+        h, smooth : ndarray, shape (n_freq, m, m)
+            Measured and smooth FRFs.
+
+        Notes
+        -----
+        By the likelihood of the differences with one level against that with parts of each pair, and by the mean of
+        ln(|h_pq - s|^2 / |h_qp - s|^2), whose variance is pi^2/3 a line.
+        """
+        squares, size = np.square(np.abs(self.values)), self.pair_variance(np.square(np.abs(h)))
+        n_pairs, n_freq = squares.shape
+        parts = noise_parts(squares, np.stack([size, np.ones_like(size)]))
+        described = np.maximum(parts[0][:, None] * size + parts[1][:, None], TINY)
+        power = float((squares / size).mean())
+        common = power * size
+        gain = 2 * float((np.log(common / described) + squares / common - squares / described).sum())
+        left = np.maximum(abs(h - smooth) ** 2, TINY)
+        apart = np.log(left[:, self.rows, self.columns] / left[:, self.columns, self.rows]).mean(axis=0)
+        chance = _APART * np.pi / np.sqrt(3 * n_freq)
+        is_common = gain < (2 * n_pairs - 1) * np.log(n_pairs * n_freq) and abs(apart).max() < chance
+        return float(np.sqrt(power)) if is_common else 0.0
 
     def inflation(self, variance: FloatArray, line_factor: FloatArray) -> float:
         """Return how many lines carry the noise of one independent line; outlying lines do not count."""

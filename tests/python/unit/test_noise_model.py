@@ -195,6 +195,39 @@ def test_noise_that_varies_over_frequency(h):
         assert noise.outlying.size < 5
 
 
+def test_noise_that_rises_100_fold(h):
+    relative = 0.1 * 100.0 ** ((FREQ - FREQ[-1]) / np.ptp(FREQ))[:, None, None]
+    ratios = []
+    for seed in range(4):
+        noise = jf.estimate_noise(FREQ, h + relative * abs(h) * circular(h.shape, seed))
+        ratios.append(np.median(np.sqrt(noise.variance) / (relative * abs(h)), axis=(1, 2)))
+        # Smooth FRFs miss the lowest lines by more than their noise of 0.1 %.
+        assert (noise.outlying > 40).sum() < 3
+    # Windows of 41 lines of 10 differences: 5 %.
+    assert np.quantile(abs(np.log(ratios)), 0.9) < 0.2
+
+
+def test_coarse_lines_take_the_noise_of_differences(h):
+    """Rational functions through one line in twenty, of fewer lines than modes need, are not what was measured."""
+    levels = []
+    for seed in range(8):
+        noise = jf.estimate_noise(FREQ[::20], jf.pollute(h, 0.02, seed=seed)[::20])
+        levels.append(noise.level)
+        assert noise.source == "reciprocity"
+        assert not noise.smooth.is_smooth
+    # 30 lines of six differences.
+    np.testing.assert_allclose(levels, 0.02, rtol=0.35)
+    assert np.mean(levels) == pytest.approx(0.02, rel=0.1)
+
+
+def test_coarse_lines_with_noise_of_another_size_by_entry_are_smoothed(h):
+    """One level does not describe it."""
+    sizes = 4.0 ** ((np.arange(16).reshape(4, 4) * 3 % 7) / 3 - 1)
+    noise = jf.estimate_noise(FREQ[::20], (h + 0.02 * sizes * abs(h) * circular(h.shape, 3))[::20])
+    assert noise.source == "residual"
+    assert noise.relative.max() > 4 * noise.relative.min()
+
+
 def test_coherence_tells_where_the_noise_is(h):
     """As `swell`, but between lines as well: what coherence sees and nothing else."""
     averages = 20
@@ -239,6 +272,16 @@ def test_parts_by_maximum_likelihood_against_a_search():
 
     grid = np.geomspace(1e-3, 10, 200)
     assert loss(*parts) < min(loss(one, two) for one in grid for two in grid) + 1e-3
+
+
+def test_parts_of_which_one_is_far_smaller():
+    """|h|^2 over 14 decades: the constant part is 1e-11 of the mean of the other, and counts on most lines."""
+    rng = np.random.default_rng(2)
+    a = 10 ** np.linspace(-14, 0, 2000)[None]
+    y = (0.3 * a + 1e-12) * rng.exponential(size=a.shape)
+    relative, floor = noise_parts(y, np.stack([a, np.ones_like(a)]))
+    assert relative[0] == pytest.approx(0.3, rel=0.15)
+    assert floor[0] == pytest.approx(1e-12, rel=0.15)
 
 
 def test_independent_lines_are_not_outlying_and_not_correlated():
