@@ -290,3 +290,18 @@ def test_identify_looks_first(beams):
 def test_bad_arguments_get_one_sentence(change, message):
     with pytest.raises(ValueError, match=message):
         jf.check_frfs(**(dict(freq_hz=S.freq, h=noisy()) | change))
+
+
+@pytest.mark.parametrize("step", [40, 26, 20])
+def test_coarse_lines_are_not_dead_but_noise_on_them_is(step):
+    """Between 20 to 40 lines over nine resonances the phase turns at random, as that of noise."""
+    freq, h = S.freq[::step], noisy()[::step]
+    assert jf.check_frfs(freq, h, NAMES).findings == ()
+    rng = np.random.default_rng(4)
+    for is_row in (True, False):
+        bad = h.copy()
+        own = bad[:, 1] if is_row else bad[:, :, 1]
+        own[:] = np.median(abs(own)) * (rng.standard_normal(own.shape) + 1j * rng.standard_normal(own.shape))
+        (finding,) = jf.check_frfs(freq, bad, NAMES).findings
+        assert (finding.kind, finding.channels) == ("dead", (f"{'response' if is_row else 'force'} {NAMES[1]}",))
+        assert finding.value < finding.threshold

@@ -26,6 +26,13 @@ __all__ = [
 
 #: Below this agreement of the phase from line to line an FRF is noise.
 LEAST_SMOOTHNESS = 0.3
+#: Of few lines the phases of noise agree by more: by less than this over the root of their number.
+_SMOOTHEST = 4.0
+#: There the mean of n |agreement|^2 over the FRFs of a channel is below this for 99 % of dead ones, even where these
+#: share their noise: it is exponential then, of mean 1.
+_OF_NOISE = 4.6
+#: And the phases of h_pq and h_qp agree by less than this over the lines: noise on 20 lines by more once in 18 000.
+_RECIPROCAL = 0.7
 #: FRFs that agree to this share are copies: two measurements differ by their noise.
 _SAME = 1e-6
 #: FRFs that are reciprocal to this share hold no noise, or were made so.
@@ -206,26 +213,52 @@ def check_signals(measurement: Measurement) -> BadSignals:
     smooth, square = measurement.smoothness, measurement.square
     # Reciprocal to rounding: calculated, or made so; equal channels are then no copies of noise.
     is_exact = bool(square.size and abs(square - square.swapaxes(1, 2)).max() <= _EXACT * abs(square).max())
-    for word, names, h, own in (
-        ("response", measurement.responses, measurement.h, smooth),
-        ("force", measurement.forces, across, smooth.T),
+    paired = _reciprocal(measurement)
+    for word, names, h, own, is_reciprocal in (
+        ("response", measurement.responses, measurement.h, smooth, paired[0]),
+        ("force", measurement.forces, across, smooth.T, paired[1]),
     ):
-        # zero or noise in all columns
-        dead = np.flatnonzero(own.max(axis=1) < max(LEAST_SMOOTHNESS, 4 / np.sqrt(h.shape[0]))).tolist()
-        findings += [_dead_finding(word, names[i], float(own[i].max())) for i in dead]
+        dead = _dead(own, len(h), is_reciprocal)
+        findings += [_dead_finding(word, names[i], float(own[i].max()), len(h)) for i in dead]
         copies = [] if is_exact else _copies(h, dead)
         findings += [_copy_finding(word, names[i], names[j], value) for i, j, value in copies]
         bad.append([*dead, *(place for i, j, _ in copies for place in (i, j))])
     return BadSignals(findings, *bad)
 
 
-def _dead_finding(word: str, name: str, value: float) -> FrfFinding:
+def _least_smoothness(n_freq: int) -> float:
+    """Return the agreement of the phase that noise on so many lines does not reach."""
+    return float(max(LEAST_SMOOTHNESS, _SMOOTHEST / np.sqrt(n_freq)))
+
+
+def _dead(smooth: FloatArray, n_freq: int, is_reciprocal: NDArray[np.bool_]) -> list[int]:
+    """Return the rows that are zero or noise in all columns; FRFs on few, coarse lines are not smooth, but no noise."""
+    best = smooth.max(axis=1)
+    like_noise = (n_freq * (smooth**2).mean(axis=1) < _OF_NOISE) & ~is_reciprocal
+    dead = (best < LEAST_SMOOTHNESS) | ((best < _least_smoothness(n_freq)) & like_noise)
+    return [int(i) for i in np.flatnonzero(dead)]
+
+
+def _reciprocal(m: Measurement) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Return the responses and the forces of which some FRF has the phases of its reciprocal one; of few lines."""
+    rows, columns = (np.zeros(n, np.bool_) for n in m.h.shape[1:])
+    if _least_smoothness(len(m.h)) == LEAST_SMOOTHNESS:
+        return rows, columns
+    turned = m.square * m.square.swapaxes(1, 2).conj()
+    size = modulus(turned)
+    agreement = abs((turned / np.where(size > 0, size, 1)).mean(axis=0))
+    np.fill_diagonal(agreement, 0.0)
+    found = agreement.max(axis=0, initial=0.0) > _RECIPROCAL
+    rows[m.rows], columns[m.columns] = found, found
+    return rows, columns
+
+
+def _dead_finding(word: str, name: str, value: float, n_freq: int) -> FrfFinding:
     what = "is zero" if value == 0 else f"is noise: its phase agrees by {value:.2f} from line to line"
     remedy = "connect or replace the sensor" if word == "response" else "repeat the impacts"
     message = f"{word} {name} {what}"
-    return FrfFinding(
-        "dead", "error", (f"{word} {name}",), value, LEAST_SMOOTHNESS, message, f"{remedy}, or leave it out"
-    )
+    least = _least_smoothness(n_freq)
+    return FrfFinding("dead", "error", (f"{word} {name}",), value, least, message, f"{remedy}, or leave it out")
 
 
 def _copies(h: ComplexArray, dead: list[int]) -> list[tuple[int, int, float]]:
