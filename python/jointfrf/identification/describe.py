@@ -104,7 +104,7 @@ def describe_springs(found: ManifoldFit, problem: FitProblem) -> Fit:
     fit = _with_best_estimates(fit, result) if found.alone is None else with_joint_alone(fit, found.alone)
     intervals = fit.confidence_interval(0.95)
     findings = [
-        *([] if found.cross_fits else _left_out_lines(result, fit.dofs)),
+        *([] if found.cross_fits else _left_out_lines(result, fit.dofs, found.test)),
         *_left_out_dofs(problem),
         *_band_parts(found),
         *_poor_springs(fit, intervals),
@@ -147,7 +147,7 @@ def _poor_springs(fit: Fit, intervals: dict[str, tuple[float, float]]) -> list[F
             found.append(warn("open", f"{one}: this DOF cannot be distinguished from a rigid one; {bound}", about))
         elif not low > 0:
             bound = f"at most {high:.3g} {one.unit} (95 %)"
-            found.append(warn("open", f"{one}: cannot be distinguished from no joint; {bound}", about))
+            found.append(warn("open", f"{one}: not significantly different from zero, a free DOF; {bound}", about))
         elif high - low > 2 * _UNCERTAIN * abs(value):
             found.append(_poor(one, low, high))
     return found
@@ -199,6 +199,16 @@ def _choices(choices: Sequence[DofDamping]) -> list[Finding]:
     """Say which damping terms were chosen for each DOF, and how clearly."""
     found = []
     for one in choices:
+        if one.others:
+            kinds = [one.best, *(kind for kind, _ in one.others)]
+            shares = [1 - sum(share for _, share in one.others), *(share for _, share in one.others)]
+            odds = ", ".join(f"{kind} {100 * share:.2g} %" for kind, share in zip(kinds, shares, strict=True))
+            text = (
+                f"damping of {one.dof}: the data do not decide its terms ({odds}); values are means over these, and "
+                "intervals hold those of all"
+            )
+            found.append(note("choice", text, (one.dof,)))
+            continue
         strength = "clearly" if one.margin > 10 else "weakly" if one.margin > 2 else "hardly"
         text = (
             f"damping of {one.dof}: {one.best}, {strength} preferred to {one.second} "
@@ -426,7 +436,7 @@ def describe_laws(found: ManifoldFit, joint: LawJoint) -> Fit:
     )
     is_log = {one.name: one.is_log for one in joint_vector(joint, (), np.ones(len(joint.dofs))).all}
     findings = [
-        *_left_out_lines(result, problem.dofs),
+        *_left_out_lines(result, problem.dofs, found.test),
         *_left_out_dofs(problem),
         *poor_laws(fit, is_log, lambda name: found.intervals.of(name, 0.95)),
         *([] if problem.noise.is_assumed else _too_large(found.test, "these laws do not fit the data")),
@@ -682,7 +692,7 @@ def _left_out_dofs(problem: FitProblem) -> list[Finding]:
     return [warn("left out", str(one)) for one in problem.left_out if one.matters]
 
 
-def _left_out_lines(result: JointEstimate, dofs: tuple[str, ...]) -> list[Finding]:
+def _left_out_lines(result: JointEstimate, dofs: tuple[str, ...], test: ResidualTest) -> list[Finding]:
     """Count the lines that no joint near the one found fits."""
     found = []
     for group in result.groups:
@@ -692,6 +702,8 @@ def _left_out_lines(result: JointEstimate, dofs: tuple[str, ...]) -> list[Findin
         if out > _UNTRUSTED * total:
             whose = f" of {_named(group.dofs, dofs)}" if len(result.groups) > 1 else ""
             text = f"{out} of {total} lines{whose} do not fit the joint found within their noise and are left out"
+            if test.leaves_out:
+                text += f": of all lines the residual is {test.whole:.3g} times the noise"
             found.append(warn("left out", text, tuple(dofs[d] for d in group.dofs)))
     return found
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 from jointfrf.errors import ConvergenceWarning, IdentificationWarning
 
-__all__ = ["Finding", "FitFindingKind", "as_warning", "note", "warn"]
+__all__ = ["Finding", "FitFindingKind", "as_warning", "note", "warn", "worst_first"]
 
 #: What a finding is about.
 FitFindingKind = Literal[
@@ -37,6 +38,13 @@ FitFindingKind = Literal[
     "window",  # what an exponential window adds
     "other",  # read from a file that does not say
 ]
+
+
+#: Kinds whose warnings say that the whole fit is in doubt, the worst first; then those of single numbers, likewise.
+_WORST: tuple[FitFindingKind, ...] = (
+    "convergence", "residual", "left out", "cross terms", "sign", "trend", "calibration", "model", "window", "prior",
+    "direction", "open", "sides", "poor",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -77,6 +85,16 @@ def warn(
 def note(kind: FitFindingKind, text: str, about: tuple[str, ...] = ()) -> Finding:
     """Return a finding that says how numbers came about."""
     return Finding(kind, "note", text, about)
+
+
+def worst_first(findings: Sequence[Finding]) -> tuple[Finding, ...]:
+    """Return findings by what they put in doubt: warnings before notes, of the whole fit before those of a number."""
+
+    def rank(one: Finding) -> tuple[bool, int]:
+        of_kind = _WORST.index(one.kind) if one.severity == "warning" and one.kind in _WORST else len(_WORST)
+        return one.severity == "note", of_kind
+
+    return tuple(sorted(findings, key=rank))
 
 
 def as_warning(finding: Finding) -> Warning:

@@ -72,7 +72,8 @@ def identify(
         `SpringLaw`.
     damping : {"auto", "viscous", "hysteretic", "both", "none"}, or a sequence of these, one for each DOF
         Terms of K* = k (1 + i eta) + i w c to fit. "auto" chooses for each DOF by the Bayesian information criterion,
-        with `cross` "fit" for all DOFs together; the default.
+        two terms with a margin of 6; values are means over the kinds that the data do not exclude, and intervals hold
+        those of all. With `cross` "fit" it chooses for all DOFs together. The default.
     cross : {"zero", "ignore", "fit"}
         Terms that couple the DOFs of the joint: none (the default), and this is used; unknown and not fitted; fitted,
         symmetric. Where they are unknown, k is 1/C_dd of the compliance.
@@ -116,7 +117,7 @@ def identify(
     joints and on lines where gamma_jk is singular. Standard errors: inverse information of the noise, times the
     correlation between lines, times the residual over the noise where it is above 1; the scatter between lines, or
     between ten parts of the band, replaces that where it exceeds it by more than chance. Intervals by the profile of
-    the likelihood where they are not symmetric.
+    the likelihood where they are not symmetric. DOFs that may be free are fitted in k, h and c instead of 1/k.
 
     Examples
     --------

@@ -76,6 +76,8 @@ class ResidualTest(NamedTuple):
         Parts of the band in Hz that hold most of the excess, and their share of it; empty where it may be chance.
     trends : tuple of Trend
         Parameters that parts of the band do not agree on.
+    of_all : float
+        Residual over noise with the lines that the fit left out, too; NaN where it left out none.
     """
 
     ratio: float
@@ -87,6 +89,17 @@ class ResidualTest(NamedTuple):
     pulls: tuple[tuple[int, float], ...] = ()
     local: tuple[tuple[float, float, float], ...] = ()
     trends: tuple[Trend, ...] = ()
+    of_all: float = float("nan")
+
+    @property
+    def leaves_out(self) -> bool:
+        """Whether lines were left out of the fit that would make the residual noticeably larger."""
+        return self.of_all > max(self.ratio, 1 + _LARGE * self.sigma)
+
+    @property
+    def whole(self) -> float:
+        """Residual over noise of all lines in the band, whether they were fitted or not."""
+        return max(self.ratio, self.of_all) if np.isfinite(self.of_all) else self.ratio
 
     @property
     def is_large(self) -> bool:
@@ -103,7 +116,7 @@ class ResidualTest(NamedTuple):
         """Whether the residual is noise, no prior is denied, and no parameter changes over the band."""
         quantile = float(special.ndtri(1 - _CHANCE))
         return not (
-            self.ratio > 1 + quantile * self.sigma
+            self.whole > 1 + quantile * self.sigma
             or self.bands
             or self.responses
             or self.forces

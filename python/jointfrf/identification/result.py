@@ -16,7 +16,7 @@ from scipy.special import ndtri
 from jointfrf.dofs import Parameter, ParameterKind
 from jointfrf.frf.bands import Band
 from jointfrf.identification.derived import Derived, DerivedFunction, derived_quantity
-from jointfrf.identification.findings import Finding, as_warning
+from jointfrf.identification.findings import Finding, as_warning, worst_first
 from jointfrf.identification.fit_data import FitData, ModelData
 from jointfrf.identification.residual_test import ResidualTest
 from jointfrf.joint import Joint
@@ -131,7 +131,7 @@ class Fit:
     laws : LawJoint or None
         The joint found, where it is one of laws; `joint` is the joint of any fit.
     findings : tuple of Finding
-        What a reader must know: `warnings` before using the numbers, `notes` on how they came about.
+        What a reader must know, the worst first: `warnings` before using the numbers, `notes` on how they came about.
     k_lines : ndarray, shape (n_freq, n, n), or None
         K*(w) of each line by itself, N/m; NaN where a line does not give it, None where the method has none.
     bands : tuple
@@ -270,8 +270,8 @@ class Fit:
         return {f"eta_{dof}": self.derived(f"h_{dof} / k_{dof}") for dof in self.dofs if dof in known}
 
     def with_findings(self, findings: Sequence[Finding]) -> Fit:
-        """Return the same fit with other findings."""
-        return replace(self, findings=tuple(findings))
+        """Return the same fit with other findings, the worst first."""
+        return replace(self, findings=worst_first(findings))
 
     def issue_warnings(self) -> None:
         """Issue what is in doubt as warnings of Python, at the caller of the public function that fitted."""
@@ -381,7 +381,7 @@ class Fit:
         raise ValueError(f"there is no parameter {one_line(parameter)}, only {', '.join(self._names)}")
 
     def __str__(self) -> str:
-        """Return a table of the parameters with their intervals, and the findings."""
+        """Return the worst finding, a table of the parameters with their intervals, and all other findings."""
         intervals, errors = self.confidence_interval(0.95), self.std_error
         has_prior = any(one.prior for one in self.parameters)
         rows = [("parameter", "value", "std error", "95 % interval", *(["prior"] if has_prior else []), "unit")]
@@ -397,14 +397,17 @@ class Fit:
             rows.append((name, shown, error, limits, *([""] if has_prior else []), "1"))
         channels = f", {len(self.responses)} responses x {len(self.forces)} forces" if self.responses else ""
         span = f"{self.freq_hz.min():g} to {self.freq_hz.max():g} Hz, {self.freq_hz.size} lines"
-        head = [f"method {self.method}, {span}{channels}"]
+        worst, *others = [_wrapped(f"warning: {text}") for text in self.warnings] or [""]
+        head = [*([worst, ""] if worst else []), f"method {self.method}, {span}{channels}"]
         if np.isfinite(self.noise_level):
-            head.append(f"noise {100 * self.noise_level:.2g} %, residual {100 * self.residual_level:.2g} % of the FRFs")
+            line = f"noise {100 * self.noise_level:.2g} %, residual {100 * self.residual_level:.2g} % of the FRFs"
+            if self.test is not None and self.test.leaves_out:
+                line += f", {self.test.whole:.3g} times the noise with the lines left out"
+            head.append(line)
         if self.laws is not None and self.laws.rigid:
             head.append(f"rigid: {', '.join(self.laws.rigid)}")
         beside = ["", *columns_of(self._seen_rows())] if self.seen else []
-        tail = [_wrapped(f"note: {text}") for text in self.notes]
-        tail += [_wrapped(f"warning: {text}") for text in self.warnings]
+        tail = [*others, *(_wrapped(f"note: {text}") for text in self.notes)]
         return "\n".join([*head, "", *columns_of(rows), *beside, *([""] if tail else []), *tail])
 
     def _seen_rows(self) -> list[tuple[str, ...]]:

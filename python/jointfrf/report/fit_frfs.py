@@ -44,7 +44,7 @@ class ComparedFrfs:
         m/N.
     residual : ndarray, shape (n_rows, n_columns)
         Root mean square of measured minus regenerated, in units of the noise (of the FRF, or of rigid motion there if
-        that has more), over the lines that were fitted.
+        that has more), over all lines in the bands, those that the fit left out, too.
     reciprocity : ndarray, shape (n_rows, n_columns), or None
         The same of h_pq - h_qp; NaN on the diagonal. None where rows and columns differ, or FRFs need not be
         reciprocal.
@@ -75,9 +75,6 @@ def compare_frfs(data: FitData, dofs: tuple[str, ...]) -> ComparedFrfs:
     n_freq = len(data.measured)
     shown = np.empty((2, n_freq, len(entries)), np.complex128)
     squares, counts = np.zeros((2, len(rows), len(columns))), np.zeros((2, len(rows), len(columns)))
-    fitted: NDArray[np.bool_] = np.asarray(data.fitted.all(axis=1))
-    if not fitted.any():
-        fitted = np.ones(n_freq, np.bool_)
     for own in line_slices(n_freq):
         h, variance = data.measured[own], data.noise_variance(own)
         regenerated = data.regenerated(own)
@@ -92,14 +89,13 @@ def compare_frfs(data: FitData, dofs: tuple[str, ...]) -> ComparedFrfs:
             of_rigid = rigid[0] @ np.where(np.isfinite(variance), variance, 0) @ rigid[1].T
             apart = np.where(np.isfinite(variance), np.maximum(variance, of_rigid), np.inf)
         shown[0, own], shown[1, own] = h[:, p, q], regenerated[:, p, q]
-        kept = fitted[own]
-        _add(squares[0], counts[0], abs(h - regenerated)[kept] ** 2, apart[kept])
+        _add(squares[0], counts[0], abs(h - regenerated) ** 2, apart)
         if same:
             # An FRF that is zero by symmetry says nothing, and has no noise of its own.
             both = variance + variance.swapaxes(1, 2)
             is_there = (abs(h) ** 2 > ZERO**2 * own_size(h)) & (both > (_NO_NOISE * abs(h)) ** 2)
             both = np.where(is_there, both, 0)
-            _add(squares[1], counts[1], abs(h - h.swapaxes(1, 2))[kept] ** 2, both[kept])
+            _add(squares[1], counts[1], abs(h - h.swapaxes(1, 2)) ** 2, both)
     with np.errstate(invalid="ignore", divide="ignore"):
         residual, reciprocity = np.sqrt(squares / np.where(counts > 0, counts, np.nan))
     if same:

@@ -160,7 +160,7 @@ def _model_sections(fit: Fit, options: ReportOptions) -> list[Section]:
     most = _most_points([*frfs, *joint])
     what = "real and imaginary part of joint stiffness K* and compliance C"
     return [
-        _summary(fit),
+        _summary(fit, compared),
         _doubts(fit),
         Section("joint", "Channels", [*_drawn(fit, options.parts), _channels(fit)]),
         Section(
@@ -209,7 +209,7 @@ def _joint_sections(fit: Fit, data: FitData, options: ReportOptions) -> list[Sec
     noise = _noise_figure(fit, data)
     most = _most_points([*frfs, *joint, *(one for one in (information, noise) if one is not None)])
     return [
-        _summary(fit),
+        _summary(fit, compared),
         _doubts(fit),
         Section("joint", "The joint and its channels", _geometry(fit, data)),
         Section(
@@ -252,13 +252,19 @@ def _charts(figures: Iterable[Figure], most: int, fit: Fit, what: str) -> list[C
     return [Chart(replace(figure, heading=""), f"{figure.caption}: {what}, {span}", most) for figure in figures]
 
 
-def _summary(fit: Fit) -> Section:
+def _summary(fit: Fit, compared: ComparedFrfs) -> Section:
+    # What the reader sees first is the worst.
+    worst = [Words([f"{fit.warnings[0]}."], "warnings")] if fit.warnings else []
+    known = compared.residual[np.isfinite(compared.residual)]
+    of_channels = float(np.sqrt((known**2).mean())) if known.size else np.nan
+    quality = Words(quality_sentences(fit, of_channels))
     return Section(
         "summary",
         "Summary",
         [
+            *worst,
             Words(finding_sentences(fit), "findings"),
-            Words(quality_sentences(fit)),
+            quality,
             parameter_table(fit),
             *([seen_table(fit)] if fit.seen else []),
         ],
@@ -499,7 +505,7 @@ def _value_sentence(term: FittedParameter, value: float, low: float, high: float
             bound, best = with_unit(low, term.unit), with_unit(float(f"{value:.2g}"), term.unit)
             return f"cannot be distinguished from rigid; at least {bound} (95 %), best estimate {best}."
         if not low > 0:
-            return f"cannot be distinguished from no joint; at most {with_unit(high, term.unit)} (95 %)."
+            return f"not significantly different from zero, a free DOF; at most {with_unit(high, term.unit)} (95 %)."
     if not (np.isfinite(low) and np.isfinite(high)):
         return "not determined by the data."
     reach = (high - low) / 2
@@ -510,22 +516,32 @@ def _value_sentence(term: FittedParameter, value: float, low: float, high: float
     return f"{_rounded(value / size, reach / size)} {shown}, with 95 % probability between {ends} {shown}{share}{zero}."
 
 
-def quality_sentences(fit: Fit) -> list[str]:
-    """Return sentences on noise and residual, and on lines that were left out."""
+def quality_sentences(fit: Fit, of_channels: float = np.nan) -> list[str]:
+    """Return sentences on noise and residual, and on lines that were left out.
+
+    Parameters
+    ----------
+    fit : Fit
+    of_channels : float
+        Residual between the channels over the noise, root mean square over all lines of the band and all FRFs.
+    """
     sentences = []
     if np.isfinite(fit.noise_level) and fit.noise_level > 0:
-        ratio = fit.residual_level / fit.noise_level
+        of_fitted = fit.residual_level / fit.noise_level
+        whole = of_fitted if fit.test is None else max(of_fitted, fit.test.whole)
+        ratio = float(np.nanmax([whole, of_channels]))
         explains, explain = ("joint explains", "joint as described does")
         if isinstance(fit.data, ModelData):
             explains, explain = ("models and the joint explain", "models and the joint as described do")
         verdict = (
-            f"the {explains} the FRFs of the lines used to within their noise."
+            f"the {explains} the FRFs to within their noise."
             if ratio < _NOISE
             else f"the {explain} not explain all that the FRFs show."
         )
         sentences.append(
             f"The noise of the FRFs is {100 * fit.noise_level:.2g} % (median); what the fit leaves unexplained is "
-            f"{100 * fit.residual_level:.2g} %, {ratio:.2f} times the noise: {verdict}"
+            f"{100 * fit.residual_level:.2g} %, {of_fitted:.3g} times the noise"
+            f"{_elsewhere(of_fitted, whole, of_channels)}: {verdict}"
         )
     if isinstance(fit.data, FitData):
         out = np.count_nonzero(~fit.data.fitted, axis=0)
@@ -538,6 +554,16 @@ def quality_sentences(fit: Fit) -> list[str]:
     if fit.warnings:
         sentences.append("Read the warnings below before quoting these numbers.")
     return sentences
+
+
+def _elsewhere(of_fitted: float, whole: float, of_channels: float) -> str:
+    """Say what residuals beside that of the lines fitted are, where they are larger."""
+    found = ""
+    if whole > _NOISE * of_fitted:
+        found += f"; with the lines left out it is {whole:.3g} times the noise"
+    if of_channels > _NOISE * max(whole, 1):
+        found += f"; between single channels, whose sides are taken as rigid, {of_channels:.3g} times (map below)"
+    return found
 
 
 def parameter_table(fit: Fit) -> Table:

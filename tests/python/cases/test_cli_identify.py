@@ -102,7 +102,7 @@ def test_hammer_test_that_comes_with_the_project(tmp_path):
         assert low - bent < truth < high + bent
         assert abs(fit[name]["value"] - truth) < abs(plain[name]["value"] - truth) + bent
     assert {path.suffix for path in out.iterdir()} == {".json", ".png", ".svg"}
-    for word in ("6 responses x 6 excitations", "95 % interval", "residual", "warning:"):
+    for word in ("6 responses x 6 excitations", "95 % interval", "residual", "note:"):
         assert word in result.stdout
 
 

@@ -23,8 +23,8 @@ def term_matrices(basis):
     )
 
 
-def cramer_rao(gamma, k_joint, basis, *, unknown_cross=False):
-    """Covariance for unit relative noise of independent entries of gamma, when nothing is known around the joint.
+def cramer_rao(gamma, k_joint, basis, *, unknown_cross=False, std=None):
+    """Covariance for independent noise of gamma, of unit relative size or of this std, nothing known around the joint.
 
     Unknown on every line: the symmetric dynamic stiffnesses Z_A and Z_B of both sides, and where `unknown_cross` the
     cross terms of the joint's compliance; measured: all entries of gamma.
@@ -46,7 +46,9 @@ def cramer_rao(gamma, k_joint, basis, *, unknown_cross=False):
             return np.linalg.inv(whole).reshape(*whole.shape[:-2], -1)
 
         sides = np.concatenate([z_a[i][upper], z_b[i][upper]])
-        size = np.sqrt(np.outer(abs(np.diagonal(k)), abs(np.diagonal(k))))
+        # A DOF that is free has no stiffness to take a share of for a step.
+        own = np.maximum(abs(np.diagonal(k)), 1e-3 * abs(np.diagonal(z_b[i])))
+        size = np.sqrt(np.outer(own, own))
         matrices = term_matrices(basis)[:, i]
         steps = np.array([1e-6 * (size / np.where(m != 0, abs(m), np.inf)).max() for m in matrices])
         moved = steps[:, None, None] * matrices
@@ -59,7 +61,7 @@ def cramer_rao(gamma, k_joint, basis, *, unknown_cross=False):
             small = 1e-6 * symmetric(np.eye(q // 2), n)[[a != b for a, b in zip(*upper, strict=True)]] / size
             by_cross = (model(k + k @ small @ k, sides) - model(k - k @ small @ k, sides)).T
             free = np.concatenate([free, by_cross], axis=1)
-        weight = 1 / abs(gamma[i].ravel())[:, None]
+        weight = 1 / (abs(gamma[i]) if std is None else std[i]).ravel()[:, None]
         slopes, free = slopes * weight, free * weight
         free = free / np.linalg.norm(free, axis=0)
         # gamma is analytic in the unknowns of a line: they take a complex subspace out of the data.

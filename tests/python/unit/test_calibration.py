@@ -220,6 +220,9 @@ def test_variances_of_effects_add_up(h):
     assert spread.squares == pytest.approx(errors.channel.sum() / 2)
 
 
+# In one draw of ten some part of the band exceeds its noise by chance.
+@pytest.mark.filterwarnings("ignore:the models and the joint do not fit:jointfrf.errors.IdentificationWarning")
+@pytest.mark.filterwarnings("ignore:beside their unknowns:jointfrf.errors.IdentificationWarning")
 def test_scatter_between_lines_sees_noise_that_frfs_share(between_points):
     """Noise of a line common to all FRFs: 16 FRFs say as much of it as one."""
     shared = between_points * (1 + 0.03 * circular((FREQ.size, 1, 1), 7))

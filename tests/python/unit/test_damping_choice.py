@@ -5,7 +5,7 @@ import pytest
 
 from compliance_lines import fitted_group, white
 from jointfrf.identification.manifold.coordinates import DiagonalJoint, joint_terms
-from jointfrf.identification.manifold.fit import choose_damping
+from jointfrf.identification.manifold.fit import MARGIN, DofDamping, choose_damping
 
 DOFS = ("x", "y")
 FREQ = np.linspace(20.0, 500.0, 150)
@@ -78,3 +78,28 @@ def test_terms_of_opposite_sign_are_not_both():
     group = fitted_group(BOTH, exact + std * white(exact.shape, 0), std, theta)
     np.testing.assert_allclose(group.joint.theta(group.x), theta, rtol=0.05)
     assert all(one.best != "both" for one in choose_damping(group, DOFS, 1.0))
+
+
+def scores(**others):
+    return {"none": 500.0, "viscous": 0.0, "hysteretic": 200.0, "both": 8.0} | others
+
+
+def test_two_terms_need_a_margin():
+    """BIC alone would take two from 0 on."""
+    assert DofDamping.by_scores("x", scores(both=-5.0)).best == "viscous"
+    assert DofDamping.by_scores("x", scores(both=-7.0)).best == "both"
+    assert DofDamping.by_scores("x", scores(both=-7.0)).others == ()
+
+
+@pytest.mark.parametrize(
+    ("others", "kinds"),
+    [({}, []), ({"both": 1.0}, ["both"]), ({"both": -5.0}, ["both"]), ({"hysteretic": 3.0}, ["hysteretic"])],
+)
+def test_kinds_that_are_not_excluded_share_the_odds(others, kinds):
+    one = DofDamping.by_scores("x", scores(**others))
+    assert [kind for kind, _ in one.others] == kinds
+    assert one.terms == ("both" if kinds else "viscous")
+    for kind, share in one.others:
+        # Odds exp(-BIC/2) with the margin of a second term.
+        odds = np.exp(-(scores(**others)[kind] + (MARGIN if kind == "both" else 0)) / 2)
+        assert share == pytest.approx(odds / (1 + odds))

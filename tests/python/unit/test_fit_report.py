@@ -180,7 +180,7 @@ def test_sentences_say_what_the_intervals_say(fits):
         f"Stiffness along y (k_y): cannot be distinguished from rigid; at least {low / 1e6:.4g} MN/m (95 %), best "
         f"estimate {float(f'{best / 1e6:.2g}'):g} MN/m."
     )
-    assert "explains the FRFs of the lines used to within their noise" in quality_sentences(fit)[0]
+    assert "explains the FRFs to within their noise" in quality_sentences(fit)[0]
     assert "does not explain all" in quality_sentences(replace(fit, residual_level=0.03))[0]
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from jointfrf.identification.manifold.interface_frfs import InterfaceFrfs, between
+from jointfrf.identification.manifold.interface_frfs import InterfaceFrfs, between, direction_share
 from jointfrf.identification.manifold.on_manifold import FrfEntries
 
 N_FREQ = 3
@@ -41,12 +41,20 @@ def drawn(f, count, seed=5):
     return e
 
 
+def of_both_directions(f, h):
+    """FRFs of the same channels with h_pq and h_qp in the share of each; others as they are."""
+    if not f.reciprocal or f.symmetrised or not np.array_equal(f.responses, f.forces):
+        return h
+    share = direction_share(f.variance)
+    return share * h + (1 - share) * h.swapaxes(-1, -2)
+
+
 def whitened(f, count=20000, dofs=None):
     """Return many draws of the weighted noise of one line, shape (count, n_freq, q)."""
     dofs = np.arange(f.n) if dofs is None else dofs
     data = f.of_dofs(dofs)
     at = np.concatenate([dofs, dofs + f.n])
-    gamma = f.responses[at] @ drawn(f, count) @ f.forces[at].T
+    gamma = f.responses[at] @ of_both_directions(f, drawn(f, count)) @ f.forces[at].T
     if f.reciprocal:
         gamma = (gamma + gamma.swapaxes(-1, -2)) / 2
     weighted = data.inverse_std * data.entries.take(gamma)
@@ -82,11 +90,25 @@ def test_weighted_noise_is_white(case, reciprocal):
 def test_the_variance_of_channels_is_that_of_a_mean_of_two_directions():
     f = frfs(np.eye(2), np.eye(2))
     v = f.variance
-    expected = np.stack([v[:, 0, 0], (v[:, 0, 1] + v[:, 1, 0]) / 4, v[:, 1, 1]], axis=1)
+    share = direction_share(v)[0, 1]
+    mean = share**2 * v[:, 0, 1] + (1 - share) ** 2 * v[:, 1, 0]
+    expected = np.stack([v[:, 0, 0], mean, v[:, 1, 1]], axis=1)
     np.testing.assert_allclose(1 / f.of_dofs(np.array([0])).inverse_std ** 2, expected, rtol=1e-12)
     one = f._replace(symmetrised=True, variance=(v + v.swapaxes(1, 2)) / 2)
-    expected[:, 1] *= 2
+    expected[:, 1] = (v[:, 0, 1] + v[:, 1, 0]) / 2
     np.testing.assert_allclose(1 / one.of_dofs(np.array([0])).inverse_std ** 2, expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize("ratio", [1.0, 3.0, 700.0])
+def test_two_directions_are_weighted_by_their_variances(ratio):
+    """The best mean of two measurements of variances v and v' has v v'/(v + v'), whatever its level on each line."""
+    f = frfs(np.eye(2), np.eye(2))
+    v = np.linspace(1.0, 2.0, N_FREQ)[:, None, None] * np.where(np.tri(2, dtype=bool), ratio, 1.0)
+    data = f._replace(variance=v).of_dofs(np.array([0]))
+    v = v[:, 1, 0] * v[:, 0, 1] / (v[:, 1, 0] + v[:, 0, 1])
+    np.testing.assert_allclose(1 / data.inverse_std[:, 1] ** 2, v, rtol=1e-12)
+    h = f.measured
+    np.testing.assert_allclose(data.measured[:, 1], (ratio * h[:, 0, 1] + h[:, 1, 0]) / (1 + ratio), rtol=1e-12)
 
 
 def test_the_covariance_of_a_transform_is_that_of_a_kronecker_product():
@@ -104,7 +126,9 @@ def test_the_covariance_of_a_transform_is_that_of_a_kronecker_product():
 def test_some_dofs_are_a_part_of_the_whole():
     f = frfs(SQUARE, SQUARE)
     own = f.of_dofs(np.array([1]))
-    np.testing.assert_allclose(own.measured[:, 1], (f.gamma(f.measured)[:, 1, 3] + f.gamma(f.measured)[:, 3, 1]) / 2)
+    gamma = f.gamma(of_both_directions(f, f.measured))
+    np.testing.assert_allclose(own.measured[:, 1], gamma[:, 1, 3])
+    np.testing.assert_allclose(gamma[:, 1, 3], gamma[:, 3, 1])
     e = whitened(f, dofs=np.array([1]))
     assert abs(np.einsum("rla,rlb->lab", e, e.conj()) / len(e) - np.eye(3)).max() < 0.04
 
@@ -114,6 +138,8 @@ def test_some_dofs_are_a_part_of_the_whole():
 def test_entries_made_of_an_unused_frf_weigh_nothing(transform, reciprocal):
     """The others keep the weights that they have without these entries."""
     f = frfs(transform, transform, reciprocal=reciprocal)
+    # Of one ratio on all lines: the mean of both directions does not change with a line that is not used.
+    f = f._replace(variance=f.variance[:1] * np.array([1.0, 2.0, 3.0])[:, None, None])
     variance = f.variance.copy()
     variance[1, 0, 2] = np.inf
     data = f._replace(variance=variance).of_dofs(np.arange(2))
@@ -125,7 +151,7 @@ def test_entries_made_of_an_unused_frf_weigh_nothing(transform, reciprocal):
     assert made.any()
     assert not made.all()
     np.testing.assert_array_equal(data.used[1], ~made)
-    np.testing.assert_array_equal(data.inverse_std[[0, 2]], whole.inverse_std[[0, 2]])
+    np.testing.assert_allclose(data.inverse_std[[0, 2]], whole.inverse_std[[0, 2]], rtol=1e-14)
     np.testing.assert_allclose(data.inverse_std[1, ~made], whole.inverse_std[1, ~made], rtol=1e-12)
     if data.correlation is not None:
         keep = np.ix_(~made, ~made)

@@ -71,9 +71,10 @@ def side_spread(found: JointEstimate, frfs: InterfaceFrfs, compliance: FloatArra
             changes.append(gradients_of(group, errors.swapaxes(0, 1)) @ inverse)
         if compliance is not None:
             softer = _softer(group, compliance[group.dofs]) @ inverse
-            if group.joint.in_compliance:
+            of_compliance = group.joint.is_compliance
+            if of_compliance.any():
                 # Whatever the damping takes up of it.
-                softer[:, group.joint.is_compliance] = np.diag(compliance[group.dofs])
+                softer[:, of_compliance] = np.diag(compliance[group.dofs])[:, of_compliance[: len(group.dofs)]]
             changes.append(softer)
         std_error[group.which], factor[group.which] = _spread(group, np.concatenate(changes), inverse / 2)
     return SideSpread(std_error, factor)

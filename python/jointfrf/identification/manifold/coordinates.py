@@ -294,6 +294,10 @@ class DiagonalJoint(SpringJoint):
                 found = self.minimise(forms, there.x, held, least_gain)
         return found
 
+    def may_be_rigid(self, i: int) -> bool:
+        """Whether a parameter is of a DOF whose coordinate is its compliance."""
+        return bool(self.is_compliance[self.dofs[i]])
+
     def has_profile(self, i: int, x: FloatArray, covariance: FloatArray) -> bool:
         """Whether the compliance of the DOF of a parameter has a large error."""
         a = self.dofs[i]

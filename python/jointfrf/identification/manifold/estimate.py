@@ -12,11 +12,18 @@ from numpy.typing import NDArray
 
 from jointfrf.frf.bands import spread_lines
 from jointfrf.identification.line_starts import from_lines, interface_compliance
-from jointfrf.identification.manifold.coordinates import CrossTerms, JointTerms, LawCoordinates, coordinates_of
+from jointfrf.identification.manifold.coordinates import (
+    CrossTerms,
+    DiagonalJoint,
+    JointTerms,
+    LawCoordinates,
+    coordinates_of,
+)
 from jointfrf.identification.manifold.group_fit import LITTLE_PATIENCE, GroupFit, GroupProblem, fit_dofs
 from jointfrf.identification.manifold.interface_frfs import InterfaceFrfs
 from jointfrf.identification.manifold.line_forms import FormMinimum, NamedParameter
 from jointfrf.identification.manifold.on_manifold import LineData, OnManifold
+from jointfrf.identification.manifold.soft import SoftJoint, fit_soft, soft_dofs
 from jointfrf.identification.manifold.starts import first_joints
 from jointfrf.identification.manifold.unknown_cross import fit_unknown_cross
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
@@ -76,6 +83,8 @@ class JointEstimate(NamedTuple):
         The same in the units in which lines were weighted: those of the noise, unless lines were seen to vary.
     equations : float
         Complex equations used.
+    kinds : tuple of tuple of FormMinimum
+        Of each group, its minima with fewer damping terms that the data do not exclude: values are means over these.
     """
 
     parameters: Sequence[NamedParameter]
@@ -85,6 +94,7 @@ class JointEstimate(NamedTuple):
     excess: float
     scale: float
     equations: float
+    kinds: tuple[tuple[FormMinimum, ...], ...] = ()
 
     @property
     def converged(self) -> bool:
@@ -98,8 +108,12 @@ class JointEstimate(NamedTuple):
 
     @property
     def starts(self) -> tuple[GroupStart, ...]:
-        """Where fits of other FRFs of the same structure begin; groups that did not converge have none."""
-        return tuple(GroupStart.of(group, group) for group in self.groups if group.converged)
+        """Where fits of other FRFs of the same structure begin; not of those unconverged or with free DOFs."""
+        return tuple(
+            GroupStart.of(group, group)
+            for group in self.groups
+            if group.converged and not isinstance(group.joint, SoftJoint)
+        )
 
 
 def estimate_joint(
@@ -147,8 +161,33 @@ def estimate_joint(
             return first_joints(lines.on_lines(some), coordinates_of(terms.on_lines(some)))
 
         start = known.get((tuple(dofs.tolist()), own.parameters))
-        groups.append(_fitted(_Search(problem, starts, cross, start, is_explained)))
+        found = _fitted(_Search(problem, starts, cross, start, is_explained))
+        if isinstance(found.joint, DiagonalJoint) and not problem.unknown.any() and not is_explained:
+            found = _with_free_dofs(found, problem, own, frfs)
+        groups.append(found)
     return assembled(terms.parameters, groups)
+
+
+def _with_free_dofs(found: GroupFit, problem: GroupProblem, terms: JointTerms, frfs: InterfaceFrfs) -> GroupFit:
+    """Fit again where DOFs may be free."""
+    soft = soft_dofs(found)
+    if not soft.any():
+        return found
+
+    def rest(kept: NDArray[np.bool_]) -> FloatArray | None:
+        if not kept.any():
+            return None
+        data = frfs.of_dofs(found.dofs[kept])
+        some = spread_lines(len(data.measured))
+        own, which = terms.of_dofs(np.flatnonzero(kept))
+        joint = coordinates_of(own)
+        theta = np.zeros(len(terms.parameters))
+        for x in first_joints(data.on_lines(some), coordinates_of(own.on_lines(some))):
+            theta[which] = np.nan_to_num(joint.theta(x), posinf=0.0, neginf=0.0)
+            return theta
+        return None
+
+    return fit_soft(found, problem, terms, soft, rest)
 
 
 def estimate_laws(
@@ -335,11 +374,11 @@ def _reported(group: GroupFit) -> tuple[FloatArray, FloatArray]:
     would have if the compliance were as large as its standard error.
     """
     joint, x, covariance = group.joint, group.x.copy(), group.covariance
-    if not joint.in_compliance:
-        return x, covariance
     a = joint.is_compliance
+    if not a.any():
+        return x, covariance
     error = np.sqrt(np.maximum(np.diagonal(covariance)[a], 0))
-    hidden = np.flatnonzero((x[joint.dofs] == 0) & ~a)
+    hidden = np.flatnonzero((x[joint.dofs] == 0) & a[joint.dofs] & ~a)
     if hidden.size:
         at = x.copy()
         at[a] = np.maximum(at[a], error)
@@ -347,7 +386,7 @@ def _reported(group: GroupFit) -> tuple[FloatArray, FloatArray]:
         information = np.einsum("lqh,lqr,lrh->h", slope.conj(), group.forms.weight, slope).real
         covariance = covariance.copy()
         covariance[hidden, hidden] = 1 / np.maximum(2 * information, _TINY)
-    x[a] = np.maximum(x[a], np.maximum(_RIGID * error, _ROUNDING * group.problem.data.own_size))
+    x[a] = np.maximum(x[a], np.maximum(_RIGID * error, _ROUNDING * group.problem.data.own_size[a[: joint.n]]))
     return x, covariance
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import NamedTuple
@@ -41,6 +41,7 @@ from jointfrf.identification.manifold.flexible_sides import JointAlone, SideBend
 from jointfrf.identification.manifold.group_fit import GroupFit
 from jointfrf.identification.manifold.line_forms import FormMinimum
 from jointfrf.identification.manifold.prepare import FitProblem, check_estimate
+from jointfrf.identification.manifold.soft import SoftJoint
 from jointfrf.identification.manifold.uncertainty import joint_intervals, residual_test_of, spread_of
 from jointfrf.identification.manifold.unknown_cross import compliance_lines
 from jointfrf.identification.profile import Intervals
@@ -50,6 +51,7 @@ from jointfrf.kernel.arguments import FloatArray
 from jointfrf.laws.law_joint import LawJoint
 
 __all__ = [
+    "MARGIN",
     "DofDamping",
     "ManifoldFit",
     "Uncertainty",
@@ -77,6 +79,13 @@ _NO_NOISE = 1e-3
 _KINDS: tuple[DampingTerms, ...] = ("none", "viscous", "hysteretic", "both")
 
 
+#: A second damping term must lower BIC by this, odds of 20 to 1, to be taken as certain; and of two kinds with one term
+#: the worse is excluded by this.
+MARGIN = 6.0
+#: Two terms are not excluded by one whose BIC is lower by less than this.
+_HARDLY = 2.0
+
+
 class DofDamping(NamedTuple):
     """Damping terms of one DOF, chosen by the Bayesian information criterion (BIC).
 
@@ -85,13 +94,37 @@ class DofDamping(NamedTuple):
     dof : str
     best, second : str
     margin : float
-        Difference of their BIC: above 10 the choice is clear, below 2 the data hardly prefer one.
+        BIC of the second less that of the best: above 10 the choice is clear, below 2 the data hardly prefer one;
+        negative where the second has one more term that the data do not support clearly.
+    others : tuple of (str, float)
+        Kinds of damping that the data do not exclude, and their probability: values are means over these and the best.
     """
 
     dof: str
     best: DampingTerms
     second: DampingTerms
     margin: float
+    others: tuple[tuple[DampingTerms, float], ...] = ()
+
+    @property
+    def terms(self) -> DampingTerms:
+        """Terms that are fitted: those of all kinds that are not excluded."""
+        return "both" if self.others else self.best
+
+    @classmethod
+    def by_scores(cls, dof: str, scores: Mapping[DampingTerms, float]) -> DofDamping:
+        """Choose by BIC: two terms must be more likely than one by `MARGIN`."""
+        fair = {kind: score + MARGIN * (kind == "both") for kind, score in scores.items()}
+        best, *rest = sorted(fair, key=lambda kind: fair[kind])
+        second = min(rest, key=lambda kind: scores[kind])
+        near = [
+            kind
+            for kind in rest
+            if "none" not in (kind, best) and scores[kind] < scores[best] + (_HARDLY if kind == "both" else MARGIN)
+        ]
+        odds = np.exp([(fair[best] - fair[kind]) / 2 for kind in near])
+        others = tuple(zip(near, (odds / (1 + odds.sum())).tolist(), strict=True))
+        return cls(dof, best, second, scores[second] - scores[best], others)
 
 
 class Uncertainty(NamedTuple):
@@ -322,7 +355,7 @@ def _band_parts(
 def _chosen(problem: FitProblem, choices: tuple[DofDamping, ...]) -> DampingTerms | Sequence[DampingTerms]:
     """Return the damping terms that were fitted."""
     damping = problem.options.damping
-    return tuple(one.best for one in choices) if damping == "auto" else damping
+    return tuple(one.terms for one in choices) if damping == "auto" else damping
 
 
 def _cross_fits(
@@ -353,15 +386,59 @@ def _with_damping(problem: FitProblem) -> tuple[JointEstimate, tuple[DofDamping,
         for one in choose_damping(group, tuple(problem.dofs[d] for d in group.dofs), factor):
             of_dof[one.dof] = one
     choices = tuple(of_dof[dof] for dof in problem.dofs)
-    chosen = tuple(one.best for one in choices)
+    chosen = tuple(one.terms for one in choices)
     if all(kind == "both" for kind in chosen):
-        return both, choices
+        return _averaged(both, problem.dofs, choices), choices
     if problem.freq_hz.size >= _FEW and left_out_share(both) == 0:
         problem = replace(problem, near=_starts(problem, both, chosen))
     data = both.data
     # Its quadratic forms, of which a long sweep has many, are not needed any more.
     del both, group
-    return _estimate(problem, chosen, data=data), choices
+    return _averaged(_estimate(problem, chosen, data=data), problem.dofs, choices), choices
+
+
+def _averaged(found: JointEstimate, dofs: tuple[str, ...], choices: tuple[DofDamping, ...]) -> JointEstimate:
+    """Return the means over kinds of damping that the data do not exclude, of an estimate with the terms of all.
+
+    The joint distribution of the parameters is the mixture of those of the kinds, each normal, weighted by its odds
+    (Bayesian model averaging); a kind has zero for terms that it lacks. DOFs are taken one by one.
+    """
+    if not any(one.others for one in choices):
+        return found
+    theta, covariance = found.theta.copy(), found.covariance.copy()
+    kinds_of_groups: list[list[FormMinimum]] = []
+    for group in found.groups:
+        names = tuple(dofs[d] for d in group.dofs)
+        kept: list[DampingTerms] = [choices[d].terms for d in group.dofs]
+        base = _values_of(group, group)
+        kinds_of_groups.append([])
+        for i, d in enumerate(group.dofs):
+            others = choices[d].others
+            odds = {choices[d].best: 1 - sum(share for _, share in others), **dict(others)} if others else {}
+            minima = [
+                _minimum(group, joint_terms(group.joint.omega, names, [*kept[:i], kind, *kept[i + 1 :]], "zero"))
+                for kind in odds
+            ]
+            parts = [_values_of(group, one) for one in minima]
+            if not odds or not all(np.isfinite(part).all() for pair in (base, *parts) for part in pair):
+                continue
+            share = np.array(list(odds.values()))
+            mean = share @ [values for values, _ in parts]
+            spread = sum(w * (own + np.outer(at - mean, at - mean)) for w, (at, own) in zip(share, parts, strict=True))
+            theta[group.which] += mean - base[0]
+            covariance[np.ix_(group.which, group.which)] += spread - base[1]
+            kinds_of_groups[-1] += minima
+    return found._replace(theta=theta, covariance=covariance, kinds=tuple(map(tuple, kinds_of_groups)))
+
+
+def _values_of(group: GroupFit, minimum: FormMinimum) -> tuple[FloatArray, FloatArray]:
+    """Return parameters of a group, zero for those that a minimum lacks, shape (p,), and their covariance."""
+    at = [group.joint.names.index(name) for name in minimum.joint.names]
+    values, covariance = np.zeros(group.x.size), np.zeros((group.x.size, group.x.size))
+    slope = minimum.joint.theta_slope(minimum.x)
+    values[at] = minimum.joint.theta(minimum.x)
+    covariance[np.ix_(at, at)] = slope @ minimum.covariance @ slope.T
+    return values, covariance
 
 
 def _with_common_damping(problem: FitProblem) -> tuple[JointEstimate, tuple[DofDamping, ...]]:
@@ -379,9 +456,8 @@ def _with_common_damping(problem: FitProblem) -> tuple[JointEstimate, tuple[DofD
     for kind, result in results.items():
         squares = sum(group.squares for group in result.groups)
         scores[kind] = 2 * squares / factor + len(result.parameters) * np.log(max(2 * result.equations / factor, 2.0))
-    best, second = sorted(scores, key=lambda kind: scores[kind])[:2]
-    margin = scores[second] - scores[best]
-    return results[best], tuple(DofDamping(dof, best, second, margin) for dof in problem.dofs)
+    choices = tuple(DofDamping.by_scores(dof, scores)._replace(others=()) for dof in problem.dofs)
+    return results[choices[0].best], choices
 
 
 def _starts(
@@ -392,7 +468,7 @@ def _starts(
     return tuple(
         GroupStart.of(group, _minimum(group, terms.of_dofs(group.dofs)[0]))
         for group in found.groups
-        if group.converged or group.is_noise
+        if (group.converged or group.is_noise) and not isinstance(group.joint, SoftJoint)
     )
 
 
@@ -448,14 +524,17 @@ def choose_damping(group: GroupFit, dofs: tuple[str, ...], factor: float) -> lis
             scores[kind] = 2 * found.cost / factor + len(terms.parameters) * price
             if kind == "both" and (damping <= 0).any():
                 scores[kind] = np.inf
-        best, second = sorted(scores, key=lambda kind: scores[kind])[:2]
-        choices.append(DofDamping(dof, best, second, scores[second] - scores[best]))
+        one = DofDamping.by_scores(dof, scores)
+        # Few lines cannot give the terms of all kinds.
+        choices.append(one if 2 * group.equations > group.x.size else one._replace(others=()))
     return choices
 
 
 def _minimum(group: GroupFit, terms: JointTerms) -> FormMinimum:
     """Minimise the forms of a group with other terms, from the joint found; terms that it has not begin at zero."""
     joint = coordinates_of(terms)
+    if isinstance(group.joint, SoftJoint):
+        joint = SoftJoint(terms, group.joint.soft)
     found = dict(zip(group.joint.names, group.joint.theta(group.x).tolist(), strict=True))
     theta = np.array([found.get(one.name, 0.0) for one in terms.parameters])
     return joint.minimise(group.forms, joint.coordinates(theta))

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import special
 
 from jointfrf.frf.bands import in_pieces, is_long
 from jointfrf.identification.manifold.line_forms import FormMinimum, JointCoordinates, LineForms
@@ -27,7 +28,16 @@ from jointfrf.identification.manifold.on_manifold import (
 from jointfrf.identification.minimise import inverse_information
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
-__all__ = ["LITTLE_PATIENCE", "GroupFit", "GroupProblem", "UnknownCrossTerms", "effects_of", "fit_dofs", "gradients_of"]
+__all__ = [
+    "FAR",
+    "LITTLE_PATIENCE",
+    "GroupFit",
+    "GroupProblem",
+    "UnknownCrossTerms",
+    "effects_of",
+    "fit_dofs",
+    "gradients_of",
+]
 
 #: Linearisations at most.
 _MOST = 25
@@ -36,7 +46,10 @@ _MOVED = 0.02
 #: Steps of the projection: of the first one, of those that follow a small change of the joint, of lines started again.
 _FIRST_STEPS, _NEXT_STEPS, _OTHER_STEPS = 30, 8, 25
 #: A line that stays farther from the manifold than this, in squares per unknown and of the noise, is not used.
-_FAR = 3.0
+FAR = 3.0
+#: Of fewer lines those that were not smoothed are not used beyond what noise reaches with this probability, and so many
+#: times that for what is not known of its level.
+_NOT_SMOOTHED, _BY_CHANCE, _LEVEL = 50, 1e-3, 2.0
 #: Linearisations of a fit that stays far from the data, from the first start and from others; after twice the first
 #: number lines that are not used do not come back.
 PATIENCE, LITTLE_PATIENCE = 8, 4
@@ -177,7 +190,7 @@ class GroupFit(FormMinimum):
     @property
     def squares(self) -> float:
         """Squares of the residual; a line that is not used counts as one that just is not."""
-        return self.cost + _FAR * (self.possible - self.equations)
+        return self.cost + FAR * (self.possible - self.equations)
 
     @property
     def is_lost(self) -> bool:
@@ -377,23 +390,34 @@ def _iterated(
                 iterations=step, converged=converged, on=kept,
             )  # fmt: skip
         x = x + length.of(change, minimum.information, is_lost=is_lost) * change
-        linearised_at = _within_sight(minimum, x) if joint.in_compliance else x
+        linearised_at = _within_sight(minimum, x) if joint.in_compliance else joint.within_sight(minimum, x)
         # Of a long sweep the forms of one step take as much memory as those of the next.
         del forms, minimum
     raise AssertionError
 
 
 class _LinesUsed:
-    """Which lines are near enough to the manifold; half of them where few are. In a long search none comes back."""
+    """Which lines are near enough to the manifold; half of them where few are. In a long search none comes back.
+
+    Few are those that are fewer than the parameters, or than a quarter of all; of so few in all none is left out. FRFs
+    that were not smoothed lie off the manifold by all of their noise, whose level few lines show to a factor.
+    """
 
     def __init__(self, problem: GroupProblem) -> None:
-        self.farthest, self.least = _FAR * problem.joint.n**2, problem.joint.lower.size
-        self.last = np.ones(len(problem.data.measured), np.bool_)
+        data, n_freq = problem.data, len(problem.data.measured)
+        self.farthest = FAR * problem.joint.n**2
+        if n_freq < _NOT_SMOOTHED and np.allclose(data.measured, data.smooth, rtol=1e-9, atol=0):
+            chance = special.gammainccinv(float(np.median(problem.equations())), _BY_CHANCE / n_freq)
+            self.farthest = max(self.farthest, _LEVEL * float(chance))
+        self.least = max(problem.joint.lower.size, n_freq // 4)
+        self.last = np.ones(n_freq, np.bool_)
 
     def near(self, on: OnManifold, step: int) -> NDArray[np.bool_]:
         """Return the lines used in a step of the search."""
         near = np.asarray(on.squares <= self.farthest)
-        if np.count_nonzero(near) < max(self.least, len(near) // 4):
+        if len(near) <= self.least:
+            near = np.ones_like(near)
+        elif np.count_nonzero(near) < self.least:
             near = on.squares <= np.quantile(on.squares, 0.5)
         both = near & self.last
         self.last = both if step > 2 * PATIENCE and both.any() else near
@@ -414,7 +438,7 @@ class _ChoiceOfM:
     def holds_for(self, minimum: FormMinimum, step: int) -> bool:
         """Return whether a minimum agrees with the choice made for its step; make that for the next."""
         error = np.sqrt(np.maximum(np.diagonal(minimum.covariance), 1e-300))
-        poorly = bool((error > _POORLY * abs(minimum.x))[minimum.joint.is_compliance].any())
+        poorly = bool((error > _POORLY * abs(minimum.x))[minimum.joint.is_compliance & (self._prior is not None)].any())
         holds = self.prior is not None or not poorly
         self.prior = self._prior if poorly or (self.prior is not None and step > 1) else None
         return holds
@@ -505,7 +529,7 @@ def _unit_places(data: LineData) -> NDArray[np.intp]:
 
 def _rescued(data: LineData, c: ComplexArray, on: OnManifold) -> OnManifold:
     """Give lines far from the manifold other starts."""
-    far = np.flatnonzero(~(on.squares <= _FAR * data.entries.n**2))
+    far = np.flatnonzero(~(on.squares <= FAR * data.entries.n**2))
     if far.size == 0 or far.size == len(c):
         return on
     other = starts_on_manifold(data.on_lines(far), c[far], _OTHER_STEPS)

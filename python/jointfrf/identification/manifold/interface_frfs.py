@@ -9,13 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf.errors import IllConditionedWarning
-from jointfrf.frf.bands import in_pieces
+from jointfrf.frf.bands import in_pieces, spread_lines
 from jointfrf.frf.entry_groups import connected
+from jointfrf.frf.quantiles import medians
 from jointfrf.identification.manifold.on_manifold import FrfEntries, LineData
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.substructuring.modification import inverse_substructuring
 
-__all__ = ["InterfaceFrfs"]
+__all__ = ["InterfaceFrfs", "direction_share", "mean_of_directions"]
 
 NumbersT = TypeVar("NumbersT", ComplexArray, FloatArray)
 #: A smooth FRF below this share of sqrt|h_pp h_qq| and of its own noise is zero by symmetry.
@@ -146,9 +147,13 @@ class InterfaceFrfs(NamedTuple):
         at = np.concatenate([dofs, dofs + self.n])
         t_r, t_f = self.responses[at], self.forces[at]
         entries = FrfEntries.of(len(dofs), reciprocal=self.reciprocal)
+        share = None
+        if self.reciprocal and not self.symmetrised and np.array_equal(self.responses, self.forces):
+            share = direction_share(self.variance)
 
         def of_lines(own: slice) -> list[NDArray[Any]]:
             part = self.on_lines(own)
+            part = part if share is None else part._made_reciprocal(share)
             measured = entries.take(_mean(between(t_r, part.measured, t_f), self.reciprocal))
             if part.noise_paths is None:
                 inverse_std, whitening = part._weights(entries, t_r, t_f)
@@ -180,6 +185,17 @@ class InterfaceFrfs(NamedTuple):
         at = np.concatenate([dofs, dofs + self.n])
         entries = FrfEntries.of(len(dofs), reciprocal=self.reciprocal)
         return entries.take(_mean(gamma[:, at[:, None], at], self.reciprocal))
+
+    def _made_reciprocal(self, share: FloatArray) -> InterfaceFrfs:
+        """Return the same with the means of h_pq and h_qp, one measurement each; not used where one is not."""
+        known = np.isfinite(self.variance)
+        own = np.where(known, share**2 * np.where(known, self.variance, 0), np.inf)
+        diagonal = np.eye(len(share), dtype=bool)
+        return self._replace(
+            measured=mean_of_directions(self.measured, share),
+            variance=np.where(diagonal, self.variance, own + own.swapaxes(1, 2)),
+            symmetrised=True,
+        )
 
     def _weights(self, entries: FrfEntries, t_r: FloatArray, t_f: FloatArray) -> tuple[FloatArray, FloatArray | None]:
         """Return 1/sqrt(variance), and unless every DOF is one channel, the triangles that whiten the correlation."""
@@ -256,6 +272,25 @@ class InterfaceFrfs(NamedTuple):
             covariance *= size[:, :, None] * size[:, None, :]
             whitening[:, block[:, None], block] = _triangles(covariance, dead)
         return inverse_std, whitening
+
+
+def direction_share(variance: FloatArray) -> FloatArray:
+    """Return which share h_pq has in the mean of h_pq and h_qp, by their variances E|e|^2, shape (m, m).
+
+    The same on all lines: variances that follow measured FRFs would favour the smaller one of each line.
+    """
+    some = variance[spread_lines(len(variance))]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        share = some.swapaxes(1, 2) / (some + some.swapaxes(1, 2))
+    of_entries = medians(np.where(np.isfinite(share), share, 0.5).T).T
+    return np.asarray(of_entries / (of_entries + of_entries.T))
+
+
+def mean_of_directions(h: ComplexArray, share: FloatArray) -> ComplexArray:
+    """Return the mean of h_pq and h_qp, the former with this share, shape (n_freq, m, m)."""
+    own = share * h
+    mean: ComplexArray = own + own.swapaxes(1, 2)
+    return mean
 
 
 def _mean(gamma: ComplexArray, reciprocal: bool) -> ComplexArray:

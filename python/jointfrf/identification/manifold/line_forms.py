@@ -222,6 +222,10 @@ class JointCoordinates(ABC):
         """Which coordinates are compliances, shape (p,)."""
         return self.is_stiffness & self.in_compliance
 
+    def may_be_rigid(self, i: int) -> bool:
+        """Whether a parameter is of a DOF whose coordinate is its compliance."""
+        return False
+
     @abstractmethod
     def on_lines(self, lines: slice | NDArray[np.intp]) -> JointCoordinates:
         """Return the same on some of the lines."""
@@ -291,6 +295,10 @@ class JointCoordinates(ABC):
     ) -> FormMinimum:
         """Minimise as `minimise` does, from other starts, too, where a minimum may not be the lowest."""
         return self.minimise(forms, start, held, least_gain)
+
+    def within_sight(self, minimum: FormMinimum, x: FloatArray) -> FloatArray:
+        """Return where to linearise near coordinates x, by what a minimum shows to be known."""
+        return x
 
     def has_profile(self, i: int, x: FloatArray, covariance: FloatArray) -> bool:
         """Whether noise is so far from normal in a coordinate that the interval of its parameter needs a profile."""

@@ -16,7 +16,7 @@ from jointfrf.frf.quantiles import medians
 from jointfrf.identification.manifold.coordinates import CrossTerms, DampingTerms
 from jointfrf.identification.manifold.estimate import GroupStart, JointEstimate
 from jointfrf.identification.manifold.flexible_sides import SideBending, side_bending
-from jointfrf.identification.manifold.interface_frfs import InterfaceFrfs
+from jointfrf.identification.manifold.interface_frfs import InterfaceFrfs, direction_share, mean_of_directions
 from jointfrf.identification.manifold.transforms import (
     Transform,
     Transforms,
@@ -155,6 +155,9 @@ def prepare_compliance(
     if not is_checked:
         _check_joint_dofs(transforms, h, names)
     found = noise_of_matrix(freq, h, noise, reciprocal=options.reciprocal and square)
+    if options.reciprocal and square and not _is_symmetrised(found.smooth):
+        # Few lines are not smoothed.
+        found = found._replace(smooth=mean_of_directions(found.smooth, direction_share(found.variance)))
     smooth, variance = transforms.gamma(found.smooth), found.variance
     check_joint_seen(freq, smooth, transforms.variance(variance))
     transforms = transforms.with_modes(found.smooth)

@@ -11,8 +11,8 @@ from scipy import special
 from jointfrf.frf.bands import in_pieces, line_slices
 from jointfrf.identification.manifold.beyond_noise import JointCalibration
 from jointfrf.identification.manifold.estimate import JointEstimate
-from jointfrf.identification.manifold.group_fit import GroupFit
-from jointfrf.identification.manifold.line_forms import FormSquares
+from jointfrf.identification.manifold.group_fit import FAR, GroupFit
+from jointfrf.identification.manifold.line_forms import FormMinimum, FormSquares
 from jointfrf.identification.minimise import inverse_information
 from jointfrf.identification.profile import Intervals, ProfileIntervals
 from jointfrf.identification.residual_test import ResidualTest, Trend, local_excess
@@ -130,14 +130,19 @@ def joint_intervals(found: JointEstimate, factor: FloatArray, added: FloatArray 
     """
     more = np.zeros_like(factor) if added is None else added
     place = {which: (group, i) for group in found.groups for i, which in enumerate(group.which.tolist())}
+    kinds = {
+        which: own for group, own in zip(found.groups, found.kinds, strict=False) for which in group.which.tolist()
+    }
 
     def limits(which: int, probability: float) -> tuple[float, float]:
         group, i = place[which]
         own = _limits(group, i, float(factor[which]), probability)
+        for kind in kinds.get(which, ()):
+            own = _with_kind(own, kind, group.joint.names[i], float(factor[which]), probability)
         if not more[group.which].any():
             return own
         reach = float(special.ndtri((1 + probability) / 2)) * float(more[which])
-        if group.joint.in_compliance and not group.joint.is_stiffness[i]:
+        if group.joint.may_be_rigid(i) and not group.joint.is_stiffness[i]:
             stiffness = int(group.which[group.joint.dofs[i]])
             if not np.isfinite(limits(stiffness, probability)[1]):
                 # A rigid DOF shows no damping.
@@ -166,7 +171,16 @@ def joint_intervals(found: JointEstimate, factor: FloatArray, added: FloatArray 
     return Intervals([one.name for one in found.parameters], limits, of_function)
 
 
-def _limits(group: GroupFit, i: int, factor: float, probability: float) -> tuple[float, float]:
+def _with_kind(
+    limits: tuple[float, float], kind: FormMinimum, name: str, factor: float, probability: float
+) -> tuple[float, float]:
+    """Return limits of a parameter that hold those of a kind of damping, too; zero where this has no such term."""
+    names = kind.joint.names
+    low, high = _limits(kind, names.index(name), factor, probability) if name in names else (0.0, 0.0)
+    return min(limits[0], low), max(limits[1], high)
+
+
+def _limits(group: FormMinimum, i: int, factor: float, probability: float) -> tuple[float, float]:
     """Return the limits of one parameter of a group."""
     joint, x, covariance = group.joint, group.x, group.covariance * factor
     if joint.has_profile(i, x, covariance):
@@ -198,12 +212,13 @@ def _widened(group: GroupFit, i: int, limits: tuple[float, float], reach: float)
     return float(1 / softest), float(1 / stiffest) if stiffest > 0 else np.inf
 
 
-def profile_interval(group: GroupFit, i: int, factor: float, probability: float = 0.95) -> tuple[float, float]:
+def profile_interval(group: FormMinimum, i: int, factor: float, probability: float = 0.95) -> tuple[float, float]:
     """Interval of one parameter of a group by profile likelihood.
 
     Parameters
     ----------
-    group : GroupFit
+    group : FormMinimum
+        Of a group of DOFs.
     i : int
         Parameter among those of the group.
     factor : float
@@ -224,15 +239,15 @@ def profile_interval(group: GroupFit, i: int, factor: float, probability: float 
     best = group if joint is group.joint else joint.lowest(group.forms, joint.coordinates(group.joint.theta(group.x)))
     profile = ProfileIntervals(
         FormSquares(group.forms, joint), joint, best.x, best.cost, best.covariance, factor,
-        (lambda x, held: joint.lowest(group.forms, x, held, _PRECISE).cost) if joint.in_compliance else None,
+        (lambda x, held: joint.lowest(group.forms, x, held, _PRECISE).cost) if joint.is_compliance.any() else None,
     )  # fmt: skip
-    if not (joint.in_compliance and _may_be_rigid(group, int(joint.dofs[i]), factor, probability)):
+    if not (joint.may_be_rigid(i) and _may_be_rigid(group, int(joint.dofs[i]), factor, probability)):
         return profile.of(i, probability)
     # A rigid DOF shows no damping.
     return (profile.limit(i, 1, probability), np.inf) if joint.is_stiffness[i] else (-np.inf, np.inf)
 
 
-def _may_be_rigid(group: GroupFit, dof: int, factor: float, probability: float) -> bool:
+def _may_be_rigid(group: FormMinimum, dof: int, factor: float, probability: float) -> bool:
     """Whether the squares of a rigid DOF, which has none of its parameters, exceed their minimum by chance."""
     start = group.x.copy()
     start[dof] = 0.0
@@ -269,13 +284,14 @@ def residual_test_of(
     from the whole, over their variance, are those of chi^2.
     """
     sigma = float(np.sqrt(2 * inflation / max(found.equations, 1.0)) / 2)
-    excess = found.excess
+    added = 1.0
     if calibration is not None:
-        excess /= 1 + calibration.excess
-        sigma = float(np.hypot(sigma, calibration.excess_error / (1 + calibration.excess) / 2))
+        added += calibration.excess
+        sigma = float(np.hypot(sigma, calibration.excess_error / added / 2))
     factor = np.fmax(np.maximum(spread.information, inflation), spread.lines)
     trends = tuple(t for group in found.groups for t in _trends(group, freq_hz, factor[group.which], calibration))
-    test = ResidualTest(float(np.sqrt(excess)), sigma, trends=trends)
+    ratio, of_all = float(np.sqrt(found.excess / added)), _ratio_of_all(found) / np.sqrt(added)
+    test = ResidualTest(ratio, sigma, trends=trends, of_all=of_all)
     if not test.is_large:
         return test
     squares, expected = np.zeros((2, freq_hz.size))
@@ -283,6 +299,22 @@ def residual_test_of(
         squares += group.forms.at(group.joint.compliance(group.x))[0]
         expected += group.used * (group.equations / max(float(np.count_nonzero(group.used)), 1.0))
     return test._replace(local=local_excess(squares, expected, freq_hz))
+
+
+def _ratio_of_all(found: JointEstimate) -> float:
+    """Return the residual over the noise with the lines left out, by their distance from what fits the joint."""
+    squares = equations = 0.0
+    for group in found.groups:
+        out = ~group.used
+        own = group.problem.equations()[out]
+        apart = np.full(own.size, FAR * group.joint.n**2) if group.on is None else group.on.squares[out]
+        # The distance is that of the smooth FRFs, without their noise.
+        known = np.isfinite(apart)
+        squares += group.noise_squares + float(apart[known].sum() + own[known].sum())
+        equations += group.equations + float(own[known].sum())
+    if all(group.used.all() for group in found.groups):
+        return float("nan")
+    return float(np.sqrt(squares / max(equations - len(found.parameters) / 2, 1)))
 
 
 def _trends(
