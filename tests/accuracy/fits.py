@@ -22,12 +22,14 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "python" / "support"))
 
-from trials import TRIALS, Trial, system
+from trials import SIZES, TRIALS, Trial
 
 import jointfrf as jf
 from cramer_rao import cramer_rao
 from jointfrf.identification.manifold.coordinates import joint_terms
 
+#: Terms of a truth that is not named by them.
+_TERMS = {"free": "viscous", "free, undamped": "none"}
 #: A parameter so many times away from the truth, while its interval says otherwise, has run off.
 _RUN_OFF = 3.0
 
@@ -61,7 +63,7 @@ def one_draw(trial: Trial, seed: int) -> Draw:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
-            fit = jf.identify(freq, gamma, joint.dofs, damping="viscous", cross=trial.cross)
+            fit = jf.identify(freq, gamma, joint.dofs, damping=trial.damping, cross=trial.cross)
         except ValueError:
             # No joint was found, and that is said.
             return Draw({}, {}, time.perf_counter() - start)
@@ -70,19 +72,25 @@ def one_draw(trial: Trial, seed: int) -> Draw:
 
 
 def truth_of(trial: Trial) -> tuple[dict[str, float], dict[str, float]]:
-    """Parameters of the joint, and their Cramer-Rao bound for circular noise relative to each entry."""
-    own = system(trial.system, trial.factor)
-    freq, gamma, joint = own.freq_hz[:: trial.step], own.gamma[:: trial.step], own.joint
-    terms = joint_terms(2 * np.pi * freq, joint.dofs, "viscous", trial.cross)
-    matrices = {0: joint.stiffness, 2: joint.damping}
+    """Parameters of the joint, and their Cramer-Rao bound.
+
+    For the noise as it is, where it is independent and circular; else as if it were that, and relative to each entry.
+    """
+    freq, gamma, joint = trial.exact.freq_hz, trial.exact.gamma, trial.exact.joint
+    if "missing" in trial.noise:
+        # The same share of the lines, evenly spread.
+        freq, gamma = (np.delete(one, np.s_[::5], axis=0) for one in (freq, gamma))
+    terms = joint_terms(2 * np.pi * freq, joint.dofs, _TERMS.get(trial.kind, trial.kind), trial.cross)
+    matrices = {0: joint.stiffness, 1: joint.structural_damping, 2: joint.damping}
     values = [matrices[kind][a, b] for kind, (a, b) in zip(terms.kinds, terms.pairs, strict=True)]
     names = [one.name for one in terms.parameters]
+    std = abs(SIZES[trial.noise](gamma, freq) if trial.noise in SIZES else gamma)
     bound = np.full(len(names), np.nan)
     for group in _groups(gamma):
         own_terms, which = terms.of_dofs(group)
         at = np.concatenate([group, group + len(joint.dofs)])
-        k = joint.dynamic_stiffness(freq)[:, group[:, None], group]
-        covariance = cramer_rao(gamma[:, at[:, None], at], k, own_terms)
+        k, own = joint.dynamic_stiffness(freq)[:, group[:, None], group], np.ix_(range(freq.size), at, at)
+        covariance = cramer_rao(gamma[own], k, own_terms, std=std[own])
         bound[which] = trial.level * np.sqrt(np.diag(covariance))
     return dict(zip(names, values, strict=True)), dict(zip(names, bound.tolist(), strict=True))
 
@@ -113,19 +121,19 @@ def row_of(trial: Trial, draws: Sequence[Draw]) -> Row:
     draws = [draw for draw in draws if draw.value]
     ratio, coverage, run_off = {}, {}, np.zeros(len(draws), bool)
     for name, true in truth.items():
-        value = np.array([draw.value.get(name, np.nan) for draw in draws])
-        low, high = np.array([draw.interval.get(name, (np.nan, np.nan)) for draw in draws]).T
+        value = np.array([draw.value.get(name, 0.0) for draw in draws])
+        low, high = np.array([draw.interval.get(name, (0.0, 0.0)) for draw in draws]).T
         inside = (low <= true) & (true <= high)
         coverage[name] = float(inside.mean())
         error, scale = value - true, bound[name]
-        if name.startswith("k") and trial.cross != "fit":
+        if name.startswith("k") and trial.cross != "fit" and true > 0:
             with np.errstate(divide="ignore"):
                 error, scale = 1 / value - 1 / true, bound[name] / true**2
         ratio[name] = float(np.sqrt((error**2).mean()) / scale)
         with np.errstate(invalid="ignore"):
             far = (
                 (value > _RUN_OFF * true) | (value < true / _RUN_OFF)
-                if name.startswith("k") and "," not in name
+                if name.startswith("k") and "," not in name and true > 0
                 else np.zeros_like(run_off)
             )
         run_off |= far & ~inside

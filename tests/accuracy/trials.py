@@ -11,7 +11,7 @@ import numpy as np
 import jointfrf as jf
 from six_dof_beams import DOFS, FREQ, JOINT, assembly
 
-__all__ = ["NOISES", "TRIALS", "System", "Trial", "running_mean", "system"]
+__all__ = ["NOISES", "SIZES", "TRIALS", "System", "Trial", "running_mean", "system"]
 
 
 @dataclass(frozen=True)
@@ -23,31 +23,48 @@ class System:
     joint: jf.Joint
 
 
-def _chains(_: float) -> System:
+#: Share of a stiffness that hysteretic damping has.
+_LOSS = 0.05
+
+
+def _damped(joint: jf.Joint, kind: str) -> jf.Joint:
+    """The same stiffness with damping of another kind."""
+    viscous = joint.damping if kind in ("viscous", "both") else None
+    hysteretic = _LOSS * joint.stiffness if kind in ("hysteretic", "both") else None
+    return jf.Joint(joint.stiffness, viscous, joint.dofs, structural_damping=hysteretic)
+
+
+def _chains(_: float, kind: str) -> System:
     a = jf.chain([5, 3], [2500, 3500], [3, 4], ground="start")
     b = jf.chain([4, 2], [2000, 2500], [2, 1], ground="end")
     freq = np.linspace(0.5, 10, 951)
-    joint = jf.Joint([2000.0], [3.0], ["x"])
+    joint = _damped(jf.Joint([2000.0], [3.0], ["x"]), kind)
     h_a, h_b = a.receptance(freq, [1]), b.receptance(freq, [0])
     return System(freq, jf.couple(h_a, h_b, joint.dynamic_stiffness(freq), [0], [0]), joint)
 
 
-def _beams(freq: np.ndarray, elements: tuple[int, int], factor: float) -> System:
+def _beams(freq: np.ndarray, elements: tuple[int, int], factor: float, kind: str) -> System:
     section = {"youngs_modulus": 67e9, "density": 2700.0, "width": 0.025, "height": 0.006, "loss_factor": 0.01}
     a = jf.beam(0.3, elements[0], ends=("clamped", "free"), **section)
     b = jf.beam(0.225, elements[1], **section)
     joint = jf.Joint(np.array([6e5, 5e3]) * factor, np.array([20, 1.5]) * factor, ["y", "theta"])
+    if kind.startswith("free"):
+        # theta has no stiffness; no DOF has damping where it is "free, undamped".
+        joint = jf.Joint([6e5, 0.0], [0.0, 0.0] if "undamped" in kind else [20.0, 0.1], ["y", "theta"])
+    else:
+        joint = _damped(joint, kind)
     tip = str(elements[0] + 1)
     h_a = a.receptance(freq, a.index(f"{tip}:y", f"{tip}:theta"))
     h_b = b.receptance(freq, b.index("1:y", "1:theta"))
     return System(freq, jf.couple(h_a, h_b, joint.dynamic_stiffness(freq), [0, 1], [0, 1]), joint)
 
 
-def _six(_: float) -> System:
-    return System(FREQ, assembly(), JOINT)
+def _six(_: float, kind: str) -> System:
+    joint = _damped(JOINT, kind)
+    return System(FREQ, assembly(joint), joint)
 
 
-def _full(_: float) -> System:
+def _full(_: float, kind: str) -> System:
     def whole(diagonal: np.ndarray, seed: int) -> np.ndarray:
         mixed = np.random.default_rng(seed).standard_normal((6, 24))
         product = mixed @ mixed.T
@@ -59,19 +76,19 @@ def _full(_: float) -> System:
     return System(freq, assembly(joint, freq), joint)
 
 
-_SYSTEMS: dict[str, Callable[[float], System]] = {
+_SYSTEMS: dict[str, Callable[[float, str], System]] = {
     "3.1": _chains,
-    "3.2": lambda factor: _beams(np.arange(15.0, 900.5, 2.0), (2, 1), factor),
-    "3.3": lambda factor: _beams(np.arange(15.0, 801.0), (12, 9), factor),
+    "3.2": lambda factor, kind: _beams(np.arange(15.0, 900.5, 2.0), (2, 1), factor, kind),
+    "3.3": lambda factor, kind: _beams(np.arange(15.0, 801.0), (12, 9), factor, kind),
     "six DOFs": _six,
     "full 6 x 6": _full,
 }
 
 
 @cache
-def system(name: str, factor: float = 1.0) -> System:
-    """One of the assemblies; the joint `factor` times as stiff."""
-    return _SYSTEMS[name](factor)
+def system(name: str, factor: float = 1.0, kind: str = "viscous") -> System:
+    """One of the assemblies; the joint `factor` times as stiff, its damping of this kind."""
+    return _SYSTEMS[name](factor, kind)
 
 
 def _circular(rng: np.random.Generator, shape: tuple[int, ...]) -> np.ndarray:
@@ -93,37 +110,58 @@ def _floor(gamma: np.ndarray) -> np.ndarray:
     return np.median(abs(gamma), axis=0)
 
 
-def _by_entry(rng: np.random.Generator, gamma: np.ndarray, level: float) -> np.ndarray:
+def _by_entry(gamma: np.ndarray, _: np.ndarray) -> np.ndarray:
     n = gamma.shape[1]
-    of_entry = 4.0 ** (((3 * np.arange(n)[:, None] + 5 * np.arange(n)) % 7) / 3 - 1)
-    return level * of_entry * gamma * _circular(rng, gamma.shape)
+    of_entry: np.ndarray = 4.0 ** (((3 * np.arange(n)[:, None] + 5 * np.arange(n)) % 7) / 3 - 1)
+    return of_entry * gamma
 
 
-def _hum(rng: np.random.Generator, gamma: np.ndarray, level: float, freq_hz: np.ndarray) -> np.ndarray:
+def _hum(gamma: np.ndarray, freq_hz: np.ndarray) -> np.ndarray:
     spacing = np.diff(freq_hz).min()
     near = abs(freq_hz - 50 * np.round(freq_hz / 50)) < spacing / 2
     size = np.where(near & (freq_hz > 25), 100.0, 1.0)[:, None, None]
-    return level * size * gamma * _circular(rng, gamma.shape)
+    return size * gamma
 
 
-#: Noise of FRFs by its kind: a function of a generator, the exact FRFs, the level and the frequencies.
-NOISES: dict[str, Callable[[np.random.Generator, np.ndarray, float, np.ndarray], np.ndarray]] = {
-    "complex": lambda rng, g, level, f: level * g * _circular(rng, g.shape),
+def _one_direction(gamma: np.ndarray, _: np.ndarray) -> np.ndarray:
+    """Noise of FRFs below the diagonal that is 8/0.3 times that of those above: other sensors, other hammers."""
+    return np.where(np.tri(gamma.shape[1], dtype=bool), 1.0, 0.3 / 8) * gamma
+
+
+def _rising(gamma: np.ndarray, freq_hz: np.ndarray) -> np.ndarray:
+    share = (freq_hz - freq_hz[0]) / (freq_hz[-1] - freq_hz[0])
+    return 100.0 ** (share[:, None, None] - 1) * gamma
+
+
+def _in_accelerance(gamma: np.ndarray, freq_hz: np.ndarray) -> np.ndarray:
+    squared = (freq_hz**2)[:, None, None]
+    return np.median(abs(gamma) * squared, axis=0) / squared
+
+
+#: Independent circular noise: its size in each FRF for a level of 1, up to a phase, by exact FRFs and frequencies.
+SIZES: dict[str, Callable[[np.ndarray, np.ndarray], np.ndarray]] = {
+    "complex": lambda g, f: g,
+    "floor": lambda g, f: np.broadcast_to(_floor(g), g.shape),
+    "mixed": lambda g, f: np.hypot(abs(g), _floor(g)),
+    "by entry": _by_entry,
+    "hum at multiples of 50 Hz": _hum,
+    "a fifth of the lines missing": lambda g, f: g,
+    "0.3 % in one direction": _one_direction,
+    "rising 100-fold": _rising,
+    "constant in accelerance": _in_accelerance,
+}
+_OTHERS: dict[str, Callable[[np.random.Generator, np.ndarray, float, np.ndarray], np.ndarray]] = {
     "real": lambda rng, g, level, f: level * g * rng.standard_normal(g.shape),
     "uniform": lambda rng, g, level, f: level * g * rng.uniform(-np.sqrt(3), np.sqrt(3), g.shape),
-    "floor": lambda rng, g, level, f: level * _floor(g) * _circular(rng, g.shape),
-    "mixed": lambda rng, g, level, f: level * (g * _circular(rng, g.shape) + _floor(g) * _circular(rng, g.shape)),
-    "by entry": lambda rng, g, level, f: _by_entry(rng, g, level),
     "correlated over 5 lines": lambda rng, g, level, f: running_mean(5)(rng, g, level),
     "correlated over 25 lines": lambda rng, g, level, f: running_mean(25)(rng, g, level),
-    "hum at multiples of 50 Hz": _hum,
-    "a fifth of the lines missing": lambda rng, g, level, f: level * g * _circular(rng, g.shape),
 }
+NOISES = (*SIZES, *_OTHERS)
 
 
 @dataclass(frozen=True)
 class Trial:
-    """One row of the table."""
+    """One row of the table; `damping` is what `identify` is told, `kind` the truth."""
 
     system: str
     noise: str
@@ -131,6 +169,8 @@ class Trial:
     factor: float = 1.0
     step: int = 1
     cross: str = "zero"
+    damping: str = "viscous"
+    kind: str = "viscous"
 
     @property
     def name(self) -> str:
@@ -139,23 +179,34 @@ class Trial:
         if self.factor != 1:
             words.append(f"joint x{self.factor:g}")
         if self.step != 1:
-            words.append(f"{system(self.system).freq_hz[:: self.step].size} lines")
+            words.append(f"{self.exact.freq_hz.size} lines")
+        if self.damping != "viscous" or self.kind != "viscous":
+            words.append(f"damping {self.damping}, truth {self.kind}")
         return ", ".join(words)
+
+    @property
+    def exact(self) -> System:
+        """What is polluted."""
+        own = system(self.system, self.factor, self.kind)
+        return System(own.freq_hz[:: self.step], own.gamma[:: self.step], own.joint)
 
     def draw(self, seed: int) -> tuple[np.ndarray, np.ndarray, jf.Joint]:
         """Frequencies, polluted FRFs and the joint of one draw."""
-        own = system(self.system, self.factor)
+        freq, gamma, joint = self.exact.freq_hz, self.exact.gamma, self.exact.joint
         rng = np.random.default_rng([seed, len(self.name)])
-        freq, gamma = own.freq_hz[:: self.step], own.gamma[:: self.step]
-        polluted = gamma + NOISES[self.noise](rng, gamma, self.level, freq)
+        if self.noise in SIZES:
+            polluted = gamma + self.level * SIZES[self.noise](gamma, freq) * _circular(rng, gamma.shape)
+        else:
+            polluted = gamma + _OTHERS[self.noise](rng, gamma, self.level, freq)
         if "missing" in self.noise:
             kept = np.sort(rng.permutation(freq.size)[: int(0.8 * freq.size)])
             freq, polluted = freq[kept], polluted[kept]
-        return freq, polluted, own.joint
+        return freq, polluted, joint
 
 
 def _trials() -> dict[str, list[Trial]]:
-    kinds = [Trial("3.3", noise, 0.02) for noise in NOISES]
+    levels_of = {"0.3 % in one direction": 0.08, "rising 100-fold": 0.1}
+    kinds = [Trial("3.3", noise, levels_of.get(noise, 0.02)) for noise in NOISES]
     levels = [Trial("3.3", "complex", level) for level in (0.005, 0.01, 0.05, 0.1)]
     stiff = [
         Trial("3.3", "complex", level, factor)
@@ -170,7 +221,18 @@ def _trials() -> dict[str, list[Trial]]:
             (1e5, 0.01),
         ]
     ]
-    few = [Trial("3.3", "complex", 0.05, step=step) for step in (300, 160, 80, 40)]
+    few = [Trial("3.3", "complex", 0.05, step=step) for step in (400, 300, 160, 80, 49, 40, 26, 20)]
+    few += [Trial("3.3", noise, 0.02, step=26) for noise in ("by entry", "floor", "0.3 % in one direction")]
+    damping = [
+        Trial(name, "complex", level, damping="auto", kind=kind)
+        for name, level in (("3.1", 0.05), ("3.3", 0.01), ("3.3", 0.05))
+        for kind in ("none", "viscous", "hysteretic", "both")
+    ]
+    free = [
+        Trial("3.3", "complex", level, damping=damping, kind=kind)
+        for level in (0.01, 0.05)
+        for damping, kind in (("viscous", "free"), ("none", "free, undamped"), ("auto", "free"))
+    ]
     return {
         "bound": [
             *[Trial(name, "complex", 0.05) for name in ("3.1", "3.2", "3.3")],
@@ -178,9 +240,11 @@ def _trials() -> dict[str, list[Trial]]:
             *[Trial("full 6 x 6", "complex", level, cross="fit") for level in (0.01, 0.03, 0.05)],
         ],
         "levels": levels,
-        "kinds": kinds,
+        "kinds": [*kinds, Trial("six DOFs", "0.3 % in one direction", 0.08), Trial("six DOFs", "floor", 0.02)],
         "stiff": stiff,
         "few": few,
+        "damping": damping,
+        "free": free,
     }
 
 
