@@ -113,7 +113,7 @@ def test_the_joint_alone_is_stiffer_than_seen_by_what_bends():
     noise = 1e-11 * (rng.standard_normal((200, 2)) + 1j * rng.standard_normal((200, 2)))
     c = 1e-8 * (1 + x + x**2)[:, None] + noise
     bending = SideBending(*(np.full(2, v) for v in (1e-10, 2e-10)))
-    fitted = (np.full(2, 2e-8), np.full(2, 1e-12))
+    fitted = (np.full(2, 2e-8), np.full(2, 1e-12), np.zeros(2))
     found = joint_alone(omega, c, np.full((200, 2), 2e-22), fitted, np.full(2, 1e-6), bending, np.array([False, True]))
     np.testing.assert_allclose(found.seen, 1e-8, rtol=3e-3)
     low, high = found.limits
@@ -121,6 +121,10 @@ def test_the_joint_alone_is_stiffer_than_seen_by_what_bends():
     assert (high > 1e-8).all()
     np.testing.assert_allclose(np.array([6.0, 16.0]) * 2e-10, found.stiffer)
     np.testing.assert_allclose(found.best, found.seen / (1 + np.array([1.1, 3.6]) * 1e-10 / found.seen), rtol=1e-12)
+    # Channels a little off move all lines alike: their standard error adds to that of the scatter, in squares.
+    off = (*fitted[:2], np.full(2, 1e-10))
+    wider = joint_alone(omega, c, np.full((200, 2), 2e-22), off, np.full(2, 1e-6), bending, np.array([False, True]))
+    np.testing.assert_allclose(wider.noise**2 - found.noise**2, (1.96 * 1e-10) ** 2, rtol=1e-9)
 
 
 def test_modes_of_a_matrix_that_channels_do_not_follow_are_not_taken():

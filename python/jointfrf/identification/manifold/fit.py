@@ -210,20 +210,23 @@ def _alone(problem: FitProblem, found: JointEstimate, known: Uncertainty, bendin
     n, freq = len(problem.dofs), problem.freq_hz
     frfs = problem.frfs if problem.deformation is None else problem.frfs.without(problem.deformation)
     value, spread = np.full((freq.size, n), np.nan, complex), np.full((freq.size, n), np.nan)
-    fitted, size = np.full((2, n), np.nan), np.zeros(n)
+    fitted, size = np.full((3, n), np.nan), np.zeros(n)
+    factor = known.spread.factor
+    smooth = _with_calibration(known.spread, known.calibration) - factor
     for group in found.groups:
         _, lines = compliance_lines(frfs.of_dofs(group.dofs))
         used = problem.used[:, group.dofs]
         value[:, group.dofs] = np.where(used, lines.value, np.nan)
         spread[:, group.dofs] = np.einsum("ldd->ld", lines.covariance).real
-        fitted[:, group.dofs] = _fitted_compliance(group, known.spread.factor[group.which])
+        fitted[:2, group.dofs] = _fitted_compliance(group, factor[group.which])
+        fitted[2, group.dofs] = _fitted_compliance(group, smooth[group.which])[1]
         size[group.dofs] = group.problem.data.own_size
     rotations = np.array([is_rotation(dof) for dof in problem.dofs])
-    return joint_alone(2 * np.pi * freq, value, spread, (fitted[0], fitted[1]), size, bending, rotations)
+    return joint_alone(2 * np.pi * freq, value, spread, (fitted[0], fitted[1], fitted[2]), size, bending, rotations)
 
 
 def _fitted_compliance(group: GroupFit, factor: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return C_dd at w = 0 of the joint fitted, and its standard error by noise, shape (n,) each."""
+    """Return C_dd at w = 0 of the joint fitted, and its standard error by variance factors, shape (n,) each."""
     joint, n = group.joint, len(group.dofs)
     if joint.in_compliance:
         stiff = joint.is_compliance

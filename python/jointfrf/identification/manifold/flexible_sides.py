@@ -263,7 +263,7 @@ def joint_alone(
     omega: FloatArray,
     compliance: ComplexArray,
     variance: FloatArray,
-    fitted: tuple[FloatArray, FloatArray],
+    fitted: tuple[FloatArray, FloatArray, FloatArray],
     size: FloatArray,
     bending: SideBending,
     is_rotation: NDArray[np.bool_],
@@ -276,8 +276,8 @@ def joint_alone(
         rad/s.
     compliance, variance : ndarray, shape (n_freq, n)
         Diagonal of C seen of each line, and E|e|^2 of its noise; NaN where a line does not give it.
-    fitted : pair of ndarray, shape (n,)
-        C_dd as fitted, one number for all lines, and its standard error by noise.
+    fitted : three of ndarray, shape (n,)
+        C_dd as fitted, one number for all lines, its standard error by noise, and by channels a little off.
     size : ndarray, shape (n,)
         Median size of the receptances of each joint DOF, m/N or rad/(N m).
     bending : SideBending
@@ -291,11 +291,12 @@ def joint_alone(
     """
     static = _static_compliance(omega, compliance, variance)
     middle, large, negative = (np.where(is_rotation, r, t) for t, r in (_MIDDLE, _LARGE, _NEGATIVE))
-    value, error = fitted
+    value, error, smooth = fitted
     is_rigid = large * bending.high / np.maximum(size, _TINY) * abs(value) <= error
     is_rigid |= ~np.isfinite(static.value)
     seen = np.where(is_rigid, value, static.value)
-    noise = np.where(is_rigid, _TWO_SIDED * error, 2 * _INERTIA * static.std_error)
+    # Errors of channels that are smooth over frequency do not show in the scatter of lines.
+    noise = np.hypot(np.where(is_rigid, _TWO_SIDED * error, 2 * _INERTIA * static.std_error), _TWO_SIDED * smooth)
     inertia = np.where(is_rigid, 0.0, _INERTIA * abs(static.value - static.before))
     # At most as soft as noise and inertia allow, where these alone leave the sign open.
     size_seen = np.maximum(seen, np.hypot(noise, inertia) / 2)
