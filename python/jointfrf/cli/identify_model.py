@@ -24,6 +24,7 @@ from jointfrf.identification.record import fit_to_dict, write_record
 from jointfrf.identification.result import Fit, columns_of
 from jointfrf.io.model_units import model_units
 from jointfrf.kernel.arguments import FloatArray
+from jointfrf.report.fit_model import next_sentences
 from jointfrf.report.fit_page import write_report
 
 __all__ = ["add_model_arguments", "run_model"]
@@ -140,6 +141,9 @@ def _one(args: argparse.Namespace, out: Output) -> tuple[Fit, dict[str, Any], li
     source, written, text = file_names(args), list[Path](), ""
     if not args.each:
         out.say("", fit)
+        with waiting("what to measure next"):
+            following = next_sentences(fit)
+        out.say(*([""] if following else []), *following)
         out.warn(*fit.warnings)
     if request is not None:
         text = written_cards(fit, request, [f"from {source}", *_place_of_joint(measured, request)])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,7 @@ from jointfrf.identification.manifold.fit import DofDamping, ManifoldFit
 from jointfrf.identification.manifold.prepare import FitProblem
 from jointfrf.identification.manifold.transforms import Transforms
 from jointfrf.identification.model.fit import FoundModel, OpenDirection
+from jointfrf.identification.model.next_channels import next_channels
 from jointfrf.identification.model.prepare import Channels
 from jointfrf.identification.parameters import joint_vector
 from jointfrf.identification.residual_test import ResidualTest
@@ -504,7 +506,8 @@ def describe_model(found: FoundModel, channels: Channels) -> Fit:
         is_converged=found.minimum.converged,
         intervals=found.intervals,
         data=ModelData(
-            whole, problem.measured, problem.variance, found.predicted, found.residual, found.directions
+            whole, problem.measured, problem.variance, found.predicted, found.residual, found.directions,
+            cache(partial(next_channels, found)),
         ),
     )  # fmt: skip
     is_log = {one.name: one.is_log for one in vector.fitted}

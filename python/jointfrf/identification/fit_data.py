@@ -12,6 +12,7 @@ from jointfrf.channels.point_lines import Interface
 from jointfrf.frf.noise_model import NoiseModel
 from jointfrf.identification.model.assembly import Assembly
 from jointfrf.identification.model.fit import OpenDirection
+from jointfrf.identification.model.next_channels import NextChannel
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
 __all__ = ["FitData", "ModelData"]
@@ -98,6 +99,9 @@ class ModelData:
         Measured minus predicted over the standard deviation of the noise; NaN where nothing was measured.
     open_directions : tuple of OpenDirection
         Combinations of parameters that the FRFs do not determine.
+    next_channels : callable
+        Returns the channels, not measured yet, that would narrow the widest interval of the joint most, best first; the
+        models are reduced again for them.
     """
 
     assembly: Assembly
@@ -106,3 +110,4 @@ class ModelData:
     predicted: ComplexArray
     residual: ComplexArray
     open_directions: tuple[OpenDirection, ...]
+    next_channels: Callable[[], tuple[NextChannel, ...]]

@@ -34,6 +34,7 @@ from jointfrf.report.fit_frfs import (
     reciprocity_map,
     residual_map,
 )
+from jointfrf.report.fit_model import assurance_map, band_map, next_parts, unknowns_table
 from jointfrf.report.receptance import noise_figure
 from jointfrf.report.sketch import SketchedPart, assembly_sketch, interface_points, interface_sketch, point_table
 from jointfrf.report.table import Cell, Table
@@ -169,7 +170,9 @@ def _model_sections(fit: Fit, options: ReportOptions) -> list[Section]:
             [Words([_HOW_MODEL]), *_charts(joint, most, fit, what)],
         ),
         _frf_section(fit, compared, frfs, most),
-        Section("maps", "Residual by channel", [residual_map(compared)]),
+        Section("maps", "Agreement and residual", [assurance_map(fit), residual_map(compared), band_map(fit)]),
+        Section("unknowns", "Unknowns of the models", [one for one in [unknowns_table(fit)] if one]),
+        Section("next", "What to measure next", next_parts(fit)),
         Section("noise", "Noise", _noise_parts(fit, None, most)),
         _blind_spots(fit, is_square=fit.responses == fit.forces),
         Section("cards", "Input of finite-element programs", _cards(fit, options.nodes)),
@@ -316,6 +319,8 @@ def _frf_section(fit: Fit, compared: ComparedFrfs, figures: Sequence[Figure], mo
         "between them can have: where they leave the measured ones by more than noise, the joint does not explain the "
         "data."
     ]
+    if any(one.kind == "model" for one in fit.findings):
+        sentences[-1] += " The errors of the models that are named above are in them."
     sentences.append(
         f"All {total} FRFs between the {where} are on this page."
         if len(figures) == total

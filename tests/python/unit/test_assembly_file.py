@@ -15,6 +15,7 @@ from jointfrf.assembly_file.keys import AssemblyKeys
 from jointfrf.assembly_file.read import read_assembly_file
 from jointfrf.errors import FileContentError
 from jointfrf.io import Channel, FrfSet, write_frfs
+from jointfrf.report.fit_model import is_wide
 from jointfrf.report.fit_page import ReportOptions, finding_sentences, fit_document
 from jointfrf.report.sketch import _view_along, assembly_sketch
 from jointfrf.toml.documents import schema_of
@@ -340,8 +341,8 @@ def test_the_page_and_the_plot_of_a_model(tmp_path, frfs):
     fit = jf.measured_assembly(written(tmp_path), frfs).fit()
     document = fit_document(fit, ReportOptions("test.uff"))
     keys = [section.key for section in document.sections]
-    assert keys == ["summary", *(["doubts"] if fit.findings else []), "joint", "stiffness", "frfs", "maps", "noise",
-                    "blind", "cards", "made"]  # fmt: skip
+    assert keys == ["summary", *(["doubts"] if fit.findings else []), "joint", "stiffness", "frfs", "maps", "unknowns",
+                    *(["next"] if is_wide(fit) else []), "noise", "blind", "cards", "made"]  # fmt: skip
     table = next(part for part in document.sections[0].parts if getattr(part, "key", "") == "parameters")
     assert "prior" in table.columns
     assert table.rows[-1][0] == "A/youngs_modulus"
