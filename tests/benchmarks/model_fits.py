@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import statistics
 import time
+import unittest.mock
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 
 import jointfrf as jf
+from jointfrf.identification.model.reduced import ReducedSubstructure
 
 _SECTION = {"youngs_modulus": 67e9, "density": 2700.0, "width": 0.025, "height": 0.006, "loss_factor": 0.01}
 #: Channels of the beams of 1 mm elements.
@@ -24,10 +28,21 @@ _TRUE = ([6e5, 6e5, 4e6, 5e3, 5e3, 400], [20, 20, 60, 1.5, 1.5, 0.2])
 _GUESS = ([3e5, 3e5, 2e6, 3e3, 3e3, 200], [10, 10, 30, 1, 1, 0.1])
 
 
+#: Bricks across, through and along each of two large parts: 9 990 and 99 225 DOFs where free.
+_LARGE = ((5, 2, 184), (20, 14, 104))
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(prog="run-model-fits", description=__doc__)
     parser.add_argument("--repetitions", type=int, default=3, metavar="N", help="draws of the noise, each timed")
+    parser.add_argument(
+        "--large", action="store_true", help="parts of 10 000 DOFs and of 100 000 instead, one draw each; minutes"
+    )
     options = parser.parse_args()
+    if options.large:
+        for divisions in _LARGE:
+            _time_large(divisions)
+        return 0
     print(f"{'':44} median s   CPU s   largest error / standard error of the joint")
     for name, channels in _CHANNELS.items():
         _time(f"case 3.3, 786 lines, {name}", *_beams(channels), options.repetitions)
@@ -65,10 +80,10 @@ def _beams(channels: tuple[str, ...]) -> tuple[Callable[[int], jf.Fit], dict[str
     return fit, {"k_y": 6e5, "k_theta": 5e3, "c_y": 20.0, "c_theta": 1.5}
 
 
-def _bar(length: float, clamped: bool, material: jf.Material) -> jf.Model:
+def _bar(length: float, clamped: bool, material: jf.Material, divisions: tuple[int, int, int] = (5, 2, 88)) -> jf.Model:
     """Brick beam with a joint at one end and observed sections along it."""
     return jf.brick_beam(
-        length, 0.025, 0.006, material, divisions=(5, 2, 88),
+        length, 0.025, 0.006, material, divisions=divisions,
         ends=("clamped" if clamped else "free", "free"), sections={"joint": length if clamped else 0.0},
         observed={f"p{i}": length * i / 5 for i in ((1, 2, 3, 4) if clamped else (2, 3, 5))},
     )  # fmt: skip
@@ -100,6 +115,55 @@ def _bricks() -> tuple[Callable[[int], jf.Fit], dict[str, float]]:
         return jf.identify_model(freq, jf.pollute(exact, 0.02, seed=seed), believed, outputs, forces)
 
     return fit, dict(zip([f"k_{dof}" for dof in _DOFS], _TRUE[0], strict=True))
+
+
+def _time_large(divisions: tuple[int, int, int]) -> None:
+    """Fit six stiffnesses, their damping, E and density of two parts of bricks: 16 responses, 4 forces, 800 lines."""
+    freq, ports = np.linspace(5.0, 900.0, 800), [f"joint:{dof}" for dof in _DOFS]
+    places = [*(f"A/p{i}" for i in (1, 2, 3, 4)), *(f"B/p{i}" for i in (2, 3, 5))]
+    outputs = [*(f"{place}:{axis}" for place in places for axis in "yz"), "A/p4:x", "B/p5:x"]
+    forces = ["A/p3:x", "A/p3:y", "B/p5:x", "B/p5:z"]
+    material = jf.Material(67e9, 0.33, 2700.0, 0.01)
+    models = [_bar(*own, material, divisions) for own in ((0.3, True), (0.2, False))]
+    truth = [jf.Substructure(model, ports, exact=True) for model in models]
+    exact = jf.Assembly(*truth, jf.Joint(*_TRUE, list(_DOFS))).receptance(freq, outputs, forces)
+    unknown = {"youngs_modulus": jf.Unknown(1.0, 0.02), "density": jf.Unknown(1.0, 0.01)}
+    parts = [jf.Substructure(model, ports, unknown) for model in models]
+    believed = jf.Assembly(*parts, jf.Joint(*_GUESS, list(_DOFS)))
+    spent = _Spent()
+    with warnings.catch_warnings(), spent.of_reductions():
+        warnings.simplefilter("ignore")
+        wall, cpu = time.perf_counter(), time.process_time()
+        found = jf.identify_model(freq, jf.pollute(exact, 0.02, seed=0), believed, outputs, forces)
+        fitted = time.perf_counter() - wall
+        found.confidence_interval(0.95)
+        whole = time.perf_counter() - wall, time.process_time() - cpu
+    errors = [abs(found.value[f"k_{d}"] - k) / found.std_error[f"k_{d}"] for d, k in zip(_DOFS, _TRUE[0], strict=True)]
+    print(
+        f"{len(models[0].dofs)} and {len(models[1].dofs)} DOFs: {whole[0]:.1f} s, {whole[1]:.1f} CPU s; reduction "
+        f"{spent.seconds:.1f} s, fit {fitted - spent.seconds:.1f} s, intervals {whole[0] - fitted:.1f} s; "
+        f"largest error of a stiffness {max(errors):.1f} standard errors",
+        flush=True,
+    )
+
+
+class _Spent:
+    """Seconds spent in reductions of models."""
+
+    def __init__(self) -> None:
+        self.seconds = 0.0
+
+    @contextlib.contextmanager
+    def of_reductions(self) -> Iterator[None]:
+        own = ReducedSubstructure.__init__
+
+        def timed(part: ReducedSubstructure, *args: Any) -> None:
+            start = time.perf_counter()
+            own(part, *args)
+            self.seconds += time.perf_counter() - start
+
+        with unittest.mock.patch.object(ReducedSubstructure, "__init__", timed):
+            yield
 
 
 if __name__ == "__main__":
