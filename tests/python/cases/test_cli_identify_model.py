@@ -134,7 +134,7 @@ def test_cards_say_where_the_nodes_of_the_joint_lie_and_what_they_follow(couplin
                         places={"lap": np.array([0.01, x, 0.0])}) for x in (0.0, -0.002)
     )  # fmt: skip
     options = {"units": "mm-t-s"}
-    lines = _place_of_joint(SimpleNamespace(parts=parts), CardRequest("nastran", [7, 8], options, False, None))
+    lines = _place_of_joint(SimpleNamespace(parts=parts), CardRequest("nastran", [7, 8], options, False, False, None))
     assert lines[-1] == "node 7 lies at (10, 0, 0), node 8 at (10, -2, 0) mm"
     assert len(lines) == said
     assert said == 1 or lines[0].startswith("A/lap and B/lap: the joint acts on the mean motion of the nodes")
