@@ -71,6 +71,7 @@ from jointfrf.laws.law import JointLaw, LawField
 from jointfrf.laws.law_joint import LawJoint
 from jointfrf.laws.springs import SpringLaw
 from jointfrf.laws.viscoelastic import FractionalZener, PowerLaw, StandardLinearSolid
+from jointfrf.levels.amplitude_laws import AmplitudeLawFit, AmplitudeLawFits, fit_amplitude_laws
 from jointfrf.models.beam import beam
 from jointfrf.models.matrices import from_triangle
 from jointfrf.models.model import Model, assemble, chain
@@ -124,6 +125,8 @@ __all__ = [
     "RCOND_LIMIT",
     "STRESS_AREA",
     "AddedMass",
+    "AmplitudeLawFit",
+    "AmplitudeLawFits",
     "Assembly",
     "AssemblyPart",
     "BandStatistics",
@@ -225,6 +228,7 @@ __all__ = [
     "estimate_noise",
     "expected_half_width",
     "find_modification",
+    "fit_amplitude_laws",
     "fit_from_dict",
     "fit_to_dict",
     "frequency_error",

@@ -218,6 +218,11 @@ def _identification(arrays: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
         },
         "expected_half_width": {"number": 5, "spread": 0.1, "error": 0.02, "probability": 0.9},
         "assemblies_needed": {"half_width": 0.3, "spread": 0.1, "error": 0.02, "probability": 0.9},
+        "fit_amplitude_laws": {
+            "amplitude": [1e-6, 2e-6, 4e-6], "stiffness": [1e6, 9e5, 8e5], "loss_factor": [0.01, 0.02, 0.03],
+            "stiffness_error": [1e3] * 3, "loss_factor_error": [1e-3] * 3, "laws": ["constant", "power"],
+            "probability": 0.9,
+        },
         "pool": {"fits": [found, again], "common": 0.01, "parameters": ["k_x"], "probability": 0.9},
         "transfer": {"fits": [found, again], "parameters": ["k_x"], "spread": 0.05},
         "write_pool": {"pooled": jf.pool([found, again]), "path": "pool.html"},

@@ -44,6 +44,18 @@ def test_python_of_the_page_on_fits_with_models_prints_what_it_shows(capsys):
         agree(capsys.readouterr().out, text)
 
 
+def test_python_of_the_page_on_levels_finds_the_joint_it_was_made_of(capsys):
+    page = DOCUMENTS["docs/levels.md"]
+    (example,), (shown,) = blocks("python", page), blocks("text", page)
+    named = {}
+    exec(example, named)
+    agree(capsys.readouterr().out, shown)
+    best = named["found"].fits[0]
+    assert best.law == "iwan"
+    for name, true in {"slip_force": 3.0, "k": 1e6, "chi": -0.4, "beta": 0.8, "loss_factor": 0.004}.items():
+        assert best.intervals[name][0] < true < best.intervals[name][1]
+
+
 def test_the_page_on_planning_prints_what_it_shows(capsys, monkeypatch, tmp_path):
     page = DOCUMENTS["docs/planning.md"]
     command, *shown = blocks("text", page)

@@ -24,7 +24,7 @@ FLOORS = (
     {"laws"},
     {"substructuring", "models"},
     {"identification"},
-    {"solids", "pooling", "planning"},
+    {"solids", "pooling", "planning", "levels"},
     {"report"},
     {"cases"},
     {"studies", "assembly_file"},
