@@ -239,7 +239,7 @@ def test_a_project_has_defaults_of_its_own():
 def test_the_command_line_wins(tmp_path):
     (tmp_path / "deep").mkdir()
     Path("deep/other.toml").write_text(NAMED)
-    words = ["--config", "deep/other.toml", "--dofs", "y", "--band", "20:150", "--json"]
+    words = ["--config", "deep/other.toml", "--dofs", "y", "--band", "20:150", "--bounds", "--json"]
     content = json.loads(run_command("identify", BARS, *words).stdout)
     fit = content["fits"][0]
     assert (fit["dofs"], fit["bands_hz"]["y"]) == (["y"], [[20, 150]])
