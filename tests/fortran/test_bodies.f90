@@ -45,7 +45,7 @@ contains
               reshape([(h1(:, :, i), h2(:, :, i), h3(:, :, i), i=1, n_freq)], [29, n_freq]), t)
     call add(z, [1, 2], [4, 5], k)
     do i = 2, 5
-      call add(z, [integer :: s%ends(1, i + 1)], [integer :: s%ends(2, i + 1)], reshape(s%t(3 + i, :), [1, 1, n_freq]))
+      call add(z, [int(s%ends(1, i + 1))], [int(s%ends(2, i + 1))], reshape(s%t(3 + i, :), [1, 1, n_freq]))
     end do
     allocate (s%whole, source=inverse(z))
   end function ring

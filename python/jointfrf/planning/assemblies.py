@@ -44,7 +44,7 @@ def expected_half_width(number: int, spread: float, error: float, probability: f
     --------
     >>> import jointfrf as jf
     >>> [round(jf.expected_half_width(n, spread=0.1, error=0.02), 2) for n in (3, 5, 10, 30)]
-    [0.5, 0.32, 0.25, 0.22]
+    [0.51, 0.32, 0.26, 0.23]
     """
     spread, error = _not_negative("spread", spread), _not_negative("error", error)
     if not 0 < as_number("probability", probability) < 1:

@@ -116,6 +116,10 @@ def plan_joint_frfs(
     >>> joint = jf.Joint([2000.0], [3.0], ["x"])
     >>> gamma = jf.couple(a, b, joint.dynamic_stiffness(freq), [1], [0])[:, 1:3, 1:3]
     >>> print(jf.plan_joint_frfs(freq, gamma, joint, noise=0.05))
+         expected  standard error  band, Hz
+    ---------------------------------------------
+    k_x  2000      0.25 %          3.238 to 9.143
+    c_x  3         4.2 %           3.881 to 9.786
     """
     check_type("joint", joint, Joint)
     lines = as_square("gamma", gamma)

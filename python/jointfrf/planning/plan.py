@@ -254,7 +254,7 @@ def plan(
     >>> masses = ["A/1:x", "A/2:x", "B/1:x", "B/2:x"]
     >>> found = jf.plan(whole, np.linspace(0.5, 10, 400), masses, masses, noise=0.05, targets=["k_x"], within=0.004)
     >>> found.proposed.sensors, found.proposed.hits
-    (('A/2:x',), ('A/2:x', 'B/1:x'))
+    (('A/1:x',), ('A/2:x',))
     """
     check_type("assembly", assembly, Assembly)
     freq = as_frequency(freq_hz)

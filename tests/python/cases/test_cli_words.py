@@ -110,7 +110,7 @@ def test_quiet_prints_nothing(tmp_path):
 
 def test_quiet_prints_warnings(monkeypatch):
     monkeypatch.chdir(ROOT)
-    words = ["identify", BARS, *JOINT[:-2]]
+    words = ["identify", BARS, *JOINT[:-4], "--dofs", "y", "--band", "20:150"]
     warned = json.loads(run_command(*words, "--json").stdout)["fits"][0]["warnings"]
     assert warned
     result = run_command(*words, "--quiet")

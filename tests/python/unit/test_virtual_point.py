@@ -223,7 +223,8 @@ def test_a_fully_coupled_joint_is_identified(six_dof_joint):
     assert max(abs(np.array(off))) < 4.5
     # Intervals that allow for sides that are not rigid are somewhat wider than noise makes them.
     assert 0.4 < np.sqrt(np.mean(np.square(off))) < 1.5
-    np.testing.assert_allclose(noisy.stiffness, np.diag(joint.stiffness), rtol=0.003)
+    # The joint alone is extrapolated from C of single lines where noise hides whether the sides bend.
+    np.testing.assert_allclose(noisy.stiffness, np.diag(joint.stiffness), rtol=0.01)
 
 
 def test_over_determination_sharpens_the_joint(six_dof_joint):

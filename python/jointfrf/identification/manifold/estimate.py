@@ -187,7 +187,10 @@ def _with_free_dofs(found: GroupFit, problem: GroupProblem, terms: JointTerms, f
             return theta
         return None
 
-    return fit_soft(found, problem, terms, soft, rest)
+    try:
+        return fit_soft(found, problem, terms, soft, rest)
+    except np.linalg.LinAlgError:  # a joint that soft leaves no information
+        return found
 
 
 def estimate_laws(

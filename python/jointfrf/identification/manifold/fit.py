@@ -233,10 +233,12 @@ def _fitted_compliance(group: GroupFit, factor: FloatArray) -> tuple[FloatArray,
         error = np.sqrt(np.maximum(np.diagonal(group.covariance) * factor, 0))
         return group.x[stiff], error[stiff]
     diagonal = np.flatnonzero(joint.rows == joint.columns)
-    entries = joint.compliance(group.x)[:, diagonal]
-    slope = joint.slope(group.x, joint.compliance(group.x))[:, diagonal].real.mean(axis=0)
+    entries = joint.compliance(group.x)
+    slope = joint.slope(group.x, entries)[:, diagonal].real.mean(axis=0)
     variance = np.einsum("dp,pq,dq->d", slope, group.covariance * np.sqrt(np.outer(factor, factor)), slope)
-    return np.asarray(entries.real.mean(axis=0))[:n], np.sqrt(np.maximum(variance, 0))[:n]
+    # The real part of K* is that of all lines, the real part of C is not: damping takes from it.
+    stiffness = np.linalg.inv(joint.matrix(entries)).real.mean(axis=0)
+    return np.diagonal(np.linalg.inv(stiffness))[:n], np.sqrt(np.maximum(variance, 0))[:n]
 
 
 def fit_laws(problem: FitProblem, joint: LawJoint) -> ManifoldFit:

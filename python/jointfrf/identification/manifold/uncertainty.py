@@ -303,6 +303,8 @@ def residual_test_of(
 
 def _ratio_of_all(found: JointEstimate) -> float:
     """Return the residual over the noise with the lines left out, by their distance from what fits the joint."""
+    if all(group.used.all() for group in found.groups):
+        return float("nan")
     squares = equations = 0.0
     for group in found.groups:
         out = ~group.used
@@ -312,8 +314,6 @@ def _ratio_of_all(found: JointEstimate) -> float:
         known = np.isfinite(apart)
         squares += group.noise_squares + float(apart[known].sum() + own[known].sum())
         equations += group.equations + float(own[known].sum())
-    if all(group.used.all() for group in found.groups):
-        return float("nan")
     return float(np.sqrt(squares / max(equations - len(found.parameters) / 2, 1)))
 
 
