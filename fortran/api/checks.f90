@@ -142,7 +142,7 @@ contains
     if (bad_wanted(outputs)) info = -15
     if (any(rigid < 0 .or. rigid > 1)) info = -12
     if (bad_connections()) info = -11
-    if (any(ends < 0 .or. ends > n) .or. any(ends(1, :) < 1 .or. ends(1, :) == ends(2, :))) info = -10
+    if (any(ends < 0 .or. ends > n) .or. any(ends(1, :) < 1)) info = -10
     if (any(sizes < 1 .or. sizes > n_h)) info = -9
     if (info /= info_good) return
     if (squares(connection) /= n_t) info = -5

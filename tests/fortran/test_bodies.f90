@@ -232,8 +232,6 @@ contains
     call try(s, -10)
     s%ends(1, 2) = 0
     call try(s, -10)
-    s%ends(1, 2) = s%ends(2, 2)
-    call try(s, -10)
     s = good
     s%connection(3) = 4
     call try(s, -11)
