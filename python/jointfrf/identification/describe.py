@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +21,7 @@ from jointfrf.identification.manifold.fit import DofDamping, ManifoldFit
 from jointfrf.identification.manifold.prepare import FitProblem
 from jointfrf.identification.manifold.transforms import Transforms
 from jointfrf.identification.model.fit import FoundModel, OpenDirection
-from jointfrf.identification.model.next_channels import next_channels
+from jointfrf.identification.model.next_channels import NextChannels
 from jointfrf.identification.model.prepare import Channels
 from jointfrf.identification.parameters import joint_vector
 from jointfrf.identification.residual_test import ResidualTest
@@ -507,7 +506,7 @@ def describe_model(found: FoundModel, channels: Channels) -> Fit:
         intervals=found.intervals,
         data=ModelData(
             whole, problem.measured, problem.variance, found.predicted, found.residual, found.directions,
-            cache(partial(next_channels, found)),
+            NextChannels(found),
         ),
     )  # fmt: skip
     is_log = {one.name: one.is_log for one in vector.fitted}

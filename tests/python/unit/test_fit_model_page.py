@@ -1,5 +1,6 @@
 """What the page of a fit of an assembly has beside: FRAC, residual by channel and band, unknowns, what to do next."""
 
+import pickle
 import warnings
 
 import numpy as np
@@ -106,3 +107,10 @@ def test_nothing_is_advised_where_intervals_are_narrow(fit):
     assert "next" not in keys
     keys = [section.key for section in fit_document(fit, ReportOptions()).sections]
     assert keys.index("maps") < keys.index("unknowns") < keys.index("next")
+
+
+def test_a_fit_goes_to_another_process_and_answers_there_as_here(fit):
+    there = pickle.loads(pickle.dumps(fit))
+    assert there.confidence_interval(0.95) == fit.confidence_interval(0.95)
+    assert there.derived("c_y / k_y") == fit.derived("c_y / k_y")
+    assert there.data.next_channels() == fit.data.next_channels()

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from jointfrf.errors import IllConditionedWarning
 from jointfrf.frf.noise_model import NoiseModel
@@ -269,21 +270,41 @@ def _judged(problem: ModelProblem, minimum: Minimum, other: float) -> FoundModel
     covariance *= np.outer(slope, slope)
     whole = inverse_information(minimum.information)
 
-    def profile(of: float) -> ProfileIntervals:
-        return ProfileIntervals(likelihood, vector, minimum.x, minimum.cost, whole, of)
-
-    intervals = Intervals(
-        [one.name for one in vector.fitted[:n]],
-        lambda i, probability: profile(float(factor[i])).of(i, probability),
-        lambda function, used, probability: profile(float(factor[used].max())).of_function(
-            lambda x: function(vector.to_values(x)[vector.free[:n]]), probability
-        ),
-    )
+    profiles = _Profiles(likelihood, vector, minimum, whole, factor)
+    intervals = Intervals([one.name for one in vector.fitted[:n]], profiles.of, profiles.of_function)
     return FoundModel(
         problem, minimum, values, covariance, intervals, predicted, residual, test,
         open_directions(problem.vector, minimum.x[:n], minimum.information[:n, :n]), other,
         None if found is None else found[2], with_error, spread, calibration,
     )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class _Profiles:
+    """Profiles of the parameters at a minimum, each with its variance factor."""
+
+    likelihood: Likelihood
+    vector: ParameterVector
+    minimum: Minimum
+    covariance: FloatArray
+    factor: FloatArray
+
+    def _profile(self, factor: float) -> ProfileIntervals:
+        least = self.minimum
+        return ProfileIntervals(self.likelihood, self.vector, least.x, least.cost, self.covariance, factor)
+
+    def of(self, i: int, probability: float) -> tuple[float, float]:
+        """Return the interval of one parameter."""
+        return self._profile(float(self.factor[i])).of(i, probability)
+
+    def of_function(
+        self, function: Callable[[FloatArray], float], used: NDArray[np.intp], probability: float
+    ) -> tuple[float, float] | None:
+        """Return the interval of a function of the parameters that depends on those with these numbers."""
+        shown = self.vector.free[: self.factor.size]
+        return self._profile(float(self.factor[used].max())).of_function(
+            lambda x: function(self.vector.to_values(x)[shown]), probability
+        )
 
 
 def _residual(problem: ModelProblem, likelihood: Likelihood, minimum: Minimum) -> tuple[ComplexArray, ComplexArray]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +14,7 @@ from jointfrf.identification.model.prediction import Prediction
 from jointfrf.identification.model.substructure import FrfSource, Substructure
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
-__all__ = ["NextChannel", "next_channels"]
+__all__ = ["NextChannel", "NextChannels", "next_channels"]
 
 #: DOFs of a part that are tried, spread over it, and lines at which.
 _TRIED, _LINES = 10, 100
@@ -39,6 +40,24 @@ class NextChannel(NamedTuple):
     dof: str
     widest: str
     shares: dict[str, float]
+
+
+class NextChannels:
+    """What to measure next, found when it is asked for, once; goes to other processes, without the start of the fit."""
+
+    def __init__(self, found: FoundModel) -> None:
+        self._found = found._replace(problem=replace(found.problem, compliance_start=_no_start))
+        self._known: tuple[NextChannel, ...] | None = None
+
+    def __call__(self) -> tuple[NextChannel, ...]:
+        """Return the channels, best first."""
+        if self._known is None:
+            self._known = next_channels(self._found)
+        return self._known
+
+
+def _no_start() -> None:
+    return None
 
 
 def next_channels(found: FoundModel) -> tuple[NextChannel, ...]:
