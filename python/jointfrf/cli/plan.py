@@ -20,7 +20,7 @@ from jointfrf.cli.usage import Output, UsageError, check_folder, waiting
 from jointfrf.dofs import is_rotation
 from jointfrf.errors import FileContentError
 from jointfrf.kernel.arguments import FloatArray
-from jointfrf.planning.assemblies import assemblies_needed, expected_half_width
+from jointfrf.planning.assemblies import assemblies_needed
 from jointfrf.planning.joint_frfs import plan_joint_frfs
 from jointfrf.planning.plan import plan
 from jointfrf.report.plan_page import write_plan
@@ -63,7 +63,7 @@ def add_arguments(parser: CommandParser) -> None:
         "--sensor-mass KG", "mass of each sensor that the models do not have: what it moves is shown", _positive
     )
     parser.heading("what is wanted")
-    parser.option("--targets NAME,...", "parameters to be found: k_y,eta; all of the joint by default", _dofs)
+    parser.option("--targets NAME,...", "parameters to be found: k_y,c_y; all of the joint by default", _dofs)
     parser.option(
         "--criterion NAME", "A: mean of squared relative errors, D: volume of their ellipsoid", ("A", "D"), "A"
     )
@@ -135,19 +135,13 @@ def run(args: argparse.Namespace) -> int:
     out.say(found)
     needed = None
     if args.spread is not None:
-        error = found.proposed.error
-        needed = assemblies_needed(args.next, args.spread, error)
-        out.say("", _assemblies(needed, args.next, args.spread, error))
+        needed = assemblies_needed(args.next, args.spread, found.proposed.error)
+        out.say("", _assemblies(needed, args.next, args.spread))
     out.say(*([""] if written else []), *(f"wrote {path}" for path in written))
     out.warn(*found.warnings)
-    content = asdict(found)
-    steps = [one._asdict() for one in found.steps]
-    content |= {
-        "steps": steps,
-        "everything": found.everything._asdict(),
-        "additions": [a._asdict() for a in found.additions],
-    }
-    out.give({"model": str(args.model), **content, "assemblies": needed, "written": [str(path) for path in written]})
+    out.give(
+        {"model": str(args.model), **asdict(found), "assemblies": needed, "written": [str(path) for path in written]}
+    )
     return 0
 
 
@@ -169,12 +163,11 @@ def _of_case(args: argparse.Namespace, freq: FloatArray, out: Output) -> int:
     return 0
 
 
-def _assemblies(needed: int | None, wanted: float, spread: float, error: float) -> str:
+def _assemblies(needed: int | None, wanted: float, spread: float) -> str:
     if needed is None:
-        least = expected_half_width(100_000, spread, error)
         return (
-            f"no number of assemblies gives an interval of the next one within {100 * wanted:.3g} %: with a spread of "
-            f"{100 * spread:.3g} % it is {100 * least:.3g} % at least"
+            f"no number of assemblies gives an interval of the next one within {100 * wanted:.3g} %: they differ by "
+            f"more themselves, with a spread of {100 * spread:.3g} %"
         )
     shown = f"{100 * wanted:.3g} % (spread {100 * spread:.3g} %)"
     return f"{needed} assemblies give an interval of the next one within {shown}"

@@ -23,7 +23,7 @@ from jointfrf.identification.noise import NoiseOptions
 from jointfrf.identification.prepare import BandsOfDofs, MeasuredFrfs, as_measured
 from jointfrf.identification.result import Fit
 from jointfrf.identification.side_models import SideModel
-from jointfrf.kernel.arguments import FloatArray, as_names, as_number, check_type
+from jointfrf.kernel.arguments import FloatArray, as_names, as_not_negative, check_type
 from jointfrf.laws.law_joint import LawJoint
 
 __all__ = ["identify"]
@@ -148,9 +148,8 @@ def identify(
         joint = _check_law_joint(joint, dofs)
         dofs = joint.dofs
         damping = "viscous"
-    if as_number("window_decay", window_decay) < 0:
-        raise ValueError(f"window_decay must not be negative, not {window_decay:g}")
-    if window_decay and joint is not None:
+    decay = as_not_negative("window_decay", window_decay)
+    if decay and joint is not None:
         raise ValueError("window_decay is taken off springs and dampers, not of laws: leave it out")
     options = FitOptions(damping or "auto", cross or "zero", reciprocal)
     problem = prepare_compliance(
@@ -162,8 +161,8 @@ def identify(
     if joint is None:
         found = fit_springs(problem)
         fit = describe_springs(found, problem)
-        if window_decay:
-            fit = without_window(fit, float(window_decay))
+        if decay:
+            fit = without_window(fit, decay)
     else:
         count = 2 * np.count_nonzero(np.isfinite(problem.frfs.variance))
         if count < len(joint.names):

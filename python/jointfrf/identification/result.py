@@ -20,7 +20,7 @@ from jointfrf.identification.findings import Finding, as_warning, worst_first
 from jointfrf.identification.fit_data import FitData, ModelData
 from jointfrf.identification.residual_test import ResidualTest
 from jointfrf.joint import Joint
-from jointfrf.kernel.arguments import ComplexArray, FloatArray, one_line
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_probability, one_line
 from jointfrf.laws.law_joint import LawJoint
 
 __all__ = [
@@ -299,8 +299,7 @@ class Fit:
             The probability is not between 0 and 1; or the fit was loaded and does not keep the interval of this one,
             see `save`.
         """
-        if not 0 < probability < 1:
-            raise ValueError(f"probability must lie between 0 and 1, not {probability}")
+        probability = as_probability("probability", probability)
         if self.intervals is not None:
             return self.intervals(probability)
         reach = float(ndtri((1 + probability) / 2))
@@ -349,8 +348,7 @@ class Fit:
         (True, True)
         """
         intervals = self.confidence_interval if self.intervals is None else self.intervals
-        if not 0 < probability < 1:
-            raise ValueError(f"probability must lie between 0 and 1, not {probability}")
+        probability = as_probability("probability", probability)
         return derived_quantity(function, self._names, self.estimate, self.covariance, intervals, probability)
 
     def k_joint(self, freq_hz: ArrayLike) -> ComplexArray:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from jointfrf.identification.model.reduced import ReducedSubstructure
 from jointfrf.identification.model.substructure import Substructure, Unknown
-from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_number, one_line
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_not_negative, as_number, one_line
 from jointfrf.kernel.linear_algebra import invert
 from jointfrf.models.model import Model
 
@@ -82,8 +82,7 @@ class SideModel:
                 object.__setattr__(self, name, self._checked(name, given))
         if self.forces is None:
             object.__setattr__(self, "forces", self.responses)
-        if as_number("modes", self.modes) < 0:
-            raise ValueError(f"modes must not be negative, but is {self.modes:g}")
+        as_not_negative("modes", self.modes)
         for name, unknown in self.part.unknowns.items():
             if unknown.std is None:
                 raise ValueError(

@@ -281,6 +281,22 @@ def as_positive(name: str, value: object, unit: str = "") -> float:
     return number
 
 
+def as_not_negative(name: str, value: object, unit: str = "") -> float:
+    """Return one number, zero or more."""
+    number = as_number(name, value)
+    if number < 0:
+        raise ValueError(f"{name} must not be negative, not {number:g}{unit and ' '}{unit}")
+    return number
+
+
+def as_probability(name: str, value: object) -> float:
+    """Return one number between 0 and 1, neither of them."""
+    number = as_number(name, value)
+    if not 0 < number < 1:
+        raise ValueError(f"{name} must lie between 0 and 1, not {number:g}")
+    return number
+
+
 def as_count(name: str, value: object, least: int = 1) -> int:
     """Return a whole number that is not too small; floats without a fraction serve, too."""
     number = as_number(name, value)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from jointfrf.identification.result import columns_of
-from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_names, as_number, as_real, check_choice
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_names, as_probability, as_real, check_choice
 from jointfrf.levels.friction import bouc_wen, iwan, jenkins
 
 __all__ = ["AmplitudeLawFit", "AmplitudeLawFits", "fit_amplitude_laws"]
@@ -184,9 +184,7 @@ def fit_amplitude_laws(
     chosen = dict.fromkeys(as_names("laws", laws))
     for law in chosen:
         check_choice("laws", law, tuple(_LAWS))
-    share = as_number("probability", probability)
-    if not 0 < share < 1:
-        raise ValueError(f"probability must lie between 0 and 1, not {share:g}")
+    share = as_probability("probability", probability)
     fits, left_out = [], {}
     for law in chosen:
         count = len(_LAWS[law].names)

@@ -6,7 +6,7 @@ import math
 
 from scipy.stats import chi2, norm, t
 
-from jointfrf.kernel.arguments import as_number, as_positive
+from jointfrf.kernel.arguments import as_count, as_not_negative, as_positive, as_probability
 
 __all__ = ["assemblies_needed", "expected_half_width"]
 
@@ -46,12 +46,9 @@ def expected_half_width(number: int, spread: float, error: float, probability: f
     >>> [round(jf.expected_half_width(n, spread=0.1, error=0.02), 2) for n in (3, 5, 10, 30)]
     [0.51, 0.32, 0.26, 0.23]
     """
-    spread, error = _not_negative("spread", spread), _not_negative("error", error)
-    if not 0 < as_number("probability", probability) < 1:
-        raise ValueError(f"probability must lie between 0 and 1, not {probability}")
-    if not isinstance(number, int) or number < 2:
-        raise ValueError(f"number must be a whole number, at least 2, not {number!r}")
-    free = number - 1
+    spread, error = as_not_negative("spread", spread), as_not_negative("error", error)
+    probability = as_probability("probability", probability)
+    free = float(as_count("number", number, 2) - 1)
     seen = float(chi2.median(free)) / free
     variance = max((spread**2 + error**2) * (1 + 1 / number) * seen - error**2, error**2 / number)
     return math.expm1(float(t.ppf((1 + probability) / 2, free)) * math.sqrt(variance))
@@ -101,10 +98,3 @@ def assemblies_needed(half_width: float, spread: float, error: float, probabilit
         else:
             high = middle
     return high
-
-
-def _not_negative(name: str, value: float) -> float:
-    number = as_number(name, value)
-    if number < 0:
-        raise ValueError(f"{name} must not be negative, not {number:g}")
-    return number

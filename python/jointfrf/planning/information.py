@@ -12,7 +12,7 @@ from jointfrf.identification.model.assembly import Assembly
 from jointfrf.identification.model.prediction import Prediction, parameter_vector
 from jointfrf.identification.model.prepare import Channels
 from jointfrf.identification.parameters import FitParameter, ParameterVector
-from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_number, as_positive
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_not_negative, as_positive
 
 __all__ = ["ExpectedNoise", "FrfInformation", "PlannedTest", "expected_noise", "narrowest_band"]
 
@@ -53,10 +53,8 @@ class ExpectedNoise:
 
 def expected_noise(noise: float, floor: float, averages: float) -> ExpectedNoise:
     """Return the noise of a test; raises ValueError for numbers that no noise has, as in `plan`."""
-    found = ExpectedNoise(as_number("noise", noise), as_number("floor", floor), as_positive("averages", averages))
-    for name, value in (("noise", found.level), ("floor", found.floor)):
-        if value < 0:
-            raise ValueError(f"{name} must not be negative, not {value:g}")
+    level, constant = as_not_negative("noise", noise), as_not_negative("floor", floor)
+    found = ExpectedNoise(level, constant, as_positive("averages", averages))
     if not found.level + found.floor:
         raise ValueError("noise and floor are both zero: without noise every test finds everything")
     return found

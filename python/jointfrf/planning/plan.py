@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple, get_args
 
 import numpy as np
@@ -16,7 +16,15 @@ from jointfrf.identification.model.prepare import Channels
 from jointfrf.identification.model.substructure import Unknown
 from jointfrf.identification.parameters import ParameterVector
 from jointfrf.identification.result import columns_of
-from jointfrf.kernel.arguments import FloatArray, as_frequency, as_names, as_number, as_positive, check_type, one_line
+from jointfrf.kernel.arguments import (
+    FloatArray,
+    as_frequency,
+    as_names,
+    as_not_negative,
+    as_positive,
+    check_type,
+    one_line,
+)
 from jointfrf.planning.design import Criterion, Design, Designer, Prices, criterion_of
 from jointfrf.planning.information import FrfInformation, PlannedTest, expected_noise, narrowest_band
 from jointfrf.spelling import did_you_mean
@@ -33,7 +41,8 @@ _OPEN = 0.5
 _NAMED = 6
 
 
-class PlanStep(NamedTuple):
+@dataclass(frozen=True)
+class PlanStep:
     """A test: sensors, each of them read at every hit.
 
     Attributes
@@ -54,7 +63,8 @@ class PlanStep(NamedTuple):
     std_error: dict[str, float]
 
 
-class Addition(NamedTuple):
+@dataclass(frozen=True)
+class Addition:
     """A sensor or a hit more.
 
     Attributes
@@ -289,10 +299,7 @@ def plan(
     )  # fmt: skip
     designer = Designer(information.of_frf, information.prior, criterion_of(wanted, criterion), prices, kept)
     planner = _Planner(test, channels, information, wanted, designer)
-    mass = as_number("sensor_mass", sensor_mass)
-    if mass < 0:
-        raise ValueError(f"sensor_mass must not be negative, not {mass:g} kg")
-    return planner.planned(list(goal.steps(designer)), mass)
+    return planner.planned(list(goal.steps(designer)), as_not_negative("sensor_mass", sensor_mass, "kg"))
 
 
 def _targets(vector: ParameterVector, names: tuple[str, ...] | None) -> NDArray[np.intp]:
@@ -371,8 +378,7 @@ class _Planner(NamedTuple):
             self._shift(chosen, names),
             (),
         )
-        object.__setattr__(found, "findings", tuple(_findings(found)))
-        return found
+        return replace(found, findings=tuple(_findings(found)))
 
     def _step(self, design: Design) -> PlanStep:
         information = self.designer.information(design)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from jointfrf.identification.findings import Finding
 from jointfrf.identification.result import Fit, columns_of
-from jointfrf.kernel.arguments import FloatArray, as_names, as_number, check_type, one_line
+from jointfrf.kernel.arguments import FloatArray, as_names, as_number, as_probability, check_type, one_line
 from jointfrf.pooling.parameter import ASSEMBLY, Estimate, PooledParameter, TestPlan, pooled_parameter, shown_chance
 from jointfrf.spelling import did_you_mean
 
@@ -146,8 +146,7 @@ def pool(
     >>> print(f"the next assembly: {k.next_one.low:.0f} to {k.next_one.high:.0f} N/m")
     the next assembly: 1521 to 2750 N/m
     """
-    if not 0 < as_number("probability", probability) < 1:
-        raise ValueError(f"probability must lie between 0 and 1, not {probability}")
+    probability = as_probability("probability", probability)
     chosen = None if parameters is None else as_names("parameters", parameters)
     listed = as_fits("a pool", fits)
     plan = _plan(as_labels(labels, len(listed)), factors, as_names("trends", trends), common, probability)

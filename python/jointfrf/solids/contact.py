@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 from scipy.sparse import linalg as sparse_linalg
 
-from jointfrf.kernel.arguments import FloatArray, as_count, as_number, as_positive, as_real
+from jointfrf.kernel.arguments import FloatArray, as_count, as_not_negative, as_positive, as_real
 from jointfrf.models.factors import SYMMETRIC
 
 __all__ = ["ContactInterface", "ContactLaw", "InterfaceState", "Iteration", "Pairs", "solve_contact", "tie"]
@@ -61,8 +61,7 @@ class ContactLaw:
     tangential_stiffness: float | None = 1e13
 
     def __post_init__(self) -> None:
-        if as_number("friction", self.friction) < 0:
-            raise ValueError(f"friction must not be negative, not {self.friction:g}")
+        as_not_negative("friction", self.friction)
         for name in ("normal_stiffness", "tangential_stiffness"):
             value = getattr(self, name)
             if value is not None:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 from scipy.spatial import cKDTree
 
-from jointfrf.kernel.arguments import FloatArray, as_array, as_count, as_number, as_real, check_type
+from jointfrf.kernel.arguments import FloatArray, as_array, as_count, as_not_negative, as_real, check_type
 
 __all__ = ["NEAR", "Mesh", "Plan", "disc", "extrude", "holed_rectangle", "interpolation", "join_plans", "rectangle"]
 
@@ -322,8 +322,7 @@ def interpolation(
     """
     check_type("mesh", mesh, Mesh)
     places = as_real("points", points, (None, 3))
-    if as_number("tolerance", tolerance) < 0:
-        raise ValueError(f"tolerance must not be negative, not {tolerance:g} m")
+    as_not_negative("tolerance", tolerance, "m")
     point, vectors = _rows(len(places), directions)
     bricks = _chosen(mesh, elements)
     found, weights = _located(mesh, bricks, places, tolerance)
