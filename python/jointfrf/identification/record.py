@@ -285,8 +285,8 @@ def read_record(path: Path) -> tuple[Fit, dict[str, Any]]:
         check_file(path)
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
-    except (UnicodeDecodeError, json.JSONDecodeError):
-        raise FileContentError(f"{path} is no file of a joint: it is not JSON, which `save` writes") from None
+    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError):
+        raise FileContentError(f"{path} is no file of a joint: it is not JSON, as `save` writes it") from None
     return _fit_of(content, str(path)), content
 
 

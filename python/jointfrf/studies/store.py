@@ -123,7 +123,7 @@ class StudyStore:
             )
         except FileNotFoundError as error:
             raise FileContentError(f"{self.folder} holds no study: there is no study.json in it") from error
-        except (OSError, ValueError, KeyError, TypeError) as error:
+        except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
             if isinstance(error, FileContentError):
                 raise
             raise FileContentError(f"{path} is not the file of a study: {error}") from error
