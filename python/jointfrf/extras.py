@@ -48,9 +48,12 @@ def import_extra(module: str) -> Any:
     MissingPackageError
         The package is not installed; the message says how to install it.
     """
+    import numpy as np
+
     package = module.partition(".")[0]
     try:
-        return importlib.import_module(module)
+        with np.printoptions():  # pyYeti sets how arrays print, also those of the program that reads a file by it
+            return importlib.import_module(module)
     except ModuleNotFoundError as error:
         if (error.name or "").partition(".")[0] != package:
             raise

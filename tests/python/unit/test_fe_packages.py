@@ -13,15 +13,13 @@ import pytest
 
 import jointfrf as jf
 from jointfrf.errors import FileContentError
+from jointfrf.extras import import_extra
 from jointfrf.io.fe.matrix_formats import read_matrix
 
 
 @pytest.fixture(scope="module")
 def nastran():
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        pyyeti = pytest.importorskip("pyyeti.nastran.op4")
-    return Path(pyyeti.__file__).parents[1] / "tests"
+    return Path(pytest.importorskip("pyyeti").__file__).parent / "tests"
 
 
 def part_of(folder, keys):
@@ -46,6 +44,13 @@ def test_a_craig_bampton_model_of_nastran(tmp_path, nastran):
     lines = "\n".join(part.describe())
     assert "(Nastran, mm-t-s)" in lines
     assert "1 nodes have directions of their own" in lines
+
+
+def test_arrays_print_as_before_once_a_package_is_loaded(tmp_path, monkeypatch):
+    (tmp_path / "sets_printing.py").write_text("import numpy as np\nnp.set_printoptions(legacy='1.13', precision=2)\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    import_extra("sets_printing")
+    assert repr(np.array([1.23456])) == "array([1.23456])"
 
 
 def test_blocks_of_output2(nastran):
