@@ -13,7 +13,7 @@ from functools import partial
 from multiprocessing import connection, context, parent_process, spawn
 from pathlib import Path
 from queue import SimpleQueue
-from threading import Lock, RLock, Thread
+from threading import Lock, RLock, Thread, current_thread, main_thread
 from typing import Any, Generic, TypeVar
 
 from jointfrf.kernel.arguments import as_integer
@@ -109,7 +109,30 @@ class _SafeProcess(context.SpawnProcess):
 
 @contextmanager
 def _uninterrupted() -> Iterator[None]:
-    """Start a process that no Ctrl-C reaches, not even while it still imports; the one here comes after the start."""
+    """Start a process that no Ctrl-C reaches, not even while it still imports; the one here comes after the start.
+
+    A signal blocked in this thread reaches another one, as of a BLAS, and is then handled here all the same: it is
+    only noted meanwhile. Else the process would be there, and what it is to do not yet written to it.
+    """
+    handler = signal.getsignal(signal.SIGINT)
+    if not hasattr(signal, "pthread_sigmask") or not callable(handler) or current_thread() is not main_thread():
+        with _blocked():
+            yield
+        return
+    noted: list[int] = []
+    try:
+        signal.signal(signal.SIGINT, lambda number, frame: noted.append(number))
+        with _blocked():
+            yield
+    finally:
+        signal.signal(signal.SIGINT, handler)
+        if noted:
+            signal.raise_signal(signal.SIGINT)
+
+
+@contextmanager
+def _blocked() -> Iterator[None]:
+    """Block Ctrl-C in this thread, and in what it starts."""
     if not hasattr(signal, "pthread_sigmask"):  # Windows
         yield
         return

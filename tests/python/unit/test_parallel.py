@@ -10,7 +10,7 @@ from threadpoolctl import threadpool_info
 
 import jointfrf as jf
 from deadly_tasks import kill_this_process, note_each
-from jointfrf.parallel.pool import Pool, available_cores, one_thread, opened_pool
+from jointfrf.parallel.pool import Pool, _uninterrupted, available_cores, one_thread, opened_pool
 
 
 def numbers_of_threads() -> dict[str, int]:
@@ -190,3 +190,21 @@ def test_few_tasks_are_submitted_at_the_same_time():
         for done, _ in enumerate(Pool(executor, 2).completed(abs, tasks()), 1):
             assert asked <= done + 2 * 2
     assert asked == 100
+
+
+@pytest.mark.skipif(not hasattr(signal, "pthread_kill"), reason="Windows sends no signal to a thread")
+def test_an_interrupt_that_another_thread_gets_waits_for_the_start():
+    # As OpenBLAS's threads do: the signal is blocked in this thread, and comes to the other one.
+    steps, may_end = [], threading.Event()
+    other = threading.Thread(target=may_end.wait)
+    other.start()
+    with pytest.raises(KeyboardInterrupt):  # noqa: PT012  # what follows the signal is what is tested
+        with _uninterrupted():
+            signal.pthread_kill(other.ident, signal.SIGINT)
+            steps += [sum(range(10**5)) for _ in range(3)]
+            steps.append("written")
+        steps.append("not interrupted")
+    may_end.set()
+    other.join()
+    assert steps[-1] == "written"
+    assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ())
