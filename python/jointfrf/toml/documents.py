@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import textwrap
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -23,16 +24,16 @@ def key_reference(tops: Mapping[str, type[Keys]]) -> str:
     parts: list[str] = []
     shown: list[type[Keys]] = []
     for heading, top in tops.items():
-        parts.append(f"## {heading}\n\n{_about(top)}\n\n{_rows(top)}")
+        parts.append(f"## {heading}\n\n{_filled(_about(top))}\n\n{_rows(top)}")
         as_above = []
         for header, table in _inner_tables(top):
             if table in shown:
                 as_above.append(f"`{header}`")
                 continue
             shown.append(table)
-            parts.append(f"### {header}\n\n{_about(table)}\n\n{_rows(table)}")
+            parts.append(f"### {header}\n\n{_filled(_about(table))}\n\n{_rows(table)}")
         if as_above:
-            parts.append(f"As above: {', '.join(as_above)}.\n")
+            parts.append(_filled(f"As above: {', '.join(as_above)}.") + "\n")
     return "\n".join(parts)
 
 
@@ -52,6 +53,11 @@ def _inner_tables(top: type[Keys], inside: str = "") -> Iterator[tuple[str, type
 
 def _about(table: type[Keys]) -> str:
     return " ".join((table.__doc__ or "").split())
+
+
+def _filled(text: str) -> str:
+    """Fill a paragraph to lines of the width of other documents."""
+    return textwrap.fill(text, 120, break_long_words=False, break_on_hyphens=False)
 
 
 def _rows(table: type[Keys]) -> str:
