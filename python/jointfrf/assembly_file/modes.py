@@ -12,12 +12,11 @@ import numpy as np
 from jointfrf.cases.keys import read_frf_file
 from jointfrf.cases.structure import Structure, SubstructureKeys
 from jointfrf.dofs import direction_names
-from jointfrf.io.fe.dof_names import read_dof_names
-from jointfrf.io.fe.nodes import read_nodes
-from jointfrf.io.model_units import UnitSystemName, model_units
+from jointfrf.io.fe.nodes import read_dof_names, read_nodes
 from jointfrf.io.modes import ModesFile, read_modes
+from jointfrf.io.units import UnitSystemName, model_units
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
-from jointfrf.models.modal_frfs import ModalFrfs
+from jointfrf.models.modal import ModalFrfs
 from jointfrf.toml.declared import key
 
 __all__ = ["ModalStructure", "ModesKeys"]

@@ -4,8 +4,7 @@ catalogue      finding cases, reading one, running one; the kinds of cases
 kind           what a kind of case consists of, and what a study asks of it
 keys           keys that several kinds have, and what follows: frequencies, joint, bands, noise
 structure      one of the structures that a joint connects: a model or FRFs
-matrices       a structure by files of matrices
-substructures  all kinds of structures
+substructures  all kinds of structures: chains, beams, bricks, files of matrices, FRFs
 comparison     computed beside expected natural frequencies; how many values of a table fit
 workers        processes that share the work
 known_joint/   two simulated substructures and a joint of known parameters

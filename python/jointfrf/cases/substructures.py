@@ -2,18 +2,29 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from functools import partial
+from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 from msgspec import field
+from scipy import sparse
 
 from jointfrf.cases.keys import MaterialKeys, read_frf_file
-from jointfrf.cases.matrices import MatricesKeys
 from jointfrf.cases.structure import MeasuredStructure, ModelStructure, Structure, SubstructureKeys
+from jointfrf.dofs import DIRECTIONS
 from jointfrf.frf.frf_set import POWER_OF_I_OMEGA
+from jointfrf.io.fe.matrix_format import StoredMatrix
+from jointfrf.io.fe.matrix_formats import read_matrix
+from jointfrf.io.fe.nodes import NodeFile, read_dof_names, read_nodes
+from jointfrf.io.units import ModelUnits, UnitSystemName, model_units
 from jointfrf.kernel.arguments import FloatArray
 from jointfrf.models.beam import BeamElement, End, beam
+from jointfrf.models.matrices import is_symmetric
 from jointfrf.models.model import Ground, chain
+from jointfrf.models.points import Coupling, PointModel, PointPatch, couple_points
 from jointfrf.solids.brick_beam import Face, Hole, Preset, brick_beam
 from jointfrf.toml.declared import Keys, NotNegative, Positive, key, read_keys
 from jointfrf.toml.table import TomlTable
@@ -24,10 +35,243 @@ __all__ = [
     "MatricesKeys",
     "MeasuredStructure",
     "ModelStructure",
+    "PointPatchKeys",
     "Structure",
     "SubstructureKeys",
     "read_model",
 ]
+
+
+class PointPatchKeys(Keys):
+    """A reference point of a patch of nodes, named by `nodes`, `set` or `box`; six DOFs, `NAME:x` to `NAME:theta_z`."""
+
+    name: Annotated[str, key("Name of the point.", example="joint", holds=lambda word: word != "" and ":" not in word)]
+    coupling: Annotated[
+        Coupling,
+        key("`rigid`: the nodes follow the point (RBE2, `*RIGID BODY`); `distributing`: the point shows their mean "
+            "motion and spreads forces over them (RBE3), which adds no stiffness."),
+    ] = "distributing"  # fmt: skip
+    nodes: Annotated[tuple[int, ...], key("Nodes of the patch.", takes="list of numbers of nodes")] = ()
+    set: Annotated[str, key("A set of nodes in the file of `nodes` of the part (`*NSET`).", absent="none")] = ""
+    box: Annotated[
+        tuple[float, float, float, float, float, float] | None,
+        key("All nodes in a box: smallest x, y, z, largest x, y, z.", "m"),
+    ] = None
+    at: Annotated[
+        tuple[float, float, float] | None, key("Where the point is.", "m", absent="the mean place of the nodes")
+    ] = None
+
+    def chosen(self, file: NodeFile, places: Mapping[str, FloatArray]) -> tuple[str, ...]:
+        """Return the nodes of the patch; raises FileContentError."""
+        ways = [name for name in ("nodes", "set", "box") if getattr(self, name)]
+        if len(ways) != 1:
+            raise self.missing(["nodes, set or box"], "exactly one of them names the patch")
+        if self.nodes:
+            return tuple(map(str, self.nodes))
+        if self.set:
+            if self.set.upper() not in file.sets:
+                known = ", ".join(list(file.sets)[:12]) or "none"
+                raise self.wrong("set", f"the file of nodes has no set {self.set!r}; it has {known}")
+            return file.sets[self.set.upper()]
+        assert self.box is not None
+        low, high = np.array(self.box[:3]), np.array(self.box[3:])
+        found = tuple(node for node, at in places.items() if (low <= at).all() and (at <= high).all())
+        if not found:
+            raise self.wrong("box", "no node lies in it")
+        return found
+
+
+class MatricesKeys(SubstructureKeys, tag="matrices"):
+    """Matrices of a finite-element model, or of your own: [formats](files.md#matrices-of-models).
+
+    A matrix in a file of several is named by the key, or as `part.op4#KAA`. Files are relative to the file naming them.
+    """
+
+    stiffness: Annotated[str, key("K, symmetric, real.", "N/m", takes="name of a file")]
+    mass: Annotated[str, key("M, symmetric, real.", "kg", takes="name of a file")]
+    damping: Annotated[str | None, key("Viscous damping C.", "N s/m", takes="name of a file")] = None
+    structural_damping: Annotated[
+        str | None, key("Structural damping H, i H added to K.", "N/m", takes="name of a file")
+    ] = None
+    loss_factor: Annotated[NotNegative, key("Loss factor eta of the stiffness, K (1 + i eta).")] = 0.0
+    dofs: Annotated[
+        tuple[str, ...] | str | None,
+        key('Names of the DOFs in the order of the rows: `"12:y"`. In a file, one a line: `12:y`, or node and number '
+            "of the DOF (1 to 6): `12 2`; `#` begins a comment; or `.dof` of CalculiX, `.mapping` of Ansys, `EXTRN` "
+            "cards of Nastran.", takes="list of texts, or name of a text file",
+            absent="required by Matrix Market and NPZ; else as the files say, or a file beside that of K",
+            holds=lambda found: found != ()),
+    ] = None  # fmt: skip
+    nodes: Annotated[
+        str | None,
+        key("Where the nodes are: a deck of Abaqus or CalculiX, bulk data of Nastran, a `.cdb` of Ansys, a Universal "
+            "File, or lines of node, x, y, z.", takes="name of a file", absent="not known"),
+    ] = None  # fmt: skip
+    units: Annotated[
+        UnitSystemName | None,
+        key("Units of the files, nodes included; all other numbers here are in SI units.",
+            absent="SI of Matrix Market and NPZ; required by files of FE programs, which do not say them"),
+    ] = None  # fmt: skip
+    point: Annotated[tuple[PointPatchKeys, ...], key("Reference points of patches of nodes.")] = ()
+
+    def structure(self, freq_hz: FloatArray) -> Structure:
+        """Return the structure."""
+        names = ("stiffness", "mass", "damping", "structural_damping")
+        paths = {name: self._path(name) for name in names if getattr(self, name) is not None}
+        stored = {name: self.build(partial(read_matrix, path, name), name) for name, path in paths.items()}
+        self._check_sizes(paths, stored)
+        units = self._units(stored)
+        file = NodeFile() if self.nodes is None else self.build(partial(read_nodes, self.file_of("nodes")), "nodes")
+        dofs = self._dof_names(paths["stiffness"], stored)
+        found = {name: self._aligned(name, paths[name], one, dofs) for name, one in stored.items()}
+        for name in ("stiffness", "mass"):
+            if not is_symmetric(sparse.csc_array(found[name])):
+                raise self.wrong(name, _unsymmetric(paths[name], found[name]))
+        mass = found["mass"].diagonal()
+        if (mass < 0).any() or not mass.any():
+            why = "must have a diagonal that is not negative, and not zero as a whole"
+            raise self.wrong("mass", f"{paths['mass']} {why}")
+        found, dofs, held = _without_empty(found, dofs)
+        found = _in_si(found, dofs, units)
+        model = PointModel(
+            found["stiffness"], found["mass"], _marked(dofs, file.turned), found.get("damping"),
+            found.get("structural_damping"), self.loss_factor, places=_places(dofs, file, units),
+        )  # fmt: skip
+        patches = [
+            PointPatch(one.name, one.chosen(file, model.places), one.coupling, np.array(one.at) if one.at else None)
+            for one in self.point
+        ]
+        if patches:
+            model = self.build(lambda: couple_points(model, patches), "point")
+        about = _about(paths, stored, units, held, len(file.turned))
+        return ModelStructure(model, about=about, patches=tuple(patches))
+
+    def _path(self, name: str) -> Path:
+        """Return the path of a file of matrices, with the name of one in it where that is said."""
+        file, mark, title = str(getattr(self, name)).rpartition("#")
+        if mark and not (self.table.folder / f"{file}#{title}").exists():
+            found = TomlTable({name: file}, self.table.where, self.table.folder).file(name)
+            return found.with_name(f"{found.name}#{title}")
+        return self.file_of(name)
+
+    def _units(self, stored: Mapping[str, StoredMatrix]) -> ModelUnits:
+        program = next((one.program for one in stored.values() if one.program), "")
+        if self.units is None and program:
+            raise self.missing(["units"], f"no file of {program} says its units, which are SI, mm-t-s or mm-kg-ms")
+        return model_units(self.units or "SI")
+
+    def _check_sizes(self, paths: Mapping[str, Path], stored: Mapping[str, StoredMatrix]) -> None:
+        """Raise an error for a matrix of another size than K, where it does not name its DOFs."""
+        n = stored["stiffness"].matrix.shape[0]
+        for name, one in stored.items():
+            if one.dofs is None and one.matrix.shape[0] != n:
+                raise self.wrong(
+                    name, f"{paths[name]} holds {one.matrix.shape[0]} DOFs, {paths['stiffness']} holds {n}"
+                )
+
+    def _dof_names(self, path: Path, stored: Mapping[str, StoredMatrix]) -> tuple[str, ...]:
+        """Return the names of all DOFs, each once."""
+        own = stored["stiffness"].dofs
+        if own is not None:
+            if self.dofs is not None:
+                raise self.wrong("dofs", f"{path} names its DOFs itself: leave the key out")
+            return tuple(dict.fromkeys([*own, *(dof for one in stored.values() for dof in one.dofs or ())]))
+        beside = path.with_suffix(stored["stiffness"].dof_suffix or path.suffix)
+        if self.dofs is None and (beside == path or not beside.exists()):
+            also = "" if beside == path else f", and there is no {beside.name} beside it"
+            raise self.missing(["dofs"], f"{path} does not name its DOFs{also}")
+        named = self.dofs if isinstance(self.dofs, tuple) else self.file_of("dofs") if self.dofs is not None else beside
+        given = named if isinstance(named, tuple) else self.build(partial(read_dof_names, named), "dofs")
+        where, n = "" if isinstance(named, tuple) else f"{named} ", stored["stiffness"].matrix.shape[0]
+        if len(given) != n:
+            raise self.wrong("dofs", f"{where}names {len(given)} DOFs, the matrices hold {n}")
+        if not all(name.strip() for name in given):
+            raise self.wrong("dofs", f"{where}has an empty name")
+        name, count = Counter(given).most_common(1)[0]
+        if count > 1:
+            raise self.wrong("dofs", f"{where}names {name!r} twice")
+        return given
+
+    def _aligned(self, name: str, path: Path, stored: StoredMatrix, dofs: tuple[str, ...]) -> sparse.csr_array:
+        """Return a matrix in the order of the DOFs."""
+        n = len(dofs)
+        if stored.dofs is None or stored.dofs == dofs:
+            return stored.matrix
+        number = {dof: i for i, dof in enumerate(dofs)}
+        at = np.array([number.get(dof, -1) for dof in stored.dofs], np.intp)
+        if (at < 0).any():
+            raise self.wrong(name, f"{path} holds {stored.dofs[int(np.argmin(at))]}, which the stiffness does not name")
+        entries = sparse.coo_array(stored.matrix)
+        return sparse.csr_array(sparse.coo_array((entries.data, (at[entries.row], at[entries.col])), shape=(n, n)))
+
+
+def _without_empty(
+    found: Mapping[str, sparse.csr_array], dofs: tuple[str, ...]
+) -> tuple[dict[str, sparse.csr_array], tuple[str, ...], int]:
+    """Leave out DOFs without any entry, which some programs keep of what is held; return how many."""
+    filled = np.zeros(len(dofs), bool)
+    for matrix in found.values():
+        filled |= abs(matrix).sum(axis=1) > 0
+    if filled.all():
+        return dict(found), dofs, 0
+    kept = np.flatnonzero(filled)
+    return {name: one[kept][:, kept] for name, one in found.items()}, tuple(dofs[i] for i in kept), int((~filled).sum())
+
+
+def _in_si(
+    found: Mapping[str, sparse.csr_array], dofs: Sequence[str], units: ModelUnits
+) -> dict[str, sparse.csr_array]:
+    """Return the matrices in SI units: rotations, and modal coordinates like them, by the unit of length."""
+    if units.name == "SI":
+        return dict(found)
+    scale = np.array([1.0 if dof.rpartition(":")[2] in DIRECTIONS[:3] else units.length for dof in dofs])
+    by_dof = sparse.diags_array(scale)
+    power = {"stiffness": 2, "structural_damping": 2, "damping": 1, "mass": 0}
+    return {name: sparse.csr_array(units.scale(power[name]) * (by_dof @ one @ by_dof)) for name, one in found.items()}
+
+
+def _marked(dofs: tuple[str, ...], turned: Sequence[str]) -> tuple[str, ...]:
+    """Return names of DOFs; those of nodes with directions of their own say so."""
+    own = set(turned)
+    if not own:
+        return dofs
+    parts = (dof.rpartition(":") for dof in dofs)
+    return tuple(f"{node}:local_{way}" if node in own else f"{node}:{way}" for node, _, way in parts)
+
+
+def _places(dofs: Sequence[str], file: NodeFile, units: ModelUnits) -> dict[str, FloatArray]:
+    """Return where the nodes of the DOFs are, m."""
+    length = 1.0 if file.is_si else units.length
+    nodes = dict.fromkeys(dof.rpartition(":")[0] for dof in dofs)
+    return {node: length * file.coordinates[node] for node in nodes if node in file.coordinates}
+
+
+def _about(
+    paths: Mapping[str, Path], stored: Mapping[str, StoredMatrix], units: ModelUnits, held: int, turned: int
+) -> str:
+    """Say which files a model is of, and what was done with them."""
+    names = ", ".join(dict.fromkeys(path.name for path in paths.values()))
+    program = next((one.program for one in stored.values() if one.program), "")
+    text = f"{names} ({program + ', ' if program else ''}{units.name})"
+    halves = sorted({one.completed for one in stored.values() if one.completed})
+    if halves:
+        text += f"; the {' and the '.join(halves)} triangle is stored, the other one was filled in"
+    text += f"; {held} DOFs without any entry are held and left out" if held else ""
+    return text + (f"; {turned} nodes have directions of their own, named local_x" if turned else "")
+
+
+def _unsymmetric(path: Path, matrix: sparse.csr_array) -> str:
+    """Say where a matrix is not symmetric."""
+    difference = sparse.coo_array(matrix - matrix.T)
+    worst = int(np.argmax(abs(difference.data)))
+    i, j = int(difference.row[worst]), int(difference.col[worst])
+    text = (
+        f"{path} must hold a symmetric matrix: entry ({i + 1}, {j + 1}) is {matrix[i, j]:g}, "
+        f"({j + 1}, {i + 1}) is {matrix[j, i]:g}"
+    )
+    is_triangle = sparse.triu(matrix, 1).count_nonzero() == 0 or sparse.tril(matrix, -1).count_nonzero() == 0
+    return text + ("; it holds one triangle only" if is_triangle else "")
+
 
 #: A key of all models of bricks.
 PRESET = key("Elements: `seed` as in the thesis (C3D8R), `accurate` with incompatible modes (C3D8I).", example="seed")

@@ -17,7 +17,7 @@ from jointfrf.identification.fit_cards import cards
 from jointfrf.identification.joint_file import JointFile, read_joint_file
 from jointfrf.identification.result import Fit
 from jointfrf.io.cards import CardFormat, CardOptions
-from jointfrf.io.model_units import UnitSystemName, model_units
+from jointfrf.io.units import UnitSystemName, model_units
 from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import FloatArray
 from jointfrf.laws.law_joint import LawJoint

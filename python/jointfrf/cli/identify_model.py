@@ -22,7 +22,7 @@ from jointfrf.errors import ConvergenceWarning, FileContentError, Identification
 from jointfrf.files import write_file
 from jointfrf.identification.record import fit_to_dict, write_record
 from jointfrf.identification.result import Fit, columns_of
-from jointfrf.io.model_units import model_units
+from jointfrf.io.units import model_units
 from jointfrf.kernel.arguments import FloatArray
 from jointfrf.report.fit_model import next_sentences
 from jointfrf.report.fit_page import write_report

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from jointfrf.dofs import DIRECTIONS, direction_places, rigid_offset
-from jointfrf.io.model_units import ModelUnits, UnitSystemName, model_units
+from jointfrf.io.units import ModelUnits, UnitSystemName, model_units
 from jointfrf.kernel.arguments import FloatArray, as_nodes, as_real, check_choice
 from jointfrf.spelling import visible
 

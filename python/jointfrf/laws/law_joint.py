@@ -362,7 +362,7 @@ class LawJoint:
 
             text += rigid_cards(program, self.rigid, nodes, options, alone=springs is None)
         if self.mass:
-            from jointfrf.io.model_units import model_units
+            from jointfrf.io.units import model_units
 
             own = model_units(options.get("units", "SI"))
             scaled = {dof: mass / own.mass for dof, mass in self.mass.items()}

@@ -6,8 +6,7 @@ points        models with places of nodes and reference points
 facts         what shows that matrices are the right ones
 beam          plane beams
 receptance    the choice of a method, and direct solutions
-modal         sums of modes; rigid-body modes apart
-modal_frfs    FRFs of modes that were measured, and residuals
+modal         sums of modes, computed or measured; rigid-body modes apart
 krylov        reduction to solutions at a few frequencies
 factors       factors of matrices and the order of elimination
 """

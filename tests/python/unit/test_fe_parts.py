@@ -12,9 +12,8 @@ import jointfrf as jf
 from fe_files import NODE_FILES, WRITERS, block, dmig, in_units, part_toml
 from jointfrf.assembly_file.read import scaled_model
 from jointfrf.errors import FileContentError
-from jointfrf.io.fe.dof_names import read_dof_names
 from jointfrf.io.fe.matrix_formats import MATRIX_FORMATS, read_matrix
-from jointfrf.io.fe.nodes import read_nodes
+from jointfrf.io.fe.nodes import read_dof_names, read_nodes
 from jointfrf.models.facts import model_facts
 from jointfrf.models.points import PointModel, PointPatch, couple_points
 

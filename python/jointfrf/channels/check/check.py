@@ -38,10 +38,9 @@ from jointfrf.channels.check.exchange import (
 )
 from jointfrf.channels.check.finding import Correction, FindingLevel, FrfCheck, FrfFinding, corrected
 from jointfrf.channels.check.pair_ratios import PairRatios, pair_ratios
-from jointfrf.channels.check.reference_points import reference_findings
 from jointfrf.channels.check.rigid_findings import rigid_faults
 from jointfrf.channels.check.rigid_motion import ChannelGroup, not_rigid
-from jointfrf.channels.check.sides import side_findings
+from jointfrf.channels.check.sides import reference_findings, side_findings
 from jointfrf.channels.check.signals import (
     Measurement,
     as_channel_names,

@@ -11,15 +11,12 @@ from scipy import sparse
 from jointfrf.errors import FileContentError
 from jointfrf.extras import check_extras
 from jointfrf.files import ReadLimit, check_file, damage_named, head_of
-from jointfrf.io.fe.abaqus import ABAQUS
+from jointfrf.io.fe.abaqus import ABAQUS, CALCULIX
 from jointfrf.io.fe.ansys_full import ANSYS_FULL
-from jointfrf.io.fe.calculix import CALCULIX
 from jointfrf.io.fe.harwell_boeing import HARWELL_BOEING
 from jointfrf.io.fe.market import MARKET
 from jointfrf.io.fe.matrix_format import ROW, MatrixFormat, StoredMatrix
-from jointfrf.io.fe.nastran_dmig import NASTRAN_DMIG
-from jointfrf.io.fe.nastran_op2 import NASTRAN_OP2
-from jointfrf.io.fe.nastran_op4 import NASTRAN_OP4
+from jointfrf.io.fe.nastran import NASTRAN_DMIG, NASTRAN_OP2, NASTRAN_OP4
 from jointfrf.io.fe.npz import NPZ
 
 __all__ = ["MATRIX_FORMATS", "format_of_matrix", "read_matrix"]
