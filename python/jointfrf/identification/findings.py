@@ -8,7 +8,7 @@ from typing import Literal
 
 from jointfrf.errors import ConvergenceWarning, IdentificationWarning
 
-__all__ = ["Finding", "FitFindingKind", "as_warning", "note", "warn", "worst_first"]
+__all__ = ["Finding", "FitFindingKind", "WithFindings", "as_warning", "note", "warn", "worst_first"]
 
 #: What a finding is about.
 FitFindingKind = Literal[
@@ -73,6 +73,22 @@ class Finding:
 
     def __str__(self) -> str:
         return self.text
+
+
+class WithFindings:
+    """What has findings says them in sentences, too."""
+
+    findings: tuple[Finding, ...]
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What a reader must know before using the numbers."""
+        return tuple(one.text for one in self.findings if one.severity == "warning")
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """How the numbers came about."""
+        return tuple(one.text for one in self.findings if one.severity == "note")
 
 
 def warn(

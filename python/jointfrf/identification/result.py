@@ -16,7 +16,7 @@ from scipy.special import ndtri
 from jointfrf.dofs import Parameter, ParameterKind
 from jointfrf.frf.bands import Band
 from jointfrf.identification.derived import Derived, DerivedFunction, derived_quantity
-from jointfrf.identification.findings import Finding, as_warning, worst_first
+from jointfrf.identification.findings import Finding, WithFindings, as_warning, worst_first
 from jointfrf.identification.fit_data import FitData, ModelData
 from jointfrf.identification.residual_test import ResidualTest
 from jointfrf.joint import Joint
@@ -104,7 +104,7 @@ def law_parameters(joint: LawJoint) -> tuple[FittedParameter, ...]:
 
 
 @dataclass(frozen=True)
-class Fit:
+class Fit(WithFindings):
     """Parameters of a joint, and what else was unknown, with their uncertainty.
 
     It is data: `plot`, `write_report`, `save`, `cards` do something with it.
@@ -211,16 +211,6 @@ class Fit:
         """Correlation of the errors of all parameters, shape (p, p)."""
         size = np.sqrt(np.maximum(np.diagonal(self.covariance), np.finfo(float).tiny))
         return np.asarray(self.covariance / np.outer(size, size))
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """What a reader must know before using the numbers."""
-        return tuple(one.text for one in self.findings if one.severity == "warning")
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """How the numbers came about."""
-        return tuple(one.text for one in self.findings if one.severity == "note")
 
     def _matrix(self, kind: ParameterKind) -> FloatArray:
         return _matrix(self.dofs, self.parameters, self.estimate, kind)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from jointfrf.frf.bands import Band
-from jointfrf.identification.findings import Finding, note, warn
+from jointfrf.identification.findings import Finding, WithFindings, note, warn
 from jointfrf.identification.model.assembly import AddedMass, Assembly
 from jointfrf.identification.model.prepare import Channels
 from jointfrf.identification.model.substructure import Unknown
@@ -84,7 +84,7 @@ class Addition:
 
 
 @dataclass(frozen=True)
-class MeasurementPlan:
+class MeasurementPlan(WithFindings):
     """What was planned.
 
     Attributes
@@ -132,11 +132,6 @@ class MeasurementPlan:
     def proposed(self) -> PlanStep:
         """The test that is proposed."""
         return self.steps[-1]
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """Sentences of the findings that are warnings."""
-        return tuple(one.text for one in self.findings if one.severity == "warning")
 
     def relative_error(self, step: PlanStep, name: str) -> float:
         """Return the standard error of a parameter over its value; of one that is 0, inf."""

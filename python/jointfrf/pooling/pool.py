@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from jointfrf.identification.findings import Finding
+from jointfrf.identification.findings import Finding, WithFindings
 from jointfrf.identification.result import Fit, columns_of
 from jointfrf.kernel.arguments import FloatArray, as_names, as_number, as_probability, check_type, one_line
 from jointfrf.pooling.parameter import ASSEMBLY, Estimate, PooledParameter, TestPlan, pooled_parameter, shown_chance
@@ -22,7 +22,7 @@ Factors = Mapping[str, Sequence[str | float]]
 
 
 @dataclass(frozen=True)
-class PooledFits:
+class PooledFits(WithFindings):
     """What several fits of one joint say together; `print` shows it.
 
     Attributes
@@ -39,16 +39,6 @@ class PooledFits:
     parameters: dict[str, PooledParameter]
     probability: float
     findings: tuple[Finding, ...]
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """What a reader must know before using the numbers."""
-        return tuple(one.text for one in self.findings if one.severity == "warning")
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """How the numbers came about."""
-        return tuple(one.text for one in self.findings if one.severity == "note")
 
     def __str__(self) -> str:
         """Return tables of means and the next assembly, of spreads and trends, and the findings."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -32,6 +32,8 @@ __all__ = [
     "Sketch",
     "Words",
     "make_document",
+    "section_of_command",
+    "words_of_findings",
 ]
 
 #: Up to so many columns fit on any screen; more than so many are written smaller; more than so many become rows.
@@ -108,11 +110,29 @@ class Section:
 
 @dataclass(frozen=True)
 class Document:
-    """What a page holds."""
+    """What a page holds; tables without rows and sections without parts are left out."""
 
     title: str
     about: str
     sections: Sequence[Section] = field(default_factory=tuple)
+
+    def __post_init__(self) -> None:
+        kept = [replace(one, parts=[part for part in one.parts if not _is_empty(part)]) for one in self.sections]
+        object.__setattr__(self, "sections", [one for one in kept if one.parts])
+
+
+def _is_empty(part: Part) -> bool:
+    return isinstance(part, Table) and not part.rows
+
+
+def section_of_command(command: str) -> Section:
+    """Return the section that says how a page was made."""
+    return Section("made", "How this was made", [Listing("", command)] if command else [])
+
+
+def words_of_findings(warnings: Sequence[str], notes: Sequence[str]) -> list[Words]:
+    """Return lists of warnings and notes, those that hold any."""
+    return [Words(texts, kind) for texts, kind in ((warnings, "warnings"), (notes, "notes")) if texts]
 
 
 def make_document(document: Document) -> str:

@@ -23,7 +23,7 @@ from jointfrf.kernel.arguments import FloatArray, check_type
 from jointfrf.kernel.call import get_engine
 from jointfrf.report.axes import prefixed_unit
 from jointfrf.report.chart import Chart, count_points
-from jointfrf.report.document import Document, Listing, Part, Section, Sketch, Words, make_document
+from jointfrf.report.document import Document, Listing, Part, Section, Sketch, Words, make_document, words_of_findings
 from jointfrf.report.figure import Figure
 from jointfrf.report.fit import fit_figures, information_figure, information_table, shown_name
 from jointfrf.report.fit_frfs import (
@@ -146,7 +146,7 @@ def fit_document(fit: Fit, options: ReportOptions) -> Document:
         f"Joint DOFs {', '.join(fit.dofs)}; {len(responses)} response{_plural(responses)}, {len(forces)} "
         f"force{_plural(forces)}; {_span(fit.freq_hz)}; method {fit.method}."
     )
-    return Document(title, about, [section for section in sections if section.parts])
+    return Document(title, about, sections)
 
 
 def _plural(names: Sequence[str]) -> str:
@@ -275,12 +275,8 @@ def _summary(fit: Fit, compared: ComparedFrfs) -> Section:
 
 
 def _doubts(fit: Fit) -> Section:
-    parts: list[Part] = []
-    if fit.warnings:
-        parts.append(Words([f"{text}." for text in fit.warnings], "warnings"))
-    if fit.notes:
-        parts.append(Words([f"{text}." for text in fit.notes], "notes"))
-    return Section("doubts", "Warnings and notes" if fit.warnings else "Notes", parts)
+    warnings, notes = ([f"{text}." for text in texts] for texts in (fit.warnings, fit.notes))
+    return Section("doubts", "Warnings and notes" if warnings else "Notes", words_of_findings(warnings, notes))
 
 
 def _geometry(fit: Fit, data: FitData) -> list[Part]:

@@ -11,7 +11,17 @@ from jointfrf.files import write_file
 from jointfrf.kernel.arguments import FloatArray
 from jointfrf.planning.joint_frfs import JointFrfPlan
 from jointfrf.planning.plan import MeasurementPlan
-from jointfrf.report.document import Document, HeatMap, Listing, Part, Picture, Section, Words, make_document
+from jointfrf.report.document import (
+    Document,
+    HeatMap,
+    Part,
+    Picture,
+    Section,
+    Words,
+    make_document,
+    section_of_command,
+    words_of_findings,
+)
 from jointfrf.report.draw import draw
 from jointfrf.report.figure import Curve, Figure, Level, Panel
 from jointfrf.report.sketch import SketchedPart, assembly_sketch
@@ -95,11 +105,11 @@ def _of_joint_frfs(plan: JointFrfPlan, command: str) -> Document:
     sections = [
         Section("summary", "What the test will know", [Table("targets", "", (*columns, *shift), rows)]),
         Section("lines", "Where the knowledge lies", [Picture(lines, draw(lines)), *maps]),
-        Section("made", "How this was made", [Listing("", command)] if command else []),
+        section_of_command(command),
     ]
     first, last = plan.freq_hz[[0, -1]].tolist()
     about = f"FRFs between all joint DOFs, {plan.freq_hz.size} lines from {first:.4g} to {last:.4g} Hz."
-    return Document("A planned test", about, [one for one in sections if one.parts])
+    return Document("A planned test", about, sections)
 
 
 def _document(plan: MeasurementPlan, parts: Sequence[SketchedPart], command: str) -> Document:
@@ -111,13 +121,13 @@ def _document(plan: MeasurementPlan, parts: Sequence[SketchedPart], command: str
         Section("summary", "The test", [*_said(plan), *([sketch] if sketch else []), _targets(plan)]),
         Section("cost", "What more would bring", [Picture(cost, draw(cost)), _steps(plan), _additions(plan)]),
         Section("lines", "Where the knowledge lies", [Picture(lines, draw(lines)), *maps]),
-        Section("made", "How this was made", [Listing("", command)] if command else []),
+        section_of_command(command),
     ]
     about = (
         f"A test of {len(best.sensors)} sensors and {len(best.hits)} hits, chosen from {len(plan.responses)} and "
         f"{len(plan.forces)} places; {plan.freq_hz.size} lines from {plan.freq_hz[0]:.4g} to {plan.freq_hz[-1]:.4g} Hz."
     )
-    return Document("A planned test", about, [one for one in sections if one.parts])
+    return Document("A planned test", about, sections)
 
 
 def _said(plan: MeasurementPlan) -> Iterator[Part]:
@@ -126,11 +136,7 @@ def _said(plan: MeasurementPlan) -> Iterator[Part]:
     yield Words(
         [f"Sensors at {', '.join(best.sensors)}; hits at {', '.join(best.hits)}: {errors} (one standard error)."]
     )
-    if plan.warnings:
-        yield Words(plan.warnings, "warnings")
-    notes = [one.text for one in plan.findings if one.severity != "warning"]
-    if notes:
-        yield Words(notes, "notes")
+    yield from words_of_findings(plan.warnings, plan.notes)
 
 
 def _targets(plan: MeasurementPlan) -> Table:

@@ -11,7 +11,15 @@ from jointfrf.files import write_file
 from jointfrf.kernel.arguments import check_type
 from jointfrf.pooling.parameter import Estimate, FactorSpread, FactorTrend, PooledParameter
 from jointfrf.pooling.pool import PooledFits
-from jointfrf.report.document import Document, Listing, Part, Picture, Section, Words, make_document
+from jointfrf.report.document import (
+    Document,
+    Picture,
+    Section,
+    Words,
+    make_document,
+    section_of_command,
+    words_of_findings,
+)
 from jointfrf.report.draw import draw
 from jointfrf.report.figure import Figure, Interval, Level, Panel
 from jointfrf.report.table import Table, csv_cell
@@ -71,21 +79,15 @@ def write_pool(pooled: PooledFits, path: Path | str, *, command: str = "") -> Pa
 def _document(pooled: PooledFits, command: str) -> Document:
     figures = [forest_figure(one, pooled.probability) for one in pooled.parameters.values()]
     sections = [
-        Section("summary", "Summary", [Words(list(_sentences(pooled))), *_said(pooled)]),
+        Section(
+            "summary", "Summary", [Words(list(_sentences(pooled))), *words_of_findings(pooled.warnings, pooled.notes)]
+        ),
         Section("forest", "Fits, mean, and the next assembly", [Picture(one, draw(one)) for one in figures]),
         Section("tables", "Tables", [_mean_table(pooled), _spread_table(pooled), _trend_table(pooled)]),
-        Section("made", "How this was made", [Listing("", command)] if command else []),
+        section_of_command(command),
     ]
     about = f"{len(pooled.labels)} fits of the same joint: {', '.join(pooled.labels)}."
-    kept = [Section(s.key, s.heading, [p for p in s.parts if not isinstance(p, Table) or p.rows]) for s in sections]
-    return Document(f"A joint from {len(pooled.labels)} fits", about, [one for one in kept if one.parts])
-
-
-def _said(pooled: PooledFits) -> Iterator[Part]:
-    if pooled.warnings:
-        yield Words(pooled.warnings, "warnings")
-    if pooled.notes:
-        yield Words(pooled.notes, "notes")
+    return Document(f"A joint from {len(pooled.labels)} fits", about, sections)
 
 
 def _sentences(pooled: PooledFits) -> Iterator[str]:
