@@ -173,7 +173,7 @@ def exact(trial: CalibrationTrial) -> tuple[np.ndarray, np.ndarray]:
 
 
 def one_draw(trial: CalibrationTrial, place: int, number: int) -> Draw | None:
-    """Fit one draw, nothing told of noise and calibration."""
+    """Fit one draw, with noise and calibration unknown."""
     freq, h = exact(trial)
     rng = np.random.default_rng([1000 * place + number, 30])
     noisy = h * trial.factor(rng, freq, h.shape)

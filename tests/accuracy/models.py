@@ -178,7 +178,7 @@ def main() -> None:
         for trial in TRIALS:
             kind = "right" if trial.wrong == "nothing" else "wrong"
             if args.only in (None, kind) and (not args.words or any(word in trial.name for word in args.words)):
-                # A fit of a wrong model follows all starts: fewer draws tell as much.
+                # A fit of a wrong model follows all starts: fewer draws show as much.
                 draws = args.draws if trial.wrong == "nothing" else -(-args.draws // 5)
                 print(row(trial, list(pool.map(partial(one_draw, trial), range(draws)))), flush=True)
 

@@ -161,7 +161,7 @@ NOISES = (*SIZES, *_OTHERS)
 
 @dataclass(frozen=True)
 class Trial:
-    """One row of the table; `damping` is what `identify` is told, `kind` the truth."""
+    """One row of the table; `damping` is what `identify` is given, `kind` the truth."""
 
     system: str
     noise: str

@@ -14,7 +14,7 @@ __all__ = ["AssemblyKeys", "GroundKeys", "MassKeys", "PartKeys", "Prior", "Prior
 
 
 class PriorKeys(Keys):
-    """What is believed of an unknown number; without `std` only the FRFs tell."""
+    """What is believed of an unknown number; without `std` only the FRFs determine it."""
 
     mean: Annotated[float | None, key("What is believed.", absent="the number given beside it")] = None
     std: Annotated[Positive | None, key("Standard deviation of that belief.", absent="no prior")] = None

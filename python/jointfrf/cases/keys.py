@@ -38,7 +38,7 @@ __all__ = [
     "Noise",
     "Observed",
     "StudyKeys",
-    "actual_values",
+    "WithActualJoint",
     "check_bands",
     "check_different",
     "check_noises",
@@ -325,9 +325,20 @@ class MaterialKeys(Keys):
         return self.build(lambda: Material(self.youngs_modulus, self.poisson, self.density, self.loss_factor))
 
 
-def actual_values(joint: Joint) -> FloatArray:
-    """Values of the parameters of a joint without cross terms, in the order of `jointfrf.dofs.joint_parameters`."""
-    return np.concatenate([np.diagonal(joint.stiffness), np.diagonal(joint.damping)])
+class WithActualJoint:
+    """What has an actual joint, without cross terms, that is to be found."""
+
+    joint: Joint
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Stiffness of every DOF, then damping."""
+        return joint_parameters(self.joint.dofs)
+
+    @property
+    def actual(self) -> FloatArray:
+        """Values of the parameters of the actual joint."""
+        return np.concatenate([np.diagonal(self.joint.stiffness), np.diagonal(self.joint.damping)])
 
 
 def constant_joint(theta: FloatArray, freq_hz: FloatArray) -> ComplexArray:

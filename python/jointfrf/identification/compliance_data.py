@@ -1,4 +1,4 @@
-"""What a compliance fit shows beside its numbers: FRFs regenerated with the joint, and which lines tell of what."""
+"""What a compliance fit shows beside its numbers: FRFs regenerated with the joint, and what each line shows."""
 
 from __future__ import annotations
 

@@ -61,7 +61,7 @@ def elastic_centre(joint: Joint | Fit) -> ElasticCentre:
     Raises
     ------
     ValueError
-        No translation and rotation together, names of DOFs that do not tell a direction, a stiffness that is not
+        No translation and rotation together, names of DOFs without a direction, a stiffness that is not
         positive on the diagonal.
 
     Notes

@@ -195,7 +195,7 @@ def _checked(
     measured: MeasuredFrfs, dofs: tuple[str, ...], transforms: tuple[FloatArray, FloatArray] | None
 ) -> FrfCheck:
     """Look at the FRFs of the lines used, by the names of the joint DOFs where these are the channels."""
-    # A look at some lines, evenly spread, tells as much.
+    # A look at some lines, evenly spread, shows as much.
     some = spread_lines(measured.freq_hz.size)
     freq, h = measured.freq_hz[some], measured.h[some]
     if transforms is None:

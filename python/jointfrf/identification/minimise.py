@@ -7,7 +7,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from jointfrf.kernel.arguments import FloatArray
+from jointfrf.kernel.arguments import TINY, FloatArray
 
 __all__ = ["Linearised", "Minimum", "Squares", "inverse_information", "minimise"]
 
@@ -19,7 +19,6 @@ _LEAST, _SMALL = 1e-4, 1e-3
 _ROUNDING = 1e-12
 #: Directions of less information than this share of the largest are rounding: of a step, and of an inverse.
 _NOT_SOLVED, _SEEN = 1e-13, 1e-15
-_TINY = float(np.finfo(float).tiny)
 
 
 class Linearised(NamedTuple):
@@ -150,7 +149,7 @@ class _Steps:
 
     def __init__(self, at: Linearised, moving: NDArray[np.intp]) -> None:
         self.moving, self.p = moving, at.gradient.size
-        self.size = np.sqrt(np.maximum(np.diagonal(at.information), _TINY))[moving]
+        self.size = np.sqrt(np.maximum(np.diagonal(at.information), TINY))[moving]
         scaled = at.information[np.ix_(moving, moving)] / np.outer(self.size, self.size)
         self.value, self.vector = np.linalg.eigh(scaled)
         self.along = self.vector.T @ (at.gradient[moving] / self.size)
@@ -172,7 +171,7 @@ def inverse_information(information: FloatArray) -> FloatArray:
     ----------
     information : ndarray, shape (..., p, p)
     """
-    size = np.sqrt(np.maximum(np.einsum("...aa->...a", information), _TINY))
+    size = np.sqrt(np.maximum(np.einsum("...aa->...a", information), TINY))
     value, vector = np.linalg.eigh(information / (size[..., :, None] * size[..., None, :]))
     length = abs(value)
     seen = length > _SEEN * length.max(axis=-1, keepdims=True)

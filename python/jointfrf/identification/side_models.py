@@ -86,8 +86,8 @@ class SideModel:
         for name, unknown in self.part.unknowns.items():
             if unknown.std is None:
                 raise ValueError(
-                    f"part: {name} has no standard deviation, and FRFs of the assembly do not tell it: say how far it "
-                    "is known, such as 0.03 of its value"
+                    f"part: {name} has no standard deviation, and FRFs of the assembly do not determine it: say how "
+                    "far it is known, such as 0.03 of its value"
                 )
         for dof in self.part.joint:
             if not self.part.has(dof):

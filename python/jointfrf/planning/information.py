@@ -19,7 +19,7 @@ __all__ = ["ExpectedNoise", "FrfInformation", "PlannedTest", "expected_noise", "
 #: Bytes of derivatives that are in memory at once.
 _BYTES = 256 * 2**20
 #: What is believed of every parameter in the widest sense, relative to its value: a factor of a thousand. It keeps the
-#: information of a single FRF, which may not tell all parameters apart, invertible.
+#: information of a single FRF, which may not distinguish all parameters, invertible.
 _WIDEST = 1e3
 #: FRFs below this part of the largest are zero by symmetry, but for rounding: they say nothing.
 _ROUNDING = 1e-10

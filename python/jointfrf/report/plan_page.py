@@ -44,7 +44,7 @@ def cost_figure(plan: MeasurementPlan) -> Figure:
 
 
 def line_figure(plan: MeasurementPlan | JointFrfPlan) -> Figure:
-    """Return what each line tells of each target."""
+    """Return what each line knows of each target."""
     width = np.gradient(plan.freq_hz) if plan.freq_hz.size > 1 else np.ones(1)
     panels = list[Panel]()
     for name, share in zip(plan.bands, plan.line_share, strict=True):

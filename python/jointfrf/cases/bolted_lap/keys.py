@@ -15,15 +15,14 @@ from jointfrf.cases.keys import (
     JointDofKeys,
     MaterialKeys,
     Noise,
-    actual_values,
+    WithActualJoint,
     check_noises,
     joints_of,
 )
 from jointfrf.cases.substructures import PRESET
-from jointfrf.dofs import Parameter, joint_parameters
+from jointfrf.dofs import Parameter
 from jointfrf.frf.bands import Band
 from jointfrf.joint import Joint
-from jointfrf.kernel.arguments import FloatArray
 from jointfrf.solids.bolted_lap import PROOF_STRENGTH, STRESS_AREA, Bolt, preload_force
 from jointfrf.solids.brick_beam import Preset
 from jointfrf.toml.declared import Keys, NotNegative, Positive, key
@@ -110,7 +109,7 @@ class BoltedLapExpected(ExpectedKeys):
 
 
 @dataclass(frozen=True, kw_only=True)
-class BoltedLapCase(Case):
+class BoltedLapCase(Case, WithActualJoint):
     """A lap joint with a preloaded bolt of solid elements, and what is measured on it.
 
     Attributes
@@ -138,16 +137,6 @@ class BoltedLapCase(Case):
     bands: BandSet
     noises: tuple[Noise, ...]
     expected: ExpectedFrequencies | None
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        """Stiffness of the six DOFs, then damping."""
-        return joint_parameters(self.joint.dofs)
-
-    @property
-    def actual(self) -> FloatArray:
-        """Values of the parameters of the known joint."""
-        return actual_values(self.joint)
 
     def bands_of(self, dof: str) -> list[Band]:
         """Bands of the stiffness and damping of a DOF, Hz."""

@@ -21,7 +21,7 @@ from jointfrf.cases.keys import (
     JointDofKeys,
     Noise,
     Observed,
-    actual_values,
+    WithActualJoint,
     check_bands,
     check_different,
     check_noises,
@@ -36,7 +36,7 @@ from jointfrf.cases.substructures import (
     ReceptancesKeys,
     Structure,
 )
-from jointfrf.dofs import Parameter, joint_parameters
+from jointfrf.dofs import Parameter
 from jointfrf.errors import FileContentError
 from jointfrf.frf.bands import Band
 from jointfrf.joint import Joint
@@ -199,7 +199,7 @@ class KnownJointExpected(ExpectedKeys):
 
 
 @dataclass(frozen=True, kw_only=True)
-class KnownJointCase(Case):
+class KnownJointCase(Case, WithActualJoint):
     """A simulated identification.
 
     Attributes
@@ -232,16 +232,6 @@ class KnownJointCase(Case):
         """Both substructures where both are known by their models, else None."""
         a, b = self.a, self.b
         return (a, b) if isinstance(a, ModelStructure) and isinstance(b, ModelStructure) else None
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        """Stiffness of every DOF, then damping."""
-        return joint_parameters(self.joint.dofs)
-
-    @property
-    def actual(self) -> FloatArray:
-        """Values of the parameters of the actual joint."""
-        return actual_values(self.joint)
 
 
 def read_known_joint(common: Case, keys: KnownJointKeys, expected: KnownJointExpected) -> KnownJointCase:

@@ -152,10 +152,10 @@ def reference_findings(joint: JointChannels) -> Iterator[FrfFinding]:
     unit = _unit(wide[0], 1) if wide else None
     if wide or any(one.reach >= _WIDEST for one in places):
         one = max(places, key=lambda each: each.reach)
-        told = f"and the reference point {_in_metres(one.point)} is in metres: " if unit else ""
+        about = f"and the reference point {_in_metres(one.point)} is in metres: " if unit else ""
         yield _found(
             "error" if unit else "warning", one.reach, _WIDEST,
-            f"the coordinates of the channels look like {unit or 'millimetres'}, {told}they lie {one.reach:.3g} m "
+            f"the coordinates of the channels look like {unit or 'millimetres'}, {about}they lie {one.reach:.3g} m "
             f"(root mean square) about their middle on side {one.side}",
             "give coordinates of channels, and the reference point, in metres",
         )  # fmt: skip

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from jointfrf.dofs import Parameter, ParameterKind, joint_parameters
 from jointfrf.identification.manifold.line_forms import LEAST_GAIN, STEPS, FormMinimum, JointCoordinates, LineForms
 from jointfrf.identification.parameters import ParameterVector, joint_vector
-from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray
 from jointfrf.kernel.call import call, call_for_number
 from jointfrf.kernel.linear_algebra import invert
 from jointfrf.laws.law_joint import LawJoint
@@ -53,7 +53,6 @@ _ALL_DAMPING = 0.1
 _COARSE = 1e-2
 #: Relative standard error of a compliance from which on intervals come from the profile of the likelihood.
 _CURVED = 0.1
-_TINY = float(np.finfo(float).tiny)
 
 
 class JointTerms(NamedTuple):
@@ -176,7 +175,7 @@ class DiagonalJoint(SpringJoint):
         self.by_rate = by_rate
         self.rows, self.columns = np.diag_indices(terms.n)
         self.rates = np.flatnonzero(terms.kinds > 0)
-        p, fastest = len(terms.parameters), max(float(terms.omega.max()), _TINY)
+        p, fastest = len(terms.parameters), max(float(terms.omega.max()), TINY)
         self.rate_of_one = np.where(terms.kinds[self.rates] == 1, 1.0, 1 / fastest)
         self.largest_rate = np.where(terms.kinds[self.rates] == 1, _LARGEST_RATE, _LARGEST_RATE / fastest)
         self.upper = np.full(p, np.inf)
@@ -286,7 +285,7 @@ class DiagonalJoint(SpringJoint):
             x[:n] = np.where(caught, size, x[:n])
             if held is not None:
                 x[held] = start[held]
-            other = share * self.rate_of_one / (1.0 if self.by_rate else np.maximum(x[of_rate], _TINY))
+            other = share * self.rate_of_one / (1.0 if self.by_rate else np.maximum(x[of_rate], TINY))
             moved = caught[of_rate] & (self.rates != held)
             x[self.rates] = np.where(moved, other, x[self.rates])
             there = self.minimise(forms, x, held, max(least_gain, _COARSE))

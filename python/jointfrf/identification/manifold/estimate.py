@@ -26,7 +26,7 @@ from jointfrf.identification.manifold.on_manifold import LineData, OnManifold
 from jointfrf.identification.manifold.soft import SoftJoint, fit_soft, soft_dofs
 from jointfrf.identification.manifold.starts import first_joints
 from jointfrf.identification.manifold.unknown_cross import fit_unknown_cross
-from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray
 from jointfrf.laws.law_joint import LawJoint
 
 __all__ = ["GroupData", "GroupStart", "JointEstimate", "assembled", "estimate_joint", "estimate_laws"]
@@ -35,7 +35,6 @@ __all__ = ["GroupData", "GroupStart", "JointEstimate", "assembled", "estimate_jo
 _RIGID, _ROUNDING = 1e-3, 1e-12
 #: A fit that leaves cross terms unknown fits far better from this ratio of the mean squares on.
 _FAR_BETTER = 4.0
-_TINY = float(np.finfo(float).tiny)
 
 #: A group of DOFs that is fitted separately, and its FRFs.
 GroupData = tuple[NDArray[np.intp], LineData]
@@ -372,7 +371,7 @@ def assembled(parameters: Sequence[NamedParameter], groups: Sequence[GroupFit]) 
 def _reported(group: GroupFit) -> tuple[FloatArray, FloatArray]:
     """Return coordinates that give finite parameters, and the covariance with that of rates of rigid DOFs.
 
-    A stiffness beyond what the data can tell stays a number; its interval says that it is open. Rates that nothing
+    A stiffness beyond what the data can resolve stays a number; its interval says that it is open. Rates that nothing
     shows because their DOF was found rigid have a variance of zero by a pseudo-inverse. They get the variance that they
     would have if the compliance were as large as its standard error.
     """
@@ -388,7 +387,7 @@ def _reported(group: GroupFit) -> tuple[FloatArray, FloatArray]:
         slope = joint.slope(at, joint.compliance(at))[:, :, hidden]
         information = np.einsum("lqh,lqr,lrh->h", slope.conj(), group.forms.weight, slope).real
         covariance = covariance.copy()
-        covariance[hidden, hidden] = 1 / np.maximum(2 * information, _TINY)
+        covariance[hidden, hidden] = 1 / np.maximum(2 * information, TINY)
     x[a] = np.maximum(x[a], np.maximum(_RIGID * error, _ROUNDING * group.problem.data.own_size[a[: joint.n]]))
     return x, covariance
 

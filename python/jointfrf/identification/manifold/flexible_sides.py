@@ -2,7 +2,7 @@
 
 Between virtual points a joint of compliance C is seen as C_seen = Q (C + D_A + D_B) P (docs/sides.md): softer at low
 frequency by what the sides give way between channels and joint, D0 = D_A(0) + D_B(0), and changing over frequency by
-their inertia. The FRFs tell C + D0, and how much the sides bend among the channels; D0 itself only within a factor.
+their inertia. The FRFs determine C + D0, and how much the sides bend among the channels; D0 only within a factor.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from scipy import special
 
 from jointfrf.frf.quantiles import medians
 from jointfrf.identification.manifold.transforms import ChannelModes
-from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray
 from jointfrf.kernel.linear_algebra import solve
 
 __all__ = ["JointAlone", "SideBending", "joint_alone", "side_bending"]
@@ -41,7 +41,6 @@ _INERTIA = 2.0
 _MIDDLE, _LARGE, _NEGATIVE = (1.1, 3.6), (6.0, 16.0), (0.2, 0.0)
 #: Part of the compliance among the channels in what is seen of bending: it makes these quantiles lie closest.
 _AMONG = 0.5
-_TINY = float(np.finfo(float).tiny)
 
 
 class SideBending(NamedTuple):
@@ -133,7 +132,7 @@ def _of_side(channels: _Channels, side: int) -> SideBending | None:
     modes, transform = responses.modes[rows][:, here], responses.transform[here][:, rows]
     residual = np.eye(rows.size) - modes @ transform
     spread = residual**2 @ spread
-    spread = np.maximum(spread, _LEAST_VARIANCE * medians(spread.swapaxes(0, 2).reshape(n, -1))[None, None] + _TINY)
+    spread = np.maximum(spread, _LEAST_VARIANCE * medians(spread.swapaxes(0, 2).reshape(n, -1))[None, None] + TINY)
     weight = 1 / spread
     total = weight.sum(axis=0)
     bent = residual @ ((weight * field.real).sum(axis=0) / total)
@@ -162,7 +161,7 @@ def _among_channels(channels: _Channels, side: int) -> SideBending | None:
         return None
     left = (responses.residual[rows] @ measured @ forces.residual[columns].T).real
     spread = variance[:, rows[:, None], columns]
-    weight = 1 / np.maximum(np.where(np.isfinite(spread), spread, 0).mean(axis=(1, 2)), _TINY)
+    weight = 1 / np.maximum(np.where(np.isfinite(spread), spread, 0).mean(axis=(1, 2)), TINY)
     mean = np.tensordot(weight, left, 1) / weight.sum()
     gains = [np.linalg.norm(own.transform[here], axis=1) for own in (responses, forces)]
     found = gains[0] * gains[1] * np.linalg.svd(mean, compute_uv=False).sum() / count
@@ -292,7 +291,7 @@ def joint_alone(
     static = _static_compliance(omega, compliance, variance)
     middle, large, negative = (np.where(is_rotation, r, t) for t, r in (_MIDDLE, _LARGE, _NEGATIVE))
     value, error, smooth = fitted
-    is_rigid = large * bending.high / np.maximum(size, _TINY) * abs(value) <= error
+    is_rigid = large * bending.high / np.maximum(size, TINY) * abs(value) <= error
     is_rigid |= ~np.isfinite(static.value)
     seen = np.where(is_rigid, value, static.value)
     # Errors of channels that are smooth over frequency do not show in the scatter of lines.
@@ -300,5 +299,5 @@ def joint_alone(
     inertia = np.where(is_rigid, 0.0, _INERTIA * abs(static.value - static.before))
     # At most as soft as noise and inertia allow, where these alone leave the sign open.
     size_seen = np.maximum(seen, np.hypot(noise, inertia) / 2)
-    best = size_seen / (1 + middle * bending.low / np.maximum(size_seen, _TINY))
+    best = size_seen / (1 + middle * bending.low / np.maximum(size_seen, TINY))
     return JointAlone(seen, noise, inertia, best, negative * bending.high, large * bending.high)

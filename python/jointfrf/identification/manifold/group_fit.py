@@ -26,7 +26,7 @@ from jointfrf.identification.manifold.on_manifold import (
     starts_on_manifold,
 )
 from jointfrf.identification.minimise import inverse_information
-from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray
 
 __all__ = [
     "FAR",
@@ -75,7 +75,6 @@ _MOST_ENTRIES = 2**22
 _HARDLY = 0.3
 #: Factors by which poorly determined DOFs are made softer: at first, and where that led nowhere.
 _SOFTER, _SOFTER_STILL = 3.0, 4.0
-_TINY = float(np.finfo(float).tiny)
 
 
 class GroupProblem(NamedTuple):
@@ -334,7 +333,7 @@ def _gradients_beside(fit: GroupFit, changes: Iterable[ComplexArray]) -> FloatAr
 def _from_softer(best: GroupFit) -> GroupFit:
     """Start again from softer values of poorly determined DOFs: far too stiff, a fit may be caught.
 
-    From a few times the compliance that the data can tell, up to that of the structure around the joint.
+    From a few times the compliance that the data can resolve, up to that of the structure around the joint.
     """
     joint, softest = best.joint, best.problem.data.own_size
     n, of_rate = joint.n, joint.dofs[joint.n :]
@@ -501,7 +500,7 @@ def _linearised(
 
 
 def _within_sight(minimum: FormMinimum, x: FloatArray) -> FloatArray:
-    """Return where to linearise: not nearer to a rigid joint, nor at a larger rate of one, than the data can tell."""
+    """Return where to linearise: not nearer to a rigid joint, nor at a larger rate of one, than the data resolve."""
     joint, n = minimum.joint, minimum.joint.n
     error = np.sqrt(np.maximum(np.diagonal(minimum.covariance), 1e-300))
     hardly = ~(error[:n] <= _HARDLY * x[:n])
@@ -571,7 +570,7 @@ def _of_coordinates(
 def _eliminated(forms: LineForms, of_smooth: LineForms, unknown: NDArray[np.bool_]) -> tuple[LineForms, ComplexArray]:
     """Minimise each form over its unknown entries; return the forms left, and the step there of the smooth FRFs."""
     w, p = forms.weight, forms.gradient
-    size = np.sqrt(np.maximum(np.einsum("lqq->lq", w).real, _TINY))
+    size = np.sqrt(np.maximum(np.einsum("lqq->lq", w).real, TINY))
     outer = size[:, :, None] * size[:, None, :]
     both = unknown[:, :, None] & unknown[:, None, :]
     masked = np.where(both, w / outer, 0) + (~unknown)[:, :, None] * np.eye(w.shape[1])

@@ -11,7 +11,7 @@ from jointfrf.frf.bands import spread_lines
 from jointfrf.identification.manifold.coordinates import DiagonalJoint, JointTerms
 from jointfrf.identification.manifold.group_fit import LITTLE_PATIENCE, GroupFit, GroupProblem, fit_dofs
 from jointfrf.identification.manifold.line_forms import FormMinimum, JointCoordinates, LineForms
-from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray
 from jointfrf.kernel.linear_algebra import solve
 
 __all__ = ["SoftJoint", "fit_soft", "soft_dofs"]
@@ -27,7 +27,6 @@ _ALL_DAMPING = 0.5
 _START, _SIGHT = 1e-2, 10.0
 #: A fit in stiffnesses replaces one in compliances unless its squares are higher by more than this.
 _AS_GOOD = 1.0
-_TINY = float(np.finfo(float).tiny)
 
 
 class SoftJoint(DiagonalJoint):
@@ -118,8 +117,8 @@ class SoftJoint(DiagonalJoint):
         return self.minimise(forms, start, held, least_gain)
 
     def within_sight(self, minimum: FormMinimum, x: FloatArray) -> FloatArray:
-        """Return where to linearise: no soft DOF nearer to free than the data can tell."""
-        error = np.sqrt(np.maximum(np.diagonal(minimum.covariance), _TINY))
+        """Return where to linearise: no soft DOF nearer to free than the data can resolve."""
+        error = np.sqrt(np.maximum(np.diagonal(minimum.covariance), TINY))
         at = x.copy()
         k = self._of_soft & self.is_stiffness
         at[k] = np.maximum(x[k], _SIGHT * error[k])
@@ -136,7 +135,7 @@ class SoftJoint(DiagonalJoint):
         return SoftJoint(self.terms, self.soft, self.about, by_rate=not self.by_rate)
 
     def end(self, i: int, sign: int) -> float:
-        """Return what a parameter runs to: a stiffness is zero where it cannot be told from that."""
+        """Return what a parameter runs to: a stiffness is zero where it cannot be distinguished from that."""
         if not self._of_soft[i]:
             return super().end(i, sign)
         return 0.0 if sign < 0 and self.is_stiffness[i] else sign * np.inf
@@ -198,7 +197,7 @@ def fit_soft(
     if theta is None:
         theta = np.nan_to_num(found.joint.theta(found.x), posinf=0.0, neginf=0.0)
     of_soft = soft[joint.dofs]
-    size = 1 / np.maximum(found.problem.data.own_size, _TINY)
+    size = 1 / np.maximum(found.problem.data.own_size, TINY)
     # Far softer than the structure, without damping, and with that of a DOF that was found to be all damping.
     softest = np.where(of_soft, np.where(joint.is_stiffness, _START * size[joint.dofs], 0.0), theta)
     damped = np.where(of_soft & ~joint.is_stiffness, np.nan_to_num(found.joint.theta(found.x)), softest)

@@ -25,7 +25,7 @@ from jointfrf.identification.scatter import (
     scatter_of,
     spread_of_scatters,
 )
-from jointfrf.kernel.arguments import FloatArray
+from jointfrf.kernel.arguments import TINY, FloatArray
 
 __all__ = [
     "block_scatter",
@@ -42,7 +42,6 @@ _DISAGREE, _LEAST_PARTS = 1e-3, 3
 _SINGULAR = 1e8
 #: Squares of profiles are minimised to this.
 _PRECISE = 1e-3
-_TINY = float(np.finfo(float).tiny)
 
 
 def line_scatter(group: GroupFit) -> tuple[FloatArray, FloatArray]:
@@ -79,7 +78,7 @@ def block_scatter(group: GroupFit, blocks: int = BLOCKS) -> tuple[FloatArray, Fl
     lines = np.flatnonzero(group.used & diagonal.any(axis=1))
     if lines.size < 2 * blocks:
         return np.full(p, np.nan), np.zeros(p)
-    size = np.maximum(np.diagonal(group.information), _TINY)
+    size = np.maximum(np.diagonal(group.information), TINY)
     member = block_members(diagonal / size, lines, blocks)
     found = group.of_groups(member)
     return scatter_of(found.information.sum(axis=0), [found])
@@ -333,7 +332,7 @@ def _trends(
     for of_part, own in zip(member, parts, strict=True):
         of_part[own] = 1
     gradient, information = group.of_groups(member)
-    size = np.sqrt(np.maximum(np.einsum("bpp->bp", information), _TINY))
+    size = np.sqrt(np.maximum(np.einsum("bpp->bp", information), TINY))
     seen = np.linalg.cond(information / (size[:, :, None] * size[:, None, :])) <= _SINGULAR
     if not seen.any():
         return []

@@ -35,7 +35,7 @@ class Unknown:
     value : float
         What is believed before the measurement, in the unit of the number.
     std : float, optional
-        Standard deviation of that belief, a normal prior; none by default: only the FRFs tell.
+        Standard deviation of that belief, a normal prior; none by default: only the FRFs determine it.
     lower, upper : float
         Limits.
 
