@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 
 from jointfrf.parallel.pool import started_processes
 
-__all__ = ["RankedProcesses", "Workers", "started_workers"]
+__all__ = ["RankedProcesses", "Workers", "silent", "started_workers"]
 
 _T = TypeVar("_T")
 #: What limits the threads of the libraries that a process calls.
@@ -23,8 +23,8 @@ _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 _HANDED_OUT = 2
 
 
-def _silent(done: int, total: int) -> None:
-    pass
+def silent(done: int, total: int) -> None:
+    """Show no progress."""
 
 
 class RankedProcesses:
@@ -112,7 +112,7 @@ class Workers:
     """
 
     pool: RankedProcesses | None = None
-    progress: Callable[[int, int], None] = _silent
+    progress: Callable[[int, int], None] = silent
     rank: int = 0
     turn: Lock | None = field(default=None, compare=False)
 

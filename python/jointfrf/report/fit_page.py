@@ -21,7 +21,7 @@ from jointfrf.identification.result import Fit, FittedParameter
 from jointfrf.io.cards import CardFormat
 from jointfrf.kernel.arguments import FloatArray, check_type
 from jointfrf.kernel.call import get_engine
-from jointfrf.report.axes import prefixed_unit
+from jointfrf.report.axes import bands_in_words, prefixed_unit
 from jointfrf.report.chart import Chart, count_points
 from jointfrf.report.document import Document, Listing, Part, Section, Sketch, Words, make_document, words_of_findings
 from jointfrf.report.figure import Figure
@@ -420,7 +420,12 @@ def _made(fit: Fit, options: ReportOptions) -> Table:
         *([("file", options.source)] if options.source else []),
         *([("command", options.command)] if options.command else []),
         *(
-            [("bands", "; ".join(f"{dof} {_bands(own)} Hz" for dof, own in zip(fit.dofs, fit.bands, strict=True)))]
+            [
+                (
+                    "bands",
+                    "; ".join(f"{dof} {bands_in_words(own)} Hz" for dof, own in zip(fit.dofs, fit.bands, strict=True)),
+                )
+            ]
             if fit.bands
             else []
         ),
@@ -428,10 +433,6 @@ def _made(fit: Fit, options: ReportOptions) -> Table:
         ("written on", f"{when:%Y-%m-%d}"),
     ]
     return Table("versions", "Command and versions", ("what", "which"), tuple(rows))
-
-
-def _bands(bands: Sequence[tuple[float, float]]) -> str:
-    return ", ".join(f"{low:g}-{high:g}" for low, high in bands)
 
 
 #: A residual up to this many times the noise is called that of the noise.

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from jointfrf.cases.catalogue import find_case
 from jointfrf.cases.kind import EstimateGroup, Estimates, RealisationSource
+from jointfrf.cases.workers import silent
 from jointfrf.errors import FileContentError
 from jointfrf.kernel.arguments import as_integer, check_type, one_line
 from jointfrf.parallel.pool import AnyExecutor, Pool, check_progress, one_thread, opened_pool
@@ -229,7 +230,7 @@ def study(
     if any(missing):
         groups = groups or _prepared(folder, plan, realisations)[0]
         with opened_pool(executor, jobs) as pool:
-            _compute(store, Schedule(groups, missing, pool.workers), pool, progress or _silent)
+            _compute(store, Schedule(groups, missing, pool.workers), pool, progress or silent)
     return StudyResult(store.folder)
 
 
@@ -326,7 +327,3 @@ def merge_studies(parts: Sequence[str | Path], out: str | Path) -> StudyResult:
     target.begin(replace(first, realisations=max(one.realisations for one in records)))
     target.take(stores)
     return StudyResult(target.folder)
-
-
-def _silent(done: int, total: int) -> None:
-    pass
