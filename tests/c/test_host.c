@@ -192,7 +192,7 @@ static jf_int call(void)
                            &info);
         break;
     case 25: {
-        const jf_int n_par = next(10) ? 1 + (jf_int)next(3 * MOST) : m, entries = next(20) ? few * (few + 1) / 2 : n_free;
+        const jf_int n_par = next(10) ? 1 + (jf_int)next(3 * MOST) : m, entries = next(20) ? order * (order + 1) / 2 : n_free;
 
         jf_joint_normal_equations(&t, &few, &n_par, &entries, &n_freq, dofs[0], dofs[1], frf(0), frf(1), frf(2), frf(3),
                                   out[0], out[1], &info);
