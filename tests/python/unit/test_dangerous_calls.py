@@ -38,7 +38,7 @@ KNOWN = {
     ("cli/study.py", "import_extra"): "executors that the command line names",
     ("io/formats.py", "import_module"): "modules of formats out of a list",
     ("io/hdf5_file.py", "import_extra"): "h5py",
-    ("io/fe/ansys_full.py", "import_extra"): "ansys-mapdl-reader, which reads numbers of a binary file",
+    ("io/fe/ansys.py", "import_extra"): "ansys-mapdl-reader, which reads numbers of a binary file",
     ("io/fe/abaqus.py", "loadtxt"): "numpy: numbers of a text file",
     ("io/fe/market.py", "loadtxt"): "numpy: numbers of a text file",
     ("io/fe/nastran.py", "import_extra"): "pyYeti, which reads numbers of a file",

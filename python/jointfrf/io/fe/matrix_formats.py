@@ -12,8 +12,7 @@ from jointfrf.errors import FileContentError
 from jointfrf.extras import check_extras
 from jointfrf.files import ReadLimit, check_file, damage_named, head_of
 from jointfrf.io.fe.abaqus import ABAQUS, CALCULIX
-from jointfrf.io.fe.ansys_full import ANSYS_FULL
-from jointfrf.io.fe.harwell_boeing import HARWELL_BOEING
+from jointfrf.io.fe.ansys import ANSYS_FULL, HARWELL_BOEING
 from jointfrf.io.fe.market import MARKET
 from jointfrf.io.fe.matrix_format import ROW, MatrixFormat, StoredMatrix
 from jointfrf.io.fe.nastran import NASTRAN_DMIG, NASTRAN_OP2, NASTRAN_OP4

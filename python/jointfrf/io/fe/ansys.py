@@ -1,4 +1,4 @@
-"""Matrices in Harwell-Boeing files, as `HBMAT` of Ansys writes them."""
+"""Matrices of Ansys: the `.full` file, by ansys-mapdl-reader; Harwell-Boeing files as `HBMAT` writes them."""
 
 from __future__ import annotations
 
@@ -9,12 +9,46 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from jointfrf.errors import FileContentError
+from jointfrf.extras import import_extra
 from jointfrf.files import ReadLimit
-from jointfrf.io.fe.matrix_format import MatrixFormat, StoredMatrix, matrix_of_entries
+from jointfrf.io.fe.matrix_format import MatrixFormat, StoredMatrix, dof_name, matrix_of_entries
 
-__all__ = ["HARWELL_BOEING"]
+__all__ = ["ANSYS_FULL", "HARWELL_BOEING"]
+
+#: Bytes of memory for a byte of the file: entries with row and column, of both matrices, and their sums.
+_TIMES = 8
+
+
+def _read_full(path: Path, name: str, limit: ReadLimit) -> StoredMatrix:
+    limit.take(_TIMES * path.stat().st_size)
+    if name not in ("stiffness", "mass"):
+        raise FileContentError(f"{path}: of a .full file K and M are read, not {name}")
+    reader = import_extra("ansys.mapdl.reader")
+    named, k, m = reader.read_binary(str(path)).load_km(as_sparse=True)
+    chosen = k if name == "stiffness" else m
+    if chosen is None:
+        raise FileContentError(f"{path} holds no {name}")
+    entries = sparse.coo_array(chosen)
+    matrix, completed = matrix_of_entries(
+        path, entries.row.astype(np.int64), entries.col.astype(np.int64), entries.data, chosen.shape[0], limit,
+        symmetric=True,
+    )  # fmt: skip
+    dofs = tuple(dof_name(node, number + 1) for node, number in named.tolist())
+    return StoredMatrix(matrix, dofs, "Ansys", completed)
+
+
+ANSYS_FULL = MatrixFormat(
+    name="Ansys .full",
+    suffixes=(".full",),
+    content="K and M, with nodes and directions",
+    read=_read_full,
+    is_own=lambda path, head: path.suffix.lower() == ".full",
+    needs="ansys",
+)
+
 
 #: ``(10I8)``, ``(1P,4D20.12)``: numbers of a line, and the width of each.
 _FORMAT = re.compile(r"\(\s*(?:\d+P,?)?\s*(\d*)\s*[IEDFG](\d+)(?:\.\d+)?(?:E\d+)?\s*\)", re.IGNORECASE)
@@ -27,7 +61,7 @@ def _is_own(path: Path, head: bytes) -> bool:
     return len(lines) > 3 and re.match(rb"^[RCP][SUHZR][AE]\s", lines[2], re.IGNORECASE) is not None
 
 
-def _read(path: Path, name: str, limit: ReadLimit) -> StoredMatrix:
+def _read_hb(path: Path, name: str, limit: ReadLimit) -> StoredMatrix:
     with path.open(encoding="latin-1") as file:
         next(file)
         cards = _whole_numbers(next(file))
@@ -82,7 +116,7 @@ HARWELL_BOEING = MatrixFormat(
     name="Harwell-Boeing",
     suffixes=(".hb", ".rsa", ".rua", ".matrix"),
     content="`HBMAT` of Ansys as text, other assembled real matrices; names of DOFs from the `.mapping` beside it",
-    read=_read,
+    read=_read_hb,
     is_own=_is_own,
     dof_suffix=".mapping",
 )
