@@ -1,10 +1,10 @@
-"""Misspelt words, and texts of files with invisible characters escaped."""
+"""Words of messages: what was misspelt, the first few of many, invisible characters of files escaped."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
-__all__ = ["did_you_mean", "look_alike", "visible"]
+__all__ = ["did_you_mean", "look_alike", "some_of", "visible"]
 
 #: Categories of invisible characters, which a terminal, a card or a page may interpret.
 _UNSEEN = {"Cc", "Cf", "Cs", "Zl", "Zp"}
@@ -37,6 +37,19 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
     """
     similar = look_alike(word, known)
     return f"; did you mean {similar}?" if similar else ""
+
+
+def some_of(names: Sequence[object], most: int, between: str = ", ") -> str:
+    """Return the first of some names, and how many more there are.
+
+    Examples
+    --------
+    >>> from jointfrf.spelling import some_of
+    >>> some_of([3, 4, 7, 9], 2), some_of(["y", "z"], 2)
+    ('3, 4 and 2 more', 'y, z')
+    """
+    more = f"{between.rstrip().rstrip(',')} and {len(names) - most} more" if len(names) > most else ""
+    return between.join(map(str, names[:most])) + more
 
 
 def visible(text: str, keep: str = "") -> str:

@@ -25,7 +25,9 @@ from jointfrf.toml.declared import Bands, Keys, NotNegative, Positive, key
 
 __all__ = [
     "FITTED",
+    "LIKE_DOFS",
     "METHODS",
+    "MOST_LINES",
     "BandKeys",
     "BandSet",
     "Case",
@@ -52,7 +54,9 @@ METHODS: tuple[str, ...] = ("compliance", *STIFFNESS_METHODS, "decoupling-fit")
 #: Methods that take all lines, not means over bands.
 FITTED = ("compliance", "decoupling-fit")
 #: More lines are a step that is a slip.
-_MOST_LINES = 1_000_000
+MOST_LINES = 1_000_000
+#: What lists of points take.
+LIKE_DOFS = "list of texts, as many as joint DOFs"
 #: A higher level of noise is more often 5 % written as 5 than meant.
 _HIGH_LEVEL = 0.5
 
@@ -92,8 +96,8 @@ class FrequencyKeys(Keys):
             raise self.error("first", "above 0 Hz, where Im K*/w is defined")
         if last < first:
             raise self.error("last", f"at least {first:g} Hz")
-        if (last - first) / step > _MOST_LINES:
-            raise self.error("step", f"larger: there would be more than {_MOST_LINES} lines")
+        if (last - first) / step > MOST_LINES:
+            raise self.error("step", f"larger: there would be more than {MOST_LINES} lines")
         count = int((last - first) / step + 1 + 1e-9)
         return np.round(first + step * np.arange(count), 9)
 

@@ -22,8 +22,10 @@ from jointfrf.dofs import DIRECTIONS, direction_names, direction_places, is_rota
 from jointfrf.errors import FileContentError, FileContentWarning
 from jointfrf.frf.frf_set import Channel, ChannelPlace, FrfSet, JointSide, check_apart
 from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray, as_real, check_type
+from jointfrf.spelling import some_of
 
 __all__ = [
+    "PAIRS_SHOWN",
     "ChannelAgreement",
     "JointChannels",
     "LeftOutDof",
@@ -47,7 +49,7 @@ _ENTERS = 0.05
 _NO_ARM = 1e-6
 _Kind = Literal["response", "excitation"]
 #: Missing FRFs that a message names.
-_PAIRS_SHOWN = 4
+PAIRS_SHOWN = 4
 #: Sides of the joint, on A and on B.
 _SIDES: tuple[JointSide, JointSide] = ("j", "k")
 #: Directions of channels in the order of `DIRECTIONS`.
@@ -272,12 +274,11 @@ class MissingFrfs:
     pairs: tuple[tuple[Channel, Channel], ...]
 
     def __str__(self) -> str:
-        names = ", ".join(f"{output} / {input_}" for output, input_ in self.pairs[:_PAIRS_SHOWN])
-        more = f" and {len(self.pairs) - _PAIRS_SHOWN} more" if len(self.pairs) > _PAIRS_SHOWN else ""
+        names = some_of([f"{output} / {input_}" for output, input_ in self.pairs], PAIRS_SHOWN)
         which = "the FRF" if len(self.pairs) == 1 else "FRFs"
         verb = "is" if len(self.pairs) == 1 else "are"
         return (
-            f"{which} {names}{more} (response / excitation) {verb} missing: {self.kind} {self.channel} is left out, "
+            f"{which} {names} (response / excitation) {verb} missing: {self.kind} {self.channel} is left out, "
             f"the virtual point of side {self.side} has {self.others} other {self.kind}s"
         )
 
@@ -372,7 +373,7 @@ class JointChannels:
         try:
             found = self.without(*own)
         except ValueError as error:
-            names = ", ".join(f"{a} / {b}" for a, b in self._pairs(~measured)[:_PAIRS_SHOWN])
+            names = ", ".join(f"{a} / {b}" for a, b in self._pairs(~measured)[:PAIRS_SHOWN])
             raise FileContentError(
                 f"missing FRFs (response / excitation): {names}; without these channels {error}"
             ) from error

@@ -25,6 +25,8 @@ from jointfrf.kernel.arguments import (
 )
 
 __all__ = [
+    "ROUND_OFF",
+    "UNSEEN",
     "Consistency",
     "DrivingPointCheck",
     "VirtualPoint",
@@ -40,11 +42,11 @@ __all__ = [
 ]
 
 #: A motion whose singular value is below this share of the largest counts as not observed.
-_UNSEEN = 1e-6
+UNSEEN = 1e-6
 #: Directions may be rounded: their length may differ from one by this.
 _UNIT = 1e-2
 #: Residuals below this share of the motion are round-off: no channel is faulty.
-_ROUND_OFF = 1e-10
+ROUND_OFF = 1e-10
 
 
 class VirtualPoint(NamedTuple):
@@ -367,12 +369,12 @@ def _as_names(dofs: Sequence[str]) -> tuple[str, ...]:
 
 def _check_seen(names: tuple[str, ...], size: FloatArray, right: FloatArray) -> None:
     """Raise where the channels do not show a motion, and name the DOFs it consists of."""
-    blind = right[size <= _UNSEEN * size[0]]
+    blind = right[size <= UNSEEN * size[0]]
     if not len(blind):
         return
     share = np.sqrt((blind**2).sum(axis=0))
-    unseen = [name for name, part in zip(names, share, strict=True) if part > 1 - _UNSEEN]
-    mixed = [name for name, part in zip(names, share, strict=True) if _UNSEEN < part <= 1 - _UNSEEN]
+    unseen = [name for name, part in zip(names, share, strict=True) if part > 1 - UNSEEN]
+    mixed = [name for name, part in zip(names, share, strict=True) if UNSEEN < part <= 1 - UNSEEN]
     faults = [f"do not show {', '.join(unseen)}"] if unseen else []
     faults += [f"cannot distinguish {', '.join(mixed)}"] if mixed else []
     raise ValueError(f"dofs: the channels {' and '.join(faults)}")
@@ -464,12 +466,12 @@ def sensor_consistency(h: ArrayLike, point: VirtualPoint) -> Consistency:
         specific = _power(_square(filtered + measured), 2) / (2 * both)
 
     redundancy = point.redundancy
-    checked = (redundancy > _ROUND_OFF) & (point.weights > 0)
+    checked = (redundancy > ROUND_OFF) & (point.weights > 0)
     explained = np.zeros(specific.shape)
     left = _power(weight * _square(residual), 2)
     explained[:, checked] = left[:, checked] / redundancy[checked]
     whole = left.sum(axis=1, keepdims=True)
-    above_rounding = whole > _ROUND_OFF**2 * _power(weight * _square(measured), (1, 2))[:, None]
+    above_rounding = whole > ROUND_OFF**2 * _power(weight * _square(measured), (1, 2))[:, None]
     where = np.broadcast_to(above_rounding, explained.shape)
     blame = np.divide(explained, whole, out=np.zeros_like(explained), where=where)
     return Consistency(overall, specific, blame)

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from jointfrf.cases.keys import MOST_LINES
 from jointfrf.cases.substructures import ModelStructure, read_model
 from jointfrf.cli.measured_file import parse_band, words
 from jointfrf.cli.parser import CommandParser
@@ -113,8 +114,6 @@ def _table(args: argparse.Namespace) -> TomlTable:
 
 #: FRFs between more DOFs are hardly meant.
 _MOST_DOFS = 240
-#: More lines are a step that is a slip.
-_MOST_LINES = 1_000_000
 #: Directions of channels, and how names of other DOFs that are rotations begin.
 CHANNEL_DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 _TURNS = re.compile(r"m?theta|phi|rot")
@@ -152,8 +151,8 @@ def lines_of(args: argparse.Namespace) -> FloatArray | None:
     if not (0 < args.step < np.inf and 0 < low <= high < np.inf):
         raise UsageError(f"--band and --step must be positive and increase, not {low:g}:{high:g} and {args.step:g}")
     count = int(np.floor((high - low) / args.step * (1 + 1e-12))) + 1
-    if count > _MOST_LINES:
-        raise UsageError(f"--band and --step give {count} lines, more than {_MOST_LINES}")
+    if count > MOST_LINES:
+        raise UsageError(f"--band and --step give {count} lines, more than {MOST_LINES}")
     lines: FloatArray = low + args.step * np.arange(count)
     return lines
 

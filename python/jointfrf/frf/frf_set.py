@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from jointfrf.errors import FileContentError, FileContentWarning
 from jointfrf.kernel.arguments import as_array, as_integer, as_nodes, as_real, check_type
+from jointfrf.spelling import some_of
 
 __all__ = [
     "POWER_OF_I_OMEGA",
@@ -310,9 +311,8 @@ class FrfSet:
         places, signs, missing = self._locate(outputs, inputs)
         if missing and not allow_missing:
             pairs = [f"{output} / {input_}" for output, input_ in missing]
-            more = f" and {len(pairs) - _NAMES_SHOWN} more" if len(pairs) > _NAMES_SHOWN else ""
-            text = f"{', '.join(pairs[:_NAMES_SHOWN])}{more}"
-            raise FileContentError(f"{self._name()}missing FRFs (response / excitation): {text}")
+            shown = some_of(pairs, _NAMES_SHOWN)
+            raise FileContentError(f"{self._name()}missing FRFs (response / excitation): {shown}")
         h = np.ascontiguousarray(self.h[:, places[0], places[1]] * signs)
         if missing:
             h[:, ~self.measured_between(outputs, inputs)] = np.nan

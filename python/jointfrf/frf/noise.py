@@ -10,12 +10,20 @@ from numpy.typing import ArrayLike, NDArray
 from jointfrf.kernel.arguments import ComplexArray, as_integer, as_lines, as_number, check_choice
 from jointfrf.kernel.call import call
 
-__all__ = ["NOISE_KINDS", "NoiseKind", "NoiseReference", "noise_arguments", "pollute", "realisations"]
+__all__ = [
+    "MOST_REALISATIONS",
+    "NOISE_KINDS",
+    "NoiseKind",
+    "NoiseReference",
+    "noise_arguments",
+    "pollute",
+    "realisations",
+]
 
 NoiseKind = Literal["complex", "complex-per-part", "real-normal", "real-uniform", "real-uniform-std"]
 NoiseReference = Literal["entry", "line", "spectrum"]
 #: Realisations are counted in 31 bits.
-_MOST: Final = 2**31 - 1
+MOST_REALISATIONS: Final = 2**31 - 1
 
 
 class NoiseNumbers(NamedTuple):
@@ -205,8 +213,8 @@ def noise_arguments(
     size = 1 if block is None else as_integer("block", block)
     if size < 1 or n_out % size or n_in % size:
         raise ValueError(f"block {block} does not divide matrices of {n_out} x {n_in}")
-    if as_integer("first", first) < 0 or as_integer("count", count) < 0 or first + count > _MOST:
-        raise ValueError(f"realisations are counted from 0 to {_MOST - 1}: not {count} from {first} on")
+    if as_integer("first", first) < 0 or as_integer("count", count) < 0 or first + count > MOST_REALISATIONS:
+        raise ValueError(f"realisations are counted from 0 to {MOST_REALISATIONS - 1}: not {count} from {first} on")
     if not 0 <= as_integer("seed", seed) < 2**64:
         raise ValueError(f"seed must lie between 0 and 2**64 - 1, not {seed}")
     words = np.array([seed & 0xFFFFFFFF, seed >> 32], np.uint32).view(np.int32)

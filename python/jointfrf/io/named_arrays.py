@@ -15,6 +15,7 @@ from jointfrf.frf.frf_set import POWER_OF_I_OMEGA, FrfSet
 from jointfrf.io.file_format import FrfArrays, FrfMapping
 from jointfrf.io.functions import arrays_of_functions, functions_of_sdynpy, functions_of_testlab
 from jointfrf.kernel.arguments import check_type
+from jointfrf.spelling import some_of
 
 __all__ = ["arrays_of_fields", "fields_of"]
 
@@ -220,8 +221,8 @@ def _field(flat: Mapping[str, Any], name: str, given: Any, where: str) -> tuple[
 
 
 def _names(flat: Mapping[str, Any]) -> str:
-    shown = [name if len(name) <= 30 else f"{name[:27]}..." for name in list(flat)[:12]]
-    return ", ".join(shown) + (f" and {len(flat) - 12} more" if len(flat) > 12 else "") if shown else "nothing"
+    shown = [name if len(name) <= 30 else f"{name[:27]}..." for name in flat]
+    return some_of(shown, 12) or "nothing"
 
 
 def _value(found: tuple[str, Any] | None) -> Any:

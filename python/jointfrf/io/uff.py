@@ -34,6 +34,7 @@ from jointfrf.io.uff_function import (
     read_header,
 )
 from jointfrf.kernel.arguments import check_type
+from jointfrf.spelling import some_of
 
 __all__ = ["UNIVERSAL_FILE", "read_uff", "write_uff"]
 
@@ -431,9 +432,7 @@ def _lines(freq_hz: NDArray[np.float64]) -> str:
 
 def _some(texts: Iterable[str]) -> str:
     """Join the first few different texts."""
-    different = list(dict.fromkeys(texts))
-    more = f"; and {len(different) - _SHOWN} more" if len(different) > _SHOWN else ""
-    return "; ".join(different[:_SHOWN]) + more
+    return some_of(list(dict.fromkeys(texts)), _SHOWN, "; ")
 
 
 def write_uff(

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from jointfrf.errors import FileContentError
 from jointfrf.files import HEAD
 from jointfrf.io.units import UnitSystem
+from jointfrf.spelling import some_of
 
 __all__ = ["UniversalFile", "index_datasets", "name_some", "node_coordinates"]
 
@@ -272,8 +273,7 @@ def _plural(name: str, count: int) -> str:
 
 def name_some(what: str, numbers: Sequence[int]) -> str:
     """Name the first few of some things, as in ``datasets 3, 4 and 12 more``."""
-    more = f" and {len(numbers) - _NUMBERS_SHOWN} more" if len(numbers) > _NUMBERS_SHOWN else ""
-    return f"{what}{'s' if len(numbers) > 1 else ''} {', '.join(map(str, numbers[:_NUMBERS_SHOWN]))}{more}"
+    return f"{what}{'s' if len(numbers) > 1 else ''} {some_of(numbers, _NUMBERS_SHOWN)}"
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,7 @@ from jointfrf.kernel.arguments import (
 )
 from jointfrf.planning.design import Criterion, Design, Designer, Prices, criterion_of
 from jointfrf.planning.information import FrfInformation, PlannedTest, expected_noise, narrowest_band
-from jointfrf.spelling import did_you_mean
+from jointfrf.spelling import did_you_mean, some_of
 
 __all__ = ["Addition", "MeasurementPlan", "PlanStep", "plan"]
 
@@ -451,5 +451,4 @@ def _findings(found: MeasurementPlan) -> Iterator[Finding]:
         mean = found.frf_share.mean(axis=0).sum(axis=axis)
         blind = [one for one, share in zip(names, mean.tolist(), strict=True) if share < _BLIND * mean.mean()]
         if blind:
-            shown = ", ".join(blind[:_NAMED]) + (f" and {len(blind) - _NAMED} more" if len(blind) > _NAMED else "")
-            yield note("blind", f"a {what} sees next to nothing of the joint at {shown}", tuple(blind))
+            yield note("blind", f"a {what} sees next to nothing of the joint at {some_of(blind, _NAMED)}", tuple(blind))

@@ -12,6 +12,7 @@ from jointfrf.cases.catalogue import find_case
 from jointfrf.cases.kind import EstimateGroup, Estimates, RealisationSource
 from jointfrf.cases.workers import silent
 from jointfrf.errors import FileContentError
+from jointfrf.frf.noise import MOST_REALISATIONS
 from jointfrf.kernel.arguments import as_integer, check_type, one_line
 from jointfrf.parallel.pool import AnyExecutor, Pool, check_progress, one_thread, opened_pool
 from jointfrf.studies.design import StudyDesign, in_words
@@ -129,10 +130,6 @@ class Schedule:
         queue.spans[:1] = [Span(end, span.end - end)] if end < span.end else []
         queue.at_work += count
         return Chunk(number, span.first, count, queue.group.source)
-
-
-#: Realisations are counted in 31 bits.
-_MOST = 2**31 - 1
 
 
 def study(
@@ -264,8 +261,8 @@ def _prepared(folder: Path, design: StudyDesign, realisations: int | None) -> tu
 
 def _count(realisations: int) -> int:
     count = as_integer("realisations", realisations)
-    if not 1 <= count <= _MOST:
-        raise ValueError(f"realisations must be from 1 to {_MOST}, not {realisations}")
+    if not 1 <= count <= MOST_REALISATIONS:
+        raise ValueError(f"realisations must be from 1 to {MOST_REALISATIONS}, not {realisations}")
     return count
 
 

@@ -11,6 +11,7 @@ from msgspec import field
 
 from jointfrf.cases.keys import (
     FITTED,
+    LIKE_DOFS,
     METHODS,
     BandKeys,
     BandSet,
@@ -55,9 +56,6 @@ __all__ = [
     "read_known_joint",
 ]
 
-#: What lists of points take.
-_LIKE_DOFS = "list of texts, as many as joint DOFs"
-
 
 class PointKeys(Keys):
     """DOFs of the substructures, in the order of the tables `[[joint]]`.
@@ -65,16 +63,16 @@ class PointKeys(Keys):
     Of FRFs, node and direction: `"102:+y"`, `"102:rz"`; a channel measured the other way serves with the opposite sign.
     """
 
-    j: Annotated[tuple[str, ...], key("Joint DOFs of A.", takes=_LIKE_DOFS, min_length=1, example=["2:x"])]
-    k: Annotated[tuple[str, ...], key("Joint DOFs of B.", takes=_LIKE_DOFS, min_length=1, example=["1:x"])]
+    j: Annotated[tuple[str, ...], key("Joint DOFs of A.", takes=LIKE_DOFS, min_length=1, example=["2:x"])]
+    k: Annotated[tuple[str, ...], key("Joint DOFs of B.", takes=LIKE_DOFS, min_length=1, example=["1:x"])]
     r: Annotated[
         tuple[str, ...],
-        key("Internal DOFs of A.", takes=_LIKE_DOFS, absent="`j`; required by decoupling", min_length=1,
+        key("Internal DOFs of A.", takes=LIKE_DOFS, absent="`j`; required by decoupling", min_length=1,
             example=["1:x"]),
     ] = ()  # fmt: skip
     s: Annotated[
         tuple[str, ...],
-        key("Internal DOFs of B.", takes=_LIKE_DOFS, absent="`k`; required by decoupling", min_length=1,
+        key("Internal DOFs of B.", takes=LIKE_DOFS, absent="`k`; required by decoupling", min_length=1,
             example=["2:x"]),
     ] = ()  # fmt: skip
 

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 import numpy as np
 from msgspec import field
 
-from jointfrf.cases.keys import Case, CaseKeys, ExpectedKeys
+from jointfrf.cases.keys import LIKE_DOFS, Case, CaseKeys, ExpectedKeys
 from jointfrf.cases.substructures import BeamKeys, BrickBeamKeys, ChainKeys, MatricesKeys, ModelStructure
 from jointfrf.identification.model.assembly import AddedMass, Assembly
 from jointfrf.identification.model.substructure import Substructure, Unknown
@@ -20,16 +20,13 @@ from jointfrf.toml.declared import Keys, NotNegative, Positive, key
 
 __all__ = ["ModelledJointCase", "ModelledJointKeys", "read_modelled_joint"]
 
-#: What lists of points take.
-_LIKE_DOFS = "list of texts, as many as joint DOFs"
-
 
 class SidePointKeys(Keys):
     """DOFs of the joint on both substructures, in the order of the tables `[[law]]`."""
 
     header = "[points], of a modelled joint"
-    j: Annotated[tuple[str, ...], key("Joint DOFs of A.", takes=_LIKE_DOFS, min_length=1, example=["7:y", "7:theta"])]
-    k: Annotated[tuple[str, ...], key("Joint DOFs of B.", takes=_LIKE_DOFS, min_length=1, example=["1:y", "1:theta"])]
+    j: Annotated[tuple[str, ...], key("Joint DOFs of A.", takes=LIKE_DOFS, min_length=1, example=["7:y", "7:theta"])]
+    k: Annotated[tuple[str, ...], key("Joint DOFs of B.", takes=LIKE_DOFS, min_length=1, example=["1:y", "1:theta"])]
 
 
 class LawKeys(Keys):

@@ -48,7 +48,7 @@ from jointfrf.channels.check.signals import (
     check_signals,
     find_bad_lines,
 )
-from jointfrf.channels.joint_channels import JointChannels
+from jointfrf.channels.joint_channels import PAIRS_SHOWN, JointChannels
 from jointfrf.errors import FileContentError, FrfCheckWarning
 from jointfrf.frf.frf_set import POWER_OF_I_OMEGA, Channel
 from jointfrf.kernel.arguments import (
@@ -61,6 +61,7 @@ from jointfrf.kernel.arguments import (
     check_choice,
     check_type,
 )
+from jointfrf.spelling import some_of
 
 __all__ = ["check_frfs", "warn_of_frfs"]
 
@@ -71,8 +72,6 @@ _LEAST_LINES = 20
 _BACKWARDS = 0.8
 #: Relative noise of channels that may hide small FRFs of joint DOFs, which are differences of large ones.
 _HIDING = 0.05
-#: Missing FRFs that are named.
-_PAIRS_SHOWN = 4
 
 
 def check_frfs(
@@ -233,11 +232,10 @@ def _missing_findings(
     if not missing.any():
         return []
     pairs = [f"{rows[i]} / {columns[j]}" for i, j in zip(*np.nonzero(missing), strict=True)]
-    more = f" and {len(pairs) - _PAIRS_SHOWN} more" if len(pairs) > _PAIRS_SHOWN else ""
     verb = "is" if len(pairs) == 1 else "are"
     text = (
         f"{len(pairs)} of {missing.size} FRFs {verb} missing (response / force): "
-        f"{', '.join(pairs[:_PAIRS_SHOWN])}{more}; all others are looked at"
+        f"{some_of(pairs, PAIRS_SHOWN)}; all others are looked at"
     )
     level: FindingLevel = "warning"
     remedy = "measure them, or leave the channels out"

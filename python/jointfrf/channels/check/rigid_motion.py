@@ -11,6 +11,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from jointfrf.channels.virtual_point import ROUND_OFF, UNSEEN
 from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray
 
 __all__ = ["ChannelGroup", "Suspects", "expected_motion", "find_suspects", "not_rigid"]
@@ -20,16 +21,12 @@ __all__ = ["ChannelGroup", "Suspects", "expected_motion", "find_suspects", "not_
 _PARTS, _BEST = 20, 0.2
 #: Lines of a part at least, so that chance does not choose it.
 _LEAST_LINES = 5
-#: A motion whose singular value is below this share of the largest is not shown by the channels.
-_UNSEEN = 1e-6
 #: A channel is compared where this share of an error of it stays in its residual: below, the others hardly say it.
 _LEAST_REDUNDANCY = 0.05
 #: Power of the motion expected of a channel, in those of the others, that its weight is limited to.
 _LEAST_POWER = 0.05
 #: Each channel more must explain this much more, a factor of 1.6 in the mean square: where sides bend, any leaves less.
 _PRICE = 0.5
-#: Residuals below this share of the motion are rounding.
-_ROUND_OFF = 1e-10
 #: Power of a channel in that expected of it, to which its weight lets it come: beyond, sums lose their digits.
 _MOST_POWER = 1e4
 #: Residuals that the others must have beside the channels left out: fewer agree by chance.
@@ -91,7 +88,7 @@ class ChannelGroup:
             gone = missing[:, column]
             if h is self.h:
                 h = h.copy()
-            inverse = np.linalg.pinv(self.motion[~gone], rcond=_UNSEEN)
+            inverse = np.linalg.pinv(self.motion[~gone], rcond=UNSEEN)
             h[:, gone, column] = h[:, ~gone, column] @ (self.motion[gone] @ inverse).T
         return self if h is self.h else replace(self, h=h)
 
@@ -217,7 +214,7 @@ def _projection(motion: FloatArray, root: FloatArray) -> FloatArray:
     weighted = root[:, None] * motion
     size = np.linalg.norm(weighted, axis=0)
     left, values, _ = np.linalg.svd(weighted / np.where(size > 0, size, 1), full_matrices=False)
-    left = left[:, values > _UNSEEN * values[0]]
+    left = left[:, values > UNSEEN * values[0]]
     return np.asarray(np.eye(len(motion)) - left @ left.T)
 
 
@@ -256,8 +253,8 @@ def _judged(
     """Say how much better the others agree without some channels, or with two of them exchanged."""
     rest = free if kind == "exchanged" else free - taken
     size = residuals.size
-    left = np.maximum(squares, _ROUND_OFF**2 * size) / rest
-    gain = float(np.log(np.maximum(residuals.whole, _ROUND_OFF**2 * size) / free / left).mean())
+    left = np.maximum(squares, ROUND_OFF**2 * size) / rest
+    gain = float(np.log(np.maximum(residuals.whole, ROUND_OFF**2 * size) / free / left).mean())
     best = np.argsort(squares / size)[: max(round(_BEST * size.size), 1)]
     ratio = float(np.median((residuals.whole - squares)[best] / taken / left[best]))
     relative = float(np.sqrt(np.median(squares[best] / size[best])))
@@ -267,7 +264,7 @@ def _judged(
 def expected_motion(group: ChannelGroup, others: NDArray[np.intp]) -> ComplexArray:
     """Return the rigid motion that some channels show, as `ChannelGroup.motion` counts it, shape (n_freq, 6, n)."""
     root = _residuals(group).root[others]
-    inverse = np.linalg.pinv(root[:, None] * group.motion[others], rcond=_UNSEEN)
+    inverse = np.linalg.pinv(root[:, None] * group.motion[others], rcond=UNSEEN)
     return np.asarray(inverse @ (root[:, None] * group.h[:, others]))
 
 
