@@ -3,6 +3,7 @@
 # .venv with the package installed editable. Does nothing when all is up to date.
 #
 #   sh python/bootstrap.sh run     what the cases need
+#   sh python/bootstrap.sh docs    also what the documentation site needs
 #   sh python/bootstrap.sh test    also what the tests need; a browser, CalculiX and readers of files of Nastran and
 #                                  Ansys where there are such to install: without them their tests are skipped
 #
@@ -13,8 +14,9 @@ set -eu
 case ${1-} in
   # Kernels for other processors than this one are compiled where they are tested.
   run) extras=all instruction_sets=own ;;
-  test) extras=all,test instruction_sets=all ;;
-  *) echo "usage: $0 run|test" >&2; exit 2 ;;
+  docs) extras=all,docs instruction_sets=own ;;
+  test) extras=all,test,docs instruction_sets=all ;;
+  *) echo "usage: $0 run|docs|test" >&2; exit 2 ;;
 esac
 root=$(CDPATH='' cd -- "$(dirname -- "$0")/.." && pwd -P)
 cd "$root"
@@ -279,7 +281,7 @@ install_packages() {
   check_installed build/installed-run.json
   # A file that cannot be compiled is not for this version of Python, and is not imported.
   "$venv/bin/python" -m compileall -q -x "$not_compiled" "$venv"/lib*/python*/site-packages || :
-  [ "$1" = run ] || install_readers
+  [ "$1" != test ] || install_readers
 }
 
 # Wheels of pyYeti and ansys-mapdl-reader, for a few tests: large, and not there for every system. Not compiled ahead.
@@ -317,6 +319,7 @@ make_venv() {
   cat build/packages.log >>"$log"
   [ $status = 0 ] || fail "could not install what the package needs"
   state >"$stamp.run"
+  [ "$1" = run ] || state >"$stamp.docs"
   [ "$1" = test ] || return 0
   [ -f "$readers" ] || say "no wheels of pyYeti and ansys-mapdl-reader: tests of files of Nastran and Ansys will be skipped"
   state >"$stamp.test"
