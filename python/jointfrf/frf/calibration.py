@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -67,7 +68,7 @@ class CalibrationErrors:
 
     def functions(self, freq_hz: FloatArray) -> FloatArray:
         """Return the functions of gain and phase, shape (2, n_functions, n_freq)."""
-        return _functions(self.span, self.channel.shape[1], freq_hz)
+        return _functions(self.span, self.channel.shape[1], freq_hz.tobytes())
 
     def variance(self, freq_hz: FloatArray) -> FloatArray:
         """Return E|g_p + f_q + e_pq|^2 of each line, shape (n_freq,)."""
@@ -90,7 +91,9 @@ class CalibrationErrors:
         return gain, phase
 
 
-def calibration_errors(freq_hz: FloatArray, h: ComplexArray) -> CalibrationErrors | None:
+def calibration_errors(
+    freq_hz: FloatArray, h: ComplexArray, known: tuple[ReciprocityDifferences, FloatArray] | None = None
+) -> CalibrationErrors | None:
     """Find the variances of smooth errors of FRFs between the same channels of a reciprocal structure.
 
     Parameters
@@ -98,6 +101,8 @@ def calibration_errors(freq_hz: FloatArray, h: ComplexArray) -> CalibrationError
     freq_hz : ndarray, shape (n_freq,)
         Hz.
     h : ndarray, shape (n_freq, m, m)
+    known : (ReciprocityDifferences, ndarray), optional
+        Differences of lines that rise in frequency, and the variance of h by their parts.
 
     Returns
     -------
@@ -112,26 +117,33 @@ def calibration_errors(freq_hz: FloatArray, h: ComplexArray) -> CalibrationError
     sums of squares of slow functions of about one speed are compared with those of the faster half, of channels with
     channels, as noise that is common to a hit is. Those that exceed them by more than chance give the variances.
     """
-    lines = np.argsort(freq_hz)[spread_lines(len(freq_hz))]
-    freq, some = freq_hz[lines], h[lines]
+    freq = freq_hz
+    if known is None:
+        lines = np.argsort(freq_hz)[spread_lines(len(freq_hz))]
+        freq, h = freq_hz[lines], h[lines]
+        found_differences = reciprocity_differences(h, entry_groups(h, reciprocal=True))
+        if found_differences is None:
+            return None
+        known = found_differences, found_differences.variance_of_parts(near_squares(h))
+    differences, variance = known
     n_slow = min(_SLOW, freq.size // _LINES // 2)
-    differences = reciprocity_differences(some, entry_groups(some, reciprocal=True)) if n_slow else None
-    if differences is None:
+    if not n_slow:
         return None
     span = float(freq[0]), float(freq[-1])
-    factors = _factors(differences, some, _functions(span, 2 * n_slow, freq))
+    factors = _factors(differences, h, variance, _functions(span, 2 * n_slow, freq.tobytes()), _mixture(span))
     rows, columns = differences.rows, differences.columns
     by_noise = _squares(factors, 1 / factors.variance, rows, columns)
     # Errors far above the noise count alike, however small the noise of a pair is.
-    alike = _squares(factors, np.ones_like(factors.variance), rows, columns)
+    alike = _squares(factors, np.ones((len(rows), 1, 1)), rows, columns)
     found = np.zeros((2, 2, 2, n_slow))  # variance and degrees; channel and own; gain and phase
-    speed = np.ceil(np.log2(np.arange(n_slow) + 1)).astype(int)
+    reference = by_noise[..., n_slow:].sum(axis=3)
+    # Functions 0, 1, 2 to 3, 4 to 7 are about as fast.
+    first = [one for one in (0, 1, 2, 4) if one < n_slow]
+    tested, sized = (np.add.reduceat(squares[..., :n_slow], first, axis=3) for squares in (by_noise, alike))
     for part in range(2):
-        reference = by_noise[:, :, part, n_slow:].sum(axis=2)
-        for one in np.unique(speed):
-            own = np.flatnonzero(speed == one)
-            tested, sized = (squares[:, :, part, own].sum(axis=2) for squares in (by_noise, alike))
-            found[:, :, part, own] = _variances(tested, sized, reference)[:, :, None]
+        for i, own in enumerate(map(slice, first, [*first[1:], n_slow])):
+            variance_and_degrees = _variances(tested[:, :, part, i], sized[:, :, part, i], reference[:, :, part])
+            found[:, :, part, own] = variance_and_degrees[:, :, None]
     variance, degrees = found
     if not variance.any():
         return None
@@ -145,17 +157,23 @@ def shows_calibration(h: ComplexArray) -> bool:
     return len(h) >= 2 * _LINES and middle.shape[0] > 1 and not np.allclose(middle, middle.T, rtol=1e-9, atol=0)
 
 
-def _functions(span: tuple[float, float], number: int, freq_hz: FloatArray) -> FloatArray:
-    """Return functions of gain and phase of mean square 1 over the band, shape (2, number, n_freq)."""
+@lru_cache(maxsize=8)
+def _functions(span: tuple[float, float], number: int, lines: bytes) -> FloatArray:
+    """Return functions of gain and phase of mean square 1 over the band, shape (2, number, n_freq), of lines in Hz."""
     middle, half = (span[1] + span[0]) / 2, (span[1] - span[0]) / 2
-    orders = np.arange(number)
-    gain = legendre.legvander((freq_hz - middle) / half, number - 1).T * np.sqrt(2 * orders + 1)[:, None]
+    gain = legendre.legvander((np.frombuffer(lines) - middle) / half, max(number, 2) - 1).T
+    gain *= np.sqrt(2 * np.arange(len(gain)) + 1)[:, None]
     phase = gain.copy()
-    size = np.hypot(middle, half / np.sqrt(3))
-    phase[0] = freq_hz / size
-    if number > 1:
-        phase[1] = (1 - middle / size * phase[0]) / np.sqrt(1 - (middle / size) ** 2)
-    return np.stack([gain, phase])
+    phase[:2] = _mixture(span) @ gain[:2]
+    found = np.stack([gain, phase])[:, :number]
+    found.flags.writeable = False
+    return found
+
+
+def _mixture(span: tuple[float, float]) -> FloatArray:
+    """Return the matrix from the first two functions of the gain to those of the phase; it is its own inverse."""
+    slow, fast = (span[1] + span[0]) / 2, (span[1] - span[0]) / np.sqrt(12)
+    return np.array([[slow, fast], [fast, -slow]]) / np.hypot(slow, fast)
 
 
 class _Factors(NamedTuple):
@@ -168,38 +186,46 @@ class _Factors(NamedTuple):
     variance: FloatArray
 
 
-def _factors(differences: ReciprocityDifferences, h: ComplexArray, functions: FloatArray) -> _Factors:
+def _factors(
+    differences: ReciprocityDifferences,
+    h: ComplexArray,
+    variance: FloatArray,
+    functions: FloatArray,
+    mixture: FloatArray,
+) -> _Factors:
     p, q = differences.rows, differences.columns
     mean = (h[:, p, q] + h[:, q, p]).T / 2
-    variance = differences.variance_of_parts(near_squares(h))
     outlying = differences.line_levels(variance).factor > 1
     inverse = np.where(outlying, 0, 1 / np.sqrt(differences.pair_variance(variance)))
     size = abs(mean)
     turned = differences.values * (mean.conj() / np.maximum(size, TINY)) * inverse
     size = size * inverse
-    value, spread, left = [], [], []
     # A real factor changes the part along h, an imaginary one the part across it.
-    for own, of_turned in zip(functions, (turned.real, turned.imag), strict=True):
-        inverse_normal = np.linalg.pinv((size[:, None] ** 2 * own) @ own.T, hermitian=True)
-        found = (inverse_normal @ ((size * of_turned) @ own.T)[:, :, None])[:, :, 0]
-        value.append(found)
-        spread.append(np.einsum("paa->pa", inverse_normal))
-        left.append(of_turned - size * (found @ own))
-    level = (left[0] ** 2 + left[1] ** 2).sum(axis=1) / max(2 * np.count_nonzero(~outlying), 1)
-    return _Factors(np.stack(value, axis=1), np.maximum(np.stack(spread, axis=1) * level[:, None, None], TINY))
+    parts = np.stack([turned.real, turned.imag], axis=1)
+    gain = functions[0]
+    of_gain = np.linalg.pinv((size[:, None] ** 2 * gain) @ gain.T, hermitian=True)
+    # The functions of the phase are those of the gain but for the first two: one inverse serves both.
+    both = np.stack([of_gain, of_gain], axis=1)
+    both[:, 1, :2] = mixture @ both[:, 1, :2]
+    both[:, 1, :, :2] = both[:, 1, :, :2] @ mixture
+    along = np.stack([(size * parts[:, i]) @ own.T for i, own in enumerate(functions)], axis=1)
+    value = (both @ along[..., None])[..., 0]
+    left = sum(
+        np.square(parts[:, i] - size * (value[:, i] @ own)).sum(axis=1) for i, own in enumerate(functions)
+    ) / max(2 * np.count_nonzero(~outlying), 1)
+    return _Factors(value, np.maximum(np.einsum("pfaa->pfa", both) * left[:, None, None], TINY))
 
 
 def _squares(factors: _Factors, weight: FloatArray, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> FloatArray:
     """Return weighted sums of squares of channels, and of what does not close, shape (2, 5, 2, n_functions).
 
     Each with its degrees of freedom, and what it is in the mean: by independent noise, by a unit of variance of each
-    FRF, and of each channel.
+    FRF, and of each channel. `weight` is broadcast to pairs, gain and phase, and functions.
     """
-    channels, at = np.unique(np.r_[rows, columns], return_inverse=True)
     n_pairs = len(rows)
-    incidence = np.zeros((n_pairs, channels.size))
-    incidence[np.arange(n_pairs), at[:n_pairs]] = 1
-    incidence[np.arange(n_pairs), at[n_pairs:]] = -1
+    incidence = np.zeros((n_pairs, max(rows.max(), columns.max()) + 1))
+    incidence[np.arange(n_pairs), rows] = 1
+    incidence[np.arange(n_pairs), columns] = -1
     # Pairs last.
     w, value, noise = (np.moveaxis(one, 0, -1) for one in (weight, factors.value, factors.variance))
     root = np.sqrt(w)
@@ -210,9 +236,13 @@ def _squares(factors: _Factors, weight: FloatArray, rows: NDArray[np.intp], colu
     of_channels = (((root * value)[..., None, :] @ basis)[..., 0, :] ** 2).sum(axis=-1)
     apart = np.maximum(whole.sum(axis=-1) - of_channels, 0)
     of_units = 2 * w.sum(axis=-1)
-    closing = of_channels, rank, (share * of_noise).sum(axis=-1), 2 * (share * w).sum(axis=-1), of_units
-    left = apart, n_pairs - rank, ((1 - share) * of_noise).sum(axis=-1), of_units - closing[3], np.zeros_like(apart)
-    return np.array([closing, left], float)
+    sums = np.zeros((2, 5, *apart.shape))
+    shares = (share * of_noise).sum(axis=-1), 2 * (share * w).sum(axis=-1)
+    for i, one in enumerate((of_channels, rank, *shares, of_units)):
+        sums[0, i] = one
+    for i, one in enumerate((apart, n_pairs - rank, of_noise.sum(axis=-1) - shares[0], of_units - shares[1])):
+        sums[1, i] = one
+    return sums
 
 
 def _variances(tested: FloatArray, sized: FloatArray, reference: FloatArray) -> FloatArray:

@@ -112,9 +112,9 @@ class NoiseModel:
             return 0.0
         ratio = np.empty((len(self.variance), np.count_nonzero(counts)))
         for own in line_slices(len(ratio)):
-            size = np.maximum(abs(self.smooth.h[own][:, counts]), TINY)
-            ratio[own] = np.sqrt(self.variance[own][:, counts]) / size
-        return float(medians(ratio.ravel()))
+            h = self.smooth.h[own][:, counts]
+            ratio[own] = self.variance[own][:, counts] / np.maximum(h.real**2 + h.imag**2, TINY)
+        return float(np.sqrt(medians(ratio.ravel())))
 
 
 def estimate_noise(
@@ -186,22 +186,31 @@ def estimate_noise(
     if like is not None and (len(places) > 1 or like.variance.shape != lines.shape):
         like = None
 
-    calibration = calibration_errors(freq, lines) if reciprocal and lines.shape[1] == lines.shape[2] else None
+    def estimated(noisy: _NoisyLines, own: NDArray[np.intp] | slice) -> NoiseModel:
+        near = None if like is None else like.variance[own]
+        return _estimated(noisy, None if given is None else given[own], near, like)
 
-    def estimated(own: NDArray[np.intp] | slice) -> NoiseModel:
-        h = lines[own] if calibration is None else calibration.without(freq[own], lines[own])
-        noisy = _NoisyLines(freq[own], h, entry_groups(h, reciprocal=reciprocal), max_poles, reciprocal)
-        return _estimated(
-            noisy, None if given is None else given[own], None if like is None else like.variance[own], like
-        )
-
+    noisy, calibration = _NoisyLines(freq, lines, reciprocal, max_poles), None
     if len(places) == 1 and (np.diff(freq) > 0).all():
-        model = replace(estimated(slice(None)), calibration=calibration)
+        if noisy.differences is not None:
+            known = noisy.differences, noisy.variance_of_differences
+            calibration = calibration_errors(freq, lines, known)
+        if calibration is not None:
+            noisy = replace(noisy, h=calibration.without(freq, lines))
+        model = replace(estimated(noisy, slice(None)), calibration=calibration)
         # What was measured is the caller's.
         return (
             model if model.smooth.is_smooth else replace(model, smooth=replace(model.smooth, h=model.smooth.h.copy()))
         )
-    return replace(_joined(places, (estimated(own) for own in places), lines.shape), calibration=calibration)
+    if reciprocal and lines.shape[1] == lines.shape[2]:
+        calibration = calibration_errors(freq, lines)
+
+    def parts() -> Iterator[NoiseModel]:
+        for own in places:
+            h = lines[own] if calibration is None else calibration.without(freq[own], lines[own])
+            yield estimated(replace(noisy, freq=freq[own], h=h), own)
+
+    return replace(_joined(places, parts(), lines.shape), calibration=calibration)
 
 
 def _joined(places: list[NDArray[np.intp]], parts: Iterable[NoiseModel], shape: tuple[int, ...]) -> NoiseModel:
@@ -236,20 +245,35 @@ class _NoisyLines:
     ----------
     freq : ndarray, shape (n_freq,)
     h : ndarray, shape (n_freq, n_out, n_in)
-    groups : list of EntryGroup
-    max_poles : int
     reciprocal : bool
+    max_poles : int
     """
 
     freq: FloatArray
     h: ComplexArray
-    groups: list[EntryGroup]
-    max_poles: int
     reciprocal: bool
+    max_poles: int
 
+    @cached_property
+    def groups(self) -> list[EntryGroup]:
+        """Groups of coupled entries."""
+        return entry_groups(self.h, reciprocal=self.reciprocal)
+
+    @cached_property
     def differences(self) -> ReciprocityDifferences | None:
-        """Return the differences of reciprocal entries, where there are any."""
+        """Differences of reciprocal entries, where there are any."""
         return reciprocity_differences(self.h, self.groups) if self.reciprocal else None
+
+    @cached_property
+    def near(self) -> FloatArray:
+        """|h|^2 over neighbouring lines."""
+        return near_squares(self.h)
+
+    @cached_property
+    def variance_of_differences(self) -> FloatArray:
+        """Variance of all entries by the parts of the differences."""
+        assert self.differences is not None
+        return self.differences.variance_of_parts(self.near)
 
     def smoothed(
         self, variance: FloatArray, inflation: float | None, patience: int, start: tuple[ComplexArray, ...] = ()
@@ -265,14 +289,14 @@ class _NoisyLines:
 
     @cached_property
     def _least(self) -> FloatArray:
-        return np.maximum(_ROUNDING**2 * first_variance(self.h), TINY)
+        return np.maximum(_ROUNDING**2 * first_variance(self.near), TINY)
 
 
 def _estimated(
     lines: _NoisyLines, given: FloatArray | None, near: FloatArray | None, like: NoiseModel | None
 ) -> NoiseModel:
     """Noise model of checked FRFs; `near` is the variance of others on these lines."""
-    differences = lines.differences()
+    differences = lines.differences
     begun = None if like is None or near is None else _begun_like(lines, near, like)
     if begun is None:
         differences, smooth, variance, inflation = _begun(lines, differences)
@@ -348,9 +372,9 @@ def _first_smooth(
     """Return smooth FRFs by weights from differences where there are any, these variances, and the inflation."""
     inflation = None
     if differences is None:
-        variance = first_variance(lines.h)
+        variance = first_variance(lines.near)
     else:
-        variance = lines.weighing(differences.variance_of_parts(near_squares(lines.h)))
+        variance = lines.weighing(lines.variance_of_differences)
         inflation = differences.inflation(variance, differences.line_levels(variance).factor)
         levels = differences.line_levels(variance, inflation)
         variance *= (levels.usual * levels.factor)[:, None, None]

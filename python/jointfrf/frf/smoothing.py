@@ -204,25 +204,27 @@ def smoothed(
         return measured
     unit = 2 * np.pi * freq.max()
     values, share, fits = np.zeros_like(h), np.zeros((1, n_out, n_in)), []
-    squares = freedom = exactness = 0.0
+    squares, freedom, is_exact = 0.0, 0.0, True
     for number, group in enumerate(groups):
         before = start[number] / unit if len(start) == len(groups) else None
         entries, fit = _smooth_group(freq, h, variance, group, search, before)
         parameters = entries.n_parameters(len(fit.poles))
         squares, freedom = squares + fit.squares, freedom + entries.n_data - parameters
-        exactness = max(exactness, _relative(entries, fit))
+        is_exact = is_exact and _is_exact(entries, fit)
         group.put(fit.smooth, values)
         group.put((parameters / entries.n_data / np.where(group.repeated, 2, 1))[:, None], share)
         fits.append(fit.poles * unit)
     level = float(np.sqrt(squares / max(freedom, 1)))
-    if exactness < _EXACT:
+    if is_exact:
         return replace(measured, poles=tuple(fits), level=level)
     return SmoothFrfs(freq, values, True, tuple(fits), level, share[0])
 
 
-def _relative(entries: Entries, fit: RationalFit) -> float:
-    """Median of |h - smooth| / |smooth|."""
-    return float(medians((abs(entries.h - fit.smooth) / np.maximum(abs(fit.smooth), TINY)).ravel()))
+def _is_exact(entries: Entries, fit: RationalFit) -> bool:
+    """Whether most residuals are errors of the rational functions rather than noise."""
+    left, smooth = entries.h - fit.smooth, fit.smooth
+    small = left.real**2 + left.imag**2 < _EXACT**2 * np.maximum(smooth.real**2 + smooth.imag**2, TINY)
+    return 2 * np.count_nonzero(small) > small.size
 
 
 def _smooth_group(
@@ -239,7 +241,7 @@ def _smooth_group(
         mean, spread = group.means(h, variance)
         entries = Entries(s, mean, 1 / np.sqrt(spread))
         return entries, search_order(entries, search, start)
-    mean, spread = group.means(h, first_variance(h))
+    mean, spread = group.means(h, first_variance(near_squares(h)))
     fit = search_order(Entries(s, mean, 1 / np.sqrt(spread)), search, start)
     count = np.where(group.repeated, 2, 1)[:, None]
     weight = np.sqrt(count / ((3 * abs(fit.smooth) ** 2 + count * spread) / 4))
@@ -247,16 +249,18 @@ def _smooth_group(
     return entries, search_order(entries, search, fit.poles)
 
 
-def first_variance(h: ComplexArray) -> FloatArray:
+def first_variance(near: FloatArray) -> FloatArray:
     """Variance before anything is known of the noise: |h|^2 over neighbouring lines, not below a part of its median."""
-    near = near_squares(h)
     return np.maximum(near + _FIRST_FLOOR * medians(near.T).T, TINY)
 
 
 def near_squares(h: ComplexArray) -> FloatArray:
-    """Mean of |h|^2 over each line and its neighbours."""
-    padded = np.pad(h.real**2 + h.imag**2, ((1, 1), (0, 0), (0, 0)), mode="edge")
-    near: FloatArray = padded[:-2] + padded[1:-1]
-    near += padded[2:]
+    """Mean of |h|^2 over each line and its neighbours; those at the ends count twice."""
+    squares: FloatArray = h.real**2 + h.imag**2
+    near = squares.copy()
+    near[1:] += squares[:-1]
+    near[:1] *= 2
+    near[:-1] += squares[1:]
+    near[-1:] += squares[-1:]
     near /= 3
     return near
