@@ -28,7 +28,7 @@ _BINS = 32
 #: Points of the grids of the logarithm of the odds of two parts, each about the best of the last, and the reach of the
 #: first: |h|^2 of lightly damped structures spans 14 decades, e^32, and either part may count at its end of them. Odds
 #: are known to 1 % in the end.
-_GRIDS = (65, 25, 25)
+_GRIDS = tuple(np.linspace(-1, 1, points)[:, None] for points in (65, 25, 25))
 _WIDEST = 40.0
 #: A running median is taken at so many lines within its reach: neighbouring windows share most of their lines.
 _STEPS = 5
@@ -99,10 +99,11 @@ class NoiseTerms:
         self._order: NDArray[np.intp] | None = None
         # Of more than two terms the variance is not the same within a bin.
         if len(terms) == 2 and n_freq > _BINS:
-            self._order = np.argsort(terms[0], axis=1)
-            self._edges = np.linspace(0, n_freq, _BINS + 1).astype(int)
+            self._edges = np.arange(_BINS + 1) * n_freq // _BINS
+            self._order = np.argpartition(terms[0], self._edges[1:-1], axis=1)
+            self._order += np.arange(0, terms[0].size, n_freq)[:, None]
             self._count = np.diff(self._edges).astype(float)
-            binned = np.stack([self._means(np.take_along_axis(term, self._order, axis=1)) for term in terms])
+            binned = np.stack([self._means(np.take(term, self._order)) for term in terms])
         else:
             self._count, binned = np.ones(n_freq), terms
         self._size = np.maximum(binned @ self._count, TINY) / self._count.sum()
@@ -112,7 +113,7 @@ class NoiseTerms:
         """Return the parts as `noise_parts` does, shape (n_terms, n_entries)."""
         y = squares
         if self._order is not None:
-            y = np.take_along_axis(squares, self._order, axis=1)
+            y = np.take(squares, self._order)
             y = _bin_medians(y, self._edges) / np.log(2) if robust else self._means(y)
         found = (_two_parts if len(self._terms) == 2 else _several_parts)(y, self._terms, self._count)
         return np.asarray(found / self._size)
@@ -125,18 +126,17 @@ class NoiseTerms:
 def _two_parts(y: FloatArray, a: FloatArray, count: FloatArray) -> FloatArray:
     """Parts of two terms of mean 1, shape (2, n_entries)."""
     centre, reach, entries = np.zeros(len(y)), _WIDEST, np.arange(len(y))
-    weighted, total = count * y, count.sum()
-    for points in _GRIDS:
-        odds = np.exp(centre + reach * np.linspace(-1, 1, points)[:, None])
-        share = np.stack([1 / (1 + odds), odds / (1 + odds)])  # (2, grid, n_entries)
-        v = share[0][:, :, None] * a[0]
-        v += share[1][:, :, None] * a[1]
-        np.maximum(v, TINY, out=v)
-        level = (weighted / v).sum(axis=2) / total
-        loss = np.log(v, out=v) @ count + total * np.log(np.maximum(level, TINY))
-        best = loss.argmin(axis=0)
-        centre, reach = np.log(odds[best, entries]), 2 * reach / (points - 1)
-    return np.asarray(share[:, best, entries] * level[best, entries])
+    weighted, total, first = count * y, count.sum(), np.maximum(a[0], TINY)
+    for grid in _GRIDS:
+        # Variances over the part of the first, shape (grid, n_entries, n_bins), and what this part is for them.
+        odds = np.exp(centre + reach * grid)
+        v = odds[:, :, None] * a[1]
+        v += first
+        part = (weighted / v).sum(axis=2) / total
+        loss = np.log(v, out=v) @ count + total * np.log(np.maximum(part, TINY))
+        best = loss.argmin(axis=0), entries
+        centre, reach = np.log(odds[best]), 2 * reach / (len(grid) - 1)
+    return part[best] * np.stack([np.ones(len(y)), odds[best]])
 
 
 def _several_parts(y: FloatArray, a: FloatArray, count: FloatArray) -> FloatArray:
