@@ -13,7 +13,15 @@ from numpy.typing import NDArray
 
 from jointfrf.channels.check.driving_points import one_sidedness
 from jointfrf.channels.check.finding import Correction, FrfFinding
-from jointfrf.channels.check.pair_ratios import BROKEN, ONE_SIDED, PairRatios, are_one_sided, are_signals, scatter_of
+from jointfrf.channels.check.pair_ratios import (
+    BROKEN,
+    ONE_SIDED,
+    PairRatios,
+    Polar,
+    are_one_sided,
+    are_signals,
+    scatter_of,
+)
 from jointfrf.channels.check.signals import Measurement
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
@@ -135,17 +143,19 @@ def hidden_exchange(h: ComplexArray, directions: Sequence[str]) -> Cause | None:
     directions : sequence of str
         Of the DOFs.
     """
-    across = np.ascontiguousarray(h.swapaxes(1, 2))
+    polar, every = Polar.of(h), np.arange(len(directions))
     best: Cause | None = None
     for i, j in combinations(range(len(directions)), 2):
         if directions[i] != directions[j]:
             continue
         # Rows of the two responses beside the columns of their forces, as they are and exchanged.
-        scatters = (scatter_of(h[:, rows], across[:, [i, j]]) for rows in ([i, j], [j, i]))
-        both = [kept[kept > 0] for kept in (np.delete(scatter, (i, j), axis=1) for scatter in scatters)]
+        others = np.delete(every, (i, j))
+        columns = polar.at(others[:, None], [i, j])
+        scatters = (scatter_of(polar.at(rows, others[:, None]), columns) for rows in ([i, j], [j, i]))
+        both = [scatter[scatter > 0] for scatter in scatters]
         # h_ij against h_ji, or, exchanged, h_jj against h_ii, is in neither.
         before, after = (float(np.mean(scatter)) if scatter.size else 0.0 for scatter in both)
-        own = [float(scatter_of(h[:, a, b], h[:, c, d])) for a, b, c, d in ((i, j, j, i), (j, j, i, i))]
+        own = scatter_of(polar.at([i, j], [j, j]), polar.at([j, i], [i, i])).tolist()
         before, after = (before * both[0].size + 2 * own[0], after * both[0].size + 2 * own[1])
         if before > _LESS * after + _ROUND_OFF and (best is None or after / before < best.after / best.before):
             best = Cause("exchanged", (i, j), before / (both[0].size + 2), after / (both[0].size + 2))
@@ -162,7 +172,8 @@ def _from_one(first: ComplexArray, second: ComplexArray) -> FloatArray:
 
 
 def _scatter(h: ComplexArray) -> FloatArray:
-    return scatter_of(h, np.ascontiguousarray(h.swapaxes(1, 2)))
+    polar = Polar.of(h)
+    return scatter_of(polar, Polar(*(array.swapaxes(1, 2) for array in polar)))
 
 
 def _exchanged(evidence: _Evidence, before: float) -> Cause | None:
@@ -200,7 +211,8 @@ def _doubled(evidence: _Evidence, before: float) -> Cause | None:
         for h, size, kind in (
             (evidence.h, evidence.size, "doubled response"), (across, evidence.size.T, "doubled force")
         ):  # fmt: skip
-            scatter = np.stack([scatter_of(h[:, copy], h[:, other]) for other in range(n)])
+            polar = Polar.of(h)
+            scatter = np.stack([scatter_of(polar.at(copy), polar.at(other)) for other in range(n)])
             worst = scatter[:, size[copy] > 0].max(axis=1, initial=0)
             worst[copy] = np.inf
             other = int(np.argmin(worst))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ __all__ = [
     "BROKEN",
     "ONE_SIDED",
     "PairRatios",
+    "Polar",
     "are_one_sided",
     "are_signals",
     "block_medians",
@@ -150,16 +151,16 @@ def block_medians(values: FloatArray, length: int = _BLOCK) -> FloatArray:
     """Return the median over blocks of lines, shape (n_blocks, ...); the last block has the remaining lines."""
     n = max(values.shape[0] // length, 1)
     whole = min(n * length, values.shape[0])
-    medians = np.median(values[:whole].reshape(n, whole // n, *values.shape[1:]), axis=1)
+    found = medians(np.moveaxis(values[:whole].reshape(n, whole // n, *values.shape[1:]), 1, -1))
     if values.shape[0] > whole:
-        medians[-1] = np.median(values[whole - whole // n :], axis=0)
-    return medians
+        found[-1] = medians(np.moveaxis(values[whole - whole // n :], 0, -1))
+    return found
 
 
 def _block_deviation(rest: ComplexArray, length: int) -> FloatArray:
     """Return the standard deviation of each line, from the median in its block, and not far below that of all."""
     squares = block_medians(rest.real**2 + rest.imag**2, length) / np.log(2)
-    squares = np.maximum(squares, 0.01 * np.median(squares, axis=0) + LEAST_ERROR**2)
+    squares = np.maximum(squares, 0.01 * medians(squares.T) + LEAST_ERROR**2)
     place = np.minimum(np.arange(rest.shape[0]) // length, squares.shape[0] - 1)
     return np.asarray(np.sqrt(squares)[place])
 
@@ -241,8 +242,8 @@ def pair_ratios(omega: FloatArray, h: ComplexArray, smooth: FloatArray) -> PairR
     """
     n = h.shape[1]
     p, q = np.triu_indices(n, 1)
-    above, below = h[:, p, q], h[:, q, p]
-    amplitude, phasor = _parts(above, below)
+    polar = Polar.of(h)
+    amplitude, phasor = polar.at(p, q).over(polar.at(q, p))
     steps, tried = _delays(omega)
     delay = steps[np.argmax(abs(tried @ phasor), axis=0)]
     turned = phasor * np.exp(1j * omega[:, None] * delay)
@@ -289,22 +290,50 @@ def are_one_sided(size: FloatArray, smooth: FloatArray) -> NDArray[np.bool_]:
     return alone | alone.T
 
 
-def scatter_of(above: ComplexArray, below: ComplexArray) -> FloatArray:
+class Polar(NamedTuple):
+    """FRFs as the logarithm of their size and a phase factor; 0 and 1 where one is zero.
+
+    Attributes
+    ----------
+    log_size : ndarray, shape (n_freq, ...)
+    phasor : ndarray, shape (n_freq, ...)
+    zero : ndarray of bool, shape (n_freq, ...)
+    """
+
+    log_size: FloatArray
+    phasor: ComplexArray
+    zero: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, h: ComplexArray) -> Polar:
+        """Return those of h, shape (n_freq, ...)."""
+        size = modulus(h)
+        zero = size == 0
+        size = np.where(zero, 1, size)
+        return cls(np.log(size), np.where(zero, 1, h / size), zero)
+
+    def at(self, *places: Any) -> Polar:
+        """Return those at some places of all lines."""
+        return Polar(*(array[(slice(None), *places)] for array in self))
+
+    def over(self, below: Polar) -> tuple[FloatArray, ComplexArray]:
+        """Return the logarithm of the size, and the phase factor, of ratios; 0 and 1 where one of them is zero."""
+        amplitude, phasor, unknown = (
+            self.log_size - below.log_size, self.phasor * below.phasor.conj(), self.zero | below.zero
+        )  # fmt: skip
+        if unknown.any():
+            amplitude[unknown], phasor[unknown] = 0, 1
+        return amplitude, phasor
+
+
+def scatter_of(above: Polar, below: Polar) -> FloatArray:
     """Median over lines of |log(above / below) - constant|: below `BROKEN` where they are one FRF up to a factor."""
-    amplitude, phasor = _parts(above, below)
+    amplitude, phasor = above.over(below)
     rest = amplitude - medians(amplitude.T).T
     turn = np.angle(phasor * _unit(phasor.sum(axis=0)).conj())
-    scatter: FloatArray = medians(np.hypot(rest, turn).T).T
-    one_is_zero = ((above == 0) != (below == 0)).mean(axis=0) > 0.5
+    scatter: FloatArray = medians(np.sqrt(rest**2 + turn**2).T).T
+    one_is_zero = (above.zero != below.zero).mean(axis=0) > 0.5
     return np.where(one_is_zero, ONE_SIDED, scatter)
-
-
-def _parts(above: ComplexArray, below: ComplexArray) -> tuple[FloatArray, ComplexArray]:
-    """Logarithm of the size, and the phase factor, of above / below; 0 and 1 where one of them is zero."""
-    known = (above != 0) & (below != 0)
-    ratio = np.asarray(np.where(known, above, 1) / np.where(known, below, 1), np.complex128)
-    size = modulus(ratio)
-    return np.log(size), ratio / size
 
 
 def _unit(values: ComplexArray) -> ComplexArray:
