@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import jointfrf as jf
+from jointfrf.identification.manifold import fit as fit_module
 
 TRUTH = {"k_y": 6e5, "k_theta": 5e3, "c_y": 20, "c_theta": 1.5}
 BANDS = {"y": (200, 800), "theta": (650, 800)}
@@ -112,6 +113,31 @@ def test_a_coupled_joint(beams):
     assert fit.value["k_y,theta"] == pytest.approx(1e4, rel=0.05)
     assert fit.unit("k_y,theta") == "N"
     np.testing.assert_allclose(fit.k_joint([100.0])[0, 0, 1], fit.k_joint([100.0])[0, 1, 0])
+
+
+@pytest.mark.parametrize("kind", ["viscous", "hysteretic", "both"])
+def test_damping_of_a_coupled_joint_is_chosen_as_if_all_kinds_were_fitted(beams, monkeypatch, kind):
+    """Kinds that quadratic forms exclude on some lines alone are not fitted."""
+    viscous = None if kind == "hysteretic" else [[40, 0.5], [0.5, 3.0]]
+    loss = 0.0 if kind == "viscous" else 0.3
+    joint = jf.Joint([[6e5, 1e4], [1e4, 5e3]], viscous, ["y", "theta"], loss)
+    measured = jf.pollute(beams.gamma(joint), 0.005, seed=1)
+
+    def fitted():
+        kinds, estimate = [], fit_module._estimate
+        monkeypatch.setattr(fit_module, "_estimate", lambda *a, **k: (kinds.append(a[1]), estimate(*a, **k))[1])
+        fit = jf.identify(beams.freq, measured, ["y", "theta"], cross="fit")
+        monkeypatch.undo()
+        return fit, kinds
+
+    fit, some = fitted()
+    monkeypatch.setattr(fit_module, "_EXCLUDED", np.inf)
+    whole, every = fitted()
+    assert every == ["viscous", "both", "hysteretic"]
+    assert some == (every if kind == "hysteretic" else every[:2])
+    assert fit.value == whole.value
+    assert fit.notes == whole.notes
+    assert any(note.startswith(f"damping of y: {kind}") for note in fit.notes)
 
 
 def test_a_joint_too_stiff_to_be_seen_is_said_with_its_bound(beams):

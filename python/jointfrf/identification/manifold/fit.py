@@ -39,7 +39,7 @@ from jointfrf.identification.manifold.estimate import (
 )
 from jointfrf.identification.manifold.flexible_sides import JointAlone, SideBending, joint_alone
 from jointfrf.identification.manifold.group_fit import GroupFit
-from jointfrf.identification.manifold.line_forms import FormMinimum
+from jointfrf.identification.manifold.line_forms import LEAST_GAIN, FormMinimum
 from jointfrf.identification.manifold.prepare import FitProblem, check_estimate
 from jointfrf.identification.manifold.soft import SoftJoint
 from jointfrf.identification.manifold.uncertainty import joint_intervals, residual_test_of, spread_of
@@ -84,6 +84,9 @@ _KINDS: tuple[DampingTerms, ...] = ("none", "viscous", "hysteretic", "both")
 MARGIN = 6.0
 #: Two terms are not excluded by one whose BIC is lower by less than this.
 _HARDLY = 2.0
+#: Terms whose BIC exceeds that of all others by this, ten times what is clear, on about so many lines alone, need no
+#: fit of their own: the quadratic forms, minimised until steps gain less than this, are not that wrong.
+_EXCLUDED, _SOME_LINES, _COARSE = 100.0, 150, 0.1
 
 
 class DofDamping(NamedTuple):
@@ -449,20 +452,41 @@ def _values_of(group: GroupFit, minimum: FormMinimum) -> tuple[FloatArray, Float
 def _with_common_damping(problem: FitProblem) -> tuple[JointEstimate, tuple[DofDamping, ...]]:
     """Choose the damping terms of a joint with cross terms: the same for all DOFs."""
     results: dict[DampingTerms, JointEstimate] = {"viscous": _estimate(problem, "viscous")}
-    before = results["viscous"]
-    for kind in ("both", "hysteretic"):
-        # Where both terms together fit, one of them needs no other start to show that it does not.
-        is_explained = kind == "hysteretic" and not problem.near and all(group.is_noise for group in before.groups)
-        near = (*_starts(problem, before, kind), *problem.near)
+    near = (*_starts(problem, results["viscous"], "both"), *problem.near)
+    both = results["both"] = _estimate(replace(problem, near=near), "both", data=results["viscous"].data)
+    factor = problem.noise.inflation * max(both.excess, _LEAST_EXCESS)
+
+    def score(squares: float, p: int) -> float:
+        return 2 * squares / factor + p * float(np.log(max(2 * both.equations / factor, 2.0)))
+
+    def score_of(result: JointEstimate) -> float:
+        return score(sum(group.squares for group in result.groups), len(result.parameters))
+
+    scores = {kind: score_of(result) for kind, result in results.items()}
+    # Where both terms together fit, one of them needs no other start to show that it does not, and mostly no fit.
+    is_explained = all(group.is_noise for group in both.groups)
+    bound = score(_least_squares(problem, both, "hysteretic"), len(results["viscous"].parameters))
+    if is_explained and bound > max(scores.values()) + _EXCLUDED:
+        scores["hysteretic"] = bound
+    else:
+        near = (*_starts(problem, both, "hysteretic"), *problem.near)
+        is_explained = is_explained and not problem.near
         own = replace(problem, near=near)
-        before = results[kind] = _estimate(own, kind, data=before.data, is_explained=is_explained)
-    factor = problem.noise.inflation * max(results["both"].excess, _LEAST_EXCESS)
-    scores = {}
-    for kind, result in results.items():
-        squares = sum(group.squares for group in result.groups)
-        scores[kind] = 2 * squares / factor + len(result.parameters) * np.log(max(2 * result.equations / factor, 2.0))
+        results["hysteretic"] = _estimate(own, "hysteretic", data=both.data, is_explained=is_explained)
+        scores["hysteretic"] = score_of(results["hysteretic"])
     choices = tuple(DofDamping.by_scores(dof, scores)._replace(others=()) for dof in problem.dofs)
     return results[choices[0].best], choices
+
+
+def _least_squares(problem: FitProblem, found: JointEstimate, damping: DampingTerms) -> float:
+    """Return what the squares with fewer terms are at least: on some lines as they then are, on others as they were."""
+    terms, squares = _terms(problem, damping, problem.options.cross), 0.0
+    for group in found.groups:
+        some = slice(None, None, max(1, len(group.used) // _SOME_LINES))
+        own = _minimum(group, terms.of_dofs(group.dofs)[0], some, _COARSE)
+        before, _ = own.forms.at(group.joint.on_lines(some).compliance(group.x))
+        squares += group.squares + own.cost - float(before.sum())
+    return squares
 
 
 def _starts(
@@ -535,11 +559,14 @@ def choose_damping(group: GroupFit, dofs: tuple[str, ...], factor: float) -> lis
     return choices
 
 
-def _minimum(group: GroupFit, terms: JointTerms) -> FormMinimum:
+def _minimum(
+    group: GroupFit, terms: JointTerms, lines: slice = slice(None), least_gain: float = LEAST_GAIN
+) -> FormMinimum:
     """Minimise the forms of a group with other terms, from the joint found; terms that it has not begin at zero."""
+    terms = terms.on_lines(lines)
     joint = coordinates_of(terms)
     if isinstance(group.joint, SoftJoint):
         joint = SoftJoint(terms, group.joint.soft)
     found = dict(zip(group.joint.names, group.joint.theta(group.x).tolist(), strict=True))
     theta = np.array([found.get(one.name, 0.0) for one in terms.parameters])
-    return joint.minimise(group.forms, joint.coordinates(theta))
+    return joint.minimise(group.forms.on_slice(lines), joint.coordinates(theta), least_gain=least_gain)
