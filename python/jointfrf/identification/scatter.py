@@ -116,15 +116,14 @@ def scatter_of(whole: FloatArray, pieces: Iterable[LineParts]) -> tuple[FloatArr
     seen = value > _SEEN * value[-1]
     root = vector[:, seen] / np.sqrt(value[seen]) / size[:, None]
     variance, (p, k) = (root**2).sum(axis=1), root.shape
-    to_root = (root[:, None, :, None] * root[None, :, None, :]).reshape(p * p, k * k)
     to_steps, to_variance = root @ root.T, (root[:, :, None] * root[:, None, :]).reshape(p, k * k).T
     taken, of_expected, of_steps = np.zeros((3, p))
     for piece in pieces:
-        # Information in those coordinates; with the root on one side, and on both.
-        within = piece.information.reshape(-1, p * p) @ to_root
-        squared = within.reshape(-1, k).T @ within.reshape(-1, k)
-        taken += np.einsum("ar,rs,as->a", root, squared, root)
-        of_expected += ((within @ to_variance) ** 2).sum(axis=0)
+        # Information in those coordinates: with the root on one side, and on both.
+        half = (piece.information.reshape(-1, p) @ root).reshape(-1, p, k)
+        within = half.swapaxes(1, 2).reshape(-1, p) @ root
+        taken += np.einsum("ar,rs,as->a", root, within.T @ within, root)
+        of_expected += ((within.reshape(-1, k * k) @ to_variance) ** 2).sum(axis=0)
         of_steps += ((piece.gradient @ to_steps) ** 2).sum(axis=0)
     left = np.maximum(variance - taken, 0)
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -112,7 +112,7 @@ def _coupled_starts(
     size = np.sqrt(np.maximum(np.einsum("lqq->lq", covariance).real, np.finfo(float).tiny))
     scaled = covariance / (size[:, :, None] * size[:, None, :])
     q = n * n
-    weight = np.linalg.pinv(scaled + 1e-10 * np.eye(q), hermitian=True) / (size[:, :, None] * size[:, None, :])
+    weight = invert(scaled + 1e-10 * np.eye(q), on_singular="nan") / (size[:, :, None] * size[:, None, :])
     fold = np.zeros((q, a.size))
     fold[a * n + b, np.arange(a.size)] = 1
     fold[b * n + a, np.arange(a.size)] = 1
