@@ -97,8 +97,10 @@ class JointTerms(NamedTuple):
 
     def of_dofs(self, dofs: NDArray[np.intp]) -> tuple[JointTerms, NDArray[np.intp]]:
         """Return the terms between some of the DOFs, and which of the parameters these are."""
-        which = np.flatnonzero(np.isin(self.pairs, dofs).all(axis=1))
-        pairs = np.searchsorted(dofs, self.pairs[which])
+        place = np.full(self.n, -1)
+        place[dofs] = np.arange(dofs.size)
+        which = np.flatnonzero((place[self.pairs] >= 0).all(axis=1))
+        pairs = place[self.pairs[which]]
         own = JointTerms(tuple(self.parameters[i] for i in which), self.omega, self.kinds[which], pairs)
         return own, which
 
@@ -185,10 +187,10 @@ class DiagonalJoint(SpringJoint):
 
     def _turn(self, x: FloatArray) -> ComplexArray:
         """Return 1/(1 + i eta + i w tau) of each DOF, shape (n_freq, n)."""
-        whole, factors = np.ones((self.terms.omega.size, self.terms.n), np.complex128), self.terms.factors
+        whole = np.ones((self.terms.omega.size, self.terms.n), np.complex128)
         for i in self.rates:
             rate = x[i] if self.by_rate else x[i] * x[self.dofs[i]]
-            whole[:, self.dofs[i]] += rate * factors[self.terms.kinds[i]]
+            whole.imag[:, self.dofs[i]] += rate if self.terms.kinds[i] == 1 else rate * self.terms.omega
         return 1 / whole
 
     def compliance(self, x: FloatArray) -> ComplexArray:

@@ -561,7 +561,9 @@ def _of_coordinates(
             forms.compliance[:, upper], fold.T @ forms.weight @ fold, forms.gradient @ fold, forms.squares
         ), found
     if len(upper) < places.size:
-        kept = np.flatnonzero(np.isin(places, upper))
+        changed = np.zeros(n * n, bool)
+        changed[upper] = True
+        kept = np.flatnonzero(changed[places])
         weight = forms.weight[:, kept[:, None], kept]
         forms = LineForms(forms.compliance[:, kept], weight, forms.gradient[:, kept], forms.squares)
     return forms, found

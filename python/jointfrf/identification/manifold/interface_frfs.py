@@ -130,13 +130,13 @@ class InterfaceFrfs(NamedTuple):
 
         Each group is a separate problem: where a structure is symmetric, the FRFs between some DOFs vanish.
         """
-        n, smooth = self.n, abs(self.smooth_gamma)
-        size = np.sqrt(np.einsum("lpp->lp", smooth))
-        relative = smooth / (size[:, :, None] * size[:, None, :])
-        exact = (relative > _ZERO).any(axis=0)
+        n, smooth = self.n, self.smooth_gamma
+        squares = smooth.real**2 + smooth.imag**2
+        own = np.einsum("lpp->lp", squares)
+        exact = (squares > _ZERO**2 * np.sqrt(own[:, :, None] * own[:, None, :])).any(axis=0)
         noise = between(self.responses**2, self.variance, self.forces**2)
-        with np.errstate(invalid="ignore", divide="ignore"):
-            seen = smooth**2 > _BELOW_NOISE * noise
+        with np.errstate(invalid="ignore"):
+            seen = squares > _BELOW_NOISE * noise
         coupled = exact & (seen.mean(axis=0) > 0.02)
         both = coupled[:n, :n] | coupled[:n, n:] | coupled[n:, :n] | coupled[n:, n:]
         label = connected(both)

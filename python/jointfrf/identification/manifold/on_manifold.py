@@ -82,9 +82,7 @@ class FrfEntries(NamedTuple):
     @property
     def free(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """Rows and columns of the free entries of H, M and C, shape (u,)."""
-        pattern = np.ones((self.n, self.n), np.bool_)
-        a, b = np.nonzero(np.triu(pattern) if self.reciprocal else pattern)
-        return a, b
+        return _free(self.n, self.reciprocal)
 
     def matrix(self, values: _Numbers) -> _Numbers:
         """Return gamma, or weights, of its entries, shape (n_freq, 2 n, 2 n)."""
@@ -98,20 +96,24 @@ class FrfEntries(NamedTuple):
 
 
 @lru_cache(maxsize=64)
+def _free(n: int, reciprocal: bool) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return rows and columns of the upper triangle, or of all entries, shape (u,)."""
+    rows, columns = np.triu_indices(n) if reciprocal else (x.ravel() for x in np.indices((n, n)))
+    for shared in (rows, columns):
+        shared.flags.writeable = False
+    return rows, columns
+
+
+@lru_cache(maxsize=64)
 def _entries_of(n: int, reciprocal: bool) -> FrfEntries:
-    if reciprocal:
-        rows, columns = np.triu_indices(2 * n)
-        a, b = np.triu_indices(n)
-    else:
-        rows, columns = (x.ravel() for x in np.indices((2 * n, 2 * n)))
-        a, b = (x.ravel() for x in np.indices((n, n)))
+    rows, columns = _free(2 * n, reciprocal)
+    a, b = _free(n, reciprocal)
     units = np.zeros((a.size, n, n))
     k = np.arange(a.size)
     units[k, a, b] = 1
     if reciprocal:
         units[k, b, a] = 1
-    for shared in (rows, columns, units):
-        shared.flags.writeable = False
+    units.flags.writeable = False
     return FrfEntries(n, rows, columns, units)
 
 

@@ -260,15 +260,13 @@ def check_channels(gamma: ComplexArray, labels: list[str]) -> None:
     """
     half = len(labels) // 2
     some = gamma[:: -(-len(gamma) // _MOST_LINES)]
-    measured = _is_measured(some)
     squares = some.real**2 + some.imag**2
     for what, h, of_h in (("responses", some, squares), ("forces", some.swapaxes(1, 2), squares.swapaxes(1, 2))):
-        size = np.sqrt(of_h.mean(axis=(0, 2)))
-        if not size.all():
-            dead = [labels[i] for i in np.flatnonzero(size == 0)]
+        seen = of_h.any(axis=(0, 2))
+        if not seen.all():
+            dead = [labels[i] for i in np.flatnonzero(~seen)]
             raise ValueError(f"gamma: the {what} {', '.join(dead)} are zero: nothing was measured there")
-        flat = _normalised(h, of_h)
-        product = flat @ flat.conj().T
+        product = _products(h, of_h)
         sides = slice(0, half), slice(half, 2 * half)
         values, vectors = np.linalg.eigh(np.array([product[side, side] for side in sides]))
         for side, least, vector in zip(sides, values[:, 0], vectors[:, :, 0], strict=True):
@@ -278,23 +276,23 @@ def check_channels(gamma: ComplexArray, labels: list[str]) -> None:
                     f"gamma: the {what} {', '.join(own)} are not independent: one of these DOFs is the others measured "
                     "again, or their sum"
                 )
-        if measured:
-            for i in range(half):
-                # The lower eigenvalue of the products of two rows of norm 1.
-                if 1 - abs(product[i, i + half]) < _DEPENDENT:
-                    raise ValueError(
-                        f"gamma: the {what} {labels[i]} and {labels[i + half]} are the same numbers, noise included: "
-                        "measure both sides of the joint"
-                    )
+        for i in range(half):
+            # The lower eigenvalue of the products of two rows of norm 1.
+            if 1 - abs(product[i, i + half]) < _DEPENDENT and _is_measured(some):
+                raise ValueError(
+                    f"gamma: the {what} {labels[i]} and {labels[i + half]} are the same numbers, noise included: "
+                    "measure both sides of the joint"
+                )
 
 
-def _normalised(h: ComplexArray, squares: FloatArray) -> ComplexArray:
-    """Return rows of norm 1, shape (rows, n_freq columns), to which every line and column adds alike."""
+def _products(h: ComplexArray, squares: FloatArray) -> ComplexArray:
+    """Return products of rows of norm 1, shape (rows, rows), to which every line and column adds alike."""
     of_columns = np.maximum(np.sqrt(squares.mean(axis=(0, 1))), _TINY)
     of_lines = np.maximum(np.sqrt((squares / of_columns / of_columns).mean(axis=(1, 2), keepdims=True)), _TINY)
-    flat = (h / of_columns / of_lines).swapaxes(0, 1).reshape(h.shape[1], -1)
-    rows: ComplexArray = flat / np.linalg.norm(flat, axis=1, keepdims=True)
-    return rows
+    flat = (h / (of_columns * of_lines)).swapaxes(0, 1).reshape(h.shape[1], -1)
+    product: ComplexArray = flat @ flat.conj().T
+    size = np.sqrt(product.diagonal().real)
+    return product / size / size[:, None]
 
 
 def _is_measured(gamma: ComplexArray) -> bool:
@@ -316,24 +314,22 @@ def check_joint_seen(freq: FloatArray, smooth: ComplexArray, variance: FloatArra
     span = f"{freq.min():g} to {freq.max():g} Hz"
     some = spread_lines(len(freq))
     smooth, variance = smooth[some], variance[some]
-    n = smooth.shape[1] // 2
-    driving = np.einsum("lpp->lp", smooth)
-    tiny = np.finfo(float).tiny
-    noise = np.sqrt(np.einsum("lpp->lp", variance)) / np.maximum(abs(driving), tiny)
+    n, squares = smooth.shape[1] // 2, smooth.real**2 + smooth.imag**2
+    driving = np.sqrt(np.einsum("lpp->lp", squares))
+    noise = np.sqrt(np.einsum("lpp->lp", variance)) / np.maximum(driving, _TINY)
     level = float(medians(noise.ravel()))
     if level >= _HIDDEN:
         raise ValueError(
             f"gamma consists of noise ({span}: the noise of driving points is {_percent(level)} of what is smooth in "
             "them): nothing can be identified from it"
         )
-    size = np.sqrt(abs(driving))
-    across = abs(smooth) / np.maximum(size[:, :, None] * size[:, None, :], tiny)
-    if not (across[:, :n, n:] > ZERO).any() and not (across[:, n:, :n] > ZERO).any():
+    across = squares > ZERO**2 * np.maximum(driving[:, :, None] * driving[:, None, :], _TINY)
+    if not across[:, :n, n:].any() and not across[:, n:, :n].any():
         raise ValueError(
             f"gamma is zero between sides j and k of the joint ({span}): no joint connects them, or DOFs j and k are "
             "not where they are said to be"
         )
-    seen = (abs(smooth) ** 2 > _HIDDEN**2 * variance).mean(axis=0) > _SEEN
+    seen = (squares > _HIDDEN**2 * variance).mean(axis=0) > _SEEN
     if not seen[:n, n:].any() and not seen[n:, :n].any():
         raise ValueError(
             f"gamma between sides j and k of the joint consists of noise ({span}): no joint is seen, or the noise "

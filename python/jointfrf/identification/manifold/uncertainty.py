@@ -333,7 +333,8 @@ def _trends(
         of_part[own] = 1
     gradient, information = group.of_groups(member)
     size = np.sqrt(np.maximum(np.einsum("bpp->bp", information), TINY))
-    seen = np.linalg.cond(information / (size[:, :, None] * size[:, None, :])) <= _SINGULAR
+    value = abs(np.linalg.eigvalsh(information / (size[:, :, None] * size[:, None, :])))
+    seen = value.max(axis=1) <= _SINGULAR * value.min(axis=1)
     if not seen.any():
         return []
     values, changes, errors = (np.full((BLOCKS, p), np.nan) for _ in range(3))
