@@ -165,7 +165,7 @@ def _functions(span: tuple[float, float], number: int, lines: bytes) -> FloatArr
     gain *= np.sqrt(2 * np.arange(len(gain)) + 1)[:, None]
     phase = gain.copy()
     phase[:2] = _mixture(span) @ gain[:2]
-    found = np.stack([gain, phase])[:, :number]
+    found = np.asarray(np.stack([gain, phase])[:, :number], float)
     found.flags.writeable = False
     return found
 
@@ -173,7 +173,7 @@ def _functions(span: tuple[float, float], number: int, lines: bytes) -> FloatArr
 def _mixture(span: tuple[float, float]) -> FloatArray:
     """Return the matrix from the first two functions of the gain to those of the phase; it is its own inverse."""
     slow, fast = (span[1] + span[0]) / 2, (span[1] - span[0]) / np.sqrt(12)
-    return np.array([[slow, fast], [fast, -slow]]) / np.hypot(slow, fast)
+    return np.asarray(np.array([[slow, fast], [fast, -slow]]) / np.hypot(slow, fast))
 
 
 class _Factors(NamedTuple):

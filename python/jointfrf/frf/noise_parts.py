@@ -136,7 +136,7 @@ def _two_parts(y: FloatArray, a: FloatArray, count: FloatArray) -> FloatArray:
         loss = np.log(v, out=v) @ count + total * np.log(np.maximum(part, TINY))
         best = loss.argmin(axis=0), entries
         centre, reach = np.log(odds[best]), 2 * reach / (len(grid) - 1)
-    return part[best] * np.stack([np.ones(len(y)), odds[best]])
+    return np.asarray(part[best] * np.stack([np.ones(len(y)), odds[best]]))
 
 
 def _several_parts(y: FloatArray, a: FloatArray, count: FloatArray) -> FloatArray:

@@ -224,7 +224,7 @@ def _is_exact(entries: Entries, fit: RationalFit) -> bool:
     """Whether most residuals are errors of the rational functions rather than noise."""
     left, smooth = entries.h - fit.smooth, fit.smooth
     small = left.real**2 + left.imag**2 < _EXACT**2 * np.maximum(smooth.real**2 + smooth.imag**2, TINY)
-    return 2 * np.count_nonzero(small) > small.size
+    return bool(2 * np.count_nonzero(small) > small.size)
 
 
 def _smooth_group(

@@ -173,7 +173,7 @@ def _from_one(first: ComplexArray, second: ComplexArray) -> FloatArray:
 
 def _scatter(h: ComplexArray) -> FloatArray:
     polar = Polar.of(h)
-    return scatter_of(polar, Polar(*(array.swapaxes(1, 2) for array in polar)))
+    return scatter_of(polar, polar.transposed)
 
 
 def _exchanged(evidence: _Evidence, before: float) -> Cause | None:

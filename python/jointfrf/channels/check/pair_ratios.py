@@ -314,7 +314,13 @@ class Polar(NamedTuple):
 
     def at(self, *places: Any) -> Polar:
         """Return those at some places of all lines."""
-        return Polar(*(array[(slice(None), *places)] for array in self))
+        at = (slice(None), *places)
+        return Polar(self.log_size[at], self.phasor[at], self.zero[at])
+
+    @property
+    def transposed(self) -> Polar:
+        """Those of h_qp in place of h_pq."""
+        return Polar(self.log_size.swapaxes(1, 2), self.phasor.swapaxes(1, 2), self.zero.swapaxes(1, 2))
 
     def over(self, below: Polar) -> tuple[FloatArray, ComplexArray]:
         """Return the logarithm of the size, and the phase factor, of ratios; 0 and 1 where one of them is zero."""
