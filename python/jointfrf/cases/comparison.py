@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from jointfrf.cases.keys import ExpectedFrequencies
 from jointfrf.report.table import Cell, Table
 
-__all__ = ["agreement", "frequency_table", "verdict"]
+__all__ = ["agreement", "failing_rows", "frequency_table", "verdict"]
 
 
 def verdict(good: bool | None) -> str:
@@ -37,7 +37,6 @@ def frequency_table(
     Table
     """
     cells: list[tuple[Cell, ...]] = []
-    failing = []
     for names, frequencies, expected in groups:
         for i, (name, freq) in enumerate(zip(names, frequencies, strict=True)):
             known = difference = good = None
@@ -45,13 +44,15 @@ def frequency_table(
                 known = expected.values[i]
                 difference = (freq / known - 1) * 100
                 good = abs(difference) <= expected.within_percent
-            if good is not None and not good:
-                failing.append(len(cells))
             cells.append((*name, freq, known, difference, verdict(good)))
     all_columns = (*columns, "found, Hz", "expected, Hz", "difference, %", "")
-    return Table(
-        "natural-frequencies", title, all_columns, tuple(cells), tuple(failing), note, percentages=("difference, %",)
-    )
+    failing = failing_rows(cells)
+    return Table("natural-frequencies", title, all_columns, tuple(cells), failing, note, percentages=("difference, %",))
+
+
+def failing_rows(cells: Sequence[Sequence[Cell]]) -> tuple[int, ...]:
+    """Return the rows whose last cell says that they do not fit."""
+    return tuple(i for i, row in enumerate(cells) if row[-1] == verdict(False))
 
 
 def agreement(tables: Sequence[Table]) -> Table:
@@ -78,6 +79,5 @@ def agreement(tables: Sequence[Table]) -> Table:
             good = sum(fits for _, fits in judged)
             others = ", ".join(str(name) for name, fits in judged if name is not None and not fits)
             cells.append((table.title, *group, f"{good} of {len(judged)}", others, verdict(good == len(judged))))
-    failing = tuple(i for i, row in enumerate(cells) if row[-1] == verdict(False))
     columns = ("table", "noise", "bands", "rows that fit", "parameters that do not", "")
-    return Table("agreement", "What fits", columns, tuple(cells), failing)
+    return Table("agreement", "What fits", columns, tuple(cells), failing_rows(cells))

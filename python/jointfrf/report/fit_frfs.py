@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -117,8 +118,7 @@ def compare_model(fit: Fit) -> ComparedFrfs:
     driving = [(p, q) for p, q in pairs if fit.responses[p] == fit.forces[q]]
     rest = [one for one in pairs if one not in driving]
     entries = driving[:_MOST]
-    count = min(_MOST - len(entries), len(rest))
-    entries += [rest[round(i * (len(rest) - 1) / max(count - 1, 1))] for i in range(count)]
+    entries += _evenly(rest, _MOST - len(entries))
     p, q = np.array(entries).T
     squares = np.where(np.isfinite(data.residual), abs(data.residual) ** 2, 0).sum(axis=0)
     counts = np.isfinite(data.residual).sum(axis=0)
@@ -154,10 +154,14 @@ def _entries(
     rest = [(p, q) for p in range(n_rows) for q in range(n_columns) if (p, q) not in known]
     kept: list[tuple[int, int]] = []
     for kind, most in ((driving, _MOST // 3), (across, _MOST // 3), (rest, _MOST)):
-        room = min(most, _MOST - len(kept))
-        count = min(room, len(kind))
-        kept += [kind[round(i * (len(kind) - 1) / max(count - 1, 1))] for i in range(count)]
+        kept += _evenly(kind, min(most, _MOST - len(kept)))
     return tuple(kept)
+
+
+def _evenly(pairs: Sequence[tuple[int, int]], most: int) -> list[tuple[int, int]]:
+    """Choose pairs, evenly spread."""
+    count = min(most, len(pairs))
+    return [pairs[round(i * (len(pairs) - 1) / max(count - 1, 1))] for i in range(count)]
 
 
 def frf_figures(compared: ComparedFrfs, freq_hz: FloatArray, up: NDArray[np.intp]) -> list[Figure]:

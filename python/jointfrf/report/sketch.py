@@ -122,14 +122,19 @@ def _axis(direction: FloatArray) -> str:
     return "(" + " ".join(f"{x:.2g}" for x in direction) + ")"
 
 
+def _fitted(flat: FloatArray) -> tuple[FloatArray, float]:
+    """Return the middle of points of a drawing, and the scale at which they fill it."""
+    extent = np.ptp(flat, axis=0)
+    scale = min((size - 2 * _MARGIN) / max(e, _SAME) for size, e in zip((_WIDTH, _HEIGHT), extent, strict=True))
+    return (flat.min(axis=0) + flat.max(axis=0)) / 2, scale
+
+
 def interface_sketch(interface: Interface, points: list[InterfacePoint], dofs: tuple[str, ...]) -> Sketch:
     """Draw the points of both sides with their directions, and the joint between the reference points."""
     places = np.array([p.place for p in points] + list(interface.references))
     flat = places @ _VIEW.T
-    extent = np.ptp(flat, axis=0)
-    scale = min((size - 2 * _MARGIN) / max(e, _SAME) for size, e in zip((_WIDTH, _HEIGHT), extent, strict=True))
-    scale = 1.0 if extent.max() <= _SAME else scale
-    middle = (flat.min(axis=0) + flat.max(axis=0)) / 2
+    middle, scale = _fitted(flat)
+    scale = 1.0 if np.ptp(flat, axis=0).max() <= _SAME else scale
 
     # Sides that lie on each other are drawn apart.
     near = _nearest(flat[: len(points)] * scale, np.array([p.side for p in points]))
@@ -249,8 +254,7 @@ def assembly_sketch(
     every = np.array([at for own in moved for at in own.values()])
     view = _view_along(int(np.argmax(np.ptp(every, axis=0))))
     flat = every @ view.T
-    extent, middle = np.ptp(flat, axis=0), (flat.min(axis=0) + flat.max(axis=0)) / 2
-    scale = min((size - 2 * _MARGIN) / max(e, _SAME) for size, e in zip((_WIDTH, _HEIGHT), extent, strict=True))
+    middle, scale = _fitted(flat)
 
     def at(place: FloatArray, side: int) -> FloatArray:
         right, up = (place @ view.T - middle) * scale

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from jointfrf.cases.comparison import agreement, frequency_table, verdict
+from jointfrf.cases.comparison import agreement, failing_rows, frequency_table, verdict
 from jointfrf.cases.keys import FITTED, Observed
 from jointfrf.cases.known_joint.compute import KnownJointResult, SensitiveBands, contrast
 from jointfrf.cases.known_joint.decoupling import decoupling_bounds
@@ -72,7 +72,7 @@ def printed_parameter_tables(result: KnownJointResult) -> list[Table]:
         f"{lines.lines_within:g} lines of the printed frequency error; an empty cell fits where there is no peak."
     )
     title = "Errors of FRFs regenerated from the printed parameters"
-    return [Table("printed-parameters", title, columns, tuple(cells), _failing(cells), note, columns[6:7])]
+    return [Table("printed-parameters", title, columns, tuple(cells), failing_rows(cells), note, columns[6:7])]
 
 
 def region_tables(result: KnownJointResult) -> list[Table]:
@@ -88,7 +88,7 @@ def region_tables(result: KnownJointResult) -> list[Table]:
         "first estimate of the joint, which is what a user has, or with the actual joint."
     )
     return [
-        Table(key_of(source), f"{title_of(source)}: sensitive regions", columns, tuple(own), _failing(own), note,
+        Table(key_of(source), f"{title_of(source)}: sensitive regions", columns, tuple(own), failing_rows(own), note,
               tuple(column for column in columns if column.endswith("dB")))
         for source, own in rows.items()
     ]  # fmt: skip
@@ -142,10 +142,6 @@ def band_table(result: KnownJointResult) -> Table:
         "identification a user has the first estimate only."
     )
     return Table("bands", "Sensitive bands", columns, cells, note=note)
-
-
-def _failing(cells: list[tuple[Cell, ...]]) -> tuple[int, ...]:
-    return tuple(i for i, row in enumerate(cells) if row[-1] == verdict(False))
 
 
 #: Relative errors without noise, and between ISMM and its short form, that "fit": those of rounding are smaller.
@@ -380,7 +376,7 @@ def _published_errors(result: KnownJointResult) -> list[Table]:
     return [
         Table(
             key_of(source), f"{title_of(source)}: errors of the regenerated FRFs", columns, tuple(own),
-            tuple(i for i, row in enumerate(own) if row[-1] == verdict(False)), note,
+            failing_rows(own), note,
             percentages=(*_SPREAD_OF_ERRORS, "percentile"),
         )
         for source, own in rows.items()

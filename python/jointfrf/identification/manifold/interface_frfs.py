@@ -217,7 +217,7 @@ class InterfaceFrfs(NamedTuple):
                 total = np.where(p == q, total, (total + of_entry[:, q, p]) / share)
                 dead = dead | unused[:, q, p]
             dead = dead | (total <= 0)
-            return np.where(dead, 0, 1 / np.sqrt(np.where(dead, 1, total))), None
+            return _inverse_root(total, dead), None
         # Entry i is sum over channels of G_i,ab h_ab.
         of_channels = t_r[p][:, :, None] * t_f[q][:, None, :]
         if self.reciprocal:
@@ -232,7 +232,7 @@ class InterfaceFrfs(NamedTuple):
         own = variance.reshape(len(variance), -1)
         dead = ~known.reshape(own.shape) @ (g != 0).T
         total = own @ (g**2).T
-        inverse_std = np.where(dead, 0, 1 / np.sqrt(np.where(dead, 1, total)))
+        inverse_std = _inverse_root(total, dead)
         whitening = np.zeros((len(own), len(p), len(p)))
         for block in _blocks(g):
             whitening[:, block[:, None], block] = _whitening(g[block], own, inverse_std[:, block], dead[:, block])
@@ -267,7 +267,7 @@ class InterfaceFrfs(NamedTuple):
                 covariance += _ERRORS * own.swapaxes(1, 2) @ own
             total = np.einsum("lqq->lq", covariance)
             dead |= ~(total > 0)
-            inverse_std[:, block] = np.where(dead, 0, 1 / np.sqrt(np.where(dead, 1, total)))
+            inverse_std[:, block] = _inverse_root(total, dead)
             size = inverse_std[:, block]
             covariance *= size[:, :, None] * size[:, None, :]
             whitening[:, block[:, None], block] = _triangles(covariance, dead)
@@ -311,6 +311,11 @@ def between(t_r: FloatArray, h: NumbersT, t_f: FloatArray) -> NumbersT:
     if all(np.count_nonzero(t) == len(t) and (t.max(axis=1) == 1).all() for t in (t_r, t_f)):
         return taken(h, t_r.argmax(axis=1), t_f.argmax(axis=1))
     return t_r @ h @ t_f.T
+
+
+def _inverse_root(variance: FloatArray, dead: NDArray[np.bool_]) -> FloatArray:
+    """Return one over the standard deviation, 0 for what is dead."""
+    return np.asarray(np.where(dead, 0, 1 / np.sqrt(np.where(dead, 1, variance))))
 
 
 def _blocks(g: FloatArray) -> list[NDArray[np.intp]]:
