@@ -36,7 +36,9 @@ def _numbers(text):
 def test_the_table_has_every_equation_once_at_a_place_that_exists():
     rows = ROW.findall(DOCUMENTS["docs/equations.md"])
     found = [number for numbers, _, _ in rows for number in _numbers(numbers)]
-    assert sorted(found) == [(2, i) for i in range(1, 60)] + [(3, i) for i in range(1, 16)] + [(4, i) for i in range(1, 31)]
+    assert sorted(found) == [(2, i) for i in range(1, 60)] + [(3, i) for i in range(1, 16)] + [
+        (4, i) for i in range(1, 31)
+    ]
     for _, place, names in rows:
         assert (ROOT / place).is_file(), place
         for name in re.findall(r"`(\w+)(?:\.\w+)?`", names):
