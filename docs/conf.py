@@ -62,8 +62,10 @@ html_title = f"jointfrf {version}"
 html_static_path = ["static"]
 html_css_files = ["site.css"]
 html_show_sourcelink = False
+html_sidebars = {"docs/generated/api/*": []}  # a list of two hundred names beside each of two hundred pages
 html_theme_options = {
     "navigation_with_keys": False,
+    "collapse_navigation": True,
     "show_prev_next": True,
     "secondary_sidebar_items": ["page-toc"],
     "footer_start": ["copyright"],
