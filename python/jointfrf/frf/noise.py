@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import operator
 from typing import Final, Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from jointfrf.kernel.arguments import ComplexArray, as_integer, as_lines, as_number, check_choice
+from jointfrf.kernel.arguments import ComplexArray, as_integer, as_lines, as_number, check_choice, one_line
 from jointfrf.kernel.call import call
 
 __all__ = [
@@ -64,6 +65,7 @@ def pollute(
     reciprocal: bool = False,
     block: int | None = None,
     realisation: int = 0,
+    rng: int | np.random.Generator | None = None,
 ) -> ComplexArray:
     """Add measurement noise to FRFs.
 
@@ -94,6 +96,9 @@ def pollute(
         Size of square blocks whose entries share one noise number, for noise common to the FRFs of a pair of points.
     realisation : int
         Number of an independent repetition with this seed.
+    rng : int or numpy.random.Generator, optional
+        In the place of `seed`, as in other scientific packages (SPEC 7): a seed, or a generator from which one is
+        drawn, so that each call has noise of its own. None is no random seed: noise is then that of `seed`.
 
     Returns
     -------
@@ -103,7 +108,9 @@ def pollute(
     ------
     ValueError
         An unknown word, a negative level, blocks that do not fit, reciprocal noise on a matrix that is not square, a
-        seed or a realisation out of range.
+        seed or a realisation out of range; both `seed` and `rng`.
+    TypeError
+        `rng` is neither a whole number nor a generator.
 
     Notes
     -----
@@ -121,6 +128,9 @@ def pollute(
     >>> polluted = jf.pollute(h, 0.05, seed=1)
     >>> round(float(np.sqrt((abs(polluted - h) ** 2).mean())), 3)
     0.05
+    >>> rng = np.random.default_rng(1)
+    >>> bool((jf.pollute(h, 0.05, rng=rng) == jf.pollute(h, 0.05, rng=rng)).any())
+    False
     """
     return np.asarray(
         realisations(
@@ -133,6 +143,7 @@ def pollute(
             block=block,
             first=realisation,
             count=1,
+            rng=rng,
         )[0]
     )
 
@@ -148,12 +159,13 @@ def realisations(
     block: int | None = None,
     first: int = 0,
     count: int = 1,
+    rng: int | np.random.Generator | None = None,
 ) -> ComplexArray:
     """Several repetitions of `pollute`, numbers `first` to `first + count - 1`.
 
     Parameters
     ----------
-    h, level, kind, seed, relative_to, reciprocal, block
+    h, level, kind, seed, relative_to, reciprocal, block, rng
         As in `pollute`.
     first, count : int
         Number of the first repetition, and how many.
@@ -164,7 +176,7 @@ def realisations(
 
     Raises
     ------
-    ValueError
+    ValueError, TypeError
         As in `pollute`.
 
     Examples
@@ -176,7 +188,7 @@ def realisations(
     True
     """
     lines = as_lines("h", h)
-    noise = noise_arguments(level, kind, seed, relative_to, reciprocal, block, first, count, lines.shape[1:])
+    noise = noise_arguments(level, kind, seed, rng, relative_to, reciprocal, block, first, count, lines.shape[1:])
     try:
         polluted = np.empty((count, *lines.shape), np.complex128)
     except MemoryError as error:
@@ -194,6 +206,7 @@ def noise_arguments(
     level: float,
     kind: NoiseKind,
     seed: int,
+    rng: int | np.random.Generator | None,
     relative_to: NoiseReference,
     reciprocal: bool,
     block: int | None,
@@ -215,7 +228,23 @@ def noise_arguments(
         raise ValueError(f"block {block} does not divide matrices of {n_out} x {n_in}")
     if as_integer("first", first) < 0 or as_integer("count", count) < 0 or first + count > MOST_REALISATIONS:
         raise ValueError(f"realisations are counted from 0 to {MOST_REALISATIONS - 1}: not {count} from {first} on")
-    if not 0 <= as_integer("seed", seed) < 2**64:
-        raise ValueError(f"seed must lie between 0 and 2**64 - 1, not {seed}")
-    words = np.array([seed & 0xFFFFFFFF, seed >> 32], np.uint32).view(np.int32)
+    whole = _whole_seed(seed, rng)
+    words = np.array([whole & 0xFFFFFFFF, whole >> 32], np.uint32).view(np.int32)
     return NOISE_KINDS[kind].letter, relative_to[0].upper(), int(reciprocal), size, number, words
+
+
+def _whole_seed(seed: int, rng: int | np.random.Generator | None) -> int:
+    """Return the seed, or that which `rng` is or gives."""
+    number, name = as_integer("seed", seed), "seed"
+    if rng is not None:
+        if number != 0:
+            raise ValueError("seed and rng are both given: one is enough")
+        if isinstance(rng, np.random.Generator):
+            return int(rng.integers(2**64, dtype=np.uint64))
+        try:
+            number, name = operator.index(rng), "rng"
+        except TypeError:
+            raise TypeError(f"rng must be a whole number or a numpy.random.Generator, not {one_line(rng)}") from None
+    if not 0 <= number < 2**64:
+        raise ValueError(f"{name} must lie between 0 and 2**64 - 1, not {number}")
+    return number

@@ -145,6 +145,7 @@ def monte_carlo(
     block: int | None = None,
     freq_hz: ArrayLike | None = None,
     on_singular: OnSingular = "raise",
+    rng: int | np.random.Generator | None = None,
 ) -> MonteCarlo:
     """Mean and covariance of the joint identified from polluted FRFs.
 
@@ -152,7 +153,7 @@ def monte_carlo(
     ----------
     gamma : array_like, shape (n_freq, 2 n, 2 n)
         Exact receptance of the assembly at joint DOFs j, then k, m/N; it is polluted.
-    level, kind, seed, relative_to, reciprocal, block
+    level, kind, seed, relative_to, reciprocal, block, rng
         The noise, as in `pollute`.
     count, first : int
         Realisations `first` to `first + count - 1`, the very ones that `realisations` gives.
@@ -193,7 +194,7 @@ def monte_carlo(
     exact, n = as_interface("gamma", gamma)
     n_freq = exact.shape[0]
     check_choice("method", method, get_args(MonteCarloMethod))
-    noise = noise_arguments(level, kind, seed, relative_to, reciprocal, block, first, count, exact.shape[1:])
+    noise = noise_arguments(level, kind, seed, rng, relative_to, reciprocal, block, first, count, exact.shape[1:])
     if as_integer("count", count) < 1:
         raise ValueError(f"count must be positive, not {count}")
     needed = () if method == "compliance" else STIFFNESS_METHODS[method].model

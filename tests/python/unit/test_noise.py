@@ -131,6 +131,21 @@ def test_entries_lines_and_realisations_are_independent():
     assert abs(power @ power.T / flat.shape[1] - np.eye(32)).max() < 2 * limit
 
 
+def test_a_generator_gives_seeds_and_a_number_is_one():
+    np.testing.assert_array_equal(jf.pollute(H, 0.05, rng=2**63 + 7), jf.pollute(H, 0.05, seed=2**63 + 7))
+    calls = [jf.pollute, lambda h, level, rng: jf.realisations(h, level, rng=rng, count=2)]
+    rng, seeds = np.random.default_rng(5), np.random.default_rng(5).integers(2**64, size=2, dtype=np.uint64)
+    for call, seed in zip(calls, seeds.tolist(), strict=True):
+        np.testing.assert_array_equal(call(H, 0.05, rng=rng), call(H, 0.05, rng=seed))
+    gamma = H[:, :2, :2] + 4 * np.eye(2)
+    drawn, by_seed = (jf.monte_carlo(gamma, 0.01, count=3, **own).mean for own in (
+        dict(rng=np.random.default_rng(5)), dict(seed=int(seeds[0])))
+    )  # fmt: skip
+    np.testing.assert_array_equal(drawn, by_seed)
+    with pytest.raises(TypeError, match=r"rng must be a whole number or a numpy\.random\.Generator, not 'x'"):
+        jf.pollute(H, 0.05, rng="x")
+
+
 def test_no_level_no_noise():
     np.testing.assert_array_equal(jf.pollute(H, 0.0), H)
 
@@ -144,6 +159,8 @@ def test_no_level_no_noise():
         (dict(level=np.nan), "level must be finite"),
         (dict(block=3), "block 3 does not divide"),
         (dict(seed=2**64), "seed must lie between"),
+        (dict(rng=-1), "rng must lie between"),
+        (dict(seed=1, rng=np.random.default_rng(1)), "seed and rng are both given"),
         (dict(realisation=-1), "realisations are counted from 0"),
         (dict(realisation=2**31 - 1), "realisations are counted from 0"),
         (dict(h=H[:, :1], reciprocal=True), "reciprocal noise needs square matrices"),
