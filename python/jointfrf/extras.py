@@ -1,12 +1,21 @@
-"""Packages that only some tasks need, and how to install them."""
+"""Packages that only some tasks need, and how to install them; what other packages add, by entry points."""
 
 from __future__ import annotations
 
 import importlib
 import importlib.util
-from typing import Any
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
 
-__all__ = ["MissingPackageError", "check_extras", "extra_of", "import_extra"]
+from jointfrf.errors import FileContentError, first_line
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
+
+__all__ = ["MissingPackageError", "check_extras", "extra_of", "import_extra", "load_plugin", "plugin_call", "plugins"]
+
+_T = TypeVar("_T")
 
 #: What each package is for, and the extra of the installation that brings it.
 _EXTRAS = {
@@ -75,6 +84,51 @@ def check_extras(*packages: str) -> None:
             is_found = False
         if not is_found:
             raise _missing(package)
+
+
+def plugins(group: str) -> list[EntryPoint]:
+    """Return what installed packages add to a group, such as ``jointfrf.formats``; nothing is loaded."""
+    from importlib.metadata import entry_points
+
+    return sorted(entry_points(group=group), key=lambda entry: (entry.name, entry.value))
+
+
+def load_plugin(entry: EntryPoint, is_right: Callable[[Any], bool], what: str) -> Any:
+    """Return what a plugin adds; its package is imported.
+
+    Raises
+    ------
+    FileContentError
+        It cannot be loaded, or is not `what` it must be.
+    """
+    found = plugin_call(entry, lambda: entry.load())
+    if not plugin_call(entry, lambda: is_right(found)):
+        raise FileContentError(f"{_plugin(entry)} is not {what}")
+    return found
+
+
+def plugin_call(entry: EntryPoint, function: Callable[..., _T], *arguments: Any) -> _T:
+    """Call a function of a plugin.
+
+    Raises
+    ------
+    FileContentError
+        It raised an error of its own: none of a file that it was given, none of a missing package.
+    """
+    try:
+        return function(*arguments)
+    except (FileContentError, MissingPackageError, MemoryError):
+        raise
+    except (Exception, SystemExit) as error:  # of code that is not ours: any
+        if isinstance(error, OSError) and arguments:
+            raise
+        where = "".join(f"{one}: " for one in arguments if isinstance(one, Path))
+        why = f"{type(error).__name__}: {first_line(error)}"
+        raise FileContentError(f"{where}{_plugin(entry)} fails: {why}") from error
+
+
+def _plugin(entry: EntryPoint) -> str:
+    return f"the plugin {entry.name!r} ({entry.value}{f' of {entry.dist.name}' if entry.dist else ''})"
 
 
 def extra_of(package: str) -> str:

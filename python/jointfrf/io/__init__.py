@@ -5,7 +5,7 @@ from jointfrf.frf.merge import merge_frfs
 from jointfrf.io.arrays import frfs_of_arrays
 from jointfrf.io.channel_table import read_channel_table
 from jointfrf.io.csv_file import write_csv
-from jointfrf.io.file_format import FrfMapping
+from jointfrf.io.file_format import FileFormat, FrfArrays, FrfMapping
 from jointfrf.io.formats import read_frfs, write_frfs
 from jointfrf.io.hdf5_file import write_hdf5
 from jointfrf.io.npz_file import write_npz
@@ -13,6 +13,8 @@ from jointfrf.io.uff import read_uff, write_uff
 
 __all__ = [
     "Channel",
+    "FileFormat",
+    "FrfArrays",
     "FrfMapping",
     "FrfSet",
     "frfs_of_arrays",

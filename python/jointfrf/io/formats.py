@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
+from functools import partial
 from importlib import import_module
 from os import PathLike
 from pathlib import Path
@@ -13,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from jointfrf.errors import FileContentError
+from jointfrf.extras import MissingPackageError, load_plugin, plugin_call, plugins
 from jointfrf.files import ReadLimit, head_of
 from jointfrf.frf.frf_set import FrfSet
 from jointfrf.frf.merge import merge_frfs
@@ -39,6 +41,8 @@ def _format_of(module: str) -> FileFormat:
 
 #: All formats, in the order in which their marks are looked for.
 FORMATS = tuple(map(_format_of, _MODULES))
+#: Entry points by which other packages add formats; they are looked at where a file is of none of the above.
+_PLUGINS = "jointfrf.formats"
 #: Why a pickle is an error.
 _PICKLE = "is a pickle, which is not read because that can run any program: save an NPZ file"
 #: First bytes of files that are not read, and what the user can do.
@@ -66,10 +70,27 @@ def check_suffix(path: str | PathLike[str]) -> FileFormat:
         The suffix is that of no format that is written.
     """
     written = {suffix: each for each in FORMATS if each.write is not None for suffix in each.suffixes}
-    found = written.get(Path(path).suffix.lower())
+    suffix = Path(path).suffix.lower()
+    if suffix in written:
+        return written[suffix]
+    found, broken = _of_plugin(lambda each: each.write is not None and suffix in each.suffixes)
     if found is None:
-        raise ValueError(f"{path} has no suffix of a format that is written: {', '.join(written)}")
+        raise ValueError(f"{path} has no suffix of a format that is written: {', '.join(written)}{broken}")
     return found
+
+
+def _of_plugin(is_wanted: Callable[[FileFormat], bool]) -> tuple[FileFormat | None, str]:
+    """Return the wanted format of another package, or what is wrong with those that fail, to end a sentence."""
+    broken = ""
+    for entry in plugins(_PLUGINS):
+        try:
+            found = load_plugin(entry, lambda each: isinstance(each, FileFormat), "a jointfrf.io.FileFormat")
+            if plugin_call(entry, lambda found=found: is_wanted(found)):
+                write = found.write and partial(plugin_call, entry, found.write)
+                return replace(found, read=partial(plugin_call, entry, found.read), write=write), ""
+        except (FileContentError, MissingPackageError) as error:
+            broken += f"; {error}"
+    return None, broken
 
 
 def write_frfs(path: str | PathLike[str], frfs: FrfSet) -> None:
@@ -173,18 +194,20 @@ def _read(path: Path, reading: Reading, limit_gb: float | None) -> FrfSet:
     if isinstance(found, FrfArrays):
         found = as_frf_set(found, str(path), reading)
         found = found if reading.nodes is None else found.at_nodes(reading.nodes)
+    if not isinstance(found, FrfSet):  # of a plugin
+        raise FileContentError(f"{path}: its reader returned a {type(found).__name__}, no FrfArrays and no FrfSet")
     return found
 
 
 def _detected(path: Path, head: bytes) -> FileFormat:
-    """Return the format of a file: by a mark in its first bytes; else by its suffix and what it looks like."""
-    marked = next((each for each in FORMATS if each.has_mark(head)), None)
-    if marked is not None:
-        return marked
-    for beginning, sentence in _OTHERS:
-        if head.startswith(beginning):
-            raise FileContentError(f"{path} {sentence}")
-    similar = next((each for each in FORMATS if each.looks_alike(path, head)), None)
-    if similar is None:
-        raise FileContentError(f"{path} is of an unknown format; known are {format_names()}")
-    return similar
+    """Return the format of a file: by a mark in its first bytes; by what it looks like; else that of a plugin."""
+    found, broken = next((each for each in FORMATS if each.has_mark(head)), None), ""
+    refusal = next((sentence for beginning, sentence in _OTHERS if head.startswith(beginning)), "")
+    if found is None and not refusal:
+        found = next((each for each in FORMATS if each.looks_alike(path, head)), None)
+    if found is None:
+        found, broken = _of_plugin(lambda each: each.has_mark(head) or each.looks_alike(path, head))
+    if found is None:
+        refusal = refusal or f"is of an unknown format; known are {format_names()}"
+        raise FileContentError(f"{path} {refusal}{broken}")
+    return found

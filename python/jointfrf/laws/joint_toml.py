@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from msgspec import field
 
 from jointfrf.dofs import UNITS
+from jointfrf.extras import load_plugin, plugins
 from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import FloatArray
 from jointfrf.laws.law import JointLaw, LawField
@@ -19,6 +20,9 @@ from jointfrf.laws.viscoelastic import FractionalZener, PowerLaw, StandardLinear
 from jointfrf.spelling import did_you_mean
 from jointfrf.toml.declared import Keys, NotNegative, key, read_keys
 from jointfrf.toml.table import TomlTable
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
 
 __all__ = [
     "LAW_WORDS",
@@ -36,8 +40,39 @@ __all__ = [
 LAWS: tuple[type[JointLaw], ...] = (SpringLaw, StandardLinearSolid, FractionalZener, PowerLaw)
 #: Laws by their words.
 _BY_WORD = {law.word: law for law in LAWS}
+
+
+def _of_plugin(word: object) -> EntryPoint | None:
+    """Return the entry point of this name by which another package adds a law."""
+    return next((entry for entry in plugins("jointfrf.laws") if entry.name == word), None)
+
+
+class _LawWords(tuple[str, ...]):
+    """Words of our own laws; those of plugins are found in it, too."""
+
+    __slots__ = ()
+
+    def __contains__(self, word: object) -> bool:
+        return super().__contains__(word) or _of_plugin(word) is not None
+
+
 #: Words of laws; a rigid DOF has none.
-LAW_WORDS = (*_BY_WORD, "rigid")
+LAW_WORDS = _LawWords((*_BY_WORD, "rigid"))
+
+
+def _law_of(word: str) -> type[JointLaw]:
+    """Return the law of a word; raises FileContentError where a plugin cannot be used."""
+    if word in _BY_WORD:
+        return _BY_WORD[word]
+    entry = _of_plugin(word)
+    assert entry is not None  # checked where the word was read
+
+    def is_law(found: type[JointLaw]) -> bool:
+        declared = all(isinstance(number, LawField) for number in _numbers(found))
+        return declared and issubclass(found, JointLaw) and found.word == word
+
+    law: type[JointLaw] = load_plugin(entry, is_law, f"a subclass of jointfrf.JointLaw whose word is {word!r}")
+    return law
 
 
 def _numbers(law: type[JointLaw]) -> tuple[LawField, ...]:
@@ -203,16 +238,17 @@ def read_law(table: TomlTable, word: str, *, is_cross: bool = False) -> JointLaw
     table : TomlTable
         Its values are numbers.
     word : str
-        Out of `LAW_WORDS`, not "rigid".
+        In `LAW_WORDS`, not "rigid".
     is_cross : bool
         Whether it couples two DOFs, so that a stiffness may be negative.
 
     Raises
     ------
     FileContentError
-        A parameter that the law does not take, one that is missing, or a value outside its bounds.
+        A parameter that the law does not take, one that is missing, a value outside its bounds, or a plugin that
+        cannot be used.
     """
-    law, given = _BY_WORD[word], table.content
+    law, given = table.build(lambda: _law_of(word)), table.content
     takes = [number.name for number in _numbers(law)]
     for name in given:
         if name not in takes:
@@ -229,13 +265,13 @@ _STARTS = {"stiffness": 1e6, "damping": 10.0, "time": 1e-3, "number": 0.5, "freq
 
 def start_values(word: object) -> dict[str, float]:
     """Return numbers for a law of which none are known, where a fit may start; empty for no such law."""
-    law = _BY_WORD.get(word) if isinstance(word, str) else None
+    law = _law_of(word) if isinstance(word, str) and word in LAW_WORDS and word != "rigid" else None
     return {} if law is None else {one.name: _STARTS[one.kind] for one in _numbers(law) if one.name != "h"}
 
 
 def _law_line(law: JointLaw) -> str:
     """Return word and values of a law as lines of TOML."""
-    if type(law) not in LAWS:
+    if type(law) not in LAWS and not (_of_plugin(law.word) and type(law) is _law_of(law.word)):
         raise ValueError(f"a {type(law).__name__} cannot be written to a file")
     values = ", ".join(f"{name} = {value!r}" for name, value in law.numbers().items())
     return f"law = {json.dumps(law.word)}\nvalues = {{ {values} }}\n"

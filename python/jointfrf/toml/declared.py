@@ -73,7 +73,7 @@ def key(
     **limits
         Of `msgspec.Meta`: ``gt``, ``ge``, ``le``, ``min_length``.
     """
-    facts = {"unit": unit, "takes": takes, "absent": absent, "choice": tuple(choice), "pattern": pattern,
+    facts = {"unit": unit, "takes": takes, "absent": absent, "choice": choice, "pattern": pattern,
             "holds": holds, "example": example}  # fmt: skip
     text = f"{meaning} Unit: {unit}." if unit else meaning
     return msgspec.Meta(description=text, extra={"meaning": meaning, **facts}, **limits)
@@ -154,7 +154,7 @@ class DeclaredKey:
         What its value must be.
     absent : str
         What holds where it is absent; empty if it is required.
-    choice : tuple of str
+    choice : collection of str
     pattern : str
     holds : callable or None
     example, default : object
@@ -169,7 +169,7 @@ class DeclaredKey:
     unit: str
     takes: str
     absent: str
-    choice: tuple[str, ...]
+    choice: Collection[str]
     pattern: str
     holds: Callable[[Any], bool] | None
     example: Any

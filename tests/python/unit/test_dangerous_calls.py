@@ -32,6 +32,7 @@ SAFE = ("allow_pickle", False)
 KNOWN = {
     ("__init__.py", "import_module"): "modules of the package by names that stand in it",
     ("extras.py", "import_module"): "packages out of a list, by their names",
+    ("extras.py", "load"): "what installed packages declare as formats and laws",
     ("cli/parser.py", "import_module"): "subcommands out of a list",
     ("cases/catalogue.py", "import_module"): "kinds of cases out of a list",
     ("cli/completion.py", "import_extra"): "shtab",

@@ -11,24 +11,9 @@ import jointfrf.io
 from command import run_command
 from format_table import filled
 from jointfrf.io.formats import FORMATS, format_names
+from new_kinds import FORMAT
 
 ROOT = Path(__file__).resolve().parents[3]
-FORMAT = """
-import numpy as np
-from jointfrf.files import write_file
-from jointfrf.io.file_format import FileFormat, FrfArrays
-
-def read(path, limit, reading):
-    freq_hz, h = np.loadtxt(path, skiprows=1, unpack=True)
-    return FrfArrays(freq_hz, h[:, None, None], "freq,out,in", ["1:x"], ["1:x"], "receptance", "mm/N")
-
-def write(path, frfs):
-    rows = zip(frfs.freq_hz, 1e3 * frfs.h[:, 0, 0].real)
-    write_file(path, "".join(["two columns\\n", *(f"{f} {h}\\n" for f, h in rows)]))
-
-PAIRS = FileFormat(name="Pairs", suffixes=(".pairs",), content="real FRFs of one point", read=read, write=write,
-                   has_mark=lambda head: head.startswith(b"two columns"), needs="`jointfrf[pairs]`")
-"""
 #: Runs code with a copy of the room of files in the place of the installed one.
 PROGRAM = """
 import sys

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import jointfrf
 from jointfrf import _kernel
+from new_kinds import LAW
 
 PACKAGE = Path(jointfrf.__file__).parent
 
@@ -21,35 +22,6 @@ spec.loader.exec_module(sys.modules["jointfrf._kernel"])
 import jointfrf as jf
 assert jf.__file__.startswith(sys.argv[1])
 """
-
-LAW = '''"""A spring beside a mass-like term."""
-
-from dataclasses import dataclass
-
-import numpy as np
-
-from jointfrf.laws.law import JointLaw, LawField
-
-
-@dataclass(frozen=True)
-class InertialSpring(JointLaw):
-    """K*(w) = k + i h - w^2 m."""
-
-    k: float
-    inertance: float
-
-    word = "inertial-spring"
-    parameters = (
-        LawField("k", "stiffness", 0.0),
-        LawField("inertance", "number", 0.0, 10.0, meaning="Force per relative acceleration."),
-    )
-
-    def stiffness(self, omega):
-        return self.k - omega**2 * self.inertance + 0j
-
-    def slopes(self, omega):
-        return np.array([np.ones_like(omega), -(omega**2)]) + 0j
-'''
 
 USES_LAW = """
 import io, contextlib, pathlib
