@@ -202,6 +202,8 @@ class Reduction:
         Modes of the reduced model.
     error_estimate : float
         Largest difference to a direct solution, relative to the largest entry of its line.
+    checked_hz : ndarray
+        Lines of this comparison, Hz.
     n_vectors : int
         Size of the reduced model.
     attainable : float
@@ -214,6 +216,7 @@ class Reduction:
 
     modes: Modes
     error_estimate: float
+    checked_hz: FloatArray
     n_vectors: int
     attainable: float
     shapes: FloatArray
@@ -352,7 +355,7 @@ class _Reducer:
         if not size:
             empty = np.zeros(0)
             none = Modes(empty, empty, empty, np.zeros((len(self.outputs), 0)), np.zeros((len(self.inputs), 0)), empty)
-            found = Reduction(none, np.inf, size, 0.0, np.zeros((self.matrices.n, 0)), self.solver.used)
+            found = Reduction(none, np.inf, empty, size, 0.0, np.zeros((self.matrices.n, 0)), self.solver.used)
             return found, freq[[freq.size // 2]]
         uncertainty = np.concatenate([rigid.uncertainty, np.zeros(squared.size)])
         squared = np.concatenate([rigid.stiffness, squared])
@@ -371,7 +374,7 @@ class _Reducer:
         error, attainable = spot_error(
             freq[lines], self.matrices, modes, self.outputs, self.inputs, self.rigid, near, self.solver
         )
-        return Reduction(modes, error, size, attainable, shapes, self.solver.used), freq[worst]
+        return Reduction(modes, error, freq[lines], size, attainable, shapes, self.solver.used), freq[worst]
 
     def _worst_lines(self, modes: Modes, shapes: FloatArray) -> NDArray[np.intp]:
         """Lines among candidates in the order of their residual Z x - b, largest first."""

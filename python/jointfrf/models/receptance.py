@@ -68,6 +68,8 @@ class ReceptanceInfo(NamedTuple):
         Modes, or vectors of the reduced model.
     solver : str or None
         What factored sparse matrices, of "sparse" and "krylov": the library and the order of elimination.
+    checked_hz : tuple of float
+        Lines of the error estimate, Hz: between them the error is not bounded.
     """
 
     method: Literal["dense", "banded", "sparse", "modal", "krylov"]
@@ -76,6 +78,7 @@ class ReceptanceInfo(NamedTuple):
     tolerance: float | None = None
     n_vectors: int | None = None
     solver: str | None = None
+    checked_hz: tuple[float, ...] = ()
 
 
 class _Task(NamedTuple):
@@ -297,17 +300,20 @@ def _automatic(task: _Task) -> tuple[ComplexArray, ReceptanceInfo]:
 def _solved(task: _Task, how: Direct, reason: str) -> tuple[ComplexArray, ReceptanceInfo]:
     """Direct solution."""
     freq, to, into = task.freq_hz, task.outputs, task.inputs
-    solver = None
+    solver, weighted = None, to.picked is None or into.picked is None
     if how == "sparse":
         result, status, solver = _solve_sparse(task)
     elif to.picked is not None and into.picked is not None:
         result, status = _solve_stored(task, to.picked, into.picked, how, task.out)
     else:
-        h, status = _solve_stored(task, to.needed, into.needed, how)
-        t_out, t_in = (ports.weights[:, ports.needed - 1].toarray() for ports in (to, into))
-        result = transform(h, t_out, t_in, freq_hz=freq, on_singular=task.on_singular, out=task.out)
+        result, status = _solve_stored(task, to.needed, into.needed, how)
     if status.lowest_rcond < RCOND_LIMIT:
-        check_lines("receptance", _unreliable_lines(task.matrices, freq, status), {}, freq, "nan", RCOND_LIMIT)
+        status = _judged(task.matrices, freq, status)
+        result[status.line_info > 0] = np.nan
+        check_lines("receptance", status, {}, freq, task.on_singular, RCOND_LIMIT)
+    if how != "sparse" and weighted:
+        t_out, t_in = (ports.weights[:, ports.needed - 1].toarray() for ports in (to, into))
+        result = transform(result, t_out, t_in, freq_hz=freq, on_singular=task.on_singular, out=task.out)
     return result, ReceptanceInfo(method=how, reason=reason, solver=solver)
 
 
@@ -378,19 +384,21 @@ def _reciprocal_condition(z: sparse.csc_matrix, factors: Factors) -> float:
     return 1 / size if size > 0 else 0.0
 
 
-def _unreliable_lines(matrices: ModelMatrices, freq: FloatArray, status: LineStatus) -> LineStatus:
-    """Return the status of lines, with a small reciprocal condition only where a direct solution is unreliable.
+def _judged(matrices: ModelMatrices, freq: FloatArray, status: LineStatus) -> LineStatus:
+    """Return the status of lines: singular where nothing holds the structure, and what condition is unreliable.
 
+    Rounding decides whether elimination of a singular matrix meets a zero: rigid motions that nothing resists say it.
     A fine mesh in mixed units has rcond 1e-13 and still gives nine digits: such a line is unreliable if it is singular
     to working precision, or if rounding of K hides what holds the structure as a whole.
     """
-    rcond = np.where(status.rcond < SINGULAR, status.rcond, 1.0)
-    poor = (status.rcond < RCOND_LIMIT) & (status.rcond >= SINGULAR)
+    rcond, info = np.where(status.rcond < SINGULAR, status.rcond, 1.0), status.line_info.copy()
+    poor = status.rcond < RCOND_LIMIT
     if poor.any() and matrices.have_real_modes:
         rigid = find_rigid_modes(matrices.operand("stiffness"), matrices.operand("mass"))
         left = rigid.dynamic_stiffness(matrices, 2 * np.pi * freq[poor])
-        rcond[poor] = mode_condition(left, rigid.uncertainty)
-    return LineStatus(status.line_info, rcond)
+        info[poor] = np.where((info[poor] == 0) & (left == 0).any(axis=1), 1, info[poor])
+        rcond[poor] = np.minimum(rcond[poor], mode_condition(left, rigid.uncertainty))
+    return LineStatus(info, rcond)
 
 
 def _fallen_back(task: _Task, error: float, n_vectors: int, what: str) -> tuple[ComplexArray, ReceptanceInfo]:
@@ -409,8 +417,9 @@ def _summed(task: _Task, reason: str) -> tuple[ComplexArray, ReceptanceInfo]:
         return _solved(task, _direct(task.matrices), str(cause).split(":")[0])
     order = np.argsort(task.freq_hz)
     lines = order[np.linspace(0, order.size - 1, _SPOTS).astype(int)]
-    error, attainable = spot_error(task.freq_hz[lines], task.matrices, modes, task.outputs, task.inputs, rigid)
-    return _finished(task, modes, error, attainable, "modal", reason)
+    spots = np.unique(task.freq_hz[lines])
+    error, attainable = spot_error(spots, task.matrices, modes, task.outputs, task.inputs, rigid)
+    return _finished(task, modes, (error, spots), attainable, "modal", reason)
 
 
 def _reduced(task: _Task, reason: str) -> tuple[ComplexArray, ReceptanceInfo]:
@@ -418,18 +427,30 @@ def _reduced(task: _Task, reason: str) -> tuple[ComplexArray, ReceptanceInfo]:
     if task.is_empty:
         return _solved(task, _direct(task.matrices), "no lines, or no DOFs with a weight")
     found = reduce_model(task.freq_hz, task.matrices, task.outputs, task.inputs, task.tolerance)
-    result, made = _finished(task, found.modes, found.error_estimate, found.attainable, "krylov", reason)
+    result, made = _finished(
+        task, found.modes, (found.error_estimate, found.checked_hz), found.attainable, "krylov", reason
+    )
     return result, made._replace(solver=found.solver) if made.method == "krylov" else made
 
 
 def _finished(
-    task: _Task, modes: Modes, error: float, attainable: float, method: Literal["modal", "krylov"], reason: str
+    task: _Task,
+    modes: Modes,
+    found: tuple[float, FloatArray],
+    attainable: float,
+    method: Literal["modal", "krylov"],
+    reason: str,
 ) -> tuple[ComplexArray, ReceptanceInfo]:
-    """Sum of modes, or a direct solution where its error is too large."""
-    n_vectors = modes.stiffness.size
+    """Sum of modes, or a direct solution where its error, found at some lines, is too large."""
+    n_vectors, (error, checked_hz) = modes.stiffness.size, found
     if not error <= max(task.tolerance, attainable):
         return _fallen_back(task, error, n_vectors, "a sum of modes" if method == "modal" else "a reduced model")
     result = modes.receptance(task.freq_hz, task.on_singular, task.out)
     return result, ReceptanceInfo(
-        method=method, reason=reason, error_estimate=error, tolerance=task.tolerance, n_vectors=n_vectors
+        method=method,
+        reason=reason,
+        error_estimate=error,
+        checked_hz=tuple(checked_hz.tolist()),
+        tolerance=task.tolerance,
+        n_vectors=n_vectors,
     )
