@@ -9,7 +9,7 @@ from typing import Annotated
 
 import numpy as np
 
-from jointfrf.cases.keys import read_frf_file
+from jointfrf.cases.keys import MAP, read_frf_file
 from jointfrf.cases.structure import Structure, SubstructureKeys
 from jointfrf.dofs import direction_names
 from jointfrf.io.fe.nodes import read_dof_names, read_nodes
@@ -95,6 +95,7 @@ class ModesKeys(SubstructureKeys, tag="modes"):
         key("FRFs of the part by themselves, from which residuals of modes below and above the band are fitted, pair "
             "by pair.", takes="name of a file of FRFs", absent="those of the file, or none"),
     ] = None  # fmt: skip
+    map: Annotated[dict[str, str], MAP] = field(default_factory=dict)
     damping_ratio: Annotated[
         float, key("Damping ratio of modes for which the file has none, as those of FE programs.", ge=0, le=0.99)
     ] = 0.0
@@ -140,7 +141,7 @@ class ModesKeys(SubstructureKeys, tag="modes"):
 
     def _with_residuals(self, whole: ModalStructure) -> tuple[ModalFrfs, list[str]]:
         """Return the modes with residuals of measured FRFs, and what these cover."""
-        frfs = read_frf_file(self, "residuals")
+        frfs = read_frf_file(self, "residuals", mapping=self.map)
         held = [[_named(f"{one.node}:{one.axis}") for one in own] for own in (frfs.responses, frfs.excitations)]
         names = [dof for dof in dict.fromkeys([*held[0], *held[1]]) if dof in whole.modes.dofs]
         h = np.full((frfs.freq_hz.size, len(names), len(names)), np.nan + 0j)

@@ -26,6 +26,7 @@ from jointfrf.toml.declared import Bands, Keys, NotNegative, Positive, key
 __all__ = [
     "FITTED",
     "LIKE_DOFS",
+    "MAP",
     "METHODS",
     "MOST_LINES",
     "BandKeys",
@@ -61,6 +62,14 @@ LIKE_DOFS = "list of texts, as many as joint DOFs"
 _HIGH_LEVEL = 0.5
 
 
+#: Which field of a file of FRFs is what, as `--map` says on the command line.
+MAP = key(
+    'Which field of a MATLAB, NPZ or HDF5 file of FRFs is what: `{ h = "test.A", axes = "out,in,freq" }`.',
+    takes="table of names",
+    absent="by the usual names",
+)
+
+
 class FrequencyKeys(Keys):
     """Frequency lines: evenly spaced, or those of a file of FRFs."""
 
@@ -82,6 +91,7 @@ class FrequencyKeys(Keys):
     from_file: Annotated[
         str | None, key("Take the lines of the FRFs in this file.", takes="name of a file of FRFs", absent="not used")
     ] = None
+    map: Annotated[dict[str, str], MAP] = field(default_factory=dict)
 
     def lines(self) -> FloatArray:
         """Return the frequency lines, Hz; raises FileContentError."""
@@ -104,7 +114,7 @@ class FrequencyKeys(Keys):
     def _lines_of_file(self) -> FloatArray:
         if self.step is not None:
             raise self.wrong("step", "the lines are those of the file that from_file names")
-        held = read_frf_file(self, "from_file").freq_hz
+        held = read_frf_file(self, "from_file", mapping=self.map).freq_hz
         low, high = self.first or 0.0, np.inf if self.last is None else self.last
         lines = held[(held >= low) & (held <= high)]
         if not lines.size:
@@ -365,10 +375,17 @@ def constant_joint(theta: FloatArray, freq_hz: FloatArray) -> ComplexArray:
     return diagonal[..., None] * np.eye(n)
 
 
-def read_frf_file(keys: Keys, name: str, quantity: str | None = None, *, force_quantity: bool = False) -> FrfSet:
+def read_frf_file(
+    keys: Keys,
+    name: str,
+    quantity: str | None = None,
+    *,
+    force_quantity: bool = False,
+    mapping: Mapping[str, str] | None = None,
+) -> FrfSet:
     """Read the receptances of a file that a key names; a line at 0 Hz that they do not have is left out."""
     path = keys.file_of(name)
-    frfs = keys.build(lambda: read_frfs(path, quantity=quantity, force_quantity=force_quantity), name)
+    frfs = keys.build(lambda: read_frfs(path, quantity=quantity, force_quantity=force_quantity, mapping=mapping), name)
     with warnings.catch_warnings():
         # No case has a line at 0 Hz.
         warnings.simplefilter("ignore", FileContentWarning)

@@ -14,6 +14,10 @@ from jointfrf.cli.usage import Output
 __all__ = ["add_arguments", "check_joint", "run"]
 
 
+#: Options that say which joint is in the file.
+_OF_JOINT = ("j", "k", "dofs", "at", "at_k", "channels", "spacing", "axis")
+
+
 def add_arguments(parser: CommandParser) -> None:
     """Describe the arguments of the command."""
     parser.description = (
@@ -42,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
     frfs = measured.receptance()
     out.say(frfs.summary(), "")
     joint = None
-    if any(word is not None for word in (args.j, args.k, args.dofs, args.at, args.channels)):
+    if any(getattr(args, name) is not None for name in _OF_JOINT):
         joint = measured_joint(args, frfs, is_look=True)
         check = check_joint(joint, measured.quantity)
         warned = [*joint.warnings(check)]

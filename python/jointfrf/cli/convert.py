@@ -6,16 +6,13 @@ import argparse
 from pathlib import Path
 
 from jointfrf.cli.frf import check_target
-from jointfrf.cli.measured_file import add_quantity_arguments, nodes, parse_band
+from jointfrf.cli.measured_file import add_reading_arguments, nodes, parse_band, reading_options
 from jointfrf.cli.parser import CommandParser
 from jointfrf.cli.usage import Output, UsageError
 from jointfrf.io import FrfSet, read_frfs, write_frfs
 from jointfrf.io.formats import format_names
 
 __all__ = ["add_arguments", "run"]
-
-#: Options that say which field of a file is what.
-_FIELDS = ("freq_hz", "h", "responses", "excitations", "axes", "quantity", "unit", "coherence", "averages")
 
 
 def add_arguments(parser: CommandParser) -> None:
@@ -26,25 +23,10 @@ def add_arguments(parser: CommandParser) -> None:
         "all files."
     )
     parser.add_argument("files", nargs="+", type=Path, metavar="IN", help="files to read, and last the one to write")
-    add_quantity_arguments(parser)
-    parser.option(
-        "--map FIELD=NAME",
-        f"which field of a MATLAB, NPZ or HDF5 file is what: {', '.join(_FIELDS)}; channels also as names "
-        "(responses=1:x,2:x), axes as freq,out,in in their order; may be repeated",
-        _field,
-        [],
-        repeated=True,
-    )
+    add_reading_arguments(parser)
     parser.option("--nodes NODES", "only FRFs between these nodes: 102,104", nodes)
     parser.option("--band LOW:HIGH", "only the lines in this band in Hz", parse_band)
     parser.option("--averages N", "number of averages, where the files do not say it", float)
-
-
-def _field(text: str) -> tuple[str, str]:
-    field, equals, name = text.partition("=")
-    if not equals or field not in _FIELDS or not name:
-        raise argparse.ArgumentTypeError(f"{text!r} is not like FIELD=NAME with a field out of {', '.join(_FIELDS)}")
-    return field, name
 
 
 def run(args: argparse.Namespace) -> int:
@@ -57,10 +39,8 @@ def run(args: argparse.Namespace) -> int:
         raise UsageError(f"{target} is one of the files to read")
     frfs = read_frfs(
         *sources,
-        quantity=args.quantity,
-        force_quantity=args.force_quantity,
+        **reading_options(args),
         nodes=None if args.nodes is None else args.nodes.numbers,
-        mapping=dict(args.map),
         averages=args.averages,
     )
     if args.band is not None:

@@ -14,13 +14,14 @@ from jointfrf.cli.frf import (
     CHANNEL_DIRECTIONS,
     add_line_arguments,
     check_target,
+    is_model,
     lines_of,
     own_matrix,
     read_structures,
 )
-from jointfrf.cli.measured_file import Nodes, add_quantity_arguments, nodes, point
+from jointfrf.cli.measured_file import READING, Nodes, add_reading_arguments, nodes, point, reading_options
 from jointfrf.cli.parser import CommandParser
-from jointfrf.cli.usage import Output, UsageError, waiting
+from jointfrf.cli.usage import Output, UsageError, waiting, warn_of_ignored
 from jointfrf.dofs import direction_places
 from jointfrf.errors import FileContentError
 from jointfrf.identification.joint_file import read_joint_file
@@ -45,7 +46,7 @@ def add_arguments(parser: CommandParser) -> None:
     add_joint_arguments(parser)
     parser.option("--output FILE", f"file to write: {format_names(written=True)}", Path)
     add_line_arguments(parser)
-    add_quantity_arguments(parser)
+    add_reading_arguments(parser)
 
 
 def add_joint_arguments(parser: CommandParser) -> None:
@@ -86,8 +87,9 @@ def run(args: argparse.Namespace) -> int:
             raise UsageError(f"{name} is missing: jointfrf couple A B --joint FILE --j NODE --k NODE --output FILE")
     check_target(args.output)
     found = read_joint_file(args.joint)
-    options = {"quantity": args.quantity, "force_quantity": args.force_quantity}
-    a, b = read_structures([args.a, args.b], lines_of(args), **options)
+    a, b = read_structures([args.a, args.b], lines_of(args), **reading_options(args))
+    if is_model(args.a) and is_model(args.b):
+        warn_of_ignored(args, READING, "both substructures are models")
     if args.band is not None:
         a, b = a.select(args.band), b.select(args.band)
     b = renumbered(b, args.renumber_b, args.shift_b)

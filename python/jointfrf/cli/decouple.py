@@ -13,15 +13,16 @@ from jointfrf.cli.couple import joint_channels_of, renumbered, shifted
 from jointfrf.cli.frf import own_matrix, read_structures
 from jointfrf.cli.measured_file import (
     Nodes,
-    add_quantity_arguments,
+    add_reading_arguments,
     joint_dofs,
     nodes,
     parse_band,
+    reading_options,
     shown_nodes,
     words,
 )
 from jointfrf.cli.parser import CommandParser
-from jointfrf.cli.usage import Output, UsageError, check_folder, waiting
+from jointfrf.cli.usage import Output, UsageError, check_folder, waiting, warn_of_ignored
 from jointfrf.errors import FileContentError, IdentificationWarning
 from jointfrf.files import write_file
 from jointfrf.identification.band_means import identify_band_mean
@@ -76,7 +77,7 @@ def add_arguments(parser: CommandParser) -> None:
     parser.option("--band LOW:HIGH", "sensitive band in Hz; may be repeated", parse_band, repeated=True)
     parser.option("--save FILE", "keep the joint in a JSON file", Path)
     parser.option("--output FILE", "K* of each line as a CSV file", Path)
-    add_quantity_arguments(parser)
+    add_reading_arguments(parser)
 
 
 @dataclass(frozen=True)
@@ -94,13 +95,13 @@ def run(args: argparse.Namespace) -> int:
     _check(args)
     check_folder("--save", args.save)
     check_folder("--output", args.output)
-    a, b, assembly = read_structures(
-        [args.a, args.b, args.assembly], None, quantity=args.quantity, force_quantity=args.force_quantity
-    )
+    a, b, assembly = read_structures([args.a, args.b, args.assembly], None, **reading_options(args))
     b = renumbered(b, args.renumber_b)
     k = shifted(args.k, args.renumber_b)
     s = None if args.s is None else [Channel(c.node + args.renumber_b, c.direction) for c in args.s]
     at = {"r": args.r, "s": s}
+    unused = [f"--{point}" for point in ("r", "s") if point not in args.equation]
+    warn_of_ignored(args, unused, f"equation {args.equation} does not use it")
     side_a = _side(a, args.j, args.dofs, args.r)
     side_b = _side(b, k, args.dofs, s)
     measured = assembly.matrix(at[args.equation[0]], at[args.equation[1]])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import re
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -13,11 +14,12 @@ import numpy as np
 
 from jointfrf.cases.keys import MOST_LINES
 from jointfrf.cases.substructures import ModelStructure, read_model
-from jointfrf.cli.measured_file import parse_band, words
+from jointfrf.cli.measured_file import READING, add_reading_arguments, parse_band, reading_options, words
 from jointfrf.cli.parser import CommandParser
-from jointfrf.cli.usage import Output, UsageError, complain, waiting
+from jointfrf.cli.usage import OptionWarning, Output, UsageError, waiting, warn_of_ignored
 from jointfrf.dofs import DIRECTIONS, direction_places
 from jointfrf.errors import FileContentError
+from jointfrf.extras import check_extras
 from jointfrf.frf.merge import same_lines
 from jointfrf.io import Channel, FrfSet, read_frfs, write_frfs
 from jointfrf.io.formats import check_suffix, format_names
@@ -57,6 +59,8 @@ def add_arguments(parser: CommandParser) -> None:
         parser.option(f"--{name.replace('_', '-')} FILE", what)
     parser.option("--loss-factor ETA", "loss factor of the stiffness (0)", float)
     parser.option("--dof-names FILE", "text file, one DOF a line: 12:y, or 12 2")
+    parser.heading("the file of --lines-of")
+    add_reading_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -70,8 +74,10 @@ def run(args: argparse.Namespace) -> int:
     if args.lines_of is not None:
         if freq_hz is not None:
             raise UsageError("--lines-of and --step both name lines: leave one out")
-        held = read_frfs(args.lines_of)
+        held = read_frfs(args.lines_of, **reading_options(args))
         freq_hz = (held if args.band is None else held.select(args.band)).freq_hz
+    else:
+        warn_of_ignored(args, READING, "no file of FRFs is read, which --lines-of names")
     if freq_hz is None:
         raise UsageError("frequency lines are missing: --band LOW:HIGH --step HZ, or --lines-of FILE")
     source = str(args.model or args.stiffness)
@@ -125,14 +131,20 @@ def check_target(target: Path) -> None:
     Raises
     ------
     UsageError
-        Its suffix is that of no format, or there is no such folder.
+        Its suffix is that of no format, there is no such folder, or it is one.
+    MissingPackageError
+        A package for the format is not installed.
     """
     try:
-        check_suffix(target)
+        needed = check_suffix(target).package
     except ValueError as error:
         raise UsageError(error) from error
     if not target.parent.is_dir():
         raise UsageError(f"there is no folder {target.parent}")
+    if target.is_dir():
+        raise UsageError(f"{target} is a folder, not a file")
+    if needed:
+        check_extras(needed)
 
 
 def add_line_arguments(parser: CommandParser) -> None:
@@ -238,7 +250,8 @@ def read_structures(paths: Sequence[Path], freq_hz: FloatArray | None, **options
             if not same_lines(first.freq_hz, each.freq_hz):
                 raise FileContentError(f"{first.source} and {each.source} have different frequency lines")
         if freq_hz is not None:
-            complain("warning", f"--step has no effect: {first.source} has frequency lines of its own")
+            why = f"{first.source} has frequency lines of its own"
+            warnings.warn(f"--step has no effect: {why}", OptionWarning, stacklevel=2)
         freq_hz = first.freq_hz
     if freq_hz is None:
         raise UsageError("models need frequency lines: --band LOW:HIGH --step HZ")

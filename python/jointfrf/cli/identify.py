@@ -28,7 +28,7 @@ from jointfrf.cli.measured_file import (
 )
 from jointfrf.cli.measured_joint import MeasuredJoint, measured_joint
 from jointfrf.cli.parser import CommandParser
-from jointfrf.cli.usage import Output, UsageError, check_folder, plain, waiting, warn_of_ignored
+from jointfrf.cli.usage import Output, UsageError, check_folder, check_out, plain, waiting, warn_of_ignored
 from jointfrf.dofs import is_rotation
 from jointfrf.errors import ConvergenceWarning, FrfCheckWarning, IdentificationWarning
 from jointfrf.extras import check_extras
@@ -117,16 +117,22 @@ def run(args: argparse.Namespace) -> int:
     """Carry out the command; the caller turns exceptions into messages."""
     if args.out is not None:
         check_extras("matplotlib")
+        check_out("--out", args.out)
     if args.report is not None:
         check_extras("jinja2")
         if "compliance" not in args.method:
             raise UsageError("--report is of method compliance: name it among the methods")
+        check_out("--report", args.report.parent)
+        if args.report.is_dir():
+            raise UsageError(f"--report: {args.report} is a folder, not a file")
     check_folder("--save", args.save)
     if args.model is not None:
         return run_model(args)
     if args.each:
         raise UsageError("--each is for tests with --model: name the file of the assembly")
     out = Output(args)
+    if args.save is None:
+        warn_of_ignored(args, ("--save-lines",), "it is for --save")
     measured = read_measured(args)
     frfs = measured.receptance()
     joint = measured_joint(args, frfs, args.bending_stiffness)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import csv
 import io
+import time
 import warnings
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -17,7 +18,7 @@ from jointfrf.channels.check.check import check_frfs, warn_of_frfs
 from jointfrf.cli.export import CardRequest, card_request, written_cards
 from jointfrf.cli.measured_file import file_names, read_receptances
 from jointfrf.cli.parser import CommandParser
-from jointfrf.cli.usage import Output, UsageError, complain, waiting
+from jointfrf.cli.usage import Output, UsageError, complain, time_left, waiting
 from jointfrf.errors import ConvergenceWarning, FileContentError, IdentificationWarning
 from jointfrf.files import write_file
 from jointfrf.identification.record import fit_to_dict, write_record
@@ -33,7 +34,8 @@ __all__ = ["add_model_arguments", "run_model"]
 _OF_THE_JOINT = (
     ("--j", "j"), ("--k", "k"), ("--dofs", "dofs"), ("--at", "at"), ("--at-k", "at_k"), ("--channels", "channels"),
     ("--spacing", "spacing"), ("--axis", "axis"), ("--law", "law"), ("--joint", "joint"),
-    ("--bending-stiffness", "bending_stiffness"),
+    ("--bending-stiffness", "bending_stiffness"), ("--side-j", "side_j"), ("--side-k", "side_k"),
+    ("--window-decay", "window_decay"),
 )  # fmt: skip
 #: Characters of a line of the table of several tests.
 _WIDTH = 100
@@ -63,8 +65,11 @@ def run_model(args: argparse.Namespace) -> int:
     stems = _stems(args.files) if args.each else [""]
     fits: dict[str, Fit] = {}
     contents, failed, written = [], 0, []
-    for files, stem in zip(tests, stems, strict=True):
+    start = time.monotonic()
+    for done, (files, stem) in enumerate(zip(tests, stems, strict=True)):
         own = _for_one(args, files, stem)
+        if args.each:
+            own.turn = f" ({done + 1} of {len(tests)}{time_left(time.monotonic() - start, done, len(tests))})"
         try:
             fit, content, paths = _one(own, out)
         except (FileContentError, OSError, ValueError) as error:
@@ -77,7 +82,9 @@ def run_model(args: argparse.Namespace) -> int:
         written += paths
         contents.append(content)
     if args.each and fits:
-        out.say(*_table(fits), *_findings(fits))
+        found = [f"{stem}: {text}" for stem, fit in fits.items() for text in fit.warnings]
+        out.say(*_table(fits), *(f"warning: {text}" for text in found))
+        out.warn(*found)
         if args.out is not None:
             path = args.out / "parameters.csv"
             write_file(path, _csv(fits))
@@ -134,7 +141,7 @@ def _one(args: argparse.Namespace, out: Output) -> tuple[Fit, dict[str, Any], li
     _look_at(measured)
     if not args.each:
         out.say(*_heading(args, measured))
-    with waiting(f"fit of {file_names(args)}"), warnings.catch_warnings():
+    with waiting(f"fit of {file_names(args)}{getattr(args, 'turn', '')}"), warnings.catch_warnings():
         warnings.simplefilter("ignore", IdentificationWarning)  # they stand in the table
         warnings.simplefilter("ignore", ConvergenceWarning)
         fit = measured.fit(noise=args.noise)
@@ -273,13 +280,6 @@ def _cell(value: float, low: float, high: float) -> str:
         return f"{value:.5g}"
     digits = int(np.floor(np.log10(abs(value)))) - int(np.floor(np.log10(half))) + 2 if value else 2
     return f"{value:.{min(max(digits, 4), 9)}g} +- {half:.2g}"
-
-
-def _findings(fits: dict[str, Fit]) -> Iterator[str]:
-    """Name warnings of each test."""
-    for stem, fit in fits.items():
-        for text in fit.warnings:
-            yield f"warning: {stem}: {text}"
 
 
 def _csv(fits: dict[str, Fit]) -> str:

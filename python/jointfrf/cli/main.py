@@ -15,7 +15,7 @@ from typing import Any, TextIO, cast
 
 from jointfrf.cli.configuration import with_configuration
 from jointfrf.cli.parser import COMMANDS, command_parser, top_parser
-from jointfrf.cli.usage import UsageError, complain
+from jointfrf.cli.usage import OptionWarning, UsageError, complain
 from jointfrf.extras import MissingPackageError
 from jointfrf.spelling import did_you_mean
 
@@ -78,8 +78,15 @@ def _run(words: list[str]) -> int:
     parser = command_parser(name)
     args = parser.parse_words(words[1:])
     args.typed = shlex.join(["jointfrf", *words])
+    args.warned = []
+
+    def show(message: Warning | str, *_: Any, **__: Any) -> None:
+        args.warned.append(str(message))
+        complain("warning", message)
+
     with warnings.catch_warnings(), _limited(args.limit_gb):
-        warnings.showwarning = _show_warning
+        warnings.simplefilter("always", OptionWarning)
+        warnings.showwarning = show
         status: int = args.action(with_configuration(args, parser, name))
         return status
 
@@ -100,10 +107,6 @@ def _limited(limit_gb: float | None) -> Iterator[None]:
         del os.environ[LIMIT_VARIABLE]
         if before is not None:
             os.environ[LIMIT_VARIABLE] = before
-
-
-def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
-    complain("warning", message)
 
 
 if __name__ == "__main__":

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterable
+from dataclasses import fields
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,14 +16,17 @@ from jointfrf.dofs import direction_names
 from jointfrf.errors import FileContentError
 from jointfrf.frf.bands import in_bands
 from jointfrf.io import FrfSet, read_frfs
+from jointfrf.io.file_format import FrfMapping
 from jointfrf.io.formats import format_names
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
+from jointfrf.spelling import did_you_mean
 
 __all__ = [
+    "READING",
     "Nodes",
     "add_file_arguments",
     "add_joint_arguments",
-    "add_quantity_arguments",
+    "add_reading_arguments",
     "file_names",
     "in_some_band",
     "joint_dofs",
@@ -32,12 +36,17 @@ __all__ = [
     "point",
     "read_measured",
     "read_receptances",
+    "reading_options",
     "shown_nodes",
     "words",
 ]
 
 #: Longer ranges of nodes are slips.
 _MOST_NODES = 100_000
+#: Options that say what the FRFs of files are, and where they stand in them.
+READING = ("--quantity", "--force-quantity", "--map")
+#: What --map may name.
+_FIELDS = tuple(field.name for field in fields(FrfMapping))
 #: Nodes that a message lists.
 _NODES_SHOWN = 40
 
@@ -187,22 +196,45 @@ def add_joint_arguments(parser: CommandParser) -> None:
     )
     parser.option("--axis", "direction of the line of nodes, with --spacing", ("x", "y", "z"))
     parser.option("--band LOW:HIGH", "frequency band in Hz; may be repeated", parse_band, repeated=True)
-    add_quantity_arguments(parser)
+    add_reading_arguments(parser)
 
 
-def add_quantity_arguments(parser: CommandParser) -> None:
-    """Describe the options that say what the FRFs of a file are."""
+def add_reading_arguments(parser: CommandParser) -> None:
+    """Describe the options that say what the FRFs of files are, and where they stand in them."""
     parser.option(
         "--quantity", "what the FRFs are, where the file does not say", ("receptance", "mobility", "accelerance")
     )
     parser.option("--force-quantity", "take --quantity also where the file says something else")
+    parser.option(
+        "--map FIELD=NAME",
+        f"which field of a MATLAB, NPZ or HDF5 file is what: {', '.join(_FIELDS)}; responses and excitations also as "
+        "names (responses=1:x,2:x), axes as freq,out,in in their order; may be repeated",
+        _field,
+        repeated=True,
+    )
+
+
+def _field(text: str) -> tuple[str, str]:
+    field, equals, name = text.partition("=")
+    if not equals or field not in _FIELDS or not name:
+        hint = did_you_mean(field, _FIELDS) if equals else ""
+        raise argparse.ArgumentTypeError(f"{text!r} is not FIELD=NAME with a field out of {', '.join(_FIELDS)}{hint}")
+    return field, name
+
+
+def reading_options(args: argparse.Namespace) -> dict[str, Any]:
+    """Return what the command line says of the files, as `jointfrf.io.read_frfs` takes it."""
+    if args.force_quantity and args.quantity is None:
+        raise UsageError("--force-quantity needs --quantity")
+    mapping = dict(args.map or ())
+    if len(mapping) < len(args.map or ()):
+        raise UsageError("--map names a field twice")
+    return {"quantity": args.quantity, "force_quantity": args.force_quantity, "mapping": mapping}
 
 
 def read_measured(args: argparse.Namespace) -> FrfSet:
     """Read the files as what they say, or the command line says, that they hold."""
-    if args.force_quantity and args.quantity is None:
-        raise UsageError("--force-quantity needs --quantity")
-    return read_frfs(*args.files, quantity=args.quantity, force_quantity=args.force_quantity)
+    return read_frfs(*args.files, **reading_options(args))
 
 
 def read_receptances(args: argparse.Namespace) -> FrfSet:

@@ -16,9 +16,10 @@ from jointfrf.cases.known_joint.keys import KnownJointCase
 from jointfrf.cases.substructures import MeasuredStructure, ModelStructure
 from jointfrf.cli.frf import add_line_arguments, lines_of
 from jointfrf.cli.parser import CommandParser
-from jointfrf.cli.usage import Output, UsageError, check_folder, waiting
+from jointfrf.cli.usage import Output, UsageError, check_folder, waiting, warn_of_ignored
 from jointfrf.dofs import is_rotation
 from jointfrf.errors import FileContentError
+from jointfrf.extras import check_extras
 from jointfrf.kernel.arguments import FloatArray
 from jointfrf.planning.assemblies import assemblies_needed
 from jointfrf.planning.joint_frfs import plan_joint_frfs
@@ -103,6 +104,8 @@ def run(args: argparse.Namespace) -> int:
     """Carry out the command; the caller turns exceptions into messages."""
     out = Output(args)
     check_folder("--report", args.report)
+    if args.report is not None:
+        check_extras("jinja2")
     if (args.spread is None) != (args.next is None):
         raise UsageError("--spread and --next belong together: --spread 0.1 --next 0.3")
     freq = lines_of(args)
@@ -120,6 +123,8 @@ def run(args: argparse.Namespace) -> int:
     kept = [one or [] for one in named[2:]]
     for name, dofs in (("--sensors", chosen[0] + kept[0]), ("--hits", chosen[1] + kept[1])):
         check_dofs(parts, file.keys, name, dofs)
+    if args.sensors is not None and args.hits is not None:
+        warn_of_ignored(args, ("--candidates",), "--sensors and --hits name them")
     used = list(dict.fromkeys(dof for own in (*chosen, *kept) for dof in own))
     with waiting(f"plan of {args.model.name}"):
         found = plan(

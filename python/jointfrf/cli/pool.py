@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from jointfrf.cli.parser import CommandParser
-from jointfrf.cli.usage import Output, UsageError, check_folder
+from jointfrf.cli.usage import Output, UsageError, check_folder, warn_of_ignored
 from jointfrf.errors import FileContentError
+from jointfrf.extras import check_extras
 from jointfrf.files import write_file
 from jointfrf.identification.record import load
 from jointfrf.identification.result import Fit
@@ -104,14 +105,19 @@ def run(args: argparse.Namespace) -> int:
     out = Output(args)
     for option, path in (("--report", args.report), ("--output", args.output)):
         check_folder(option, path)
+    if args.report is not None:
+        check_extras("jinja2")
     files, labels, factors = _tests(args)
     fits = [load(path) for path in files]
     sources = [str(path) for path in files]
     if args.transfer:
+        of_pool = ("--factor", "--trend", "--common", "--probability", "--report", "--output")
+        warn_of_ignored(args, of_pool, "it is of the pool, and --transfer only tests")
         compared = _transferred(args, fits, labels)
         out.say(compared)
         out.give({"sources": sources, "transfer": asdict(compared)})
         return 0
+    warn_of_ignored(args, ("--spread",), "it is of --transfer")
     pooled = _pooled(args, fits, labels, factors)
     written = []
     if args.report is not None:

@@ -17,7 +17,7 @@ from jointfrf.cases.catalogue import UnknownCaseError, find_case, list_cases, ru
 from jointfrf.cases.keys import Case
 from jointfrf.cases.workers import Workers, started_workers
 from jointfrf.cli.parser import CommandParser
-from jointfrf.cli.usage import Output, UsageError, positive, progress
+from jointfrf.cli.usage import Output, UsageError, check_out, positive, progress
 from jointfrf.extras import check_extras
 from jointfrf.parallel.pool import available_cores
 from jointfrf.report.table import Table, as_text
@@ -40,6 +40,7 @@ def add_arguments(parser: CommandParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Carry out the command."""
     check_extras("matplotlib", "jinja2")
+    check_out("--out", options.out)
     try:
         folders = [find_case(word).resolve() for word in options.cases] or list_cases()
     except UnknownCaseError as error:

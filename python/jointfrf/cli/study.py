@@ -10,7 +10,7 @@ from typing import Any, get_args
 
 from jointfrf.cases.catalogue import UnknownCaseError
 from jointfrf.cli.parser import CommandParser
-from jointfrf.cli.usage import Output, UsageError, positive, progress
+from jointfrf.cli.usage import Output, UsageError, check_out, positive, progress, warn_of_ignored
 from jointfrf.extras import check_extras, import_extra
 from jointfrf.parallel.pool import AnyExecutor, available_cores, check_processes, safe_environment
 from jointfrf.studies.design import Arrangement, StudyDesign, parse_factor
@@ -19,6 +19,11 @@ from jointfrf.studies.run import merge_studies, study
 
 __all__ = ["add_arguments", "run"]
 
+#: Options that merge does not use.
+_OF_COMPUTING = (
+    "--realisations", "--factor", "--arrangement", "--estimator", "--noise", "--first", "--count", "--jobs",
+    "--executor",
+)  # fmt: skip
 #: What --executor takes.
 _EXECUTORS = ("processes", "threads", "loky", "mpi", "dask:ADDRESS")
 
@@ -78,9 +83,11 @@ def _format(word: str) -> str:
 def run(options: argparse.Namespace) -> int:
     """Carry out the command."""
     check_extras("matplotlib", "jinja2", *(["pyarrow"] if "parquet" in options.values else []))
+    check_out("--out", options.out)
     out = Output(options)
-    is_part = options.first is not None or options.count is not None
-    found = _merged(options) if options.words[0] == "merge" else _studied(options, is_part)
+    is_merge = options.words[0] == "merge"
+    is_part = not is_merge and (options.first is not None or options.count is not None)
+    found = _merged(options) if is_merge else _studied(options, is_part)
     if is_part:
         own = _range(options)
         out.say(
@@ -99,6 +106,7 @@ def run(options: argparse.Namespace) -> int:
 def _merged(options: argparse.Namespace) -> StudyResult:
     if len(options.words) < 2 or options.out is None:
         raise UsageError("merge needs the folders of parts, and --out DIR")
+    warn_of_ignored(options, _OF_COMPUTING, "merge computes nothing")
     return merge_studies(options.words[1:], options.out)
 
 

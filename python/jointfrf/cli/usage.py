@@ -5,9 +5,11 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import re
 import sys
 import threading
 import time
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -16,13 +18,17 @@ from typing import Any
 from jointfrf.spelling import visible
 
 __all__ = [
+    "OptionWarning",
     "Output",
     "UsageError",
     "check_folder",
+    "check_out",
     "complain",
+    "in_options",
     "plain",
     "positive",
     "progress",
+    "time_left",
     "waiting",
     "warn_of_ignored",
 ]
@@ -35,16 +41,48 @@ class UsageError(Exception):
     """A wrong word on the command line."""
 
 
+class OptionWarning(UserWarning):
+    """A word on the command line without effect."""
+
+
+#: What messages of the library call its arguments, and what stands for it on the command line.
+_WORDS = tuple(
+    (re.compile(python), option)
+    for python, option in (
+        (r"\bsay (\w+)= by mapping", r"say --map \1=..."),
+        (r"\bor (\w+)= by mapping", r"or --map \1=..."),
+        (r"\b(by|of) mapping\b", r"\1 --map"),
+        (r"\bmapping names\b", "--map names"),
+        (r"\bgive axes=", "give --map axes="),
+        (r"\bgive quantity=", "give --quantity"),
+        (r"\bleave the quantity out, or force it", "leave --quantity out, or say --force-quantity"),
+        (r"\blimit_gb=, --limit-gb", "--limit-gb"),
+        (r"\bwindow_decay\b", "--window-decay"),
+        (r"^gamma ", "gamma, the FRFs between all joint DOFs, "),
+        (r"\bgive models of these to identify_model\b", "name models of these by --model"),
+        (r"\(check_frfs\), at transform,", "(jointfrf check), at --at and --channels,"),
+    )
+)
+
+
 def complain(kind: str, message: object) -> None:
     """Print a warning or an error as one line that does nothing to a terminal: the name of a file may hold anything."""
-    print(f"jointfrf: {kind}: {visible(str(message))}", file=sys.stderr)
+    print(f"jointfrf: {kind}: {visible(in_options(str(message)))}", file=sys.stderr)
+
+
+def in_options(text: str) -> str:
+    """Return a message of the library with options of the command line for arguments of functions."""
+    for python, option in _WORDS:
+        text = python.sub(option, text)
+    return text
 
 
 def warn_of_ignored(args: argparse.Namespace, names: Iterable[str], why: str) -> None:
     """Warn of options that were given and have no effect."""
     found = [name for name in names if name.removeprefix("--").replace("-", "_") in args.given]
     if found:
-        complain("warning", f"{' and '.join(found)} {'have' if found[1:] else 'has'} no effect: {why}")
+        verb = "have" if found[1:] else "has"
+        warnings.warn(f"{' and '.join(found)} {verb} no effect: {why}", OptionWarning, stacklevel=2)
 
 
 class Output:
@@ -53,6 +91,7 @@ class Output:
     def __init__(self, args: argparse.Namespace) -> None:
         self._is_json: bool = args.json
         self._is_quiet: bool = args.quiet
+        self._warned: list[str] = args.warned
 
     def say(self, *lines: object) -> None:
         """Print lines of text, unless JSON or nothing is wanted."""
@@ -60,14 +99,17 @@ class Output:
             print(*(visible(str(line), "\n\t") for line in lines), sep="\n", flush=True)
 
     def warn(self, *texts: object) -> None:
-        """Print warnings that are part of the text and of the JSON, where neither is printed."""
+        """Note warnings that are part of the text: for the JSON, or to be printed where nothing else is."""
+        self._warned += map(str, texts)
         for text in texts if self._is_quiet and not self._is_json else ():
             complain("warning", text)
 
     def give(self, content: Mapping[str, Any]) -> None:
-        """Print the result as JSON where that is wanted."""
+        """Print the result as JSON where that is wanted, with all warnings at its top level."""
         if self._is_json:
-            print(json.dumps(plain(content), indent=2, allow_nan=False))
+            warned = [in_options(str(text)) for text in (*content.get("warnings", ()), *self._warned)]
+            whole = {**content, "warnings": list(dict.fromkeys(warned))}
+            print(json.dumps(plain(whole), indent=2, allow_nan=False))
 
 
 def plain(value: Any) -> Any:
@@ -97,6 +139,20 @@ def check_folder(option: str, path: Path | None) -> None:
         raise UsageError(f"{option}: there is no folder {path.parent}")
     if path is not None and path.is_dir():
         raise UsageError(f"{option}: {path} is a folder, not a file")
+
+
+def check_out(option: str, path: Path | None) -> None:
+    """Check, before anything is computed, that a folder can be made there.
+
+    Raises
+    ------
+    UsageError
+        It, or a folder above it, is a file.
+    """
+    above = [] if path is None else [path, *path.parents]
+    there = next((one for one in above if one.exists() or one.is_symlink()), None)
+    if there is not None and not there.is_dir():
+        raise UsageError(f"{option}: {there} is a file, not a folder")
 
 
 def positive(word: str, least: int = 1) -> int:
@@ -129,12 +185,12 @@ def progress(name: str) -> Callable[[int, int], None]:
                 furthest = 0.0
             elif done / total >= furthest:
                 furthest = done / total
-                _on_its_line(f"{name}: {100 * done // total} %{_time_left(time.monotonic() - start, done, total)}")
+                _on_its_line(f"{name}: {100 * done // total} %{time_left(time.monotonic() - start, done, total)}")
 
     return show
 
 
-def _time_left(spent: float, done: int, total: int) -> str:
+def time_left(spent: float, done: int, total: int) -> str:
     """Say how long it will take at the speed so far, where that is known."""
     if done == 0 or spent < _SETTLED:
         return ""

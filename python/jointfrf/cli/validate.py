@@ -8,7 +8,7 @@ from pathlib import Path
 
 from jointfrf.cli.couple import add_joint_arguments, coupled, renumbered, shifted
 from jointfrf.cli.frf import add_line_arguments, check_target, lines_of, read_structures
-from jointfrf.cli.measured_file import add_quantity_arguments
+from jointfrf.cli.measured_file import add_reading_arguments, reading_options
 from jointfrf.cli.parser import CommandParser
 from jointfrf.cli.usage import Output, UsageError, waiting
 from jointfrf.errors import FileContentError
@@ -35,7 +35,7 @@ def add_arguments(parser: CommandParser) -> None:
     add_joint_arguments(parser)
     parser.option("--output FILE", f"also write the regenerated FRFs: {format_names(written=True)}", Path)
     add_line_arguments(parser)
-    add_quantity_arguments(parser)
+    add_reading_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -47,8 +47,7 @@ def run(args: argparse.Namespace) -> int:
     if args.output is not None:
         check_target(args.output)
     found = read_joint_file(args.joint)
-    options = {"quantity": args.quantity, "force_quantity": args.force_quantity}
-    a, b, *parts = read_structures([args.a, args.b, *args.measured], lines_of(args), **options)
+    a, b, *parts = read_structures([args.a, args.b, *args.measured], lines_of(args), **reading_options(args))
     measured = parts[0] if len(parts) == 1 else merge_frfs(parts)
     if args.band is not None:
         a, b, measured = (each.select(args.band) for each in (a, b, measured))

@@ -30,6 +30,8 @@ class FrfMapping:
         Names of fields; inside structures or groups with points between, ``test.frf``.
     responses, excitations : str or sequence of str, optional
         The field that holds the names of the channels, or these names.
+    response_nodes, response_directions, excitation_nodes, excitation_directions : str, optional
+        Instead: fields of nodes, and of directions as names or codes 1 to 6; one value stands for all channels.
     axes : str, optional
         Order of the axes: ``freq,out,in``, ``out,in,freq``, ...; by the sizes where they say it.
     """
@@ -38,6 +40,10 @@ class FrfMapping:
     h: str | None = None
     responses: Any = None
     excitations: Any = None
+    response_nodes: str | None = None
+    response_directions: str | None = None
+    excitation_nodes: str | None = None
+    excitation_directions: str | None = None
     axes: str | None = None
     quantity: str | None = None
     unit: str | None = None
@@ -154,6 +160,8 @@ class FileFormat:
         Called with the path and a set.
     needs : str
         What must be installed, for the documentation.
+    package : str
+        What writing needs beside the requirements of the installation, a name of `extras`.
     """
 
     name: str
@@ -164,3 +172,4 @@ class FileFormat:
     looks_alike: Callable[[Path, bytes], bool] = _never
     write: Callable[[Path, FrfSet], None] | None = None
     needs: str = ""
+    package: str = ""

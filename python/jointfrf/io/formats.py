@@ -142,7 +142,9 @@ def read_frfs(
     mapping : mapping, optional
         Which field of a MATLAB, NPZ or HDF5 file is what, where it has other names than the usual ones: keys
         ``freq_hz``, ``h``, ``responses``, ``excitations``, ``quantity``, ``unit``, ``coherence``, ``averages`` (names
-        of fields, ``test.frf`` inside a structure; channels also as their names), ``axes`` (``out,in,freq``).
+        of fields, ``test.frf`` inside a structure; channels also as their names), ``axes`` (``out,in,freq``). Instead
+        of names of channels ``response_nodes`` and ``response_directions`` (``x``, ``-rz``; or codes 1 to 6), and
+        ``excitation_nodes`` and ``excitation_directions``.
     averages : number or array_like, shape (n_responses, n_excitations), optional
         Number of averages, where the files do not say it.
     limit_gb : float, optional

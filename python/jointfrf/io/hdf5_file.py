@@ -355,4 +355,5 @@ HDF5 = FileFormat(
     read=_read,
     write=write_hdf5,
     needs="`jointfrf[hdf5]`",
+    package="h5py",
 )

@@ -39,6 +39,10 @@ _KNOWN = {
     "responses": ("responses", "response", "response_dofs", "rsp", "outputs", "output", "out_dofs", "channels"),
     "excitations": ("excitations", "excitation", "references", "reference", "reference_dofs", "ref", "inputs",
                     "input", "in_dofs", "impacts"),
+    "response_nodes": ("response_nodes",),
+    "response_directions": ("response_directions",),
+    "excitation_nodes": ("excitation_nodes",),
+    "excitation_directions": ("excitation_directions",),
     "quantity": ("quantity",),
     "unit": ("unit", "units", "frf_unit"),
     "coherence": ("coherence", "coh", "gamma2", "coherences"),
@@ -187,13 +191,34 @@ def _mapped_arrays(content: Mapping[str, Any], mapping: FrfMapping, where: str) 
         freq_hz,
         h[1],
         mapping.axes or "",
-        _value(found["responses"]),
-        _value(found["excitations"]),
+        _channels(found, "response", where),
+        _channels(found, "excitation", where),
         quantity or (last if last in _QUANTITIES else ""),
         _text(found["unit"]),
         _value(found["coherence"]),
         _value(found["averages"]),
     )
+
+
+def _channels(found: Mapping[str, tuple[str, Any] | None], what: str, where: str) -> Any:
+    """Return the channels of a side as `channels_of` takes them: one field, or nodes and directions apart."""
+    apart = found[f"{what}_nodes"], found[f"{what}_directions"]
+    if apart == (None, None) or (found[f"{what}s"] is not None and None in apart):
+        return _value(found[f"{what}s"])
+    if found[f"{what}s"] is not None:
+        raise FileContentError(f"{where} has {what}s as names and as nodes and directions: leave one out of mapping")
+    if apart[0] is None or apart[1] is None:
+        missing = f"{what}_{'nodes' if apart[0] is None else 'directions'}"
+        raise FileContentError(f"{where} has no field {missing}: say which one holds it by mapping")
+    nodes, directions = (np.ravel(np.asarray(each[1])) for each in apart if each is not None)
+    if 1 not in (nodes.size, directions.size) and nodes.size != directions.size:
+        raise FileContentError(f"{where} has {nodes.size} nodes of {what}s, but {directions.size} directions")
+    nodes, directions = np.broadcast_arrays(nodes, directions)
+    if nodes.dtype.kind not in "iuf" or not (nodes == np.floor(nodes)).all():
+        raise FileContentError(f"{where}: the nodes of the {what}s ({apart[0][0]}) are not whole numbers")
+    if directions.dtype.kind in "iuf":
+        return np.column_stack([nodes, directions])
+    return [f"{int(node)}:{str(way).strip()}" for node, way in zip(nodes, directions, strict=True)]
 
 
 def _flattened(content: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:

@@ -10,8 +10,10 @@ import subprocess
 import sys
 import time
 from functools import partial
+from itertools import chain, repeat
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from command import run_command
@@ -136,6 +138,172 @@ def test_options_without_effect_are_named(words, warning):
     assert result.returncode == 0
     assert f"jointfrf: warning: {warning}" in result.stderr
     assert "no effect" not in run_command("identify", BARS, *JOINT).stderr
+
+
+PARTS = ("a.toml", "b.toml")
+CHAIN = (
+    'model = "chain"\nmasses = [2.0, 1.0, 3.0]\nstiffness = [1e5, 2e5, 3e5]\ndamping = [3.0, 2.0, 1.0]\n'
+    'ground = "{ground}"\n'
+)
+BETWEEN = ["--joint", "joint.toml", "--j", "3", "--k", "1", "--renumber-b", "100"]
+
+
+@pytest.fixture
+def _structures(tmp_path):
+    """Two chains, their joint, FRFs of their assembly, a saved fit."""
+    for name, ground in zip(PARTS, ("start", "end"), strict=True):
+        (tmp_path / name).write_text(CHAIN.format(ground=ground))
+    (tmp_path / "joint.toml").write_text('dofs = ["x"]\nstiffness = [1e5]\ndamping = [10.0]\n')
+    words = ["couple", *PARTS, *BETWEEN, "--band", "5:100", "--step", "0.5", "--output", "c.npz"]
+    result = run_command(*words)
+    assert result == (0, result.stdout, ""), result.stderr
+    assert run_command("identify", BARS, *JOINT, "--save", "fit.json").returncode == 0
+    (tmp_path / "again.json").write_bytes((tmp_path / "fit.json").read_bytes())
+
+
+@pytest.mark.usefixtures("_structures")
+@pytest.mark.parametrize(
+    ("words", "warning"),
+    [
+        (["couple", *PARTS, *BETWEEN, "--band", "5:9", "--step", "1", "--output", "d.npz", "--quantity", "mobility"],
+         "--quantity has no effect: both substructures are models"),
+        (["validate", *PARTS, "c.npz", *BETWEEN, "--band", "5:100", "--step", "0.5"],
+         "--step has no effect: c.npz has frequency lines of its own"),
+        (["frf", "a.toml", "--band", "5:9", "--step", "1", "--output", "d.npz", "--map", "h=A"],
+         "--map has no effect: no file of FRFs is read"),
+        (["decouple", *PARTS, "c.npz", "--equation", "rr", "--j", "3", "--k", "1", "--dofs", "x", "--r", "2:x", "--s",
+          "2:x", "--renumber-b", "100"], "--s has no effect: equation rr does not use it"),
+        (["pool", "fit.json", "again.json", "--transfer", "--output", "p.csv", "--trend", "m"],
+         "--trend and --output have no effect: it is of the pool"),
+        (["identify", BARS, *JOINT, "--save-lines"], "--save-lines has no effect: it is for --save"),
+        (["export", "joint.toml", "abaqus:1,2", "--frequency", "5"], "--frequency has no effect: no law"),
+    ],
+)  # fmt: skip
+def test_every_command_names_options_without_effect_also_in_json(words, warning):
+    result = run_command(*words, "--json")
+    assert result.returncode == 0, result.stderr
+    assert f"jointfrf: warning: {warning}" in result.stderr
+    found = json.loads(result.stdout)["warnings"]
+    assert any(text.startswith(warning) for text in found)
+    assert len(found) == len(set(found))
+    assert f"jointfrf: warning: {warning}" in run_command(*words, "--quiet").stderr
+
+
+@pytest.mark.usefixtures("_structures")
+def test_several_tests_of_models_say_the_time_left_and_their_warnings(monkeypatch, tmp_path):
+    from jointfrf.cli import identify_model
+
+    said = []
+    monkeypatch.setattr(identify_model, "waiting", lambda text: said.append(text) or contextlib.nullcontext())
+    monkeypatch.setattr(identify_model.time, "monotonic", chain([0.0, 0.0, 100.0], repeat(0.0)).__next__)
+    wrong = CHAIN.replace("[2.0, 1.0, 3.0]", "[2.0, 1.1, 3.0]")  # which the residual shows
+    (tmp_path / "assembly.toml").write_text(
+        f'[A]\n{wrong.format(ground="start")}joint = ["3:x"]\nexact = true\n[B]\n{CHAIN.format(ground="end")}'
+        'joint = ["1:x"]\nexact = true\n[joint]\ndofs = ["x"]\nstiffness = [9e4]\ndamping = [9.0]\n'
+        '[channels]\n"2:+x" = "A/2:x"\n"102:+x" = "B/2:x"\n'
+    )
+    assert run_command("convert", "c.npz", "d.npz").returncode == 0
+    words = ["identify", "c.npz", "d.npz", "--model", "assembly.toml", "--noise", "0.001", "--json"]
+    result = run_command(*words, "--each")
+    assert result.returncode == 0, result.stderr
+    content = json.loads(result.stdout)
+    own = [test["fits"][0]["warnings"] for test in content["tests"]]
+    assert own[0]
+    named = [f"{name}: {text}" for name, texts in zip("cd", own, strict=True) for text in texts]
+    assert [text for text in content["warnings"] if text in named] == named
+    assert said == ["fit of c.npz (1 of 2)", "fit of d.npz (2 of 2, about 2 min left)"]
+    alone = json.loads(run_command(*[word for word in words if word != "d.npz"]).stdout)
+    assert set(own[0]) <= set(alone["warnings"])
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--model", "m.toml", "--window-decay", "3"], "--window-decay are of fits without models"),
+        (["--out", "fit.txt"], "--out: fit.txt is a file, not a folder"),
+        (["--out", "fit.txt/deep"], "--out: fit.txt is a file, not a folder"),
+        (["--report", "."], "--report: . is a folder, not a file"),
+        (["--report", "fit.txt/page.html"], "--report: fit.txt is a file, not a folder"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_done_is_said_before_a_file_is_read(tmp_path, words, message):
+    (tmp_path / "fit.txt").write_text("")
+    result = run_command("identify", "no.uff", *JOINT, *words)
+    assert result.returncode == 2
+    assert message in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("package", "words"),
+    [
+        ("matplotlib", ["identify", "no.uff", "--out", "o"]),
+        ("jinja2", ["identify", "no.uff", "--report", "r.html"]),
+        ("matplotlib", ["run", "no"]),
+        ("jinja2", ["study", "no"]),
+        ("pyarrow", ["study", "no", "--values", "parquet"]),
+        ("pyarrow", ["study", "merge", "a", "b", "--out", "c", "--values", "parquet"]),
+        ("jinja2", ["plan", "no.toml", "--report", "p.html"]),
+        ("jinja2", ["pool", "no.json", "--report", "p.html"]),
+        ("h5py", ["convert", "no.uff", "a.h5"]),
+        ("h5py", ["frf", "no.toml", "--output", "a.h5"]),
+        ("h5py", ["couple", *PARTS, *BETWEEN, "--output", "a.h5"]),
+        ("h5py", ["validate", *PARTS, "no.uff", *BETWEEN, "--output", "a.h5"]),
+        ("shtab", ["completion", "bash"]),
+    ],
+)
+def test_what_an_option_needs_is_checked_before_the_work(monkeypatch, package, words):
+    """None of the files named is there: nothing was read before."""
+    monkeypatch.setitem(sys.modules, package, None)
+    result = run_command(*words)
+    assert result.returncode == 1
+    assert f"need the package {package}: pip install 'jointfrf[" in result.stderr
+
+
+@pytest.mark.skipif(os.name == "nt", reason="links need rights on Windows")
+def test_paths_through_a_link_mean_what_the_system_means(tmp_path):
+    """link/.. is the folder above that of the link's target, not the one that holds the link."""
+    (tmp_path / "real" / "deep").mkdir(parents=True)
+    (tmp_path / "link").symlink_to(Path("real") / "deep")
+    words = ["--out", "link/../out", "--save", "link/../new.json", "--report", "link/../page/r.html"]
+    words += ["--export", "abaqus:1,2", "--bounds", "--output", "link/../cards.inp"]
+    assert run_command("identify", BARS, *JOINT, *words).returncode == 0
+    assert run_command("convert", BARS, "link/../bars.npz").returncode == 0
+    assert run_command("new", "known-joint", "link/../case").returncode == 0
+    part = ["--realisations", "2", "--jobs", "1", "--first", "0", "--count", "1"]
+    study = run_command("study", "link/../case", "--out", "link/../study", *part)
+    assert study.returncode == 0, study.stderr
+    (tmp_path / "link" / "link.json").symlink_to("../../real/other.json")  # a link where a file is written
+    (tmp_path / "real" / "other.json").write_text("")
+    assert run_command("identify", BARS, *JOINT, "--save", "link/link.json").returncode == 0
+    made = {path.name for path in (tmp_path / "real").iterdir()}
+    files = {"new.json", "cards.inp", "bars.npz", "other.json"}
+    assert made == {"deep", "out", "page", "case", "study"} | files
+    assert {path.name for path in tmp_path.iterdir()} == {"link", "real"}
+    assert json.loads((tmp_path / "real" / "other.json").read_text())["format"] == "jointfrf joint"
+
+
+@pytest.mark.parametrize(
+    ("fields", "words", "message"),
+    [
+        ({"quantity": None}, [], "it is not said what the FRFs are: give --quantity (receptance, mobility or acceler"),
+        ({"unit": "m/N"}, ["--quantity", "mobility"], "leave --quantity out, or say --force-quantity"),
+        ({"h": np.ones((2, 2, 2)), "freq_hz": [1.0, 2.0], "more": 1}, [], "give --map axes=, such as freq,out,in"),
+        ({"y": 1}, [], "has several fields for h: say which of h, y by --map"),
+        ({"responses": None}, [], "the responses are not named: give them, such as 102:+y"),
+        ({}, ["--map", "axis=3"], "'axis=3' is not FIELD=NAME with a field out of"),
+        ({}, ["--limit-gb", "1e-9"], ": --limit-gb or the environment variable"),
+    ],
+)
+def test_messages_speak_of_options(tmp_path, fields, words, message):
+    rng = np.random.default_rng(0)
+    values = {"h": rng.normal(size=(3, 2, 2)) + 0j, "freq_hz": [1.0, 2.0, 3.0], "quantity": "receptance"}
+    values |= {"responses": ["1:y", "2:y"], "excitations": ["1:y", "2:y"]} | fields
+    values["h"] = values["h"] * np.arange(1, 5).reshape(2, 2)
+    np.savez(tmp_path / "a.npz", **{name: value for name, value in values.items() if value is not None})
+    result = run_command("convert", "a.npz", "b.npz", *words)
+    assert result.returncode != 0
+    assert message in result.stderr
+    assert not re.search(r"mapping|limit_gb|quantity=|force it", result.stderr)
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no such signal")
@@ -335,7 +503,7 @@ def test_the_limit_of_what_is_read_is_an_option(tmp_path, monkeypatch):
     monkeypatch.delenv("JOINTFRF_FILE_LIMIT_GB", raising=False)
     result = run_command("check", BARS, "--limit-gb", "1e-6")
     assert result.returncode == 1
-    assert "more than the 1e-06 GB that are read: limit_gb=, --limit-gb or the environment" in result.stderr
+    assert "more than the 1e-06 GB that are read: --limit-gb or the environment" in result.stderr
     assert "must be a number of GB above 0, not '0'" in run_command("check", BARS, "--limit-gb", "0").stderr
     assert main(["check", str(BARS), "--limit-gb", "1e-6", "--quiet"]) == 1
     assert "JOINTFRF_FILE_LIMIT_GB" not in os.environ
