@@ -199,6 +199,13 @@ class Joint:
             are apart from the reference point, such cards are sketched in comments.
         comments : sequence of str, optional
             Lines of comment before the input.
+        connector : bool
+            Abaqus: a connector element where matrices, or springs, would be written: direct steady-state steps take no
+            matrices. Both sides have one reference point, and there is no hysteretic damping but in a table.
+        table_hz : array_like, optional
+            Frequencies of tables, Hz, above 0: Re K* and Im K*/w over frequency, for direct steady-state steps. Abaqus:
+            SPRING2 and DASHPOT2 with frequencies, or a connector element where DOFs are coupled or nodes lie beside the
+            joint. Nastran: PBUSHT and TABLED1, not where DOFs are coupled.
 
         Returns
         -------
@@ -238,6 +245,9 @@ class Joint:
         <BLANKLINE>
         """
         matrices = self.stiffness, self.damping, self.hysteretic_stiffness
-        from jointfrf.io.cards import spring_cards  # readers of files take their time to import
+        from jointfrf.io.cards import spring_cards, table_cards  # readers of files take their time to import
 
+        if options.get("table_hz") is not None:
+            freq = as_real("table_hz", options["table_hz"], (None,))
+            return table_cards(program, self.dofs, freq, self.dynamic_stiffness(freq), nodes, **options)
         return spring_cards(program, self.dofs, matrices, nodes, **options)

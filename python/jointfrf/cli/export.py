@@ -26,6 +26,22 @@ from jointfrf.spelling import did_you_mean
 __all__ = ["CardRequest", "add_arguments", "add_card_arguments", "card_request", "parse_export", "run", "written_cards"]
 
 
+#: Arguments of `export` in its messages, and the options that stand for them.
+_OPTIONS = (
+    ("full_matrix", "--full-matrix"),
+    ("(bounds)", "(--bounds)"),
+    ("name the freq_hz at which it is taken", "name by --frequency HZ that at which it is taken"),
+    ("freq_hz names one frequency instead", "--frequency HZ names one frequency instead"),
+    ("leave connector out", "leave --connector out"),
+    ("and connector exclude", "and --connector exclude"),
+    ("table_hz= gives", "--frequency LOW:HIGH gives"),
+    ("damping=False leaves", "--no-damping leaves"),
+    ("name one in points", "name one by --joint-at"),
+)
+#: Lines of a table between which K* differs from a straight line by less than this share; it doubles so often at most.
+_STRAIGHT, _MOST_HALVINGS = 1e-3, 9
+
+
 def add_arguments(parser: CommandParser) -> None:
     """Describe the arguments of the command."""
     parser.description = (
@@ -40,47 +56,76 @@ def add_arguments(parser: CommandParser) -> None:
         help="program and nodes j and k of its model: nastran:9001,9002; calculix: two ROT NODEs more for rotations",
     )
     parser.option(
-        "--frequency HZ", "where laws that depend on frequency are taken: cards hold k, c and h only", _frequency
+        "--frequency HZ",
+        "where laws that depend on frequency are taken; LOW:HIGH writes tables over frequency (abaqus, nastran)",
+        _frequency,
     )
     parser.option("--joint-at X,Y,Z", "reference point of the joint in the model, in its unit of length (saved)", point)
     add_card_arguments(parser)
 
 
-def _frequency(text: str) -> float:
-    (found,) = numbers(text, 1, "a frequency in Hz")
-    if found <= 0:
-        raise argparse.ArgumentTypeError(f"must be a frequency above 0 Hz, not {text!r}")
-    return float(found)
+def _frequency(text: str) -> float | tuple[float, float]:
+    low, colon, high = text.partition(":")
+    (found,) = numbers(low, 1, "a frequency in Hz, or LOW:HIGH")
+    last = numbers(high, 1, "LOW:HIGH in Hz")[0] if colon else found
+    if not found > 0 or (colon and not found < last):
+        raise argparse.ArgumentTypeError(f"must be a frequency above 0 Hz, or LOW:HIGH, not {text!r}")
+    return (float(found), float(last)) if colon else float(found)
+
+
+def _table_lines(joint: Joint | LawJoint, low: float, high: float) -> FloatArray:
+    """Return lines between which Re K* and Im K*/w are nearly straight, Hz: as many as that takes."""
+    springs = joint if isinstance(joint, Joint) else LawJoint(joint.laws)
+    for power in range(_MOST_HALVINGS + 1):
+        freq = np.geomspace(low, high, 2**power + 1)
+        between = (freq[1:] + freq[:-1]) / 2
+        known, exact = (springs.dynamic_stiffness(lines) for lines in (freq, between))
+        ends = known.real + 1j * known.imag / freq[:, None, None]
+        straight = (ends[1:] + ends[:-1]) / 2
+        error = abs(straight.real + 1j * straight.imag * between[:, None, None] - exact).max(axis=(1, 2))
+        if (error <= _STRAIGHT * abs(exact).max(axis=(1, 2))).all():
+            break
+    return freq
 
 
 def run(args: argparse.Namespace) -> int:
     """Carry out the command; the caller turns exceptions into messages."""
     out = Output(args)
     found = read_joint_file(args.joint)
-    if isinstance(found.joint, Joint):
+    at = args.frequency if isinstance(args.frequency, float) else None
+    if isinstance(found.joint, Joint) and at is not None:
         warn_of_ignored(args, ("--frequency",), "no law of this joint depends on frequency")
     if args.nodes_at is None:
         warn_of_ignored(args, ("--joint-at",), "without --nodes-at the nodes are taken to lie at the joint")
-    damping, cross = _terms(_springs(found.joint, args.frequency))
+    is_table = isinstance(args.frequency, tuple)
+    damping, cross = ("none", "zero") if is_table else _terms(_springs(found.joint, at))
     request = card_request(args, found.joint.dofs, damping=damping, cross=cross, points=_points(args, found))
     assert request is not None
+    if is_table and (isinstance(found.joint, Joint) or found.joint.laws):
+        request.options["table_hz"] = _table_lines(found.joint, *args.frequency)
     if found.fit is not None:
-        at = args.frequency if found.fit.laws is not None else None
-        text = written_cards(found.fit, request, found.about, at)
+        text = written_cards(found.fit, request, found.about, at if found.fit.laws is not None else None)
     else:
-        options: CardOptions = {**request.options, "comments": found.about}
-        if isinstance(found.joint, LawJoint):
-            text = found.joint.export(request.program, request.nodes, freq_hz=args.frequency, **options)
-        else:
-            joint, left_out = (found.joint, ()) if request.all_damping else _without_negative(found.joint)
-            options["comments"] = [*found.about, *left_out]
-            text = joint.export(request.program, request.nodes, **options)
+        text = _by_hand(found, request, at)
         if request.output is not None:
             write_file(request.output, text)
     written = [] if args.output is None else [str(args.output)]
     out.say(f"wrote {args.output}" if written else text.rstrip("\n"))
     out.give({"source": str(args.joint), "program": request.program, "cards": text, "written": written})
     return 0
+
+
+def _by_hand(found: JointFile, request: CardRequest, freq_hz: float | None) -> str:
+    """Return the cards of a joint that was written by hand."""
+    options: CardOptions = {**request.options, "comments": found.about}
+    try:
+        if isinstance(found.joint, LawJoint):
+            return found.joint.export(request.program, request.nodes, freq_hz=freq_hz, **options)
+        joint, left_out = (found.joint, ()) if request.all_damping else _without_negative(found.joint)
+        options["comments"] = [*found.about, *left_out]
+        return joint.export(request.program, request.nodes, **options)
+    except ValueError as error:
+        raise UsageError(_refusal(str(error), "")) from error
 
 
 def _without_negative(joint: Joint) -> tuple[Joint, list[str]]:
@@ -106,7 +151,7 @@ def _springs(joint: Joint | LawJoint, freq_hz: float | None) -> Joint | None:
     try:
         return LawJoint(joint.laws).constant_joint(freq_hz) if joint.laws else None
     except ValueError as error:
-        raise UsageError(str(error).replace("the freq_hz", "by --frequency HZ that")) from error
+        raise UsageError(_refusal(str(error), "")) from error
 
 
 def _terms(joint: Joint | None) -> tuple[str, str]:
@@ -194,6 +239,7 @@ def add_card_arguments(parser: CommandParser) -> None:
     parser.option("--element N", "first number of new elements (1)", positive, 1)
     parser.option("--property N", "first number of properties (1)", positive, 1)
     parser.option("--full-matrix", "matrices where springs would do (abaqus, nastran)")
+    parser.option("--connector", "abaqus: a connector element, which direct steady-state steps take, not matrices")
     parser.option("--all-damping", "also dashpots that are negative or not significantly above zero")
     parser.option("--bounds", "also stiffnesses of which only a bound is known, by their best estimates")
     parser.option("--no-damping", "no damping in the cards")
@@ -228,7 +274,7 @@ def card_request(
         ):
             if given is not None:
                 raise UsageError(f"{name} is for cards: say --export PROGRAM:J,K, too")
-        flags = ("--element", "--property", "--full-matrix", "--all-damping", "--bounds", "--no-damping")
+        flags = ("--element", "--property", "--full-matrix", "--connector", "--all-damping", "--bounds", "--no-damping")
         warn_of_ignored(args, flags, "it is for cards, --export PROGRAM:J,K")
         return None
     check_folder("--output", args.output)
@@ -239,6 +285,7 @@ def card_request(
         "rotation_nodes": ends[2:] or None,
         "damping": not args.no_damping and program != "calculix",  # it has none between DOFs; the text says so
         "full_matrix": args.full_matrix,
+        "connector": args.connector,
         "units": args.units or "SI",
         "faces": args.faces,
     }
@@ -264,12 +311,14 @@ def _probe(n: int, dofs: Sequence[str], damping: str, cross: str) -> Joint:
 
 def _refusal(why: str, damping: str) -> str:
     """Say with the words of the command line what a program cannot hold."""
-    if "hysteretic" in why:
+    if "MATRIX27" in why and damping:
         may = f"--damping {damping} may find" if damping == "auto" else f"--damping {damping} fits"
         return f"MATRIX27 of ansys holds no hysteretic damping, which {may}: say --damping viscous, or --no-damping"
     if "rotation_nodes must" in why:
         return "rotations of calculix need the ROT NODEs of both rigid bodies after their nodes: calculix:J,K,ROTJ,ROTK"
-    return why.replace("full_matrix", "--full-matrix")
+    for argument, option in _OPTIONS:
+        why = why.replace(argument, option)
+    return why
 
 
 def written_cards(fit: Fit, request: CardRequest, about: Sequence[str], freq_hz: float | None = None) -> str:
@@ -280,7 +329,7 @@ def written_cards(fit: Fit, request: CardRequest, about: Sequence[str], freq_hz:
             freq_hz=freq_hz, **request.options,
         )  # fmt: skip
     except ValueError as error:
-        raise UsageError(str(error).replace("(bounds)", "(--bounds)")) from error
+        raise UsageError(_refusal(str(error), "")) from error
     if request.output is not None:
         write_file(request.output, text)
     return text

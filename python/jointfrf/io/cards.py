@@ -8,14 +8,14 @@ from collections.abc import Sequence
 from typing import Literal, NamedTuple, TypedDict, Unpack, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from jointfrf.dofs import DIRECTIONS, direction_places, rigid_offset
 from jointfrf.io.units import ModelUnits, UnitSystemName, model_units
-from jointfrf.kernel.arguments import FloatArray, as_nodes, as_real, check_choice
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_nodes, as_real, check_choice
 from jointfrf.spelling import visible
 
-__all__ = ["CardFormat", "CardOptions", "rigid_cards", "spring_cards"]
+__all__ = ["CardFormat", "CardOptions", "rigid_cards", "spring_cards", "table_cards"]
 
 CardFormat = Literal["abaqus", "calculix", "nastran", "ansys"]
 
@@ -54,6 +54,16 @@ class CardOptions(TypedDict, total=False):
     units: UnitSystemName
     faces: Sequence[Sequence[int]] | None
     comments: Sequence[str]
+    connector: bool
+    table_hz: ArrayLike | None
+
+
+class _Table(NamedTuple):
+    """Stiffness and viscous damping over frequency, shape (n_freq, 6, 6), all in units of the model."""
+
+    freq: FloatArray
+    stiffness: FloatArray
+    damping: FloatArray
 
 
 class _Link(NamedTuple):
@@ -74,6 +84,7 @@ class _Link(NamedTuple):
     positions: FloatArray | None
     units: ModelUnits
     faces: tuple[tuple[int, ...], tuple[int, ...]] | None
+    table: _Table | None = None
 
     @property
     def matrices(self) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -82,6 +93,14 @@ class _Link(NamedTuple):
     @property
     def has_arms(self) -> bool:
         return bool(self.arms.any())
+
+    @property
+    def has_one_point(self) -> bool:
+        """Whether both arms end at the same place."""
+        if self.positions is None:
+            return True
+        ends = self.positions + self.arms
+        return np.allclose(ends[0], ends[1], rtol=0, atol=_NO_ARM / self.units.length)
 
     def both_sides(self, matrix: FloatArray) -> FloatArray:
         """T^T [[K, -K], [-K, K]] T: the joint resists the difference of the motions of its two points, shape (12, 12).
@@ -144,15 +163,80 @@ def spring_cards(
     """
     check_choice("program", program, get_args(CardFormat))
     link = _link(program, dofs, matrices, nodes, options)
+    return _text(program, link, options)
+
+
+def table_cards(
+    program: CardFormat,
+    dofs: Sequence[str],
+    freq_hz: FloatArray,
+    k_joint: ComplexArray,
+    nodes: Sequence[int],
+    **options: Unpack[CardOptions],
+) -> str:
+    """Write K* over frequency as tables of stiffness Re K* and viscous damping Im K*/w, for direct steady-state steps.
+
+    Parameters
+    ----------
+    program : {"abaqus", "nastran"}
+        The others have no such tables.
+    dofs : sequence of str
+        Names of the n DOFs.
+    freq_hz : ndarray, shape (n_freq,)
+        Lines of the table, above 0 Hz, Hz.
+    k_joint : ndarray, shape (n_freq, n, n)
+        N/m, rotational N m/rad.
+    nodes, **options
+        As for `Joint.export`.
+
+    Returns
+    -------
+    str
+        Lines of input.
+    """
+    check_choice("program", program, get_args(CardFormat))
+    if program not in ("abaqus", "nastran"):
+        raise ValueError(f"{program} has no tables over frequency: freq_hz names one frequency instead")
+    if options.get("full_matrix", False):
+        raise ValueError("full_matrix is not for tables over frequency: matrices have none")
+    if freq_hz.size < 2 or not (freq_hz[0] > 0 and (np.diff(freq_hz) > 0).all()):
+        raise ValueError("table_hz must hold at least two frequencies above 0 Hz that increase")
+    lines = np.stack([k_joint.real, k_joint.imag / (2 * np.pi * freq_hz[:, None, None])])
+    if not options.get("damping", True):
+        lines[1] = 0
+    link = _link(program, dofs, (lines[0, 0], lines[1, 0], 0 * lines[0, 0]), nodes, options)
+    places, units = direction_places(dofs), link.units
+    stiffness, damping = (
+        np.array([_widened(name, matrix, seconds, places, units) for matrix in own])
+        for name, own, seconds in (("stiffness", lines[0], 2), ("damping", lines[1], 1))
+    )
+    about = _text_lines([
+        f"tables of {freq_hz.size} lines, {freq_hz[0]:.6g} to {freq_hz[-1]:.6g} Hz: Re K* and Im K*/w, linear between "
+        "lines; for direct steady-state steps within these frequencies"
+    ])  # fmt: skip
+    table = _Table(freq_hz * units.time, stiffness, damping)
+    return _text(program, link._replace(table=table, notes=(*link.notes, *about)), options)
+
+
+def _text(program: CardFormat, link: _Link, options: CardOptions) -> str:
+    """Write the elements of a joint, and what follows its nodes."""
+    is_connector = options.get("connector", False)
+    if is_connector and program != "abaqus":
+        raise ValueError(f"connector elements are for abaqus, not for {program}: leave connector out")
+    if is_connector and options.get("full_matrix", False):
+        raise ValueError("full_matrix and connector exclude each other: name one of them")
     is_matrix = options.get("full_matrix", False) or _coupled(link)
     if program == "calculix":
         lines = _calculix(link)
     elif program == "ansys":
         lines = _ansys(link)
     elif program == "abaqus":
-        lines = _abaqus_matrices(link) if is_matrix or link.has_arms else _abaqus_springs(link)
+        if is_connector or (link.table is not None and (is_matrix or link.has_arms)):
+            lines = _abaqus_connector(link)
+        else:
+            lines = _abaqus_matrices(link) if is_matrix or link.has_arms else _abaqus_springs(link)
     else:
-        lines = _nastran_matrices(link) if is_matrix else _nastran_bush(link)
+        lines = _nastran_matrices(link) if is_matrix and link.table is None else _nastran_bush(link)
     return "\n".join([*lines, *_bodies(program, link)]) + "\n"
 
 
@@ -165,17 +249,9 @@ def _link(
 ) -> _Link:
     """Check the arguments of `cards`."""
     places = direction_places(dofs)
-    wide = []
     units = model_units(options.get("units", "SI"))
-    turns = places > 2
-    rotations = turns.astype(int)[:, None] + turns
-    for name, matrix, seconds in zip(("stiffness", "damping", "hysteretic damping"), matrices, (2, 1, 2), strict=True):
-        if abs(matrix - matrix.T).max() > _ROUND_OFF * abs(matrix).max():
-            raise ValueError(f"the {name} of the joint must be symmetric to be exported")
-        whole = np.zeros((6, 6))
-        scale = np.array([units.scale(seconds, count) for count in range(3)])
-        whole[np.ix_(places, places)] = (matrix + matrix.T) / 2 / scale[rotations]
-        wide.append(whole)
+    names = ("stiffness", "damping", "hysteretic damping")
+    wide = [_widened(name, m, s, places, units) for name, m, s in zip(names, matrices, (2, 1, 2), strict=True)]
     named = "SI units" if units.name == "SI" else f"units {units.words} ({units.name})"
     note = f"DOFs {', '.join(DIRECTIONS[place] for place in sorted(places))}; {named}, written by jointfrf"
     if not options.get("damping", True):
@@ -193,6 +269,18 @@ def _link(
     faces = _faces(options.get("faces"), numbers)
     notes = (note, *_text_lines(options.get("comments", ())), *_text_lines(where), *_arm_note(arms, units))
     return _Link(wide[0], wide[1], wide[2], (*numbers, *turning), element, number, notes, arms, positions, units, faces)
+
+
+def _widened(name: str, matrix: FloatArray, seconds: int, places: NDArray[np.intp], units: ModelUnits) -> FloatArray:
+    """Return a matrix in all six directions, in units of the model."""
+    if abs(matrix - matrix.T).max() > _ROUND_OFF * abs(matrix).max():
+        raise ValueError(f"the {name} of the joint must be symmetric to be exported")
+    turns = places > 2
+    rotations = turns.astype(int)[:, None] + turns
+    scale = np.array([units.scale(seconds, count) for count in range(3)])
+    whole = np.zeros((6, 6))
+    whole[np.ix_(places, places)] = (matrix + matrix.T) / 2 / scale[rotations]
+    return whole
 
 
 def _geometry(options: CardOptions, units: ModelUnits) -> tuple[FloatArray | None, FloatArray, list[str]]:
@@ -379,7 +467,8 @@ def _two_nodes(name: str, nodes: Sequence[int]) -> tuple[int, int]:
 
 
 def _coupled(link: _Link) -> bool:
-    return any(np.count_nonzero(matrix - np.diag(matrix.diagonal())) > 0 for matrix in link.matrices)
+    tables = [] if link.table is None else [link.table.stiffness, link.table.damping]
+    return any(np.count_nonzero(matrix * (1 - np.eye(6))) > 0 for matrix in (*link.matrices, *tables))
 
 
 def _upper_entries(link: _Link, matrix: FloatArray) -> list[tuple[int, int, int, int, float]]:
@@ -401,6 +490,18 @@ def _abaqus_springs(link: _Link) -> list[str]:
     for i in range(6):
         k, c, h = (float(matrix[i, i]) for matrix in link.matrices)
         of_dof = f"{i + 1}, {i + 1}"
+        if link.table is not None:
+            for word, kind, letter, values in (
+                ("SPRING", "SPRING2", "K", link.table.stiffness[:, i, i]),
+                ("DASHPOT", "DASHPOT2", "C", link.table.damping[:, i, i]),
+            ):
+                if values.any():
+                    name = f"JOINT{link.number}_{letter}{i + 1}"
+                    lines += [f"*ELEMENT, TYPE={kind}, ELSET={name}", f"{element}, {joined}"]
+                    lines += [f"*{word}, ELSET={name}", of_dof]
+                    lines += [f"{_real(x)}, {_real(f)}" for x, f in zip(values, link.table.freq, strict=True)]
+                    element += 1
+            continue
         if k != 0 or h != 0:
             name = f"JOINT{link.number}_K{i + 1}"
             lines += [f"*ELEMENT, TYPE=SPRING2, ELSET={name}", f"{element}, {joined}"]
@@ -415,10 +516,44 @@ def _abaqus_springs(link: _Link) -> list[str]:
     return lines
 
 
+def _abaqus_connector(link: _Link) -> list[str]:
+    """One connector element, which direct steady-state steps take: its motion is that of node K as J carries it along.
+
+    The relative motion of the joint's point is that of node K, moved by the arm of K as K turns against J.
+    """
+    if not link.has_one_point:
+        raise ValueError("a connector element needs one reference point of both sides of the joint: name one in points")
+    if link.table is None and link.hysteretic.any():
+        raise ValueError(
+            "a connector element holds no hysteretic damping: table_hz= gives a table over frequency that does, "
+            "damping=False leaves damping out"
+        )
+    move = rigid_offset(DIRECTIONS, link.arms[1])
+    name, j, k = f"JOINT{link.number}", *link.nodes[:2]
+    lines = [*link.comments("**")]
+    if link.positions is None:
+        lines.append(f"** a connector acts at node {k} where its nodes are apart")
+    lines += [f"*ELEMENT, TYPE=CONN3D2, ELSET={name}", f"{link.element}, {j}, {k}"]
+    lines += [f"*CONNECTOR SECTION, ELSET={name}, BEHAVIOR={name}_B", "CARTESIAN, CARDAN"]
+    lines.append(f"*CONNECTOR BEHAVIOR, NAME={name}_B")
+    table = link.table or _Table(np.zeros(1), link.stiffness[None], link.damping[None])
+    for word, matrices in (("ELASTICITY", table.stiffness), ("DAMPING", table.damping)):
+        if not matrices.any():
+            continue
+        lines.append(f"*CONNECTOR {word}" + (", FREQUENCY DEPENDENCE=ON" if link.table else ""))
+        for freq, matrix in zip(table.freq, matrices, strict=True):
+            moved = move.T @ matrix @ move
+            words = [_real(float(moved[row, column])) for column in range(6) for row in range(column + 1)]
+            words += [_real(float(freq))] if link.table else []
+            lines += [", ".join(words[at : at + _IN_A_LINE]) for at in range(0, len(words), _IN_A_LINE)]
+    return lines
+
+
 def _abaqus_matrices(link: _Link) -> list[str]:
     lines = [
         *link.comments("**"),
-        "** matrices take part in steps of the SIM architecture, not in direct steady-state ones",
+        "** matrices take part in steps of the SIM architecture, not in direct steady-state ones,",
+        "** which take connector elements",
     ]
     used = []
     words = ("STIFFNESS", "VISCOUS DAMPING", "STRUCTURAL DAMPING")
@@ -477,6 +612,11 @@ def _large(first: str, fields: Sequence[str | int | float]) -> list[str]:
 
 def _nastran_bush(link: _Link) -> list[str]:
     k, c, h = (matrix.diagonal() for matrix in link.matrices)
+    if link.table is not None and (_coupled(link) or not link.has_one_point):
+        raise ValueError(
+            "PBUSHT of nastran holds tables of single directions at one point: terms between directions, or reference "
+            "points that are apart, have none"
+        )
     if ((k == 0) & (h != 0)).any():
         return _nastran_matrices(link)  # GE is a multiple of K
     eta = np.divide(h, k, out=np.zeros(6), where=k != 0)
@@ -499,7 +639,29 @@ def _nastran_bush(link: _Link) -> list[str]:
         *system,
         *_bush(link, where),
         *_large("PBUSH", fields),
+        *_bush_tables(link),
     ]
+
+
+def _bush_tables(link: _Link) -> list[str]:
+    """Write PBUSHT and its tables; PBUSH holds what other analyses take, the first line."""
+    if link.table is None:
+        return []
+    fields: list[str | int | float] = [link.number]
+    tables: list[str] = []
+    number = link.number
+    for word, matrices in (("K", link.table.stiffness), ("B", link.table.damping)):
+        numbers: list[str | int | float] = []
+        for i in range(6):
+            values = matrices[:, i, i]
+            numbers.append(number if values.any() else "")
+            if values.any():
+                pairs = [float(x) for pair in zip(link.table.freq, values, strict=True) for x in pair]
+                tables += _large("TABLED1", [number, "", "", "", "", "", "", "", *pairs, "ENDT"])
+                number += 1
+        if any(one != "" for one in numbers):
+            fields += [*([] if fields == [link.number] else [""]), word, *numbers]
+    return [*_large("PBUSHT", fields), *tables]
 
 
 def _bush(link: _Link, where: list[str | int | float]) -> list[str]:
@@ -518,8 +680,7 @@ def _bush_place(link: _Link) -> tuple[list[str], list[str | int | float]] | None
     if link.positions is None or not link.has_arms:
         return [], []
     node_j, node_k = link.positions
-    at = node_j + link.arms[0]
-    if not np.allclose(at, node_k + link.arms[1], rtol=0, atol=_NO_ARM):
+    if not link.has_one_point:
         return None
     apart = node_k - node_j
     length = float(np.linalg.norm(apart))

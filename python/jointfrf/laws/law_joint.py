@@ -314,10 +314,12 @@ class LawJoint:
         nodes : sequence of two int
             Nodes j on A and k on B.
         freq_hz : float, optional
-            Where laws are taken that depend on frequency, which these cards cannot represent: stiffness and hysteretic
-            damping at that frequency. A comment says so.
-        element, number, rotation_nodes, damping, full_matrix, positions, points, units, faces, comments
+            Where laws are taken that depend on frequency, where there are no tables: stiffness and hysteretic damping
+            at that frequency. A comment says so.
+        element, number, rotation_nodes, damping, full_matrix, positions, points, units, faces, comments, connector
             As for `Joint.export`; no `positions` of a joint with masses.
+        table_hz : array_like, optional
+            Instead of `freq_hz`: laws as tables over these frequencies, as for `Joint.export`.
 
         Returns
         -------
@@ -328,8 +330,8 @@ class LawJoint:
         Raises
         ------
         ValueError
-            What the program cannot represent: a law that depends on frequency without `freq_hz`; masses that differ by
-            direction, or rotary inertia; what `Joint.export` rejects.
+            What the program cannot represent: a law that depends on frequency without `freq_hz` or `table_hz`;
+            masses that differ by direction, or rotary inertia; what `Joint.export` rejects.
 
         Examples
         --------
@@ -341,12 +343,21 @@ class LawJoint:
         102, 2, 1., 202, 2, -1.
         <BLANKLINE>
         """
-        springs = LawJoint(self.laws).constant_joint(freq_hz) if self.laws else None
-        varying = [
-            f"{type(law).__name__} of {','.join(dict.fromkeys(pair))}"
-            for pair, law in self.laws.items()
-            if law.constant_terms is None
-        ]
+        table_hz = options.get("table_hz")
+        if table_hz is not None and freq_hz is not None:
+            raise ValueError("freq_hz takes laws at one frequency, table_hz over many: name one of them")
+        springs = None
+        if self.laws:
+            springs = LawJoint(self.laws) if table_hz is not None else LawJoint(self.laws).constant_joint(freq_hz)
+        varying = (
+            []
+            if table_hz is not None
+            else [
+                f"{type(law).__name__} of {','.join(dict.fromkeys(pair))}"
+                for pair, law in self.laws.items()
+                if law.constant_terms is None
+            ]
+        )
         comment = {"abaqus": "**", "calculix": "**", "nastran": "$", "ansys": "!"}.get(program, "")
         if self.mass and options.get("positions") is not None:
             raise ValueError("point masses are written at the nodes: leave positions out")
@@ -354,7 +365,7 @@ class LawJoint:
         text = f"{note}: stiffness and hysteretic damping of that frequency hold there only\n" if note else ""
         number, element = options.get("number", 1), options.get("element", 1)
         if springs is not None:
-            cards = springs.export(program, nodes, **options)
+            cards = _springs(springs, program, nodes, options)
             text += cards
             element += len(cards.splitlines())  # beyond every element that these lines name
         if self.rigid:
@@ -368,6 +379,16 @@ class LawJoint:
             scaled = {dof: mass / own.mass for dof, mass in self.mass.items()}
             text += _masses(program, comment, scaled, nodes, (element, number))
         return text
+
+
+def _springs(springs: Joint | LawJoint, program: CardFormat, nodes: Sequence[int], options: CardOptions) -> str:
+    """Return the cards of springs and dampers, or of laws as tables over frequency."""
+    if isinstance(springs, Joint):
+        return springs.export(program, nodes, **options)
+    from jointfrf.io.cards import table_cards  # readers of files take their time to import
+
+    freq = as_real("table_hz", options["table_hz"], (None,))
+    return table_cards(program, springs.dofs, freq, springs.dynamic_stiffness(freq), nodes, **options)
 
 
 def _masses(

@@ -178,6 +178,62 @@ def test_negative_dashpots_of_a_joint_by_hand_are_left_out(program, tmp_path):
     assert texts["given", True] not in (texts["given", False], texts["without", True])
 
 
+LAWS = """
+[[law]]
+dof = "y"
+law = "standard-linear-solid"
+values = { k = 6e5, k_m = 3e5, tau = 2e-3 }
+
+[[law]]
+dof = "rz"
+law = "spring"
+values = { k = 5e3, h = 50.0 }
+"""
+
+
+def test_laws_are_exported_as_tables_that_a_straight_line_between_lines_meets(tmp_path):
+    (tmp_path / "laws.toml").write_text(LAWS)
+    joint = jf.read_joint(tmp_path / "laws.toml")
+    result = run_command("export", tmp_path / "laws.toml", "abaqus:1,2", "--frequency", "5:500")
+    assert (result.returncode, result.stderr) == (0, "")
+    spring, dashpot, turning, turning_damper = (
+        np.array([line.split(", ") for line in part.splitlines()[4:]], float)
+        for part in result.stdout.split("*ELEMENT")[1:]
+    )
+    freq = np.geomspace(5, 500, 1000)
+    exact = joint.dynamic_stiffness(freq)
+    for i, (k, c) in enumerate(((spring, dashpot), (turning, turning_damper))):
+        real, damping = (np.interp(freq, own[:, 1], own[:, 0]) for own in (k, c))
+        found = real + 2j * np.pi * freq * damping
+        assert abs(found / exact[:, i, i] - 1).max() < 2e-3
+    assert spring[[0, -1], 1].tolist() == [5, 500]
+    assert len(spring) <= 129
+    result = run_command("export", tmp_path / "laws.toml", "nastran:1,2", "--frequency", "5:500")
+    assert result.stdout.count("TABLED1*") == 4
+    one = run_command("export", tmp_path / "laws.toml", "abaqus:1,2", "--frequency", "5").stdout
+    assert "StandardLinearSolid of y at 5 Hz" in one
+    connector = run_command("export", "joint.toml", "abaqus:1,2", "--connector")
+    assert "*CONNECTOR DAMPING" in connector.stdout
+    assert (connector.returncode, connector.stderr) == (0, "")
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["ansys:1,2", "--frequency", "5:500"], "ansys has no tables over frequency: --frequency HZ names one"),
+        (["abaqus:1,2", "--frequency", "500:5"], "must be a frequency above 0 Hz, or LOW:HIGH, not '500:5'"),
+        (["abaqus:1,2"], "depends on frequency: name by --frequency HZ that at which it is taken"),
+        (["nastran:1,2", "--frequency", "5", "--connector"], "are for abaqus, not for nastran: leave --connector out"),
+        (["abaqus:1,2", "--frequency", "5", "--connector"], "--frequency LOW:HIGH gives a table over frequency"),
+    ],
+)  # fmt: skip
+def test_tables_that_cannot_be_written(tmp_path, words, message):
+    (tmp_path / "laws.toml").write_text(LAWS)
+    result = run_command("export", tmp_path / "laws.toml", *words)
+    assert result.returncode == 2
+    assert message in result.stderr
+
+
 WRONG = [
     (["frf", "b.toml", *LINES], 2, "--output is missing"),
     (["frf", "b.toml", "--output", "x.xls", *LINES], 2, "x.xls has no suffix of a format"),

@@ -115,6 +115,137 @@ def read_abaqus_matrices(text):
     return whole
 
 
+def read_connector(text, places):
+    """Frequencies, and K, C by frequency, (n, 12, 12), of one CONN3D2: motion of K as J, rotating, sees it."""
+    found, freq = {}, []
+    for word, parameters, rows in keywords(text):
+        if word == "*ELEMENT":
+            assert parameters["TYPE"] == "CONN3D2"
+            assert [int(x) for x in rows[0][1:]] == list(NODES)
+        elif word == "*CONNECTOR SECTION":
+            assert rows == [["CARTESIAN", "CARDAN"]]
+        elif word in ("*CONNECTOR ELASTICITY", "*CONNECTOR DAMPING"):
+            values = [float(x) for row in rows for x in row]
+            size = 22 if parameters.get("FREQUENCY DEPENDENCE") == "ON" else 21
+            assert len(values) % size == 0
+            assert all(len(row) == 8 for i, row in enumerate(rows) if i % 3 < 2)
+            matrices = []
+            for own in np.reshape(values, (-1, size)):
+                matrix = np.zeros((6, 6))
+                matrix.T[np.tril_indices(6)] = own[:21]  # 11, 12, 22, 13, ...: column after column
+                matrices.append(matrix + matrix.T - np.diag(matrix.diagonal()))
+            freq = np.reshape(values, (-1, size))[:, 21:].ravel()
+            found[word] = np.array(matrices)
+        else:
+            assert word == "*CONNECTOR BEHAVIOR"
+    apart = np.subtract(places[1], places[0])
+    seen = np.zeros((6, 12))
+    for i, unit in enumerate(np.eye(12)):
+        u_j, turn_j, u_k, turn_k = unit.reshape(4, 3)
+        seen[:, i] = [*(u_k - u_j - np.cross(turn_j, apart)), *(turn_k - turn_j)]
+    none = np.zeros((1, 6, 6))
+    order = ("*CONNECTOR ELASTICITY", "*CONNECTOR DAMPING")
+    return freq, *(seen.T @ found.get(word, none) @ seen for word in order)
+
+
+#: A joint whose stiffness and damping depend on frequency, with cross terms or without.
+LAWS = {
+    "y": jf.StandardLinearSolid(6e5, 2e5, 1e-3),
+    "theta_z": jf.FractionalZener(5e3, 1e3, 2e-4, 0.6),
+    "x": jf.SpringLaw(1e6, h=2e4),
+}
+TABLE_HZ = [10.0, 60.0, 200.0, 900.0]
+
+
+def of_laws(joint):
+    """K* of both sides over the table, (n, 12, 12), at x ... theta_z of nodes that lie at the joint."""
+    relative = np.zeros((len(joint.dofs), 12))
+    for row, dof in zip(relative, joint.dofs, strict=True):
+        row[[DOFS.index(dof), 6 + DOFS.index(dof)]] = 1, -1
+    return relative.T @ joint.dynamic_stiffness(TABLE_HZ) @ relative
+
+
+def moved(matrix, positions, point):
+    """The same for nodes elsewhere: rigid arms lead to the point."""
+    arms = np.zeros((12, 12))
+    for side, place in enumerate(positions):
+        own = slice(6 * side, 6 * side + 6)
+        arms[own, own] = rigid_offset(DOFS, np.subtract(point, place))
+    return arms.T @ matrix @ arms
+
+
+@pytest.mark.parametrize("coupled", [False, True])
+@pytest.mark.parametrize("beside", [False, True])
+def test_laws_as_tables_of_abaqus(coupled, beside):
+    laws = LAWS | ({("y", "theta_z"): jf.StandardLinearSolid(2e3, 1e2, 1e-3)} if coupled else {})
+    joint = jf.LawJoint(laws)
+    positions, point = (
+        ([[0.1, 0.2, 0.3], [0.15, 0.2, 0.28]], [0.12, 0.21, 0.3]) if beside else (2 * [[0, 0, 0]], [0, 0, 0])
+    )
+    text = joint.export("abaqus", NODES, table_hz=TABLE_HZ, positions=positions, points=point, faces=[[1], [2]])
+    text = text[: text.index("*NSET")]
+    exact = moved(of_laws(joint), positions, point)
+    if coupled or beside:
+        freq, stiffness, damping = read_connector(text, positions)
+        np.testing.assert_allclose(freq, TABLE_HZ, rtol=1e-13)
+    else:
+        stiffness, damping = np.zeros((2, len(TABLE_HZ), 12, 12))
+        at = None
+        for word, parameters, rows in keywords(text):
+            if word == "*ELEMENT":
+                at = parameters["TYPE"]
+                continue
+            assert (word, at) in (("*SPRING", "SPRING2"), ("*DASHPOT", "DASHPOT2"))
+            (dof, same), *lines = rows
+            assert dof == same
+            np.testing.assert_allclose([float(row[1]) for row in lines], TABLE_HZ, rtol=1e-13)
+            for matrix, row in zip(stiffness if word == "*SPRING" else damping, lines, strict=True):
+                spring(matrix, int(dof) - 1, 5 + int(dof), float(row[0]))
+    found = stiffness + 2j * np.pi * np.array(TABLE_HZ)[:, None, None] * damping
+    np.testing.assert_allclose(found, exact, atol=1e-12 * abs(exact).max())
+
+
+@pytest.mark.parametrize("units", ["SI", "mm-kg-ms"])
+def test_laws_as_tables_of_nastran(units):
+    joint = jf.LawJoint(LAWS)
+    cards = nastran_fields(joint.export("nastran", NODES, table_hz=TABLE_HZ, number=77, units=units))
+    names = [card[0] for card in cards]
+    assert names == ["CBUSH", "PBUSH", "PBUSHT", *["TABLED1"] * 6]
+    tables = {}
+    for card in cards[3:]:
+        assert card[2:9] == [""] * 7
+        values = [nastran_real(word) for word in card[9 : card.index("ENDT")]]
+        tables[card[1]] = np.reshape(values, (-1, 2))
+    groups = {}
+    for i in range(2):
+        word, *numbers = cards[2][2 + 8 * i : 9 + 8 * i]
+        groups[word] = numbers
+    assert cards[2][1] == cards[1][1] == "77"
+    si = {"SI": (1.0, 1.0, 1.0), "mm-kg-ms": (1e6, 1.0, 1e-3)}[units]  # N/m, N m/rad of a unit; s
+    exact = joint.dynamic_stiffness(TABLE_HZ)
+    for i, dof in enumerate(DOFS):
+        if dof not in joint.dofs:
+            assert groups["K"][i] == groups["B"][i] == ""
+            continue
+        own = exact[:, joint.dofs.index(dof), joint.dofs.index(dof)]
+        k, b = (tables[groups[word][i]] for word in "KB")
+        np.testing.assert_allclose(k[:, 0], np.array(TABLE_HZ) * si[2], rtol=1e-12)
+        scale = si[1] if dof.startswith("theta") else si[0]
+        np.testing.assert_allclose(k[:, 1] * scale, own.real, rtol=1e-10)
+        omega = 2 * np.pi * k[:, 0]  # per unit of time
+        np.testing.assert_allclose(omega * b[:, 1] * scale, own.imag, rtol=1e-10)
+        assert nastran_real(cards[1][3 + i]) == pytest.approx(k[0, 1], rel=1e-10)  # for other analyses
+
+
+def test_a_constant_joint_as_a_connector():
+    positions, point = [[0.1, 0.2, 0.3], [0.15, 0.2, 0.28]], [0.12, 0.21, 0.3]
+    text = WITHOUT_LOSS.export("abaqus", NODES, connector=True, positions=positions, points=point, faces=[[1], [2]])
+    _, stiffness, damping = read_connector(text[: text.index("*NSET")], positions)
+    for found, exact in zip((stiffness[0], damping[0]), expected(WITHOUT_LOSS), strict=False):
+        np.testing.assert_allclose(found, moved(exact, positions, point), atol=1e-12 * abs(exact).max())
+    assert "acts at node 202" in WITHOUT_LOSS.export("abaqus", NODES, connector=True)
+
+
 def nastran_fields(text):
     """Cards as lists of fields without the first and the tenth of every line of eight."""
     found = []
@@ -228,6 +359,27 @@ def test_text_holds_the_joint(joint, program, options, reader, digits):
     found = reader(joint.export(program, NODES, element=9001, number=77, **options))
     for ours, exact in zip(found, expected(joint), strict=True):
         np.testing.assert_allclose(ours, exact, rtol=10.0**-digits * 2, atol=1e-13 * abs(exact).max())
+
+
+@pytest.mark.parametrize(
+    ("joint", "program", "options", "message"),
+    [
+        (COUPLED, "abaqus", {"connector": True}, "a connector element holds no hysteretic damping: table_hz= gives"),
+        (DIAGONAL, "nastran", {"connector": True}, "connector elements are for abaqus"),
+        (WITHOUT_LOSS, "abaqus", {"connector": True, "full_matrix": True}, "exclude each other"),
+        (WITHOUT_LOSS, "abaqus", {"connector": True, "positions": [[0, 0, 0], [1, 0, 0]],
+                                  "points": [[0, 0, 0], [0.5, 0, 0]]}, "needs one reference point"),
+        (COUPLED, "nastran", {"table_hz": TABLE_HZ}, "PBUSHT of nastran holds tables of single directions"),
+        (DIAGONAL, "ansys", {"table_hz": TABLE_HZ}, "ansys has no tables over frequency"),
+        (DIAGONAL, "calculix", {"table_hz": TABLE_HZ}, "calculix has no tables over frequency"),
+        (DIAGONAL, "abaqus", {"table_hz": [0.0, 5.0]}, "at least two frequencies above 0 Hz"),
+        (DIAGONAL, "abaqus", {"table_hz": [5.0]}, "at least two frequencies above 0 Hz"),
+        (DIAGONAL, "abaqus", {"table_hz": TABLE_HZ, "full_matrix": True}, "matrices have none"),
+    ],
+)  # fmt: skip
+def test_what_no_connector_and_no_table_holds(joint, program, options, message):
+    with pytest.raises(ValueError, match=re.escape(message)):
+        joint.export(program, NODES, **options)
 
 
 def test_calculix_springs_add_up_to_the_matrix():
