@@ -247,7 +247,7 @@ class Joint:
         matrices = self.stiffness, self.damping, self.hysteretic_stiffness
         from jointfrf.io.cards import spring_cards, table_cards  # readers of files take their time to import
 
-        if options.get("table_hz") is not None:
-            freq = as_real("table_hz", options["table_hz"], (None,))
+        if (table_hz := options.get("table_hz")) is not None:
+            freq = as_real("table_hz", table_hz, (None,))
             return table_cards(program, self.dofs, freq, self.dynamic_stiffness(freq), nodes, **options)
         return spring_cards(program, self.dofs, matrices, nodes, **options)

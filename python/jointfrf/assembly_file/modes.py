@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Annotated
 
+import msgspec
 import numpy as np
 
 from jointfrf.cases.keys import MAP, read_frf_file
@@ -95,7 +96,7 @@ class ModesKeys(SubstructureKeys, tag="modes"):
         key("FRFs of the part by themselves, from which residuals of modes below and above the band are fitted, pair "
             "by pair.", takes="name of a file of FRFs", absent="those of the file, or none"),
     ] = None  # fmt: skip
-    map: Annotated[dict[str, str], MAP] = field(default_factory=dict)
+    map: Annotated[dict[str, str], MAP] = msgspec.field(default_factory=dict)
     damping_ratio: Annotated[
         float, key("Damping ratio of modes for which the file has none, as those of FE programs.", ge=0, le=0.99)
     ] = 0.0

@@ -365,7 +365,7 @@ class LawJoint:
         text = f"{note}: stiffness and hysteretic damping of that frequency hold there only\n" if note else ""
         number, element = options.get("number", 1), options.get("element", 1)
         if springs is not None:
-            cards = _springs(springs, program, nodes, options)
+            cards = _springs(springs, program, nodes, table_hz, options)
             text += cards
             element += len(cards.splitlines())  # beyond every element that these lines name
         if self.rigid:
@@ -381,13 +381,19 @@ class LawJoint:
         return text
 
 
-def _springs(springs: Joint | LawJoint, program: CardFormat, nodes: Sequence[int], options: CardOptions) -> str:
+def _springs(
+    springs: Joint | LawJoint,
+    program: CardFormat,
+    nodes: Sequence[int],
+    table_hz: ArrayLike | None,
+    options: CardOptions,
+) -> str:
     """Return the cards of springs and dampers, or of laws as tables over frequency."""
-    if isinstance(springs, Joint):
+    if isinstance(springs, Joint) or table_hz is None:
         return springs.export(program, nodes, **options)
     from jointfrf.io.cards import table_cards  # readers of files take their time to import
 
-    freq = as_real("table_hz", options["table_hz"], (None,))
+    freq = as_real("table_hz", table_hz, (None,))
     return table_cards(program, springs.dofs, freq, springs.dynamic_stiffness(freq), nodes, **options)
 
 

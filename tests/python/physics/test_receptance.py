@@ -427,10 +427,12 @@ def test_96_free_beams_are_singular_at_0_hz_however_they_are_solved():
 
 def test_the_error_estimate_says_of_which_lines():
     k, m = plate(12)
+    order = np.random.default_rng(0).permutation(k.shape[0])  # no narrow band, which is solved line by line
+    k, m = k.toarray()[np.ix_(order, order)], m.toarray()[np.ix_(order, order)]
     for method, freq in (("krylov", LINES), ("auto", np.linspace(1, 15, 900))):
         given = dict(loss_factor=0.02, outputs=[0, 70], inputs=[0, 70])
         h, info = jf.receptance(freq, k, m, method=method, full_output=True, **given)
-        assert info.method == ("krylov" if method == "krylov" else "modal")
+        assert info.method == {"krylov": "krylov", "auto": "modal"}[method]
         lines = np.searchsorted(freq, info.checked_hz)
         np.testing.assert_array_equal(freq[lines], info.checked_hz)
         exact = jf.receptance(freq[lines], k, m, method="sparse", **given)
