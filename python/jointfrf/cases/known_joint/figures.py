@@ -335,6 +335,26 @@ def _regenerated(result: KnownJointResult) -> Iterator[Figure]:
         caption = f"Receptance of the assembly at {_place(result, one)}, regenerated from the identified parameters"
         columns = 1 if len(pairs) < 3 else 2
         yield Figure(f"regenerated-{one.key}", caption, side_by_side(pairs, columns), columns)
+        if one.bands:
+            yield Figure(f"zoom-{one.key}", f"{caption}, where errors are counted", _zoomed(result, one))
+
+
+def _zoomed(result: KnownJointResult, one: Observed) -> tuple[Panel, ...]:
+    """One realisation of each method beside the actual FRF, in each band by itself."""
+    noise, freq = result.case.noises[0].name, result.exact.freq_hz
+    names = (*(own.name for own in result.case.band_sets[:1]), ALL_LINES)
+    found = [r for r in result.regenerated
+             if r.observed == one and r.identified.noise == noise and r.identified.bands in names]  # fmt: skip
+    found = [r for r in found if r.identified.method in _SINGLE] or found[:2]
+    lines = [("actual", _curve(result, "actual", result.exact.h_c, one, "actual").h, "actual")]
+    lines += [(_METHOD_NAMES[r.identified.method], r.first, r.identified.method) for r in found]
+    panels = []
+    for low, high in one.bands:
+        inside = (freq >= low) & (freq <= high)
+        curves = tuple(Curve(name, freq[inside], np.abs(h[inside]), style) for name, h, style in lines)
+        title = f"{low:g} to {high:g} Hz, one realisation"
+        panels.append(Panel(title, FREQUENCY, _label(result, one), curves, x_limits=(low, high), log_y=True))
+    return tuple(panels)
 
 
 def _regenerated_panels(result: KnownJointResult, regenerated: RegeneratedFrf) -> tuple[Panel, Panel]:
