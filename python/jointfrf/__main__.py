@@ -1,4 +1,4 @@
-"""`python -m jointfrf`."""
+"""The command `jointfrf`, and `python -m jointfrf`: what it is made of is imported where Ctrl-C is already known."""
 
 import os
 import sys
@@ -9,7 +9,16 @@ _HERE = os.getcwd()
 if not sys.flags.safe_path and sys.path[:1] == [_HERE] and Path(__file__).resolve().parents[1] != Path(_HERE).resolve():
     del sys.path[0]
 
-from jointfrf.cli.main import main  # noqa: E402
+
+def main() -> int:
+    """Run the command line; returns the exit status, 130 after Ctrl-C."""
+    try:
+        from jointfrf.cli.main import main as run
+    except KeyboardInterrupt:
+        print("jointfrf: error: interrupted", file=sys.stderr)
+        return 130
+    return run()
+
 
 if __name__ == "__main__":  # workers of MPI import this
     sys.exit(main())

@@ -8,7 +8,7 @@ import signal
 import sys
 import threading
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, redirect_stderr, redirect_stdout
 from types import FrameType
 from typing import Any, TextIO, cast
@@ -51,8 +51,8 @@ def _answer(words: list[str]) -> int:
             return _USAGE_ERROR
         if words[0].startswith("-"):
             top_parser()[0].parse_words(words)  # prints help, version or what is wrong, and ends
-        with _interrupts():
-            status = _run(words)
+        with _interrupts() as stop_if_interrupted:
+            status = _run(words, stop_if_interrupted)
         sys.stdout.flush()
         return status
     except UsageError as error:
@@ -69,13 +69,14 @@ def _answer(words: list[str]) -> int:
     return _FAILURE
 
 
-def _run(words: list[str]) -> int:
+def _run(words: list[str], stop_if_interrupted: Callable[[], None]) -> int:
     """Run one command."""
     name = words[0]
     if name not in COMMANDS:
         hint = did_you_mean(name, COMMANDS) or ": jointfrf --help lists them"
         raise UsageError(f"there is no command {name!r}{hint}")
-    parser = command_parser(name)
+    parser = command_parser(name)  # imports the command
+    stop_if_interrupted()
     args = parser.parse_words(words[1:])
     args.typed = shlex.join(["jointfrf", *words])
     args.warned = []
@@ -114,8 +115,11 @@ if __name__ == "__main__":
 
 
 @contextmanager
-def _interrupts() -> Iterator[None]:
-    """Raise KeyboardInterrupt after Ctrl-C, also where what it cuts short, such as an import, calls it otherwise."""
+def _interrupts() -> Iterator[Callable[[], None]]:
+    """Raise KeyboardInterrupt after Ctrl-C, also where what it cuts short, such as an import, calls it otherwise.
+
+    Where an import goes on, since only a callback was cut short, the function that is yielded raises it.
+    """
     have_come = False
 
     def note(number: int, frame: FrameType | None) -> None:
@@ -123,13 +127,22 @@ def _interrupts() -> Iterator[None]:
         have_come = True
         raise KeyboardInterrupt
 
+    def stop_if_interrupted() -> None:
+        if have_come:
+            raise KeyboardInterrupt
+
+    def note_unraisable(found: sys.UnraisableHookArgs) -> None:
+        if not isinstance(found.exc_value, KeyboardInterrupt):
+            before(found)
+
     # Another handler, or none (a shell starts what runs in its background so), is left as it is.
     is_usual = signal.getsignal(signal.SIGINT) is signal.default_int_handler
-    own = is_usual and threading.current_thread() is threading.main_thread()
+    own, before = is_usual and threading.current_thread() is threading.main_thread(), sys.unraisablehook
     if own:
         signal.signal(signal.SIGINT, note)
+        sys.unraisablehook = note_unraisable
     try:
-        yield
+        yield stop_if_interrupted
     except Exception as error:
         if have_come:
             raise KeyboardInterrupt from error
@@ -137,6 +150,7 @@ def _interrupts() -> Iterator[None]:
     finally:
         if own:
             signal.signal(signal.SIGINT, signal.default_int_handler)
+            sys.unraisablehook = before
 
 
 @contextmanager

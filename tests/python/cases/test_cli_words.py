@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+import weakref
 from functools import partial
 from itertools import chain, repeat
 from pathlib import Path
@@ -17,6 +18,7 @@ import numpy as np
 import pytest
 
 from command import run_command
+from jointfrf.__main__ import main as started
 from jointfrf.cli.main import main
 from jointfrf.cli.parser import COMMANDS, command_parser
 
@@ -359,6 +361,34 @@ def test_an_interrupt_that_an_import_calls_something_else(monkeypatch, capsys):
     monkeypatch.setattr("jointfrf.cli.cases.run", cut_short)
     monkeypatch.setattr(signal, "getsignal", lambda number: signal.default_int_handler)
     assert main(["cases"]) == 130
+    assert capsys.readouterr().err == "jointfrf: error: interrupted\n"
+
+
+def test_an_interrupt_inside_a_callback_that_an_import_calls(monkeypatch, capsys):
+    """Python only prints what a callback raises, and goes on."""
+
+    def swallowed(name):
+        gone = set()
+        held = weakref.ref(gone, lambda _: signal.raise_signal(signal.SIGINT))
+        del gone
+        assert held() is None
+        return command_parser(name)
+
+    monkeypatch.setattr("jointfrf.cli.main.command_parser", swallowed)
+    monkeypatch.setattr(signal, "getsignal", lambda number: signal.default_int_handler)
+    assert main(["cases"]) == 130
+    assert capsys.readouterr().err == "jointfrf: error: interrupted\n"
+
+
+def test_an_interrupt_while_the_command_is_imported(monkeypatch, capsys):
+    class Cut:
+        def find_spec(self, name, path=None, target=None):
+            if name == "jointfrf.cli.main":
+                raise KeyboardInterrupt
+
+    monkeypatch.delitem(sys.modules, "jointfrf.cli.main")
+    monkeypatch.setattr(sys, "meta_path", [Cut(), *sys.meta_path])
+    assert started() == 130
     assert capsys.readouterr().err == "jointfrf: error: interrupted\n"
 
 
