@@ -202,6 +202,28 @@ def test_ismm_against_decoupling(results):
         assert error < 0.05 * rr[parameter], parameter
 
 
+def test_decoupling_by_two_translations(results):
+    """With little noise translations far apart find the rotation, which the tip alone loses (figure 3-29)."""
+    apart = results["3.3.1-two-translations"]
+    at_tip = results["3.3.1-decoupling"]
+    assert apart.case.points["s"] == ("226:y", "26:y")
+    tip = dataclasses.replace(apart.case, points=at_tip.case.points)
+    (by_rotation,) = [
+        one.theta
+        for one in estimate_realisations(tip, exact_frfs(tip), COUNT)
+        if (one.noise, one.method) == ("0.1 %", "decoupling-ss")
+    ]
+    (by_translations,) = [
+        one.theta for one in apart.identified if (one.noise, one.method) == ("0.1 %", "decoupling-ss")
+    ]
+    lost, found = (np.median(theta, axis=0)[[1, 3]] / [5e3, 1.5] - 1 for theta in (by_rotation, by_translations))
+    assert (lost < -0.95).all()
+    assert (abs(found) < 0.25).all()
+    with_noise = rmse(apart, "5 %", "decoupling-ss")
+    assert with_noise["k_Mtheta"] > 90
+    assert rmse(apart, "5 %", "ismm")["k_Mtheta"] < 10
+
+
 def test_regenerated_frfs_are_near_the_exact_ones(results):
     found = [r for r in results["3.3-beams-1mm"].regenerated if r.identified.method == "compliance"]
     assert {r.observed.key for r in found} == {"r", "s"}

@@ -13,11 +13,12 @@ _SHORT = {
     "3.2-fe-beams": (1, 300),
     "3.3-beams-1mm": (3, 60),
     "3.3.1-decoupling": (3, 60),
+    "3.3.1-two-translations": (3, 60),
     "4.3.1-six-dof": (4, 8),
     "4.3.2-six-dof-decoupling": (4, 4),
 }
-PLANE = list(_SHORT)[:4]
-SOLID = list(_SHORT)[4:]
+PLANE = list(_SHORT)[:5]
+SOLID = list(_SHORT)[5:]
 
 
 def compute_thinned(name: str) -> KnownJointResult:
