@@ -152,22 +152,23 @@ class AssemblyPart:
             return keys.build(lambda: Substructure.of_frfs(freq_hz, h, named, keys.joint))
         assert isinstance(self.structure, ModelStructure)
         unknowns = {name: self._unknown(name, prior) for name, prior in self._priors().items()}
+        known = keys.joint, unknowns, keys.exact, keys.model_error
         if set(unknowns) <= set(SCALES):
             # Factors of the matrices are faster than models built again.
             means = {name: one.value for name, one in unknowns.items() if hasattr(keys, name)}
             model = self._model(means) if means != self._numbers(means) else self.structure.model
-            return keys.build(lambda: Substructure(model, keys.joint, unknowns, keys.exact))
+            return keys.build(lambda: Substructure(model, *known))
         if isinstance(keys, MatricesPart):
             model = self.structure.model
-            return keys.build(lambda: Substructure(partial(scaled_model, model), keys.joint, unknowns, keys.exact))
-        return keys.build(lambda: Substructure(lambda **values: self._model(values), keys.joint, unknowns, keys.exact))
+            return keys.build(lambda: Substructure(partial(scaled_model, model), *known))
+        return keys.build(lambda: Substructure(lambda **values: self._model(values), *known))
 
     def _priors(self) -> Mapping[str, Prior]:
         """Return what is unknown by the names of the numbers of this part."""
         keys = self.keys
         assert not isinstance(keys, ReceptancesPart | ModesPart)
         takes = ["length_scale"] if isinstance(keys, MatricesPart) else []
-        takes += [one.name for one in msgspec.structs.fields(keys) if isinstance(getattr(keys, one.name), float)]
+        takes += _numbers_of(keys)
         meant = dict(_MEANT)
         if "length" in takes:
             meant["length_scale"] = "length"
@@ -189,16 +190,17 @@ class AssemblyPart:
         return structure.model
 
     def _unknown(self, name: str, prior: Prior) -> Unknown:
-        keys = self.keys
-        numbers = {
-            one.name: value
-            for one in msgspec.structs.fields(keys)
-            if isinstance(value := getattr(keys, one.name), float)
-        }
+        keys, numbers = self.keys, _numbers_of(self.keys)
         table = keys.table if isinstance(keys.table.content.get("unknown"), list) else keys.table.table("unknown")
         if name not in numbers and isinstance(prior, PriorKeys) and prior.mean is not None:
             raise table.wrong(name, "it is a factor of the matrices, about 1: leave mean out")
         return unknown_of(prior, numbers.get(name, 1.0), table, name, -np.inf if name == "poisson" else 0.0)
+
+
+def _numbers_of(keys: PartKeys) -> dict[str, float]:
+    """Return the numbers of the model by their keys."""
+    values = {one.name: getattr(keys, one.name) for one in msgspec.structs.fields(keys) if one.name != "model_error"}
+    return {name: value for name, value in values.items() if isinstance(value, float)}
 
 
 def named_dof(part: AssemblyPart, dof: str) -> NamedDof:

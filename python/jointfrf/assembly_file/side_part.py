@@ -94,7 +94,9 @@ def read_side(
         found.append(named)
     names = [dof for own in found for channel in own for dof in channel]
     substructure = part.substructure(freq_hz, names)
-    model = part.keys.build(lambda: SideModel(substructure, tuple(found[0]), tuple(found[1])))
+    # The eigenvalue of a mode holds both errors, of its stiffness and of its mass.
+    modes = {} if substructure.model_error is None else {"modes": np.sqrt(2) * substructure.model_error}
+    model = part.keys.build(lambda: SideModel(substructure, tuple(found[0]), tuple(found[1]), **modes))
     text = [f"side by {path}: {len(responses)} responses, {len(forces)} excitations", *part.describe()]
     text += [f"  nearest nodes: {'; '.join(moved.values())}"] if moved else []
     return SidePart(model, tuple(text))

@@ -53,7 +53,8 @@ class SideModel:
     forces : the same, optional
         Its excitations; the responses by default.
     modes : float
-        Relative standard deviation of the eigenvalue of each mode beside that, 0.03: 1.5 % of its frequency.
+        Relative standard deviation of the eigenvalue of each mode beside that, 0.03: 1.5 % of its frequency; in place
+        of the `model_error` of the part.
 
     Raises
     ------

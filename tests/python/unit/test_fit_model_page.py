@@ -85,7 +85,7 @@ def test_what_to_measure_next_keeps_its_promise(fit):
     """The standard errors of a fit with the channel that is named, against those that were promised."""
     assert is_wide(fit)
     best = fit.data.next_channels()[0]
-    assert best.widest == "c_y"
+    assert best.widest == "c_theta"
     assert best.dof not in fit.responses
     more = fit_of(["B/10:y", "A/7:y", best.dof], ["B/10:y"]) if best.kind == "response" else fit_of(
         ["B/10:y", "A/7:y"], ["B/10:y", best.dof]
@@ -96,7 +96,7 @@ def test_what_to_measure_next_keeps_its_promise(fit):
     sentences = next_sentences(fit)
     assert sentences[0].startswith("Measure a ")
     assert best.dof in sentences[0]
-    assert "c_y" in sentences[0]
+    assert "c_theta" in sentences[0]
 
 
 def test_nothing_is_advised_where_intervals_are_narrow(fit):

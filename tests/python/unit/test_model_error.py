@@ -8,7 +8,13 @@ import pytest
 
 import jointfrf as jf
 from jointfrf.identification.minimise import Linearised, minimise
-from jointfrf.identification.model.evidence import _Levels, _with_errors, with_model_error
+from jointfrf.identification.model.evidence import (
+    ModelError,
+    _deviations,
+    _Levels,
+    _with_errors,
+    with_model_error,
+)
 from jointfrf.identification.model.model_error import ModalErrors
 from jointfrf.identification.model.prepare import Channels, prepare_model_fit
 from jointfrf.identification.noise import NoiseOptions
@@ -48,7 +54,7 @@ def test_errors_that_make_a_mass_negative_are_no_minimum():
     problem = problem_of(assembly(TRUTH, exact=False))
     for side in problem.prediction.sides:
         side.allow_errors(30)
-    vector = _with_errors(problem.vector, problem.prediction, 0.01)
+    vector = _with_errors(problem.vector, problem.prediction, _deviations(problem.prediction, ModelError(0.01, 0, 0)))
     values = vector.values.copy()
     values[[i for i, one in enumerate(vector.all) if one.is_error]] = -5.0
     likelihood = replace(problem.likelihood, vector=vector)
@@ -60,7 +66,7 @@ def test_derivatives_by_the_errors_are_differences_of_frfs():
     problem = problem_of(assembly(TRUTH, exact=False))
     for side in problem.prediction.sides:
         side.allow_errors(30)
-    vector = _with_errors(problem.vector, problem.prediction, 0.01)
+    vector = _with_errors(problem.vector, problem.prediction, _deviations(problem.prediction, ModelError(0.01, 0, 0)))
     rng = np.random.default_rng(3)
     values = vector.values.copy()
     own = [i for i, one in enumerate(vector.all) if one.is_error]
@@ -114,7 +120,7 @@ def test_evidence_is_the_marginal_likelihood_of_a_linear_model():
     about = Linearised(
         float(residual @ residual + x @ prior @ x), slopes.T @ slopes + prior, slopes.T @ residual - prior @ x
     )
-    levels = _Levels(about, x, p, first)
+    levels = _Levels(about, x, np.ones(q), np.full(q, first))
 
     def by_covariance(level):
         covariance = np.eye(n) + level**2 * of_e @ of_e.T
@@ -128,6 +134,50 @@ def test_evidence_is_the_marginal_likelihood_of_a_linear_model():
         own, other = (f(level) - f(0.05) for f in (levels.evidence, by_covariance))
         # Of levels 3000 times apart the information has 1e7 times that of the data: 1e7 roundings.
         assert own == pytest.approx(other, abs=1e-6)
+    # The largest level that is not excluded is the last one, in steps of a factor of 1.12, within 3.84 of the best.
+    largest, costs = levels.error().largest, [by_covariance(level) for level in np.geomspace(1e-6, 0.3 / 9, 93)]
+    assert by_covariance(largest) <= min(costs) + 3.84 + 1e-6
+    assert largest == pytest.approx(0.3 / 9) or by_covariance(1.13 * largest) > min(costs) + 3.84 - 1e-6
+
+
+def test_errors_are_believed_as_far_as_they_are_not_excluded():
+    error = ModelError(0.0, 0.0, 0.002)
+    assert [error.of_part(believed) for believed in (0.0, 0.001, 0.005)] == [0.0, 0.001, 0.002]
+    assert ModelError(0.003, 20.0, 0.004).of_part(0.0) == 0.003
+    own = assembly(TRUTH).b.source
+    parts = [jf.Substructure(own, ["1:y", "1:theta"], **said)
+             for said in ({}, {"exact": True}, {"model_error": 0}, {"model_error": 0.02})]  # fmt: skip
+    assert [part.error_level for part in parts] == [0.005, 0.0, 0.0, 0.02]
+    for wrong in ({"model_error": 0.02, "exact": True}, {"model_error": -0.01}, {"model_error": 0.2}):
+        with pytest.raises(ValueError, match="model_error"):
+            jf.Substructure(own, ["1:y", "1:theta"], **wrong)
+
+
+def test_intervals_allow_for_a_mesh_that_is_too_coarse_beyond_the_band():
+    """Four elements for twelve: the first modes are right to 0.2 %, those beyond the band wrong by up to 30 %.
+
+    One FRF with 5 % noise hardly shows it; k_y is off by 8 %, three times the half of an interval without errors.
+    """
+    channel = ("B/10:y",)
+    exact = assembly(TRUTH).receptance(FREQ, channel, channel)
+
+    def fitted(seed, model_error=None):
+        parts = []
+        for length, elements, ends, joint in ((0.3, 4, ("clamped", "free"), 5), (0.225, 3, ("free", "free"), 1)):
+            model = jf.beam(length, elements, ends=ends, youngs_modulus=67e9, **SECTION)
+            parts.append(jf.Substructure(model, [f"{joint}:y", f"{joint}:theta"], model_error=model_error))
+        whole = jf.Assembly(*parts, jf.Joint(*GUESS, ["y", "theta"]))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            fit = jf.identify_model(FREQ, jf.pollute(exact, 0.05, seed=seed), whole, ["B/4:y"], ["B/4:y"])
+        return fit, fit.confidence_interval(0.95)["k_y"]
+
+    found = [fitted(seed) for seed in range(4)]
+    said = [any(one.kind == "model" and one.severity == "warning" for one in fit.findings) for fit, _ in found]
+    held = [low < TRUE["k_y"] < high for _, (low, high) in found]
+    assert sum(np.logical_or(said, held)) >= 3
+    (low, high), (narrow, wide) = found[0][1], fitted(0, 0.0)[1]
+    assert high - low > 1.3 * (wide - narrow)
 
 
 @pytest.mark.parametrize("exact", [True, False])

@@ -2,6 +2,7 @@
 
 import itertools
 import json
+import warnings
 
 import numpy as np
 import pytest
@@ -62,7 +63,10 @@ def test_fits_scatter_as_predicted():
     exact = whole.receptance(FREQ, test.sensors, test.hits)
     away = []
     for seed in range(40):
-        fit = jf.identify_model(FREQ, jf.pollute(exact, 0.05, seed=seed), whole, test.sensors, test.hits, noise=0.05)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # one fit of 80 finds an error of the models by chance
+            h = jf.pollute(exact, 0.05, seed=seed)
+            fit = jf.identify_model(FREQ, h, whole, test.sensors, test.hits, noise=0.05)
         away += [(fit.value[name] - true) / test.std_error[name] for name, true in (("k_x", 2000), ("c_x", 3))]
     assert 0.75 < np.std(away) < 1.25  # 80 numbers scatter by 8 %: three times that
 

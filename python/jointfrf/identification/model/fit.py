@@ -249,7 +249,7 @@ def _judged(problem: ModelProblem, minimum: Minimum, other: float) -> FoundModel
     test = with_error = _test(problem, likelihood, minimum, residual, predicted)
     # Of a residual that errors of channels explain, none is one of the models.
     explained = problem.noise.calibration is not None and test.is_noise
-    found = None if explained else with_model_error(likelihood, minimum)
+    found = with_model_error(likelihood, minimum, is_sought=not explained)
     if found is not None:
         likelihood, minimum = found[:2]
         residual, predicted = _residual(problem, likelihood, minimum)

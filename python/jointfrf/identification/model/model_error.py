@@ -13,6 +13,9 @@ __all__ = ["ErrorTerm", "ModalErrors"]
 
 #: Modes up to this many times the highest frequency mix with each other; of those above only the stiffness may be off.
 _MIXED = 3.0
+#: Errors of meshes grow with this power of the frequency beyond the band: the square of the wave number times the size
+#: of solid elements, its fourth power for beams in bending, whose wave number goes with the root of the frequency.
+_GROWTH = 2.0
 #: A mode below this share of the highest frequency is one of a free body: it has no stiffness that could be off.
 _RIGID = 1e-3
 
@@ -26,7 +29,7 @@ class ErrorTerm(NamedTuple):
     row, column : int
         Modes, row <= column.
     weight : float
-        Its standard deviation for a level of 1.
+        Its standard deviation for a level of 1: 1 of modal stiffnesses and masses in the band, more beyond it.
     """
 
     matrix: str
@@ -53,6 +56,7 @@ class ModalErrors:
     entries, as of the Gaussian orthogonal ensemble: K + W G_K W, W = diag(w_a), and M + G_M; entries on the diagonal
     have twice the variance of others. These are random matrices about a mean model as in [1]_, to first order of the
     dispersion, so that an error of E, of a section, a mass or a clamp is one draw of them; rigid bodies stay free.
+    Above the band the standard deviation grows with the square of the frequency, up to the ninefold.
 
     References
     ----------
@@ -68,11 +72,12 @@ class ModalErrors:
         elastic = [a for a in range(w.size) if w[a] > _RIGID * highest]
         mixed = np.count_nonzero(w < _MIXED * highest)
         pairs = sorted(((a, b) for b in range(mixed) for a in range(b + 1)), key=lambda ab: (ab[1] - ab[0], ab[1]))
-        first = [ErrorTerm("K", a, a, 1.0) for a in elastic if a < mixed]
-        first += [ErrorTerm("M", a, a, 1.0) for a in range(mixed)]
-        first += [ErrorTerm("K", a, a, 1.0) for a in elastic if a >= mixed]
+        root = np.sqrt(np.clip(w / highest, 1.0, _MIXED) ** _GROWTH)
+        first = [ErrorTerm("K", a, a, float(root[a] ** 2)) for a in elastic if a < mixed]
+        first += [ErrorTerm("M", a, a, float(root[a] ** 2)) for a in range(mixed)]
+        first += [ErrorTerm("K", a, a, float(root[a] ** 2)) for a in elastic if a >= mixed]
         others = [
-            ErrorTerm(matrix, a, b, float(np.sqrt(0.5)))
+            ErrorTerm(matrix, a, b, float(np.sqrt(0.5) * root[a] * root[b]))
             for a, b in pairs
             if a != b
             for matrix in "KM"

@@ -71,6 +71,10 @@ class Unknown:
 
 #: Relative standard deviations of what no model knows exactly: Young's modulus, density.
 _NEVER_EXACT = {"youngs_modulus": 0.03, "density": 0.01}
+#: Relative standard deviation of each modal stiffness and mass of a model, beside what its unknowns describe.
+_MODEL_ERROR = 0.005
+#: Above this a model does not describe its part.
+_LARGEST_ERROR = 0.1
 #: What a model's own matrices may be scaled by, and its loss factor.
 SCALES = ("youngs_modulus", "density", "loss_factor")
 
@@ -110,6 +114,9 @@ class Substructure:
         Whether nothing else of a model is unknown. By default none is exact: Young's modulus and density, where they
         are not among the unknowns, are fitted as factors of K and M under priors of 3 % and 1 %, the coefficients of
         variation of structural steel [1]_.
+    model_error : float, optional
+        Relative standard deviation of each modal stiffness and mass of the free substructure that is believed beside
+        what its unknowns describe: mesh, clamps, small masses. 0.005 by default, 0 of a model that is exact.
 
     References
     ----------
@@ -119,7 +126,8 @@ class Substructure:
     Raises
     ------
     ValueError
-        An unknown that the source does not have; unknowns of FRFs.
+        An unknown that the source does not have; unknowns or errors of FRFs; an error that is negative or above 0.1,
+        or of what is exact.
 
     Examples
     --------
@@ -137,6 +145,7 @@ class Substructure:
     joint: tuple[str, ...]
     unknowns: Mapping[str, Unknown] = field(default_factory=dict)
     exact: bool = False
+    model_error: float | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "joint", as_names("joint", self.joint))
@@ -157,6 +166,12 @@ class Substructure:
                     raise ValueError(f"{name} must be positive, not {self.unknowns[name].value:g}")
         if not isinstance(self.source, Model | FrfSource) and not callable(self.source):
             raise TypeError(f"source must be a Model, a function or FRFs, not {type(self.source).__name__}")
+        if self.model_error is not None:
+            object.__setattr__(self, "model_error", as_number("model_error", self.model_error))
+            if not 0 <= self.model_error <= _LARGEST_ERROR:
+                raise ValueError(f"model_error must be 0 to {_LARGEST_ERROR:g}, not {self.model_error:g}")
+            if self.model_error and (self.exact or isinstance(self.source, FrfSource)):
+                raise ValueError("model_error: FRFs, and a model that is exact, have none")
 
     @classmethod
     def of_frfs(cls, freq_hz: ArrayLike, h: ArrayLike, dofs: Sequence[str], joint: Sequence[str]) -> Substructure:
@@ -193,6 +208,13 @@ class Substructure:
             return dict(self.unknowns)
         errors = {name: Unknown(1.0, std, 0.0) for name, std in _NEVER_EXACT.items() if name not in self.unknowns}
         return {**self.unknowns, **errors}
+
+    @property
+    def error_level(self) -> float:
+        """Relative standard deviation of its modal stiffnesses and masses beside its unknowns."""
+        if self.model_error is None:
+            return 0.0 if self.exact or isinstance(self.source, FrfSource) else _MODEL_ERROR
+        return self.model_error
 
     @cached_property
     def scaled(self) -> dict[str, Unknown]:
