@@ -4,9 +4,14 @@ import os
 import sys
 from pathlib import Path
 
-# Python has put the working directory first among the places of modules.
+# `python -m` has put the working directory first among the places of modules; the script of the command has not.
 _HERE = os.getcwd()
-if not sys.flags.safe_path and sys.path[:1] == [_HERE] and Path(__file__).resolve().parents[1] != Path(_HERE).resolve():
+if (
+    __name__ != "jointfrf.__main__"
+    and not sys.flags.safe_path
+    and sys.path[:1] == [_HERE]
+    and Path(__file__).resolve().parents[1] != Path(_HERE).resolve()
+):
     del sys.path[0]
 
 
