@@ -24,6 +24,9 @@ __all__ = [
     "direction_places",
     "is_rotation",
     "joint_parameters",
+    "parameter_name",
+    "parameters_shared",
+    "point_and_direction",
     "rigid_motion",
     "rigid_offset",
 ]
@@ -41,6 +44,8 @@ _PLACES = {prefix + axis: i for prefix in _TRANSLATIONS for i, axis in enumerate
 }
 #: A rotation whose axis the name may leave out, as in a plane: theta, Mtheta, rot1.
 _ROTATION = re.compile(r"m?(theta|phi|rot|r[xyz])", re.IGNORECASE)
+#: What follows the point in the name of a parameter.
+_OF_POINT = re.compile("[khc]_")
 
 #: Units of numbers of a joint between two DOFs of which 0, 1 or 2 are rotations.
 UNITS = {
@@ -55,15 +60,87 @@ UNITS = {
 ParameterKind = Literal["k", "h", "c"]
 
 
+def point_and_direction(dof: str) -> tuple[str, str]:
+    """Return the point and the direction of a DOF like ``"bolt1.y"``: of one of several joint points.
+
+    Examples
+    --------
+    >>> from jointfrf.dofs import point_and_direction
+    >>> point_and_direction("bolt1.theta_x"), point_and_direction("y")
+    (('bolt1', 'theta_x'), ('', 'y'))
+    """
+    point, _, direction = dof.rpartition(".")
+    return (point, direction) if point and direction else ("", dof)
+
+
+def parameter_name(kind: str, row: str, column: str) -> str:
+    """Name a number of a joint between two DOFs: first the point where both have the same.
+
+    Examples
+    --------
+    >>> from jointfrf.dofs import parameter_name
+    >>> parameter_name("k", "y", "y"), parameter_name("c", "bolt1.y", "bolt1.rz"), parameter_name("k", "a.y", "b.y")
+    ('k_y', 'bolt1.c_y,rz', 'k_a.y,b.y')
+    """
+    (point, own), (other, across) = point_and_direction(row), point_and_direction(column)
+    if point != other:
+        point, own, across = "", row, column
+    name = f"{kind}_{own}" + (f",{across}" if row != column else "")
+    return f"{point}.{name}" if point else name
+
+
+def parameters_shared(names: Sequence[str], same: Sequence[Sequence[str]]) -> NDArray[np.intp]:
+    """Return, for each parameter, the number of that whose value it has, counted among those that are left.
+
+    Parameters
+    ----------
+    names : sequence of str, length q
+    same : sequence of sequence of str
+        Points whose joints are equal: a parameter ``"bolt2.k_y"`` is that of the first point of its list.
+
+    Returns
+    -------
+    ndarray of int, shape (q,)
+
+    Raises
+    ------
+    ValueError
+        Equal points whose parameters have other names.
+
+    Examples
+    --------
+    >>> from jointfrf.dofs import parameters_shared
+    >>> parameters_shared(["a.k_y", "b.k_y", "c.k_y", "k_a.y,b.y"], [["a", "b"]]).tolist()
+    [0, 0, 1, 2]
+    """
+    owner = {point: points[0] for points in same for point in points}
+    for points in same:
+        first, *rest = ([name for name in names if name.rpartition(".")[0] == point] for point in points)
+        for point, own in zip(points[1:], rest, strict=True):
+            if [name[len(point) :] for name in own] != [name[len(points[0]) :] for name in first]:
+                raise ValueError(
+                    f"same: {points[0]} and {point} must have the same DOFs and terms in one order, not "
+                    f"{', '.join(first)} and {', '.join(own)}"
+                )
+    kept: dict[str, int] = {}
+    found = []
+    for name in names:
+        point, _, rest_of_name = name.rpartition(".")
+        shared = f"{owner[point]}.{rest_of_name}" if point in owner else name
+        found.append(kept.setdefault(shared, len(kept)))
+    return np.array(found, np.intp)
+
+
 def is_rotation(dof: str) -> bool:
     """Whether a DOF is a rotation: by its name, as `direction_places` reads it, or a name like theta, Mtheta, phi, rot.
 
     Examples
     --------
     >>> from jointfrf.dofs import is_rotation
-    >>> [is_rotation(dof) for dof in ("y", "Fx", "theta", "Mtheta_z", "rx", "Mx", "0")]
-    [False, False, True, True, True, True, False]
+    >>> [is_rotation(dof) for dof in ("y", "Fx", "theta", "Mtheta_z", "rx", "Mx", "0", "bolt1.rx")]
+    [False, False, True, True, True, True, False, True]
     """
+    dof = point_and_direction(dof)[1]
     place = _PLACES.get(dof.lower())
     return _ROTATION.match(dof) is not None if place is None else place >= 3
 
@@ -99,7 +176,7 @@ class Parameter:
 
     @classmethod
     def parse(cls, name: str) -> Parameter:
-        """Read a name like ``"k_y"`` or ``"c_y,theta"``.
+        """Read a name like ``"k_y"``, ``"c_y,theta"`` or ``"bolt1.k_y"``.
 
         Raises
         ------
@@ -107,8 +184,12 @@ class Parameter:
             No such name.
         """
         check_type("a parameter", name, str)
-        kind, underscore, dofs = name.partition("_")
+        point, direction = point_and_direction(name)
+        of_point = _OF_POINT.match(direction) is not None and "," not in point
+        kind, underscore, dofs = (direction if of_point else name).partition("_")
         row, _, column = dofs.partition(",")
+        if of_point and row:
+            row, column = f"{point}.{row}", column and f"{point}.{column}"
         if kind not in get_args(ParameterKind) or not underscore or not row or dofs.endswith(","):
             raise ValueError(f"a parameter must be named k_<dof>, h_<dof> or c_<dof>, not {reprlib.repr(name)}")
         return cls(cast(ParameterKind, kind), row, column or row)
@@ -118,8 +199,8 @@ class Parameter:
 
     @property
     def name(self) -> str:
-        """``"k_<dof>"``, or ``"k_<dof>,<dof>"`` of a cross term."""
-        return f"{self.kind}_{self.row}" + (f",{self.column}" if self.is_cross else "")
+        """``"k_<dof>"``, or ``"k_<dof>,<dof>"`` of a cross term; before it the point of both, ``"bolt1.k_y"``."""
+        return parameter_name(self.kind, self.row, self.column)
 
     @property
     def is_cross(self) -> bool:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
-from jointfrf.dofs import compliance_unit
+from jointfrf.dofs import Parameter, compliance_unit, parameters_shared
 from jointfrf.frf.calibration import CalibrationErrors
 from jointfrf.identification.elastic_centre import elastic_centre
 from jointfrf.identification.findings import Finding, note, warn
@@ -26,7 +26,6 @@ from jointfrf.identification.model.prepare import Channels
 from jointfrf.identification.parameters import joint_vector
 from jointfrf.identification.residual_test import ResidualTest
 from jointfrf.identification.result import Fit, FittedParameter, law_parameters
-from jointfrf.identification.scatter import Spread
 from jointfrf.kernel.arguments import FloatArray
 from jointfrf.laws.law_joint import LawJoint
 
@@ -87,12 +86,13 @@ _COUPLED = (
 
 def describe_springs(found: ManifoldFit, problem: FitProblem) -> Fit:
     """Make the result of a fit of springs and dampers."""
-    result = found.estimate
+    result, same = found.estimate, problem.options.same
+    names, shared = _at_all_points([one.name for one in result.parameters], same, problem.dofs)
     fit = Fit.of_springs(
         "compliance",
         problem.dofs,
-        dict(zip([one.name for one in result.parameters], result.theta.tolist(), strict=True)),
-        found.covariance,
+        dict(zip(names, result.theta[shared].tolist(), strict=True)),
+        found.covariance[shared[:, None], shared],
         found.noise_level,
         found.residual_level,
         problem.freq_hz,
@@ -101,7 +101,7 @@ def describe_springs(found: ManifoldFit, problem: FitProblem) -> Fit:
         residual_is_noise=found.test.is_noise,
         test=found.test,
         is_converged=result.converged,
-        intervals=found.intervals,
+        intervals=found.intervals.shared(names, shared) if same else found.intervals,
     )
     fit = _with_best_estimates(fit, result) if found.alone is None else with_joint_alone(fit, found.alone)
     intervals = fit.confidence_interval(0.95)
@@ -112,7 +112,7 @@ def describe_springs(found: ManifoldFit, problem: FitProblem) -> Fit:
         *_poor_springs(fit, intervals),
         *_misfit(found, problem),
         *_unknown_cross(result, fit.dofs, problem.options.cross),
-        *([] if found.alone is not None else _scattering(fit, found.spread)),
+        *([] if found.alone is not None else _scattering(fit, found.spread.chance[shared])),
         *_negative_damping(fit, intervals),
         *_choices(found.choices),
         *_noise(problem.noise.is_assumed, problem.noise.inflation, problem.freq_hz),
@@ -122,6 +122,7 @@ def describe_springs(found: ManifoldFit, problem: FitProblem) -> Fit:
         *_sides(problem),
         *_seen(fit, intervals),
         *_groups([group.dofs for group in result.groups], fit.dofs, problem.options.cross),
+        *_equal_points(same),
         *_hidden_lines(result, fit.dofs),
         *_insignificant(fit, intervals),
         *_reference_point(fit),
@@ -130,6 +131,29 @@ def describe_springs(found: ManifoldFit, problem: FitProblem) -> Fit:
         most = max(group.iterations for group in result.groups)
         findings.append(warn("convergence", f"the fit did not converge in {most} iterations"))
     return fit.with_findings(findings)
+
+
+def _at_all_points(
+    names: Sequence[str], same: Sequence[Sequence[str]], dofs: Sequence[str]
+) -> tuple[list[str], NDArray[np.intp]]:
+    """Return the names of springs at all points, and which of those fitted each is."""
+    points = {own[0]: own for own in same}
+    found: dict[str, int] = {}
+    for i, name in enumerate(names):
+        point, _, rest = name.rpartition(".")
+        found |= {f"{own}.{rest}": i for own in points[point]} if point in points else {name: i}
+
+    def place(name: str) -> tuple[int, bool, int, int]:
+        one = Parameter.parse(name)
+        return "khc".index(one.kind), one.is_cross, dofs.index(one.row), dofs.index(one.column)
+
+    ordered = sorted(found, key=place) if same else list(found)
+    return ordered, np.array([found[name] for name in ordered], np.intp)
+
+
+def _equal_points(same: Sequence[Sequence[str]]) -> list[Finding]:
+    """Say which points share their parameters."""
+    return [note("same", f"{', '.join(own)}: equal joints, which share their parameters", tuple(own)) for own in same]
 
 
 def _poor_springs(fit: Fit, intervals: dict[str, tuple[float, float]]) -> list[Finding]:
@@ -369,12 +393,12 @@ def _band_parts(found: ManifoldFit) -> list[Finding]:
     return warnings
 
 
-def _scattering(fit: Fit, spread: Spread) -> list[Finding]:
+def _scattering(fit: Fit, chances: FloatArray) -> list[Finding]:
     """Name parameters whose interval comes from the scatter between parts of the band."""
     if fit.noise_level < _ROUNDING:
         return []
     clear = _BY_CHANCE / len(fit.parameters)
-    wide = tuple(one.name for one, chance in zip(fit.parameters, spread.chance, strict=True) if chance < clear)
+    wide = tuple(one.name for one, chance in zip(fit.parameters, chances, strict=True) if chance < clear)
     text = (
         f"{', '.join(wide)}: parts of the band scatter more than the noise explains; the intervals are widened by that"
     )
@@ -418,35 +442,38 @@ def _small_residual(found: ManifoldFit, problem: FitProblem) -> list[Finding]:
 
 def describe_laws(found: ManifoldFit, joint: LawJoint) -> Fit:
     """Make the result of a fit of laws to FRFs between all joint DOFs."""
-    problem, result = found.problem, found.estimate
+    problem, result, same = found.problem, found.estimate, found.problem.options.same
+    shared = parameters_shared(joint.names, same)
+    intervals = found.intervals.shared(joint.names, shared) if same else found.intervals
     fit = Fit(
         method="compliance",
         dofs=problem.dofs,
         parameters=law_parameters(joint),
-        estimate=result.theta,
-        covariance=found.covariance,
+        estimate=result.theta[shared],
+        covariance=found.covariance[shared[:, None], shared],
         noise_level=found.noise_level,
         residual_level=found.residual_level,
         freq_hz=problem.freq_hz,
-        laws=joint.with_values(result.theta),
+        laws=joint.with_values(result.theta[shared]),
         k_lines=problem.frfs.line_stiffness(),
         bands=problem.bands,
         residual_is_noise=found.test.is_noise,
         test=found.test,
         is_converged=result.converged,
-        intervals=found.intervals,
+        intervals=intervals,
     )
     is_log = {one.name: one.is_log for one in joint_vector(joint, (), np.ones(len(joint.dofs))).all}
     findings = [
         *_left_out_lines(result, problem.dofs, found.test),
         *_left_out_dofs(problem),
-        *poor_laws(fit, is_log, lambda name: found.intervals.of(name, 0.95)),
+        *poor_laws(fit, is_log, lambda name: intervals.of(name, 0.95)),
         *([] if problem.noise.is_assumed else _too_large(found.test, "these laws do not fit the data")),
         *_law_trends(found.test),
         *_noise(problem.noise.is_assumed, problem.noise.inflation, problem.freq_hz),
         *_calibration(problem.noise.calibration),
         *_outlying_lines(problem),
         *_correlated(fit),
+        *_equal_points(same),
     ]
     if problem.added_compliance is not None or problem.bending is not None:
         text = "the intervals do not allow for what is not rigid between the channels of a side"

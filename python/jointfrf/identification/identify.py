@@ -17,7 +17,12 @@ from jointfrf.identification.describe import describe_laws, describe_springs
 from jointfrf.identification.findings import note
 from jointfrf.identification.manifold.coordinates import CrossTerms, DampingTerms
 from jointfrf.identification.manifold.fit import fit_laws, fit_springs
-from jointfrf.identification.manifold.prepare import FitOptions, FitProblem, prepare_compliance
+from jointfrf.identification.manifold.prepare import (
+    FitOptions,
+    FitProblem,
+    as_equal_points,
+    prepare_compliance,
+)
 from jointfrf.identification.manifold.transforms import Transform
 from jointfrf.identification.noise import NoiseOptions
 from jointfrf.identification.prepare import BandsOfDofs, MeasuredFrfs, as_measured
@@ -40,6 +45,7 @@ def identify(
     joint: LawJoint | None = None,
     damping: DampingTerms | Literal["auto"] | Sequence[DampingTerms] | None = None,
     cross: CrossTerms | None = None,
+    same: Sequence[str] | Sequence[Sequence[str]] | None = None,
     noise: float | ArrayLike | None = None,
     coherence: ArrayLike | None = None,
     averages: float | None = None,
@@ -57,7 +63,7 @@ def identify(
         Measured receptances, m/N: at joint DOFs j, then k; or at the points that `transform` takes there.
     dofs : sequence of str, optional
         Names of the n joint DOFs; names beginning with theta, rx, ry, rz are rotations. ``"0"``, ``"1"``, ... by
-        default.
+        default. Of several points at once, point and DOF: ``"bolt1.y"``, whose parameters are then ``"bolt1.k_y"``.
     bands : None, (low, high), sequence of these, or mapping of DOF name to these, optional
         Sensitive bands in Hz; all lines by default: each is weighted by its information, so that none are needed.
     transform : array_like, shape (2 n, m), or Interface, or a pair of these, optional
@@ -74,10 +80,13 @@ def identify(
     damping : {"auto", "viscous", "hysteretic", "both", "none"}, or a sequence of these, one for each DOF
         Terms of K* = k (1 + i eta) + i w c to fit. "auto" chooses for each DOF by the Bayesian information criterion,
         two terms with a margin of 6; values are means over the kinds that the data do not exclude, and intervals hold
-        those of all. With `cross` "fit" it chooses for all DOFs together. The default.
-    cross : {"zero", "ignore", "fit"}
-        Terms that couple the DOFs of the joint: none (the default), and this is used; unknown and not fitted; fitted,
-        symmetric. Where they are unknown, k is 1/C_dd of the compliance.
+        those of all. With `cross` "points" or "fit", and with `same`, it chooses for all DOFs together. The default.
+    cross : {"zero", "ignore", "points", "fit"}
+        Terms that couple the DOFs of the joint: none (the default), and this is used; unknown and not fitted; fitted
+        between the DOFs of each point, so that K* is a block for each, and none between points; fitted, symmetric.
+        Where they are unknown, k is 1/C_dd of the compliance.
+    same : sequence of str, or sequence of these, optional
+        Points whose joints are equal, ``["bolt1", "bolt2"]``: they share all parameters, which are named at each.
     noise : float or array_like, shape (n_freq, m_r, m_f), optional
         Relative noise level of each entry, 0.01 for 1 %, sqrt(E|e|^2) of real and imaginary part together; or the
         variance E|e|^2 of each, (m/N)^2. By default it is found by entry and frequency, as
@@ -149,10 +158,11 @@ def identify(
         joint = _check_law_joint(joint, dofs)
         dofs = joint.dofs
         damping = "viscous"
+    equal = as_equal_points(same)
     decay = as_not_negative("window_decay", window_decay)
     if decay and joint is not None:
         raise ValueError("window_decay is taken off springs and dampers, not of laws: leave it out")
-    options = FitOptions(damping or "auto", cross or "zero", reciprocal)
+    options = FitOptions(damping or "auto", cross or "zero", reciprocal, equal)
     problem = prepare_compliance(
         as_measured(freq_hz, gamma, square=False), dofs, bands, transform,
         NoiseOptions(noise, coherence, averages), options, _check_sides(sides),

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
+from jointfrf.dofs import parameter_name
 from jointfrf.identification.manifold.flexible_sides import JointAlone
 from jointfrf.identification.result import Fit, SeenStiffness
 from jointfrf.kernel.arguments import FloatArray
@@ -78,10 +79,11 @@ def _seen(fit: Fit, alone: JointAlone) -> dict[str, SeenStiffness]:
     low, high = alone.seen - alone.reach, alone.seen + alone.reach
     found = {}
     for d, dof in enumerate(fit.dofs):
-        if f"k_{dof}" not in fit.value:
+        name = parameter_name("k", dof, dof)
+        if name not in fit.value:
             continue
         c, softest, stiffest = float(alone.seen[d]), float(high[d]), float(low[d])
-        found[f"k_{dof}"] = SeenStiffness(
+        found[name] = SeenStiffness(
             1 / c if c > 0 else np.inf,
             1 / softest if softest > 0 else np.inf,
             1 / stiffest if stiffest > 0 else np.inf,

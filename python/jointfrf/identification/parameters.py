@@ -10,6 +10,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from jointfrf.dofs import parameter_name
 from jointfrf.kernel.arguments import FloatArray
 from jointfrf.laws.law_joint import JointQuantity, LawJoint
 
@@ -209,8 +210,8 @@ def _of_joint(one: JointQuantity, place: int, is_free: bool, size: Mapping[str, 
     kind, lower, upper = one.field.kind, one.field.lower, one.field.upper
     is_log = kind in ("stiffness", "time") and lower >= 0
     if is_log and kind == "stiffness":
-        dof = one.name.partition("_")[2]
-        known = next((value for name, value in size.items() if dof == name or dof.endswith(f"_{name}")), one.value)
+        own = (value for dof, value in size.items() if one.name == parameter_name(one.field.name, dof, dof))
+        known = next(own, one.value)
         lower, upper = max(lower, min(known, one.value or known) / _WIDEST), min(upper, max(known, one.value) * _WIDEST)
     if is_log and kind == "time":
         upper = min(upper, max(1e3, 10 * one.value))

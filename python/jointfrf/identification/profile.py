@@ -232,6 +232,19 @@ class Intervals:
             self._known[name, probability] = self._limits(self.names.index(name), probability)
         return self._known[name, probability]
 
+    def shared(self, names: Sequence[str], which: NDArray[np.intp]) -> Intervals:
+        """Return the intervals of parameters of equal points: each is that of one of these, by its number."""
+
+        def limits(i: int, probability: float) -> tuple[float, float]:
+            return self.of(self.names[which[i]], probability)
+
+        def of_function(
+            function: Callable[[FloatArray], float], used: NDArray[np.intp], probability: float
+        ) -> tuple[float, float] | None:
+            return self.of_function(lambda values: function(values[which]), np.unique(which[used]), probability)
+
+        return Intervals(names, limits, of_function)
+
     def __call__(self, probability: float) -> dict[str, tuple[float, float]]:
         """Return the interval of every parameter."""
         return {name: self.of(name, probability) for name in self.names}

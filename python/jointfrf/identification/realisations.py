@@ -14,7 +14,12 @@ from jointfrf.identification.describe import describe_springs
 from jointfrf.identification.manifold.coordinates import CrossTerms, DampingTerms
 from jointfrf.identification.manifold.estimate import GroupStart, JointEstimate
 from jointfrf.identification.manifold.fit import estimated_joint, fit_springs, uncertainty_of
-from jointfrf.identification.manifold.prepare import FitOptions, FitProblem, prepare_compliance
+from jointfrf.identification.manifold.prepare import (
+    FitOptions,
+    FitProblem,
+    as_equal_points,
+    prepare_compliance,
+)
 from jointfrf.identification.noise import NoiseOptions
 from jointfrf.identification.prepare import BandsOfDofs, as_measured
 from jointfrf.identification.result import Fit
@@ -93,6 +98,7 @@ def identify_realisations(
     transform: ArrayLike | tuple[ArrayLike, ArrayLike] | None = None,
     damping: DampingTerms | Literal["auto"] | Sequence[DampingTerms] = "auto",
     cross: CrossTerms = "zero",
+    same: Sequence[str] | Sequence[Sequence[str]] | None = None,
     noise: float | ArrayLike | None = None,
     reciprocal: bool = True,
     start: FitStart | None = None,
@@ -105,7 +111,7 @@ def identify_realisations(
         Hz.
     gammas : iterable of array_like, shape (n_freq, m_r, m_f)
         Measured receptances, m/N, as `identify` takes them: realisations of noise, repeated measurements.
-    dofs, bands, transform, damping, cross, noise, reciprocal
+    dofs, bands, transform, damping, cross, same, noise, reciprocal
         As in `identify` with the method "compliance".
     start : FitStart, optional
         Where the searches begin, in place of the first set: then a result depends on its own set only, whatever others
@@ -140,7 +146,7 @@ def identify_realisations(
     >>> bool(abs(np.mean(k) / 2000 - 1) < 0.005), bool(np.std(k) / 2000 < 0.01)
     (True, True)
     """
-    options = FitOptions(damping, cross, reciprocal)
+    options = FitOptions(damping, cross, reciprocal, as_equal_points(same))
     known = NoiseOptions(noise)
     near: tuple[GroupStart, ...] | None = None
     if start is not None:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import ndtri
 
-from jointfrf.dofs import Parameter, ParameterKind
+from jointfrf.dofs import Parameter, ParameterKind, parameter_name
 from jointfrf.frf.bands import Band
 from jointfrf.identification.derived import Derived, DerivedFunction, derived_quantity
 from jointfrf.identification.findings import Finding, WithFindings, as_warning, worst_first
@@ -47,7 +47,8 @@ class FittedParameter:
     ----------
     name : str
         ``"k_<dof>"`` stiffness, ``"h_<dof>"`` hysteretic stiffness eta k, ``"c_<dof>"`` viscous damping,
-        ``"k_<dof>,<dof>"`` a cross term; ``"tau_<dof>"`` and the like of other laws; ``"A/youngs_modulus"``,
+        ``"k_<dof>,<dof>"`` a cross term; ``"tau_<dof>"`` and the like of other laws; ``"bolt1.k_<dof>"`` at one of
+        several points; ``"A/youngs_modulus"``,
         ``"mass A/151:y"``, ``"gain of response B/226:y"`` of models and channels.
     unit : str
     kind, row, column : str
@@ -257,7 +258,8 @@ class Fit(WithFindings):
     def loss_factors(self) -> dict[str, Derived]:
         """Loss factor eta = h/k, with its uncertainty, of each DOF whose hysteretic damping was fitted."""
         known = {one.row for one in self.parameters if one.kind == "h" and not one.is_cross}
-        return {f"eta_{dof}": self.derived(f"h_{dof} / k_{dof}") for dof in self.dofs if dof in known}
+        names = ([parameter_name(kind, dof, dof) for kind in ("eta", "h", "k")] for dof in self.dofs if dof in known)
+        return {eta: self.derived(f"{{{h}}} / {{{k}}}") for eta, h, k in names}
 
     def with_findings(self, findings: Sequence[Finding]) -> Fit:
         """Return the same fit with other findings, the worst first."""

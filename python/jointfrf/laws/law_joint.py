@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self, Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
-from jointfrf.dofs import direction_places, is_rotation
+from jointfrf.dofs import direction_places, is_rotation, parameter_name
 from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_frequency, as_names, as_number, as_real, check_type
 from jointfrf.kernel.call import OnSingular
@@ -33,7 +33,7 @@ class JointQuantity(NamedTuple):
     Attributes
     ----------
     name : str
-        Field and DOF, ``"k_y"``; of a cross term ``"k_y,theta"``.
+        Field and DOF, ``"k_y"``; of a cross term ``"k_y,theta"``; at one of several points ``"bolt1.k_y"``.
     field : LawField
     unit : str
     value : float
@@ -168,11 +168,12 @@ class LawJoint:
         found = []
         for (a, b), law in self.laws.items():
             rotations = is_rotation(a) + is_rotation(b)
-            where = a if a == b else f"{a},{b}"
             for field, value in zip(law.fields, law.values.tolist(), strict=True):
-                found.append(JointQuantity(f"{field.name}_{where}", field, field.unit(rotations), value))
+                found.append(JointQuantity(parameter_name(field.name, a, b), field, field.unit(rotations), value))
         for dof, mass in self.mass.items():
-            found.append(JointQuantity(f"m_{dof}", _MASS, "kg m^2" if is_rotation(dof) else "kg", mass))
+            found.append(
+                JointQuantity(parameter_name("m", dof, dof), _MASS, "kg m^2" if is_rotation(dof) else "kg", mass)
+            )
         return tuple(found)
 
     @property

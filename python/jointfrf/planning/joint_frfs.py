@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from jointfrf.dofs import Parameter, parameter_name
 from jointfrf.frf.bands import Band
 from jointfrf.identification.identify import identify
 from jointfrf.identification.information_bound import information_rows
@@ -135,7 +136,11 @@ def plan_joint_frfs(
     if not variance.all():
         raise ValueError("an FRF is zero on a line, and has no noise there: give floor")
     kinds = ["k", *(kind for kind in "ch" if matrices[kind].any())]
-    expected = {f"{kind}_{dof}": float(matrices[kind][i, i]) for kind in kinds for i, dof in enumerate(joint.dofs)}
+    expected = {
+        parameter_name(kind, dof, dof): float(matrices[kind][i, i])
+        for kind in kinds
+        for i, dof in enumerate(joint.dofs)
+    }
     rows = information_rows(freq, lines, variance, kinds)
     size = 1 / np.sqrt(2 * np.einsum("lfp,lfp->p", rows.conj(), rows).real)  # stiffness and damping differ by much
     rows = rows * size
@@ -162,7 +167,7 @@ def _shift(
     freq_hz: FloatArray, biased: ComplexArray, variance: FloatArray, joint: Joint, expected: dict[str, float]
 ) -> dict[str, float]:
     """Return what the fit of FRFs without noise that are wrong finds, less what is expected."""
-    kinds = {name[0] for name in expected}
+    kinds = {Parameter.parse(name).kind for name in expected}
     damping: DampingTerms = "both" if kinds == {"k", "c", "h"} else "hysteretic" if "h" in kinds else "viscous"
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")

@@ -208,7 +208,7 @@ _FURTHEST = 3.0
 
 def symbol(parameter: Parameter) -> str:
     """Write a parameter as a formula: k_Mtheta as k with index M theta."""
-    index = parameter.name.partition("_")[2].replace("theta", "\\theta ").strip()
+    index = ",".join(dict.fromkeys((parameter.row, parameter.column))).replace("theta", "\\theta ").strip()
     return f"${parameter.kind}_{{{index}}}$"
 
 

@@ -250,7 +250,7 @@ def _marked(parameter: Parameter) -> str:
     """Write a parameter with its index and Greek letter."""
     from markupsafe import Markup
 
-    index = parameter.name.partition("_")[2].replace("theta_", "θ").replace("theta", "θ")
+    index = ",".join(dict.fromkeys((parameter.row, parameter.column))).replace("theta_", "θ").replace("theta", "θ")
     return Markup("<i>{}</i><sub>{}</sub>").format(parameter.kind, index)
 
 

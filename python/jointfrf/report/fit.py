@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
-from jointfrf.dofs import Parameter, ParameterKind, compliance_unit
+from jointfrf.dofs import Parameter, ParameterKind, compliance_unit, parameter_name
 from jointfrf.errors import IllConditionedWarning
 from jointfrf.files import below, write_file
 from jointfrf.identification.fit_data import FitData
@@ -110,7 +110,8 @@ def _of_law(fit: Fit, dof: str, freq_hz: FloatArray) -> tuple[Ribbon, ...]:
     """Confidence interval of Re K* of a law at each frequency, from the covariance of its parameters."""
     assert fit.laws is not None
     law, names = fit.laws.laws[dof, dof], [one.name for one in fit.parameters]
-    own = [(i, names.index(f"{one.name}_{dof}")) for i, one in enumerate(law.fields) if f"{one.name}_{dof}" in names]
+    fields = enumerate(parameter_name(field.name, dof, dof) for field in law.fields)
+    own = [(i, names.index(name)) for i, name in fields if name in names]
     if not own:
         return ()
     slopes = law.slopes(2 * np.pi * freq_hz)[[i for i, _ in own]].real

@@ -12,7 +12,7 @@ from typing import get_args
 
 import numpy as np
 
-from jointfrf.dofs import ParameterKind, is_rotation
+from jointfrf.dofs import ParameterKind, is_rotation, parameter_name, point_and_direction
 from jointfrf.files import write_file
 from jointfrf.frf.calibration import shows_calibration
 from jointfrf.identification.fit_cards import cards
@@ -468,10 +468,11 @@ def _named(term: FittedParameter) -> str:
     kind = {"k": "stiffness", "h": "hysteretic stiffness", "c": "viscous damping"}.get(term.kind)
     if kind is None:
         return f"parameter {term.kind} of {term.row}"
-    axis = term.row.rpartition("_")[2].lstrip("r")
+    point, direction = point_and_direction(term.row)
+    axis, where = direction.rpartition("_")[2].lstrip("r"), f" at {point}" if point else ""
     if is_rotation(term.row) and axis in ("x", "y", "z"):
-        return f"{'rotational ' if term.kind != 'c' else ''}{kind} about {axis}"
-    return f"{kind} of {term.row}" if is_rotation(term.row) else f"{kind} along {term.row}"
+        return f"{'rotational ' if term.kind != 'c' else ''}{kind} about {axis}{where}"
+    return f"{kind} {'of' if is_rotation(term.row) else 'along'} {direction}{where}"
 
 
 def finding_sentences(fit: Fit) -> list[str]:
@@ -485,8 +486,9 @@ def finding_sentences(fit: Fit) -> list[str]:
         name = _named(term)
         if not term.is_cross:
             sentences.append(f"{name[0].upper()}{name[1:]} ({term.name}): {_value_sentence(term, value, low, high)}")
+    dof_of = {parameter_name("eta", dof, dof): dof for dof in fit.dofs}
     for name, eta in fit.loss_factors.items():
-        of = FittedParameter(name, "", "eta", name.removeprefix("eta_"), name.removeprefix("eta_"))
+        of = FittedParameter(name, "", "eta", dof_of[name], dof_of[name])
         sentences.append(f"Loss factor of {of.row} ({name}): {_value_sentence(of, eta.value, eta.low, eta.high)}")
     rest = [term.name for term in fit.parameters if term.origin != "joint"]
     if rest:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from jointfrf.dofs import Parameter
 from jointfrf.files import write_file
 from jointfrf.kernel.arguments import FloatArray
 from jointfrf.planning.joint_frfs import JointFrfPlan
@@ -99,7 +100,8 @@ def _of_joint_frfs(plan: JointFrfPlan, command: str) -> Document:
          *plan.bands[name], *([plan.shift[name]] if shift else []))
         for name, value in plan.value.items()
     )  # fmt: skip
-    lines, dofs = line_figure(plan), [name.partition("_")[2] for name in plan.value if name.startswith("k_")]
+    terms = map(Parameter.parse, plan.value)
+    lines, dofs = line_figure(plan), [one.row for one in terms if one.kind == "k"]
     names = [f"{side}:{dof}" for side in "jk" for dof in dofs]
     maps = list(_shares(tuple(plan.value), names, names, plan.frf_share, "what all know"))
     sections = [

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from jointfrf.dofs import Parameter, ParameterKind, joint_parameters
+from jointfrf.dofs import Parameter, ParameterKind, joint_parameters, parameters_shared, point_and_direction
 from jointfrf.identification.manifold.line_forms import LEAST_GAIN, STEPS, FormMinimum, JointCoordinates, LineForms
 from jointfrf.identification.parameters import ParameterVector, joint_vector
 from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray
@@ -32,12 +32,16 @@ __all__ = [
     "SpringJoint",
     "coordinates_of",
     "joint_terms",
+    "summed_terms",
 ]
 
 #: Terms of K* in addition to its stiffness.
 DampingTerms = Literal["none", "viscous", "hysteretic", "both"]
-#: Terms that couple the DOFs of a joint: none, and this is used; perhaps, but not sought; fitted.
-CrossTerms = Literal["zero", "ignore", "fit"]
+#: Terms that couple the DOFs of a joint: none, and this is used; perhaps, but not sought; fitted between the DOFs of
+#: each point, none between points; fitted.
+CrossTerms = Literal["zero", "ignore", "points", "fit"]
+
+NumbersT = TypeVar("NumbersT", ComplexArray, FloatArray)
 
 _KINDS: Mapping[DampingTerms, tuple[ParameterKind, ...]] = {
     "none": ("k",),
@@ -64,16 +68,19 @@ class JointTerms(NamedTuple):
         By kind, k before h before c, and within a kind the diagonal first.
     omega : ndarray, shape (n_freq,)
         rad/s.
-    kinds : ndarray of int, shape (p,)
+    kinds : ndarray of int, shape (q,)
         0, 1, 2 for k, h, c: the functions of frequency 1, i, i w.
-    pairs : ndarray of int, shape (p, 2)
-        Row and column of each parameter in K*.
+    pairs : ndarray of int, shape (q, 2)
+        Row and column of each term in K*.
+    shared : ndarray of int, shape (q,)
+        The parameter that each term is: q = p, in one order, but for points whose joints are equal.
     """
 
     parameters: tuple[Parameter, ...]
     omega: FloatArray
     kinds: NDArray[np.intp]
     pairs: NDArray[np.intp]
+    shared: NDArray[np.intp]
 
     @property
     def n(self) -> int:
@@ -84,6 +91,16 @@ class JointTerms(NamedTuple):
     def has_cross_terms(self) -> bool:
         """Whether a parameter couples two DOFs."""
         return bool((self.pairs[:, 0] != self.pairs[:, 1]).any())
+
+    @property
+    def is_shared(self) -> bool:
+        """Whether a parameter is that of several points."""
+        return self.shared.size > len(self.parameters)
+
+    @property
+    def first(self) -> NDArray[np.intp]:
+        """The first term of each parameter, shape (p,)."""
+        return np.unique(self.shared, return_index=True)[1]
 
     @property
     def factors(self) -> ComplexArray:
@@ -99,23 +116,27 @@ class JointTerms(NamedTuple):
         """Return the terms between some of the DOFs, and which of the parameters these are."""
         place = np.full(self.n, -1)
         place[dofs] = np.arange(dofs.size)
-        which = np.flatnonzero((place[self.pairs] >= 0).all(axis=1))
-        pairs = place[self.pairs[which]]
-        own = JointTerms(tuple(self.parameters[i] for i in which), self.omega, self.kinds[which], pairs)
-        return own, which
+        terms = np.flatnonzero((place[self.pairs] >= 0).all(axis=1))
+        which, shared = np.unique(self.shared[terms], return_inverse=True)
+        parameters = tuple(self.parameters[i] for i in which)
+        return JointTerms(parameters, self.omega, self.kinds[terms], place[self.pairs[terms]], shared.ravel()), which
 
     def stiffness(self, theta: FloatArray) -> ComplexArray:
         """Return K*(w) of parameters, shape (n_freq, n, n), N/m."""
         n, (a, b) = self.n, self.pairs.T
         of_kinds = np.zeros((3, n, n))
-        of_kinds[self.kinds, a, b] = of_kinds[self.kinds, b, a] = theta
+        of_kinds[self.kinds, a, b] = of_kinds[self.kinds, b, a] = theta[self.shared]
         k: ComplexArray = np.empty((self.omega.size, n, n), np.complex128)
         k.real, k.imag = of_kinds[0], of_kinds[1] + self.omega[:, None, None] * of_kinds[2]
         return k
 
 
 def joint_terms(
-    omega: FloatArray, dofs: Sequence[str], damping: DampingTerms | Sequence[DampingTerms], cross: CrossTerms
+    omega: FloatArray,
+    dofs: Sequence[str],
+    damping: DampingTerms | Sequence[DampingTerms],
+    cross: CrossTerms,
+    same: Sequence[Sequence[str]] = (),
 ) -> JointTerms:
     """Return the terms of K*(w) = k + i h + i w c asked for.
 
@@ -127,22 +148,28 @@ def joint_terms(
         Names of the n joint DOFs.
     damping : str, or sequence of str of length n
         Damping terms of all DOFs, or of each. A cross term has those that both its DOFs have.
-    cross : {"zero", "ignore", "fit"}
-        Symmetric cross terms are parameters where it is "fit".
+    cross : {"zero", "ignore", "points", "fit"}
+        Symmetric cross terms are parameters where it is "fit", and between DOFs of one point where it is "points".
+    same : sequence of sequence of str
+        Points whose joints are equal.
     """
     of_dof = [damping] * len(dofs) if isinstance(damping, str) else list(damping)
     place = {dof: i for i, dof in enumerate(dofs)}
     kept = [
         one
-        for one in joint_parameters(dofs, ("k", "h", "c"), cross=cross == "fit")
+        for one in joint_parameters(dofs, ("k", "h", "c"), cross=cross in ("points", "fit"))
         if all(one.kind in _KINDS[of_dof[place[dof]]] for dof in (one.row, one.column))
+        and (cross == "fit" or point_and_direction(one.row)[0] == point_and_direction(one.column)[0])
     ]
-    return JointTerms(
+    shared = parameters_shared([one.name for one in kept], same)
+    terms = JointTerms(
         tuple(kept),
         omega,
         np.array(["khc".index(one.kind) for one in kept], np.intp),
         np.array([(place[one.row], place[one.column]) for one in kept], np.intp),
+        shared,
     )
+    return terms._replace(parameters=tuple(kept[i] for i in terms.first))
 
 
 class SpringJoint(JointCoordinates):
@@ -155,8 +182,9 @@ class SpringJoint(JointCoordinates):
 
     def __init__(self, terms: JointTerms) -> None:
         self.terms, self.parameters, self.omega, self.n = terms, terms.parameters, terms.omega, terms.n
-        self.dofs = terms.pairs[:, 0]
-        self.is_stiffness = (terms.kinds == 0) & (terms.pairs[:, 0] == terms.pairs[:, 1])
+        first = terms.first
+        self.dofs = terms.pairs[first, 0]
+        self.is_stiffness = (terms.kinds[first] == 0) & (terms.pairs[first, 0] == terms.pairs[first, 1])
 
     def on_lines(self, lines: slice | NDArray[np.intp]) -> SpringJoint:
         """Return the same on some of the lines."""
@@ -314,7 +342,7 @@ class DiagonalJoint(SpringJoint):
 
 
 class CoupledJoint(SpringJoint):
-    """A joint with cross terms: its coordinates are the parameters themselves; entries are the upper triangle of C."""
+    """A joint with cross terms or equal points: coordinates are the parameters, entries the upper triangle of C."""
 
     def __init__(self, terms: JointTerms) -> None:
         super().__init__(terms)
@@ -349,13 +377,14 @@ class CoupledJoint(SpringJoint):
         """Return the derivatives of the upper triangle, -C E C, shape (n_freq, n (n + 1)/2, p)."""
         slope: ComplexArray = self._by_pair(entries)[:, :, self.pair_of]
         slope *= -self.terms.factors[self.terms.kinds].T[:, None, :]
-        return slope
+        return summed_terms(slope, self.terms.shared)
 
     def normal_equations(
         self, x: FloatArray, entries: ComplexArray, weight: ComplexArray, residual: ComplexArray
     ) -> tuple[FloatArray, FloatArray]:
         """Return Re(J^H W J) and Re(J^H r) of all lines."""
-        return _of_triangle(self.terms.pairs, self.terms.factors[self.terms.kinds], entries, weight, residual)
+        terms = self.terms
+        return _of_triangle(terms.pairs, terms.factors[terms.kinds], entries, weight, residual, terms.shared)
 
     def theta(self, x: FloatArray) -> FloatArray:
         """Return the parameters."""
@@ -370,31 +399,44 @@ class CoupledJoint(SpringJoint):
         return np.eye(x.size)
 
 
+def summed_terms(terms: NumbersT, shared: NDArray[np.intp]) -> NumbersT:
+    """Return sums along the last axis over the terms that are one parameter."""
+    count = int(shared.max(initial=-1)) + 1
+    return terms if count == shared.size else terms @ np.eye(count)[shared]
+
+
 def _of_triangle(
-    pairs: NDArray[np.intp], slopes: ComplexArray, entries: ComplexArray, weight: ComplexArray, residual: ComplexArray
+    pairs: NDArray[np.intp],
+    slopes: ComplexArray,
+    entries: ComplexArray,
+    weight: ComplexArray,
+    residual: ComplexArray,
+    shared: NDArray[np.intp],
 ) -> tuple[FloatArray, FloatArray]:
     """Return Re(J^H W J) and Re(J^H r) of all lines, J = -f C E C of the upper triangle of C.
 
     Parameters
     ----------
-    pairs : ndarray of int, shape (p, 2)
-        Entry of K* that each coordinate changes, with its mirror image.
-    slopes : ndarray, shape (p, n_freq)
+    pairs : ndarray of int, shape (q, 2)
+        Entry of K* that each term changes, with its mirror image.
+    slopes : ndarray, shape (q, n_freq)
         f, by how much.
     entries, weight, residual
         Of all lines.
+    shared : ndarray of int, shape (q,)
+        The coordinate that each term is.
     """
     p, (n_freq, u) = len(pairs), entries.shape
     normal, descent = np.empty((p, p)), np.empty(p)
     rows, columns = np.ascontiguousarray(pairs.T + 1, np.int32)
     lines = map(np.ascontiguousarray, (slopes.T, entries, weight, residual))
     call("joint_normal_equations", (math.isqrt(2 * u), p, u, n_freq, rows, columns, *lines, normal, descent))
-    return normal, descent
+    return summed_terms(summed_terms(normal, shared).T, shared), summed_terms(descent, shared)
 
 
 def coordinates_of(terms: JointTerms) -> SpringJoint:
     """Return the coordinates in which a joint of springs is fitted."""
-    return CoupledJoint(terms) if terms.has_cross_terms else DiagonalJoint(terms)
+    return CoupledJoint(terms) if terms.has_cross_terms or terms.is_shared else DiagonalJoint(terms)
 
 
 class LawCoordinates(JointCoordinates):
@@ -408,22 +450,33 @@ class LawCoordinates(JointCoordinates):
         rad/s.
     size : ndarray, shape (n,)
         Dynamic stiffness of the structure at the joint DOFs: stiffnesses are sought around it.
+    shared : ndarray of int, shape (q,), optional
+        The parameter that each of `joint` is, of points whose joints are equal; each its own by default.
 
     Notes
     -----
     Entries are the upper triangle of C. Stiffnesses and times that cannot be negative are sought as logarithms.
     """
 
-    def __init__(self, joint: LawJoint, omega: FloatArray, size: FloatArray) -> None:
-        self.joint, self.omega, self.size = joint, omega, size
-        self.parameters, self.n = joint.quantities, len(joint.dofs)
-        self.vector: ParameterVector = joint_vector(joint, (), size)
+    def __init__(
+        self, joint: LawJoint, omega: FloatArray, size: FloatArray, shared: NDArray[np.intp] | None = None
+    ) -> None:
+        self.joint, self.omega, self.size, self.n = joint, omega, size, len(joint.dofs)
+        self.shared = np.arange(len(joint.quantities)) if shared is None else shared
+        first = np.unique(self.shared, return_index=True)[1].tolist()
+        self.parameters = tuple(joint.quantities[i] for i in first)
+        every = joint_vector(joint, (), size).all
+        self.vector = ParameterVector(tuple(every[i] for i in first))
         self.lower, self.upper = self.vector.bounds
         self.rows, self.columns = np.triu_indices(self.n)
         self.dofs, self.is_stiffness = np.zeros(self.lower.size, np.intp), np.zeros(self.lower.size, bool)
 
     def _at(self, x: FloatArray) -> LawJoint:
-        return self.joint.with_values(self.vector.to_values(x))
+        return self.joint.with_values(self.vector.to_values(x)[self.shared])
+
+    def common(self, values: FloatArray) -> FloatArray:
+        """Return values of the parameters from those of all points: their means over equal ones."""
+        return np.asarray(np.bincount(self.shared, values) / np.bincount(self.shared))
 
     def compliance(self, x: FloatArray) -> ComplexArray:
         """Return the upper triangle of C, shape (n_freq, n (n + 1)/2); NaN where K* is singular."""
@@ -434,7 +487,7 @@ class LawCoordinates(JointCoordinates):
         """Return its derivatives by the coordinates, -C dK C, shape (n_freq, n (n + 1)/2, p)."""
         c = self.matrix(entries)
         slope = np.zeros((*entries.shape, x.size), np.complex128)
-        for i, (places, by_value) in enumerate(self._at(x).connection_slopes(self.omega)):
+        for i, (places, by_value) in zip(self.shared, self._at(x).connection_slopes(self.omega), strict=True):
             for a, b in places:
                 slope[:, :, i] -= c[:, self.rows, a] * c[:, b, self.columns] * by_value[:, None]
         slope *= self.vector.slope(x)
@@ -447,12 +500,12 @@ class LawCoordinates(JointCoordinates):
         slopes = self._at(x).connection_slopes(self.omega)
         pairs = np.array([places[0] for places, _ in slopes], np.intp)
         by_coordinate = np.array([by_value for _, by_value in slopes], np.complex128)
-        by_coordinate *= self.vector.slope(x)[:, None]
-        return _of_triangle(pairs, by_coordinate, entries, weight, residual)
+        by_coordinate *= self.vector.slope(x)[self.shared, None]
+        return _of_triangle(pairs, by_coordinate, entries, weight, residual, self.shared)
 
     def on_lines(self, lines: slice | NDArray[np.intp]) -> LawCoordinates:
         """Return the same on some of the lines."""
-        return LawCoordinates(self.joint, self.omega[lines], self.size)
+        return LawCoordinates(self.joint, self.omega[lines], self.size, self.shared)
 
     def theta(self, x: FloatArray) -> FloatArray:
         """Return the parameters."""

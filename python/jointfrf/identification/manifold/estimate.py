@@ -10,7 +10,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from jointfrf.dofs import parameters_shared, point_and_direction
 from jointfrf.frf.bands import spread_lines
+from jointfrf.frf.entry_groups import connected
 from jointfrf.identification.line_starts import from_lines, interface_compliance
 from jointfrf.identification.manifold.coordinates import (
     CrossTerms,
@@ -133,7 +135,7 @@ def estimate_joint(
     frfs : InterfaceFrfs
     terms : JointTerms
         Terms of K* that are sought.
-    cross : {"zero", "ignore", "fit"}
+    cross : {"zero", "ignore", "points", "fit"}
         Whether cross terms of C that are not sought are zero, or unknown.
     used : ndarray of bool, shape (n_freq, n), optional
         Lines used for each DOF; all by default.
@@ -148,7 +150,8 @@ def estimate_joint(
     """
     groups = []
     known = {(tuple(start.dofs.tolist()), start.parameters): start for start in near}
-    for dofs, lines in _grouped(frfs) if data is None else data:
+    linked = [terms.pairs[terms.shared == i].ravel() for i in range(len(terms.parameters))] if terms.is_shared else []
+    for dofs, lines in _grouped(frfs, linked) if data is None else data:
         own, which = terms.of_dofs(dofs)
         joint = coordinates_of(own)
         unknown = _unknown_entries(dofs, cross, used, len(lines.measured))
@@ -193,7 +196,11 @@ def _with_free_dofs(found: GroupFit, problem: GroupProblem, terms: JointTerms, f
 
 
 def estimate_laws(
-    frfs: InterfaceFrfs, joint: LawJoint, omega: FloatArray, used: NDArray[np.bool_] | None = None
+    frfs: InterfaceFrfs,
+    joint: LawJoint,
+    omega: FloatArray,
+    used: NDArray[np.bool_] | None = None,
+    same: Sequence[Sequence[str]] = (),
 ) -> JointEstimate:
     """Fit a joint of laws to FRFs whose noise is known.
 
@@ -206,10 +213,14 @@ def estimate_laws(
         rad/s.
     used : ndarray of bool, shape (n_freq, n), optional
         Lines used for each DOF; all by default.
+    same : sequence of sequence of str
+        Points whose joints are equal.
     """
-    groups, names = [], list(joint.names)
-    left = set(joint.laws)
-    for dofs, lines in _grouped(frfs):
+    groups, shared = [], parameters_shared(joint.names, same)
+    quantities = tuple(joint.quantities[i] for i in np.unique(shared, return_index=True)[1])
+    names, left = [one.name for one in quantities], set(joint.laws)
+    points = [point_and_direction(dof)[0] for dof in joint.dofs]
+    for dofs, lines in _grouped(frfs, [np.flatnonzero(np.isin(points, own)) for own in same]):
         inside = [joint.dofs[d] for d in dofs]
         laws = {pair: law for pair, law in joint.laws.items() if set(pair) <= set(inside)}
         if not laws:
@@ -220,27 +231,31 @@ def estimate_laws(
         driving = abs(np.einsum("lpp->lp", gamma))
         # 1/(|gamma_jj| + |gamma_kk|) is a size of stiffness that FRFs can show.
         size = np.median(1 / np.maximum(driving[:, : dofs.size] + driving[:, dofs.size :], 1e-300), axis=0)
-        coordinates = LawCoordinates(own, omega, size)
+        coordinates = LawCoordinates(own, omega, size, parameters_shared(own.names, same))
         rigid = len(own.rigid)
         problem = GroupProblem(
-            dofs, np.array([names.index(name) for name in own.names], np.intp), lines, coordinates,
+            dofs, np.array([names.index(name) for name in coordinates.names], np.intp), lines, coordinates,
             _unknown_entries(dofs, "zero", used, len(lines.measured)),
             rigid * (rigid + 1) // 2 if frfs.reciprocal else rigid**2,
         )  # fmt: skip
         both = list(range(2 * dofs.size))
         values = from_lines(own, omega, interface_compliance(gamma, variance, (both, both)))
         given = [own.values] if values is None else [values, own.values]
-        starts = [coordinates.coordinates(one) for one in given]
+        starts = [coordinates.coordinates(coordinates.common(one)) for one in given]
         groups.append(_fitted(_Search(problem, lambda starts=starts: starts, "zero")))  # type: ignore[misc]
     if left:
         a, b = next(iter(left))
         raise ValueError(f"the FRFs between {a} and {b} are zero: they say nothing of the cross term {a},{b}")
-    return assembled(joint.quantities, groups)
+    return assembled(quantities, groups)
 
 
-def _grouped(frfs: InterfaceFrfs) -> Iterator[GroupData]:
-    """Return groups of DOFs that are fitted separately, and their FRFs."""
-    for dofs in frfs.on_lines(spread_lines(len(frfs.measured))).groups():
+def _grouped(frfs: InterfaceFrfs, linked: Iterable[NDArray[np.intp]] = ()) -> Iterator[GroupData]:
+    """Return groups of DOFs that are fitted separately, and their FRFs; DOFs that are linked belong to one."""
+    both = np.eye(frfs.n, dtype=bool)
+    for together in (*frfs.on_lines(spread_lines(len(frfs.measured))).groups(), *linked):
+        both[together[:, None], together] = True
+    label = connected(both)
+    for dofs in (np.flatnonzero(label == own) for own in dict.fromkeys(label.tolist())):
         yield dofs, frfs.of_dofs(dofs)
 
 
@@ -260,7 +275,7 @@ class _Search:
     problem : GroupProblem
     starts_of_lines : callable
         Returns coordinates of the joint from the compliance of single lines, the likeliest first.
-    cross : {"zero", "ignore", "fit"}
+    cross : {"zero", "ignore", "points", "fit"}
     near : GroupStart, optional
         What a fit to other FRFs of the same structure, or with other terms, has found.
     is_explained : bool

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from jointfrf.dofs import is_rotation
+from jointfrf.dofs import is_rotation, point_and_direction
 from jointfrf.errors import IllConditionedWarning
 from jointfrf.identification.calibration import student_factor
 from jointfrf.identification.manifold.beyond_noise import (
@@ -255,7 +255,7 @@ def fit_laws(problem: FitProblem, joint: LawJoint) -> ManifoldFit:
     """
 
     def fit(own: FitProblem) -> tuple[JointEstimate, tuple[DofDamping, ...]]:
-        return estimate_laws(own.frfs, joint, 2 * np.pi * own.freq_hz, own.used), ()
+        return estimate_laws(own.frfs, joint, 2 * np.pi * own.freq_hz, own.used, own.options.same), ()
 
     with _quiet():
         problem, found, _ = _estimated(problem, fit)
@@ -377,7 +377,8 @@ def _cross_fits(
     is_asked = problem.options.cross == "zero" and not (problem.noise.is_assumed or problem.sides_bend)
     if not (is_asked and test.is_large and coupled):
         return False
-    other = _estimate(problem, _chosen(problem, choices), "fit", result.data)
+    of_points = any(point for point, _ in map(point_and_direction, problem.dofs))
+    other = _estimate(problem, _chosen(problem, choices), "points" if of_points else "fit", result.data)
     return bool(np.sqrt(other.excess) - 1 < (test.ratio - 1) / 4)
 
 
@@ -385,7 +386,7 @@ def _with_damping(problem: FitProblem) -> tuple[JointEstimate, tuple[DofDamping,
     damping = problem.options.damping
     if damping != "auto":
         return _estimate(problem, damping), ()
-    if problem.options.cross == "fit":
+    if problem.options.cross in ("points", "fit") or problem.options.same:
         return _with_common_damping(problem)
     both = _estimate(problem, "both")
     factor = problem.noise.inflation * max(both.scale, _LEAST_EXCESS if problem.noise.is_assumed else 1.0)
@@ -502,7 +503,7 @@ def _starts(
 
 
 def _terms(problem: FitProblem, damping: DampingTerms | Sequence[DampingTerms], cross: CrossTerms) -> JointTerms:
-    return joint_terms(2 * np.pi * problem.freq_hz, problem.dofs, damping, cross)
+    return joint_terms(2 * np.pi * problem.freq_hz, problem.dofs, damping, cross, problem.options.same)
 
 
 def _estimate(

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, get_args
+from typing import Literal, cast, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf.channels.joint_channels import LeftOutDof, left_out_dofs
+from jointfrf.dofs import point_and_direction
 from jointfrf.frf.bands import Band, as_bands, in_bands, line_slices, spread_lines
 from jointfrf.frf.entry_groups import ZERO
 from jointfrf.frf.quantiles import medians
@@ -26,11 +27,12 @@ from jointfrf.identification.manifold.transforms import (
 from jointfrf.identification.noise import KnownNoise, NoiseOptions, noise_of_matrix
 from jointfrf.identification.prepare import BandsOfDofs, MeasuredFrfs, as_dof_names
 from jointfrf.identification.side_models import SideModel, corrected_frfs
-from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_names, as_real, check_choice
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_names, as_real, check_choice, one_line
 
 __all__ = [
     "FitOptions",
     "FitProblem",
+    "as_equal_points",
     "check_channels",
     "check_estimate",
     "check_joint_seen",
@@ -49,6 +51,7 @@ class FitOptions:
     damping: DampingTerms | Literal["auto"] | Sequence[DampingTerms]
     cross: CrossTerms
     reciprocal: bool
+    same: tuple[tuple[str, ...], ...] = ()
 
     def __post_init__(self) -> None:
         """Check the words."""
@@ -58,6 +61,8 @@ class FitOptions:
             for word in as_names("damping", self.damping):
                 check_choice("damping", word, get_args(DampingTerms))
         check_choice("cross", self.cross, get_args(CrossTerms))
+        if self.same and self.cross == "ignore":
+            raise ValueError('same takes the joints of points as a whole: cross "ignore" does not go with it')
 
 
 @dataclass(frozen=True)
@@ -118,6 +123,32 @@ class FitProblem:
         return replace(self, noise=noise, frfs=self.frfs._replace(variance=variance))
 
 
+def as_equal_points(same: Sequence[str] | Sequence[Sequence[str]] | None) -> tuple[tuple[str, ...], ...]:
+    """Return lists of points whose joints are equal, as `identify` takes them: one list of names, or several."""
+    if same is None:
+        return ()
+    if isinstance(same, Sequence) and not isinstance(same, str) and all(isinstance(one, str) for one in same):
+        same = [cast("Sequence[str]", same)]
+    if not isinstance(same, Sequence) or isinstance(same, str):
+        raise TypeError(f"same must be a list of names of points, not {one_line(same)}")
+    found = tuple(as_names("same", one) for one in same)
+    named = [point for points in found for point in points]
+    if len(set(named)) != len(named) or any(len(points) < 2 for points in found):
+        raise ValueError(f"same must name at least two points, each once, not {one_line(same)}")
+    return found
+
+
+def _check_points(options: FitOptions, dofs: tuple[str, ...]) -> None:
+    """Raise an error for options about points that the DOFs do not have."""
+    points = {point for point, _ in map(point_and_direction, dofs) if point}
+    if options.cross == "points" and not points:
+        raise ValueError(f'cross "points" needs DOFs of points, such as "bolt1.y", not {", ".join(dofs)}')
+    for point in (point for own in options.same for point in own):
+        if point not in points:
+            known = f"the DOFs have {', '.join(sorted(points))}" if points else f"{', '.join(dofs)} have none"
+            raise ValueError(f'same names {point!r}, which is no point of a DOF like "bolt1.y": {known}')
+
+
 def prepare_compliance(
     measured: MeasuredFrfs,
     dofs: Sequence[str] | None,
@@ -139,6 +170,7 @@ def prepare_compliance(
     if dofs is None and transforms.geometry is not None:
         dofs = transforms.geometry.dofs
     names = as_dof_names(dofs, responses.shape[0] // 2)
+    _check_points(options, names)
     if not isinstance(options.damping, str) and len(options.damping) != len(names):
         raise ValueError(f"damping must hold one word for each of {len(names)} DOFs, not {len(options.damping)}")
     own = as_bands(bands, names, freq)

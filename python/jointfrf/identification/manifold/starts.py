@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf.frf.bands import in_pieces
-from jointfrf.identification.manifold.coordinates import SpringJoint
+from jointfrf.identification.manifold.coordinates import SpringJoint, summed_terms
 from jointfrf.identification.manifold.line_forms import LineForms
 from jointfrf.identification.manifold.on_manifold import LineData
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
@@ -134,8 +134,8 @@ def _mean_start(value: ComplexArray, own: FloatArray, line_weight: FloatArray, j
     w = line_weight / (own / size**4).max(axis=1)
     mean = np.tensordot(w, scaled, 1) / w.sum()
     k = np.linalg.pinv((mean + mean.T) / 2, hermitian=True) / np.outer(size, size)
-    start, of_stiffness = np.zeros(joint.lower.size), joint.terms.kinds == 0
-    start[of_stiffness] = k[tuple(joint.terms.pairs[of_stiffness].T)]
+    terms, first = joint.terms, joint.terms.first
+    start: FloatArray = np.where(terms.kinds[first] == 0, k[tuple(terms.pairs[first].T)], 0.0)
     return start
 
 
@@ -155,8 +155,9 @@ def _linear_start(value: ComplexArray, own: FloatArray, line_weight: FloatArray,
             column[:, b] = c[:, a]
         columns.append((column * (root * factors[kind])[:, None, None]).ravel())
     right = (root[:, None, None] * np.eye(n)).astype(np.complex128).ravel()
-    matrix = np.array(columns).T
+    units = size[terms.pairs[:, 0]] * size[terms.pairs[:, 1]] * scale[terms.kinds]
+    of_parameter = units[terms.first]
+    matrix = summed_terms(np.array(columns).T * (units / of_parameter[terms.shared]), terms.shared)
     theta = np.linalg.lstsq(np.r_[matrix.real, matrix.imag], np.r_[right.real, right.imag], rcond=1e-12)[0]
-    units = size[terms.pairs[:, 0]] * size[terms.pairs[:, 1]]
-    start: FloatArray = theta / scale[terms.kinds] / units
+    start: FloatArray = theta / of_parameter
     return start
