@@ -60,6 +60,7 @@ def add_arguments(parser: CommandParser) -> None:
         "where laws that depend on frequency are taken; LOW:HIGH writes tables over frequency (abaqus, nastran)",
         _frequency,
     )
+    parser.option("--point NAME", "of a fit of several joint points: the one that is written: bolt1")
     parser.option("--joint-at X,Y,Z", "reference point of the joint in the model, in its unit of length (saved)", point)
     add_card_arguments(parser)
 
@@ -91,7 +92,7 @@ def _table_lines(joint: Joint | LawJoint, low: float, high: float) -> FloatArray
 def run(args: argparse.Namespace) -> int:
     """Carry out the command; the caller turns exceptions into messages."""
     out = Output(args)
-    found = read_joint_file(args.joint)
+    found = _at_point(read_joint_file(args.joint), args.point)
     at = args.frequency if isinstance(args.frequency, float) else None
     if isinstance(found.joint, Joint) and at is not None:
         warn_of_ignored(args, ("--frequency",), "no law of this joint depends on frequency")
@@ -126,6 +127,20 @@ def _by_hand(found: JointFile, request: CardRequest, freq_hz: float | None) -> s
         return joint.export(request.program, request.nodes, **options)
     except ValueError as error:
         raise UsageError(_refusal(str(error), "")) from error
+
+
+def _at_point(found: JointFile, point: str | None) -> JointFile:
+    """Return the one of several joint points that is named; the joint itself where it has no points."""
+    known = () if found.fit is None else found.fit.points
+    if point is None and not known:
+        return found
+    if found.fit is None or point not in known:
+        raise UsageError(
+            f"--point must name one joint point of the file, {', '.join(known) or 'which has none'}"
+            + ("" if point is None else f", not {point!r}")
+        )
+    fit = found.fit.at_point(point)
+    return found._replace(fit=fit, joint=fit.joint, about=(*found.about, f"joint point {point}"))
 
 
 def _without_negative(joint: Joint) -> tuple[Joint, list[str]]:

@@ -80,7 +80,13 @@ def add_arguments(parser: CommandParser) -> None:
         "auto",
     )
     parser.option(
-        "--cross", "terms between the joint DOFs: none (default), not looked at, fitted", get_args(CrossTerms), "zero"
+        "--cross",
+        "terms between the joint DOFs: none (default), not looked at, fitted within each of --points, fitted",
+        get_args(CrossTerms),
+        "zero",
+    )
+    parser.option(
+        "--same NAMES", "joint points that are equal and share their parameters: bolt1,bolt2", words, repeated=True
     )
     parser.option(
         "--side-j PART",
@@ -127,12 +133,19 @@ def run(args: argparse.Namespace) -> int:
             raise UsageError(f"--report: {args.report} is a folder, not a file")
     check_folder("--save", args.save)
     if args.model is not None:
+        for name in ("points", "same"):
+            if getattr(args, name) is not None:
+                raise UsageError(f"--{name} is of FRFs at the joint points themselves: it does not go with --model")
         return run_model(args)
     if args.each:
         raise UsageError("--each is for tests with --model: name the file of the assembly")
     out = Output(args)
     if args.save is None:
         warn_of_ignored(args, ("--save-lines",), "it is for --save")
+    if args.points is not None:
+        _check_points(args)
+    elif args.same is not None:
+        raise UsageError("--same is of several joint points: name them by --points")
     measured = read_measured(args)
     frfs = measured.receptance()
     joint = measured_joint(args, frfs, args.bending_stiffness)
@@ -180,6 +193,17 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
+def _check_points(args: argparse.Namespace) -> None:
+    """Raise an error for options that are of one joint point."""
+    for name, value, instead in (
+        ("--export", args.export, "say --save FILE, then jointfrf export FILE PROGRAM:J,K --point NAME"),
+        ("--side-j", args.side_j, "models of the sides correct the FRFs of one joint point"),
+        ("--side-k", args.side_k, "models of the sides correct the FRFs of one joint point"),
+    ):
+        if value is not None:
+            raise UsageError(f"--points does not go with {name}: {instead}")
+
+
 def _content(
     args: argparse.Namespace,
     joint: MeasuredJoint,
@@ -207,7 +231,7 @@ def _heading(args: argparse.Namespace, frfs: FrfSet, joint: MeasuredJoint) -> It
     size = f"{frfs.h.shape[1]} responses x {frfs.h.shape[2]} excitations"
     yield f"{file_names(args)}: {size}; joint between points {points}"
     yield from joint.text()
-    if joint.channels is None and len(joint.nodes[0]) > 1:
+    if joint.channels is None and len(joint.nodes[0]) > 1 and not joint.is_of_points:
         yield from _differences(args, joint)
 
 
@@ -278,6 +302,8 @@ def _of_compliance(
 ) -> dict[str, Any]:
     """Return the options of the compliance fit: damping, cross terms, noise, coherence where the file has it."""
     terms = {"damping": args.damping, "cross": args.cross} if laws is None else {"joint": laws}
+    if args.same is not None:
+        terms["same"] = args.same
     names = joint.responses.channels, joint.forces.channels
     coherence = frfs.coherence_matrix(*names)
     known = {} if coherence is None else {"coherence": coherence, "averages": frfs.least_averages(*names)}
@@ -300,7 +326,9 @@ def _places(joint: MeasuredJoint) -> list[str]:
 
 
 def _save(path: Path, fit: Fit, source: str, joint: MeasuredJoint, *, lines: bool) -> None:
-    about = {"source": source, "reference_points_m": plain(dict(zip("jk", joint.responses.references, strict=True)))}
+    about: dict[str, Any] = {"source": source}
+    if not joint.is_of_points:
+        about["reference_points_m"] = plain(dict(zip("jk", joint.responses.references, strict=True)))
     write_record(path, fit_to_dict(fit, lines=lines) | about)
 
 

@@ -166,6 +166,12 @@ def add_file_arguments(parser: CommandParser) -> None:
         help=f"FRFs of the points around the joint: {format_names()}; several files of one test become one",
     )
     add_joint_arguments(parser)
+    parser.option(
+        "--points NAMES",
+        "several joint points at once, bolt1,bolt2: one node of --j and of --k for each, with all of --dofs in the "
+        "file; DOFs are then bolt1.x, ...",
+        words,
+    )
 
 
 def add_joint_arguments(parser: CommandParser) -> None:

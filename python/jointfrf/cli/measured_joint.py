@@ -57,6 +57,8 @@ class MeasuredJoint:
     every : (JointChannels, ndarray) or None
         The virtual points with the channels, too, that are left out because FRFs of them are missing, and the FRFs
         between all of them, NaN where there is none.
+    is_of_points : bool
+        Whether the channels are the DOFs of several joint points.
     """
 
     freq_hz: FloatArray
@@ -67,6 +69,7 @@ class MeasuredJoint:
     nodes: tuple[list[int], list[int]]
     bands: list[tuple[float, float]] | None
     every: tuple[JointChannels, ComplexArray] | None = None
+    is_of_points: bool = False
 
     def placed(self, side: int, coordinates: Mapping[int, FloatArray]) -> list[list[PlacedChannel]]:
         """Return the responses and the excitations of side 0 (j) or 1 (k), with their places from its reference."""
@@ -85,8 +88,10 @@ class MeasuredJoint:
         return found
 
     @property
-    def transform(self) -> Interface | tuple[Interface, Interface]:
+    def transform(self) -> Interface | tuple[Interface, Interface] | None:
         """What `identify` takes."""
+        if self.is_of_points:
+            return None
         return self.responses if self.responses is self.forces else (self.responses, self.forces)
 
     @property
@@ -111,7 +116,7 @@ class MeasuredJoint:
     @cached_property
     def left_out(self) -> tuple[LeftOutDof, ...]:
         """DOFs left out that enter those that are kept."""
-        if np.isnan(self._lines).all(axis=0).any():
+        if self.is_of_points or np.isnan(self._lines).all(axis=0).any():
             return ()
         found = left_out_dofs(self._lines, self.responses)
         if not self.is_square:
@@ -139,7 +144,7 @@ class MeasuredJoint:
     @property
     def offsets(self) -> tuple[OffsetCoupling, ...]:
         """Rotations that reference points which are apart turn into displacements."""
-        return offset_couplings(self.responses)
+        return () if self.is_of_points else offset_couplings(self.responses)
 
     def warnings(self, check: FrfCheck) -> Iterator[str]:
         """Say what a reader must know before the fit, beside what a look at the FRFs has found."""
@@ -255,9 +260,31 @@ def measured_joint(
         return MeasuredJoint(
             frfs.freq_hz, found.gamma(frfs), found.responses, found.forces, found, nodes, args.band, whole
         )
-    sides = _node_dofs(args, frfs, nodes) or _point_lines(args, frfs, nodes, bending_stiffness)
+    of_points = args.points is not None
+    sides = (
+        _points(args, nodes)
+        if of_points
+        else _node_dofs(args, frfs, nodes) or _point_lines(args, frfs, nodes, bending_stiffness)
+    )
     h = frfs.matrix(sides.channels, sides.channels, allow_missing=is_look)
-    return MeasuredJoint(frfs.freq_hz, h, sides, sides, None, nodes, args.band)
+    return MeasuredJoint(frfs.freq_hz, h, sides, sides, None, nodes, args.band, is_of_points=of_points)
+
+
+def _points(args: argparse.Namespace, nodes: tuple[list[int], list[int]]) -> Interface:
+    """Return the DOFs of several joint points, one node on each side for each."""
+    if not len(args.points) == len(nodes[0]) == len(nodes[1]):
+        raise UsageError(
+            f"--points names {len(args.points)}, --j {len(nodes[0])} and --k {len(nodes[1])}: each joint point has one "
+            "node on either side"
+        )
+    if len(set(args.points)) != len(args.points):
+        raise UsageError("--points names a joint point twice")
+    pairs = [node_dofs(j, k, args.dofs, {}) for j, k in zip(*nodes, strict=True)]
+    n = len(args.dofs)
+    channels = [channel for side in range(2) for one in pairs for channel in one.channels[side * n : (side + 1) * n]]
+    dofs = tuple(f"{name}.{dof}" for name, one in zip(args.points, pairs, strict=True) for dof in one.dofs)
+    ends = np.zeros(3), np.zeros(3)
+    return Interface(tuple(channels), np.eye(len(channels)), ends, dofs, np.zeros((len(channels), 12)))
 
 
 def _table(args: argparse.Namespace) -> tuple[ChannelPlace, ...] | None:
@@ -286,6 +313,10 @@ def _check_options(args: argparse.Namespace, frfs: FrfSet, table: object) -> Non
         nodes = "" if missing == ["--dofs"] else f" ({file_names(args)} has nodes {known})"
         names = ", ".join([*missing[:-2], " and ".join(missing[-2:])])
         raise UsageError(f"{names} {verb} missing: {what}{nodes}")
+    if args.points is not None:
+        for name, value in (("--at", args.at), ("--spacing", args.spacing), ("a table of channels", table)):
+            if value is not None:
+                raise UsageError(f"--points takes the nodes themselves as joint points: {name} does not go with it")
     if args.at is None:
         for name, value in (("--at-k", args.at_k), ("a table of channels", table)):
             if value is not None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
@@ -23,7 +23,7 @@ _ROUNDING = 1e-9
 def cards(
     fit: Fit,
     program: CardFormat,
-    nodes: Sequence[int],
+    nodes: Sequence[int] | Mapping[str, Sequence[int]],
     *,
     about: Sequence[str] = (),
     all_damping: bool = False,
@@ -37,7 +37,8 @@ def cards(
     ----------
     fit : Fit
     program, nodes, **options
-        As in `Joint.export`.
+        As in `Joint.export`. Of a fit of several joint points, a mapping from each of them to its nodes, in CalculiX
+        followed by its two rotation nodes; numbers of elements and properties go on from point to point.
     about : sequence of str
         Where the fit comes from: first lines of comment.
     all_damping : bool
@@ -59,6 +60,8 @@ def cards(
         As `Joint.export` and `LawJoint.export`; a stiffness is infinite, or only a bound of it is known.
     """
     check_type("fit", fit, Fit)
+    if fit.points or isinstance(nodes, Mapping):
+        return "".join(_cards_of_points(fit, program, nodes, about, options, all_damping, bounds, freq_hz))
     intervals = fit.confidence_interval(0.95)
     dropped = _worthless(fit, intervals) if fit.laws is None and not all_damping else set()
     _check_finite(fit)
@@ -82,6 +85,35 @@ def cards(
         comments += _active(joint)
     options["comments"] = [*options.get("comments", ()), *comments]
     return joint.export(program, nodes, **options)
+
+
+def _cards_of_points(
+    fit: Fit,
+    program: CardFormat,
+    nodes: Sequence[int] | Mapping[str, Sequence[int]],
+    about: Sequence[str],
+    options: CardOptions,
+    all_damping: bool,
+    bounds: bool,
+    freq_hz: float | None,
+) -> Iterator[str]:
+    """Yield the cards of each joint point."""
+    if not isinstance(nodes, Mapping) or sorted(nodes) != sorted(fit.points):
+        raise ValueError(f"nodes must map each joint point, {', '.join(fit.points) or 'here none'}, to its nodes")
+    given = [name for name in ("positions", "points", "faces", "rotation_nodes") if options.get(name) is not None]
+    if given:
+        raise ValueError(f"{given[0]} is of one joint point: write the cards of each, fit.at_point")
+    element, number = options.get("element", 1), options.get("number", 1)
+    for point in fit.points:
+        ends = nodes[point]
+        own: CardOptions = {**options, "element": element, "number": number, "rotation_nodes": ends[2:] or None}
+        text = cards(
+            fit.at_point(point), program, ends[:2], about=[*about, f"joint point {point}"], all_damping=all_damping,
+            bounds=bounds, freq_hz=freq_hz, **own,
+        )  # fmt: skip
+        # Beyond every element and property that these lines name.
+        element, number = element + len(text.splitlines()), number + len(text.splitlines())
+        yield text
 
 
 def _worthless(fit: Fit, intervals: dict[str, tuple[float, float]]) -> set[FittedParameter]:

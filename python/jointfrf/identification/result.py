@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import ndtri
 
-from jointfrf.dofs import Parameter, ParameterKind, parameter_name
+from jointfrf.dofs import Parameter, ParameterKind, parameter_name, point_and_direction
 from jointfrf.frf.bands import Band
 from jointfrf.identification.derived import Derived, DerivedFunction, derived_quantity
 from jointfrf.identification.findings import Finding, WithFindings, as_warning, worst_first
@@ -260,6 +260,88 @@ class Fit(WithFindings):
         known = {one.row for one in self.parameters if one.kind == "h" and not one.is_cross}
         names = ([parameter_name(kind, dof, dof) for kind in ("eta", "h", "k")] for dof in self.dofs if dof in known)
         return {eta: self.derived(f"{{{h}}} / {{{k}}}") for eta, h, k in names}
+
+    @property
+    def points(self) -> tuple[str, ...]:
+        """Names of the joint points of DOFs like ``"bolt1.y"``; empty where there is one point without a name."""
+        return tuple(dict.fromkeys(point for point, _ in map(point_and_direction, self.dofs) if point))
+
+    def at_point(self, point: str) -> Fit:
+        """Return the fit of one of several joint points, whose DOFs lose its name: for cards, `elastic_centre`, `pool`.
+
+        Parameters
+        ----------
+        point : str
+            One of `points`.
+
+        Returns
+        -------
+        Fit
+            Its parameters, as all points together gave them, with their covariance and intervals. It has no data for
+            figures.
+
+        Raises
+        ------
+        ValueError
+            There is no such point.
+
+        Examples
+        --------
+        >>> import numpy as np, jointfrf as jf
+        >>> freq = np.linspace(0.5, 10, 200)
+        >>> a = jf.chain([5, 3], [2500, 3500], [3, 4], ground="start").receptance(freq)
+        >>> b = jf.chain([4, 2], [2000, 2500], [2, 1], ground="end").receptance(freq)
+        >>> bolts = jf.Joint([2000.0, 2000.0], [3.0, 3.0]).dynamic_stiffness(freq)
+        >>> gamma = jf.pollute(jf.couple(a, b, bolts, [0, 1], [0, 1]), 0.02, seed=2)
+        >>> fit = jf.identify(freq, gamma, ["left.x", "right.x"], same=["left", "right"], damping="viscous")
+        >>> fit.points, list(fit.value), list(fit.at_point("right").value)
+        (('left', 'right'), ['left.k_x', 'right.k_x', 'left.c_x', 'right.c_x'], ['k_x', 'c_x'])
+        """
+        if point not in self.points:
+            known = f"only {', '.join(self.points)}" if self.points else "the DOFs have none, such as bolt1.y"
+            raise ValueError(f"there is no joint point {one_line(point)}, {known}")
+        at = [d for d, dof in enumerate(self.dofs) if point_and_direction(dof)[0] == point]
+        own = {self.dofs[d]: point_and_direction(self.dofs[d])[1] for d in at}
+        kept = [i for i, one in enumerate(self.parameters) if one.row in own and one.column in own]
+        names = {
+            one.name: replace(
+                one, name=parameter_name(one.kind, own[one.row], own[one.column]), row=own[one.row],
+                column=own[one.column],
+            )
+            for one in (self.parameters[i] for i in kept)
+        }  # fmt: skip
+
+        def intervals(probability: float) -> dict[str, tuple[float, float]]:
+            every = self.confidence_interval(probability)
+            return {one.name: every[name] for name, one in names.items()}
+
+        laws = self.laws
+        if laws is not None:
+            terms = {(own[a], own[b]): law for (a, b), law in laws.laws.items() if a in own and b in own}
+            rigid, mass = ([dof for dof in some if dof in own] for some in (laws.rigid, laws.mass))
+            laws = LawJoint(
+                terms, [own[dof] for dof in rigid], {own[dof]: laws.mass[dof] for dof in mass}, tuple(own.values())
+            )
+        return replace(
+            self,
+            dofs=tuple(own.values()),
+            parameters=tuple(names.values()),
+            estimate=self.estimate[kept],
+            covariance=self.covariance[np.ix_(kept, kept)],
+            laws=laws,
+            findings=tuple(
+                replace(
+                    one, about=tuple(names[name].name if name in names else own.get(name, name) for name in one.about)
+                )
+                for one in self.findings
+                if not one.about or {*own, *names, point} & {*one.about}
+            ),
+            k_lines=None if self.k_lines is None else self.k_lines[:, at][:, :, at],
+            bands=tuple(self.bands[d] for d in at) if self.bands else (),
+            intervals=intervals,
+            seen={names[name].name: one for name, one in self.seen.items() if name in names},
+            data=None,
+        )
 
     def with_findings(self, findings: Sequence[Finding]) -> Fit:
         """Return the same fit with other findings, the worst first."""
