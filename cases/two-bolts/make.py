@@ -4,6 +4,7 @@
 """
 
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -46,30 +47,36 @@ def plate(name: str) -> SolidModel:
     return solid_model(mesh, ALUMINIUM, patches=patches)
 
 
-def stiffness(bolt: str) -> np.ndarray:
-    """Return the stiffness of a bolt, shape (6, 6)."""
+def stiffness(share: float) -> np.ndarray:
+    """Return the stiffness of a bolt that has this share of that of bolt1, shape (6, 6)."""
     k = np.diag(STIFFNESS)
-    for (row, column), share in CROSS.items():
+    for (row, column), relative in CROSS.items():
         a, b = DOFS.index(row), DOFS.index(column)
-        k[a, b] = k[b, a] = share * np.sqrt(k[a, a] * k[b, b])
-    return SHARE[bolt] * k
+        k[a, b] = k[b, a] = relative * np.sqrt(k[a, a] * k[b, b])
+    return share * k
 
 
-def exact() -> np.ndarray:
+def joint(shares: Mapping[str, float] = SHARE) -> jf.Joint:
+    """Return the joint of both bolts, which are not coupled with each other, DOFs bolt1.x to bolt2.theta_z."""
+    k = np.zeros((12, 12))
+    for i, bolt in enumerate(BOLTS):
+        k[6 * i : 6 * i + 6, 6 * i : 6 * i + 6] = stiffness(shares[bolt])
+    dofs = [f"{bolt}.{dof}" for bolt in BOLTS for dof in DOFS]
+    return jf.Joint(k, dofs=dofs, structural_damping=LOSS_FACTOR * k)
+
+
+def exact(bolts: jf.Joint) -> np.ndarray:
     """Return receptances of the assembly: bolt1, bolt2 of A, then of B, shape (n_freq, 24, 24), m/N."""
     dofs = [f"{bolt}:{dof}" for bolt in BOLTS for dof in DOFS]
     h_a, h_b = (model.receptance(FREQ_HZ, model.ports(*dofs)) for model in map(plate, SPANS))
-    k = np.zeros((12, 12))
-    for i, bolt in enumerate(BOLTS):
-        k[6 * i : 6 * i + 6, 6 * i : 6 * i + 6] = stiffness(bolt)
-    return jf.couple(h_a, h_b, np.tile(k * (1 + 1j * LOSS_FACTOR), (FREQ_HZ.size, 1, 1)), range(12), range(12))
+    return jf.couple(h_a, h_b, bolts.dynamic_stiffness(FREQ_HZ), range(12), range(12))
 
 
 if __name__ == "__main__":
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent
     names = ("+x", "+y", "+z", "+rx", "+ry", "+rz")
     channels = tuple(Channel(NODES[bolt][side], way) for side in (0, 1) for bolt in BOLTS for way in names)
-    h = jf.pollute(exact(), NOISE, seed=SEED)
+    h = jf.pollute(exact(joint()), NOISE, seed=SEED)
     places = {node: np.array([0.0, THICKNESS, z]) for bolt, z in BOLTS.items() for node in NODES[bolt]}
     frfs = FrfSet(FREQ_HZ, channels, channels, h, "receptance", places)
     write_uff(folder / "test.uff", frfs, title="Simulated FRFs of two plates at both bolts, 1 % noise", single=True)

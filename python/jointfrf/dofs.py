@@ -185,7 +185,7 @@ class Parameter:
         """
         check_type("a parameter", name, str)
         point, direction = point_and_direction(name)
-        of_point = _OF_POINT.match(direction) is not None and "," not in point
+        of_point = bool(point) and _OF_POINT.match(direction) is not None and "," not in point
         kind, underscore, dofs = (direction if of_point else name).partition("_")
         row, _, column = dofs.partition(",")
         if of_point and row:

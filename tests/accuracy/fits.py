@@ -26,6 +26,7 @@ from trials import SIZES, TRIALS, Trial
 
 import jointfrf as jf
 from cramer_rao import cramer_rao
+from jointfrf.dofs import Parameter, parameters_shared
 from jointfrf.identification.manifold.coordinates import joint_terms
 
 #: Terms of a truth that is not named by them.
@@ -63,7 +64,7 @@ def one_draw(trial: Trial, seed: int) -> Draw:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
-            fit = jf.identify(freq, gamma, joint.dofs, damping=trial.damping, cross=trial.cross)
+            fit = jf.identify(freq, gamma, joint.dofs, damping=trial.damping, cross=trial.cross, same=trial.same)
         except ValueError:
             # No joint was found, and that is said.
             return Draw({}, {}, time.perf_counter() - start)
@@ -91,6 +92,10 @@ def truth_of(trial: Trial) -> tuple[dict[str, float], dict[str, float]]:
         at = np.concatenate([group, group + len(joint.dofs)])
         k, own = joint.dynamic_stiffness(freq)[:, group[:, None], group], np.ix_(range(freq.size), at, at)
         covariance = cramer_rao(gamma[own], k, own_terms, std=std[own])
+        if trial.same is not None:
+            shared = parameters_shared([one.name for one in own_terms.parameters], [trial.same])
+            fold = np.eye(shared.max() + 1)[shared]
+            covariance = fold @ np.linalg.inv(fold.T @ np.linalg.inv(covariance) @ fold) @ fold.T
         bound[which] = trial.level * np.sqrt(np.diag(covariance))
     return dict(zip(names, values, strict=True)), dict(zip(names, bound.tolist(), strict=True))
 
@@ -121,19 +126,23 @@ def row_of(trial: Trial, draws: Sequence[Draw]) -> Row:
     draws = [draw for draw in draws if draw.value]
     ratio, coverage, run_off = {}, {}, np.zeros(len(draws), bool)
     for name, true in truth.items():
+        if np.isnan(bound[name]):
+            # A cross term between DOFs that no FRF connects is not fitted.
+            continue
+        one = Parameter.parse(name)
         value = np.array([draw.value.get(name, 0.0) for draw in draws])
         low, high = np.array([draw.interval.get(name, (0.0, 0.0)) for draw in draws]).T
         inside = (low <= true) & (true <= high)
         coverage[name] = float(inside.mean())
         error, scale = value - true, bound[name]
-        if name.startswith("k") and trial.cross != "fit" and true > 0:
+        if one.kind == "k" and trial.cross not in ("points", "fit") and true > 0:
             with np.errstate(divide="ignore"):
                 error, scale = 1 / value - 1 / true, bound[name] / true**2
         ratio[name] = float(np.sqrt((error**2).mean()) / scale)
         with np.errstate(invalid="ignore"):
             far = (
                 (value > _RUN_OFF * true) | (value < true / _RUN_OFF)
-                if name.startswith("k") and "," not in name and true > 0
+                if one.kind == "k" and not one.is_cross and true > 0
                 else np.zeros_like(run_off)
             )
         run_off |= far & ~inside

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import runpy
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -76,12 +79,25 @@ def _full(_: float, kind: str) -> System:
     return System(freq, assembly(joint, freq), joint)
 
 
+@cache
+def _two_bolts() -> dict[str, Any]:
+    return runpy.run_path(str(Path(__file__).resolve().parents[2] / "cases" / "two-bolts" / "make.py"))
+
+
+def _bolts(share: float) -> System:
+    case = _two_bolts()
+    joint = case["joint"]({"bolt1": 1.0, "bolt2": share})
+    return System(case["FREQ_HZ"], case["exact"](joint), joint)
+
+
 _SYSTEMS: dict[str, Callable[[float, str], System]] = {
     "3.1": _chains,
     "3.2": lambda factor, kind: _beams(np.arange(15.0, 900.5, 2.0), (2, 1), factor, kind),
     "3.3": lambda factor, kind: _beams(np.arange(15.0, 801.0), (12, 9), factor, kind),
     "six DOFs": _six,
     "full 6 x 6": _full,
+    "two bolts": lambda factor, kind: _bolts(0.7),
+    "two equal bolts": lambda factor, kind: _bolts(1.0),
 }
 
 
@@ -171,6 +187,7 @@ class Trial:
     cross: str = "zero"
     damping: str = "viscous"
     kind: str = "viscous"
+    same: tuple[str, ...] | None = None
 
     @property
     def name(self) -> str:
@@ -180,7 +197,9 @@ class Trial:
             words.append(f"joint x{self.factor:g}")
         if self.step != 1:
             words.append(f"{self.exact.freq_hz.size} lines")
-        if self.damping != "viscous" or self.kind != "viscous":
+        if self.system.startswith("two"):
+            words.append("equal" if self.same else "each its own")
+        elif self.damping != "viscous" or self.kind != "viscous":
             words.append(f"damping {self.damping}, truth {self.kind}")
         return ", ".join(words)
 
@@ -245,6 +264,10 @@ def _trials() -> dict[str, list[Trial]]:
         "few": few,
         "damping": damping,
         "free": free,
+        "points": [
+            Trial(name, "complex", 0.01, cross="points", damping="hysteretic", kind="hysteretic", same=same)
+            for name, same in (("two bolts", None), ("two equal bolts", ("bolt1", "bolt2")))
+        ],
     }
 
 

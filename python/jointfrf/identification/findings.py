@@ -32,6 +32,7 @@ FitFindingKind = Literal[
     "prior",
     "reference point",
     "residual",  # it is not the noise
+    "same",  # joint points that share their parameters
     "sides",  # bodies that deform between the channels
     "sign",  # damping that is negative, or may be
     "trend",  # a parameter that changes over the band

@@ -18,6 +18,7 @@ from jointfrf.frf.bands import Band
 from jointfrf.identification.derived import Derived, DerivedFunction, derived_quantity
 from jointfrf.identification.findings import Finding, WithFindings, as_warning, worst_first
 from jointfrf.identification.fit_data import FitData, ModelData
+from jointfrf.identification.profile import Intervals
 from jointfrf.identification.residual_test import ResidualTest
 from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_probability, one_line
@@ -310,10 +311,14 @@ class Fit(WithFindings):
             )
             for one in (self.parameters[i] for i in kept)
         }  # fmt: skip
+        intervals: IntervalsByProbability
+        if isinstance(self.intervals, Intervals):
+            intervals = self.intervals.shared([one.name for one in names.values()], np.array(kept, np.intp))
+        else:
 
-        def intervals(probability: float) -> dict[str, tuple[float, float]]:
-            every = self.confidence_interval(probability)
-            return {one.name: every[name] for name, one in names.items()}
+            def intervals(probability: float) -> dict[str, tuple[float, float]]:
+                every = self.confidence_interval(probability)
+                return {one.name: every[name] for name, one in names.items()}
 
         laws = self.laws
         if laws is not None:
@@ -322,7 +327,7 @@ class Fit(WithFindings):
             laws = LawJoint(
                 terms, [own[dof] for dof in rigid], {own[dof]: laws.mass[dof] for dof in mass}, tuple(own.values())
             )
-        return replace(
+        found = replace(
             self,
             dofs=tuple(own.values()),
             parameters=tuple(names.values()),
@@ -342,6 +347,11 @@ class Fit(WithFindings):
             seen={names[name].name: one for name, one in self.seen.items() if name in names},
             data=None,
         )
+        if "loss_factors" in vars(self):  # of a fit that was loaded they cannot be found again
+            etas = {parameter_name("eta", dof, dof): parameter_name("eta", new, new) for dof, new in own.items()}
+            kept_etas = {etas[name]: one for name, one in self.loss_factors.items() if name in etas}
+            vars(found)["loss_factors"] = kept_etas
+        return found
 
     def with_findings(self, findings: Sequence[Finding]) -> Fit:
         """Return the same fit with other findings, the worst first."""

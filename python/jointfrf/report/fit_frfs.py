@@ -90,12 +90,12 @@ def compare_frfs(data: FitData, dofs: tuple[str, ...]) -> ComparedFrfs:
             of_rigid = rigid[0] @ np.where(np.isfinite(variance), variance, 0) @ rigid[1].T
             apart = np.where(np.isfinite(variance), np.maximum(variance, of_rigid), np.inf)
         shown[0, own], shown[1, own] = h[:, p, q], regenerated[:, p, q]
-        _add(squares[0], counts[0], abs(h - regenerated) ** 2, apart)
+        # An FRF that is zero by symmetry says nothing, and has no noise of its own.
+        is_there = abs(h) ** 2 > ZERO**2 * own_size(h) if same or modes is None else np.ones_like(h, bool)
+        _add(squares[0], counts[0], abs(h - regenerated) ** 2, np.where(is_there, apart, 0))
         if same:
-            # An FRF that is zero by symmetry says nothing, and has no noise of its own.
             both = variance + variance.swapaxes(1, 2)
-            is_there = (abs(h) ** 2 > ZERO**2 * own_size(h)) & (both > (_NO_NOISE * abs(h)) ** 2)
-            both = np.where(is_there, both, 0)
+            both = np.where(is_there & (both > (_NO_NOISE * abs(h)) ** 2), both, 0)
             _add(squares[1], counts[1], abs(h - h.swapaxes(1, 2)) ** 2, both)
     with np.errstate(invalid="ignore", divide="ignore"):
         residual, reciprocity = np.sqrt(squares / np.where(counts > 0, counts, np.nan))

@@ -391,17 +391,28 @@ def _cards(fit: Fit, nodes: Sequence[int]) -> list[Part]:
     listings, unsupported = [], []
     changes = fit.laws is not None and any(law.constant_terms is None for law in fit.laws.laws.values())
     freq_hz = float(f"{np.sqrt(fit.freq_hz.min() * fit.freq_hz.max()):.3g}") if changes else None
+    of_points = {point: (j + 4 * i, k + 4 * i) for i, point in enumerate(fit.points)}
     for program in get_args(CardFormat):
         is_calculix = program == "calculix"
-        rotation = (tuple(nodes[2:4]) or (max(j, k) + 1, max(j, k) + 2)) if is_calculix else None
+        rotation = (tuple(nodes[2:4]) or (max(j, k) + 1, max(j, k) + 2)) if is_calculix else ()
+        # Nodes of the next joint point follow those of this one.
+        ends = {point: (*own, *(node + 4 * i for node in rotation)) for i, (point, own) in enumerate(of_points.items())}
         name = _PROGRAMS[program] + (" (stiffness only)" if is_calculix else "")
         try:
-            text = cards(fit, program, (j, k), damping=not is_calculix, rotation_nodes=rotation, freq_hz=freq_hz)
+            text = cards(
+                fit, program, ends or (j, k), damping=not is_calculix, freq_hz=freq_hz,
+                rotation_nodes=None if ends else rotation or None,
+            )  # fmt: skip
         except ValueError as error:
             unsupported.append(f"{_PROGRAMS[program]}: {error}.")
         else:
             listings.append(Listing(name, text, printed=text.count("\n") <= _PRINTED))
-    where = f"In SI units, between node {j} on side j and node {k} on side k, along the global axes."
+    pairs = [f"{a} and {b} ({point})" for point, (a, b) in of_points.items()]
+    where = (
+        f"In SI units, between nodes {', '.join(pairs)} on sides j and k, along the global axes."
+        if pairs
+        else f"In SI units, between node {j} on side j and node {k} on side k, along the global axes."
+    )
     if freq_hz is not None:
         where += f" The laws are taken at {freq_hz:g} Hz: cards hold constants."
     if not all(listing.printed for listing in listings):

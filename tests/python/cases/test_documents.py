@@ -26,8 +26,14 @@ def test_python_of_the_readme_prints_what_it_shows(capsys):
     agree(capsys.readouterr().out, expected)
 
 
+def test_python_example_of_several_joint_points(capsys):
+    example, (shown,) = blocks("python", DOCUMENTS["docs/python.md"])[0], blocks("text", DOCUMENTS["docs/python.md"])
+    exec(example, {})
+    agree(capsys.readouterr().out, shown)
+
+
 def test_python_example_of_solid_bodies(capsys):
-    (example,) = blocks("python", DOCUMENTS["docs/python.md"])
+    _, example = blocks("python", DOCUMENTS["docs/python.md"])
     exec(example, {})
     printed = capsys.readouterr().out
     found = {line.split()[0]: float(line.split()[1]) for line in printed.splitlines() if line[:2] in ("k_", "c_")}

@@ -31,6 +31,21 @@ def test_other_names_are_displacements(dof):
     assert compliance_unit(dof, dof) == "m/N"
 
 
+@pytest.mark.parametrize(
+    ("one", "name", "unit"),
+    [
+        (Parameter.of_dof("k", "bolt1.y"), "bolt1.k_y", "N/m"),
+        (Parameter("c", "bolt1.y", "bolt1.rz"), "bolt1.c_y,rz", "N s"),
+        (Parameter("h", "left.a.rx", "left.a.ry"), "left.a.h_rx,ry", "N m/rad"),
+        (Parameter("k", "a.y", "b.rz"), "k_a.y,b.rz", "N"),
+        (Parameter.of_dof("k", "y"), "k_y", "N/m"),
+    ],
+)
+def test_parameters_at_points_are_read_as_they_are_written(one, name, unit):
+    assert (one.name, one.unit) == (name, unit)
+    assert Parameter.parse(name) == one
+
+
 def test_units_between_a_displacement_and_a_rotation():
     assert [Parameter(kind, "y", "Mtheta").unit for kind in "khc"] == ["N", "N", "N s"]
     assert (compliance_unit("y", "theta"), compliance_unit("theta", "y")) == ("m/(N m)", "rad/N")

@@ -49,6 +49,26 @@ def test_every_dof_has_the_damping_asked_for_and_a_cross_term_what_both_have():
     assert not joint_terms(OMEGA, DOFS, "both", "ignore").has_cross_terms
 
 
+def test_equal_points_change_together():
+    dofs = ["a.x", "a.y", "b.x", "b.y", "c.x"]
+    terms = joint_terms(OMEGA, dofs, "viscous", "points", [["a", "b"]])
+    assert names(terms) == ["a.k_x", "a.k_y", "c.k_x", "a.k_x,y", "a.c_x", "a.c_y", "c.c_x", "a.c_x,y"]
+    free = joint_terms(OMEGA, dofs, "viscous", "points")
+    shared, apart = CoupledJoint(terms), CoupledJoint(free)
+    x = np.array([5e5, 7e5, 3e5, 1e5, 50.0, 70.0, 30.0, 10.0])
+    at = x[terms.shared]
+    entries = shared.compliance(x)
+    np.testing.assert_array_equal(entries, apart.compliance(at))
+    close(shared.slope(x, entries), differences(shared.compliance, x), 1e-7)
+    random = np.random.default_rng(3)
+    half = random.normal(size=(3, 15, 15)) + 1j * random.normal(size=(3, 15, 15))
+    weight, residual = half @ half.conj().swapaxes(1, 2), half[:, 0]
+    gradient, information = (part.sum(axis=0) for part in shared.line_parts(x, entries, weight, residual))
+    by_kernel = shared.normal_equations(x, entries, weight, residual)
+    np.testing.assert_allclose(by_kernel[0], information, rtol=1e-9, atol=1e-12 * abs(information).max())
+    np.testing.assert_allclose(by_kernel[1], gradient, rtol=1e-9, atol=1e-12 * abs(gradient).max())
+
+
 def test_stiffness_is_the_sum_of_matrices():
     terms = joint_terms(OMEGA, DOFS, "both", "fit")
     theta = values(terms)

@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from jointfrf.dofs import parameters_shared, point_and_direction
+from jointfrf.dofs import Parameter, ParameterKind, parameters_shared
 from jointfrf.frf.bands import spread_lines
-from jointfrf.frf.entry_groups import connected
 from jointfrf.identification.line_starts import from_lines, interface_compliance
 from jointfrf.identification.manifold.coordinates import (
     CrossTerms,
@@ -150,9 +149,10 @@ def estimate_joint(
     """
     groups = []
     known = {(tuple(start.dofs.tolist()), start.parameters): start for start in near}
-    linked = [terms.pairs[terms.shared == i].ravel() for i in range(len(terms.parameters))] if terms.is_shared else []
-    for dofs, lines in _grouped(frfs, linked) if data is None else data:
+    names, fitted = [one.name for one in terms.parameters], np.zeros(len(terms.parameters), bool)
+    for dofs, lines in _grouped(frfs) if data is None else data:
         own, which = terms.of_dofs(dofs)
+        _count_fitted(fitted, which, names)
         joint = coordinates_of(own)
         unknown = _unknown_entries(dofs, cross, used, len(lines.measured))
         problem = GroupProblem(dofs, which, lines, joint, unknown, sides_bend=sides_bend)
@@ -218,9 +218,8 @@ def estimate_laws(
     """
     groups, shared = [], parameters_shared(joint.names, same)
     quantities = tuple(joint.quantities[i] for i in np.unique(shared, return_index=True)[1])
-    names, left = [one.name for one in quantities], set(joint.laws)
-    points = [point_and_direction(dof)[0] for dof in joint.dofs]
-    for dofs, lines in _grouped(frfs, [np.flatnonzero(np.isin(points, own)) for own in same]):
+    names, left, fitted = list(joint.names), set(joint.laws), np.zeros(len(quantities), bool)
+    for dofs, lines in _grouped(frfs):
         inside = [joint.dofs[d] for d in dofs]
         laws = {pair: law for pair, law in joint.laws.items() if set(pair) <= set(inside)}
         if not laws:
@@ -231,16 +230,18 @@ def estimate_laws(
         driving = abs(np.einsum("lpp->lp", gamma))
         # 1/(|gamma_jj| + |gamma_kk|) is a size of stiffness that FRFs can show.
         size = np.median(1 / np.maximum(driving[:, : dofs.size] + driving[:, dofs.size :], 1e-300), axis=0)
-        coordinates = LawCoordinates(own, omega, size, parameters_shared(own.names, same))
+        which, of_own = np.unique(shared[[names.index(name) for name in own.names]], return_inverse=True)
+        _count_fitted(fitted, which, [one.name for one in quantities])
+        coordinates = LawCoordinates(own, omega, size, of_own.ravel())
         rigid = len(own.rigid)
         problem = GroupProblem(
-            dofs, np.array([names.index(name) for name in coordinates.names], np.intp), lines, coordinates,
+            dofs, which, lines, coordinates,
             _unknown_entries(dofs, "zero", used, len(lines.measured)),
             rigid * (rigid + 1) // 2 if frfs.reciprocal else rigid**2,
         )  # fmt: skip
         both = list(range(2 * dofs.size))
         values = from_lines(own, omega, interface_compliance(gamma, variance, (both, both)))
-        given = [own.values] if values is None else [values, own.values]
+        given = [*_near_springs(own, lines, omega), *([] if values is None else [values]), own.values]
         starts = [coordinates.coordinates(coordinates.common(one)) for one in given]
         groups.append(_fitted(_Search(problem, lambda starts=starts: starts, "zero")))  # type: ignore[misc]
     if left:
@@ -249,14 +250,41 @@ def estimate_laws(
     return assembled(quantities, groups)
 
 
-def _grouped(frfs: InterfaceFrfs, linked: Iterable[NDArray[np.intp]] = ()) -> Iterator[GroupData]:
-    """Return groups of DOFs that are fitted separately, and their FRFs; DOFs that are linked belong to one."""
-    both = np.eye(frfs.n, dtype=bool)
-    for together in (*frfs.on_lines(spread_lines(len(frfs.measured))).groups(), *linked):
-        both[together[:, None], together] = True
-    label = connected(both)
-    for dofs in (np.flatnonzero(label == own) for own in dict.fromkeys(label.tolist())):
+def _near_springs(joint: LawJoint, lines: LineData, omega: FloatArray) -> list[FloatArray]:
+    """Return values of laws near to springs and dampers with the same cross terms, where there are any.
+
+    K* of single lines is an inverse of their noisy C, which the cross terms make worse; springs are fitted to C itself.
+    """
+    place = {dof: i for i, dof in enumerate(joint.dofs)}
+    pairs = [(place[a], place[b]) for a, b in joint.laws]
+    if joint.rigid or all(a == b for a, b in pairs):
+        return []
+    parameters = tuple(Parameter(kind, a, b) for kind in get_args(ParameterKind) for a, b in joint.laws)
+    kinds, number = np.repeat(np.arange(3), len(pairs)), np.arange(3 * len(pairs))
+    terms = JointTerms(parameters, omega, kinds, np.array(pairs * 3, np.intp), number)
+    some = spread_lines(len(lines.measured))
+    found = []
+    for x in first_joints(lines.on_lines(some), coordinates_of(terms.on_lines(some))):
+        k = terms.stiffness(x)
+        laws = [law.started(omega, k[:, a, b]) for law, (a, b) in zip(joint.laws.values(), pairs, strict=True)]
+        found.append(np.concatenate([law.values for law in laws]))
+    return found
+
+
+def _grouped(frfs: InterfaceFrfs) -> Iterator[GroupData]:
+    """Return groups of DOFs that are fitted separately, and their FRFs."""
+    for dofs in frfs.on_lines(spread_lines(len(frfs.measured))).groups():
         yield dofs, frfs.of_dofs(dofs)
+
+
+def _count_fitted(fitted: NDArray[np.bool_], which: NDArray[np.intp], names: Sequence[str]) -> None:
+    """Note the parameters of a group as fitted; raise an error for one that is also of another group."""
+    if twice := [names[i] for i in which if fitted[i]]:
+        raise ValueError(
+            f"same: the FRFs between equal points are zero, so that {', '.join(twice)} would belong to separate "
+            "problems: identify each point by itself, and pool the fits"
+        )
+    fitted[which] = True
 
 
 def _between(frfs: InterfaceFrfs, dofs: NDArray[np.intp]) -> tuple[ComplexArray, FloatArray]:

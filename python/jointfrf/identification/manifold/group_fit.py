@@ -235,14 +235,17 @@ def fit_dofs(
     for start in itertools.islice(starts, _FEW_STARTS if problem.sides_bend else None):
         if not np.isfinite(start).all():
             continue
-        found = _iterated(problem, start, patience if best is None else LITTLE_PATIENCE, on)
+        try:
+            found = _iterated(problem, start, patience if best is None else LITTLE_PATIENCE, on)
+        except np.linalg.LinAlgError:  # K* ran off to infinity: another start may do
+            continue
         again = best is not None and found.is_noise and abs(found.squares - best.squares) < _SAME
         if best is None or found.squares < best.squares:
             best = found
         if best.is_good or again:
             break
     if best is None:
-        raise np.linalg.LinAlgError("no start of the fit is finite")
+        raise np.linalg.LinAlgError("no start of the fit stays finite")
     is_last = best.is_noise or best.is_lost or problem.sides_bend or not problem.joint.in_compliance
     return best if is_last else _from_softer(best)
 
