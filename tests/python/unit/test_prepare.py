@@ -203,7 +203,7 @@ def test_words_are_checked_when_they_are_chosen():
         FitOptions("dry", "zero", True)
     with pytest.raises(ValueError, match="damping must be one of none, viscous, hysteretic, both, not 'auto'"):
         FitOptions(("viscous", "auto"), "zero", True)
-    with pytest.raises(ValueError, match="cross must be one of zero, ignore, fit, not 'some'"):
+    with pytest.raises(ValueError, match="cross must be one of zero, ignore, points, fit, not 'some'"):
         FitOptions("auto", "some", True)
 
 
