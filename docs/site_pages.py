@@ -55,6 +55,7 @@ _SECTIONS = {
     ],
     "Project": [
         "CONTRIBUTING.md",
+        "CODE_OF_CONDUCT.md",
         "fortran/README.md",
         "SECURITY.md",
         "CHANGELOG.md",
