@@ -45,6 +45,7 @@ from jointfrf.frf.bands import amplitude_error, as_bands, band_mean, frequency_e
 from jointfrf.frf.frf_set import ChannelPlace, places_of_nodes
 from jointfrf.frf.noise import pollute, realisations
 from jointfrf.frf.noise_model import NoiseModel, estimate_noise
+from jointfrf.frf.setups import SetUps
 from jointfrf.frf.smoothing import SmoothFrfs, smooth_frfs
 from jointfrf.identification.band_means import identify_band_mean
 from jointfrf.identification.derived import Derived
@@ -184,6 +185,7 @@ __all__ = [
     "PowerLaw",
     "PreloadedLap",
     "ReceptanceInfo",
+    "SetUps",
     "SideAgreement",
     "SideModel",
     "SingularLineError",

@@ -267,6 +267,10 @@ def _identification(arrays: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
             "freq_hz": np.arange(1.0, 5.0), "responses": tuple(channels), "excitations": tuple(channels), "h": rigid,
         },
         "merge_frfs": {"sets": [frfs]},
+        "SetUps": {
+            "names": ["monday", "tuesday"], "of": [[0, 1], [0, 1]], "gain": 0.01, "common_gain": 0.01,
+            "repeats": [[0, 0, 1]], "repeated": np.ones((4, 1)),
+        },
     }  # fmt: skip
 
 

@@ -14,6 +14,7 @@ from jointfrf.dofs import direction_names
 from jointfrf.errors import FileContentError
 from jointfrf.frf.bands import in_bands
 from jointfrf.frf.frf_set import Channel, FrfSet
+from jointfrf.frf.setups import SetUps
 from jointfrf.identification.identify_model import identify_model
 from jointfrf.identification.model.assembly import AddedMass, Assembly
 from jointfrf.identification.model.substructure import Unknown
@@ -52,6 +53,8 @@ class MeasuredAssembly:
     parts : tuple of two AssemblyPart
     located : tuple of str
         Which node each position of the file is.
+    setups : SetUps, optional
+        Which FRF came from which set-up of the test.
     """
 
     freq_hz: FloatArray
@@ -68,6 +71,7 @@ class MeasuredAssembly:
     averages: float | None
     parts: tuple[AssemblyPart, AssemblyPart]
     located: tuple[str, ...]
+    setups: SetUps | None = None
 
     @property
     def sketched(self) -> tuple[SketchedPart, SketchedPart]:
@@ -98,7 +102,7 @@ class MeasuredAssembly:
         return identify_model(
             self.freq_hz, self.h, self.assembly, self.responses, self.forces, response_gains=self.response_gains,
             force_gains=self.force_gains, fixed=self.fixed, noise=noise,
-            coherence=coherence, averages=averages,
+            coherence=coherence, averages=averages, setups=self.setups,
         )  # fmt: skip
 
 
@@ -200,8 +204,16 @@ def measured_assembly(
     return MeasuredAssembly(
         freq, np.ascontiguousarray(frfs.h[at] * signs), file.assembly(freq, parts, names), tuple(rows), tuple(columns),
         gains[0], gains[1], file.keys.fixed, (named[0], named[1]), _unused(frfs, named), coherence, averages,
-        parts, located,
+        parts, located, _setups(frfs, at, signs, kept),
     )  # fmt: skip
+
+
+def _setups(frfs: FrfSet, at: tuple[np.ndarray, ...], signs: np.ndarray, kept: np.ndarray) -> SetUps | None:
+    """Return the set-ups of the FRFs used."""
+    if frfs.setups is None:
+        return None
+    rows, columns = np.broadcast_arrays(at[1][0], at[2][0])
+    return frfs.setups.between(rows, columns, signs, frfs.measured[rows, columns]).on_lines(kept)
 
 
 def _quality(frfs: FrfSet, at: tuple[np.ndarray, ...]) -> tuple[FloatArray | None, float | None]:

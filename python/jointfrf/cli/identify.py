@@ -23,6 +23,7 @@ from jointfrf.cli.measured_file import (
     file_names,
     in_some_band,
     read_measured,
+    setups_with_gains,
     shown_nodes,
     words,
 )
@@ -98,6 +99,15 @@ def add_arguments(parser: CommandParser) -> None:
     add_law_arguments(parser)
     parser.option("--noise LEVEL", "relative noise of the FRFs, 0.01 for 1 %% (default: from their reciprocity)", float)
     parser.option(
+        "--setup-gain LEVEL",
+        "relative standard deviation of the gain of one set-up, 0.01 for 1 %%: each file is one (default: from what "
+        "they differ by)",
+        float,
+    )
+    parser.option(
+        "--common-gain LEVEL", "that of a gain which all FRFs share, as by one calibration of the hammer", float
+    )
+    parser.option(
         "--window-decay SIGMA", "exponential window exp(-SIGMA t) of the test, 1/s: taken off stiffnesses", float
     )
     parser.option(
@@ -160,7 +170,9 @@ def run(args: argparse.Namespace) -> int:
         warnings.warn(text, FrfCheckWarning, stacklevel=2)
     if "compliance" not in args.method:
         warn_of_ignored(
-            args, ("--damping", "--cross", "--noise", "--window-decay"), f"method {args.method[0]} does not use it"
+            args,
+            ("--damping", "--cross", "--noise", "--setup-gain", "--common-gain", "--window-decay"),
+            f"method {args.method[0]} does not use it",
         )
     if joint.channels is not None or len(joint.nodes[0]) == 1:
         warn_of_ignored(args, ("--bending-stiffness",), "no rotation is found by differences along a line")
@@ -310,6 +322,7 @@ def _of_compliance(
     return {
         "transform": joint.transform,
         "noise": args.noise,
+        "setups": setups_with_gains(args, frfs.setups_between(*names), joint.h.shape),
         **({"window_decay": args.window_decay} if args.window_decay is not None else {}),
         **terms,
         **known,

@@ -8,6 +8,7 @@ import io
 import time
 import warnings
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ import numpy as np
 from jointfrf.assembly_file.measured import MeasuredAssembly, measured_assembly
 from jointfrf.channels.check.check import check_frfs, warn_of_frfs
 from jointfrf.cli.export import CardRequest, card_request, written_cards
-from jointfrf.cli.measured_file import file_names, read_receptances
+from jointfrf.cli.measured_file import file_names, read_receptances, setups_with_gains
 from jointfrf.cli.parser import CommandParser
 from jointfrf.cli.usage import Output, UsageError, complain, time_left, waiting
 from jointfrf.errors import ConvergenceWarning, FileContentError, IdentificationWarning
@@ -137,6 +138,7 @@ def _one(args: argparse.Namespace, out: Output) -> tuple[Fit, dict[str, Any], li
         hint = "; with --each every file is a test of its own" if len(args.files) > 1 else ""
         raise FileContentError(f"{error}{hint}") from error
     measured = measured_assembly(args.model, frfs, bands=args.band)
+    measured = replace(measured, setups=setups_with_gains(args, measured.setups, measured.h.shape))
     request = _request(args, measured)
     _look_at(measured)
     if not args.each:

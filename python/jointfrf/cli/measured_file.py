@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterable
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -15,6 +15,7 @@ from jointfrf.cli.usage import UsageError
 from jointfrf.dofs import direction_names
 from jointfrf.errors import FileContentError
 from jointfrf.frf.bands import in_bands
+from jointfrf.frf.setups import SetUps
 from jointfrf.io import FrfSet, read_frfs
 from jointfrf.io.file_format import FrfMapping
 from jointfrf.io.formats import format_names
@@ -37,6 +38,7 @@ __all__ = [
     "read_measured",
     "read_receptances",
     "reading_options",
+    "setups_with_gains",
     "shown_nodes",
     "words",
 ]
@@ -246,6 +248,15 @@ def read_measured(args: argparse.Namespace) -> FrfSet:
 def read_receptances(args: argparse.Namespace) -> FrfSet:
     """Read the files as receptances."""
     return read_measured(args).receptance()
+
+
+def setups_with_gains(args: argparse.Namespace, setups: SetUps | None, shape: tuple[int, ...]) -> SetUps | None:
+    """Return the set-ups of FRFs of this shape, with the gains that the command line says."""
+    if args.setup_gain is None and args.common_gain is None:
+        return setups
+    found = SetUps([file_names(args)], np.zeros(shape[1:], int)) if setups is None else setups
+    given = {"gain": args.setup_gain, "common_gain": args.common_gain}
+    return replace(found, **{name: value for name, value in given.items() if value is not None})
 
 
 def file_names(args: argparse.Namespace) -> str:

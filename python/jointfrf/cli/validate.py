@@ -88,5 +88,6 @@ def _shared(measured: FrfSet, assembly: FrfSet) -> tuple[FrfSet, list[str]]:
         h=measured.h[:, rows][:, :, columns],
         coherence=None,
         averages=None,
+        setups=None,
     )
     return own, unused

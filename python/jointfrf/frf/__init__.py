@@ -1,6 +1,7 @@
 """FRFs as data.
 
 frf_set       sets of measured FRFs with names of channels
+setups        which FRF came from which set-up of a test
 merge         several sets as one
 bands         bands, means over them, errors of peaks in them; lines in chunks
 noise         pollution
@@ -8,7 +9,7 @@ rational_fit  rational functions with common poles: how many, and where
 smoothing     smooth FRFs by them, many lines in pieces
 entry_groups  which entries are measured twice, are zero, or have their poles in common
 noise_parts   relative and constant part of the noise, its correlation, outlying lines
-calibration   errors of channels that are smooth over frequency, by h_pq and h_qp
+calibration   errors of channels and set-ups that are smooth over frequency, by FRFs measured twice
 noise_model   noise of measured FRFs, from residuals and differences of reciprocal entries
 quantiles     medians and quantiles of small arrays
 

@@ -1,10 +1,11 @@
-"""Errors of channels and of single FRFs that go smoothly over frequency, by the differences of h_pq and h_qp."""
+"""Errors of channels, set-ups and single FRFs that are smooth over frequency, by FRFs that were measured twice."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.polynomial import legendre
@@ -13,11 +14,19 @@ from scipy import special
 
 from jointfrf.frf.bands import spread_lines
 from jointfrf.frf.entry_groups import entry_groups
-from jointfrf.frf.noise_parts import ReciprocityDifferences, reciprocity_differences
+from jointfrf.frf.noise_parts import (
+    ReciprocityDifferences,
+    line_correlation,
+    line_levels,
+    noise_parts,
+    reciprocity_differences,
+)
+from jointfrf.frf.quantiles import medians
+from jointfrf.frf.setups import SetUps
 from jointfrf.frf.smoothing import near_squares
 from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray
 
-__all__ = ["CalibrationErrors", "calibration_errors", "shows_calibration"]
+__all__ = ["CalibrationErrors", "ErrorKind", "SetUpErrors", "calibration_errors", "shows_calibration"]
 
 #: Functions of frequency that may be calibration, about as slow as an eighth of the band; as many faster ones show the
 #: noise. Lines that each needs.
@@ -25,17 +34,79 @@ _SLOW, _LINES = 8, 20
 #: Probability at which a sum of squares that exceeds that of noise is taken for chance: sixteen sums are looked at, so
 #: that calibration is seen where there is none in 1.6 % of the tests.
 _CHANCE = 0.001
+#: A set-up is named where it is off by so many standard errors: by chance one of 1500 is.
+_NAMED = 3.4
 #: Singular values below this share of the largest are zero.
 _RANK = 1e-9
+
+
+#: What an error is one of: all FRFs of a response or of a force, a single FRF, those of a set-up, all.
+ErrorKind = Literal["channel", "own", "setup", "common"]
+
+
+class SetUpDeviation(NamedTuple):
+    """What a set-up differs from the mean of all by.
+
+    Attributes
+    ----------
+    name : str
+    part : {"gain", "phase", "resonances"}
+    size, error : float
+        Where the deviation is largest, relative or in rad, and its standard error there; of resonances, by how much of
+        their frequency they are higher.
+    band : (float, float)
+        Where FRFs deviate by more than half of what they do at most, Hz.
+    delay : float
+        Of a phase that is proportional to frequency, s; NaN of others.
+    change : float
+        Largest relative change of FRFs; of resonances the median over those that were measured twice.
+    """
+
+    name: str
+    part: str
+    size: float
+    error: float
+    band: tuple[float, float]
+    delay: float
+    change: float
+
+
+@dataclass(frozen=True, eq=False)
+class SetUpErrors:
+    """Relative errors that the FRFs of a set-up have in common, and those that all set-ups have.
+
+    Attributes
+    ----------
+    setups : SetUps
+    variance, degrees : ndarray, shape (2, n_functions)
+        Of the errors of one set-up, gain and phase, and degrees of freedom of these.
+    common : float
+        Variance of a gain that all FRFs share, as was said.
+    deviations : tuple of SetUpDeviation
+        Set-ups that differ from the mean by more than chance.
+    exceeds : bool
+        Whether gains differ by more than was said.
+    """
+
+    setups: SetUps
+    variance: FloatArray
+    degrees: FloatArray
+    common: float
+    deviations: tuple[SetUpDeviation, ...]
+    exceeds: bool = False
+
+    def masks(self) -> NDArray[np.bool_]:
+        """Return the FRFs of each set-up that has any, shape (n, n_responses, n_excitations)."""
+        return np.stack([self.setups.of == number for number in np.flatnonzero(self.setups.counts)])
 
 
 @dataclass(frozen=True, eq=False)
 class CalibrationErrors:
     """Variances of relative errors of FRFs that are smooth over frequency.
 
-    h_pq is measured as h_pq (1 + g_p + f_q + e_pq): g_p of the response, f_q of the force, e_pq of the FRF itself. Real
-    and imaginary part, gain and phase, are sums of functions of frequency of mean square 1 (`functions`), each with an
-    independent, normal factor.
+    h_pq of set-up s is measured as h_pq (1 + g_p + f_q + u_s + e_pq): g_p of the response, f_q of the force, u_s of the
+    set-up, e_pq of the FRF itself. Real and imaginary part, gain and phase, are sums of functions of frequency of mean
+    square 1 (`functions`), each with an independent, normal factor.
 
     Attributes
     ----------
@@ -50,6 +121,8 @@ class CalibrationErrors:
     rows, columns : ndarray of int, shape (n_pairs,)
     differences : ndarray, shape (n_pairs, 2, n_functions)
         Significant factors of (h_pq - h_qp) over the mean of both.
+    setups : SetUpErrors, optional
+        Where the FRFs are of several set-ups, or a gain that all share was said.
 
     Notes
     -----
@@ -65,14 +138,18 @@ class CalibrationErrors:
     rows: NDArray[np.intp]
     columns: NDArray[np.intp]
     differences: FloatArray
+    setups: SetUpErrors | None = None
 
     def functions(self, freq_hz: FloatArray) -> FloatArray:
         """Return the functions of gain and phase, shape (2, n_functions, n_freq)."""
         return _functions(self.span, self.channel.shape[1], freq_hz.tobytes())
 
     def variance(self, freq_hz: FloatArray) -> FloatArray:
-        """Return E|g_p + f_q + e_pq|^2 of each line, shape (n_freq,)."""
-        return np.asarray(np.einsum("ab,abl->l", self.channel + self.own, self.functions(freq_hz) ** 2))
+        """Return E|g_p + f_q + u_s + e_pq|^2 of each line, shape (n_freq,)."""
+        variance = self.channel + self.own
+        if self.setups is not None:
+            variance = variance + self.setups.variance
+        return np.asarray(np.einsum("ab,abl->l", variance, self.functions(freq_hz) ** 2))
 
     def without(self, freq_hz: FloatArray, h: ComplexArray) -> ComplexArray:
         """Return FRFs less the half of their smooth differences."""
@@ -85,6 +162,34 @@ class CalibrationErrors:
         left[:, q, p] += half
         return left
 
+    def kinds(self) -> list[tuple[ErrorKind, FloatArray, FloatArray]]:
+        """Return what errs, with variances and degrees of freedom by function, without what has none.
+
+        Of responses and of forces, each with half the variance of their difference; of single FRFs; of set-ups; of all.
+        """
+        found: list[tuple[ErrorKind, FloatArray, FloatArray]] = [
+            ("channel", self.channel / 2, self.channel_degrees),
+            ("own", self.own, self.own_degrees),
+        ]
+        if self.setups is not None:
+            common = np.zeros_like(self.channel)
+            common[0, 0] = self.setups.common
+            found.append(("setup", self.setups.variance, self.setups.degrees))
+            found.append(("common", common, np.full_like(common, np.inf)))
+        return [one for one in found if one[1].any()]
+
+    def masks(self, kind: ErrorKind, shape: tuple[int, int]) -> NDArray[np.bool_]:
+        """Return which FRFs, of this shape, each error of a kind is one of, shape (n_errors, n_responses, n_forces)."""
+        if kind == "setup" and self.setups is not None:
+            return self.setups.masks()
+        if kind == "common":
+            return np.ones((1, *shape), bool)
+        if kind == "own":
+            return np.eye(shape[0] * shape[1], dtype=bool).reshape(-1, *shape)
+        rows = np.broadcast_to(np.eye(shape[0], dtype=bool)[:, :, None], (shape[0], *shape))
+        columns = np.broadcast_to(np.eye(shape[1], dtype=bool)[:, None, :], (shape[1], *shape))
+        return np.concatenate([rows, columns])
+
     def level(self, which: str) -> tuple[float, float]:
         """Return root mean squares over the band of gain and of phase, rad: of "channel" or "own"."""
         gain, phase = np.sqrt(getattr(self, which).sum(axis=1)).tolist()
@@ -92,63 +197,98 @@ class CalibrationErrors:
 
 
 def calibration_errors(
-    freq_hz: FloatArray, h: ComplexArray, known: tuple[ReciprocityDifferences, FloatArray] | None = None
+    freq_hz: FloatArray,
+    h: ComplexArray,
+    setups: SetUps | None = None,
+    *,
+    reciprocal: bool = True,
+    known: tuple[ReciprocityDifferences, FloatArray] | None = None,
 ) -> CalibrationErrors | None:
-    """Find the variances of smooth errors of FRFs between the same channels of a reciprocal structure.
+    """Find the variances of smooth errors of FRFs that were measured twice: both ways, or in two set-ups.
 
     Parameters
     ----------
     freq_hz : ndarray, shape (n_freq,)
         Hz.
-    h : ndarray, shape (n_freq, m, m)
+    h : ndarray, shape (n_freq, m_r, m_f)
+    setups : SetUps, optional
+    reciprocal : bool
+        Whether responses and forces are the same channels of a reciprocal structure.
     known : (ReciprocityDifferences, ndarray), optional
-        Differences of lines that rise in frequency, and the variance of h by their parts.
+        Differences of lines that rise in frequency, and the variance of h by their parts; of no set-ups.
 
     Returns
     -------
     CalibrationErrors or None
-        None where differences are those of noise, or FRFs were made reciprocal, or there are few lines.
+        None where differences are those of noise, or there are none, or there are few lines; not of several set-ups.
 
     Notes
     -----
-    Differences of each pair are fitted by least squares, weighted by their noise, and the factors split into those of
-    channels, u_p - u_q with u = g - f, and what does not close, e_pq - e_qp. Noise has the same squares in slow
-    functions as in faster ones, however far neighbouring lines correlate, unless that is over a good part of the band:
-    sums of squares of slow functions of about one speed are compared with those of the faster half, of channels with
-    channels, as noise that is common to a hit is. Those that exceed them by more than chance give the variances.
+    Differences of each pair are fitted by least squares, weighted by their noise, and the factors split one after the
+    other into those of set-ups, u_s - u_t, of channels, u_p - u_q with u = g - f, and what does not close, e_pq - e_qp.
+    Noise has the same squares in slow functions as in faster ones, however far neighbouring lines correlate, unless
+    that is over a good part of the band: sums of squares of slow functions of about one speed are compared with those
+    of the faster half, each level with itself, as noise that is common to a hit is. Those that exceed them by more than
+    chance give the variances. Gains and delays of set-ups are tested by nothing: few set-ups may agree by chance, and
+    their squares over their few degrees of freedom, n - 1 of n set-ups, are then the variance that their mean has.
     """
     freq = freq_hz
     if known is None:
         lines = np.argsort(freq_hz)[spread_lines(len(freq_hz))]
         freq, h = freq_hz[lines], h[lines]
-        found_differences = reciprocity_differences(h, entry_groups(h, reciprocal=True))
-        if found_differences is None:
-            return None
-        known = found_differences, found_differences.variance_of_parts(near_squares(h))
-    differences, variance = known
     n_slow = min(_SLOW, freq.size // _LINES // 2)
-    if not n_slow:
-        return None
     span = float(freq[0]), float(freq[-1])
-    factors = _factors(differences, h, variance, _functions(span, 2 * n_slow, freq.tobytes()), _mixture(span))
-    rows, columns = differences.rows, differences.columns
-    by_noise = _squares(factors, 1 / factors.variance, rows, columns)
+    differences = None
+    if n_slow and known is not None:
+        differences = _of_directions(h, *known)
+    elif n_slow:
+        again = setups if setups is None else setups.on_lines(lines)
+        differences = _differences(h, again, reciprocal=reciprocal)
+    if differences is None:
+        return _as_said(span, setups)
+    factors = _factors(differences, _functions(span, 2 * n_slow, freq.tobytes()), _mixture(span))
+    by_noise = _squares(factors, 1 / factors.variance, differences)
     # Errors far above the noise count alike, however small the noise of a pair is.
-    alike = _squares(factors, np.ones((len(rows), 1, 1)), rows, columns)
-    found = np.zeros((2, 2, 2, n_slow))  # variance and degrees; channel and own; gain and phase
+    alike = _squares(factors, np.ones((len(factors.value), 1, 1)), differences)
+    found = np.zeros((2, 3, 2, n_slow))  # variance and degrees; set-up, channel and own; gain and phase
     reference = by_noise[..., n_slow:].sum(axis=3)
     # Functions 0, 1, 2 to 3, 4 to 7 are about as fast.
     first = [one for one in (0, 1, 2, 4) if one < n_slow]
     tested, sized = (np.add.reduceat(squares[..., :n_slow], first, axis=3) for squares in (by_noise, alike))
+    said = None if setups is None else setups.gain
+    exceeds = False
     for part in range(2):
         for i, own in enumerate(map(slice, first, [*first[1:], n_slow])):
-            variance_and_degrees = _variances(tested[:, :, part, i], sized[:, :, part, i], reference[:, :, part])
+            variance_and_degrees = _variances(
+                tested[:, :, part, i], sized[:, :, part, i], reference[:, :, part], said if i == part == 0 else None,
+                always=i == 0,
+            )  # fmt: skip
             found[:, :, part, own] = variance_and_degrees[:, :, None]
+            if i == part == 0 and said is not None:
+                exceeds = bool(np.isfinite(variance_and_degrees[1, 0]))
     variance, degrees = found
-    if not variance.any():
+    errors = None
+    if setups is not None:
+        deviations = _deviations(factors, differences, setups, variance, span)
+        deviations += _higher_resonances(factors, differences, setups, freq)
+        errors = SetUpErrors(setups, variance[0], degrees[0], setups.common_gain**2, deviations, exceeds)
+    elif not variance.any():
         return None
-    significant = np.where(variance.any(axis=0), factors.value[:, :, :n_slow], 0)
-    return CalibrationErrors(span, variance[0], variance[1], degrees[0], degrees[1], rows, columns, significant)
+    ways = differences.is_reciprocity
+    significant = np.where(variance.any(axis=0), factors.value[ways][:, :, :n_slow], 0)
+    return CalibrationErrors(
+        span, variance[1], variance[2], degrees[1], degrees[2], differences.rows[ways], differences.columns[ways],
+        significant, errors,
+    )  # fmt: skip
+
+
+def _as_said(span: tuple[float, float], setups: SetUps | None) -> CalibrationErrors | None:
+    """Return errors of gain that were said, where no FRFs show any."""
+    if setups is None or (setups.gain is None and not setups.common_gain):
+        return None
+    variance, none, no_pairs = np.array([[(setups.gain or 0.0) ** 2], [0.0]]), np.zeros((2, 1)), np.zeros(0, np.intp)
+    errors = SetUpErrors(setups, variance, np.full((2, 1), np.inf), setups.common_gain**2, ())
+    return CalibrationErrors(span, none, none, none, none, no_pairs, no_pairs, np.zeros((0, 2, 1)), errors)
 
 
 def shows_calibration(h: ComplexArray) -> bool:
@@ -176,93 +316,266 @@ def _mixture(span: tuple[float, float]) -> FloatArray:
     return np.asarray(np.array([[slow, fast], [fast, -slow]]) / np.hypot(slow, fast))
 
 
-class _Factors(NamedTuple):
-    """Factors of the functions in the relative differences of each pair, and their variance if lines were independent.
+class _Differences(NamedTuple):
+    """Differences of FRFs that were measured twice, and what they hold of channels and set-ups.
 
-    Shape (n_pairs, 2, n_functions) each.
+    Attributes
+    ----------
+    rows, columns : ndarray, shape (n_pairs,)
+        Of the first of both.
+    values, mean : ndarray, shape (n_pairs, n_freq)
+        h_one - h_other, and their mean.
+    noise : ndarray, shape (n_pairs, n_freq)
+        Variance of the differences.
+    of_channels, of_setups : ndarray, shape (n_pairs, m), (n_pairs, n_setups)
+        How often each enters a difference.
+    is_reciprocity : ndarray of bool, shape (n_pairs,)
+        h_pq and h_qp, not one FRF of two set-ups.
+    """
+
+    rows: NDArray[np.intp]
+    columns: NDArray[np.intp]
+    values: ComplexArray
+    mean: ComplexArray
+    noise: FloatArray
+    of_channels: FloatArray
+    of_setups: FloatArray
+    is_reciprocity: NDArray[np.bool_]
+
+
+def _of_directions(h: ComplexArray, both: ReciprocityDifferences, variance: FloatArray) -> _Differences:
+    """Return the differences of both directions, by the variance of the FRFs."""
+    p, q = both.rows, both.columns
+    return _Differences(
+        p, q, both.values, (h[:, p, q] + h[:, q, p]).T / 2, both.pair_variance(variance), _of_channels(p, q, len(p)),
+        np.zeros((len(p), 0)), np.ones(len(p), bool),
+    )  # fmt: skip
+
+
+def _of_channels(rows: NDArray[np.intp], columns: NDArray[np.intp], n_ways: int) -> FloatArray:
+    """Return how often channels enter differences, of which the first are those of both directions."""
+    found = np.zeros((len(rows), max(rows.max(), columns.max()) + 1))
+    found[np.arange(n_ways), rows[:n_ways]] = 1
+    found[np.arange(n_ways), columns[:n_ways]] = -1
+    return found
+
+
+def _differences(h: ComplexArray, setups: SetUps | None, *, reciprocal: bool) -> _Differences | None:
+    """Return the differences that there are; None where there are none."""
+    both = reciprocity_differences(h, entry_groups(h, reciprocal=True)) if reciprocal else None
+    if setups is None:
+        return None if both is None else _of_directions(h, both, both.variance_of_parts(near_squares(h)))
+    empty = np.zeros(0, np.intp)
+    rows, columns = (empty, empty) if both is None else (both.rows, both.columns)
+    one, other, n_ways = h[:, rows, columns], h[:, columns, rows], len(rows)
+    first, second = setups.of[rows, columns], setups.of[columns, rows]
+    if setups.repeated is not None:
+        again_rows, again_columns, again = setups.repeats.T
+        rows, columns = np.r_[rows, again_rows], np.r_[columns, again_columns]
+        one = np.concatenate([one, h[:, again_rows, again_columns]], axis=1)
+        other = np.concatenate([other, setups.repeated], axis=1)
+        first, second = np.r_[first, setups.of[again_rows, again_columns]], np.r_[second, again]
+    if not rows.size:
+        return None
+    values, near = np.ascontiguousarray((one - other).T), near_squares(np.stack([one, other], axis=1))
+    both_near = near.sum(axis=1).T
+    flat = np.broadcast_to(medians(near.T).sum(axis=1)[:, None], both_near.shape)
+    relative, floor = noise_parts(np.square(abs(values)), np.stack([both_near, flat]), robust=True)
+    noise = np.maximum(relative[:, None] * both_near + floor[:, None] * flat, TINY)
+    number = np.arange(len(rows))
+    of_setups = np.zeros((len(rows), len(setups.names)))
+    np.add.at(of_setups, (number, first), 1)
+    np.add.at(of_setups, (number, second), -1)
+    return _Differences(
+        rows, columns, values, (one + other).T / 2, noise, _of_channels(rows, columns, n_ways), of_setups,
+        number < n_ways,
+    )  # fmt: skip
+
+
+class _Factors(NamedTuple):
+    """Factors of the functions in the relative differences of each pair.
+
+    Attributes
+    ----------
+    value, variance : ndarray, shape (n_pairs, 2, n_functions)
+        Factors, and their variance if lines were independent.
+    left : ndarray, shape (n_pairs, 2, n_freq)
+        Of the differences along and across h, over their noise.
+    solve : callable
+        Returns factors of other differences, and what is left of them, by the same weights.
+    turning : ndarray, shape (n_pairs, n_freq)
+        By which differences are turned and weighted; 0 on outlying lines.
     """
 
     value: FloatArray
     variance: FloatArray
+    left: FloatArray
+    solve: Callable[[ComplexArray], tuple[FloatArray, FloatArray]]
+    turning: ComplexArray
 
 
-def _factors(
-    differences: ReciprocityDifferences,
-    h: ComplexArray,
-    variance: FloatArray,
-    functions: FloatArray,
-    mixture: FloatArray,
-) -> _Factors:
-    p, q = differences.rows, differences.columns
-    mean = (h[:, p, q] + h[:, q, p]).T / 2
-    outlying = differences.line_levels(variance).factor > 1
-    inverse = np.where(outlying, 0, 1 / np.sqrt(differences.pair_variance(variance)))
+def _factors(differences: _Differences, functions: FloatArray, mixture: FloatArray) -> _Factors:
+    mean, root = differences.mean, np.sqrt(differences.noise)
+    outlying = line_levels(differences.values / root, is_residual=False).factor > 1
+    inverse = np.where(outlying, 0, 1 / root)
     size = abs(mean)
-    turned = differences.values * (mean.conj() / np.maximum(size, TINY)) * inverse
+    turning = (mean.conj() / np.maximum(size, TINY)) * inverse
     size = size * inverse
-    # A real factor changes the part along h, an imaginary one the part across it.
-    parts = np.stack([turned.real, turned.imag], axis=1)
     gain = functions[0]
     of_gain = np.linalg.pinv((size[:, None] ** 2 * gain) @ gain.T, hermitian=True)
     # The functions of the phase are those of the gain but for the first two: one inverse serves both.
     both = np.stack([of_gain, of_gain], axis=1)
     both[:, 1, :2] = mixture @ both[:, 1, :2]
     both[:, 1, :, :2] = both[:, 1, :, :2] @ mixture
-    along = np.stack([(size * parts[:, i]) @ own.T for i, own in enumerate(functions)], axis=1)
-    value = (both @ along[..., None])[..., 0]
-    left = sum(
-        np.square(parts[:, i] - size * (value[:, i] @ own)).sum(axis=1) for i, own in enumerate(functions)
-    ) / max(2 * np.count_nonzero(~outlying), 1)
-    return _Factors(value, np.maximum(np.einsum("pfaa->pfa", both) * left[:, None, None], TINY))
+
+    def solve(turned: ComplexArray) -> tuple[FloatArray, FloatArray]:
+        # A real factor changes the part along h, an imaginary one the part across it.
+        parts = np.stack([turned.real, turned.imag], axis=1)
+        along = np.stack([(size * parts[:, i]) @ own.T for i, own in enumerate(functions)], axis=1)
+        value = (both @ along[..., None])[..., 0]
+        for i, own in enumerate(functions):
+            parts[:, i] -= size * (value[:, i] @ own)
+        return value, parts
+
+    value, left = solve(differences.values * turning)
+    level = np.square(left).sum(axis=(1, 2)) / max(2 * np.count_nonzero(~outlying), 1)
+    variance = np.maximum(np.einsum("pfaa->pfa", both) * level[:, None, None], TINY)
+    return _Factors(value, variance, left, solve, turning)
 
 
-def _squares(factors: _Factors, weight: FloatArray, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> FloatArray:
-    """Return weighted sums of squares of channels, and of what does not close, shape (2, 5, 2, n_functions).
+def _squares(factors: _Factors, weight: FloatArray, differences: _Differences) -> FloatArray:
+    """Return weighted sums of squares of set-ups, channels, and what does not close, shape (3, 6, 2, n_functions).
 
-    Each with its degrees of freedom, and what it is in the mean: by independent noise, by a unit of variance of each
-    FRF, and of each channel. `weight` is broadcast to pairs, gain and phase, and functions.
+    Each level beside those before, with its degrees of freedom, and what it is in the mean: by independent noise, and
+    by a unit of variance of each set-up, of each channel, and of each FRF.
     """
-    n_pairs = len(rows)
-    incidence = np.zeros((n_pairs, max(rows.max(), columns.max()) + 1))
-    incidence[np.arange(n_pairs), rows] = 1
-    incidence[np.arange(n_pairs), columns] = -1
-    # Pairs last.
+    # Pairs last; weights may be the same for all functions.
     w, value, noise = (np.moveaxis(one, 0, -1) for one in (weight, factors.value, factors.variance))
     root = np.sqrt(w)
-    u, size, _ = np.linalg.svd(incidence * root[..., None], full_matrices=False)
-    basis = np.where(size[..., None, :] > _RANK * size[..., None, :1], u, 0)
-    share, rank = (basis**2).sum(axis=-1), (size > _RANK * size[..., :1]).sum(axis=-1)
-    whole, of_noise = (root * value) ** 2, noise * w
-    of_channels = (((root * value)[..., None, :] @ basis)[..., 0, :] ** 2).sum(axis=-1)
-    apart = np.maximum(whole.sum(axis=-1) - of_channels, 0)
-    of_units = 2 * w.sum(axis=-1)
-    sums = np.zeros((2, 5, *apart.shape))
-    shares = (share * of_noise).sum(axis=-1), 2 * (share * w).sum(axis=-1)
-    for i, one in enumerate((of_channels, rank, *shares, of_units)):
-        sums[0, i] = one
-    for i, one in enumerate((apart, n_pairs - rank, of_noise.sum(axis=-1) - shares[0], of_units - shares[1])):
-        sums[1, i] = one
+    weighted = [root[..., None] * one for one in (differences.of_setups, differences.of_channels)]
+    taken: FloatArray = np.zeros((*w.shape, 0))
+    of_all, of_noise = root * value, noise * w
+    sums = np.zeros((3, 6, *value.shape[:-1]))
+    units = [np.square(one).sum(axis=(-2, -1)) for one in weighted]
+    for i, whole in enumerate((np.square(of_all).sum(axis=-1), w.shape[-1], of_noise.sum(axis=-1), *units)):
+        sums[2, i] = whole
+    sums[2, 5] = 2 * w.sum(axis=-1)
+    for number, own in enumerate(weighted):
+        if not own.any():
+            continue
+        basis = _beside(own, taken)
+        taken = np.concatenate([taken, basis], axis=-1)
+        share = np.square(basis).sum(axis=-1)
+        sums[number, 0] = np.square((of_all[..., None, :] @ basis)[..., 0, :]).sum(axis=-1)
+        sums[number, 1] = basis.any(axis=-2).sum(axis=-1)
+        sums[number, 2] = (share * of_noise).sum(axis=-1)
+        for unit, one in enumerate(weighted):
+            sums[number, 3 + unit] = np.square(basis.swapaxes(-1, -2) @ one).sum(axis=(-2, -1))
+        sums[number, 5] = 2 * (share * w).sum(axis=-1)
+    sums[2] = np.maximum(sums[2] - sums[0] - sums[1], 0)
+    # What does not close holds neither set-ups nor channels.
+    sums[2, 3:5] = 0
     return sums
 
 
-def _variances(tested: FloatArray, sized: FloatArray, reference: FloatArray) -> FloatArray:
-    """Return variance and degrees of freedom of channels and of single FRFs, shape (2, 2), from sums of `_squares`.
+def _beside(columns: FloatArray, taken: FloatArray) -> FloatArray:
+    """Return an orthonormal basis of what columns hold beside a basis that is taken; zero columns fill it up."""
+    size = np.linalg.norm(columns, axis=(-2, -1))[..., None]
+    left = columns - taken @ (taken.swapaxes(-1, -2) @ columns)
+    u, value, _ = np.linalg.svd(left, full_matrices=False)
+    return np.asarray(np.where((value > _RANK * size)[..., None, :], u, 0))
 
-    By the first sums it is tested whether they exceed those of noise, the third; the second ones give the size.
+
+def _variances(
+    tested: FloatArray, sized: FloatArray, reference: FloatArray, said: float | None, *, always: bool
+) -> FloatArray:
+    """Return variance and degrees of freedom of set-ups, channels and FRFs, shape (2, 3), by sums of `_squares`.
+
+    By the first sums it is tested whether they exceed those of noise, the third; the second ones give the size. Set-ups
+    have the variance that was said, unless they exceed it; where none was said, `always` takes what they have.
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         noise = np.where(reference[:, 1] > 0, reference[:, 0] / reference[:, 2], 0)
-    found, degrees_noise = np.zeros((2, 2)), reference[:, 1].copy()
-    for kind in (1, 0):
-        expected = noise[kind] * tested[kind, 2] + found[0, 1] * tested[kind, 3]
+    found, degrees_noise = np.zeros((2, 3)), reference[:, 1].copy()
+    for kind in (2, 1, 0):
         degrees = tested[kind, 1]
+        if kind == 0 and said is not None:
+            found[:, 0] = said**2, np.inf
+        expected = noise[kind] * tested[kind, 2] + found[0] @ tested[kind, 3:]
         if degrees == 0 or expected <= 0:
             continue
-        if special.fdtrc(degrees, degrees_noise[kind], tested[kind, 0] / expected) < _CHANCE:
-            expected = noise[kind] * sized[kind, 2] + found[0, 1] * sized[kind, 3]
+        is_more = special.fdtrc(degrees, degrees_noise[kind], tested[kind, 0] / expected) < _CHANCE
+        if kind == 0 and always and said is None and sized[0, 3] > 0:
+            found[:, 0] = sized[0, 0] / sized[0, 3], degrees
+        elif is_more:
+            found[0, kind] = 0
+            expected = noise[kind] * sized[kind, 2] + found[0] @ sized[kind, 3:]
             if sized[kind, 0] > expected:
-                found[0, kind] = (sized[kind, 0] - expected) / sized[kind, 3 + (kind == 0)]
+                found[0, kind] = (sized[kind, 0] - expected) / sized[kind, 3 + kind]
                 found[1, kind] = degrees * (1 - expected / sized[kind, 0]) ** 2
-                if kind == 1:
-                    degrees_noise[0] = degrees
+                degrees_noise[:kind] = degrees
     return found
+
+
+def _deviations(
+    factors: _Factors, differences: _Differences, setups: SetUps, variance: FloatArray, span: tuple[float, float]
+) -> tuple[SetUpDeviation, ...]:
+    """Return the set-ups that differ from the mean of those compared by more than noise, channels and FRFs explain."""
+    linked = differences.of_setups.any(axis=0)
+    design = differences.of_setups[:, linked]
+    n_slow = variance.shape[-1]
+    freq = np.linspace(*span, 201)
+    functions, found = _functions(span, n_slow, freq), []
+    for part, name in enumerate(("gain", "phase")):
+        values, errors = (np.zeros((design.shape[1], freq.size)) for _ in range(2))
+        for i in range(n_slow):
+            noise, own = factors.variance[:, part, i], 2 * variance[2, part, i]
+            inverse = np.linalg.pinv(design / np.sqrt(noise + own)[:, None]) / np.sqrt(noise + own)
+            of_channels = inverse @ differences.of_channels
+            spread = (inverse**2) @ (noise + own) + variance[1, part, i] * (of_channels**2).sum(axis=1)
+            estimate = inverse @ factors.value[:, part, i]
+            if i == 0 or variance[0, part, i] > 0:
+                values += estimate[:, None] * functions[part, i]
+                errors += spread[:, None] * functions[part, i] ** 2
+        errors = np.sqrt(errors)
+        for number, value, error in zip(np.flatnonzero(linked), values, errors, strict=True):
+            at = int(abs(value).argmax())
+            if abs(value[at]) > _NAMED * error[at]:
+                inside = freq[abs(value) > abs(value[at]) / 2]
+                is_delay = part == 1 and not variance[0, 1, 1:].any()
+                delay = -float(value[at] / (2 * np.pi * freq[at])) if is_delay else np.nan
+                band = (float(inside[0]), float(inside[-1]))
+                found.append(
+                    SetUpDeviation(
+                        setups.names[int(number)], name, float(value[at]), float(error[at]), band, delay,
+                        float(abs(value[at])),
+                    )
+                )  # fmt: skip
+    return tuple(found)
+
+
+def _higher_resonances(
+    factors: _Factors, differences: _Differences, setups: SetUps, freq_hz: FloatArray
+) -> tuple[SetUpDeviation, ...]:
+    """Return the set-ups whose resonances are higher or lower than the mean: by masses of sensors, by temperature."""
+    slope = freq_hz * np.gradient(differences.mean, freq_hz, axis=1)
+    # h(f / (1 + d)) = h - d f dh/df, beside gain and phase, with the level and the correlation of what it leaves.
+    _, moved = factors.solve(-slope * factors.turning)
+    information = np.maximum(np.square(moved).sum(axis=(1, 2)), TINY)
+    higher = (factors.left * moved).sum(axis=(1, 2)) / information
+    left = factors.left - higher[:, None, None] * moved
+    inside = factors.turning.any(axis=0)
+    level = np.maximum(np.square(left).sum(axis=(1, 2)) / max(2 * np.count_nonzero(inside), 1), TINY)
+    rest = (left[:, 0] + 1j * left[:, 1]) / np.sqrt(2 * level)[:, None]
+    variance = line_correlation(np.where(inside, rest, np.nan)) * level / information
+    linked = np.flatnonzero(differences.of_setups.any(axis=0))
+    inverse = np.linalg.pinv(differences.of_setups[:, linked] / np.sqrt(variance)[:, None]) / np.sqrt(variance)
+    values, errors = inverse @ higher, np.sqrt(inverse**2 @ variance)
+    usual = np.asarray(medians((abs(slope) / np.maximum(abs(differences.mean), TINY)).T))
+    steep = freq_hz[usual > usual.max() / 2]
+    band, found = (float(steep[0]), float(steep[-1])), []
+    for number, value, error in zip(linked.tolist(), values.tolist(), errors.tolist(), strict=True):
+        if abs(value) > _NAMED * error:
+            change = abs(value) * float(usual.max())
+            found.append(SetUpDeviation(setups.names[number], "resonances", value, error, band, np.nan, change))
+    return tuple(found)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from jointfrf.errors import FileContentError, FileContentWarning
+from jointfrf.frf.setups import SetUps
 from jointfrf.kernel.arguments import as_array, as_integer, as_nodes, as_real, check_type
 from jointfrf.spelling import some_of
 
@@ -144,6 +145,8 @@ class FrfSet:
         How many measurements each FRF is the average of; NaN where it is not known.
     stated : str
         Quantity and unit in the words of the file.
+    setups : SetUps, optional
+        Which FRF came from which set-up, of a set that was merged from several.
 
     Examples
     --------
@@ -176,6 +179,7 @@ class FrfSet:
     coherence: NDArray[np.float64] | None = None
     averages: NDArray[np.float64] | None = None
     stated: str = ""
+    setups: SetUps | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "freq_hz", _numbers("freq_hz", self.freq_hz, "biuf").astype(np.float64, copy=False))
@@ -198,6 +202,9 @@ class FrfSet:
             object.__setattr__(self, "coherence", _checked_coherence(self.coherence, shape))
         if self.averages is not None:
             object.__setattr__(self, "averages", _checked_averages(self.averages, shape[1:]))
+        if self.setups is not None:
+            check_type("setups", self.setups, SetUps)
+            self.setups.check_fits(shape)
 
     @property
     def measured(self) -> NDArray[np.bool_]:
@@ -255,8 +262,9 @@ class FrfSet:
             warnings.warn(message, FileContentWarning, stacklevel=2)
         freq_hz = self.freq_hz[usable]
         i_omega = 2j * np.pi * freq_hz
-        h = self.h[usable] / i_omega[:, None, None] ** power
-        return replace(self._lines(usable), h=h, quantity="receptance")
+        kept, over = self._lines(usable), i_omega[:, None, None] ** power
+        setups = None if kept.setups is None else kept.setups.times(1 / over[:, 0])
+        return replace(kept, h=kept.h / over, quantity="receptance", setups=setups)
 
     def has(self, output: ChannelLike, input: ChannelLike) -> bool:
         """Whether the FRF is there, possibly measured along the opposite direction."""
@@ -364,6 +372,24 @@ class FrfSet:
         least = float(self.averages[places].min())
         return None if np.isnan(least) else least
 
+    def setups_between(self, outputs: Sequence[ChannelLike], inputs: Sequence[ChannelLike]) -> SetUps | None:
+        """Set-ups of the FRFs between named channels, as `identify` and `identify_model` take them.
+
+        Parameters
+        ----------
+        outputs, inputs : sequence of Channel or str
+            As for `matrix`.
+
+        Returns
+        -------
+        SetUps or None
+            None where the set was not merged from several.
+        """
+        if self.setups is None:
+            return None
+        places, signs, _ = self._locate(outputs, inputs)
+        return self.setups.between(*places, signs, self.measured_between(outputs, inputs))
+
     def select(self, band: tuple[float, float]) -> FrfSet:
         """Return the lines in a band.
 
@@ -416,6 +442,13 @@ class FrfSet:
             coherence=None if self.coherence is None else self.coherence[:, rows][:, :, columns],
             averages=None if self.averages is None else self.averages[np.ix_(rows, columns)],
             coordinates={node: place for node, place in self.coordinates.items() if node in nodes},
+            setups=None
+            if self.setups is None
+            else self.setups.between(
+                *np.meshgrid(rows, columns, indexing="ij"),
+                np.ones((len(rows), len(columns))),
+                self.measured[np.ix_(rows, columns)],
+            ),
         )
 
     def summary(self) -> str:
@@ -433,6 +466,10 @@ class FrfSet:
             f"responses: {_by_node(self.responses)}",
             f"excitations: {_by_node(self.excitations)}",
         ]
+        if self.setups is not None:
+            counts = zip(self.setups.names, self.setups.counts, strict=True)
+            again = f"; {len(self.setups.repeats)} measured again" if len(self.setups.repeats) else ""
+            lines.append(f"set-ups: {', '.join(f'{name} ({count} FRFs)' for name, count in counts)}{again}")
         if self.stated:
             lines[:1] = [f"in the file: {self.stated}", f"used as: {lines[0]}"]
         return "\n".join([self.source, *lines] if self.source else lines)
@@ -446,7 +483,8 @@ class FrfSet:
     def _lines(self, kept: NDArray[np.bool_]) -> FrfSet:
         """Return some of the lines."""
         coherence = None if self.coherence is None else self.coherence[kept]
-        return replace(self, freq_hz=self.freq_hz[kept], h=self.h[kept], coherence=coherence)
+        setups = None if self.setups is None else self.setups.on_lines(kept)
+        return replace(self, freq_hz=self.freq_hz[kept], h=self.h[kept], coherence=coherence, setups=setups)
 
     def _quality(self) -> list[str]:
         """Describe coherence and averages, as far as known."""

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from jointfrf.errors import FileContentError
 from jointfrf.frf.frf_set import POWER_OF_I_OMEGA, Channel, FrfSet
+from jointfrf.frf.setups import SetUps
 
 __all__ = ["merge_frfs", "same_lines"]
 
@@ -16,6 +18,9 @@ __all__ = ["merge_frfs", "same_lines"]
 _SAME_LINES = 1e-5
 #: How far two copies of the same FRF differ at most, relative to its largest value: single precision.
 _SAME_VALUES = 1e-6
+#: An FRF that was measured again differs by less than this part of it (median over the lines): gains, delays and moved
+#: resonances of set-ups do; another sign, another unit, another FRF do not.
+_SAME_FRF = 0.3
 #: In metres.
 _SAME_PLACE = 1e-6
 
@@ -39,13 +44,14 @@ def merge_frfs(sets: Sequence[FrfSet]) -> FrfSet:
     Returns
     -------
     FrfSet
-        Channels in the order of the sets.
+        Channels in the order of the sets. `FrfSet.setups` says which FRF came from which set: of several, an FRF is
+        that of the first, and the others are kept beside it.
 
     Raises
     ------
     FileContentError
-        Sets differ in their frequency lines, in an FRF, in its coherence or number of averages, or in the coordinates
-        of a node; both sources are named.
+        Sets differ in their frequency lines, grossly in an FRF, in coherence or number of averages of one and the same
+        FRF, or in the coordinates of a node; both sources are named.
     ValueError
         There is no set.
 
@@ -76,7 +82,7 @@ def merge_frfs(sets: Sequence[FrfSet]) -> FrfSet:
     merged = _Merged(responses, excitations, sets)
     n_freq, shape = first.freq_hz.size, (len(responses), len(excitations))
     h = np.full((n_freq, *shape), np.nan + 0j)
-    merged.fill(h, lambda each: _as_quantity(each, quantity), "the FRF")
+    merged.fill(h, lambda each: _as_quantity(each, quantity, each.h), "the FRF")
     coherence = averages = None
     if any(each.coherence is not None for each in sets):
         coherence = np.full((n_freq, *shape), np.nan)
@@ -84,7 +90,7 @@ def merge_frfs(sets: Sequence[FrfSet]) -> FrfSet:
     if any(each.averages is not None for each in sets):
         averages = np.full((1, *shape), np.nan)
         merged.fill(averages, lambda each: None if each.averages is None else each.averages[None], "the averages of")
-    return FrfSet(
+    found = FrfSet(
         first.freq_hz,
         responses,
         excitations,
@@ -96,6 +102,7 @@ def merge_frfs(sets: Sequence[FrfSet]) -> FrfSet:
         None if averages is None else averages[0],
         "; ".join(dict.fromkeys(each.stated for each in sets if each.stated)),
     )
+    return replace(found, setups=merged.setups(quantity))
 
 
 class _Merged:
@@ -105,6 +112,44 @@ class _Merged:
         self.responses, self.excitations, self.sets = responses, excitations, sets
         self.row_of = {channel: i for i, channel in enumerate(responses)}
         self.column_of = {channel: j for j, channel in enumerate(excitations)}
+        self.origin = np.full((len(responses), len(excitations)), -1)
+        self.again: dict[tuple[int, int, int], tuple[int, int]] = {}
+
+    def setups(self, quantity: str) -> SetUps | None:
+        """Return which FRF came from which set-up, once FRFs are in place; None where all came from one."""
+        names: list[str] = []
+        of, found, values = np.full(self.origin.shape, -1), list[tuple[int, int, int]](), list[NDArray[np.complex128]]()
+        for number, each in enumerate(self.sets):
+            held = each.setups
+            own = np.zeros(each.h.shape[1:], np.intp) if held is None else held.of
+            rows, columns = (
+                [self.row_of[one] for one in each.responses],
+                [self.column_of[one] for one in each.excitations],
+            )
+            at = np.ix_(rows, columns)
+            here = self.origin[at] == number
+            again = [(i, j) for (_, _, which), (i, j) in self.again.items() if which == number]
+            if not here.any() and not again:
+                continue
+            of[at] = np.where(here, len(names) + own, of[at])
+            h = _as_quantity(each, quantity, each.h) if again else each.h
+            found += [(rows[i], columns[j], len(names) + int(own[i, j])) for i, j in again]
+            values += [h[:, i, j] for i, j in again]
+            if held is not None and held.repeated is not None:
+                found += [(rows[i], columns[j], len(names) + setup) for i, j, setup in held.repeats.tolist()]
+                values += list(_as_quantity(each, quantity, held.repeated).T)
+            names += [_name(each, self.sets)] if held is None else held.names
+        if len(names) < 2:
+            return None
+        stated = [each.setups for each in self.sets if each.setups is not None]
+        return SetUps(
+            names,
+            of,
+            max((one.gain for one in stated if one.gain is not None), default=None),
+            max((one.common_gain for one in stated), default=0.0),
+            np.array(found, np.intp).reshape(-1, 3),
+            np.stack(values, axis=1) if values else None,
+        )
 
     def fill(self, target: _Values, values_of: Callable[[FrfSet], _Values | None], what: str) -> None:
         """Copy what each set holds into place; where something is there already, compare the two."""
@@ -119,28 +164,45 @@ class _Merged:
                     if np.isnan(value).all():
                         continue
                     place = self.row_of[response], self.column_of[excitation]
-                    if origin[place] >= 0:
-                        self._compare(
-                            target[:, *place], value, f"{what} {response} / {excitation}", origin[place], each
-                        )
+                    if (*place, number) in self.again:  # what is known of an FRF that is beside the one in place
                         continue
-                    target[:, *place] = value
-                    origin[place] = number
+                    kept = target[:, *place]
+                    if origin[place] < 0:
+                        target[:, *place] = value
+                        origin[place] = number
+                    elif target.dtype.kind == "c" and _is_measured_again(kept, value):
+                        self.again[(*place, number)] = i, j
+                    elif not _is_copy(kept, value):
+                        one, two = _name(self.sets[origin[place]], self.sets), _name(each, self.sets)
+                        raise FileContentError(
+                            f"{what} {response} / {excitation} in {one} and in {two} contradict each other: leave one "
+                            "out"
+                        )
+        if target.dtype.kind == "c":
+            self.origin = origin
 
-    def _compare(self, kept: _Values, value: _Values, what: str, number: int, each: FrfSet) -> None:
-        """Raise an error if a second copy differs from the first."""
-        scale = np.nanmax(abs(kept)) if np.isfinite(kept).any() else 0.0
-        if not np.allclose(kept, value, rtol=0.0, atol=_SAME_VALUES * float(scale), equal_nan=True):
-            one, two = _name(self.sets[number], self.sets), _name(each, self.sets)
-            raise FileContentError(f"{what} in {one} and in {two} contradict each other: leave one out")
+
+def _is_copy(kept: _Values, value: _Values) -> bool:
+    """Whether two are the same but for the digits of their files."""
+    scale = np.nanmax(abs(kept)) if np.isfinite(kept).any() else 0.0
+    return np.allclose(kept, value, rtol=0.0, atol=_SAME_VALUES * float(scale), equal_nan=True)
 
 
-def _as_quantity(frfs: FrfSet, quantity: str) -> NDArray[np.complex128]:
-    """FRFs differentiated in time as often as needed."""
+def _is_measured_again(kept: _Values, value: _Values) -> bool:
+    """Whether two FRFs may be one FRF measured twice."""
+    if _is_copy(kept, value) or not (np.isfinite(kept).all() and np.isfinite(value).all()):
+        return False
+    size = np.maximum(abs(kept), abs(value))
+    return float(np.median(abs(kept - value)[size > 0] / size[size > 0])) < _SAME_FRF
+
+
+def _as_quantity(frfs: FrfSet, quantity: str, values: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """FRFs of a set, frequency first, differentiated in time as often as needed."""
     power = POWER_OF_I_OMEGA[quantity] - POWER_OF_I_OMEGA[frfs.quantity]
     if power <= 0:  # negative for a set that holds no FRF
-        return frfs.h
-    return np.asarray(frfs.h * ((2j * np.pi * frfs.freq_hz) ** power)[:, None, None])
+        return values
+    i_omega = 2j * np.pi * frfs.freq_hz.reshape(-1, *[1] * (values.ndim - 1))
+    return np.asarray(values * i_omega**power)
 
 
 def _coordinates(sets: Sequence[FrfSet]) -> dict[int, NDArray[np.float64]]:

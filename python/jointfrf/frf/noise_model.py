@@ -194,7 +194,7 @@ def estimate_noise(
     if len(places) == 1 and (np.diff(freq) > 0).all():
         if noisy.differences is not None:
             known = noisy.differences, noisy.variance_of_differences
-            calibration = calibration_errors(freq, lines, known)
+            calibration = calibration_errors(freq, lines, known=known)
         if calibration is not None:
             noisy = replace(noisy, h=calibration.without(freq, lines))
         model = replace(estimated(noisy, slice(None)), calibration=calibration)

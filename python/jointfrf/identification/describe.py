@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
 from jointfrf.dofs import Parameter, compliance_unit, parameters_shared
-from jointfrf.frf.calibration import CalibrationErrors
+from jointfrf.frf.calibration import CalibrationErrors, SetUpErrors
 from jointfrf.identification.elastic_centre import elastic_centre
 from jointfrf.identification.findings import Finding, note, warn
 from jointfrf.identification.fit_data import ModelData
@@ -55,6 +56,10 @@ _CURES = (
 )
 #: A reference point is proposed where it lowers the largest coupling to this share.
 _LESS = 0.5
+#: Gains of set-ups beyond this, relative, or in rad, are more than calibration leaves: ISO 7626-5 asks for 5 %.
+_USUAL_GAIN = 0.05
+#: Degrees of freedom of a scatter of set-ups up to which Student's t widens intervals by more than a half.
+_FEW_SETUPS = 3
 #: Share of lines that cannot fit the joint from which on a warning says so.
 _UNTRUSTED = 0.02
 #: Share of a compliance by which it varies between lines from which on a warning says so.
@@ -426,7 +431,9 @@ def _small_residual(found: ManifoldFit, problem: FitProblem) -> list[Finding]:
     """Say that the residual is below the noise: intervals are then wider than they need be."""
     misfit, noise = found.test, problem.noise
     # What is not rigid in the channels weighs as noise, and averages out of a residual of joint DOFs.
-    if noise.is_assumed or problem.sides_bend or not misfit.is_small:
+    # Nor does what set-ups have in common always leave a residual: gains of all forces of a side change the joint.
+    of_setups = noise.calibration is not None and noise.calibration.setups is not None
+    if noise.is_assumed or problem.sides_bend or of_setups or not misfit.is_small:
         return []
     why = "said" if noise.is_given else "their reciprocity shows"
     mean = _MEAN_OF_TWO if problem.frfs.symmetrised and noise.is_given else ""
@@ -703,16 +710,49 @@ def _calibration(errors: CalibrationErrors | None) -> list[Finding]:
     """Say by how much h_pq and h_qp differ smoothly, and what intervals allow for."""
     if errors is None:
         return []
-    parts = []
+    found, parts = [] if errors.setups is None else _setups(errors.setups), []
     for level, what in ((errors.level("channel"), "of channels"), (errors.level("own"), "of single FRFs")):
         sizes = (f"{100 * level[0]:.2g} % in gain", f"{level[1]:.2g} rad in phase")
         shown = [size for size, value in zip(sizes, level, strict=True) if value > 0]
         parts += [f"{what} by {' and '.join(shown)}"] if shown else []
+    if not parts:
+        return found
     text = (
         f"h_pq and h_qp differ smoothly over frequency, {', '.join(parts)} (root mean square over the band): taken for "
         "calibration, not noise; intervals allow for as much in what h_pq and h_qp have in common"
     )
-    return [note("calibration", text)]
+    return [*found, note("calibration", text)]
+
+
+def _setups(errors: SetUpErrors) -> list[Finding]:
+    """Name set-ups that disagree, and say what intervals allow for."""
+    found = []
+    for one in errors.deviations:
+        if one.part == "gain":
+            what = f"its gain is {100 * one.size:+.2g} % ({100 * one.error:.1g} %)"
+        elif np.isfinite(one.delay):
+            what = f"its FRFs are {1e6 * one.delay:+.3g} us late ({1e6 * abs(one.error / one.size * one.delay):.1g} us)"
+        else:
+            what = f"its phase is {one.size:+.2g} rad ({one.error:.1g} rad)"
+        low, high = one.band
+        text = f"set-up {one.name} disagrees with the others: {what} off their mean at {low:.4g} to {high:.4g} Hz"
+        severity: Literal["warning", "note"] = "warning" if abs(one.size) > _USUAL_GAIN or errors.exceeds else "note"
+        found.append(Finding("calibration", severity, text, (one.name,), (one.band,)))
+    gain, phase = np.sqrt(errors.variance.sum(axis=1)).tolist()
+    parts = []
+    if errors.exceeds:
+        parts.append(f"set-ups differ by more in gain than was said: {100 * gain:.2g} % instead")
+    elif gain or phase:
+        parts.append(f"set-ups scatter by {100 * gain:.2g} % in gain and {phase:.2g} rad in phase")
+    if errors.common:
+        parts.append(f"a gain of all FRFs is known to {100 * np.sqrt(errors.common):.2g} %, as was said")
+    text = f"{'; '.join(parts)}: intervals allow for what FRFs of a set-up, and all FRFs, have in common"
+    if errors.setups.gain is None and 0 < errors.degrees[0, 0] <= _FEW_SETUPS:
+        text += (
+            "; so few set-ups hardly show how they scatter: the gain of one, known to so much, narrows the intervals"
+        )
+        text += " (--setup-gain; SetUps.gain)"
+    return [*found, *([(warn if errors.exceeds else note)("calibration", text)] if parts else [])]
 
 
 def _outlying_lines(problem: FitProblem) -> list[Finding]:

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from jointfrf.channels.check.check import check_frfs, warn_of_frfs
 from jointfrf.channels.check.finding import FrfCheck
 from jointfrf.frf.bands import spread_lines
+from jointfrf.frf.setups import SetUps
 from jointfrf.identification.compliance_data import compliance_data
 from jointfrf.identification.describe import describe_laws, describe_springs
 from jointfrf.identification.findings import note
@@ -49,6 +50,7 @@ def identify(
     noise: float | ArrayLike | None = None,
     coherence: ArrayLike | None = None,
     averages: float | None = None,
+    setups: SetUps | None = None,
     reciprocal: bool = True,
     window_decay: float = 0.0,
     sides: tuple[SideModel, SideModel] | None = None,
@@ -93,6 +95,9 @@ def identify(
         `estimate_noise` does.
     coherence, averages : optional
         As in `estimate_noise`, where `noise` is not given.
+    setups : SetUps, optional
+        Which FRF came from which set-up of the test, as `FrfSet.setups_between` returns it: what the FRFs of a set-up
+        have in common, and what all have, is in the intervals, and set-ups that disagree are named in the findings.
     reciprocal : bool
         Whether the structure is reciprocal, so that gamma_pq and gamma_qp may be averaged.
     window_decay : float
@@ -165,7 +170,7 @@ def identify(
     options = FitOptions(damping or "auto", cross or "zero", reciprocal, equal)
     problem = prepare_compliance(
         as_measured(freq_hz, gamma, square=False), dofs, bands, transform,
-        NoiseOptions(noise, coherence, averages), options, _check_sides(sides),
+        NoiseOptions(noise, coherence, averages, setups=setups), options, _check_sides(sides),
     )  # fmt: skip
     if reciprocal:
         _look_at(problem, transform)

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from jointfrf.frf.setups import SetUps
 from jointfrf.identification.describe import describe_model
 from jointfrf.identification.identify import identify
 from jointfrf.identification.manifold.coordinates import CrossTerms
@@ -37,6 +38,7 @@ def identify_model(
     noise: float | ArrayLike | None = None,
     coherence: ArrayLike | None = None,
     averages: float | None = None,
+    setups: SetUps | None = None,
 ) -> Fit:
     """Identify a joint from any measured FRFs of the assembly, given its substructures as models or FRFs.
 
@@ -61,6 +63,9 @@ def identify_model(
         Relative noise level of each FRF, or E|e|^2 of each, (m/N)^2. By default it is found, as `estimate_noise` does.
     coherence, averages : optional
         As in `estimate_noise`, where `noise` is not given.
+    setups : SetUps, optional
+        Which FRF came from which set-up of the test, as `FrfSet.setups_between` returns it: what the FRFs of a set-up
+        have in common, and what all have, is in the intervals, and set-ups that disagree are named in the findings.
 
     Returns
     -------
@@ -118,7 +123,7 @@ def identify_model(
             raise TypeError(f"{name} must be a mapping of channels to Unknown, not {type(gains).__name__}")
     named = as_names("responses", responses), as_names("forces", forces)
     channels = Channels(*named, dict(response_gains or {}), dict(force_gains or {}))
-    known = NoiseOptions(noise, coherence, averages)
+    known = NoiseOptions(noise, coherence, averages, setups=setups)
     problem = prepare_model_fit(freq_hz, h, assembly, channels, known, fixed, _springs_at_joint)
     fit = describe_model(fit_assembly(problem), channels)
     fit.issue_warnings()

@@ -14,8 +14,9 @@ from jointfrf.frf.entry_groups import ZERO, entry_groups
 from jointfrf.frf.noise_model import NoiseModel, estimate_noise
 from jointfrf.frf.noise_parts import noise_parts
 from jointfrf.frf.quantiles import medians
+from jointfrf.frf.setups import SetUps
 from jointfrf.frf.smoothing import near_squares, smooth_frfs
-from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_number, as_real
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_number, as_real, check_type
 
 __all__ = ["KnownNoise", "NoiseOptions", "SmoothedFrfs", "noise_about", "noise_of_channels", "noise_of_matrix"]
 
@@ -40,6 +41,26 @@ class NoiseOptions:
     coherence: ArrayLike | None = None
     averages: float | None = None
     like: NoiseModel | None = None
+    setups: SetUps | None = None
+
+    def on_lines(self, kept: NDArray[np.bool_], shape: tuple[int, ...]) -> NoiseOptions:
+        """Return the same for some of the lines of FRFs of a shape; what is not of this shape raises an error."""
+        found = self
+        if self.coherence is not None:
+            found = replace(found, coherence=as_real("coherence", self.coherence, shape)[kept])
+        if self.noise is not None and np.ndim(self.noise) > 0:
+            found = replace(found, noise=as_real("noise", self.noise, shape)[kept])
+        if self.setups is not None:
+            check_type("setups", self.setups, SetUps)
+            self.setups.check_fits(shape)
+            found = replace(found, setups=self.setups.on_lines(kept))
+        return found
+
+    def calibration(self, freq: FloatArray, h: ComplexArray, *, reciprocal: bool) -> CalibrationErrors | None:
+        """Return errors of FRFs that are smooth over frequency, where the FRFs of these lines show any."""
+        if not reciprocal and self.setups is None:
+            return None
+        return calibration_errors(freq, h, self.setups, reciprocal=reciprocal)
 
     def level(self) -> float | None:
         """Return the relative level where one is given; check that nothing else is."""
@@ -124,7 +145,9 @@ class SmoothedFrfs(NamedTuple):
 def noise_of_matrix(freq: FloatArray, h: ComplexArray, options: NoiseOptions, *, reciprocal: bool) -> SmoothedFrfs:
     """Return smooth FRFs and noise of a matrix of FRFs, all measured; a level is relative to the smooth FRFs."""
     level = options.level()
-    calibration = calibration_errors(freq, h) if options.noise is not None and reciprocal else None
+    # What is found below takes off what set-ups differ by as errors of channels, but does not know it as theirs.
+    is_apart = options.noise is not None or options.setups is not None
+    calibration = options.calibration(freq, h, reciprocal=reciprocal) if is_apart else None
     if level is not None:
         variance = _relative_variance(np.sqrt(near_squares(h)), level)
         # Measured FRFs as weights favour lines that noise has made small.
@@ -143,6 +166,8 @@ def noise_of_matrix(freq: FloatArray, h: ComplexArray, options: NoiseOptions, *,
             freq, h, reciprocal=reciprocal, coherence=options.coherence, averages=options.averages, like=options.like
         )
         known = KnownNoise.found(model)
+        if options.setups is not None:
+            known = replace(known, calibration=calibration)
         if model.source == "residual" and not model.smooth.is_smooth:
             # What a rational function leaves of FRFs that it meets but for so little is no noise, either.
             known = replace(known, level=_ASSUMED_LEVEL, is_assumed=True)
@@ -182,7 +207,7 @@ def noise_of_channels(
     size = np.maximum(size, np.maximum(_LEAST_SIZE * size.max(axis=0), _TINY))
     if options.noise is not None:
         variance = options.variance(h.shape, shown) if level is None else (level * size) ** 2
-        calibration = calibration_errors(freq, measured) if reciprocal else None
+        calibration = options.calibration(freq, measured, reciprocal=reciprocal)
         known = KnownNoise.given(np.nan if level is None else level, calibration)
         return SmoothedFrfs(measured, np.where(kept, variance, np.inf), known)
     # Of a square matrix FRFs that are zero by symmetry may stay: reciprocity says more of the noise.
@@ -210,6 +235,8 @@ def noise_of_channels(
     )
     model = replace(found, relative=relative, floor=floor, coherence_factor=of_coherence, variance=variance)
     known = replace(KnownNoise.found(found), model=model)
+    if options.setups is not None:
+        known = replace(known, calibration=options.calibration(freq, measured, reciprocal=reciprocal and is_block))
     if known.is_assumed:
         variance, smooth = (_ASSUMED_LEVEL * size) ** 2, measured
     return SmoothedFrfs(smooth, np.where(kept, variance, np.inf), known)

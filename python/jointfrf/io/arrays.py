@@ -124,7 +124,8 @@ def as_frf_set(content: FrfArrays, where: str, reading: Reading) -> FrfSet:
         with np.errstate(over="ignore", invalid="ignore"):
             h *= factor
         places = content.coordinates
-        found = FrfSet(freq_hz, responses, excitations, h, used, places, where, coherence, averages, stated)
+        setups = None if content.setups is None else content.setups.times(factor)
+        found = FrfSet(freq_hz, responses, excitations, h, used, places, where, coherence, averages, stated, setups)
         found.check_whole()
     except (ValueError, TypeError, OverflowError) as error:
         raise FileContentError(f"{where}: {error}") from error

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from jointfrf.errors import FileContentWarning
 from jointfrf.files import ReadLimit
 from jointfrf.frf.frf_set import POWER_OF_I_OMEGA, FrfSet
+from jointfrf.frf.setups import SetUps
 from jointfrf.kernel.arguments import as_nodes
 from jointfrf.spelling import did_you_mean
 
@@ -132,6 +133,7 @@ class FrfArrays:
     coherence: Any = None
     averages: Any = None
     coordinates: Mapping[int, NDArray[np.float64]] = field(default_factory=dict)
+    setups: SetUps | None = None
 
 
 def _never(*_: object) -> bool:
@@ -162,6 +164,8 @@ class FileFormat:
         What must be installed, for the documentation.
     package : str
         What writing needs beside the requirements of the installation, a name of `extras`.
+    keeps_setups : bool
+        Whether such a file holds which FRF came from which set-up.
     """
 
     name: str
@@ -173,3 +177,4 @@ class FileFormat:
     write: Callable[[Path, FrfSet], None] | None = None
     needs: str = ""
     package: str = ""
+    keeps_setups: bool = False

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 from functools import partial
@@ -13,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from jointfrf.errors import FileContentError
+from jointfrf.errors import FileContentError, FileContentWarning
 from jointfrf.extras import MissingPackageError, load_plugin, plugin_call, plugins
 from jointfrf.files import ReadLimit, head_of
 from jointfrf.frf.frf_set import FrfSet
@@ -111,10 +112,19 @@ def write_frfs(path: str | PathLike[str], frfs: FrfSet) -> None:
         A package for the format is not installed.
     OSError
         The file cannot be written; nothing is left behind.
+
+    Warns
+    -----
+    FileContentWarning
+        The format does not hold the set-ups of a set that was merged.
     """
-    write = check_suffix(path).write
-    assert write is not None
-    write(Path(path), frfs)
+    kind = check_suffix(path)
+    assert kind.write is not None
+    kind.write(Path(path), frfs)
+    if isinstance(frfs, FrfSet) and frfs.setups is not None and not kind.keeps_setups:
+        keeping = ", ".join(each.suffixes[0] for each in FORMATS if each.keeps_setups)
+        message = f"{path} does not hold which FRF came from which set-up, nor those measured again: {keeping} do"
+        warnings.warn(message, FileContentWarning, stacklevel=2)
 
 
 def read_frfs(

@@ -336,7 +336,7 @@ def write_hdf5(path: str | PathLike[str], frfs: FrfSet) -> None:
     content = io.BytesIO()
     with h5py.File(content, "w") as file:
         for name, value in fields_of(frfs).items():
-            fixed = np.char.encode(value, "ascii") if value.dtype.kind == "U" else value
+            fixed = np.char.encode(value, "utf-8") if value.dtype.kind == "U" else value
             file.create_dataset(name, data=fixed, compression="gzip" if value.dtype.kind in "fc" else None)
     write_file(Path(path), content.getvalue())
 
@@ -354,6 +354,7 @@ HDF5 = FileFormat(
     has_mark=lambda head: any(head[place:].startswith(_SIGN) for place in _PLACES),
     read=_read,
     write=write_hdf5,
+    keeps_setups=True,
     needs="`jointfrf[hdf5]`",
     package="h5py",
 )

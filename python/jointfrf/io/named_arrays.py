@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from jointfrf.errors import FileContentError
 from jointfrf.files import ReadLimit
 from jointfrf.frf.frf_set import POWER_OF_I_OMEGA, FrfSet
+from jointfrf.frf.setups import SetUps
 from jointfrf.io.file_format import FrfArrays, FrfMapping
 from jointfrf.io.functions import arrays_of_functions, functions_of_sdynpy, functions_of_testlab
-from jointfrf.kernel.arguments import check_type
+from jointfrf.kernel.arguments import as_array, check_type
 from jointfrf.spelling import some_of
 
 __all__ = ["arrays_of_fields", "fields_of"]
@@ -111,8 +112,41 @@ def fields_of(frfs: FrfSet) -> dict[str, NDArray[Any]]:
         nodes = sorted(frfs.coordinates)
         fields["nodes"] = np.array(nodes)
         fields["coordinates"] = np.array([frfs.coordinates[node] for node in nodes])
+    if frfs.setups is not None:
+        fields |= _fields_of_setups(frfs.setups)
     fields[_CHECKSUM] = np.array(_checksum(fields))
     return fields
+
+
+def _fields_of_setups(setups: SetUps) -> dict[str, NDArray[Any]]:
+    gain = np.nan if setups.gain is None else setups.gain
+    fields = {
+        "setups": np.array(setups.names),
+        "setup_of": setups.of,
+        "setup_gains": np.array([gain, setups.common_gain]),
+    }
+    if setups.repeated is not None:
+        fields |= {"setup_repeats": setups.repeats, "setup_repeated": setups.repeated}
+    return fields
+
+
+def _setups_of(fields: Mapping[str, Any], where: str) -> SetUps | None:
+    """Set-ups of a file in the own layout."""
+    if "setups" not in fields:
+        return None
+    try:
+        gain, common = as_array("setup_gains", fields.get("setup_gains", [np.nan, 0.0])).ravel().tolist()
+        return SetUps(
+            [str(name) for name in np.ravel(fields["setups"])],
+            fields["setup_of"],
+            None if np.isnan(gain) else gain,
+            common,
+            fields.get("setup_repeats", np.zeros((0, 3), np.intp)),
+            fields.get("setup_repeated"),
+        )
+    except (KeyError, ValueError, TypeError) as error:
+        what = "setup_of is missing" if isinstance(error, KeyError) else str(error)
+        raise FileContentError(f"{where}: the set-ups do not fit each other: {what}") from error
 
 
 def _checksum(fields: Mapping[str, Any]) -> str:
@@ -165,6 +199,7 @@ def _own_arrays(fields: Mapping[str, Any], where: str) -> FrfArrays:
         fields.get("coherence"),
         fields.get("averages"),
         {int(node): place.astype(np.float64) for node, place in zip(nodes.ravel(), places, strict=True)},
+        _setups_of(fields, where),
     )
 
 

@@ -83,7 +83,9 @@ def write_npz(path: str | PathLike[str], frfs: FrfSet) -> None:
     The arrays, SI units: ``jointfrf_frfs`` (2, the number of the layout), ``freq_hz`` (n_freq), ``h`` complex
     (n_freq, n_responses, n_excitations), NaN where there is no FRF, ``responses`` and ``excitations`` (texts such as
     ``102:+y``), ``quantity`` (text: receptance, mobility, accelerance), ``unit`` (text); where known ``coherence``
-    (shape of h), ``averages`` (n_responses, n_excitations), ``nodes`` (n) and ``coordinates`` (n, 3) in m;
+    (shape of h), ``averages`` (n_responses, n_excitations), ``nodes`` (n) and ``coordinates`` (n, 3) in m; of merged
+    sets ``setups`` (names), ``setup_of`` (n_responses, n_excitations), ``setup_gains`` (2: of one set-up, NaN where it
+    is not said, and common), ``setup_repeats`` (n, 3) and ``setup_repeated`` (n_freq, n), as in `SetUps`;
     ``sha256``, a checksum of all of these, by which a reader sees a damaged file. Layout 1 is the same without it:
     what a program of one's own writes or edits.
 
@@ -117,4 +119,5 @@ NPZ = FileFormat(
     has_mark=lambda head: head.startswith(b"PK"),
     read=_read,
     write=write_npz,
+    keeps_setups=True,
 )

@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 
 from command import run_command
 from jointfrf.cli.main import main
+from jointfrf.io import read_frfs, write_frfs
 from uff_writer import function
 
 DATA = Path(os.environ.get("JOINTFRF_TEST_DATA", Path(__file__).resolve().parents[4] / "shared" / "data"))
@@ -206,6 +208,38 @@ def test_a_file_that_is_missing_or_no_universal_file(tmp_path):
     assert "x.uff" in run(tmp_path / "x.uff", expect=1).stderr
     (tmp_path / "y.uff").write_text("nothing\n")
     assert "not a Universal File" in run(tmp_path / "y.uff", expect=1).stderr
+
+
+@pytest.fixture(scope="module")
+def two_setups(tmp_path_factory):
+    """The test of the bars in two files: hits of side k by a hammer that shows 2 % too much, one of them twice."""
+    frfs, folder = read_frfs(BARS), tmp_path_factory.mktemp("setups")
+    for name, nodes, gain in (("monday", (101, 102, 201), 1.0), ("tuesday", (201, 202), 1.02)):
+        kept = [i for i, channel in enumerate(frfs.excitations) if channel.node in nodes]
+        excitations = tuple(frfs.excitations[i] for i in kept)
+        write_frfs(folder / f"{name}.npz", replace(frfs, h=gain * frfs.h[:, :, kept], excitations=excitations))
+    return folder
+
+
+def test_files_are_set_ups_with_errors_of_their_own(two_setups, tmp_path):
+    both = [two_setups / "monday.npz", two_setups / "tuesday.npz"]
+    run_command("convert", *both, tmp_path / "test.h5")
+    found = [
+        json.loads(run(*files, *JOINT_OF_BARS, "--json", *more).stdout)["fits"][0]
+        for files, more in ((both, ()), ([tmp_path / "test.h5"], ()), (both, ("--common-gain", "0.05")))
+    ]
+    named = {f["about"][0]: f["text"] for f in found[0]["findings"] if f["text"].startswith("set-up ")}
+    assert set(named) == {str(path) for path in both}
+    assert "its gain is +0.99 % " in named[str(both[1])] or "its gain is +1 % " in named[str(both[1])]
+    assert found[1]["parameters"] == found[0]["parameters"]
+    own, common = (
+        one["parameters"]["k_theta_z"]["std_error"] / one["parameters"]["k_theta_z"]["value"] for one in found[::2]
+    )
+    assert np.sqrt(common**2 - own**2) == pytest.approx(0.05, rel=0.02)
+    assert (
+        "--setup-gain has no effect"
+        in run(*both, *JOINT_OF_BARS, "--method", "inverse-substructuring", "--setup-gain", "0.01").stderr
+    )
 
 
 @needs_data

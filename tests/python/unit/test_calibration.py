@@ -207,14 +207,16 @@ def test_student_for_few_channels():
     one = np.ones(1)
     squares = lambda degrees: (stats.t.ppf(0.975, degrees) / stats.norm.ppf(0.975)) ** 2  # noqa: E731
     np.testing.assert_allclose(student_factor(1e-9 * one, one, 3 * one), squares(3), rtol=1e-6)
-    np.testing.assert_allclose(student_factor(one, one, 3 * one), squares(12), rtol=1e-6)
+    np.testing.assert_allclose(student_factor(4 * one, one, 3 * one), squares(75), rtol=1e-6)
+    # As wide as the interval of what is added alone, at least: it has a half of the variance.
+    np.testing.assert_allclose(student_factor(one, one, 3 * one), squares(3) / 2, rtol=1e-6)
     np.testing.assert_allclose(student_factor(one, 0 * one, np.inf * one), 1)
 
 
 def test_variances_of_effects_add_up(h):
     errors = calibration_errors(FREQ, noisy(h * gains(2)))
     steps = np.random.default_rng(0).standard_normal((8, *errors.channel.shape, 3))
-    spread = CalibrationSpread.of(errors, Effects(steps, np.ones(errors.channel.shape)), None)
+    spread = CalibrationSpread.of(errors, np.eye(3), lambda kind: Effects(steps, np.ones(errors.channel.shape)))
     expected = np.einsum("ab,kabp,kabq->pq", errors.channel / 2, steps, steps)
     np.testing.assert_allclose(spread.covariance, expected)
     assert spread.squares == pytest.approx(errors.channel.sum() / 2)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy import special
 
 from jointfrf.frf.bands import line_slices
-from jointfrf.frf.calibration import CalibrationErrors
+from jointfrf.frf.calibration import CalibrationErrors, ErrorKind
 from jointfrf.identification.calibration import CalibrationSpread, Effects, effects_by_function
 from jointfrf.identification.manifold.estimate import JointEstimate
 from jointfrf.identification.manifold.group_fit import GroupFit, effects_of, gradients_of
@@ -194,7 +194,9 @@ class JointCalibration(NamedTuple):
     factor : ndarray, shape (p,)
         Variance of each parameter in units of that from independent noise.
     degrees : ndarray, shape (p,)
-        Degrees of freedom of that.
+        Degrees of freedom of that, as far as it was found.
+    found : ndarray, shape (p,)
+        Share of it that was found, and not said.
     covariance : ndarray, shape (p, p)
         Of the parameters.
     excess, excess_error : float
@@ -206,6 +208,7 @@ class JointCalibration(NamedTuple):
 
     factor: FloatArray
     degrees: FloatArray
+    found: FloatArray
     covariance: FloatArray
     excess: float
     excess_error: float
@@ -235,7 +238,7 @@ def joint_calibration(
     if errors is None:
         return None
     p = len(found.parameters)
-    factor, degrees, covariance = np.zeros(p), np.full(p, np.inf), np.zeros((p, p))
+    factor, degrees, share, covariance = np.zeros(p), np.full(p, np.inf), np.zeros(p), np.zeros((p, p))
     excess = error = 0.0
     for group in found.groups:
         spread = _group_calibration(group, frfs, freq_hz, errors)
@@ -248,13 +251,13 @@ def joint_calibration(
         # A rigid DOF has no finite slope.
         in_coordinate = group.joint.is_compliance | ~np.isfinite(ratio)
         factor[which] = np.nan_to_num(np.where(in_coordinate, of_coordinate, ratio))
-        degrees[which] = spread.degrees
+        degrees[which], share[which] = spread.degrees, spread.found
         covariance[which[:, None], which] = np.nan_to_num(of_theta, posinf=0.0, neginf=0.0)
         excess += spread.squares
         error = float(np.hypot(error, spread.squares_error))
     equations = max(found.equations - p / 2, 1.0)
     between = partial(_between_parts, frfs, errors, errors.functions(freq_hz))
-    return JointCalibration(factor, degrees, covariance, excess / equations, error / equations, between)
+    return JointCalibration(factor, degrees, share, covariance, excess / equations, error / equations, between)
 
 
 def _between_parts(
@@ -266,10 +269,8 @@ def _between_parts(
     inverse: FloatArray,
 ) -> FloatArray:
     whole, found = inverse_information(group.information), np.zeros_like(inverse)
-    for variance, changes in ((errors.channel / 2, _channel_errors), (errors.own, _own_errors)):
-        if not variance.any():
-            continue
-        for gradient, _ in effects_of(group, changes(frfs, group.dofs)):
+    for kind, variance, _ in errors.kinds():
+        for gradient, _ in effects_of(group, _unit_errors(frfs, group.dofs, errors, kind)):
             parts = np.einsum(
                 "afl,bl,alp->abfp", functions, member, np.stack([gradient.real, -gradient.imag]), optimize=True
             )
@@ -284,29 +285,21 @@ def _group_calibration(
     """Return what smooth errors do to the coordinates of a group."""
     functions, inverse = errors.functions(freq_hz), inverse_information(group.information)
 
-    def effects(changes: Callable[[slice], Iterator[ComplexArray]]) -> Effects:
-        parts = [
-            effects_by_function(effects_of(group, changes(own), own), functions[:, :, own], inverse)
-            for own in line_slices(len(freq_hz))
-        ]
+    def effects(kind: ErrorKind) -> Effects:
+        parts = []
+        for own in line_slices(len(freq_hz)):
+            changes = _unit_errors(frfs.on_lines(own), group.dofs, errors, kind)
+            parts.append(effects_by_function(effects_of(group, changes, own), functions[:, :, own], inverse))
         return Effects(np.sum([one.steps for one in parts], axis=0), np.sum([one.squares for one in parts], axis=0))
 
-    of_channels = effects(lambda own: _channel_errors(frfs.on_lines(own), group.dofs))
-    of_own = effects(lambda own: _own_errors(frfs.on_lines(own), group.dofs)) if errors.own.any() else None
-    return CalibrationSpread.of(errors, of_channels, of_own)
+    return CalibrationSpread.of(errors, group.joint.theta_slope(group.x), effects)
 
 
-def _channel_errors(frfs: InterfaceFrfs, dofs: NDArray[np.intp]) -> Iterator[ComplexArray]:
-    """Yield changes of the entries between some joint DOFs by a unit relative error of each response and force."""
-    from_responses, to_forces = frfs.measured @ frfs.forces.T, frfs.responses @ frfs.measured
-    for a in range(frfs.responses.shape[1]):
-        yield frfs.entries_of(dofs, frfs.responses[:, a, None] * from_responses[:, None, a])
-    for b in range(frfs.forces.shape[1]):
-        yield frfs.entries_of(dofs, to_forces[:, :, b, None] * frfs.forces[:, b])
-
-
-def _own_errors(frfs: InterfaceFrfs, dofs: NDArray[np.intp]) -> Iterator[ComplexArray]:
-    """Yield those by a unit relative error of each FRF."""
-    for a, b in np.ndindex(frfs.measured.shape[1:]):
-        place = np.outer(frfs.responses[:, a], frfs.forces[:, b])
-        yield frfs.entries_of(dofs, frfs.measured[:, a, b, None, None] * place)
+def _unit_errors(
+    frfs: InterfaceFrfs, dofs: NDArray[np.intp], errors: CalibrationErrors, kind: ErrorKind
+) -> Iterator[ComplexArray]:
+    """Yield changes of the entries between some joint DOFs by a unit relative error of each of a kind."""
+    for mask in errors.masks(kind, frfs.measured.shape[1:]):
+        rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+        own = np.where(mask[np.ix_(rows, columns)], frfs.measured[:, rows[:, None], columns], 0)
+        yield frfs.entries_of(dofs, frfs.responses[:, rows] @ own @ frfs.forces[:, columns].T)

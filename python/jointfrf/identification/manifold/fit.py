@@ -313,7 +313,8 @@ def _with_calibration(spread: Spread, calibration: JointCalibration | None) -> F
     """Return variance factors for intervals, with smooth errors, whose variances are known from few channels."""
     if calibration is None:
         return spread.factor
-    few = student_factor(spread.factor, calibration.factor, calibration.degrees)
+    found = calibration.factor * calibration.found
+    few = student_factor(spread.factor + calibration.factor - found, found, calibration.degrees)
     return (spread.factor + calibration.factor) * few
 
 

@@ -27,7 +27,7 @@ from jointfrf.identification.manifold.transforms import (
 from jointfrf.identification.noise import KnownNoise, NoiseOptions, noise_of_matrix
 from jointfrf.identification.prepare import BandsOfDofs, MeasuredFrfs, as_dof_names
 from jointfrf.identification.side_models import SideModel, corrected_frfs
-from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_names, as_real, check_choice, one_line
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_names, check_choice, one_line
 
 __all__ = [
     "FitOptions",
@@ -178,10 +178,7 @@ def prepare_compliance(
     kept = np.asarray(used.any(axis=1))
     if not kept.all():  # no copy of long sweeps otherwise
         freq, h = freq[kept], h[kept]
-    if noise.coherence is not None:
-        noise = replace(noise, coherence=as_real("coherence", noise.coherence, measured.h.shape)[kept])
-    if noise.noise is not None and np.ndim(noise.noise) > 0:
-        noise = replace(noise, noise=as_real("noise", noise.noise, measured.h.shape)[kept])
+    noise = noise.on_lines(kept, measured.h.shape)
     # Whether channels are the same points is known where both transforms are one.
     square = h.shape[1] == h.shape[2] and np.array_equal(responses, forces)
     if not is_checked:

@@ -266,7 +266,8 @@ def _judged(problem: ModelProblem, minimum: Minimum, other: float) -> FoundModel
     covariance = own * np.outer(root, root)
     if calibration is not None:
         covariance += calibration.covariance
-        factor = (factor + beside) * student_factor(factor, np.asarray(beside), calibration.degrees)
+        found_part = np.asarray(beside) * calibration.found
+        factor = (factor + beside) * student_factor(factor + beside - found_part, found_part, calibration.degrees)
     covariance *= np.outer(slope, slope)
     whole = inverse_information(minimum.information)
 

@@ -8,12 +8,13 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from jointfrf.frf.setups import SetUps
 from jointfrf.identification.model.assembly import Assembly
 from jointfrf.identification.model.fit import ModelProblem
 from jointfrf.identification.model.prediction import Prediction, parameter_vector
 from jointfrf.identification.model.substructure import Unknown
 from jointfrf.identification.noise import NoiseOptions, noise_of_channels
-from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_frequency, as_lines
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_frequency, as_lines, check_type
 from jointfrf.laws.law_joint import LawJoint
 
 __all__ = ["Channels", "JointStart", "prepare_model_fit"]
@@ -84,6 +85,9 @@ def prepare_model_fit(
         whole.check(names, what)
     shown = _shown(lines, freq)
     reciprocal = channels.responses == channels.forces and bool(shown.all())
+    if noise.setups is not None:
+        check_type("setups", noise.setups, SetUps)
+        noise.setups.check_fits(lines.shape)
     found = noise_of_channels(freq, lines, shown, noise, reciprocal=reciprocal)
     variance = found.variance
     prediction = Prediction(whole, freq, channels.responses, channels.forces)

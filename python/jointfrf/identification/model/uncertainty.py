@@ -7,8 +7,8 @@ from functools import cached_property
 
 import numpy as np
 
-from jointfrf.frf.calibration import CalibrationErrors
-from jointfrf.identification.calibration import CalibrationSpread, effects_by_function
+from jointfrf.frf.calibration import CalibrationErrors, ErrorKind
+from jointfrf.identification.calibration import CalibrationSpread, Effects, effects_by_function
 from jointfrf.identification.minimise import Minimum, inverse_information
 from jointfrf.identification.model.likelihood import Likelihood
 from jointfrf.identification.scatter import (
@@ -121,17 +121,12 @@ class ModelGradient:
         gradient = self.slopes.conj() * self.predicted
         squares = np.asarray(abs(self.predicted) ** 2 * (self.inflation / 2), np.float64)
 
-        def effects(by_axis: list[int]) -> list[tuple[ComplexArray, FloatArray]]:
-            found = []
-            for axis in by_axis:
-                of_axis = np.moveaxis(gradient.sum(axis=5 - axis), 2, 0)
-                found += list(zip(of_axis.swapaxes(1, 2), squares.sum(axis=4 - axis).T, strict=True))
-            return found
+        def effects(kind: ErrorKind) -> Effects:
+            masks = errors.masks(kind, self.predicted.shape[1:])
+            each = [
+                (gradient[:, :, mask].sum(axis=2).T, np.asarray(squares[:, mask].sum(axis=1), np.float64))
+                for mask in masks
+            ]
+            return effects_by_function(each, functions, self.covariance)
 
-        of_channels = effects_by_function(effects([2, 3]), functions, self.covariance)
-        of_own = None
-        if errors.own.any():
-            p, n_freq = gradient.shape[:2]
-            each = zip(gradient.reshape(p, n_freq, -1).transpose(2, 1, 0), squares.reshape(n_freq, -1).T, strict=True)
-            of_own = effects_by_function(each, functions, self.covariance)
-        return CalibrationSpread.of(errors, of_channels, of_own)
+        return CalibrationSpread.of(errors, np.eye(len(gradient)), effects)
