@@ -117,7 +117,7 @@ from jointfrf.substructuring.compliance import (
     multi_point_compliance,
     multi_point_stiffness,
 )
-from jointfrf.substructuring.coupling import couple, semm
+from jointfrf.substructuring.coupling import couple, semm, semm_standard_error
 from jointfrf.substructuring.methods import decouple
 from jointfrf.substructuring.modification import find_modification, inverse_substructuring, ismm, modify
 
@@ -277,6 +277,7 @@ __all__ = [
     "rigid_offset",
     "save",
     "semm",
+    "semm_standard_error",
     "sensitivity",
     "sensor_consistency",
     "set_engine",

@@ -52,7 +52,9 @@ def assembly(name):
     """Substructures by their FRFs, and the names of channels at the joint and inside."""
     _, exact = prepared(name)
     joint, inner = [f"joint {dof}" for dof in exact.dofs], [f"inner {dof}" for dof in exact.dofs]
-    parts = [jf.Substructure.of_frfs(exact.freq_hz, h, [*joint, *inner], joint) for h in (exact.h_a, exact.h_b)]
+    parts = [
+        jf.Substructure.of_frfs(exact.freq_hz, h, [*joint, *inner], joint, noise=0.0) for h in (exact.h_a, exact.h_b)
+    ]
     interface = [f"{side}/{dof}" for side in "AB" for dof in joint]
     internal = [f"{side}/{dof}" for side in "AB" for dof in inner]
     return parts, interface, internal

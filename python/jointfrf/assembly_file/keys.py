@@ -111,10 +111,15 @@ class MatricesPart(MatricesKeys, tag="matrices"):
 class ReceptancesPart(ReceptancesKeys, tag="receptances"):
     """FRFs of the part, measured or computed elsewhere, in any format that `jointfrf.io.read_frfs` reads.
 
-    They are taken as exact, and must be there on the lines of the measurement, between all DOFs that are used.
+    They must be there on the lines of the measurement, between all DOFs that are used. Their noise is in the weights
+    and intervals of a fit.
     """
 
     joint: _JointDofs
+    noise: Annotated[
+        NotNegative | None,
+        key("Relative noise of these FRFs; 0 where they are exact.", absent="found from them", example=0.01),
+    ] = None
 
 
 class ModesPart(ModesKeys, tag="modes"):

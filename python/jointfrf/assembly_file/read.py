@@ -149,7 +149,8 @@ class AssemblyPart:
         if isinstance(keys, ReceptancesPart | ModesPart):
             named = list(dict.fromkeys([*keys.joint, *dofs]))
             h = keys.build(lambda: self.structure.receptance(freq_hz, named), "file")
-            return keys.build(lambda: Substructure.of_frfs(freq_hz, h, named, keys.joint))
+            noise = keys.noise if isinstance(keys, ReceptancesPart) else 0.0
+            return keys.build(lambda: Substructure.of_frfs(freq_hz, h, named, keys.joint, noise=noise))
         assert isinstance(self.structure, ModelStructure)
         unknowns = {name: self._unknown(name, prior) for name, prior in self._priors().items()}
         known = keys.joint, unknowns, keys.exact, keys.model_error

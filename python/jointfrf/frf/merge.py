@@ -51,7 +51,7 @@ def merge_frfs(sets: Sequence[FrfSet]) -> FrfSet:
     ------
     FileContentError
         Sets differ in their frequency lines, grossly in an FRF, in coherence or number of averages of one and the same
-        FRF, or in the coordinates of a node; both sources are named.
+        FRF, or in the coordinates of a node; or all FRFs of one were measured before. Both sources are named.
     ValueError
         There is no set.
 
@@ -112,7 +112,7 @@ class _Merged:
         self.responses, self.excitations, self.sets = responses, excitations, sets
         self.row_of = {channel: i for i, channel in enumerate(responses)}
         self.column_of = {channel: j for j, channel in enumerate(excitations)}
-        self.origin = np.full((len(responses), len(excitations)), -1)
+        self.origin: NDArray[np.intp] = np.full((len(responses), len(excitations)), -1)
         self.again: dict[tuple[int, int, int], tuple[int, int]] = {}
 
     def setups(self, quantity: str) -> SetUps | None:
@@ -153,7 +153,7 @@ class _Merged:
 
     def fill(self, target: _Values, values_of: Callable[[FrfSet], _Values | None], what: str) -> None:
         """Copy what each set holds into place; where something is there already, compare the two."""
-        origin = np.full(target.shape[1:], -1)
+        origin: NDArray[np.intp] = np.full(target.shape[1:], -1)
         for number, each in enumerate(self.sets):
             values = values_of(each)
             if values is None:
@@ -180,6 +180,17 @@ class _Merged:
                         )
         if target.dtype.kind == "c":
             self.origin = origin
+            self._check_own()
+
+    def _check_own(self) -> None:
+        """Raise an error for a set of which every FRF was measured before: it is another test, not a set-up of one."""
+        for row, column, number in self.again:
+            if not (self.origin == number).any():
+                one, two = _name(self.sets[self.origin[row, column]], self.sets), _name(self.sets[number], self.sets)
+                raise FileContentError(
+                    f"the FRF {self.responses[row]} / {self.excitations[column]} in {one} and in {two} contradict each "
+                    f"other, and {two} adds none: these are two tests, or leave one out"
+                )
 
 
 def _is_copy(kept: _Values, value: _Values) -> bool:

@@ -93,7 +93,7 @@ class CalibrationSpread(NamedTuple):
             Returns what unit errors of a kind do to the coordinates.
         """
         p = len(slope)
-        to_parameters = np.where(np.isfinite(slope).all(axis=1)[:, None], slope, np.eye(p))
+        to_parameters = np.where(np.isfinite(slope).all(axis=1, keepdims=True), slope, np.eye(p))
         covariance, scatter, whole, of_found = np.zeros((p, p)), *np.zeros((3, p))
         total = total_scatter = 0.0
         for kind, variance, degrees in errors.kinds():

@@ -98,7 +98,9 @@ def identify_model(
     exactly known of the models must be among the unknowns. An error that none of these describes shows in the residual,
     and a warning says at which frequencies and in which channels, or in a prior that the FRFs deny.
 
-    FRFs of a substructure are taken as exact.
+    Noise of FRFs of a substructure, Y = ... + P e Q to first order, is shared by the FRFs of the assembly: those of a
+    line are weighted by their whole covariance, with P and Q at the minimum. It is found or as said
+    (`Substructure.of_frfs`).
 
     Examples
     --------

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Literal, get_args
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from jointfrf.frf.noise_model import estimate_noise
 from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import (
     ComplexArray,
@@ -16,7 +17,9 @@ from jointfrf.kernel.arguments import (
     as_frequency,
     as_joint_lines,
     as_lines,
+    as_not_negative,
     as_number,
+    as_real,
     as_square,
     check_choice,
     check_finite_lines,
@@ -27,7 +30,7 @@ from jointfrf.kernel.call import N_FREQ, OnSingular, run
 from jointfrf.kernel.linear_algebra import solve
 from jointfrf.laws.law_joint import Connection, LawJoint
 
-__all__ = ["connect", "connection_forces", "couple", "semm"]
+__all__ = ["connect", "connection_forces", "couple", "semm", "semm_standard_error"]
 
 SemmMethod = Literal["original", "extended"]
 
@@ -198,7 +201,7 @@ def semm(
     Returns
     -------
     ndarray, shape (n_freq, n, n)
-        m/N. At the measured DOFs it is the measurement: its noise is expanded, too.
+        m/N. At the measured DOFs it is the measurement: its noise is expanded, too (`semm_standard_error`).
 
     Raises
     ------
@@ -229,24 +232,124 @@ def semm(
     >>> bool(np.allclose(mixed, real))
     True
     """
+    found = _expansion(h_model, outputs, inputs, method, rcond)
+    measured = as_lines("h_measured", h_measured, found.outputs.size, found.inputs.size, len(found.model))
+    freq = optional_frequency(freq_hz, len(measured))
+    for name, lines in (("h_model", found.model), ("h_measured", measured)):
+        check_finite_lines(name, lines, freq)
+    wrong = found.model[:, found.outputs][:, :, found.inputs] - measured
+    left, right = found.factors()
+    mixed: ComplexArray = found.model - left @ wrong @ right
+    return np.ascontiguousarray(mixed)
+
+
+def semm_standard_error(
+    h_model: ArrayLike,
+    h_measured: ArrayLike,
+    outputs: ArrayLike,
+    inputs: ArrayLike | None = None,
+    *,
+    noise: float | ArrayLike | None = None,
+    method: SemmMethod = "extended",
+    rcond: float = 1e-12,
+    freq_hz: ArrayLike | None = None,
+) -> FloatArray:
+    """Return the standard error of each FRF that `semm` expands, by the noise of the measured ones.
+
+    Parameters
+    ----------
+    h_model, h_measured, outputs, inputs, method, rcond
+        As in `semm`.
+    noise : float or array_like, shape (n_freq, m_o, m_i), optional
+        Relative noise of the measured FRFs, or E|e|^2 of each, (m/N)^2. By default it is found, as `estimate_noise`
+        does, which needs `freq_hz`.
+    freq_hz : array_like, shape (n_freq,), optional
+        Hz.
+
+    Returns
+    -------
+    ndarray of float, shape (n_freq, n, n)
+        sqrt(E|e|^2), m/N, of real and imaginary part together: |Y - true| is below 1.73 times that in 95 % of cases,
+        and each part is within 1.96 / sqrt(2) times that.
+
+    Raises
+    ------
+    ValueError
+        Wrong shapes or DOFs, NaN or Inf in a line, noise that is negative; FRFs whose noise is not seen.
+
+    Notes
+    -----
+    Y is linear in the measured FRFs, Y = ... + L Y_meas R, so that this is exact for circular noise that is independent
+    between them: E|e_ab|^2 = sum |L_ap|^2 E|e_pq|^2 |R_qb|^2. Where the FRFs were made reciprocal before, h_pq and
+    h_qp have one noise, with |L_ap R_qb + L_aq R_pb|^2 for each pair. What is wrong with the parent model is not in it.
+
+    Examples
+    --------
+    >>> import numpy as np, jointfrf as jf
+    >>> freq = np.array([1.0])
+    >>> model = jf.chain([5, 3], [2250, 3500], ground="start").receptance(freq)
+    >>> error = jf.semm_standard_error(model, model[:, :1, :1], [0], noise=0.01, method="original")
+    >>> np.round(error / abs(model), 4)[0, 0].tolist()
+    [0.01, 0.01]
+    """
+    expansion = _expansion(h_model, outputs, inputs, method, rcond)
+    shape = (len(expansion.model), expansion.outputs.size, expansion.inputs.size)
+    measured = as_lines("h_measured", h_measured, shape[1], shape[2], shape[0])
+    freq = optional_frequency(freq_hz, shape[0])
+    for name, lines in (("h_model", expansion.model), ("h_measured", measured)):
+        check_finite_lines(name, lines, freq)
+    is_square = np.array_equal(expansion.outputs, expansion.inputs)
+    if noise is None:
+        if freq is None:
+            raise ValueError("freq_hz is needed to find the noise of h_measured: give it, or noise")
+        found = estimate_noise(freq, measured, reciprocal=is_square)
+        if found.source == "none":
+            raise ValueError("h_measured does not show its noise, by too few lines or too little of it: give noise")
+        variance = found.variance
+    elif np.ndim(noise) == 0:
+        variance = np.asarray(as_not_negative("noise", noise) ** 2 * abs(measured) ** 2, np.float64)
+    else:
+        variance = as_real("noise", noise, shape)
+        if (variance < 0).any():
+            raise ValueError("noise must hold variances E|e|^2 of each measured FRF, none below 0")
+    left, right = expansion.factors()
+    total = abs(left) ** 2 @ variance @ abs(right) ** 2
+    if is_square and np.allclose(measured, measured.swapaxes(1, 2), rtol=1e-9, atol=0):
+        # 2 Re of the cross products of h_pq and h_qp.
+        off = np.where(np.eye(shape[1], dtype=bool), 0, variance)
+        across = np.einsum("lap,lpq,laq,lqb,lpb->lab", left, off, left.conj(), right, right.conj(), optimize=True)
+        total = total + across.real
+    return np.sqrt(np.maximum(total, 0))
+
+
+class _Expansion(NamedTuple):
+    """A parent model, the places of what was measured, and how it is expanded."""
+
+    model: ComplexArray
+    outputs: NDArray[np.int32]
+    inputs: NDArray[np.int32]
+    method: SemmMethod
+    rcond: float
+
+    def factors(self) -> tuple[ComplexArray, ComplexArray]:
+        """Return L and R: Y changes by L (Y_meas - Y_bb) R."""
+        model, out, into = self.model, self.outputs, self.inputs
+        if self.method == "original":
+            inverse = np.linalg.pinv(model[:, out][:, :, into], rcond=self.rcond)
+            return model[:, :, into] @ inverse, inverse @ model[:, out]
+        left = model @ np.linalg.pinv(model[:, out], rcond=self.rcond)
+        return left, np.linalg.pinv(model[:, :, into], rcond=self.rcond) @ model
+
+
+def _expansion(
+    h_model: ArrayLike, outputs: ArrayLike, inputs: ArrayLike | None, method: SemmMethod, rcond: float
+) -> _Expansion:
+    """Check what `semm` expands by."""
     check_choice("method", method, get_args(SemmMethod))
     model = as_lines("h_model", h_model)
-    rcond = as_number("rcond", rcond)
-    n_freq, n, columns = model.shape
+    n, columns = model.shape[1:]
     if n != columns:
         raise ValueError(f"h_model must be square, not {n} x {columns}")
     out = as_dofs("outputs", outputs, n) - 1
     into = out if inputs is None else as_dofs("inputs", inputs, n) - 1
-    measured = as_lines("h_measured", h_measured, out.size, into.size, n_freq)
-    freq = optional_frequency(freq_hz, n_freq)
-    for name, lines in (("h_model", model), ("h_measured", measured)):
-        check_finite_lines(name, lines, freq)
-    wrong = model[:, out][:, :, into] - measured
-    if method == "original":
-        inverse = np.linalg.pinv(model[:, out][:, :, into], rcond=rcond)
-        left, right = model[:, :, into] @ inverse, inverse @ model[:, out]
-    else:
-        left = model @ np.linalg.pinv(model[:, out], rcond=rcond)
-        right = np.linalg.pinv(model[:, :, into], rcond=rcond) @ model
-    mixed: ComplexArray = model - left @ wrong @ right
-    return np.ascontiguousarray(mixed)
+    return _Expansion(model, out, into, method, as_number("rcond", rcond))

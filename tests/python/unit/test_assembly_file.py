@@ -136,6 +136,9 @@ exact = true
     one = jf.measured_assembly(written(tmp_path), frfs).fit()
     other = jf.measured_assembly(written(tmp_path, text), frfs).fit()
     np.testing.assert_allclose(one.estimate, other.estimate, rtol=1e-5)
+    noisy = text.replace('file = "b.npz"', 'file = "b.npz"\nnoise = 0.05')
+    third = jf.measured_assembly(written(tmp_path, noisy), frfs).fit()
+    assert third.std_error["k_x"] > 1.2 * other.std_error["k_x"]
 
 
 def test_unknown_numbers_of_a_beam_have_their_means(tmp_path):

@@ -2,6 +2,7 @@
 
 import re
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -217,6 +218,80 @@ def test_substructures_may_be_given_by_frfs():
     assert [fit.value[n] for n in PLAIN_NAMES] == pytest.approx([same.value[n] for n in PLAIN_NAMES], rel=1e-3)
     for name, true in zip(PLAIN_NAMES, (6e5, 20, 5e3, 1.5), strict=True):
         assert abs(fit.value[name] - true) < 4 * fit.std_error[name]
+
+
+NAMES_A, NAMES_B = ("7:y", "7:theta", "4:y"), ("1:y", "1:theta", "6:y")
+
+
+def measured_parts(noise, level=0.01, joint=PLAIN):
+    """The assembly with both parts by FRFs of this noise, drawn once."""
+    a, b = arm(), free_beam()
+    h_a, h_b = a.receptance(FREQ, a.index(*NAMES_A)), b.receptance(FREQ, b.index(*NAMES_B))
+    return jf.Assembly(
+        jf.Substructure.of_frfs(FREQ, jf.pollute(h_a, level, seed=1), NAMES_A, NAMES_A[:2], noise=noise),
+        jf.Substructure.of_frfs(FREQ, jf.pollute(h_b, level, seed=2), NAMES_B, NAMES_B[:2], noise=noise),
+        joint,
+    )
+
+
+def test_noise_of_parts_does_to_the_assembly_what_differences_say():
+    """Each FRF of a part changed by itself, and the assembly coupled again."""
+    whole, channels = measured_parts(0.01), ("A/4:y", "B/6:y", "B/1:y")
+    prediction = Prediction(whole, FREQ, channels, channels)
+    vector = parameter_vector(whole, ({}, {}), (), prediction.joint_stiffness())
+    shared = prediction.part_noise(vector, vector.values)
+    assert shared.shape == (FREQ.size, 3, 3, 18)
+    before = whole.receptance(FREQ, channels, channels)
+    for source, part in ((5, "a"), (9, "b")):
+        own = getattr(whole, part)
+        step = np.zeros_like(own.source.h)
+        row, column = divmod(source % 9, 3)
+        step[:, row, column] = 1e-6 * abs(own.source.h[:, row, column])
+        moved = jf.Substructure.of_frfs(FREQ, own.source.h + step, own.source.dofs, own.joint)
+        sides = {"a": whole.a, "b": whole.b, part: moved}
+        change = jf.Assembly(sides["a"], sides["b"], whole.joint).receptance(FREQ, channels, channels) - before
+        size = abs(shared[..., source]).max()
+        np.testing.assert_allclose(shared[..., source], change / 1e-4, atol=1e-3 * size)
+
+
+def test_the_likelihood_with_noise_of_parts_is_that_of_the_normal_distribution():
+    """r^H C^-1 r with the whole covariance of a line, twice: real and imaginary part have half of E|e|^2."""
+    whole, channels = measured_parts(0.01), ("A/4:y", "B/6:y")
+    h = jf.pollute(assembly().receptance(FREQ, channels, channels), 0.02, seed=4)
+    problem = prepare_model_fit(FREQ, h, whole, Channels(channels, channels), NoiseOptions(0.02), ())
+    x = problem.vector.to_coordinates(problem.vector.values)
+    shared = problem.prediction.part_noise(problem.vector, problem.vector.values)
+    likelihood = replace(problem, shared=shared).likelihood
+    left = (h - whole.receptance(FREQ, channels, channels)).reshape(FREQ.size, -1, 1)
+    flat = shared.reshape(FREQ.size, 4, -1)
+    covariance = flat @ flat.conj().swapaxes(1, 2)
+    covariance[:, range(4), range(4)] += problem.variance.reshape(FREQ.size, 4)
+    expected = 2 * (left.conj().swapaxes(1, 2) @ np.linalg.solve(covariance, left)).real.sum()
+    assert likelihood.cost(x) == pytest.approx(expected, rel=1e-9)
+    at = likelihood.linearised(x)
+    assert at.cost == pytest.approx(expected, rel=1e-9)
+    step = 1e-6 * np.eye(x.size)
+    slope = [(likelihood.cost(x + one) - likelihood.cost(x - one)) / 4e-6 for one in step]
+    np.testing.assert_allclose(at.gradient, -np.array(slope), rtol=1e-4)
+
+
+def test_noise_of_parts_is_in_weights_and_intervals():
+    channels = ("A/4:y", "A/7:y", "B/1:y", "B/6:y")
+    h = jf.pollute(assembly().receptance(FREQ, channels, channels), 0.01, seed=4)
+    guess = jf.Joint([3e5, 3e3], [10.0, 1.0], ["y", "theta"])
+    said, found = (fit_of(FREQ, h, measured_parts(noise, 0.003, guess), channels, channels) for noise in (0.003, None))
+    alone = fit_of(FREQ, h, assembly(guess), channels, channels)
+    assert said.test.is_noise
+    for name, true in zip(PLAIN_NAMES, (6e5, 20, 5e3, 1.5), strict=True):
+        low, high = said.confidence_interval(0.99)[name]
+        assert low < true < high
+        assert said.std_error[name] > alone.std_error[name]
+        assert found.std_error[name] == pytest.approx(said.std_error[name], rel=0.4)
+    exact = jf.Substructure.of_frfs(FREQ, np.ones((FREQ.size, 1, 1)), ["1:y"], ["1:y"], noise=0.0)
+    assert exact.source.variance is None
+    for wrong in (-0.1, -np.ones((FREQ.size, 1, 1)), np.ones((3, 1, 1))):
+        with pytest.raises(ValueError, match="noise must"):
+            jf.Substructure.of_frfs(FREQ, np.ones((FREQ.size, 1, 1)), ["1:y"], ["1:y"], noise=wrong)
 
 
 def test_a_mount_with_mass_and_a_rigid_rotation_is_found():

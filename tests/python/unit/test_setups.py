@@ -85,13 +85,21 @@ def test_merging_keeps_which_frf_came_from_which_setup(tmp_path):
 def test_merging_a_merged_set_and_other_quantities():
     h = np.random.default_rng(1).normal(size=(4, 3, 3)) + 1j
     parts = [one_set(name, [f"{i + 1}:y"], h[:, :, i : i + 1]) for i, name in enumerate("abc")]
-    twice = one_set("again", ["1:y"], 1.01 * h[:, :, :1] * 2j * np.pi * np.arange(1.0, 5.0)[:, None, None], "mobility")
+    i_omega = 2j * np.pi * np.arange(1.0, 5.0)[:, None, None]
+    twice = one_set("again", ["1:y", "4:y"], 1.01 * h[:, :, :2] * i_omega, "mobility")
     whole = merge_frfs([merge_frfs([*parts[:2], twice]), parts[2]])
     assert (whole.quantity, whole.setups.names) == ("mobility", ("a", "b", "again", "c"))
-    assert whole.setups.of.tolist() == [[0, 1, 3]] * 3
+    assert [str(channel) for channel in whole.excitations] == ["1:+y", "2:+y", "4:+y", "3:+y"]
+    assert whole.setups.of.tolist() == [[0, 1, 2, 3]] * 3
     receptance = whole.receptance()
-    np.testing.assert_allclose(receptance.h, h, rtol=1e-12)
+    np.testing.assert_allclose(receptance.matrix(["1:y", "2:y", "3:y"], ["1:y", "2:y", "3:y"]), h, rtol=1e-12)
     np.testing.assert_allclose(receptance.setups.repeated, 1.01 * h[:, :, 0], rtol=1e-12)
+
+
+def test_a_set_that_only_repeats_is_another_test():
+    h = np.random.default_rng(3).normal(size=(5, 3, 2)) + 1j
+    with pytest.raises(FileContentError, match="in a and in b contradict each other, and b adds none"):
+        merge_frfs([one_set("a", ["1:y", "2:y"], h), one_set("b", ["1:y"], 1.01 * h[:, :, :1])])
 
 
 def test_other_frfs_are_no_repetition():
@@ -153,6 +161,21 @@ def test_a_late_setup_is_named_with_its_delay(h):
     assert delays == {
         "early": pytest.approx(-late / 2, rel=0.05), "late": pytest.approx(late / 2, rel=0.05),
     }  # fmt: skip
+
+
+def test_a_setup_whose_resonances_are_lower_is_named(assembly, h):
+    """As on a warmer day: h(f) becomes h(f / (1 + d)); another gain alone moves no resonance."""
+    setups, lower = jf.SetUps(["cold", "warm"], SIDES), -0.001
+    warm = assembly.receptance(FREQ / (1 + lower), ENDS, ENDS)
+    errors = calibration_errors(FREQ, noisy(np.where(setups.of == 0, h, warm), 10), setups).setups
+    found = {one.name: one for one in errors.deviations if one.part == "resonances"}
+    assert {name: one.size for name, one in found.items()} == {
+        "cold": pytest.approx(-lower / 2, rel=0.1), "warm": pytest.approx(lower / 2, rel=0.1),
+    }  # fmt: skip
+    # Resonances at 17.5 to 590 Hz, a few lines wide.
+    assert FREQ[0] <= found["warm"].band[0] < found["warm"].band[1] < FREQ[-1]
+    apart = noisy(h * factors(setups, [1.0, 1.02]), 10)
+    assert {one.part for one in calibration_errors(FREQ, apart, setups).setups.deviations} == {"gain"}
 
 
 def test_repeats_alone_show_what_setups_differ_by(h):

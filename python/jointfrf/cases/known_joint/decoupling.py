@@ -63,7 +63,7 @@ def _decoupled(
 ) -> tuple[Assembly, Channels]:
     """Return substructures by their FRFs, with springs and dashpots near to K*, and the channels at r, then s."""
     joint, inner = [f"joint {dof}" for dof in dofs], [f"inner {dof}" for dof in dofs]
-    a, b = (Substructure.of_frfs(freq_hz, h, [*joint, *inner], joint) for h in substructures)
+    a, b = (Substructure.of_frfs(freq_hz, h, [*joint, *inner], joint, noise=0.0) for h in substructures)
     diagonal = np.einsum("laa->la", k_joint)
     k, c = np.median(diagonal.real, axis=0), np.median(diagonal.imag / (2 * np.pi * freq_hz)[:, None], axis=0)
     names = (*(f"A/{name}" for name in inner), *(f"B/{name}" for name in inner))

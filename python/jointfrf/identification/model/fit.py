@@ -37,6 +37,8 @@ _GOOD = 1.1
 _SMALL_ERROR = 0.02
 #: Starts that are followed to their minimum at most.
 _FOLLOWED = 4
+#: Noise of FRFs of substructures is taken near the minimum so many times: what it does there depends on the joint.
+_TURNS = 2
 #: Reductions of the models are extended at most so many times.
 _REFINED = 3
 
@@ -63,6 +65,9 @@ class ModelProblem:
         Returns values of the joint from the compliance fit, or None.
     tested : ndarray, shape (n_freq, n_o, n_i), optional
         E|e|^2 found without the models, which the residual is compared with; `variance` by default.
+    shared : ndarray, shape (n_freq, n_o, n_i, n_sources), optional
+        What noise of FRFs of the substructures does to those of the assembly near the minimum, m/N: as large as it
+        counts over lines that are correlated.
     """
 
     prediction: Prediction
@@ -75,11 +80,20 @@ class ModelProblem:
     joint_channels: tuple[list[int], list[int]] | None
     compliance_start: Callable[[], FloatArray | None]
     tested: FloatArray | None = None
+    shared: ComplexArray | None = None
 
     @property
     def likelihood(self) -> Likelihood:
         """The likelihood for this variance."""
-        return Likelihood.of_variance(self.prediction, self.vector, self.measured, self.variance, self.noise.inflation)
+        return Likelihood.of_variance(
+            self.prediction, self.vector, self.measured, self.variance, self.noise.inflation, self.shared
+        )
+
+    def near(self, minimum: Minimum) -> ModelProblem:
+        """Return the same with the noise of substructures as it is near a minimum."""
+        if not self.prediction.has_noisy_parts:
+            return self
+        return replace(self, shared=self.prediction.part_noise(self.vector, self.vector.to_values(minimum.x)))
 
 
 class FoundModel(NamedTuple):
@@ -133,6 +147,10 @@ def fit_assembly(problem: ModelProblem) -> FoundModel:
     with warnings.catch_warnings(), np.errstate(over="ignore", divide="ignore", invalid="ignore"):
         warnings.simplefilter("ignore", IllConditionedWarning)
         minimum, other = _lowest(problem)
+        if problem.prediction.has_noisy_parts:
+            for _ in range(_TURNS):
+                problem = problem.near(minimum)
+                minimum = minimise(problem.likelihood, minimum.x)
         for _ in range(_REFINED):
             if not problem.prediction.refine(problem.vector, problem.vector.to_values(minimum.x)):
                 break
@@ -144,6 +162,12 @@ def fit_assembly(problem: ModelProblem) -> FoundModel:
             problem = changed
             minimum = minimise(problem.likelihood, minimum.x)
         return _judged(problem, minimum, other)
+
+
+def _explained(problem: ModelProblem, minimum: Minimum) -> float:
+    """Return the residual over the noise, that of the substructures with it."""
+    likelihood = problem.near(minimum).likelihood
+    return _ratio(likelihood, minimum._replace(cost=likelihood.cost(minimum.x)), problem.noise.inflation)
 
 
 def _ratio(likelihood: Likelihood, minimum: Minimum, inflation: float) -> float:
@@ -161,7 +185,7 @@ def _lowest(problem: ModelProblem) -> tuple[Minimum, float]:
     for values in itertools.chain(_values_of_lines(problem), [vector.values]):
         given.append(values)
         found.append(minimise(likelihood, vector.to_coordinates(values)))
-        if _ratio(likelihood, found[-1], problem.noise.inflation) < _GOOD:
+        if _explained(problem, found[-1]) < _GOOD:
             return found[-1], np.inf
     nearest = min(found, key=lambda one: one.cost)
     if not problem.noise.is_assumed and _is_explained(problem, nearest):
@@ -169,7 +193,7 @@ def _lowest(problem: ModelProblem) -> tuple[Minimum, float]:
     trials = ranked_trials(likelihood, given)
     for x in itertools.islice(refined(likelihood, trials), _FOLLOWED):
         found.append(minimise(likelihood, x))
-        if _ratio(likelihood, found[-1], problem.noise.inflation) < _GOOD and not problem.noise.is_assumed:
+        if _explained(problem, found[-1]) < _GOOD and not problem.noise.is_assumed:
             break
     best = min(found, key=lambda one: one.cost)
     apart = [one.cost - best.cost for one in found if abs(one.x - best.x).max(initial=0) > 0.1 and one.cost > best.cost]
@@ -215,7 +239,9 @@ def _with_noise_of_model(problem: ModelProblem, minimum: Minimum) -> ModelProble
     if problem.noise.is_assumed:
         return None if abs(ratio - 1) < 1e-3 else replace(problem, variance=problem.variance * ratio**2)
     noise = problem.noise.model
-    if noise is None or noise.source != "residual" or ratio > _GOOD or noise.coherence_factor.any():
+    # About fitted FRFs there is the noise of the substructures, too.
+    is_apart = problem.shared is None and noise is not None and noise.source == "residual" and ratio <= _GOOD
+    if noise is None or not is_apart or noise.coherence_factor.any():
         return None
     predicted = problem.prediction.frfs(problem.vector, problem.vector.to_values(minimum.x))
     parts = [noise.relative**2 * abs(h) ** 2 + noise.floor**2 for h in (predicted, problem.smooth)]
@@ -312,12 +338,19 @@ def _residual(problem: ModelProblem, likelihood: Likelihood, minimum: Minimum) -
     """Return the residual over the noise, and the FRFs fitted."""
     vector = likelihood.vector
     predicted = problem.prediction.frfs(vector, vector.to_values(minimum.x))
+    if likelihood.whitening is not None:
+        # Noise of substructures is shared by the FRFs of a line: their combinations are independent.
+        size = np.where(likelihood.used, np.sqrt(problem.noise.inflation / 2), np.nan)
+        return likelihood.weighted(likelihood.difference(predicted)) * size, predicted
     return (likelihood.measured - predicted) / _tested(problem, likelihood), predicted
 
 
 def _tested(problem: ModelProblem, likelihood: Likelihood) -> FloatArray:
     """Return the standard deviation of the noise that the residual is compared with; NaN where nothing is measured."""
     tested = problem.variance if problem.tested is None else problem.tested
+    if problem.shared is not None:
+        # Its lines are taken to be correlated as those of the FRFs of the assembly.
+        tested = tested + (abs(problem.shared) ** 2).sum(axis=-1) / problem.noise.inflation
     return np.sqrt(np.where(likelihood.used, tested, np.nan))
 
 

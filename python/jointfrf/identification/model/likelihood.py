@@ -60,8 +60,12 @@ class WeightedResiduals(ABC):
         """Return the difference between measured and predicted FRFs."""
 
     @abstractmethod
-    def scale(self, y: ComplexArray) -> ComplexArray | FloatArray:
-        """Return minus the derivative of the weighted difference by the predicted FRFs."""
+    def weigh_slopes(self, y: ComplexArray, slopes: ComplexArray) -> ComplexArray:
+        """Return minus derivatives of the weighted difference by those of the predicted FRFs, which may be changed."""
+
+    def weighted(self, frfs: ComplexArray) -> ComplexArray:
+        """Return differences of FRFs, frequency first of the last three axes, by their standard deviation."""
+        return frfs * self.weight
 
     def cost(self, x: FloatArray) -> float:
         """Return the sum of the squares; inf where a line is singular, or errors of a model make its mass negative."""
@@ -69,15 +73,15 @@ class WeightedResiduals(ABC):
             y = self.prediction.frfs(self.vector, self.vector.to_values(x))
         except np.linalg.LinAlgError:
             return np.inf
-        squares = _squares(self.difference(y) * self.weight) + float((self.vector.pulls(x) ** 2).sum())
+        squares = _squares(self.weighted(self.difference(y))) + float((self.vector.pulls(x) ** 2).sum())
         return squares if np.isfinite(squares) else np.inf
 
     def linearised(self, x: FloatArray) -> Linearised:
         """Return the squares with information and gradient."""
         vector = self.vector
         y, slopes = self.prediction.linearised(vector, vector.to_values(x))
-        residual = np.ascontiguousarray((self.difference(y) * self.weight).ravel())
-        slopes *= self.scale(y)
+        residual = np.ascontiguousarray(self.weighted(self.difference(y)).ravel())
+        slopes = np.ascontiguousarray(self.weigh_slopes(y, slopes))
         pulls, of_pulls, by_x = vector.pulls(x), vector.pull_slopes(x), vector.slope(x)
         real = slopes.reshape(len(slopes), -1).view(np.float64)
         information = (real @ real.T) * np.outer(by_x, by_x) + np.diag(of_pulls**2)
@@ -86,8 +90,18 @@ class WeightedResiduals(ABC):
         return Linearised(cost if np.isfinite(cost) else np.inf, information, gradient)
 
 
+@dataclass(frozen=True)
 class Likelihood(WeightedResiduals):
-    """-2 log likelihood of measured FRFs with circular noise, and of priors, but for a constant."""
+    """-2 log likelihood of measured FRFs with circular noise, and of priors, but for a constant.
+
+    Attributes
+    ----------
+    whitening : ndarray, shape (n_freq, n_o n_i, n_o n_i), optional
+        Lower triangles that make the FRFs of a line independent and of unit variance, where noise is not independent
+        between them; by default `weight` does.
+    """
+
+    whitening: ComplexArray | None = None
 
     @classmethod
     def of_variance(
@@ -97,19 +111,57 @@ class Likelihood(WeightedResiduals):
         measured: ComplexArray,
         variance: FloatArray,
         inflation: float,
+        shared: ComplexArray | None = None,
     ) -> Likelihood:
-        """Return the likelihood for noise of this variance E|e|^2, infinite where nothing is measured."""
+        """Return the likelihood for noise of this variance E|e|^2, infinite where nothing is measured.
+
+        `shared`, shape (n_freq, n_o, n_i, n_sources), is what each independent error, of E|e|^2 = 1, adds to the FRFs:
+        the covariance of the noise of a line is diag(inflation variance) + shared shared^H.
+        """
         usable = np.isfinite(variance) & (variance > 0)
         inverse = np.sqrt(2 / (inflation * np.where(usable, variance, 1)))
-        return cls(prediction, vector, np.where(usable, measured, 0), np.where(usable, inverse, 0))
+        weight = np.where(usable, inverse, 0)
+        whitening: ComplexArray | None = None
+        if shared is not None:
+            # In units of the noise of each FRF by itself, whose weight is that of its real part.
+            scaled = (shared * weight[..., None] / np.sqrt(2)).reshape(len(weight), -1, shared.shape[-1])
+            covariance = scaled @ scaled.conj().swapaxes(1, 2)
+            covariance[:, range(scaled.shape[1]), range(scaled.shape[1])] += 1
+            lower = np.linalg.cholesky(covariance)
+            whitening = np.linalg.inv(lower) * weight.reshape(len(weight), 1, -1)
+        return cls(prediction, vector, np.where(usable, measured, 0), weight, whitening)
 
     def difference(self, y: ComplexArray) -> ComplexArray:
         """Return measured minus predicted FRFs, m/N."""
         return self.measured - y
 
-    def scale(self, y: ComplexArray) -> FloatArray:
-        """Return the weight."""
-        return self.weight
+    def weighted(self, frfs: ComplexArray) -> ComplexArray:
+        """Return differences of FRFs over their noise."""
+        if self.whitening is None:
+            return frfs * self.weight
+        flat = frfs.reshape(*frfs.shape[:-2], -1, 1)
+        return np.asarray((self.whitening @ flat).reshape(frfs.shape))
+
+    def carried_back(self, weighted: ComplexArray) -> ComplexArray:
+        """Return the adjoint of `weighted`."""
+        if self.whitening is None:
+            return weighted * self.weight
+        flat = weighted.reshape(*weighted.shape[:-2], -1, 1)
+        return np.asarray((self.whitening.conj().swapaxes(1, 2) @ flat).reshape(weighted.shape))
+
+    @property
+    def precision(self) -> FloatArray:
+        """Squares that a unit of each FRF by itself leaves, shape (n_freq, n_o, n_i)."""
+        if self.whitening is None:
+            return np.asarray(self.weight**2)
+        return np.asarray((abs(self.whitening) ** 2).sum(axis=1).reshape(self.weight.shape))
+
+    def weigh_slopes(self, y: ComplexArray, slopes: ComplexArray) -> ComplexArray:
+        """Return derivatives of the FRFs over their noise."""
+        if self.whitening is not None:
+            return self.weighted(slopes)
+        slopes *= self.weight
+        return slopes
 
 
 class LogLikelihood(WeightedResiduals):
@@ -120,9 +172,10 @@ class LogLikelihood(WeightedResiduals):
         known = (self.weight > 0) & (self.measured != 0) & (y != 0)
         return np.log(np.where(known, self.measured, 1) / np.where(known, y, 1))
 
-    def scale(self, y: ComplexArray) -> ComplexArray:
-        """Return the weight over the predicted FRFs."""
-        return np.asarray(self.weight / np.where(y == 0, 1, y))
+    def weigh_slopes(self, y: ComplexArray, slopes: ComplexArray) -> ComplexArray:
+        """Return derivatives of the logarithms times their weight."""
+        slopes *= self.weight / np.where(y == 0, 1, y)
+        return slopes
 
 
 def _squares(residual: ComplexArray) -> float:

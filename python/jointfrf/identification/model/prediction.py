@@ -180,6 +180,39 @@ class Prediction:
             slopes[i, :, :, column] = (coupled.y * gains)[:, :, column] / values[i]
         return coupled.y * gains, slopes if len(slopes) == vector.free.size else slopes[vector.free]
 
+    @property
+    def has_noisy_parts(self) -> bool:
+        """Whether a substructure is given by FRFs that are not exact."""
+        return any(side.noise is not None for side in self.sides)
+
+    def part_noise(self, vector: ParameterVector, values: FloatArray) -> ComplexArray | None:
+        """Return what noise of FRFs of the substructures does to those of the assembly; None where they are exact.
+
+        Returns
+        -------
+        ndarray, shape (n_freq, n_o, n_i, n_sources)
+            By each of the independent errors, of its standard deviation; to first order, m/N.
+        """
+        link, states = self._parts(vector, values)
+        opened, gains, found, first = self._open(link, states), self._gains(vector, values), [], 0
+        w = connection_forces(opened.between, link, self.freq_hz, "nan")
+        for side in self.sides:
+            own = slice(first, first + len(side.dofs))
+            first = own.stop
+            if side.noise is None:
+                continue
+            out, into = self._paths(opened, link, w, own)
+            found.append(_of_entries(out, into, np.sqrt(side.noise), both=side.is_symmetrised) * gains[..., None])
+        return np.concatenate(found, axis=-1) if found else None
+
+    def _paths(self, opened: _Open, link: Connection, w: ComplexArray, own: slice) -> tuple[ComplexArray, ComplexArray]:
+        """Return out, into of dY = out dH into for the FRFs H between some DOFs, all of one substructure."""
+        unit, e = np.eye(opened.h.shape[1])[own], link.pattern[own]
+        return (
+            unit[:, self.responses].T - (opened.to_out @ w) @ e.T,
+            unit[:, self.forces] - e @ (w @ opened.to_in),
+        )
+
     def refine(self, vector: ParameterVector, values: FloatArray) -> bool:
         """Return whether a basis had to be extended to be good for these values."""
         done = [side.refine(self._of_side(vector, values, name)) for side, name in zip(self.sides, "AB", strict=True)]
@@ -272,10 +305,7 @@ class Prediction:
                 continue
             names = [str(vector.all[i].place[0]) for i in places]
             of_side = side.slopes(self._of_side(vector, values, name), names, state)
-            # dY = out dH into
-            unit, e = np.eye(opened.h.shape[1])[own], link.pattern[own]
-            out = unit[:, self.responses].T - (opened.to_out @ coupled.w) @ e.T
-            into = unit[:, self.forces] - e @ (coupled.w @ opened.to_in)
+            out, into = self._paths(opened, link, coupled.w, own)
             left = out @ state.x
             right = state.x.swapaxes(1, 2) @ into
             assert state.matrices is not None
@@ -294,6 +324,18 @@ class Prediction:
 
 def _error_of(name: str) -> ParameterOrigin:
     return "error of A" if name == "A" else "error of B"
+
+
+def _of_entries(out: ComplexArray, into: ComplexArray, std: FloatArray, *, both: bool) -> ComplexArray:
+    """Return out e into for an error in each entry of a matrix, or in each pair of entries that are one measurement."""
+    m = std.shape[1]
+    found = (out[:, :, None, :, None] * into.swapaxes(1, 2)[:, None, :, None, :]) * std[:, None, None]
+    if both:
+        rows, columns = np.triu_indices(m)
+        apart = rows != columns
+        found[..., rows[apart], columns[apart]] += found[..., columns[apart], rows[apart]]
+        return np.ascontiguousarray(found[..., rows, columns])
+    return np.asarray(found.reshape(*found.shape[:3], m * m))
 
 
 def _together(states: tuple[SubstructureState, ...]) -> ComplexArray:

@@ -132,10 +132,15 @@ class ReducedSubstructure:
         self._last: tuple[tuple[float, ...], SubstructureState] | None = None
         self._polynomial: MatrixPolynomial | None = None
         self._narrowed = 1.0
+        self.noise: FloatArray | None = None
+        self.is_symmetrised = False
         if isinstance(part.source, FrfSource):
             check_same_lines(name, part.source, freq_hz)
             none = np.zeros(0)
             h = part.receptance(freq_hz, self.dofs)
+            if part.source.variance is not None:
+                at = [part.source.dofs.index(dof) for dof in self.dofs]
+                self.noise, self.is_symmetrised = part.source.variance[:, at][:, :, at], part.source.is_symmetrised
             self._last = ((), SubstructureState(h, np.zeros((*h.shape[:2], 0), complex), None, none, none[:, None]))
         else:
             self.basis = self._space(self._trials())

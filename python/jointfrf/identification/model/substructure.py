@@ -10,13 +10,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from jointfrf.frf.noise_model import estimate_noise
 from jointfrf.kernel.arguments import (
     ComplexArray,
     FloatArray,
     as_frequency,
     as_limits,
     as_names,
+    as_not_negative,
     as_number,
+    as_real,
     as_square,
     check_finite_lines,
     one_line,
@@ -75,13 +78,15 @@ _NEVER_EXACT = {"youngs_modulus": 0.03, "density": 0.01}
 _MODEL_ERROR = 0.005
 #: Above this a model does not describe its part.
 _LARGEST_ERROR = 0.1
+#: Relative noise below this is rounding.
+_LEAST_LEVEL = 1e-7
 #: What a model's own matrices may be scaled by, and its loss factor.
 SCALES = ("youngs_modulus", "density", "loss_factor")
 
 
 @dataclass(frozen=True)
 class FrfSource:
-    """FRFs of a substructure between named DOFs, taken as exact.
+    """FRFs of a substructure between named DOFs.
 
     Attributes
     ----------
@@ -89,11 +94,33 @@ class FrfSource:
     h : ndarray, shape (n_freq, m, m)
         m/N.
     dofs : tuple of str, length m
+    noise : float or ndarray, shape (n_freq, m, m), optional
+        Relative level, or E|e|^2 of each FRF, (m/N)^2; 0 where they are exact. By default it is found from the FRFs.
     """
 
     freq_hz: FloatArray
     h: ComplexArray
     dofs: tuple[str, ...]
+    noise: float | FloatArray | None = None
+
+    @cached_property
+    def variance(self) -> FloatArray | None:
+        """E|e|^2 times the lines that carry the noise of one independent line; None where the FRFs are exact."""
+        if isinstance(self.noise, np.ndarray):
+            return self.noise if self.noise.any() else None
+        if self.noise is not None:
+            return np.asarray(self.noise**2 * abs(self.h) ** 2, np.float64) if self.noise else None
+        found = estimate_noise(self.freq_hz, self.h)
+        # What a rational function leaves of FRFs that it does not meet is no noise.
+        is_seen = found.source == "reciprocity" or (found.source == "residual" and found.smooth.is_smooth)
+        if not is_seen or found.level < _LEAST_LEVEL:
+            return None
+        return np.asarray(found.inflation * found.variance)
+
+    @cached_property
+    def is_symmetrised(self) -> bool:
+        """Whether h_pq and h_qp are one measurement, with one noise."""
+        return bool(np.allclose(self.h, self.h.swapaxes(1, 2), rtol=1e-9, atol=0))
 
 
 @dataclass(frozen=True)
@@ -174,7 +201,15 @@ class Substructure:
                 raise ValueError("model_error: FRFs, and a model that is exact, have none")
 
     @classmethod
-    def of_frfs(cls, freq_hz: ArrayLike, h: ArrayLike, dofs: Sequence[str], joint: Sequence[str]) -> Substructure:
+    def of_frfs(
+        cls,
+        freq_hz: ArrayLike,
+        h: ArrayLike,
+        dofs: Sequence[str],
+        joint: Sequence[str],
+        *,
+        noise: float | ArrayLike | None = None,
+    ) -> Substructure:
         """Return a substructure given by FRFs.
 
         Parameters
@@ -182,16 +217,19 @@ class Substructure:
         freq_hz : array_like, shape (n_freq,)
             The lines of the measurement of the assembly, Hz.
         h : array_like, shape (n_freq, m, m)
-            Receptances between its joint DOFs and the points measured, m/N; taken as exact.
+            Receptances between its joint DOFs and the points measured, m/N.
         dofs : sequence of str, length m
             Their names.
         joint : sequence of str
             Which of them are the joint DOFs.
+        noise : float or array_like, shape of h, optional
+            Relative noise of these FRFs, or E|e|^2 of each, (m/N)^2; 0 where they are exact. By default it is found, as
+            `estimate_noise` does: computed FRFs show none. It is in the weights and intervals of `identify_model`.
 
         Raises
         ------
         ValueError
-            Wrong shapes or names, NaN or Inf.
+            Wrong shapes or names, NaN or Inf, noise that is negative.
         """
         lines = as_square("h", h)
         freq = as_frequency(freq_hz, len(lines))
@@ -199,7 +237,12 @@ class Substructure:
         names = as_names("dofs", dofs)
         if len(names) != lines.shape[1] or len(set(names)) != len(names):
             raise ValueError(f"dofs must name {lines.shape[1]} different DOFs, not {one_line(names)}")
-        return cls(FrfSource(freq, lines, names), as_names("joint", joint))
+        level: float | FloatArray | None = None
+        if noise is not None:
+            level = as_not_negative("noise", noise) if np.ndim(noise) == 0 else as_real("noise", noise, lines.shape)
+            if np.min(level) < 0:
+                raise ValueError("noise must hold variances E|e|^2 of each FRF, none below 0")
+        return cls(FrfSource(freq, lines, names, level), as_names("joint", joint))
 
     @cached_property
     def fitted(self) -> dict[str, Unknown]:

@@ -39,8 +39,12 @@ class ModelGradient:
         Lines that carry the noise of one independent line: 1 over it is the mean square of a real residual.
     slopes : ndarray, shape (p, n_freq, n_o, n_i)
         Derivatives of the weighted FRFs by the coordinates.
-    residual, predicted : ndarray, shape (n_freq, n_o, n_i)
+    residual : ndarray, shape (n_freq, n_o, n_i)
         Weighted.
+    of_errors : ndarray, shape (p, n_freq, n_o, n_i)
+        Change of the gradient (its real part) by a relative error of 1 of each FRF.
+    squares : ndarray, shape (n_freq, n_o, n_i)
+        Of the weighted residual that such an error leaves.
     priors : LineParts
         Of each prior.
     """
@@ -49,7 +53,8 @@ class ModelGradient:
     inflation: float
     slopes: ComplexArray
     residual: ComplexArray
-    predicted: ComplexArray
+    of_errors: ComplexArray
+    squares: FloatArray
     priors: LineParts
 
     @classmethod
@@ -62,13 +67,15 @@ class ModelGradient:
         if n < x.size:
             kept[:, n:] = -whole[:n, n:] @ inverse_information(whole[n:, n:])
         # A prediction may lend its derivatives.
-        slopes = slopes * likelihood.weight
         slopes = np.tensordot(kept * vector.slope(x), slopes, 1)
+        slopes = likelihood.weighted(slopes)
         by_prior = vector.pull_slopes(x)
         pulled = kept * by_prior
         priors = LineParts(-(pulled * vector.pulls(x)).T, pulled.T[:, :, None] * pulled.T[:, None])
-        residual = likelihood.difference(y) * likelihood.weight
-        return cls(kept @ whole @ kept.T, inflation, slopes, residual, y * likelihood.weight, priors)
+        residual = likelihood.weighted(likelihood.difference(y))
+        of_errors = likelihood.carried_back(slopes).conj() * y
+        squares = np.asarray(abs(y) ** 2 * likelihood.precision, np.float64)
+        return cls(kept @ whole @ kept.T, inflation, slopes, residual, of_errors, squares, priors)
 
     @cached_property
     def covariance(self) -> FloatArray:
@@ -118,11 +125,10 @@ class ModelGradient:
     def calibration(self, errors: CalibrationErrors, freq_hz: FloatArray) -> CalibrationSpread:
         """Return what errors of FRFs that are smooth over frequency add to the coordinates."""
         functions = errors.functions(freq_hz)
-        gradient = self.slopes.conj() * self.predicted
-        squares = np.asarray(abs(self.predicted) ** 2 * (self.inflation / 2), np.float64)
+        gradient, squares = self.of_errors, self.squares * (self.inflation / 2)
 
         def effects(kind: ErrorKind) -> Effects:
-            masks = errors.masks(kind, self.predicted.shape[1:])
+            masks = errors.masks(kind, squares.shape[1:])
             each = [
                 (gradient[:, :, mask].sum(axis=2).T, np.asarray(squares[:, mask].sum(axis=1), np.float64))
                 for mask in masks
