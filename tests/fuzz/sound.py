@@ -82,6 +82,9 @@ def _arrays() -> dict[str, dict[str, Any]]:
         "sweep": {"operation": jf.invert, "arrays": {"a": lines}, "out": np.empty((6, 4, 4), complex), "jobs": 1},
         "plan_sweep": {"operation": jf.invert, "arrays": {"a": lines}, "out": np.empty((6, 4, 4), complex), "jobs": 1},
         "semm": {"h_model": lines, "h_measured": lines[:, :2, :2], "outputs": [0, 1], "inputs": [0, 1], **out},
+        "semm_standard_error": {
+            "h_model": lines, "h_measured": lines[:, :2, :2], "outputs": [0, 1], "inputs": [0, 1], "noise": 0.01,
+        },
         "band_mean": {"freq_hz": c["freq"], "k_joint": k0, "bands": (1.0, 9.0), "dofs": ["x"]},
         "in_bands": {"freq_hz": c["freq"], "bands": [(1.0, 4.0), (5.0, 9.0)]},
         "as_bands": {"bands": {"x": (1.0, 9.0)}, "dofs": ["x"], "freq_hz": c["freq"]},

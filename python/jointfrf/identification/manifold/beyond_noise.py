@@ -302,5 +302,5 @@ def _unit_errors(
     for mask in errors.masks(kind, frfs.measured.shape[1:]):
         rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
         own = np.where(mask[np.ix_(rows, columns)], frfs.measured[:, rows[:, None], columns], 0)
-        change: ComplexArray = frfs.responses[:, rows] @ own @ frfs.forces[:, columns].T
-        yield frfs.entries_of(dofs, change)
+        change = frfs.responses[:, rows] @ own @ frfs.forces[:, columns].T
+        yield frfs.entries_of(dofs, np.asarray(change, np.complex128))

@@ -128,7 +128,7 @@ class Likelihood(WeightedResiduals):
             covariance = scaled @ scaled.conj().swapaxes(1, 2)
             covariance[:, range(scaled.shape[1]), range(scaled.shape[1])] += 1
             lower = np.linalg.cholesky(covariance)
-            whitening = np.linalg.inv(lower) * weight.reshape(len(weight), 1, -1)
+            whitening = np.asarray(np.linalg.inv(lower) * weight.reshape(len(weight), 1, -1), np.complex128)
         return cls(prediction, vector, np.where(usable, measured, 0), weight, whitening)
 
     def difference(self, y: ComplexArray) -> ComplexArray:
