@@ -525,7 +525,7 @@ def _deviations(
     design = differences.of_setups[:, linked]
     n_slow = variance.shape[-1]
     freq = np.linspace(*span, 201)
-    functions, found = _functions(span, n_slow, freq), []
+    functions, found = _functions(span, n_slow, freq.tobytes()), []
     for part, name in enumerate(("gain", "phase")):
         values, errors = (np.zeros((design.shape[1], freq.size)) for _ in range(2))
         for i in range(n_slow):
