@@ -114,20 +114,22 @@ def scatter_of(whole: FloatArray, pieces: Iterable[LineParts]) -> tuple[FloatArr
     value, vector = np.linalg.eigh(whole / np.outer(size, size))
     # Coordinates in which the whole information is 1; directions that the data do not see are left out.
     seen = value > _SEEN * value[-1]
-    root = vector[:, seen] / np.sqrt(value[seen]) / size[:, None]
+    root = vector[:, seen] / np.sqrt(value[seen])
+    to_those = root / size[:, None]
     variance, (p, k) = (root**2).sum(axis=1), root.shape
-    to_steps, to_variance = root @ root.T, (root[:, :, None] * root[:, None, :]).reshape(p, k * k).T
+    # Steps and variances in units of 1/size: of what the FRFs hardly see they are too large to be squared.
+    to_steps, to_variance = to_those @ root.T, (root[:, :, None] * root[:, None, :]).reshape(p, k * k).T
     taken, of_expected, of_steps = np.zeros((3, p))
     for piece in pieces:
         # Information in those coordinates: with the root on one side, and on both.
-        half = (piece.information.reshape(-1, p) @ root).reshape(-1, p, k)
-        within = half.swapaxes(1, 2).reshape(-1, p) @ root
+        half = (piece.information.reshape(-1, p) @ to_those).reshape(-1, p, k)
+        within = half.swapaxes(1, 2).reshape(-1, p) @ to_those
         taken += np.einsum("ar,rs,as->a", root, within.T @ within, root)
         of_expected += ((within.reshape(-1, k * k) @ to_variance) ** 2).sum(axis=0)
         of_steps += ((piece.gradient @ to_steps) ** 2).sum(axis=0)
     left = np.maximum(variance - taken, 0)
     with np.errstate(divide="ignore", invalid="ignore"):
-        scatter = of_steps * variance / left
+        scatter = of_steps * variance / left / size**2
         degrees = variance**2 / of_expected * left / variance
     return scatter, np.nan_to_num(degrees)
 

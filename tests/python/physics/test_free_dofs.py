@@ -1,5 +1,7 @@
 """Joints with a DOF that is free: found, said, with a bound above; and damping that is not decided."""
 
+import warnings
+
 import numpy as np
 import pytest
 
@@ -76,6 +78,23 @@ def test_a_hinge_has_both_bounds(damping):
         low, high = limits["c_theta"]
         assert low < 0.1 < high
         assert fit.value["c_theta"] == pytest.approx(0.1, rel=0.01)
+
+
+@pytest.mark.parametrize(("damping", "seeds"), [("none", [(0.01, 0), (0.01, 1), (0.05, 1)]), ("viscous", [(0.01, 1)])])
+def test_a_pin_without_damping_is_free(damping, seeds):
+    """Nothing but noise is in gamma_jk of theta: no joint in compliances is near it, one in k of theta is."""
+    exact, held = beams(jf.Joint([1e11, 0.0], [0.0, 0.0], DOFS)), []
+    for level, seed in seeds:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            fit = jf.identify(FREQ, jf.pollute(exact, level, seed=seed), DOFS, damping=damping)
+        limits = fit.confidence_interval()
+        assert limits["k_y"][0] < 1e11 < limits["k_y"][1]
+        # The beams have 1e3 N m/rad there.
+        assert 0 <= limits["k_theta"][0] < limits["k_theta"][1] < 1
+        held.append(limits["k_theta"][0] == 0)
+    assert any(held)
+    assert damping != "none" or limits["k_y"][0] > 1e8
 
 
 def test_damping_that_is_not_decided_has_the_interval_of_all_kinds():

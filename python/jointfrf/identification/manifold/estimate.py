@@ -189,10 +189,7 @@ def _with_free_dofs(found: GroupFit, problem: GroupProblem, terms: JointTerms, f
             return theta
         return None
 
-    try:
-        return fit_soft(found, problem, terms, soft, rest)
-    except np.linalg.LinAlgError:  # the data do not see these DOFs: their stiffness has run off to any size
-        return found
+    return fit_soft(found, problem, terms, soft, rest)
 
 
 def estimate_laws(

@@ -221,27 +221,29 @@ def _alone(problem: FitProblem, found: JointEstimate, known: Uncertainty, bendin
         used = problem.used[:, group.dofs]
         value[:, group.dofs] = np.where(used, lines.value, np.nan)
         spread[:, group.dofs] = np.einsum("ldd->ld", lines.covariance).real
-        fitted[:2, group.dofs] = _fitted_compliance(group, factor[group.which])
-        fitted[2, group.dofs] = _fitted_compliance(group, smooth[group.which])[1]
+        fitted[:, group.dofs] = _fitted_compliance(group, (factor[group.which], smooth[group.which]))
         size[group.dofs] = group.problem.data.own_size
     rotations = np.array([is_rotation(dof) for dof in problem.dofs])
     return joint_alone(2 * np.pi * freq, value, spread, (fitted[0], fitted[1], fitted[2]), size, bending, rotations)
 
 
-def _fitted_compliance(group: GroupFit, factor: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return C_dd at w = 0 of the joint fitted, and its standard error by variance factors, shape (n,) each."""
+def _fitted_compliance(group: GroupFit, factors: Sequence[FloatArray]) -> FloatArray:
+    """Return C_dd at w = 0 of the joint fitted, and its standard errors by variance factors below, shape (., n)."""
     joint, n = group.joint, len(group.dofs)
     if joint.in_compliance:
         stiff = joint.is_compliance
-        error = np.sqrt(np.maximum(np.diagonal(group.covariance) * factor, 0))
-        return group.x[stiff], error[stiff]
-    diagonal = np.flatnonzero(joint.rows == joint.columns)
-    entries = joint.compliance(group.x)
-    slope = joint.slope(group.x, entries)[:, diagonal].real.mean(axis=0)
-    variance = np.einsum("dp,pq,dq->d", slope, group.covariance * np.sqrt(np.outer(factor, factor)), slope)
-    # The real part of K* is that of all lines, the real part of C is not: damping takes from it.
-    stiffness = np.linalg.inv(joint.matrix(entries)).real.mean(axis=0)
-    return np.diagonal(np.linalg.inv(stiffness))[:n], np.sqrt(np.maximum(variance, 0))[:n]
+        value, own = group.x[stiff], np.diagonal(group.covariance)[stiff]
+        variances = [own * factor[stiff] for factor in factors]
+    else:
+        diagonal = np.flatnonzero(joint.rows == joint.columns)
+        entries = joint.compliance(group.x)
+        slope = joint.slope(group.x, entries)[:, diagonal].real.mean(axis=0)[:n]
+        # The real part of K* is that of all lines, the real part of C is not: damping takes from it.
+        stiffness = np.linalg.inv(joint.matrix(entries)).real.mean(axis=0)
+        value = np.diagonal(np.linalg.inv(stiffness))[:n]
+        roots = [slope * np.sqrt(factor) for factor in factors]
+        variances = [np.einsum("dp,pq,dq->d", root, group.covariance, root) for root in roots]
+    return np.array([value, *np.sqrt(np.maximum(variances, 0))])
 
 
 def fit_laws(problem: FitProblem, joint: LawJoint) -> ManifoldFit:
@@ -568,7 +570,7 @@ def _minimum(
     terms = terms.on_lines(lines)
     joint = coordinates_of(terms)
     if isinstance(group.joint, SoftJoint):
-        joint = SoftJoint(terms, group.joint.soft)
+        joint = SoftJoint(terms, group.joint.soft, group.joint.size)
     found = dict(zip(group.joint.names, group.joint.theta(group.x).tolist(), strict=True))
     theta = np.array([found.get(one.name, 0.0) for one in terms.parameters])
     return joint.minimise(group.forms.on_slice(lines), joint.coordinates(theta), least_gain=least_gain)

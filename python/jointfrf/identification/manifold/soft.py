@@ -22,9 +22,13 @@ _PASSED = 0.1
 _SOFT, _POORLY = 3.0, 0.1
 #: Share of the largest rate beyond which a DOF is all damping.
 _ALL_DAMPING = 0.5
-#: Where a fit begins, in units of the stiffness of the structure, and how near to free it is linearised, in standard
+#: Where fits begin, in units of the stiffness of the structure, and how near to free they are linearised, in standard
 #: errors: FRFs are linear in such a stiffness, and nearer to free their projection hardly converges.
-_START, _SIGHT = 1e-2, 10.0
+_STARTS, _SIGHT = (1e-2, 1e-4, 1e-6), 10.0
+#: Terms of K* of a soft DOF are sought up to this many times the stiffness of the structure: more is rigid to any data.
+_STIFFEST = 1e4
+#: Share of the lines that a fit must use to be taken where no other joint is near the data.
+_MOST_LINES = 0.75
 #: A fit in stiffnesses replaces one in compliances unless its squares are higher by more than this.
 _AS_GOOD = 1.0
 
@@ -37,6 +41,8 @@ class SoftJoint(DiagonalJoint):
     terms : JointTerms
     soft : ndarray of bool, shape (n,)
         DOFs fitted in stiffnesses.
+    size : ndarray, shape (n,)
+        Stiffness of the structure at each DOF: those of soft DOFs are sought within a multiple of it.
     by_rate : bool
         As in `DiagonalJoint`, of DOFs that are not soft.
     about : ndarray, shape (n_freq, n), optional
@@ -47,13 +53,21 @@ class SoftJoint(DiagonalJoint):
     in_compliance = False
 
     def __init__(
-        self, terms: JointTerms, soft: NDArray[np.bool_], about: ComplexArray | None = None, *, by_rate: bool = True
+        self,
+        terms: JointTerms,
+        soft: NDArray[np.bool_],
+        size: FloatArray,
+        about: ComplexArray | None = None,
+        *,
+        by_rate: bool = True,
     ) -> None:
         super().__init__(terms, by_rate=by_rate)
-        self.soft, self.about = soft, about
+        self.soft, self.size, self.about = soft, size, about
         self._of_soft = soft[self.dofs]
-        free = self._of_soft & (terms.kinds > 0)
-        self.lower, self.upper = np.where(free, -np.inf, self.lower), np.where(free, np.inf, self.upper)
+        stiffest = _STIFFEST * size[self.dofs]
+        stiffest[self.rates] *= self.rate_of_one
+        self.upper = np.where(self._of_soft, stiffest, self.upper)
+        self.lower = np.where(self._of_soft & (terms.kinds > 0), -stiffest, self.lower)
 
     @property
     def is_compliance(self) -> NDArray[np.bool_]:
@@ -85,7 +99,7 @@ class SoftJoint(DiagonalJoint):
     def on_lines(self, lines: slice | NDArray[np.intp]) -> SoftJoint:
         """Return the same on some of the lines."""
         about = None if self.about is None else self.about[lines]
-        return SoftJoint(self.terms.on_lines(lines), self.soft, about, by_rate=self.by_rate)
+        return SoftJoint(self.terms.on_lines(lines), self.soft, self.size, about, by_rate=self.by_rate)
 
     def theta(self, x: FloatArray) -> FloatArray:
         """Return the parameters."""
@@ -107,7 +121,7 @@ class SoftJoint(DiagonalJoint):
         self, forms: LineForms, start: FloatArray, held: int | None = None, least_gain: float = 1e-6
     ) -> FormMinimum:
         """Minimise quadratic forms about the compliance at which these were taken."""
-        bound = SoftJoint(self.terms, self.soft, forms.compliance, by_rate=self.by_rate)
+        bound = SoftJoint(self.terms, self.soft, self.size, forms.compliance, by_rate=self.by_rate)
         return JointCoordinates.minimise(bound, forms, start, held, least_gain)
 
     def lowest(
@@ -132,7 +146,7 @@ class SoftJoint(DiagonalJoint):
         """Return the coordinates of a profile: damping itself where its own is asked for."""
         if self._of_soft[i] or self.is_stiffness[i] == self.by_rate:
             return self
-        return SoftJoint(self.terms, self.soft, self.about, by_rate=not self.by_rate)
+        return SoftJoint(self.terms, self.soft, self.size, self.about, by_rate=not self.by_rate)
 
     def end(self, i: int, sign: int) -> float:
         """Return what a parameter runs to: a stiffness is zero where it cannot be distinguished from that."""
@@ -192,16 +206,22 @@ def fit_soft(
     rest : callable
         Returns first parameters of the other DOFs with the soft ones taken as free, shape (p,), or None.
     """
-    joint = SoftJoint(terms, soft)
+    size = 1 / np.maximum(found.problem.data.own_size, TINY)
+    joint = SoftJoint(terms, soft, size)
     theta = None if _is_explained(found) else rest(~soft)
     if theta is None:
         theta = np.nan_to_num(found.joint.theta(found.x), posinf=0.0, neginf=0.0)
     of_soft = soft[joint.dofs]
-    size = 1 / np.maximum(found.problem.data.own_size, TINY)
-    # Far softer than the structure, without damping, and with that of a DOF that was found to be all damping.
-    softest = np.where(of_soft, np.where(joint.is_stiffness, _START * size[joint.dofs], 0.0), theta)
-    damped = np.where(of_soft & ~joint.is_stiffness, np.nan_to_num(found.joint.theta(found.x)), softest)
-    starts = [joint.coordinates(one) for one in (softest, damped)]
+    starts = []
+    for share in _STARTS if found.unknown_cross else _STARTS[:1]:
+        # Far softer than the structure, without damping, and with that of a DOF that was found to be all damping.
+        softest = np.where(of_soft, np.where(joint.is_stiffness, share * size[joint.dofs], 0.0), theta)
+        damped = np.where(of_soft & ~joint.is_stiffness, np.nan_to_num(found.joint.theta(found.x)), softest)
+        starts += [joint.coordinates(one) for one in (softest, damped)]
     other = fit_dofs(problem._replace(joint=joint), starts, LITTLE_PATIENCE)
-    is_better = other.is_noise if found.unknown_cross else other.squares < found.squares + _AS_GOOD
+    if found.unknown_cross:
+        # No joint without cross terms was near the data: lines that a free DOF leaves out are fewer.
+        is_better = other.squares < found.noise_squares and bool(other.used.mean() > _MOST_LINES)
+    else:
+        is_better = other.squares < found.squares + _AS_GOOD
     return other if is_better else found
