@@ -342,6 +342,11 @@ class BrickBeamKeys(SubstructureKeys, MaterialKeys, tag="brick-beam"):
     height: Annotated[Positive, key("Height along y.", "m")]
     ends: Annotated[tuple[End, End], key("How the ends are held.")] = ("free", "free")
     preset: Annotated[Preset, PRESET]
+    divisions: Annotated[
+        tuple[int, int, int] | None,
+        key("Bricks along x, y and z; along z as many as there were without a hole.",
+            takes="list of 3 whole numbers, at least 1", absent="of about half the height"),
+    ] = None  # fmt: skip
     origin: Annotated[
         tuple[float, float, float],
         key("Middle of the lower edge of the first end; the beam lies above it.", "m"),
@@ -360,7 +365,7 @@ class BrickBeamKeys(SubstructureKeys, MaterialKeys, tag="brick-beam"):
         material = self.material
         return ModelStructure(self.build(lambda: brick_beam(
             self.length, self.width, self.height, material, ends=self.ends, hole=hole, observed=self.observed,
-            preset=self.preset, origin=self.origin,
+            preset=self.preset, divisions=self.divisions, origin=self.origin,
         )))  # fmt: skip
 
 

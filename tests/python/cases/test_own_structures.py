@@ -180,3 +180,14 @@ def test_dofs_without_mass_have_no_modes():
     np.testing.assert_allclose(abs(shapes[:, 0]), [0.5, 1.0], rtol=1e-6)
     with pytest.raises(ValueError, match="has no modes: a motion has neither stiffness nor mass"):
         jf.Model(np.diag([0.0, 1.0]), np.diag([0.0, 1.0]), ("1:x", "2:x")).modes()
+
+
+def test_bricks_of_a_beam_are_as_many_as_asked_for(tmp_path):
+    text = (ROOT / "cases" / "4.3.2-six-dof-decoupling" / "case.toml").read_text(encoding="utf-8")
+    asked = "\ndivisions = [8, {}, 57]\nlength = 0.3"
+    (tmp_path / "case.toml").write_text(text.replace("\nlength = 0.3", asked.format(4), 1), encoding="utf-8")
+    case = read_case(tmp_path)
+    assert [len(one.model.mesh.elements) for one in (case.a, case.b)] == [2048, 1024]  # by default 8, 2, 57
+    (tmp_path / "case.toml").write_text(text.replace("\nlength = 0.3", asked.format(0), 1), encoding="utf-8")
+    with pytest.raises(ValueError, match=r"substructure_a.*divisions along y"):
+        read_case(tmp_path)
