@@ -147,8 +147,10 @@ def run(args: argparse.Namespace) -> int:
             if getattr(args, name) is not None:
                 raise UsageError(f"--{name} is of FRFs at the joint points themselves: it does not go with --model")
         return run_model(args)
-    if args.each:
-        raise UsageError("--each is for tests with --model: name the file of the assembly")
+    for option in ("each", "find_wrong_channels"):
+        if getattr(args, option):
+            name = option.replace("_", "-")
+            raise UsageError(f"--{name} is for tests with --model: name the file of the assembly")
     out = Output(args)
     if args.save is None:
         warn_of_ignored(args, ("--save-lines",), "it is for --save")

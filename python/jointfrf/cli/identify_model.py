@@ -56,6 +56,11 @@ def add_model_arguments(parser: CommandParser) -> None:
         "with --model: every file is a test of its own (levels, assemblies); one table of all, and the name of each "
         "file in those of --save, --report, --output and in the folder of --out",
     )
+    parser.option(
+        "--find-wrong-channels",
+        "with --model: look for a channel of the opposite sign, or two exchanged ones, with which the models fit; a "
+        "warning names what was found",
+    )
 
 
 def run_model(args: argparse.Namespace) -> int:
@@ -146,7 +151,7 @@ def _one(args: argparse.Namespace, out: Output) -> tuple[Fit, dict[str, Any], li
     with waiting(f"fit of {file_names(args)}{getattr(args, 'turn', '')}"), warnings.catch_warnings():
         warnings.simplefilter("ignore", IdentificationWarning)  # they stand in the table
         warnings.simplefilter("ignore", ConvergenceWarning)
-        fit = measured.fit(noise=args.noise)
+        fit = measured.fit(noise=args.noise, find_wrong_channels=args.find_wrong_channels)
     source, written, text = file_names(args), list[Path](), ""
     if not args.each:
         out.say("", fit)

@@ -15,6 +15,7 @@ FitFindingKind = Literal[
     "averages",  # how a mean over bands is to be read
     "blind",  # places where a planned sensor or hit would see nothing
     "calibration",  # channels whose gain or phase is a little off
+    "channels",  # signs and exchanges of channels that were looked for
     "choice",  # damping terms that were chosen
     "convergence",
     "correlation",  # parameters, or lines, that are not independent
@@ -43,8 +44,8 @@ FitFindingKind = Literal[
 
 #: Kinds whose warnings say that the whole fit is in doubt, the worst first; then those of single numbers, likewise.
 _WORST: tuple[FitFindingKind, ...] = (
-    "convergence", "residual", "left out", "cross terms", "sign", "trend", "calibration", "model", "window", "prior",
-    "direction", "open", "sides", "poor",
+    "channels", "convergence", "residual", "left out", "cross terms", "sign", "trend", "calibration", "model", "window",
+    "prior", "direction", "open", "sides", "poor",
 )  # fmt: skip
 
 

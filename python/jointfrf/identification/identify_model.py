@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,12 +14,13 @@ from jointfrf.identification.describe import describe_model
 from jointfrf.identification.identify import identify
 from jointfrf.identification.manifold.coordinates import CrossTerms
 from jointfrf.identification.model.assembly import Assembly
+from jointfrf.identification.model.channel_map import ChannelChange, find_channel_change
 from jointfrf.identification.model.fit import fit_assembly
 from jointfrf.identification.model.prepare import Channels, prepare_model_fit
 from jointfrf.identification.model.substructure import Unknown
 from jointfrf.identification.noise import NoiseOptions
 from jointfrf.identification.result import Fit
-from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_names, check_type
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_lines, as_names, check_type
 from jointfrf.laws.law_joint import LawJoint
 from jointfrf.laws.springs import SpringLaw
 
@@ -39,6 +41,7 @@ def identify_model(
     coherence: ArrayLike | None = None,
     averages: float | None = None,
     setups: SetUps | None = None,
+    find_wrong_channels: bool = False,
 ) -> Fit:
     """Identify a joint from any measured FRFs of the assembly, given its substructures as models or FRFs.
 
@@ -66,6 +69,10 @@ def identify_model(
     setups : SetUps, optional
         Which FRF came from which set-up of the test, as `FrfSet.setups_between` returns it: what the FRFs of a set-up
         have in common, and what all have, is in the intervals, and set-ups that disagree are named in the findings.
+    find_wrong_channels : bool
+        Whether to look for one channel of the opposite sign, or two exchanged ones of the same quantity, with which the
+        models fit the FRFs far better. A warning names what was found and that the fit takes it so; where two changes
+        fit alike both are named and none is made.
 
     Returns
     -------
@@ -127,9 +134,26 @@ def identify_model(
     channels = Channels(*named, dict(response_gains or {}), dict(force_gains or {}))
     known = NoiseOptions(noise, coherence, averages, setups=setups)
     problem = prepare_model_fit(freq_hz, h, assembly, channels, known, fixed, _springs_at_joint)
+    search = find_channel_change(problem, channels) if find_wrong_channels else None
+    if search is not None and search.change is not None:
+        lines = search.change.of(as_lines("h", h))
+        known = _changed(known, search.change)
+        problem = prepare_model_fit(freq_hz, lines, assembly, channels, known, fixed, _springs_at_joint)
     fit = describe_model(fit_assembly(problem), channels)
+    if search is not None:
+        fit = fit.with_findings([*fit.findings, search.finding])
     fit.issue_warnings()
     return fit
+
+
+def _changed(known: NoiseOptions, change: ChannelChange) -> NoiseOptions:
+    """Return what is known of the noise and the set-up of each FRF with a change of the channels."""
+
+    def of(one: ArrayLike | None) -> ArrayLike | None:
+        return one if one is None or np.ndim(one) != 3 else change.of(np.asarray(one, float), signed=False)
+
+    setups = None if known.setups is None else change.of_setups(known.setups)
+    return replace(known, noise=of(known.noise), coherence=of(known.coherence), setups=setups)
 
 
 def _springs_at_joint(

@@ -234,3 +234,16 @@ def test_a_new_assembly_is_read_as_it_is(tmp_path):
     assert found["k_theta_z"]["value"] == pytest.approx(2e3, rel=0.05)
     assert run_command("new", "assembly", folder).returncode == 2
     assert json.loads(run_command("new", "assembly", "--schema").stdout)["$defs"]
+
+
+@pytest.mark.long
+def test_a_sensor_that_points_the_other_way_is_named(tmp_path):
+    file = tmp_path / "assembly.toml"
+    file.write_text((LAP / "assembly.toml").read_text().replace('"22:+y"', '"22:-y"'))
+    result = run(LEVELS[0], "--model", file, "--find-wrong-channels", "--save", tmp_path / "joint.json")
+    assert "the fit takes response B/25:y with the opposite sign" in " ".join(result.stdout.split())
+    assert json.loads((tmp_path / "joint.json").read_text())["residual_is_noise"]
+
+
+def test_looking_for_exchanged_channels_needs_models():
+    assert "--find-wrong-channels is for tests with --model" in run(*BARS, "--find-wrong-channels", expect=2).stderr

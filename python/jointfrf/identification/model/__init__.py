@@ -14,5 +14,6 @@ uncertainty    scatter of the gradient between lines, blocks and hits; channels 
 fit            the steps of a fit in their order; what the data do not determine
 next_channels  what to measure next
 prepare        arguments into a problem
+channel_map    signs and exchanges of channels that the FRFs show
 realisations   many sets of FRFs of one assembly
 """

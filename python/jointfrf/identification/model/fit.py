@@ -29,7 +29,7 @@ from jointfrf.identification.residual_test import ResidualTest, check_residual
 from jointfrf.identification.scatter import Spread
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
-__all__ = ["FoundModel", "ModelProblem", "OpenDirection", "fit_assembly", "open_directions"]
+__all__ = ["FoundModel", "ModelProblem", "OpenDirection", "fit_assembly", "lowest_minimum", "open_directions"]
 
 #: A start is good whose minimum leaves a residual below this many times the noise.
 _GOOD = 1.1
@@ -146,7 +146,7 @@ def fit_assembly(problem: ModelProblem) -> FoundModel:
     """Fit all free parameters by maximum likelihood."""
     with warnings.catch_warnings(), np.errstate(over="ignore", divide="ignore", invalid="ignore"):
         warnings.simplefilter("ignore", IllConditionedWarning)
-        minimum, other = _lowest(problem)
+        minimum, other = lowest_minimum(problem)
         if problem.prediction.has_noisy_parts:
             for _ in range(_TURNS):
                 problem = problem.near(minimum)
@@ -177,11 +177,13 @@ def _ratio(likelihood: Likelihood, minimum: Minimum, inflation: float) -> float:
     return float(np.sqrt(squares * inflation / max(2 * count - minimum.x.size, 1.0)))
 
 
-def _lowest(problem: ModelProblem) -> tuple[Minimum, float]:
-    """Return the lowest minimum of several starts, and by how much the next one is higher."""
+def lowest_minimum(problem: ModelProblem, known: Minimum | None = None) -> tuple[Minimum, float]:
+    """Return the lowest minimum of several starts, and by how much the next one is higher: one known, if it fits."""
     likelihood, vector = problem.likelihood, problem.vector
     given: list[FloatArray] = []
     found: list[Minimum] = []
+    if known is not None and _explained(problem, known) < _GOOD:
+        return known, np.inf
     for values in itertools.chain(_values_of_lines(problem), [vector.values]):
         given.append(values)
         found.append(minimise(likelihood, vector.to_coordinates(values)))

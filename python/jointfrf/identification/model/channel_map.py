@@ -1,0 +1,202 @@
+"""Channels that are not what they were named: signs and exchanges that the FRFs show beside models of the parts."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import Literal, NamedTuple, TypeVar
+
+import numpy as np
+
+from jointfrf.dofs import is_rotation
+from jointfrf.errors import IllConditionedWarning
+from jointfrf.frf.setups import SetUps
+from jointfrf.identification.findings import Finding, note, warn
+from jointfrf.identification.line_starts import from_lines
+from jointfrf.identification.minimise import Minimum, minimise
+from jointfrf.identification.model.fit import ModelProblem, lowest_minimum
+from jointfrf.identification.model.prepare import Channels
+from jointfrf.kernel.arguments import ComplexArray, FloatArray
+
+__all__ = ["ChannelChange", "ChannelSearch", "find_channel_change"]
+
+NumbersT = TypeVar("NumbersT", ComplexArray, FloatArray)
+#: A change is made when it lowers -2 log likelihood by this and 2 ln of the number tried: odds of 1 to e^10 for each of
+#: those that were not made.
+_CLEAR = 20.0
+#: It must remove this share of what the residual has above the noise: a change that only covers for models that are off
+#: removes less.
+_EXPLAINED = 0.8
+#: Linearisations with each change, and how many of the best are followed to their minimum.
+_GLANCE, _FOLLOWED = 6, 6
+
+
+@dataclass(frozen=True)
+class ChannelChange:
+    """One change of the channels.
+
+    Attributes
+    ----------
+    kind : {"sign", "exchange"}
+    side : {"response", "force"}
+    channels : tuple of int
+        One channel, or two that measure the same quantity.
+    names : tuple of str
+    """
+
+    kind: Literal["sign", "exchange"]
+    side: Literal["response", "force"]
+    channels: tuple[int, ...]
+    names: tuple[str, ...]
+
+    def of(self, frfs: NumbersT, *, signed: bool = True) -> NumbersT:
+        """Return FRFs with the change, shape (n_freq, n_o, n_i); their variances where `signed` is false."""
+        found = frfs.copy()
+        across = found if self.side == "response" else found.swapaxes(1, 2)
+        if self.kind == "exchange":
+            across[:, list(self.channels)] = across[:, list(self.channels[::-1])]
+        elif signed:
+            across[:, self.channels[0]] *= -1
+        return found
+
+    def of_setups(self, setups: SetUps) -> SetUps:
+        """Return set-ups with the change."""
+        of, repeats, repeated = setups.of.copy(), setups.repeats.copy(), setups.repeated
+        across, own = (of, repeats[:, 0]) if self.side == "response" else (of.T, repeats[:, 1])
+        if self.kind == "exchange":
+            i, j = self.channels
+            across[[i, j]] = across[[j, i]]
+            own[:] = np.where(own == i, j, np.where(own == j, i, own))
+        elif repeated is not None:
+            repeated = repeated * np.where(own == self.channels[0], -1.0, 1.0)
+        return replace(setups, of=of, repeats=repeats, repeated=repeated)
+
+    def __str__(self) -> str:
+        if self.kind == "exchange":
+            return f"{self.side}s {self.names[0]} and {self.names[1]} exchanged"
+        return f"{self.side} {self.names[0]} with the opposite sign"
+
+
+class ChannelSearch(NamedTuple):
+    """Result of a search for a change of the channels.
+
+    Attributes
+    ----------
+    change : ChannelChange or None
+        The one that the FRFs show, alone.
+    finding : Finding
+        What was found, in a sentence.
+    """
+
+    change: ChannelChange | None
+    finding: Finding
+
+
+def _changes(channels: Channels) -> Iterator[ChannelChange]:
+    """Yield the sign of each channel, and exchanges of two that measure the same quantity."""
+    sides: tuple[tuple[Literal["response", "force"], tuple[str, ...]], ...] = (
+        ("response", channels.responses), ("force", channels.forces),
+    )  # fmt: skip
+    for side, names in sides:
+        # One response by one force: the sign of one is that of the other.
+        if side == "response" or max(len(channels.responses), len(channels.forces)) > 1:
+            for i, name in enumerate(names):
+                yield ChannelChange("sign", side, (i,), (name,))
+        turns = [is_rotation(name.rpartition(":")[2]) for name in names]
+        for i, j in combinations(range(len(names)), 2):
+            if turns[i] == turns[j]:
+                yield ChannelChange("exchange", side, (i, j), (names[i], names[j]))
+
+
+def find_channel_change(problem: ModelProblem, channels: Channels) -> ChannelSearch:
+    """Look for one sign or one exchange of channels with which the models and a joint fit the FRFs far better.
+
+    Parameters
+    ----------
+    problem : ModelProblem
+        With the channels as they were named.
+    channels : Channels
+
+    Notes
+    -----
+    The joint and all unknowns are fitted anew with each change, in a few steps, and with the best to the end.
+    -2 log likelihood is taken in units of the residual that the best leaves, so that models that are off do not count
+    as evidence. Two changes that fit alike, as those of a symmetric structure do, are both named, and none is made.
+    """
+    changes = tuple(_changes(channels))
+    with warnings.catch_warnings(), np.errstate(all="ignore"):
+        warnings.simplefilter("ignore", IllConditionedWarning)
+        given = _least(problem, [problem.vector.to_coordinates(problem.vector.values)])
+        found = [_least(_changed(problem, one), [given.x], _GLANCE) for one in changes]
+        best = sorted(range(len(changes)), key=lambda i: found[i].cost)[:_FOLLOWED]
+        for i in best:
+            found[i] = minimise(_changed(problem, changes[i]).likelihood, found[i].x)
+        first = min(best, key=lambda i: found[i].cost)
+        # The starts of a whole fit, where these have not led to the noise.
+        nearest = found[first] = min(
+            found[first], lowest_minimum(_changed(problem, changes[first]), found[first])[0], key=lambda one: one.cost
+        )
+        # A start from which the channels as they are named do not get to their minimum is no evidence against them.
+        given = min(given, minimise(problem.likelihood, nearest.x), key=lambda one: one.cost)
+    return _judged(problem, changes, given.cost, np.array([one.cost for one in found]))
+
+
+def _judged(
+    problem: ModelProblem, changes: Sequence[ChannelChange], given: float, squares: FloatArray
+) -> ChannelSearch:
+    """Return the change that least squares with the channels as given and with each change show, and a sentence."""
+    count = max(2.0 * np.count_nonzero(problem.likelihood.used) / problem.noise.inflation - problem.vector.free.size, 1)
+    noise = 0.0 if problem.noise.is_assumed else 1.0
+    best = float(squares.min())
+    least = min(best, given)
+    margin = (_CLEAR + 2 * np.log(len(changes))) * max(least / count, noise)
+    alike = [changes[i] for i in np.argsort(squares) if squares[i] < least + margin]
+    tried = f"{len(changes)} signs and exchanges of channels were tried"
+    if given < best + margin or given - best < _EXPLAINED * (given - noise * count):
+        if given < least + margin and alike:
+            text = f"the FRFs fit as well with {_either(alike)} and do not show which holds; {tried}"
+            return ChannelSearch(None, note("channels", text, _named(alike)))
+        return ChannelSearch(None, note("channels", f"{tried}, and none fits as well as the names that were given"))
+    ratios = [float(np.sqrt(one / count)) for one in (given, best)]
+    falls = f"the residual falls from {ratios[0]:.3g} to {ratios[1]:.3g} times the noise; {tried}"
+    if len(alike) > 1:
+        text = f"with {_either(alike)} {falls}; the FRFs do not show which of these holds, and none was made"
+        return ChannelSearch(None, warn("channels", text, _named(alike)))
+    text = f"the fit takes {alike[0]}: {falls}; correct names or signs of the channels"
+    return ChannelSearch(alike[0], warn("channels", text, alike[0].names))
+
+
+def _either(changes: Sequence[ChannelChange]) -> str:
+    return " or ".join(map(str, changes))
+
+
+def _named(changes: Sequence[ChannelChange]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(name for one in changes for name in one.names))
+
+
+def _changed(problem: ModelProblem, change: ChannelChange) -> ModelProblem:
+    """Return the problem with the change; variances of an exchanged channel go with it."""
+    return replace(
+        problem,
+        measured=change.of(problem.measured),
+        smooth=change.of(problem.smooth),
+        variance=change.of(problem.variance, signed=False),
+    )
+
+
+def _least(problem: ModelProblem, starts: Sequence[FloatArray], steps: int = 40) -> Minimum:
+    """Return the lowest minimum from what single lines give, where all FRFs were measured, and from other starts."""
+    vector, prediction = problem.vector, problem.prediction
+    found = list(starts)
+    values = None
+    if np.isfinite(problem.measured).all():
+        lines = prediction.joint_compliance(vector, problem.smooth, problem.variance)
+        values = None if lines is None else from_lines(prediction.whole.joint, prediction.omega, lines)
+    if values is not None:
+        own = vector.places_of("joint")
+        whole = vector.values.copy()
+        whole[own] = np.where([vector.all[i].is_free for i in own], values, whole[own])
+        found.append(vector.to_coordinates(whole))
+    return min((minimise(problem.likelihood, x, steps=steps) for x in found), key=lambda one: one.cost)
