@@ -18,7 +18,7 @@ _ROOMS = {
     "joint": "Joints",
     "models": "Models",
     "solids": "Solid bodies",
-    "levels": "Levels",
+    "amplitude": "Joints over amplitude",
     "pooling": "Several assemblies",
     "planning": "Planning",
     "studies": "Studies",

@@ -2,6 +2,10 @@
 from jointfrf import io as io
 from jointfrf import report as report
 from jointfrf import solids as solids
+from jointfrf.amplitude.amplitude_laws import AmplitudeLawFit, AmplitudeLawFits, fit_amplitude_laws
+from jointfrf.amplitude.backbone import Backbone, backbone_levels
+from jointfrf.amplitude.levels import JointLevel, JointLevels, levels
+from jointfrf.amplitude.lines import Drive
 from jointfrf.assembly_file.measured import MeasuredAssembly, measured_assembly
 from jointfrf.assembly_file.read import AssemblyPart, read_part
 from jointfrf.channels.check.check import check_frfs
@@ -72,7 +76,6 @@ from jointfrf.laws.law import JointLaw, LawField
 from jointfrf.laws.law_joint import LawJoint
 from jointfrf.laws.springs import SpringLaw
 from jointfrf.laws.viscoelastic import FractionalZener, PowerLaw, StandardLinearSolid
-from jointfrf.levels.amplitude_laws import AmplitudeLawFit, AmplitudeLawFits, fit_amplitude_laws
 from jointfrf.models.beam import beam
 from jointfrf.models.matrices import from_triangle
 from jointfrf.models.model import Model, assemble, chain
@@ -87,6 +90,7 @@ from jointfrf.pooling.pool import PooledFits, pool
 from jointfrf.pooling.transfer import Transfer, transfer
 from jointfrf.report.fit import plot
 from jointfrf.report.fit_page import write_report
+from jointfrf.report.levels_page import write_levels
 from jointfrf.report.plan_page import write_plan
 from jointfrf.report.pool_page import write_pool
 from jointfrf.solids.bolted_lap import (
@@ -130,6 +134,7 @@ __all__ = [
     "AmplitudeLawFits",
     "Assembly",
     "AssemblyPart",
+    "Backbone",
     "BandStatistics",
     "BodyLink",
     "Bolt",
@@ -143,6 +148,7 @@ __all__ = [
     "CopyWarning",
     "Derived",
     "DifferenceError",
+    "Drive",
     "DrivingPointCheck",
     "ElasticCentre",
     "FileContentError",
@@ -166,6 +172,8 @@ __all__ = [
     "JointChannels",
     "JointFrfPlan",
     "JointLaw",
+    "JointLevel",
+    "JointLevels",
     "LapDivisions",
     "LawField",
     "LawJoint",
@@ -207,6 +215,7 @@ __all__ = [
     "assemble",
     "assemble_bricks",
     "assemblies_needed",
+    "backbone_levels",
     "band_mean",
     "beam",
     "bolted_lap",
@@ -250,6 +259,7 @@ __all__ = [
     "ismm",
     "joint_channels",
     "joint_compliance",
+    "levels",
     "load",
     "measured_assembly",
     "merge_studies",
@@ -294,6 +304,7 @@ __all__ = [
     "virtual_point",
     "virtual_points",
     "write_joint",
+    "write_levels",
     "write_plan",
     "write_pool",
     "write_report",

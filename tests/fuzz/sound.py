@@ -226,6 +226,18 @@ def _identification(arrays: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
             "stiffness_error": [1e3] * 3, "loss_factor_error": [1e-3] * 3, "laws": ["constant", "power"],
             "probability": 0.9,
         },
+        "Drive": {"held": "response", "level": 1e-3, "channel": "A/1:y", "quantity": "velocity"},
+        "levels": {"fits": [found, again], "drives": [jf.Drive("joint", 1e-3, "x")] * 2, "laws": ["constant"],
+                   "labels": ["a", "b"], "probability": 0.9},
+        "Backbone": {
+            "channel": "A/1:x", "freq_hz": [2.0, 1.9], "amplitude": [1e-3, 2e-3], "damping": [0.01, 0.02],
+            "freq_error": 0.002, "damping_error": 0.1, "labels": ["a", "b"],
+        },
+        "backbone_levels": {
+            "whole": assembly, "backbone": jf.Backbone("A/1:x", [2.0, 1.9], [1e-3, 2e-3], damping=[0.01, 0.02]),
+            "dof": "x", "laws": ["constant"], "probability": 0.9,
+        },
+        "write_levels": {"found": jf.levels([found], [jf.Drive("joint", 1e-3, "x")]), "path": "levels.html"},
         "pool": {"fits": [found, again], "common": 0.01, "parameters": ["k_x"], "probability": 0.9},
         "transfer": {"fits": [found, again], "parameters": ["k_x"], "spread": 0.05},
         "write_pool": {"pooled": jf.pool([found, again]), "path": "pool.html"},

@@ -25,6 +25,7 @@ COMMANDS = {
     "decouple": "a joint from FRFs of the assembly away from it and of both substructures",
     "frf": "receptances of a model",
     "plan": "which sensors and hits show a joint best, before anything is measured",
+    "levels": "one joint at several levels: stiffness and loss factor over amplitude",
     "pool": "fits of one joint in several assemblies: mean, spread, the next assembly",
     "run": "run cases: tables, figures and a report each",
     "cases": "list the cases that come with jointfrf",

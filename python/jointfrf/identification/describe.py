@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -22,6 +23,7 @@ from jointfrf.identification.manifold.fit import DofDamping, ManifoldFit
 from jointfrf.identification.manifold.prepare import FitProblem
 from jointfrf.identification.manifold.transforms import Transforms
 from jointfrf.identification.model.fit import FoundModel, OpenDirection
+from jointfrf.identification.model.joint_motion import FoundMotion
 from jointfrf.identification.model.next_channels import NextChannels
 from jointfrf.identification.model.prepare import Channels
 from jointfrf.identification.parameters import joint_vector
@@ -542,7 +544,7 @@ def describe_model(found: FoundModel, channels: Channels) -> Fit:
         intervals=found.intervals,
         data=ModelData(
             whole, problem.measured, problem.variance, found.predicted, found.residual, found.directions,
-            NextChannels(found),
+            NextChannels(found), FoundMotion(found, partial(describe_model, channels=channels)),
         ),
     )  # fmt: skip
     is_log = {one.name: one.is_log for one in vector.fitted}

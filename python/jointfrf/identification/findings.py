@@ -13,6 +13,7 @@ __all__ = ["Finding", "FitFindingKind", "WithFindings", "as_warning", "note", "w
 #: What a finding is about.
 FitFindingKind = Literal[
     "averages",  # how a mean over bands is to be read
+    "bent",  # FRFs of a joint whose stiffness changes with their amplitude
     "blind",  # places where a planned sensor or hit would see nothing
     "calibration",  # channels whose gain or phase is a little off
     "channels",  # signs and exchanges of channels that were looked for
@@ -44,8 +45,8 @@ FitFindingKind = Literal[
 
 #: Kinds whose warnings say that the whole fit is in doubt, the worst first; then those of single numbers, likewise.
 _WORST: tuple[FitFindingKind, ...] = (
-    "channels", "convergence", "residual", "left out", "cross terms", "sign", "trend", "calibration", "model", "window",
-    "prior", "direction", "open", "sides", "poor",
+    "bent", "channels", "convergence", "residual", "left out", "cross terms", "sign", "trend", "calibration", "model",
+    "window", "prior", "direction", "open", "sides", "poor",
 )  # fmt: skip
 
 

@@ -12,6 +12,7 @@ from jointfrf.channels.point_lines import Interface
 from jointfrf.frf.noise_model import NoiseModel
 from jointfrf.identification.model.assembly import Assembly
 from jointfrf.identification.model.fit import OpenDirection
+from jointfrf.identification.model.joint_motion import FoundMotion
 from jointfrf.identification.model.next_channels import NextChannel
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
@@ -102,6 +103,8 @@ class ModelData:
     next_channels : callable
         Returns the channels, not measured yet, that would narrow the widest interval of the joint most, best first; the
         models are reduced again for them.
+    joint_motion : FoundMotion
+        Returns how the joint moves on each line, and what each line adds to the fit; fits another joint.
     """
 
     assembly: Assembly
@@ -111,3 +114,4 @@ class ModelData:
     residual: ComplexArray
     open_directions: tuple[OpenDirection, ...]
     next_channels: Callable[[], tuple[NextChannel, ...]]
+    joint_motion: FoundMotion

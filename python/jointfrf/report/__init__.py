@@ -13,5 +13,6 @@ fit_frfs     measured FRFs against those regenerated with the joint
 fit_model    what the page of a fit of an assembly has beside
 fit_page     the report of an identification
 plan_page    a planned test: where sensors and hits go, where the knowledge lies
+levels_page  a joint at several levels: stiffness and loss factor over amplitude, a page
 pool_page    fits of one joint in several assemblies: forest plots, a page
 """

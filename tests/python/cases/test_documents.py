@@ -50,9 +50,19 @@ def test_python_of_the_page_on_fits_with_models_prints_what_it_shows(capsys):
         agree(capsys.readouterr().out, text)
 
 
-def test_python_of_the_page_on_levels_finds_the_joint_it_was_made_of(capsys):
+def test_the_page_on_levels_finds_the_joint_it_was_made_of(capsys, monkeypatch):
     page = DOCUMENTS["docs/levels.md"]
-    (example,), (shown,) = blocks("python", page), blocks("text", page)
+    (example,), (command, shown) = blocks("python", page), blocks("text", page)
+    words, expected = command.removeprefix("$ jointfrf ").split("\n", 1)
+    monkeypatch.chdir(ROOT)
+    assert main(words.split()) == 0
+    # the data hold only a combination of slip force and beta: parameters are compared with the truth
+    printed, expected = (text.split("parameter of iwan") for text in (capsys.readouterr().out, expected))
+    agree(printed[0], expected[0])
+    for text in (printed[1], expected[1]):
+        intervals = {row.split()[0]: row.split()[2::2] for row in text.splitlines()[2:] if row}
+        for name, true in {"slip_force": 20, "k": 1.2e5, "chi": -0.4, "beta": 0.8, "loss_factor": 0}.items():
+            assert float(intervals[name][0]) <= true <= float(intervals[name][1])
     named = {}
     exec(example, named)
     agree(capsys.readouterr().out, shown)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import jointfrf as jf
-from jointfrf.levels.friction import bouc_wen, iwan, jenkins
+from jointfrf.amplitude.friction import bouc_wen, iwan, jenkins
 
 AMPLITUDES = np.array([0.03, 0.4, 1.3, 6.0])
 

@@ -24,7 +24,7 @@ FLOORS = (
     {"laws"},
     {"substructuring", "models"},
     {"identification"},
-    {"solids", "pooling", "planning", "levels"},
+    {"solids", "pooling", "planning", "amplitude"},
     {"report"},
     {"cases"},
     {"studies", "assembly_file"},

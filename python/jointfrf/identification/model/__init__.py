@@ -7,6 +7,7 @@ assembly       substructures, joint, masses and springs attached: FRFs of the wh
 model_error    errors of modal matrices that no unknown describes
 reduced        a substructure reduced once, its FRFs and their derivatives for other values of its unknowns
 prediction     all parameters in one vector; FRFs between channels, and their derivatives -H dZ H
+joint_motion   how the joint of an assembly found moves on each line, and what each line adds to the fit
 likelihood     residuals, priors, information
 starts         values to start from: the best of many trials
 evidence       the level of the errors of the models, by the evidence of the FRFs

@@ -14,7 +14,7 @@ from jointfrf.identification.model.prediction import Prediction
 from jointfrf.identification.model.substructure import FrfSource, Substructure
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
-__all__ = ["NextChannel", "NextChannels", "next_channels"]
+__all__ = ["NextChannel", "NextChannels", "next_channels", "without_start"]
 
 #: DOFs of a part that are tried, spread over it, and lines at which.
 _TRIED, _LINES = 10, 100
@@ -46,7 +46,7 @@ class NextChannels:
     """What to measure next, found when it is asked for, once; goes to other processes, without the start of the fit."""
 
     def __init__(self, found: FoundModel) -> None:
-        self._found = found._replace(problem=replace(found.problem, compliance_start=_no_start))
+        self._found = without_start(found)
         self._known: tuple[NextChannel, ...] | None = None
 
     def __call__(self) -> tuple[NextChannel, ...]:
@@ -54,6 +54,11 @@ class NextChannels:
         if self._known is None:
             self._known = next_channels(self._found)
         return self._known
+
+
+def without_start(found: FoundModel) -> FoundModel:
+    """Return the same without the start of the fit, which does not go to other processes."""
+    return found._replace(problem=replace(found.problem, compliance_start=_no_start))
 
 
 def _no_start() -> None:

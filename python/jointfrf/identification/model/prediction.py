@@ -213,6 +213,18 @@ class Prediction:
             unit[:, self.forces] - e @ (w @ opened.to_in),
         )
 
+    def joint_motion(self, vector: ParameterVector, values: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+        """Return motions across the joint per unit force, j less k, of forces at responses and at forces.
+
+        Returns
+        -------
+        tuple of ndarray, shapes (n_freq, n_o, n) and (n_freq, n, n_i)
+            Without gains; the derivative of the FRFs by K*_dd is minus the product of both for DOF d.
+        """
+        n = len(self.whole.joint.dofs)
+        coupled = self._coupled(*self._parts(vector, values))
+        return coupled.across_out[:, :, :n], coupled.across_in[:, :n]
+
     def refine(self, vector: ParameterVector, values: FloatArray) -> bool:
         """Return whether a basis had to be extended to be good for these values."""
         done = [side.refine(self._of_side(vector, values, name)) for side, name in zip(self.sides, "AB", strict=True)]
@@ -252,12 +264,16 @@ class Prediction:
         return _Coupled(opened.free - opened.to_out @ w_in, w, across_out, across_in)
 
     def _gains(self, vector: ParameterVector, values: FloatArray) -> FloatArray:
+        return np.outer(*self.channel_gains(vector, values))
+
+    def channel_gains(self, vector: ParameterVector, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return measured over true FRFs by the calibration of responses, shape (n_o,), and of forces, (n_i,)."""
         rows, columns = np.ones(len(self.responses)), np.ones(len(self.forces))
         for i in vector.places_of("response"):
             rows[int(vector.all[i].place[0])] = values[i]
         for i in vector.places_of("force"):
             columns[int(vector.all[i].place[0])] = values[i]
-        return np.outer(rows, columns)
+        return rows, columns
 
     def _joint_slopes(
         self, vector: ParameterVector, values: FloatArray, coupled: _Coupled, slopes: ComplexArray

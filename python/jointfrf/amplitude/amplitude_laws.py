@@ -9,11 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from jointfrf.amplitude.friction import bouc_wen, iwan, jenkins
 from jointfrf.identification.result import columns_of
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_names, as_probability, as_real, check_choice
-from jointfrf.levels.friction import bouc_wen, iwan, jenkins
 
-__all__ = ["AmplitudeLawFit", "AmplitudeLawFits", "fit_amplitude_laws"]
+__all__ = ["AMPLITUDE_LAWS", "AmplitudeLawFit", "AmplitudeLawFits", "fit_amplitude_laws"]
 
 #: Slip displacements that fits start from, times the median amplitude: a decade to either side.
 _STARTS = (0.1, 0.3, 1.0, 3.0, 10.0)
@@ -65,6 +65,8 @@ _LAWS = {
         lambda a, spring, k, limit, loss: spring + bouc_wen(a, k, limit) + 1j * loss * (spring + k),
     ),
 }  # fmt: skip
+#: Names of the laws.
+AMPLITUDE_LAWS = tuple(_LAWS)
 
 
 @dataclass(frozen=True)
@@ -130,7 +132,7 @@ def fit_amplitude_laws(
     stiffness_error: ArrayLike,
     loss_factor_error: ArrayLike,
     *,
-    laws: Iterable[str] = tuple(_LAWS),
+    laws: Iterable[str] = AMPLITUDE_LAWS,
     probability: float = 0.95,
 ) -> AmplitudeLawFits:
     """Fit laws over amplitude to k(a) and eta(a) of one joint, and order them by AICc.
@@ -183,7 +185,7 @@ def fit_amplitude_laws(
         raise ValueError(f"loss_factor must lie within {_MOST:g}, but is {eta[np.argmax(np.abs(eta))]:g}")
     chosen = dict.fromkeys(as_names("laws", laws))
     for law in chosen:
-        check_choice("laws", law, tuple(_LAWS))
+        check_choice("laws", law, AMPLITUDE_LAWS)
     share = as_probability("probability", probability)
     fits, left_out = [], {}
     for law in chosen:

@@ -1,0 +1,336 @@
+"""A joint at several levels: stiffness and loss factor over amplitude, from one fit each."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from jointfrf.amplitude.amplitude_laws import AMPLITUDE_LAWS, AmplitudeLawFits, fit_amplitude_laws
+from jointfrf.amplitude.lines import Bend, DofLines, Drive, lines_of_fit, with_amplitude
+from jointfrf.dofs import is_rotation
+from jointfrf.identification.derived import Derived
+from jointfrf.identification.findings import Finding, note, warn, worst_first
+from jointfrf.identification.result import Fit, columns_of
+from jointfrf.kernel.arguments import as_names, as_probability, check_choice
+
+__all__ = ["JointLevel", "JointLevels", "check_laws", "levels", "of_levels"]
+
+#: Chance below which K* is taken to change over the lines of a test, and to do so in a way that no fit follows: then
+#: it is refused, which must not befall one linear test in a hundred.
+_CHANGES, _BENT = 0.05, 1e-4
+#: Powers of ln a that are fitted at most.
+_MOST = 3
+#: Amplitudes of the fit that differ from those of the one before by less than this, e-fold, are found.
+_SETTLED, _ROUNDS = 0.02, 4
+#: What can be done about bent FRFs.
+_CURE = (
+    "measure with the motion held (response control) or at a lower level, leave out the lines where the amplitude "
+    "changes most, or use the backbone of a mode"
+)
+
+
+@dataclass(frozen=True)
+class JointLevel:
+    """A DOF of a joint at one level.
+
+    Attributes
+    ----------
+    label : str
+        Of the test.
+    amplitude : float
+        Of the relative motion, peak, m or rad, at which the stiffness was found; the geometric mean over the lines by
+        their weight in the fit.
+    lowest, highest : float
+        Between which 95 % of that weight lie.
+    order : int
+        Up to which power of ln a K* was found to change over the lines; stiffness and loss factor are those at
+        `amplitude`.
+    force : float
+        In the joint, peak, N or N m: |K*| times the amplitude.
+    stiffness, loss_factor : Derived
+        With standard error and interval; N/m or N m/rad, and 1.
+    """
+
+    label: str
+    amplitude: float
+    lowest: float
+    highest: float
+    order: int
+    force: float
+    stiffness: Derived
+    loss_factor: Derived
+
+
+@dataclass(frozen=True)
+class JointLevels:
+    """A joint over amplitude; `print` shows it, `write_levels` makes a page.
+
+    Attributes
+    ----------
+    levels : dict of str to tuple of JointLevel
+        By DOF, lowest amplitude first.
+    laws : dict of str to AmplitudeLawFits
+        Of the DOFs that have levels enough.
+    refused : dict of str to str
+        Tests that are not in `levels`, by their labels, and why.
+    findings : tuple of Finding
+    probability : float
+        Of the intervals.
+    """
+
+    levels: dict[str, tuple[JointLevel, ...]]
+    laws: dict[str, AmplitudeLawFits]
+    refused: dict[str, str]
+    findings: tuple[Finding, ...]
+    probability: float = 0.95
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What a reader must know before using the numbers."""
+        return tuple(one.text for one in self.findings if one.severity == "warning")
+
+    def __str__(self) -> str:
+        """Return a table of each DOF, that of its laws, and the findings."""
+        parts = []
+        for dof, own in self.levels.items():
+            parts.append("\n".join(columns_of(level_rows(dof, own, self.probability))))
+            if dof in self.laws:
+                parts.append(str(self.laws[dof]))
+        said = [f"{'warning' if one.severity == 'warning' else 'note'}: {one.text}" for one in self.findings]
+        return "\n\n".join([*parts, "\n".join(said)] if said else parts)
+
+
+def level_rows(dof: str, own: Sequence[JointLevel], probability: float) -> list[tuple[str, ...]]:
+    """Return the table of a DOF as text, its heading first."""
+    motion, moment = ("rad", "N m") if is_rotation(dof) else ("m", "N")
+    percent = f"{100 * probability:g} %"
+    rows: list[tuple[str, ...]] = [
+        (dof, f"amplitude, {motion}", "over the lines", f"force, {moment}", f"k, {moment}/{motion}", percent,
+         "loss factor", percent)
+    ]  # fmt: skip
+    for one in own:
+        k, eta = one.stiffness, one.loss_factor
+        rows.append((
+            one.label, f"{one.amplitude:.4g}", f"{one.lowest:.3g} .. {one.highest:.3g}", f"{one.force:.4g}",
+            f"{k.value:.5g}", f"{k.low:.5g} .. {k.high:.5g}", f"{eta.value:.4g}", f"{eta.low:.4g} .. {eta.high:.4g}",
+        ))  # fmt: skip
+    return rows
+
+
+def levels(
+    fits: Sequence[Fit],
+    drives: Sequence[Drive],
+    *,
+    labels: Sequence[str] | None = None,
+    laws: Iterable[str] = AMPLITUDE_LAWS,
+    probability: float = 0.95,
+) -> JointLevels:
+    """Put fits of one joint at several levels together: k(a) and eta(a) over amplitude and force in the joint.
+
+    Parameters
+    ----------
+    fits : sequence of Fit
+        One for each level, of `identify` or `identify_model`, as they were made (not loaded).
+    drives : sequence of Drive
+        What was held in each test.
+    labels : sequence of str, optional
+        Names of the tests; by default their numbers.
+    laws : iterable of str
+        Laws over amplitude that are fitted, as in `fit_amplitude_laws`; none where it is empty.
+    probability : float
+        Of the intervals.
+
+    Returns
+    -------
+    JointLevels
+
+    Raises
+    ------
+    ValueError
+        Numbers of fits, drives and labels that differ; a fit without FRFs; a drive that does not belong to its fit; a
+        joint without springs; every test bent by amplitude.
+
+    Notes
+    -----
+    The relative motion on each line is that of the fit, times the force of that line. A fit of a constant K* to a joint
+    whose K* goes with ln a gives its value at the mean of ln a, weighted by what each line adds to the parameter: this
+    is the amplitude of the level, free of an error of first order.
+
+    Where the amplitude changes over the lines by more than 1 %, fits with models are made again with K* linear in
+    ln a, of the second and third power where these show (chance below 5 %, by the residual projected on dH/dK* times
+    the next power beside all parameters); values are those at the amplitude of the level. Where that is not enough
+    (chance below 1e-4), or there are no models, the FRF is bent by amplitude, and the test is left out.
+
+    Examples
+    --------
+    >>> import numpy as np, jointfrf as jf
+    >>> freq = np.linspace(0.5, 10, 400)
+    >>> a = jf.Substructure(jf.chain([5, 3], [2500, 3500], [3, 4], ground="start"), ["2:x"], exact=True)
+    >>> b = jf.Substructure(jf.chain([4, 2], [2000, 2500], [2, 1], ground="end"), ["1:x"], exact=True)
+    >>> fits = []
+    >>> for seed, k in enumerate([2000.0, 1900.0], start=1):
+    ...     truth = jf.Assembly(a, b, jf.LawJoint({"x": jf.SpringLaw(k, h=0.05 * k)}))
+    ...     h = jf.pollute(truth.receptance(freq, ["A/1:x"], ["A/1:x"]), 0.05, seed=seed)
+    ...     fits.append(jf.identify_model(freq, h, truth, ["A/1:x"], ["A/1:x"]))
+    >>> found = jf.levels(fits, [jf.Drive("joint", 1e-3, "x"), jf.Drive("joint", 4e-3, "x")], laws=["power"])
+    >>> [(round(one.amplitude, 6), bool(one.stiffness.low < k < one.stiffness.high))
+    ...  for one, k in zip(found.levels["x"], [2000, 1900])]
+    [(0.001, True), (0.004, True)]
+    """
+    share, named = as_probability("probability", probability), _labels(fits, drives, labels)
+    chosen = check_laws(laws)
+    found: dict[str, list[JointLevel]] = {}
+    refused, findings = dict[str, str](), list[Finding]()
+    for fit, drive, label in zip(fits, drives, named, strict=True):
+        try:
+            one = _followed(fit, drive)
+        except ValueError as error:
+            raise ValueError(f"{label}: {error}") from error
+        if not one.lines:
+            raise ValueError(f"{label}: no DOF of the joint is a spring whose stiffness was found")
+        if one.bent:
+            refused[label] = "; ".join(one.bent.values())
+            text = f"{label}: FRFs bent by amplitude, left out: {refused[label]}; {_CURE}"
+            findings.append(warn("bent", text, tuple(one.bent)))
+            continue
+        findings += _of_fit(one, label)
+        for dof in one.lines:
+            found.setdefault(dof, []).append(_level(one, dof, label, share))
+    if not found:
+        raise ValueError(f"every test is bent by amplitude: {next(iter(refused.values()))}; {_CURE}")
+    return of_levels(found, refused, findings, chosen, share)
+
+
+def check_laws(laws: Iterable[str]) -> tuple[str, ...]:
+    """Return the names of laws over amplitude."""
+    chosen = as_names("laws", laws)
+    for law in chosen:
+        check_choice("laws", law, AMPLITUDE_LAWS)
+    return chosen
+
+
+def of_levels(
+    found: Mapping[str, Sequence[JointLevel]],
+    refused: dict[str, str],
+    findings: list[Finding],
+    laws: Sequence[str],
+    share: float,
+) -> JointLevels:
+    """Return levels in the order of their amplitude, with laws fitted to them where there are any to fit."""
+    ordered = {dof: tuple(sorted(own, key=lambda one: one.amplitude)) for dof, own in found.items()}
+    of_laws: dict[str, AmplitudeLawFits] = {}
+    for dof, own in ordered.items():
+        usable, why = _usable(own)
+        try:
+            of_laws |= {dof: _laws(usable, laws, share)} if laws and usable else {}
+        except ValueError as error:
+            findings.append(note("left out", f"{dof}: no law is fitted: {error}", (dof,)))
+        if why:
+            findings.append(note("left out", f"{dof}: no laws are fitted to {why}", (dof,)))
+    return JointLevels(ordered, of_laws, refused, worst_first(findings), share)
+
+
+def _labels(fits: Sequence[Fit], drives: Sequence[Drive], labels: Sequence[str] | None) -> tuple[str, ...]:
+    for name, own, kind in (("fits", fits, Fit), ("drives", drives, Drive)):
+        if not isinstance(own, Sequence) or not all(isinstance(one, kind) for one in own):
+            raise TypeError(f"{name} must be a sequence of {kind.__name__}")
+    if not fits or len(fits) != len(drives):
+        raise ValueError(f"fits and drives must be as many, at least one, not {len(fits)} and {len(drives)}")
+    named = tuple(f"level {i}" for i in range(1, len(fits) + 1)) if labels is None else as_names("labels", labels)
+    if len(named) != len(fits) or len(set(named)) < len(named):
+        raise ValueError(f"labels must name each of the {len(fits)} fits, each another one")
+    return named
+
+
+class _Followed(NamedTuple):
+    """A fit whose K* follows the amplitude: its lines, orders in ln a, and what is left, by DOF."""
+
+    fit: Fit
+    lines: dict[str, DofLines]
+    orders: dict[str, int]
+    bent: dict[str, str]
+
+
+def _followed(fit: Fit, drive: Drive) -> _Followed:
+    """Let K* follow the amplitude over the lines: linear in ln a where it changes, of higher powers where they show."""
+    lines = lines_of_fit(fit, drive)
+    orders = dict.fromkeys(lines, 0)
+    for dof in lines:
+        while orders[dof] < _MOST and not lines[dof].is_held:
+            if orders[dof] and lines[dof].bend(orders[dof] + 1).p_value > _CHANGES:
+                break
+            more = orders | {dof: orders[dof] + 1}
+            changed = _refitted(fit, lines, drive, more)
+            if changed is None:
+                break
+            (fit, lines), orders = changed, more
+    bent = {dof: _words(dof, own, bend) for dof, own in lines.items()
+            if (bend := own.bend(orders[dof] + 1)).p_value < _BENT}  # fmt: skip
+    return _Followed(fit, lines, orders, bent)
+
+
+def _refitted(
+    fit: Fit, lines: dict[str, DofLines], drive: Drive, orders: dict[str, int]
+) -> tuple[Fit, dict[str, DofLines]] | None:
+    """Fit with K* of these orders in ln a, until the amplitudes are those of the fit."""
+    for _ in range(_ROUNDS):
+        found = with_amplitude(fit, lines, {dof: order for dof, order in orders.items() if order})
+        if found is None:
+            return None
+        before, fit = lines, found
+        lines = lines_of_fit(fit, drive)
+        if set(lines) != set(before):
+            return None
+        change = [np.ptp(np.log(own.amplitude / before[dof].amplitude)) for dof, own in lines.items()]
+        if max(change) < _SETTLED:
+            break
+    return fit, lines
+
+
+def _of_fit(one: _Followed, label: str) -> list[Finding]:
+    """Return what is in doubt of a fit, but for how K* goes with amplitude, which is no result."""
+    own = {each.name for each in one.fit.parameters if each.origin == "joint" and each.kind not in ("k", "h", "c", "m")}
+    said = [each for each in one.fit.findings if each.severity == "warning" and not own & set(each.about)]
+    return [replace(each, text=f"{label}: {each.text}") for each in said]
+
+
+def _words(dof: str, own: DofLines, bend: Bend) -> str:
+    """Say how much K* of a test goes with amplitude."""
+    low, high = own.range()
+    return (
+        f"K* of {dof} is not what a smooth function of ln a makes of it while the amplitude goes from {low:.2g} to "
+        f"{high:.2g} over the lines (chance {bend.p_value:.1g})"
+    )
+
+
+def _level(one: _Followed, dof: str, label: str, share: float) -> JointLevel:
+    fit, own = one.fit, one.lines[dof]
+    k = fit.derived(f"{{k_{dof}}}", share)
+    names = {each.name for each in fit.parameters}
+    if f"h_{dof}" in names:
+        eta = fit.derived(f"{{h_{dof}}} / {{k_{dof}}}", share)
+    elif f"c_{dof}" in names:
+        eta = fit.derived(f"{own.omega!r} * {{c_{dof}}} / {{k_{dof}}}", share)
+    else:
+        eta = Derived(0.0, 0.0, 0.0, 0.0)
+    a = own.mean_amplitude
+    force = a * k.value * float(abs(1 + 1j * eta.value))
+    return JointLevel(label, a, *own.range(), one.orders[dof], force, k, eta)
+
+
+def _usable(own: Sequence[JointLevel]) -> tuple[list[JointLevel], str]:
+    """Return the levels to which laws can be fitted, and what the others are."""
+    good = [one for one in own if one.stiffness.std_error > 0 and one.loss_factor.std_error > 0]
+    left = [one.label for one in own if one not in good]
+    return good, f"{', '.join(left)}: stiffness or damping has no standard error" if left else ""
+
+
+def _laws(own: Sequence[JointLevel], laws: Iterable[str], share: float) -> AmplitudeLawFits:
+    k, eta = [one.stiffness for one in own], [one.loss_factor for one in own]
+    return fit_amplitude_laws(
+        [one.amplitude for one in own], [one.value for one in k], [one.value for one in eta],
+        [one.std_error for one in k], [one.std_error for one in eta], laws=laws, probability=share,
+    )  # fmt: skip

@@ -1,0 +1,387 @@
+"""What a fit saw of a joint at which amplitude: motion, weight of each line, and how stiffness goes with amplitude."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal, NamedTuple, Self, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from jointfrf.dofs import is_rotation
+from jointfrf.identification.fit_data import FitData, ModelData
+from jointfrf.identification.result import Fit
+from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_positive, check_choice, check_type, one_line
+from jointfrf.laws.law import JointLaw, LawField
+from jointfrf.laws.law_joint import LawJoint
+from jointfrf.laws.springs import SpringLaw
+from jointfrf.spelling import did_you_mean
+
+__all__ = ["Bend", "DofLines", "Drive", "lines_of_fit", "with_amplitude"]
+
+#: Amplitudes that differ by less than this, e-fold, are one.
+_HELD = 0.01
+
+Held = Literal["force", "response", "joint"]
+MotionQuantity = Literal["displacement", "velocity", "acceleration"]
+
+
+@dataclass(frozen=True)
+class Drive:
+    """What was held during a test, on all its lines.
+
+    Parameters
+    ----------
+    held : {"force", "response", "joint"}
+        The force; the motion of a channel; the relative motion in the joint.
+    level : float
+        Peak value: N (N m), m, m/s or m/s^2, rad.
+    channel : str
+        The channel that was held, as the fit names it, or the joint DOF.
+    quantity : {"displacement", "velocity", "acceleration"}
+        Of the channel.
+
+    Examples
+    --------
+    >>> import jointfrf as jf
+    >>> print(jf.Drive("force", 2.0)); print(jf.Drive("response", 9.81, "A/1:y", "acceleration"))
+    force 2 N
+    A/1:y 9.81 m/s^2
+    """
+
+    held: Held
+    level: float
+    channel: str = ""
+    quantity: MotionQuantity = "displacement"
+
+    def __post_init__(self) -> None:
+        check_choice("held", self.held, get_args(Held))
+        check_choice("quantity", self.quantity, get_args(MotionQuantity))
+        object.__setattr__(self, "level", as_positive("level", self.level))
+        check_type("channel", self.channel, str)
+        if (self.held == "force") == bool(self.channel):
+            what = "a force names no channel" if self.channel else "channel must name what was held"
+            raise ValueError(f"{what}: {one_line(self.channel)}")
+
+    def __str__(self) -> str:
+        unit = {"force": "N", "joint": "rad" if is_rotation(self.channel) else "m"}
+        own = unit.get(self.held, ("m", "m/s", "m/s^2")[self.power])
+        return f"{self.channel or 'force'} {self.level:g} {own}"
+
+    @property
+    def power(self) -> int:
+        """Power of omega by which the quantity exceeds a displacement."""
+        return get_args(MotionQuantity).index(self.quantity)
+
+
+class AmplitudeSpring(JointLaw):
+    """A spring whose K* is a polynomial of ln a, the amplitude on each line being known.
+
+    Parameters
+    ----------
+    spring : SpringLaw
+    omega : ndarray, shape (n_freq,)
+        rad/s, rising.
+    x : ndarray, shape (n_freq,)
+        ln a less that at which K* is that of the spring.
+    terms : tuple of float
+        Real and imaginary part of the factors of x, x^2/2, ...
+    """
+
+    def __init__(self, spring: SpringLaw, omega: FloatArray, x: FloatArray, terms: tuple[float, ...]) -> None:
+        self.spring, self.omega, self.x, self.terms = spring, omega, x, terms
+
+    @property
+    def fields(self) -> tuple[LawField, ...]:
+        """Those of the spring, then ``k1``, ``h1``, ..."""
+        names = [f"{part}{i}" for i in range(1, len(self.terms) // 2 + 1) for part in "kh"]
+        return (*self.spring.fields, *(LawField(name, "stiffness") for name in names))
+
+    @property
+    def values(self) -> FloatArray:
+        """Values of the parameters, shape (p,)."""
+        return np.array([*self.spring.values, *self.terms])
+
+    def with_values(self, values: ArrayLike) -> Self:
+        """Return the same law with other values of its parameters, shape (p,)."""
+        found, n = self.checked(values), len(self.spring.fields)
+        return type(self)(self.spring.with_values(found[:n]), self.omega, self.x, tuple(found[n:].tolist()))
+
+    def _powers(self, omega: FloatArray) -> list[FloatArray]:
+        x = np.interp(omega, self.omega, self.x)
+        return [np.asarray(x**i / math.factorial(i)) for i in range(1, len(self.terms) // 2 + 1)]
+
+    def stiffness(self, omega: FloatArray) -> ComplexArray:
+        """Return K*(w), shape (n_freq,)."""
+        found = self.spring.stiffness(omega)
+        for i, power in enumerate(self._powers(omega)):
+            found = found + (self.terms[2 * i] + 1j * self.terms[2 * i + 1]) * power
+        return found
+
+    def slopes(self, omega: FloatArray) -> ComplexArray:
+        """Return the derivatives of K*(w) by each parameter, shape (p, n_freq)."""
+        own = [power * unit for power in self._powers(omega) for unit in (1.0, 1j)]
+        return np.concatenate([self.spring.slopes(omega), np.asarray(own, np.complex128)])
+
+
+class Bend(NamedTuple):
+    """How K* goes with amplitude on the lines of one test.
+
+    Attributes
+    ----------
+    slope : complex
+        By which K* goes with a power of ln a.
+    p_value : float
+        Of a joint that does not depend on amplitude.
+    """
+
+    slope: complex
+    p_value: float
+
+
+@dataclass(frozen=True)
+class DofLines:
+    """A DOF of the joint on the lines of a fit.
+
+    Attributes
+    ----------
+    amplitude : ndarray, shape (n_freq, n_i)
+        Of the relative motion, peak, m or rad, with each force by itself.
+    weights : ndarray, shape (2, n_freq, n_i)
+        By which K* of a line enters the stiffness found, and its imaginary part the damping found; sums are 1.
+    omega : float
+        Where viscous damping was seen, rad/s.
+    source : _ModelLines or _JointLines
+    """
+
+    amplitude: FloatArray
+    weights: FloatArray
+    omega: float
+    source: _ModelLines | _JointLines
+
+    @property
+    def mean_amplitude(self) -> float:
+        """Amplitude at which the stiffness was found.
+
+        K* that is linear in ln a gives the same fit as one that is constant and has its value there. Beside unknowns
+        of the models weights have both signs, and it may lie outside the amplitudes of the lines: then K* is to be
+        fitted as a function of ln a about `centre`.
+        """
+        return float(np.exp(np.sum(self.weights[0] * np.log(self.amplitude))))
+
+    @property
+    def is_held(self) -> bool:
+        """Whether the amplitude is the same on all lines, within 1 %: K* then changes by no more."""
+        return float(np.ptp(np.log(self.amplitude))) < _HELD
+
+    @property
+    def centre(self) -> float:
+        """Geometric mean of the amplitudes by what each line says of the stiffness, whatever its sign."""
+        size = abs(self.weights[0])
+        return float(np.exp(np.sum(size * np.log(self.amplitude)) / size.sum()))
+
+    def range(self, share: float = 0.95) -> tuple[float, float]:
+        """Return the amplitudes between which lines have this share of the weight in the stiffness."""
+        size, order = abs(self.weights[0]).ravel(), np.argsort(self.amplitude, axis=None)
+        part = np.cumsum(size[order]) / size.sum()
+        a = self.amplitude.ravel()[order]
+        low, high = (int(np.searchsorted(part, (1 + sign * share) / 2)) for sign in (-1, 1))
+        return float(a[low]), float(a[min(high, a.size - 1)])
+
+    def bend(self, power: int = 1) -> Bend:
+        """Return how K* goes with a power of ln a, found beside all parameters of the fit."""
+        x = np.log(self.amplitude / self.centre) ** power
+        if self.is_held:
+            return Bend(0j, 1.0)
+        return self.source.bend(x)
+
+
+def lines_of_fit(fit: Fit, drive: Drive) -> dict[str, DofLines]:
+    """Return what a fit saw of each DOF of the joint that is a spring, by its name.
+
+    Raises
+    ------
+    ValueError
+        The fit has no FRFs behind it, or the drive does not belong to it.
+    """
+    motion = _model_lines(fit, fit.data) if isinstance(fit.data, ModelData) else _joint_lines(fit)
+    force = _force(fit, drive, motion)
+    found = {}
+    for dof, own in motion.sources.items():
+        amplitude = abs(motion.per_force[:, fit.dofs.index(dof)]) * force
+        if not (amplitude > 0).all():
+            raise ValueError(f"{dof}: the drive does not move this DOF of the joint on all lines")
+        weights = own.weights()
+        omega = float(np.sum(abs(weights[1]) * fit.freq_hz[:, None]) / abs(weights[1]).sum() * 2 * np.pi)
+        found[dof] = DofLines(amplitude, weights, omega, own)
+    return found
+
+
+class _Motion(NamedTuple):
+    """Relative motion per force (n_freq, n, n_i); FRFs as predicted, names of their rows; lines of DOFs."""
+
+    per_force: ComplexArray
+    predicted: ComplexArray
+    names: tuple[str, ...]
+    sources: dict[str, _ModelLines | _JointLines]
+
+
+def _force(fit: Fit, drive: Drive, motion: _Motion) -> FloatArray:
+    """Return the force as measured on each line, shape (n_freq, n_i) or (1, 1)."""
+    if drive.held == "force":
+        return np.full((1, 1), drive.level)
+    names = fit.dofs if drive.held == "joint" else motion.names
+    if drive.channel not in names:
+        hint = did_you_mean(drive.channel, names)
+        raise ValueError(f"{one_line(drive.channel)} was held, but the fit has only {', '.join(names)}{hint}")
+    row = names.index(drive.channel)
+    size = abs((motion.per_force if drive.held == "joint" else motion.predicted)[:, row])
+    if not (size > 0).all():
+        raise ValueError(f"{drive.channel} was held, but does not move on all lines")
+    power = 0 if drive.held == "joint" else drive.power
+    found: FloatArray = drive.level / (2 * np.pi * fit.freq_hz[:, None]) ** power / size
+    return found
+
+
+def _parameters(fit: Fit, dof: str) -> tuple[int, int | None] | None:
+    """Return the places of stiffness and damping of a DOF; None where it is not a spring whose stiffness is finite."""
+    own = {
+        one.kind: i for i, one in enumerate(fit.parameters) if one.origin == "joint" and one.row == one.column == dof
+    }
+    law = None if fit.laws is None else fit.laws.laws.get((dof, dof))
+    if not isinstance(law, SpringLaw | AmplitudeSpring | None) or not np.isfinite(fit.estimate[own.get("k", 0)]):
+        return None
+    if "k" not in own:
+        return None
+    return own["k"], own.get("h", own.get("c"))
+
+
+@dataclass(frozen=True)
+class _ModelLines:
+    """A DOF of a fit with models: `slopes` by K* of the weighted FRFs, those by the coordinates, covariance."""
+
+    slopes: ComplexArray
+    of_fit: ComplexArray
+    residual: ComplexArray
+    covariance: FloatArray
+    places: tuple[int, int | None]
+
+    def weights(self) -> FloatArray:
+        found = []
+        for place, unit in zip(self.places, (1.0, 1j), strict=True):
+            if place is None:
+                continue
+            influence = np.tensordot(self.covariance[place], self.of_fit, 1)
+            own = np.sum((influence.conj() * self.slopes * unit).real, axis=1)
+            found.append(own / own.sum())
+        return np.array([found[0], found[-1]])
+
+    def bend(self, x: FloatArray) -> Bend:
+        """By the score: what the residual has of K* in proportion to x, less what other parameters explain of it."""
+        rows = [(self.slopes * x[:, None, :] * unit).ravel() for unit in (1.0, 1j)]
+        added = np.ascontiguousarray(rows).view(np.float64)
+        own = np.ascontiguousarray(self.of_fit).reshape(len(self.of_fit), -1).view(np.float64)
+        residual = np.ascontiguousarray(self.residual).ravel().view(np.float64)
+        cross = added @ own.T
+        information = added @ added.T - cross @ self.covariance @ cross.T
+        score = added @ residual
+        seen = int(np.count_nonzero(residual))
+        return _bend(information, score, float(residual @ residual), seen - len(own))
+
+
+@dataclass(frozen=True)
+class _JointLines:
+    """A DOF of a fit at the joint: K* of each line by itself less that of the fit, and its share of what is known."""
+
+    difference: ComplexArray
+    shares: FloatArray
+    per_force: FloatArray
+
+    def weights(self) -> FloatArray:
+        size = self.per_force**2
+        by_force = size / size.sum(axis=1, keepdims=True)
+        own = [share[:, None] * by_force for share in self.shares]
+        return np.array([one / one.sum() for one in own])
+
+    def bend(self, x: FloatArray) -> Bend:
+        """By a straight line through K* of the lines over ln a."""
+        weight = self.weights()[0]
+        share = weight.sum(axis=1)
+        mean = np.sum(weight * x, axis=1) / np.where(share > 0, share, 1)
+        good = (share > 0) & np.isfinite(self.difference)
+        n = int(good.sum())
+        w, t, y = share[good] * n, mean[good], self.difference[good]
+        if n < 3 or np.ptp(t) == 0:
+            return Bend(0j, 1.0)
+        t, y = t - np.sum(w * t) / w.sum(), y - np.sum(w * y) / w.sum()
+        level = 1.0 / float(np.median(w * abs(y) ** 2) / (2 * np.log(2)))
+        information, score = level * np.sum(w * t * t), level * np.sum(w * t * y)
+        squares = level * float(np.sum(w * abs(y) ** 2))
+        return _bend(np.eye(2) * information, np.array([score.real, score.imag]), squares, 2 * n - 2)
+
+
+def _bend(information: FloatArray, score: FloatArray, squares: float, degrees: int) -> Bend:
+    """Return slopes by information and score of both, tested against what is then left of the squares."""
+    from scipy.special import fdtrc
+
+    slope = np.linalg.lstsq(information, score, rcond=1e-10)[0]
+    gain, left = float(score @ slope), max(degrees - 2, 1)
+    rest = max((squares - gain) / left, 1.0)
+    return Bend(complex(slope[0], slope[1]), float(fdtrc(2, left, max(gain, 0.0) / 2 / rest)))
+
+
+def _model_lines(fit: Fit, data: ModelData) -> _Motion:
+    found = data.joint_motion()
+    gradient, sources = found.gradient, dict[str, _ModelLines | _JointLines]()
+    for d, dof in enumerate(fit.dofs):
+        places = _parameters(fit, dof)
+        if places is not None:
+            sources[dof] = _ModelLines(found.slopes[d], gradient.slopes, gradient.residual, gradient.covariance, places)
+    return _Motion(found.per_force, found.predicted, fit.responses, sources)
+
+
+def _joint_lines(fit: Fit) -> _Motion:
+    data = fit.data
+    if not isinstance(data, FitData):
+        raise ValueError(
+            "the fit has no FRFs behind it: one that was loaded cannot say at which amplitude it was found"
+        )
+    if data.modes is None:
+        raise ValueError("the transform does not say how channels move with the joint: name places, or the joint DOFs")
+    gamma, n = data.regenerated(slice(None)), len(fit.dofs)
+    known = np.asarray(np.isfinite(gamma).all(axis=(1, 2)))
+    gamma = np.where(known[:, None, None], gamma, np.nanmean(gamma, axis=0)) if not known.all() else gamma
+    out, into = data.modes
+    per_force: ComplexArray = (gamma[:, :n] - gamma[:, n:]) @ into.T
+    shares, compliance = data.information() * known[:, None], data.line_compliance()
+    k = fit.k_joint(fit.freq_hz)
+    sources: dict[str, _ModelLines | _JointLines] = {}
+    for d, dof in enumerate(fit.dofs):
+        places = _parameters(fit, dof)
+        if places is not None:
+            own = shares[:, [places[0], places[0] if places[1] is None else places[1]]].T
+            difference = k[:, d, d] - k[:, d, d] ** 2 * compliance[:, d]
+            sources[dof] = _JointLines(difference, np.asarray(own), np.abs(per_force[:, d]))
+    return _Motion(per_force, out @ gamma @ into.T, data.response_names, sources)
+
+
+def with_amplitude(fit: Fit, lines: dict[str, DofLines], orders: dict[str, int]) -> Fit | None:
+    """Return the fit with K* as polynomials of ln a of these orders; None where it has no models to be fitted again."""
+    if not isinstance(fit.data, ModelData) or fit.laws is None:
+        return None
+    omega, laws = 2 * np.pi * fit.freq_hz, dict(fit.laws.laws)
+    order_of_lines = np.argsort(omega)
+    for dof, order in orders.items():
+        own, law = lines[dof], fit.laws.laws[dof, dof]
+        weight = abs(own.weights[0])
+        share = weight.sum(axis=1, keepdims=True)
+        by_force = np.where(share > 0, weight / np.where(share > 0, share, 1), 1 / weight.shape[1])
+        x = np.sum(by_force * np.log(own.amplitude), axis=1) - math.log(own.centre)
+        known = (*law.terms, *[0.0] * (2 * order)) if isinstance(law, AmplitudeSpring) else (0.0,) * (2 * order)
+        spring = law.spring if isinstance(law, AmplitudeSpring) else law
+        assert isinstance(spring, SpringLaw)
+        laws[dof, dof] = AmplitudeSpring(spring, omega[order_of_lines], x[order_of_lines], known[: 2 * order])
+    joint = LawJoint(laws, fit.laws.rigid, fit.laws.mass, fit.laws.dofs)
+    refitted: Fit = fit.data.joint_motion.refitted(joint)
+    return refitted

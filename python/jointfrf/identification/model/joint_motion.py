@@ -1,0 +1,83 @@
+"""How the joint of an assembly found moves on each line, and what each line adds to the fit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from copy import copy
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from jointfrf.identification.minimise import minimise
+from jointfrf.identification.model.fit import FoundModel, fit_assembly
+from jointfrf.identification.model.next_channels import without_start
+from jointfrf.identification.model.uncertainty import ModelGradient
+from jointfrf.identification.parameters import ParameterVector, joint_vector
+from jointfrf.kernel.arguments import ComplexArray
+from jointfrf.laws.law_joint import LawJoint
+
+__all__ = ["FoundMotion", "JointMotion"]
+
+
+class JointMotion(NamedTuple):
+    """Motion across the joint, and derivatives of the FRFs by what it does there.
+
+    Attributes
+    ----------
+    per_force : ndarray, shape (n_freq, n, n_i)
+        Of each joint DOF, j less k, per force as measured, m/N or rad/N.
+    slopes : ndarray, shape (n, n_freq, n_o, n_i)
+        Derivatives of the weighted FRFs by K*_dd.
+    gradient : ModelGradient
+        Derivatives by the coordinates, residual, information.
+    predicted : ndarray, shape (n_freq, n_o, n_i)
+        FRFs, m/N.
+    """
+
+    per_force: ComplexArray
+    slopes: ComplexArray
+    gradient: ModelGradient
+    predicted: ComplexArray
+
+
+class FoundMotion:
+    """The motion of the joint of a fit, when it is asked for; goes to other processes, without the start of the fit.
+
+    Parameters
+    ----------
+    found : FoundModel
+    describe : callable
+        Makes a result of what was found.
+    """
+
+    def __init__(self, found: FoundModel, describe: Callable[[FoundModel], Any]) -> None:
+        self._found, self._describe = without_start(found), describe
+
+    def refitted(self, joint: LawJoint) -> Any:
+        """Return the fit with another joint, all else starting from what was found; fixed parameters stay fixed."""
+        found = self._found
+        problem, vector = found.problem, found.problem.vector
+        fixed = [one.name for one in vector.all if one.origin == "joint" and not one.is_free]
+        prediction = copy(problem.prediction)
+        prediction.whole = replace(prediction.whole, joint=joint)
+        own = joint_vector(joint, fixed, prediction.joint_stiffness()).all
+        rest = [one for one in vector.all if one.origin != "joint"]
+        return self._describe(
+            fit_assembly(replace(problem, prediction=prediction, vector=ParameterVector((*own, *rest))))
+        )
+
+    def __call__(self) -> JointMotion:
+        """Return it at the parameters found, without errors of the models: they can look like a joint that changes."""
+        found, problem = self._found, self._found.problem
+        likelihood, minimum = problem.likelihood, found.minimum
+        vector, prediction = likelihood.vector, likelihood.prediction
+        if found.error is not None:
+            minimum = minimise(likelihood, minimum.x[: vector.free.size])
+        values = vector.to_values(minimum.x)
+        rows, columns = prediction.channel_gains(vector, values)
+        out, into = prediction.joint_motion(vector, values)
+        weight = likelihood.weight * np.outer(rows, columns)
+        slopes = -(out.transpose(2, 0, 1)[..., None] * into.transpose(1, 0, 2)[:, :, None, :]) * weight
+        gradient = ModelGradient.of(likelihood, minimum, problem.noise.inflation)
+        return JointMotion(into * columns, slopes, gradient, prediction.frfs(vector, values))

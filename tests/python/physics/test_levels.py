@@ -1,0 +1,295 @@
+"""A joint at several levels against an independent solver: an Iwan joint in a beam, balanced with its harmonics."""
+
+import csv
+import json
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.linalg import eig
+from scipy.optimize import brentq
+
+import jointfrf as jf
+from harmonic_balance import SECTION, Sliders, iwan_beam
+from jointfrf.amplitude.friction import iwan
+from jointfrf.cli.main import main
+
+IWAN = (20.0, 1.2e5, -0.4, 0.8)
+FREQ_HZ = np.arange(180.0, 400.5, 2.0)
+CHANNELS = ["A/1:y", "A/15:y", "B/9:y", "B/25:y"]
+#: Of fits whose parameters are not all well determined, which is not looked at here.
+pytestmark = pytest.mark.filterwarnings("ignore::jointfrf.IdentificationWarning")
+CASE = Path(__file__).resolve().parents[3] / "cases" / "iwan-beam"
+
+
+@pytest.fixture(scope="module")
+def beam():
+    return iwan_beam(Sliders.iwan(*IWAN), youngs_modulus=(1.004 * 210e9, 0.998 * 210e9), loss_factor=0.0012)
+
+
+def believed():
+    halves = [
+        jf.Substructure(
+            jf.beam(0.36, 24, youngs_modulus=210e9, loss_factor=0.001, **SECTION), joint,
+            {"youngs_modulus": jf.Unknown(1.0, 0.01), "loss_factor": jf.Unknown(0.001, 0.0005, lower=0)}, exact=True,
+        )
+        for joint in (["25:y", "25:theta"], ["1:y", "1:theta"])
+    ]  # fmt: skip
+    joint = jf.LawJoint({"theta_z": jf.SpringLaw(1e5, h=1e3)}, ["y"], dofs=["y", "theta_z"])
+    return jf.Assembly(*halves, joint)
+
+
+def fitted(h, noise=0.01, seed=1):
+    measured = jf.pollute(h[:, :, None], noise, seed=seed)
+    return jf.identify_model(FREQ_HZ, measured, believed(), CHANNELS, CHANNELS[:1])
+
+
+def test_sliders_have_the_first_harmonic_of_the_formula():
+    sliders = Sliders.iwan(*IWAN)
+    a = sliders.limit[-1] * np.geomspace(0.01, 3, 7)
+    assert_allclose(sliders.first_harmonic(a), iwan(a, *IWAN), rtol=1e-3)
+
+
+@pytest.mark.parametrize("freq_hz", [240.0, 262.0])
+def test_harmonic_balance_agrees_with_time_integration(freq_hz):
+    small = iwan_beam(Sliders.iwan(*IWAN), elements=4, loss_factor=0.0, viscous=4e-5)
+    steady = small.at_force(np.array([freq_hz]), 30.0)
+    channels, joint = small.integrated(freq_hz, 30.0, 60, 300)
+    assert_allclose(abs(joint), steady.joint[0], rtol=1e-3)
+    # far from its rest: the joint is half slipping
+    assert 0.3 < steady.joint[0] / small.joint.limit[-1] < 1.2
+    assert_allclose(channels / 30, steady.h[0], rtol=0, atol=5e-3 * abs(steady.h).max())
+
+
+@pytest.mark.parametrize(
+    ("control", "level"), [("joint", 5e-5), ("response", 4e-6), ("response", 5e-5), ("force", 3.0)]
+)
+def test_stiffness_and_loss_factor_are_those_at_the_amplitude_found(beam, control, level):
+    if control == "joint":
+        steady, drive = (
+            beam.at_joint_amplitude(FREQ_HZ, np.full(FREQ_HZ.size, level)),
+            jf.Drive("joint", level, "theta_z"),
+        )
+    elif control == "response":
+        steady, drive = beam.at_response(FREQ_HZ, 3, level), jf.Drive("response", level, "B/25:y")
+    else:
+        steady, drive = beam.at_force(FREQ_HZ, level), jf.Drive("force", level)
+    found = jf.levels([fitted(steady.h)], [drive], laws=())
+    (one,) = found.levels["theta_z"]
+    true = beam.joint.first_harmonic(np.array([one.amplitude]))[0]
+    assert steady.joint.min() < one.amplitude * 1.01
+    assert one.amplitude < steady.joint.max() * 1.01
+    assert abs(one.stiffness.value - true.real) < 3 * one.stiffness.std_error < 0.2 * true.real
+    assert abs(one.loss_factor.value - true.imag / true.real) < 3 * one.loss_factor.std_error
+    assert_allclose(one.force, one.amplitude * abs(true), rtol=0.1)
+    assert (one.order == 0) == (control == "joint")
+
+
+def test_motion_held_as_velocity_and_acceleration_is_the_same_test(beam):
+    freq = np.array([250.0])
+    found = [
+        beam.at_response(freq, 3, 1e-5 * (2 * np.pi * freq[0]) ** power, power).joint[0] for power in range(3)
+    ]  # fmt: skip
+    assert_allclose(found, found[0], rtol=1e-5)
+    fit = fitted(beam.at_joint_amplitude(FREQ_HZ, np.full(FREQ_HZ.size, 2e-6)).h)
+    shown = [
+        jf.levels([fit], [jf.Drive("response", 1.0, "B/25:y", quantity)], laws=()).levels["theta_z"][0].amplitude
+        for quantity in ("displacement", "velocity", "acceleration")
+    ]
+    omega = 2 * np.pi * np.array([FREQ_HZ[0], FREQ_HZ[-1]])
+    for slower, faster in zip(shown[1:], shown, strict=False):
+        assert omega[0] < faster / slower < omega[1]
+
+
+def chains(k_of_line):
+    """FRFs between both DOFs of a joint that has another stiffness on each line."""
+    freq = np.linspace(0.5, 10, 300)
+    a = jf.chain([5, 3], [2500, 3500], [3, 4], ground="start").receptance(freq, [1])
+    b = jf.chain([4, 2], [2000, 2500], [2, 1], ground="end").receptance(freq, [0])
+    return freq, jf.couple(a, b, k_of_line(freq, a, b)[:, None, None], [0], [0])
+
+
+def bent(freq, a, b):
+    """K* that falls with the relative motion under a force of 1 N, found by iteration."""
+    k = np.full(freq.size, 2000.0 + 100j)
+    for _ in range(200):
+        motion = abs(a / (1 + k[:, None, None] * (a + b)))[:, 0, 0]
+        k = 0.9 * k + 0.1 * 2000 * (1 + 0.05j) / (1 + motion / 1e-3)
+    return k
+
+
+def test_frfs_at_the_joint_that_are_bent_by_amplitude_are_refused():
+    freq, h = chains(bent)
+    fit = jf.identify(freq, jf.pollute(h, 0.01, seed=2), ["x"], damping="hysteretic")
+    with pytest.raises(ValueError, match=r"every test is bent by amplitude: K\* of x .*response control"):
+        jf.levels([fit], [jf.Drive("force", 1.0)])
+    freq, h = chains(lambda freq, a, b: np.full(freq.size, 2000 + 100j))
+    good = jf.identify(freq, jf.pollute(h, 0.01, seed=2), ["x"], damping="hysteretic")
+    found = jf.levels([fit, good], [jf.Drive("force", 1.0)] * 2, labels=["high", "low"])
+    assert list(found.refused) == ["high"]
+    assert [one.label for one in found.levels["x"]] == ["low"]
+    assert found.findings[0].kind == "bent"
+
+
+def test_linear_frfs_at_the_joint_are_not_called_bent():
+    freq, h = chains(lambda freq, a, b: np.full(freq.size, 2000 + 100j))
+    for seed in range(5):
+        fit = jf.identify(freq, jf.pollute(h, 0.03, seed=seed), ["x"], damping="hysteretic")
+        assert not jf.levels([fit], [jf.Drive("force", 1.0)]).refused
+
+
+@pytest.fixture(scope="module")
+def believed_beam():
+    """A beam whose models are as they are believed, its mode at three amplitudes, and K* there."""
+    own = iwan_beam(Sliders.iwan(*IWAN))
+    return own, np.array([2e-6, 2e-5, 2e-4]), own.joint.first_harmonic(np.array([2e-6, 2e-5, 2e-4]))
+
+
+def check_backbone(backbone, amplitude, k, rtol):
+    found = jf.backbone_levels(believed(), backbone, laws=()).levels["theta_z"]
+    assert_allclose([one.amplitude for one in found], amplitude, rtol=rtol)
+    assert_allclose([one.stiffness.value for one in found], k.real, rtol=rtol)
+    assert_allclose([one.loss_factor.value for one in found], k.imag / k.real, rtol=rtol)
+    return found
+
+
+def of_mode(own, amplitude, k):
+    """Eigenvalue near 235 Hz of the beam with K*, and the motion of the driven channel there."""
+    squares, shapes = eig(own.stiffness + k * np.outer(own.across, own.across), own.mass)
+    i = np.argmin(abs(squares - (2 * np.pi * 235) ** 2))
+    motion = amplitude * abs(shapes[own.outputs[0], i] / (own.across @ shapes[:, i]))
+    return np.sqrt(squares[i].real) / (2 * np.pi), squares[i].imag / squares[i].real / 2, motion
+
+
+def test_a_backbone_of_a_mode_gives_the_joint_that_it_was_made_of(believed_beam):
+    own, amplitude, k = believed_beam
+    freq, damping, motion = np.transpose([of_mode(own, *one) for one in zip(amplitude, k, strict=True)])
+    found = check_backbone(jf.Backbone("A/1:y", freq, motion, damping=damping), amplitude, k, 1e-5)
+    # a frequency that is off by its error moves k by no more than its interval says, and by a good part of that
+    off = jf.backbone_levels(believed(), jf.Backbone("A/1:y", 0.999 * freq, motion, damping=damping), laws=())
+    for one, wrong in zip(found, off.levels["theta_z"], strict=True):
+        assert 0.3 < (one.stiffness.value - wrong.stiffness.value) / one.stiffness.std_error < 1.05
+
+
+def test_phase_resonance_with_harmonics_gives_the_joint_within_what_they_change(believed_beam):
+    own, amplitude, k = believed_beam
+    freq = []
+    for one in amplitude:
+        lag = partial(own.at_joint_amplitude, amplitude=np.array([one]))
+        freq.append(brentq(lambda f, lag=lag: lag(np.array([f])).h[0, 0].real, 222, 240))
+    steady = own.at_joint_amplitude(np.array(freq), amplitude)
+    motion = abs(steady.h[:, 0]) * steady.force
+    check_backbone(jf.Backbone("A/1:y", freq, motion, force=steady.force), amplitude, k, 0.02)
+
+
+def test_errors_of_models_widen_the_intervals_of_a_backbone(believed_beam):
+    own, amplitude, k = believed_beam
+    freq, damping, motion = of_mode(own, amplitude[0], k[0])
+    whole, point = believed(), jf.Backbone("A/1:y", [freq], [motion], damping=[damping])
+    known, stiffer = (
+        jf.Substructure(whole.a.model({"youngs_modulus": e}), whole.a.joint, exact=True) for e in (1, 1.01)
+    )
+    other = jf.Substructure(whole.b.nominal_model, whole.b.joint, exact=True)
+    exact, changed, believed_one = (
+        jf.backbone_levels(one, point, laws=()).levels["theta_z"][0].stiffness
+        for one in (jf.Assembly(known, other, whole.joint), jf.Assembly(stiffer, other, whole.joint), whole)
+    )
+    errors, change = (exact.std_error, believed_one.std_error), (exact.value, changed.value)
+    assert_allclose(np.sqrt(errors[1] ** 2 - errors[0] ** 2), np.sqrt(2) * abs(change[1] - change[0]), rtol=0.1)
+
+
+def test_a_backbone_that_does_not_fit_its_assembly_is_an_error(believed_beam):
+    whole, points = believed(), {"freq_hz": [235.0], "amplitude": [1e-5]}
+    good = jf.Backbone("A/1:y", **points, damping=[0.001])
+    for backbone, options, text in (
+        (jf.Backbone("A/99:y", **points, damping=[0.001]), {}, "channel 'A/99:y'"),
+        (good, {"dof": "theta_y"}, "dof must be one of theta_z, not 'theta_y'"),
+        (good, {"laws": ["voigt"]}, "laws"),
+    ):
+        with pytest.raises(ValueError, match=text):
+            jf.backbone_levels(whole, backbone, **options)
+    for wrong, text in (
+        ({}, "either damping"),
+        ({"damping": [0.0]}, "damping must hold positive"),
+        ({"damping": [0.1, 0.2]}, "shape"),
+        ({"force": [1.0], "labels": ["a", "b"]}, "labels"),
+    ):
+        with pytest.raises(ValueError, match=text):
+            jf.Backbone("A/1:y", **points, **wrong)
+    # a mode that is stiffer than with a rigid joint
+    stiff = jf.backbone_levels(whole, jf.Backbone("A/1:y", [330.0], [1e-5], damping=[0.001]), laws=())
+    assert "not positive" in stiff.warnings[0]
+
+
+def test_the_command_reads_a_backbone(capsys, tmp_path):
+    words = ["levels", "--backbone", str(CASE / "backbone.csv"), "--model", str(CASE / "assembly.toml"), "--channel"]
+    assert main([*words, "A/1:y", "--laws", "iwan", "--output", str(tmp_path / "out.csv")]) == 0
+    assert "loss factor" in capsys.readouterr().out
+    true = Sliders.iwan(*IWAN)
+    with (tmp_path / "out.csv").open() as file:
+        for row in csv.DictReader(file):
+            k = true.first_harmonic(np.array([float(row["amplitude"])]))[0]
+            assert float(row["k_low"]) < k.real < float(row["k_high"])
+            assert float(row["loss_factor_low"]) < k.imag / k.real < float(row["loss_factor_high"])
+    assert main([*words, "A/1:y", "--laws", "power", "--json"]) == 0
+    lowest = json.loads(capsys.readouterr().out)["levels"]["theta_z"][0]
+    assert lowest["stiffness"]["low"] < true.first_harmonic(np.array([lowest["amplitude"]]))[0].real
+    assert main([*words, "A/1:y", "a.uff"]) == 2
+    assert "leave out files" in capsys.readouterr().err
+
+
+def test_what_does_not_belong_together_is_an_error():
+    freq, h = chains(lambda freq, a, b: np.full(freq.size, 2000 + 100j))
+    fit = jf.identify(freq, jf.pollute(h, 0.03, seed=1), ["x"])
+    force = jf.Drive("force", 1.0)
+    for fits, drives, options, text in (
+        ([fit], [force, force], {}, "as many"),
+        ([fit, fit], [force, force], {"labels": ["a", "a"]}, "labels must name"),
+        ([fit], [jf.Drive("response", 1.0, "j:y")], {}, "'j:y' was held, but the fit has only j:x, k:x"),
+        ([fit], [jf.Drive("joint", 1.0, "y")], {}, "'y' was held"),
+        ([fit], [force], {"laws": ["voigt"]}, "laws"),
+        ([jf.fit_from_dict(jf.fit_to_dict(fit))], [force], {}, "no FRFs behind it"),
+    ):
+        with pytest.raises(ValueError, match=text):
+            jf.levels(fits, drives, **options)
+    with pytest.raises(ValueError, match="a force names no channel"):
+        jf.Drive("force", 1.0, "x")
+    with pytest.raises(ValueError, match="channel must name what was held"):
+        jf.Drive("joint", 1.0)
+
+
+def test_the_command_writes_table_page_and_csv(capsys, tmp_path):
+    lines = (CASE / "tests.csv").read_text().splitlines()
+    table = tmp_path / "tests.csv"
+    table.write_text("\n".join([lines[0], *(f"{CASE}/{line}" for line in (lines[5], lines[1]))]) + "\n")
+    words = ["levels", "--table", str(table), "--model", str(CASE / "assembly.toml"), "--held", "B/25:y"]
+    words += ["--report", str(tmp_path / "page.html"), "--output", str(tmp_path / "out.csv"), "--laws", "power"]
+    assert main(words) == 0
+    shown = capsys.readouterr().out
+    assert shown.index("level_1") < shown.index("level_5")
+    page = (tmp_path / "page.html").read_text()
+    assert "theta_z over amplitude" in page
+    assert "power" in page
+    header, *rows = (tmp_path / "out.csv").read_text().splitlines()
+    assert header.startswith("dof,test,amplitude")
+    assert [row.split(",")[1] for row in rows] == ["level_1", "level_5"]
+
+
+@pytest.mark.parametrize(
+    ("words", "status", "text"),
+    [
+        (["a.uff"], 2, "--model is missing"),
+        (["a.uff", "--model", "m.toml"], 2, "--level must name 1 levels"),
+        (["--model", "m.toml"], 2, "name the files"),
+        (["a.uff", "--model", "m.toml", "--table", "t.csv"], 2, "leave out those"),
+        (["--model", "m.toml", "--table", "t.csv"], 1, "line 2: the level 'high' is no number"),
+        (["a.uff", "--model", "m.toml", "--level", "-1"], 1, "a: level must be positive"),
+    ],
+)
+def test_wrong_words_of_the_command(words, status, text, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("t.csv").write_text("file,level\na.uff,high\n")
+    assert main(["levels", *words]) == status
+    assert text in capsys.readouterr().err
