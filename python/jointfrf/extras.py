@@ -8,8 +8,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from jointfrf.errors import FileContentError, first_line
-
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
 
@@ -101,6 +99,8 @@ def load_plugin(entry: EntryPoint, is_right: Callable[[Any], bool], what: str) -
     FileContentError
         It cannot be loaded, or is not `what` it must be.
     """
+    from jointfrf.errors import FileContentError  # imports numpy, which a command that only asks for help does not need
+
     found = plugin_call(entry, lambda: entry.load())
     if not plugin_call(entry, lambda: is_right(found)):
         raise FileContentError(f"{_plugin(entry)} is not {what}")
@@ -115,6 +115,8 @@ def plugin_call(entry: EntryPoint, function: Callable[..., _T], *arguments: Any)
     FileContentError
         It raised an error of its own: none of a file that it was given, none of a missing package.
     """
+    from jointfrf.errors import FileContentError, first_line
+
     try:
         return function(*arguments)
     except (FileContentError, MissingPackageError, MemoryError):
