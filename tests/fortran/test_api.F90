@@ -158,8 +158,8 @@ contains
                              line_info, rcond, info)
     call good('receptance_modal')
     call check_same(h, expected, 'receptance_modal')
-    call jf_receptance_modal('T', 4_ip, n_freq, 3_ip, 2_ip, omega, lambda, damping, eta, transpose(phi_out), &
-                             transpose(phi_in), h_t, line_info, rcond, info)
+    call jf_receptance_modal('T', 4_ip, n_freq, 3_ip, 2_ip, omega, lambda, damping, eta, transposed(phi_out), &
+                             transposed(phi_in), h_t, line_info, rcond, info)
     call good('receptance_modal T')
     call check_same(transposed(h_t), expected, 'receptance_modal T')
   end subroutine models
@@ -266,7 +266,7 @@ contains
     call jf_compliance_factors('N', 2_ip, 3_ip, n_freq, gamma, t, found, line_info, rcond, info)
     call good('compliance_factors')
     call check_same(found, factors, 'compliance_factors')
-    call jf_compliance_factors('T', 2_ip, 3_ip, n_freq, transposed(gamma), transpose(t), found_t, line_info, rcond, &
+    call jf_compliance_factors('T', 2_ip, 3_ip, n_freq, transposed(gamma), transposed(t), found_t, line_info, rcond, &
                                info)
     call good('compliance_factors T')
     call check_same(transposed(found_t), factors, 'compliance_factors T')
@@ -277,9 +277,9 @@ contains
                                     line_info, rcond, info)
       call good('compliance_covariance')
       call check_same(covariance, propagated, 'compliance_covariance')
-      call compliance_covariance(.true., transposed(gamma), transpose(t), variance_t, reciprocal == 1, propagated, &
+      call compliance_covariance(.true., transposed(gamma), transposed(t), variance_t, reciprocal == 1, propagated, &
                                  line_info, rcond, info)
-      call jf_compliance_covariance('T', int(reciprocal, ip), 2_ip, 3_ip, n_freq, transposed(gamma), transpose(t), &
+      call jf_compliance_covariance('T', int(reciprocal, ip), 2_ip, 3_ip, n_freq, transposed(gamma), transposed(t), &
                                     variance_t, covariance, line_info, rcond, info)
       call good('compliance_covariance T')
       call check_same(covariance, propagated, 'compliance_covariance T')
@@ -312,8 +312,8 @@ contains
     call jf_transform('N', 2_ip, 4_ip, 3_ip, 5_ip, n_freq, wide, t_out, t_in, new, line_info, rcond, info)
     call good('transform')
     call check_same(new, transformed, 'transform')
-    call jf_transform('T', 2_ip, 4_ip, 3_ip, 5_ip, n_freq, transposed(wide), transpose(t_out), transpose(t_in), new_t, &
-                      line_info, rcond, info)
+    call jf_transform('T', 2_ip, 4_ip, 3_ip, 5_ip, n_freq, transposed(wide), transposed(t_out), &
+                      transposed(t_in), new_t, line_info, rcond, info)
     call good('transform T')
     call check_same(transposed(new_t), transformed, 'transform T')
   end subroutine differences

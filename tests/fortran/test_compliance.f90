@@ -108,7 +108,7 @@ contains
       end do
       call check_close(found, expected, tolerance, 'factors')
     end do
-    call compliance_factors(.true., transposed(gamma), transpose(t), factors_t, line_info, rcond_t, info)
+    call compliance_factors(.true., transposed(gamma), transposed(t), factors_t, line_info, rcond_t, info)
     call check_same(transposed(factors_t), factors, 'factors, transposed')
     call check_same(rcond_t, rcond, 'factors: rcond knows no order of storage')
   end subroutine factors_against_derivatives
@@ -178,8 +178,8 @@ contains
     call compliance_covariance(.false., gamma, t, variance, reciprocal, covariance, line_info, rcond, info)
     call check(info == 0 .and. all(line_info == 0) .and. all(rcond > 0.0_dp .and. rcond < 1.001_dp), 'covariance: good')
     call check_close(covariance, expected, tolerance, 'covariance')
-    call compliance_covariance(.true., transposed(gamma), transpose(t), variance_t, reciprocal, covariance, line_info, &
-                               rcond_t, info)
+    call compliance_covariance(.true., transposed(gamma), transposed(t), variance_t, reciprocal, covariance, &
+                               line_info, rcond_t, info)
     do i = 1, lines
       expected(:, :, i) = reordered(expected(:, :, i), n)
       ! E[dC_ab conj(dC_cd)] stored (in, out): the transpose of a Hermitian matrix
@@ -209,7 +209,7 @@ contains
     gamma = random_regular(m, 1)
     h = gamma(:, :, 1)
     if (reciprocal) h = (h + transpose(h))/2
-    gamma(:, :, 1) = matmul(t, matmul(h, transpose(t)))
+    gamma(:, :, 1) = matmul(t, matmul(h, transposed(t)))
     do i = 1, draws
       do q = 1, m
         do p = 1, m
@@ -217,7 +217,7 @@ contains
         end do
       end do
       if (reciprocal) e = (e + transpose(e))/2
-      noisy(:, :, i) = matmul(t, matmul(h + e, transpose(t)))
+      noisy(:, :, i) = matmul(t, matmul(h + e, transposed(t)))
     end do
     call joint_compliance(.false., gamma, centre, line_info(:1), rcond(:1), info)
     call joint_compliance(.false., noisy, c, line_info, rcond, info)

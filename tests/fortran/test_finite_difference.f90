@@ -67,7 +67,7 @@ contains
     call transform_receptance(.false., h, weights, weights, h_new, line_info, rcond, info)
     call check(info == 0 .and. line_info(1) == 0 .and. rcond(1) >= 1.0_dp, 'polynomial: good')
     call check_close(h_new, expected, tolerance, 'polynomial')
-    call transform_receptance(.true., transposed(h), transpose(weights), transpose(weights), h_new_t, line_info, &
+    call transform_receptance(.true., transposed(h), transposed(weights), transposed(weights), h_new_t, line_info, &
                               rcond, info)
     call check_same(transposed(h_new_t), h_new, 'polynomial, transposed')
   end subroutine polynomial
@@ -93,15 +93,17 @@ contains
       end do
     end do
     do i = 1, lines
-      expected(:, :, i) = matmul(t_out, matmul(h(:, :, i), transpose(t_in)))
+      expected(:, :, i) = matmul(t_out, matmul(h(:, :, i), transposed(t_in)))
     end do
     call transform_receptance(.false., h, t_out, t_in, h_new, line_info, rcond, info)
     call check(info == 0 .and. all(line_info == 0), 'any sizes: good')
     call check_close(h_new, expected, tolerance, 'any sizes')
-    call transform_receptance(.true., transposed(h), transpose(t_out), transpose(t_in), h_new_t, line_info, rcond, info)
+    call transform_receptance(.true., transposed(h), transposed(t_out), transposed(t_in), h_new_t, line_info, &
+                              rcond, info)
     call check_same(transposed(h_new_t), h_new, 'any sizes, transposed')
     h(m_out, m_in, 2) = cmplx(0.0_dp, not_a_number(), dp)
-    call transform_receptance(.true., transposed(h), transpose(t_out), transpose(t_in), h_new_t, line_info, rcond, info)
+    call transform_receptance(.true., transposed(h), transposed(t_out), transposed(t_in), h_new_t, line_info, &
+                              rcond, info)
     call check(info == 1 .and. line_info(2) == -1, 'any sizes: NaN')
   end subroutine any_transformation
 

@@ -75,7 +75,7 @@ contains
     call receptance_modal(.false., omega, lambda, c, eta, phi_out, phi_in, h, line_info, rcond, info)
     call check(info == 0, 'sum: good')
     call check_close(h, expected, tolerance, 'sum')
-    call receptance_modal(.true., omega, lambda, c, eta, transpose(phi_out), transpose(phi_in), h_t, line_info, &
+    call receptance_modal(.true., omega, lambda, c, eta, transposed(phi_out), transposed(phi_in), h_t, line_info, &
                           rcond, info)
     call check_same(transposed(h_t), h, 'sum, transposed')
   end subroutine against_sum
@@ -109,7 +109,7 @@ contains
     call receptance_modal(.false., omega, lambda, c, eta, phi, phi, h, line_info, rcond, info)
     call check(info == 0, 'reciprocal: good')
     call check_close(h, expected, 1.0e-14_dp, 'reciprocal')
-    call receptance_modal(.true., omega, lambda, c, eta, transpose(phi), transpose(phi), h_t, line_info, rcond, info)
+    call receptance_modal(.true., omega, lambda, c, eta, transposed(phi), transposed(phi), h_t, line_info, rcond, info)
     call check_same(transposed(h_t), h, 'reciprocal, transposed')
   end subroutine reciprocal
 

@@ -43,6 +43,10 @@ module testing
     module procedure untouched_real
   end interface check_untouched
 
+  interface transposed
+    module procedure transposed_lines, transposed_matrix
+  end interface transposed
+
 contains
 
   ! Checks
@@ -255,7 +259,7 @@ contains
   end function random_regular
 
   !> Each line transposed.
-  function transposed(a) result(t)
+  function transposed_lines(a) result(t)
     complex(dp), intent(in) :: a(:, :, :)
     complex(dp) :: t(size(a, 2), size(a, 1), size(a, 3))
     integer :: i
@@ -263,7 +267,15 @@ contains
     do i = 1, size(a, 3)
       t(:, :, i) = transpose(a(:, :, i))
     end do
-  end function transposed
+  end function transposed_lines
+
+  !> gfortran 13 and 14 hand over `transpose(a)` wrongly where an argument is contiguous and a target.
+  function transposed_matrix(a) result(t)
+    real(dp), intent(in) :: a(:, :)
+    real(dp) :: t(size(a, 2), size(a, 1))
+
+    t = transpose(a)
+  end function transposed_matrix
 
   ! References
 
