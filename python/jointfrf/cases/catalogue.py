@@ -10,6 +10,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from jointfrf.cases.comparison import verdict_sentence
 from jointfrf.cases.keys import Case, CaseKeys, ExpectedKeys
 from jointfrf.cases.kind import CaseKind
 from jointfrf.cases.workers import Workers
@@ -307,6 +308,8 @@ def run_case(
         summary=summary,
         tables=tables,
         figures=list(zip(figures, drawn, strict=True)),
+        verdict=verdict_sentence(summary),
+        headline=next((key for key in kind.headline if any(one.key == key for one in figures)), ""),
         subject="The case",
         text=_text(case.folder, "README.md"),
         sources=[("case.toml", _text(case.folder, "case.toml"))],
@@ -338,8 +341,10 @@ def write_results(
 
 def _about(case: Case, count: int) -> str:
     freq = case.freq_hz
+    # A case of the user's own has no section of a source.
+    where = f"Section {case.section}. " if case.section[:1].isdigit() else ""
     return (
-        f"Section {case.section}. {count} realisations of each noise level, seed {case.seed}; "
+        f"{where}{count} realisations of each noise level, seed {case.seed}; "
         f"{freq.size} frequency lines from {freq[0]:g} to {freq[-1]:g} Hz."
     )
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from jointfrf.cases.keys import ExpectedFrequencies
 from jointfrf.report.table import Cell, Table
 
-__all__ = ["agreement", "failing_rows", "frequency_table", "verdict"]
+__all__ = ["agreement", "failing_rows", "frequency_table", "verdict", "verdict_sentence"]
 
 
 def verdict(good: bool | None) -> str:
@@ -81,3 +81,17 @@ def agreement(tables: Sequence[Table]) -> Table:
             cells.append((table.title, *group, f"{good} of {len(judged)}", others, verdict(good == len(judged))))
     columns = ("table", "noise", "bands", "rows that fit", "parameters that do not", "")
     return Table("agreement", "What fits", columns, tuple(cells), failing_rows(cells))
+
+
+def verdict_sentence(summary: Sequence[Table]) -> str:
+    """Say how many of the comparisons counted by `agreement` fit, and in which tables others do not; "" without any."""
+    table = next((one for one in summary if one.key == "agreement" and one.rows), None)
+    if table is None:
+        return ""
+    total, failing = len(table.rows), list(dict.fromkeys(str(table.rows[i][0]) for i in table.failing))
+    if not failing:
+        return f"All {total} comparisons with what is known of the case fit." if total > 1 else "What is known fits."
+    good = total - len(table.failing)
+    return (
+        f"{good} of {total} comparisons with what is known of the case fit. Not all rows fit in: {'; '.join(failing)}."
+    )

@@ -174,6 +174,8 @@ class CaseKind(Generic[CaseT, ResultT]):
         ``groups(case, choice)`` returns what a study of the case computes, see `EstimateGroup`. It raises ValueError.
     not_printed : tuple of str
         Keys of tables that the report has but that are not printed.
+    headline : tuple of str
+        Keys of figures: the first of them that there is stands before the tables of the report.
 
     Examples
     --------
@@ -192,6 +194,7 @@ class CaseKind(Generic[CaseT, ResultT]):
     numbers: Callable[[ResultT], dict[str, Any]]
     groups: Callable[[CaseT, StudyChoice], list[EstimateGroup]] | None = None
     not_printed: tuple[str, ...] = ()
+    headline: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:

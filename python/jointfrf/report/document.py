@@ -18,7 +18,7 @@ from jointfrf.kernel.arguments import FloatArray
 from jointfrf.report.chart import Chart, chart_view, style_rules
 from jointfrf.report.draw import Drawing
 from jointfrf.report.figure import Figure
-from jointfrf.report.table import VERDICT, Table, shown, turned, written
+from jointfrf.report.table import VERDICT, Table, shown, turned, without_repeats, written
 from jointfrf.spelling import visible
 
 __all__ = [
@@ -230,7 +230,7 @@ def _map_view(part: HeatMap) -> dict[str, Any]:
 
 
 def _table_view(table: Table) -> dict[str, Any]:
-    table = shown(table)
+    table = without_repeats(shown(table))
     if len(table.columns) > _WIDEST and len(table.rows) < _WIDEST:
         table = turned(table)
     cells = [
@@ -274,6 +274,10 @@ class Page:
         Shown as it is written; left out if empty.
     sources : sequence of (name, text)
         Shown when the reader asks for them.
+    verdict : str
+        The sentence that the page begins with.
+    headline : str
+        Key of the figure that follows it, before all tables.
     """
 
     title: str
@@ -284,14 +288,19 @@ class Page:
     subject: str = ""
     text: str = ""
     sources: Sequence[tuple[str, str]] = ()
+    verdict: str = ""
+    headline: str = ""
 
     @property
     def document(self) -> Document:
         """The page as sections and their parts."""
+        pictures = [Picture(figure, drawing) for figure, drawing in self.figures]
+        first = [one for one in pictures if one.figure.key == self.headline]
+        said = [Words([self.verdict], "findings")] if self.verdict else []
         sections = [
-            Section("summary", "Summary", self.summary),
+            Section("summary", "Summary", [*said, *first, *self.summary]),
             Section("tables", "Tables", self.tables),
-            Section("figures", "Figures", [Picture(figure, drawing) for figure, drawing in self.figures]),
+            Section("figures", "Figures", [one for one in pictures if one not in first]),
         ]
         if self.subject:
             texts = ([Listing("", self.text)] if self.text else []) + [Listing(*own) for own in self.sources]

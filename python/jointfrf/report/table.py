@@ -23,6 +23,7 @@ __all__ = [
     "shown",
     "table_csv",
     "turned",
+    "without_repeats",
     "written",
 ]
 
@@ -32,6 +33,8 @@ Cell = str | float | Parameter | None
 VERDICT = "verdict"
 #: Significant digits of values and of percentages.
 _DIGITS, _DIGITS_OF_PERCENT = 5, 3
+#: Percentages below this are written as being below it: no measurement and no model is so exact.
+_LEAST_PERCENT = 1e-3
 #: What a formula of a spreadsheet begins with.
 _FORMULA = ("=", "+", "-", "@")
 #: Numbers with blanks between, which are none.
@@ -92,6 +95,29 @@ def shown(table: Table) -> Table:
     return replace(table, columns=columns, rows=tuple(first(row) for row in table.rows))
 
 
+def without_repeats(table: Table) -> Table:
+    """Return a table without percentiles that repeat their median, then without columns that hold nothing.
+
+    Examples
+    --------
+    >>> from jointfrf.report.table import Table, without_repeats
+    >>> columns = ("FRF", "peak: median, %", "peak: 2.5 %", "peak: 97.5 %", "thesis")
+    >>> table = without_repeats(Table("e", "Errors", columns, (("a", 0.0, 0.0, 0.0, None), ("b", 1.0, 1.0, 1.0, ""))))
+    >>> table.columns, table.rows
+    (('FRF', 'peak: median, %'), (('a', 0.0), ('b', 1.0)))
+    """
+    ends = [c for c, name in enumerate(table.columns) if name.endswith("97.5 %") and c > 1]
+    rows = [list(row) for row in table.rows]
+    for row in rows:
+        for c in ends:
+            if row[c] == row[c - 1] == row[c - 2]:
+                row[c] = row[c - 1] = None
+    kept = [c for c in range(len(table.columns)) if not rows or any(row[c] not in (None, "") for row in rows)]
+    return replace(
+        table, columns=tuple(table.columns[c] for c in kept), rows=tuple(tuple(row[c] for c in kept) for row in rows)
+    )
+
+
 def turned(table: Table) -> Table:
     """Return a table of many columns with a row for each of its numbers, and a column for each row.
 
@@ -120,7 +146,7 @@ def number(value: Cell, digits: int = _DIGITS) -> str:
         return str(value)
     if value == 0 or 1e-3 <= abs(value) < 10**6:
         places = digits if value == 0 else max(0, digits - 1 - int(np.floor(np.log10(abs(value)))))
-        text = f"{value:.{places}f}"
+        text = f"{value + 0.0:.{places}f}"  # a zero has no sign
         return text.rstrip("0").rstrip(".") if "." in text else text
     mantissa, _, exponent = f"{value:.{digits - 1}e}".partition("e")
     return f"{mantissa.rstrip('0').rstrip('.') if '.' in mantissa else mantissa}e{int(exponent)}"
@@ -129,7 +155,14 @@ def number(value: Cell, digits: int = _DIGITS) -> str:
 def written(table: Table) -> list[list[str]]:
     """Write the cells of a table for a reader: values with five digits, percentages with three."""
     digits = [_DIGITS_OF_PERCENT if column in table.percentages else _DIGITS for column in table.columns]
-    return [[number(cell, d) for cell, d in zip(row, digits, strict=True)] for row in table.rows]
+    return [[_written(cell, d) for cell, d in zip(row, digits, strict=True)] for row in table.rows]
+
+
+def _written(cell: Cell, digits: int) -> str:
+    """Write a cell; a percentage that nobody distinguishes from zero as one that is small."""
+    if digits == _DIGITS_OF_PERCENT and isinstance(cell, float) and 0 < abs(cell) < _LEAST_PERCENT:
+        return f"{'< ' if cell > 0 else '> -'}{_LEAST_PERCENT:g}"
+    return number(cell, digits)
 
 
 def as_text(table: Table) -> str:

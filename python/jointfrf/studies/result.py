@@ -200,8 +200,8 @@ def _write_report(
     check_extras("matplotlib", "jinja2")
     drawn = [(figure, draw(figure)) for figure in figures]
     sections = [
-        Section("estimates", "Estimates", [table]),
-        Section("figures", "Figures", [Picture(figure, drawing) for figure, drawing in drawn]),
+        Section("summary", "Estimates", [*(Picture(*one) for one in drawn[:1]), table]),
+        Section("figures", "Figures", [Picture(*one) for one in drawn[1:]]),
         Section("subject", "The study", [Listing("case and design", json.dumps(record.identity, indent=1))]),
     ]
     document = Document(f"Study: {record.title}", _about(record), sections)

@@ -2,6 +2,7 @@
 
 import ast
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,13 +10,14 @@ import pytest
 
 import jointfrf as jf
 import jointfrf.report
+from jointfrf.cases.comparison import verdict_sentence
 from jointfrf.dofs import Parameter
 from jointfrf.report.axes import bulk_limits, modulus_label, parameter_label, parameter_lines
 from jointfrf.report.document import Page, make_document
 from jointfrf.report.draw import draw
 from jointfrf.report.figure import Curve, Figure, Panel
 from jointfrf.report.fit import fit_figures
-from jointfrf.report.table import Table, as_text, plain_rows, table_csv
+from jointfrf.report.table import Table, as_text, plain_rows, table_csv, written
 
 
 def test_the_report_room_knows_of_no_case():
@@ -84,6 +86,28 @@ def test_a_page_of_neutral_parts():
     assert text.count('class="failing"') == 2
     assert "subject" not in make_document(Page("t", "", [], [], []).document)
     assert not re.search(r'(?:src|href)="(?!data:|#)', text)
+
+
+def test_a_page_begins_with_its_verdict_and_one_figure_before_all_tables():
+    x = np.arange(1.0, 5.0)
+    pictures = [(one, draw(one)) for one in (Figure(key, key, (Panel("", "x", "y", (Curve("a", x, x, "actual"),)),))
+                                             for key in ("other", "estimates"))]  # fmt: skip
+    page = Page("A", "", [SUMMARY], [TABLE], pictures, verdict="1 of 2 fit.", headline="estimates")
+    text = make_document(page.document)
+    places = [text.index(part) for part in ("1 of 2 fit.", 'id="estimates"', 'id="short"', 'id="k"', 'id="other"')]
+    assert places == sorted(places)
+    assert text.count('id="estimates"') == 1
+    counted = replace(SUMMARY, key="agreement")
+    assert verdict_sentence([TABLE, counted]).startswith("0 of 1 comparisons")
+    assert verdict_sentence([replace(counted, failing=())]) == "What is known fits."
+    assert verdict_sentence([TABLE]) == ""
+
+
+def test_numbers_on_a_page_have_no_false_sign_and_no_false_digits():
+    columns = ("error, %", "x, mm")
+    table = Table("n", "Numbers", columns, ((2.6e-7, -0.0), (-2.6e-7, 0.25), (0.0, 1e-7)), percentages=columns[:1])
+    assert written(table) == [["< 0.001", "0"], ["> -0.001", "0.25"], ["0", "1e-7"]]
+    assert plain_rows(table)[0][0] == 2.6e-7
 
 
 @pytest.fixture

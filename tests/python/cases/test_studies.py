@@ -14,6 +14,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from multiprocessing import active_children
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -25,6 +26,7 @@ from jointfrf.cases.catalogue import find_case, read_case
 from jointfrf.cases.known_joint.exact import exact_frfs
 from jointfrf.cases.known_joint.realisations import estimate_realisations
 from jointfrf.cli.parser import command_parser
+from jointfrf.studies.summary import ParameterSummary, study_figures
 from studied_case import CASE, DESIGN, WORDS, N, broken_off, doubled, same
 
 
@@ -200,6 +202,22 @@ def test_the_bound_is_that_of_the_variance_of_the_noise(tmp_path):
     assert (whole > 0).all()
     np.testing.assert_allclose(per_part, np.sqrt(2) * whole)
     assert np.isnan(of_modulus).all()
+
+
+def test_errors_at_the_bound_lie_in_the_band_beside_it():
+    rng, rows, bound = np.random.default_rng(7), [], 0.02
+    for level, count in ((1.0, 8), (2.0, 50)):
+        errors = bound * rng.standard_normal((4000, count))
+        shared = dict(noise="n", estimator="e", parameter="k_x", unit="N/m", actual=1.0, count=count + 3, failed=3,
+                      mean=1.0, std=bound, median=1.0, low=0.9, high=1.1, bias=0.0, coverage=np.nan)  # fmt: skip
+        rmse = np.sqrt((errors**2).mean(axis=1))
+        rows.append((ParameterSummary({"noise": level}, rmse=float(rmse[0]), bound=bound, **shared), rmse))
+    identity = {"factors": {"noise": [1.0, 2.0]}}
+    figures = study_figures(SimpleNamespace(identity=identity), [row for row, _ in rows])
+    (ribbon,) = next(one for one in figures if one.key.startswith("rmse")).panels[0].ribbons
+    for low, high, (_, rmse) in zip(ribbon.low, ribbon.high, rows, strict=True):
+        inside = np.mean((100 * rmse > low) & (100 * rmse < high))
+        assert abs(inside - 0.95) < 0.015  # 4000 draws: four standard errors
 
 
 def test_a_modelled_joint(tmp_path):

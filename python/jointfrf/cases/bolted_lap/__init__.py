@@ -29,4 +29,5 @@ KIND: CaseKind[BoltedLapCase, BoltedLapResult] = CaseKind(
     summary=build_summary,
     numbers=build_numbers,
     groups=estimate_groups,
+    headline=("lines-k",),
 )

@@ -31,4 +31,5 @@ KIND: CaseKind[KnownJointCase, KnownJointResult] = CaseKind(
     numbers=build_numbers,
     groups=estimate_groups,
     not_printed=("bands", "blocks", "regenerated"),
+    headline=("noise", "noise-k"),
 )

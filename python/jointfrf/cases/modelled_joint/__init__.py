@@ -21,4 +21,5 @@ KIND: CaseKind[ModelledJointCase, ModelledJointResult] = CaseKind(
     summary=build_summary,
     numbers=build_numbers,
     groups=estimate_groups,
+    headline=("stiffness",),
 )
