@@ -202,6 +202,8 @@ _SPREAD = (2.5, 50, 97.5)
 _BULK = (5, 95)
 #: Margin around what is shown, as a share of its extent, and at least as a share of the largest value.
 _ROOM, _LEAST_ROOM = 0.15, 0.05
+#: The same where nothing but rounding limits what is shown: numbers along the axis have six digits then.
+_ROUNDING = 1e-5
 #: How far an axis reaches from a value that is shown in any case, in such values.
 _FURTHEST = 3.0
 
@@ -266,7 +268,10 @@ def percentile_lines(lines: FloatArray) -> FloatArray:
 
 
 def bulk_limits(
-    values: Sequence[FloatArray], shown: Sequence[float] = (), around: float | None = None
+    values: Sequence[FloatArray],
+    shown: Sequence[float] = (),
+    around: float | None = None,
+    least_room: float = _LEAST_ROOM,
 ) -> tuple[float, float]:
     """Limits of an axis that show nine tenths of the values: a few lines near a singular matrix would hide them.
 
@@ -278,6 +283,8 @@ def bulk_limits(
         Values that lie within the limits in any case.
     around : float, optional
         One more such value; the limits do not go further from it than three times its size.
+    least_room : float
+        Margin at least, as a share of the largest value: 0 where intervals say how exact values are.
 
     Returns
     -------
@@ -291,13 +298,13 @@ def bulk_limits(
     >>> round(low, 2), round(high, 2)
     (0.55, 4.45)
     """
-    every = np.concatenate([np.ravel(own) for own in values])
+    every = np.concatenate([np.empty(0), *(np.ravel(own) for own in values)])
     every = every[np.isfinite(every)]
-    low, high = np.percentile(every, _BULK) if every.size else (0.0, 0.0)
-    low, high = min([low, *shown]), max([high, *shown])
+    bulk = [float(end) for end in np.percentile(every, _BULK)] if every.size else []
+    low, high = min([*bulk, *shown], default=0.0), max([*bulk, *shown], default=0.0)
     if around is not None:
         reach = _FURTHEST * abs(around) or np.inf
         low, high = max(min(low, around), around - reach), min(max(high, around), around + reach)
     # Round-off is not to fill a panel.
-    room = max(_ROOM * (high - low), _LEAST_ROOM * max(abs(low), abs(high))) or 1.0
+    room = max(_ROOM * (high - low), max(least_room, _ROUNDING) * max(abs(low), abs(high))) or 1.0
     return float(low - room), float(high + room)

@@ -14,6 +14,7 @@ import numpy as np
 
 from jointfrf.dofs import Parameter
 from jointfrf.extras import check_extras
+from jointfrf.identification.findings import Finding, worst_first
 from jointfrf.kernel.arguments import FloatArray
 from jointfrf.report.chart import Chart, chart_view, style_rules
 from jointfrf.report.draw import Drawing
@@ -46,10 +47,14 @@ _DENSE = 8
 
 @dataclass(frozen=True)
 class Words:
-    """Sentences: paragraphs, or with `kind` a list of notes, warnings or findings."""
+    """Sentences: paragraphs, or with `kind` a list of notes, warnings or findings.
+
+    `folded` has for each sentence the texts that are shown when the reader asks for them, and on paper.
+    """
 
     sentences: Sequence[str]
     kind: str = ""
+    folded: Sequence[Sequence[str]] = ()
 
 
 @dataclass(frozen=True)
@@ -72,7 +77,10 @@ class Sketch:
 
 @dataclass(frozen=True)
 class HeatMap:
-    """Numbers by row and column, shaded from `light` (no shade) to `dark`; NaN is left empty."""
+    """Numbers by row and column, shaded from `light` (no shade) to `dark`; NaN is left empty.
+
+    With `log` the shade goes with the logarithm, up to the largest value if that is above `dark`.
+    """
 
     key: str
     title: str
@@ -84,6 +92,13 @@ class HeatMap:
     dark: float
     note: str = ""
     digits: int = 2
+    log: bool = False
+
+    @property
+    def darkest(self) -> float:
+        """The value of the darkest shade."""
+        finite = self.values[np.isfinite(self.values)]
+        return max(self.dark, float(finite.max())) if self.log and finite.size else self.dark
 
 
 @dataclass(frozen=True)
@@ -130,9 +145,45 @@ def section_of_command(command: str) -> Section:
     return Section("made", "How this was made", [Listing("", command)] if command else [])
 
 
-def words_of_findings(warnings: Sequence[str], notes: Sequence[str]) -> list[Words]:
-    """Return lists of warnings and notes, those that hold any."""
-    return [Words(texts, kind) for texts, kind in ((warnings, "warnings"), (notes, "notes")) if texts]
+#: Characters of a finding that stand in one line of a page.
+_ONE_LINE = 84
+
+
+def words_of_findings(findings: Sequence[Finding]) -> list[Words]:
+    """Return warnings and notes as lists, the worst first: a line for each kind; all of a long text is folded below it.
+
+    Examples
+    --------
+    >>> from jointfrf.identification.findings import note, warn
+    >>> from jointfrf.report.document import words_of_findings
+    >>> (words,) = words_of_findings([note("choice", "damping of y: viscous"), note("choice", "damping of x: none")])
+    >>> words.sentences, words.folded
+    (['damping of y: viscous (and 1 more)'], [['damping of y: viscous.', 'damping of x: none.']])
+    """
+    words = []
+    for severity, style in (("warning", "warnings"), ("note", "notes")):
+        groups: dict[str, list[str]] = {}
+        for one in worst_first(findings):
+            if one.severity == severity:
+                groups.setdefault(one.kind, []).append(one.text)
+        heads = [_head(texts) for texts in groups.values()]
+        folded = [
+            [f"{text}." for text in texts] if head.rstrip(".") != texts[0] else []
+            for head, texts in zip(heads, groups.values(), strict=True)
+        ]
+        if heads:
+            words.append(Words(heads, style, folded))
+    return words
+
+
+def _head(texts: Sequence[str]) -> str:
+    """Return the line of a group of findings: the first, as far as it goes in a line."""
+    first, more = texts[0], f" (and {len(texts) - 1} more)" if len(texts) > 1 else ""
+    if len(first) > _ONE_LINE:
+        ends = [match.start() for match in re.finditer(r"[;,:(](?= )|(?<= )[(]| (?=%|and|which|because)", first)]
+        cut = max((end for end in ends if _ONE_LINE // 3 < end <= _ONE_LINE), default=first.rfind(" ", 0, _ONE_LINE))
+        first = first[: cut if cut > 0 else _ONE_LINE].rstrip(" ;,:(") + " …"
+    return first + (more or ("" if first.endswith("…") else "."))
 
 
 def make_document(document: Document) -> str:
@@ -220,13 +271,24 @@ def _as_address(svg: bytes) -> str:
 
 def _map_view(part: HeatMap) -> dict[str, Any]:
     """Return the cells of a map: text, and its shade from 0 to 100."""
-    span = part.dark - part.light
-    shades = 100 * np.clip((np.nan_to_num(part.values, nan=part.light) - part.light) / span, 0, 1)
+    known = np.where(np.isfinite(part.values), part.values, part.light)
+    light, dark = part.light, part.darkest
+    if part.log:
+        known, light, dark = np.log(np.maximum(known, light)), np.log(light), np.log(dark)
+    shades = 100 * np.clip((known - light) / (dark - light), 0, 1)
     rows = [
-        (name, [("" if np.isnan(v) else f"{v:.{part.digits}f}", f"{s:.0f}") for v, s in zip(own, shade, strict=True)])
+        (name, [(_map_text(v, part.digits), f"{s:.0f}") for v, s in zip(own, shade, strict=True)])
         for name, own, shade in zip(part.rows, part.values.tolist(), shades.tolist(), strict=True)
     ]
-    return {"map": part, "rows": rows, "dense": len(part.columns) > _DENSE}
+    ends = [f"{value:.3g}" for value in (part.light, part.darkest)]
+    return {"map": part, "rows": rows, "dense": len(part.columns) > _DENSE, "ends": ends}
+
+
+def _map_text(value: float, digits: int) -> str:
+    """Write a cell of a map: of large values as many decimals less as they have digits more."""
+    if np.isnan(value):
+        return ""
+    return f"{value:.{max(digits - (int(np.log10(abs(value))) if abs(value) >= 1 else 0), 0)}f}"
 
 
 def _table_view(table: Table) -> dict[str, Any]:

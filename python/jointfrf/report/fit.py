@@ -63,8 +63,8 @@ def fit_figures(fit: Fit) -> list[Figure]:
         stiffness = Parameter.of_dof("k", dof)
         panels = []
         for label, each, curve, ribbons in (
-            (f"K*, {stiffness.unit}", lines[:, d, d], fitted, _interval(fit, stiffness, freq)),
-            (f"C, {compliance_unit(dof, dof)}", each_compliance[:, d], compliance, ()),
+            (f"K*, {stiffness.unit}", lines[:, d, d], fitted, _intervals(fit, stiffness, freq)),
+            (f"C, {compliance_unit(dof, dof)}", each_compliance[:, d], compliance, ((), ())),
         ):
             own = _EntryLines(fit.method, label, freq, each, curve[:, d, d], used[:, d], ribbons)
             panels += _panels(own if label.startswith("C") else _as_open(own, fit, stiffness))
@@ -82,7 +82,10 @@ def _inverted(k_lines: ComplexArray) -> ComplexArray:
 
 
 class _EntryLines(NamedTuple):
-    """One entry of K* or C: values of each line by itself, as fitted, which lines were used, interval or bound."""
+    """One entry of K* or C: values of each line by itself, as fitted, which lines were used, intervals or bound.
+
+    `intervals` are those of the real and of the imaginary part.
+    """
 
     method: str
     label: str
@@ -90,7 +93,7 @@ class _EntryLines(NamedTuple):
     each: ComplexArray
     fitted: ComplexArray
     used: NDArray[np.bool_]
-    interval: tuple[Ribbon, ...] = ()
+    intervals: tuple[tuple[Ribbon, ...], tuple[Ribbon, ...]] = ((), ())
     bound: float | None = None
 
 
@@ -106,30 +109,46 @@ def _stiffness_found(fit: Fit, freq_hz: FloatArray) -> ComplexArray:
     return k
 
 
-def _of_law(fit: Fit, dof: str, freq_hz: FloatArray) -> tuple[Ribbon, ...]:
-    """Confidence interval of Re K* of a law at each frequency, from the covariance of its parameters."""
+def _of_law(fit: Fit, dof: str, freq_hz: FloatArray) -> tuple[tuple[Ribbon, ...], tuple[Ribbon, ...]]:
+    """Confidence intervals of Re K* and Im K* of a law at each frequency, from the covariance of its parameters."""
     assert fit.laws is not None
     law, names = fit.laws.laws[dof, dof], [one.name for one in fit.parameters]
     fields = enumerate(parameter_name(field.name, dof, dof) for field in law.fields)
     own = [(i, names.index(name)) for i, name in fields if name in names]
     if not own:
-        return ()
-    slopes = law.slopes(2 * np.pi * freq_hz)[[i for i, _ in own]].real
-    at = [place for _, place in own]
-    error = np.sqrt(np.maximum(np.einsum("pf,pq,qf->f", slopes, fit.covariance[np.ix_(at, at)], slopes), 0))
-    middle, reach = law.stiffness(2 * np.pi * freq_hz).real, float(ndtri(0.975))
-    return (Ribbon("95 % interval of Re K*", freq_hz, middle - reach * error, middle + reach * error, "low"),)
+        return (), ()
+    omega, at, ribbons = 2 * np.pi * freq_hz, [place for _, place in own], []
+    slopes, middle = law.slopes(omega)[[i for i, _ in own]], law.stiffness(omega)
+    for part, own_slopes, own_middle in (("Re", slopes.real, middle.real), ("Im", slopes.imag, middle.imag)):
+        variance = np.einsum("pf,pq,qf->f", own_slopes, fit.covariance[np.ix_(at, at)], own_slopes)
+        reach = float(ndtri(0.975)) * np.sqrt(np.maximum(variance, 0))
+        ribbons.append(Ribbon(f"95 % interval of {part} K*", freq_hz, own_middle - reach, own_middle + reach, "low"))
+    return (ribbons[0],), (ribbons[1],)
 
 
-def _interval(fit: Fit, stiffness: Parameter, freq_hz: FloatArray) -> tuple[Ribbon, ...]:
-    """Confidence interval of a stiffness, where it is not open."""
+def _intervals(fit: Fit, stiffness: Parameter, freq_hz: FloatArray) -> tuple[tuple[Ribbon, ...], tuple[Ribbon, ...]]:
+    """Confidence intervals of a stiffness, and of the damping of its DOF if that is one term; none that are open."""
+    dof = stiffness.row
     if fit.laws is not None:
-        return _of_law(fit, stiffness.row, freq_hz)
-    low, high = fit.confidence_interval(0.95)[stiffness.name]
-    if not (np.isfinite(low) and np.isfinite(high)):
-        return ()
-    ends = np.array([fit.freq_hz.min(), fit.freq_hz.max()])
-    return (Ribbon("95 % interval of k", ends, np.full(2, low), np.full(2, high), "low"),)
+        return _of_law(fit, dof, freq_hz)
+    found, ends = fit.confidence_interval(0.95), np.array([freq_hz.min(), freq_hz.max()])
+
+    def ribbon(name: str, label: str, factor: FloatArray) -> tuple[Ribbon, ...]:
+        low, high = found[name]
+        if not (np.isfinite(low) and np.isfinite(high)):
+            return ()
+        return (Ribbon(f"95 % interval of {label}", ends, low * factor, high * factor, "low"),)
+
+    damping = [
+        (name, factor)
+        for name, factor in (
+            (parameter_name("h", dof, dof), np.ones(2)),
+            (parameter_name("c", dof, dof), 2 * np.pi * ends),
+        )
+        if name in found and fit.value[name] != 0
+    ]
+    of_damping = ribbon(damping[0][0], "damping", damping[0][1]) if len(damping) == 1 else ()
+    return ribbon(stiffness.name, "k", np.ones(2)), of_damping
 
 
 def _as_open(lines: _EntryLines, fit: Fit, stiffness: Parameter) -> _EntryLines:
@@ -141,12 +160,12 @@ def _as_open(lines: _EntryLines, fit: Fit, stiffness: Parameter) -> _EntryLines:
 
 
 def _panels(lines: _EntryLines) -> list[Panel]:
-    """Real and imaginary part of one entry; interval and bound belong to the real part."""
+    """Real and imaginary part of one entry; the bound belongs to the real part."""
     panels = []
     used, out = lines.used, ~lines.used
-    for part, values, curve in (
-        ("Re", lines.each.real, lines.fitted.real),
-        ("Im", lines.each.imag, lines.fitted.imag),
+    for part, values, curve, ribbons in (
+        ("Re", lines.each.real, lines.fitted.real, lines.intervals[0]),
+        ("Im", lines.each.imag, lines.fitted.imag, lines.intervals[1]),
     ):
         is_known = np.isfinite(lines.each[used]).any()
         curves = [Curve("each line", lines.freq_hz[used], values[used], "dots")] if is_known else []
@@ -160,8 +179,12 @@ def _panels(lines: _EntryLines) -> list[Panel]:
             shown = [lines.bound]
         if out.any():
             curves.append(Curve("lines left out", lines.freq_hz[out], values[out], "outlying"))
-        ribbons = lines.interval if part == "Re" else ()
-        limits = bulk_limits([values], shown)
+        if ribbons and not is_known:
+            # Without lines by themselves the axis fits the interval.
+            shown += [float(end) for one in ribbons for end in (one.low.min(), one.high.max())]
+            limits = bulk_limits([], shown, least_room=0.0)
+        else:
+            limits = bulk_limits([values], shown)
         panels.append(Panel("", FREQUENCY, f"{part} {lines.label}", tuple(curves), ribbons, y_limits=limits))
     return panels
 

@@ -24,8 +24,10 @@ __all__ = ["ComparedFrfs", "compare_frfs", "compare_model", "frf_figures", "reci
 _MOST = 24
 #: An FRF with less noise than this share of it has none.
 _NO_NOISE = 1e-9
-#: Values from which on cells of a map are shaded, and those of the darkest.
-_LIGHT, _DARK = 1.0, 3.0
+#: Values from which on cells of a map are shaded, and of the darkest unless some are larger.
+_LIGHT, _DARK = 1.0, 10.0
+#: An FRF has signal where its mean square is above so many times that of its noise, which has 1; lines that are asked.
+_SIGNAL, _ASKED = 2.0, 200
 #: Share of the differences that may lie below a panel.
 _LOWEST = 0.05
 
@@ -51,6 +53,8 @@ class ComparedFrfs:
         reciprocal.
     predicted : str
         What is compared with the measured FRFs.
+    silent : int
+        FRFs that hold noise only, as those that are zero by symmetry: they are not drawn.
     """
 
     rows: tuple[str, ...]
@@ -62,6 +66,13 @@ class ComparedFrfs:
     residual: FloatArray
     reciprocity: FloatArray | None
     predicted: str = "regenerated with the joint found"
+    silent: int = 0
+
+    @property
+    def worst(self) -> int:
+        """The number of the drawn FRF that fits worst."""
+        left = [self.residual[entry] for entry in self.entries]
+        return int(np.argmax(np.where(np.isfinite(left), left, -1.0)))
 
 
 def compare_frfs(data: FitData, dofs: tuple[str, ...]) -> ComparedFrfs:
@@ -71,7 +82,8 @@ def compare_frfs(data: FitData, dofs: tuple[str, ...]) -> ComparedFrfs:
     of_channels = modes is not None
     joint_names = tuple(f"{side}:{dof}" for side in "jk" for dof in dofs)
     rows, columns = (data.response_names, data.force_names) if of_channels else (joint_names, joint_names)
-    entries = _entries(data, len(rows), len(columns), of_channels=of_channels, same=same)
+    loud = _is_loud(data, of_channels=of_channels)
+    entries = _entries(data, loud, of_channels=of_channels, same=same)
     p, q = np.array(entries).T
     n_freq = len(data.measured)
     shown = np.empty((2, n_freq, len(entries)), np.complex128)
@@ -105,8 +117,27 @@ def compare_frfs(data: FitData, dofs: tuple[str, ...]) -> ComparedFrfs:
         same = bool((reciprocity > 0).any())
     is_shown = same and data.reciprocal
     return ComparedFrfs(
-        rows, columns, of_channels, entries, shown[0], shown[1], residual, reciprocity if is_shown else None
+        rows, columns, of_channels, entries, shown[0], shown[1], residual, reciprocity if is_shown else None,
+        silent=int((~loud).sum()),
     )  # fmt: skip
+
+
+def _is_loud(data: FitData, *, of_channels: bool) -> NDArray[np.bool_]:
+    """Return which FRFs hold more than noise, shape (n_rows, n_columns); all of them if none does."""
+    asked = np.unique(np.linspace(0, len(data.measured) - 1, min(len(data.measured), _ASKED)).astype(np.intp))
+    h, variance = data.measured[asked], np.stack([data.noise_variance(slice(i, i + 1))[0] for i in asked])
+    if not of_channels:
+        h, variance = data.responses @ h @ data.forces.T, data.responses**2 @ variance @ (data.forces**2).T
+    return _above_noise(abs(h) ** 2, variance)
+
+
+def _above_noise(squares: NDArray[np.floating], variance: NDArray[np.floating]) -> NDArray[np.bool_]:
+    """Return which FRFs are larger than their noise; those that were measured if none is."""
+    known = np.isfinite(squares) & np.isfinite(variance)
+    signal, noise = (np.where(known, values, 0).sum(axis=0) for values in (squares, variance))
+    # Rounding is no signal, where nothing has noise.
+    loud = (signal > _SIGNAL * noise) & (signal > ZERO**2 * signal.max(initial=0.0))
+    return np.asarray(loud if loud.any() else known.any(axis=0), np.bool_)
 
 
 def compare_model(fit: Fit) -> ComparedFrfs:
@@ -114,7 +145,8 @@ def compare_model(fit: Fit) -> ComparedFrfs:
     data = fit.data
     assert isinstance(data, ModelData)
     known = np.isfinite(data.variance).any(axis=0)
-    pairs = [(int(p), int(q)) for p, q in np.argwhere(known)]
+    loud = np.asarray(known & _above_noise(abs(data.measured) ** 2, data.variance), np.bool_)
+    pairs = [(int(p), int(q)) for p, q in np.argwhere(loud)]
     driving = [(p, q) for p, q in pairs if fit.responses[p] == fit.forces[q]]
     rest = [one for one in pairs if one not in driving]
     entries = driving[:_MOST]
@@ -126,7 +158,7 @@ def compare_model(fit: Fit) -> ComparedFrfs:
         residual = np.sqrt(squares / np.where(counts > 0, counts, np.nan))
     return ComparedFrfs(
         fit.responses, fit.forces, True, tuple(entries), data.measured[:, p, q], data.predicted[:, p, q], residual,
-        None, "predicted by the models and the joint found",
+        None, "predicted by the models and the joint found", int((known & ~loud).sum()),
     )  # fmt: skip
 
 
@@ -139,11 +171,9 @@ def _add(squares: FloatArray, counts: FloatArray, own: NDArray[np.floating], var
     counts += known.sum(axis=0)
 
 
-def _entries(
-    data: FitData, n_rows: int, n_columns: int, *, of_channels: bool, same: bool
-) -> tuple[tuple[int, int], ...]:
+def _entries(data: FitData, loud: NDArray[np.bool_], *, of_channels: bool, same: bool) -> tuple[tuple[int, int], ...]:
     """Choose the FRFs to draw: at one channel, then across the joint, then the others; a spread of each where many."""
-    n = len(data.responses) // 2
+    n, (n_rows, n_columns) = len(data.responses) // 2, loud.shape
     side_of_row, side_of_column = (
         list((matrix[n:] != 0).any(axis=0)) if of_channels else [i >= n for i in range(2 * n)]
         for matrix in (data.responses, data.forces)
@@ -153,7 +183,8 @@ def _entries(
     known = {*driving, *across}
     rest = [(p, q) for p in range(n_rows) for q in range(n_columns) if (p, q) not in known]
     kept: list[tuple[int, int]] = []
-    for kind, most in ((driving, _MOST // 3), (across, _MOST // 3), (rest, _MOST)):
+    for pairs, most in ((driving, _MOST // 3), (across, _MOST // 3), (rest, _MOST)):
+        kind = [pair for pair in pairs if loud[pair]]
         kept += _evenly(kind, min(most, _MOST - len(kept)))
     return tuple(kept)
 
@@ -205,7 +236,7 @@ def residual_map(compared: ComparedFrfs) -> HeatMap:
         )
         return HeatMap(
             "residual-map", "Residual by channel, in units of the noise", "response \\ force", compared.rows,
-            compared.columns, compared.residual, _LIGHT, _DARK, note,
+            compared.columns, compared.residual, _LIGHT, _DARK, note, log=True,
         )  # fmt: skip
     note = (
         "Root mean square of measured minus regenerated over the lines used, in units of the noise of the FRF, or of "
@@ -215,7 +246,7 @@ def residual_map(compared: ComparedFrfs) -> HeatMap:
     )
     return HeatMap(
         "residual-map", f"Residual by {where}, in units of the noise", "response \\ force", compared.rows,
-        compared.columns, compared.residual, _LIGHT, _DARK, note,
+        compared.columns, compared.residual, _LIGHT, _DARK, note, log=True,
     )  # fmt: skip
 
 
@@ -229,5 +260,5 @@ def reciprocity_map(compared: ComparedFrfs) -> HeatMap | None:
     )
     return HeatMap(
         "reciprocity-map", "Reciprocity, in units of the noise", "response \\ force", compared.rows, compared.columns,
-        compared.reciprocity, _LIGHT, _DARK, note,
+        compared.reciprocity, _LIGHT, _DARK, note, log=True,
     )  # fmt: skip

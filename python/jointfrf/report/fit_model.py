@@ -19,8 +19,8 @@ _WIDE = 0.1
 _AGREES, _DIFFERS = 0.95, 0.6
 #: Parts of the band in the map of the residual, and lines that each holds at least.
 _PARTS, _LEAST_LINES = 8, 8
-#: Residuals over noise of cells that are shaded first, and darkest.
-_LIGHT, _DARK = 1.0, 3.0
+#: Residuals over noise of cells that are shaded first, and darkest unless some are larger.
+_LIGHT, _DARK = 1.0, 10.0
 #: Unknowns have moved from this many standard deviations of the prior on; the FRFs say little of one whose standard
 #: deviation they leave above this share.
 _MOVED, _UNCHANGED = 1.0, 0.9
@@ -89,7 +89,7 @@ def band_map(fit: Fit) -> HeatMap:
     )
     return HeatMap(
         "residual-band-map", "Residual by channel and band, in units of the noise", "channel \\ band", rows, columns,
-        np.array(values), _LIGHT, _DARK, note,
+        np.array(values), _LIGHT, _DARK, note, log=True,
     )  # fmt: skip
 
 

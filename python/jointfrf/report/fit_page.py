@@ -54,6 +54,8 @@ __all__ = [
 _POINTS, _LEAST = 130_000, 240
 #: FRFs that are shown at once; the others when the reader asks for them.
 _AT_ONCE = 6
+#: Sentences on parameters before the first figure.
+_FIRST_FOUND = 3
 #: Lines of cards that are printed at most.
 _PRINTED = 40
 #: What is said above the charts of a fit with models.
@@ -160,8 +162,10 @@ def _model_sections(fit: Fit, options: ReportOptions) -> list[Section]:
     frfs, joint = frf_figures(compared, fit.freq_hz, up), fit_figures(fit)
     most = _most_points([*frfs, *joint])
     what = "real and imaginary part of joint stiffness K* and compliance C"
+    shown = _charts(frfs, most, fit, _what_frfs(fit))
+    headline = shown.pop(compared.worst)
     return [
-        _summary(fit, compared),
+        _summary(fit, compared, _as_headline(headline)),
         _doubts(fit),
         Section("joint", "Channels", [*_drawn(fit, options.parts), _channels(fit)]),
         Section(
@@ -169,7 +173,7 @@ def _model_sections(fit: Fit, options: ReportOptions) -> list[Section]:
             "Stiffness and compliance over frequency",
             [Words([_HOW_MODEL]), *_charts(joint, most, fit, what)],
         ),
-        _frf_section(fit, compared, frfs, most),
+        _frf_section(fit, compared, shown, most),
         Section("maps", "Agreement and residual", [assurance_map(fit), residual_map(compared), band_map(fit)]),
         Section("unknowns", "Unknowns of the models", [one for one in [unknowns_table(fit)] if one]),
         Section("next", "What to measure next", next_parts(fit)),
@@ -181,8 +185,7 @@ def _model_sections(fit: Fit, options: ReportOptions) -> list[Section]:
 
 
 def _drawn(fit: Fit, parts: Sequence[SketchedPart]) -> list[Part]:
-    names = {dof: dof for dof in (*fit.responses, *fit.forces)}
-    sketch = assembly_sketch(parts, fit.responses, fit.forces, names) if parts else None
+    sketch = assembly_sketch(parts, fit.responses, fit.forces) if parts else None
     return [] if sketch is None else [sketch]
 
 
@@ -211,8 +214,10 @@ def _joint_sections(fit: Fit, data: FitData, options: ReportOptions) -> list[Sec
     information = information_figure(fit, fit.freq_hz[up], shares)
     noise = _noise_figure(fit, data)
     most = _most_points([*frfs, *joint, *(one for one in (information, noise) if one is not None)])
+    shown = _charts(frfs, most, fit, _what_frfs(fit))
+    headline = shown.pop(compared.worst)
     return [
-        _summary(fit, compared),
+        _summary(fit, compared, _as_headline(headline)),
         _doubts(fit),
         Section("joint", "The joint and its channels", _geometry(fit, data)),
         Section(
@@ -225,7 +230,7 @@ def _joint_sections(fit: Fit, data: FitData, options: ReportOptions) -> list[Sec
                 information_table(fit, fit.freq_hz[up], shares),
             ],
         ),
-        _frf_section(fit, compared, frfs, most),
+        _frf_section(fit, compared, shown, most),
         Section("maps", "Residual and reciprocity by channel", _maps(compared)),
         Section("noise", "Noise", _noise_parts(fit, noise, most)),
         _blind_spots(fit, is_square=data.reciprocal and data.response_names == data.force_names),
@@ -255,19 +260,21 @@ def _charts(figures: Iterable[Figure], most: int, fit: Fit, what: str) -> list[C
     return [Chart(replace(figure, heading=""), f"{figure.caption}: {what}, {span}", most) for figure in figures]
 
 
-def _summary(fit: Fit, compared: ComparedFrfs) -> Section:
-    # What the reader sees first is the worst.
+def _summary(fit: Fit, compared: ComparedFrfs, first: Part) -> Section:
+    # What the reader sees first is the worst; the first figure is on the first screen of a phone, too.
     worst = [Words([f"{fit.warnings[0]}."], "warnings")] if fit.warnings else []
     known = compared.residual[np.isfinite(compared.residual)]
     of_channels = float(np.sqrt((known**2).mean())) if known.size else np.nan
-    quality = Words(quality_sentences(fit, of_channels))
+    found = finding_sentences(fit)
     return Section(
         "summary",
         "Summary",
         [
             *worst,
-            Words(finding_sentences(fit), "findings"),
-            quality,
+            Words(found[:_FIRST_FOUND], "findings"),
+            first,
+            *([Words(found[_FIRST_FOUND:], "findings")] if found[_FIRST_FOUND:] else []),
+            Words(quality_sentences(fit, of_channels)),
             parameter_table(fit),
             *([seen_table(fit)] if fit.seen else []),
         ],
@@ -275,8 +282,7 @@ def _summary(fit: Fit, compared: ComparedFrfs) -> Section:
 
 
 def _doubts(fit: Fit) -> Section:
-    warnings, notes = ([f"{text}." for text in texts] for texts in (fit.warnings, fit.notes))
-    return Section("doubts", "Warnings and notes" if warnings else "Notes", words_of_findings(warnings, notes))
+    return Section("doubts", "Warnings and notes" if fit.warnings else "Notes", words_of_findings(fit.findings))
 
 
 def _geometry(fit: Fit, data: FitData) -> list[Part]:
@@ -302,9 +308,23 @@ def _how_joint(fit: Fit) -> str:
     )
 
 
-def _frf_section(fit: Fit, compared: ComparedFrfs, figures: Sequence[Figure], most: int) -> Section:
+def _word(fit: Fit) -> str:
+    return "predicted" if isinstance(fit.data, ModelData) else "regenerated"
+
+
+def _what_frfs(fit: Fit) -> str:
+    return f"measured and {_word(fit)}, modulus and phase"
+
+
+def _as_headline(chart: Chart) -> Chart:
+    caption = f"{chart.figure.caption}: of the FRFs drawn the one that fits worst"
+    return replace(chart, figure=replace(chart.figure, caption=caption))
+
+
+def _frf_section(fit: Fit, compared: ComparedFrfs, charts: Sequence[Chart], most: int) -> Section:
     total = len(compared.rows) * len(compared.columns)
-    total = int(np.isfinite(compared.residual).sum()) if isinstance(fit.data, ModelData) else total
+    total = (int(np.isfinite(compared.residual).sum()) if isinstance(fit.data, ModelData) else total) - compared.silent
+    drawn = len(compared.entries)
     where = "channels" if compared.of_channels else "joint DOFs"
     is_model = isinstance(fit.data, ModelData)
     sentences = [
@@ -317,24 +337,30 @@ def _frf_section(fit: Fit, compared: ComparedFrfs, figures: Sequence[Figure], mo
     ]
     if any(one.kind == "model" for one in fit.findings):
         sentences[-1] += " The errors of the models that are named above are in them."
+    loud = " that hold more than noise" if compared.silent else ""
     sentences.append(
-        f"All {total} FRFs between the {where} are on this page."
-        if len(figures) == total
-        else f"{len(figures)} of {total} FRFs between the {where} are on this page, first those with response and "
-        "force at one place, then those across the joint; the maps below are of all."
+        f"All {total} FRFs between the {where}{loud} are on this page, the one that fits worst in the summary."
+        if drawn == total
+        else f"{drawn} of {total} FRFs between the {where}{loud} are on this page: in the summary the one of them that "
+        "fits worst, here first those with response and force at one place, then those across the joint; the maps "
+        "below are of all."
     )
-    if len(figures) > _AT_ONCE:
+    if compared.silent:
+        sentences[-1] += f" {compared.silent} hold noise only, such as those that are zero by symmetry."
+    if len(charts) > _AT_ONCE:
         sentences[-1] += f" On paper there are the first {_AT_ONCE}."
     if fit.freq_hz.size > most:
         sentences.append(
             f"Curves of more than {most} lines are drawn through the smallest and the largest value of each of "
             f"{most // 2} parts of the band, so that no peak is lost; all numbers are from all lines."
         )
-    word = "predicted" if is_model else "regenerated"
-    charts = _charts(figures, most, fit, f"measured and {word}, modulus and phase")
+    word = _word(fit)
     more = f"{len(charts) - _AT_ONCE} more FRFs"
     return Section(
-        "frfs", f"Measured and {word} FRFs", [Words(sentences), *charts[:_AT_ONCE]], (more, charts[_AT_ONCE:])
+        "frfs",
+        f"Measured and {word} FRFs",
+        [Words(sentences), *charts[:_AT_ONCE]],
+        (more if charts[_AT_ONCE:] else "", charts[_AT_ONCE:]),
     )
 
 
@@ -464,7 +490,7 @@ def with_unit(value: float, unit: str, uncertainty: float | None = None) -> str:
     ('9.9955 MN/m', '5000 N m/rad', '0.976 N m s/rad')
     """
     shown, size = prefixed_unit(unit, abs(value))
-    return f"{_rounded(value / size, None if uncertainty is None else uncertainty / size)} {shown}"
+    return f"{_rounded(value / size, None if uncertainty is None else uncertainty / size)} {shown}".rstrip()
 
 
 def _rounded(value: float, uncertainty: float | None) -> str:
@@ -528,7 +554,8 @@ def _value_sentence(term: FittedParameter, value: float, low: float, high: float
     ends = " and ".join(_rounded(limit / size, reach / size) for limit in (low, high))
     share = f" (±{100 * reach / abs(value):.2g} %)" if abs(value) > reach else ""
     zero = "; not significantly different from zero" if low < 0 < high else ""
-    return f"{_rounded(value / size, reach / size)} {shown}, with 95 % probability between {ends} {shown}{share}{zero}."
+    unit = f" {shown}" if shown else ""
+    return f"{_rounded(value / size, reach / size)}{unit}, with 95 % probability between {ends}{unit}{share}{zero}."
 
 
 def quality_sentences(fit: Fit, of_channels: float = np.nan) -> list[str]:

@@ -138,7 +138,7 @@ def _said(plan: MeasurementPlan) -> Iterator[Part]:
     yield Words(
         [f"Sensors at {', '.join(best.sensors)}; hits at {', '.join(best.hits)}: {errors} (one standard error)."]
     )
-    yield from words_of_findings(plan.warnings, plan.notes)
+    yield from words_of_findings(plan.findings)
 
 
 def _targets(plan: MeasurementPlan) -> Table:

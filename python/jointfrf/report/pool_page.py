@@ -11,6 +11,7 @@ from jointfrf.files import write_file
 from jointfrf.kernel.arguments import check_type
 from jointfrf.pooling.parameter import Estimate, FactorSpread, FactorTrend, PooledParameter
 from jointfrf.pooling.pool import PooledFits
+from jointfrf.report.axes import prefixed_unit
 from jointfrf.report.document import (
     Document,
     Picture,
@@ -25,6 +26,10 @@ from jointfrf.report.figure import Figure, Interval, Level, Panel
 from jointfrf.report.table import Table, csv_cell
 
 __all__ = ["forest_figure", "pool_csv", "write_pool"]
+
+
+#: Fits that are named above the page; the plots name all.
+_NAMED = 6
 
 
 def forest_figure(one: PooledParameter, probability: float = 0.95) -> Figure:
@@ -79,14 +84,13 @@ def write_pool(pooled: PooledFits, path: Path | str, *, command: str = "") -> Pa
 def _document(pooled: PooledFits, command: str) -> Document:
     figures = [forest_figure(one, pooled.probability) for one in pooled.parameters.values()]
     sections = [
-        Section(
-            "summary", "Summary", [Words(list(_sentences(pooled))), *words_of_findings(pooled.warnings, pooled.notes)]
-        ),
+        Section("summary", "Summary", [Words(list(_sentences(pooled))), *words_of_findings(pooled.findings)]),
         Section("forest", "Fits, mean, and the next assembly", [Picture(one, draw(one)) for one in figures]),
         Section("tables", "Tables", [_mean_table(pooled), _spread_table(pooled), _trend_table(pooled)]),
         section_of_command(command),
     ]
-    about = f"{len(pooled.labels)} fits of the same joint: {', '.join(pooled.labels)}."
+    named = f": {', '.join(pooled.labels)}" if len(pooled.labels) <= _NAMED else ""
+    about = f"{len(pooled.labels)} fits of the same joint{named}."
     return Document(f"A joint from {len(pooled.labels)} fits", about, sections)
 
 
@@ -94,10 +98,14 @@ def _sentences(pooled: PooledFits) -> Iterator[str]:
     percent = f"{100 * pooled.probability:g} %"
     for one in pooled.parameters.values():
         spread = "; ".join(f"over {own.factor} {_spread(one, own.value)}" for own in one.spreads)
+        unit, size = prefixed_unit(one.unit, abs(one.mean.value))
+        value, low, high, least, most = (
+            f"{number / size:.4g}"
+            for number in (one.mean.value, one.mean.low, one.mean.high, one.next_one.low, one.next_one.high)
+        )
         yield (
-            f"{one.name} = {one.mean.value:.5g} {one.unit} ({percent}: {one.mean.low:.4g} to {one.mean.high:.4g}); "
-            f"scatter {spread}; the next assembly lies between {one.next_one.low:.4g} and {one.next_one.high:.4g} "
-            f"with {percent}."
+            f"{one.name} = {value} {unit} ({percent}: {low} to {high}); scatter {spread}; the next assembly lies "
+            f"between {least} and {most} {unit} with {percent} probability."
         )
 
 

@@ -19,10 +19,15 @@ __all__ = ["InterfacePoint", "SketchedPart", "assembly_sketch", "interface_point
 
 #: Directions on the page, to the right and up, of x, y and z.
 _VIEW = np.array([[0.87, -0.32], [0.0, 0.95], [0.5, 0.42]]).T
-#: Size of the drawing, its margin, and of arrows.
-_WIDTH, _HEIGHT, _MARGIN, _ARROW = 520.0, 260.0, 62.0, 34.0
-#: Where the axes of space begin.
-_CORNER = (30.0, _HEIGHT - 32.0)
+#: Width of the drawing, least and largest height, margin, and size of arrows.
+_WIDTH, _LOW, _HIGH, _MARGIN, _ARROW = 760.0, 170.0, 340.0, 62.0, 34.0
+#: Where the axes of space begin, from the left and from below, and how long they are.
+_CORNER, _AXIS = (34.0, 34.0), 26.0
+#: Letters as large as on a phone, and their width in heights: names that do not overprint there do not elsewhere.
+_FONT, _LETTER = 17.0, 0.58
+#: Where a name may stand about its place, and how far away.
+_AROUND = ((1, -1), (-1, -1), (1, 1), (-1, 1), (0, 1), (0, -1), (1, 0), (-1, 0))
+_DISTANCES = (8.0, 22.0, 40.0, 60.0)
 #: A spring from (0, 0) to (1, 0), six turns high.
 _SPRING = "M0 0H.25L.29 6 .38-6 .46 6 .54-6 .63 6 .71-6 .75 0H1"
 #: Heads of arrows, in the colours of the sides and of the axes.
@@ -33,6 +38,8 @@ _HEADS = "".join(
 )
 #: Points nearer than this share of the extent count as one place.
 _SAME = 1e-6
+#: Directions that differ by less are one.
+_PARALLEL = 1e-6
 #: Directions whose triple product is above this determine a place.
 _INDEPENDENT = 0.1
 #: Sides whose points are nearer on the page are drawn so far apart, each way.
@@ -40,15 +47,18 @@ _APART = 30.0
 
 
 _OnPage = Callable[[FloatArray, int], FloatArray]
+#: Left, top, right and bottom of what is drawn already.
+_Box = tuple[float, float, float, float]
 
 
 class InterfacePoint(NamedTuple):
-    """A measured point: its name, side 0 (j) or 1 (k), place in m, and the directions of its channels."""
+    """A measured point: name, side 0 (j) or 1 (k), place in m, directions of its channels, what is known of x, y, z."""
 
     name: str
     side: int
     place: FloatArray
     directions: tuple[FloatArray, ...]
+    known: tuple[bool, bool, bool] = (True, True, True)
 
 
 def interface_points(interface: Interface) -> list[InterfacePoint]:
@@ -66,7 +76,12 @@ def interface_points(interface: Interface) -> list[InterfacePoint]:
         side = int(motion[0, 6:].any())
         motion = motion[:, 6 * side : 6 * side + 6]
         r, _ = _place(motion)
-        points.append(InterfacePoint(name, side, interface.references[side] + r, tuple(motion[:, :3])))
+        # Nothing says where along its only direction a point is.
+        ways = (
+            np.linalg.svd(motion[:, :3])[2][0] if np.linalg.matrix_rank(motion[:, :3], _PARALLEL) == 1 else np.zeros(3)
+        )
+        x, y, z = (bool(abs(part) <= _PARALLEL) for part in ways)
+        points.append(InterfacePoint(name, side, interface.references[side] + r, tuple(motion[:, :3]), (x, y, z)))
     return points
 
 
@@ -106,13 +121,16 @@ def point_table(points: list[InterfacePoint]) -> Table:
         (
             p.name,
             "jk"[p.side],
-            *(float(1e3 * x) for x in np.round(p.place, 9)),
+            *(float(1e3 * x) if known else None for x, known in zip(np.round(p.place, 9), p.known, strict=True)),
             ", ".join(map(_axis, p.directions)),
         )
         for p in points
     )
     columns = ("point", "side", "x, mm", "y, mm", "z, mm", "directions")
-    return Table("points", "Points and directions", columns, rows)
+    note = "Empty or left out: a channel does not say where along its direction it is."
+    return Table(
+        "points", "Points and directions", columns, rows, note="" if all(all(p.known) for p in points) else note
+    )
 
 
 def _axis(direction: FloatArray) -> str:
@@ -122,19 +140,73 @@ def _axis(direction: FloatArray) -> str:
     return "(" + " ".join(f"{x:.2g}" for x in direction) + ")"
 
 
-def _fitted(flat: FloatArray) -> tuple[FloatArray, float]:
-    """Return the middle of points of a drawing, and the scale at which they fill it."""
+def _fitted(flat: FloatArray) -> tuple[FloatArray, float, float]:
+    """Return the middle of points of a drawing, the scale at which they fill it, and its height."""
     extent = np.ptp(flat, axis=0)
-    scale = min((size - 2 * _MARGIN) / max(e, _SAME) for size, e in zip((_WIDTH, _HEIGHT), extent, strict=True))
-    return (flat.min(axis=0) + flat.max(axis=0)) / 2, scale
+    sizes = [(size - 2 * _MARGIN) / max(e, _SAME) for size, e in zip((_WIDTH, _HIGH), extent, strict=True)]
+    scale = min(sizes) if extent.max() > _SAME else 1.0
+    height = float(np.clip(extent[1] * scale + 2 * _MARGIN, _LOW, _HIGH))
+    return (flat.min(axis=0) + flat.max(axis=0)) / 2, scale, height
+
+
+def _pair(spot: FloatArray) -> tuple[float, float]:
+    return float(spot[0]), float(spot[1])
+
+
+def _box(x: float, y: float, half: float) -> _Box:
+    return (x - half, y - half, x + half, y + half)
+
+
+def _boxes_along(x: float, y: float, step: FloatArray) -> list[_Box]:
+    """Return boxes that cover an arrow."""
+    return [_box(x + part * float(step[0]), y + part * float(step[1]), 4.0) for part in np.linspace(0, 1, 6)]
+
+
+def _names(wanted: Mapping[str, tuple[float, float]], taken: list[_Box], height: float) -> tuple[str, str]:
+    """Write names beside their places where they overprint nothing; say how many find no such place."""
+    drawn, left = [], 0
+    for text, (x, y) in wanted.items():
+        half_width, half_height = _FONT * _LETTER * len(text) / 2, _FONT / 2
+        for distance, (right, down) in ((d, way) for d in _DISTANCES for way in _AROUND):
+            a, b = x + right * (distance + half_width), y + down * (distance + half_height)
+            box = (a - half_width, b - half_height, a + half_width, b + half_height)
+            is_inside = box[0] >= 0 and box[1] >= 0 and box[2] <= _WIDTH and box[3] <= height
+            if is_inside and not any(_overlap(box, one) for one in taken):
+                break
+        else:
+            left += 1
+            continue
+        taken.append(box)
+        if distance > _DISTANCES[0]:
+            near = (a - right * half_width, b - down * half_height)
+            drawn.append(f'<path class="leader" d="M{x:.1f} {y:.1f}L{near[0]:.1f} {near[1]:.1f}"/>')
+        # Smaller letters, on a wide screen, stay near their place.
+        start, anchor = a - right * half_width, ("middle", "start", "end")[right]
+        base = y - distance if down < 0 else b + 0.35 * _FONT
+        drawn.append(f'<text x="{start:.1f}" y="{base:.1f}" text-anchor="{anchor}">{escape(text)}</text>')
+    said = (
+        f"; {left} name{'s' if left > 1 else ''} without room for {'them' if left > 1 else 'it'} left out"
+        if left
+        else ""
+    )
+    return "".join(drawn), said
+
+
+def _overlap(one: _Box, other: _Box) -> bool:
+    return one[0] < other[2] and other[0] < one[2] and one[1] < other[3] and other[1] < one[3]
+
+
+def _as_svg(drawn: Sequence[str], height: float) -> str:
+    # Arrows of sides that are drawn apart reach a little above the margin.
+    content = "".join(drawn)
+    return f'<svg viewBox="0 -6 {_WIDTH:g} {height + 6:g}" aria-hidden="true"><defs>{_HEADS}</defs>{content}</svg>'
 
 
 def interface_sketch(interface: Interface, points: list[InterfacePoint], dofs: tuple[str, ...]) -> Sketch:
     """Draw the points of both sides with their directions, and the joint between the reference points."""
     places = np.array([p.place for p in points] + list(interface.references))
     flat = places @ _VIEW.T
-    middle, scale = _fitted(flat)
-    scale = 1.0 if np.ptp(flat, axis=0).max() <= _SAME else scale
+    middle, scale, height = _fitted(flat)
 
     # Sides that lie on each other are drawn apart.
     near = _nearest(flat[: len(points)] * scale, np.array([p.side for p in points]))
@@ -142,16 +214,17 @@ def interface_sketch(interface: Interface, points: list[InterfacePoint], dofs: t
 
     def at(place: FloatArray, side: int) -> FloatArray:
         right, up = (place @ _VIEW.T - middle) * scale
-        return np.array([_WIDTH / 2 + right, _HEIGHT / 2 - up + (side - 0.5) * 2 * shift])
+        return np.array([_WIDTH / 2 + right, height / 2 - up + (side - 0.5) * 2 * shift])
 
     ends = [at(reference, side) for side, reference in enumerate(interface.references)]
-    parts = [_links(points, at, side, ends[side]) for side in (0, 1)]
-    parts += [_point(p, at) for p in points]
-    parts.append(_spring(*ends))
-    parts.append(_axes())
-    drawn = f"<defs>{_HEADS}</defs>" + "".join(parts)
-    # Arrows of sides that are drawn apart reach a little above the margin.
-    svg = f'<svg viewBox="0 -6 {_WIDTH:g} {_HEIGHT + 6:g}" aria-hidden="true">{drawn}</svg>'
+    taken = [_corner_box(height), *(_box(*_pair(end), 10.0) for end in (*ends, (ends[0] + ends[1]) / 2))]
+    drawn = [_links(points, at, side, ends[side]) for side in (0, 1)]
+    drawn += [_point(p, at, taken) for p in points]
+    names: dict[str, tuple[float, float]] = {}
+    for p in points:
+        names[p.name] = _pair(at(p.place, p.side))
+    text, left_out = _names(names, taken, height)
+    drawn += [_spring(*ends), _axes(height), text]
     sides = [", ".join(p.name for p in points if p.side == side) for side in (0, 1)]
     apart = 1e3 * float(np.linalg.norm(interface.references[1] - interface.references[0]))
     where = "at one place" if apart < 1e-6 else f"{apart:.3g} mm apart"
@@ -159,8 +232,9 @@ def interface_sketch(interface: Interface, points: list[InterfacePoint], dofs: t
         f"Side j (filled): points {sides[0]}; side k (open): points {sides[1]}; arrows: measured directions; spring: "
         f"the joint in {', '.join(dofs)} between the reference points, which are {where}"
         + ("; the sides are drawn apart" if shift else "")
+        + left_out
     )
-    return Sketch("sketch", svg, caption, f"Sketch of the joint. {caption}.")
+    return Sketch("sketch", _as_svg(drawn, height), caption, f"Sketch of the joint. {caption}.")
 
 
 def _nearest(flat: FloatArray, side: NDArray[np.intp]) -> float:
@@ -175,20 +249,17 @@ def _links(points: list[InterfacePoint], at: _OnPage, side: int, end: FloatArray
     return f'<path class="{"jk"[side]} link" stroke-width="1.2" stroke-dasharray="{("none", "5 3")[side]}" d="{path}"/>'
 
 
-def _point(point: InterfacePoint, at: _OnPage) -> str:
-    x, y = at(point.place, point.side)
+def _point(point: InterfacePoint, at: _OnPage, taken: list[_Box]) -> str:
+    x, y = _pair(at(point.place, point.side))
     side = "jk"[point.side]
     drawn = [
         f'<circle class="{side}{" open" if point.side else ""}" cx="{x:.1f}" cy="{y:.1f}" r="4.5" stroke-width="2"/>'
     ]
+    taken.append(_box(x, y, 6.0))
     for direction in point.directions:
         step = (_VIEW @ direction) * (1, -1) * _ARROW
+        taken += _boxes_along(x, y, step)
         drawn.append(_arrow(side, x, y, step))
-    # Names of both sides do not collide where the points do.
-    up = -12 if point.side == 0 else 20
-    anchor = "end" if point.side == 0 else "start"
-    beside = x + (-8 if point.side == 0 else 8)
-    drawn.append(f'<text x="{beside:.1f}" y="{y + up:.1f}" text-anchor="{anchor}">{point.name}</text>')
     return "".join(drawn)
 
 
@@ -206,13 +277,18 @@ def _spring(first: FloatArray, last: FloatArray) -> str:
     return f'<path class="joint open" {look} transform="matrix({place})" d="{_SPRING}"/>'
 
 
-def _axes(view: FloatArray = _VIEW) -> str:
+def _corner_box(height: float) -> _Box:
+    """Return where the axes of space are drawn."""
+    return (0.0, height - _CORNER[1] - 1.6 * _AXIS, _CORNER[0] + 1.6 * _AXIS, height)
+
+
+def _axes(height: float, view: FloatArray = _VIEW) -> str:
     """Draw the axes of space in the corner."""
-    drawn = []
+    drawn, corner = [], np.array([_CORNER[0], height - _CORNER[1]])
     for letter, direction in zip("xyz", view.T, strict=True):
-        step = direction * (1, -1) * 26
-        a, b = np.array(_CORNER) + 1.38 * step
-        drawn.append(_arrow("axis", *_CORNER, step))
+        step = direction * (1, -1) * _AXIS
+        a, b = corner + 1.38 * step
+        drawn.append(_arrow("axis", *_pair(corner), step))
         drawn.append(f'<text x="{a:.1f}" y="{b + 4:.1f}" text-anchor="middle" font-style="italic">{letter}</text>')
     return "".join(drawn)
 
@@ -229,9 +305,7 @@ class SketchedPart(NamedTuple):
 _MOST_NODES = 400
 
 
-def assembly_sketch(
-    parts: Sequence[SketchedPart], sensors: Sequence[str], hits: Sequence[str], names: Mapping[str, str] | None = None
-) -> Sketch | None:
+def assembly_sketch(parts: Sequence[SketchedPart], sensors: Sequence[str], hits: Sequence[str]) -> Sketch | None:
     """Draw both parts of an assembly, sensors and hits; None where places of nodes are not known.
 
     Parameters
@@ -240,8 +314,6 @@ def assembly_sketch(
         The second is moved to where its nodes at the joint lie on those of the first.
     sensors, hits : sequence of str
         DOFs ``"A/7:y"``.
-    names : mapping of str to str, optional
-        What is written beside DOFs.
     """
     ends = [[part.places[node] for node in part.joint if node in part.places] for part in parts]
     if not all(ends):
@@ -254,19 +326,20 @@ def assembly_sketch(
     every = np.array([at for own in moved for at in own.values()])
     view = _view_along(int(np.argmax(np.ptp(every, axis=0))))
     flat = every @ view.T
-    middle, scale = _fitted(flat)
+    middle, scale, height = _fitted(flat)
 
     def at(place: FloatArray, side: int) -> FloatArray:
         right, up = (place @ view.T - middle) * scale
-        return np.array([_WIDTH / 2 + right, _HEIGHT / 2 - up + (2 * side - 1) * _LIFT])
+        return np.array([_WIDTH / 2 + right, height / 2 - up + (2 * side - 1) * _LIFT])
 
-    drawn = [f"<defs>{_HEADS}</defs>"]
+    drawn: list[str] = []
     for side, own in enumerate(moved):
         step = max(1, len(own) // _MOST_NODES)
         spots = (at(place, side) for place in list(own.values())[::step])
         drawn += [f'<circle class="{"jk"[side]} node" cx="{x:.1f}" cy="{y:.1f}" r="1.6"/>' for x, y in spots]
     letters = [part.letter for part in parts]
-    labels: dict[str, tuple[float, float]] = {}
+    names: dict[str, tuple[float, float]] = {}
+    taken = [_corner_box(height), _box(*_pair((at(reference, 0) + at(reference, 1)) / 2), 12.0)]
     for dofs, draw in ((hits, _hit), (sensors, _sensor)):
         for dof in dofs:
             letter, _, rest = dof.partition("/")
@@ -274,18 +347,19 @@ def assembly_sketch(
             side = letters.index(letter)
             if node in moved[side]:
                 spot = at(moved[side][node], side)
-                drawn.append(draw("jk"[side], spot, _on_page(direction, view)))
-                if names and dof in names:
-                    labels.setdefault(names[dof], (float(spot[0]) + 9, float(spot[1]) + (20 if side else -12)))
-    drawn += [f'<text x="{x:.1f}" y="{y:.1f}">{escape(name)}</text>' for name, (x, y) in labels.items()]
-    drawn += [_spring(at(reference, 0), at(reference, 1)), _axes(view)]
-    svg = f'<svg viewBox="0 -6 {_WIDTH:g} {_HEIGHT + 6:g}" aria-hidden="true">{"".join(drawn)}</svg>'
+                along = _on_page(direction, view)
+                drawn.append(draw("jk"[side], spot, along))
+                names[dof] = _pair(spot)
+                taken.append(_box(*names[dof], 7.0))
+                taken += _boxes_along(*names[dof], -along * _ARROW) if draw is _hit else []
+    text, left_out = _names(names, taken, height)
+    drawn += [_spring(at(reference, 0), at(reference, 1)), _axes(height, view), text]
     caption = (
         f"Nodes of {letters[0]} and of {letters[1]} (drawn below it, where they meet); squares: sensors; arrows: hits; "
-        "spring: the joint"
+        f"spring: the joint{left_out}"
     )
     words = f"Sensors at {', '.join(sensors)}; hits at {', '.join(hits)}."
-    return Sketch("assembly", svg, caption, f"Sketch of the assembly. {words}")
+    return Sketch("assembly", _as_svg(drawn, height), caption, f"Sketch of the assembly. {words}")
 
 
 #: How far parts are drawn apart where they meet, each way.

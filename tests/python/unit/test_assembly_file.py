@@ -459,8 +459,8 @@ def test_the_sketch_in_words_and_on_the_page(tmp_path, frfs):
     rows = [re.split(r" {2,}", line.strip()) for line in lines]
     assert ["A/3", "0.1, 0, 0", "0.2", "response y (11:+x), force y (11:+x)"] in rows
     assert ["A/1", "0, 0, 0", "0.3", "spring to the ground"] in rows
-    sketch = assembly_sketch(measured.sketched, measured.responses, measured.forces, {"A/3:y": "<tip>"})
-    assert (sketch.svg.count("<rect"), sketch.svg.count("&lt;tip&gt;"), sketch.svg.count(" node")) == (2, 1, 7 + 5)
+    sketch = assembly_sketch(measured.sketched, measured.responses, measured.forces)
+    assert (sketch.svg.count("<rect"), sketch.svg.count(">A/3:y<"), sketch.svg.count(" node")) == (2, 1, 7 + 5)
     # B goes on where A ends: the sensor at its end is the farthest to the right.
     places = [float(x) for x in re.findall(r'<rect class="[jk]" x="([\d.]+)"', sketch.svg)]
     nodes = [float(x) for x in re.findall(r' node" cx="([\d.]+)"', sketch.svg)]

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import jointfrf as jf
+from jointfrf.report.fit import fit_figures
 from jointfrf.report.fit_model import (
     assurance,
     assurance_map,
@@ -107,6 +108,17 @@ def test_nothing_is_advised_where_intervals_are_narrow(fit):
     assert "next" not in keys
     keys = [section.key for section in fit_document(fit, ReportOptions()).sections]
     assert keys.index("maps") < keys.index("unknowns") < keys.index("next")
+
+
+def test_axes_of_a_joint_without_lines_fit_its_intervals(fit):
+    ends = fit.confidence_interval(0.95)
+    for dof, figure in zip(fit.dofs, fit_figures(fit), strict=True):
+        low, high = ends[f"k_{dof}"]
+        bottom, top = figure.panels[0].y_limits
+        assert bottom < low < high < top
+        assert top - bottom < 1.5 * (high - low)
+        (damping,) = figure.panels[1].ribbons
+        np.testing.assert_allclose(damping.high / damping.x / 2 / np.pi, ends[f"c_{dof}"][1], rtol=0.05)
 
 
 def test_a_fit_goes_to_another_process_and_answers_there_as_here(fit):

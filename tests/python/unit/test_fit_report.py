@@ -10,16 +10,18 @@ import pytest
 
 import jointfrf as jf
 from jointfrf.dofs import DIRECTIONS, joint_parameters
+from jointfrf.identification.findings import note, warn
 from jointfrf.identification.fit_data import FitData
 from jointfrf.identification.result import Fit
 from jointfrf.report.chart import Chart, chart_view, thinned_dots, thinned_line
-from jointfrf.report.document import Document, HeatMap, Section, make_document
+from jointfrf.report.document import Document, HeatMap, Section, make_document, words_of_findings
 from jointfrf.report.draw import STYLES
 from jointfrf.report.figure import Curve, Figure, Panel
 from jointfrf.report.fit import fit_figures
 from jointfrf.report.fit_frfs import compare_frfs
 from jointfrf.report.fit_page import ReportOptions, finding_sentences, fit_document, parameter_table, quality_sentences
-from jointfrf.report.sketch import interface_points
+from jointfrf.report.sketch import _names, interface_points, interface_sketch, point_table
+from jointfrf.report.table import written
 
 
 def points_of(path: str) -> np.ndarray:
@@ -208,7 +210,118 @@ def test_a_cell_of_a_map_without_a_number_is_empty():
     heat = HeatMap("map", "A map", "row \\ column", ["a", "b"], ["c", "d"], values, 1, 3)
     page = make_document(Document("Page", "", [Section("one", "One", [heat])]))
     cells = re.findall(r"<td[^>]*>([^<]*)</td>", page)
-    assert cells == ["", "1.00", "0.50", "12.35"]
+    assert cells == ["", "1.00", "0.50", "12.3"]
+
+
+def test_a_map_of_residuals_shades_by_their_logarithm_up_to_the_largest():
+    values = np.array([[0.5, 1.0, 6.0, 88.0, np.nan]])
+    shades = {}
+    for largest in (88.0, 4.0):
+        own = np.minimum(values, largest)
+        heat = HeatMap("map", "A map", "r", ["a"], list("abcde"), own, 1, 10, log=True)
+        page = make_document(Document("Page", "", [Section("one", "One", [heat])]))
+        shades[largest] = [int(s) for s in re.findall(r'style="--s:(\d+)"', page)]
+    assert shades[88.0] == [0, 0, round(100 * np.log(6) / np.log(88)), 100, 0]
+    assert shades[4.0] == [0, 0, 60, 60, 0]
+
+
+def test_findings_are_a_line_a_kind_the_worst_first_and_nothing_is_lost():
+    long = "lines with far more noise than their neighbours weigh less: " + ", ".join(f"{hz} Hz" for hz in range(40))
+    found = [
+        note("noise", long),
+        warn("poor", "k_y: poorly determined"),
+        warn("residual", "the joint does not explain"),
+        note("choice", "damping of y: none"),
+        note("choice", "damping of x: none"),
+    ]
+    warned, noted = words_of_findings(found)
+    assert warned.sentences == ["the joint does not explain.", "k_y: poorly determined."]
+    assert [len(own) for own in noted.folded] == [1, 2]
+    assert all(len(line) < 110 for line in noted.sentences)
+    page = make_document(Document("Page", "", [Section("one", "One", [warned, noted])]))
+    assert page.count("<summary>") == 2
+    for one in found:
+        assert one.text in page
+
+
+def _two_directions(freq, seed):
+    """FRFs of two masses joined by springs in x and in y, which do not couple, with noise of a constant level."""
+    omega = 2 * np.pi * freq
+    h = np.zeros((freq.size, 4, 4), complex)
+    for d, (k, mass) in enumerate(((1e5, 1.0), (3e5, 2.0))):
+        z = np.zeros((freq.size, 2, 2), complex)
+        for side, ground in enumerate((2e4, 5e4)):
+            z[:, side, side] = k + 5j * omega + ground * (1 + 0.05j) - mass * omega**2
+        z[:, 0, 1] = z[:, 1, 0] = -k - 5j * omega
+        h[:, d::2, d::2] = np.linalg.inv(z)
+    noise = np.random.default_rng(seed).standard_normal((2, *h.shape))
+    return h + 1e-8 * (noise[0] + 1j * noise[1]) / np.sqrt(2)
+
+
+def test_frfs_that_are_zero_by_symmetry_are_not_drawn():
+    freq = np.arange(5.0, 300.0)
+    variance = np.full((freq.size, 4, 4), 1e-16)
+    fit = jf.identify(freq, _two_directions(freq, 3), ["x", "y"], noise=variance)
+    compared = compare_frfs(fit.data, fit.dofs)
+    assert compared.silent == 8
+    assert sorted(compared.entries) == [(p, q) for p in range(4) for q in range(4) if (p - q) % 2 == 0]
+    text = make_document(fit_document(fit, ReportOptions()))
+    assert "All 8 FRFs between the channels that hold more than noise" in text
+    assert "8 hold noise only" in text
+
+
+def test_a_page_begins_with_what_was_found_and_the_frf_that_fits_worst(fits):
+    fit = fits["plain"]
+    compared = compare_frfs(fit.data, fit.dofs)
+    parts = fit_document(fit, ReportOptions()).sections[0].parts
+    kinds = [type(part).__name__ for part in parts]
+    assert kinds[:2] == ["Words", "Chart"]
+    assert set(kinds[2 : kinds.index("Table")]) == {"Words"}
+    chart = parts[1]
+    worst = max(compared.entries, key=lambda entry: compared.residual[entry])
+    assert chart.figure.caption.startswith(f"Response {compared.rows[worst[0]]}, force {compared.columns[worst[1]]}: ")
+    keys = re.findall(r'<figure class="chart" id="([^"]*)"', make_document(fit_document(fit, ReportOptions())))
+    assert sorted(key for key in keys if key.startswith("frf")) == sorted(f"frf-{i + 1}" for i in range(16))
+
+
+def _label_boxes(svg):
+    boxes = []
+    for x, y, anchor, text in re.findall(r'<text x="([\d.-]+)" y="([\d.-]+)" text-anchor="(\w+)">([^<]*)<', svg):
+        width = 0.55 * 17 * len(text)
+        left = float(x) - {"start": 0, "middle": 0.5, "end": 1}[anchor] * width
+        boxes.append((left, float(y) - 12, left + width, float(y)))
+    return boxes
+
+
+@pytest.mark.parametrize("count", [3, 12, 40])
+def test_names_in_a_sketch_overprint_neither_each_other_nor_points(count):
+    rng = np.random.default_rng(count)
+    at = rng.uniform(-0.1, 0.1, (2, count, 3))
+    sides = jf.virtual_interface(*(
+        jf.virtual_point(np.repeat(own, 3, axis=0), np.tile(np.eye(3), (count, 1)), [0, 0, 0], DIRECTIONS) for own in at
+    ))  # fmt: skip
+    points = interface_points(sides)
+    sketch = interface_sketch(sides, points, sides.dofs)
+    boxes = _label_boxes(sketch.svg)
+    left_out = re.search(r"(\d+) names? without room", sketch.caption)
+    assert len(boxes) + int(left_out[1] if left_out else 0) == 2 * count
+    assert len(boxes) > min(count, 12)
+    circles = [(x - 4, y - 4, x + 4, y + 4) for x, y in
+               np.array(re.findall(r'cx="([\d.-]+)" cy="([\d.-]+)"', sketch.svg), float)]  # fmt: skip
+    for i, a in enumerate(boxes):
+        for b in (*boxes[i + 1 :], *circles):
+            assert a[2] <= b[0] or b[2] <= a[0] or a[3] <= b[1] or b[3] <= a[1], (a, b)
+    assert "<tip>" not in _names({"<tip>": (100.0, 100.0)}, [], 200.0)[0]
+
+
+def test_the_table_of_points_has_no_coordinate_that_nobody_measured():
+    sides = jf.interface([1, 2], [3, 4], ["y", "theta_z"], {1: (-0.1, 0.02, 0), 2: (-0.2, 0.02, 0), 3: (0.1, 0, 0),
+                                                           4: (0.2, 0, 0)})  # fmt: skip
+    table = point_table(interface_points(sides))
+    assert [row[3] for row in table.rows] == [None] * 4
+    assert [row[2] for row in table.rows] == pytest.approx([-100, -200, 100, 200])
+    assert "-0" not in [cell for row in written(table) for cell in row]
+    assert "does not say where along its direction" in table.note
 
 
 def test_lines_left_out_are_drawn_apart(fits):
