@@ -83,9 +83,8 @@ def write_levels(found: JointLevels, path: Path | str, *, command: str = "") -> 
     """
     check_type("found", found, JointLevels)
     figures = [levels_figure(found, dof) for dof in found.levels]
-    notes = [one.text for one in found.findings if one.severity == "note"]
     sections = [
-        Section("summary", "Summary", [Words(list(_sentences(found))), *words_of_findings(found.warnings, notes)]),
+        Section("summary", "Summary", [Words(list(_sentences(found))), *words_of_findings(found.findings)]),
         Section("levels", "Over amplitude", [Picture(one, draw(one)) for one in figures]),
         Section("tables", "Tables", [table for dof in found.levels for table in _tables(found, dof)]),
         section_of_command(command),
