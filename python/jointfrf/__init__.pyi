@@ -59,7 +59,7 @@ from jointfrf.identification.fit_cards import cards
 from jointfrf.identification.identify import identify
 from jointfrf.identification.identify_model import identify_model
 from jointfrf.identification.joint_file import read_joint, write_joint
-from jointfrf.identification.model.assembly import AddedMass, Assembly, GroundSpring
+from jointfrf.identification.model.assembly import AddedMass, Alike, Assembly, GroundSpring, PlacedJoint
 from jointfrf.identification.model.substructure import Substructure, Unknown
 from jointfrf.identification.monte_carlo import BandStatistics, MonteCarlo, monte_carlo
 from jointfrf.identification.realisations import FitStart, identify_realisations
@@ -79,6 +79,7 @@ from jointfrf.laws.viscoelastic import FractionalZener, PowerLaw, StandardLinear
 from jointfrf.models.beam import beam
 from jointfrf.models.matrices import from_triangle
 from jointfrf.models.model import Model, assemble, chain
+from jointfrf.models.points import rigid_body
 from jointfrf.models.receptance import ReceptanceInfo, receptance
 from jointfrf.parallel.pool import BrokenPoolError
 from jointfrf.parallel.sweep import SweepPlan, plan_sweep, sweep
@@ -130,6 +131,7 @@ __all__ = [
     "RCOND_LIMIT",
     "STRESS_AREA",
     "AddedMass",
+    "Alike",
     "AmplitudeLawFit",
     "AmplitudeLawFits",
     "Assembly",
@@ -188,6 +190,7 @@ __all__ = [
     "NoiseModel",
     "ParameterSummary",
     "Patch",
+    "PlacedJoint",
     "PooledFits",
     "PooledParameter",
     "PowerLaw",
@@ -284,6 +287,7 @@ __all__ = [
     "realisations",
     "receptance",
     "reciprocal_condition",
+    "rigid_body",
     "rigid_offset",
     "save",
     "semm",

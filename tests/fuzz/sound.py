@@ -119,6 +119,7 @@ def _structures() -> dict[str, dict[str, Any]]:
     law = jf.LawJoint({"x": jf.SpringLaw(2000.0, 3.0)})
     return {
         "chain": {"masses": [5, 3], "stiffness": [2500, 3500], "damping": [3, 4]},
+        "rigid_body": {"mass": 2.0, "inertia": [0.1, 0.1, 0.2], "points": {"edge": [0.5, 0.0, 0.0]}},
         "beam": dict(length=0.3, n_elements=3, youngs_modulus=67e9, density=2700.0, width=0.025, height=0.006),
         "Model": {"stiffness": k, "mass": m, "dofs": ("1:x", "2:x", "3:x"), "damping": 0.1 * k},
         "receptance": {
@@ -147,6 +148,8 @@ def _structures() -> dict[str, dict[str, Any]]:
         "GroundSpring": {"dof": "1:x", "stiffness": 10.0, "damping": 0.1},
         "Substructure": {"source": c["a"], "joint": ("2:x",)},
         "Assembly": {"a": substructures[0], "b": substructures[1], "joint": law},
+        "PlacedJoint": {"joint": law, "j": ("A/2:x",), "k": ("B/1:x",)},
+        "Alike": {"joints": ("left", "right"), "spread": 0.1},
     }  # fmt: skip
 
 

@@ -194,7 +194,8 @@ def _unknowns(whole: Assembly) -> Iterator[tuple[str, float | None, Callable[[fl
             def changed(step: float, side: str = side, name: str = name, part: Substructure = part) -> Assembly:
                 model = part.model({name: part.nominal[name] + step})
                 own = Substructure(model, part.joint, exact=True)
-                return replace(whole, a=own) if side == "a" else replace(whole, b=own)
+                a, b = (own, whole.b) if side == "a" else (whole.a, own)
+                return Assembly(a, b, whole.joint, whole.attachments)
 
             yield f"{name} of {side.upper()}", one.std, changed
     for i, attached in enumerate(whole.attachments):
@@ -246,8 +247,8 @@ def _slopes(above: ComplexArray, below: ComplexArray) -> FloatArray:
 def _stiffness(whole: Assembly, backbone: Backbone, dof: str) -> tuple[ComplexArray, FloatArray]:
     """Return K* of all levels, and the amplitude of the relative motion."""
     joint, i = whole.joint, whole.joint.dofs.index(dof)
-    opened = replace(whole, joint=LawJoint(dict(joint.laws) | {(dof, dof): SpringLaw(0.0)}, joint.rigid, joint.mass,
-                                           joint.dofs))  # fmt: skip
+    laws = dict(joint.laws) | {(dof, dof): SpringLaw(0.0)}
+    opened = whole.with_joint(LawJoint(laws, joint.rigid, joint.mass, joint.dofs))
     names = [f"A/{whole.a.joint[i]}", f"B/{whole.b.joint[i]}", backbone.channel]
     across = np.array([[1.0, -1.0, 0.0], [0.0, 0.0, 1.0]])
     squared = np.square(backbone.freq_hz)

@@ -5,13 +5,29 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 import msgspec
+import numpy as np
 from msgspec import field
 
 from jointfrf.assembly_file.modes import ModesKeys
+from jointfrf.cases.structure import ModelStructure, Structure, SubstructureKeys
 from jointfrf.cases.substructures import BeamKeys, BrickBeamKeys, ChainKeys, MatricesKeys, ReceptancesKeys
+from jointfrf.dofs import DIRECTIONS
+from jointfrf.kernel.arguments import FloatArray
+from jointfrf.models.points import rigid_body
 from jointfrf.toml.declared import Keys, NotNegative, Positive, key
 
-__all__ = ["AssemblyKeys", "GroundKeys", "MassKeys", "PartKeys", "Prior", "PriorKeys", "Unknowns"]
+__all__ = [
+    "AlikeKeys",
+    "AssemblyKeys",
+    "GroundKeys",
+    "MassKeys",
+    "PartKeys",
+    "PartsKeys",
+    "PlacedJointKeys",
+    "Prior",
+    "PriorKeys",
+    "Unknowns",
+]
 
 
 class PriorKeys(Keys):
@@ -132,7 +148,36 @@ class ModesPart(ModesKeys, tag="modes"):
     joint: _JointDofs
 
 
-PartKeys = ChainPart | BeamPart | BrickBeamPart | MatricesPart | ReceptancesPart | ModesPart
+_Vector = tuple[float, float, float]
+
+
+class RigidBodyPart(SubstructureKeys, tag="rigid-body"):
+    """A rigid body with named points; DOFs `"foot:x"` to `"foot:theta_z"` of each, and of its `centre`."""
+
+    mass: Annotated[Positive, key("Mass.", "kg", example=60.0)]
+    inertia: Annotated[_Vector, key("Moments of inertia about its centre, x, y, z.", "kg m^2", example=[2.2, 3.0, 3.6])]
+    points: Annotated[
+        dict[str, _Vector],
+        key("Where its points are, by their names: `{ foot = [0.3, 0.2, -0.25] }`.", "m",
+            takes="table of lists of 3 numbers", example={"foot": [0.3, 0.2, -0.25]}),
+    ]  # fmt: skip
+    joint: _JointDofs
+    centre: Annotated[_Vector, key("Its centre of mass.", "m")] = (0.0, 0.0, 0.0)
+    moves: Annotated[tuple[str, ...], key("Directions in which it is free.", choice=DIRECTIONS)] = DIRECTIONS
+    unknown: Annotated[
+        dict[str, _Prior] | tuple[str, ...], _unknown("`mass`, or `density`, a factor of mass and inertia, about 1.")
+    ] = field(default_factory=dict)
+    exact: Annotated[bool, key("Whether mass and inertia are exact but for what is `unknown`.")] = True
+    model_error: _ModelError = None
+
+    def structure(self, freq_hz: FloatArray) -> Structure:
+        """Return the structure."""
+        points = {name: np.array(at) for name, at in self.points.items()}
+        model = self.build(lambda: rigid_body(self.mass, self.inertia, points, centre=self.centre, moves=self.moves))
+        return ModelStructure(model)
+
+
+PartKeys = ChainPart | BeamPart | BrickBeamPart | RigidBodyPart | MatricesPart | ReceptancesPart | ModesPart
 
 
 class MassKeys(Keys):
@@ -160,6 +205,27 @@ class GroundKeys(Keys):
     ] = field(default_factory=dict)
 
 
+_Fixed = Annotated[tuple[str, ...], key("Parameters of joints that keep their value: `c_y`, of several `bolt.c_y`.")]
+_Masses = Annotated[tuple[MassKeys, ...], key("Masses of sensors and shakers.")]
+_Grounds = Annotated[tuple[GroundKeys, ...], key("Springs to the ground.")]
+_Channels = Annotated[
+    dict[str, str],
+    key('Which channel of the file is which DOF: `"3:+y" = "A/151:y"`; `-y` where it points the other way. '
+        '`"A/@0.3,0.006,0:y"`, here and wherever DOFs are named, is the node nearest to a position, m. Channels '
+        "that are not named are not used.",
+        absent="channels that are named like one DOF of one part, `151:y`"),
+]  # fmt: skip
+_ResponseGains = Annotated[
+    dict[str, _Prior],
+    key('Responses whose calibration is not exactly known: `"A/151:y" = 0.02`; measured = gain times true.',
+        takes="table of relative standard deviations, or of tables"),
+]  # fmt: skip
+_ForceGains = Annotated[
+    dict[str, _Prior],
+    key("The same of forces.", takes="table of relative standard deviations, or of tables"),
+]
+
+
 class AssemblyKeys(Keys):
     """Two parts A and B, the joint between them, what is unknown, and which channel of a measurement is which DOF.
 
@@ -175,22 +241,70 @@ class AssemblyKeys(Keys):
             "`dofs`, `stiffness`, ... as in `joint.toml`; or the name of such a file, or of a saved joint.",
             takes="table, or name of a file"),
     ]  # fmt: skip
-    fixed: Annotated[tuple[str, ...], key("Parameters of the joint that keep their value: `c_y`.")] = ()
-    mass: Annotated[tuple[MassKeys, ...], key("Masses of sensors and shakers.")] = ()
-    ground: Annotated[tuple[GroundKeys, ...], key("Springs to the ground.")] = ()
-    channels: Annotated[
-        dict[str, str],
-        key('Which channel of the file is which DOF: `"3:+y" = "A/151:y"`; `-y` where it points the other way. '
-            '`"A/@0.3,0.006,0:y"`, here and wherever DOFs are named, is the node nearest to a position, m. Channels '
-            "that are not named are not used.",
-            absent="channels that are named like one DOF of A or of B, `151:y`"),
-    ] = field(default_factory=dict)  # fmt: skip
-    response_gains: Annotated[
-        dict[str, _Prior],
-        key('Responses whose calibration is not exactly known: `"A/151:y" = 0.02`; measured = gain times true.',
-            takes="table of relative standard deviations, or of tables"),
-    ] = field(default_factory=dict)  # fmt: skip
-    force_gains: Annotated[
-        dict[str, _Prior],
-        key("The same of forces.", takes="table of relative standard deviations, or of tables"),
+    fixed: _Fixed = ()
+    mass: _Masses = ()
+    ground: _Grounds = ()
+    channels: _Channels = field(default_factory=dict)
+    response_gains: _ResponseGains = field(default_factory=dict)
+    force_gains: _ForceGains = field(default_factory=dict)
+
+
+class PlacedJointKeys(Keys):
+    """One of several joints, between DOFs of two parts, or of one part and the ground."""
+
+    header = "[joints.NAME]"
+    j: Annotated[
+        tuple[str, ...],
+        key("Its DOFs on one side, in the order of its laws.", min_length=1, example=["machine/foot:z"]),
+    ]
+    k: Annotated[tuple[str, ...], key("Its DOFs on the other side.", absent="the ground")] = ()
+    law: Annotated[
+        tuple[dict[str, Any], ...] | None,
+        key("Its laws, `[[joints.NAME.law]]`, as in joint.toml; `values`, where the fit starts, may be left out.",
+            takes="tables", absent="those of `file`"),
+    ] = None  # fmt: skip
+    file: Annotated[str | None, key("A joint.toml or a saved joint in place of `law`.", absent="`law`")] = None
+
+
+class AlikeKeys(Keys):
+    """Joints whose parameters scatter about common means, which are named by NAME."""
+
+    header = "[alike.NAME]"
+    joints: Annotated[tuple[str, ...], key("Their names.", min_length=2, example=["left", "right"])]
+    spread: Annotated[
+        Positive | None,
+        key("Standard deviation relative to the mean.", absent="found from the FRFs, of three joints or more"),
+    ] = None
+
+
+class PartsKeys(Keys):
+    """Any number of parts and joints by names; what else there is is that of two parts.
+
+    DOFs are named by their part, `frame/7:y`, parameters by their joint, `bolt.k_y`.
+    """
+
+    header = "assembly.toml of several parts"
+    parts: Annotated[
+        dict[str, Annotated[Any, key("A part.", takes="table")]],
+        key("Parts by their names, `[parts.NAME]`, each with the keys of `[A]`; without `joint`, which `joints` name.",
+            takes="table of tables"),
+    ]  # fmt: skip
+    joints: Annotated[
+        dict[str, Annotated[Any, key("A joint.", takes="table")]],
+        key("Joints by their names, `[joints.NAME]`.", takes="table of tables"),
+    ]
+    same: Annotated[
+        tuple[str | tuple[str, ...], ...],
+        key('Joints that are equal, or parts whose unknowns are: `["left", "right"]`, or a list of such lists.',
+            takes="list of names, or of lists of names"),
+    ] = ()  # fmt: skip
+    alike: Annotated[
+        dict[str, Annotated[Any, key("A group.", takes="table")]],
+        key("Joints that scatter about a common mean, `[alike.NAME]`.", takes="table of tables"),
     ] = field(default_factory=dict)
+    fixed: _Fixed = ()
+    mass: _Masses = ()
+    ground: _Grounds = ()
+    channels: _Channels = field(default_factory=dict)
+    response_gains: _ResponseGains = field(default_factory=dict)
+    force_gains: _ForceGains = field(default_factory=dict)

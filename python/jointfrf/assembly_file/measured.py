@@ -16,7 +16,7 @@ from jointfrf.frf.bands import in_bands
 from jointfrf.frf.frf_set import Channel, FrfSet
 from jointfrf.frf.setups import SetUps
 from jointfrf.identification.identify_model import identify_model
-from jointfrf.identification.model.assembly import AddedMass, Assembly
+from jointfrf.identification.model.assembly import AddedMass, Assembly, PlacedJoint
 from jointfrf.identification.model.substructure import Unknown
 from jointfrf.identification.result import Fit, columns_of
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, check_type
@@ -40,7 +40,7 @@ class MeasuredAssembly:
         Receptances, m/N; NaN for an FRF that was not measured.
     assembly : Assembly
     responses, forces : tuple of str
-        DOFs ``"A/..."``, ``"B/..."`` of its rows and columns.
+        DOFs ``"A/7:y"`` of its rows and columns.
     response_gains, force_gains : dict of str to Unknown
     fixed : tuple of str
         Parameters of the joint that keep their value.
@@ -50,7 +50,7 @@ class MeasuredAssembly:
         Channels of the file that are not used.
     coherence : ndarray, shape (n_freq, n_o, n_i), or None
     averages : float or None
-    parts : tuple of two AssemblyPart
+    parts : dict of str to AssemblyPart
     located : tuple of str
         Which node each position of the file is.
     setups : SetUps, optional
@@ -69,15 +69,14 @@ class MeasuredAssembly:
     unused: tuple[str, ...]
     coherence: FloatArray | None
     averages: float | None
-    parts: tuple[AssemblyPart, AssemblyPart]
+    parts: dict[str, AssemblyPart]
     located: tuple[str, ...]
     setups: SetUps | None = None
 
     @property
-    def sketched(self) -> tuple[SketchedPart, SketchedPart]:
-        """Both parts as `write_report` draws them."""
-        a, b = (part.sketched(letter) for letter, part in zip("AB", self.parts, strict=True))
-        return a, b
+    def sketched(self) -> tuple[SketchedPart, ...]:
+        """Both parts as `write_report` draws them; none of parts and joints by names."""
+        return tuple(part.sketched(name) for name, part in self.parts.items()) if "A" in self.parts else ()
 
     def describe(self) -> list[str]:
         """Say in words what a sketch shows, and what the files of the parts hold, line by line.
@@ -85,8 +84,9 @@ class MeasuredAssembly:
         Where the joint is, and what is measured, driven and attached at which node; which node each position is;
         mass, centre of gravity, rigid motions, natural frequencies of parts from files, and what looks wrong.
         """
-        parts = dict(zip("AB", self.parts, strict=True))
-        lines = [_joint_words(self.assembly, parts), *columns_of(_node_rows(self, parts)), *self.located]
+        parts = self.parts
+        words = [_joint_words(name, one, parts) for name, one in self.assembly.joints.items()]
+        lines = [*words, *columns_of(_node_rows(self, parts)), *self.located]
         lines += [f"{name}: {line}" for name, part in parts.items() for line in part.describe()]
         return lines + ([f"not used: {', '.join(self.unused)}"] if self.unused else [])
 
@@ -109,16 +109,20 @@ class MeasuredAssembly:
         )  # fmt: skip
 
 
-def _joint_words(assembly: Assembly, parts: Mapping[str, AssemblyPart]) -> str:
-    """Say between which nodes the joint acts, where they are, and how."""
+def _joint_words(name: str, one: PlacedJoint, parts: Mapping[str, AssemblyPart]) -> str:
+    """Say between which nodes a joint acts, where they are, and how."""
     ends = []
-    for name, part in parts.items():
-        nodes = dict.fromkeys(dof.rpartition(":")[0] for dof in part.keys.joint)
-        ends.append(", ".join(f"{name}/{node}{_at(part, node)}" for node in nodes))
-    joint = assembly.joint
-    kinds = [f"rigid {', '.join(joint.rigid)}"] if joint.rigid else []
-    kinds += [f"{law.word} {', '.join(dict.fromkeys(pair))}" for pair, law in joint.laws.items()]
-    return f"joint between {ends[0]} and {ends[1]}: {'; '.join(kinds)}"
+    for dofs in (one.j, one.k):
+        nodes = dict.fromkeys(dof.rpartition(":")[0] for dof in dofs)
+        ends.append(", ".join(f"{node}{_place_of(node, parts)}" for node in nodes) or "the ground")
+    kinds = [f"rigid {', '.join(one.joint.rigid)}"] if one.joint.rigid else []
+    kinds += [f"{law.word} {', '.join(dict.fromkeys(pair))}" for pair, law in one.joint.laws.items()]
+    return f"joint {name} between {ends[0]} and {ends[1]}: {'; '.join(kinds)}".replace("  ", " ")
+
+
+def _place_of(node: str, parts: Mapping[str, AssemblyPart]) -> str:
+    name, _, own = node.partition("/")
+    return _at(parts[name], own)
 
 
 def _at(part: AssemblyPart, node: str) -> str:
@@ -140,12 +144,16 @@ def _node_rows(own: MeasuredAssembly, parts: Mapping[str, AssemblyPart]) -> list
     for one in own.assembly.attachments:
         for node in dict.fromkeys(dof.rpartition(":")[0] for dof in one.places):
             what.setdefault(node, []).append("mass" if isinstance(one, AddedMass) else "spring to the ground")
-    rows: list[tuple[str, ...]] = [("node", "place, m", "from the joint, m", "what")]
+    is_one = len(own.assembly.joints) == 1
+    which = "from the joint, m" if is_one else "from the nearest joint, m"
+    rows: list[tuple[str, ...]] = [("node", "place, m", which, "what")]
     for name, words in what.items():
-        part, node = parts[name[0]], name[2:]
+        of, _, node = name.partition("/")
+        part = parts[of]
         ends = [part.places[end] for dof in part.keys.joint if (end := dof.rpartition(":")[0]) in part.places]
         at = part.places.get(node)
-        away = "" if at is None or not ends else f"{np.linalg.norm(at - np.mean(ends, axis=0)):.4g}"
+        ends = [np.mean(ends, axis=0)] if is_one and ends else ends
+        away = "" if at is None or not ends else f"{min(np.linalg.norm(at - end) for end in ends):.4g}"
         rows.append((name, "" if at is None else _numbers(at), away, ", ".join(words)))
     return rows
 
@@ -193,9 +201,11 @@ def measured_assembly(
     _check_named(file, frfs)
     for own, what in ((rows, "response"), (columns, "excitation")):
         if not own:
+            whose = "A or B" if "A" in parts else ", ".join(parts)
+            first, channel = next(iter(parts)), (frfs.responses if what == "response" else frfs.excitations)[0]
             raise FileContentError(
-                f"{file.path}: no {what} of {frfs.source} is a DOF of A or B: name them under [channels], such as "
-                f'"{(frfs.responses if what == "response" else frfs.excitations)[0]}" = "A/{file.keys.A.joint[0]}"'
+                f"{file.path}: no {what} of {frfs.source} is a DOF of {whose}: name them under [channels], such as "
+                f'"{channel}" = "{first}/{parts[first].keys.joint[0]}"'
             )
     names = tuple(dict.fromkeys([*rows, *columns]))
     signs = np.array([[a[1] * b[1] for b in columns.values()] for a in rows.values()])
@@ -236,7 +246,7 @@ def _unused(frfs: FrfSet, named: tuple[dict[str, str], ...]) -> tuple[str, ...]:
 
 
 def _dofs(
-    file: AssemblyFile, parts: tuple[AssemblyPart, AssemblyPart], frfs: FrfSet, channels: tuple[Channel, ...]
+    file: AssemblyFile, parts: Mapping[str, AssemblyPart], frfs: FrfSet, channels: tuple[Channel, ...]
 ) -> dict[str, tuple[int, int]]:
     """Return for each DOF the number of its channel and its sign, in the order of the file of FRFs."""
     given = file.keys.channels
@@ -258,12 +268,12 @@ def _dofs(
     return found
 
 
-def _named_alike(parts: tuple[AssemblyPart, AssemblyPart], file: AssemblyFile, channel: Channel) -> tuple[str, int]:
-    """Return the DOF of A or B that is named like a channel; empty if there is none."""
+def _named_alike(parts: Mapping[str, AssemblyPart], file: AssemblyFile, channel: Channel) -> tuple[str, int]:
+    """Return the DOF of a part that is named like a channel; empty if there is none."""
     words = [f"{channel.node}:{channel.axis}", f"{channel.node}:{direction_names([channel.axis])[0]}"]
     words += [f"{channel.node}:theta"] if channel.is_rotation else []
     found = []
-    for side, part in zip("AB", parts, strict=True):
+    for side, part in parts.items():
         found += [f"{side}/{word}" for word in words if part.has(word)][:1]
     if len(found) > 1:
         raise FileContentError(

@@ -14,10 +14,13 @@ import scipy.sparse as sp
 from numpy.typing import ArrayLike
 
 from jointfrf.assembly_file.keys import (
+    AlikeKeys,
     AssemblyKeys,
     MatricesPart,
     ModesPart,
     PartKeys,
+    PartsKeys,
+    PlacedJointKeys,
     Prior,
     PriorKeys,
     ReceptancesPart,
@@ -28,7 +31,15 @@ from jointfrf.cases.substructures import MeasuredStructure, ModelStructure, Stru
 from jointfrf.dofs import is_rotation
 from jointfrf.frf.frf_set import Channel
 from jointfrf.identification.joint_file import read_joint
-from jointfrf.identification.model.assembly import AddedMass, Assembly, Attachment, GroundSpring, check_joint_order
+from jointfrf.identification.model.assembly import (
+    AddedMass,
+    Alike,
+    Assembly,
+    Attachment,
+    GroundSpring,
+    PlacedJoint,
+    check_joint_order,
+)
 from jointfrf.identification.model.substructure import SCALES, Substructure, Unknown
 from jointfrf.joint import Joint
 from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_frequency
@@ -38,7 +49,7 @@ from jointfrf.models.facts import model_facts
 from jointfrf.models.model import Model
 from jointfrf.models.points import PointModel, PointPatch
 from jointfrf.spelling import did_you_mean
-from jointfrf.toml.declared import read_keys
+from jointfrf.toml.declared import Keys, read_keys
 from jointfrf.toml.table import TomlTable, read_toml
 
 if TYPE_CHECKING:
@@ -349,21 +360,27 @@ class AssemblyFile:
 
     Attributes
     ----------
-    keys : AssemblyKeys
-    joint : LawJoint
+    keys : AssemblyKeys or PartsKeys
+    part_keys : dict of str to PartKeys
+        Those of A and B, or of parts by their names.
+    joint : LawJoint or None
+        That of two parts.
+    joints : dict of str to PlacedJoint
+        Those of several parts.
     path : Path
     """
 
-    keys: AssemblyKeys
-    joint: LawJoint
+    keys: AssemblyKeys | PartsKeys
+    part_keys: dict[str, PartKeys]
+    joint: LawJoint | None
+    joints: dict[str, PlacedJoint]
     path: Path
 
-    def parts(self, freq_hz: FloatArray) -> tuple[AssemblyPart, AssemblyPart]:
-        """Return both substructures; FRFs must be available on these lines, Hz."""
-        a, b = (AssemblyPart.of_keys(keys, freq_hz) for keys in (self.keys.A, self.keys.B))
-        return a, b
+    def parts(self, freq_hz: FloatArray) -> dict[str, AssemblyPart]:
+        """Return the substructures by name; FRFs must be available on these lines, Hz."""
+        return {name: AssemblyPart.of_keys(keys, freq_hz) for name, keys in self.part_keys.items()}
 
-    def located(self, parts: tuple[AssemblyPart, AssemblyPart]) -> tuple[AssemblyFile, tuple[str, ...]]:
+    def located(self, parts: Mapping[str, AssemblyPart]) -> tuple[AssemblyFile, tuple[str, ...]]:
         """Return the same with DOFs by nodes instead of positions, and which node each position is.
 
         Raises
@@ -374,36 +391,48 @@ class AssemblyFile:
         said: dict[str, None] = {}
 
         def named(keys: Any, key: str, dof: str) -> str:
-            part = {"A/@": parts[0], "B/@": parts[1]}.get(dof[:3])
-            if part is None:
+            name, _, own = dof.partition("/")
+            if name not in parts or not own.startswith("@"):
                 return dof
-            found: NamedDof = keys.build(lambda: named_dof(part, dof[2:]), key)
-            at, node = (name.rpartition(":")[0] for name in (dof, found.dof))
-            text = f"{at} is {dof[:2]}{node}, {1e3 * (found.away or 0.0):.3g} mm away"
-            said[text] = None
-            return dof[:2] + found.dof
+            found: NamedDof = keys.build(lambda: named_dof(parts[name], own), key)
+            at, node = (one.rpartition(":")[0] for one in (dof, found.dof))
+            said[f"{at} is {name}/{node}, {1e3 * (found.away or 0.0):.3g} mm away"] = None
+            return f"{name}/{found.dof}"
 
         own = self.keys
-        keys = _changed(
+        changed = _changed(
             own,
-            A=parts[0].keys,
-            B=parts[1].keys,
             channels={name: named(own, "channels", dof) for name, dof in own.channels.items()},
             mass=tuple(_changed(one, dofs=tuple(named(one, "dofs", dof) for dof in one.dofs)) for one in own.mass),
             ground=tuple(_changed(one, dof=named(one, "dof", one.dof)) for one in own.ground),
             response_gains={named(own, "response_gains", dof): prior for dof, prior in own.response_gains.items()},
             force_gains={named(own, "force_gains", dof): prior for dof, prior in own.force_gains.items()},
         )
-        return replace(self, keys=keys), tuple(said)
+        node = {
+            f"{name}/{old}": f"{name}/{new}"
+            for name, part in parts.items()
+            for old, new in zip(self.part_keys[name].joint, part.keys.joint, strict=True)
+        }
+        joints = {
+            name: PlacedJoint(one.joint, tuple(node[dof] for dof in one.j), tuple(node[dof] for dof in one.k))
+            for name, one in self.joints.items()
+        }
+        keys = {name: part.keys for name, part in parts.items()}
+        return replace(self, keys=changed, part_keys=keys, joints=joints), tuple(said)
 
     def check_values(self) -> None:
         """Raise a FileContentError where a law has no values: a fit starts anywhere, a plan needs what is expected."""
-        laws = None if isinstance(self.keys.joint, str) else self.keys.table.table("joint").content.get("law")
-        for law in laws if isinstance(laws, list) else ():
-            if _is_bare(law):
-                usual = ", ".join(f"{name} = ..." for name in start_values(law.get("law")))
-                text = f"the law of {law.get('dof')} needs the values that are expected: values = {{ {usual} }}"
-                raise self.keys.wrong("joint", text)
+        if isinstance(self.keys, PartsKeys):
+            tables = [(name, _inside(self.keys.table, "joints", name)) for name in self.joints]
+        else:
+            tables = [] if isinstance(self.keys.joint, str) else [("joint", self.keys.table.table("joint"))]
+        for name, table in tables:
+            laws = table.content.get("law")
+            for law in laws if isinstance(laws, list) else ():
+                if _is_bare(law):
+                    usual = ", ".join(f"{name} = ..." for name in start_values(law.get("law")))
+                    text = f"the law of {law.get('dof')} needs the values that are expected: values = {{ {usual} }}"
+                    raise self.keys.wrong(name, text)
 
     def attachments(self) -> tuple[Attachment, ...]:
         """Return masses and springs to the ground."""
@@ -419,23 +448,49 @@ class AssemblyFile:
             found.append(spring.build(lambda own=spring, n=numbers: GroundSpring(own.dof, **n)))  # type: ignore[misc]
         return tuple(found)
 
-    def assembly(
-        self, freq_hz: FloatArray, parts: tuple[AssemblyPart, AssemblyPart], channels: Sequence[str]
-    ) -> Assembly:
+    def assembly(self, freq_hz: FloatArray, parts: Mapping[str, AssemblyPart], channels: Sequence[str]) -> Assembly:
         """Return the assembly, of which FRFs between some DOFs are wanted; raises FileContentError."""
         attachments = self.attachments()
         used = [*channels, *(dof for one in attachments for dof in one.places)]
-        sides = []
-        for name, part in zip("AB", parts, strict=True):
+        keys, joint, sides = self.keys, self.joint, {}
+        for name, part in parts.items():
             own = part.keys
             for dof in own.joint:
                 if not part.has(dof):
                     raise own.wrong("joint", f"{name} has no DOF {dof!r}")
-            if len(own.joint) == len(self.joint.dofs):  # else it is said how many there must be
-                own.build(lambda own=own: check_joint_order("", own.joint, self.joint.dofs), "joint")  # type: ignore[misc]
-            here = [dof[2:] for dof in used if dof.startswith(f"{name}/") and part.has(dof[2:])]
-            sides.append(part.substructure(freq_hz, here))
-        return self.keys.build(lambda: Assembly(sides[0], sides[1], self.joint, attachments))
+            if joint is not None and len(own.joint) == len(joint.dofs):  # else it is said how many there must be
+                own.build(lambda own=own: check_joint_order("", own.joint, joint.dofs), "joint")  # type: ignore[misc]
+            begin = f"{name}/"
+            here = [dof.removeprefix(begin) for dof in used if dof.startswith(begin)]
+            sides[name] = part.substructure(freq_hz, [dof for dof in here if part.has(dof)])
+        if joint is not None:
+            return keys.build(lambda: Assembly(sides["A"], sides["B"], joint, attachments))
+        assert isinstance(keys, PartsKeys)
+        return keys.build(
+            lambda: Assembly.of_parts(sides, self.joints, attachments, same=_groups(keys), alike=_alike(keys))
+        )
+
+
+def _groups(keys: PartsKeys) -> list[tuple[str, ...]]:
+    """Return groups of what is the same; names alone are one."""
+    names = [one for one in keys.same if isinstance(one, str)]
+    groups = [one for one in keys.same if not isinstance(one, str)]
+    if names and groups:
+        raise keys.error("same", "a list of names, or of lists of names")
+    return [tuple(names)] if names else groups
+
+
+def _alike(keys: PartsKeys) -> dict[str, Alike]:
+    found = {}
+    for name in keys.alike:
+        own = read_keys(_inside(keys.table, "alike", name), AlikeKeys)
+        found[name] = own.build(lambda own=own: Alike(own.joints, own.spread))  # type: ignore[misc]
+    return found
+
+
+def _inside(table: TomlTable, key: str, name: str) -> TomlTable:
+    """Return the table ``[key.name]``."""
+    return TomlTable(table.content[key][name], f"{table.where}: [{key}.{name}]", table.folder)
 
 
 def read_assembly_file(path: Path) -> AssemblyFile:
@@ -446,16 +501,56 @@ def read_assembly_file(path: Path) -> AssemblyFile:
     FileContentError
         One sentence that names the file, the table and the key; all keys that are missing.
     """
-    keys = read_keys(read_toml(path), AssemblyKeys)
-    return AssemblyFile(keys, _joint_of(keys), path)
+    table = read_toml(path)
+    if "parts" not in table.content and "joints" not in table.content:
+        pair = read_keys(table, AssemblyKeys)
+        is_file = isinstance(pair.joint, str)
+        joint = _joint_of(pair, "joint") if is_file else _joint_of_table(pair.table.table("joint"))
+        return AssemblyFile(pair, {"A": pair.A, "B": pair.B}, joint, {}, path)
+    keys = read_keys(table, PartsKeys)
+    joints = {name: _placed(read_keys(_inside(table, "joints", name), PlacedJointKeys)) for name in keys.joints}
+    for name, one in joints.items():
+        for dof in (*one.j, *one.k):
+            if dof.partition("/")[0] not in keys.parts:
+                begin = " or ".join(f"'{part}/'" for part in list(keys.parts)[:2])
+                raise keys.wrong("joints", f"{name}: no part has a DOF {dof!r}; names begin with {begin}")
+    parts = {name: _part_of(_inside(table, "parts", name), name, joints) for name in keys.parts}
+    return AssemblyFile(keys, parts, None, joints, path)
 
 
-def _joint_of(keys: AssemblyKeys) -> LawJoint:
-    if isinstance(keys.joint, str):
-        named = keys.file_of("joint")
-        joint = keys.build(lambda: read_joint(named), "joint")
+def _placed(keys: PlacedJointKeys) -> PlacedJoint:
+    if (keys.law is None) == (keys.file is None):
+        raise keys.missing(["law"], "or file; one of them says what the joint is")
+    table = keys.table
+    if keys.file is None:
+        joint = _joint_of_table(TomlTable({"law": table.content["law"]}, table.where, table.folder))
     else:
-        joint = read_joint_table(_with_values(keys.table.table("joint")))
+        joint = _joint_of(keys, "file")
+    return keys.build(lambda: PlacedJoint(joint, keys.j, keys.k))
+
+
+def _part_of(table: TomlTable, name: str, joints: Mapping[str, PlacedJoint]) -> PartKeys:
+    """Return the keys of one of several parts, with its DOFs at all joints."""
+    if "joint" in table.content:
+        raise table.wrong("joint", "joints name the DOFs of their parts under [joints]: leave it out")
+    dofs = [dof.removeprefix(f"{name}/") for one in joints.values() for dof in (*one.j, *one.k)
+            if dof.startswith(f"{name}/")]  # fmt: skip
+    if not dofs:
+        raise table.wrong("joint", f"no joint names a DOF of {name}")
+    content = {**table.content, "joint": list(dict.fromkeys(dofs))}
+    keys: PartKeys = read_keys(TomlTable(content, table.where, table.folder), *get_args(PartKeys))
+    return keys
+
+
+def _joint_of(keys: Keys, key: str) -> LawJoint:
+    """Return the joint of the file that a key names."""
+    named = keys.file_of(key)
+    joint = keys.build(lambda: read_joint(named), key)
+    return LawJoint.of_joint(joint) if isinstance(joint, Joint) else joint
+
+
+def _joint_of_table(table: TomlTable) -> LawJoint:
+    joint = read_joint_table(_with_values(table))
     return LawJoint.of_joint(joint) if isinstance(joint, Joint) else joint
 
 
@@ -472,9 +567,13 @@ def _is_bare(law: Mapping[str, Any]) -> bool:
     return "values" not in law and start_values(law.get("law")) != {}
 
 
-def check_dofs(parts: tuple[AssemblyPart, AssemblyPart], keys: AssemblyKeys, name: str, dofs: Sequence[str]) -> None:
-    """Raise a FileContentError for a DOF that neither part has."""
+def check_dofs(
+    parts: Mapping[str, AssemblyPart], keys: AssemblyKeys | PartsKeys, name: str, dofs: Sequence[str]
+) -> None:
+    """Raise a FileContentError for a DOF that no part has."""
+    whose = "neither A nor B has" if list(parts) == ["A", "B"] else f"none of {', '.join(parts)} has"
     for dof in dofs:
-        side = {"A/": parts[0], "B/": parts[1]}.get(dof[:2])
-        if side is None or not side.has(dof[2:]):
-            raise keys.wrong(name, f"neither A nor B has a DOF {dof!r}; names begin with 'A/' or 'B/'")
+        part, _, own = dof.partition("/")
+        if part not in parts or not parts[part].has(own):
+            begin = " or ".join(f"'{one}/'" for one in list(parts)[:2])
+            raise keys.wrong(name, f"{whose} a DOF {dof!r}; names begin with {begin}")

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 __all__ = ["TEMPLATE"]
 
-#: Two parts of beams, a joint, a sensor; how parts of files of an FE program are written, in comments.
+#: Two parts of beams, a joint, a sensor; in comments parts of files of an FE program, and more parts than two.
 TEMPLATE = """\
 #:schema ./assembly.schema.json
 # Two parts, the joint between them, what is unknown, and which channel of a test is which DOF. SI units.
 # All keys: docs/assembly-keys.md. Then: jointfrf identify TEST.uff --model assembly.toml
 
 [A]                                 # side j of the joint
-model = "beam"                      # or chain, brick-beam, matrices, modes, receptances
+model = "beam"                      # or chain, brick-beam, rigid-body, matrices, modes, receptances
 length = 0.3                        # m
 elements = 12
 ends = ["clamped", "free"]
@@ -75,4 +75,29 @@ law = "spring"
 dofs = ["B/10:y"]
 mass = 0.003                        # kg
 unknown = 0.2                       # known to 20 %
+
+# More parts and joints than two and one have names, in place of [A], [B] and [joint]:
+#
+# same = ["left", "right"]          # equal; or [alike.mounts] with joints = [...]: a common mean with a spread
+#
+# [parts.machine]
+# model = "rigid-body"              # or any of the others; without joint
+# mass = 60.0                       # kg
+# inertia = [2.2, 3.0, 3.6]         # kg m^2
+# points = { left = [-0.3, 0.0, -0.2], right = [0.3, 0.0, -0.2] }  # m
+# moves = ["z", "theta_y"]
+#
+# [joints.left]
+# j = ["machine/left:z"]            # k = ["frame/3:z"]: the other side; without it the ground
+#
+# [[joints.left.law]]
+# dof = "z"
+# law = "spring"
+#
+# [joints.right]
+# j = ["machine/right:z"]
+#
+# [[joints.right.law]]
+# dof = "z"
+# law = "spring"
 """

@@ -188,6 +188,8 @@ def _one(args: argparse.Namespace, out: Output) -> tuple[Fit, dict[str, Any], li
 
 def _request(args: argparse.Namespace, measured: MeasuredAssembly) -> CardRequest | None:
     joint = measured.assembly.joint
+    if args.export is not None and len(measured.assembly.joints) > 1:
+        raise UsageError("--export writes one joint, and there are several: --save, then jf.cards of fit.at_point(...)")
     if args.export is not None and args.faces is None:
         args.faces = _rigid_faces(measured)
     return card_request(args, joint.dofs, damping="none", cross="zero", points=_joint_places(measured))
@@ -198,7 +200,7 @@ def _rigid_faces(measured: MeasuredAssembly) -> tuple[list[int], list[int]] | No
 
     Where a number is that of a node on both sides, the model of the assembly must have other numbers.
     """
-    patches = [part.joint_patch for part in measured.parts]
+    patches = [part.joint_patch for part in measured.parts.values()]
     nodes = [[int(n) for n in one.nodes] for one in patches if one is not None and one.coupling == "rigid"]
     return (nodes[0], nodes[1]) if len(nodes) == 2 and not {*nodes[0]} & {*nodes[1]} else None
 
@@ -206,7 +208,7 @@ def _rigid_faces(measured: MeasuredAssembly) -> tuple[list[int], list[int]] | No
 def _joint_places(measured: MeasuredAssembly) -> FloatArray | None:
     """Return where the joint is on both sides, m; None where it is not known, or at several nodes of a side."""
     found = []
-    for part in measured.parts:
+    for part in measured.parts.values():
         nodes = {dof.rpartition(":")[0] for dof in part.keys.joint}
         found += [part.places[node] for node in nodes if len(nodes) == 1 and node in part.places]
     return np.array(found) if len(found) == 2 else None
@@ -214,7 +216,7 @@ def _joint_places(measured: MeasuredAssembly) -> FloatArray | None:
 
 def _place_of_joint(measured: MeasuredAssembly, request: CardRequest) -> list[str]:
     """Say where the nodes of the joint must be, unless that was given, and what they follow."""
-    spread = [f"{name}/{patch.name}" for name, part in zip("AB", measured.parts, strict=True)
+    spread = [f"{name}/{patch.name}" for name, part in measured.parts.items()
               if (patch := part.joint_patch) is not None and patch.coupling == "distributing"]  # fmt: skip
     said = [f"{' and '.join(spread)}: the joint acts on the mean motion of the nodes: connect its node to them by a "
             "distributing coupling (RBE3), which adds no stiffness"] if spread else []  # fmt: skip

@@ -5,8 +5,9 @@ from __future__ import annotations
 import argparse
 import json
 from pathlib import Path
+from typing import Any
 
-from jointfrf.assembly_file.keys import AssemblyKeys
+from jointfrf.assembly_file.keys import AssemblyKeys, PartsKeys
 from jointfrf.assembly_file.template import TEMPLATE
 from jointfrf.cases.catalogue import KINDS
 from jointfrf.cli.usage import Output, UsageError
@@ -62,7 +63,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _new_assembly(options: argparse.Namespace) -> int:
-    schema = json.dumps(schema_of(AssemblyKeys), indent=1) + "\n"
+    schema = json.dumps(_of_either(schema_of(AssemblyKeys), schema_of(PartsKeys)), indent=1) + "\n"
     if options.schema:
         print(schema, end="")
         return 0
@@ -78,3 +79,9 @@ def _new_assembly(options: argparse.Namespace) -> int:
     out.say(f"wrote {path} and {beside}; edit it, then: {command}")
     out.give({"assembly": str(path), "schema": str(beside), "command": command})
     return 0
+
+
+def _of_either(*schemas: dict[str, Any]) -> dict[str, Any]:
+    """Return the schema of files of several forms."""
+    defined = {name: one for schema in schemas for name, one in schema["$defs"].items()}
+    return {"$schema": schemas[0]["$schema"], "anyOf": [{"$ref": one["$ref"]} for one in schemas], "$defs": defined}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping
 from dataclasses import asdict, replace
 from pathlib import Path
 
@@ -135,7 +136,7 @@ def run(args: argparse.Namespace) -> int:
         )  # fmt: skip
     written = []
     if args.report is not None:
-        sketched = [part.sketched(letter) for letter, part in zip("AB", parts, strict=True)]
+        sketched = [part.sketched(letter) for letter, part in parts.items()] if "A" in parts else []
         written.append(write_plan(found, args.report, parts=sketched, command=args.typed))
     out.say(found)
     needed = None
@@ -178,21 +179,23 @@ def _assemblies(needed: int | None, wanted: float, spread: float) -> str:
     return f"{needed} assemblies give an interval of the next one within {shown}"
 
 
-def _located(parts: tuple[AssemblyPart, AssemblyPart], dofs: list[str]) -> list[str]:
+def _located(parts: Mapping[str, AssemblyPart], dofs: list[str]) -> list[str]:
     """Return DOFs by nodes instead of positions."""
-    of_side = {"A/@": parts[0], "B/@": parts[1]}
     try:
-        return [dof[:2] + named_dof(of_side[dof[:3]], dof[2:]).dof if dof[:3] in of_side else dof for dof in dofs]
+        return [
+            f"{name}/{named_dof(parts[name], own).dof}" if name in parts and own.startswith("@") else dof
+            for dof, (name, _, own) in ((dof, dof.partition("/")) for dof in dofs)
+        ]
     except ValueError as error:
         raise UsageError(error) from error
 
 
-def _candidates(parts: tuple[AssemblyPart, AssemblyPart], most: int) -> list[str]:
-    """Return translations of nodes of both parts, far from each other."""
+def _candidates(parts: Mapping[str, AssemblyPart], most: int) -> list[str]:
+    """Return translations of nodes of all parts, far from each other."""
     if most < 1:
         raise UsageError(f"--candidates must be at least 1, not {most}")
     found: list[str] = []
-    for letter, part in zip("AB", parts, strict=True):
+    for letter, part in parts.items():
         if isinstance(part.keys, ReceptancesPart):
             assert isinstance(part.structure, MeasuredStructure)
             channels = [one for one in part.structure.frfs.responses if one in part.structure.frfs.excitations]

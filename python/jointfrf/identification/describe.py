@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Literal
@@ -522,10 +522,11 @@ def describe_model(found: FoundModel, channels: Channels) -> Fit:
         of_joint[one.name]
         if one.origin == "joint"
         else FittedParameter(
-            one.name, one.unit, origin=one.origin, prior=None if one.std is None else (one.value, one.std)
+            one.name, one.unit, origin=str(one.place[0]) if one.origin == "part" else one.origin,
+            prior=None if one.std is None else (one.value, one.std),
         )
         for one in vector.fitted
-    )
+    )  # fmt: skip
     fit = Fit(
         method="model",
         dofs=joint.dofs,
@@ -536,6 +537,7 @@ def describe_model(found: FoundModel, channels: Channels) -> Fit:
         residual_level=level * test.ratio,
         freq_hz=problem.freq_hz,
         laws=joint,
+        same=tuple(one for one in whole.same if one[0] in whole.joints),
         responses=channels.responses,
         forces=channels.forces,
         residual_is_noise=test.is_noise,
@@ -548,15 +550,18 @@ def describe_model(found: FoundModel, channels: Channels) -> Fit:
         ),
     )  # fmt: skip
     is_log = {one.name: one.is_log for one in vector.fitted}
+    said = [name for one in found.unseparated for name in one.names]
     findings = [
         *_model_residual(fit, found, channels),
         *_model_error(found),
         *poor_laws(fit, is_log, lambda name: found.intervals.of(name, 0.95)),
-        *_directions(found.directions),
+        *_directions(found.directions, said),
+        *_separation(found),
+        *_groups_of_joints(found),
         *_other_minimum(found.other),
         *_noise(problem.noise.is_assumed, problem.noise.inflation, problem.freq_hz),
         *_calibration(problem.noise.calibration),
-        *_priors(fit, found.directions),
+        *_priors(fit, found.directions, said),
         *_correlated(fit),
     ]
     if not found.minimum.converged:
@@ -602,7 +607,7 @@ def _model_error(found: FoundModel) -> list[Finding]:
     level, left = 100 * found.error.level, found.test_with_error
     if level == 0:
         whole = found.problem.prediction.whole
-        largest = 100 * max(found.error.of_part(part.error_level) for part in (whole.a, whole.b))
+        largest = 100 * max(found.error.of_part(part.error_level) for part in whole.parts.values())
         text = (
             f"the intervals allow for errors of the models of {largest:.2g} % of their modal stiffnesses and masses, "
             "more beyond the band, beside their unknowns (model_error): as believed, or as the FRFs do not exclude"
@@ -621,15 +626,57 @@ def _model_error(found: FoundModel) -> list[Finding]:
     return [warn("model", text) if is_clear else note("model", text)]
 
 
-def _directions(directions: Sequence[OpenDirection]) -> list[Finding]:
-    """Say what the FRFs do not determine, by its direction, unless a prior does."""
+def _separation(found: FoundModel) -> list[Finding]:
+    """Name joints that the FRFs do not separate, and which combinations of their parameters are known."""
+    value = dict(zip([one.name for one in found.problem.vector.all], found.values, strict=False))
+    findings = []
+    for one in found.unseparated:
+        joints = list(dict.fromkeys(name.rpartition(".")[0] for name in one.names))
+        sums = []
+        for weights, std in one.known[:_SHOWN]:
+            terms = [
+                f"{'-' if weight < 0 else '+'} {_coefficient(abs(weight))}{name}"
+                for weight, name in zip(weights, one.names, strict=True)
+                if abs(weight * value[name])
+                > 0.1 * max(abs(w * value[n]) for w, n in zip(weights, one.names, strict=True))
+            ]
+            total = sum(weight * value[name] for weight, name in zip(weights, one.names, strict=True))
+            sums.append(f"{' '.join(terms).removeprefix('+ ')} = {total:.4g} +- {std:.2g}")
+        text = f"the FRFs do not separate {', '.join(one.names)} of the joints {', '.join(joints)}"
+        text += ": their priors do" if one.is_held_by_prior else ""
+        text += f"; known is {'; '.join(sums)}" if sums else ""
+        findings.append((note if one.is_held_by_prior else warn)("direction", text, one.names))
+    return findings
+
+
+def _coefficient(weight: float) -> str:
+    return "" if abs(weight - 1) < 5e-3 else f"{weight:.3g} "
+
+
+def _groups_of_joints(found: FoundModel) -> list[Finding]:
+    """Say which joints are equal, and how far those that are alike scatter."""
+    vector, whole = found.problem.vector, found.problem.prediction.whole
+    said = [
+        note("groups", f"{', '.join(others)}: the same as {first}", (first, *others)) for first, *others in whole.same
+    ]
+    for one in vector.means:
+        mean = vector.all[one.mean]
+        std = one.std if mean.is_log else one.std / max(abs(found.values[one.mean]), np.finfo(float).tiny)
+        how = "given" if one.relative is not None else f"found from {len(one.members)} joints"
+        text = f"{mean.name} is a mean: the joints scatter about it by {100 * std:.2g} % (spread {how})"
+        said.append(note("prior", text, (mean.name, *(vector.all[i].name for i in one.members))))
+    return said
+
+
+def _directions(directions: Sequence[OpenDirection], said: Collection[str] = ()) -> list[Finding]:
+    """Say what the FRFs do not determine, by its direction, unless a prior does, or it is said already."""
     return [
         warn(
             "direction", f"the FRFs do not hold {_direction(one)}: moved along it, they stay within their noise",
             tuple(name for name, _ in one.parts),
         )
         for one in directions
-        if not one.is_held_by_prior
+        if not one.is_held_by_prior and not {name for name, _ in one.parts} <= set(said)
     ]  # fmt: skip
 
 
@@ -646,14 +693,17 @@ def _other_minimum(other: float) -> list[Finding]:
     return [warn("convergence", text)] if other < _OTHER else []
 
 
-def _priors(fit: Fit, directions: Sequence[OpenDirection]) -> list[Finding]:
+def _priors(fit: Fit, directions: Sequence[OpenDirection], said: Collection[str]) -> list[Finding]:
     """Name unknowns of which the FRFs say no more than the prior, and directions that priors hold."""
     errors = fit.std_error
     same = tuple(
         one.name for one in fit.parameters if one.prior is not None and errors[one.name] > _UNCHANGED * one.prior[1]
     )
     found = [note("prior", f"{', '.join(same)}: known from the prior, hardly from the FRFs", same)] if same else []
-    held = [one for one in directions if one.is_held_by_prior and len(one.parts) > 1]
+    held = [
+        one for one in directions
+        if one.is_held_by_prior and len(one.parts) > 1 and not {name for name, _ in one.parts} <= set(said)
+    ]  # fmt: skip
     return found + [
         note("prior", f"priors hold what the FRFs do not: {_direction(one)}", tuple(name for name, _ in one.parts))
         for one in held[:_SHOWN]

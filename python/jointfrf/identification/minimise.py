@@ -164,17 +164,23 @@ class _Steps:
         return step, float(part @ self.along)
 
 
-def inverse_information(information: FloatArray) -> FloatArray:
+def inverse_information(information: FloatArray, *, open_ends: bool = False) -> FloatArray:
     """Inverse of information matrices of parameters of very different size; a pseudo-inverse where one has none.
 
     Parameters
     ----------
     information : ndarray, shape (..., p, p)
+    open_ends : bool
+        Whether directions without information have the variance of what rounding leaves, as parameters that are shown
+        need it; none in a pseudo-inverse.
     """
     size = np.sqrt(np.maximum(np.einsum("...aa->...a", information), TINY))
     value, vector = np.linalg.eigh(information / (size[..., :, None] * size[..., None, :]))
     length = abs(value)
     seen = length > _SEEN * length.max(axis=-1, keepdims=True)
+    if open_ends:
+        length = np.maximum(length, _SEEN * length.max(axis=-1, keepdims=True))
+        value, seen = length, length > 0
     own = vector / size[..., :, None]
     inverse: FloatArray = (own * np.where(seen, 1 / np.where(seen, value, 1), 0)[..., None, :]) @ own.swapaxes(-1, -2)
     return inverse

@@ -14,10 +14,10 @@ from jointfrf.dofs import parameter_name
 from jointfrf.kernel.arguments import FloatArray
 from jointfrf.laws.law_joint import JointQuantity, LawJoint
 
-__all__ = ["FitParameter", "ParameterOrigin", "ParameterVector", "joint_vector"]
+__all__ = ["CommonMean", "FitParameter", "ParameterOrigin", "ParameterVector", "joint_vector"]
 
-#: What a parameter belongs to.
-ParameterOrigin = Literal["joint", "A", "B", "attachment", "response", "force", "error of A", "error of B"]
+#: What a parameter belongs to; a mean is that of several joints, an error one of the model of a part.
+ParameterOrigin = Literal["joint", "mean", "part", "attachment", "response", "force", "error"]
 
 
 #: Stiffnesses of the joint are sought within this factor of the stiffness that the substructures have there.
@@ -36,8 +36,8 @@ class FitParameter(NamedTuple):
     origin : str
         What it belongs to.
     place : tuple
-        Its place there: its number in the joint; number of the attachment and of its number; name of an unknown;
-        number of a channel.
+        Its place there: its number in the joint; number of the attachment and of its number; names of the part and of
+        the unknown; number of a channel.
     value : float
         Where the fit may start, and the mean of the prior.
     std : float or None
@@ -47,6 +47,8 @@ class FitParameter(NamedTuple):
         Whether it is sought as its logarithm.
     is_free : bool
         Whether it is fitted.
+    like : int or None
+        Place among all of the parameter that it equals.
     """
 
     name: str
@@ -59,11 +61,33 @@ class FitParameter(NamedTuple):
     upper: float
     is_log: bool
     is_free: bool
+    like: int | None = None
 
     @property
     def is_error(self) -> bool:
         """Whether it is an entry of the error of a model, which nobody asked for by name."""
-        return self.origin in ("error of A", "error of B")
+        return self.origin == "error"
+
+
+class CommonMean(NamedTuple):
+    """A parameter of several joints whose values scatter about a common mean.
+
+    Attributes
+    ----------
+    mean : int
+        Place of the mean among all parameters.
+    members : tuple of int
+        Places of the parameters.
+    std : float
+        Standard deviation of the members, of their logarithms where these are sought.
+    relative : float or None
+        Where the spread was given: `std`, or its ratio to the mean.
+    """
+
+    mean: int
+    members: tuple[int, ...]
+    std: float
+    relative: float | None
 
 
 @dataclass(frozen=True)
@@ -73,9 +97,12 @@ class ParameterVector:
     Attributes
     ----------
     all : tuple of FitParameter
+    means : tuple of CommonMean
+        Priors that several parameters share.
     """
 
     all: tuple[FitParameter, ...]
+    means: tuple[CommonMean, ...] = ()
 
     @cached_property
     def free(self) -> NDArray[np.intp]:
@@ -118,7 +145,24 @@ class ParameterVector:
         """Return the values of all from coordinates."""
         values = self.values.copy()
         values[self.free] = self._own(x)
+        values[self._alike[0]] = values[self._alike[1]]
         return values
+
+    @cached_property
+    def _alike(self) -> tuple[list[int], list[int]]:
+        """Places of the parameters that equal others, and of these."""
+        own = [(i, one.like) for i, one in enumerate(self.all) if one.like is not None]
+        return [i for i, _ in own], [like for _, like in own]
+
+    def with_means(self, values: FloatArray, *, at_mean: bool = False) -> FloatArray:
+        """Return values of all with the means of those members that they have; and, if wanted, the members there."""
+        found = values.copy()
+        for one in self.means:
+            own, members = self.all[one.mean], values[list(one.members)]
+            found[one.mean] = np.exp(np.log(members).mean()) if own.is_log else members.mean()
+            if at_mean:
+                found[list(one.members)] = found[one.mean] = members[0]
+        return found
 
     def _own(self, x: FloatArray) -> FloatArray:
         found: FloatArray = np.where(self.is_log, np.exp(np.where(self.is_log, x, 0)), x * self.scale)
@@ -166,16 +210,32 @@ class ParameterVector:
         """Which of the free ones have a prior."""
         return np.array([one.std is not None for one in self.fitted], bool)
 
+    @cached_property
+    def _shared(self) -> FloatArray:
+        """Coordinates of members less that of their mean, over their standard deviation, as a matrix."""
+        rows, place = [], {int(i): at for at, i in enumerate(self.free)}
+        for one in self.means:
+            for member in one.members:
+                row = np.zeros(self.free.size)
+                for i, sign in ((member, 1), (one.mean, -1)):
+                    row[place[i]] = sign * (1.0 if self.all[i].is_log else self.scale[place[i]]) / one.std
+                rows.append(row)
+        return np.array(rows).reshape(-1, self.free.size)
+
     def pulls(self, x: FloatArray) -> FloatArray:
-        """Return by how many standard deviations of its prior each free value is off; 0 without one."""
+        """Return by how many standard deviations of its prior each free value is off, 0 without one; then members."""
         std = np.array([one.std or np.inf for one in self.fitted])
-        found: FloatArray = (self._own(x) - self.values[self.free]) / std
-        return found
+        return np.concatenate([(self._own(x) - self.values[self.free]) / std, self._shared @ x])
 
     def pull_slopes(self, x: FloatArray) -> FloatArray:
-        """Return their derivatives by the coordinates."""
+        """Return their derivatives by the coordinates, a row each."""
         std = np.array([one.std or np.inf for one in self.fitted])
-        return np.asarray(self.slope(x) / std)
+        return np.concatenate([np.diag(self.slope(x) / std), self._shared])
+
+    def prior_information(self, x: FloatArray) -> FloatArray:
+        """Return the information of all priors on the coordinates, shape (p, p)."""
+        slopes = self.pull_slopes(x)
+        return np.asarray(slopes.T @ slopes)
 
     def places_of(self, origin: ParameterOrigin) -> list[int]:
         """Return the places, among all, of the parameters of an origin."""
@@ -184,6 +244,25 @@ class ParameterVector:
     def of_joint(self) -> ParameterVector:
         """Return the same with the parameters of the joint free only."""
         return ParameterVector(tuple(one._replace(is_free=one.is_free and one.origin == "joint") for one in self.all))
+
+    def of_equal_joints(self) -> ParameterVector | None:
+        """Return the same with all joints of the same laws equal; None where there are none but those that are."""
+        first: dict[str, int] = {}
+        found, is_new = list(self.all), False
+        for i, one in enumerate(self.all):
+            if one.origin == "joint" and one.is_free:
+                like = first.setdefault(one.name.rpartition(".")[2], i)
+                if like != i:
+                    found[i], is_new = one._replace(is_free=False, like=like), True
+            elif one.like is not None and found[one.like].like is not None:
+                found[i] = one._replace(like=found[one.like].like)
+            elif one.origin == "mean":
+                found[i] = one._replace(is_free=False)
+        return ParameterVector(tuple(found)) if is_new else None
+
+    def places_of_part(self, name: str, origin: ParameterOrigin = "part") -> list[int]:
+        """Return the places, among all, of the unknowns or the errors of a part."""
+        return [i for i in self.places_of(origin) if self.all[i].place[0] == name]
 
 
 def joint_vector(joint: LawJoint, fixed: Sequence[str], joint_stiffness: FloatArray) -> ParameterVector:

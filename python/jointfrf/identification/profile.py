@@ -23,6 +23,8 @@ _STEPS, _MANY_STEPS = 12, 30
 _HELD_STEPS, _HELD_LEAST = 6, 1e-2
 #: Step of a difference, in standard errors, and how far from its value a function may be that is held, likewise.
 _SLOPE, _HELD = 1e-3, 1e-2
+#: What brackets a limit may be as narrow as this share of how near squares must come to it.
+_WALL = 0.3
 #: A limit is sought between these shares of what brackets it.
 _INSIDE = np.array([0.1, 0.9])
 
@@ -112,7 +114,8 @@ class ProfileIntervals:
                 if abs(excess / quadratic - 1) < self.parabola:
                     return self._value(i, sign * reach * np.sqrt(limit / excess))
             excess = self._excess(self.least(self._there(sign * reach * along), i))
-            if abs(excess / limit - 1) < self.near:
+            # Beyond a parameter that cannot be negative squares rise like a wall.
+            if abs(excess / limit - 1) < self.near or high - low < _WALL * self.near * reach:
                 break
             if excess < limit:
                 if at_bound:

@@ -103,6 +103,7 @@ def fit_to_dict(fit: Fit, *, probabilities: Sequence[float] | None = None, lines
             for one in fit.parameters
         },
         "joint": None if fit.laws is None else tomllib.loads(joint_text(fit.laws)),
+        "same": [list(one) for one in fit.same],
         "covariance": [[_plain(value) for value in row] for row in fit.covariance.tolist()],
         "intervals": _plain_intervals(fit, probabilities),
         "derived": {
@@ -305,7 +306,7 @@ def _fit_of(content: object, source: str) -> Fit:
         )
     read: dict[str, Any] = {}
     for key, (reader, is_new) in _READERS.items():
-        if key not in content and key not in ("k_lines", "seen") and not (is_new and version == 1):
+        if key not in content and key not in ("k_lines", "seen", "same") and not (is_new and version == 1):
             raise FileContentError(f'{source}: "{key}" is missing')
         try:
             read[key] = reader(content.get(key), read)
@@ -322,6 +323,7 @@ def _fit_of(content: object, source: str) -> Fit:
         residual_level=read["residual_level"],
         freq_hz=read["lines_hz"],
         laws=read["joint"],
+        same=read["same"],
         findings=read["findings"] if version > 1 else (*read["warnings"], *read["notes"]),
         k_lines=read["k_lines"],
         bands=read["bands_hz"],
@@ -456,6 +458,19 @@ def _derived_of(content: Any, _: dict[str, Any]) -> dict[str, Derived]:
     }
 
 
+def _same_of(content: Any, read: dict[str, Any]) -> tuple[tuple[str, ...], ...]:
+    """Read groups of equal joints; files of before have none."""
+    if content is None:
+        return ()
+    if not isinstance(content, list):
+        raise TypeError
+    groups = tuple(_texts_of(one, read) for one in content)
+    known = {dof.rpartition(".")[0] for dof in read["dofs"]}
+    if not all(len(one) > 1 and known.issuperset(one) for one in groups):
+        raise ValueError
+    return groups
+
+
 def _seen_of(content: Any, _: dict[str, Any]) -> dict[str, SeenStiffness]:
     """Read what virtual points see; files of before have none."""
     return {
@@ -503,6 +518,7 @@ _READERS: dict[str, tuple[Callable[[Any, dict[str, Any]], Any], bool]] = {
     "bands_hz": (_bands_of, False),
     "derived": (_derived_of, True),
     "seen": (_seen_of, True),
+    "same": (_same_of, True),
     "findings": (_findings_of, True),
     "warnings": (_warnings_of, False),
     "notes": (_notes_of, False),

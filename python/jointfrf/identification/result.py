@@ -55,7 +55,7 @@ class FittedParameter:
     kind, row, column : str
         Of the joint: ``"k"``, ``"tau"``, ..., and its DOFs, the same twice but for a cross term. Empty elsewhere.
     origin : str
-        What it belongs to: "joint", "A", "B", "attachment", "response", "force".
+        What it belongs to: "joint", "mean" of several joints, name of a part ("A"), "attachment", "response", "force".
     prior : (float, float) or None
         Mean and standard deviation of what was believed before.
     """
@@ -153,6 +153,8 @@ class Fit(WithFindings):
         as seen between them. The parameters are then those of the joint alone.
     data : FitData, ModelData or None
         What it was made from, for figures and pages; a fit that was loaded has none.
+    same : tuple of tuple of str
+        Joints that are equal: their parameters are those of the first.
     """
 
     method: str
@@ -175,6 +177,7 @@ class Fit(WithFindings):
     intervals: IntervalsByProbability | None = field(default=None, repr=False, compare=False)
     seen: Mapping[str, SeenStiffness] = field(default_factory=dict)
     data: FitData | ModelData | None = field(default=None, repr=False, compare=False)
+    same: tuple[tuple[str, ...], ...] = ()
 
     @classmethod
     def of_springs(
@@ -215,11 +218,20 @@ class Fit(WithFindings):
         return np.asarray(self.covariance / np.outer(size, size))
 
     def _matrix(self, kind: ParameterKind) -> FloatArray:
-        return _matrix(self.dofs, self.parameters, self.estimate, kind)
+        matrix = _matrix(self.dofs, self.parameters, self.estimate, kind)
+        for first, *others in self.same:
+            own = [i for i, dof in enumerate(self.dofs) if dof.startswith(f"{first}.")]
+            for name in others:
+                at = [i for i, dof in enumerate(self.dofs) if dof.startswith(f"{name}.")]
+                if len(at) == len(own):
+                    matrix[np.ix_(at, at)] = matrix[np.ix_(own, own)]
+        return matrix
 
     @property
     def joint(self) -> Joint | LawJoint:
         """The joint found, to be coupled, moved, reordered or written; DOFs in the order of `dofs`.
+
+        Several joints are one with DOFs named ``"mount.y"``; `at_point` has each.
 
         Raises
         ------
@@ -258,9 +270,9 @@ class Fit(WithFindings):
     @cached_property
     def loss_factors(self) -> dict[str, Derived]:
         """Loss factor eta = h/k, with its uncertainty, of each DOF whose hysteretic damping was fitted."""
-        known = {one.row for one in self.parameters if one.kind == "h" and not one.is_cross}
+        known = {one.row for one in self.parameters if one.kind == "h" and one.origin == "joint" and not one.is_cross}
         names = ([parameter_name(kind, dof, dof) for kind in ("eta", "h", "k")] for dof in self.dofs if dof in known)
-        return {eta: self.derived(f"{{{h}}} / {{{k}}}") for eta, h, k in names}
+        return {eta: self.derived(f"{{{h}}} / {{{k}}}") for eta, h, k in names if k in self._names}
 
     @property
     def points(self) -> tuple[str, ...]:
@@ -301,6 +313,7 @@ class Fit(WithFindings):
         if point not in self.points:
             known = f"only {', '.join(self.points)}" if self.points else "the DOFs have none, such as bolt1.y"
             raise ValueError(f"there is no joint point {one_line(point)}, {known}")
+        point = next((group[0] for group in self.same if point in group), point)
         at = [d for d, dof in enumerate(self.dofs) if point_and_direction(dof)[0] == point]
         own = {self.dofs[d]: point_and_direction(self.dofs[d])[1] for d in at}
         kept = [i for i, one in enumerate(self.parameters) if one.row in own and one.column in own]
@@ -331,6 +344,7 @@ class Fit(WithFindings):
             self,
             dofs=tuple(own.values()),
             parameters=tuple(names.values()),
+            same=(),
             estimate=self.estimate[kept],
             covariance=self.covariance[np.ix_(kept, kept)],
             laws=laws,

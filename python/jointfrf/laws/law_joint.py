@@ -21,7 +21,7 @@ from jointfrf.laws.springs import SpringLaw
 if TYPE_CHECKING:
     from jointfrf.io.cards import CardFormat, CardOptions
 
-__all__ = ["Connection", "JointQuantity", "LawJoint"]
+__all__ = ["Connection", "JointQuantity", "LawJoint", "joined"]
 
 #: The mass of a joint DOF, half of it on either side.
 _MASS = LawField("m", "number", 0.0)
@@ -396,6 +396,17 @@ def _springs(
 
     freq = as_real("table_hz", table_hz, (None,))
     return table_cards(program, springs.dofs, freq, springs.dynamic_stiffness(freq), nodes, **options)
+
+
+def joined(joints: Mapping[str, LawJoint]) -> LawJoint:
+    """Return several joints as one, none of which couples DOFs of two: its DOFs are named ``"mount.y"``."""
+    laws, rigid, mass, dofs = {}, list[str](), dict[str, float](), list[str]()
+    for name, joint in joints.items():
+        laws.update({(f"{name}.{a}", f"{name}.{b}"): law for (a, b), law in joint.laws.items()})
+        rigid += [f"{name}.{dof}" for dof in joint.rigid]
+        mass.update({f"{name}.{dof}": value for dof, value in joint.mass.items()})
+        dofs += [f"{name}.{dof}" for dof in joint.dofs]
+    return LawJoint(laws, rigid, mass, dofs)
 
 
 def _masses(

@@ -7,13 +7,14 @@ from dataclasses import dataclass, field, fields, replace
 from typing import Literal, get_args
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy import sparse
 
-from jointfrf.dofs import DIRECTIONS, rigid_motion
-from jointfrf.kernel.arguments import FloatArray, check_choice
+from jointfrf.dofs import DIRECTIONS, direction_places, rigid_motion
+from jointfrf.kernel.arguments import FloatArray, as_positive, as_real, check_choice, check_type, one_line
 from jointfrf.models.model import Model
 
-__all__ = ["Coupling", "PointModel", "PointPatch", "couple_points"]
+__all__ = ["Coupling", "PointModel", "PointPatch", "couple_points", "rigid_body"]
 
 Coupling = Literal["rigid", "distributing"]
 #: A motion is not held by a patch where its nodes see less than this share of the motion that they see most of.
@@ -48,6 +49,76 @@ class PointModel(Model):
         unit = sparse.eye_array(len(self.dofs), format="csr")
         rows = [self.shown[name] if name in self.shown else unit[[self.index(name)]] for name in names]
         return sparse.csr_array(sparse.vstack(rows))
+
+
+def rigid_body(
+    mass: float,
+    inertia: ArrayLike,
+    points: Mapping[str, ArrayLike],
+    *,
+    centre: ArrayLike = (0.0, 0.0, 0.0),
+    moves: Sequence[str] = DIRECTIONS,
+) -> PointModel:
+    """Model of a rigid body with named points.
+
+    Parameters
+    ----------
+    mass : float
+        kg.
+    inertia : array_like, shape (3,) or (3, 3)
+        About its centre of mass: moments about axes along x, y, z, or the tensor, kg m^2.
+    points : mapping of str to array_like, shape (3,)
+        Where they are, m; each has six DOFs, ``"foot:x"`` to ``"foot:theta_z"``.
+    centre : array_like, shape (3,)
+        Its centre of mass, m; its DOFs are ``"centre:x"``, ...
+    moves : sequence of str
+        Directions in which it is free, among x, y, z, theta_x, theta_y, theta_z; rails hold it in the others.
+
+    Returns
+    -------
+    PointModel
+
+    Raises
+    ------
+    ValueError
+        A mass or an inertia that is not positive, a point named ``centre``, a direction that there is not.
+
+    Examples
+    --------
+    >>> import jointfrf as jf
+    >>> plate = jf.rigid_body(2.0, [0.1, 0.1, 0.2], {"edge": [0.5, 0.0, 0.0]})
+    >>> h = plate.receptance([1.0], ["edge:z"])[0, 0, 0]
+    >>> bool(abs(h * (2 * 3.141592653589793) ** 2 + 1 / 2.0 + 0.5**2 / 0.1) < 1e-9)
+    True
+    """
+    own = as_positive("mass", mass)
+    is_tensor = np.asarray(inertia, object).ndim == 2
+    tensor = as_real("inertia", inertia, (3, 3)) if is_tensor else np.diag(as_real("inertia", inertia, (3,)))
+    if not np.allclose(tensor, tensor.T) or np.linalg.eigvalsh(tensor)[0] <= 0:
+        raise ValueError("inertia must be symmetric and positive definite")
+    check_type("points", points, Mapping)
+    at = {"centre": as_real("centre", centre, (3,))}
+    for name, place in points.items():
+        if not isinstance(name, str) or not name or name == "centre" or ":" in name or "/" in name:
+            raise ValueError(f"points: a point cannot be named {one_line(name)}")
+        at[name] = as_real(f"points: {name}", place, (3,))
+    free = np.sort(direction_places(moves))
+    if not free.size:
+        raise ValueError("moves must name at least one direction")
+    whole = np.zeros((6, 6))
+    whole[[0, 1, 2], [0, 1, 2]], whole[3:, 3:] = own, tensor
+    shown = {}
+    for name, place in at.items():
+        motion = np.eye(6)
+        motion[:3] = rigid_motion(place[None], at["centre"])[0]
+        for i, direction in enumerate(DIRECTIONS):
+            if name != "centre" or i not in free:
+                shown[f"{name}:{direction}"] = sparse.csr_array(motion[[i]][:, free])
+    n = free.size
+    return PointModel(
+        stiffness=sparse.csr_array((n, n)), mass=sparse.csr_array(whole[np.ix_(free, free)]),
+        dofs=tuple(f"centre:{DIRECTIONS[i]}" for i in free), places=at, shown=shown,
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)

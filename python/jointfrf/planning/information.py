@@ -168,7 +168,13 @@ class PlannedTest:
     def vector(self, channels: Channels) -> ParameterVector:
         """Return all parameters, with those of the channels."""
         prediction = Prediction(self.assembly, self.freq_hz[:1], channels.responses[:1], channels.forces[:1])
-        return parameter_vector(self.assembly, channels.gains(), self.fixed, prediction.joint_stiffness())
+        found = parameter_vector(self.assembly, channels.gains(), self.fixed, prediction.joint_stiffness())
+        # Joints whose spread is to be found are each for itself before that.
+        known = tuple(one for one in found.means if one.relative is not None)
+        unknown = {one.mean for one in found.means} - {one.mean for one in known}
+        return ParameterVector(
+            tuple(one._replace(is_free=one.is_free and i not in unknown) for i, one in enumerate(found.all)), known
+        )
 
     def _part(
         self, vector: ParameterVector, channels: Channels, freq_hz: FloatArray, measured: Assembly | None
@@ -188,5 +194,7 @@ class PlannedTest:
             change = (measured.receptance(freq_hz, channels.responses, channels.forces) - y) * weight
             parts = np.stack([change.real, change.imag], axis=-1)
             pull = np.einsum("loipr,loir->oip", real, parts, optimize=True)
-        believed = [(value / one.std) ** 2 if one.std else 0.0 for one, value in zip(vector.fitted, scale, strict=True)]
-        return FrfInformation(vector.fitted, of_frf, of_line, np.diag(believed) + np.eye(len(scale)) / _WIDEST**2, pull)
+        x = vector.to_coordinates(vector.values)
+        to_scale = scale / vector.slope(x)
+        prior = vector.prior_information(x) * np.outer(to_scale, to_scale) + np.eye(len(scale)) / _WIDEST**2
+        return FrfInformation(vector.fitted, of_frf, of_line, prior, pull)

@@ -201,7 +201,7 @@ def plan(
     freq_hz : array_like, shape (n_freq,)
         Lines that will be measured, above 0 Hz.
     responses, forces : sequence of str
-        Candidates: DOFs ``"A/..."``, ``"B/..."`` where there could be a sensor, and a hit or a shaker.
+        Candidates: DOFs ``"A/7:y"`` where there could be a sensor, and a hit or a shaker.
     noise : float
         Standard deviation of an average relative to the FRF.
     floor : float
@@ -405,8 +405,7 @@ class _Planner(NamedTuple):
         measured = None
         if sensor_mass:
             masses = tuple(AddedMass(dofs, sensor_mass) for dofs in self._nodes(responses))
-            whole = self.test.assembly
-            measured = Assembly(whole.a, whole.b, whole.joint, (*whole.attachments, *masses))
+            measured = self.test.assembly.with_attachments(*masses)
         return self.test.information(chosen, measured)
 
     def _nodes(self, responses: Sequence[str]) -> list[tuple[str, ...]]:
@@ -414,8 +413,7 @@ class _Planner(NamedTuple):
         nodes = dict.fromkeys(name.rpartition(":")[0] for name in responses)
         moving = []
         for node in nodes:
-            side = self.test.assembly.a if node.startswith("A/") else self.test.assembly.b
-            own = [f"{node}:{axis}" for axis in "xyz" if side.has(f"{node[2:]}:{axis}")]
+            own = [f"{node}:{axis}" for axis in "xyz" if self.test.assembly.has(f"{node}:{axis}")]
             moving.append(tuple(own or [name for name in responses if name.rpartition(":")[0] == node]))
         return moving
 

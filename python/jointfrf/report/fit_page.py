@@ -197,8 +197,8 @@ def _channels(fit: Fit) -> Table:
     rows: list[tuple[Cell, ...]] = [
         ("responses", ", ".join(fit.responses)),
         ("forces", ", ".join(fit.forces)),
-        ("joint between", f"{', '.join(f'A/{dof}' for dof in whole.a.joint)} and "
-                          f"{', '.join(f'B/{dof}' for dof in whole.b.joint)}"),
+        *((f"joint {name} between".replace("  ", " "), f"{', '.join(one.j)} and {', '.join(one.k) or 'the ground'}")
+          for name, one in whole.joints.items()),
         *([("attached", ", ".join(attached))] if attached else []),
     ]  # fmt: skip
     return Table("channels", "DOFs of the assembly", ("what", "which"), tuple(rows))

@@ -4,7 +4,6 @@ import csv
 import importlib.util
 import json
 import re
-from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -123,7 +122,7 @@ def test_one_test_in_several_files_with_all_that_is_written(tmp_path):
 def test_rigid_points_of_the_joint_are_the_faces_of_cards(k, coupling, expected):
     """Not where both parts have a node of one number, which the whole model cannot have."""
     patches = [PointPatch("lap", ("1", "2"), "rigid"), PointPatch("lap", k, coupling)]
-    parts = tuple(SimpleNamespace(joint_patch=one) for one in patches)
+    parts = {name: SimpleNamespace(joint_patch=one) for name, one in zip("AB", patches, strict=True)}
     assert _rigid_faces(SimpleNamespace(parts=parts)) == expected
 
 
@@ -134,7 +133,10 @@ def test_cards_say_where_the_nodes_of_the_joint_lie_and_what_they_follow(couplin
                         places={"lap": np.array([0.01, x, 0.0])}) for x in (0.0, -0.002)
     )  # fmt: skip
     options = {"units": "mm-t-s"}
-    lines = _place_of_joint(SimpleNamespace(parts=parts), CardRequest("nastran", [7, 8], options, False, False, None))
+    lines = _place_of_joint(
+        SimpleNamespace(parts=dict(zip("AB", parts, strict=True))),
+        CardRequest("nastran", [7, 8], options, False, False, None),
+    )
     assert lines[-1] == "node 7 lies at (10, 0, 0), node 8 at (10, -2, 0) mm"
     assert len(lines) == said
     assert said == 1 or lines[0].startswith("A/lap and B/lap: the joint acts on the mean motion of the nodes")
@@ -209,7 +211,8 @@ def test_a_new_assembly_is_read_as_it_is(tmp_path):
     result = run_command("new", "assembly", folder)
     assert result.returncode == 0
     assert "jointfrf identify TEST.uff --model" in result.stdout
-    assert "AssemblyKeys" in json.loads((folder / "assembly.schema.json").read_text())["$ref"]
+    schema = json.loads((folder / "assembly.schema.json").read_text())
+    assert [one["$ref"].rpartition("/")[2] for one in schema["anyOf"]] == ["AssemblyKeys", "PartsKeys"]
     # What stands in comments, too, is read: keys and values are known.
     text = (folder / "assembly.toml").read_text()
     assert read_assembly_file(folder / "assembly.toml").joint.dofs == ("y", "theta_z")
@@ -220,11 +223,15 @@ def test_a_new_assembly_is_read_as_it_is(tmp_path):
         (folder / "files.toml").write_text(text[: text.index("[B]   ")] + files + text[text.index("[[joint.law]]") :])
         read.append(read_assembly_file(folder / "files.toml").keys.B)
     assert (read[0].units, read[1].residuals) == ("mm-t-s", "part.uff")
+    (folder / "several.toml").write_text(re.sub(r"(?m)^# ?", "", text[text.index("# same = ") :]))
+    several = read_assembly_file(folder / "several.toml")
+    whole = several.assembly(np.ones(1), several.parts(np.ones(1)), [])
+    assert (list(whole.joints), whole.same) == (["left", "right"], (("left", "right"),))
     # A simulated test of it gives its joint.
     truth = read_assembly_file(folder / "assembly.toml")
     freq = np.arange(10.0, 600.0, 4.0)
     laws = jf.LawJoint({"y": jf.SpringLaw(4e5, c=8.0), "theta_z": jf.SpringLaw(2e3, c=0.4)})
-    whole = replace(truth.assembly(freq, truth.parts(freq), ["A/7:y"]), joint=laws)
+    whole = truth.assembly(freq, truth.parts(freq), ["A/7:y"]).with_joint(laws)
     h = jf.pollute(whole.receptance(freq, ["A/7:y", "A/10:y", "B/10:y"], ["A/7:y"]), 0.02, seed=4)
     channels = [jf.io.Channel(i, "+y") for i in (1, 2, 3)]
     write_frfs(tmp_path / "test.npz", jf.io.FrfSet(freq, channels, channels[:1], h, "receptance"))

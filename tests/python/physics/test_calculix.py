@@ -112,7 +112,7 @@ measured = jf.measured_assembly("assembly.toml", FrfSet(freq, channels, channels
 fit = measured.fit()
 low, high = fit.confidence_interval(0.99)["k_theta_x"]
 assert low < 8e3 < high, (low, high)
-print(len(measured.parts[0].structure.model.dofs), 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+print(len(measured.parts["A"].structure.model.dofs), 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 """
 
 

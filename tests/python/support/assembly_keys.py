@@ -8,7 +8,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from jointfrf.assembly_file.keys import AssemblyKeys
+from jointfrf.assembly_file.keys import AlikeKeys, AssemblyKeys, PartsKeys, PlacedJointKeys
 from jointfrf.io.channel_table import ChannelTableKeys
 from jointfrf.laws.joint_toml import ConstantsKeys, LawJointKeys
 from jointfrf.toml.documents import key_reference
@@ -24,7 +24,8 @@ A key that is not in this list is an error that lists those that are.
 
 
 TOPS = {
-    "assembly.toml": AssemblyKeys, "joint.toml of constants": ConstantsKeys, "joint.toml of laws": LawJointKeys,
+    "assembly.toml": AssemblyKeys, "assembly.toml of several parts": PartsKeys, "[joints.NAME]": PlacedJointKeys,
+    "[alike.NAME]": AlikeKeys, "joint.toml of constants": ConstantsKeys, "joint.toml of laws": LawJointKeys,
     "Tables of channels": ChannelTableKeys,
 }  # fmt: skip
 

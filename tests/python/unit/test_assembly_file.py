@@ -158,7 +158,7 @@ unknown = { youngs_modulus = { mean = 70e9, std = 1e9 }, %s = 0.01, density = { 
     for name in ("loss_factor", "height"):
         text = re.sub(r"\[A\].*?\n\n", beam % name, ASSEMBLY, flags=re.DOTALL)
         file = read_assembly_file(written(tmp_path, text))
-        part = file.parts(at_freq)[0]
+        part = file.parts(at_freq)["A"]
         if name == "loss_factor":
             with pytest.raises(FileContentError, match="it is 0, so that a relative standard deviation says nothing"):
                 part.substructure(at_freq, [])
@@ -219,7 +219,7 @@ def test_unknowns_by_words(tmp_path):
     more = '[[ground]]\ndof = "B/2:x"\nstiffness = 10.0\nunknown = ["stiffness"]\n'
     text = ASSEMBLY.replace("{ youngs_modulus = 0.02 }", '["E", "density"]') + more
     file = read_assembly_file(written(tmp_path, text))
-    found = file.parts(np.ones(1))[0].substructure(np.ones(1), [])
+    found = file.parts(np.ones(1))["A"].substructure(np.ones(1), [])
     assert found.unknowns == {"youngs_modulus": jf.Unknown(1.0, 0.03, 0.0), "density": jf.Unknown(1.0, 0.01, 0.0)}
     assert file.attachments() == (jf.GroundSpring("B/2:x", jf.Unknown(10.0, 5.0, 0.0)),)
     for words, message in (
@@ -229,7 +229,7 @@ def test_unknowns_by_words(tmp_path):
     ):
         file = read_assembly_file(written(tmp_path, text.replace('["E", "density"]', words)))
         with pytest.raises(FileContentError, match=r"\[A\]: unknown: " + message):
-            file.parts(np.ones(1))[0].substructure(np.ones(1), [])
+            file.parts(np.ones(1))["A"].substructure(np.ones(1), [])
 
 
 def test_length_scale_of_matrices_is_that_of_a_beam(tmp_path):
@@ -250,7 +250,7 @@ unknown = ["length_scale"]
 
 """
     text = re.sub(r"\[A\].*?\n\n", part, ASSEMBLY, flags=re.DOTALL)
-    found = read_assembly_file(written(tmp_path, text)).parts(np.ones(1))[0].substructure(np.ones(1), [])
+    found = read_assembly_file(written(tmp_path, text)).parts(np.ones(1))["A"].substructure(np.ones(1), [])
     assert found.unknowns == {"length_scale": jf.Unknown(1.0, 0.003, 0.0)}
     changed, wanted = found.model({"length_scale": 1.1, "youngs_modulus": 1.02}), built(1.1)
     for own, expected in ((changed.stiffness, 1.02 * wanted.stiffness), (changed.mass, wanted.mass)):
@@ -271,8 +271,8 @@ def without(*lines: str) -> str:
         ("", r"the keys 'A' \(a table \[A\] with model\), 'B' \(a table \[B\] with model\), 'joint' are missing"),
         (ASSEMBLY.replace("masses", "mases", 1), r"\[A\]: unknown key 'mases'.*did you mean 'masses'"),
         (ASSEMBLY.replace("[channels]", "[chanels]"), "unknown key 'chanels'.*did you mean 'channels'"),
-        (ASSEMBLY.replace('"chain"', '"chian"', 1), r"\[A\]: model must be one of chain, beam, brick-beam, matrices, "
-         "receptances, modes, not 'chian'"),
+        (ASSEMBLY.replace('"chain"', '"chian"', 1), r"\[A\]: model must be one of chain, beam, brick-beam, rigid-body, "
+         "matrices, receptances, modes, not 'chian'"),
         (ASSEMBLY.replace("0.02", "-0.02"), r"\[A\]: unknown must be .* positive .*not {'youngs_modulus': -0.02}"),
         (ASSEMBLY.replace("youngs_modulus", "young"), r"\[A\]: unknown: young: there is no such number.*loss_factor"),
         (ASSEMBLY.replace('["2:x"]', '["3:x"]'), r"\[A\]: joint: A has no DOF '3:x'"),
@@ -498,3 +498,99 @@ def test_parts_of_a_page_that_are_none(tmp_path, frfs):
 def test_positions_where_nothing_is(tmp_path, frfs, dof, message):
     with pytest.raises(FileContentError, match=f"channels: .*{message}"):
         jf.measured_assembly(written(tmp_path, BEAMS.replace("A/@0.102,0.001,0:y", dof)), frfs)
+
+
+SEVERAL = """
+same = ["fl", "fr"]
+
+[parts.machine]
+model = "rigid-body"
+mass = 60.0
+inertia = [2.2, 3.0, 3.6]
+moves = ["z", "theta_x", "theta_y"]
+[parts.machine.points]
+fl = [-0.3, -0.2, -0.25]
+fr = [0.3, -0.2, -0.25]
+rear = [0.0, 0.2, -0.25]
+top = [0.1, 0.05, 0.25]
+side = [0.35, 0.0, 0.0]
+
+[parts.base]
+model = "chain"
+masses = [30.0]
+stiffness = [4e6]
+damping = [200.0]
+exact = true
+
+[joints.fl]
+j = ["machine/fl:z"]
+[[joints.fl.law]]
+dof = "z"
+law = "spring"
+
+[joints.fr]
+j = ["machine/@0.3,-0.2,-0.25:z"]
+[[joints.fr.law]]
+dof = "z"
+law = "spring"
+
+[joints.rear]
+j = ["machine/rear:z"]
+k = ["base/1:x"]
+file = "mount.toml"
+
+[channels]
+"1:+z" = "machine/@0.1,0.05,0.25:z"
+"2:-z" = "machine/side:z"
+"""
+MOUNT = '[[law]]\ndof = "z"\nlaw = "spring"\nvalues = { k = 1e5, c = 50.0 }\n'
+
+
+def test_several_parts_and_joints(tmp_path):
+    (tmp_path / "mount.toml").write_text(MOUNT)
+    path = written(tmp_path, SEVERAL)
+    freq, channels = np.arange(4.0, 40.0, 0.25), ["machine/top:z", "machine/side:z"]
+    file = read_assembly_file(path)
+    file, said = file.located(parts := file.parts(freq))
+    believed = file.assembly(freq, parts, channels)
+    assert said == ("machine/@0.1,0.05,0.25 is machine/top, 0 mm away",)
+    with pytest.raises(FileContentError, match="fl: the law of z needs the values that are expected"):
+        file.check_values()
+    assert (believed.joints["fr"].j, believed.joints["rear"].k) == (("machine/fr:z",), ("base/1:x",))
+    true = {"fl": 2e5, "fr": 2e5, "rear": 3e5}
+    joints = {name: jf.PlacedJoint(jf.LawJoint({"z": jf.SpringLaw(true[name], c=80.0)}), one.j, one.k)
+              for name, one in believed.joints.items()}  # fmt: skip
+    h = jf.pollute(jf.Assembly.of_parts(believed.parts, joints).receptance(freq, channels, channels[:1]), 0.03, seed=1)
+    of_file = Channel(1, "+z"), Channel(2, "+z")
+    frfs = FrfSet(freq, of_file, of_file[:1], h * [[1.0], [-1.0]], source="test.uff")
+    measured = jf.measured_assembly(path, frfs)
+    assert measured.describe()[2] == ("joint rear between machine/rear at (0, 0.2, -0.25) m and base/1: spring z")
+    fit = measured.fit()
+    assert [one.name for one in fit.parameters] == ["fl.k_z", "fl.c_z", "rear.k_z", "rear.c_z"]
+    for name, (low, high) in fit.confidence_interval(0.99).items():
+        assert low < (true[name.partition(".")[0]] if ".k" in name else 80.0) < high
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('same = ["fl", "fr"]', 'same = ["fl", "up"]', "same names 'up': there are fl, fr, rear"),
+        ('same = ["fl", "fr"]', 'same = ["fl", ["fr", "rear"]]', "same must be a list of names, or of lists of names"),
+        ("[joints.fl]", "[parts.lid]\nmodel = 'chain'\n[joints.fl]", "[parts.lid]: joint: no joint names a DOF of lid"),
+        ("exact = true", 'exact = true\njoint = ["1:x"]', "[parts.base]: joint: joints name the DOFs of their parts"),
+        ('file = "mount.toml"', "", "[joints.rear]: the key 'law' is missing: or file"),
+        ('j = ["machine/rear:z"]', 'j = ["machine/back:z"]', "[parts.machine]: joint: machine has no DOF 'back:z'"),
+        ('k = ["base/1:x"]', 'k = ["floor/1:x"]', "joints: rear: no part has a DOF 'floor/1:x'"),
+        ('"machine/side:z"', '"machine/low:z"', "channels: none of machine, base has a DOF 'machine/low:z'"),
+        ("[channels]", "[alike.rear]\njoints = ['fl', 'rear']\n[channels]", "two do not show how they scatter"),
+        ("[channels]", "[A]\n[channels]", "unknown key 'A'"),
+    ],
+)
+def test_what_is_wrong_with_several_parts(tmp_path, old, new, said):
+    (tmp_path / "mount.toml").write_text(MOUNT)
+    text = SEVERAL.replace(old, new, 1)
+    assert text != SEVERAL
+    channels = Channel(1, "+z"), Channel(2, "+z")
+    frfs = FrfSet(np.arange(1.0, 21.0), channels, channels, np.ones((20, 2, 2), complex), source="test.uff")
+    with pytest.raises(FileContentError, match=re.escape(said)):
+        jf.measured_assembly(written(tmp_path, text), frfs)

@@ -135,6 +135,8 @@ def test_what_is_missing_or_damaged_is_named(fits):
         ("is_converged", None),
         ("bands_hz", {}),
         ("seen", None),
+        ("same", None),
+        ("same", []),
     ]
     fine += [(level, bad) for level in ("noise_level", "residual_level") for bad in (3, None)]
     derived = {"written_by", "frequency_hz", "n_lines"}
@@ -144,7 +146,7 @@ def test_what_is_missing_or_damaged_is_named(fits):
                 continue
             with pytest.raises(jf.FileContentError, match=key):
                 jf.fit_from_dict(content | {key: bad})
-        if key not in ("k_lines", "seen"):
+        if key not in ("k_lines", "seen", "same"):
             with pytest.raises(jf.FileContentError, match=f'"{key}" is missing'):
                 jf.fit_from_dict({name: value for name, value in content.items() if name != key})
     for key in derived:

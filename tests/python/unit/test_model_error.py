@@ -220,7 +220,7 @@ def test_frfs_as_parts_have_no_errors():
     whole = assembly(TRUTH)
     names = ["7:y", "10:y", "13:y", "13:theta"]
     part = jf.Substructure.of_frfs(FREQ, whole.a.receptance(FREQ, names), names, ["13:y", "13:theta"])
-    problem = problem_of(replace(whole, a=part, b=replace(whole.b, exact=False)))
+    problem = problem_of(jf.Assembly(part, replace(whole.b, exact=False), whole.joint, whole.attachments))
     names = [one.name for one in problem.vector.fitted if one.origin != "joint"]
     assert names == ["B/youngs_modulus", "B/density"]
     for side in problem.prediction.sides:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -91,7 +91,7 @@ def compute_modelled(case: ModelledJointCase, n_realisations: int, workers: Work
     measured = pollute(exact, case.noise, seed=case.seed)
     bound = workers.begin(fit_of_exact, case, exact)
     first = workers.begin(_fit, case, case.believed, measured)
-    constant = workers.begin(_fit, case, replace(case.believed, joint=_constant(case.believed.joint)), measured)
+    constant = workers.begin(_fit, case, case.believed.with_joint(_constant(case.believed.joint)), measured)
     draws = tuple(
         workers.counted(workers.map(partial(fitted_draw, case, exact), range(n_realisations)), n_realisations)
     )
@@ -100,7 +100,7 @@ def compute_modelled(case: ModelledJointCase, n_realisations: int, workers: Work
 
 def fit_of_exact(case: ModelledJointCase, exact: ComplexArray) -> Fit:
     """Fit exact FRFs from the actual joint, with the noise known: standard errors are at the Cramer-Rao bound."""
-    at_truth = replace(case.believed, joint=case.truth.joint)
+    at_truth = case.believed.with_joint(case.truth.joint)
     return _fit(case, at_truth, exact, np.asarray((case.noise * abs(exact)) ** 2, float))
 
 

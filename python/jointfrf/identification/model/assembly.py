@@ -1,10 +1,12 @@
-"""An assembly of two substructures, a joint and what is attached to it."""
+"""An assembly of substructures, the joints between them or to the ground, and what is attached to it."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
-from typing import get_args
+from functools import cached_property
+from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,54 +14,162 @@ from numpy.typing import ArrayLike
 from jointfrf.dofs import direction_names, is_rotation
 from jointfrf.identification.model.substructure import FrfSource, Substructure, Unknown, check_same_lines
 from jointfrf.joint import Joint
-from jointfrf.kernel.arguments import ComplexArray, FloatArray, as_frequency, as_names, check_type, one_line
-from jointfrf.laws.law_joint import Connection, LawJoint
+from jointfrf.kernel.arguments import (
+    ComplexArray,
+    FloatArray,
+    as_frequency,
+    as_names,
+    as_positive,
+    check_type,
+    one_line,
+)
+from jointfrf.laws.law_joint import Connection, LawJoint, joined
+from jointfrf.spelling import did_you_mean
 from jointfrf.substructuring.coupling import connect
 
 __all__ = [
     "AddedMass",
+    "Alike",
     "Assembly",
     "Attachment",
     "GroundSpring",
+    "PlacedJoint",
     "Places",
     "assembly_connection",
     "check_joint_order",
     "places_of",
 ]
 
+#: Words that say what a parameter belongs to beside parts.
+_WORDS = ("joint", "mean", "attachment", "response", "force")
+
 
 @dataclass(frozen=True)
 class Places:
-    """DOFs of both substructures that matter: joint, attachments, channels; those of A first.
+    """DOFs of the substructures that matter: joints, attachments, channels; part by part.
 
     Attributes
     ----------
-    a, b : tuple of str
-        Names in A and B, without ``"A/"`` and ``"B/"``.
+    of : dict of str to tuple of str
+        By part; names without that of the part.
     """
 
-    a: tuple[str, ...]
-    b: tuple[str, ...]
+    of: dict[str, tuple[str, ...]]
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """All of them, ``"A/7:y"``."""
+        return tuple(f"{part}/{dof}" for part, dofs in self.of.items() for dof in dofs)
+
+    @cached_property
+    def _number(self) -> dict[str, int]:
+        return {name: i for i, name in enumerate(self.names)}
 
     def at(self, names: Sequence[str]) -> list[int]:
-        """Return the numbers of DOFs ``"A/..."``, ``"B/..."`` among all."""
-        return [
-            self.a.index(name[2:]) if name.startswith("A/") else len(self.a) + self.b.index(name[2:]) for name in names
-        ]
+        """Return the numbers of DOFs ``"A/..."`` among all."""
+        return [self._number[name] for name in names]
 
 
 @dataclass(frozen=True)
-class Assembly:
-    """Two substructures, a joint between them, and what is attached.
+class PlacedJoint:
+    """A joint between DOFs of two substructures, or between one and the ground.
 
-    DOFs of the assembly are named ``"A/..."`` and ``"B/..."``, as by `assemble`.
+    Parameters
+    ----------
+    joint : LawJoint or Joint
+        Its laws; a `Joint` becomes springs and dampers. Its values are where a fit may start.
+    j, k : sequence of str
+        Its DOFs on either side, ``"frame/3:y"``, in its order; no `k` is the ground.
+
+    Raises
+    ------
+    ValueError
+        A number of DOFs that is not that of the joint, or another order.
+
+    Examples
+    --------
+    >>> import jointfrf as jf
+    >>> mount = jf.PlacedJoint(jf.Joint([2e5], [30.0], ["z"]), ["machine/foot:z"])
+    >>> mount.k, mount.joint.names
+    ((), ('k_z', 'c_z'))
+    """
+
+    joint: LawJoint
+    j: tuple[str, ...]
+    k: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if isinstance(self.joint, Joint):
+            object.__setattr__(self, "joint", LawJoint.of_joint(self.joint))
+        check_type("joint", self.joint, LawJoint)
+        for side in "jk":
+            dofs = as_names(side, getattr(self, side))
+            object.__setattr__(self, side, dofs)
+            if side == "k" and not dofs:
+                continue
+            if len(dofs) != len(self.joint.dofs):
+                raise ValueError(f"{side} names {len(dofs)} DOFs, the joint has {len(self.joint.dofs)}")
+            check_joint_order(f"{side}: ", [dof.partition("/")[2] for dof in dofs], self.joint.dofs)
+
+
+@dataclass(frozen=True)
+class Alike:
+    """Joints whose parameters scatter about common means.
+
+    Parameters
+    ----------
+    joints : sequence of str
+        Their names.
+    spread : float, optional
+        Standard deviation of each parameter relative to its mean; by default the FRFs tell it.
+
+    Raises
+    ------
+    ValueError
+        Fewer than two joints, or fewer than three without a spread; a spread that is not positive.
+
+    Examples
+    --------
+    >>> import jointfrf as jf
+    >>> jf.Alike(["left", "right"], spread=0.1).joints
+    ('left', 'right')
+    """
+
+    joints: tuple[str, ...]
+    spread: float | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "joints", as_names("joints", self.joints))
+        if self.spread is not None:
+            object.__setattr__(self, "spread", as_positive("spread", self.spread))
+        if len(self.joints) < (3 if self.spread is None else 2):
+            why = "two do not show how they scatter: give a spread" if len(self.joints) == 2 else "there are too few"
+            raise ValueError(f"joints must name joints that are alike, not {one_line(self.joints)}: {why}")
+
+
+@dataclass(frozen=True, init=False)
+class Assembly:
+    """Substructures, joints between them or to the ground, and what is attached.
+
+    DOFs of the assembly are named by their part, ``"A/7:y"`` and ``"B/1:y"`` of two; `of_parts` takes any number.
 
     Parameters
     ----------
     a, b : Substructure
+        Two of them, with the joint between their joint DOFs.
     joint : LawJoint or Joint
         Its laws; a `Joint` becomes springs and dampers. Its values are where a fit may start.
     attachments : sequence of AddedMass or GroundSpring
+
+    Attributes
+    ----------
+    parts : dict of str to Substructure
+    joints : dict of str to PlacedJoint
+        That of two parts is named ``""``.
+    attachments : tuple of AddedMass or GroundSpring
+    same : tuple of tuple of str
+        Joints that are equal, or parts whose unknowns are.
+    alike : dict of str to Alike
 
     Raises
     ------
@@ -76,45 +186,194 @@ class Assembly:
     (2, 1, 1)
     """
 
-    a: Substructure
-    b: Substructure
-    joint: LawJoint
-    attachments: tuple[Attachment, ...] = ()
+    parts: dict[str, Substructure]
+    joints: dict[str, PlacedJoint]
+    attachments: tuple[Attachment, ...]
+    same: tuple[tuple[str, ...], ...]
+    alike: dict[str, Alike]
 
-    def __post_init__(self) -> None:
-        if isinstance(self.joint, Joint):
-            object.__setattr__(self, "joint", LawJoint.of_joint(self.joint))
-        for name, value, kind in (
-            ("a", self.a, Substructure),
-            ("b", self.b, Substructure),
-            ("joint", self.joint, LawJoint),
-        ):
+    def __init__(
+        self, a: Substructure, b: Substructure, joint: LawJoint | Joint, attachments: Sequence[Attachment] = ()
+    ) -> None:
+        if isinstance(joint, Joint):
+            joint = LawJoint.of_joint(joint)
+        for name, value, kind in (("a", a, Substructure), ("b", b, Substructure), ("joint", joint, LawJoint)):
             check_type(name, value, kind)
-        if not isinstance(self.attachments, tuple | list):
-            raise TypeError(f"attachments must be a tuple of attachments, not {one_line(self.attachments)}")
-        object.__setattr__(self, "attachments", tuple(self.attachments))
+        for side, part in (("a", a), ("b", b)):
+            if len(part.joint) != len(joint.dofs):
+                raise ValueError(
+                    f"{side}: the substructure has {len(part.joint)} joint DOFs, the joint {len(joint.dofs)}"
+                )
+            for dof in part.joint:
+                if not part.has(dof):
+                    raise ValueError(f"joint DOF {one_line(dof)}: {side.upper()} has no such DOF")
+            check_joint_order(f"{side}: ", part.joint, joint.dofs)
+        j, k = ([f"{name}/{dof}" for dof in part.joint] for name, part in (("A", a), ("B", b)))
+        self._set({"A": a, "B": b}, {"": PlacedJoint(joint, tuple(j), tuple(k))}, attachments, (), {})
+
+    @classmethod
+    def of_parts(
+        cls,
+        parts: Mapping[str, Substructure],
+        joints: Mapping[str, PlacedJoint],
+        attachments: Sequence[Attachment] = (),
+        *,
+        same: Iterable[Sequence[str]] = (),
+        alike: Mapping[str, Alike] | None = None,
+    ) -> Assembly:
+        """Return an assembly of any number of parts and joints.
+
+        Parameters
+        ----------
+        parts : mapping of str to Substructure
+            By their names; the joint DOFs of these are not used.
+        joints : mapping of str to PlacedJoint
+            By their names, which stand before those of their parameters: ``"mount.k_z"``.
+        attachments : sequence of AddedMass or GroundSpring
+        same : sequence of sequence of str
+            Groups of joints that are equal, or of parts whose unknowns are: they have the parameters of the first one.
+        alike : mapping of str to Alike
+            Joints with common means, which are named like parameters of a joint of this name.
+
+        Raises
+        ------
+        ValueError
+            A name that there is not, or comes twice; joints of a group with other laws; a DOF that does not exist.
+
+        Examples
+        --------
+        A machine of 10 kg on two equal mounts:
+
+        >>> import jointfrf as jf
+        >>> mass = jf.Substructure(jf.chain([10.0], [], ground="none"), exact=True)
+        >>> mount = jf.Joint([2e5], [30.0], ["x"])
+        >>> joints = {name: jf.PlacedJoint(mount, ["machine/1:x"]) for name in ("left", "right")}
+        >>> whole = jf.Assembly.of_parts({"machine": mass}, joints, same=[["left", "right"]])
+        >>> h, w = whole.receptance([5.0], ["machine/1:x"], ["machine/1:x"])[0, 0, 0], 2 * 3.141592653589793 * 5.0
+        >>> bool(abs(h * (2 * 2e5 + 2 * 30j * w - 10 * w**2) - 1) < 1e-9)
+        True
+        """
+        for what, given, kind in (("parts", parts, Substructure), ("joints", joints, PlacedJoint)):
+            if not isinstance(given, Mapping) or not given:
+                raise TypeError(f"{what} must be a mapping of names to {kind.__name__}, not {one_line(given)}")
+            for name, one in given.items():
+                check_type(f"{what}: {one_line(name)}", one, kind)
+                if not isinstance(name, str) or not name or any(sign in name for sign in "./, ") or name in _WORDS:
+                    raise ValueError(
+                        f"{what}: a name must be a word without . / and commas, none of {', '.join(_WORDS)}, not "
+                        f"{one_line(name)}"
+                    )
+        if not isinstance(alike, Mapping | None):
+            raise TypeError(f"alike must be a mapping of names to Alike, not {one_line(alike)}")
+        for name, group in (alike or {}).items():
+            check_type(f"alike: {one_line(name)}", group, Alike)
+        if isinstance(same, str) or not isinstance(same, Iterable):
+            raise TypeError(f"same must be a list of lists of names, not {one_line(same)}")
+        found = cls.__new__(cls)
+        found._set(
+            dict(parts), dict(joints), attachments, tuple(as_names("same", one) for one in same), dict(alike or {})
+        )
+        for name, one in found.joints.items():
+            for side, dofs in (("j", one.j), ("k", one.k)):
+                found.check(dofs, f"{side} of {name}:")
+        held = {dof.partition("/")[0] for own in found.ends for dof in own}
+        for name in found.parts:
+            if name not in held:
+                raise ValueError(f"no joint holds {name}")
+        found._check_groups()
+        return found
+
+    def _set(self, parts: Any, joints: Any, attachments: Any, same: Any, alike: Any) -> None:
+        if not isinstance(attachments, tuple | list):
+            raise TypeError(f"attachments must be a tuple of attachments, not {one_line(attachments)}")
+        for name, value in (("parts", parts), ("joints", joints), ("attachments", tuple(attachments)), ("same", same),
+                            ("alike", alike)):  # fmt: skip
+            object.__setattr__(self, name, value)
         for one in self.attachments:
             if not isinstance(one, get_args(Attachment)):
                 raise TypeError(f"attachments must hold AddedMass and GroundSpring, not {type(one).__name__}")
-        for side, part in (("a", self.a), ("b", self.b)):
-            if len(part.joint) != len(self.joint.dofs):
-                raise ValueError(
-                    f"{side}: the substructure has {len(part.joint)} joint DOFs, the joint {len(self.joint.dofs)}"
-                )
-            self.check([f"{side.upper()}/{dof}" for dof in part.joint], "joint DOF")
-            check_joint_order(f"{side}: ", part.joint, self.joint.dofs)
-        for one in self.attachments:
             self.check(one.places, "attachment")
 
+    def _check_groups(self) -> None:
+        """Raise an error for groups of what there is not, or of joints of other laws."""
+        grouped: list[str] = []
+        for what, names in (
+            *(("same", one) for one in self.same),
+            *((name, one.joints) for name, one in self.alike.items()),
+        ):
+            known = self.parts if what == "same" and names and names[0] in self.parts else self.joints
+            for name in names:
+                if name not in known:
+                    raise ValueError(
+                        f"{what} names {one_line(name)}: there are {', '.join(known)}{did_you_mean(name, known)}"
+                    )
+                if name in grouped:
+                    raise ValueError(f"{what} names {name}, which is already in a group")
+                grouped.append(name)
+                own, first = known[name], known[names[0]]
+                is_other = (
+                    own.joint.names != first.joint.names or own.joint.dofs != first.joint.dofs
+                    if isinstance(own, PlacedJoint) and isinstance(first, PlacedJoint)
+                    else list(own.fitted) != list(first.fitted)  # type: ignore[union-attr]
+                )
+                if is_other:
+                    raise ValueError(f"{what}: {name} has other parameters than {names[0]}")
+        for name in self.alike:
+            if not isinstance(name, str) or not name or name in self.joints or any(sign in name for sign in "./, "):
+                raise ValueError(f"alike: a group must have a name of its own, not {one_line(name)}")
+
+    @property
+    def a(self) -> Substructure:
+        """The first of two parts; a ValueError of others."""
+        return self._of_two("A")
+
+    @property
+    def b(self) -> Substructure:
+        """The second of two parts; a ValueError of others."""
+        return self._of_two("B")
+
+    def _of_two(self, name: str) -> Substructure:
+        if "" not in self.joints:
+            raise ValueError(f"the parts are {', '.join(self.parts)}: a, b and with_joint are those of two parts")
+        return self.parts[name]
+
+    @cached_property
+    def joint(self) -> LawJoint:
+        """The joint; of several all of them as one, with DOFs named ``"mount.y"``."""
+        own = {name: one.joint for name, one in self.joints.items()}
+        return own[""] if "" in own else joined(own)
+
+    @cached_property
+    def ends(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """The DOFs of `joint` on either side; ``""`` on that of the ground."""
+        j = tuple(dof for one in self.joints.values() for dof in one.j)
+        return j, tuple(dof for one in self.joints.values() for dof in one.k or ("",) * len(one.j))
+
+    def with_joint(self, joint: LawJoint) -> Assembly:
+        """Return the same assembly of two parts with another joint."""
+        return Assembly(self.a, self.b, joint, self.attachments)
+
+    def with_attachments(self, *more: Attachment) -> Assembly:
+        """Return the same assembly with more attached."""
+        found = copy(self)
+        object.__setattr__(found, "attachments", (*self.attachments, *more))
+        return found
+
+    def has(self, name: str) -> bool:
+        """Whether there is a DOF ``"A/7:y"``."""
+        check_type("name", name, str)
+        part, slash, dof = name.partition("/")
+        return bool(slash) and part in self.parts and self.parts[part].has(dof)
+
     def check(self, names: Sequence[str], what: str) -> None:
-        """Raise an error for a DOF that neither substructure has."""
+        """Raise an error for a DOF that no substructure has."""
         check_type("what", what, str)
         for name in as_names("names", names):
-            side = {"A/": self.a, "B/": self.b}.get(str(name)[:2])
-            if side is None or not side.has(name[2:]):
-                raise ValueError(
-                    f"{what} {one_line(name)}: neither A nor B has such a DOF (names begin with 'A/' or 'B/')"
-                )
+            if not self.has(name):
+                whose = "neither A nor B" if list(self.parts) == ["A", "B"] else f"none of {', '.join(self.parts)}"
+                first, *others = self.parts
+                begin = " or ".join(f"'{part}/'" for part in (first, *others[:1]))
+                raise ValueError(f"{what} {one_line(name)}: {whose} has such a DOF (names begin with {begin})")
 
     def receptance(self, freq_hz: ArrayLike, responses: Sequence[str], forces: Sequence[str]) -> ComplexArray:
         """Return the FRFs of the assembly as believed, shape (n_freq, n_responses, n_forces), m/N.
@@ -131,12 +390,15 @@ class Assembly:
         for names, what in ((responses, "response"), (forces, "force")):
             self.check(names, what)
         places = places_of(self, responses, forces)
-        n_a, n = len(places.a), len(places.a) + len(places.b)
-        h = np.zeros((freq.size, n, n), np.complex128)
-        for name, part, own in (("A", self.a, slice(0, n_a)), ("B", self.b, slice(n_a, n))):
+        n = len(places.names)
+        h, first = np.zeros((freq.size, n, n), np.complex128), 0
+        for name, dofs in places.of.items():
+            part, own = self.parts[name], slice(first, first + len(dofs))
+            first = own.stop
             if isinstance(part.source, FrfSource):
                 check_same_lines(name, part.source, freq)
-            h[:, own, own] = part.receptance(freq, places.a if name == "A" else places.b)
+            if dofs:
+                h[:, own, own] = part.receptance(freq, dofs)
         numbers = [
             [number.value if isinstance(number, Unknown) else number for number in one.numbers]
             for one in self.attachments
@@ -190,18 +452,20 @@ def _is_open(own: str, meant: str) -> bool:
 
 
 def places_of(whole: Assembly, responses: Sequence[str], forces: Sequence[str]) -> Places:
-    """Return the DOFs that matter: those of the joint first, each once."""
-    named = [*responses, *forces, *(dof for one in whole.attachments for dof in one.places)]
-    of_side = {"A/": list(whole.a.joint), "B/": list(whole.b.joint)}
+    """Return the DOFs that matter: those of joints first, each once."""
+    named = [dof for own in whole.ends for dof in own if dof]
+    named += [*responses, *forces, *(dof for one in whole.attachments for dof in one.places)]
+    of_part: dict[str, list[str]] = {name: [] for name in whole.parts}
     for name in named:
-        of_side[name[:2]].append(name[2:])
-    return Places(tuple(dict.fromkeys(of_side["A/"])), tuple(dict.fromkeys(of_side["B/"])))
+        part, _, dof = name.partition("/")
+        of_part[part].append(dof)
+    return Places({part: tuple(dict.fromkeys(dofs)) for part, dofs in of_part.items()})
 
 
 def assembly_connection(
     whole: Assembly, places: Places, omega: FloatArray, joint: LawJoint, numbers: Sequence[Sequence[float]]
 ) -> Connection:
-    """Return all that connects the substructures and holds or loads them: the joint first, then attachments.
+    """Return all that connects the substructures and holds or loads them: the joints first, then attachments.
 
     Parameters
     ----------
@@ -210,7 +474,7 @@ def assembly_connection(
     omega : ndarray, shape (n_freq,)
         rad/s.
     joint : LawJoint
-        With the values wanted.
+        That of the assembly with the values wanted.
     numbers : sequence of sequence of float
         Those of each attachment.
 
@@ -223,9 +487,10 @@ def assembly_connection(
     q = own.pattern.shape[1]
     attached = [dof for one in whole.attachments for dof in one.places]
     total = q + len(attached)
-    pattern = np.zeros((len(places.a) + len(places.b), total))
-    at_joint = [*places.at([f"A/{dof}" for dof in whole.a.joint]), *places.at([f"B/{dof}" for dof in whole.b.joint])]
-    pattern[at_joint, :q] = own.pattern
+    pattern = np.zeros((len(places.names), total))
+    ends = [*whole.ends[0], *whole.ends[1]]
+    held = [i for i, dof in enumerate(ends) if dof]  # the ground does not move
+    np.add.at(pattern[:, :q], places.at([ends[i] for i in held]), own.pattern[held])
     s, t = np.zeros((2, omega.size, total, total), np.complex128)
     s[:, :q, :q], t[:, :q, :q] = own.s, own.t
     rest = np.arange(q, total)

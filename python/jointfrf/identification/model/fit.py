@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import itertools
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import special
+from scipy.sparse import csgraph
 
 from jointfrf.errors import IllConditionedWarning
 from jointfrf.frf.noise_model import NoiseModel
@@ -17,7 +19,7 @@ from jointfrf.frf.smoothing import pieces
 from jointfrf.identification.calibration import CalibrationSpread, student_factor
 from jointfrf.identification.line_starts import LineCompliance, from_lines, interface_compliance
 from jointfrf.identification.minimise import Minimum, inverse_information, minimise
-from jointfrf.identification.model.evidence import ModelError, with_model_error
+from jointfrf.identification.model.evidence import ModelError, spread_factors, with_model_error, with_spreads
 from jointfrf.identification.model.likelihood import Likelihood
 from jointfrf.identification.model.prediction import Prediction
 from jointfrf.identification.model.starts import ranked_trials, refined
@@ -29,7 +31,16 @@ from jointfrf.identification.residual_test import ResidualTest, check_residual
 from jointfrf.identification.scatter import Spread
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 
-__all__ = ["FoundModel", "ModelProblem", "OpenDirection", "fit_assembly", "lowest_minimum", "open_directions"]
+__all__ = [
+    "FoundModel",
+    "ModelProblem",
+    "OpenDirection",
+    "Unseparated",
+    "fit_assembly",
+    "lowest_minimum",
+    "open_directions",
+    "unseparated",
+]
 
 #: A start is good whose minimum leaves a residual below this many times the noise.
 _GOOD = 1.1
@@ -39,6 +50,8 @@ _SMALL_ERROR = 0.02
 _FOLLOWED = 4
 #: Noise of FRFs of substructures is taken near the minimum so many times: what it does there depends on the joint.
 _TURNS = 2
+#: From this variance factor on most of a variance is that of spreads which are not known.
+_OF_SPREAD = 2.0
 #: Reductions of the models are extended at most so many times.
 _REFINED = 3
 
@@ -124,6 +137,8 @@ class FoundModel(NamedTuple):
         Variance factors by what FRFs share.
     calibration : CalibrationSpread or None
         What smooth errors of channels add to the coordinates.
+    unseparated : tuple of Unseparated
+        Parameters of several joints that the FRFs do not tell apart.
     """
 
     problem: ModelProblem
@@ -140,6 +155,7 @@ class FoundModel(NamedTuple):
     test_with_error: ResidualTest
     spread: Spread
     calibration: CalibrationSpread | None
+    unseparated: tuple[Unseparated, ...]
 
 
 def fit_assembly(problem: ModelProblem) -> FoundModel:
@@ -161,7 +177,8 @@ def fit_assembly(problem: ModelProblem) -> FoundModel:
                 break
             problem = changed
             minimum = minimise(problem.likelihood, minimum.x)
-        return _judged(problem, minimum, other)
+        likelihood, minimum = with_spreads(problem.likelihood, minimum)
+        return _judged(replace(problem, vector=likelihood.vector), minimum, other)
 
 
 def _explained(problem: ModelProblem, minimum: Minimum) -> float:
@@ -184,7 +201,7 @@ def lowest_minimum(problem: ModelProblem, known: Minimum | None = None) -> tuple
     found: list[Minimum] = []
     if known is not None and _explained(problem, known) < _GOOD:
         return known, np.inf
-    for values in itertools.chain(_values_of_lines(problem), [vector.values]):
+    for values in itertools.chain(_values_of_lines(problem), [vector.values], _values_of_equal(problem)):
         given.append(values)
         found.append(minimise(likelihood, vector.to_coordinates(values)))
         if _explained(problem, found[-1]) < _GOOD:
@@ -200,6 +217,19 @@ def lowest_minimum(problem: ModelProblem, known: Minimum | None = None) -> tuple
     best = min(found, key=lambda one: one.cost)
     apart = [one.cost - best.cost for one in found if abs(one.x - best.x).max(initial=0) > 0.1 and one.cost > best.cost]
     return best, min(apart, default=np.inf)
+
+
+def _values_of_equal(problem: ModelProblem) -> Iterator[FloatArray]:
+    """Yield the values where joints of the same laws are equal: few unknowns are found from anywhere."""
+    equal = problem.vector.of_equal_joints()
+    if equal is not None:
+        likelihood = replace(problem, vector=equal).likelihood
+        best: Minimum | None = None
+        for x in itertools.islice(refined(likelihood, ranked_trials(likelihood, [equal.values])), _FOLLOWED):
+            found = minimise(likelihood, x)
+            best = found if best is None or found.cost < best.cost else best
+        if best is not None:
+            yield problem.vector.with_means(equal.to_values(best.x))
 
 
 def _is_explained(problem: ModelProblem, minimum: Minimum) -> bool:
@@ -231,7 +261,7 @@ def _values_of_lines(problem: ModelProblem) -> Iterator[FloatArray]:
             free = np.array([vector.all[i].is_free for i in own])
             whole = vector.values.copy()
             whole[own] = np.where(free, values, whole[own])
-            yield whole
+            yield vector.with_means(whole)
 
 
 def _with_noise_of_model(problem: ModelProblem, minimum: Minimum) -> ModelProblem | None:
@@ -296,27 +326,38 @@ def _judged(problem: ModelProblem, minimum: Minimum, other: float) -> FoundModel
         covariance += calibration.covariance
         found_part = np.asarray(beside) * calibration.found
         factor = (factor + beside) * student_factor(factor + beside - found_part, found_part, calibration.degrees)
+    if vector.means:
+        wider = spread_factors(vector, minimum)[:n]
+        covariance, factor = covariance * np.sqrt(np.outer(wider, wider)), factor * wider
     covariance *= np.outer(slope, slope)
-    whole = inverse_information(minimum.information)
+    whole = inverse_information(minimum.information, open_ends=True)
 
-    profiles = _Profiles(likelihood, vector, minimum, whole, factor)
+    of_spread = spread_factors(vector, minimum)[:n] > _OF_SPREAD if vector.means else np.zeros(n, bool)
+    profiles = _Profiles(likelihood, vector, minimum, whole, factor, of_spread)
     intervals = Intervals([one.name for one in vector.fitted[:n]], profiles.of, profiles.of_function)
+    of_shown = problem.vector, minimum.x[:n], minimum.information[:n, :n]
+    directions = open_directions(*of_shown)
     return FoundModel(
         problem, minimum, values, covariance, intervals, predicted, residual, test,
-        open_directions(problem.vector, minimum.x[:n], minimum.information[:n, :n]), other,
-        None if found is None else found[2], with_error, spread, calibration,
+        directions, other, None if found is None else found[2], with_error, spread, calibration,
+        unseparated(*of_shown, directions),
     )  # fmt: skip
 
 
 @dataclass(frozen=True)
 class _Profiles:
-    """Profiles of the parameters at a minimum, each with its variance factor."""
+    """Profiles of the parameters at a minimum, each with its variance factor.
+
+    The likelihood has one spread for joints that are alike: where most of a variance is due to others, `of_spread`, the
+    interval follows from it.
+    """
 
     likelihood: Likelihood
     vector: ParameterVector
     minimum: Minimum
     covariance: FloatArray
     factor: FloatArray
+    of_spread: NDArray[np.bool_]
 
     def _profile(self, factor: float) -> ProfileIntervals:
         least = self.minimum
@@ -324,13 +365,22 @@ class _Profiles:
 
     def of(self, i: int, probability: float) -> tuple[float, float]:
         """Return the interval of one parameter."""
-        return self._profile(float(self.factor[i])).of(i, probability)
+        if self.of_spread[i]:
+            reach = np.sqrt(self.covariance[i, i] * self.factor[i]) * float(special.ndtri((1 + probability) / 2))
+            step = np.eye(1, self.minimum.x.size, i)[0] * reach
+            low, high = (self.vector.value(i, self.minimum.x + sign * step) for sign in (-1, 1))
+            return low, high
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", IllConditionedWarning)  # on the way to limits that are far off
+            return self._profile(float(self.factor[i])).of(i, probability)
 
     def of_function(
         self, function: Callable[[FloatArray], float], used: NDArray[np.intp], probability: float
     ) -> tuple[float, float] | None:
         """Return the interval of a function of the parameters that depends on those with these numbers."""
         shown = self.vector.free[: self.factor.size]
+        if self.of_spread[used].any():
+            return None
         return self._profile(float(self.factor[used].max())).of_function(
             lambda x: function(self.vector.to_values(x)[shown]), probability
         )
@@ -361,7 +411,7 @@ def _test(
 ) -> ResidualTest:
     """Compare a residual with noise and calibration; terms that their priors hold use up less of it than free ones."""
     n, errors = likelihood.vector.n_shown, problem.noise.calibration
-    of_priors = likelihood.vector.pull_slopes(minimum.x)[n:] ** 2
+    of_priors = np.diagonal(likelihood.vector.prior_information(minimum.x))[n:]
     held = float(of_priors @ np.diagonal(inverse_information(minimum.information))[n:])
     smooth = None
     if errors is not None:
@@ -378,6 +428,8 @@ def _test(
 _SHARE = 0.3
 #: Components below this part of the largest are not named.
 _NAMED = 0.2
+#: Parameters of a space of directions belong together where the cosine between their parts of it exceeds this.
+_LINKED = 0.05
 
 
 class OpenDirection(NamedTuple):
@@ -414,26 +466,106 @@ def open_directions(vector: ParameterVector, x: FloatArray, information: FloatAr
     Eigenvectors of the information of the FRFs alone, in units of a share of each value, or of its prior.
     """
     values, slope = vector.to_values(x)[vector.free], vector.slope(x)
-    of_priors = vector.pull_slopes(x)
-    of_frfs = information - np.diag(of_priors**2)
-    std = np.array([one.std or np.inf for one in vector.fitted])
+    # What a mean is, no FRF says but by its members.
+    seen = [i for i, one in enumerate(vector.fitted) if one.origin != "mean"]
+    of_priors = vector.pull_slopes(x)[:, seen]
+    of_frfs = information[np.ix_(seen, seen)] - of_priors.T @ of_priors
+    fitted, values, slope = [vector.fitted[i] for i in seen], values[seen], slope[seen]
+    std = np.array([one.std or np.inf for one in fitted])
     unit = np.minimum(np.where(values == 0, np.inf, _SHARE * abs(values)), std)
     unit = np.where(np.isfinite(unit), unit, 1.0) / np.maximum(slope, np.finfo(float).tiny)
-    value, turned = np.linalg.eigh(of_frfs * np.outer(unit, unit))
+    scaled = of_frfs * np.outer(unit, unit)
+    value, turned = np.linalg.eigh(scaled)
     found = []
-    for size, direction in zip(value, turned.T, strict=True):
-        if size >= 1:
-            continue
-        largest = abs(direction).max()
+    for direction in _apart(turned[:, value < 1]).T:
+        size, largest = float(direction @ scaled @ direction), abs(direction).max()
         change = direction * unit * slope / np.where(values == 0, 1, abs(values))
         change = change * np.sign(direction[abs(direction).argmax()])
         named = [i for i in np.argsort(-abs(direction)) if abs(direction[i]) > _NAMED * largest]
-        by_prior = float(((direction * unit * of_priors) ** 2).sum())
+        by_prior = float(((of_priors @ (direction * unit)) ** 2).sum())
         found.append(
             OpenDirection(
-                tuple((vector.fitted[i].name, float(change[i])) for i in named),
+                tuple((fitted[i].name, float(change[i])) for i in named),
                 float(1 / np.sqrt(size)) if size > 0 else float("inf"),
                 by_prior + max(size, 0) > 1 / 9,
             )
         )
+    return tuple(found)
+
+
+def _apart(directions: FloatArray) -> FloatArray:
+    """Return directions of the same space that share no parameters, as far as there are such; in columns."""
+    if directions.shape[1] < 2:
+        return directions
+    within = directions @ directions.T  # does not depend on which directions span the space
+    size = np.sqrt(np.maximum(np.diagonal(within), 0))
+    moved = np.flatnonzero(size > _NAMED * size.max())
+    linked = abs(within[np.ix_(moved, moved)]) > _LINKED * np.outer(size[moved], size[moved])
+    count, group = csgraph.connected_components(linked, directed=False)
+    found = []
+    for number in range(count):
+        own = moved[group == number]
+        left, length, _ = np.linalg.svd(directions[own], full_matrices=False)
+        for vector in left[:, length > 0.5].T:  # sqrt(1/2): half of it is in these parameters
+            whole = np.zeros(len(directions))
+            whole[own] = vector
+            found.append(whole)
+    return np.array(found).T if len(found) == directions.shape[1] else directions
+
+
+class Unseparated(NamedTuple):
+    """Parameters of several joints that the FRFs do not tell apart.
+
+    Attributes
+    ----------
+    names : tuple of str
+    known : tuple of (tuple of float, float)
+        Sums of them that are known: their coefficients, the largest is 1, and the standard deviation.
+    is_held_by_prior : bool
+    """
+
+    names: tuple[str, ...]
+    known: tuple[tuple[tuple[float, ...], float], ...]
+    is_held_by_prior: bool
+
+
+def unseparated(
+    vector: ParameterVector, x: FloatArray, information: FloatArray, directions: Sequence[OpenDirection]
+) -> tuple[Unseparated, ...]:
+    """Return the parameters of several joints that open directions connect, and what is known of them together.
+
+    Notes
+    -----
+    Known are the eigenvectors of the information of the FRFs on relative changes, all others being unknown, less the
+    open directions.
+    """
+    place = {one.name: i for i, one in enumerate(vector.fitted)}
+    slope, of_frfs = vector.slope(x), information - vector.prior_information(x)
+    groups: list[tuple[list[str], list[OpenDirection]]] = []
+    for one in directions:
+        names = [name for name, _ in one.parts]
+        joints = {name.rpartition(".")[0] for name in names}
+        if len(joints) < 2 or not all(vector.fitted[place[name]].origin == "joint" for name in names):
+            continue
+        touched = [group for group in groups if set(group[0]) & set(names)]
+        groups = [group for group in groups if group not in touched]
+        groups.append(([*names, *(name for group in touched for name in group[0])],
+                       [one, *(each for group in touched for each in group[1])]))  # fmt: skip
+    found = []
+    for names, own in groups:
+        at = sorted({place[name] for name in names})
+        rest = [i for i in place.values() if i not in at]
+        cross = of_frfs[np.ix_(at, rest)]
+        known = of_frfs[np.ix_(at, at)] - cross @ inverse_information(information[np.ix_(rest, rest)]) @ cross.T
+        values = vector.to_values(x)[vector.free][at]
+        size = np.where(values == 0, 1, abs(values))
+        unit = size / np.maximum(slope[at], np.finfo(float).tiny)
+        value, turned = np.linalg.eigh(known * np.outer(unit, unit))
+        sums = []
+        for level, share in list(zip(value, turned.T, strict=True))[: len(own) - 1 : -1]:
+            largest = share[abs(share).argmax()] / size[abs(share).argmax()]
+            weights = share / size / largest
+            sums.append((tuple(weights.tolist()), float(1 / np.sqrt(max(level, np.finfo(float).tiny)) / abs(largest))))
+        held = all(one.is_held_by_prior for one in own)
+        found.append(Unseparated(tuple(vector.fitted[i].name for i in at), tuple(sums), held))
     return tuple(found)

@@ -60,7 +60,7 @@ class FoundMotion:
         problem, vector = found.problem, found.problem.vector
         fixed = [one.name for one in vector.all if one.origin == "joint" and not one.is_free]
         prediction = copy(problem.prediction)
-        prediction.whole = replace(prediction.whole, joint=joint)
+        prediction.whole = prediction.whole.with_joint(joint)
         own = joint_vector(joint, fixed, prediction.joint_stiffness()).all
         rest = [one for one in vector.all if one.origin != "joint"]
         return self._describe(

@@ -84,8 +84,8 @@ class WeightedResiduals(ABC):
         slopes = np.ascontiguousarray(self.weigh_slopes(y, slopes))
         pulls, of_pulls, by_x = vector.pulls(x), vector.pull_slopes(x), vector.slope(x)
         real = slopes.reshape(len(slopes), -1).view(np.float64)
-        information = (real @ real.T) * np.outer(by_x, by_x) + np.diag(of_pulls**2)
-        gradient = (real @ residual.view(np.float64)) * by_x - of_pulls * pulls
+        information = (real @ real.T) * np.outer(by_x, by_x) + of_pulls.T @ of_pulls
+        gradient = (real @ residual.view(np.float64)) * by_x - of_pulls.T @ pulls
         cost = _squares(residual) + float((pulls**2).sum())
         return Linearised(cost if np.isfinite(cost) else np.inf, information, gradient)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -77,9 +78,9 @@ def next_channels(found: FoundModel) -> tuple[NextChannel, ...]:
     problem = found.problem
     prediction, vector = problem.prediction, problem.vector
     whole, places = prediction.whole, prediction.places
-    names = [*(f"A/{dof}" for dof in places.a), *(f"B/{dof}" for dof in places.b)]
+    names = places.names
     responses, forces = ([names[i] for i in own] for own in (prediction.responses, prediction.forces))
-    tried = [f"{side}/{dof}" for side, part in (("A", whole.a), ("B", whole.b)) for dof in _candidates(part)]
+    tried = [f"{name}/{dof}" for name, part in whole.parts.items() for dof in _candidates(part, whole.ends, name)]
     more = [[dof for dof in tried if dof not in own] for own in (responses, forces)]
     every = np.unique(np.linspace(0, problem.freq_hz.size - 1, min(_LINES, problem.freq_hz.size)).astype(np.intp))
     other = Prediction(whole, problem.freq_hz[every], [*responses, *more[0]], [*forces, *more[1]])
@@ -116,12 +117,13 @@ def _without_errors(information: FloatArray, n: int) -> FloatArray:
     return np.asarray(information[:n, :n] - cross @ inverse_information(information[n:, n:]) @ cross.T)
 
 
-def _candidates(part: Substructure) -> list[str]:
-    """Return translations of a model: at its joint, and spread over it."""
+def _candidates(part: Substructure, ends: Sequence[Sequence[str]], name: str) -> list[str]:
+    """Return translations of a model: at its joints, and spread over it."""
     dofs = part.source.dofs if isinstance(part.source, FrfSource) else part.nominal_model.dofs
     moving = [dof for dof in dofs if not is_rotation(dof.rpartition(":")[2])]
     at = np.unique(np.linspace(0, len(moving) - 1, _TRIED).astype(np.intp)).tolist() if moving else []
-    own = [dof for dof in part.joint if not is_rotation(dof.rpartition(":")[2])]
+    joint = [dof.partition("/")[2] for end in ends for dof in end if dof.startswith(f"{name}/")]
+    own = [dof for dof in joint if not is_rotation(dof.rpartition(":")[2])]
     return list(dict.fromkeys([*own, *(moving[i] for i in at)]))
 
 

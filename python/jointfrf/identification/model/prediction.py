@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
@@ -17,8 +18,14 @@ from jointfrf.identification.model.assembly import (
     places_of,
 )
 from jointfrf.identification.model.reduced import ReducedSlope, ReducedSubstructure, SubstructureState, range_of
-from jointfrf.identification.model.substructure import Substructure, Unknown
-from jointfrf.identification.parameters import FitParameter, ParameterOrigin, ParameterVector, joint_vector
+from jointfrf.identification.model.substructure import Unknown
+from jointfrf.identification.parameters import (
+    CommonMean,
+    FitParameter,
+    ParameterOrigin,
+    ParameterVector,
+    joint_vector,
+)
 from jointfrf.kernel.arguments import ComplexArray, FloatArray
 from jointfrf.kernel.linear_algebra import invert
 from jointfrf.laws.law_joint import Connection
@@ -76,7 +83,7 @@ class Prediction:
     whole : Assembly
     freq_hz : ndarray, shape (n_freq,)
     responses, forces : sequence of str
-        DOFs ``"A/..."``, ``"B/..."`` of the channels.
+        DOFs ``"A/..."`` of the channels.
     """
 
     def __init__(self, whole: Assembly, freq_hz: FloatArray, responses: Sequence[str], forces: Sequence[str]) -> None:
@@ -84,16 +91,18 @@ class Prediction:
         self.places = places_of(whole, responses, forces)
         self.responses, self.forces = self.places.at(responses), self.places.at(forces)
         self._last: tuple[tuple[SubstructureState, ...], _Open] | None = None
-        self.sides = (
-            ReducedSubstructure("A", whole.a, freq_hz, self.places.a),
-            ReducedSubstructure("B", whole.b, freq_hz, self.places.b),
+        self.sides = tuple(
+            ReducedSubstructure(name, part, freq_hz, self.places.of[name]) for name, part in whole.parts.items()
         )
 
     def joint_stiffness(self) -> FloatArray:
         """Return the median over the lines of |(H_jj + H_kk)_dd|^-1, the size of stiffness that FRFs can show."""
-        n = len(self.whole.joint.dofs)
-        size = [abs(side.at(side.part.nominal).h[:, range(n), range(n)]) for side in self.sides]
-        found: FloatArray = np.median(1 / (size[0] + size[1]), axis=0)
+        size = np.concatenate([abs(np.einsum("lpp->lp", side.at(side.part.nominal).h)) for side in self.sides], axis=1)
+        total = np.zeros((self.omega.size, len(self.whole.joint.dofs)))
+        for own in self.whole.ends:
+            held = [i for i, dof in enumerate(own) if dof]
+            total[:, held] += size[:, self.places.at([own[i] for i in held])]
+        found: FloatArray = np.median(1 / np.maximum(total, np.finfo(float).tiny), axis=0)
         return found
 
     def joint_compliance(
@@ -227,12 +236,11 @@ class Prediction:
 
     def refine(self, vector: ParameterVector, values: FloatArray) -> bool:
         """Return whether a basis had to be extended to be good for these values."""
-        done = [side.refine(self._of_side(vector, values, name)) for side, name in zip(self.sides, "AB", strict=True)]
+        done = [side.refine(self._of_side(vector, values, side.name)) for side in self.sides]
         return any(done)
 
     def _of_side(self, vector: ParameterVector, values: FloatArray, name: str) -> dict[str, float]:
-        origin = "A" if name == "A" else "B"
-        return {str(vector.all[i].place[0]): float(values[i]) for i in vector.places_of(origin)}  # type: ignore[arg-type]
+        return {str(vector.all[i].place[1]): float(values[i]) for i in vector.places_of_part(name)}
 
     def _parts(self, vector: ParameterVector, values: FloatArray) -> tuple[Connection, tuple[SubstructureState, ...]]:
         """Return connections and substructures for values of all parameters."""
@@ -242,8 +250,8 @@ class Prediction:
             numbers[int(vector.all[i].place[0])].append(float(values[i]))
         link = assembly_connection(self.whole, self.places, self.omega, joint, numbers)
         states = [
-            side.at(self._of_side(vector, values, name), values[vector.places_of(_error_of(name))])
-            for side, name in zip(self.sides, "AB", strict=True)
+            side.at(self._of_side(vector, values, side.name), values[vector.places_of_part(side.name, "error")])
+            for side in self.sides
         ]
         return link, tuple(states)
 
@@ -291,7 +299,9 @@ class Prediction:
             changes[i] = (entries, attachment_factors(one, self.omega)[number])
         last: list[tuple[int, int]] = []
         for i, (entries, slope) in changes.items():
-            if not vector.all[i].is_free:
+            to = i if vector.all[i].like is None else vector.all[i].like
+            assert to is not None
+            if not vector.all[to].is_free:
                 continue
             if entries != last:  # parameters of one law change the same entries
                 last = entries
@@ -299,7 +309,10 @@ class Prediction:
                     coupled.across_out[:, :, row, None] * coupled.across_in[:, column, None, :]
                     for row, column in entries
                 )
-            np.multiply(moved, -slope[:, None, None], out=slopes[i])
+            if to == i:
+                np.multiply(moved, -slope[:, None, None], out=slopes[i])
+            else:
+                slopes[to] -= moved * slope[:, None, None]
 
     def _model_slopes(
         self,
@@ -312,34 +325,31 @@ class Prediction:
         """Put the derivatives by unknowns of the models into their places."""
         link, states = parts
         first, opened = 0, self._open(link, states)
-        for side, state, name in zip(self.sides, states, "AB", strict=True):
+        for side, state in zip(self.sides, states, strict=True):
             own = slice(first, first + len(side.dofs))
             first = own.stop
-            places = [i for i in vector.places_of("A" if name == "A" else "B") if vector.all[i].is_free]
-            errors = vector.places_of(_error_of(name))
+            of_part = vector.places_of_part(side.name)
+            places = [i if vector.all[i].like is None else vector.all[i].like for i in of_part]
+            errors = vector.places_of_part(side.name, "error")
             if not places and not errors:
                 continue
-            names = [str(vector.all[i].place[0]) for i in places]
-            of_side = side.slopes(self._of_side(vector, values, name), names, state)
+            numbers = self._of_side(vector, values, side.name)
+            of_side = side.slopes(numbers, [str(vector.all[i].place[1]) for i in of_part], state)
             out, into = self._paths(opened, link, coupled.w, own)
             left = out @ state.x
             right = state.x.swapaxes(1, 2) @ into
             assert state.matrices is not None
             for i, slope in zip(places, of_side, strict=True):
-                slopes[i] = _by_slope(slope, state.matrices.eta, self.omega, left, right)
+                slopes[i] += _by_slope(slope, state.matrices.eta, self.omega, left, right)
                 if slope.ports is not None:
                     slopes[i] += out @ (slope.ports @ right)
                     slopes[i] += (left @ slope.ports.T) @ into
             if errors and side.errors is not None:
                 # Errors are changes of the matrices before these are scaled.
-                of_k, of_m = side.scales(self._of_side(vector, values, name))
+                of_k, of_m = side.scales(numbers)
                 slopes[errors] = side.errors.slopes(
                     state.shapes, (1 + 1j * state.matrices.eta) * of_k, of_m * self.omega**2, left, right
                 )
-
-
-def _error_of(name: str) -> ParameterOrigin:
-    return "error of A" if name == "A" else "error of B"
 
 
 def _of_entries(out: ComplexArray, into: ComplexArray, std: FloatArray, *, both: bool) -> ComplexArray:
@@ -355,10 +365,11 @@ def _of_entries(out: ComplexArray, into: ComplexArray, std: FloatArray, *, both:
 
 
 def _together(states: tuple[SubstructureState, ...]) -> ComplexArray:
-    a, b = (state.h for state in states)
-    n_a, n = a.shape[1], a.shape[1] + b.shape[1]
-    h = np.zeros((len(a), n, n), np.complex128)
-    h[:, :n_a, :n_a], h[:, n_a:, n_a:] = a, b
+    n = sum(state.h.shape[1] for state in states)
+    h, first = np.zeros((len(states[0].h), n, n), np.complex128), 0
+    for state in states:
+        own = slice(first, first + state.h.shape[1])
+        h[:, own, own], first = state.h, own.stop
     return h
 
 
@@ -394,6 +405,8 @@ def _times(left: ComplexArray, matrix: FloatArray) -> ComplexArray:
     return found.reshape(left.shape)
 
 
+#: Where the search for a spread begins: mounts of one kind differ by as much.
+_FIRST_SPREAD = 0.3
 #: Units of unknowns of models by their usual names.
 _UNITS = {
     "youngs_modulus": "N/m^2", "density": "kg/m^3", "loss_factor": "1", "length": "m", "width": "m", "height": "m",
@@ -425,20 +438,54 @@ def parameter_vector(
         `fixed` names what is no parameter of the joint.
     """
     found = list(joint_vector(whole.joint, fixed, joint_stiffness).all)
-    sides: tuple[tuple[ParameterOrigin, Substructure], ...] = (("A", whole.a), ("B", whole.b))
-    for side, part in sides:
+    means = _with_means(whole, found)
+    for side, part in whole.parts.items():
         for name, unknown in part.fitted.items():
             lower, upper = range_of(part, name, unknown)
             unit = "1" if name in part.scaled and unknown.value == 1 else _UNITS.get(name, "")
-            own = _of_unknown(f"{side}/{name}", unit, side, (name,), unknown)
+            own = _of_unknown(f"{side}/{name}", unit, "part", (side, name), unknown)
             found.append(own._replace(lower=lower, upper=upper))
+    _with_same(whole, found)
     for i, one in enumerate(whole.attachments):
         found += _of_attachment(one, i)
     words: tuple[ParameterOrigin, ParameterOrigin] = ("response", "force")
     for origin, of_channels in zip(words, gains, strict=True):
         for place, (channel, unknown) in of_channels.items():
             found.append(_of_unknown(f"gain of {origin} {channel}", "1", origin, (place,), unknown))
-    return ParameterVector(tuple(found))
+    return ParameterVector(tuple(found), means)
+
+
+def _with_same(whole: Assembly, parameters: list[FitParameter]) -> None:
+    """Let parameters of joints and parts that are the same equal those of the first one."""
+    at = {one.name: i for i, one in enumerate(parameters)}
+    for first, *others in whole.same:
+        sign = "." if first in whole.joints else "/"
+        own = [name for name in at if name.startswith(first + sign)]
+        for other, name in itertools.product(others, own):
+            i, like = at[other + name[len(first) :]], at[name]
+            parameters[i] = parameters[like]._replace(
+                name=parameters[i].name, place=parameters[i].place, is_free=False, std=None, like=like
+            )
+
+
+def _with_means(whole: Assembly, parameters: list[FitParameter]) -> tuple[CommonMean, ...]:
+    """Add the common means of parameters of joints that are alike; return what these have in common."""
+    at = {one.name: i for i, one in enumerate(parameters)}
+    found = []
+    for group, alike in whole.alike.items():
+        first = alike.joints[0]
+        for name in [name for name in at if name.startswith(f"{first}.")]:
+            own = name[len(first) :]
+            members = tuple(at[joint + own] for joint in alike.joints)
+            if not all(parameters[i].is_free for i in members):
+                continue
+            one = parameters[members[0]]
+            place = (group, own[1:])
+            parameters.append(one._replace(name=group + own, origin="mean", place=place))
+            spread = _FIRST_SPREAD if alike.spread is None else alike.spread
+            std = spread if one.is_log else spread * (abs(one.value) or 1.0)
+            found.append(CommonMean(len(parameters) - 1, members, std, alike.spread))
+    return tuple(found)
 
 
 def _of_unknown(

@@ -129,9 +129,9 @@ def _shown(lines: ComplexArray, freq: FloatArray) -> NDArray[np.bool_]:
 def _joint_channels(
     whole: Assembly, channels: Channels, shown: NDArray[np.bool_]
 ) -> tuple[list[int], list[int]] | None:
-    """Return the channels at the joint DOFs j, then k, where all FRFs between them were measured."""
-    names = [*(f"A/{dof}" for dof in whole.a.joint), *(f"B/{dof}" for dof in whole.b.joint)]
-    if not all(name in channels.responses and name in channels.forces for name in names):
+    """Return the channels at the DOFs j, then k, of the only joint where all FRFs between them were measured."""
+    names = [*whole.ends[0], *whole.ends[1]]
+    if len(whole.joints) > 1 or not all(name in channels.responses and name in channels.forces for name in names):
         return None
     at = [channels.responses.index(name) for name in names], [channels.forces.index(name) for name in names]
     return at if shown[np.ix_(*at)].all() else None

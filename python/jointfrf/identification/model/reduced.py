@@ -160,6 +160,9 @@ class ReducedSubstructure:
 
     def _space(self, trials: Sequence[Mapping[str, float]]) -> FloatArray:
         """Return a basis of all motions of the models for some values, orthonormal but for the scale of each DOF."""
+        n = len(self.part.nominal_model.dofs)
+        if n <= len(self.dofs):  # nothing is left to reduce
+            return np.eye(n)
         found = [self.basis] if self.basis.size else []
         low, high = self.freq_hz.min() * (1 - _MARGIN), self.freq_hz.max() * (1 + _MARGIN)
         band = np.linspace(low, high, min(max(self.freq_hz.size, 2), 400))

@@ -77,7 +77,7 @@ def _drawn(vector: ParameterVector, stiffness: FloatArray) -> list[FloatArray]:
             else:
                 value = one.value
             values[i] = np.clip(value, one.lower, one.upper)
-        trials.append(values)
+        trials.append(vector.with_means(values, at_mean=True))
     return trials
 
 

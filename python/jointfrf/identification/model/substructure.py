@@ -133,7 +133,7 @@ class Substructure:
         A model; a function that builds one from the values of `unknowns` by name, ``build(length=0.3)``; or FRFs, see
         `of_frfs`.
     joint : sequence of str
-        Names of its joint DOFs, in the order of the joint.
+        Names of its joint DOFs, in the order of the joint; of two parts and one joint only.
     unknowns : mapping of str to Unknown
         Of a `Model`: ``"youngs_modulus"`` scales K and H, ``"density"`` scales M, ``"loss_factor"`` is its eta. Of a
         function: its arguments.
@@ -169,7 +169,7 @@ class Substructure:
     """
 
     source: Model | Callable[..., Model] | FrfSource
-    joint: tuple[str, ...]
+    joint: tuple[str, ...] = ()
     unknowns: Mapping[str, Unknown] = field(default_factory=dict)
     exact: bool = False
     model_error: float | None = None

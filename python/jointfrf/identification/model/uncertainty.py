@@ -69,8 +69,7 @@ class ModelGradient:
         # A prediction may lend its derivatives.
         slopes = np.tensordot(kept * vector.slope(x), slopes, 1)
         slopes = likelihood.weighted(slopes)
-        by_prior = vector.pull_slopes(x)
-        pulled = kept * by_prior
+        pulled = kept @ vector.pull_slopes(x).T
         priors = LineParts(-(pulled * vector.pulls(x)).T, pulled.T[:, :, None] * pulled.T[:, None])
         residual = likelihood.weighted(likelihood.difference(y))
         of_errors = likelihood.carried_back(slopes).conj() * y
@@ -80,7 +79,7 @@ class ModelGradient:
     @cached_property
     def covariance(self) -> FloatArray:
         """Covariance of the coordinates, from noise as known, shape (p, p)."""
-        return inverse_information(self.information)
+        return inverse_information(self.information, open_ends=True)
 
     def _parts(self, axis: int) -> LineParts:
         """Return the parts of each line (axis 1), response (2) or force (3), and of each prior."""
