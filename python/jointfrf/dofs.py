@@ -70,7 +70,7 @@ def point_and_direction(dof: str) -> tuple[str, str]:
     (('bolt1', 'theta_x'), ('', 'y'))
     """
     point, _, direction = dof.rpartition(".")
-    return (point, direction) if point and direction else ("", dof)
+    return (point, direction) if point and direction and "/" not in dof else ("", dof)  # ../x is a path
 
 
 def parameter_name(kind: str, row: str, column: str) -> str:

@@ -72,6 +72,6 @@ def test_the_commands_give_what_is_shown(tmp_path, make):
     agree(printed[3].split("\n", 1)[0], frequencies.split("\n", 1)[0])
     rows, said = (np.array([[float(x) for x in re.findall(r"[-+]?\d+\.\d+", row)] for row in text.splitlines()[1:]])
                   for text in (printed[3], frequencies))  # fmt: skip
-    np.testing.assert_allclose(rows[:, [0, 1, 3]], said[:, [0, 1, 3]], rtol=2e-4)
+    np.testing.assert_allclose(rows[:, [0, 1, 3]], said[:, [0, 1, 3]], rtol=0, atol=0.11)  # the last digit
     assert (abs(rows[:, 4]) <= 0.05).all()  # the corrected model, %
     assert abs(rows[:, 2]).max() > 20  # the rigid lap

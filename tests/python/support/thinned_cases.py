@@ -13,7 +13,7 @@ _SHORT = {
     "3.2-fe-beams": (1, 300),
     "3.3-beams-1mm": (3, 60),
     "3.3.1-decoupling": (3, 60),
-    "3.3.1-two-translations": (3, 60),
+    "3.3.1a-two-translations": (3, 60),
     "4.3.1-six-dof": (4, 8),
     "4.3.2-six-dof-decoupling": (4, 4),
 }

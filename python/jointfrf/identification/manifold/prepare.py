@@ -318,7 +318,8 @@ def _products(h: ComplexArray, squares: FloatArray) -> ComplexArray:
     """Return products of rows of norm 1, shape (rows, rows), to which every line and column adds alike."""
     of_columns = np.maximum(np.sqrt(squares.mean(axis=(0, 1))), _TINY)
     of_lines = np.maximum(np.sqrt((squares / of_columns / of_columns).mean(axis=(1, 2), keepdims=True)), _TINY)
-    flat = (h / (of_columns * of_lines)).swapaxes(0, 1).reshape(h.shape[1], -1)
+    # A divisor below the smallest normal number has no finite inverse: what is dead stays 0.
+    flat = (h / np.maximum(of_columns * of_lines, _TINY)).swapaxes(0, 1).reshape(h.shape[1], -1)
     product: ComplexArray = flat @ flat.conj().T
     size = np.sqrt(product.diagonal().real)
     return product / size / size[:, None]

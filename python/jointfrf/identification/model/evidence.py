@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg, optimize
+from scipy import linalg
 
 from jointfrf.identification.minimise import Linearised, Minimum, inverse_information, minimise
 from jointfrf.identification.model.likelihood import Likelihood
@@ -281,8 +281,10 @@ def spread_factors(vector: ParameterVector, minimum: Minimum) -> FloatArray:
 
 def _most_likely(squares: float, count: int, size: float) -> float:
     """Return the spread at the largest likelihood times its prior: (m - 1) s^2 + s^3 / u = squares."""
+    from scipy.optimize import brentq  # takes long to import, and is seldom needed
+
     usual, largest = _USUAL_SPREAD * size, float(np.sqrt(squares / (count - 1)))
-    return float(optimize.brentq(lambda s: (count - 1) * s**2 + s**3 / usual - squares, 0.0, largest, rtol=1e-9))
+    return float(brentq(lambda s: (count - 1) * s**2 + s**3 / usual - squares, 0.0, largest, rtol=1e-9))
 
 
 def _deviations(prediction: Prediction, error: ModelError) -> FloatArray:
