@@ -118,7 +118,7 @@ def list_cases() -> list[Path]:
     found = [] if folder is None else [path.parent for path in folder.glob("*/case.toml")]
 
     def place(path: Path) -> tuple[bool, list[int], str]:
-        numbers = [int(x) for x in path.name.split("-")[0].split(".") if x.isdigit()]
+        numbers = [int(x) for x in re.findall(r"\d+", path.name.split("-")[0])]
         return not numbers, numbers, path.name
 
     return sorted(found, key=place)
