@@ -103,16 +103,17 @@ class _SafeProcess(context.SpawnProcess):
         self._more = more
 
     def start(self) -> None:
-        with safe_environment(self._more), _uninterrupted():
+        with safe_environment(self._more):
             super().start()
 
 
 @contextmanager
 def _uninterrupted() -> Iterator[None]:
-    """Start a process that no Ctrl-C reaches, not even while it still imports; the one here comes after the start.
+    """Hand a task out, and start a process that no Ctrl-C reaches, not even while it imports; ours comes afterwards.
 
     A signal blocked in this thread reaches another one, as of a BLAS, and is then handled here all the same: it is
-    only noted meanwhile. Else the process would be there, and what it is to do not yet written to it.
+    only noted meanwhile. Else the process would be there, and what it is to do not yet written to it; or the executor
+    would not know of it, and wait for another one, the sign of whose end this one took.
     """
     handler = signal.getsignal(signal.SIGINT)
     if not hasattr(signal, "pthread_sigmask") or not callable(handler) or current_thread() is not main_thread():
@@ -176,6 +177,10 @@ class _StartedProcesses(ProcessPoolExecutor):
     def __init__(self, *arguments: Any, started: list[Any], **options: Any) -> None:
         super().__init__(*arguments, **options)
         self._started = started
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        with _uninterrupted():
+            return super().submit(fn, *args, **kwargs)
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         try:

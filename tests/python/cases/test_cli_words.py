@@ -319,9 +319,18 @@ def test_an_interrupted_command_ends_with_one_sentence(tmp_path):
             time.sleep(0.05)
         time.sleep(1)
         os.killpg(process.pid, signal.SIGINT)  # as Ctrl-C on a terminal
-        _, complained = process.communicate(timeout=900)
+        complained = _last_words(process)
     assert process.returncode == 130
     assert complained == "jointfrf: error: interrupted\n"
+
+
+def _last_words(process: subprocess.Popen[str]) -> str:
+    """What a process complains of until it ends; one that does not is ended with all of its group."""
+    try:
+        return process.communicate(timeout=300)[1]
+    except subprocess.TimeoutExpired:
+        os.killpg(process.pid, signal.SIGKILL)
+        raise
 
 
 def _workers(children: Path) -> list[str]:
@@ -345,7 +354,7 @@ def test_an_interrupt_while_processes_start_ends_all_of_them(delay):
             time.sleep(0.01)
         time.sleep(delay)
         os.killpg(process.pid, signal.SIGINT)
-        _, complained = process.communicate(timeout=300)
+        complained = _last_words(process)
     # Python ends itself by the signal where it came inside exec(), as in dataclasses: to a shell that is 130, too
     assert process.returncode in (130, -signal.SIGINT), complained
     assert complained == "jointfrf: error: interrupted\n"

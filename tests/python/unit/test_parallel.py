@@ -10,7 +10,15 @@ from threadpoolctl import threadpool_info
 
 import jointfrf as jf
 from deadly_tasks import kill_this_process, note_each
-from jointfrf.parallel.pool import Pool, _uninterrupted, available_cores, one_thread, opened_pool
+from jointfrf.parallel.pool import (
+    Pool,
+    _SafeProcess,
+    _uninterrupted,
+    available_cores,
+    one_thread,
+    opened_pool,
+    started_processes,
+)
 
 
 def numbers_of_threads() -> dict[str, int]:
@@ -212,3 +220,22 @@ def test_an_interrupt_that_another_thread_gets_waits_for_the_start():
         steps.append("not interrupted")
     assert steps == ["written"]
     assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ())
+
+
+@pytest.mark.skipif(not hasattr(signal, "pthread_kill"), reason="Windows sends no signal to a thread")
+def test_an_interrupt_after_a_start_leaves_no_process_that_the_executor_does_not_know(monkeypatch):
+    # Else it takes the sign to end that was meant for the other one, for which the executor then waits for ever.
+    begin = _SafeProcess.start
+
+    def start(process):
+        begin(process)
+        signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(_SafeProcess, "start", start)
+    executor = started_processes(2)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            executor.submit(abs, -1)
+        assert len(executor._processes) == len(executor._started) == 1
+    finally:
+        executor.shutdown()
