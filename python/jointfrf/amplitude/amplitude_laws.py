@@ -23,6 +23,8 @@ _CHI = (-0.98, 1.0)
 _FAR = 14.0
 #: A stiffness below this part of the measured one is rounding of the terms it is the difference of.
 _ROUNDING = 1e-12
+#: Residuals rarer than this by chance are those of a law that is not the joint's, or of errors that are too small.
+_CHANCE = 1e-3
 #: Values and errors lie within these, so that no square of a ratio overflows.
 _LEAST, _MOST = 1e-30, 1e30
 
@@ -83,6 +85,9 @@ class AmplitudeLawFit:
         do not determine a parameter.
     chi_square, degrees : float, int
         Squared residuals in units of the standard errors, and their number less that of parameters.
+    widened : float
+        By how much intervals are wider than the standard errors alone make them: the root of chi_square / degrees
+        where chance has less than one in a thousand such residuals, else 1.
     aicc, bic : float
         Akaike's criterion, corrected for few data, and the Bayesian one; the lowest is the best.
     stiffness, loss_factor : ndarray, shape (n_levels,)
@@ -94,6 +99,7 @@ class AmplitudeLawFit:
     intervals: dict[str, tuple[float, float]]
     chi_square: float
     degrees: int
+    widened: float
     aicc: float
     bic: float
     stiffness: FloatArray
@@ -212,7 +218,7 @@ def _fit(
     law: str, a: FloatArray, k: FloatArray, eta: FloatArray, dk: FloatArray, d_eta: FloatArray, share: float
 ) -> AmplitudeLawFit:
     from scipy.optimize import least_squares
-    from scipy.special import ndtri
+    from scipy.special import chdtrc, ndtri
 
     own = _LAWS[law]
     is_log = np.array([name not in own.not_logarithmic for name in own.names])
@@ -240,8 +246,9 @@ def _fit(
     _, values, rows = np.linalg.svd(best.jac, full_matrices=False)
     # A direction that changes no residual by more than rounding has an error beyond all bounds, not none.
     values = np.maximum(values, np.finfo(float).eps * values[0])
-    width = float(ndtri((1 + share) / 2)) * np.sqrt(np.sum((rows / values[:, None]) ** 2, axis=0))
     n, count, chi_square = 2 * a.size, len(own.names), 2 * float(best.cost)
+    widened = math.sqrt(chi_square / (n - count)) if chdtrc(n - count, chi_square) < _CHANCE else 1.0
+    width = widened * float(ndtri((1 + share) / 2)) * np.sqrt(np.sum((rows / values[:, None]) ** 2, axis=0))
     found = of_law(best.x)
     limits, parameters = {}, {}
     for name, x, half, logarithmic in zip(own.names, best.x, width, is_log, strict=True):
@@ -251,7 +258,7 @@ def _fit(
             ends = (math.exp(ends[0]), math.exp(ends[1])) if half < _FAR / 2 else (0.0, math.inf)
         limits[name] = ends
     return AmplitudeLawFit(
-        law, parameters, limits, chi_square, n - count,
+        law, parameters, limits, chi_square, n - count, widened,
         chi_square + 2 * count + 2 * count * (count + 1) / (n - count - 1), chi_square + count * math.log(n),
         found.real, found.imag / found.real,
     )  # fmt: skip

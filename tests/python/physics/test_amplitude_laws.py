@@ -102,3 +102,19 @@ def test_laws_need_levels():
     assert "iwan" in found.left_out
     with pytest.raises(ValueError, match=r"amplitude must be positive.* is -1 at level 1"):
         jf.fit_amplitude_laws([1, -1], [1, 1], [0, 0], [1, 1], [1, 1])
+
+
+def test_intervals_allow_for_levels_that_scatter_more_than_their_errors():
+    """With errors of a tenth of the scatter: as wide as with the right ones."""
+    a = np.geomspace(2e-7, 2e-5, 40)
+    rng = np.random.default_rng(5)
+    k, eta = 1e6 * (1 + 0.01 * rng.standard_normal(40)), 0.01 * (a / 1e-6) ** 0.5 + 1e-3 * rng.standard_normal(40)
+    right, small = (
+        jf.fit_amplitude_laws(a, k, eta, share * np.full(40, 1e4), share * np.full(40, 1e-3), laws=["power"]).fits[0]
+        for share in (1.0, 0.1)
+    )
+    assert right.widened == 1.0
+    assert 10 / np.sqrt(1.5) < small.widened < 10 * np.sqrt(1.5)
+    for name, (low, high) in right.intervals.items():
+        ends = small.intervals[name]
+        assert (ends[1] - ends[0]) / (high - low) == pytest.approx(small.widened / 10, rel=0.02)
