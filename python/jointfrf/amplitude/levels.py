@@ -229,11 +229,11 @@ def of_levels(
         except ValueError as error:
             findings.append(note("left out", f"{dof}: no law is fitted: {error}", (dof,)))
         if dof in of_laws and (best := of_laws[dof].fits[0]).widened > 1:
-            findings.append(warn(
-                "law", f"{dof}: no law explains the levels: chi^2 of the best, {best.law}, is {best.chi_square:.3g} with "
-                f"{best.degrees} degrees of freedom; intervals of its parameters are {best.widened:.2g} times as wide "
-                "for it", (dof,)
-            ))  # fmt: skip
+            text = (
+                f"{dof}: no law explains the levels: chi^2 of the best, {best.law}, is {best.chi_square:.3g} with "
+                f"{best.degrees} degrees of freedom; intervals of its parameters are {best.widened:.2g} times as wide"
+            )
+            findings.append(warn("residual", text, (dof,)))
         if why:
             findings.append(note("left out", f"{dof}: no laws are fitted to {why}", (dof,)))
     return JointLevels(ordered, of_laws, refused, worst_first(findings), share)

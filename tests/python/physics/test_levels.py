@@ -235,7 +235,7 @@ def test_the_command_reads_a_backbone(capsys, tmp_path):
             assert float(row["loss_factor_low"]) < k.imag / k.real < float(row["loss_factor_high"])
     assert main([*words, "A/1:y", "--laws", "power", "--json"]) == 0
     printed = json.loads(capsys.readouterr().out)
-    assert any("theta_z: no law explains the levels: chi^2 of the best, power, is" in one for one in printed["warnings"])
+    assert any("no law explains the levels: chi^2 of the best, power, is" in one for one in printed["warnings"])
     lowest = printed["levels"]["theta_z"][0]
     assert lowest["stiffness"]["low"] < true.first_harmonic(np.array([lowest["amplitude"]]))[0].real
     assert main([*words, "A/1:y", "a.uff"]) == 2
