@@ -200,6 +200,15 @@ def test_few_tasks_are_submitted_at_the_same_time():
     assert asked == 100
 
 
+@pytest.fixture
+def usual_interrupts():
+    """A shell starts what runs in its background with the signal ignored, and tests hand that on."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("usual_interrupts")
 @pytest.mark.skipif(not hasattr(signal, "pthread_kill"), reason="Windows sends no signal to a thread")
 def test_an_interrupt_that_another_thread_gets_waits_for_the_start():
     # As OpenBLAS's threads do: they were there before the signal was blocked here. What a thread sends itself has come
@@ -222,6 +231,7 @@ def test_an_interrupt_that_another_thread_gets_waits_for_the_start():
     assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ())
 
 
+@pytest.mark.usefixtures("usual_interrupts")
 @pytest.mark.skipif(not hasattr(signal, "pthread_kill"), reason="Windows sends no signal to a thread")
 def test_an_interrupt_after_a_start_leaves_no_process_that_the_executor_does_not_know(monkeypatch):
     # Else it takes the sign to end that was meant for the other one, for which the executor then waits for ever.
