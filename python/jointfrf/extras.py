@@ -20,6 +20,7 @@ _EXTRAS = {
     "h5py": ("HDF5 files (MATLAB 7.3 among them)", "hdf5"),
     "jinja2": ("reports", "report"),
     "matplotlib": ("figures", "plot"),
+    "plotly": ("views in space", "report3d"),
     "mumps": ("factors by MUMPS", "mumps"),
     "ansys": (".full files of Ansys", "ansys"),
     "pyyeti": ("OUTPUT2 and OUTPUT4 files of Nastran", "nastran"),

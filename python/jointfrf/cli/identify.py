@@ -118,6 +118,7 @@ def add_arguments(parser: CommandParser) -> None:
     parser.heading("results")
     parser.option("--out DIR", "folder for identification.json and figures", Path)
     parser.option("--report FILE", "the identification by method compliance as one HTML page", Path)
+    parser.option("--space", "with --report: a view in space with moving deformation; needs plotly, 5 MB more")
     parser.option("--save FILE", "keep the joint (by the first method) in a JSON file", Path)
     parser.option("--save-lines", "with --save: K* of each line, too, which makes the file many times as long")
     parser.option(
@@ -135,12 +136,14 @@ def run(args: argparse.Namespace) -> int:
         check_extras("matplotlib")
         check_out("--out", args.out)
     if args.report is not None:
-        check_extras("jinja2")
+        check_extras("jinja2", *(["plotly"] if args.space else []))
         if "compliance" not in args.method:
             raise UsageError("--report is of method compliance: name it among the methods")
         check_out("--report", args.report.parent)
         if args.report.is_dir():
             raise UsageError(f"--report: {args.report} is a folder, not a file")
+    elif args.space:
+        raise UsageError("--space is of --report: name a file for the page")
     check_folder("--save", args.save)
     if args.model is not None:
         for name in ("points", "same"):
@@ -199,7 +202,8 @@ def run(args: argparse.Namespace) -> int:
         fit = fits[args.method.index("compliance")]
         ends = (1, 2) if args.export is None else args.export[1]
         args.report.parent.mkdir(parents=True, exist_ok=True)
-        written.append(write_report(fit, args.report, source=file_names(args), command=args.typed, nodes=ends))
+        written.append(write_report(fit, args.report, source=file_names(args), command=args.typed, nodes=ends,
+                                    space=args.space))  # fmt: skip
     if args.out is not None:
         written += _write_figures(args, frfs, joint, fits)
     out.say(*([""] if written else []), *(f"wrote {path}" for path in written))

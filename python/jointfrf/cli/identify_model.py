@@ -172,7 +172,7 @@ def _one(args: argparse.Namespace, out: Output) -> tuple[Fit, dict[str, Any], li
         ends = (1, 2) if args.export is None else args.export[1]
         args.report.parent.mkdir(parents=True, exist_ok=True)
         written.append(write_report(fit, args.report, source=source, command=args.typed, nodes=ends,
-                                    parts=measured.sketched))  # fmt: skip
+                                    parts=measured.sketched, space=args.space))  # fmt: skip
     if args.out is not None:
         from jointfrf.report.fit import write_fit
 

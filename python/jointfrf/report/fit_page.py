@@ -13,6 +13,7 @@ from typing import get_args
 import numpy as np
 
 from jointfrf.dofs import ParameterKind, is_rotation, parameter_name, point_and_direction
+from jointfrf.extras import check_extras
 from jointfrf.files import write_file
 from jointfrf.frf.calibration import shows_calibration
 from jointfrf.identification.fit_cards import cards
@@ -37,6 +38,7 @@ from jointfrf.report.fit_frfs import (
 from jointfrf.report.fit_model import assurance_map, band_map, next_parts, unknowns_table
 from jointfrf.report.receptance import noise_figure
 from jointfrf.report.sketch import SketchedPart, assembly_sketch, interface_points, interface_sketch, point_table
+from jointfrf.report.space import space_of_fit
 from jointfrf.report.table import Cell, Table
 
 __all__ = [
@@ -69,12 +71,16 @@ _PROGRAMS = {"abaqus": "Abaqus", "calculix": "CalculiX", "nastran": "Nastran", "
 
 @dataclass(frozen=True)
 class ReportOptions:
-    """What a report says beside the fit: the file measured, the command typed, nodes j and k of cards, parts drawn."""
+    """What a report says beside the fit.
+
+    The file measured, the command typed, nodes j and k of cards, parts drawn, and whether there is a view in space.
+    """
 
     source: str = ""
     command: str = ""
     nodes: Sequence[int] = (1, 2)
     parts: Sequence[SketchedPart] = ()
+    space: bool = False
 
 
 def write_report(
@@ -85,6 +91,7 @@ def write_report(
     command: str = "",
     nodes: Sequence[int] = (1, 2),
     parts: Sequence[SketchedPart] = (),
+    space: bool = False,
 ) -> Path:
     """Write a page on a fit: one HTML file with all that is needed to judge and to quote the joint, no link to another.
 
@@ -102,6 +109,9 @@ def write_report(
     parts : sequence of SketchedPart
         Both parts of an assembly with the places of their nodes, as `MeasuredAssembly.sketched`: they are drawn with
         channels and joint.
+    space : bool
+        Whether the page has a view in space of channels, forces and joint, with the deformation measured and fitted at
+        each frequency, moving. It needs plotly, whose script makes the page 5 MB larger, and WebGL where it is read.
 
     Returns
     -------
@@ -113,15 +123,18 @@ def write_report(
     ValueError
         The fit does not hold the measured FRFs: it was loaded, or is a mean over bands.
     MissingPackageError
-        jinja2 is missing.
+        jinja2 is missing, or with `space` plotly.
     OSError
         The file cannot be written.
     """
     check_type("fit", fit, Fit)
+    check_type("space", space, bool)
+    if space:
+        check_extras("plotly")
     check_type("parts", parts, Sequence)
     for part in parts:
         check_type("parts", part, SketchedPart)
-    write_file(Path(path), make_document(fit_document(fit, ReportOptions(source, command, nodes, parts))))
+    write_file(Path(path), make_document(fit_document(fit, ReportOptions(source, command, nodes, parts, space))))
     return Path(path)
 
 
@@ -167,7 +180,7 @@ def _model_sections(fit: Fit, options: ReportOptions) -> list[Section]:
     return [
         _summary(fit, compared, _as_headline(headline)),
         _doubts(fit),
-        Section("joint", "Channels", [*_drawn(fit, options.parts), _channels(fit)]),
+        Section("joint", "Channels", [*_drawn(fit, options), _channels(fit)]),
         Section(
             "stiffness",
             "Stiffness and compliance over frequency",
@@ -184,9 +197,14 @@ def _model_sections(fit: Fit, options: ReportOptions) -> list[Section]:
     ]
 
 
-def _drawn(fit: Fit, parts: Sequence[SketchedPart]) -> list[Part]:
-    sketch = assembly_sketch(parts, fit.responses, fit.forces) if parts else None
-    return [] if sketch is None else [sketch]
+def _drawn(fit: Fit, options: ReportOptions) -> list[Part]:
+    sketch = assembly_sketch(options.parts, fit.responses, fit.forces) if options.parts else None
+    return [] if sketch is None else [sketch, *_in_space(fit, options)]
+
+
+def _in_space(fit: Fit, options: ReportOptions) -> list[Part]:
+    view = space_of_fit(fit, options.parts) if options.space else None
+    return [] if view is None else [view]
 
 
 def _channels(fit: Fit) -> Table:
@@ -219,7 +237,7 @@ def _joint_sections(fit: Fit, data: FitData, options: ReportOptions) -> list[Sec
     return [
         _summary(fit, compared, _as_headline(headline)),
         _doubts(fit),
-        Section("joint", "The joint and its channels", _geometry(fit, data)),
+        Section("joint", "The joint and its channels", _geometry(fit, data, options)),
         Section(
             "stiffness",
             "Stiffness and compliance over frequency",
@@ -285,7 +303,7 @@ def _doubts(fit: Fit) -> Section:
     return Section("doubts", "Warnings and notes" if fit.warnings else "Notes", words_of_findings(fit.findings))
 
 
-def _geometry(fit: Fit, data: FitData) -> list[Part]:
+def _geometry(fit: Fit, data: FitData, options: ReportOptions) -> list[Part]:
     if data.interface is None:
         names = ", ".join(data.response_names)
         known = f"Responses {names}" + (
@@ -294,7 +312,7 @@ def _geometry(fit: Fit, data: FitData) -> list[Part]:
         return [Words([f"The positions of the channels are not known, so there is no sketch. {known}."])]
     points = interface_points(data.interface)
     sketch: Sketch = interface_sketch(data.interface, points, fit.dofs)
-    return [sketch, point_table(points)]
+    return [sketch, *_in_space(fit, options), point_table(points)]
 
 
 def _how_joint(fit: Fit) -> str:

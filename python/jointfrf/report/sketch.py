@@ -15,7 +15,16 @@ from jointfrf.kernel.arguments import FloatArray
 from jointfrf.report.document import Sketch
 from jointfrf.report.table import Cell, Table
 
-__all__ = ["InterfacePoint", "SketchedPart", "assembly_sketch", "interface_points", "interface_sketch", "point_table"]
+__all__ = [
+    "InterfacePoint",
+    "SketchedPart",
+    "assembly_sketch",
+    "interface_points",
+    "interface_sketch",
+    "moved_parts",
+    "point_table",
+    "rows_of_points",
+]
 
 #: Directions on the page, to the right and up, of x, y and z.
 _VIEW = np.array([[0.87, -0.32], [0.0, 0.95], [0.5, 0.42]]).T
@@ -71,7 +80,7 @@ def interface_points(interface: Interface) -> list[InterfacePoint]:
     numbers; three in a row that can be at one place, as those of a sensor of three axes, are one.
     """
     points = []
-    for name, own in _grouped(interface):
+    for name, own in rows_of_points(interface):
         motion = interface.motion[own]
         side = int(motion[0, 6:].any())
         motion = motion[:, 6 * side : 6 * side + 6]
@@ -94,7 +103,7 @@ def _place(motion: FloatArray) -> tuple[FloatArray, float]:
     return r, float(abs(crosses @ r - turned).max())
 
 
-def _grouped(interface: Interface) -> list[tuple[str, list[int]]]:
+def rows_of_points(interface: Interface) -> list[tuple[str, list[int]]]:
     """Return names of points, and the numbers of their channels."""
     if interface.channels:
         by_node: dict[int, list[int]] = {}
@@ -301,6 +310,19 @@ class SketchedPart(NamedTuple):
     joint: Sequence[str]
 
 
+def moved_parts(parts: Sequence[SketchedPart]) -> tuple[list[dict[str, FloatArray]], FloatArray] | None:
+    """Return places of nodes with all parts where they meet the first, and where that is, m; None if not known."""
+    ends = [[part.places[node] for node in part.joint if node in part.places] for part in parts]
+    if not all(ends):
+        return None
+    reference = np.mean(ends[0], axis=0)
+    moved = [
+        {node: at - np.mean(end, axis=0) + reference for node, at in part.places.items()}
+        for part, end in zip(parts, ends, strict=True)
+    ]
+    return moved, reference
+
+
 #: Nodes of a part that are drawn at most: more are a grey body.
 _MOST_NODES = 400
 
@@ -315,14 +337,10 @@ def assembly_sketch(parts: Sequence[SketchedPart], sensors: Sequence[str], hits:
     sensors, hits : sequence of str
         DOFs ``"A/7:y"``.
     """
-    ends = [[part.places[node] for node in part.joint if node in part.places] for part in parts]
-    if not all(ends):
+    placed = moved_parts(parts)
+    if placed is None:
         return None
-    reference = np.mean(ends[0], axis=0)
-    moved = [
-        {node: at - np.mean(end, axis=0) + reference for node, at in part.places.items()}
-        for part, end in zip(parts, ends, strict=True)
-    ]
+    moved, reference = placed
     every = np.array([at for own in moved for at in own.values()])
     view = _view_along(int(np.argmax(np.ptp(every, axis=0))))
     flat = every @ view.T

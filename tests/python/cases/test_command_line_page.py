@@ -2,18 +2,16 @@
 
 import re
 import shlex
-from pathlib import Path
 
 from command import run_command
+from documents import DOCUMENTS, ROOT
 from jointfrf.cli.configuration import with_configuration
 from jointfrf.cli.parser import COMMANDS, command_parser
 from jointfrf.io.channel_table import places_of_table, read_channel_table
 from jointfrf.toml.table import read_toml
 from option_tables import commands_with_a_table, filled
 
-ROOT = Path(__file__).resolve().parents[3]
-PAGE = (ROOT / "docs" / "command-line.md").read_text(encoding="utf-8")
-README = (ROOT / "README.md").read_text(encoding="utf-8")
+PAGE = DOCUMENTS["docs/command-line.md"]
 
 
 def test_every_command_has_its_table():
@@ -32,12 +30,15 @@ def test_a_page_that_is_old_is_seen():
 
 
 def commands_shown():
-    """Commands of all blocks of the page and of the README, as words."""
-    for page in (PAGE, README):
-        for block in re.findall(r"```(?:sh|text)\n(.*?)```", page, re.DOTALL):
+    """Commands of all blocks of all documents, fragments among them, as words."""
+    for page in DOCUMENTS.values():
+        for block in re.findall(r"```(?:sh|text|console)(?: fragment)?\n(.*?)```", page, re.DOTALL):
             for line in block.replace("\\\n", " ").splitlines():
-                words = shlex.split(line.removeprefix("$ "), comments=True)
-                if words[:1] == ["jointfrf"] and len(words) > 1 and words[1] in COMMANDS:
+                if not line.removeprefix("$ ").startswith("jointfrf "):
+                    continue
+                line = re.sub(r"\$\(\(.*?\)\)|\$\w+", "4", line.removeprefix("$ "))
+                words = shlex.split(line, comments=True)
+                if len(words) > 1 and words[1] in COMMANDS:
                     yield words[1 : words.index(">")] if ">" in words else words[1:]
 
 

@@ -1,12 +1,15 @@
 """README and docs are true: their Python runs, their commands give the output shown, and links lead somewhere."""
 
+import os
 import re
 import shlex
 import shutil
 import subprocess
 import sys
 import tomllib
+from pathlib import Path
 
+import numpy as np
 import pytest
 
 import jointfrf as jf
@@ -85,6 +88,113 @@ def test_the_page_on_planning_prints_what_it_shows(capsys, monkeypatch, tmp_path
         agree(capsys.readouterr().out, text)
 
 
+#: Blocks that are no fragments, which tests of their own run: how many of each language a page has.
+OWN_TESTS = {
+    ("README.md", "python"): 1,
+    ("docs/cases.md", "python"): 1,
+    ("docs/cases.md", "sh"): 1,
+    ("docs/cases.md", "toml"): 1,
+    ("docs/command-line.md", "toml"): 1,
+    ("docs/embedding.md", "fortran"): 2,
+    ("docs/engine.md", "python"): 1,
+    ("docs/files.md", "python"): 2,
+    ("docs/levels.md", "python"): 1,
+    ("docs/model-fit.md", "python"): 4,
+    ("docs/model-fit.md", "toml"): 2,
+    ("docs/planning.md", "python"): 2,
+    ("docs/python.md", "python"): 2,
+    ("docs/tutorial.md", "sh"): 4,
+    ("docs/tutorial.md", "toml"): 1,
+}
+#: Pages whose Python `test_python_that_shows_no_output_runs` runs, and numbers that make it short.
+SHORT = {
+    "docs/checks.md": {},
+    "docs/report.md": {},
+    "docs/studies.md": {"200, design": "2, design", "100_000_000": "2000"},
+}
+
+
+def test_every_block_runs_or_is_a_fragment():
+    """Commands of a shell are found by `SHELL`, whatever page they are on."""
+    for name, text in DOCUMENTS.items():
+        for language in set(re.findall(r"^```(\w+)", text, re.MULTILINE)) - {"text", "sh", "console"}:
+            wanted = OWN_TESTS.get((name, language), 0)
+            if not (language == "python" and name in SHORT):
+                assert len(blocks(language, text)) == wanted, f"{name}: a block of {language} that no test runs"
+    assert not set(SHORT) & {name for name, language in OWN_TESTS if language == "python"}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", SHORT)
+def test_python_that_shows_no_output_runs(name, monkeypatch, tmp_path, hammer):
+    monkeypatch.chdir(tmp_path)
+    np.memmap("gamma.bin", complex, "w+", shape=(2000, 4, 4))[:] = 2 * np.eye(4)[::-1] + np.eye(4)
+    named = {"__name__": "__main__", "jf": jf, **hammer}
+    for example in blocks("python", DOCUMENTS[name]):
+        for usual, short in SHORT[name].items():
+            example = example.replace(usual, short)
+        exec(example, named)
+    if name == "docs/checks.md":
+        assert named["check"].h.shape == hammer["h"].shape
+    elif name == "docs/report.md":
+        assert (tmp_path / "report.html").stat().st_size > 50_000
+        assert named["fit"].value == named["known"].value
+    else:
+        assert {path.name for path in (tmp_path / "studies").iterdir()} >= {"noise", "noise.parquet"}
+        np.testing.assert_allclose(named["k_joint"][1999], -np.linalg.inv(named["gamma"][1999])[:2, 2:])
+
+
+@pytest.fixture
+def hammer():
+    """What pages take as given: a measured file, its FRFs and channels."""
+    frfs = jf.io.read_frfs(ROOT / "cases/hammer-test/two_bars.uff").receptance()
+    sides = jf.interface([101, 102], [201, 202], ["y", "theta_z"], frfs.coordinates)
+    known = jf.identify(frfs.freq_hz, h := frfs.matrix(sides.channels, sides.channels), transform=sides)
+    return {
+        "frfs": frfs, "nodes_j": [101, 102], "nodes_k": [201, 202], "freq": frfs.freq_hz, "h": h, "sides": sides,
+        "names": [str(channel) for channel in sides.channels], "known": known, "dofs_a": [0, 1], "dofs_b": [0, 1],
+        "h_a": h[:, :2, :2], "h_b": h[:, 2:, 2:],
+    }  # fmt: skip
+
+
+def _shell_blocks():
+    """Blocks of commands with the page's folder; where prompts stand before commands what they print follows."""
+    for name, text in DOCUMENTS.items():
+        if (name, "sh") not in OWN_TESTS:
+            yield from ((name, block) for block in blocks("sh", text))
+    for name in ("docs/pools.md", "docs/command-line.md"):
+        for block in (*blocks("text", DOCUMENTS[name]), *blocks("console", DOCUMENTS[name])):
+            if block.startswith(("$ jointfrf pool", "$ jointfrf new")):
+                yield name, block
+
+
+SHELL = list(dict.fromkeys(_shell_blocks()))
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("name", "block"), SHELL, ids=[f"{name}-{i}" for i, (name, _) in enumerate(SHELL)])
+def test_commands_run_and_print_what_is_shown(name, block, tmp_path, monkeypatch):
+    for path in (ROOT / name).parent.iterdir() if name.startswith("cases/") else ():
+        (tmp_path / path.name).symlink_to(path)
+    (tmp_path / "cases").symlink_to(ROOT / "cases")
+    monkeypatch.chdir(tmp_path)
+    shown = block.startswith("$ ")
+    commands, _, expected = block.removeprefix("$ ").partition("\n") if shown else (block, "", "")
+    environment = os.environ | {"PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}"}
+    done = subprocess.run(["sh", "-ec", commands], capture_output=True, text=True, check=False, env=environment)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.strip()
+    if shown:
+        agree(done.stdout, expected)
+
+
+def test_joint_in_a_file_of_the_page_on_fits_with_models_is_read(tmp_path):
+    (content,) = [text for text in blocks("toml", DOCUMENTS["docs/model-fit.md"]) if text.startswith("[[law]]")]
+    (tmp_path / "mount.toml").write_text(content)
+    joint = jf.read_joint(tmp_path / "mount.toml")
+    assert (joint.dofs, joint.rigid) == (("y", "theta"), ("theta",))
+
+
 def test_assembly_of_the_page_on_fits_with_models_is_read():
     (content,) = [text for text in blocks("toml", DOCUMENTS["docs/model-fit.md"]) if "[A]" in text]
     keys = read_keys(TomlTable(tomllib.loads(content), "assembly.toml"), AssemblyKeys)
@@ -160,9 +270,9 @@ def test_the_readme_fits_a_reader():
 
 @pytest.mark.parametrize("name", DOCUMENTS)
 def test_lines_can_be_read_in_an_editor_and_compared(name):
-    """Rows of tables cannot be broken."""
-    lines = enumerate(DOCUMENTS[name].splitlines(), 1)
-    assert not [number for number, line in lines if len(line) > 160 and not line.startswith("|")]
+    """Rows of tables cannot be broken, nor what a command prints."""
+    lines = re.sub(r"```text\n.*?```", "", DOCUMENTS[name], flags=re.DOTALL).splitlines()
+    assert not [line for line in lines if len(line) > 120 and not line.startswith("|")]
 
 
 @pytest.mark.parametrize("name", DOCUMENTS)

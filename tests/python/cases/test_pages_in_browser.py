@@ -223,3 +223,55 @@ def inflated(paper: bytes) -> bytes:
         except zlib.error:
             continue
     return found
+
+
+@pytest.fixture(scope="module")
+def in_space(tmp_path_factory):
+    """A page with a view in space."""
+    pytest.importorskip("plotly")
+    frfs = jf.io.read_frfs(BARS).receptance()
+    sides = jf.interface([101, 102], [201, 202], ["y", "theta_z"], frfs.coordinates)
+    fit = jf.identify(frfs.freq_hz, frfs.matrix(sides.channels, sides.channels), transform=sides)
+    return jf.write_report(fit, tmp_path_factory.mktemp("space") / "fit.html", space=True)
+
+
+#: What a browser without a graphics card says of itself.
+_SLOW = re.compile("GPU stall|willReadFrequently|software WebGL")
+
+
+@pytest.mark.parametrize("width", [1100, 390])
+def test_a_view_in_space_moves_and_stays_in_the_page(browser, in_space, width):
+    opened = Opened(browser, in_space, width)
+    page = opened.page
+    if not page.evaluate("Boolean(document.createElement('canvas').getContext('webgl'))"):
+        pytest.skip("this browser draws nothing in space")
+    page.locator(".space").scroll_into_view_if_needed()
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    y = "() => [...document.querySelector('.plot3d').data[0].y]"
+    page.wait_for_function("() => document.querySelector('.plot3d').data")
+    first = page.evaluate(y)
+    page.wait_for_function(f"was => JSON.stringify(({y})()) !== was", arg=page.evaluate(f"JSON.stringify(({y})())"))
+    page.locator(".space .play").uncheck()
+    page.locator(".space .line").fill("3")
+    still = page.evaluate(y)
+    page.wait_for_timeout(300)
+    assert page.evaluate(y) == still != first
+    assert float(page.locator(".space .hz").inner_text().removesuffix(" Hz")) == page.evaluate(
+        "() => JSON.parse(document.querySelector('.space').dataset.content).freq[3]"
+    )
+    page.locator(".space .hit").select_option("2")
+    cone = page.evaluate("() => document.querySelector('.plot3d').data.find(t => t.type === 'cone').x")
+    assert cone[0] == pytest.approx(page.evaluate("() => document.querySelector('.plot3d').data[1].x")[0])
+    assert [text for text in opened.complaints if not _SLOW.search(text)] == []
+    assert all(url.startswith(("file:", "data:", "blob:")) for url in opened.requests)
+
+
+def test_without_webgl_the_sketch_is_there_and_nothing_complains(browser, in_space):
+    context = browser.new_context(viewport={"width": 1100, "height": 800})
+    context.add_init_script("HTMLCanvasElement.prototype.getContext = () => null")
+    page, complaints = context.new_page(), []
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    page.goto(in_space.as_uri())
+    assert page.locator("#sketch svg").is_visible()
+    assert not page.locator(".space .stage").is_visible()
+    assert complaints == []

@@ -16,6 +16,7 @@ README = DOCUMENTS["README.md"]
 
 
 def blocks(language: str, text: str = README) -> list[str]:
+    """Blocks of a language that run; those whose first line says that they are fragments are left out."""
     return re.findall(rf"```{language}\n(.*?)```", text, re.DOTALL)
 
 

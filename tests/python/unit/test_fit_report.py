@@ -1,5 +1,6 @@
 """The report of an identification: what it says and draws, and that what is thinned hides nothing."""
 
+import base64
 import json
 import re
 import warnings
@@ -9,6 +10,8 @@ import numpy as np
 import pytest
 
 import jointfrf as jf
+from documents import ROOT
+from jointfrf.assembly_file.measured import measured_assembly
 from jointfrf.dofs import DIRECTIONS, joint_parameters
 from jointfrf.identification.findings import note, warn
 from jointfrf.identification.fit_data import FitData
@@ -21,6 +24,7 @@ from jointfrf.report.fit import fit_figures
 from jointfrf.report.fit_frfs import compare_frfs
 from jointfrf.report.fit_page import ReportOptions, finding_sentences, fit_document, parameter_table, quality_sentences
 from jointfrf.report.sketch import _names, interface_points, interface_sketch, point_table
+from jointfrf.report.space import space_of_fit
 from jointfrf.report.table import written
 
 
@@ -463,3 +467,51 @@ def test_styles_differ_in_grey():
                 assert (
                     abs(one[0] - other[0]) > 25 or one[1] != other[1] or one[3] != other[3] or one[2] > 1.5 * other[2]
                 )
+
+
+def test_a_view_in_space_moves_points_as_their_frfs_say():
+    frfs = jf.io.read_frfs(ROOT / "cases/hammer-test/two_bars.uff").receptance()
+    sides = jf.interface([101, 102], [201, 202], ["y", "theta_z"], frfs.coordinates)
+    up = frfs.matrix(sides.channels, sides.channels)
+    order = np.random.default_rng(3).permutation(frfs.freq_hz.size)  # of the lines
+    with pytest.warns(jf.FrfCheckWarning, match="do not increase"):
+        fit = jf.identify(frfs.freq_hz[order], up[order], transform=sides)
+    view = space_of_fit(fit, ())
+    found = shapes_of(view.content)
+    lines = np.searchsorted(frfs.freq_hz, np.array(view.content["freq"]) - 1e-3)
+    assert np.all(np.diff(lines) > 0)
+    assert lines.size > 100
+    wanted = np.swapaxes(up[lines], 1, 2)  # every point has one channel, along y
+    size = abs(wanted).max(axis=2, keepdims=True)
+    strong = (abs(found[0]).max(axis=(2, 3)) > 126)[..., None]  # elsewhere the shape regenerated is the larger
+    assert strong.mean() > 0.3
+    # 1.75 of the scale, which the other shape may set, 0.75 of rounding both parts
+    np.testing.assert_allclose(np.where(strong, found[0, ..., 1] - 127 * wanted / size, 0), 0, atol=2.5)
+    assert not found[..., [0, 2]].any()
+    assert np.median(abs(found[1] - found[0])) < 3  # regenerated about as measured
+    assert abs(found).max() <= 127 * 1.01
+    assert [hit[1:] for hit in view.content["hits"]] == [[i, 0, 1, 0] for i in range(4)]
+    places = [1e3 * np.array(frfs.coordinates[int(name)]) for name in view.content["points"]]
+    np.testing.assert_allclose(view.content["at"], places, atol=1e-3)
+    assert 0 < view.content["peak"] < lines.size
+
+
+def shapes_of(content):
+    """Return shapes as the script of the page reads them: (source, line, force, point, 3), complex."""
+    size = (2, len(content["freq"]), len(content["hits"]), len(content["points"]), 3, 2)
+    parts = np.frombuffer(base64.b64decode(content["shapes"]), np.int8).reshape(size).astype(float)
+    return parts[..., 0] + 1j * parts[..., 1]
+
+
+def test_a_view_in_space_of_a_fit_with_models_has_both_parts(tmp_path):
+    frfs = jf.io.read_frfs(ROOT / "cases/lap-beam/level_1.uff").receptance()
+    measured = measured_assembly(ROOT / "cases/lap-beam/assembly.toml", frfs)
+    fit = measured.fit()
+    content = space_of_fit(fit, measured.sketched).content
+    assert content["points"] == ["A/1", "A/15", "B/9", "B/25"]
+    assert content["sides"] == [0, 0, 1, 1]
+    assert content["at"][3][0] > content["centres"][0][0] > content["at"][1][0] > content["at"][0][0]
+    assert content["hits"] == [["A/1:y", 0, 0, 1, 0]]
+    assert np.median(abs(np.diff(shapes_of(content), axis=0))) < 3
+    assert space_of_fit(fit, ()) is None
+    assert "newPlot" not in jf.write_report(fit, tmp_path / "report.html", parts=measured.sketched).read_text()
