@@ -1,51 +1,183 @@
 """
-Arrays and tables of other tools
-================================
+To and from pyFBS, SDynPy and MATLAB
+====================================
 
-FRFs as pyFBS and SDynPy hold them, tables of sensors and impacts as pyFBS reads them from a spreadsheet, and the way
-back. Nothing of these tools is needed here: arrays and columns are what goes to and fro.
+A test as pyFBS holds it, tables of sensors and impacts and an array of FRFs, goes into the fit channel by channel; the
+joint, virtual points and FRFs go back as the arrays that pyFBS, SDynPy and MATLAB hold. None of these needs to be
+installed: where pyFBS or SDynPy is, the last steps are done by it, too.
 """
 
+import importlib.util
+import tempfile
+from pathlib import Path
+
 import numpy as np
+import scipy.io
 
 import jointfrf as jf
 
 # %%
-# pyFBS and FRF matrices of sdypy have shape (lines, responses, forces): it is the shape of jointfrf, and nothing is
-# copied. An array of MATLAB or SDynPy has the lines last.
-rng = np.random.default_rng(1)
-lines_last = rng.standard_normal((6, 6, 200)) + 1j * rng.standard_normal((6, 6, 200))
-lines_first = np.moveaxis(lines_last, -1, 0)
-print(lines_first.shape)
+# What stands for the measurement: two free blocks, a joint in six DOFs, at each block three sensors of three axes and
+# nine hits. The tables have the columns that pyFBS reads from a spreadsheet; what
+# ``pandas.read_excel("test.xlsx", sheet_name="Channels_AB").to_dict("records")`` gives looks the same.
+freq = np.arange(20.0, 1200.0, 4.0)  # Hz
+dofs = ["x", "y", "z", "theta_x", "theta_y", "theta_z"]
+stiffness, damping = [2e7, 2e7, 3e7, 6e3, 8e3, 7e3], [90.0, 90.0, 120.0, 0.03, 0.04, 0.03]
+joint = jf.Joint(stiffness, damping, dofs)
+where = {1: [(-0.03, 0.02, 0.01), (-0.03, -0.02, 0.0), (-0.05, 0.0, 0.02)],
+         2: [(0.03, 0.02, -0.01), (0.04, -0.02, 0.0), (0.05, 0.01, 0.02)]}  # fmt: skip
+
+
+def table(letter):
+    """Rows of a table of channels or of impacts: three directions at each place of both sides."""
+    return [
+        {"Name": f"{letter}{3 * (side - 1) + i + 1}{axis}", "Quantity": "Acceleration", "Grouping": side,
+         **{f"Position_{a + 1}": float(x) for a, x in enumerate(place)},
+         **{f"Direction_{a + 1}": float(axis == "xyz"[a]) for a in range(3)}}
+        for side, places in where.items() for i, place in enumerate(places) for axis in "xyz"
+    ]  # fmt: skip
+
+
+df_chn, df_imp = table("S"), table("H")
+
+
+def vectors(rows, what):
+    """Three columns of a table as an array."""
+    return np.array([[row[f"{what}_{a}"] for a in (1, 2, 3)] for row in rows])
+
+
+blocks = [jf.rigid_body(m, [m / 900] * 3, {"joint": at}) for m, at in ((1.4, (0.04, 0, 0)), (0.9, (-0.04, 0.01, 0)))]
+h_a, h_b = (block.receptance(freq, block.ports(*(f"joint:{dof}" for dof in dofs))) for block in blocks)
+at_joint = jf.couple(h_a, h_b, joint.dynamic_stiffness(freq), range(6), range(6))
+side = np.array([row["Grouping"] for row in df_chn])
+arms = np.hstack([vectors(df_chn, "Direction"), np.cross(vectors(df_chn, "Position"), vectors(df_chn, "Direction"))])
+r = np.hstack([arms * (side == 1)[:, None], arms * (side == 2)[:, None]])  # rigid motion of every channel
+accelerance = -((2 * np.pi * freq) ** 2)[:, None, None] * (r @ at_joint @ r.T)
+y = jf.pollute(accelerance, 0.01, seed=1)  # (lines, responses, forces), as pyFBS has it
+print(y.shape, df_chn[0])
 
 # %%
-# A table of channels of pyFBS: a row each, position in metres, direction as a vector. The same columns of impacts.
-df_chn = {  # what `pandas.read_excel("test.xlsx", sheet_name="Channels_AB").to_dict("list")` gives
-    "Name": ["S1", "S1", "S1", "S2", "S2", "S2"],
-    "Position_1": [-0.02, -0.02, -0.02, 0.02, 0.02, 0.02],
-    "Position_2": [0.01, 0.01, 0.01, -0.01, -0.01, -0.01],
-    "Position_3": [0.0, 0.0, 0.0, 0.02, 0.02, 0.02],
-    "Direction_1": [1, 0, 0, 1, 0, 0],
-    "Direction_2": [0, 1, 0, 0, 1, 0],
-    "Direction_3": [0, 0, 1, 0, 0, 1],
-}
-positions = np.column_stack([df_chn[f"Position_{i}"] for i in (1, 2, 3)])
-directions = np.column_stack([df_chn[f"Direction_{i}"] for i in (1, 2, 3)])
+# From pyFBS
+# ----------
+# A row becomes a channel of a number and a direction, with its place, its unit vector, and its side of the joint. The
+# array needs no conversion; an array of SDynPy or MATLAB would be turned by ``numpy.moveaxis(h, -1, 0)`` before.
+
+
+def channels_of(rows, first):
+    """Channels of rows: nodes are counted from a number, so that sensors and hits keep apart."""
+    return tuple(jf.io.Channel(first + i // 3, "+" + row["Name"][-1]) for i, row in enumerate(rows))
+
+
+def places_of(rows, channels, role):
+    """Places of channels: what `jointfrf.io.read_channel_table` reads from a file."""
+    return [
+        jf.ChannelPlace(channel, "jk"[row["Grouping"] - 1], role, np.array(position), np.array(direction))
+        for channel, row, position, direction in zip(
+            channels, rows, vectors(rows, "Position"), vectors(rows, "Direction"), strict=True
+        )
+    ]
+
+
+sensors, hits = channels_of(df_chn, 101), channels_of(df_imp, 201)
+frfs = jf.io.FrfSet(freq, sensors, hits, y, "accelerance")
+places = places_of(df_chn, sensors, "response") + places_of(df_imp, hits, "excitation")
 
 # %%
-# The virtual point of one side: what pyFBS calls `VPT` with `Ru` and `Tu` is here the geometry of the point, and its
-# transform.
-point = jf.virtual_point(positions, directions, [0, 0, 0], ["x", "y", "z", "theta_x", "theta_y"])
-print(point.dofs, point.transform.shape)
+# Virtual points, FRFs of their channels, a look at them, the fit: all of the path in four lines.
+channels = jf.joint_channels(frfs, places, at=[0, 0, 0], dofs=dofs)
+gamma = channels.gamma(frfs.receptance())
+print(jf.check_frfs(freq, gamma, joint=channels).ok)
+fit = jf.identify(freq, gamma, transform=channels.transform)
+for name, true in zip((f"k_{dof}" for dof in dofs), stiffness, strict=True):
+    low, high = fit.confidence_interval(0.95)[name]
+    print(f"{name:10} {fit.value[name]:.4g}, 95 % {low:.4g} .. {high:.4g}, true {true:.4g}")
 
 # %%
-# Back: FRFs with names and coordinates as a file that all of them read. `write_frfs` takes the format from the suffix:
-# a Universal File for SDynPy and test systems, a `.mat` or `.npz` with named arrays for MATLAB and Python.
-channels = tuple(jf.io.Channel(1 + i // 3, "xyz"[i % 3]) for i in range(6))
-places = {1: tuple(positions[0]), 2: tuple(positions[3])}
-frfs = jf.io.FrfSet(np.arange(1.0, 201.0), channels, channels, lines_first, "accelerance", places)
-print(frfs.receptance().matrix(channels, channels).shape)
+# To pyFBS
+# --------
+# ``tu`` and ``tf`` of pyFBS are here the transforms of both sides, one for responses and one for forces. The FRFs of
+# the virtual points are an array of its shape, and the joint is the one that its decoupling gives line by line, without
+# the scatter of single lines.
+t_u, t_f = channels.responses.transform, channels.forces.transform
+y_vp = jf.transform(gamma, t_u, t_f)
+print(y_vp.shape, fit.k_joint(freq).shape)
+
+if importlib.util.find_spec("pyfbs"):
+    import pandas as pd
+    from pyfbs.interface.vpt import VPT
+
+    def virtual(words):
+        rows = [
+            {"Grouping": side, "Description": word, **{f"Position_{a}": 0.0 for a in (1, 2, 3)},
+             **{f"Direction_{a}": 0.0 for a in (1, 2, 3)}}
+            for side in (1, 2) for word in words.split()
+        ]  # fmt: skip
+        return pd.DataFrame(rows)
+
+    vpt = VPT(pd.DataFrame(df_chn), pd.DataFrame(df_imp), virtual("ux uy uz rx ry rz"), virtual("fx fy fz mx my mz"))
+    vpt.apply_vpt(freq, gamma)
+    print(f"differs from pyFBS by {abs(vpt.frf - y_vp).max() / abs(y_vp).max():.0e} of the largest")
+else:
+    print("pyFBS is not installed")
 
 # %%
-# In MATLAB: ``[m, n, l] = size(H)`` has the lines last, so ``permute(H, [3 1 2])`` before ``save``, or the same with
-# `numpy.moveaxis` after `scipy.io.loadmat`.
+# To and from SDynPy
+# ------------------
+# SDynPy holds coordinates as records of node and direction, 1 to 6 for x to theta_z, negative along -x, and FRFs with
+# the lines last. Both ways, by arrays only:
+number = {"x": 1, "y": 2, "z": 3, "theta_x": 4, "theta_y": 5, "theta_z": 6}
+word = {n: name for name, n in number.items()}
+
+
+def coordinates_of(channels):
+    """Records as a `CoordinateArray` has them."""
+    rows = [(one.node, (-1 if one.direction[0] == "-" else 1) * number[one.direction[1:]]) for one in channels]
+    return np.array(rows, dtype=[("node", "<u8"), ("direction", "i1")])
+
+
+def channels_of_records(records):
+    """Channels of such records."""
+    return tuple(
+        jf.io.Channel(int(node), ("-" if way < 0 else "+") + word[abs(int(way))]) for node, way in records.tolist()
+    )
+
+
+rows, columns = coordinates_of(frfs.responses), coordinates_of(frfs.excitations)
+ordinate = np.moveaxis(frfs.h, 0, -1)
+pairs = np.stack(np.broadcast_arrays(rows[:, None], columns[None, :]), axis=-1)
+print(ordinate.shape, pairs.shape, pairs[0, 0].tolist())
+
+if importlib.util.find_spec("sdynpy"):
+    import sdynpy as sdpy
+
+    held = sdpy.data_array(
+        sdpy.data.FunctionTypes.FREQUENCY_RESPONSE_FUNCTION, freq, ordinate,
+        sdpy.coordinate_array(pairs["node"], pairs["direction"]),
+    )  # fmt: skip
+    ordinate, pairs = held.ordinate, held.coordinate
+    print("held by SDynPy:", type(held).__name__, held.shape)
+else:
+    print("SDynPy is not installed")
+
+back = jf.io.FrfSet(
+    freq, channels_of_records(pairs[:, 0, 0]), channels_of_records(pairs[0, :, 1]), np.moveaxis(ordinate, -1, 0),
+    "accelerance",
+)  # fmt: skip
+print(back.responses == frfs.responses, back.excitations == frfs.excitations, np.array_equal(back.h, frfs.h))
+
+# %%
+# To and from MATLAB, and to any other program
+# --------------------------------------------
+# ``jf.io.write_frfs`` takes the format from the suffix: a Universal File for SDynPy and test systems, ``.npz``.
+# A ``.mat`` is written by scipy and read by `jf.io.read_frfs`, whatever its fields are called (``mapping=``); in MATLAB
+# lines are often last: ``permute(h, [3 1 2])`` before ``save``.
+with tempfile.TemporaryDirectory() as folder:
+    paths = [Path(folder) / f"test.{suffix}" for suffix in ("mat", "uff", "npz")]
+    names = {"responses": [str(one) for one in frfs.responses], "excitations": [str(one) for one in frfs.excitations]}
+    scipy.io.savemat(paths[0], {"freq_hz": freq, "h": frfs.h, "quantity": "accelerance", "unit": "m/s^2/N", **names})
+    for path in paths:
+        if path.suffix != ".mat":
+            jf.io.write_frfs(path, frfs)
+        again = jf.io.read_frfs(path)
+        error = abs(again.matrix(frfs.responses, frfs.excitations) - frfs.h).max() / abs(frfs.h).max()
+        print(path.suffix, again.quantity, again.h.shape, f"{error:.0e}")

@@ -22,7 +22,13 @@ def test_a_script_of_the_gallery_runs(script, monkeypatch, capsys):
     monkeypatch.setenv("MPLBACKEND", "Agg")
     monkeypatch.chdir(script.parent)
     runpy.run_path(str(script))
-    assert "nan" not in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert "nan" not in printed
+    if script.stem == "exchange":
+        assert "True True True" in printed  # there and back
+        found = re.findall(r"95 % (\S+) \.\. (\S+), true (\S+)", printed)
+        assert len(found) == 6
+        assert all(float(low) < float(true) < float(high) for low, high, true in found)
 
 
 def _numbers(text):
