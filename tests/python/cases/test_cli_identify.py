@@ -247,6 +247,21 @@ def test_files_are_set_ups_with_errors_of_their_own(two_setups, tmp_path):
     )
 
 
+def test_the_shipped_set_ups_hold_the_joint_with_the_gain_that_differs():
+    files = [BARS.with_name(f"{name}.uff") for name in ("monday", "tuesday")]
+    words = [*JOINT_OF_BARS, "--damping", "viscous", "--json"]
+    found, known = (
+        json.loads(run(*files, *words, *more).stdout)["fits"][0] for more in ((), ("--setup-gain", "0.015"))
+    )
+    named = {Path(one["about"][0]).stem: one["text"] for one in found["findings"] if one["text"].startswith("set-up ")}
+    # 2 % between them
+    assert "its gain is -0.99 % " in named["monday"]
+    assert "its gain is +0.99 % " in named["tuesday"]
+    for name, true in {"k_y": 1e7, "c_y": 200.0, "c_theta_z": 1.0, "k_theta_z": 5e3}.items():
+        narrow, wide = (one["parameters"][name]["confidence_interval_95"] for one in (known, found))
+        assert wide[0] < narrow[0] < true < narrow[1] < wide[1]
+
+
 @needs_data
 def test_vendor_files_give_a_sentence(capsys):
     for path in sorted((DATA / "uff").iterdir()):
