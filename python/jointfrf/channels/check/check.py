@@ -10,6 +10,7 @@ from typing import Literal, cast, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from jointfrf.channels.check.bent import bent_findings
 from jointfrf.channels.check.channel_ratios import (
     LEAST_GAIN,
     LEAST_PHASE,
@@ -185,6 +186,7 @@ def check_frfs(
             state.findings.extend(reference_findings(joint))
             unspoilt = _check_rigid_motion(state, joint, missing)
         _check_channels(state)
+        state.findings.extend(bent_findings(state.corrected(), state.bad_rows, state.bad_columns))
         if state.measurement.rows.size < 2:
             if joint is not None and unspoilt is not None:
                 state.findings.extend(_findings_at_channels(state, unspoilt, joint))

@@ -31,6 +31,7 @@ FindingKind = Literal[
     "place",
     "reciprocity",
     "passivity",
+    "bent",
 ]
 
 
@@ -42,7 +43,7 @@ class FrfFinding:
     ----------
     kind : str
         One of "lines", "missing", "zero-frequency", "reference", "dead", "doubled", "time-convention", "exchanged",
-        "quantity", "sign", "units", "gain", "delay", "direction", "place", "reciprocity", "passivity".
+        "quantity", "sign", "units", "gain", "delay", "direction", "place", "reciprocity", "passivity", "bent".
     level : {"error", "warning", "note"}
         A fit is meaningless; it is wrong by about the size found; for information.
     channels : tuple of str

@@ -1,0 +1,191 @@
+"""FRFs that are bent by amplitude: a resonance that moves with the motion it has."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from jointfrf.channels.check.finding import FrfFinding
+from jointfrf.channels.check.signals import Measurement
+from jointfrf.kernel.arguments import TINY, ComplexArray, FloatArray
+
+__all__ = ["bent_findings"]
+
+#: Powers of 1 / (f - z) of a pole alone, and of each of two, for further ones close by; powers of f, for all others.
+_ALONE, _TOGETHER, _POWERS = 3, 2, 4
+#: Lines on both sides of a peak at most; beyond the powers the fewest that show a residual.
+_REACH, _FEWEST = 60, 8
+#: A peak rises by this factor from the minima beside it; its lines are those above this share of it.
+_RISE, _SHARE = 3.0, 1 / 8
+#: Peaks and responses that are looked at for each force, the largest ones: more hardly add to what one mode shows.
+#: Fewer responses cannot agree.
+_PEAKS, _RESPONSES, _LEAST = 10, 8, 3
+#: Steps of the search for the pole, and relative change at which it is found.
+_STEPS, _FOUND = 15, 1e-6
+#: Chance, divided by the number of peaks, and shift in half bandwidths from which a resonance is called bent: less
+#: hardly changes the FRF, and other modes that the powers do not quite describe reach 0.1.
+_CHANCE, _SHIFT = 1e-4, 0.3
+#: Chance below which responses agree on the shift: noise that goes on over many lines is not common to all.
+_AGREE = 1e-3
+#: Lines whose residual is so many times the median are left out: of noise one in 10^15 is.
+_OUTLYING = 6.0
+
+
+class _Peak(NamedTuple):
+    """Chance of a linear structure; by how much its pole moves, Hz and half bandwidths; range of amplitude, e-fold."""
+
+    chance: float
+    hertz: complex
+    shift: complex
+    span: float
+
+
+def bent_findings(m: Measurement, rows: set[int], columns: set[int]) -> Iterator[FrfFinding]:
+    """Yield a finding for each force whose FRFs are bent, of channels that are not left out.
+
+    About a resonance the FRFs of a linear structure are c_p / (f - z), with one pole z for all responses, beside powers
+    of f and further ones of 1 / (f - z). A joint that depends on amplitude makes the pole z + g ln a, a the motion on
+    the line: ln a of a resonance is half of ln(f - z) + ln(f - z*), of which the second has its branch in the half
+    plane where no causal system has anything. So the residual is projected on c_p ln a / (f - z)^2, less what all
+    powers of each response explain of it, and the common g is tested: by F, and by the scatter of each line (HC3), as
+    noise may go with the FRF, both widened by the correlation from line to line. The largest chance counts, that beside
+    a second pole, too; and the responses must agree, by their scatter.
+    """
+    kept = [i for i in range(len(m.responses)) if i not in rows]
+    looked, found = 0, []
+    for column in (i for i in range(len(m.forces)) if i not in columns):
+        for line, peak in _peaks(m.freq_hz, m.h[:, kept, column]):
+            looked += 1
+            found.append((column, float(m.freq_hz[line]), peak))
+    bent = [one for one in found if one[2].chance * looked < _CHANCE and abs(one[2].shift) > _SHIFT]
+    for column in dict.fromkeys(one[0] for one in bent):
+        _, freq, worst = min((one for one in bent if one[0] == column), key=lambda one: one[2].chance)
+        others = sum(one[0] == column for one in bent) - 1
+        more = f", and {others} more resonance{'s' * (others > 1)}" if others else ""
+        name = f"force {m.forces[column]}"
+        yield FrfFinding(
+            "bent", "warning", (name,), float(abs(worst.shift)), _SHIFT,
+            f"FRFs of {name} are bent by amplitude: the resonance at {freq:.4g} Hz moves by {worst.hertz.real:+.2g} Hz "
+            f"while the motion grows {np.exp(worst.span):.2g} times (chance of a linear structure "
+            f"{worst.chance * looked:.1g}){more}",
+            "measure at a lower level or with the motion held, or leave these lines out; jointfrf levels finds "
+            "stiffness and damping over amplitude",
+        )  # fmt: skip
+
+
+def _peaks(freq_hz: FloatArray, h: ComplexArray) -> Iterator[tuple[int, _Peak]]:
+    """Yield the line of each peak of the FRFs of a force, shape (n_freq, n), and what was found there."""
+    usual = np.median(abs(h), axis=0)
+    h = h[:, usual > 0]
+    if h.shape[1] < _LEAST:
+        return
+    size = np.sqrt(np.mean((abs(h) / usual[usual > 0]) ** 2, axis=1))
+    inner = np.flatnonzero((size[1:-1] > size[:-2]) & (size[1:-1] >= size[2:])) + 1
+    for line in inner[np.argsort(-size[inner])][:_PEAKS].tolist():
+        first, last = _reach(size[line::-1]), _reach(size[line:])
+        own = slice(line - first, line + last + 1)
+        if min(first, last) < 2 or first + last + 1 < 2 * _TOGETHER + _POWERS + _FEWEST:
+            continue
+        there = h[own]
+        largest = np.argsort(-abs(there).max(axis=0) / np.maximum(np.median(abs(h), axis=0), TINY))[:_RESPONSES]
+        peak = _look(freq_hz[own], there[:, largest])
+        if peak is not None:
+            yield line, peak
+
+
+def _reach(size: FloatArray) -> int:
+    """Return how many lines beyond the first belong to its peak; 0 where it is none."""
+    lowest, reach = size[0], 0
+    for value in size[1 : _REACH + 1].tolist():
+        if value > size[0] or value > 2 * lowest or value < _SHARE * size[0]:
+            break
+        lowest, reach = min(lowest, value), reach + 1
+    return reach if lowest < size[0] / _RISE else 0
+
+
+def _basis(x: FloatArray, poles: ComplexArray, powers: int) -> ComplexArray:
+    """Return an orthonormal basis of powers of 1 / (x - z) of each pole, and of x, shape (n, n_powers)."""
+    columns = [(x - z) ** -k for z in poles for k in range(1, powers + 1)] + [x**k + 0j for k in range(_POWERS)]
+    own: ComplexArray = np.linalg.qr(np.stack([one / np.linalg.norm(one) for one in columns], axis=1))[0]
+    return own
+
+
+def _look(freq_hz: FloatArray, h: ComplexArray) -> _Peak | None:
+    """Test one resonance: lines, and FRFs of shape (n_freq, n); None where its pole is not found."""
+    half = (freq_hz[-1] - freq_hz[0]) / 2
+    x = (freq_hz - freq_hz[0]) / half - 1
+    h = h / abs(h).max(axis=0)
+    size = np.linalg.norm(h, axis=1)
+    width = max(float(np.ptp(x[size > size.max() / np.sqrt(2)])) / 2, float(x[1] - x[0]))
+    alone = _poles(x, h, np.array([x[np.argmax(size)] + 1j * width]))
+    if alone is None:
+        return None
+    one, left = _moved(x, h, *alone, _ALONE)
+    size = np.linalg.norm(left, axis=1)
+    usual = size < _OUTLYING * np.median(size)
+    if not usual.all():  # hum
+        x, h = x[usual], h[usual]
+        one, left = _moved(x, h, *alone, _ALONE)
+    if one.chance < _CHANCE and abs(one.shift) > _SHIFT:
+        # Two resonances, so close that there is one peak, look bent to a single pole.
+        second = x[np.argmax(np.linalg.norm(left, axis=1))] + 1j * alone[0][0].imag
+        both = _poles(x, h, np.array([alone[0][0], second]))
+        if both is not None:
+            one = one._replace(chance=max(one.chance, _moved(x, h, *both, _TOGETHER)[0].chance))
+    return one._replace(hertz=one.hertz * half)
+
+
+def _moved(
+    x: FloatArray, h: ComplexArray, poles: ComplexArray, residues: ComplexArray, powers: int
+) -> tuple[_Peak, ComplexArray]:
+    """Return by how much the first pole moves with the motion, in units of x, and what is left of h without that."""
+    q: ComplexArray = _basis(x, poles, powers)
+    fitted = q @ (q.conj().T @ h)
+    left = h - fitted
+    log = np.log(np.maximum(np.linalg.norm(fitted, axis=1), TINY))
+    log -= log.max()
+    g = residues[0] * (log / (x - poles[0]) ** 2)[:, None]
+    g -= q @ (q.conj().T @ g)
+    information = max(float(np.vdot(g, g).real), TINY)
+    slope = complex(np.vdot(g, left)) / information
+    rest = left - slope * g
+    squares = max(float(np.vdot(rest, rest).real), TINY)
+    correlation = float(np.vdot(rest[:-1], rest[1:]).real) / squares
+    wider = max((1 + correlation) / max(1 - correlation, TINY), 1.0)
+    degrees = max((h.shape[1] * (len(x) - q.shape[1]) - 1) / wider, 1.0)
+    chances = [_tail(abs(slope) ** 2 * information / squares * degrees, degrees)]
+    known = np.maximum(1 - np.sum(abs(q) ** 2, axis=1), 1 / len(x))[:, None]
+    scatter = max(float(np.sum(abs(g * rest / known) ** 2)), TINY)
+    chances.append(_tail(abs(slope * information) ** 2 / scatter / wider, degrees))
+    scatter = max(float(np.sum(abs(np.sum(g.conj() * rest, axis=0)) ** 2)), TINY)
+    agree = _tail(abs(slope * information) ** 2 / scatter, h.shape[1] - 1)
+    span = float(-log.min())
+    return _Peak(max(chances) if agree < _AGREE else 1.0, slope * span, slope * span / poles[0].imag, span), left
+
+
+def _tail(value: float, degrees: float) -> float:
+    """Return the upper tail of F of 2 and twice these degrees."""
+    return float((1 + value / degrees) ** -degrees)
+
+
+def _poles(x: FloatArray, h: ComplexArray, poles: ComplexArray) -> tuple[ComplexArray, ComplexArray] | None:
+    """Return poles that all FRFs share, beside a parabola of each, and residues (n_poles, n), by Gauss and Newton."""
+    n = len(poles)
+    residues: ComplexArray = np.zeros((n, h.shape[1]), np.complex128)
+    for _ in range(_STEPS):
+        own = np.stack([*(1 / (x - z) for z in poles), *(x**k + 0j for k in range(3))], axis=1)
+        q, r = np.linalg.qr(own)
+        if not abs(np.diagonal(r)).min() > TINY:
+            return None
+        inside = q.conj().T @ h
+        residues = np.asarray(np.linalg.solve(r, inside)[:n], np.complex128)
+        slopes = residues[:, None, :] / (x[None, :, None] - poles[:, None, None]) ** 2
+        own_slopes = (slopes - np.einsum("il,klp->kip", q @ q.conj().T, slopes)).reshape(n, -1)
+        step = np.linalg.lstsq(own_slopes.T, (h - q @ inside).ravel(), rcond=1e-10)[0]
+        step *= min(1.0, 0.5 * float(np.min(poles.imag / np.maximum(abs(step), TINY))))
+        poles = poles + step
+        if abs(step).max() < _FOUND:
+            break
+    return (poles, residues) if (poles.imag > 0).all() and abs(poles[0].real) < 1 else None
